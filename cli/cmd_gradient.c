@@ -20,6 +20,8 @@
 
 static const char *adjoint_path, *textures, *spectra;
 static double until;
+static int allocation;
+static const char *const allocation_words[] = {"variance", "even", NULL};
 static const struct arg_option options[] = {
     {ARG_TEXT, 0, "adjoint", "FILE",
      "derivative of sum(FILE * picture), in place of a loss", &adjoint_path, 0, 0, NULL},
@@ -32,6 +34,10 @@ static const struct arg_option options[] = {
      "of "
      "100 cases",
      &until, 1e-6, 10, NULL},
+    {ARG_CHOICE, 0, "allocation", "HOW",
+     "with --until, of samples to tiles of a target: variance (default; by the "
+     "gradient's), or even",
+     &allocation, 0, 0, allocation_words},
     {0}};
 
 struct result {
@@ -147,7 +153,8 @@ static int estimate_for(imp_problem *problem, struct imp_run run, const float *s
 static enum imp_status estimate_until(imp_problem *problem, struct imp_run run,
                                       const float *seed, struct result *r)
 {
-    const struct imp_until_options options = until_options(until, &run);
+    struct imp_until_options options = until_options(until, &run);
+    if (allocation) options.allocation = IMP_ALLOCATION_EVEN;
     const enum imp_status st = imp_problem_until(problem, seed, &run, &options, &r->value,
                                                  r->grad, r->se, &r->end);
     if (r->end.spp > 0) r->spp = r->spp_taken = (int)r->end.spp;

@@ -4,6 +4,8 @@
 static const char *const optimizer_words[] = {"adam", "lm",    "lbfgs",
                                               "mma",  "slsqp", NULL};
 
+static const char *const allocation_words[] = {"variance", "even", NULL};
+
 static const char *const missing_words[] = {"auto", "always", "never", NULL};
 
 static const char *const variate_words[] = {"auto", "on", "off", NULL};
@@ -21,6 +23,9 @@ const struct arg_option options_search[] = {
     {ARG_INT, 0, "levels", "N",
      "of adam, and of bent rays: from coarse to fine, in N levels", &fit_choice.levels, 1,
      16, NULL},
+    {ARG_CHOICE, 0, "allocation", "HOW",
+     "of adam's samples to tiles: variance (default; by the gradient's), or even",
+     &fit_choice.allocation, 0, 0, allocation_words},
     {ARG_NUMBER, 0, "tolerance", "T",
      "stop when relative steps stay below (default 1e-4)", &fit_choice.tolerance, 1e-15,
      1, NULL},
@@ -58,6 +63,7 @@ struct imp_fit_options fit_choice_options(void)
     static const enum imp_variates variates[] = {IMP_VARIATES_AUTO, IMP_VARIATES_ON,
                                                  IMP_VARIATES_OFF};
     fit.control_variate = variates[fit_choice.variate];
+    fit.allocation = fit_choice.allocation ? IMP_ALLOCATION_EVEN : IMP_ALLOCATION_DEFAULT;
     fit.intervals = !fit_choice.no_intervals;
     return fit;
 }

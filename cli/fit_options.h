@@ -7,7 +7,7 @@
 #include "command.h"
 
 struct fit_choice {
-    int optimizer, iterations, no_intervals, levels, missing, variate;
+    int optimizer, iterations, no_intervals, levels, missing, variate, allocation;
     double learning_rate, tolerance;
     double memory; /* MB; < 0: not given */
 };

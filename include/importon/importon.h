@@ -992,6 +992,16 @@ enum imp_variates {
     IMP_VARIATES_OFF
 };
 
+/** How the samples of a search are divided among the tiles (8 x 8 pixels) of its targets. */
+enum imp_allocation {
+    IMP_ALLOCATION_DEFAULT = 0, /**< by variance, where that can be */
+    IMP_ALLOCATION_EVEN,        /**< every pixel has the same */
+    /** By the root of what a tile adds to the variance of the gradient, over what its samples
+     * cost, as the iterations before have seen it: between 1/4 and 16 times the samples asked
+     * for, at their cost. */
+    IMP_ALLOCATION_VARIANCE
+};
+
 struct imp_fit_options {
     size_t size;
     enum imp_optimizer optimizer;
@@ -1014,11 +1024,14 @@ struct imp_fit_options {
      * walks. */
     double memory;
     enum imp_variates control_variate;
+    /** Of IMP_ADAM, quadratic losses, box filters and walks from the sensor; others have the
+     * same samples everywhere. */
+    enum imp_allocation allocation;
 };
 #define IMP_FIT_OPTIONS_INIT                                                             \
     {                                                                                    \
         sizeof(struct imp_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,          \
-            IMP_VARIATES_AUTO                                                            \
+            IMP_VARIATES_AUTO, IMP_ALLOCATION_DEFAULT                                    \
     }
 
 struct imp_fit_variable {

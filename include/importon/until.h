@@ -24,10 +24,13 @@ struct imp_until_options {
     double relative; /**< the wanted error, as a part of the answer; 0: .05 */
     double risk;     /**< probability, at most, that it is missed, below 1; 0: .05 */
     int most_spp;    /**< samples per pixel, at most; 0: 65536 */
+    /** Of gradients of a loss, from the third look on: by the variance of the parameters
+     * that are known least. */
+    enum imp_allocation allocation;
 };
 #define IMP_UNTIL_OPTIONS_INIT                                                           \
     {                                                                                    \
-        sizeof(struct imp_until_options), 0, 0, 0                                        \
+        sizeof(struct imp_until_options), 0, 0, 0, IMP_ALLOCATION_DEFAULT                \
     }
 
 /** How a sequence ended. */

@@ -215,7 +215,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         stay: Optional[Mapping[str, float]] = None, smooth: Optional[Mapping[str, float]] = None,
         same: Any = None, factor: Any = None, log: Any = None, time_limit: float = 0, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
         wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", levels: int = 0, memory: float = 0,
-        control_variate: str = "auto", progress: Any = None) -> Fit:
+        control_variate: str = "auto", allocation: str = "default", progress: Any = None) -> Fit:
     """Fit parameters to target pictures; the scene ends at the best estimate.
 
     Parameters
@@ -236,6 +236,10 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
     levels : int
         Of adam: fit textures and volumes from coarse to fine, first with one number for
         2^(levels - 1) cells along each axis; 0: as they are.
+    allocation : str
+        Of adam's samples to tiles of 8 x 8 pixels: "variance" gives them where the gradient's
+        variance comes from, at the same cost; "even": all pixels have the same; "default":
+        "variance" where that can be.
     memory : float
         Bytes for the walks that lbfgs, mma and slsqp keep, since they evaluate one draw;
         0: 2^30; negative: walks are traced each time. `Fit.walks` says what was kept.
@@ -297,7 +301,8 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
                       max_iterations=integer(max_iterations, "max_iterations"), learning_rate=float(learning_rate),
                       tolerance=float(tolerance), intervals=bool(intervals), checkpoint=path, resume=bool(resume),
                       levels=integer(levels, "levels"), memory=float(memory),
-                      control_variate=choice("imp_variates", control_variate, "control_variate"))
+                      control_variate=choice("imp_variates", control_variate, "control_variate"),
+                      allocation=choice("imp_allocation", allocation, "allocation"))
         out, start = ctypes.c_void_p(), p.x()
         status, message = run(p.context, options, progress, lib.imp_fit, p.pointer, ctypes.byref(wanted),
                               ctypes.byref(options), ctypes.byref(out))

@@ -88,6 +88,7 @@ static enum imp_status targets_estimate(struct imp_problem *p, const struct imp_
     const double start = imp__now(), n = (double)p->n_targets;
     enum imp_status st = IMP_OK;
     if (p->variate) imp__variate_begin(p->variate);
+    if (p->allocation) p->allocation->next = 0;
     for (size_t t = 0; t < p->n_targets; t++) {
         const int parts = imp__target_parts(&p->targets[t]);
         for (int k = 0; k < parts && st == IMP_OK; k++)

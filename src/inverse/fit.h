@@ -4,6 +4,7 @@
 #ifndef IMP_INVERSE_FIT_H
 #define IMP_INVERSE_FIT_H
 
+#include "allocation.h"
 #include "problem.h"
 #include "search/checkpoint.h"
 
@@ -29,6 +30,9 @@ struct imp__fit {
     int final_calls, final_total; /* evaluations after the search; total 0: not there */
     int first_iteration;          /* of this call; not 0 where the fit was continued */
     bool stopped;                 /* by the caller or the deadline */
+
+    struct imp__allocation allocation; /* of the search's samples; n 0: all alike */
+    const struct imp__metric *metric;  /* of the next evaluation's variance; or NULL */
 
     /* Of searches with common random numbers (fit_kept.c): walks that are evaluated. */
     imp_walks *walks; /* NULL: none are */

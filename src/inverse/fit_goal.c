@@ -82,6 +82,7 @@ static enum imp_status iterated(const struct imp__search *s, void *payload)
 {
     struct imp__fit *f = payload;
     const double now = imp__now();
+    if (f->allocation.n > 0) imp__allocation_update(&f->allocation);
     snprintf(f->note, sizeof f->note, "loss %.3g +- %.1g", s->history[s->n_history - 1],
              s->history_se[s->n_history - 1]);
     if (f->options.checkpoint &&
@@ -115,13 +116,24 @@ static enum imp_status eval(const double *x, uint64_t seed, struct imp_estimate 
     fit->run.seed = seed;
     fit->final_calls++;
     enum imp_status st = imp__fit_take_walks(fit, x, seed);
+    /* What comes after the search is of samples that are alike. */
+    if (fit->allocation.n > 0 && fit->searching)
+        fit->problem->allocation = &fit->allocation;
+    fit->allocation.metric = fit->metric;
+    fit->metric = NULL;
     fit->problem->variate = fit->searching && g ? fit->variate : NULL;
     if (st == IMP_OK)
         st = imp__problem_objective(fit->problem, x, &fit->run, true, f, g, g_se);
     fit->problem->variate = NULL;
+    fit->problem->allocation = NULL;
     fit->run.walks = NULL;
     if (st == IMP_CANCELLED) fit->stopped = true; /* by this rank or another */
     return st;
+}
+
+static void measure(const struct imp__metric *metric, void *payload)
+{
+    ((struct imp__fit *)payload)->metric = metric;
 }
 
 static enum imp_status normal(const double *x, uint64_t seed, int rounds,
@@ -182,6 +194,13 @@ static void coarsen(bool fewer, void *payload)
     f->run.spp = fewer ? coarse_spp(f) : f->outer.spp;
 }
 
+/* Do tiles get samples by their share of the variance? Control variates have equal ones. */
+static bool allocates(const struct imp__fit *f)
+{
+    return f->options.optimizer == IMP_ADAM && !f->variate &&
+           f->options.allocation != IMP_ALLOCATION_EVEN;
+}
+
 /* ---- What the fit belongs to --------------------------------------------------- */
 
 /* With an active number, the index of a medium differs from start to start. */
@@ -235,6 +254,10 @@ static void fingerprint(struct imp__fit *f)
     if (f->options.optimizer == IMP_LM) {
         const int version[2] = {PAIRS_VERSION, coarse_spp(f)};
         h->options = imp__hash(h->options, version, sizeof version);
+    }
+    if (f->allocation.n > 0) {
+        const uint64_t numbers = imp__allocation_numbers(&f->allocation);
+        h->options = imp__hash(h->options, &numbers, sizeof numbers);
     }
     if (imp__fit_keeps(f))
         h->options = imp__hash(h->options, &f->options.memory, sizeof f->options.memory);
@@ -320,6 +343,9 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
             "max_iterations %d, learning_rate %g (0 to 1), tolerance %g: out of "
             "range",
             f.options.max_iterations, f.options.learning_rate, f.options.tolerance);
+    if ((unsigned)f.options.allocation > IMP_ALLOCATION_VARIANCE)
+        return imp__error(ctx, IMP_E_ARG, "allocation %d does not exist",
+                          (int)f.options.allocation);
     if (!isfinite(f.options.memory))
         return imp__error(ctx, IMP_E_ARG, "options: memory %g", f.options.memory);
     IMP_CHECKED(imp__fit_levels_allowed(p, &f.options));
@@ -349,6 +375,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
     f.run = f.outer;
     f.run.time_limit_s = 0;
     IMP_TRY(imp__fit_variates(&f));
+    if (allocates(&f)) IMP_TRY(imp__allocation_create(p, &f.run, &f.allocation));
     if (f.options.checkpoint) fingerprint(&f);
     *out = f;
     /* Pointers to the fit itself: it does not move any more. */
@@ -366,6 +393,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
                                    .normal = n <= IMP_DENSE_MAX ? normal : NULL,
                                    .iterated = iterated,
                                    .payload = out};
+    if (out->allocation.n > 0) out->goal.measure = measure;
     if (coarse_spp(out) < imp__fit_spp(out)) out->goal.coarsen = coarsen;
     if (imp__fit_keeps(out)) {
         out->goal.draw = imp__fit_draw;
@@ -382,6 +410,7 @@ void imp__fit_end(struct imp__fit *f)
     if (!f->problem) return;
     imp__walks_destroy(f->walks);
     imp__variate_destroy(f->variate);
+    imp__allocation_destroy(&f->allocation);
     imp__release(f->problem->ctx, f->lo);
     imp__release(f->problem->ctx, f->spans);
     imp__release(f->problem->ctx, f->H_prior);

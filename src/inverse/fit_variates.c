@@ -42,9 +42,13 @@ enum imp_status imp__fit_variates(struct imp__fit *f)
     return IMP_OK;
 }
 
-/* Room for the variate's numbers in a search that is written or read. */
+/* The variate's numbers, or those of the allocation, in a search that is written or read. */
 static enum imp_status state_begin(const struct imp__fit *f, struct imp__search *s)
 {
+    if (!f->variate && f->allocation.n > 0) {
+        s->n_goal = imp__allocation_numbers(&f->allocation);
+        s->goal_numbers = f->allocation.state;
+    }
     if (!f->variate) return IMP_OK;
     s->n_goal = imp__variate_numbers(f->variate, f->problem);
     s->goal_numbers = imp__alloc_raw(f->problem->ctx, s->n_goal, sizeof *s->goal_numbers);
@@ -55,7 +59,7 @@ static enum imp_status state_begin(const struct imp__fit *f, struct imp__search 
 
 static void state_end(const struct imp__fit *f, struct imp__search *s)
 {
-    imp__release(f->problem->ctx, s->goal_numbers);
+    if (f->variate) imp__release(f->problem->ctx, s->goal_numbers);
     s->goal_numbers = NULL;
     s->n_goal = 0;
 }

@@ -27,14 +27,15 @@ static imp_spec walk_there(const struct imp__gradient_job *j, size_t pixel,
 
 /* Replicate b of a pixel, in work item `part`: trace, fold, adjoints, sweep. Returns its
  * loss estimate. */
-static double replicate(struct imp__gradient_job *j, struct imp_tile_worker *w, int x,
-                        int y, int b, int part, double *moments)
+static double replicate(struct imp__gradient_job *j, struct imp__replicates plan,
+                        struct imp_tile_worker *w, int x, int y, int b, int part,
+                        double *moments)
 {
     if (imp_unlikely(j->light != NULL)) {
         imp__light_replicate(j, w, x, y, b);
         return 0;
     }
-    const int n = j->plan.n, m = j->plan.m;
+    const int n = plan.n, m = plan.m;
     struct imp_tally *tally = &j->tallies[w->index];
     const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
     struct imp_walk *walks = imp__arena_take(&w->arena, (size_t)n, sizeof *walks);
@@ -51,16 +52,17 @@ static double replicate(struct imp__gradient_job *j, struct imp_tile_worker *w, 
     const bool keep = j->target && !j->splat; /* the others' mean is needed first */
     const size_t pixel = (size_t)y * (size_t)j->width + (size_t)x;
     for (int s = 0; s < m; s++) {
-        const int first = imp__replicates_set(j->plan, s);
-        const int end = imp__replicates_set(j->plan, s + 1);
+        const int first = imp__replicates_set(plan, s);
+        const int end = imp__replicates_set(plan, s + 1);
         L[s] = H[s] = (imp_spec){0};
         for (int i = first; i < end; i++) {
             const struct imp_arena_mark one = imp__arena_mark(&w->arena);
-            const int64_t sample = imp__replicates_first(j->plan, b, s) + i - first;
+            const int64_t sample = imp__replicates_first(plan, b, s) + i - first;
             imp__walk_trace(&j->tracer, &w->arena, x, y, sample, &walks[i]);
             imp__tile_drop(w, walks[i].dropped, x, y, sample);
             L[s] += walks[i].L;
             if (imp_unlikely(j->variate != NULL)) H[s] += walk_there(j, pixel, &walks[i]);
+            tally->rays += imp_max(2 * walks[i].n - 1, 1);
             if (keep) continue;
             if (j->splat)
                 P[0] = imp__splat_adjoint(j->splat, b, s, walks[i].px, walks[i].py,
@@ -80,13 +82,13 @@ static double replicate(struct imp__gradient_job *j, struct imp_tile_worker *w, 
     if (keep) {
         value = imp__replicate_adjoints(j->target, j->channels, pixel, m, L, P);
         if (j->variate) {
-            imp__variate_replicate(j->variate, j->target, j->plan, part, pixel, L, H,
+            imp__variate_replicate(j->variate, j->target, plan, part, pixel, L, H,
                                    j->look ? NULL : moments);
             (void)imp__replicate_adjoints(j->target, j->channels, pixel, m, L, P);
         }
         for (int s = 0; j->want_gradient && s < m; s++) {
-            const int first = imp__replicates_set(j->plan, s);
-            const int end = imp__replicates_set(j->plan, s + 1);
+            const int first = imp__replicates_set(plan, s);
+            const int end = imp__replicates_set(plan, s + 1);
             if (end - first > 1) P[s] /= imp__spec(end - first);
             for (int i = first; i < end; i++)
                 imp__walk_sweep(&j->tracer, &walks[i], P[s], &tally->sink);
@@ -111,6 +113,15 @@ static size_t moment_numbers(const struct imp__gradient_job *j)
     return j->variate ? IMP_VARIATE_MOMENTS : 0;
 }
 
+/* The samples of a tile: those of all, or its own. */
+static struct imp__replicates plan_of(const struct imp__gradient_job *j, size_t tile)
+{
+    if (!j->allocation) return j->plan;
+    struct imp_run own = *j->run;
+    own.spp = j->allocation->spp[j->first_tile + tile];
+    return imp__replicates_of(j->problem->scene, j->target, &own);
+}
+
 /* Does a pixel have a part in the loss? One of weight 0 has no walks. */
 static bool counts(const struct imp__gradient_job *j, int x, int y)
 {
@@ -123,6 +134,7 @@ static void tally_empty(const struct imp__gradient_job *j, struct imp_tally *t,
                         double by_variance)
 {
     if (imp_likely(!imp__tally_full(t))) return;
+    imp__tally_measure(t);
     imp__tally_flush(t, by_variance, j->overlap.gradient, j->mean, j->spread);
     imp__tally_clear(t);
 }
@@ -133,11 +145,13 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
     struct imp__gradient_job *j = payload;
     struct part *out = result;
     struct imp_tally *tally = &j->tallies[w->index];
-    const int b0 = imp__replicates_begin(j->plan, (int)t->part);
-    const int b1 = imp__replicates_begin(j->plan, (int)t->part + 1);
-    const double R = b1 - b0, all = j->plan.R;
-    const bool paired = j->plan.R == 1; /* spread from pairs of pixels instead */
-    const double by_variance = paired ? 0 : R / ((R - 1) * all * all);
+    const struct imp__replicates plan = plan_of(j, t->index);
+    const bool none = t->part >= (size_t)plan.chunks; /* other tiles have more parts */
+    const int b0 = none ? plan.R : imp__replicates_begin(plan, (int)t->part);
+    const int b1 = none ? plan.R : imp__replicates_begin(plan, (int)t->part + 1);
+    const double R = b1 - b0, all = plan.R;
+    const bool paired = plan.R == 1; /* spread from pairs of pixels instead */
+    const double by_variance = paired || none ? 0 : R / ((R - 1) * all * all);
     double first = 0;
     int in_pair = 0;
 
@@ -145,12 +159,13 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
     double *moments = out->dense + dense_numbers(j);
     memset(moments, 0, moment_numbers(j) * sizeof *moments);
     imp__tally_clear(tally);
-    for (int y = t->y0; y < t->y1; y++)
+    tally->measured = tally->rays = 0;
+    for (int y = t->y0; y < t->y1 && !none; y++)
         for (int x = t->x0; x < t->x1; x++) {
             double sum = 0, square = 0;
             if (!counts(j, x, y)) continue;
             for (int b = b0; b < b1; b++) {
-                const double v = replicate(j, w, x, y, b, (int)t->part, moments);
+                const double v = replicate(j, plan, w, x, y, b, (int)t->part, moments);
                 sum += v;
                 square += v * v;
             }
@@ -179,6 +194,10 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
         imp__tally_pixel(tally, 2, 1, 2);
         out->variance += imp__sqr(first);
     }
+    imp__tally_measure(tally);
+    if (tally->metric && !j->look)
+        imp__allocation_see(j->allocation, j->first_tile + t->index, t->part,
+                            (double[]){tally->measured, out->variance, tally->rays});
     if (tally->dense) {
         if (j->shared) imp__tally_tile(tally, by_variance);
         memcpy(out->dense, imp__tally_dense(tally),
@@ -228,7 +247,7 @@ static enum imp_status tile_take(size_t group, const void *sum, void *payload)
 
 static double terms_most(const struct imp__gradient_job *j)
 {
-    return (double)imp__tiles_count(&j->tiles) * j->plan.chunks *
+    return (double)imp__tiles_count(&j->tiles) * (double)j->parts *
            (double)j->problem->n_targets;
 }
 
@@ -297,6 +316,23 @@ static void job_destroy(struct imp__gradient_job *j)
     if (j->tiles.ctx) imp__tiles_destroy(&j->tiles);
 }
 
+/* The tiles of this job in the allocation: sets parts, returns the walks of all. */
+static double allocation_take(struct imp__gradient_job *j)
+{
+    const struct imp_tiles *t = &j->tiles;
+    double walks = 0;
+    j->first_tile = imp__allocation_take(j->allocation, imp__tiles_count(t));
+    for (size_t k = 0; k < imp__tiles_count(t); k++) {
+        const struct imp__replicates r = plan_of(j, k);
+        const int x0 = (int)(k % (size_t)t->across) * t->side,
+                  y0 = (int)(k / (size_t)t->across) * t->side;
+        walks += (double)imp_min(t->side, t->width - x0) *
+                 imp_min(t->side, t->height - y0) * r.n * r.R;
+        j->parts = imp_max(j->parts, (size_t)r.chunks);
+    }
+    return walks;
+}
+
 enum imp_status imp__gradient_job_run(struct imp__gradient_job *j,
                                       const struct imp_run *run, const char *stage,
                                       double lo, double hi, double start_s)
@@ -308,12 +344,18 @@ enum imp_status imp__gradient_job_run(struct imp__gradient_job *j,
     j->channels = j->problem->scene->channels;
     const int margin = j->splat && film->sample_border ? imp__film_border(film) : 0;
     j->shared = j->splat != NULL;
+    j->allocation =
+        j->target && !j->splat && imp__allocation_allowed(j->target, &j->tracer)
+            ? j->problem->allocation
+            : NULL;
+    const bool measures = j->want_gradient && j->allocation && j->allocation->metric;
     if (j->shared) j->overlap = imp__overlap_of(film, margin, j->plan.R);
-    const double walks = (double)film->crop_w * film->crop_h * j->plan.n * j->plan.R;
+    j->run = run;
+    j->parts = (size_t)j->plan.chunks;
+    double walks = (double)film->crop_w * film->crop_h * j->plan.n * j->plan.R;
     j->tiles = (struct imp_tiles){
         .ctx = ctx,
         .run = run,
-        .walks = walks,
         .width = film->crop_w,
         .height = film->crop_h,
         .margin = margin,
@@ -324,24 +366,31 @@ enum imp_status imp__gradient_job_run(struct imp__gradient_job *j,
         .take = tile_take,
         .payload = j};
     IMP_TRY(imp__tiles_create(&j->tiles));
+    if (j->allocation) walks = allocation_take(j);
+    j->tiles.walks = walks;
     j->tallies = imp__alloc(ctx, (size_t)ctx->threads, sizeof *j->tallies);
     if (!j->tallies) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
     for (int k = 0; k < ctx->threads; k++)
         IMP_TRY(imp__tally_create(ctx, j->want_gradient ? j->tracer.active : &j->nothing,
                                   j->problem->scene->lanes, j->shared ? j->plan.R : 0,
                                   &j->tallies[k]));
+    for (int k = 0; measures && k < ctx->threads; k++)
+        j->tallies[k].metric = j->allocation->metric;
     const struct imp_tiles_pass pass = {.stage = stage,
                                         .rate_unit = "walks",
                                         .units = walks,
                                         .fraction_lo = lo,
                                         .fraction_hi = hi,
                                         .start_s = start_s,
-                                        .parts = (size_t)j->plan.chunks};
+                                        .parts = j->parts};
     if (j->want_gradient && j->totals->many && !j->totals->unit_known)
         IMP_TRY(unit_find(j, &pass));
     j->mean = &j->totals->mean;
     j->spread = j->totals->spread.sum ? &j->totals->spread : NULL;
     IMP_TRY(imp__tiles_run(&j->tiles, &pass));
+    if (measures)
+        IMP_TRY(imp__allocation_share(j->allocation, j->first_tile,
+                                      imp__tiles_count(&j->tiles)));
 out:
     job_destroy(j);
     return st;

@@ -8,6 +8,7 @@
 #ifndef IMP_INVERSE_GRADIENT_JOB_H
 #define IMP_INVERSE_GRADIENT_JOB_H
 
+#include "allocation.h"
 #include "estimate.h"
 #include "film/film_tiles.h"
 #include "overlap.h"
@@ -30,6 +31,10 @@ struct imp__gradient_job {
     struct imp_tracer there;           /* of the variate */
     bool want_gradient;
     /* Set by imp__gradient_job_run. */
+    const struct imp_run *run;
+    struct imp__allocation *allocation; /* of samples to tiles; NULL: all have `plan` */
+    size_t first_tile;                  /* of this job, in the allocation */
+    size_t parts;                       /* work items of a tile */
     int width, channels;
     bool shared; /* pixels share walks, to the extent of overlap */
     struct imp__overlap overlap;

@@ -4,8 +4,8 @@
  * its own walks. Of a parameter with standard errors s_i, |g - truth|^2 is beyond z^2 sum
  * s_i^2 no oftener than a normal number is beyond +-z, for z >= 1.54 and however the errors
  * depend on each other (Szekely and Bakirov, Probab. Theory Relat. Fields 126, 2003). */
+#include "allocation.h"
 #include "base/arguments.h"
-#include "problem.h"
 #include "walk/looks.h"
 #include <math.h>
 #include <string.h>
@@ -35,6 +35,39 @@ static double bound(const struct imp__looks *l, const struct imp_problem *p,
     return worst;
 }
 
+/* What the variance of a look counts by. With q_b the squared error of parameter b over its
+ * squared length, the largest of which ends the sequence, sum q_b^4 stands for it:
+ *
+ *     d q_b^4 / d Var g_k  ~  q_b^3 / |g_b|^2
+ */
+struct counting {
+    const struct imp_problem *p;
+    double *weight; /* [n_blocks] */
+};
+
+static double counting_weight(size_t k, const void *payload)
+{
+    const struct counting *c = payload;
+    return c->weight[imp__problem_block(c->p, k) - c->p->blocks];
+}
+
+static void counting_set(const struct counting *c, const double *g, const double *se)
+{
+    double most = 0;
+    for (int pass = 0; pass < 2; pass++)
+        for (size_t b = 0; b < c->p->n_blocks; b++) {
+            const struct imp__block *of = &c->p->blocks[b];
+            double square = 0, length = 0;
+            for (size_t i = of->first; i < of->first + of->count; i++) {
+                square += se[i] * se[i];
+                length += g[i] * g[i];
+            }
+            const double q = length > 0 ? square / length : 0;
+            if (pass == 0) most = fmax(most, q);
+            else c->weight[b] = q > 0 ? pow(q / most, 3) / length : 0;
+        }
+}
+
 static void mix(double w, double value, double value_se, double *mean, double *se)
 {
     *mean = (1 - w) * *mean + w * value;
@@ -51,6 +84,7 @@ enum imp_status imp_problem_until(imp_problem *p, const float *adjoint,
     struct imp_run own;
     struct imp__looks l;
     struct imp_estimate all = {0}, f;
+    struct imp__allocation allocation = {0};
     double *g = NULL;
     IMP_REQUIRE(NULL, p, "problem");
     imp_context *ctx = p->ctx;
@@ -61,14 +95,22 @@ enum imp_status imp_problem_until(imp_problem *p, const float *adjoint,
     IMP_RUN(ctx, own, run);
     IMP_CHECKED(imp__looks_begin(ctx, __func__, &own, options, &l));
     const size_t n = gradient ? p->n : 0;
-    g = imp__alloc(ctx, 4 * n + 1, sizeof *g);
+    g = imp__alloc(ctx, 4 * n + p->n_blocks + 1, sizeof *g);
     if (!g) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu derivatives", n));
     double *se = g + n, *mean = se + n, *mean_se = mean + n;
+    const struct counting counting = {p, mean_se + n};
+    const struct imp__metric metric = {.weight = counting_weight, .payload = &counting};
+    const bool allocates =
+        n > 0 && !adjoint && l.options.allocation != IMP_ALLOCATION_EVEN;
     l.run.time_limit_s = 0;
     while (imp__looks_next(&l)) {
         double *to = gradient ? g : NULL, *to_se = gradient ? se : NULL;
+        if (allocates) IMP_TRY(imp__allocation_again(p, &l.run, &allocation));
+        allocation.metric = l.end.looks > 1 ? &metric : NULL;
+        p->allocation = allocation.n > 0 ? &allocation : NULL;
         st = adjoint ? imp_problem_functional(p, adjoint, &l.run, &f, to, to_se)
                      : imp_problem_objective(p, NULL, &l.run, &f, to, to_se);
+        p->allocation = NULL;
         if (st == IMP_CANCELLED && l.end.looks > 1) {
             l.end.spp = (int64_t)l.before;
             l.end.looks--;
@@ -80,6 +122,10 @@ enum imp_status imp_problem_until(imp_problem *p, const float *adjoint,
         /* Each look has its own bias, of its own samples: the mean's is that of the first. */
         all.bias_order = l.end.looks > 1 && f.bias_order ? 1 : f.bias_order;
         for (size_t i = 0; i < n; i++) mix(w, g[i], se[i], &mean[i], &mean_se[i]);
+        if (allocation.n > 0) {
+            imp__allocation_update(&allocation);
+            counting_set(&counting, mean, mean_se);
+        }
         imp__looks_bound(&l, bound(&l, p, &all, gradient ? mean : NULL, mean_se));
     }
     if (value) *value = all;
@@ -87,6 +133,8 @@ enum imp_status imp_problem_until(imp_problem *p, const float *adjoint,
     if (n > 0) memcpy(gradient_se, mean_se, n * sizeof *mean_se);
     if (end) IMP_GIVE(ctx, end, l.end, "end");
 out:
+    p->allocation = NULL;
+    imp__allocation_destroy(&allocation);
     imp__release(ctx, g);
     return st;
 }

@@ -14,6 +14,7 @@
 #include "walk/walk.h"
 
 struct imp_problem;
+struct imp__allocation;
 
 struct imp__target {
     struct imp_target desc; /* pixels, weights, noise_se point to copies */
@@ -107,11 +108,12 @@ struct imp_problem {
     struct imp__target *targets;
     size_t n_regularisers, cap_regularisers;
     struct imp__regulariser *regularisers;
-    struct imp_run run;         /* of imp_problem_nlopt */
+    struct imp_run run;                 /* of imp_problem_nlopt */
+    struct imp__allocation *allocation; /* of its samples; NULL: all alike */
     struct imp__variate *variate; /* of the evaluation at work (variate.h); NULL: none */
-    bool missing_told;          /* that walks from the lights miss some light */
-    bool same_known;            /* the ranks of a team have the same problem */
-    struct imp_arena fit_arena; /* of the last fit's result */
+    bool missing_told;            /* that walks from the lights miss some light */
+    bool same_known;              /* the ranks of a team have the same problem */
+    struct imp_arena fit_arena;   /* of the last fit's result */
     struct imp__fit_answer fit_answer;
     struct imp_arena check_arena;   /* of the last check's rows */
     struct imp_arena missing_arena; /* of rows of imp_problem_missing */

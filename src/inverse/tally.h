@@ -12,6 +12,7 @@
 #define IMP_INVERSE_TALLY_H
 
 #include "base/fixed_sum.h"
+#include "search/metric.h"
 #include "walk/walk.h"
 
 #define IMP_TALLY_DENSE 1024 /* numbers, above which the hash table is used */
@@ -57,6 +58,11 @@ struct imp_tally {
         uint32_t *index;
         size_t n, cap;
     } touched_triples, touched_singles;
+    /* What the variance is measured by, as one number; NULL: it is not. */
+    const struct imp__metric *metric;
+    double probe_sum[IMP_PROBES_MOST], probe_square[IMP_PROBES_MOST]; /* of the pixel */
+    double measured; /* of the tile so far */
+    double rays; /* of the tile's walks: one to each vertex, and one from it to a light */
 };
 
 /* R: replicates of pixels that share walks; 0: of others. */
@@ -81,6 +87,9 @@ static inline bool imp__tally_full(const struct imp_tally *t)
 /* Few numbers, after a tile whose pixels share walks: the variance of sums over it,
  * by_variance (sum of squares - sum^2/R). */
 void imp__tally_tile(struct imp_tally *t, double by_variance);
+
+/* Before a tile is taken over or flushed: `measured` has all of its variance. */
+void imp__tally_measure(struct imp_tally *t);
 
 /* Few numbers: mean, variance and, where pixels share walks, that of sums over the tile,
  * [3][n] in x's order. */

@@ -18,6 +18,7 @@
  * Zhang 2013). */
 #include "adam_many.h"
 #include "basis.h"
+#include "math/rng.h"
 #include <math.h>
 #include <string.h>
 
@@ -27,6 +28,7 @@
 #define STALLED IMP_ADAM_STALLED /* net motion over path length: below, no progress */
 #define STEADY  0.8              /* above, it made progress and the rate may grow again */
 #define COOLING IMP_ADAM_COOLING /* rate ~ (1 + windows wandered)^-COOLING */
+#define FLAT    1e-6             /* least second moment of a direction, over their mean */
 #define FELL    IMP_ADAM_FELL /* standard errors, by which a loss is lower than before */
 #define FAR     IMP_ADAM_FAR  /* by which it is so low that older iterates do not count */
 
@@ -175,6 +177,64 @@ static enum imp_status align(const struct imp__goal *goal, struct imp__search *s
     return changed && turned(s) ? turn(s) : IMP_OK;
 }
 
+/* ---- The noise of a step ---------------------------------------------------------- */
+
+struct noise {
+    const struct imp__goal *goal;
+    const struct imp__search *s;
+    double least; /* second moment */
+};
+
+/* Step j is m_j/sqrt(v_j) in the directions' coordinates, V S g of the gradient g, with S the
+ * scales. The noise of all is sum_j Var(V S g)_j/v_j: probes are the rows of v^-1/2 V S, or of
+ * many rows mixtures with signs from `seed`. out [IMP_PROBES_MOST][n], work [n]. */
+static size_t noise_probes(const struct noise *noise, uint64_t seed, double *work,
+                           double *out)
+{
+    const struct imp__search *s = noise->s;
+    const size_t n = s->n, rows = n < IMP_PROBES_MOST ? n : IMP_PROBES_MOST;
+    const double *v = s->array[SECOND];
+    for (size_t p = 0; p < rows; p++, out += n) {
+        uint64_t signs = 0;
+        for (size_t j = 0; j < n; j++) {
+            if (j % 64 == 0) signs = imp__mix64(seed + 64 * p + j / 64);
+            const double sign = signs >> (j % 64) & 1 ? 1 : -1;
+            work[j] = rows == n && p != j ? 0 : sign / sqrt(fmax(v[j], noise->least));
+        }
+        back(s, work, out);
+        for (size_t k = 0; k < n; k++) out[k] *= noise->goal->scale[k];
+    }
+    return rows;
+}
+
+/* The same along the axes. */
+static double noise_weight(size_t k, const void *payload)
+{
+    const struct noise *a = payload;
+    const double v = fmax(a->s->array[SECOND][k], a->least);
+    return v > 0 ? a->goal->scale[k] * a->goal->scale[k] / v : 0;
+}
+
+/* The next evaluation measures the noise of the step. work [n], probes [IMP_PROBES_MOST][n]. */
+static void noise_measure(struct noise *noise, struct imp__metric *metric, double *work,
+                          double *probes)
+{
+    const struct imp__goal *goal = noise->goal;
+    const struct imp__search *s = noise->s;
+    double mean = 0;
+    if (!goal->measure || s->scalar[AGE] < IMP_ADAM_KNOWN) return;
+    for (size_t j = 0; j < s->n; j++) mean += s->array[SECOND][j] / (double)s->n;
+    if (!(mean > 0)) return;
+    /* Flat directions have small moments, and all have been seen. */
+    noise->least = (turned(s) ? FLAT : IMP_ADAM_LEAST) * mean;
+    *metric =
+        (struct imp__metric){.probes = probes, .weight = noise_weight, .payload = noise};
+    if (turned(s))
+        metric->n_probes =
+            noise_probes(noise, imp__search_seed(goal, s->iteration, 2), work, probes);
+    goal->measure(metric, goal->payload);
+}
+
 /* ---- Steps --------------------------------------------------------------------- */
 
 /* One step from HERE. g: the gradient; it and work [n] are destroyed. */
@@ -299,18 +359,22 @@ static enum imp_status run(const struct imp__goal *goal,
 {
     if (imp__adam_is_many(goal)) return imp__adam_many_run(goal, options, s);
     enum imp_status st = IMP_OK;
-    double *g = imp__alloc(goal->ctx, 2 * goal->n + 1, sizeof *g);
+    const size_t n = goal->n;
+    double *g = imp__alloc(goal->ctx, (2 + IMP_PROBES_MOST) * n + 1, sizeof *g);
     if (!g) IMP_TRY(imp__error(goal->ctx, IMP_E_NOMEM, "no memory for a gradient"));
+    struct noise noise = {.goal = goal, .s = s};
+    struct imp__metric metric;
 
     while (!s->finished && s->iteration < options->max_iterations) {
         struct imp_estimate f;
         if (s->iteration >= s->scalar[TURN]) IMP_TRY(look_round(goal, s));
+        noise_measure(&noise, &metric, g, g + 2 * n);
         IMP_TRY(goal->eval(s->array[HERE], imp__search_seed(goal, s->iteration, 0), &f, g,
                            NULL, goal->payload));
         IMP_TRY(imp__search_log(s, f, s->array[HERE]));
         s->scalar[LOSS] += f.value;
         s->scalar[LOSS_VAR] += f.se * f.se;
-        IMP_TRY(step(goal, options->learning_rate, s, g, g + goal->n));
+        IMP_TRY(step(goal, options->learning_rate, s, g, g + n));
         if (s->scalar[COUNT] == WINDOW) IMP_TRY(window_end(goal, options, s, g));
         answer(goal, s);
         IMP_TRY(imp__search_iterated(goal, s));

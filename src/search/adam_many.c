@@ -190,15 +190,58 @@ static void average(struct imp__search *s)
         mean[k] = (float)(mean[k] + (s->x[k] - mean[k]) * 2 / (n + 1));
 }
 
+/* ---- The noise of a step ---------------------------------------------------------- */
+
+/* The step of variable k is m/sqrt(v), so that noise of the gradient counts by 1/v, where v is
+ * at least a part of the mean of its parameter. */
+struct noise {
+    const struct imp__goal *goal;
+    const struct imp__search *s;
+    double *least; /* [n_spans] */
+};
+
+static double noise_weight(size_t k, const void *payload)
+{
+    const struct noise *a = payload;
+    const struct imp__goal *goal = a->goal;
+    size_t i = 0, end = goal->n_spans - 1;
+    while (i < end) {
+        const size_t middle = (i + end) / 2;
+        if (k < goal->spans[middle].end) end = middle;
+        else i = middle + 1;
+    }
+    const double r = floats(a->s, ROOT_V)[k], scale = scale_of(a->s, &goal->spans[i], k);
+    const double v = fmax(r * r, a->least[i]);
+    return v > 0 ? scale * scale / v : 0;
+}
+
+static void noise_begin(struct noise *a)
+{
+    const packed *r = floats(a->s, ROOT_V);
+    for (size_t i = 0, k = 0; i < a->goal->n_spans; i++) {
+        const size_t first = k;
+        double sum = 0;
+        for (; k < a->goal->spans[i].end; k++) sum += (double)r[k] * r[k];
+        a->least[i] = k > first ? IMP_ADAM_LEAST * sum / (double)(k - first) : 0;
+    }
+}
+
 enum imp_status imp__adam_many_run(const struct imp__goal *goal,
                                    const struct imp__opt_options *options,
                                    struct imp__search *s)
 {
     enum imp_status st = IMP_OK;
     double *g = imp__alloc_raw(goal->ctx, goal->n, sizeof *g);
-    if (!g) IMP_TRY(imp__error(goal->ctx, IMP_E_NOMEM, "no memory for a gradient"));
+    struct noise noise = {goal, s, imp__alloc(goal->ctx, goal->n_spans, sizeof(double))};
+    const struct imp__metric metric = {.weight = noise_weight, .payload = &noise};
+    if (!g || !noise.least)
+        IMP_TRY(imp__error(goal->ctx, IMP_E_NOMEM, "no memory for a gradient"));
     while (!s->finished && s->iteration < options->max_iterations) {
         struct imp_estimate f;
+        if (goal->measure && s->scalar[AGE] >= IMP_ADAM_KNOWN) {
+            noise_begin(&noise);
+            goal->measure(&metric, goal->payload);
+        }
         IMP_TRY(goal->eval(s->x, imp__search_seed(goal, s->iteration, 0), &f, g, NULL,
                            goal->payload));
         IMP_TRY(imp__search_log(s, f, s->x));
@@ -211,5 +254,6 @@ enum imp_status imp__adam_many_run(const struct imp__goal *goal,
     }
 out:
     imp__release(goal->ctx, g);
+    imp__release(goal->ctx, noise.least);
     return st;
 }

@@ -17,6 +17,10 @@
 #define IMP_ADAM_COOLING 1.5
 #define IMP_ADAM_FELL    2
 #define IMP_ADAM_FAR     4
+/* Steps after which second moments are known well enough to measure noise in their units, */
+#define IMP_ADAM_KNOWN 4
+/* and what they count as at least, over their mean: some have hardly been seen yet. */
+#define IMP_ADAM_LEAST 0.01
 
 static inline bool imp__adam_is_many(const struct imp__goal *goal)
 {

@@ -10,6 +10,7 @@
 #define IMP_SEARCH_OPTIMIZE_H
 
 #include "base/context.h"
+#include "metric.h"
 
 #define IMP_DENSE_MAX  256  /* most variables of methods that hold [n][n] matrices */
 #define IMP_SEARCH_FEW 1024 /* variables, above which Adam's memory counts */
@@ -60,6 +61,9 @@ struct imp__goal {
      * equal seeds are common random numbers. g and g_se may be NULL. */
     enum imp_status (*eval)(const double *x, uint64_t seed, struct imp_estimate *f,
                             double *g, double *g_se, void *payload);
+    /* The next eval measures the variance of its gradient by this, which lives until it
+     * returns: what it spends its samples on may follow. NULL: not wanted. */
+    void (*measure)(const struct imp__metric *metric, void *payload);
     /* For Levenberg-Marquardt and covariances: sets all of `out`, from `rounds` >= 1 times
      * the samples of eval. NULL: not offered. */
     enum imp_status (*normal)(const double *x, uint64_t seed, int rounds,
