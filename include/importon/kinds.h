@@ -144,10 +144,18 @@ struct imp_sink {
 struct imp_dirs {
     imp_v3 wo, wi;
     int lobe; /* IMP_SMOOTH, or the index of a delta lobe (with wi as sample set it) */
-    /* For sample and pdf: derivatives with respect to this material's inputs will be taken
-     * at what is drawn. A kind may draw without the parts whose value is 0, but then not. */
-    bool derivative;
+    /* For sample and pdf: derivatives with respect to these inputs of the material will be
+     * taken at what is drawn, bit j for input j, children's included (imp_wanted_of_child); 0:
+     * with respect to none. A kind may draw without the parts whose value is 0, but then
+     * not; it may draw more where such a derivative is large. */
+    uint64_t derivative;
 };
+
+/* The derivatives wanted of a child whose inputs begin at `first`. */
+static inline uint64_t imp_wanted_of_child(uint64_t derivative, int first)
+{
+    return first < 64 ? derivative >> first : 0;
+}
 
 enum imp_bsdf_flags {
     IMP_BSDF_SMOOTH = 1, /* has lobes with a density */

@@ -220,7 +220,8 @@ enum imp_status imp__walks_begin(imp_scene *scene, const struct imp_run *run,
     w->stores = imp__alloc(ctx, (size_t)scene->n_sensors + 1, sizeof *w->stores);
     if (!w->stores) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks"));
     IMP_TRY(chosen_make(w));
-    IMP_TRY(imp__densities_create(scene, integrator, w->survival, &w->densities));
+    IMP_TRY(imp__densities_create(scene, integrator, w->chosen, w->survival,
+                                  &w->densities));
     *out = w;
     return IMP_OK;
 out:

@@ -21,6 +21,14 @@ static bool texture_depends(const struct imp_texture *t, const uint8_t *chosen)
     return false;
 }
 
+uint64_t imp__inputs_depend(const struct imp_bsdf *b, const uint8_t *chosen)
+{
+    uint64_t inputs = 0;
+    for (int k = 0; k < b->n_in; k++)
+        inputs |= (uint64_t)imp__input_depends(b->input[k], chosen) << k;
+    return inputs;
+}
+
 /* Inputs of the medium that need not be looked up for derivatives by its extinction: where
  * one input alone is active, itself. */
 static uint32_t medium_unseen(const struct imp_medium *m, const uint8_t *chosen)
@@ -69,8 +77,9 @@ enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t 
     struct imp_active a = {0};
     a.base = imp__alloc(ctx, scene->n_params + 1, sizeof *a.base);
     a.bsdf = imp__alloc(ctx, (size_t)scene->n_bsdfs + 1, 1);
+    a.inputs = imp__alloc(ctx, (size_t)scene->n_bsdfs + 1, sizeof *a.inputs);
     a.emitter = imp__alloc(ctx, (size_t)scene->n_emitters + 1, 1);
-    if (!a.base || !a.bsdf || !a.emitter) {
+    if (!a.base || !a.bsdf || !a.inputs || !a.emitter) {
         imp__active_destroy(ctx, &a);
         return imp__error(ctx, IMP_E_NOMEM, "no memory for the active parameters");
     }
@@ -78,9 +87,10 @@ enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t 
         a.base[i] = chosen[i] ? (int64_t)a.n : -1;
         if (chosen[i]) a.n += scene->params[i].info.count;
     }
-    for (int b = 0; b < scene->n_bsdfs; b++)
-        for (int k = 0; k < scene->bsdfs[b]->n_in; k++)
-            a.bsdf[b] |= imp__input_depends(scene->bsdfs[b]->input[k], chosen);
+    for (int b = 0; b < scene->n_bsdfs; b++) {
+        a.inputs[b] = imp__inputs_depend(scene->bsdfs[b], chosen);
+        a.bsdf[b] = a.inputs[b] != 0;
+    }
     for (int e = 0; e < scene->n_emitters; e++)
         for (int k = 0; k < scene->emitters[e]->n_in; k++)
             a.emitter[e] |= imp__input_depends(scene->emitters[e]->input[k], chosen);
@@ -109,6 +119,7 @@ void imp__active_destroy(imp_context *ctx, struct imp_active *a)
     imp__release(ctx, a->base);
     imp__release(ctx, a->tied);
     imp__release(ctx, a->bsdf);
+    imp__release(ctx, a->inputs);
     imp__release(ctx, a->emitter);
     imp__release(ctx, a->body);
     imp__release(ctx, a->medium);

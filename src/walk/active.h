@@ -25,6 +25,7 @@ struct imp_active {
     struct imp_tied *tied; /* [n_params]; NULL: none of them is */
     uint8_t *bsdf;    /* [n_bsdfs] does it depend on an active number; IMP_BY_EXTINCTION:
                          by extinctions alone, of which probes know */
+    uint64_t *inputs; /* [n_bsdfs] bit j: its input j does, children's included */
     uint8_t *emitter; /* [n_emitters] */
     uint8_t *body;    /* [n_bodies]; NULL: none of them */
     uint8_t *medium;  /* [n_media] does its extinction; NULL: none of them */
@@ -45,6 +46,8 @@ static inline double imp__active_slope(const struct imp_active *a, int param, si
 }
 /* Does it depend on a parameter that is chosen? `chosen` [n_params]. */
 bool imp__input_depends(const struct imp_input *input, const uint8_t *chosen);
+/* Of a material's inputs, bit j: input j does. */
+uint64_t imp__inputs_depend(const struct imp_bsdf *b, const uint8_t *chosen);
 enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t *chosen,
                                    struct imp_active *out);
 void imp__active_destroy(imp_context *ctx, struct imp_active *active);

@@ -146,7 +146,7 @@ void imp__both_eye_leaves(struct imp_step *s, const struct imp_bsdf *bsdf,
 {
     struct imp_both *b = s->both;
     struct imp_end *end = &b->from_eye[b->n_eye - 1];
-    const bool derivative = imp__wants_derivative(s, bsdf);
+    const uint64_t derivative = imp__derivative_wanted(s, bsdf);
     end->delta = !(s->pdf > 0);
     b->pdf_eye = 0;
     if (end->delta) return;

@@ -11,7 +11,7 @@
 
 static inline double imp__end_pdf(const struct imp_bsdf *b,
                                   const struct imp_carried *carried, const imp_spec *in,
-                                  imp_v3 wo, imp_v3 wi, bool derivative)
+                                  imp_v3 wo, imp_v3 wi, uint64_t derivative)
 {
     const struct imp_dirs dirs = {wo, wi, IMP_SMOOTH, derivative};
     if (imp_likely(!b->shaped)) return b->ops->pdf(b, in, &dirs);

@@ -71,9 +71,9 @@ static void join(struct imp_step *s, struct imp_vertex *v, int k,
     if (!(r2 > 0)) return;
     const imp_v3 w = d * (1 / sqrt(r2));
     const struct imp_dirs at_y = {s->wo, imp__decide(imp__to_local(frame, w)), IMP_SMOOTH,
-                                  imp__wants_derivative(s, by)};
+                                  imp__derivative_wanted(s, by)};
     const struct imp_dirs at_z = {imp__decide(imp__to_local(&z->frame, -w)), z->wi,
-                                  IMP_SMOOTH, imp__wants_derivative(s, bz)};
+                                  IMP_SMOOTH, imp__derivative_wanted(s, bz)};
 
     /* The scattering at both ends. */
     imp_spec f_y, f_z;

@@ -43,7 +43,7 @@ static bool derives(const struct imp_bsdf *b)
 }
 
 /* Does the density differ where input j does? Found by trying: kinds do not declare it. */
-static bool depends(const struct imp_bsdf *b, int j)
+static bool depends(const struct imp_bsdf *b, int j, uint64_t wanted)
 {
     const struct imp_input_desc *own = desc_of(b, j);
     imp_spec in[IMP_INPUTS_MAX];
@@ -60,7 +60,7 @@ static bool depends(const struct imp_bsdf *b, int j)
             phi[i] = 6.28 * imp__u01(key, 200 + (uint32_t)i);
         }
         if (k % 2) z[1] = copysign(z[1], z[0]); /* reflection too */
-        struct imp_dirs dirs = {.lobe = IMP_SMOOTH, .derivative = true};
+        struct imp_dirs dirs = {.lobe = IMP_SMOOTH, .derivative = wanted};
         const double r0 = sqrt(1 - z[0] * z[0]), r1 = sqrt(1 - z[1] * z[1]);
         dirs.wo = imp__v3(r0 * cos(phi[0]), r0 * sin(phi[0]), z[0]);
         dirs.wi = k % 3 ? imp__v3(r1 * cos(phi[1]), r1 * sin(phi[1]), z[1])
@@ -81,22 +81,25 @@ static bool depends(const struct imp_bsdf *b, int j)
 
 enum imp_status imp__densities_create(const struct imp_scene *scene,
                                       const struct imp_walk_integrator *integrator,
-                                      double survival, struct imp_densities *out)
+                                      const uint8_t *chosen, double survival,
+                                      struct imp_densities *out)
 {
     struct imp_densities d = {
         .scene = scene, .integrator = integrator, .survival = survival};
     const size_t n = (size_t)scene->n_bsdfs + 1;
+    d.wanted = imp__alloc(scene->ctx, n, sizeof *d.wanted);
     d.inputs = imp__alloc(scene->ctx, n, sizeof *d.inputs);
     d.moved = imp__alloc(scene->ctx, n, sizeof *d.moved);
-    if (!d.inputs || !d.moved) {
+    if (!d.wanted || !d.inputs || !d.moved) {
         imp__densities_destroy(scene->ctx, &d);
         return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for kept walks");
     }
     for (int b = 0; b < scene->n_bsdfs; b++) {
         const struct imp_bsdf *bsdf = scene->bsdfs[b];
+        d.wanted[b] = imp__inputs_depend(bsdf, chosen);
         const bool medium = bsdf->ops->inputs == NULL && bsdf->n_in > 0;
         for (int j = 0; j < bsdf->n_in; j++)
-            if (medium || bsdf->shaped || depends(bsdf, j))
+            if (medium || bsdf->shaped || depends(bsdf, j, d.wanted[b]))
                 d.inputs[b] |= UINT64_C(1) << j;
     }
     *out = d;
@@ -105,9 +108,10 @@ enum imp_status imp__densities_create(const struct imp_scene *scene,
 
 void imp__densities_destroy(imp_context *ctx, struct imp_densities *d)
 {
+    imp__release(ctx, d->wanted);
     imp__release(ctx, d->inputs);
     imp__release(ctx, d->moved);
-    d->inputs = NULL;
+    d->wanted = d->inputs = NULL;
     d->moved = NULL;
 }
 

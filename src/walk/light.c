@@ -175,7 +175,7 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
 
     /* Its weight against the continuation that could have met it. */
     const struct imp_dirs dirs = {s->wo, imp__decide(imp__to_local(frame, ls.wi)),
-                                  IMP_SMOOTH, imp__wants_derivative(s, b)};
+                                  IMP_SMOOTH, imp__derivative_wanted(s, b)};
     imp_spec f;
     const double pdf = continuation_pdf(s, b, &dirs, ls.wi, &f);
     if (!(pdf > 0)) return; /* structurally zero: nothing to see, no derivative */

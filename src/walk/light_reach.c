@@ -193,7 +193,7 @@ void imp__light_connect_vertex(struct imp_light_step *w, struct imp_vertex *v,
         return;
 
     const struct imp_dirs dirs = {imp__decide(imp__to_local(frame, to.wo)), s->wo,
-                                  IMP_SMOOTH, imp__wants_derivative(s, b)};
+                                  IMP_SMOOTH, imp__derivative_wanted(s, b)};
     const double c = v->shape
                          ? imp__bsdf_exchange(b, s->in, &dirs, imp__dot(to.wo, at->ng),
                                               imp__dot(-s->d, at->ng))

@@ -54,8 +54,9 @@ static bool scatter(struct imp_light_step *w, struct imp_vertex *v,
     double u[3] = {imp__u01(key, imp__dim(s->depth, IMP_DIM_LOBE)),
                    imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_U)),
                    imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_V))};
-    struct imp_dirs dirs = {
-        .wi = s->wo_drawn, .lobe = IMP_SMOOTH, .derivative = imp__wants_derivative(s, b)};
+    struct imp_dirs dirs = {.wi = s->wo_drawn,
+                            .lobe = IMP_SMOOTH,
+                            .derivative = imp__derivative_wanted(s, b)};
     if (!direction_draw(s, b, frame, u, &dirs)) return false;
     const bool straight = imp_unlikely(b->straight) && s->segment->through &&
                           dirs.lobe >= 0 && dirs.lobe < 64 &&

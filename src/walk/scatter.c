@@ -100,8 +100,9 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
                          imp__step_number(s, IMP_DIM_DIR_U),
                          imp__step_number(s, IMP_DIM_DIR_V)};
     const struct imp_bsdf *b = v->bsdf;
-    struct imp_dirs dirs = {
-        .wo = s->wo_drawn, .lobe = IMP_SMOOTH, .derivative = imp__wants_derivative(s, b)};
+    struct imp_dirs dirs = {.wo = s->wo_drawn,
+                            .lobe = IMP_SMOOTH,
+                            .derivative = imp__derivative_wanted(s, b)};
 
     /* The direction, its density and its value. */
     int drawn;

@@ -341,12 +341,17 @@ static inline void imp__guided_leave(struct imp_guided *g)
 /* Survival by what is expected to come; `q`: by throughput. */
 double imp__guided_survival(const struct imp_step *s, double q);
 
-/* Are derivatives taken with respect to inputs of this material? */
+/* The inputs of this material with respect to which derivatives are taken (imp_dirs). */
+static inline uint64_t imp__derivative_wanted(const struct imp_step *s,
+                                              const struct imp_bsdf *b)
+{
+    const struct imp_active *active = s->tracer->active;
+    return imp_unlikely(active != NULL) && b->index >= 0 ? active->inputs[b->index] : 0;
+}
 static inline bool imp__wants_derivative(const struct imp_step *s,
                                          const struct imp_bsdf *b)
 {
-    const struct imp_active *active = s->tracer->active;
-    return imp_unlikely(active != NULL) && b->index >= 0 && active->bsdf[b->index];
+    return imp__derivative_wanted(s, b) != 0;
 }
 
 #endif

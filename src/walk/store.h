@@ -79,6 +79,7 @@ struct imp_densities {
     const struct imp_walk_integrator *integrator;
     double survival;  /* of the tracer they were drawn with */
     bool guided;      /* their survival was decided by a guide */
+    uint64_t *wanted; /* [n_bsdfs] imp_dirs.derivative that they were drawn with */
     uint64_t *inputs; /* [n_bsdfs] bit j: the density depends on input j */
     uint8_t *moved;   /* [n_bsdfs] it has changed */
     bool any;         /* of moved */
@@ -87,7 +88,8 @@ struct imp_densities {
 };
 enum imp_status imp__densities_create(const struct imp_scene *scene,
                                       const struct imp_walk_integrator *integrator,
-                                      double survival, struct imp_densities *out);
+                                      const uint8_t *chosen, double survival,
+                                      struct imp_densities *out);
 void imp__densities_destroy(imp_context *ctx, struct imp_densities *d);
 /* changed [n_params]: parameters whose numbers are not those that walks were drawn at. */
 void imp__densities_move(struct imp_densities *d, const uint8_t *changed);

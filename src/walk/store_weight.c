@@ -45,18 +45,19 @@ struct looked {
     struct imp_dirs dirs;
 };
 
-static void look(const struct imp_scene *scene, const struct imp_decision *d,
+static void look(const struct imp_densities *m, const struct imp_decision *d,
                  struct looked *v)
 {
     const struct imp_shape *shape =
-        d->scatterer == IMP_IN_MEDIUM ? NULL : scene->shapes[d->shape];
+        d->scatterer == IMP_IN_MEDIUM ? NULL : m->scene->shapes[d->shape];
     const struct imp_texcoord at = {.uv = {d->uv[0], d->uv[1]},
                                     .p = imp__decided_v3(d->p),
                                     .carried = v->carried,
                                     .shape = shape};
     imp__evaluate_inputs(v->bsdf, shape, &at, v->in);
-    v->dirs =
-        (struct imp_dirs){imp__decided_v3(d->wo), imp__decided_v3(d->wi), d->lobe, true};
+    const int of = v->bsdf->index;
+    v->dirs = (struct imp_dirs){imp__decided_v3(d->wo), imp__decided_v3(d->wi), d->lobe,
+                                of >= 0 ? m->wanted[of] : 0};
 }
 
 /* Density now over the density when the direction was drawn. */
@@ -189,7 +190,7 @@ static double walk_weight(const struct imp_store *s, const struct imp_record *r,
         const bool own = rolls && j < k->n;
         if (own && !v.bsdf) beta *= crossed(d, here);
         if (!v.bsdf || (!moved && !own)) continue;
-        look(scene, d, &v);
+        look(m, d, &v);
         const double ratio = moved ? density_ratio(&v, d) : 1;
         any |= moved && d->drawn == IMP_DENSITY_KERNEL;
         seen *= ratio;

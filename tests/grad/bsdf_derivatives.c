@@ -46,7 +46,7 @@ static struct tally check_case(const struct imp_bsdf *b, enum kind_set set)
     imp_spec in[KINDS_MAX_INPUTS], df[KINDS_MAX_INPUTS];
     for (int i = 0; i < TRIALS; i++) {
         kind_inputs(b, set, 1000 + (uint64_t)i, in);
-        struct imp_dirs d = {kind_direction(i, 5), {0}, IMP_SMOOTH, true};
+        struct imp_dirs d = {kind_direction(i, 5), {0}, IMP_SMOOTH, ~UINT64_C(0)};
         struct kind_draw s;
         const struct imp_key key = imp__key(9, (uint64_t)i, 0);
         const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};

@@ -21,7 +21,8 @@ struct point {
     imp_v3 wo;
     struct imp_dirs lobe[IMP_DRAWS_LOBES]; /* as drawn */
     long draws;
-    bool sane, derivative;
+    bool sane;
+    uint64_t derivative;
 };
 static double density(imp_v3 wi, void *payload)
 {
@@ -125,7 +126,7 @@ static void visit(const struct kind_case *c, void *payload)
     const bool sharp = strstr(c->label, "principled") != NULL;
     const int depth = kind_steps(c) ? IMP_SPHERE_STEPS : IMP_SPHERE_SMOOTH;
     for (int i = 0; i < directions; i++) {
-        struct point p = {.b = &c->bsdf, .derivative = i % 2 == 0};
+        struct point p = {.b = &c->bsdf, .derivative = i % 2 == 0 ? ~UINT64_C(0) : 0};
         kind_inputs(p.b,
                     i % 6 == 5                 ? KIND_WIDE
                     : i == 0 && !too_narrow(c) ? KIND_LOWEST

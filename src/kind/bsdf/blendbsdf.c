@@ -52,7 +52,10 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
     const int k = u[0] < q ? 0 : 1;
     const double v[3] = {imp__mixing_rest(u[0], k ? q : 0, k ? 1 : q), u[1], u[2]};
     const struct imp_bsdf *c = b->child[k];
-    struct imp_dirs e = {.wo = d->wo, .lobe = IMP_SMOOTH, .derivative = d->derivative};
+    struct imp_dirs e = {.wo = d->wo,
+                         .lobe = IMP_SMOOTH,
+                         .derivative =
+                             imp_wanted_of_child(d->derivative, b->child_in[k])};
     if (!c->ops->sample(c, in + b->child_in[k], v, &e)) return false;
     d->wi = e.wi;
     d->lobe = e.lobe == IMP_SMOOTH ? IMP_SMOOTH : 2 * e.lobe + k;
@@ -65,8 +68,9 @@ static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp
     double sum = 0;
     for (int k = 0; k < 2; k++) {
         const struct imp_bsdf *c = b->child[k];
-        if (asked(k, d, &e))
-            sum += (k ? q : 1 - q) * c->ops->pdf(c, in + b->child_in[k], &e);
+        if (!asked(k, d, &e)) continue;
+        e.derivative = imp_wanted_of_child(d->derivative, b->child_in[k]);
+        sum += (k ? q : 1 - q) * c->ops->pdf(c, in + b->child_in[k], &e);
     }
     return sum;
 }

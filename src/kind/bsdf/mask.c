@@ -41,6 +41,7 @@ static const struct imp_bsdf *nested(const struct imp_bsdf *b, const imp_spec **
     *in += b->child_in[0];
     *e = *d;
     if (d->lobe != IMP_SMOOTH) e->lobe = d->lobe - 1;
+    e->derivative = imp_wanted_of_child(d->derivative, b->child_in[0]);
     return b->child[0];
 }
 

@@ -54,6 +54,7 @@ static bool nested(const struct imp_bsdf *b, const imp_spec *in, const struct im
 {
     *f = frame_of(b, in, d->wo);
     *e = *d;
+    e->derivative = imp_wanted_of_child(d->derivative, b->child_in[0]);
     e->wo = into(f, d->wo);
     e->wi = into(f, d->wi);
     return d->wi[2] * e->wi[2] > 0;
@@ -73,6 +74,7 @@ bool imp__turned_sample(const struct imp_bsdf *b, const imp_spec *in, const doub
     const struct imp_bsdf *c = b->child[0];
     const struct turned f = frame_of(b, in, d->wo);
     struct imp_dirs e = *d;
+    e.derivative = imp_wanted_of_child(d->derivative, b->child_in[0]);
     e.wo = into(&f, d->wo);
     if (!c->ops->sample(c, in + b->child_in[0], u, &e)) return false;
     d->wi = out_of(&f, e.wi);

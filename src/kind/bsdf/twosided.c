@@ -47,7 +47,8 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
     bool back;
     int first;
     const struct imp_bsdf *c = side(b, &d->wo, &back, &first);
-    struct imp_dirs e = {flip(d->wo, back), d->wi, d->lobe, d->derivative};
+    struct imp_dirs e = {flip(d->wo, back), d->wi, d->lobe,
+                         imp_wanted_of_child(d->derivative, first)};
     if (!c->ops->sample(c, in + first, u, &e)) return false;
     d->wi = flip(e.wi, back);
     d->lobe = e.lobe;
@@ -59,7 +60,7 @@ static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_
     bool back;
     int first;
     const struct imp_bsdf *c = side(b, &d->wo, &back, &first);
-    const struct imp_dirs e = {flip(d->wo, back), flip(d->wi, back), d->lobe, false};
+    const struct imp_dirs e = {flip(d->wo, back), flip(d->wi, back), d->lobe, 0};
     c->ops->eval(c, in + first, &e, f);
 }
 static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
@@ -68,7 +69,7 @@ static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp
     int first;
     const struct imp_bsdf *c = side(b, &d->wo, &back, &first);
     const struct imp_dirs e = {flip(d->wo, back), flip(d->wi, back), d->lobe,
-                               d->derivative};
+                               imp_wanted_of_child(d->derivative, first)};
     return c->ops->pdf(c, in + first, &e);
 }
 static double pdf_eval(const struct imp_bsdf *b, const imp_spec *in,
@@ -78,7 +79,7 @@ static double pdf_eval(const struct imp_bsdf *b, const imp_spec *in,
     int first;
     const struct imp_bsdf *c = side(b, &d->wo, &back, &first);
     const struct imp_dirs e = {flip(d->wo, back), flip(d->wi, back), d->lobe,
-                               d->derivative};
+                               imp_wanted_of_child(d->derivative, first)};
     return imp__bsdf_pdf_eval(c, in + first, &e, f);
 }
 static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
@@ -87,7 +88,7 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     bool back;
     int first;
     const struct imp_bsdf *c = side(b, &d->wo, &back, &first);
-    const struct imp_dirs e = {flip(d->wo, back), flip(d->wi, back), d->lobe, false};
+    const struct imp_dirs e = {flip(d->wo, back), flip(d->wi, back), d->lobe, 0};
     for (int j = 0; j < b->n_in; j++) df[j] = imp__spec(0);
     c->ops->eval_d(c, in + first, &e, df + first);
 }
@@ -117,7 +118,7 @@ static bool sample_d(const struct imp_bsdf *b, const imp_spec *in, const double 
     bool back;
     int first;
     const struct imp_bsdf *c = side(b, &d->wo, &back, &first);
-    const struct imp_dirs e = {flip(d->wo, back), flip(d->wi, back), d->lobe, false};
+    const struct imp_dirs e = {flip(d->wo, back), flip(d->wi, back), d->lobe, 0};
     if (!c->ops->sample_d || j < first || j >= first + c->n_in) return false;
     if (!c->ops->sample_d(c, in + first, u, &e, j - first, dweight, dwi)) return false;
     *dwi = flip(*dwi, back);
