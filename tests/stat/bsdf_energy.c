@@ -362,14 +362,14 @@ static double facet_value(imp_v3 m, void *payload)
 }
 static void microfacets(void)
 {
-    const struct imp__microfacet unit = {IMP_BECKMANN, true, 1, 1};
+    const struct imp__microfacet unit = {IMP_BECKMANN, true, 1, 1, 0};
     const double t = 1; /* a = 1/(alpha tan) = 1 */
     const imp_v3 v = imp__normalize(imp__v3(t, 0, 1));
     tap_near(imp__microfacet_g1(&unit, &v, NULL), 0.976593, 0, 1e-6 * 1,
              "Beckmann G1 at a = 1");
     for (int i = 0; i < 8; i++) {
         const struct imp__microfacet f = {i & 1 ? IMP_GGX : IMP_BECKMANN, true,
-                                          i & 2 ? 0.1 : 0.5, i & 4 ? 0.9 : 0.5};
+                                          i & 2 ? 0.1 : 0.5, i & 4 ? 0.9 : 0.5, 0};
         const struct facet_point d = {&f, {0}, 0},
                                  g = {&f, imp__normalize(imp__v3(0.7, -0.4, 0.2)), 1};
         const char *name = f.type == IMP_GGX ? "ggx" : "beckmann";

@@ -13,12 +13,24 @@
 #include "math/vec.h"
 
 #define IMP_MIXING_LEAST 0.02
+/* In imp_dirs.derivative. */
+#define IMP_INPUT_BIT(j) (UINT64_C(1) << (j))
 #define IMP_LOBES_MAX    128 /* records keep them in a signed byte */
 
+/* Least probability of a part that a wanted derivative lives in: that with respect to its
+ * weight, or to its roughness. The second moment of the value grows by 1/(1 - 1/6) = 1.2 at
+ * most. */
+#define IMP_WANTED_LEAST (1. / 6)
+/* The same before probabilities are divided by their sum, 1 + this. */
+#define IMP_WANTED_PART (IMP_WANTED_LEAST / (1 - IMP_WANTED_LEAST))
+
+/* Input 0 is the weight. */
 static inline double imp__mixing_weight(double w) { return imp_clamp(w, 0, 1); }
 static inline double imp__mixing_chance(double w, const struct imp_dirs *d)
 {
-    const double least = d->derivative ? IMP_MIXING_LEAST : 0;
+    const double least = d->derivative & 1 ? IMP_WANTED_LEAST
+                         : d->derivative   ? IMP_MIXING_LEAST
+                                           : 0;
     return imp_clamp(w, least, 1 - least);
 }
 /* What is left of u, uniform again, once it is known to lie in [lo, hi). */
@@ -28,15 +40,19 @@ static inline double imp__mixing_rest(double u, double lo, double hi)
 }
 
 /* Probability of the coat's lobe over that of a base, where the coat reflects F: its share,
- * roughly. Where derivatives are taken, dark colours keep a part. */
+ * roughly. Where derivatives are taken, dark colours keep a part, and the coat a larger one
+ * if they are by one of its own inputs, `wanted`. */
 static inline double imp__coated_chance(imp_spec coat, imp_spec base,
-                                        const struct imp_dirs *d, double F)
+                                        const struct imp_dirs *d, double F,
+                                        uint64_t wanted)
 {
     const double least = d->derivative ? 0.1 : 0;
     const double s = F * imp_max(imp__max3(coat), least),
                  r = (1 - F) * imp_max(imp__max3(base), least);
     const double q = s + r > 0 ? s / (s + r) : 1;
-    return d->derivative ? imp_clamp(q, IMP_MIXING_LEAST, 1 - IMP_MIXING_LEAST) : q;
+    if (!d->derivative) return q;
+    return imp_clamp(q, d->derivative & wanted ? IMP_WANTED_LEAST : IMP_MIXING_LEAST,
+                     1 - IMP_MIXING_LEAST);
 }
 
 /* Delta lobes of a material. */

@@ -51,7 +51,7 @@ static inline struct imp__burley_facets imp__burley_facets(double roughness,
     const double a = sqrt(1 - 0.9 * anisotropic), r2 = roughness * roughness;
     const double au = r2 / a, av = r2 * a, least = 1e-3;
     struct imp__burley_facets m = {
-        {IMP_GGX, true, imp_max(au, least), imp_max(av, least)}, {0, 0}, {0, 0}};
+        {IMP_GGX, true, imp_max(au, least), imp_max(av, least), 0}, {0, 0}, {0, 0}};
     if (au > least) {
         m.d_roughness[0] = 2 * roughness / a;
         m.d_anisotropic[0] = 0.45 * r2 / (a * a * a);
@@ -61,6 +61,12 @@ static inline struct imp__burley_facets imp__burley_facets(double roughness,
         m.d_anisotropic[1] = -0.45 * r2 / a;
     }
     return m;
+}
+
+/* For drawing: by which of the two derivatives are wanted. Roughness scales both. */
+static inline unsigned imp__burley_wanted(bool roughness, bool anisotropic)
+{
+    return (roughness ? IMP_SCORE_SCALE : 0) | (anisotropic ? IMP_SCORE_ASPECT : 0);
 }
 
 /* D G1(wo) G1(wi), and its derivatives by roughness and anisotropic. */

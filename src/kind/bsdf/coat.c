@@ -42,7 +42,7 @@ static imp__dual inverse(imp__dual a) { return chain(a, 1 / a[0], -1 / (a[0] * a
 /* G1 of a direction with cosine z > 0 (isotropic). */
 static imp__dual masking(enum imp__distribution type, imp__dual alpha, imp__dual z)
 {
-    const struct imp__microfacet f = {type, true, alpha[0], alpha[0]};
+    const struct imp__microfacet f = {type, true, alpha[0], alpha[0], 0};
     const double s2 = imp_max(1 - z[0] * z[0], 0);
     const imp_v3 v = imp__v3(sqrt(s2), 0, z[0]);
     double d[2];

@@ -78,12 +78,21 @@ static double g1_exact(const struct imp__microfacet *f, const imp_v3 *v)
     return 2 / (1 + erf(a) + exp(-a * a) / (a * sqrt(IMP_PI)));
 }
 
+/* With the part of normals that are drawn for the derivative. */
+static double with_score(const struct imp__microfacet *f, const imp_v3 *m, double D,
+                         double p)
+{
+    const double share = imp_unlikely(f->wanted) ? imp__score_share(f) : 0;
+    return imp_likely(!(share > 0)) ? p : p + share * (imp__score_pdf(f, m, D) - p);
+}
+
 double imp__microfacet_pdf(const struct imp__microfacet *f, const imp_v3 *v,
                            const imp_v3 *m)
 {
     const double vm = imp__dot(*v, *m), D = imp__microfacet_d(f, m, NULL);
     if (!(vm > 0) || !((*v)[2] > 0)) return 0;
-    return f->visible ? D * g1_exact(f, v) * vm / (*v)[2] : D * (*m)[2];
+    return with_score(f, m, D,
+                      f->visible ? D * g1_exact(f, v) * vm / (*v)[2] : D * (*m)[2]);
 }
 
 double imp__microfacet_pdf_of(const struct imp__microfacet *f, const imp_v3 *v,
@@ -91,8 +100,9 @@ double imp__microfacet_pdf_of(const struct imp__microfacet *f, const imp_v3 *v,
 {
     const double vm = imp__dot(*v, *m);
     if (!(vm > 0) || !((*v)[2] > 0)) return 0;
-    if (!f->visible) return D * (*m)[2];
-    return D * (f->type == IMP_GGX ? G1 : g1_exact(f, v)) * vm / (*v)[2];
+    if (!f->visible) return with_score(f, m, D, D * (*m)[2]);
+    return with_score(f, m, D,
+                      D * (f->type == IMP_GGX ? G1 : g1_exact(f, v)) * vm / (*v)[2]);
 }
 
 /* Inverse error function to 2e-3 (Winitzki 2008): where Halley's steps begin. */
@@ -104,7 +114,7 @@ static double erf_inverse_start(double y)
 
 /* A draw need not be exact to the last bit, as its density is evaluated where it fell;
  * two steps of third order leave 1e-13. */
-static double erf_inverse(double y)
+double imp__erf_inverse(double y)
 {
     y = imp_clamp(y, -1 + 1e-16, 1 - 1e-16);
     double x = erf_inverse_start(y);
@@ -158,7 +168,7 @@ static imp_v3 beckmann_visible(const struct imp__microfacet *f, const imp_v3 *v,
     const imp_v3 w = imp__normalize(imp__v3(f->au * (*v)[0], f->av * (*v)[1], (*v)[2]));
     const double s = hypot(w[0], w[1]);
     const double cp = s > 0 ? w[0] / s : 1, sp = s > 0 ? w[1] / s : 0;
-    const double x = beckmann_slope(w[2], s, u[0]), y = erf_inverse(2 * u[1] - 1);
+    const double x = beckmann_slope(w[2], s, u[0]), y = imp__erf_inverse(2 * u[1] - 1);
     return imp__normalize(
         imp__v3(-f->au * (cp * x - sp * y), -f->av * (sp * x + cp * y), 1));
 }
@@ -175,8 +185,8 @@ static imp_v3 ggx_visible(const struct imp__microfacet *f, const imp_v3 *v,
     return imp__normalize(imp__v3(f->au * h[0], f->av * h[1], imp_max(h[2], 0)));
 }
 
-imp_v3 imp__microfacet_sample(const struct imp__microfacet *f, const imp_v3 *v,
-                              const double u[2])
+static imp_v3 normal_sample(const struct imp__microfacet *f, const imp_v3 *v,
+                            const double u[2])
 {
     if (f->visible)
         return f->type == IMP_GGX ? ggx_visible(f, v, u) : beckmann_visible(f, v, u);
@@ -185,4 +195,15 @@ imp_v3 imp__microfacet_sample(const struct imp__microfacet *f, const imp_v3 *v,
     const double r2 = f->type == IMP_GGX ? u[0] / (1 - u[0]) : -log1p(-u[0]);
     const double r = sqrt(r2), phi = IMP_2PI * u[1];
     return imp__normalize(imp__v3(f->au * r * cos(phi), f->av * r * sin(phi), 1));
+}
+
+imp_v3 imp__microfacet_sample(const struct imp__microfacet *f, const imp_v3 *v,
+                              const double u[2])
+{
+    const double c = imp_unlikely(f->wanted) ? imp__score_share(f) : 0;
+    const double below = 0x1.fffffffffffffp-1;
+    if (imp_likely(!(c > 0))) return normal_sample(f, v, u);
+    if (u[0] < c) return imp__score_sample(f, (double[]){imp_min(u[0] / c, below), u[1]});
+    return normal_sample(f, v,
+                         (double[]){imp_clamp((u[0] - c) / (1 - c), 0, below), u[1]});
 }

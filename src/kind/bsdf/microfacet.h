@@ -20,7 +20,24 @@ struct imp__microfacet {
     enum imp__distribution type;
     bool visible; /* sample visible normals; false: all normals */
     double au, av;
+    /* Of sampling: derivatives that will be taken at what is drawn, so that a part of the
+     * normals is drawn where D changes (microfacet_score.c). 0: none. */
+    unsigned wanted; /* enum imp__score */
 };
+/* By ln au + ln av, ln au, ln av, ln au - ln av. */
+enum imp__score {
+    IMP_SCORE_SCALE = 1,
+    IMP_SCORE_U = 2,
+    IMP_SCORE_V = 4,
+    IMP_SCORE_ASPECT = 8
+};
+/* That part, of f with `wanted`: where lobes are wide nothing is gained (docs/estimators.md 8.2),
+ * and then there is none. */
+static inline double imp__score_share(const struct imp__microfacet *f)
+{
+    const double alpha = sqrt(f->au * f->av);
+    return f->wanted ? 0.25 * imp_clamp((0.2 - alpha) / 0.1, 0, 1) : 0;
+}
 
 /* D, in 1/sr; 0 for m below the surface. d_log (may be NULL): d ln D / d(au, av). */
 double imp__microfacet_d(const struct imp__microfacet *f, const imp_v3 *m,
@@ -39,5 +56,10 @@ double imp__microfacet_pdf(const struct imp__microfacet *f, const imp_v3 *v,
 /* The same where D of m, and G1 of v, are known. */
 double imp__microfacet_pdf_of(const struct imp__microfacet *f, const imp_v3 *v,
                               const imp_v3 *m, double D, double G1);
+/* Normals where D changes, and their density, where D of m is known; `wanted` is not 0. */
+imp_v3 imp__score_sample(const struct imp__microfacet *f, const double u[2]);
+double imp__score_pdf(const struct imp__microfacet *f, const imp_v3 *m, double D);
+/* Inverse error function, to 1e-13. */
+double imp__erf_inverse(double y);
 
 #endif

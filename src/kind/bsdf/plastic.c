@@ -53,7 +53,7 @@ static double fresnel(const imp_spec *in, double c)
 /* Probability of the mirror lobe: its share of what is reflected, roughly. */
 static double mirror_chance(const imp_spec *in, const struct imp_dirs *d, double F)
 {
-    return imp__coated_chance(in[TINT], in[DIFFUSE], d, F);
+    return imp__coated_chance(in[TINT], in[DIFFUSE], d, F, IMP_INPUT_BIT(TINT));
 }
 
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],

@@ -20,6 +20,7 @@
  * Where derivatives are taken, all lobes keep a part of the draws, since the derivative
  * with respect to a weight does not vanish with it. */
 #include "principled.h"
+#include "blending.h"
 #include "burley.h"
 #include "fresnel.h"
 #include "lambert.h"
@@ -75,6 +76,8 @@ static struct look look_at(const struct imp_bsdf *b, const imp_spec *in,
     l.metallic = in[METALLIC][0];
     l.trans = p->transmits ? in[TRANS][0] : 0;
     l.facets = imp__burley_facets(in[ROUGHNESS][0], in[ANISOTROPIC][0]);
+    l.facets.f.wanted = imp__burley_wanted(d->derivative & IMP_INPUT_BIT(ROUGHNESS),
+                                           d->derivative & IMP_INPUT_BIT(ANISOTROPIC));
     return l;
 }
 /* Sets the half-vector. False: structurally zero. */
@@ -136,7 +139,7 @@ static void front_add(const struct look *l, const imp_spec *in, imp_spec *f, imp
     const struct imp__burley burley =
         imp__burley(l->wo[2], cos_i, l->om, in[ROUGHNESS][0], in[FLATNESS][0]);
     const double lambert = cos_i * IMP_INV_PI, brdf = (1 - m) * (1 - t);
-    const struct imp__microfacet quarter = {IMP_GGX, true, 0.25, 0.25};
+    const struct imp__microfacet quarter = {IMP_GGX, true, 0.25, 0.25, 0};
     const double coat = 0.25 * coat_d(coat_alpha(in), l->m[2], &dlog_coat) *
                         imp__microfacet_g1(&quarter, &l->wo, NULL) *
                         imp__microfacet_g1(&quarter, &l->wi, NULL) * cos_i;
@@ -240,21 +243,30 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
 struct chances {
     double facets, glass, diffuse, coat;
 };
+/* Inputs that are weights of a lobe, or that only its shape depends on. */
+#define BIT        IMP_INPUT_BIT
+#define OF_FACETS  (BIT(ROUGHNESS) | BIT(ANISOTROPIC) | BIT(METALLIC) | BIT(SPEC_TINT))
+#define OF_GLASS   (BIT(ROUGHNESS) | BIT(ANISOTROPIC) | BIT(METALLIC) | BIT(TRANS))
+#define OF_DIFFUSE (BIT(METALLIC) | BIT(TRANS) | BIT(SHEEN))
+static double least(uint64_t derivative, uint64_t of)
+{
+    return derivative & of ? IMP_WANTED_PART : derivative ? 0.1 : 0.02;
+}
 static struct chances chances_of(const struct look *l, const imp_spec *in,
-                                 bool derivative)
+                                 uint64_t derivative)
 {
     double cos_t, eta_t;
     const double m = l->metallic, t = l->trans;
     const double F = imp__fresnel_dielectric(l->wo[2], l->e, &cos_t, &eta_t);
     const double sheen = in[SHEEN][0], coat = 0.25 * in[CLEARCOAT][0];
-    const double least = derivative ? 0.1 : 0.02;
-    struct chances q = {imp_max(m + (1 - m) * F, least), 0, 0, 0};
+    struct chances q = {imp_max(m + (1 - m) * F, least(derivative, OF_FACETS)), 0, 0, 0};
     if (l->p->transmits && (derivative || t > 0))
-        q.glass = imp_max((1 - m) * t * (1 - F), least);
+        q.glass = imp_max((1 - m) * t * (1 - F), least(derivative, OF_GLASS));
     if (!l->back) {
         const double diffuse = (1 - m) * imp_max(1 - t, sheen);
-        q.diffuse = derivative ? imp_max(diffuse, least) : diffuse;
-        q.coat = l->p->coated && (derivative || coat > 0) ? imp_max(coat, 0.03) : 0;
+        q.diffuse =
+            derivative ? imp_max(diffuse, least(derivative, OF_DIFFUSE)) : diffuse;
+        if (l->p->coated && (derivative || coat > 0)) q.coat = imp_max(coat, 0.03);
     }
     const double all = 1 / (q.facets + q.glass + q.diffuse + q.coat);
     return (struct chances){q.facets * all, q.glass * all, q.diffuse * all, q.coat * all};

@@ -13,6 +13,7 @@
  *
  * D', G' have the roughness times 0.65 eta - 0.35, and the first transmission is there only
  * where wi is behind the facet h. Nothing is bent. Not reciprocal, by that condition. */
+#include "blending.h"
 #include "burley.h"
 #include "fresnel.h"
 #include "math/warp.h"
@@ -103,6 +104,8 @@ static bool sheet_of(const imp_spec *x, const struct imp_dirs *d, struct sheet *
     s->c = imp_min(imp__dot(s->wo, s->h), 1.0);
     s->spread = s->reflects ? 1 : 0.65 * x[ETA][0] - 0.35;
     s->facets = imp__burley_facets(x[ROUGHNESS][0] * s->spread, x[ANISOTROPIC][0]);
+    s->facets.f.wanted = imp__burley_wanted(d->derivative & IMP_INPUT_BIT(ROUGHNESS),
+                                            d->derivative & IMP_INPUT_BIT(ANISOTROPIC));
     return d->lobe == IMP_SMOOTH && s->wo[2] > 0 && s->wi[2] > 0 && s->c > 0;
 }
 
@@ -214,6 +217,9 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
 
 /* Probabilities of the lobes: facets and diffuse, of either side. Where derivatives are
  * taken, all keep a part, since that with respect to a weight does not vanish with it. */
+#define BIT        IMP_INPUT_BIT
+#define OF_FACETS  (BIT(ROUGHNESS) | BIT(ANISOTROPIC) | BIT(TRANS))
+#define OF_DIFFUSE (BIT(TRANS) | BIT(DIFF_TRANS))
 struct chances {
     double facets[2], diffuse[2]; /* reflection, transmission */
 };
@@ -222,11 +228,13 @@ static struct chances chances_of(const imp_spec *x, const struct imp_dirs *d)
     double cos_t, eta_t;
     const double t = x[TRANS][0], dt = 0.5 * x[DIFF_TRANS][0];
     const double F = imp__fresnel_dielectric(fabs(d->wo[2]), x[ETA][0], &cos_t, &eta_t);
-    const double least = d->derivative ? 0.1 : 0, some = t > 0 ? 0.02 : 0;
+    const uint64_t w = d->derivative;
+    const double least = w ? 0.1 : 0, some = t > 0 ? 0.02 : 0;
+    const double facets = w & OF_FACETS ? IMP_WANTED_PART : imp_max(least, some),
+                 diffuse = w & OF_DIFFUSE ? IMP_WANTED_PART : least;
     struct chances q = {
-        {imp_max(t * F, imp_max(least, some)),
-         imp_max(t * (1 - F), imp_max(least, some))},
-        {imp_max((1 - t) * (1 - dt), least), imp_max((1 - t) * dt, least)}};
+        {imp_max(t * F, facets), imp_max(t * (1 - F), facets)},
+        {imp_max((1 - t) * (1 - dt), diffuse), imp_max((1 - t) * dt, diffuse)}};
     const double all = 1 / (q.facets[0] + q.facets[1] + q.diffuse[0] + q.diffuse[1]);
     for (int k = 0; k < 2; k++) {
         q.facets[k] *= all;

@@ -48,7 +48,7 @@ static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_
 static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
 {
     if (!imp__front(d)) return 0;
-    const struct imp__microfacet m = imp__roughness_at(b->self, &in[ALPHA]);
+    const struct imp__microfacet m = imp__roughness_drawn(b->self, &in[ALPHA], d, ALPHA);
     const imp_v3 h = imp__normalize(d->wo + d->wi);
     return imp__microfacet_pdf(&m, &d->wo, &h) / (4 * imp__dot(d->wo, h));
 }
@@ -56,7 +56,7 @@ static double pdf_eval(const struct imp_bsdf *b, const imp_spec *in,
                        const struct imp_dirs *d, imp_spec *f)
 {
     if (!imp__front(d)) return 0;
-    const struct imp__microfacet m = imp__roughness_at(b->self, &in[ALPHA]);
+    const struct imp__microfacet m = imp__roughness_drawn(b->self, &in[ALPHA], d, ALPHA);
     const imp_v3 h = imp__normalize(d->wo + d->wi);
     const double D = imp__microfacet_d(&m, &h, NULL),
                  Go = imp__microfacet_g1(&m, &d->wo, NULL),
@@ -69,7 +69,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
                    struct imp_dirs *d)
 {
     if (!(d->wo[2] > 0)) return false;
-    const struct imp__microfacet m = imp__roughness_at(b->self, &in[ALPHA]);
+    const struct imp__microfacet m = imp__roughness_drawn(b->self, &in[ALPHA], d, ALPHA);
     const imp_v3 h = imp__microfacet_sample(&m, &d->wo, &u[1]);
     const double c = imp__dot(d->wo, h);
     if (!(c > 0)) return false;

@@ -98,7 +98,7 @@ static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp
     struct facet x;
     double cos_t, eta_t;
     if (d->lobe != IMP_SMOOTH || !facet_of(&v, &x)) return 0;
-    const struct imp__microfacet q = imp__roughness_at(b->self, &in[ALPHA]);
+    const struct imp__microfacet q = imp__roughness_drawn(b->self, &in[ALPHA], d, ALPHA);
     const double p = imp__microfacet_pdf(&q, &v.wo, &x.m);
     const double F = imp__fresnel_dielectric(x.om, v.e, &cos_t, &eta_t);
     /* dm/dwi = 1/(4 wo.m), or e^2 |wi.m|/n^2. */
@@ -112,7 +112,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
     struct view v = view_of(in, d);
     double cos_t, eta_t;
     if (!(v.wo[2] > 0)) return false;
-    const struct imp__microfacet q = imp__roughness_at(b->self, &in[ALPHA]);
+    const struct imp__microfacet q = imp__roughness_drawn(b->self, &in[ALPHA], d, ALPHA);
     const imp_v3 m = imp__microfacet_sample(&q, &v.wo, &u[1]);
     const double c = imp__dot(v.wo, m);
     if (!(c > 0)) return false;

@@ -36,8 +36,22 @@ static inline struct imp__microfacet imp__roughness_at(const struct imp__roughne
 {
     const double au = in[r->anisotropic ? 1 : 0][0], av = in[r->anisotropic ? 2 : 0][0];
     return (struct imp__microfacet){r->type, r->visible, imp_max(au, IMP_ALPHA_MIN),
-                                    imp_max(av, IMP_ALPHA_MIN)};
+                                    imp_max(av, IMP_ALPHA_MIN), 0};
 }
+/* The same for drawing directions: with the derivatives that d wants. The first of the three
+ * inputs has bit `first`. */
+static inline struct imp__microfacet imp__roughness_drawn(const struct imp__roughness *r,
+                                                          const imp_spec *in,
+                                                          const struct imp_dirs *d,
+                                                          int first)
+{
+    struct imp__microfacet f = imp__roughness_at(r, in);
+    const unsigned by = (unsigned)(d->derivative >> first) & 7;
+    f.wanted = !r->anisotropic ? (by & 1 ? IMP_SCORE_SCALE : 0)
+                               : (by & 2 ? IMP_SCORE_U : 0) | (by & 4 ? IMP_SCORE_V : 0);
+    return f;
+}
+
 /* Adds df by (au, av), lane by lane, to the derivatives `df` by the three inputs. */
 static inline void imp__roughness_d(const struct imp__roughness *r, const imp_spec *in,
                                     const imp_spec d[2], imp_spec *df)

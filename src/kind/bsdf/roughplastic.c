@@ -75,8 +75,18 @@ static struct at at_inputs(const struct imp_bsdf *b, const imp_spec *in)
 {
     const struct roughplastic *p = b->self;
     const double alpha = fmax(in[ALPHA][0], IMP_ALPHA_MIN);
-    return (struct at){p, {p->type, p->visible, alpha, alpha}, alpha, in[ETA][0]};
+    return (struct at){p, {p->type, p->visible, alpha, alpha, 0}, alpha, in[ETA][0]};
 }
+
+/* The same, for drawing directions. */
+static struct at at_drawn(const struct imp_bsdf *b, const imp_spec *in,
+                          const struct imp_dirs *d)
+{
+    struct at a = at_inputs(b, in);
+    if (d->derivative & IMP_INPUT_BIT(ALPHA)) a.facets.wanted = IMP_SCORE_SCALE;
+    return a;
+}
+
 static double number(const struct at *a, imp__dual x)
 {
     return imp__coat_at(&a->p->coat, x, a->alpha, a->eta);
@@ -87,14 +97,15 @@ static double facet_chance(const struct at *a, const imp_spec *in,
                            const struct imp_dirs *d)
 {
     const double T = imp_clamp(number(a, imp__coat_T(&a->p->coat, d->wo[2])), 0, 1);
-    return imp__coated_chance(in[TINT], in[DIFFUSE], d, 1 - T);
+    return imp__coated_chance(in[TINT], in[DIFFUSE], d, 1 - T,
+                              IMP_INPUT_BIT(TINT) | IMP_INPUT_BIT(ALPHA));
 }
 
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
                    struct imp_dirs *d)
 {
     if (!(d->wo[2] > 0)) return false;
-    const struct at a = at_inputs(b, in);
+    const struct at a = at_drawn(b, in, d);
     if (!(u[0] < facet_chance(&a, in, d))) return imp__lambert_sample(&u[1], d);
     const imp_v3 h = imp__microfacet_sample(&a.facets, &d->wo, &u[1]);
     const double c = imp__dot(d->wo, h);
@@ -106,7 +117,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
 static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
 {
     if (!imp__front(d)) return 0;
-    const struct at a = at_inputs(b, in);
+    const struct at a = at_drawn(b, in, d);
     const imp_v3 h = imp__normalize(d->wo + d->wi);
     const double q = facet_chance(&a, in, d);
     return q * imp__microfacet_pdf(&a.facets, &d->wo, &h) / (4 * imp__dot(d->wo, h)) +
