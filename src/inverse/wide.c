@@ -80,6 +80,24 @@ out:
     return st;
 }
 
+static int64_t light_spp(const struct imp_tracer *tracer, const struct imp_run *run,
+                         int rounds)
+{
+    return (int64_t)imp_max(run->spp > 0 ? run->spp : tracer->sensor->spp, 4) * rounds;
+}
+
+/* How many replicates there are, and whether their pictures, and those of `buffers`, fit
+ * into memory: before anything is taken. */
+static enum imp_status light_plan(struct imp__wide *w, const struct imp_tracer *tracer,
+                                  const struct imp_run *run, int rounds)
+{
+    const double pixels = (double)w->width * w->height, K = (double)w->K;
+    w->R = light_spp(tracer, run, rounds) < 8 ? 4 : IMP_WIDE_REPLICATES;
+    return imp__memory_check(
+        w->ctx, pixels * (w->R * (K + 1) * w->channels + 2 * K + 1) * sizeof(double),
+        "derivative pictures of walks from the lights");
+}
+
 /* A walk from a light reaches many pixels, whatever the filter. */
 static enum imp_status light_replicates(struct imp__wide *w,
                                         const struct imp_tracer *tracer,
@@ -87,17 +105,11 @@ static enum imp_status light_replicates(struct imp__wide *w,
                                         double hi)
 {
     const size_t pixels = (size_t)w->width * (size_t)w->height;
-    const int64_t spp =
-        (int64_t)imp_max(run->spp > 0 ? run->spp : tracer->sensor->spp, 4) * rounds;
+    const int64_t spp = light_spp(tracer, run, rounds);
     struct imp_run own = *run;
     own.time_limit_s = 0;
-    w->R = spp < 8 ? 4 : IMP_WIDE_REPLICATES;
     const int64_t walks = ((spp - 1) / w->R + 1) * (int64_t)pixels;
     const size_t n = pixels * (w->K + 1) * (size_t)w->channels;
-    const enum imp_status fits =
-        imp__memory_check(w->ctx, (double)w->R * (double)n * sizeof(double),
-                          "derivative pictures of walks from the lights");
-    if (fits != IMP_OK) return fits;
     for (int b = 0; b < w->R; b++) {
         w->rows[b] = imp__alloc(w->ctx, n, sizeof(double));
         if (!w->rows[b])
@@ -271,8 +283,9 @@ enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                           .seen = target->desc.channels,
                           .luminance = imp__sees_luminance(target, p->scene->channels),
                           .K = p->n};
-    IMP_TRY(buffers(&w));
     const bool lights = tracer->integrator->from_lights;
+    if (lights) IMP_TRY(light_plan(&w, tracer, run, rounds));
+    IMP_TRY(buffers(&w));
     IMP_TRY(lights ? light_replicates(&w, tracer, run, rounds, lo, hi)
                    : replicates(&w, tracer, run, rounds, lo, hi));
     IMP_TRY(imp__pair_noise_create(w.ctx, lights ? 1 : w.width, lights ? 1 : w.height,
