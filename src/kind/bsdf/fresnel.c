@@ -120,6 +120,36 @@ static double conductor(double c, double eta, double k, double *d_eta, double *d
     return 0.5 * Rs * (1 + ratio);
 }
 
+/* a where the lanes of `mask` are set, else b. */
+typedef int64_t lanes_mask __attribute__((vector_size(32)));
+static inline imp_spec pick(lanes_mask mask, imp_spec a, imp_spec b)
+{
+    return (imp_spec)((mask & (lanes_mask)a) | (~mask & (lanes_mask)b));
+}
+static inline imp_spec roots(imp_spec x)
+{
+    imp_spec r;
+    for (int i = 0; i < 4; i++) r[i] = sqrt(x[i]);
+    return r;
+}
+
+/* The value of all lanes at once, operation by operation as in one. */
+static imp_spec conductors(double c, imp_spec eta, imp_spec k)
+{
+    const double c2 = c * c, s2 = imp_max(1 - c2, 0);
+    const imp_spec zero = {0}, one = imp__spec(1);
+    const imp_spec ek = eta * k, t = eta * eta - k * k - s2;
+    const imp_spec A = roots(t * t + 4 * ek * ek);
+    const lanes_mask turned = t < zero;
+    const imp_spec a = pick(turned, ek * roots(pick(turned, 2 / (A - t), zero)),
+                            roots(pick(turned, zero, 0.5 * (A + t))));
+    const imp_spec P = A + c2, Q = 2 * a * c, U = A * c2 + s2 * s2, V = Q * s2;
+    const imp_spec s_sum = P + Q, p_sum = U + V, rest = P - Q;
+    const imp_spec Rs = pick(s_sum > zero, pick(rest > zero, rest, zero) / s_sum, one);
+    const imp_spec ratio = pick(p_sum > zero, (U - V) / p_sum, one);
+    return 0.5 * Rs * (1 + ratio);
+}
+
 /* Lanes that differ: one where all are equal; of colours, whose fourth is 0, three. */
 static int lanes_of(const imp_spec *eta, const imp_spec *k)
 {
@@ -131,9 +161,12 @@ static int lanes_of(const imp_spec *eta, const imp_spec *k)
 void imp__fresnel_conductor(double c, const imp_spec *eta, const imp_spec *k, imp_spec *f)
 {
     const int n = lanes_of(eta, k);
-    *f = imp__spec(n == 1 ? conductor(c, (*eta)[0], (*k)[0], NULL, NULL) : 0);
-    for (int i = 0; n > 1 && i < n; i++)
-        (*f)[i] = conductor(c, (*eta)[i], (*k)[i], NULL, NULL);
+    if (n == 1) {
+        *f = imp__spec(conductor(c, (*eta)[0], (*k)[0], NULL, NULL));
+        return;
+    }
+    *f = conductors(c, *eta, *k);
+    if (n == 3) (*f)[3] = 0;
 }
 
 void imp__fresnel_conductor_d(double c, const imp_spec *eta, const imp_spec *k,

@@ -61,21 +61,22 @@ out:
 /* Quantities shared by the formulas, for two directions on the front. */
 struct half {
     imp_v3 m;
-    double c_m, sin_m, mo;
+    double c_m, mo;
     double p; /* p_m/(4 mo): density of the lobe's own sampling */
     double V;
 };
+
+static double sin_m(const struct half *h) { return hypot(h->m[0], h->m[1]); }
 
 static struct half half(const struct m2 *m2, double alpha, const struct imp_dirs *d)
 {
     struct half h;
     h.m = imp__normalize(d->wo + d->wi);
     h.c_m = h.m[2];
-    h.sin_m = hypot(h.m[0], h.m[1]);
     h.mo = imp__dot(h.m, d->wo);
     h.p = (alpha + 2) / IMP_2PI * pow(h.c_m, alpha + 1) / (4 * h.mo);
     h.V = m2->variant == RECIPROCAL ? fmin(1, d->wi[2] / d->wo[2])
-          : m2->variant == PAPER    ? h.sin_m
+          : m2->variant == PAPER    ? sin_m(&h)
                                     : 1;
     return h;
 }
@@ -153,15 +154,16 @@ static bool sample_d(const struct imp_bsdf *b, const imp_spec *in, const double 
     if (j != EXPONENT || !imp__front(d)) return false;
     const double alpha = in[EXPONENT][0], q = cosine_share(m2);
     const struct half h = half(m2, alpha, d);
+    const double sine = sin_m(&h);
     double dc = 0, dmo = 0;
     *dwi = imp__v3(0, 0, 0);
     if (!(u[0] < q)) {
         dc = -h.c_m * log(h.c_m) / (alpha + 2);
-        if (h.sin_m > 0) {
+        if (sine > 0) {
             /* d theta = -dc/sin; e_theta = (cos phi c_m, sin phi c_m, -sin_m) */
-            const double t = -dc / h.sin_m;
+            const double t = -dc / sine;
             const imp_v3 dm =
-                imp__v3(h.m[0] / h.sin_m * h.c_m * t, h.m[1] / h.sin_m * h.c_m * t, dc);
+                imp__v3(h.m[0] / sine * h.c_m * t, h.m[1] / sine * h.c_m * t, dc);
             dmo = imp__dot(dm, d->wo);
             *dwi = (h.m * dmo + dm * h.mo) * 2.0;
         }
@@ -169,7 +171,7 @@ static bool sample_d(const struct imp_bsdf *b, const imp_spec *in, const double 
     const double dci = (*dwi)[2];
     const double dlog_p = score(alpha, &h) + (alpha + 1) * dc / h.c_m - dmo / h.mo;
     double dV = 0;
-    if (m2->variant == PAPER && h.sin_m > 0) dV = -h.c_m * dc / h.sin_m;
+    if (m2->variant == PAPER && sine > 0) dV = -h.c_m * dc / sine;
     if (m2->variant == RECIPROCAL && d->wi[2] < d->wo[2]) dV = dci / d->wo[2];
 
     const double p = q * imp__lambert(d) + (1 - q) * h.p;
