@@ -103,6 +103,23 @@ static void names_make(struct names *s, const struct imp_scene *scene,
                 names_add(s, moment == 2 ? "m2_" : "", top->inner[k].name, xyz[c]);
 }
 
+/* integrator NULL: of the first hit. */
+static struct imp_tracer tracer_of(const struct imp_measure *m,
+                                   const struct imp_walk_integrator *integrator)
+{
+    static const struct imp_walk_integrator first_hit = {.max_depth = 0};
+    struct imp_tracer tracer = {
+        .scene = m->scene,
+        .integrator = integrator ? integrator : &first_hit,
+        .sensor = m->sensor,
+        .seed = m->seed,
+        .guide = integrator ? imp__guide_of(m->scene, integrator, m->guide) : NULL,
+        .value_only = true,
+        .kept = m->kept};
+    imp__tracer_numbers(&tracer, m->run, imp__walks_of(m->run, m->sensor));
+    return tracer;
+}
+
 enum imp_status imp__measure_create(const struct imp_scene *scene,
                                     const struct imp_run *run, struct imp_measure *out)
 {
@@ -154,6 +171,7 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
         else st = imp__walks_use(run, &tracer);
     }
     out->kept = tracer.kept;
+    if (from) out->tracer = tracer_of(out, from);
     out->spp = (int)imp_max(samples, (int64_t)1);
     out->set = imp__tracer_set(&tracer, samples);
     if (st != IMP_OK) imp__measure_destroy(out);
@@ -297,19 +315,15 @@ static void radiance(const struct imp_measure *m,
                      const struct imp_walk_integrator *integrator, struct imp_sample *s,
                      imp_spec *L, double *alpha, struct imp_walk *walk)
 {
-    static const struct imp_walk_integrator first_hit = {.max_depth = 0};
-    struct imp_tracer tracer = {
-        .scene = m->scene,
-        .integrator = integrator ? integrator : &first_hit,
-        .sensor = m->sensor,
-        .seed = m->seed,
-        .guide = integrator ? imp__guide_of(m->scene, integrator, m->guide) : NULL,
-        .value_only = true,
-        .kept = m->kept};
-    imp__tracer_numbers(&tracer, m->run, imp__walks_of(m->run, m->sensor));
+    struct imp_tracer own;
+    const struct imp_tracer *tracer = &m->tracer;
+    if (imp_unlikely(!integrator || integrator != tracer->integrator)) {
+        own = tracer_of(m, integrator);
+        tracer = &own;
+    }
     const enum imp_drop before = s->dropped;
     const struct imp_arena_mark mark = imp__arena_mark(s->arena);
-    imp__sample_walk(s, &tracer, walk);
+    imp__sample_walk(s, tracer, walk);
     if (before != IMP_DROP_NONE) s->dropped = before;
     *L = walk->L;
     if (integrator) {
@@ -321,7 +335,7 @@ static void radiance(const struct imp_measure *m,
     const struct imp_film_desc *film = &m->sensor->film;
     const double gain = imp_likely(!m->sensor->gain)
                             ? 1 /* of all curves: they have no white balance */
-                            : imp__walk_gain(&tracer, walk)[0];
+                            : imp__walk_gain(tracer, walk)[0];
     for (int c = 0; c < film->n_responses; c++) {
         imp_spec weight = {0};
         if (walk->waves) imp__waves_response(walk->waves, &film->response[c], &weight);

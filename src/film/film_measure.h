@@ -20,8 +20,9 @@ struct imp_measure {
     int set; /* of samples that depend on each other (imp_picture) */
     const struct imp_walk_integrator *integrator; /* of the scene, from the run's end */
     bool from_lights;
-    int n;       /* channels */
-    char *names; /* "R,G,B,..." for imp__film_create */
+    struct imp_tracer tracer; /* of that integrator, for values */
+    int n;                    /* channels */
+    char *names;              /* "R,G,B,..." for imp__film_create */
 };
 
 /* IMP_E_SCENE without a sensor or integrator; names are released by measure_destroy. */
