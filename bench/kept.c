@@ -4,8 +4,8 @@
  * processor time; the median of pairs measured in turn. Then whole pictures, and searches
  * by L-BFGS.
  *
- *     kept [--repeats N] [--spp N] */
-#include "walk/record.h"
+ *     kept [--repeats N] [--spp N] [--only walks|pictures|fits] [--scene NAME] */
+#include "walk/reduced.h"
 #include <importon/walks.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,6 +13,7 @@
 #include <time.h>
 
 static int repeats = 5, spp = 16;
+static const char *only = "", *scene_only = ""; /* parts, and scenes, whose name has it */
 static imp_context *ctx;
 
 static void must(enum imp_status st)
@@ -60,6 +61,8 @@ struct job {
     struct imp_tracer tracer;
     struct imp_arena arena;
     struct imp_record record;
+    struct imp_reduction *reduction;
+    struct imp_reduced reduced;
     struct gradient to;
     double sum; /* of radiance: what was asked for is used */
 };
@@ -91,7 +94,9 @@ static void evaluate_all(struct job *j, bool swept)
     for (size_t i = 0; i < j->record.n_walks; i++) {
         const struct imp_arena_mark mark = imp__arena_mark(&j->arena);
         struct imp_walk w;
-        imp__record_walk(&j->record, i, &j->tracer, &j->arena, &w);
+        if (!j->reduced.of ||
+            !imp__reduced_walk(&j->reduced, &j->record, i, &j->tracer, &j->arena, &w))
+            imp__record_walk(&j->record, i, &j->tracer, &j->arena, &w);
         if (swept) sweep(j, &w);
         else j->sum += w.L[0] + w.L[1] + w.L[2];
         imp__arena_rewind(&j->arena, mark);
@@ -99,8 +104,14 @@ static void evaluate_all(struct job *j, bool swept)
     j->tracer.value_only = false;
 }
 
+static bool wanted(const char *part, const char *file)
+{
+    return strstr(part, only) && strstr(file, scene_only);
+}
+
 static void measure(const char *file, const char *define)
 {
+    if (!wanted("walks", file)) return;
     struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
     char path[1024];
     imp_scene *scene;
@@ -124,6 +135,10 @@ static void measure(const char *file, const char *define)
     imp__arena_init(&j.arena, ctx);
     must(imp__record_create(&j.tracer, (size_t)2 << 30, &j.record));
     trace_all(&j, true, false);
+    must(imp__reduction_create(scene, j.tracer.integrator, chosen, &j.reduction));
+    double reducing = cpu();
+    if (j.reduction) imp__reduced_make(j.reduction, &j.record, &j.reduced);
+    reducing = cpu() - reducing;
 
     double both[64], value[64], ns[64];
     for (int k = 0; k < repeats; k++) {
@@ -138,13 +153,17 @@ static void measure(const char *file, const char *define)
         value[k] = (t3 - t2) / (t1 - t0);
         ns[k] = (t1 - t0) / (double)j.record.n_walks * 1e9;
     }
-    printf("%-14s %-16s %5.2f vertices %5.0f bytes a walk; traced and swept %5.0f ns; "
-           "kept: value %.3f, and swept %.3f of that\n",
+    printf("%-14s %-16s %5.2f vertices %5.0f bytes a walk, reduced %3.0f in %3.0f ns; "
+           "traced and swept %5.0f ns; kept: value %.3f, and swept %.3f of that\n",
            file, define ? define : "",
            (double)j.record.n_vertices / (double)j.record.n_walks,
            (double)imp__record_bytes(&j.record) / (double)j.record.n_walks,
-           median(ns, repeats), median(value, repeats), median(both, repeats));
+           (double)imp__reduced_bytes(&j.reduced) / (double)j.record.n_walks,
+           reducing / (double)j.record.n_walks * 1e9, median(ns, repeats),
+           median(value, repeats), median(both, repeats));
     fflush(stdout);
+    imp__reduced_free(&j.reduced);
+    imp__reduction_destroy(j.reduction);
     imp__record_destroy(&j.record);
     imp__arena_free(&j.arena);
     imp__active_destroy(ctx, &active);
@@ -156,6 +175,7 @@ static void measure(const char *file, const char *define)
 /* Whole pictures, through the film: kept ones over traced ones. */
 static void measure_picture(const char *file, const char *define)
 {
+    if (!wanted("pictures", file)) return;
     struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
     struct imp_run run = IMP_RUN_INIT;
     char path[1024];
@@ -190,6 +210,7 @@ static void measure_picture(const char *file, const char *define)
  * after it. */
 static void measure_fit(const char *file, const char *define, const char *glob)
 {
+    if (!wanted("fits", file)) return;
     struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
     struct imp_run run = IMP_RUN_INIT;
     struct imp_target t = IMP_TARGET_INIT;
@@ -252,6 +273,8 @@ int main(int argc, char **argv)
     for (int k = 1; k + 1 < argc; k += 2) {
         if (strcmp(argv[k], "--repeats") == 0) repeats = atoi(argv[k + 1]);
         else if (strcmp(argv[k], "--spp") == 0) spp = atoi(argv[k + 1]);
+        else if (strcmp(argv[k], "--only") == 0) only = argv[k + 1];
+        else if (strcmp(argv[k], "--scene") == 0) scene_only = argv[k + 1];
     }
     if (repeats < 1 || repeats > 64 || spp < 1) return 2;
     o.threads = 1;

@@ -171,6 +171,20 @@ out:
     return st;
 }
 
+/* Walks are reduced with the numbers that may not change as they are in the scene: not
+ * where these are others than when the walks were drawn, which is an error later on. */
+static enum imp_status reduction_check(struct imp_walks *w)
+{
+    uint8_t *changed = imp__alloc(w->ctx, w->scene->n_params + 1, 1);
+    if (!changed) return imp__error(w->ctx, IMP_E_NOMEM, "no memory for kept walks");
+    if (imp__walks_changed(w, changed) != IMP_OK) {
+        imp__reduction_destroy(w->reduction);
+        w->reduction = NULL;
+    }
+    imp__release(w->ctx, changed);
+    return IMP_OK;
+}
+
 /* `scene`: NULL, or whose walks these have to be. */
 static enum imp_status walks_take(struct reading *r, imp_scene *scene, double memory,
                                   double ess, imp_walks **out)
@@ -193,9 +207,10 @@ static enum imp_status walks_take(struct reading *r, imp_scene *scene, double me
                                         .survival =
                                             r->head.survival > 0 ? r->head.survival : -1,
                                         .ess = ess > 0 ? ess : r->head.ess};
-    IMP_TRY(imp__walks_begin(scene, &run, &o, &w));
+    IMP_TRY(imp__walks_begin(scene, &run, &o, NULL, &w));
     w->guided = r->head.guided != 0;
     memcpy(w->theta, r->theta, scene->n_theta * sizeof *w->theta);
+    IMP_TRY(reduction_check(w));
     IMP_TRY(stores_take(r, w, memory));
     w->owns_scene = scene == r->held;
     for (size_t k = 0; k < scene->n_params && w->owns_scene; k++) {

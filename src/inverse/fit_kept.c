@@ -11,10 +11,14 @@
 #include "keep.h"
 #include <stdio.h>
 
-#define REDRAW_ESS 0.8 /* below: a new draw */
-#define TRACED_ESS 0.5 /* below: the evaluation traces its own walks */
-#define SURVIVAL   0.8
-#define MEMORY     0x1p30
+#define REDRAW_ESS     0.8 /* below: a new draw */
+#define TRACED_ESS     0.5 /* below: the evaluation traces its own walks */
+#define SURVIVAL       0.8 /* most that roulette's floor is */
+#define SURVIVAL_LEAST 0.3
+#define ROOM           1.7 /* to which the second moment of a step may grow under the floor */
+#define PILOT          4 /* samples of a pixel by which it is found */
+#define MEMORY         0x1p30
+#define WEIGHED        8192 /* walks whose effective sample size is found, a sensor */
 
 bool imp__fit_keeps(const struct imp__fit *f)
 {
@@ -44,17 +48,49 @@ static bool all_chosen(const struct imp_problem *p, const imp_walks *w)
     return true;
 }
 
+/* Roulette's floor, no higher than the scene needs: high ones make long walks, and each
+ * evaluation pays for them. It is a bound of rho'^2, which a few walks tell. */
+static enum imp_status survival_find(struct imp__fit *f, const struct imp_run *run,
+                                     const struct imp_walks_options *o,
+                                     const uint8_t *sensors, const uint8_t *free,
+                                     double *survival)
+{
+    struct imp_problem *p = f->problem;
+    const double spp = imp__fit_spp(f);
+    struct imp_run few = *run;
+    imp_walks *pilot = NULL;
+    double most = 0;
+    *survival = SURVIVAL;
+    if (run->guide || spp < 8 * PILOT) return IMP_OK;
+    few.spp = PILOT;
+    few.progress = NULL;
+    enum imp_status st = imp__walks_make(p->scene, &few, o, sensors, free, &pilot);
+    /* As if all had changed: growth is found for that, though densities stay. */
+    for (size_t k = 0; st == IMP_OK && k < p->scene->n_params; k++)
+        for (size_t e = 0; pilot->chosen[k] && e < p->scene->params[k].info.count; e++)
+            pilot->theta[p->scene->params[k].info.offset + e] = NAN;
+    for (int k = 0; st == IMP_OK && k < pilot->n_stores; k++) {
+        struct imp_walks_weight w;
+        st = imp__walks_weigh(pilot, &pilot->stores[k], NULL, 0, &w);
+        most = fmax(most, w.growth);
+    }
+    if (st == IMP_OK && most > 0)
+        *survival = imp_clamp(ROOM * SURVIVAL * most, SURVIVAL_LEAST, SURVIVAL);
+    imp__walks_destroy(pilot);
+    return st;
+}
+
 enum imp_status imp__fit_draw(const double *x, uint64_t seed, void *payload)
 {
     struct imp__fit *f = payload;
     struct imp_problem *p = f->problem;
     struct imp_run run = f->run;
-    const struct imp_walks_options o = {
-        .size = sizeof o,
-        .memory = f->options.memory > 0 ? f->options.memory : MEMORY,
-        .losses = 1,
-        .survival = SURVIVAL,
-        .ess = -1}; /* imp__fit_take_walks checks it */
+    struct imp_walks_options o = {.size = sizeof o,
+                                  .memory =
+                                      f->options.memory > 0 ? f->options.memory : MEMORY,
+                                  .losses = 1,
+                                  .survival = SURVIVAL,
+                                  .ess = -1}; /* imp__fit_take_walks checks it */
     imp__walks_destroy(f->walks);
     f->walks = NULL;
     f->stale = false;
@@ -67,13 +103,18 @@ enum imp_status imp__fit_draw(const double *x, uint64_t seed, void *payload)
             give_up(f);
             return IMP_OK;
         }
-    uint8_t *sensors = imp__alloc(p->ctx, (size_t)p->scene->n_sensors + 1, 1);
+    const size_t n_sensors = (size_t)p->scene->n_sensors, n_params = p->scene->n_params;
+    uint8_t *sensors = imp__alloc(p->ctx, n_sensors + n_params + 1, 1);
     if (!sensors) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for kept walks");
+    uint8_t *free = sensors + n_sensors;
+    for (size_t k = 0; k < n_params; k++) free[k] = p->active.base[k] >= 0;
     for (size_t t = 0; t < p->n_targets; t++) sensors[p->targets[t].desc.sensor] = 1;
     run.seed = seed;
     enum imp_status st = imp_problem_set_x(p, x);
     if (st == IMP_OK) {
-        st = imp__walks_make(p->scene, &run, &o, sensors, &f->walks);
+        st = survival_find(f, &run, &o, sensors, free, &o.survival);
+        if (st == IMP_OK)
+            st = imp__walks_make(p->scene, &run, &o, sensors, free, &f->walks);
         if (st == IMP_E_NOMEM || st == IMP_E_UNSUPPORTED ||
             (st == IMP_OK && !all_chosen(p, f->walks))) {
             give_up(f);
@@ -96,7 +137,8 @@ enum imp_status imp__fit_draw(const double *x, uint64_t seed, void *payload)
     f->walks_seed = seed;
     f->walks_bytes = 0;
     for (int k = 0; k < f->walks->n_stores; k++)
-        f->walks_bytes += (double)f->walks->stores[k].bytes;
+        f->walks_bytes +=
+            (double)f->walks->stores[k].bytes + (double)f->walks->stores[k].reduced_bytes;
     f->draws++;
     return IMP_OK;
 }
@@ -113,7 +155,7 @@ enum imp_status imp__fit_take_walks(struct imp__fit *f, const double *x, uint64_
     enum imp_status st = imp_problem_set_x(f->problem, x);
     for (int k = 0; k < f->walks->n_stores && st == IMP_OK; k++) {
         struct imp_walks_weight w;
-        st = imp__walks_weigh(f->walks, &f->walks->stores[k], NULL, &w);
+        st = imp__walks_weigh(f->walks, &f->walks->stores[k], NULL, WEIGHED, &w);
         ess = fmin(ess, w.ess);
         finite &= imp__walks_finite(f->walks, &w);
     }

@@ -139,7 +139,7 @@ enum imp_status imp__walks_sensor(struct imp_walks *w, const struct imp_active *
     if (w->losses) tracer->set = 1;
     IMP_TRY(imp__store_create(
         tracer, index, sensor->film.sample_border ? imp__film_border(&sensor->film) : 0,
-        numbers.sample, numbers.n, budget, store));
+        numbers.sample, numbers.n, budget, w->reduction, store));
     w->n_stores++;
     store->stratified = tracer->wavelengths && tracer->set > 1;
     if (w->losses && tracer->points) {
@@ -157,15 +157,17 @@ static enum imp_status sensor_keep(struct imp_walks *w, const struct imp_active 
                                    int index, size_t budget)
 {
     struct filling f = {.store = &w->stores[w->n_stores]};
-    const enum imp_status st = imp__walks_sensor(w, active, index, budget, &f.tracer);
-    return st == IMP_OK ? store_fill(w, &f) : st;
+    enum imp_status st = imp__walks_sensor(w, active, index, budget, &f.tracer);
+    if (st == IMP_OK) st = store_fill(w, &f);
+    if (st == IMP_OK) imp__store_settle(f.store);
+    return st;
 }
 
 /* ---- All of them ----------------------------------------------------------------- */
 
 /* Chooses the parameters whose derivative is that of frozen walks, and those by which
  * collisions were drawn. */
-static enum imp_status chosen_make(struct imp_walks *w)
+static enum imp_status chosen_make(struct imp_walks *w, const uint8_t *free)
 {
     const struct imp_scene *scene = w->scene;
     w->chosen = imp__alloc(w->ctx, scene->n_params + 1, 1);
@@ -175,7 +177,8 @@ static enum imp_status chosen_make(struct imp_walks *w)
         return imp__error(w->ctx, IMP_E_NOMEM, "no memory for kept walks");
     for (size_t k = 0; k < scene->n_params; k++) {
         const struct imp_param *p = &scene->params[k];
-        const bool smooth = p->info.flags & IMP_PARAM_DIFFERENTIABLE;
+        const bool smooth =
+            p->info.flags & IMP_PARAM_DIFFERENTIABLE && (!free || free[k]);
         w->chosen[k] = smooth && !p->probed;
         w->flights[k] = smooth && p->probed;
         for (size_t e = 0; e < p->info.count; e++)
@@ -190,7 +193,8 @@ static enum imp_status chosen_make(struct imp_walks *w)
 }
 
 enum imp_status imp__walks_begin(imp_scene *scene, const struct imp_run *run,
-                                 const struct imp_walks_options *o, imp_walks **out)
+                                 const struct imp_walks_options *o, const uint8_t *free,
+                                 imp_walks **out)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = scene->ctx;
@@ -219,9 +223,11 @@ enum imp_status imp__walks_begin(imp_scene *scene, const struct imp_run *run,
                             .integrator = integrator};
     w->stores = imp__alloc(ctx, (size_t)scene->n_sensors + 1, sizeof *w->stores);
     if (!w->stores) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks"));
-    IMP_TRY(chosen_make(w));
-    IMP_TRY(imp__densities_create(scene, integrator, w->chosen, w->survival,
-                                  &w->densities));
+    IMP_TRY(chosen_make(w, free));
+    IMP_TRY(
+        imp__densities_create(scene, integrator, w->chosen, w->survival, &w->densities));
+    if (!w->spread)
+        IMP_TRY(imp__reduction_create(scene, integrator, w->chosen, &w->reduction));
     *out = w;
     return IMP_OK;
 out:
@@ -238,7 +244,8 @@ static enum imp_status sensors_keep(struct imp_walks *w, const uint8_t *sensors,
     for (int k = 0; k < w->scene->n_sensors; k++) {
         if (!sensors[k]) continue;
         IMP_TRY(sensor_keep(w, &active, k, (size_t)fmin(memory, 0x1p62)));
-        memory -= (double)w->stores[w->n_stores - 1].bytes;
+        const struct imp_store *s = &w->stores[w->n_stores - 1];
+        memory -= (double)s->bytes + (double)s->reduced_bytes;
     }
 out:
     imp__active_destroy(w->ctx, &active);
@@ -262,13 +269,13 @@ static enum imp_status spread_agree(struct imp_walks *w, enum imp_status st)
 
 enum imp_status imp__walks_make(imp_scene *scene, const struct imp_run *run,
                                 const struct imp_walks_options *o, const uint8_t *sensors,
-                                imp_walks **out)
+                                const uint8_t *free, imp_walks **out)
 {
     enum imp_status st = IMP_OK;
     struct imp_walks *w = NULL;
     if (imp__team_apart(scene->ctx))
         return imp__error(scene->ctx, IMP_E_UNSUPPORTED, "walks are not kept in parts");
-    IMP_TRY(imp__walks_begin(scene, run, o, &w));
+    IMP_TRY(imp__walks_begin(scene, run, o, free, &w));
     IMP_TRY(spread_agree(w, sensors_keep(w, sensors, o->memory)));
     w->run.progress = NULL; /* of this call alone */
     w->run.guide = NULL;
@@ -315,7 +322,7 @@ enum imp_status imp_walks_keep(imp_scene *scene, const struct imp_run *run,
     }
     if (o.losses && !told && scene->n_media == 0)
         own.points = IMP_POINTS_SOBOL; /* imp__points_of_losses */
-    IMP_TRY(imp__walks_make(scene, &own, &o, sensors, out));
+    IMP_TRY(imp__walks_make(scene, &own, &o, sensors, NULL, out));
 out:
     imp__release(ctx, sensors);
     return st;

@@ -28,6 +28,7 @@ void imp__walks_destroy(struct imp_walks *w)
     for (int k = 0; k < w->n_stores; k++) imp__store_destroy(&w->stores[k]);
     imp__release(ctx, w->stores);
     imp__densities_destroy(ctx, &w->densities);
+    imp__reduction_destroy(w->reduction);
     imp__release(ctx, w->theta);
     imp__release(ctx, w->chosen);
     imp__release(ctx, w->flights);
@@ -93,6 +94,7 @@ struct weighing {
     const struct imp_densities *densities;
     struct imp_tracer tracer;
     const float *mask;
+    size_t every;             /* walk that is asked */
     struct imp_arena *arenas; /* [threads] */
     struct imp_moments sum;
 };
@@ -105,7 +107,7 @@ static enum imp_status tiles_weigh(size_t item, int worker, void *result, void *
     memset(result, 0, sizeof(struct imp_moments));
     for (size_t k = item * TILES_AT_ONCE; k < end && st == IMP_OK; k++)
         st = imp__store_moments(w->store, w->densities, &w->tracer, &w->arenas[worker], k,
-                                w->mask, result);
+                                w->mask, w->every, result);
     return st;
 }
 static void moments_add(void *into, const void *from, void *payload)
@@ -213,8 +215,28 @@ static enum imp_status worth_check(const struct imp_walks *w,
     return IMP_OK;
 }
 
+static void weighing_begin(const struct imp_walks *w, const struct imp_store *store,
+                           const struct imp_densities *densities, const float *mask,
+                           size_t most, struct weighing *x)
+{
+    struct imp_run run = w->run;
+    size_t n = 0;
+    *x = (struct weighing){.store = store,
+                           .densities = densities,
+                           .tracer = {.scene = w->scene,
+                                      .integrator = w->integrator,
+                                      .sensor = store->sensor},
+                           .mask = mask,
+                           .every = 1};
+    for (size_t k = 0; k < imp__store_tiles(store); k++) n += store->records[k].n_walks;
+    if (most > 0 && !densities->flights) x->every = (n / most) | 1;
+    run.sensor = store->index;
+    imp__tracer_numbers(&x->tracer, &run, 0);
+}
+
 enum imp_status imp__walks_weigh(const struct imp_walks *w, const struct imp_store *store,
-                                 const float *mask, struct imp_walks_weight *out)
+                                 const float *mask, size_t most,
+                                 struct imp_walks_weight *out)
 {
     imp_context *ctx = w->ctx;
     enum imp_status st = IMP_OK;
@@ -231,15 +253,8 @@ enum imp_status imp__walks_weigh(const struct imp_walks *w, const struct imp_sto
     imp__densities_move(&own, changed);
     /* Roulette's own growth is of interest at the parameters of the draw, too. */
     if (!own.any && !(store->roulette && own.weights)) goto out;
-    struct imp_run run = w->run;
-    struct weighing x = {.store = store,
-                         .densities = &own,
-                         .tracer = {.scene = w->scene,
-                                    .integrator = w->integrator,
-                                    .sensor = store->sensor},
-                         .mask = mask};
-    run.sensor = store->index;
-    imp__tracer_numbers(&x.tracer, &run, 0);
+    struct weighing x;
+    weighing_begin(w, store, &own, mask, most, &x);
     IMP_TRY(moments_sum(w, &x));
     out->n_walks = x.sum.n;
     if (x.sum.w2 > 0) out->ess = x.sum.w * x.sum.w / (x.sum.n * x.sum.w2);
@@ -291,7 +306,7 @@ enum imp_status imp__walks_use(const struct imp_run *run, struct imp_tracer *tra
         return imp__error(ctx, IMP_E_ARG, "kept walks of another integrator");
     IMP_CHECKED(active_check(w, tracer->active));
     if (w->ess >= 0) { /* else whoever made them has looked */
-        IMP_CHECKED(imp__walks_weigh(w, store, NULL, &worth));
+        IMP_CHECKED(imp__walks_weigh(w, store, NULL, 0, &worth));
         IMP_CHECKED(worth_check(w, &worth));
     }
     tracer->kept = store;
@@ -349,7 +364,7 @@ enum imp_status imp_walks_weigh(const imp_walks *w, int sensor, const float *mas
     for (size_t i = 0; mask && i < pixels; i++)
         if (!isfinite(mask[i]))
             return imp__error(w->ctx, IMP_E_ARG, "mask: pixel %zu is %g", i, mask[i]);
-    enum imp_status st = imp__walks_weigh(w, store, mask, &all);
+    enum imp_status st = imp__walks_weigh(w, store, mask, 0, &all);
     if (st == IMP_OK) st = worth_check(w, &all);
     if (st != IMP_OK && st != IMP_E_UNSUPPORTED && st != IMP_E_NUMERIC) return st;
     if (st != IMP_OK) all.refused = imp_last_error(w->ctx);

@@ -175,9 +175,6 @@ void imp__light_walk_begin(const struct imp_tracer *tracer, struct imp_walk *wal
                            struct imp_key key);
 void imp__step_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
                      struct imp_walk *walk, imp_spec *scratch, struct imp_step *s);
-/* Why a walk of this radiance is dropped: no light can have it, or no picture can hold
- * it. */
-enum imp_drop imp__drop_cause(imp_spec L);
 
 /* ---- tracking.c ---- */
 /* The shapes with a priority around p, where a walk begins in `around` outside of them, by a

@@ -5,6 +5,7 @@
 
 enum imp_status imp__store_create(const struct imp_tracer *tracer, int index, int margin,
                                   const int64_t *samples, size_t n, size_t budget,
+                                  const struct imp_reduction *reduction,
                                   struct imp_store *out)
 {
     enum imp_status st = IMP_OK;
@@ -17,12 +18,14 @@ enum imp_status imp__store_create(const struct imp_tracer *tracer, int index, in
                           .height = film->crop_h,
                           .margin = margin,
                           .n = n,
+                          .reduction = reduction,
                           .budget = budget};
     s.across = (s.width + 2 * margin + IMP_STORE_SIDE - 1) / IMP_STORE_SIDE;
     s.down = (s.height + 2 * margin + IMP_STORE_SIDE - 1) / IMP_STORE_SIDE;
     s.sample = imp__alloc(ctx, n, sizeof *s.sample);
     s.records = imp__alloc(ctx, imp__store_tiles(&s), sizeof *s.records);
-    if (!s.sample || !s.records)
+    s.reduced = imp__alloc(ctx, imp__store_tiles(&s), sizeof *s.reduced);
+    if (!s.sample || !s.records || !s.reduced)
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks"));
     memcpy(s.sample, samples, n * sizeof *samples);
     IMP_TRY(imp__record_create(tracer, budget, &s.records[0]));
@@ -32,13 +35,18 @@ enum imp_status imp__store_create(const struct imp_tracer *tracer, int index, in
 out:
     imp__release(ctx, s.sample);
     imp__release(ctx, s.records);
+    imp__release(ctx, s.reduced);
     return st;
 }
 
 void imp__store_destroy(struct imp_store *s)
 {
     if (!s->ctx) return;
-    for (size_t k = 0; k < imp__store_tiles(s); k++) imp__record_destroy(&s->records[k]);
+    for (size_t k = 0; k < imp__store_tiles(s); k++) {
+        imp__record_destroy(&s->records[k]);
+        imp__reduced_free(&s->reduced[k]);
+    }
+    imp__release(s->ctx, s->reduced);
     imp__release(s->ctx, s->sample);
     imp__release(s->ctx, s->records);
     s->ctx = NULL;
@@ -54,6 +62,23 @@ static struct tile tile_at(const struct imp_store *s, size_t k)
     const int y0 = (int)(k / (size_t)s->across) * IMP_STORE_SIDE - s->margin;
     return (struct tile){x0, y0, imp_min(x0 + IMP_STORE_SIDE, s->width + s->margin),
                          imp_min(y0 + IMP_STORE_SIDE, s->height + s->margin)};
+}
+
+/* A tile's walks, unless those so far do not fit. */
+static void tile_reduce(struct imp_store *s, size_t k)
+{
+    if (!s->reduction || s->reduced_bytes > s->budget) return;
+    imp__reduced_make(s->reduction, &s->records[k], &s->reduced[k]);
+    const size_t bytes =
+        s->reduced[k].of ? imp__reduced_bytes(&s->reduced[k]) : s->budget;
+    atomic_fetch_add(&s->reduced_bytes, bytes);
+}
+
+void imp__store_settle(struct imp_store *s)
+{
+    if (s->bytes <= s->budget && s->reduced_bytes <= s->budget - s->bytes) return;
+    for (size_t k = 0; k < imp__store_tiles(s); k++) imp__reduced_free(&s->reduced[k]);
+    atomic_store(&s->reduced_bytes, 0);
 }
 
 /* Does the walk have a step that roulette could have ended? */
@@ -85,6 +110,7 @@ enum imp_status imp__store_fill(struct imp_store *s, const struct imp_tracer *tr
             }
     IMP_TRY(imp__record_trim(r));
     if (roulette) atomic_store(&s->roulette, true);
+    tile_reduce(s, k);
     if (atomic_fetch_add(&s->bytes, imp__record_bytes(r)) + imp__record_bytes(r) <=
         s->budget)
         return IMP_OK;
@@ -124,7 +150,10 @@ void imp__store_walk_at(const struct imp_tracer *tracer, struct imp_arena *arena
            k < imp__store_tiles(s));
     const struct tile t = tile_at(s, k);
     const size_t pixel = (size_t)(y - t.y0) * (size_t)(t.x1 - t.x0) + (size_t)(x - t.x0);
-    imp__record_walk(&s->records[k], pixel * s->n + (size_t)at, tracer, arena, walk);
+    const size_t i = pixel * s->n + (size_t)at;
+    if (!s->reduced[k].of ||
+        !imp__reduced_walk(&s->reduced[k], &s->records[k], i, tracer, arena, walk))
+        imp__record_walk(&s->records[k], i, tracer, arena, walk);
 }
 
 void imp__store_walk(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
@@ -172,7 +201,9 @@ enum imp_status imp__store_take(struct imp_record_source *from, struct imp_store
                                from->path));
         IMP_TRY(imp__record_trim(r));
         s->bytes += imp__record_bytes(r);
+        tile_reduce(s, k);
     }
+    imp__store_settle(s);
 out:
     return st;
 }

@@ -6,7 +6,7 @@
 #ifndef IMP_WALK_STORE_H
 #define IMP_WALK_STORE_H
 
-#include "record.h"
+#include "reduced.h"
 #include <importon/walks.h>
 #include <stdatomic.h>
 
@@ -26,15 +26,21 @@ struct imp_store {
     int set;          /* of them that depend on each other; 0: as of a picture */
     bool stratified;  /* wavelengths of a picture's walks depend on each other */
     int64_t *sample;  /* [n] their numbers, ascending */
-    struct imp_record *records; /* [across down] */
+    struct imp_record *records;  /* [across down] */
+    struct imp_reduced *reduced; /* [across down] the same walks, those that reduce; one
+                                     without `of`: none of them does */
+    const struct imp_reduction *reduction; /* NULL: walks are not reduced */
     size_t budget;
-    atomic_size_t bytes;  /* so far */
-    atomic_bool roulette; /* some step had a survival below 1 */
+    atomic_size_t bytes;         /* of records so far */
+    atomic_size_t reduced_bytes; /* and of what they are reduced to */
+    atomic_bool roulette;        /* some step had a survival below 1 */
 };
 
-/* Empty. samples [n], ascending, are copied; IMP_E_UNSUPPORTED as of imp__record_create. */
+/* Empty. samples [n], ascending, are copied; IMP_E_UNSUPPORTED as of imp__record_create.
+ * reduction, which outlives it: how walks are reduced; NULL: they are not. */
 enum imp_status imp__store_create(const struct imp_tracer *tracer, int index, int margin,
                                   const int64_t *samples, size_t n, size_t budget,
+                                  const struct imp_reduction *reduction,
                                   struct imp_store *out);
 void imp__store_destroy(struct imp_store *store);
 static inline size_t imp__store_tiles(const struct imp_store *s)
@@ -46,6 +52,9 @@ static inline size_t imp__store_tiles(const struct imp_store *s)
  * IMP_E_NOMEM beyond the budget, with an estimate of what all of them need. */
 enum imp_status imp__store_fill(struct imp_store *store, const struct imp_tracer *tracer,
                                 struct imp_arena *arena, size_t tile);
+
+/* All tiles are made: walks stay reduced if they fit into the budget with the records. */
+void imp__store_settle(struct imp_store *store);
 
 /* Place of a walk with this number in its pixel; -1: it was not kept. */
 int64_t imp__store_find(const struct imp_store *store, int64_t sample);
@@ -110,13 +119,12 @@ struct imp_moments {
     double certain[IMP_STORE_CLASSES]; /* it is below a bound that it had reached, so that
                                           no null collision was drawn */
 };
-/* Adds the walks of a tile; mask [height][width]: pixels with 0 are left out; NULL: none
+/* Adds each `every`-th walk of a tile, from the first on; mask [height][width]: pixels with 0 are left out; NULL: none
  * are. */
-enum imp_status imp__store_moments(const struct imp_store *store,
-                                   const struct imp_densities *d,
-                                   const struct imp_tracer *tracer,
-                                   struct imp_arena *arena, size_t tile,
-                                   const float *mask, struct imp_moments *sum);
+enum imp_status
+imp__store_moments(const struct imp_store *store, const struct imp_densities *d,
+                   const struct imp_tracer *tracer, struct imp_arena *arena, size_t tile,
+                   const float *mask, size_t every, struct imp_moments *sum);
 /* ---- All of a scene (kept_use.c) -------------------------------------------------- */
 
 struct imp_walks {
@@ -130,7 +138,8 @@ struct imp_walks {
     bool losses; /* numbers of samples are those of losses */
     double survival, ess; /* ess < 0: imp__walks_use does not look at it */
     const struct imp_walk_integrator *integrator;
-    double *theta;    /* [n_theta] where they were drawn */
+    struct imp_reduction *reduction; /* NULL: walks are not reduced */
+    double *theta;                   /* [n_theta] where they were drawn */
     uint8_t *chosen;  /* [n_params] parameters that may change and have a derivative */
     uint8_t *flights; /* [n_params] those that may change, and by which collisions were
                          drawn: they have none */
@@ -149,10 +158,11 @@ enum imp_status imp__walks_run(imp_context *ctx, const char *function,
  * this sensor. IMP_E_UNSUPPORTED: a parameter has changed, or is active, of which they
  * say nothing. IMP_E_NUMERIC: too few of them count now, or their variance is infinite. */
 enum imp_status imp__walks_use(const struct imp_run *run, struct imp_tracer *tracer);
-/* What they are worth at the scene's present parameters; mask as of imp__store_moments. */
+/* What they are worth at the scene's present parameters; mask as of imp__store_moments. `most`:
+ * so many walks say enough, 0: all of them are asked; where collisions are weighed, all are. */
 enum imp_status imp__walks_weigh(const struct imp_walks *walks,
                                  const struct imp_store *store, const float *mask,
-                                 struct imp_walks_weight *out);
+                                 size_t most, struct imp_walks_weight *out);
 /* Is their variance, as far as roulette makes it? */
 bool imp__walks_finite(const struct imp_walks *walks, const struct imp_walks_weight *x);
 /* The parameters whose numbers have changed, [n_params]; IMP_E_UNSUPPORTED as above. */

@@ -231,18 +231,17 @@ static double walk_weight(const struct imp_store *s, const struct imp_record *r,
     return w;
 }
 
-enum imp_status imp__store_moments(const struct imp_store *s,
-                                   const struct imp_densities *d,
-                                   const struct imp_tracer *tracer,
-                                   struct imp_arena *arena, size_t tile,
-                                   const float *mask, struct imp_moments *sum)
+enum imp_status
+imp__store_moments(const struct imp_store *s, const struct imp_densities *d,
+                   const struct imp_tracer *tracer, struct imp_arena *arena, size_t tile,
+                   const float *mask, size_t every, struct imp_moments *sum)
 {
     const struct imp_record *r = &s->records[tile];
     const int x0 = (int)(tile % (size_t)s->across) * IMP_STORE_SIDE - s->margin;
     const int y0 = (int)(tile / (size_t)s->across) * IMP_STORE_SIDE - s->margin;
     const int side = imp_min(IMP_STORE_SIDE, s->width + s->margin - x0);
     const bool tracks = s->roulette && d->weights && !d->guided;
-    for (size_t i = 0; i < r->n_walks; i++) {
+    for (size_t i = 0; i < r->n_walks; i += every) {
         const struct imp_record_walk *k = imp__record_at(r, i);
         const int pixel = (int)(i / s->n);
         const int x = imp_clamp(x0 + pixel % side, 0, s->width - 1);

@@ -5,6 +5,7 @@
  * piece of gradient falls off at every vertex. Tangent: derivative and radiance together,
  * from the last vertex to the first. The three differ only in the order in which the
  * product rule is read. */
+#include "reduced.h"
 #include "sweep_media.h"
 
 imp_spec imp__walk_fold(struct imp_walk *walk)
@@ -113,6 +114,12 @@ emitter_scatter(const struct imp_tracer *tracer, int emitter, struct imp_emissio
     for (int j = 0; j < e->n_in; j++) d[j] *= bar;
     imp__inputs_scatter(e->input, e->n_in, at, d, sink);
 }
+void imp__emitter_scatter(const struct imp_tracer *tracer, int emitter,
+                          struct imp_emission *x, struct imp_texcoord *at, imp_spec bar,
+                          struct imp_sink *sink)
+{
+    emitter_scatter(tracer, emitter, x, at, bar, sink);
+}
 static void met_scatter(const struct imp_tracer *tracer, const struct imp_vertex *v,
                         imp_spec bar, struct imp_sink *sink)
 {
@@ -149,6 +156,10 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
 {
     const struct imp_active *active = tracer->active;
     if (walk->dropped || !walk->valid) return;
+    if (imp_unlikely(walk->reduced != NULL)) {
+        imp__reduced_sweep(tracer, walk, adjoint, sink);
+        return;
+    }
     imp_spec P = adjoint;
     int depth = walk->depth;
     for (const struct imp_vertex *v = walk->first; v; v = v->next, depth++) {
@@ -217,16 +228,16 @@ static double direction_at(const void *payload, int param, size_t element)
            imp__active_slope(d->active, param, element);
 }
 
-static imp_spec emitter_tangent(const struct imp_tracer *tracer, int emitter,
-                                struct imp_emission x, struct imp_texcoord at,
-                                const struct direction *direction)
+imp_spec imp__emitter_tangent(const struct imp_tracer *tracer, int emitter,
+                              struct imp_emission x, struct imp_texcoord at,
+                              imp_dot_fn *dot, const void *x_dot)
 {
     const struct imp_emitter *e = tracer->scene->emitters[emitter];
     imp_spec d[IMP_INPUTS_MAX], in_dot[IMP_INPUTS_MAX], sum = {0};
     at.shape = e->shape; /* of a walk's light vertex, too */
     imp__emitter_place(e, &x, &at);
     emitter_d(e, tracer->active, &x, &at, d);
-    imp__inputs_tangent(e->input, e->n_in, &at, direction_at, direction, in_dot);
+    imp__inputs_tangent(e->input, e->n_in, &at, dot, x_dot, in_dot);
     for (int j = 0; j < e->n_in; j++) sum += d[j] * in_dot[j];
     return sum;
 }
@@ -239,6 +250,8 @@ static imp_spec tangent(const struct imp_tracer *tracer, const struct imp_walk *
     imp_spec L_dot = {0};
     int depth = walk->depth + walk->n - 1;
     if (walk->dropped || !walk->valid) return L_dot;
+    if (imp_unlikely(walk->reduced != NULL))
+        return imp__reduced_tangent(tracer, walk, direction_at, &direction);
     for (const struct imp_vertex *v = walk->last; v; v = v->prev, depth--) {
         const struct imp_bsdf *b = v->bsdf;
         L_dot *= v->w;
@@ -253,13 +266,14 @@ static imp_spec tangent(const struct imp_tracer *tracer, const struct imp_walk *
         const bool connected = v->d.connection == IMP_CONNECTED;
         const struct imp_texcoord at = imp__vertex_at(v);
         if (met->emitter >= 0 && active->emitter[met->emitter])
-            L_dot += emitter_tangent(tracer, met->emitter, imp__vertex_met(v), at,
-                                     &direction) *
+            L_dot += imp__emitter_tangent(tracer, met->emitter, imp__vertex_met(v), at,
+                                          direction_at, &direction) *
                      (imp_likely(v->d.scatterer != IMP_AT_LIGHT) ? met->weight * own
                                                                  : v->beyond * v->scale);
         if (connected && light->emitter >= 0 && active->emitter[light->emitter])
-            L_dot += emitter_tangent(tracer, light->emitter, imp__light_emission(light),
-                                     imp__light_at(tracer->scene, v), &direction) *
+            L_dot += imp__emitter_tangent(
+                         tracer, light->emitter, imp__light_emission(light),
+                         imp__light_at(tracer->scene, v), direction_at, &direction) *
                      v->light_f * v->light_w * lit;
         if (imp_unlikely(imp__vertex_crosses(v)))
             L_dot += imp__media_tangent(tracer, v, lit, direction_at, &direction);

@@ -30,13 +30,15 @@
 #include "scene/guide.h"
 #include "shaped.h"
 #include "walk_integrator.h"
+#include <float.h>
 
 /* ---- Record ---------------------------------------------------------------------- */
 
 struct imp_store;
 struct imp_segment_ops;
-struct imp_track; /* what a segment crosses (tracking.h) */
-struct imp_probe; /* of an extinction's derivative (probe.h) */
+struct imp_track;      /* what a segment crosses (tracking.h) */
+struct imp_probe;      /* of an extinction's derivative (probe.h) */
+struct imp_reduced_of; /* what stands for vertices (reduced.h) */
 
 /* One segment of a record; kinds put what they keep behind it (segment.h). */
 struct imp_segment {
@@ -110,6 +112,7 @@ struct imp_walk {
     const struct imp_entry *entry;
     /* Kind of the segments that move with an active parameter; NULL: none does. */
     const struct imp_segment_ops *moving;
+    const struct imp_reduced_of *reduced; /* in place of vertices; NULL: they are there */
 };
 
 /* A walk that hangs on a vertex of another: its radiance adds to that vertex's. It begins
@@ -231,6 +234,24 @@ bool imp__walk_wave(const struct imp_tracer *tracer, struct imp_arena *arena, do
 void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
                      int y, int64_t sample, struct imp_walk *walk);
 
+/* Nothing yet; its key, film position, point and time are set behind this. Field by field, as
+ * compilers clear structs of this size by an instruction that takes 2 % of a walk. */
+static inline __attribute__((always_inline)) void imp__walk_clear(struct imp_walk *walk)
+{
+    walk->first = walk->last = NULL;
+    walk->n = walk->depth = 0;
+    walk->ray.o = walk->ray.d = (imp_v3){0};
+    walk->ray.t_near = walk->ray.t_far = 0;
+    walk->L = walk->values = (imp_spec){0};
+    walk->waves = NULL;
+    walk->wave = 0;
+    walk->valid = walk->absorbed = false;
+    walk->dropped = IMP_DROP_NONE;
+    walk->entry = NULL;
+    walk->moving = NULL;
+    walk->reduced = NULL;
+}
+
 /* Its number, film position, first ray and time alone; lens: the numbers of the ray. */
 void imp__walk_begin(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                      struct imp_walk *walk, double lens[2]);
@@ -256,8 +277,9 @@ imp_spec imp__walk_elsewhere(const struct imp_tracer *there, const struct imp_wa
 /* Fold, and L as it counts: a walk that is not valid brings 0, and one whose value no
  * light can have, or no picture can hold, is dropped (trace.c). */
 void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk);
-/* The same when L has been folded. */
-void imp__walk_value(const struct imp_tracer *tracer, struct imp_walk *walk, imp_spec L);
+/* Why a walk of this radiance is dropped: no light can have it, or no picture can hold
+ * it. */
+enum imp_drop imp__drop_cause(imp_spec L);
 /* E_k, B_k and w_k of a vertex that no track belongs to, from its decisions alone. */
 struct imp_values {
     imp_spec e, b, w;
@@ -275,6 +297,15 @@ imp_spec imp__walk_fold(struct imp_walk *walk);
  * are wavelengths where it carries some. */
 void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_walk *walk,
                             imp_spec adjoint, struct imp_sink *sink);
+
+/* Of an emitter's radiance at x, looked up at `at` (which changes): what bar gives to its
+ * parameters, and its tangent. */
+void imp__emitter_scatter(const struct imp_tracer *tracer, int emitter,
+                          struct imp_emission *x, struct imp_texcoord *at, imp_spec bar,
+                          struct imp_sink *sink);
+imp_spec imp__emitter_tangent(const struct imp_tracer *tracer, int emitter,
+                              struct imp_emission x, struct imp_texcoord at,
+                              imp_dot_fn *dot, const void *x_dot);
 
 /* Of one vertex: do its BSDF's inputs count; what bar [n_in] gives to their parameters;
  * their tangent, into in_dot [n_in]. */
@@ -317,6 +348,18 @@ static inline imp_spec imp__walk_values(const struct imp_tracer *tracer,
     if (imp_unlikely(tracer->sensor->gain != NULL))
         channels *= imp__walk_gain(tracer, walk);
     return imp__walk_lanes(walk, channels);
+}
+
+/* As imp__walk_close, when L has been folded. */
+static inline __attribute__((always_inline)) void
+imp__walk_value(const struct imp_tracer *tracer, struct imp_walk *walk, imp_spec L)
+{
+    imp_spec used = L;
+    if (!tracer->wavelengths) used[3] = 0;
+    if (imp_unlikely(!imp__is_within(used, FLT_MAX)))
+        walk->dropped = imp__drop_cause(used);
+    walk->values = walk->dropped || !walk->valid ? (imp_spec){0} : L;
+    walk->L = imp__walk_channels(tracer, walk, walk->values);
 }
 
 /* Reverse mode, for an adjoint of the walk's channels. */

@@ -58,16 +58,6 @@ walk_close(const struct imp_tracer *tracer, struct imp_walk *walk)
     imp__walk_value(tracer, walk, imp__walk_fold(walk));
 }
 
-void imp__walk_value(const struct imp_tracer *tracer, struct imp_walk *walk, imp_spec L)
-{
-    imp_spec used = L;
-    if (!tracer->wavelengths) used[3] = 0;
-    if (imp_unlikely(!imp__is_within(used, FLT_MAX)))
-        walk->dropped = imp__drop_cause(used);
-    walk->values = walk->dropped || !walk->valid ? (imp_spec){0} : L;
-    walk->L = imp__walk_channels(tracer, walk, walk->values);
-}
-
 void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk)
 {
     walk_close(tracer, walk);
@@ -82,29 +72,13 @@ void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk)
 #define FILL(p) memset((p), 0xff, sizeof *(p))
 #endif
 
-/* Nothing yet; its key, film position and time are set behind this. */
-static inline __attribute__((always_inline)) void walk_clear(struct imp_walk *walk)
-{
-    walk->first = walk->last = NULL;
-    walk->n = walk->depth = 0;
-    walk->ray.o = walk->ray.d = (imp_v3){0};
-    walk->ray.t_near = walk->ray.t_far = 0;
-    walk->L = walk->values = (imp_spec){0};
-    walk->waves = NULL;
-    walk->wave = 0;
-    walk->valid = walk->absorbed = false;
-    walk->dropped = IMP_DROP_NONE;
-    walk->entry = NULL;
-    walk->moving = NULL;
-}
-
 static inline __attribute__((always_inline)) void
 walk_begin(const struct imp_tracer *tracer, int x, int y, int64_t sample,
            struct imp_walk *walk, double lens[2])
 {
     const struct imp_sensor *sensor = tracer->sensor;
     FILL(walk);
-    walk_clear(walk);
+    imp__walk_clear(walk);
     number(tracer, x, y, sample, walk);
     position(tracer, walk, x, y, &walk->px, &walk->py);
     lens[0] = imp__start_number(walk->key, walk->point, IMP_DIM_LENS_U);
@@ -171,7 +145,7 @@ void imp__light_walk_begin(const struct imp_tracer *tracer, struct imp_walk *wal
                            struct imp_key key)
 {
     FILL(walk);
-    walk_clear(walk);
+    imp__walk_clear(walk);
     walk->key = key;
     walk->px = walk->py = 0;
     walk->point = (struct imp_point){0};

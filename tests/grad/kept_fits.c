@@ -77,7 +77,7 @@ static struct fitted fit(imp_context *ctx, const char *file, const char *defines
 static bool same(const struct fitted *a, const struct fitted *b)
 {
     return a->n == b->n && memcmp(a->v, b->v, a->n * sizeof *a->v) == 0 &&
-           memcmp(&a->objective, &b->objective, sizeof a->objective) == 0;
+           a->objective.value == b->objective.value && a->objective.se == b->objective.se;
 }
 
 /* Largest |difference| over the standard errors of both. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Kept walks as a host uses them. At the parameters of the draw, pictures, losses and
- * gradients are those of tracing, to the bit, on any number of threads. At others they
+ * gradients are those of tracing, but for rounding, on any number of threads. At others they
  * agree with fresh ones within their errors, and gradients in both modes agree with each
  * other and with differences. The effective sample size is compared with a closed form.
  * What they cannot answer is refused. */
@@ -95,6 +95,20 @@ static struct answer loss(imp_problem *p, const imp_walks *walks, int spp, uint6
 
 /* ---- The same bits --------------------------------------------------------------- */
 
+/* Largest difference, of values that are not small beside the errors. */
+static double apart(const struct answer *a, const struct answer *b)
+{
+    double worst = fabs(a->f.value - b->f.value) / fabs(a->f.value);
+    worst = fmax(worst, fabs(a->f.se - b->f.se) / a->f.se);
+    for (int k = 0; k < NUMBERS; k++) {
+        const double size = fmax(fabs(a->g[k]), a->se[k]);
+        if (!(size > 0)) continue;
+        worst = fmax(worst, fabs(a->g[k] - b->g[k]) / size);
+        worst = fmax(worst, fabs(a->se[k] - b->se[k]) / size);
+    }
+    return worst;
+}
+
 static void to_the_bit(const char *file, const char *defines, enum imp_color_mode mode,
                        const char *glob, enum imp_points points)
 {
@@ -112,8 +126,11 @@ static void to_the_bit(const char *file, const char *defines, enum imp_color_mod
     walks = keep(scene, 9, 5, points, true, -1);
     const struct answer a = loss(p, NULL, 9, 5, points);
     const struct answer b = loss(p, walks, 0, 0, IMP_POINTS_SCENE);
-    tap_ok(memcmp(&a, &b, sizeof a) == 0 && a.g[0] != 0,
-           "%s %s: loss, gradient and errors, to the bit", file, defines ? defines : "");
+    const double worst = apart(&a, &b);
+    /* Walks that are reduced are rounded in another order; others are not. */
+    tap_ok(worst <= (mode == IMP_SPECTRAL ? 0 : 1e-11) && a.g[0] != 0,
+           "%s %s: loss, gradient and errors # %.1e", file, defines ? defines : "",
+           worst);
     imp_problem_destroy(p);
     imp_walks_destroy(walks);
     imp_scene_destroy(scene);

@@ -5,11 +5,11 @@
  * of gradient of the traced walk, to the bit. At other parameters they have the value of the frozen walk, whose differences are
  * the sweep's. Files of another scene, version or byte order, and damaged ones, are
  * refused. */
-#include "walk/record.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "scene/guide.h"
 #include "vol_write.h"
+#include "walk/reduced.h"
 #include <importon/elements.h>
 #include <math.h>
 #include <stdbool.h>
@@ -127,6 +127,17 @@ static double dot(const struct pieces *p, const struct imp_active *a, const doub
     return sum;
 }
 
+static void gradient_add(const struct pieces *p, const struct imp_active *a, double *g)
+{
+    for (size_t k = 0; k < p->n; k++) {
+        const int64_t base = a->base[p->at[k].param];
+        if (base < 0) continue;
+        const size_t e = (size_t)base + p->at[k].element;
+        for (int c = 0; c < 3; c++)
+            g[p->at[k].channels == 3 ? e + (size_t)c : e] += p->at[k].bar[c];
+    }
+}
+
 /* ---- theta moves ----------------------------------------------------------------- */
 
 static double unit_noise(size_t k)
@@ -190,6 +201,26 @@ static const struct scene_case {
     {"cornell.xml", "res=32", false, 3},
     {"fog.xml", "res=32", false, 0},
     {"photons/sky.xml", NULL, true, 0},
+    {"<scene version='3.0.0'><integrator type='path'><integer name='max_depth' "
+     "value='6'/></integrator><sensor type='perspective'><float name='fov' value='60'/>"
+     "<transform name='to_world'><lookat origin='0,1,5' target='0,1,0' up='0,1,0'/>"
+     "</transform><film type='hdrfilm'><integer name='width' value='32'/><integer "
+     "name='height' value='32'/><rfilter type='box'/></film></sensor>"
+     "<emitter type='spot' id='spot'><rgb name='intensity' value='9,8,7'/><transform "
+     "name='to_world'><lookat origin='0,4,0' target='0,0,0' up='1,0,0'/></transform>"
+     "</emitter><emitter type='envmap' id='sky'><string name='filename' "
+     "value='" IMP_SCENES "/textured/waves.png'/></emitter>"
+     "<shape type='sphere'><point name='center' x='-1' y='1' z='0'/>"
+     "<bsdf type='dielectric' id='glass'/></shape>"
+     "<shape type='sphere'><point name='center' x='1' y='1' z='0'/>"
+     "<bsdf type='twosided' id='both'><bsdf type='diffuse'><rgb name='reflectance' "
+     "value='.2,.5,.8'/></bsdf></bsdf></shape>"
+     "<shape type='sphere'><point name='center' x='0' y='1' z='-2'/>"
+     "<bsdf type='blendbsdf' id='blend'><float name='weight' value='.4'/><bsdf "
+     "type='diffuse'/><bsdf type='plastic'/></bsdf></shape>"
+     "<shape type='rectangle'><transform name='to_world'><scale value='5'/><rotate x='1' "
+     "angle='-90'/></transform><bsdf type='phong' id='floor'/></shape></scene>",
+     NULL, true, 0},
     {"photons/reflector.xml", "weights=kernel=1,emitters=1,proxies=1,uniform=.3", false,
      0},
     {"../tests/render/attributes_lamp.xml", "res=32", true, 0},
@@ -249,6 +280,72 @@ static void kept_same(struct traced *t, const char *name, struct imp_record *rea
            gradients, N, n_pieces);
 }
 
+/* Walks that are reduced have the values, the gradients and the tangents of their vertices
+ * at other parameters, where each `every`-th parameter may change and no other. */
+static void reduced_same(struct traced *t, const char *name,
+                         const struct imp_record *read, size_t every)
+{
+    struct imp_reduction *reduction;
+    struct imp_reduced reduced = {.of = NULL};
+    const struct imp_active all = t->active;
+    static struct pieces one, two;
+    uint8_t *free_ones = calloc(t->scene->n_params + 1, 1);
+    for (size_t k = 0, i = 0; k < t->scene->n_params; k++)
+        free_ones[k] = t->chosen[k] && i++ % every == every / 2;
+    test_must(ctx, imp__active_create(t->scene, free_ones, &t->active));
+    test_must(ctx,
+              imp__reduction_create(t->scene, &t->integrator, free_ones, &reduction));
+    if (reduction) imp__reduced_make(reduction, read, &reduced);
+    const size_t n = t->active.n;
+    double *theta = malloc((n + 1) * sizeof *theta),
+           *x_dot = calloc(n + 1, sizeof *x_dot);
+    double *g = calloc(2 * n + 2, sizeof *g);
+    const struct imp_arena_mark mark = imp__arena_mark(&t->arena);
+    double value = 0, gradient = 0, tangent = 0;
+    int whole = 0;
+    theta_get(t, theta);
+    direction(t, x_dot);
+    move(t, theta, x_dot, 0.25);
+    for (size_t i = 0; i < read->n_walks && reduced.of; i++) {
+        struct imp_walk a, b;
+        imp__record_walk(read, i, &t->tracer, &t->arena, &a);
+        if (imp__reduced_walk(&reduced, read, i, &t->tracer, &t->arena, &b)) {
+            whole++;
+            const double size = weighed(a.L);
+            value = fmax(value, fabs(weighed(b.L) - size) / fmax(fabs(size), 1e-12));
+            sweep(t, &a, &one);
+            sweep(t, &b, &two);
+            memset(g, 0, 2 * n * sizeof *g);
+            gradient_add(&one, &t->active, g);
+            gradient_add(&two, &t->active, g + n);
+            double most = 1e-12;
+            for (size_t k = 0; k < n; k++) most = fmax(most, fabs(g[k]));
+            for (size_t k = 0; k < n; k++)
+                gradient = fmax(gradient, fabs(g[k] - g[n + k]) / most);
+            const double d = weighed(imp__walk_tangent(&t->tracer, &a, x_dot));
+            const double e = weighed(imp__walk_tangent(&t->tracer, &b, x_dot));
+            tangent = fmax(tangent, fabs(d - e) / fmax(fabs(d), 1e-9 * most + 1e-12));
+        }
+        imp__arena_rewind(&t->arena, mark);
+    }
+    if (reduced.of)
+        tap_ok(value < 1e-11 && gradient < 1e-11 && tangent < 1e-7,
+               "%s: reduced, each parameter of %zu may change # %d of %zu walks, %.0f "
+               "bytes a walk; %.1e %.1e %.1e",
+               name, every, whole, read->n_walks,
+               (double)imp__reduced_bytes(&reduced) / (double)read->n_walks, value,
+               gradient, tangent);
+    move(t, theta, x_dot, 0);
+    imp__reduced_free(&reduced);
+    imp__reduction_destroy(reduction);
+    imp__active_destroy(ctx, &t->active);
+    t->active = all;
+    free(g);
+    free(theta);
+    free(x_dot);
+    free(free_ones);
+}
+
 static void scene_test(const struct scene_case *c)
 {
     struct traced t;
@@ -260,6 +357,8 @@ static void scene_test(const struct scene_case *c)
     begin(&t, c->file, c->defines, true);
     t.tracer.split = c->split;
     kept_same(&t, name, &read);
+    reduced_same(&t, name, &read, 1);
+    reduced_same(&t, name, &read, 3);
 
     /* At others: against the walks traced at the first ones, frozen. */
     const size_t n = t.active.n;

@@ -163,7 +163,7 @@ static int wrap_index(int i, int n, enum wrap wrap)
 struct footprint {
     int n;
     size_t texel[4];
-    double weight[4];
+    double weight[4], a, b;
 };
 
 static inline void footprint(const struct bitmap *t, const struct imp_texcoord *at,
@@ -189,6 +189,8 @@ static inline void footprint(const struct bitmap *t, const struct imp_texcoord *
     const size_t ys[2] = {w * (size_t)wrap_index(y0, t->height, t->wrap),
                           w * (size_t)wrap_index(y0 + 1, t->height, t->wrap)};
     f->n = 4;
+    f->a = a;
+    f->b = b;
     f->texel[0] = ys[0] + xs[0];
     f->texel[1] = ys[0] + xs[1];
     f->texel[2] = ys[1] + xs[0];
@@ -329,6 +331,23 @@ static bool slope(const struct imp_texture *tex, const struct imp_texcoord *at,
     d[1] = ((texel[2] - texel[0]) * (1 - a) + (texel[3] - texel[1]) * a) * t->height;
     for (int k = 0; k < 2; k++)
         d_uv[k] = d[0] * t->to_uv.m[0][k] + d[1] * t->to_uv.m[1][k];
+    return true;
+}
+
+bool imp__bitmap_cell(const struct imp_texture *tex, const struct imp_texcoord *at,
+                      struct imp__cell *out)
+{
+    const struct bitmap *t = tex->self;
+    struct footprint f;
+    if (tex->ops != &imp__bitmap ||
+        (uint64_t)t->width * (uint64_t)t->height > UINT32_MAX / 3)
+        return false;
+    footprint(t, at, &f);
+    out->n = f.n;
+    for (int k = 0; k < f.n; k++)
+        out->element[k] = (uint32_t)(f.texel[k] * (size_t)t->channels);
+    out->a = f.n == 4 ? f.a : 0;
+    out->b = f.n == 4 ? f.b : 0;
     return true;
 }
 

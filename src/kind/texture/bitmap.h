@@ -17,4 +17,15 @@ struct imp__texels {
 /* False: t is another texture. */
 bool imp__bitmap_texels(const struct imp_texture *t, struct imp__texels *out);
 
+/* A lookup: up to four texels, the elements of its parameter that they begin at, and their
+ * weights (1 - a)(1 - b), a (1 - b), (1 - a) b, a b; `n` 1: the first alone. */
+struct imp__cell {
+    int n;
+    uint32_t element[4];
+    double a, b;
+};
+/* False: t is another texture, or has too many numbers. */
+bool imp__bitmap_cell(const struct imp_texture *t, const struct imp_texcoord *at,
+                      struct imp__cell *out);
+
 #endif

@@ -6,6 +6,8 @@
 #include "input.h"
 #include "uv.h"
 
+extern const struct imp_texture_ops imp__checkerboard;
+
 struct checkerboard {
     struct imp__to_uv to_uv;
 };
@@ -39,6 +41,12 @@ static const struct imp_input *choose(const struct imp_texture *t,
     imp__to_uv_apply(&c->to_uv, at->uv, uv);
     const bool bx = uv[0] - floor(uv[0]) > 0.5, by = uv[1] - floor(uv[1]) > 0.5;
     return t->input[(bx == by) == scalar];
+}
+
+const struct imp_input *imp__checkerboard_input(const struct imp_texture *t,
+                                                const struct imp_texcoord *at)
+{
+    return t->ops == &imp__checkerboard ? choose(t, at, false) : NULL;
 }
 
 static void eval(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,

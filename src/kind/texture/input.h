@@ -13,4 +13,9 @@
 void imp__luminance_scatter(struct imp_sink *sink, int param, size_t element,
                             imp_spec bar);
 
+/* The input that a checkerboard, read as a colour, is at a place; NULL: t is another
+ * texture. */
+const struct imp_input *imp__checkerboard_input(const struct imp_texture *t,
+                                                const struct imp_texcoord *at);
+
 #endif
