@@ -52,7 +52,7 @@ struct imp_dirs imp__trial_dirs(uint64_t k)
         phi[i] = 6.28 * imp__u01(key, 200 + (uint32_t)i);
     }
     if (k % 2) z[1] = copysign(z[1], z[0]); /* reflection too */
-    struct imp_dirs dirs = {.lobe = IMP_SMOOTH, .derivative = true};
+    struct imp_dirs dirs = {.lobe = IMP_SMOOTH, .derivative = UINT64_MAX};
     const double r0 = sqrt(1 - z[0] * z[0]), r1 = sqrt(1 - z[1] * z[1]);
     dirs.wo = imp__v3(r0 * cos(phi[0]), r0 * sin(phi[0]), z[0]);
     dirs.wi = k % 3 ? imp__v3(r1 * cos(phi[1]), r1 * sin(phi[1]), z[1])
