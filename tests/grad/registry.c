@@ -445,6 +445,11 @@ static void fresh(imp_scene *s, imp_problem *p, size_t param, const double *v,
     run.seed = 77;
     test_must(ctx, imp_problem_forward(p, x_dot, &run, &film));
     const struct imp_estimate mine = functional(film);
+    double floats = 0; /* rounding of the film, where pixels cancel each other */
+    struct imp_film_info pixels = {.size = sizeof pixels};
+    imp_film_get_info(film, &pixels);
+    for (int k = 0; k < SIDE * SIDE * pixels.channels; k++)
+        floats += 0x1p-24 * fabs((double)imp_film_mean(film)[k]);
     imp_film_destroy(film);
 
     /* The same seed backwards: the same number up to the films' floats. */
@@ -458,7 +463,7 @@ static void fresh(imp_scene *s, imp_problem *p, size_t param, const double *v,
     test_must(ctx, imp_problem_reverse(p, seed_image, &run, g, NULL));
     double back = 0, size = 0;
     for (size_t i = 0; i < n; i++) back += g[i] * x_dot[i], size += fabs(g[i] * x_dot[i]);
-    const double dot = fabs(back - mine.value) / fmax(size, 1e-300);
+    const double dot = fmax(fabs(back - mine.value) - floats, 0) / fmax(size, 1e-300);
     if (size > 0) worst_dot = fmax(worst_dot, dot);
     if (size > 0 && dot > 1e-5)
         tap_ok(0, "%s: %s: forward %.9g, reverse %.9g", what, info.name, mine.value,

@@ -45,10 +45,20 @@ static bool asked(int k, const struct imp_dirs *d, struct imp_dirs *e)
     return d->lobe % 2 == k;
 }
 
+/* Probability of material 1. What is seen straight through a lobe without a density has no
+ * noise but that of the choice: there the least is small. */
+static double second_chance(const struct imp_bsdf *b, const imp_spec *in,
+                            const struct imp_dirs *d)
+{
+    return imp__mixing_chance(in[WEIGHT][0], d,
+                              b->flags & IMP_BSDF_DELTA ? IMP_MIXING_LEAST
+                                                        : IMP_WANTED_LEAST);
+}
+
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
                    struct imp_dirs *d)
 {
-    const double q = 1 - imp__mixing_chance(in[WEIGHT][0], d);
+    const double q = 1 - second_chance(b, in, d);
     const int k = u[0] < q ? 0 : 1;
     const double v[3] = {imp__mixing_rest(u[0], k ? q : 0, k ? 1 : q), u[1], u[2]};
     const struct imp_bsdf *c = b->child[k];
@@ -63,7 +73,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
 }
 static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
 {
-    const double q = imp__mixing_chance(in[WEIGHT][0], d);
+    const double q = second_chance(b, in, d);
     struct imp_dirs e;
     double sum = 0;
     for (int k = 0; k < 2; k++) {

@@ -26,9 +26,10 @@
 
 /* Input 0 is the weight. */
 static inline double imp__mixing_weight(double w) { return imp_clamp(w, 0, 1); }
-static inline double imp__mixing_chance(double w, const struct imp_dirs *d)
+/* `wanted`: least probability of either where the derivative is by the weight itself. */
+static inline double imp__mixing_chance(double w, const struct imp_dirs *d, double wanted)
 {
-    const double least = d->derivative & 1 ? IMP_WANTED_LEAST
+    const double least = d->derivative & 1 ? wanted
                          : d->derivative   ? IMP_MIXING_LEAST
                                            : 0;
     return imp_clamp(w, least, 1 - least);

@@ -49,7 +49,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
                    struct imp_dirs *d)
 {
     struct imp_dirs e;
-    const double q = 1 - imp__mixing_chance(in[OPACITY][0], d);
+    const double q = 1 - imp__mixing_chance(in[OPACITY][0], d, IMP_MIXING_LEAST);
     if (u[0] < q) {
         d->wi = -d->wo;
         d->lobe = HOLE;
@@ -66,7 +66,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
 static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
 {
     struct imp_dirs e;
-    const double q = imp__mixing_chance(in[OPACITY][0], d);
+    const double q = imp__mixing_chance(in[OPACITY][0], d, IMP_MIXING_LEAST);
     if (d->lobe == HOLE) return 1 - q;
     const struct imp_bsdf *c = nested(b, &in, d, &e);
     return q * c->ops->pdf(c, in, &e);
