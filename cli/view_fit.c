@@ -203,8 +203,10 @@ static int run_fit(bool *whole)
     struct imp_run run = cli_run();
     double *x = cli_alloc(f.n, sizeof *x);
     run.progress = view_progress;
-    fit.checkpoint = f.checkpoint;
-    fit.resume = f.begun;
+    if (!problem_options.clip) { /* else it begins where the scene stands */
+        fit.checkpoint = f.checkpoint;
+        fit.resume = f.begun;
+    }
     fit.step = step;
     f.begun_s = cli_now();
     f.pictures_s = 0;

@@ -135,8 +135,9 @@ static enum imp_status clipped_searches(struct imp__fit *f,
         IMP_CHECKED(imp__fit_clipped(f, round, &own, s, &again));
         if (!again) return IMP_OK;
         f->final_total = 0;
-        IMP_CHECKED(search(f, &own, *s));
+        const enum imp_status st = search(f, &own, *s);
         imp__search_settle(*s);
+        if (st != IMP_OK) return st;
         f->final_calls = 0;
         f->final_total = final_total(f);
         if (!f->options.intervals) continue;

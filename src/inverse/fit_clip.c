@@ -10,8 +10,9 @@
 #include <string.h>
 
 #define DECIDING_SEED 0x40000003
-#define ROUNDS        5    /* of deciding and searching, at most; and at least: */
-#define ROUNDS_PHOTO  2    /* of photographs, which are expanded about the pictures */
+#define ROUNDS        5 /* of deciding and searching, at most; and at least: */
+#define ROUNDS_PHOTO  2 /* of photographs, which are expanded about the pictures */
+#define ADAM_SHARE    4 /* part of the first search's iterations that the next ones take */
 #define STAYS         1e-3 /* part of the weights that may still change */
 
 /* The next search: from the answer of the last, with its history. */
@@ -79,6 +80,9 @@ enum imp_status imp__fit_clipped(struct imp__fit *f, int round,
     *again = (double)changed > STAYS * (double)numbers ||
              (photographs && round < ROUNDS_PHOTO);
     if (!*again) return IMP_OK;
+    /* Adam takes all iterations that it may; the others end where they arrive. */
+    if (f->options.optimizer == IMP_ADAM)
+        o->max_iterations = imp_max(o->max_iterations / ADAM_SHARE, 1);
     o->max_iterations += (*s)->iteration;
     IMP_CHECKED(follow(f, o, *s, &next));
     imp__search_destroy(*s);
