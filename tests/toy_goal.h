@@ -68,6 +68,7 @@ static inline enum imp_status toy_normal(const double *x, uint64_t seed, int rou
         for (int k = 0; k < TOY_N; k++) r += t->A[p][k] * x[k];
         r2 += r * r;
     }
+    out->pairs = out->f;
     out->chi2 = r2 - TOY_M * mc * mc / rounds;
     out->n_residuals = TOY_M;
     out->noise_known = false;

@@ -136,6 +136,7 @@ enum imp_status imp__design_normal(const double *x, uint64_t seed, int rounds,
     out->chi2 = 2 * imp__design_value(d);
     out->f = (struct imp_estimate){
         imp__design_value(d) + imp__regularise(d->p, x, out->g), 0, 0};
+    out->pairs = out->f;
     out->n_residuals = (double)d->goals;
     out->noise_known = true;
 out:

@@ -216,7 +216,8 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     if (ended == IMP_OK && u.n && biased)
         ended = imp__fit_shift(&f, s->x, u.G, imp__search_seed(&f.goal, FINAL_SEED, 1),
                                rows, &shift);
-    if (ended == IMP_OK) ended = final_objective(&f, s->x, &objective);
+    if (ended == IMP_OK && u.n && isfinite(u.loss.value)) objective = u.loss;
+    else if (ended == IMP_OK) ended = final_objective(&f, s->x, &objective);
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     IMP_TRY(imp_problem_set_x(p, s->x));
     IMP_TRY(imp__fit_answer(&f, s, objective, &u, rows, start, why, &shift, result));

@@ -21,7 +21,7 @@
 #define REPORT_S         0.1
 #define COARSER          4  /* samples of an evaluation, over those of a coarse search, */
 #define COARSE_SPP       16 /* which are at least so many: fewer lead far away */
-#define PAIRS_VERSION    1  /* of what Levenberg-Marquardt estimates from its samples */
+#define PAIRS_VERSION    2  /* of what Levenberg-Marquardt estimates from its samples */
 #define VARIATE_VERSION  1  /* of what control variates keep */
 
 /* ---- Progress ------------------------------------------------------------------ */
@@ -136,6 +136,14 @@ static void measure(const struct imp__metric *metric, void *payload)
     ((struct imp__fit *)payload)->metric = metric;
 }
 
+static bool quadratic(const struct imp__fit *f)
+{
+    const struct imp_problem *p = f->problem;
+    for (size_t t = 0; t < p->n_targets; t++)
+        if (!imp__loss_quadratic(p->targets[t].desc.loss)) return false;
+    return true;
+}
+
 static enum imp_status normal(const double *x, uint64_t seed, int rounds,
                               struct imp__normal *out, void *payload)
 {
@@ -155,8 +163,11 @@ static enum imp_status normal(const double *x, uint64_t seed, int rounds,
     const enum imp_status st = imp__gauss_newton(fit->problem, x, &fit->run, &gn);
     if (st == IMP_CANCELLED) fit->stopped = true;
     if (st != IMP_OK) return st;
+    const double prior = imp__regularise(fit->problem, x, out->g);
     out->f = gn.objective;
-    out->f.value += imp__regularise(fit->problem, x, out->g);
+    out->f.value += prior;
+    out->pairs = (struct imp_estimate){quadratic(fit) ? 0.5 * gn.chi2 + prior : NAN,
+                                       0.5 * gn.chi2_se, out->f.bias_order};
     out->chi2 = gn.chi2;
     out->n_residuals = gn.n_residuals;
     out->noise_known = true;
@@ -178,12 +189,8 @@ static enum imp_status normal(const double *x, uint64_t seed, int rounds,
  * not quadratic has a bias that grows. */
 static int coarse_spp(const struct imp__fit *f)
 {
-    const struct imp_problem *p = f->problem;
     const int spp = imp__fit_spp(f);
-    bool quadratic = true;
-    for (size_t t = 0; t < p->n_targets; t++)
-        quadratic &= imp__loss_quadratic(p->targets[t].desc.loss);
-    return f->options.optimizer == IMP_LM && f->options.intervals && quadratic
+    return f->options.optimizer == IMP_LM && f->options.intervals && quadratic(f)
                ? imp_min(spp, imp_max(spp / COARSER, COARSE_SPP))
                : spp;
 }

@@ -198,6 +198,7 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
     }
     out->objective = objective;
     out->chi2 = total.scalars[IMP_NORMAL_CHI2];
+    out->chi2_se = sqrt(fmax(0, total.scalars[IMP_NORMAL_CHI2_VARIANCE]));
     out->n_residuals = residuals;
 out:
     for (int k = 0; j.workers && k < ctx->threads; k++) {

@@ -14,8 +14,15 @@ struct imp__normal_sums { /* matrices [K*K], lower triangles */
     double *scalars;    /* [IMP_NORMAL_SCALARS] */
     double *deviations; /* [IMP_DEVIATIONS][K*K], or NULL */
 };
-/* Of a target: loss, its variance, chi^2. */
-enum { IMP_NORMAL_OBJECTIVE, IMP_NORMAL_VARIANCE, IMP_NORMAL_CHI2, IMP_NORMAL_SCALARS };
+/* Of a target: loss and its variance, as those of an evaluation with the same walks; chi^2
+ * by all pairs of walks, and its variance. */
+enum {
+    IMP_NORMAL_OBJECTIVE,
+    IMP_NORMAL_VARIANCE,
+    IMP_NORMAL_CHI2,
+    IMP_NORMAL_CHI2_VARIANCE,
+    IMP_NORMAL_SCALARS
+};
 
 /* Adds H, H_same, H_meas, g, cov_g, cov_excess, deviations and chi2 of a target whose pixels
  * share walks (a filter wider than a pixel, or walks from the lights), from `rounds` times

@@ -320,6 +320,36 @@ static void gradient_add(const struct imp__normal_job *j, const struct pixel *p,
         }
 }
 
+/* Variance of chi^2, of the mean over pairs of sum over channels of w r_a r_b: its
+ * jackknife less what that has too much. */
+static double chi2_variance(const struct imp__normal_job *j, const struct pixel *p)
+{
+    const struct imp__normal_worker *w = p->w;
+    const size_t S = (size_t)seen_channels(j);
+    const double M = p->M;
+    double h[IMP_NORMAL_UNITS][IMP_NORMAL_UNITS], e[IMP_NORMAL_UNITS] = {0}, total = 0;
+    double first = 0, second = 0;
+    for (int a = 0; a < p->M; a++)
+        for (int b = a + 1; b < p->M; b++) {
+            double product = 0;
+            for (size_t c = 0; c < S; c++)
+                product += w->weight[c] * w->r[a][c] * w->r[b][c];
+            h[a][b] = product;
+            e[a] += product;
+            e[b] += product;
+            total += product;
+        }
+    for (int a = 0; a < p->M; a++) {
+        e[a] = (e[a] - 2 * total / M) / (M - 2);
+        first += e[a] * e[a];
+    }
+    for (int a = 0; a < p->M; a++)
+        for (int b = a + 1; b < p->M; b++)
+            second += imp__sqr(h[a][b] - total / (M * (M - 1) / 2) - e[a] - e[b]);
+    return p->share * p->share * 4 / (M * (M - 1)) *
+           (first - second / ((M - 2) * (M - 3)));
+}
+
 /* ---- Tiles ------------------------------------------------------------------------ */
 
 enum imp_status imp__normal_work(const struct imp_tile *t, struct imp_tile_worker *tile,
@@ -345,6 +375,7 @@ enum imp_status imp__normal_work(const struct imp_tile *t, struct imp_tile_worke
             for (size_t c = 0; c < (size_t)seen_channels(j); c++)
                 channel_add(j, &p, c, &out);
             gradient_add(j, &p, &out);
+            out.scalars[IMP_NORMAL_CHI2_VARIANCE] += chi2_variance(j, &p);
             out.scalars[IMP_NORMAL_OBJECTIVE] += p.value / all;
             out.scalars[IMP_NORMAL_VARIANCE] +=
                 (p.square - p.value * p.value / R) * R / ((R - 1) * all * all);

@@ -182,7 +182,9 @@ struct imp__gauss_newton {
     double *deviations; /* [IMP_DEVIATIONS][K*K] of H (search/optimize.h); or NULL */
     int rounds;         /* set by the caller: so many times the samples; 0: once */
     struct imp_estimate objective; /* data term */
-    double chi2;                   /* sum w (mean - T)^2 - w Var(mean), unbiased */
+    /* sum w (mean - T)^2 - w Var(mean), unbiased; of losses that are quadratic in the
+     * picture its standard error, too */
+    double chi2, chi2_se;
     double n_residuals;
 };
 enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,

@@ -216,6 +216,8 @@ static void pixel_add(struct imp__wide *w, int px, int py, int c,
     const bool apart = w->rows[0] == NULL; /* else all pixels share walks */
     imp__pair_noise_add(&w->noise, apart ? px : 0, apart ? py : 0, weight, residual,
                         w->X);
+    imp__pair_noise_add(&w->loss_noise, apart ? px : 0, apart ? py : 0, weight, residual,
+                        residual);
     for (size_t k = 0; k < K; k++) {
         double lx = 0;
         for (int b = 0; b < w->R; b++) lx += w->L[b] * w->X[(size_t)b * K + k];
@@ -290,9 +292,15 @@ enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                    : replicates(&w, tracer, run, rounds, lo, hi));
     IMP_TRY(imp__pair_noise_create(w.ctx, lights ? 1 : w.width, lights ? 1 : w.height,
                                    w.R, w.K, &w.noise));
+    IMP_TRY(imp__pair_noise_create(w.ctx, lights ? 1 : w.width, lights ? 1 : w.height,
+                                   w.R, 1, &w.loss_noise));
     normal_add(&w, out);
     IMP_TRY(imp__pair_noise_covariance(&w.noise, 2 * imp__film_border(w.film), out->cov_g,
                                        out->cov_excess));
+    double variance = 0, excess = 0;
+    IMP_TRY(imp__pair_noise_covariance(&w.loss_noise, 2 * imp__film_border(w.film),
+                                       &variance, &excess));
+    out->scalars[IMP_NORMAL_CHI2_VARIANCE] += variance - excess;
     imp__wide_measurement(&w, out);
 out:
     for (int b = 0; b < IMP_WIDE_REPLICATES; b++) {
@@ -301,6 +309,7 @@ out:
     }
     imp__release(w.ctx, w.L);
     imp__pair_noise_destroy(&w.noise);
+    imp__pair_noise_destroy(&w.loss_noise);
     imp__release(w.ctx, w.sigma2);
     imp__release(w.ctx, w.row);
     return st;

@@ -22,7 +22,7 @@ struct imp__wide {
     double *rows[IMP_WIDE_REPLICATES];    /* the same of walks from the lights */
     double *L, *X;                        /* of a pixel and channel: [R], [R][K] */
     double *sum;                          /* [K] */
-    struct imp__pair_noise noise;
+    struct imp__pair_noise noise, loss_noise; /* of the gradient; of chi^2 */
     /* Of one channel and half of the replicates, for H_meas: [pixels], [K][pixels]. */
     double *sigma2, *Xc, *Xd, *row;
 };

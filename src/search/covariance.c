@@ -14,17 +14,16 @@
  * has the sum of these covariances, wherever in its neighbourhood x was. */
 #include "covariance.h"
 #include "directions.h"
+#include "interval_row.h"
 #include "sampled.h"
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
-#define Z_TWO_SIDED 1.959963984540054
-#define Z_ONE_SIDED 1.6448536269514722
-#define SEED_BASE   0x40000000 /* iteration numbers no search reaches */
+#define SEED_BASE 0x40000000 /* iteration numbers no search reaches */
+#define SEED_LAST 63
 
-/* Samples are taken in two stages (IMP_SAMPLED_STAGES): FIRST rounds, and as many more as
- * these show to be missing. */
+/* Samples are taken in stages: FIRST rounds, and as many more as these show to be missing. */
 #define FIRST  2
 #define ENOUGH 0.2 /* Monte Carlo's variance over the measurement's: then no more */
 
@@ -76,32 +75,6 @@ static double noise_scale(const struct imp__sampled *s, const struct imp__direct
             q += a->G[k * n + l] * (e->g[k] * e->g[l] - e->cov_g[k * n + l]);
     const double freedom = e->n_residuals - (double)(a->m - a->n_loose);
     return freedom > 0 ? fmax((e->chi2 - fmax(q, 0)) / freedom, 0) : 0;
-}
-
-/* se NAN: there is no interval. */
-static void interval_free(const struct imp__goal *goal, size_t k, double se,
-                          struct imp_fit_variable *v)
-{
-    const bool open = isnan(se);
-    v->se = se;
-    v->lo95 = open ? NAN : imp__into_bounds(goal, k, v->value - Z_TWO_SIDED * se);
-    v->hi95 = open ? NAN : imp__into_bounds(goal, k, v->value + Z_TWO_SIDED * se);
-}
-
-/* At a bound the interval is one-sided: from the bound to the 95 % limit about `u`, the
- * Newton point without bounds. */
-static void interval_bound(const struct imp__goal *goal, size_t k, double u, double se,
-                           struct imp_fit_variable *v)
-{
-    interval_free(goal, k, se, v);
-    if (isnan(se)) return;
-    if (v->at_bound < 0) {
-        v->lo95 = goal->lo[k];
-        v->hi95 = imp__into_bounds(goal, k, fmax(u, goal->lo[k]) + Z_ONE_SIDED * se);
-    } else {
-        v->hi95 = goal->hi[k];
-        v->lo95 = imp__into_bounds(goal, k, fmin(u, goal->hi[k]) - Z_ONE_SIDED * se);
-    }
 }
 
 static enum imp_status newton_point(const struct imp__sampled *s, const double *x,
@@ -178,16 +151,6 @@ static enum imp_status newton_free(const struct imp__goal *goal,
     }
 out:
     return st;
-}
-
-/* Standard error of variable k from the two covariances [n][n]; NAN: nothing determines
- * it. */
-static double standard_error(const struct imp__directions *a, size_t n, size_t k,
-                             const double *measurement, const double *monte_carlo)
-{
-    const size_t d = k * n + k;
-    if (imp__is_loose(a, k) && !a->held) return NAN;
-    return sqrt(fmax(measurement[d], 0) + fmax(monte_carlo[d], 0));
 }
 
 /* measurement += kappa G H_prior G of directions that the prior alone determines. */
@@ -295,23 +258,49 @@ static int rounds_missing(const struct imp__sampled *s, const struct answer *a,
     return (int)fmin(ceil(s->rounds * (worst / ENOUGH - 1)), most);
 }
 
-/* The samples that are missing, at Newton's point of those that are there. H0, a linear
- * model: the gradient there is the noise of both. */
-static enum imp_status newton_samples(const struct imp__goal *goal, const double *x,
-                                      int missing, struct imp__sampled *s,
-                                      const struct answer *a, struct imp__uncertainty *u)
+/* Rounds at x: two, and those that are missing. */
+static enum imp_status samples_here(const struct imp__goal *goal, const double *x,
+                                    int most, struct imp__sampled *s, double *noise,
+                                    struct answer *a, struct imp__uncertainty *u)
+{
+    enum imp_status st = IMP_OK;
+    int missing = imp_min(FIRST, most);
+    for (int k = 0; k < 2 && missing > 0; k++) {
+        IMP_TRY(
+            imp__sampled_take(goal, x, imp__search_seed(goal, SEED_BASE, k), missing, s));
+        IMP_TRY(imp__sampled_add(x, x, s));
+        IMP_TRY(answer_find(goal, s, x, noise, a, u));
+        missing = rounds_missing(s, a, u, most - s->rounds);
+    }
+    u->is_linear = true;
+out:
+    return st;
+}
+
+/* A round at x, and those that are missing at its Newton point. H0, a linear model: the
+ * gradient there is the noise of both. u->is_linear: does H0 hold? */
+static enum imp_status samples_ahead(const struct imp__goal *goal, const double *x,
+                                     int most, struct imp__sampled *s, double *noise,
+                                     struct answer *a, struct imp__uncertainty *u)
 {
     enum imp_status st = IMP_OK;
     const size_t n = s->n, nn = n * n;
+    int missing = 1;
     double *work = imp__alloc(s->ctx, n + nn, sizeof *work);
     if (!work) IMP_TRY(no_memory(s->ctx));
     double *at = work, *C = work + n;
-    for (size_t k = 0; k < n; k++) at[k] = imp__into_bounds(goal, k, u->x[k]);
-    memcpy(C, s->last_cov, nn * sizeof *C);
-    IMP_TRY(
-        imp__sampled_add(goal, x, at, imp__search_seed(goal, SEED_BASE, 1), missing, s));
-    for (size_t i = 0; i < nn; i++) C[i] += s->last_cov[i];
-    u->is_linear = over_noise(n, a->free.G, s->last_g, C) <= 1;
+    memcpy(at, x, n * sizeof *at);
+    for (int k = 0; missing > 0 && s->stages < IMP_SAMPLED_STAGES; k++) {
+        IMP_TRY(imp__sampled_take(goal, at, imp__search_seed(goal, SEED_BASE, k), missing,
+                                  s));
+        for (size_t i = 0; i < nn; i++) C[i] = s->mean.cov_g[i] + s->one_cov[i];
+        if (s->stages > 0 && over_noise(n, a->free.G, s->one.g, C) > 1) goto out;
+        IMP_TRY(imp__sampled_add(x, at, s));
+        IMP_TRY(answer_find(goal, s, x, noise, a, u));
+        missing = imp_max(rounds_missing(s, a, u, most - s->rounds), s->stages == 1);
+        for (size_t i = 0; i < n; i++) at[i] = imp__into_bounds(goal, i, u->x[i]);
+    }
+    u->is_linear = true;
 out:
     imp__release(s->ctx, work);
     return st;
@@ -329,38 +318,27 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
     struct answer a = {0};
     struct imp__uncertainty u = {0};
     double *noise = imp__alloc(ctx, n * n, sizeof *noise);
-    const int first = rounds->at_newton ? 1 : imp_min(FIRST, rounds->most);
-    const int more = rounds->most - first;
-    bool go = false;
+    bool go = true;
 
     *out = (struct imp__uncertainty){0};
     if (!noise) IMP_TRY(no_memory(ctx));
     IMP_TRY(answer_create(ctx, n, &a));
     IMP_TRY(uncertainty_create(ctx, n, &u));
     IMP_TRY(imp__sampled_create(goal, x, &s));
-    IMP_TRY(
-        imp__sampled_add(goal, x, x, imp__search_seed(goal, SEED_BASE, 0), first, &s));
-    IMP_TRY(answer_find(goal, &s, x, noise, &a, &u));
-    const int missing = rounds_missing(&s, &a, &u, more);
-    if (rounds->at_newton) {
-        IMP_TRY(newton_samples(goal, x, imp_max(missing, 1), &s, &a, &u));
-        if (!u.is_linear) goto out;
-    } else {
-        u.is_linear = true;
-        if (missing > 0)
-            IMP_TRY(imp__sampled_add(goal, x, x, imp__search_seed(goal, SEED_BASE, 1),
-                                     missing, &s));
-    }
-    if (s.rounds > first) IMP_TRY(answer_find(goal, &s, x, noise, &a, &u));
+    IMP_TRY((rounds->at_newton ? samples_ahead : samples_here)(goal, x, rounds->most, &s,
+                                                               noise, &a, &u));
+    if (!u.is_linear) goto out;
     u.rounds = s.rounds;
-    const double share = s.rounds / (s.rounds + rounds->searched);
-    if (share < 1 && over_noise(n, a.free.G, s.mean.g, s.mean.cov_g) <= 1)
-        for (size_t k = 0; k < n; k++) u.x[k] = x[k] + share * (u.x[k] - x[k]);
-    for (size_t k = 0; k < n; k++) u.x[k] = imp__into_bounds(goal, k, u.x[k]);
+    double part = s.rounds / (s.rounds + rounds->searched);
+    if (part == 1 || over_noise(n, a.free.G, s.mean.g, s.mean.cov_g) > 1) part = 1;
+    for (size_t k = 0; k < n; k++)
+        u.x[k] =
+            imp__into_bounds(goal, k, part < 1 ? x[k] + part * (u.x[k] - x[k]) : u.x[k]);
     if (!rounds->at_newton) {
-        IMP_TRY(accept(goal, x, imp__search_seed(goal, SEED_BASE, 63), u.x, &go));
+        IMP_TRY(accept(goal, x, imp__search_seed(goal, SEED_BASE, SEED_LAST), u.x, &go));
         if (!go) memcpy(u.x, x, n * sizeof *x);
     }
+    u.loss = imp__sampled_loss(&s, x, u.x, a.free.G, go ? part : 0);
 
     memcpy(u.G, a.free.G, n * n * sizeof *u.G);
     u.condition = a.every.values[0] > 0 && !a.every.loose[0]
@@ -374,12 +352,13 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
         v->at_bound = imp__at_bound(goal, u.x, k);
         v->determined = !imp__is_loose(a.fixed[k] ? &a.every : &a.free, k);
         if (a.fixed[k])
-            interval_bound(goal, k, a.wish[k],
-                           standard_error(&a.every, n, k, a.measurement, a.monte_carlo),
-                           v);
+            imp__interval_bound(
+                goal, k, a.wish[k],
+                imp__interval_se(&a.every, n, k, a.measurement, a.monte_carlo), v);
         else
-            interval_free(goal, k,
-                          standard_error(&a.free, n, k, u.measurement, u.monte_carlo), v);
+            imp__interval_free(
+                goal, k, imp__interval_se(&a.free, n, k, u.measurement, u.monte_carlo),
+                v);
     }
     *out = u;
     u = (struct imp__uncertainty){.is_linear = true};

@@ -19,8 +19,9 @@ struct imp__uncertainty {
     double *loosest;     /* [n] unit vector, in units of the scales: the worst of them */
     double
         noise_scale; /* estimated variance of the data in units of 1/weight; 0: known */
-    int rounds;      /* samples taken, in those of an evaluation */
-    bool is_linear;  /* the gradient at the first Newton point is 0 within noise */
+    struct imp_estimate loss; /* at x, by the same samples; value NAN: not known */
+    int rounds;               /* samples taken, in those of an evaluation */
+    bool is_linear; /* the gradient at the first Newton point is 0 within noise */
 };
 
 /* Samples, in those of an evaluation by the goal. */
@@ -35,9 +36,9 @@ struct imp__rounds {
  * measurement's. Sets value, se, lo95, hi95, at_bound, determined of variables [n].
  *
  * at_newton, where x is the end of a search with fewer samples, and further away: one round
- * at x, the others at its Newton point u, all of them behind the answer. Where the model is
- * linear the gradient at u is 0 but for the noise of both; where it is not, or there is no
- * u, out->is_linear is false, and nothing else is set.
+ * at x, the others at its Newton point u, all of them behind the answer.
+ * Where the model is linear the gradient at u is 0 but for the noise of both; where it is
+ * not, or there is no u, out->is_linear is false, and nothing else is set.
  *
  * Where x is an average over a search, these samples are a part of all that are behind the
  * answer. If the Newton step is then no longer than its own noise, it is taken by that part

@@ -54,7 +54,7 @@ static enum imp_status spectrum(const struct imp__sampled *s, struct imp__direct
         IMP_TRY(imp__error(s->ctx, IMP_E_NUMERIC, "J^T J is not finite"));
     for (size_t j = 0; j < m; j++) {
         double sum = 0;
-        for (int b = 0; b < s->n_deviations; b++)
+        for (int b = 0; b < s->stages * IMP_DEVIATIONS; b++)
             sum += pow(along(s, a, s->deviations + (size_t)b * n * n, j), 2);
         a->se[j] = sqrt(sum);
         a->loose[j] =

@@ -31,7 +31,9 @@ struct imp__normal {
     double
         *deviations; /* [IMP_DEVIATIONS][n][n] of the data's part of H: their squares add
                            up to its variance, in every combination; or NULL */
-    struct imp_estimate f;
+    struct imp_estimate f; /* of the same walks as eval's */
+    /* The same by all pairs of walks, which has less noise; value NAN: there is none. */
+    struct imp_estimate pairs;
     double chi2; /* sum of weighted squared residuals, Monte Carlo's part taken off */
     double n_residuals;
     bool noise_known; /* H_meas is filled; else the noise is estimated from chi2 */

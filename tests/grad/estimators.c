@@ -302,16 +302,39 @@ static void covariance_of(struct setting *s, int p, int n, double *g, double *co
     for (size_t k = 0; k < 3; k++) g[k] += mean[k];
 }
 
+/* Likewise of chi^2, h_ij the sum over channels of w r_i r_j. */
+static void chi2_of(struct setting *s, int p, int n, double *chi2, double *variance)
+{
+    double h[8][8] = {{0}}, mean = 0, apart = 0;
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) {
+            for (int c = 0; c < C; c++)
+                h[i][j] += weight(s, p) * (L(s, p, i, c) - target(s, p, c)) *
+                           (L(s, p, j, c) - target(s, p, c));
+            if (i != j) mean += h[i][j] / (n * (n - 1));
+        }
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++)
+            for (int a = 0; a < n; a++)
+                for (int b = 0; b < n; b++)
+                    if (i != j && i != a && i != b && j != a && j != b && a != b)
+                        apart += h[i][j] * h[a][b] / (n * (n - 1) * (n - 2) * (n - 3));
+    *chi2 += mean;
+    *variance += mean * mean - apart;
+}
+
 static void gauss_newton(void)
 {
     struct setting s;
     enum { K = 3, n = 8 };
+    double chi2 = 0, chi2_variance = 0;
     double H[9] = {0}, same[9] = {0}, meas[9] = {0}, cov[9] = {0}, g[3] = {0};
     double mine[5][9], mine_g[3];
     begin(&s, ball("box"), "ball.*", n, IMP_LOSS_L2);
     s.n = 4, s.R = 2;
     for (int p = 0; p < PIXELS; p++) {
         covariance_of(&s, p, n, g, cov);
+        chi2_of(&s, p, n, &chi2, &chi2_variance);
         for (int c = 0; c < C; c++) {
             const double w = weight(&s, p), sigma = s.noise[C * p + c];
             for (int i = 0; i < n; i++)
@@ -340,6 +363,10 @@ static void gauss_newton(void)
                                         "noise of the target",
                                         "covariance of the gradient", "gradient"};
     for (int k = 0; k < 5; k++) tap_ok(off[k] < 1e-10, "%s # %.1e", names[k], off[k]);
+    tap_ok(relative(out.chi2, chi2) < 1e-10 &&
+               relative(out.chi2_se, sqrt(fmax(chi2_variance, 0))) < 1e-9,
+           "chi^2 and its error # %g +- %g, off %.1e, %.1e", out.chi2, out.chi2_se,
+           relative(out.chi2, chi2), relative(out.chi2_se, sqrt(chi2_variance)));
     end(&s);
 }
 

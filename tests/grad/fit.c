@@ -236,6 +236,47 @@ static void few_samples(void)
     imp_scene_destroy(s);
 }
 
+/* The loss at the end of a fit that searched with fewer samples is that of the walks behind
+ * its intervals: as many walks at the answer say the same, and one evaluation with the
+ * samples asked for has more than twice its error. */
+static void closing(void)
+{
+    enum { FITS = 6 };
+    imp_scene *s = scene_open(ctx, box_xml, IMP_RGB);
+    imp_film *film;
+    const struct imp_target t = target_of(ctx, s, 0, 256, 81, &film);
+    const char *const globs[] = {"lamp*", "green.*"};
+    double z2 = 0, told = 0, once = 0;
+    enum imp_status st = IMP_OK;
+    for (uint64_t seed = 1; seed <= FITS && st == IMP_OK; seed++) {
+        struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+        struct imp_run run = run_of(64, seed);
+        struct imp_estimate one = {0, 0, 0}, many = {0, 0, 0};
+        const struct imp_fit_result *r = NULL;
+        imp_problem *p = problem_of(s, globs, 2);
+        o.optimizer = IMP_LM;
+        o.intervals = 1;
+        st = imp_problem_add_target(p, &t);
+        if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
+        run.seed += 1000;
+        if (st == IMP_OK) st = imp_problem_objective(p, NULL, &run, &one, NULL, NULL);
+        run.spp = 4096;
+        if (st == IMP_OK) st = imp_problem_objective(p, NULL, &run, &many, NULL, NULL);
+        if (st == IMP_OK) {
+            z2 += pow(r->objective.value - many.value, 2) /
+                  (pow(r->objective.se, 2) + pow(many.se, 2)) / FITS;
+            told += r->objective.se / FITS;
+            once += one.se / FITS;
+        }
+        imp_problem_destroy(p);
+    }
+    tap_ok(st == IMP_OK && z2 < 3 && told < 0.5 * once,
+           "closing loss # mean z^2 %.2f, error %.3g, of one evaluation %.3g", z2, told,
+           once);
+    imp_film_destroy(film);
+    imp_scene_destroy(s);
+}
+
 /* The left half of the picture, with NaN elsewhere: the lamps still. */
 static int by_size(const void *a, const void *b)
 {
@@ -633,6 +674,7 @@ int main(void)
     box(IMP_LM);
     box(IMP_ADAM);
     few_samples();
+    closing();
     mask();
     resume(IMP_ADAM);
     resume(IMP_LM);

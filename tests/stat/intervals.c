@@ -87,6 +87,7 @@ static void at_newton(double bend)
     enum { SEEDS = 200 };
     const struct imp__rounds rounds = {.most = 6, .at_newton = true};
     int linear = 0, held = 0;
+    struct tap_stat loss_z = {0};
     for (uint64_t seed = 0; seed < SEEDS; seed++) {
         struct curved c;
         struct imp_fit_variable v[TOY_N];
@@ -98,6 +99,12 @@ static void at_newton(double bend)
         linear += u.is_linear;
         for (int k = 0; u.is_linear && k < TOY_N; k++)
             held += v[k].lo95 <= c.toy.truth[k] && c.toy.truth[k] <= v[k].hi95;
+        if (u.is_linear && bend == 0) {
+            struct imp_estimate exact;
+            c.toy.mc = 0;
+            if (toy_eval(u.x, 1, &exact, NULL, NULL, &c.toy) != IMP_OK) exit(99);
+            tap_add(&loss_z, (u.loss.value - exact.value) / u.loss.se);
+        }
         imp__uncertainty_destroy(ctx, &u);
     }
     if (bend > 0) {
@@ -110,6 +117,10 @@ static void at_newton(double bend)
     const double share = (double)held / (TOY_N * linear);
     tap_ok(share >= 0.92 && share <= 0.98, "its 95 %% intervals # cover %.1f %%",
            100 * share);
+    const double spread = sqrt(loss_z.m2 / (loss_z.n - 1));
+    tap_ok(fabs(loss_z.mean) < 4 * spread / sqrt(loss_z.n) && spread < 1.2,
+           "the loss at the answer, by the same samples # mean z %.2f, spread %.2f",
+           loss_z.mean, spread);
 }
 
 static void refined(void)
