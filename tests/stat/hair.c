@@ -79,16 +79,16 @@ static void furnace(double m, double n, double sigma)
     imp_spec in[IMP_INPUTS_MAX], f, albedo;
     double apart = 0, white = 0, weight = 0;
     for (int j = 0; j < b->n_in; j++) in[j] = b->input[j]->value;
-    for (int k = 0; k < 5; k++) {
+    for (int k = 0; k < 4; k++) {
         const imp_v3 wo = imp__normalize(
             imp__v3(0.4 * k - 0.8, 0.31 * k - 0.7, k == 3 ? -0.5 : 0.2 + 0.2 * k));
         struct point p = {b, in, wo};
         b->ops->directional_albedo(b, in, &wo, &albedo);
         const double exact =
-            imp__sphere_integral(value, &p, -1, 1, 1e-6, IMP_SPHERE_SMOOTH);
+            imp__sphere_integral(value, &p, -1, 1, 1e-4, IMP_SPHERE_SMOOTH);
         apart = fmax(apart, fabs(exact - albedo[1]));
         white = fmax(white, fabs(albedo[0] - 1));
-        for (uint32_t i = 0; i < 2000 && sigma == 0; i++) {
+        for (uint32_t i = 0; i < 500 && sigma == 0; i++) {
             const struct imp_key key = imp__key(7, (uint64_t)k, i);
             const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
             struct imp_dirs d = {wo, {0}, IMP_SMOOTH, false};
@@ -118,7 +118,7 @@ static void edges(void)
     imp_scene *s = scene_of("<bsdf type='hair'/>", IMP_RGB);
     const struct imp_bsdf *b = s->bsdfs[0];
     long bad = 0, lost = 0, n = 0;
-    for (uint32_t i = 0; i < 60000; i++) {
+    for (uint32_t i = 0; i < 20000; i++) {
         const struct imp_key key = imp__key(11, 0, i);
         double u[12];
         imp_spec in[IMP_INPUTS_MAX], f, df[IMP_INPUTS_MAX];
@@ -167,7 +167,7 @@ static void lock(void)
     imp_film *film;
     struct tap_stat z = {0};
     struct imp_run run = IMP_RUN_INIT;
-    run.spp = 64;
+    run.spp = 24;
     test_must(ctx, imp_render(s, &run, &film));
     const float *mean = imp_film_mean(film);
     for (size_t k = 0; k < 64; k++) tap_add(&z, (double)mean[3 * k]);
@@ -207,8 +207,8 @@ static void gradients(const char *material, enum imp_color_mode mode, size_t num
     struct imp_run run = IMP_RUN_INIT;
     const struct imp_check_row *rows;
     size_t n, bad = 0;
-    o.paths = 100;
-    o.fresh_spp = 64;
+    o.paths = 40;
+    o.fresh_spp = 32;
     run.seed = 3;
     test_must(ctx, imp_check(p, &o, &run, &rows, &n));
     for (size_t k = 0; k < n; k++) {

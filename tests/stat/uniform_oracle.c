@@ -89,7 +89,8 @@ static void bsdf_xml(const struct imp_bsdf_ops *ops, char *xml, size_t size)
                      "<float name='%s' value='%s'/>", d->name,
                      strcmp(d->name, "alpha") == 0 ? ".8" : ".4");
     /* Through a ball two lobes would have to be hit at once. */
-    const bool through = strcmp(ops->name, "roughdielectric") == 0;
+    const bool through =
+        strcmp(ops->name, "roughdielectric") == 0 || strcmp(ops->name, "hair") == 0;
     snprintf(xml, size, "<shape type='%s'><bsdf type='%s'>%s</bsdf></shape>" SKY LAMP,
              through ? "rectangle" : "sphere", ops->name, inner);
 }

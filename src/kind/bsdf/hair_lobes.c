@@ -2,6 +2,7 @@
 #include "hair_lobes.h"
 #include "fresnel.h"
 #include "math/bessel.h"
+#include <stdlib.h>
 
 /* x^n and its derivative. */
 static double power(double x, int n, double *d)
@@ -17,17 +18,27 @@ void imp__hair_shape(double longitudinal, double azimuthal, double tilt,
                      struct imp__hair_shape *out)
 {
     static const double factor[] = {1, 0.25, 4, 4}, turn[] = {-2, 1, 4, 0};
+    double turned[5][2]; /* cosine and sine of as many tilts */
     const double degree = IMP_PI / 180, root = sqrt(IMP_PI / 8);
     double d;
     const double m = longitudinal, n = azimuthal, high = power(m, 20, &d);
     const double w = 0.726 * m + 0.812 * m * m + 3.7 * high,
                  dw = 0.726 + 1.624 * m + 3.7 * d;
+    turned[0][0] = 1;
+    turned[0][1] = 0;
+    turned[1][0] = cos(tilt * degree);
+    turned[1][1] = sin(tilt * degree);
+    for (int k = 2; k <= 4; k *= 2) {
+        const double c = turned[k / 2][0], s = turned[k / 2][1];
+        turned[k][0] = (c - s) * (c + s);
+        turned[k][1] = 2 * c * s;
+    }
     for (int p = 0; p < IMP_HAIR_LOBES; p++) {
         out->v[p] = factor[p] * w * w;
         out->dv[p] = factor[p] * 2 * w * dw;
-        out->norm[p] = -1 / (out->v[p] * expm1(-2 / out->v[p]));
-        out->turn[p][0] = cos(turn[p] * tilt * degree);
-        out->turn[p][1] = sin(turn[p] * tilt * degree);
+        out->norm[p] = 1 / (out->v[p] * (out->v[p] < 0.05 ? 1 : -expm1(-2 / out->v[p])));
+        out->turn[p][0] = turned[abs((int)turn[p])][0];
+        out->turn[p][1] = turned[abs((int)turn[p])][1] * (turn[p] < 0 ? -1 : 1);
         out->dturn[p] = turn[p] * degree;
     }
     const double last = power(n, 22, &d);
@@ -106,7 +117,8 @@ double imp__hair_lobe(const struct imp__hair_shape *h, const struct imp__hair_si
         h->norm[p] * imp__bessel_i0(c / v, by ? &ratio : NULL) * exp((c - s - 1) / v);
     double value = M / IMP_2PI;
     if (p < IMP_HAIR_LOBES - 1) {
-        x = remainder(i->phi - azimuth(o, p), IMP_2PI);
+        x = i->phi - azimuth(o, p);
+        x = imp_clamp(x - IMP_2PI * rint(x / IMP_2PI), -IMP_PI, IMP_PI);
         e = exp(-fabs(x) / h->s);
         value = M * e / (h->s * (1 + e) * (1 + e) * h->share);
     }
