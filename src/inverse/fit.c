@@ -5,6 +5,7 @@
 #include "base/arguments.h"
 #include "clip.h"
 #include "search/covariance.h"
+#include "variate.h"
 #include <math.h>
 #include <string.h>
 
@@ -135,6 +136,7 @@ static enum imp_status clipped_searches(struct imp__fit *f,
         IMP_CHECKED(imp__fit_clipped(f, round, &own, s, &again));
         if (!again) return IMP_OK;
         f->final_total = 0;
+        imp__variate_forget(f->variate);
         const enum imp_status st = search(f, &own, *s);
         imp__search_settle(*s);
         if (st != IMP_OK) return st;

@@ -114,6 +114,7 @@ enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
             "specfilm has %d response curves (a loss takes any number)",
             sensor->film.n_responses);
     imp__tracer_numbers(out, run, 0);
+    if (integrator->from_lights) out->points = NULL; /* groups would share a set */
     if (waves)
         out->wavelengths =
             &waves[run->wavelengths == IMP_WAVELENGTHS_IMPORTANCE ? IMP_WAVES_IMPORTANCE

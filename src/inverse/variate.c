@@ -121,6 +121,11 @@ void imp__variate_destroy(struct imp__variate *v)
     imp__release(v->ctx, v);
 }
 
+void imp__variate_forget(struct imp__variate *v)
+{
+    if (v) v->evaluations = 0;
+}
+
 /* ---- An evaluation --------------------------------------------------------------- */
 
 /* The w that makes the variance of F + w (I - H) least, by what earlier walks of the other
@@ -189,14 +194,14 @@ void imp__variate_replicate(struct imp__variate_view *view, const struct imp__ta
     const int m = plan.m;
     const struct imp_target *d = &t->desc;
     const bool luminance = imp__sees_luminance(t, view->channels);
-    const double scale = d->scale * (t->weights ? t->weights[pixel] : 1);
     const size_t at = pixel * (size_t)view->channels, width = (size_t)view->width;
     const int half = (int)((pixel / width + pixel % width) % 2);
     const double by = view->half[half].w;
     double f[IMP_REPLICATE_MAX], h[IMP_REPLICATE_MAX];
     for (int c = 0; c < d->channels && m > 1 && moments; c++) {
         const double T = t->pixels[pixel * (size_t)d->channels + (size_t)c];
-        const double w = imp__loss_weight(d->loss, scale, d->epsilon, T);
+        const double w =
+            imp__loss_weight(d->loss, imp__target_weight(t, pixel, c), d->epsilon, T);
         for (int s = 0; s < m; s++) {
             f[s] = imp__seen(luminance, (double[3]){L[s][0], L[s][1], L[s][2]}, c);
             h[s] = imp__seen(luminance, (double[3]){H[s][0], H[s][1], H[s][2]}, c);

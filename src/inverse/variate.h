@@ -49,6 +49,9 @@ enum imp_status imp__variate_create(const struct imp_problem *p,
                                     const struct imp_run *run, struct imp__variate **out);
 void imp__variate_destroy(struct imp__variate *v);
 
+/* Targets have changed what pictures are: begin anew. v may be NULL. */
+void imp__variate_forget(struct imp__variate *v);
+
 /* Around the estimates of all targets: what they have so far is cleared; when they are
  * complete, the pictures take a step, and `there` takes the scene's present parameters. */
 void imp__variate_begin(struct imp__variate *v);
