@@ -64,6 +64,7 @@ static void begin(struct setting *s, imp_scene *scene, const char *active, int s
     *s = (struct setting){.scene = scene};
     s->run = (struct imp_run)IMP_RUN_INIT;
     s->run.spp = spp;
+    s->run.points = IMP_POINTS_INDEPENDENT; /* the sums below are over walks */
     s->run.seed = 11;
     s->problem = test_problem(ctx, s->scene, active);
     s->K = imp_problem_n(s->problem);
