@@ -627,7 +627,7 @@ typedef void (*imp_preview_fn)(const imp_film *picture, void *payload);
 /** The random numbers of a pixel's walks. */
 enum imp_points {
     /** As the sampler of the sensor says; where there is none, independent for pictures, of
-     * Sobol's sequence for losses and fits of scenes without media. */
+     * Sobol's sequence for losses, and fits but IMP_LM, of scenes without media. */
     IMP_POINTS_SCENE = 0,
     IMP_POINTS_INDEPENDENT, /**< independent */
     /** Sets of up to 64 points of Sobol's sequence, scrambled by Owen's method. Pixels and

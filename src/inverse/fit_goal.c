@@ -334,7 +334,9 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
                                   sizeof f.options));
     IMP_CHECKED(imp__run_take(ctx, "imp_fit", run, &f.outer));
     IMP_CHECKED(imp__run_traces(ctx, "imp_fit", &f.outer));
-    imp__points_of_losses(p, &f.outer);
+    /* Levenberg-Marquardt ends where its gradient is within its noise: of few sets that
+     * noise is known too badly. */
+    if (f.options.optimizer != IMP_LM) imp__points_of_losses(p, &f.outer);
     if ((unsigned)f.options.optimizer > IMP_SLSQP)
         return imp__error(ctx, IMP_E_ARG, "optimizer %d does not exist",
                           (int)f.options.optimizer);
