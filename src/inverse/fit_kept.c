@@ -18,7 +18,7 @@
 #define ROOM           1.7 /* to which the second moment of a step may grow under the floor */
 #define PILOT          4 /* samples of a pixel by which it is found */
 #define MEMORY         0x1p30
-#define WEIGHED        8192 /* walks whose effective sample size is found, a sensor */
+#define WEIGHED        2048 /* walks whose effective sample size is found, a sensor */
 
 bool imp__fit_keeps(const struct imp__fit *f)
 {
