@@ -5,6 +5,7 @@
  * kinds have the same means. Run with "long" for the larger pictures and all scenes. */
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include "inverse/problem.h"
 #include <stdbool.h>
 #include <stdlib.h>
 
@@ -136,24 +137,32 @@ static const char *const actives[][5] = {
     {"wall.reflectance.color0.value", "wall.reflectance.color1.value", "metal.alpha*",
      "sky.radiance.value", "lamp.radiance.value"}};
 
+/* The picture by many samples is the target. */
+static imp_problem *problem_of(imp_scene *scene, enum which which, imp_film **film)
+{
+    imp_problem *p;
+    struct imp_target target = IMP_TARGET_INIT;
+    struct imp_run run = run_of(IMP_POINTS_INDEPENDENT, 7);
+    run.spp = 1024;
+    test_must(ctx, imp_render(scene, &run, film));
+    test_must(ctx, imp_problem_create(scene, &p));
+    for (int k = 0; k < 5 && actives[which][k]; k++)
+        test_must(ctx, imp_problem_activate(p, actives[which][k]));
+    target.pixels = imp_film_mean(*film);
+    target.width = size_of(*film).width;
+    target.height = size_of(*film).height;
+    target.channels = 3;
+    test_must(ctx, imp_problem_add_target(p, &target));
+    return p;
+}
+
 static void gradient(enum which which, int side, bool away, double most)
 {
     imp_scene *scene = scene_of(which, side);
     const char *name = scene_names[which], *state = away ? "away" : "at the optimum";
     imp_film *film;
-    imp_problem *p;
-    struct imp_run run = run_of(IMP_POINTS_INDEPENDENT, 7);
-    run.spp = 1024;
-    test_must(ctx, imp_render(scene, &run, &film));
-    test_must(ctx, imp_problem_create(scene, &p));
-    for (int k = 0; k < 5 && actives[which][k]; k++)
-        test_must(ctx, imp_problem_activate(p, actives[which][k]));
-    struct imp_target target = IMP_TARGET_INIT;
-    target.pixels = imp_film_mean(film);
-    target.width = size_of(film).width;
-    target.height = size_of(film).height;
-    target.channels = 3;
-    test_must(ctx, imp_problem_add_target(p, &target));
+    struct imp_run run;
+    imp_problem *p = problem_of(scene, which, &film);
     const size_t n = imp_problem_n(p);
     double x[PARAMS], g[PARAMS], se[PARAMS], ratio[PARAMS], error[PARAMS];
     double stated[PARAMS + 1] = {0}, z_most = 0, lowest = INFINITY, highest = 0;
@@ -200,6 +209,45 @@ static void gradient(enum which which, int side, bool away, double most)
     imp_scene_destroy(scene);
 }
 
+/* ---- All pairs ---------------------------------------------------------------------- */
+
+/* Variance of the gradient, as it is told without bias, by products over all pairs of up to
+ * 16 units of a pixel's samples, over that of two groups of the same samples. Losses keep the
+ * groups, since this is no more than a quarter (docs/decisions.md). */
+static void pairs(enum which which, int spp, enum imp_points points)
+{
+    enum { RUNS = 8 };
+    imp_scene *scene = scene_of(which, 32);
+    imp_film *film;
+    imp_problem *p = problem_of(scene, which, &film);
+    const size_t n = imp_problem_n(p);
+    double *H = calloc(4 * n * n, sizeof *H);
+    double g[PARAMS], se[PARAMS], sum[2][PARAMS] = {{0}}, ratio[PARAMS];
+    for (int seed = 0; seed < RUNS; seed++) {
+        struct imp_run run = run_of(points, seed);
+        struct imp__gauss_newton all = {.H = H,
+                                        .H_same = H + n * n,
+                                        .cov_g = H + 2 * n * n,
+                                        .cov_excess = H + 3 * n * n,
+                                        .g = g,
+                                        .g_se = se};
+        run.spp = spp;
+        test_must(ctx, imp_problem_objective(p, NULL, &run, NULL, g, se));
+        for (size_t k = 0; k < n; k++) sum[0][k] += se[k] * se[k];
+        test_must(ctx, imp__gauss_newton(p, NULL, &run, &all));
+        for (size_t k = 0; k < n; k++) sum[1][k] += se[k] * se[k];
+    }
+    for (size_t k = 0; k < n; k++) ratio[k] = sum[1][k] / sum[0][k];
+    const double mid = median(ratio, n);
+    tap_ok(mid > 0.75, "%s, %d samples, %s: all pairs # variance %.3f, of %.2f to %.2f",
+           scene_names[which], spp, points == IMP_POINTS_SOBOL ? "sobol" : "independent",
+           mid, ratio[0], ratio[n - 1]);
+    free(H);
+    imp_film_destroy(film);
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+}
+
 int main(int argc, char **argv)
 {
     const bool all = argc > 1 && strcmp(argv[1], "long") == 0;
@@ -216,6 +264,12 @@ int main(int argc, char **argv)
         gradient(TEXTURED, side, false, .45);
         gradient(TEXTURED, side, true, .45);
     }
+    static const int samples[] = {16, 64, 256};
+    for (size_t k = 0; all && k < 3; k++)
+        for (int which = CORNELL; which <= TEXTURED; which++) {
+            pairs(which, samples[k], IMP_POINTS_INDEPENDENT);
+            pairs(which, samples[k], IMP_POINTS_SOBOL);
+        }
     imp_context_destroy(ctx);
     return tap_done();
 }
