@@ -217,7 +217,7 @@ static void photographs(const struct setting *of, int seeds, bool all)
                plain.worst);
     }
     if (seeds > 1)
-        tap_ok(fabs(inside.mean - 0.95) < 3 * tap_se(&inside) && tap_se(&inside) < 0.01,
+        tap_ok(fabs(inside.mean - 0.95) < 3 * tap_se(&inside) && tap_se(&inside) < 0.015,
                "intervals hold %.1f +- %.1f %% of the truths", 100 * inside.mean,
                100 * tap_se(&inside));
     imp_scene_destroy(s);
