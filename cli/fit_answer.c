@@ -288,8 +288,7 @@ int fit_answer_give(const struct fit_answer *a)
         print_table(a, paths);
     }
     if (a->result->walks) cli_say("importon: walks: %s", a->result->walks);
-    if (a->result->control_variate)
-        cli_say("importon: %s", a->result->control_variate);
+    if (a->result->control_variate) cli_say("importon: %s", a->result->control_variate);
     if (a->result->warning) cli_say("importon: warning: %s", a->result->warning);
     paths_free(a, paths);
     return rc;
