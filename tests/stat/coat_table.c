@@ -18,7 +18,7 @@ static struct imp__coat table, above, below;
 static void draw(enum imp__distribution type, double alpha, double e, double mu,
                  bool back, uint64_t seed, struct tap_stat *sum)
 {
-    const struct imp__microfacet f = {type, true, alpha, alpha};
+    const struct imp__microfacet f = {type, true, alpha, alpha, 0};
     const imp_v3 w = imp__v3(sqrt(1 - mu * mu), 0, mu);
     for (uint32_t i = 0; i < DRAWS; i++) {
         const struct imp_key key = imp__key(seed, i, 0);
