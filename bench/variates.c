@@ -5,7 +5,7 @@
  * end at, by several ways of cooling and averaging.
  *
  *     variates chains [--spp N] [--repeats N] [SCENE GLOB]      # of some shipped scenes
- *     variates fits [--seeds N] [--iterations N] [--levels N]   # the floor of textured.xml
+ *     variates fits [--width N] [--seeds N] [--iterations N] [--levels N]   # the floor of textured.xml
  *     variates answers [--spp N] [--seeds N] [--iterations N]   # fits of few numbers
  *
  * Variances are those of chains that follow one and the same path of parameters, so that
@@ -18,7 +18,7 @@
 #include <string.h>
 #include <time.h>
 
-static int spp = 8, repeats = 12, seeds = 5, iterations = 150, levels = 1;
+static int spp = 8, repeats = 12, seeds = 5, iterations = 150, levels = 1, width = 80;
 static imp_context *ctx;
 
 static void must(enum imp_status st)
@@ -279,11 +279,14 @@ static double excess(struct task *t, const double *x, float *const truth[2])
 
 static void fits(void)
 {
-    static const char *const defines[] = {"width=80", "height=60"};
+    char across[24], down[24];
+    const char *const defines[] = {across, down};
+    snprintf(across, sizeof across, "width=%d", width);
+    snprintf(down, sizeof down, "height=%d", width * 3 / 4);
     static const struct {
         int spp;
         bool variates;
-    } column[] = {{4, false}, {16, false}, {4, true}};
+    } column[] = {{4, false}, {16, false}, {4, true}, {8, true}};
     struct task t;
     float *truth[2];
     int w, h, c;
@@ -293,9 +296,9 @@ static void fits(void)
         truth[k] = picture(t.scene, 128, 4711 + (uint64_t)k, &w, &h, &c);
     double *x = room(t.n);
     printf(
-        "floor of textured.xml, 80 x 60, %d iterations, %d seeds: excess loss (rms error "
+        "floor of textured.xml, %d x %d, %d iterations, %d seeds: excess loss (rms error "
         "of a texel; cpu s)\n%-24s",
-        iterations, seeds, "");
+        width, width * 3 / 4, iterations, seeds, "");
     for (size_t k = 0; k < imp_count(column); k++)
         printf("  %2d samples%s        ", column[k].spp,
                column[k].variates ? ", with" : "      ");
@@ -370,6 +373,7 @@ int main(int argc, char **argv)
         else if (more && strcmp(argv[k], "--seeds") == 0) seeds = atoi(argv[++k]);
         else if (more && strcmp(argv[k], "--iterations") == 0)
             iterations = atoi(argv[++k]);
+        else if (more && strcmp(argv[k], "--width") == 0) width = atoi(argv[++k]);
         else if (more && strcmp(argv[k], "--levels") == 0) levels = atoi(argv[++k]);
         else if (*argv[k] != '-' && n_rest < 2) rest[n_rest++] = argv[k];
         else what = "";
@@ -377,11 +381,12 @@ int main(int argc, char **argv)
     const bool of_chains = strcmp(what, "chains") == 0;
     const bool of_answers = strcmp(what, "answers") == 0;
     if ((!of_chains && !of_answers && strcmp(what, "fits") != 0) || n_rest == 1 ||
-        spp < 4 || repeats < 2 || seeds < 1 || iterations < 2) {
-        fprintf(stderr,
-                "usage: variates chains [--spp N] [--repeats N] [SCENE GLOB]\n"
-                "       variates fits [--seeds N] [--iterations N] [--levels N]\n"
-                "       variates answers [--spp N] [--seeds N] [--iterations N]\n");
+        spp < 4 || repeats < 2 || seeds < 1 || iterations < 2 || width < 4) {
+        fprintf(
+            stderr,
+            "usage: variates chains [--spp N] [--repeats N] [SCENE GLOB]\n"
+            "       variates fits [--width N] [--seeds N] [--iterations N] [--levels N]\n"
+            "       variates answers [--spp N] [--seeds N] [--iterations N]\n");
         return 2;
     }
     const struct imp_context_options o = {.size = sizeof o, .threads = 1};
