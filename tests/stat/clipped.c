@@ -318,7 +318,7 @@ int main(int argc, char **argv)
     ctx = test_context(2);
     decisions();
     gradients();
-    photographs(&yard, all ? 100 : 1, all);
+    photographs(&yard, all ? 140 : 1, all);
     if (all) photographs(&room, 1, all);
     imp_context_destroy(ctx);
     return tap_done();
