@@ -74,7 +74,7 @@ def importon_gradient(program, spp, seed):
     found = {}
     with tempfile.TemporaryDirectory() as folder:
         command = [program, "gradient", SCENE, "--spp", str(spp), "--seed", str(seed),
-                   "--json", "-q", "-o", os.path.join(folder, "g")]
+                   "--json", "-q", "--textures", os.path.join(folder, "g")]
         out = subprocess.run(command, check=True, capture_output=True, text=True).stdout
         for p in json.loads(out)["params"]:
             if "grad" in p:

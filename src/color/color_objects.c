@@ -320,7 +320,7 @@ enum imp_status imp__color_object(const struct imp__color_ask *ask, struct imp_n
         struct imp__color_ask surface = *ask;
         surface.role = IMP_REFLECTANCE;
         IMP_TRY(imp__color_require(ctx, node, "color"));
-        if (!p || p->type != IMP_PROP_RGB)
+        if (!p || (p->type != IMP_PROP_RGB && p->type != IMP_PROP_VECTOR))
             IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "'color' must be an rgb"));
         p->used = true;
         IMP_TRY(imp__color_check_rgb(&surface, node, p, p->number));

@@ -139,6 +139,35 @@ static void integrator_replace(struct imp_node *node)
     node->type = "path";
 }
 
+/* Child i, a `merge`, is replaced by the shapes in it, as if they stood in its place: Mitsuba
+ * makes one mesh of those of one material, and here each keeps its numbers. */
+static enum imp_status merge_open(struct imp_scene *scene, struct imp_node *parent,
+                                  size_t i)
+{
+    const struct imp_node *merge = parent->children[i].node;
+    const size_t m = merge->n_children, n = parent->n_children;
+    struct imp_child *child = imp__arena_array(&scene->arena, n + m, sizeof *child);
+    if (!child) return imp__error(scene->ctx, IMP_E_NOMEM, "scene: out of memory");
+    for (size_t k = 0; k < m; k++)
+        if (strcmp(merge->children[k].node->tag, "shape") != 0)
+            return imp__node_error(scene->ctx, merge, IMP_E_SCENE,
+                                   "holds shapes only, not a %s",
+                                   merge->children[k].node->tag);
+    if (merge->n_props > 0)
+        return imp__prop_error(scene->ctx, merge, &merge->props[0], IMP_E_SCENE,
+                               "not a property of this plugin: %s", merge->props[0].name);
+    memcpy(child, parent->children, i * sizeof *child);
+    for (size_t k = 0; k < m; k++) {
+        child[i + k] = merge->children[k];
+        if (child[i + k].name && imp__node_child(parent, child[i + k].name))
+            child[i + k].name = NULL; /* that of another */
+    }
+    memcpy(child + i + m, parent->children + i + 1, (n - i - 1) * sizeof *child);
+    parent->children = child;
+    parent->n_children = parent->cap_children = n + m - 1;
+    return IMP_OK;
+}
+
 /* Is what the node is supported? *gone: its parent goes on without it. */
 static enum imp_status look(struct survey *s, struct imp_node *node, bool *gone)
 {
@@ -173,6 +202,10 @@ static enum imp_status walk(struct survey *s, struct imp_node *node)
         struct imp_node *child = node->children[i].node;
         bool gone = child->gone;
         child->referred |= node->children[i].ref != NULL;
+        if (strcmp(child->tag, "shape") == 0 && strcmp(child->type, "merge") == 0) {
+            IMP_TRY(merge_open(s->scene, node, i--));
+            continue;
+        }
         if (!child->surveyed) IMP_TRY(look(s, child, &gone));
         child->gone = gone;
         if (gone) child_remove(node, i--);

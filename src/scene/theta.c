@@ -5,7 +5,7 @@
  * texture's texels); theta is a list of addresses, so setting it needs no rebuild. */
 #include "base/arguments.h"
 #include "base/nearest.h"
-#include "scene.h"
+#include "theta_alias.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -112,6 +112,31 @@ static bool name_matches(const char *given, const char *name)
            strcmp(name + g, ".value") == 0;
 }
 
+bool imp__theta_exact(const struct imp_scene *scene, const char *name, size_t *index)
+{
+    for (size_t i = 0; i < scene->n_params; i++)
+        if (name_matches(name, scene->params[i].info.name)) {
+            *index = i;
+            return true;
+        }
+    return false;
+}
+
+/* Is this what Mitsuba's traverse() calls numbers that move things, up to 3.9 or from 3.10
+ * on? */
+static bool is_geometry(const char *name)
+{
+    static const char *const keys[] = {
+        "vertex_positions", "vertex_normals", "vertex_texcoords", "faces",
+        "positions",        "normals",        "texcoords",        "position_index",
+        "normal_index",     "bsdf_index",     "to_world",         "x_fov",
+        "position",         "control_points"};
+    const char *dot = strrchr(name, '.');
+    for (size_t k = 0; dot && k < imp_count(keys); k++)
+        if (strcmp(dot + 1, keys[k]) == 0) return true;
+    return false;
+}
+
 enum imp_status imp_scene_find_param(const imp_scene *scene, const char *name,
                                      size_t *index)
 {
@@ -120,11 +145,13 @@ enum imp_status imp_scene_find_param(const imp_scene *scene, const char *name,
     IMP_REQUIRE(scene->ctx, index, "index");
     for (const char *tail = name; tail;
          tail = strchr(tail, '.') ? strchr(tail, '.') + 1 : NULL)
-        for (size_t i = 0; i < scene->n_params; i++)
-            if (name_matches(tail, scene->params[i].info.name)) {
-                *index = i;
-                return IMP_OK;
-            }
+        if (imp__theta_exact(scene, tail, index)) return IMP_OK;
+    if (imp__theta_alias(scene, name, index)) return IMP_OK;
+    if (is_geometry(name))
+        return imp__error(scene->ctx, IMP_E_ARG,
+                          "there is no parameter '%s': vertices, transformations and "
+                          "cameras are not among them",
+                          name);
     const char *near[3] = {0};
     size_t distance[3] = {SIZE_MAX, SIZE_MAX, SIZE_MAX};
     for (size_t i = 0; i < scene->n_params; i++) {

@@ -18,6 +18,76 @@ static const char plates[] =
     "<shape type='sphere'><ref id='a'/></shape><shape type='sphere'><ref id='b'/></shape>"
     "<emitter type='constant'/></scene>";
 
+/* Paths of Mitsuba's traverse() to objects that are called by their ids here. */
+static void aliases(imp_context *ctx)
+{
+    static const char scene[] =
+        "<scene version='3.0.0'><integrator type='volpath'/>"
+        "<texture type='checkerboard' id='squares'/>"
+        "<medium type='homogeneous' id='fog'><float name='albedo' value='.5'/>"
+        "<phase type='blendphase'><float name='weight' value='.2'/>"
+        "<phase type='hg' id='ahead'/><phase type='hg'/></phase></medium>"
+        "<bsdf type='twosided' id='sheet'><bsdf type='blendbsdf' id='mixed'>"
+        "<float name='weight' value='.3'/><bsdf type='diffuse' id='first'/>"
+        "<bsdf type='diffuse'><ref id='squares' name='reflectance'/></bsdf></bsdf>"
+        "<bsdf type='diffuse' id='under'/></bsdf>"
+        "<shape type='rectangle' id='leaf'><bsdf type='mask'><bsdf type='diffuse' "
+        "id='green'/></bsdf></shape>"
+        "<shape type='sphere' id='ball'><ref id='sheet'/></shape>"
+        "<shape type='sphere' id='cloud'><bsdf type='null'/>"
+        "<ref id='fog' name='interior'/></shape>"
+        "<shape type='rectangle' name='panel'><emitter type='area' id='glow'/></shape>"
+        "<shape type='sphere' id='smoke'><bsdf type='null'/><medium type='homogeneous' "
+        "name='interior'><float name='albedo' value='.4'/><phase type='hg'/></medium>"
+        "</shape></scene>";
+    static const char *const pairs[][2] = {
+        {"ball.bsdf.brdf_0.weight.value", "mixed.weight.value"},
+        {"ball.bsdf.brdf_0.bsdf_0.reflectance.value", "first.reflectance.value"},
+        {"sheet.brdf_0.bsdf_0.reflectance", "first.reflectance.value"},
+        {"ball.bsdf.brdf_0.bsdf_1.reflectance.color1.value", "squares.color1.value"},
+        {"ball.bsdf.brdf_1.reflectance.value", "under.reflectance.value"},
+        {"leaf.bsdf.nested_bsdf.reflectance.value", "green.reflectance.value"},
+        {"cloud.interior_medium.albedo.value.value", "fog.albedo.value"},
+        {"cloud.interior_medium.phase_function.weight.value", "fog.phase.weight.value"},
+        {"cloud.interior_medium.phase_function.phase_0.g", "ahead.g.value"},
+        {"fog.phase_function.phase_1.g", "fog.phase.phase_1.g.value"},
+        {"smoke.interior_medium.albedo.value.value", "smoke.interior.albedo.value"},
+        {"smoke.interior_medium.phase_function.g", "smoke.interior.phase.g.value"},
+        {"group.ball.bsdf.brdf_0.weight.value", "mixed.weight.value"},
+        {"panel.emitter.radiance.value", "glow.radiance.value"},
+    };
+    imp_scene *s = test_scene_text(ctx, scene, IMP_RGB);
+    for (size_t k = 0; k < sizeof pairs / sizeof *pairs; k++) {
+        struct imp_param_info p = {.size = sizeof p};
+        size_t index;
+        const enum imp_status st = imp_scene_find_param(s, pairs[k][0], &index);
+        if (st == IMP_OK) test_must(ctx, imp_scene_get_param(s, index, &p));
+        tap_ok(st == IMP_OK && strcmp(p.name, pairs[k][1]) == 0, "%s is %s # %s",
+               pairs[k][0], pairs[k][1], st == IMP_OK ? p.name : imp_last_error(ctx));
+    }
+    static const char *const none[] = {"ball.bsdf.brdf_2.weight.value",
+                                       "ball.bsdf.brdf_1.bsdf_0.reflectance.value",
+                                       "cloud.exterior_medium.albedo.value.value",
+                                       "ball",
+                                       "ball.",
+                                       "..",
+                                       ""};
+    for (size_t k = 0; k < sizeof none / sizeof *none; k++) {
+        size_t index;
+        tap_ok(imp_scene_find_param(s, none[k], &index) == IMP_E_ARG,
+               "'%s' is no parameter", none[k]);
+    }
+    static const char *const geometry[] = {"ball.vertex_positions", "ball.positions",
+                                           "leaf.to_world", "camera.x_fov"};
+    for (size_t k = 0; k < sizeof geometry / sizeof *geometry; k++) {
+        size_t index;
+        tap_ok(imp_scene_find_param(s, geometry[k], &index) == IMP_E_ARG &&
+                   strstr(imp_last_error(ctx), "are not among them"),
+               "%s: numbers that move things are no parameters", geometry[k]);
+    }
+    imp_scene_destroy(s);
+}
+
 /* The sum of two numbers, as whoever derived it keeps it. */
 struct derived {
     const imp_scene *scene;
@@ -109,6 +179,7 @@ static void fields(imp_context *ctx)
 int main(void)
 {
     imp_context *ctx = test_context(1);
+    aliases(ctx);
     listeners(ctx);
     fields(ctx);
     imp_context_destroy(ctx);
