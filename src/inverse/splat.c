@@ -12,7 +12,11 @@ static void sample_radiance(const void *payload, struct imp_sample *s)
 {
     const struct imp_tracer *tracer = payload;
     struct imp_walk walk;
-    imp__sample_walk(s, tracer, &walk);
+    /* The index is the number of a sample, not its place among kept ones. */
+    imp__walk_trace(tracer, s->arena, s->x, s->y, s->index, &walk);
+    s->px = walk.px;
+    s->py = walk.py;
+    s->dropped = walk.dropped;
     for (int c = 0; c < tracer->scene->channels; c++) s->value[c] = walk.L[c];
 }
 

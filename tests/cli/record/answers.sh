@@ -13,7 +13,10 @@ echo "- at the parameters of the draw"
 importon what-if room.walks --gradient --json >kept.json
 [[ $(number kept.json value) == "$(number traced.json value)" && $(number kept.json se) == "$(number traced.json se)" ]] && echo mean: equal
 importon what-if room.walks -T target.exr --gradient --json >kept_loss.json
-[[ $(number kept_loss.json value) == "$(number loss.json value)" && $(params kept_loss.json) == "$(params loss.json)" ]] && echo loss and gradient: equal
+# Kept walks are sums of products here, which round in another order.
+numbers() { params "$1" | grep -oE '[-+]?[0-9][-+.0-9e]*'; }
+paste <(number loss.json value | cut -d: -f2; numbers loss.json) <(number kept_loss.json value | cut -d: -f2; numbers kept_loss.json) |
+    awk '{ d = $1 - $2; s = $1 * 1e-9; if (d * d > s * s) bad++ } END { if (NR > 20 && !bad) print "loss and gradient: equal to 1e-9" }'
 importon what-if room.walks -o kept.exr -q --no-preview >answer && importon compare kept.exr traced.exr | grep max
 grep -c 'effective sample size 1$' answer
 echo "- elsewhere"
