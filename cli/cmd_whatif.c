@@ -80,6 +80,10 @@ static int open_all(const char *path)
     if (!rc && o.region && problem_options.targets.n)
         rc = cli_error(EXIT_USAGE, "--region is of means; the pixels of a loss are "
                                    "chosen by --mask");
+    if (!rc && problem_options.clip)
+        rc =
+            cli_error(EXIT_USAGE, "--clip: pictures decide which numbers count, and kept "
+                                  "walks make none");
     w.run = cli_run();
     w.run.walks = w.walks;
     if (!rc) rc = problem_open(&w.problem);

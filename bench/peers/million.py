@@ -73,6 +73,7 @@ def main():
     ap.add_argument("--repeats", type=int, default=5)
     ap.add_argument("--rows", type=int, default=355)
     a = ap.parse_args()
+    a.importon = os.path.abspath(a.importon)
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         each = {"large": meshes.ball("large.ply", a.rows), "small": meshes.ball("small.ply", 45)}

@@ -225,13 +225,14 @@ def _is_path(target: Any) -> bool:
 def _integers(path: Any) -> Optional[tuple[bool, int]]:
     """Of a file of integers, which `read` takes for sRGB: is it JPEG, and its largest number."""
     with open(path, "rb") as file:
-        head = file.read(64)
+        head = file.read(1024)
     if head[:2] in (b"PF", b"Pf", b"#?") or head[:4] == b"\x76\x2f\x31\x01" or head[:6] == b"\x93NUMPY" or head[:3] == b"VOL":
         return None
     if head[:4] == b"\x89PNG":
         return False, 65535 if head[24] == 16 else 255
     if head[:2] in (b"P5", b"P6"):
-        return False, int(head.split()[3])
+        words = b"\n".join(line.split(b"#")[0] for line in head.split(b"\n")).split()  # without comments
+        return False, int(words[3]) if len(words) > 3 and words[3].isdigit() else 255
     return head[:2] == b"\xff\xd8", 255
 
 
@@ -257,10 +258,10 @@ def levels(target: Any, clip: Any, photograph: bool) -> tuple[float, float]:
             raise ArgumentError("clip=%r: 'auto' is of files of integers; else (low, high) in the file's numbers" % (clip,))
         part = (5 if file[0] else 0.5) / file[1]
         pair = [part, 1 - part]
+    elif len(clip) != 2:
+        raise ArgumentError("clip=%r: (low, high) is wanted" % (clip,))
     else:
         pair = [bound if v is None else float(v) for v, bound in zip(clip, _ENDS)]
-    if len(pair) != 2:
-        raise ArgumentError("clip=%r: (low, high) is wanted" % (clip,))
     if file is not None and not photograph:
         pair = [v if v in _ENDS else _decode(v) for v in pair]
     return pair[0], pair[1]

@@ -144,8 +144,11 @@ static void integrator_replace(struct imp_node *node)
 static enum imp_status merge_open(struct imp_scene *scene, struct imp_node *parent,
                                   size_t i)
 {
-    const struct imp_node *merge = parent->children[i].node;
-    const size_t m = merge->n_children, n = parent->n_children;
+    struct imp_node *merge = parent->children[i].node;
+    /* One that stands in the scene already adds nothing: references to references would
+     * else open it any number of times. */
+    const size_t m = merge->surveyed ? 0 : merge->n_children, n = parent->n_children;
+    merge->surveyed = true;
     struct imp_child *child = imp__arena_array(&scene->arena, n + m, sizeof *child);
     if (!child) return imp__error(scene->ctx, IMP_E_NOMEM, "scene: out of memory");
     for (size_t k = 0; k < m; k++)
@@ -286,6 +289,6 @@ static void idle_list(struct imp_scene *scene)
 enum imp_status imp__survey_finish(struct imp_scene *scene)
 {
     if (!scene->root) return IMP_OK;
-    idle_list(scene);
+    if (!scene->rayless) idle_list(scene); /* a second scene: the first has said so */
     return scene->lenient ? unused_list(scene, scene->root) : IMP_OK;
 }

@@ -49,7 +49,7 @@ static void part_add(const struct imp_problem *p, const struct imp__target *targ
     const struct imp__replicates r = imp__replicates_of(p->scene, target, run);
     for (size_t k = 0; a->even && k < across * down; k++) a->even[a->n + k] = r.n * r.R;
     a->n += across * down;
-    most.spp = CAP * r.n * r.R;
+    most.spp = (int)fmin((double)CAP * r.n * r.R, INT32_MAX);
     a->parts = imp_max(a->parts, imp__replicates_of(p->scene, target, &most).chunks);
 }
 

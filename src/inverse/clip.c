@@ -309,7 +309,8 @@ enum imp_status imp__censor(struct imp_problem *p, const struct imp_run *run,
         if (!p->targets[k].clip) continue;
         IMP_TRY(target_censor(p, k, run));
         *changed += p->targets[k].clip->changed;
-        *numbers += numbers_of(&p->targets[k]);
+        for (size_t i = 0; i < numbers_of(&p->targets[k]); i++)
+            *numbers += has_weight(&p->targets[k], i);
     }
 out:
     return st;

@@ -136,16 +136,17 @@ static enum imp_status clipped_searches(struct imp__fit *f,
         IMP_CHECKED(imp__fit_clipped(f, round, &own, s, &again));
         if (!again) return IMP_OK;
         f->final_total = 0;
+        f->run.spp = f->outer.spp; /* intervals took others */
         imp__variate_forget(f->variate);
+        imp__uncertainty_destroy(f->problem->ctx, u);
+        *u = (struct imp__uncertainty){0};
+        *why = NULL;
         const enum imp_status st = search(f, &own, *s);
         imp__search_settle(*s);
         if (st != IMP_OK) return st;
         f->final_calls = 0;
         f->final_total = final_total(f);
         if (!f->options.intervals) continue;
-        imp__uncertainty_destroy(f->problem->ctx, u);
-        *u = (struct imp__uncertainty){0};
-        *why = NULL;
         IMP_CHECKED(search_look(f, &own, *s, rows, u, why));
     }
 }

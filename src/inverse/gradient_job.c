@@ -117,8 +117,10 @@ static size_t moment_numbers(const struct imp__gradient_job *j)
 static struct imp__replicates plan_of(const struct imp__gradient_job *j, size_t tile)
 {
     if (!j->allocation) return j->plan;
+    const size_t k = j->first_tile + tile;
     struct imp_run own = *j->run;
-    own.spp = j->allocation->spp[j->first_tile + tile];
+    own.spp = j->allocation->spp[k];
+    if (own.spp == j->allocation->even[k]) return j->plan;
     return imp__replicates_of(j->problem->scene, j->target, &own);
 }
 

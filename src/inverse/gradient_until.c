@@ -103,6 +103,7 @@ enum imp_status imp_problem_until(imp_problem *p, const float *adjoint,
     const bool allocates =
         n > 0 && !adjoint && l.options.allocation != IMP_ALLOCATION_EVEN;
     l.run.time_limit_s = 0;
+    if (!adjoint) imp__points_of_losses(p, &l.run);
     while (imp__looks_next(&l)) {
         double *to = gradient ? g : NULL, *to_se = gradient ? se : NULL;
         if (allocates) IMP_TRY(imp__allocation_again(p, &l.run, &allocation));

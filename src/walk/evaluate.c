@@ -22,7 +22,7 @@ static inline void place_set(const struct imp_decision *d, const struct imp_shap
     p->dirs.wo = imp__decided_v3(d->wo);
     p->dirs.wi = imp__decided_v3(d->wi);
     p->dirs.lobe = d->lobe;
-    p->dirs.derivative = false;
+    p->dirs.derivative = 0;
     p->ratio = 1;
     if (m->emitter < 0 && d->scatterer != IMP_AT_LIGHT) return;
     p->met.uv[0] = d->uv[0];

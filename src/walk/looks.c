@@ -44,6 +44,9 @@ enum imp_status imp__looks_begin(imp_context *ctx, const char *function,
     if (o->most_spp < 0)
         return imp__error(ctx, IMP_E_ARG, "%s: options->most_spp %d is negative",
                           function, o->most_spp);
+    if ((unsigned)o->allocation > IMP_ALLOCATION_VARIANCE)
+        return imp__error(ctx, IMP_E_ARG, "%s: allocation %d does not exist", function,
+                          (int)o->allocation);
     if (imp__team_apart(ctx))
         return imp__error(ctx, IMP_E_UNSUPPORTED,
                           "%s: a part cannot see when the error of the whole is reached",

@@ -94,7 +94,8 @@ static void calibrations(void)
             const imp_v3 d = k < 3 ? direction(s->sensors[k], u, v)
                                    : direction(s->sensors[k], (u + 0.5) / 4 - 0.5,
                                                (v + 0.5) / 4 - 0.5);
-            worst[k] = fmax(worst[k], hypot(-d[0] - row[0], -d[1] - row[1]));
+            const double off = hypot(-d[0] - row[0], -d[1] - row[1]);
+            if (!(off <= worst[k])) worst[k] = isnan(off) ? INFINITY : off;
         }
     }
     tap_ok(worst[0] < 1e-12, "barrel: rays of OpenCV's pixels # %.1e", worst[0]);

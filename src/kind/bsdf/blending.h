@@ -18,8 +18,8 @@
 #define IMP_LOBES_MAX    128 /* records keep them in a signed byte */
 
 /* Least probability of a part that a wanted derivative lives in: that with respect to its
- * weight, or to its roughness. The second moment of the value grows by 1/(1 - 1/6) = 1.2 at
- * most. */
+ * weight, or to its roughness. The second moment of the value grows by 1/(1 - 1/6) = 1.2
+ * for one such part, and by 1.6 at most, for the three of principledthin. */
 #define IMP_WANTED_LEAST (1. / 6)
 /* The same before probabilities are divided by their sum, 1 + this. */
 #define IMP_WANTED_PART (IMP_WANTED_LEAST / (1 - IMP_WANTED_LEAST))

@@ -37,6 +37,13 @@ static enum imp_status calibration_read(const struct imp_build *b,
     out->dx = -1 / fx * ((double)width / film->width);
     out->y0 = (cy + 0.5) / fy;
     out->dy = -1 / fy * ((double)height / film->height);
+    const double wide = -out->dx * film->width, high = -out->dy * film->height;
+    if (!(fabs(out->x0) < 1e12 && fabs(out->y0) < 1e12 && wide > 1e-12 && wide < 1e12 &&
+          high > 1e-12 && high < 1e12))
+        IMP_TRY(imp_build_error(b, "opencv_fx", IMP_E_SCENE,
+                                "opencv_fx = %g, opencv_fy = %g, opencv_cx = %g, "
+                                "opencv_cy = %g: no picture has such a field of view",
+                                fx, fy, cx, cy));
 out:
     return st;
 }
