@@ -163,8 +163,9 @@ static enum imp_status stores_take(struct reading *r, struct imp_walks *w, doubl
             imp__walks_sensor(w, NULL, h.index, (size_t)fmin(memory, 0x1p62), &tracer));
         struct imp_store *s = &w->stores[k];
         atomic_store(&s->roulette, h.roulette != 0);
+        s->left = r->head.n_stores - k;
         IMP_TRY(imp__store_take(&r->from, s, &tracer, own ? &h.of : NULL));
-        memory -= (double)s->bytes;
+        memory -= (double)s->bytes + (double)s->reduced_bytes;
     }
     if (fgetc(r->from.f) != EOF) IMP_TRY(damaged(r, "it goes on behind its end"));
 out:

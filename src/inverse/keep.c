@@ -154,11 +154,12 @@ out:
 }
 
 static enum imp_status sensor_keep(struct imp_walks *w, const struct imp_active *active,
-                                   int index, size_t budget)
+                                   int index, size_t budget, int left)
 {
     struct filling f = {.store = &w->stores[w->n_stores]};
     enum imp_status st = imp__walks_sensor(w, active, index, budget, &f.tracer);
     if (st == IMP_OK) st = store_fill(w, &f);
+    f.store->left = left;
     if (st == IMP_OK) imp__store_settle(f.store);
     return st;
 }
@@ -240,10 +241,12 @@ static enum imp_status sensors_keep(struct imp_walks *w, const uint8_t *sensors,
 {
     enum imp_status st = IMP_OK;
     struct imp_active active = {0};
+    int left = 0;
     IMP_TRY(imp__active_create(w->scene, w->chosen, &active));
+    for (int k = 0; k < w->scene->n_sensors; k++) left += sensors[k] != 0;
     for (int k = 0; k < w->scene->n_sensors; k++) {
         if (!sensors[k]) continue;
-        IMP_TRY(sensor_keep(w, &active, k, (size_t)fmin(memory, 0x1p62)));
+        IMP_TRY(sensor_keep(w, &active, k, (size_t)fmin(memory, 0x1p62), left--));
         const struct imp_store *s = &w->stores[w->n_stores - 1];
         memory -= (double)s->bytes + (double)s->reduced_bytes;
     }

@@ -76,7 +76,8 @@ static void tile_reduce(struct imp_store *s, size_t k)
 
 void imp__store_settle(struct imp_store *s)
 {
-    if (s->bytes <= s->budget && s->reduced_bytes <= s->budget - s->bytes) return;
+    const size_t share = s->budget / (size_t)imp_max(s->left, 1);
+    if (s->bytes <= share && s->reduced_bytes <= share - s->bytes) return;
     for (size_t k = 0; k < imp__store_tiles(s); k++) imp__reduced_free(&s->reduced[k]);
     atomic_store(&s->reduced_bytes, 0);
 }

@@ -31,6 +31,7 @@ struct imp_store {
                                      without `of`: none of them does */
     const struct imp_reduction *reduction; /* NULL: walks are not reduced */
     size_t budget;
+    int left; /* sensors to come that share it, this one too: reduced walks leave them room */
     atomic_size_t bytes;         /* of records so far */
     atomic_size_t reduced_bytes; /* and of what they are reduced to */
     atomic_bool roulette;        /* some step had a survival below 1 */
