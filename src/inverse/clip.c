@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Which numbers of a clipped target count. V is the number that the scene would give, from a
- * picture J of other random numbers than the loss has; s is its standard error and the
- * target's noise together. With the level `high` at white
+ * picture J of other random numbers than the loss has, s_V its standard error and s that of
+ * the target's noise. With the level `high` at white
  *
- *     no weight      where V > high - 3 s  and  T > high - 6 s
- *     T = high       where V <= high - 3 s and  T >= high
+ *     no weight      where V + 3 s_V > high - 3 s  and  T > high - 6 s - 3 s_V
+ *     T = high       where V + 3 s_V <= high - 3 s and  T >= high
  *     as it is       else
  *
- * At the truth, |V - T| < 3 s but for 3 numbers in 1000, so the second condition of the first
- * line hardly ever decides, and weights depend on J alone, not on the noise of T: numbers
+ * At the truth, |V - T| < 3 s but for 3 numbers in 1000 where V is well known, so the second
+ * condition of the first line hardly ever decides, and weights depend on J alone, not on the noise of T: numbers
  * near the level are neither taken nor left by what their noise is. The second condition
  * lets a number speak that is far from the level, where the scene is wrong.
  *
