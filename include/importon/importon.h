@@ -716,7 +716,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_denoise(const imp_scene *scene,
 IMP_API IMP_MUST_CHECK enum imp_status imp_denoiser_check(imp_context *context);
 
 /** One walk, vertex by vertex, as text (json 0) or JSON: sample number `sample` of pixel
- * (x, y) of the picture, the same walk that renders and gradients of run->seed use. Pixels
+ * (x, y) of the picture, the same walk that renders and gradients of run->seed use (losses
+ * of scenes without a sampler: with run->points IMP_POINTS_SOBOL). Pixels
  * of the border that a film with sample_border samples for its filter have numbers below 0
  * and from the width, or height, on. The caller frees *text with imp_free.
  * @return IMP_OK; IMP_E_ARG for a pixel outside these; IMP_E_SCENE if the

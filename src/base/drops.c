@@ -67,7 +67,7 @@ uint64_t imp__drops_total(const struct imp_drops *d)
 }
 
 enum imp_status imp__drops_budget(imp_context *ctx, const struct imp_drops *d,
-                                  double budget, double walks)
+                                  double budget, double walks, const char *points)
 {
     const uint64_t total = imp__drops_total(d);
     if ((double)total <= 1 + (budget > 0 ? budget : 1e-4) * walks) return IMP_OK;
@@ -80,9 +80,9 @@ enum imp_status imp__drops_budget(imp_context *ctx, const struct imp_drops *d,
                                      imp_drop_text((enum imp_drop)c));
     if (d->n_keys)
         snprintf(first, sizeof first,
-                 "; the first is --pixel %d,%d --sample %lld --seed %llu --sensor %d",
+                 "; the first is --pixel %d,%d --sample %lld --seed %llu --sensor %d%s",
                  d->keys[0].x, d->keys[0].y, (long long)d->keys[0].sample,
-                 (unsigned long long)d->keys[0].seed, d->keys[0].sensor);
+                 (unsigned long long)d->keys[0].seed, d->keys[0].sensor, points);
     return imp__error(ctx, IMP_E_PATHS, "%llu of %.0f walks were dropped (%s%s)",
                       (unsigned long long)total, walks, causes, first);
 }

@@ -173,7 +173,7 @@ static enum imp_status item_work(size_t item, int worker, void *result, void *pa
         st = walk_add(j, w, i, sums);
         if (st == IMP_OK && (i - from) % CHECK_WALKS == 0 && imp__drops_total(&w->drops))
             st = imp__drops_budget(j->ctx, &w->drops, p->run->drop_budget,
-                                   (double)p->walks);
+                                   (double)p->walks, "");
     }
     if (imp__drops_total(&w->drops) > 0) {
         pthread_mutex_lock(&j->lock);
@@ -358,7 +358,7 @@ enum imp_status imp__light_picture_make(const struct imp_light_picture *p, doubl
                                   .fraction_lo = p->lo,
                                   .fraction_hi = p->hi};
     IMP_TRY(imp__shared_sum(ctx, &loop, &desc, item_work, &shared));
-    IMP_TRY(imp__drops_budget(ctx, &j.drops, p->run->drop_budget, (double)p->walks));
+    IMP_TRY(imp__drops_budget(ctx, &j.drops, p->run->drop_budget, (double)p->walks, ""));
     if (drops) imp__drops_merge(drops, &j.drops);
     if (j.groups) groups_end(&j);
 out:

@@ -314,8 +314,9 @@ static enum imp_status render_run(struct render *r, imp_film *preview, int64_t *
     }
     if (st == IMP_OK || st == IMP_CANCELLED) {
         const double walks = pixels * (double)imp_max(*spp, (int64_t)r->pass_spp);
-        const enum imp_status dropped =
-            imp__drops_budget(r->tiles.ctx, &r->tiles.drops, r->run->drop_budget, walks);
+        const enum imp_status dropped = imp__drops_budget(
+            r->tiles.ctx, &r->tiles.drops, r->run->drop_budget, walks,
+            r->run->points == IMP_POINTS_SOBOL ? " --points sobol" : "");
         if (dropped != IMP_OK) st = dropped;
     }
     return st;

@@ -48,6 +48,12 @@ void imp__tile_drop(struct imp_tile_worker *w, enum imp_drop cause, int x, int y
     w->no_memory |= cause == IMP_DROP_MEMORY;
 }
 
+/* Losses have Sobol's points where the scene names no sampler, and pictures there have not. */
+static const char *points_of(const struct imp_tiles *t)
+{
+    return t->run->points == IMP_POINTS_SOBOL ? " --points sobol" : "";
+}
+
 enum imp_status imp__tile_check(struct imp_tile_worker *w)
 {
     const struct imp_tiles *t = w->tiles;
@@ -55,7 +61,8 @@ enum imp_status imp__tile_check(struct imp_tile_worker *w)
     if (w->no_memory || w->arena.failed)
         return imp__error(t->ctx, IMP_E_NOMEM, "no memory to record a walk");
     if (imp_likely(w->n_drops == 0)) return IMP_OK;
-    return imp__drops_budget(t->ctx, &w->drops, t->run->drop_budget, t->walks);
+    return imp__drops_budget(t->ctx, &w->drops, t->run->drop_budget, t->walks,
+                             points_of(t));
 }
 
 struct running {
@@ -91,7 +98,8 @@ static enum imp_status item_work(size_t item, int worker, void *result, void *pa
         pthread_mutex_lock(&t->lock);
         imp__drops_merge(&t->drops, &w->drops);
         if (st == IMP_OK)
-            st = imp__drops_budget(t->ctx, &t->drops, t->run->drop_budget, t->walks);
+            st = imp__drops_budget(t->ctx, &t->drops, t->run->drop_budget, t->walks,
+                                   points_of(t));
         pthread_mutex_unlock(&t->lock);
         memset(&w->drops, 0, sizeof w->drops);
         w->n_drops = 0;
@@ -145,6 +153,7 @@ enum imp_status imp__tiles_run(struct imp_tiles *t, const struct imp_tiles_pass 
     if (alone) ctx->team->alone--;
     t->late = shared.late;
     if (st == IMP_OK)
-        st = imp__drops_budget(ctx, &t->drops, t->run->drop_budget, t->walks);
+        st = imp__drops_budget(ctx, &t->drops, t->run->drop_budget, t->walks,
+                               points_of(t));
     return st;
 }

@@ -227,7 +227,8 @@ static void photograph_set(struct decision *d, size_t i)
     struct imp__clip *c = t->clip;
     const double T = at_level(c, i), V = (double)d->V[i], gamma = d->gamma;
     const double se = ((double)d->up[i] - (double)d->down[i]) / (2 * SIGMAS);
-    if (V < IMP_PHOTOGRAPH_LEAST || se > KNOWN_SE * V || T < 0.5 * V) {
+    if (V < IMP_PHOTOGRAPH_LEAST || se > KNOWN_SE * V ||
+        T < fmax(0.5, 1 - 0.5 / gamma) * V) {
         c->base[i] = (float)T;
         t->pixels[i] = (float)T;
         return;

@@ -369,6 +369,10 @@ enum imp_status imp__gradient_job_run(struct imp__gradient_job *j,
         .payload = j};
     IMP_TRY(imp__tiles_create(&j->tiles));
     if (j->allocation) walks = allocation_take(j);
+    size_t in = 0;
+    for (int y = 0; y < film->crop_h; y++)
+        for (int x = 0; x < film->crop_w; x++) in += counts(j, x, y);
+    walks *= (double)imp_max(in, (size_t)1) / ((double)film->crop_w * film->crop_h);
     j->tiles.walks = walks;
     j->tallies = imp__alloc(ctx, (size_t)ctx->threads, sizeof *j->tallies);
     if (!j->tallies) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));

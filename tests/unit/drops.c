@@ -81,11 +81,13 @@ int main(void)
     tap_ok(imp__drops_total(&none) == 0 && none.n_keys == 0, "no cause: not counted");
 
     imp_context *ctx = test_context(1);
-    tap_ok(imp__drops_budget(ctx, &forward, 0, 1e6) == IMP_OK, "60 of 1e6 are few");
-    const enum imp_status st = imp__drops_budget(ctx, &forward, 1e-5, 1e6);
+    tap_ok(imp__drops_budget(ctx, &forward, 0, 1e6, "") == IMP_OK, "60 of 1e6 are few");
+    const enum imp_status st =
+        imp__drops_budget(ctx, &forward, 1e-5, 1e6, " --points sobol");
     const char *said = imp_last_error(ctx);
     tap_ok(st == IMP_E_PATHS && strstr(said, "30: the value is not a number") &&
-               strstr(said, "--pixel 0,0 --sample 0 --seed 3"),
+               strstr(said, "--pixel 0,0 --sample 0 --seed 3") &&
+               strstr(said, " --points sobol"),
            "too many for the budget # %s", said);
     float pixel = 0;
     tap_ok(sky(ctx, "1e38", &pixel) == IMP_OK && pixel == 1e38f, "radiance 1e38 # %g",
