@@ -10,7 +10,7 @@
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "walk/dims.h"
-#include "walk/walk.h"
+#include "walk/vertex.h"
 #include <stdbool.h>
 
 /* theta_1 .. theta_7 of the paper, from 0. */

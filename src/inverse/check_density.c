@@ -13,6 +13,7 @@
 #include "check_walks.h"
 #include "math/rng.h"
 #include "math/warp.h"
+#include "walk/vertex.h"
 #include <math.h>
 #include <string.h>
 

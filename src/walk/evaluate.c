@@ -5,6 +5,7 @@
 #include "graded.h"
 #include "record.h"
 #include "tracking.h"
+#include "vertex.h"
 
 /* Where a vertex was decided. Member by member: clearing all of it would take as long as
  * what is done with it. */

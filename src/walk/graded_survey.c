@@ -8,6 +8,7 @@
  * and refraction meet there), nor is the border of a light that is dark along it, in the
  * dark. */
 #include "graded.h"
+#include "vertex.h"
 #include <stdio.h>
 #include <string.h>
 

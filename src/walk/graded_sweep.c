@@ -13,6 +13,7 @@
  * imp__graded_obstacle; edges are looked for by the survey. */
 #include "graded.h"
 #include "kind/bsdf/fresnel.h"
+#include "vertex.h"
 
 /* ---- One boundary -------------------------------------------------------------- */
 

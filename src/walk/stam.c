@@ -3,6 +3,7 @@
  * What only Stam's walk does (Stam 2020): it ends by absorption, and the derivative of a
  * lobe's exponent may follow the direction that was drawn with it. */
 #include "step.h"
+#include "vertex.h"
 
 bool imp__absorb(struct imp_step *s, const struct imp_bsdf *b, double *weight)
 {

@@ -7,6 +7,7 @@
  * product rule is read. */
 #include "reduced.h"
 #include "sweep_media.h"
+#include "vertex.h"
 
 imp_spec imp__walk_fold(struct imp_walk *walk)
 {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "sweep_media.h"
 #include "baseline.h"
+#include "vertex.h"
 
 void imp__extinction_drop(const struct imp_tracer *tracer, const struct imp_vertex *v,
                           imp_spec *x)

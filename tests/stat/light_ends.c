@@ -10,6 +10,7 @@
 #include "kind/bsdf/transport.h"
 #include "scene/scene.h"
 #include "walk/light_walk.h"
+#include "walk/vertex.h"
 
 static imp_context *ctx;
 
