@@ -17,8 +17,8 @@
  * larger weight; its noise falls with their number (Polyak and Juditsky 1992; Shamir and
  * Zhang 2013). */
 #include "adam_many.h"
+#include "adam_noise.h"
 #include "basis.h"
-#include "math/rng.h"
 #include <math.h>
 #include <string.h>
 
@@ -82,27 +82,10 @@ void imp__adam_moved(struct imp__search *s)
 
 /* ---- Directions ---------------------------------------------------------------- */
 
-/* out_i = sum_j V[i row + j column] in_j */
-static void rotate(const struct imp__search *s, size_t row, size_t column,
-                   const double *in, double *out)
+/* The rows of V; NULL: the axes. */
+static const double *rows(const struct imp__search *s)
 {
-    const size_t n = s->n;
-    memcpy(out, in, n * sizeof *out);
-    for (size_t i = 0; turned(s) && i < n; i++) {
-        out[i] = 0;
-        for (size_t j = 0; j < n; j++)
-            out[i] += s->array[V][i * row + j * column] * in[j];
-    }
-}
-/* out = V in: numbers of the variables, along the directions. */
-static void along(const struct imp__search *s, const double *in, double *out)
-{
-    rotate(s, s->n, 1, in, out);
-}
-/* out = V^T in */
-static void back(const struct imp__search *s, const double *in, double *out)
-{
-    rotate(s, 1, s->n, in, out);
+    return turned(s) ? s->array[V] : NULL;
 }
 
 /* Directions from A and ALIGNED. What is known along the old ones is turned with them;
@@ -177,64 +160,6 @@ static enum imp_status align(const struct imp__goal *goal, struct imp__search *s
     return changed && turned(s) ? turn(s) : IMP_OK;
 }
 
-/* ---- The noise of a step ---------------------------------------------------------- */
-
-struct noise {
-    const struct imp__goal *goal;
-    const struct imp__search *s;
-    double least; /* second moment */
-};
-
-/* Step j is m_j/sqrt(v_j) in the directions' coordinates, V S g of the gradient g, with S the
- * scales. The noise of all is sum_j Var(V S g)_j/v_j: probes are the rows of v^-1/2 V S, or of
- * many rows mixtures with signs from `seed`. out [IMP_PROBES_MOST][n], work [n]. */
-static size_t noise_probes(const struct noise *noise, uint64_t seed, double *work,
-                           double *out)
-{
-    const struct imp__search *s = noise->s;
-    const size_t n = s->n, rows = n < IMP_PROBES_MOST ? n : IMP_PROBES_MOST;
-    const double *v = s->array[SECOND];
-    for (size_t p = 0; p < rows; p++, out += n) {
-        uint64_t signs = 0;
-        for (size_t j = 0; j < n; j++) {
-            if (j % 64 == 0) signs = imp__mix64(seed + 64 * p + j / 64);
-            const double sign = signs >> (j % 64) & 1 ? 1 : -1;
-            work[j] = rows == n && p != j ? 0 : sign / sqrt(fmax(v[j], noise->least));
-        }
-        back(s, work, out);
-        for (size_t k = 0; k < n; k++) out[k] *= noise->goal->scale[k];
-    }
-    return rows;
-}
-
-/* The same along the axes. */
-static double noise_weight(size_t k, const void *payload)
-{
-    const struct noise *a = payload;
-    const double v = fmax(a->s->array[SECOND][k], a->least);
-    return v > 0 ? a->goal->scale[k] * a->goal->scale[k] / v : 0;
-}
-
-/* The next evaluation measures the noise of the step. work [n], probes [IMP_PROBES_MOST][n]. */
-static void noise_measure(struct noise *noise, struct imp__metric *metric, double *work,
-                          double *probes)
-{
-    const struct imp__goal *goal = noise->goal;
-    const struct imp__search *s = noise->s;
-    double mean = 0;
-    if (!goal->measure || s->scalar[AGE] < IMP_ADAM_KNOWN) return;
-    for (size_t j = 0; j < s->n; j++) mean += s->array[SECOND][j] / (double)s->n;
-    if (!(mean > 0)) return;
-    /* Flat directions have small moments, and all have been seen. */
-    noise->least = (turned(s) ? FLAT : IMP_ADAM_LEAST) * mean;
-    *metric =
-        (struct imp__metric){.probes = probes, .weight = noise_weight, .payload = noise};
-    if (turned(s))
-        metric->n_probes =
-            noise_probes(noise, imp__search_seed(goal, s->iteration, 2), work, probes);
-    goal->measure(metric, goal->payload);
-}
-
 /* ---- Steps --------------------------------------------------------------------- */
 
 /* One step from HERE. g: the gradient; it and work [n] are destroyed. */
@@ -246,7 +171,7 @@ static enum imp_status step(const struct imp__goal *goal, double learning_rate,
     const double c1 = 1 - pow(BETA1, age), c2 = 1 - pow(BETA2, age);
     double mean_v = 0;
     for (size_t k = 0; k < s->n; k++) g[k] *= goal->scale[k];
-    along(s, g, work);
+    imp__basis_along(s->n, rows(s), g, work);
     for (size_t j = 0; j < s->n; j++) {
         m[j] = BETA1 * m[j] + (1 - BETA1) * work[j];
         v[j] = BETA2 * v[j] + (1 - BETA2) * work[j] * work[j];
@@ -263,7 +188,7 @@ static enum imp_status step(const struct imp__goal *goal, double learning_rate,
         }
         work[j] = rate * (m[j] / c1) / (sqrt(v[j] / c2) + tiny);
     }
-    back(s, work, g);
+    imp__basis_back(s->n, rows(s), work, g);
     for (size_t k = 0; k < s->n; k++) {
         const double old = x[k];
         x[k] = imp__into_bounds(goal, k, old - goal->scale[k] * g[k]);
@@ -271,7 +196,7 @@ static enum imp_status step(const struct imp__goal *goal, double learning_rate,
         s->scalar[LARGEST] = fmax(s->scalar[LARGEST], fabs(g[k]));
         s->array[SUM][k] += x[k];
     }
-    along(s, g, work);
+    imp__basis_along(s->n, rows(s), g, work);
     for (size_t j = 0; j < s->n; j++) {
         s->array[NET][j] += work[j];
         s->array[WAY][j] += fabs(work[j]);
@@ -295,7 +220,7 @@ static void cool(const struct imp__goal *goal, struct imp__search *s, bool all, 
     double *mean = work, *move = work + n, *pace = s->array[PACE];
     for (size_t k = 0; k < n; k++)
         move[k] = (s->array[SUM][k] / (WINDOW + 1) - s->array[HERE][k]) / goal->scale[k];
-    along(s, move, mean);
+    imp__basis_along(s->n, rows(s), move, mean);
     for (size_t j = 0; j < n; j++) {
         const double net = fabs(s->array[NET][j]), way = s->array[WAY][j];
         if (turned(s) ? net <= STALLED * way : all && !fell) {
@@ -306,7 +231,7 @@ static void cool(const struct imp__goal *goal, struct imp__search *s, bool all, 
         mean[j] = 0;
         if (turned(s) && net >= STEADY * way) pace[j] = fmax(pace[j] - 1, 0);
     }
-    back(s, mean, move);
+    imp__basis_back(s->n, rows(s), mean, move);
     for (size_t k = 0; k < n; k++)
         s->array[HERE][k] =
             imp__into_bounds(goal, k, s->array[HERE][k] + goal->scale[k] * move[k]);
@@ -362,13 +287,19 @@ static enum imp_status run(const struct imp__goal *goal,
     const size_t n = goal->n;
     double *g = imp__alloc(goal->ctx, (2 + IMP_PROBES_MOST) * n + 1, sizeof *g);
     if (!g) IMP_TRY(imp__error(goal->ctx, IMP_E_NOMEM, "no memory for a gradient"));
-    struct noise noise = {.goal = goal, .s = s};
-    struct imp__metric metric;
+    struct imp__adam_noise noise;
 
     while (!s->finished && s->iteration < options->max_iterations) {
         struct imp_estimate f;
         if (s->iteration >= s->scalar[TURN]) IMP_TRY(look_round(goal, s));
-        noise_measure(&noise, &metric, g, g + 2 * n);
+        if (s->scalar[AGE] >= IMP_ADAM_KNOWN) {
+            noise = (struct imp__adam_noise){.goal = goal,
+                                             .iteration = s->iteration,
+                                             .second = s->array[SECOND],
+                                             .rows = rows(s)};
+            imp__adam_noise_measure(&noise, turned(s) ? FLAT : IMP_ADAM_LEAST, g,
+                                    g + 2 * n);
+        }
         IMP_TRY(goal->eval(s->array[HERE], imp__search_seed(goal, s->iteration, 0), &f, g,
                            NULL, goal->payload));
         IMP_TRY(imp__search_log(s, f, s->array[HERE]));

@@ -64,3 +64,24 @@ enum imp_status imp__basis_turn(imp_context *ctx, size_t n, const double *A,
     imp__release(ctx, work);
     return IMP_OK;
 }
+
+/* out_i = sum_j V[i row + j column] in_j */
+static void rotate(size_t n, const double *V, size_t row, size_t column, const double *in,
+                   double *out)
+{
+    memcpy(out, in, n * sizeof *out);
+    for (size_t i = 0; V && i < n; i++) {
+        out[i] = 0;
+        for (size_t j = 0; j < n; j++) out[i] += V[i * row + j * column] * in[j];
+    }
+}
+
+void imp__basis_along(size_t n, const double *V, const double *in, double *out)
+{
+    rotate(n, V, n, 1, in, out);
+}
+
+void imp__basis_back(size_t n, const double *V, const double *in, double *out)
+{
+    rotate(n, V, 1, n, in, out);
+}

@@ -21,4 +21,9 @@ enum imp_status imp__basis_matrix(const struct imp__goal *goal, const double *x,
 enum imp_status imp__basis_turn(imp_context *ctx, size_t n, const double *A,
                                 const double *aligned, double *V, double *R);
 
+/* Numbers of the variables along the directions, out = V in, and back, out = V^T in; V NULL:
+ * the directions are the variables. */
+void imp__basis_along(size_t n, const double *V, const double *in, double *out);
+void imp__basis_back(size_t n, const double *V, const double *in, double *out);
+
 #endif
