@@ -3,6 +3,7 @@
  * The objective of a problem with its gradient, and gradients of linear functions of
  * pictures: jobs over the targets (gradient_job.c), added up. */
 #include "estimate.h"
+#include "allocation.h"
 #include "base/team.h"
 #include "film/film_filter.h"
 #include "gradient_job.h"

@@ -8,7 +8,6 @@
 #ifndef IMP_INVERSE_GRADIENT_JOB_H
 #define IMP_INVERSE_GRADIENT_JOB_H
 
-#include "allocation.h"
 #include "estimate.h"
 #include "film/film_tiles.h"
 #include "overlap.h"
@@ -16,6 +15,8 @@
 #include "tally.h"
 #include "totals.h"
 #include "variate.h"
+
+struct imp__allocation;
 
 struct imp__gradient_job {
     const struct imp_problem *problem;
@@ -28,7 +29,7 @@ struct imp__gradient_job {
     const struct imp__light_adjoints
         *light;                        /* of walks from the lights; NULL: not those */
     struct imp__variate_view *variate; /* NULL: none */
-    struct imp_tracer there;           /* of the variate */
+    struct imp_tracer there;           /* of the variate; scene NULL: nowhere yet */
     bool want_gradient;
     /* Set by imp__gradient_job_run. */
     const struct imp_run *run;
@@ -45,9 +46,40 @@ struct imp__gradient_job {
     struct imp_tally *tallies; /* [threads] */
 };
 
+/* Has a pixel a part in the loss? One that has none has no walks. */
+static inline bool imp__gradient_counts(const struct imp__gradient_job *j, int x, int y)
+{
+    return !j->target || j->splat || j->light ||
+           imp__target_counts(j->target, (size_t)y * (size_t)j->width + (size_t)x);
+}
+
 /* Adds objective, variance and gradients of this job to the totals. */
 enum imp_status imp__gradient_job_run(struct imp__gradient_job *job,
                                       const struct imp_run *run, const char *stage,
                                       double lo, double hi, double start_s);
+
+/* ---- Of one pixel (gradient_replicate.c) ---- */
+/* Replicate b, in work item `part` of its tile: to the worker's tally; returns its estimate of
+ * the loss. moments: of the variate. */
+double imp__gradient_replicate(struct imp__gradient_job *job, struct imp__replicates plan,
+                               struct imp_tile_worker *worker, int x, int y, int b,
+                               int part, double *moments);
+
+/* ---- Samples of tiles (gradient_samples.c) ---- */
+/* Sets the allocation, parts and walks of a job whose tiles are known. */
+void imp__gradient_samples(struct imp__gradient_job *job);
+struct imp__replicates imp__gradient_plan(const struct imp__gradient_job *job,
+                                          size_t tile);
+/* What the allocation measures tallies by; NULL: nothing. */
+const struct imp__metric *imp__gradient_metric(const struct imp__gradient_job *job);
+/* Tells the allocation of a tile's item; and the team of all items. */
+void imp__gradient_see(const struct imp__gradient_job *job, const struct imp_tile *tile,
+                       const struct imp_tally *tally, double loss_variance);
+enum imp_status imp__gradient_seen(const struct imp__gradient_job *job);
+
+/* ---- Sums of many numbers (gradient_unit.c) ---- */
+/* Sets their unit. */
+enum imp_status imp__gradient_unit(struct imp__gradient_job *job,
+                                   const struct imp_tiles_pass *pass);
 
 #endif

@@ -367,7 +367,7 @@ enum imp_status imp__normal_work(const struct imp_tile *t, struct imp_tile_worke
                               .index = (size_t)y * (size_t)j->width + (size_t)x,
                               .M = units_of((b1 - b0) * j->plan.m),
                               .share = R / all};
-            if (j->target->weights && j->target->weights[p.index] == 0) continue;
+            if (!imp__target_counts(j->target, p.index)) continue;
             units_gather(j, tile, x, y, b0, b1, &p);
             const enum imp_status st = imp__tile_check(tile);
             if (st != IMP_OK) return st;

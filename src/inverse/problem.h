@@ -29,6 +29,11 @@ struct imp__target {
     bool of_curves;                                /* it is such a part */
     struct imp_wavelengths waves[IMP_WAVES_DRAWN]; /* of a part: its curves */
 };
+/* Has a pixel a part in the loss? */
+static inline bool imp__target_counts(const struct imp__target *t, size_t pixel)
+{
+    return !t->weights || t->weights[pixel] != 0;
+}
 /* Factor of the loss of channel c of a pixel. */
 static inline double imp__target_weight(const struct imp__target *t, size_t pixel, int c)
 {

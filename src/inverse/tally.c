@@ -252,56 +252,12 @@ void imp__tally_clear(struct imp_tally *t)
     }
 }
 
-/* ---- The variance as one number --------------------------------------------------- */
-
-static bool probes(const struct imp_tally *t)
-{
-    return t->metric && t->dense && t->metric->n_probes > 0;
-}
-
-static void probes_batch(struct imp_tally *t)
-{
-    const double *probe = t->metric->probes;
-    for (size_t p = 0; p < t->metric->n_probes; p++, probe += t->active->n) {
-        double sum = 0;
-        for (size_t k = 0; k < t->active->n; k++) sum += probe[k] * t->batch[k];
-        t->probe_sum[p] += sum;
-        t->probe_square[p] += sum * sum;
-    }
-}
-
-static void probes_pixel(struct imp_tally *t, double r, double by_variance)
-{
-    for (size_t p = 0; p < t->metric->n_probes; p++) {
-        t->measured +=
-            by_variance * (t->probe_square[p] - t->probe_sum[p] * t->probe_sum[p] * r);
-        t->probe_sum[p] = t->probe_square[p] = 0;
-    }
-}
-
-void imp__tally_measure(struct imp_tally *t)
-{
-    const struct imp__metric *m = t->metric;
-    if (!m || m->n_probes > 0) return;
-    for (size_t k = 0; t->dense && k < t->active->n; k++)
-        if (t->variance[k] > 0) t->measured += m->weight(k, m->payload) * t->variance[k];
-    for (size_t k = 0; k < t->n_triples; k++)
-        for (uint32_t c = 0; c < 3; c++)
-            if (t->triples[k].variance[c] > 0)
-                t->measured += m->weight(t->triples[k].key + c, m->payload) *
-                               t->triples[k].variance[c];
-    for (size_t k = 0; k < t->n_singles; k++)
-        if (t->singles[k].variance > 0)
-            t->measured +=
-                m->weight(t->singles[k].key, m->payload) * t->singles[k].variance;
-}
-
 /* ---- Batches, pixels, tiles --------------------------------------------------------- */
 
 void imp__tally_batch(struct imp_tally *t, int b)
 {
     const size_t R = (size_t)t->R, at = R ? (size_t)b : 0;
-    if (imp_unlikely(probes(t))) probes_batch(t);
+    if (imp_unlikely(imp__tally_probes(t))) imp__tally_probe_batch(t);
     if (t->dense) {
         double *of_tile = t->of_tile + at * t->active->n;
         for (size_t k = 0; k < t->active->n; k++) {
@@ -334,7 +290,7 @@ void imp__tally_pixel(struct imp_tally *t, double replicates, double by_mean,
                       double by_variance)
 {
     const double r = 1 / replicates;
-    if (imp_unlikely(probes(t))) probes_pixel(t, r, by_variance);
+    if (imp_unlikely(imp__tally_probes(t))) imp__tally_probe_pixel(t, r, by_variance);
     if (t->dense) {
         for (size_t k = 0; k < t->active->n; k++) {
             t->mean[k] += by_mean * t->sum[k];

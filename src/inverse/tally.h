@@ -88,6 +88,14 @@ static inline bool imp__tally_full(const struct imp_tally *t)
  * by_variance (sum of squares - sum^2/R). */
 void imp__tally_tile(struct imp_tally *t, double by_variance);
 
+/* ---- The variance as one number (tally_measure.c) ---- */
+/* Is it that of probes, which need every batch and every pixel? r: 1 / replicates. */
+static inline bool imp__tally_probes(const struct imp_tally *t)
+{
+    return t->metric && t->dense && t->metric->n_probes > 0;
+}
+void imp__tally_probe_batch(struct imp_tally *t);
+void imp__tally_probe_pixel(struct imp_tally *t, double r, double by_variance);
 /* Before a tile is taken over or flushed: `measured` has all of its variance. */
 void imp__tally_measure(struct imp_tally *t);
 
