@@ -55,6 +55,10 @@ enum imp_status imp__fit_begin(struct imp_problem *problem,
                                const struct imp_run *run, struct imp__fit *fit);
 /* Samples per pixel of one evaluation, as asked for. */
 int imp__fit_spp(const struct imp__fit *fit);
+/* Those of a search that is far from its end. */
+int imp__fit_coarse_spp(const struct imp__fit *fit);
+/* fit_fingerprint.c: sets that of the fit. */
+void imp__fit_fingerprint(struct imp__fit *fit);
 /* Scales of the variables, from where the search starts. */
 void imp__fit_scales(struct imp__fit *fit, const struct imp__search *search);
 void imp__fit_end(struct imp__fit *fit);

@@ -2,12 +2,9 @@
  *
  * A problem as an optimiser sees it. */
 #include "base/team.h"
-#include "bend/inside.h"
 #include "estimate.h"
 #include "fit.h"
 #include "loss.h"
-#include "math/hash.h"
-#include "scene/fingerprint.h"
 #include "variate.h"
 #include "walk/light_walk.h"
 #include "walk/run.h"
@@ -21,8 +18,6 @@
 #define REPORT_S         0.1
 #define COARSER          4  /* samples of an evaluation, over those of a coarse search, */
 #define COARSE_SPP       16 /* which are at least so many: fewer lead far away */
-#define PAIRS_VERSION    2  /* of what Levenberg-Marquardt estimates from its samples */
-#define VARIATE_VERSION  1  /* of what control variates keep */
 
 /* ---- Progress ------------------------------------------------------------------ */
 
@@ -187,7 +182,7 @@ static enum imp_status normal(const double *x, uint64_t seed, int rounds,
 /* A search by Levenberg-Marquardt whose end is looked at and gone on from takes a quarter of
  * the samples: half of its time would otherwise go to where it only passes. A loss that is
  * not quadratic has a bias that grows. */
-static int coarse_spp(const struct imp__fit *f)
+int imp__fit_coarse_spp(const struct imp__fit *f)
 {
     const int spp = imp__fit_spp(f);
     return f->options.optimizer == IMP_LM && f->options.intervals && quadratic(f)
@@ -198,7 +193,7 @@ static int coarse_spp(const struct imp__fit *f)
 static void coarsen(bool fewer, void *payload)
 {
     struct imp__fit *f = payload;
-    f->run.spp = fewer ? coarse_spp(f) : f->outer.spp;
+    f->run.spp = fewer ? imp__fit_coarse_spp(f) : f->outer.spp;
 }
 
 /* Do tiles get samples by their share of the variance? Control variates have equal ones. */
@@ -208,77 +203,7 @@ static bool allocates(const struct imp__fit *f)
            f->options.allocation != IMP_ALLOCATION_EVEN;
 }
 
-/* ---- What the fit belongs to --------------------------------------------------- */
-
-/* With an active number, the index of a medium differs from start to start. */
-static bool medium_active(const struct imp_body *m, const int64_t *base)
-{
-    for (int k = 0; k < m->n_numbers; k++)
-        if (m->numbers[k].param >= 0 && base[m->numbers[k].param] >= 0) return true;
-    return false;
-}
-
-static void fingerprint(struct imp__fit *f)
-{
-    const struct imp_problem *p = f->problem;
-    struct imp__fingerprint *h = &f->fingerprint;
-
-    h->scene = imp__fingerprint_objects(p->scene);
-    const uint64_t integrator = imp__walk_integrator_hash(imp__walk_integrator(p->scene));
-    h->scene = imp__hash(h->scene, &integrator, sizeof integrator);
-    for (size_t i = 0; i < p->n_targets; i++) {
-        const uint64_t sensor =
-            imp__fingerprint_sensor(p->scene->sensors[p->targets[i].desc.sensor]);
-        h->scene = imp__hash(h->scene, &sensor, sizeof sensor);
-    }
-    for (size_t k = 0; k < p->scene->n_params; k++) {
-        const struct imp_param *q = &p->scene->params[k];
-        const size_t n = q->info.count;
-        if (p->active.base[k] >= 0) {
-            h->parameters = imp__hash(h->parameters, q->info.name, strlen(q->info.name));
-            h->parameters = imp__hash(h->parameters, &n, sizeof n);
-        } else if (q->store == IMP_STORE_BULK) {
-            h->scene = imp__hash(h->scene, q->bulk, n * sizeof *q->bulk);
-        } else {
-            for (size_t e = 0; e < n; e++) {
-                const double value = imp__param_get(q, e);
-                h->scene = imp__hash(h->scene, &value, sizeof value);
-            }
-        }
-    }
-    for (int m = 0; m < p->scene->n_bodies; m++)
-        if (!medium_active(p->scene->bodies[m], p->active.base))
-            h->scene = imp__graded_hash(h->scene, p->scene->bodies[m]);
-    if (p->n_ties > 0) h->parameters = imp__ties_hash(p, h->parameters);
-    h->targets = imp__problem_targets_hash(p);
-    const struct imp_sensor *sensor = p->scene->sensors[p->targets[0].desc.sensor];
-    const double number[4] = {f->options.optimizer, f->options.learning_rate,
-                              f->options.tolerance,
-                              f->run.spp > 0 ? f->run.spp : sensor->spp};
-    h->options = imp__hash(f->outer.seed, number, sizeof number);
-    if (f->outer.from != IMP_FROM_SCENE)
-        h->options = imp__hash(h->options, &f->outer.from, sizeof f->outer.from);
-    if (f->options.optimizer == IMP_LM) {
-        const int version[2] = {PAIRS_VERSION, coarse_spp(f)};
-        h->options = imp__hash(h->options, version, sizeof version);
-    }
-    if (f->allocation.n > 0) {
-        const uint64_t numbers = imp__allocation_numbers(&f->allocation);
-        h->options = imp__hash(h->options, &numbers, sizeof numbers);
-    }
-    if (imp__fit_keeps(f))
-        h->options = imp__hash(h->options, &f->options.memory, sizeof f->options.memory);
-    if (f->variate) {
-        const int version = VARIATE_VERSION;
-        h->options = imp__hash(h->options, &version, sizeof version);
-    }
-    if (imp__points_of(sensor, &f->outer) == IMP_POINTS_SOBOL) {
-        const struct imp__replicates plan =
-            imp__replicates_of(p->scene, &p->targets[0], &f->outer);
-        const int sets[3] = {plan.n, plan.m, IMP_SET_POINTS};
-        h->options = imp__hash(h->options, sets, sizeof sets);
-    }
-}
+/* ---- From the beginning to the end ------------------------------------------------ */
 
 /* Bounds, by variable or by parameter. */
 static enum imp_status bounds_make(struct imp__fit *f)
@@ -385,7 +310,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
     f.run.time_limit_s = 0;
     IMP_TRY(imp__fit_variates(&f));
     if (allocates(&f)) IMP_TRY(imp__allocation_create(p, &f.run, &f.allocation));
-    if (f.options.checkpoint) fingerprint(&f);
+    if (f.options.checkpoint) imp__fit_fingerprint(&f);
     *out = f;
     /* Pointers to the fit itself: it does not move any more. */
     out->run.progress = inner_progress;
@@ -403,7 +328,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
                                    .iterated = iterated,
                                    .payload = out};
     if (out->allocation.n > 0) out->goal.measure = measure;
-    if (coarse_spp(out) < imp__fit_spp(out)) out->goal.coarsen = coarsen;
+    if (imp__fit_coarse_spp(out) < imp__fit_spp(out)) out->goal.coarsen = coarsen;
     if (imp__fit_keeps(out)) {
         out->goal.draw = imp__fit_draw;
         out->goal.is_stale = imp__fit_is_stale;
