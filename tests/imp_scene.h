@@ -101,6 +101,19 @@ static inline imp_problem *test_problem(imp_context *ctx, imp_scene *scene,
     return p;
 }
 
+/* A target of three channels; pixels are copied. */
+static inline void test_target(imp_context *ctx, imp_problem *p, int sensor, int width,
+                               int height, const float *pixels)
+{
+    struct imp_target t = IMP_TARGET_INIT;
+    t.sensor = sensor;
+    t.width = width;
+    t.height = height;
+    t.channels = 3;
+    t.pixels = pixels;
+    test_must(ctx, imp_problem_add_target(p, &t));
+}
+
 /* Index in x of the first number of a parameter. */
 static inline size_t test_variable(imp_problem *p, imp_scene *scene, imp_context *ctx,
                                    const char *name)

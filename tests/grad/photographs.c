@@ -143,17 +143,6 @@ static void photograph(imp_scene *s, int sensor, double gamma, float *out)
     imp_film_destroy(film);
 }
 
-static void target_add(imp_problem *p, int sensor, const float *pixels)
-{
-    struct imp_target t = IMP_TARGET_INIT;
-    t.sensor = sensor;
-    t.width = WIDTH;
-    t.height = HEIGHT;
-    t.channels = 3;
-    t.pixels = pixels;
-    test_must(ctx, imp_problem_add_target(p, &t));
-}
-
 static void loss(void)
 {
     imp_scene *s = test_scene_text(
@@ -164,7 +153,7 @@ static void loss(void)
     double x[6], g[6], seen = 0;
     struct tap_stat of = {0};
     for (int i = 0; i < 3 * PIXELS; i++) T[i] = 0.1f + 0.8f * (float)(i * 37 % 101) / 101;
-    target_add(p, 0, T);
+    test_target(ctx, p, 0, WIDTH, HEIGHT, T);
     tap_ok(n == 6, "a camera has six numbers");
     for (uint64_t k = 0; k < 64; k++) {
         const struct imp_run run = run_of(16, 1000 + k, 0);
@@ -219,7 +208,7 @@ static void room(void)
     photograph(s, 1, 2.4, T[1]);
     test_must(ctx, imp_problem_create(s, &p));
     for (int i = 0; i < 4; i++) test_must(ctx, imp_problem_activate(p, names[i]));
-    for (int i = 0; i < 2; i++) target_add(p, i, T[i]);
+    for (int i = 0; i < 2; i++) test_target(ctx, p, i, WIDTH, HEIGHT, T[i]);
     tap_ok(imp_problem_n(p) == 10, "six reflectances, two cameras of two numbers");
     struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
     const struct imp_fit_result *r;

@@ -3,7 +3,7 @@
  * Samples of tiles by their share of the gradient's variance: what is gained at equal cost,
  * against the same samples everywhere and against what Neyman's formula promises; means are the
  * same, and errors are as large as they are stated. Run with "long" for more seeds. */
-#include "imp_scene.h"
+#include "gain_scenes.h"
 #include "imp_tap.h"
 #include "inverse/allocation.h"
 #include <stdbool.h>
@@ -16,20 +16,8 @@ static bool all; /* "long" */
 
 static imp_context *ctx;
 
-static const char open_xml[] =
-    "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' "
-    "value='5'/></integrator><sensor type='perspective'><float name='fov' value='40'/>"
-    "<transform name='to_world'><lookat origin='0,2.4,5' target='0,.6,0' "
-    "up='0,1,0'/></transform><sampler type='independent'/><film type='hdrfilm'><integer "
-    "name='width' value='%d'/><integer name='height' value='%d'/><rfilter "
-    "type='box'/></film></sensor>"
-    "<emitter type='constant' id='sky'><rgb name='radiance' value='.3,.4,.6'/></emitter>"
-    "<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='90'/>"
-    "<translate x='-1' y='3' z='1'/></transform><emitter type='area' id='lamp'><rgb "
-    "name='radiance' value='6,5,4'/></emitter></shape>"
-    "<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' "
-    "angle='-90'/></transform><bsdf type='diffuse' id='clay'><rgb name='reflectance' "
-    "value='.6,.4,.3'/></bsdf></shape>"
+/* In the open scene. */
+static const char metal_and_bulb[] =
     "<shape type='sphere'><point name='center' x='-.9' y='.3' z='.6'/><float "
     "name='radius' "
     "value='.3'/><bsdf type='roughconductor' id='metal'><string name='material' "
@@ -38,7 +26,7 @@ static const char open_xml[] =
     "<shape type='sphere'><point name='center' x='.8' y='.25' z='.8'/><float "
     "name='radius' "
     "value='.05'/><emitter type='area' id='bulb'><rgb name='radiance' "
-    "value='80,60,40'/></emitter></shape></scene>";
+    "value='80,60,40'/></emitter></shape>";
 
 enum which { CORNELL, TEXTURED, OPEN, MASKED, SMALL, SCENES };
 static const char *const names[] = {"cornell", "textured", "open", "masked",
@@ -56,16 +44,8 @@ static const char *const actives[][5] = {
 
 static imp_scene *scene_of(enum which which)
 {
-    char text[4096], size[64];
-    if (which == OPEN || which == SMALL) {
-        snprintf(text, sizeof text, open_xml, side, side);
-        return test_scene_text(ctx, text, IMP_RGB);
-    }
-    if (which == TEXTURED)
-        snprintf(size, sizeof size, "width=%d height=%d", side * 7 / 6, side * 7 / 8);
-    else snprintf(size, sizeof size, "res=%d", side);
-    return test_scene(ctx, which == TEXTURED ? "textured.xml" : "cornell.xml", IMP_RGB,
-                      size);
+    if (which == OPEN || which == SMALL) return gain_open(ctx, side, metal_and_bulb);
+    return which == TEXTURED ? gain_textured(ctx, side) : gain_cornell(ctx, side);
 }
 
 static double weight_of(size_t k, const void *payload)

@@ -109,17 +109,6 @@ static void photograph(imp_scene *s, int sensor, uint64_t seed, double gamma,
     imp_film_destroy(film);
 }
 
-static void target_add(imp_problem *p, int sensor, const float *pixels)
-{
-    struct imp_target t = IMP_TARGET_INIT;
-    t.sensor = sensor;
-    t.width = WIDTH;
-    t.height = HEIGHT;
-    t.channels = 3;
-    t.pixels = pixels;
-    test_must(ctx, imp_problem_add_target(p, &t));
-}
-
 enum how { AS_IT_IS, CENSORED, UNLIT };
 struct found {
     double worst;  /* z */
@@ -167,7 +156,7 @@ static struct found fit(const struct setting *of, imp_scene *s, float T[2][N],
     o.intervals = 1;
     p = problem_make(s);
     for (int i = 0; i < 2; i++) {
-        target_add(p, i, T[i]);
+        test_target(ctx, p, i, WIDTH, HEIGHT, T[i]);
         if (how != AS_IT_IS)
             test_must(ctx, imp_problem_clip(p, i, .5 / 255, 254.5 / 255));
     }
@@ -290,7 +279,7 @@ static void gradients(void)
     test_must(ctx, imp_problem_activate(p, "left.*"));
     const size_t n = imp_problem_n(p);
     photograph(s, 0, 1, 1.8, .01, T);
-    target_add(p, 0, T);
+    test_target(ctx, p, 0, WIDTH, HEIGHT, T);
     test_must(ctx, imp_problem_clip(p, 0, .5 / 255, 254.5 / 255));
     run.spp = 8;
     test_must(ctx, imp_problem_censor(p, &run));

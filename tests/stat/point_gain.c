@@ -3,7 +3,7 @@
  * What points in sets gain over independent ones at 64 samples per pixel: variance over
  * seeds of pictures and of gradients of a loss, with its errors as they are stated. Both
  * kinds have the same means. Run with "long" for the larger pictures and all scenes. */
-#include "imp_scene.h"
+#include "gain_scenes.h"
 #include "imp_tap.h"
 #include "inverse/problem.h"
 #include <stdbool.h>
@@ -13,21 +13,8 @@ enum { SEEDS = 64, SPP = 64, PARAMS = 64 };
 
 static imp_context *ctx;
 
-/* Two meshes, rough metal, sky and lamp. */
-static const char open_xml[] =
-    "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' "
-    "value='5'/></integrator><sensor type='perspective'><float name='fov' value='40'/>"
-    "<transform name='to_world'><lookat origin='0,2.4,5' target='0,.6,0' "
-    "up='0,1,0'/></transform><sampler type='independent'/><film type='hdrfilm'><integer "
-    "name='width' value='%d'/><integer name='height' value='%d'/><rfilter "
-    "type='box'/></film></sensor>"
-    "<emitter type='constant' id='sky'><rgb name='radiance' value='.3,.4,.6'/></emitter>"
-    "<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='90'/>"
-    "<translate x='-1' y='3' z='1'/></transform><emitter type='area' id='lamp'><rgb "
-    "name='radiance' value='6,5,4'/></emitter></shape>"
-    "<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' "
-    "angle='-90'/></transform><bsdf type='diffuse' id='clay'><rgb name='reflectance' "
-    "value='.6,.4,.3'/></bsdf></shape>"
+/* Two meshes, one of rough metal, in the open scene. */
+static const char blocks_xml[] =
     "<shape type='obj'><string name='filename' value='%s/cornell/tall_block.obj'/>"
     "<transform name='to_world'><scale value='.004'/><translate x='-2.2' z='-1.6'/>"
     "</transform><bsdf type='roughconductor' id='metal'><string name='material' "
@@ -36,22 +23,18 @@ static const char open_xml[] =
     "<shape type='obj'><string name='filename' value='%s/cornell/short_block.obj'/>"
     "<transform name='to_world'><scale value='.004'/><translate x='.2' z='.2'/>"
     "</transform><bsdf type='diffuse' id='chalk'><rgb name='reflectance' "
-    "value='.7,.7,.65'/></bsdf></shape></scene>";
+    "value='.7,.7,.65'/></bsdf></shape>";
 
 enum which { CORNELL, OPEN, TEXTURED };
 static const char *const scene_names[] = {"cornell", "open", "textured"};
 
 static imp_scene *scene_of(enum which which, int side)
 {
-    char text[4096], size[64];
-    if (which == OPEN) {
-        snprintf(text, sizeof text, open_xml, side, side, IMP_SCENES, IMP_SCENES);
-        return test_scene_text(ctx, text, IMP_RGB);
-    }
-    if (which == CORNELL) snprintf(size, sizeof size, "res=%d", side);
-    else snprintf(size, sizeof size, "width=%d height=%d", side * 7 / 6, side * 7 / 8);
-    return test_scene(ctx, which == CORNELL ? "cornell.xml" : "textured.xml", IMP_RGB,
-                      size);
+    char blocks[2048];
+    if (which == CORNELL) return gain_cornell(ctx, side);
+    if (which == TEXTURED) return gain_textured(ctx, side);
+    snprintf(blocks, sizeof blocks, blocks_xml, IMP_SCENES, IMP_SCENES);
+    return gain_open(ctx, side, blocks);
 }
 
 static int by_value(const void *a, const void *b)
