@@ -7,8 +7,6 @@
 #include "color/rgb.h"
 #include "film_aov.h"
 #include "film_integrator.h"
-#include "scene/instances.h"
-#include "walk/dims.h"
 #include <stdio.h>
 #include <string.h>
 
