@@ -52,13 +52,15 @@ struct imp_decision {
     bool stands : 1;     /* in a medium: this collision stands for derivatives with
                                  respect to the extinction (tracking.h) */
     uint8_t drawn : 3;   /* enum imp_density that drew the continuation */
+    bool alone : 1;      /* its vertex splits, and one member of the mixture drew it */
     bool from_light : 1; /* of a walk from a light: the light sample is a connection to
                                  the sensor, what is met the sensor, wi is given */
     imp_decided uv[2], p[3];  /* the place; at the sky p is the direction */
     imp_decided wo[3], wi[3]; /* of the continuation, shading frame */
     imp_decided pdf, survive; /* p, s of the continuation */
-    imp_decided kernel;       /* density of wi by the BSDF alone; of lanes that differ, by
-                                 the one that drew */
+    imp_decided share, rest;  /* p before roulette, by k, the density of wi by the BSDF
+                                 alone: share k + rest, in each lane where lanes differ;
+                                 alone: in the lane that drew */
     imp_decided passes;       /* T of the segment that follows, where no parameter that
                                  is differentiated changes it */
     imp_decided glow_weight;  /* of the BSDF's own emission: 1, or 1/absorb */

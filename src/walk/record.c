@@ -6,7 +6,7 @@
 #include "segment.h"
 #include <string.h>
 
-_Static_assert(sizeof(struct imp_decision) <= 160, "a kept vertex");
+_Static_assert(sizeof(struct imp_decision) <= 164, "a kept vertex");
 _Static_assert(sizeof(struct imp_record_walk) == 72, "no padding: it is written");
 _Static_assert(sizeof(union imp_kept) == 16, "a kept event");
 _Static_assert(IMP_WALK_MAX <= UINT16_MAX, "imp_record_walk.n");
@@ -121,6 +121,7 @@ static struct imp_decision decided(const struct imp_decision *d)
     k.glows = d->glows;
     k.goes_on = d->goes_on;
     k.drawn = d->goes_on ? d->drawn : 0;
+    k.alone = d->goes_on && d->alone;
     memcpy(k.uv, d->uv, sizeof k.uv);
     memcpy(k.p, d->p, sizeof k.p);
     if (d->scatterer != IMP_AT_SKY) memcpy(k.wo, d->wo, sizeof k.wo);
@@ -131,7 +132,8 @@ static struct imp_decision decided(const struct imp_decision *d)
         memcpy(k.wi, d->wi, sizeof k.wi);
         k.lobe = d->lobe;
         k.pdf = d->pdf;
-        k.kernel = d->kernel;
+        k.share = d->share;
+        k.rest = d->rest;
         k.survive = d->survive;
     }
     if (d->met.emitter >= 0) k.met = d->met;

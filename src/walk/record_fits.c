@@ -47,7 +47,7 @@ static bool continuation_fits(const struct imp_bsdf *b, const struct imp_decisio
     if (!d->goes_on) return true;
     const unsigned needs = d->lobe == IMP_SMOOTH ? IMP_BSDF_SMOOTH : IMP_BSDF_DELTA;
     return d->lobe >= IMP_SMOOTH && (b->flags & (needs | IMP_BSDF_NULL)) && unit(d->wi) &&
-           isfinite(d->pdf) && d->pdf > 0 && isfinite(d->kernel) && d->kernel >= 0 &&
+           isfinite(d->pdf) && d->pdf > 0 && weight(d->share) && weight(d->rest) &&
            isfinite(d->survive) && d->survive > 0;
 }
 

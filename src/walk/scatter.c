@@ -60,30 +60,54 @@ static bool roulette(struct imp_step *s, const struct imp_bsdf *b, imp_spec fact
     return imp__step_number(s, IMP_DIM_SURVIVE) < *survive;
 }
 
-/* Density of the direction as drawn, in all lanes together where they differ. 0: the walk
- * ends. *kernel: of the BSDF alone; *competing as of imp__mixture_pdf; f: the value. Where a vertex splits, the members' MIS weights
- * are those of the lane that drew, which add up to 1 for every lane. */
-static double density(struct imp_step *s, const struct imp_bsdf *b,
-                      const struct imp_dirs *dirs, imp_v3 w, int drawn, double *kernel,
-                      double *competing, imp_spec *f)
+/* A direction as drawn: p, in all lanes together where they differ (0: the walk ends), and
+ * the density that a light sample competes with. share, rest as of struct imp_decision. */
+struct drawn {
+    double pdf, competing, share, rest;
+};
+
+/* Of a vertex with a mixture: what the densities other than the BSDF's have, `all` being
+ * the whole and k the BSDF's. */
+static void mixed_parts(const struct imp_step *s, double all, double k, int by, int lobe,
+                        struct drawn *p)
 {
+    const struct imp_mixed *m = &s->mixed;
+    const bool alone = m->only >= 0;
+    if (!alone || lobe != IMP_SMOOTH) p->share = alone ? 1 : m->share[IMP_DENSITY_KERNEL];
+    else p->share = by == IMP_DENSITY_KERNEL ? all / k : 0;
+    if (lobe == IMP_SMOOTH) p->rest = fmax(all - p->share * k, 0);
+}
+
+/* f: the value. Where a vertex splits, the members' MIS weights are those of the lane that
+ * drew, which add up to 1 for every lane. */
+static struct drawn density(struct imp_step *s, const struct imp_bsdf *b,
+                            const struct imp_dirs *dirs, imp_v3 w, int by, imp_spec *f)
+{
+    struct drawn d = {.share = 1};
     if (imp_likely(!b->shaped)) {
-        *kernel = imp__bsdf_pdf_eval(b, s->in, dirs, f);
-        if (!(*kernel > 0)) return 0;
-        return imp__direction_pdf(s, *kernel, w, drawn, dirs->lobe, competing);
+        const double k = imp__bsdf_pdf_eval(b, s->in, dirs, f);
+        if (!(k > 0)) return d;
+        d.pdf = imp__direction_pdf(s, k, w, by, dirs->lobe, &d.competing);
+        if (imp_unlikely(s->mixed.here)) mixed_parts(s, d.pdf, k, by, dirs->lobe, &d);
+        return d;
     }
     imp_spec p;
     imp__shaped_pdf(b, s->at.carried, s->in, dirs, &p);
     imp__shaped_eval(b, s->at.carried, s->in, dirs, f);
-    if (!(imp__max_used(p, true) > 0)) return 0;
+    if (!(imp__max_used(p, true) > 0)) return d;
     const int drew = imp__lane_mis_drew(s);
-    *kernel = p[drew];
-    if (s->mixed.here && s->mixed.splits)
-        return imp__direction_pdf(s, p[drew], w, drawn, dirs->lobe, competing);
+    const double k = p[drew];
+    if (s->mixed.here && s->mixed.splits) {
+        d.pdf = imp__direction_pdf(s, k, w, by, dirs->lobe, &d.competing);
+        if (k > 0) mixed_parts(s, d.pdf, k, by, dirs->lobe, &d);
+        return d;
+    }
     for (int j = 0; j < s->at.carried->n; j++)
-        p[j] = imp__direction_pdf(s, p[j], w, drawn, dirs->lobe, competing);
-    if (!(p[drew] > 0)) return 0;
-    return *competing = 1 / imp__lane_mis_decide(s, p);
+        p[j] = imp__direction_pdf(s, p[j], w, by, dirs->lobe, &d.competing);
+    if (!(p[drew] > 0)) return d;
+    if (s->mixed.here) mixed_parts(s, p[drew], k, by, dirs->lobe, &d);
+    d.pdf = d.competing = 1 / imp__lane_mis_decide(s, p);
+    return d;
 }
 
 /* May nothing follow but what is no bounce? */
@@ -105,8 +129,8 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
                             .derivative = imp__derivative_wanted(s, b)};
 
     /* The direction, its density and its value. */
-    int drawn;
-    if (!imp__direction_draw(s, b, frame, u, &dirs, &drawn)) return false;
+    int by;
+    if (!imp__direction_draw(s, b, frame, u, &dirs, &by)) return false;
     const imp_v3 w = imp__to_world(frame, dirs.wi);
     dirs.wo = s->wo;
     dirs.wi = imp__decide(dirs.wi);
@@ -115,9 +139,8 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
                           b->straight >> dirs.lobe & 1;
     if (imp_unlikely(!straight && b->straight) && last_bounce(s)) return false;
     imp_spec f;
-    double kernel = 0, competing;
-    const double pdf =
-        imp__decide1(density(s, b, &dirs, w, drawn, &kernel, &competing, &f));
+    const struct drawn p = density(s, b, &dirs, w, by, &f);
+    const double pdf = imp__decide1(p.pdf);
     if (!(pdf > 0)) return false; /* structurally zero */
 
     /* Does the walk go on? */
@@ -134,9 +157,11 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
     if (s->recorded) {
         imp__store_v3(v->d.wi, dirs.wi);
         v->d.lobe = (int8_t)dirs.lobe;
-        v->d.drawn = (uint8_t)(drawn & 7);
+        v->d.drawn = (uint8_t)(by & 7);
+        v->d.alone = s->mixed.here && s->mixed.only >= 0;
         v->d.pdf = (imp_decided)pdf;
-        v->d.kernel = (imp_decided)kernel;
+        v->d.share = (imp_decided)p.share;
+        v->d.rest = (imp_decided)p.rest;
         v->d.survive = (imp_decided)survive;
         v->d.goes_on = true;
     }
@@ -155,7 +180,7 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
     }
     s->from = at->p;
     if (imp_unlikely(s->light_tree != NULL)) s->left = imp__light_place(s, b, at);
-    if (imp_likely(!s->mixed.splits)) competing = pdf;
+    const double competing = imp_likely(!s->mixed.splits) ? pdf : p.competing;
     s->pdf = dirs.lobe == IMP_SMOOTH && s->segment->connects ? competing : 0;
     return true;
 }

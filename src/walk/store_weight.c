@@ -7,16 +7,22 @@
  *
  * one positive number a walk, and the effective sample size of n walks is
  * (sum w)^2/(n sum w^2) of n. It ranks draws: where it is below .8 a new draw is worth its
- * price. A direction that another density than the BSDF's drew counts 1, since the choice
- * of the density is part of the draw; so does a step whose survival a guide decided.
+ * price. p is the density of what was drawn, whichever way: where guides and aims draw
+ * directions beside the BSDF, with k its own density and r that of the others,
+ *
+ *     p(theta')/p(theta) = (share k' + r)/p(theta)
+ *
+ * since r is part of the draw. A step whose survival a guide decided counts 1.
  *
  * The ratios of densities alone have the mean 1, as far as walks were drawn where the new
  * density is. A mean far below 1 says that they were not: then they count no more than it.
  *
- * A free flight has the density of its events, in the mean over the lanes of a walk
- * (lane_mis.h). Tentative collisions at which the extinction is now above their bound have
- * no density, nor have null collisions where the extinction was the bound: both are
- * counted, and such walks are refused.
+ * Free flights, and directions that depend on the wavelength, have the density of all
+ * that was decided so far, in the mean over the lanes of a walk (lane_mis.h), and
+ * roulette sees the throughput that a fresh walk would have, over the present density.
+ * Tentative collisions at which the extinction is now above their bound have no density,
+ * nor have null collisions where the extinction was the bound: both are counted, and such
+ * walks are refused.
  *
  * No sample shows that a variance is infinite. A step that is survived with probability q
  * adds to the second moment of the throughput the factor f'^2/(p^2 q); from materials a to
@@ -29,6 +35,7 @@
 
 /* A bound that is reached is above its extinction by a few roundings (majorants.c). */
 #define CERTAIN 1e-6
+#define TINY    1e-300 /* a ratio that is 0 is no divisor */
 
 /* ---- Walks ----------------------------------------------------------------------- */
 
@@ -60,21 +67,6 @@ static void look(const struct imp_densities *m, const struct imp_decision *d,
                                 of >= 0 ? m->wanted[of] : 0};
 }
 
-/* Density now over the density when the direction was drawn. */
-static double density_ratio(const struct looked *v, const struct imp_decision *d)
-{
-    if (d->drawn != IMP_DENSITY_KERNEL || !(d->kernel > 0)) return 1;
-    double p;
-    if (imp_likely(!v->bsdf->shaped)) {
-        p = v->bsdf->ops->pdf(v->bsdf, v->in, &v->dirs);
-    } else {
-        imp_spec lanes;
-        imp__shaped_pdf(v->bsdf, v->carried, v->in, &v->dirs, &lanes);
-        p = lanes[imp__waves_drew(v->carried)];
-    }
-    return p / (double)d->kernel;
-}
-
 /* Survival that roulette would decide now (scatter.c). */
 static double survival_now(const struct imp_densities *m, const struct looked *v,
                            imp_spec factor, imp_spec beta, double eta, bool four)
@@ -90,14 +82,6 @@ static double survival_now(const struct imp_densities *m, const struct looked *v
         q = fmin(imp__max_used(beta, four) * eta * eta, 0.95);
     }
     return fmax(q, m->survival);
-}
-
-/* T of the segment that follows, over its density, by lane. `v`: the vertex, evaluated; NULL:
- * nothing that was crossed is kept. */
-static imp_spec crossed(const struct imp_decision *d, const struct imp_vertex *v)
-{
-    if (!v || !v->on) return imp__spec((double)d->passes);
-    return v->scale * ((double)d->pdf * (double)d->survive);
 }
 
 /* Throughput as roulette sees it (scatter.c): in a lane, the first factor that is zero but
@@ -135,100 +119,137 @@ static void collisions_look(const struct imp_scene *scene, const struct imp_vert
     }
 }
 
-static double lanes_mean(imp_spec f, int n)
+/* ---- One walk ---------------------------------------------------------------------- */
+
+/* What a walk has been through. */
+struct course {
+    const struct imp_densities *m;
+    const struct imp_record *record;
+    const struct imp_carried *carried;
+    struct imp_moments *sum;
+    int lanes;
+    bool rolls;
+    bool own;      /* no branch of another walk */
+    imp_spec p;    /* density of what lanes may decide otherwise, its mean is 1 */
+    imp_spec beta; /* as roulette would see it now */
+    double w, eta;
+    double seen; /* ratio of its directions alone */
+    int zeros[4];
+    bool settled; /* roulette's first step answers for all before it */
+    bool any;     /* a direction's density has changed */
+};
+
+/* Density now, over the decided one, of a decision that has the density p for each lane. */
+static double lanes_ratio(struct course *c, imp_spec p, double decided)
 {
     double sum = 0;
-    for (int c = 0; c < n; c++) sum += f[c];
-    return sum / n;
+    c->p *= p;
+    for (int k = 0; k < c->lanes; k++) sum += c->p[k];
+    const double mean = sum / c->lanes;
+    if (!(mean > 0)) return 0;
+    c->p *= 1 / mean;
+    return mean / decided;
 }
 
-/* Density now over density then of all flights of a walk, and of those that hang on it:
- * each the mean over the lanes (lane_mis.h). Of the latter, `passes` is the reciprocal. f:
- * of the way to the walk's start. */
-static double flights_ratio(const struct imp_scene *scene, const struct imp_walk *walk,
-                            int lanes, imp_spec f, struct imp_moments *sum)
+static double direction_ratio(struct course *c, const struct looked *v,
+                              const struct imp_decision *d)
 {
-    double ratio = 1, mean = lanes_mean(f, lanes);
-    for (const struct imp_vertex *v = walk->first; v; v = v->next) {
-        for (const struct imp_side *s = v->side; s; s = s->next)
-            ratio *= flights_ratio(scene, &s->walk, lanes, f, sum);
-        if (!v->on) continue;
-        collisions_look(scene, v, sum);
-        f *= imp__track_eval(scene, v->on, v->carried);
-        const double next = lanes_mean(f, lanes);
-        if (!(mean > 0) || !(next > 0)) return 0;
-        ratio *= next / mean * (double)v->d.passes;
-        mean = next;
+    const double share = d->share, rest = d->rest, p = d->pdf;
+    if (imp_likely(!v->bsdf->shaped))
+        return (share * v->bsdf->ops->pdf(v->bsdf, v->in, &v->dirs) + rest) / p;
+    imp_spec k;
+    imp__shaped_pdf(v->bsdf, c->carried, v->in, &v->dirs, &k);
+    if (d->alone) return (share * k[imp__waves_drew(c->carried)] + rest) / p;
+    return lanes_ratio(c, share * k + rest, p);
+}
+
+/* The segment that follows; `v`: the vertex, evaluated, NULL: nothing that was crossed is
+ * kept. */
+static void cross(struct course *c, const struct imp_decision *d,
+                  const struct imp_vertex *v)
+{
+    double ratio = 1;
+    if (!v || !v->on) {
+        c->beta *= (double)d->passes;
+        return;
     }
-    return ratio;
+    const imp_spec T = imp__track_eval(c->m->scene, v->on, c->carried);
+    if (c->m->flights) collisions_look(c->m->scene, v, c->sum);
+    if (c->m->flights || c->carried) ratio = lanes_ratio(c, T, 1 / (double)d->passes);
+    c->w *= ratio;
+    c->beta *= T * ((double)d->passes / fmax(ratio, TINY));
 }
 
-/* w of the walk's own vertices, and its steps' share in the growth. `v`: the vertices,
- * evaluated, of a walk with tracks; else NULL. */
-static double walk_weight(const struct imp_store *s, const struct imp_record *r,
-                          const struct imp_densities *m, const struct imp_record_walk *k,
-                          const struct imp_walk *walk, const struct imp_vertex *at,
-                          struct imp_moments *sum)
+/* Roulette at a step that it plays with; f: the value there. */
+static void roll(struct course *c, const struct looked *v, const struct imp_decision *d,
+                 imp_spec step, double ratio, const struct imp_bsdf *next)
 {
-    const struct imp_carried *carried = walk->waves ? &walk->waves->carried : NULL;
-    const struct imp_scene *scene = m->scene;
-    const bool rolls = s->roulette && m->weights && !m->integrator->absorbs;
-    imp_spec beta = imp__spec(1);
-    double w = 1, eta = 1, seen = 1;
-    int zeros[4] = {0};
-    bool settled = false; /* roulette's first step answers for all before it */
-    bool any = false;
-    for (uint32_t j = 0; j < k->n_vertices; j++) {
-        const struct imp_decision *d = imp__record_vertex(r, k->first + j);
-        const struct imp_vertex *here = at;
-        struct looked v;
-        if (at) at = at->next;
-        v.carried = carried;
-        v.bsdf = imp__decided_bsdf(scene, d);
-        if (!d->goes_on) continue;
-        const bool moved = v.bsdf && v.bsdf->index >= 0 && m->moved[v.bsdf->index];
-        const bool own = rolls && j < k->n;
-        if (own && !v.bsdf) beta *= crossed(d, here);
-        if (!v.bsdf || (!moved && !own)) continue;
+    struct imp_moments *sum = c->sum;
+    const bool four = c->carried != NULL;
+    const double q = c->m->guided ? (double)d->survive
+                                  : survival_now(c->m, v, step * (1 / fmax(ratio, TINY)),
+                                                 c->beta, c->eta, four);
+    const bool first = !c->settled;
+    c->w *= q / (double)d->survive;
+    c->beta *= 1 / q;
+    c->settled = true;
+    if (first || !c->own) return;
+    const int a = class_of(v->bsdf);
+    sum->steps[a]++;
+    for (int k = 0; next && k < 4; k++)
+        sum->growth[a][class_of(next)][k] += step[k] * step[k] / (double)d->survive;
+}
+
+/* The continuation of a vertex. */
+static void step_on(struct course *c, const struct imp_decision *d,
+                    const struct imp_vertex *at, const struct imp_bsdf *next)
+{
+    const struct imp_densities *m = c->m;
+    struct looked v = {.bsdf = imp__decided_bsdf(m->scene, d), .carried = c->carried};
+    const bool moved = v.bsdf && v.bsdf->index >= 0 && m->moved[v.bsdf->index];
+    const bool lanes = v.bsdf && v.bsdf->shaped && !d->alone;
+    if (v.bsdf && (moved || lanes || c->rolls)) {
         look(m, d, &v);
-        const double ratio = moved ? density_ratio(&v, d) : 1;
-        any |= moved && d->drawn == IMP_DENSITY_KERNEL;
-        seen *= ratio;
-        w *= ratio;
-        if (!own) continue;
-        imp_spec f;
-        imp__bsdf_eval(v.bsdf, carried, v.in, &v.dirs, &f);
-        const imp_spec step = f * (1 / (double)d->pdf);
-        beta *=
-            seen_by_roulette(step * (1 / fmax(ratio, 1e-300)), carried != NULL, zeros);
-        if (v.bsdf->ops->index_ratio && !v.bsdf->shaped)
-            eta *= v.bsdf->ops->index_ratio(v.bsdf, v.in, &v.dirs);
-        if (!(d->survive < 1)) {
-            beta *= crossed(d, here);
-            continue;
+        const double ratio = moved || lanes ? direction_ratio(c, &v, d) : 1;
+        c->any |= moved && d->share > 0;
+        c->seen *= ratio;
+        c->w *= ratio;
+        if (c->rolls) {
+            imp_spec f;
+            imp__bsdf_eval(v.bsdf, c->carried, v.in, &v.dirs, &f);
+            const imp_spec step = f * (1 / (double)d->pdf);
+            c->beta *= seen_by_roulette(step * (1 / fmax(ratio, TINY)),
+                                        c->carried != NULL, c->zeros);
+            if (v.bsdf->ops->index_ratio && !v.bsdf->shaped)
+                c->eta *= v.bsdf->ops->index_ratio(v.bsdf, v.in, &v.dirs);
+            if (d->survive < 1) roll(c, &v, d, step, ratio, next);
         }
-        const double q = m->guided
-                             ? (double)d->survive
-                             : survival_now(m, &v, step, beta, eta, carried != NULL);
-        w *= q / (double)d->survive;
-        beta *= crossed(d, here) * (1 / q);
-        const bool first = !settled;
-        settled = true;
-        if (first) continue;
-        const int a = class_of(v.bsdf);
-        const struct imp_bsdf *next =
-            j + 1 < k->n
-                ? imp__decided_bsdf(scene, imp__record_vertex(r, k->first + j + 1))
-                : NULL;
-        sum->steps[a]++;
-        for (int c = 0; next && c < 4; c++)
-            sum->growth[a][class_of(next)][c] += step[c] * step[c] / (double)d->survive;
     }
-    if (any) {
-        sum->moved++;
-        sum->seen += seen;
+    cross(c, d, at);
+}
+
+/* Density now over density then of vertices [j, end) of the record, or of those from `at`
+ * on, which are evaluated, with all that hangs on them. */
+static double course_weight(struct course *c, uint64_t j, uint64_t end,
+                            const struct imp_vertex *at)
+{
+    for (; at || j < end; at = at ? at->next : NULL, j++) {
+        const struct imp_decision *d = at ? &at->d : imp__record_vertex(c->record, j);
+        const struct imp_decision *next = NULL;
+        double branches = 1;
+        for (const struct imp_side *s = at ? at->side : NULL; s; s = s->next) {
+            struct course side = *c;
+            side.own = false;
+            side.w = 1;
+            branches *= course_weight(&side, end, end, s->walk.first);
+        }
+        c->w *= branches;
+        if (!d->goes_on) continue;
+        if (at && at->next) next = &at->next->d;
+        else if (!at && j + 1 < end) next = imp__record_vertex(c->record, j + 1);
+        step_on(c, d, at, next ? imp__decided_bsdf(c->m->scene, next) : NULL);
     }
-    return w;
+    return c->w;
 }
 
 enum imp_status
@@ -240,7 +261,8 @@ imp__store_moments(const struct imp_store *s, const struct imp_densities *d,
     const int x0 = (int)(tile % (size_t)s->across) * IMP_STORE_SIDE - s->margin;
     const int y0 = (int)(tile / (size_t)s->across) * IMP_STORE_SIDE - s->margin;
     const int side = imp_min(IMP_STORE_SIDE, s->width + s->margin - x0);
-    const bool tracks = s->roulette && d->weights && !d->guided;
+    const bool rolls = s->roulette && d->weights && !d->integrator->absorbs;
+    const bool tracks = (rolls && !d->guided) || d->flights || tracer->wavelengths;
     for (size_t i = 0; i < r->n_walks; i += every) {
         const struct imp_record_walk *k = imp__record_at(r, i);
         const int pixel = (int)(i / s->n);
@@ -249,18 +271,29 @@ imp__store_moments(const struct imp_store *s, const struct imp_densities *d,
         struct imp_walk walk = {.key = k->key};
         if (mask && !(mask[(size_t)y * (size_t)s->width + (size_t)x] > 0)) continue;
         const struct imp_arena_mark mark = imp__arena_mark(arena);
-        if ((tracks || d->flights) && k->n_items > 0)
+        if (k->n_items > 0 && (tracks || k->n_vertices > k->n))
             imp__record_walk(r, i, tracer, arena, &walk);
         else if (tracer->wavelengths && !imp__walk_wave(tracer, arena, k->wave, &walk))
             return imp__error(s->ctx, IMP_E_NOMEM, "no memory for a walk");
         if (walk.dropped == IMP_DROP_MEMORY)
             return imp__error(s->ctx, IMP_E_NOMEM, "no memory for a walk");
-        double w = walk_weight(s, r, d, k, &walk, walk.first, sum);
-        if (d->flights)
-            w *= flights_ratio(tracer->scene, &walk,
-                               walk.waves ? walk.waves->carried.n
-                                          : tracer->scene->channels,
-                               imp__spec(1), sum);
+        struct course c = {.m = d,
+                           .record = r,
+                           .carried = walk.waves ? &walk.waves->carried : NULL,
+                           .sum = sum,
+                           .rolls = rolls,
+                           .own = true,
+                           .p = imp__spec(1),
+                           .beta = imp__spec(1),
+                           .w = 1,
+                           .eta = 1,
+                           .seen = 1};
+        c.lanes = c.carried ? c.carried->n : tracer->scene->channels;
+        const double w = course_weight(&c, k->first, k->first + k->n, walk.first);
+        if (c.any) {
+            sum->moved++;
+            sum->seen += c.seen;
+        }
         sum->n++;
         sum->w += w;
         sum->w2 += w * w;

@@ -51,10 +51,10 @@ static inline struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
     struct imp_decision *d = &v->d;
     d->shape = d->met.emitter = -1;
     d->connection = IMP_NOT_CONNECTED;
-    d->glows = d->goes_on = d->stands = d->from_light = false;
+    d->glows = d->goes_on = d->stands = d->from_light = d->alone = false;
     d->drawn = IMP_DENSITY_KERNEL;
-    d->pdf = d->kernel = 0;
-    d->survive = d->passes = 1;
+    d->pdf = d->rest = 0;
+    d->survive = d->passes = d->share = 1;
     d->met.weight = d->glow_weight = 1;
     return v;
 }

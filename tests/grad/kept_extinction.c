@@ -334,6 +334,62 @@ static void closed_form(double r)
     imp_scene_destroy(scene);
 }
 
+/* Two flights in a fog without an end, with a collision between them, as all lanes together
+ * draw them: with p_j(t) = sigma_j exp(-sigma_j t), and p' that of r sigma,
+ *
+ *     n/ESS = int int (mean_j p_j'(t) p_j'(u))^2/(mean_j p_j(t) p_j(u)) dt du
+ *
+ * by the rule of midpoints in x = 1 - exp(-t sigma_0). */
+static double two_flights(const double sigma[3], double r)
+{
+    enum { POINTS = 400 };
+    double sum = 0;
+    for (int a = 0; a < POINTS; a++)
+        for (int b = 0; b < POINTS; b++) {
+            const double rate = sigma[0] < sigma[2] ? sigma[0] : sigma[2];
+            const double x = 1 - (a + 0.5) / POINTS, y = 1 - (b + 0.5) / POINTS;
+            const double t = -log(x) / rate, u = -log(y) / rate;
+            double before = 0, now = 0;
+            for (int j = 0; j < 3; j++) {
+                before += pow(sigma[j], 2) * exp(-sigma[j] * (t + u)) / 3;
+                now += pow(r * sigma[j], 2) * exp(-r * sigma[j] * (t + u)) / 3;
+            }
+            sum += now * now / before / (rate * x * rate * y) / (POINTS * POINTS);
+        }
+    return sum;
+}
+
+/* Roulette survives by the albedo a alone where extinction has no colour, at any
+ * extinction; a walk that ends has one flight: with e = r^2/(2 r - 1), that of one,
+ *
+ *     n/ESS = e (1 - a + a e)                                                         */
+static void closed_form_of_two(const double sigma[3], double r, bool roulette)
+{
+    const double albedo = 0.6, one = r * r / (2 * r - 1);
+    char xml[2048];
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'><integrator type='volpath'><integer "
+             "name='max_depth' value='2'/><integer name='rr_depth' value='%d'/>"
+             "</integrator><medium type='homogeneous' id='fog'><rgb name='sigma_t' "
+             "value='%g,%g,%g'/><float name='albedo' value='%g'/></medium><sensor "
+             "type='orthographic'><float name='near_clip' value='1e-4'/><ref "
+             "id='fog'/><film type='hdrfilm'><integer name='width' value='16'/><integer "
+             "name='height' value='16'/><rfilter type='box'/></film></sensor><shape "
+             "type='sphere'><point name='center' x='0' y='0' z='-9'/><emitter "
+             "type='area'/><ref name='exterior' id='fog'/></shape></scene>",
+             roulette ? 1 : 100, sigma[0], sigma[1], sigma[2], albedo);
+    imp_scene *scene = test_scene_text(ctx, xml, IMP_RGB);
+    imp_walks *walks = keep(scene, 512, false);
+    scale(scene, "fog.sigma_t.value", r, INFINITY);
+    tap_near(weigh(walks).ess,
+             1 / (roulette ? one * (1 - albedo + albedo * one) : two_flights(sigma, r)),
+             0.01, 0,
+             roulette ? "two flights and roulette: effective sample size in closed form"
+                      : "two coloured flights: effective sample size in closed form");
+    imp_walks_destroy(walks);
+    imp_scene_destroy(scene);
+}
+
 /* ---- Refused --------------------------------------------------------------------- */
 
 static void refused(imp_scene *scene, const imp_walks *walks, const char *word,
@@ -424,6 +480,10 @@ int main(void)
     distance();
     closed_form(1.4);
     closed_form(0.7);
+    closed_form_of_two((const double[]){1, 2, 4}, 1.3, false);
+    closed_form_of_two((const double[]){4, 2, 1}, 0.75, false);
+    closed_form_of_two((const double[]){2, 2, 2}, 1.4, true);
+    closed_form_of_two((const double[]){2, 2, 2}, 0.8, true);
     refusals();
     remove(grey);
     remove(coloured);

@@ -385,6 +385,47 @@ static void closed_form(double m)
     imp_scene_destroy(scene);
 }
 
+/* The same lobe, drawn with the probability s and else evenly: q_m = s p_m + 1 - s whichever
+ * drew, and n/ESS = int_0^1 q_m^2/q_1 dc. Where the vertex splits, both are drawn, and all
+ * that was drawn has the ratio p_m/p_1. */
+static void closed_form_of_mixtures(double m, double s, bool splits)
+{
+    enum { CELLS = 1000 };
+    char xml[1024];
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'><integrator type='path'><string name='weights' "
+             "value='kernel=%g,uniform=%g'/><integer name='split' value='%d'/>"
+             "</integrator><sensor type='orthographic'><transform name='to_world'>"
+             "<lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform><film "
+             "type='hdrfilm'><integer name='width' value='16'/><integer name='height' "
+             "value='16'/><rfilter type='box'/></film></sensor><shape type='rectangle'>"
+             "<transform name='to_world'><scale value='4'/></transform><bsdf "
+             "type='phong' id='lobe'><float name='exponent' value='1'/></bsdf></shape>"
+             "<emitter type='constant'/></scene>",
+             s, 1 - s, splits);
+    double moment = 0.75 + (m + 1) * (m + 1) / (16 * m);
+    if (!splits) {
+        moment = 0;
+        for (int k = 0; k < CELLS; k++) {
+            const double c = (k + 0.5) / CELLS;
+            const double q = s * (c + (m + 1) / 2 * pow(c, m)) + 1 - s;
+            moment += q * q / (2 * s * c + 1 - s) / CELLS;
+        }
+    }
+    imp_scene *scene = test_scene_text(ctx, xml, IMP_MONO);
+    imp_walks *walks = keep(scene, 256, 3, IMP_POINTS_INDEPENDENT, false, 0);
+    struct imp_walks_weight w = IMP_WALKS_WEIGHT_INIT;
+    size_t k;
+    test_must(ctx, imp_scene_find_param(scene, "lobe.exponent", &k));
+    test_must(ctx, imp_scene_set_values(scene, k, 1, &m));
+    test_must(ctx, imp_walks_weigh(walks, 0, NULL, &w));
+    tap_near(w.ess, 1 / moment, 0.02, 0,
+             splits ? "both of a mixture drawn: effective sample size in closed form"
+                    : "a mixture: effective sample size in closed form");
+    imp_walks_destroy(walks);
+    imp_scene_destroy(scene);
+}
+
 /* Roulette's part is 1 at the numbers of the draw, whoever decided the survival: with
  * extinctions that differ between lanes, behind which the throughput has a colour, and by
  * a guide. A number is moved by so little that only the looking begins. */
@@ -599,6 +640,9 @@ int main(void)
     walk_by_walk("cornell.xml", "res=24", "white.reflectance");
     closed_form(5);
     closed_form(9);
+    closed_form_of_mixtures(9, 0.5, false);
+    closed_form_of_mixtures(20, 0.2, false);
+    closed_form_of_mixtures(9, 0.5, true);
     roulette_counts_once();
     diverging();
     refusals();
