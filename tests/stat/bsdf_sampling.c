@@ -154,7 +154,7 @@ static void visit(const struct kind_case *c, void *payload)
     tap_ok(above < 1e-4, "%s: no more than 1 in all # %.1e above", c->label, above);
     tap_ok(sane, "%s: draws are unit vectors, finite, on an allowed side", c->label);
     if (!(c->bsdf.flags & IMP_BSDF_DELTA))
-        tap_ok(cells >= 42 * directions, "%s: the test looks closely # %d cells",
+        tap_ok(cells >= 40 * directions, "%s: the test looks closely # %d cells",
                c->label, cells);
 }
 
