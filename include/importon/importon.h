@@ -963,7 +963,7 @@ imp_problem_jacobian_sums(imp_problem *problem, const float *adjoint,
 
 enum imp_optimizer {
     IMP_ADAM = 0, /**< stochastic, fresh walks every iteration */
-    IMP_LM,       /**< Gauss-Newton/Levenberg-Marquardt, unbiased J^T J; n <= 256 */
+    IMP_LM,       /**< Gauss-Newton/Levenberg-Marquardt, unbiased J^T J; n <= 262144 */
     IMP_LBFGS,    /**< NLopt, common random numbers */
     IMP_MMA,
     IMP_SLSQP /**< NLopt, bounded, common random numbers */

@@ -226,7 +226,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
     params : SceneParameters, names or patterns
         The active parameters; None: all that have a gradient.
     optimizer : str
-        "adam", "lm" (at most 256 numbers), "lbfgs", "mma" or "slsqp".
+        "adam", "lm" (at most 262144 numbers), "lbfgs", "mma" or "slsqp".
     max_iterations : int
         0: 200 (adam), 30 (others).
     learning_rate : float

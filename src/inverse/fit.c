@@ -60,6 +60,7 @@ static double rounds_searched(const struct imp__fit *f, const struct imp__search
 /* Evaluations after the search: two of intervals, two that accept their step, bias, loss. */
 static int final_total(const struct imp__fit *f)
 {
+    if (f->options.intervals && imp__fit_is_sparse(f)) return 1 + 2 + 1;
     return f->options.intervals && f->problem->n <= IMP_DENSE_MAX
                ? 2 + 3 + imp__fit_is_biased(f->problem)
                : 1;
@@ -72,8 +73,15 @@ static enum imp_status intervals(struct imp__fit *f, const struct imp__search *s
                                  struct imp__uncertainty *u, const char **why)
 {
     imp_context *ctx = f->problem->ctx;
+    if (imp__fit_is_sparse(f)) {
+        imp__sparse_errors_destroy(ctx, &f->errors);
+        IMP_CHECKED(imp__sparse_errors_find(&f->goal, x, &f->errors));
+        if (f->errors.x) memcpy(x, f->errors.x, f->problem->n * sizeof *x);
+        *why = f->errors.why;
+        return IMP_OK;
+    }
     if (f->problem->n > IMP_DENSE_MAX) {
-        *why = "they are for at most 256 numbers";
+        *why = "they are for at most 256 numbers, and with lm for any";
         return IMP_OK;
     }
     const struct imp_problem *p = f->problem;

@@ -7,6 +7,7 @@
 #include "allocation.h"
 #include "problem.h"
 #include "search/checkpoint.h"
+#include "search/sparse_errors.h"
 
 struct imp__fit {
     struct imp_problem *problem;
@@ -33,6 +34,7 @@ struct imp__fit {
 
     struct imp__allocation allocation; /* of the search's samples; n 0: all alike */
     const struct imp__metric *metric;  /* of the next evaluation's variance; or NULL */
+    bool rows_fit; /* rows of derivatives are known to fit into memory */
 
     /* Of searches with common random numbers (fit_kept.c): walks that are evaluated. */
     imp_walks *walks; /* NULL: none are */
@@ -46,6 +48,7 @@ struct imp__fit {
     struct imp__variate *variate; /* NULL: there is none */
     bool searching;               /* evaluations are those of the search */
     const char *without_variate;  /* why not; NULL: there is one, or none was wanted */
+    struct imp__sparse_errors errors; /* of many numbers; x NULL: there are none */
     char note[96];
 };
 
@@ -53,6 +56,14 @@ struct imp__fit {
 enum imp_status imp__fit_begin(struct imp_problem *problem,
                                const struct imp_fit_options *options,
                                const struct imp_run *run, struct imp__fit *fit);
+/* fit_sparse.c: are normal equations those of rows of derivatives? */
+static inline bool imp__fit_is_sparse(const struct imp__fit *fit)
+{
+    return fit->options.optimizer == IMP_LM && fit->problem->n > IMP_DENSE_MAX;
+}
+/* imp__goal.sparse. */
+enum imp_status imp__fit_sparse(const double *x, uint64_t seed, int rounds,
+                                struct imp__sparse_normal *out, void *payload);
 /* Samples per pixel of one evaluation, as asked for. */
 int imp__fit_spp(const struct imp__fit *fit);
 /* Those of a search that is far from its end. */

@@ -184,8 +184,10 @@ static enum imp_status normal(const double *x, uint64_t seed, int rounds,
  * not quadratic has a bias that grows. */
 int imp__fit_coarse_spp(const struct imp__fit *f)
 {
+    const struct imp_problem *p = f->problem;
     const int spp = imp__fit_spp(f);
-    return f->options.optimizer == IMP_LM && f->options.intervals && quadratic(f)
+    return f->options.optimizer == IMP_LM && f->options.intervals && quadratic(f) &&
+                   p->n <= IMP_DENSE_MAX
                ? imp_min(spp, imp_max(spp / COARSER, COARSE_SPP))
                : spp;
 }
@@ -305,7 +307,8 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
     f.start_s = imp__now();
     f.last_checkpoint_s = f.start_s;
     f.deadline_s = f.outer.time_limit_s > 0 ? f.start_s + f.outer.time_limit_s : 0;
-    f.search_share = f.options.intervals && n <= IMP_DENSE_MAX ? 0.7 : 0.98;
+    const bool errors = n <= IMP_DENSE_MAX || imp__fit_is_sparse(&f);
+    f.search_share = f.options.intervals && errors ? 0.7 : 0.98;
     f.run = f.outer;
     f.run.time_limit_s = 0;
     IMP_TRY(imp__fit_variates(&f));
@@ -315,18 +318,20 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
     /* Pointers to the fit itself: it does not move any more. */
     out->run.progress = inner_progress;
     out->run.progress_payload = out;
-    out->goal = (struct imp__goal){.ctx = ctx,
-                                   .n = n,
-                                   .lo = out->lo,
-                                   .hi = out->hi,
-                                   .scale = out->scale,
-                                   .spans = out->spans,
-                                   .n_spans = out->n_spans,
-                                   .seed = out->outer.seed,
-                                   .eval = eval,
-                                   .normal = n <= IMP_DENSE_MAX ? normal : NULL,
-                                   .iterated = iterated,
-                                   .payload = out};
+    out->goal =
+        (struct imp__goal){.ctx = ctx,
+                           .n = n,
+                           .lo = out->lo,
+                           .hi = out->hi,
+                           .scale = out->scale,
+                           .spans = out->spans,
+                           .n_spans = out->n_spans,
+                           .seed = out->outer.seed,
+                           .eval = eval,
+                           .normal = n <= IMP_DENSE_MAX ? normal : NULL,
+                           .sparse = imp__fit_is_sparse(out) ? imp__fit_sparse : NULL,
+                           .iterated = iterated,
+                           .payload = out};
     if (out->allocation.n > 0) out->goal.measure = measure;
     if (imp__fit_coarse_spp(out) < imp__fit_spp(out)) out->goal.coarsen = coarsen;
     if (imp__fit_keeps(out)) {
@@ -348,4 +353,5 @@ void imp__fit_end(struct imp__fit *f)
     imp__release(f->problem->ctx, f->lo);
     imp__release(f->problem->ctx, f->spans);
     imp__release(f->problem->ctx, f->H_prior);
+    imp__sparse_errors_destroy(f->problem->ctx, &f->errors);
 }

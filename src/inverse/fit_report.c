@@ -65,6 +65,17 @@ static void put_loose(struct text *t, const struct imp__fit *f,
     }
 }
 
+/* Of many numbers. */
+static void put_errors(struct text *t, const struct imp__fit *f)
+{
+    put(t, "%sstandard errors are those of %d drawn vectors, each known to %.0f %%",
+        t->used ? "; " : "", IMP_ERROR_DRAWS, 100 / sqrt(2.0 * IMP_ERROR_DRAWS));
+    if (f->errors.n_loose)
+        put(t, "; the pictures do not determine %zu of %zu numbers", f->errors.n_loose,
+            f->problem->n);
+    if (f->errors.n_bound) put(t, "; %zu at a bound have none", f->errors.n_bound);
+}
+
 static void put_shift(struct text *t, const struct imp__fit *f,
                       const struct imp__fit_shift *shift)
 {
@@ -123,6 +134,7 @@ const char *imp__fit_warning(const struct imp__fit *f, int bias_order,
             residual->freedom > 0 ? "little" : "nothing",
             residual->freedom > 0 ? "are uncertain" : "are without it");
     if (loosest) put_loose(&t, f, variables, loosest);
+    if (f->errors.x) put_errors(&t, f);
     if (no_intervals) put(&t, "%sno intervals: %s", t.used ? "; " : "", no_intervals);
     if (bias_order > 0)
         put(&t, "%s%s a bias of order 1/spp%s in value and gradient", t.used ? "; " : "",

@@ -90,7 +90,20 @@ static enum imp_status blocks_make(struct imp__fit *f, const double *start)
     return IMP_OK;
 }
 
-/* The row of a number, without standard error and interval. */
+/* Of many numbers: what drawn vectors say of this one, in the units of x. */
+static void error_of(const struct imp__fit_block *b, double x, double se,
+                     struct imp_fit_variable *v)
+{
+    const double lo = imp_clamp(x - IMP_ERROR_T * se, b->lo, b->hi);
+    const double hi = imp_clamp(x + IMP_ERROR_T * se, b->lo, b->hi);
+    v->determined = !isnan(se) || v->at_bound != 0;
+    if (isnan(se)) return;
+    v->se = se * (b->log ? exp(x) : 1);
+    v->lo95 = b->log ? exp(lo) : lo;
+    v->hi95 = b->log ? exp(hi) : hi;
+}
+
+/* The row of a number, without standard error and interval where those are of matrices. */
 static struct imp_fit_variable variable_of(const struct imp__fit_answer *a, size_t i)
 {
     size_t at = 0, end = a->n_blocks;
@@ -103,16 +116,18 @@ static struct imp_fit_variable variable_of(const struct imp__fit_answer *a, size
     const double x = a->search->x[i];
     const double start =
         b->start ? b->start[i - b->first] : imp__search_start(a->search, i);
-    return (struct imp_fit_variable){.start = b->log ? exp(start) : start,
-                                     .value = b->log ? exp(x) : x,
-                                     .se = NAN,
-                                     .lo95 = NAN,
-                                     .hi95 = NAN,
-                                     .at_bound = x <= b->lo   ? -1
-                                                 : x >= b->hi ? 1
-                                                              : 0,
-                                     .determined = 1}; /* until a covariance shows the
-                                                          contrary */
+    struct imp_fit_variable v = {.start = b->log ? exp(start) : start,
+                                 .value = b->log ? exp(x) : x,
+                                 .se = NAN,
+                                 .lo95 = NAN,
+                                 .hi95 = NAN,
+                                 .at_bound = x <= b->lo   ? -1
+                                             : x >= b->hi ? 1
+                                                          : 0,
+                                 .determined = 1}; /* until a covariance shows the
+                                                      contrary */
+    if (a->se) error_of(b, x, a->se[i], &v);
+    return v;
 }
 
 enum imp_status imp_problem_fit_variable(const imp_problem *p, size_t i,
@@ -240,7 +255,14 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
     const double *covariance = NULL;
     IMP_CHECKED(covariance_give(f, u, rows, s->x, &covariance));
     *answer = (struct imp__fit_answer){.search = s};
-    const enum imp_status st = blocks_make(f, start);
+    enum imp_status st = blocks_make(f, start);
+    if (st == IMP_OK && f->errors.x) {
+        double *se = imp__arena_array(arena, n, sizeof *se);
+        if (se) memcpy(se, f->errors.se, n * sizeof *se);
+        else st = imp__error(f->problem->ctx, IMP_E_NOMEM, "no memory for %zu errors", n);
+        answer->se = se;
+        determined = n - f->errors.n_loose;
+    }
     if (st != IMP_OK) {
         answer->search = NULL; /* the caller's */
         return st;

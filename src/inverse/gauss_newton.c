@@ -105,17 +105,6 @@ static enum imp_status target_add(struct imp__normal_job *j,
     return st;
 }
 
-/* Channels of pixels whose weight is not 0. */
-static double numbers_in_use(const struct imp__target *t)
-{
-    const size_t n = (size_t)t->desc.width * (size_t)t->desc.height;
-    double count = 0;
-    for (size_t i = 0; i < n; i++)
-        for (int c = 0; c < t->desc.channels; c++)
-            count += imp__target_weight(t, i, c) > 0;
-    return count;
-}
-
 static void matrix_copy(double *to, const double *lower, size_t K)
 {
     if (!to) return;
@@ -171,7 +160,7 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
             IMP_TRY(target_add(&j, imp__target_part(&p->targets[t], k), k, &own, rounds,
                                ((double)t + (double)k / parts) / targets,
                                ((double)t + (double)(k + 1) / parts) / targets, start));
-        residuals += numbers_in_use(&p->targets[t]);
+        residuals += imp__normal_residual_count(&p->targets[t]);
         const int bias = imp__loss_bias_order(p->targets[t].desc.loss);
         if (bias && (!bias_order || bias < bias_order)) bias_order = bias;
         wide |= shares_walks(&j.tracer);

@@ -20,16 +20,6 @@ static double seen(const struct imp__normal_job *j, const double *lanes, int c)
     return imp__seen(imp__sees_luminance(j->target, j->channels), lanes, c);
 }
 
-/* Units of so many sets, of one size where that can be: pairs of units are all pairs but
- * those within a unit. */
-static int units_of(int sets)
-{
-    if (sets <= IMP_NORMAL_UNITS) return sets;
-    for (int m = IMP_NORMAL_UNITS; m >= IMP_NORMAL_UNITS / 2; m--)
-        if (sets % m == 0) return m;
-    return IMP_NORMAL_UNITS;
-}
-
 /* Set s of a replicate: its mean radiance, and x, the mean of its derivatives. */
 static imp_spec set_mean(const struct imp__normal_job *j, struct imp_tile_worker *tile,
                          int x, int y, int b, int s)
@@ -114,43 +104,6 @@ static void touched_find(const struct imp__normal_job *j, struct pixel *p)
 
 /* ---- One channel ---------------------------------------------------------------- */
 
-/* Of a loss that is not quadratic: what the derivative of unit a is multiplied with, by
- * the jackknife over units (adjoint.c). */
-static void jackknife(const struct imp_target *t, double scale, double T,
-                      const struct pixel *p, size_t c, double *factor)
-{
-    struct imp__loss_at at;
-    const double M = p->M;
-    double S = 0, A = 0;
-    for (int a = 0; a < p->M; a++) S += p->w->r[a][c];
-    for (int a = 0; a < p->M; a++) {
-        imp__loss_eval(t->loss, scale, t->epsilon, (S - p->w->r[a][c]) / (M - 1), T, &at);
-        factor[a] = at.d1;
-        A += at.d1;
-    }
-    imp__loss_eval(t->loss, scale, t->epsilon, S / M, T, &at);
-    for (int a = 0; a < p->M; a++) factor[a] = at.d1 - (A - factor[a]) / M;
-}
-
-/* r: from radiance to residual, so that the loss is 1/2 w r^2; returns w. */
-static double residuals(const struct imp__normal_job *j, const struct pixel *p, size_t c,
-                        double *factor)
-{
-    const struct imp_target *t = &j->target->desc;
-    const double scale = imp__target_weight(j->target, p->index, (int)c);
-    double T = t->pixels[p->index * (size_t)seen_channels(j) + c], mean = 0;
-    for (int a = 0; a < p->M; a++) mean += p->w->r[a][c] / p->M;
-    const double weight = imp__loss_gauss_newton(t->loss, scale, t->epsilon, mean, T);
-    if (!imp__loss_quadratic(t->loss)) {
-        struct imp__loss_at at;
-        jackknife(t, scale, T, p, c, factor);
-        imp__loss_eval(t->loss, scale, t->epsilon, mean, T, &at);
-        T = weight > 0 ? mean - at.d1 / weight : T;
-    }
-    for (int a = 0; a < p->M; a++) p->w->r[a][c] -= T;
-    return weight;
-}
-
 /* Mean of r_a r_b over pairs of units of [a0, a1). */
 static double square_residual(const struct pixel *p, size_t c, int a0, int a1)
 {
@@ -216,7 +169,8 @@ static void channel_add(const struct imp__normal_job *j, const struct pixel *p, 
     const int half = p->M / 2;
     const double M = p->M, pairs = M * (M - 1), n0 = half, n1 = M - half;
     double factor[IMP_NORMAL_UNITS];
-    const double weight = residuals(j, p, c, factor);
+    const double weight =
+        imp__normal_residuals(j->target, p->index, c, p->M, p->w->r, factor);
     const bool quadratic = imp__loss_quadratic(j->target->desc.loss);
     const bool known = j->target->noise_se != NULL;
     const double sigma = known ? j->target->noise_se[p->index * S + c] : 0;
@@ -365,7 +319,7 @@ enum imp_status imp__normal_work(const struct imp_tile *t, struct imp_tile_worke
         for (int x = t->x0; x < t->x1; x++) {
             struct pixel p = {.w = &j->workers[tile->index],
                               .index = (size_t)y * (size_t)j->width + (size_t)x,
-                              .M = units_of((b1 - b0) * j->plan.m),
+                              .M = imp__normal_units((b1 - b0) * j->plan.m),
                               .share = R / all};
             if (!imp__target_counts(j->target, p.index)) continue;
             units_gather(j, tile, x, y, b0, b1, &p);

@@ -57,6 +57,17 @@ static inline struct imp__normal_sums imp__normal_at(double *p, size_t K, bool d
         .deviations = deviate ? p + 5 * K * K + K + IMP_NORMAL_SCALARS : NULL};
 }
 
+/* normal_units.c: units of a pixel that has so many sets. */
+int imp__normal_units(int sets);
+/* r[unit][c], in: radiance of channel c, out: residual, so that the loss is 1/2 w r^2;
+ * @return w. factor [units]: of a loss that is not quadratic, what a unit's derivatives
+ * are multiplied with; of others not set. */
+double imp__normal_residuals(const struct imp__target *target, size_t pixel, size_t c,
+                             int units, double r[][3], double *factor);
+
+/* Channels of pixels whose weight is not 0. */
+double imp__normal_residual_count(const struct imp__target *target);
+
 /* For imp__tiles_run. */
 enum imp_status imp__normal_work(const struct imp_tile *t, struct imp_tile_worker *tile,
                                  void *result, void *payload);

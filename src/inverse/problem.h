@@ -96,6 +96,7 @@ struct imp__fit_answer {
     struct imp__search *search;          /* settled; owned */
     size_t n_blocks;
     struct imp__fit_block *blocks; /* in fit_arena */
+    const double *se; /* [n] in fit_arena, of lm with many numbers; NULL: none */
 };
 void imp__fit_answer_free(struct imp_problem *p);
 
@@ -168,6 +169,8 @@ enum imp_status imp__problem_no_parts(const struct imp_problem *p, const char *c
  * now. */
 double imp__regularise(const struct imp_problem *p, const double *x, double *gradient);
 
+/* Adds the diagonal of their second derivative to d [n]. */
+void imp__regularise_diagonal(const struct imp_problem *p, double *d);
 /* Their second derivative, H [n][n]. */
 enum imp_status imp__regularise_second(const struct imp_problem *p, double *H);
 

@@ -162,6 +162,37 @@ double imp__regularise(const struct imp_problem *p, const double *x, double *gra
     return value;
 }
 
+/* Of smoothness: a weight for each neighbour. */
+static void neighbours_add(double weight, const struct imp__cells *n, double *d)
+{
+    const size_t c = n->channels, rows = n->n[0] * n->n[1];
+    for (size_t i = 0; i < rows; i++)
+        for (size_t j = 0; j < n->n[2]; j++) {
+            const size_t y = i % n->n[1], z = i / n->n[1];
+            const int count = (j > 0) + (j + 1 < n->n[2]) + (y > 0) + (y + 1 < n->n[1]) +
+                              (z > 0) + (z + 1 < n->n[0]);
+            for (size_t k = 0; k < c; k++) d[(i * n->n[2] + j) * c + k] += weight * count;
+        }
+}
+
+void imp__regularise_diagonal(const struct imp_problem *p, double *d)
+{
+    for (size_t i = 0; i < p->n_regularisers; i++) {
+        const struct imp__regulariser *r = &p->regularisers[i];
+        for (size_t k = 0; k < p->n_blocks; k++) {
+            const struct imp__block *b = &p->blocks[k];
+            if (!r->on[b->param]) continue;
+            if (r->kind == IMP_TIKHONOV) {
+                for (size_t e = 0; e < b->count; e++) d[b->first + e] += r->weight;
+            } else if (!imp__block_factor(p, b)) {
+                const struct imp__cells cells =
+                    imp__cells_of(&p->scene->params[b->param].info);
+                neighbours_add(r->weight, &cells, d + b->first);
+            }
+        }
+    }
+}
+
 /* They are quadratic: column k is a difference of gradients, without error. */
 enum imp_status imp__regularise_second(const struct imp_problem *p, double *H)
 {

@@ -11,6 +11,7 @@
 
 #include "base/context.h"
 #include "metric.h"
+#include "sparse_normal.h"
 
 #define IMP_DENSE_MAX  256  /* most variables of methods that hold [n][n] matrices */
 #define IMP_SEARCH_FEW 1024 /* variables, above which Adam's memory counts */
@@ -70,6 +71,10 @@ struct imp__goal {
      * the samples of eval. NULL: not offered. */
     enum imp_status (*normal)(const double *x, uint64_t seed, int rounds,
                               struct imp__normal *out, void *payload);
+    /* Where `normal` is NULL, the same by products with the matrix, of `rounds` times the
+     * samples of eval. The caller ends it by imp__sparse_normal_destroy. NULL: not offered. */
+    enum imp_status (*sparse)(const double *x, uint64_t seed, int rounds,
+                              struct imp__sparse_normal *out, void *payload);
     /* Levenberg-Marquardt: from here on eval and normal take fewer samples, or those asked
      * for. A search that ends with fewer has to be looked at (imp__covariance) and may have
      * to go on (imp__search_refine). NULL: they always take those asked for. */

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The linear systems of Levenberg and Marquardt's iterations, as lm.c sees them: of few
+ * variables with matrices, of many by products with them. */
+#ifndef IMP_SEARCH_LM_SYSTEM_H
+#define IMP_SEARCH_LM_SYSTEM_H
+
+#include "optimize.h"
+
+#define IMP_LM_MU_MIN 1e-7
+#define IMP_LM_MU_MAX 1e8
+
+struct imp__lm_system {
+    const struct imp__goal *goal;
+    const double *g; /* [n] gradient */
+    struct imp_estimate f;
+    bool after_step; /* x is itself the Newton point of as many walks; set by lm.c */
+    size_t
+        n_free; /* variables that neither press against a bound nor are without effect */
+    /* The equations at x. */
+    enum imp_status (*take)(struct imp__lm_system *s, const double *x, uint64_t seed);
+    /* delta = (H + mu diag H_same)^-1 g over the variables that are free, 0 elsewhere, for
+     * the smallest mu >= *mu at which the matrix is positive definite; *found false: none. */
+    enum imp_status (*newton)(struct imp__lm_system *s, double *mu, double *delta,
+                              bool *found);
+    /* out = H v, [n]. */
+    enum imp_status (*product)(struct imp__lm_system *s, const double *v, double *out);
+    /* Is q = g^T A^-1 g no more than Monte Carlo noise alone makes it? Under a zero gradient
+     * its mean is tr(A^-1 C) and its variance 2 tr((A^-1 C)^2), C the covariance of g. */
+    enum imp_status (*within_noise)(struct imp__lm_system *s, bool *within);
+    void (*destroy)(struct imp__lm_system *s);
+};
+
+/* lm_dense.c: goal->normal; lm_sparse.c: goal->sparse. */
+enum imp_status imp__lm_dense(const struct imp__goal *goal, struct imp__lm_system **out);
+enum imp_status imp__lm_sparse(const struct imp__goal *goal, struct imp__lm_system **out);
+
+#endif
