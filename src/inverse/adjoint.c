@@ -17,16 +17,18 @@ struct loss {
     double scale, epsilon, T;
 };
 
-/* l, a [n]: samples and their adjoints; returns the loss. */
-static double leave_one_out(const struct loss *f, int n, const double *l, double *a)
+/* l, m, a [n]: samples, those of residuals, adjoints; returns the loss. */
+static double leave_one_out(const struct loss *f, int n, const double *l, const double *m,
+                            double *a)
 {
     const double w = imp__loss_weight(f->kind, f->scale, f->epsilon, f->T);
-    double S = 0, S2 = 0;
+    double S = 0, S2 = 0, M = 0;
     for (int i = 0; i < n; i++) {
         S += l[i];
         S2 += l[i] * l[i];
+        M += m[i];
     }
-    for (int i = 0; i < n; i++) a[i] = imp__loss_loo(w, f->T, n, S, l[i]) / n;
+    for (int i = 0; i < n; i++) a[i] = imp__loss_loo(w, f->T, n, M, m[i]) / n;
     return imp__loss_unbiased(w, f->T, n, S, S2);
 }
 
@@ -52,18 +54,21 @@ static double jackknife(const struct loss *f, int n, const double *l, double *a)
 }
 
 double imp__replicate_adjoints(const struct imp__target *target, int channels,
-                               size_t pixel, int n, const imp_spec *L, imp_spec *P)
+                               size_t pixel, int n, const imp_spec *L, const imp_spec *M,
+                               imp_spec *P)
 {
     const struct imp_target *t = &target->desc;
     const bool luminance = imp__sees_luminance(target, channels);
-    double value = 0, l[IMP_REPLICATE_MAX], a[IMP_REPLICATE_MAX];
+    double value = 0, l[IMP_REPLICATE_MAX], m[IMP_REPLICATE_MAX], a[IMP_REPLICATE_MAX];
     for (int i = 0; i < n; i++) P[i] = (imp_spec){0};
     for (int c = 0; c < t->channels; c++) {
         const struct loss f = {t->loss, imp__target_weight(target, pixel, c), t->epsilon,
                                target->pixels[pixel * (size_t)t->channels + (size_t)c]};
         for (int i = 0; i < n; i++)
             l[i] = imp__seen(luminance, (double[3]){L[i][0], L[i][1], L[i][2]}, c);
-        value += imp__loss_quadratic(t->loss) ? leave_one_out(&f, n, l, a)
+        for (int i = 0; M != L && i < n; i++)
+            m[i] = imp__seen(luminance, (double[3]){M[i][0], M[i][1], M[i][2]}, c);
+        value += imp__loss_quadratic(t->loss) ? leave_one_out(&f, n, l, M == L ? l : m, a)
                                               : jackknife(&f, n, l, a);
         for (int i = 0; i < n; i++)
             if (luminance) P[i] = imp__seen_bar(true, 1, &a[i]);

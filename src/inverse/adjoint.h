@@ -13,8 +13,10 @@
  *
  *     sum_i P_i dL_i
  *
- * Returns the estimate of the loss. */
+ * Residuals are those of M [n], which is L but with a control variate of a quadratic loss.
+ * Returns the estimate of the loss, of L alone. */
 double imp__replicate_adjoints(const struct imp__target *target, int channels,
-                               size_t pixel, int n, const imp_spec *L, imp_spec *P);
+                               size_t pixel, int n, const imp_spec *L, const imp_spec *M,
+                               imp_spec *P);
 
 #endif

@@ -73,8 +73,7 @@ static enum imp_status target_estimate(struct imp_problem *p,
                        "a loss needs independent ones: keep them with `losses`");
     if (st != IMP_OK) return st;
     if (p->variate && want_gradient)
-        st =
-            imp__variate_use(p->variate, target, j.plan, &j.tracer, &j.there, &j.variate);
+        j.variate = imp__variate_use(p->variate, target, &j.tracer, &j.there);
     if (st == IMP_OK && imp__film_border(&j.tracer.sensor->film) > 0)
         st = splat_prepare(&j, &own, &splat);
     if (st == IMP_OK && (!j.splat || want_gradient))

@@ -228,6 +228,7 @@ enum imp_status imp__gradient_job_run(struct imp__gradient_job *j,
         .payload = j};
     IMP_TRY(imp__tiles_create(&j->tiles));
     imp__gradient_samples(j);
+    if (j->variate) IMP_TRY(imp__variate_room(ctx, j->variate, j->parts));
     IMP_TRY(tallies_create(j));
     const struct imp_tiles_pass pass = {.stage = stage,
                                         .rate_unit = "walks",

@@ -53,23 +53,25 @@ static void sweep_each(const struct replicate *r)
 
 /* ---- Adjoints made of residuals ----------------------------------------------------- */
 
-/* The means of the sets' walks: L, and H at the numbers before, where there is a variate. */
+/* The means of the sets' walks: L, and H at the numbers before, where the variate looks. */
 static void sets_trace(const struct replicate *r, struct imp_walk *walks, imp_spec *L,
                        imp_spec *H)
 {
     const struct imp__gradient_job *j = r->job;
+    const bool looks = j->variate && imp__variate_looks(j->variate, r->pixel);
     for (int s = 0; s < r->plan.m; s++) {
         const int first = imp__replicates_set(r->plan, s);
         const int n = imp__replicates_set(r->plan, s + 1) - first;
-        L[s] = H[s] = (imp_spec){0};
+        L[s] = (imp_spec){0};
+        if (j->variate) H[s] = (imp_spec){0};
         for (int i = 0; i < n; i++) {
             trace(r, s, i, &walks[first + i]);
             L[s] += walks[first + i].L;
-            if (imp_unlikely(j->there.scene != NULL))
+            if (imp_unlikely(looks))
                 H[s] += imp__walk_elsewhere(&j->there, &walks[first + i]);
         }
         if (n > 1) L[s] /= imp__spec(n);
-        if (n > 1 && j->variate) H[s] /= imp__spec(n);
+        if (n > 1 && looks) H[s] /= imp__spec(n);
     }
 }
 
@@ -94,19 +96,17 @@ static double sweep_residuals(const struct replicate *r, int part, double *momen
     struct imp_walk *walks = imp__arena_take(arena, (size_t)r->plan.n, sizeof *walks);
     imp_spec *L = imp__arena_take(arena, m, sizeof *L);
     imp_spec *P = imp__arena_take(arena, m, sizeof *P);
-    imp_spec *H = j->variate ? imp__arena_take(arena, m, sizeof *H) : L;
-    if (!walks || !L || !P || !H) {
+    imp_spec *H = j->variate ? imp__arena_take(arena, m, sizeof *H) : NULL;
+    if (!walks || !L || !P || (j->variate && !H)) {
         r->worker->no_memory = true;
         return 0;
     }
     sets_trace(r, walks, L, H);
-    const double value =
-        imp__replicate_adjoints(j->target, j->channels, r->pixel, r->plan.m, L, P);
-    if (j->variate) {
+    if (j->variate) /* H becomes what residuals are taken from */
         imp__variate_replicate(j->variate, j->target, r->plan, part, r->pixel, L, H,
                                j->look ? NULL : moments);
-        (void)imp__replicate_adjoints(j->target, j->channels, r->pixel, r->plan.m, L, P);
-    }
+    const double value = imp__replicate_adjoints(j->target, j->channels, r->pixel,
+                                                 r->plan.m, L, j->variate ? H : L, P);
     if (j->want_gradient) sets_sweep(r, walks, P);
     return value;
 }

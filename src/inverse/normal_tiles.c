@@ -79,7 +79,7 @@ static void units_gather(const struct imp__normal_job *j, struct imp_tile_worker
         w->L[i % m] = mean;
         if (i % m < m - 1) continue;
         const double v =
-            imp__replicate_adjoints(j->target, j->channels, p->index, m, w->L, w->P);
+            imp__replicate_adjoints(j->target, j->channels, p->index, m, w->L, w->L, w->P);
         p->value += v;
         p->square += v * v;
     }

@@ -22,9 +22,10 @@ static enum mistake mistake;
 static enum imp_loss in;
 
 double imp__replicate_adjoints(const struct imp__target *target, int channels,
-                               size_t pixel, int n, const imp_spec *L, imp_spec *P)
+                               size_t pixel, int n, const imp_spec *L, const imp_spec *M,
+                               imp_spec *P)
 {
-    const double value = right_adjoints(target, channels, pixel, n, L, P);
+    const double value = right_adjoints(target, channels, pixel, n, L, M, P);
     const struct imp_target *t = &target->desc;
     if (t->loss != in) return value;
     imp_spec mean = {0};

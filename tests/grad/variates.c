@@ -2,11 +2,13 @@
  *
  * Control variates of fits: walks evaluated at the last numbers; pictures carried on along a
  * given path of numbers, whose means, gradients and variances are those of estimators.md 21;
- * the same bits for any threads, ranks and pauses; where they are refused.
+ * also with samples that are allocated to tiles; the same bits for any threads, ranks and pauses;
+ * where they are refused.
  *
  *     variates long     # more chains, and the variances of docs/fitting.md */
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include "inverse/allocation.h"
 #include "inverse/estimate.h"
 #include "inverse/variate.h"
 #include "math/rng.h"
@@ -105,10 +107,22 @@ static void path_at(int t, size_t n, const double *truth, double *x)
     }
 }
 
+static double unit(size_t k, const void *payload)
+{
+    (void)k, (void)payload;
+    return 1;
+}
+
+enum how { PLAIN, MASKED, POINTS, ALLOCATED };
+static const char *const how_words[] = {"", " masked", " in sets of points",
+                                        " with allocated samples"};
+
 /* Along a given path the mean of I_t, of the gradient and of the squared error of I_t. */
 static void along_a_path(const char *file, const char *defines, const char *glob,
-                         enum imp_loss loss, bool masked, bool points, int chains)
+                         enum imp_loss loss, enum how how, int chains)
 {
+    const bool masked = how == MASKED, points = how == POINTS;
+    const struct imp__metric metric = {.weight = unit};
     imp_scene *scene = test_scene(ctx, file, IMP_RGB, defines);
     imp_problem *p;
     struct imp_target target = IMP_TARGET_INIT;
@@ -145,7 +159,7 @@ static void along_a_path(const char *file, const char *defines, const char *glob
         imp_film *picture;
         path_at(t, n, truth, x);
         test_must(ctx, imp_problem_set_x(p, x));
-        fine.spp = 20000;
+        fine.spp = how == ALLOCATED ? 4000 : 20000;
         fine.points = IMP_POINTS_SOBOL;
         test_must(ctx, imp_render(scene, &fine, &picture));
         is[t] = calloc(3 * pixels, sizeof **is);
@@ -154,21 +168,29 @@ static void along_a_path(const char *file, const char *defines, const char *glob
             is[t][i] = (double)imp_film_mean(picture)[i];
         imp_film_destroy(picture);
     }
+    bool uneven = how != ALLOCATED;
     for (int chain = 0; chain < chains; chain++) {
         struct imp__variate *v;
+        struct imp__allocation a = {0};
         path_at(0, n, truth, x);
         test_must(ctx, imp_problem_set_x(p, x));
         test_must(ctx, imp__variate_create(p, &run, &v));
+        if (how == ALLOCATED) test_must(ctx, imp__allocation_create(p, &run, &a));
         for (int t = 0; t < STEPS; t++) {
             path_at(t, n, truth, x);
             for (int with = 0; with < 2; with++) {
                 p->variate = with ? v : NULL;
+                p->allocation = with && a.n > 0 ? &a : NULL;
+                a.metric = &metric;
                 run.seed = imp__mix64(2 * (uint64_t)(chain * STEPS + t) + (uint64_t)with);
                 test_must(ctx, imp__problem_objective(p, x, &run, false, NULL, g, NULL));
                 for (size_t k = 0; k < n; k++)
                     tap_add(with ? &sums.g[t][k] : &sums.plain[t][k], g[k]);
                 p->variate = NULL;
+                p->allocation = NULL;
             }
+            for (size_t k = 0; k < a.n; k++) uneven |= a.spp[k] != a.even[k];
+            imp__allocation_update(&a);
             const struct imp__variate_view *view = &v->views[0];
             double error = 0, square = 0;
             for (size_t i = 0; i < view->n; i++) {
@@ -183,6 +205,7 @@ static void along_a_path(const char *file, const char *defines, const char *glob
             tap_add(&sums.told[t], told - square);
         }
         imp__variate_destroy(v);
+        imp__allocation_destroy(&a);
     }
     double worst = 0, count = 0, gain = 0, off = 0, mean = 0;
     for (int t = 1; t < STEPS; t++) {
@@ -198,17 +221,53 @@ static void along_a_path(const char *file, const char *defines, const char *glob
     }
     for (size_t k = 0; k < n; k++)
         gain += sums.plain[STEPS - 1][k].m2 / sums.g[STEPS - 1][k].m2 / (double)n;
-    tap_ok(
-        worst < 4.5 && count > 5 && gain > 1.5,
-        "%s%s%s, loss %d: along a given path gradients have the mean of those without # "
-        "worst z of %.0f %.2f; variance without/with %.2f at last",
-        file, masked ? " masked" : "", points ? " in sets of points" : "", (int)loss,
-        count, worst, gain);
+    tap_ok(worst < 4.5 && count > 5 && gain > 1.5 && uneven,
+           "%s%s, loss %d: along a given path gradients have the mean of those without # "
+           "worst z of %.0f %.2f; variance without/with %.2f at last",
+           file, how_words[how], (int)loss, count, worst, gain);
     tap_ok(mean < 4.5, "... pictures that of many samples # worst z %.2f", mean);
     tap_ok(off < 0.3, "... and the variance that is told # off by %.3f", off);
     for (int t = 0; t < STEPS; t++) free(is[t]);
     free(pixel);
     free(mask);
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+}
+
+/* ---- Rests ---------------------------------------------------------------------------- */
+
+/* Roughness that goes to and fro lets nothing be carried on; where it stays, all is. */
+static void rests(void)
+{
+    enum { ALL = 16, STAYS = 10 };
+    imp_scene *scene = test_scene(ctx, "textured.xml", IMP_RGB, "width=48 height=36");
+    imp_problem *p = test_problem(ctx, scene, "metal.alpha*");
+    float *grey = calloc((size_t)3 * 48 * 36, sizeof *grey);
+    const size_t n = imp_problem_n(p);
+    struct imp__variate *v;
+    struct imp_run run = IMP_RUN_INIT;
+    double x[4], g[4];
+    int few = 0, back = 0;
+    if (!grey || n > 4) exit(99);
+    test_target(ctx, p, 0, 48, 36, grey);
+    run.spp = 8;
+    test_must(ctx, imp__variate_create(p, &run, &v));
+    for (int t = 0; t < ALL; t++) {
+        for (size_t k = 0; k < n; k++) x[k] = t >= STAYS || t % 2 ? 0.05 : 0.6;
+        run.seed = 500 + (uint64_t)t;
+        p->variate = v;
+        test_must(ctx, imp__problem_objective(p, x, &run, false, NULL, g, NULL));
+        p->variate = NULL;
+        const enum imp__variate_looks looks = v->views[0].looks;
+        if (t > 2 && t < STAYS) few += looks == IMP_VARIATE_AT_FEW;
+        if (t > STAYS + 2) back += looks == IMP_VARIATE_AT_ALL;
+    }
+    tap_ok(few >= 5 && back == ALL - STAYS - 3,
+           "rests where nothing can be carried on, and goes on where it can # %d of %d, "
+           "%d of %d",
+           few, STAYS - 3, back, ALL - STAYS - 3);
+    imp__variate_destroy(v);
+    free(grey);
     imp_problem_destroy(p);
     imp_scene_destroy(scene);
 }
@@ -222,6 +281,7 @@ struct fitted {
     int iterations;
     const char *checkpoint;
     bool resume;
+    enum imp_allocation allocation;
     double x[12288 + 1], loss, history;
     char text[200];
     struct team_rank rank;
@@ -255,9 +315,10 @@ static void *fit(void *payload)
     test_must(c, imp_scene_set_values(scene, param, 1, &half));
     o.max_iterations = f->iterations;
     o.control_variate = IMP_VARIATES_ON;
+    o.allocation = f->allocation;
     o.checkpoint = f->checkpoint;
     o.resume = f->resume;
-    run.spp = 4;
+    run.spp = f->allocation == IMP_ALLOCATION_EVEN ? 4 : 16; /* no tile has below 4 */
     test_must(c, imp_fit(p, &o, &run, &result));
     imp_problem_get_x(p, f->x);
     f->loss = result->objective.value;
@@ -283,14 +344,17 @@ static bool same(const struct fitted *a, const struct fitted *b)
            a->history == b->history;
 }
 
-static void same_bits(void)
+static void same_bits(enum imp_allocation allocation)
 {
-    static struct fitted one = {.iterations = 12}, other[3];
-    one.context = ctx;
+    static struct fitted one, other[3];
+    const struct fitted all = {
+        .iterations = 12, .context = ctx, .allocation = allocation};
+    one = all;
     fit(&one);
     tap_ok(strncmp(one.text, "control variate: at the end", 27) == 0, "%s", one.text);
     for (int threads = 1; threads <= 3; threads += 2) {
-        other[0] = (struct fitted){.iterations = 12, .context = test_context(threads)};
+        other[0] = all;
+        other[0].context = test_context(threads);
         fit(&other[0]);
         tap_ok(same(&one, &other[0]), "%d threads: the same bits", threads);
         imp_context_destroy(other[0].context);
@@ -300,7 +364,8 @@ static void same_bits(void)
         pthread_t thread[3];
         pthread_barrier_init(&hub.barrier, NULL, 3);
         for (int k = 0; k < 3; k++) {
-            other[k] = (struct fitted){.iterations = 12, .context = test_context(1)};
+            other[k] = all;
+            other[k].context = test_context(1);
             other[k].rank = (struct team_rank){&hub, k};
             if (pthread_create(&thread[k], NULL, fit_of_rank, &other[k]) != 0) exit(99);
         }
@@ -313,7 +378,9 @@ static void same_bits(void)
     char path[] = "variates_XXXXXX";
     if (mkstemp(path) < 0) exit(99);
     remove(path);
-    other[0] = (struct fitted){.iterations = 5, .context = ctx, .checkpoint = path};
+    other[0] = all;
+    other[0].iterations = 7;
+    other[0].checkpoint = path;
     fit(&other[0]);
     other[0].iterations = 12;
     other[0].resume = true;
@@ -402,13 +469,14 @@ int main(int argc, char **argv)
     elsewhere("lamps.xml", IMP_RGB, "res=16", "*");
     elsewhere("skin.xml", IMP_RGB, NULL, "*albedo*");
     elsewhere("fog.xml", IMP_RGB, "res=8", "*radiance*");
-    along_a_path("cornell.xml", "res=4", "*", IMP_LOSS_L2, false, false,
-                 more ? 20000 : 800);
-    along_a_path("cornell.xml", "res=4", "*", IMP_LOSS_RELATIVE_L2, true, false,
-                 more ? 20000 : 400);
-    along_a_path("cornell.xml", "res=4", "*", IMP_LOSS_L2, false, true,
-                 more ? 5000 : 100);
-    same_bits();
+    along_a_path("cornell.xml", "res=4", "*", IMP_LOSS_L2, PLAIN, more ? 20000 : 800);
+    along_a_path("cornell.xml", "res=4", "*", IMP_LOSS_RELATIVE_L2, MASKED,
+                 more ? 20000 : 1200);
+    along_a_path("cornell.xml", "res=4", "*", IMP_LOSS_L2, POINTS, more ? 5000 : 300);
+    along_a_path("cornell.xml", "res=9", "*", IMP_LOSS_L2, ALLOCATED, more ? 5000 : 150);
+    rests();
+    same_bits(IMP_ALLOCATION_EVEN);
+    same_bits(IMP_ALLOCATION_VARIANCE);
     refusals();
     imp_context_destroy(ctx);
     return tap_done();
