@@ -12,6 +12,7 @@ after some reflections in coloured light that makes .5 %.
 import math
 import os
 import random
+import re
 import struct
 import sys
 import zlib
@@ -192,8 +193,8 @@ class Maker:
             out += self.metal() + self.tint("specular_reflectance")
         elif k == "roughconductor":
             out += self.metal() + self.roughness() + self.tint("specular_reflectance")
-        elif k == "plastic":
-            out += self.index() + self.reflectance("diffuse_reflectance", nested=False) + self.tint("specular_reflectance", nested=False) + self.flag("nonlinear")
+        elif k == "plastic":  # of diamond, Mitsuba's fit of the reflectance from inside makes the base 3 % brighter
+            out += self.index().replace("diamond", "bk7") + self.reflectance("diffuse_reflectance", nested=False) + self.tint("specular_reflectance", nested=False) + self.flag("nonlinear")
         elif k == "roughplastic":
             out += self.index() + self.reflectance("diffuse_reflectance", nested=False) + self.tint("specular_reflectance", nested=False) + self.flag("nonlinear")
             out += self.roughness(False, False)
@@ -346,8 +347,10 @@ class Maker:
                 f.write("\n")
         return file
 
-    def place(self, x, y, z, size, stretch=True):
+    def place(self, x, y, z, size, stretch=True, stays_round=False):
         s = [size * self.u(.8, 1.2) for _ in range(3)] if stretch else [size] * 3
+        if stays_round:
+            s[1] = s[0]
         turn = self.r.choice(["x", "y", "z"])
         return ('<transform name="to_world"><scale x="%g" y="%g" z="%g"/><rotate %s="1" angle="%g"/><translate x="%g" y="%g" z="%g"/></transform>'
                 % (*s, turn, self.u(-60, 60), x, y, z))
@@ -366,7 +369,7 @@ class Maker:
             props += '<string name="filename" value="%s"/>' % self.curve()
             place = self.place(x, y, size, size, False)
         else:
-            place = self.place(x, y, size, size)
+            place = self.place(x, y, size, size, stays_round=k == "cylinder")
         if k in ("obj", "serialized"):
             props += '<string name="filename" value="%s"/>' % (self.obj() if k == "obj" else self.serialized())
             if self.maybe(.3):
@@ -390,6 +393,8 @@ class Maker:
             material = ('<bsdf type="null"/>' if self.maybe(.5) else self.clear() if self.maybe(.6) else self.holes()) + self.medium("interior", box)
         elif k in ("bsplinecurve", "linearcurve"):
             material = self.opaque(bumps=False)
+            if k == "linearcurve":  # Mitsuba's frame does not follow it: the same roughness in all directions
+                material = re.sub(r'<float name="(anisotropic|alpha_v)"[^>]*>', "", material).replace('"alpha_u"', '"alpha"')
         elif material is None:
             material = self.material(closed, holes)
         return '<shape type="%s" id="%s">%s%s%s%s</shape>' % (k, name, props, place, material, inside)
