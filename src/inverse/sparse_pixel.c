@@ -133,7 +133,7 @@ enum imp_status imp__rows_pixel(const struct imp__rows_job *j,
         w->L[i % m] = mean;
         if (i % m < m - 1) continue;
         const double v =
-            imp__replicate_adjoints(j->target, channels, index, m, w->L, w->P);
+            imp__replicate_adjoints(j->target, channels, index, m, w->L, w->L, w->P);
         value += v;
         square += v * v;
     }
