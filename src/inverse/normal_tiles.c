@@ -78,8 +78,8 @@ static void units_gather(const struct imp__normal_job *j, struct imp_tile_worker
                 X[c * K + k] += part * seen(j, w->x + k * (size_t)j->channels, (int)c);
         w->L[i % m] = mean;
         if (i % m < m - 1) continue;
-        const double v =
-            imp__replicate_adjoints(j->target, j->channels, p->index, m, w->L, w->L, w->P);
+        const double v = imp__replicate_adjoints(j->target, j->channels, p->index, m,
+                                                 w->L, w->L, w->P);
         p->value += v;
         p->square += v * v;
     }
