@@ -217,32 +217,116 @@ static void check_references(void)
     parse_close(&s);
 }
 
+/* What files of versions before 2.0.0 write, and its name today (docs/scene-format.md 1.6). */
+static const struct {
+    const char *object, *written, *name; /* name NULL: an error */
+} old_names[] = {
+    {"shape type='sphere'", "<transform name='toWorld'/>", "to_world"},
+    {"shape type='sphere'", "<boolean name='flipNormals' value='true'/>", "flip_normals"},
+    {"shape type='obj'", "<boolean name='faceNormals' value='true'/>", "face_normals"},
+    {"bsdf type='dielectric'", "<float name='intIOR' value='1.5'/>", "int_ior"},
+    {"bsdf type='dielectric'", "<string name='extIOR' value='air'/>", "ext_ior"},
+    {"bsdf type='roughconductor'", "<float name='alphaU' value='.1'/>", "alpha_u"},
+    {"bsdf type='plastic'", "<rgb name='diffuseReflectance' value='1'/>",
+     "diffuse_reflectance"},
+    {"bsdf type='diffuse'", "<rgb name='diffuseReflectance' value='1'/>", "reflectance"},
+    {"bsdf type='diffuse'", "<rgb name='diffuse_reflectance' value='1'/>", "reflectance"},
+    {"bsdf type='diffuse'", "<spectrum name='reflectance' value='1'/>", "reflectance"},
+    {"bsdf type='twosided'", "<bsdf type='diffuse' name='innerPart'/>", "inner_part"},
+    {"bsdf type='twosided'", "<ref id='other' name='innerPart'/>", "inner_part"},
+    {"sensor type='thinlens'", "<float name='apertureRadius' value='1'/>",
+     "aperture_radius"},
+    {"sensor type='thinlens'", "<float name='focusDistance' value='1'/>",
+     "focus_distance"},
+    {"sensor type='perspective'", "<string name='fovAxis' value='x'/>", "fov_axis"},
+    {"sensor type='perspective'", "<float name='nearClip' value='1'/>", "near_clip"},
+    {"film type='hdrfilm'", "<string name='pixelFormat' value='rgb'/>", "pixel_format"},
+    {"film type='hdrfilm'", "<integer name='cropOffsetX' value='1'/>", "crop_offset_x"},
+    {"sampler type='independent'", "<integer name='sampleCount' value='1'/>",
+     "sample_count"},
+    {"integrator type='path'", "<integer name='maxDepth' value='1'/>", "max_depth"},
+    {"integrator type='path'", "<boolean name='hideEmitters' value='true'/>",
+     "hide_emitters"},
+    {"medium type='homogeneous'", "<rgb name='sigmaT' value='1'/>", "sigma_t"},
+    {"emitter type='point'", "<float name='samplingWeight' value='1'/>",
+     "sampling_weight"},
+    {"texture type='bitmap'", "<string name='filterType' value='nearest'/>",
+     "filter_type"},
+    {"texture type='bitmap'", "<string name='ABC' value='nearest'/>", "abc"},
+    {"texture type='bitmap'", "<float name='uoffset' value='2'/>", "to_uv"},
+    {"texture type='bitmap'", "<integer name='vscale' value='2'/>", "to_uv"},
+    {"texture type='bitmap'", "<string name='uscale' value='2'/>", NULL},
+    {"texture type='bitmap'", "<transform name='toUV'/><float name='uscale' value='2'/>",
+     NULL},
+};
+
+/* uoffset, voffset, uscale, vscale, and the rows of scale(us, vs, 1) translate(uo, vo, 0). */
+static const struct {
+    const char *written;
+    double row[2][4];
+} old_uv[] = {
+    {"<float name='uoffset' value='2'/>", {{1, 0, 0, 2}, {0, 1, 0, 0}}},
+    {"<float name='voffset' value='3'/>", {{1, 0, 0, 0}, {0, 1, 0, 3}}},
+    {"<float name='uscale' value='5'/>", {{5, 0, 0, 0}, {0, 1, 0, 0}}},
+    {"<integer name='vscale' value='7'/>", {{1, 0, 0, 0}, {0, 7, 0, 0}}},
+    {"<float name='vscale' value='7'/><float name='uoffset' value='2'/>"
+     "<float name='uscale' value='5'/><float name='voffset' value='3'/>",
+     {{5, 0, 0, 10}, {0, 7, 0, 21}}},
+};
+
+static enum imp_status parse_old(const char *version, const char *object,
+                                 const char *written, struct imp_scene *s)
+{
+    char xml[1024];
+    snprintf(xml, sizeof xml,
+             "<scene version='%s'><default name='someCase' value='1'/><bsdf "
+             "type='diffuse' id='other'/><%s>%s</%.*s></scene>",
+             version, object, written, (int)strcspn(object, " "), object);
+    return parse(xml, NULL, s);
+}
+
 static void check_upgrade(void)
 {
+    static const struct {
+        const char *version;
+        bool old;
+    } versions[] = {{"0.4.0", true},  {"0.6.0", true},  {"1.9.9", true},
+                    {"2.0.0", false}, {"2.1.0", false}, {"3.10.0", false}};
     struct imp_scene s;
-    const enum imp_status st =
-        parse("<scene version='1.0.0'><shape type='sphere'><transform name='toWorld'/>"
-              "<bsdf type='diffuse'><rgb name='diffuseReflectance' value='1'/></bsdf>"
-              "<bsdf type='dielectric' name='innerPart'><float name='intIOR' "
-              "value='1.5'/></bsdf>"
-              "<texture type='bitmap' name='myTex'><float name='uscale' value='2'/>"
-              "<float name='voffset' value='3'/></texture></shape></scene>",
-              NULL, &s);
-    tap_ok(st == IMP_OK, "old files are upgraded # %s", st ? imp_last_error(ctx) : "");
-    if (st == IMP_OK) {
-        const struct imp_node *shape = child(s.root, 0);
-        tap_ok(imp__node_prop(shape, "to_world") != NULL, "toWorld");
-        tap_ok(imp__node_prop(shape->children[0].node, "reflectance") != NULL,
-               "diffuse_reflectance");
-        tap_ok(imp__node_prop(shape->children[1].node, "int_ior") != NULL &&
-                   strcmp(shape->children[1].name, "inner_part") == 0,
-               "intIOR, innerPart");
-        const struct imp_prop *uv = imp__node_prop(shape->children[2].node, "to_uv");
-        tap_ok(uv && uv->number[0] == 2 && uv->number[7] == 3 && uv->number[3] == 0 &&
-                   shape->children[2].node->n_props == 1,
-               "uscale, voffset -> to_uv");
+    for (size_t k = 0; k < imp_count(old_names); k++) {
+        const char *name = old_names[k].name;
+        const enum imp_status st =
+            parse_old("0.6.0", old_names[k].object, old_names[k].written, &s);
+        const struct imp_node *node = st == IMP_OK ? child(s.root, 1) : NULL;
+        tap_ok(name ? node && node->n_props + node->n_children == 1 &&
+                          (imp__node_prop(node, name) || imp__node_child(node, name))
+                    : st == IMP_E_SCENE,
+               "%s: %s is %s # %s", old_names[k].object, old_names[k].written,
+               name ? name : "an error", st ? imp_last_error(ctx) : "");
+        parse_close(&s);
     }
-    parse_close(&s);
+    for (size_t k = 0; k < imp_count(old_uv); k++) {
+        const enum imp_status st =
+            parse_old("0.6.0", "texture type='bitmap'", old_uv[k].written, &s);
+        const struct imp_prop *uv =
+            st == IMP_OK ? imp__node_prop(child(s.root, 1), "to_uv") : NULL;
+        bool same = uv != NULL;
+        for (int i = 0; i < 8 && uv; i++)
+            same &= uv->number[i] == old_uv[k].row[i / 4][i % 4];
+        tap_ok(same, "%s", old_uv[k].written);
+        parse_close(&s);
+    }
+    for (size_t k = 0; k < imp_count(versions); k++) {
+        const enum imp_status st = parse_old(
+            versions[k].version, "shape type='sphere'",
+            "<transform name='toWorld'/><float name='a' value='$someCase'/>", &s);
+        const struct imp_node *node = st == IMP_OK ? child(s.root, 1) : NULL;
+        tap_ok(node && imp__node_prop(node, versions[k].old ? "to_world" : "toWorld"),
+               "version %s %s upgraded, and names of parameters never # %s",
+               versions[k].version, versions[k].old ? "is" : "is not",
+               st ? imp_last_error(ctx) : "");
+        parse_close(&s);
+    }
 }
 
 /* ---- Files --------------------------------------------------------------------- */
