@@ -19,6 +19,14 @@ static bool is_dark(const struct imp_bsdf *b, const struct imp_active *active)
     return true;
 }
 
+/* The material in it, or it itself, whose directions are turned. */
+static const struct imp_bsdf *turned_of(const struct imp_bsdf *b)
+{
+    for (int k = 0; k < b->n_child; k++)
+        if (b->child[k]->flags & IMP_BSDF_TURNED) return turned_of(b->child[k]);
+    return b;
+}
+
 /* Nothing but lights may emit, and each must be able to send a walk. */
 static enum imp_status emission_allowed(const struct imp_scene *scene,
                                         const struct imp_active *active)
@@ -46,12 +54,16 @@ static enum imp_status emission_allowed(const struct imp_scene *scene,
                               "begins there; let walks begin at the sensor",
                               scene->media[m]->name);
     for (int b = 0; b < scene->n_bsdfs; b++)
-        if (scene->bsdfs[b]->flags & IMP_BSDF_TURNED)
+        if (scene->bsdfs[b]->flags & IMP_BSDF_TURNED) {
+            const struct imp_bsdf *m = turned_of(scene->bsdfs[b]);
             return imp__error(ctx, IMP_E_UNSUPPORTED,
-                              "walks from the lights: material '%s' (%s) shades about "
-                              "normals of its own, or is a fibre, which light enters "
-                              "where it is seen; let walks begin at the sensor",
-                              scene->bsdfs[b]->name, scene->bsdfs[b]->ops->name);
+                              "walks from the lights: material '%s' (%s) %s; let walks "
+                              "begin at the sensor",
+                              m->name, m->ops->name,
+                              m->n_child
+                                  ? "shades about normals of its own"
+                                  : "is a fibre, which light enters where it is seen");
+        }
     for (int b = 0; b < scene->n_bsdfs; b++)
         if (scene->bsdfs[b]->flags & IMP_BSDF_EMIT && !is_dark(scene->bsdfs[b], active))
             return imp__error(ctx, IMP_E_UNSUPPORTED,
