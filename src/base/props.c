@@ -10,11 +10,11 @@
 #include <strings.h>
 
 static const char *const type_names[] = {
-    [IMP_PROP_BOOL] = "boolean",        [IMP_PROP_INTEGER] = "integer",
-    [IMP_PROP_FLOAT] = "float",         [IMP_PROP_STRING] = "string",
-    [IMP_PROP_VECTOR] = "vector",       [IMP_PROP_RGB] = "rgb",
-    [IMP_PROP_UNIFORM] = "spectrum",    [IMP_PROP_SPECTRUM] = "spectrum",
-    [IMP_PROP_TRANSFORM] = "transform", [IMP_PROP_REF] = "ref"};
+    [IMP_PROP_BOOL] = "a boolean",        [IMP_PROP_INTEGER] = "an integer",
+    [IMP_PROP_FLOAT] = "a float",         [IMP_PROP_STRING] = "a string",
+    [IMP_PROP_VECTOR] = "a vector",       [IMP_PROP_RGB] = "an rgb",
+    [IMP_PROP_UNIFORM] = "a spectrum",    [IMP_PROP_SPECTRUM] = "a spectrum",
+    [IMP_PROP_TRANSFORM] = "a transform", [IMP_PROP_REF] = "a ref"};
 
 struct imp_node *imp__node_create(struct imp_arena *a, const char *tag, const char *type,
                                   const char *id, const char *name, struct imp_loc loc)
@@ -157,14 +157,14 @@ static enum imp_status find(imp_context *ctx, struct imp_node *node, const char 
         const struct imp_child *c = imp__node_child(node, name);
         if (!c) return IMP_OK;
         return imp__node_error(ctx, node, IMP_E_SCENE,
-                               "property '%s' must be a %s, not an object", name,
+                               "property '%s' must be %s, not an object", name,
                                type_names[type]);
     }
     p->used = true;
     if (p->type != type && !(type == IMP_PROP_FLOAT && p->type == IMP_PROP_INTEGER))
         return imp__prop_error(ctx, node, p, IMP_E_SCENE,
-                               "property '%s' must be a %s, not a %s", name,
-                               type_names[type], type_names[p->type]);
+                               "property '%s' must be %s, not %s", name, type_names[type],
+                               type_names[p->type]);
     *out = p;
     return IMP_OK;
 }
@@ -207,6 +207,24 @@ enum imp_status imp__props_float(imp_context *ctx, struct imp_node *node,
                                v);
     *out = v;
     return IMP_OK;
+}
+
+static bool is_in(double v, struct imp_interval r)
+{
+    return (r.open & IMP_OPEN_LO ? v > r.lo : v >= r.lo) &&
+           (r.open & IMP_OPEN_HI ? v < r.hi : v <= r.hi);
+}
+
+enum imp_status imp__props_float_in(imp_context *ctx, struct imp_node *node,
+                                    const char *name, double fallback,
+                                    struct imp_interval range, double *out)
+{
+    const enum imp_status st = imp__props_float(ctx, node, name, fallback, out);
+    const struct imp_prop *p = imp__node_prop(node, name);
+    if (st != IMP_OK || !p || is_in(*out, range)) return st;
+    return imp__prop_error(ctx, node, p, IMP_E_SCENE, "%s = %g is outside %s%g, %g%s",
+                           name, *out, range.open & IMP_OPEN_LO ? "(" : "[", range.lo,
+                           range.hi, range.open & IMP_OPEN_HI ? ")" : "]");
 }
 
 enum imp_status imp__props_string(imp_context *ctx, struct imp_node *node,

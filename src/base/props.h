@@ -8,6 +8,7 @@
 #define IMP_BASE_PROPS_H
 
 #include "arena.h"
+#include <math.h>
 
 struct imp_loc { /* where something was written; file NULL: built by calls */
     const char *file;
@@ -31,6 +32,7 @@ struct imp_prop {
     const char *name;
     enum imp_prop_type type;
     struct imp_loc loc;
+    const char *of;    /* what is written, if a kind made this of it; else NULL */
     int64_t integer;   /* BOOL, INTEGER */
     double number[16]; /* FLOAT [0], VECTOR and RGB [0..2], TRANSFORM row-major */
     const char *string;
@@ -141,7 +143,7 @@ struct imp_node {
     const struct imp_attribute_data *attribute;
     struct imp_body *body; /* attached: a graded index (format/graded_file.c), or NULL */
     void *object;          /* what was made from it (scene/scene_build.c) */
-    const char *asked[24]; /* names of properties that were looked for, literals; */
+    const char *asked[32]; /* names of properties that were looked for, literals; */
     int n_asked;           /* what a misspelt one may have meant. Full: no more */
     int visiting;          /* cycle detection */
     bool vector;           /* a texture read as IMP_INPUT_VECTOR */
@@ -150,6 +152,14 @@ struct imp_node {
     bool lenient;          /* what nobody reads is left out, not an error: */
     bool read;             /* its object was made: what is not used is used by nobody */
 };
+
+/* What a number may be; `open` says which end does not belong to it. */
+struct imp_interval {
+    double lo, hi;
+    enum imp_interval_open { IMP_CLOSED, IMP_OPEN_LO, IMP_OPEN_HI, IMP_OPEN } open;
+};
+#define IMP_NOT_NEGATIVE ((struct imp_interval){0, INFINITY, IMP_CLOSED})
+#define IMP_POSITIVE     ((struct imp_interval){0, INFINITY, IMP_OPEN_LO})
 
 /* Nodes and everything in them live in the arena; arrays grow in it too. */
 struct imp_node *imp__node_create(struct imp_arena *a, const char *tag, const char *type,
@@ -187,6 +197,10 @@ enum imp_status imp__props_int(imp_context *ctx, struct imp_node *node, const ch
                                int64_t fallback, int64_t lo, int64_t hi, int64_t *out);
 enum imp_status imp__props_float(imp_context *ctx, struct imp_node *node,
                                  const char *name, double fallback, double *out);
+/* The same; a number that is written is in the interval, or an error that shows it. */
+enum imp_status imp__props_float_in(imp_context *ctx, struct imp_node *node,
+                                    const char *name, double fallback,
+                                    struct imp_interval range, double *out);
 enum imp_status imp__props_string(imp_context *ctx, struct imp_node *node,
                                   const char *name, const char *fallback,
                                   const char **out);

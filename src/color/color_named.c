@@ -31,10 +31,7 @@ enum imp_status imp__color_illuminant(const struct imp__color_ask *ask,
     int n = IMP_CIE_N;
     IMP_TRY(imp__color_require(ctx, node, "name"));
     IMP_TRY(imp__props_string(ctx, node, "name", "", &name));
-    IMP_TRY(imp__props_float(ctx, node, "scale", 1, &scale));
-    if (!isfinite(scale) || scale < 0)
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
-                                "'scale' must be finite and not negative"));
+    IMP_TRY(imp__props_float_in(ctx, node, "scale", 1, IMP_NOT_NEGATIVE, &scale));
     light = imp__illuminant_find(name);
     if (strcasecmp(name, "D65") == 0) {
         memcpy(value, imp__cie_d65, sizeof value);
@@ -44,10 +41,11 @@ enum imp_status imp__color_illuminant(const struct imp__color_ask *ask,
         n = light->n;
         memcpy(value, light->value, (size_t)n * sizeof *value);
     } else {
-        IMP_TRY(imp__prop_error(ctx, node, imp__node_prop(node, "name"), IMP_E_SCENE,
-                                "there is no illuminant '%s'; there are A, B, C, D50, "
-                                "D55, D65, D75, E, F1 to F12 and G173",
-                                name));
+        IMP_TRY(
+            imp__prop_error(ctx, node, imp__node_prop(node, "name"), IMP_E_SCENE,
+                            "name: there is no illuminant '%s'; there are A, B, C, D50, "
+                            "D55, D65, D75, E, F1 to F12 and G173",
+                            name));
     }
     for (int q = 0; q < n; q++)
         nm[q] = (light ? light->first_nm : IMP_CIE_FIRST_NM) + IMP_CIE_STEP_NM * q;
@@ -90,10 +88,7 @@ enum imp_status imp__color_rayleigh(const struct imp__color_ask *ask,
     double scale, rgb[3];
     size_t law = 0;
     IMP_TRY(imp__props_string(ctx, node, "law", laws[0].name, &name));
-    IMP_TRY(imp__props_float(ctx, node, "scale", 1, &scale));
-    if (!isfinite(scale) || scale < 0)
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
-                                "'scale' must be finite and not negative"));
+    IMP_TRY(imp__props_float_in(ctx, node, "scale", 1, IMP_NOT_NEGATIVE, &scale));
     while (law < imp_count(laws) && strcmp(name, laws[law].name) != 0) law++;
     if (law == imp_count(laws))
         IMP_TRY(imp__prop_error(ctx, node, imp__node_prop(node, "law"), IMP_E_SCENE,
@@ -146,10 +141,11 @@ enum imp_status imp__color_glass(const struct imp__color_ask *ask, struct imp_no
     IMP_TRY(imp__props_string(ask->ctx, node, "name", "", &name));
     const struct imp__glass *g = imp__glass_find(name);
     if (!g)
-        IMP_TRY(imp__prop_error(ask->ctx, node, imp__node_prop(node, "name"), IMP_E_SCENE,
-                                "there is no glass '%s'; there are N-BK7, N-SF6, N-SF10, "
-                                "N-SF11, fused silica and others (the manual lists them)",
-                                name));
+        IMP_TRY(imp__prop_error(
+            ask->ctx, node, imp__node_prop(node, "name"), IMP_E_SCENE,
+            "name: there is no glass '%s'; there are N-BK7, N-SF6, N-SF10, "
+            "N-SF11, fused silica and others (the manual lists them)",
+            name));
     IMP_TRY(
         index_set(ask, node, IMP_SPECTRUM_SELLMEIER, 2 * (size_t)g->n, g->number, out));
 out:

@@ -84,16 +84,38 @@ enum imp_status imp__color_require(imp_context *ctx, struct imp_node *node,
     return imp__node_error(ctx, node, IMP_E_SCENE, "'%s' is required", name);
 }
 
-/* Read what must be there, and be finite. */
-static enum imp_status number_read(imp_context *ctx, struct imp_node *node,
-                                   const char *name, double *out)
+/* wavelength_min and wavelength_max, in nm. */
+static enum imp_status range_read(imp_context *ctx, struct imp_node *node, double *lo,
+                                  double *hi)
 {
-    enum imp_status st = imp__color_require(ctx, node, name);
-    if (st == IMP_OK) st = imp__props_float(ctx, node, name, 0, out);
-    if (st == IMP_OK && !isfinite(*out))
-        st = imp__prop_error(ctx, node, imp__node_prop(node, name), IMP_E_SCENE,
-                             "'%s' is not finite", name);
+    enum imp_status st = IMP_OK;
+    IMP_TRY(imp__props_float_in(ctx, node, "wavelength_min", IMP_CIE_FIRST_NM,
+                                IMP_POSITIVE, lo));
+    IMP_TRY(imp__props_float_in(ctx, node, "wavelength_max", IMP_CIE_LAST_NM,
+                                IMP_POSITIVE, hi));
+    if (!(*lo < *hi)) {
+        const struct imp_prop *p = imp__node_prop(node, "wavelength_max");
+        if (p)
+            IMP_TRY(
+                imp__prop_error(ctx, node, p, IMP_E_SCENE,
+                                "wavelength_max = %g is outside (wavelength_min = %g, "
+                                "inf]",
+                                *hi, *lo));
+        IMP_TRY(imp__prop_error(
+            ctx, node, imp__node_prop(node, "wavelength_min"), IMP_E_SCENE,
+            "wavelength_min = %g is outside (0, wavelength_max = %g)", *lo, *hi));
+    }
+out:
     return st;
+}
+
+const struct imp_prop *imp__color_written(const struct imp_node *node)
+{
+    static const char *const names[] = {"value", "values", "color", "coefficients", "B"};
+    const struct imp_prop *p = NULL;
+    for (size_t k = 0; k < imp_count(names) && !p; k++)
+        p = imp__node_prop(node, names[k]);
+    return p;
 }
 
 static enum imp_status samples_object(const struct imp__color_ask *ask,
@@ -110,8 +132,7 @@ static enum imp_status samples_object(const struct imp__color_ask *ask,
         double lo, hi;
         IMP_TRY(imp__color_require(ctx, node, "wavelength_min"));
         IMP_TRY(imp__color_require(ctx, node, "wavelength_max"));
-        IMP_TRY(imp__props_float(ctx, node, "wavelength_min", 0, &lo));
-        IMP_TRY(imp__props_float(ctx, node, "wavelength_max", 0, &hi));
+        IMP_TRY(range_read(ctx, node, &lo, &hi));
         nm = imp__alloc(ctx, n ? n : 1, sizeof *nm);
         if (!nm) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "out of memory"));
         for (size_t i = 0; i < n; i++) nm[i] = n > 1 ? lo + (hi - lo) * i / (n - 1) : lo;
@@ -186,10 +207,7 @@ static enum imp_status d65_object(const struct imp__color_ask *ask, struct imp_n
     enum imp_status st = IMP_OK;
     double scale;
 
-    IMP_TRY(imp__props_float(ctx, node, "scale", 1, &scale));
-    if (!isfinite(scale) || scale < 0)
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
-                                "'scale' must be finite and not negative"));
+    IMP_TRY(imp__props_float_in(ctx, node, "scale", 1, IMP_NOT_NEGATIVE, &scale));
     struct imp_prop *color = imp__node_prop(node, "color");
     if (color) {
         struct imp__color_ask light = *ask;
@@ -223,20 +241,15 @@ static enum imp_status uniform_object(const struct imp__color_ask *ask,
     imp_context *ctx = ask->ctx;
     enum imp_status st = IMP_OK;
     double c, lo, hi;
-    IMP_TRY(imp__props_float(ctx, node, "value", 1, &c));
-    IMP_TRY(imp__props_float(ctx, node, "wavelength_min", 360, &lo));
-    IMP_TRY(imp__props_float(ctx, node, "wavelength_max", 830, &hi));
-    if (!isfinite(c) || (ask->role == IMP_EMISSION && c < 0))
-        IMP_TRY(
-            imp__node_error(ctx, node, IMP_E_SCENE, "'value' %g is not allowed here", c));
+    const double least = ask->role == IMP_EMISSION ? 0 : -INFINITY;
+    IMP_TRY(imp__props_float_in(ctx, node, "value", 1,
+                                (struct imp_interval){least, INFINITY, IMP_CLOSED}, &c));
+    IMP_TRY(range_read(ctx, node, &lo, &hi));
     imp__color_number_set(ask, c, out);
     /* The range matters in spectral modes only. */
     if (!imp__color_wants_spectrum(ask) ||
         (lo <= IMP_CIE_FIRST_NM && hi >= IMP_CIE_LAST_NM))
         goto out;
-    if (!(lo < hi))
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "a range of %g to %g nm is empty",
-                                lo, hi));
     IMP_TRY(imp__color_spectrum_make(ask, IMP_SPECTRUM_NUMBER, 1, NULL, &c, NULL, out));
     out->spectrum->lo = lo;
     out->spectrum->hi = hi;
@@ -255,18 +268,10 @@ static enum imp_status blackbody_object(const struct imp__color_ask *ask,
         IMP_TRY(imp__node_error(ctx, node, IMP_E_UNSUPPORTED,
                                 "blackbody exists in spectral modes only "
                                 "(-m spectral, -m single)"));
-    IMP_TRY(number_read(ctx, node, "temperature", &T));
-    IMP_TRY(imp__props_float(ctx, node, "scale", 1, &scale));
-    IMP_TRY(imp__props_float(ctx, node, "wavelength_min", 360, &lo));
-    IMP_TRY(imp__props_float(ctx, node, "wavelength_max", 830, &hi));
-    if (!(T > 0))
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "a temperature of %g K", T));
-    if (!isfinite(scale) || scale < 0)
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
-                                "'scale' must be finite and not negative"));
-    if (!(lo < hi) || !(lo > 0))
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "a range of %g to %g nm is empty",
-                                lo, hi));
+    IMP_TRY(imp__color_require(ctx, node, "temperature"));
+    IMP_TRY(imp__props_float_in(ctx, node, "temperature", 0, IMP_POSITIVE, &T));
+    IMP_TRY(imp__props_float_in(ctx, node, "scale", 1, IMP_NOT_NEGATIVE, &scale));
+    IMP_TRY(range_read(ctx, node, &lo, &hi));
     IMP_TRY(
         imp__color_spectrum_make(ask, IMP_SPECTRUM_BLACKBODY, 1, NULL, &T, NULL, out));
     out->spectrum->lo = lo;
@@ -321,7 +326,7 @@ enum imp_status imp__color_object(const struct imp__color_ask *ask, struct imp_n
         surface.role = IMP_REFLECTANCE;
         IMP_TRY(imp__color_require(ctx, node, "color"));
         if (!p || (p->type != IMP_PROP_RGB && p->type != IMP_PROP_VECTOR))
-            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "'color' must be an rgb"));
+            IMP_TRY(imp__prop_error(ctx, node, p, IMP_E_SCENE, "'color' must be an rgb"));
         p->used = true;
         IMP_TRY(imp__color_check_rgb(&surface, node, p, p->number));
         imp__color_rgb_set(ask, p->number, &color);

@@ -128,7 +128,7 @@ static enum imp_status check_number(const struct imp__color_ask *ask,
                                prop->name);
     if (ask->role == IMP_EMISSION && c < 0)
         return imp__prop_error(ask->ctx, node, prop, IMP_E_SCENE,
-                               "'%s': emission %g is negative", prop->name, c);
+                               "%s = %g is outside [0, inf]", prop->name, c);
     return IMP_OK;
 }
 
@@ -142,8 +142,7 @@ enum imp_status imp__color_check_rgb(const struct imp__color_ask *ask,
         if (st != IMP_OK) return st;
         if (ask->role == IMP_REFLECTANCE && (rgb[c] < 0 || rgb[c] > 1))
             return imp__prop_error(ask->ctx, node, prop, IMP_E_SCENE,
-                                   "'%s': reflectance %g is outside [0, 1]", prop->name,
-                                   rgb[c]);
+                                   "%s = %g is outside [0, 1]", prop->name, rgb[c]);
     }
     return IMP_OK;
 }
@@ -154,6 +153,8 @@ static enum imp_status check_samples(const struct imp__color_ask *ask,
                                      const double *nm, const double *v)
 {
     imp_context *ctx = ask->ctx;
+    const char *name = prop ? prop->name : "values"; /* of an object */
+    if (!prop) prop = imp__color_written(node);
     if (n < 2)
         return imp__prop_error(ctx, node, prop, IMP_E_SCENE,
                                "a spectrum needs at least two samples");
@@ -166,13 +167,14 @@ static enum imp_status check_samples(const struct imp__color_ask *ask,
                                    "wavelengths must increase (%g nm after %g nm)", nm[i],
                                    nm[i - 1]);
         if (v[i] < 0 && ask->role != IMP_UNBOUNDED)
-            return imp__prop_error(
-                ctx, node, prop, IMP_E_SCENE, "%s %g at %g nm is negative",
-                ask->role == IMP_EMISSION ? "emission" : "reflectance", v[i], nm[i]);
+            return imp__prop_error(ctx, node, prop, IMP_E_SCENE,
+                                   "%s = %g at %g nm is outside [0, %s]", name, v[i],
+                                   nm[i], ask->role == IMP_EMISSION ? "inf" : "1");
         if (v[i] > 1 && ask->role == IMP_REFLECTANCE && imp__color_wants_spectrum(ask) &&
             !ask->scalar)
             return imp__prop_error(ctx, node, prop, IMP_E_SCENE,
-                                   "reflectance %g at %g nm is above 1", v[i], nm[i]);
+                                   "%s = %g at %g nm is outside [0, 1]", name, v[i],
+                                   nm[i]);
     }
     return IMP_OK;
 }

@@ -20,14 +20,13 @@ static enum imp_status elements_build(const struct imp_build *build,
     IMP_TRY(imp__props_int(ctx, node, "rays", 0, 0, 64, &rays));
     IMP_TRY(imp__props_int(ctx, node, "max_level", 0, 0, 10, &level));
     IMP_TRY(imp__props_int(ctx, node, "max_links", 0, 0, UINT32_MAX - 1, &links));
-    IMP_TRY(imp__props_float(ctx, node, "max_memory", 0, &megabytes));
-    IMP_TRY(imp__props_float(ctx, node, "stop", 0.01, &e->stop));
-    IMP_TRY(imp__props_float(ctx, node, "eps", 0, &e->eps));
-    if (order == 1 || !(e->stop >= 0) || !(e->eps >= 0) ||
-        !(megabytes >= 0 && megabytes < 1e12))
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
-                                "a property is outside its range: order 2..12, and stop, "
-                                "eps, max_memory not negative"));
+    IMP_TRY(imp__props_float_in(ctx, node, "max_memory", 0,
+                                (struct imp_interval){0, 1e12, IMP_OPEN_HI}, &megabytes));
+    IMP_TRY(imp__props_float_in(ctx, node, "stop", 0.01, IMP_NOT_NEGATIVE, &e->stop));
+    IMP_TRY(imp__props_float_in(ctx, node, "eps", 0, IMP_NOT_NEGATIVE, &e->eps));
+    if (order == 1)
+        IMP_TRY(imp__prop_error(ctx, node, imp__node_prop(node, "order"), IMP_E_SCENE,
+                                "order = 1 is outside [2, 12], and not 0, the default"));
     if (e->stop == 0) e->stop = -1;
     e->image = (enum imp_elements_image)image;
     e->no_importance = !importance;

@@ -40,6 +40,7 @@ static enum imp_status path_of(struct imp_scene *scene, struct imp_node *node,
         if (!first) return imp__error(scene->ctx, IMP_E_NOMEM, "scene: out of memory");
     }
     st = imp__search(scene, first, name, out);
+    if (st != IMP_OK) imp__error_prefix(scene->ctx, st, "filename");
     return st == IMP_OK ? st : placed(scene, node, st);
 }
 

@@ -131,8 +131,9 @@ static enum imp_status mesh_find(const struct serialized *s, int index,
         return imp__error(s->ctx, IMP_E_SCENE, "%s: %llu meshes in %zu bytes", name,
                           (unsigned long long)n, size);
     if ((uint64_t)index >= n)
-        return imp__error(s->ctx, IMP_E_SCENE, "%s: shape_index %d; it has %llu meshes",
-                          name, index, (unsigned long long)n);
+        return imp__error(s->ctx, IMP_E_SCENE,
+                          "%s: shape_index = %d is outside [0, %llu]", name, index,
+                          (unsigned long long)n - 1);
     const unsigned char *table = data + size - 4 - n * width;
     const uint64_t from = little(table + (size_t)index * width, (int)width),
                    last = (uint64_t)(table - data),

@@ -10,6 +10,11 @@
 #include "base/props.h"
 #include <importon/kinds.h>
 
+/* Embree takes larger numbers, and NaN, for a mistake of the caller: shapes that reach so
+ * far vanish without a word, and rays end the process where it was built with assertions.
+ */
+#define IMP_REACH_MAX 1e18
+
 struct imp_build {
     imp_context *ctx;
     struct imp_node *node;

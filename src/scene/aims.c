@@ -53,10 +53,8 @@ static enum imp_status proxy_shape(struct imp_scene *scene, const struct imp_pro
         for (size_t i = 0; i < node->n_children; i++)
             IMP_TRY(imp__node_error(scene->ctx, node->children[i].node, IMP_E_SCENE,
                                     "a proxy is a bare shape: light passes it"));
-        IMP_TRY(imp__props_float(scene->ctx, node, "sampling_weight", 1, weight));
-        if (!(*weight >= 0))
-            IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_SCENE,
-                                    "sampling_weight is negative"));
+        IMP_TRY(imp__props_float_in(scene->ctx, node, "sampling_weight", 1,
+                                    IMP_NOT_NEGATIVE, weight));
         struct imp_shape *made;
         IMP_TRY(imp__build_shape_bare(scene, node, name, &made));
         IMP_TRY(imp__props_finish(scene->ctx, node));

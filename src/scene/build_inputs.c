@@ -145,6 +145,15 @@ static bool is_spectrum(const imp_context *ctx, const struct imp_node *node)
     return false;
 }
 
+/* A number of a colour that is written as an object. */
+static enum imp_status outside_of(imp_context *ctx, const struct imp_node *object,
+                                  const struct imp_input_desc *d, double v, double hi)
+{
+    const struct imp_prop *p = imp__color_written(object);
+    return imp__prop_error(ctx, object, p, IMP_E_SCENE, "%s%s%s = %g is outside [%g, %g]",
+                           p ? p->name : "", p ? ": " : "", d->name, v, d->lo, hi);
+}
+
 static enum imp_status input_build(struct imp_scene *scene, struct imp_node *node,
                                    const char *name, const struct imp_input_desc *d,
                                    struct imp_input *in)
@@ -155,6 +164,7 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
     struct imp_prop *prop = imp__node_prop(node, d->name);
     struct imp_child *child = imp__node_child(node, d->name);
     struct imp__color color = {.count = 1};
+    const struct imp_node *object = NULL; /* that the colour was written as */
     bool absent_here = false;
     const struct imp__color_ask ask = {.ctx = ctx,
                                        .arena = &scene->arena,
@@ -182,6 +192,7 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
         IMP_TRY(imp__color_convert(&ask, node, prop, &color));
     } else if (child && imp__color_is_object(child->node)) {
         child->used = true;
+        object = child->node;
         IMP_TRY(imp__color_object(&ask, child->node, &color));
     } else if (child) {
         struct imp_texture *t;
@@ -242,9 +253,11 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
         const double v = color.spectrum ? color.spectrum->value[k] : in->value[k];
         const double hi = unbounded ? INFINITY : d->hi;
         if (!isfinite(v) || v < d->lo || v > hi)
-            IMP_TRY(imp__prop_error(ctx, node, prop, IMP_E_SCENE,
-                                    "%s = %g is outside [%g, %g]", d->name, v, d->lo,
-                                    hi));
+            IMP_TRY(object ? outside_of(ctx, object, d, v, hi)
+                           : imp__prop_error(ctx, node, prop, IMP_E_SCENE,
+                                             "%s = %g is outside [%g, %g]",
+                                             prop && prop->of ? prop->of : d->name, v,
+                                             d->lo, hi));
     }
     IMP_TRY(param_add(scene, name, d, &color, in));
     if (prop) prop->theta = true;

@@ -202,10 +202,11 @@ static enum imp_status motion_read(struct imp_scene *scene, struct imp_node *nod
     IMP_TRY(imp__props_float(ctx, node, "time_start", 0, &from));
     IMP_TRY(imp__props_float(ctx, node, "time_end", 1, &to));
     if (!(from < to))
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
-                                "it moves from time_start %g to time_end %g, which is "
-                                "not later",
-                                from, to));
+        IMP_TRY(imp__prop_error(
+            ctx, node,
+            imp__node_prop(node,
+                           imp__props_has(node, "time_end") ? "time_end" : "time_start"),
+            IMP_E_SCENE, "time_end = %g is outside (time_start = %g, inf]", to, from));
     struct imp_motion *m = imp__arena_array(&scene->arena, 1, sizeof *m);
     if (!m) IMP_TRY(imp__build_no_memory(scene));
     if (!imp__motion_make(&p->to_world, &end, from, to, m))

@@ -208,6 +208,16 @@ static bool knows_media(const struct imp_integrator *i)
     return false;
 }
 
+/* The first object with a priority. */
+static const struct imp_node *priority_of(const struct imp_node *node)
+{
+    if (imp__node_prop(node, "priority")) return node;
+    const struct imp_node *found = NULL;
+    for (size_t i = 0; i < node->n_children && !found; i++)
+        found = priority_of(node->children[i].node);
+    return found;
+}
+
 enum imp_status imp__media_check(struct imp_scene *scene)
 {
     const bool knows = knows_media(scene->integrator);
@@ -228,12 +238,14 @@ enum imp_status imp__media_check(struct imp_scene *scene)
                               s->name);
     }
     for (int i = 0; i < scene->n_sensors; i++) used |= scene->sensors[i]->medium != NULL;
-    if (scene->priorities && !knows)
-        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                          "shapes have a priority, which the integrator, %s, does not "
-                          "know: volpath, photons, ptracer and bdpt do",
-                          scene->integrator ? scene->integrator->ops->name
-                                            : "path by default");
+    if (scene->priorities && !knows) {
+        const struct imp_node *node = priority_of(scene->root);
+        return imp__prop_error(
+            scene->ctx, node, imp__node_prop(node, "priority"), IMP_E_UNSUPPORTED,
+            "has a priority, which the integrator, %s, does not know: "
+            "volpath, photons, ptracer and bdpt do",
+            scene->integrator ? scene->integrator->ops->name : "path by default");
+    }
     if (used && !knows)
         imp__warn(scene->ctx,
                   "the scene has media, and its integrator, %s, does not see them: "

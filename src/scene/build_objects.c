@@ -80,9 +80,8 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     IMP_TRY(imp__build_inputs(scene, node, e->name, ops->inputs, input, &e->n_in));
     e->input = input;
     e->shaped = imp__build_shaped(scene, e->input, e->n_in);
-    IMP_TRY(imp__props_float(ctx, node, "sampling_weight", 1, &e->weight));
-    if (e->weight < 0)
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "sampling_weight is negative"));
+    IMP_TRY(imp__props_float_in(ctx, node, "sampling_weight", 1, IMP_NOT_NEGATIVE,
+                                &e->weight));
     IMP_TRY(imp__build_course(scene, node, &e->course));
     medium_child(node); /* walks know where they are */
     if (ops->build) IMP_TRY(ops->build(&b, self, e));
@@ -188,9 +187,10 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
     }
     IMP_TRY(imp__build_bumps_survey(scene, node, s));
     if ((side[0] || side[1] || priority) && s->geometry == IMP_CURVES)
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_UNSUPPORTED,
-                                "a medium needs a surface that is met from both sides, "
-                                "and curves are met from outside alone"));
+        IMP_TRY(imp__prop_error(
+            ctx, node, imp__node_prop(node, "priority"), IMP_E_UNSUPPORTED,
+            "a medium, and a priority, needs a surface that is met "
+            "from both sides, and curves are met from outside alone"));
     if (side[1] && strcmp(side[1]->type, "graded") == 0)
         IMP_TRY(imp__node_error(ctx, side[1], IMP_E_UNSUPPORTED,
                                 "a graded medium fills the interior of a shape"));

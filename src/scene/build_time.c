@@ -52,7 +52,7 @@ enum imp_status imp__build_shutter(struct imp_scene *scene, struct imp_node *nod
     if (s->close < s->open)
         IMP_TRY(imp__prop_error(
             ctx, node, imp__node_prop(node, "shutter_close"), IMP_E_SCENE,
-            "shutter_close = %g comes before shutter_open = %g", s->close, s->open));
+            "shutter_close = %g is outside [shutter_open = %g, inf]", s->close, s->open));
     IMP_TRY(imp__build_course(scene, node, &s->course));
     const bool instant = s->open == s->close;
     if (s->course && !instant &&

@@ -43,7 +43,6 @@ enum imp_status imp__build_gain(struct imp_scene *scene, struct imp_node *film,
     if (!g) return imp__build_no_memory(scene);
     IMP_CHECKED(imp__build_inputs(scene, film, name, inputs, in, &n));
     memcpy(g->input, in, sizeof g->input);
-    g->balanced = written[IMP_GAIN_RED] || written[IMP_GAIN_BLUE];
     g->fitted_gamma = written[IMP_GAIN_GAMMA];
     *out = g;
     return IMP_OK;
@@ -53,11 +52,15 @@ enum imp_status imp__gain_fit(struct imp_scene *scene, struct imp_node *film,
                               const struct imp_film_desc *desc, struct imp_camera_gain *g)
 {
     if (!g) return IMP_OK;
-    if (g->balanced && (scene->channels != 3 || desc->n_responses > 0))
-        return imp__node_error(scene->ctx, film, IMP_E_UNSUPPORTED,
-                               "a white balance is of films with red, green and blue");
+    const struct imp_prop *red = imp__node_prop(film, "white_balance_red");
+    const struct imp_prop *balance =
+        red ? red : imp__node_prop(film, "white_balance_blue");
+    if (balance && (scene->channels != 3 || desc->n_responses > 0))
+        return imp__prop_error(scene->ctx, film, balance, IMP_E_UNSUPPORTED,
+                               "%s needs a film with red, green and blue", balance->name);
     if (g->fitted_gamma && desc->filter.radius > 0.5)
-        return imp__node_error(scene->ctx, film, IMP_E_UNSUPPORTED,
+        return imp__prop_error(scene->ctx, film, imp__node_prop(film, "gamma"),
+                               IMP_E_UNSUPPORTED,
                                "gamma needs a box filter of one pixel: a wider one mixes "
                                "pixels before the power law");
     g->middle[0] = 0.5 * desc->width;

@@ -31,7 +31,6 @@ enum imp__gain_input {
 struct imp_camera_gain {
     const struct imp_input *input[IMP_GAIN_INPUTS];
     double middle[2], per_half_diagonal;
-    bool balanced;     /* a white balance is written */
     bool fitted_gamma; /* gamma is written: targets are photographs */
 };
 

@@ -214,11 +214,6 @@ void imp__theta_announce(const struct imp_scene *scene);
 enum imp_status imp__param_check(const struct imp_scene *scene, const struct imp_param *p,
                                  size_t k, double value);
 
-/* Embree takes larger numbers, and NaN, for a mistake of the caller: shapes that reach so
- * far vanish without a word, and rays end the process where it was built with assertions.
- */
-#define IMP_REACH_MAX 1e18
-
 /* ---- intersect.c --------------------------------------------------------------- */
 enum imp_status imp__intersector_create(struct imp_scene *scene);
 void imp__intersector_destroy(struct imp_scene *scene);

@@ -225,10 +225,7 @@ static enum imp_status photons_build(const struct imp_build *build,
                                       .photons = true,
                                       .media = true};
     IMP_TRY(imp__depth_read(build, -1, i, w));
-    IMP_TRY(imp__props_float(build->ctx, build->node, "h", 1, &w->h));
-    if (!(w->h > 0))
-        IMP_TRY(imp__node_error(build->ctx, build->node, IMP_E_SCENE,
-                                "h = %g is not positive", w->h));
+    IMP_TRY(imp__props_float_in(build->ctx, build->node, "h", 1, IMP_POSITIVE, &w->h));
     IMP_TRY(imp__mixture_read(build, w));
     IMP_TRY(imp__other_end_make(build, w));
 out:

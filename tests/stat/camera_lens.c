@@ -388,7 +388,7 @@ int main(void)
             "give fov or opencv_fx");
     refused(
         CAMERA("thinlens", NUMBER("aperture_radius", "0") NUMBER("opencv_fx", "-3") FEW),
-        "opencv_fx = -3 must be greater than 0");
+        "opencv_fx = -3 is outside (0, inf]");
     refused(CAMERA("perspective", NUMBER("opencv_k4", ".1") FEW), "opencv_k4");
     imp_context_destroy(ctx);
     return tap_done();

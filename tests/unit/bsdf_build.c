@@ -110,8 +110,8 @@ int main(void)
     if (!kinds_open(&f)) return 1;
     registry();
     made("dielectric", "int_ior=Water ICE", "ext_ior=1");
-    refused("dielectric", "int_ior=-1.5", NULL, "positive");
-    refused("dielectric", "ext_ior=0", NULL, "positive");
+    refused("dielectric", "int_ior=-1.5", NULL, "int_ior = -1.5 is outside (0, inf]");
+    refused("dielectric", "ext_ior=0", NULL, "ext_ior = 0 is outside (0, inf]");
     refused("dielectric", "int_ior=kryptonite", NULL, "known are vacuum, helium");
     refused("dielectric", "eta=1.5", NULL, "int_ior");
     refused("dielectric", "int_ior=true", NULL, "must be a");

@@ -586,7 +586,7 @@ int main(void)
              "type='gridvolume'><string name='filename' value='%s'/>"
              "<float name='max_value' value='2'/></volume></medium>",
              path);
-    refused(text, "", "a value of the grid is 3");
+    refused(text, "", "max_value = 2 is outside [3, inf]");
     snprintf(
         text, sizeof text,
         "<medium type='heterogeneous' id='fog'><float name='sigma_t' value='1'/>"

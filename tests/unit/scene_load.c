@@ -352,11 +352,13 @@ static void check_files(void)
         {"<shape type='ply'><string name='filename' value='tri.obj'/></shape>",
          "D/m.xml:2:19: shape (ply): D/tri.obj: not a PLY file", IMP_E_SCENE},
         {"<shape type='obj'><string name='filename' value='none.obj'/></shape>",
-         "D/m.xml:2:19: shape (obj): cannot find 'none.obj' (looked in: ., D)", IMP_E_IO},
+         "D/m.xml:2:19: shape (obj): filename: cannot find 'none.obj' (looked in: ., D)",
+         IMP_E_IO},
         {"<shape type='obj'/>", "D/m.xml:2:1: shape (obj): 'filename' is required",
          IMP_E_SCENE},
         {"<shape type='obj'><integer name='filename' value='1'/></shape>",
-         "D/m.xml:2:19: shape (obj): property 'filename' must be a string, not a integer",
+         "D/m.xml:2:19: shape (obj): property 'filename' must be a string, not an "
+         "integer",
          IMP_E_SCENE},
         {"<bsdf type='diffuse' id='a'><texture name='reflectance' type='bitmap' id='t'>"
          "<string name='filename' value='cut.pfm'/></texture></bsdf>",

@@ -215,12 +215,12 @@ static void sensor_errors(void)
             const char *name, *words;
             double v;
         } numbers[] = {
-            {"near_clip", "near_clip = 0 must", 0},
-            {"near_clip", "near_clip = -1 must", -1},
-            {"near_clip", "far_clip = 10000 must be greater than near_clip", 20000},
-            {"far_clip", "far_clip = 0.01 must", 0.01},
+            {"near_clip", "near_clip = 0 is outside (0, inf]", 0},
+            {"near_clip", "near_clip = -1 is outside (0, inf]", -1},
+            {"near_clip", "near_clip = 20000 is outside (0, far_clip = 10000)", 20000},
+            {"far_clip", "far_clip = 0.01 is outside (near_clip = 0.01, inf]", 0.01},
             {"near_clip", "not finite", NAN},
-            {"focus_distance", "focus_distance = 0 must", 0},
+            {"focus_distance", "focus_distance = 0 is outside (0, inf]", 0},
             {"x_fov", "'x_fov'", 3}};
         for (size_t k = 0; k < imp_count(numbers); k++) {
             n = sensor_node(type);
@@ -277,7 +277,7 @@ static void sensor_errors(void)
     refused(node_new("sensor", "thinlens"), "aperture_radius is missing");
     n = node_new("sensor", "thinlens");
     node_float(n, "aperture_radius", -1);
-    refused(n, "is negative");
+    refused(n, "aperture_radius = -1 is outside [0, inf]");
 }
 
 static enum imp_status film_status;
@@ -348,8 +348,10 @@ static void films(void)
     } numbers[] = {{"width", "width = 0", 0},
                    {"height", "height = -3", -3},
                    {"width", "width = 2000000", 2000000},
-                   {"crop_width", "column 769 of a film of 768", 769},
-                   {"crop_offset_x", "column 769 of a film of 768", 1},
+                   {"crop_width",
+                    "crop_offset_x + crop_width = 769 is outside [1, width = 768]", 769},
+                   {"crop_offset_x",
+                    "crop_offset_x + crop_width = 769 is outside [1, width = 768]", 1},
                    {"crop_offset_y", "crop_offset_y = -1", -1},
                    {"crop_height", "crop_height = 0", 0},
                    {"bit_depth", "'bit_depth'", 8}};
@@ -364,7 +366,7 @@ static void films(void)
     film_refused(n, IMP_E_SCENE, "too many");
     n = node_new("film", "hdrfilm");
     node_float(n, "width", 10);
-    film_refused(n, IMP_E_SCENE, "must be a integer, not a float");
+    film_refused(n, IMP_E_SCENE, "must be an integer, not a float");
     static const struct {
         const char *name, *value, *words;
     } strings[] = {

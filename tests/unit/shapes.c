@@ -415,10 +415,10 @@ static void errors(void)
     }
     struct imp_node *n = node_new("shape", "sphere");
     node_float(n, "radius", 0);
-    expect_error(n, IMP_E_SCENE, "its radius is 0");
+    expect_error(n, IMP_E_SCENE, "its length, 0, is outside (0, ");
     n = node_new("shape", "sphere");
     node_float(n, "radius", 1e200);
-    expect_error(n, IMP_E_SCENE, "its radius is 1e+200");
+    expect_error(n, IMP_E_SCENE, "its length, 1e+200, is outside (0, ");
     n = node_new("shape", "cylinder");
     node_vector(n, "p1", imp__v3(0, 0, 0));
     expect_error(n, IMP_E_SCENE, "p0 and p1 are 0 apart");

@@ -18,13 +18,8 @@ enum imp_status imp__bendfile_number(struct imp__bendfile *l, struct imp_node *n
 {
     if (isnan(fallback) && !imp__props_has(node, name))
         return imp__node_error(l->ctx, node, IMP_E_SCENE, "needs the float '%s'", name);
-    const enum imp_status st =
-        imp__props_float(l->ctx, node, name, isnan(fallback) ? 0 : fallback, out);
-    if (st != IMP_OK) return st;
-    if (!(*out >= lo && *out <= hi))
-        return imp__prop_error(l->ctx, node, imp__node_prop(node, name), IMP_E_SCENE,
-                               "%g is not in %g .. %g", *out, lo, hi);
-    return IMP_OK;
+    return imp__props_float_in(l->ctx, node, name, isnan(fallback) ? 0 : fallback,
+                               (struct imp_interval){lo, hi, IMP_CLOSED}, out);
 }
 
 /* Data of `from_truth` targets: exits of the same rays through the field `truth`, traced

@@ -88,11 +88,17 @@ static enum imp_status prepare(const struct imp_build *b)
                     {"pheomelanin", "pheomelanin_sigma_a", 0.2, {0.187, 0.4, 1.05}}};
     const bool sigma = imp_build_has(b, "sigma_a");
     enum imp_status st = imp__ior_prepare(b, "amber", false);
+    if (st == IMP_OK && !sigma && imp_build_has(b, "scale"))
+        st = imp_build_error(b, "scale", IMP_E_SCENE,
+                             "scale needs a sigma_a, which it multiplies");
     for (int k = 0; k < 2 && st == IMP_OK; k++) {
-        if (sigma && imp_build_has(b, pigments[k].amount))
-            IMP_TRY(imp_build_error(b, pigments[k].amount, IMP_E_SCENE,
+        const char *const other = imp_build_has(b, pigments[k].amount)
+                                      ? pigments[k].amount
+                                      : pigments[k].colour;
+        if (sigma && imp_build_has(b, other))
+            IMP_TRY(imp_build_error(b, other, IMP_E_SCENE,
                                     "has a sigma_a and %s: it can be one of the two",
-                                    pigments[k].amount));
+                                    other));
         if (!sigma && !imp_build_has(b, pigments[k].amount))
             IMP_TRY(imp_build_set(b, pigments[k].amount, 1, &pigments[k].number));
         if (!sigma && !imp_build_has(b, pigments[k].colour))

@@ -40,11 +40,7 @@ enum imp_status imp__ior_read(const struct imp_build *b, const char *name,
     double n = NAN;
 
     if (p && p->type != IMP_PROP_STRING) {
-        IMP_TRY(imp_build_float(b, name, 1, &n));
-        if (!(n > 0) || !isfinite(n))
-            IMP_TRY(imp_build_error(b, name, IMP_E_SCENE,
-                                    "'%s' = %g: a refractive index is positive", name,
-                                    n));
+        IMP_TRY(imp__props_float_in(b->ctx, b->node, name, 1, IMP_POSITIVE, &n));
     } else {
         const char *material;
         IMP_TRY(imp_build_string(b, name, fallback, &material));
@@ -168,6 +164,11 @@ enum imp_status imp__ior_prepare(const struct imp_build *b, const char *inside,
                                 "boundary to be rough",
                                 n_inside));
     IMP_TRY(imp_build_set(b, "eta", 1, &(double){n_inside / n_outside}));
+    struct imp_prop *eta = imp__node_prop(b->node, "eta");
+    const struct imp_prop *in = imp__node_prop(b->node, "int_ior"),
+                          *out = imp__node_prop(b->node, "ext_ior");
+    eta->of = in && out ? "int_ior/ext_ior" : out ? "1/ext_ior" : "int_ior";
+    if (in || out) eta->loc = in ? in->loc : out->loc;
 out:
     return st;
 }

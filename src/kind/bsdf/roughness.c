@@ -19,7 +19,11 @@ enum imp_status imp__roughness_prepare(const struct imp_build *b)
     const bool iso = imp_build_has(b, "alpha"), u = imp_build_has(b, "alpha_u"),
                v = imp_build_has(b, "alpha_v");
     if (u != v || (iso && u))
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
+        IMP_TRY(imp_build_error(b,
+                                iso ? "alpha"
+                                : u ? "alpha_u"
+                                    : "alpha_v",
+                                IMP_E_SCENE,
                                 "give either 'alpha', or both 'alpha_u' and 'alpha_v'"));
     if (!iso && !u) IMP_TRY(imp_build_set(b, "alpha", 1, &(double){0.1}));
     for (int i = 0; i < 3; i++) raise_to_least(imp__node_prop(b->node, names[i]));

@@ -107,8 +107,8 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
     IMP_TRY(imp_build_bool(b, "mis_compensation", false, &compensation));
     IMP_TRY(imp__sky_axes(b, s->axis));
     if (!data || !imp__bitmap_texels(data, &s->texels))
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
-                                "needs a picture: 'filename', or a texture of type "
+        IMP_TRY(imp_build_error(b, "data", IMP_E_SCENE,
+                                "data needs a picture: 'filename', or a texture of type "
                                 "'bitmap'"));
     if (!s->texels.plain)
         IMP_TRY(imp_build_error(b, NULL, IMP_E_UNSUPPORTED,

@@ -49,7 +49,8 @@ static enum imp_status date_read(const struct imp_build *b, imp_v3 *sun)
     enum imp_status st = IMP_OK;
     struct imp__sun_date d;
     int64_t year, month, day;
-    IMP_TRY(imp_build_float(b, "latitude", 35.6894, &d.latitude));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "latitude", 35.6894,
+                                (struct imp_interval){-90, 90, IMP_CLOSED}, &d.latitude));
     IMP_TRY(imp_build_float(b, "longitude", 139.6917, &d.longitude));
     IMP_TRY(imp_build_float(b, "timezone", 9, &d.timezone));
     IMP_TRY(imp_build_int(b, "year", 2010, 1900, 2100, &year));
@@ -61,9 +62,6 @@ static enum imp_status date_read(const struct imp_build *b, imp_v3 *sun)
     d.year = (int)year;
     d.month = (int)month;
     d.day = (int)day;
-    if (!(fabs(d.latitude) <= 90))
-        IMP_TRY(imp_build_error(b, "latitude", IMP_E_SCENE,
-                                "latitude = %g is outside [-90, 90]", d.latitude));
     *sun = imp__sun_direction(&d);
 out:
     return st;

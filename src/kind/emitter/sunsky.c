@@ -323,12 +323,9 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
     IMP_TRY(imp__sky_axes(b, s->axis));
     IMP_TRY(imp__sun_read(b, &s->sun, &of_world));
     if (of_world) s->sun = local(s, s->sun);
-    IMP_TRY(imp_build_float(b, "sun_aperture", 2 * SUN_RADIUS_DEGREES, &aperture));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "sun_aperture", 2 * SUN_RADIUS_DEGREES,
+                                (struct imp_interval){0, 180, IMP_OPEN}, &aperture));
     IMP_TRY(imp_build_bool(b, "complex_sun", false, &s->limb));
-    if (!(aperture > 0 && aperture < 180))
-        IMP_TRY(imp_build_error(b, "sun_aperture", IMP_E_SCENE,
-                                "sun_aperture = %g degrees is outside (0, 180)",
-                                aperture));
     const double radius = aperture * IMP_PI / 360;
     const double half = sin(radius / 2), own = sin(SUN_RADIUS_DEGREES * IMP_PI / 360);
     s->cos_radius = cos(radius);

@@ -27,10 +27,8 @@ static enum imp_status mitchell_build(const struct imp_build *b, void *self,
     static const char *const names[2] = {"B", "C"};
     double value[2];
     for (int k = 0; k < 2; k++) {
-        IMP_TRY(imp_build_float(b, names[k], 1. / 3, &value[k]));
-        if (!(value[k] >= 0 && value[k] <= 1))
-            IMP_TRY(imp_build_error(b, names[k], IMP_E_SCENE, "%s = %g is outside [0, 1]",
-                                    names[k], value[k]));
+        IMP_TRY(imp__props_float_in(b->ctx, b->node, names[k], 1. / 3,
+                                    (struct imp_interval){0, 1, IMP_CLOSED}, &value[k]));
     }
     f->radius = 2;
     coefficients(self, value[0], value[1]);

@@ -20,15 +20,9 @@ const struct imp_filter_ops *const imp__filter_kinds[] = {FILTERS(ADDRESS) NULL}
 enum imp_status imp__filter_size(const struct imp_build *b, const char *name,
                                  double fallback, double limit, double *out)
 {
-    double v;
-    const enum imp_status st = imp_build_float(b, name, fallback, &v);
-    if (st != IMP_OK) return st;
     /* Below this a sample could miss every pixel centre by rounding. */
-    if (!(v >= 1e-3 && v <= limit))
-        return imp_build_error(b, name, IMP_E_SCENE, "%s = %g is outside [0.001, %g]",
-                               name, v, limit);
-    *out = v;
-    return IMP_OK;
+    return imp__props_float_in(b->ctx, b->node, name, fallback,
+                               (struct imp_interval){1e-3, limit, IMP_CLOSED}, out);
 }
 
 enum imp_status imp__filter_build(const struct imp_build *b, struct imp_node *node,

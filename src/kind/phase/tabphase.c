@@ -94,7 +94,7 @@ static enum imp_status prepare(const struct imp_build *b)
     for (int i = 0; st == IMP_OK && i < n && are_numbers(n); i++) {
         if (imp_build_has(b, inputs[i].name))
             return imp_build_error(b, inputs[i].name, IMP_E_SCENE,
-                                   "'%s' is a number of 'values'", inputs[i].name);
+                                   "give %s or values, not both", inputs[i].name);
         st = imp_build_set(b, inputs[i].name, 1, &value[i]);
     }
     return st;
@@ -119,8 +119,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_p
     for (int i = numbers ? t->n : 0; i < NUMBERS; i++)
         if (imp_build_has(b, inputs[i].name))
             IMP_TRY(imp_build_error(b, inputs[i].name, IMP_E_SCENE,
-                                    "'%s' is a number of 'values', which has %d",
-                                    inputs[i].name, t->n));
+                                    "give %s or values, not both", inputs[i].name));
     double *below = imp_build_alloc(b, (size_t)t->n, sizeof *below);
     if (!below)
         IMP_TRY(imp_build_error(b, "values", IMP_E_NOMEM, "no memory for its values"));

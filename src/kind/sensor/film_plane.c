@@ -23,24 +23,22 @@ static enum imp_status calibration_read(const struct imp_build *b,
                                     "give %s or opencv_fx, not both", others[i]));
     IMP_TRY(imp_build_int(b, "opencv_width", film->width, 1, 1 << 30, &width));
     IMP_TRY(imp_build_int(b, "opencv_height", film->height, 1, 1 << 30, &height));
-    IMP_TRY(imp_build_float(b, "opencv_fx", 0, &fx));
-    IMP_TRY(imp_build_float(b, "opencv_fy", fx, &fy));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "opencv_fx", 0, IMP_POSITIVE, &fx));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "opencv_fy", fx, IMP_POSITIVE, &fy));
     IMP_TRY(imp_build_float(b, "opencv_cx", 0.5 * ((double)width - 1), &cx));
     IMP_TRY(imp_build_float(b, "opencv_cy", 0.5 * ((double)height - 1), &cy));
-    if (!(fx > 0))
-        IMP_TRY(imp_build_error(b, "opencv_fx", IMP_E_SCENE,
-                                "opencv_fx = %g must be greater than 0", fx));
-    if (!(fy > 0))
-        IMP_TRY(imp_build_error(b, "opencv_fy", IMP_E_SCENE,
-                                "opencv_fy = %g must be greater than 0", fy));
     out->x0 = (cx + 0.5) / fx;
     out->dx = -1 / fx * ((double)width / film->width);
     out->y0 = (cy + 0.5) / fy;
     out->dy = -1 / fy * ((double)height / film->height);
     const double wide = -out->dx * film->width, high = -out->dy * film->height;
-    if (!(fabs(out->x0) < 1e12 && fabs(out->y0) < 1e12 && wide > 1e-12 && wide < 1e12 &&
-          high > 1e-12 && high < 1e12))
-        IMP_TRY(imp_build_error(b, "opencv_fx", IMP_E_SCENE,
+    const bool x_fits = fabs(out->x0) < 1e12 && wide > 1e-12 && wide < 1e12;
+    const bool y_fits = fabs(out->y0) < 1e12 && high > 1e-12 && high < 1e12;
+    const char *const odd = x_fits ? "opencv_fy" : "opencv_fx", *const centre =
+                                                                    x_fits ? "opencv_cy"
+                                                                           : "opencv_cx";
+    if (!x_fits || !y_fits)
+        IMP_TRY(imp_build_error(b, imp_build_has(b, centre) ? centre : odd, IMP_E_SCENE,
                                 "opencv_fx = %g, opencv_fy = %g, opencv_cx = %g, "
                                 "opencv_cy = %g: no picture has such a field of view",
                                 fx, fy, cx, cy));

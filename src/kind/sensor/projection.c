@@ -51,20 +51,19 @@ enum imp_status imp__projection_build(const struct imp_build *b, bool rigid,
     struct imp_projection p;
 
     IMP_TRY(placement_read(b, rigid, &p.to_world, &p.to_local));
-    IMP_TRY(imp_build_float(b, "near_clip", 1e-2, &p.near_clip));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "near_clip", 1e-2, IMP_POSITIVE,
+                                &p.near_clip));
     IMP_TRY(imp_build_float(b, "far_clip", 1e4, &p.far_clip));
-    if (!(p.near_clip > 0))
-        IMP_TRY(imp_build_error(b, "near_clip", IMP_E_SCENE,
-                                "near_clip = %g must be greater than 0", p.near_clip));
-    if (!(p.far_clip > p.near_clip))
+    if (!(p.far_clip > p.near_clip) && imp_build_has(b, "far_clip"))
         IMP_TRY(imp_build_error(b, "far_clip", IMP_E_SCENE,
-                                "far_clip = %g must be greater than near_clip = %g",
+                                "far_clip = %g is outside (near_clip = %g, inf]",
                                 p.far_clip, p.near_clip));
-    IMP_TRY(imp_build_float(b, "focus_distance", p.far_clip, &p.focus_distance));
-    if (!(p.focus_distance > 0))
-        IMP_TRY(imp_build_error(b, "focus_distance", IMP_E_SCENE,
-                                "focus_distance = %g must be greater than 0",
-                                p.focus_distance));
+    if (!(p.far_clip > p.near_clip))
+        IMP_TRY(imp_build_error(b, "near_clip", IMP_E_SCENE,
+                                "near_clip = %g is outside (0, far_clip = %g)",
+                                p.near_clip, p.far_clip));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "focus_distance", p.far_clip,
+                                IMP_POSITIVE, &p.focus_distance));
     *out = p;
 out:
     return st;
@@ -157,7 +156,8 @@ enum imp_status imp__fov_build(const struct imp_build *b, double a, double *tan_
         IMP_TRY(imp_build_error(b, "focal_length", IMP_E_SCENE,
                                 "give fov or focal_length, not both"));
     if (by_fov) {
-        IMP_TRY(imp_build_float(b, "fov", 0, &fov));
+        IMP_TRY(imp__props_float_in(b->ctx, b->node, "fov", 0,
+                                    (struct imp_interval){0, 180, IMP_OPEN}, &fov));
         IMP_TRY(imp_build_string(b, "fov_axis", "x", &text));
         for (axis = 0; axis <= LARGER && strcasecmp(axes[axis], text) != 0;) axis++;
         if (axis > LARGER)
@@ -165,9 +165,6 @@ enum imp_status imp__fov_build(const struct imp_build *b, double a, double *tan_
                                     "fov_axis = '%s': must be one of x, y, "
                                     "diagonal, smaller, larger",
                                     text));
-        if (!(fov > 0 && fov < 180))
-            IMP_TRY(imp_build_error(b, "fov", IMP_E_SCENE, "fov = %g is outside (0, 180)",
-                                    fov));
         tan_half = tan(fov * (IMP_PI / 360));
     } else { /* the diagonal of a 36 x 24 mm picture; fov_axis then is an unused property
               */

@@ -24,8 +24,9 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
         IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
                                 "give origin and direction, or to_world, not both"));
     if (by_ray && !(imp_build_has(b, "origin") && imp_build_has(b, "direction")))
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
-                                "origin and direction are given together"));
+        IMP_TRY(imp_build_error(b, imp_build_has(b, "origin") ? "origin" : "direction",
+                                IMP_E_SCENE,
+                                "give both origin and direction, or to_world"));
     IMP_TRY(imp_build_vector(b, "origin", (double[3]){0, 0, 0}, o));
     IMP_TRY(imp_build_vector(b, "direction", (double[3]){0, 0, 1}, d));
     IMP_TRY(imp__sensor_place(b, &m, &inverse));

@@ -31,9 +31,10 @@ static enum imp_status size_read(const struct imp_build *b, struct imp_film_desc
     for (int i = 0; i < 2; i++)
         if (v[2 + i] + v[4 + i] > v[i])
             IMP_TRY(imp_build_error(
-                b, NULL, IMP_E_SCENE,
-                "the crop window ends at %s %lld of a film of %lld pixels",
-                i ? "row" : "column", (long long)(v[2 + i] + v[4 + i]), (long long)v[i]));
+                b, fields[imp_build_has(b, fields[2 + i].name) ? 2 + i : 4 + i].name,
+                IMP_E_SCENE, "%s + %s = %lld is outside [1, %s = %lld]",
+                fields[2 + i].name, fields[4 + i].name, (long long)(v[2 + i] + v[4 + i]),
+                fields[i].name, (long long)v[i]));
     f->width = (int)v[0];
     f->height = (int)v[1];
     f->crop_x = (int)v[2];

@@ -20,10 +20,8 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     IMP_TRY(imp__film_plane_build(b, false, &s->film, &p->film));
     if (!imp_build_has(b, "aperture_radius"))
         IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE, "aperture_radius is missing"));
-    IMP_TRY(imp_build_float(b, "aperture_radius", 0, &p->aperture_radius));
-    if (p->aperture_radius < 0)
-        IMP_TRY(imp_build_error(b, "aperture_radius", IMP_E_SCENE,
-                                "aperture_radius = %g is negative", p->aperture_radius));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "aperture_radius", 0, IMP_NOT_NEGATIVE,
+                                &p->aperture_radius));
 out:
     return st;
 }

@@ -35,9 +35,11 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     c->radius = fabs(radius) * scale[0];
     c->length = length * scale[2];
     s->area = IMP_2PI * c->radius * c->length;
-    if (!(s->area > 0) || !isfinite(s->area) || !imp__is_finite(c->base))
-        IMP_TRY(imp_build_error(b, "radius", IMP_E_SCENE, "its radius is %g, its area %g",
-                                c->radius, s->area));
+    if (!(s->area > 0) || !(c->radius < IMP_REACH_MAX) || !isfinite(s->area) ||
+        !imp__is_finite(c->base))
+        IMP_TRY(imp_build_error(b, "radius", IMP_E_SCENE,
+                                "radius: in the world its length, %g, is outside (0, %g)",
+                                c->radius, IMP_REACH_MAX));
     c->side = (at.mirrored != s->flip_normals) ? -1 : 1;
     /* A circle about n reaches r sqrt(1 - n_i^2) along axis i. */
     const imp_v3 top = c->base + c->axes.n * c->length;

@@ -26,9 +26,10 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     p->center = imp__point(&at.to_world, imp__v3(center[0], center[1], center[2]));
     p->radius = fabs(radius) * scale[0];
     s->area = 4 * IMP_PI * p->radius * p->radius;
-    if (!(s->area > 0) || !isfinite(s->area) || !imp__is_finite(p->center))
-        IMP_TRY(imp_build_error(b, "radius", IMP_E_SCENE, "its radius is %g, its area %g",
-                                p->radius, s->area));
+    if (!(s->area > 0) || !(p->radius < IMP_REACH_MAX) || !imp__is_finite(p->center))
+        IMP_TRY(imp_build_error(b, "radius", IMP_E_SCENE,
+                                "radius: in the world its length, %g, is outside (0, %g)",
+                                p->radius, IMP_REACH_MAX));
     /* A mirroring placement turns the normal inwards, flip_normals turns it back
      * (docs/scene-format.md 4.2). A negative radius mirrors all three axes. */
     if (radius < 0) p->axes = (struct imp_frame){-p->axes.s, -p->axes.t, -p->axes.n};

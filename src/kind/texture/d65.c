@@ -21,12 +21,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_t
 {
     struct d65 *d = self;
     t->param = -1;
-    const enum imp_status st = imp_build_float(b, "scale", 1, &d->scale);
-    if (st != IMP_OK) return st;
-    if (!isfinite(d->scale) || d->scale < 0)
-        return imp_build_error(b, NULL, IMP_E_SCENE,
-                               "'scale' must be finite and not negative");
-    return IMP_OK;
+    return imp__props_float_in(b->ctx, b->node, "scale", 1, IMP_NOT_NEGATIVE, &d->scale);
 }
 /* As one number it is the scale alone. */
 static imp_spec factor(const struct imp_texture *t, const struct imp_texcoord *at,

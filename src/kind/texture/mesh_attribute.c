@@ -29,9 +29,9 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_t
     if (!m->name)
         IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE, "property 'name' is missing"));
     if (!imp__attribute_name(m->name))
-        IMP_TRY(imp_build_error(b, "name", IMP_E_SCENE,
-                                "'%s': names of attributes begin with vertex_ or face_",
-                                m->name));
+        IMP_TRY(imp_build_error(
+            b, "name", IMP_E_SCENE,
+            "name = '%s': names of attributes begin with vertex_ or face_", m->name));
     if (!isfinite(m->scale))
         IMP_TRY(imp_build_error(b, "scale", IMP_E_SCENE, "'scale' must be finite"));
 out:

@@ -36,16 +36,14 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_t
     double center[3];
     t->param = -1;
     IMP_TRY(imp_build_vector(b, "center", (double[3]){0}, center));
-    IMP_TRY(imp_build_float(b, "radius", 0, &v->radius));
-    IMP_TRY(imp_build_float(b, "top", 0, &v->top));
+    IMP_TRY(
+        imp__props_float_in(b->ctx, b->node, "radius", 0, IMP_NOT_NEGATIVE, &v->radius));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "top", 0, IMP_POSITIVE, &v->top));
     v->center = imp__v3(center[0], center[1], center[2]);
-    if (!(v->radius >= 0))
-        IMP_TRY(imp_build_error(b, "radius", IMP_E_SCENE, "radius = %g is negative",
-                                v->radius));
-    if (!(v->top > 0))
-        IMP_TRY(imp_build_error(b, imp_build_has(b, "top") ? "top" : NULL, IMP_E_SCENE,
-                                "top, the height at which it ends, is required, and more "
-                                "than 0"));
+    if (!imp_build_has(b, "top"))
+        IMP_TRY(
+            imp_build_error(b, NULL, IMP_E_SCENE,
+                            "property 'top', the height at which it ends, is missing"));
     if (t->input[VALUE]->texture)
         IMP_TRY(imp_build_error(b, "value", IMP_E_SCENE, "value cannot be a texture"));
 out:

@@ -95,7 +95,8 @@ static enum imp_status build(const struct imp_build *b, void *self,
     }
     if (imp_build_has(b, "max_value") && !(most <= max_value))
         IMP_TRY(imp_build_error(b, "max_value", IMP_E_SCENE,
-                                "max_value = %g, and a value of the grid is %g",
+                                "max_value = %g is outside [%g, inf]: the grid has the "
+                                "lower end",
                                 max_value, most));
     v->spectral = v->channels == 3 && (b->mode == IMP_SPECTRAL || b->mode == IMP_SINGLE);
     if (v->spectral)
