@@ -65,9 +65,12 @@ static bool integrator_exists(const char *type)
 
 struct survey {
     struct imp_scene *scene;
-    int n; /* found */
+    int n;                 /* types that are not supported */
+    struct missing **type; /* in the order they were met */
+};
+struct missing {
     const struct imp_node *first;
-    char list[768]; /* the others, with their places */
+    int others; /* of the same type */
 };
 
 /* One line of what a lenient scene goes on without (imp_scene_info). */
@@ -90,12 +93,18 @@ static enum imp_status note(struct survey *s, const struct imp_node *node,
                  node->id ? "'" : "", lost);
         return lost_add(s->scene, text);
     }
-    const size_t n = strlen(s->list);
-    if (s->n++ == 0) s->first = node;
-    else
-        snprintf(s->list + n, sizeof s->list - n, "%s%s %s (%s)", n ? ", " : "",
-                 node->tag, node->type, where);
-    return IMP_OK;
+    for (int k = 0; k < s->n; k++) {
+        struct missing *m = s->type[k];
+        if (strcmp(m->first->tag, node->tag) == 0 &&
+            strcmp(m->first->type, node->type) == 0) {
+            m->others++;
+            return IMP_OK;
+        }
+    }
+    struct missing *m = imp__arena_array(&s->scene->arena, 1, sizeof *m);
+    if (!m) return imp__build_no_memory(s->scene);
+    m->first = node;
+    return imp__build_list_add(s->scene, (void ***)&s->type, &s->n, m);
 }
 
 static void child_remove(struct imp_node *parent, size_t i)
@@ -223,14 +232,29 @@ enum imp_status imp__survey(struct imp_scene *scene)
     struct survey s = {.scene = scene};
     const enum imp_status st = scene->root ? walk(&s, scene->root) : IMP_OK;
     if (st != IMP_OK || s.n < 2) return st; /* of one the builder says so */
-    char first[1024];
+    char first[1024], list[960] = "", where[128], entry[256];
     const void *none;
-    const struct rule *r = rule_of(s.first);
+    const struct imp_node *node = s.type[0]->first;
+    const struct rule *r = rule_of(node);
     const enum imp_status why =
-        r ? imp__kind_find(scene->ctx, (enum imp_concept)r->concept, s.first, &none)
-          : imp__kind_choose(scene->ctx, s.first, integrator_at, NULL, &none);
+        r ? imp__kind_find(scene->ctx, (enum imp_concept)r->concept, node, &none)
+          : imp__kind_choose(scene->ctx, node, integrator_at, NULL, &none);
     snprintf(first, sizeof first, "%s", imp_last_error(scene->ctx));
-    return imp__error(scene->ctx, why, "%s; nor has it %s", first, s.list);
+    int k = 1;
+    for (size_t n = 0; k < s.n; k++) {
+        const struct missing *m = s.type[k];
+        const int length = snprintf(entry, sizeof entry, "%s%s %.80s (%s%s)",
+                                    k > 1 ? ", " : "", m->first->tag, m->first->type,
+                                    imp__loc_text(m->first->loc, where, sizeof where),
+                                    m->others ? " and elsewhere" : "");
+        if (length < 0 || n + (size_t)length + 32 > sizeof list)
+            break; /* " and N more" */
+        n += (size_t)snprintf(list + n, sizeof list - n, "%s", entry);
+    }
+    if (k < s.n)
+        snprintf(list + strlen(list), sizeof list - strlen(list), " and %d more types",
+                 s.n - k);
+    return imp__error(scene->ctx, why, "%s; nor has it %s", first, list);
 }
 
 static enum imp_status unused_list(struct imp_scene *scene, struct imp_node *node)

@@ -196,6 +196,35 @@ static void kind(const char *tag, const char *type)
     if (!any) row(&(struct row){tag, type, NULL, NULL, NULL, IMP_RGB});
 }
 
+/* Types that this version has not are told together, each once; of very many, how many. */
+static void missing(void)
+{
+    static const int counts[] = {5, 300};
+    for (size_t k = 0; k < imp_count(counts); k++) {
+        int told = 0, more = 0;
+        char want[64];
+        scene_text.bytes.size = 0;
+        imp__put(&scene_text, "<scene version='3.0.0'>\n");
+        for (int i = 0; i < 2 * counts[k]; i++)
+            imp__put(&scene_text, "<shape type='sphere'><bsdf type='none%d'/></shape>\n",
+                     i % counts[k]);
+        imp__put(&scene_text, "</scene>\n");
+        const char *message = said(&(struct row){.mode = IMP_RGB}, NULL);
+        for (int i = 1; i < counts[k]; i++) {
+            snprintf(want, sizeof want, "bsdf none%d (bad.xml:%d:22 and elsewhere)", i,
+                     i + 2);
+            told += strstr(message, want) != NULL;
+        }
+        const char *rest = strstr(message, " and ");
+        while (rest && sscanf(rest, " and %d more types", &more) != 1)
+            rest = strstr(rest + 1, " and ");
+        tap_ok(strncmp(message, "bad.xml:2:22: bsdf (none0): ", 28) == 0 &&
+                   1 + told + more == counts[k] && (more == 0) == (counts[k] < 10),
+               "%d types that do not exist: %d are told, and %d more", counts[k],
+               1 + told, more);
+    }
+}
+
 static void put_file(const char *name, const void *bytes, size_t n)
 {
     char path[96];
@@ -248,6 +277,7 @@ int main(void)
         {"film", "specfilm"},        {"sampler", "independent"},
         {"sampler", "stratified"}};
     for (size_t k = 0; k < imp_count(others); k++) kind(others[k][0], others[k][1]);
+    missing();
     imp__bytes_free(ctx, &scene_text.bytes);
     imp_context_destroy(ctx);
     put_file("mesh.serialized", NULL, 0);
