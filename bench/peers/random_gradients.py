@@ -9,7 +9,8 @@ times each with seeds of their own. importon's error is the one that it reports,
 fails if a number is beyond 4 normal deviates, or the sum of squares beyond its 1e-4 level (numbers of one scene are correlated:
 Satterthwaite's degrees of freedom, with the correlations of the runs); it is then run again with 4 times the samples and other
 seeds, and the second verdict counts. For the worst number of each parameter that still fails, central differences of both
-programs' pictures (common random numbers) then say whose derivative is wrong.
+programs' pictures (common random numbers) then say whose derivative is wrong; and they stand in for Mitsuba's derivative where
+it is known to be none, or another than that of its pictures (delta lobes and what wrong_there names).
 """
 import argparse
 import json
@@ -288,16 +289,28 @@ def differences(own, peer, key, row, spp, runs):
     return [float(x) for d in (ours, theirs) for x in (d.mean(), d.std(ddof=1) / np.sqrt(runs))]
 
 
-def verdict(row):
+def verdict(row, runs):
     """Whose derivative do the differences contradict?"""
-    def off(x, se, d, d_se):
-        return abs(x - d) > 4 * np.hypot(np.hypot(se, d_se), 2e-3 * abs(d))
     ours, ours_se, theirs, theirs_se = row["differences"]
-    best = (ours, ours_se) if ours_se < theirs_se else (theirs, theirs_se)
-    if off(ours, ours_se, theirs, theirs_se):
+
+    def off(x, se, d, d_se):
+        return abs(float(normal_deviate(x - d, [(se ** 2, 1e9), (d_se ** 2, runs - 1), ((2e-3 * d) ** 2 + 1e-24, 1e9)]))) > LEVEL
+
+    if abs(float(normal_deviate(ours - theirs, [(ours_se ** 2, runs - 1), (theirs_se ** 2, runs - 1), ((2e-3 * ours) ** 2 + 1e-24, 1e9)]))) > LEVEL:
         return "pictures"
+    best = (ours, ours_se) if ours_se < theirs_se else (theirs, theirs_se)
     own, peer = off(row["own"], row["own_se"], *best), off(row["peer"], row["peer_se"], *best)
     return {(False, True): "prb", (True, False): "importon", (True, True): "both"}.get((own, peer), "unclear")
+
+
+def judge_by_differences(own, peer, found, keys, spp, runs):
+    for key in keys:
+        row = found["parameters"][key]
+        try:
+            row["differences"] = differences(own, peer, key, row, spp, runs)
+            row["verdict"] = verdict(row, runs)
+        except (RuntimeError, ValueError, TypeError, KeyError) as e:
+            row["verdict"] = "no differences: " + str(e)[-200:]
 
 
 def look(args, seed, folder):
@@ -326,16 +339,10 @@ def look(args, seed, folder):
             value, se = found["loss"][0], found["loss"][2]
             found["scene_z"] = float(((value - theirs.mean()) / np.hypot(se, theirs.std(ddof=1) / np.sqrt(args.runs))))
             found["prb_picture_differs"] = abs(found["scene_z"]) < LEVEL
-        for key in found["failing"]:
-            if key in found["theirs"]:
-                continue
-            row = found["parameters"][key]
-            try:
-                row["differences"] = differences(own, peer, key, row, 4 * args.spp, 8)
-                row["verdict"] = verdict(row)
-            except (RuntimeError, ValueError, TypeError, KeyError) as e:
-                row["verdict"] = "no differences: " + str(e)[-200:]
+        judge_by_differences(own, peer, found, set(found["failing"]) - set(found["theirs"]), 4 * args.spp, 8)
         judge(found, rows)
+    judge_by_differences(own, peer, found, [k for k in found["theirs"] if "verdict" not in found["parameters"][k]], args.spp, 8)
+    found["fails"] |= any(found["parameters"][k]["verdict"] in ("importon", "both", "pictures") for k in found["theirs"])
     result.update(found)
     return result
 
