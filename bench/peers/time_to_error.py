@@ -14,7 +14,8 @@ take turns, seed by seed.
              all numbers is 1 % of the gradient's length; "optimum": the same length at the truth,
              where the gradient is 0
   fit        seconds until the median number is within 2 % of the truth (median of seeds): importon's lm;
-             Mitsuba's Adam with its best of the learning rates, samples and coolings of FITS
+             Mitsuba's Adam with its best of the learning rates (times the mean of a parameter's start), samples
+             and coolings of FITS. Lights start at half of their radiance, grey
 
 Errors come from the spread of seeds. Variance falls as 1/time, so that seconds to 1 % are seconds of a run times its
 relative variance over .0001; fits are run to it. Mitsuba's loss is unbiased: two renders, one for the residual
@@ -251,6 +252,7 @@ def adam(case, peer, target, start, truth, points, setting, seed, limit):
     rate, spp, cool = setting
     peer.set(start)
     values = [np.array(v, float) for v in start.values()]
+    scale = [np.abs(x).mean() for x in values]
     m, v2 = [0 * x for x in values], [0 * x for x in values]
     spent, k, when = 0, 0, None
     peer.gradient(target, points, spp, 1)  # compiles
@@ -264,7 +266,7 @@ def adam(case, peer, target, start, truth, points, setting, seed, limit):
             at += x.size
             m[i] = 0.9 * m[i] + 0.1 * gi
             v2[i] = 0.999 * v2[i] + 0.001 * gi ** 2
-            step = rate * cool ** k * (m[i] / (1 - 0.9 ** k)) / (np.sqrt(v2[i] / (1 - 0.999 ** k)) + 1e-12)
+            step = rate * scale[i] * cool ** k * (m[i] / (1 - 0.9 ** k)) / (np.sqrt(v2[i] / (1 - 0.999 ** k)) + 1e-12)
             values[i] = np.maximum(x - step, 1e-3)
         peer.set(dict(enumerate(values)))
         when = (when or spent) if error(values, truth) <= 0.02 else None
@@ -277,7 +279,7 @@ def fits(case, own, peer, a):
     """Each program's seconds until the median number is within 2 %, by its best setting."""
     own.set(own.truth)
     target = own.picture("sobol", 4096, 98).astype(np.float32)
-    start = {k: 0 * v + np.minimum(case.wrong, v * 1.5 if k.endswith("alpha") else case.wrong)
+    start = {k: 0 * v + (v.mean() / 2 if ".radiance" in k else np.minimum(case.wrong, v * 1.5 if k.endswith("alpha") else case.wrong))
              for k, v in own.truth.items()}
     truth = list(own.truth.values())
     rows = {}
