@@ -20,6 +20,10 @@ const struct arg_option options_search[] = {
      &fit_choice.iterations, 1, 1e9, NULL},
     {ARG_NUMBER, 0, "lr", "RATE", "learning rate of adam (default 0.05)",
      &fit_choice.learning_rate, 1e-12, 1e6, NULL},
+    {ARG_NUMBER, 0, "momentum", "B",
+     "of adam: the part of the mean gradient that stays from iteration to iteration "
+     "(default 0.9; textures with control variates: 0.5)",
+     &fit_choice.momentum, 0, 0.999999, NULL},
     {ARG_INT, 0, "levels", "N",
      "of adam, and of bent rays: from coarse to fine, in N levels", &fit_choice.levels, 1,
      16, NULL},
@@ -56,6 +60,7 @@ struct imp_fit_options fit_choice_options(void)
     fit.max_iterations = fit_choice.iterations;
     fit.learning_rate = fit_choice.learning_rate;
     fit.tolerance = fit_choice.tolerance;
+    fit.momentum = fit_choice.momentum;
     fit.levels = fit_choice.levels;
     fit.memory = fit_choice.memory < 0    ? 0
                  : fit_choice.memory == 0 ? -1

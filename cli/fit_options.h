@@ -8,7 +8,7 @@
 
 struct fit_choice {
     int optimizer, iterations, no_intervals, levels, missing, variate, allocation;
-    double learning_rate, tolerance;
+    double learning_rate, tolerance, momentum;
     double memory; /* MB; < 0: not given */
 };
 extern struct fit_choice fit_choice;

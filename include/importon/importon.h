@@ -1028,11 +1028,15 @@ struct imp_fit_options {
     /** Of IMP_ADAM, quadratic losses, box filters and walks from the sensor; others have the
      * same samples everywhere. */
     enum imp_allocation allocation;
+    /** Adam: the part of the mean gradient that stays from one iteration to the next, its
+     * beta1, in (0, 1); 0: 0.9. With control variates gradients have little noise, and
+     * textures want 0.5 (docs/fitting.md). */
+    double momentum;
 };
 #define IMP_FIT_OPTIONS_INIT                                                             \
     {                                                                                    \
         sizeof(struct imp_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,          \
-            IMP_VARIATES_AUTO, IMP_ALLOCATION_DEFAULT                                    \
+            IMP_VARIATES_AUTO, IMP_ALLOCATION_DEFAULT, 0                                 \
     }
 
 struct imp_fit_variable {

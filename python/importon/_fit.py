@@ -215,7 +215,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         stay: Optional[Mapping[str, float]] = None, smooth: Optional[Mapping[str, float]] = None,
         same: Any = None, factor: Any = None, log: Any = None, time_limit: float = 0, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
         wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", levels: int = 0, memory: float = 0,
-        control_variate: str = "auto", allocation: str = "default", progress: Any = None) -> Fit:
+        control_variate: str = "auto", allocation: str = "default", momentum: float = 0, progress: Any = None) -> Fit:
     """Fit parameters to target pictures; the scene ends at the best estimate.
 
     Parameters
@@ -231,6 +231,9 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         0: 200 (adam), 30 (others).
     learning_rate : float
         Of adam, as a part of each variable's scale; 0: 0.05.
+    momentum : float
+        Of adam: the part of the mean gradient that stays from iteration to iteration, its beta1;
+        0: 0.9. Textures with control variates want 0.5.
     tolerance : float
         Stop when relative steps stay below; 0: 1e-4.
     levels : int
@@ -302,7 +305,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
                       tolerance=float(tolerance), intervals=bool(intervals), checkpoint=path, resume=bool(resume),
                       levels=integer(levels, "levels"), memory=float(memory),
                       control_variate=choice("imp_variates", control_variate, "control_variate"),
-                      allocation=choice("imp_allocation", allocation, "allocation"))
+                      allocation=choice("imp_allocation", allocation, "allocation"), momentum=float(momentum))
         out, start = ctypes.c_void_p(), p.x()
         status, message = run(p.context, options, progress, lib.imp_fit, p.pointer, ctypes.byref(wanted),
                               ctypes.byref(options), ctypes.byref(out))

@@ -57,6 +57,9 @@ void imp__fit_fingerprint(struct imp__fit *f)
                               f->options.tolerance,
                               f->run.spp > 0 ? f->run.spp : sensor->spp};
     h->options = imp__hash(f->outer.seed, number, sizeof number);
+    if (f->options.momentum != IMP_ADAM_MOMENTUM)
+        h->options =
+            imp__hash(h->options, &f->options.momentum, sizeof f->options.momentum);
     if (f->outer.from != IMP_FROM_SCENE)
         h->options = imp__hash(h->options, &f->outer.from, sizeof f->outer.from);
     if (f->options.optimizer == IMP_LM) {

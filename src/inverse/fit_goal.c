@@ -273,12 +273,13 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
         return imp__error(ctx, IMP_E_ARG, "nothing to fit to: no target");
     if (f.options.max_iterations < 0 || !(f.options.learning_rate >= 0) ||
         !(f.options.tolerance >= 0) || isinf(f.options.tolerance) ||
-        f.options.learning_rate > 1)
-        return imp__error(
-            ctx, IMP_E_ARG,
-            "max_iterations %d, learning_rate %g (0 to 1), tolerance %g: out of "
-            "range",
-            f.options.max_iterations, f.options.learning_rate, f.options.tolerance);
+        f.options.learning_rate > 1 || !(f.options.momentum >= 0) ||
+        !(f.options.momentum < 1))
+        return imp__error(ctx, IMP_E_ARG,
+                          "max_iterations %d, learning_rate %g (0 to 1), tolerance %g, "
+                          "momentum %g (below 1): out of range",
+                          f.options.max_iterations, f.options.learning_rate,
+                          f.options.tolerance, f.options.momentum);
     if ((unsigned)f.options.allocation > IMP_ALLOCATION_VARIANCE)
         return imp__error(ctx, IMP_E_ARG, "allocation %d does not exist",
                           (int)f.options.allocation);
@@ -292,6 +293,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
         f.options.max_iterations = f.options.optimizer == IMP_ADAM ? 200 : 30;
     if (f.options.learning_rate == 0) f.options.learning_rate = 0.05;
     if (f.options.tolerance == 0) f.options.tolerance = 1e-4;
+    if (f.options.momentum == 0) f.options.momentum = IMP_ADAM_MOMENTUM;
 
     IMP_TRY(bounds_make(&f));
     if (n <= IMP_DENSE_MAX) {

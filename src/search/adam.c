@@ -22,7 +22,6 @@
 #include <math.h>
 #include <string.h>
 
-#define BETA1   IMP_ADAM_BETA1
 #define BETA2   IMP_ADAM_BETA2
 #define WINDOW  IMP_ADAM_WINDOW
 #define STALLED IMP_ADAM_STALLED /* net motion over path length: below, no progress */
@@ -163,17 +162,19 @@ static enum imp_status align(const struct imp__goal *goal, struct imp__search *s
 /* ---- Steps --------------------------------------------------------------------- */
 
 /* One step from HERE. g: the gradient; it and work [n] are destroyed. */
-static enum imp_status step(const struct imp__goal *goal, double learning_rate,
-                            struct imp__search *s, double *g, double *work)
+static enum imp_status step(const struct imp__goal *goal,
+                            const struct imp__opt_options *options, struct imp__search *s,
+                            double *g, double *work)
 {
     double *m = s->array[FIRST], *v = s->array[SECOND], *x = s->array[HERE];
     const double age = ++s->scalar[AGE];
-    const double c1 = 1 - pow(BETA1, age), c2 = 1 - pow(BETA2, age);
+    const double b1 = imp__adam_momentum(options), learning_rate = options->learning_rate;
+    const double c1 = 1 - pow(b1, age), c2 = 1 - pow(BETA2, age);
     double mean_v = 0;
     for (size_t k = 0; k < s->n; k++) g[k] *= goal->scale[k];
     imp__basis_along(s->n, rows(s), g, work);
     for (size_t j = 0; j < s->n; j++) {
-        m[j] = BETA1 * m[j] + (1 - BETA1) * work[j];
+        m[j] = b1 * m[j] + (1 - b1) * work[j];
         v[j] = BETA2 * v[j] + (1 - BETA2) * work[j] * work[j];
         mean_v += v[j] / (double)s->n;
     }
@@ -305,7 +306,7 @@ static enum imp_status run(const struct imp__goal *goal,
         IMP_TRY(imp__search_log(s, f, s->array[HERE]));
         s->scalar[LOSS] += f.value;
         s->scalar[LOSS_VAR] += f.se * f.se;
-        IMP_TRY(step(goal, options->learning_rate, s, g, g + n));
+        IMP_TRY(step(goal, options, s, g, g + n));
         if (s->scalar[COUNT] == WINDOW) IMP_TRY(window_end(goal, options, s, g));
         answer(goal, s);
         IMP_TRY(imp__search_iterated(goal, s));

@@ -89,8 +89,8 @@ static double unit_of(const struct imp__goal *goal, const struct imp__search *s,
     return ldexp(1, imp_clamp(exponent, -1000, 1000));
 }
 
-/* Moments from the gradient; returns the mean of v. */
-static double moments(const struct imp__goal *goal, struct imp__search *s,
+/* Moments from the gradient, b1 that of the first; returns the mean of v. */
+static double moments(const struct imp__goal *goal, double b1, struct imp__search *s,
                       const double *g)
 {
     packed *m = floats(s, MEAN_G), *r = floats(s, ROOT_V);
@@ -101,7 +101,7 @@ static double moments(const struct imp__goal *goal, struct imp__search *s,
             const double d = g[k] * (scale_of(s, a, k) / s->scalar[UNIT]);
             const double v =
                 IMP_ADAM_BETA2 * ((double)r[k] * r[k]) + (1 - IMP_ADAM_BETA2) * d * d;
-            m[k] = (float)(IMP_ADAM_BETA1 * m[k] + (1 - IMP_ADAM_BETA1) * d);
+            m[k] = (float)(b1 * m[k] + (1 - b1) * d);
             r[k] = (float)sqrt(v);
             mean_v += v / (double)s->n;
         }
@@ -109,7 +109,7 @@ static double moments(const struct imp__goal *goal, struct imp__search *s,
     return mean_v;
 }
 
-static void step(const struct imp__goal *goal, double learning_rate,
+static void step(const struct imp__goal *goal, const struct imp__opt_options *options,
                  struct imp__search *s, const double *g)
 {
     packed *m = floats(s, MEAN_G), *r = floats(s, ROOT_V);
@@ -117,9 +117,11 @@ static void step(const struct imp__goal *goal, double learning_rate,
     if (s->scalar[UNIT] == 0) s->scalar[UNIT] = unit_of(goal, s, g);
     s->scalar[COUNT]++;
     if (s->scalar[UNIT] == 0) return; /* nothing has a derivative yet */
-    const double age = ++s->scalar[AGE], mean_v = moments(goal, s, g);
-    const double c1 = 1 - pow(IMP_ADAM_BETA1, age), c2 = 1 - pow(IMP_ADAM_BETA2, age);
-    const double rate = learning_rate * pow(1 + s->scalar[PACE], -IMP_ADAM_COOLING);
+    const double b1 = imp__adam_momentum(options), age = ++s->scalar[AGE];
+    const double mean_v = moments(goal, b1, s, g);
+    const double c1 = 1 - pow(b1, age), c2 = 1 - pow(IMP_ADAM_BETA2, age);
+    const double rate =
+        options->learning_rate * pow(1 + s->scalar[PACE], -IMP_ADAM_COOLING);
     /* Relative to the mean of v, whatever the objective's unit: variables that never had
      * a gradient stay at rest. */
     const double tiny = 1e-8 * sqrt(mean_v / c2) + 1e-300;
@@ -247,7 +249,7 @@ enum imp_status imp__adam_many_run(const struct imp__goal *goal,
         IMP_TRY(imp__search_log(s, f, s->x));
         s->scalar[LOSS] += f.value;
         s->scalar[LOSS_VAR] += f.se * f.se;
-        step(goal, options->learning_rate, s, g);
+        step(goal, options, s, g);
         if (s->scalar[COUNT] == IMP_ADAM_WINDOW) window_end(goal, options, s);
         average(s);
         IMP_TRY(imp__search_iterated(goal, s));

@@ -10,7 +10,6 @@
 #include "optimize.h"
 
 /* What both searches are tuned with; adam.c says what it is. */
-#define IMP_ADAM_BETA1   0.9
 #define IMP_ADAM_BETA2   0.99
 #define IMP_ADAM_WINDOW  20
 #define IMP_ADAM_STALLED 0.5
@@ -22,6 +21,10 @@
 /* and what they count as at least, over their mean: some have hardly been seen yet. */
 #define IMP_ADAM_LEAST 0.01
 
+static inline double imp__adam_momentum(const struct imp__opt_options *options)
+{
+    return options->momentum > 0 ? options->momentum : IMP_ADAM_MOMENTUM;
+}
 static inline bool imp__adam_is_many(const struct imp__goal *goal)
 {
     return goal->spans != NULL;

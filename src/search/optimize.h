@@ -13,9 +13,10 @@
 #include "metric.h"
 #include "sparse_normal.h"
 
-#define IMP_DENSE_MAX  256  /* most variables of methods that hold [n][n] matrices */
-#define IMP_SEARCH_FEW 1024 /* variables, above which Adam's memory counts */
-#define IMP_TRAIL_MAX  64   /* variables, up to which a search keeps where it was */
+#define IMP_DENSE_MAX     256  /* most variables of methods that hold [n][n] matrices */
+#define IMP_SEARCH_FEW    1024 /* variables, above which Adam's memory counts */
+#define IMP_ADAM_MOMENTUM 0.9
+#define IMP_TRAIL_MAX     64 /* variables, up to which a search keeps where it was */
 
 /* Parts of the walks whose absence shows how noisy a matrix is. */
 enum { IMP_DEVIATIONS = 8 };
@@ -95,6 +96,8 @@ struct imp__opt_options {
     int max_iterations;   /* > 0 */
     double learning_rate; /* Adam: fraction of the scale */
     double tolerance;     /* fraction of the scale */
+    double
+        momentum; /* Adam: what stays of the mean gradient, below 1; 0: IMP_ADAM_MOMENTUM */
 };
 
 /* scalar[IMP_SEARCH_AVERAGED], public: number of iterates whose average x is. */

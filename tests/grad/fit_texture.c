@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A texture back from a picture: 24 x 24 texels of three colours, by Adam, with bounds;
- * and what smoothness does where the picture says nothing. */
+ * how soon with less momentum, and to the same answer; and what smoothness does where the
+ * picture says nothing. */
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include <math.h>
+#include <unistd.h>
 
 enum { SIDE = 24, N = SIDE * SIDE * 3 };
 
@@ -48,6 +50,105 @@ static double rmse(const double *x, const float *ref)
     double sum = 0, n = 0;
     for (int i = 0; i < N; i++) sum += (x[i] - ref[i]) * (x[i] - ref[i]), n++;
     return sqrt(sum / n);
+}
+
+/* A smooth texture from grey by `iterations` of 8 samples, its target and its walks those of
+ * `seed`; stopped on the way and resumed if there is a checkpoint. x: [N] */
+static void fit(imp_context *ctx, double momentum, int iterations, uint64_t seed,
+                const char *checkpoint, const float *truth, double *x)
+{
+    static float grey[N];
+    struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+    const struct imp_fit_result *r;
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_target t = IMP_TARGET_INIT;
+    imp_film *film;
+    imp_problem *p;
+    imp_scene *s = square(ctx, truth);
+    for (int i = 0; i < N; i++) grey[i] = 0.5f;
+    run.spp = 256;
+    run.seed = 1000 + seed;
+    test_must(ctx, imp_render(s, &run, &film));
+    imp_scene_destroy(s);
+    s = square(ctx, grey);
+    t.width = t.height = 2 * SIDE;
+    t.channels = 3;
+    t.pixels = imp_film_mean(film);
+    test_must(ctx, imp_problem_create(s, &p));
+    test_must(ctx, imp_problem_activate(p, "picture.*"));
+    test_must(ctx, imp_problem_add_target(p, &t));
+    run.spp = 8;
+    run.seed = seed;
+    o.momentum = momentum;
+    o.checkpoint = checkpoint;
+    o.resume = checkpoint != NULL;
+    for (int part = checkpoint ? 0 : 1; part < 2; part++) {
+        o.max_iterations = part ? iterations : iterations / 3;
+        test_must(ctx, imp_fit(p, &o, &run, &r));
+    }
+    imp_problem_get_x(p, x);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+    imp_film_destroy(film);
+}
+
+static void momenta(imp_context *ctx)
+{
+    enum { SEEDS = 5, SOON = 20, LATE = 45 };
+    static float truth[N];
+    static double x[N], other[N];
+    double gain = 0, gain2 = 0, error[2] = {0, 0};
+    for (int i = 0; i < N; i++)
+        truth[i] = (float)(0.5 + 0.3 * sin(0.8 * (i / 3 % SIDE) + i % 3) *
+                                     cos(0.6 * (i / 3. / SIDE)));
+    for (uint64_t seed = 1; seed <= SEEDS; seed++) {
+        double e[2];
+        for (int k = 0; k < 2; k++) {
+            fit(ctx, k ? 0.5 : 0, SOON, seed, NULL, truth, x);
+            e[k] = rmse(x, truth);
+            error[k] += e[k] / SEEDS;
+        }
+        gain += (e[0] - e[1]) / SEEDS;
+        gain2 += (e[0] - e[1]) * (e[0] - e[1]) / SEEDS;
+    }
+    const double gain_se = sqrt(fmax(gain2 - gain * gain, 0) / (SEEDS - 1));
+    tap_ok(gain > 4.5 * gain_se && error[1] < 0.5 * error[0],
+           "sooner with momentum .5 # rms error %.4f after %d iterations, %.4f with .9; "
+           "z %.1f",
+           error[1], SOON, error[0], gain / gain_se);
+
+    /* The mean over the texels, whose errors have either sign. */
+    for (int k = 0; k < 2; k++) {
+        double mean = 0, square_mean = 0;
+        for (uint64_t seed = 1; seed <= SEEDS; seed++) {
+            double off = 0;
+            fit(ctx, k ? 0.5 : 0, LATE, seed, NULL, truth, x);
+            for (int i = 0; i < N; i++) off += (x[i] - truth[i]) / N;
+            mean += off / SEEDS;
+            square_mean += off * off / SEEDS;
+        }
+        const double se = sqrt(fmax(square_mean - mean * mean, 0) / (SEEDS - 1));
+        tap_ok(
+            fabs(mean) < 4.5 * se && se < 2e-4,
+            "momentum %s ends at the truth # mean over the texels %.2g +- %.2g, z %.2f",
+            k ? ".5" : ".9", mean, se, mean / se);
+    }
+
+    char path[64];
+    imp_context *one = test_context(1), *three = test_context(3);
+    int differ[2] = {0, 0};
+    snprintf(path, sizeof path, "/tmp/imp_fit_texture_%ld.ck", (long)getpid());
+    fit(three, 0.5, 30, 1, NULL, truth, x);
+    fit(one, 0.5, 30, 1, NULL, truth, other);
+    for (int i = 0; i < N; i++) differ[0] += x[i] != other[i];
+    fit(one, 0.5, 30, 1, path, truth, other);
+    for (int i = 0; i < N; i++) differ[1] += x[i] != other[i];
+    remove(path);
+    imp_context_destroy(one);
+    imp_context_destroy(three);
+    tap_ok(differ[0] == 0 && differ[1] == 0,
+           "the same bits by one thread, and stopped and resumed # %d, %d differ",
+           differ[0], differ[1]);
 }
 
 int main(void)
@@ -150,6 +251,7 @@ int main(void)
     imp_problem_destroy(p);
     imp_film_destroy(film);
     imp_scene_destroy(s);
+    momenta(ctx);
     imp_context_destroy(ctx);
     return tap_done();
 }

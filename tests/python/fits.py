@@ -238,6 +238,16 @@ def test_ties():
     return "z %.2f" % worst
 
 
+def test_momentum():
+    """Momentum of Adam: 0 is 0.9, and another takes another way"""
+    s, target, p, truth = setting(res=8)
+    fits = []
+    for momentum in (0, .9, .5):
+        p[RED] = .4, .3, .2
+        fits.append(im.fit(s, target, p, spp=4, max_iterations=10, momentum=momentum, intervals=False)[RED].value)
+    assert np.array_equal(fits[0], fits[1]) and not np.array_equal(fits[0], fits[2])
+
+
 def test_intervals_off():
     """Without intervals there are no errors and no covariance"""
     s, target, p, truth = setting()
@@ -249,7 +259,7 @@ def test_bad_fits():
     """Bad arguments are named; the scene is as it was"""
     s, target, p, truth = setting()
     for words, kw in ((("optimizer", "adam"), dict(optimizer="sgd")), (("max_iterations",), dict(max_iterations=-1)),
-                      (("learning_rate",), dict(learning_rate=float("nan"))), (("loss",), dict(loss="l0")),
+                      (("learning_rate",), dict(learning_rate=float("nan"))), (("momentum",), dict(momentum=1)), (("loss",), dict(loss="l0")),
                       (("l1",), dict(optimizer="lm", loss="l1")), (("no/where/c",), dict(checkpoint="no/where/c")),
                       (("noise_se",), dict(noise_se=np.full((16, 16, 3), -1.)))):
         raises(im.Error, lambda: im.fit(s, target, p, spp=4, **kw), *words)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Adam of many variables: 40 bytes each, gradient included; the steps and the answer of
- * the search that keeps doubles; and the bits of an uninterrupted search after a
- * checkpoint. */
+ * the search that keeps doubles; the bits of an uninterrupted search after a checkpoint;
+ * and steps with other momenta against the formula. */
 #include "imp_fail_alloc.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
@@ -68,7 +68,7 @@ static void bowl_make(struct bowl *b, imp_context *ctx, size_t n, bool many, dou
 static struct imp__search *begin(struct bowl *b, double *x0, int iterations)
 {
     struct imp__search *s;
-    const struct imp__opt_options o = {iterations, 0.05, 1e-6};
+    const struct imp__opt_options o = {iterations, 0.05, 1e-6, 0};
     for (size_t k = 0; k < b->n; k++) x0[k] = 0.5;
     test_must(b->goal.ctx, imp__search_create(&b->goal, IMP_ADAM, &o, x0, &s));
     return s;
@@ -76,7 +76,7 @@ static struct imp__search *begin(struct bowl *b, double *x0, int iterations)
 
 static void run(struct bowl *b, struct imp__search *s, int iterations)
 {
-    const struct imp__opt_options o = {iterations, 0.05, 1e-6};
+    const struct imp__opt_options o = {iterations, 0.05, 1e-6, 0};
     const enum imp_status st = imp__optimize(&b->goal, &o, s);
     if (st != IMP_CANCELLED) test_must(b->goal.ctx, st);
 }
@@ -148,6 +148,48 @@ static void resumed(void)
     imp_context_destroy(ctx);
 }
 
+/* Its gradient is 1, then -1. */
+static enum imp_status eval_turned(const double *x, uint64_t seed, struct imp_estimate *f,
+                                   double *g, double *g_se, void *payload)
+{
+    int *calls = payload;
+    (void)x, (void)seed, (void)g_se;
+    for (size_t k = 0; k < 2; k++) g[k] = *calls % 2 ? -1 : 1;
+    ++*calls;
+    *f = (struct imp_estimate){0};
+    return IMP_OK;
+}
+
+/* Two steps: the first is the rate a, and of the second, with v = 1 either way,
+ *
+ *     m / (1 - b^2) = (b (1 - b) - (1 - b)) / (1 - b^2) = -(1 - b) / (1 + b)
+ */
+static void momenta(bool many)
+{
+    static const double lo[2] = {-1, -1}, hi[2] = {1, 1}, scale[2] = {1, 1};
+    static const double asked[] = {0, 0.9, 0.5, 0.25};
+    imp_context *ctx = test_context(1);
+    for (int i = 0; i < 4; i++) {
+        const double b = asked[i] > 0 ? asked[i] : 0.9;
+        const double x0[2] = {0, 0}, expected = -0.05 + 0.05 * (1 - b) / (1 + b);
+        const struct imp__opt_options o = {2, 0.05, 1e-6, asked[i]};
+        const struct imp__span span = {2, -1, 1, 1, false};
+        int calls = 0;
+        struct imp__goal goal = {
+            .ctx = ctx, .n = 2, .eval = eval_turned, .payload = &calls};
+        struct imp__search *s;
+        if (many) goal.spans = &span, goal.n_spans = 1;
+        else goal.lo = lo, goal.hi = hi, goal.scale = scale;
+        test_must(ctx, imp__search_create(&goal, IMP_ADAM, &o, x0, &s));
+        test_must(ctx, imp__optimize(&goal, &o, s));
+        const double off = fabs(imp__search_answer(s, 0) - expected);
+        tap_ok(off < 1e-7, "%s: momentum %g # %.9f, off by %.1g",
+               many ? "in floats" : "in doubles", asked[i], expected, off);
+        imp__search_destroy(s);
+    }
+    imp_context_destroy(ctx);
+}
+
 static void memory(void)
 {
     enum { LARGE = 500000 };
@@ -173,6 +215,8 @@ int main(void)
     compared(1e-60); /* squares of such derivatives are no floats */
     compared(1e60);
     resumed();
+    momenta(false);
+    momenta(true);
     memory();
     return tap_done();
 }
