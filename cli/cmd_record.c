@@ -13,7 +13,7 @@
 #include <sys/stat.h>
 
 static struct {
-    double memory, survival, ess;
+    double memory, survival, ess, headroom;
     int all_sensors, pictures;
 } o = {.survival = 0.8};
 
@@ -33,6 +33,10 @@ static const struct arg_option options[] = {
     {ARG_NUMBER, 0, "ess", "F",
      "least effective sample size, a fraction, with which they answer (default 0.5)",
      &o.ess, 1e-6, 1, NULL},
+    {ARG_NUMBER, 0, "headroom", "H",
+     "extinctions of grids may grow, by this factor where they are largest, also from 0 "
+     "(default 1: they may not)",
+     &o.headroom, 1, 64, NULL},
     {0}};
 
 /* The scene's file name with the extension .walks, in the working folder. */
@@ -82,6 +86,7 @@ static int run_record(int n, char **operand)
         options_of.all_sensors = o.all_sensors;
         options_of.survival = o.survival > 0 ? o.survival : -1;
         options_of.ess = o.ess;
+        options_of.headroom = o.headroom;
         options_of.spread = 1;
         enum imp_status st = imp_walks_keep(cli.scene, &run, &options_of, &walks);
         if (st == IMP_OK) st = imp_walks_write(walks, path);

@@ -36,6 +36,10 @@ const struct arg_option options_search[] = {
     {ARG_NUMBER, 0, "memory", "MB",
      "of lbfgs, mma and slsqp, for the walks that they keep (default 1074; 0: none)",
      &fit_choice.memory, 0, 1e12, NULL},
+    {ARG_NUMBER, 0, "headroom", "H",
+     "of lbfgs, mma and slsqp, by which extinctions of grids may grow while walks are "
+     "kept (default 1: such walks are not kept)",
+     &fit_choice.headroom, 1, 64, NULL},
     {ARG_CHOICE, 0, "control-variate", "WHEN",
      "of adam, walks are evaluated at the last numbers, too: auto (default: for more "
      "than 64 numbers, where possible), on or off",
@@ -65,6 +69,7 @@ struct imp_fit_options fit_choice_options(void)
     fit.memory = fit_choice.memory < 0    ? 0
                  : fit_choice.memory == 0 ? -1
                                           : 1e6 * fit_choice.memory;
+    fit.headroom = fit_choice.headroom;
     static const enum imp_variates variates[] = {IMP_VARIATES_AUTO, IMP_VARIATES_ON,
                                                  IMP_VARIATES_OFF};
     fit.control_variate = variates[fit_choice.variate];

@@ -10,6 +10,7 @@ struct fit_choice {
     int optimizer, iterations, no_intervals, levels, missing, variate, allocation;
     double learning_rate, tolerance, momentum;
     double memory; /* MB; < 0: not given */
+    double headroom;
 };
 extern struct fit_choice fit_choice;
 extern const struct arg_option options_search[],

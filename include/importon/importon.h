@@ -1032,6 +1032,10 @@ struct imp_fit_options {
      * beta1, in (0, 1); 0: 0.9. With control variates gradients have little noise, and
      * textures want 0.5 (docs/fitting.md). */
     double momentum;
+    /** Of IMP_LBFGS, IMP_MMA and IMP_SLSQP: walks are kept, too, where extinctions that vary
+     * in space are fitted, with so much room to grow (imp_walks_options.headroom); 0 or 1:
+     * none, and such walks are traced each time. */
+    double headroom;
 };
 #define IMP_FIT_OPTIONS_INIT                                                             \
     {                                                                                    \

@@ -45,17 +45,24 @@ struct imp_walks_options {
     /** Ranks of a team keep a share each, to be written (imp_walks_write) and not evaluated:
      * memory and work are divided. 0: each keeps all of them. */
     int spread;
+    /** Room for extinctions that vary in space, of grids: collisions are drawn under bounds
+     * that many times as high, at least an eighth of the medium's largest and one over the
+     * size of its box before they are raised by this factor less 1, and a tenth of them at
+     * least count as real. Such numbers may then grow up to the bounds, also from 0, and
+     * walks have the derivative with respect to them. Walks become longer, and their
+     * variance larger. 0 or 1: none; at most 64. */
+    double headroom;
 };
 #define IMP_WALKS_OPTIONS_INIT                                                           \
     {                                                                                    \
-        sizeof(struct imp_walks_options), 0, 0, 0, 0, 0, 0                               \
+        sizeof(struct imp_walks_options), 0, 0, 0, 0, 0, 0, 0                            \
     }
 
 /** Draw walks at the scene's present parameters and keep them: about 160 bytes a vertex.
  * The scene must outlive them. Parameters with a gradient may change afterwards, but for
  * those of graded indices, which move rays. By extinctions collisions were drawn: they may
  * change where they were not 0, up to the bounds under which collisions were drawn, and
- * walks have no derivative with respect to them. Alpha stays that of the draw.
+ * walks have no derivative with respect to them, unless there is headroom. Alpha stays that of the draw.
  * @param run     as of imp_render; NULL for the defaults.
  * @param options NULL for the defaults.
  * @param[out] out the caller destroys it.

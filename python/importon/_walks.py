@@ -179,7 +179,7 @@ def read_walks(path: Any, scene: Optional[Scene] = None, *, memory: float = 0, e
 
 
 def keep(scene: Scene, params: Any = None, sensor: Any = 0, seed: int = 0, spp: int = 0, *, memory: float = 0,
-         losses: bool = False, survival: float = 0, ess: float = 0, guide: Any = None,
+         losses: bool = False, survival: float = 0, ess: float = 0, headroom: float = 0, guide: Any = None,
          wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene",
          progress: Any = None) -> Walks:
     """Draw walks at the scene's present parameters and keep what rays and random numbers have
@@ -202,6 +202,9 @@ def keep(scene: Scene, params: Any = None, sensor: Any = 0, seed: int = 0, spp: 
         integrator decides.
     ess : float
         Least effective sample size, as a fraction, with which they are evaluated; 0: 0.5.
+    headroom : float
+        By which factor extinctions of grids may grow, also from 0, so that walks have the
+        derivative with respect to them; 0 or 1: none.
 
     Returns
     -------
@@ -228,7 +231,7 @@ def keep(scene: Scene, params: Any = None, sensor: Any = 0, seed: int = 0, spp: 
     options = run_options(scene, sensor=sensor, seed=seed, spp=spp, guide=guide, wavelengths=wavelengths,
                           wavelength_set=wavelength_set, points=points)
     wanted = make(_c.imp_walks_options, memory=float(memory), losses=bool(losses), survival=float(survival),
-                  ess=float(ess))
+                  ess=float(ess), headroom=float(headroom))
     not_inside()
     with scene.lock:
         push(scene, params)

@@ -12,7 +12,7 @@
 
 #define IMP_WALKS_MAGIC      "impdrawn"
 #define IMP_WALKS_BYTE_ORDER 0x01020304u
-#define IMP_WALKS_VERSION    2
+#define IMP_WALKS_VERSION    3
 
 struct imp_walks_head {
     char magic[8];
@@ -21,9 +21,9 @@ struct imp_walks_head {
     uint64_t evaluated; /* imp__fingerprint_evaluated */
     uint64_t seed;
     int32_t spp, points, wavelengths, wavelength_set, losses, n_stores, guided, reserved;
-    double survival, ess;
+    double survival, ess, headroom;
 };
-_Static_assert(sizeof(struct imp_walks_head) == 96, "no padding: it is written");
+_Static_assert(sizeof(struct imp_walks_head) == 104, "no padding: it is written");
 
 struct imp_walks_store_head {
     struct imp_record_of of;

@@ -79,6 +79,7 @@ static enum imp_status head_take(struct reading *r)
         h->wavelength_set < 0 || h->losses < 0 || h->losses > 1 || h->n_stores < 1 ||
         h->guided < 0 || h->guided > 1 || h->reserved != 0 ||
         !(h->survival >= 0 && h->survival <= 1) || !(h->ess >= 0 && h->ess <= 1) ||
+        !(h->headroom >= 0 && h->headroom <= IMP_HEADROOM_MOST) ||
         h->n_theta > SIZE_MAX / 16)
         IMP_TRY(damaged(r, "its head"));
     if (h->scene_bytes > r->size) IMP_TRY(damaged(r, "it ends early"));
@@ -207,7 +208,8 @@ static enum imp_status walks_take(struct reading *r, imp_scene *scene, double me
                                         .losses = r->head.losses,
                                         .survival =
                                             r->head.survival > 0 ? r->head.survival : -1,
-                                        .ess = ess > 0 ? ess : r->head.ess};
+                                        .ess = ess > 0 ? ess : r->head.ess,
+                                        .headroom = r->head.headroom};
     IMP_TRY(imp__walks_begin(scene, &run, &o, NULL, &w));
     w->guided = r->head.guided != 0;
     memcpy(w->theta, r->theta, scene->n_theta * sizeof *w->theta);
@@ -247,9 +249,11 @@ enum imp_status imp_walks_read(imp_context *ctx, imp_scene *scene, const char *p
     if (!(o.memory >= 0) || isinf(o.memory) || !(o.ess >= 0 && o.ess <= 1))
         return imp__error(ctx, IMP_E_ARG, "options: memory %g or ess %g is out of range",
                           o.memory, o.ess);
-    if (o.survival != 0)
+    if (o.survival != 0 || o.headroom != 0)
         return imp__error(ctx, IMP_E_ARG,
-                          "options: the file has its own survival, not %g", o.survival);
+                          "options: the file has its own survival and headroom, not %g "
+                          "and %g",
+                          o.survival, o.headroom);
     IMP_TRY(imp__file_open(ctx, path, &held, &r.from.f));
     if (!r.from.f) IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: there is no such file", path));
     if (scene) {

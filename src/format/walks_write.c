@@ -146,7 +146,8 @@ enum imp_status imp_walks_write(const imp_walks *w, const char *path)
                                     .n_stores = w->n_stores,
                                     .guided = w->guided,
                                     .survival = w->survival,
-                                    .ess = w->ess};
+                                    .ess = w->ess,
+                                    .headroom = w->headroom};
         st = imp__file_write_by(ctx, path, walks_fill, &payload);
         if (w->spread && !x.begun) stores_put(&x); /* the others wait for it */
         if (x.status != IMP_OK)

@@ -4,6 +4,7 @@
 #include "fit.h"
 #include "base/arguments.h"
 #include "clip.h"
+#include "keep.h"
 #include "search/covariance.h"
 #include "variate.h"
 #include <math.h>
@@ -183,6 +184,9 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
         IMP_TRY(imp__error(ctx, IMP_E_ARG,
                            "Levenberg-Marquardt needs a second derivative of the loss, "
                            "and l1 has none: use Adam, or another loss"));
+    if (!(f.options.headroom >= 0 && f.options.headroom <= IMP_HEADROOM_MOST))
+        IMP_TRY(
+            imp__error(ctx, IMP_E_ARG, "headroom %g: out of range", f.options.headroom));
     IMP_TRY(imp__fit_start_keep(p, f.spans != NULL, &start));
     imp__fit_answer_free(p);
     imp__clip_reset(p);

@@ -72,6 +72,9 @@ void imp__fit_fingerprint(struct imp__fit *f)
     }
     if (imp__fit_keeps(f))
         h->options = imp__hash(h->options, &f->options.memory, sizeof f->options.memory);
+    if (imp__fit_keeps(f) && f->options.headroom > 1)
+        h->options =
+            imp__hash(h->options, &f->options.headroom, sizeof f->options.headroom);
     if (f->variate) {
         const int version = VARIATE_VERSION;
         h->options = imp__hash(h->options, &version, sizeof version);

@@ -3,7 +3,7 @@
  * Methods with common random numbers (L-BFGS, MMA, SLSQP) evaluate one draw of walks many
  * times: the walks are kept, and evaluated at other numbers without a ray. A new draw is
  * made when the effective sample size of n walks falls below REDRAW_ESS n
- * (walk/store_weight.c). The objective and the intervals of an answer come from fresh
+ * (walk/store_weight.c), or an extinction leaves its headroom. The objective and the intervals of an answer come from fresh
  * walks (fit.c): the search has fitted the noise of its own walks, whose errors would be
  * too small. */
 #include "base/team.h"
@@ -90,6 +90,7 @@ enum imp_status imp__fit_draw(const double *x, uint64_t seed, void *payload)
                                       f->options.memory > 0 ? f->options.memory : MEMORY,
                                   .losses = 1,
                                   .survival = SURVIVAL,
+                                  .headroom = f->options.headroom,
                                   .ess = -1}; /* imp__fit_take_walks checks it */
     imp__walks_destroy(f->walks);
     f->walks = NULL;
@@ -156,6 +157,10 @@ enum imp_status imp__fit_take_walks(struct imp__fit *f, const double *x, uint64_
     for (int k = 0; k < f->walks->n_stores && st == IMP_OK; k++) {
         struct imp_walks_weight w;
         st = imp__walks_weigh(f->walks, &f->walks->stores[k], NULL, WEIGHED, &w);
+        if (st == IMP_E_UNSUPPORTED) { /* an extinction is above its bounds */
+            w.ess = 0;
+            st = IMP_OK;
+        }
         ess = fmin(ess, w.ess);
         finite &= imp__walks_finite(f->walks, &w);
     }

@@ -8,6 +8,7 @@
 #include "estimate.h"
 #include "film/film_filter.h"
 #include "film/film_measure.h"
+#include "scene/in_medium.h"
 #include "walk/run.h"
 #include <string.h>
 
@@ -134,7 +135,8 @@ enum imp_status imp__walks_sensor(struct imp_walks *w, const struct imp_active *
                                   .seed = run.seed,
                                   .guide = imp__guide_of(scene, w->integrator, run.guide),
                                   .collisions_stand = true,
-                                  .survival = w->survival};
+                                  .survival = w->survival,
+                                  .headroom = w->headroom};
     imp__tracer_numbers(tracer, &run, w->losses ? 0 : (int64_t)numbers.n);
     if (w->losses) tracer->set = 1;
     IMP_TRY(imp__store_create(
@@ -166,6 +168,26 @@ static enum imp_status sensor_keep(struct imp_walks *w, const struct imp_active 
 
 /* ---- All of them ----------------------------------------------------------------- */
 
+/* Is it an extinction of media that vary, beside an albedo, and of no others? */
+static bool is_grid(const struct imp_walks *w, size_t param, uint8_t *one)
+{
+    bool any = false;
+    one[param] = 1;
+    for (int k = 0; k < w->scene->n_media; k++) {
+        const struct imp_medium *m = w->scene->media[k];
+        for (int j = 0; j < m->n_own; j++) {
+            if (!(m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION) ||
+                !imp__input_depends(m->input[j], one))
+                continue;
+            any = m->majorants && imp__in_medium_has_albedo(m);
+            if (!any) goto out;
+        }
+    }
+out:
+    one[param] = 0;
+    return any;
+}
+
 /* Chooses the parameters whose derivative is that of frozen walks, and those by which
  * collisions were drawn. */
 static enum imp_status chosen_make(struct imp_walks *w, const uint8_t *free)
@@ -174,17 +196,21 @@ static enum imp_status chosen_make(struct imp_walks *w, const uint8_t *free)
     w->chosen = imp__alloc(w->ctx, scene->n_params + 1, 1);
     w->flights = imp__alloc(w->ctx, scene->n_params + 1, 1);
     w->theta = imp__alloc(w->ctx, scene->n_theta + 1, sizeof *w->theta);
-    if (!w->chosen || !w->flights || !w->theta)
+    uint8_t *one = imp__alloc(w->ctx, scene->n_params + 1, 1);
+    if (!w->chosen || !w->flights || !w->theta || !one) {
+        imp__release(w->ctx, one);
         return imp__error(w->ctx, IMP_E_NOMEM, "no memory for kept walks");
+    }
     for (size_t k = 0; k < scene->n_params; k++) {
         const struct imp_param *p = &scene->params[k];
         const bool smooth =
             p->info.flags & IMP_PARAM_DIFFERENTIABLE && (!free || free[k]);
-        w->chosen[k] = smooth && !p->probed;
-        w->flights[k] = smooth && p->probed;
+        w->chosen[k] = smooth && (!p->probed || (w->headroom > 1 && is_grid(w, k, one)));
+        w->flights[k] = smooth && !w->chosen[k];
         for (size_t e = 0; e < p->info.count; e++)
             w->theta[p->info.offset + e] = imp__param_get(p, e);
     }
+    imp__release(w->ctx, one);
     for (int b = 0; b < scene->n_bodies; b++)
         for (int k = 0; k < scene->bodies[b]->n_numbers; k++) {
             const int param = scene->bodies[b]->numbers[k].param;
@@ -220,6 +246,7 @@ enum imp_status imp__walks_begin(imp_scene *scene, const struct imp_run *run,
                             .guided = run->guide && run->guide->expected,
                             .spread = o->spread && imp__team_ranks(ctx),
                             .survival = o->survival < 0 ? 0 : o->survival,
+                            .headroom = o->headroom > 1 ? o->headroom : 0,
                             .ess = o->ess,
                             .integrator = integrator};
     w->stores = imp__alloc(ctx, (size_t)scene->n_sensors + 1, sizeof *w->stores);
@@ -305,10 +332,12 @@ enum imp_status imp_walks_keep(imp_scene *scene, const struct imp_run *run,
     const struct imp_sensor *sensor;
     uint8_t *sensors = NULL;
     if (!(o.memory >= 0) || !(o.survival <= 1) || isinf(o.survival) ||
-        !(o.ess >= 0 && o.ess <= 1) || isinf(o.memory))
+        !(o.ess >= 0 && o.ess <= 1) || isinf(o.memory) ||
+        !(o.headroom >= 0 && o.headroom <= IMP_HEADROOM_MOST))
         return imp__error(ctx, IMP_E_ARG,
-                          "options: memory %g, survival %g or ess %g is out of range",
-                          o.memory, o.survival, o.ess);
+                          "options: memory %g, survival %g, ess %g or headroom %g is out "
+                          "of range",
+                          o.memory, o.survival, o.ess, o.headroom);
     if (own.walks || own.time_limit_s > 0)
         return imp__error(ctx, IMP_E_ARG,
                           "walks that are kept are traced, as many as run->spp says");

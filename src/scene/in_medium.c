@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "in_medium.h"
+#include "majorants.h"
 #include "math/vec.h"
 
 static const struct imp_medium *medium_of(const struct imp_bsdf *b) { return b->self; }
@@ -26,6 +27,39 @@ static imp_spec over(imp_spec a, imp_spec b)
 static imp_spec albedo_of(const struct imp_coefficients *c)
 {
     return over(c->scattering, c->extinction);
+}
+/* ... or what it would be if anything did, where that is one number: it is no factor of the
+ * derivative with respect to an extinction of 0, but what is scattered there is. */
+static imp_spec albedo_near(const struct imp_medium *m, const imp_spec *in,
+                            const struct imp_coefficients *c)
+{
+    imp_spec albedo = albedo_of(c);
+    struct imp_coefficients dc[IMP_INPUTS_MAX];
+    bool all = true;
+    for (int k = 0; m->majorants && k < m->majorants->channels; k++)
+        all &= c->extinction[k] > 0;
+    if (imp_likely(all)) return albedo;
+    m->ops->eval_d(m, in, dc);
+    for (int j = 0; j < m->n_own; j++)
+        for (int k = 0; k < 4; k++)
+            if (!(c->extinction[k] > 0) && dc[j].extinction[k] > 0)
+                albedo[k] = dc[j].scattering[k] / dc[j].extinction[k];
+    return albedo;
+}
+bool imp__in_medium_has_albedo(const struct imp_medium *m)
+{
+    imp_spec in[IMP_INPUTS_MAX];
+    struct imp_coefficients c, dc[IMP_INPUTS_MAX];
+    for (int j = 0; j < m->n_own; j++) in[j] = imp__spec(0.5 + 0.125 * j);
+    m->ops->eval(m, in, &c);
+    m->ops->eval_d(m, in, dc);
+    for (int j = 0; j < m->n_own; j++) {
+        if (!(dc[j].extinction[0] > 0)) continue;
+        const double apart =
+            dc[j].scattering[0] * c.extinction[0] - dc[j].extinction[0] * c.scattering[0];
+        if (fabs(apart) > 1e-9 * c.extinction[0] * dc[j].extinction[0]) return false;
+    }
+    return true;
 }
 /* albedo = scattering/extinction */
 static imp_spec albedo_d(const struct imp_coefficients *c,
@@ -69,7 +103,7 @@ static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_
     struct imp_coefficients c;
     m->ops->eval(m, in, &c);
     pure_eval(b, in, d, f);
-    *f *= albedo_of(&c);
+    *f *= albedo_near(m, in, &c);
 }
 static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
                    imp_spec *df)
@@ -82,7 +116,8 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     pure_eval(b, in, d, &p);
     pure_eval_d(b, in, d, df);
     for (int j = 0; j < m->n_own; j++) df[j] = albedo_d(&c, &dc[j]) * p;
-    for (int j = m->n_own; j < m->n_in; j++) df[j] *= albedo_of(&c);
+    const imp_spec albedo = albedo_near(m, in, &c);
+    for (int j = m->n_own; j < m->n_in; j++) df[j] *= albedo;
 }
 
 /* What is absorbed at a collision is emitted there (1 - albedo times the emission). */

@@ -16,6 +16,9 @@ static inline bool imp__is_in_medium(const struct imp_bsdf *b)
 {
     return b->ops == &imp__in_medium || b->ops == &imp__in_pure_medium;
 }
+/* Does the albedo not depend on how large the extinction is? Of scattering and absorption it
+ * does, and where both are 0 it is not known. */
+bool imp__in_medium_has_albedo(const struct imp_medium *m);
 /* Input j as the medium or its phase function declares it. */
 const struct imp_input_desc *imp__in_medium_input(const struct imp_bsdf *b, int j);
 

@@ -17,7 +17,8 @@ struct imp_free_flight imp__flight_from(struct imp_step *s, imp_v3 o, imp_v3 d,
                                         imp__key_branch(s->walk->key, s->depth, stream),
                                     .o = imp__decide(o),
                                     .d = imp__decide(d),
-                                    .f = imp__spec(1)};
+                                    .f = imp__spec(1),
+                                    .p = imp__spec(1)};
 }
 
 bool imp__flight_event(struct imp_free_flight *w, struct imp_event e)
@@ -75,7 +76,9 @@ static bool uniform_fly(struct imp_free_flight *w, const struct imp_medium *m,
     *t = near + length;
     length = imp__decide1(length);
     const imp_spec T = imp__attenuation(sigma, length);
-    w->f *= hit ? sigma * T : T;
+    const imp_spec value = hit ? sigma * T : T;
+    w->f *= value;
+    w->p *= value;
     imp__flight_event(w, (struct imp_event){.t = (imp_decided)length,
                                             .bound = *stands,
                                             .medium = m->index,
@@ -87,6 +90,30 @@ static bool uniform_fly(struct imp_free_flight *w, const struct imp_medium *m,
 
 /* Of a walk, in all; extinctions without measure would go on for hours. */
 #define EVENTS_MAX (1 << 20)
+
+#define REAL_LEAST 0.1   /* probability of a real collision, with headroom */
+#define EMPTY      0.125 /* of the largest bound, where there is none */
+
+static inline bool has_room(const struct imp_free_flight *w)
+{
+    return imp_unlikely(w->s->tracer->headroom > 1);
+}
+
+/* As a record stores it. */
+static double raised(const struct imp_free_flight *w, const struct imp_majorants *g,
+                     double bound)
+{
+    const double h = w->s->tracer->headroom;
+    double size = 0;
+    if (!has_room(w)) return bound;
+    for (int a = 0; a < 3; a++) {
+        imp_v3 edge = {0};
+        edge[a] = 1;
+        size = fmax(size, imp__length(imp__vector(&g->to_world, edge)));
+    }
+    const double empty = fmax(EMPTY * (double)g->most, 1 / size);
+    return imp__decide1(fmax(h * bound, (h - 1) * empty));
+}
 
 /* Extinction over its bound at a tentative collision. False: the walk is dropped. */
 static inline bool tentative(struct imp_free_flight *w, const struct imp_medium *m,
@@ -114,8 +141,11 @@ static bool collide(struct imp_free_flight *w, const struct imp_medium *m, doubl
     struct imp_step *s = w->s;
     imp_spec sigma;
     if (!tentative(w, m, t, bound, &sigma)) return true;
-    const bool real = collides && uniform(w) < sigma[imp__lane_mis_drew(s)];
+    imp_spec p = sigma;
+    for (int c = 0; has_room(w) && c < 4; c++) p[c] = fmax(p[c], REAL_LEAST);
+    const bool real = collides && uniform(w) < p[imp__lane_mis_drew(s)];
     w->f *= real ? sigma : 1 - sigma;
+    w->p *= real ? p : 1 - p;
     imp__flight_event(w, (struct imp_event){.t = (imp_decided)t,
                                             .bound = (imp_decided)bound,
                                             .medium = m->index,
@@ -151,12 +181,14 @@ static bool varying_fly(struct imp_free_flight *w, const struct imp_medium *m,
     const bool lanes =
         !collides && w->s->tracer->integrator->transmittance == IMP_DELTA_TRACKING;
     double path = free_path(w), at = cells.t;
+    cells.bound = raised(w, cells.of, cells.bound);
     for (;;) {
         const double room = (cells.leave - at) * cells.bound;
         if (!(path < room)) {
             path -= room;
             if (!imp__majorants_next(&cells)) return false;
             at = cells.t;
+            if (has_room(w)) cells.bound = raised(w, cells.of, cells.bound);
             continue;
         }
         at += path / cells.bound;
@@ -177,7 +209,7 @@ static bool varying_fly(struct imp_free_flight *w, const struct imp_medium *m,
 
 /* A tentative collision with what the control leaves. */
 static bool residual_at(struct imp_free_flight *w, const struct imp_medium *m, double t,
-                        const struct imp_control *c)
+                        double mean, double reach)
 {
     struct imp_step *s = w->s;
     imp_spec in[IMP_INPUTS_MAX];
@@ -187,10 +219,10 @@ static bool residual_at(struct imp_free_flight *w, const struct imp_medium *m, d
     }
     const imp_spec sigma = imp__extinction_at(m, w->o + w->d * t, s->at.carried, in);
     const struct imp_event e[2] = {{.t = (imp_decided)t,
-                                    .bound = c->reach,
+                                    .bound = (imp_decided)reach,
                                     .medium = m->index,
                                     .kind = IMP_RESIDUAL_AT},
-                                   {.t = c->mean, .kind = IMP_RESIDUAL_OF}};
+                                   {.t = (imp_decided)mean, .kind = IMP_RESIDUAL_OF}};
     w->f *= imp__residual(sigma, e);
     return imp__flight_event(w, e[0]) && imp__flight_event(w, e[1]) &&
            !imp__is_zero_used(w->f, s->at.carried);
@@ -203,14 +235,15 @@ static void residual_fly(struct imp_free_flight *w, const struct imp_medium *m,
     double path = free_path(w);
     do {
         const struct imp_control *c = &m->majorants->control[cells->cell];
+        const double mean = c->mean, reach = raised(w, cells->of, c->reach);
         double at = cells->t;
-        w->control += (double)c->mean * (cells->leave - at);
-        while (path < (cells->leave - at) * (double)c->reach) {
-            at += path / (double)c->reach;
+        w->control += mean * (cells->leave - at);
+        while (path < (cells->leave - at) * reach) {
+            at += path / reach;
             path = free_path(w);
-            if (!residual_at(w, m, imp__decide1(at), c)) return;
+            if (!residual_at(w, m, imp__decide1(at), mean, reach)) return;
         }
-        path -= (cells->leave - at) * (double)c->reach;
+        path -= (cells->leave - at) * reach;
     } while (imp__majorants_next(cells));
 }
 

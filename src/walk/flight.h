@@ -1,7 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A free flight through media while it is decided (tracking.h says what its events
- * are). */
+ * are).
+ *
+ * With headroom h > 1, so that kept walks can be evaluated where extinctions are larger,
+ * tentative collisions are drawn under b' = max(h b, (h - 1) e), e an eighth of the largest
+ * bound or one over the size of the box, and are real with the probability max(sigma/b',
+ * 1/10) of a lane. Then there is a density wherever 0 <= sigma <= b', also where sigma is
+ * 0, and the value of a flight is no longer its density. */
 #ifndef IMP_WALK_FLIGHT_H
 #define IMP_WALK_FLIGHT_H
 
@@ -10,10 +16,11 @@
 /* A ray through media, from its start. */
 struct imp_free_flight {
     struct imp_step *s;
-    struct imp_key key;      /* of its own random numbers */
-    uint32_t n;              /* of them used */
-    imp_v3 o, d;             /* as decided: where extinction is looked up */
-    imp_spec f;              /* the segment's value */
+    struct imp_key key; /* of its own random numbers */
+    uint32_t n;         /* of them used */
+    imp_v3 o, d;        /* as decided: where extinction is looked up */
+    imp_spec f;         /* the segment's value */
+    imp_spec p; /* its density; that is the value, too, unless there is headroom */
     struct imp_track *track; /* NULL: not kept */
     bool any;                /* it has crossed a medium */
     bool open;               /* no surface ends the stretch at work */

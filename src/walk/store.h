@@ -10,7 +10,8 @@
 #include <importon/walks.h>
 #include <stdatomic.h>
 
-#define IMP_STORE_SIDE 8 /* pixels of a tile */
+#define IMP_STORE_SIDE    8 /* pixels of a tile */
+#define IMP_HEADROOM_MOST 64
 
 /* Steps from materials of class a to class b, of those that roulette looked at. */
 #define IMP_STORE_CLASSES 32
@@ -137,7 +138,8 @@ struct imp_walks {
     struct imp_run
         run;     /* seed, samples, points and wavelengths that they were drawn with */
     bool losses; /* numbers of samples are those of losses */
-    double survival, ess; /* ess < 0: imp__walks_use does not look at it */
+    double survival, headroom; /* of the tracer that drew them */
+    double ess;                /* < 0: imp__walks_use does not look at it */
     const struct imp_walk_integrator *integrator;
     struct imp_reduction *reduction; /* NULL: walks are not reduced */
     double *theta;                   /* [n_theta] where they were drawn */

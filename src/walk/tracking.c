@@ -110,10 +110,9 @@ static void pass(struct imp_step *s, const struct imp_free_flight *w)
 {
     struct imp_vertex *from = s->walk->last;
     if (!w->any) return;
-    const double factor = imp__lane_mis_decide(s, w->f);
-    const imp_spec weight = w->f * factor;
-    imp__step_pass(from, weight);
-    s->beta *= weight;
+    const double factor = imp__lane_mis_decide(s, w->p);
+    imp__step_pass(from, w->f * factor);
+    s->beta *= w->p * factor; /* it ends no walk for what is 0 and may grow */
     if (!s->recorded) return;
     from->d.passes = (imp_decided)factor;
     from->on = w->track;

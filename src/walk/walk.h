@@ -154,6 +154,9 @@ struct imp_tracer {
                   with media have one */
     double
         survival; /* least probability with which roulette lets a walk go on; 0: none */
+    double
+        headroom; /* collisions are drawn under bounds so much higher (flight.h); 0 or 1:
+                        as they are */
     imp_spec baseline; /* by lanes: what derivatives of flights take from the light that
                           arrives (baseline.h) */
     const struct imp_store *kept; /* walks that are evaluated in place of tracing

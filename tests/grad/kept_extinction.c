@@ -5,28 +5,11 @@
  * so do derivatives with respect to what is no extinction. At the extinction of the draw
  * they are those of tracing, to the bit. Where no collision was drawn, or none could be
  * at the bound, they are refused. */
-#include "imp_scene.h"
-#include "imp_tap.h"
-#include "vol_write.h"
-#include <importon/walks.h>
-#include <math.h>
-#include <stdbool.h>
+#include "kept_media.h"
 
-#define FAIL_Z 4.5
-#define CELLS  64
-
-static imp_context *ctx;
 static char grey[64], coloured[64], full[64];
 
 /* ---- Scenes ---------------------------------------------------------------------- */
-
-#define CAMERA(medium)                                                                   \
-    "<sensor type='perspective'><float name='fov' value='45'/><transform "               \
-    "name='to_world'><lookat origin='0,0,2.6' target='0,0,0' "                           \
-    "up='0,1,0'/></transform>" medium                                                    \
-    "<film type='hdrfilm'><integer name='width' value='16'/><integer "                   \
-    "name='height' value='16'/><string name='pixel_format' value='rgb'/><rfilter "       \
-    "type='box'/></film></sensor>"
 
 /* The camera in a ball of fog. */
 static imp_scene *ball(const char *sigma, const char *rr_depth, enum imp_color_mode mode)
@@ -51,78 +34,8 @@ static imp_scene *ball(const char *sigma, const char *rr_depth, enum imp_color_m
     return test_scene_text(ctx, xml, mode);
 }
 
-/* A cloud in a box under a sky and a lamp. */
-static imp_scene *cloud(const char *vol, const char *filter, const char *how,
-                        enum imp_color_mode mode)
-{
-    char xml[4096];
-    snprintf(
-        xml, sizeof xml,
-        "<scene version='3.0.0'><integrator type='volpath'><integer name='rr_depth' "
-        "value='6'/>%s</integrator>" CAMERA(
-            "") "<emitter type='constant'><rgb name='radiance' "
-                "value='.3,.4,.5'/></emitter>"
-                "<shape type='sphere'><point name='center' x='.8' y='2' z='1'/><float "
-                "name='radius' value='.4'/><emitter type='area'><float name='radiance' "
-                "value='8'/></emitter></shape><shape type='cube'><transform "
-                "name='to_world'>"
-                "<scale value='.8'/></transform><bsdf type='null'/><medium "
-                "name='interior' "
-                "id='cloud' type='heterogeneous'><volume name='sigma_t' "
-                "type='gridvolume'><string "
-                "name='filename' value='%s'/><string name='filter_type' "
-                "value='%s'/><transform "
-                "name='to_world'><scale value='1.6'/><translate x='-.8' y='-.8' z='-.8'/>"
-                "</transform></volume><rgb name='albedo' value='.9,.7,.5'/><phase "
-                "type='hg'><float "
-                "name='g' value='.4'/></phase></medium></shape></scene>",
-        how, vol, filter);
-    return test_scene_text(ctx, xml, mode);
-}
-
 /* ---- Tools ----------------------------------------------------------------------- */
 
-static imp_walks *keep(imp_scene *scene, int spp, bool losses)
-{
-    struct imp_run run = IMP_RUN_INIT;
-    struct imp_walks_options o = IMP_WALKS_OPTIONS_INIT;
-    imp_walks *walks;
-    run.spp = spp;
-    run.seed = 21;
-    run.points = IMP_POINTS_INDEPENDENT;
-    o.survival = -1;
-    o.losses = losses;
-    o.ess = 0.1;
-    test_must(ctx, imp_walks_keep(scene, &run, &o, &walks));
-    return walks;
-}
-static imp_film *render(imp_scene *scene, const imp_walks *walks, int spp, uint64_t seed)
-{
-    struct imp_run run = IMP_RUN_INIT;
-    imp_film *film;
-    run.spp = spp;
-    run.seed = seed;
-    run.points = IMP_POINTS_INDEPENDENT;
-    run.walks = walks;
-    test_must(ctx, imp_render(scene, &run, &film));
-    return film;
-}
-static struct imp_walks_weight weigh(const imp_walks *walks)
-{
-    struct imp_walks_weight w = IMP_WALKS_WEIGHT_INIT;
-    test_must(ctx, imp_walks_weigh(walks, 0, NULL, &w));
-    return w;
-}
-static size_t param(imp_scene *scene, const char *name, double *x, size_t *n)
-{
-    struct imp_param_info info = {.size = sizeof info};
-    size_t k;
-    test_must(ctx, imp_scene_find_param(scene, name, &k));
-    test_must(ctx, imp_scene_get_param(scene, k, &info));
-    test_must(ctx, imp_scene_get_values(scene, k, x));
-    *n = info.count;
-    return k;
-}
 /* Times a factor; only: those below it. */
 static void scale(imp_scene *scene, const char *name, double factor, double only)
 {
@@ -142,33 +55,6 @@ static bool same(imp_film *a, imp_film *b)
            memcmp(imp_film_se(a), imp_film_se(b), n * sizeof(float)) == 0;
 }
 
-/* Largest difference of the means over blocks of 4 x 4 pixels, channel by channel, in
- * standard errors: pixels are independent of each other. Its square's mean: about 1. */
-static double worst_of(imp_film *a, imp_film *b, double *square)
-{
-    struct imp_film_info i = {.size = sizeof i};
-    imp_film_get_info(a, &i);
-    double worst = 0, sum = 0;
-    int n = 0;
-    for (int block = 0; block < 16; block++)
-        for (int c = 0; c < i.channels; c++) {
-            double d = 0, var = 0;
-            for (int k = 0; k < 16; k++) {
-                const int x = block % 4 * 4 + k % 4, y = block / 4 * 4 + k / 4;
-                const size_t at = (size_t)((y * i.width + x) * i.channels + c);
-                d += (double)imp_film_mean(a)[at] - (double)imp_film_mean(b)[at];
-                var += pow((double)imp_film_se(a)[at], 2) +
-                       pow((double)imp_film_se(b)[at], 2);
-            }
-            if (!(var > 0)) continue;
-            worst = fmax(worst, fabs(d) / sqrt(var));
-            sum += d * d / var;
-            n++;
-        }
-    *square = sum / n;
-    return worst;
-}
-
 /* ---- Values ---------------------------------------------------------------------- */
 
 /* Kept walks against fresh ones. */
@@ -176,7 +62,7 @@ static void elsewhere(imp_scene *scene, const char *name, double factor, double 
                       const char *what)
 {
     double square, moved;
-    imp_walks *walks = keep(scene, 96, false);
+    imp_walks *walks = keep(scene, 96, false, 0);
     imp_film *traced = render(scene, NULL, 96, 21);
     imp_film *before = render(scene, walks, 0, 0);
     tap_ok(same(traced, before), "%s: at the draw, to the bit", what);
@@ -203,7 +89,7 @@ static void to_nothing(void)
 {
     imp_scene *scene = ball("<float name='sigma_t' value='.01'/>", "5", IMP_RGB);
     double square;
-    imp_walks *walks = keep(scene, 96, false);
+    imp_walks *walks = keep(scene, 96, false, 0);
     scale(scene, "fog.sigma_t.value", 0, INFINITY);
     imp_film *kept = render(scene, walks, 0, 0);
     imp_film *fresh = render(scene, NULL, 256, 22);
@@ -242,7 +128,7 @@ static void derivatives(imp_scene *scene, const char *name, const char *active,
     struct imp_target t = IMP_TARGET_INIT;
     struct imp_run run = IMP_RUN_INIT;
     float pixels[16 * 16 * 3];
-    imp_walks *walks = keep(scene, 128, true);
+    imp_walks *walks = keep(scene, 128, true, 0);
     for (int k = 0; k < 16 * 16 * 3; k++) pixels[k] = 0.1f + 0.3f * (float)(k % 7) / 7;
     test_must(ctx, imp_problem_create(scene, &p));
     test_must(ctx, imp_problem_activate(p, active));
@@ -288,7 +174,7 @@ static void distance(void)
     double ess[FACTORS], x[3];
     size_t n;
     imp_scene *scene = ball("<rgb name='sigma_t' value='.2,.3,.5'/>", "100", IMP_RGB);
-    imp_walks *walks = keep(scene, 32, false);
+    imp_walks *walks = keep(scene, 32, false, 0);
     const size_t k = param(scene, "fog.sigma_t.value", x, &n);
     for (int i = 0; i < FACTORS; i++) {
         double y[3];
@@ -326,7 +212,7 @@ static void closed_form(double r)
              "type='area'/><ref name='exterior' id='fog'/></shape></scene>",
              sigma, D);
     imp_scene *scene = test_scene_text(ctx, xml, IMP_MONO);
-    imp_walks *walks = keep(scene, 1024, false);
+    imp_walks *walks = keep(scene, 1024, false, 0);
     scale(scene, "fog.sigma_t.value", r, INFINITY);
     tap_near(weigh(walks).ess, 1 / (r * r * sigma * (1 - exp(-a * D)) / a + exp(-a * D)),
              0.004, 0, "one flight: effective sample size in closed form");
@@ -379,7 +265,7 @@ static void closed_form_of_two(const double sigma[3], double r, bool roulette)
              "type='area'/><ref name='exterior' id='fog'/></shape></scene>",
              roulette ? 1 : 100, sigma[0], sigma[1], sigma[2], albedo);
     imp_scene *scene = test_scene_text(ctx, xml, IMP_RGB);
-    imp_walks *walks = keep(scene, 512, false);
+    imp_walks *walks = keep(scene, 512, false, 0);
     scale(scene, "fog.sigma_t.value", r, INFINITY);
     tap_near(weigh(walks).ess,
              1 / (roulette ? one * (1 - albedo + albedo * one) : two_flights(sigma, r)),
@@ -412,7 +298,7 @@ static void refusals(void)
     double x[3 * CELLS];
     size_t n, k;
     imp_scene *scene = ball("<rgb name='sigma_t' value='.3,0,.5'/>", "5", IMP_RGB);
-    imp_walks *walks = keep(scene, 4, false);
+    imp_walks *walks = keep(scene, 4, false, 0);
     k = param(scene, "fog.sigma_t.value", x, &n);
     x[1] = 0.1;
     test_must(ctx, imp_scene_set_values(scene, k, n, x));
@@ -422,14 +308,14 @@ static void refusals(void)
     imp_scene_destroy(scene);
 
     scene = cloud(grey, "trilinear", "", IMP_RGB);
-    walks = keep(scene, 16, false);
+    walks = keep(scene, 16, false, 0);
     scale(scene, "cloud.sigma_t.data", 1.2, INFINITY);
     refused(scene, walks, "above the bound", "'cloud'", "a grid above its bounds");
     imp_walks_destroy(walks);
     imp_scene_destroy(scene);
 
     scene = cloud(full, "trilinear", "", IMP_RGB);
-    walks = keep(scene, 16, false);
+    walks = keep(scene, 16, false, 0);
     scale(scene, "cloud.sigma_t.data", 0.7, INFINITY);
     refused(scene, walks, "had reached its bound", "'cloud'",
             "a grid without null collisions");
