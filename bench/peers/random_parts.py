@@ -4,8 +4,8 @@
     python3 bench/peers/random_parts.py SEED MODE FOLDER       # writes FOLDER/scene.xml and what it names
 
 Materials, textures and lights stand inside what uses them, without ids, so that parameters have the names of mi.traverse
-in both. What docs/mitsuba.md lists as different on purpose is left out: mirrored meshes, `mask` under `path`, and in
-spectral mode metals by name, the tints of `principled`, texels of light above 1, and so on. There colours are lists of
+in both. What docs/mitsuba.md lists as different is left out: mirrored meshes, oval cylinders, `mask` under `path`, mirrors in
+blends, and in spectral mode metals by name, the tints of `principled`, texels of light above 1, and so on. There colours are lists of
 wavelengths, and pictures grey: Mitsuba looks the spectrum of three numbers up in a table, importon solves for it, and
 after some reflections in coloured light that makes .5 %.
 """
@@ -94,6 +94,16 @@ class Maker:
             return '<spectrum name="%s" value="%s"/>' % (name, ", ".join("%d:%g" % (nm, self.u(lo, hi)) for nm in (360, 450, 540, 630, 830)))
         return '<rgb name="%s" value="%s"/>' % (name, self.rgb_of(lo, hi))
 
+    def ground(self, name, lo, hi):
+        """A color; a list has the wavelengths that Mitsuba evaluates it at."""
+        if self.mode != "spectral":
+            return self.color(name, lo, hi)
+        at, values = (360, 450, 540, 630, 830), [self.u(lo, hi) for _ in range(5)]
+        def between(nm):
+            k = max(j for j in range(4) if j == 0 or at[j] <= nm)
+            return values[k] + max(0, nm - at[k]) / (at[k + 1] - at[k]) * (values[k + 1] - values[k])
+        return '<spectrum name="%s" value="%s"/>' % (name, ", ".join("%d:%.4f" % (nm, between(nm)) for nm in range(320, 721, 40)))
+
     def number(self, name, lo, hi):
         return '<float name="%s" value="%g"/>' % (name, self.u(lo, hi))
 
@@ -181,12 +191,16 @@ class Maker:
     def tint(self, name, p=.4, nested=True):
         return self.reflectance(name, .3, .95, nested) if self.maybe(p) else ""
 
-    def opaque(self, depth=0, bumps=True, maps=True):
-        """A material that lets no light through. bumps, maps: may it have bump and normal maps?"""
+    def opaque(self, depth=0, bumps=True, maps=True, deltas=True):
+        """A material that lets no light through. bumps, maps: may it have bump and normal maps? deltas: mirrors?"""
         simple = ["diffuse", "diffuse", "conductor", "roughconductor", "plastic", "roughplastic", "principled"]
         nested = (["bumpmap"] if bumps else []) + (["normalmap"] if maps else []) + ["blendbsdf"] if depth < 2 else []
-        k = self.kind(self.r.choice(simple + nested))
-        out = '<bsdf type="%s">' % k
+        k = self.r.choice(simple + nested)
+        # Mitsuba mixes the weight of a mirror's sample with the density of what it is blended with: rough, in a blend.
+        dull = {"conductor": "roughconductor", "plastic": "roughplastic"}.get(k, k) if not deltas else k
+        out = '<bsdf type="%s">' % self.kind(dull)
+        if dull != k:
+            out += '<float name="alpha" value="0.3"/>'
         if k == "diffuse":
             out += self.reflectance("reflectance")
         elif k == "conductor":
@@ -203,7 +217,7 @@ class Maker:
         elif k == "bumpmap":
             # Mitsuba's slope under a turned to_uv is that of the turn back: not turned.
             out += self.bitmap("arbitrary", 0, 1, grey=True, raw=True, turned=False).replace('"nearest"', '"bilinear"') + self.number("scale", .02, .2)
-            out += self.opaque(depth + 1, False, maps)  # nor nested in another
+            out += self.opaque(depth + 1, False, maps, deltas)  # nor nested in another
         elif k == "normalmap":
             file, w, h = self.file("png"), 4, 4
             data = []
@@ -212,9 +226,9 @@ class Maker:
                 data += [round(255 * (.5 + .5 * x)) for x in (a, b, math.sqrt(1 - a * a - b * b))]
             png_write(self.path(file), w, h, 3, data)
             out += '<texture type="bitmap" name="normalmap"><string name="filename" value="%s"/><boolean name="raw" value="true"/></texture>' % file
-            out += self.opaque(depth + 1, False, maps)
+            out += self.opaque(depth + 1, False, maps, deltas)
         elif k == "blendbsdf":
-            out += self.scalar("weight", .1, .9) + self.opaque(depth + 1, bumps, maps) + self.opaque(depth + 1, bumps, maps)
+            out += self.scalar("weight", .1, .9) + self.opaque(depth + 1, bumps, maps, False) + self.opaque(depth + 1, bumps, maps, False)
         return out + "</bsdf>"
 
     def principled(self, thin, glass=False):
@@ -425,8 +439,10 @@ class Maker:
             place = ('<transform name="to_world"><scale value="%g"/><rotate x="1" angle="%g"/><translate x="%g" y="%g" z="%g"/></transform>'
                      % (self.u(.4, .9), self.u(150, 210), x, y, z))
             props = '<string name="filename" value="%s"/><boolean name="face_normals" value="true"/>' % self.obj() if shape == "obj" else ""
-            return '<shape type="%s" id="%s">%s%s<emitter type="area">%s</emitter></shape>' % (
-                shape, name, props, place, self.emission("radiance", 1, 6, shape in ("rectangle", "disk", "sphere")))
+            radiance = self.emission("radiance", 1, 6, shape in ("rectangle", "disk", "sphere"))
+            if shape == "sphere" and "<texture" in radiance:  # Mitsuba's light samples of these are others than its BSDF samples
+                radiance = '<spectrum name="radiance" value="3"/>'
+            return '<shape type="%s" id="%s">%s%s<emitter type="area">%s</emitter></shape>' % (shape, name, props, place, radiance)
         if k == "directionalarea":
             return ('<shape type="%s" id="%s"><transform name="to_world"><scale value="%g"/><rotate x="1" angle="%g"/><translate x="%g" y="%g" z="%g"/></transform>'
                     '<emitter type="directionalarea">%s</emitter></shape>' % (self.r.choice(["rectangle", "disk"]), name, self.u(.8, 1.6), self.u(160, 200), x, y, z,
@@ -460,7 +476,7 @@ class Maker:
             out += '<float name="sun_scale" value="%g"/>' % (self.u(.0002, .001) if self.mode == "spectral" else 0)
             out += '<vector name="sun_direction" x="%g" y="%g" z="1"/>' % (self.u(-1, 1), self.u(-1, 1))
             if self.maybe(.5):
-                out += self.color("albedo", .1, .8)
+                out += self.ground("albedo", .1, .8)
         return out + "</emitter>"
 
     # ---- the whole ------------------------------------------------------------------
@@ -524,7 +540,8 @@ class Maker:
         spots = [(-1.6, .6), (0, -.4), (1.6, .7), (.3, 1.8)]
         self.r.shuffle(spots)
         for x, y in spots[:self.r.randint(2, 4)]:
-            out += self.body(x, y, self.u(.5, .8), holes, media) + "\n"
+            # Media must not overlap.
+            out += self.body(x, y, self.u(.5, .8) * (.6 if media else 1), holes, media) + "\n"
         return out + "</scene>\n"
 
 

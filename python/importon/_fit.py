@@ -215,8 +215,8 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         stay: Optional[Mapping[str, float]] = None, smooth: Optional[Mapping[str, float]] = None,
         same: Any = None, factor: Any = None, log: Any = None, time_limit: float = 0, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
         wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", levels: int = 0, memory: float = 0,
-                      headroom=float(headroom), control_variate=choice("imp_variates", control_variate, "control_variate"),
-                      allocation=choice("imp_allocation", allocation, "allocation"), momentum=float(momentum))
+         headroom: float = 0, control_variate: str = "auto", allocation: str = "default", momentum: float = 0,
+         progress: Any = None) -> Fit:
     """Fit parameters to target pictures; the scene ends at the best estimate.
 
     Parameters
@@ -308,12 +308,8 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
                       max_iterations=integer(max_iterations, "max_iterations"), learning_rate=float(learning_rate),
                       tolerance=float(tolerance), intervals=bool(intervals), checkpoint=path, resume=bool(resume),
                       levels=integer(levels, "levels"), memory=float(memory),
-<<<<<<< HEAD
-                      control_variate=choice("imp_variates", control_variate, "control_variate"),
-                      allocation=choice("imp_allocation", allocation, "allocation"), momentum=float(momentum))
-=======
                       headroom=float(headroom), control_variate=choice("imp_variates", control_variate, "control_variate"),
-                      allocation=choice("imp_allocation", allocation, "allocation"))
+                      allocation=choice("imp_allocation", allocation, "allocation"), momentum=float(momentum))
         out, start = ctypes.c_void_p(), p.x()
         status, message = run(p.context, options, progress, lib.imp_fit, p.pointer, ctypes.byref(wanted),
                               ctypes.byref(options), ctypes.byref(out))
