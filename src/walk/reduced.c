@@ -9,11 +9,11 @@ struct imp_op *imp__reduced_op(struct imp_reduced *r, enum imp_op_kind kind,
 {
     struct imp_op *grown =
         imp__grow(r->of->ctx, r->ops, &r->cap_ops, r->n_ops + 1, sizeof *grown);
+    if (grown) r->ops = grown; /* even if it is of no use: the old one is gone */
     if (!grown || r->n_ops >= INT32_MAX || index >= 1 << 27) {
         r->failed = true;
         return NULL;
     }
-    r->ops = grown;
     grown[r->n_ops] =
         (struct imp_op){(uint32_t)kind & 15, coloured, (uint32_t)index & 0x7ffffff};
     return &grown[r->n_ops++];
@@ -24,11 +24,11 @@ void imp__reduced_words(struct imp_reduced *r, const void *data, size_t bytes)
     const size_t n = bytes / sizeof *r->words;
     uint32_t *grown =
         imp__grow(r->of->ctx, r->words, &r->cap_words, r->n_words + n, sizeof *grown);
+    if (grown) r->words = grown;
     if (!grown || r->n_words + n > UINT32_MAX) {
         r->failed = true;
         return;
     }
-    r->words = grown;
     memcpy(grown + r->n_words, data, bytes);
     r->n_words += n;
 }
