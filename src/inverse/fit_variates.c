@@ -26,16 +26,18 @@ enum imp_status imp__fit_variates(struct imp__fit *f)
                           "and long steps, or evaluate one draw of walks");
     }
     st = imp__variate_create(p, &f->run, &f->variate);
-    if (st == IMP_E_UNSUPPORTED || st == IMP_E_NOMEM) {
-        if (asked) return st;
+    if (!asked && (st == IMP_E_UNSUPPORTED || st == IMP_E_NOMEM)) {
         f->without_variate =
             imp__arena_strdup(&f->problem->fit_arena, imp_last_error(p->ctx));
         st = IMP_OK;
     }
-    /* Memory may be short on one rank alone, but all ranks must go on alike. */
+    /* Memory may be short on one rank alone, but all ranks must go on alike, or fail. */
     const enum imp_status heard = imp__team_any(p->ctx, !f->variate, &without);
     if (st == IMP_OK) st = heard;
     if (st != IMP_OK || !without || !f->variate) return st;
+    if (asked)
+        return imp__error(p->ctx, IMP_E_NOMEM,
+                          "control variate: another rank has no memory for it");
     imp__variate_destroy(f->variate);
     f->variate = NULL;
     f->without_variate = "control variate: another rank has none";
