@@ -93,6 +93,7 @@ static enum imp_status intervals(struct imp__fit *f, const struct imp__search *s
     const int spp = imp__fit_spp(f);
     f->run.spp = round_spp(f, s, spp);
     const struct imp__rounds rounds = {.most = ROUNDS,
+                                       .look = f->clipped_rounds,
                                        .searched = rounds_searched(f, s, spp),
                                        .at_newton = imp__search_is_coarse(s) &&
                                                     s->finished == IMP_FINISH_NOISE};
@@ -145,6 +146,7 @@ static enum imp_status clipped_searches(struct imp__fit *f,
         IMP_CHECKED(imp__fit_clipped(f, round, &own, s, &again));
         if (!again) return IMP_OK;
         f->final_total = 0;
+        f->clipped_rounds = round + 1;
         f->run.spp = f->outer.spp; /* intervals took others */
         imp__variate_forget(f->variate);
         imp__uncertainty_destroy(f->problem->ctx, u);

@@ -28,6 +28,7 @@ struct imp__fit {
     double last_report_s, last_checkpoint_s, checkpoint_cost_s;
     double fraction;
     double search_share;          /* of the work, the rest is what comes after it */
+    int clipped_rounds;           /* searches after the first (fit_clip.c) */
     int final_calls, final_total; /* evaluations after the search; total 0: not there */
     int first_iteration;          /* of this call; not 0 where the fit was continued */
     bool stopped;                 /* by the caller or the deadline */

@@ -20,8 +20,9 @@
 #include <math.h>
 #include <string.h>
 
-#define SEED_BASE 0x40000000 /* iteration numbers no search reaches */
-#define SEED_LAST 63
+#define SEED_BASE  0x40000000 /* iteration numbers no search reaches */
+#define SEED_LAST  63
+#define LOOK_SEEDS 256 /* iteration numbers from one look to the next */
 
 /* Samples are taken in stages: FIRST rounds, and as many more as these show to be missing. */
 #define FIRST  2
@@ -260,14 +261,16 @@ static int rounds_missing(const struct imp__sampled *s, const struct answer *a,
 
 /* Rounds at x: two, and those that are missing. */
 static enum imp_status samples_here(const struct imp__goal *goal, const double *x,
-                                    int most, struct imp__sampled *s, double *noise,
-                                    struct answer *a, struct imp__uncertainty *u)
+                                    int look, int most, struct imp__sampled *s,
+                                    double *noise, struct answer *a,
+                                    struct imp__uncertainty *u)
 {
     enum imp_status st = IMP_OK;
     int missing = imp_min(FIRST, most);
     for (int k = 0; k < 2 && missing > 0; k++) {
-        IMP_TRY(
-            imp__sampled_take(goal, x, imp__search_seed(goal, SEED_BASE, k), missing, s));
+        IMP_TRY(imp__sampled_take(
+            goal, x, imp__search_seed(goal, SEED_BASE + LOOK_SEEDS * look, k), missing,
+            s));
         IMP_TRY(imp__sampled_add(x, x, s));
         IMP_TRY(answer_find(goal, s, x, noise, a, u));
         missing = rounds_missing(s, a, u, most - s->rounds);
@@ -280,8 +283,9 @@ out:
 /* A round at x, and those that are missing at its Newton point. H0, a linear model: the
  * gradient there is the noise of both. u->is_linear: does H0 hold? */
 static enum imp_status samples_ahead(const struct imp__goal *goal, const double *x,
-                                     int most, struct imp__sampled *s, double *noise,
-                                     struct answer *a, struct imp__uncertainty *u)
+                                     int look, int most, struct imp__sampled *s,
+                                     double *noise, struct answer *a,
+                                     struct imp__uncertainty *u)
 {
     enum imp_status st = IMP_OK;
     const size_t n = s->n, nn = n * n;
@@ -291,8 +295,9 @@ static enum imp_status samples_ahead(const struct imp__goal *goal, const double 
     double *at = work, *C = work + n;
     memcpy(at, x, n * sizeof *at);
     for (int k = 0; missing > 0 && s->stages < IMP_SAMPLED_STAGES; k++) {
-        IMP_TRY(imp__sampled_take(goal, at, imp__search_seed(goal, SEED_BASE, k), missing,
-                                  s));
+        IMP_TRY(imp__sampled_take(
+            goal, at, imp__search_seed(goal, SEED_BASE + LOOK_SEEDS * look, k), missing,
+            s));
         for (size_t i = 0; i < nn; i++) C[i] = s->mean.cov_g[i] + s->one_cov[i];
         if (s->stages > 0 && over_noise(n, a->free.G, s->one.g, C) > 1) goto out;
         IMP_TRY(imp__sampled_add(x, at, s));
@@ -325,8 +330,8 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
     IMP_TRY(answer_create(ctx, n, &a));
     IMP_TRY(uncertainty_create(ctx, n, &u));
     IMP_TRY(imp__sampled_create(goal, x, &s));
-    IMP_TRY((rounds->at_newton ? samples_ahead : samples_here)(goal, x, rounds->most, &s,
-                                                               noise, &a, &u));
+    IMP_TRY((rounds->at_newton ? samples_ahead : samples_here)(
+        goal, x, rounds->look, rounds->most, &s, noise, &a, &u));
     if (!u.is_linear) goto out;
     u.rounds = s.rounds;
     double part = s.rounds / (s.rounds + rounds->searched);
@@ -335,7 +340,10 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
         u.x[k] =
             imp__into_bounds(goal, k, part < 1 ? x[k] + part * (u.x[k] - x[k]) : u.x[k]);
     if (!rounds->at_newton) {
-        IMP_TRY(accept(goal, x, imp__search_seed(goal, SEED_BASE, SEED_LAST), u.x, &go));
+        IMP_TRY(accept(
+            goal, x,
+            imp__search_seed(goal, SEED_BASE + LOOK_SEEDS * rounds->look, SEED_LAST), u.x,
+            &go));
         if (!go) memcpy(u.x, x, n * sizeof *x);
     }
     u.loss = imp__sampled_loss(&s, x, u.x, a.free.G, go ? part : 0);

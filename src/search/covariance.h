@@ -27,6 +27,7 @@ struct imp__uncertainty {
 /* Samples, in those of an evaluation by the goal. */
 struct imp__rounds {
     int most;        /* >= 2 */
+    int look;        /* times that it was asked for before: each has walks of its own */
     double searched; /* behind x, where that is an average over a search; 0: it is none */
     bool at_newton;  /* all but the first are taken at the Newton point of the first */
 };
