@@ -193,7 +193,9 @@ static void derivative(imp_context *ctx, const char *kind, const char *distribut
     tap_ok(fabs(sum - truth) < 4 * sqrt(seen / SEEDS),
            "%s %s, %s: the derivative # %.5g, by quadrature %.5g, z %.1f", kind,
            distribution, name, sum, truth, (sum - truth) / sqrt(seen / SEEDS));
-    tap_ok(seen < 2.2 * told && told < 2.2 * seen,
+    /* Of 39 degrees of freedom chi^2/39 is above 1.85 once in 1,000 times, and below .44:
+     * ten such checks fail once in a hundred. */
+    tap_ok(seen < 1.85 * told && told < 2.2 * seen,
            "%s %s, %s: its error # seen/told %.2f", kind, distribution, name,
            sqrt(seen / told));
 
