@@ -320,6 +320,17 @@ static enum imp_status members_put(struct putting *p)
     return st;
 }
 
+/* Shapes without a name are numbered, and instances, which are not written, have numbers
+ * too: each takes along what it was called. */
+static enum imp_status top_put(struct putting *p, const struct imp_child *c)
+{
+    const struct imp_node *node = c->node;
+    const struct imp_shape *s = node->object;
+    const bool numbered =
+        strcmp(node->tag, "shape") == 0 && s && !c->ref && !c->name && !node->id;
+    return numbered ? node_put(p, node, s->name, NULL) : child_put(p, c);
+}
+
 enum imp_status imp__tree_put(const struct imp_scene *scene, const double *theta,
                               struct imp_bytes *out)
 {
@@ -329,8 +340,7 @@ enum imp_status imp__tree_put(const struct imp_scene *scene, const double *theta
     const uint8_t how[2] = {(uint8_t)scene->mode, scene->linear_colors};
     put(&p, how, sizeof how);
     for (size_t k = 0; k < root->n_children && st == IMP_OK; k++)
-        if (!imp__is_group(root->children[k].node))
-            st = child_put(&p, &root->children[k]);
+        if (!imp__is_group(root->children[k].node)) st = top_put(&p, &root->children[k]);
     if (st == IMP_OK) st = members_put(&p);
     put_mark(&p, MARK_END);
     if (st == IMP_OK && p.full)

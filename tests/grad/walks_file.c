@@ -229,7 +229,7 @@ static const char room[] =
     "z='.5'/></transform><ref id='pair'/></shape>"
     "<shape type='sphere' id='ball'><point name='center' x='1.2' y='-1' z='.4'/><float "
     "name='radius' value='.4'/><bsdf type='merl'><string name='filename' "
-    "value='%s'/></bsdf></shape><shape type='sphere' id='orb'><point name='center' "
+    "value='%s'/></bsdf></shape><shape type='sphere'><point name='center' "
     "x='-1' y='-1' "
     "z='.3'/><float name='radius' value='.3'/><bsdf type='measured'><string "
     "name='filename' value='%s'/></bsdf></shape>%s</scene>";
