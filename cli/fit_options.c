@@ -4,7 +4,7 @@
 static const char *const optimizer_words[] = {"adam", "lm",    "lbfgs",
                                               "mma",  "slsqp", NULL};
 
-static const char *const allocation_words[] = {"variance", "even", NULL};
+static const char *const allocation_words[] = {"auto", "variance", "even", NULL};
 
 static const char *const missing_words[] = {"auto", "always", "never", NULL};
 
@@ -28,7 +28,8 @@ const struct arg_option options_search[] = {
      "of adam, and of bent rays: from coarse to fine, in N levels", &fit_choice.levels, 1,
      16, NULL},
     {ARG_CHOICE, 0, "allocation", "HOW",
-     "of adam's samples to tiles: variance (default; by the gradient's), or even",
+     "of adam's samples to tiles: variance (by the gradient's), even, or auto (default: "
+     "even beside control variates of more than 64 numbers)",
      &fit_choice.allocation, 0, 0, allocation_words},
     {ARG_NUMBER, 0, "tolerance", "T",
      "stop when relative steps stay below (default 1e-4)", &fit_choice.tolerance, 1e-15,
@@ -73,7 +74,9 @@ struct imp_fit_options fit_choice_options(void)
     static const enum imp_variates variates[] = {IMP_VARIATES_AUTO, IMP_VARIATES_ON,
                                                  IMP_VARIATES_OFF};
     fit.control_variate = variates[fit_choice.variate];
-    fit.allocation = fit_choice.allocation ? IMP_ALLOCATION_EVEN : IMP_ALLOCATION_DEFAULT;
+    static const enum imp_allocation allocations[] = {
+        IMP_ALLOCATION_DEFAULT, IMP_ALLOCATION_VARIANCE, IMP_ALLOCATION_EVEN};
+    fit.allocation = allocations[fit_choice.allocation];
     fit.intervals = !fit_choice.no_intervals;
     return fit;
 }

@@ -995,7 +995,7 @@ enum imp_variates {
 
 /** How the samples of a search are divided among the tiles (8 x 8 pixels) of its targets. */
 enum imp_allocation {
-    IMP_ALLOCATION_DEFAULT = 0, /**< by variance, where that can be */
+    IMP_ALLOCATION_DEFAULT = 0, /**< by variance; with variates of > 64 numbers, even */
     IMP_ALLOCATION_EVEN,        /**< every pixel has the same */
     /** By the root of what a tile adds to the variance of the gradient, over what its samples
      * cost, as the iterations before have seen it: between 1/4 and 16 times the samples asked

@@ -243,7 +243,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
     allocation : str
         Of adam's samples to tiles of 8 x 8 pixels: "variance" gives them where the gradient's
         variance comes from, at the same cost; "even": all pixels have the same; "default":
-        "variance" where that can be.
+        "variance" where that can be, but for control variates of more than 64 numbers.
     memory : float
         Bytes for the walks that lbfgs, mma and slsqp keep, since they evaluate one draw;
         0: 2^30; negative: walks are traced each time. `Fit.walks` says what was kept.

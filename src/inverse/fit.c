@@ -202,7 +202,6 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     x = NULL;
     bool found = false;
     if (f.options.resume) IMP_TRY(imp__fit_checkpoint_read(&f, s, &found));
-    if (found && f.allocation.n > 0) imp__allocation_place(&f.allocation);
     imp__fit_scales(&f, s);
     f.first_iteration = s->iteration;
     f.searching = true;

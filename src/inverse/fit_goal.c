@@ -198,11 +198,14 @@ static void coarsen(bool fewer, void *payload)
     f->run.spp = fewer ? imp__fit_coarse_spp(f) : f->outer.spp;
 }
 
-/* Do tiles get samples by their share of the variance? Control variates have equal ones. */
+/* Do tiles get samples by their share of the variance? Beside control variates of many numbers,
+ * which have each their own pixels, nothing is gained by it: there they do if it is asked for. */
 static bool allocates(const struct imp__fit *f)
 {
-    return f->options.optimizer == IMP_ADAM && !f->variate &&
-           f->options.allocation != IMP_ALLOCATION_EVEN;
+    const bool many = f->variate && f->problem->n > IMP_TRAIL_MAX;
+    return f->options.optimizer == IMP_ADAM &&
+           f->options.allocation != IMP_ALLOCATION_EVEN &&
+           (!many || f->options.allocation == IMP_ALLOCATION_VARIANCE);
 }
 
 /* ---- From the beginning to the end ------------------------------------------------ */

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Control variates of a fit by Adam (variate.h): where they are possible, the search has
- * them; intervals and the loss of the answer are of fresh walks. */
+ * them; intervals and the loss of the answer are of fresh walks. Checkpoints hold what they and
+ * the allocation know. */
 #include "base/team.h"
 #include "fit.h"
 #include "variate.h"
 #include <stdio.h>
+#include <string.h>
 
 enum imp_status imp__fit_variates(struct imp__fit *f)
 {
@@ -44,15 +46,24 @@ enum imp_status imp__fit_variates(struct imp__fit *f)
     return IMP_OK;
 }
 
-/* The variate's numbers, or those of the allocation, in a search that is written or read. */
+/* ---- Checkpoints ------------------------------------------------------------------ */
+
+static size_t variate_numbers(const struct imp__fit *f)
+{
+    return f->variate ? imp__variate_numbers(f->variate, f->problem) : 0;
+}
+
+static size_t allocation_numbers(const struct imp__fit *f)
+{
+    return f->allocation.n > 0 ? imp__allocation_numbers(&f->allocation) : 0;
+}
+
+/* Room for the numbers of the variate, then those of the allocation, in a search that is written
+ * or read. */
 static enum imp_status state_begin(const struct imp__fit *f, struct imp__search *s)
 {
-    if (!f->variate && f->allocation.n > 0) {
-        s->n_goal = imp__allocation_numbers(&f->allocation);
-        s->goal_numbers = f->allocation.state;
-    }
-    if (!f->variate) return IMP_OK;
-    s->n_goal = imp__variate_numbers(f->variate, f->problem);
+    s->n_goal = variate_numbers(f) + allocation_numbers(f);
+    if (s->n_goal == 0) return IMP_OK;
     s->goal_numbers = imp__alloc_raw(f->problem->ctx, s->n_goal, sizeof *s->goal_numbers);
     if (s->goal_numbers) return IMP_OK;
     s->n_goal = 0;
@@ -61,7 +72,7 @@ static enum imp_status state_begin(const struct imp__fit *f, struct imp__search 
 
 static void state_end(const struct imp__fit *f, struct imp__search *s)
 {
-    if (f->variate) imp__release(f->problem->ctx, s->goal_numbers);
+    imp__release(f->problem->ctx, s->goal_numbers);
     s->goal_numbers = NULL;
     s->n_goal = 0;
 }
@@ -73,6 +84,9 @@ enum imp_status imp__fit_checkpoint_write(const struct imp__fit *f,
     enum imp_status st = state_begin(f, &s);
     if (st != IMP_OK) return st;
     if (f->variate) imp__variate_save(f->variate, f->problem, s.goal_numbers);
+    if (f->allocation.n > 0)
+        memcpy(s.goal_numbers + variate_numbers(f), f->allocation.state,
+               allocation_numbers(f) * sizeof *s.goal_numbers);
     st = imp__checkpoint_write(f->problem->ctx, f->options.checkpoint, &f->fingerprint,
                                &s);
     state_end(f, &s);
@@ -86,11 +100,19 @@ enum imp_status imp__fit_checkpoint_read(struct imp__fit *f, struct imp__search 
     if (st != IMP_OK) return st;
     st = imp__checkpoint_read(f->problem->ctx, f->options.checkpoint, &f->fingerprint,
                               &f->goal, s, found);
-    if (st == IMP_OK && *found && f->variate)
-        imp__variate_restore(f->variate, f->problem, s->goal_numbers);
+    if (st == IMP_OK && *found) {
+        if (f->variate) imp__variate_restore(f->variate, f->problem, s->goal_numbers);
+        if (f->allocation.n > 0) {
+            memcpy(f->allocation.state, s->goal_numbers + variate_numbers(f),
+                   allocation_numbers(f) * sizeof *f->allocation.state);
+            imp__allocation_place(&f->allocation);
+        }
+    }
     state_end(f, s);
     return st;
 }
+
+/* ---- What it brought -------------------------------------------------------------- */
 
 const char *imp__fit_variate_text(const struct imp__fit *f)
 {
