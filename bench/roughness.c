@@ -8,8 +8,9 @@
  *     roughness [ROUNDS [SPP [CASE [sobol]]]]
  *
  * In a cell: derivative of the pixels, summed over them; derivative of an l2 loss against the
- * picture of another number. Then the largest ratio of the variances of the value, and of
- * the times. CASE: a part of the name of a row. */
+ * picture of another number; each with its standard error, by the jackknife over eight groups
+ * of rounds. Then the largest ratio of the variances of the value, and of the times. CASE: a
+ * part of the name of a row. */
 #include "../tests/imp_scene.h"
 #include "walk/active.h"
 #include <math.h>
@@ -186,25 +187,56 @@ static void target_add(size_t c, int l, int depth, double value, imp_problem *p)
     imp_scene_destroy(s);
 }
 
-enum { PIXELS = 32 * 32, NUMBERS = 2 };
+enum { PIXELS = 32 * 32, NUMBERS = 2, GROUPS = 8 };
 
-/* Sums over the pixels of the variances of the value and of the derivatives, from the spread
- * over seeds; variance of the derivatives of the loss; processor seconds. */
-struct spread {
-    double value, derivative, loss, seconds;
-};
 struct moments {
-    double sum, squares;
+    double n, sum, squares;
 };
 static void moment_add(struct moments *m, double x)
 {
+    m->n++;
     m->sum += x;
     m->squares += x * x;
 }
-static double variance(struct moments m, int n)
+/* Of one problem; rounds r and r + GROUPS are in one group. */
+struct seen {
+    struct moments I[GROUPS][PIXELS], dI[GROUPS][NUMBERS][PIXELS], dJ[GROUPS][NUMBERS];
+    double seconds;
+};
+
+/* Sums over the pixels of the variances of the value and of the derivatives, from the spread
+ * over seeds; variance of the derivatives of the loss. */
+struct spread {
+    double value, derivative, loss;
+};
+
+/* Without one of the groups; -1: of all. The groups' moments are `stride` apart. */
+static double variance(const struct moments *m, size_t stride, int without_group)
 {
-    return (m.squares - m.sum * m.sum / n) / (n - 1);
+    struct moments all = {0};
+    for (int i = 0; i < GROUPS; i++) {
+        if (i == without_group) continue;
+        all.n += m[(size_t)i * stride].n;
+        all.sum += m[(size_t)i * stride].sum;
+        all.squares += m[(size_t)i * stride].squares;
+    }
+    return (all.squares - all.sum * all.sum / all.n) / (all.n - 1);
 }
+
+static struct spread spread_of(const struct seen *s, size_t n, int without_group)
+{
+    struct spread out = {0};
+    for (size_t j = 0; j < n; j++) {
+        out.loss += variance(&s->dJ[0][j], NUMBERS, without_group);
+        for (int i = 0; i < PIXELS; i++) {
+            if (j == 0) out.value += variance(&s->I[0][i], PIXELS, without_group);
+            out.derivative +=
+                variance(&s->dI[0][j][i], (size_t)NUMBERS * PIXELS, without_group);
+        }
+    }
+    return out;
+}
+
 static void pictures(imp_problem *p, int seed, struct moments *I,
                      struct moments (*dI)[PIXELS])
 {
@@ -233,28 +265,36 @@ static void losses(imp_problem *p, int seed, struct moments *dJ)
     test_must(ctx, imp_problem_objective(p, NULL, &run, &J, g, NULL));
     for (size_t j = 0; j < imp_problem_n(p); j++) moment_add(&dJ[j], g[j]);
 }
-static void compare(imp_problem *const p[2], struct spread out[2])
+/* With draws for the derivative, over without; and the jackknife's standard errors. */
+static struct spread compare(imp_problem *const p[2], struct spread *se, double *slower)
 {
-    static struct moments I[2][PIXELS], dI[2][NUMBERS][PIXELS];
-    struct moments dJ[2][NUMBERS] = {0};
-    memset(I, 0, sizeof I);
-    memset(dI, 0, sizeof dI);
-    memset(out, 0, 2 * sizeof *out);
+    static struct seen seen[2];
+    const size_t n = imp_problem_n(p[0]);
+    memset(seen, 0, sizeof seen);
     for (int r = 0; r < rounds; r++)
         for (int k = 0; k < 2; k++) {
+            const int group = r % GROUPS;
             const double t = cpu();
-            pictures(p[k], r + 1, I[k], dI[k]);
-            out[k].seconds += cpu() - t;
-            for (int i = 0; i < 4; i++) losses(p[k], 1000 + 4 * r + i, dJ[k]);
+            pictures(p[k], r + 1, seen[k].I[group], seen[k].dI[group]);
+            seen[k].seconds += cpu() - t;
+            for (int i = 0; i < 4; i++) losses(p[k], 1000 + 4 * r + i, seen[k].dJ[group]);
         }
-    for (int k = 0; k < 2; k++)
-        for (size_t j = 0; j < imp_problem_n(p[k]); j++) {
-            out[k].loss += variance(dJ[k][j], 4 * rounds);
-            for (int i = 0; i < PIXELS; i++) {
-                if (j == 0) out[k].value += variance(I[k][i], rounds);
-                out[k].derivative += variance(dI[k][j][i], rounds);
-            }
-        }
+    struct spread all = {0};
+    *slower = seen[0].seconds / seen[1].seconds;
+    *se = (struct spread){0};
+    for (int out = -1; out < GROUPS; out++) {
+        const struct spread a = spread_of(&seen[0], n, out),
+                            b = spread_of(&seen[1], n, out);
+        const struct spread x = {a.value / b.value, a.derivative / b.derivative * *slower,
+                                 a.loss / b.loss * *slower};
+        if (out < 0) all = x;
+        const double f = (GROUPS - 1.) / GROUPS;
+        se->derivative += f * pow(x.derivative - all.derivative, 2);
+        se->loss += f * pow(x.loss - all.loss, 2);
+    }
+    se->derivative = sqrt(se->derivative);
+    se->loss = sqrt(se->loss);
+    return all;
 }
 
 static void row(size_t c, int l, int depth)
@@ -266,18 +306,18 @@ static void row(size_t c, int l, int depth)
         const double value = cases[c].value[i];
         imp_scene *scene = scene_of(c, l, depth, value);
         imp_problem *p[2];
-        struct spread x[2];
+        struct spread se;
+        double slower;
         for (int k = 0; k < 2; k++) {
             without = k;
             p[k] = test_problem(ctx, scene, cases[c].param);
             target_add(c, l, depth, value < .5 ? value * 1.3 + .05 : value * .8, p[k]);
         }
-        compare(p, x);
-        const double slower = x[0].seconds / x[1].seconds;
-        printf(" %.2f, %.2f |", x[0].derivative / x[1].derivative * slower,
-               x[0].loss / x[1].loss * slower);
+        const struct spread x = compare(p, &se, &slower);
+        printf(" %.2f +- %.2f, %.2f +- %.2f |", x.derivative, se.derivative, x.loss,
+               se.loss);
         fflush(stdout);
-        value_most = fmax(value_most, x[0].value / x[1].value);
+        value_most = fmax(value_most, x.value);
         time += slower / 6;
         for (int k = 0; k < 2; k++) imp_problem_destroy(p[k]);
         imp_scene_destroy(scene);
@@ -291,8 +331,9 @@ int main(int argc, char **argv)
     if (argc > 1) rounds = atoi(argv[1]);
     if (argc > 2) spp = atoi(argv[2]);
     if (argc > 4 && strcmp(argv[4], "sobol") == 0) points = IMP_POINTS_SOBOL;
-    if (rounds < 1 || spp < 4) {
-        fprintf(stderr, "usage: roughness [ROUNDS [SPP [CASE [sobol]]]]\n");
+    if (rounds < 2 * GROUPS || spp < 4) {
+        fprintf(stderr,
+                "usage: roughness [ROUNDS [SPP [CASE [sobol]]]], 16 rounds or more\n");
         return 2;
     }
     ctx = test_context(1);
