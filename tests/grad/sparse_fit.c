@@ -118,7 +118,8 @@ static double samples(const struct imp_fit_result *r, int spp)
     return spp * (9.0 * r->iterations + 5);
 }
 
-static void recover(imp_context *ctx, int seeds)
+/* Of a picture of `of` samples, with its noise known or not, by `spp`. */
+static void recover(imp_context *ctx, int seeds, int known, int of, int spp)
 {
     struct score s = {0};
     struct tap_stat sky_off = {0};
@@ -129,28 +130,28 @@ static void recover(imp_context *ctx, int seeds)
         const struct imp_fit_result *r;
         imp_scene *real = scene_make(ctx, truth, FILM, FILM, "box");
         imp_film *film;
-        run.spp = 64;
+        run.spp = of;
         run.seed = 100 + (uint64_t)seed;
         test_must(ctx, imp_render(real, &run, &film));
         imp_scene_destroy(real);
         static float se[FILM * FILM * 3];
         memcpy(se, imp_film_se(film), sizeof se);
-        const struct imp_target t = target_of(film, se);
+        const struct imp_target t = target_of(film, known ? se : NULL);
         struct room room = room_make(ctx, &t, "box");
-        run.spp = 16;
+        run.spp = spp;
         run.seed = 200 + (uint64_t)seed;
         o.optimizer = IMP_LM;
         o.intervals = 1;
         test_must(ctx, imp_fit(room.problem, &o, &run, &r));
-        if (!(seed > 0))
+        if (seed == 0)
             tap_ok(r->n == MOST && !r->covariance && r->iterations < 12 && r->warning &&
                        strstr(r->warning, "32 drawn vectors"),
                    "%zu numbers # %d iterations, %s; %s", r->n, r->iterations, r->reason,
                    r->warning ? r->warning : "no warning");
         score_add(ctx, &room, &s);
-        most = fmax(most, samples(r, 16));
+        most = fmax(most, samples(r, spp));
         room_free(&room);
-        if (seed > 0) {
+        if (seed > 0 || !known) {
             imp_film_destroy(film);
             continue;
         }
@@ -171,10 +172,13 @@ static void recover(imp_context *ctx, int seeds)
         room_free(&room);
         imp_film_destroy(film);
     }
-    tap_ok(s.square.mean > .8 && s.square.mean < 1.2,
-           "squared errors over those told # %.3f +- %.3f of %d fits", s.square.mean,
-           tap_se(&s.square), seeds);
-    tap_ok(s.inside.mean > .93 && s.inside.mean < .975,
+    /* With few samples and residuals for the noise the errors are upper bounds. */
+    const double least = known ? .8 : .6, most_inside = known ? .975 : .995;
+    tap_ok(
+        s.square.mean > least && s.square.mean < 1.2,
+        "squared errors over those told, noise %s, %d samples # %.3f +- %.3f of %d fits",
+        known ? "known" : "not known", spp, s.square.mean, tap_se(&s.square), seeds);
+    tap_ok(s.inside.mean > .93 && s.inside.mean < most_inside,
            "95 %% intervals that hold the truth # %.4f +- %.4f", s.inside.mean,
            tap_se(&s.inside));
     tap_ok(s.without < (size_t)seeds * MOST / 10 && s.sky.n == 3 * seeds,
@@ -277,7 +281,8 @@ int main(int argc, char **argv)
         truth[i] = (float)(.5 + .35 * sin(.5 * x + c) * cos(.4 * y - c));
         start[i] = .5f;
     }
-    recover(ctx, all ? 40 : 2);
+    recover(ctx, all ? 40 : 2, 1, 64, 16);
+    recover(ctx, all ? 40 : 1, 0, 64, 8);
     same_bits();
     refusals(ctx);
     imp_context_destroy(ctx);
