@@ -94,7 +94,7 @@ static void fit(imp_context *ctx, double momentum, int iterations, uint64_t seed
 
 static void momenta(imp_context *ctx)
 {
-    enum { SEEDS = 5, SOON = 20, LATE = 45 };
+    enum { SEEDS = 6, SOON = 20, LATE = 90 };
     static float truth[N];
     static double x[N], other[N];
     double gain = 0, gain2 = 0, error[2] = {0, 0};
