@@ -2,7 +2,7 @@
  *
  * What a kept walk costs: evaluated, folded and swept, over traced and swept, one thread,
  * processor time; the median of pairs measured in turn. Then whole pictures, and searches
- * by L-BFGS.
+ * by L-BFGS, MMA and SLSQP.
  *
  *     kept [--repeats N] [--spp N] [--only walks|pictures|fits] [--scene NAME] */
 #include "walk/reduced.h"
@@ -208,9 +208,11 @@ static void measure_picture(const char *file, const char *define)
 
 /* A search of 15 evaluations with kept walks over one that traces them, without what comes
  * after it. */
-static void measure_fit(const char *file, const char *define, const char *glob)
+static void measure_fit(const char *file, const char *define, const char *glob,
+                        enum imp_optimizer method, const char *name)
 {
     if (!wanted("fits", file)) return;
+    int evaluations[2] = {0, 0};
     struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
     struct imp_run run = IMP_RUN_INIT;
     struct imp_target t = IMP_TARGET_INIT;
@@ -247,13 +249,14 @@ static void measure_fit(const char *file, const char *define, const char *glob)
             for (size_t i = 0; i < n; i++) at[i] = 0.7 * x[i];
             must(imp_problem_set_x(p, at));
             run.seed = 9;
-            f.optimizer = IMP_LBFGS;
+            f.optimizer = method;
             f.max_iterations = 15;
             f.tolerance = 1e-9;
             f.memory = kept ? 4e9 : -1;
             const double start = cpu();
             must(imp_fit(p, &f, &run, &r));
             took[kept] = cpu() - start;
+            evaluations[kept] = r->iterations;
             if (kept) snprintf(said, sizeof said, "%s", r->walks);
             must(imp_problem_set_x(p, x));
             imp_problem_destroy(p);
@@ -261,8 +264,12 @@ static void measure_fit(const char *file, const char *define, const char *glob)
         }
         ratio[k] = took[0] / took[1];
     }
-    printf("%-14s %-16s lbfgs, 15 evaluations and the last: %.2f times as fast; %s\n",
-           file, define ? define : "", median(ratio, repeats), said);
+    printf(
+        "%-14s %-16s %-5s, %d evaluations (traced %d) and the last: %.2f times as fast; "
+        "%s\n",
+        file, define ? define : "", name, evaluations[1], evaluations[0],
+        median(ratio, repeats), said);
+    fflush(stdout);
     imp_film_destroy(film);
     imp_scene_destroy(scene);
 }
@@ -288,8 +295,12 @@ int main(int argc, char **argv)
     measure_picture("stam.xml", "integrator=path");
     measure_picture("textured.xml", NULL);
     measure_picture("lamps.xml", NULL);
-    measure_fit("cornell.xml", "res=64", "*");
-    measure_fit("stam.xml", "integrator=path", "*");
+    static const enum imp_optimizer methods[] = {IMP_LBFGS, IMP_MMA, IMP_SLSQP};
+    static const char *const names[] = {"lbfgs", "mma", "slsqp"};
+    for (int k = 0; k < 3; k++) {
+        measure_fit("cornell.xml", "res=64", "*", methods[k], names[k]);
+        measure_fit("stam.xml", "integrator=path", "*", methods[k], names[k]);
+    }
     imp_context_destroy(ctx);
     return 0;
 }
