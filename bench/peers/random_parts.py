@@ -400,13 +400,13 @@ class Maker:
         if k == "instance":
             return ('<shape type="shapegroup" id="group%d"><shape type="cube" id="%s_a">%s</shape><shape type="sphere" id="%s_b"><point name="center" x="0" y="0" z="1.4"/><float name="radius" value=".6"/>%s</shape></shape>'
                     '<shape type="instance">%s<ref id="group%d"/></shape><shape type="instance">%s<ref id="group%d"/></shape>'
-                    % (self.names, name, self.opaque(bumps=False), name, self.opaque(bumps=False), self.place(x, y, size, .6 * size), self.names,
+                    % (self.names, name, self.opaque(bumps=False, maps=not self.from_lights), name, self.opaque(bumps=False, maps=not self.from_lights), self.place(x, y, size, .6 * size), self.names,
                        self.place(x + .5, y + 1.2, size, .5 * size), self.names))
         if material is None and media and closed and self.maybe(.7) and k in ("sphere", "cube"):
             box = ("<translate x='-.5' y='-.5' z='-.5'/><scale value='%g'/><translate x='%g' y='%g' z='%g'/>" % (4 * size, x, y, size))
             material = ('<bsdf type="null"/>' if self.maybe(.5) else self.clear() if self.maybe(.6) else self.holes()) + self.medium("interior", box)
         elif k in ("bsplinecurve", "linearcurve"):
-            material = self.opaque(bumps=False)
+            material = self.opaque(bumps=False, maps=not self.from_lights)
             if k == "linearcurve":  # Mitsuba's frame does not follow it: the same roughness in all directions
                 material = re.sub(r'<float name="(anisotropic|alpha_v)"[^>]*>', "", material).replace('"alpha_u"', '"alpha"')
         elif material is None:
