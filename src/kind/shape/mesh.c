@@ -141,7 +141,7 @@ static inline bool sample_at(const struct imp_shape *s, const struct imp_hit *hi
     const struct imp__mesh_corner c =
         f ? (struct imp__mesh_corner){f->p0, f->e1, f->e2} : imp__mesh_corner(m, lo);
     struct imp_surface at;
-    imp__mesh_point(m, hit, &c, f ? f->ng : imp__mesh_face_normal(m, lo), &at);
+    imp__mesh_point(m, hit, &c, f ? f->ng : imp__mesh_face_normal(&c), &at);
     if (imp_unlikely(s->by_triangle)) point_write(s, hit, at.uv);
     out->uv[0] = at.uv[0];
     out->uv[1] = at.uv[1];

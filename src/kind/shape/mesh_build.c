@@ -73,23 +73,16 @@ static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
                                  struct imp_shape *s, size_t n)
 {
     m->cumulative = imp__arena_take(b->arena, n + 1, sizeof *m->cumulative);
-    double *normals = imp__arena_take(b->arena, 3 * n, sizeof *normals);
-    m->face_normals = normals;
-    if (!m->cumulative || !normals)
-        return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
+    if (!m->cumulative) return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
     const imp_v3 centre = (s->lo + s->hi) * 0.5;
     double sum = 0, volume = 0;
     m->cumulative[0] = 0;
     for (size_t k = 0; k < n; k++) {
-        const uint32_t *i = m->indices + 3 * k;
-        const imp_v3 p = imp__mesh_load(m->positions, i[0]);
-        const imp_v3 c = imp__cross(imp__mesh_load(m->positions, i[1]) - p,
-                                    imp__mesh_load(m->positions, i[2]) - p);
-        const double before = sum, length = imp__length(c);
-        const imp_v3 ng = length > 0 ? c * (1 / length) : imp__v3(0, 0, 1);
-        for (int j = 0; j < 3; j++) normals[3 * k + (size_t)j] = ng[j];
-        sum += length / 2;
-        volume += imp__dot(p - centre, c) / 6;
+        const struct imp__mesh_corner e = imp__mesh_corner(m, k);
+        const imp_v3 c = imp__cross(e.e1, e.e2);
+        const double before = sum;
+        sum += imp__length(c) / 2;
+        volume += imp__dot(e.p0 - centre, c) / 6;
         if (sum > before) m->last = k;
         m->cumulative[k + 1] = sum;
     }
@@ -104,11 +97,13 @@ static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
 /* Do all vertex normals say what the faces say? Then they are not worth looking up. */
 static bool is_flat(const struct imp__mesh *m, const float *normals, size_t n)
 {
-    for (size_t k = 0; k < 3 * n; k++) {
-        const double *ng = m->face_normals + k / 3 * 3;
-        const imp_v3 d =
-            imp__mesh_load(normals, m->indices[k]) - imp__v3(ng[0], ng[1], ng[2]);
-        if (!(imp__dot(d, d) < 1e-13)) return false;
+    for (size_t k = 0; k < n; k++) {
+        const struct imp__mesh_corner c = imp__mesh_corner(m, k);
+        const imp_v3 ng = imp__mesh_face_normal(&c);
+        for (size_t j = 3 * k; j < 3 * k + 3; j++) {
+            const imp_v3 d = imp__mesh_load(normals, m->indices[j]) - ng;
+            if (!(imp__dot(d, d) < 1e-13)) return false;
+        }
     }
     return true;
 }
@@ -123,7 +118,7 @@ static enum imp_status tangents_make(const struct imp_build *b, struct imp__mesh
         const struct imp_hit hit = {.prim = (int)k};
         const struct imp__mesh_corner c = imp__mesh_corner(m, k);
         struct imp_surface at;
-        imp__mesh_point(m, &hit, &c, imp__mesh_face_normal(m, k), &at);
+        imp__mesh_point(m, &hit, &c, imp__mesh_face_normal(&c), &at);
         imp__mesh_slopes(m, m->indices + 3 * k, &c, &at);
         imp__surface_frame(&at);
         for (int j = 0; j < 3; j++) tangents[3 * k + (size_t)j] = at.s[j];

@@ -105,7 +105,6 @@ struct imp__mesh {
     double *cumulative; /* [n + 1] area of the triangles before this one */
     size_t last;        /* the last triangle that has area */
     double inv_area;
-    const double *face_normals;  /* [3 n_triangles], 0 0 1 of those without area */
     const double *face_tangents; /* [3 n_triangles] s of the shading frame of flat meshes,
                                     where it does not vary over a triangle; else NULL */
     const struct imp__facet *facets; /* [n_triangles]; NULL: too many */
