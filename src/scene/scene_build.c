@@ -163,6 +163,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
     IMP_TRY(imp__media_check(scene));
     imp__theta_finish(scene);
     if (!scene->rayless) {
+        imp__scene_release_files(scene); /* before a tree is built beside them */
         IMP_TRY(imp__intersector_create(scene));
         if (scene->aims.aimed) IMP_TRY(imp__aims_aim(scene));
         if (scene->lights_in_tree) IMP_TRY(imp__light_tree_build(scene));
