@@ -70,7 +70,14 @@ static double at_level(const struct imp__clip *c, size_t i)
     return (double)fmaxf(c->low, fminf(c->high, c->measured[i]));
 }
 
-static void target_reset(struct imp__target *t)
+/* The gamma of a photograph, where the scene stands; 1 of other targets. */
+static double gamma_of(const struct imp_problem *p, const struct imp__target *t)
+{
+    const struct imp_camera_gain *gain = p->scene->sensors[t->desc.sensor]->gain;
+    return t->clip->base ? gain->input[IMP_GAIN_GAMMA]->value[0] : 1;
+}
+
+static void target_reset(const struct imp_problem *p, struct imp__target *t)
 {
     struct imp__clip *c = t->clip;
     for (size_t i = 0; i < numbers_of(t); i++) {
@@ -78,12 +85,13 @@ static void target_reset(struct imp__target *t)
         t->pixels[i] = c->measured[i];
         if (c->base) c->base[i] = c->measured[i];
     }
+    t->photograph.at = gamma_of(p, t);
 }
 
 void imp__clip_reset(struct imp_problem *p)
 {
     for (size_t t = 0; t < p->n_targets; t++)
-        if (p->targets[t].clip) target_reset(&p->targets[t]);
+        if (p->targets[t].clip) target_reset(p, &p->targets[t]);
 }
 
 enum imp_status imp_problem_clip(imp_problem *p, int target, double low, double high)
@@ -123,7 +131,7 @@ enum imp_status imp_problem_clip(imp_problem *p, int target, double low, double 
     t->clip = c;
     t->silent = c->silent;
     if (c->base) t->photograph.pixels = c->base;
-    target_reset(t);
+    target_reset(p, t);
     return IMP_OK;
 out:
     imp__clip_free(ctx, c);
@@ -281,11 +289,10 @@ static enum imp_status target_censor(struct imp_problem *p, size_t number,
     enum imp_status st = IMP_OK;
     imp_context *ctx = p->ctx;
     struct imp__target *t = &p->targets[number];
-    const struct imp_camera_gain *gain = p->scene->sensors[t->desc.sensor]->gain;
-    struct decision d = {.t = t, .gamma = 1};
+    struct decision d = {.t = t, .gamma = gamma_of(p, t)};
     const size_t n = numbers_of(t);
     imp_film *film = NULL;
-    if (t->clip->base) d.gamma = gain->input[IMP_GAIN_GAMMA]->value[0];
+    t->photograph.at = d.gamma;
     d.V = imp__alloc(ctx, 4 * n, sizeof *d.V);
     if (!d.V) return imp__error(ctx, IMP_E_NOMEM, "no memory for clipped numbers");
     d.up = d.V + n;

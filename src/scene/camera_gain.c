@@ -69,23 +69,49 @@ enum imp_status imp__gain_fit(struct imp_scene *scene, struct imp_node *film,
     return IMP_OK;
 }
 
-/* T^(1 - gamma), and its derivative with respect to gamma. */
+/* The channels of a pixel; NULL outside, and without a photograph. */
+static const float *pixel_of(const struct imp_photograph *photo, double px, double py)
+{
+    if (!photo) return NULL;
+    const int x = (int)floor(px) - photo->x, y = (int)floor(py) - photo->y;
+    if (x < 0 || y < 0 || x >= photo->width || y >= photo->height) return NULL;
+    return photo->pixels + ((size_t)y * (size_t)photo->width + (size_t)x) *
+                               (size_t)photo->channels;
+}
+
+/* T^(1 - gamma), of one that belongs to a gamma `at` times at/gamma, and its derivative with
+ * respect to gamma. */
 static imp_spec developed(const struct imp_photograph *photo, double gamma, double px,
                           double py, imp_spec *d)
 {
     imp_spec factor = imp__spec(1);
     *d = imp__spec(0);
-    if (!photo) return factor;
-    const int x = (int)floor(px) - photo->x, y = (int)floor(py) - photo->y;
-    if (x < 0 || y < 0 || x >= photo->width || y >= photo->height) return factor;
-    const float *T = photo->pixels + ((size_t)y * (size_t)photo->width + (size_t)x) *
-                                         (size_t)photo->channels;
+    const float *T = pixel_of(photo, px, py);
+    if (!T) return factor;
+    const double scale = photo->at > 0 ? photo->at / gamma : 1;
+    const double slope = photo->at > 0 ? -1 / gamma : 0; /* of log scale */
     for (int c = 0; c < 4; c++) {
         const double t = T[imp_min(c, photo->channels - 1)];
-        factor[c] = t >= IMP_PHOTOGRAPH_LEAST ? pow(t, 1 - gamma) : 0;
-        (*d)[c] = t >= IMP_PHOTOGRAPH_LEAST ? -log(t) * factor[c] : 0;
+        factor[c] = t >= IMP_PHOTOGRAPH_LEAST ? scale * pow(t, 1 - gamma) : 0;
+        (*d)[c] = t >= IMP_PHOTOGRAPH_LEAST ? (slope - log(t)) * factor[c] : 0;
     }
     return factor;
+}
+
+imp_spec imp__gain_offset(const struct imp_camera_gain *g,
+                          const struct imp_photograph *photo, double px, double py,
+                          imp_spec *d)
+{
+    const double gamma = g->input[IMP_GAIN_GAMMA]->value[0];
+    const float *V = photo && photo->at > 0 ? pixel_of(photo, px, py) : NULL;
+    imp_spec offset = {0};
+    if (d) *d = (imp_spec){0};
+    for (int c = 0; V && c < photo->channels; c++) {
+        if (V[c] < (float)IMP_PHOTOGRAPH_LEAST) continue;
+        offset[c] = (double)V[c] * (1 - photo->at / gamma);
+        if (d) (*d)[c] = (double)V[c] * photo->at / (gamma * gamma);
+    }
+    return offset;
 }
 
 imp_spec imp__gain_at(const struct imp_camera_gain *g, const struct imp_photograph *photo,

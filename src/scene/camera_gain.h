@@ -13,7 +13,13 @@
  *     T^(1 - gamma) M' - T  =  gamma (M'^(1/gamma) - T) + O((M' - M)^2)
  *
  * so that losses are those of the photograph's own values, and stay polynomials of the
- * picture, unbiased (docs/photographs.md). */
+ * picture, unbiased (docs/photographs.md). Where the power is expanded about another picture
+ * V (docs/estimators.md 20), found when gamma was `at`, the same is told in units that gamma
+ * does not change,
+ *
+ *     at/gamma V^(1 - gamma) M' + (1 - at/gamma) V  =  V + at (M'^(1/gamma) - V) + O((M' - V^gamma)^2)
+ *
+ * by a factor and an offset. */
 #ifndef IMP_SCENE_CAMERA_GAIN_H
 #define IMP_SCENE_CAMERA_GAIN_H
 
@@ -39,6 +45,7 @@ struct imp_camera_gain {
 struct imp_photograph {
     const float *pixels;
     int x, y, width, height, channels;
+    double at; /* gamma that the pixels belong to; 0: they are compared as they are */
 };
 
 /* Below this a photograph's value says nothing: dark current, rounding. */
@@ -48,5 +55,10 @@ struct imp_photograph {
  * NULL: not wanted. */
 imp_spec imp__gain_at(const struct imp_camera_gain *g, const struct imp_photograph *photo,
                       double px, double py, imp_spec *d);
+/* What a photograph with an `at` adds to the value of each walk, and its derivative with
+ * respect to gamma (may be NULL). */
+imp_spec imp__gain_offset(const struct imp_camera_gain *g,
+                          const struct imp_photograph *photo, double px, double py,
+                          imp_spec *d);
 
 #endif

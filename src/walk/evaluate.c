@@ -242,11 +242,11 @@ static imp_spec elsewhere(const struct imp_tracer *there, const struct imp_walk 
 
 imp_spec imp__walk_elsewhere(const struct imp_tracer *there, const struct imp_walk *walk)
 {
-    imp_spec L = {0};
-    if (walk->dropped || !walk->valid) return L;
-    L = imp__walk_channels(there, walk, elsewhere(there, walk));
+    const imp_spec none = {0};
+    if (walk->dropped || !walk->valid) return imp__walk_shown(there, walk, none);
+    const imp_spec L = imp__walk_shown(there, walk, elsewhere(there, walk));
     for (int c = 0; c < 4; c++)
-        if (!isfinite(L[c])) return (imp_spec){0};
+        if (!isfinite(L[c])) return imp__walk_shown(there, walk, none);
     return L;
 }
 

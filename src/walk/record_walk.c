@@ -189,6 +189,6 @@ void imp__record_walk(const struct imp_record *r, size_t i,
     if (imp_unlikely(walk->dropped == IMP_DROP_NEGATIVE) && k->n_items > 0) {
         walk->dropped = IMP_DROP_NONE; /* 1 - sigma/b of a null collision */
         walk->values = imp__walk_fold(walk);
-        walk->L = imp__walk_channels(tracer, walk, walk->values);
+        walk->L = imp__walk_shown(tracer, walk, walk->values);
     }
 }

@@ -329,7 +329,6 @@ imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_wal
 {
     imp_spec L_dot = imp__walk_channels(tracer, walk, tangent(tracer, walk, x_dot));
     if (imp_unlikely(tracer->sensor->gain != NULL))
-        L_dot +=
-            imp__walk_seen(walk, walk->values) * imp__gain_tangent(tracer, walk, x_dot);
+        L_dot += imp__gain_tangent(tracer, walk, x_dot);
     return L_dot;
 }

@@ -320,12 +320,13 @@ void imp__vertex_tangent(const struct imp_tracer *tracer, const struct imp_verte
 
 /* ---- From a walk to the picture (gain.c) ------------------------------------------ */
 
-/* The camera's factor for this walk, by channel. */
+/* The camera's factor for this walk, by channel, and what is added behind it. */
 imp_spec imp__walk_gain(const struct imp_tracer *tracer, const struct imp_walk *walk);
+imp_spec imp__walk_offset(const struct imp_tracer *tracer, const struct imp_walk *walk);
 /* What an adjoint of the walk's channels gives to the camera's own numbers. */
 void imp__gain_sweep(const struct imp_tracer *tracer, const struct imp_walk *walk,
                      imp_spec adjoint, struct imp_sink *sink);
-/* d gain in the direction x_dot. */
+/* What the camera makes of the walk's values, in the direction x_dot of its own numbers. */
 imp_spec imp__gain_tangent(const struct imp_tracer *tracer, const struct imp_walk *walk,
                            const double *x_dot);
 
@@ -345,6 +346,13 @@ static inline imp_spec imp__walk_channels(const struct imp_tracer *tracer,
     const imp_spec seen = imp__walk_seen(walk, values);
     return imp_likely(!tracer->sensor->gain) ? seen : seen * imp__walk_gain(tracer, walk);
 }
+/* As the target sees them. */
+static inline imp_spec imp__walk_shown(const struct imp_tracer *tracer,
+                                       const struct imp_walk *walk, imp_spec values)
+{
+    const imp_spec L = imp__walk_channels(tracer, walk, values);
+    return imp_likely(!tracer->photograph) ? L : L + imp__walk_offset(tracer, walk);
+}
 static inline imp_spec imp__walk_values(const struct imp_tracer *tracer,
                                         const struct imp_walk *walk, imp_spec channels)
 {
@@ -362,7 +370,7 @@ imp__walk_value(const struct imp_tracer *tracer, struct imp_walk *walk, imp_spec
     if (imp_unlikely(!imp__is_within(used, FLT_MAX)))
         walk->dropped = imp__drop_cause(used);
     walk->values = walk->dropped || !walk->valid ? (imp_spec){0} : L;
-    walk->L = imp__walk_channels(tracer, walk, walk->values);
+    walk->L = imp__walk_shown(tracer, walk, walk->values);
 }
 
 /* Reverse mode, for an adjoint of the walk's channels. */
