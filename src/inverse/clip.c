@@ -16,9 +16,11 @@
  * A photograph (docs/photographs.md) is compared by a power of T, whose noise is in the
  * power. Here the power is expanded about V instead,
  *
- *     V^(1 - gamma) g L - [ V + gamma (T - V) + 1/2 gamma (gamma - 1) s_V^2/V ]
+ *     at/gamma (V^(1 - gamma) g L - V) - [ at (T - V) + 1/2 at (at - 1) s_V^2/V ]
  *
- * which is linear in T; the last term is the mean of what the noise of V adds. */
+ * which is linear in T; `at` is the gamma of J, and the last term is the mean of what the
+ * noise of V adds. Where a scene follows gamma so that its photograph stays, that noise
+ * enters by its square alone, at any gamma: it does not hold gamma at `at`. */
 #include "clip.h"
 #include "base/arguments.h"
 #include "math/hash.h"

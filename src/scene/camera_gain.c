@@ -75,8 +75,8 @@ static const float *pixel_of(const struct imp_photograph *photo, double px, doub
     if (!photo) return NULL;
     const int x = (int)floor(px) - photo->x, y = (int)floor(py) - photo->y;
     if (x < 0 || y < 0 || x >= photo->width || y >= photo->height) return NULL;
-    return photo->pixels + ((size_t)y * (size_t)photo->width + (size_t)x) *
-                               (size_t)photo->channels;
+    return photo->pixels +
+           ((size_t)y * (size_t)photo->width + (size_t)x) * (size_t)photo->channels;
 }
 
 /* T^(1 - gamma), of one that belongs to a gamma `at` times at/gamma, and its derivative with
