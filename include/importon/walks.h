@@ -58,7 +58,7 @@ struct imp_walks_options {
         sizeof(struct imp_walks_options), 0, 0, 0, 0, 0, 0, 0                            \
     }
 
-/** Draw walks at the scene's present parameters and keep them: about 160 bytes a vertex.
+/** Draw walks at the scene's present parameters and keep them: about 164 bytes a vertex.
  * The scene must outlive them. Parameters with a gradient may change afterwards, but for
  * those of graded indices, which move rays. By extinctions collisions were drawn: they may
  * change where they were not 0, up to the bounds under which collisions were drawn, and
