@@ -22,7 +22,7 @@ CASES = ["stage", "stage_mono", "shapes", "shapes_flip", "shapes_mirror", "meshe
          "spots_mono", "directional", "projector", "stage_spectral", "rough_spectral", "glass_spectral",
          "textures_spectral", "emission_forms_spectral", "reflectance_forms_spectral", "sky_spectral",
          "attributes", "attributes_mono", "bumps", "bumps_nearest",
-         "curves_bspline", "curves_linear", "batch"]
+         "beam", "beam_disk", "curves_bspline", "curves_linear", "batch"]
 
 
 def quarters(stack):
