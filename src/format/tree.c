@@ -91,6 +91,22 @@ static struct imp_arena *arena_of(const struct imp_tree *t, const char *tag,
     return many ? t->brief : t->arena;
 }
 
+/* Instances are taken out of the tree once they are built, and what they were read from is
+ * released: elsewhere nobody takes them. */
+static enum imp_status place_check(const struct imp_tree *t,
+                                   const struct imp_node *parent, const char *type,
+                                   struct imp_loc loc)
+{
+    const char *in = parent->type ? parent->type : "";
+    const bool group = strcmp(in, "shapegroup") == 0 || strcmp(in, "merge") == 0;
+    if (strcmp(parent->tag, "scene") == 0 || (strcmp(parent->tag, "shape") == 0 && group))
+        return IMP_OK;
+    return imp__loc_error(t->ctx, loc, IMP_E_SCENE,
+                          "shape (%s): it stands in a %s (%s); instances stand in the "
+                          "scene, or in a shapegroup",
+                          type, parent->tag, in);
+}
+
 enum imp_status imp__tree_open(struct imp_tree *t, struct imp_node *parent,
                                const char *tag, const char *type, const char *id,
                                const char *name, struct imp_loc loc,
@@ -108,6 +124,7 @@ enum imp_status imp__tree_open(struct imp_tree *t, struct imp_node *parent,
     if (id) IMP_TRY(id_take(t, node->id, node, loc));
     if (parent) {
         const bool many = arena_of(t, tag, type) == t->brief;
+        if (many) IMP_TRY(place_check(t, parent, type, loc));
         struct imp_arena *list = many ? t->brief : arena_of(t, parent->tag, parent->type);
         if (!imp__node_add_child(list, parent, node, name, loc))
             IMP_TRY(no_memory(t->ctx));
