@@ -106,10 +106,11 @@ imp_spec imp__gain_offset(const struct imp_camera_gain *g,
     const float *V = photo && photo->at > 0 ? pixel_of(photo, px, py) : NULL;
     imp_spec offset = {0};
     if (d) *d = (imp_spec){0};
-    for (int c = 0; V && c < photo->channels; c++) {
-        if (V[c] < (float)IMP_PHOTOGRAPH_LEAST) continue;
-        offset[c] = (double)V[c] * (1 - photo->at / gamma);
-        if (d) (*d)[c] = (double)V[c] * photo->at / (gamma * gamma);
+    for (int c = 0; V && c < 3; c++) {
+        const double v = V[imp_min(c, photo->channels - 1)];
+        if (v < IMP_PHOTOGRAPH_LEAST) continue;
+        offset[c] = v * (1 - photo->at / gamma);
+        if (d) (*d)[c] = v * photo->at / (gamma * gamma);
     }
     return offset;
 }

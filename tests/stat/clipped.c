@@ -316,7 +316,8 @@ static void gradients(void)
     "<integer name='height' value='12'/><rfilter type='box'/>" NUMBER("exposure", "1")   \
         NUMBER("gamma", "2.2") "</film></sensor></scene>"
 
-static void grey_wall(void)
+/* Of one channel, luminance is what is seen. */
+static void grey_wall(int channels)
 {
     imp_scene *s = test_scene_text(ctx, GREY, IMP_RGB);
     imp_problem *p = test_problem(ctx, s, "cam.*");
@@ -324,7 +325,12 @@ static void grey_wall(void)
     static float T[N];
     struct imp_run run = IMP_RUN_INIT;
     for (size_t i = 0; i < N; i++) T[i] = (float)V;
-    test_target(ctx, p, 0, WIDTH, HEIGHT, T);
+    struct imp_target t = IMP_TARGET_INIT;
+    t.width = WIDTH;
+    t.height = HEIGHT;
+    t.channels = channels;
+    t.pixels = T;
+    test_must(ctx, imp_problem_add_target(p, &t));
     test_must(ctx, imp_problem_clip(p, 0, .5 / 255, 254.5 / 255));
     tap_ok(imp_problem_n(p) == 2, "exposure and gamma");
     test_must(ctx, imp_problem_set_x(p, (double[]){pow(V, 2.2) / mean, 2.2}));
@@ -337,8 +343,9 @@ static void grey_wall(void)
         test_must(ctx, imp_problem_objective(p, (double[]){pow(V, gamma) / mean, gamma},
                                              &run, &e, NULL, NULL));
         tap_ok(fabs(e.value) < 0.001 && e.se < 0.0002,
-               "a grey wall, decided at 2.2, loss at gamma %.1f # %.5f +- %.5f", gamma,
-               e.value, e.se);
+               "a grey wall of %d channels, decided at 2.2, loss at gamma %.1f # %.5f +- "
+               "%.5f",
+               channels, gamma, e.value, e.se);
     }
     imp_problem_destroy(p);
     imp_scene_destroy(s);
@@ -350,7 +357,8 @@ int main(int argc, char **argv)
     ctx = test_context(2);
     decisions();
     gradients();
-    grey_wall();
+    grey_wall(3);
+    grey_wall(1);
     photographs(&yard, all ? 140 : 1, all);
     if (all) photographs(&room, 1, all);
     imp_context_destroy(ctx);
