@@ -76,7 +76,7 @@ static enum imp_status intervals(struct imp__fit *f, const struct imp__search *s
     imp_context *ctx = f->problem->ctx;
     if (imp__fit_is_sparse(f)) {
         imp__sparse_errors_destroy(ctx, &f->errors);
-        IMP_CHECKED(imp__sparse_errors_find(&f->goal, x, &f->errors));
+        IMP_CHECKED(imp__sparse_errors_find(&f->goal, x, f->clipped_rounds, &f->errors));
         if (f->errors.x) memcpy(x, f->errors.x, f->problem->n * sizeof *x);
         *why = f->errors.why;
         return IMP_OK;
@@ -150,6 +150,7 @@ static enum imp_status clipped_searches(struct imp__fit *f,
         f->run.spp = f->outer.spp; /* intervals took others */
         imp__variate_forget(f->variate);
         imp__uncertainty_destroy(f->problem->ctx, u);
+        imp__sparse_errors_destroy(f->problem->ctx, &f->errors);
         *u = (struct imp__uncertainty){0};
         *why = NULL;
         const enum imp_status st = search(f, &own, *s);

@@ -35,7 +35,7 @@ struct imp__fit {
 
     struct imp__allocation allocation; /* of the search's samples; n 0: all alike */
     const struct imp__metric *metric;  /* of the next evaluation's variance; or NULL */
-    bool rows_fit; /* rows of derivatives are known to fit into memory */
+    int rounds_fit; /* rows of derivatives of so many rounds are known to fit into memory */
 
     /* Of searches with common random numbers (fit_kept.c): walks that are evaluated. */
     imp_walks *walks; /* NULL: none are */

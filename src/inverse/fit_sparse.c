@@ -2,6 +2,8 @@
  *
  * Normal equations of many numbers, as the optimiser sees them: rows of derivatives, and the
  * regularisers, which are quadratic. */
+#include "base/arguments.h"
+#include "base/team.h"
 #include "fit.h"
 #include "sparse_rows.h"
 #include <math.h>
@@ -15,6 +17,7 @@ struct equations {
     double *at_zero;   /* [n] gradient of the regularisers at 0; NULL: there are none */
     double *one, *its; /* [n] a vector, and the regularisers' gradient there */
     double widen;      /* of the noise: of residuals that a fit has reduced */
+    double *prior;     /* [n] the diagonal of the regularisers' second derivative */
     double *memory;
 };
 
@@ -52,6 +55,28 @@ static void destroy(struct imp__sparse_normal *eq)
     imp__release(ctx, e);
 }
 
+/* Rows may fail on one rank alone, or meet its time limit, but all ranks must go on alike:
+ * of a failure anywhere nothing is left here. */
+static enum imp_status alike(struct imp__fit *f, enum imp_status st, struct equations *e,
+                             bool *failed)
+{
+    imp_context *ctx = f->problem->ctx;
+    bool stopped = false;
+    enum imp_status asked = imp__team_any(ctx, st == IMP_CANCELLED, &stopped);
+    if (asked == IMP_OK) asked = imp__team_any(ctx, st != IMP_OK, failed);
+    f->stopped |= stopped;
+    if (asked == IMP_OK && *failed && st == IMP_OK)
+        asked = stopped ? IMP_CANCELLED
+                        : imp__error(ctx, IMP_E_NOMEM, "another rank has no equations");
+    if (asked == IMP_OK && !*failed) return IMP_OK;
+    if (e) {
+        imp__rows_destroy(&e->rows);
+        imp__release(ctx, e->memory);
+        imp__release(ctx, e);
+    }
+    return asked;
+}
+
 enum imp_status imp__fit_sparse(const double *x, uint64_t seed, int rounds,
                                 struct imp__sparse_normal *out, void *payload)
 {
@@ -60,35 +85,39 @@ enum imp_status imp__fit_sparse(const double *x, uint64_t seed, int rounds,
     imp_context *ctx = p->ctx;
     enum imp_status st = IMP_OK;
     const size_t n = p->n;
+    bool failed;
     struct equations *e = imp__alloc(ctx, 1, sizeof *e);
-    if (!e) return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu numbers", n);
+    if (!e) st = imp__error(ctx, IMP_E_NOMEM, "no memory for %zu numbers", n);
+    else e->memory = imp__alloc(ctx, 8 * n, sizeof *e->memory);
+    if (e && !e->memory)
+        st = imp__error(ctx, IMP_E_NOMEM, "no memory for %zu numbers", n);
+    f->run.seed = seed;
+    f->final_calls++;
+    if (st == IMP_OK)
+        st = imp__rows_take(p, x, &f->run, rounds, rounds > f->rounds_fit, &e->rows);
+    IMP_CHECKED(alike(f, st, e, &failed));
+    if (failed) return st;
+    f->rounds_fit = imp_max(f->rounds_fit, rounds);
     e->problem = p;
     struct imp__sparse_normal eq = {.n = n,
-                                    .has_prior = p->n_regularisers > 0,
                                     .noise_known = f->noise_known,
                                     .product = product,
                                     .draw = draw,
                                     .destroy = destroy,
                                     .of = e};
-    f->run.seed = seed;
-    f->final_calls++;
-    e->memory = imp__alloc(ctx, 7 * n, sizeof *e->memory);
-    if (!e->memory) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu numbers", n));
     eq.g = e->memory;
     eq.same = eq.g + n;
     eq.diagonal = eq.same + n;
     eq.spread = eq.diagonal + n;
     e->one = eq.spread + n;
     e->its = e->one + n;
-    if (eq.has_prior) e->at_zero = e->its + n;
-    st = imp__rows_take(p, x, &f->run, rounds, !f->rows_fit, &e->rows);
-    if (st == IMP_CANCELLED) f->stopped = true;
-    if (st != IMP_OK) goto out;
-    f->rows_fit = true;
+    eq.prior = e->prior = e->its + n;
+    if (p->n_regularisers > 0) e->at_zero = e->prior + n;
     IMP_TRY(imp__rows_gradient(&e->rows, eq.g));
     IMP_TRY(imp__rows_diagonal(&e->rows, eq.diagonal, eq.spread, eq.same));
-    imp__regularise_diagonal(p, eq.same);
-    if (eq.has_prior) imp__regularise(p, e->one, e->at_zero); /* `one` is 0 */
+    imp__regularise_diagonal(p, e->prior);
+    for (size_t k = 0; k < n; k++) eq.same[k] += e->prior[k];
+    if (e->at_zero) imp__regularise(p, e->one, e->at_zero); /* `one` is 0 */
     eq.f = e->rows.objective;
     eq.f.value += imp__regularise(p, x, eq.g);
     eq.n_residuals = e->rows.n_residuals;

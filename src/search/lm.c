@@ -140,7 +140,7 @@ static enum imp_status iterate(const struct imp__goal *goal,
         else if (!(ratio > 0.25)) mu = fmin(fmax(mu, 1e-4) * 5, IMP_LM_MU_MAX);
     }
     IMP_TRY(imp__search_log(s, system->f, s->x));
-    s->scalar[MU] = mu;
+    s->scalar[MU] = fmin(mu, IMP_LM_MU_MAX);
     if (moved) memcpy(s->x, w->trial, n * sizeof *s->x);
     if (s->finished) goto out;
     s->scalar[WITHIN] = quiet ? s->scalar[WITHIN] + 1 : 0;

@@ -21,6 +21,7 @@ struct work {
     bool *fixed, *loose;  /* [n] */
     double *step, *b, *u; /* [n], [n][WIDTH] twice */
     struct imp__sparse_errors *out;
+    int base; /* of seeds */
 };
 
 /* Which variables may move, and which of them the data determine. A prior holds those that
@@ -31,7 +32,7 @@ static void choose(struct work *w, const double *x)
         const int wall = imp__at_bound(w->goal, x, k);
         const double g = w->eq.g[k];
         w->loose[k] = !(w->eq.diagonal[k] > LOOSE * sqrt(w->eq.spread[k]));
-        w->fixed[k] = !(w->eq.same[k] > 0) || (w->loose[k] && !w->eq.has_prior) ||
+        w->fixed[k] = !(w->eq.same[k] > 0) || (w->loose[k] && !(w->eq.prior[k] > 0)) ||
                       (wall < 0 && g >= 0) || (wall > 0 && g <= 0);
     }
 }
@@ -77,7 +78,7 @@ static enum imp_status step(struct work *w, const double *x)
 static enum imp_status accept(struct work *w, const double *x)
 {
     const struct imp__goal *goal = w->goal;
-    const uint64_t seed = imp__search_seed(goal, SEED_BASE, 2);
+    const uint64_t seed = imp__search_seed(goal, w->base, 2);
     struct imp_estimate old, new;
     IMP_CHECKED(goal->eval(x, seed, &old, NULL, NULL, goal->payload));
     IMP_CHECKED(goal->eval(w->out->x, seed, &new, NULL, NULL, goal->payload));
@@ -92,7 +93,7 @@ static enum imp_status draws(struct work *w)
     double *se = w->out->se;
     const size_t n = w->eq.n;
     for (int k = 0; k < DRAWS / WIDTH && !w->out->why; k++) {
-        const uint64_t seed = imp__search_seed(w->goal, SEED_BASE, 3 + k);
+        const uint64_t seed = imp__search_seed(w->goal, w->base, 3 + k);
         IMP_CHECKED(w->eq.draw(&w->eq, IMP_DRAW_GRADIENT, seed, w->b));
         IMP_CHECKED(w->eq.draw(&w->eq, IMP_DRAW_MEASUREMENT, ~seed, w->u));
         for (size_t i = 0; i < n * WIDTH; i++) w->b[i] += w->u[i];
@@ -121,13 +122,13 @@ void imp__sparse_errors_destroy(imp_context *ctx, struct imp__sparse_errors *e)
 }
 
 enum imp_status imp__sparse_errors_find(const struct imp__goal *goal, const double *x,
-                                        struct imp__sparse_errors *out)
+                                        int look, struct imp__sparse_errors *out)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = goal->ctx;
     const size_t n = goal->n;
     struct imp__sparse_errors made = {.x = imp__alloc(ctx, 2 * n, sizeof *made.x)};
-    struct work w = {.goal = goal, .out = &made};
+    struct work w = {.goal = goal, .out = &made, .base = SEED_BASE + look};
     *out = (struct imp__sparse_errors){0};
     w.fixed = imp__alloc(ctx, 2 * n, sizeof *w.fixed);
     w.step = imp__alloc(ctx, (1 + 2 * WIDTH) * n, sizeof *w.step);
@@ -137,8 +138,13 @@ enum imp_status imp__sparse_errors_find(const struct imp__goal *goal, const doub
     w.loose = w.fixed + n;
     w.b = w.step + n;
     w.u = w.b + WIDTH * n;
-    IMP_TRY(goal->sparse(x, imp__search_seed(goal, SEED_BASE, 0), ROUNDS, &w.eq,
-                         goal->payload));
+    st = goal->sparse(x, imp__search_seed(goal, w.base, 0), ROUNDS, &w.eq, goal->payload);
+    if (st == IMP_E_NOMEM) { /* all ranks alike */
+        out->why = "the equations of their walks do not fit into memory";
+        st = IMP_OK;
+        goto out;
+    }
+    if (st != IMP_OK) goto out;
     if (!w.eq.noise_known && w.eq.n_residuals <= (double)n)
         made.why =
             "the targets' noise is not known, and there are no more residuals than "

@@ -27,7 +27,7 @@ struct imp__sparse_errors {
 
 /* Normal equations at x with fresh random numbers, twice the samples of an evaluation. */
 enum imp_status imp__sparse_errors_find(const struct imp__goal *goal, const double *x,
-                                        struct imp__sparse_errors *out);
+                                        int look, struct imp__sparse_errors *out);
 void imp__sparse_errors_destroy(imp_context *ctx, struct imp__sparse_errors *errors);
 
 #endif

@@ -25,7 +25,7 @@ struct imp__sparse_normal {
     double *spread;   /* [n] with this variance */
     struct imp_estimate f;
     double n_residuals;
-    bool has_prior;   /* a part of H is not from data */
+    double *prior;    /* [n] diagonal of the part of H that is not from data */
     bool noise_known; /* every target has its standard errors */
     /* y = H v, of `width` vectors (1 or IMP_SPARSE_WIDTH), [n][width]. */
     enum imp_status (*product)(const struct imp__sparse_normal *eq, int width,
