@@ -122,7 +122,7 @@ void imp__variate_replicate(struct imp__variate_view *view, const struct imp__ta
             moments_add(m, scale, f, h, to + IMP_VARIATE_KINDS);
     }
     imp_spec rest = {0}, last = {0};
-    for (int s = 0; s < m; s++) rest += L[s] - by * H[s];
+    for (int s = 0; s < m; s++) rest += by != 0 ? L[s] - by * H[s] : L[s];
     for (int c = 0; c < view->channels; c++) {
         if (moments)
             view->sum[(size_t)k * view->n + at + (size_t)c] += rest[c] / m / plan.R;
