@@ -99,7 +99,7 @@ static struct drawn density(struct imp_step *s, const struct imp_bsdf *b,
     const double k = p[drew];
     if (s->mixed.here && s->mixed.splits) {
         d.pdf = imp__direction_pdf(s, k, w, by, dirs->lobe, &d.competing);
-        if (k > 0) mixed_parts(s, d.pdf, k, by, dirs->lobe, &d);
+        if (d.pdf > 0) mixed_parts(s, d.pdf, k, by, dirs->lobe, &d);
         return d;
     }
     for (int j = 0; j < s->at.carried->n; j++)
