@@ -90,7 +90,7 @@ static enum imp_status range_read(imp_context *ctx, struct imp_node *node, doubl
 {
     enum imp_status st = IMP_OK;
     IMP_TRY(imp__props_float_in(ctx, node, "wavelength_min", IMP_CIE_FIRST_NM,
-                                IMP_POSITIVE, lo));
+                                IMP_NOT_NEGATIVE, lo));
     IMP_TRY(imp__props_float_in(ctx, node, "wavelength_max", IMP_CIE_LAST_NM,
                                 IMP_POSITIVE, hi));
     if (!(*lo < *hi)) {
@@ -103,7 +103,7 @@ static enum imp_status range_read(imp_context *ctx, struct imp_node *node, doubl
                                 *hi, *lo));
         IMP_TRY(imp__prop_error(
             ctx, node, imp__node_prop(node, "wavelength_min"), IMP_E_SCENE,
-            "wavelength_min = %g is outside (0, wavelength_max = %g)", *lo, *hi));
+            "wavelength_min = %g is outside [0, wavelength_max = %g)", *lo, *hi));
     }
 out:
     return st;

@@ -239,7 +239,8 @@ enum imp_status imp__media_check(struct imp_scene *scene)
     }
     for (int i = 0; i < scene->n_sensors; i++) used |= scene->sensors[i]->medium != NULL;
     if (scene->priorities && !knows) {
-        const struct imp_node *node = priority_of(scene->root);
+        const struct imp_node *found = priority_of(scene->root);
+        const struct imp_node *node = found ? found : scene->root;
         return imp__prop_error(
             scene->ctx, node, imp__node_prop(node, "priority"), IMP_E_UNSUPPORTED,
             "has a priority, which the integrator, %s, does not know: "
