@@ -36,7 +36,8 @@ static struct imp__search *search_of(struct toy *t, enum imp_optimizer kind,
 
 static void begin(void)
 {
-    const struct imp__opt_options o = {12, 0.05, 1e-6};
+    const struct imp__opt_options o = {
+        .max_iterations = 12, .learning_rate = 0.05, .tolerance = 1e-6};
     if (imp_context_create(NULL, &ctx) != IMP_OK) abort();
     for (int k = 0; k < KINDS; k++) {
         struct toy t;
@@ -92,7 +93,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (!ctx) begin();
     if (size == 0) return 0;
     const int how = data[0], k = how >> 2 & 3;
-    const struct imp__opt_options o = {12, 0.05, 1e-6};
+    const struct imp__opt_options o = {
+        .max_iterations = 12, .learning_rate = 0.05, .tolerance = 1e-6};
     const size_t n = how & 2 ? n_good[k] / 2 : n_good[k];
     memset(text, 0, sizeof text);
     memcpy(text, good[k], n);
