@@ -41,11 +41,17 @@ static bool word_is(struct text *t, const char *word)
     t->s += n;
     return true;
 }
+/* Powers of larger numbers, and of lengths in units of smaller ones, overflow where a
+ * profile goes on beyond its radius. */
+#define LARGEST  1e12
+#define SHORTEST 1e-12
+
 static bool numbers(struct text *t, int n, double *out)
 {
     for (int i = 0; i < n; i++) {
         blank(t);
-        if (!imp__number(&t->s, t->end, &out[i]) || !isfinite(out[i])) return false;
+        if (!imp__number(&t->s, t->end, &out[i]) || !(fabs(out[i]) <= LARGEST))
+            return false;
     }
     return true;
 }
@@ -61,8 +67,11 @@ static enum imp_status radial_read(imp_context *ctx, const char *path, struct te
     ok = ok && word_is(t, "centre") && numbers(t, 3, r.centre) && word_is(t, "axis") &&
          numbers(t, 3, r.axis) && word_is(t, "radius") && numbers(t, 1, &r.radius) &&
          word_is(t, "coefficients") && numbers(t, 1, count);
-    if (!ok || !(*count >= 4) || !(*count <= 65539))
-        return imp__error(ctx, IMP_E_SCENE, "%s: not a profile (importon-profile 1)",
+    if (!ok || (r.radius > 0 && r.radius < SHORTEST) || !(*count >= 4) ||
+        !(*count <= 65539))
+        return imp__error(ctx, IMP_E_SCENE,
+                          "%s: not a profile (importon-profile 1) of numbers up to "
+                          "1e12 and of a radius from 1e-12",
                           path);
     r.cells = (int)*count - 3;
     return imp_field_radial_create(ctx, &r, 1, out);
@@ -71,13 +80,17 @@ static enum imp_status rz_read(imp_context *ctx, const char *path, struct text *
                                double *count, imp_field **out)
 {
     struct imp_field_rz r = IMP_FIELD_RZ_INIT;
-    double z[2], n[2];
+    double z[2] = {0}, n[2] = {0};
     const bool ok = word_is(t, "centre") && numbers(t, 3, r.centre) &&
                     word_is(t, "axis") && numbers(t, 3, r.axis) && word_is(t, "radius") &&
                     numbers(t, 1, &r.radius) && word_is(t, "z") && numbers(t, 2, z) &&
                     word_is(t, "coefficients") && numbers(t, 2, n);
-    if (!ok || !(n[0] >= 4 && n[0] <= 8195 && n[1] >= 4 && n[1] <= 8195))
-        return imp__error(ctx, IMP_E_SCENE, "%s: not an rz profile (importon-profile 1)",
+    const bool thin =
+        (r.radius > 0 && r.radius < SHORTEST) || (z[1] > z[0] && z[1] - z[0] < SHORTEST);
+    if (!ok || thin || !(n[0] >= 4 && n[0] <= 8195 && n[1] >= 4 && n[1] <= 8195))
+        return imp__error(ctx, IMP_E_SCENE,
+                          "%s: not an rz profile (importon-profile 1) of numbers "
+                          "up to 1e12 and of a radius and height from 1e-12",
                           path);
     r.lo = z[0], r.hi = z[1];
     r.cells_r = (int)n[0] - 3, r.cells_z = (int)n[1] - 3;
