@@ -11,6 +11,8 @@
 #include "loss.h"
 #include "seen.h"
 
+#define EDGES 0.1 /* docs/estimators.md 14 */
+
 /* The loss of one number of a pixel. */
 struct loss {
     enum imp_loss kind;
@@ -75,4 +77,24 @@ double imp__replicate_adjoints(const struct imp__target *target, int channels,
             else P[i][c] = a[i];
     }
     return value;
+}
+
+double imp__replicate_errors(const struct imp__target *target, int channels, size_t pixel,
+                             const imp_spec L[2], const imp_spec P[2], imp_spec E[2])
+{
+    const struct imp_target *t = &target->desc;
+    const bool luminance = imp__sees_luminance(target, channels);
+    double error = 0, apart = 0, a[2];
+    E[0] = P[1];
+    E[1] = -P[0];
+    for (int c = 0; c < t->channels; c++) {
+        const double T = target->pixels[pixel * (size_t)t->channels + (size_t)c];
+        const double w = imp__loss_weight(t->loss, imp__target_weight(target, pixel, c),
+                                          t->epsilon, T);
+        for (int i = 0; i < 2; i++)
+            a[i] = imp__seen(luminance, (double[3]){L[i][0], L[i][1], L[i][2]}, c) - T;
+        error += w / 4 * (a[0] - a[1]) * (a[0] + a[1]);
+        apart += w / 4 * (a[0] - a[1]) * (a[0] - a[1]);
+    }
+    return error * error + EDGES * apart * apart;
 }

@@ -19,4 +19,13 @@ double imp__replicate_adjoints(const struct imp__target *target, int channels,
                                size_t pixel, int n, const imp_spec *L, const imp_spec *M,
                                imp_spec *P);
 
+/* Of two independent sets, with their means L and the adjoints P of the above: the variance of the
+ * loss, and adjoints E of a number of mean 0, whose square is the variance of the gradient
+ * (docs/estimators.md 14):
+ *
+ *     sum_i E_i dL_i
+ */
+double imp__replicate_errors(const struct imp__target *target, int channels, size_t pixel,
+                             const imp_spec L[2], const imp_spec P[2], imp_spec E[2]);
+
 #endif

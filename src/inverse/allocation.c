@@ -8,7 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-#define LEAST  4    /* samples of a pixel: two replicates of two */
+#define LEAST  4    /* samples of a pixel: two sets, or two replicates, of two */
 #define FLOOR  0.25 /* of the samples asked for */
 #define CAP    16
 #define MEMORY 0.8 /* weight of what was seen before; a look's noise is 20 to 50 % */
@@ -46,11 +46,11 @@ static void part_add(const struct imp_problem *p, const struct imp__target *targ
     const struct imp_film_desc *film = &sensor->film;
     const size_t side = IMP_TILE_SIDE, across = ((size_t)film->crop_w + side - 1) / side,
                  down = ((size_t)film->crop_h + side - 1) / side;
-    const struct imp__replicates r = imp__replicates_of(p->scene, target, run);
+    const struct imp__replicates r = imp__replicates_loss(p, target, run);
     for (size_t k = 0; a->even && k < across * down; k++) a->even[a->n + k] = r.n * r.R;
     a->n += across * down;
     most.spp = (int)fmin((double)CAP * r.n * r.R, INT32_MAX);
-    a->parts = imp_max(a->parts, imp__replicates_of(p->scene, target, &most).chunks);
+    a->parts = imp_max(a->parts, imp__replicates_loss(p, target, &most).chunks);
 }
 
 static void targets_add(const struct imp_problem *p, const struct imp_run *run,

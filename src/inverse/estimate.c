@@ -64,7 +64,7 @@ static enum imp_status target_estimate(struct imp_problem *p,
             p, target, &j.tracer, &own, &totals->objective, &totals->variance,
             want_gradient ? totals->gradient : NULL, totals->gradient_variance);
     if (!want_gradient) j.tracer.active = NULL;
-    j.plan = imp__replicates_of(p->scene, target, &own);
+    j.plan = imp__replicates_loss(p, target, &own);
     st = imp__replicates_kept(&j.tracer, j.plan);
     if (st == IMP_OK && j.tracer.kept && j.tracer.kept->stratified)
         st =

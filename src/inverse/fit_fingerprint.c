@@ -81,7 +81,7 @@ void imp__fit_fingerprint(struct imp__fit *f)
     }
     if (imp__points_of(sensor, &f->outer) == IMP_POINTS_SOBOL) {
         const struct imp__replicates plan =
-            imp__replicates_of(p->scene, &p->targets[0], &f->outer);
+            imp__replicates_loss(p, &p->targets[0], &f->outer);
         const int sets[3] = {plan.n, plan.m, IMP_SET_POINTS};
         h->options = imp__hash(h->options, sets, sizeof sets);
     }

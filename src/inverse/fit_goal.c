@@ -250,6 +250,14 @@ static void missing_tell(struct imp_problem *p, enum imp_from end)
     p->missing_told = true;
 }
 
+/* What reads losses: trial steps beside the loss of a Gauss-Newton matrix, methods whose walks are
+ * kept and traced in turn, or Adam, which asks for no errors of a gradient. */
+static enum imp__loss_use use_of(const struct imp__fit *f)
+{
+    return f->options.optimizer == IMP_LM || imp__fit_keeps(f) ? IMP_LOSS_COMPARED
+                                                               : IMP_LOSS_SOUGHT;
+}
+
 enum imp_status imp__fit_begin(struct imp_problem *p,
                                const struct imp_fit_options *options,
                                const struct imp_run *run, struct imp__fit *out)
@@ -298,6 +306,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
     if (f.options.tolerance == 0) f.options.tolerance = 1e-4;
     if (f.options.momentum == 0) f.options.momentum = IMP_ADAM_MOMENTUM;
 
+    p->use = use_of(&f);
     IMP_TRY(bounds_make(&f));
     if (n <= IMP_DENSE_MAX) {
         f.H_prior = imp__alloc(ctx, n * n, sizeof *f.H_prior);
@@ -352,6 +361,7 @@ out:
 void imp__fit_end(struct imp__fit *f)
 {
     if (!f->problem) return;
+    f->problem->use = IMP_LOSS_TOLD;
     imp__walks_destroy(f->walks);
     imp__variate_destroy(f->variate);
     imp__allocation_destroy(&f->allocation);

@@ -227,7 +227,7 @@ static int spp_taken(const struct imp__fit *f)
         const struct imp__replicates r =
             f->options.optimizer == IMP_LM
                 ? imp__replicates_normal(p->scene, &p->targets[t], &f->outer, 1)
-                : imp__replicates_of(p->scene, &p->targets[t], &f->outer);
+                : imp__replicates_loss(p, &p->targets[t], &f->outer);
         most = imp_max(most, r.n * r.R);
     }
     return most;

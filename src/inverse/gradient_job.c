@@ -78,6 +78,14 @@ static void pair_add(struct item *i, double value)
     i->second = true;
 }
 
+static void lone_add(const struct item *i, double value, double variance)
+{
+    imp__tally_pixel(i->tally, 1, 1, 0);
+    tally_empty(i);
+    i->out->objective += value;
+    i->out->variance += variance;
+}
+
 static enum imp_status pixels_work(const struct imp_tile *t, struct imp_tile_worker *w,
                                    struct imp__replicates plan, struct item *i,
                                    double *moments)
@@ -86,18 +94,19 @@ static enum imp_status pixels_work(const struct imp_tile *t, struct imp_tile_wor
     const int b1 = imp__replicates_begin(plan, (int)t->part + 1);
     for (int y = t->y0; y < t->y1; y++)
         for (int x = t->x0; x < t->x1; x++) {
-            double sum = 0, square = 0;
+            double sum = 0, square = 0, variance = 0;
             if (!imp__gradient_counts(i->job, x, y)) continue;
             for (int b = b0; b < b1; b++) {
-                const double v = imp__gradient_replicate(i->job, plan, w, x, y, b,
-                                                         (int)t->part, moments);
+                const double v = imp__gradient_replicate(
+                    i->job, plan, w, x, y, b, (int)t->part, moments, &variance);
                 sum += v;
                 square += v * v;
             }
             w->no_memory |= i->tally->failed;
             const enum imp_status st = imp__tile_check(w);
             if (st != IMP_OK) return st;
-            if (i->paired) pair_add(i, sum);
+            if (plan.lone) lone_add(i, sum, variance);
+            else if (i->paired) pair_add(i, sum);
             else pixel_add(i, sum, square);
         }
     if (i->second) pair_end(i, i->first);
@@ -125,8 +134,7 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
                  imp__replicates_begin(plan, (int)t->part);
         item.all = plan.R;
         item.paired = plan.R == 1;
-        if (!item.paired)
-            item.by_variance = item.R / ((item.R - 1) * item.all * item.all);
+        if (plan.R > 1) item.by_variance = item.R / ((item.R - 1) * item.all * item.all);
         const enum imp_status st = pixels_work(t, w, plan, &item, moments);
         if (st != IMP_OK) return st;
     }
@@ -228,6 +236,7 @@ enum imp_status imp__gradient_job_run(struct imp__gradient_job *j,
         .payload = j};
     IMP_TRY(imp__tiles_create(&j->tiles));
     imp__gradient_samples(j);
+    j->want_errors = j->totals->wants_errors || imp__gradient_metric(j);
     if (j->variate) IMP_TRY(imp__variate_room(ctx, j->variate, j->parts));
     IMP_TRY(tallies_create(j));
     const struct imp_tiles_pass pass = {.stage = stage,

@@ -31,6 +31,7 @@ struct imp__gradient_job {
     struct imp__variate_view *variate; /* NULL: none */
     struct imp_tracer there;           /* of the variate; scene NULL: nowhere yet */
     bool want_gradient;
+    bool want_errors; /* of the gradient */
     /* Set by imp__gradient_job_run. */
     const struct imp_run *run;
     struct imp__allocation *allocation; /* of samples to tiles; NULL: all have `plan` */
@@ -60,10 +61,10 @@ enum imp_status imp__gradient_job_run(struct imp__gradient_job *job,
 
 /* ---- Of one pixel (gradient_replicate.c) ---- */
 /* Replicate b, in work item `part` of its tile: to the worker's tally; returns its estimate of
- * the loss. moments: of the variate. */
+ * the loss. moments: of the variate. variance: of that estimate, from a lone replicate only. */
 double imp__gradient_replicate(struct imp__gradient_job *job, struct imp__replicates plan,
                                struct imp_tile_worker *worker, int x, int y, int b,
-                               int part, double *moments);
+                               int part, double *moments, double *variance);
 
 /* ---- Samples of tiles (gradient_samples.c) ---- */
 /* Sets the allocation, parts and walks of a job whose tiles are known. */

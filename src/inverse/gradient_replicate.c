@@ -88,7 +88,24 @@ static void sets_sweep(const struct replicate *r, const struct imp_walk *walks,
     }
 }
 
-static double sweep_residuals(const struct replicate *r, int part, double *moments)
+/* Once more, for the errors of a replicate that has no other beside it. */
+static double errors_sweep(const struct replicate *r, const struct imp_walk *walks,
+                           const imp_spec *L, const imp_spec *P)
+{
+    const struct imp__gradient_job *j = r->job;
+    imp_spec E[2];
+    const double variance =
+        imp__replicate_errors(j->target, j->channels, r->pixel, L, P, E);
+    if (j->want_gradient && j->want_errors) {
+        imp__tally_batch(r->tally, r->b);
+        sets_sweep(r, walks, E);
+        imp__tally_error(r->tally);
+    }
+    return variance;
+}
+
+static double sweep_residuals(const struct replicate *r, int part, double *moments,
+                              double *variance)
 {
     struct imp__gradient_job *j = r->job;
     struct imp_arena *arena = &r->worker->arena;
@@ -108,6 +125,7 @@ static double sweep_residuals(const struct replicate *r, int part, double *momen
     const double value = imp__replicate_adjoints(j->target, j->channels, r->pixel,
                                                  r->plan.m, L, j->variate ? H : L, P);
     if (j->want_gradient) sets_sweep(r, walks, P);
+    if (r->plan.lone) *variance = errors_sweep(r, walks, L, P);
     return value;
 }
 
@@ -115,7 +133,7 @@ static double sweep_residuals(const struct replicate *r, int part, double *momen
 
 double imp__gradient_replicate(struct imp__gradient_job *j, struct imp__replicates plan,
                                struct imp_tile_worker *w, int x, int y, int b, int part,
-                               double *moments)
+                               double *moments, double *variance)
 {
     if (imp_unlikely(j->light != NULL)) {
         imp__light_replicate(j, w, x, y, b);
@@ -133,7 +151,7 @@ double imp__gradient_replicate(struct imp__gradient_job *j, struct imp__replicat
     };
     const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
     double value = 0;
-    if (j->target && !j->splat) value = sweep_residuals(&r, part, moments);
+    if (j->target && !j->splat) value = sweep_residuals(&r, part, moments, variance);
     else sweep_each(&r);
     imp__tally_batch(r.tally, b);
     imp__arena_rewind(&w->arena, mark);

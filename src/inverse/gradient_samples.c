@@ -19,7 +19,7 @@ struct imp__replicates imp__gradient_plan(const struct imp__gradient_job *j, siz
     struct imp_run own = *j->run;
     own.spp = j->allocation->spp[k];
     if (own.spp == j->allocation->even[k]) return j->plan;
-    return imp__replicates_of(j->problem->scene, j->target, &own);
+    return imp__replicates_loss(j->problem, j->target, &own);
 }
 
 /* The share of pixels that have walks. */

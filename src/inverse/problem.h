@@ -83,6 +83,13 @@ struct imp__block {
 struct imp__search;
 struct imp__variate;
 
+/* What a loss and its gradient are for: which plan their samples have (imp__replicates_loss). */
+enum imp__loss_use {
+    IMP_LOSS_TOLD,    /* with their errors */
+    IMP_LOSS_SOUGHT,  /* by a search, which wants little variance */
+    IMP_LOSS_COMPARED /* with those of the same walks in Gauss-Newton matrices, or kept */
+};
+
 /* The last fit, as imp_problem_fit_variable returns it (fit_result.c). */
 struct imp__fit_block { /* numbers of one parameter */
     size_t first;
@@ -117,9 +124,10 @@ struct imp_problem {
     struct imp_run run;                 /* of imp_problem_nlopt */
     struct imp__allocation *allocation; /* of its samples; NULL: all alike */
     struct imp__variate *variate; /* of the evaluation at work (variate.h); NULL: none */
-    bool missing_told;            /* that walks from the lights miss some light */
-    bool same_known;              /* the ranks of a team have the same problem */
-    struct imp_arena fit_arena;   /* of the last fit's result */
+    enum imp__loss_use use;
+    bool missing_told;          /* that walks from the lights miss some light */
+    bool same_known;            /* the ranks of a team have the same problem */
+    struct imp_arena fit_arena; /* of the last fit's result */
     struct imp__fit_answer fit_answer;
     struct imp_arena check_arena;   /* of the last check's rows */
     struct imp_arena missing_arena; /* of rows of imp_problem_missing */

@@ -9,6 +9,10 @@
 
 #define WIDE_MANY    16  /* samples per pixel */
 #define NORMAL_CHUNK 512 /* samples of a pixel, all pairs of which are products */
+/* Least samples of a replicate that tells its own errors: skewed sets of fewer points make them too
+ * large (docs/estimators.md 14). And where nobody reads those of gradients. */
+#define LONE_TOLD   32
+#define LONE_SOUGHT 4
 
 /* Sets of points in a replicate: two for a product of independent means, more for the
  * jackknife of a loss that is not quadratic. A fixed adjoint needs one. */
@@ -37,7 +41,7 @@ static struct imp__replicates in_sets(struct imp__replicates r, int sets)
 
 static struct imp__replicates box_plan(int spp, int batch_max, int sets)
 {
-    struct imp__replicates r;
+    struct imp__replicates r = {0};
     spp = imp_max(spp, 2);
     r.n = spp < 4 ? spp : imp_min(spp / 2, batch_max);
     r.R = (spp - 1) / r.n + 1;
@@ -100,6 +104,23 @@ struct imp__replicates imp__replicates_of(const struct imp_scene *scene,
     return box_plan(spp_of(sensor, run), most, sets);
 }
 
+struct imp__replicates imp__replicates_loss(const struct imp_problem *p,
+                                            const struct imp__target *t,
+                                            const struct imp_run *run)
+{
+    const struct imp_sensor *sensor = sensor_of(p->scene, t, run);
+    const int spp = spp_of(sensor, run);
+    const int least = p->use == IMP_LOSS_SOUGHT ? LONE_SOUGHT : LONE_TOLD;
+    struct imp__replicates r = imp__replicates_of(p->scene, t, run);
+    if (p->use == IMP_LOSS_COMPARED || run->walks || curved(t) ||
+        imp__film_border(&sensor->film) > 0 ||
+        imp__points_of(sensor, run) != IMP_POINTS_SOBOL || spp < least ||
+        spp > SETS * IMP_SET_POINTS)
+        return r;
+    r = (struct imp__replicates){.n = spp, .R = 1, .chunks = 1, .lone = true};
+    return in_sets(r, SETS);
+}
+
 struct imp__replicates imp__replicates_normal(const struct imp_scene *scene,
                                               const struct imp__target *t,
                                               const struct imp_run *run, int rounds)
@@ -155,7 +176,8 @@ enum imp_status imp_problem_spp(const imp_problem *p, int target,
     if (sensor < 0 || sensor >= p->scene->n_sensors || own.spp < 0)
         return imp__error(p->ctx, IMP_E_ARG, "run: there is no sensor %d, or spp %d < 0",
                           sensor, own.spp);
-    const struct imp__replicates r = imp__replicates_of(p->scene, t, &own);
+    const struct imp__replicates r =
+        t ? imp__replicates_loss(p, t, &own) : imp__replicates_of(p->scene, NULL, &own);
     *spp = r.n * r.R;
     return IMP_OK;
 }

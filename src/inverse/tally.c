@@ -319,6 +319,25 @@ void imp__tally_pixel(struct imp_tally *t, double replicates, double by_mean,
     t->touched_triples.n = t->touched_singles.n = 0;
 }
 
+void imp__tally_error(struct imp_tally *t)
+{
+    if (imp_unlikely(imp__tally_probes(t))) imp__tally_probe_error(t);
+    for (size_t k = 0; t->dense && k < t->active->n; k++) {
+        t->variance[k] += t->batch[k] * t->batch[k];
+        t->batch[k] = 0;
+    }
+    for (size_t k = 0; k < t->touched_triples.n; k++) {
+        struct imp__tally_triple *e = &t->triples[t->touched_triples.index[k]];
+        for (int c = 0; c < 3; c++) e->variance[c] += e->batch[c] * e->batch[c];
+        e->batch = (imp_spec){0};
+    }
+    for (size_t k = 0; k < t->touched_singles.n; k++) {
+        struct imp__tally_single *e = &t->singles[t->touched_singles.index[k]];
+        e->variance += e->batch * e->batch;
+        e->batch = 0;
+    }
+}
+
 void imp__tally_tile(struct imp_tally *t, double by_variance)
 {
     const size_t n = t->active->n;

@@ -77,6 +77,8 @@ void imp__tally_batch(struct imp_tally *t, int b);
  * (sum of squares - sum^2/replicates). */
 void imp__tally_pixel(struct imp_tally *t, double replicates, double by_mean,
                       double by_variance);
+/* After the sweeps of what has the mean 0 and the variance of the pixel's gradient: its square. */
+void imp__tally_error(struct imp_tally *t);
 /* Many numbers, between pixels that share no walks: has the tile so many that they are to
  * be flushed and cleared before it goes on? Memory then does not grow with the samples, and
  * stays in the cache. */
@@ -96,6 +98,7 @@ static inline bool imp__tally_probes(const struct imp_tally *t)
 }
 void imp__tally_probe_batch(struct imp_tally *t);
 void imp__tally_probe_pixel(struct imp_tally *t, double r, double by_variance);
+void imp__tally_probe_error(struct imp_tally *t);
 /* Before a tile is taken over or flushed: `measured` has all of its variance. */
 void imp__tally_measure(struct imp_tally *t);
 

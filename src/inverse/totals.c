@@ -9,7 +9,8 @@ enum imp_status imp__totals_begin(struct imp_problem *p, bool in_place, double *
                                   double *gradient_se, struct imp__totals *t)
 {
     const size_t n = p->n;
-    *t = (struct imp__totals){.many = n > IMP_TALLY_DENSE};
+    *t = (struct imp__totals){.many = n > IMP_TALLY_DENSE,
+                              .wants_errors = gradient_se != NULL};
     const bool fine = t->many && gradient_se;
     const size_t rows = t->many ? !!gradient + !!gradient_se : 2;
     const size_t own = t->many && in_place ? fine : rows + fine;

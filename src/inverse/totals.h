@@ -13,6 +13,7 @@ struct imp__totals {
     double *gradient, *gradient_variance; /* [n] of few numbers */
     /* Of many: fixed point, in the place of the caller's arrays. */
     bool many, unit_known;
+    bool wants_errors; /* of the gradient */
     struct imp_fixed_sum mean, spread;
     double *own; /* where sums stand that are not in the caller's arrays */
 };
