@@ -50,19 +50,24 @@ static enum imp_status init(const struct imp__goal *goal,
 
 static void work_destroy(imp_context *ctx, struct work *w)
 {
-    if (w->system) w->system->destroy(w->system);
+    if (w->system) w->system->kind->end(w->system);
+    imp__release(ctx, w->system);
     imp__release(ctx, w->delta);
 }
 
 static enum imp_status work_create(const struct imp__goal *goal, struct work *w)
 {
     const size_t n = goal->n;
+    const struct imp__lm_kind *kind = goal->normal ? &imp__lm_dense : &imp__lm_sparse;
     w->delta = imp__alloc(goal->ctx, 3 * n, sizeof *w->delta);
-    if (!w->delta)
+    w->system = imp__alloc(goal->ctx, 1, kind->size);
+    if (!w->delta || !w->system)
         return imp__error(goal->ctx, IMP_E_NOMEM, "no memory for %zu variables", n);
     w->trial = w->delta + n;
     w->h = w->delta + 2 * n;
-    return (goal->normal ? imp__lm_dense : imp__lm_sparse)(goal, &w->system);
+    w->system->kind = kind;
+    w->system->goal = goal;
+    return kind->begin(w->system);
 }
 
 /* Newton's point for a variable, cut off on its way to a bound. A step from far away may
@@ -85,7 +90,7 @@ static enum imp_status propose(const struct imp__goal *goal, const double *x,
         w->trial[k] = toward(goal, k, x[k], x[k] - w->delta[k]);
         w->delta[k] = w->trial[k] - x[k];
     }
-    const enum imp_status st = w->system->product(w->system, w->delta, w->h);
+    const enum imp_status st = w->system->kind->product(w->system, w->delta, w->h);
     *gain = 0;
     for (size_t k = 0; k < n; k++)
         *gain -= w->delta[k] * (w->system->g[k] + 0.5 * w->h[k]);
@@ -113,20 +118,20 @@ static enum imp_status iterate(const struct imp__goal *goal,
     bool moved = false, quiet;
 
     system->after_step = s->iteration > 0;
-    IMP_TRY(system->take(system, s->x, seed));
+    IMP_TRY(system->kind->take(system, s->x, seed));
     const double f0 = system->f.value;
     if (system->n_free == 0) {
         IMP_TRY(imp__search_log(s, system->f, s->x));
         imp__search_finish(s, IMP_FINISH_BOUNDED);
         goto out;
     }
-    IMP_TRY(system->within_noise(system, &quiet));
+    IMP_TRY(system->kind->within_noise(system, &quiet));
 
     for (int trial = 0; trial < TRIALS && !moved; trial++) {
         struct imp_estimate f1;
         double promised;
         bool found;
-        IMP_TRY(system->newton(system, &mu, w->delta, &found));
+        IMP_TRY(system->kind->newton(system, &mu, w->delta, &found));
         if (!found) break;
         IMP_TRY(propose(goal, s->x, w, &promised));
         if (promised > 0 && largest_step(goal, w->delta) < options->tolerance && !quiet) {

@@ -114,7 +114,7 @@ static enum imp_status within_noise(struct imp__lm_system *s, bool *within)
     return IMP_OK;
 }
 
-static void destroy(struct imp__lm_system *s)
+static void end(struct imp__lm_system *s)
 {
     struct dense *w = (struct dense *)s;
     imp_context *ctx = s->goal->ctx;
@@ -123,35 +123,26 @@ static void destroy(struct imp__lm_system *s)
     imp__release(ctx, w->p);
     imp__release(ctx, w->delta);
     imp__release(ctx, w->free);
-    imp__release(ctx, w);
 }
 
-enum imp_status imp__lm_dense(const struct imp__goal *goal, struct imp__lm_system **out)
+static enum imp_status begin(struct imp__lm_system *s)
 {
-    imp_context *ctx = goal->ctx;
-    const size_t n = goal->n;
-    struct dense *w = imp__alloc(ctx, 1, sizeof *w);
-    if (!w) return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu x %zu matrices", n, n);
-    w->system = (struct imp__lm_system){.goal = goal,
-                                        .take = take,
-                                        .newton = newton,
-                                        .product = product,
-                                        .within_noise = within_noise,
-                                        .destroy = destroy};
-    enum imp_status st = imp__normal_create(ctx, n, false, &w->eq);
+    struct dense *w = (struct dense *)s;
+    imp_context *ctx = s->goal->ctx;
+    const size_t n = s->goal->n;
+    const enum imp_status st = imp__normal_create(ctx, n, false, &w->eq);
+    if (st != IMP_OK) return st;
     w->a = imp__alloc(ctx, n * n, sizeof *w->a);
     w->p = imp__alloc(ctx, n * n, sizeof *w->p);
     w->delta = imp__alloc(ctx, 3 * n, sizeof *w->delta);
     w->free = imp__alloc(ctx, n, sizeof *w->free);
-    if (st == IMP_OK && (!w->a || !w->p || !w->delta || !w->free))
-        st = imp__error(ctx, IMP_E_NOMEM, "no memory for %zu x %zu matrices", n, n);
-    if (st != IMP_OK) {
-        destroy(&w->system);
-        return st;
-    }
+    if (!w->a || !w->p || !w->delta || !w->free)
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu x %zu matrices", n, n);
     w->c = w->delta + n;
     w->d = w->delta + 2 * n;
-    w->system.g = w->eq.g;
-    *out = &w->system;
+    s->g = w->eq.g;
     return IMP_OK;
 }
+
+const struct imp__lm_kind imp__lm_dense = {
+    sizeof(struct dense), begin, end, take, newton, product, within_noise};

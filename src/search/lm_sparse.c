@@ -119,36 +119,27 @@ out:
     return st;
 }
 
-static void destroy(struct imp__lm_system *s)
+static void end(struct imp__lm_system *s)
+{
+    struct sparse *w = (struct sparse *)s;
+    imp__sparse_normal_destroy(&w->eq);
+    imp__release(s->goal->ctx, w->fixed);
+    imp__release(s->goal->ctx, w->b);
+}
+
+static enum imp_status begin(struct imp__lm_system *s)
 {
     struct sparse *w = (struct sparse *)s;
     imp_context *ctx = s->goal->ctx;
-    imp__sparse_normal_destroy(&w->eq);
-    imp__release(ctx, w->fixed);
-    imp__release(ctx, w->b);
-    imp__release(ctx, w);
-}
-
-enum imp_status imp__lm_sparse(const struct imp__goal *goal, struct imp__lm_system **out)
-{
-    imp_context *ctx = goal->ctx;
-    const size_t n = goal->n;
-    struct sparse *w = imp__alloc(ctx, 1, sizeof *w);
-    if (!w) return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu variables", n);
-    w->system = (struct imp__lm_system){.goal = goal,
-                                        .take = take,
-                                        .newton = newton,
-                                        .product = product,
-                                        .within_noise = within_noise,
-                                        .destroy = destroy};
+    const size_t n = s->goal->n;
     w->fixed = imp__alloc(ctx, n, sizeof *w->fixed);
     w->b = imp__alloc_raw(ctx, 3 * WIDTH * n, sizeof *w->b);
-    if (!w->fixed || !w->b) {
-        destroy(&w->system);
+    if (!w->fixed || !w->b)
         return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu variables", n);
-    }
     w->u = w->b + WIDTH * n;
     w->z = w->u + WIDTH * n;
-    *out = &w->system;
     return IMP_OK;
 }
+
+const struct imp__lm_kind imp__lm_sparse = {
+    sizeof(struct sparse), begin, end, take, newton, product, within_noise};

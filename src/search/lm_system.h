@@ -11,12 +11,21 @@
 #define IMP_LM_MU_MAX 1e8
 
 struct imp__lm_system {
+    const struct imp__lm_kind *kind;
     const struct imp__goal *goal;
     const double *g; /* [n] gradient */
     struct imp_estimate f;
     bool after_step; /* x is itself the Newton point of as many walks; set by lm.c */
     size_t
         n_free; /* variables that neither press against a bound nor are without effect */
+};
+
+/* What lm.c makes a system of, and ends it by: it is zeroed memory of this size before `begin`
+ * and released after `end`, which is called also where `begin` has failed. */
+struct imp__lm_kind {
+    size_t size;
+    enum imp_status (*begin)(struct imp__lm_system *s);
+    void (*end)(struct imp__lm_system *s);
     /* The equations at x. */
     enum imp_status (*take)(struct imp__lm_system *s, const double *x, uint64_t seed);
     /* delta = (H + mu diag H_same)^-1 g over the variables that are free, 0 elsewhere, for
@@ -28,11 +37,9 @@ struct imp__lm_system {
     /* Is q = g^T A^-1 g no more than Monte Carlo noise alone makes it? Under a zero gradient
      * its mean is tr(A^-1 C) and its variance 2 tr((A^-1 C)^2), C the covariance of g. */
     enum imp_status (*within_noise)(struct imp__lm_system *s, bool *within);
-    void (*destroy)(struct imp__lm_system *s);
 };
 
-/* lm_dense.c: goal->normal; lm_sparse.c: goal->sparse. */
-enum imp_status imp__lm_dense(const struct imp__goal *goal, struct imp__lm_system **out);
-enum imp_status imp__lm_sparse(const struct imp__goal *goal, struct imp__lm_system **out);
+/* Of goal->normal (lm_dense.c), and of goal->sparse (lm_sparse.c). */
+extern const struct imp__lm_kind imp__lm_dense, imp__lm_sparse;
 
 #endif
