@@ -57,6 +57,9 @@ struct imp__fit {
 enum imp_status imp__fit_begin(struct imp_problem *problem,
                                const struct imp_fit_options *options,
                                const struct imp_run *run, struct imp__fit *fit);
+/* Tells how far it is. IMP_CANCELLED: it shall stop here, by the caller or its time limit, on
+ * this rank or another. All ranks ask alike. */
+enum imp_status imp__fit_goes_on(struct imp__fit *fit, double fraction);
 /* fit_sparse.c: are normal equations those of rows of derivatives? */
 static inline bool imp__fit_is_sparse(const struct imp__fit *fit)
 {

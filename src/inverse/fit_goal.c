@@ -43,6 +43,13 @@ static void report(struct imp__fit *f, double fraction)
     if (f->outer.progress(&p, f->outer.progress_payload) != 0) f->stopped = true;
 }
 
+enum imp_status imp__fit_goes_on(struct imp__fit *f, double fraction)
+{
+    report(f, fraction);
+    IMP_CHECKED(imp__team_any(f->problem->ctx, f->stopped, &f->stopped));
+    return f->stopped ? IMP_CANCELLED : IMP_OK;
+}
+
 /* Progress of the evaluation at work. */
 static int inner_progress(const struct imp_progress *p, void *payload)
 {
@@ -88,11 +95,9 @@ static enum imp_status iterated(const struct imp__search *s, void *payload)
         f->last_checkpoint_s = imp__now();
         f->checkpoint_cost_s = f->last_checkpoint_s - now;
     }
-    report(f, f->search_share * s->iteration / f->options.max_iterations);
     show_step(f, s);
-    const enum imp_status st = imp__team_any(f->problem->ctx, f->stopped, &f->stopped);
-    if (st != IMP_OK) return st;
-    return f->stopped ? IMP_CANCELLED : IMP_OK;
+    return imp__fit_goes_on(f,
+                            f->search_share * s->iteration / f->options.max_iterations);
 }
 
 /* ---- Evaluations --------------------------------------------------------------- */

@@ -13,6 +13,7 @@ enum { WIDTH = IMP_SPARSE_WIDTH };
 
 struct equations {
     struct imp__rows rows;
+    struct imp__fit *fit;
     const struct imp_problem *problem;
     double *at_zero;   /* [n] gradient of the regularisers at 0; NULL: there are none */
     double *one, *its; /* [n] a vector, and the regularisers' gradient there */
@@ -26,6 +27,8 @@ static enum imp_status product(const struct imp__sparse_normal *eq, int width,
 {
     const struct equations *e = eq->of;
     const size_t n = eq->n, W = (size_t)width;
+    /* A step takes up to thousands of products. */
+    IMP_CHECKED(imp__fit_goes_on(e->fit, e->fit->fraction));
     const enum imp_status st = imp__rows_product(&e->rows, width, v, y);
     for (size_t c = 0; st == IMP_OK && e->at_zero && c < W; c++) {
         for (size_t k = 0; k < n; k++) e->one[k] = v[k * W + c];
@@ -99,6 +102,7 @@ enum imp_status imp__fit_sparse(const double *x, uint64_t seed, int rounds,
     if (failed) return st;
     f->rounds_fit = imp_max(f->rounds_fit, rounds);
     e->problem = p;
+    e->fit = f;
     struct imp__sparse_normal eq = {.n = n,
                                     .noise_known = f->noise_known,
                                     .product = product,

@@ -6,6 +6,8 @@
  * any number of threads. What is refused. With the argument "long", more seeds. */
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include "inverse/fit.h"
+#include "search/conjugate.h"
 
 enum { SIDE = 32, TEXELS = 3 * SIDE * SIDE, FILM = 64, MOST = TEXELS + 3 };
 
@@ -221,6 +223,52 @@ static void same_bits(void)
     tap_ok(memcmp(x[0], x[1], sizeof x[0]) == 0, "the same bits on 1 and 3 threads");
 }
 
+static int ask(const struct imp_progress *p, void *stop)
+{
+    (void)p;
+    return *(int *)stop;
+}
+
+/* A step takes up to thousands of products: it ends between two of them. */
+static void stopped(imp_context *ctx)
+{
+    static float pixels[FILM * FILM * 3];
+    static double x[MOST], step[MOST];
+    static bool fixed[MOST];
+    struct imp_target t = IMP_TARGET_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+    struct imp__fit fit = {0};
+    struct imp__sparse_normal eq = {0};
+    int stop = 0;
+    t.width = t.height = FILM, t.channels = 3, t.pixels = pixels;
+    struct room room = room_make(ctx, &t, "box");
+    imp_problem_get_x(room.problem, x);
+    o.optimizer = IMP_LM;
+    run.spp = 4;
+    run.progress = ask;
+    run.progress_payload = &stop;
+    test_must(ctx, imp__fit_begin(room.problem, &o, &run, &fit));
+    test_must(ctx, fit.goal.sparse(x, 1, 1, &eq, fit.goal.payload));
+    for (size_t k = 0; k < MOST; k++) fixed[k] = !(eq.same[k] > 0);
+    struct imp__conjugate c = {.eq = &eq, .fixed = fixed, .tolerance = 1e-9, .most = 50};
+    test_must(ctx, imp__conjugate_solve(ctx, &c, .1, 1, eq.g, step));
+    const int whole = c.iterations;
+    stop = 1;
+    fit.last_report_s = 0;
+    enum imp_status st = imp__conjugate_solve(ctx, &c, .1, 1, eq.g, step);
+    tap_ok(whole > 5 && st == IMP_CANCELLED && c.iterations == 0,
+           "cancelled within a step # of %d products", whole);
+    fit.stopped = false;
+    stop = 0;
+    fit.deadline_s = imp__now() - 1;
+    st = imp__conjugate_solve(ctx, &c, .1, 1, eq.g, step);
+    tap_ok(st == IMP_CANCELLED && c.iterations == 0, "and by its time limit");
+    imp__sparse_normal_destroy(&eq);
+    imp__fit_end(&fit);
+    room_free(&room);
+}
+
 static void refused(imp_context *ctx, imp_problem *p, int spp, enum imp_status expected,
                     const char *part, const char *name)
 {
@@ -284,6 +332,7 @@ int main(int argc, char **argv)
     recover(ctx, all ? 40 : 2, 1, 64, 16);
     recover(ctx, all ? 40 : 1, 0, 64, 8);
     same_bits();
+    stopped(ctx);
     refusals(ctx);
     imp_context_destroy(ctx);
     return tap_done();
