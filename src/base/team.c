@@ -65,17 +65,25 @@ void imp__machine_text(char text[256])
 #endif
 }
 
-/* What results depend on besides the calls: equal on all ranks, or bits would differ. */
+/* What results depend on besides the calls: equal on all ranks, or bits would differ. And
+ * which running kernel it is, whose memory all ranks on it share; "": not known. */
 struct hello {
     int32_t ranks, rank;
-    char machine[256];
+    char machine[256], kernel[40];
 };
+
+static void kernel_text(char text[40])
+{
+    FILE *f = fopen("/proc/sys/kernel/random/boot_id", "r");
+    if (!f || !fgets(text, 40, f)) text[0] = 0;
+    if (f) fclose(f);
+}
 
 struct greeting {
     imp_context *ctx;
     struct hello own, first;
     bool differs;
-    int other;
+    int other, here;
     struct hello seen;
 };
 
@@ -85,7 +93,8 @@ static void greet(void *receiver, int rank, const void *message, size_t bytes)
     struct hello h = {0};
     if (g->differs) return;
     if (bytes == sizeof h) memcpy(&h, message, sizeof h);
-    h.machine[sizeof h.machine - 1] = 0;
+    h.machine[sizeof h.machine - 1] = h.kernel[sizeof h.kernel - 1] = 0;
+    g->here += h.kernel[0] && !strcmp(h.kernel, g->own.kernel);
     if (bytes == sizeof h && h.ranks == g->own.ranks && h.rank == rank &&
         !strcmp(h.machine, g->own.machine))
         return;
@@ -110,6 +119,7 @@ enum imp_status imp_context_set_team(imp_context *ctx, const struct imp_team *te
 
     struct greeting g = {.ctx = ctx, .own = {.ranks = own.ranks, .rank = own.rank}};
     imp__machine_text(g.own.machine);
+    kernel_text(g.own.kernel);
     st = own.gather(&g.own, sizeof g.own, greet, &g, own.payload);
     if (st != IMP_OK)
         st = imp__error(ctx, st, "%s: the ranks of the team do not reach each other",
@@ -120,6 +130,7 @@ enum imp_status imp_context_set_team(imp_context *ctx, const struct imp_team *te
                         "not have the same bits",
                         __func__, own.rank, g.own.machine, g.other,
                         g.seen.machine[0] ? g.seen.machine : "another version");
+    ctx->team->here = g.here;
     if (st != IMP_OK) {
         own.ranks = 0;
         (void)imp__team_join(ctx, &own, IMP_TEAM_RANK);

@@ -33,6 +33,7 @@ struct imp__team {
     /* Hash of the parameters and random numbers of the present call: ranks that follow an
      * optimiser of their own find out where one of them has left the others. 0: none. */
     uint64_t state;
+    int here;                    /* ranks on this machine, this one too; 0: not known */
     int alone;                   /* > 0: inside of what every rank computes whole */
     bool (*pick)(void *payload); /* is the next chunk verified? */
     /* Chunks of a sum to keep, no more than `most`, which take so many bytes, and for each
@@ -85,6 +86,12 @@ static inline bool imp__team_writes(const imp_context *ctx)
 static inline bool imp__team_broadcasts(const imp_context *ctx)
 {
     return ctx->team && ctx->team->role == IMP_TEAM_RANK && ctx->team->host.broadcast;
+}
+
+/* Processes that take the same memory of this machine as this one, itself too. */
+static inline int imp__team_here(const imp_context *ctx)
+{
+    return imp__team_ranks(ctx) && ctx->team->here > 0 ? ctx->team->here : 1;
 }
 
 /* What imp__shared_sum finds out besides the sum. */

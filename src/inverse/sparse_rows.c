@@ -10,6 +10,7 @@
 #include "normal_tiles.h"
 #include "sparse_job.h"
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #define LOOKS 4 /* tiles that tell what all of them take */
@@ -141,7 +142,14 @@ static enum imp_status look(struct imp__rows_job *j, const struct imp_tiles_pass
         j->total[IMP_ROWS_BYTES] * (double)all / fmax(j->total[IMP_ROWS_ITEMS], 1);
     memcpy(j->total, before, sizeof before);
     if (st != IMP_OK) return st;
-    return imp__memory_check(j->problem->ctx, bytes, "least squares of many numbers");
+    /* All ranks have all rows, and come here before any has more than some tiles. */
+    imp_context *ctx = j->problem->ctx;
+    const int here = imp__team_here(ctx);
+    char what[80] = "least squares of many numbers";
+    if (here > 1)
+        snprintf(what, sizeof what, "least squares of many numbers, by %d processes",
+                 here);
+    return imp__memory_check(ctx, here * bytes, what);
 }
 
 /* Blocks of one more target, and its part of the loss. */

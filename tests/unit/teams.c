@@ -3,6 +3,7 @@
  * Teams: pictures, losses, gradients, Jacobians, means and fits have the bits of one
  * process, for any number of ranks and threads; a rank that differs is found by all. */
 #include "base/compiler.h"
+#include "base/team.h"
 #include "math/hash.h"
 #include "parts_kit.h"
 #include "team_kit.h"
@@ -20,6 +21,7 @@ struct member {
     char error[400];
     struct result r;
     double fraction; /* the last that was reported before the end */
+    int here;        /* ranks on its machine */
 };
 
 static int stop_now(const struct imp_progress *p, void *payload)
@@ -93,6 +95,7 @@ static void *member_main(void *payload)
     imp_context *ctx = test_context(m->threads);
     imp_scene *s = scene_make(ctx, m->filter, m->red);
     m->st = team_join(ctx, &m->rank);
+    m->here = imp__team_here(ctx);
     if (m->st == IMP_OK && m->fails == 4) {
         m->st = large_run(ctx, &m->r);
     } else if (m->st == IMP_OK && m->fails == 3) {
@@ -182,6 +185,31 @@ static const char *other_machine(const void *message, size_t bytes)
     char *word = memmem(other, bytes, "importon ", 9);
     if (word) strcpy(word, "importon 0.1.0 sse4.2 neon");
     return other;
+}
+
+/* As a rank under another kernel: the last of what ranks say of themselves. */
+static const char *other_kernel(const void *message, size_t bytes)
+{
+    static char other[512];
+    if (bytes > sizeof other || !memmem(message, bytes, "importon ", 9)) return message;
+    memcpy(other, message, bytes);
+    memset(other + bytes - 40, 'x', 39);
+    return other;
+}
+
+/* Ranks on one machine share its memory. */
+static void team_here(void)
+{
+    members_reset();
+    team(3, 0, "box", PICTURE);
+    tap_ok(members[0].here == 3 && members[1].here == 3 && members[2].here == 3,
+           "three ranks on a machine");
+    members_reset();
+    tamper = other_kernel;
+    team(3, 0, "box", PICTURE);
+    tamper = NULL;
+    tap_ok(members[0].here == 2 && members[2].here == 2, "two, and one elsewhere # %d %d",
+           members[0].here, members[2].here);
 }
 
 static void team_troubles(void)
@@ -295,6 +323,7 @@ int main(void)
     points = IMP_POINTS_SOBOL;
     teams("box");
     points = IMP_POINTS_INDEPENDENT;
+    team_here();
     team_troubles();
     large();
     idle();
