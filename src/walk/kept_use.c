@@ -9,7 +9,9 @@
 
 #define TILES_AT_ONCE 16
 #define SEEN_LEAST                                                                       \
-    0.5 /* mean ratio of densities, which is 1 where all of them was drawn */
+    0.5            /* mean ratio of densities, which is 1 where all of them was drawn */
+#define ASKED 1024 /* walks that say enough, where they say it clearly: by this factor */
+#define CLEAR 1.25
 /* Roulette's growth, over all its steps of walks that have a last depth. */
 #define GROWTH_MOST 4
 
@@ -270,6 +272,19 @@ out:
     return st;
 }
 
+/* Walks that are worth their use by far need no more than a look at some of them: to ask all
+ * of them takes longer than a picture of their values. */
+static enum imp_status use_check(const struct imp_walks *w, const struct imp_store *store)
+{
+    struct imp_walks_weight x;
+    IMP_CHECKED(imp__walks_weigh(w, store, NULL, ASKED, &x));
+    struct imp_walks_weight worse = x;
+    worse.growth *= CLEAR;
+    if (x.ess >= CLEAR * w->ess && imp__walks_finite(w, &worse)) return IMP_OK;
+    IMP_CHECKED(imp__walks_weigh(w, store, NULL, 0, &x));
+    return worth_check(w, &x);
+}
+
 /* Are all active parameters among those that may change? */
 static enum imp_status active_check(const struct imp_walks *w,
                                     const struct imp_active *active)
@@ -287,7 +302,6 @@ static enum imp_status active_check(const struct imp_walks *w,
 enum imp_status imp__walks_use(const struct imp_run *run, struct imp_tracer *tracer)
 {
     const struct imp_walks *w = run->walks;
-    struct imp_walks_weight worth;
     imp_context *ctx = tracer->scene->ctx;
     if (w->scene != tracer->scene)
         return imp__error(ctx, IMP_E_ARG, "kept walks of another scene");
@@ -305,10 +319,7 @@ enum imp_status imp__walks_use(const struct imp_run *run, struct imp_tracer *tra
     if (tracer->integrator != w->integrator)
         return imp__error(ctx, IMP_E_ARG, "kept walks of another integrator");
     IMP_CHECKED(active_check(w, tracer->active));
-    if (w->ess >= 0) { /* else whoever made them has looked */
-        IMP_CHECKED(imp__walks_weigh(w, store, NULL, 0, &worth));
-        IMP_CHECKED(worth_check(w, &worth));
-    }
+    if (w->ess >= 0) IMP_CHECKED(use_check(w, store)); /* else whoever made them has */
     tracer->kept = store;
     return IMP_OK;
 }

@@ -5,13 +5,13 @@
 #define IMP_WALK_REDUCED_READ_H
 
 #include "reduced.h"
+#include <stddef.h>
 #include <string.h>
 
 /* Of a material that is at hand. */
 struct imp_reduced_at_hand {
     const struct imp_bsdf *bsdf;
-    const struct imp_shape *shape;
-    struct imp_texcoord at;
+    const uint32_t *words; /* its struct imp_reduced_material: where it is */
     imp_v3 wo;
     imp_spec *in; /* [bsdf->n_in] */
 };
@@ -50,6 +50,15 @@ static inline struct imp_texcoord imp__reduced_lookup_at(const struct imp_scene 
     struct imp_reduced_place place;
     memcpy(&place, words, sizeof place);
     return imp__reduced_texcoord(scene, &place);
+}
+
+/* Where the material at hand is. */
+static inline struct imp_texcoord
+imp__reduced_material_at(const struct imp_scene *scene,
+                         const struct imp_reduced_at_hand *m)
+{
+    return imp__reduced_lookup_at(
+        scene, m->words + offsetof(struct imp_reduced_material, at) / sizeof *m->words);
 }
 
 /* The weights of four texels. */

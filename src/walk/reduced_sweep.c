@@ -162,9 +162,10 @@ void imp__reduced_sweep(const struct imp_tracer *tracer, const struct imp_walk *
         }
         case IMP_OP_MATERIAL: {
             const struct imp_reduced_at_hand *m = (--seen)->material;
-            if (bars.any)
-                imp__inputs_scatter(m->bsdf->input, m->bsdf->n_in, &m->at, bars.bar,
-                                    sink);
+            if (bars.any) {
+                const struct imp_texcoord at = imp__reduced_material_at(all->scene, m);
+                imp__inputs_scatter(m->bsdf->input, m->bsdf->n_in, &at, bars.bar, sink);
+            }
             bars.any = false;
             break;
         }
@@ -214,7 +215,8 @@ static imp_spec material_tangent(const struct imp_tracer *tracer,
     const struct imp_reduced_at_hand *m = seen->material;
     imp_spec sum = {0};
     if (!tracer->active->bsdf[m->bsdf->index]) return sum;
-    imp__inputs_tangent(m->bsdf->input, m->bsdf->n_in, &m->at, dot, x_dot, in_dot);
+    const struct imp_texcoord at = imp__reduced_material_at(tracer->scene, m);
+    imp__inputs_tangent(m->bsdf->input, m->bsdf->n_in, &at, dot, x_dot, in_dot);
     const imp_spec *d = derivatives(seen, dirs, room);
     for (int j = 0; j < m->bsdf->n_in; j++) sum += d[j] * in_dot[j];
     return sum;
@@ -294,8 +296,8 @@ imp_spec imp__reduced_tangent(const struct imp_tracer *tracer,
             m->bsdf->ops->emit(m->bsdf, m->in, &m->wo, &glow);
             term = c * glow;
             if (!tracer->active->bsdf[m->bsdf->index]) break;
-            imp__inputs_tangent(m->bsdf->input, m->bsdf->n_in, &m->at, dot, x_dot,
-                                in_dot);
+            const struct imp_texcoord at = imp__reduced_material_at(all->scene, m);
+            imp__inputs_tangent(m->bsdf->input, m->bsdf->n_in, &at, dot, x_dot, in_dot);
             m->bsdf->ops->emit_d(m->bsdf, m->in, &m->wo, d);
             for (int j = 0; j < m->bsdf->n_in; j++) term_dot += c * d[j] * in_dot[j];
             break;

@@ -28,19 +28,22 @@ static inline imp_spec texels_value(const struct imp_reduction *all, struct imp_
 static void material_look(const struct imp_scene *scene, struct imp_op op,
                           const uint32_t *words, struct imp_reduced_at_hand *m)
 {
-    struct imp_reduced_material data;
-    memcpy(&data, words, sizeof data);
+    float wo[3];
+    memcpy(wo, words + offsetof(struct imp_reduced_material, wo) / sizeof *words,
+           sizeof wo);
     m->bsdf = scene->bsdfs[op.index];
-    m->at = imp__reduced_texcoord(scene, &data.at);
-    m->shape = m->at.shape;
-    m->wo = imp__decided_v3(data.wo);
+    m->words = words;
+    m->wo = imp__decided_v3(wo);
     const struct imp_input *const *input = m->bsdf->input;
+    const int n = m->bsdf->n_in;
     bool plain = true;
-    for (int j = 0; j < m->bsdf->n_in; j++) {
+    for (int j = 0; j < n; j++) {
         m->in[j] = input[j]->value;
         plain &= input[j]->plain;
     }
-    if (imp_unlikely(!plain)) imp__inputs_eval(input, m->bsdf->n_in, &m->at, m->in);
+    if (imp_likely(plain)) return;
+    const struct imp_texcoord at = imp__reduced_material_at(scene, m);
+    imp__inputs_eval(input, n, &at, m->in);
 }
 
 /* ---- Sums ------------------------------------------------------------------------ */
@@ -102,8 +105,9 @@ walk_sum(const struct imp_reduced *r, const struct imp_reduced_walk *begin,
     imp_spec P = imp__spec(1), L = {0}, lit = {0};
     bool is_lit = false;
     imp_spec in[IMP_INPUTS_MAX];
-    struct imp_reduced_at_hand own = {.in = in}, *m = &own;
+    struct imp_reduced_at_hand own, *m = &own; /* set by the first material */
     size_t n = 0;
+    own.in = in;
     for (; op < end; op++) {
         const struct imp_op o = *op;
         const uint32_t *at = words;

@@ -144,13 +144,15 @@ void imp__store_walk_at(const struct imp_tracer *tracer, struct imp_arena *arena
                         int y, int64_t at, struct imp_walk *walk)
 {
     const struct imp_store *s = tracer->kept;
-    const int column = x + s->margin, row = y + s->margin;
-    const size_t k = (size_t)(row / IMP_STORE_SIDE) * (size_t)s->across +
-                     (size_t)(column / IMP_STORE_SIDE);
-    assert(at >= 0 && (uint64_t)at < s->n && column >= 0 && row >= 0 &&
+    /* As of tile_at, without its quotients: each sample asks. */
+    const size_t column = (size_t)(x + s->margin), row = (size_t)(y + s->margin);
+    const size_t k = row / IMP_STORE_SIDE * (size_t)s->across + column / IMP_STORE_SIDE;
+    assert(at >= 0 && (uint64_t)at < s->n && x + s->margin >= 0 && y + s->margin >= 0 &&
            k < imp__store_tiles(s));
-    const struct tile t = tile_at(s, k);
-    const size_t pixel = (size_t)(y - t.y0) * (size_t)(t.x1 - t.x0) + (size_t)(x - t.x0);
+    const size_t left = column - column % IMP_STORE_SIDE;
+    const size_t side =
+        imp_min((size_t)(s->width + 2 * s->margin) - left, (size_t)IMP_STORE_SIDE);
+    const size_t pixel = row % IMP_STORE_SIDE * side + (column - left);
     const size_t i = pixel * s->n + (size_t)at;
     if (!s->reduced[k].of ||
         !imp__reduced_walk(&s->reduced[k], &s->records[k], i, tracer, arena, walk))

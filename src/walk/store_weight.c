@@ -252,6 +252,18 @@ static double course_weight(struct course *c, uint64_t j, uint64_t end,
     return c->w;
 }
 
+/* A walk that is asked soon is far from the last one, and would be waited for. */
+static void fetch(const struct imp_record *r, size_t i)
+{
+    if (i >= r->n_walks) return;
+    const struct imp_record_walk *k = imp__record_at(r, i);
+    for (uint32_t j = 0; j < k->n; j++) {
+        const char *d = (const char *)imp__record_vertex(r, k->first + j);
+        for (size_t b = 0; b < sizeof(struct imp_decision); b += IMP_CACHE_LINE)
+            __builtin_prefetch(d + b);
+    }
+}
+
 enum imp_status
 imp__store_moments(const struct imp_store *s, const struct imp_densities *d,
                    const struct imp_tracer *tracer, struct imp_arena *arena, size_t tile,
@@ -269,6 +281,7 @@ imp__store_moments(const struct imp_store *s, const struct imp_densities *d,
         const int x = imp_clamp(x0 + pixel % side, 0, s->width - 1);
         const int y = imp_clamp(y0 + pixel / side, 0, s->height - 1);
         struct imp_walk walk = {.key = k->key};
+        if (every > 1) fetch(r, i + every);
         if (mask && !(mask[(size_t)y * (size_t)s->width + (size_t)x] > 0)) continue;
         const struct imp_arena_mark mark = imp__arena_mark(arena);
         if (k->n_items > 0 && (tracks || k->n_vertices > k->n))

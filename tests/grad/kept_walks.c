@@ -546,6 +546,40 @@ static void diverging(void)
     imp_scene_destroy(scene);
 }
 
+/* Some walks are looked at first; next to the limit all of them decide. */
+static void next_to_the_limit(void)
+{
+    imp_scene *scene = test_scene(ctx, "textured.xml", IMP_RGB, "width=32 height=24");
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_walks_options o = IMP_WALKS_OPTIONS_INIT;
+    struct imp_walks_weight w = IMP_WALKS_WEIGHT_INIT;
+    double ess = 0;
+    size_t k;
+    run.spp = 32;
+    test_must(ctx, imp_scene_find_param(scene, "metal.alpha", &k));
+    for (int side = 0; side < 3; side++) { /* find it; just below; just above */
+        imp_walks *walks;
+        imp_film *film;
+        o.ess = side == 0 ? 0 : ess + (side == 1 ? -1e-5 : 1e-5);
+        test_must(ctx, imp_scene_set_values(scene, k, 1, &(double){0.2}));
+        test_must(ctx, imp_walks_keep(scene, &run, &o, &walks));
+        test_must(ctx, imp_scene_set_values(scene, k, 1, &(double){0.16}));
+        test_must(ctx, imp_walks_weigh(walks, 0, NULL, &w));
+        ess = w.ess;
+        run.walks = walks;
+        if (side == 2)
+            refused_with(scene, walks, "effective sample size", "just above the limit");
+        else if (side == 1) {
+            tap_ok(imp_render(scene, &run, &film) == IMP_OK && !w.refused,
+                   "just below the limit # ess %.5f of %.0f", ess, w.n_walks);
+            imp_film_destroy(film);
+        }
+        run.walks = NULL;
+        imp_walks_destroy(walks);
+    }
+    imp_scene_destroy(scene);
+}
+
 static void refusals(void)
 {
     imp_scene *scene = test_scene(ctx, "textured.xml", IMP_RGB, NULL);
@@ -645,6 +679,7 @@ int main(void)
     closed_form_of_mixtures(9, 0.5, true);
     roulette_counts_once();
     diverging();
+    next_to_the_limit();
     refusals();
     imp_context_destroy(ctx);
     return tap_done();
