@@ -104,6 +104,24 @@ static void draws_check(const struct imp__sparse_normal *eq, enum imp__draw what
     tap_z(&mixed, 1, .1, text);
 }
 
+static struct imp__lm_system *system_of(const struct imp__lm_kind *kind,
+                                        const struct imp__goal *goal)
+{
+    struct imp__lm_system *s = imp__alloc(goal->ctx, 1, kind->size);
+    if (!s) abort();
+    s->kind = kind;
+    s->goal = goal;
+    test_must(goal->ctx, kind->begin(s));
+    return s;
+}
+
+static void system_end(struct imp__lm_system *s)
+{
+    imp_context *ctx = s->goal->ctx;
+    s->kind->end(s);
+    imp__release(ctx, s);
+}
+
 static void compare(imp_context *ctx, const struct trial *t)
 {
     imp_scene *scene;
@@ -161,16 +179,16 @@ static void compare(imp_context *ctx, const struct trial *t)
     struct imp__lm_system *few, *many_of;
     goal.normal = NULL;
     goal.sparse = imp__fit_sparse;
-    test_must(ctx, imp__lm_dense(&f.goal, &few));
-    test_must(ctx, imp__lm_sparse(&goal, &many_of));
-    test_must(ctx, few->take(few, x, 5));
-    test_must(ctx, many_of->take(many_of, x, 5));
+    few = system_of(&imp__lm_dense, &f.goal);
+    many_of = system_of(&imp__lm_sparse, &goal);
+    test_must(ctx, few->kind->take(few, x, 5));
+    test_must(ctx, many_of->kind->take(many_of, x, 5));
     for (int k = t->singular; k < 3; k++) {
         double mu = k == 0 ? IMP_LM_MU_MIN : k == 1 ? 1e-2 : 1, own = mu;
         bool found, found_own;
         bool fixed[MOST] = {false};
-        test_must(ctx, few->newton(few, &mu, ref, &found));
-        test_must(ctx, many_of->newton(many_of, &own, y, &found_own));
+        test_must(ctx, few->kind->newton(few, &mu, ref, &found));
+        test_must(ctx, many_of->kind->newton(many_of, &own, y, &found_own));
         struct imp__conjugate c = {
             .eq = &eq, .fixed = fixed, .tolerance = 1e-13, .most = 10000};
         test_must(ctx, imp__conjugate_solve(ctx, &c, mu, 1, eq.g, d));
@@ -182,8 +200,8 @@ static void compare(imp_context *ctx, const struct trial *t)
     }
     tap_ok(few->n_free == many_of->n_free, "%s: %zu numbers are free", t->name,
            few->n_free);
-    few->destroy(few);
-    many_of->destroy(many_of);
+    system_end(few);
+    system_end(many_of);
     imp__sparse_normal_destroy(&eq);
     imp__normal_destroy(ctx, &dense);
     imp__fit_end(&f);
