@@ -78,6 +78,7 @@ for loss in l2 l1 log relative; do
     answer "loss_cornell_$loss" gradient $c "${small[@]}" --spp 16 -T cornell.exr --loss "$loss"
 done
 answer loss_cornell_guided gradient $c "${small[@]}" --spp 16 -T cornell.exr --guide-share 0.5
+answer loss_cornell_sobol gradient $c "${small[@]}" --spp 32 -T cornell.exr --points sobol
 answer loss_cornell_mono gradient $c "${small[@]}" --spp 16 -T cornell.exr -m mono
 answer loss_textured gradient $t "${wide[@]}" --spp 16 -T textured.exr
 answer loss_lamps gradient $l "${small[@]}" --spp 16 -T lamps.exr
@@ -99,6 +100,7 @@ for optimizer in adam lm lbfgs; do
     answer "fit_cornell_$optimizer" fit $c "${small[@]}" --spp 8 -T cornell.exr --optimizer "$optimizer" -n 4 -p '*reflectance*'
 done
 answer fit_textured fit $t "${wide[@]}" --spp 4 -T textured.exr -n 3 -o out/textured_fit
+answer fit_cornell_sobol fit $c "${small[@]}" --spp 8 -T cornell.exr --points sobol -n 4 -p '*reflectance*'
 answer fit_stam fit $s "${small[@]}" --spp 8 -T stam.exr --optimizer lm -n 3
 answer fit_seen fit scenes/bend/seen.xml -D width=24 --spp 4 -T seen.exr -n 2 --no-intervals -o out/seen_fit
 
