@@ -4,7 +4,7 @@
     python3 bench/peers/random_parts.py SEED MODE FOLDER       # writes FOLDER/scene.xml and what it names
 
 Materials, textures and lights stand inside what uses them, without ids, so that parameters have the names of mi.traverse
-in both. What docs/mitsuba.md lists as different is left out: mirrored meshes, oval cylinders, `mask` under `path`, mirrors in
+in both. What docs/mitsuba.md lists as different is left out: mirrored meshes, `mask` under `path`, mirrors in
 blends, and in spectral mode metals by name, the tints of `principled`, texels of light above 1, and so on. There colours are lists of
 wavelengths, and pictures grey: Mitsuba looks the spectrum of three numbers up in a table, importon solves for it, and
 after some reflections in coloured light that makes .5 %.
@@ -361,10 +361,8 @@ class Maker:
                 f.write("\n")
         return file
 
-    def place(self, x, y, z, size, stretch=True, stays_round=False):
+    def place(self, x, y, z, size, stretch=True):
         s = [size * self.u(.8, 1.2) for _ in range(3)] if stretch else [size] * 3
-        if stays_round:
-            s[1] = s[0]
         turn = self.r.choice(["x", "y", "z"])
         return ('<transform name="to_world"><scale x="%g" y="%g" z="%g"/><rotate %s="1" angle="%g"/><translate x="%g" y="%g" z="%g"/></transform>'
                 % (*s, turn, self.u(-60, 60), x, y, z))
@@ -383,7 +381,7 @@ class Maker:
             props += '<string name="filename" value="%s"/>' % self.curve()
             place = self.place(x, y, size, size, False)
         else:
-            place = self.place(x, y, size, size, stays_round=k == "cylinder")
+            place = self.place(x, y, size, size)
         if k in ("obj", "serialized"):
             props += '<string name="filename" value="%s"/>' % (self.obj() if k == "obj" else self.serialized())
             if self.maybe(.3):

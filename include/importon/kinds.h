@@ -610,7 +610,8 @@ struct imp_shape_ops {
     /* Its density for the point found at `at` (hit from ref), per steradian. */
     double (*pdf_toward)(const struct imp_shape *s, const imp_v3 *ref,
                          const struct imp_hit *hit, const struct imp_surface *at);
-    /* The sphere or cylinder that it is part of; NULL: flat where it is hit. */
+    /* The sphere or cylinder that it is part of, or the radius 0: of neither. NULL: flat
+     * where it is hit. */
     void (*round)(const struct imp_shape *s, struct imp_round *out);
     /* Draw a point uniformly by area, density 1/area; of IMP_SHAPE_SQUARE its uv is u.
      * NULL: light walks cannot begin on it. */

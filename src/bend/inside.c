@@ -3,6 +3,7 @@
  * step that hits a shape is shortened to end on it. Same steps and transposes as in
  * bend_trace.c and bend_adjoint.c, for one ray without reflections. */
 #include "inside.h"
+#include "kind/shape/shape.h"
 #include "math/hash.h"
 
 #define STEPS_DEFAULT 100 /* across a body whose field has no cells */
@@ -94,9 +95,8 @@ out:
 void imp__level(const struct imp_shape *s, imp_v3 p, imp_v3 ng, struct imp__surface *l)
 {
     *l = (struct imp__surface){.kind = IMP__PLANE, .n = ng, .offset = imp__dot(ng, p)};
-    if (!s->ops->round) return;
     struct imp_round r;
-    s->ops->round(s, &r);
+    if (!imp__shape_round(s, &r)) return;
     const bool sphere = imp__dot(r.axis, r.axis) == 0;
     *l = (struct imp__surface){.kind = sphere ? IMP__SPHERE : IMP__CYLINDER,
                                .n = r.axis,

@@ -2,6 +2,7 @@
  *
  * Graded media: which shapes they fill, their numbers as parameters, and what of them can
  * be differentiated. */
+#include "kind/shape/shape.h"
 #include "scene_build.h"
 
 enum imp_status imp__build_body(struct imp_scene *scene, struct imp_node *node,
@@ -60,6 +61,32 @@ static enum imp_status boundary_check(const struct imp_scene *scene,
     return IMP_OK;
 }
 
+/* Do their boxes meet? */
+static bool is_near(const struct imp_shape *s, const struct imp_body *m)
+{
+    bool near = true;
+    for (int k = 0; k < 3; k++) near &= s->lo[k] <= m->hi[k] && s->hi[k] >= m->lo[k];
+    return near;
+}
+
+/* Bent rays end on triangles, flat shapes, spheres and circular cylinders: of others the
+ * level whose zero they end on (bend/inside.c) is not known. */
+static enum imp_status bent_check(const struct imp_scene *scene,
+                                  const struct imp_shape *s)
+{
+    struct imp_round round;
+    const bool oval = s->ops->round && !imp__shape_round(s, &round);
+    bool near = false;
+    if (!oval && s->geometry != IMP_CURVES) return IMP_OK;
+    for (int i = 0; i < scene->n_bodies; i++)
+        near |= scene->bodies[i]->index >= 0 && is_near(s, scene->bodies[i]);
+    return near ? imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                             "shape '%s': %s on or in a graded medium; its rays end on "
+                             "triangles, flat shapes, spheres and circular cylinders",
+                             s->name, oval ? "an oval cylinder" : "a curve")
+                : IMP_OK;
+}
+
 /* The only shape of a medium, if it is a sphere and no other shape's box meets its own: a
  * ray inside meets nothing before it is outside. */
 static const struct imp_shape *ball_of(const struct imp_scene *scene,
@@ -69,17 +96,14 @@ static const struct imp_shape *ball_of(const struct imp_scene *scene,
     struct imp_round round;
     for (int i = 0; i < scene->n_shapes; i++) {
         const struct imp_shape *s = scene->shapes[i];
-        bool apart = false;
         if (s->body == m) {
             if (ball) return NULL;
             ball = s;
             continue;
         }
-        for (int k = 0; k < 3; k++) apart |= s->lo[k] > m->hi[k] || s->hi[k] < m->lo[k];
-        if (!apart) return NULL;
+        if (is_near(s, m)) return NULL;
     }
-    if (!ball || !ball->ops->round) return NULL;
-    ball->ops->round(ball, &round);
+    if (!ball || !imp__shape_round(ball, &round)) return NULL;
     return imp__dot(round.axis, round.axis) == 0 ? ball : NULL;
 }
 
@@ -118,6 +142,10 @@ enum imp_status imp__bodies_check(struct imp_scene *scene)
             m->lo[k] = fmin(m->lo[k], s->lo[k]);
             m->hi[k] = fmax(m->hi[k], s->hi[k]);
         }
+    }
+    for (int i = 0; i < scene->n_shapes; i++) {
+        const enum imp_status st = bent_check(scene, scene->shapes[i]);
+        if (st != IMP_OK) return st;
     }
     for (int i = 0; i < scene->n_bodies; i++) {
         struct imp_body *m = scene->bodies[i];

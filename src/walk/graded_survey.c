@@ -8,6 +8,7 @@
  * and refraction meet there), nor is the border of a light that is dark along it, in the
  * dark. */
 #include "graded.h"
+#include "kind/shape/shape.h"
 #include "vertex.h"
 #include <stdio.h>
 #include <string.h>
@@ -29,15 +30,14 @@ struct pair {
 static struct piece piece_of(const struct imp_scene *scene, const struct imp_vertex *v)
 {
     struct piece p = {.around = true};
-    struct imp_round r = {.radius = 0};
+    struct imp_round r;
     if (!v || !v->shape) return p;
     p.shape = v->shape;
     p.around = false;
-    if (!v->shape->ops->round) {
+    if (!imp__shape_round(v->shape, &r)) {
         for (int k = 0; k < 3; k++) p.normal[k] = (int)lrint(v->ng[k] * 1e4);
         return p;
     }
-    v->shape->ops->round(v->shape, &r);
     if (imp__dot(r.axis, r.axis) != 0) return p;
     const imp_v3 from = v->prev ? imp__decided_v3(v->prev->d.p) - r.centre : (imp_v3){0};
     const bool outside = imp__dot(from, from) > imp__sqr(r.radius) * (1 + 1e-9);

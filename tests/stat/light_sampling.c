@@ -49,7 +49,7 @@ static imp_v3 cone_direction(const struct cone *c, double u, double v)
  * density of first hits. Both sides leave out what the shape itself hides, and what is
  * seen nearly from the edge: densities like 1/cos in directions too thin for the
  * quadrature. */
-static void against_density(struct imp_shape *s, imp_v3 ref, const char *where)
+static void against_density(struct imp_shape *s, int round, imp_v3 ref, const char *where)
 {
     enum { DRAWS = 40000, RAYS = 48 };
     const double grazing = 0.1;
@@ -134,23 +134,24 @@ static void against_density(struct imp_shape *s, imp_v3 ref, const char *where)
     tap_ok(z < 5 && fabs(za) < 4.5 && outside == 0 && mismatch <= DRAWS / 2000 &&
                none <= DRAWS / 1000 && visible > DRAWS / 20 && total < 1.02 &&
                tap_se(&angle) < 0.05 * angle.mean,
-           "%s from %s # chi2 z %.2f in %g bins, solid angle %.4g z %.2f, mismatch %d "
+           "%s%s from %s # chi2 z %.2f in %g bins, solid angle %.4g z %.2f, mismatch %d "
            "none %d "
            "visible %d",
-           s->ops->name, where, z, dof, angle.mean, za, mismatch, none, visible);
+           round ? "round " : "", s->ops->name, where, z, dof, angle.mean, za, mismatch,
+           none, visible);
 }
 
 static void densities(void)
 {
     static const char *const where[] = {"outside", "far away", "close to it", "inside"};
     for (int k = 0; imp__shape_kinds[k]; k++)
-        for (int place = 0; place < 4; place++) {
+        for (int c = 0; c < 8; c++) {
             const struct imp_shape_ops *ops = imp__shape_kinds[k];
+            const int place = c % 4, round = c >= 4;
             if (!ops->sample_toward) continue; /* it cannot be a light */
+            if (round ? !ops->round : !strcmp(ops->name, "sphere")) continue;
             const int flat =
                 !strcmp(ops->name, "rectangle") || !strcmp(ops->name, "disk");
-            const int round =
-                !strcmp(ops->name, "sphere") || !strcmp(ops->name, "cylinder");
             world_begin(ctx);
             struct imp_node *n = kind_node(ops);
             const struct imp_mat4 turn =
@@ -182,10 +183,58 @@ static void densities(void)
                 }
                 tap_ok(drawn == 0, "%s: nothing to draw from the edge", ops->name);
             } else {
-                against_density(s, ref, where[place]);
+                against_density(s, round, ref, where[place]);
             }
             world_end();
         }
+}
+
+/* Points of an oval cylinder, sheared too, against its area: bins of phi and v, whose shares are
+ * integrals of |dp_du x dp_dv| by trapezoids. */
+static void oval_areas(void)
+{
+    enum { DRAWS = 200000, TURNS = 40, HEIGHTS = 5, STEPS = 200 };
+    static const double width[] = {0.9, 0.3, 1e-2, 1e-5};
+    for (int k = 0; k < 8; k++) {
+        static int count[TURNS][HEIGHTS];
+        double share[TURNS], sum = 0, chi2 = 0;
+        struct imp_mat4 m = imp__scale(imp__v3(1, width[k % 4], 1.4));
+        if (k >= 4) m.m[1] = 0.7, m.m[6] = 0.4, m.m[8] = -0.3;
+        world_begin(ctx);
+        struct imp_node *n = node_new("shape", "cylinder");
+        node_transform(n, m);
+        const struct imp_shape *s = shape_build(n, NULL);
+        if (!s) return;
+        memset(count, 0, sizeof count);
+        for (uint32_t i = 0; i < DRAWS; i++) {
+            const struct imp_key key = imp__key(61, (uint64_t)k, i);
+            struct imp_surface at;
+            s->ops->sample_area(s, (double[2]){imp__u01(key, 0), imp__u01(key, 1)}, &at);
+            count[imp_min((int)(at.uv[0] * TURNS), TURNS - 1)]
+                 [(int)(at.uv[1] * HEIGHTS)]++;
+        }
+        for (int b = 0; b < TURNS; b++) {
+            share[b] = 0;
+            for (int i = 0; i <= STEPS; i++) {
+                const double uv[2] = {(b + (double)i / STEPS) / TURNS, 0.5};
+                struct imp_surface at;
+                s->ops->place(s, uv, &at, NULL);
+                share[b] += (i % STEPS ? 1 : 0.5) *
+                            imp__length(imp__cross(at.dp_du, at.dp_dv)) / (STEPS * TURNS);
+            }
+            sum += share[b];
+        }
+        for (int b = 0; b < TURNS; b++)
+            for (int v = 0; v < HEIGHTS; v++) {
+                const double expected = DRAWS * share[b] / sum / HEIGHTS;
+                chi2 += imp__sqr(count[b][v] - expected) / expected;
+            }
+        const double dof = TURNS * HEIGHTS - 1, z = (chi2 - dof) / sqrt(2 * dof);
+        tap_ok(fabs(z) < 4.5 && fabs(sum / s->area - 1) < 1e-5,
+               "points of a%s cylinder %g across # z %.2f, area %.8g, by trapezoids %.8g",
+               k >= 4 ? " sheared" : "n oval", width[k % 4], z, s->area, sum);
+        world_end();
+    }
 }
 
 /* ---- closed forms -------------------------------------------------------------- */
@@ -529,6 +578,7 @@ int main(void)
 {
     if (imp_context_create(NULL, &ctx) != IMP_OK) return 1;
     densities();
+    oval_areas();
     solid_angles();
     form_factors();
     emitters();

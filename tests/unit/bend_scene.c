@@ -8,6 +8,7 @@
 #include "walk/graded.h"
 #include <math.h>
 #include <stdarg.h>
+#include <unistd.h>
 
 #define tap_note(...) (printf("# " __VA_ARGS__), printf("\n"))
 
@@ -328,6 +329,22 @@ static void hostile(imp_context *ctx)
                  N0("1")) "<shape type='sphere'><float name='radius' value='0.5'/><bsdf "
                           "type='dielectric'/></shape>",
             IMP_E_PATHS, "bent");
+    refused(ctx,
+            BALL("<bsdf type='null'/>",
+                 N0("1")) "<shape type='cylinder'><transform name='to_world'><scale "
+                          "x='.2' y='.1' z='.3'/></transform></shape>",
+            no, "an oval cylinder on or in a graded medium");
+    char curve[] = "/tmp/imp_bend_XXXXXX", text[512];
+    const int fd = mkstemp(curve);
+    if (fd < 0 || write(fd, "-.5 0 0 .2\n.5 0 0 .2\n", 21) != 21) exit(99);
+    close(fd);
+    snprintf(text, sizeof text,
+             BALL("<bsdf type='null'/>",
+                  N0("1")) "<shape type='linearcurve'><string name='filename' "
+                           "value='%s'/></shape>",
+             curve);
+    refused(ctx, text, no, "a curve on or in a graded medium");
+    unlink(curve);
     refused(ctx, BALL("<bsdf type='null'/>", N0("-1")), IMP_E_SCENE, "n0 = -1");
     refused(ctx,
             BALL("<bsdf type='null'/>", /* no index where r > 1/2 */

@@ -465,6 +465,9 @@ static void scenes(void)
         {LAMP("downlight", "<point name='position' x='1'/>"), "position"},
         {LAMP("downlight", "<texture type='checkerboard' name='scale'/>"),
          "scale cannot be a texture"},
+        {"<shape type='cylinder'><transform name='to_world'><scale "
+         "x='2'/></transform>" LAMP("downlight", "") "</shape>",
+         "is an oval cylinder: by a table only a circular one glows"},
         {"<shape type='sphere' id='s'>" LAMP("downlight", "") "</shape><shape "
                                                               "type='disk'><ref "
                                                               "id='lamp'/></shape>",

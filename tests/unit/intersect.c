@@ -12,7 +12,11 @@ static struct imp_mat4 placement(int k)
     struct imp_mat4 m = imp__mat4_identity();
     if (k == 0) return m;
     const struct imp_mat4 r = imp__rotate(imp__normalize(imp__v3(1, 2, -0.5)), 37);
-    const struct imp_mat4 s = imp__scale(imp__v3(1.7, 1.7, k == 2 ? -1.7 : 1.7));
+    struct imp_mat4 s = imp__scale(imp__v3(1.7, 1.7, k == 2 ? -1.7 : 1.7));
+    if (k == 3) { /* uneven, and sheared */
+        s = imp__scale(imp__v3(1.7, 0.6, 1.2));
+        s.m[1] = 0.5, s.m[6] = -0.4, s.m[8] = 0.3;
+    }
     const struct imp_mat4 t = imp__translate(imp__v3(0.3, -0.2, 0.7));
     m = imp__mat4_multiply(&r, &s);
     return imp__mat4_multiply(&t, &m);
@@ -366,8 +370,9 @@ int main(void)
     imp_context *ctx;
     if (imp_context_create(NULL, &ctx) != IMP_OK) return 1;
     for (int k = 0; imp__shape_kinds[k]; k++)
-        for (int place = 0; place < 3 && has_reference(imp__shape_kinds[k]); place++)
-            single(ctx, imp__shape_kinds[k], place);
+        for (int place = 0; place < 4 && has_reference(imp__shape_kinds[k]); place++)
+            if (place < 3 || strcmp(imp__shape_kinds[k]->name, "sphere"))
+                single(ctx, imp__shape_kinds[k], place);
     together(ctx);
     intervals(ctx);
     imp_context_destroy(ctx);

@@ -262,14 +262,18 @@ static enum imp_status area_build(const struct imp_build *b, void *self,
     IMP_TRY(common_build(b, x));
     if (s->geometry == IMP_TRIANGLES) {
         IMP_TRY(facets_find(b, s, x, &at));
-    } else if (s->ops->round) {
-        s->ops->round(s, &round);
+    } else if (imp__shape_round(s, &round)) {
         const double length = imp__length(round.axis);
         if (length == 0) x->same = IMP_PI * round.radius * round.radius;
         else {
             x->across = s->area / IMP_PI; /* 2 pi r h, of which 2 r h is seen */
             x->axis = round.axis * (1 / length);
         }
+    } else if (s->ops->round) {
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_UNSUPPORTED,
+                                "its shape '%s' is an oval cylinder: by a table only a "
+                                "circular one glows",
+                                s->name ? s->name : ""));
     } else {
         struct imp__ies_facet *f = imp_build_alloc(b, 1, sizeof *f);
         if (!f) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "scene: out of memory"));

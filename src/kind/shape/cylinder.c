@@ -1,21 +1,51 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * An open circular cylinder about the line from p0 to p1, in double precision. */
+ * An open cylinder about the line from p0 to p1, in double precision: circular, or what an
+ * uneven or shearing to_world makes of that. It is the points
+ *
+ *     base + n length v + radius (s cos(phi) + t sin(phi))                             (1)
+ *
+ * where s, t, n are the orthonormal frame of a circular one; of another one the images of the
+ * axes, with length and radius 1. */
+#include "math/ellipse.h"
 #include "shape.h"
 
 struct cylinder {
-    imp_v3 base;           /* the middle of the end at p0 */
-    struct imp_frame axes; /* orthonormal; n runs along the axis */
+    imp_v3 base;            /* the middle of the end at p0 */
+    struct imp_frame axes;  /* of (1) */
+    struct imp_frame inner; /* rows of the inverse of axes: dot products with them are
+                               coordinates along axes. Of a circular one the same */
     double radius, length;
     double side; /* 1: the normal points outwards */
+    bool oval;
+    struct imp_ellipse across; /* of an oval one: what is seen of it along its axis */
 };
+
+/* From the images of the axes. False: they lie in a plane. */
+static bool oval_set(const imp_v3 axis[3], struct cylinder *c)
+{
+    imp_v3 e[3];
+    for (int i = 0; i < 3; i++) e[i] = imp__normalize(axis[i]);
+    const double volume = imp__dot(imp__cross(e[0], e[1]), e[2]);
+    imp_v3 rows[3];
+    for (int i = 0; i < 3; i++)
+        rows[i] = imp__cross(e[(i + 1) % 3], e[(i + 2) % 3]) *
+                  (1 / (volume * imp__length(axis[i])));
+    const imp_v3 p = axis[0] - e[2] * imp__dot(axis[0], e[2]),
+                 q = axis[1] - e[2] * imp__dot(axis[1], e[2]);
+    c->oval = true;
+    c->axes = (struct imp_frame){axis[0], axis[1], axis[2]};
+    c->inner = (struct imp_frame){rows[0], rows[1], rows[2]};
+    imp__ellipse(&p, &q, &c->across);
+    return imp__is_finite(rows[0]) && imp__is_finite(rows[1]) && imp__is_finite(rows[2]);
+}
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_shape *s)
 {
     enum imp_status st = IMP_OK;
     struct cylinder *c = self;
     struct imp_placement at;
-    double p0[3], p1[3], radius, scale[3];
+    double p0[3], p1[3], radius, scale[3], reach = 0;
 
     IMP_TRY(imp__shape_placement(b, s, &at));
     IMP_TRY(imp_build_vector(b, "p0", (double[3]){0, 0, 0}, p0));
@@ -30,23 +60,35 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     const struct imp_mat4 local = {{f.s[0], f.t[0], f.n[0], a[0], f.s[1], f.t[1], f.n[1],
                                     a[1], f.s[2], f.t[2], f.n[2], a[2], 0, 0, 0, 1}};
     const struct imp_mat4 placed = imp__mat4_multiply(&at.to_world, &local);
-    imp__placement_frame(b, &placed, 2, &c->axes, scale);
     c->base = imp__point(&placed, imp__v3(0, 0, 0));
-    c->radius = fabs(radius) * scale[0];
-    c->length = length * scale[2];
-    s->area = IMP_2PI * c->radius * c->length;
-    if (!(s->area > 0) || !(c->radius < IMP_REACH_MAX) || !isfinite(s->area) ||
+    if (imp__placement_frame(&placed, 2, &c->axes, scale)) {
+        c->inner = c->axes;
+        c->radius = reach = fabs(radius) * scale[0];
+        c->length = length * scale[2];
+        s->area = IMP_2PI * c->radius * c->length;
+    } else {
+        const imp_v3 axis[3] = {imp__mat4_column(&placed, 0) * fabs(radius),
+                                imp__mat4_column(&placed, 1) * fabs(radius),
+                                imp__mat4_column(&placed, 2) * length};
+        if (!oval_set(axis, c))
+            IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
+                                    "to_world flattens the shape"));
+        c->radius = c->length = 1;
+        reach = fabs(radius) * fmax(scale[0], scale[1]);
+        s->area = c->across.length * imp__length(axis[2]);
+    }
+    if (!(s->area > 0) || !(reach < IMP_REACH_MAX) || !isfinite(s->area) ||
         !imp__is_finite(c->base))
         IMP_TRY(imp_build_error(b, "radius", IMP_E_SCENE,
                                 "radius: in the world its length, %g, is outside (0, %g)",
-                                c->radius, IMP_REACH_MAX));
+                                reach, IMP_REACH_MAX));
     c->side = (at.mirrored != s->flip_normals) ? -1 : 1;
-    /* A circle about n reaches r sqrt(1 - n_i^2) along axis i. */
+    /* s cos(phi) + t sin(phi) is largest along axis i at |(s_i, t_i)|. */
     const imp_v3 top = c->base + c->axes.n * c->length;
     for (int i = 0; i < 3; i++) {
-        const double reach = c->radius * hypot(c->axes.s[i], c->axes.t[i]);
-        s->lo[i] = fmin(c->base[i], top[i]) - reach;
-        s->hi[i] = fmax(c->base[i], top[i]) + reach;
+        const double most = c->radius * hypot(c->axes.s[i], c->axes.t[i]);
+        s->lo[i] = fmin(c->base[i], top[i]) - most;
+        s->hi[i] = fmax(c->base[i], top[i]) + most;
     }
     s->lo[3] = s->hi[3] = 0;
     s->geometry = IMP_ANALYTIC;
@@ -60,8 +102,8 @@ static bool intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *
                       double tmin, double tmax, struct imp_hit *hit)
 {
     const struct cylinder *k = s->self;
-    const imp_v3 p = imp__to_local(&k->axes, *o - k->base),
-                 w = imp__to_local(&k->axes, *d);
+    const imp_v3 p = imp__to_local(&k->inner, *o - k->base),
+                 w = imp__to_local(&k->inner, *d);
     const double a = w[0] * w[0] + w[1] * w[1], b = -(p[0] * w[0] + p[1] * w[1]);
     const double lx = p[0] + w[0] * (b / a), ly = p[1] + w[1] * (b / a);
     const double r2 = k->radius * k->radius, e = r2 - (lx * lx + ly * ly);
@@ -81,12 +123,14 @@ static bool intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *
     return false;
 }
 
-/* x, y: a unit vector across the axis. */
+/* x, y: cosine and sine of phi. */
 static void surface_at(const struct cylinder *k, double x, double y, double v,
                        struct imp_surface *out)
 {
-    const imp_v3 outward = k->axes.s * x + k->axes.t * y;
-    out->p = k->base + k->axes.n * (v * k->length) + outward * k->radius;
+    const imp_v3 across = k->axes.s * x + k->axes.t * y;
+    const imp_v3 outward =
+        k->oval ? imp__normalize(k->inner.s * x + k->inner.t * y) : across;
+    out->p = k->base + k->axes.n * (v * k->length) + across * k->radius;
     out->ng = out->n = outward * k->side;
     out->uv[0] = imp__uv_turn(x, y);
     out->uv[1] = v;
@@ -100,7 +144,7 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit, const 
 {
     const struct cylinder *k = s->self;
     const imp_v3 p = *o + *d * hit->t - k->base;
-    const double x = imp__dot(p, k->axes.s), y = imp__dot(p, k->axes.t);
+    const double x = imp__dot(p, k->inner.s), y = imp__dot(p, k->inner.t);
     const double r = 1 / sqrt(x * x + y * y);
     surface_at(k, x * r, y * r, hit->v, out);
 }
@@ -115,15 +159,16 @@ static void place(const struct imp_shape *s, const double uv[2], struct imp_surf
 static void sample_area(const struct imp_shape *s, const double u[2],
                         struct imp_surface *out)
 {
-    surface_at(s->self, cos(IMP_2PI * u[0]), sin(IMP_2PI * u[0]), u[1], out);
+    const struct cylinder *k = s->self;
+    const double phi = k->oval ? imp__ellipse_phi(&k->across, u[0]) : IMP_2PI * u[0];
+    surface_at(k, cos(phi), sin(phi), u[1], out);
 }
 
 static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
                           struct imp_light_sample *out)
 {
-    const struct cylinder *k = s->self;
     struct imp_surface at;
-    surface_at(k, cos(IMP_2PI * u[0]), sin(IMP_2PI * u[0]), u[1], &at);
+    sample_area(s, u, &at);
     out->uv[0] = at.uv[0];
     out->uv[1] = at.uv[1];
     return imp__light_from_area(*ref, at.p, at.ng, at.n, 1 / s->area, out);
@@ -139,7 +184,8 @@ static double pdf_toward(const struct imp_shape *s, const imp_v3 *ref,
 static void round_of(const struct imp_shape *s, struct imp_round *out)
 {
     const struct cylinder *k = s->self;
-    *out = (struct imp_round){k->base, k->axes.n, k->radius};
+    *out = k->oval ? (struct imp_round){.radius = 0}
+                   : (struct imp_round){k->base, k->axes.n, k->radius};
 }
 
 const struct imp_shape_ops imp__cylinder = {.size = sizeof(struct imp_shape_ops),

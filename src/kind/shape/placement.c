@@ -28,8 +28,8 @@ out:
 }
 
 /* Gram and Schmidt, x first: for a rotation and scales it is the exact decomposition. */
-void imp__placement_frame(const struct imp_build *b, const struct imp_mat4 *to_world,
-                          int equal, struct imp_frame *frame, double length[3])
+bool imp__placement_frame(const struct imp_mat4 *to_world, int equal,
+                          struct imp_frame *frame, double length[3])
 {
     imp_v3 e[3];
     bool exact = true;
@@ -48,13 +48,6 @@ void imp__placement_frame(const struct imp_build *b, const struct imp_mat4 *to_w
     }
     for (int i = 1; i < equal; i++)
         exact &= fabs(length[i] - length[0]) < 1e-6 * length[0];
-    if (!exact) {
-        char where[512];
-        imp__warn(b->ctx,
-                  "%s: shape '%s' (%s): to_world shears it or scales it unevenly; it "
-                  "stays round, with the scale of its x axis",
-                  imp__loc_text(b->node->loc, where, sizeof where),
-                  b->node->id ? b->node->id : "", b->node->type);
-    }
     *frame = (struct imp_frame){e[0], e[1], e[2]};
+    return exact;
 }

@@ -25,11 +25,18 @@ static inline imp_v3 imp__mat4_column(const struct imp_mat4 *a, int j)
     return imp__v3(a->m[j], a->m[4 + j], a->m[8 + j]);
 }
 
-/* For shapes that stay round: the images of x, y, z as an orthonormal frame (of either
- * hand) and their lengths; warns that `what` is not exact if to_world shears or if
- * `equal` of the lengths differ. */
-void imp__placement_frame(const struct imp_build *b, const struct imp_mat4 *to_world,
-                          int equal, struct imp_frame *frame, double length[3]);
+/* The images of x, y, z as an orthonormal frame (of either hand) and their lengths. False:
+ * to_world shears, or the first `equal` of the lengths differ, so that they are not all. */
+bool imp__placement_frame(const struct imp_mat4 *to_world, int equal,
+                          struct imp_frame *frame, double length[3]);
+
+/* The sphere or circular cylinder that a shape is part of. False: none. */
+static inline bool imp__shape_round(const struct imp_shape *s, struct imp_round *out)
+{
+    *out = (struct imp_round){.radius = 0};
+    if (s->ops->round) s->ops->round(s, out);
+    return out->radius > 0;
+}
 
 /* s and t from n and dp_du (docs/scene-format.md 3.2); the basis of n alone where dp_du
  * vanishes. */

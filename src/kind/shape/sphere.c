@@ -22,7 +22,14 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     IMP_TRY(imp__shape_placement(b, s, &at));
     IMP_TRY(imp_build_vector(b, "center", (double[3]){0, 0, 0}, center));
     IMP_TRY(imp_build_float(b, "radius", 1, &radius));
-    imp__placement_frame(b, &at.to_world, 3, &p->axes, scale);
+    if (!imp__placement_frame(&at.to_world, 3, &p->axes, scale)) {
+        char where[512];
+        imp__warn(b->ctx,
+                  "%s: shape '%s' (%s): to_world shears it or scales it unevenly; it "
+                  "stays round, with the scale of its x axis",
+                  imp__loc_text(b->node->loc, where, sizeof where),
+                  b->node->id ? b->node->id : "", b->node->type);
+    }
     p->center = imp__point(&at.to_world, imp__v3(center[0], center[1], center[2]));
     p->radius = fabs(radius) * scale[0];
     s->area = 4 * IMP_PI * p->radius * p->radius;
