@@ -145,7 +145,9 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_field_read(imp_context *context,
                                                       const char *path,
                                                       const struct imp_field_grid *grid,
                                                       imp_field **out);
-/** Write samples at cell corners (.vol, .npy), or a radial profile (.txt). */
+/** Write samples at cell corners (.vol, .npy), or a radial or rz profile (any other name).
+ * @return IMP_E_ARG for other fields; IMP_E_UNSUPPORTED for profiles that could not be read
+ *         again: numbers beyond 1e12, a radius or height below 1e-12 (docs/bend.md). */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_write(const imp_field *field,
                                                        const char *path);
 

@@ -46,12 +46,14 @@ static bool word_is(struct text *t, const char *word)
 #define LARGEST  1e12
 #define SHORTEST 1e-12
 
+static bool is_large(double x) { return !(fabs(x) <= LARGEST); }
+static bool is_short(double length) { return length > 0 && length < SHORTEST; }
+
 static bool numbers(struct text *t, int n, double *out)
 {
     for (int i = 0; i < n; i++) {
         blank(t);
-        if (!imp__number(&t->s, t->end, &out[i]) || !(fabs(out[i]) <= LARGEST))
-            return false;
+        if (!imp__number(&t->s, t->end, &out[i]) || is_large(out[i])) return false;
     }
     return true;
 }
@@ -67,8 +69,7 @@ static enum imp_status radial_read(imp_context *ctx, const char *path, struct te
     ok = ok && word_is(t, "centre") && numbers(t, 3, r.centre) && word_is(t, "axis") &&
          numbers(t, 3, r.axis) && word_is(t, "radius") && numbers(t, 1, &r.radius) &&
          word_is(t, "coefficients") && numbers(t, 1, count);
-    if (!ok || (r.radius > 0 && r.radius < SHORTEST) || !(*count >= 4) ||
-        !(*count <= 65539))
+    if (!ok || is_short(r.radius) || !(*count >= 4) || !(*count <= 65539))
         return imp__error(ctx, IMP_E_SCENE,
                           "%s: not a profile (importon-profile 1) of numbers up to "
                           "1e12 and of a radius from 1e-12",
@@ -85,8 +86,7 @@ static enum imp_status rz_read(imp_context *ctx, const char *path, struct text *
                     word_is(t, "axis") && numbers(t, 3, r.axis) && word_is(t, "radius") &&
                     numbers(t, 1, &r.radius) && word_is(t, "z") && numbers(t, 2, z) &&
                     word_is(t, "coefficients") && numbers(t, 2, n);
-    const bool thin =
-        (r.radius > 0 && r.radius < SHORTEST) || (z[1] > z[0] && z[1] - z[0] < SHORTEST);
+    const bool thin = is_short(r.radius) || is_short(z[1] - z[0]);
     if (!ok || thin || !(n[0] >= 4 && n[0] <= 8195 && n[1] >= 4 && n[1] <= 8195))
         return imp__error(ctx, IMP_E_SCENE,
                           "%s: not an rz profile (importon-profile 1) of numbers "
@@ -139,8 +139,38 @@ static size_t place_print(char *s, size_t room, imp_v3 centre, imp_v3 axis, doub
                             radius);
 }
 
+/* Are all numbers of a field such as are read? */
+static bool is_within(const imp_field *f)
+{
+    imp_v3 centre, axis;
+    double length[4]; /* radius, lo, hi, height */
+    if (f->ops == &imp__field_radial) {
+        const struct imp__radial *r = (const struct imp__radial *)f;
+        centre = r->centre;
+        axis = imp__v3_load(r->desc.axis);
+        memcpy(length, (double[4]){r->desc.radius}, sizeof length);
+    } else {
+        const struct imp__rz *r = (const struct imp__rz *)f;
+        const double lo = r->desc.lo, hi = r->desc.hi;
+        centre = r->centre;
+        axis = r->axis;
+        memcpy(length, (double[4]){r->desc.radius, lo, hi, hi - lo}, sizeof length);
+    }
+    bool large = false;
+    for (int i = 0; i < 3; i++) large |= is_large(centre[i]) || is_large(axis[i]);
+    for (int i = 0; i < 3; i++) large |= is_large(length[i]);
+    for (size_t i = 0; i < f->n_theta; i++) large |= is_large(f->theta[i]);
+    return !large && !is_short(length[0]) && !is_short(length[3]);
+}
+
 enum imp_status imp__profile_write(const imp_field *f, const char *path)
 {
+    if (!is_within(f))
+        return imp__error(f->ctx, IMP_E_UNSUPPORTED,
+                          "%s: not written, since it could not be read: files of "
+                          "profiles hold numbers up to 1e12, a radius and a height from "
+                          "1e-12",
+                          path);
     const size_t room = 1024 + 32 * f->n_theta;
     char *s = imp__alloc(f->ctx, room, 1);
     size_t at;

@@ -281,6 +281,48 @@ static void densities(void)
     remove("rho.npy");
 }
 
+/* Profiles that could not be read are not written. */
+static void too_far(void)
+{
+    struct imp_field_radial r = IMP_FIELD_RADIAL_INIT;
+    struct imp_field_rz z = IMP_FIELD_RZ_INIT;
+    imp_field *f;
+    for (int k = 0; k < 10; k++) {
+        const bool flat = k >= 5, fine = k % 5 == 4;
+        const double change = k % 5 == 1 ? 2e12 : k % 5 == 3 ? 0.9e-12 : 1;
+        if (flat) {
+            z = (struct imp_field_rz)IMP_FIELD_RZ_INIT;
+            if (k == 6) z.centre[1] = -change;
+            if (k == 8) z.lo = 0, z.hi = change;
+            if (k == 9) z.lo = -1e12, z.radius = 1e-12;
+            KIT_CHECK(imp_field_rz_create(kit_ctx, &z, 1, &f));
+        } else {
+            r = (struct imp_field_radial)IMP_FIELD_RADIAL_INIT;
+            if (k == 1) r.centre[1] = -change;
+            if (k == 3) r.radius = change;
+            if (k == 4) r.centre[0] = 1e12, r.radius = 1e-12;
+            KIT_CHECK(imp_field_radial_create(kit_ctx, &r, 1, &f));
+        }
+        if (k % 5 == 0) f->theta[f->n_theta - 1] = 1.1e12;
+        if (k % 5 == 2) f->theta[0] = NAN;
+        remove("far.txt");
+        const enum imp_status st = imp_field_write(f, "far.txt");
+        imp_field *back = NULL;
+        if (fine) {
+            if (st == IMP_OK) KIT_CHECK(imp_field_read(kit_ctx, "far.txt", NULL, &back));
+            tap_ok(back != NULL, "%s at the bounds: read again", flat ? "rz" : "radial");
+        } else {
+            tap_ok(st == IMP_E_UNSUPPORTED && access("far.txt", F_OK) != 0 &&
+                       strstr(imp_last_error(kit_ctx), "far.txt: not written"),
+                   "%s, case %d: not written # %s", flat ? "rz" : "radial", k % 5,
+                   imp_last_error(kit_ctx));
+        }
+        imp_field_destroy(back);
+        imp_field_destroy(f);
+    }
+    remove("far.txt");
+}
+
 int main(void)
 {
     char folder[] = "/tmp/bend_files.XXXXXX";
@@ -299,6 +341,7 @@ int main(void)
     f = kit_field(12, &name);
     round_trip("a.txt", f, 1e-15);
     imp_field_destroy(f);
+    too_far();
     densities();
     fortran_order();
     messages();
