@@ -326,14 +326,8 @@ static void refusals(void)
 int main(void)
 {
     float value[3 * CELLS];
-    uint32_t state = 1;
     ctx = test_context(2);
-    for (int k = 0; k < 3 * CELLS; k++) {
-        state = state * 1664525u + 1013904223u;
-        value[k] = 0.2f + 2.3f * (float)(state >> 8) / 16777216.0f;
-    }
-    vol_write(grey, 4, 4, 4, 1, value);
-    vol_write(coloured, 4, 4, 4, 3, value);
+    clouds_write(2.3f, grey, coloured, value);
     for (int k = 0; k < CELLS; k++) value[k] = 1;
     vol_write(full, 4, 4, 4, 1, value);
 

@@ -212,14 +212,8 @@ static void refusals(void)
 int main(void)
 {
     float value[3 * CELLS];
-    uint32_t state = 1;
     ctx = test_context(2);
-    for (int k = 0; k < 3 * CELLS; k++) {
-        state = state * 1664525u + 1013904223u;
-        value[k] = 0.2f + 1.6f * (float)(state >> 8) / 16777216.0f;
-    }
-    vol_write(grey, 4, 4, 4, 1, value);
-    vol_write(coloured, 4, 4, 4, 3, value);
+    clouds_write(1.6f, grey, coloured, value);
     vol_write(coarse, 2, 2, 2, 1, value);
     static const char residual[] = "<string name='transmittance' value='residual'/>";
     elsewhere(cloud(grey, "trilinear", "", IMP_MONO), false, (struct change){1.6, 0}, 2,

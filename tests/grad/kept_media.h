@@ -53,6 +53,19 @@ static imp_scene *cloud(const char *vol, const char *filter, const char *how,
     return test_scene_text(ctx, xml, mode);
 }
 
+/* Grids of 4^3 numbers drawn evenly from [.2, .2 + spread), and of three times as many;
+ * value [3 CELLS] gets them. */
+static void clouds_write(float spread, char *grey, char *coloured, float *value)
+{
+    uint32_t state = 1;
+    for (int k = 0; k < 3 * CELLS; k++) {
+        state = state * 1664525u + 1013904223u;
+        value[k] = 0.2f + spread * (float)(state >> 8) / 16777216.0f;
+    }
+    vol_write(grey, 4, 4, 4, 1, value);
+    vol_write(coloured, 4, 4, 4, 3, value);
+}
+
 /* headroom 0: none. */
 static imp_walks *keep(imp_scene *scene, int spp, bool losses, double headroom)
 {
