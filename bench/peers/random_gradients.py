@@ -12,18 +12,17 @@ seeds, and the second verdict counts. For the worst number of each parameter tha
 programs' pictures (common random numbers) then say whose derivative is wrong; and they stand in for Mitsuba's derivative where
 it is known to be none, or another than that of its pictures (delta lobes and what wrong_there names).
 """
-import argparse
 import json
 import os
 import re
 import subprocess
 import sys
-import tempfile
 
 import random_parts
+import random_run
 from gradients import texture_read
 from random_scenes import channels_of, normal_deviate
-from zcompare import mi, np, root, stats
+from zcompare import mi, np, stats
 
 STEP = 0.02  # of differences, as a fraction of the value
 LEVEL, TAIL = 4, 1e-4
@@ -365,33 +364,5 @@ def line(r):
     return out
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-i", "--importon", default=os.path.join(root, "build/cli/importon"))
-    parser.add_argument("--mode", default="rgb", choices=["rgb", "mono", "spectral"])
-    parser.add_argument("--spp", type=int, default=64)
-    parser.add_argument("--runs", type=int, default=16)
-    parser.add_argument("--json")
-    parser.add_argument("first", type=int)
-    parser.add_argument("last", type=int)
-    args = parser.parse_args()
-    mi.set_variant("llvm_ad_" + args.mode)
-    mi.set_log_level(mi.LogLevel.Error)
-    bad = 0
-    for seed in range(args.first, args.last + 1):
-        with tempfile.TemporaryDirectory() as folder:
-            try:
-                result = look(args, seed, folder)
-            except (RuntimeError, ValueError, KeyError) as e:
-                result = {"seed": seed, "mode": args.mode, "error": str(e)[-600:]}
-        bad += "error" in result or result.get("fails", False)
-        print(line(result), flush=True)
-        if args.json:
-            with open(args.json, "a") as f:
-                print(json.dumps(result), file=f)
-    print("%d of %d differ or fail" % (bad, args.last - args.first + 1))
-    return 1 if bad else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(random_run.main(__doc__, 64, 16, look, line))

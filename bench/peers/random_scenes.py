@@ -9,15 +9,13 @@ each program with seeds of their own: Welch's test, two-sided; a scene differs i
 the mean of the picture beyond 4; it is then run again with 8 times the samples and other seeds, and the second verdict counts.
 Of derivatives: random_gradients.py.
 """
-import argparse
-import json
 import os
 import subprocess
 import sys
-import tempfile
 
 import random_parts
-from zcompare import mi, np, root, stats
+import random_run
+from zcompare import mi, np, stats
 
 
 def normal_deviate(difference, parts):
@@ -84,42 +82,22 @@ def look(program, seed, args, spp, first, folder):
     return result
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-i", "--importon", default=os.path.join(root, "build/cli/importon"))
-    parser.add_argument("--mode", default="rgb", choices=["rgb", "mono", "spectral"])
-    parser.add_argument("--spp", type=int, default=512)
-    parser.add_argument("--runs", type=int, default=10)
-    parser.add_argument("--json")
-    parser.add_argument("first", type=int)
-    parser.add_argument("last", type=int)
-    args = parser.parse_args()
-    mi.set_variant("llvm_ad_" + args.mode)
-    mi.set_log_level(mi.LogLevel.Error)
-    bad = 0
-    for seed in range(args.first, args.last + 1):
-        with tempfile.TemporaryDirectory() as folder:
-            try:
-                result = look(args.importon, seed, args, args.spp, 1, folder)
-                if result["differs"]:
-                    first = {k: result[k] for k in ("worst", "mean", "ratio")}
-                    result = look(args.importon, seed, args, 8 * args.spp, 500, folder)
-                    result["first"] = first
-            except (RuntimeError, ValueError, KeyError) as e:
-                result = {"seed": seed, "mode": args.mode, "error": str(e)[-600:], "kinds": random_parts.make(seed, args.mode, folder)[1]}
-        bad += "error" in result or result["differs"]
-        if "error" in result:
-            print("%4d ERROR %s" % (seed, result["error"]), flush=True)
-        else:
-            print("%4d %s worst %5.2f mean %5.2f ratio %.5f +- %.1e, %d of %d beyond 2" % (
-                seed, "DIFFERS" if result["differs"] else "agrees ", result["worst"], result["mean"], result["ratio"] or 0, result["relative"],
-                result["over2"], result["tests"]), flush=True)
-        if args.json:
-            with open(args.json, "a") as f:
-                print(json.dumps(result), file=f)
-    print("%d of %d differ or fail" % (bad, args.last - args.first + 1))
-    return 1 if bad else 0
+def twice(args, seed, folder):
+    """A scene that differs is looked at again, with more samples."""
+    result = look(args.importon, seed, args, args.spp, 1, folder)
+    if result["differs"]:
+        first = {k: result[k] for k in ("worst", "mean", "ratio")}
+        result = look(args.importon, seed, args, 8 * args.spp, 500, folder)
+        result["first"] = first
+    return dict(result, fails=result["differs"])
+
+
+def line(r):
+    if "error" in r:
+        return "%4d ERROR %s" % (r["seed"], r["error"])
+    return "%4d %s worst %5.2f mean %5.2f ratio %.5f +- %.1e, %d of %d beyond 2" % (
+        r["seed"], "DIFFERS" if r["differs"] else "agrees ", r["worst"], r["mean"], r["ratio"] or 0, r["relative"], r["over2"], r["tests"])
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(random_run.main(__doc__, 512, 10, twice, line))
