@@ -300,6 +300,15 @@ static bool is_written(const struct imp_node *node, const char *name)
     return p && (p->loc.line != node->loc.line || p->loc.column != node->loc.column);
 }
 
+const char *imp__node_meant(const struct imp_node *node, const char *name)
+{
+    struct imp_nearest near = imp__nearest(name);
+    for (int k = 0; k < node->n_asked; k++)
+        if (!is_written(node, node->asked[k]) && !imp__node_child(node, node->asked[k]))
+            imp__nearest_try(&near, node->asked[k]);
+    return near.best;
+}
+
 enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node)
 {
     char list[768] = "", where[256], meant[80] = "";
@@ -308,6 +317,9 @@ enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node)
         const struct imp_prop *p = &node->props[i];
         if (p->used) continue;
         const size_t n = strlen(list);
+        const char *near = imp__node_meant(node, p->name);
+        if (near && !*meant)
+            snprintf(meant, sizeof meant, "; did you mean '%.50s'?", near);
         if (first) {
             snprintf(list + n, sizeof list - n, ", '%s' (%s)", p->name,
                      imp__loc_text(p->loc, where, sizeof where));
@@ -315,17 +327,14 @@ enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node)
         }
         first = p; /* whose place the message begins with */
         snprintf(list, sizeof list, "'%s'", p->name);
-        struct imp_nearest near = imp__nearest(p->name);
-        for (int k = 0; k < node->n_asked; k++)
-            if (!is_written(node, node->asked[k]))
-                imp__nearest_try(&near, node->asked[k]);
-        if (near.best)
-            snprintf(meant, sizeof meant, "; did you mean '%.50s'?", near.best);
     }
     for (size_t i = 0; i < node->n_children; i++) {
         const struct imp_child *c = &node->children[i];
         if (c->used) continue;
         const size_t n = strlen(list);
+        const char *near = c->name ? imp__node_meant(node, c->name) : NULL;
+        if (near && !*meant)
+            snprintf(meant, sizeof meant, "; did you mean '%.50s'?", near);
         snprintf(list + n, sizeof list - n, "%s%s '%s' (%s)", n ? ", " : "",
                  c->node ? c->node->tag : "ref", c->name ? c->name : "",
                  imp__loc_text(c->loc, where, sizeof where));

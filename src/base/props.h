@@ -220,5 +220,7 @@ enum imp_status imp__props_choice(imp_context *ctx, struct imp_node *node,
                                   int fallback, int *out);
 /* IMP_E_SCENE with a list of all unused properties and children. */
 enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node);
+/* The property that a misspelt one may have meant, or NULL: one that was looked for and not found. */
+IMP_COLD const char *imp__node_meant(const struct imp_node *node, const char *name);
 
 #endif

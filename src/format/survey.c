@@ -30,16 +30,23 @@ static const struct rule {
     {"medium", IMP_CONCEPT_MEDIUM, "nothing scatters there", NULL},
 };
 
-static bool is_kind(const struct imp_scene *scene, const struct rule *r,
-                    const struct imp_node *node)
+/* Names of a rule's kinds; NULL after the last. */
+static const char *kind_name(const struct imp_scene *scene, const struct rule *r,
+                             size_t i)
 {
     const struct {
         size_t size;
         const char *name;
-    } * head;
-    for (size_t i = 0; (head = imp__kind_at(scene->ctx, (enum imp_concept)r->concept, i));
-         i++)
-        if (strcmp(head->name, node->type) == 0) return true;
+    } *head = imp__kind_at(scene->ctx, (enum imp_concept)r->concept, i);
+    return head ? head->name : NULL;
+}
+
+static bool is_kind(const struct imp_scene *scene, const struct rule *r,
+                    const struct imp_node *node)
+{
+    const char *name;
+    for (size_t i = 0; (name = kind_name(scene, r, i)); i++)
+        if (strcmp(name, node->type) == 0) return true;
     if (imp__is_group(node) || imp__is_instance(node)) return true;
     return r->concept == IMP_CONCEPT_MEDIUM && strcmp(node->type, "graded") == 0;
 }
@@ -82,15 +89,30 @@ static enum imp_status lost_add(struct imp_scene *scene, const char *text)
     return imp__build_list_add(scene, (void ***)&scene->missing, &scene->n_missing, copy);
 }
 
+/* The kind whose name is nearest to the node's type, or NULL. */
+static const char *kind_meant(const struct imp_scene *scene, const struct imp_node *node)
+{
+    const struct rule *r = rule_of(node);
+    const char *name;
+    struct imp_nearest near = imp__nearest(node->type);
+    for (size_t i = 0; r && (name = kind_name(scene, r, i)); i++)
+        imp__nearest_try(&near, name);
+    for (size_t i = 0; !r && imp__integrator_kinds[i]; i++)
+        imp__nearest_try(&near, imp__integrator_kinds[i]->name);
+    return near.best;
+}
+
 static enum imp_status note(struct survey *s, const struct imp_node *node,
                             const char *lost)
 {
     char where[256], text[512];
     imp__loc_text(node->loc, where, sizeof where);
     if (s->scene->lenient) {
-        snprintf(text, sizeof text, "%s: %s %s%s%s%s: not supported; %s", where,
+        const char *near = kind_meant(s->scene, node);
+        snprintf(text, sizeof text, "%s: %s %s%s%s%s: not supported; %s%s%s%s", where,
                  node->tag, node->type, node->id ? " '" : "", node->id ? node->id : "",
-                 node->id ? "'" : "", lost);
+                 node->id ? "'" : "", lost, near ? " (did you mean '" : "",
+                 near ? near : "", near ? "'?)" : "");
         return lost_add(s->scene, text);
     }
     for (int k = 0; k < s->n; k++) {
@@ -267,17 +289,22 @@ static enum imp_status unused_list(struct imp_scene *scene, struct imp_node *nod
         const struct imp_prop *p = &node->props[i];
         if (p->used || !node->read) continue;
         imp__loc_text(p->loc, where, sizeof where);
-        snprintf(text, sizeof text, "%s: %s %s: no property '%s'; it is left out", where,
-                 node->tag, node->type, p->name);
+        const char *near = imp__node_meant(node, p->name);
+        snprintf(text, sizeof text, "%s: %s %s: no property '%s'; it is left out%s%s%s",
+                 where, node->tag, node->type, p->name, near ? " (did you mean '" : "",
+                 near ? near : "", near ? "'?)" : "");
         IMP_TRY(lost_add(scene, text));
     }
     for (size_t i = 0; i < node->n_children; i++) {
         const struct imp_child *c = &node->children[i];
         if (!c->used && node->read) {
             imp__loc_text(c->loc, where, sizeof where);
+            const char *near = c->name ? imp__node_meant(node, c->name) : NULL;
             snprintf(text, sizeof text,
-                     "%s: %s %s: has no place for a %s; it is left out", where, node->tag,
-                     node->type, c->node->tag);
+                     "%s: %s %s: has no place for a %s%s%s%s; it is left out%s%s%s",
+                     where, node->tag, node->type, c->node->tag, c->name ? " '" : "",
+                     c->name ? c->name : "", c->name ? "'" : "",
+                     near ? " (did you mean '" : "", near ? near : "", near ? "'?)" : "");
             IMP_TRY(lost_add(scene, text));
         }
         IMP_TRY(unused_list(scene, c->node));

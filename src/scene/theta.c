@@ -156,7 +156,9 @@ enum imp_status imp_scene_find_param(const imp_scene *scene, const char *name,
     size_t distance[3] = {SIZE_MAX, SIZE_MAX, SIZE_MAX};
     for (size_t i = 0; i < scene->n_params; i++) {
         const char *candidate = scene->params[i].info.name;
-        size_t d = imp__edit_distance(name, candidate);
+        const size_t n = strlen(name);
+        const bool within = strncmp(candidate, name, n) == 0 && candidate[n] == '.';
+        size_t d = within ? 0 : imp__edit_distance(name, candidate);
         for (int k = 0; k < 3; k++)
             if (d < distance[k]) {
                 const size_t old = distance[k];
