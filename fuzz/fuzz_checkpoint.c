@@ -6,12 +6,11 @@
  * and 3, the optimiser. What is read is within its bounds, and is continued. */
 #include "../tests/toy_goal.h"
 #include "math/hash.h"
+#include "memory_file.h"
 #include "search/checkpoint.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -19,9 +18,9 @@ enum { KINDS = 4, BYTES = 1 << 16 };
 static const enum imp_optimizer kinds[KINDS] = {IMP_ADAM, IMP_LM, IMP_LBFGS, IMP_MMA};
 static const struct imp__fingerprint of = {1, 2, 3, 4};
 static imp_context *ctx;
-static char good[KINDS][BYTES], path[64]; /* of a file in memory */
+static char good[KINDS][BYTES];
 static size_t n_good[KINDS];
-static int file;
+static struct memory_file file;
 
 static struct imp__search *search_of(struct toy *t, enum imp_optimizer kind,
                                      const struct imp__opt_options *o)
@@ -45,19 +44,12 @@ static void begin(void)
         struct imp__search *s = search_of(&t, kinds[k], &o);
         t.stop_after = 5;
         (void)!imp__optimize(&t.goal, &o, s);
-        snprintf(name, sizeof name, "fuzz_checkpoint.%ld.tmp", (long)getpid());
+        good_file_name(name);
         if (imp__checkpoint_write(ctx, name, &of, s) != IMP_OK) abort();
         imp__search_destroy(s);
-        FILE *f = fopen(name, "rb");
-        if (!f) abort();
-        n_good[k] = fread(good[k], 1, BYTES, f);
-        fclose(f);
-        remove(name);
-        if (n_good[k] == BYTES) abort();
+        n_good[k] = good_file_take(name, good[k], BYTES);
     }
-    file = memfd_create("checkpoint", 0);
-    snprintf(path, sizeof path, "/proc/self/fd/%d", file);
-    if (file < 0) abort();
+    memory_file_open(&file);
 }
 
 /* The number of a line "word number"; 0 if there is none. */
@@ -101,11 +93,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     for (size_t i = 1; i + 3 <= size; i += 3)
         text[(data[i] | (size_t)data[i + 1] << 8) % n] ^= (char)data[i + 2];
     if (how & 1) sum_fit(text, n);
-    if (ftruncate(file, 0) != 0 || pwrite(file, text, n, 0) != (ssize_t)n) abort();
+    memory_file_put(&file, text, n);
     struct toy t;
     struct imp__search *s = search_of(&t, kinds[k], &o);
     bool found;
-    if (imp__checkpoint_read(ctx, path, &of, &t.goal, s, &found) == IMP_OK) {
+    if (imp__checkpoint_read(ctx, file.path, &of, &t.goal, s, &found) == IMP_OK) {
         for (size_t i = 0; i < s->n; i++)
             if (!(s->x[i] >= t.goal.lo[i] && s->x[i] <= t.goal.hi[i])) abort();
         (void)!imp__optimize(&t.goal, &o, s);

@@ -5,12 +5,11 @@
  * xored there. The first: bit 0, the checksum is made to fit again; bit 1, a manifest;
  * bit 2, half of the file is missing. What is read is merged, or verified. */
 #include "math/hash.h"
+#include "memory_file.h"
 #include <importon/importon.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -24,8 +23,7 @@ struct good {
 static imp_context *ctx;
 static imp_scene *scene;
 static struct good part, other, proof;
-static char path[3][64]; /* of files in memory */
-static int file[3];
+static struct memory_file file[2];
 
 static void must(enum imp_status st)
 {
@@ -95,11 +93,8 @@ static enum imp_status job(int many)
 static struct good taken(const char *name)
 {
     struct good out = {malloc(1 << 20), 0};
-    FILE *f = fopen(name, "rb");
-    if (!f || !out.bytes) abort();
-    out.n = fread(out.bytes, 1, 1 << 20, f);
-    fclose(f);
-    remove(name);
+    if (!out.bytes) abort();
+    out.n = good_file_take(name, out.bytes, 1 << 20);
     return out;
 }
 
@@ -110,7 +105,7 @@ static struct good part_make(int index)
     must(imp_parts_create(ctx, index, 2, "a run", &p));
     must(imp_context_set_parts(ctx, p));
     if (job(1) != IMP_PART) abort();
-    snprintf(name, sizeof name, "fuzz_parts.%ld.tmp", (long)getpid());
+    good_file_name(name);
     must(imp_parts_write(p, name));
     imp_parts_destroy(p);
     return taken(name);
@@ -131,20 +126,11 @@ static void begin(void)
     must(job(0));
     must(imp_context_set_manifest(ctx, NULL));
     must(imp_manifest_result(m, "bits", "1", 1));
-    snprintf(name, sizeof name, "fuzz_parts.%ld.tmp", (long)getpid());
+    good_file_name(name);
     must(imp_manifest_write(m, name));
     imp_manifest_destroy(m);
     proof = taken(name);
-    for (int k = 0; k < 3; k++) {
-        file[k] = memfd_create("parts", 0);
-        if (file[k] < 0) abort();
-        snprintf(path[k], sizeof path[k], "/proc/self/fd/%d", file[k]);
-    }
-}
-
-static void put(int k, const uint8_t *bytes, size_t n)
-{
-    if (ftruncate(file[k], 0) != 0 || pwrite(file[k], bytes, n, 0) != (ssize_t)n) abort();
+    for (int k = 0; k < 2; k++) memory_file_open(&file[k]);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -163,18 +149,18 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         const uint64_t sum = imp__hash(0, bytes, n - SUM);
         memcpy(bytes + n - SUM, &sum, SUM);
     }
-    put(0, bytes, n);
+    memory_file_put(&file[0], bytes, n);
     free(bytes);
     if (how & 2) {
         imp_manifest *m;
-        if (imp_manifest_read(ctx, path[0], .5, 1, &m) == IMP_OK) {
+        if (imp_manifest_read(ctx, file[0].path, .5, 1, &m) == IMP_OK) {
             if (imp_context_set_manifest(ctx, m) == IMP_OK) (void)!job(0);
             imp_manifest_destroy(m);
         }
     } else {
-        const char *const paths[] = {path[0], path[1]};
+        const char *const paths[] = {file[0].path, file[1].path};
         imp_parts *p;
-        put(1, other.bytes, other.n);
+        memory_file_put(&file[1], other.bytes, other.n);
         if (imp_parts_read(ctx, paths, 2, &p) == IMP_OK) {
             if (imp_context_set_parts(ctx, p) == IMP_OK) (void)!job(1);
             imp_parts_destroy(p);

@@ -5,12 +5,11 @@
  * checksum is made to fit again, so that decisions no tracer makes are looked at one by
  * one. What is read is evaluated and swept. */
 #include "math/hash.h"
+#include "memory_file.h"
 #include "walk/record.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -46,8 +45,7 @@ static struct imp_tracer tracer;
 static struct imp_arena arena;
 static uint8_t good[1 << 16];
 static size_t n_good;
-static char path[64]; /* of a file in memory */
-static int file;
+static struct memory_file file;
 
 static void must(enum imp_status st)
 {
@@ -84,16 +82,11 @@ static void begin(void)
         must(imp__record_keep(&record, &walk, i));
         imp__arena_rewind(&arena, mark);
     }
-    file = memfd_create("walks", 0);
-    snprintf(path, sizeof path, "/proc/self/fd/%d", file);
     char name[64];
-    snprintf(name, sizeof name, "fuzz_record.%ld.tmp", (long)getpid());
+    memory_file_open(&file);
+    good_file_name(name);
     must(imp__record_write(&record, name));
-    FILE *f = fopen(name, "rb");
-    if (!f || file < 0) abort();
-    n_good = fread(good, 1, sizeof good, f);
-    fclose(f);
-    remove(name);
+    n_good = good_file_take(name, good, sizeof good);
     if (n_good != HEAD + imp__record_bytes(&record) + SUM) abort();
     imp__record_destroy(&record);
 }
@@ -136,8 +129,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         memcpy(b + n_good - SUM, &sum, SUM);
     }
     const size_t n = size > 0 && data[0] & 2 ? n_good / 2 : n_good; /* cut short */
-    if (ftruncate(file, 0) != 0 || pwrite(file, b, n, 0) != (ssize_t)n) abort();
-    if (imp__record_read(&tracer, path, sizeof good, &record) != IMP_OK) {
+    memory_file_put(&file, b, n);
+    if (imp__record_read(&tracer, file.path, sizeof good, &record) != IMP_OK) {
         if (!imp_last_error(ctx)[0]) abort();
         return 0;
     }

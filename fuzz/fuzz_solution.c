@@ -5,13 +5,12 @@
  * first: bit 0, the checksum is made to fit again; bit 1, half of the file is missing. What is
  * read is measured. */
 #include "math/hash.h"
+#include "memory_file.h"
 #include <importon/elements.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -33,8 +32,7 @@ static imp_context *ctx;
 static imp_scene *scene;
 static uint8_t *good;
 static size_t n_good;
-static char path[64]; /* of a file in memory */
-static int file;
+static struct memory_file file;
 
 static void must(enum imp_status st)
 {
@@ -56,18 +54,14 @@ static void begin(void)
     solve.max_level = 1;
     must(imp_elements_create(scene, &solve, &e));
     must(imp_elements_solve(e));
-    snprintf(name, sizeof name, "fuzz_solution.%ld.tmp", (long)getpid());
+    good_file_name(name);
     must(imp_elements_save(e, name));
     imp_elements_destroy(e);
     good = malloc(1 << 22);
-    FILE *f = fopen(name, "rb");
-    if (!f || !good) abort();
-    n_good = fread(good, 1, 1 << 22, f);
-    fclose(f);
-    remove(name);
-    file = memfd_create("solution", 0);
-    snprintf(path, sizeof path, "/proc/self/fd/%d", file);
-    if (file < 0 || n_good <= HEAD) abort();
+    if (!good) abort();
+    n_good = good_file_take(name, good, 1 << 22);
+    memory_file_open(&file);
+    if (n_good <= HEAD) abort();
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -85,12 +79,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         const uint64_t sum = imp__hash(imp__hash(0, bytes, HEAD), bytes + HEAD, n - HEAD);
         memcpy(bytes + HEAD - SUM, &sum, SUM);
     }
-    if (ftruncate(file, 0) != 0 || pwrite(file, bytes, n, 0) != (ssize_t)n) abort();
+    memory_file_put(&file, bytes, n);
     free(bytes);
     struct imp_elements_options solve = IMP_ELEMENTS_OPTIONS_INIT;
     imp_elements *e = NULL;
     solve.max_level = 1;
-    if (imp_elements_open(scene, &solve, path, &e) == IMP_OK) {
+    if (imp_elements_open(scene, &solve, file.path, &e) == IMP_OK) {
         imp_film *f = NULL;
         if (imp_elements_image(e, 0, IMP_ELEMENTS_GOURAUD, 1, &f) == IMP_OK)
             imp_film_destroy(f);

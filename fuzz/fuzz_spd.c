@@ -3,29 +3,25 @@
  * Files of spectra. What is read has at least two wavelengths, which ascend, and finite
  * values. */
 #include "format/value.h"
+#include "memory_file.h"
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static imp_context *ctx;
-    static int file;
-    static char path[64]; /* of a file in memory */
+    static struct memory_file file;
     if (!ctx) {
-        file = memfd_create("spectrum", 0);
-        snprintf(path, sizeof path, "/proc/self/fd/%d", file);
-        if (file < 0 || imp_context_create(NULL, &ctx) != IMP_OK) abort();
+        memory_file_open(&file);
+        if (imp_context_create(NULL, &ctx) != IMP_OK) abort();
     }
-    if (ftruncate(file, 0) != 0 || pwrite(file, data, size, 0) != (ssize_t)size) abort();
+    memory_file_put(&file, data, size);
     struct imp_samples s;
-    if (imp__samples_read(ctx, path, &s) != IMP_OK) {
-        if (!strstr(imp_last_error(ctx), path)) abort();
+    if (imp__samples_read(ctx, file.path, &s) != IMP_OK) {
+        if (!strstr(imp_last_error(ctx), file.path)) abort();
         return 0;
     }
     if (s.n < 2) abort();

@@ -5,12 +5,11 @@
  * there. With an odd first byte the checksum is made to fit again, so that scenes that
  * nobody has written are made. What is read makes a picture. (fuzz_record changes walks.) */
 #include "math/hash.h"
+#include "memory_file.h"
 #include <importon/walks.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -32,8 +31,7 @@ enum { HEAD = 104, SUM = 8 };
 static imp_context *ctx;
 static uint8_t good[1 << 17];
 static size_t n_good, n_start; /* bytes in all, and up to the first checksum */
-static char path[64];          /* of a file in memory */
-static int file;
+static struct memory_file file;
 
 static void must(enum imp_status st)
 {
@@ -62,17 +60,12 @@ static void begin(void)
                                &scene));
     must(imp_walks_keep(scene, &run, NULL, &walks));
     char name[64];
-    snprintf(name, sizeof name, "fuzz_walks.%ld.tmp", (long)getpid());
+    good_file_name(name);
     must(imp_walks_write(walks, name));
-    FILE *f = fopen(name, "rb");
-    file = memfd_create("walks", 0);
-    snprintf(path, sizeof path, "/proc/self/fd/%d", file);
-    if (!f || file < 0) abort();
-    n_good = fread(good, 1, sizeof good, f);
-    fclose(f);
-    remove(name);
+    n_good = good_file_take(name, good, sizeof good);
+    memory_file_open(&file);
     n_start = HEAD + word_at(good, 16) + 8 * word_at(good, 24);
-    if (n_start + SUM >= n_good || n_good == sizeof good) abort();
+    if (n_start + SUM >= n_good) abort();
     imp_walks_destroy(walks);
     imp_scene_destroy(scene);
 }
@@ -120,8 +113,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         memcpy(b + n_start, &sum, SUM);
     }
     const size_t n = size > 0 && data[0] & 2 ? n_good / 2 : n_good; /* cut short */
-    if (ftruncate(file, 0) != 0 || pwrite(file, b, n, 0) != (ssize_t)n) abort();
-    if (imp_walks_read(ctx, NULL, path, NULL, &walks) != IMP_OK) {
+    memory_file_put(&file, b, n);
+    if (imp_walks_read(ctx, NULL, file.path, NULL, &walks) != IMP_OK) {
         if (!imp_last_error(ctx)[0]) abort();
         return 0;
     }
