@@ -11,6 +11,7 @@
  * there. */
 #include "check_difference.h"
 #include "light_gradient.h"
+#include <limits.h>
 #include <math.h>
 
 #define Z_LIMIT 4.5 /* of many rows, with few batches behind a standard error */
@@ -22,6 +23,9 @@
 #define WALKS_LEAST 32768
 /* From the sensor, where a fresh row brings what it has: with fewer a row decides nothing. */
 #define SAMPLES_LEAST 4096
+/* A row that fails is measured again, with this many times as many walks from the lights: where single
+ * walks bring much (a lamp in a blurred mirror), value and error of few are too low together. */
+#define AGAIN 8
 
 struct ends {
     struct imp__check *check;
@@ -109,7 +113,7 @@ static void walk_rows(const void *payload, const struct imp_light_walk *walk,
         value[0] = NAN;
 }
 
-static enum imp_status lights_measure(struct ends *e)
+static enum imp_status lights_measure(struct ends *e, int times)
 {
     enum imp_status st = IMP_OK;
     struct imp__check *c = e->check;
@@ -138,6 +142,7 @@ static enum imp_status lights_measure(struct ends *e)
     run.spp = ((run.spp > 0 ? run.spp : c->tracer.sensor->spp) + 1) / 2;
     run.spp =
         imp_max(run.spp, (int)(WALKS_LEAST / ((int64_t)film->crop_w * film->crop_h)));
+    run.spp = (int)imp_min((int64_t)run.spp * times, (int64_t)INT_MAX);
     run.seed = imp__fresh_seed(&e->fresh);
     IMP_TRY(imp__problem_tracer_of_any_end(p, &run, NULL, &tracer));
     IMP_TRY(imp__splat_scale_create(c->ctx, film, &scale));
@@ -216,8 +221,8 @@ static bool few_samples(const struct imp__check *c)
     return spp * sensor->film.crop_w * sensor->film.crop_h < SAMPLES_LEAST;
 }
 
-static enum imp_status row_add(struct imp__check *c, const char *param, int64_t element,
-                               struct imp_estimate lights, struct imp_estimate sensor)
+static struct imp_check_row judged(const struct imp__check *c, struct imp_estimate lights,
+                                   struct imp_estimate sensor)
 {
     struct imp_check_row row = {.value = lights.value,
                                 .reference = sensor.value,
@@ -239,7 +244,13 @@ static enum imp_status row_add(struct imp__check *c, const char *param, int64_t 
                        lights.se > RESOLVED * fabs(lights.value) ||
                        sensor.se > RESOLVED * fabs(sensor.value);
     row.ok = noisy ? -1 : row.error <= row.limit;
-    return imp__check_row(c, "ends", param, element, &row);
+    return row;
+}
+
+static struct imp_check_row judged_row(const struct ends *e, size_t k)
+{
+    return judged(e->check, (struct imp_estimate){e->lights[k], e->se[k], 0},
+                  e->sensor[k]);
 }
 
 enum imp_status imp__check_ends(struct imp__check *c)
@@ -259,12 +270,18 @@ enum imp_status imp__check_ends(struct imp__check *c)
             imp__check_direction(&p->scene->params[k], e.weight + p->active.base[k]);
     IMP_TRY(imp__fresh_begin(&e.fresh, c));
     IMP_TRY(sensor_measure(&e));
-    IMP_TRY(lights_measure(&e));
+    IMP_TRY(lights_measure(&e, 1));
+    for (size_t k = 0; k < e.n; k++)
+        if (judged_row(&e, k).ok == 0) {
+            IMP_TRY(lights_measure(&e, AGAIN));
+            break;
+        }
     for (size_t k = 0; k < e.n; k++) {
         const struct imp__slope *s = k > 0 ? &c->slopes[k - 1] : NULL;
-        IMP_TRY(row_add(c, s ? p->scene->params[s->param].info.name : "reading",
-                        s ? s->element : -1,
-                        (struct imp_estimate){e.lights[k], e.se[k], 0}, e.sensor[k]));
+        const struct imp_check_row row = judged_row(&e, k);
+        IMP_TRY(imp__check_row(c, "ends",
+                               s ? p->scene->params[s->param].info.name : "reading",
+                               s ? s->element : -1, &row));
     }
 out:
     imp__fresh_end(&e.fresh);

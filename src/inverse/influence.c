@@ -297,8 +297,8 @@ static enum imp_status pass_run(imp_context *ctx, const struct imp__functional *
                            f->tracer.kept->n < 2
                                ? "one kept walk of a pixel tells no error: keep more"
                                : "these walks were kept for losses, in sets of points; "
-                                 "numbers made of pictures need walks that are kept "
-                                 "without `losses`"));
+                                 "means and pictures need walks that are kept for "
+                                 "pictures (importon record --pictures)"));
     const double walks =
         (double)p.spp * (width + 2. * f->margin) * (height + 2. * f->margin);
     p.set = imp_max(imp__tracer_set(&f->tracer, p.spp), 1);
