@@ -5,7 +5,8 @@
 
 Scenes: cornell (scenes/cornell.xml), textured (rough metal and a texture under a sky and a lamp), million (two
 bumpy balls of a million triangles each, one rough metal, under a sky and a lamp), lamps (10,000 squares,
-scalar_rgb: llvm_ad_rgb does not compile them in minutes, so that there are pictures alone). Both programs have one
+scalar_rgb: llvm_ad_rgb does not compile them in minutes, so that there are pictures alone), lamps300 (those of them
+within 17.3 m of the middle; active are the ground and ten lamps). Both programs have one
 thread, the scene loaded and kernels compiled; importon is called in process; both have the scene's own depth. They
 take turns, seed by seed.
 
@@ -85,9 +86,28 @@ def cases(folder, build, wanted):
             file.write(MILLION)
         yield Case("million", folder + "/million.xml", {}, r"^(clay|floor|sky|lamp|metal)\.(reflectance|radiance|alpha)(\.value)?$",
                    0.4)
-    if "lamps" in wanted:
+    if {"lamps", "lamps300"} & set(wanted):
         subprocess.run([build + "/bench/lamps", folder, "--spp", "1"], check=True, stdout=subprocess.DEVNULL)
+    if "lamps300" in wanted:
+        yield few_lamps(folder)
+    if "lamps" in wanted:
         yield Case("lamps", folder + "/squares10000_tree.xml", variant="scalar_rgb")
+
+
+def few_lamps(folder):
+    """The lamps over the middle of the ground, of as many a square metre as all; ids stand at their shapes, where Mitsuba keeps them."""
+    text = open(folder + "/squares10000_tree.xml", encoding="utf-8").read()
+    head, *lamps = re.split(r"(?=<shape type='rectangle'><transform name='to_world'><scale value='0.1'/>)", text.replace("</scene>", ""))
+    kept = []
+    for lamp in lamps:
+        x, z = (float(re.search(r"<translate [^>]*%s='([^']*)'" % axis, lamp).group(1)) for axis in "xz")
+        if max(abs(x), abs(z)) < 300 ** .5:
+            name = " id='lamp%d'" % len(kept)
+            kept.append(re.sub(r" id='lamp\d+'", "", lamp).replace("<shape type='rectangle'", "<shape type='rectangle'" + name, 1))
+    with open(folder + "/lamps300.xml", "w", encoding="utf-8") as file:
+        file.write(head + "".join(kept) + "</scene>")
+    print("# lamps300 has %d" % len(kept))
+    return Case("lamps300", folder + "/lamps300.xml", {}, r"^(ground|lamp\d)\.(emitter\.)?(reflectance|radiance)(\.value)?$", 0.25)
 
 
 def clocked(function):
@@ -294,14 +314,14 @@ def fits(case, own, peer, a):
                 errors.append(error([own.params[k] for k in own.active], truth))
             if statistics.median(errors) <= 0.02:
                 rows["importon", points] = statistics.median(seconds)
-                print("# importon's lm, %s: %d samples, median error %.2g %%" % (points, spp, 100 * statistics.median(errors)))
+                print("# importon's lm, %s: %d samples, median error %.2g %%, %.3g s" % (points, spp, 100 * statistics.median(errors), statistics.median(seconds)), flush=True)
                 break
     for points in both_points(peer):
         first = {setting: adam(case, peer, target, start, truth, points, setting, 0, a.limit) for setting in FITS}
         setting = min(first, key=first.get)
         more = [adam(case, peer, target, start, truth, points, setting, seed, a.limit) for seed in range(1, a.fits)]
         rows["Mitsuba", points] = statistics.median([first[setting]] + more)
-        print("# Mitsuba's Adam, %s: rate %g, %d samples, cooled by %g" % (points, *setting))
+        print("# Mitsuba's Adam, %s: rate %g, %d samples, cooled by %g" % (points, *setting), flush=True)
     told(case.name + " fit, 2 %", rows)
 
 
