@@ -4,13 +4,18 @@
  * sky, seen by four cameras of WIDTH x WIDTH pixels, from grey to the texture that made the
  * targets; and whether other coordinates than the texels get there sooner.
  *
- *     textures [--side N] [--width N] [--spp N] [--iterations N] [--threads N] [ROW]...
+ *     textures [--side N] [--width N] [--spp N] [--iterations N] [--threads N] [--seed N]
+ *              [--target-spp N] [ROW]...
+ *
+ * Targets are the same for all seeds.
  *
  * Prints the root of the mean squared error of all texels after so many samples of each pixel
  * (iterations x spp). Rows, all by default:
  *
- *     fit M [levels | smooth | noisy]   importon fit with momentum M; from coarse to fine in 3
- *                                       levels, with smoothness, or without control variates
+ *     fit M [plain | levels | smooth | noisy [RATE]]
+ *                                       importon fit with momentum M, 0: what it does by
+ *                                       itself; from coarse to fine in 3 levels, with
+ *                                       smoothness, or without control variates
  *     texels M, pyramid M, large M      plain Adam with momentum M in coordinates c of
  *                                       x = B c: B = 1, a Laplacian pyramid of 5 levels whose
  *                                       rate is halved from level to level, or
@@ -29,12 +34,13 @@
 #include <unistd.h>
 
 enum { VIEWS = 4, LEVELS = 5, COARSE = 3 };
-#define RATE       .05  /* of all rows */
+#define RATE       .05  /* of all rows that name none */
 #define LARGE_RATE .03  /* that of (1 + L)^-1; not tuned */
 #define SMOOTH     .003 /* weight */
 
 static imp_context *ctx;
-static int side = 64, width = 96, spp = 8, iterations = 150, threads = 1;
+static int side = 64, width = 96, spp = 8, iterations = 150, threads = 1, seed = 1;
+static int target_spp = 2048;
 static size_t n; /* numbers */
 static double *truth;
 static float *grey, *target[VIEWS];
@@ -161,10 +167,12 @@ static void targets_make(const float *pixels)
     for (int k = 0; k < VIEWS; k++) {
         struct imp_run run = IMP_RUN_INIT;
         imp_film *film;
-        run.spp = 2048;
+        run.spp = target_spp;
+        run.points = IMP_POINTS_SOBOL;
         run.sensor = k;
-        must(imp_render(s, &run, &film));
+        run.seed = 1001;
         target[k] = room(count, sizeof(float));
+        must(imp_render(s, &run, &film));
         memcpy(target[k], imp_film_mean(film), count * sizeof(float));
         imp_film_destroy(film);
     }
@@ -226,7 +234,7 @@ static size_t unseen(void)
 /* ---- Rows --------------------------------------------------------------------------- */
 
 /* Parts of one fit, each resumed from the last one's checkpoint: the bits of the whole. */
-static void fit(double momentum, const char *how)
+static void fit(double momentum, const char *how, double rate)
 {
     imp_scene *s;
     imp_problem *p = problem_make(&s);
@@ -237,9 +245,9 @@ static void fit(double momentum, const char *how)
     snprintf(file, sizeof file, "/tmp/textures.%ld.checkpoint", (long)getpid());
     remove(file);
     run.spp = spp;
-    run.seed = 1;
+    run.seed = (uint64_t)seed;
     o.momentum = momentum;
-    o.learning_rate = RATE;
+    o.learning_rate = rate > 0 ? rate : RATE;
     o.checkpoint = file;
     if (strcmp(how, "levels") == 0) o.levels = COARSE;
     if (strcmp(how, "noisy") == 0) o.control_variate = IMP_VARIATES_OFF;
@@ -351,7 +359,7 @@ static void adam(enum basis basis, double momentum)
     for (size_t k = 0; k < n; k++) x[k] = grey[k];
     for (int i = 1; i <= iterations; i++) {
         double largest = 0;
-        run.seed = imp__mix64((uint64_t)i);
+        run.seed = imp__mix64(((uint64_t)seed << 32) + (uint64_t)i);
         p->variate = variate;
         must(imp__problem_objective(p, x, &run, true, NULL, g, NULL));
         p->variate = NULL;
@@ -386,12 +394,12 @@ static bool row(const char *text)
 {
     static const char *const words[] = {"texels", "pyramid", "large", "fit"};
     char word[16], how[16] = "";
-    double momentum;
-    if (sscanf(text, "%15s %lf %15s", word, &momentum, how) < 2) return false;
+    double momentum, rate = 0;
+    if (sscanf(text, "%15s %lf %15s %lf", word, &momentum, how, &rate) < 2) return false;
     for (int k = 0; k < 4; k++) {
         if (strcmp(word, words[k]) != 0) continue;
-        printf("%-16s", text);
-        if (k == 3) fit(momentum, how);
+        printf("%-20s", text);
+        if (k == 3) fit(momentum, how, rate);
         else adam((enum basis)k, momentum);
         printf("\n");
         return true;
@@ -402,9 +410,9 @@ static bool row(const char *text)
 int main(int argc, char **argv)
 {
     static const char *const all[] = {
-        "fit .9",        "fit .7",       "fit .5",       "fit .3",    "fit .5 levels",
-        "fit .5 smooth", "fit .9 noisy", "fit .5 noisy", "texels .9", "texels .5",
-        "pyramid .9",    "pyramid .5",   "large .9",     "large .5"};
+        "fit 0",        "fit .9",       "fit .7",       "fit .3",    "fit 0 levels",
+        "fit 0 smooth", "fit .9 noisy", "fit .5 noisy", "texels .9", "texels .5",
+        "pyramid .9",   "pyramid .5",   "large .9",     "large .5"};
     const char *rows[16];
     int n_rows = 0, wrong = 0;
     static const struct {
@@ -414,19 +422,22 @@ int main(int argc, char **argv)
                    {"--width", &width},
                    {"--spp", &spp},
                    {"--iterations", &iterations},
-                   {"--threads", &threads}};
+                   {"--threads", &threads},
+                   {"--seed", &seed},
+                   {"--target-spp", &target_spp}};
     for (int k = 1; k < argc; k++) {
         int *value = NULL;
-        for (int j = 0; j < 5; j++)
+        for (int j = 0; j < 7; j++)
             if (strcmp(argv[k], numbers[j].name) == 0) value = numbers[j].value;
         if (value && k + 1 < argc) *value = atoi(argv[++k]);
         else if (!value && *argv[k] != '-' && n_rows < 16) rows[n_rows++] = argv[k];
         else wrong = 1;
     }
-    if (wrong || side < 8 || width < 8 || spp < 4 || iterations < 1 || threads < 0) {
+    if (wrong || side < 8 || width < 8 || spp < 4 || iterations < 1 || threads < 0 ||
+        target_spp < 1) {
         fprintf(stderr,
                 "usage: textures [--side N] [--width N] [--spp N] [--iterations N] "
-                "[--threads N] [ROW]...\n");
+                "[--threads N] [--seed N] [--target-spp N] [ROW]...\n");
         return 2;
     }
     const struct imp_context_options o = {.size = sizeof o, .threads = threads};

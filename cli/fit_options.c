@@ -22,7 +22,7 @@ const struct arg_option options_search[] = {
      &fit_choice.learning_rate, 1e-12, 1e6, NULL},
     {ARG_NUMBER, 0, "momentum", "B",
      "of adam: the part of the mean gradient that stays from iteration to iteration "
-     "(default 0.9; textures with control variates want 0.5 to 0.7)",
+     "(default 0.9; 0.5 for textures with control variates)",
      &fit_choice.momentum, 1e-6, 0.999999, NULL},
     {ARG_INT, 0, "levels", "N",
      "of adam, and of bent rays: from coarse to fine, in N levels", &fit_choice.levels, 1,

@@ -1029,8 +1029,8 @@ struct imp_fit_options {
      * same samples everywhere. */
     enum imp_allocation allocation;
     /** Adam: the part of the mean gradient that stays from one iteration to the next, its
-     * beta1, in (0, 1); 0: 0.9. With control variates gradients have little noise, and
-     * textures want 0.5 (docs/fitting.md). */
+     * beta1, in (0, 1); 0: 0.9, or for textures with control variates, whose gradients have
+     * little noise, 0.5, while their learning rate falls (docs/fitting.md). */
     double momentum;
     /** Of IMP_LBFGS, IMP_MMA and IMP_SLSQP: walks are kept, too, where extinctions that vary
      * in space are fitted, with so much room to grow (imp_walks_options.headroom); 0 or 1:

@@ -168,8 +168,8 @@ static enum imp_status level_begin(struct fit *f)
     for (int l = 0; l <= f->level; l++)
         if (f->o->iterations[l] > 0) iterations = f->o->iterations[l];
     for (int l = 0; l < f->level; l++) rate /= 2;
-    f->opt = (struct imp__opt_options){iterations, rate,
-                                       f->o->tolerance > 0 ? f->o->tolerance : 1e-6, 0};
+    f->opt = (struct imp__opt_options){
+        iterations, rate, f->o->tolerance > 0 ? f->o->tolerance : 1e-6, 0, false};
     f->done_iterations = 0;
     imp__bend_fingerprint(b, f->held, f->o->optimizer, f->level, &f->print);
 out:

@@ -218,7 +218,7 @@ static enum imp_status round_run(struct imp__design *d, double *x, double *trial
                                  double *moved)
 {
     enum imp_status st = IMP_OK;
-    const struct imp__opt_options oo = {d->o.max_iterations, 0, d->o.tolerance, 0};
+    const struct imp__opt_options oo = {d->o.max_iterations, 0, d->o.tolerance, 0, false};
     struct imp__search *s = NULL;
     memcpy(trial, x, d->n * sizeof *x);
     if (d->round == 0) lit(d, x, trial);

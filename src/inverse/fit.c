@@ -194,7 +194,7 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     imp__fit_answer_free(p);
     imp__clip_reset(p);
     const struct imp__opt_options o = {f.options.max_iterations, f.options.learning_rate,
-                                       f.options.tolerance, f.options.momentum};
+                                       f.options.tolerance, f.options.momentum, f.quiet};
     x = imp__alloc_raw(ctx, p->n, sizeof *x);
     if (!x) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu variables", p->n));
     imp_problem_get_x(p, x);

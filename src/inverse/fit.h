@@ -48,6 +48,7 @@ struct imp__fit {
     /* Of Adam (fit_variates.c). */
     struct imp__variate *variate; /* NULL: there is none */
     bool searching;               /* evaluations are those of the search */
+    bool quiet;                   /* imp__opt_options */
     const char *without_variate;  /* why not; NULL: there is one, or none was wanted */
     struct imp__sparse_errors errors; /* of many numbers; x NULL: there are none */
     char note[96];

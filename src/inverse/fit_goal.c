@@ -309,7 +309,6 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
         f.options.max_iterations = f.options.optimizer == IMP_ADAM ? 200 : 30;
     if (f.options.learning_rate == 0) f.options.learning_rate = 0.05;
     if (f.options.tolerance == 0) f.options.tolerance = 1e-4;
-    if (f.options.momentum == 0) f.options.momentum = IMP_ADAM_MOMENTUM;
 
     p->use = use_of(&f);
     IMP_TRY(bounds_make(&f));
@@ -331,6 +330,8 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
     f.run = f.outer;
     f.run.time_limit_s = 0;
     IMP_TRY(imp__fit_variates(&f));
+    f.quiet = f.variate && n > IMP_TRAIL_MAX;
+    if (f.options.momentum == 0 && !f.quiet) f.options.momentum = IMP_ADAM_MOMENTUM;
     if (allocates(&f)) IMP_TRY(imp__allocation_create(p, &f.run, &f.allocation));
     if (f.options.checkpoint) imp__fit_fingerprint(&f);
     *out = f;

@@ -161,6 +161,13 @@ static enum imp_status align(const struct imp__goal *goal, struct imp__search *s
 
 /* ---- Steps --------------------------------------------------------------------- */
 
+/* Only variables have bounds, not directions of many. */
+static bool settles(const struct imp__goal *goal, const struct imp__opt_options *options,
+                    const struct imp__search *s, size_t j)
+{
+    return !turned(s) && imp__adam_settles(options, goal->lo[j], goal->hi[j]);
+}
+
 /* One step from HERE. g: the gradient; it and work [n] are destroyed. */
 static enum imp_status step(const struct imp__goal *goal,
                             const struct imp__opt_options *options, struct imp__search *s,
@@ -168,12 +175,12 @@ static enum imp_status step(const struct imp__goal *goal,
 {
     double *m = s->array[FIRST], *v = s->array[SECOND], *x = s->array[HERE];
     const double age = ++s->scalar[AGE];
-    const double b1 = imp__adam_momentum(options), learning_rate = options->learning_rate;
-    const double c1 = 1 - pow(b1, age), c2 = 1 - pow(BETA2, age);
+    const double learning_rate = options->learning_rate, c2 = 1 - pow(BETA2, age);
     double mean_v = 0;
     for (size_t k = 0; k < s->n; k++) g[k] *= goal->scale[k];
     imp__basis_along(s->n, rows(s), g, work);
     for (size_t j = 0; j < s->n; j++) {
+        const double b1 = imp__adam_momentum(options, settles(goal, options, s, j));
         m[j] = b1 * m[j] + (1 - b1) * work[j];
         v[j] = BETA2 * v[j] + (1 - BETA2) * work[j] * work[j];
         mean_v += v[j] / (double)s->n;
@@ -187,7 +194,10 @@ static enum imp_status step(const struct imp__goal *goal,
             pace = s->array[PACE][j];
             rate = learning_rate * pow(1 + pace, -COOLING);
         }
-        work[j] = rate * (m[j] / c1) / (sqrt(v[j] / c2) + tiny);
+        const bool slow = settles(goal, options, s, j);
+        const double c1 = 1 - pow(imp__adam_momentum(options, slow), age);
+        work[j] = rate * imp__adam_fall(s->iteration, slow) * (m[j] / c1) /
+                  (sqrt(v[j] / c2) + tiny);
     }
     imp__basis_back(s->n, rows(s), work, g);
     for (size_t k = 0; k < s->n; k++) {

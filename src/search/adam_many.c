@@ -89,14 +89,17 @@ static double unit_of(const struct imp__goal *goal, const struct imp__search *s,
     return ldexp(1, imp_clamp(exponent, -1000, 1000));
 }
 
-/* Moments from the gradient, b1 that of the first; returns the mean of v. */
-static double moments(const struct imp__goal *goal, double b1, struct imp__search *s,
+/* Moments from the gradient; returns the mean of v. */
+static double moments(const struct imp__goal *goal,
+                      const struct imp__opt_options *options, struct imp__search *s,
                       const double *g)
 {
     packed *m = floats(s, MEAN_G), *r = floats(s, ROOT_V);
     double mean_v = 0;
     for (size_t i = 0, k = 0; i < goal->n_spans; i++) {
         const struct imp__span *a = &goal->spans[i];
+        const double b1 =
+            imp__adam_momentum(options, imp__adam_settles(options, a->lo, a->hi));
         for (; k < a->end; k++) {
             const double d = g[k] * (scale_of(s, a, k) / s->scalar[UNIT]);
             const double v =
@@ -117,16 +120,18 @@ static void step(const struct imp__goal *goal, const struct imp__opt_options *op
     if (s->scalar[UNIT] == 0) s->scalar[UNIT] = unit_of(goal, s, g);
     s->scalar[COUNT]++;
     if (s->scalar[UNIT] == 0) return; /* nothing has a derivative yet */
-    const double b1 = imp__adam_momentum(options), age = ++s->scalar[AGE];
-    const double mean_v = moments(goal, b1, s, g);
-    const double c1 = 1 - pow(b1, age), c2 = 1 - pow(IMP_ADAM_BETA2, age);
-    const double rate =
+    const double age = ++s->scalar[AGE], mean_v = moments(goal, options, s, g);
+    const double c2 = 1 - pow(IMP_ADAM_BETA2, age);
+    const double all =
         options->learning_rate * pow(1 + s->scalar[PACE], -IMP_ADAM_COOLING);
     /* Relative to the mean of v, whatever the objective's unit: variables that never had
      * a gradient stay at rest. */
     const double tiny = 1e-8 * sqrt(mean_v / c2) + 1e-300;
     for (size_t i = 0, k = 0; i < goal->n_spans; i++) {
         const struct imp__span *a = &goal->spans[i];
+        const bool settles = imp__adam_settles(options, a->lo, a->hi);
+        const double rate = all * imp__adam_fall(s->iteration, settles);
+        const double c1 = 1 - pow(imp__adam_momentum(options, settles), age);
         for (; k < a->end; k++) {
             const double wanted = rate * (m[k] / c1) / (r[k] / sqrt(c2) + tiny);
             const double old = s->x[k], scale = scale_of(s, a, k);

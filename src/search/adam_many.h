@@ -8,6 +8,7 @@
 #define IMP_SEARCH_ADAM_MANY_H
 
 #include "optimize.h"
+#include <math.h>
 
 /* What both searches are tuned with; adam.c says what it is. */
 #define IMP_ADAM_BETA2   0.99
@@ -21,9 +22,23 @@
 /* and what they count as at least, over their mean: some have hardly been seen yet. */
 #define IMP_ADAM_LEAST 0.01
 
-static inline double imp__adam_momentum(const struct imp__opt_options *options)
+/* Is a variable, in [lo, hi], one whose steps are to become shorter? How far it has to go is known then: no
+ * farther than its scale. */
+static inline bool imp__adam_settles(const struct imp__opt_options *options, double lo,
+                                     double hi)
 {
-    return options->momentum > 0 ? options->momentum : IMP_ADAM_MOMENTUM;
+    return options->quiet && isfinite(hi - lo);
+}
+static inline double imp__adam_momentum(const struct imp__opt_options *options,
+                                        bool settles)
+{
+    if (options->momentum > 0) return options->momentum;
+    return settles ? IMP_ADAM_MOMENTUM_QUIET : IMP_ADAM_MOMENTUM;
+}
+/* What the rate is multiplied by in iteration i. */
+static inline double imp__adam_fall(int i, bool settles)
+{
+    return settles ? 1 / sqrt(1 + i / (double)IMP_ADAM_FALLING_QUIET) : 1;
 }
 static inline bool imp__adam_is_many(const struct imp__goal *goal)
 {

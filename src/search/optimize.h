@@ -16,7 +16,10 @@
 #define IMP_DENSE_MAX     256  /* most variables of methods that hold [n][n] matrices */
 #define IMP_SEARCH_FEW    1024 /* variables, above which Adam's memory counts */
 #define IMP_ADAM_MOMENTUM 0.9
-#define IMP_TRAIL_MAX     64 /* variables, up to which a search keeps where it was */
+/* Of variables between bounds, in searches whose gradients have little noise: */
+#define IMP_ADAM_MOMENTUM_QUIET 0.5
+#define IMP_ADAM_FALLING_QUIET  10
+#define IMP_TRAIL_MAX           64 /* variables, up to which a search keeps where it was */
 
 /* Parts of the walks whose absence shows how noisy a matrix is. */
 enum { IMP_DEVIATIONS = 8 };
@@ -98,6 +101,10 @@ struct imp__opt_options {
     double tolerance;     /* fraction of the scale */
     double
         momentum; /* Adam: what stays of the mean gradient, below 1; 0: IMP_ADAM_MOMENTUM */
+    /* Adam: gradients have little noise, and variables with a bound on each side arrive soon.
+     * Their rate is (1 + i/IMP_ADAM_FALLING_QUIET)^-1/2 of the first in iteration i = 0, 1, ...,
+     * and their momentum, if it is 0 above, IMP_ADAM_MOMENTUM_QUIET. */
+    bool quiet;
 };
 
 /* scalar[IMP_SEARCH_AVERAGED], public: number of iterates whose average x is. */

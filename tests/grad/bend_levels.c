@@ -56,7 +56,7 @@ static void curvature(void)
     double *lo[2], *hi[2], *scale[2], *x[2];
     struct imp__goal goal[2];
     struct imp__search *s[2];
-    const struct imp__opt_options options = {5, 0.05, 1e-9, 0};
+    const struct imp__opt_options options = {5, 0.05, 1e-9, 0, false};
     for (int k = 0; k < 2; k++) {
         const size_t n = (k ? fine : f)->n_theta;
         lo[k] = malloc(n * sizeof(double)), hi[k] = malloc(n * sizeof(double));
@@ -110,7 +110,7 @@ static void moments(void)
            *scale = a + 2 * n[1];
     struct imp__search *s[2];
     for (size_t i = 0; i < n[1]; i++) lo[i] = -10, hi[i] = 10, scale[i] = 1;
-    const struct imp__opt_options options = {1, 0.05, 1e-9, 0};
+    const struct imp__opt_options options = {1, 0.05, 1e-9, 0, false};
     for (int k = 0; k < 2; k++) {
         const struct imp__goal goal = {
             .ctx = kit_ctx, .n = n[k], .lo = lo, .hi = hi, .scale = scale};

@@ -125,7 +125,7 @@ static void at_newton(double bend)
 
 static void refined(void)
 {
-    const struct imp__opt_options o = {40, 0.05, 1e-6, 0};
+    const struct imp__opt_options o = {40, 0.05, 1e-6, 0, false};
     struct imp__search *s = NULL;
     struct curved c;
     double x0[TOY_N];
@@ -157,7 +157,7 @@ int main(void)
     struct tap_stat sigma = {0}, ratio = {0};
 
     for (uint64_t seed = 0; seed < SEEDS; seed++) {
-        const struct imp__opt_options o = {30, 0.05, 1e-6, 0};
+        const struct imp__opt_options o = {30, 0.05, 1e-6, 0, false};
         struct imp__search *s = NULL;
         double x0[TOY_N];
         toy_make(&t, ctx, 1000 + 7 * seed, 0.2, 0.3);

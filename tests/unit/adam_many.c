@@ -68,7 +68,7 @@ static void bowl_make(struct bowl *b, imp_context *ctx, size_t n, bool many, dou
 static struct imp__search *begin(struct bowl *b, double *x0, int iterations)
 {
     struct imp__search *s;
-    const struct imp__opt_options o = {iterations, 0.05, 1e-6, 0};
+    const struct imp__opt_options o = {iterations, 0.05, 1e-6, 0, false};
     for (size_t k = 0; k < b->n; k++) x0[k] = 0.5;
     test_must(b->goal.ctx, imp__search_create(&b->goal, IMP_ADAM, &o, x0, &s));
     return s;
@@ -76,7 +76,7 @@ static struct imp__search *begin(struct bowl *b, double *x0, int iterations)
 
 static void run(struct bowl *b, struct imp__search *s, int iterations)
 {
-    const struct imp__opt_options o = {iterations, 0.05, 1e-6, 0};
+    const struct imp__opt_options o = {iterations, 0.05, 1e-6, 0, false};
     const enum imp_status st = imp__optimize(&b->goal, &o, s);
     if (st != IMP_CANCELLED) test_must(b->goal.ctx, st);
 }
@@ -163,17 +163,24 @@ static enum imp_status eval_turned(const double *x, uint64_t seed, struct imp_es
 /* Two steps: the first is the rate a, and of the second, with v = 1 either way,
  *
  *     m / (1 - b^2) = (b (1 - b) - (1 - b)) / (1 - b^2) = -(1 - b) / (1 + b)
- */
+ *
+ * The second has the rate a / sqrt(1.1) where gradients are quiet and both bounds are there. */
 static void momenta(bool many)
 {
-    static const double lo[2] = {-1, -1}, hi[2] = {1, 1}, scale[2] = {1, 1};
-    static const double asked[] = {0, 0.9, 0.5, 0.25};
+    static const struct {
+        double asked, hi, b, fall;
+        bool quiet;
+    } row[] = {{0, 1, .9, 1, false},       {.9, 1, .9, 1, false},
+               {.5, 1, .5, 1, false},      {.25, 1, .25, 1, false},
+               {0, 1, .5, 1.1, true},      {.9, 1, .9, 1.1, true},
+               {0, INFINITY, .9, 1, true}, {.25, INFINITY, .25, 1, true}};
+    static const double lo[2] = {-1, -1}, scale[2] = {1, 1};
     imp_context *ctx = test_context(1);
-    for (int i = 0; i < 4; i++) {
-        const double b = asked[i] > 0 ? asked[i] : 0.9;
-        const double x0[2] = {0, 0}, expected = -0.05 + 0.05 * (1 - b) / (1 + b);
-        const struct imp__opt_options o = {2, 0.05, 1e-6, asked[i]};
-        const struct imp__span span = {2, -1, 1, 1, false};
+    for (size_t i = 0; i < sizeof row / sizeof *row; i++) {
+        const double b = row[i].b, hi[2] = {row[i].hi, row[i].hi}, x0[2] = {0, 0};
+        const double expected = -.05 + .05 / sqrt(row[i].fall) * (1 - b) / (1 + b);
+        const struct imp__opt_options o = {2, 0.05, 1e-6, row[i].asked, row[i].quiet};
+        const struct imp__span span = {2, -1, row[i].hi, 1, false};
         int calls = 0;
         struct imp__goal goal = {
             .ctx = ctx, .n = 2, .eval = eval_turned, .payload = &calls};
@@ -183,8 +190,9 @@ static void momenta(bool many)
         test_must(ctx, imp__search_create(&goal, IMP_ADAM, &o, x0, &s));
         test_must(ctx, imp__optimize(&goal, &o, s));
         const double off = fabs(imp__search_answer(s, 0) - expected);
-        tap_ok(off < 1e-7, "%s: momentum %g # %.9f, off by %.1g",
-               many ? "in floats" : "in doubles", asked[i], expected, off);
+        tap_ok(off < 1e-7, "%s: momentum %g%s, bound %g # %.9f, off by %.1g",
+               many ? "in floats" : "in doubles", row[i].asked,
+               row[i].quiet ? " of quiet gradients" : "", row[i].hi, expected, off);
         imp__search_destroy(s);
     }
     imp_context_destroy(ctx);

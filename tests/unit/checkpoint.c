@@ -15,7 +15,7 @@ static const struct imp__fingerprint of = {1, 2, 3, 4};
 
 static struct imp__opt_options options_of(enum imp_optimizer kind)
 {
-    return (struct imp__opt_options){kind == IMP_ADAM ? 90 : 20, 0.05, 1e-6, 0};
+    return (struct imp__opt_options){kind == IMP_ADAM ? 90 : 20, 0.05, 1e-6, 0, false};
 }
 
 static struct imp__search *begin(struct toy *t, enum imp_optimizer kind)
@@ -94,7 +94,7 @@ int main(void)
     /* A checkpoint with something in every array. */
     struct imp__search *s = begin(&t, IMP_ADAM);
     t.stop_after = 30;
-    if (imp__optimize(&t.goal, &(struct imp__opt_options){90, 0.05, 1e-6, 0}, s) !=
+    if (imp__optimize(&t.goal, &(struct imp__opt_options){90, 0.05, 1e-6, 0, false}, s) !=
             IMP_CANCELLED ||
         imp__checkpoint_write(ctx, path, &of, s) != IMP_OK)
         return 1;

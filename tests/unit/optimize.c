@@ -10,7 +10,7 @@ static const char *const name[] = {"Adam", "LM", "L-BFGS", "MMA", "SLSQP"};
 
 static struct imp__opt_options options_of(enum imp_optimizer kind)
 {
-    return (struct imp__opt_options){kind == IMP_ADAM ? 600 : 60, 0.05, 1e-6, 0};
+    return (struct imp__opt_options){kind == IMP_ADAM ? 600 : 60, 0.05, 1e-6, 0, false};
 }
 
 /* Distance from `ref` in units of the scale, worst variable. */
@@ -258,7 +258,7 @@ static void adam_by_the_book(void)
     struct toy t;
     struct imp__search *s = NULL;
     double x[TOY_N], m[TOY_N] = {0}, v[TOY_N] = {0}, g[TOY_N];
-    const struct imp__opt_options o = {6, 0.05, 1e-6, 0};
+    const struct imp__opt_options o = {6, 0.05, 1e-6, 0, false};
     toy_make(&t, ctx, 4, 0.1, 0);
     t.goal.normal = NULL; /* no directions but the axes */
     for (int k = 0; k < TOY_N; k++) x[k] = 0.5 * t.truth[k];
@@ -303,7 +303,7 @@ int main(void)
         imp__search_destroy(s);
     }
     struct imp__search *s = NULL;
-    const struct imp__opt_options o = {10, 0.05, 1e-4, 0};
+    const struct imp__opt_options o = {10, 0.05, 1e-4, 0, false};
     toy_make(&t, ctx, 4, 0.1, 0.1);
     tap_ok(imp__search_create(&t.goal, 99, &o, t.truth, &s) == IMP_E_ARG && !s,
            "an optimiser that does not exist");
