@@ -91,8 +91,7 @@ static bool uniform_fly(struct imp_free_flight *w, const struct imp_medium *m,
 /* Of a walk, in all; extinctions without measure would go on for hours. */
 #define EVENTS_MAX (1 << 20)
 
-#define REAL_LEAST 0.1   /* probability of a real collision, with headroom */
-#define EMPTY      0.125 /* of the largest bound, where there is none */
+#define EMPTY 0.125 /* of the largest bound, where there is none */
 
 static inline bool has_room(const struct imp_free_flight *w)
 {
@@ -142,7 +141,7 @@ static bool collide(struct imp_free_flight *w, const struct imp_medium *m, doubl
     imp_spec sigma;
     if (!tentative(w, m, t, bound, &sigma)) return true;
     imp_spec p = sigma;
-    for (int c = 0; has_room(w) && c < 4; c++) p[c] = fmax(p[c], REAL_LEAST);
+    for (int c = 0; has_room(w) && c < 4; c++) p[c] = fmax(p[c], IMP_REAL_LEAST);
     const bool real = collides && uniform(w) < p[imp__lane_mis_drew(s)];
     w->f *= real ? sigma : 1 - sigma;
     w->p *= real ? p : 1 - p;

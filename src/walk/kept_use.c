@@ -5,6 +5,7 @@
 #include "base/arguments.h"
 #include "base/team.h"
 #include "store.h"
+#include "tracking.h"
 #include <string.h>
 
 #define TILES_AT_ONCE 16
@@ -244,6 +245,7 @@ enum imp_status imp__walks_weigh(const struct imp_walks *w, const struct imp_sto
     enum imp_status st = IMP_OK;
     struct imp_densities own = w->densities; /* with `moved` of this call */
     own.guided = w->guided;
+    own.least = w->headroom > 1 ? IMP_REAL_LEAST : 0;
     uint8_t *changed = imp__alloc(ctx, w->scene->n_params + 1, 1);
     const size_t walks = imp__store_tiles(store);
     own.moved = imp__alloc(ctx, (size_t)w->scene->n_bsdfs + 1, 1);

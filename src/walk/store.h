@@ -89,6 +89,7 @@ struct imp_densities {
     const struct imp_scene *scene;
     const struct imp_walk_integrator *integrator;
     double survival;  /* of the tracer they were drawn with */
+    double least;     /* probability of a real collision; 0: there is no headroom */
     bool guided;      /* their survival was decided by a guide */
     uint64_t *wanted; /* [n_bsdfs] imp_dirs.derivative that they were drawn with */
     uint64_t *inputs; /* [n_bsdfs] bit j: the density depends on input j */

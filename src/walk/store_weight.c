@@ -20,6 +20,10 @@
  * Free flights, and directions that depend on the wavelength, have the density of all
  * that was decided so far, in the mean over the lanes of a walk (lane_mis.h), and
  * roulette sees the throughput that a fresh walk would have, over the present density.
+ * With headroom a collision is real with another probability than its factor (flight.h), and
+ * what counts is how the draw would decide now: walks in empty space, where nothing has
+ * changed, are as good as they were, though their values differ.
+ *
  * Tentative collisions at which the extinction is now above their bound have no density,
  * nor have null collisions where the extinction was the bound: both are counted, and such
  * walks are refused.
@@ -173,11 +177,11 @@ static void cross(struct course *c, const struct imp_decision *d,
         c->beta *= (double)d->passes;
         return;
     }
-    const imp_spec T = imp__track_eval(c->m->scene, v->on, c->carried);
+    const imp_spec p = imp__track_density(c->m->scene, v->on, c->carried, c->m->least);
     if (c->m->flights) collisions_look(c->m->scene, v, c->sum);
-    if (c->m->flights || c->carried) ratio = lanes_ratio(c, T, 1 / (double)d->passes);
+    if (c->m->flights || c->carried) ratio = lanes_ratio(c, p, 1 / (double)d->passes);
     c->w *= ratio;
-    c->beta *= T * ((double)d->passes / fmax(ratio, TINY));
+    c->beta *= p * ((double)d->passes / fmax(ratio, TINY)); /* as in tracking.c */
 }
 
 /* Roulette at a step that it plays with; f: the value there. */

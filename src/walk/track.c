@@ -162,6 +162,22 @@ imp_spec imp__track_eval(const struct imp_scene *scene, const struct imp_track *
     return f;
 }
 
+imp_spec imp__track_density(const struct imp_scene *scene, const struct imp_track *track,
+                            const struct imp_carried *carried, double least)
+{
+    imp_spec p = imp__spec(1);
+    for (int i = 0; i < track->n; i++) {
+        const struct imp_event *e = &track->event[i];
+        imp_spec f = event_factor(scene, track, e, carried);
+        for (int c = 0; least > 0 && c < 4; c++) {
+            if (e->kind == IMP_REAL_AT) f[c] = fmax(f[c], least);
+            else if (e->kind == IMP_NULL_AT) f[c] = fmin(f[c], 1 - least);
+        }
+        p *= f;
+    }
+    return p;
+}
+
 /* Product of the factors that are not 0, and how many are. */
 struct product {
     imp_spec rest;

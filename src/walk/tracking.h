@@ -72,6 +72,12 @@ extern const struct imp_segment_ops imp__tracking;
 /* The segment's value at the scene's present parameters. */
 imp_spec imp__track_eval(const struct imp_scene *scene, const struct imp_track *track,
                          const struct imp_carried *carried);
+/* With headroom, the least probability of a real collision (flight.h). */
+#define IMP_REAL_LEAST 0.1
+/* The density with which its events would be drawn there, under their bounds; `least`: of a
+ * real collision, IMP_REAL_LEAST or 0. At the draw it is the decided one. */
+imp_spec imp__track_density(const struct imp_scene *scene, const struct imp_track *track,
+                            const struct imp_carried *carried, double least);
 /* Along a walk: has it a derivative with the events where they are? */
 bool imp__track_counts(const struct imp_tracer *tracer, const struct imp_track *track);
 /* This derivative: f_bar to the sink, or along x_dot.

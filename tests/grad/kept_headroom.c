@@ -63,6 +63,43 @@ static void elsewhere(imp_scene *scene, bool empty, struct change c, double head
     imp_scene_destroy(scene);
 }
 
+/* ---- What they are worth ----------------------------------------------------------- */
+
+static double variance(imp_film *film)
+{
+    double sum = 0;
+    for (int k = 0; k < 16 * 16; k++) sum += pow((double)imp_film_se(film)[k], 2);
+    return sum;
+}
+
+/* A cloud with holes, by walks that meet many collisions in emptiness: where hardly anything
+ * has changed all of them count, and elsewhere as many as the variance says, of kept walks
+ * over that of walks which are drawn there in the same way. */
+static void worth(double factor)
+{
+    static const char name[] = "cloud.sigma_t.data";
+    imp_scene *scene = cloud(grey, "nearest", "", IMP_MONO);
+    empty_some(scene, name);
+    imp_walks *walks = keep(scene, 1024, false, 4);
+    change_grid(scene, name, (struct change){1 + 1e-7, 0});
+    const struct imp_walks_weight here = weigh(walks);
+    change_grid(scene, name, (struct change){factor, 0});
+    const struct imp_walks_weight there = weigh(walks);
+    imp_walks *new = keep(scene, 1024, false, 4);
+    imp_film *kept = render(scene, walks, 0, 0), *fresh = render(scene, new, 0, 0);
+    const double ratio = variance(kept) / variance(fresh);
+    tap_ok(here.ess > 1 - 1e-6, "holes, where nothing moved # ess 1 - %.2g",
+           1 - here.ess);
+    tap_ok(there.ess < 1 - 1e-3 && there.ess * ratio > 0.5 && there.ess * ratio < 2,
+           "%g times as dense # ess %.3f, variance %.3f of fresh walks", factor,
+           there.ess, ratio);
+    imp_film_destroy(kept);
+    imp_film_destroy(fresh);
+    imp_walks_destroy(walks);
+    imp_walks_destroy(new);
+    imp_scene_destroy(scene);
+}
+
 /* ---- Derivatives ------------------------------------------------------------------- */
 
 static imp_problem *problem_of(imp_scene *scene, const char *active, imp_film *film)
@@ -226,6 +263,8 @@ int main(void)
               "coloured, holes of cells");
     elsewhere(cloud(grey, "trilinear", residual, IMP_RGB), true,
               (struct change){1.2, 0.6}, 2, "by residuals");
+    worth(0.8);
+    worth(1.5);
     derivatives(grey, (struct change){1, 0}, "at the draw, with holes");
     derivatives(coloured, (struct change){1.2, 0.1}, "elsewhere, coloured");
     from_file();
