@@ -3,7 +3,7 @@
  * Covariance of the gradient that Gauss-Newton takes from pairs of units, or from
  * pictures through a wide filter, against the spread over seeds, in every eigenvector of
  * J^T W J: where the pictures tell little, most of the noise is of second order, of two at
- * once. Run with the name of a filter, or with "metal", for whole fits: how often
+ * once. Run with the name of a filter, or with "metal" or "stam", for whole fits: how often
  * their intervals hold the truth. */
 #include "imp_cornell.h"
 #include "imp_tap.h"
@@ -92,6 +92,7 @@ struct experiment {
     double least, start; /* of the truth */
     int width, height, target_spp, spp;
     enum imp_points points;
+    bool mono;
 };
 
 static void one_fit(imp_context *ctx, const struct experiment *e, int seed, int *held,
@@ -119,7 +120,7 @@ static void one_fit(imp_context *ctx, const struct experiment *e, int seed, int 
     target.noise_se = imp_film_se(film);
     target.width = e->width;
     target.height = e->height;
-    target.channels = 3;
+    target.channels = e->mono ? 1 : 3;
     test_must(ctx, imp_problem_add_target(p, &target));
     for (size_t k = 0; k < n; k++) start[k] = e->start * truth[k];
     test_must(ctx, imp_problem_set_x(p, start));
@@ -154,8 +155,8 @@ static void fits(imp_context *ctx, const struct experiment *e)
 static void cornell(imp_context *ctx, const char *filter)
 {
     struct experiment e = {
-        filter, box(ctx, filter),      active, 3, .4, .8, SIDE, SIDE, 64,
-        SPP,    IMP_POINTS_INDEPENDENT};
+        filter, box(ctx, filter),       active, 3, .4, .8, SIDE, SIDE, 64,
+        SPP,    IMP_POINTS_INDEPENDENT, false};
     fits(ctx, &e);
     e.points = IMP_POINTS_SOBOL;
     fits(ctx, &e);
@@ -174,12 +175,30 @@ static void metal(imp_context *ctx)
     static const char *const size[] = {"width=40", "height=30"};
     struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
     struct experiment e = {
-        "rough metal", NULL, numbers, 4, 0, .8, 40, 30, 256, SPP, IMP_POINTS_INDEPENDENT};
+        "rough metal",          NULL, numbers, 4, 0, .8, 40, 30, 256, SPP,
+        IMP_POINTS_INDEPENDENT, false};
     o.defines = size;
     o.n_defines = 2;
     test_must(ctx, imp_scene_load(ctx, IMP_SCENES "/textured.xml", &o, &e.scene));
     fits(ctx, &e);
     e.spp = 4 * SPP;
+    fits(ctx, &e);
+    imp_scene_destroy(e.scene);
+}
+
+/* Numbers that trade: of the lamp, and of what it lights. */
+static void stam(imp_context *ctx)
+{
+    static const char *const numbers[] = {"*"};
+    static const char *const told[] = {"res=24", "integrator=path"};
+    struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
+    struct experiment e = {
+        "Stam's box",           NULL, numbers, 1, 0, .8, 24, 24, 512, 64,
+        IMP_POINTS_INDEPENDENT, true};
+    o.defines = told;
+    o.n_defines = 2;
+    o.mode = IMP_MONO;
+    test_must(ctx, imp_scene_load(ctx, IMP_SCENES "/stam.xml", &o, &e.scene));
     fits(ctx, &e);
     imp_scene_destroy(e.scene);
 }
@@ -194,6 +213,7 @@ int main(int argc, char **argv)
         filter(ctx, "box", IMP_POINTS_INDEPENDENT);
         filter(ctx, "box", IMP_POINTS_SOBOL);
     } else if (strcmp(argv[1], "metal") == 0) metal(ctx);
+    else if (strcmp(argv[1], "stam") == 0) stam(ctx);
     else
         for (size_t f = 0; f < imp_count(filters); f++)
             if (strcmp(argv[1], filters[f]) == 0) cornell(ctx, filters[f]);
