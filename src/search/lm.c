@@ -48,26 +48,44 @@ static enum imp_status init(const struct imp__goal *goal,
     return imp__search_array(s, FIRST, goal->n);
 }
 
+void imp__lm_system_destroy(struct imp__lm_system *s)
+{
+    if (!s) return;
+    s->kind->end(s);
+    imp__release(s->goal->ctx, s);
+}
+
+enum imp_status imp__lm_system_create(const struct imp__goal *goal,
+                                      const struct imp__lm_kind *kind,
+                                      struct imp__lm_system **out)
+{
+    struct imp__lm_system *s = imp__alloc(goal->ctx, 1, kind->size);
+    if (!s)
+        return imp__error(goal->ctx, IMP_E_NOMEM, "no memory for %zu variables", goal->n);
+    s->kind = kind;
+    s->goal = goal;
+    const enum imp_status st = kind->begin(s);
+    if (st == IMP_OK) *out = s;
+    else imp__lm_system_destroy(s);
+    return st;
+}
+
 static void work_destroy(imp_context *ctx, struct work *w)
 {
-    if (w->system) w->system->kind->end(w->system);
-    imp__release(ctx, w->system);
+    imp__lm_system_destroy(w->system);
     imp__release(ctx, w->delta);
 }
 
 static enum imp_status work_create(const struct imp__goal *goal, struct work *w)
 {
     const size_t n = goal->n;
-    const struct imp__lm_kind *kind = goal->normal ? &imp__lm_dense : &imp__lm_sparse;
     w->delta = imp__alloc(goal->ctx, 3 * n, sizeof *w->delta);
-    w->system = imp__alloc(goal->ctx, 1, kind->size);
-    if (!w->delta || !w->system)
+    if (!w->delta)
         return imp__error(goal->ctx, IMP_E_NOMEM, "no memory for %zu variables", n);
     w->trial = w->delta + n;
     w->h = w->delta + 2 * n;
-    w->system->kind = kind;
-    w->system->goal = goal;
-    return kind->begin(w->system);
+    return imp__lm_system_create(goal, goal->normal ? &imp__lm_dense : &imp__lm_sparse,
+                                 &w->system);
 }
 
 /* Newton's point for a variable, cut off on its way to a bound. A step from far away may

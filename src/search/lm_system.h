@@ -42,4 +42,10 @@ struct imp__lm_kind {
 /* Of goal->normal (lm_dense.c), and of goal->sparse (lm_sparse.c). */
 extern const struct imp__lm_kind imp__lm_dense, imp__lm_sparse;
 
+/* lm.c */
+enum imp_status imp__lm_system_create(const struct imp__goal *goal,
+                                      const struct imp__lm_kind *kind,
+                                      struct imp__lm_system **out);
+void imp__lm_system_destroy(struct imp__lm_system *system);
+
 #endif

@@ -104,24 +104,6 @@ static void draws_check(const struct imp__sparse_normal *eq, enum imp__draw what
     tap_z(&mixed, 1, .1, text);
 }
 
-static struct imp__lm_system *system_of(const struct imp__lm_kind *kind,
-                                        const struct imp__goal *goal)
-{
-    struct imp__lm_system *s = imp__alloc(goal->ctx, 1, kind->size);
-    if (!s) abort();
-    s->kind = kind;
-    s->goal = goal;
-    test_must(goal->ctx, kind->begin(s));
-    return s;
-}
-
-static void system_end(struct imp__lm_system *s)
-{
-    imp_context *ctx = s->goal->ctx;
-    s->kind->end(s);
-    imp__release(ctx, s);
-}
-
 static void compare(imp_context *ctx, const struct trial *t)
 {
     imp_scene *scene;
@@ -179,8 +161,8 @@ static void compare(imp_context *ctx, const struct trial *t)
     struct imp__lm_system *few, *many_of;
     goal.normal = NULL;
     goal.sparse = imp__fit_sparse;
-    few = system_of(&imp__lm_dense, &f.goal);
-    many_of = system_of(&imp__lm_sparse, &goal);
+    test_must(ctx, imp__lm_system_create(&f.goal, &imp__lm_dense, &few));
+    test_must(ctx, imp__lm_system_create(&goal, &imp__lm_sparse, &many_of));
     test_must(ctx, few->kind->take(few, x, 5));
     test_must(ctx, many_of->kind->take(many_of, x, 5));
     for (int k = t->singular; k < 3; k++) {
@@ -200,8 +182,8 @@ static void compare(imp_context *ctx, const struct trial *t)
     }
     tap_ok(few->n_free == many_of->n_free, "%s: %zu numbers are free", t->name,
            few->n_free);
-    system_end(few);
-    system_end(many_of);
+    imp__lm_system_destroy(few);
+    imp__lm_system_destroy(many_of);
     imp__sparse_normal_destroy(&eq);
     imp__normal_destroy(ctx, &dense);
     imp__fit_end(&f);
