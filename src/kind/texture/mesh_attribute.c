@@ -60,10 +60,12 @@ static const struct imp_texture *found(const struct imp_texture *t,
                                        const struct imp_texcoord *at)
 {
     const struct mesh_attribute *m = t->self;
-    for (int k = 0; at->shape && k < at->shape->n_attributes; k++)
+    const int n = at->shape ? at->shape->n_attributes : 0;
+    const struct imp_texture *of = NULL;
+    for (int k = 0; k < n && !of; k++)
         if (strcmp(at->shape->attribute[k].name, m->name) == 0)
-            return at->shape->attribute[k].texture;
-    return NULL;
+            of = at->shape->attribute[k].texture;
+    return of;
 }
 
 static void eval(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
