@@ -142,7 +142,8 @@ static enum imp_status look(struct imp__rows_job *j, const struct imp_tiles_pass
         j->total[IMP_ROWS_BYTES] * (double)all / fmax(j->total[IMP_ROWS_ITEMS], 1);
     memcpy(j->total, before, sizeof before);
     if (st != IMP_OK) return st;
-    /* All ranks have all rows, and come here before any has more than some tiles. */
+    /* All ranks have all rows. One that comes late counts again what others hold by then: the
+     * check may refuse too soon, not too late. */
     imp_context *ctx = j->problem->ctx;
     const int here = imp__team_here(ctx);
     char what[80] = "least squares of many numbers";

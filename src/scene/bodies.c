@@ -80,10 +80,12 @@ static enum imp_status bent_check(const struct imp_scene *scene,
     if (!oval && s->geometry != IMP_CURVES) return IMP_OK;
     for (int i = 0; i < scene->n_bodies; i++)
         near |= scene->bodies[i]->index >= 0 && is_near(s, scene->bodies[i]);
-    return near ? imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                             "shape '%s': %s on or in a graded medium; its rays end on "
-                             "triangles, flat shapes, spheres and circular cylinders",
-                             s->name, oval ? "an oval cylinder" : "a curve")
+    return near ? imp__error(
+                      scene->ctx, IMP_E_UNSUPPORTED,
+                      "shape '%s': %s in the box around a graded medium, whose rays "
+                      "end on triangles, flat shapes, spheres and circular "
+                      "cylinders",
+                      s->name, oval ? "an oval cylinder" : "a curve")
                 : IMP_OK;
 }
 

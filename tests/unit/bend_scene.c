@@ -333,7 +333,7 @@ static void hostile(imp_context *ctx)
             BALL("<bsdf type='null'/>",
                  N0("1")) "<shape type='cylinder'><transform name='to_world'><scale "
                           "x='.2' y='.1' z='.3'/></transform></shape>",
-            no, "an oval cylinder on or in a graded medium");
+            no, "an oval cylinder in the box around a graded medium");
     char curve[] = "/tmp/imp_bend_XXXXXX", text[512];
     const int fd = mkstemp(curve);
     if (fd < 0 || write(fd, "-.5 0 0 .2\n.5 0 0 .2\n", 21) != 21) exit(99);
@@ -343,7 +343,7 @@ static void hostile(imp_context *ctx)
                   N0("1")) "<shape type='linearcurve'><string name='filename' "
                            "value='%s'/></shape>",
              curve);
-    refused(ctx, text, no, "a curve on or in a graded medium");
+    refused(ctx, text, no, "a curve in the box around a graded medium");
     unlink(curve);
     refused(ctx, BALL("<bsdf type='null'/>", N0("-1")), IMP_E_SCENE, "n0 = -1");
     refused(ctx,

@@ -70,7 +70,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
         const imp_v3 axis[3] = {imp__mat4_column(&placed, 0) * fabs(radius),
                                 imp__mat4_column(&placed, 1) * fabs(radius),
                                 imp__mat4_column(&placed, 2) * length};
-        if (!oval_set(axis, c))
+        if (radius != 0 && !oval_set(axis, c))
             IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
                                     "to_world flattens the shape"));
         c->radius = c->length = 1;
