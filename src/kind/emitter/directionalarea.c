@@ -94,19 +94,19 @@ static bool foot(const struct imp_shape *s, imp_v3 ref, imp_v3 d, struct imp_hit
 {
     if (s->geometry == IMP_ANALYTIC)
         return s->ops->intersect(s, &ref, &d, 0, INFINITY, hit);
-    for (size_t k = 0; k < s->triangles.n_triangles; k++) {
+    bool found = false;
+    for (size_t k = 0; !found && k < s->triangles.n_triangles; k++) {
         const struct corner c = corner(s, k);
         const imp_v3 from = ref - c.p, across = imp__cross(d, c.e2);
-        const double det = imp__dot(c.e1, across);
-        if (det == 0) continue;
+        const double det =
+            imp__dot(c.e1, across); /* 0: u and v are no numbers in [0, 1] */
         const imp_v3 up = imp__cross(from, c.e1);
         const double u = imp__dot(from, across) / det, v = imp__dot(d, up) / det,
                      t = imp__dot(c.e2, up) / det;
-        if (!(u >= 0 && v >= 0 && u + v <= 1 && t > 0)) continue;
-        *hit = (struct imp_hit){.prim = (int)k, .t = t, .u = u, .v = v};
-        return true;
+        found = u >= 0 && v >= 0 && u + v <= 1 && t > 0;
+        if (found) *hit = (struct imp_hit){.prim = (int)k, .t = t, .u = u, .v = v};
     }
-    return false;
+    return found;
 }
 
 static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double u[2],

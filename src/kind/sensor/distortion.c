@@ -24,7 +24,8 @@ void imp__distort(const struct imp_distortion *d, const double at[2], double out
 static double newton(const struct imp_distortion *d, const double seen[2], double x[2])
 {
     double at[2], s[3];
-    for (int i = 0; i < NEWTON; i++) {
+    bool there = false;
+    for (int i = 0; !there && i < NEWTON; i++) {
         imp__distort(d, x, at, s);
         const double det = s[0] * s[2] - s[1] * s[1];
         const double rx = seen[0] - at[0], ry = seen[1] - at[1];
@@ -33,12 +34,11 @@ static double newton(const struct imp_distortion *d, const double seen[2], doubl
         x[0] += dx;
         x[1] += dy;
         /* Squared by one more step, which is below rounding. */
-        if (fabs(dx) + fabs(dy) < 1e-9 * (1 + fabs(x[0]) + fabs(x[1]))) {
-            imp__distort(d, x, at, s);
-            return 0.5 * (s[0] + s[2]) - hypot(0.5 * (s[0] - s[2]), s[1]);
-        }
+        there = fabs(dx) + fabs(dy) < 1e-9 * (1 + fabs(x[0]) + fabs(x[1]));
     }
-    return NAN;
+    if (!there) return NAN;
+    imp__distort(d, x, at, s);
+    return 0.5 * (s[0] + s[2]) - hypot(0.5 * (s[0] - s[2]), s[1]);
 }
 
 void imp__undistort(const struct imp_distortion *d, const double seen[2], double out[2])

@@ -111,16 +111,17 @@ static bool intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *
     const double q = b + copysign(sqrt(a * e), b), c = p[0] * p[0] + p[1] * p[1] - r2;
     const double ta = q / a, tb = q != 0 ? c / q : ta;
     const double t[2] = {imp_min(ta, tb), imp_max(ta, tb)};
-    for (int i = 0; i < 2; i++) {
+    bool met = false;
+    for (int i = 0; !met && i < 2; i++) {
         const double z = p[2] + t[i] * w[2];
-        if (!(t[i] > tmin && t[i] < tmax && z >= 0 && z <= k->length)) continue;
+        met = t[i] > tmin && t[i] < tmax && z >= 0 && z <= k->length;
+        if (!met) continue;
         hit->t = t[i];
         hit->u = 0;
         hit->v = z / k->length;
         hit->prim = 0;
-        return true;
     }
-    return false;
+    return met;
 }
 
 /* x, y: cosine and sine of phi. */
