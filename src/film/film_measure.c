@@ -35,11 +35,16 @@ enum imp_status imp__run_sensor(const struct imp_scene *scene, const struct imp_
                           run->spp);
     const struct imp_sensor *sensor = scene->sensors[run->sensor];
     const struct imp_walk_integrator *walks = imp__walk_integrator(scene);
-    if (sensor->shape && (!walks || walks->absorbs || walks->hide_emitters ||
-                          imp__channels_of(scene->integrator)))
+    if (sensor->shape &&
+        (!walks || walks->absorbs || imp__channels_of(scene->integrator)))
         return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
                           "sensor '%s' (%s) is read by walks of path, direct, volpath, "
-                          "photons or ptracer, without hide_emitters",
+                          "photons or ptracer",
+                          sensor->name, sensor->ops->name);
+    if (sensor->shape && walks->both && walks->hide_emitters)
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "integrator bdpt: sensor '%s' (%s) with hide_emitters is read "
+                          "by path, direct, volpath or photons",
                           sensor->name, sensor->ops->name);
     *out = sensor;
     return IMP_OK;

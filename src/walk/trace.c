@@ -283,13 +283,15 @@ vertex_work(struct imp_step *s, struct imp_vertex *v, const struct imp_hit *hit,
     /* Emission that is met. */
     if (counts && emits > 0) emission_add(s, v, emits, hit, at);
     if (absorbed || !goes_on) return false;
-    if (!(v->bsdf->flags & IMP_BSDF_NULL)) s->walk->valid = true;
+    /* What a sensor that is a surface receives at once is what a camera sees. */
+    const bool unseen = imp_unlikely(integrator->hide_emitters) && s->depth < 0;
+    if (!(v->bsdf->flags & IMP_BSDF_NULL) && !unseen) s->walk->valid = true;
 
     /* The connection to a light. */
     struct imp_shadow shadow;
     shadow.wanted = false;
     if ((v->bsdf->flags & IMP_BSDF_SMOOTH) && s->segment->connects &&
-        integrator->lights && bounces)
+        integrator->lights && bounces && !unseen)
         imp__light_sample(s, v, at, frame, &shadow);
 
     /* The continuation. */
