@@ -44,7 +44,9 @@ enum imp_status imp__build_bumps_survey(struct imp_scene *scene,
     const bool bump = imp__is_bumped(scene, s->bsdf);
     if (bump && !s->ops->place)
         return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
-                               "a %s cannot have a bumpmap", s->ops->name);
+                               "a %s cannot have a bumpmap: its uv does not tell which "
+                               "of its points is meant",
+                               s->ops->name);
     s->by_triangle |= bump && s->ops->flags & IMP_SHAPE_TRIANGLES;
     return IMP_OK;
 }

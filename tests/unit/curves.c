@@ -104,7 +104,7 @@ static void surfaces(const char *kind)
     imp_scene *scene = scene_of(body);
     const struct imp_shape *s = scene->shapes[0];
     const struct imp_curves *k = &s->curves;
-    double off = 0, slanted = 0, moved = 0, normal = 0, inside = 0;
+    double off = 0, slanted = 0, moved = 0, normal = 0, inside = 0, slope = 0, again = 0;
     int hits = 0, compared = 0;
     for (uint32_t i = 0; i < 20000; i++) {
         imp_v3 o, d;
@@ -139,6 +139,17 @@ static void surfaces(const char *kind)
         }
         const imp_v3 n = imp__normalize(imp__cross(by[0], by[1]));
         off = fmax(off, imp__length(place(k, at.uv) - at.p));
+        slope = fmax(slope, imp__length(by[0] * (0.5 / h) - at.dp_du));
+        slope = fmax(slope, imp__length(by[1] * (0.5 / h) - at.dp_dv));
+        struct imp_surface there;
+        int prim;
+        if (s->ops->place) {
+            s->ops->place(s, at.uv, &there, &prim);
+            again =
+                fmax(again, imp__length(there.p - at.p) + imp__length(there.n - at.n));
+            again = fmax(again, imp__length(there.dp_du - at.dp_du) +
+                                    imp__length(there.dp_dv - at.dp_dv));
+        }
         normal = fmax(normal, imp__length(n - at.n));
         compared++;
     }
@@ -148,6 +159,10 @@ static void surfaces(const char *kind)
         "%s: %d hits lie on the ray and on the tube, with its normal and uv # off %.1e "
         "radius %.1e normal %.1e t %.1e inside %.1e",
         kind, hits, off, slanted, normal, moved, inside);
+    tap_ok(slope < 1e-6, "%s: dp_du and dp_dv are its derivatives # off %.1e", kind,
+           slope);
+    tap_ok(again < 1e-9 && (k->degree == 1) == !s->ops->place,
+           "%s: its place by uv # off %.1e", kind, again);
 
     /* From inside nothing is met. */
     int met = 0;
@@ -263,6 +278,80 @@ static void cylinder(const char *kind, double low, double high)
     imp_film_destroy(a);
 }
 
+/* Heights of 8 x 6 texels, bilinear, moved along u. */
+#define BUMPS(u)                                                                         \
+    "<bsdf type='bumpmap'><texture type='bitmap' name='h'><string name='filename' "      \
+    "value='heights.pfm'/><boolean name='raw' value='true'/><transform name='to_uv'>"    \
+    "<translate x='" u "'/></transform></texture><float name='scale' value='.3'/><bsdf " \
+    "type='diffuse' id='paint'><float name='reflectance' value='.5'/></bsdf></bsdf>"
+
+static void heights_write(void)
+{
+    char path[128];
+    snprintf(path, sizeof path, "%s/heights.pfm", folder);
+    FILE *f = fopen(path, "wb");
+    fprintf(f, "Pf\n8 6\n-1\n");
+    for (int k = 0; k < 48; k++)
+        fwrite(&(float){(float)(k * 29 % 13) / 13}, sizeof(float), 1, f);
+    fclose(f);
+}
+
+/* A straight tube with a bump map is a cylinder with one, whose turn is counted from -z: a
+ * quarter further. The light that it reflects once is proportional to its reflectance, so that the
+ * derivative, from walks that were kept, is the value by it. */
+static void bumped(void)
+{
+    const char *look = CAMERA "<emitter type='directional'><vector name='direction' "
+                              "value='.2,1,-.7'/></emitter>";
+    char body[3][4096];
+    imp_film *film[3];
+    snprintf(body[0], sizeof body[0],
+             "%s<shape type='bsplinecurve'><string name='filename' value='straight.txt'/>"
+             "%s</shape>",
+             look, BUMPS(".25"));
+    snprintf(
+        body[1], sizeof body[1],
+        "%s<shape type='cylinder'><point name='p0' value='-1,0,.5'/><point name='p1' "
+        "value='1,0,.5'/><float name='radius' value='.5'/>%s</shape>",
+        look, BUMPS("0"));
+    snprintf(body[2], sizeof body[2],
+             "%s<shape type='bsplinecurve'><string name='filename' value='straight.txt'/>"
+             "<bsdf type='diffuse'/></shape>",
+             look);
+    for (int k = 0; k < 3; k++) pixels(body[k], &film[k]);
+    const float *x = imp_film_mean(film[0]), *y = imp_film_mean(film[1]),
+                *flat = imp_film_mean(film[2]);
+    double worst = 0, raised = 0;
+    for (int i = 0; i < 12 * 8 * 3; i++) {
+        worst = fmax(worst, fabs((double)x[i] - (double)y[i]));
+        raised = fmax(raised, fabs((double)x[i] - (double)flat[i]));
+    }
+    tap_ok(worst < 1e-4 && raised > 0.05,
+           "a straight tube with bumps, as a cylinder # off %.1e; without bumps by %.2g",
+           worst, raised);
+    for (int k = 0; k < 3; k++) imp_film_destroy(film[k]);
+
+    snprintf(
+        body[0], sizeof body[0],
+        "<integrator type='path'><integer name='max_depth' value='2'/></integrator>" LOOK
+        "<emitter type='directional'><vector name='direction' value='.2,1,-.7'/>"
+        "</emitter><shape type='bsplinecurve'><string name='filename' "
+        "value='bent.txt'/>%s</shape>",
+        BUMPS("0"));
+    imp_scene *s = scene_of(body[0]);
+    imp_problem *p = test_problem(ctx, s, "paint.reflectance");
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_estimate e;
+    double g, se;
+    run.spp = 16;
+    test_must(ctx, imp_problem_functional(p, NULL, &run, &e, &g, &se));
+    tap_ok(e.value > 0.005 && fabs(0.5 * g / e.value - 1) < 1e-6,
+           "bumps on a bent tube: value %.6g, derivative times .5 %.6g # off %.1e",
+           e.value, 0.5 * g, fabs(0.5 * g / e.value - 1));
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
 static void refused(const char *what, const char *body, const char *reason)
 {
     imp_scene *s = NULL;
@@ -289,6 +378,10 @@ int main(void)
     instances("linearcurve");
     cylinder("bsplinecurve", -1, 1);
     cylinder("linearcurve", -3, 3);
+    heights_write();
+    bumped();
+    refused("bumps on cones", TUBES("linearcurve", "bent.txt", BUMPS("0")),
+            "a linearcurve cannot have a bumpmap: its uv does not tell");
     refused("a light on curves",
             TUBES("linearcurve", "bent.txt", "<emitter type='area'/>"),
             "points of its shape (linearcurve) cannot be drawn");
@@ -319,7 +412,7 @@ int main(void)
     refused("no such file", TUBES("bsplinecurve", "none.txt", ""), "none.txt");
     static const char *const files[] = {"bent.txt", "straight.txt", "short.txt",
                                         "five.txt", "thin.txt",     "empty.txt",
-                                        "far.txt"};
+                                        "far.txt",  "heights.pfm"};
     for (size_t i = 0; i < imp_count(files); i++) file_remove(files[i]);
     rmdir(folder);
     imp_context_destroy(ctx);

@@ -127,6 +127,46 @@ static enum imp_status linear_build(const struct imp_build *b, void *self,
     return build(b, s, 1);
 }
 
+/* The directions across the line from which the turn is counted: a quarter of it apart. */
+struct across {
+    imp_v3 axis, start, turned;
+};
+static struct across across_of(const struct imp__curve_at *at)
+{
+    const imp_v3 axis = imp__curve_axis(at);
+    const imp_v3 z = imp__v3(0, 0, 1) - axis * axis[2];
+    const imp_v3 turned = imp__dot(z, z) > 1e-14 ? imp__normalize(z) : imp__v3(0, 1, 0);
+    return (struct across){axis, imp__cross(turned, axis), turned};
+}
+
+/* de/dv, where e, from the line to the point, keeps its turn while the line bends. */
+static imp_v3 bending(const struct imp__curve_at *at, const struct across *x, imp_v3 e)
+{
+    const double length = imp__length(at->d1);
+    const imp_v3 z = imp__v3(0, 0, 1) - x->axis * x->axis[2];
+    const double across = imp__length(z);
+    if (!(length > 0) || !(across > 1e-7)) return (imp_v3){0};
+    const imp_v3 axis_d = (at->d2 - x->axis * imp__dot(x->axis, at->d2)) * (1 / length);
+    const imp_v3 z_d = -(axis_d * x->axis[2] + x->axis * axis_d[2]);
+    const imp_v3 turned_d = (z_d - x->turned * imp__dot(x->turned, z_d)) * (1 / across);
+    const imp_v3 start_d = imp__cross(turned_d, x->axis) + imp__cross(x->turned, axis_d);
+    return start_d * imp__dot(x->start, e) + turned_d * imp__dot(x->turned, e);
+}
+
+/* At a line's point, outward from it; all but uv. */
+static void surface_at(const struct imp_curves *k, const struct imp__curve_at *at,
+                       const struct across *x, imp_v3 outward, struct imp_surface *out)
+{
+    const imp_v3 q = outward * at->r;
+    out->p = at->c + q;
+    const imp_v3 n = imp__normalize(imp__curve_normal(k, at, outward));
+    out->n = out->ng = imp__is_finite(n) ? n : outward; /* a sharp bend */
+    out->dp_du = imp__cross(x->axis, q) * IMP_2PI;
+    out->dp_dv = (at->d1 + outward * at->r1 + bending(at, x, outward) * at->r) *
+                 (double)k->n_segments;
+    imp__surface_frame(out);
+}
+
 static void surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
                     const imp_v3 *d, struct imp_surface *out)
 {
@@ -134,26 +174,35 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit, const 
     struct imp__curve_at at;
     double v = hit->u;
     const imp_v3 outward = imp__curve_meet(k, hit->prim, hit->t, &v, *o, *d, &at);
-    const imp_v3 q = outward * at.r;
-    const imp_v3 axis = imp__curve_axis(&at);
-    out->p = at.c + q;
-    const imp_v3 n = imp__normalize(imp__curve_normal(k, &at, outward));
-    out->n = out->ng = imp__is_finite(n) ? n : outward; /* a sharp bend */
-    const double along = axis[2];
-    const imp_v3 z = imp__v3(0, 0, 1) - axis * along;
-    const imp_v3 turned = imp__dot(z, z) > 1e-14 ? imp__normalize(z) : imp__v3(0, 1, 0);
-    const imp_v3 start = imp__cross(turned, axis);
-    out->uv[0] = imp__uv_turn(imp__dot(start, outward), imp__dot(turned, outward));
+    const struct across x = across_of(&at);
+    out->uv[0] = imp__uv_turn(imp__dot(x.start, outward), imp__dot(x.turned, outward));
     out->uv[1] = (v + hit->prim) / (double)k->n_segments;
-    out->dp_du = imp__cross(axis, q) * IMP_2PI;
-    out->dp_dv = (at.d1 + outward * at.r1) * (double)k->n_segments;
-    imp__surface_frame(out);
+    surface_at(k, &at, &x, outward, out);
 }
 
-#define CURVE_OPS(name_, build_)                                                         \
+/* Of swept circles: on the ball at a joint of cones uv is one number for many points. */
+static void place(const struct imp_shape *s, const double uv[2], struct imp_surface *out,
+                  int *prim)
+{
+    (void)prim;
+    const struct imp_curves *k = &s->curves;
+    const double along = imp_clamp(uv[1], 0, 1) * (double)k->n_segments;
+    const double segment = fmin(floor(along), (double)(k->n_segments - 1));
+    struct imp__curve_at at;
+    imp__curve_at(k, (int)segment, along - segment, &at);
+    const struct across x = across_of(&at);
+    const double turn = IMP_2PI * uv[0];
+    out->uv[0] = uv[0];
+    out->uv[1] = uv[1];
+    surface_at(k, &at, &x, x.start * cos(turn) + x.turned * sin(turn), out);
+}
+
+#define CURVE_OPS(name_, build_, place_)                                                 \
     {                                                                                    \
         .size = sizeof(struct imp_shape_ops), .name = name_, .build = build_,            \
-        .surface = surface                                                               \
+        .surface = surface, .place = place_                                              \
     }
-const struct imp_shape_ops imp__bsplinecurve = CURVE_OPS("bsplinecurve", bspline_build);
-const struct imp_shape_ops imp__linearcurve = CURVE_OPS("linearcurve", linear_build);
+const struct imp_shape_ops imp__bsplinecurve =
+    CURVE_OPS("bsplinecurve", bspline_build, place);
+const struct imp_shape_ops imp__linearcurve =
+    CURVE_OPS("linearcurve", linear_build, NULL);
