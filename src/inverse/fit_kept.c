@@ -71,7 +71,7 @@ static enum imp_status survival_find(struct imp__fit *f, const struct imp_run *r
             pilot->theta[p->scene->params[k].info.offset + e] = NAN;
     for (int k = 0; st == IMP_OK && k < pilot->n_stores; k++) {
         struct imp_walks_weight w;
-        st = imp__walks_weigh(pilot, &pilot->stores[k], NULL, 0, &w);
+        st = imp__walks_weigh(pilot, &pilot->stores[k], NULL, 0, &w, NULL);
         most = fmax(most, w.growth);
     }
     if (st == IMP_OK && most > 0)
@@ -156,7 +156,7 @@ enum imp_status imp__fit_take_walks(struct imp__fit *f, const double *x, uint64_
     enum imp_status st = imp_problem_set_x(f->problem, x);
     for (int k = 0; k < f->walks->n_stores && st == IMP_OK; k++) {
         struct imp_walks_weight w;
-        st = imp__walks_weigh(f->walks, &f->walks->stores[k], NULL, WEIGHED, &w);
+        st = imp__walks_weigh(f->walks, &f->walks->stores[k], NULL, WEIGHED, &w, NULL);
         if (st == IMP_E_UNSUPPORTED) { /* an extinction is above its bounds */
             w.ess = 0;
             st = IMP_OK;

@@ -11,7 +11,7 @@
 #define TILES_AT_ONCE 16
 #define SEEN_LEAST                                                                       \
     0.5            /* mean ratio of densities, which is 1 where all of them was drawn */
-#define ASKED 1024 /* walks that say enough, where they say it clearly: by this factor */
+#define ASKED 1024 /* walks and more that say enough, if clearly: by this factor */
 #define CLEAR 1.25
 /* Roulette's growth, over all its steps of walks that have a last depth. */
 #define GROWTH_MOST 4
@@ -97,7 +97,7 @@ struct weighing {
     const struct imp_densities *densities;
     struct imp_tracer tracer;
     const float *mask;
-    size_t every;             /* walk that is asked */
+    struct imp_asking asking;
     struct imp_arena *arenas; /* [threads] */
     struct imp_moments sum;
 };
@@ -110,7 +110,7 @@ static enum imp_status tiles_weigh(size_t item, int worker, void *result, void *
     memset(result, 0, sizeof(struct imp_moments));
     for (size_t k = item * TILES_AT_ONCE; k < end && st == IMP_OK; k++)
         st = imp__store_moments(w->store, w->densities, &w->tracer, &w->arenas[worker], k,
-                                w->mask, w->every, result);
+                                w->mask, &w->asking, result);
     return st;
 }
 static void moments_add(void *into, const void *from, void *payload)
@@ -223,23 +223,20 @@ static void weighing_begin(const struct imp_walks *w, const struct imp_store *st
                            size_t most, struct weighing *x)
 {
     struct imp_run run = w->run;
-    size_t n = 0;
     *x = (struct weighing){.store = store,
                            .densities = densities,
                            .tracer = {.scene = w->scene,
                                       .integrator = w->integrator,
                                       .sensor = store->sensor},
                            .mask = mask,
-                           .every = 1};
-    for (size_t k = 0; k < imp__store_tiles(store); k++) n += store->records[k].n_walks;
-    if (most > 0 && !densities->flights) x->every = (n / most) | 1;
+                           .asking = imp__store_asking(store, densities, most)};
     run.sensor = store->index;
     imp__tracer_numbers(&x->tracer, &run, 0);
 }
 
 enum imp_status imp__walks_weigh(const struct imp_walks *w, const struct imp_store *store,
                                  const float *mask, size_t most,
-                                 struct imp_walks_weight *out)
+                                 struct imp_walks_weight *out, bool *all)
 {
     imp_context *ctx = w->ctx;
     enum imp_status st = IMP_OK;
@@ -250,6 +247,7 @@ enum imp_status imp__walks_weigh(const struct imp_walks *w, const struct imp_sto
     const size_t walks = imp__store_tiles(store);
     own.moved = imp__alloc(ctx, (size_t)w->scene->n_bsdfs + 1, 1);
     *out = (struct imp_walks_weight){.size = sizeof *out, .ess = 1};
+    if (all) *all = true;
     for (size_t k = 0; k < walks; k++) out->n_walks += (double)store->records[k].n_walks;
     if (!changed || !own.moved)
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks"));
@@ -259,6 +257,7 @@ enum imp_status imp__walks_weigh(const struct imp_walks *w, const struct imp_sto
     if (!own.any && !(store->roulette && own.weights)) goto out;
     struct weighing x;
     weighing_begin(w, store, &own, mask, most, &x);
+    if (all) *all = x.asking.every == 1;
     IMP_TRY(moments_sum(w, &x));
     out->n_walks = x.sum.n;
     if (x.sum.w2 > 0) out->ess = x.sum.w * x.sum.w / (x.sum.n * x.sum.w2);
@@ -279,11 +278,12 @@ out:
 static enum imp_status use_check(const struct imp_walks *w, const struct imp_store *store)
 {
     struct imp_walks_weight x;
-    IMP_CHECKED(imp__walks_weigh(w, store, NULL, ASKED, &x));
+    bool all;
+    IMP_CHECKED(imp__walks_weigh(w, store, NULL, ASKED, &x, &all));
     struct imp_walks_weight worse = x;
     worse.growth *= CLEAR;
-    if (x.ess >= CLEAR * w->ess && imp__walks_finite(w, &worse)) return IMP_OK;
-    IMP_CHECKED(imp__walks_weigh(w, store, NULL, 0, &x));
+    if (!all && x.ess >= CLEAR * w->ess && imp__walks_finite(w, &worse)) return IMP_OK;
+    if (!all) IMP_CHECKED(imp__walks_weigh(w, store, NULL, 0, &x, NULL));
     return worth_check(w, &x);
 }
 
@@ -351,7 +351,7 @@ enum imp_status imp_walks_get_info(const imp_walks *w, struct imp_walks_info *in
             const struct imp_record *r = &w->stores[k].records[t];
             all.n_walks += (double)r->n_walks;
             all.n_vertices += (double)r->n_vertices;
-            all.bytes += (double)imp__record_bytes(r);
+            all.bytes += (double)imp__store_bytes(&w->stores[k], t);
         }
     IMP_GIVE(w->ctx, info, all, "info");
     return IMP_OK;
@@ -377,7 +377,7 @@ enum imp_status imp_walks_weigh(const imp_walks *w, int sensor, const float *mas
     for (size_t i = 0; mask && i < pixels; i++)
         if (!isfinite(mask[i]))
             return imp__error(w->ctx, IMP_E_ARG, "mask: pixel %zu is %g", i, mask[i]);
-    enum imp_status st = imp__walks_weigh(w, store, mask, 0, &all);
+    enum imp_status st = imp__walks_weigh(w, store, mask, 0, &all, NULL);
     if (st == IMP_OK) st = worth_check(w, &all);
     if (st != IMP_OK && st != IMP_E_UNSUPPORTED && st != IMP_E_NUMERIC) return st;
     if (st != IMP_OK) all.refused = imp_last_error(w->ctx);

@@ -25,7 +25,8 @@ enum imp_status imp__store_create(const struct imp_tracer *tracer, int index, in
     s.sample = imp__alloc(ctx, n, sizeof *s.sample);
     s.records = imp__alloc(ctx, imp__store_tiles(&s), sizeof *s.records);
     s.reduced = imp__alloc(ctx, imp__store_tiles(&s), sizeof *s.reduced);
-    if (!s.sample || !s.records || !s.reduced)
+    s.meets = imp__alloc(ctx, imp__store_tiles(&s), sizeof *s.meets);
+    if (!s.sample || !s.records || !s.reduced || !s.meets)
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks"));
     memcpy(s.sample, samples, n * sizeof *samples);
     IMP_TRY(imp__record_create(tracer, budget, &s.records[0]));
@@ -36,6 +37,7 @@ out:
     imp__release(ctx, s.sample);
     imp__release(ctx, s.records);
     imp__release(ctx, s.reduced);
+    imp__release(ctx, s.meets);
     return st;
 }
 
@@ -45,8 +47,10 @@ void imp__store_destroy(struct imp_store *s)
     for (size_t k = 0; k < imp__store_tiles(s); k++) {
         imp__record_destroy(&s->records[k]);
         imp__reduced_free(&s->reduced[k]);
+        imp__release(s->ctx, s->meets[k]);
     }
     imp__release(s->ctx, s->reduced);
+    imp__release(s->ctx, s->meets);
     imp__release(s->ctx, s->sample);
     imp__release(s->ctx, s->records);
     s->ctx = NULL;
@@ -110,11 +114,11 @@ enum imp_status imp__store_fill(struct imp_store *s, const struct imp_tracer *tr
                 if (st != IMP_OK) return st;
             }
     IMP_TRY(imp__record_trim(r));
+    IMP_TRY(imp__store_look(s, tracer->scene, k));
     if (roulette) atomic_store(&s->roulette, true);
     tile_reduce(s, k);
-    if (atomic_fetch_add(&s->bytes, imp__record_bytes(r)) + imp__record_bytes(r) <=
-        s->budget)
-        return IMP_OK;
+    const size_t bytes = imp__store_bytes(s, k);
+    if (atomic_fetch_add(&s->bytes, bytes) + bytes <= s->budget) return IMP_OK;
 full:;
     const double walks = (double)(s->width + 2 * s->margin) *
                          (double)(s->height + 2 * s->margin) * (double)s->n;
@@ -194,7 +198,8 @@ enum imp_status imp__store_take(struct imp_record_source *from, struct imp_store
         const struct tile t = tile_at(s, k);
         struct imp_record *r = &s->records[k];
         const size_t n = (size_t)(t.x1 - t.x0) * (size_t)(t.y1 - t.y0) * s->n;
-        IMP_TRY(imp__record_take(from, tracer, of, s->budget - (size_t)s->bytes, r));
+        const size_t left = s->budget - imp_min((size_t)s->bytes, s->budget);
+        IMP_TRY(imp__record_take(from, tracer, of, left, r));
         bool placed = r->n_walks == n;
         for (size_t i = 0; i < n && placed; i++)
             placed = is_placed(s, tracer, &t, imp__record_at(r, i), i);
@@ -203,7 +208,8 @@ enum imp_status imp__store_take(struct imp_record_source *from, struct imp_store
                                "%s: damaged (walks that are not those of their pixels)",
                                from->path));
         IMP_TRY(imp__record_trim(r));
-        s->bytes += imp__record_bytes(r);
+        IMP_TRY(imp__store_look(s, tracer->scene, k));
+        s->bytes += imp__store_bytes(s, k);
         tile_reduce(s, k);
     }
     imp__store_settle(s);

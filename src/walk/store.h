@@ -33,7 +33,9 @@ struct imp_store {
     const struct imp_reduction *reduction; /* NULL: walks are not reduced */
     size_t budget;
     int left; /* sensors to come that share it, this one too: reduced walks leave them room */
-    atomic_size_t bytes;         /* of records so far */
+    uint64_t **meets;            /* [across down][walks] store_ask.c */
+    atomic_size_t met[64];       /* walks that meet each of its bits */
+    atomic_size_t bytes;         /* of records so far, and of `meets` */
     atomic_size_t reduced_bytes; /* and of what they are reduced to */
     atomic_bool roulette;        /* some step had a survival below 1 */
 };
@@ -54,6 +56,13 @@ static inline size_t imp__store_tiles(const struct imp_store *s)
  * IMP_E_NOMEM beyond the budget, with an estimate of what all of them need. */
 enum imp_status imp__store_fill(struct imp_store *store, const struct imp_tracer *tracer,
                                 struct imp_arena *arena, size_t tile);
+
+/* Bytes of the walks of a tile, and of what they meet. */
+static inline size_t imp__store_bytes(const struct imp_store *s, size_t tile)
+{
+    return imp__record_bytes(&s->records[tile]) +
+           s->records[tile].n_walks * sizeof(uint64_t);
+}
 
 /* All tiles are made: walks stay reduced if they fit into the budget with the records. */
 void imp__store_settle(struct imp_store *store);
@@ -97,6 +106,7 @@ struct imp_densities {
     bool any;         /* of moved */
     bool flights;     /* an extinction has changed */
     bool weights;     /* some value that roulette looks at has changed */
+    uint64_t matters; /* bits of imp_store.meets: for those that changed */
 };
 enum imp_status imp__densities_create(const struct imp_scene *scene,
                                       const struct imp_walk_integrator *integrator,
@@ -122,12 +132,36 @@ struct imp_moments {
     double certain[IMP_STORE_CLASSES]; /* it is below a bound that it had reached, so that
                                           no null collision was drawn */
 };
-/* Adds each `every`-th walk of a tile, from the first on; mask [height][width]: pixels with 0 are left out; NULL: none
- * are. */
-enum imp_status
-imp__store_moments(const struct imp_store *store, const struct imp_densities *d,
-                   const struct imp_tracer *tracer, struct imp_arena *arena, size_t tile,
-                   const float *mask, size_t every, struct imp_moments *sum);
+/* ---- Which are asked (store_ask.c) ------------------------------------------------- */
+
+static inline int imp__store_class(const struct imp_bsdf *b)
+{
+    return b->index >= 0 ? b->index % IMP_STORE_CLASSES : 0;
+}
+/* What the walks of a tile meet; once a tile, by any thread. */
+enum imp_status imp__store_look(struct imp_store *store, const struct imp_scene *scene,
+                                size_t tile);
+struct imp_asking {
+    size_t every;  /* walk is asked; 1: all of them are */
+    uint64_t rare; /* but of those that meet one of these bits, more */
+};
+/* About `most` walks, and enough of those that meet what matters now. 0: all; and all
+ * where collisions are weighed. */
+struct imp_asking imp__store_asking(const struct imp_store *store,
+                                    const struct imp_densities *d, size_t most);
+/* The next walk of a tile that is asked, from i on; n_walks: none is. It stands for
+ * `weight` walks. */
+size_t imp__store_next(const struct imp_store *store, const struct imp_asking *asking,
+                       size_t tile, size_t i, double *weight);
+
+/* Adds the walks of a tile that are asked; mask [height][width]: pixels with 0 are left
+ * out; NULL: none are. */
+enum imp_status imp__store_moments(const struct imp_store *store,
+                                   const struct imp_densities *d,
+                                   const struct imp_tracer *tracer,
+                                   struct imp_arena *arena, size_t tile,
+                                   const float *mask, const struct imp_asking *asking,
+                                   struct imp_moments *sum);
 /* ---- All of a scene (kept_use.c) -------------------------------------------------- */
 
 struct imp_walks {
@@ -162,11 +196,11 @@ enum imp_status imp__walks_run(imp_context *ctx, const char *function,
  * this sensor. IMP_E_UNSUPPORTED: a parameter has changed, or is active, of which they
  * say nothing. IMP_E_NUMERIC: too few of them count now, or their variance is infinite. */
 enum imp_status imp__walks_use(const struct imp_run *run, struct imp_tracer *tracer);
-/* What they are worth at the scene's present parameters; mask as of imp__store_moments. `most`:
- * so many walks say enough, 0: all of them are asked; where collisions are weighed, all are. */
+/* What they are worth at the scene's present parameters; mask as of imp__store_moments,
+ * `most` as of imp__store_asking. all: were all of them asked? May be NULL. */
 enum imp_status imp__walks_weigh(const struct imp_walks *walks,
                                  const struct imp_store *store, const float *mask,
-                                 size_t most, struct imp_walks_weight *out);
+                                 size_t most, struct imp_walks_weight *out, bool *all);
 /* Is their variance, as far as roulette makes it? */
 bool imp__walks_finite(const struct imp_walks *walks, const struct imp_walks_weight *x);
 /* The parameters whose numbers have changed, [n_params]; IMP_E_UNSUPPORTED as above. */

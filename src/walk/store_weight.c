@@ -43,11 +43,6 @@
 
 /* ---- Walks ----------------------------------------------------------------------- */
 
-static int class_of(const struct imp_bsdf *b)
-{
-    return b && b->index >= 0 ? b->index % IMP_STORE_CLASSES : 0;
-}
-
 /* A vertex that is looked at. */
 struct looked {
     const struct imp_bsdf *bsdf;
@@ -137,7 +132,8 @@ struct course {
     imp_spec p;    /* density of what lanes may decide otherwise, its mean is 1 */
     imp_spec beta; /* as roulette would see it now */
     double w, eta;
-    double seen; /* ratio of its directions alone */
+    double stands_for; /* so many walks */
+    double seen;       /* ratio of its directions alone */
     int zeros[4];
     bool settled; /* roulette's first step answers for all before it */
     bool any;     /* a direction's density has changed */
@@ -198,10 +194,11 @@ static void roll(struct course *c, const struct looked *v, const struct imp_deci
     c->beta *= 1 / q;
     c->settled = true;
     if (first || !c->own) return;
-    const int a = class_of(v->bsdf);
-    sum->steps[a]++;
+    const int a = imp__store_class(v->bsdf);
+    sum->steps[a] += c->stands_for;
     for (int k = 0; next && k < 4; k++)
-        sum->growth[a][class_of(next)][k] += step[k] * step[k] / (double)d->survive;
+        sum->growth[a][imp__store_class(next)][k] +=
+            c->stands_for * step[k] * step[k] / (double)d->survive;
 }
 
 /* The continuation of a vertex. */
@@ -268,10 +265,12 @@ static void fetch(const struct imp_record *r, size_t i)
     }
 }
 
-enum imp_status
-imp__store_moments(const struct imp_store *s, const struct imp_densities *d,
-                   const struct imp_tracer *tracer, struct imp_arena *arena, size_t tile,
-                   const float *mask, size_t every, struct imp_moments *sum)
+enum imp_status imp__store_moments(const struct imp_store *s,
+                                   const struct imp_densities *d,
+                                   const struct imp_tracer *tracer,
+                                   struct imp_arena *arena, size_t tile,
+                                   const float *mask, const struct imp_asking *asking,
+                                   struct imp_moments *sum)
 {
     const struct imp_record *r = &s->records[tile];
     const int x0 = (int)(tile % (size_t)s->across) * IMP_STORE_SIDE - s->margin;
@@ -279,13 +278,18 @@ imp__store_moments(const struct imp_store *s, const struct imp_densities *d,
     const int side = imp_min(IMP_STORE_SIDE, s->width + s->margin - x0);
     const bool rolls = s->roulette && d->weights && !d->integrator->absorbs;
     const bool tracks = (rolls && !d->guided) || d->flights || tracer->wavelengths;
-    for (size_t i = 0; i < r->n_walks; i += every) {
+    double of, of_next;
+    size_t next = imp__store_next(s, asking, tile, 0, &of_next);
+    while (next < r->n_walks) {
+        const size_t i = next;
+        of = of_next;
+        next = imp__store_next(s, asking, tile, i + 1, &of_next);
         const struct imp_record_walk *k = imp__record_at(r, i);
         const int pixel = (int)(i / s->n);
         const int x = imp_clamp(x0 + pixel % side, 0, s->width - 1);
         const int y = imp_clamp(y0 + pixel / side, 0, s->height - 1);
         struct imp_walk walk = {.key = k->key};
-        if (every > 1) fetch(r, i + every);
+        if (next > i + 1) fetch(r, next);
         if (mask && !(mask[(size_t)y * (size_t)s->width + (size_t)x] > 0)) continue;
         const struct imp_arena_mark mark = imp__arena_mark(arena);
         if (k->n_items > 0 && (tracks || k->n_vertices > k->n))
@@ -304,16 +308,17 @@ imp__store_moments(const struct imp_store *s, const struct imp_densities *d,
                            .beta = imp__spec(1),
                            .w = 1,
                            .eta = 1,
+                           .stands_for = of,
                            .seen = 1};
         c.lanes = c.carried ? c.carried->n : tracer->scene->channels;
         const double w = course_weight(&c, k->first, k->first + k->n, walk.first);
         if (c.any) {
-            sum->moved++;
-            sum->seen += c.seen;
+            sum->moved += of;
+            sum->seen += of * c.seen;
         }
-        sum->n++;
-        sum->w += w;
-        sum->w2 += w * w;
+        sum->n += of;
+        sum->w += of * w;
+        sum->w2 += of * w * w;
         imp__arena_rewind(arena, mark);
     }
     return IMP_OK;

@@ -580,6 +580,50 @@ static void next_to_the_limit(void)
     imp_scene_destroy(scene);
 }
 
+/* A material in few pixels: a ball of metal, and two plates that face each other closely, so
+ * that light goes to and fro between them. Few walks meet them, and these have to say it. */
+static void in_few_pixels(const char *name, double at, double to, const char *word)
+{
+    static const char xml[] =
+        "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' "
+        "value='-1'/><integer name='rr_depth' value='2'/></integrator><sensor "
+        "type='perspective'><float name='fov' value='40'/><transform name='to_world'>"
+        "<lookat origin='0,0,8' target='0,0,0' up='0,1,0'/></transform><film "
+        "type='hdrfilm'><integer name='width' value='64'/><integer name='height' "
+        "value='64'/><rfilter type='box'/></film></sensor><emitter type='constant'/>"
+        "<shape type='rectangle'><transform name='to_world'><scale value='4'/>"
+        "</transform><bsdf type='diffuse' id='wall'><float name='reflectance' "
+        "value='.2'/></bsdf></shape><shape type='sphere'><point name='center' x='1.5' "
+        "y='1.2' z='3'/><float name='radius' value='.06'/><bsdf type='roughconductor' "
+        "id='metal'><float name='alpha' value='.3'/></bsdf></shape>"
+        "<bsdf type='twosided' id='both'><bsdf type='diffuse' id='white'><float "
+        "name='reflectance' value='.3'/></bsdf></bsdf>"
+        "<shape type='rectangle'><transform name='to_world'><scale value='.4'/><rotate "
+        "y='1' angle='90'/><translate x='-1.02' z='3'/></transform><ref id='both'/>"
+        "</shape><shape type='rectangle'><transform name='to_world'><scale value='.4'/>"
+        "<rotate y='1' angle='-90'/><translate x='-.98' z='3'/></transform><ref "
+        "id='both'/></shape></scene>";
+    imp_scene *scene = test_scene_text(ctx, xml, IMP_MONO);
+    imp_walks *walks = keep(scene, 64, 3, IMP_POINTS_INDEPENDENT, false, -1);
+    struct imp_walks_weight all = IMP_WALKS_WEIGHT_INIT, some;
+    size_t k;
+    test_must(ctx, imp_scene_find_param(scene, name, &k));
+    test_must(ctx, imp_scene_set_values(scene, k, 1, &at));
+    test_must(ctx, imp_walks_weigh(walks, 0, NULL, &all));
+    test_must(ctx, imp__walks_weigh(walks, walks->stores, NULL, 1024, &some, NULL));
+    tap_ok(!all.refused && fabs(some.n_walks / all.n_walks - 1) < 0.1 &&
+               fabs(some.ess - all.ess) < 0.02 &&
+               fabs(some.growth / all.growth - 1) < 0.2,
+           "%s %g: some walks say what all say # walks %.0f of %.0f, ess %.4f of %.4f, "
+           "growth %.3f of %.3f %s",
+           name, at, some.n_walks, all.n_walks, some.ess, all.ess, some.growth,
+           all.growth, all.refused ? all.refused : "");
+    test_must(ctx, imp_scene_set_values(scene, k, 1, &to));
+    refused_with(scene, walks, word, "in few pixels, far away");
+    imp_walks_destroy(walks);
+    imp_scene_destroy(scene);
+}
+
 static void refusals(void)
 {
     imp_scene *scene = test_scene(ctx, "textured.xml", IMP_RGB, NULL);
@@ -680,6 +724,8 @@ int main(void)
     roulette_counts_once();
     diverging();
     next_to_the_limit();
+    in_few_pixels("metal.alpha", 0.28, 0.01, "effective sample size");
+    in_few_pixels("white.reflectance", 0.31, 0.9, "infinite");
     refusals();
     imp_context_destroy(ctx);
     return tap_done();
