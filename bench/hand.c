@@ -17,14 +17,20 @@
 #include <string.h>
 #include <time.h>
 
-enum { ROUNDS_MAX = 99, PICTURES = 64, EACH = 8, BLOCKS = 8, SIDE = 64, NUMBERS = 3 * BLOCKS * BLOCKS };
+enum {
+    ROUNDS_MAX = 99,
+    PICTURES = 64,
+    EACH = 8,
+    BLOCKS = 8,
+    SIDE = 64,
+    NUMBERS = 3 * BLOCKS * BLOCKS
+};
 
-static const struct hand_sphere spheres[] = {
-    {{-1.7, 0.7, 0.2}, 0.7, {.75, .25, .2}, 0},
-    {{0, 0.9, 1.1}, 0.9, {.9, .85, .8}, 1},
-    {{1.6, 0.6, 0.3}, 0.6, {.2, .45, .75}, 0},
-    {{-0.5, 0.35, -0.9}, 0.35, {.8, .9, .95}, 1},
-    {{0.6, 0.4, -0.8}, 0.4, {.7, .7, .3}, 0}};
+static const struct hand_sphere spheres[] = {{{-1.7, 0.7, 0.2}, 0.7, {.75, .25, .2}, 0},
+                                             {{0, 0.9, 1.1}, 0.9, {.9, .85, .8}, 1},
+                                             {{1.6, 0.6, 0.3}, 0.6, {.2, .45, .75}, 0},
+                                             {{-0.5, 0.35, -0.9}, 0.35, {.8, .9, .95}, 1},
+                                             {{0.6, 0.4, -0.8}, 0.4, {.7, .7, .3}, 0}};
 static const struct hand_rectangle rectangles[] = {
     {{0, 0, 0}, {0, 0, 4}, {4, 0, 0}, {.6, .6, .6}, {0}},    /* floor, y up */
     {{0, 2, 3}, {-4, 0, 0}, {0, 2, 0}, {.7, .65, .6}, {0}},  /* back, to -z */
@@ -62,7 +68,8 @@ static imp_scene *library_scene(imp_context *ctx, int res)
     int n = 0;
 #define PUT(...) (n += snprintf(text + n, sizeof text - (size_t)n, __VA_ARGS__))
 #define THREE(v) (v)[0], (v)[1], (v)[2]
-    PUT("<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='%d'/>"
+    PUT("<scene version='3.0.0'><integrator type='path'><integer name='max_depth' "
+        "value='%d'/>"
         "<integer name='rr_depth' value='%d'/></integrator>\n<sensor type='perspective'>"
         "<float name='fov' value='%.17g'/><transform name='to_world'>"
         "<lookat origin='%.17g,%.17g,%.17g' target='%.17g,%.17g,%.17g' "
@@ -76,7 +83,8 @@ static imp_scene *library_scene(imp_context *ctx, int res)
         PUT("<shape type='sphere'><point name='center' x='%.17g' y='%.17g' z='%.17g'/>"
             "<float name='radius' value='%.17g'/>",
             THREE(k->centre), k->radius);
-        PUT("<bsdf type='%s'><rgb name='%s' value='%.17g,%.17g,%.17g'/>%s</bsdf></shape>\n",
+        PUT("<bsdf type='%s'><rgb name='%s' "
+            "value='%.17g,%.17g,%.17g'/>%s</bsdf></shape>\n",
             k->mirror ? "conductor" : "diffuse",
             k->mirror ? "specular_reflectance" : "reflectance", THREE(k->albedo),
             k->mirror ? "<string name='material' value='none'/>" : "");
@@ -184,7 +192,8 @@ static int compare_pictures(imp_context *ctx)
     for (int p = 0; p < 2; p++)
         printf("%s: mean %.6f %.6f %.6f +- %.6f %.6f %.6f\n", p ? "hand" : "library",
                THREE(mean[p]), THREE(se[p]));
-    printf("z of the means %.2f %.2f %.2f; of %d numbers of blocks at most %.2f, mean square "
+    printf("z of the means %.2f %.2f %.2f; of %d numbers of blocks at most %.2f, mean "
+           "square "
            "%.3f; variance library / hand %.3f\n",
            THREE(z), n, worst, squares / n, noise[0] / noise[1]);
     for (int c = 0; c < 3; c++) worst = fmax(worst, fabs(z[c]));
@@ -222,9 +231,9 @@ static void compare_times(int threads, int rounds, int res, int spp)
     qsort(library, (size_t)rounds, sizeof *library, by_value);
     qsort(hand, (size_t)rounds, sizeof *hand, by_value);
     qsort(ratio, (size_t)rounds, sizeof *ratio, by_value);
-    printf("| %d | %.0f | %.0f | %.2f | %.2f (%.2f to %.2f) |\n", threads, 1e9 * library[0],
-           1e9 * hand[0], library[0] / hand[0], ratio[rounds / 2], ratio[0],
-           ratio[rounds - 1]);
+    printf("| %d | %.0f | %.0f | %.2f | %.2f (%.2f to %.2f) |\n", threads,
+           1e9 * library[0], 1e9 * hand[0], library[0] / hand[0], ratio[rounds / 2],
+           ratio[0], ratio[rounds - 1]);
     imp_scene_destroy(s);
     imp_context_destroy(ctx);
     free(picture);
@@ -249,7 +258,8 @@ int main(int argc, char **argv)
     must(NULL, imp_context_create(&o, &ctx));
     const int same = compare_pictures(ctx);
     imp_context_destroy(ctx);
-    printf("\n| threads | library, ns a sample | hand | ratio of minima | median of %d rounds "
+    printf("\n| threads | library, ns a sample | hand | ratio of minima | median of %d "
+           "rounds "
            "(all) |\n|---|---|---|---|---|\n",
            rounds);
     for (int threads = 1; threads <= 2; threads++)

@@ -239,11 +239,11 @@ static void scene_begin(struct scene *s, const struct hand_scene *from)
     }
     for (int i = 0; i < s->n_plates; i++) {
         const struct hand_rectangle *k = &from->rectangle[i];
-        const vec a = make(k->a), b = make(k->b), c = make(k->centre), n = unit(cross(a, b));
+        const vec a = make(k->a), b = make(k->b), c = make(k->centre),
+                  n = unit(cross(a, b));
         const vec u = scale(a, 1 / dot(a, a)), v = scale(b, 1 / dot(b, b));
-        s->plate[i] = (struct plate){
-            n, u, v, dot(n, c), dot(c, u), dot(c, v), c, a, b, make(k->albedo),
-            make(k->emits)};
+        s->plate[i] = (struct plate){n, u, v, dot(n, c),       dot(c, u),     dot(c, v),
+                                     c, a, b, make(k->albedo), make(k->emits)};
         if (i == s->light) s->inv_area = 1 / (4 * sqrt(dot(a, a) * dot(b, b)));
     }
 }

@@ -21,7 +21,7 @@ struct hand_scene {
     const struct hand_sphere *sphere;
     const struct hand_rectangle *rectangle;
     int n_spheres, n_rectangles;
-    int light; /* the rectangle that emits */
+    int light;                            /* the rectangle that emits */
     double eye[3], target[3], up[3], fov; /* degrees, across the width */
     int max_depth, rr_depth;
 };
