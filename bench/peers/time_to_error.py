@@ -2,6 +2,7 @@
 """Processor seconds to a wanted error, importon and Mitsuba 3 in one run.
 
     PYTHONPATH=build/python python3 bench/peers/time_to_error.py [-b BUILD] [--scenes A,B] [--seeds N] [--spp N]
+        [--peer-spp N]
 
 Scenes: cornell (scenes/cornell.xml), textured (rough metal and a texture under a sky and a lamp), million (two
 bumpy balls of a million triangles each, one rough metal, under a sky and a lamp), lamps (10,000 squares,
@@ -218,6 +219,10 @@ def both_points(p):
     return ("independent", p.best)
 
 
+def samples(p, a):
+    return a.peer_spp if a.peer_spp and p.name == "Mitsuba" else a.spp
+
+
 def told(what, rows, note=""):
     fastest = min(s for (name, _), s in rows.items() if name == "Mitsuba")
     for (name, points), s in rows.items():
@@ -229,7 +234,7 @@ def told(what, rows, note=""):
 
 
 def pictures(case, own, peer, a):
-    got = in_turn((own, peer), both_points, a.seeds, lambda p, points, seed: p.picture(points, a.spp, seed))
+    got = in_turn((own, peer), both_points, a.seeds, lambda p, points, seed: p.picture(points, samples(p, a), seed))
     mean = got["importon", "independent"][1].mean(axis=0)
     lit = mean > 1e-3 * mean.mean()
     told(case.name + " picture, 1 %", {k: s * float(np.median(v.var(axis=0, ddof=1)[lit] / mean[lit] ** 2)) / 1e-4
@@ -245,13 +250,16 @@ def gradients(case, own, peer, a):
         own.set(now)
         peer.set(now)
         got = in_turn((own, peer), both_points, a.seeds,
-                      lambda p, points, seed: p.gradient(target, points, a.spp, seed))
+                      lambda p, points, seed: p.gradient(target, points, samples(p, a), seed))
         values[where] = got
         if where == "wrong":
             ours, theirs = (got[p.name, p.best][1] for p in (own, peer))
             length = float((ours.mean(axis=0) ** 2).sum())
             level = scipy.stats.ttest_ind(ours, theirs, equal_var=False).pvalue.min() * ours.shape[1]
             print("%s: %d numbers, the programs' mean gradients agree at level %.3g" % (case.name, ours.shape[1], level))
+            print("%s: a gradient takes %s" % (case.name, ", ".join(
+                "%.3g s (%s, %s, %d samples)" % (s, p.name, points, samples(p, a)) for p in (own, peer)
+                for points in both_points(p) for s in [got[p.name, points][0]])), flush=True)
         told("%s gradient, %s" % (case.name, where),
              {k: s * float(v.var(axis=0, ddof=1).sum()) / length / 1e-4 for k, (s, v) in got.items()})
         best = got["Mitsuba", "independent"]
@@ -333,6 +341,7 @@ def main():
     ap.add_argument("--seeds", type=int, default=32)
     ap.add_argument("--fits", type=int, default=5)
     ap.add_argument("--spp", type=int, default=64)
+    ap.add_argument("--peer-spp", type=int, help="samples of each of Mitsuba's renders; else those of --spp")
     ap.add_argument("--limit", type=float, default=20, help="processor seconds of a fit of Mitsuba's")
     a = ap.parse_args()
     mi.set_log_level(mi.LogLevel.Error) if mi.variant() else None
