@@ -18,6 +18,7 @@ struct imp__fit {
     struct imp__fingerprint fingerprint;
     double *lo, *hi, *scale; /* [n]; NULL with spans */
     double *g_se;            /* [n], for Gauss-Newton; likewise */
+    bool *settles;           /* [n], likewise */
     struct imp__span *spans; /* Adam of many variables: by parameter; or NULL */
     size_t n_spans;
     double *H_prior;  /* [n][n] second derivative of the regularisers */

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #define PAIRS_VERSION   2 /* of what Levenberg-Marquardt estimates from its samples */
-#define VARIATE_VERSION 2 /* of what control variates keep, and of steps with them */
+#define VARIATE_VERSION 3 /* of what control variates keep, and of steps with them */
 
 /* With an active number, the index of a medium differs from start to start. */
 static bool medium_active(const struct imp_body *m, const int64_t *base)

@@ -222,8 +222,11 @@ static enum imp_status bounds_make(struct imp__fit *f)
     const size_t n = p->n;
     const bool many = f->options.optimizer == IMP_ADAM && n > IMP_SEARCH_FEW;
     if (many) f->spans = imp__alloc(p->ctx, p->scene->n_params, sizeof *f->spans);
-    else f->lo = imp__alloc(p->ctx, 4 * n, sizeof *f->lo);
-    if (!f->spans && !f->lo)
+    else {
+        f->lo = imp__alloc(p->ctx, 4 * n, sizeof *f->lo);
+        f->settles = imp__alloc(p->ctx, n, sizeof *f->settles);
+    }
+    if (!f->spans && !(f->lo && f->settles))
         return imp__error(p->ctx, IMP_E_NOMEM, "no memory for %zu variables", n);
     if (!many) {
         f->hi = f->lo + n;
@@ -233,8 +236,8 @@ static enum imp_status bounds_make(struct imp__fit *f)
     for (size_t k = 0; k < p->n_blocks; k++) {
         const struct imp__block *b = &p->blocks[k];
         if (many)
-            f->spans[f->n_spans++] =
-                (struct imp__span){b->first + b->count, b->lo, b->hi, 1, false};
+            f->spans[f->n_spans++] = (struct imp__span){
+                .end = b->first + b->count, .lo = b->lo, .hi = b->hi, .scale = 1};
         for (size_t e = 0; !many && e < b->count; e++) {
             f->lo[b->first + e] = b->lo;
             f->hi[b->first + e] = b->hi;
@@ -344,6 +347,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
                            .lo = out->lo,
                            .hi = out->hi,
                            .scale = out->scale,
+                           .settles = out->settles,
                            .spans = out->spans,
                            .n_spans = out->n_spans,
                            .seed = out->outer.seed,
@@ -372,6 +376,7 @@ void imp__fit_end(struct imp__fit *f)
     imp__variate_destroy(f->variate);
     imp__allocation_destroy(&f->allocation);
     imp__release(f->problem->ctx, f->lo);
+    imp__release(f->problem->ctx, f->settles);
     imp__release(f->problem->ctx, f->spans);
     imp__release(f->problem->ctx, f->H_prior);
     imp__sparse_errors_destroy(f->problem->ctx, &f->errors);

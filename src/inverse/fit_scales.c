@@ -21,6 +21,7 @@ static void span_scale(const struct imp__block *b, double square, struct imp__sp
     const double scale = bounded ? b->hi - b->lo : typical_of(b, square);
     span->by_start = !bounded && !b->log;
     span->scale = scale > 0 ? scale : 1;
+    span->settles = bounded;
 }
 void imp__fit_span_scale(const struct imp__block *b, const double *x,
                          struct imp__span *span)
@@ -50,6 +51,7 @@ void imp__fit_scales(struct imp__fit *f, const struct imp__search *search)
                                  : b->log      ? 1
                                                : fmax(start, typical);
             f->scale[b->first + e] = scale > 0 ? scale : 1;
+            f->settles[b->first + e] = is_bounded(b);
         }
     }
 }

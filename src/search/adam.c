@@ -161,11 +161,11 @@ static enum imp_status align(const struct imp__goal *goal, struct imp__search *s
 
 /* ---- Steps --------------------------------------------------------------------- */
 
-/* Only variables have bounds, not directions of many. */
+/* Only variables do, not directions of several. */
 static bool settles(const struct imp__goal *goal, const struct imp__opt_options *options,
                     const struct imp__search *s, size_t j)
 {
-    return !turned(s) && imp__adam_settles(options, goal->lo[j], goal->hi[j]);
+    return !turned(s) && options->quiet && goal->settles && goal->settles[j];
 }
 
 /* One step from HERE. g: the gradient; it and work [n] are destroyed. */

@@ -98,8 +98,7 @@ static double moments(const struct imp__goal *goal,
     double mean_v = 0;
     for (size_t i = 0, k = 0; i < goal->n_spans; i++) {
         const struct imp__span *a = &goal->spans[i];
-        const double b1 =
-            imp__adam_momentum(options, imp__adam_settles(options, a->lo, a->hi));
+        const double b1 = imp__adam_momentum(options, options->quiet && a->settles);
         for (; k < a->end; k++) {
             const double d = g[k] * (scale_of(s, a, k) / s->scalar[UNIT]);
             const double v =
@@ -129,7 +128,7 @@ static void step(const struct imp__goal *goal, const struct imp__opt_options *op
     const double tiny = 1e-8 * sqrt(mean_v / c2) + 1e-300;
     for (size_t i = 0, k = 0; i < goal->n_spans; i++) {
         const struct imp__span *a = &goal->spans[i];
-        const bool settles = imp__adam_settles(options, a->lo, a->hi);
+        const bool settles = options->quiet && a->settles;
         const double rate = all * imp__adam_fall(s->iteration, settles);
         const double c1 = 1 - pow(imp__adam_momentum(options, settles), age);
         for (; k < a->end; k++) {

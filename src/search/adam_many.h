@@ -22,13 +22,6 @@
 /* and what they count as at least, over their mean: some have hardly been seen yet. */
 #define IMP_ADAM_LEAST 0.01
 
-/* Is a variable, in [lo, hi], one whose steps are to become shorter? How far it has to go is known then: no
- * farther than its scale. */
-static inline bool imp__adam_settles(const struct imp__opt_options *options, double lo,
-                                     double hi)
-{
-    return options->quiet && isfinite(hi - lo);
-}
 static inline double imp__adam_momentum(const struct imp__opt_options *options,
                                         bool settles)
 {

@@ -16,7 +16,7 @@
 #define IMP_DENSE_MAX     256  /* most variables of methods that hold [n][n] matrices */
 #define IMP_SEARCH_FEW    1024 /* variables, above which Adam's memory counts */
 #define IMP_ADAM_MOMENTUM 0.9
-/* Of variables between bounds, in searches whose gradients have little noise: */
+/* Of variables that settle, in searches whose gradients have little noise: */
 #define IMP_ADAM_MOMENTUM_QUIET 0.5
 #define IMP_ADAM_FALLING_QUIET  10
 #define IMP_TRAIL_MAX           64 /* variables, up to which a search keeps where it was */
@@ -51,6 +51,7 @@ struct imp__span {
     size_t end;
     double lo, hi, scale;
     bool by_start; /* a start that is larger than `scale` is the variable's scale */
+    bool settles;  /* `scale` is the whole range: the variable has no farther to go */
 };
 
 struct imp__goal {
@@ -58,6 +59,7 @@ struct imp__goal {
     size_t n;
     const double *lo, *hi; /* [n] bounds, may be infinite */
     const double *scale;   /* [n] > 0: a large change of each variable */
+    const bool *settles;   /* [n] is that its whole range? NULL: of none */
     /* Adam of many variables, which lo, hi and scale have no memory for (NULL): the same
      * in spans; a search then keeps its iterate in x, and imp__search_answer is its
      * answer. NULL: lo, hi and scale are there. */
@@ -101,7 +103,7 @@ struct imp__opt_options {
     double tolerance;     /* fraction of the scale */
     double
         momentum; /* Adam: what stays of the mean gradient, below 1; 0: IMP_ADAM_MOMENTUM */
-    /* Adam: gradients have little noise, and variables with a bound on each side arrive soon.
+    /* Adam: gradients have little noise, and variables that settle (imp__span) arrive soon.
      * Their rate is (1 + i/IMP_ADAM_FALLING_QUIET)^-1/2 of the first in iteration i = 0, 1, ...,
      * and their momentum, if it is 0 above, IMP_ADAM_MOMENTUM_QUIET. */
     bool quiet;
@@ -231,7 +233,11 @@ static inline size_t imp__search_trail(const struct imp__search *s)
 static inline struct imp__span imp__goal_span(const struct imp__goal *goal, size_t k)
 {
     if (goal->lo)
-        return (struct imp__span){k + 1, goal->lo[k], goal->hi[k], goal->scale[k], false};
+        return (struct imp__span){.end = k + 1,
+                                  .lo = goal->lo[k],
+                                  .hi = goal->hi[k],
+                                  .scale = goal->scale[k],
+                                  .settles = goal->settles && goal->settles[k]};
     size_t lo = 0, hi = goal->n_spans - 1;
     while (lo < hi) {
         const size_t middle = (lo + hi) / 2;
