@@ -28,7 +28,8 @@ static inline double imp__adam_momentum(const struct imp__opt_options *options,
     if (options->momentum > 0) return options->momentum;
     return settles ? IMP_ADAM_MOMENTUM_QUIET : IMP_ADAM_MOMENTUM;
 }
-/* What the rate is multiplied by in iteration i. */
+/* What the rate is multiplied by in iteration i, which counts those of earlier searches whose
+ * history this one has: it begins near its end (docs/fitting.md). */
 static inline double imp__adam_fall(int i, bool settles)
 {
     return settles ? 1 / sqrt(1 + i / (double)IMP_ADAM_FALLING_QUIET) : 1;

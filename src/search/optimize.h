@@ -104,8 +104,8 @@ struct imp__opt_options {
     double
         momentum; /* Adam: what stays of the mean gradient, below 1; 0: IMP_ADAM_MOMENTUM */
     /* Adam: gradients have little noise, and variables that settle (imp__span) arrive soon.
-     * Their rate is (1 + i/IMP_ADAM_FALLING_QUIET)^-1/2 of the first in iteration i = 0, 1, ...,
-     * and their momentum, if it is 0 above, IMP_ADAM_MOMENTUM_QUIET. */
+     * Their rate is (1 + i/IMP_ADAM_FALLING_QUIET)^-1/2 of the first in iteration i = 0, 1, ... of
+     * the history, and their momentum, if it is 0 above, IMP_ADAM_MOMENTUM_QUIET. */
     bool quiet;
 };
 

@@ -278,7 +278,7 @@ enum { W = 16, H = 12 };
 
 struct fitted {
     imp_context *context;
-    int iterations;
+    int iterations, levels, stop_after;
     const char *checkpoint;
     bool resume;
     enum imp_allocation allocation;
@@ -286,6 +286,12 @@ struct fitted {
     char text[200];
     struct team_rank rank;
 };
+
+static int stop(const struct imp_fit_step *step, void *payload)
+{
+    const struct fitted *f = payload;
+    return step->iteration == f->stop_after;
+}
 
 /* The floor of textured.xml from a picture, and from two at once. */
 static void *fit(void *payload)
@@ -314,12 +320,16 @@ static void *fit(void *payload)
     test_must(c, imp_scene_find_param(scene, "floor.reflectance.data", &param));
     test_must(c, imp_scene_set_values(scene, param, 1, &half));
     o.max_iterations = f->iterations;
+    o.levels = f->levels;
+    o.step = stop;
+    o.step_payload = f;
     o.control_variate = IMP_VARIATES_ON;
     o.allocation = f->allocation;
     o.checkpoint = f->checkpoint;
     o.resume = f->resume;
     run.spp = f->allocation == IMP_ALLOCATION_EVEN ? 4 : 16; /* no tile has below 4 */
-    test_must(c, imp_fit(p, &o, &run, &result));
+    const enum imp_status st = imp_fit(p, &o, &run, &result);
+    if (st != IMP_CANCELLED || f->stop_after == 0) test_must(c, st);
     imp_problem_get_x(p, f->x);
     f->loss = result->objective.value;
     f->history = result->history[result->n_history - 1];
@@ -386,6 +396,21 @@ static void same_bits(enum imp_allocation allocation)
     other[0].resume = true;
     fit(&other[0]);
     tap_ok(same(&one, &other[0]), "stopped and resumed: the same bits");
+    remove(path);
+    /* The finest level begins six iterations after the fit. */
+    one = all;
+    one.levels = 2;
+    fit(&one);
+    other[0] = one;
+    other[0].stop_after = 9;
+    other[0].checkpoint = path;
+    fit(&other[0]);
+    const bool stopped = !same(&one, &other[0]);
+    other[0].stop_after = 0;
+    other[0].resume = true;
+    fit(&other[0]);
+    tap_ok(stopped && same(&one, &other[0]),
+           "stopped and resumed on the last of two levels: the same bits");
     remove(path);
 }
 

@@ -117,6 +117,16 @@ static void compared(double gain)
     imp_context_destroy(ctx);
 }
 
+/* A search that follows another of 30 iterations, whose history it has. */
+static struct imp__search *follow(struct bowl *b, double *x0, int iterations)
+{
+    struct imp__search *first = begin(b, x0, 30), *s = begin(b, x0, iterations);
+    run(b, first, 30);
+    imp__search_take_history(s, first);
+    imp__search_destroy(first);
+    return s;
+}
+
 static void resumed(void)
 {
     imp_context *ctx = test_context(1);
@@ -128,7 +138,7 @@ static void resumed(void)
     snprintf(path, sizeof path, "/tmp/imp_adam_many_%ld.ck", (long)getpid());
     bowl_make(&b, ctx, N, true, 1);
     b.quiet = true;
-    struct imp__search *whole = begin(&b, x0, 137), *part = begin(&b, x0, 137);
+    struct imp__search *whole = follow(&b, x0, 137), *part = follow(&b, x0, 137);
     run(&b, whole, 137);
     b.stop_at = 61;
     run(&b, part, 137);
@@ -166,39 +176,57 @@ static enum imp_status eval_turned(const double *x, uint64_t seed, struct imp_es
  *
  *     m / (1 - b^2) = (b (1 - b) - (1 - b)) / (1 - b^2) = -(1 - b) / (1 + b)
  *
- * The second has the rate a / sqrt(1.1) where gradients are quiet and variables settle, whatever
- * bounds they have (a logarithm's are far away). */
+ * Where gradients are quiet and variables settle, whatever bounds they have (a logarithm's are far
+ * away), iteration i has the rate a / sqrt(1 + i/10), and i goes on from another search's. */
 static void momenta(bool many)
 {
     static const struct {
-        double asked, hi, b, fall;
-        bool quiet, settles;
-    } row[] = {{0, 1, .9, 1, false, true},        {.9, 1, .9, 1, false, true},
-               {.5, 1, .5, 1, false, true},       {.25, 1, .25, 1, false, true},
-               {0, 1, .5, 1.1, true, true},       {.9, 1, .9, 1.1, true, true},
-               {0, INFINITY, .9, 1, true, false}, {.25, INFINITY, .25, 1, true, false},
-               {0, 710, .9, 1, true, false}};
+        double asked, hi, b;
+        bool falls, quiet, settles;
+        int before; /* iterations of another search */
+    } row[] = {
+        {0, 1, .9, false, false, true, 0},
+        {.9, 1, .9, false, false, true, 0},
+        {.5, 1, .5, false, false, true, 0},
+        {.25, 1, .25, false, false, true, 0},
+        {0, 1, .5, true, true, true, 0},
+        {.9, 1, .9, true, true, true, 0},
+        {0, INFINITY, .9, false, true, false, 0},
+        {.25, INFINITY, .25, false, true, false, 0},
+        {0, 710, .9, false, true, false, 0},
+        {0, 1, .5, true, true, true, 40},
+        {0, 1, .9, false, false, true, 40},
+    };
     static const double lo[2] = {-1, -1}, scale[2] = {1, 1};
     imp_context *ctx = test_context(1);
     for (size_t i = 0; i < sizeof row / sizeof *row; i++) {
         const double b = row[i].b, hi[2] = {row[i].hi, row[i].hi}, x0[2] = {0, 0};
-        const double expected = -.05 + .05 / sqrt(row[i].fall) * (1 - b) / (1 + b);
+        const double before = row[i].falls ? row[i].before / 10. : 0,
+                     next = row[i].falls ? before + .1 : 0;
+        const double expected =
+            -.05 / sqrt(1 + before) + .05 / sqrt(1 + next) * (1 - b) / (1 + b);
         const bool settles[2] = {row[i].settles, row[i].settles};
-        const struct imp__opt_options o = {2, 0.05, 1e-6, row[i].asked, row[i].quiet};
+        const struct imp__opt_options o = {row[i].before + 2, 0.05, 1e-6, row[i].asked,
+                                           row[i].quiet};
         const struct imp__span span = {2, -1, row[i].hi, 1, false, row[i].settles};
         int calls = 0;
         struct imp__goal goal = {
             .ctx = ctx, .n = 2, .eval = eval_turned, .payload = &calls};
-        struct imp__search *s;
+        struct imp__search *s, *last;
         if (many) goal.spans = &span, goal.n_spans = 1;
         else goal.lo = lo, goal.hi = hi, goal.scale = scale, goal.settles = settles;
+        test_must(ctx, imp__search_create(&goal, IMP_ADAM, &o, x0, &last));
         test_must(ctx, imp__search_create(&goal, IMP_ADAM, &o, x0, &s));
+        last->iteration = row[i].before;
+        imp__search_take_history(s, last);
+        imp__search_destroy(last);
         test_must(ctx, imp__optimize(&goal, &o, s));
         const double off = fabs(imp__search_answer(s, 0) - expected);
-        tap_ok(off < 1e-7, "%s: momentum %g%s, bound %g, %ssettles # %.9f, off by %.1g",
+        tap_ok(off < 1e-7,
+               "%s: momentum %g%s, bound %g, %ssettles, after %d # %.9f, off by %.1g",
                many ? "in floats" : "in doubles", row[i].asked,
                row[i].quiet ? " of quiet gradients" : "", row[i].hi,
-               row[i].settles ? "" : "never ", expected, off);
+               row[i].settles ? "" : "never ", row[i].before, expected, off);
         imp__search_destroy(s);
     }
     imp_context_destroy(ctx);
