@@ -154,7 +154,7 @@ static int levels_of(int even, int level[LEVELS])
         for (int64_t s = power; s <= power * 3 / 2; s += power / 2) {
             const bool beside = n == 0 || level[n - 1] < even;
             if (beside && s >= even) level[n++] = even;
-            /* 6 samples are two sets of one and two */
+            /* Below those asked for not 6, whose sets have three points. */
             if (s > even ? s <= (int64_t)CAP * even : s >= floor && s != even && s != 6)
                 level[n++] = (int)s;
         }

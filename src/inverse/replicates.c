@@ -117,7 +117,9 @@ struct imp__replicates imp__replicates_loss(const struct imp_problem *p,
         imp__points_of(sensor, run) != IMP_POINTS_SOBOL || spp < least ||
         spp > SETS * IMP_SET_POINTS)
         return r;
-    r = (struct imp__replicates){.n = spp, .R = 1, .chunks = 1, .lone = true};
+    /* Of sets of unequal size, what tells errors has a mean (docs/estimators.md 14). */
+    r = (struct imp__replicates){
+        .n = spp + spp % SETS, .R = 1, .chunks = 1, .lone = true};
     return in_sets(r, SETS);
 }
 

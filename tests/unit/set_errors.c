@@ -3,6 +3,7 @@
  * Errors of losses and gradients that two sets tell (docs/estimators.md 14), beside the variances of
  * these estimates: closed forms for normal sets, the draws' own for skewed ones and for counts.
  * Which samples have such errors, and that they are the same in arrays and in hash tables. */
+#include "color/rgb.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "inverse/adjoint.h"
@@ -17,6 +18,9 @@ struct kind {
     enum { NORMAL, SKEWED, COUNT } draws;
     int channels, points;
     double m, d, s_a, s_d, rho;
+    double
+        square; /* 1, or of luminance, which is then what the target has, the sum of the
+                      squares of its weights */
 };
 
 static double normal(struct imp_key key, uint32_t k)
@@ -53,7 +57,7 @@ static void draw(const struct kind *k, struct seen *out)
     const double scale = 1.7;
     struct imp__target t = {.pixels = pixels,
                             .desc = {.loss = IMP_LOSS_L2,
-                                     .channels = k->channels,
+                                     .channels = k->square < 1 ? 1 : k->channels,
                                      .scale = scale,
                                      .pixels = pixels}};
     *out = (struct seen){0};
@@ -64,7 +68,7 @@ static void draw(const struct kind *k, struct seen *out)
             for (int c = 0; c < k->channels; c++) {
                 double z[2];
                 pair(k, i, s, c, share, z);
-                L[s][c] = pixels[c] + k->m + k->s_a * z[0];
+                L[s][c] = pixels[k->square < 1 ? 0 : c] + k->m + k->s_a * z[0];
                 dL[s][c] = k->d + k->s_d * z[1];
             }
         const double value = imp__replicate_adjoints(&t, k->channels, 0, 2, L, L, P);
@@ -85,8 +89,10 @@ static void draw(const struct kind *k, struct seen *out)
 static void normal_sets(const struct kind *k)
 {
     struct seen s;
-    const double w = 1.7, V = k->s_a * k->s_a, D = k->s_d * k->s_d,
-                 C = k->rho * k->s_a * k->s_d, n = k->channels;
+    const double w = 1.7, V = k->s_a * k->s_a * k->square,
+                 D = k->s_d * k->s_d * k->square,
+                 C = k->rho * k->s_a * k->s_d * k->square,
+                 n = k->square < 1 ? 1 : k->channels;
     const double value = n * w * w / 4 * (2 * k->m * k->m * V + V * V);
     const double gradient =
         n * w * w / 2 *
@@ -155,13 +161,16 @@ static void plans(imp_context *ctx, imp_scene *scene, const float *target)
     plan(p, 16, IMP_POINTS_SCENE, 2, 4);
     plan(p, 31, IMP_POINTS_SCENE, 3, 7);
     plan(p, 32, IMP_POINTS_SCENE, 1, 16);
-    plan(p, 33, IMP_POINTS_SCENE, 1, 16);
+    plan(p, 33, IMP_POINTS_SCENE, 1, 17);
+    plan(p, 127, IMP_POINTS_SCENE, 1, 64);
     plan(p, 128, IMP_POINTS_SCENE, 1, 64);
     plan(p, 130, IMP_POINTS_SCENE, 2, 32);
     plan(p, 256, IMP_POINTS_SCENE, 2, 64);
     plan(p, 64, IMP_POINTS_INDEPENDENT, 2, 1);
     p->use = IMP_LOSS_SOUGHT;
     plan(p, 4, IMP_POINTS_SCENE, 1, 2);
+    plan(p, 5, IMP_POINTS_SCENE, 1, 3);
+    plan(p, 7, IMP_POINTS_SCENE, 1, 4);
     plan(p, 16, IMP_POINTS_SCENE, 1, 8);
     p->use = IMP_LOSS_COMPARED;
     plan(p, 64, IMP_POINTS_SCENE, 2, 16);
@@ -198,17 +207,19 @@ static void arrays_and_tables(imp_context *ctx, imp_scene *scene, const float *t
 int main(void)
 {
     static const struct kind normals[] = {
-        {"normal sets", NORMAL, 1, 1, 0, 1, 1, .5, .3},
-        {"normal sets", NORMAL, 1, 1, .6, 1, 1, .5, -.8},
-        {"normal sets", NORMAL, 1, 1, -2, .5, .7, .9, .5},
-        {"normal sets of three channels", NORMAL, 3, 1, .3, 1, 1, .5, .6}};
+        {"normal sets", NORMAL, 1, 1, 0, 1, 1, .5, .3, 1},
+        {"normal sets", NORMAL, 1, 1, .6, 1, 1, .5, -.8, 1},
+        {"normal sets", NORMAL, 1, 1, -2, .5, .7, .9, .5, 1},
+        {"normal sets of three channels", NORMAL, 3, 1, .3, 1, 1, .5, .6, 1},
+        {"normal sets of a luminance", NORMAL, 3, 1, .3, 1, 1, .5, .6,
+         IMP_LUM_R * IMP_LUM_R + IMP_LUM_G * IMP_LUM_G + IMP_LUM_B * IMP_LUM_B}};
     /* Of long tails errors are large; a pixel that an edge divides has counts, and their kurtosis
      * is 2 where the edge is anywhere. */
     static const struct kind skewed[] = {
-        {"skewed sets", SKEWED, 1, 16, 0, 1, .25, .25, .9},
-        {"skewed sets", SKEWED, 1, 16, -.5, 1, .25, .25, .9},
-        {"skewed sets", SKEWED, 1, 2, 0, 1, .7, .7, .9},
-        {"counts", COUNT, 1, 1, 0, 1, .5, .1, .9}};
+        {"skewed sets", SKEWED, 1, 16, 0, 1, .25, .25, .9, 1},
+        {"skewed sets", SKEWED, 1, 16, -.5, 1, .25, .25, .9, 1},
+        {"skewed sets", SKEWED, 1, 2, 0, 1, .7, .7, .9, 1},
+        {"counts", COUNT, 1, 1, 0, 1, .5, .1, .9, 1}};
     static const double bounds[][2] = {{1, 1.25}, {.85, 1.25}, {1.2, 2}, {.82, 1.1}};
     static float target[SIDE * SIDE * 3];
     for (size_t k = 0; k < imp_count(normals); k++) normal_sets(&normals[k]);
