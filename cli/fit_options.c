@@ -18,11 +18,15 @@ const struct arg_option options_search[] = {
     {ARG_INT, 'n', "iterations", "N",
      "maximum number of iterations (default 200 for adam, else 30)",
      &fit_choice.iterations, 1, 1e9, NULL},
-    {ARG_NUMBER, 0, "lr", "RATE", "learning rate of adam (default 0.05)",
+    {ARG_NUMBER, 0, "lr", "RATE",
+     "learning rate of adam (default 0.05); of numbers between two bounds it falls in "
+     "fits "
+     "of more than 64 numbers with control variates",
      &fit_choice.learning_rate, 1e-12, 1e6, NULL},
     {ARG_NUMBER, 0, "momentum", "B",
      "of adam: the part of the mean gradient that stays from iteration to iteration "
-     "(default 0.9; 0.5 for textures with control variates)",
+     "(default 0.9; 0.5 for numbers between two bounds in fits of more than 64 numbers "
+     "with control variates)",
      &fit_choice.momentum, 1e-6, 0.999999, NULL},
     {ARG_INT, 0, "levels", "N",
      "of adam, and of bent rays: from coarse to fine, in N levels", &fit_choice.levels, 1,

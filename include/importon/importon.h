@@ -850,7 +850,7 @@ imp_problem_add_smoothness(imp_problem *problem, const char *glob, double weight
 
 /** Samples per pixel that imp_problem_objective takes for a target (imp_problem_reverse
  * for target -1), where this run asks for run->spp: they are cut into replicates of equal
- * size, so it may be a few more.
+ * size, or into two sets of equal size, so it may be a few more.
  * @return IMP_OK; IMP_E_ARG if there is no such target or sensor. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_spp(const imp_problem *problem,
                                                        int target,
@@ -863,7 +863,7 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_problem_spp(const imp_problem *proble
  * Quadratic losses through box filters take one pass with leave-one-out adjoints, so that
  * value and gradient have no bias (docs: estimators); others take two passes, and
  * objective->bias_order says what is left. spp is rounded up to at least 2,
- * and so that replicates have one size (imp_problem_spp).
+ * and so that replicates and sets have one size (imp_problem_spp).
  *
  * @param x         [imp_problem_n]; NULL: the scene's values.
  * @param run       run->sensor is ignored; NULL for defaults.
@@ -1007,7 +1007,8 @@ struct imp_fit_options {
     size_t size;
     enum imp_optimizer optimizer;
     int max_iterations;     /**< 0: 200 (Adam), 30 (others) */
-    double learning_rate;   /**< Adam, as a fraction of each variable's scale; 0: 0.05 */
+    double learning_rate;   /**< Adam, as a fraction of each variable's scale; 0: 0.05. It
+                                 falls with control variates (momentum) */
     double tolerance;       /**< stop when steps stay below this, relative; 0: 1e-4 */
     int intervals;          /**< estimate covariance and 95 % intervals at the end */
     const char *checkpoint; /**< file, rewritten every few seconds; NULL: none */
@@ -1029,8 +1030,9 @@ struct imp_fit_options {
      * same samples everywhere. */
     enum imp_allocation allocation;
     /** Adam: the part of the mean gradient that stays from one iteration to the next, its
-     * beta1, in (0, 1); 0: 0.9, or for textures with control variates, whose gradients have
-     * little noise, 0.5, while their learning rate falls (docs/fitting.md). */
+     * beta1, in (0, 1); 0: 0.9, but 0.5 for numbers between two bounds in fits of more than 64
+     * numbers with control variates, whose gradients have little noise. The learning rate of
+     * these falls as (1 + i/10)^-1/2 with iterations i, whatever momentum is (docs/fitting.md). */
     double momentum;
     /** Of IMP_LBFGS, IMP_MMA and IMP_SLSQP: walks are kept, too, where extinctions that vary
      * in space are fitted, with so much room to grow (imp_walks_options.headroom); 0 or 1:

@@ -12,7 +12,9 @@
  *     imp_walks_weigh         how many of them still count
  *
  * At the parameters that they were drawn at, kept walks give what tracing gives, to the
- * bit, unless roulette was given a floor (imp_walks_options). At others they are unbiased,
+ * bit, unless roulette was given a floor (imp_walks_options) or they are those of a loss with
+ * points of Sobol's sequence: kept walks serve losses of all kinds with one number of sets,
+ * and a loss that is traced has the sets that are best for it. At others they are unbiased,
  * and their variance grows where densities move away: with a narrower lobe much, with
  * reflectances and lamps not at all. Many evaluations of the same walks share their noise,
  * so that a fit's errors have to come from fresh ones (imp_fit takes care of that).
@@ -29,10 +31,12 @@ extern "C" {
 struct imp_walks_options {
     size_t size;
     double memory; /**< bytes that the walks may take; 0: 2^30 */
-    /** 0: the walks of imp_render with this run. 1: those of losses and their gradients
+    /** 0: the walks of imp_render with this run. 1: walks of losses and their gradients
      * (imp_problem_objective), of which pictures can be made too. They are the same walks
-     * unless points are those of Sobol's sequence, whose sets have to be independent of
-     * each other for a loss, or wavelengths are stratified. */
+     * unless wavelengths are stratified or points are those of Sobol's sequence, whose sets
+     * have to be independent of each other for a loss. Kept walks are then two or more
+     * replicates of two sets; a quadratic loss that is traced may have one replicate, and
+     * one that is not quadratic has four sets. */
     int losses;
     int all_sensors; /**< not 0: of all sensors; 0: of run->sensor alone */
     /** Least probability with which roulette lets a walk go on: reflectances up to its root

@@ -196,7 +196,8 @@ def keep(scene: Scene, params: Any = None, sensor: Any = 0, seed: int = 0, spp: 
     memory : float
         Bytes that the walks may take; 0: 2^30.
     losses : bool
-        The walks of losses and gradients, of which pictures can be made too.
+        Walks of losses and gradients, of which pictures can be made too. With Sobol's points
+        they are in sets for losses of all kinds; a loss that is traced may have other sets.
     survival : float
         Least probability with which roulette lets a walk go on; 0: 0.8; negative: what the
         integrator decides.
