@@ -95,6 +95,8 @@ struct chain_sums {
     struct tap_stat g[STEPS][MOST], plain[STEPS][MOST];
     struct tap_stat mean[STEPS], variance[STEPS]; /* of the picture; by the variate */
     struct tap_stat told[STEPS]; /* the variance less the squared error */
+    /* Of the gradient where I_{t-1} is given: squared errors told, and seen by two seeds. */
+    struct tap_stat se2[STEPS][MOST], seen2[STEPS][MOST];
 };
 
 /* Numbers of step t: on both sides of the true ones, some of them 0 for a while. */
@@ -116,6 +118,57 @@ static double unit(size_t k, const void *payload)
 enum how { PLAIN, MASKED, POINTS, ALLOCATED };
 static const char *const how_words[] = {"", " masked", " in sets of points",
                                         " with allocated samples"};
+
+/* The gradient's errors are of this evaluation's walks alone: from one I_{t-1}, two seeds. */
+static void errors_told(imp_problem *p, int t, const double *x, struct imp_run run,
+                        struct chain_sums *sums)
+{
+    const size_t n = imp_problem_n(p);
+    double *before = calloc(imp__variate_numbers(p->variate, p), sizeof *before);
+    double g[2][MOST], se[2][MOST];
+    if (!before) exit(99);
+    imp__variate_save(p->variate, p, before);
+    for (int k = 0; k < 2; k++) {
+        run.seed = imp__mix64(run.seed + 1);
+        test_must(ctx, imp__problem_objective(p, x, &run, false, NULL, g[k], se[k]));
+        imp__variate_restore(p->variate, p, before);
+    }
+    for (size_t k = 0; k < n; k++) {
+        tap_add(&sums->seen2[t][k], imp__sqr(g[0][k] - g[1][k]) / 2);
+        tap_add(&sums->se2[t][k], (imp__sqr(se[0][k]) + imp__sqr(se[1][k])) / 2);
+    }
+    free(before);
+}
+
+static int by_size(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Of each number, over the steps that see it. */
+static void errors_compare(const struct chain_sums *sums, size_t n)
+{
+    double ratio[MOST];
+    size_t count = 0;
+    for (size_t k = 0; k < n; k++) {
+        double told = 0, seen = 0;
+        for (int t = 1; t < STEPS; t++) {
+            /* In units of the step's own variance: steps count alike. */
+            const double unit = sums->se2[t][k].mean;
+            if (unit > 0) told++, seen += sums->seen2[t][k].mean / unit;
+        }
+        if (seen > 0) ratio[count++] = sqrt(told / seen);
+    }
+    qsort(ratio, count, sizeof *ratio, by_size);
+    if (count == 0) exit(99);
+    const double median = ratio[count / 2], least = ratio[0], most = ratio[count - 1];
+    tap_ok(
+        count > 10 && median > .9 && median < 1.1 && least > .7 && most < 1.3,
+        "... and errors of gradients, the last picture given # told/seen %.3f, %.3f to "
+        "%.3f of %zu numbers",
+        median, least, most, count);
+}
 
 /* Along a given path the mean of I_t, of the gradient and of the squared error of I_t. */
 static void along_a_path(const char *file, const char *defines, const char *glob,
@@ -183,6 +236,7 @@ static void along_a_path(const char *file, const char *defines, const char *glob
                 p->allocation = with && a.n > 0 ? &a : NULL;
                 a.metric = &metric;
                 run.seed = imp__mix64(2 * (uint64_t)(chain * STEPS + t) + (uint64_t)with);
+                if (with && points && t > 0) errors_told(p, t, x, run, &sums);
                 test_must(ctx, imp__problem_objective(p, x, &run, false, NULL, g, NULL));
                 for (size_t k = 0; k < n; k++)
                     tap_add(with ? &sums.g[t][k] : &sums.plain[t][k], g[k]);
@@ -227,6 +281,7 @@ static void along_a_path(const char *file, const char *defines, const char *glob
            file, how_words[how], (int)loss, count, worst, gain);
     tap_ok(mean < 4.5, "... pictures that of many samples # worst z %.2f", mean);
     tap_ok(off < 0.3, "... and the variance that is told # off by %.3f", off);
+    if (points) errors_compare(&sums, n);
     for (int t = 0; t < STEPS; t++) free(is[t]);
     free(pixel);
     free(mask);
