@@ -21,7 +21,7 @@ CASES = ["stage", "stage_mono", "shapes", "shapes_flip", "shapes_mirror", "meshe
          "emission_forms", "reflectance_forms", "sensor_0", "sensor_4", "sensor_9", "spots",
          "spots_mono", "directional", "projector", "stage_spectral", "rough_spectral", "glass_spectral",
          "textures_spectral", "emission_forms_spectral", "reflectance_forms_spectral", "sky_spectral",
-         "attributes", "attributes_mono", "bumps", "bumps_nearest",
+         "attributes", "attributes_mono", "bumps", "bumps_nearest", "bumps_curves", "bumps_instances",
          "beam", "beam_disk", "curves_bspline", "curves_linear", "batch"]
 
 

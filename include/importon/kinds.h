@@ -571,6 +571,9 @@ struct imp_shape {
     /* Its textures ask for more than uv: what `surface` and the draws of points write to uv
      * then stands for the triangle and the point in it, and `place` gives uv back. */
     bool by_triangle;
+    /* [2] of a shape that is there for instances alone which stretch or mirror its group, and
+     * has a bump map: from the group to the world, and back. Else NULL. */
+    const struct imp_map *placed;
 };
 
 /* A surface of constant curvature. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "kind/bsdf/measured.h"
 #include "scene/instances.h"
+#include "scene/scene_build.h"
 #include "tree_file.h"
 #include "tree_marks.h"
 #include <string.h>
@@ -293,7 +294,8 @@ static const struct imp_node *member_of(const struct imp_node *root,
 }
 
 /* Shapes of groups stand behind those of the scene, under the names that they have, and
- * so do those that an instance has covered with another material. */
+ * so do those that an instance has covered with another material: as spheres, of which uv alone
+ * is looked up. */
 static enum imp_status members_put(struct putting *p)
 {
     const struct imp_scene *scene = p->scene;
@@ -305,6 +307,11 @@ static enum imp_status members_put(struct putting *p)
             st = node_put(p, node, s->name, NULL);
             continue;
         }
+        if (imp__is_bumped(scene, s->bsdf))
+            return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                              "shape '%s': a bump map that its instance brings or "
+                              "stretches is not written with kept walks",
+                              s->name);
         char id[32];
         snprintf(id, sizeof id, "covered shape %d", k);
         put_mark(p, MARK_BEGIN);

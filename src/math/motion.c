@@ -18,6 +18,16 @@ bool imp__map_inverse(const struct imp_map *a, struct imp_map *out)
     return true;
 }
 
+struct imp_map imp__map_product(const struct imp_map *a, const struct imp_map *b)
+{
+    struct imp_map c;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 4; j++)
+            c.m[4 * i + j] = (a->m[4 * i] * b->m[j] + a->m[4 * i + 1] * b->m[4 + j]) +
+                             (a->m[4 * i + 2] * b->m[8 + j] + (j == 3) * a->m[4 * i + 3]);
+    return c;
+}
+
 void imp__map_box(const struct imp_map *a, imp_v3 *lo, imp_v3 *hi)
 {
     const imp_v3 from[2] = {*lo, *hi};

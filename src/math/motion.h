@@ -28,6 +28,8 @@ static inline imp_v3 imp__map_normal(const struct imp_map *inverse, imp_v3 n)
 struct imp_map imp__map_of(const struct imp_mat4 *a);
 /* False, and *out unchanged, if it is singular. */
 bool imp__map_inverse(const struct imp_map *a, struct imp_map *out);
+/* a after b. */
+struct imp_map imp__map_product(const struct imp_map *a, const struct imp_map *b);
 /* The box around the image of a box. */
 void imp__map_box(const struct imp_map *a, imp_v3 *lo, imp_v3 *hi);
 

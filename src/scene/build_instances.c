@@ -119,6 +119,12 @@ static enum imp_status within_list(struct imp_scene *scene, struct imp_group *g)
     g->within = all;
     for (int k = 0; k < g->n_within; k++)
         g->bumped |= imp__is_bumped(scene, scene->shapes[all[k]]->bsdf);
+    for (int i = 0; i < g->n_instances; i++) {
+        const struct imp_instance *p = &g->instance[i];
+        g->bumped |=
+            p->group->bumped || (p->covered && imp__is_bumped(scene, p->covered->bsdf));
+        g->stretched |= p->group->stretched || imp__instance_stretches(p);
+    }
     return IMP_OK;
 }
 
@@ -175,19 +181,6 @@ static enum imp_status place_read(struct imp_scene *scene, struct imp_node *node
                                 "%s is singular: it flattens the group", key));
 out:
     return st;
-}
-
-/* A rotation, a shift, one factor? */
-static bool is_similar(const struct imp_map *map)
-{
-    const double *m = map->m;
-    const imp_v3 c[3] = {{m[0], m[4], m[8]}, {m[1], m[5], m[9]}, {m[2], m[6], m[10]}};
-    const double size = imp__dot(c[0], c[0]);
-    double off = 0;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            off = fmax(off, fabs(imp__dot(c[i], c[j]) - (i == j ? size : 0)));
-    return off <= 1e-6 * size && imp__dot(imp__cross(c[0], c[1]), c[2]) > 0;
 }
 
 static enum imp_status motion_read(struct imp_scene *scene, struct imp_node *node,
@@ -260,13 +253,6 @@ static enum imp_status instance_build(struct imp_scene *scene, struct imp_node *
         IMP_TRY(imp__build_bsdf(scene, bsdf, name, "bsdf", &made));
         IMP_TRY(covered_make(scene, node, p->group, made->index, &p->covered));
     }
-    struct imp_map last = p->to_world, inverse;
-    if (p->motion) imp__motion_at(p->motion, p->motion->end, &last, &inverse);
-    if ((bsdf ? imp__is_bumped(scene, p->covered->bsdf) : p->group->bumped) &&
-        !(is_similar(&p->to_world) && is_similar(&last)))
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_UNSUPPORTED,
-                                "it mirrors, shears or stretches a group with a bumpmap: "
-                                "slopes are those of the group"));
     IMP_TRY(imp__props_finish(ctx, node));
 out:
     return st;
@@ -299,6 +285,7 @@ static enum imp_status instances_build(struct imp_scene *scene, struct imp_node 
         c->used = true;
         IMP_TRY(
             instance_build(scene, c->node, c->node->id ? c->node->id : name, depth, p));
+        if (depth == 0) IMP_TRY(imp__bumps_place(scene, c->node, p));
         p->before = g->n_places;
         if (__builtin_add_overflow(g->n_places, 1 + p->group->n_places, &g->n_places))
             IMP_TRY(imp__node_error(scene->ctx, c->node, IMP_E_SCENE,

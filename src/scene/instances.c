@@ -23,16 +23,6 @@ static const struct imp_instance *descend(const struct imp_group *g, int64_t *pl
     return &g->instance[at];
 }
 
-static struct imp_map product(const struct imp_map *a, const struct imp_map *b)
-{
-    struct imp_map c;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 4; j++)
-            c.m[4 * i + j] = (a->m[4 * i] * b->m[j] + a->m[4 * i + 1] * b->m[4 + j]) +
-                             (a->m[4 * i + 2] * b->m[8 + j] + (j == 3) * a->m[4 * i + 3]);
-    return c;
-}
-
 void imp__placed_surface(const struct imp_scene *scene, const struct imp_hit *hit,
                          const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
 {
@@ -47,33 +37,37 @@ void imp__placed_surface(const struct imp_scene *scene, const struct imp_hit *hi
         if (p->motion) imp__motion_at(p->motion, hit->time, &at[0], &at[1]);
         from = imp__map_point(&at[1], from);
         along = imp__map_vector(&at[1], along);
-        to_world = first ? at[0] : product(&to_world, &at[0]);
-        to_local = first ? at[1] : product(&at[1], &to_local);
+        to_world = first ? at[0] : imp__map_product(&to_world, &at[0]);
+        to_local = first ? at[1] : imp__map_product(&at[1], &to_local);
         g = p->group;
     }
     s->ops->surface(s, hit, &from, &along, out);
-    out->p = imp__map_point(&to_world, out->p);
-    out->ng = imp__normalize(imp__map_normal(&to_local, out->ng));
-    out->n = imp__normalize(imp__map_normal(&to_local, out->n));
-    out->dp_du = imp__map_vector(&to_world, out->dp_du);
-    out->dp_dv = imp__map_vector(&to_world, out->dp_dv);
-    imp__surface_frame(out);
+    imp__surface_move(out, &to_world, &to_local);
+}
+
+int imp__covered_shape(const struct imp_covered *c, int shape)
+{
+    const struct imp_group *g = c->group;
+    int at = 0; /* of the shape in g->within */
+    for (int n = g->n_within; n > 1;) {
+        const int half = n / 2;
+        if (g->within[at + half] <= shape) at += half;
+        n -= half;
+    }
+    return c->first + at;
 }
 
 int imp__placed_shape(const struct imp_scene *scene, int shape, int64_t place)
 {
     const struct imp_group *g = scene->world;
-    while (place > 0) {
+    const struct imp_covered *covered = NULL;
+    int raised = -1;
+    for (bool outermost = true; place > 0; outermost = false) {
         const struct imp_instance *p = descend(g, &place);
+        if (outermost && p->raised) raised = p->raised[place];
+        if (!covered) covered = p->covered;
         g = p->group;
-        if (!p->covered) continue;
-        int at = 0; /* of the shape in g->within */
-        for (int n = g->n_within; n > 1;) {
-            const int half = n / 2;
-            if (g->within[at + half] <= shape) at += half;
-            n -= half;
-        }
-        return p->covered->first + at;
     }
-    return shape;
+    if (raised >= 0) return raised + (shape - g->first);
+    return covered ? imp__covered_shape(covered, shape) : shape;
 }

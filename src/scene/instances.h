@@ -21,7 +21,11 @@ struct imp_instance {
     const struct imp_motion *motion;   /* NULL: it stands still */
     const struct imp_covered *covered; /* what its own material makes of the group's
                                           shapes; NULL: they have theirs */
-    int64_t before;                    /* places in the instances before it */
+    const int *raised; /* [1 + group->n_places] of an instance of the scene: first of the
+                          copies of a group's shapes that stand for them at the rest of a
+                          place (build_bumps.c); -1: they stand there themselves. NULL:
+                          all do */
+    int64_t before;    /* places in the instances before it */
 };
 
 /* The shapes of a group with another material: copies of them, of which the first has
@@ -38,10 +42,11 @@ struct imp_group {
     struct imp_instance *instance; /* [n_instances] */
     int64_t n_places;              /* in all of them */
     int n_within;
-    int *within;   /* [n_within] all shapes that a ray can meet in it, ascending; of a
+    int *within;    /* [n_within] all shapes that a ray can meet in it, ascending; of a
                       group only */
-    imp_v3 lo, hi; /* bounds of all of it */
-    bool bumped;   /* a material in it has a bump map */
+    imp_v3 lo, hi;  /* bounds of all of it */
+    bool bumped;    /* a material in it has a bump map */
+    bool stretched; /* an instance in it stretches or mirrors */
     void *intersector;
 };
 
@@ -52,7 +57,16 @@ bool imp__is_instance(const struct imp_node *node);
 /* All groups and instances of the scene, when its other shapes are there. */
 enum imp_status imp__instances_build(struct imp_scene *scene);
 
+/* ---- build_bumps.c ---- */
+/* Does it stretch or mirror its group, at any time? */
+bool imp__instance_stretches(const struct imp_instance *p);
+/* Copies of shapes for the bump maps in an instance of the scene. */
+enum imp_status imp__bumps_place(struct imp_scene *scene, const struct imp_node *node,
+                                 struct imp_instance *p);
+
 /* ---- instances.c ---- */
+/* The shape that stands for this one of the group. */
+int imp__covered_shape(const struct imp_covered *c, int shape);
 /* From the world of an instance to its group, at a time; `room`: for what moves. */
 static inline const struct imp_map *
 imp__instance_local(const struct imp_instance *p, double time, struct imp_map room[2])
@@ -66,7 +80,8 @@ void imp__instance_box(const struct imp_instance *p, imp_v3 *lo, imp_v3 *hi);
 /* The surface at a hit in an instance. */
 void imp__placed_surface(const struct imp_scene *scene, const struct imp_hit *hit,
                          const imp_v3 *o, const imp_v3 *d, struct imp_surface *out);
-/* Index of the shape that was hit at this place, with the material it has there. */
+/* Index of the shape that was hit at this place, with the material and heights that it has
+ * there. */
 int imp__placed_shape(const struct imp_scene *scene, int shape, int64_t place);
 /* The surface at a hit of the ray (o, d). */
 static inline void imp__hit_surface(const struct imp_scene *scene,

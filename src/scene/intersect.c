@@ -209,7 +209,7 @@ bool imp__intersect_at(const struct imp_scene *scene, double time, const imp_v3 
 {
     if (!nearest(scene->intersector, time, o, d, tmin, tmax, hit)) return false;
     hit->time = time;
-    if (imp_unlikely(hit->place > 0) && scene->n_covered > 0)
+    if (imp_unlikely(hit->place > 0) && (scene->n_covered > 0 || scene->raised))
         hit->shape = imp__placed_shape(scene, hit->shape, hit->place);
     return true;
 }

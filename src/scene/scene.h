@@ -121,6 +121,8 @@ struct imp_scene {
     int n_groups, n_covered;
     struct imp_group **groups; /* instances.h */
     struct imp_covered **covered;
+    const struct imp_raised *raised; /* copies of shapes for bump maps in instances: the
+                                        last one made (build_bumps.c); NULL: none */
     struct imp_group *world; /* its shapes and instances; NULL: there are no instances */
     struct imp_bsdf **bsdfs; /* every node, nested ones too */
     struct imp_emitter **emitters;

@@ -384,25 +384,44 @@ static void rayless(void)
     imp_walks_destroy(walks);
 }
 
-static void unwritten(void)
+static void unwritten_one(const char *what, const char *shapes, const char *reason)
 {
-    static const char bumped[] =
-        "<scene version='3.0.0'><integrator type='path'/><sensor "
-        "type='perspective'><film "
-        "type='hdrfilm'><integer name='width' value='4'/><integer name='height' "
-        "value='4'/></film></sensor><emitter type='constant'/><shape type='obj'><string "
-        "name='filename' value='%s'/><bsdf type='bumpmap'><texture type='bitmap' "
-        "name='arbitrary'><string name='filename' value='%s'/></texture><bsdf "
-        "type='diffuse'/></bsdf></shape></scene>";
-    char text[1024];
-    snprintf(text, sizeof text, bumped, mesh, picture);
+    char text[2048];
+    snprintf(text, sizeof text,
+             "<scene version='3.0.0'><integrator type='path'/><sensor "
+             "type='perspective'><transform name='to_world'><lookat origin='0,0,4' "
+             "target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><integer "
+             "name='width' value='4'/><integer name='height' value='4'/></film></sensor>"
+             "<emitter type='constant'/><bsdf type='bumpmap' id='bumps'><texture "
+             "type='bitmap' name='arbitrary'><string name='filename' value='%s'/>"
+             "</texture><bsdf type='diffuse'/></bsdf>%s</scene>",
+             picture, shapes);
     imp_scene *scene = test_scene_text(ctx, text, IMP_RGB);
     imp_walks *walks = keep(scene, 2, IMP_POINTS_SCENE);
     tap_ok(imp_walks_write(walks, path) == IMP_E_UNSUPPORTED &&
-               strstr(imp_last_error(ctx), "triangles count"),
-           "bumps on triangles are refused # %s", imp_last_error(ctx));
+               strstr(imp_last_error(ctx), reason),
+           "%s are refused # %s", what, imp_last_error(ctx));
     imp_walks_destroy(walks);
     imp_scene_destroy(scene);
+}
+
+static void unwritten(void)
+{
+    char shapes[512];
+    snprintf(shapes, sizeof shapes,
+             "<shape type='obj'><string name='filename' value='%s'/><ref id='bumps'/>"
+             "</shape>",
+             mesh);
+    unwritten_one("bumps on triangles", shapes, "triangles count");
+    unwritten_one("bumps of an instance",
+                  "<shape type='shapegroup' id='g'><shape type='rectangle'/></shape>"
+                  "<shape type='instance'><ref id='g'/><ref id='bumps'/></shape>",
+                  "brings or stretches");
+    unwritten_one("bumps that an instance stretches",
+                  "<shape type='shapegroup' id='g'><shape type='rectangle'><ref "
+                  "id='bumps'/></shape></shape><shape type='instance'><ref id='g'/>"
+                  "<transform name='to_world'><scale x='2'/></transform></shape>",
+                  "brings or stretches");
 }
 
 int main(void)

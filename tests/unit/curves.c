@@ -303,7 +303,7 @@ static void bumped(void)
 {
     const char *look = CAMERA "<emitter type='directional'><vector name='direction' "
                               "value='.2,1,-.7'/></emitter>";
-    char body[3][4096];
+    char body[3][2048];
     imp_film *film[3];
     snprintf(body[0], sizeof body[0],
              "%s<shape type='bsplinecurve'><string name='filename' value='straight.txt'/>"

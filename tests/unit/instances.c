@@ -2,7 +2,7 @@
  *
  * Instances beside copies of the same shapes: ray by ray the same shape, place, surface and
  * material; the same pictures and gradients. Sheared, mirrored, nested and moving ones, of
- * meshes and of analytic shapes. */
+ * meshes and of analytic shapes; bump maps in all of these. */
 #include "scene/instances.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
@@ -249,41 +249,53 @@ static void placed(const char *what, const struct member *m, int n,
     free(a.at), free(b.at), free(of);
 }
 
-/* A bump map that an instance puts on shapes which had none. */
-static void bumped(void)
+/* ---- Bump maps -------------------------------------------------------------------- */
+
+static char heights_path[64];
+static void heights_write(void)
 {
-    static const struct member m[] = {
-        {"rectangle", "red"}, {"mesh", "blue"}, {"sphere", "red"}};
-    const struct imp_mat4 at[2] = {turned(-2, 0, 0, 20, 1), turned(4, 1, 1, 50, 1)};
-    struct text a = {0}, b = {0};
-    char path[64];
-    snprintf(path, sizeof path, "instances_%ld.pfm", (long)getpid());
-    FILE *f = fopen(path, "wb");
+    snprintf(heights_path, sizeof heights_path, "instances_%ld.pfm", (long)getpid());
+    FILE *f = fopen(heights_path, "wb");
     fprintf(f, "Pf\n8 8\n-1\n");
     for (int k = 0; k < 64; k++)
         fwrite(&(float){.3f * (float)(k * 29 % 13) / 13}, sizeof(float), 1, f);
     fclose(f);
-    for (int k = 0; k < 2; k++) {
-        struct text *t = k ? &b : &a;
-        put_head(t);
-        put(t,
-            "<bsdf type='twosided' id='rough'><bsdf type='bumpmap'><texture "
-            "type='bitmap' name='height'><string name='filename' value='%s'/><boolean "
-            "name='raw' value='true'/></texture><bsdf type='diffuse' id='rough_paint'>"
-            "<rgb name='reflectance' value='.5,.4,.7'/></bsdf></bsdf></bsdf>",
-            path);
-    }
+}
+static void put_rough(struct text *t)
+{
+    put(t,
+        "<bsdf type='twosided' id='rough'><bsdf type='bumpmap'><texture "
+        "type='bitmap' name='height'><string name='filename' value='%s'/><boolean "
+        "name='raw' value='true'/></texture><bsdf type='diffuse' id='rough_paint'>"
+        "<rgb name='reflectance' value='.5,.4,.7'/></bsdf></bsdf></bsdf>",
+        heights_path);
+}
+static void put_instance(struct text *t, const char *group, bool own,
+                         const struct imp_mat4 *at)
+{
+    put(t, "<shape type='instance'><ref id='%s'/>%s", group,
+        own ? "<ref id='rough'/>" : "");
+    put_matrix(t, "to_world", at);
+    put(t, "</shape>");
+}
+
+/* Beside copies where the instances are; of a group whose material is bumped, or which gets
+ * it by instance. */
+static void bumped(const char *what, const struct member *m, int n,
+                   const struct imp_mat4 *at, int n_at, bool own)
+{
+    struct text a = {0}, b = {0};
+    put_head(&a), put_head(&b);
+    put_rough(&a), put_rough(&b);
     put(&a, "<shape type='shapegroup' id='group'>");
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < n; k++) {
         const struct imp_mat4 in = of_member(k);
-        put_member(&a, &m[k], &in, NULL);
+        put_member(&a, &m[k], &in, own ? NULL : "rough");
     }
     put(&a, "</shape>");
-    for (int i = 0; i < 2; i++) {
-        put(&a, "<shape type='instance'><ref id='group'/><ref id='rough'/>");
-        put_matrix(&a, "to_world", &at[i]);
-        put(&a, "</shape>");
-        for (int k = 0; k < 3; k++) {
+    for (int i = 0; i < n_at; i++) {
+        put_instance(&a, "group", own, &at[i]);
+        for (int k = 0; k < n; k++) {
             const struct imp_mat4 there = times(at[i], of_member(k));
             put_member(&b, &m[k], &there, "rough");
         }
@@ -291,20 +303,86 @@ static void bumped(void)
     put(&a, "</scene>"), put(&b, "</scene>");
     imp_scene *with = test_scene_text(ctx, a.at, IMP_RGB),
               *copies = test_scene_text(ctx, b.at, IMP_RGB);
-    outputs_compare("a bump map by instance", with, copies);
+    outputs_compare(what, with, copies);
     imp_scene_destroy(with);
     imp_scene_destroy(copies);
-    /* One that mirrors is refused. */
-    struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
-    a.n -= strlen("</scene>");
-    put(&a, "<shape type='instance'><ref id='group'/><ref id='rough'/><transform "
-            "name='to_world'><scale x='-1'/></transform></shape></scene>");
-    const enum imp_status st =
-        imp_scene_load_string(ctx, a.at, strlen(a.at), "test", &o, &with);
-    tap_ok(st == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "mirrors, shears"),
-           "a mirrored bump map is refused # %s", imp_last_error(ctx));
     free(a.at), free(b.at);
-    remove(path);
+}
+
+/* Stretched instances in stretched instances, the second of which may have its bumps from
+ * outside. `wanted` places are stretched in different ways, and have copies of shapes. */
+static void bumped_nested(const struct imp_mat4 inner[2], const struct imp_mat4 outer[2],
+                          bool own, int wanted)
+{
+    struct text a = {0}, b = {0};
+    put_head(&a), put_head(&b);
+    put_rough(&a), put_rough(&b);
+    put(&a, "<shape type='shapegroup' id='outer'>");
+    for (int j = 0; j < 2; j++) put_instance(&a, "inner", j == 0, &inner[j]);
+    put(&a, "</shape><shape type='shapegroup' id='inner'>");
+    for (int k = 0; k < 3; k++) {
+        const struct imp_mat4 in = of_member(k);
+        put_member(&a, &flat[k], &in, k == 0 ? "rough" : NULL);
+    }
+    put(&a, "</shape>");
+    for (int i = 0; i < 2; i++) {
+        put_instance(&a, "outer", own && i == 1, &outer[i]);
+        for (int j = 0; j < 2; j++)
+            for (int k = 0; k < 3; k++) {
+                const struct imp_mat4 there =
+                    times(outer[i], times(inner[j], of_member(k)));
+                put_member(&b, &flat[k], &there,
+                           (own && i == 1) || j == 0 || k == 0 ? "rough" : NULL);
+            }
+    }
+    put(&a, "</scene>"), put(&b, "</scene>");
+    imp_scene *with = test_scene_text(ctx, a.at, IMP_RGB),
+              *copies = test_scene_text(ctx, b.at, IMP_RGB);
+    outputs_compare("nested bumps", with, copies);
+    const int raised = with->n_all_shapes - 3 - 3 * (1 + own);
+    tap_ok(raised == 3 * wanted, "nested bumps: %d copies of shapes # wanted 3 * %d",
+           raised, wanted);
+    imp_scene_destroy(with);
+    imp_scene_destroy(copies);
+    free(a.at), free(b.at);
+}
+
+/* One that moves keeps its stretch, or is refused; its picture from before it begins. */
+static void bumped_moving(struct imp_mat4 from)
+{
+    for (int changes = 0; changes < 2; changes++) {
+        const struct imp_mat4 to = times(turned(4, 1, 0, 50, changes ? 1.1 : 1), from),
+                              in = of_member(0);
+        struct text a = {0}, b = {0};
+        put_head(&a), put_head(&b);
+        put_rough(&a), put_rough(&b);
+        put(&a, "<shape type='shapegroup' id='group'>");
+        put_member(&a, &flat[0], &in, "rough");
+        put(&a, "</shape><shape type='instance'><ref id='group'/><float "
+                "name='time_start' value='2'/><float name='time_end' value='3'/>");
+        put_matrix(&a, "to_world", &from);
+        put_matrix(&a, "to_world_end", &to);
+        put(&a, "</shape></scene>");
+        const struct imp_mat4 there = times(from, in);
+        put_member(&b, &flat[0], &there, "rough");
+        put(&b, "</scene>");
+        struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
+        imp_scene *with = NULL;
+        const enum imp_status st =
+            imp_scene_load_string(ctx, a.at, strlen(a.at), "test", &o, &with);
+        if (changes) {
+            tap_ok(st == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "that moves"),
+                   "bumps that are stretched more and more are refused # %s",
+                   imp_last_error(ctx));
+        } else {
+            test_must(ctx, st);
+            imp_scene *copies = test_scene_text(ctx, b.at, IMP_RGB);
+            outputs_compare("moving bumps", with, copies);
+            imp_scene_destroy(copies);
+        }
+        imp_scene_destroy(with);
+        free(a.at), free(b.at);
+    }
 }
 
 /* Two instances of a group of two instances and a shape. */
@@ -491,7 +569,25 @@ int main(void)
     placed("sheared", flat, 3, sheared, 3, false);
     placed("mirrored cubes", flat, 1, mirrored, 3, false);
     placed("materials by instance", flat, 4, even, 3, true);
-    bumped();
+    heights_write();
+    static const struct member smooth[] = {
+        {"rectangle", "red"}, {"mesh", "blue"}, {"sphere", "red"}, {"cylinder", "blue"}};
+    static const struct member slanted[] = {
+        {"rectangle", "red"}, {"cube", "blue"}, {"cylinder", "red"}, {"disk", "red"}};
+    const struct imp_mat4 rigid[2] = {turned(-2, 0, 0, 20, 1), turned(4, 1, 1, 50, 1)};
+    bumped("bumps", smooth, 4, rigid, 2, false);
+    bumped("bumps by instance", smooth, 4, rigid, 2, true);
+    bumped("bumps, other sizes", smooth, 4, even, 3, false);
+    bumped("bumps, other sizes, by instance", smooth, 4, even, 3, true);
+    bumped("bumps, sheared", slanted, 4, sheared, 3, false);
+    bumped("bumps, mirrored", &slanted[1], 1, mirrored, 3, false);
+    const struct imp_mat4 outer[2] = {sheared[0],
+                                      times(turned(9, 1, 0, 35, 1), sheared[0])};
+    bumped_nested(mirrored, outer, true, 4);
+    bumped_nested(mirrored, outer, false, 2);
+    bumped_nested(rigid, rigid, true, 0);
+    bumped_moving(sheared[0]);
+    remove(heights_path);
     nested();
     motions();
     memory();

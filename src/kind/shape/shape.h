@@ -7,7 +7,7 @@
 
 #include "base/compiler.h"
 #include "kind/build.h"
-#include "math/transform.h"
+#include "math/motion.h"
 
 struct imp_placement {
     struct imp_mat4 to_world, to_local;
@@ -52,6 +52,19 @@ static inline void imp__surface_frame(struct imp_surface *x)
         x->s = f.s;
         x->t = f.t;
     }
+}
+
+/* From a group to the world. */
+static inline void imp__surface_move(struct imp_surface *x,
+                                     const struct imp_map *to_world,
+                                     const struct imp_map *to_local)
+{
+    x->p = imp__map_point(to_world, x->p);
+    x->ng = imp__normalize(imp__map_normal(to_local, x->ng));
+    x->n = imp__normalize(imp__map_normal(to_local, x->n));
+    x->dp_du = imp__map_vector(to_world, x->dp_du);
+    x->dp_dv = imp__map_vector(to_world, x->dp_dv);
+    imp__surface_frame(x);
 }
 
 /* Points nearer to edge-on than this are neither drawn nor given a density. */

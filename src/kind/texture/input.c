@@ -8,6 +8,7 @@
 #include "base/arguments.h"
 #include "color/rgb.h"
 #include "color/spectrum.h"
+#include "kind/shape/shape.h"
 #include "math/vec.h"
 
 static void weighted_scatter(struct imp_sink *sink, int param, size_t element,
@@ -151,6 +152,11 @@ static imp_spec bumped(const struct imp_input *input, const struct imp_texcoord 
         return (imp_spec){0, 0, 1, 0};
     if (!x) {
         at->shape->ops->place(at->shape, at->uv, &made, &prim);
+        x = &made;
+    }
+    if (imp_unlikely(at->shape->placed != NULL)) {
+        made = *x;
+        imp__surface_move(&made, &at->shape->placed[0], &at->shape->placed[1]);
         x = &made;
     }
     const double scale = input->value[0];
