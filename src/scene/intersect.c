@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Rays against the scene. Triangles are Embree's own work, in float; analytic shapes answer
- * through their ops, in double, and their hits never pass through a float (struct query
- * carries ray and hit past it). Instances are shapes of this kind, too: each takes the ray
+ * through their ops, in double, and their hits never pass through a float (where Embree has
+ * them in its tree, struct query carries ray and hit past it). Instances are shapes of this kind, too: each takes the ray
  * to its group, in double, and asks the group's own scene of Embree. So they can be nested
  * and move, and one costs 280 bytes; Embree's own instances cost 375 to 400, and those of
  * Debian cannot be nested. */
@@ -157,7 +157,7 @@ static inline void query_fill(struct query *q, const struct imp_intersector *x,
 {
     rtcInitIntersectContext(&q->context);
     q->geometry = RTC_INVALID_GEOMETRY_ID;
-    if (!x->analytic) return;
+    if (!x->calls_back) return;
     q->o = o;
     q->d = d;
     q->tmin = tmin;
@@ -172,12 +172,14 @@ nearest(const struct imp_intersector *x, double time, const imp_v3 *o, const imp
     struct query q;
     struct RTCRayHit r;
     if (imp_unlikely(!ray_valid(o, d, tmin, tmax))) return false;
+    const bool met = imp__few_nearest(&x->few, o, d, tmin, &tmax, hit);
+    if (imp_unlikely(!x->knows)) return met;
     query_fill(&q, x, time, o, d, tmin, tmax);
     ray_fill(&r.ray, o, d, tmin, tmax);
     r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(x->rtc, &q.context, &r);
-    if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+    if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return met;
     if (q.geometry == r.hit.geomID) {
         *hit = q.hit;
         return true;
@@ -198,6 +200,8 @@ anything(const struct imp_intersector *x, double time, const imp_v3 *o, const im
     struct query q;
     struct RTCRay r;
     if (imp_unlikely(!ray_valid(o, d, tmin, tmax))) return false;
+    if (imp__few_occluded(&x->few, o, d, tmin, tmax)) return true;
+    if (imp_unlikely(!x->knows)) return false;
     query_fill(&q, x, time, o, d, tmin, tmax);
     ray_fill(&r, o, d, tmin, tmax);
     rtcOccluded1(x->rtc, &q.context, &r);

@@ -215,6 +215,14 @@ static bool is_robust(const struct imp_scene *scene, const struct content *c)
     return c->aims != NULL;
 }
 
+static bool is_few(const struct imp_scene *scene, const struct content *c)
+{
+    int n = 0;
+    for (int i = 0; !c->aims && i < c->n; i++)
+        n += shape_at(scene, c, i)->geometry == IMP_ANALYTIC;
+    return !c->aims && n <= IMP_FEW;
+}
+
 static enum imp_status intersector_make(struct imp_scene *scene, const struct content *c,
                                         void **out)
 {
@@ -234,15 +242,21 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
         rtcSetSceneFlags(
             x->rtc, (is_robust(scene, c) ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE) |
                         (c->aims ? RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION : 0));
-    const bool instances = c->group && c->group->n_instances > 0;
+    const bool instances = c->group && c->group->n_instances > 0,
+               few = is_few(scene, c);
     for (int i = 0; x->rtc && i < c->n + instances && told.error == RTC_ERROR_NONE; i++) {
         const struct imp_shape *s = i < c->n ? shape_at(scene, c, i) : NULL;
+        if (s && s->geometry == IMP_ANALYTIC && few) {
+            imp__few_add(&x->few, s);
+            continue;
+        }
         RTCGeometry g = s ? geometry_create(rtc, s, c->aims != NULL)
                           : instances_create(rtc, c->group);
         if (!g) break;
         rtcAttachGeometryByID(x->rtc, g, (unsigned)i);
         rtcReleaseGeometry(g); /* the scene holds it now */
-        x->analytic |= !s || s->geometry == IMP_ANALYTIC;
+        x->knows = true;
+        x->calls_back |= !s || s->geometry == IMP_ANALYTIC;
     }
     if (x->rtc && told.error == RTC_ERROR_NONE) rtcCommitScene(x->rtc);
     const enum RTCError error =

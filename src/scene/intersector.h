@@ -4,12 +4,14 @@
 #ifndef IMP_INTERSECTOR_H
 #define IMP_INTERSECTOR_H
 
-#include "scene.h"
+#include "few.h"
 #include <embree3/rtcore.h>
 
 struct imp_intersector {
     RTCScene rtc;
-    bool analytic; /* some shape answers through its ops, or there are instances */
+    struct imp_few few; /* analytic shapes that Embree does not know */
+    bool knows;         /* Embree has something to look for */
+    bool calls_back;    /* for analytic shapes or instances */
     int first;     /* index of its first shape */
     int64_t bytes;
 };

@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "few.h"
+#include "kind/shape/shape.h"
+
+/* The radius is enlarged by more than the rounding of what is computed with it. */
+void imp__few_add(struct imp_few *f, const struct imp_shape *shape)
+{
+    const int g = f->n / 4, k = f->n % 4;
+    struct imp_round round;
+    imp_v3 centre = (shape->lo + shape->hi) * 0.5;
+    double radius = 0.5 * imp__length(shape->hi - shape->lo);
+    if (imp__shape_round(shape, &round) && imp__dot(round.axis, round.axis) == 0) {
+        centre = round.centre;
+        radius = round.radius;
+    }
+    if (k == 0) /* no ray meets a ball that is not there */
+        f->r2[g] = imp__spec(-INFINITY);
+    f->x[g][k] = centre[0];
+    f->y[g][k] = centre[1];
+    f->z[g][k] = centre[2];
+    f->r2[g][k] = imp__sqr(radius * (1 + 1e-6));
+    f->shape[f->n++] = shape;
+}

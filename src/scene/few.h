@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Analytic shapes of a scene that has few of them. Four at a time, those are found whose
+ * surrounding ball a ray may meet, and these are asked; Embree, which calls back for one
+ * after the other in its tree, does not know them. */
+#ifndef IMP_SCENE_FEW_H
+#define IMP_SCENE_FEW_H
+
+#include "scene.h"
+
+#define IMP_FEW 8
+
+struct imp_few {
+    int n;
+    imp_v3 x[IMP_FEW / 4], y[IMP_FEW / 4], z[IMP_FEW / 4]; /* centres of the balls */
+    imp_v3 r2[IMP_FEW / 4]; /* squares of their radii, a little enlarged */
+    const struct imp_shape *shape[IMP_FEW];
+};
+
+/* At most IMP_FEW of geometry IMP_ANALYTIC. */
+void imp__few_add(struct imp_few *f, const struct imp_shape *shape);
+
+/* Of balls 4 g to 4 g + 3, which may the ray meet? A bit for each. With c from its origin to a centre, b = c.d
+ * and a = d.d it meets the ball's line where b^2 >= a (c.c - r^2), and the ball if that lies
+ * ahead or the origin is inside. Where c.c is so large that its rounding exceeds what r was
+ * enlarged by, the ball counts as met. */
+static inline unsigned imp__few_met(const struct imp_few *f, int g, const imp_v3 *o,
+                                    const imp_v3 *d)
+{
+    const imp_v3 x = f->x[g] - (*o)[0], y = f->y[g] - (*o)[1], z = f->z[g] - (*o)[2];
+    const imp_v3 b = x * (*d)[0] + y * (*d)[1] + z * (*d)[2];
+    const imp_v3 out = (x * x + y * y + z * z) * (1 - 1e-14) - f->r2[g];
+    const __typeof__(b >= 0) met =
+        (b * b >= out * imp__dot(*d, *d)) & ((b >= 0) | (out <= 0));
+#ifdef __AVX__
+    return (unsigned)__builtin_ia32_movmskpd256((imp_v3)met);
+#else
+    return (met[0] & 1) | (met[1] & 2) | (met[2] & 4) | (met[3] & 8);
+#endif
+}
+
+/* The nearest hit before *tmax, which becomes its distance. */
+static inline bool imp__few_nearest(const struct imp_few *f, const imp_v3 *o,
+                                    const imp_v3 *d, double tmin, double *tmax,
+                                    struct imp_hit *hit)
+{
+    bool met = false;
+    for (int g = 0; 4 * g < f->n; g++)
+        for (unsigned ask = imp__few_met(f, g, o, d); ask; ask &= ask - 1) {
+            const struct imp_shape *s = f->shape[4 * g + __builtin_ctz(ask)];
+            struct imp_hit own;
+            if (!s->ops->intersect(s, o, d, tmin, *tmax, &own)) continue;
+            *hit = own;
+            hit->shape = s->index;
+            hit->place = 0;
+            *tmax = own.t;
+            met = true;
+        }
+    return met;
+}
+
+/* Is one of them met between tmin and tmax? */
+static inline bool imp__few_occluded(const struct imp_few *f, const imp_v3 *o,
+                                     const imp_v3 *d, double tmin, double tmax)
+{
+    for (int g = 0; 4 * g < f->n; g++)
+        for (unsigned ask = imp__few_met(f, g, o, d); ask; ask &= ask - 1) {
+            const struct imp_shape *s = f->shape[4 * g + __builtin_ctz(ask)];
+            struct imp_hit own;
+            if (s->ops->intersect(s, o, d, tmin, tmax, &own)) return true;
+        }
+    return false;
+}
+
+#endif
