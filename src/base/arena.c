@@ -29,8 +29,9 @@ static bool block_next(struct imp_arena *a, size_t bytes)
     if (!next) {
         size_t size = imp_max(bytes, imp_max(BLOCK_MIN, a->total / 2));
         size = (size + 31) & ~(size_t)31; /* so that `used`, rounded up, stays inside */
-        next = imp__alloc(a->ctx, 1, sizeof *next + size);
+        next = imp__alloc_raw(a->ctx, 1, sizeof *next + size);
         if (!next) return false;
+        next->next = NULL;
         next->size = size;
         a->total += size;
         struct imp__arena_block **tail = &a->first;

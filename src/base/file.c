@@ -70,7 +70,7 @@ enum imp_status imp__file_read_own(imp_context *ctx, const char *path, size_t li
         if (b.size + room > b.capacity) {
             unsigned char *grown;
             if (!b.data) { /* exactly, not doubled */
-                grown = imp__alloc(ctx, room, 1);
+                grown = imp__alloc_raw(ctx, room, 1);
                 b.capacity = room;
             } else grown = imp__grow(ctx, b.data, &b.capacity, b.size + room, 1);
             if (!grown)
