@@ -312,6 +312,35 @@ out:
     return st;
 }
 
+/* ---- Ranges --------------------------------------------------------------------- */
+
+struct ranges {
+    size_t n, each;
+    enum imp_status (*work)(size_t first, size_t end, void *payload);
+    void *payload;
+};
+
+static enum imp_status range_work(size_t i, int worker, int slot, void *payload)
+{
+    const struct ranges *r = payload;
+    (void)worker, (void)slot;
+    return r->work(i * r->each, imp_min((i + 1) * r->each, r->n), r->payload);
+}
+
+enum imp_status imp__parallel_ranges(imp_context *ctx, size_t n, size_t least,
+                                     enum imp_status (*work)(size_t first, size_t end,
+                                                             void *payload),
+                                     void *payload)
+{
+    const size_t most = (size_t)ctx->threads;
+    const size_t each = imp_max(n / most + (n % most != 0), least);
+    if (n <= each) return n > 0 ? work(0, n, payload) : IMP_OK;
+    struct ranges r = {n, each, work, payload};
+    const struct imp_loop loop = {
+        .n_items = n / each + (n % each != 0), .work = range_work, .payload = &r};
+    return imp__parallel(ctx, &loop, NULL);
+}
+
 /* ---- Sums ---------------------------------------------------------------------- */
 
 /* Nodes that wait for a slow item: no more than this many a thread. */

@@ -47,6 +47,14 @@ int imp__pool_slots(const imp_context *ctx);
 enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop,
                               size_t *done);
 
+/* work(first, end) for [0, n) in as many ranges as there are threads, each of `least` or more
+ * elements; for fewer than two of these in the calling thread. Nothing may depend on where a
+ * range begins, but work may stop at its first failure, and the first of all is returned. */
+enum imp_status imp__parallel_ranges(imp_context *ctx, size_t n, size_t least,
+                                     enum imp_status (*work)(size_t first, size_t end,
+                                                             void *payload),
+                                     void *payload);
+
 /* Is the calling thread at work on a loop of this context? */
 bool imp__pool_inside(imp_context *ctx);
 /* Add up results over items [first, first + loop->n_items) of the tree (sum_tree.h):

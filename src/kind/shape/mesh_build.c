@@ -2,34 +2,63 @@
  *
  * Triangle meshes are made: arrays placed in the world, areas, and what a hit would
  * otherwise compute again. */
+#include "base/pool.h"
 #include "mesh_triangle.h"
 #include "shape.h"
 
 /* Embree takes larger coordinates for invalid. */
 #define COORDINATE_MAX 1e18
 
+#define LEAST 32768 /* vertices that are worth a thread */
+
+/* Of all threads: each places a range, and the boxes of ranges add up to the shape's. */
+struct placing {
+    const struct imp_build *b;
+    const struct imp_mesh_data *data;
+    const struct imp_placement *at;
+    pthread_mutex_t lock; /* of s->lo and s->hi */
+    struct imp_shape *s;
+    float *out;
+};
+
+static enum imp_status range_place(size_t first, size_t end, void *payload)
+{
+    struct placing *place = payload;
+    imp_v3 lo = imp__v3(INFINITY, INFINITY, INFINITY), hi = -lo;
+    for (size_t k = first; k < end; k++) {
+        const float *q = place->data->positions + 3 * k;
+        const imp_v3 p = imp__point(&place->at->to_world, imp__v3(q[0], q[1], q[2]));
+        for (int i = 0; i < 3; i++) {
+            if (!(fabs(p[i]) < COORDINATE_MAX))
+                return imp_build_error(place->b, NULL, IMP_E_SCENE,
+                                       "vertex %zu is not finite, or further out than %g",
+                                       k, COORDINATE_MAX);
+            const float x = (float)p[i];
+            place->out[3 * k + (size_t)i] = x;
+            lo[i] = imp_min(lo[i], x);
+            hi[i] = imp_max(hi[i], x);
+        }
+    }
+    pthread_mutex_lock(&place->lock);
+    for (int i = 0; i < 3; i++) {
+        place->s->lo[i] = fmin(place->s->lo[i], lo[i]);
+        place->s->hi[i] = fmax(place->s->hi[i], hi[i]);
+    }
+    pthread_mutex_unlock(&place->lock);
+    return IMP_OK;
+}
+
 static enum imp_status positions_place(const struct imp_build *b, struct imp_shape *s,
                                        const struct imp_mesh_data *data,
                                        const struct imp_placement *at, float *out)
 {
+    struct placing place = {b, data, at, PTHREAD_MUTEX_INITIALIZER, s, out};
     s->lo = imp__v3(INFINITY, INFINITY, INFINITY);
     s->hi = -s->lo;
-    for (size_t k = 0; k < data->n_vertices; k++) {
-        const float *q = data->positions + 3 * k;
-        const imp_v3 p = imp__point(&at->to_world, imp__v3(q[0], q[1], q[2]));
-        for (int i = 0; i < 3; i++) {
-            if (!(fabs(p[i]) < COORDINATE_MAX))
-                return imp_build_error(b, NULL, IMP_E_SCENE,
-                                       "vertex %zu is not finite, or further out than %g",
-                                       k, COORDINATE_MAX);
-            const float x = (float)p[i];
-            out[3 * k + i] = x;
-            s->lo[i] = fmin(s->lo[i], x);
-            s->hi[i] = fmax(s->hi[i], x);
-        }
-    }
+    const enum imp_status st =
+        imp__parallel_ranges(b->ctx, data->n_vertices, LEAST, range_place, &place);
     s->lo[3] = s->hi[3] = 0;
-    return IMP_OK;
+    return st;
 }
 
 static enum imp_status normals_place(const struct imp_build *b, const struct imp_shape *s,
@@ -69,29 +98,60 @@ static enum imp_status data_check(const struct imp_build *b,
     return IMP_OK;
 }
 
+/* Blocks of triangles: their volumes add up in one order, whoever computed them. */
+#define BLOCK 4096
+struct measuring {
+    const struct imp__mesh *m;
+    imp_v3 centre;
+    size_t n;       /* triangles */
+    double *volume; /* [n / BLOCK + 1], of cones from the centre */
+};
+
+/* Areas go to m->cumulative, one place behind. */
+static enum imp_status blocks_measure(size_t first, size_t end, void *payload)
+{
+    const struct measuring *x = payload;
+    for (size_t block = first; block < end; block++) {
+        double volume = 0;
+        for (size_t k = block * BLOCK; k < imp_min((block + 1) * BLOCK, x->n); k++) {
+            const struct imp__mesh_corner e = imp__mesh_corner(x->m, k);
+            const imp_v3 c = imp__cross(e.e1, e.e2);
+            x->m->cumulative[k + 1] = imp__length(c) / 2;
+            volume += imp__dot(e.p0 - x->centre, c) / 6;
+        }
+        x->volume[block] = volume;
+    }
+    return IMP_OK;
+}
+
 static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
                                  struct imp_shape *s, size_t n)
 {
+    enum imp_status st = IMP_OK;
+    const size_t blocks = n / BLOCK + (n % BLOCK != 0);
+    struct measuring x = {m, (s->lo + s->hi) * 0.5, n,
+                          imp__alloc_raw(b->ctx, blocks, sizeof *x.volume)};
     m->cumulative = imp__arena_take(b->arena, n + 1, sizeof *m->cumulative);
-    if (!m->cumulative) return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
-    const imp_v3 centre = (s->lo + s->hi) * 0.5;
-    double sum = 0, volume = 0;
+    if (!m->cumulative || !x.volume)
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory"));
+    IMP_TRY(imp__parallel_ranges(b->ctx, blocks, LEAST / BLOCK, blocks_measure, &x));
+    double sum = 0;
     m->cumulative[0] = 0;
     for (size_t k = 0; k < n; k++) {
-        const struct imp__mesh_corner e = imp__mesh_corner(m, k);
-        const imp_v3 c = imp__cross(e.e1, e.e2);
         const double before = sum;
-        sum += imp__length(c) / 2;
-        volume += imp__dot(e.p0 - centre, c) / 6;
+        sum += m->cumulative[k + 1];
         if (sum > before) m->last = k;
         m->cumulative[k + 1] = sum;
     }
     if (!isfinite(sum))
-        return imp_build_error(b, NULL, IMP_E_SCENE, "its area is not finite");
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE, "its area is not finite"));
     s->area = sum;
-    s->triangles.volume = volume;
+    s->triangles.volume = 0;
+    for (size_t k = 0; k < blocks; k++) s->triangles.volume += x.volume[k];
     m->inv_area = sum > 0 ? 1 / sum : 0;
-    return IMP_OK;
+out:
+    imp__release(b->ctx, x.volume);
+    return st;
 }
 
 /* Do all vertex normals say what the faces say? Then they are not worth looking up. */
@@ -144,6 +204,14 @@ static enum imp_status facets_make(const struct imp_build *b, struct imp__mesh *
     return IMP_OK;
 }
 
+/* Room for n triples, not zeroed, and for what is loaded with the last of them. */
+static float *triples_take(const struct imp_build *b, size_t n)
+{
+    float *array = imp__arena_take(b->arena, 3 * n + IMP_MESH_PADDING, sizeof *array);
+    if (array) memset(array + 3 * n, 0, IMP_MESH_PADDING * sizeof *array);
+    return array;
+}
+
 enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
                                 struct imp_shape *s, const struct imp_mesh_data *data,
                                 bool face_normals)
@@ -155,10 +223,8 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
     IMP_TRY(imp__shape_placement(b, s, &at));
     IMP_TRY(data_check(b, data));
     const size_t n = data->n_vertices;
-    float *positions = imp_build_alloc(b, 3 * n + IMP_MESH_PADDING, sizeof *positions);
-    float *normals = face_normals
-                         ? NULL
-                         : imp_build_alloc(b, 3 * n + IMP_MESH_PADDING, sizeof *normals);
+    float *positions = triples_take(b, n),
+          *normals = face_normals ? NULL : triples_take(b, n);
     if (!positions || (!normals && !face_normals))
         IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory"));
     IMP_TRY(positions_place(b, s, data, &at, positions));
