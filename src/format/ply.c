@@ -109,7 +109,7 @@ static enum imp_status element_read(struct ply *p, int index)
 {
     enum imp_status st = IMP_OK;
     const struct ply_element *e = &p->elements[index];
-    if (e->n_properties == 0) return IMP_OK;
+    if (e->n_properties == 0 || imp__ply_copy(p, index)) return IMP_OK;
     for (size_t row = 0; row < e->n; row++) {
         double value[USES + 2] = {0};
         for (int i = 0; i < e->n_properties; i++) {

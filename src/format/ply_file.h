@@ -77,6 +77,11 @@ bool imp__ply_has(const struct ply *p, enum ply_use use);
 /* Up to the first byte of the body. The counts are not larger than the file can hold. */
 enum imp_status imp__ply_header(struct ply *p);
 
+/* The rows of an element, where they have one size and their numbers lie as in this machine's
+ * memory: copied, by all threads, and p->at is behind them. False: nothing was done; they are
+ * to be read number by number, which also says what is wrong with them. */
+bool imp__ply_copy(struct ply *p, int element);
+
 /* Attributes: found in the header, with room for their numbers; number x of property q
  * goes to row `row`; and they are the mesh's. */
 enum imp_status imp__ply_attributes(struct ply *p);
