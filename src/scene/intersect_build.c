@@ -6,34 +6,46 @@
  * thread library makes a thread when a device is released, or when a second one is made,
  * and ends the process if it cannot. Scenes are built in the thread that commits, the
  * same way each time; no thread of Embree's is used. */
+#include "base/pool.h"
 #include "instances.h"
 #include "intersector.h"
+#include <sched.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
 
-/* Memory and errors of one commit: Embree calls back in the committing thread. */
-static _Thread_local struct commit {
-    int64_t bytes;
-    enum RTCError error;
+/* Memory and errors of one commit, inside build_enter: Embree calls back in any thread that
+ * builds. */
+static struct commit {
+    _Atomic int64_t bytes;
+    _Atomic int error;  /* enum RTCError; the first counts */
+    _Atomic bool begun; /* threads can join */
     char message[256];
 } told;
 
 static void error_keep(void *user, enum RTCError error, const char *text)
 {
+    int none = RTC_ERROR_NONE;
     (void)user;
-    if (told.error != RTC_ERROR_NONE) return;
-    told.error = error;
+    if (!atomic_compare_exchange_strong(&told.error, &none, (int)error)) return;
     snprintf(told.message, sizeof told.message, "%s", text ? text : "");
 }
 
 static bool bytes_count(void *user, ssize_t bytes, bool post)
 {
     (void)user, (void)post;
-    told.bytes += bytes;
+    atomic_fetch_add(&told.bytes, bytes);
+    atomic_store(&told.begun, true);
     return true;
+}
+
+static void told_clear(void)
+{
+    atomic_store(&told.bytes, 0);
+    atomic_store(&told.error, RTC_ERROR_NONE);
+    told.message[0] = 0;
 }
 
 static enum imp_status device_error(imp_context *ctx, enum RTCError error,
@@ -46,6 +58,7 @@ static enum imp_status device_error(imp_context *ctx, enum RTCError error,
                       text);
 }
 
+#define BUILDERS_MAX 64
 static RTCDevice device;
 static _Atomic long builder; /* process of the thread that is with Embree; 0: none */
 
@@ -68,7 +81,12 @@ static enum imp_status device_get(imp_context *ctx, RTCDevice *out)
 {
     enum imp_status st = IMP_OK;
     if (!(*out = device)) {
-        *out = rtcNewDevice("threads=1,ignore_config_files=1");
+        char config[64];
+        long threads = sysconf(_SC_NPROCESSORS_ONLN);
+        threads = threads < 1 ? 1 : threads > BUILDERS_MAX ? BUILDERS_MAX : threads;
+        snprintf(config, sizeof config,
+                 "threads=%ld,user_threads=%ld,ignore_config_files=1", threads, threads);
+        *out = rtcNewDevice(config);
         if (*out) {
             rtcSetDeviceErrorFunction(*out, error_keep, NULL);
             rtcSetDeviceMemoryMonitorFunction(*out, bytes_count, NULL);
@@ -215,6 +233,23 @@ static bool is_robust(const struct imp_scene *scene, const struct content *c)
     return c->aims != NULL;
 }
 
+/* Of one commit: all workers build, the first item begins. */
+static enum imp_status tree_join(size_t i, int worker, int slot, void *rtc)
+{
+    (void)worker, (void)slot;
+    while (i > 0 && !atomic_load(&told.begun)) sched_yield();
+    rtcJoinCommitScene(rtc);
+    atomic_store(&told.begun, true);
+    return IMP_OK;
+}
+static enum imp_status tree_build(imp_context *ctx, RTCScene rtc)
+{
+    const struct imp_loop loop = {
+        .n_items = (size_t)ctx->threads, .work = tree_join, .payload = rtc};
+    atomic_store(&told.begun, false);
+    return imp__parallel(ctx, &loop, NULL);
+}
+
 static bool is_few(const struct imp_scene *scene, const struct content *c)
 {
     int n = 0;
@@ -235,15 +270,14 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
     if (!x)
         IMP_TRY(imp__error(scene->ctx, IMP_E_NOMEM, "out of memory for the intersector"));
 
-    told = (struct commit){.error = RTC_ERROR_NONE};
+    told_clear();
     x->first = c->first;
     x->rtc = rtcNewScene(rtc);
     if (x->rtc)
         rtcSetSceneFlags(
             x->rtc, (is_robust(scene, c) ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE) |
                         (c->aims ? RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION : 0));
-    const bool instances = c->group && c->group->n_instances > 0,
-               few = is_few(scene, c);
+    const bool instances = c->group && c->group->n_instances > 0, few = is_few(scene, c);
     for (int i = 0; x->rtc && i < c->n + instances && told.error == RTC_ERROR_NONE; i++) {
         const struct imp_shape *s = i < c->n ? shape_at(scene, c, i) : NULL;
         if (s && s->geometry == IMP_ANALYTIC && few) {
@@ -258,9 +292,10 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
         x->knows = true;
         x->calls_back |= !s || s->geometry == IMP_ANALYTIC;
     }
-    if (x->rtc && told.error == RTC_ERROR_NONE) rtcCommitScene(x->rtc);
-    const enum RTCError error =
-        !x->rtc && told.error == RTC_ERROR_NONE ? RTC_ERROR_UNKNOWN : told.error;
+    if (x->rtc && told.error == RTC_ERROR_NONE) st = tree_build(scene->ctx, x->rtc);
+    const enum RTCError error = !x->rtc && told.error == RTC_ERROR_NONE
+                                    ? RTC_ERROR_UNKNOWN
+                                    : (enum RTCError)told.error;
     x->bytes = told.bytes;
     if (error != RTC_ERROR_NONE) {
         if (x->rtc) rtcReleaseScene(x->rtc);

@@ -12,7 +12,7 @@ struct imp_intersector {
     struct imp_few few; /* analytic shapes that Embree does not know */
     bool knows;         /* Embree has something to look for */
     bool calls_back;    /* for analytic shapes or instances */
-    int first;     /* index of its first shape */
+    int first;          /* index of its first shape */
     int64_t bytes;
 };
 
