@@ -141,7 +141,9 @@ static bool scatter(struct imp_step *s, struct imp_vertex *v,
     if (!imp__light_depth_allows(s, segments + 1)) return false;
     if (v->bsdf->flags & IMP_BSDF_SMOOTH) {
         struct imp_shadow shadow = {.wanted = false};
-        imp__light_sample(s, v, at, frame, &shadow);
+        struct imp_light_point point;
+        if (imp__light_point(s, v, at, &point))
+            imp__light_sample(s, v, at, frame, &point, &shadow);
         if (shadow.wanted) light_see(s, v, at, &shadow);
         /* A sensor that is a surface is connected by the walk from the light. */
         for (int k = 1; s->depth >= 0 && k < b->n_light && !s->walk->dropped; k++)

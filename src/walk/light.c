@@ -150,50 +150,55 @@ static inline double continuation_pdf(const struct imp_step *s, const struct imp
                            : imp__lane_mis_density(s, p);
 }
 
+bool imp__light_point(const struct imp_step *s, const struct imp_vertex *v,
+                      const struct imp_surface *at, struct imp_light_point *out)
+{
+    if (s->scene->n_emitters == 0) return false;
+    double u[2] = {imp__step_number(s, IMP_DIM_LIGHT_U),
+                   imp__step_number(s, IMP_DIM_LIGHT_V)};
+    out->light = imp_unlikely(s->light_tree != NULL && !s->guided.here)
+                     ? tree_sample(s, v->bsdf, at, u, &out->pmf, &out->there)
+                     : weights_sample(s, at, u, &out->pmf, &out->there);
+    return out->light >= 0 && out->there.pdf > 0;
+}
+
 void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
                        const struct imp_surface *at, const struct imp_frame *frame,
-                       struct imp_shadow *shadow)
+                       const struct imp_light_point *to, struct imp_shadow *shadow)
 {
     const struct imp_scene *scene = s->scene;
     const struct imp_bsdf *b = v->bsdf;
-    if (scene->n_emitters == 0) return;
-
-    /* A light and a point on it. */
-    double u[2] = {imp__step_number(s, IMP_DIM_LIGHT_U),
-                   imp__step_number(s, IMP_DIM_LIGHT_V)};
-    double pmf;
-    struct imp_light_sample ls;
-    const int light = imp_unlikely(s->light_tree != NULL && !s->guided.here)
-                          ? tree_sample(s, b, at, u, &pmf, &ls)
-                          : weights_sample(s, at, u, &pmf, &ls);
-    if (light < 0 || !(ls.pdf > 0)) return;
+    const struct imp_light_sample *ls = &to->there;
+    const int light = to->light;
+    const double pmf = to->pmf;
     const struct imp_emitter *e = scene->emitters[light];
     if (imp_unlikely(s->tracer->integrator->only_points) &&
         !(e->ops->flags & IMP_EMITTER_DELTA))
         return;
-    if ((e->ops->flags & IMP_EMITTER_AREA) && !(ls.cos_light > 0)) return; /* its back */
+    if ((e->ops->flags & IMP_EMITTER_AREA) && !(ls->cos_light > 0)) return; /* its back */
 
     /* Its weight against the continuation that could have met it. */
-    const struct imp_dirs dirs = {s->wo, imp__decide(imp__to_local(frame, ls.wi)),
+    const struct imp_dirs dirs = {s->wo, imp__decide(imp__to_local(frame, ls->wi)),
                                   IMP_SMOOTH, imp__derivative_wanted(s, b)};
     imp_spec f;
-    const double pdf = continuation_pdf(s, b, &dirs, ls.wi, &f);
+    const double pdf = continuation_pdf(s, b, &dirs, ls->wi, &f);
     if (!(pdf > 0)) return; /* structurally zero: nothing to see, no derivative */
-    const double p = ls.pdf * pmf;
+    const double p = ls->pdf * pmf;
     const bool alone =
         (e->ops->flags & IMP_EMITTER_DELTA) || !s->tracer->integrator->directions;
     const double mis = imp_unlikely(s->both != NULL)
-                           ? imp__both_sample_weight(s, light, &ls, b, &dirs)
+                           ? imp__both_sample_weight(s, light, ls, b, &dirs)
                        : alone ? 1
                                : power_heuristic(p, pdf);
     const double weight = imp__emitter_timed(e, s->walk->time, imp__decide1(mis / p));
 
     /* What it brings, if it is seen. */
-    const imp_v3 there = imp__decide((imp_v3){ls.uv[0], ls.uv[1], ls.dist, ls.cos_light});
+    const imp_v3 there =
+        imp__decide((imp_v3){ls->uv[0], ls->uv[1], ls->dist, ls->cos_light});
     const struct imp_emission x = {
-        {there[0], there[1]}, there[2], there[3], imp__decide(-ls.wi)};
-    const bool far = !isfinite(ls.dist);
-    const imp_v3 point = imp__decide(far ? (imp_v3){0} : ls.p);
+        {there[0], there[1]}, there[2], there[3], imp__decide(-ls->wi)};
+    const bool far = !isfinite(ls->dist);
+    const imp_v3 point = imp__decide(far ? (imp_v3){0} : ls->p);
     const imp_spec le = imp__emitter_radiance(scene, light, &x, point, s->at.carried);
     const struct imp_active *active = s->tracer->active;
     const bool differentiable =
@@ -209,8 +214,8 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
 
     /* Aimed from the moved origin at the point itself: a ray parallel to wi would meet a
      * concave light before its end. */
-    shadow->o = imp__offset(at->p, at->ng, ls.wi);
-    shadow->d = far ? ls.wi : ls.p - shadow->o; /* then t = 1 is the light */
+    shadow->o = imp__offset(at->p, at->ng, ls->wi);
+    shadow->d = far ? ls->wi : ls->p - shadow->o; /* then t = 1 is the light */
     shadow->reach = far ? INFINITY : 1 - 10 * IMP_RAY_EPSILON;
     shadow->wanted = true;
 }

@@ -117,29 +117,37 @@ static bool last_bounce(const struct imp_step *s)
     return max_depth >= 0 && imp__bounces(s) + 1 >= max_depth;
 }
 
-bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_surface *at,
-                  const struct imp_frame *frame)
+bool imp__direction_begin(const struct imp_step *s, const struct imp_vertex *v,
+                          const struct imp_frame *frame, struct imp_direction *out)
 {
     const double u[3] = {imp__step_number(s, IMP_DIM_LOBE),
                          imp__step_number(s, IMP_DIM_DIR_U),
                          imp__step_number(s, IMP_DIM_DIR_V)};
     const struct imp_bsdf *b = v->bsdf;
-    struct imp_dirs dirs = {.wo = s->wo_drawn,
-                            .lobe = IMP_SMOOTH,
-                            .derivative = imp__derivative_wanted(s, b)};
+    out->dirs = (struct imp_dirs){.wo = s->wo_drawn,
+                                  .lobe = IMP_SMOOTH,
+                                  .derivative = imp__derivative_wanted(s, b)};
+    return imp__direction_draw(s, b, frame, u, &out->dirs, &out->by);
+}
 
-    /* The direction, its density and its value. */
-    int by;
-    if (!imp__direction_draw(s, b, frame, u, &dirs, &by)) return false;
-    const imp_v3 w = imp__to_world(frame, dirs.wi);
-    dirs.wo = s->wo;
-    dirs.wi = imp__decide(dirs.wi);
+bool imp__scatter_along(struct imp_step *s, struct imp_vertex *v,
+                        const struct imp_surface *at, const struct imp_frame *frame,
+                        struct imp_direction *direction)
+{
+    const struct imp_bsdf *b = v->bsdf;
+    struct imp_dirs *dirs = &direction->dirs;
+    const int by = direction->by;
+
+    /* Its density and its value. */
+    const imp_v3 w = imp__to_world(frame, dirs->wi);
+    dirs->wo = s->wo;
+    dirs->wi = imp__decide(dirs->wi);
     const bool straight = imp_unlikely(b->straight) && s->segment->through &&
-                          dirs.lobe >= 0 && dirs.lobe < 64 &&
-                          b->straight >> dirs.lobe & 1;
+                          dirs->lobe >= 0 && dirs->lobe < 64 &&
+                          b->straight >> dirs->lobe & 1;
     if (imp_unlikely(!straight && b->straight) && last_bounce(s)) return false;
     imp_spec f;
-    const struct drawn p = density(s, b, &dirs, w, by, &f);
+    const struct drawn p = density(s, b, dirs, w, by, &f);
     const double pdf = imp__decide1(p.pdf);
     if (!(pdf > 0)) return false; /* structurally zero */
 
@@ -149,14 +157,14 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
     if (!imp__throughput_add(s, b, f * (1 / pdf))) return false;
     if (b->ops->index_ratio)
         s->eta *= imp_likely(!b->shaped)
-                      ? b->ops->index_ratio(b, s->in, &dirs)
-                      : imp__shaped_index_ratio(b, s->at.carried, s->in, &dirs);
+                      ? b->ops->index_ratio(b, s->in, dirs)
+                      : imp__shaped_index_ratio(b, s->at.carried, s->in, dirs);
     if (!roulette(s, b, f * (1 / pdf), &survive)) return false;
     s->beta *= imp__spec(1 / survive);
     imp__step_weigh(v, f, pdf, survive);
     if (s->recorded) {
-        imp__store_v3(v->d.wi, dirs.wi);
-        v->d.lobe = (int8_t)dirs.lobe;
+        imp__store_v3(v->d.wi, dirs->wi);
+        v->d.lobe = (int8_t)dirs->lobe;
         v->d.drawn = (uint8_t)(by & 7);
         v->d.alone = s->mixed.here && s->mixed.only >= 0;
         v->d.pdf = (imp_decided)pdf;
@@ -181,6 +189,14 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
     s->from = at->p;
     if (imp_unlikely(s->light_tree != NULL)) s->left = imp__light_place(s, b, at);
     const double competing = imp_likely(!s->mixed.splits) ? pdf : p.competing;
-    s->pdf = dirs.lobe == IMP_SMOOTH && s->segment->connects ? competing : 0;
+    s->pdf = dirs->lobe == IMP_SMOOTH && s->segment->connects ? competing : 0;
     return true;
+}
+
+bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_surface *at,
+                  const struct imp_frame *frame)
+{
+    struct imp_direction direction;
+    return imp__direction_begin(s, v, frame, &direction) &&
+           imp__scatter_along(s, v, at, frame, &direction);
 }

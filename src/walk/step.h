@@ -226,11 +226,18 @@ struct imp_shadow {
 void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
                         double weight, const struct imp_hit *hit,
                         const struct imp_surface *at);
-/* Light sample at v: choose an emitter and a point on it. Whether it is visible is asked
- * later, after the continuation is drawn: neither waits for the other's arithmetic. */
+/* A light and a point of it, for the vertex v. False: none. */
+struct imp_light_point {
+    int light;
+    double pmf; /* of the light, or of the triangle that there.pdf is that of */
+    struct imp_light_sample there;
+};
+bool imp__light_point(const struct imp_step *s, const struct imp_vertex *v,
+                      const struct imp_surface *at, struct imp_light_point *out);
+/* What v gets from there, and the shadow ray. */
 void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
                        const struct imp_surface *at, const struct imp_frame *frame,
-                       struct imp_shadow *shadow);
+                       const struct imp_light_point *to, struct imp_shadow *shadow);
 
 /* ---- stam.c ---- */
 /* Stam's termination: with probability `absorb` the walk ends and collects what glows
@@ -322,7 +329,18 @@ static inline bool imp__throughput_add(struct imp_step *s, const struct imp_bsdf
     s->beta *= factor;
     return !imp__is_zero_used(s->beta, four);
 }
-/* Decide whether and whither the walk goes on. False: it ends here. */
+/* A direction in which the walk may go on from v. False: it ends. */
+struct imp_direction {
+    int by; /* which member of the mixture drew it (enum imp_density) */
+    struct imp_dirs dirs;
+};
+bool imp__direction_begin(const struct imp_step *s, const struct imp_vertex *v,
+                          const struct imp_frame *frame, struct imp_direction *out);
+/* Decide whether the walk goes on there; rounds the direction. False: it ends here. */
+bool imp__scatter_along(struct imp_step *s, struct imp_vertex *v,
+                        const struct imp_surface *at, const struct imp_frame *frame,
+                        struct imp_direction *direction);
+/* Both. */
 bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_surface *at,
                   const struct imp_frame *frame);
 

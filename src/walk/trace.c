@@ -287,20 +287,26 @@ vertex_work(struct imp_step *s, struct imp_vertex *v, const struct imp_hit *hit,
     const bool unseen = imp_unlikely(integrator->hide_emitters) && s->depth < 0;
     if (!(v->bsdf->flags & IMP_BSDF_NULL) && !unseen) s->walk->valid = true;
 
-    /* The connection to a light. */
-    struct imp_shadow shadow;
-    shadow.wanted = false;
-    if ((v->bsdf->flags & IMP_BSDF_SMOOTH) && s->segment->connects &&
-        integrator->lights && bounces && !unseen)
-        imp__light_sample(s, v, at, frame, &shadow);
-
-    /* The continuation. */
+    /* A point of a light, and a direction: both are drawn before either is weighed, and both are
+     * weighed before the light is looked for, so that neither waits for the other's roots and
+     * quotients. */
     const bool splits = imp_unlikely(s->mixed.splits) ||
                         (imp_unlikely(s->tracer->split > 1) && s->depth == 0 &&
                          s->scene->n_bodies + s->scene->n_media == 0);
+    struct imp_light_point point;
+    const bool lit = (v->bsdf->flags & IMP_BSDF_SMOOTH) && s->segment->connects &&
+                     integrator->lights && bounces && !unseen &&
+                     imp__light_point(s, v, at, &point);
+    struct imp_direction direction;
+    const bool drawn = integrator->directions && !splits &&
+                       imp__direction_begin(s, v, frame, &direction);
+
+    struct imp_shadow shadow;
+    shadow.wanted = false;
+    if (lit) imp__light_sample(s, v, at, frame, &point, &shadow);
     const bool continues =
-        integrator->directions &&
-        (splits ? imp__scatter_split(s, v, at, frame) : imp__scatter(s, v, at, frame));
+        drawn ? imp__scatter_along(s, v, at, frame, &direction)
+              : splits && integrator->directions && imp__scatter_split(s, v, at, frame);
 
     /* Is the light seen? */
     if (shadow.wanted) {
