@@ -3,6 +3,7 @@
  * Colours written as objects (docs/scene-format.md 2.4). */
 #include "color_objects.h"
 #include "base/number.h"
+#include "base/required.h"
 #include "cie.h"
 #include "math/vec.h"
 #include <string.h>
@@ -54,7 +55,7 @@ enum imp_status imp__color_list(imp_context *ctx, struct imp_node *node, const c
     size_t cap = 0, len = 0;
 
     IMP_TRY(imp__props_string(ctx, node, name, NULL, &text));
-    if (!text) IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "'%s' is required", name));
+    if (!text) IMP_TRY(imp__node_missing(ctx, node, name));
     const char *s = text, *end = text + strlen(text);
     while (*(s += strspn(s, ", \t\r\n"))) {
         const char *start = s;
@@ -81,7 +82,7 @@ enum imp_status imp__color_require(imp_context *ctx, struct imp_node *node,
                                    const char *name)
 {
     if (imp__props_has(node, name)) return IMP_OK;
-    return imp__node_error(ctx, node, IMP_E_SCENE, "'%s' is required", name);
+    return imp__node_missing(ctx, node, name);
 }
 
 /* wavelength_min and wavelength_max, in nm. */
@@ -267,7 +268,8 @@ static enum imp_status blackbody_object(const struct imp__color_ask *ask,
     if (!imp__color_wants_spectrum(ask))
         IMP_TRY(imp__node_error(ctx, node, IMP_E_UNSUPPORTED,
                                 "blackbody exists in spectral modes only "
-                                "(-m spectral, -m single)"));
+                                "(-m spectral, -m single); in others write the light's "
+                                "colour, as <rgb>"));
     IMP_TRY(imp__color_require(ctx, node, "temperature"));
     IMP_TRY(imp__props_float_in(ctx, node, "temperature", 0, IMP_POSITIVE, &T));
     IMP_TRY(imp__props_float_in(ctx, node, "scale", 1, IMP_NOT_NEGATIVE, &scale));

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "film_integrator.h"
+#include "base/required.h"
 #include "elements/elements_integrator.h"
 #include "walk/walk_integrator.h"
 #include <string.h>
@@ -71,8 +72,7 @@ static enum imp_status aov_build(const struct imp_build *build, struct imp_integ
     const char *text;
     IMP_TRY(depth_build(build, i));
     if (!imp__props_has(build->node, "aovs"))
-        IMP_TRY(imp__node_error(build->ctx, build->node, IMP_E_SCENE,
-                                "property 'aovs' is missing"));
+        IMP_TRY(imp__node_missing(build->ctx, build->node, "aovs"));
     IMP_TRY(imp__props_string(build->ctx, build->node, "aovs", "", &text));
     IMP_TRY(aovs_read(build, text, i->self));
 out:

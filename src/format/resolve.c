@@ -5,6 +5,7 @@
  * bitmap and envmap, intensities for ies, reflectances for merl and measured, cells for gridvolume,
  * control points for curves. */
 #include "base/film.h"
+#include "base/required.h"
 #include "color/rgb.h"
 #include "curve_file.h"
 #include "ies_file.h"
@@ -32,8 +33,7 @@ static enum imp_status path_of(struct imp_scene *scene, struct imp_node *node,
     const char *name, *first = NULL;
     enum imp_status st = imp__props_string(scene->ctx, node, "filename", NULL, &name);
     if (st != IMP_OK) return st;
-    if (!name)
-        return imp__node_error(scene->ctx, node, IMP_E_SCENE, "'filename' is required");
+    if (!name) return imp__node_missing(scene->ctx, node, "filename");
     const char *file = imp__node_prop(node, "filename")->loc.file;
     if (file && file != scene->root->loc.file) {
         first = imp__folder_of(scene, file);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Inputs of objects: constants, which become parameters, and textures. */
+#include "base/required.h"
 #include "color/convert.h"
 #include "color/rgb.h"
 #include "scene_build.h"
@@ -233,8 +234,7 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
         if (volume) IMP_TRY(volume_check(scene, child->node, t, d));
         return IMP_OK;
     } else if (d->flags & IMP_INPUT_REQUIRED) {
-        IMP_TRY(
-            imp__node_error(ctx, node, IMP_E_SCENE, "property '%s' is missing", d->name));
+        IMP_TRY(imp__node_missing(ctx, node, d->name));
     } else {
         struct imp__color_ask absent = ask;
         if (scalar) absent.role = IMP_REFLECTANCE;

@@ -456,7 +456,7 @@ static void scenes(void)
     static const struct {
         const char *xml, *words;
     } wrong[] = {
-        {"<emitter type='ies'/>", "'filename' is required"},
+        {"<emitter type='ies'/>", "'filename' is missing"},
         {"<emitter type='ies'><string name='filename' value='no.ies'/></emitter>",
          "no.ies"},
         {LAMP("downlight", "<string name='units' value='lux'/>"), "units"},

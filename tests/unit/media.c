@@ -543,7 +543,7 @@ int main(void)
     refused(FOG("<phase type='hg'/><phase type='rayleigh'/>"), "", "blendphase");
 #define TABLE(values)                                                                    \
     FOG("<phase type='tabphase'><string name='values' value='" values "'/></phase>")
-    refused(FOG("<phase type='tabphase'/>"), "", "'values' is required");
+    refused(FOG("<phase type='tabphase'/>"), "", "'values' is missing");
     refused(TABLE("1"), "", "not a row");
     refused(TABLE("1, x"), "", "not a row");
     refused(TABLE("1, -1, 2"), "", "value 1, -1, is negative");

@@ -354,7 +354,17 @@ static void check_files(void)
         {"<shape type='obj'><string name='filename' value='none.obj'/></shape>",
          "D/m.xml:2:19: shape (obj): filename: cannot find 'none.obj' (looked in: ., D)",
          IMP_E_IO},
-        {"<shape type='obj'/>", "D/m.xml:2:1: shape (obj): 'filename' is required",
+        {"<shape type='obj'/>",
+         "D/m.xml:2:1: shape (obj): property 'filename' is missing", IMP_E_SCENE},
+        {"<shape type='obj'>\n<string name='file_name' value='tri.obj'/></shape>",
+         "D/m.xml:2:1: shape (obj): property 'filename' is missing; did you mean it by "
+         "'file_name' (D/m.xml:3:1)?",
+         IMP_E_SCENE},
+        {"<bsdf type='blendbsdf'><bsdf type='diffuse'/><bsdf type='diffuse'/>\n<texture "
+         "type='checkerboard' name='wieght'/></bsdf>",
+         "D/m.xml:2:1: bsdf 'bsdf0' (blendbsdf): property 'weight' is missing; did you "
+         "mean "
+         "it by 'wieght' (D/m.xml:3:1)?",
          IMP_E_SCENE},
         {"<shape type='obj'><integer name='filename' value='1'/></shape>",
          "D/m.xml:2:19: shape (obj): property 'filename' must be a string, not an "

@@ -274,7 +274,7 @@ static void sensor_errors(void)
             refused(n, "must be like '50mm'");
         }
     }
-    refused(node_new("sensor", "thinlens"), "aperture_radius is missing");
+    refused(node_new("sensor", "thinlens"), "property 'aperture_radius' is missing");
     n = node_new("sensor", "thinlens");
     node_float(n, "aperture_radius", -1);
     refused(n, "aperture_radius = -1 is outside [0, inf]");

@@ -20,6 +20,7 @@
  * carry wavelengths and the file has them, by wavelength; else its spectra under D65 are
  * the rgb. */
 #include "measured.h"
+#include "base/required.h"
 #include "color/cie.h"
 #include "color/rgb.h"
 #include "kind/build.h"
@@ -127,9 +128,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_b
     const char *filename;
     const struct imp_measured_data *t = m->data = b->node->measured;
     IMP_TRY(imp_build_string(b, "filename", NULL, &filename));
-    if (!t)
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
-                                "needs a table: 'filename' is required"));
+    if (!t) IMP_TRY(imp__node_missing(b->ctx, b->node, "filename"));
     const float *phi = t->table[PHI];
     if (t->n_phi > 2)
         m->fold = (int)lrint(IMP_2PI / (double)(phi[t->n_phi - 1] - phi[0]));

@@ -14,6 +14,7 @@
  * takes what is Lambertian in the lobe, and covers what the table, made of some half-vectors
  * of every cell, does not see. */
 #include "merl.h"
+#include "base/required.h"
 #include "kind/build.h"
 #include "lambert.h"
 
@@ -60,9 +61,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_b
     const char *filename;
     IMP_TRY(imp_build_string(b, "filename", NULL, &filename));
     m->table = b->node->merl;
-    if (!m->table)
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
-                                "needs a table: 'filename' is required"));
+    if (!m->table) IMP_TRY(imp__node_missing(b->ctx, b->node, "filename"));
     const size_t rows = imp__merl_lobes_rows(m->table);
     m->lobes.row = imp_build_alloc(b, rows, sizeof(double));
     m->lobes.column = imp_build_alloc(b, rows * IMP_MERL_TURNS, sizeof(double));

@@ -16,6 +16,7 @@
  *
  *     q(c) = (1 - e) p(c) + e/(4 pi) */
 #include "base/number.h"
+#include "base/required.h"
 #include "kind/build.h"
 #include "turn.h"
 #include <string.h>
@@ -65,7 +66,7 @@ static enum imp_status values_read(const struct imp_build *b, int *n, double **v
     enum imp_status st = IMP_OK;
     const char *text;
     IMP_TRY(imp_build_string(b, "values", NULL, &text));
-    if (!text) IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE, "'values' is required"));
+    if (!text) IMP_TRY(imp__node_missing(b->ctx, b->node, "values"));
     read(text, NULL, n);
     if (*n < 2)
         IMP_TRY(imp_build_error(b, "values", IMP_E_SCENE,

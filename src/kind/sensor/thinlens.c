@@ -2,6 +2,7 @@
  *
  * A thin lens: rays of one film position start anywhere on the aperture and meet where
  * the pinhole's ray reaches z = focus_distance (docs/scene-format.md 9). */
+#include "base/required.h"
 #include "math/warp.h"
 #include "projection.h"
 
@@ -19,7 +20,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     IMP_TRY(imp__projection_build(b, true, &p->projection));
     IMP_TRY(imp__film_plane_build(b, false, &s->film, &p->film));
     if (!imp_build_has(b, "aperture_radius"))
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE, "aperture_radius is missing"));
+        IMP_TRY(imp__node_missing(b->ctx, b->node, "aperture_radius"));
     IMP_TRY(imp__props_float_in(b->ctx, b->node, "aperture_radius", 0, IMP_NOT_NEGATIVE,
                                 &p->aperture_radius));
 out:

@@ -4,6 +4,7 @@
  * float and from outside alone; the surface is computed again in double. uv is the turn about
  * the line and the place along all segments, as in Mitsuba 3.9.1. */
 #include "curve.h"
+#include "base/required.h"
 
 static enum imp_status radius_check(const struct imp_build *b, const float *points,
                                     size_t n)
@@ -98,9 +99,7 @@ static enum imp_status build(const struct imp_build *b, struct imp_shape *s, int
     const struct imp_curve_data *data = b->node->curves;
     IMP_TRY(imp__shape_placement(b, s, &at));
     IMP_TRY(imp_build_string(b, "filename", NULL, &filename));
-    if (!data)
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
-                                "has no control points: 'filename' is required"));
+    if (!data) IMP_TRY(imp__node_missing(b->ctx, b->node, "filename"));
     if (s->flip_normals)
         IMP_TRY(imp_build_error(b, "flip_normals", IMP_E_UNSUPPORTED,
                                 "curves are met from outside alone, and their normals "

@@ -4,6 +4,7 @@
  * = 0. The value is linear in the texels, so its derivative is the set of filter weights
  * itself: eval, scatter and tangent all go through `footprint`. */
 #include "bitmap.h"
+#include "base/required.h"
 #include "color/rgb.h"
 #include "color/spectrum.h"
 #include "input.h"
@@ -103,9 +104,7 @@ static enum imp_status build(const struct imp_build *b, void *self,
     IMP_TRY(imp_build_choice(b, "format", formats, 5, 0, &format));
     IMP_TRY(imp_build_bool(b, "accel", true, &accel));
     IMP_TRY(imp__to_uv_read(b, &t->to_uv));
-    if (!im)
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
-                                "needs a picture: 'filename' is required"));
+    if (!im) IMP_TRY(imp__node_missing(b->ctx, b->node, "filename"));
     if (im->width < 1 || im->height < 1 || (im->channels != 1 && im->channels != 3))
         IMP_TRY(
             imp_build_error(b, NULL, IMP_E_SCENE,

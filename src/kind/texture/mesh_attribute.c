@@ -5,6 +5,7 @@
  * (attribute_data.c), any shape the textures that stand in it under such names. When the
  * scene is whole these textures are its inputs (scene/build_attributes.c). */
 #include "mesh_attribute.h"
+#include "base/required.h"
 #include "input.h"
 #include "math/vec.h"
 #include <math.h>
@@ -26,8 +27,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_t
     t->param = -1;
     IMP_TRY(imp_build_string(b, "name", NULL, &m->name));
     IMP_TRY(imp_build_float(b, "scale", 1, &m->scale));
-    if (!m->name)
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE, "property 'name' is missing"));
+    if (!m->name) IMP_TRY(imp__node_missing(b->ctx, b->node, "name"));
     if (!imp__attribute_name(m->name))
         IMP_TRY(imp_build_error(
             b, "name", IMP_E_SCENE,

@@ -7,6 +7,7 @@
  *
  * and 0 above `top`. So the optical depth of a column of it is value scale_height
  * (1 - exp(-top/scale_height)). Within the sphere it is the value at its surface. */
+#include "base/required.h"
 #include "box.h"
 #include "math/vec.h"
 #include <math.h>
@@ -40,10 +41,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_t
         imp__props_float_in(b->ctx, b->node, "radius", 0, IMP_NOT_NEGATIVE, &v->radius));
     IMP_TRY(imp__props_float_in(b->ctx, b->node, "top", 0, IMP_POSITIVE, &v->top));
     v->center = imp__v3(center[0], center[1], center[2]);
-    if (!imp_build_has(b, "top"))
-        IMP_TRY(
-            imp_build_error(b, NULL, IMP_E_SCENE,
-                            "property 'top', the height at which it ends, is missing"));
+    if (!imp_build_has(b, "top")) IMP_TRY(imp__node_missing(b->ctx, b->node, "top"));
     if (t->input[VALUE]->texture)
         IMP_TRY(imp_build_error(b, "value", IMP_E_SCENE, "value cannot be a texture"));
 out:

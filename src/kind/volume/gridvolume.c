@@ -3,6 +3,7 @@
  * gridvolume: values of a .vol file over a box. Cell (i, j, k) has its centre at ((i +
  * .5)/nx, ...) of the unit cube. The value is linear in the cells: eval, scatter and
  * tangent go through `footprint`. */
+#include "base/required.h"
 #include "box.h"
 #include "color/rgb.h"
 #include "kind/texture/input.h"
@@ -73,9 +74,7 @@ static enum imp_status build(const struct imp_build *b, void *self,
     IMP_TRY(imp_build_bool(b, "raw", false, &raw));    /* colours are linear already */
     IMP_TRY(imp_build_bool(b, "accel", true, &accel)); /* Mitsuba's */
     IMP_TRY(imp_build_float(b, "max_value", 0, &max_value));
-    if (!g)
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
-                                "needs a grid: 'filename' is required"));
+    if (!g) IMP_TRY(imp__node_missing(b->ctx, b->node, "filename"));
     IMP_TRY(box_read(b, g, &v->to_unit));
     v->wrap = (enum wrap)wrap;
     v->filter = (enum filter)filter;
