@@ -3,6 +3,7 @@
  * Problems: which numbers are free, and what they have to match. */
 #include "problem.h"
 #include "match.h"
+#include "scene/theta_near.h"
 #include "walk/run.h"
 #include <math.h>
 #include <stdio.h>
@@ -136,8 +137,8 @@ enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
         if (!met) IMP_TRY(camera_geometry(p, glob));
         if (!met)
             IMP_TRY(imp__error(p->ctx, IMP_E_ARG,
-                               "no parameter matches '%s' (there are %zu)", glob,
-                               s->n_params));
+                               "no parameter matches '%s' (there are %zu)%s", glob,
+                               s->n_params, imp__theta_near(s, glob).text));
         if (!usable) { /* the reason, of one of them */
             IMP_TRY(activate_named(p, s->params[last].info.name, chosen));
         }

@@ -4,8 +4,8 @@
  * write. A parameter's numbers live where rendering uses them (an input's lanes, a
  * texture's texels); theta is a list of addresses, so setting it needs no rebuild. */
 #include "base/arguments.h"
-#include "base/nearest.h"
 #include "theta_alias.h"
+#include "theta_near.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -152,29 +152,9 @@ enum imp_status imp_scene_find_param(const imp_scene *scene, const char *name,
                           "there is no parameter '%s': vertices, transformations and "
                           "cameras are not among them",
                           name);
-    const char *near[3] = {0};
-    size_t distance[3] = {SIZE_MAX, SIZE_MAX, SIZE_MAX};
-    for (size_t i = 0; i < scene->n_params; i++) {
-        const char *candidate = scene->params[i].info.name;
-        const size_t n = strlen(name);
-        const bool within = strncmp(candidate, name, n) == 0 && candidate[n] == '.';
-        size_t d = within ? 0 : imp__edit_distance(name, candidate);
-        for (int k = 0; k < 3; k++)
-            if (d < distance[k]) {
-                const size_t old = distance[k];
-                const char *other = near[k];
-                distance[k] = d, near[k] = candidate;
-                d = old, candidate = other;
-            }
-    }
-    char list[512] = "";
-    for (int k = 0; k < 3 && near[k]; k++) {
-        const size_t used = strlen(list);
-        snprintf(list + used, sizeof list - used, "%s%s", k ? ", " : "; the nearest are ",
-                 near[k]);
-    }
+    const struct imp_near_names near = imp__theta_near(scene, name);
     return imp__error(scene->ctx, IMP_E_ARG, "there is no parameter '%s'%s", name,
-                      *list ? list : "; the scene has none");
+                      scene->n_params ? near.text : "; the scene has none");
 }
 
 void imp_scene_get_theta(const imp_scene *scene, double *theta)
