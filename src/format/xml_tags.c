@@ -295,6 +295,7 @@ void imp__xml_start(struct xml_file *f, const char *tag, const char **from)
         push(f, XML_LEAF, r->tag);
         return;
     }
+    const char *of;
     bool known = object || strcmp(tag, "transform") == 0;
     struct imp_nearest near = imp__nearest(tag);
     for (size_t i = 0; i < imp_count(rules); i++) {
@@ -310,6 +311,9 @@ void imp__xml_start(struct xml_file *f, const char *tag, const char **from)
     else if (near.best)
         imp__xml_fail(f, IMP_E_SCENE, "unknown tag <%s>; did you mean <%s>?", tag,
                       near.best);
+    else if (imp__tag_of_type(f->reader->ctx, tag, &of) == IMP_OK)
+        imp__xml_fail(f, IMP_E_SCENE, "unknown tag <%s>; it is a type: <%s type=\"%s\">",
+                      tag, of, tag);
     else imp__xml_fail(f, IMP_E_SCENE, "unknown tag <%s>", tag);
 }
 

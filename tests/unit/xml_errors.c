@@ -29,6 +29,8 @@ static const struct {
     {"<!DOCTYPE a [<!ENTITY b 'c'>]><scene version='3.0.0'/>",
      "s.xml:1:13: a document type (<!DOCTYPE>) is not allowed"},
     {IN(" <spline/>"), "s.xml:2:2: unknown tag <spline>"},
+    {IN("<emitter type='area'><blackbody name='radiance' temperature='5000'/></emitter>"),
+     "s.xml:2:22: unknown tag <blackbody>; it is a type: <spectrum type=\"blackbody\">"},
     {IN("<shpae type='cube'/>"), "s.xml:2:1: unknown tag <shpae>; did you mean <shape>?"},
     {IN("<sensor type='perspective'><transform name='to_world'><lookAt/>"),
      "s.xml:2:55: unknown tag <lookAt>; did you mean <lookat>?"},
