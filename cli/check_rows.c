@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "check_rows.h"
+#include "command.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -27,7 +28,7 @@ void check_rows_print(const struct imp_check_row *rows, size_t n)
         printf("%-7s %-*s %-8s %-15.8g %-15.8g %-9s %s%-9.2g %s", r->method, width,
                r->param ? r->param : "", step, r->value, r->reference, se,
                r->se > 0 ? "z " : "", r->error, verdict(r));
-        if (r->kinks > 0) printf(" (%d walk%s)", r->kinks, r->kinks > 1 ? "s" : "");
+        if (r->kinks > 0) printf(" (%d walk%s)", r->kinks, plural(r->kinks));
         printf("\n");
     }
 }

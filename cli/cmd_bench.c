@@ -112,8 +112,8 @@ static void print(const struct times *t, size_t n)
         cli_json_end(&j);
         return;
     }
-    printf("%s: %.4g samples, %zu numbers with a gradient\n", cli.scene_path,
-           t[0].samples, t[0].n);
+    printf("%s: %.4g samples, %zu number%s with a gradient\n", cli.scene_path,
+           t[0].samples, t[0].n, plural((long long)t[0].n));
     printf("%-8s %-9s %-10s %-14s %-14s %-14s %s\n", "threads", "load s", "render s",
            "Msamples/s", "loss+grad s", "grad/render", "speed-up render, gradient");
     for (size_t i = 0; i < n; i++)

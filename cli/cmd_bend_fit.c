@@ -206,9 +206,9 @@ int bend_fit(imp_bend *bend)
         put_answer(&j, bend, &r, seconds);
         cli_json_end(&j);
     } else {
-        printf("objective %.9g -> %.9g in %d evaluations, %d level%s, %.1f s: %s\n",
-               r.start, r.value, r.iterations, r.levels, r.levels > 1 ? "s" : "", seconds,
-               r.reason);
+        printf("objective %.9g -> %.9g in %d evaluation%s, %d level%s, %.1f s: %s\n",
+               r.start, r.value, r.iterations, plural(r.iterations), r.levels,
+               plural(r.levels), seconds, r.reason);
         bend_put_numbers(bend, stdout, NULL);
         bend_print_stats(stdout, &r.stats);
     }

@@ -256,8 +256,8 @@ static int spots(imp_bend *b, const struct palette *palette, size_t target,
     snprintf(name, sizeof name, "spot-%zu", target);
     rc = chart_save(&c, folder, prefix, name);
     if (n > 0)
-        cli_say("target %zu: %zu rays, rms spot %.4g; the picture is %.4g wide", target,
-                n, rms, 2 * half);
+        cli_say("target %zu: %zu ray%s, rms spot %.4g; the picture is %.4g wide", target,
+                n, plural((long long)n), rms, 2 * half);
     else cli_say("target %zu: no ray arrives, the picture is empty", target);
     free(a);
     return rc;

@@ -64,7 +64,8 @@ static int run_check(int n, char **operand)
         if (!cli.json) check_rows_print(rows, n_rows);
         else if (!cli_failed(imp_problem_spp(problem, -1, &fresh, &taken)))
             print_json(&run, taken, rows, n_rows);
-        cli_say("%zu checks, %zu failed, %zu too noisy to tell%s", n_rows, failed, noisy,
+        cli_say("%zu check%s, %zu failed, %zu too noisy to tell%s", n_rows,
+                plural((long long)n_rows), failed, noisy,
                 noisy ? " (more --fresh-spp)" : "");
         rc = cli_done();
         if (!rc && failed) rc = EXIT_NO;

@@ -148,8 +148,8 @@ static void print(const struct elements_sources *s, const struct block *blocks,
                    : v->at_bound > 0 ? "  at its upper bound"
                                      : "");
         }
-    printf("\nloss %.6g after %d iterations in %d rounds: %s\n", r->objective,
-           r->iterations, r->rounds, r->reason);
+    printf("\nloss %.6g after %d iteration%s in %d round%s: %s\n", r->objective,
+           r->iterations, plural(r->iterations), r->rounds, plural(r->rounds), r->reason);
 }
 
 static int write_set(const struct block *blocks, size_t n_blocks)

@@ -150,9 +150,12 @@ static int run_info(int n, char **operand)
         cli_json_end(&j);
         return rc ? rc : verdict(&s);
     }
-    printf("%s: %s, %d shapes (%lld triangles), %d emitters, %d bsdfs, %d textures\n",
-           cli.scene_path, cli_mode_word(s.mode), s.n_shapes, (long long)s.n_triangles,
-           s.n_emitters, s.n_bsdfs, s.n_textures);
+    printf(
+        "%s: %s, %d shape%s (%lld triangle%s), %d emitter%s, %d bsdf%s, %d texture%s\n",
+        cli.scene_path, cli_mode_word(s.mode), s.n_shapes, plural(s.n_shapes),
+        (long long)s.n_triangles, plural(s.n_triangles), s.n_emitters,
+        plural(s.n_emitters), s.n_bsdfs, plural(s.n_bsdfs), s.n_textures,
+        plural(s.n_textures));
     if (s.n_instances)
         printf("instances: %d, by which rays can meet %.9g triangles\n", s.n_instances,
                s.triangles_met);
@@ -166,9 +169,10 @@ static int run_info(int n, char **operand)
     for (int i = 0; i < s.n_sensors; i++) {
         struct imp_sensor_info c = {.size = sizeof c};
         if (imp_scene_get_sensor(cli.scene, i, &c) != IMP_OK) continue;
-        printf(
-            "sensor %d: %s (%s), %d x %d, %d samples per pixel, %s filter of radius %g\n",
-            i, c.name, c.type, c.width, c.height, c.spp, c.filter, c.filter_radius);
+        printf("sensor %d: %s (%s), %d x %d, %d sample%s per pixel, %s filter of radius "
+               "%g\n",
+               i, c.name, c.type, c.width, c.height, c.spp, plural(c.spp), c.filter,
+               c.filter_radius);
     }
     rc = print_params(NULL);
     return rc ? rc : verdict(&s);

@@ -49,8 +49,8 @@ static int run_merge(int n, char **operand)
         if (rc) return rc;
         st = imp_parts_write(cli.parts, cli.out);
         if (st != IMP_OK) return cli_fail(st, NULL);
-        cli_say("%s: %d parts%s%s", cli.out, info.n, info.missing ? "; missing: " : "",
-                info.missing ? info.holes : "");
+        cli_say("%s: %d part%s%s%s", cli.out, info.n, plural(info.n),
+                info.missing ? "; missing: " : "", info.missing ? info.holes : "");
         return EXIT_DONE;
     }
     if (info.missing) return cli_error(EXIT_USAGE, "parts are missing: %s", info.holes);

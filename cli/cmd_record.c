@@ -55,8 +55,8 @@ static char *default_output(void)
 static void report(const char *path, const struct imp_walks_info *info)
 {
     struct stat file;
-    cli_say("%s: %d walks a pixel%s, drawn with seed %llu", path, info->spp,
-            info->n_sensors > 1 ? ", of several sensors" : "",
+    cli_say("%s: %d walk%s a pixel%s, drawn with seed %llu", path, info->spp,
+            plural(info->spp), info->n_sensors > 1 ? ", of several sensors" : "",
             (unsigned long long)info->seed);
     if (!cli.json) return;
     struct json j = cli_json();

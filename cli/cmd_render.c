@@ -151,8 +151,8 @@ static void report(const char *path, imp_film *film, const struct imp_run *run,
 {
     struct imp_film_info info = {.size = sizeof info};
     imp_film_get_info(film, &info);
-    cli_say("%s: %d x %d, %lld samples per pixel%s", path, info.width, info.height,
-            (long long)info.spp,
+    cli_say("%s: %d x %d, %lld sample%s per pixel%s", path, info.width, info.height,
+            (long long)info.spp, plural(info.spp),
             !progress_interrupted() ? ""
             : info.spp
                 ? ", interrupted"

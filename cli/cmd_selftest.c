@@ -101,7 +101,7 @@ static int run_selftest(int n, char **operand)
     for (size_t i = 0; i < n_rows; i++) failed += rows[i].ok == 0;
     if (cli.json) print_json(subjects[subject], rows, n_rows, failed);
     else print_text(rows, n_rows);
-    cli_say("%zu contracts, %zu broken", n_rows, failed);
+    cli_say("%zu contract%s, %zu broken", n_rows, plural((long long)n_rows), failed);
     rc = cli_done();
     return !rc && failed ? EXIT_NO : rc;
 }

@@ -43,15 +43,17 @@ static int verdict(const char *path, const struct imp_manifest_info *info, int r
     } else if (why) {
         printf("%s: refuted: %s\n", path, why);
     } else if (o.fraction < 1) {
-        printf(
-            "%s: verified: %d input files, %d output files, %llu of %llu sums computed "
-            "again, and what they make\n",
-            path, info->n_inputs, info->n_outputs, (unsigned long long)info->n_verified,
-            (unsigned long long)info->n_sums);
+        printf("%s: verified: %d input file%s, %d output file%s, %llu of %llu sum%s "
+               "computed "
+               "again, and what they make\n",
+               path, info->n_inputs, plural(info->n_inputs), info->n_outputs,
+               plural(info->n_outputs), (unsigned long long)info->n_verified,
+               (unsigned long long)info->n_sums, plural((long long)info->n_sums));
     } else {
-        printf("%s: verified: %d input files, %d output files, and the result, all "
+        printf("%s: verified: %d input file%s, %d output file%s, and the result, all "
                "computed again\n",
-               path, info->n_inputs, info->n_outputs);
+               path, info->n_inputs, plural(info->n_inputs), info->n_outputs,
+               plural(info->n_outputs));
     }
     return why ? EXIT_NO : EXIT_DONE;
 }

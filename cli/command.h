@@ -115,6 +115,9 @@ static inline int cli_failed(enum imp_status status)
 /* The exit code of a run that was not refused: 130 after Ctrl-C. */
 int cli_done(void);
 
+/* Behind the word for what is counted: "1 sample", "2 samples". */
+static inline const char *plural(long long n) { return n == 1 ? "" : "s"; }
+
 /* Talk on stderr, unless --quiet. */
 void cli_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
 

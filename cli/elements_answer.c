@@ -39,9 +39,11 @@ void elements_answer_info(const struct elements_answer *a, struct json *j)
 {
     const struct imp_elements_info *i = a->info;
     if (!j) {
-        cli_say("%zu polygons, %zu elements (%zu leaves), %zu links, %lld rays; order %d",
-                i->polygons, i->elements, i->leaves, i->links, (long long)i->rays,
-                i->order);
+        cli_say("%zu polygon%s, %zu element%s (%zu %s), %zu link%s, %lld ray%s; order %d",
+                i->polygons, plural((long long)i->polygons), i->elements,
+                plural((long long)i->elements), i->leaves,
+                i->leaves == 1 ? "leaf" : "leaves", i->links, plural((long long)i->links),
+                (long long)i->rays, plural(i->rays), i->order);
         print_measures(a);
         const double change = i->n_steps > 1 ? i->steps[i->n_steps - 2].change : NAN;
         if (isfinite(change))

@@ -132,8 +132,9 @@ static void print_table(const struct fit_answer *a, char **paths)
                                              : "");
         }
     }
-    printf("\n%s %.6g +- %.2g after %d iterations: %s\n", loss_word(), r->objective.value,
-           r->objective.se, r->iterations, r->reason ? r->reason : "");
+    printf("\n%s %.6g +- %.2g after %d iteration%s: %s\n", loss_word(),
+           r->objective.value, r->objective.se, r->iterations, plural(r->iterations),
+           r->reason ? r->reason : "");
     print_residual(r);
     print_clipped(a->problem);
     if (a->looked) fit_missing_print(a);

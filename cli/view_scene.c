@@ -76,7 +76,9 @@ static int numbers_open(void)
         return cli_error(EXIT_USAGE, "no number with a slider matches -p %s",
                          problem_options.params.item[0]);
     }
-    if (left_out) cli_say("%zu numbers have no sliders: choose some with -p", left_out);
+    if (left_out)
+        cli_say("%zu number%s no slider: choose some with -p", left_out,
+                left_out == 1 ? " has" : "s have");
     view_numbers(number, r.n);
     return 0;
 }
@@ -184,9 +186,9 @@ static void take_kept(int64_t all)
     show(film, NULL);
     snprintf(
         text, sizeof text,
-        "this picture: %lld kept walks per pixel, of which %.2g count; fresh ones are "
+        "this picture: %lld kept walk%s per pixel, of which %.2g count; fresh ones are "
         "on their way",
-        (long long)spp_of(film), ess);
+        (long long)spp_of(film), plural(spp_of(film)), ess);
     view_state(VIEW_RUNNING, text);
     r.said_so = true;
 }
@@ -240,8 +242,9 @@ static int work(void)
         }
         if (rc) return rc;
         if (!view_asked()) { /* all is done, or nothing is to be done */
-            snprintf(text, sizeof text, "%lld of %lld samples per pixel%s%s",
-                     (long long)spp_of(r.film), (long long)all, *said ? "; " : "", said);
+            snprintf(text, sizeof text, "%lld of %lld sample%s per pixel%s%s",
+                     (long long)spp_of(r.film), (long long)all, plural(all),
+                     *said ? "; " : "", said);
             view_state(spp_of(r.film) < all ? VIEW_STOPPED : VIEW_DONE, text);
         }
         const struct view_wish w = view_wait();

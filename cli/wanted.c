@@ -26,10 +26,10 @@ struct imp_until_options until_options(double relative, struct imp_run *run)
 
 void until_say(const char *what, const struct imp_until_end *end)
 {
-    cli_say("%s: within %.3g of itself in 95 of 100 cases%s (%lld samples, %d looks)",
+    cli_say("%s: within %.3g of itself in 95 of 100 cases%s (%lld sample%s, %d look%s)",
             what, end->relative,
             end->reached ? "" : ", which is not what --until asks for",
-            (long long)end->spp, end->looks);
+            (long long)end->spp, plural(end->spp), end->looks, plural(end->looks));
 }
 
 void until_json(struct json *j, double relative, const struct imp_until_end *end)
