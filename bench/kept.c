@@ -2,11 +2,12 @@
  *
  * What a kept walk costs: evaluated, folded and swept, over traced and swept, one thread,
  * processor time; the median of pairs measured in turn. Then whole pictures, and searches
- * by L-BFGS, MMA and SLSQP.
+ * by L-BFGS, MMA and SLSQP; and how far values of as many draws spread at numbers far away.
  *
- *     kept [--repeats N] [--spp N] [--only walks|pictures|fits] [--scene NAME] */
-#include "walk/reduced.h"
+ *     kept [--repeats N] [--spp N] [--only walks|pictures|fits|spread] [--scene NAME] */
+#include "walk/store.h"
 #include <importon/walks.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -293,6 +294,77 @@ static void measure_fit(const char *file, const char *define, const char *glob,
     imp_scene_destroy(scene);
 }
 
+/* Stam's box where MMA's fourth evaluation went, whose reflectances of the sphere add up to
+ * 1.3: the loss and its derivative by the walls' reflectance, of draws kept at seven tenths
+ * of all numbers by roulette's floor, or of fresh walks, floor 0. */
+static void measure_spread(const char *file, const char *define, double floor)
+{
+    static const double went[] = {.015, .015, .015, .629, .696, 19.7, .023,
+                                  .023, .023, .492, 5.25, 5.25, 5.25};
+    enum { N = sizeof went / sizeof *went, WALLS = 9 };
+    if (!wanted("spread", file)) return;
+    struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
+    struct imp_target t = IMP_TARGET_INIT;
+    struct imp_film_info info = {.size = sizeof info};
+    char path[1024];
+    double near[N], g[N], se[N], sum[2] = {0}, square[2] = {0}, growth = 0;
+    imp_scene *scene;
+    imp_film *film;
+    imp_problem *p;
+    o.defines = &define;
+    o.n_defines = 1;
+    snprintf(path, sizeof path, "%s/%s", IMP_SCENES, file);
+    must(imp_scene_load(ctx, path, &o, &scene));
+    must(imp_render(scene, NULL, &film));
+    must(imp_film_get_info(film, &info));
+    t.width = info.width;
+    t.height = info.height;
+    t.channels = info.channels;
+    t.pixels = imp_film_mean(film);
+    must(imp_problem_create(scene, &p));
+    must(imp_problem_activate(p, "*"));
+    must(imp_problem_add_target(p, &t));
+    if (imp_problem_n(p) != N) exit(3);
+    imp_problem_get_x(p, near);
+    for (int i = 0; i < N; i++) near[i] *= 0.7;
+    for (int k = 0; k < repeats; k++) {
+        struct imp_run run = IMP_RUN_INIT;
+        struct imp_walks_options keep = IMP_WALKS_OPTIONS_INIT;
+        struct imp_walks_weight weight = IMP_WALKS_WEIGHT_INIT;
+        struct imp_estimate f;
+        imp_walks *walks = NULL;
+        run.seed = 1000 + (uint64_t)k;
+        keep.losses = 1;
+        keep.survival = floor;
+        must(imp_problem_set_x(p, near));
+        if (floor > 0) must(imp_walks_keep(scene, &run, &keep, &walks));
+        must(imp_problem_set_x(p, went));
+        if (walks) {
+            must(imp_walks_weigh(walks, 0, NULL, &weight));
+            walks->ess = -1; /* evaluated, whatever they are worth */
+            run = (struct imp_run)IMP_RUN_INIT;
+            run.walks = walks;
+            growth += weight.growth / repeats;
+        }
+        must(imp_problem_objective(p, NULL, &run, &f, g, se));
+        for (int j = 0; j < 2; j++) {
+            const double x = j ? g[WALLS] : f.value;
+            sum[j] += x;
+            square[j] += x * x;
+        }
+        imp_walks_destroy(walks);
+    }
+    printf("%-14s floor %.2f, growth %.2f:", file, floor, growth);
+    for (int j = 0; j < 2; j++) {
+        const double mean = sum[j] / repeats;
+        printf(" %s %.1f, spread %.2f%s", j ? "by the walls" : "loss", mean,
+               sqrt(fmax(square[j] / repeats - mean * mean, 0)), j ? "\n" : ";");
+    }
+    imp_problem_destroy(p);
+    imp_film_destroy(film);
+    imp_scene_destroy(scene);
+}
+
 int main(int argc, char **argv)
 {
     struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
@@ -320,6 +392,8 @@ int main(int argc, char **argv)
         measure_fit("cornell.xml", "res=64", "*", methods[k], names[k]);
         measure_fit("stam.xml", "integrator=path", "*", methods[k], names[k]);
     }
+    static const double floors[] = {0, 0.3, 0.4, 0.45, 0.6};
+    for (int k = 0; k < 5; k++) measure_spread("stam.xml", "integrator=path", floors[k]);
     imp_context_destroy(ctx);
     return 0;
 }

@@ -11,14 +11,14 @@
 #include "keep.h"
 #include <stdio.h>
 
-#define REDRAW_ESS     0.8 /* below: a new draw */
-#define TRACED_ESS     0.5 /* below: the evaluation traces its own walks */
-#define SURVIVAL       0.8 /* most that roulette's floor is */
-#define SURVIVAL_LEAST 0.3
+#define REDRAW_ESS     0.8  /* below: a new draw */
+#define TRACED_ESS     0.5  /* below: the evaluation traces its own walks */
+#define SURVIVAL       0.8  /* most that roulette's floor is */
+#define SURVIVAL_LEAST 0.45 /* grey of .66 in a closed room */
 #define ROOM           1.7 /* to which the second moment of a step may grow under the floor */
-#define PILOT          4 /* samples of a pixel by which it is found */
+#define PILOT          2         /* samples of a pixel by which it is found, */
+#define PILOT_SHARE    (1. / 16) /* of all at most */
 #define MEMORY         0x1p30
-#define WEIGHED        2048 /* walks whose effective sample size is found, a sensor */
 
 bool imp__fit_keeps(const struct imp__fit *f)
 {
@@ -61,7 +61,7 @@ static enum imp_status survival_find(struct imp__fit *f, const struct imp_run *r
     imp_walks *pilot = NULL;
     double most = 0;
     *survival = SURVIVAL;
-    if (run->guide || spp < 8 * PILOT) return IMP_OK;
+    if (run->guide || PILOT > PILOT_SHARE * spp) return IMP_OK;
     few.spp = PILOT;
     few.progress = NULL;
     enum imp_status st = imp__walks_make(p->scene, &few, o, sensors, free, &pilot);
@@ -156,7 +156,8 @@ enum imp_status imp__fit_take_walks(struct imp__fit *f, const double *x, uint64_
     enum imp_status st = imp_problem_set_x(f->problem, x);
     for (int k = 0; k < f->walks->n_stores && st == IMP_OK; k++) {
         struct imp_walks_weight w;
-        st = imp__walks_weigh(f->walks, &f->walks->stores[k], NULL, WEIGHED, &w, NULL);
+        st = imp__walks_weigh(f->walks, &f->walks->stores[k], NULL, IMP_WALKS_ASKED, &w,
+                              NULL);
         if (st == IMP_E_UNSUPPORTED) { /* an extinction is above its bounds */
             w.ess = 0;
             st = IMP_OK;

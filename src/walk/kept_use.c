@@ -11,8 +11,7 @@
 #define TILES_AT_ONCE 16
 #define SEEN_LEAST                                                                       \
     0.5            /* mean ratio of densities, which is 1 where all of them was drawn */
-#define ASKED 1024 /* walks and more that say enough, if clearly: by this factor */
-#define CLEAR 1.25
+#define CLEAR 1.25 /* what some walks say is enough by this factor */
 /* Roulette's growth, over all its steps of walks that have a last depth. */
 #define GROWTH_MOST 4
 
@@ -279,7 +278,7 @@ static enum imp_status use_check(const struct imp_walks *w, const struct imp_sto
 {
     struct imp_walks_weight x;
     bool all;
-    IMP_CHECKED(imp__walks_weigh(w, store, NULL, ASKED, &x, &all));
+    IMP_CHECKED(imp__walks_weigh(w, store, NULL, IMP_WALKS_ASKED, &x, &all));
     struct imp_walks_weight worse = x;
     worse.growth *= CLEAR;
     if (!all && x.ess >= CLEAR * w->ess && imp__walks_finite(w, &worse)) return IMP_OK;

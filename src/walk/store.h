@@ -12,6 +12,7 @@
 
 #define IMP_STORE_SIDE    8 /* pixels of a tile */
 #define IMP_HEADROOM_MOST 64
+#define IMP_WALKS_ASKED   1024 /* that say what all are worth (store_ask.c) */
 
 /* Steps from materials of class a to class b, of those that roulette looked at. */
 #define IMP_STORE_CLASSES 32
