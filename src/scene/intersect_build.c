@@ -4,8 +4,14 @@
  *
  * One device a process, made on first use and kept until the process ends: Embree's
  * thread library makes a thread when a device is released, or when a second one is made,
- * and ends the process if it cannot. Scenes are built in the thread that commits, the
- * same way each time; no thread of Embree's is used. */
+ * and ends the process if it cannot. Large scenes are built by all threads of the context,
+ * which join the commit, others in the thread that commits: Embree makes no thread, since
+ * all places of its arena (`user_threads`) are for those that come by themselves.
+ *
+ * Embree cuts its work by the number of these places, whoever comes, so a tree is the same on
+ * any number of threads. On another number of processors the triangles of a leaf (no more
+ * than four; in trees of some thousand) may stand in another order, which decides between two
+ * of them that a ray meets at the same distance in all bits. */
 #include "base/pool.h"
 #include "instances.h"
 #include "intersector.h"
@@ -58,7 +64,7 @@ static enum imp_status device_error(imp_context *ctx, enum RTCError error,
                       text);
 }
 
-#define BUILDERS_MAX 64
+#define BUILDERS_MAX 64 /* places: Embree cuts nothing into more pieces */
 static RTCDevice device;
 static _Atomic long builder; /* process of the thread that is with Embree; 0: none */
 
@@ -70,7 +76,10 @@ static void build_enter(void)
     for (;;) {
         long by = 0;
         if (atomic_compare_exchange_strong(&builder, &by, here)) return;
-        if (by != here && atomic_compare_exchange_strong(&builder, &by, here)) return;
+        if (by != here && atomic_compare_exchange_strong(&builder, &by, here)) {
+            device = NULL; /* its arena may be full of threads that are not here */
+            return;
+        }
         nanosleep(&(struct timespec){0, 100000}, NULL);
     }
 }
@@ -233,7 +242,8 @@ static bool is_robust(const struct imp_scene *scene, const struct content *c)
     return c->aims != NULL;
 }
 
-/* Of one commit: all workers build, the first item begins. */
+/* Of one commit: all workers build. The first item begins; one that came before it would
+ * begin, too, but one that came before there is work would not stay. */
 static enum imp_status tree_join(size_t i, int worker, int slot, void *rtc)
 {
     (void)worker, (void)slot;
@@ -242,12 +252,22 @@ static enum imp_status tree_join(size_t i, int worker, int slot, void *rtc)
     atomic_store(&told.begun, true);
     return IMP_OK;
 }
-static enum imp_status tree_build(imp_context *ctx, RTCScene rtc)
+
+#define PRIMITIVES_FEW 32768 /* not worth other threads */
+static void tree_build(imp_context *ctx, RTCScene rtc, size_t primitives)
 {
     const struct imp_loop loop = {
         .n_items = (size_t)ctx->threads, .work = tree_join, .payload = rtc};
     atomic_store(&told.begun, false);
-    return imp__parallel(ctx, &loop, NULL);
+    if (primitives < PRIMITIVES_FEW || imp__parallel(ctx, &loop, NULL) != IMP_OK)
+        rtcJoinCommitScene(rtc); /* of what is built it does nothing */
+}
+
+static size_t primitives_of(const struct imp_shape *s)
+{
+    return s->geometry == IMP_TRIANGLES ? s->triangles.n_triangles
+           : s->geometry == IMP_CURVES  ? s->curves.n_segments
+                                        : 1;
 }
 
 static bool is_few(const struct imp_scene *scene, const struct content *c)
@@ -278,6 +298,7 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
             x->rtc, (is_robust(scene, c) ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE) |
                         (c->aims ? RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION : 0));
     const bool instances = c->group && c->group->n_instances > 0, few = is_few(scene, c);
+    size_t primitives = 0;
     for (int i = 0; x->rtc && i < c->n + instances && told.error == RTC_ERROR_NONE; i++) {
         const struct imp_shape *s = i < c->n ? shape_at(scene, c, i) : NULL;
         if (s && s->geometry == IMP_ANALYTIC && few) {
@@ -290,9 +311,11 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
         rtcAttachGeometryByID(x->rtc, g, (unsigned)i);
         rtcReleaseGeometry(g); /* the scene holds it now */
         x->knows = true;
+        primitives += s ? primitives_of(s) : (size_t)c->group->n_instances;
         x->calls_back |= !s || s->geometry == IMP_ANALYTIC;
     }
-    if (x->rtc && told.error == RTC_ERROR_NONE) st = tree_build(scene->ctx, x->rtc);
+    if (x->rtc && told.error == RTC_ERROR_NONE)
+        tree_build(scene->ctx, x->rtc, primitives);
     const enum RTCError error = !x->rtc && told.error == RTC_ERROR_NONE
                                     ? RTC_ERROR_UNKNOWN
                                     : (enum RTCError)told.error;

@@ -231,6 +231,70 @@ static void forks(uint64_t right)
     imp_context_destroy(ctx);
 }
 
+/* A mesh that all threads build. */
+enum { SIDE = 256 };
+static imp_scene *large_scene(imp_context *ctx)
+{
+    const size_t n = SIDE * SIDE, triangles = 2 * (SIDE - 1) * (SIDE - 1);
+    float *positions = malloc(3 * n * sizeof *positions);
+    uint32_t *indices = malloc(3 * triangles * sizeof *indices), *to = indices;
+    imp_scene *s = NULL;
+    if (!positions || !indices || imp_scene_create(ctx, NULL, &s) != IMP_OK) abort();
+    for (uint32_t k = 0; k < n; k++) {
+        const uint32_t x = k % SIDE, y = k / SIDE;
+        positions[3 * k] = (float)x;
+        positions[3 * k + 1] = (float)y;
+        positions[3 * k + 2] = (float)(x * y % 7);
+        if (x + 1 == SIDE || y + 1 == SIDE) continue;
+        const uint32_t corner[6] = {k, k + 1, k + SIDE, k + 1, k + SIDE + 1, k + SIDE};
+        memcpy(to, corner, sizeof corner);
+        to += 6;
+    }
+    imp_scene_begin(s, "shape", "mesh", NULL, NULL);
+    imp_scene_mesh(s, n, triangles, positions, NULL, NULL, indices);
+    imp_scene_end(s);
+    if (imp_scene_commit(s) != IMP_OK) s = NULL;
+    free(positions);
+    free(indices);
+    return s;
+}
+static bool builds(imp_context *ctx, uint64_t right)
+{
+    imp_scene *s = large_scene(ctx);
+    (void)right;
+    imp_scene_destroy(s);
+    return s != NULL;
+}
+static void *build_on(void *payload)
+{
+    struct busy *b = payload;
+    bool all = true;
+    while (!atomic_load(&b->stop)) {
+        all &= builds(b->ctx, 0);
+        atomic_store(&b->begun, true);
+    }
+    return all ? b : NULL;
+}
+
+static void forks_in_builds(void)
+{
+    struct busy b = {.ctx = test_context(3)};
+    pthread_t thread;
+    void *fine = NULL;
+    bool all = true;
+    if (pthread_create(&thread, NULL, build_on, &b) != 0) return;
+    while (!atomic_load(&b.begun)) usleep(1000);
+    for (int i = 0; i < 12; i++) {
+        usleep(3000); /* somewhere in the next build */
+        all &= child(builds, b.ctx, 0);
+    }
+    tap_ok(all, "forked while threads build a tree: twelve children build");
+    atomic_store(&b.stop, true);
+    pthread_join(thread, &fine);
+    tap_ok(fine != NULL, "and the parent goes on");
+    imp_context_destroy(b.ctx);
+}
+
 /* ---- No threads ---------------------------------------------------------------- */
 
 static bool limited(imp_context *ctx, uint64_t right)
@@ -493,6 +557,7 @@ int main(void)
     else tap_skip("RLIMIT_NPROC", "not root");
     modes(right);
     forks(right);
+    forks_in_builds();
     order();
     shared();
     short_lived();
