@@ -8,6 +8,7 @@
  * everything, in order, and takes what belongs to its range. So the sums do not depend on how
  * many threads there are. */
 #include "base/pool.h"
+#include "math/trig.h"
 #include "shape.h"
 #include <stdatomic.h>
 #include <string.h>
@@ -98,13 +99,14 @@ static enum imp_status angles_add(size_t first, size_t end, void *payload)
         const imp_v3 normal = imp__cross(p[1] - p[0], p[2] - p[0]);
         const double twice_area = imp__length(normal);
         if (!(twice_area > 0)) continue;
-        for (int i = 0; i < 3; i++) {
-            if (!own[i]) continue;
-            const imp_v3 a = p[(i + 1) % 3] - p[i], b = p[(i + 2) % 3] - p[i];
-            /* atan2 keeps the angle exact for slivers, where acos loses it. */
-            const double angle = atan2(twice_area, imp__dot(a, b));
-            m->sum[at[i]] += normal * (angle / twice_area);
-        }
+        /* From sine and cosine, which keep the angle exact for slivers, where acos loses
+         * it. */
+        const imp_v3 a = p[1] - p[0], b = p[2] - p[1], c = p[0] - p[2];
+        const imp_v3 cosine = {-imp__dot(a, c), -imp__dot(a, b), -imp__dot(b, c), 0};
+        const imp_v3 weight =
+            imp__angles(cosine, imp__spec(twice_area)) * (1 / twice_area);
+        for (int i = 0; i < 3; i++)
+            if (own[i]) m->sum[at[i]] += normal * weight[i];
     }
     return IMP_OK;
 }
