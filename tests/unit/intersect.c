@@ -245,6 +245,53 @@ static void together(imp_context *ctx)
     world_end();
 }
 
+/* The same hits, in all bits, of shapes that are asked before Embree (8 analytic ones, as many
+ * as it may be) and in Embree's tree (with another one far away). */
+static void few(imp_context *ctx)
+{
+    enum { N = 8, RAYS = 20000 };
+    static const char *const kinds[] = {"sphere", "disk", "cylinder"};
+    static struct imp_hit hits[2][RAYS];
+    static bool found[2][RAYS], dark[2][RAYS];
+    int met = 0, wrong = 0;
+    for (int more = 0; more < 2; more++) {
+        world_begin(ctx);
+        for (int k = 0; k < N + more; k++) {
+            const struct imp_key key = imp__key(5, 0, (uint64_t)k);
+            const imp_v3 at = k < N ? uniform3(key, 0, 6) : imp__v3(0, 0, 1e5);
+            const struct imp_mat4 m = placement(k % 3), t = imp__translate(at);
+            struct imp_node *n = node_new("shape", kinds[k % 3]);
+            node_transform(n, imp__mat4_multiply(&t, &m));
+            shape_build(n, NULL);
+        }
+        struct imp_node *wall = node_new("shape", "rectangle");
+        node_transform(wall, imp__scale(imp__v3(4, 4, 4)));
+        shape_build(wall, NULL);
+        if (imp__intersector_create(&world) != IMP_OK) return;
+        for (uint32_t i = 0; i < RAYS; i++) {
+            const struct imp_key key = imp__key(6, 0, i);
+            /* From around them and from among them; one in eight from far away. */
+            const imp_v3 o = uniform3(key, 0, i % 8 ? 9 : 1e4), to = uniform3(key, 8, 4);
+            const imp_v3 d = (to - o) * (i % 3 ? 1 / imp__length(to - o) : 0.1);
+            struct imp_hit hit = {.shape = -1};
+            found[more][i] = imp__intersect(&world, &o, &d, 0, INFINITY, &hit);
+            if (hit.shape == N + more) hit.shape = N; /* the wall */
+            hits[more][i] = hit;
+            dark[more][i] = imp__occluded(&world, &o, &d, 0.5, 6);
+        }
+        world_end();
+    }
+    for (int i = 0; i < RAYS; i++) {
+        const struct imp_hit *a = &hits[0][i], *b = &hits[1][i];
+        met += found[0][i];
+        wrong += found[0][i] != found[1][i] || dark[0][i] != dark[1][i] ||
+                 a->shape != b->shape || a->t != b->t || a->u != b->u || a->v != b->v;
+    }
+    tap_ok(met > RAYS / 4 && met < RAYS && wrong == 0,
+           "few analytic shapes as many: the same bits # %d of %d rays meet, %d differ",
+           met, RAYS, wrong);
+}
+
 static void intervals(imp_context *ctx)
 {
     world_begin(ctx);
@@ -374,6 +421,7 @@ int main(void)
             if (place < 3 || strcmp(imp__shape_kinds[k]->name, "sphere"))
                 single(ctx, imp__shape_kinds[k], place);
     together(ctx);
+    few(ctx);
     intervals(ctx);
     imp_context_destroy(ctx);
     threads();

@@ -5,6 +5,7 @@
 #include "format/mesh_file.h"
 #include "imp_fail_alloc.h"
 #include "imp_tap.h"
+#include "kind/shape/shape.h"
 #include <stdlib.h>
 
 static imp_context *ctx;
@@ -258,6 +259,136 @@ static void check_ply(void)
     }
 }
 
+/* Rows that are copied and rows that are read number by number, which differ by their order of
+ * bytes alone: a grid of 300 x 300 vertices with normals and uv, a number of bad value in
+ * one of its rows if `bad` is not 0. */
+enum { GRID = 300, GRID_FACES = 2 * (GRID - 1) * (GRID - 1) };
+static void grid_put(unsigned char **to, bool big, const void *number)
+{
+    const unsigned char *from = number;
+    for (int i = 0; i < 4; i++) (*to)[i] = from[big ? 3 - i : i];
+    *to += 4;
+}
+static size_t grid_make(unsigned char *text, bool big, int bad)
+{
+    unsigned char *to = text;
+    to += sprintf((char *)to,
+                  "ply\nformat binary_%s_endian 1.0\nelement vertex %d\n"
+                  "property float nx\nproperty float ny\nproperty float nz\n"
+                  "property float x\nproperty float y\nproperty float z\n"
+                  "property float u\nproperty float v\nelement face %d\n"
+                  "property list uchar uint vertex_indices\nend_header\n",
+                  big ? "big" : "little", GRID * GRID, GRID_FACES);
+    for (int k = 0; k < GRID * GRID; k++)
+        for (int i = 0; i < 8; i++) {
+            const float f = bad == 1 && k == 70000 && i == 4 ? NAN : .1f * i + k;
+            grid_put(&to, big, &f);
+        }
+    for (uint32_t k = 0; k < GRID_FACES; k++) {
+        *to++ = bad == 2 && k == 150000 ? 4 : 3;
+        for (uint32_t i = 0; i < 3; i++) {
+            const uint32_t index =
+                bad == 3 && k == 160000 ? GRID * GRID : (k + 7 * i) % (GRID * GRID);
+            grid_put(&to, big, &index);
+        }
+    }
+    return (size_t)(to - text);
+}
+
+static void check_copied(int threads)
+{
+    static const char *const messages[] = {
+        "", "g.ply: vertex 70000: y is not finite",
+        "g.ply: face 150000 has 4 corners: only triangles are read",
+        "g.ply: face 160000 names vertex 90000; there are 90000"};
+    struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
+    unsigned char *text = malloc(1024 + 32 * GRID * GRID + 13 * GRID_FACES);
+    imp_context *c;
+    o.threads = threads;
+    if (!text || imp_context_create(&o, &c) != IMP_OK) abort();
+    for (int bad = 0; bad < 4; bad++) {
+        struct loaded l[2];
+        bool right = true;
+        for (int big = 0; big < 2; big++) {
+            const enum imp_status st =
+                load(c, text, grid_make(text, big, bad), "g.ply", true, &l[big]);
+            right &=
+                bad ? st == IMP_E_SCENE && strcmp(imp_last_error(c), messages[bad]) == 0
+                    : st == IMP_OK;
+        }
+        if (right && !bad) {
+            const struct imp_mesh_data *a = &l[0].m, *b = &l[1].m;
+            const size_t n = GRID * GRID * sizeof(float);
+            right = a->positions[3 * 70000 + 1] == .1f * 4 + 70000 &&
+                    a->uvs[2 * 70000 + 1] == 1 - (.1f * 7 + 70000) &&
+                    a->indices[3 * 150000 + 2] == 150014 % (GRID * GRID) &&
+                    !memcmp(a->positions, b->positions, 3 * n) &&
+                    !memcmp(a->normals, b->normals, 3 * n) &&
+                    !memcmp(a->uvs, b->uvs, 2 * n) &&
+                    !memcmp(a->indices, b->indices, GRID_FACES * 3 * sizeof *a->indices);
+        }
+        tap_ok(right, "%d threads copy what is read by numbers, too # %s", threads,
+               messages[bad]);
+        unload(&l[0]), unload(&l[1]);
+    }
+    imp_context_destroy(c);
+    free(text);
+}
+
+/* ---- Normals ------------------------------------------------------------------- */
+
+/* Of a bumpy grid whose every vertex stands in the list twice: triangles name one or the
+ * other, and the normals of both are those of the function. */
+static void check_normals(void)
+{
+    const size_t n = 2 * GRID * GRID;
+    float *positions = malloc(3 * n * sizeof *positions), *normals[3];
+    uint32_t *indices = malloc(3 * GRID_FACES * sizeof *indices), *to = indices;
+    if (!positions || !indices) abort();
+    for (uint32_t k = 0; k < n; k++) {
+        const uint32_t x = k / 2 % GRID, y = k / 2 / GRID;
+        positions[3 * k] = (float)x, positions[3 * k + 1] = (float)y;
+        positions[3 * k + 2] = (float)(3 * sin(x * .1) * cos(y * .13));
+    }
+    for (uint32_t y = 0; y + 1 < GRID; y++)
+        for (uint32_t x = 0; x + 1 < GRID; x++) {
+            const uint32_t a = 2 * (y * GRID + x), b = a + 2, c = a + 2 * GRID, d = c + 2,
+                           twin = (x ^ y) & 1;
+            const uint32_t corner[6] = {a, b + twin, d, a + twin, d, c + twin};
+            memcpy(to, corner, sizeof corner);
+            to += 6;
+        }
+    for (int t = 0; t < 3; t++) {
+        struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
+        imp_context *c;
+        o.threads = 2 * t + 1;
+        normals[t] = malloc(3 * n * sizeof *normals[t]);
+        if (!normals[t] || imp_context_create(&o, &c) != IMP_OK ||
+            imp__mesh_normals(c, n, GRID_FACES, positions, indices, normals[t]) != IMP_OK)
+            abort();
+        imp_context_destroy(c);
+    }
+    double worst = 0;
+    bool twins = true;
+    for (size_t k = 0; k < n; k++) {
+        const float *p = positions + 3 * k, *q = normals[0] + 3 * k;
+        const double x = (double)p[0], y = (double)p[1];
+        const imp_v3 right = imp__normalize(imp__v3(-.3 * cos(x * .1) * cos(y * .13),
+                                                    .39 * sin(x * .1) * sin(y * .13), 1));
+        twins &= memcmp(q, normals[0] + 3 * (k ^ 1), 3 * sizeof *q) == 0;
+        if (x == 0 || y == 0 || x == GRID - 1 || y == GRID - 1) continue;
+        worst = fmax(worst, 1 - imp__dot(right, imp__v3(q[0], q[1], q[2])));
+    }
+    tap_ok(worst < 1e-4, "normals of a bumpy grid # cosines 1 - %.3g at worst", worst);
+    tap_ok(twins, "vertices at one place have one normal");
+    for (int t = 1; t < 3; t++)
+        tap_ok(memcmp(normals[0], normals[t], 3 * n * sizeof *normals[t]) == 0,
+               "the same bits by %d threads", 2 * t + 1);
+    for (int t = 0; t < 3; t++) free(normals[t]);
+    free(positions);
+    free(indices);
+}
+
 /* ---- Hostile --------------------------------------------------------------------------
  */
 
@@ -341,6 +472,9 @@ int main(void)
     if (imp_context_create(&o, &ctx) != IMP_OK) return 1;
     check_obj();
     check_ply();
+    check_copied(1);
+    check_copied(3);
+    check_normals();
     static const char obj[] =
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\n";
     check_cut("h.obj", obj, sizeof obj - 1, 6); /* "3" and "3/1" are corners too */

@@ -7,6 +7,7 @@
 #include "math/quadrature.h"
 #include "math/rng.h"
 #include "math/stat.h"
+#include "math/trig.h"
 
 static void distributions(void)
 {
@@ -126,8 +127,27 @@ static void linear_algebra(void)
     tap_ok(!imp__eigen_symmetric(2, bad, values, v), "NaN: no eigenvalues, and no hang");
 }
 
+/* Of vectors in all directions above the x axis, of lengths that differ by powers of two. */
+static void angles(void)
+{
+    double worst = 0;
+    for (uint32_t i = 0; i < 100000; i++) {
+        const struct imp_key key = imp__key(3, 0, i);
+        const double turn = IMP_PI * imp__u01(key, 0), size = exp2(i % 200 - 100.);
+        const imp_v3 x = {size * cos(turn), -size, 0, size * imp__u01(key, 1)},
+                     y = {size * sin(turn), size * exp2(-(double)(i % 60)), size, size};
+        const imp_v3 a = imp__angles(x, y);
+        for (int k = 0; k < 4; k++) {
+            const long double right = atan2l(y[k], x[k]);
+            worst = fmax(worst, (double)fabsl((a[k] - right) / right));
+        }
+    }
+    tap_ok(worst < 0x1p-51, "angles of vectors # worst relative error %.3g", worst);
+}
+
 int main(void)
 {
+    angles();
     distributions();
     quadrature();
     linear_algebra();
