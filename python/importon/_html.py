@@ -50,8 +50,8 @@ def scene(s: Any) -> str:
             ("bsdfs", s.n_bsdfs), ("textures", s.n_textures),
             ("integrator", s.integrator + (", max_depth %d" % s.max_depth if s.max_depth >= 0 else "")),
             ("bounds", "%s to %s" % tuple("(%g, %g, %g)" % c for c in s.bounds))]
-    rows += [("sensor %d" % i, "%s (%s), %d x %d, %d samples per pixel, %s filter of radius %g" % (
-        c.name, c.type, c.width, c.height, c.spp, c.filter, c.filter_radius)) for i, c in enumerate(s.sensors)]
+    rows += [("sensor %d" % i, "%s (%s), %d x %d, %d sample%s per pixel, %s filter of radius %g" % (
+        c.name, c.type, c.width, c.height, c.spp, "s" * (c.spp != 1), c.filter, c.filter_radius)) for i, c in enumerate(s.sensors)]
     return _table(("scene", s.mode), rows, s.name)
 
 
