@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What a kept walk costs: evaluated, folded and swept, over traced and swept, one thread,
- * processor time; the median of pairs measured in turn. Then whole pictures, and searches
- * by L-BFGS, MMA and SLSQP; and how far values of as many draws spread at numbers far away.
+ * processor time; the median of pairs measured in turn (walks). Then pictures, searches (fits)
+ * by L-BFGS, MMA and SLSQP, and how far values of N draws spread far away (spread).
  *
- *     kept [--repeats N] [--spp N] [--only walks|pictures|fits|spread] [--scene NAME] */
+ *     kept [--repeats N] [--spp N] [--picture-spp N] [--scene NAME] [--only PART] */
 #include "walk/store.h"
 #include <importon/walks.h>
 #include <math.h>
@@ -13,7 +13,7 @@
 #include <string.h>
 #include <time.h>
 
-static int repeats = 5, spp = 16;
+static int repeats = 5, spp = 16, picture_spp = 0; /* 0: the scene's */
 static const char *only = "", *scene_only = ""; /* parts, and scenes, whose name has it */
 static imp_context *ctx;
 
@@ -189,8 +189,7 @@ static void change(imp_scene *scene)
     free(x);
 }
 
-/* Whole pictures, through the film, at other parameters than those of the draw, with as many
- * samples as the scene has: kept ones over traced ones. */
+/* Whole pictures, through the film, elsewhere than at the draw: kept ones over traced ones. */
 static void measure_picture(const char *file, const char *define)
 {
     if (!wanted("pictures", file)) return;
@@ -206,6 +205,7 @@ static void measure_picture(const char *file, const char *define)
     snprintf(path, sizeof path, "%s/%s", IMP_SCENES, file);
     must(imp_scene_load(ctx, path, &o, &scene));
     keep.memory = 8e9;
+    run.spp = picture_spp;
     must(imp_walks_keep(scene, &run, &keep, &walks));
     change(scene);
     for (int k = 0; k < repeats; k++) {
@@ -371,6 +371,7 @@ int main(int argc, char **argv)
     for (int k = 1; k + 1 < argc; k += 2) {
         if (strcmp(argv[k], "--repeats") == 0) repeats = atoi(argv[k + 1]);
         else if (strcmp(argv[k], "--spp") == 0) spp = atoi(argv[k + 1]);
+        else if (strcmp(argv[k], "--picture-spp") == 0) picture_spp = atoi(argv[k + 1]);
         else if (strcmp(argv[k], "--only") == 0) only = argv[k + 1];
         else if (strcmp(argv[k], "--scene") == 0) scene_only = argv[k + 1];
     }

@@ -278,7 +278,9 @@ static enum imp_status use_check(const struct imp_walks *w, const struct imp_sto
 {
     struct imp_walks_weight x;
     bool all;
-    IMP_CHECKED(imp__walks_weigh(w, store, NULL, IMP_WALKS_ASKED, &x, &all));
+    /* Classes that materials share say nothing of each. */
+    const bool apart = w->scene->n_bsdfs <= IMP_STORE_CLASSES;
+    IMP_CHECKED(imp__walks_weigh(w, store, NULL, apart ? IMP_WALKS_ASKED : 0, &x, &all));
     struct imp_walks_weight worse = x;
     worse.growth *= CLEAR;
     if (!all && x.ess >= CLEAR * w->ess && imp__walks_finite(w, &worse)) return IMP_OK;

@@ -1,20 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Which kept walks are asked what they are worth elsewhere. Some thousand of many say it, if
- * those that meet what matters are among them: a material in few pixels that has changed
- * may refuse all. Of each walk it is known what it meets, in 64 bits: bit a, it goes on at a material of
- * class a; bit 32 + a, roulette looks at such a step, beyond the first that it looks at
- * (store_weight.c). With n_a walks that meet a, a is rare if each `every`-th walk brings
- * fewer than LEAST of them. Walks that meet something rare are asked each with the
+ * Which kept walks are asked what they are worth elsewhere. Some thousand of many say it,
+ * if those that meet what matters are among them: a material in few pixels that has changed
+ * may refuse all. Of each walk it is known what it meets, in 64 bits: bit a, it goes on at
+ * a material of class a; bit 32 + a, roulette looks at such a step, beyond the first that it
+ * looks at (store_weight.c). With n_a walks that meet a, a is rare if each `every`-th walk
+ * brings fewer than LEAST of them. Walks that meet something rare are asked each with the
  * probability
  *
  *     P = min(1, LEAST/n_a),   a the rarest that it meets
  *
- * others every `every`-th, and sums weigh walks by 1/P. */
+ * others every `every`-th, and sums weigh walks by 1/P. Of materials that share a class,
+ * with more than IMP_STORE_CLASSES of them, a rare one is met with the others alone. */
 #include "math/rng.h"
 #include "store.h"
 
-#define LEAST 128
+#define LEAST 64
 
 _Static_assert(2 * IMP_STORE_CLASSES == 64, "bits of what a walk meets");
 
@@ -60,8 +61,7 @@ struct imp_asking imp__store_asking(const struct imp_store *s,
     struct imp_asking a = {.every = 1};
     size_t n = 0;
     for (size_t k = 0; k < imp__store_tiles(s); k++) n += s->records[k].n_walks;
-    /* Classes that materials share say nothing of each. */
-    if (most == 0 || d->flights || d->scene->n_bsdfs > IMP_STORE_CLASSES) return a;
+    if (most == 0 || d->flights) return a;
     a.every = n / most | 1;
     for (int b = 0; b < 64; b++)
         if ((d->matters >> b & 1) && s->met[b] > 0 && s->met[b] / a.every < LEAST)

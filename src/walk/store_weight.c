@@ -206,7 +206,9 @@ static void step_on(struct course *c, const struct imp_decision *d,
                     const struct imp_vertex *at, const struct imp_bsdf *next)
 {
     const struct imp_densities *m = c->m;
-    struct looked v = {.bsdf = imp__decided_bsdf(m->scene, d), .carried = c->carried};
+    struct looked v; /* its inputs are not cleared: most materials have few */
+    v.bsdf = imp__decided_bsdf(m->scene, d);
+    v.carried = c->carried;
     const bool moved = v.bsdf && v.bsdf->index >= 0 && m->moved[v.bsdf->index];
     const bool lanes = v.bsdf && v.bsdf->shaped && !d->alone;
     if (v.bsdf && (moved || lanes || c->rolls)) {
@@ -253,11 +255,17 @@ static double course_weight(struct course *c, uint64_t j, uint64_t end,
     return c->w;
 }
 
-/* A walk that is asked soon is far from the last one, and would be waited for. */
-static void fetch(const struct imp_record *r, size_t i)
+/* Walks that are asked are far from each other, and would be waited for: the next but one's
+ * head, which says where its vertices are, and the next one's vertices come meanwhile. */
+static void fetch(const struct imp_record *r, size_t next, size_t after)
 {
-    if (i >= r->n_walks) return;
-    const struct imp_record_walk *k = imp__record_at(r, i);
+    if (after < r->n_walks) {
+        const char *head = (const char *)imp__record_at(r, after);
+        __builtin_prefetch(head);
+        __builtin_prefetch(head + sizeof(struct imp_record_walk) - 1);
+    }
+    if (next >= r->n_walks) return;
+    const struct imp_record_walk *k = imp__record_at(r, next);
     for (uint32_t j = 0; j < k->n; j++) {
         const char *d = (const char *)imp__record_vertex(r, k->first + j);
         for (size_t b = 0; b < sizeof(struct imp_decision); b += IMP_CACHE_LINE)
@@ -278,18 +286,21 @@ enum imp_status imp__store_moments(const struct imp_store *s,
     const int side = imp_min(IMP_STORE_SIDE, s->width + s->margin - x0);
     const bool rolls = s->roulette && d->weights && !d->integrator->absorbs;
     const bool tracks = (rolls && !d->guided) || d->flights || tracer->wavelengths;
-    double of, of_next;
+    double of, of_next, of_after;
     size_t next = imp__store_next(s, asking, tile, 0, &of_next);
+    size_t after = imp__store_next(s, asking, tile, next + 1, &of_after);
     while (next < r->n_walks) {
         const size_t i = next;
         of = of_next;
-        next = imp__store_next(s, asking, tile, i + 1, &of_next);
+        next = after;
+        of_next = of_after;
+        after = imp__store_next(s, asking, tile, next + 1, &of_after);
         const struct imp_record_walk *k = imp__record_at(r, i);
         const int pixel = (int)(i / s->n);
         const int x = imp_clamp(x0 + pixel % side, 0, s->width - 1);
         const int y = imp_clamp(y0 + pixel / side, 0, s->height - 1);
         struct imp_walk walk = {.key = k->key};
-        if (next > i + 1) fetch(r, next);
+        if (next > i + 1) fetch(r, next, after);
         if (mask && !(mask[(size_t)y * (size_t)s->width + (size_t)x] > 0)) continue;
         const struct imp_arena_mark mark = imp__arena_mark(arena);
         if (k->n_items > 0 && (tracks || k->n_vertices > k->n))
@@ -327,29 +338,32 @@ enum imp_status imp__store_moments(const struct imp_store *s,
 double imp__moments_radius(const struct imp_moments *sum)
 {
     double most = 0;
+    int from[IMP_STORE_CLASSES], n = 0; /* classes that go on; others have rows of 0 */
+    for (int a = 0; a < IMP_STORE_CLASSES; a++)
+        if (sum->steps[a] > 0) from[n++] = a;
     for (int c = 0; c < 4; c++) {
-        double x[IMP_STORE_CLASSES], radius = 0;
-        for (int a = 0; a < IMP_STORE_CLASSES; a++) x[a] = 1;
+        double T[IMP_STORE_CLASSES][IMP_STORE_CLASSES], x[IMP_STORE_CLASSES], radius = 0;
+        for (int a = 0; a < n; a++) {
+            x[a] = 1;
+            for (int b = 0; b < n; b++)
+                T[a][b] = sum->growth[from[a]][from[b]][c] / sum->steps[from[a]];
+        }
         for (int round = 0; round < 100; round++) { /* power iteration */
             double y[IMP_STORE_CLASSES], largest = 0;
-            for (int a = 0; a < IMP_STORE_CLASSES; a++) {
+            for (int a = 0; a < n; a++) {
                 y[a] = 0;
-                for (int b = 0; sum->steps[a] > 0 && b < IMP_STORE_CLASSES; b++)
-                    y[a] += sum->growth[a][b][c] / sum->steps[a] * x[b];
+                for (int b = 0; b < n; b++) y[a] += T[a][b] * x[b];
                 largest = fmax(largest, y[a]);
             }
-            if (!(largest > 0)) {
-                radius = 0;
-                break;
-            }
-            /* Shifted, so that classes that take turns do not oscillate. */
             radius = largest;
+            if (!(largest > 0)) break;
+            /* Shifted, so that classes that take turns do not oscillate. */
             double norm = 0;
-            for (int a = 0; a < IMP_STORE_CLASSES; a++) {
+            for (int a = 0; a < n; a++) {
                 x[a] = y[a] + 0.1 * largest * x[a];
                 norm = fmax(norm, x[a]);
             }
-            for (int a = 0; a < IMP_STORE_CLASSES; a++) x[a] /= norm;
+            for (int a = 0; a < n; a++) x[a] /= norm;
         }
         most = fmax(most, radius);
     }
