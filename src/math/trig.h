@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Sine and cosine of a fraction of a turn, and angles of vectors. Every direction drawn needs
- * the former, every triangle of a mesh without normals the latter; written out they cost a third
- * of the C library's, and give the same bits with every C library. */
+ * the former, every hit of a sphere and every triangle of a mesh without normals the latter;
+ * written out they cost a third of the C library's, and give the same bits with every C
+ * library. */
 #ifndef IMP_MATH_TRIG_H
 #define IMP_MATH_TRIG_H
 
@@ -50,7 +51,7 @@ static inline imp_v3 imp__lanes_choose(__typeof__((imp_v3){0} > 0) first, imp_v3
     return (imp_v3)(((mask)a & first) | ((mask)b & ~first));
 }
 
-/* Angles of the vectors (x, y), one a lane, y > 0: in (0, pi), to 2^-51. With t, the smaller of
+/* Angles of the vectors (x, y), one a lane, y >= 0 and not both 0: in [0, pi], to 2^-51. With t, the smaller of
  * |x| and y over the larger, atan t = atan c + atan s, s = (t - c) / (1 + c t), where c is the
  * one of 0, 1/2 and 1 for which |s| < .24; then the series, cut where the next term is below
  * 2^-54. */

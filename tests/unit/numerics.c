@@ -142,6 +142,10 @@ static void angles(void)
             worst = fmax(worst, (double)fabsl((a[k] - right) / right));
         }
     }
+    const imp_v3 flat = imp__angles((imp_v3){2, -2, 0, 1}, (imp_v3){0, 0, 3, 1});
+    tap_ok(flat[0] == 0 && flat[1] == IMP_PI && flat[2] == IMP_PI / 2 &&
+               flat[3] == IMP_PI / 4,
+           "along the axes and between them");
     tap_ok(worst < 0x1p-51, "angles of vectors # worst relative error %.3g", worst);
 }
 

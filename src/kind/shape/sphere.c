@@ -2,6 +2,7 @@
  *
  * The sphere, in double precision. Seen from outside it is sampled by the cone of
  * directions it fills, from inside by area. */
+#include "math/trig.h"
 #include "math/warp.h"
 #include "shape.h"
 
@@ -79,8 +80,12 @@ static void surface_at(const struct sphere *p, imp_v3 outward, struct imp_surfac
     const double rho = sqrt(q[0] * q[0] + q[1] * q[1]);
     out->p = p->center + outward * p->radius;
     out->ng = out->n = outward * p->side;
-    out->uv[0] = imp__uv_turn(q[0], q[1]);
-    out->uv[1] = atan2(rho, q[2]) * IMP_INV_PI;
+    /* Longitude, over a turn, and latitude; 0 of the former at a pole. */
+    const imp_v3 angle = imp__angles((imp_v3){rho > 0 ? q[0] : 1, q[2], 1, 1},
+                                     (imp_v3){fabs(q[1]), rho, 0, 0});
+    const double turn = angle[0] * (1 / IMP_2PI), u = q[1] < 0 ? 1 - turn : turn;
+    out->uv[0] = u < 1 ? u : 0;
+    out->uv[1] = angle[1] * IMP_INV_PI;
     out->dp_du = imp__to_world(&p->axes, imp__v3(-q[1], q[0], 0)) * (IMP_2PI * p->radius);
     const double c = rho > 0 ? q[0] / rho : 1, si = rho > 0 ? q[1] / rho : 0;
     out->dp_dv = imp__to_world(&p->axes, imp__v3(q[2] * c, q[2] * si, -rho)) *
