@@ -78,6 +78,21 @@ static enum imp_status normals_place(const struct imp_build *b, const struct imp
     return IMP_OK;
 }
 
+struct checking {
+    const struct imp_build *b;
+    const struct imp_mesh_data *data;
+};
+static enum imp_status corners_check(size_t first, size_t end, void *payload)
+{
+    const struct checking *x = payload;
+    for (size_t k = first; k < end; k++)
+        if (x->data->indices[k] >= x->data->n_vertices)
+            return imp_build_error(x->b, NULL, IMP_E_SCENE,
+                                   "triangle %zu names vertex %u; there are %zu", k / 3,
+                                   x->data->indices[k], x->data->n_vertices);
+    return IMP_OK;
+}
+
 static enum imp_status data_check(const struct imp_build *b,
                                   const struct imp_mesh_data *data)
 {
@@ -86,11 +101,10 @@ static enum imp_status data_check(const struct imp_build *b,
     if (data->n_triangles > INT32_MAX || data->n_vertices > INT32_MAX)
         return imp_build_error(b, NULL, IMP_E_SCENE,
                                "it has more than 2^31 triangles or vertices");
-    for (size_t k = 0; k < 3 * data->n_triangles; k++)
-        if (data->indices[k] >= data->n_vertices)
-            return imp_build_error(b, NULL, IMP_E_SCENE,
-                                   "triangle %zu names vertex %u; there are %zu", k / 3,
-                                   data->indices[k], data->n_vertices);
+    struct checking x = {b, data};
+    const enum imp_status st =
+        imp__parallel_ranges(b->ctx, 3 * data->n_triangles, LEAST, corners_check, &x);
+    if (st != IMP_OK) return st;
     for (size_t k = 0; data->uvs && k < 2 * data->n_vertices; k++)
         if (!isfinite(data->uvs[k]))
             return imp_build_error(b, NULL, IMP_E_SCENE,

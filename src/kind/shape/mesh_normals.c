@@ -23,7 +23,7 @@ struct normals {
     size_t slots;
     uint32_t *table;   /* [slots] vertex + 1; 0: free */
     _Atomic bool full; /* a part of it, and places are missing */
-    imp_v3 *sum;       /* [n_vertices] */
+    double (*sum)[3];  /* [n_vertices] */
     float *out;
 };
 
@@ -39,6 +39,13 @@ static uint64_t position_hash(const float p[3])
         h ^= h >> 32;
     }
     return h;
+}
+
+/* The slot where v is looked for first. */
+#define AHEAD 16 /* vertices for whose slots memory is asked before they are needed */
+static inline size_t home(const struct normals *m, size_t v)
+{
+    return position_hash(m->positions + 3 * v) & (m->slots - 1);
 }
 
 /* The place of v by slots [first, end), where k is the first to look at; `used` counts those
@@ -66,7 +73,9 @@ static enum imp_status places_find(size_t first, size_t end, void *payload)
     size_t used = 0;
     memset(m->table + first, 0, (end - first) * sizeof *m->table);
     for (size_t v = 0; v < m->n_vertices; v++) {
-        const size_t k = position_hash(m->positions + 3 * v) & (m->slots - 1);
+        if (v + AHEAD < m->n_vertices)
+            __builtin_prefetch(&m->table[home(m, v + AHEAD)], 1);
+        const size_t k = home(m, v);
         if (k < first || k >= end) continue;
         if (used == end - first) {
             atomic_store(&m->full, true);
@@ -101,12 +110,14 @@ static enum imp_status angles_add(size_t first, size_t end, void *payload)
         if (!(twice_area > 0)) continue;
         /* From sine and cosine, which keep the angle exact for slivers, where acos loses
          * it. */
-        const imp_v3 a = p[1] - p[0], b = p[2] - p[1], c = p[0] - p[2];
-        const imp_v3 cosine = {-imp__dot(a, c), -imp__dot(a, b), -imp__dot(b, c), 0};
+        const imp_v3 e0 = p[1] - p[0], e1 = p[2] - p[1], e2 = p[0] - p[2];
+        const imp_v3 cosine = {-imp__dot(e0, e2), -imp__dot(e0, e1), -imp__dot(e1, e2),
+                               0};
         const imp_v3 weight =
             imp__angles(cosine, imp__spec(twice_area)) * (1 / twice_area);
         for (int i = 0; i < 3; i++)
-            if (own[i]) m->sum[at[i]] += normal * weight[i];
+            for (int c = 0; own[i] && c < 3; c++)
+                m->sum[at[i]][c] += normal[c] * weight[i];
     }
     return IMP_OK;
 }
@@ -115,7 +126,8 @@ static enum imp_status normals_write(size_t first, size_t end, void *payload)
 {
     const struct normals *m = payload;
     for (size_t v = first; v < end; v++) {
-        const imp_v3 n = m->sum[m->place[v]];
+        const double *sum = m->sum[m->place[v]];
+        const imp_v3 n = imp__v3(sum[0], sum[1], sum[2]);
         const double length = imp__length(n);
         const imp_v3 unit = length > 0 ? n * (1 / length) : imp__v3(1, 0, 0);
         for (int i = 0; i < 3; i++) m->out[3 * v + (size_t)i] = (float)unit[i];
