@@ -26,12 +26,20 @@ static inline void imp__emitter_place(const struct imp_emitter *e,
 {
     if (imp_unlikely(e->ops->place != NULL)) e->ops->place(e, x, at->uv);
 }
+/* Is its radiance a constant, the same in all directions of its front or from all around? */
+static inline bool imp__emitter_even(const struct imp_emitter *e,
+                                     const struct imp_carried *carried)
+{
+    return (e->ops->flags & IMP_EMITTER_UNIFORM) && e->input[0]->plain && !carried;
+}
 /* Radiance of an emitter at x, point p of it, at the scene's present parameters. */
 static inline imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,
                                              const struct imp_emission *x, imp_v3 p,
                                              const struct imp_carried *carried)
 {
     const struct imp_emitter *e = scene->emitters[emitter];
+    if (imp_likely(imp__emitter_even(e, carried)))
+        return x->cos_light > 0 ? e->input[0]->value : imp__spec(0);
     struct imp_texcoord at = {
         .uv = {x->uv[0], x->uv[1]}, .p = p, .carried = carried, .shape = e->shape};
     imp_spec in[IMP_INPUTS_MAX], le;

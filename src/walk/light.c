@@ -14,7 +14,6 @@ static double power_heuristic(double a, double b)
     const double a2 = a * a, b2 = b * b;
     return a2 > 0 ? a2 / (a2 + b2) : 0;
 }
-
 /* By what the density of a point of this light is multiplied, since light samples choose
  * the light where the ray in flight left: its probability. prim: of the point that is met. */
 static double choice_factor(const struct imp_step *s, int light, int prim)
@@ -100,10 +99,14 @@ static inline int weights_sample(const struct imp_step *s, const struct imp_surf
                                  double u[2], double *pmf, struct imp_light_sample *ls)
 {
     const bool one = s->walk->point.points && !s->guided.here;
-    const int light =
-        light_choose(s, one ? u[0] : imp__step_number(s, IMP_DIM_LIGHT), pmf);
-    if (!(*pmf > 0)) return -1;
-    if (one) u[0] = light_part(s->scene, light, u[0], *pmf);
+    int light = 0;
+    if (s->scene->n_emitters > 1 || s->guided.here) {
+        light = light_choose(s, one ? u[0] : imp__step_number(s, IMP_DIM_LIGHT), pmf);
+        if (!(*pmf > 0)) return -1;
+        if (one) u[0] = light_part(s->scene, light, u[0], *pmf);
+    } else { /* nothing to choose */
+        *pmf = s->scene->light_cdf[0];
+    }
     const struct imp_emitter *e = s->scene->emitters[light];
     return e->ops->sample(e, &at->p, u, ls) ? light : -1;
 }
