@@ -9,11 +9,18 @@ static double light_pmf(const struct imp_scene *s, int light)
     return s->light_cdf[light] - (light ? s->light_cdf[light - 1] : 0);
 }
 
+/* The weight of what density a drew and density b could have drawn; and that over a. */
 static double power_heuristic(double a, double b)
 {
     const double a2 = a * a, b2 = b * b;
     return a2 > 0 ? a2 / (a2 + b2) : 0;
 }
+static double power_heuristic_over(double a, double b)
+{
+    const double a2 = a * a, b2 = b * b;
+    return a2 > 0 ? a / (a2 + b2) : 0;
+}
+
 /* By what the density of a point of this light is multiplied, since light samples choose
  * the light where the ray in flight left: its probability. prim: of the point that is met. */
 static double choice_factor(const struct imp_step *s, int light, int prim)
@@ -189,11 +196,11 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
     const double p = ls->pdf * pmf;
     const bool alone =
         (e->ops->flags & IMP_EMITTER_DELTA) || !s->tracer->integrator->directions;
-    const double mis = imp_unlikely(s->both != NULL)
-                           ? imp__both_sample_weight(s, light, ls, b, &dirs)
-                       : alone ? 1
-                               : power_heuristic(p, pdf);
-    const double weight = imp__emitter_timed(e, s->walk->time, imp__decide1(mis / p));
+    const double mis_over_p = imp_unlikely(s->both != NULL)
+                                  ? imp__both_sample_weight(s, light, ls, b, &dirs) / p
+                              : alone ? 1 / p
+                                      : power_heuristic_over(p, pdf);
+    const double weight = imp__emitter_timed(e, s->walk->time, imp__decide1(mis_over_p));
 
     /* What it brings, if it is seen. */
     const imp_v3 there =
