@@ -117,19 +117,6 @@ static bool last_bounce(const struct imp_step *s)
     return max_depth >= 0 && imp__bounces(s) + 1 >= max_depth;
 }
 
-bool imp__direction_begin(const struct imp_step *s, const struct imp_vertex *v,
-                          const struct imp_frame *frame, struct imp_direction *out)
-{
-    const double u[3] = {imp__step_number(s, IMP_DIM_LOBE),
-                         imp__step_number(s, IMP_DIM_DIR_U),
-                         imp__step_number(s, IMP_DIM_DIR_V)};
-    const struct imp_bsdf *b = v->bsdf;
-    out->dirs = (struct imp_dirs){.wo = s->wo_drawn,
-                                  .lobe = IMP_SMOOTH,
-                                  .derivative = imp__derivative_wanted(s, b)};
-    return imp__direction_draw(s, b, frame, u, &out->dirs, &out->by);
-}
-
 bool imp__scatter_along(struct imp_step *s, struct imp_vertex *v,
                         const struct imp_surface *at, const struct imp_frame *frame,
                         struct imp_direction *direction)

@@ -15,6 +15,7 @@
 #include "shaped.h"
 
 struct imp_both;
+struct imp_direction;
 
 /* What a guide knows of the walk (guided.c). */
 struct imp_guided {
@@ -329,18 +330,11 @@ static inline bool imp__throughput_add(struct imp_step *s, const struct imp_bsdf
     s->beta *= factor;
     return !imp__is_zero_used(s->beta, four);
 }
-/* A direction in which the walk may go on from v. False: it ends. */
-struct imp_direction {
-    int by; /* which member of the mixture drew it (enum imp_density) */
-    struct imp_dirs dirs;
-};
-bool imp__direction_begin(const struct imp_step *s, const struct imp_vertex *v,
-                          const struct imp_frame *frame, struct imp_direction *out);
-/* Decide whether the walk goes on there; rounds the direction. False: it ends here. */
+/* Decide whether the walk goes on along a direction; rounds it. False: it ends here. */
 bool imp__scatter_along(struct imp_step *s, struct imp_vertex *v,
                         const struct imp_surface *at, const struct imp_frame *frame,
                         struct imp_direction *direction);
-/* Both. */
+/* A direction, and whether the walk goes on there. */
 bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_surface *at,
                   const struct imp_frame *frame);
 
@@ -367,6 +361,26 @@ static inline bool imp__wants_derivative(const struct imp_step *s,
                                          const struct imp_bsdf *b)
 {
     return imp__derivative_wanted(s, b) != 0;
+}
+
+/* ---- A direction before it is weighed ---- */
+struct imp_direction {
+    int by; /* which member of the mixture drew it (enum imp_density) */
+    struct imp_dirs dirs;
+};
+/* One in which the walk may go on from v. False: it ends. */
+static inline bool imp__direction_begin(const struct imp_step *s,
+                                        const struct imp_vertex *v,
+                                        const struct imp_frame *frame,
+                                        struct imp_direction *out)
+{
+    const double u[3] = {imp__step_number(s, IMP_DIM_LOBE),
+                         imp__step_number(s, IMP_DIM_DIR_U),
+                         imp__step_number(s, IMP_DIM_DIR_V)};
+    out->dirs.wo = s->wo_drawn;
+    out->dirs.lobe = IMP_SMOOTH;
+    out->dirs.derivative = imp__derivative_wanted(s, v->bsdf);
+    return imp__direction_draw(s, v->bsdf, frame, u, &out->dirs, &out->by);
 }
 
 #endif
