@@ -4,6 +4,7 @@
  * walk from the sensor, whose vertices are joined with those of the first. They share
  * their time, their wavelengths and the lane that draws. */
 #include "both.h"
+#include "drawn.h"
 #include "kind/bsdf/transport.h"
 #include "meter.h"
 
@@ -142,7 +143,7 @@ static bool scatter(struct imp_step *s, struct imp_vertex *v,
     if (v->bsdf->flags & IMP_BSDF_SMOOTH) {
         struct imp_shadow shadow = {.wanted = false};
         struct imp_light_point point;
-        if (imp__light_point(s, v, at, &point))
+        if (imp__light_point(s, v->bsdf, at, &point))
             imp__light_sample(s, v, at, frame, &point, &shadow);
         if (shadow.wanted) light_see(s, v, at, &shadow);
         /* A sensor that is a surface is connected by the walk from the light. */

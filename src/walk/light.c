@@ -3,6 +3,7 @@
  * Emission: met by chance, and asked for by light samples, each with the weight of the
  * power heuristic (Veach 1997) against the other. */
 #include "both.h"
+#include "drawn.h"
 
 static double light_pmf(const struct imp_scene *s, int light)
 {
@@ -106,14 +107,10 @@ static inline int weights_sample(const struct imp_step *s, const struct imp_surf
                                  double u[2], double *pmf, struct imp_light_sample *ls)
 {
     const bool one = s->walk->point.points && !s->guided.here;
-    int light = 0;
-    if (s->scene->n_emitters > 1 || s->guided.here) {
-        light = light_choose(s, one ? u[0] : imp__step_number(s, IMP_DIM_LIGHT), pmf);
-        if (!(*pmf > 0)) return -1;
-        if (one) u[0] = light_part(s->scene, light, u[0], *pmf);
-    } else { /* nothing to choose */
-        *pmf = s->scene->light_cdf[0];
-    }
+    const int light =
+        light_choose(s, one ? u[0] : imp__step_number(s, IMP_DIM_LIGHT), pmf);
+    if (!(*pmf > 0)) return -1;
+    if (one) u[0] = light_part(s->scene, light, u[0], *pmf);
     const struct imp_emitter *e = s->scene->emitters[light];
     return e->ops->sample(e, &at->p, u, ls) ? light : -1;
 }
@@ -160,14 +157,12 @@ static inline double continuation_pdf(const struct imp_step *s, const struct imp
                            : imp__lane_mis_density(s, p);
 }
 
-bool imp__light_point(const struct imp_step *s, const struct imp_vertex *v,
-                      const struct imp_surface *at, struct imp_light_point *out)
+bool imp__light_point_of(const struct imp_step *s, const struct imp_bsdf *b,
+                         const struct imp_surface *at, double u[2],
+                         struct imp_light_point *out)
 {
-    if (s->scene->n_emitters == 0) return false;
-    double u[2] = {imp__step_number(s, IMP_DIM_LIGHT_U),
-                   imp__step_number(s, IMP_DIM_LIGHT_V)};
     out->light = imp_unlikely(s->light_tree != NULL && !s->guided.here)
-                     ? tree_sample(s, v->bsdf, at, u, &out->pmf, &out->there)
+                     ? tree_sample(s, b, at, u, &out->pmf, &out->there)
                      : weights_sample(s, at, u, &out->pmf, &out->there);
     return out->light >= 0 && out->there.pdf > 0;
 }

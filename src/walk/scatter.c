@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Whether a walk goes on, and where: the draw of a direction, and roulette. */
-#include "step.h"
+#include "drawn.h"
 
 bool imp__throughput_part(struct imp_step *s, const struct imp_bsdf *b, imp_spec factor)
 {

@@ -16,6 +16,7 @@
 
 struct imp_both;
 struct imp_direction;
+struct imp_light_point;
 
 /* What a guide knows of the walk (guided.c). */
 struct imp_guided {
@@ -227,15 +228,7 @@ struct imp_shadow {
 void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
                         double weight, const struct imp_hit *hit,
                         const struct imp_surface *at);
-/* A light and a point of it, for the vertex v. False: none. */
-struct imp_light_point {
-    int light;
-    double pmf; /* of the light, or of the triangle that there.pdf is that of */
-    struct imp_light_sample there;
-};
-bool imp__light_point(const struct imp_step *s, const struct imp_vertex *v,
-                      const struct imp_surface *at, struct imp_light_point *out);
-/* What v gets from there, and the shadow ray. */
+/* What v gets from a point of a light (drawn.h), and the shadow ray. */
 void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
                        const struct imp_surface *at, const struct imp_frame *frame,
                        const struct imp_light_point *to, struct imp_shadow *shadow);
@@ -330,7 +323,7 @@ static inline bool imp__throughput_add(struct imp_step *s, const struct imp_bsdf
     s->beta *= factor;
     return !imp__is_zero_used(s->beta, four);
 }
-/* Decide whether the walk goes on along a direction; rounds it. False: it ends here. */
+/* Decide whether the walk goes on along a direction (drawn.h); rounds it. False: it ends here. */
 bool imp__scatter_along(struct imp_step *s, struct imp_vertex *v,
                         const struct imp_surface *at, const struct imp_frame *frame,
                         struct imp_direction *direction);
@@ -361,26 +354,6 @@ static inline bool imp__wants_derivative(const struct imp_step *s,
                                          const struct imp_bsdf *b)
 {
     return imp__derivative_wanted(s, b) != 0;
-}
-
-/* ---- A direction before it is weighed ---- */
-struct imp_direction {
-    int by; /* which member of the mixture drew it (enum imp_density) */
-    struct imp_dirs dirs;
-};
-/* One in which the walk may go on from v. False: it ends. */
-static inline bool imp__direction_begin(const struct imp_step *s,
-                                        const struct imp_vertex *v,
-                                        const struct imp_frame *frame,
-                                        struct imp_direction *out)
-{
-    const double u[3] = {imp__step_number(s, IMP_DIM_LOBE),
-                         imp__step_number(s, IMP_DIM_DIR_U),
-                         imp__step_number(s, IMP_DIM_DIR_V)};
-    out->dirs.wo = s->wo_drawn;
-    out->dirs.lobe = IMP_SMOOTH;
-    out->dirs.derivative = imp__derivative_wanted(s, v->bsdf);
-    return imp__direction_draw(s, v->bsdf, frame, u, &out->dirs, &out->by);
 }
 
 #endif

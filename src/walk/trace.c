@@ -9,6 +9,7 @@
  * Le/p^e for a light sample, power heuristic with exponent 2, w^B = 1 at the first vertex
  * and after a delta lobe. Depth: emission at vertex k counts if k < max_depth, scattering
  * goes on and samples lights if k + 1 < max_depth (docs/scene-format.md 11). */
+#include "drawn.h"
 #include "meter.h"
 #include "scene/instances.h"
 #include <stddef.h>
@@ -296,7 +297,7 @@ vertex_work(struct imp_step *s, struct imp_vertex *v, const struct imp_hit *hit,
     struct imp_light_point point;
     const bool lit = (v->bsdf->flags & IMP_BSDF_SMOOTH) && s->segment->connects &&
                      integrator->lights && bounces && !unseen &&
-                     imp__light_point(s, v, at, &point);
+                     imp__light_point(s, v->bsdf, at, &point);
     struct imp_direction direction;
     const bool drawn = integrator->directions && !splits &&
                        imp__direction_begin(s, v, frame, &direction);
