@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A pool of pthreads, made on first use and kept by the context. One loop runs at a time;
- * a loop started by a second host thread waits for the first one, a loop started by a
- * worker runs inline. */
+ * a loop started by a second host thread waits for the first one, or is left to the caller;
+ * a loop started by a worker runs inline. */
 #include "pool.h"
 #include "float_mode.h"
 #include <stdio.h>
@@ -251,9 +251,12 @@ bool imp__pool_inside(imp_context *ctx)
     return pool && pthread_getspecific(pool->inside) != NULL;
 }
 
-enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop, size_t *done)
+/* `ran` NULL: wait for the loop of another thread, else do not, and say whether it ran. */
+static enum imp_status loop_run(imp_context *ctx, const struct imp_loop *loop,
+                                size_t *done, bool *ran)
 {
     IMP_FLOAT_MODE;
+    if (ran) *ran = true;
     imp__context_own(ctx);
     pthread_mutex_lock(&ctx->lock);
     if (!ctx->pool) ctx->pool = pool_create(ctx);
@@ -286,7 +289,13 @@ enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop, siz
                 st = loop->commit(r.committed, 0, loop->payload);
         }
     } else {
-        pthread_mutex_lock(&pool->turn);
+        if (!ran) {
+            pthread_mutex_lock(&pool->turn);
+        } else if (pthread_mutex_trylock(&pool->turn) != 0) {
+            *ran = false;
+            st = IMP_OK;
+            goto out;
+        }
         pthread_setspecific(pool->inside, pool);
         pthread_mutex_lock(&pool->lock);
         pool->run = &r;
@@ -310,6 +319,18 @@ out:
     imp__release(ctx, r.slot_done);
     imp__release(ctx, r.at);
     return st;
+}
+
+enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop, size_t *done)
+{
+    return loop_run(ctx, loop, done, NULL);
+}
+
+bool imp__parallel_try(imp_context *ctx, const struct imp_loop *loop, enum imp_status *st)
+{
+    bool ran;
+    *st = loop_run(ctx, loop, NULL, &ran);
+    return ran;
 }
 
 /* ---- Ranges --------------------------------------------------------------------- */
@@ -338,7 +359,8 @@ enum imp_status imp__parallel_ranges(imp_context *ctx, size_t n, size_t least,
     struct ranges r = {n, each, work, payload};
     const struct imp_loop loop = {
         .n_items = n / each + (n % each != 0), .work = range_work, .payload = &r};
-    return imp__parallel(ctx, &loop, NULL);
+    enum imp_status st;
+    return imp__parallel_try(ctx, &loop, &st) ? st : work(0, n, payload);
 }
 
 /* ---- Sums ---------------------------------------------------------------------- */

@@ -47,9 +47,14 @@ int imp__pool_slots(const imp_context *ctx);
 enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop,
                               size_t *done);
 
-/* work(first, end) for [0, n) in as many ranges as there are threads, each of `least` or more
- * elements; for fewer than two of these in the calling thread. Nothing may depend on where a
- * range begins, but work may stop at its first failure, and the first of all is returned. */
+/* The same, but nothing is done if another thread runs a loop of this context, which may be
+ * a picture of hours. @return whether the loop ran; `*st` is what it gave. */
+bool imp__parallel_try(imp_context *ctx, const struct imp_loop *loop,
+                       enum imp_status *st);
+
+/* work(first, end) for [0, n) in as many ranges as there are threads, of `least` or more
+ * elements; if these are fewer than two, or another thread runs a loop, in one. Nothing may
+ * depend on where one begins; work may stop at its first failure: the first is returned. */
 enum imp_status imp__parallel_ranges(imp_context *ctx, size_t n, size_t least,
                                      enum imp_status (*work)(size_t first, size_t end,
                                                              void *payload),

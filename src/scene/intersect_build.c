@@ -2,11 +2,12 @@
  *
  * The intersector of a scene: Embree's device and its scenes.
  *
- * One device a process, made on first use and kept until the process ends: Embree's
- * thread library makes a thread when a device is released, or when a second one is made,
- * and ends the process if it cannot. Large scenes are built by all threads of the context,
- * which join the commit, others in the thread that commits: Embree makes no thread, since
- * all places of its arena (`user_threads`) are for those that come by themselves.
+ * One device, made on first use and kept until the process ends (a child that was forked in a
+ * build makes another): Embree's thread library makes a thread when a device is released, or
+ * when a second one is made, and ends the process if it cannot. Large scenes are built by all
+ * threads of the context, if they are at no loop, which join the commit, others in the thread
+ * that commits: Embree makes no thread, since all places of its arena (`user_threads`) are for
+ * those that come by themselves.
  *
  * Embree cuts its work by the number of these places, whoever comes, so a tree is the same on
  * any number of threads. On another number of processors the triangles of a leaf (no more
@@ -258,8 +259,11 @@ static void tree_build(imp_context *ctx, RTCScene rtc, size_t primitives)
 {
     const struct imp_loop loop = {
         .n_items = (size_t)ctx->threads, .work = tree_join, .payload = rtc};
+    enum imp_status st;
     atomic_store(&told.begun, false);
-    if (primitives < PRIMITIVES_FEW || imp__parallel(ctx, &loop, NULL) != IMP_OK)
+    /* Inside build_enter, where others wait: it may not wait for another's loop. */
+    if (primitives < PRIMITIVES_FEW || !imp__parallel_try(ctx, &loop, &st) ||
+        st != IMP_OK)
         rtcJoinCommitScene(rtc); /* of what is built it does nothing */
 }
 
