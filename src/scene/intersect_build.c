@@ -16,6 +16,7 @@
 #include "base/pool.h"
 #include "instances.h"
 #include "intersector.h"
+#include "math/offset.h"
 #include <sched.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -121,7 +122,11 @@ static void bounds_set(imp_v3 lo, imp_v3 hi, struct RTCBounds *b)
 static void analytic_bounds(const struct RTCBoundsFunctionArguments *args)
 {
     const struct imp_shape *s = args->geometryUserPtr;
-    bounds_set(s->lo, s->hi, args->bounds_o);
+    const imp_v3 a = imp__abs(s->lo), b = imp__abs(s->hi);
+    const double size = fmax(fmax(fmax(a[0], a[1]), a[2]), fmax(fmax(b[0], b[1]), b[2]));
+    /* It is asked also where a triangle was met that may lie behind it. */
+    const imp_v3 more = imp__spec((1 + size) * IMP_RAY_EPSILON);
+    bounds_set(s->lo - more, s->hi + more, args->bounds_o);
 }
 
 static void instance_bounds(const struct RTCBoundsFunctionArguments *args)

@@ -245,6 +245,13 @@ static void together(imp_context *ctx)
     world_end();
 }
 
+static bool made(void)
+{
+    const bool is = imp__intersector_create(&world) == IMP_OK;
+    if (!is) tap_ok(0, "an intersector: %s", imp_last_error(world.ctx));
+    return is;
+}
+
 /* The same hits, in all bits, of shapes that are asked before Embree (8 analytic ones, as many
  * as it may be) and in Embree's tree (with another one far away). */
 static void few(imp_context *ctx)
@@ -267,7 +274,7 @@ static void few(imp_context *ctx)
         struct imp_node *wall = node_new("shape", "rectangle");
         node_transform(wall, imp__scale(imp__v3(4, 4, 4)));
         shape_build(wall, NULL);
-        if (imp__intersector_create(&world) != IMP_OK) return;
+        if (!made()) return;
         for (uint32_t i = 0; i < RAYS; i++) {
             const struct imp_key key = imp__key(6, 0, i);
             /* From around them and from among them; one in eight from far away. */
@@ -292,6 +299,63 @@ static void few(imp_context *ctx)
            met, RAYS, wrong);
 }
 
+/* A disk that lies on a rectangle, which is two triangles: within the rounding of a triangle's
+ * distance the disk is met, as it should be a hair above; and what is clearly in front is
+ * met, the rectangle or the disk. In each row rays of all distances up to 60 degrees from the normal. */
+static void ties(imp_context *ctx)
+{
+    enum { RAYS = 20000 };
+    static const struct {
+        double above;
+        bool disk;
+    } rows[] = {{0, true}, {1e-7, true}, {1e-5, true}, {-3e-5, false}};
+    static const double planes[] = {0, 1.3, -2.7};
+    for (int more = 0; more <= 9; more += 9)
+        for (int order = 0; order < 2; order++)
+            for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
+                int wrong = 0, met = 0;
+                for (int at = 0; at < 3; at++) {
+                    const double z = (double)(float)planes[at];
+                    world_begin(ctx);
+                    for (int k = 0; k < 2 + more; k++) {
+                        const bool disk = k < 2 ? k == order : true;
+                        struct imp_node *n =
+                            node_new("shape", disk ? "disk" : "rectangle");
+                        const double size = k > 1 ? 1 : disk ? 0.8 : 2;
+                        const imp_v3 to =
+                            imp__v3(k > 1 ? 1e3 * k : 0, 0,
+                                    z + (k < 2 && disk ? rows[r].above : 0));
+                        const struct imp_mat4 m = imp__scale(imp__v3(size, size, size)),
+                                              t = imp__translate(to);
+                        node_transform(n, imp__mat4_multiply(&t, &m));
+                        shape_build(n, NULL);
+                    }
+                    if (!made()) return;
+                    const int wanted = rows[r].disk ? order : 1 - order;
+                    for (uint32_t i = 0; i < RAYS; i++) {
+                        const struct imp_key key = imp__key(21, (uint64_t)at, i);
+                        const imp_v3 to =
+                            imp__v3(imp__u01(key, 0) - 0.5, imp__u01(key, 1) - 0.5, z);
+                        const double c = 0.5 + 0.5 * imp__u01(key, 2),
+                                     phi = 6.28 * imp__u01(key, 3),
+                                     t = 0.5 + 7 * imp__u01(key, 4), s = sqrt(1 - c * c);
+                        const imp_v3 d = imp__v3(-s * cos(phi), -s * sin(phi), -c);
+                        const imp_v3 o = to - d * t;
+                        struct imp_hit hit = {.shape = -1};
+                        met += imp__intersect(&world, &o, &d, 0, INFINITY, &hit);
+                        wrong += hit.shape != wanted;
+                    }
+                    world_end();
+                }
+                tap_ok(met == 3 * RAYS && wrong == 0,
+                       "a disk %g above a rectangle, made %s, %s: the %s # %d rays, %d "
+                       "wrong",
+                       rows[r].above, order ? "last" : "first",
+                       more ? "of many shapes" : "of few",
+                       rows[r].disk ? "disk" : "rectangle", met, wrong);
+            }
+}
+
 static void intervals(imp_context *ctx)
 {
     world_begin(ctx);
@@ -303,7 +367,7 @@ static void intervals(imp_context *ctx)
     shape_build(wall, NULL);
     struct imp_hit hit = {0};
     const imp_v3 o = imp__v3(0, 0, 0), d = imp__v3(0, 0, 1);
-    if (imp__intersector_create(&world) != IMP_OK) return;
+    if (!made()) return;
     tap_ok(imp__intersect(&world, &o, &d, 0, INFINITY, &hit) && hit.shape == 0 &&
                hit.t == 4,
            "front of the ball");
@@ -397,7 +461,10 @@ static void threads(void)
     imp_context *ctx;
     struct thread_job job[N];
     pthread_t thread[N];
-    if (imp_context_create(NULL, &ctx) != IMP_OK) return;
+    if (imp_context_create(NULL, &ctx) != IMP_OK) {
+        tap_ok(0, "a context for four threads");
+        return;
+    }
     for (int i = 0; i < N; i++) {
         job[i] = (struct thread_job){.ctx = ctx};
         pthread_create(&thread[i], NULL, thread_run, &job[i]);
@@ -422,6 +489,7 @@ int main(void)
                 single(ctx, imp__shape_kinds[k], place);
     together(ctx);
     few(ctx);
+    ties(ctx);
     intervals(ctx);
     imp_context_destroy(ctx);
     threads();
