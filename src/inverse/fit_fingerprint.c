@@ -10,6 +10,7 @@
 
 #define PAIRS_VERSION   2 /* of what Levenberg-Marquardt estimates from its samples */
 #define VARIATE_VERSION 3 /* of what control variates keep, and of steps with them */
+#define KEPT_VERSION    2 /* of how walks are drawn that are kept (fit_kept.c) */
 
 /* With an active number, the index of a medium differs from start to start. */
 static bool medium_active(const struct imp_body *m, const int64_t *base)
@@ -70,8 +71,10 @@ void imp__fit_fingerprint(struct imp__fit *f)
         const uint64_t numbers = imp__allocation_numbers(&f->allocation);
         h->options = imp__hash(h->options, &numbers, sizeof numbers);
     }
-    if (imp__fit_keeps(f))
-        h->options = imp__hash(h->options, &f->options.memory, sizeof f->options.memory);
+    if (imp__fit_keeps(f)) {
+        const double kept[2] = {f->options.memory, KEPT_VERSION};
+        h->options = imp__hash(h->options, kept, sizeof kept);
+    }
     if (imp__fit_keeps(f) && f->options.headroom > 1)
         h->options =
             imp__hash(h->options, &f->options.headroom, sizeof f->options.headroom);
