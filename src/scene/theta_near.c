@@ -24,7 +24,8 @@ static size_t distance_of(const char *given, const char *name)
     if (strcasecmp(given, begins) == 0) return 0;
     const size_t whole = imp__edit_distance(given, name),
                  part = imp__edit_distance(given, begins);
-    return 1 + imp_min(whole, part);
+    const size_t least = imp_min(whole, part);
+    return least < SIZE_MAX ? 1 + least : SIZE_MAX; /* too long for a distance */
 }
 
 struct imp_near_names imp__theta_near(const struct imp_scene *scene, const char *name)

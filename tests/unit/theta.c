@@ -88,6 +88,30 @@ static void aliases(imp_context *ctx)
     imp_scene_destroy(s);
 }
 
+/* Names that are too long for a distance are next to none. */
+static void long_names(imp_context *ctx)
+{
+    char name[121], xml[1024];
+    size_t index;
+    memset(name, 'x', sizeof name - 1);
+    name[sizeof name - 1] = 0;
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'><integrator type='path'/><sensor "
+             "type='perspective'/><emitter type='constant'/><shape type='sphere'><bsdf "
+             "type='diffuse' id='%s'/></shape><shape type='sphere'><bsdf type='diffuse' "
+             "id='lamp'/></shape></scene>",
+             name + 20);
+    imp_scene *s = test_scene_text(ctx, xml, IMP_MONO);
+    tap_ok(imp_scene_find_param(s, "lamq", &index) == IMP_E_ARG &&
+               strstr(imp_last_error(ctx), "the nearest are lamp.reflectance.value") &&
+               !strstr(imp_last_error(ctx), name + 20),
+           "a long name is not next to 'lamq' # %s", imp_last_error(ctx));
+    tap_ok(imp_scene_find_param(s, name, &index) == IMP_E_ARG &&
+               !strstr(imp_last_error(ctx), "nearest"),
+           "nothing is next to a long name # %s", imp_last_error(ctx));
+    imp_scene_destroy(s);
+}
+
 /* The sum of two numbers, as whoever derived it keeps it. */
 struct derived {
     const imp_scene *scene;
@@ -180,6 +204,7 @@ int main(void)
 {
     imp_context *ctx = test_context(1);
     aliases(ctx);
+    long_names(ctx);
     listeners(ctx);
     fields(ctx);
     imp_context_destroy(ctx);
