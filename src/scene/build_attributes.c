@@ -38,6 +38,10 @@ bool imp__is_bumped(const struct imp_scene *scene, int bsdf)
     return false;
 }
 
+/* Vertices keep uv as floats (decision.h): of so many segments the last ones' v has steps of
+ * 1/16 of a segment, and a point next to a segment's end may be taken for one of the next. */
+#define BUMPED_SEGMENTS ((size_t)1 << 20)
+
 enum imp_status imp__build_bumps_survey(struct imp_scene *scene,
                                         const struct imp_node *node, struct imp_shape *s)
 {
@@ -47,6 +51,12 @@ enum imp_status imp__build_bumps_survey(struct imp_scene *scene,
                                "a %s cannot have a bumpmap: its uv does not tell which "
                                "of its points is meant",
                                s->ops->name);
+    if (bump && s->geometry == IMP_CURVES && s->curves.n_segments > BUMPED_SEGMENTS)
+        return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
+                               "has %zu segments, and with a bumpmap at most %zu: uv in "
+                               "single precision does not tell more of them apart; make "
+                               "it several shapes",
+                               s->curves.n_segments, BUMPED_SEGMENTS);
     s->by_triangle |= bump && s->ops->flags & IMP_SHAPE_TRIANGLES;
     return IMP_OK;
 }

@@ -361,6 +361,19 @@ static void refused(const char *what, const char *body, const char *reason)
     imp_scene_destroy(s);
 }
 
+/* One more segment than uv can tell apart. */
+static void many_segments(void)
+{
+    char path[128];
+    snprintf(path, sizeof path, "%s/many.txt", folder);
+    FILE *f = fopen(path, "w");
+    for (int k = 0; k < (1 << 20) + 4; k++) fprintf(f, "%d 0 0 1\n", k);
+    fclose(f);
+    refused("bumps on more segments than uv tells apart",
+            TUBES("bsplinecurve", "many.txt", BUMPS("0")), "at most 1048576");
+    file_remove("many.txt");
+}
+
 int main(void)
 {
     ctx = test_context(1);
@@ -382,6 +395,7 @@ int main(void)
     bumped();
     refused("bumps on cones", TUBES("linearcurve", "bent.txt", BUMPS("0")),
             "a linearcurve cannot have a bumpmap: its uv does not tell");
+    many_segments();
     refused("a light on curves",
             TUBES("linearcurve", "bent.txt", "<emitter type='area'/>"),
             "points of its shape (linearcurve) cannot be drawn");
