@@ -73,20 +73,21 @@ void imp__densities_destroy(imp_context *ctx, struct imp_densities *d)
 void imp__densities_move(struct imp_densities *d, const uint8_t *changed)
 {
     d->any = d->weights = d->flights = false;
-    d->matters = 0;
+    d->matters = d->rolled = 0;
     for (int b = 0; b < d->scene->n_bsdfs; b++) {
         const struct imp_bsdf *bsdf = d->scene->bsdfs[b];
         d->moved[b] = 0;
         for (int j = 0; j < bsdf->n_in; j++) {
             if (!imp__input_depends(bsdf->input[j], changed)) continue;
             d->weights = true;
+            d->rolled |= UINT64_C(1) << imp__store_class(bsdf);
             d->moved[b] |= d->inputs[b] >> j & 1;
         }
         d->any |= d->moved[b];
         d->matters |= (uint64_t)d->moved[b] << imp__store_class(bsdf);
     }
     /* The second moment grows from class to class: all steps matter. */
-    if (d->weights) d->matters |= ~UINT64_C(0) << IMP_STORE_CLASSES;
+    if (d->weights) d->rolled |= ~UINT64_C(0) << IMP_STORE_CLASSES;
     for (int k = 0; k < d->scene->n_media; k++) {
         const struct imp_medium *m = d->scene->media[k];
         for (int j = 0; j < m->n_own; j++)

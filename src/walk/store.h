@@ -108,6 +108,7 @@ struct imp_densities {
     bool flights;     /* an extinction has changed */
     bool weights;     /* some value that roulette looks at has changed */
     uint64_t matters; /* bits of imp_store.meets: for those that changed */
+    uint64_t rolled;  /* and for those whose values did, which matter to roulette */
 };
 enum imp_status imp__densities_create(const struct imp_scene *scene,
                                       const struct imp_walk_integrator *integrator,

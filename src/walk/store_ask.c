@@ -63,8 +63,11 @@ struct imp_asking imp__store_asking(const struct imp_store *s,
     for (size_t k = 0; k < imp__store_tiles(s); k++) n += s->records[k].n_walks;
     if (most == 0 || d->flights) return a;
     a.every = n / most | 1;
+    /* A step that roulette rarely let survive may count many times as much now. */
+    const bool rolls = s->roulette && !d->integrator->absorbs;
+    const uint64_t matters = d->matters | (rolls ? d->rolled : 0);
     for (int b = 0; b < 64; b++)
-        if ((d->matters >> b & 1) && s->met[b] > 0 && s->met[b] / a.every < LEAST)
+        if ((matters >> b & 1) && s->met[b] > 0 && s->met[b] / a.every < LEAST)
             a.rare |= UINT64_C(1) << b;
     return a;
 }

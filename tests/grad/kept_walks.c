@@ -624,6 +624,42 @@ static void in_few_pixels(const char *name, double at, double to, const char *wo
     imp_scene_destroy(scene);
 }
 
+/* A dark ball that becomes bright: of the walks that meet it roulette at the first step let
+ * 1 in 20 survive, which count 19 times as much now. */
+static void rarely_survived(void)
+{
+    static const char xml[] =
+        "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' "
+        "value='-1'/><integer name='rr_depth' value='1'/></integrator><sensor "
+        "type='perspective'><float name='fov' value='40'/><film type='hdrfilm'><integer "
+        "name='width' value='64'/><integer name='height' value='64'/><rfilter "
+        "type='box'/></film></sensor><emitter type='constant'/><shape type='sphere'>"
+        "<point name='center' value='0,0,8'/><float name='radius' value='.87'/><bsdf "
+        "type='diffuse' id='ball'><float name='reflectance' value='.05'/></bsdf></shape>"
+        "</scene>";
+    imp_scene *scene = test_scene_text(ctx, xml, IMP_MONO);
+    double off = 0, least = 1, most = 0;
+    size_t k;
+    test_must(ctx, imp_scene_find_param(scene, "ball.reflectance", &k));
+    for (uint64_t seed = 1; seed <= 16; seed++) {
+        struct imp_walks_weight all = IMP_WALKS_WEIGHT_INIT, some;
+        test_must(ctx, imp_scene_set_values(scene, k, 1, &(double){0.05}));
+        imp_walks *walks = keep(scene, 32, seed, IMP_POINTS_INDEPENDENT, false, -1);
+        test_must(ctx, imp_scene_set_values(scene, k, 1, &(double){0.95}));
+        test_must(ctx, imp_walks_weigh(walks, 0, NULL, &all));
+        test_must(ctx, imp__walks_weigh(walks, walks->stores, NULL, 1024, &some, NULL));
+        off = fmax(off, fabs(some.ess / all.ess - 1));
+        least = fmin(least, all.ess);
+        most = fmax(most, all.ess);
+        imp_walks_destroy(walks);
+    }
+    tap_ok(least > 0.4 && most < 0.6 && off < 0.25,
+           "a dark ball that becomes bright: some walks say what all say # ess %.3f to "
+           "%.3f, off by at most %.2f of it",
+           least, most, off);
+    imp_scene_destroy(scene);
+}
+
 static void refusals(void)
 {
     imp_scene *scene = test_scene(ctx, "textured.xml", IMP_RGB, NULL);
@@ -726,6 +762,7 @@ int main(void)
     next_to_the_limit();
     in_few_pixels("metal.alpha", 0.28, 0.01, "effective sample size");
     in_few_pixels("white.reflectance", 0.31, 0.9, "infinite");
+    rarely_survived();
     refusals();
     imp_context_destroy(ctx);
     return tap_done();
