@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "interval_row.h"
+#include "math/vec.h"
 #include <math.h>
 
 #define Z_TWO_SIDED 1.959963984540054
@@ -34,4 +35,11 @@ void imp__interval_bound(const struct imp__goal *goal, size_t k, double u, doubl
         v->hi95 = goal->hi[k];
         v->lo95 = imp__into_bounds(goal, k, fmin(u, goal->hi[k]) - Z_ONE_SIDED * se);
     }
+}
+
+double imp__beyond_square(double t)
+{
+    if (t < -20) return 2 / (t * t); /* 1 % off, where the sum cancels */
+    const double density = exp(-0.5 * t * t) / sqrt(IMP_2PI);
+    return 1 + t * t + t * density / (0.5 * erfc(-t / sqrt(2)));
 }

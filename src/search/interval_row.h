@@ -18,4 +18,7 @@ void imp__interval_free(const struct imp__goal *goal, size_t k, double se,
 void imp__interval_bound(const struct imp__goal *goal, size_t k, double u, double se,
                          struct imp_fit_variable *v);
 
+/* Mean square of what of N(t, 1) is beyond 0: 1 + t^2 + t phi(t)/Phi(t). */
+double imp__beyond_square(double t);
+
 #endif

@@ -100,6 +100,9 @@ enum imp_status imp__sampled_add(const double *x, const double *at,
     return imp__excess_take(s->ctx, n, mean->cov_g, s->excess);
 }
 
+/* The next have weight 1 in every mean. */
+void imp__sampled_forget(struct imp__sampled *s) { s->rounds = s->stages = 0; }
+
 /* The step follows the noise of g, so that the quadratic is low there by part tr(G C). */
 struct imp_estimate imp__sampled_loss(const struct imp__sampled *s, const double *x,
                                       const double *to, const double *G, double part)

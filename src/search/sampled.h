@@ -39,6 +39,9 @@ enum imp_status imp__sampled_take(const struct imp__goal *goal, const double *at
 enum imp_status imp__sampled_add(const double *x, const double *at,
                                  struct imp__sampled *s);
 
+/* No samples any more: the next are the first. */
+void imp__sampled_forget(struct imp__sampled *s);
+
 /* The loss at `to`, by the quadratic of the samples at x, where `part` of the way is that of
  * their own Newton step -G g. */
 struct imp_estimate imp__sampled_loss(const struct imp__sampled *s, const double *x,

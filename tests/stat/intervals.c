@@ -5,6 +5,7 @@
  * say nothing about what the data do not determine. */
 #include "imp_tap.h"
 #include "search/covariance.h"
+#include "search/interval_row.h"
 #include "toy_goal.h"
 #include <stdlib.h>
 
@@ -145,6 +146,91 @@ static void refined(void)
     imp__search_destroy(s);
 }
 
+/* From where the Newton point of a curved model is far beyond the truth, and its loss higher:
+ * the way is gone as far as the loss falls, with samples from there. */
+static void overshot(void)
+{
+    enum { SEEDS = 200 };
+    const struct imp__rounds rounds = {.most = 6};
+    int held = 0;
+    for (uint64_t seed = 0; seed < SEEDS; seed++) {
+        struct curved c;
+        struct imp_fit_variable v[TOY_N];
+        struct imp__uncertainty u;
+        double x[TOY_N];
+        curved_make(&c, 9000 + 7 * seed, 0.6);
+        for (int k = 0; k < TOY_N; k++) x[k] = 0.35 * c.toy.truth[k];
+        if (imp__covariance(&c.goal, x, &rounds, v, &u) != IMP_OK) exit(99);
+        for (int k = 0; k < TOY_N; k++)
+            held += v[k].lo95 <= c.toy.truth[k] && c.toy.truth[k] <= v[k].hi95;
+        imp__uncertainty_destroy(ctx, &u);
+    }
+    const double share = (double)held / (TOY_N * SEEDS);
+    tap_ok(share >= 0.92, "from where Newton's step overshoots # cover %.1f %%",
+           100 * share);
+}
+
+/* One column is nearly another, and the truth is half a standard error inside of its bound. Where
+ * the fit ends at the bound, the others' errors are those of a variable that may be inside. */
+static void beside_a_bound(void)
+{
+    enum { SEEDS = 400 };
+    const struct imp__rounds rounds = {.most = 6};
+    int held = 0, held_there = 0, there = 0;
+    for (uint64_t seed = 0; seed < SEEDS; seed++) {
+        const struct imp__opt_options o = {30, 0.05, 1e-6, 0, false};
+        struct imp__search *s = NULL;
+        struct imp_fit_variable v[TOY_N];
+        struct imp__uncertainty u;
+        double x0[TOY_N], ls[TOY_N], inv[TOY_N * TOY_N];
+        struct toy t;
+        toy_make(&t, ctx, 20000 + 7 * seed, 0.2, 0.3);
+        for (int p = 0; p < TOY_M; p++) {
+            const double old = t.A[p][2];
+            t.A[p][2] = t.A[p][0] * t.scale[0] / t.scale[2] + 0.3 * old;
+            t.T[p] += (t.A[p][2] - old) * t.truth[2];
+        }
+        toy_least_squares(&t, ls, inv);
+        t.lo[2] = t.truth[2] - 0.5 * sqrt(inv[2 * TOY_N + 2] * (0.04 + 0.09 / 6));
+        for (int k = 0; k < TOY_N; k++)
+            x0[k] = fmax(t.truth[k] + 0.1 * t.scale[k], t.lo[k]);
+        if (imp__search_create(&t.goal, IMP_LM, &o, x0, &s) != IMP_OK) exit(99);
+        enum imp_status st = imp__optimize(&t.goal, &o, s);
+        if (st == IMP_OK) st = imp__covariance(&t.goal, s->x, &rounds, v, &u);
+        if (st != IMP_OK) exit(99);
+        const bool holds = v[0].lo95 <= t.truth[0] && t.truth[0] <= v[0].hi95;
+        there += v[2].at_bound < 0;
+        held_there += v[2].at_bound < 0 && holds;
+        held += holds;
+        imp__uncertainty_destroy(ctx, &u);
+        imp__search_destroy(s);
+    }
+    const double sd = sqrt(.95 * .05 / there);
+    tap_ok(there > SEEDS / 8 && held_there >= there * (.95 - 3 * sd) &&
+               held >= SEEDS * .92,
+           "beside a variable at its bound # %d of %d there, cover %.1f %%; all %.1f %%",
+           there, SEEDS, 100. * held_there / there, 100. * held / SEEDS);
+
+    /* Simpson's rule. */
+    for (int i = 0; i < 5; i++) {
+        static const double at[] = {-25, -4, -.5, 0, 3};
+        const double t = at[i], to = fmax(t, 0) + 12, h = to / 20000;
+        double mass = 0, square = 0;
+        for (int k = 0; k <= 20000; k++) {
+            const double y = k * h,
+                         w = k == 0 || k == 20000 ? 1
+                             : k % 2              ? 4
+                                                  : 2,
+                         e = w * exp(t * y - 0.5 * y * y);
+            mass += e;
+            square += e * y * y;
+        }
+        const double off = imp__beyond_square(t) * mass / square - 1;
+        tap_ok(fabs(off) < (t < -20 ? 0.02 : 1e-8),
+               "mean square of N(%g, 1) beyond 0 # off by %.1g", t, off);
+    }
+}
+
 int main(void)
 {
     if (imp_context_create(NULL, &ctx) != IMP_OK) return 1;
@@ -223,6 +309,8 @@ int main(void)
 
     at_newton(0);
     at_newton(0.6);
+    overshot();
+    beside_a_bound();
     refined();
     imp_context_destroy(ctx);
     return tap_done();

@@ -155,8 +155,8 @@ static void fits(imp_context *ctx, const struct experiment *e)
 static void cornell(imp_context *ctx, const char *filter)
 {
     struct experiment e = {
-        filter, box(ctx, filter),       active, 3, .4, .8, SIDE, SIDE, 64,
-        SPP,    IMP_POINTS_INDEPENDENT, false};
+        filter, box(ctx, filter),       active, 3,  .4, .8, SIDE, SIDE, 64,
+        SPP,    IMP_POINTS_INDEPENDENT, false,  .93};
     fits(ctx, &e);
     e.points = IMP_POINTS_SOBOL;
     fits(ctx, &e);
@@ -175,7 +175,7 @@ static void metal(imp_context *ctx)
     static const char *const size[] = {"width=40", "height=30"};
     struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
     struct experiment e = {
-        "rough metal",          NULL, numbers, 4, 0, .8, 40, 30, 256, SPP,
+        "rough metal",          NULL,  numbers, 4, 0, .8, 40, 30, 256, SPP,
         IMP_POINTS_INDEPENDENT, false};
     o.defines = size;
     o.n_defines = 2;
