@@ -83,6 +83,10 @@ struct subject {
     bool nested;                           /* the texture's own inputs are textures too */
 };
 
+/* By wavelengths three numbers are lifted to a reflectance, which is cut at 1, those of eta and k too (as
+ * in Mitsuba): the slope above is 0, and differences would go across. */
+static bool lifted;
+
 static double random_in(const struct imp_input_desc *d, uint64_t seed, uint32_t k)
 {
     const double u = imp__u01(imp__key(seed, 4, 4), k);
@@ -92,6 +96,9 @@ static double random_in(const struct imp_input_desc *d, uint64_t seed, uint32_t 
         hi = 0.75;
         return lo + u * (hi - lo);
     }
+    if (lifted && d->role != IMP_EMISSION &&
+        !(d->flags & (IMP_INPUT_SCALAR | IMP_INPUT_NUMBER)))
+        return 0.4 + 0.3 * u;
     const double typical = d->fallback > 0 ? d->fallback : 1;
     return imp_clamp(typical * (0.6 + 0.8 * u), lo, hi);
 }
@@ -613,6 +620,7 @@ static void check_one(const struct subject *q, const char *integrator,
     if (only && strncmp(what, only, strlen(only)) != 0) return;
     const int failed = tap_failed;
     worst_z = worst_frozen = worst_dot = n_z = n_frozen = 0;
+    lifted = mode == IMP_SPECTRAL || mode == IMP_SINGLE;
     imp_scene *s = scene_make(q, integrator, mode);
     imp_problem *all = test_problem(ctx, s, "*"), *p = test_problem(ctx, s, "subject*");
     for (int j = 0; inputs && inputs[j].name; j++) {

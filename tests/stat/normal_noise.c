@@ -175,7 +175,7 @@ static void metal(imp_context *ctx)
     static const char *const size[] = {"width=40", "height=30"};
     struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
     struct experiment e = {
-        "rough metal",          NULL,  numbers, 4, 0, .8, 40, 30, 256, SPP,
+        "rough metal",          NULL, numbers, 4, 0, .8, 40, 30, 256, SPP,
         IMP_POINTS_INDEPENDENT, false};
     o.defines = size;
     o.n_defines = 2;
