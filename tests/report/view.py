@@ -25,6 +25,7 @@ from tap import done, ok
 
 importon, scenes = sys.argv[1:]
 PATIENCE = 120
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # under nohup it is ignored, and the command leaves it so
 
 
 class View:
