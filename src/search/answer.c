@@ -6,7 +6,7 @@
 
 #define SEED_BASE  0x40000000 /* iteration numbers no search reaches */
 #define SEED_LAST  63
-#define LEAP_SEEDS 64  /* iteration numbers from samples at one x to those at the next, */
+#define LEAP_SEEDS 32  /* iteration numbers from samples at one x to those at the next, */
 #define LOOK_SEEDS 256 /* and from one look to the next */
 
 /* Samples are taken in stages: FIRST rounds, and as many more as these show to be missing. */
@@ -16,6 +16,9 @@
 #define LEAPS                                                                            \
     3 /* times that x moves to where the loss is lower, on the way to a Newton point */
 #define HALVES 3 /* of the way, that are tried */
+_Static_assert(LEAPS *LEAP_SEEDS + SEED_LAST < LOOK_SEEDS,
+               "each look has numbers of its own");
+_Static_assert(IMP_SAMPLED_STAGES <= SEED_LAST - LEAP_SEEDS - HALVES, "and each leap");
 
 static enum imp_status no_memory(imp_context *ctx)
 {
