@@ -79,12 +79,7 @@ static enum imp_status vertex_store(struct ply *p, size_t row, const double valu
         if (!isfinite(f[i]))
             return imp__ply_error(p, "vertex %zu: %s is not finite", row, names[i]);
     }
-    memcpy(p->positions + 3 * row, f + USE_X, 3 * sizeof *f);
-    if (p->normals) memcpy(p->normals + 3 * row, f + USE_NX, 3 * sizeof *f);
-    if (p->uvs) {
-        p->uvs[2 * row] = f[USE_U];
-        p->uvs[2 * row + 1] = p->source->flip_v ? 1 - f[USE_V] : f[USE_V];
-    }
+    imp__ply_put(p, row, f);
     return IMP_OK;
 }
 

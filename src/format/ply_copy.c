@@ -31,12 +31,7 @@ static enum imp_status vertices_copy(size_t first, size_t end, void *payload)
             finite &= (bool)isfinite(f[i]);
         }
         if (!finite) return IMP_E_SCENE;
-        memcpy(p->positions + 3 * k, f + USE_X, 3 * sizeof *f);
-        if (p->normals) memcpy(p->normals + 3 * k, f + USE_NX, 3 * sizeof *f);
-        if (p->uvs) {
-            p->uvs[2 * k] = f[USE_U];
-            p->uvs[2 * k + 1] = p->source->flip_v ? 1 - f[USE_V] : f[USE_V];
-        }
+        imp__ply_put(p, k, f);
     }
     return IMP_OK;
 }

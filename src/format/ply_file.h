@@ -5,6 +5,7 @@
 #define IMP_PLY_FILE_H
 
 #include "mesh_file.h"
+#include <string.h>
 
 #define ELEMENTS_MAX   64
 #define PROPERTIES_MAX 256
@@ -76,6 +77,16 @@ IMP_COLD enum imp_status IMP_PRINTF(2, 3)
 bool imp__ply_has(const struct ply *p, enum ply_use use);
 /* Up to the first byte of the body. The counts are not larger than the file can hold. */
 enum imp_status imp__ply_header(struct ply *p);
+
+/* The numbers of a vertex, by their use, where they belong. */
+static inline void imp__ply_put(struct ply *p, size_t row, const float f[USES])
+{
+    memcpy(p->positions + 3 * row, f + USE_X, 3 * sizeof *f);
+    if (p->normals) memcpy(p->normals + 3 * row, f + USE_NX, 3 * sizeof *f);
+    if (!p->uvs) return;
+    p->uvs[2 * row] = f[USE_U];
+    p->uvs[2 * row + 1] = p->source->flip_v ? 1 - f[USE_V] : f[USE_V];
+}
 
 /* The rows of an element, where they have one size and their numbers lie as in this machine's
  * memory: copied, by all threads, and p->at is behind them. False: nothing was done; they are
