@@ -63,7 +63,7 @@ struct imp__fit_residual imp__fit_residual(const struct imp__fit *f, const doubl
     const double freedom = s.count - (double)determined;
     r.count = s.count;
     r.freedom = freedom;
-    if (s.signal > 0) {
+    if (s.signal > 0 && !isnan(data)) { /* cancelled before its first evaluation */
         r.relative = sqrt(fmax(0, 2 * data) / s.signal);
         r.relative_hi = sqrt(fmax(0, 2 * (data + 2 * objective.se)) / s.signal);
     }
