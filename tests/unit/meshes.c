@@ -6,6 +6,7 @@
 #include "imp_fail_alloc.h"
 #include "imp_tap.h"
 #include "kind/shape/shape.h"
+#include "math/rng.h"
 #include <stdlib.h>
 
 static imp_context *ctx;
@@ -389,6 +390,58 @@ static void check_normals(void)
     free(indices);
 }
 
+/* Soups of up to 41 triangles between the points of a lattice that is 1000 times as wide as high:
+ * vertices at one position, slivers, and triangles without area. Beside the sum as it is
+ * written, of all corners at each vertex's position. */
+static void check_soups(void)
+{
+    enum { VERTICES = 60, TRIANGLES = 41 };
+    double worst = 0;
+    int n_equal = 0, n_flat = 0, bad = 0;
+    for (size_t n = 1; n <= TRIANGLES; n++) {
+        float p[3 * VERTICES + 4] = {0}, out[3 * VERTICES];
+        uint32_t index[3 * TRIANGLES];
+        const struct imp_key key = imp__key(17, n, 0);
+        for (uint32_t k = 0; k < 3 * VERTICES; k++) {
+            p[k] = (float)floor(3 * imp__u01(key, k)) * (k % 3 == 2 ? 1e-3f : 1);
+            if (p[k] == 0 && k % 2) p[k] = -0.0f;
+        }
+        for (uint32_t k = 0; k < 3 * n; k++)
+            index[k] = (uint32_t)(VERTICES * imp__u01(key, 1000 + k));
+        bad += imp__mesh_normals(ctx, VERTICES, n, p, index, out) != IMP_OK;
+        for (size_t v = 0; v < VERTICES; v++) {
+            imp_v3 sum = {0};
+            double most = 0; /* a sum that cancels is known to this */
+            for (size_t k = 0; k < 3 * n; k++) {
+                const size_t t = k - k % 3;
+                const float *a = p + 3 * (size_t)index[k],
+                            *b = p + 3 * (size_t)index[t + (k + 1) % 3],
+                            *c = p + 3 * (size_t)index[t + (k + 2) % 3], *q = p + 3 * v;
+                if (a[0] != q[0] || a[1] != q[1] || a[2] != q[2]) continue;
+                const imp_v3 ab = imp__v3((double)b[0] - a[0], (double)b[1] - a[1],
+                                          (double)b[2] - a[2]),
+                             ac = imp__v3((double)c[0] - a[0], (double)c[1] - a[1],
+                                          (double)c[2] - a[2]);
+                const imp_v3 up = imp__cross(ab, ac);
+                const double angle = atan2(imp__length(up), imp__dot(ab, ac));
+                n_equal += (size_t)index[k] != v;
+                n_flat += imp__length(up) == 0;
+                if (imp__length(up) == 0) continue;
+                sum += imp__normalize(up) * angle;
+                most += angle;
+            }
+            const double length = imp__length(sum);
+            const imp_v3 want = length > 0 ? sum * (1 / length) : imp__v3(1, 0, 0);
+            if (length > 0 && length < 1e-6 * most) continue;
+            for (int i = 0; i < 3; i++)
+                worst = fmax(worst, fabs(out[3 * v + (size_t)i] - want[i]));
+        }
+    }
+    tap_ok(bad == 0 && worst < 1e-7 && n_equal > 1000 && n_flat > 1000,
+           "normals of soups # error %.2g at worst; %d corners of twins, %d without area",
+           worst, n_equal, n_flat);
+}
+
 /* ---- Hostile --------------------------------------------------------------------------
  */
 
@@ -475,6 +528,7 @@ int main(void)
     check_copied(1);
     check_copied(3);
     check_normals();
+    check_soups();
     static const char obj[] =
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\n";
     check_cut("h.obj", obj, sizeof obj - 1, 6); /* "3" and "3/1" are corners too */

@@ -21,11 +21,13 @@ struct normals {
     const uint32_t *indices;
     uint32_t *place; /* [n_vertices] the first vertex at the same position */
     size_t slots;
-    uint32_t *table;   /* [slots] vertex + 1; 0: free */
-    _Atomic bool full; /* a part of it, and places are missing */
-    double (*sum)[3];  /* [n_vertices] */
+    uint32_t *table, vertex; /* [slots]; their bits that name a vertex */
+    _Atomic bool full;       /* a part of it, and places are missing */
+    double (*sum)[3];        /* [n_vertices] */
     float *out;
 };
+
+/* ---- Places -------------------------------------------------------------------------- */
 
 /* Equal positions are equal bits; +0 and -0 are one place. */
 static uint64_t position_hash(const float p[3])
@@ -41,27 +43,32 @@ static uint64_t position_hash(const float p[3])
     return h;
 }
 
-/* The slot where v is looked for first. */
+/* A slot of the table is 0, or vertex + 1 in its lower bits and in those above, which no vertex
+ * needs, bits of its hash: of a mesh of a million vertices 12. So nearly every vertex that is in
+ * another's way is known for another without its position, which would come from memory. */
 #define AHEAD 16 /* vertices for whose slots memory is asked before they are needed */
-static inline size_t home(const struct normals *m, size_t v)
+static inline size_t home(const struct normals *m, uint64_t hash)
 {
-    return position_hash(m->positions + 3 * v) & (m->slots - 1);
+    return hash & (m->slots - 1);
 }
 
-/* The place of v by slots [first, end), where k is the first to look at; `used` counts those
- * that are not free. */
-static uint32_t place_find(const struct normals *m, size_t v, size_t k, size_t first,
+/* The place of v by slots [first, end); `used` counts those that are not free. */
+static uint32_t place_find(const struct normals *m, size_t v, uint64_t hash, size_t first,
                            size_t end, size_t *used)
 {
     const float *p = m->positions + 3 * v;
-    for (;; k = k + 1 < end ? k + 1 : first) {
-        if (m->table[k] == 0) {
-            m->table[k] = (uint32_t)(v + 1);
+    const uint32_t tag = (uint32_t)(hash >> 32) & ~m->vertex;
+    for (size_t k = home(m, hash);; k = k + 1 < end ? k + 1 : first) {
+        const uint32_t slot = m->table[k];
+        if (slot == 0) {
+            m->table[k] = tag | (uint32_t)(v + 1);
             ++*used;
             return (uint32_t)v;
         }
-        const float *q = m->positions + 3 * (size_t)(m->table[k] - 1);
-        if (p[0] == q[0] && p[1] == q[1] && p[2] == q[2]) return m->table[k] - 1;
+        if ((slot & ~m->vertex) != tag) continue;
+        const uint32_t at = (slot & m->vertex) - 1;
+        const float *q = m->positions + 3 * (size_t)at;
+        if (p[0] == q[0] && p[1] == q[1] && p[2] == q[2]) return at;
     }
 }
 
@@ -71,19 +78,78 @@ static enum imp_status places_find(size_t first, size_t end, void *payload)
 {
     struct normals *m = payload;
     size_t used = 0;
+    uint64_t ahead[AHEAD] = {0};
     memset(m->table + first, 0, (end - first) * sizeof *m->table);
-    for (size_t v = 0; v < m->n_vertices; v++) {
-        if (v + AHEAD < m->n_vertices)
-            __builtin_prefetch(&m->table[home(m, v + AHEAD)], 1);
-        const size_t k = home(m, v);
-        if (k < first || k >= end) continue;
+    for (size_t i = 0; i < m->n_vertices + AHEAD; i++) {
+        const uint64_t hash = ahead[i % AHEAD]; /* of vertex i - AHEAD */
+        if (i < m->n_vertices) {
+            ahead[i % AHEAD] = position_hash(m->positions + 3 * i);
+            __builtin_prefetch(&m->table[home(m, ahead[i % AHEAD])], 1);
+        }
+        if (i < AHEAD || home(m, hash) < first || home(m, hash) >= end) continue;
         if (used == end - first) {
             atomic_store(&m->full, true);
             return IMP_OK;
         }
-        m->place[v] = place_find(m, v, k, first, end, &used);
+        m->place[i - AHEAD] = place_find(m, i - AHEAD, hash, first, end, &used);
     }
     return IMP_OK;
+}
+
+/* ---- Sums ---------------------------------------------------------------------------- */
+
+/* A coordinate of four points, and one of four vectors. */
+struct four {
+    imp_v3 x, y, z;
+};
+static inline struct four four_minus(const struct four *a, const struct four *b)
+{
+    return (struct four){a->x - b->x, a->y - b->y, a->z - b->z};
+}
+static inline imp_v3 four_dot(const struct four *a, const struct four *b)
+{
+    return (a->x * b->x + a->y * b->y) + a->z * b->z;
+}
+static inline struct four four_cross(const struct four *a, const struct four *b)
+{
+    return (struct four){a->y * b->z - a->z * b->y, a->z * b->x - a->x * b->z,
+                         a->x * b->y - a->y * b->x};
+}
+static inline imp_v3 four_root(imp_v3 x)
+{
+    return (imp_v3){sqrt(x[0]), sqrt(x[1]), sqrt(x[2]), sqrt(x[3])};
+}
+static inline struct four four_load(const float *positions, const uint32_t *index)
+{
+    const float *a = positions + 3 * (size_t)index[0],
+                *b = positions + 3 * (size_t)index[3],
+                *c = positions + 3 * (size_t)index[6],
+                *d = positions + 3 * (size_t)index[9];
+    return (struct four){imp__widen((imp_float4){a[0], b[0], c[0], d[0]}),
+                         imp__widen((imp_float4){a[1], b[1], c[1], d[1]}),
+                         imp__widen((imp_float4){a[2], b[2], c[2], d[2]})};
+}
+
+/* What four triangles add to their corners: unit normals times angles. @return twice their
+ * areas; without area, they add nothing. */
+static inline imp_v3 four_weigh(const float *positions, const uint32_t index[12],
+                                struct four add[3])
+{
+    struct four p[3];
+    for (int i = 0; i < 3; i++) p[i] = four_load(positions, index + i);
+    const struct four e0 = four_minus(&p[1], &p[0]), e1 = four_minus(&p[2], &p[1]),
+                      e2 = four_minus(&p[0], &p[2]), back = four_minus(&p[2], &p[0]);
+    const struct four normal = four_cross(&e0, &back);
+    const imp_v3 twice_area = four_root(four_dot(&normal, &normal)), one = 1 / twice_area;
+    const imp_v3 cosine[3] = {-four_dot(&e0, &e2), -four_dot(&e0, &e1),
+                              -four_dot(&e1, &e2)};
+    for (int i = 0; i < 3; i++) {
+        /* From sine and cosine, which keep the angle exact for slivers, where acos loses
+         * it. */
+        const imp_v3 weight = imp__angles(cosine[i], twice_area) * one;
+        add[i] = (struct four){normal.x * weight, normal.y * weight, normal.z * weight};
+    }
+    return twice_area;
 }
 
 /* Of the places from `first` to `end`. */
@@ -91,33 +157,28 @@ static enum imp_status angles_add(size_t first, size_t end, void *payload)
 {
     const struct normals *m = payload;
     memset(m->sum + first, 0, (end - first) * sizeof *m->sum);
-    for (size_t k = 0; k < m->n_triangles; k++) {
-        const uint32_t *index = m->indices + 3 * k;
-        size_t at[3];
-        bool own[3];
-        for (int i = 0; i < 3; i++) {
-            at[i] = m->place[index[i]];
-            own[i] = at[i] >= first && at[i] < end;
+    for (size_t k = 0; k < m->n_triangles; k += 4) {
+        const size_t n = imp_min(m->n_triangles - k, (size_t)4);
+        uint32_t index[12] = {0};
+        size_t at[12];
+        bool own = false;
+        memcpy(index, m->indices + 3 * k, 3 * n * sizeof *index);
+        for (int i = 0; i < 12; i++) {
+            at[i] = m->place[index[i]] - first;
+            own |= at[i] < end - first;
         }
-        if (!own[0] && !own[1] && !own[2]) continue;
-        imp_v3 p[3];
-        for (int i = 0; i < 3; i++) {
-            const float *q = m->positions + 3 * (size_t)index[i];
-            p[i] = imp__v3(q[0], q[1], q[2]);
+        if (!own) continue;
+        struct four add[3];
+        const imp_v3 twice_area = four_weigh(m->positions, index, add);
+        for (size_t j = 0; j < n; j++) {
+            for (size_t i = 0; i < 3 && twice_area[j] > 0; i++) {
+                if (at[3 * j + i] >= end - first) continue;
+                double *sum = m->sum[first + at[3 * j + i]];
+                sum[0] += add[i].x[j];
+                sum[1] += add[i].y[j];
+                sum[2] += add[i].z[j];
+            }
         }
-        const imp_v3 normal = imp__cross(p[1] - p[0], p[2] - p[0]);
-        const double twice_area = imp__length(normal);
-        if (!(twice_area > 0)) continue;
-        /* From sine and cosine, which keep the angle exact for slivers, where acos loses
-         * it. */
-        const imp_v3 e0 = p[1] - p[0], e1 = p[2] - p[1], e2 = p[0] - p[2];
-        const imp_v3 cosine = {-imp__dot(e0, e2), -imp__dot(e0, e1), -imp__dot(e1, e2),
-                               0};
-        const imp_v3 weight =
-            imp__angles(cosine, imp__spec(twice_area)) * (1 / twice_area);
-        for (int i = 0; i < 3; i++)
-            for (int c = 0; own[i] && c < 3; c++)
-                m->sum[at[i]][c] += normal[c] * weight[i];
     }
     return IMP_OK;
 }
@@ -145,8 +206,10 @@ enum imp_status imp__mesh_normals(imp_context *ctx, size_t n_vertices, size_t n_
                         .positions = positions,
                         .indices = indices,
                         .slots = 16,
+                        .vertex = 1,
                         .out = out};
     while (m.slots < 2 * n_vertices) m.slots *= 2;
+    while (m.vertex < n_vertices) m.vertex = 2 * m.vertex + 1;
     m.place = imp__alloc_raw(ctx, n_vertices, sizeof *m.place);
     m.table = imp__alloc_raw(ctx, m.slots, sizeof *m.table);
     m.sum = imp__alloc_raw(ctx, n_vertices, sizeof *m.sum);
