@@ -47,7 +47,7 @@ static void item_note(imp_manifest *m, enum imp__item_kind kind, const char *nam
                       const void *bytes, size_t n)
 {
     static const char *const what[] = {"the file", "the result", "the file"};
-    const uint64_t hash = imp__hash(0, bytes, n);
+    const uint64_t hash = imp__hash_array(0, bytes, n);
     struct imp__item *i = item_find(m, kind, name);
     if (m->making) {
         /* Read again, a file must still be the same. */

@@ -6,7 +6,7 @@
 
 #define MAGIC       "impparts"
 #define PARTS_ORDER 0x01020304u
-#define VERSION     2
+#define VERSION     3
 
 struct head {
     char magic[8];

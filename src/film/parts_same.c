@@ -56,7 +56,7 @@ static uint64_t theta_hash(const struct imp_scene *scene)
     for (size_t k = 0; k < scene->n_params; k++) {
         const struct imp_param *q = &scene->params[k];
         if (q->store == IMP_STORE_BULK) {
-            theta = imp__hash(theta, q->bulk, q->info.count * sizeof *q->bulk);
+            theta = imp__hash_array(theta, q->bulk, q->info.count * sizeof *q->bulk);
             continue;
         }
         for (size_t e = 0; e < q->info.count; e++) {

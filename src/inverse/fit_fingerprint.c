@@ -40,7 +40,7 @@ void imp__fit_fingerprint(struct imp__fit *f)
             h->parameters = imp__hash(h->parameters, q->info.name, strlen(q->info.name));
             h->parameters = imp__hash(h->parameters, &n, sizeof n);
         } else if (q->store == IMP_STORE_BULK) {
-            h->scene = imp__hash(h->scene, q->bulk, n * sizeof *q->bulk);
+            h->scene = imp__hash_array(h->scene, q->bulk, n * sizeof *q->bulk);
         } else {
             for (size_t e = 0; e < n; e++) {
                 const double value = imp__param_get(q, e);

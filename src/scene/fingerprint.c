@@ -5,6 +5,7 @@
 #include "fingerprint.h"
 #include "instances.h"
 #include "kind/bsdf/measured.h"
+#include "kind/shape/shape.h"
 #include "math/course.h"
 #include "math/hash.h"
 #include <string.h>
@@ -40,7 +41,7 @@ static uint64_t measured_hash(uint64_t h, const struct imp_measured_data *d)
     size_t count[IMP_MEASURED_TABLES];
     if (!imp__measured_counts(d, count)) return h;
     for (int k = 0; k < IMP_MEASURED_TABLES; k++)
-        if (count[k]) h = imp__hash(h, d->table[k], count[k] * sizeof *d->table[k]);
+        if (count[k]) h = imp__hash_array(h, d->table[k], count[k] * sizeof *d->table[k]);
     return HASH(h, d->jacobian);
 }
 
@@ -50,9 +51,10 @@ static uint64_t node_hash(uint64_t h, const struct imp_node *node)
     h = imp__hash_text(h, node->type);
     h = imp__hash_text(h, node->id);
     if (node->merl)
-        h = imp__hash(h, node->merl->rho,
-                      3 * (size_t)node->merl->n_half * (size_t)node->merl->n_difference *
-                          (size_t)node->merl->n_azimuth * sizeof *node->merl->rho);
+        h = imp__hash_array(h, node->merl->rho,
+                            3 * (size_t)node->merl->n_half *
+                                (size_t)node->merl->n_difference *
+                                (size_t)node->merl->n_azimuth * sizeof *node->merl->rho);
     if (node->measured) h = measured_hash(h, node->measured);
     for (size_t i = 0; i < node->n_props; i++) h = prop_hash(h, &node->props[i]);
     for (size_t i = 0; i < node->n_children; i++) {
@@ -76,6 +78,15 @@ static bool is_object(const struct imp_node *node)
 
 /* ---- What files held ------------------------------------------------------------- */
 
+/* Of a mesh, what its surface is made of besides the triangles. */
+static uint64_t mesh_hash(uint64_t h, const struct imp__mesh *m, size_t n_vertices)
+{
+    const bool has[3] = {m->reversed, m->normals != NULL, m->uvs != NULL};
+    h = HASH(h, has);
+    if (m->normals) h = imp__hash_array(h, m->normals, 3 * n_vertices * sizeof(float));
+    return m->uvs ? imp__hash_array(h, m->uvs, 2 * n_vertices * sizeof(float)) : h;
+}
+
 static uint64_t shape_hash(uint64_t h, const struct imp_shape *s)
 {
     const struct imp_triangles *t = &s->triangles;
@@ -87,12 +98,13 @@ static uint64_t shape_hash(uint64_t h, const struct imp_shape *s)
     h = vector_hash(vector_hash(h, s->lo), s->hi);
     if (s->geometry == IMP_CURVES) {
         const struct imp_curves *c = &s->curves;
-        h = imp__hash(h, c->points, 4 * c->n_points * sizeof *c->points);
-        return imp__hash(h, c->first, c->n_segments * sizeof *c->first);
+        h = imp__hash_array(h, c->points, 4 * c->n_points * sizeof *c->points);
+        return imp__hash_array(h, c->first, c->n_segments * sizeof *c->first);
     }
     if (s->geometry != IMP_TRIANGLES) return h;
-    h = imp__hash(h, t->positions, 3 * t->n_vertices * sizeof *t->positions);
-    h = imp__hash(h, t->indices, 3 * t->n_triangles * sizeof *t->indices);
+    h = imp__hash_array(h, t->positions, 3 * t->n_vertices * sizeof *t->positions);
+    h = imp__hash_array(h, t->indices, 3 * t->n_triangles * sizeof *t->indices);
+    if (s->ops->surface == imp__mesh_surface) return mesh_hash(h, s->self, t->n_vertices);
     for (size_t k = 0; k < t->n_triangles; k++) { /* normals and uv at a point of each */
         const imp_v3 o = {0}, d = {0, 0, 1, 0};
         const struct imp_hit hit = {

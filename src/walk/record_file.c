@@ -11,7 +11,7 @@
 
 #define MAGIC      "impwalks"
 #define BYTE_ORDER 0x01020304u
-#define VERSION    5
+#define VERSION    6
 
 struct head {
     char magic[8];

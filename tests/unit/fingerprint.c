@@ -5,8 +5,10 @@
 #include "scene/fingerprint.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include "math/hash.h"
 #include "scene/scene.h"
 #include "walk/walk_integrator.h"
+#include <stdlib.h>
 
 static imp_context *ctx;
 
@@ -159,6 +161,54 @@ static void meshes(void)
     n[4] = 0;
     uv[2] = 0.9f;
     tap_ok(strcmp(differ(first, mesh_prints(x, n, uv)), "o---") == 0, "another uv");
+    tap_ok(strcmp(differ(first, mesh_prints(x, n, NULL)), "o---") == 0, "no uv");
+    uv[2] = 1;
+    tap_ok(strcmp(differ(first, mesh_prints(x, n, uv)), "----") == 0, "all as at first");
+}
+
+/* ---- Arrays ------------------------------------------------------------------------ */
+
+static int by_value(const void *a, const void *b)
+{
+    const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Of arrays of 0 to 70 bytes, of zeros and others, and of the others with one bit changed or
+ * two words exchanged, no two have one hash; wherever in memory they lie it is the same. */
+static void arrays(void)
+{
+    enum { MOST = 70 };
+    static uint64_t hash[MOST * (8 * MOST + 16) + 2 * (MOST + 1)];
+    static const unsigned char zeros[MOST];
+    size_t n_hashes = 0, n_equal = 0, moved = 0;
+    for (size_t n = 0; n <= MOST; n++) {
+        unsigned char bytes[MOST], elsewhere[MOST + 1];
+        uint64_t word[2];
+        for (size_t k = 0; k < MOST; k++) bytes[k] = (unsigned char)(37 * k + 11);
+        hash[n_hashes++] = imp__hash_array(0, zeros, n);
+        hash[n_hashes++] = imp__hash_array(5, bytes, n);
+        memcpy(elsewhere + 1, bytes, n);
+        moved += imp__hash_array(5, elsewhere + 1, n) != hash[n_hashes - 1];
+        for (size_t bit = 0; bit < 8 * n; bit++) {
+            bytes[bit / 8] ^= (unsigned char)(1 << bit % 8);
+            hash[n_hashes++] = imp__hash_array(5, bytes, n);
+            bytes[bit / 8] ^= (unsigned char)(1 << bit % 8);
+        }
+        for (size_t k = 8; k + 8 <= n; k += 8) {
+            memcpy(&word[0], bytes, 8);
+            memcpy(&word[1], bytes + k, 8);
+            memcpy(bytes, &word[1], 8);
+            memcpy(bytes + k, &word[0], 8);
+            hash[n_hashes++] = imp__hash_array(5, bytes, n);
+            memcpy(bytes, &word[0], 8);
+            memcpy(bytes + k, &word[1], 8);
+        }
+    }
+    qsort(hash, n_hashes, sizeof *hash, by_value);
+    for (size_t k = 1; k < n_hashes; k++) n_equal += hash[k] == hash[k - 1];
+    tap_ok(n_hashes > 19000 && n_equal == 0 && moved == 0,
+           "hashes of arrays # %zu, %zu of them equal", n_hashes, n_equal);
 }
 
 int main(void)
@@ -168,6 +218,7 @@ int main(void)
     batch();
     skies();
     meshes();
+    arrays();
     imp_context_destroy(ctx);
     return tap_done();
 }
