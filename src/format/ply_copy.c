@@ -36,21 +36,46 @@ static enum imp_status vertices_copy(size_t first, size_t end, void *payload)
     return IMP_OK;
 }
 
+/* Of vertices that are three floats in a row, and nothing else that is read. A float whose bits
+ * but the sign are these or more is not finite. */
+#define BITS_INFINITE 0x7f800000u
+static enum imp_status positions_copy(size_t first, size_t end, void *payload)
+{
+    const struct copying *c = payload;
+    float *to = c->p->positions;
+    uint32_t most = 0;
+    for (size_t k = first; k < end; k++) {
+        uint32_t bits[3];
+        memcpy(bits, c->rows + k * c->row + c->offset[USE_X], sizeof bits);
+        memcpy(to + 3 * k, bits, sizeof bits);
+        for (int i = 0; i < 3; i++) most = imp_max(most, bits[i] & ~(1u << 31));
+    }
+    return most < BITS_INFINITE ? IMP_OK : IMP_E_SCENE;
+}
+static bool are_positions(const struct copying *c)
+{
+    const int *at = c->offset;
+    for (int i = 0; i < USES; i++)
+        if (i > USE_Z && at[i] >= 0) return false;
+    return at[USE_X] >= 0 && at[USE_Y] == at[USE_X] + 4 && at[USE_Z] == at[USE_X] + 8;
+}
+
+/* What is wrong with one is known when all are copied: so none waits for a branch. */
 static enum imp_status faces_copy(size_t first, size_t end, void *payload)
 {
     const struct copying *c = payload;
-    const struct ply *p = c->p;
-    const size_t n = p->elements[p->vertex].n;
+    const size_t n = c->p->elements[c->p->vertex].n;
+    uint32_t *to = c->p->indices, most = 0, others = 0;
     for (size_t k = first; k < end; k++) {
         const unsigned char *row = c->rows + k * c->row;
-        uint32_t corners = 0, index[3];
-        memcpy(&corners, row + c->count, (size_t)c->count_bytes);
+        uint32_t corners = row[c->count], index[3];
+        if (c->count_bytes > 1) memcpy(&corners, row + c->count, (size_t)c->count_bytes);
         memcpy(index, row + c->corner, sizeof index);
-        if (corners != 3 || index[0] >= n || index[1] >= n || index[2] >= n)
-            return IMP_E_SCENE;
-        memcpy(p->indices + 3 * k, index, sizeof index);
+        others |= corners ^ 3;
+        most = imp_max(imp_max(most, index[0]), imp_max(index[1], index[2]));
+        memcpy(to + 3 * k, index, sizeof index);
     }
-    return IMP_OK;
+    return others == 0 && most < n ? IMP_OK : IMP_E_SCENE;
 }
 
 /* Where the numbers lie in a row of three corners a list; false: elsewhere in each. */
@@ -87,7 +112,10 @@ bool imp__ply_copy(struct ply *p, int element)
         return false;
     if ((!vertices && element != p->face) || !layout(p, e, &c)) return false;
     if (e->n > (size_t)(p->end - p->at) / c.row) return false;
-    if (imp__parallel_ranges(p->ctx, e->n, LEAST, vertices ? vertices_copy : faces_copy,
+    if (imp__parallel_ranges(p->ctx, e->n, LEAST,
+                             !vertices           ? faces_copy
+                             : are_positions(&c) ? positions_copy
+                                                 : vertices_copy,
                              &c) != IMP_OK)
         return false;
     p->at += e->n * c.row;

@@ -79,7 +79,7 @@ bool imp__ply_has(const struct ply *p, enum ply_use use);
 enum imp_status imp__ply_header(struct ply *p);
 
 /* The numbers of a vertex, by their use, where they belong. */
-static inline void imp__ply_put(struct ply *p, size_t row, const float f[USES])
+static inline void imp__ply_put(const struct ply *p, size_t row, const float f[USES])
 {
     memcpy(p->positions + 3 * row, f + USE_X, 3 * sizeof *f);
     if (p->normals) memcpy(p->normals + 3 * row, f + USE_NX, 3 * sizeof *f);

@@ -261,8 +261,8 @@ static void check_ply(void)
 }
 
 /* Rows that are copied and rows that are read number by number, which differ by their order of
- * bytes alone: a grid of 300 x 300 vertices with normals and uv, a number of bad value in
- * one of its rows if `bad` is not 0. */
+ * bytes alone: a grid of 300 x 300 vertices with normals and uv, or `bare`, a number of bad
+ * value in one of its rows if `bad` is not 0. */
 enum { GRID = 300, GRID_FACES = 2 * (GRID - 1) * (GRID - 1) };
 static void grid_put(unsigned char **to, bool big, const void *number)
 {
@@ -270,23 +270,27 @@ static void grid_put(unsigned char **to, bool big, const void *number)
     for (int i = 0; i < 4; i++) (*to)[i] = from[big ? 3 - i : i];
     *to += 4;
 }
-static size_t grid_make(unsigned char *text, bool big, int bad)
+static size_t grid_make(unsigned char *text, bool big, bool bare, int bad)
 {
     unsigned char *to = text;
     to += sprintf((char *)to,
                   "ply\nformat binary_%s_endian 1.0\nelement vertex %d\n"
-                  "property float nx\nproperty float ny\nproperty float nz\n"
-                  "property float x\nproperty float y\nproperty float z\n"
-                  "property float u\nproperty float v\nelement face %d\n"
-                  "property list uchar uint vertex_indices\nend_header\n",
-                  big ? "big" : "little", GRID * GRID, GRID_FACES);
+                  "%sproperty float x\nproperty float y\nproperty float z\n%s"
+                  "element face %d\nproperty list %s uint vertex_indices\nend_header\n",
+                  big ? "big" : "little", GRID * GRID,
+                  bare ? "" : "property float nx\nproperty float ny\nproperty float nz\n",
+                  bare ? "" : "property float u\nproperty float v\n", GRID_FACES,
+                  bare ? "uint" : "uchar");
     for (int k = 0; k < GRID * GRID; k++)
-        for (int i = 0; i < 8; i++) {
-            const float f = bad == 1 && k == 70000 && i == 4 ? NAN : .1f * i + k;
+        for (int i = bare ? 3 : 0; i < (bare ? 6 : 8); i++) {
+            const float wrong = bare ? -INFINITY : NAN;
+            const float f = bad == 1 && k == 70000 && i == 4 ? wrong : .1f * i + k;
             grid_put(&to, big, &f);
         }
     for (uint32_t k = 0; k < GRID_FACES; k++) {
-        *to++ = bad == 2 && k == 150000 ? 4 : 3;
+        const uint32_t corners = bad == 2 && k == 150000 ? 4 : 3;
+        if (bare) grid_put(&to, big, &corners);
+        else *to++ = (unsigned char)corners;
         for (uint32_t i = 0; i < 3; i++) {
             const uint32_t index =
                 bad == 3 && k == 160000 ? GRID * GRID : (k + 7 * i) % (GRID * GRID);
@@ -296,14 +300,14 @@ static size_t grid_make(unsigned char *text, bool big, int bad)
     return (size_t)(to - text);
 }
 
-static void check_copied(int threads)
+static void check_copied(int threads, bool bare)
 {
     static const char *const messages[] = {
         "", "g.ply: vertex 70000: y is not finite",
         "g.ply: face 150000 has 4 corners: only triangles are read",
         "g.ply: face 160000 names vertex 90000; there are 90000"};
     struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
-    unsigned char *text = malloc(1024 + 32 * GRID * GRID + 13 * GRID_FACES);
+    unsigned char *text = malloc(1024 + 32 * GRID * GRID + 16 * GRID_FACES);
     imp_context *c;
     o.threads = threads;
     if (!text || imp_context_create(&o, &c) != IMP_OK) abort();
@@ -312,7 +316,7 @@ static void check_copied(int threads)
         bool right = true;
         for (int big = 0; big < 2; big++) {
             const enum imp_status st =
-                load(c, text, grid_make(text, big, bad), "g.ply", true, &l[big]);
+                load(c, text, grid_make(text, big, bare, bad), "g.ply", true, &l[big]);
             right &=
                 bad ? st == IMP_E_SCENE && strcmp(imp_last_error(c), messages[bad]) == 0
                     : st == IMP_OK;
@@ -320,16 +324,17 @@ static void check_copied(int threads)
         if (right && !bad) {
             const struct imp_mesh_data *a = &l[0].m, *b = &l[1].m;
             const size_t n = GRID * GRID * sizeof(float);
-            right = a->positions[3 * 70000 + 1] == .1f * 4 + 70000 &&
-                    a->uvs[2 * 70000 + 1] == 1 - (.1f * 7 + 70000) &&
+            right = a->positions[3 * 70000 + 1] == .1f * 4 + 70000 && bare == !a->uvs &&
+                    bare == !a->normals &&
+                    (bare || a->uvs[2 * 70000 + 1] == 1 - (.1f * 7 + 70000)) &&
                     a->indices[3 * 150000 + 2] == 150014 % (GRID * GRID) &&
                     !memcmp(a->positions, b->positions, 3 * n) &&
-                    !memcmp(a->normals, b->normals, 3 * n) &&
-                    !memcmp(a->uvs, b->uvs, 2 * n) &&
+                    (bare || !memcmp(a->normals, b->normals, 3 * n)) &&
+                    (bare || !memcmp(a->uvs, b->uvs, 2 * n)) &&
                     !memcmp(a->indices, b->indices, GRID_FACES * 3 * sizeof *a->indices);
         }
-        tap_ok(right, "%d threads copy what is read by numbers, too # %s", threads,
-               messages[bad]);
+        tap_ok(right, "%d threads copy what is read by numbers, too%s # %s", threads,
+               bare ? ", bare" : "", messages[bad]);
         unload(&l[0]), unload(&l[1]);
     }
     imp_context_destroy(c);
@@ -525,8 +530,10 @@ int main(void)
     if (imp_context_create(&o, &ctx) != IMP_OK) return 1;
     check_obj();
     check_ply();
-    check_copied(1);
-    check_copied(3);
+    for (int bare = 0; bare < 2; bare++) {
+        check_copied(1, bare);
+        check_copied(3, bare);
+    }
     check_normals();
     check_soups();
     static const char obj[] =
