@@ -85,6 +85,7 @@ static inline struct imp_shape *shape_build(struct imp_node *node,
                             .name = node->type};
     enum imp_status st = ops->build(&b, self, s);
     if (st == IMP_OK) st = imp__props_finish(world.ctx, node);
+    if (st == IMP_OK) st = imp__shape_measure(world.ctx, &world.arena, s);
     if (status) *status = st;
     if (st != IMP_OK) return NULL;
     world.shapes =

@@ -552,7 +552,7 @@ struct imp_shape {
     int bsdf;    /* index; -1: the scene's default, -2: black (emitters' default) */
     int emitter; /* index or -1 */
     bool flip_normals;
-    double area; /* world units; build sets it */
+    double area; /* world units; build sets it. Of a mesh from which nothing is sent: 0 */
     enum imp_geometry geometry;
     struct imp_triangles triangles; /* if geometry is IMP_TRIANGLES */
     struct imp_curves curves;       /* if it is IMP_CURVES */

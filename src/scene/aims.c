@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "aims.h"
 #include "color/rgb.h"
+#include "kind/shape/shape.h"
 #include "math/rng.h"
 #include "math/warp.h"
 #include "scene_build.h"
@@ -42,9 +43,9 @@ static enum imp_status proxy_shape(struct imp_scene *scene, const struct imp_pro
 {
     enum imp_status st = IMP_OK;
     struct imp_node *node = p->node;
+    struct imp_shape *made = node->object;
     *weight = 1;
-    *out = node->object;
-    if (!*out) {
+    if (!made) {
         const char *name = *p->parent
                                ? imp__build_object_name(scene, node, p->parent, p->slot)
                            : node->id ? node->id
@@ -55,15 +56,15 @@ static enum imp_status proxy_shape(struct imp_scene *scene, const struct imp_pro
                                     "a proxy is a bare shape: light passes it"));
         IMP_TRY(imp__props_float_in(scene->ctx, node, "sampling_weight", 1,
                                     IMP_NOT_NEGATIVE, weight));
-        struct imp_shape *made;
         IMP_TRY(imp__build_shape_bare(scene, node, name, &made));
         IMP_TRY(imp__props_finish(scene->ctx, node));
-        *out = made;
     }
-    if (!(*out)->ops->sample_toward)
+    *out = made;
+    IMP_TRY(imp__shape_measure(scene->ctx, &scene->arena, made));
+    if (!made->ops->sample_toward)
         IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_SCENE,
                                 "points of this shape cannot be drawn"));
-    if (!((*out)->area > 0))
+    if (!(made->area > 0))
         IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_SCENE,
                                 "a proxy without area: no direction meets it"));
 out:

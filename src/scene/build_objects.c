@@ -4,6 +4,7 @@
  * document order, however many references it has. */
 #include "kind/sensor/sensor_film.h"
 #include "kind/sensor/sensor_response.h"
+#include "kind/shape/shape.h"
 #include "kind/texture/mesh_attribute.h"
 #include "priorities.h"
 #include "scene_build.h"
@@ -206,6 +207,7 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
     }
     if (side[1])
         IMP_TRY(imp__build_medium(scene, side[1], name, "exterior", &s->exterior));
+    if (emitter || sensor) IMP_TRY(imp__shape_measure(ctx, &scene->arena, s));
     if (emitter) {
         if (!(s->area > 0))
             IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,

@@ -448,6 +448,10 @@ static void degenerate(void)
     world_begin(ctx);
     struct imp_shape *s = shape_build(mesh_node(&m), NULL);
     tap_near(s ? s->area : NAN, 0.5, 1e-12, 0, "only the triangle with area counts");
+    const double *areas = s ? ((struct imp__mesh *)s->self)->cumulative : NULL;
+    tap_ok(s && imp__shape_measure(ctx, &world.arena, s) == IMP_OK &&
+               ((struct imp__mesh *)s->self)->cumulative == areas && s->area == 0.5,
+           "it is measured once");
     int other = 0, bad = 0;
     const imp_v3 ref = imp__v3(0.2, 0.3, 2);
     for (uint32_t k = 0; s && k < 2000; k++) {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Triangle meshes are made: arrays placed in the world, areas, and what a hit would
- * otherwise compute again. */
+ * Triangle meshes are made: arrays placed in the world, volume, areas where points are drawn,
+ * and what a hit would otherwise compute again. */
 #include "base/pool.h"
 #include "mesh_triangle.h"
 #include "shape.h"
@@ -85,6 +85,9 @@ struct checking {
 static enum imp_status corners_check(size_t first, size_t end, void *payload)
 {
     const struct checking *x = payload;
+    uint32_t most = 0;
+    for (size_t k = first; k < end; k++) most = imp_max(most, x->data->indices[k]);
+    if (most < x->data->n_vertices) return IMP_OK;
     for (size_t k = first; k < end; k++)
         if (x->data->indices[k] >= x->data->n_vertices)
             return imp_build_error(x->b, NULL, IMP_E_SCENE,
@@ -121,7 +124,6 @@ struct measuring {
     double *volume; /* [n / BLOCK + 1], of cones from the centre */
 };
 
-/* Areas go to m->cumulative, one place behind. */
 static enum imp_status blocks_measure(size_t first, size_t end, void *payload)
 {
     const struct measuring *x = payload;
@@ -129,26 +131,49 @@ static enum imp_status blocks_measure(size_t first, size_t end, void *payload)
         double volume = 0;
         for (size_t k = block * BLOCK; k < imp_min((block + 1) * BLOCK, x->n); k++) {
             const struct imp__mesh_corner e = imp__mesh_corner(x->m, k);
-            const imp_v3 c = imp__cross(e.e1, e.e2);
-            x->m->cumulative[k + 1] = imp__length(c) / 2;
-            volume += imp__dot(e.p0 - x->centre, c) / 6;
+            volume += imp__dot(e.p0 - x->centre, imp__cross(e.e1, e.e2)) / 6;
         }
         x->volume[block] = volume;
     }
     return IMP_OK;
 }
 
-static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
-                                 struct imp_shape *s, size_t n)
+static enum imp_status volume_sum(const struct imp_build *b, const struct imp__mesh *m,
+                                  struct imp_shape *s, size_t n)
 {
-    enum imp_status st = IMP_OK;
     const size_t blocks = n / BLOCK + (n % BLOCK != 0);
     struct measuring x = {m, (s->lo + s->hi) * 0.5, n,
                           imp__alloc_raw(b->ctx, blocks, sizeof *x.volume)};
-    m->cumulative = imp__arena_take(b->arena, n + 1, sizeof *m->cumulative);
-    if (!m->cumulative || !x.volume)
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory"));
-    IMP_TRY(imp__parallel_ranges(b->ctx, blocks, LEAST / BLOCK, blocks_measure, &x));
+    if (!x.volume) return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
+    const enum imp_status st =
+        imp__parallel_ranges(b->ctx, blocks, LEAST / BLOCK, blocks_measure, &x);
+    s->triangles.volume = 0;
+    for (size_t k = 0; k < blocks; k++) s->triangles.volume += x.volume[k];
+    imp__release(b->ctx, x.volume);
+    return st;
+}
+
+/* Into m->cumulative, one place behind. */
+static enum imp_status areas_find(size_t first, size_t end, void *payload)
+{
+    const struct imp__mesh *m = payload;
+    for (size_t k = first; k < end; k++) {
+        const struct imp__mesh_corner e = imp__mesh_corner(m, k);
+        m->cumulative[k + 1] = imp__length(imp__cross(e.e1, e.e2)) / 2;
+    }
+    return IMP_OK;
+}
+
+enum imp_status imp__shape_measure(imp_context *ctx, struct imp_arena *arena,
+                                   struct imp_shape *s)
+{
+    struct imp__mesh *m = s->self;
+    const size_t n = s->triangles.n_triangles;
+    if (s->ops->surface != imp__mesh_surface || m->cumulative) return IMP_OK;
+    m->cumulative = imp__arena_take(arena, n + 1, sizeof *m->cumulative);
+    if (!m->cumulative)
+        return imp__error(ctx, IMP_E_NOMEM, "%s: out of memory for areas", s->name);
+    const enum imp_status st = imp__parallel_ranges(ctx, n, LEAST, areas_find, m);
     double sum = 0;
     m->cumulative[0] = 0;
     for (size_t k = 0; k < n; k++) {
@@ -157,14 +182,8 @@ static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
         if (sum > before) m->last = k;
         m->cumulative[k + 1] = sum;
     }
-    if (!isfinite(sum))
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE, "its area is not finite"));
     s->area = sum;
-    s->triangles.volume = 0;
-    for (size_t k = 0; k < blocks; k++) s->triangles.volume += x.volume[k];
     m->inv_area = sum > 0 ? 1 / sum : 0;
-out:
-    imp__release(b->ctx, x.volume);
     return st;
 }
 
@@ -261,7 +280,7 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
     else if (normals)
         IMP_TRY(imp__mesh_normals(b->ctx, n, data->n_triangles, m->positions, m->indices,
                                   normals));
-    IMP_TRY(areas_sum(b, m, s, data->n_triangles));
+    IMP_TRY(volume_sum(b, m, s, data->n_triangles));
     m->normals = normals && !is_flat(m, normals, data->n_triangles) ? normals : NULL;
     if (!m->normals) IMP_TRY(tangents_make(b, m, data->n_triangles));
     if (data->n_triangles <= IMP_FACETS_MAX)

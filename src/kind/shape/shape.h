@@ -106,6 +106,10 @@ static inline double imp__uv_turn(double x, double y)
 enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
                                 struct imp_shape *s, const struct imp_mesh_data *data,
                                 bool face_normals);
+/* The area of a mesh, and what its points are drawn by (mesh_build.c); others have theirs. For a
+ * shape that emits, measures or is aimed at; done again, it does nothing. */
+enum imp_status imp__shape_measure(imp_context *ctx, struct imp_arena *arena,
+                                   struct imp_shape *s);
 /* Angle-weighted vertex normals, averaged over vertices at equal positions
  * (mesh_normals.c). out [3 n_vertices]. */
 enum imp_status imp__mesh_normals(imp_context *ctx, size_t n_vertices, size_t n_triangles,
@@ -122,7 +126,8 @@ struct imp__mesh {
     const float *positions, *normals, *uvs; /* world; normals, uvs may be NULL */
     const uint32_t *indices;
     bool reversed;      /* second and third vertex were exchanged */
-    double *cumulative; /* [n + 1] area of the triangles before this one */
+    double *cumulative; /* [n + 1] area of the triangles before this one; NULL: no points
+                           are drawn (imp__shape_measure), and the next two are 0 */
     size_t last;        /* the last triangle that has area */
     double inv_area;
     const double *face_tangents; /* [3 n_triangles] s of the shading frame of flat meshes,
