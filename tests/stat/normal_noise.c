@@ -155,8 +155,8 @@ static void fits(imp_context *ctx, const struct experiment *e)
 static void cornell(imp_context *ctx, const char *filter)
 {
     struct experiment e = {
-        filter, box(ctx, filter),       active, 3,  .4, .8, SIDE, SIDE, 64,
-        SPP,    IMP_POINTS_INDEPENDENT, false,  .93};
+        filter, box(ctx, filter),       active, 3, .4, .8, SIDE, SIDE, 64,
+        SPP,    IMP_POINTS_INDEPENDENT, false};
     fits(ctx, &e);
     e.points = IMP_POINTS_SOBOL;
     fits(ctx, &e);
