@@ -38,6 +38,19 @@ static inline imp_v3 imp__widen(imp_float4 v)
 #endif
 }
 
+/* A bit for each lane of what a comparison of two vectors gives. */
+#define imp__lanes_of(mask) imp__lanes((imp_v3)(mask))
+static inline unsigned imp__lanes(imp_v3 mask)
+{
+#ifdef __AVX__
+    return (unsigned)__builtin_ia32_movmskpd256(mask);
+#else
+    typedef int64_t bits __attribute__((vector_size(32)));
+    const bits m = (bits)mask;
+    return (unsigned)((m[0] & 1) | (m[1] & 2) | (m[2] & 4) | (m[3] & 8));
+#endif
+}
+
 static inline imp_v3 imp__abs(imp_v3 v)
 {
     typedef int64_t bits __attribute__((vector_size(32)));

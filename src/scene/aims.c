@@ -142,7 +142,7 @@ static enum imp_status proxies_add(struct imp_scene *scene,
     *area = 0;
     for (int k = 0; k < scene->n_proxies; k++) {
         const struct imp_proxy *p = scene->proxies[k];
-        const struct imp_shape *shape;
+        const struct imp_shape *shape = NULL;
         double weight;
         if ((p->owner ? p->owner->object : NULL) != light) continue;
         if (light && !light->shape)

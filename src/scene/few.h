@@ -30,13 +30,7 @@ static inline unsigned imp__few_met(const struct imp_few *f, int g, const imp_v3
     const imp_v3 x = f->x[g] - (*o)[0], y = f->y[g] - (*o)[1], z = f->z[g] - (*o)[2];
     const imp_v3 b = x * (*d)[0] + y * (*d)[1] + z * (*d)[2];
     const imp_v3 out = (x * x + y * y + z * z) * (1 - 1e-14) - f->r2[g];
-    const __typeof__(b >= 0) met =
-        (b * b >= out * imp__dot(*d, *d)) & ((b >= 0) | (out <= 0));
-#ifdef __AVX__
-    return (unsigned)__builtin_ia32_movmskpd256((imp_v3)met);
-#else
-    return (met[0] & 1) | (met[1] & 2) | (met[2] & 4) | (met[3] & 8);
-#endif
+    return imp__lanes_of((b * b >= out * imp__dot(*d, *d)) & ((b >= 0) | (out <= 0)));
 }
 
 /* The nearest hit before *tmax, which becomes its distance. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Rays against the scene. Triangles are Embree's own work, in float; analytic shapes answer
- * through their ops, in double, and their hits never pass through a float (where Embree has
+ * Rays against the scene. Triangles are Embree's own work, in float, where there are more than
+ * a few (facets.h); analytic shapes answer through their ops, in double, and their hits never pass through a float (where Embree has
  * them in its tree, struct query carries ray and hit past it). Instances are shapes of this
  * kind, too: each takes the ray to its group, in double, and asks the group's own scene of
  * Embree. So they can be nested and move, and one costs 232 bytes and 63 in Embree's tree (of
@@ -187,10 +187,17 @@ nearest(const struct imp_intersector *x, double time, const imp_v3 *o, const imp
     struct query q;
     struct RTCRayHit r;
     if (imp_unlikely(!ray_valid(o, d, tmin, tmax))) return false;
-    const bool met = imp__few_nearest(&x->few, o, d, tmin, &tmax, hit);
-    if (imp_unlikely(!x->knows)) return met;
+    bool met = imp__few_nearest(&x->few, o, d, tmin, &tmax, hit);
+    float far = met ? triangle_far(o, d, tmax) : (float)tmax;
+    if (x->facets &&
+        imp__facets_nearest(x->facets, o, d, tmin, met ? (double)far : tmax, hit)) {
+        met = true;
+        tmax = hit->t;
+        far = (float)tmax;
+    }
+    if (!x->knows) return met;
     query_fill(&q, x, time, o, d, tmin, tmax);
-    ray_fill(&r.ray, o, d, tmin, met ? triangle_far(o, d, tmax) : (float)tmax);
+    ray_fill(&r.ray, o, d, tmin, far);
     r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(x->rtc, &q.context, &r);
@@ -216,7 +223,8 @@ anything(const struct imp_intersector *x, double time, const imp_v3 *o, const im
     struct RTCRay r;
     if (imp_unlikely(!ray_valid(o, d, tmin, tmax))) return false;
     if (imp__few_occluded(&x->few, o, d, tmin, tmax)) return true;
-    if (imp_unlikely(!x->knows)) return false;
+    if (x->facets && imp__facets_occluded(x->facets, o, d, tmin, tmax)) return true;
+    if (!x->knows) return false;
     query_fill(&q, x, time, o, d, tmin, tmax);
     ray_fill(&r, o, d, tmin, (float)tmax);
     rtcOccluded1(x->rtc, &q.context, &r);

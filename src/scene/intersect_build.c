@@ -299,6 +299,13 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
     if (!x)
         IMP_TRY(imp__error(scene->ctx, IMP_E_NOMEM, "out of memory for the intersector"));
 
+    /* Where analytic shapes are in the tree, it decides which of two at one place is met. */
+    const bool few = is_few(scene, c);
+    if (few && !imp__facets_create(scene->ctx, scene->shapes + c->first, c->n, &x->facets,
+                                   &x->bytes)) {
+        imp__release(scene->ctx, x);
+        IMP_TRY(imp__error(scene->ctx, IMP_E_NOMEM, "out of memory for triangles"));
+    }
     told_clear();
     x->first = c->first;
     x->rtc = rtcNewScene(rtc);
@@ -306,7 +313,7 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
         rtcSetSceneFlags(
             x->rtc, (is_robust(scene, c) ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE) |
                         (c->aims ? RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION : 0));
-    const bool instances = c->group && c->group->n_instances > 0, few = is_few(scene, c);
+    const bool instances = c->group && c->group->n_instances > 0;
     size_t primitives = 0;
     for (int i = 0; x->rtc && i < c->n + instances && told.error == RTC_ERROR_NONE; i++) {
         const struct imp_shape *s = i < c->n ? shape_at(scene, c, i) : NULL;
@@ -314,6 +321,7 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
             imp__few_add(&x->few, s);
             continue;
         }
+        if (s && s->geometry == IMP_TRIANGLES && x->facets) continue;
         RTCGeometry g = s ? geometry_create(rtc, s, c->aims != NULL)
                           : instances_create(rtc, c->group);
         if (!g) break;
@@ -328,9 +336,10 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
     const enum RTCError error = !x->rtc && told.error == RTC_ERROR_NONE
                                     ? RTC_ERROR_UNKNOWN
                                     : (enum RTCError)told.error;
-    x->bytes = told.bytes;
+    x->bytes += told.bytes;
     if (error != RTC_ERROR_NONE) {
         if (x->rtc) rtcReleaseScene(x->rtc);
+        imp__facets_destroy(scene->ctx, x->facets);
         imp__release(scene->ctx, x);
         IMP_TRY(device_error(scene->ctx, error, told.message));
     }
@@ -367,6 +376,7 @@ static void intersector_release(struct imp_scene *scene, void **intersector)
     build_enter();
     rtcReleaseScene(x->rtc);
     build_leave();
+    imp__facets_destroy(scene->ctx, x->facets);
     imp__release(scene->ctx, x);
     *intersector = NULL;
 }

@@ -4,15 +4,18 @@
 #ifndef IMP_INTERSECTOR_H
 #define IMP_INTERSECTOR_H
 
+#include "facets.h"
 #include "few.h"
 #include <embree3/rtcore.h>
 
 struct imp_intersector {
     RTCScene rtc;
-    struct imp_few few; /* analytic shapes that Embree does not know */
-    bool knows;         /* Embree has something to look for */
-    bool calls_back;    /* for analytic shapes or instances */
-    int first;          /* index of its first shape */
+    /* What Embree does not know: analytic shapes, and triangles (NULL: none). */
+    struct imp_few few;
+    struct imp_facets *facets;
+    bool knows;      /* Embree has something to look for */
+    bool calls_back; /* for analytic shapes or instances */
+    int first;       /* index of its first shape */
     int64_t bytes;
 };
 

@@ -252,14 +252,16 @@ static bool made(void)
     return is;
 }
 
-/* The same hits, in all bits, of shapes that are asked before Embree (8 analytic ones, as many
- * as it may be) and in Embree's tree (with another one far away). */
+/* The same hits of shapes that are asked before Embree (8 analytic ones, as many as it may be, and
+ * a wall) and in Embree's tree (with another one far away): in all bits, but for the wall's, which
+ * are floats in the tree. */
 static void few(imp_context *ctx)
 {
     enum { N = 8, RAYS = 20000 };
     static const char *const kinds[] = {"sphere", "disk", "cylinder"};
     static struct imp_hit hits[2][RAYS];
     static bool found[2][RAYS], dark[2][RAYS];
+    static double rounding[RAYS];
     int met = 0, wrong = 0;
     for (int more = 0; more < 2; more++) {
         world_begin(ctx);
@@ -285,18 +287,21 @@ static void few(imp_context *ctx)
             if (hit.shape == N + more) hit.shape = N; /* the wall */
             hits[more][i] = hit;
             dark[more][i] = imp__occluded(&world, &o, &d, 0.5, 6);
+            rounding[i] = 4e-7 * (1 + imp__length(o)) * fmax(1, 1 / imp__length(d));
         }
         world_end();
     }
     for (int i = 0; i < RAYS; i++) {
         const struct imp_hit *a = &hits[0][i], *b = &hits[1][i];
         met += found[0][i];
+        const double off = a->shape == N ? rounding[i] : 0;
         wrong += found[0][i] != found[1][i] || dark[0][i] != dark[1][i] ||
-                 a->shape != b->shape || a->t != b->t || a->u != b->u || a->v != b->v;
+                 a->shape != b->shape || !(fabs(a->t - b->t) <= off) ||
+                 !(fabs(a->u - b->u) <= off) || !(fabs(a->v - b->v) <= off);
     }
     tap_ok(met > RAYS / 4 && met < RAYS && wrong == 0,
-           "few analytic shapes as many: the same bits # %d of %d rays meet, %d differ",
-           met, RAYS, wrong);
+           "few shapes as many: the same hits # %d of %d rays meet, %d differ", met, RAYS,
+           wrong);
 }
 
 /* A disk that lies on a rectangle, which is two triangles: within the rounding of a triangle's
