@@ -241,9 +241,10 @@ int main(void)
         tap_ok(info.triangles_met >= 8.7e8 && info.n_triangles == 2 * SIDE * SIDE,
                "%s: %.4g triangles are met of %.0f", name[how], info.triangles_met,
                (double)info.n_triangles);
-        /* Embree takes blocks of up to a megabyte, of which few instances have their share.
+        /* Embree takes blocks of up to a megabyte, of which few instances have their share,
+         * and the scene's last block is half of all before, whatever is in it yet.
          * What is resident of many has what their building left to the heap, up to 4 MB. */
-        const double slack = how == FLAT ? 1e6 : 0;
+        const double slack = how == FLAT ? 2e6 : 0;
         tap_ok(cost.held - one.held <= 600 * n + slack &&
                    (SANITIZED || how == MORE ||
                     cost.resident - one.resident <= 600 * n + 1e6),
