@@ -79,6 +79,7 @@ struct imp_arena_mark imp__arena_mark(const struct imp_arena *a)
 
 void imp__arena_rewind(struct imp_arena *a, struct imp_arena_mark mark)
 {
-    a->current = mark.block;
+    /* A mark of an empty arena leads to the block that it has by now. */
+    a->current = mark.block ? mark.block : a->first;
     a->used = mark.used;
 }
