@@ -32,6 +32,11 @@ static inline bool imp__emitter_even(const struct imp_emitter *e,
 {
     return (e->ops->flags & IMP_EMITTER_UNIFORM) && e->input[0]->plain && !carried;
 }
+/* ... of such a one. */
+static inline imp_spec imp__even_radiance(const struct imp_emitter *e, double cos_light)
+{
+    return cos_light > 0 ? e->input[0]->value : imp__spec(0);
+}
 /* Radiance of an emitter at x, point p of it, at the scene's present parameters. */
 static inline imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,
                                              const struct imp_emission *x, imp_v3 p,
@@ -39,7 +44,7 @@ static inline imp_spec imp__emitter_radiance(const struct imp_scene *scene, int 
 {
     const struct imp_emitter *e = scene->emitters[emitter];
     if (imp_likely(imp__emitter_even(e, carried)))
-        return x->cos_light > 0 ? e->input[0]->value : imp__spec(0);
+        return imp__even_radiance(e, x->cos_light);
     struct imp_texcoord at = {
         .uv = {x->uv[0], x->uv[1]}, .p = p, .carried = carried, .shape = e->shape};
     imp_spec in[IMP_INPUTS_MAX], le;

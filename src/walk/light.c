@@ -115,20 +115,48 @@ static inline int weights_sample(const struct imp_step *s, const struct imp_surf
     return e->ops->sample(e, &at->p, u, ls) ? light : -1;
 }
 
-/* there: uv, distance, cosine at the light. */
-static inline void record(struct imp_vertex *v, int emitter, double weight, imp_v3 there,
-                          imp_v3 d, imp_v3 p, imp_v3 wi)
+/* The point; none of a light that is infinitely far. */
+static inline imp_v3 point_of(const struct imp_light_sample *ls)
+{
+    return isfinite(ls->dist) ? ls->p : (imp_v3){0};
+}
+
+/* The radiance of a light, from what is decided. That of an even one asks for its side
+ * alone. */
+static __attribute__((noinline)) imp_spec
+uneven_radiance(const struct imp_step *s, int light, const struct imp_light_sample *ls)
+{
+    const imp_v3 there =
+        imp__decide((imp_v3){ls->uv[0], ls->uv[1], ls->dist, ls->cos_light});
+    const struct imp_emission x = {
+        {there[0], there[1]}, there[2], there[3], imp__decide(-ls->wi)};
+    return imp__emitter_radiance(s->scene, light, &x, imp__decide(point_of(ls)),
+                                 s->at.carried);
+}
+static inline imp_spec sample_radiance(const struct imp_step *s, int light,
+                                       const struct imp_light_sample *ls)
+{
+    const struct imp_emitter *e = s->scene->emitters[light];
+    return imp_likely(imp__emitter_even(e, s->at.carried))
+               ? imp__even_radiance(e, imp__decide1(ls->cos_light))
+               : uneven_radiance(s, light, ls);
+}
+
+/* wi: towards it, in the frame of the vertex. */
+static inline void record(struct imp_vertex *v, int emitter, double weight,
+                          const struct imp_light_sample *ls, imp_v3 wi)
 {
     struct imp_light *l = &v->d.light;
     l->emitter = emitter;
     l->weight = (imp_decided)weight;
-    const imp_float4 stored = imp__narrow(there);
-    l->uv[0] = stored[0];
-    l->uv[1] = stored[1];
-    l->dist = stored[2];
-    l->cos_light = stored[3];
-    imp__store_v3(l->d, d);
-    imp__store_v3(l->p, p);
+    const imp_float4 there =
+        imp__narrow((imp_v3){ls->uv[0], ls->uv[1], ls->dist, ls->cos_light});
+    l->uv[0] = there[0];
+    l->uv[1] = there[1];
+    l->dist = there[2];
+    l->cos_light = there[3];
+    imp__store_v3(l->d, -ls->wi);
+    imp__store_v3(l->p, point_of(ls));
     imp__store_v3(l->wi, wi);
     v->d.connection = IMP_OCCLUDED; /* until it is seen */
 }
@@ -198,20 +226,14 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
     const double weight = imp__emitter_timed(e, s->walk->time, imp__decide1(mis_over_p));
 
     /* What it brings, if it is seen. */
-    const imp_v3 there =
-        imp__decide((imp_v3){ls->uv[0], ls->uv[1], ls->dist, ls->cos_light});
-    const struct imp_emission x = {
-        {there[0], there[1]}, there[2], there[3], imp__decide(-ls->wi)};
-    const bool far = !isfinite(ls->dist);
-    const imp_v3 point = imp__decide(far ? (imp_v3){0} : ls->p);
-    const imp_spec le = imp__emitter_radiance(scene, light, &x, point, s->at.carried);
+    const imp_spec le = sample_radiance(s, light, ls);
     const struct imp_active *active = s->tracer->active;
     const bool differentiable =
         active && ((b->index >= 0 && active->bsdf[b->index]) || active->emitter[light]);
     if (imp__is_zero_used(f * le, s->at.carried) && !differentiable) return;
     shadow->brings = f * le * weight;
     if (s->recorded) {
-        record(v, light, weight, there, x.d, point, dirs.wi);
+        record(v, light, weight, ls, dirs.wi);
         v->light_f = f;
         v->light_e = le;
         v->light_w = imp__spec(weight);
@@ -219,6 +241,7 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
 
     /* Aimed from the moved origin at the point itself: a ray parallel to wi would meet a
      * concave light before its end. */
+    const bool far = !isfinite(ls->dist);
     shadow->o = imp__offset(at->p, at->ng, ls->wi);
     shadow->d = far ? ls->wi : ls->p - shadow->o; /* then t = 1 is the light */
     shadow->reach = far ? INFINITY : 1 - 10 * IMP_RAY_EPSILON;

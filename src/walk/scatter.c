@@ -55,7 +55,7 @@ static bool roulette(struct imp_step *s, const struct imp_bsdf *b, imp_spec fact
         q = imp_min(imp__max_used(s->beta, s->at.carried) * s->eta * s->eta, 0.95);
         if (guided) q = imp__guided_survival(s, q);
     }
-    q = fmax(q, s->tracer->survival);
+    q = imp_max(q, s->tracer->survival);
     *survive = imp__decide1(q);
     return imp__step_number(s, IMP_DIM_SURVIVE) < *survive;
 }
