@@ -49,14 +49,26 @@ static size_t apart(size_t n)
 }
 
 /* A picture holds floats. */
-static enum imp_drop beyond_float(const double *value, int n)
+static IMP_COLD enum imp_drop cause_of(const double *value, int n)
 {
-    bool fine = true, number = true;
+    for (int c = 0; c < n; c++)
+        if (isnan(value[c])) return IMP_DROP_NAN;
+    return IMP_DROP_INFINITE;
+}
+static inline enum imp_drop beyond_float(const double *value, int n)
+{
+    bool fine = true;
+    for (int c = 0; c < n; c++) fine &= fabs(value[c]) <= FLT_MAX;
+    return imp_likely(fine) ? IMP_DROP_NONE : cause_of(value, n);
+}
+
+/* Sums of n values and of their squares. */
+static inline void box_add(const double *restrict value, int n, double *restrict sums)
+{
     for (int c = 0; c < n; c++) {
-        fine &= fabs(value[c]) <= FLT_MAX;
-        number &= !isnan(value[c]);
+        sums[2 * c] += value[c];
+        sums[2 * c + 1] += value[c] * value[c];
     }
-    return imp_likely(fine) ? IMP_DROP_NONE : number ? IMP_DROP_INFINITE : IMP_DROP_NAN;
 }
 
 static void sample_take(const struct render *r, struct imp_tile_worker *w,
@@ -139,10 +151,7 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
                     imp__patch_splat(&r->patch, t, patch, &s);
                     continue;
                 }
-                for (int c = 0; c < n; c++) {
-                    own[2 * c] += s.value[c];
-                    own[2 * c + 1] += s.value[c] * s.value[c];
-                }
+                box_add(s.value, n, own);
             }
             if (r->patch.border > 0)
                 imp__patch_add(&r->patch, t, patch, s.x, s.y,
