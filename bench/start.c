@@ -2,7 +2,7 @@
  *
  * The start with two meshes of a million triangles, beside what no program could leave out: the
  * same files read and copied, and Embree's tree of them. The library also places the vertices,
- * makes their normals (the files have none), areas and a scene, and takes one sample. Wall and
+ * makes their normals (the files have none), volumes and a scene, and takes one sample. Wall and
  * processor seconds, each measurement in a process of its own, in rounds in which both take
  * turns; files come from the page cache, memory is of pages that were in use just before.
  *
