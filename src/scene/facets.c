@@ -115,23 +115,31 @@ struct ray {
     lanes stretch; /* of slacks, by the length of d */
 };
 #define NEAR 2 /* reaches */
-/* The distance, in units of d, after which the ray is near, or from where on it goes away. */
-static IMP_COLD double approach(const struct imp_facets *f, imp_v3 from, imp_v3 d)
+/* From far away: false if the ray does not come to the ball around all facets; *t is a distance,
+ * in units of d, at which it has not come there yet, but is near. length: |x| + |y| + |z| of d,
+ * by which the way that is left to the ball's centre is 1.15 to 2 reaches. */
+static inline bool ray_comes(const struct imp_facets *f, imp_v3 from, imp_v3 d,
+                             double length, double *t)
 {
-    const double square = imp__dot(d, d);
-    return imp_max(-imp__dot(from, d) / square - NEAR * (double)f->reach / sqrt(square),
-                   0);
+    const double reach = (double)f->reach * (1 + 1e-6), square = imp__dot(d, d);
+    const double ahead = -imp__dot(from, d);
+    const double out = imp__dot(from, from) * (1 - 1e-14) - reach * reach;
+    if (!(ahead > 0) || ahead * ahead < square * out) return false;
+    *t = imp_max((ahead * length - NEAR * reach * square) / (square * length), 0);
+    return true;
 }
-/* False: it starts outside of the box and goes away from it. */
+/* False: it meets nothing. */
 static inline bool ray_of(const struct imp_facets *f, const imp_v3 *o, const imp_v3 *d,
                           double tmin, double tmax, struct ray *out)
 {
     struct ray r;
     imp_v3 from = *o - f->centre;
     const imp_v3 step = imp__abs(*d), outside = imp__abs(from) - f->half;
-    if (imp__lanes_of((outside > 0) & (from * *d > 0))) return false;
+    const double length = (step[0] + step[1]) + step[2];
+    if (imp__lanes_of((outside > 0) & (from * *d > 0))) return false; /* it goes away */
     if (imp_unlikely(imp__lanes_of(outside > f->near))) {
-        const double t = approach(f, from, *d);
+        double t;
+        if (!ray_comes(f, from, *d, length, &t)) return false;
         from += t * *d;
         tmin -= t;
         tmax -= t;
@@ -142,7 +150,7 @@ static inline bool ray_of(const struct imp_facets *f, const imp_v3 *o, const imp
     }
     r.lo = splat((float)tmin);
     r.hi = splat((float)tmax);
-    r.stretch = splat((float)((step[0] + step[1]) + step[2]));
+    r.stretch = splat((float)length);
     *out = r;
     return true;
 }
@@ -359,7 +367,7 @@ bool imp__facets_create(imp_context *ctx, struct imp_shape *const *shapes, int n
     }
     if (triangles == 0 || triangles > 2 * IMP_FACETS) return true;
     struct imp_facets head = {.centre = (lo + hi) * .5, .half = (hi - lo) * .5};
-    head.centre[3] = 0;
+    head.centre[3] = head.half[3] = 0;
     head.reach = (float)imp__length(head.half);
     head.near = imp__spec(NEAR * (double)head.reach);
     head.slack = (float)(SLACK_DISTANCE * (double)head.reach);
