@@ -12,7 +12,7 @@
 
 #include "scene.h"
 
-#define IMP_FACETS 24 /* more are Embree's: there its tree is faster (docs/speed.md) */
+#define IMP_FACETS 32 /* more are Embree's: there its tree is faster (docs/speed.md) */
 
 struct imp_facets;
 
