@@ -98,7 +98,7 @@ static enum imp_status intervals(struct imp__fit *f, const struct imp__search *s
                                        .at_newton = imp__search_is_coarse(s) &&
                                                     s->finished == IMP_FINISH_NOISE};
     const enum imp_status st = imp__covariance(&f->goal, x, &rounds, variables, u);
-    if (st == IMP_OK && u->is_linear) memcpy(x, u->x, f->problem->n * sizeof *x);
+    if (st == IMP_OK && u->found) memcpy(x, u->x, f->problem->n * sizeof *x);
     if (st != IMP_E_NUMERIC && st != IMP_E_UNSUPPORTED) return st;
     *why = imp__arena_strdup(&f->problem->fit_arena, imp_last_error(ctx));
     return IMP_OK;
@@ -123,7 +123,7 @@ static enum imp_status search_look(struct imp__fit *f, const struct imp__opt_opt
 {
     const bool coarse = imp__search_is_coarse(s) && s->finished == IMP_FINISH_NOISE;
     enum imp_status st = intervals(f, s, s->x, rows, u, why);
-    if (st != IMP_OK || !coarse || u->is_linear) return st;
+    if (st != IMP_OK || !coarse || u->found) return st;
     imp__search_refine(s);
     *why = NULL;
     f->final_total = 0;

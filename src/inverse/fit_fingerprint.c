@@ -8,7 +8,7 @@
 #include "scene/fingerprint.h"
 #include <string.h>
 
-#define PAIRS_VERSION   2 /* of what Levenberg-Marquardt estimates from its samples */
+#define PAIRS_VERSION   3 /* of what Levenberg-Marquardt estimates from its samples */
 #define VARIATE_VERSION 3 /* of what control variates keep, and of steps with them */
 #define KEPT_VERSION    2 /* of how walks are drawn that are kept (fit_kept.c) */
 

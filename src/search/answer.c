@@ -6,6 +6,7 @@
 
 #define SEED_BASE  0x40000000 /* iteration numbers no search reaches */
 #define SEED_LAST  63
+#define SEED_AHEAD 59  /* of the look ahead; those of halves are between */
 #define LEAP_SEEDS 32  /* iteration numbers from samples at one x to those at the next, */
 #define LOOK_SEEDS 256 /* and from one look to the next */
 
@@ -18,7 +19,9 @@
 #define HALVES 3 /* of the way, that are tried */
 _Static_assert(LEAPS *LEAP_SEEDS + SEED_LAST < LOOK_SEEDS,
                "each look has numbers of its own");
-_Static_assert(IMP_SAMPLED_STAGES <= SEED_LAST - LEAP_SEEDS - HALVES, "and each leap");
+_Static_assert(SEED_AHEAD + HALVES < SEED_LAST &&
+                   IMP_SAMPLED_STAGES <= SEED_AHEAD - LEAP_SEEDS,
+               "and each leap");
 
 static enum imp_status no_memory(imp_context *ctx)
 {
@@ -243,16 +246,24 @@ static enum imp_status samples_here(const struct imp__goal *goal, const double *
         IMP_TRY(answer_find(goal, s, x, a, u));
         missing = rounds_missing(s, a, u, most - s->rounds);
     }
-    u->is_linear = true;
 out:
     return st;
 }
 
+/* What samples ahead have found. */
+enum ahead {
+    AHEAD_LINEAR, /* all of them count at x */
+    AHEAD_MOVED,  /* x is the Newton point now, and those taken there count */
+    AHEAD_HIGHER  /* the loss at the Newton point is higher: none were taken there */
+};
+
 /* A round at x, and those that are missing at its Newton point. H0, a linear model: the
- * gradient there is the noise of both. u->is_linear: does H0 hold? */
-static enum imp_status samples_ahead(const struct imp__goal *goal, const double *x,
+ * gradient there is the noise of both. Elsewhere x moves there; as it does not depend on the
+ * samples there, they are as good as any. */
+static enum imp_status samples_ahead(const struct imp__goal *goal, double *x,
                                      uint64_t base, int most, struct imp__sampled *s,
-                                     struct imp__answer *a, struct imp__uncertainty *u)
+                                     struct imp__answer *a, struct imp__uncertainty *u,
+                                     enum ahead *end)
 {
     enum imp_status st = IMP_OK;
     const size_t n = s->n, nn = n * n;
@@ -262,20 +273,29 @@ static enum imp_status samples_ahead(const struct imp__goal *goal, const double 
     if (!work) IMP_TRY(no_memory(s->ctx));
     double *at = work, *C = work + n;
     memcpy(at, x, n * sizeof *at);
-    for (int k = 0; missing > 0 && s->stages < IMP_SAMPLED_STAGES; k++) {
+    *end = AHEAD_LINEAR;
+    for (int k = 0; missing > 0 && k < IMP_SAMPLED_STAGES; k++) {
         IMP_TRY(imp__sampled_take(goal, at, imp__search_seed(goal, base, k), missing, s));
         for (size_t i = 0; i < nn; i++) C[i] = s->mean.cov_g[i] + s->one_cov[i];
-        if (s->stages > 0 && over_noise(n, a->free.G, s->one.g, C) > 1) goto out;
+        if (k > 0 && *end == AHEAD_LINEAR && over_noise(n, a->free.G, s->one.g, C) > 1) {
+            *end = AHEAD_MOVED;
+            memcpy(x, at, n * sizeof *x);
+            imp__sampled_forget(s);
+        }
         IMP_TRY(imp__sampled_add(x, at, s));
         IMP_TRY(answer_find(goal, s, x, a, u));
-        missing = imp_max(rounds_missing(s, a, u, most - s->rounds), s->stages == 1);
-        for (size_t i = 0; i < n; i++) at[i] = imp__into_bounds(goal, i, u->x[i]);
-        if (s->stages > 1) continue;
+        missing = imp_max(rounds_missing(s, a, u, most - s->rounds), k == 0);
+        if (*end == AHEAD_MOVED && missing < s->rounds) break;
+        if (*end == AHEAD_LINEAR)
+            for (size_t i = 0; i < n; i++) at[i] = imp__into_bounds(goal, i, u->x[i]);
+        if (k > 0) continue;
         IMP_TRY(
-            accept_coarse(goal, x, imp__search_seed(goal, base, SEED_LAST), at, &lower));
-        if (!lower) goto out;
+            accept_coarse(goal, x, imp__search_seed(goal, base, SEED_AHEAD), at, &lower));
+        if (!lower) {
+            *end = AHEAD_HIGHER;
+            break;
+        }
     }
-    u->is_linear = true;
 out:
     imp__release(s->ctx, work);
     return st;
@@ -284,7 +304,8 @@ out:
 /* Towards the Newton point: is the loss there no higher than at x, or half of the way, ..? x
  * moves that far. */
 static enum imp_status leap(const struct imp__goal *goal, uint64_t base,
-                            const double *newton, double *x, double *at, bool *moved)
+                            const double *newton, bool coarse, double *x, double *at,
+                            bool *moved)
 {
     enum imp_status st = IMP_OK;
     double part = 0.5;
@@ -292,7 +313,8 @@ static enum imp_status leap(const struct imp__goal *goal, uint64_t base,
     for (int k = 1; k <= HALVES && !*moved; k++, part /= 2) {
         for (size_t i = 0; i < goal->n; i++)
             at[i] = imp__into_bounds(goal, i, x[i] + part * (newton[i] - x[i]));
-        IMP_TRY(accept(goal, x, imp__search_seed(goal, base, SEED_LAST - k), at, moved));
+        const uint64_t seed = imp__search_seed(goal, base, SEED_LAST - k);
+        IMP_TRY((coarse ? accept_coarse : accept)(goal, x, seed, at, moved));
     }
     if (*moved) memcpy(x, at, goal->n * sizeof *x);
 out:
@@ -306,32 +328,41 @@ enum imp_status imp__answer_here(const struct imp__goal *goal,
     enum imp_status st = IMP_OK;
     const size_t n = s->n;
     double *x = a->from, *step = a->step;
-    bool go = true, moved = true;
+    bool go = true, moved = true, ahead = rounds->at_newton, leapt = false;
     for (int k = 0; k <= LEAPS && moved; k++) {
         const uint64_t base =
             SEED_BASE + LOOK_SEEDS * (uint64_t)rounds->look + LEAP_SEEDS * (uint64_t)k;
+        enum ahead end = AHEAD_MOVED;
         imp__sampled_forget(s);
-        IMP_TRY((rounds->at_newton ? samples_ahead
-                                   : samples_here)(goal, x, base, rounds->most, s, a, u));
-        if (!u->is_linear) goto out;
+        if (ahead) IMP_TRY(samples_ahead(goal, x, base, rounds->most, s, a, u, &end));
+        else IMP_TRY(samples_here(goal, x, base, rounds->most, s, a, u));
+        if (end == AHEAD_HIGHER) {
+            moved = false;
+            if (k < LEAPS) IMP_TRY(leap(goal, base, u->x, true, x, step, &moved));
+            if (!moved) goto out;
+            continue;
+        }
+        ahead = false;
         a->part = s->rounds / (s->rounds + rounds->searched);
         const bool far = over_noise(n, a->free.G, s->mean.g, s->mean.cov_g) > 1;
         if (k > 0 || far) a->part = 1;
         for (size_t i = 0; i < n; i++)
             u->x[i] = imp__into_bounds(
                 goal, i, a->part < 1 ? x[i] + a->part * (u->x[i] - x[i]) : u->x[i]);
-        if (rounds->at_newton) break;
+        if (end == AHEAD_LINEAR) break;
         IMP_TRY(accept(goal, x, imp__search_seed(goal, base, SEED_LAST), u->x, &go));
-        moved = go && far && k > 0;
+        moved = go && far && leapt;
+        leapt |= !go;
         if (k == LEAPS) break;
         if (moved) memcpy(x, u->x, n * sizeof *x);
-        if (!go) IMP_TRY(leap(goal, base, u->x, x, step, &moved));
+        if (!go) IMP_TRY(leap(goal, base, u->x, false, x, step, &moved));
     }
     for (size_t i = 0; i < n; i++) step[i] = go ? 0 : u->x[i] - x[i];
     if (!go) {
         memcpy(u->x, x, n * sizeof *x);
         a->part = 0;
     }
+    u->found = true;
 out:
     return st;
 }

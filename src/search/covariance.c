@@ -92,7 +92,7 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
     IMP_TRY(uncertainty_create(ctx, n, &u));
     IMP_TRY(imp__sampled_create(goal, x, &s));
     IMP_TRY(imp__answer_here(goal, rounds, &s, &a, &u));
-    if (!u.is_linear) goto out;
+    if (!u.found) goto out;
     u.rounds = s.rounds;
     u.loss = imp__sampled_loss(&s, a.from, u.x, a.free.G, a.part);
     unknown_add(goal, &s, &a, &u);
@@ -118,9 +118,9 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
                 v);
     }
     *out = u;
-    u = (struct imp__uncertainty){.is_linear = true};
+    u = (struct imp__uncertainty){.found = true};
 out:
-    if (st == IMP_E_NUMERIC && rounds->at_newton && !u.is_linear) st = IMP_OK;
+    if (st == IMP_E_NUMERIC && rounds->at_newton && !u.found) st = IMP_OK;
     imp__uncertainty_destroy(ctx, &u);
     imp__answer_destroy(ctx, &a);
     imp__sampled_destroy(&s);

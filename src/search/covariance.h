@@ -21,7 +21,7 @@ struct imp__uncertainty {
         noise_scale; /* estimated variance of the data in units of 1/weight; 0: known */
     struct imp_estimate loss; /* at x, by the same samples; value NAN: not known */
     int rounds;               /* samples taken, in those of an evaluation */
-    bool is_linear; /* the gradient at the first Newton point is 0 within noise */
+    bool found;               /* at_newton: false where the search has to go on */
 };
 
 /* Samples, in those of an evaluation by the goal. */
@@ -37,9 +37,11 @@ struct imp__rounds {
  * measurement's. Sets value, se, lo95, hi95, at_bound, determined of variables [n].
  *
  * at_newton, where x is the end of a search with fewer samples, and further away: one round
- * at x, the others at its Newton point u, all of them behind the answer.
- * Where the model is linear the gradient at u is 0 but for the noise of both; where it is
- * not, or there is no u, out->is_linear is false, and nothing else is set.
+ * at x, the others at its Newton point u. Where the model is linear the gradient at u is 0
+ * but for the noise of both, and all are behind the answer; where it is not, those at u are.
+ * If the loss at u is higher than at x, x moves half of the way, or less, and a round is taken
+ * there. Where it is higher all the way, or there is no u, out->found is false, and nothing
+ * else is set.
  *
  * Where x is an average over a search, these samples are a part of all that are behind the
  * answer. If the Newton step is then no longer than its own noise, it is taken by that part

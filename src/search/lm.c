@@ -8,8 +8,9 @@
  * Every iteration has its own random numbers; the trial steps of one iteration share
  * them, so that the gain is not drowned. The search ends when g^T H^-1 g is what noise in
  * g alone would give, twice in a row; the estimate is the average of the two Newton
- * points. A goal may offer fewer samples for all of this; only that end counts then, and
- * any other is where the search goes on with those asked for. */
+ * points. A goal may offer fewer samples for all of this: then once is enough, since samples
+ * of another kind follow, and any other end is where the search goes on with those asked
+ * for. */
 #include "lm_system.h"
 #include <math.h>
 #include <string.h>
@@ -167,7 +168,9 @@ static enum imp_status iterate(const struct imp__goal *goal,
     if (moved) memcpy(s->x, w->trial, n * sizeof *s->x);
     if (s->finished) goto out;
     s->scalar[WITHIN] = quiet ? s->scalar[WITHIN] + 1 : 0;
-    if (s->scalar[WITHIN] == 1) {
+    if (quiet && s->scalar[COARSE] != 0) {
+        imp__search_finish(s, IMP_FINISH_NOISE);
+    } else if (s->scalar[WITHIN] == 1) {
         memcpy(s->array[FIRST], s->x, n * sizeof *s->x);
     } else if (s->scalar[WITHIN] == 2) {
         for (size_t k = 0; k < n; k++)
