@@ -84,10 +84,13 @@ int main(int argc, char **argv)
     e = fit(p, scene, IMP_ADAM, lengthy ? 256 : 16, lengthy ? 0 : 80, 1, truth);
     tap_ok(e.z < 4 && e.relative <= (lengthy ? .02 : .3),
            "seven controls, Adam # worst %.2f %%, %.1f se", 100 * e.relative, e.z);
-    if (lengthy) { /* and alone, without the Newton step that the intervals bring */
+    /* And alone, without the Newton step that the intervals bring. Such an answer has no error to be
+     * judged by: with 64 samples seven seeds are off by 5.2 %, root mean square of the worst number,
+     * which would be 2.6 % with 256. The axes, along which Adam would creep, leave 38 %. */
+    if (lengthy) {
         test_must(ctx, imp_problem_set_x(p, start));
         e = fit(p, scene, IMP_ADAM, 256, 0, 0, truth);
-        tap_ok(e.relative <= .02, "seven controls, Adam alone # worst %.2f %%",
+        tap_ok(e.relative <= .1, "seven controls, Adam alone # worst %.2f %%",
                100 * e.relative);
     }
     imp_problem_destroy(p);
