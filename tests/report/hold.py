@@ -84,7 +84,7 @@ result = os.path.join(folder, "fit")
 def make_fit(result, size, spp, parameters):
     run("render", cornell, "-D", "res=%d" % size, "-q", "--spp", "64", "--seed", "5", "--se", "-o", folder + "/t.exr", "--no-preview")
     patterns = [w for p in parameters for w in ("-p", p)]
-    run("fit", cornell, "-D", "res=%d" % size, "-q", "--target", folder + "/t.exr", "--set", "red.reflectance.value=0.5", *patterns, "--spp",
+    run("fit", cornell, "-D", "res=%d" % size, "-q", "--target", folder + "/t.exr", "--set", "red.reflectance.value=0.5", "--set", "light.radiance.value=8,4,1", *patterns, "--spp",
         str(spp), "--optimizer", "lm", "--picture-spp", "16", "-o", result)
     run("jacobian", cornell, "-D", "res=%d" % size, "-q", "--spp", "16", *patterns, "-o", result)
     run("check", cornell, "-D", "res=%d" % size, "-q", "--spp", "16", "-p", "red.*", "--json", "-o", result + "/check.json")

@@ -24,7 +24,7 @@ from chromium import PROGRAM, Browser
 from tap import done, ok
 
 importon, scenes = sys.argv[1:]
-
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # under nohup it is ignored, and the command leaves it so
 
 if not PROGRAM:
     print("1..0 # SKIP no chromium")
