@@ -14,6 +14,8 @@ struct imp__fit {
     struct imp_fit_options options; /* defaults filled in */
     struct imp_run run;             /* of one evaluation; its progress is ours */
     struct imp_run outer;           /* the caller's */
+    bool coarse;                    /* a part of the samples is taken for now ... */
+    int fine_spp;                   /* ... in place of these */
     struct imp__goal goal;
     struct imp__fingerprint fingerprint;
     double *lo, *hi, *scale; /* [n]; NULL with spans */

@@ -55,10 +55,10 @@ static int inner_progress(const struct imp_progress *p, void *payload)
 {
     struct imp__fit *f = payload;
     const double done = f->search ? f->search->iteration : 0;
-    if (f->final_total > 0)
-        report(f, f->search_share + (0.999 - f->search_share) *
-                                        (f->final_calls - 1 + p->fraction) /
-                                        f->final_total);
+    if (f->final_total > 0) /* A look that leaps takes more evaluations than were told. */
+        report(f, f->search_share +
+                      (0.999 - f->search_share) *
+                          fmin(1, (f->final_calls - 1 + p->fraction) / f->final_total));
     else
         report(f,
                f->search_share * (done + 0.5 * p->fraction) / f->options.max_iterations);
@@ -200,7 +200,10 @@ int imp__fit_coarse_spp(const struct imp__fit *f)
 static void coarsen(bool fewer, void *payload)
 {
     struct imp__fit *f = payload;
-    f->run.spp = fewer ? imp__fit_coarse_spp(f) : f->outer.spp;
+    if (fewer == f->coarse) return;
+    if (fewer) f->fine_spp = f->run.spp;
+    f->run.spp = fewer ? imp__fit_coarse_spp(f) : f->fine_spp;
+    f->coarse = fewer;
 }
 
 /* Do tiles get samples by their share of the variance? Beside control variates of many numbers,

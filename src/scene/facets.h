@@ -17,8 +17,9 @@
 struct imp_facets;
 
 /* Facets of all triangles of the n shapes; shapes of other geometries are passed over. *out is
- * the caller's (imp__facets_destroy), and its size is added to *bytes; NULL: there are none, or
- * more than IMP_FACETS. False: out of memory. */
+ * the caller's (imp__facets_destroy), and its size is added to *bytes; NULL: there are none,
+ * more than IMP_FACETS, or one that is thinner than about 1 / 26,000 of the way across all.
+ * False: out of memory. */
 bool imp__facets_create(imp_context *ctx, struct imp_shape *const *shapes, int n,
                         struct imp_facets **out, int64_t *bytes);
 void imp__facets_destroy(imp_context *ctx, struct imp_facets *f);

@@ -132,9 +132,10 @@ static int by_ratio(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Standard errors by which it lies outside of the edges; 0: inside. */
+/* Standard errors by which it lies outside of the edges; 0: inside; infinite: no number. */
 static double outside(struct ratio r, const double edges[2])
 {
+    if (!(isfinite(r.value) && r.value > 0 && isfinite(r.se))) return INFINITY;
     return fmax(0, fmax(log(edges[0] / r.value), log(r.value / edges[1])) / r.se);
 }
 
@@ -152,9 +153,10 @@ static void errors(const struct setting *s)
         evaluate(s, p, imp_film_mean(film), seeds, next);
         seeds = next;
         for (size_t k = 0; k < n; k++) ratio[k] = ratio_of(k, seeds);
+        double worst = 0;
+        for (size_t k = 0; k < n; k++) worst = fmax(worst, outside(ratio[k], EDGES_ONE));
         qsort(ratio, n, sizeof *ratio, by_ratio);
-        z[0] = fmax(outside(ratio[n / 2], EDGES),
-                    fmax(outside(ratio[0], EDGES_ONE), outside(ratio[n - 1], EDGES_ONE)));
+        z[0] = fmax(worst, outside(ratio[n / 2], EDGES));
         if (!s->fixed) {
             loss = ratio_of(n, seeds);
             z[1] = outside(loss, EDGES);

@@ -62,7 +62,7 @@ static void soup_make(uint64_t seed, double size, imp_v3 centre)
         case 1: quad_add(a, a + e, a + 1.3 * e + .8 * f, a + f, turn); break;
         case 2: quad_add(a, a + e, a + e + f * 1.01, a + f, turn); break;
         case 3: quad_add(a, a + e, a + e + f + 1e-3 * centre, a + f, turn); break;
-        case 4: triangle_add(a, a + e, a + e + 1e-4 * f); break;
+        case 4: triangle_add(a, a + e, a + e + 1e-2 * f); break;
         case 5: triangle_add(a, a, a + (turn % 2 ? e : a - a)); break;
         default: triangle_add(a, a + e, a + f);
         }
@@ -131,7 +131,7 @@ static struct meeting meet(int triangle, imp_v3 o, imp_v3 d)
 static bool reference(imp_v3 o, imp_v3 d, double tmin, double tmax, struct meeting *first)
 {
     const real length = (real)imp__length(d), reach = (real)imp__length(o) + 1;
-    const real room = 1e-9L * reach / length;
+    const real room = 1e-12L * reach / length;
     real sure = INFINITY, perhaps = INFINITY;
     for (int k = 0; k < n_triangles; k++) {
         const struct meeting m = meet(k, o, d);
@@ -150,9 +150,9 @@ static bool reference(imp_v3 o, imp_v3 d, double tmin, double tmax, struct meeti
 
 /* ---- tests -------------------------------------------------------------------------------------- */
 
-enum from { ANYWHERE, SURFACE, GRAZING, FAR, KINDS };
+enum from { ANYWHERE, SURFACE, GRAZING, FAR, CLOSE, KINDS };
 static const char *const names[] = {"from anywhere", "from triangles", "that graze",
-                                    "from far away"};
+                                    "from far away", "from close by, in any units"};
 
 static void ray_make(enum from kind, struct imp_key key, double size, imp_v3 centre,
                      imp_v3 *o, imp_v3 *d)
@@ -180,6 +180,12 @@ static void ray_make(enum from kind, struct imp_key key, double size, imp_v3 cen
     if (kind == FAR) {
         *o = centre + *o * pow(10, 1 + 3 * w);
         *d = imp__normalize(on - *o);
+    }
+    if (kind ==
+        CLOSE) { /* 1e-9 to 1e-3 in front of it, directions of lengths 1e-4 to 1e4 */
+        const double length = pow(10, 8 * u - 4);
+        *o = on - *d * (size * pow(10, -9 + 6 * w));
+        *d *= length;
     }
     if (kind == ANYWHERE && u < .5) *d = on - *o; /* not a unit vector */
 }
@@ -272,18 +278,33 @@ static void closed(imp_context *ctx)
     world_end();
 }
 
-/* Two rectangles at one place: the first is met, from both sides. */
+/* Two meshes of 13 triangles at one place: the first is met, from both sides. */
 static void same_place(imp_context *ctx)
 {
+    enum { N = 13 };
+    static float at[3 * N][3];
+    static uint32_t index[3 * N];
+    const struct imp_mesh_data fan = {
+        .n_vertices = 3 * N, .n_triangles = N, .positions = at[0], .indices = index};
     int wrong = 0, met = 0;
+    for (int k = 0; k < 3 * N; k++) {
+        const double phi = IMP_2PI * (k / 3 + k % 3 / 2) / N;
+        index[k] = (uint32_t)k;
+        at[k][0] = k % 3 ? (float)cos(phi) : 0;
+        at[k][1] = k % 3 ? (float)sin(phi) : 0;
+    }
     world_begin(ctx);
-    for (int k = 0; k < 2; k++) shape_build(node_new("shape", "rectangle"), NULL);
+    for (int k = 0; k < 2; k++) {
+        struct imp_node *n = node_new("shape", "mesh");
+        n->mesh = &fan;
+        shape_build(n, NULL);
+    }
     const bool made = imp__intersector_create(&world) == IMP_OK;
     for (uint32_t i = 0; made && i < 10000; i++) {
         const struct imp_key key = imp__key(34, 0, i);
         uint32_t dim = 0;
         const imp_v3 o = somewhere(key, &dim);
-        imp_v3 to = somewhere(key, &dim);
+        imp_v3 to = .6 * somewhere(key, &dim);
         to[2] = 0;
         const imp_v3 d = to - o;
         struct imp_hit hit = {.shape = -1};
@@ -291,7 +312,7 @@ static void same_place(imp_context *ctx)
         wrong += hit.shape != 0;
     }
     tap_ok(made && met == 10000 && wrong == 0,
-           "of two rectangles at one place the first is met # %d wrong", wrong);
+           "of two meshes at one place the first is met # %d wrong of %d", wrong, met);
     world_end();
 }
 

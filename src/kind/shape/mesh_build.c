@@ -174,6 +174,7 @@ enum imp_status imp__shape_measure(imp_context *ctx, struct imp_arena *arena,
     if (!m->cumulative)
         return imp__error(ctx, IMP_E_NOMEM, "%s: out of memory for areas", s->name);
     const enum imp_status st = imp__parallel_ranges(ctx, n, LEAST, areas_find, m);
+    if (st != IMP_OK) return st;
     double sum = 0;
     m->cumulative[0] = 0;
     for (size_t k = 0; k < n; k++) {
@@ -184,7 +185,7 @@ enum imp_status imp__shape_measure(imp_context *ctx, struct imp_arena *arena,
     }
     s->area = sum;
     m->inv_area = sum > 0 ? 1 / sum : 0;
-    return st;
+    return IMP_OK;
 }
 
 /* Do all vertex normals say what the faces say? Then they are not worth looking up. */
