@@ -14,6 +14,7 @@ struct imp_reduced_at_hand {
     const uint32_t *words; /* its struct imp_reduced_material: where it is */
     imp_v3 wo;
     imp_spec *in; /* [bsdf->n_in] */
+    bool plain;   /* all inputs are numbers */
 };
 struct imp_reduced_seen {
     imp_spec value;

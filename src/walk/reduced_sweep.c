@@ -75,6 +75,20 @@ static void bar_add(struct material_bar *b, const struct imp_reduced_at_hand *m,
     b->any = true;
 }
 
+static void bars_scatter(const struct imp_scene *scene,
+                         const struct imp_reduced_at_hand *m,
+                         const struct material_bar *b, struct imp_sink *sink)
+{
+    const struct imp_input *const *input = m->bsdf->input;
+    const int n = m->bsdf->n_in;
+    if (imp_likely(m->plain)) {
+        for (int j = 0; j < n; j++) imp__plain_scatter(input[j], &b->bar[j], sink);
+        return;
+    }
+    const struct imp_texcoord at = imp__reduced_material_at(scene, m);
+    imp__inputs_scatter(input, n, &at, b->bar, sink);
+}
+
 /* By the inputs of a material: those that are there, or into d [n_in]. */
 static const imp_spec *derivatives(const struct imp_reduced_seen *seen,
                                    const struct imp_dirs *dirs, imp_spec *d)
@@ -162,10 +176,7 @@ void imp__reduced_sweep(const struct imp_tracer *tracer, const struct imp_walk *
         }
         case IMP_OP_MATERIAL: {
             const struct imp_reduced_at_hand *m = (--seen)->material;
-            if (bars.any) {
-                const struct imp_texcoord at = imp__reduced_material_at(all->scene, m);
-                imp__inputs_scatter(m->bsdf->input, m->bsdf->n_in, &at, bars.bar, sink);
-            }
+            if (bars.any) bars_scatter(all->scene, m, &bars, sink);
             bars.any = false;
             break;
         }

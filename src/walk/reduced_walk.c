@@ -41,6 +41,7 @@ static void material_look(const struct imp_scene *scene, struct imp_op op,
         m->in[j] = input[j]->value;
         plain &= input[j]->plain;
     }
+    m->plain = plain;
     if (imp_likely(plain)) return;
     const struct imp_texcoord at = imp__reduced_material_at(scene, m);
     imp__inputs_eval(input, n, &at, m->in);
