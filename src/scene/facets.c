@@ -86,13 +86,13 @@ static inline bool ray_of(const struct imp_facets *f, imp_v3 from, const imp_v3 
         tmax -= t;
     }
     for (int k = 0; k < 3; k++) {
-        r.o[k] = splat((float)from[k]);
-        r.d[k] = splat((float)(*d)[k]);
+        r.o[k] = imp__splat((float)from[k]);
+        r.d[k] = imp__splat((float)(*d)[k]);
     }
-    r.lo = splat((float)tmin);
-    r.hi = splat((float)tmax);
-    r.stretch = splat((float)length);
-    r.least = splat((float)(length * 0x1p-23));
+    r.lo = imp__splat((float)tmin);
+    r.hi = imp__splat((float)tmax);
+    r.stretch = imp__splat((float)length);
+    r.least = imp__splat((float)(length * 0x1p-23));
     *out = r;
     return true;
 }
@@ -151,17 +151,17 @@ bool imp__facets_nearest(const struct imp_facets *f, const imp_v3 *o, const imp_
     const imp_v3 from = *o - f->centre;
     struct ray r;
     if (!ray_of(f, from, d, tmin, tmax, &r)) return false;
-    lanes best = splat(INFINITY), in = splat(0), half = splat(0);
+    lanes best = imp__splat(INFINITY), in = imp__splat(0), half = imp__splat(0);
     for (int g = 0; g < f->n_groups; g++) {
         lanes t, sum;
         const mask m = group_met(&f->group[g], &r, f->slack, &t, &sum) & (t < best);
         best = choose(m, t, best);
-        in = choose(m, splat((float)g), in);
+        in = choose(m, imp__splat((float)g), in);
         half = choose(m, sum, half);
     }
     const float first = least(best);
     if (!(first < INFINITY)) return false;
-    unsigned equal = bits_of(best == splat(first));
+    unsigned equal = bits_of(best == imp__splat(first));
     int k = __builtin_ctz(equal);
     while (imp_unlikely(equal &= equal - 1)) { /* at one place */
         const int other = __builtin_ctz(equal);

@@ -177,7 +177,8 @@ bool imp__facets_create(imp_context *ctx, struct imp_shape *const *shapes, int n
     f->n_groups = (int)groups;
     f->group = (struct group *)(f + 1);
     f->facet = (struct triangle(*)[2])(f->group + groups);
-    for (size_t g = 0; g < groups; g++) f->group[g].n[3] = splat(NAN); /* never met */
+    for (size_t g = 0; g < groups; g++)
+        f->group[g].n[3] = imp__splat(NAN); /* never met */
     meshes_add(f, shapes, n);
     *bytes += (int64_t)size;
     *out = f;

@@ -49,6 +49,6 @@ struct imp_facets {
 /* Rays start at most so many reaches before the box (facets.c); slacks are made for that. */
 #define NEAR 2
 
-static inline lanes splat(float x) { return (lanes){x, x, x, x, x, x, x, x}; }
+static inline lanes imp__splat(float x) { return (lanes){x, x, x, x, x, x, x, x}; }
 
 #endif
