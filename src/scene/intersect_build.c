@@ -301,8 +301,9 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
 
     /* Where analytic shapes are in the tree, it decides which of two at one place is met. */
     const bool few = is_few(scene, c);
-    if (few && !imp__facets_create(scene->ctx, scene->shapes + c->first, c->n, &x->facets,
-                                   &x->bytes)) {
+    if (few && c->n > 0 &&
+        !imp__facets_create(scene->ctx, scene->shapes + c->first, c->n, &x->facets,
+                            &x->bytes)) {
         imp__release(scene->ctx, x);
         IMP_TRY(imp__error(scene->ctx, IMP_E_NOMEM, "out of memory for triangles"));
     }
