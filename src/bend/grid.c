@@ -6,6 +6,10 @@
 #include "bend_rays.h"
 #include <string.h>
 
+/* Edges of a cell: places in units of it, and floats of coefficients times them, stay finite. */
+#define CELL_LEAST 1e-15
+#define CELL_MOST  1e15
+
 bool imp__field_is_grid(const imp_field *f)
 {
     return f->ops == &imp__field_spline || f->ops == &imp__field_trilinear;
@@ -90,6 +94,11 @@ enum imp_status imp_field_grid_create(imp_context *ctx, const struct imp_field_g
             return imp__error(ctx, IMP_E_ARG,
                               "index grid: empty box, %g to %g along axis %d",
                               desc->lo[k], desc->hi[k], k);
+        const double h = (desc->hi[k] - desc->lo[k]) / desc->cells[k];
+        if (!(h >= CELL_LEAST && h <= CELL_MOST))
+            return imp__error(ctx, IMP_E_ARG,
+                              "index grid: cells of %g along axis %d: %g to %g are read",
+                              h, k, CELL_LEAST, CELL_MOST);
         nodes[k] = desc->cells[k] + (spline ? 3 : 1);
         n *= (size_t)nodes[k];
     }
