@@ -23,9 +23,10 @@
  *                                       moment for all (Nicolet, Jacob and Jakob 2021)
  *
  * A row is a word and a number, as "fit .5" or "fit .5 levels", in quotes. */
-#include "inverse/cells.h"
-#include "inverse/estimate.h"
-#include "inverse/variate.h"
+#include "inverse/estimate/replicates.h"
+#include "inverse/gradient/objective_gradient.h"
+#include "inverse/gradient/variate.h"
+#include "inverse/problem/cells.h"
 #include "math/rng.h"
 #include <math.h>
 #include <stdio.h>

@@ -10,8 +10,9 @@
  *
  * Variances are those of chains that follow one and the same path of parameters, so that
  * they differ in their walks alone. */
-#include "inverse/estimate.h"
-#include "inverse/variate.h"
+#include "inverse/estimate/replicates.h"
+#include "inverse/gradient/objective_gradient.h"
+#include "inverse/gradient/variate.h"
 #include "math/rng.h"
 #include <stdio.h>
 #include <stdlib.h>

@@ -6,7 +6,7 @@
 #ifndef IMP_FORMAT_WALKS_FILE_H
 #define IMP_FORMAT_WALKS_FILE_H
 
-#include "inverse/keep.h"
+#include "inverse/estimate/walks_make.h"
 #include "scene/fingerprint.h"
 #include "tree_file.h"
 

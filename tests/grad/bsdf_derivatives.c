@@ -6,7 +6,7 @@
  * checker itself against planted mistakes. */
 #include "imp_kinds.h"
 #include "imp_tap.h"
-#include "inverse/selftest.h"
+#include "inverse/check/selftest.h"
 #include "kind/bsdf/fresnel.h"
 
 enum { TRIALS = 60 };

@@ -4,7 +4,7 @@
  * imp__replicate_adjoints returns fail, each loss by itself. This program links its own
  * copy of that function, in place of the library's. */
 #define imp__replicate_adjoints right_adjoints
-#include "inverse/adjoint.c"
+#include "inverse/estimate/adjoint.c"
 #undef imp__replicate_adjoints
 #include "imp_scene.h"
 #include "imp_tap.h"

@@ -6,9 +6,11 @@
  * here in full. A wrong error bar or a lost weight leaves every mean right. */
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "inverse/estimate.h"
-#include "inverse/lanes.h"
-#include "inverse/loss.h"
+#include "inverse/estimate/channel_sink.h"
+#include "inverse/estimate/problem_tracer.h"
+#include "inverse/estimate/replicates.h"
+#include "inverse/gauss/gauss_newton.h"
+#include "inverse/problem/loss.h"
 
 static imp_context *ctx;
 

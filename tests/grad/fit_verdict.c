@@ -4,7 +4,8 @@
  * by every search and through every filter; chi-square of a scene that can make the
  * picture and of one that cannot; losses without a second derivative. */
 #include "imp_tap.h"
-#include "inverse/problem.h"
+#include "inverse/gauss/gauss_newton.h"
+#include "inverse/problem/problem.h"
 #include "inverse_scenes.h"
 #include <stdbool.h>
 

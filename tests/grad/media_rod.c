@@ -8,7 +8,8 @@
  * divide by extinction: of collisions that stand where they are, none is ever in it. */
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "inverse/estimate.h"
+#include "inverse/estimate/problem_tracer.h"
+#include "inverse/estimate/replicates.h"
 #include "math/warp.h"
 #include "rod.h"
 #include "vol_write.h"

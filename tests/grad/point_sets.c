@@ -6,7 +6,8 @@
  * sets is no larger. */
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "inverse/estimate.h"
+#include "inverse/estimate/replicates.h"
+#include "inverse/gauss/gauss_newton.h"
 #include <stdbool.h>
 #include <string.h>
 

@@ -6,7 +6,7 @@
  * any number of threads. What is refused. With the argument "long", more seeds. */
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "inverse/fit.h"
+#include "inverse/fit/fit.h"
 #include "search/conjugate.h"
 
 enum { SIDE = 32, TEXELS = 3 * SIDE * SIDE, FILM = 64, MOST = TEXELS + 3 };

@@ -6,8 +6,8 @@
  * masks, luminance, a loss that is not quadratic, and samples in several parts. */
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "inverse/fit.h"
-#include "inverse/sparse_rows.h"
+#include "inverse/fit/fit.h"
+#include "inverse/gauss/sparse_rows.h"
 #include "search/conjugate.h"
 #include "search/excess.h"
 #include "search/lm_system.h"

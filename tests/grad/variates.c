@@ -8,9 +8,11 @@
  *     variates long     # more chains, and the variances of docs/fitting.md */
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "inverse/allocation.h"
-#include "inverse/estimate.h"
-#include "inverse/variate.h"
+#include "inverse/estimate/problem_tracer.h"
+#include "inverse/estimate/replicates.h"
+#include "inverse/gradient/allocation.h"
+#include "inverse/gradient/objective_gradient.h"
+#include "inverse/gradient/variate.h"
 #include "math/rng.h"
 #include "team_kit.h"
 

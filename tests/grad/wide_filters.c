@@ -4,7 +4,8 @@
  * and their noise against many seeds and against derivative pictures with many samples,
  * and fits of a scene whose film has the format's default filter. */
 #include "imp_tap.h"
-#include "inverse/problem.h"
+#include "inverse/gauss/gauss_newton.h"
+#include "inverse/problem/problem.h"
 #include "inverse_scenes.h"
 #include <math.h>
 

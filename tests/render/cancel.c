@@ -5,7 +5,8 @@
  * and the problem goes on afterwards as if nothing had been. */
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "inverse/problem.h"
+#include "inverse/gauss/gauss_newton.h"
+#include "inverse/problem/problem.h"
 #include <math.h>
 
 #define MANY 100000000 /* samples: only the stop ends this */

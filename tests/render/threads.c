@@ -5,7 +5,8 @@
  * colours and wavelengths. */
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "inverse/problem.h"
+#include "inverse/gauss/gauss_newton.h"
+#include "inverse/problem/problem.h"
 
 struct output {
     double *numbers;

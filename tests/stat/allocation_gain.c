@@ -5,7 +5,7 @@
  * same, and errors are as large as they are stated. Run with "long" for more seeds. */
 #include "gain_scenes.h"
 #include "imp_tap.h"
-#include "inverse/allocation.h"
+#include "inverse/gradient/allocation.h"
 #include <stdbool.h>
 #include <stdlib.h>
 #include <time.h>

@@ -6,7 +6,8 @@
 #include "imp_light_room.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "inverse/problem.h"
+#include "inverse/gauss/gauss_newton.h"
+#include "inverse/problem/problem.h"
 
 static imp_context *ctx;
 

@@ -7,7 +7,8 @@
  * their intervals hold the truth. */
 #include "imp_cornell.h"
 #include "imp_tap.h"
-#include "inverse/problem.h"
+#include "inverse/gauss/gauss_newton.h"
+#include "inverse/problem/problem.h"
 #include "math/linalg.h"
 
 enum { N = 9, SIDE = 12, SPP = 16, SEEDS = 300, FITS = 200 };

@@ -5,7 +5,8 @@
  * have the same means. Run with "long" for the larger pictures and all scenes. */
 #include "gain_scenes.h"
 #include "imp_tap.h"
-#include "inverse/problem.h"
+#include "inverse/gauss/gauss_newton.h"
+#include "inverse/problem/problem.h"
 #include <stdbool.h>
 #include <stdlib.h>
 

@@ -7,8 +7,9 @@
  *     variate_gain long     # 80 x 60 pixels, 20 iterations */
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "inverse/estimate.h"
-#include "inverse/variate.h"
+#include "inverse/estimate/replicates.h"
+#include "inverse/gradient/objective_gradient.h"
+#include "inverse/gradient/variate.h"
 #include "math/rng.h"
 
 enum { SPP = 8, CHAINS_MOST = 12, STEPS_MOST = 21 };

@@ -2,7 +2,7 @@
  *
  * Samples of tiles: what they are for given variances and costs, and fits whose samples are
  * allocated: the same bits on any number of threads, and after a break. */
-#include "inverse/allocation.h"
+#include "inverse/gradient/allocation.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "math/rng.h"

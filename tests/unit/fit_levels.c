@@ -5,7 +5,7 @@
  * coarse to fine. */
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "inverse/cells.h"
+#include "inverse/problem/cells.h"
 #include "vol_write.h"
 
 static imp_context *ctx;

@@ -5,7 +5,7 @@
  * numbers, for many, and where cells are taken together. */
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "inverse/fit.h"
+#include "inverse/fit/fit.h"
 
 enum { FILM = 8, MOST = 24, SKY = 2 };
 

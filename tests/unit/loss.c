@@ -4,7 +4,7 @@
  * theta X_i, x_i = X_i, X ~ Exp(1), theta = 1.3, T = 1. The gradient of 1/2 (I - T)^2 is
  * 0.3; estimators that use a sample against itself give something else, and leave-one-out
  * does not. */
-#include "inverse/loss.h"
+#include "inverse/problem/loss.h"
 #include "imp_tap.h"
 #include "math/rng.h"
 

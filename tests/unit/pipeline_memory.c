@@ -6,7 +6,8 @@
 #include "imp_fail_alloc.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "inverse/problem.h"
+#include "inverse/gauss/gauss_newton.h"
+#include "inverse/problem/problem.h"
 #include <unistd.h>
 
 static struct fail_alloc heap;

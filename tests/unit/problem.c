@@ -2,9 +2,9 @@
  *
  * Problems: what can be made active, what a target must be, and the regularisers' values
  * and gradients. */
-#include "inverse/problem.h"
+#include "inverse/problem/problem.h"
 #include "imp_tap.h"
-#include "inverse/match.h"
+#include "inverse/problem/match.h"
 #include "inverse_scenes.h"
 #include <math.h>
 

@@ -6,8 +6,8 @@
 #include "color/rgb.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "inverse/adjoint.h"
-#include "inverse/estimate.h"
+#include "inverse/estimate/adjoint.h"
+#include "inverse/estimate/replicates.h"
 #include "math/rng.h"
 
 enum { DRAWS = 200000, MOST = 3, TEXELS = 32, SIDE = 24 };

@@ -1,0 +1,157 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "check.h"
+#include "base/team.h"
+#include "inverse/estimate/problem_tracer.h"
+#include "walk/run.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum imp_status imp__check_row(struct imp__check *c, const char *method,
+                               const char *param, int64_t element,
+                               const struct imp_check_row *row)
+{
+    char name[512];
+    struct imp_check_row *grown =
+        imp__grow(c->ctx, c->rows, &c->cap_rows, c->n_rows + 1, sizeof *grown);
+    if (grown) c->rows = grown;
+    if (element >= 0) snprintf(name, sizeof name, "%s[%lld]", param, (long long)element);
+    else snprintf(name, sizeof name, "%s", param ? param : "*");
+    char *copy = imp__arena_strdup(&c->problem->check_arena, name);
+    if (!grown || !copy) return imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check");
+    c->rows[c->n_rows] = *row;
+    c->rows[c->n_rows].method = method;
+    c->rows[c->n_rows++].param = copy;
+    return IMP_OK;
+}
+
+double imp__check_scale(const struct imp_param *p, size_t e)
+{
+    const double value = fabs(imp__param_get(p, e)), range = p->info.hi - p->info.lo;
+    const double size = isfinite(range) && range > 0 ? fmax(value, 1e-3 * range) : value;
+    return size > 0 ? size : 1;
+}
+
+void imp__check_direction(const struct imp_param *p, double *w)
+{
+    for (size_t e = 0; e < p->info.count; e++) {
+        const double by = 0.5 + imp__u01(imp__key(9, 9, 9), (uint32_t)e);
+        const double x = imp__param_get(p, e);
+        w[e] = x - p->info.lo > p->info.hi - x ? -by : by;
+    }
+}
+
+static bool report(struct imp__check *c, double fraction)
+{
+    if (!c->outer.progress) return false;
+    const double elapsed = imp__now() - c->start_s;
+    fraction = c->shown = fmax(c->shown, fraction); /* rows may need more samples */
+    const struct imp_progress p = {
+        .size = sizeof p,
+        .stage = "check",
+        .fraction = fmin(fraction, 1),
+        .elapsed_s = elapsed,
+        .eta_s = fraction > 1e-3 ? elapsed * (1 - fraction) / fraction : -1,
+        .rate = elapsed > 0 ? c->done / elapsed : 0,
+        .rate_unit = "pieces"};
+    c->stopped |= c->outer.progress(&p, c->outer.progress_payload) != 0;
+    return c->stopped;
+}
+
+enum imp_status imp__check_progress(struct imp__check *c, double work)
+{
+    c->done += work;
+    if (c->outer.time_limit_s > 0 && imp__now() - c->start_s > c->outer.time_limit_s)
+        c->stopped = true;
+    report(c, c->done / fmax(c->total, 1));
+    const enum imp_status st = imp__team_any(c->ctx, c->stopped, &c->stopped);
+    if (st != IMP_OK) return st;
+    return c->stopped ? IMP_CANCELLED : IMP_OK;
+}
+
+/* Progress of one evaluation, which is one piece of work. */
+static int inner_progress(const struct imp_progress *p, void *payload)
+{
+    struct imp__check *c = payload;
+    return report(c, (c->done + p->fraction) / fmax(c->total, 1));
+}
+
+static enum imp_status check(imp_problem *p, const struct imp_check_options *options,
+                             const struct imp_run *run, const struct imp_check_row **rows,
+                             size_t *n_rows)
+{
+    enum imp_status st = IMP_OK, ended = IMP_OK;
+    IMP_CHECKED(imp__problem_no_parts(p, "check"));
+    IMP_FLOAT_MODE;
+    IMP_SETS(p->scene, st);
+    if (st != IMP_OK) return st;
+    struct imp__check c = {.problem = p,
+                           .ctx = p->ctx,
+                           .options = IMP_CHECK_OPTIONS_INIT,
+                           .outer = IMP_RUN_INIT,
+                           .start_s = imp__now()};
+
+    IMP_CHECKED(imp__options_take(p->ctx, "imp_check", "options", options, &c.options,
+                                  sizeof c.options));
+    IMP_CHECKED(imp__run_take(p->ctx, "imp_check", run, &c.outer));
+    IMP_CHECKED(imp__run_traces(p->ctx, "imp_check", &c.outer));
+    if (p->n == 0 && !c.options.sampling)
+        IMP_TRY(
+            imp__error(p->ctx, IMP_E_ARG, "nothing to check: no parameter is active"));
+    if (c.options.paths < 0 || c.options.fresh_spp < 0)
+        IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "paths and fresh_spp must be >= 0"));
+    if (c.options.paths == 0) c.options.paths = 1000;
+    c.outer.points = IMP_POINTS_INDEPENDENT; /* samples are compared one by one */
+    c.run = c.outer;
+    c.run.time_limit_s = 0;
+    c.run.progress = inner_progress;
+    c.run.progress_payload = &c;
+    if (c.options.fresh_spp > 0) c.run.spp = c.options.fresh_spp;
+    IMP_TRY(imp__problem_tracer_of_any_end(p, &c.outer, NULL, &c.tracer));
+    const bool lights = c.tracer.integrator->from_lights;
+    if (lights && c.options.sampling)
+        IMP_TRY(
+            imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                       "sampling is checked of walks from the sensor; let walks begin "
+                       "there"));
+    imp__arena_free(&p->check_arena);
+
+    if (c.options.sampling) {
+        ended = imp__check_sampling(&c);
+    } else {
+        if (!lights) ended = imp__check_frozen(&c);
+        if (ended == IMP_OK) ended = imp__check_fresh(&c);
+        if (ended == IMP_OK && !lights) ended = imp__check_losses(&c);
+        if (ended == IMP_OK) ended = imp__check_ends(&c);
+    }
+    if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
+    struct imp_check_row *kept =
+        imp__arena_array(&p->check_arena, c.n_rows + 1, sizeof *kept);
+    if (!kept) IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for a check"));
+    if (c.n_rows > 0) memcpy(kept, c.rows, c.n_rows * sizeof *kept);
+    *rows = kept;
+    *n_rows = c.n_rows;
+    st = ended;
+out:
+    imp__release(p->ctx, c.rows);
+    imp__release(p->ctx, c.slopes);
+    return st;
+}
+
+/* Numbers are checked one by one, whatever ties they have. */
+enum imp_status imp_check(imp_problem *p, const struct imp_check_options *options,
+                          const struct imp_run *run, const struct imp_check_row **rows,
+                          size_t *n_rows)
+{
+    IMP_REQUIRE(NULL, p, "problem");
+    IMP_REQUIRE(p->ctx, rows, "rows");
+    IMP_REQUIRE(p->ctx, n_rows, "n_rows");
+    const size_t ties = p->n_ties;
+    if (ties == 0) return check(p, options, run, rows, n_rows);
+    p->n_ties = 0;
+    enum imp_status st = imp__problem_layout(p, p->chosen);
+    if (st == IMP_OK) st = check(p, options, run, rows, n_rows);
+    p->n_ties = ties;
+    const enum imp_status back = imp__problem_layout(p, p->chosen);
+    return st != IMP_OK ? st : back;
+}

@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Losses seen through filters wider than a pixel. A sample then reaches several pixels,
+ * so its adjoint is known only when all of them are: pass 1 makes the picture of each
+ * replicate, pass 2 walks the same random numbers again and weights sample i by
+ *
+ *     P_i = sum_p  w_ip / W_p  l'_p( (S_p - w_ip L_i) / (W_p - w_ip) )
+ *
+ * over the pixels p it reaches: its own part left out, the normaliser W fixed (it depends
+ * on positions only; docs/estimators.md 5.4).
+ *
+ * Where the samples of a replicate are m sets of points, each set has a picture, and a
+ * sample of set s takes the mean of the other sets' pictures:
+ *
+ *     P_i = 1/m sum_p  w_ip / W_p,s  l'_p( mean of S_p,t / W_p,t over t != s ) */
+#ifndef IMP_INVERSE_SPLAT_H
+#define IMP_INVERSE_SPLAT_H
+
+#include "replicates.h"
+
+struct imp__splat {
+    const struct imp__target *target; /* NULL: a fixed adjoint image */
+    const float *seed;
+    const struct imp_film_desc *film;
+    int channels;
+    int n; /* pictures: of the replicates, or of their sets of points, m each */
+    int m; /* 1: pictures of replicates */
+    double **weights; /* [n][height][width] W_p */
+    imp_film **films; /* [n] pictures; NULL entries with a fixed adjoint */
+    double objective, objective_variance;
+};
+
+/* Two to four replicates of half the samples or fewer. */
+enum imp_status imp__splat_create(const struct imp_problem *p,
+                                  const struct imp_tracer *tracer,
+                                  const struct imp__target *target, const float *seed,
+                                  struct imp__replicates plan, const struct imp_run *run,
+                                  struct imp__splat *out);
+void imp__splat_destroy(imp_context *ctx, struct imp__splat *s);
+/* P_i of a sample of replicate b, set k of it, at film position (px, py). */
+imp_spec imp__splat_adjoint(const struct imp__splat *s, int b, int k, double px,
+                            double py, imp_spec L);
+
+#endif

@@ -1,0 +1,388 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A problem as an optimiser sees it. */
+#include "base/team.h"
+#include "fit.h"
+#include "inverse/estimate/replicates.h"
+#include "inverse/gauss/gauss_newton.h"
+#include "inverse/gradient/objective_gradient.h"
+#include "inverse/gradient/variate.h"
+#include "inverse/problem/loss.h"
+#include "walk/light_walk.h"
+#include "walk/run.h"
+#include "walk/store.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define CHECKPOINT_S     2  /* seconds between checkpoints, and at most */
+#define CHECKPOINT_SHARE 20 /* 1/20 of the time */
+#define REPORT_S         0.1
+#define COARSER          4  /* samples of an evaluation, over those of a coarse search, */
+#define COARSE_SPP       16 /* which are at least so many: fewer lead far away */
+
+/* ---- Progress ------------------------------------------------------------------ */
+
+static void report(struct imp__fit *f, double fraction)
+{
+    const double now = imp__now();
+    if (f->deadline_s > 0 && now > f->deadline_s) f->stopped = true;
+    f->fraction = fmax(f->fraction, fmin(fraction, 1));
+    if (!f->outer.progress || (now - f->last_report_s < REPORT_S && fraction < 1)) return;
+    f->last_report_s = now;
+    const double elapsed = now - f->start_s;
+    const int done = f->search ? f->search->iteration - f->first_iteration : 0;
+    const bool closing = f->final_total > 0; /* the search is over */
+    const struct imp_progress p = {
+        .size = sizeof p,
+        .stage = closing ? "intervals" : "fit",
+        .fraction = f->fraction,
+        .elapsed_s = elapsed,
+        .eta_s = f->fraction > 1e-3 ? elapsed * (1 - f->fraction) / f->fraction : -1,
+        .rate = elapsed > 0 && !closing ? done / elapsed : 0,
+        .rate_unit = "iterations",
+        .note = f->note[0] && !closing ? f->note : NULL};
+    if (f->outer.progress(&p, f->outer.progress_payload) != 0) f->stopped = true;
+}
+
+enum imp_status imp__fit_goes_on(struct imp__fit *f, double fraction)
+{
+    report(f, fraction);
+    IMP_CHECKED(imp__team_any(f->problem->ctx, f->stopped, &f->stopped));
+    return f->stopped ? IMP_CANCELLED : IMP_OK;
+}
+
+/* Progress of the evaluation at work. */
+static int inner_progress(const struct imp_progress *p, void *payload)
+{
+    struct imp__fit *f = payload;
+    const double done = f->search ? f->search->iteration : 0;
+    if (f->final_total > 0) /* A look that leaps takes more evaluations than were told. */
+        report(f, f->search_share +
+                      (0.999 - f->search_share) *
+                          fmin(1, (f->final_calls - 1 + p->fraction) / f->final_total));
+    else
+        report(f,
+               f->search_share * (done + 0.5 * p->fraction) / f->options.max_iterations);
+    return f->stopped;
+}
+
+/* With many variables the answer so far would need extra memory: none is shown. */
+static void show_step(struct imp__fit *f, const struct imp__search *s)
+{
+    const struct imp_fit_step step = {.size = sizeof step,
+                                      .iteration = s->iteration,
+                                      .n = s->start ? s->n : 0,
+                                      .x = s->start ? s->x : NULL,
+                                      .n_history = s->n_history,
+                                      .history = s->history,
+                                      .history_se = s->history_se,
+                                      .history_x = s->history_x};
+    if (f->options.step && f->options.step(&step, f->options.step_payload) != 0)
+        f->stopped = true;
+}
+
+static enum imp_status iterated(const struct imp__search *s, void *payload)
+{
+    struct imp__fit *f = payload;
+    const double now = imp__now();
+    if (f->allocation.n > 0) imp__allocation_update(&f->allocation);
+    snprintf(f->note, sizeof f->note, "loss %.3g +- %.1g", s->history[s->n_history - 1],
+             s->history_se[s->n_history - 1]);
+    if (f->options.checkpoint &&
+        now - f->last_checkpoint_s >
+            fmax(CHECKPOINT_S, CHECKPOINT_SHARE * f->checkpoint_cost_s)) {
+        const enum imp_status st = imp__fit_checkpoint_write(f, s);
+        if (st != IMP_OK) return st;
+        f->last_checkpoint_s = imp__now();
+        f->checkpoint_cost_s = f->last_checkpoint_s - now;
+    }
+    show_step(f, s);
+    return imp__fit_goes_on(f,
+                            f->search_share * s->iteration / f->options.max_iterations);
+}
+
+/* ---- Evaluations --------------------------------------------------------------- */
+
+int imp__fit_spp(const struct imp__fit *f)
+{
+    const struct imp_problem *p = f->problem;
+    return f->outer.spp > 0 ? f->outer.spp
+                            : p->scene->sensors[p->targets[0].desc.sensor]->spp;
+}
+
+static enum imp_status eval(const double *x, uint64_t seed, struct imp_estimate *f,
+                            double *g, double *g_se, void *payload)
+{
+    struct imp__fit *fit = payload;
+    fit->run.seed = seed;
+    fit->final_calls++;
+    enum imp_status st = imp__fit_take_walks(fit, x, seed);
+    /* What comes after the search is of samples that are alike. */
+    if (fit->allocation.n > 0 && fit->searching)
+        fit->problem->allocation = &fit->allocation;
+    fit->allocation.metric = fit->metric;
+    fit->metric = NULL;
+    fit->problem->variate = fit->searching && g ? fit->variate : NULL;
+    if (st == IMP_OK)
+        st = imp__problem_objective(fit->problem, x, &fit->run, true, f, g, g_se);
+    fit->problem->variate = NULL;
+    fit->problem->allocation = NULL;
+    fit->run.walks = NULL;
+    if (st == IMP_CANCELLED) fit->stopped = true; /* by this rank or another */
+    return st;
+}
+
+static void measure(const struct imp__metric *metric, void *payload)
+{
+    ((struct imp__fit *)payload)->metric = metric;
+}
+
+static bool quadratic(const struct imp__fit *f)
+{
+    const struct imp_problem *p = f->problem;
+    for (size_t t = 0; t < p->n_targets; t++)
+        if (!imp__loss_quadratic(p->targets[t].desc.loss)) return false;
+    return true;
+}
+
+static enum imp_status normal(const double *x, uint64_t seed, int rounds,
+                              struct imp__normal *out, void *payload)
+{
+    struct imp__fit *fit = payload;
+    const size_t n = fit->problem->n;
+    struct imp__gauss_newton gn = {.H = out->H,
+                                   .H_same = out->H_same,
+                                   .H_meas = out->H_meas,
+                                   .g = out->g,
+                                   .g_se = fit->g_se,
+                                   .cov_g = out->cov_g,
+                                   .cov_excess = out->cov_excess,
+                                   .deviations = out->deviations,
+                                   .rounds = rounds};
+    fit->run.seed = seed;
+    fit->final_calls++;
+    const enum imp_status st = imp__gauss_newton(fit->problem, x, &fit->run, &gn);
+    if (st == IMP_CANCELLED) fit->stopped = true;
+    if (st != IMP_OK) return st;
+    const double prior = imp__regularise(fit->problem, x, out->g);
+    out->f = gn.objective;
+    out->f.value += prior;
+    out->pairs = (struct imp_estimate){quadratic(fit) ? 0.5 * gn.chi2 + prior : NAN,
+                                       0.5 * gn.chi2_se, out->f.bias_order};
+    out->chi2 = gn.chi2;
+    out->n_residuals = gn.n_residuals;
+    out->noise_known = true;
+    /* A fit of n variables reduces the squared residuals of M pixels by (M - n)/M on
+     * average; undone where they stand in for the noise. */
+    const double freedom = gn.n_residuals - (double)n;
+    const double widen = fit->noise_known || freedom < 1 ? 1 : gn.n_residuals / freedom;
+    for (size_t i = 0; i < n * n; i++) out->H_meas[i] *= widen;
+    for (size_t i = 0; i < n * n; i++) {
+        out->H_prior[i] = fit->H_prior[i];
+        out->H[i] += fit->H_prior[i];
+        out->H_same[i] += fit->H_prior[i];
+    }
+    return IMP_OK;
+}
+
+/* A search by Levenberg-Marquardt whose end is looked at and gone on from takes a quarter of
+ * the samples: half of its time would otherwise go to where it only passes. A loss that is
+ * not quadratic has a bias that grows. */
+int imp__fit_coarse_spp(const struct imp__fit *f)
+{
+    const struct imp_problem *p = f->problem;
+    const int spp = imp__fit_spp(f);
+    return f->options.optimizer == IMP_LM && f->options.intervals && quadratic(f) &&
+                   p->n <= IMP_DENSE_MAX
+               ? imp_min(spp, imp_max(spp / COARSER, COARSE_SPP))
+               : spp;
+}
+
+static void coarsen(bool fewer, void *payload)
+{
+    struct imp__fit *f = payload;
+    if (fewer == f->coarse) return;
+    if (fewer) f->fine_spp = f->run.spp;
+    f->run.spp = fewer ? imp__fit_coarse_spp(f) : f->fine_spp;
+    f->coarse = fewer;
+}
+
+/* Do tiles get samples by their share of the variance? Beside control variates of many numbers,
+ * which have each their own pixels, nothing is gained by it: there they do if it is asked for. */
+static bool allocates(const struct imp__fit *f)
+{
+    const bool many = f->variate && f->problem->n > IMP_TRAIL_MAX;
+    return f->options.optimizer == IMP_ADAM &&
+           f->options.allocation != IMP_ALLOCATION_EVEN &&
+           (!many || f->options.allocation == IMP_ALLOCATION_VARIANCE);
+}
+
+/* ---- From the beginning to the end ------------------------------------------------ */
+
+/* Bounds, by variable or by parameter. */
+static enum imp_status bounds_make(struct imp__fit *f)
+{
+    const struct imp_problem *p = f->problem;
+    const size_t n = p->n;
+    const bool many = f->options.optimizer == IMP_ADAM && n > IMP_SEARCH_FEW;
+    if (many) f->spans = imp__alloc(p->ctx, p->scene->n_params, sizeof *f->spans);
+    else {
+        f->lo = imp__alloc(p->ctx, 4 * n, sizeof *f->lo);
+        f->settles = imp__alloc(p->ctx, n, sizeof *f->settles);
+    }
+    if (!f->spans && !(f->lo && f->settles))
+        return imp__error(p->ctx, IMP_E_NOMEM, "no memory for %zu variables", n);
+    if (!many) {
+        f->hi = f->lo + n;
+        f->scale = f->lo + 2 * n;
+        f->g_se = f->lo + 3 * n;
+    }
+    for (size_t k = 0; k < p->n_blocks; k++) {
+        const struct imp__block *b = &p->blocks[k];
+        if (many)
+            f->spans[f->n_spans++] = (struct imp__span){
+                .end = b->first + b->count, .lo = b->lo, .hi = b->hi, .scale = 1};
+        for (size_t e = 0; !many && e < b->count; e++) {
+            f->lo[b->first + e] = b->lo;
+            f->hi[b->first + e] = b->hi;
+        }
+    }
+    return IMP_OK;
+}
+
+/* Walks from the lights do not bring everything that targets may hold. */
+static void missing_tell(struct imp_problem *p, enum imp_from end)
+{
+    const struct imp_scene *scene = p->scene;
+    const struct imp_walk_integrator *from = imp__walk_integrator(scene);
+    if (p->missing_told || !from || imp__walks_from(scene, from, end, &from) != IMP_OK)
+        return;
+    for (size_t i = 0; i < p->n_targets; i++)
+        imp__light_walks_tell(scene, scene->sensors[p->targets[i].desc.sensor], from);
+    p->missing_told = true;
+}
+
+/* What reads losses: trial steps beside the loss of a Gauss-Newton matrix, methods whose walks are
+ * kept and traced in turn, or Adam, which asks for no errors of a gradient. */
+static enum imp__loss_use use_of(const struct imp__fit *f)
+{
+    return f->options.optimizer == IMP_LM || imp__fit_keeps(f) ? IMP_LOSS_COMPARED
+                                                               : IMP_LOSS_SOUGHT;
+}
+
+enum imp_status imp__fit_begin(struct imp_problem *p,
+                               const struct imp_fit_options *options,
+                               const struct imp_run *run, struct imp__fit *out)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = p->ctx;
+    const size_t n = p->n;
+    struct imp__fit f = {
+        .problem = p, .options = IMP_FIT_OPTIONS_INIT, .outer = IMP_RUN_INIT};
+
+    IMP_CHECKED(imp__options_take(ctx, "imp_fit", "options", options, &f.options,
+                                  sizeof f.options));
+    IMP_CHECKED(imp__run_take(ctx, "imp_fit", run, &f.outer));
+    IMP_CHECKED(imp__run_traces(ctx, "imp_fit", &f.outer));
+    /* Levenberg-Marquardt ends where its gradient is within its noise: of few sets that
+     * noise is known too badly. */
+    if (f.options.optimizer != IMP_LM) imp__points_of_losses(p, &f.outer);
+    if ((unsigned)f.options.optimizer > IMP_SLSQP)
+        return imp__error(ctx, IMP_E_ARG, "optimizer %d does not exist",
+                          (int)f.options.optimizer);
+    if (n == 0)
+        return imp__error(ctx, IMP_E_ARG, "nothing to fit: no parameter is active");
+    if (p->n_targets == 0)
+        return imp__error(ctx, IMP_E_ARG, "nothing to fit to: no target");
+    if (f.options.max_iterations < 0 || !(f.options.learning_rate >= 0) ||
+        !(f.options.tolerance >= 0) || isinf(f.options.tolerance) ||
+        f.options.learning_rate > 1 || !(f.options.momentum >= 0) ||
+        !(f.options.momentum < 1))
+        return imp__error(ctx, IMP_E_ARG,
+                          "max_iterations %d, learning_rate %g (0 to 1), tolerance %g, "
+                          "momentum %g (below 1): out of range",
+                          f.options.max_iterations, f.options.learning_rate,
+                          f.options.tolerance, f.options.momentum);
+    if ((unsigned)f.options.allocation > IMP_ALLOCATION_VARIANCE)
+        return imp__error(ctx, IMP_E_ARG, "allocation %d does not exist",
+                          (int)f.options.allocation);
+    if (!isfinite(f.options.memory))
+        return imp__error(ctx, IMP_E_ARG, "options: memory %g", f.options.memory);
+    IMP_CHECKED(imp__fit_levels_allowed(p, &f.options));
+    IMP_CHECKED(imp__fit_clipped_allowed(p, &f.options));
+    if (f.options.resume && !f.options.checkpoint)
+        return imp__error(ctx, IMP_E_ARG, "resume needs the name of a checkpoint");
+    if (f.options.max_iterations == 0)
+        f.options.max_iterations = f.options.optimizer == IMP_ADAM ? 200 : 30;
+    if (f.options.learning_rate == 0) f.options.learning_rate = 0.05;
+    if (f.options.tolerance == 0) f.options.tolerance = 1e-4;
+
+    p->use = use_of(&f);
+    IMP_TRY(bounds_make(&f));
+    if (n <= IMP_DENSE_MAX) {
+        f.H_prior = imp__alloc(ctx, n * n, sizeof *f.H_prior);
+        if (!f.H_prior)
+            IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for regularisers"));
+        IMP_TRY(imp__regularise_second(p, f.H_prior));
+    }
+    f.noise_known = true;
+    for (size_t i = 0; i < p->n_targets; i++)
+        f.noise_known &= p->targets[i].noise_se != NULL;
+    missing_tell(p, f.outer.from);
+    f.start_s = imp__now();
+    f.last_checkpoint_s = f.start_s;
+    f.deadline_s = f.outer.time_limit_s > 0 ? f.start_s + f.outer.time_limit_s : 0;
+    const bool errors = n <= IMP_DENSE_MAX || imp__fit_is_sparse(&f);
+    f.search_share = f.options.intervals && errors ? 0.7 : 0.98;
+    f.run = f.outer;
+    f.run.time_limit_s = 0;
+    IMP_TRY(imp__fit_variates(&f));
+    f.quiet = f.variate && n > IMP_TRAIL_MAX;
+    if (f.options.momentum == 0 && !f.quiet) f.options.momentum = IMP_ADAM_MOMENTUM;
+    if (allocates(&f)) IMP_TRY(imp__allocation_create(p, &f.run, &f.allocation));
+    if (f.options.checkpoint) imp__fit_fingerprint(&f);
+    *out = f;
+    /* Pointers to the fit itself: it does not move any more. */
+    out->run.progress = inner_progress;
+    out->run.progress_payload = out;
+    out->goal =
+        (struct imp__goal){.ctx = ctx,
+                           .n = n,
+                           .lo = out->lo,
+                           .hi = out->hi,
+                           .scale = out->scale,
+                           .settles = out->settles,
+                           .spans = out->spans,
+                           .n_spans = out->n_spans,
+                           .seed = out->outer.seed,
+                           .eval = eval,
+                           .normal = n <= IMP_DENSE_MAX ? normal : NULL,
+                           .sparse = imp__fit_is_sparse(out) ? imp__fit_sparse : NULL,
+                           .iterated = iterated,
+                           .payload = out};
+    if (out->allocation.n > 0) out->goal.measure = measure;
+    if (imp__fit_coarse_spp(out) < imp__fit_spp(out)) out->goal.coarsen = coarsen;
+    if (imp__fit_keeps(out)) {
+        out->goal.draw = imp__fit_draw;
+        out->goal.is_stale = imp__fit_is_stale;
+    }
+    return IMP_OK;
+out:
+    imp__fit_end(&f);
+    return st;
+}
+
+void imp__fit_end(struct imp__fit *f)
+{
+    if (!f->problem) return;
+    f->problem->use = IMP_LOSS_TOLD;
+    imp__walks_destroy(f->walks);
+    imp__variate_destroy(f->variate);
+    imp__allocation_destroy(&f->allocation);
+    imp__release(f->problem->ctx, f->lo);
+    imp__release(f->problem->ctx, f->settles);
+    imp__release(f->problem->ctx, f->spans);
+    imp__release(f->problem->ctx, f->H_prior);
+    imp__sparse_errors_destroy(f->problem->ctx, &f->errors);
+}

@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What the two estimators of J^T W J share: walk by walk where a walk reaches one pixel
+ * (gauss_newton.c), picture by picture where the filter gives it several (wide.c). */
+#ifndef IMP_INVERSE_GAUSS_NEWTON_H
+#define IMP_INVERSE_GAUSS_NEWTON_H
+
+#include "inverse/estimate/replicates.h"
+#include "inverse/problem/target_channels.h"
+#include "search/optimize.h"
+
+/* Gauss-Newton pieces for all targets, from one set of walks, K = p->n <= 256
+ * (docs/estimators.md 15). Regularisers are not included. Targets that are not quadratic have
+ * their Gauss-Newton weights at the present pictures; what bias that leaves in value and
+ * gradient is objective.bias_order. */
+struct imp__gauss_newton {
+    double *H;      /* [K*K] U-statistic of J^T W J: unbiased, may be indefinite */
+    double *H_same; /* [K*K] same-sample matrix: biased upwards, positive semi-definite */
+    double *H_meas; /* [K*K] sum of w^2 sigma^2 J J^T for the measurement's covariance, or
+                       NULL; sigma^2 from the residuals where a target gives none */
+    double *g, *g_se; /* [K] leave-one-out gradient of the data term, standard errors; or
+                         NULL */
+    double *cov_g;    /* [K*K] covariance of g, too large by */
+    double *cov_excess; /* [K*K] this, unbiased (pair_noise.h); or NULL both */
+    double *deviations; /* [IMP_DEVIATIONS][K*K] of H (search/optimize.h); or NULL */
+    int rounds;         /* set by the caller: so many times the samples; 0: once */
+    struct imp_estimate objective; /* data term */
+    /* sum w (mean - T)^2 - w Var(mean), unbiased; of losses that are quadratic in the
+     * picture its standard error, too */
+    double chi2, chi2_se;
+    double n_residuals;
+};
+enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
+                                  const struct imp_run *run,
+                                  struct imp__gauss_newton *out);
+
+struct imp__normal_sums { /* matrices [K*K], lower triangles */
+    double *H, *H_same, *H_meas, *cov_g, *cov_excess, *g;
+    double *scalars;    /* [IMP_NORMAL_SCALARS] */
+    double *deviations; /* [IMP_DEVIATIONS][K*K], or NULL */
+};
+/* Of a target: loss and its variance, as those of an evaluation with the same walks; chi^2
+ * by all pairs of walks, and its variance. */
+enum {
+    IMP_NORMAL_OBJECTIVE,
+    IMP_NORMAL_VARIANCE,
+    IMP_NORMAL_CHI2,
+    IMP_NORMAL_CHI2_VARIANCE,
+    IMP_NORMAL_SCALARS
+};
+
+/* Adds H, H_same, H_meas, g, cov_g, cov_excess, deviations and chi2 of a target whose pixels
+ * share walks (a filter wider than a pixel, or walks from the lights), from `rounds` times
+ * the samples of an evaluation; lo, hi: the part of the caller's progress. */
+enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
+                                       const struct imp_tracer *tracer,
+                                       const struct imp__target *target,
+                                       const struct imp_run *run, int rounds, double lo,
+                                       double hi, struct imp__normal_sums *out);
+
+#endif

@@ -1,0 +1,159 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * One replicate of a pixel: its walks are traced and folded, and swept with their adjoints. Where
+ * these are made of the other walks' mean, all walks are kept until it is known. */
+#include "gradient_job.h"
+#include "inverse/estimate/adjoint.h"
+#include "light_gradient.h"
+
+struct replicate {
+    struct imp__gradient_job *job;
+    struct imp__replicates plan;
+    struct imp_tile_worker *worker;
+    struct imp_tally *tally;
+    int x, y, b;
+    size_t pixel;
+};
+
+static void trace(const struct replicate *r, int set, int i, struct imp_walk *walk)
+{
+    const int64_t sample = imp__replicates_first(r->plan, r->b, set) + i;
+    imp__walk_trace(&r->job->tracer, &r->worker->arena, r->x, r->y, sample, walk);
+    imp__tile_drop(r->worker, walk->dropped, r->x, r->y, sample);
+    r->tally->rays += imp_max(2 * walk->n - 1, 1);
+}
+
+/* ---- Adjoints that are known before ------------------------------------------------ */
+
+static imp_spec adjoint_of(const struct replicate *r, int set, const struct imp_walk *w)
+{
+    const struct imp__gradient_job *j = r->job;
+    imp_spec P = {0};
+    if (j->splat) return imp__splat_adjoint(j->splat, r->b, set, w->px, w->py, w->L);
+    const float *seed = j->seed + r->pixel * (size_t)j->channels;
+    for (int c = 0; c < j->channels; c++) P[c] = seed[c] / (double)r->plan.n;
+    return P;
+}
+
+static void sweep_each(const struct replicate *r)
+{
+    const struct imp__gradient_job *j = r->job;
+    for (int s = 0; s < r->plan.m; s++) {
+        const int n =
+            imp__replicates_set(r->plan, s + 1) - imp__replicates_set(r->plan, s);
+        for (int i = 0; i < n; i++) {
+            const struct imp_arena_mark mark = imp__arena_mark(&r->worker->arena);
+            struct imp_walk walk;
+            trace(r, s, i, &walk);
+            imp__walk_sweep(&j->tracer, &walk, adjoint_of(r, s, &walk), &r->tally->sink);
+            imp__arena_rewind(&r->worker->arena, mark);
+        }
+    }
+}
+
+/* ---- Adjoints made of residuals ----------------------------------------------------- */
+
+/* The means of the sets' walks: L, and H at the numbers before, where the variate looks. */
+static void sets_trace(const struct replicate *r, struct imp_walk *walks, imp_spec *L,
+                       imp_spec *H)
+{
+    const struct imp__gradient_job *j = r->job;
+    const bool looks = j->variate && imp__variate_looks(j->variate, r->pixel);
+    for (int s = 0; s < r->plan.m; s++) {
+        const int first = imp__replicates_set(r->plan, s);
+        const int n = imp__replicates_set(r->plan, s + 1) - first;
+        L[s] = (imp_spec){0};
+        if (j->variate) H[s] = (imp_spec){0};
+        for (int i = 0; i < n; i++) {
+            trace(r, s, i, &walks[first + i]);
+            L[s] += walks[first + i].L;
+            if (imp_unlikely(looks))
+                H[s] += imp__walk_elsewhere(&j->there, &walks[first + i]);
+        }
+        if (n > 1) L[s] /= imp__spec(n);
+        if (n > 1 && looks) H[s] /= imp__spec(n);
+    }
+}
+
+static void sets_sweep(const struct replicate *r, const struct imp_walk *walks,
+                       const imp_spec *P)
+{
+    for (int s = 0; s < r->plan.m; s++) {
+        const int first = imp__replicates_set(r->plan, s);
+        const int end = imp__replicates_set(r->plan, s + 1);
+        imp_spec mean = P[s];
+        if (end - first > 1) mean /= imp__spec(end - first);
+        for (int i = first; i < end; i++)
+            imp__walk_sweep(&r->job->tracer, &walks[i], mean, &r->tally->sink);
+    }
+}
+
+/* Once more, for the errors of a replicate that has no other beside it. */
+static double errors_sweep(const struct replicate *r, const struct imp_walk *walks,
+                           const imp_spec *L, const imp_spec *P)
+{
+    const struct imp__gradient_job *j = r->job;
+    imp_spec E[2];
+    const double variance =
+        imp__replicate_errors(j->target, j->channels, r->pixel, L, P, E);
+    if (j->want_gradient && j->want_errors) {
+        imp__tally_batch(r->tally, r->b);
+        sets_sweep(r, walks, E);
+        imp__tally_error(r->tally);
+    }
+    return variance;
+}
+
+static double sweep_residuals(const struct replicate *r, int part, double *moments,
+                              double *variance)
+{
+    struct imp__gradient_job *j = r->job;
+    struct imp_arena *arena = &r->worker->arena;
+    const size_t m = (size_t)r->plan.m;
+    struct imp_walk *walks = imp__arena_take(arena, (size_t)r->plan.n, sizeof *walks);
+    imp_spec *L = imp__arena_take(arena, m, sizeof *L);
+    imp_spec *P = imp__arena_take(arena, m, sizeof *P);
+    imp_spec *H = j->variate ? imp__arena_take(arena, m, sizeof *H) : NULL;
+    if (!walks || !L || !P || (j->variate && !H)) {
+        r->worker->no_memory = true;
+        return 0;
+    }
+    sets_trace(r, walks, L, H);
+    if (j->variate) /* H becomes what residuals are taken from */
+        imp__variate_replicate(j->variate, j->target, r->plan, part, r->pixel, L, H,
+                               j->look ? NULL : moments);
+    const double value = imp__replicate_adjoints(j->target, j->channels, r->pixel,
+                                                 r->plan.m, L, j->variate ? H : L, P);
+    if (j->want_gradient) sets_sweep(r, walks, P);
+    if (r->plan.lone) *variance = errors_sweep(r, walks, L, P);
+    return value;
+}
+
+/* ---- Either ------------------------------------------------------------------------- */
+
+double imp__gradient_replicate(struct imp__gradient_job *j, struct imp__replicates plan,
+                               struct imp_tile_worker *w, int x, int y, int b, int part,
+                               double *moments, double *variance)
+{
+    if (imp_unlikely(j->light != NULL)) {
+        imp__light_replicate(j, w, x, y, b);
+        return 0;
+    }
+    const struct replicate r = {
+        .job = j,
+        .plan = plan,
+        .worker = w,
+        .tally = &j->tallies[w->index],
+        .x = x,
+        .y = y,
+        .b = b,
+        .pixel = (size_t)y * (size_t)j->width + (size_t)x,
+    };
+    const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
+    double value = 0;
+    if (j->target && !j->splat) value = sweep_residuals(&r, part, moments, variance);
+    else sweep_each(&r);
+    imp__tally_batch(r.tally, b);
+    imp__arena_rewind(&w->arena, mark);
+    return value;
+}

@@ -1,0 +1,250 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The objective of a problem with its gradient, and gradients of linear functions of
+ * pictures: jobs over the targets (gradient_job.c), added up. */
+#include "objective_gradient.h"
+#include "allocation.h"
+#include "base/team.h"
+#include "film/film_filter.h"
+#include "gradient_job.h"
+#include "inverse/estimate/problem_tracer.h"
+#include "inverse/estimate/replicates.h"
+#include "inverse/problem/loss.h"
+#include "light_gradient.h"
+#include "walk/run.h"
+#include "walk/store.h"
+#include <math.h>
+#include <string.h>
+
+/* Pass 1 of a wide filter: the replicates' pictures, and the adjoints of their pixels. */
+static enum imp_status splat_prepare(struct imp__gradient_job *j,
+                                     const struct imp_run *run, struct imp__splat *splat)
+{
+    imp_context *ctx = j->problem->ctx;
+    /* The second pass needs these pictures, so each part computes all of them. */
+    const bool apart = imp__team_apart(ctx);
+    double value[2] = {0, 0};
+    bool known = false;
+    enum imp_status st = IMP_OK;
+    if (imp__team_merges(ctx)) IMP_TRY(imp__team_keep(ctx, value, sizeof value, &known));
+    if (!known) {
+        if (apart) ctx->team->alone++;
+        st = imp__splat_create(j->problem, &j->tracer, j->target, j->seed, j->plan, run,
+                               splat);
+        if (apart) ctx->team->alone--;
+        IMP_TRY(st);
+        value[0] = splat->objective;
+        value[1] = splat->objective_variance;
+        if (imp__team_part(ctx))
+            IMP_TRY(imp__team_keep(ctx, value, sizeof value, &known));
+    }
+    j->splat = splat;
+    j->totals->objective += value[0];
+    j->totals->variance += value[1];
+out:
+    return st;
+}
+
+static enum imp_status target_estimate(struct imp_problem *p,
+                                       const struct imp__target *target, int part,
+                                       const struct imp_run *run, double lo, double hi,
+                                       double start_s, bool want_gradient,
+                                       struct imp__totals *totals)
+{
+    struct imp_run own = *run;
+    struct imp__splat splat = {0};
+    struct imp__gradient_job j = {
+        .problem = p, .totals = totals, .target = target, .want_gradient = want_gradient};
+    enum imp_status st = imp__target_tracer(p, target, part, &own, &j.tracer);
+    if (st != IMP_OK) return st;
+    if (j.tracer.integrator->from_lights && want_gradient && totals->many)
+        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                          "losses of walks from the lights have gradients of at most %d "
+                          "numbers; let walks begin at the sensor",
+                          IMP_TALLY_DENSE);
+    if (j.tracer.integrator->from_lights)
+        return imp__light_objective(
+            p, target, &j.tracer, &own, &totals->objective, &totals->variance,
+            want_gradient ? totals->gradient : NULL, totals->gradient_variance);
+    if (!want_gradient) j.tracer.active = NULL;
+    j.plan = imp__replicates_loss(p, target, &own);
+    st = imp__replicates_kept(&j.tracer, j.plan);
+    if (st == IMP_OK && j.tracer.kept && j.tracer.kept->stratified)
+        st =
+            imp__error(p->ctx, IMP_E_ARG,
+                       "these walks were kept for pictures, with stratified wavelengths; "
+                       "a loss needs independent ones: keep them with `losses`");
+    if (st != IMP_OK) return st;
+    if (p->variate && want_gradient)
+        j.variate = imp__variate_use(p->variate, target, &j.tracer, &j.there);
+    if (st == IMP_OK && imp__film_border(&j.tracer.sensor->film) > 0)
+        st = splat_prepare(&j, &own, &splat);
+    if (st == IMP_OK && (!j.splat || want_gradient))
+        st = imp__gradient_job_run(&j, &own, "gradient", lo, hi, start_s);
+    imp__splat_destroy(p->ctx, &splat);
+    return st;
+}
+
+static enum imp_status targets_estimate(struct imp_problem *p, const struct imp_run *run,
+                                        bool want_gradient, struct imp__totals *totals)
+{
+    const double start = imp__now(), n = (double)p->n_targets;
+    enum imp_status st = IMP_OK;
+    if (p->variate) imp__variate_begin(p->variate);
+    if (p->allocation) p->allocation->next = 0;
+    for (size_t t = 0; t < p->n_targets; t++) {
+        const int parts = imp__target_parts(&p->targets[t]);
+        for (int k = 0; k < parts && st == IMP_OK; k++)
+            st = target_estimate(p, imp__target_part(&p->targets[t], k), k, run,
+                                 ((double)t + (double)k / parts) / n,
+                                 ((double)t + (double)(k + 1) / parts) / n, start,
+                                 want_gradient, totals);
+    }
+    return st;
+}
+
+static int bias_order(const struct imp_problem *p)
+{
+    int order = 0;
+    for (size_t t = 0; t < p->n_targets; t++) {
+        const struct imp_target *d = &p->targets[t].desc;
+        const bool wide = imp__film_border(&p->scene->sensors[d->sensor]->film) > 0;
+        const int here = wide ? 1 : imp__loss_bias_order(d->loss); /* ratio of sums */
+        if (here && (!order || here < order)) order = here;
+    }
+    return order;
+}
+
+enum imp_status imp__problem_objective(struct imp_problem *p, const double *x,
+                                       const struct imp_run *run, bool in_place,
+                                       struct imp_estimate *objective, double *gradient,
+                                       double *gradient_se)
+{
+    enum imp_status st = IMP_OK;
+    IMP_FLOAT_MODE;
+    const struct imp__access_held access
+        __attribute__((cleanup(imp__access_leave), unused)) =
+            x ? imp__access_set(p->scene, &st) : imp__access_read(p->scene);
+    if (st != IMP_OK) return st;
+    const bool want_gradient = gradient || gradient_se;
+    struct imp__totals totals = {0};
+    bool again = false;
+    if (x) IMP_TRY(imp_problem_set_x(p, x));
+    IMP_TRY(imp__problem_same(p, run, "loss"));
+    IMP_TRY(imp__totals_begin(p, in_place, gradient, gradient_se, &totals));
+    IMP_TRY(targets_estimate(p, run, want_gradient, &totals));
+    IMP_TRY(imp__totals_share(p, &totals));
+    IMP_TRY(imp__totals_again(p, &totals, &again));
+    if (again) {
+        IMP_TRY(targets_estimate(p, run, want_gradient, &totals));
+        IMP_TRY(imp__totals_share(p, &totals));
+    }
+    if (p->variate) IMP_TRY(imp__variate_end(p->variate, p));
+    imp__totals_end(p, &totals, gradient, gradient_se);
+    const double prior = imp__regularise(p, NULL, gradient);
+    if (objective)
+        *objective = (struct imp_estimate){.value = totals.objective + prior,
+                                           .se = sqrt(fmax(totals.variance, 0)),
+                                           .bias_order = bias_order(p)};
+out:
+    imp__totals_free(p, &totals);
+    return st;
+}
+
+enum imp_status imp_problem_objective(imp_problem *p, const double *x,
+                                      const struct imp_run *run,
+                                      struct imp_estimate *objective, double *gradient,
+                                      double *gradient_se)
+{
+    struct imp_run own;
+    IMP_REQUIRE(NULL, p, "problem");
+    IMP_RUN(p->ctx, own, run);
+    if (p->n_targets == 0)
+        return imp__error(p->ctx, IMP_E_ARG, "the problem has no target");
+    imp__points_of_losses(p, &own);
+    return imp__problem_objective(p, x, &own, false, objective, gradient, gradient_se);
+}
+
+double imp_problem_nlopt(unsigned n, const double *x, double *gradient, void *problem)
+{
+    imp_problem *p = problem;
+    struct imp_estimate e;
+    IMP_REQUIRE_OR(NULL, p, "problem", HUGE_VAL);
+    IMP_REQUIRE_OR(p->ctx, x || n == 0, "x", HUGE_VAL);
+    if (n != p->n) {
+        imp__error(p->ctx, IMP_E_ARG, "n is %u, but %zu numbers are active", n, p->n);
+        return HUGE_VAL;
+    }
+    const enum imp_status st = imp_problem_objective(p, x, &p->run, &e, gradient, NULL);
+    return st == IMP_OK && isfinite(e.value) ? e.value : HUGE_VAL;
+}
+
+enum imp_status imp__adjoint_check(const struct imp_problem *p,
+                                   const struct imp_film_desc *film, const float *adjoint,
+                                   const char *name)
+{
+    const size_t channels = (size_t)p->scene->channels, width = (size_t)film->crop_w;
+    for (size_t i = 0; i < width * (size_t)film->crop_h * channels; i++)
+        if (!isfinite(adjoint[i]))
+            return imp__error(p->ctx, IMP_E_ARG,
+                              "%s: channel %zu of pixel (%zu, %zu) is %g", name,
+                              i % channels, i / channels % width, i / channels / width,
+                              (double)adjoint[i]);
+    return IMP_OK;
+}
+
+enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
+                                    const struct imp_run *run, double *gradient,
+                                    double *gradient_se)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_run own;
+    IMP_REQUIRE(NULL, p, "problem");
+    IMP_REQUIRE(p->ctx, seed_image, "seed_image");
+    IMP_REQUIRE(p->ctx, gradient, "gradient");
+    IMP_RUN(p->ctx, own, run);
+    IMP_FLOAT_MODE;
+    IMP_READS(p->scene);
+    struct imp__splat splat = {0};
+    struct imp__totals totals = {0};
+    bool again = false;
+    struct imp__gradient_job j = {
+        .problem = p, .totals = &totals, .seed = seed_image, .want_gradient = true};
+    IMP_TRY(imp__problem_same(p, &own, "reverse"));
+    IMP_TRY(imp__totals_begin(p, false, gradient, gradient_se, &totals));
+    IMP_TRY(imp__problem_tracer_of_any_end(p, &own, NULL, &j.tracer));
+    IMP_TRY(imp__adjoint_check(p, &j.tracer.sensor->film, seed_image, "seed_image"));
+    if (j.tracer.integrator->from_lights) {
+        IMP_TRY(imp__light_reverse(p, &j.tracer, seed_image, &own, &totals));
+        IMP_TRY(imp__totals_share(p, &totals));
+        IMP_TRY(imp__totals_again(p, &totals, &again));
+        if (again) {
+            IMP_TRY(imp__light_reverse(p, &j.tracer, seed_image, &own, &totals));
+            IMP_TRY(imp__totals_share(p, &totals));
+        }
+        imp__totals_end(p, &totals, gradient, gradient_se);
+        goto out;
+    }
+    j.plan = imp__replicates_of(p->scene, NULL, &own);
+    IMP_TRY(imp__replicates_kept(&j.tracer, j.plan));
+    if (imp__film_border(&j.tracer.sensor->film) > 0)
+        IMP_TRY(splat_prepare(&j, &own, &splat));
+    /* With a fixed adjoint the walks of a replicate may depend on each other: standard
+     * errors come from the spread between replicates. */
+    if (!j.tracer.points) {
+        if (own.wavelengths != IMP_WAVELENGTHS_INDEPENDENT) j.tracer.set = j.plan.n;
+        j.tracer.period = j.plan.n;
+    }
+    IMP_TRY(imp__gradient_job_run(&j, &own, "gradient", 0, 1, imp__now()));
+    IMP_TRY(imp__totals_share(p, &totals));
+    IMP_TRY(imp__totals_again(p, &totals, &again));
+    if (again) {
+        IMP_TRY(imp__gradient_job_run(&j, &own, "gradient", 0, 1, imp__now()));
+        IMP_TRY(imp__totals_share(p, &totals));
+    }
+    imp__totals_end(p, &totals, gradient, gradient_se);
+out:
+    imp__splat_destroy(p->ctx, &splat);
+    imp__totals_free(p, &totals);
+    return st;
+}
