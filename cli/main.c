@@ -2,12 +2,12 @@
  *
  * importon: the command line of libimporton. Data goes to standard output or -o, talk to
  * standard error. */
-#include "command.h"
-#include "output.h"
-#include "part.h"
-#include "progress.h"
-#include "proof.h"
-#include "ranks.h"
+#include "shared/command.h"
+#include "shared/output.h"
+#include "shared/part.h"
+#include "shared/proof.h"
+#include "shared/ranks.h"
+#include "text/progress.h"
 
 #include <errno.h>
 #ifdef __GLIBC__

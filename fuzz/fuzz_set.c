@@ -2,10 +2,10 @@
  *
  * Files of `--set @FILE`. Each is taken, or ends with a message that names it; all numbers of the
  * scene are then still such as it may have. */
-#include "../cli/command.h"
-#include "../cli/ranks.h"
-#include "../cli/settings.h"
 #include "memory_file.h"
+#include "shared/command.h"
+#include "shared/ranks.h"
+#include "shared/settings.h"
 #include <math.h>
 #include <stdarg.h>
 #include <string.h>
@@ -22,7 +22,7 @@ static const char scene_text[] =
     "value='.1,.2,.3'/></bsdf></shape><shape "
     "type='rectangle'><ref id='m'/></shape></scene>";
 
-/* ---- What cli/settings.c has from the command ------------------------------------------ */
+/* ---- What cli/shared/settings.c has from the command ------------------------------------------ */
 
 struct cli cli;
 static char said[1024];

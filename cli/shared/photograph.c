@@ -1,0 +1,135 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "photograph.h"
+
+#include "picture_files.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* JPEG's own noise makes white a little darker, and black a little brighter. */
+#define JPEG_LEVELS 5
+
+/* What the file's first bytes say, as imp_film_read takes them. */
+struct encoding {
+    bool srgb, jpeg; /* read as sRGB: not a file of floating-point numbers */
+    double most;     /* largest number of a channel */
+};
+
+static struct encoding encoding_of(const char *spec)
+{
+    static const char *const linear[] = {
+        "\x76\x2f\x31\x01", "\x93NUMPY", "PF", "Pf", "VOL", "#?"};
+    const char *at = picture_sensor(spec) >= 0 ? strrchr(spec, '@') : NULL;
+    char *path = at ? strndup(spec, (size_t)(at - spec)) : strdup(spec);
+    FILE *f = path ? fopen(path, "rb") : NULL;
+    char header[64] = {0};
+    struct encoding e = {.srgb = f && fread(header, 1, sizeof header - 1, f) > 2,
+                         .most = 255};
+    int maxval;
+    if (f) fclose(f);
+    free(path);
+    for (size_t k = 0; k < sizeof linear / sizeof *linear; k++)
+        if (!memcmp(header, linear[k], strlen(linear[k]))) e.srgb = false;
+    e.jpeg = e.srgb && !memcmp(header, "\xff\xd8", 2);
+    /* PNG: the depth is byte 24, behind width and height (RFC 2083, 11.2.1). */
+    if (!memcmp(header, "\x89PNG", 4) && header[24] == 16) e.most = 65535;
+    if (header[0] == 'P' && sscanf(header, "P%*d %*d %*d %d", &maxval) == 1 && maxval > 0)
+        e.most = maxval;
+    return e;
+}
+
+static double encode(double v)
+{
+    return v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1 / 2.4) - 0.055;
+}
+static double decode(double v)
+{
+    return v <= 0.04045 ? v / 12.92 : pow((v + 0.055) / 1.055, 2.4);
+}
+
+static bool is_photograph(const struct imp_target *t)
+{
+    struct imp_sensor_info sensor = {.size = sizeof sensor};
+    return imp_scene_get_sensor(cli.scene, t->sensor, &sensor) == IMP_OK &&
+           sensor.photograph;
+}
+
+void photograph_undo_srgb(const char *spec, struct imp_target *t)
+{
+    float *v = (float *)t->pixels;
+    if (!encoding_of(spec).srgb || !is_photograph(t)) return;
+    for (size_t i = 0; i < (size_t)t->width * (size_t)t->height * (size_t)t->channels;
+         i++)
+        v[i] = (float)encode((double)v[i]);
+}
+
+static void file_levels(const struct encoding *e, double *low, double *high)
+{
+    const double part = e->jpeg ? JPEG_LEVELS : 0.5;
+    *low = part / e->most;
+    *high = 1 - part / e->most;
+}
+
+void photograph_warn_clipped(const char *spec, const struct imp_target *t)
+{
+    double low, high;
+    size_t clipped = 0;
+    const struct encoding e = encoding_of(spec);
+    if (!e.srgb) return;
+    file_levels(&e, &low, &high);
+    if (!is_photograph(t)) high = decode(high);
+    for (size_t i = 0; i < (size_t)t->width * (size_t)t->height; i++) {
+        bool over = false;
+        for (int c = 0; c < t->channels; c++)
+            over |= (double)t->pixels[i * (size_t)t->channels + (size_t)c] >= high;
+        clipped += over && !(t->weights && t->weights[i] == 0);
+    }
+    if (clipped)
+        cli_say(
+            "importon: warning: %s: %zu of %zu pixels are as bright as the file can "
+            "hold, and may have been brighter: say so with --clip auto, or leave them "
+            "out with --mask",
+            spec, clipped, (size_t)t->width * (size_t)t->height);
+}
+
+int photograph_levels(const char *spec, const char *text, const struct imp_target *t,
+                      double *low, double *high)
+{
+    const struct encoding e = encoding_of(spec);
+    *low = (double)-FLT_MAX; /* below all numbers */
+    *high = (double)FLT_MAX;
+    if (!strcmp(text, "auto")) {
+        if (!e.srgb)
+            return cli_error(EXIT_USAGE,
+                             "--clip auto: %s holds floating-point numbers, and does not "
+                             "say where they were clipped: give --clip LOW,HIGH",
+                             spec);
+        file_levels(&e, low, high);
+    } else {
+        char *end;
+        const char *comma = strchr(text, ',');
+        bool fine = comma && (comma > text || comma[1]);
+        if (fine && comma > text) {
+            *low = strtod(text, &end);
+            fine = end == comma;
+        }
+        if (fine && comma[1]) {
+            *high = strtod(comma + 1, &end);
+            fine = !*end;
+        }
+        if (!fine || !(*low < *high))
+            return cli_error(EXIT_USAGE,
+                             "--clip %s: expected auto, LOW,HIGH, LOW, or ,HIGH in the "
+                             "numbers of the file, LOW less than HIGH",
+                             text);
+    }
+    if (e.srgb && !is_photograph(t)) {
+        if (*low > (double)-FLT_MAX) *low = decode(*low);
+        if (*high < (double)FLT_MAX) *high = decode(*high);
+    }
+    return 0;
+}

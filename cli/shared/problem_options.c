@@ -1,0 +1,387 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Options of a problem (targets, losses, regularisers, active parameters) and the
+ * problem made from them. */
+#include "problem_options.h"
+
+#include "overwrite.h"
+#include "photograph.h"
+#include "picture_files.h"
+
+#include <importon/clip.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct problem_options problem_options;
+
+static const char *const loss_words[] = {"l2", "relative", "l1", "log", NULL};
+static const enum imp_loss losses[] = {IMP_LOSS_L2, IMP_LOSS_RELATIVE_L2, IMP_LOSS_L1,
+                                       IMP_LOSS_LOG};
+
+const struct arg_option options_params[] = {
+    {ARG_LIST, 'p', "param", "GLOB",
+     "active parameters: a name or a pattern (default '*')", &problem_options.params, 0,
+     0, NULL},
+    {ARG_LIST, 0, "same", "GLOB,..", "numbers of all these are equal: one paint",
+     &problem_options.same, 0, 0, NULL},
+    {ARG_LIST, 0, "factor", "GLOB,..", "all these keep their ratios: one factor",
+     &problem_options.factor, 0, 0, NULL},
+    {ARG_LIST, 0, "log", "GLOB,..", "these move as logarithms, and stay positive",
+     &problem_options.log, 0, 0, NULL},
+    {0}};
+
+const struct arg_option options_targets[] = {
+    {ARG_LIST, 'T', "target", "FILE[@N]",
+     "picture to match, through sensor N; several without @N: one for each sensor, in "
+     "order",
+     &problem_options.targets, 0, 0, NULL},
+    {ARG_LIST, 0, "mask", "FILE", "weights of the pixels, one for each --target in order",
+     &problem_options.masks, 0, 0, NULL},
+    {ARG_TEXT, 0, "clip", "auto|LOW,HIGH",
+     "numbers at these levels were clipped: white is at least, black at most",
+     &problem_options.clip, 0, 0, NULL},
+    {ARG_CHOICE, 0, "loss", "LOSS", "l2 (default), relative, l1 or log",
+     &problem_options.loss, 0, 0, loss_words},
+    {ARG_NUMBER, 0, "epsilon", "E",
+     "constant of the relative and log losses (default 0.01)", &problem_options.epsilon,
+     1e-12, 1e12, NULL},
+    {ARG_LIST, 0, "tikhonov", "GLOB=W", "add W/2 |x|^2 over these parameters",
+     &problem_options.tikhonov, 0, 0, NULL},
+    {ARG_LIST, 0, "stay", "GLOB=W", "add W/2 |x - start|^2 over these parameters",
+     &problem_options.stay, 0, 0, NULL},
+    {ARG_LIST, 0, "smooth", "GLOB=W",
+     "add W/2 |grad x|^2 over these textures and spectra", &problem_options.smooth, 0, 0,
+     NULL},
+    {0}};
+
+const char *loss_word(void) { return loss_words[problem_options.loss]; }
+
+/* "GLOB=W"; the glob is a new string. */
+static int split_weight(const char *option, const char *text, char **glob, double *weight)
+{
+    const char *equal = strrchr(text, '=');
+    char *end;
+    if (equal && equal > text) {
+        *weight = strtod(equal + 1, &end);
+        if (end != equal + 1 && !*end && *weight >= 0) {
+            if (!(*glob = strndup(text, (size_t)(equal - text))))
+                return cli_error(EXIT_RUN, "out of memory");
+            return 0;
+        }
+    }
+    return cli_error(EXIT_USAGE, "--%s %s: expected GLOB=WEIGHT, the weight not negative",
+                     option, text);
+}
+
+enum regulariser { TIKHONOV, STAY, SMOOTH };
+static int add_regularisers(imp_problem *problem, enum regulariser kind,
+                            const char *option, const struct arg_list *list)
+{
+    for (size_t i = 0; i < list->n; i++) {
+        char *glob = NULL;
+        double weight = 0;
+        int rc = split_weight(option, list->item[i], &glob, &weight);
+        if (rc) return rc;
+        const enum imp_status st =
+            kind == SMOOTH
+                ? imp_problem_add_smoothness(problem, glob, weight)
+                : imp_problem_add_tikhonov(problem, glob, weight, kind == STAY);
+        free(glob);
+        if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    }
+    return 0;
+}
+
+/* What speaks of a loss is not ignored where there is none. */
+static int needs_target(void)
+{
+    const struct problem_options *o = &problem_options;
+    const char *option = o->masks.n      ? "mask"
+                         : o->clip       ? "clip"
+                         : o->loss       ? "loss"
+                         : o->epsilon    ? "epsilon"
+                         : o->tikhonov.n ? "tikhonov"
+                         : o->stay.n     ? "stay"
+                         : o->smooth.n   ? "smooth"
+                                         : NULL;
+    if (o->targets.n || !option) return 0;
+    return cli_error(EXIT_USAGE, "--%s is part of a loss, and needs a --target", option);
+}
+
+int target_sensor(size_t i)
+{
+    const struct problem_options *o = &problem_options;
+    const int named = picture_sensor(o->targets.item[i]);
+    return named >= 0 ? named : o->targets.n > 1 ? (int)i : cli.sensor;
+}
+
+/* Several targets either all name their sensors, or are one for each sensor, in order:
+ * what else could be meant is not guessed. */
+static int match_sensors(void)
+{
+    const struct arg_list *t = &problem_options.targets;
+    struct imp_scene_info scene = {.size = sizeof scene};
+    size_t named = 0;
+    imp_scene_get_info(cli.scene, &scene);
+    for (size_t i = 0; i < t->n; i++) named += picture_sensor(t->item[i]) >= 0;
+    if (t->n < 2 || named == t->n) return 0;
+    if (named)
+        return cli_error(EXIT_USAGE,
+                         "%zu of %zu targets name a sensor: name one for each, like "
+                         "--target %s@0",
+                         named, t->n, t->item[picture_sensor(t->item[0]) >= 0 ? 1 : 0]);
+    if (t->n == (size_t)scene.n_sensors && !cli.sensor) return 0;
+    if (t->n == (size_t)scene.n_sensors)
+        return cli_error(EXIT_USAGE,
+                         "--sensor %d and %zu targets: name the sensor of each target, "
+                         "like --target %s@%d",
+                         cli.sensor, t->n, t->item[0], cli.sensor);
+    return cli_error(EXIT_USAGE,
+                     "%zu targets, but the scene has %d %s: name the sensor of each "
+                     "target, like --target %s@0 --target %s@%d",
+                     t->n, scene.n_sensors, scene.n_sensors == 1 ? "sensor" : "sensors",
+                     t->item[0], t->item[1], scene.n_sensors > 1);
+}
+
+int problem_spp(const struct imp_run *run)
+{
+    const int spp = cli_spp(run);
+    return problem_options.targets.n && spp == 1 ? 2 : spp;
+}
+
+static int add_target(imp_problem *problem, int i, const struct imp_target *target)
+{
+    const struct problem_options *o = &problem_options;
+    const char *spec = o->targets.item[i];
+    double low = 0, high = 0;
+    int rc = 0;
+    if (o->clip) rc = photograph_levels(spec, o->clip, target, &low, &high);
+    else photograph_warn_clipped(spec, target);
+    if (rc) return rc;
+    enum imp_status st = imp_problem_add_target(problem, target);
+    if (st == IMP_OK && o->clip) st = imp_problem_clip(problem, i, low, high);
+    return st == IMP_OK ? 0 : cli_fail(st, spec);
+}
+
+static int add_targets(imp_problem *problem)
+{
+    const struct problem_options *o = &problem_options;
+    const int unclear = match_sensors();
+    if (unclear) return unclear;
+    if (o->masks.n > o->targets.n)
+        return cli_error(EXIT_USAGE, "%zu masks, but only %zu %s", o->masks.n,
+                         o->targets.n, o->targets.n == 1 ? "target" : "targets");
+    for (size_t i = 0; i < o->targets.n; i++) {
+        struct imp_target target = IMP_TARGET_INIT;
+        const char *mask = i < o->masks.n ? o->masks.item[i] : NULL;
+        const int rc = picture_target(o->targets.item[i], mask, &target);
+        if (rc) return rc;
+        target.sensor = target_sensor(i);
+        target.loss = losses[o->loss];
+        target.epsilon = o->epsilon;
+        photograph_undo_srgb(o->targets.item[i], &target);
+        const int failed = add_target(problem, (int)i, &target);
+        picture_target_free(&target);
+        if (failed) return failed;
+    }
+    return 0;
+}
+
+static enum imp_status add_ties(imp_problem *problem)
+{
+    const struct problem_options *o = &problem_options;
+    const struct {
+        const struct arg_list *globs;
+        enum imp_tie kind;
+    } ties[] = {
+        {&o->same, IMP_TIE_SAME}, {&o->factor, IMP_TIE_FACTOR}, {&o->log, IMP_TIE_LOG}};
+    enum imp_status st = IMP_OK;
+    /* Equal numbers that are logarithms become logarithms together: first these. */
+    for (size_t k = 0; k < 3 && st == IMP_OK; k++)
+        for (size_t i = 0; i < ties[k].globs->n && st == IMP_OK; i++)
+            st = imp_problem_tie(problem, ties[k].globs->item[i], ties[k].kind);
+    return st;
+}
+
+int problem_open(imp_problem **out)
+{
+    const struct problem_options *o = &problem_options;
+    imp_problem *problem = NULL;
+    int rc = needs_target();
+    if (rc) return rc;
+    enum imp_status st = imp_problem_create(cli.scene, &problem);
+    for (size_t i = 0; i < o->params.n && st == IMP_OK; i++)
+        st = imp_problem_activate(problem, o->params.item[i]);
+    if (st == IMP_OK && o->params.n == 0) st = imp_problem_activate(problem, "*");
+    if (st == IMP_OK) st = add_ties(problem);
+    if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
+    if (!rc) rc = add_targets(problem);
+    const struct imp_run run = cli_run();
+    if (!rc && o->targets.n && cli_spp(&run) == 1)
+        cli_say("importon: a loss without bias takes 2 samples per pixel: 2 are taken");
+    if (!rc) rc = add_regularisers(problem, TIKHONOV, "tikhonov", &o->tikhonov);
+    if (!rc) rc = add_regularisers(problem, STAY, "stay", &o->stay);
+    if (!rc) rc = add_regularisers(problem, SMOOTH, "smooth", &o->smooth);
+    if (rc) imp_problem_destroy(problem);
+    else *out = problem;
+    return rc;
+}
+
+int problem_censor(imp_problem *problem)
+{
+    const struct imp_run run = cli_run();
+    if (!problem_options.clip) return 0;
+    const enum imp_status st = imp_problem_censor(problem, &run);
+    return st == IMP_OK ? 0 : cli_fail(st, cli.scene_path);
+}
+
+void problem_close(imp_problem *problem)
+{
+    struct problem_options *o = &problem_options;
+    imp_problem_destroy(problem);
+    args_list_free(&o->params);
+    args_list_free(&o->same);
+    args_list_free(&o->factor);
+    args_list_free(&o->log);
+    args_list_free(&o->targets);
+    args_list_free(&o->masks);
+    args_list_free(&o->tikhonov);
+    args_list_free(&o->stay);
+    args_list_free(&o->smooth);
+}
+
+struct block *problem_blocks(const imp_problem *problem, size_t *n_blocks)
+{
+    const size_t n = imp_problem_n(problem);
+    struct block *blocks = cli_alloc(imp_scene_n_params(cli.scene), sizeof *blocks);
+    *n_blocks = 0;
+    for (size_t i = 0; i < n;) {
+        struct block *b = &blocks[*n_blocks];
+        size_t param;
+        b->info.size = sizeof b->info;
+        b->tie.size = sizeof b->tie;
+        if (imp_problem_variable(problem, i, &param, NULL, NULL, NULL) != IMP_OK ||
+            imp_problem_get_tie(problem, i, &b->tie) != IMP_OK ||
+            imp_scene_get_param(cli.scene, param, &b->info) != IMP_OK || !b->info.count)
+            break;
+        if (b->tie.factor) {
+            b->info.name = b->tie.name;
+            b->info.unit = "1";
+            b->info.count = 1;
+            b->info.n_dims = 0;
+            b->info.wavelengths_nm = NULL;
+        }
+        b->first = i;
+        b->n = b->tie.count; /* parameters are active as a whole */
+        i += b->n;
+        ++*n_blocks;
+    }
+    return blocks;
+}
+
+/* Spectra are tables of their wavelengths. */
+int block_is_large(const struct block *b)
+{
+    return b->n > (b->info.wavelengths_nm ? 1000 : 12);
+}
+
+void block_json(struct json *j, const struct block *b)
+{
+    json_object(j, NULL);
+    json_text(j, "name", b->info.name);
+    json_text(j, "unit", b->info.unit);
+    if (b->info.wavelengths_nm)
+        json_numbers(j, "wavelengths_nm", b->info.count, b->info.wavelengths_nm);
+    block_ties_json(j, b);
+}
+
+void block_ties_json(struct json *j, const struct block *b)
+{
+    if (b->tie.log) json_bool(j, "log", 1);
+    if (!b->tie.factor && b->tie.n_members < 2) return;
+    json_array(j, b->tie.factor ? "multiplies" : "same");
+    for (size_t i = 0; i < b->tie.n_members; i++) json_text(j, NULL, b->tie.members[i]);
+    json_end_array(j);
+}
+
+static int is_volume(const struct block *b)
+{
+    return (b->info.flags & IMP_PARAM_VOLUME) != 0;
+}
+
+/* `of`: "", or ".se" of a volume's standard errors. */
+static char *block_path(const struct block *b, const char *folder, const char *of)
+{
+    char name[512];
+    snprintf(name, sizeof name, "%s%s.%s", b->info.name, of,
+             is_volume(b) ? "vol" : "exr");
+    make_file_name(name);
+    return join_path(folder, name);
+}
+int block_writable(const struct block *b, const char *folder, int errors)
+{
+    char *path = block_path(b, folder, ""), *se = block_path(b, folder, ".se");
+    int rc = is_volume(b) ? overwrite_check(path, OUTPUT_VOL) : picture_writable(path, 1);
+    if (!rc && is_volume(b) && errors) rc = overwrite_check(se, OUTPUT_VOL);
+    free(path);
+    free(se);
+    return rc;
+}
+
+void block_remove(const struct block *b, const char *folder)
+{
+    char *path = block_path(b, folder, "");
+    picture_remove(path);
+    free(path);
+}
+
+/* A .vol file; standard errors have one of their own. */
+static int volume_write(const struct block *b, const double *x, const double *se,
+                        const char *folder, char **path)
+{
+    size_t param;
+    enum imp_status st = imp_scene_find_param(cli.scene, b->info.name, &param);
+    char *errors = se ? block_path(b, folder, ".se") : NULL;
+    *path = block_path(b, folder, "");
+    if (st == IMP_OK) st = imp_scene_write_volume(cli.scene, param, x + b->first, *path);
+    if (st == IMP_OK && se)
+        st = imp_scene_write_volume(cli.scene, param, se + b->first, errors);
+    free(errors);
+    return st == IMP_OK ? 0 : cli_fail(st, *path);
+}
+
+int block_write(const struct block *b, const double *x, const double *se,
+                const char *folder, char **path)
+{
+    const struct imp_param_info *p = &b->info;
+    const size_t last = p->n_dims > 0 ? p->dims[p->n_dims - 1] : 1;
+    const size_t channels = p->n_dims == 3 && (last == 1 || last == 3) ? last
+                            : p->n_dims == 2 && last == 3              ? 3
+                                                                       : 1;
+    const size_t width = p->n_dims == 3 || (p->n_dims == 2 && channels == 1)
+                             ? p->dims[1]
+                             : b->n / channels;
+    const size_t height = b->n / channels / (width ? width : 1);
+    const struct picture_options o = {.diverging = se != NULL};
+    static const char *const channel_names[2][2] = {{"Y", "Y,se.Y"},
+                                                    {"R,G,B", "R,G,B,se.R,se.G,se.B"}};
+    const struct imp_run run = cli_run();
+    imp_film *film = NULL;
+    if (is_volume(b)) return volume_write(b, x, se, folder, path);
+    *path = block_path(b, folder, "");
+    const enum imp_status st =
+        imp_film_create(cli.context, (int)width, (int)height,
+                        channel_names[channels == 3][se != NULL], &film);
+    if (st != IMP_OK) return cli_fail(st, *path);
+    float *out = imp_film_mean(film);
+    for (size_t i = 0; i < width * height; i++) {
+        const size_t at = b->first + i * channels;
+        for (size_t c = 0; c < channels; c++) *out++ = (float)x[at + c];
+        for (size_t c = 0; c < channels && se; c++) *out++ = (float)se[at + c];
+    }
+    picture_stamp(film, &run);
+    const int rc = picture_write(film, *path, &o);
+    imp_film_destroy(film);
+    return rc;
+}
