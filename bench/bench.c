@@ -13,7 +13,7 @@
  *   first_gradient_s process start to the first gradient, 64 x 64, 4 spp
  *   memory           peak memory at 65,536 spp over that at 16 spp, 16 x 16 pixels */
 #include "base/pool.h"
-#include "walk/walk.h"
+#include "walk/core/walk.h"
 #include <importon/importon.h>
 #include <math.h>
 #include <stdio.h>

@@ -5,7 +5,7 @@
  * by L-BFGS, MMA and SLSQP, and how far values of N draws spread far away (spread).
  *
  *     kept [--repeats N] [--spp N] [--picture-spp N] [--scene NAME] [--only PART] */
-#include "walk/store.h"
+#include "walk/kept/store.h"
 #include <importon/walks.h>
 #include <math.h>
 #include <stdio.h>

@@ -10,7 +10,7 @@
  * The first is single scattering of a point light in a cube of random layers of mean
  * extinction 2, the second the shadow of an area light below such layers. */
 #include "marcher.h"
-#include "walk/tracking.h"
+#include "walk/media/tracking.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

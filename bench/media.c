@@ -14,7 +14,7 @@
  * for `spp` samples a pixel, SUM the sum of the squared errors of all derivatives, ERROR
  * the median pixel's, relative, NUMBER that of a walk. */
 #include "plume.h"
-#include "walk/walk.h"
+#include "walk/core/walk.h"
 #include <sys/resource.h>
 #include <time.h>
 

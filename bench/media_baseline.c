@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the baseline of the light (src/walk/baseline.h) does to derivatives with respect to
+ * What the baseline of the light (src/walk/path/baseline.h) does to derivatives with respect to
  * the extinction of uniform media: variance and processor time without it, over those with
  * it, for fog that is thin and thick, dark and white, grey and coloured, lit from outside
  * and from within. One thread; runs with and without take turns.
@@ -12,7 +12,7 @@
  * some. Told are medians over the repeats, since near a point light single walks bring very
  * much, with their standard errors (1.25 times those of a mean). */
 #include "../tests/imp_scene.h"
-#include "walk/baseline.h"
+#include "walk/path/baseline.h"
 #include <math.h>
 #include <time.h>
 

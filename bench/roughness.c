@@ -12,7 +12,7 @@
  * of rounds. Then the largest ratio of the variances of the value, and of the times. CASE: a
  * part of the name of a row. */
 #include "../tests/imp_scene.h"
-#include "walk/active.h"
+#include "walk/core/active.h"
 #include <math.h>
 #include <time.h>
 

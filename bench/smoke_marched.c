@@ -10,7 +10,7 @@
  * and prints root mean square errors against many walks. The marcher takes a step a cell
  * along the ray and along a shadow ray from each step; the lamp's point is another for each. */
 #include "plume.h"
-#include "walk/tracking.h"
+#include "walk/media/tracking.h"
 #include <importon/importon.h>
 #include <stdio.h>
 #include <stdlib.h>

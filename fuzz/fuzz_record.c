@@ -6,7 +6,7 @@
  * one. What is read is evaluated and swept. */
 #include "math/hash.h"
 #include "memory_file.h"
-#include "walk/record.h"
+#include "walk/kept/record.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

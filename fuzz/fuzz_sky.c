@@ -4,7 +4,7 @@
  * floats. A map that is taken has a density that is finite and positive where draws go. */
 #include "math/rng.h"
 #include "scene/scene.h"
-#include "walk/walk.h"
+#include "walk/core/walk.h"
 #include <stdlib.h>
 #include <string.h>
 

@@ -8,8 +8,8 @@
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "scene/scene.h"
-#include "walk/walk.h"
-#include "walk/walk_integrator.h"
+#include "walk/core/walk.h"
+#include "walk/core/walk_integrator.h"
 
 struct photons {
     imp_context *ctx;

@@ -9,8 +9,8 @@
 
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "walk/dims.h"
-#include "walk/vertex.h"
+#include "walk/core/dims.h"
+#include "walk/core/vertex.h"
 #include <stdbool.h>
 
 /* theta_1 .. theta_7 of the paper, from 0. */

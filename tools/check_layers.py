@@ -17,10 +17,14 @@ import sys
 # From the ground up.
 ROOMS = "base math color kind scene search bend elements walk film inverse format render report"
 INSIDE = {
+    "src/walk": "core media graded path lights both kept run",
     "src/inverse": "problem estimate gradient gauss fit check design",
     "cli": "text shared bend elements fit view commands",
 }
 EMBREE = "src/scene/intersector.h"
+# Files of src/walk whose arrows still run up; each goes.
+UP_FOR_NOW = """light segment waves light_reach light_start light_walk sweep_media evaluate sweep
+    walk_trace graded probe track tracking""".split()
 
 
 def floors():
@@ -45,6 +49,11 @@ def place(path):
     return None
 
 
+def runs_up(path, other):
+    for_now = path.parts[1] == "walk" and path.stem in UP_FOR_NOW
+    return place(other) > place(path) and not (for_now and other.parts[1] == "walk")
+
+
 def check_folders(complain):
     for folder in pathlib.Path("src").iterdir():
         if folder.is_dir() and str(folder) not in FLOORS:
@@ -64,7 +73,7 @@ def check_includes(complain):
             other = path.parent / include if "/" not in include else top / include
             if path.parts[0] == "cli" and not other.exists():
                 complain(f"{path}: {include}: commands use include/importon only")
-            elif place(other) and place(path) and place(other) > place(path):
+            elif place(other) and place(path) and runs_up(path, other):
                 complain(f"{path}: {include} runs up")
         if str(path) != EMBREE and re.search(r"^#include <embree", path.read_text(), re.M):
             complain(f"{path}: includes Embree")
@@ -87,7 +96,7 @@ def check_calls(library, complain):
         else:
             home[found[3]] = path
     for path, symbol in sorted(uses):
-        if symbol in home and place(home[symbol]) > place(path):
+        if symbol in home and runs_up(path, home[symbol]):
             complain(f"{path}: refers to {symbol} of {home[symbol]}, which runs up")
     if len(home) < 500:
         complain("too few symbols: is this the static library?")

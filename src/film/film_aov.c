@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "film_aov.h"
 #include "scene/instances.h"
-#include "walk/dims.h"
+#include "walk/core/dims.h"
 
 int imp__aov_count(enum imp_aov_type type)
 {

@@ -4,7 +4,7 @@
 #include "base/arguments.h"
 #include "denoiser.h"
 #include "film_measure.h"
-#include "walk/run.h"
+#include "walk/run/run.h"
 #include <math.h>
 #include <string.h>
 

@@ -5,7 +5,7 @@
 #include "base/text.h"
 #include "film_filter.h"
 #include "film_measure.h"
-#include "walk/run.h"
+#include "walk/run/run.h"
 #include <stdio.h>
 #include <string.h>
 

@@ -2,7 +2,7 @@
 #include "film_integrator.h"
 #include "base/required.h"
 #include "elements/elements_integrator.h"
-#include "walk/walk_integrator.h"
+#include "walk/core/walk_integrator.h"
 #include <string.h>
 
 static const struct {

@@ -7,7 +7,7 @@
  * with the filter h and its integral H_p over the part of the film that is sampled. Walks
  * are independent, c_ip is 0 in most pixels, and se^2 = (sum c^2 - (sum c)^2/N)/(N (N-1)).
  *
- * A sample from both ends (walk/both.h) adds what its walk from the sensor, which begins in
+ * A sample from both ends (walk/both/both.h) adds what its walk from the sensor, which begins in
  * a pixel, brings: N of a pixel, not of the picture. The samples are cut into groups with as
  * many of each pixel, and the spread of the groups' pictures is the standard error.
  *
@@ -18,7 +18,7 @@
 
 #include "base/drops.h"
 #include "film_filter.h"
-#include "walk/light_walk.h"
+#include "walk/lights/light_walk.h"
 
 /* 1/H_p along both axes of a film; a filter no wider than a pixel (box) has 1. */
 struct imp_splat_scale {

@@ -6,7 +6,7 @@
 
 #include "base/film.h"
 #include "film_filter.h"
-#include "walk/store.h"
+#include "walk/kept/store.h"
 
 /* A sample of a pixel: which one, and what comes of it. */
 struct imp_sample {

@@ -6,7 +6,7 @@
 #include "film_measure.h"
 #include "film_picture.h"
 #include "parts.h"
-#include "walk/run.h"
+#include "walk/run/run.h"
 
 enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
                            imp_film **out)

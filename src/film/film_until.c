@@ -15,8 +15,8 @@
 #include "base/film.h"
 #include "film_filter.h"
 #include "film_measure.h"
-#include "walk/looks.h"
-#include "walk/walk_integrator.h"
+#include "walk/core/walk_integrator.h"
+#include "walk/run/looks.h"
 #include <math.h>
 
 /* Values whose errors depend on each other with one of them; 0: any may. */

@@ -3,7 +3,7 @@
 #include "parts.h"
 #include "parts_file.h"
 #include "scene/fingerprint.h"
-#include "walk/walk.h"
+#include "walk/core/walk.h"
 
 struct comparing {
     const struct imp_same *same;

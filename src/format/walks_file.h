@@ -2,7 +2,7 @@
  *
  * Kept walks in a file: a head, the scene without its geometry (tree_file.h), the numbers
  * at which they were drawn, a checksum of these; then for each sensor a head and the
- * records of its tiles (walk/record_file.c), each with a checksum of its own. */
+ * records of its tiles (walk/kept/record_file.c), each with a checksum of its own. */
 #ifndef IMP_FORMAT_WALKS_FILE_H
 #define IMP_FORMAT_WALKS_FILE_H
 

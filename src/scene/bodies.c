@@ -110,7 +110,7 @@ static const struct imp_shape *ball_of(const struct imp_scene *scene,
 }
 
 /* Reason why the derivative with respect to the field would be incomplete, as far as the
- * scene alone decides it; NULL: none. src/walk/graded_survey.c checks what rays meet. */
+ * scene alone decides it; NULL: none. src/walk/path/graded_survey.c checks what rays meet. */
 static const char *fixed_because(const struct imp_scene *scene, const struct imp_body *m)
 {
     if (scene->integrator && scene->integrator->ops->flags & IMP_INTEGRATOR_NO_FIELDS)

@@ -12,7 +12,7 @@ struct imp_scene;
 
 enum imp_integrator_flags {
     IMP_INTEGRATOR_WALKS = 1,      /* radiance along walks; self is a struct
-                                 imp_walk_integrator (walk/walk_integrator.h) */
+                                 imp_walk_integrator (walk/core/walk_integrator.h) */
     IMP_INTEGRATOR_SOLVES = 2,     /* finite elements; self is a struct
                                   imp_elements_integrator */
     IMP_INTEGRATOR_CONTAINS = 4,   /* others, which must be INNER */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * From which densities walks draw their directions, and with which weights
- * (walk/direction.c). Weights are written for the integrator and for single materials; what
+ * (walk/core/direction.c). Weights are written for the integrator and for single materials; what
  * directions are aimed at, lights and proxies, stands in aims.h. */
 #ifndef IMP_SCENE_MIXING_H
 #define IMP_SCENE_MIXING_H

@@ -45,7 +45,7 @@ struct imp_param {
     float box[6];    /* of a volume: its file's, corner by corner */
     double *doubles; /* DOUBLES: [info.count] in place */
     bool probed;     /* an extinction depends on it: its derivative has side walks, and is
-                        not that of a frozen walk (walk/probe.c) */
+                        not that of a frozen walk (walk/media/probe.c) */
 };
 
 /* Ways of drawing wavelengths that a sensor has. */

@@ -7,7 +7,7 @@
  * here. */
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "walk/walk.h"
+#include "walk/core/walk.h"
 
 struct dual {
     double v, d;

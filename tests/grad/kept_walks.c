@@ -7,7 +7,7 @@
  * What they cannot answer is refused. */
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "walk/store.h"
+#include "walk/kept/store.h"
 #include <importon/elements.h>
 #include <importon/walks.h>
 

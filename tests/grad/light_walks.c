@@ -8,7 +8,7 @@
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "scene/scene.h"
-#include "walk/light_walk.h"
+#include "walk/lights/light_walk.h"
 #include <importon/elements.h>
 
 #define WALKS 4000

@@ -13,7 +13,7 @@
 #include "math/warp.h"
 #include "rod.h"
 #include "vol_write.h"
-#include "walk/walk.h"
+#include "walk/core/walk.h"
 
 static imp_context *ctx;
 

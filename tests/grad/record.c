@@ -9,7 +9,7 @@
 #include "imp_tap.h"
 #include "scene/guide.h"
 #include "vol_write.h"
-#include "walk/reduced.h"
+#include "walk/kept/reduced.h"
 #include <importon/elements.h>
 #include <math.h>
 #include <stdbool.h>

@@ -9,7 +9,7 @@
 #include "math/rng.h"
 #include "math/warp.h"
 #include "scene/guide.h"
-#include "walk/walk_integrator.h"
+#include "walk/core/walk_integrator.h"
 
 static imp_elements *solved_to(imp_scene *s, int order)
 {

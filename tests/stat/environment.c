@@ -13,7 +13,7 @@
 #include "math/warp.h"
 #include "math/weight_table.h"
 #include "scene/scene.h"
-#include "walk/walk.h"
+#include "walk/core/walk.h"
 #include <unistd.h>
 
 static imp_context *ctx;

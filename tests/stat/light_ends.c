@@ -9,8 +9,8 @@
 #include "imp_tap.h"
 #include "kind/bsdf/transport.h"
 #include "scene/scene.h"
-#include "walk/light_walk.h"
-#include "walk/vertex.h"
+#include "walk/core/vertex.h"
+#include "walk/lights/light_walk.h"
 
 static imp_context *ctx;
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Directions drawn from mixtures of densities (walk/direction.c): every member's density
+ * Directions drawn from mixtures of densities (walk/core/direction.c): every member's density
  * is the one it draws with, means and gradients do not depend on the weights, and walks
  * that split have the same means. Negative control: the density of the member that drew,
  * alone, is caught. */

@@ -12,7 +12,7 @@
 #include "math/stat.h"
 #include "scene/scene.h"
 #include "vol_write.h"
-#include "walk/walk.h"
+#include "walk/core/walk.h"
 #include <unistd.h>
 
 static imp_context *ctx;

@@ -7,7 +7,7 @@
 #include "imp_tap.h"
 #include "kind/emitter/sun_position.h"
 #include "scene/scene.h"
-#include "walk/walk.h"
+#include "walk/core/walk.h"
 #include <stdbool.h>
 
 #define SKY(attributes)     "<emitter type='sunsky' id='sky'>" attributes "</emitter>"

@@ -10,7 +10,7 @@
 #include "imp_tap.h"
 #include "macbeth.h"
 #include "math/stat.h"
-#include "walk/walk.h"
+#include "walk/core/walk.h"
 
 static imp_context *ctx;
 static struct imp_arena arena;

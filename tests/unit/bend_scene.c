@@ -5,7 +5,7 @@
 #include "imp_fail_alloc.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "walk/graded.h"
+#include "walk/graded/graded.h"
 #include <math.h>
 #include <stdarg.h>
 #include <unistd.h>

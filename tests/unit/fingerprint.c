@@ -7,7 +7,7 @@
 #include "imp_tap.h"
 #include "math/hash.h"
 #include "scene/scene.h"
-#include "walk/walk_integrator.h"
+#include "walk/core/walk_integrator.h"
 #include <stdlib.h>
 
 static imp_context *ctx;

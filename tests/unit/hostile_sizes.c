@@ -6,7 +6,7 @@
 #include "imp_fail_alloc.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "walk/walk.h"
+#include "walk/core/walk.h"
 
 static imp_context *ctx;
 static size_t live, peak;

@@ -8,9 +8,9 @@
 #include "color/spectrum.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "walk/segment.h"
-#include "walk/walk.h"
-#include "walk/walk_integrator.h"
+#include "walk/core/segment.h"
+#include "walk/core/walk.h"
+#include "walk/core/walk_integrator.h"
 #include <math.h>
 
 static imp_context *ctx;

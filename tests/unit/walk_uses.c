@@ -10,7 +10,7 @@
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "kind/build.h"
-#include "walk/walk.h"
+#include "walk/core/walk.h"
 #include <math.h>
 
 enum { D = 5, WALKS = 200 };

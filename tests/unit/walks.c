@@ -6,7 +6,7 @@
  * still add up to 1, or roulette that is merely unwise, leave every picture right. */
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "walk/walk.h"
+#include "walk/core/walk.h"
 #include <math.h>
 
 static imp_context *ctx;

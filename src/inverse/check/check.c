@@ -2,7 +2,7 @@
 #include "check.h"
 #include "base/team.h"
 #include "inverse/estimate/problem_tracer.h"
-#include "walk/run.h"
+#include "walk/run/run.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

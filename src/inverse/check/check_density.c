@@ -13,7 +13,7 @@
 #include "check_walks.h"
 #include "math/rng.h"
 #include "math/warp.h"
-#include "walk/vertex.h"
+#include "walk/core/vertex.h"
 #include <math.h>
 #include <string.h>
 

@@ -21,7 +21,7 @@
 #include "check.h"
 #include "film/film_picture.h"
 #include "inverse/problem/loss.h"
-#include "walk/baseline.h"
+#include "walk/path/baseline.h"
 #include <math.h>
 #include <string.h>
 

@@ -4,7 +4,7 @@
  * light by their own draws and by directions drawn without them. */
 #include "math/warp.h"
 #include "selftest.h"
-#include "walk/walk.h"
+#include "walk/core/walk.h"
 
 struct light {
     const struct imp_scene *scene;

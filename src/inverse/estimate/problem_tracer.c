@@ -5,9 +5,9 @@
 #include "film/film_measure.h"
 #include "film/film_picture.h"
 #include "replicates.h"
-#include "walk/baseline.h"
-#include "walk/graded.h"
-#include "walk/light_walk.h"
+#include "walk/graded/graded.h"
+#include "walk/lights/light_walk.h"
+#include "walk/path/baseline.h"
 #include <string.h>
 
 /* The attached form of the exponent here has neither the gradient of what arrives nor

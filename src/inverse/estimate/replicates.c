@@ -3,8 +3,8 @@
 #include "adjoint.h"
 #include "film/film_filter.h"
 #include "inverse/problem/loss.h"
-#include "walk/run.h"
-#include "walk/store.h"
+#include "walk/kept/store.h"
+#include "walk/run/run.h"
 #include <math.h>
 
 #define WIDE_MANY    16  /* samples per pixel */

@@ -13,7 +13,7 @@
 
 #include "base/fixed_sum.h"
 #include "search/metric.h"
-#include "walk/walk.h"
+#include "walk/core/walk.h"
 
 #define IMP_TALLY_DENSE 1024 /* numbers, above which the hash table is used */
 #define IMP_TALLY_FULL  16384

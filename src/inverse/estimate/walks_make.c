@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Walks are drawn and kept (walk/store.h), by all threads, tile by tile. Of a team, every
+ * Walks are drawn and kept (walk/kept/store.h), by all threads, tile by tile. Of a team, every
  * rank keeps all of them, and evaluates its share. */
 #include "walks_make.h"
 #include "base/arguments.h"
@@ -9,7 +9,7 @@
 #include "film/film_measure.h"
 #include "replicates.h"
 #include "scene/in_medium.h"
-#include "walk/run.h"
+#include "walk/run/run.h"
 #include <string.h>
 
 #define SURVIVAL 0.8

@@ -2,7 +2,7 @@
 #ifndef IMP_INVERSE_WALKS_MAKE_H
 #define IMP_INVERSE_WALKS_MAKE_H
 
-#include "walk/store.h"
+#include "walk/kept/store.h"
 
 /* The walks of some sensors, marked [n_sensors], drawn at the scene's present parameters.
  * options have their defaults filled in; run->sensor is ignored. free [n_params]: those

@@ -25,7 +25,7 @@
 #include "base/arguments.h"
 #include "inverse/problem/target_channels.h"
 #include "math/hash.h"
-#include "walk/run.h"
+#include "walk/run/run.h"
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>

@@ -8,9 +8,9 @@
 #include "inverse/gradient/objective_gradient.h"
 #include "inverse/gradient/variate.h"
 #include "inverse/problem/loss.h"
-#include "walk/light_walk.h"
-#include "walk/run.h"
-#include "walk/store.h"
+#include "walk/kept/store.h"
+#include "walk/lights/light_walk.h"
+#include "walk/run/run.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

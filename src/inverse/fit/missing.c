@@ -20,7 +20,7 @@
 #include "math/linalg.h"
 #include "math/rng.h"
 #include "search/optimize.h"
-#include "walk/run.h"
+#include "walk/run/run.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

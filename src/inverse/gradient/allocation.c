@@ -4,7 +4,7 @@
 #include "film/film_filter.h"
 #include "film/film_tiles.h"
 #include "inverse/problem/loss.h"
-#include "walk/walk_integrator.h"
+#include "walk/core/walk_integrator.h"
 #include <math.h>
 #include <string.h>
 

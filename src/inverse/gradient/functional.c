@@ -9,8 +9,8 @@
 #include "math/hash.h"
 #include "objective_gradient.h"
 #include "scene/unlit.h"
-#include "walk/light_walk.h"
-#include "walk/run.h"
+#include "walk/lights/light_walk.h"
+#include "walk/run/run.h"
 #include <math.h>
 #include <string.h>
 

@@ -6,7 +6,7 @@
  * depend on each other (Szekely and Bakirov, Probab. Theory Relat. Fields 126, 2003). */
 #include "allocation.h"
 #include "base/arguments.h"
-#include "walk/looks.h"
+#include "walk/run/looks.h"
 #include <math.h>
 #include <string.h>
 

@@ -7,7 +7,7 @@
 #include "inverse/estimate/problem_tracer.h"
 #include "inverse/estimate/replicates.h"
 #include "light_gradient.h"
-#include "walk/run.h"
+#include "walk/run/run.h"
 #include <string.h>
 
 #define JACOBIAN_MAX 256

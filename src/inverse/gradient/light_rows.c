@@ -7,7 +7,7 @@
 #include "film/film_picture.h"
 #include "inverse/estimate/channel_sink.h"
 #include "light_gradient.h"
-#include "walk/both.h"
+#include "walk/both/both.h"
 #include <string.h>
 
 struct rows {

@@ -11,8 +11,8 @@
 #include "inverse/estimate/replicates.h"
 #include "inverse/problem/loss.h"
 #include "light_gradient.h"
-#include "walk/run.h"
-#include "walk/store.h"
+#include "walk/kept/store.h"
+#include "walk/run/run.h"
 #include <math.h>
 #include <string.h>
 

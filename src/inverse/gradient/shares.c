@@ -13,7 +13,7 @@
 #include "film/film_picture.h"
 #include "inverse/estimate/problem_tracer.h"
 #include "inverse/estimate/replicates.h"
-#include "walk/run.h"
+#include "walk/run/run.h"
 #include <importon/report.h>
 #include <math.h>
 

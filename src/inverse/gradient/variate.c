@@ -3,7 +3,7 @@
 #include "base/arguments.h"
 #include "film/film_filter.h"
 #include "inverse/problem/loss.h"
-#include "walk/walk_integrator.h"
+#include "walk/core/walk_integrator.h"
 #include <string.h>
 
 /* ---- Where they are possible ----------------------------------------------------- */

@@ -5,7 +5,7 @@
 #include "match.h"
 #include "scene/theta_near.h"
 #include "search/optimize.h"
-#include "walk/run.h"
+#include "walk/run/run.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -11,7 +11,7 @@
 #include "color/wavelength.h"
 #include "scene/camera_gain.h"
 #include "scene/scene.h"
-#include "walk/walk.h"
+#include "walk/core/walk.h"
 
 struct imp_problem;
 struct imp__allocation;

@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A walk from a light while it is decided: what the files that do it share. It begins on
+ * a light (light_start.c), goes on vertex by vertex (light_walk.c), and from each vertex
+ * light reaches the sensor (light_reach.c).
+ *
+ * Depth: a connection from vertex k, 0 on the light, makes a path of k + 1 segments, and a
+ * sensor that is met there one of k; they count up to max_depth. Vertices where light goes
+ * straight on, which connections through media pass, are left out (imp_step.straight). */
+#ifndef IMP_WALK_LIGHT_STEP_H
+#define IMP_WALK_LIGHT_STEP_H
+
+#include "light_walk.h"
+#include "walk/core/guided.h"
+
+struct imp_light_step {
+    struct imp_step s;
+    struct imp_light_walk *out;
+    struct imp_reach **end; /* of the list */
+    /* The ray in flight: its density per area across it, where the sky sent it; else 0. */
+    double pdf_across;
+    double passed; /* length of the way to where it begins, from where a connection could
+                      have been made: light went straight on in between */
+    double point[2];       /* numbers that the point on the light was made of */
+    struct imp_both *both; /* of a sample from both ends; NULL: none */
+};
+
+static inline bool imp__light_depth_allows(const struct imp_step *s, int segments)
+{
+    const int max = s->tracer->integrator->max_depth;
+    return max < 0 || segments - s->straight <= max;
+}
+
+/* ---- light_walk.c ---- */
+/* All steps of out->walk, whose key, time and wavelengths are set. */
+void imp__light_walk_follow(const struct imp_tracer *tracer, struct imp_arena *arena,
+                            struct imp_light_walk *out);
+/* The values of what reaches the film. */
+void imp__light_walk_close(const struct imp_tracer *tracer, struct imp_light_walk *out);
+
+/* ---- light_start.c ---- */
+/* Vertex 0: the light that sends the walk, and the ray that leaves it. False: nothing is
+ * sent. */
+bool imp__light_start(struct imp_light_step *w);
+
+/* ---- light_reach.c ---- */
+/* The surface of the sensor, met at v. */
+void imp__light_meet_sensor(struct imp_light_step *w, struct imp_vertex *v,
+                            const struct imp_surface *at);
+/* A connection of a vertex that scatters, at `at`, to the sensor. */
+void imp__light_connect_vertex(struct imp_light_step *w, struct imp_vertex *v,
+                               const struct imp_surface *at,
+                               const struct imp_frame *frame);
+/* Can a connection reach a pixel? */
+bool imp__light_on_film(const struct imp_sensor *s, const struct imp_sensor_sample *to);
+/* The parts of a connection, for vertices and for lights: the random numbers of the
+ * point on the sensor; the weight against a walk that meets the sensor, which has density
+ * `pdf` per steradian, or `across` per area across the ray; the shadow ray; and, if the
+ * sensor is seen along it, the value f le weight. */
+void imp__light_sensor_numbers(const struct imp_step *s, double u[4]);
+double imp__light_connect_weight(const struct imp_step *s,
+                                 const struct imp_sensor_sample *to, double pdf,
+                                 double across);
+void imp__light_shadow_aim(const struct imp_surface *from,
+                           const struct imp_sensor_sample *to, struct imp_shadow *shadow);
+void imp__light_connect(struct imp_light_step *w, struct imp_vertex *v,
+                        const struct imp_surface *from, const struct imp_shadow *shadow,
+                        const struct imp_sensor_sample *to, imp_spec f, imp_spec le,
+                        double weight);
+
+#endif

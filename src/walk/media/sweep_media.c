@@ -1,0 +1,107 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "sweep_media.h"
+#include "walk/core/vertex.h"
+#include "walk/path/baseline.h"
+
+void imp__extinction_drop(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                          imp_spec *x)
+{
+    const struct imp_medium *m;
+    if (v->d.scatterer != IMP_IN_MEDIUM || tracer->collisions_stand || v->d.stands)
+        return;
+    m = v->bsdf->self;
+    for (int j = 0; j < m->n_own; j++)
+        if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION) x[j] = (imp_spec){0};
+}
+
+void imp__point_scatter(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                        const struct imp_texcoord *at, const imp_spec *bar,
+                        struct imp_sink *sink)
+{
+    const struct imp_medium *m = v->bsdf->self;
+    for (int j = 0; j < m->n_in; j++)
+        if (j >= m->n_own || tracer->collisions_stand || v->d.stands ||
+            !(m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION))
+            imp__inputs_scatter(&m->input[j], 1, at, &bar[j], sink);
+}
+
+/* w_k without the value of what the segment crosses. */
+static imp_spec weight_before(const struct imp_vertex *v)
+{
+    const double scale = (double)v->d.passes / ((double)v->d.pdf * (double)v->d.survive);
+    imp_spec f = imp__spec(1);
+    if (v->bsdf) {
+        const struct imp_dirs dirs = imp__vertex_dirs(v);
+        imp__bsdf_eval(v->bsdf, v->carried, v->in, &dirs, &f);
+    } else if (v->d.scatterer == IMP_AT_LIGHT) {
+        f = v->in[0];
+    }
+    return f * scale;
+}
+
+/* Of the segment that goes on, does something stand for its derivative? */
+static bool segment_counts(const struct imp_tracer *tracer, const struct imp_vertex *v)
+{
+    return v->on && v->d.goes_on && imp__track_counts(tracer, v->on);
+}
+
+/* d B_k / d T of the way to the light. */
+static imp_spec light_before(const struct imp_vertex *v)
+{
+    return v->light_f * v->light_e * (double)v->d.light.weight;
+}
+
+/* T of the way to the light. */
+static imp_spec to_light_value(const struct imp_vertex *v)
+{
+    return v->light_w * (1 / (double)v->d.light.weight);
+}
+
+void imp__media_scatter(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                        imp_spec P, imp_spec own, struct imp_sink *sink)
+{
+    if (v->to_light) {
+        const imp_spec T = to_light_value(v);
+        imp__track_sweep(tracer, v->to_light, v->carried, &T, own * light_before(v),
+                         sink);
+    }
+    if (segment_counts(tracer, v))
+        imp__track_sweep(tracer, v->on, v->carried, NULL,
+                         P * weight_before(v) * (v->beyond - imp__baseline(tracer)),
+                         sink);
+    if (v->probe) {
+        const struct imp_medium *m = v->probe->medium;
+        imp_spec d[IMP_INPUTS_MAX];
+        imp__probe_d(tracer, v, d);
+        for (int j = 0; j < m->n_own; j++) {
+            d[j] *= P;
+            if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)
+                imp__inputs_scatter(&m->input[j], 1, &v->probe->at, &d[j], sink);
+        }
+    }
+}
+
+imp_spec imp__media_tangent(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                            imp_spec own, imp_dot_fn *dot, const void *x_dot)
+{
+    imp_spec L_dot = {0};
+    if (v->to_light) {
+        const imp_spec T = to_light_value(v);
+        L_dot += own * light_before(v) *
+                 imp__track_tangent(tracer, v->to_light, v->carried, &T, dot, x_dot);
+    }
+    if (segment_counts(tracer, v))
+        L_dot += weight_before(v) * (v->beyond - imp__baseline(tracer)) *
+                 imp__track_tangent(tracer, v->on, v->carried, NULL, dot, x_dot);
+    if (v->probe) {
+        const struct imp_medium *m = v->probe->medium;
+        imp_spec d[IMP_INPUTS_MAX], in_dot;
+        imp__probe_d(tracer, v, d);
+        for (int j = 0; j < m->n_own; j++) {
+            if (!(m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)) continue;
+            imp__inputs_tangent(&m->input[j], 1, &v->probe->at, dot, x_dot, &in_dot);
+            L_dot += d[j] * in_dot;
+        }
+    }
+    return L_dot;
+}
