@@ -372,6 +372,11 @@ IMP_API void imp_scene_mesh(imp_scene *scene, size_t n_vertices, size_t n_triang
  * pixels [height][width][channels], channels 1 or 3. */
 IMP_API void imp_scene_image(imp_scene *scene, int width, int height, int channels,
                              const float *pixels);
+/** Values of the cells of the open volume of type "gridvolume", in place of `filename`, in the
+ * order of its files: values [nz][ny][nx][channels], channels 1 or 3, finite. The grid fills
+ * the unit cube, to which `to_world` applies; they are copied. */
+IMP_API void imp_scene_grid(imp_scene *scene, int nx, int ny, int nz, int channels,
+                            const float *values);
 /** Finish a scene built by calls: make all objects, check them, build what rays need.
  * @return IMP_OK; the first error of the calls before; IMP_E_SCENE; IMP_E_UNSUPPORTED;
  *         IMP_E_NOMEM; IMP_E_ARG if it has been committed already. */

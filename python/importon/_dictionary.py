@@ -2,6 +2,7 @@
 """Scenes as dictionaries, Mitsuba's way, through the library's building calls."""
 from __future__ import annotations
 
+import builtins
 import ctypes
 import os
 from collections.abc import Mapping, Sequence
@@ -11,11 +12,13 @@ import numpy as np
 
 from ._array import address, numbers
 from ._library import ArgumentError, Handle, context, lib, not_inside, text, warn_said
+from ._objects import grid_of, is_array, is_mesh, matrix_of, mesh_of, pixels_of
 from ._scene import Scene, _load_options
 from ._transform import Transform4f
 
-_MESH = {"positions": ("vertex_positions", "positions"), "normals": ("vertex_normals", "normals"),
-         "uvs": ("vertex_texcoords", "uvs"), "indices": ("faces", "indices")}
+# Keys under which an object takes what would be in a file, by its type.
+_PICTURE = {"bitmap": ("bitmap", "data", "filename"), "envmap": ("bitmap", "data", "filename")}
+_GRID = ("grid", "data", "filename")
 
 
 class _Builder:
@@ -39,8 +42,7 @@ class _Builder:
         function(self.scene, text(name, "name"), address(v))
 
     def transform(self, name: str, value: Any) -> None:
-        m = numbers(value.matrix if isinstance(value, Transform4f) else value, name, shape=(4, 4))
-        lib.imp_scene_transform(self.scene, text(name, "name"), address(m))
+        lib.imp_scene_transform(self.scene, text(name, "name"), address(value))
 
     def spectrum(self, name: str, value: Any) -> None:
         """A number; pairs of wavelength in nm and value; a string or file of them."""
@@ -72,50 +74,50 @@ class _Builder:
     def end(self) -> None:
         lib.imp_scene_end(self.scene)
 
-    def mesh(self, d: dict[str, Any]) -> None:
-        given: dict[str, Any] = {}
-        for key, names in _MESH.items():
-            for n in names:
-                if n in d:
-                    given[key] = d.pop(n)
-        if "positions" not in given or "indices" not in given:
-            raise ArgumentError("a mesh needs 'vertex_positions' and 'faces'")
+    def mesh(self, name: str, d: dict[str, Any]) -> None:
+        m = mesh_of(d, name)
+        lib.imp_scene_mesh(self.scene, len(m["positions"]), len(m["indices"]), address(m["positions"]),
+                           address(m.get("normals")), address(m.get("uvs")), address(m["indices"]))
 
-        def wide(key: str, n: int) -> Any:
-            return None if key not in given else numbers(
-                np.reshape(numbers(given[key], key, np.float32), (-1, n)), key, np.float32)
-
-        positions, normals, uvs = wide("positions", 3), wide("normals", 3), wide("uvs", 2)
-        faces = np.reshape(numbers(given["indices"], "faces"), (-1, 3))
-        if faces.size and (faces.min() < 0 or faces.max() >= len(positions) or np.any(faces != np.floor(faces))):
-            raise ArgumentError("faces are numbers of vertices, 0 to %d" % (len(positions) - 1))
-        indices = np.ascontiguousarray(faces, dtype=np.uint32)
-        for key, array in (("normals", normals), ("uvs", uvs)):
-            if array is not None and len(array) != len(positions):
-                raise ArgumentError("%d %s for %d vertices" % (len(array), key, len(positions)))
-        lib.imp_scene_mesh(self.scene, len(positions), len(indices), address(positions), address(normals),
-                           address(uvs), address(indices))
-
-    def image(self, pixels: Any) -> None:
-        p = numbers(pixels, "bitmap", np.float32)
-        p = p[..., None] if p.ndim == 2 else p
-        if p.ndim != 3 or p.shape[2] not in (1, 3):
-            raise ArgumentError("bitmap has shape %s: (height, width) or (height, width, 1 or 3) is wanted" % (p.shape,))
-        lib.imp_scene_image(self.scene, p.shape[1], p.shape[0], p.shape[2], address(p))
+    def bulk(self, type: str, name: str, d: dict[str, Any]) -> None:
+        """Arrays in place of files, taken out of d."""
+        if type == "mesh":
+            self.mesh(name, d)
+        for key in _PICTURE.get(type, ()):
+            if is_array(d.get(key)) or hasattr(d.get(key), "srgb_gamma"):
+                p = pixels_of(d.pop(key), "%s: %s" % (name, key), bool(d.get("raw", False)))
+                lib.imp_scene_image(self.scene, p.shape[1], p.shape[0], p.shape[2], address(p))
+        for key in _GRID if type == "gridvolume" else ():
+            if is_array(d.get(key)):
+                g = grid_of(d.pop(key), "%s: %s" % (name, key))
+                lib.imp_scene_grid(self.scene, g.shape[2], g.shape[1], g.shape[0], g.shape[3], address(g))
 
     def value(self, name: str, value: Any, top: bool) -> None:
+        matrix = None
         if isinstance(value, Mapping):
             self.object(name, dict(value), top)
-        elif isinstance(value, Transform4f):
-            self.transform(name, value)
+        elif is_mesh(value):
+            self.object(name, {"type": "mesh", "mesh": value}, top)
         elif isinstance(value, str) or hasattr(value, "__fspath__"):
             lib.imp_scene_string(self.scene, text(name, "name"), text(value, name))
         elif isinstance(value, (bool, int, float, np.bool_, np.integer, np.floating)):
             self.number(name, value)
-        elif np.shape(value) == (4, 4):
-            self.transform(name, value)
+        elif hasattr(value, "matrix") or is_array(value):
+            matrix = matrix_of(value, name)
+            if matrix is not None:
+                self.transform(name, matrix)
+            elif np.size(v := numbers(value, name)) == 1 and not isinstance(value, (list, tuple)):
+                self.number(name, float(v.reshape(())))
+            elif v.size == 3:
+                self.three(lib.imp_scene_vector, name, v.reshape(3))
+            else:
+                raise ArgumentError("%s is an array of shape %s: a number, three numbers or a [4][4] matrix are values "
+                                    "here; pictures, grids and meshes are given to objects of type 'bitmap', 'envmap', "
+                                    "'gridvolume' and 'mesh'" % (name, v.shape))
         else:
-            self.three(lib.imp_scene_vector, name, value)
+            raise ArgumentError("%s is a %s: numbers, strings, arrays, transforms and dictionaries are values; for an "
+                                "object of another program give the dictionary that it was made from"
+                                % (name, builtins.type(value).__name__))
 
     def object(self, name: str, d: dict[str, Any], top: bool) -> None:
         type = d.pop("type", None)
@@ -130,11 +132,7 @@ class _Builder:
         else:
             # At the top a key is the object's id; below, its slot, unless it has an id too.
             self.begin(type, d.pop("id", name if top else None), None if top else name)
-            if type == "mesh":
-                self.mesh(d)
-            for key in ("bitmap", "data"):
-                if type == "bitmap" and key in d:
-                    self.image(d.pop(key))
+            self.bulk(type, name, d)
             for key, v in d.items():
                 self.value(key, v, False)
             self.end()
@@ -152,11 +150,15 @@ def load_dict(dictionary: Mapping[str, Any], *, mode: Optional[str] = None, sear
     dictionary : mapping
         ``{"type": "scene", ...}``. Objects are dictionaries with a "type"; at the top
         their keys are their ids. Values are numbers, strings, three numbers (points and
-        vectors), transforms (`ScalarTransform4f`, or [4][4]), colours ``{"type": "rgb",
-        "value": ...}``, spectra ``{"type": "spectrum", "value": number or pairs}`` and
-        references ``{"type": "ref", "id": ...}``. A "mesh" takes arrays:
-        "vertex_positions" [n][3], "faces" [m][3], "vertex_normals" and
-        "vertex_texcoords"; a "bitmap" takes "bitmap", linear [height][width][1 or 3].
+        vectors), transforms (`ScalarTransform4f`, any object with a `matrix`, or [4][4]),
+        colours ``{"type": "rgb", "value": ...}``, spectra ``{"type": "spectrum", "value":
+        number or pairs}`` and references ``{"type": "ref", "id": ...}``. Arrays are taken
+        where files are, from NumPy and anything with an array interface: a "bitmap" or
+        "envmap" takes "bitmap" or "data", [height][width] or [height][width][channels],
+        of which uint8 and uint16 are those of a file (sRGB unless "raw"), floats linear,
+        and alpha is left out; a "gridvolume" takes "grid" or "data", [nz][ny][nx] or
+        [nz][ny][nx][1 or 3]; a "mesh" takes "vertex_positions" [n][3], "faces" [m][3],
+        "vertex_normals" and "vertex_texcoords", or "mesh", an object that has them.
     mode, search, upsampling, parallel, optimize
         As `load_file`'s.
 

@@ -275,9 +275,12 @@ static enum imp_status attach(struct imp_scene *scene, struct imp_node *node)
         IMP_TRY(measured_attach(scene, node));
     if (strcmp(node->tag, "emitter") == 0 && strcmp(node->type, "envmap") == 0)
         IMP_TRY(sky_expand(scene, node));
-    if (strcmp(node->tag, "volume") == 0 && strcmp(node->type, "gridvolume") == 0 &&
-        !node->grid)
-        IMP_TRY(grid_attach(scene, node));
+    if (strcmp(node->tag, "volume") == 0 && strcmp(node->type, "gridvolume") == 0) {
+        if (!node->grid) IMP_TRY(grid_attach(scene, node));
+        else if (imp__node_prop(node, "filename"))
+            IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_SCENE,
+                                    "has cells and a 'filename': only one can be"));
+    }
     if (bitmap && !node->image) IMP_TRY(image_attach(scene, node));
     else if (bitmap && imp__node_prop(node, "filename"))
         IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_SCENE,

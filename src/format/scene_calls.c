@@ -9,6 +9,7 @@
 #include "search.h"
 #include "tree.h"
 #include "value.h"
+#include "vol_file.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -330,6 +331,43 @@ void imp_scene_image(imp_scene *scene, int width, int height, int channels,
                      const float *pixels)
 {
     if (ready(scene)) keep(scene, image(scene, width, height, channels, pixels));
+}
+
+static enum imp_status grid(struct imp_scene *scene, const int n[3], int channels,
+                            const float *values)
+{
+    imp_context *ctx = scene->ctx;
+    struct imp_node *node = top(scene);
+    if (!open_is(scene, "volume", "gridvolume") || node->grid)
+        return imp__node_error(ctx, node, IMP_E_ARG,
+                               "cells are for a volume of type 'gridvolume', once");
+    if (!values) return imp__node_error(ctx, node, IMP_E_ARG, "values is NULL");
+    size_t cells = 1;
+    for (int k = 0; k < 3; k++)
+        if (n[k] < 1 || __builtin_mul_overflow(cells, (size_t)n[k], &cells) ||
+            cells > IMP_VOL_BYTES_MAX / (3 * sizeof(float)))
+            return imp__node_error(ctx, node, IMP_E_ARG, "a grid of %d x %d x %d cells",
+                                   n[0], n[1], n[2]);
+    if (channels != 1 && channels != 3)
+        return imp__node_error(ctx, node, IMP_E_ARG,
+                               "a grid with %d channels; 1 or 3 are possible", channels);
+    const size_t count = cells * (size_t)channels;
+    IMP_CHECKED(floats_check(ctx, node, "values", values, count));
+    struct imp_grid_data *data = imp__arena_array(&scene->files, 1, sizeof *data);
+    float *copy = data ? imp__arena_take(&scene->files, count, sizeof *copy) : NULL;
+    if (!copy) return imp__error(ctx, IMP_E_NOMEM, "scene: no memory for a grid");
+    memcpy(copy, values, count * sizeof *copy);
+    *data =
+        (struct imp_grid_data){{n[0], n[1], n[2]}, channels, {0, 0, 0, 1, 1, 1}, copy};
+    node->grid = data;
+    return IMP_OK;
+}
+
+void imp_scene_grid(imp_scene *scene, int nx, int ny, int nz, int channels,
+                    const float *values)
+{
+    if (ready(scene))
+        keep(scene, grid(scene, (const int[3]){nx, ny, nz}, channels, values));
 }
 
 /* ---- Commit -------------------------------------------------------------------- */

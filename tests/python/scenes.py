@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenes from files, strings and dictionaries; what is said of bad ones."""
 import os
+import struct
+import tempfile
 import warnings
+import zlib
 
 import importon as im
 import numpy as np
@@ -137,6 +140,145 @@ def test_meshes_and_bitmaps():
     del d["sheet"]["vertex_texcoords"]
     d["sheet"]["vertex_positions"] = positions * np.nan
     raises(im.Error, lambda: im.load_dict(d))
+
+def png(path, pixels):
+    """A PNG of uint8 or uint16 [h][w][channels]"""
+    h, w, channels = pixels.shape
+    rows = b"".join(b"\0" + row.astype(">u%d" % pixels.itemsize).tobytes() for row in pixels)
+    chunks = [(b"IHDR", struct.pack(">IIBBBBB", w, h, 8 * pixels.itemsize, {1: 0, 3: 2, 4: 6}[channels], 0, 0, 0)),
+              (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]
+    with open(path, "wb") as f:
+        f.write(b"\x89PNG\r\n\x1a\n")
+        for kind, data in chunks:
+            f.write(struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)))
+
+
+class Bitmap:
+    """As Mitsuba's: an array interface, and whether values are encoded"""
+    def __init__(self, pixels, encoded):
+        self.pixels, self.encoded = pixels, encoded
+        self.__array_interface__ = pixels.__array_interface__
+
+    def srgb_gamma(self):
+        return self.encoded
+
+
+class Mesh:
+    """As Mitsuba's: flat buffers"""
+    class_name = "SmoothDiffuse"
+
+    def __init__(self, bsdf="SmoothDiffuse[reflectance=[value=0.5]]"):
+        self.text = bsdf
+
+    def __str__(self):
+        return self.text
+
+    def bsdf(self):
+        return self
+
+    def vertex_positions_buffer(self):
+        return np.array([-1, -1, 0, 1, -1, 0, 0, 1, 0], np.float32)
+
+    def faces_buffer(self):
+        return np.array([0, 1, 2], np.uint32)
+
+    def has_vertex_normals(self):
+        return False
+
+    has_vertex_texcoords = has_vertex_normals
+
+
+def texels(picture, raw=False, sky=False, key="bitmap"):
+    d = dictionary()
+    if sky:
+        d["sky"] = {"type": "envmap", key: picture}
+    else:
+        d["paint"]["reflectance"] = {"type": "bitmap", key: picture, "raw": raw}
+    p = im.traverse(im.load_dict(d))
+    return p[[n for n in p if np.ndim(p[n]) == 3][0]]
+
+
+def test_pictures_of_whole_numbers():
+    """Arrays and bitmaps of 8 and 16 bits are what a file of them is, raw or not; alpha is left out"""
+    rng = np.random.default_rng(2)
+    assert abs(texels(np.full((2, 2, 3), 128, np.uint8)) - .21586).max() < 1e-5
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "a.png")
+        for dtype in (np.uint8, np.uint16):
+            for channels in (1, 3, 4):
+                pixels = rng.integers(0, np.iinfo(dtype).max, (3, 5, channels), endpoint=True).astype(dtype)
+                png(path, pixels)
+                for raw in (False, True):
+                    if raw and dtype == np.uint16:
+                        continue
+                    file = texels(path, raw, key="filename")
+                    for given in (pixels, Bitmap(pixels, True)):
+                        for key in ("bitmap", "data", "filename"):
+                            assert np.allclose(texels(given, raw, key=key), file, rtol=2e-7, atol=0), (dtype, channels, raw)
+                assert np.allclose(texels(Bitmap(pixels, False)), texels(pixels, raw=True), rtol=2e-7)
+                file = texels(path, sky=True, key="filename")
+                assert np.allclose(texels(pixels, sky=True), file, rtol=2e-7)
+    linear = rng.random((3, 5, 4)).astype(np.float32)
+    assert np.array_equal(texels(linear), linear[..., :3]) and np.array_equal(texels(Bitmap(linear, False)), linear[..., :3])
+    raises(im.ArgumentError, lambda: texels(np.zeros((2, 2, 3), int)), "bitmap", "uint8")
+    raises(im.ArgumentError, lambda: texels(np.zeros((2, 2, 5))), "bitmap", "channels")
+    raises(im.ArgumentError, lambda: texels(np.zeros((0, 2))), "bitmap")
+
+
+def test_grids():
+    """Cells of gridvolume from arrays are those of a file; errors name the key"""
+    cells = np.random.default_rng(3).random((2, 3, 4)).astype(np.float32)
+
+    def fog(**grid):
+        d = dictionary()
+        d["integrator"] = {"type": "volpath"}
+        d["cloud"] = {"type": "cube", "bsdf": {"type": "null"}, "interior": {
+            "type": "heterogeneous", "albedo": .5, "sigma_t": {"type": "gridvolume", **grid}}}
+        s = im.load_dict(d)
+        p = im.traverse(s)
+        return p[[n for n in p if np.ndim(p[n]) >= 3][0]], np.array(im.render(s, spp=2))
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "a.vol")
+        with open(path, "wb") as f:
+            f.write(b"VOL\x03" + struct.pack("<iiiii6f", 1, 4, 3, 2, 1, 0, 0, 0, 1, 1, 1) + cells.tobytes())
+        file, picture = fog(filename=path)
+        raises(im.Error, lambda: fog(filename=path, grid=cells), "filename")
+    for key in ("grid", "data", "filename"):
+        for given in (cells, cells[..., None], cells.tolist()):
+            got, seen = fog(**{key: given})
+            assert np.array_equal(got, file) and np.array_equal(seen, picture)
+    raises(im.ArgumentError, lambda: fog(grid=cells[0]), "sigma_t: grid", "(nz, ny, nx)")
+    raises(im.ArgumentError, lambda: fog(grid=np.zeros((2, 2, 2, 2))), "sigma_t: grid")
+    raises(im.Error, lambda: fog(grid=cells * np.nan), "values[0]")
+
+
+def test_objects_of_others():
+    """Objects with .matrix, meshes, numbers as arrays; what cannot be read is named"""
+    class Transform:
+        def __init__(self, matrix):
+            self.matrix = matrix
+    d = dictionary()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", im.ImportonWarning)
+        picture = np.array(im.render(im.load_dict(d), spp=2))
+    for matrix in (d["floor"]["to_world"].matrix, d["floor"]["to_world"].matrix[..., None]):
+        d["floor"]["to_world"] = Transform(matrix)
+        assert np.array_equal(im.render(im.load_dict(d), spp=2), picture)
+    d["floor"]["to_world"] = Transform(np.eye(3))
+    raises(im.ArgumentError, lambda: im.load_dict(d), "to_world", "(3, 3)")
+    d = dictionary()
+    d["ball"]["radius"], d["ball"]["center"] = np.array([.4]), np.array([[.5], [0], [0]])
+    assert np.array_equal(im.render(im.load_dict(d), spp=2), picture)
+    d["sheet"] = Mesh()
+    d["other"] = {"type": "mesh", "mesh": Mesh("Rough"), "bsdf": {"type": "diffuse", "id": "paper"}}
+    assert "paper.reflectance.value" in im.traverse(im.load_dict(d))
+    d["sheet"] = Mesh("Rough")
+    raises(im.ArgumentError, lambda: im.load_dict(d), "sheet", "BSDF")
+    d["sheet"] = object()
+    raises(im.ArgumentError, lambda: im.load_dict(d), "sheet", "dictionary")
+    d["sheet"] = np.zeros((5, 5))
+    raises(im.ArgumentError, lambda: im.load_dict(d), "sheet", "(5, 5)")
 
 
 def test_transforms():

@@ -251,9 +251,10 @@ class Fixture:
             return self.context
         if kind == "imp_context": return context
         if kind == "imp_scene":
-            if re.match(r"imp_scene_(begin|end|bool|integer|float|string|vector|rgb|spectrum|transform|ref|mesh|image)$", function):
+            if re.match(r"imp_scene_(begin|end|bool|integer|float|string|vector|rgb|spectrum|transform|ref|mesh|image|grid)$", function):
                 s = self.make("imp_scene_create", context, None)
-                tag, kind = (b"texture", b"bitmap") if function.endswith("image") else (b"shape", b"mesh")
+                tag, kind = {"image": (b"texture", b"bitmap"), "grid": (b"volume", b"gridvolume")}.get(
+                    function.split("_")[-1], (b"shape", b"mesh"))
                 lib.imp_scene_begin(s, tag, kind, None, None)
                 return s
             return scene
@@ -372,7 +373,7 @@ class Fixture:
             scalars = {"fallback": 1., "fraction": 1., "seed": 1, "flags": 0, "size": 8, "width": 4, "height": 4, "channels": 3, "length": len(self.good(xml, function)[0]) if "load_string" in function else 0, "weight": 1., "order": 1,
                        "index": 1.5 if a.ctype is C.c_double else 0, "cells": 1., "um": .5, "k": 1.,
                        "radius": 2., "bytes": 1 << 20, "hi": 3., "lo": 1., "value": 1.5 if a.ctype is C.c_double else 1,
-                       "n_vertices": 3, "n_triangles": 1, "layers": 1, "a": 1., "pilots": 2, "n_groups": 1, "low": .1, "high": .9,
+                       "n_vertices": 3, "n_triangles": 1, "layers": 1, "nx": 1, "ny": 1, "nz": 1, "a": 1., "pilots": 2, "n_groups": 1, "low": .1, "high": .9,
                        "n": {"imp_scene_set_values": 1, "imp_scene_spectrum": 2, "imp_problem_nlopt": 3}.get(function, 1)}
             zeros = {"scalar", "status", "cause", "sensor", "channel", "x", "y", "sample", "json", "i", "from_here",
                      "kind", "progress", "rays", "ray", "bundle", "n_walks", "target", "edge", "most", "subject", "from", "to"}

@@ -5,6 +5,7 @@
 #include "imp_fail_alloc.h"
 #include "imp_tap.h"
 #include <importon/importon.h>
+#include <limits.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <sys/stat.h>
@@ -201,6 +202,11 @@ enum fault {
     F_MESH_INDEX,
     F_MESH_NAN,
     F_IMAGE,
+    F_GRID_PLACE,
+    F_GRID_SIZE,
+    F_GRID_HUGE,
+    F_GRID_CHANNELS,
+    F_GRID_NAN,
     F_UNUSED,
     F_TYPE,
     N_FAULTS
@@ -232,6 +238,17 @@ static const struct {
     [F_MESH_NAN] = {"scene: shape (mesh): positions[3] is nan", IMP_E_ARG},
     [F_IMAGE] = {"scene: texture (bitmap): a picture of 2 x 0 with 3 channels",
                  IMP_E_ARG},
+    [F_GRID_PLACE] =
+        {"scene: volume (constvolume): cells are for a volume of type 'gridvolume', once",
+         IMP_E_ARG},
+    [F_GRID_SIZE] = {"scene: volume (gridvolume): a grid of 3 x 0 x 1 cells", IMP_E_ARG},
+    [F_GRID_HUGE] =
+        {"scene: volume (gridvolume): a grid of 2147483647 x 2147483647 x 9 cells",
+         IMP_E_ARG},
+    [F_GRID_CHANNELS] =
+        {"scene: volume (gridvolume): a grid with 2 channels; 1 or 3 are possible",
+         IMP_E_ARG},
+    [F_GRID_NAN] = {"scene: volume (gridvolume): values[3] is nan", IMP_E_ARG},
     [F_UNUSED] = {"scene: shape (sphere): not a property of this plugin: 'colour'",
                   IMP_E_SCENE},
     [F_TYPE] = {"scene: shape (sphere): property 'radius' must be a float, not a string",
@@ -268,6 +285,22 @@ static void fault_make(imp_scene *s, enum fault f)
     case F_IMAGE:
         imp_scene_begin(s, "texture", "bitmap", NULL, NULL);
         imp_scene_image(s, 2, 0, 3, xyz);
+        imp_scene_end(s);
+        return;
+    case F_GRID_PLACE:
+        imp_scene_begin(s, "volume", "constvolume", NULL, NULL);
+        imp_scene_grid(s, 3, 1, 1, 1, xyz);
+        imp_scene_end(s);
+        return;
+    case F_GRID_SIZE:
+    case F_GRID_HUGE:
+    case F_GRID_CHANNELS:
+    case F_GRID_NAN:
+        imp_scene_begin(s, "volume", "gridvolume", NULL, NULL);
+        if (f == F_GRID_SIZE) imp_scene_grid(s, 3, 0, 1, 1, xyz);
+        if (f == F_GRID_HUGE) imp_scene_grid(s, INT_MAX, INT_MAX, 9, 3, xyz);
+        if (f == F_GRID_CHANNELS) imp_scene_grid(s, 2, 2, 1, 2, xyz);
+        if (f == F_GRID_NAN) imp_scene_grid(s, 3, 1, 1, 3, nan_xyz);
         imp_scene_end(s);
         return;
     default: break;
