@@ -292,7 +292,7 @@ static enum imp_status pass_run(imp_context *ctx, const struct imp__functional *
                      .border = f->W ? imp__film_border(f->film) : 0,
                      .spp = imp__error_spp(f->spp)};
     const int width = f->film->crop_w, height = f->film->crop_h;
-    if (f->tracer.kept && (f->tracer.kept->set > 0 || f->tracer.kept->n < 2))
+    if (f->tracer.kept && (f->tracer.kept->source.set > 0 || f->tracer.kept->n < 2))
         IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
                            f->tracer.kept->n < 2
                                ? "one kept walk of a pixel tells no error: keep more"

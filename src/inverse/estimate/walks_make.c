@@ -148,7 +148,7 @@ enum imp_status imp__walks_sensor(struct imp_walks *w, const struct imp_active *
         const struct imp__target l2 = {.desc = {.sensor = index}};
         run.walks = w;
         const struct imp__replicates r = imp__replicates_of(scene, &l2, &run);
-        store->set = r.n / r.m;
+        store->source.set = r.n / r.m;
     }
 out:
     imp__release(w->ctx, numbers.sample);

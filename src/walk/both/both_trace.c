@@ -6,6 +6,7 @@
 #include "both.h"
 #include "kind/bsdf/transport.h"
 #include "walk/core/drawn.h"
+#include "walk/path/first_segment.h"
 #include "walk/path/meter.h"
 
 /* ---- Joints ------------------------------------------------------------------------ */

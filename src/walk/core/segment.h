@@ -2,7 +2,7 @@
  *
  * Segments join the vertices of a walk. What a ray crosses on its way, how it finds the
  * next vertex, and how that depends on parameters is known to the segment's kind alone:
- * straight through nothing (segment.c) or through media that scatter (tracking.c), or bent
+ * straight through nothing (straight.c) or through media that scatter (tracking.c), or bent
  * inside a body of graded index (graded.c).
  * A slot that is NULL has nothing to do. */
 #ifndef IMP_WALK_SEGMENT_H
@@ -71,9 +71,7 @@ struct imp_segment_ops {
                         const double *x_dot);
 };
 
+extern const struct imp_segment_ops imp__straight_ops;
 extern struct imp_segment imp__straight; /* nothing to keep */
-
-/* The kind that the first segment of a walk has. */
-const struct imp_segment_ops *imp__segment_first(const struct imp_tracer *tracer);
 
 #endif

@@ -137,7 +137,7 @@ static inline void imp__store_v3(imp_decided out[3], imp_v3 v)
     for (int k = 0; k < 3; k++) out[k] = rounded[k];
 }
 
-/* ---- trace.c ---- */
+/* ---- vertices.c ---- */
 /* A vertex behind the last one, with room for the inputs of its BSDF. NULL: the walk is
  * dropped. */
 struct imp_vertex *imp__vertex_add(struct imp_step *s, int n_in);
@@ -155,6 +155,7 @@ void imp__vertex_place(struct imp_step *s, struct imp_vertex *v,
 void imp__sky_meet(struct imp_step *s);
 /* The vertex that the first segment begins at, if it has a weight. False: no memory. */
 bool imp__sensor_vertex(struct imp_step *s);
+/* ---- trace.c ---- */
 /* Step after step from the ray in flight, until the walk ends; from a sensor that is a
  * surface, whose vertex comes first. */
 void imp__walk_on(struct imp_step *s);
@@ -190,15 +191,15 @@ bool imp__nest_begin(struct imp_step *s, const struct imp_medium *around, imp_v3
 enum imp_meeting imp__straight_meet(struct imp_step *s, struct imp_hit *hit);
 
 /* ---- evaluate.c: the values of a vertex from its decisions ---- */
-/* The index of a boundary is that of the medium behind it (graded.c). */
-void imp__graded_inputs(const struct imp_bsdf *b, const struct imp_shape *shape,
-                        const struct imp_texcoord *at, imp_spec *in);
+/* The index of a boundary is that of the body behind it (body_index.c). */
+void imp__body_inputs(const struct imp_bsdf *b, const struct imp_shape *shape,
+                      const struct imp_texcoord *at, imp_spec *in);
 static inline void imp__evaluate_inputs(const struct imp_bsdf *b,
                                         const struct imp_shape *shape,
                                         const struct imp_texcoord *at, imp_spec *in)
 {
     imp__inputs_eval(b->input, b->n_in, at, in);
-    if (imp_unlikely(shape && shape->body)) imp__graded_inputs(b, shape, at, in);
+    if (imp_unlikely(shape && shape->body)) imp__body_inputs(b, shape, at, in);
 }
 /* f with densities frozen becomes the weight of the step; T of the segment that follows
  * is not known yet. */

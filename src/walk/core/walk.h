@@ -36,9 +36,10 @@
 
 struct imp_store;
 struct imp_segment_ops;
-struct imp_track;      /* what a segment crosses (tracking.h) */
-struct imp_probe;      /* of an extinction's derivative (probe.h) */
-struct imp_reduced_of; /* what stands for vertices (reduced.h) */
+struct imp_tracer;
+struct imp_sink;
+struct imp_track; /* what a segment crosses (tracking.h) */
+struct imp_probe; /* of an extinction's derivative (probe.h) */
 
 /* One segment of a record; kinds put what they keep behind it (segment.h). */
 struct imp_segment {
@@ -112,7 +113,18 @@ struct imp_walk {
     const struct imp_entry *entry;
     /* Kind of the segments that move with an active parameter; NULL: none does. */
     const struct imp_segment_ops *moving;
-    const struct imp_reduced_of *reduced; /* in place of vertices; NULL: they are there */
+    const struct imp_reduced_ops
+        *reduced; /* in place of vertices; NULL: they are there */
+};
+
+/* Sweep and tangent of what takes the place of vertices: the first member of struct
+ * imp_reduced_of (kept/reduced.h). The arguments are those of imp__walk_sweep_values and
+ * imp__walk_tangent_values. */
+struct imp_reduced_ops {
+    void (*sweep)(const struct imp_tracer *tracer, const struct imp_walk *walk,
+                  imp_spec adjoint, struct imp_sink *sink);
+    imp_spec (*tangent)(const struct imp_tracer *tracer, const struct imp_walk *walk,
+                        imp_dot_fn *dot, const void *x_dot);
 };
 
 /* A walk that hangs on a vertex of another: its radiance adds to that vertex's. It begins
@@ -121,6 +133,14 @@ struct imp_walk {
 struct imp_side {
     struct imp_side *next;
     struct imp_walk walk;
+};
+
+/* Where walks come from that are not traced: the first member of struct imp_store. */
+struct imp_walk_source {
+    /* As imp__walk_trace. */
+    void (*walk)(const struct imp_tracer *tracer, struct imp_arena *arena, int x, int y,
+                 int64_t sample, struct imp_walk *walk);
+    int set; /* walks of a pixel that depend on each other; 0: as those of a picture */
 };
 
 /* What walks are made with; read-only, shared by all workers. */
@@ -165,6 +185,11 @@ struct imp_tracer {
         elsewhere; /* walks are evaluated at other numbers, too (imp__walk_elsewhere): any
                        number of factors that are zero, but have a derivative, ends none */
 };
+
+static inline const struct imp_walk_source *imp__walk_source(const struct imp_tracer *t)
+{
+    return (const struct imp_walk_source *)t->kept;
+}
 
 /* The guide that walks of this integrator follow: its densities are made for paths and for
  * walks from the lights, in scenes that finite elements know. */
@@ -263,6 +288,16 @@ void imp__walk_begin(const struct imp_tracer *tracer, int x, int y, int64_t samp
 void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                         double *px, double *py);
 
+/* The scatterer of a recorded vertex; NULL at the sky and the sensor. */
+static inline const struct imp_bsdf *imp__decided_bsdf(const struct imp_scene *scene,
+                                                       const struct imp_decision *d)
+{
+    if (d->shape < 0) return NULL;
+    return d->scatterer == IMP_IN_MEDIUM
+               ? scene->media[d->shape]->scatterer
+               : imp__shape_bsdf(scene, scene->shapes[d->shape]);
+}
+
 /* ---- Evaluate (evaluate.c) ------------------------------------------------------- */
 
 /* L of the same decisions at the scene's present parameters: what central differences on
@@ -291,7 +326,7 @@ void imp__decided_values(const struct imp_tracer *tracer, const struct imp_decis
                          const struct imp_bsdf *bsdf, const struct imp_carried *carried,
                          struct imp_values *out);
 
-/* ---- Fold, sweep, tangent (sweep.c) ---------------------------------------------- */
+/* ---- Fold (fold.c), sweep, tangent (sweep.c) ---------------------------------------------- */
 
 /* L = E + B + w L, from the last vertex to the first; sets `beyond` of every vertex. */
 imp_spec imp__walk_fold(struct imp_walk *walk);

@@ -2,7 +2,7 @@
  *
  * Wavelengths of a walk: drawn at its start, the same for all its vertices. */
 #include "lane_mis.h"
-#include "walk/kept/store.h"
+#include "walk.h"
 
 /* Walks of a set, where none is asked for: of at least four sets, whose spread is the
  * standard error. */
@@ -41,7 +41,8 @@ void imp__tracer_numbers(struct imp_tracer *tracer, const struct imp_run *run, i
 
 int imp__tracer_set(const struct imp_tracer *tracer, int64_t n)
 {
-    if (tracer->kept && tracer->kept->set > 0) return tracer->kept->set;
+    if (tracer->kept && imp__walk_source(tracer)->set > 0)
+        return imp__walk_source(tracer)->set;
     if (tracer->set > 1) return tracer->set;
     return tracer->points ? set_default(n) : 1;
 }

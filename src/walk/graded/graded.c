@@ -3,14 +3,6 @@
  * Segments outside and inside bodies of graded index, while a walk is decided. */
 #include "graded.h"
 
-void imp__graded_inputs(const struct imp_bsdf *b, const struct imp_shape *shape,
-                        const struct imp_texcoord *at, imp_spec *in)
-{
-    const struct imp_body *m = shape->body;
-    const int j = b->index_input;
-    if (j >= 0) in[j] = imp__spec(imp__graded_index(m->graded, &at->p) / m->outside);
-}
-
 static bool drop(struct imp_walk *walk)
 {
     walk->dropped = IMP_DROP_BENT;

@@ -117,16 +117,6 @@ static inline union imp_kept *imp__record_item(const struct imp_record *r, uint6
     return &r->items[i / IMP_RECORD_PAGE][i % IMP_RECORD_PAGE];
 }
 
-/* The scatterer of a kept vertex; NULL at the sky and the sensor. */
-static inline const struct imp_bsdf *imp__decided_bsdf(const struct imp_scene *scene,
-                                                       const struct imp_decision *d)
-{
-    if (d->shape < 0) return NULL;
-    return d->scatterer == IMP_IN_MEDIUM
-               ? scene->media[d->shape]->scatterer
-               : imp__shape_bsdf(scene, scene->shapes[d->shape]);
-}
-
 /* Walk i in the arena, with its values at the scene's present parameters, folded, to be
  * swept like any other; it has no camera ray, normals and lengths. The derivative with
  * respect to extinctions is that of frozen collisions: the tracer's `collisions_stand` is

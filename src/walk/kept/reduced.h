@@ -135,6 +135,7 @@ size_t imp__reduced_bytes(const struct imp_reduced *r);
 struct imp_reduced_seen;
 /* imp_walk.reduced */
 struct imp_reduced_of {
+    struct imp_reduced_ops ops;
     const struct imp_reduced *all;
     uint32_t op, n_ops, word;
     struct imp_reduced_seen *seen; /* [as many as need it], in the order of ops */

@@ -111,7 +111,7 @@ static void emitter_sweep(const struct imp_tracer *tracer, struct imp_op op,
 void imp__reduced_sweep(const struct imp_tracer *tracer, const struct imp_walk *walk,
                         imp_spec adjoint, struct imp_sink *sink)
 {
-    const struct imp_reduced_of *of = walk->reduced;
+    const struct imp_reduced_of *of = (const struct imp_reduced_of *)walk->reduced;
     const struct imp_reduction *all = of->all->of;
     const struct imp_active *active = tracer->active;
     const struct imp_op *op = of->all->ops + of->op;
@@ -238,7 +238,7 @@ imp_spec imp__reduced_tangent(const struct imp_tracer *tracer,
                               const struct imp_walk *walk, imp_dot_fn *dot,
                               const void *x_dot)
 {
-    const struct imp_reduced_of *of = walk->reduced;
+    const struct imp_reduced_of *of = (const struct imp_reduced_of *)walk->reduced;
     const struct imp_reduction *all = of->all->of;
     const struct imp_op *op = of->all->ops + of->op;
     const uint32_t *words = of->all->words + of->word;

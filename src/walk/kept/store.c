@@ -11,7 +11,8 @@ enum imp_status imp__store_create(const struct imp_tracer *tracer, int index, in
     enum imp_status st = IMP_OK;
     const struct imp_film_desc *film = &tracer->sensor->film;
     imp_context *ctx = tracer->scene->ctx;
-    struct imp_store s = {.ctx = ctx,
+    struct imp_store s = {.source = {.walk = imp__store_walk},
+                          .ctx = ctx,
                           .sensor = tracer->sensor,
                           .index = index,
                           .width = film->crop_w,

@@ -18,6 +18,7 @@
 #define IMP_STORE_CLASSES 32
 
 struct imp_store {
+    struct imp_walk_source source;
     imp_context *ctx;
     const struct imp_sensor *sensor;
     int index;         /* of the sensor */
@@ -25,7 +26,6 @@ struct imp_store {
     int margin;
     int across, down; /* tiles */
     size_t n;         /* walks of a pixel */
-    int set;          /* of them that depend on each other; 0: as of a picture */
     bool stratified;  /* wavelengths of a picture's walks depend on each other */
     int64_t *sample;  /* [n] their numbers, ascending */
     struct imp_record *records;  /* [across down] */

@@ -130,7 +130,7 @@ void imp__probe_follow(struct imp_step *s)
     side->probing = NULL;
     side->scratch = scratch;
     const struct imp_arena_mark mark = imp__arena_mark(s->arena);
-    probe->scattered = imp__walk_scattered(side, probe->medium->pure, probe->at.p);
+    probe->scattered = p->scattered(side, probe->medium->pure, probe->at.p);
     imp__arena_rewind(s->arena, mark);
     s->walk->dropped = walk.dropped;
 }

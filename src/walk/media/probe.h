@@ -45,8 +45,11 @@ struct imp_probing {
     double weight;
     uint32_t n;    /* stretches */
     bool followed; /* else nothing of them is kept */
+    /* What is scattered at a point of a medium: imp__walk_scattered. */
+    imp_spec (*scattered)(struct imp_step *s, const struct imp_bsdf *scatterer, imp_v3 p);
 };
 
+/* `scattered` of *p is set by whoever traces the walk. */
 void imp__probe_begin(const struct imp_walk *walk, struct imp_probing *p);
 
 /* The flight has gone from near to far in m, with events [first, track->n) of the track;

@@ -1,7 +1,16 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Derivatives of a walk through media with respect to coefficients of the media: at points
+ * where they scatter, and along segments, from which a baseline of the arriving light is
+ * subtracted (path/baseline.h). */
 #include "sweep_media.h"
 #include "walk/core/vertex.h"
-#include "walk/path/baseline.h"
+
+/* What derivatives of flights that stand take from the light that arrives. */
+static imp_spec baseline(const struct imp_tracer *tracer)
+{
+    return tracer->collisions_stand ? (imp_spec){0} : tracer->baseline;
+}
 
 void imp__extinction_drop(const struct imp_tracer *tracer, const struct imp_vertex *v,
                           imp_spec *x)
@@ -67,8 +76,7 @@ void imp__media_scatter(const struct imp_tracer *tracer, const struct imp_vertex
     }
     if (segment_counts(tracer, v))
         imp__track_sweep(tracer, v->on, v->carried, NULL,
-                         P * weight_before(v) * (v->beyond - imp__baseline(tracer)),
-                         sink);
+                         P * weight_before(v) * (v->beyond - baseline(tracer)), sink);
     if (v->probe) {
         const struct imp_medium *m = v->probe->medium;
         imp_spec d[IMP_INPUTS_MAX];
@@ -91,7 +99,7 @@ imp_spec imp__media_tangent(const struct imp_tracer *tracer, const struct imp_ve
                  imp__track_tangent(tracer, v->to_light, v->carried, &T, dot, x_dot);
     }
     if (segment_counts(tracer, v))
-        L_dot += weight_before(v) * (v->beyond - imp__baseline(tracer)) *
+        L_dot += weight_before(v) * (v->beyond - baseline(tracer)) *
                  imp__track_tangent(tracer, v->on, v->carried, NULL, dot, x_dot);
     if (v->probe) {
         const struct imp_medium *m = v->probe->medium;

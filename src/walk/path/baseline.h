@@ -22,10 +22,4 @@
  * the run is too short. IMP_E_NOMEM. */
 enum imp_status imp__baseline_set(struct imp_tracer *tracer, int64_t walks);
 
-/* What derivatives of flights that stand take from the light that arrives. */
-static inline imp_spec imp__baseline(const struct imp_tracer *tracer)
-{
-    return tracer->collisions_stand ? (imp_spec){0} : tracer->baseline;
-}
-
 #endif

@@ -4,7 +4,6 @@
  * vertices, directions, densities, MIS weights and roulette are settled. */
 #include "walk/core/vertex.h"
 #include "walk/graded/graded.h"
-#include "walk/kept/record.h"
 #include "walk/media/tracking.h"
 
 /* Where a vertex was decided. Member by member: clearing all of it would take as long as

@@ -1,31 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The record read again. Fold: radiance, from the last vertex to the first. Sweep: the
+ * The record read again, behind the fold (fold.c). Sweep: the
  * adjoint, from the first vertex to the last (reverse mode, not reverse order), and a
  * piece of gradient falls off at every vertex. Tangent: derivative and radiance together,
  * from the last vertex to the first. The three differ only in the order in which the
  * product rule is read. */
 #include "walk/core/vertex.h"
-#include "walk/kept/reduced.h"
 #include "walk/media/sweep_media.h"
-
-imp_spec imp__walk_fold(struct imp_walk *walk)
-{
-    imp_spec L = {0};
-    const struct imp_entry *entry = walk->entry ? walk->entry + walk->n : NULL;
-    for (struct imp_vertex *v = walk->last; v; v = v->prev) {
-        v->beyond = L;
-        if (imp_likely(!entry)) {
-            L = v->e + v->w * L + v->b;
-        } else {
-            entry--;
-            L = (entry->e * v->e + entry->b * v->b) + v->w * L + entry->joints;
-        }
-        for (struct imp_side *s = v->side; s; s = s->next)
-            L += s->walk.L = imp__walk_fold(&s->walk);
-    }
-    return L;
-}
 
 static inline bool bsdf_active(const struct imp_tracer *t, const struct imp_vertex *v)
 {
@@ -158,7 +139,7 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
     const struct imp_active *active = tracer->active;
     if (walk->dropped || !walk->valid) return;
     if (imp_unlikely(walk->reduced != NULL)) {
-        imp__reduced_sweep(tracer, walk, adjoint, sink);
+        walk->reduced->sweep(tracer, walk, adjoint, sink);
         return;
     }
     imp_spec P = adjoint;
@@ -252,7 +233,7 @@ static imp_spec tangent(const struct imp_tracer *tracer, const struct imp_walk *
     int depth = walk->depth + walk->n - 1;
     if (walk->dropped || !walk->valid) return L_dot;
     if (imp_unlikely(walk->reduced != NULL))
-        return imp__reduced_tangent(tracer, walk, direction_at, &direction);
+        return walk->reduced->tangent(tracer, walk, direction_at, &direction);
     for (const struct imp_vertex *v = walk->last; v; v = v->prev, depth--) {
         const struct imp_bsdf *b = v->bsdf;
         L_dot *= v->w;

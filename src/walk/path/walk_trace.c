@@ -2,8 +2,8 @@
  *
  * One walk from a sensor, from its number to its radiance: key, film position, ray, time
  * and wavelengths; its steps (trace.c); the fold. */
+#include "first_segment.h"
 #include "meter.h"
-#include "walk/kept/store.h"
 #include "walk/media/probe.h"
 #include <float.h>
 #include <string.h>
@@ -164,7 +164,7 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
 {
     const struct imp_sensor *sensor = tracer->sensor;
     if (imp_unlikely(tracer->kept != NULL)) {
-        imp__store_walk(tracer, arena, x, y, sample, walk);
+        imp__walk_source(tracer)->walk(tracer, arena, x, y, sample, walk);
         return;
     }
     double lens[2];
@@ -181,6 +181,7 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
     if (imp_unlikely(tracer->active && tracer->active->medium) && s.recorded &&
         !tracer->collisions_stand && tracer->integrator->media) {
         imp__probe_begin(walk, &probing);
+        probing.scattered = imp__walk_scattered;
         s.probing = &probing;
     }
     if (imp_unlikely(sensor->shape != NULL)) imp__walk_on_meter(&s);

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Straight segments through nothing. */
-#include "walk/graded/graded.h"
-#include "walk/media/tracking.h"
+#include "step.h"
 
 static inline enum imp_meeting nearest_hit(struct imp_step *s, struct imp_hit *hit)
 {
@@ -31,22 +30,6 @@ enum imp_meeting imp__straight_meet(struct imp_step *s, struct imp_hit *hit)
     return imp_likely(!hide) ? nearest_hit(s, hit) : camera_meet(s, hit);
 }
 
-static const struct imp_segment_ops straight = {
+const struct imp_segment_ops imp__straight_ops = {
     .name = "straight", .connects = true, .meet = imp__straight_meet};
-struct imp_segment imp__straight = {&straight, NULL};
-
-/* Adjoint photons cross media where there are some; else they are walks of surfaces alone,
- * as those of path. */
-static bool tracks(const struct imp_tracer *tracer)
-{
-    const struct imp_walk_integrator *i = tracer->integrator;
-    return i->media && (tracer->scene->n_media > 0 || tracer->scene->priorities ||
-                        !(i->photons || i->from_lights));
-}
-
-const struct imp_segment_ops *imp__segment_first(const struct imp_tracer *tracer)
-{
-    return imp_unlikely(tracer->scene->n_bodies > 0) ? &imp__graded_outside
-           : imp_unlikely(tracks(tracer))            ? &imp__tracking
-                                                     : &straight;
-}
+struct imp_segment imp__straight = {&imp__straight_ops, NULL};
