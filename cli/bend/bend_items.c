@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * JSON of the item "rays": paths, slices of the index, spots and irradiances, thinned to what a page
+ * can draw. */
 #include "bend_items.h"
 
 #include "cmd_bend.h"

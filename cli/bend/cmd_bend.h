@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What the files of `importon bend` share: the open problem, its answer as text or JSON, pictures. */
 #ifndef IMP_CLI_CMD_BEND_H
 #define IMP_CLI_CMD_BEND_H
 

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What the files of `importon elements` share: options as arrays, the answer, the fit. */
 #ifndef IMP_CLI_CMD_ELEMENTS_H
 #define IMP_CLI_CMD_ELEMENTS_H
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * JSON of a finite-element solution for a page: elements.json with the answer, mesh.json with
+ * elements, links, illuminances and ranked lamps. */
 #include "elements_items.h"
 
 #include "elements_mesh.h"

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Elements of a solution read from the library, and the coarsest level of at most 3000 of them,
+ * which is drawn. */
 #include "elements_mesh.h"
 
 #include "shared/command.h"

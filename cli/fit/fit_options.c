@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Options of a search, as both fit and view take them, and the imp_fit_options that they make. */
 #include "fit_options.h"
 
 static const char *const optimizer_words[] = {"adam", "lm",    "lbfgs",

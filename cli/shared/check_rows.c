@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Rows of a check printed as a table or as JSON, and their count by verdict. */
 #include "check_rows.h"
 #include "command.h"
 

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Pictures sent to tev over TCP: packets CreateImage and UpdateImage. */
 #include "display.h"
 
 #include "command.h"

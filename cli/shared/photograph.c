@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Targets of 8 or 16 bits: sRGB undone, clipped values counted for a warning, lowest and highest
+ * level. */
 #include "photograph.h"
 
 #include "picture_files.h"

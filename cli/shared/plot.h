@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Line charts as SVG files. */
 #ifndef IMP_CLI_PLOT_H
 #define IMP_CLI_PLOT_H
 

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * --region X0,Y0,X1,Y1 as the adjoint image of a mean over it, and as a mask. */
 #include "region.h"
 
 #include "command.h"

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * JSON of a pixel's walks, and of the shares of pixel and walk in the gradient of each parameter. */
 #include "walk_items.h"
 
 #include <importon/report.h>

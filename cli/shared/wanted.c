@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * --until: options, refusals and the closing line of a render that stops at a relative error. */
 #include "wanted.h"
 #include "command.h"
 #include "ranks.h"

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The server behind `importon view`: token and Host of a request checked, wishes passed on, news
+ * sent to each open stream (http.h). */
 #include "http.h"
 
 #include "http_server.h"

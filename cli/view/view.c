@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * State of a view that page and command share: wishes from the server's thread, items and progress
+ * for the page. */
 #include "view.h"
 
 #include "http.h"

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The error of a property or child that a plugin requires and a node lacks; a name near it that
+ * nobody has read is suggested. */
 #include "required.h"
 #include "nearest.h"
 

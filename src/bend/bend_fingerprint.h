@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Hash of a problem of bent rays, by which a checkpoint is matched to it. */
 #ifndef IMP_BEND_FINGERPRINT_H
 #define IMP_BEND_FINGERPRINT_H
 

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * L-BFGS with bounds for objectives without noise, as fits of bent rays are. */
 #ifndef IMP_BEND_LBFGS_H
 #define IMP_BEND_LBFGS_H
 

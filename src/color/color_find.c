@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Illuminants, glasses and metals by name, from the tables of color_tables.c. */
 #include "color_tables.h"
 #include <stddef.h>
 #include <strings.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Values, derivatives and bounds of spectra at wavelengths: interpolated samples, Planck's law,
+ * Sellmeier's and Cauchy's formulas, lifted colours; their colour under the CIE curves. */
 #include "spectrum.h"
 #include "base/compiler.h"
 #include "cie.h"

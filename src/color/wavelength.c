@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Hero wavelength and companions from one uniform number, and the sensor's responses at them. */
 #include "wavelength.h"
 #include "base/compiler.h"
 #include "cie.h"

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The plugin `elements` of a scene file: its properties, checked by the ranges of
+ * imp_elements_create. */
 #include "elements_integrator.h"
 
 /* Ranges are those of imp_elements_create, which has the defaults too. */

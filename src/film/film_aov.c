@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Albedo, depth, position, normals, texture coordinates and their slopes at a sample's first hit,
+ * by type of channel. */
 #include "film_aov.h"
 #include "scene/instances.h"
 #include "walk/core/dims.h"

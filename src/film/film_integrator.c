@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The list of all integrators, and the three that this room defines: `depth`, `aov` and `moment`. */
 #include "film_integrator.h"
 #include "base/required.h"
 #include "elements/elements_integrator.h"

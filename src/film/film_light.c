@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Workers, groups and sums of a picture by light tracing or by bidirectional samples, and standard
+ * errors from the spread of groups (film_light.h). */
 #include "film_light.h"
 #include "base/team.h"
 #include <stdio.h>

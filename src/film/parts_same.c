@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Hashes of scene, parameters and run, compared between ranks and between parts before sums are
+ * added. */
 #include "math/hash.h"
 #include "parts.h"
 #include "parts_file.h"

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A parser of curve files: x, y, z and radius in a line, empty lines between curves. */
 #include "curve_file.h"
 #include "base/number.h"
 #include <float.h>

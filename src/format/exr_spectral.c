@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Names of spectral channels in a film and in a file (Fichet et al. 2021), and the RGB picture of a
+ * spectral one. */
 #include "exr_spectral.h"
 #include "base/number.h"
 #include "color/cie.h"

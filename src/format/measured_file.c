@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Fields of an RGL file found by name, their sizes checked against each other, tables copied. */
 #include "measured_file.h"
 #include "base/little.h"
 #include "kind/bsdf/measured.h"

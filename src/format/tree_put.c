@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Writes a committed scene as building calls (tree_marks.h); texels have their present values, and
+ * a mesh whose triangles are not needed is one triangle across its bounds. */
 #include "kind/bsdf/measured.h"
 #include "scene/instances.h"
 #include "scene/scene_build.h"

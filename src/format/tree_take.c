@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Reads building calls from bytes and makes them: counts are checked against the bytes that are
+ * left before memory is taken. */
 #include "ies_file.h"
 #include "kind/bsdf/measured.h"
 #include "mesh_file.h"

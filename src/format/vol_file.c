@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A parser of .vol grids, the picture of one as a film, and imp_scene_write_volume. */
 #include "vol_file.h"
 #include "base/arguments.h"
 #include "base/little.h"

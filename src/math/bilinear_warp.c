@@ -1,4 +1,8 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Values, mixtures, draws and inverse draws of bilinear densities (bilinear_warp.h). Both the
+ * marginal of rows and the conditional of columns are piecewise linear, so that a draw is the root
+ * of a quadratic equation. */
 #include "bilinear_warp.h"
 #include <math.h>
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Value, integral and draw of a piecewise linear factor over time: trapezoids between its times,
+ * constant at the ends. */
 #include "course.h"
 #include <math.h>
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Chi-square test of drawn directions against their density: cells by a pilot run, expected counts
+ * by quadrature, one cell for each delta lobe and one for "no draw". */
 #include "draws.h"
 #include "rng.h"
 #include "stat.h"

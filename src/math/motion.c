@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Affine maps, their inverses and products, and motions between two maps: polar decomposition by
+ * Newton's iteration, rotation by quaternions, bounds of a moving box. */
 #include "motion.h"
 #include <string.h>
 

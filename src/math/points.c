@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The table of 64 scrambled blocks that sets of points are made from: a (0,2)-sequence by radical
+ * inverse and Sobol's second dimension, scrambled by Owen's method. */
 #include "points.h"
 #include <pthread.h>
 

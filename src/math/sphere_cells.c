@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Adaptive Gauss-Legendre over the sphere in (z, phi), and a tree of cells that is cut where pilot
+ * draws fall. */
 #include "sphere_cells.h"
 #include "quadrature.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Running sums of a table of weights, and the texel that two uniform numbers draw by them: row
+ * first, then column. */
 #include "weight_table.h"
 #include <math.h>
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Proxies of a scene file made into aims, strengths that follow the lights' parameters, and the
+ * density p(w) of aims.h with its draws. */
 #include "aims.h"
 #include "color/rgb.h"
 #include "kind/shape/shape.h"

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The factors g_c and T^(1 - gamma) of camera_gain.h, with derivatives with respect to exposure,
+ * white balance, vignetting and gamma; their inputs in a film. */
 #include "camera_gain.h"
 #include "base/arguments.h"
 #include "scene_build.h"

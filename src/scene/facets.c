@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Intersection of a ray with eight facets at a time in float, confirmed triangle by triangle in
+ * double (facets.h). */
 #include "facets_lanes.h"
 
 /* ---- one triangle, in double ------------------------------------------------------------------ */

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Facets of a scene's meshes: pairs of triangles that are halves of a flat quadrilateral, as planes
+ * in float about the centre of the scene, and the triangles in double. */
 #include "base/context.h"
 #include "facets_lanes.h"
 

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The ball around an analytic shape joins the list that few.h searches. */
 #include "few.h"
 #include "kind/shape/shape.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A collision in a medium as a BSDF without a cosine: phase function times albedo, and emission
+ * (1 - albedo) times the emitted radiance; with and without an albedo. */
 #include "in_medium.h"
 #include "majorants.h"
 #include "math/vec.h"

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Places of instances by number (instances.h), the surface at a hit in one, and the shape with the
+ * material that an instance covers it with. */
 #include "instances.h"
 #include "kind/shape/shape.h"
 

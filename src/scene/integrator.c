@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Integrators of a scene file, and those nested in them, made from the list of kinds. */
 #include "integrator.h"
 #include "scene_build.h"
 

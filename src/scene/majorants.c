@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Grid of bounds and control extinctions over a medium's box, filled again where parameters
+ * change; a ray's entry into it. */
 #include "majorants.h"
 
 #define CELLS_MAX 64 /* along an axis */

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The medium at a point, found by a ray to the next boundary. */
 #ifndef IMP_SCENE_MEDIA_AROUND_H
 #define IMP_SCENE_MEDIA_AROUND_H
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Weights of the densities of directions as text, checked, and settled for a scene: densities that
+ * it has no use for get weight 0. */
 #include "mixing.h"
 #include "base/nearest.h"
 #include "base/number.h"

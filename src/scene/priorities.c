@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Nests of overlapping shapes along a ray, and the materials of pairs of dielectrics, whose index
+ * is the ratio of the two (priorities.h). */
 #include "priorities.h"
 #include "instances.h"
 #include "scene_build.h"

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Names of parameters nearest to one that does not exist, by edit distance. */
 #include "theta_near.h"
 #include "base/nearest.h"
 #include <stdio.h>

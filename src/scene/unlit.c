@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The error of a scene without light: whether any shape, medium, map or point emits. */
 #include "unlit.h"
 
 const struct imp_node *imp__node_of(const struct imp_node *at, const void *object)

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Newton's point after a search, accepted where the loss there is no higher, with the covariance
+ * G C G^T of samples that the search did not use (docs/estimators.md 15). */
 #include "answer.h"
 #include <float.h>
 #include <math.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Preconditioned conjugate gradients for WIDTH right-hand sides at once, and the mu that makes the
+ * matrix positive along the directions met. */
 #include "conjugate.h"
 #include "base/arguments.h"
 #include "math/vec.h"

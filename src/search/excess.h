@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Subtraction of one covariance from another, both of them estimates, with a result that is
+ * positive. */
 #ifndef IMP_SEARCH_EXCESS_H
 #define IMP_SEARCH_EXCESS_H
 

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Draws G z of a fit with many variables, and their mean squares as standard errors. */
 #include "sparse_errors.h"
 #include "base/arguments.h"
 #include "conjugate.h"

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * imp_check: options, the order of its checks, rows of the answer, progress. */
 #include "check.h"
 #include "base/team.h"
 #include "inverse/estimate/problem_tracer.h"

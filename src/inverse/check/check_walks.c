@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Recorded walks of a frozen check, the scalar that their colours fold to, and the sink that takes
+ * their gradients. */
 #include "check_walks.h"
 #include "color/rgb.h"
 #include "film/film_picture.h"

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Derivatives of a BSDF's value with respect to its inputs against fourth-order differences. */
 #include "scene/in_medium.h"
 #include "selftest.h"
 

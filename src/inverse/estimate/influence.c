@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Sums of squared influences e_i over the samples of a picture, for pixels that share samples
+ * (influence.h): tile by tile, with a cross term between neighbouring pixels. */
 #include "influence.h"
 #include "base/team.h"
 #include "channel_sink.h"

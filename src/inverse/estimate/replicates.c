@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Plans of replicates: how many, how many samples in each, and in how many sets of points, by filter,
+ * loss and estimator (replicates.h). */
 #include "replicates.h"
 #include "adjoint.h"
 #include "film/film_filter.h"

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Pictures of replicates through a wide filter, and the adjoint P_i of a sample with its own
+ * part left out (splat.h). */
 #include "splat.h"
 #include "film/film_picture.h"
 #include "film/film_tiles.h"

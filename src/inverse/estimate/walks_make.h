@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Recorded walks of sensors (imp_walks_keep): drawn, or filled from a file. */
 #ifndef IMP_INVERSE_WALKS_MAKE_H
 #define IMP_INVERSE_WALKS_MAKE_H
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The warnings of a fit as one text: chi-square too large, noise not known, variables without an
+ * interval, bias of order 1/spp. */
 #include "fit.h"
 #include "inverse/problem/loss.h"
 #include <math.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Hoeffding's decomposition of products of replicates, tile by tile, and the covariance of their
+ * sum (pair_noise.h). */
 #include "pair_noise.h"
 #include <string.h>
 

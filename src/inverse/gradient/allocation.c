@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Variance and cost of each tile over the evaluations of a search, and the samples per pixel that
+ * follow by Neyman's rule (allocation.h). */
 #include "allocation.h"
 #include "base/team.h"
 #include "film/film_filter.h"

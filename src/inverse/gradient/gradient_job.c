@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Work of one tile and sums over tiles, for the loss and the gradient of a target (gradient_job.h). */
 #include "gradient_job.h"
 #include "base/arguments.h"
 #include "base/team.h"

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Losses and gradients by light tracing: pictures of sets A and B, adjoints of one swept along the
+ * walks of the other (light_gradient.h). */
 #include "light_gradient.h"
 #include "base/team.h"
 #include "gradient_job.h"

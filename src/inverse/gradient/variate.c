@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Pictures, weights and refusals of recursive control variates, and their numbers in a checkpoint
+ * (variate.h). */
 #include "variate.h"
 #include "base/arguments.h"
 #include "film/film_filter.h"

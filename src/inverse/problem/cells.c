@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Interpolation P from coarse to fine grids, its transpose, and the average over cells (cells.h). */
 #include "cells.h"
 #include <math.h>
 #include <string.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Values and derivatives l, l', l'', l''' of the losses, their Gauss-Newton weight, and the order
+ * of the bias that remains (loss.h). */
 #include "loss.h"
 #include <math.h>
 

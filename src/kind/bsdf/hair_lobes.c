@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Values, draws and attenuations A_p of the lobes of a fibre (hair_lobes.h), with derivatives with
+ * respect to roughness, tilt, reflectance F and transmittance T. */
 #include "hair_lobes.h"
 #include "fresnel.h"
 #include "math/bessel.h"

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Sizes and numbers of the tables of a measured material, checked before they are used. */
 #include "measured.h"
 #include <math.h>
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Values of a MERL table, by Rusinkiewicz's angles of half vector and difference, and densities of
+ * half vectors made from it, by direction wo: cells weighted by the table plus a cosine part. */
 #include "color/rgb.h"
 #include "merl.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The properties `alpha`, `alpha_u`, `alpha_v`, `distribution` and `sample_visible`, read and
+ * checked for all microfacet kinds. */
 #include "roughness.h"
 #include "kind/build.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Transposed value, draw and density of a BSDF, made from those of radiance by exchange of wo and
+ * wi and Veach's factor (transport.h). */
 #include "transport.h"
 #include "math/vec.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Value, draw, density, emission and derivatives of a nested material in a turned frame, with the
+ * shadowing g of Estevez, Lecocq and Stein (2019). */
 #include "turned.h"
 #include "math/vec.h"
 #include <math.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Starts of walks from lights, and their densities: on a surface with the cosine of its shading
+ * normal, at a point in any direction, on a disk before the scene for the sky. */
 #include "emission.h"
 #include "kind/shape/shape.h"
 #include "math/transform.h"

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Radiance of the clear sky and of the sun's disk from the tables of Hosek and Wilkie, and its
+ * derivatives with respect to turbidity and albedo. */
 #include "skylight.h"
 #include "color/rgb.h"
 #include <math.h>

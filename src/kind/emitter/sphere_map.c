@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Directions of texels, solid angles of rows, and draws inside a texel, for both projections of a
+ * picture of all directions. */
 #include "sphere_map.h"
 
 void imp__sphere_map_place(const struct imp__sphere_map *m, imp_v3 d, double *u,

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The sun's direction from date, time and place by the algorithm of Blanco-Muriel et al. (2001), or
+ * as the scene gives it. */
 #include "sun_position.h"
 #include <math.h>
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Direction to the sun, from a date, a time and a place on earth or from `sun_direction`: shared by
+ * the kinds `sun`, `sky` and `sunsky`. */
 #ifndef IMP_KIND_EMITTER_SUN_POSITION_H
 #define IMP_KIND_EMITTER_SUN_POSITION_H
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Inputs, values and derivatives of extinction, scattering and emission, by either of the two
+ * descriptions of a medium (coefficients.h). */
 #include "coefficients.h"
 #include "math/vec.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Brown and Conrady's map, and its inverse by Newton's method, followed from the middle of the film
+ * so that the continuous branch is found. */
 #include "distortion.h"
 #include <math.h>
 

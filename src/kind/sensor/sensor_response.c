@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Response curves of a specfilm and the factor `srf`, read from a film's properties. */
 #include "sensor_response.h"
 #include "base/compiler.h"
 #include "color/cie.h"

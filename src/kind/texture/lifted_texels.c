@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Spectra of RGB texels, lifted when texels change; value, reverse and forward derivatives of their
+ * interpolation at a wavelength. */
 #include "lifted_texels.h"
 #include "color/rgb_basis.h"
 #include "math/vec.h"
