@@ -31,9 +31,9 @@
 #include <stdint.h>
 
 #define IMP_VERSION_MAJOR  0
-#define IMP_VERSION_MINOR  1
+#define IMP_VERSION_MINOR  2
 #define IMP_VERSION_PATCH  0
-#define IMP_VERSION_STRING "0.1.0"
+#define IMP_VERSION_STRING "0.2.0"
 
 #if defined(__GNUC__)
 #define IMP_API        __attribute__((visibility("default")))

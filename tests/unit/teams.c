@@ -183,7 +183,7 @@ static const char *other_machine(const void *message, size_t bytes)
     if (bytes > sizeof other) return message;
     memcpy(other, message, bytes);
     char *word = memmem(other, bytes, "importon ", 9);
-    if (word) strcpy(word, "importon 0.1.0 sse4.2 neon");
+    if (word) strcpy(word, "importon 0.2.0 sse4.2 neon");
     return other;
 }
 
@@ -219,8 +219,8 @@ static void team_troubles(void)
     team(3, 0, "box", PICTURE);
     tamper = NULL;
     tap_ok(members[0].st == IMP_E_ARG && members[2].st == IMP_E_ARG &&
-               strstr(members[0].error, "rank 0 runs \"importon 0.1.0") &&
-               strstr(members[0].error, "rank 1 \"importon 0.1.0 sse4.2 neon\""),
+               strstr(members[0].error, "rank 0 runs \"importon 0.2.0") &&
+               strstr(members[0].error, "rank 1 \"importon 0.2.0 sse4.2 neon\""),
            "a rank on another processor: both are named # %s", members[0].error);
 
     members_reset();

@@ -47,7 +47,7 @@ command -v cmake >/dev/null || exit 0
 cat >CMakeLists.txt <<END
 cmake_minimum_required(VERSION 3.13)
 project(host C)
-find_package(importon 0.1 REQUIRED)
+find_package(importon 0.2 REQUIRED)
 add_executable(by_cmake $ROOT/examples/render.c)
 target_link_libraries(by_cmake importon::importon)
 END

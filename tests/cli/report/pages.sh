@@ -18,7 +18,7 @@ importon report r --walks 3
 mkdir empty broken
 importon report empty
 importon report missing
-echo '{"importon":"0.1.0","command":"fit","params":[1,]}' >broken/parameters.json
+echo '{"importon":"0.2.0","command":"fit","params":[1,]}' >broken/parameters.json
 importon report broken
 echo "exit $?"
 echo '{"somebody":"else"}' >r/other.json
