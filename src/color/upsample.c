@@ -8,6 +8,7 @@
 #include "base/compiler.h"
 #include "cie.h"
 #include "math/linalg.h"
+#include "math/vec.h"
 #include "rgb.h"
 #include "rgb_basis.h"
 #include <string.h>
@@ -30,51 +31,58 @@ static double sigmoid_d(double v)
     return 0.5 * q * q * q;
 }
 
-/* Weights of a reflectance's values in its colour under daylight, by Simpson's rule over
- * the steps of the tables, each channel scaled so that white is 1. */
-#define POINTS (2 * IMP_CIE_N - 1)
 static double table_at(const double *table, int q)
 {
     return q % 2 ? 0.5 * (table[q / 2] + table[q / 2 + 1]) : table[q / 2];
 }
-static void weights_make(double weight[POINTS][3])
+
+/* By Simpson's rule over the steps of the tables, each channel scaled so that white is 1. */
+void imp__lifter_make(struct imp__lifter *out)
 {
     double sum[3] = {0, 0, 0};
-    for (int q = 0; q < POINTS; q++) {
-        const double w = q % 2 ? 4 : q == 0 || q == POINTS - 1 ? 1 : 2;
+    for (int q = 0; q < IMP__LIFT_POINTS; q++) {
+        const double w = q % 2 ? 4 : q == 0 || q == IMP__LIFT_POINTS - 1 ? 1 : 2;
         const double light = w * table_at(imp__cie_d65, q);
-        double xyz[3];
+        double xyz[3], rgb[3];
         for (int c = 0; c < 3; c++) xyz[c] = light * table_at(imp__cie_xyz[c], q);
-        imp__xyz_to_rgb(xyz, weight[q]);
-        for (int c = 0; c < 3; c++) sum[c] += weight[q][c];
+        imp__xyz_to_rgb(xyz, rgb);
+        out->x[q] = (double)q / (IMP__LIFT_POINTS - 1);
+        out->weight[q] = imp__v3(rgb[0], rgb[1], rgb[2]);
+        for (int c = 0; c < 3; c++) sum[c] += rgb[c];
     }
-    for (int q = 0; q < POINTS; q++)
-        for (int c = 0; c < 3; c++) weight[q][c] /= sum[c];
+    for (int q = 0; q < IMP__LIFT_POINTS; q++)
+        for (int c = 0; c < 3; c++) out->weight[q][c] /= sum[c];
 }
 
-/* rgb of S, and J = d rgb/d c divided by peak. */
-static void colour_of(double weight[POINTS][3], const double c[3], double rgb[3],
+/* rgb of S, and J = d rgb/d c divided by peak. Sums run along q, channels in lanes. */
+static void colour_of(const struct imp__lifter *by, const double c[3], double rgb[3],
                       double J[9], double *peak)
 {
-    double slope[POINTS];
-    memset(rgb, 0, 3 * sizeof *rgb);
-    memset(J, 0, 9 * sizeof *J);
-    *peak = 0;
-    for (int q = 0; q < POINTS; q++) {
-        const double x = (double)q / (POINTS - 1);
-        const double v = (c[0] * x + c[1]) * x + c[2], s = sigmoid(v);
+    double s[IMP__LIFT_POINTS], slope[IMP__LIFT_POINTS];
+    for (int q = 0; q < IMP__LIFT_POINTS; q++) {
+        const double x = by->x[q];
+        const double v = (c[0] * x + c[1]) * x + c[2];
+        s[q] = sigmoid(v);
         slope[q] = sigmoid_d(v);
-        *peak = imp_max(*peak, slope[q]);
-        for (int k = 0; k < 3; k++) rgb[k] += weight[q][k] * s;
     }
-    for (int q = 0; q < POINTS; q++) {
-        const double x = (double)q / (POINTS - 1), w = slope[q] / *peak;
-        for (int k = 0; k < 3; k++) {
-            const double a = weight[q][k] * w;
-            J[3 * k] += a * x * x;
-            J[3 * k + 1] += a * x;
-            J[3 * k + 2] += a;
-        }
+    imp_spec sum = {0}, by_c0 = {0}, by_c1 = {0}, by_c2 = {0};
+    *peak = 0;
+    for (int q = 0; q < IMP__LIFT_POINTS; q++) {
+        *peak = imp_max(*peak, slope[q]);
+        sum += by->weight[q] * imp__spec(s[q]);
+    }
+    for (int q = 0; q < IMP__LIFT_POINTS; q++) {
+        const double x = by->x[q];
+        const imp_spec a = by->weight[q] * imp__spec(slope[q] / *peak), ax = a * x;
+        by_c0 += ax * x;
+        by_c1 += ax;
+        by_c2 += a;
+    }
+    for (int k = 0; k < 3; k++) {
+        rgb[k] = sum[k];
+        J[3 * k] = by_c0[k];
+        J[3 * k + 1] = by_c1[k];
+        J[3 * k + 2] = by_c2[k];
     }
 }
 
@@ -112,16 +120,16 @@ static double grey_v(double a)
 }
 
 /* Coefficients, and d_c = (J/peak)^-1. */
-static void fit(const double target[3], struct imp__lifted *out)
+static void fit(const struct imp__lifter *by, const double target[3],
+                struct imp__lifted *out)
 {
-    double weight[POINTS][3], rgb[3], J[9], peak, damping = 1e-6;
+    double rgb[3], J[9], peak, damping = 1e-6;
     double *c = out->c;
-    weights_make(weight);
     c[0] = c[1] = 0;
     const bool grey = target[0] == target[1] && target[1] == target[2];
     c[2] = grey ? grey_v(target[0])
                 : grey_v(imp_clamp((target[0] + target[1] + target[2]) / 3, 0.02, 0.98));
-    colour_of(weight, c, rgb, J, &peak);
+    colour_of(by, c, rgb, J, &peak);
     double error = distance2(rgb, target);
     for (int step = 0; step < STEPS && !grey && error > MET * MET; step++) {
         double N[9], g[3], d[3], next[3], next_rgb[3], next_J[9], next_peak;
@@ -137,7 +145,7 @@ static void fit(const double target[3], struct imp__lifted *out)
         if (!solve3(N, g, d)) break;
         for (int i = 0; i < 3; i++)
             next[i] = imp_clamp(c[i] + d[i] / peak, -COEFFICIENT_MAX, COEFFICIENT_MAX);
-        colour_of(weight, next, next_rgb, next_J, &next_peak);
+        colour_of(by, next, next_rgb, next_J, &next_peak);
         const double next_error = distance2(next_rgb, target);
         if (!(next_error < error)) {
             damping *= 8;
@@ -160,12 +168,13 @@ static void fit(const double target[3], struct imp__lifted *out)
     }
 }
 
-void imp__lift_reflectance(const double rgb[3], struct imp__lifted *out)
+void imp__lift_reflectance_by(const struct imp__lifter *by, const double rgb[3],
+                              struct imp__lifted *out)
 {
     double inside[3];
     struct imp__lifted l = {.scale = 1};
     for (int k = 0; k < 3; k++) inside[k] = imp_clamp(rgb[k], 0.0, 1.0);
-    fit(inside, &l);
+    fit(by, inside, &l);
     for (int k = 0; k < 3; k++)
         if (rgb[k] < 0 || rgb[k] > 1)
             for (int i = 0; i < 3; i++) l.d_c[i][k] = 0;
@@ -173,7 +182,8 @@ void imp__lift_reflectance(const double rgb[3], struct imp__lifted *out)
 }
 
 /* value = s S(c(rgb/s)), s = 2 m: the part of drgb along rgb changes the size alone. */
-void imp__lift_unbounded(const double rgb[3], struct imp__lifted *out)
+void imp__lift_unbounded_by(const struct imp__lifter *by, const double rgb[3],
+                            struct imp__lifted *out)
 {
     int top = 0;
     for (int k = 1; k < 3; k++)
@@ -183,7 +193,7 @@ void imp__lift_unbounded(const double rgb[3], struct imp__lifted *out)
     struct imp__lifted l = {.scale = s};
     if (s > 0)
         for (int k = 0; k < 3; k++) part[k] = imp_max(rgb[k] / s, 0.0);
-    fit(part, &l);
+    fit(by, part, &l);
     l.d_scale[top] = 2;
     for (int i = 0; i < 3; i++) {
         double along = 0;
@@ -192,6 +202,20 @@ void imp__lift_unbounded(const double rgb[3], struct imp__lifted *out)
             l.d_c[i][k] = s > 0 ? ((l.d_c[i][k] - (k == top ? 2 * along : 0)) / s) : 0;
     }
     *out = l;
+}
+
+void imp__lift_reflectance(const double rgb[3], struct imp__lifted *out)
+{
+    struct imp__lifter by;
+    imp__lifter_make(&by);
+    imp__lift_reflectance_by(&by, rgb, out);
+}
+
+void imp__lift_unbounded(const double rgb[3], struct imp__lifted *out)
+{
+    struct imp__lifter by;
+    imp__lifter_make(&by);
+    imp__lift_unbounded_by(&by, rgb, out);
 }
 
 void imp__lift_linear(const double rgb[3], bool bounded, struct imp__lifted *out)

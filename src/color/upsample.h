@@ -13,6 +13,7 @@
 #ifndef IMP_COLOR_UPSAMPLE_H
 #define IMP_COLOR_UPSAMPLE_H
 
+#include "cie.h"
 #include <importon/kinds.h>
 #include <math.h>
 #include <stdbool.h>
@@ -26,10 +27,23 @@ struct imp__lifted {
     double d_scale[3], d_c[3][3]; /* by r, g, b; d_c [i][k] = peak dc_i/drgb_k */
 };
 
+/* Weights of a reflectance's values in its colour under daylight: the same for all colours. */
+#define IMP__LIFT_POINTS (2 * IMP_CIE_N - 1)
+struct imp__lifter {
+    imp_spec weight[IMP__LIFT_POINTS]; /* r, g, b */
+    double x[IMP__LIFT_POINTS];
+};
+void imp__lifter_make(struct imp__lifter *out);
+
 /* rgb in [0,1]; outside it is clamped, and its derivative there is 0. */
 void imp__lift_reflectance(const double rgb[3], struct imp__lifted *out);
 /* rgb >= 0: 2 m S of rgb/(2 m), m its largest. */
 void imp__lift_unbounded(const double rgb[3], struct imp__lifted *out);
+/* The same to the bit, for many colours. */
+void imp__lift_reflectance_by(const struct imp__lifter *by, const double rgb[3],
+                              struct imp__lifted *out);
+void imp__lift_unbounded_by(const struct imp__lifter *by, const double rgb[3],
+                            struct imp__lifted *out);
 
 /* Linear. `bounded`: a reflectance, clamped to [0,1]; else rgb >= 0. */
 void imp__lift_linear(const double rgb[3], bool bounded, struct imp__lifted *out);

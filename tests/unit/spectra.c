@@ -8,6 +8,7 @@
 #include "color/rgb_basis.h"
 #include "color/wavelength.h"
 #include "imp_tap.h"
+#include "kind/texture/lifted_texels.h"
 #include "math/rng.h"
 #include <string.h>
 
@@ -184,6 +185,61 @@ static void bounds(void)
     tap_ok(held == 3 && imp__spectrum_most(&lit) >= most, "bounds of spectra");
 }
 
+/* ---- Texels --------------------------------------------------------------------------- */
+
+#define SIDE     120
+#define TEXELS   (SIDE * SIDE)
+#define DISTINCT 700
+
+static bool lifted_alike(const struct imp__lifted_texels *t, enum imp__lift_rule rule)
+{
+    for (size_t i = 0; i < t->n; i++) {
+        const double rgb[3] = {t->data[3 * i], t->data[3 * i + 1], t->data[3 * i + 2]};
+        const bool beyond = rgb[0] > 1 || rgb[1] > 1 || rgb[2] > 1;
+        struct imp__lifted l;
+        if (rule == IMP__LIFT_ANY_SIZE || (rule == IMP__LIFT_BY_SIZE && beyond))
+            imp__lift_unbounded(rgb, &l);
+        else imp__lift_reflectance(rgb, &l);
+        const struct imp__lifted *is = &t->texel[i].lifted;
+        if (l.scale != is->scale || memcmp(l.c, is->c, sizeof l.c) != 0 ||
+            memcmp(l.d_c, is->d_c, sizeof l.d_c) != 0)
+            return false;
+    }
+    return true;
+}
+
+/* Each texel has the spectrum of its colour to the bit, on any number of threads, also
+ * where another rule or other colours follow. */
+static void texels(int threads)
+{
+    static float data[3 * TEXELS];
+    struct imp_context_options options = IMP_CONTEXT_OPTIONS_INIT;
+    struct imp_arena own;
+    struct imp__lifted_texels t;
+    options.threads = threads;
+    imp_context *with = NULL;
+    if (imp_context_create(&options, &with) != IMP_OK) return;
+    imp__arena_init(&own, with);
+    const struct imp_build b = {.ctx = with, .arena = &own};
+    for (uint32_t i = 0; i < TEXELS; i++)
+        for (uint32_t c = 0; c < 3; c++) {
+            const struct imp_key key =
+                imp__key(5, (uint64_t)(imp__u01(imp__key(6, i, 0), 0) * DISTINCT), c);
+            data[3 * i + c] = (float)(1.5 * imp__u01(key, 1));
+        }
+    bool good = imp__lifted_texels_make(&b, data, TEXELS, &t) == IMP_OK;
+    for (int rule = 0; good && rule < 3; rule++) {
+        imp__lifted_texels_update(&t, (enum imp__lift_rule)rule);
+        good = lifted_alike(&t, (enum imp__lift_rule)rule);
+    }
+    for (size_t k = 0; good && k < TEXELS; k += 7) data[3 * k] = 0.25f;
+    if (good) imp__lifted_texels_update(&t, IMP__LIFT_ANY_SIZE);
+    good = good && lifted_alike(&t, IMP__LIFT_ANY_SIZE);
+    tap_ok(good, "texels have the spectra of their colours on %d threads", threads);
+    imp__arena_free(&own);
+    imp_context_destroy(with);
+}
+
 int main(void)
 {
     const struct imp_context_options options = {.size = sizeof options, .threads = 1};
@@ -193,6 +249,8 @@ int main(void)
     linear();
     bounds();
     lanes();
+    texels(1);
+    texels(3);
     for (int q = 0; q < 6; q++) {
         static const double rgb[6][3] = {{.2, .5, .9}, {.9, .05, .05}, {1, 0, 0},
                                          {.1, .8, .1}, {.5, .5, .1},   {.73, .72, .69}};

@@ -51,7 +51,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_t
         negative |= a->data[k] < 0;
     }
     if (a->spectral && a->channels == 3)
-        IMP_TRY(imp__lifted_texels_make(b, a->data, a->n, a->n, &a->lifted));
+        IMP_TRY(imp__lifted_texels_make(b, a->data, a->n, &a->lifted));
     changed(t);
     const size_t dims[2] = {a->n, (size_t)a->channels};
     IMP_TRY(imp_build_texels(b, "", a->data, 2, dims,

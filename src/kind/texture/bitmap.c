@@ -121,7 +121,7 @@ static enum imp_status build(const struct imp_build *b, void *self,
     t->spectral = b->mode == IMP_SPECTRAL || b->mode == IMP_SINGLE;
     if (t->channels == 3 && t->spectral)
         IMP_TRY(imp__lifted_texels_make(b, t->data, (size_t)t->width * (size_t)t->height,
-                                        (size_t)t->width, &t->lifted));
+                                        &t->lifted));
     changed(tex);
 
     const size_t dims[3] = {(size_t)t->height, (size_t)t->width, (size_t)t->channels};

@@ -1,50 +1,83 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Spectra of RGB texels, lifted when texels change; value, reverse and forward derivatives of their
- * interpolation at a wavelength. */
+ * Spectra of RGB texels: lifted when texels change, on all threads, each colour once where
+ * it is met again; value, reverse and forward derivatives of their interpolation at a
+ * wavelength. */
 #include "lifted_texels.h"
+#include "base/context.h"
+#include "base/pool.h"
 #include "color/rgb_basis.h"
 #include "math/vec.h"
 #include <string.h>
 
-static void lift(const struct imp__lifted_texels *t, const float *p,
-                 struct imp__lifted *out)
+/* A texel that was made from the same colour, by a hash of it: pictures have far fewer
+ * colours than texels. Of two colours with one place the later one stays. */
+struct known {
+    uint32_t
+        *texel; /* [1 << bits], 0: none, k + 1: texel k; NULL: no memory, none is known */
+    int bits;
+};
+#define KNOWN_BITS 17
+#define LEAST      1024 /* texels of a thread */
+
+static uint32_t *known_at(const struct known *k, const float colour[3])
+{
+    uint32_t bits[3];
+    memcpy(bits, colour, sizeof bits);
+    const uint64_t h = (bits[0] * UINT64_C(0x9e3779b97f4a7c15)) ^
+                       (bits[1] * UINT64_C(0xc2b2ae3d27d4eb4f)) ^
+                       (bits[2] * UINT64_C(0x165667b19e3779f9));
+    return &k->texel[(h ^ h >> 29) * UINT64_C(0xbf58476d1ce4e5b9) >> (64 - k->bits)];
+}
+
+static void lift(const struct imp__lifted_texels *t, const struct imp__lifter *by,
+                 const float *p, struct imp__lifted *out)
 {
     const double rgb[3] = {p[0], p[1], p[2]};
     const bool beyond = rgb[0] > 1 || rgb[1] > 1 || rgb[2] > 1;
     if (t->rule == IMP__LIFT_ANY_SIZE || (t->rule == IMP__LIFT_BY_SIZE && beyond))
-        imp__lift_unbounded(rgb, out);
-    else imp__lift_reflectance(rgb, out);
+        imp__lift_unbounded_by(by, rgb, out);
+    else imp__lift_reflectance_by(by, rgb, out);
 }
 
-/* Spectra of texels that have others now; `all`: of all. Equal neighbours have equal
- * spectra. */
-static void texels_lift(struct imp__lifted_texels *t, bool all)
+struct lifting {
+    struct imp__lifted_texels *texels;
+    bool all; /* not only texels that have other colours now */
+};
+
+static enum imp_status texels_lift(size_t first, size_t end, void *payload)
 {
-    for (size_t i = 0; i < t->n; i++) {
+    const struct lifting *l = payload;
+    struct imp__lifted_texels *t = l->texels;
+    struct known known = {.bits = 4};
+    struct imp__lifter by;
+    while (known.bits < KNOWN_BITS && (size_t)1 << known.bits < 2 * (end - first))
+        known.bits++;
+    if (t->n < UINT32_MAX)
+        known.texel = imp__alloc(t->ctx, (size_t)1 << known.bits, sizeof *known.texel);
+    imp__lifter_make(&by);
+    for (size_t i = first; i < end; i++) {
         struct imp__lifted_texel *to = &t->texel[i];
         const float *p = t->data + 3 * i;
-        const struct imp__lifted_texel *before = i ? to - 1 : NULL,
-                                       *above = i >= t->width ? to - t->width : NULL;
-        if (!all && memcmp(p, to->of, sizeof to->of) == 0) continue;
-        if (all && before && memcmp(p, before->of, sizeof to->of) == 0) {
-            *to = *before;
+        if (!l->all && memcmp(p, to->of, sizeof to->of) == 0) continue;
+        uint32_t *at = known.texel ? known_at(&known, p) : NULL;
+        const struct imp__lifted_texel *same = at && *at ? &t->texel[*at - 1] : NULL;
+        if (same && memcmp(p, same->of, sizeof same->of) == 0) {
+            *to = *same;
             continue;
         }
-        if (all && above && memcmp(p, above->of, sizeof to->of) == 0) {
-            *to = *above;
-            continue;
-        }
-        lift(t, p, &to->lifted);
+        lift(t, &by, p, &to->lifted);
         memcpy(to->of, p, sizeof to->of);
+        if (at) *at = (uint32_t)i + 1;
     }
+    imp__release(t->ctx, known.texel);
+    return IMP_OK;
 }
 
 enum imp_status imp__lifted_texels_make(const struct imp_build *b, const float *data,
-                                        size_t n, size_t width,
-                                        struct imp__lifted_texels *out)
+                                        size_t n, struct imp__lifted_texels *out)
 {
-    *out = (struct imp__lifted_texels){.data = data, .n = n, .width = width};
+    *out = (struct imp__lifted_texels){.ctx = b->ctx, .data = data, .n = n};
     if (b->linear_colors) return IMP_OK;
     out->texel = imp__arena_take(b->arena, n, sizeof *out->texel);
     if (!out->texel)
@@ -57,7 +90,11 @@ void imp__lifted_texels_update(struct imp__lifted_texels *t, enum imp__lift_rule
     const bool all = !t->made || t->rule != rule;
     t->rule = rule;
     t->made = true;
-    if (t->texel) texels_lift(t, all);
+    struct lifting l = {t, all};
+    if (!t->texel) return;
+    /* Without memory for a loop of all threads, this one does it. */
+    if (imp__parallel_ranges(t->ctx, t->n, LEAST, texels_lift, &l) != IMP_OK)
+        (void)texels_lift(0, t->n, &l);
 }
 
 /* Value of a texel at one wavelength and its derivatives by its three numbers. */

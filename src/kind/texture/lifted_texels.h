@@ -21,8 +21,9 @@ struct imp__lifted_texel {
 };
 
 struct imp__lifted_texels {
+    imp_context *ctx;
     const float *data; /* [n][3] */
-    size_t n, width;   /* of a row: the texel before, and that above, may be equal */
+    size_t n;
     enum imp__lift_rule rule;
     bool made;                       /* by this rule */
     struct imp__lifted_texel *texel; /* [n]; NULL: linear */
@@ -37,8 +38,7 @@ struct imp__texel_sum {
 
 /* data [n][3] stays the caller's. Update makes the spectra. IMP_E_NOMEM. */
 enum imp_status imp__lifted_texels_make(const struct imp_build *b, const float *data,
-                                        size_t n, size_t width,
-                                        struct imp__lifted_texels *out);
+                                        size_t n, struct imp__lifted_texels *out);
 /* Numbers have changed, or the rule has. */
 void imp__lifted_texels_update(struct imp__lifted_texels *t, enum imp__lift_rule rule);
 
