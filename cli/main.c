@@ -61,7 +61,7 @@ static int finish(int rc)
         const char *name = redirected.file ? redirected.path : "standard output";
         const int code = errno ? errno : EIO;
         (void)output_close(&redirected, EXIT_RUN);
-        /* the terminal is gone, and was to be told; files are written */
+        /* the terminal is gone; files are written */
         if (!redirected.path && progress_interrupted() == SIGHUP) return rc;
         return cli_error(EXIT_RUN, "%s: %s", name, strerror(code));
     }

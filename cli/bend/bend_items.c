@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * JSON of the item "rays": paths, slices of the index, spots and irradiances, thinned to what a page
- * can draw. */
+ * JSON of the item "rays": paths, slices of the index, spots and irradiances, thinned to what a
+ * page can draw. */
 #include "bend_items.h"
 
 #include "cmd_bend.h"
@@ -45,7 +45,7 @@ static int by_size(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Those of the bundles, ascending; 0 stands for none given. */
+/* Those of the bundles, ascending; 0: none given. */
 static int wavelengths(const imp_bend *b, double um[UM_MAX])
 {
     int n = 0;

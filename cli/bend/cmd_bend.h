@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the files of `importon bend` share: the open problem, its answer as text or JSON, pictures. */
+ * What the files of `importon bend` share: the open problem, its answer as text or JSON,
+ * pictures. */
 #ifndef IMP_CLI_CMD_BEND_H
 #define IMP_CLI_CMD_BEND_H
 

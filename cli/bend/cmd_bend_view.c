@@ -126,7 +126,7 @@ static void slice(const imp_field *f, struct chart *c, int u, int v, const doubl
             if (isfinite(*e))
                 range[0] = fmin(range[0], *e), range[1] = fmax(range[1], *e);
         }
-    /* Of one value everywhere, rounding is no picture. */
+    /* Where all values are one, rounding is no picture. */
     if (range[1] - range[0] < 1e-12 * fabs(range[1])) range[1] = range[0];
     const double span = range[1] - range[0];
     for (int j = 0; j < SIDE; j++)

@@ -44,7 +44,7 @@ struct result {
     struct imp_estimate value;
     const char *functional; /* "loss", "mean" or "adjoint" */
     double *x, *grad, *se;
-    int rounds, spp; /* of the run, each with spp samples asked for */
+    int rounds, spp; /* of the run, each with spp samples at first */
     int spp_taken;   /* by a round's gradient: of the target with most of them */
     struct imp_until_end end;
 };
@@ -108,7 +108,7 @@ static void add_round(struct result *sum, const struct result *r, size_t n)
 
 /* With --time: rounds of the run with other random numbers, as many as fit, each taken to
  * last as long as those before. Where the time is too short for the first, a small one
- * tells how many samples fit, or is the answer if no more do. The mean of unbiased
+ * shows how many samples fit, or is the answer if no more do. The mean of unbiased
  * estimates is one, and rounds that were done survive an interrupt. */
 static int estimate_for(imp_problem *problem, struct imp_run run, const float *seed,
                         struct result *sum)

@@ -30,7 +30,7 @@ struct findings {
 
 struct reading {
     struct imp_estimate value;
-    double *grad, *se; /* NULL: no derivatives are asked for */
+    double *grad, *se; /* NULL: no derivatives are wanted */
 };
 
 /* Adjoint of the mean over the film of one channel, or of the luminance (channel -1). */
@@ -224,7 +224,7 @@ static void unlit_tell(struct json *j, const int *sensor, int n)
     if (cli.json) json_end_array(j);
 }
 
-/* Is one sensor asked for, and not all? */
+/* Is one sensor chosen, and not all? */
 static int sensor_named(void)
 {
     for (size_t k = 0; k < cli.typed.n; k++)

@@ -90,7 +90,7 @@ static int write_paths(const struct imp_run *run)
     return rc ? rc : cli_done();
 }
 
-/* The scene's file name with the extension its film asks for, in the working folder. */
+/* The scene's file name with the extension of its film's format, in the working folder. */
 static char *default_output(const struct imp_run *run)
 {
     struct imp_sensor_info info = {.size = sizeof info};

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon verify: is a result what its manifest says? Its files are compared with their
+ * importon verify: does a result agree with its manifest? Its files are compared with their
  * hashes, and the command that made it is run again, all of it or a random part. */
 #include "shared/part.h"
 #include "shared/ranks.h"
@@ -27,7 +27,7 @@ static const struct arg_option options[] = {
 static int verdict(const char *path, const struct imp_manifest_info *info, int rc)
 {
     const char *why = info->refuted;
-    if (!why && rc) return rc; /* it was said */
+    if (!why && rc) return rc; /* it was printed */
     if (!why && info->n_missing) why = "the command did not read or make all that it did";
     if (cli.json) {
         struct json j = cli_json();

@@ -54,7 +54,7 @@ static const struct arg_option options[] = {
      &o.picture.no_preview, 0, 0, NULL},
     {0}};
 
-/* ---- What is asked --------------------------------------------------------------- */
+/* ---- Questions ------------------------------------------------------------------- */
 
 static struct {
     imp_walks *walks;
@@ -111,7 +111,7 @@ struct answer {
     char refused[512]; /* why; "": it is not */
 };
 
-/* The least effective sample size of the sensors that are asked. */
+/* The least effective sample size of the chosen sensors. */
 static enum imp_status weigh(struct answer *a)
 {
     const size_t n = problem_options.targets.n;
@@ -141,7 +141,7 @@ static enum imp_status ask(struct answer *a, double *grad, double *se)
                  : imp_problem_objective(w.problem, NULL, &w.run, &a->value, grad, se);
     if (st == IMP_E_NUMERIC || st == IMP_E_UNSUPPORTED)
         snprintf(a->refused, sizeof a->refused, "%s", imp_last_error(cli.context));
-    /* Evaluation looks at all pixels, the weights at those that were asked. */
+    /* Evaluation looks at all pixels, the weights at a subset of them. */
     return st == IMP_OK && a->refused[0] ? IMP_E_NUMERIC : st;
 }
 

@@ -173,7 +173,7 @@ static int put_map(struct json *j, const struct elements_mesh *m, size_t index,
     return st == IMP_OK ? 0 : cli_fail(st, cli.scene_path);
 }
 
-/* Of the largest polygons that are measured. */
+/* Maps of the largest polygons that are measured. */
 static int put_maps(struct json *j, const struct elements_mesh *m,
                     const struct elements_answer *a)
 {

@@ -7,8 +7,8 @@
 #include <importon/elements.h>
 
 /* Ids of elements on the page: those that are drawn first, then others that links come
- * from. Where there are too many leaves, an element with at most `most` of them stands
- * for them: it is fine where the solution is. */
+ * from. Where there are too many leaves, an element with at most `most` of them replaces
+ * them: it is fine where the solution is. */
 struct elements_mesh {
     const imp_elements *e;
     size_t n; /* elements of the solution */
@@ -30,7 +30,7 @@ int elements_mesh_read(struct elements_mesh *m, const imp_elements *e, size_t n)
 void elements_mesh_choose(struct elements_mesh *m); /* those that are drawn */
 /* A name's place in the list; the same pointer is the same shape. */
 size_t elements_mesh_name(struct elements_mesh *m, const char *name);
-/* Of what is drawn in an element's place, or of another place. */
+/* Id of what is drawn in an element's place, or of a place of its own. */
 size_t elements_mesh_id(struct elements_mesh *m, size_t k);
 void elements_mesh_free(struct elements_mesh *m);
 

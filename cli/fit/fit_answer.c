@@ -53,7 +53,7 @@ static int write_json(const struct fit_answer *a, char **paths)
     return rc;
 }
 
-/* What is left, or that it is below what so many samples tell. */
+/* What is left, or that it is below the noise of so many samples. */
 static void print_residual(const struct imp_fit_result *r)
 {
     if (!isfinite(r->residual)) return;

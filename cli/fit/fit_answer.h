@@ -12,7 +12,7 @@ struct fit_answer {
     const struct block *blocks;
     size_t n_blocks;
     const char *optimizer;
-    int no_intervals;                  /* they were not asked for */
+    int no_intervals;                  /* they were not computed */
     const struct imp_missing *missing; /* [n_missing] numbers that may be wrong */
     size_t n_missing;
     int looked; /* they were looked for */

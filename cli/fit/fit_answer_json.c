@@ -97,7 +97,7 @@ static void put_names(struct json *j, const struct block *blocks, size_t n_block
     json_end_array(j);
 }
 
-/* Numbers that a fit searches by their logarithm are told as they are. */
+/* Values that a fit searches by their logarithm are written as they are. */
 static void put_row(struct json *j, const struct block *blocks, size_t n_blocks,
                     const double *x)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Numbers that were not fitted and may be wrong: looked for, and told. */
+ * Parameters that were not fitted and may be wrong: tested and reported. */
 #include "fit_answer.h"
 #include "fit_options.h"
 #include "shared/command.h"

@@ -14,7 +14,7 @@ int fit_pictures_write(const char *name, int spp);
 /* Target i as the fit compares it, with its standard errors where it has them; the
  * caller destroys it. */
 int fit_target_film(size_t i, imp_film **out);
-/* A copy of each target, so that the folder tells the whole story. */
+/* A copy of each target, so that the folder is complete. */
 int fit_targets_write(void);
 /* undetermined.exr: the change of each sensor's picture when the problem's numbers change
  * by x_dot. */

@@ -125,7 +125,7 @@ double cli_now(void)
 
 /* ---- Opening ------------------------------------------------------------------- */
 
-/* Was this warning said before? A fit and the pictures that it writes have the same to say. */
+/* Was this warning printed before? A fit and the pictures that it writes cause the same ones. */
 static bool said_before(const char *warning)
 {
     static char *said[16];

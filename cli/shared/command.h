@@ -24,7 +24,7 @@ enum {
 struct command {
     struct args_spec args;
     int (*run)(int n, char **operand);
-    int prints;         /* all its data is text, so -o stands for standard output */
+    int prints;         /* all its data is text, so -o replaces standard output */
     const char *answer; /* in the first line of that text; NULL: none is known */
     int shared;         /* may run in several processes, by mpirun */
 };
@@ -97,7 +97,7 @@ const char *cli_mode_word(enum imp_color_mode mode);
 /* From here on, what is printed goes to -o, if there is one. 0, or an exit code. */
 int cli_redirect(void);
 
-/* The run the options ask for. */
+/* The run of the options. */
 struct imp_run cli_run(void);
 /* Samples per pixel that `run` will take. */
 int cli_spp(const struct imp_run *run);

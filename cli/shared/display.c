@@ -135,7 +135,7 @@ void display_film(const imp_film *film, const char *name)
         add_number(&p, y, 4);
         add_number(&p, info.width, 4);
         add_number(&p, n, 4);
-        /* Of each channel: its first number, and the distance from pixel to pixel. */
+        /* Each channel: its first number, and the distance from pixel to pixel. */
         for (int k = 0; k < sets; k++)
             for (int i = 0; i < info.channels; i++) add_number(&p, k * set + i, 8);
         for (int k = 0; k < sets * info.channels; k++) add_number(&p, info.channels, 8);

@@ -11,7 +11,7 @@
  * printed. */
 int display_open(void);
 /* Show a film, with its standard errors as channels se.*, under this name; a later one of
- * the same name and size takes its place. A connection that breaks is told once, and the
+ * the same name and size takes its place. A connection that breaks is reported once, and the
  * run goes on. */
 void display_film(const imp_film *film, const char *name);
 /* An imp_preview_fn; payload: the name. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Tells from its first bytes whether an existing file may be replaced by an output. */
+ * May an existing file be replaced by an output? Its first bytes decide. */
 #include "overwrite.h"
 
 #include "command.h"

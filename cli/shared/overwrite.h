@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What an output may replace: a file that begins as one of the same kind that this
- * program wrote, an empty file, or, with --overwrite, any file. Asked before the work. */
+ * program wrote, an empty file, or, with --overwrite, any file. Called before the work. */
 #ifndef IMP_CLI_OVERWRITE_H
 #define IMP_CLI_OVERWRITE_H
 

@@ -162,7 +162,7 @@ static int write_to_stdout(const imp_film *film, const struct imp_write_options 
     unlink(name);
     if (st != IMP_OK) return cli_fail(st, NULL);
     if (good) return 0;
-    __fpurge(stdout); /* it has been said: nothing is left to fail at the end */
+    __fpurge(stdout); /* reported here: nothing is left to fail at the end */
     clearerr(stdout);
     return cli_error(EXIT_RUN, "standard output: %s", strerror(code));
 }

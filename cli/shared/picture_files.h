@@ -45,7 +45,7 @@ extern const double *const picture_luminance;
 int picture_target(const char *spec, const char *mask, struct imp_target *target);
 void picture_target_free(struct imp_target *target);
 
-/* May picture_write write `path` and, if asked, the preview beside it? Asked before hours
+/* May picture_write write `path` and, if wanted, the preview beside it? Called before hours
  * of work. 0, or an exit code with the reason printed. */
 int picture_writable(const char *path, int preview);
 /* It and its preview, if they are there. */

@@ -12,11 +12,11 @@
 #include <string.h>
 #include <sys/stat.h>
 
-/* Bytes of sums in a manifest that nobody asked for. They are in memory twice until the end:
+/* Most bytes of sums in a manifest without --manifest. They are in memory twice until the end:
  * of 1 MB, a picture of 128 x 128 took a fifth more memory in all. */
 #define LIMIT_BESIDE ((size_t)1 << 18)
 
-static char *beside; /* where the manifest goes that nobody asked for; NULL: nowhere */
+static char *beside; /* path of a manifest without --manifest; NULL: none */
 
 static int status(enum imp_status st) { return st == IMP_OK ? 0 : cli_fail(st, NULL); }
 
@@ -158,10 +158,10 @@ int manifest_end(int rc)
     if (!cli.manifest || cli.verifies || rc != EXIT_DONE || progress_interrupted() ||
         !(beside || cli.manifest_path))
         goto out;
-    /* Of commands that print, the answer. */
+    /* The answer of a command that prints. */
     if (!strcmp(cli.name, "gradient") && cli.out) rc = manifest_output(cli.out);
     if (!rc) st = imp_manifest_write(cli.manifest, beside ? beside : cli.manifest_path);
-    /* The result is there; without one that was asked for, the run has failed. */
+    /* The result is there; without a manifest that was wanted, the run has failed. */
     if (st != IMP_OK && beside)
         cli_say("importon: warning: no manifest: %s", imp_last_error(cli.context));
     else rc = rc ? rc : status(st);

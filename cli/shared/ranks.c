@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The ranks of MPI. The library for it is opened when the environment says that mpirun
+ * The ranks of MPI. The library for it is opened when the environment shows that mpirun
  * started several processes. Ranks other than 0 work with standard output closed; their
- * warnings and errors are told to rank 0 in the end, which prints those that are not its
+ * warnings and errors are sent to rank 0 in the end, which prints those that are not its
  * own too. */
 #include "ranks.h"
 #include "command.h"
@@ -27,7 +27,7 @@ static struct {
     imp_mpi *mpi;
     struct imp_team team;
     double asked_s; /* when a signal asked to end; 0: it did not */
-    int failed;     /* an error was said here */
+    int failed;     /* an error was printed here */
     bool unable;    /* to meet the others */
     int heard;      /* what standard error is to be again */
     char said[2048];
@@ -185,7 +185,7 @@ void ranks_remember(bool error, const char *text)
     const size_t used = strlen(r.said);
     if (r.ranks == 1) return;
     r.failed |= error;
-    /* A line of 'E' or 'W', as said; the first that do not fit are the last. */
+    /* A line of 'E' or 'W', as printed; the first that do not fit are the last. */
     if (used + strlen(text) + 3 < sizeof r.said)
         snprintf(r.said + used, sizeof r.said - used, "%c%s\n", error ? 'E' : 'W', text);
 }
@@ -211,8 +211,8 @@ int ranks_ended(const char **text)
     return code ? code : EXIT_RUN;
 }
 
-/* Of what another rank has said, what rank 0 has not. Where rank 0 has an error too, it
- * speaks of the same. */
+/* Prints a message of another rank that rank 0 has not printed. Where rank 0 has an error
+ * too, it is the same one. */
 static void other_said(int rank, const char *text, void *payload)
 {
     (void)payload;

@@ -17,7 +17,7 @@ int ranks_count(void);
 bool ranks_first(void);
 /* Does it read files that are not the library's to read? */
 bool ranks_reads(void);
-/* Until then, rank 0 alone is heard on standard error: all parse the same options. */
+/* Until then, rank 0 alone writes to standard error: all parse the same options. */
 void ranks_heard(void);
 
 /* Join the others in this context. 0, or an exit code. */

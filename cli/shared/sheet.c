@@ -35,7 +35,7 @@ void sheet_free(struct sheet *s)
     *s = (struct sheet){NULL, 0};
 }
 
-/* Copy one picture, magnified, to where tile i stands; grey becomes colour. */
+/* Copy one picture, magnified, to tile i; grey becomes colour. */
 static void place(imp_film *from, imp_film *sheet, size_t x0, size_t y0, size_t zoom)
 {
     struct imp_film_info a = {.size = sizeof a}, b = {.size = sizeof b};

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * JSON of a pixel's walks, and of the shares of pixel and walk in the gradient of each parameter. */
+ * JSON of a pixel's walks, and of the shares of pixel and walk in the gradient of each
+ * parameter. */
 #include "walk_items.h"
 
 #include <importon/report.h>
@@ -16,7 +17,7 @@ struct shares {
     size_t *on, n_on; /* those that have derivatives */
 };
 
-/* Of all parameters with a gradient. A scene that has none has walks all the same. */
+/* Shares of all parameters with a gradient. A scene that has none has walks all the same. */
 static void shares_open(struct shares *s, int count)
 {
     *s = (struct shares){.n = imp_scene_n_params(cli.scene)};
@@ -64,7 +65,7 @@ static void put_params(struct json *j, const struct shares *s)
     json_end_array(j);
 }
 
-/* Of one pixel, and of its first walks. */
+/* Shares of one pixel, and of its first walks. */
 static enum imp_status put_shares(struct json *pixels, struct json *walks,
                                   const struct shares *s, const struct imp_run *run,
                                   const int at[2], int count)

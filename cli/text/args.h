@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Command-line options from tables: one table says how an option is spelled, where its
+ * Command-line options from tables: one table holds how an option is spelled, where its
  * value goes, which values are good and what help prints about it. */
 #ifndef IMP_CLI_ARGS_H
 #define IMP_CLI_ARGS_H

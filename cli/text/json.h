@@ -11,7 +11,7 @@
 
 struct json {
     FILE *file;
-    int started; /* something stands before in the open object or array */
+    int started; /* something precedes in the open object or array */
 };
 
 void json_object(struct json *j, const char *key);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The progress bar on stderr, and the signals that end a run (SIGINT by Ctrl-C, SIGTERM,
- * SIGHUP): the first asks the library to stop after what it is doing, and results so far
+ * SIGHUP): the first stops the library after what it is doing, and results so far
  * are written; the second ends the process at once. */
 #ifndef IMP_CLI_PROGRESS_H
 #define IMP_CLI_PROGRESS_H
@@ -16,9 +16,9 @@ void progress_init(enum progress_mode mode);
 int progress_report(const struct imp_progress *progress, void *payload);
 /* Remove the bar from the terminal; call before printing to stderr. */
 void progress_clear(void);
-/* The signal that asked to stop; 0: none did. */
+/* The signal that came; 0: none did. */
 int progress_interrupted(void);
-/* From now on, ask the library to stop after this time, too; 0: never. */
+/* From now on, the library stops after this time, too; 0: never. */
 void progress_deadline(double seconds);
 /* Go on after a signal, to write what is there; the exit code stays. */
 void progress_resume(void);

@@ -48,9 +48,9 @@ static struct {
     int closing;
 } s = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
-/* ---- Who may ask ------------------------------------------------------------------- */
+/* ---- Access ------------------------------------------------------------------------ */
 
-/* In a time that does not tell how much of it is right. */
+/* In a time that does not depend on how much of it is right. */
 static int is_token(const char *text)
 {
     unsigned char differs = 0;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A page for the person at this machine: served on a loopback address alone, under a
- * random token that only the address printed to the terminal tells; requests whose Host or
+ * random token that only the address printed to the terminal contains; requests whose Host or
  * Origin is another are refused (a page of somebody else's may send requests to any
  * address, and a name of theirs may lead here). News go to the page as server-sent
  * events. HTTP itself is libmicrohttpd's; its thread calls back. */
@@ -26,7 +26,7 @@ struct http_service {
 int http_open(const struct http_service *service, int port);
 /* The address of the page, with its token. */
 const char *http_url(void);
-/* Tell all pages: an event of this name with this text (JSON; malloc'ed, taken over). Of
+/* Send to all pages: an event of this name with this text (JSON; malloc'ed, taken over). Of
  * each channel, a small number, a page that comes late or is slow gets the last one
  * alone. */
 enum { HTTP_CHANNELS = 16 };

@@ -17,7 +17,7 @@ struct view_number {
     double start, value;
 };
 
-/* What a page may ask for, until it is taken. */
+/* Wishes of a page, until they are taken. */
 struct view_wish {
     int stop;  /* what runs */
     int go;    /* go on with it */
@@ -35,7 +35,7 @@ struct view_kind {
     const char *what;   /* "render", "fit", "bend fit" */
     const char *target; /* of "save": the file or folder; NULL: there is none */
     int again;          /* may begin anew from the numbers as they are */
-    int walks;          /* knows random walks: see view_walks */
+    int walks;          /* has random walks: see view_walks */
 };
 
 /* Serve, and print the address. 0, or an exit code with the reason printed. */
@@ -50,7 +50,7 @@ void view_numbers_are(const double *value);
 /* Values [n] that sliders were moved to. */
 void view_values(double *value);
 
-/* An imp_progress_fn: shows progress, serves walks; asks to stop for any other wish. */
+/* An imp_progress_fn: shows progress, serves walks; stops for any other wish. */
 int view_progress(const struct imp_progress *progress, void *payload);
 /* The wishes so far, which are taken away. */
 struct view_wish view_take(void);

@@ -48,7 +48,7 @@ static double hidden(const struct block *b, double v, size_t i)
     return fmin(fmax(b->tie.log ? log(v) : v, lo), hi);
 }
 
-/* Of all blocks but textures, in the order of x. */
+/* Values of all blocks but textures, in the order of x. */
 static size_t few(const double *x, double *out)
 {
     size_t n = 0;
@@ -203,7 +203,7 @@ static int run_fit(bool *whole)
     struct imp_run run = cli_run();
     double *x = cli_alloc(f.n, sizeof *x);
     run.progress = view_progress;
-    if (!problem_options.clip) { /* else it begins where the scene stands */
+    if (!problem_options.clip) { /* else it begins at the scene's present parameters */
         fit.checkpoint = f.checkpoint;
         fit.resume = f.begun;
     }
@@ -263,7 +263,7 @@ static int work(void)
             view_state(VIEW_RUNNING, said);
             rc = run_fit(&whole);
             running = false;
-        } else if (moved) { /* what the sliders say, until one asks for more */
+        } else if (moved) { /* the sliders' values, until more is wanted */
             view_state(VIEW_STOPPED, "a picture of the numbers as they are");
             view_pictures(VIEW_PICTURE, "recovered", "picture", 1);
             view_pictures(VIEW_PICTURE, "recovered", "picture", 8);
@@ -297,7 +297,7 @@ static int work(void)
 
 /* ---- Beginning and end ------------------------------------------------------------------ */
 
-/* A checkpoint of its own, where none was asked for. */
+/* A checkpoint of its own, without --checkpoint. */
 static int checkpoint_open(void)
 {
     if (view_options.checkpoint) {

@@ -23,7 +23,7 @@ static struct {
     const char *path; /* of "save" */
     imp_film *film;   /* the best so far; NULL: none */
     bool kept;        /* it was made of kept walks */
-    bool said_so;     /* and the page says so */
+    bool said_so;     /* and the page shows it */
     int sessions;     /* seeds in use: each run that is merged has its own */
 } r;
 

@@ -8,8 +8,8 @@
  *     IMP_REQUIRE(p->ctx, out, "out");
  *     IMP_OPTIONS(p->ctx, own, run, "run");
  *
- * A sized struct may be older or newer than this library. Of an older one, the fields it
- * has are taken and the others keep their defaults; a newer one may not use what this
+ * A sized struct may be older or newer than this library. The fields of an
+ * older one are taken and the others keep their defaults; a newer one may not use what this
  * version does not have: those bytes must be 0. */
 #ifndef IMP_BASE_ARGUMENTS_H
 #define IMP_BASE_ARGUMENTS_H

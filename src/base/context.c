@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Context, errors and memory. Error texts are kept per thread through a pthread key of
- * the context, until the thread or the context ends. A call whose context is not known (an object is NULL) leaves a short text
- * that belongs to the thread. */
+ * the context, until the thread or the context ends. A call whose context is not known (an
+ * object is NULL) leaves a short text that belongs to the thread. */
 #include "arguments.h"
 #include "pool.h"
 #include <stdatomic.h>
@@ -33,7 +33,7 @@ static bool fits_machine(size_t bytes)
 }
 
 /* Large arrays are read at random (volumes, their gradients): with pages of 2 MB the
- * processor keeps their addresses, and the system is not asked for each 4 kB. */
+ * processor keeps their addresses, and the system does not map each 4 kB by itself. */
 #define HUGE_PAGE ((size_t)1 << 21)
 
 static void *default_allocate(size_t bytes, void *payload)

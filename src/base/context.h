@@ -35,7 +35,7 @@ struct imp_context {
     struct imp__error_text *errors; /* list of all threads' texts, freed at the end */
     struct imp_pool *pool;          /* made on first use */
     struct imp__team *team;         /* NULL: alone */
-    /* Told of every file that is read whole; NULL: nobody. */
+    /* Called with every file that is read whole; NULL: not called. */
     void (*on_read)(void *payload, const char *path, const void *bytes, size_t n);
     void *on_read_payload;
     struct imp_registered *kinds;
@@ -74,7 +74,7 @@ void *imp__alloc(imp_context *ctx, size_t n, size_t size);
 void *imp__alloc_raw(imp_context *ctx, size_t n, size_t size); /* not zeroed */
 void imp__release(imp_context *ctx, void *memory);
 /* IMP_E_NOMEM, with both sizes, if so many bytes are more than the machine has left. Not
- * of a host's own allocator: it knows its limits. `what` begins the message. */
+ * checked with a host's own allocator, which has its own limits. `what` begins the message. */
 enum imp_status imp__memory_check(imp_context *ctx, double bytes, const char *what);
 /* Grow an array of `old_n` elements to at least `n` (doubling); keeps the contents, new
  * ones are zero. On failure returns NULL and the old array stays. */

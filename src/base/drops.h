@@ -23,7 +23,7 @@ uint64_t imp__drops_total(const struct imp_drops *drops);
 
 /* IMP_E_PATHS if more than 1 + budget * walks were dropped; budget 0: 1e-4. The message
  * has the count of each cause and the walk to look at first; `points`: an option that
- * says which random numbers it has, or "". */
+ * names its random numbers, or "". */
 enum imp_status imp__drops_budget(imp_context *ctx, const struct imp_drops *drops,
                                   double budget, double walks, const char *points);
 

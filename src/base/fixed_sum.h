@@ -14,7 +14,7 @@
 
 #define IMP_FIXED_FINE 0x1p40
 
-/* Stands in the place of a double that it becomes in the end. */
+/* Overlays the double that it becomes in the end. */
 typedef int64_t __attribute__((may_alias)) imp_fixed;
 
 struct imp_fixed_sum {
@@ -60,7 +60,7 @@ static inline double imp__fixed_largest(const struct imp_fixed_sum *f)
     return u.value;
 }
 
-/* Of a sum that is added to soon: they lie far apart, and each would be waited for. (GCC 12
+/* Prefetches number k, to which a term is added soon: terms lie far apart in memory. (GCC 12
  * drops calls of functions that prefetch and do nothing else, unless it inlines them
  * first.) */
 static inline __attribute__((always_inline)) void

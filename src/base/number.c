@@ -22,7 +22,7 @@ static bool word(const char **s, const char *end, const char *text, size_t n)
 
 /* mantissa * 10^exponent, correctly rounded. Both factors exact below 2^53 and 10^22: one
  * rounding (Clinger, "How to read floating point numbers accurately", 1990). Otherwise
- * the C library does it in its "C" locale; `sticky` says that non-zero digits were cut
+ * the C library does it in its "C" locale; `sticky`: non-zero digits were cut
  * off. */
 static double scale10(uint64_t mantissa, int exponent, bool sticky)
 {

@@ -153,7 +153,7 @@ struct imp_node {
     bool read;             /* its object was made: what is not used is used by nobody */
 };
 
-/* What a number may be; `open` says which end does not belong to it. */
+/* What a number may be; `open`: the end that does not belong to it. */
 struct imp_interval {
     double lo, hi;
     enum imp_interval_open { IMP_CLOSED, IMP_OPEN_LO, IMP_OPEN_HI, IMP_OPEN } open;
@@ -220,7 +220,8 @@ enum imp_status imp__props_choice(imp_context *ctx, struct imp_node *node,
                                   int fallback, int *out);
 /* IMP_E_SCENE with a list of all unused properties and children. */
 enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node);
-/* The property that a misspelt one may have meant, or NULL: one that was looked for and not found. */
+/* The property that a misspelt one may have meant, or NULL: one that was looked for and not
+ * found. */
 IMP_COLD const char *imp__node_meant(const struct imp_node *node, const char *name);
 
 #endif

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A team of processes: who belongs to it, and what its ranks tell each other besides
- * sums. */
+ * A team of processes: who belongs to it, and the messages of its ranks besides sums. */
 #include "team.h"
 #include "arguments.h"
 #include "file.h"
@@ -40,8 +39,8 @@ static bool is_active(unsigned index)
 }
 #endif
 
-/* Embree and libm choose their code by these. glibc knows them; GCC's own list would be made by a
- * constructor that every start of a program runs. */
+/* Embree and libm choose their code by these. They come from glibc; GCC's own list would be
+ * made by a constructor that every start of a program runs. */
 void imp__machine_text(char text[256])
 {
     snprintf(text, 256, "importon %s", IMP_VERSION_STRING);
@@ -155,7 +154,7 @@ enum imp_status imp__team_any(imp_context *ctx, bool here, bool *any)
     return team->host.gather(&own, 1, any_receive, any, team->host.payload);
 }
 
-/* What rank 0 says first; the text of an error follows it. */
+/* The first message of rank 0; the text of an error follows it. */
 struct broadcast_head {
     uint64_t bytes;
     uint32_t status;

@@ -81,8 +81,8 @@ static inline bool imp__team_writes(const imp_context *ctx)
     return !ctx->team || ctx->team->role != IMP_TEAM_RANK || ctx->team->host.rank == 0;
 }
 
-/* Do files come from rank 0? Then all ranks make every call that reads one, or asks
- * whether it is there. */
+/* Do files come from rank 0? Then all ranks make every call that reads one, or looks
+ * whether it exists. */
 static inline bool imp__team_broadcasts(const imp_context *ctx)
 {
     return ctx->team && ctx->team->role == IMP_TEAM_RANK && ctx->team->host.broadcast;
@@ -112,8 +112,8 @@ enum imp_status imp__shared_sum(imp_context *ctx, const struct imp_loop *loop,
  * not sent. f->sum may be NULL. */
 enum imp_status imp__shared_fixed(imp_context *ctx, struct imp_fixed_sum *f);
 
-/* Is it so on any rank? What a clock or a user says differs between ranks; what follows
- * may not. `here` where it cannot be asked (parts). */
+/* Is it so on any rank? Clocks and users differ between ranks; what follows may not. Parts
+ * have no ranks to compare with: `here`. */
 enum imp_status imp__team_any(imp_context *ctx, bool here, bool *any);
 
 /* All get the status of rank 0, its message, and its bytes. */
@@ -121,7 +121,7 @@ struct imp_bytes;
 enum imp_status imp__team_broadcast(imp_context *ctx, enum imp_status st,
                                     struct imp_bytes *bytes);
 
-/* Bytes that every rank has computed alike: parts keep them, and *known of a merge says
+/* Bytes that every rank has computed alike: parts keep them, and *known of a merge tells
  * that they have been read instead. */
 enum imp_status imp__team_keep(imp_context *ctx, void *bytes, size_t n, bool *known);
 

@@ -16,7 +16,7 @@ struct head {
     double unit;
 };
 
-/* Of a block, the numbers that there are. */
+/* How many numbers a block has: the last one has fewer. */
 static size_t block_size(const struct imp_fixed_sum *f, size_t block)
 {
     return imp_min(f->n - block * BLOCK, (size_t)BLOCK);
@@ -177,7 +177,7 @@ enum imp_status imp__shared_fixed(imp_context *ctx, struct imp_fixed_sum *f)
         head.failed = !blocks_write(ctx, f, &head, &out);
         if (!head.failed) memcpy(out.data, &head, sizeof head);
     }
-    /* A rank without memory tells the others; a part has none to tell. */
+    /* A rank without memory sends its failure to the others; a part has no others. */
     const bool whole = !sums && !head.failed;
     st = team->role != IMP_TEAM_RANK && head.failed
              ? IMP_E_NOMEM

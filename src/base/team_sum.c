@@ -71,7 +71,7 @@ static bool share_take(struct imp__share *s, size_t *item)
     return got;
 }
 
-/* Of all ranks, were they equally fast. */
+/* Items that all ranks have done, if they are equally fast. */
 static size_t share_reached(void *payload)
 {
     struct imp__share *s = &((struct imp__sharing *)payload)->share;
@@ -84,7 +84,7 @@ static size_t share_reached(void *payload)
     return reached;
 }
 
-/* ---- What a rank tells the others ------------------------------------------------------ */
+/* ---- Messages of a rank to the others -------------------------------------------------- */
 
 void imp__message_node(struct imp__sharing *s, const struct imp_sum_node *node)
 {
@@ -100,7 +100,7 @@ void imp__sharing_add(void *into, const void *from, void *payload)
     s->desc->add(into, from, s->desc->payload);
 }
 
-/* A group that this rank completed alone is told to the others; by any thread. */
+/* A group that this rank completed alone goes to the others; by any thread. */
 static enum imp_status sum_take(size_t group, void *sum, void *payload)
 {
     struct imp__sharing *s = payload;
@@ -197,7 +197,7 @@ void imp__message_end(struct imp__sharing *s, enum imp_status st,
     if (!s->no_memory) memcpy(s->message.data, head, sizeof *head);
 }
 
-/* Tell what this rank computed, and complete the tree with what the others did. */
+/* Sends what this rank computed, and completes the tree with what the others did. */
 static enum imp_status exchange(struct imp__sharing *s, enum imp_status st,
                                 struct imp_shared *shared)
 {
@@ -211,7 +211,7 @@ static enum imp_status exchange(struct imp__sharing *s, enum imp_status st,
                            imp__sharing_receive, s, team->host.payload);
     team->round++;
     if (st != IMP_OK) return imp__error_prefix(s->ctx, st, "the team");
-    /* Nobody answers a part: what it knows is what itself did. */
+    /* A part gets no answer: its status is that of its own work. */
     if (team->role == IMP_TEAM_PART && mine != IMP_OK) return mine;
     if (s->strange)
         return imp__error(s->ctx, IMP_E_ARG,
@@ -246,7 +246,7 @@ static enum imp_status window_run(struct imp__sharing *s, const struct imp_loop 
     s->nodes = 0;
     s->message.size = 0;
     *shared->drops = (struct imp_drops){0};
-    /* A rank that cannot begin tells the others. */
+    /* A rank that cannot begin sends its failure to the others. */
     s->no_memory |= !imp__bytes_add(s->ctx, &s->message, &none, sizeof none);
     each.n_items = end - first;
     each.fraction_lo = loop->fraction_lo + span * (double)first / all;

@@ -18,7 +18,7 @@ struct imp__share {
     bool more;            /* there may be other chunks */
 };
 
-/* What a rank tells the others: a head, then nodes of the tree, each behind its place. */
+/* A rank's message to the others: a head, then nodes of the tree, each behind its place. */
 struct imp__sum_head {
     uint32_t status, late;
     uint64_t items, group, size, nodes, state;

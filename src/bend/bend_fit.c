@@ -20,8 +20,8 @@ struct fit {
     double *theta, *bar, *lo, *hi, *scale,
         *x0;    /* [n_theta], of active numbers where [n] */
     size_t *at; /* [n] index in theta */
-    struct imp__search
-        *last; /* search and grid of the level before, whose memory is carried on */
+    /* Search and grid of the level before, whose memory is carried on. */
+    struct imp__search *last;
     imp_field *coarse;
     size_t *coarse_at; /* [last->n] */
     bool carries;
@@ -95,7 +95,7 @@ static enum imp_status goal_eval(const double *x, uint64_t seed, struct imp_esti
     return IMP_OK;
 }
 
-/* Call the caller's function after an iteration. True: it asks to stop the fit. */
+/* Calls the caller's function after an iteration. True: the fit is to stop. */
 static bool show_step(struct fit *f, const struct imp__search *s)
 {
     const struct imp_bend_fit_step step = {

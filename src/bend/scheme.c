@@ -7,7 +7,7 @@
  *     arc length   drift x += c t v/|v|    kick v += d t g,       path += d t eta
  *
  * Each line below is one of these, its tangent or its transpose. Supplement (23), (24),
- * which has x' = v/eta(x) and no explicit inverse, stands apart at the end. */
+ * which has x' = v/eta(x) and no explicit inverse, is apart at the end. */
 #include "bend_rays.h"
 
 /* Yoshida 1990: w1 = 1/(2 - 2^(1/3)), w0 = 1 - 2 w1. */

@@ -22,7 +22,7 @@ enum object {
     CAUCHY,
     RAYLEIGH,
     INDEX_RATIO, /* these two are made by imp__ior_prepare */
-    WRITTEN,     /* what its property `value` says */
+    WRITTEN,     /* its property `value` */
     N_OBJECTS
 };
 static const char *const object_names[N_OBJECTS] = {

@@ -25,7 +25,7 @@ enum imp_status imp__color_spectrum_make(const struct imp__color_ask *ask,
 /* The spectrum of a colour, where the mode has spectra. */
 enum imp_status imp__color_lift(const struct imp__color_ask *ask, const double rgb[3],
                                 struct imp__color *out);
-/* A colour as the role allows it; `prop` is where it stands. */
+/* A colour as the role allows it; `prop` is where it is written. */
 enum imp_status imp__color_check_rgb(const struct imp__color_ask *ask,
                                      const struct imp_node *node,
                                      const struct imp_prop *prop, const double rgb[3]);

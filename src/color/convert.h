@@ -11,7 +11,7 @@
 #include "base/props.h"
 #include <importon/kinds.h>
 
-/* What is asked for. */
+/* A request for a colour. */
 struct imp__color_ask {
     imp_context *ctx;
     struct imp_arena *arena; /* for spectra */
@@ -19,9 +19,9 @@ struct imp__color_ask {
     enum imp_role role;
     bool scalar; /* one number of a colour: the mean of the three, in mono mode the
                     luminance */
-    bool
-        any_size; /* colours above 1 are lifted as they are, of a role that is no light */
-    bool linear;  /* colours are lifted by the linear basis */
+    /* Colours above 1 are lifted as they are, of a role that is no light. */
+    bool any_size;
+    bool linear; /* colours are lifted by the linear basis */
 };
 
 /* What it turns into. In spectral modes `value` is the colour in rgb, for what needs no

@@ -36,7 +36,7 @@ struct imp_spectrum {
     struct imp__lifted lifted;               /* COLOR: what follows from value */
     bool emission;                           /* COLOR: of any size, else <= 1 */
     bool linear;                             /* COLOR: linear in its numbers */
-    double *color_d; /* [n][3] d colour/d number, where it was asked for; NULL */
+    double *color_d; /* [n][3] d colour/d number, if prepared; or NULL */
 };
 
 /* Value at one wavelength, and its derivatives by numbers first .. first + n - 1. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Wavelengths of walks, and what a sensor makes of the radiance at them. Of a walk with C
- * wavelengths, the hero l_0 is drawn with density p and its companions follow at equal
+ * Wavelengths of walks, and what a sensor makes of the radiance at them. A walk carries C
+ * wavelengths: the hero l_0 is drawn with density p and its companions follow at equal
  * distances in the cumulative distribution, so that each of them alone has density p
  * (Wilkie et al., "Hero Wavelength Spectral Sampling", 2014). Channel c of the walk is
  *
@@ -26,7 +26,7 @@ struct imp_wavelengths {
     const struct imp_spectrum *response; /* [n_channels] r_c, per nm */
 };
 
-/* Of one walk. */
+/* The wavelengths of one walk. */
 struct imp_waves {
     struct imp_carried carried;
     int drew;         /* lane that makes decisions whose density depends on the lane */

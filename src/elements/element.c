@@ -42,7 +42,7 @@ void imp__el_quarter(const struct imp__element *x, int q, imp_v3 v[4])
 
 /* ---- What is exposed ----------------------------------------------------------- */
 
-/* Does light reach the point at all? Inside a solid that stands on the surface, every ray
+/* Does light reach the point at all? Inside a solid on the surface, every ray
  * meets the wrong side of something. Flat directions come last: they settle the doubt. */
 static bool is_exposed(const imp_elements *e, const struct imp__el_root *r, imp_v3 p,
                        struct imp_key key)
@@ -66,7 +66,7 @@ static bool is_exposed(const imp_elements *e, const struct imp__el_root *r, imp_
 }
 
 /* The part of an element that is not covered by solids. Radiance and moments are means
- * over that part: a mean over all of it would darken what stands next to a block twice,
+ * over that part: a mean over all of it would darken what is next to a block twice,
  * as receiver and as source. */
 static double exposure_of(const imp_elements *e, const struct imp__element *x,
                           uint32_t index)

@@ -184,12 +184,12 @@ struct imp_elements {
     size_t cap_in, cap_out_start, cap_out, cap_value;
     bool sorted;
 
-    /* Rays of camera sources and of the view, the picture that was asked for: by root and
+    /* Rays of camera sources and of the view, the picture of the call: by root and
      * path, so that those of an element are together; misses last. */
     size_t n_hits;
     struct imp__el_hit *hits;
     double *seen;              /* [n_hits] radiance along each ray, in order of tracing */
-    size_t first_view, n_view; /* rays of the view; none: no picture was asked for */
+    size_t first_view, n_view; /* rays of the view; none: no picture is made */
     double *picture;           /* the view's pixels at the last step */
 
     int64_t rays;
@@ -198,7 +198,7 @@ struct imp_elements {
     struct imp_elements_step *log;
     double start_s, deadline_s;
     double last_tick_s, fraction;
-    bool stop; /* progress asked for it, or the deadline passed */
+    bool stop; /* by progress, or the deadline passed */
     bool solved, has_importance;
     const char *reason;
     struct imp_elements_row *rows;
@@ -292,7 +292,7 @@ void imp__el_quarter(const struct imp__element *x, int q, imp_v3 v[4]);
 imp_v3 imp__el_point(int corners, const imp_v3 *v, double s, double t);
 
 /* link.c */
-/* Is nothing of one visible from the other, whatever stands between? */
+/* Is nothing of one visible from the other, whatever is between? */
 bool imp__el_back_facing(const imp_elements *e, const struct imp__element *a,
                          const struct imp__element *b);
 /* Is the segment free between points of two polygons? */
@@ -356,7 +356,7 @@ int imp__el_source_of(const imp_elements *e, uint32_t root);
 enum imp_status imp__el_measure_each(imp_elements *e, double *J);
 
 /* eye.c */
-/* Order the hits and tell the elements which are theirs; after they were taken. */
+/* Order the hits and give the elements theirs; after they were taken. */
 enum imp_status imp__el_hits_sort(imp_elements *e);
 /* The hits of the parent that are its child k's. */
 void imp__el_hits_share(const imp_elements *e, const struct imp__element *parent, int k,
@@ -364,7 +364,7 @@ void imp__el_hits_share(const imp_elements *e, const struct imp__element *parent
 enum imp_status imp__el_bin(imp_elements *e); /* a from the hits */
 /* Fill `seen` from the present solution. */
 enum imp_status imp__el_see(imp_elements *e);
-/* Relative change since the last call of what was asked for: the larger of the view's RMS
+/* Relative change of the results since the last call: the larger of the view's RMS
  * and, where sources were given, sum w |dJ| / sum w |J| over their measurements J. NaN
  * the first time. */
 enum imp_status imp__el_look(imp_elements *e, double *change);

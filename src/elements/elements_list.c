@@ -16,7 +16,7 @@ static enum imp_status ready(const imp_elements *e, size_t index)
     return IMP_OK;
 }
 
-/* Of all leaves in an element: where solids cover corners, its own estimate of the same
+/* Area of all leaves in an element: where solids cover corners, its own estimate of the same
  * area is another one. */
 static double leaf_area(const imp_elements *e, const struct imp__element *x)
 {

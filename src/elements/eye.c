@@ -214,7 +214,7 @@ enum imp_status imp__el_see(imp_elements *e)
     return imp__parallel(e->ctx, &loop, NULL);
 }
 
-/* ---- What was asked for -------------------------------------------------------- */
+/* ---- Measurements -------------------------------------------------------------- */
 
 /* Relative RMS change of the view's pixels, which are kept for the next time. */
 static enum imp_status view_change(imp_elements *e, bool first, double *change)

@@ -6,7 +6,7 @@
 #include "math/rng.h"
 #include <string.h>
 
-#define SPREAD 16 /* points of a source that stand for it */
+#define SPREAD 16 /* points that represent a source */
 
 /* Sums over the links into a cell; NULL: not wanted. */
 struct arriving {
@@ -270,7 +270,7 @@ void imp__guide_cumulate(const double *sum, int n, double base, float *cdf)
 }
 
 /* How flat a material's lobes are: of R all is in one number if it is Lambert's. Light
- * that arrives says nothing of lobes: where they are narrow, the BSDF draws better. */
+ * that arrives does not resolve lobes: where they are narrow, the BSDF draws better. */
 static double flatness(const imp_elements *e, const struct imp__el_material *m)
 {
     double one = 0, all = 0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a guide tells walks from the lights about their beginning. They carry radiance, and
+ * Where a guide begins walks from the lights. They carry radiance, and
  * what guides them is the adjoint of that, the importance that the elements hold
  * (Christensen et al. 1993): flux that arrives at x from w brings the reading g(x->w).
  *

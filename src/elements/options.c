@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Options: defaults, what the scene's integrator asks for, bounds, and copies of what the
+ * Options: defaults, those of the scene's integrator, bounds, and copies of what the
  * host may free. */
 #include "elements.h"
 #include "elements_integrator.h"

@@ -120,7 +120,7 @@ static double error_of(const imp_elements *e, const struct imp__el_link *k,
 /* The part of the source's radiance that finer sources would resolve. The kernel is
  * integrated over the source exactly, so a uniform lamp that the receiver sees whole
  * gives the same irradiance from its parts: only the light that it reflects may differ
- * from part to part. A glossy receiver tells directions apart, a beam has a lobe, and
+ * from part to part. A glossy receiver depends on direction, a beam has a lobe, and
  * behind an edge more samples mean more rays: there all of it counts. */
 static double resolved_by_source(const imp_elements *e, const struct imp__el_link *k)
 {
@@ -142,8 +142,8 @@ static double resolved_by_source(const imp_elements *e, const struct imp__el_lin
 
 /* ---- One wave: look at links [from, n), split, make their children's links ----- */
 
-/* Of a link: it stays, its receiver is to be split, its source is, or it goes. Whether
- * the element still needs to be split itself is told by FRESH. */
+/* What becomes of a link: it stays, its receiver is to be split, its source is, or it goes.
+ * FRESH: the element still needs to be split itself. */
 enum { KEEP = 0, SPLIT_RECEIVER, SPLIT_SOURCE, GONE, FRESH = 4 };
 enum { LINKS_PER_ITEM = 256 };
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The schedule: links between whole polygons first, then refinement under a falling
- * tolerance with a few warm-started sweeps each, until what was asked for hardly changes
+ * tolerance with a few warm-started sweeps each, until the results hardly change
  * (measurements; the picture, as the paper has it, where one is wanted), the tolerance
  * has reached its end, or a budget is spent. */
 #include "base/team.h"
@@ -40,7 +40,7 @@ void imp__el_tick(imp_elements *e, const char *stage, double fraction, const cha
 {
     bool any;
     tick(e, stage, fraction, note);
-    /* What a clock or a user says differs between ranks. */
+    /* Clocks and users differ between ranks. */
     if (imp__team_any(e->ctx, e->stop, &any) != IMP_OK) any = true;
     if (any && !e->stop) e->reason = "stopped by another rank";
     e->stop = any;
@@ -226,7 +226,7 @@ enum imp_status imp_elements_solve(imp_elements *e)
             e->reason = "the budget of links or memory is spent";
             break;
         }
-        /* Twice in a row; a step that refined nothing says nothing. */
+        /* Twice in a row; a step that refined nothing does not count. */
         if (s->links > before + before / 8)
             still = s->change < e->opt.stop ? still + 1 : 0;
         if (still == 2) {

@@ -31,7 +31,7 @@ void imp__el_locate(const struct imp__el_root *r, imp_v3 p, double *u, double *v
     *v = imp_clamp(t, 0.0, 0x1.fffffffffffffp-1);
 }
 
-/* Of a meter on a shape, point and direction: Roberts' sequence in four dimensions (2018),
+/* Point and direction of a meter on a shape: Roberts' sequence in four dimensions (2018),
  * whose ratio solves g^5 = g + 1. */
 static void meter_ray(const struct imp_sensor *s, double px, double py, int k, int side,
                       struct imp_sensor_ray *ray)
@@ -51,7 +51,7 @@ static void meter_ray(const struct imp_sensor *s, double px, double py, int k, i
  * picture: an edge along a row takes or loses the whole row, and a lamp that covers 1 %
  * of scene a came out 1.8 % too small. So rows are shifted inside their cells by the
  * golden ratio from column to column, and columns from row to row: along any edge the
- * rays then cut it at evenly spread places (0.03 %). Of a lens it is the middle. */
+ * rays then cut it at evenly spread places (0.03 %). Through a lens they take its middle. */
 void imp__el_ray(const struct imp_sensor *s, int x, int y, int k, int side,
                  struct imp_sensor_ray *ray)
 {
@@ -153,7 +153,7 @@ out:
 }
 
 /* The view and the first source that is all of it, -1: none. There is no view without a
- * sensor, or where only measurements were asked for. */
+ * sensor, or where only measurements are made. */
 static int view_of(const imp_elements *e, int view[4])
 {
     memset(view, 0, 4 * sizeof *view);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Intel's Open Image Denoise, found when it is asked for: the library has no need of it
+ * Intel's Open Image Denoise, found when it is first used: the library has no need of it
  * otherwise. */
 #ifndef IMP_FILM_DENOISER_H
 #define IMP_FILM_DENOISER_H

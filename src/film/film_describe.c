@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * One walk told vertex by vertex: Stam's single-path view, as text to read or JSON to
+ * One walk described vertex by vertex: Stam's single-path view, as text to read or JSON to
  * draw. */
 #include "base/text.h"
 #include "film_filter.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A picture by finite elements: solved for the mean of this picture, then seen through
- * the sensor on a regular grid of rays in every pixel, as many as samples were asked for.
+ * the sensor on a regular grid of rays in every pixel, as many as there are samples.
  * The film's filter is not applied: a pixel is the mean of its square. */
 #include "base/film.h"
 #include "base/pool.h"

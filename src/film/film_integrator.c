@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The list of all integrators, and the three that this room defines: `depth`, `aov` and `moment`. */
+ * The list of all integrators, and the three that this room defines: `depth`, `aov` and
+ * `moment`. */
 #include "film_integrator.h"
 #include "base/required.h"
 #include "elements/elements_integrator.h"
@@ -59,7 +60,7 @@ static enum imp_status aovs_read(const struct imp_build *build, const char *text
     return IMP_OK;
 }
 
-/* Taken for Mitsuba's sake; here it says nothing. */
+/* Accepted for Mitsuba's sake, without effect. */
 static enum imp_status depth_build(const struct imp_build *build,
                                    struct imp_integrator *i)
 {

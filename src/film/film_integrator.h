@@ -27,8 +27,8 @@ enum imp_aov_type {
 
 /* What aov and moment add to the channels of the first integrator in them. */
 struct imp_channels {
-    bool
-        moments; /* first and second moments of each integrator; else its radiance, and: */
+    /* True: first and second moments of each integrator; false: its radiance and the aovs. */
+    bool moments;
     int n_aovs;
     struct imp_aov {
         const char *name;

@@ -63,7 +63,7 @@ struct imp_light_picture {
     double lo, hi;        /* part of the progress; hi 0: all */
 };
 
-/* mean, se [height][width][n]; se may be NULL. The budget of dropped walks is asked.
+/* mean, se [height][width][n]; se may be NULL. The budget of dropped walks is checked.
  * @return IMP_OK; IMP_CANCELLED, with nothing; IMP_E_PATHS; IMP_E_NOMEM. */
 enum imp_status imp__light_picture_make(const struct imp_light_picture *picture,
                                         double *mean, double *se,

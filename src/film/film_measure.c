@@ -211,7 +211,7 @@ int imp__measure_base(const struct imp_measure *m, imp_spec L, double alpha,
 }
 
 /* Alpha (docs/scene-format.md 11): an environment in sight makes every path valid; direct
- * asks for a surface at the first hit. */
+ * needs a surface at the first hit. */
 static double walk_alpha(const struct imp_measure *m,
                          const struct imp_walk_integrator *integrator,
                          const struct imp_walk *walk)

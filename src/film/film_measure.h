@@ -39,7 +39,7 @@ void imp__measure_features(const void *measure, struct imp_sample *sample);
 int imp__measure_base(const struct imp_measure *m, imp_spec L, double alpha,
                       double *value);
 
-/* The sensor of a run, or an error that says how many there are. */
+/* The sensor of a run, or an error with the number of sensors. */
 enum imp_status imp__run_sensor(const struct imp_scene *scene, const struct imp_run *run,
                                 const struct imp_sensor **out);
 

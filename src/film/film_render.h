@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Between the solvers: this room stands on walk and elements, which do not know each
+ * Between the solvers: this room is above walk and elements, which do not include each
  * other. */
 #ifndef IMP_FILM_RENDER_H
 #define IMP_FILM_RENDER_H

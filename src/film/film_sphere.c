@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Pictures of all directions from one projection to another, with the light of the map as
- * it is interpolated kept. Of a map sum L_k hat_k, texel i of the new one is
+ * it is interpolated kept. For a map sum L_k hat_k, texel i of the new one is
  *
  *     L_i = (Int psi_i sum L_k hat_k dw) / (Int hat_i dw),    sum_i psi_i = 1,
  *

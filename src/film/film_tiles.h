@@ -11,7 +11,7 @@
 #include "base/drops.h"
 #include "base/team.h"
 
-#define IMP_TILE_SIDE 8 /* pixels, where nothing asks for larger tiles */
+#define IMP_TILE_SIDE 8 /* pixels, unless larger tiles are needed */
 
 struct imp_tile {
     int x0, y0, x1, y1; /* [x0, x1) x [y0, y1); beyond the picture in its margin */

@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define LIMIT ((size_t)256 << 20) /* of bytes of sums, where nothing is said */
+#define LIMIT ((size_t)256 << 20) /* bytes of sums, by default */
 
 static void refute(imp_manifest *m, const char *what, const char *name, const char *why)
 {

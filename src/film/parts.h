@@ -17,7 +17,7 @@ struct imp_same {
 /* Equal on all ranks and in all parts, or IMP_E_ARG with the first name that differs. */
 enum imp_status imp__team_same(imp_context *ctx, const struct imp_same *same, int n);
 
-/* Tell the team which parameters and random numbers the sums are of that follow. */
+/* Gives the team the parameters and random numbers of the sums that follow. */
 void imp__team_state(const struct imp_scene *scene, const struct imp_run *run);
 
 /* The scene at its present parameters, the sensor, and how Monte Carlo is run: fills

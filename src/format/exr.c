@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* The handler cannot ask its context for the user data: while writing, the context is
+/* The handler cannot get the user data from its context: while writing, the context is
  * locked when the handler is called. */
 static _Thread_local struct imp_exr *current;
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Reading EXR: scanlines or tiles, half, float or uint, any compression that the library
- * knows. Channels are found by name; those called se.NAME beside a NAME are standard
+ * Reading EXR: scanlines or tiles, half, float or uint, any compression of the
+ * library. Channels are found by name; those called se.NAME beside a NAME are standard
  * errors. */
 #include "base/number.h"
 #include "exr.h"
@@ -24,9 +24,9 @@ struct exr_reader {
     exr_attr_box2i_t window;
     const exr_attr_chlist_t *list;
     int n_planes, n_se;
-    bool
-        skip_rgb; /* R, G, B are made from the spectrum, and have no errors of their own */
-    int *order;   /* of the channels in the film: index in list */
+    /* R, G, B are made from the spectrum, and have no errors of their own. */
+    bool skip_rgb;
+    int *order;     /* of the channels in the film: index in list */
     float **target; /* by index in list: first number of the channel */
     imp_film *film;
 };

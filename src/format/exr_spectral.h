@@ -20,7 +20,7 @@ void imp__exr_name_to_file(const char *name, char text[IMP_EXR_NAME_ROOM]);
 void imp__exr_name_to_film(const char *name, char text[IMP_EXR_NAME_ROOM]);
 
 /* The picture in linear sRGB, channels R, G, B without errors: of light (S0) as it is, of
- * what reflects (T) in daylight. A channel stands for the wavelengths that are nearest to
+ * what reflects (T) in daylight. A channel covers the wavelengths that are nearest to
  * its own. *out is NULL of films that are not spectral, or have an R of their own. */
 enum imp_status imp__exr_spectral_rgb(const imp_film *film, imp_film **out);
 

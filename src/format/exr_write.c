@@ -27,7 +27,7 @@ struct exr_writer {
     bool half;
 };
 
-/* Texts of the layout for spectral images. The unit is the one that the layout knows;
+/* Texts of the layout for spectral images. The unit is the one of the layout;
  * numbers are per nm. */
 static enum imp_status spectral_texts(struct exr_writer *w, int part)
 {

@@ -94,7 +94,7 @@ static enum imp_status png_encode(const imp_film *f, const struct imp_write_opti
     return st;
 }
 
-/* Of spectra, their colours. */
+/* An 8-bit preview; of spectra, their colours. */
 static enum imp_status preview_encode(const imp_film *f,
                                       const struct imp_write_options *o,
                                       struct imp_bytes *out)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Reads a picture of any known format: tells the format from the first bytes, and
+ * Reads a picture of any known format: finds the format by the first bytes, and
  * picks the colour channels of the film that comes out. */
 #include "image.h"
 #include "vol_file.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Picture files (docs/scene-format.md 13.5). All are read into films, whatever their
- * channels; the format is told from the first bytes, not from the name. */
+ * channels; the format is found by the first bytes, not from the name. */
 #ifndef IMP_FORMAT_IMAGE_H
 #define IMP_FORMAT_IMAGE_H
 
@@ -42,7 +42,7 @@ enum imp_status imp__hdr_parse(imp_context *ctx, const char *name,
                                const struct imp_bytes *file, imp_film **out);
 enum imp_status imp__bmp_parse(imp_context *ctx, const char *name,
                                const struct imp_bytes *file, imp_film **out);
-/* Of at least two bytes. */
+/* PPM and PGM, of at least two bytes. */
 enum imp_status imp__ppm_parse(imp_context *ctx, const char *name,
                                const struct imp_bytes *file, imp_film **out);
 /* Can it be one? */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * JPEG, reading only. libjpeg ends the process on errors unless told otherwise: here
+ * JPEG, reading only. libjpeg ends the process on errors by default: here
  * errors jump back, and a file that ends early is an error, not a grey rest. Its memory
  * manager takes no hooks. */
 #include "image.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * NumPy arrays (H, W, C) or (H, W): <f4 and <f8 in either order are read, <f4 is written. The header is a
- * Python dictionary, of which three entries are looked for. */
+ * NumPy arrays (H, W, C) or (H, W): <f4 and <f8 in either order are read, <f4 is written. The
+ * header is a Python dictionary, of which three entries are looked for. */
 #include "base/little.h"
 #include "base/number.h"
 #include "image.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * PFM: "PF" or "Pf", size, scale whose sign tells the byte order, rows from the bottom
+ * PFM: "PF" or "Pf", size, scale whose sign is the byte order, rows from the bottom
  * up. */
 #include "base/number.h"
 #include "image.h"

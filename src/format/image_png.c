@@ -78,7 +78,7 @@ static void job_close(struct png_job *j)
     imp_film_destroy(j->film);
 }
 
-/* Everything that may jump; false: it did, or j->st says why. */
+/* Everything that may jump; false: it did, or j->st is the reason. */
 static bool decode(struct png_job *j)
 {
     static const char *const names[] = {"Y", "Y,A", "R,G,B", "R,G,B,A"};

@@ -7,7 +7,7 @@
 #include "base/file.h"
 #include "scene/scene.h"
 
-/* The caller's options, complete whatever `size` says. @return IMP_E_ARG if malformed. */
+/* The caller's options, complete for any `size`. @return IMP_E_ARG if malformed. */
 enum imp_status imp__load_options(imp_context *ctx, const struct imp_load_options *from,
                                   struct imp_load_options *to);
 /* A file to load: complete options, its text, and its folder. */
@@ -28,8 +28,8 @@ enum imp_status imp__graded_finish(struct imp_scene *scene);
 /* survey.c: IMP_E_UNSUPPORTED if two or more plugins do not exist, with all of them; a
  * lenient scene goes on without. References are resolved. */
 enum imp_status imp__survey(struct imp_scene *scene);
-/* survey.c: when objects are made, a warning for what is declared and stands nowhere; what
- * of a lenient scene nobody has read. */
+/* survey.c: when objects are made, a warning for what is declared and used nowhere, and for
+ * what was not read of a lenient scene. */
 enum imp_status imp__survey_finish(struct imp_scene *scene);
 /* resolve.c: attach meshes and pictures to the nodes that name files. */
 enum imp_status imp__files_attach(struct imp_scene *scene);

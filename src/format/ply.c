@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * PLY 1.0: ascii, binary_little_endian, binary_big_endian. Of vertices x y z, nx ny nz
- * and uv are read, of faces vertex_index or vertex_indices; other numbers are attributes
+ * PLY 1.0: ascii, binary_little_endian, binary_big_endian. Vertices give x y z, nx ny nz
+ * and uv, faces vertex_index or vertex_indices; other numbers are attributes
  * (ply_attributes.c); other lists and elements are skipped. */
 #include "base/number.h"
 #include "ply_file.h"

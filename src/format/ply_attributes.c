@@ -103,7 +103,7 @@ static enum imp_status attributes_allocate(struct ply *p)
     return IMP_OK;
 }
 
-/* Integers stand for [0,1], encoded as in pictures. */
+/* Integers encode [0,1], as in pictures. */
 enum imp_status imp__ply_attribute_store(struct ply *p, const struct ply_property *q,
                                          size_t row, double x)
 {

@@ -36,8 +36,8 @@ static enum imp_status vertices_copy(size_t first, size_t end, void *payload)
     return IMP_OK;
 }
 
-/* Of vertices that are three floats in a row, and nothing else that is read. A float whose bits
- * but the sign are these or more is not finite. */
+/* Copies vertices that are three floats in a row, with nothing else that is read. A float whose
+ * bits but the sign are these or more is not finite. */
 #define BITS_INFINITE 0x7f800000u
 static enum imp_status positions_copy(size_t first, size_t end, void *payload)
 {

@@ -23,7 +23,7 @@ enum ply_type {
     PLY_F64,
     PLY_NONE
 };
-/* Of a number in the body. */
+/* Bytes of a number in the body. */
 static inline int imp__ply_bytes(enum ply_type type)
 {
     static const int bytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
@@ -90,7 +90,7 @@ static inline void imp__ply_put(const struct ply *p, size_t row, const float f[U
 
 /* The rows of an element, where they have one size and their numbers lie as in this machine's
  * memory: copied, by all threads, and p->at is behind them. False: nothing was done; they are
- * to be read number by number, which also says what is wrong with them. */
+ * to be read number by number, which also finds what is wrong with them. */
 bool imp__ply_copy(struct ply *p, int element);
 
 /* Attributes: found in the header, with room for their numbers; number x of property q

@@ -72,7 +72,7 @@ enum imp_status imp__scene_finish(struct imp_scene *scene)
     return st;
 }
 
-/* The integrator's property `weights`, whatever the file says. */
+/* The integrator's property `weights`, in place of the file's. */
 static enum imp_status weights_set(struct imp_scene *scene, const char *text)
 {
     static const struct imp_loc nowhere = {NULL, 0, 0};
@@ -114,8 +114,8 @@ static void curves_drop(struct imp_node *film)
     film->n_children = n;
 }
 
-/* The property `bins` of the films of the sensors in `parent` and in its shapes, whatever the
- * file says of their channels. */
+/* The property `bins` of the films of the sensors in `parent` and in its shapes, in place of
+ * the channels in the file. */
 static enum imp_status bins_set(struct imp_scene *scene, const struct imp_node *parent,
                                 const char *text)
 {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What a scene names and this version does not have: all of it at once, before anything is
- * made. A lenient scene goes on without: each such object is removed or replaced, and what
- * is lost is said. */
+ * made. A lenient scene goes on without: each such object is removed or replaced, with a
+ * warning that names what is lost. */
 #include "color/color_set.h"
 #include "film/film_integrator.h"
 #include "kind/registry.h"
@@ -12,7 +12,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* What stands for an object of a tag that cannot be made. */
+/* The replacement of an object of a tag that cannot be made. */
 static const struct rule {
     const char *tag;
     int concept;      /* enum imp_concept, or one of these: */
@@ -170,13 +170,13 @@ static void integrator_replace(struct imp_node *node)
     node->type = "path";
 }
 
-/* Child i, a `merge`, is replaced by the shapes in it, as if they stood in its place: Mitsuba
+/* Child i, a `merge`, is replaced by the shapes in it, in its place: Mitsuba
  * makes one mesh of those of one material, and here each keeps its numbers. */
 static enum imp_status merge_open(struct imp_scene *scene, struct imp_node *parent,
                                   size_t i)
 {
     struct imp_node *merge = parent->children[i].node;
-    /* One that stands in the scene already adds nothing: references to references would
+    /* One that is in the scene already adds nothing: references to references would
      * else open it any number of times. */
     const size_t m = merge->surveyed ? 0 : merge->n_children, n = parent->n_children;
     merge->surveyed = true;
@@ -253,7 +253,7 @@ enum imp_status imp__survey(struct imp_scene *scene)
 {
     struct survey s = {.scene = scene};
     const enum imp_status st = scene->root ? walk(&s, scene->root) : IMP_OK;
-    if (st != IMP_OK || s.n < 2) return st; /* of one the builder says so */
+    if (st != IMP_OK || s.n < 2) return st; /* the builder reports a single one */
     char first[1024], list[960] = "", where[128], entry[256];
     const void *none;
     const struct imp_node *node = s.type[0]->first;
@@ -313,7 +313,7 @@ out:
     return st;
 }
 
-/* What is declared at the top for others, and stands in none of them: it does nothing. */
+/* What is declared at the top for others, and used by none of them: it does nothing. */
 static void idle_list(struct imp_scene *scene)
 {
     static const char *const idle[][2] = {
@@ -340,6 +340,6 @@ static void idle_list(struct imp_scene *scene)
 enum imp_status imp__survey_finish(struct imp_scene *scene)
 {
     if (!scene->root) return IMP_OK;
-    if (!scene->rayless) idle_list(scene); /* a second scene: the first has said so */
+    if (!scene->rayless) idle_list(scene); /* a second scene: the first has reported it */
     return scene->lenient ? unused_list(scene, scene->root) : IMP_OK;
 }

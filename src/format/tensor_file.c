@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A parser of tensor files: named arrays inside the file's bytes, with offsets and sizes checked. */
+ * A parser of tensor files: named arrays inside the file's bytes, with offsets and sizes
+ * checked. */
 #include "tensor_file.h"
 #include "base/little.h"
 #include <string.h>

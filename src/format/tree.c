@@ -92,7 +92,7 @@ static struct imp_arena *arena_of(const struct imp_tree *t, const char *tag,
 }
 
 /* Instances are taken out of the tree once they are built, and what they were read from is
- * released: elsewhere nobody takes them. */
+ * released: elsewhere they are not used. */
 static enum imp_status place_check(const struct imp_tree *t,
                                    const struct imp_node *parent, const char *type,
                                    struct imp_loc loc)

@@ -13,11 +13,12 @@
 struct imp_tree {
     imp_context *ctx;
     struct imp_arena *arena;
-    struct imp_arena *brief; /* of instances' nodes and lists of them, which nobody needs
+    struct imp_arena
+        *brief;             /* of instances' nodes and lists of them, which are not needed
                                 once the scene is built, and which are long */
-    struct imp_node *root;   /* tag "scene" */
-    struct imp_names ids;    /* owner NULL; value: the node */
-    struct imp_names slots;  /* owner: a node */
+    struct imp_node *root;  /* tag "scene" */
+    struct imp_names ids;   /* owner NULL; value: the node */
+    struct imp_names slots; /* owner: a node */
     struct imp_node **nodes; /* all of them, in the order they were opened */
     size_t n_nodes, cap_nodes;
 };

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * From the type of an object to its tag. Dictionaries of Mitsuba name types alone; a type
- * belongs to one tag there. Types that this version cannot make are in the table too: what
- * is said of them then names what they are. */
+ * belongs to one tag there. Types that this version cannot make are in the table too:
+ * messages then name what they are. */
 #include "base/nearest.h"
 #include "kind/registry.h"
 #include "tree.h"

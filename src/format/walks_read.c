@@ -200,7 +200,7 @@ static enum imp_status walks_take(struct reading *r, imp_scene *scene, double me
     else scene = r->held;
     run.seed = r->head.seed;
     run.spp = r->head.spp;
-    run.from = IMP_FROM_SENSOR; /* whatever the integrator says: others are not kept */
+    run.from = IMP_FROM_SENSOR; /* whatever the integrator is: others are not recorded */
     run.points = (enum imp_points)r->head.points;
     run.wavelengths = (enum imp_wavelength_sampling)r->head.wavelengths;
     run.wavelength_set = r->head.wavelength_set;

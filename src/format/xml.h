@@ -10,7 +10,7 @@
 #include "params.h"
 #include "tree.h"
 
-/* Read `text` into the tree of scene->root. `name` stands for the file in messages,
+/* Read `text` into the tree of scene->root. `name` is the file in messages,
  * `options` gives parameters. scene->search must be filled. References are resolved. */
 enum imp_status imp__xml_read(struct imp_scene *scene, const struct imp_bytes *text,
                               const char *name, const struct imp_load_options *options);
@@ -76,7 +76,7 @@ IMP_COLD void imp__xml_fail(struct xml_file *f, enum imp_status status,
 IMP_COLD void imp__xml_fail_here(struct xml_file *f, enum imp_status status);
 /* Stop with a message that names its place already; nothing happens for IMP_OK. */
 void imp__xml_fail_placed(struct xml_file *f, enum imp_status status);
-/* Read the file `name` as if it stood here. */
+/* Read the file `name` in place of its tag. */
 void imp__xml_include(struct xml_file *f, const char *name, const char *slot,
                       struct imp_node *parent);
 

@@ -144,7 +144,7 @@ static void act_path(struct xml_file *f, const struct xml_attributes *a)
 
 static const struct rule {
     const char *tag, *required, *optional;
-    bool operation; /* stands in a transform; all others in an object */
+    bool operation; /* inside a transform; all others inside an object */
     imp__xml_act *act;
 } rules[] = {
     {"integer", "name value", "", false, imp__xml_integer},

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * How build functions read what a scene says of an object (kinds.h): the property bag of
+ * How build functions read the properties of an object (kinds.h): the property bag of
  * base/props.h with the object filled in. */
 #include "base/arguments.h"
 #include "build.h"

@@ -182,8 +182,8 @@ static enum imp_status inputs_check(imp_context *ctx, const char *function,
     return IMP_OK;
 }
 
-/* Append. Two lights may share a name, one of its own and one in a shape; `same` says
- * whether a kind of that name is in the way. */
+/* Append. Two lights may share a name, one of its own and one in a shape; `same`:
+ * does a kind of that name exclude this one? */
 static enum imp_status append(imp_context *ctx, const char *function,
                               enum imp_concept concept, const void *ops, size_t size,
                               bool (*same)(const void *ops, const void *other))
@@ -272,7 +272,7 @@ enum imp_status imp_register_bsdf(imp_context *context, const struct imp_bsdf_op
     return append(context, __func__, IMP_CONCEPT_BSDF, &own, sizeof own, NULL);
 }
 
-/* Of textures and volumes, which are looked up one by one. */
+/* Inputs of textures and volumes, which are looked up one by one. */
 static enum imp_status texture_inputs_check(imp_context *context, const char *function,
                                             const struct imp_input_desc *inputs)
 {

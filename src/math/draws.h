@@ -16,12 +16,12 @@ struct imp__drawn {
     imp__sphere_fn *density;                   /* NULL: there is none, lobes alone */
     double (*chance)(void *payload, int lobe); /* of a lobe that has been drawn */
     void *payload;
-    /* Draws that the cells are cut by, 0: 1500. More find narrower peaks, and tell less of
-     * broad ones. */
+    /* Draws that the cells are cut by, 0: 1500. More find narrower peaks, and leave
+     * larger cells to broad ones. */
     uint32_t pilot;
 };
 struct imp__draws {
-    double chance; /* p of the chi-square; 1: too few cells to tell */
+    double chance; /* p of the chi-square; 1: too few cells for a test */
     int cells;
     double total;  /* of the density and the lobes */
     double none;   /* fraction of draws that gave none */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Running hash of bytes, in one chain or four: xor with a word, multiply by an odd constant, mix. */
+ * Running hash of bytes, in one chain or four: xor with a word, multiply by an odd constant,
+ * mix. */
 #include "hash.h"
 #include "rng.h"
 #include <string.h>

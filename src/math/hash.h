@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A running hash of bytes, for fingerprints and checksums: it tells files and scenes
- * apart, and resists no attacker. */
+ * A running hash of bytes, for fingerprints and checksums: it distinguishes files
+ * and scenes, and resists no attacker. */
 #ifndef IMP_MATH_HASH_H
 #define IMP_MATH_HASH_H
 

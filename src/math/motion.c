@@ -92,8 +92,8 @@ static void orthogonal_factor(const double a[9], double q[9])
     }
 }
 
-/* Of a rotation: the component of largest magnitude first (Shepperd, J. Guidance and
- * Control 1, 1978). */
+/* Unit quaternion of a rotation matrix: the component of largest magnitude first (Shepperd, J.
+ * Guidance and Control 1, 1978). */
 static void quaternion(const double r[9], double out[4])
 {
     const double trace = r[0] + r[4] + r[8];

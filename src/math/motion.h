@@ -3,7 +3,7 @@
  * Affine maps of twelve numbers, and maps that change with time. A motion goes from one
  * map to another: the translation and the stretch linearly, the rotation about one axis
  * with constant speed (polar decomposition M = R S, Shoemake and Duff, "Matrix Animation
- * and Polar Decomposition", 1992). Before its start and after its end it stands still. */
+ * and Polar Decomposition", 1992). Before its start and after its end it is at rest. */
 #ifndef IMP_MATH_MOTION_H
 #define IMP_MATH_MOTION_H
 

@@ -26,10 +26,10 @@ struct imp_point_table {
     uint16_t number[IMP_POINT_BLOCKS][IMP_SET_POINTS][IMP_BLOCK_NUMBERS];
 };
 void imp__points_make(struct imp_point_table *points);
-/* The one that walks take, made when it is first asked for. */
+/* The one that walks take, made at its first use. */
 const struct imp_point_table *imp__points(void);
 
-/* Point `index` of the set that the hash `set` stands for. */
+/* Point `index` of the set with hash `set`. */
 struct imp_point {
     const struct imp_point_table *points; /* NULL: no such point, numbers are random */
     uint64_t set;

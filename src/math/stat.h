@@ -26,7 +26,7 @@ static inline void imp__mean_add(struct imp__mean *s, double x)
     s->mean += d / s->n;
     s->m2 += d * (x - s->mean);
 }
-/* Of the mean: its squared standard error. */
+/* Squared standard error of the mean. */
 static inline double imp__mean_variance(const struct imp__mean *s)
 {
     return s->m2 / (s->n - 1) / s->n;

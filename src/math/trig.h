@@ -51,10 +51,10 @@ static inline imp_v3 imp__lanes_choose(__typeof__((imp_v3){0} > 0) first, imp_v3
     return (imp_v3)(((mask)a & first) | ((mask)b & ~first));
 }
 
-/* Angles of the vectors (x, y), one a lane, y >= 0 and not both 0: in [0, pi], to 2^-51. With t, the smaller of
- * |x| and y over the larger, atan t = atan c + atan s, s = (t - c) / (1 + c t), where c is the
- * one of 0, 1/2 and 1 for which |s| < .24; then the series, cut where the next term is below
- * 2^-54. */
+/* Angles of the vectors (x, y), one a lane, y >= 0 and not both 0: in [0, pi], to 2^-51. With
+ * t, the smaller of |x| and y over the larger, atan t = atan c + atan s, s = (t - c) / (1 + c
+ * t), where c is the one of 0, 1/2 and 1 for which |s| < .24; then the series, cut where the
+ * next term is below 2^-54. */
 static inline imp_v3 imp__angles(imp_v3 x, imp_v3 y)
 {
     const imp_v3 zero = {0}, ax = imp__abs(x), half = imp__spec(0.5), one = imp__spec(1);

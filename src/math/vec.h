@@ -75,7 +75,7 @@ static inline bool imp__is_zero(imp_spec s)
 {
     return s[0] == 0 && s[1] == 0 && s[2] == 0;
 }
-/* Of the first n lanes, n = 1, 3 or 4. */
+/* Sum of the first n lanes, n = 1, 3 or 4. */
 static inline double imp__sum_used(imp_spec s, int n)
 {
     return n == 3 ? imp__sum3(s) : n == 1 ? s[0] : (s[0] + s[1]) + (s[2] + s[3]);

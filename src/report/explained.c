@@ -136,7 +136,7 @@ struct region {
     double difference, target, variance, pixels;
 };
 
-/* Of a sum of differences over pixels and n channels. */
+/* z of a sum of differences over pixels and n channels. */
 static double z_of(double difference, double variance, int n)
 {
     return variance > 0 ? difference / n / sqrt(CORRELATED * variance) : 0;
@@ -226,7 +226,7 @@ static void windows_mark(struct sums *s, int channels, int side)
         }
 }
 
-/* Without noise, no block stands out: the one with the largest difference is told. */
+/* Without noise no block is significant: the one with the largest difference is reported. */
 static size_t find_regions(struct sums *s, int channels, struct region *regions,
                            int *stack)
 {

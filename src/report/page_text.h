@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The page's template, made of page.html, page.css and the scripts by
- * tools/embed_page.py: what stands before the addresses it may connect to (of the content
+ * tools/embed_page.py: what precedes the addresses it may connect to (of the content
  * security policy), between these and its data, and behind. */
 #ifndef IMP_REPORT_PAGE_TEXT_H
 #define IMP_REPORT_PAGE_TEXT_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The page of a report: template, data, template. The data is JSON in a script element of
- * the page; '<' stands only in its strings and is written as \u003c, so that no text can
+ * the page; '<' occurs only in its strings and is written as \u003c, so that no text can
  * end the element. */
 #include "base/arguments.h"
 #include "base/film.h"

@@ -239,7 +239,7 @@ int imp__aim_choose(const struct imp_aims *t, int first, int end, double sum, im
     return chosen;
 }
 
-/* Of all aims that lie along w. */
+/* Called for each aim that lies along w. */
 #define HITS 32
 typedef void met_fn(void *payload, int aim, double p);
 static void along(const struct imp_aims *t, const double sum[2], imp_v3 from, imp_v3 w,

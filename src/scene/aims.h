@@ -16,8 +16,8 @@
 
 struct imp_aim {
     const struct imp_shape *shape;
-    const struct imp_emitter
-        *light;      /* whose directions it gives; NULL: a proxy of none */
+    /* The light whose directions it gives; NULL: a proxy of none. */
+    const struct imp_emitter *light;
     double part;     /* of the light's strength; or the proxy's own */
     double strength; /* mean intensity of the light, or weight times area */
     imp_v3 centre;

@@ -2,7 +2,7 @@
  *
  * Attributes of shapes: textures that a mesh_attribute looks up by name on the shape at
  * hand. Which these are is known when the scene is whole; they then become the inputs of
- * the mesh_attribute, so that whoever asks what an object depends on finds them. */
+ * the mesh_attribute, so that they are found among what an object depends on. */
 #include "kind/texture/mesh_attribute.h"
 #include "scene_build.h"
 
@@ -86,7 +86,7 @@ out:
     return st;
 }
 
-/* What an input asks of its texture's numbers holds for those of attributes. */
+/* Bounds that an input sets to its texture's numbers hold for those of attributes. */
 static void inputs_bound(struct imp_scene *scene, const struct imp_input *const *input,
                          const struct imp_input_desc *desc, unsigned fixed)
 {

@@ -65,7 +65,7 @@ static bool is_none(const struct stretch *s)
     return is_same(&none, s, SAME_WITHIN);
 }
 
-/* Of an instance: when it begins to move, and at its end. */
+/* Stretches of an instance: when it begins to move, and at its end. */
 static void stretches_of(const struct imp_instance *p, struct stretch of[2])
 {
     of[0] = of[1] = stretch_of(&p->to_world);

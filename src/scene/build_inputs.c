@@ -110,7 +110,7 @@ void imp__build_texels_bound(struct imp_scene *scene, int param,
     p->info.hi = imp_min(p->info.hi, hi);
 }
 
-/* Values of a volume are in the bounds of what it stands for. */
+/* Values of a volume are in the bounds of its input. */
 static enum imp_status volume_check(struct imp_scene *scene, const struct imp_node *node,
                                     const struct imp_texture *t,
                                     const struct imp_input_desc *d)

@@ -9,7 +9,7 @@
 #include "priorities.h"
 #include "scene_build.h"
 
-/* The medium that a sensor or a light says it is in; NULL: none. */
+/* The medium that a sensor or a light names; NULL: none. */
 static struct imp_node *medium_child(struct imp_node *node)
 {
     for (size_t i = 0; i < node->n_children; i++) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Textures and volumes: made where they are first asked for. */
+ * Textures and volumes: made where they are first used. */
 #include "scene_build.h"
 
 /* The data of a picture in a slot that is called data are that slot: sky.data. */

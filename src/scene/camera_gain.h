@@ -14,7 +14,7 @@
  *
  * so that losses are those of the photograph's own values, and stay polynomials of the
  * picture, unbiased (docs/photographs.md). Where the power is expanded about another picture
- * V (docs/estimators.md 20), found when gamma was `at`, the same is told in units that gamma
+ * V (docs/estimators.md 20), found when gamma was `at`, the same is written in units that gamma
  * does not change,
  *
  *     at/gamma V^(1 - gamma) M' + (1 - at/gamma) V  =  V + at (M'^(1/gamma) - V) + O((M' - V^gamma)^2)
@@ -48,7 +48,7 @@ struct imp_photograph {
     double at; /* gamma that the pixels belong to; 0: they are compared as they are */
 };
 
-/* Below this a photograph's value says nothing: dark current, rounding. */
+/* Below this a photograph's value is not used: dark current, rounding. */
 #define IMP_PHOTOGRAPH_LEAST 1e-3
 
 /* g at a film position; `photograph` may be NULL. d [IMP_GAIN_INPUTS]: its derivatives;

@@ -4,7 +4,8 @@
  * double (facets.h). */
 #include "facets_lanes.h"
 
-/* ---- one triangle, in double ------------------------------------------------------------------ */
+/* ---- one triangle, in double
+ * ------------------------------------------------------------------ */
 
 /* Triangles that share an edge overlap by this part of their sides: more than what is rounded
  * off, and far less than what a picture shows. */
@@ -28,7 +29,8 @@ static inline bool triangle_met(const struct triangle *s, imp_v3 from, imp_v3 d,
     return true;
 }
 
-/* ---- eight facets, in float ------------------------------------------------------------------- */
+/* ---- eight facets, in float
+ * ------------------------------------------------------------------- */
 
 static inline lanes choose(mask m, lanes a, lanes b)
 {
@@ -103,7 +105,7 @@ static inline bool ray_of(const struct imp_facets *f, imp_v3 from, const imp_v3 
 /* Which facets may be met, and where. With the rounding unit e and the reach R of all facets,
  * n.o is known to some 6 e R; the distance t, which divides it by n.d, to 3 e t |d| / n.d more,
  * and t is at most 4 R / |d| in the box. The point moves with t. Where n.d is less than its own
- * rounding, that stands for it, and the slack is as large as the box. */
+ * rounding, that replaces it, and the slack is as large as the box. */
 static inline mask group_met(const struct group *g, const struct ray *r, float slack,
                              lanes *t, lanes *sum)
 {
@@ -121,7 +123,7 @@ static inline mask group_met(const struct group *g, const struct ray *r, float s
            (*t > r->lo - far) & (*t < r->hi + 4 * far);
 }
 
-/* first: the half that is asked first. */
+/* first: the half that is tested first. */
 static inline bool facet_met(const struct triangle half[2], int first, imp_v3 from,
                              imp_v3 d, double tmin, double tmax, struct imp_hit *hit)
 {

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Triangles of a scene that has few of them: all are asked, eight facets at a time. A facet is a
+ * Triangles of a scene that has few of them: all are tested, eight facets at a time. A facet is a
  * triangle, or two that are the halves of a flat quadrilateral.
  *
  * Floats choose what a ray may meet, with a slack above their rounding, and doubles decide. So a
  * hit is as exact as that of an analytic shape, and no ray slips between two triangles that
- * share an edge. Of two facets that are met at distances which floats cannot tell apart, either
- * counts as the nearer. */
+ * share an edge. Where floats cannot separate the distances of two facets, either counts as
+ * the nearer. */
 #ifndef IMP_SCENE_FACETS_H
 #define IMP_SCENE_FACETS_H
 

@@ -11,7 +11,7 @@ static imp_v3 plane(imp_v3 normal, imp_v3 zero)
     return normal;
 }
 
-/* Of a triangle without area they are not finite or not numbers, and it is never met. */
+/* The planes of a triangle without area are infinite or NAN, and it is never met. */
 static struct planes planes_of(const imp_v3 corner[3])
 {
     const imp_v3 e = corner[1] - corner[0], f = corner[2] - corner[0];
@@ -25,8 +25,8 @@ static struct planes planes_of(const imp_v3 corner[3])
 /* In units of R, and of what u and v change over R: see group_met. */
 #define SLACK_DISTANCE (16 * 0x1p-24)
 #define SLACK_ASIDE    (32 * 0x1p-24)
-/* Facets are Embree's where one is so small beside the way across all that floats about the centre see
- * hardly where it is. */
+/* Facets are Embree's where one is so small beside all of them that floats about the centre
+ * hardly resolve its position. */
 #define BLUR_MAX 0.1f
 
 /* About a centre. */
@@ -58,8 +58,8 @@ static int corner_alone(const imp_v3 a[3], const imp_v3 b[3])
 
 static double at(imp_v3 plane, imp_v3 point) { return imp__dot(plane, point) + plane[3]; }
 
-/* What floats are asked of a facet: of the triangle a and of b, if it is the other half of a
- * quadrilateral: flat, as far as floats can tell, and nearly a parallelogram. False: it is not.
+/* Planes in float of a facet: of the triangle a, and of b, if it is the other half of a
+ * quadrilateral: flat to the precision of floats, and nearly a parallelogram. False: it is not.
  * b may be NULL. */
 static bool lane_fill(struct imp_facets *f, struct group *g, int lane, const imp_v3 a[3],
                       const imp_v3 *b)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Shared by facets.c, which asks facets, and facets_build.c, which makes them. */
+ * Facets as facets.c intersects them and facets_build.c makes them. */
 #ifndef IMP_SCENE_FACETS_LANES_H
 #define IMP_SCENE_FACETS_LANES_H
 
@@ -24,7 +24,7 @@ enum { LANES = 8 };
 typedef float lanes __attribute__((vector_size(4 * LANES)));
 typedef int32_t mask __attribute__((vector_size(4 * LANES)));
 
-/* Of the triangle of a facet's corner A and its neighbours B and C, about the centre of all
+/* The triangle of a facet's corner A and its neighbours B and C, about the centre of all
  * facets: the plane with a unit normal, and u and v, which go from -1 to 1 in the facet: from A
  * to B or C, or to the fourth corner, if it lies farther off. */
 struct group {

@@ -20,10 +20,10 @@ struct imp_few {
 /* At most IMP_FEW of geometry IMP_ANALYTIC. */
 void imp__few_add(struct imp_few *f, const struct imp_shape *shape);
 
-/* Of balls 4 g to 4 g + 3, which may the ray meet? A bit for each. With c from its origin to a centre, b = c.d
- * and a = d.d it meets the ball's line where b^2 >= a (c.c - r^2), and the ball if that lies
- * ahead or the origin is inside. Where c.c is so large that its rounding exceeds what r was
- * enlarged by, the ball counts as met. */
+/* Which of the balls 4 g to 4 g + 3 may the ray meet? A bit for each. With c from its origin to a
+ * centre, b = c.d and a = d.d it meets the ball's line where b^2 >= a (c.c - r^2), and the ball
+ * if that lies ahead or the origin is inside. Where c.c is so large that its rounding exceeds
+ * what r was enlarged by, the ball counts as met. */
 static inline unsigned imp__few_met(const struct imp_few *f, int g, const imp_v3 *o,
                                     const imp_v3 *d)
 {

@@ -78,7 +78,7 @@ static bool is_object(const struct imp_node *node)
 
 /* ---- What files held ------------------------------------------------------------- */
 
-/* Of a mesh, what its surface is made of besides the triangles. */
+/* Hash of the parts of a mesh's surface besides its triangles. */
 static uint64_t mesh_hash(uint64_t h, const struct imp__mesh *m, size_t n_vertices)
 {
     const bool has[3] = {m->reversed, m->normals != NULL, m->uvs != NULL};

@@ -21,7 +21,7 @@ enum imp_guide_field {
     IMP_GUIDE_FIELDS
 };
 
-struct imp_guide_place { /* a point that the guide knows */
+struct imp_guide_place { /* a point where the guide has a cell */
     const struct imp_frame *frame;
     const void *cell;
     enum imp_guide_field field;

@@ -14,7 +14,7 @@ static double triangles_of(const struct imp_scene *scene, int first, int n)
     return sum;
 }
 
-/* Of a group, with those in its instances. */
+/* Triangles of a group, with those in its instances. */
 static double triangles_met(const struct imp_scene *scene, const struct imp_group *g)
 {
     double sum = triangles_of(scene, g->first, g->n_shapes), of_last = 0;

@@ -16,9 +16,9 @@
 
 struct imp_instance {
     struct imp_map to_world,
-        to_local; /* where it stands; of one that moves at its start */
+        to_local; /* its placement; of one that moves, at its start */
     const struct imp_group *group;
-    const struct imp_motion *motion;   /* NULL: it stands still */
+    const struct imp_motion *motion;   /* NULL: it is at rest */
     const struct imp_covered *covered; /* what its own material makes of the group's
                                           shapes; NULL: they have theirs */
     const int *raised; /* [1 + group->n_places] of an instance of the scene: first of the
@@ -65,7 +65,7 @@ enum imp_status imp__bumps_place(struct imp_scene *scene, const struct imp_node 
                                  struct imp_instance *p);
 
 /* ---- instances.c ---- */
-/* The shape that stands for this one of the group. */
+/* The copy that replaces this shape of the group. */
 int imp__covered_shape(const struct imp_covered *c, int shape);
 /* From the world of an instance to its group, at a time; `room`: for what moves. */
 static inline const struct imp_map *

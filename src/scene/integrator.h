@@ -2,7 +2,8 @@
  *
  * Integrators: what a picture holds. A kind is a table; those of this program are listed
  * by the room that makes pictures (film/film_integrator.c), since most belong to rooms
- * above this one: walk, elements, film. The scene makes them and knows no settings. */
+ * above this one: walk, elements, film. The scene makes them and does not depend on their
+ * settings. */
 #ifndef IMP_SCENE_INTEGRATOR_H
 #define IMP_SCENE_INTEGRATOR_H
 
@@ -25,7 +26,7 @@ struct imp_integrator {
     const struct imp_integrator_ops *ops;
     void *self;       /* ops->object_size bytes, filled by build */
     const char *name; /* of one that is contained: its slot, for names of channels */
-    int max_depth;    /* what imp_scene_get_info says of it; -1: unlimited, or none */
+    int max_depth;    /* as in imp_scene_get_info; -1: unlimited, or none */
     int n_inner;
     struct imp_integrator *inner; /* [n_inner], in document order */
 };

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Rays against the scene. Triangles are Embree's own work, in float, where there are more than
- * a few (facets.h); analytic shapes answer through their ops, in double, and their hits never pass through a float (where Embree has
- * them in its tree, struct query carries ray and hit past it). Instances are shapes of this
- * kind, too: each takes the ray to its group, in double, and asks the group's own scene of
- * Embree. So they can be nested and move, and one costs 232 bytes and 63 in Embree's tree (of
- * 200,000); Embree's own instances cost 375 to 400, and those of Debian cannot be nested. */
+ * a few (facets.h); analytic shapes are met through their ops, in double, and their hits never
+ * pass through a float (where Embree has them in its tree, struct query carries ray and hit past
+ * it). Instances are shapes of this kind, too: each takes the ray to its group, in double, and
+ * intersects the group's own scene of Embree. So they can be nested and move, and one costs 232
+ * bytes and 63 in Embree's tree (of 200,000); Embree's own instances cost 375 to 400, and those
+ * of Debian cannot be nested. */
 #include "instances.h"
 #include "intersector.h"
 #include <string.h>
@@ -124,7 +125,7 @@ void imp__gather_analytic(const struct RTCIntersectFunctionNArguments *args)
     }
 }
 
-/* Of triangles: the hit is kept, and refused, so that the ray goes on. */
+/* Filter of triangles: the hit is kept, and refused, so that the ray goes on. */
 static void gather_triangle(const struct RTCFilterFunctionNArguments *args)
 {
     struct gather *g = (struct gather *)args->context;

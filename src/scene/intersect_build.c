@@ -124,7 +124,7 @@ static void analytic_bounds(const struct RTCBoundsFunctionArguments *args)
     const struct imp_shape *s = args->geometryUserPtr;
     const imp_v3 a = imp__abs(s->lo), b = imp__abs(s->hi);
     const double size = fmax(fmax(fmax(a[0], a[1]), a[2]), fmax(fmax(b[0], b[1]), b[2]));
-    /* It is asked also where a triangle was met that may lie behind it. */
+    /* It is intersected also where a triangle was met that may lie behind it. */
     const imp_v3 more = imp__spec((1 + size) * IMP_RAY_EPSILON);
     bounds_set(s->lo - more, s->hi + more, args->bounds_o);
 }
@@ -169,7 +169,7 @@ static RTCGeometry curves_create(RTCDevice rtc, const struct imp_curves *c)
     return g;
 }
 
-/* all: its geometries are asked for all hits of a ray, not for the nearest. */
+/* all: its geometries report all hits of a ray, not the nearest. */
 static RTCGeometry geometry_create(RTCDevice rtc, const struct imp_shape *s, bool all)
 {
     if (s->geometry == IMP_CURVES) return curves_create(rtc, &s->curves);
@@ -196,7 +196,7 @@ static RTCGeometry geometry_create(RTCDevice rtc, const struct imp_shape *s, boo
 }
 
 /* Does light travel on the inner side of the mesh: in a room, a body of glass, a medium?
- * Of 10^8 rays in closed rooms and through bodies, 22 slip between two triangles without
+ * Among 10^8 rays in closed rooms and through bodies, 22 slip between two triangles without
  * Embree's robust flag, 20 of them in rooms of 20,480 triangles; 1 slips with the flag
  * everywhere, and 1 by this rule (tests/stat/leaks.c long). A ray that slips into an
  * opaque body is lost to the picture as if it were black there.
@@ -248,7 +248,7 @@ static bool is_robust(const struct imp_scene *scene, const struct content *c)
     return c->aims != NULL;
 }
 
-/* Of one commit: all workers build. The first item begins; one that came before it would
+/* In one commit all workers build. The first item begins; one that came before it would
  * begin, too, but one that came before there is work would not stay. */
 static enum imp_status tree_join(size_t i, int worker, int slot, void *rtc)
 {

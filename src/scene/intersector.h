@@ -10,7 +10,7 @@
 
 struct imp_intersector {
     RTCScene rtc;
-    /* What Embree does not know: analytic shapes, and triangles (NULL: none). */
+    /* Outside of Embree: few analytic shapes, and few triangles (NULL: none). */
     struct imp_few few;
     struct imp_facets *facets;
     bool knows;      /* Embree has something to look for */

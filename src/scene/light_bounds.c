@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the tree of lights knows of a single light, by asking its kind and its shape. */
+ * Bounds of a single light for the tree of lights, from its kind and its shape. */
 #include "color/rgb.h"
 #include "light_tree.h"
 #include <string.h>
@@ -64,7 +64,7 @@ static double strength_of_point(const struct imp_scene *scene,
     return sum / DIRECTIONS / (double)bound->gain;
 }
 
-/* Of a surface: mean intensity over all directions, by what arrives on a sphere around it. */
+/* Mean intensity of a surface over all directions, by what arrives on a sphere around it. */
 static double strength_of_surface(const struct imp_scene *scene,
                                   const struct imp_emitter *e)
 {
@@ -173,7 +173,7 @@ void imp__light_bound(const struct imp_emitter *e, int prim, struct imp_light_no
     if (!s) {
         struct imp_light_sample ls = {.p = {0}};
         const double u[2] = {0.5, 0.5};
-        for (int k = 0; k < 2; k++) { /* a light cannot be seen from where it stands */
+        for (int k = 0; k < 2; k++) { /* a light cannot be seen from its own place */
             const imp_v3 ref = imp__spec(k);
             if (e->ops->sample(e, &ref, u, &ls)) break;
         }

@@ -27,7 +27,7 @@ static inline double mean_positive(double m, double e)
     return m >= e ? m : m <= -e ? 0 : (m + e) * (m + e) / (4 * e);
 }
 
-/* *near: the place is so near that the node says little of where its lights are. */
+/* *near: the place is so near that the node's box hardly bounds where its lights are. */
 static double importance(const struct imp_light_node *n, const struct imp_light_place *at,
                          bool *near)
 {
@@ -104,7 +104,7 @@ static double near_chance(const struct imp_light_tree *t, const struct cut *c)
     return t->n_far == 0 ? c->sum > 0 : c->sum > 0 ? t->near_chance : 0;
 }
 
-/* Of the first child of node i; < 0: neither can count. */
+/* Probability of the first child of node i; < 0: neither can count. */
 static double first_chance(const struct imp_light_tree *t, int i,
                            const struct imp_light_place *place)
 {

@@ -3,7 +3,7 @@
  * A tree over the lights of a scene, by which light samples choose among many (Conty Estevez
  * and Kulla 2018; Pharr, Jakob and Humphreys, PBR 4e, section 12.6.3). A node holds bounds of
  * its lights: a box, a cone of their normals, and their strength S, an intensity. From the
- * root on, a child is chosen by its importance at the place that asks,
+ * root on, a child is chosen by its importance at the place to be lit,
  *
  *     S cos(theta') cos(theta_i') / d^2
  *
@@ -29,11 +29,11 @@ struct imp_light_node {
     float strength;  /* intensity, mean over all directions */
     float gain; /* over the mean: along the axis of a light whose normals fill the cone */
     int32_t parent; /* -1: the root */
-    int32_t
-        second; /* its second child, the first is the next node; of a leaf -1 - item */
+    /* The second child, the first is the next node; in a leaf -1 - item. */
+    int32_t second;
 };
 
-/* What a leaf stands for. */
+/* The light, or part of a light, in a leaf. */
 struct imp_light_item {
     int32_t emitter, prim; /* triangle; -1: all of the light */
     int32_t leaf;          /* its node */
@@ -49,11 +49,11 @@ struct imp_light_tree {
     int32_t *first;              /* [n_emitters] its first item; -1: not in the tree */
     int32_t *far_light;          /* [n_far] lights without end */
     double *far_share;           /* [n_far] of them all */
-    double
-        near_chance; /* of the tree, where something in it and something far may count */
+    /* Probability of the tree, where something in it and something far may count. */
+    double near_chance;
 };
 
-/* A place that asks for a light. */
+/* A place to be lit. */
 struct imp_light_place {
     imp_v3 p, n;
     bool faces; /* what arrives from behind n counts for nothing */
@@ -82,7 +82,7 @@ size_t imp__light_tree_bytes(const struct imp_light_tree *t);
  * the lights' parameters as they are. `all`: what this function gives for the whole light.
  */
 double imp__light_strength(const struct imp_scene *scene, const struct imp_emitter *e);
-/* Of a triangle of a light whose radiance depends on the place alone: its mean radiance. */
+/* Mean radiance of a triangle of a light whose radiance depends on the place alone. */
 double imp__light_triangle_radiance(const struct imp_scene *scene,
                                     const struct imp_emitter *e, int prim);
 /* Box, normals and reach of a light or of a triangle of it; the node's other fields stay. */

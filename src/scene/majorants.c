@@ -37,8 +37,8 @@ static float above(double x)
     return x > 0 ? nextafterf((float)(x * (1 + 1e-7)), INFINITY) : 0;
 }
 
-/* Of 2 x 2 x 2 points of the cell, and its bound. The reach is a tenth of the bound at
- * least: a factor is then at most 11, whatever lies between the points. */
+/* Control extinction of a cell by 2 x 2 x 2 of its points and its bound. The reach is a tenth
+ * of the bound at least: a factor is then at most 11, whatever lies between the points. */
 static struct imp_control cell_control(const struct imp_majorants *g, const int cell[3],
                                        double bound)
 {

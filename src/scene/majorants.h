@@ -17,7 +17,7 @@ struct imp_majorants {
     int n[3];
     float *bound; /* [n[2]][n[1]][n[0]] */
     float most;   /* the largest */
-    /* For residual ratio tracking; NULL: nobody asked. Of each cell an extinction that is
+    /* For residual ratio tracking; NULL: not needed. For each cell an extinction that is
      * close to all in it, and a bound of the difference, to which estimates owe no more than
      * small variance: where it is passed they are still right in the mean. */
     struct imp_control {

@@ -2,7 +2,7 @@
  *
  * Looks where cameras and boundaries of media are, when the scene is made. A camera in a
  * medium that it does not name would see it as vacuum; a body in fog that does not name
- * the fog leaves a vacuum behind it, which is what the format says and Mitsuba does, and
+ * the fog leaves a vacuum behind it, which is what the format defines and Mitsuba does, and
  * seldom what is meant. */
 #include "instances.h"
 #include "media_around.h"
@@ -39,7 +39,7 @@ const struct imp_medium *imp__medium_around(const struct imp_scene *scene, imp_v
     return !s ? otherwise : outwards ? s->interior : s->exterior;
 }
 
-/* In shapes with priorities a camera knows its medium by them. */
+/* In shapes with priorities a camera's medium follows from them. */
 static enum imp_status nest_check(const struct imp_scene *scene,
                                   const struct imp_sensor *sensor,
                                   const struct imp_sensor_ray *ray)

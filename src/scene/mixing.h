@@ -2,7 +2,7 @@
  *
  * From which densities walks draw their directions, and with which weights
  * (walk/core/direction.c). Weights are written for the integrator and for single materials; what
- * directions are aimed at, lights and proxies, stands in aims.h. */
+ * directions are aimed at, lights and proxies, is in aims.h. */
 #ifndef IMP_SCENE_MIXING_H
 #define IMP_SCENE_MIXING_H
 
@@ -13,13 +13,13 @@ enum imp_density {
     IMP_DENSITY_EMITTERS,    /* towards lights with a surface, or their proxies */
     IMP_DENSITY_ENVIRONMENT, /* the environment's own sampling */
     IMP_DENSITY_PROXIES,     /* towards proxies of no light */
-    IMP_DENSITY_GUIDE,       /* the guide's, where it knows the place */
+    IMP_DENSITY_GUIDE,       /* the guide's, where it has a cell */
     IMP_DENSITY_UNIFORM,     /* the hemisphere, or the sphere of what transmits */
     IMP_DENSITIES
 };
 extern const char *const imp__density_name[IMP_DENSITIES];
 
-/* Weights of a mixture. Those in use add up to 1; of these the guide's stands only where it
+/* Weights of a mixture. Those in use add up to 1; the guide's is set only where it
  * was written: else (-1) a guide takes the share that it judges right. */
 struct imp_mixing {
     double weight[IMP_DENSITIES];

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Closed shapes that overlap, by priority (Schmidt, Budge, "Simple nested dielectrics in
- * ray traced images", Journal of Graphics Tools 7(2), 2002). Of the shapes with a priority
- * that a point lies in, the one with the highest is there, the later one of the file among
- * equals; the boundaries of the others are not there. So a liquid may reach into the wall
- * of its glass, and there is one boundary of the two.
+ * ray traced images", Journal of Graphics Tools 7(2), 2002). Where a point
+ * lies in several shapes with a priority, the one with the highest is there, the later one of
+ * the file among equals; the boundaries of the others are not there. So a liquid may reach into
+ * the wall of its glass, and there is one boundary of the two.
  *
  * A nest is the list of these shapes around a point. A ray that passes a boundary enters
  * or leaves a shape of its nest; what is seen of the boundary, the medium behind it and

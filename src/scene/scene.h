@@ -94,8 +94,8 @@ struct imp_scene {
     const struct imp_wavelengths *wavelengths; /* [n_sensors][IMP_WAVES_DRAWN]; NULL:
                                                   colours */
     bool committed;
-    bool
-        rayless; /* of a file of kept walks, which no ray meets: shapes have no geometry */
+    /* The scene in a file of recorded walks, which no ray meets: shapes have no geometry. */
+    bool rayless;
     int lenient; /* not 0: it goes on without what there is not; 1: with warnings */
     const char **missing; /* [n_missing] a line for each */
     int n_missing;
@@ -111,7 +111,7 @@ struct imp_scene {
     struct imp_arena files; /* what files held and objects copy; freed by commit */
     struct imp_owned *owned;
     /* Another scene of the same objects and numbers, in which walks are evaluated and no ray
-     * meets anything. Of the room that makes scenes from files and calls (format/twin.c); NULL:
+     * meets anything. Set by the room that makes scenes from files and calls (format/twin.c); NULL:
      * no such room made it. */
     enum imp_status (*twin)(const struct imp_scene *scene, struct imp_scene **out);
 

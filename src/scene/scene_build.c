@@ -156,7 +156,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
     IMP_TRY(lights_build(scene));
     IMP_TRY(imp__aims_build(scene));
     IMP_TRY(imp__mixing_materials(scene));
-    IMP_TRY(imp__priorities_build(scene)); /* integrators ask for them */
+    IMP_TRY(imp__priorities_build(scene)); /* integrators need them */
     if (scene->integrator) IMP_TRY(imp__integrator_ready(scene, scene->integrator));
     IMP_TRY(imp__waves_build(scene));
     IMP_TRY(imp__bodies_check(scene));

@@ -37,11 +37,11 @@ bool imp__build_shaped(const struct imp_scene *scene,
 enum imp_status imp__build_watch(struct imp_scene *scene,
                                  const struct imp_input *const *input, int n,
                                  void (*changed)(void *payload), void *payload);
-/* A spectrum that may be asked for as a colour, or as one number: what its numbers do to
+/* A spectrum that may be read as a colour, or as one number: what its numbers do to
  * that. */
 enum imp_status imp__build_spectrum(struct imp_scene *scene, const struct imp_input *in,
                                     enum imp_role role);
-/* asked: the input that it stands for; NULL: it is declared only. */
+/* asked: the input that it is the value of; NULL: it is declared only. */
 enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *node,
                                    const char *parent, const char *slot,
                                    const struct imp_input_desc *asked,
@@ -68,11 +68,11 @@ enum imp_status imp__gain_fit(struct imp_scene *scene, struct imp_node *film,
 /* Listeners of these objects' numbers; payload: the object. */
 void imp__bsdf_changed(void *payload);
 void imp__emitter_changed(void *payload);
-/* Bounds of an input for the texels that stand for it. */
+/* Bounds of an input for the texels that are its values. */
 void imp__build_texels_bound(struct imp_scene *scene, int param,
                              const struct imp_input_desc *d);
-/* Attributes (build_attributes.c): the textures that stand in a shape under such names;
- * whether its material has bump maps, which ask for its surface; and, when all objects are
+/* Attributes (build_attributes.c): the textures in a shape under such names;
+ * whether its material has bump maps, which need its surface; and, when all objects are
  * made, the textures that mesh_attributes look up. */
 enum imp_status imp__build_shape_attributes(struct imp_scene *scene,
                                             struct imp_node *node, struct imp_shape *s);
@@ -85,11 +85,10 @@ bool imp__is_bumped(const struct imp_scene *scene, int bsdf);
 enum imp_status imp__build_medium(struct imp_scene *scene, struct imp_node *node,
                                   const char *parent, const char *slot,
                                   const struct imp_medium **out);
-/* When all objects are there: is the light of these media what the integrator can know?
- */
+/* When all objects are there: does the integrator scatter light in these media? */
 enum imp_status imp__media_check(struct imp_scene *scene);
 /* When rays can be traced: is it known where cameras and boundaries are? IMP_E_SCENE for
- * a camera; what boundaries do not say is a warning, and scene->media_open. */
+ * a camera; a boundary without a medium is a warning, and scene->media_open. */
 enum imp_status imp__media_survey(struct imp_scene *scene);
 /* A material that reflects nothing: emitters' default. */
 enum imp_status imp__build_black(struct imp_scene *scene, struct imp_bsdf **out);
@@ -97,12 +96,12 @@ enum imp_status imp__build_black(struct imp_scene *scene, struct imp_bsdf **out)
 enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *node,
                                    const char *parent, const char *slot,
                                    struct imp_shape *shape);
-/* A shape of which nobody knows yet: neither its material nor its index are set. */
+/* A shape that is in no list yet: neither its material nor its index are set. */
 enum imp_status imp__build_shape_bare(struct imp_scene *scene, struct imp_node *node,
                                       const char *name, struct imp_shape **out);
 enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
                                  const char *name);
-/* shape: that it stands in, or NULL. A sensor that needs one is made there alone. */
+/* shape: the one it is nested in, or NULL. A sensor that needs one is made there alone. */
 enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node,
                                   const char *name, struct imp_shape *shape);
 

@@ -9,7 +9,7 @@
 /* Steps of the density stop stratification at about 100 walks if they are as wide as 1 nm. */
 #define BIN_NM   0.125
 #define BINS_MAX 4096 /* of a range that a file may make as wide as it likes */
-/* Of the mean light, added everywhere: where lights are dark a derivative may not be. */
+/* Part of the mean light, added everywhere: where lights are dark a derivative may not be. */
 #define LIGHT_FLOOR 0.05
 
 /* Spectrum of an emitter's first input; textures are taken for daylight. */
@@ -95,7 +95,8 @@ static bool inputs_reach(const struct imp_input_desc *desc,
                          const struct imp_input *const *input, int n, struct range seen,
                          bool *any)
 {
-    for (int j = 0; desc && j < n; j++) { /* of its own: children are asked themselves */
+    for (int j = 0; desc && j < n;
+         j++) { /* its own inputs: children are visited themselves */
         if (desc[j].role != IMP_EMISSION) continue;
         *any = true;
         if (input[j]->texture || !input[j]->spectrum) return true; /* not known */

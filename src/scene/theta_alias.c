@@ -100,7 +100,7 @@ static bool follow(const struct imp_scene *scene, const struct imp_node *node,
     return false;
 }
 
-/* From the object that the path begins with, wherever it stands. */
+/* From the object that the path begins with, at any depth. */
 static bool begin(const struct imp_scene *scene, const struct imp_node *node,
                   const char *path, int steps, size_t *index)
 {

@@ -6,8 +6,8 @@
 
 #include "scene.h"
 
-/* "; the nearest are A, B, C", of the names that are next to `name`; of a pattern, to what
- * stands before its first wildcard. Empty if nothing is to be said. */
+/* "; the nearest are A, B, C", of the names that are next to `name`, or to a
+ * pattern's part before its first wildcard. Empty if none is near. */
 struct imp_near_names {
     char text[512];
 };

@@ -222,7 +222,7 @@ static enum imp_status step(const struct imp__goal *goal,
 }
 
 /* Directions without net motion continue from the window's mean, with a smaller rate.
- * With many variables, where the path of a single one says little, all do or none. work:
+ * With many variables, where the path of a single one shows little, all do or none. work:
  * [2 n]. */
 static void cool(const struct imp__goal *goal, struct imp__search *s, bool all, bool fell,
                  double *work)

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Of a variable, in units of its scale: MEAN_G and ROOT_V the moments of the gradient, v
+/* Numbers of a variable, in units of its scale: MEAN_G and ROOT_V the moments of the gradient, v
  * as its root, since squares leave the range of floats; NET the motion in this window,
  * SUM_NET the sum of NET over its steps. Not in these units: AVERAGE of the iterates, and
  * START. */

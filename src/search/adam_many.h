@@ -10,7 +10,7 @@
 #include "optimize.h"
 #include <math.h>
 
-/* What both searches are tuned with; adam.c says what it is. */
+/* Constants of both searches, explained in adam.c. */
 #define IMP_ADAM_BETA2   0.99
 #define IMP_ADAM_WINDOW  20
 #define IMP_ADAM_STALLED 0.5

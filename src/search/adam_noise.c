@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Probes of Adam's step, v^-1/2 V S, and the noise that its variances make of them (adam_noise.h). */
+ * Probes of Adam's step, v^-1/2 V S, and the noise that its variances make of them
+ * (adam_noise.h). */
 #include "adam_noise.h"
 #include "basis.h"
 #include "math/rng.h"

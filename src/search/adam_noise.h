@@ -10,7 +10,7 @@
 #include "metric.h"
 #include "optimize.h"
 
-/* Of one iteration. */
+/* Noise of one iteration. */
 struct imp__adam_noise {
     const struct imp__goal *goal;
     int iteration;

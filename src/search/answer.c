@@ -113,7 +113,7 @@ out:
     return st;
 }
 
-/* The same by fewer samples: a model that is far from linear is told before more are spent. */
+/* The same by fewer samples: a model that is far from linear is found before more are spent. */
 static enum imp_status accept_coarse(const struct imp__goal *goal, const double *x,
                                      uint64_t seed, const double *point, bool *yes)
 {
@@ -263,7 +263,7 @@ enum ahead {
 /* A round at x, and those that are missing at its Newton point. H0, a linear model: the
  * gradient there is the noise of both. Elsewhere x moves there. It does not depend on the samples
  * there, but that they are kept does: where a linear model is taken for another, in 2 to 5 of
- * 100, their noise is larger than they tell. */
+ * 100, their noise is larger than its estimate. */
 static enum imp_status samples_ahead(const struct imp__goal *goal, double *x,
                                      uint64_t base, int most, struct imp__sampled *s,
                                      struct imp__answer *a, struct imp__uncertainty *u,

@@ -25,9 +25,10 @@ struct imp__answer {
 enum imp_status imp__answer_create(imp_context *ctx, size_t n, struct imp__answer *a);
 void imp__answer_destroy(imp_context *ctx, struct imp__answer *a);
 
-/* Samples at x = a->from, and the answer u->x that they give: the Newton point, or the part of the way
- * that they have in all that is behind it. Where the model fails on that way, x moves as far
- * as it holds, and samples there take the place of these. u->found: see imp__covariance. */
+/* Samples at x = a->from, and the answer u->x that they give: the Newton point, or the part of
+ * the way that they have in all that is behind it. Where the model fails on that way, x moves
+ * as far as it holds, and samples there take the place of these. u->found: see imp__covariance.
+ * */
 enum imp_status imp__answer_here(const struct imp__goal *goal,
                                  const struct imp__rounds *rounds, struct imp__sampled *s,
                                  struct imp__answer *a, struct imp__uncertainty *u);

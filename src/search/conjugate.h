@@ -5,7 +5,7 @@
  *     (H + mu D) x = b,      D = diag H_same,
  *
  * over the variables that may move, of several b at once. D preconditions. H may be
- * indefinite; a direction p with p^T (H + mu D) p <= 0 is told, and how large mu has to be
+ * indefinite; a direction p with p^T (H + mu D) p <= 0 is reported, and how large mu has to be
  * for it. */
 #ifndef IMP_SEARCH_CONJUGATE_H
 #define IMP_SEARCH_CONJUGATE_H

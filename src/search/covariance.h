@@ -17,8 +17,8 @@ struct imp__uncertainty {
     double condition;    /* of the scaled H; INFINITY if it is singular */
     int n_loose;         /* directions that are not determined */
     double *loosest;     /* [n] unit vector, in units of the scales: the worst of them */
-    double
-        noise_scale; /* estimated variance of the data in units of 1/weight; 0: known */
+    /* Estimated variance of the data in units of 1/weight; 0: known. */
+    double noise_scale;
     struct imp_estimate loss; /* at x, by the same samples; value NAN: not known */
     int rounds;               /* samples taken, in those of an evaluation */
     bool found;               /* at_newton: false where the search has to go on */
@@ -27,7 +27,7 @@ struct imp__uncertainty {
 /* Samples, in those of an evaluation by the goal. */
 struct imp__rounds {
     int most;        /* >= 2 */
-    int look;        /* times that it was asked for before: each has walks of its own */
+    int look;        /* number of calls before: each has walks of its own */
     double searched; /* behind x, where that is an average over a search; 0: it is none */
     bool at_newton;  /* all but the first are taken at the Newton point of the first */
 };

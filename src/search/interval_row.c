@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Standard error of one variable from two covariances, its interval, and the one-sided interval at a
- * bound. */
+ * Standard error of one variable from two covariances, its interval, and the one-sided interval
+ * at a bound. */
 #include "interval_row.h"
 #include "math/vec.h"
 #include <math.h>

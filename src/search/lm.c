@@ -9,8 +9,8 @@
  * them, so that the gain is not drowned. The search ends when g^T H^-1 g is what noise in
  * g alone would give, twice in a row; the estimate is the average of the two Newton
  * points. A goal may offer fewer samples for all of this: then once is enough, since samples
- * of another kind follow, and any other end is where the search goes on with those asked
- * for. */
+ * of another kind follow, and after any other end the search goes on with the full
+ * number. */
 #include "lm_system.h"
 #include <math.h>
 #include <string.h>
@@ -26,7 +26,7 @@ enum {
     WITHIN,
     COARSE
 }; /* scalars; WITHIN: iterations within noise, in a row;
-                                COARSE: with fewer samples than were asked for */
+                                COARSE: with fewer samples than given */
 
 struct work {
     struct imp__lm_system *system;
@@ -91,7 +91,7 @@ static enum imp_status work_create(const struct imp__goal *goal, struct work *w)
 
 /* Newton's point for a variable, cut off on its way to a bound. A step from far away may
  * promise the bound itself, and some bounds are traps: a lobe as narrow as a mirror's
- * says next to nothing of its roughness, and the search would end there. */
+ * hardly depends on its roughness, and the search would end there. */
 static double toward(const struct imp__goal *goal, size_t k, double x, double to)
 {
     const double lo = goal->lo[k], hi = goal->hi[k], touch = TOUCH * goal->scale[k];

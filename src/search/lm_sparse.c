@@ -112,8 +112,8 @@ static enum imp_status within_noise(struct imp__lm_system *s, bool *within)
         for (size_t j = i + 1; j <= DRAWS; j++)
             half_var += imp__sqr(inner(w, i, j)) / (DRAWS * (DRAWS - 1) / 2.0);
     mean -= imp_clamp(excess, 0.0, EXCESS_MOST * mean);
-    /* The noise that x has from the step before makes as much of q as that of g here. Of few
-     * variables the spread of q covers it, of many it does not. */
+    /* The noise that x has from the step before makes as much of q as that of g here. With few
+     * variables the spread of q covers it, with many it does not. */
     *within = inner(w, 0, 0) <= (s->after_step ? 2 : 1) * (mean + 2 * sqrt(2 * half_var));
 out:
     return st;

@@ -16,8 +16,8 @@ struct imp__lm_system {
     const double *g; /* [n] gradient */
     struct imp_estimate f;
     bool after_step; /* x is itself the Newton point of as many walks; set by lm.c */
-    size_t
-        n_free; /* variables that neither press against a bound nor are without effect */
+    /* Variables that neither press against a bound nor are without effect. */
+    size_t n_free;
 };
 
 /* What lm.c makes a system of, and ends it by: it is zeroed memory of this size before `begin`
@@ -39,7 +39,7 @@ struct imp__lm_kind {
     enum imp_status (*within_noise)(struct imp__lm_system *s, bool *within);
 };
 
-/* Of goal->normal (lm_dense.c), and of goal->sparse (lm_sparse.c). */
+/* Systems from goal->normal (lm_dense.c) and from goal->sparse (lm_sparse.c). */
 extern const struct imp__lm_kind imp__lm_dense, imp__lm_sparse;
 
 /* lm.c */

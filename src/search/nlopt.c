@@ -19,7 +19,7 @@
 /* Arrays: rows of (f, se, g[n]); where the last draw was made, empty: the start. */
 enum { RECORD, BASE };
 /* Scalars: the lowest objective, iterations before the last draw, and whether the best x
- * asks for a new one. */
+ * needs a new one. */
 enum { BEST, BEFORE, STALE };
 
 struct call {

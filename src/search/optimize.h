@@ -16,12 +16,12 @@
 #define IMP_DENSE_MAX     256  /* most variables of methods that hold [n][n] matrices */
 #define IMP_SEARCH_FEW    1024 /* variables, above which Adam's memory counts */
 #define IMP_ADAM_MOMENTUM 0.9
-/* Of variables that settle, in searches whose gradients have little noise: */
+/* For variables that converge between bounds, where gradients have little noise: */
 #define IMP_ADAM_MOMENTUM_QUIET 0.5
 #define IMP_ADAM_FALLING_QUIET  10
 #define IMP_TRAIL_MAX           64 /* variables, up to which a search keeps where it was */
 
-/* Parts of the walks whose absence shows how noisy a matrix is. */
+/* Jackknife groups: parts of the walks whose absence shows how noisy a matrix is. */
 enum { IMP_DEVIATIONS = 8 };
 
 /* Normal equations at one x, from one set of random numbers. */
@@ -33,9 +33,9 @@ struct imp__normal {
     double *cov_g;      /* [n][n] its covariance by Monte Carlo, too large by */
     double *cov_excess; /* [n][n] this: unbiased, noisy, less than 2/3 of cov_g */
     double *H_meas;     /* [n][n] its covariance by noise of the data */
-    double
-        *deviations; /* [IMP_DEVIATIONS][n][n] of the data's part of H: their squares add
-                           up to its variance, in every combination; or NULL */
+    /* [IMP_DEVIATIONS][n][n] of the data's part of H: their squares add up to its variance, in
+     * every combination; or NULL. */
+    double *deviations;
     struct imp_estimate f; /* of the same walks as eval's */
     /* The same by all pairs of walks, which has less noise; value NAN: there is none. */
     struct imp_estimate pairs;
@@ -81,9 +81,9 @@ struct imp__goal {
      * samples of eval. The caller ends it by imp__sparse_normal_destroy. NULL: not offered. */
     enum imp_status (*sparse)(const double *x, uint64_t seed, int rounds,
                               struct imp__sparse_normal *out, void *payload);
-    /* Levenberg-Marquardt: from here on eval and normal take fewer samples, or those asked
-     * for. A search that ends with fewer has to be looked at (imp__covariance) and may have
-     * to go on (imp__search_refine). NULL: they always take those asked for. */
+    /* Levenberg-Marquardt: from here on eval and normal take fewer samples, or the full
+     * number. A search that ends with fewer has to be looked at (imp__covariance) and may have
+     * to go on (imp__search_refine). NULL: they always take the full number. */
     void (*coarsen)(bool fewer, void *payload);
     /* For methods with common random numbers: those of `seed` are drawn at x, and are the
      * ones of all evaluations with this seed until the next draw. NULL: evaluations draw
@@ -101,8 +101,8 @@ struct imp__opt_options {
     int max_iterations;   /* > 0 */
     double learning_rate; /* Adam: fraction of the scale */
     double tolerance;     /* fraction of the scale */
-    double
-        momentum; /* Adam: what stays of the mean gradient, below 1; 0: IMP_ADAM_MOMENTUM */
+    /* Adam: what stays of the mean gradient, below 1; 0: IMP_ADAM_MOMENTUM. */
+    double momentum;
     /* Adam: gradients have little noise, and variables that settle (imp__span) arrive soon.
      * Their rate is (1 + i/IMP_ADAM_FALLING_QUIET)^-1/2 of the first in iteration i = 0, 1, ... of
      * the history, and their momentum, if it is 0 above, IMP_ADAM_MOMENTUM_QUIET. */
@@ -134,8 +134,8 @@ struct imp__search {
     size_t n_history, cap_history, cap_history_se, cap_history_x;
     double *history, *history_se;
     double *history_x; /* [n_history][n] where these were; see imp__search_trail */
-    /* [n_goal] what the goal knows from one iteration to the next: a checkpoint holds it. Of
-     * the goal, which has it there when a checkpoint is written or read. */
+    /* [n_goal] the goal's state from one iteration to the next, in checkpoints. The goal puts
+     * it here before a checkpoint is written, and takes it after one is read. */
     double *goal_numbers;
     size_t n_goal;
     /* Private to the optimiser. */
@@ -156,8 +156,8 @@ enum imp_status imp__optimize(const struct imp__goal *goal,
                               const struct imp__opt_options *options,
                               struct imp__search *search);
 
-/* Is the search one of Levenberg and Marquardt that has ended with fewer samples than were
- * asked for? It goes on from where it is, with these. */
+/* Is the search one of Levenberg and Marquardt that has ended with fewer samples than
+ * given? It goes on from where it is, with these. */
 bool imp__search_is_coarse(const struct imp__search *search);
 void imp__search_refine(struct imp__search *search);
 
@@ -169,7 +169,7 @@ double imp__search_answer(const struct imp__search *search, size_t k);
 /* x: the answer; of many variables, the memory of what led there is given back. */
 void imp__search_settle(struct imp__search *search);
 
-/* Of Adam, before its first iteration: go on from x, while `start` stays. */
+/* For Adam, before its first iteration: go on from x, while `start` stays. */
 void imp__search_move(const struct imp__goal *goal, struct imp__search *search,
                       const double *x);
 /* Its iterations and their losses follow those of `from`, which has none then; history_x
@@ -209,7 +209,7 @@ enum imp_status imp__search_array(struct imp__search *s, int k, size_t n);
 /* The objective f at x [n]. */
 enum imp_status imp__search_log(struct imp__search *s, struct imp_estimate f,
                                 const double *x);
-/* iteration++, and tell the goal. */
+/* iteration++, and goal->iterated. */
 enum imp_status imp__search_iterated(const struct imp__goal *goal, struct imp__search *s);
 /* Random numbers of iteration i, purpose k: independent of each other. */
 uint64_t imp__search_seed(const struct imp__goal *goal, int i, int k);
@@ -218,7 +218,7 @@ enum imp_status imp__normal_create(imp_context *ctx, size_t n, bool deviate,
                                    struct imp__normal *out);
 void imp__normal_destroy(imp_context *ctx, struct imp__normal *normal);
 
-/* Does it keep where it was? Of few variables, unless they stand for others
+/* Does it keep where it was? With few variables, unless they are coarse values of others
  * (fit_levels.c). */
 static inline bool imp__search_trails(const struct imp__search *s)
 {

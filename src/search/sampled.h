@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Normal equations of a fit (J^T W J and J^T W r) as samples tell them, with the
+ * Normal equations of a fit (J^T W J and J^T W r) as samples estimate them, with the
  * covariance of the gradient and the deviations of the matrix. */
 #ifndef IMP_SEARCH_SAMPLED_H
 #define IMP_SEARCH_SAMPLED_H

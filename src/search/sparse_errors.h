@@ -18,7 +18,7 @@ enum { IMP_ERROR_DRAWS = 4 * IMP_SPARSE_WIDTH };
 
 struct imp__sparse_errors {
     double *x; /* [n] a last Newton step from the x handed in, made with random numbers of
-                  its own: its error is what se says; NULL: there are none, and */
+                  its own: its error is se; NULL: there are none, and */
     const char *why; /* is the reason, a constant string */
     double *se;      /* [n] NAN at a bound, and of variables that are not determined */
     size_t n_bound;  /* variables that press against a bound */

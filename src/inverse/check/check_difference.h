@@ -15,7 +15,7 @@ struct imp__fresh {
     struct imp__check *check;
     float *pattern; /* [height][width][channels] s */
     int channels;
-    int more; /* samples per pixel of an evaluation, in units of those asked for */
+    int more; /* samples per pixel of an evaluation, in units of the given number */
     uint64_t next_seed;
 };
 enum imp_status imp__fresh_begin(struct imp__fresh *f, struct imp__check *c);

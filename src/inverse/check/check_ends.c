@@ -24,8 +24,9 @@
 #define WALKS_LEAST 32768
 /* From the sensor, where a fresh row brings what it has: with fewer a row decides nothing. */
 #define SAMPLES_LEAST 4096
-/* A row that fails is measured again, with this many times as many walks from the lights: where single
- * walks bring much (a lamp in a blurred mirror), value and error of few are too low together. */
+/* A row that fails is measured again, with this many times as many walks from the lights: where
+ * single walks bring much (a lamp in a blurred mirror), value and error of few are too low
+ * together. */
 #define AGAIN 8
 
 struct ends {

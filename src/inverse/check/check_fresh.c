@@ -24,7 +24,7 @@
  * D(h/2) by 1/3 of that difference, and (8 D(h/2) - D(h))/7 by 1/7, so KINK times the
  * correction is at least the difference. */
 #define KINK 7
-/* Samples of the three rounds: 1, 4 and 16 times what was asked for, in all. */
+/* Samples of the three rounds: 1, 4 and 16 times the given number, in all. */
 #define ROUNDS 3
 static const int round_more[ROUNDS] = {1, 3, 12};
 
@@ -129,7 +129,7 @@ static bool is_emission(const struct imp_scene *s, size_t param)
     return emission && !other;
 }
 
-/* `before`: samples that the row has had, in multiples of those asked for. */
+/* `before`: samples that the row has had, in multiples of the given number. */
 static enum imp_status comparison_round(struct rows *r, struct comparison *c, int before)
 {
     enum imp_status st = IMP_OK;

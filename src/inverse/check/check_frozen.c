@@ -12,7 +12,7 @@
 /* Central differences leave an error of step^2 times the third derivative, and rounding
  * of 1e-16/step: 1e-8 to 1e-10 at the better steps. A wrong term is far above. */
 #define FROZEN_LIMIT 1e-6
-/* Of the larger of two values of a walk: products of up to some hundred factors, each
+/* Relative to the larger of two values of a walk: products of up to some hundred factors, each
  * with a rounding of 1e-16. */
 #define WALK_ROUNDING 5e-14
 /* Errors are relative to the derivative, or to this part of the walk's L per relative

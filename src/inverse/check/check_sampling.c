@@ -41,7 +41,7 @@ static int aims_told(const struct imp_scene *scene)
 
 /* Distributes a direction that was drawn towards lights or proxies over them: its energy
  * by the posterior probability S_t p_t(w)/sum of each, its count by S_t/sum, which also
- * stands in where w is unknown. */
+ * is used where w is unknown. */
 static void aims_add(const struct looked *j, const struct imp_vertex *v, double energy,
                      double *part)
 {

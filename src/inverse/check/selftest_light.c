@@ -54,7 +54,7 @@ static double radiance(const struct light *l, const struct imp_emission *x, imp_
     return brightness(l, imp__emitter_radiance(l->scene, l->e->index, x, p, l->carried));
 }
 
-/* Directions that can meet the light: a cone around its shape, or all. Of a sky, half of
+/* Directions that can meet the light: a cone around its shape, or all. For a sky, half of
  * them are drawn from a cone about its brightest spot, which may be as small as the sun. */
 struct cone {
     struct imp_frame frame;

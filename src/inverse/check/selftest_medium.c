@@ -23,7 +23,7 @@ out:
     return st;
 }
 
-/* What is asked at one place: eval of the medium, number by number. */
+/* Values at one place: eval of the medium, number by number. */
 struct tally {
     double n, bad, above, unbounded, error;
 };

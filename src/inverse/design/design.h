@@ -32,7 +32,7 @@ struct imp__design {
     double deadline_s;
 };
 
-/* IMP_CANCELLED if the host or the clock asked for it. */
+/* IMP_CANCELLED by the host or the clock. */
 enum imp_status imp__design_stopped(const struct imp__design *d);
 /* Set the weights `w` [goals] of the sources. */
 enum imp_status imp__design_weigh(struct imp__design *d, const double *w);

@@ -19,9 +19,9 @@ double imp__replicate_adjoints(const struct imp__target *target, int channels,
                                size_t pixel, int n, const imp_spec *L, const imp_spec *M,
                                imp_spec *P);
 
-/* Of two independent sets, with their means L and the adjoints P of the above: the variance of the
- * loss, and adjoints E of a number of mean 0, whose square is the variance of the gradient
- * (docs/estimators.md 14):
+/* From two independent sets, with their means L and the adjoints P of the above: the variance
+ * of the loss, and adjoints E of a number of mean 0, whose square is the variance of the
+ * gradient (docs/estimators.md 14):
  *
  *     sum_i E_i dL_i
  */

@@ -45,7 +45,7 @@ struct imp__functional {
     imp_film *const *films;  /* [tracer.active->n] */
 };
 
-/* Of F of the picture, and of the groups: n = 1 + n_groups numbers. */
+/* Variances of F of the picture, and of the groups: n = 1 + n_groups numbers. */
 struct imp__influence {
     double *variance; /* [n] sum over pixels of m/(m - 1) sum (A - mean A)^2 */
     double *cross;    /* [height][width][n] as well, with u_p; NULL: box filter */

@@ -25,7 +25,7 @@ struct imp__overlap {
     bool few;        /* degrees of freedom */
 };
 
-/* Of a picture whose film is sampled `margin` pixels beyond it on every side. */
+/* The overlap in a picture whose film is sampled `margin` pixels beyond it on every side. */
 struct imp__overlap imp__overlap_of(const struct imp_film_desc *film, int margin, int R);
 
 static inline double imp__overlap_variance(double factor, bool few, double pixels,

@@ -21,7 +21,8 @@ enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
                                                struct imp_tracer *out);
 /* Warn, once, of light that its walks do not bring. */
 void imp__problem_tell(struct imp_problem *p, const struct imp_tracer *tracer);
-/* The tracer of one part of a target (struct imp__target), of any end. `run` becomes the part's run. */
+/* The tracer of one part of a target (struct imp__target), of any end. `run` becomes the part's
+ * run. */
 enum imp_status imp__target_tracer(const struct imp_problem *p,
                                    const struct imp__target *target, int part,
                                    struct imp_run *run, struct imp_tracer *out);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Plans of replicates: how many, how many samples in each, and in how many sets of points, by filter,
- * loss and estimator (replicates.h). */
+ * Plans of replicates: how many, how many samples in each, and in how many sets of points, by
+ * filter, loss and estimator (replicates.h). */
 #include "replicates.h"
 #include "adjoint.h"
 #include "film/film_filter.h"
@@ -12,8 +12,8 @@
 
 #define WIDE_MANY    16  /* samples per pixel */
 #define NORMAL_CHUNK 512 /* samples of a pixel, all pairs of which are products */
-/* Least samples of a replicate that tells its own errors: skewed sets of fewer points make them too
- * large (docs/estimators.md 14). And where nobody reads those of gradients. */
+/* Least samples of a replicate with its own error: skewed sets of fewer points make them too
+ * large (docs/estimators.md 14). And where errors of gradients are not read. */
 #define LONE_TOLD   32
 #define LONE_SOUGHT 4
 
@@ -120,7 +120,7 @@ struct imp__replicates imp__replicates_loss(const struct imp_problem *p,
         imp__points_of(sensor, run) != IMP_POINTS_SOBOL || spp < least ||
         spp > SETS * IMP_SET_POINTS)
         return r;
-    /* Of sets of unequal size, what tells errors has a mean (docs/estimators.md 14). */
+    /* With sets of unequal size the estimate of the error has a mean (docs/estimators.md 14). */
     r = (struct imp__replicates){
         .n = spp + spp % SETS, .R = 1, .chunks = 1, .lone = true};
     return in_sets(r, SETS);

@@ -10,9 +10,9 @@
 #define IMP_BATCHES_PER_ITEM 8
 #define IMP_WIDE_REPLICATES  8 /* most of a Gauss-Newton matrix through wide filters */
 
-/* R replicates of n samples; spp = R n >= the spp asked for. R = 1 where spp < 4: then
+/* R replicates of n samples; spp = R n >= the given spp. R = 1 where spp < 4: then
  * neighbouring pixels are paired, which makes the variance an upper bound. And where a replicate
- * of two sets tells its own error (`lone`).
+ * of two sets has its own error (`lone`).
  *
  * The samples of a replicate are m sets, independent of each other; what leaves one out
  * leaves out a set. Independent samples are sets of one. Sets of points have n/m samples,
@@ -23,18 +23,18 @@ struct imp__replicates {
     int stride; /* from the number of a set's first sample to that of the next set */
     bool lone;  /* R = 1, m = 2, and errors are those of imp__replicate_errors */
 };
-/* Of independent samples. */
+/* The plan for independent samples. */
 struct imp__replicates imp__replicates_plan(int spp, int batch_max);
-/* Losses have Sobol's points where neither the run nor the sampler of a sensor says which:
+/* Losses have Sobol's points where neither the run nor the sampler of a sensor names others:
  * errors come from sets, which are independent. In media most numbers of a walk are no
  * points, and fewer pairs of sets than of samples cost more than the points bring. */
 void imp__points_of_losses(const struct imp_problem *p, struct imp_run *run);
-/* Of imp_problem_objective. */
+/* The plan of imp_problem_objective. */
 struct imp__replicates imp__replicates_loss(const struct imp_problem *p,
                                             const struct imp__target *target,
                                             const struct imp_run *run);
-/* Of imp_problem_reverse, where there is no target; and of losses that are compared with others of
- * the same walks: those of kept walks, or of Gauss-Newton matrices. */
+/* The plan of imp_problem_reverse, which has no target, and of losses that are compared with others
+ * of the same walks: those of recorded walks, or of Gauss-Newton matrices. */
 struct imp__replicates imp__replicates_of(const struct imp_scene *scene,
                                           const struct imp__target *target,
                                           const struct imp_run *run);

@@ -94,7 +94,7 @@ static void pixel_loss(const struct imp__splat *s, int b, size_t p, double *tota
 
 /* ---- The loss ------------------------------------------------------------------ */
 
-/* Of a mean over R replicates. */
+/* Variance of a mean over R replicates. */
 static double spread_of(const double *values, int R)
 {
     double sum = 0, square = 0;

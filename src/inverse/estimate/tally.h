@@ -19,7 +19,7 @@
 #define IMP_TALLY_FULL  16384
 
 struct imp__tally_triple { /* three neighbouring numbers */
-    /* Of the pixel at work. What an addition needs is on one cache line. */
+    /* Sums of the present pixel. What an addition needs is on one cache line. */
     imp_spec batch;
     uint32_t key;
     bool touched;

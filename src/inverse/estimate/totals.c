@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Totals over targets, as doubles or as fixed-point sums: begun, shared between ranks, widened where
- * a term overflows, ended. */
+ * Totals over targets, as doubles or as fixed-point sums: begun, shared between ranks, widened
+ * where a term overflows, ended. */
 #include "totals.h"
 #include "base/team.h"
 #include "tally.h"

@@ -11,21 +11,21 @@
 struct imp__totals {
     double objective, variance;
     double *gradient, *gradient_variance; /* [n] of few numbers */
-    /* Of many: fixed point, in the place of the caller's arrays. */
+    /* For many numbers: fixed point, in the place of the caller's arrays. */
     bool many, unit_known;
     bool wants_errors; /* of the gradient */
     struct imp_fixed_sum mean, spread;
     double *own; /* where sums stand that are not in the caller's arrays */
 };
 
-/* gradient, gradient_se: where the results go, either may be NULL. Of many numbers they
+/* gradient, gradient_se: where the results go, either may be NULL. For many numbers they
  * hold the sums in the meantime, unless they are to keep their contents on failure. */
 enum imp_status imp__totals_begin(struct imp_problem *p, bool in_place, double *gradient,
                                   double *gradient_se, struct imp__totals *t);
 /* Sums in fixed point are complete when the other ranks' are added (base/team.h). */
 enum imp_status imp__totals_share(struct imp_problem *p, struct imp__totals *t);
 /* *again: terms were too large for the unit and were left out. All is then to be added
- * once more, with the unit that the largest asks for. */
+ * once more, with the unit that the largest needs. */
 enum imp_status imp__totals_again(struct imp_problem *p, struct imp__totals *t,
                                   bool *again);
 void imp__totals_end(struct imp_problem *p, struct imp__totals *t, double *gradient,

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Walks are drawn and kept (walk/kept/store.h), by all threads, tile by tile. Of a team, every
- * rank keeps all of them, and evaluates its share. */
+ * Walks are drawn and kept (walk/kept/store.h), by all threads, tile by tile. Every rank
+ * of a team keeps all of them, and evaluates its share. */
 #include "walks_make.h"
 #include "base/arguments.h"
 #include "base/team.h"

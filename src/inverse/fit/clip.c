@@ -9,9 +9,9 @@
  *     as it is       else
  *
  * At the truth, |V - T| < 3 s but for 3 numbers in 1000 where V is well known, so the second
- * condition of the first line hardly ever decides, and weights depend on J alone, not on the noise of T: numbers
- * near the level are neither taken nor left by what their noise is. The second condition
- * lets a number speak that is far from the level, where the scene is wrong.
+ * condition of the first line hardly ever decides, and weights depend on J alone, not on the
+ * noise of T: numbers near the level are neither taken nor left by what their noise is. The
+ * second condition lets a number count that is far from the level, where the scene is wrong.
  *
  * A photograph (docs/photographs.md) is compared by a power of T, whose noise is in the
  * power. Here the power is expanded about V instead,
@@ -63,7 +63,7 @@ static double at_level(const struct imp__clip *c, size_t i)
     return (double)fmaxf(c->low, fminf(c->high, c->measured[i]));
 }
 
-/* The gamma of a photograph, where the scene stands; 1 of other targets. */
+/* The gamma of a photograph at the scene's present parameters; 1 of other targets. */
 static double gamma_of(const struct imp_problem *p, const struct imp__target *t)
 {
     const struct imp_camera_gain *gain = p->scene->sensors[t->desc.sensor]->gain;

@@ -133,7 +133,7 @@ static enum imp_status search_look(struct imp__fit *f, const struct imp__opt_opt
     return st == IMP_OK ? intervals(f, s, s->x, rows, u, why) : st;
 }
 
-/* Of clipped targets: searches and their intervals, until the numbers that count stay. */
+/* Clipped targets: searches and their intervals, until the set of pixels that count is fixed. */
 static enum imp_status clipped_searches(struct imp__fit *f,
                                         const struct imp__opt_options *o,
                                         struct imp__search **s,

@@ -40,7 +40,7 @@ struct imp__fit {
     const struct imp__metric *metric;  /* of the next evaluation's variance; or NULL */
     int rounds_fit; /* rows of derivatives of so many rounds are known to fit into memory */
 
-    /* Of searches with common random numbers (fit_kept.c): walks that are evaluated. */
+    /* Recorded walks of searches with common random numbers (fit_kept.c). */
     imp_walks *walks; /* NULL: none are */
     uint64_t walks_seed;
     double walks_bytes; /* of the last draw */
@@ -48,7 +48,7 @@ struct imp__fit {
     bool stale;          /* the last evaluation was far from the draw */
     const char *untaken; /* why walks are not kept; NULL: they are, or were not wanted */
 
-    /* Of Adam (fit_variates.c). */
+    /* Control variates of Adam (fit_variates.c). */
     struct imp__variate *variate; /* NULL: there is none */
     bool searching;               /* evaluations are those of the search */
     bool quiet;                   /* imp__opt_options */
@@ -61,8 +61,8 @@ struct imp__fit {
 enum imp_status imp__fit_begin(struct imp_problem *problem,
                                const struct imp_fit_options *options,
                                const struct imp_run *run, struct imp__fit *fit);
-/* Tells how far it is. IMP_CANCELLED: it shall stop here, by the caller or its time limit, on
- * this rank or another. All ranks ask alike. */
+/* Reports progress. IMP_CANCELLED: it shall stop here, by the caller or its time limit, on
+ * this rank or another. All ranks call it alike. */
 enum imp_status imp__fit_goes_on(struct imp__fit *fit, double fraction);
 /* fit_sparse.c: are normal equations those of rows of derivatives? */
 static inline bool imp__fit_is_sparse(const struct imp__fit *fit)
@@ -72,7 +72,7 @@ static inline bool imp__fit_is_sparse(const struct imp__fit *fit)
 /* imp__goal.sparse. */
 enum imp_status imp__fit_sparse(const double *x, uint64_t seed, int rounds,
                                 struct imp__sparse_normal *out, void *payload);
-/* Samples per pixel of one evaluation, as asked for. */
+/* Samples per pixel of one evaluation, as given. */
 int imp__fit_spp(const struct imp__fit *fit);
 /* Those of a search that is far from its end. */
 int imp__fit_coarse_spp(const struct imp__fit *fit);
@@ -124,7 +124,7 @@ enum imp_status imp__fit_checkpoint_read(struct imp__fit *fit, struct imp__searc
 
 struct imp__uncertainty;
 
-/* fit_result.c: the numbers before the fit, for its report and to restore them. Of `many`
+/* fit_result.c: the numbers before the fit, for its report and to restore them. `many`:
  * only those that are not stored as floats; the search keeps the others. */
 enum imp_status imp__fit_start_keep(const struct imp_problem *p, bool many, double **out);
 void imp__fit_start_restore(struct imp_problem *p, bool many, const double *start,

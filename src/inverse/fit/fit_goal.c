@@ -57,7 +57,8 @@ static int inner_progress(const struct imp_progress *p, void *payload)
 {
     struct imp__fit *f = payload;
     const double done = f->search ? f->search->iteration : 0;
-    if (f->final_total > 0) /* A look that leaps takes more evaluations than were told. */
+    if (f->final_total >
+        0) /* A covariance that moves to the Newton point takes more evaluations than planned. */
         report(f, f->search_share +
                       (0.999 - f->search_share) *
                           fmin(1, (f->final_calls - 1 + p->fraction) / f->final_total));
@@ -209,7 +210,8 @@ static void coarsen(bool fewer, void *payload)
 }
 
 /* Do tiles get samples by their share of the variance? Beside control variates of many numbers,
- * which have each their own pixels, nothing is gained by it: there they do if it is asked for. */
+ * which have each their own pixels, nothing is gained by it: there they do if the options
+ * demand it. */
 static bool allocates(const struct imp__fit *f)
 {
     const bool many = f->variate && f->problem->n > IMP_TRAIL_MAX;
@@ -264,7 +266,7 @@ static void missing_tell(struct imp_problem *p, enum imp_from end)
 }
 
 /* What reads losses: trial steps beside the loss of a Gauss-Newton matrix, methods whose walks are
- * kept and traced in turn, or Adam, which asks for no errors of a gradient. */
+ * kept and traced in turn, or Adam, which needs no errors of a gradient. */
 static enum imp__loss_use use_of(const struct imp__fit *f)
 {
     return f->options.optimizer == IMP_LM || imp__fit_keeps(f) ? IMP_LOSS_COMPARED

@@ -3,9 +3,9 @@
  * Methods with common random numbers (L-BFGS, MMA, SLSQP) evaluate one draw of walks many
  * times: the walks are kept, and evaluated at other numbers without a ray. A new draw is
  * made when the effective sample size of n walks falls below REDRAW_ESS n
- * (walk/kept/store_weight.c), or an extinction leaves its headroom. The objective and the intervals of an answer come from fresh
- * walks (fit.c): the search has fitted the noise of its own walks, whose errors would be
- * too small. */
+ * (walk/kept/store_weight.c), or an extinction leaves its headroom. The objective and the
+ * intervals of an answer come from fresh walks (fit.c): the search has fitted the noise of its
+ * own walks, whose errors would be too small. */
 #include "base/team.h"
 #include "fit.h"
 #include "inverse/estimate/walks_make.h"
@@ -49,7 +49,7 @@ static bool all_chosen(const struct imp_problem *p, const imp_walks *w)
 }
 
 /* Roulette's floor, no higher than the scene needs: high ones make long walks, and each
- * evaluation pays for them. It is a bound of rho'^2, which a few walks tell. */
+ * evaluation pays for them. It is a bound of rho'^2, which a few walks estimate. */
 static enum imp_status survival_find(struct imp__fit *f, const struct imp_run *run,
                                      const struct imp_walks_options *o,
                                      const uint8_t *sensors, const uint8_t *free,

@@ -59,7 +59,7 @@ static enum imp_status eval(const double *c, uint64_t seed, struct imp_estimate 
 {
     struct level *l = payload;
     const struct imp__goal *fine = &l->fit->goal;
-    (void)g_se; /* Adam asks for none */
+    (void)g_se; /* Adam needs none */
     blocks_map(l, imp__cells_prolong, true, c, l->x);
     const enum imp_status st = fine->eval(l->x, seed, f, l->g, NULL, fine->payload);
     if (st == IMP_OK) blocks_map(l, imp__cells_restrict, false, l->g, g);

@@ -68,7 +68,7 @@ static void put_loose(struct text *t, const struct imp__fit *f,
     }
 }
 
-/* Of many numbers. */
+/* Standard errors of many variables, which drawn vectors estimate. */
 static void put_errors(struct text *t, const struct imp__fit *f)
 {
     put(t, "%sstandard errors are those of %d drawn vectors, each known to %.0f %%",

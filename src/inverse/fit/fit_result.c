@@ -64,7 +64,7 @@ void imp__fit_start_restore(struct imp_problem *p, bool many, const double *star
 
 /* ---- Its answer ---------------------------------------------------------------- */
 
-/* One entry an active parameter. Numbers kept in doubles start where `start` says; those
+/* One entry an active parameter. Numbers kept in doubles start at `start`; those
  * of textures where the search does, which has them as floats. */
 static enum imp_status blocks_make(struct imp__fit *f, const double *start)
 {
@@ -90,7 +90,7 @@ static enum imp_status blocks_make(struct imp__fit *f, const double *start)
     return IMP_OK;
 }
 
-/* Of many numbers: what drawn vectors say of this one, in the units of x. */
+/* One of many variables: error and interval by drawn vectors, in the units of x. */
 static void error_of(const struct imp__fit_block *b, double x, double se,
                      struct imp_fit_variable *v)
 {
@@ -309,7 +309,7 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
         .control_variate = imp__fit_variate_text(f)};
     answer->n = n;
     answer->rows = rows;
-    if (rows) answer->search = NULL; /* all is said */
+    if (rows) answer->search = NULL; /* every row is filled */
     *out = r;
     return IMP_OK;
 }

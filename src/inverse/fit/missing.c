@@ -27,7 +27,7 @@
 
 #define ROWS       20 /* numbers with Gauss-Newton rows, at least; less if there are less */
 #define REPLICATES 6
-#define APART      8    /* a parameter of more numbers is asked by a common factor */
+#define APART      8 /* a parameter of more numbers is tested through one common factor */
 #define LOOSE      1e-6 /* directions of H_aa below this, scaled, are not followed */
 #define SEED       0x5c03e
 
@@ -35,10 +35,11 @@ struct missing {
     struct imp_problem *p;
     struct imp_run run;
     uint8_t *own;  /* [n_params] chosen by the caller */
-    uint8_t *able; /* [n_params] may be asked */
+    uint8_t *able; /* [n_params] may be tested */
     size_t own_ties;
-    size_t asked; /* numbers that have been looked at */
-    /* Of the layout at work: */
+    /* Numbers that have been tested: the factor of Bonferroni's correction. */
+    size_t asked;
+    /* For the present layout: */
     size_t n;
     double *H, *H_meas, *cov, *g, *g_prior; /* sums over replicates */
 };
@@ -64,7 +65,7 @@ out:
     return st;
 }
 
-/* May this parameter be asked? Its numbers within their bounds; one that is 0 everywhere has
+/* May this parameter be tested? Its numbers within their bounds; one that is 0 everywhere has
  * no factor. */
 static bool may_ask(const struct imp_scene *s, size_t k)
 {

@@ -14,7 +14,7 @@
  * r = l'/w at the mean of a few walks would have the bias that the jackknife removes.
  *
  * The noise of the targets gives the gradient the covariance sum w^2 sigma^2 J^T J. Where
- * sigma is not given, the squared residual stands in for sigma^2, pixel by pixel, which
+ * sigma is not given, the squared residual replaces sigma^2, pixel by pixel, which
  * holds however the noise differs between pixels (White, Econometrica 48, 1980); residual
  * and J^T J come from different halves of the units, so that their own noise is not
  * correlated. */

@@ -39,7 +39,7 @@ struct imp__normal_sums { /* matrices [K*K], lower triangles */
     double *scalars;    /* [IMP_NORMAL_SCALARS] */
     double *deviations; /* [IMP_DEVIATIONS][K*K], or NULL */
 };
-/* Of a target: loss and its variance, as those of an evaluation with the same walks; chi^2
+/* Scalars of a target: loss and its variance, as those of an evaluation with the same walks; chi^2
  * by all pairs of walks, and its variance. */
 enum {
     IMP_NORMAL_OBJECTIVE,

@@ -178,7 +178,7 @@ static void channel_add(const struct imp__normal_job *j, const struct pixel *p, 
     w->weight[c] = weight;
     products(j, p, c, 0, half, sum, xx);
     products(j, p, c, half, p->M, sum1, xx1);
-    /* Of each half: (J^T J of it) (squared residual of the other). */
+    /* Cross-fitted: J^T J of each half times the squared residual of the other. */
     const double meas = 0.5 * weight * weight * p->share;
     const double m0 =
         known ? 0 : meas / (n0 * (n0 - 1)) * square_residual(p, c, half, p->M);
@@ -222,7 +222,7 @@ static void pair(const struct imp__normal_job *j, const struct pixel *p, int a, 
     }
 }
 
-/* Of v [T], the numbers touched. */
+/* Adds v v^T over the numbers touched, v [T]. */
 static void square_add(const struct imp__normal_job *j, const struct pixel *p,
                        double scale, const double *v, double *out)
 {

@@ -8,7 +8,7 @@
 #include "gauss_newton.h"
 
 /* The sets of a pixel are put together to so many units at most, and to fewer where their
- * number asks for it; all pairs of units are multiplied. */
+ * number needs it; all pairs of units are multiplied. */
 enum {
     IMP_NORMAL_UNITS = 16,
     IMP_NORMAL_PAIRS = IMP_NORMAL_UNITS * (IMP_NORMAL_UNITS - 1) / 2
@@ -27,7 +27,7 @@ struct imp__normal_job {
         double *x;              /* [K][channels] of one set: mean */
         double *X;              /* [units][seen][K] of a pixel, then [units][seen][T] */
         size_t *touched;        /* [T] in increasing order: numbers that the pixel's walks
-                                   tell of; of others all is 0 */
+                                   contribute to; of others all is 0 */
         double *sum, *sum_xx;   /* [T], [T*T] of a channel: over half of the units */
         double *sum1, *sum1_xx; /* and over the other half */
         double *own;            /* [T], [T*T] of a group of units */

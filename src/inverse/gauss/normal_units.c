@@ -5,7 +5,7 @@
 #include "inverse/problem/loss.h"
 #include "normal_tiles.h"
 
-/* Of one size where that can be: pairs of units are all pairs but those within a unit. */
+/* Units have one size where that can be: pairs of units are all pairs but those within a unit. */
 int imp__normal_units(int sets)
 {
     if (sets <= IMP_NORMAL_UNITS) return sets;
@@ -14,7 +14,7 @@ int imp__normal_units(int sets)
     return IMP_NORMAL_UNITS;
 }
 
-/* Of a loss that is not quadratic: what the derivative of unit a is multiplied with, by
+/* Factor of the derivative of unit a where the loss is not quadratic, by
  * the jackknife over units (adjoint.c). */
 static void jackknife(const struct imp_target *t, double scale, double T, int units,
                       double r[][3], size_t c, double *factor)

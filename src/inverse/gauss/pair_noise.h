@@ -16,8 +16,8 @@
  *
  *     s2 = 2/(R (R - 3)) sum over a < b of (h_ab - m - e_a - e_b)^2
  *
- * and the excess is 2 s2/((R - 1)(R - 2)). Sums over tiles of pixels are multiplied with those of the tiles around, as far
- * as a filter makes pixels share walks (docs/estimators.md 15). */
+ * and the excess is 2 s2/((R - 1)(R - 2)). Sums over tiles of pixels are multiplied with those
+ * of the tiles around, as far as a filter makes pixels share walks (docs/estimators.md 15). */
 #ifndef IMP_INVERSE_PAIR_NOISE_H
 #define IMP_INVERSE_PAIR_NOISE_H
 

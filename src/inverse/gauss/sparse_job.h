@@ -8,7 +8,7 @@
 #include "sparse_rows.h"
 #include "sparse_sink.h"
 
-/* Of a tile and of all. */
+/* Scalars of a tile, and their sums. */
 enum {
     IMP_ROWS_OBJECTIVE,
     IMP_ROWS_VARIANCE,

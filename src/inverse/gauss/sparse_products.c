@@ -4,7 +4,7 @@
  * combinations of rows, X^T f: f is found pixel by pixel, and rows are added up in groups
  * of blocks whose sums are then added in order.
  *
- * Of the gradient's covariance (pair_noise.h): with h_ab = w/2 (r_a X_b + r_b X_a), their sum
+ * The gradient's covariance (pair_noise.h): with h_ab = w/2 (r_a X_b + r_b X_a), their sum
  * over a < b  H = w/2 sum_b (R - r_b) X_b, R = sum r, and e_a = (sum_b h_ab - 2 H/M)/(M - 2),
  * the jackknife's covariance is s^2 4/(M (M-1)) sum_a e_a e_a^T, s the share, so that of
  *
@@ -245,7 +245,7 @@ static void excess_draw(const struct imp__row_block *b, const struct imp__row_pi
 }
 
 /* Noise of the target moves g by -w X sigma xi, X the mean over units; where sigma is not
- * known the residual stands in for it, less what walks make of it. Parts of a pixel share
+ * known the residual replaces it, less what walks make of it. Parts of a pixel share
  * its sign. */
 static void measurement_draw(const struct imp__row_block *b,
                              const struct imp__row_pixel *p, int width,

@@ -14,7 +14,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define LOOKS 4 /* tiles that tell what all of them take */
+#define LOOKS 4 /* tiles by which the memory of all is estimated */
 
 /* ---- Tiles ---------------------------------------------------------------------- */
 
@@ -58,8 +58,8 @@ static enum imp_status block_keep(imp_context *ctx, const struct imp__row_block 
     return IMP_OK;
 }
 
-/* Of mean residuals r of M units, by the pairs of different ones: r^2 has the variance of r
- * by walks, too, and pixel by pixel the difference may be negative. */
+/* Squared residual of M units with means r, by the pairs of different ones: r^2 has the
+ * variance of r by walks, too, and pixel by pixel the difference may be negative. */
 static double noise_share(const struct imp__row_block *b)
 {
     double pairs = 0, all = 0;
@@ -125,7 +125,7 @@ static enum imp_status take(size_t group, const void *sum, void *payload)
 
 /* ---- A target ------------------------------------------------------------------- */
 
-/* Do the rows of all tiles fit? Those of some tell. */
+/* Do the rows of all tiles fit in memory? Estimated by those of some. */
 static enum imp_status look(struct imp__rows_job *j, const struct imp_tiles_pass *run)
 {
     const size_t all = imp__tiles_count(&j->tiles) * run->parts;

@@ -24,7 +24,7 @@ struct imp__row_pixel {
     float noise_se[3]; /* of the target; below 0: not known */
 };
 
-/* Of a part of the samples of a tile. A row is one channel of one unit. */
+/* Rows of a part of the samples of a tile. A row is one channel of one unit. */
 struct imp__row_block {
     void *memory; /* of all that follows */
     int channels;
@@ -65,13 +65,13 @@ enum imp_status imp__rows_product(const struct imp__rows *rows, int width,
                                   const double *v, double *y);
 /* g = J^T W r, [n]. */
 enum imp_status imp__rows_gradient(const struct imp__rows *rows, double *g);
-/* z [n][IMP_SPARSE_WIDTH]: vectors of mean 0 whose covariance is the one asked for. */
+/* z [n][IMP_SPARSE_WIDTH]: vectors of mean 0 with the given covariance. */
 enum imp_status imp__rows_draw(const struct imp__rows *rows, enum imp__draw what,
                                uint64_t seed, double *z);
 
 /* ---- sparse_diagonal.c ----------------------------------------------------------- */
 
-/* Of H: its diagonal, and the variance of that; the diagonal of the same-sample matrix.
+/* The diagonal of H, and the variance of that; the diagonal of the same-sample matrix.
  * [n] each. */
 enum imp_status imp__rows_diagonal(const struct imp__rows *rows, double *diagonal,
                                    double *spread, double *same);

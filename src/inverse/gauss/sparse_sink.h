@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A sink that keeps the channels of a derivative apart (channel_sink.h), of the numbers alone that
- * a walk tells of: memory and time follow these, and not all numbers. */
+ * a walk contributes to: memory and time follow these, and not all numbers. */
 #ifndef IMP_INVERSE_SPARSE_SINK_H
 #define IMP_INVERSE_SPARSE_SINK_H
 

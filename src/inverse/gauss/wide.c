@@ -155,7 +155,7 @@ double imp__wide_weight(const struct imp__wide *w, size_t pixel, int c, double m
     return weight;
 }
 
-/* Of a loss that is not quadratic: what the derivative of replicate b is multiplied with,
+/* Factor of the derivative of replicate b where the loss is not quadratic,
  * by the jackknife over replicates (adjoint.c). */
 static void jackknife(const struct imp__wide *w, size_t pixel, int c, double S,
                       double *factor)

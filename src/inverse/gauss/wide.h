@@ -23,7 +23,7 @@ struct imp__wide {
     double *L, *X;                        /* of a pixel and channel: [R], [R][K] */
     double *sum;                          /* [K] */
     struct imp__pair_noise noise, loss_noise; /* of the gradient; of chi^2 */
-    /* Of one channel and half of the replicates, for H_meas: [pixels], [K][pixels]. */
+    /* One channel of half of the replicates, for H_meas: [pixels], [K][pixels]. */
     double *sigma2, *Xc, *Xd, *row;
 };
 

@@ -12,10 +12,10 @@
 #include <string.h>
 
 #define LEAST  4    /* samples of a pixel: two sets, or two replicates, of two */
-#define FLOOR  0.25 /* of the samples asked for */
+#define FLOOR  0.25 /* of the given samples */
 #define CAP    16
 #define MEMORY 0.8 /* weight of what was seen before; a look's noise is 20 to 50 % */
-/* Of the loss's variance, beside the gradient's: searches go by how it falls. */
+/* Weight of the loss's variance beside the gradient's: searches go by how it falls. */
 #define LOSS   0.1
 #define LEVELS 48
 #define HALVES 50 /* of an interval of 2^40 */
@@ -147,7 +147,7 @@ enum imp_status imp__allocation_share(struct imp__allocation *a, size_t first,
 /* ---- Samples ------------------------------------------------------------------------ */
 
 /* Samples per pixel that a tile may have: 2^k and 3 2^k, which sets of points are best at, and
- * those asked for. */
+ * the given number. */
 static int levels_of(int even, int level[LEVELS])
 {
     const int floor = imp_max(imp_min(LEAST, even), (int)ceil(FLOOR * even));
@@ -157,7 +157,7 @@ static int levels_of(int even, int level[LEVELS])
         for (int64_t s = power; s <= power * 3 / 2; s += power / 2) {
             const bool beside = n == 0 || level[n - 1] < even;
             if (beside && s >= even) level[n++] = even;
-            /* Below those asked for not 6, whose sets have three points. */
+            /* Below the given number not 6, whose sets have three points. */
             if (s > even ? s <= (int64_t)CAP * even : s >= floor && s != even && s != 6)
                 level[n++] = (int)s;
         }

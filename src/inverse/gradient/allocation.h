@@ -7,7 +7,7 @@
  *     sum v_i / n_i   is least for   n_i ~ (v_i / c_i)^1/2,   given sum c_i n_i
  *
  * (Neyman, J. R. Stat. Soc. 97, 1934), between a floor, so that what a tile has not shown yet is
- * found, and a cap. The cost is that of the samples asked for. v and c come from evaluations
+ * found, and a cap. The cost is that of the given samples. v and c come from evaluations
  * before, whose walks are others: every tile's estimate is unbiased whatever its samples, and so
  * are sums over tiles, and their standard errors. */
 #ifndef IMP_INVERSE_ALLOCATION_H
@@ -17,14 +17,14 @@
 #include "inverse/estimate/replicates.h"
 #include "search/metric.h"
 
-/* Of an item: the gradient's variance, the loss's, and rays. */
+/* Numbers of an item: the gradient's variance, the loss's, and rays. */
 enum { IMP_ALLOCATION_SEES = 3 };
 
 struct imp__allocation {
     imp_context *ctx;
     size_t n;  /* tiles, of all targets and their parts that are cut into tiles */
     int parts; /* most work items of a tile */
-    int *even; /* [n] samples per pixel as asked for */
+    int *even; /* [n] samples per pixel as given */
     int *spp;  /* [n] of the next evaluation */
     /* [n] share of the variance, [n] cost, both of one sample a pixel; how many evaluations
      * these come from. All that is kept between evaluations, and that checkpoints hold. */
@@ -39,7 +39,7 @@ struct imp__allocation {
 /* n = 0: no target has tiles that samples may be allocated to. */
 enum imp_status imp__allocation_create(struct imp_problem *p, const struct imp_run *run,
                                        struct imp__allocation *a);
-/* Of a run that asks for other samples, or of the first: the state stays. */
+/* Begins a run with other samples, or the first: the state stays. */
 enum imp_status imp__allocation_again(struct imp_problem *p, const struct imp_run *run,
                                       struct imp__allocation *a);
 void imp__allocation_destroy(struct imp__allocation *a);
@@ -57,7 +57,7 @@ size_t imp__allocation_take(struct imp__allocation *a, size_t tiles);
 /* Item `part` of a tile is done, by any thread. */
 void imp__allocation_see(struct imp__allocation *a, size_t tile, size_t part,
                          const double seen[IMP_ALLOCATION_SEES]);
-/* The ranks of a team tell each other what they have seen in `tiles` tiles. */
+/* Shares between the ranks of a team what they have seen in `tiles` tiles. */
 enum imp_status imp__allocation_share(struct imp__allocation *a, size_t first,
                                       size_t tiles);
 /* Between evaluations: spp from what was seen. */

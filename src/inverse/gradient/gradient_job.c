@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Work of one tile and sums over tiles, for the loss and the gradient of a target (gradient_job.h). */
+ * Work of one tile and sums over tiles, for the loss and the gradient of a target
+ * (gradient_job.h). */
 #include "gradient_job.h"
 #include "base/arguments.h"
 #include "base/team.h"

@@ -26,8 +26,8 @@ struct imp__gradient_job {
     const struct imp__target *target; /* NULL: fixed adjoint */
     const float *seed;                /* fixed adjoint image, [h][w][channels] */
     const struct imp__splat *splat;   /* wide filters: pass 2; NULL: box */
-    const struct imp__light_adjoints
-        *light;                        /* of walks from the lights; NULL: not those */
+    /* Adjoints in light tracing; NULL: walks begin at the sensor. */
+    const struct imp__light_adjoints *light;
     struct imp__variate_view *variate; /* NULL: none */
     struct imp_tracer there;           /* of the variate; scene NULL: nowhere yet */
     bool want_gradient;
@@ -73,7 +73,7 @@ struct imp__replicates imp__gradient_plan(const struct imp__gradient_job *job,
                                           size_t tile);
 /* What the allocation measures tallies by; NULL: nothing. */
 const struct imp__metric *imp__gradient_metric(const struct imp__gradient_job *job);
-/* Tells the allocation of a tile's item; and the team of all items. */
+/* Gives a tile's item to the allocation; and all items to the team. */
 void imp__gradient_see(const struct imp__gradient_job *job, const struct imp_tile *tile,
                        const struct imp_tally *tally, double loss_variance);
 enum imp_status imp__gradient_seen(const struct imp__gradient_job *job);

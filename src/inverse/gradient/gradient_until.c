@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A number and its gradient until they are known well enough: the mean over looks, each of
- * its own walks. Of a parameter with standard errors s_i, |g - truth|^2 is beyond z^2 sum
+ * its own walks. For a parameter with standard errors s_i, |g - truth|^2 is beyond z^2 sum
  * s_i^2 no oftener than a normal number is beyond +-z, for z >= 1.54 and however the errors
  * depend on each other (Szekely and Bakirov, Probab. Theory Relat. Fields 126, 2003). */
 #include "allocation.h"
@@ -15,7 +15,7 @@ static double over(double error, double of)
     return of > 0 ? error / of : INFINITY; /* what is 0 may not have been found yet */
 }
 
-/* Of the parameter that is known least; of the value, if there is no gradient. */
+/* Error bound of the least certain parameter; of the value, if there is no gradient. */
 static double bound(const struct imp__looks *l, const struct imp_problem *p,
                     const struct imp_estimate *value, const double *g, const double *se)
 {
@@ -36,7 +36,7 @@ static double bound(const struct imp__looks *l, const struct imp_problem *p,
 }
 
 /* What the variance of a look counts by. With q_b the squared error of parameter b over its
- * squared length, the largest of which ends the sequence, sum q_b^4 stands for it:
+ * squared length, the largest of which ends the sequence, sum q_b^4 estimates it:
  *
  *     d q_b^4 / d Var g_k  ~  q_b^3 / |g_b|^2
  */

@@ -128,7 +128,7 @@ static void walk_value(const void *payload, const struct imp_light_walk *walk,
     const struct imp__functional *f = own->f;
     const size_t C = (size_t)f->channels, K = f->derivatives ? f->tracer.active->n : 0;
     double L[3], *row = K ? imp__arena_take(walk->arena, (K + 1) * C, sizeof *row) : L;
-    value[0] = row ? 0 : NAN; /* no memory is said by a number that is none */
+    value[0] = row ? 0 : NAN; /* NAN: no memory */
     for (size_t k = 0; k < K; k++) value[1 + f->group[k]] = 0;
     for (const struct imp_reach *r = row ? walk->reach : NULL; r; r = r->next) {
         struct imp_splat_taps taps;

@@ -54,7 +54,7 @@ enum imp_status imp__light_objective(struct imp_problem *p,
                                      const struct imp_run *run, double *objective,
                                      double *variance, double *gradient,
                                      double *gradient_variance);
-/* F of the picture and, where f says so, of groups of derivative pictures: mean, se
+/* F of the picture and, with f->derivatives, of groups of derivative pictures: mean, se
  * [1 + n_groups]. */
 enum imp_status imp__light_functional(const struct imp__functional *f,
                                       const struct imp_run *run, double *mean,

@@ -30,7 +30,7 @@ static imp_spec *adjoint_of(const struct imp_tracer *tracer,
     return P;
 }
 
-/* Of the walk from the sensor: x [active->n][channels]. */
+/* Row of the walk from the sensor: x [active->n][channels]. */
 static bool eye_row(const struct imp_tracer *tracer, const struct imp_light_walk *walk,
                     const struct imp_reach *reach, double *x)
 {
@@ -68,7 +68,7 @@ void imp__light_row(const struct imp_tracer *tracer, const struct imp_light_walk
     for (size_t c = 0; c < C; c++) value[c] = reach->L[c];
     const bool done = reach->vertex ? light_row(tracer, walk, reach, value + C)
                                     : eye_row(tracer, walk, reach, value + C);
-    if (!done) value[0] = NAN; /* no memory is said by a number that is none */
+    if (!done) value[0] = NAN; /* NAN: no memory */
 }
 
 static void reach_row(const void *payload, const struct imp_light_walk *walk,

@@ -8,10 +8,11 @@
  *     I_t = F + w (I_{t-1} - H)       F, H: means of the walks at theta_t and theta_{t-1}
  *
  * The residual that weighs a walk's derivative is made of the other walks' F - w H, and of
- * I_{t-1}. w is known before the walks are drawn, and is independent of the pixel: the pixels
- * where x + y is even have the w that the others ask for, and the others theirs. Where that
- * promises too little, a half rests: its pictures are F alone, and of the other half few pixels
- * are evaluated at theta_{t-1}, which say when it is worth the time again. */
+ * I_{t-1}. w is cross-fitted, known before the walks are drawn and independent of the pixel:
+ * that of the pixels where x + y is even is estimated from the others, and the other way round.
+ * Where it promises too little, it is disabled for that half: its pictures are F alone, and of
+ * the other half few pixels are evaluated at theta_{t-1}, which say when it is worth the time
+ * again. */
 #ifndef IMP_INVERSE_VARIATE_H
 #define IMP_INVERSE_VARIATE_H
 
@@ -20,7 +21,7 @@
 /* Sums over half of the pixels, with the weights of the loss: variances of F and of H,
  * covariance. */
 enum { IMP_VARIATE_F, IMP_VARIATE_H, IMP_VARIATE_BOTH, IMP_VARIATE_KINDS };
-/* Of the even pixels, of the few among them, of the odd ones, of the few among them. */
+/* Groups of pixels: the even ones, the few among them, the odd ones, the few among them. */
 enum { IMP_VARIATE_MOMENTS = 4 * IMP_VARIATE_KINDS };
 /* Pixels whose walks are evaluated at theta_{t-1}, too. */
 enum imp__variate_looks { IMP_VARIATE_AT_NONE, IMP_VARIATE_AT_FEW, IMP_VARIATE_AT_ALL };
@@ -35,9 +36,9 @@ struct imp__variate_view {
     double *sum;                   /* [chunks][n] parts of F - w H of this evaluation */
     enum imp__variate_looks looks; /* in this evaluation */
     struct {
-        bool rests;                       /* in this evaluation: w is 0 */
+        bool rests;                       /* disabled in this evaluation: w is 0 */
         double w;                         /* of this evaluation */
-        double variance;                  /* of `last`, as far as the other half tells */
+        double variance;                  /* of `last`, estimated from the other half */
         double before[IMP_VARIATE_KINDS]; /* moments of the other half, so far */
     } half[2];
     double moments[IMP_VARIATE_MOMENTS]; /* of this evaluation */
@@ -85,9 +86,9 @@ static inline bool imp__variate_looks(const struct imp__variate_view *view, size
     return view->looks == IMP_VARIATE_AT_ALL ||
            (view->looks == IMP_VARIATE_AT_FEW && imp__variate_few(view, pixel));
 }
-/* Of a replicate's m sets at a pixel: L and H [m] are means of their walks at the two sets
- * of parameters; H is 0 where nobody looks. Adds to the sums of chunk k and to `moments` (NULL: to
- * neither); H becomes L + w (last - H). */
+/* A replicate's m sets at a pixel: L and H [m] are means of their walks at the two sets
+ * of parameters; H is 0 where it is not evaluated. Adds to the sums of chunk k and to `moments`
+ * (NULL: to neither); H becomes L + w (last - H). */
 void imp__variate_replicate(struct imp__variate_view *view, const struct imp__target *t,
                             struct imp__replicates plan, int k, size_t pixel,
                             const imp_spec *L, imp_spec *H, double *moments);

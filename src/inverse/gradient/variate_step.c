@@ -141,7 +141,7 @@ static enum imp_status sum_share(imp_context *ctx, const struct imp__variate_vie
     return imp__shared_fixed(ctx, &bits);
 }
 
-/* Moments of the other half, by which the next w of a half is chosen. A half that rests goes by
+/* Moments of the other half, by which the next w of a half is chosen. A disabled half goes by
  * the few pixels, whether or not there are others: what it goes by must not depend on what its own
  * walks have the other half do. */
 static void moments_now(const struct imp__variate_view *view, int half, double *now)

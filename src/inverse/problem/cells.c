@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Interpolation P from coarse to fine grids, its transpose, and the average over cells (cells.h). */
+ * Interpolation P from coarse to fine grids, its transpose, and the average over cells
+ * (cells.h). */
 #include "cells.h"
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Globs over parameter names: `*` stands for any characters, dots included, `?` for one.
+ * Globs over parameter names: `*` matches any characters, dots included, `?` for one.
  */
 #ifndef IMP_INVERSE_MATCH_H
 #define IMP_INVERSE_MATCH_H

@@ -21,8 +21,8 @@ struct imp__target {
     float *pixels, *weights, *noise_se;
     struct imp_photograph photograph; /* the pixels, if they have a gamma; else NULL */
     struct imp__clip *clip;           /* levels, and who has no weight; NULL: none */
-    const uint8_t *silent; /* of clip, [height][width][channels]; NULL: all speak */
-    /* Of a film with response curves, unless they are three: targets of up to three of
+    const uint8_t *silent; /* of clip, [height][width][channels]; NULL: all count */
+    /* A film with response curves, unless they are three: targets of up to three of
      * its curves, each with walks of its own; they share the weights. n_parts 0: none. */
     int n_parts;
     struct imp__target *part;
@@ -162,10 +162,10 @@ void imp__ties_free(struct imp_problem *p);
 /* Forgets the tie that was made last; the layout is the caller's. */
 void imp__tie_last_free(struct imp_problem *p);
 uint64_t imp__ties_hash(const struct imp_problem *p, uint64_t hash);
-/* IMP_E_UNSUPPORTED where `what` knows equal numbers alone. */
+/* IMP_E_UNSUPPORTED where `what` supports ties of equal numbers alone. */
 enum imp_status imp__ties_equal_only(const struct imp_problem *p, const char *what);
 
-/* Of pixels, weights, losses and regularisers. */
+/* Hash of pixels, weights, losses and regularisers. */
 uint64_t imp__problem_targets_hash(const struct imp_problem *p);
 /* IMP_E_ARG if parts, or other ranks, are of another problem, scene or call. */
 enum imp_status imp__problem_same(struct imp_problem *p, const struct imp_run *run,

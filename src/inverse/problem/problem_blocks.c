@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Blocks of x: which numbers of the scene a number of x stands for, between which bounds, and
+ * Blocks of x: which numbers of the scene a number of x sets, between which bounds, and
  * how it is moved there and back. */
 #include "math/hash.h"
 #include "problem.h"

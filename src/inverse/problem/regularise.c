@@ -162,7 +162,7 @@ double imp__regularise(const struct imp_problem *p, const double *x, double *gra
     return value;
 }
 
-/* Of smoothness: a weight for each neighbour. */
+/* Adds the curvature of smoothness: a weight for each neighbour. */
 static void neighbours_add(double weight, const struct imp__cells *n, double *d)
 {
     const size_t c = n->channels, rows = n->n[0] * n->n[1];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Targets of films with response curves. A walk knows three channels; of a film with
+ * Targets of films with response curves. A walk carries three channels; of a film with
  * another number of curves a loss is the sum of losses of up to three curves each, made
  * from independent walks. */
 #include "target_levels.h"

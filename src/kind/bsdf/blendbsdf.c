@@ -36,7 +36,7 @@ static enum imp_status build(const struct imp_build *build, void *self,
     return imp__lobes_check(build, b);
 }
 
-/* What material k is asked; false: the lobe is the other's. */
+/* The directions as material k gets them; false: the lobe is the other's. */
 static bool asked(int k, const struct imp_dirs *d, struct imp_dirs *e)
 {
     *e = *d;
@@ -85,7 +85,7 @@ static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp
     return sum;
 }
 
-/* Of both materials; 0 where a lobe is the other's. */
+/* Values of both materials; 0 where a lobe is the other's. */
 static void parts(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
                   imp_spec f[2])
 {

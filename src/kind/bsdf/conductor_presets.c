@@ -60,8 +60,8 @@ static const struct imp__conductor *conductor_exact(const char *name, size_t len
     return NULL;
 }
 
-/* Data of Palik's handbook may be asked for as NAME_palik; where the two sources differ,
- * or there is no such data, the table or this list says so. */
+/* NAME_palik names data of Palik's handbook; the table, or this list, marks where the two
+ * sources differ or there is no such data. */
 const struct imp__conductor *imp__conductor_find(const char *name)
 {
     static const char *const other_source[] = {"Ag", "Al", "Au", "Cr", "W", "a-C"};

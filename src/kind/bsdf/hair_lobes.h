@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Light through a fibre of circular section (Marschner et al. 2003; d'Eon et al. 2011;
- * Chiang et al. 2016). The fibre lies along y, and z is its normal. Of a direction w, theta
+ * Chiang et al. 2016). The fibre lies along y, and z is its normal. For a direction w, theta
  * is the angle to the section, sin(theta) = w_y, phi = atan2(w_z, w_x) the one in it, and
  * gamma = phi - pi/2 that to the normal. Light that leaves along wo has passed the section
  * p times:

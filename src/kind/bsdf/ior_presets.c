@@ -103,7 +103,7 @@ static enum imp_status side_node(const struct imp_build *b, const char *name,
     return IMP_OK;
 }
 
-/* The number that stands where the other side has a spectrum. */
+/* An index that is one number, as a node, where the other side has a spectrum. */
 static enum imp_status number_node(const struct imp_build *b, const char *name,
                                    const char *fallback, struct imp_node **out)
 {
@@ -121,7 +121,7 @@ static enum imp_status number_node(const struct imp_build *b, const char *name,
     return IMP_OK;
 }
 
-/* eta becomes the ratio of two spectra, if one of them is one; *made says so. */
+/* eta becomes the ratio of two spectra, if one of them is one; *made: it did. */
 static enum imp_status ratio_prepare(const struct imp_build *b, const char *inside,
                                      bool *made)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * mask: a material with holes. Of what arrives the part `opacity` meets the nested
+ * mask: a material with holes. The part `opacity` of what arrives meets the nested
  * material, the rest goes straight on, through one more delta lobe:
  *
  *   f = o f_nested,      coefficient of the hole 1 - o
@@ -34,7 +34,7 @@ static enum imp_status build(const struct imp_build *build, void *self,
     return imp__lobes_check(build, b);
 }
 
-/* The nested material, where its inputs are, and what it is asked. */
+/* The nested material, its inputs, and the directions as it gets them. */
 static const struct imp_bsdf *nested(const struct imp_bsdf *b, const imp_spec **in,
                                      const struct imp_dirs *d, struct imp_dirs *e)
 {

@@ -4,10 +4,10 @@
  *
  *     f cos(theta_i) = scale (red rho_r + green rho_g + blue rho_b) cos(theta_i), front
  *
- * rho from a table (merl.h; docs/scene-format.md 5.2). red, green and blue are the colours of its three planes: in
- * rgb their own lanes, in mono their luminances, and by wavelength the linear basis of
- * colours (color/rgb_basis.h): what is grey stays grey, and nothing exceeds 1 that did
- * not before.
+ * rho from a table (merl.h; docs/scene-format.md 5.2). red, green and blue are the colours of
+ * its three planes: in rgb their own lanes, in mono their luminances, and by wavelength the
+ * linear basis of colours (color/rgb_basis.h): what is grey stays grey, and nothing exceeds 1
+ * that did not before.
  *
  * Directions are drawn by half-vectors, with the table's own lobe for the direction of
  * sight, and by the cosine: p = s cos/pi + (1 - s) p(h)/(4 wo.h). The cosine's share s

@@ -20,7 +20,7 @@ struct imp__microfacet {
     enum imp__distribution type;
     bool visible; /* sample visible normals; false: all normals */
     double au, av;
-    /* Of sampling: derivatives that will be taken at what is drawn, so that a part of the
+    /* For sampling: derivatives that will be taken at what is drawn, so that a part of the
      * normals is drawn where D changes (microfacet_score.c). 0: none. */
     unsigned wanted; /* enum imp__score */
 };

@@ -46,8 +46,8 @@ struct look {
     struct imp__burley_facets facets;
 };
 
-/* 2/(1 - q) - 1 with q^2 = 0.08 specular, not below what glass must have. F begins with (eta - 1)^2, hence with specular:
- * far below any effect, the root keeps a slope. */
+/* 2/(1 - q) - 1 with q^2 = 0.08 specular, not below what glass must have. F begins with (eta -
+ * 1)^2, hence with specular: far below any effect, the root keeps a slope. */
 static double eta_of(const struct imp__principled_self *p, const imp_spec *in,
                      double *slope)
 {

@@ -18,7 +18,7 @@
         IMP_ROUGHNESS_INPUT("alpha_u", IMP_INPUT_OPTIONAL),                              \
         IMP_ROUGHNESS_INPUT("alpha_v", IMP_INPUT_OPTIONAL)
 
-/* What stands in a kind's object; filled by imp__roughness_build. */
+/* Part of a kind's object; filled by imp__roughness_build. */
 struct imp__roughness {
     enum imp__distribution type;
     bool visible, anisotropic;

@@ -2,7 +2,7 @@
  *
  * A BSDF as the other transports need it. `eval` is the kernel of radiance, followed from
  * the sensor: the BSDF f times |cos(theta_i)|, with wi drawn. Followed from the lights, wo
- * is drawn, and the same f stands beside |cos(theta_o)| (Veach 1997, 3.7):
+ * is drawn, and the same f is multiplied by |cos(theta_o)| (Veach 1997, 3.7):
  *
  *     kernel of radiance     K (wo, wi) = f(wo, wi) |cos(theta_i)|   per steradian of wi
  *     transposed kernel      K*(wo, wi) = f(wo, wi) |cos(theta_o)|   per steradian of wo

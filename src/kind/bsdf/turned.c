@@ -51,7 +51,7 @@ static imp_v3 out_of(const struct turned *f, imp_v3 w)
     return f->s * w[0] + f->t * w[1] + f->n * w[2];
 }
 
-/* What the nested material is asked; false: wi is on different sides of n and n'. */
+/* The directions in the nested material's frame; false: wi is on different sides of n and n'. */
 static bool nested(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
                    struct turned *f, struct imp_dirs *e)
 {

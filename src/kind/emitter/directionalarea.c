@@ -7,7 +7,7 @@
 #include "from_point.h"
 #include "kind/shape/shape.h"
 
-/* Of normals and of distances from a plane, relative: positions of meshes are floats. */
+/* Relative tolerance of normals and of distances from a plane: positions are floats. */
 #define FLATNESS 1e-5
 
 struct beam {

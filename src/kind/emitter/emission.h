@@ -21,12 +21,12 @@ bool imp__surface_emission_sample(const struct imp_emitter *e,
 double imp__surface_emission_pdf(const struct imp_emitter *e,
                                  const struct imp_emission *x);
 
-/* Of a light at one point. */
+/* Emission of a light at one point. */
 void imp__point_emission_sample(imp_v3 position, const double u[4],
                                 struct imp_emission_sample *out);
 double imp__point_emission_pdf(const struct imp_emitter *e, const struct imp_emission *x);
 
-/* Of light along one direction: 1. */
+/* Density of emission along one direction: 1. */
 double imp__along_emission_pdf(const struct imp_emitter *e, const struct imp_emission *x);
 
 /* The axes of an environment in the world, unit, from its to_world, which can turn and mirror
@@ -37,7 +37,7 @@ enum imp_status imp__sky_axes(const struct imp_build *b, imp_v3 axis[3]);
  * it is. */
 enum imp_status imp__travel_read(const struct imp_build *b, imp_v3 *along);
 
-/* Of the environment, whose `sample` and `pdf` do not look at the receiver. */
+/* Emission of an environment, whose `sample` and `pdf` do not depend on the receiver. */
 bool imp__sky_emission_sample(const struct imp_emitter *e, const struct imp_ball *scene,
                               const double u[4], struct imp_emission_sample *out);
 double imp__sky_emission_pdf(const struct imp_emitter *e, const struct imp_emission *x);

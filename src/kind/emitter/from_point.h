@@ -14,7 +14,7 @@ double imp__point_light_pdf(const struct imp_emitter *e, const imp_v3 *ref,
                             const imp_v3 *wi, const struct imp_hit *hit,
                             const struct imp_surface *at);
 
-/* Where a light stands and how it is turned: columns of to_world, the first three unit and
+/* Position and orientation of a light: columns of to_world, the first three unit and
  * orthogonal. */
 struct imp__light_frame {
     imp_v3 axis[3], origin;

@@ -2,13 +2,13 @@
  *
  * ies: a luminaire as it was measured, intensity I by direction from an LM-63 table.
  *
- * Photometry is of the far field: it says what a whole luminaire sends along w, not from
+ * Photometry is of the far field: it measures what a whole luminaire sends along w, not from
  * where. At the top of a scene the luminaire is a point: irradiance I(w)/r^2 across the
  * ray. In a shape it is the shape that glows, alike all over:
  *
  *     L(w) = scale I(w) / A(w),      A(w) = Int max(0, n . w) dA,
  *
- * so that far away Int L max(0, n . w) dA = scale I(w) again. Of a flat shape A is
+ * so that far away Int L max(0, n . w) dA = scale I(w) again. For a flat shape A is
  * area x cos: a table of cos^(n+1) is `beam` with exponent n. L grows without bound
  * towards the shape's own plane if the table does not vanish there, but L cos does not:
  * points are drawn as for `area`, by projected area, and the cosine cancels. Meeting such

@@ -118,7 +118,7 @@ struct imp__sky_value imp__sky_radiance(const struct imp__skylight *s, int k,
 
 /* ---- Sun ------------------------------------------------------------------------- */
 
-/* At the middle of the disc, of whole turbidity t + 1. */
+/* Radiance at the middle of the disc for the whole turbidity t + 1. */
 static double sun_at(int t, int k, double elevation)
 {
     const double x = cbrt(elevation / (IMP_PI / 2)) * SUN_PIECES;
@@ -138,7 +138,7 @@ static double limb_at(int k, double cos_limb)
     return sum;
 }
 
-/* Of a sun that is darker towards its limb by limb[]. */
+/* Radiance of a sun that is darker towards its limb by limb[]. */
 static void sun_blend(double turbidity, double elevation,
                       const double limb[IMP_SKY_WAVES],
                       struct imp__sky_value out[IMP_SKY_WAVES])

@@ -12,8 +12,8 @@
  * whole turbidities and in the albedo. The radiance of the sun is a cubic of the elevation
  * in 45 pieces, darker towards its limb by a polynomial of the cosine there.
  *
- * The tables (skylight_tables.txt) are the authors', under their licence, which stands in
- * the file: of three colours, in units of luminance, and of eleven wavelengths, in
+ * The tables (skylight_tables.txt) are the authors', under their licence, which is in
+ * the file: for three colours, in units of luminance, and for eleven wavelengths, in
  * W m^-2 sr^-1 nm^-1. */
 #ifndef IMP_KIND_EMITTER_SKYLIGHT_H
 #define IMP_KIND_EMITTER_SKYLIGHT_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * sunsky: the clear sky of skylight.h with its sun, in the frame of Mitsuba's kind: z is up,
- * and the sun stands at sun_direction, or where it is at a place and a time. Below the
+ * and the sun is at sun_direction, or where a place and a time put it. Below the
  * horizon all is black.
  *
  *     L = sky_scale L_sky + sun_scale L_sun (r_0/r)^2 inside the disc of radius r
@@ -115,7 +115,7 @@ static void at_wave(const struct sunsky *s, const struct at *x, double turbidity
     }
 }
 
-/* Of colour c: the sky's tables are of colours, in units of luminance. */
+/* Sky and sun in colour c: the sky's tables are for colours, in units of luminance. */
 static void at_color(const struct sunsky *s, const struct at *x, double turbidity,
                      double albedo, int c, const struct imp__sky_value *sun,
                      struct both *out)

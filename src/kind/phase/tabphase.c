@@ -26,8 +26,9 @@ enum { VALUES_MAX = 1 << 16, NUMBERS = 24 };
 
 struct tabphase {
     int n;
-    double *value; /* [n] of a table that stands; NULL: the inputs are the values */
-    double *below; /* [n] of one that stands: the integral from -1 */
+    /* [n] of a table without parameters; NULL: the inputs are the values. */
+    double *value;
+    double *below; /* [n] of such a table: the integral from -1 */
 };
 
 #define VALUE(k)                                                                         \

@@ -25,7 +25,7 @@ struct imp_distortion {
 /* (x'', y''), and d(x'', y'')/d(x, y), which is symmetric: xx, xy, yy. */
 void imp__distort(const struct imp_distortion *d, const double at[2], double out[2],
                   double slope[3]);
-/* Its inverse, where the table stands. */
+/* Its inverse; the table must be filled. */
 void imp__undistort(const struct imp_distortion *d, const double seen[2], double out[2]);
 
 /* Fills the table for x'' in [lo[0], hi[0]], y'' in [lo[1], hi[1]], from k and p. False:

@@ -18,7 +18,8 @@ struct imp_projection {
 enum imp_status imp__sensor_place(const struct imp_build *b, struct imp_mat4 *m,
                                   struct imp_mat4 *inverse);
 
-/* to_world, near_clip, far_clip and focus_distance. `rigid`: a scale in to_world is an error (tolerance 1e-3). */
+/* to_world, near_clip, far_clip and focus_distance. `rigid`: a scale in to_world is an error
+ * (tolerance 1e-3). */
 enum imp_status imp__projection_build(const struct imp_build *b, bool rigid,
                                       struct imp_projection *out);
 
@@ -41,7 +42,7 @@ static inline void imp__projection_ray(const struct imp_projection *p, imp_v3 o,
     out->t_far = (p->far_clip - p->near_clip) * inv_z * length;
 }
 
-/* Of a camera whose rays through local point o run along (x, y, 1) - o/f. Without a lens
+/* The film of a camera whose rays through local point o run along (x, y, 1) - o/f. Without a lens
  * x = x0 + px dx, y = y0 + py dy, and solid angle and film area are
  *
  *     dw = |dx dy| cos(theta)^3 dpx dpy,    theta: the angle with the axis

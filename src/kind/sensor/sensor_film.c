@@ -71,7 +71,7 @@ static enum imp_status format_read(const struct imp_build *b, struct imp_film_de
         f->half = false;
     }
     if (b->mode == IMP_MONO && f->pixel_format != IMP_PIXEL_LUMINANCE_ALPHA)
-        f->pixel_format = IMP_PIXEL_LUMINANCE; /* alpha stays where it was asked for so */
+        f->pixel_format = IMP_PIXEL_LUMINANCE; /* alpha stays where it is written */
     if (component == 2)
         imp__warn(b->ctx, "film: component_format 'uint32' is written as float32");
 out:

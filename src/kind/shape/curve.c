@@ -179,7 +179,7 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit, const 
     surface_at(k, &at, &x, outward, out);
 }
 
-/* Of swept circles: on the ball at a joint of cones uv is one number for many points. */
+/* Swept circles: on the ball at a joint of cones one uv belongs to many points. */
 static void place(const struct imp_shape *s, const double uv[2], struct imp_surface *out,
                   int *prim)
 {

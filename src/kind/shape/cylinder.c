@@ -14,7 +14,7 @@ struct cylinder {
     imp_v3 base;            /* the middle of the end at p0 */
     struct imp_frame axes;  /* of (1) */
     struct imp_frame inner; /* rows of the inverse of axes: dot products with them are
-                               coordinates along axes. Of a circular one the same */
+                               coordinates along axes. For a circular one the same */
     double radius, length;
     double side; /* 1: the normal points outwards */
     bool oval;

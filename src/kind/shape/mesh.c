@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Triangle meshes, from files (`obj`, `ply`, `serialized`) or from calls (`mesh`), in world space after
- * build. A mirroring to_world or flip_normals reverses the winding, so that geometric and
- * shading normals agree (docs/scene-format.md 4.3, as Mitsuba 3.10). */
+ * Triangle meshes, from files (`obj`, `ply`, `serialized`) or from calls (`mesh`), in world
+ * space after build. A mirroring to_world or flip_normals reverses the winding, so that
+ * geometric and shading normals agree (docs/scene-format.md 4.3, as Mitsuba 3.10). */
 #include "math/warp.h"
 #include "mesh_triangle.h"
 #include <math.h>

@@ -11,7 +11,7 @@
 
 #define LEAST 32768 /* vertices that are worth a thread */
 
-/* Of all threads: each places a range, and the boxes of ranges add up to the shape's. */
+/* Shared by all threads: each places a range; the boxes of ranges make up the shape's. */
 struct placing {
     const struct imp_build *b;
     const struct imp_mesh_data *data;

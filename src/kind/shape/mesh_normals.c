@@ -44,9 +44,9 @@ static uint64_t position_hash(const float p[3])
 }
 
 /* A slot of the table is 0, or vertex + 1 in its lower bits and in those above, which no vertex
- * needs, bits of its hash: of a mesh of a million vertices 12. So nearly every vertex that is in
- * another's way is known for another without its position, which would come from memory. */
-#define AHEAD 16 /* vertices for whose slots memory is asked before they are needed */
+ * needs, bits of its hash: 12 bits for a mesh of a million vertices. So nearly every collision of
+ * different vertices is found without their positions, which would come from memory. */
+#define AHEAD 16 /* vertices whose slots are prefetched before they are needed */
 static inline size_t home(const struct normals *m, uint64_t hash)
 {
     return hash & (m->slots - 1);
@@ -72,7 +72,7 @@ static uint32_t place_find(const struct normals *m, size_t v, uint64_t hash, siz
     }
 }
 
-/* Those of the vertices whose hash says a slot from `first` to `end`. A range of all slots is
+/* Places of the vertices whose hash gives a slot from `first` to `end`. A range of all slots is
  * never full; a part of them is if somebody chose the vertices for it. */
 static enum imp_status places_find(size_t first, size_t end, void *payload)
 {
@@ -152,7 +152,7 @@ static inline imp_v3 four_weigh(const float *positions, const uint32_t index[12]
     return twice_area;
 }
 
-/* Of the places from `first` to `end`. */
+/* Adds normals, weighted by angles, at the places from `first` to `end`. */
 static enum imp_status angles_add(size_t first, size_t end, void *payload)
 {
     const struct normals *m = payload;

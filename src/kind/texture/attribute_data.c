@@ -2,7 +2,7 @@
  *
  * attribute: numbers of the vertices of a mesh, interpolated over its triangles, or of its
  * triangles. The reader of the mesh makes one for each of its attributes; no file writes
- * it. Numbers of three channels are a colour if the name says color; else they are read as
+ * it. Numbers of three channels are a colour if the name contains color; else they are read as
  * a vector in mode rgb, and as its luminance in the others, as in Mitsuba. */
 #include "color/rgb.h"
 #include "input.h"

@@ -73,7 +73,7 @@ static enum imp_status data_convert(const struct imp_build *b,
     return IMP_OK;
 }
 
-/* Another input may ask first, or texels be set. */
+/* Another input may be the first that reads it, or texels be set. */
 static void changed(const struct imp_texture *tex)
 {
     struct bitmap *t = tex->self;

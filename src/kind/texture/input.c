@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What an input is at a point, and the two derivatives of that. Between the lanes of a
- * walk and the numbers of a parameter stands a map: with colours lane c is number c, or
+ * What an input is at a point, and the two derivatives of that. A map leads from
+ * the numbers of a parameter to the lanes of a walk: with colours lane c is number c, or
  * all lanes are one number; with wavelengths a lane is a weighted sum of neighbouring
  * samples of a spectrum. */
 #include "input.h"
@@ -33,7 +33,7 @@ static imp_spec mean(double r, double g, double b) { return imp__spec((r + g + b
 
 /* ---- Wavelengths ----------------------------------------------------------------- */
 
-/* Is a colour asked for as one number? Then it is the number of the mode rgb, whatever
+/* Is a colour read as one number? Then it is the number of the mode rgb, whatever
  * walks carry; a scalar input that is a spectrum has a number at each wavelength. */
 static bool as_number(const struct imp_input *input, bool scalar)
 {
@@ -77,8 +77,8 @@ static void spectrum_tangent(const struct imp_input *input, const struct imp_car
     for (int k = c->n; k < 4; k++) (*value_dot)[k] = (*value_dot)[0];
 }
 
-/* As a colour, though the mode has spectra: luminances ask so, and numbers made of
- * colours. The colour is that of imp__color_preview. */
+/* As a colour, though the mode has spectra: luminances are read so, and numbers
+ * made of colours. The colour is that of imp__color_preview. */
 static bool by_colour(const struct imp_input *input, const struct imp_texcoord *at,
                       bool scalar)
 {
@@ -297,7 +297,7 @@ static double luminance_of(const struct imp_input *colour, imp_spec weight,
 }
 
 /* Takes what a colour's numbers get through a luminance: all of it belongs to the lane of
- * the picture that asked, whichever number it goes to. */
+ * the picture whose derivative it is, whichever number it goes to. */
 struct one_lane {
     struct imp_sink sink; /* first */
     struct imp_sink *to;

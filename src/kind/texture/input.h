@@ -8,8 +8,8 @@
 #include "kind/build.h"
 
 /* Transpose of reading three numbers (element, +1, +2) as their luminance. Three
- * additions of one number each: every lane of `bar` stays in its lane, as sinks that tell
- * channels apart need it. */
+ * additions of one number each: every lane of `bar` stays in its lane, as sinks that
+ * separate channels need it. */
 void imp__luminance_scatter(struct imp_sink *sink, int param, size_t element,
                             imp_spec bar);
 
