@@ -214,12 +214,19 @@ enum imp_status imp_field_samples_vjp(const imp_field *f, const double *theta_ba
 
 /* ---- Levels -------------------------------------------------------------------- */
 
+/* Nodes of the grid whose cells are half as large; true: splines. */
+static bool fine_nodes(const struct imp__grid *g, int nodes[3])
+{
+    const bool spline = g->desc.interp == IMP_FIELD_SPLINE;
+    for (int k = 0; k < 3; k++) nodes[k] = 2 * g->desc.cells[k] + (spline ? 3 : 1);
+    return spline;
+}
+
 enum imp_status imp__grid_prolong(const imp_field *f, const double *coarse, double *fine)
 {
     const struct imp__grid *g = (const struct imp__grid *)f;
-    const bool spline = g->desc.interp == IMP_FIELD_SPLINE;
     int nodes[3];
-    for (int k = 0; k < 3; k++) nodes[k] = 2 * g->desc.cells[k] + (spline ? 3 : 1);
+    const bool spline = fine_nodes(g, nodes);
     return along_axes(f->ctx, spline ? line_refine_spline : line_refine_linear, g->nodes,
                       nodes, coarse, fine);
 }
@@ -256,9 +263,8 @@ enum imp_status imp_field_refine_vjp(const imp_field *f, const double *fine_bar,
     IMP_FLOAT_MODE;
     const struct imp__grid *g = grid_of(f, &st);
     if (st != IMP_OK) return st;
-    const bool spline = g->desc.interp == IMP_FIELD_SPLINE;
     int fine[3];
-    for (int k = 0; k < 3; k++) fine[k] = 2 * g->desc.cells[k] + (spline ? 3 : 1);
+    const bool spline = fine_nodes(g, fine);
     IMP_FINITE_ALL(f->ctx, fine_bar, (size_t)fine[0] * (size_t)fine[1] * (size_t)fine[2],
                    "fine_bar");
     return along_axes(f->ctx, spline ? line_refine_spline_vjp : line_refine_linear_vjp,

@@ -58,30 +58,38 @@ static void turn_back(struct imp__adjoint_slot *slot, const struct imp__surface 
     surface_bar(slot, s, x, 0, n_bar, curved, e2_bar);
 }
 
-/* Adjoint of a fractional step: (lam, mu, path_bar) at its end -> at its start. `from` is
- * the state at the start, `v_in` the momentum at the end. */
+/* A fractional step of length tau that ends on a surface: the state at its start, the place
+ * and the momentum at its end. */
+struct landing {
+    const struct imp__surface *surface;
+    struct imp__state from;
+    double tau;
+    imp_v3 x, v_in;
+};
+
+/* Adjoint of a fractional step: (lam, mu, path_bar) at its end -> at its start. */
 static void land_back(const struct imp__plan *p, struct imp__adjoint_slot *slot,
-                      const struct imp__surface *s, const struct imp__state *from,
-                      double tau, imp_v3 x, imp_v3 v_in, imp_v3 *lam, imp_v3 *mu,
-                      double path_bar, struct imp__bar *theta_bar)
+                      const struct landing *l, imp_v3 *lam, imp_v3 *mu, double path_bar,
+                      struct imp__bar *theta_bar)
 {
-    struct imp__state at = *from, rate;
+    const struct imp__surface *s = l->surface;
+    struct imp__state at = l->from, rate;
     struct imp__surface_at sa;
-    imp__step_rate(p->scheme, p->field, tau, &at, &rate);
-    imp__surface_eval(s, &x, &v_in, &sa);
+    imp__step_rate(p->scheme, p->field, l->tau, &at, &rate);
+    imp__surface_eval(s, &l->x, &l->v_in, &sa);
     const double below = imp__dot(sa.gx, rate.x) + imp__dot(sa.gv, rate.v);
     const double above =
         imp__dot(*lam, rate.x) + imp__dot(*mu, rate.v) + path_bar * rate.path;
     const double rho = below != 0 ? above / below : 0;
     struct imp__back b;
-    b.x[0] = x, b.v[0] = v_in;
+    b.x[0] = l->x, b.v[0] = l->v_in;
     b.lam[0] = *lam - rho * sa.gx;
     b.mu[0] = *mu - rho * sa.gv;
     b.path_bar[0] = path_bar;
-    if (slot) surface_bar(slot, s, x, rho, (imp_v3){0}, (imp_v3){0}, 0);
-    const struct imp__state *before[1] = {p->options.way == IMP_BEND_STORED ? from
-                                                                            : NULL};
-    imp__step_adjoint(p->scheme, p->field, tau, 1, &b, before, theta_bar);
+    if (slot) surface_bar(slot, s, l->x, rho, (imp_v3){0}, (imp_v3){0}, 0);
+    const bool stored = p->options.way == IMP_BEND_STORED;
+    const struct imp__state *before[1] = {stored ? &l->from : NULL};
+    imp__step_adjoint(p->scheme, p->field, l->tau, 1, &b, before, theta_bar);
     *lam = b.lam[0];
     *mu = b.mu[0];
 }
@@ -116,8 +124,8 @@ static void segment_begin(const struct imp__plan *p, struct imp__adjoint_slot *s
                           struct imp__bar *theta_bar)
 {
     const struct imp__segment *g = &l->track->segment[l->segment];
-    land_back(p, slot, g->surface, &g->from, g->tau, g->at.x, g->at.v, &b->lam[i],
-              &b->mu[i], b->path_bar[i], theta_bar);
+    const struct landing landing = {g->surface, g->from, g->tau, g->at.x, g->at.v};
+    land_back(p, slot, &landing, &b->lam[i], &b->mu[i], b->path_bar[i], theta_bar);
     b->x[i] = g->from.x;
     b->v[i] = g->from.v;
     l->left = g->steps;
@@ -175,12 +183,11 @@ enum imp_status imp__lane_begin(const struct imp__adjoint *job,
         segment_begin(p, slot, l, b, i, theta_bar);
         return IMP_OK;
     }
-    struct imp__state from = {x, v_in, 0};
-    reverse_landing(p, e->tau, &from);
-    land_back(p, slot, s, &from, e->tau, x, v_in, &b->lam[i], &b->mu[i], b->path_bar[i],
-              theta_bar);
-    b->x[i] = from.x;
-    b->v[i] = from.v;
+    struct landing landing = {s, {x, v_in, 0}, e->tau, x, v_in};
+    reverse_landing(p, e->tau, &landing.from);
+    land_back(p, slot, &landing, &b->lam[i], &b->mu[i], b->path_bar[i], theta_bar);
+    b->x[i] = landing.from.x;
+    b->v[i] = landing.from.v;
     l->left = e->steps;
     return IMP_OK;
 }
@@ -196,11 +203,13 @@ void imp__lane_taps(const struct imp__adjoint *job, struct imp__lane *l,
         if ((t->flags & IMP_BEND_TAP_MISSED) || t->steps != l->left ||
             t->segments != l->segment + 1)
             continue;
-        const struct imp__state from = {b->x[i], b->v[i], 0};
+        const struct landing landing = {&p->taps[k],
+                                        {b->x[i], b->v[i], 0},
+                                        t->tau,
+                                        imp__v3_load(t->x),
+                                        imp__v3_load(t->v)};
         imp_v3 lam = imp__v3_load(bar->x), mu = imp__v3_load(bar->v);
-        const imp_v3 x = imp__v3_load(t->x), v = imp__v3_load(t->v);
-        land_back(p, NULL, &p->taps[k], &from, t->tau, x, v, &lam, &mu, bar->path,
-                  theta_bar);
+        land_back(p, NULL, &landing, &lam, &mu, bar->path, theta_bar);
         b->lam[i] += lam;
         b->mu[i] += mu;
         b->path_bar[i] += bar->path;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * Checks options and prepares tracing: chooses the step, sorts surfaces by group, splits
  * boxes into faces. */
 #include "bend_rays.h"
@@ -9,6 +10,48 @@
 #define GROUPS_MAX        65535
 #define SURFACES_MAX      60000
 
+/* The faces of a box, planes that differ from s in normal and offset. */
+static enum imp_status box_faces(imp_context *ctx, const struct imp_bend_surface *in,
+                                 const struct imp__surface *s, struct imp__surface out[6])
+{
+    for (int k = 0; k < 3; k++) {
+        if (!(in->hi[k] > in->lo[k]))
+            return imp__error(ctx, IMP_E_ARG,
+                              "surface %d: empty box, %g to %g along axis %d", s->id,
+                              in->lo[k], in->hi[k], k);
+        for (int side = 0; side < 2; side++) {
+            struct imp__surface *face = &out[2 * k + side];
+            *face = *s;
+            face->n = (imp_v3){0};
+            face->n[k] = side ? 1 : -1;
+            face->offset = side ? in->hi[k] : -in->lo[k];
+        }
+    }
+    return IMP_OK;
+}
+
+/* Unit normal, and the offset with it; that of a disc is its centre's. */
+static enum imp_status normal_set(imp_context *ctx, const struct imp_bend_surface *in,
+                                  struct imp__surface *s)
+{
+    const double length = imp__length(s->n);
+    if (!(length > 0) || !isfinite(length))
+        return imp__error(ctx, IMP_E_ARG, "surface %d: the normal has no direction",
+                          s->id);
+    s->n *= 1 / length;
+    s->offset /= length;
+    if (in->type == IMP_BEND_DISC) s->offset = imp__dot(s->n, s->c);
+    return IMP_OK;
+}
+
+static enum imp_status radius_check(imp_context *ctx, const struct imp_bend_surface *in,
+                                    int id)
+{
+    if (in->radius > 0 && isfinite(in->radius)) return IMP_OK;
+    return imp__error(ctx, IMP_E_ARG, "surface %d: radius %g", id, in->radius);
+}
+
+/* One surface, or the *n = 6 faces of a box. */
 static enum imp_status surface_make(imp_context *ctx, const struct imp_bend_surface *in,
                                     int id, struct imp__surface out[6], int *n)
 {
@@ -20,70 +63,42 @@ static enum imp_status surface_make(imp_context *ctx, const struct imp_bend_surf
     if ((int)in->type < 0 || in->type > IMP_BEND_MESH || (int)in->event < 0 ||
         in->event > IMP_BEND_STOP)
         return imp__error(ctx, IMP_E_ARG, "surface %d: no such type or event", id);
-    struct imp__surface s = {.kind = kinds[in->type],
-                             .event = in->event,
-                             .id = id,
-                             .n = imp__v3_load(in->normal),
-                             .c = imp__v3_load(in->centre),
-                             .offset = in->offset,
-                             .radius = in->radius,
-                             .index = in->index,
-                             .sdf = in->sdf,
-                             .scene = in->scene};
-    const double length = imp__length(s.n);
-    *n = 1;
+    const struct imp__surface s = {.kind = kinds[in->type],
+                                   .event = in->event,
+                                   .id = id,
+                                   .n = imp__v3_load(in->normal),
+                                   .c = imp__v3_load(in->centre),
+                                   .offset = in->offset,
+                                   .radius = in->radius,
+                                   .index = in->index,
+                                   .sdf = in->sdf,
+                                   .scene = in->scene};
     if (in->event == IMP_BEND_REFRACT && !(in->index > 0 && isfinite(in->index)))
         return imp__error(ctx, IMP_E_ARG, "surface %d: index %g outside is not positive",
                           id, in->index);
     if (!imp__is_finite(s.c) || !isfinite(s.offset))
         return imp__error(ctx, IMP_E_ARG, "surface %d: not finite", id);
+    *n = 1;
+    out[0] = s;
     switch (in->type) {
-    case IMP_BEND_PLANE:
+    case IMP_BEND_PLANE: return normal_set(ctx, in, &out[0]);
     case IMP_BEND_DISC:
     case IMP_BEND_CYLINDER:
-        if (!(length > 0) || !isfinite(length))
-            return imp__error(ctx, IMP_E_ARG, "surface %d: the normal has no direction",
-                              id);
-        s.n *= 1 / length;
-        s.offset /= length;
-        if (in->type == IMP_BEND_DISC) s.offset = imp__dot(s.n, s.c);
-        if (in->type == IMP_BEND_PLANE) break;
-        /* fall through */
-    case IMP_BEND_SPHERE:
-        if (!(in->radius > 0) || !isfinite(in->radius))
-            return imp__error(ctx, IMP_E_ARG, "surface %d: radius %g", id, in->radius);
-        break;
-    case IMP_BEND_BOX:
-        *n = 6;
-        for (int k = 0; k < 3; k++) {
-            if (!(in->hi[k] > in->lo[k]))
-                return imp__error(ctx, IMP_E_ARG,
-                                  "surface %d: empty box, %g to %g along axis %d", id,
-                                  in->lo[k], in->hi[k], k);
-            for (int side = 0; side < 2; side++) {
-                struct imp__surface *face = &out[2 * k + side];
-                *face = s;
-                face->n = (imp_v3){0};
-                face->n[k] = side ? 1 : -1;
-                face->offset = side ? in->hi[k] : -in->lo[k];
-            }
-        }
-        return IMP_OK;
+        IMP_CHECKED(normal_set(ctx, in, &out[0]));
+        return radius_check(ctx, in, id);
+    case IMP_BEND_SPHERE: return radius_check(ctx, in, id);
+    case IMP_BEND_BOX: *n = 6; return box_faces(ctx, in, &s, out);
     case IMP_BEND_SDF:
-        if (!in->sdf)
-            return imp__error(ctx, IMP_E_ARG, "surface %d: no distance field", id);
-        break;
+        if (in->sdf) return IMP_OK;
+        return imp__error(ctx, IMP_E_ARG, "surface %d: no distance field", id);
     case IMP_BEND_APPROACH:
-        if (in->event != IMP_BEND_END)
-            return imp__error(ctx, IMP_E_ARG,
-                              "surface %d: rays end at a closest approach", id);
-        break;
+        if (in->event == IMP_BEND_END) return IMP_OK;
+        return imp__error(ctx, IMP_E_ARG, "surface %d: rays end at a closest approach",
+                          id);
     case IMP_BEND_MESH:
-        if (!in->scene || in->scene->n_shapes == 0)
-            return imp__error(ctx, IMP_E_ARG, "surface %d: no scene with shapes", id);
-        break;
+        if (in->scene && in->scene->n_shapes > 0) return IMP_OK;
+        return imp__error(ctx, IMP_E_ARG, "surface %d: no scene with shapes", id);
     }
-    out[0] = s;
     return IMP_OK;
 }
 
