@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Inputs of objects: constants, which become parameters, and textures. */
+#include "base/arguments.h"
 #include "base/required.h"
 #include "color/convert.h"
 #include "color/rgb.h"
@@ -155,115 +156,149 @@ static enum imp_status outside_of(imp_context *ctx, const struct imp_node *objec
                            p ? p->name : "", p ? ": " : "", d->name, v, d->lo, hi);
 }
 
+/* Tags and flags of a child that is to be the texture of an input. */
+static enum imp_status texture_allowed(imp_context *ctx, const struct imp_node *child,
+                                       bool spectrum, const struct imp_input_desc *d)
+{
+    const bool volume = d->flags & IMP_INPUT_VOLUME;
+    if (strcmp(child->tag, volume ? "volume" : "texture") != 0 && !spectrum)
+        return imp__node_error(ctx, child, IMP_E_SCENE,
+                               "'%s' must be a number, a colour or a %s", d->name,
+                               volume ? "volume" : "texture");
+    if (d->flags & IMP_INPUT_NUMBER)
+        return imp__node_error(
+            ctx, child, IMP_E_SCENE, "'%s' must be a %s, not a texture", d->name,
+            d->flags & IMP_INPUT_SCALAR ? "number" : "number or a colour");
+    return IMP_OK;
+}
+
+/* An input that is looked up: the texture is made, and its texels are kept in bounds. */
+static enum imp_status texture_input(struct imp_scene *scene, struct imp_node *node,
+                                     struct imp_node *child, const char *name,
+                                     const struct imp_input_desc *d, struct imp_input *in)
+{
+    imp_context *ctx = scene->ctx;
+    const bool bump = d->flags & IMP_INPUT_BUMP, spectrum = is_spectrum(ctx, child);
+    struct imp_texture *t;
+    if (spectrum && child->n_children) child->children[0].name = "nested_texture";
+    IMP_CHECKED(texture_allowed(ctx, child, spectrum, d));
+    in->vector = d->flags & IMP_INPUT_VECTOR;
+    in->bump = bump;
+    if (bump) {
+        double scale;
+        IMP_CHECKED(imp__props_float(ctx, node, "scale", 1, &scale));
+        in->value = imp__spec(scale);
+    }
+    if (child->object && in->vector != child->vector && scene->mode == IMP_MONO)
+        return imp__node_error(ctx, child, IMP_E_SCENE,
+                               "is a colour in one place and a vector in another: "
+                               "in mono mode each needs a texture of its own");
+    if (!child->object) child->vector = in->vector;
+    IMP_CHECKED(imp__build_texture(scene, child, name, d->name, d, &t));
+    in->texture = t;
+    if (bump && !t->ops->slope)
+        return imp__node_error(ctx, child, IMP_E_UNSUPPORTED,
+                               "the slope of such a texture is not known: it raises "
+                               "nothing");
+    if (d->flags & IMP_INPUT_FIXED) imp__build_fix(scene, in);
+    imp__build_texels_bound(scene, t->param, d);
+    return d->flags & IMP_INPUT_VOLUME ? volume_check(scene, child, t, d) : IMP_OK;
+}
+
+/* A constant input as the scene writes it: a property, or an object that is a colour. */
+struct written {
+    struct imp_node *node;
+    struct imp_prop *prop;   /* NULL: none */
+    struct imp_child *child; /* NULL: none */
+    bool object;             /* the child is a colour */
+};
+
+/* The numbers of a constant are within the bounds of its input; those of a formula have
+ * none. */
+static enum imp_status numbers_check(imp_context *ctx, const struct written *w,
+                                     const struct imp_input_desc *d,
+                                     const struct imp__color *color)
+{
+    const size_t n = formula(color->spectrum) ? 0
+                     : color->spectrum        ? color->spectrum->n
+                                              : (size_t)color->count;
+    const bool unbounded = (d->lo == 0 && d->hi == 0) || d->flags & IMP_INPUT_SOFT;
+    const double hi = unbounded ? INFINITY : d->hi;
+    for (size_t k = 0; k < n; k++) {
+        const double v = color->spectrum ? color->spectrum->value[k] : color->value[k];
+        if (isfinite(v) && v >= d->lo && v <= hi) continue;
+        if (w->object) return outside_of(ctx, w->child->node, d, v, hi);
+        return imp__prop_error(
+            ctx, w->node, w->prop, IMP_E_SCENE, "%s = %g is outside [%g, %g]",
+            w->prop && w->prop->of ? w->prop->of : d->name, v, d->lo, hi);
+    }
+    return IMP_OK;
+}
+
+/* A constant, written or by default; it becomes a parameter, unless it is an optional one
+ * that is not there. */
+static enum imp_status constant_input(struct imp_scene *scene, const struct written *w,
+                                      const char *name, const struct imp_input_desc *d,
+                                      struct imp_input *in)
+{
+    imp_context *ctx = scene->ctx;
+    struct imp__color color = {.count = 1};
+    struct imp__color_ask ask = {.ctx = ctx,
+                                 .arena = &scene->arena,
+                                 .mode = scene->mode,
+                                 .role = d->role,
+                                 .scalar = in->scalar,
+                                 .any_size = d->flags & IMP_INPUT_EXTINCTION,
+                                 .linear =
+                                     scene->linear_colors || d->flags & IMP_INPUT_LINEAR};
+    if (w->prop) {
+        w->prop->used = true;
+        IMP_CHECKED(imp__color_convert(&ask, w->node, w->prop, &color));
+    } else if (w->object) {
+        w->child->used = true;
+        IMP_CHECKED(imp__color_object(&ask, w->child->node, &color));
+    } else if (d->flags & IMP_INPUT_REQUIRED) {
+        return imp__node_missing(ctx, w->node, d->name);
+    } else {
+        if (in->scalar) ask.role = IMP_REFLECTANCE;
+        IMP_CHECKED(imp__color_default(&ask, d->fallback, &color));
+    }
+    in->value = color.value;
+    in->count = color.count;
+    in->spectrum = color.spectrum;
+    const bool there = w->prop || w->object;
+    if (!there && d->flags & IMP_INPUT_OPTIONAL) return IMP_OK;
+    IMP_CHECKED(numbers_check(ctx, w, d, &color));
+    IMP_CHECKED(param_add(scene, name, d, &color, in));
+    if (w->prop) w->prop->theta = true;
+    else if (w->object) w->child->theta = true;
+    return IMP_OK;
+}
+
 static enum imp_status input_build(struct imp_scene *scene, struct imp_node *node,
                                    const char *name, const struct imp_input_desc *d,
                                    struct imp_input *in)
 {
-    imp_context *ctx = scene->ctx;
-    enum imp_status st = IMP_OK;
-    const bool scalar = d->flags & IMP_INPUT_SCALAR;
-    struct imp_prop *prop = imp__node_prop(node, d->name);
-    struct imp_child *child = imp__node_child(node, d->name);
-    struct imp__color color = {.count = 1};
-    const struct imp_node *object = NULL; /* that the colour was written as */
-    bool absent_here = false;
-    const struct imp__color_ask ask = {.ctx = ctx,
-                                       .arena = &scene->arena,
-                                       .mode = scene->mode,
-                                       .role = d->role,
-                                       .scalar = scalar,
-                                       .any_size = d->flags & IMP_INPUT_EXTINCTION,
-                                       .linear = scene->linear_colors ||
-                                                 d->flags & IMP_INPUT_LINEAR};
-    *in = (struct imp_input){.param = -1, .scalar = scalar};
+    *in = (struct imp_input){.param = -1, .scalar = d->flags & IMP_INPUT_SCALAR};
     if (d->flags & (IMP_INPUT_LUMINANCE | IMP_INPUT_WAVELENGTH)) {
         in->count = 1;
         if (d->flags & IMP_INPUT_WAVELENGTH) in->spectrum = &imp__wavelength;
         return IMP_OK;
     }
+    struct written w = {.node = node,
+                        .prop = imp__node_prop(node, d->name),
+                        .child = imp__node_child(node, d->name)};
     imp__node_ask(node, d->name);
-
-    const bool bump = d->flags & IMP_INPUT_BUMP;
-    if ((bump || d->flags & IMP_INPUT_VECTOR) &&
-        (prop || (child && imp__color_is_object(child->node))))
-        IMP_TRY(imp__prop_error(ctx, node, prop, IMP_E_SCENE, "'%s' must be a texture",
-                                d->name));
-    if (prop) {
-        prop->used = true;
-        IMP_TRY(imp__color_convert(&ask, node, prop, &color));
-    } else if (child && imp__color_is_object(child->node)) {
-        child->used = true;
-        object = child->node;
-        IMP_TRY(imp__color_object(&ask, child->node, &color));
-    } else if (child) {
-        struct imp_texture *t;
-        child->used = true;
-        const bool spectrum = is_spectrum(ctx, child->node);
-        if (spectrum && child->node->n_children)
-            child->node->children[0].name = "nested_texture";
-        const bool volume = d->flags & IMP_INPUT_VOLUME;
-        if (strcmp(child->node->tag, volume ? "volume" : "texture") != 0 && !spectrum)
-            IMP_TRY(imp__node_error(ctx, child->node, IMP_E_SCENE,
-                                    "'%s' must be a number, a colour or a %s", d->name,
-                                    volume ? "volume" : "texture"));
-        if (d->flags & IMP_INPUT_NUMBER)
-            IMP_TRY(imp__node_error(ctx, child->node, IMP_E_SCENE,
-                                    "'%s' must be a %s, not a texture", d->name,
-                                    scalar ? "number" : "number or a colour"));
-        in->vector = d->flags & IMP_INPUT_VECTOR;
-        in->bump = bump;
-        if (bump) {
-            double scale;
-            IMP_TRY(imp__props_float(ctx, node, "scale", 1, &scale));
-            in->value = imp__spec(scale);
-        }
-        if (child->node->object && in->vector != child->node->vector &&
-            scene->mode == IMP_MONO)
-            IMP_TRY(imp__node_error(ctx, child->node, IMP_E_SCENE,
-                                    "is a colour in one place and a vector in another: "
-                                    "in mono mode each needs a texture of its own"));
-        if (!child->node->object) child->node->vector = in->vector;
-        IMP_TRY(imp__build_texture(scene, child->node, name, d->name, d, &t));
-        in->texture = t;
-        if (bump && !t->ops->slope)
-            IMP_TRY(imp__node_error(ctx, child->node, IMP_E_UNSUPPORTED,
-                                    "the slope of such a texture is not known: it raises "
-                                    "nothing"));
-        if (d->flags & IMP_INPUT_FIXED) imp__build_fix(scene, in);
-        imp__build_texels_bound(scene, t->param, d);
-        if (volume) IMP_TRY(volume_check(scene, child->node, t, d));
-        return IMP_OK;
-    } else if (d->flags & IMP_INPUT_REQUIRED) {
-        IMP_TRY(imp__node_missing(ctx, node, d->name));
-    } else {
-        struct imp__color_ask absent = ask;
-        if (scalar) absent.role = IMP_REFLECTANCE;
-        IMP_TRY(imp__color_default(&absent, d->fallback, &color));
-        absent_here = d->flags & IMP_INPUT_OPTIONAL;
+    w.object = w.child && imp__color_is_object(w.child->node);
+    if (d->flags & (IMP_INPUT_BUMP | IMP_INPUT_VECTOR) && (w.prop || w.object))
+        return imp__prop_error(scene->ctx, node, w.prop, IMP_E_SCENE,
+                               "'%s' must be a texture", d->name);
+    if (!w.prop && w.child && !w.object) {
+        w.child->used = true;
+        return texture_input(scene, node, w.child->node, name, d, in);
     }
-    in->value = color.value;
-    in->count = color.count;
-    in->spectrum = color.spectrum;
-    if (absent_here) return IMP_OK;
-    const size_t n_numbers = formula(color.spectrum) ? 0
-                             : color.spectrum        ? color.spectrum->n
-                                                     : (size_t)color.count;
-    for (size_t k = 0; k < n_numbers; k++) {
-        const bool unbounded = (d->lo == 0 && d->hi == 0) || d->flags & IMP_INPUT_SOFT;
-        const double v = color.spectrum ? color.spectrum->value[k] : in->value[k];
-        const double hi = unbounded ? INFINITY : d->hi;
-        if (!isfinite(v) || v < d->lo || v > hi)
-            IMP_TRY(object ? outside_of(ctx, object, d, v, hi)
-                           : imp__prop_error(ctx, node, prop, IMP_E_SCENE,
-                                             "%s = %g is outside [%g, %g]",
-                                             prop && prop->of ? prop->of : d->name, v,
-                                             d->lo, hi));
-    }
-    IMP_TRY(param_add(scene, name, d, &color, in));
-    if (prop) prop->theta = true;
-    else if (child) child->theta = true;
-out:
-    return st;
+    w.object &= !w.prop;
+    return constant_input(scene, &w, name, d, in);
 }
 
 enum imp_status imp__build_inputs(struct imp_scene *scene, struct imp_node *node,

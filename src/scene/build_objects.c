@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Builds emitters, shapes and sensors. Each is built once, where it first appears in
- * document order, however many references it has. */
+ * Builds emitters and sensors. Each is built once, where it first appears in document order,
+ * however many references it has. */
 #include "kind/sensor/sensor_film.h"
 #include "kind/sensor/sensor_response.h"
 #include "kind/shape/shape.h"
-#include "kind/texture/mesh_attribute.h"
-#include "priorities.h"
 #include "scene_build.h"
 
 /* The medium that a sensor or a light names; NULL: none. */
@@ -95,138 +93,6 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     if (shape) shape->emitter = e->index;
     IMP_TRY(
         imp__build_list_add(scene, (void ***)&scene->emitters, &scene->n_emitters, e));
-out:
-    return st;
-}
-
-enum imp_status imp__build_shape_bare(struct imp_scene *scene, struct imp_node *node,
-                                      const char *name, struct imp_shape **out)
-{
-    enum imp_status st = IMP_OK;
-    imp_context *ctx = scene->ctx;
-    const void *found;
-    IMP_TRY(imp__kind_find(ctx, IMP_CONCEPT_SHAPE, node, &found));
-    const struct imp_shape_ops *ops = found;
-    struct imp_shape *s = imp__arena_array(&scene->arena, 1, sizeof *s);
-    void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
-    if (!s || !self) IMP_TRY(imp__build_no_memory(scene));
-    *s = (struct imp_shape){
-        .ops = ops, .self = self, .index = -1, .bsdf = -1, .emitter = -1, .name = name};
-    /* Has a say in gradients of geometry only; there are none yet. */
-    double silhouette;
-    IMP_TRY(imp__props_float(ctx, node, "silhouette_sampling_weight", 1, &silhouette));
-    const struct imp_build b = imp__build_make(scene, node);
-    IMP_TRY(ops->build(&b, self, s));
-    IMP_TRY(imp__props_finish(ctx, node));
-    for (int k = 0; k < 3; k++)
-        if (!(s->lo[k] > -IMP_REACH_MAX && s->hi[k] < IMP_REACH_MAX))
-            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "reaches further out than %g",
-                                    IMP_REACH_MAX));
-    *out = s;
-out:
-    return st;
-}
-
-enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
-                                 const char *name)
-{
-    enum imp_status st = IMP_OK;
-    imp_context *ctx = scene->ctx;
-    struct imp_shape *s;
-    int64_t priority;
-    IMP_TRY(imp__proxies_take(scene, node, name));
-    IMP_TRY(imp__props_int(ctx, node, "priority", 0, 0, IMP_PRIORITY_MAX, &priority));
-
-    struct imp_node *bsdf = NULL, *emitter = NULL, *sensor = NULL;
-    struct imp_node *side[2] = {NULL, NULL};
-    for (size_t i = 0; i < node->n_children; i++) {
-        struct imp_child *c = &node->children[i];
-        const char *tag = c->node->tag;
-        if (strcmp(tag, "bsdf") == 0) {
-            if (bsdf) IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "has two bsdfs"));
-            bsdf = c->node;
-        } else if (strcmp(tag, "emitter") == 0) {
-            if (emitter)
-                IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "has two emitters"));
-            emitter = c->node;
-        } else if (strcmp(tag, "medium") == 0) {
-            const bool out = c->name && strcmp(c->name, "exterior") == 0;
-            if (!out && (!c->name || strcmp(c->name, "interior") != 0))
-                IMP_TRY(imp__node_error(ctx, c->node, IMP_E_SCENE,
-                                        "a shape's medium is named interior or "
-                                        "exterior"));
-            if (side[out])
-                IMP_TRY(imp__node_error(ctx, c->node, IMP_E_SCENE,
-                                        "the shape has another %s", c->name));
-            side[out] = c->node;
-        } else if (strcmp(tag, "sensor") == 0) {
-            if (sensor)
-                IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "has two sensors"));
-            sensor = c->node;
-        } else if (strcmp(tag, "texture") != 0 || !c->name ||
-                   !imp__attribute_name(c->name)) {
-            continue;
-        }
-        c->used = true;
-    }
-    IMP_TRY(imp__build_shape_bare(scene, node, name, &s));
-    IMP_TRY(imp__build_shape_attributes(scene, node, s));
-    s->index = scene->n_shapes;
-    s->priority = (int)priority;
-    node->object = s;
-
-    if (!bsdf && !emitter) { /* as if <bsdf type="diffuse"/> had been written */
-        bsdf = imp__node_create(&scene->arena, "bsdf", "diffuse", NULL, NULL, node->loc);
-        if (!bsdf) IMP_TRY(imp__build_no_memory(scene));
-    }
-    if (bsdf) {
-        struct imp_bsdf *made;
-        IMP_TRY(imp__build_bsdf(scene, bsdf, name, "bsdf", &made));
-        s->bsdf = made->index;
-    } else {
-        s->bsdf = -2;
-    }
-    IMP_TRY(imp__build_bumps_survey(scene, node, s));
-    if ((side[0] || side[1] || priority) && s->geometry == IMP_CURVES)
-        IMP_TRY(imp__prop_error(
-            ctx, node, imp__node_prop(node, "priority"), IMP_E_UNSUPPORTED,
-            "a medium, and a priority, needs a surface that is met "
-            "from both sides, and curves are met from outside alone"));
-    if (side[1] && strcmp(side[1]->type, "graded") == 0)
-        IMP_TRY(imp__node_error(ctx, side[1], IMP_E_UNSUPPORTED,
-                                "a graded medium fills the interior of a shape"));
-    if (side[0] && strcmp(side[0]->type, "graded") == 0) {
-        if (bsdf && (imp__props_has(bsdf, "int_ior") || imp__props_has(bsdf, "ext_ior")))
-            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
-                                    "the index inside is its medium's, the one outside "
-                                    "the medium's outside_index: the bsdf has no "
-                                    "int_ior and no ext_ior"));
-        IMP_TRY(imp__build_body(scene, side[0], name, &s->body));
-    } else if (side[0]) {
-        IMP_TRY(imp__build_medium(scene, side[0], name, "interior", &s->interior));
-    }
-    if (side[1])
-        IMP_TRY(imp__build_medium(scene, side[1], name, "exterior", &s->exterior));
-    if (emitter || sensor) IMP_TRY(imp__shape_measure(ctx, &scene->arena, s));
-    if (emitter) {
-        if (!(s->area > 0))
-            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
-                                    "has an emitter, but no area to emit from"));
-        IMP_TRY(imp__build_emitter(scene, emitter, name, "emitter", s));
-    }
-    if (sensor && emitter)
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
-                                "has an emitter and a sensor; put them on two shapes"));
-    if (sensor) {
-        const char *sensor_name = imp__build_object_name(scene, sensor, name, "sensor");
-        if (!sensor_name) IMP_TRY(imp__build_no_memory(scene));
-        IMP_TRY(imp__build_sensor(scene, sensor, sensor_name, s));
-    }
-    IMP_TRY(imp__build_list_add(scene, (void ***)&scene->shapes, &scene->n_shapes, s));
-    scene->lo = (imp_v3){fmin(scene->lo[0], s->lo[0]), fmin(scene->lo[1], s->lo[1]),
-                         fmin(scene->lo[2], s->lo[2]), 0};
-    scene->hi = (imp_v3){fmax(scene->hi[0], s->hi[0]), fmax(scene->hi[1], s->hi[1]),
-                         fmax(scene->hi[2], s->hi[2]), 0};
 out:
     return st;
 }
