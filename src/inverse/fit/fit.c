@@ -163,6 +163,73 @@ static enum imp_status clipped_searches(struct imp__fit *f,
     }
 }
 
+/* The search of a fit, from its start or from a checkpoint; *found: from the latter. */
+static enum imp_status search_make(struct imp__fit *f, const struct imp__opt_options *o,
+                                   struct imp__search **out, bool *found)
+{
+    struct imp_problem *p = f->problem;
+    double *x = imp__alloc_raw(p->ctx, p->n, sizeof *x);
+    if (!x) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for %zu variables", p->n);
+    imp_problem_get_x(p, x);
+    const enum imp_status st =
+        imp__search_create(&f->goal, f->options.optimizer, o, x, out);
+    imp__release(p->ctx, x);
+    *found = false;
+    if (st != IMP_OK || !f->options.resume) return st;
+    return imp__fit_checkpoint_read(f, *out, found);
+}
+
+/* From the start, or the checkpoint, to the end of the search: coarse levels first. */
+static enum imp_status search_all(struct imp__fit *f, const struct imp__opt_options *o,
+                                  struct imp__search *s, bool found)
+{
+    enum imp_status st = IMP_OK;
+    imp__fit_scales(f, s);
+    f->first_iteration = s->iteration;
+    f->searching = true;
+    if (f->options.levels > 1 && !found) st = imp__fit_levels(f, o, s);
+    f->searching = false;
+    f->search = s;
+    return st == IMP_OK ? search(f, o, s) : st;
+}
+
+/* What follows a search, with walks of its own. */
+struct found {
+    struct imp__uncertainty u;
+    struct imp__fit_shift shift;
+    struct imp_estimate objective; /* of the last iteration, unless it was found anew */
+    const char *why;               /* there are no intervals; NULL: there are */
+};
+
+/* Intervals, searches anew where targets were clipped, the shift by a bias, and the objective
+ * at the end. */
+static enum imp_status answers_find(struct imp__fit *f, const struct imp__opt_options *o,
+                                    struct imp__search **s, struct imp_fit_variable *rows,
+                                    struct found *a)
+{
+    const bool biased = imp__fit_is_biased(f->problem);
+    if (f->options.intervals) IMP_CHECKED(search_look(f, o, *s, rows, &a->u, &a->why));
+    IMP_CHECKED(clipped_searches(f, o, s, rows, &a->u, &a->why));
+    if (a->u.n && biased)
+        IMP_CHECKED(imp__fit_shift(f, (*s)->x, a->u.G,
+                                   imp__search_seed(&f->goal, FINAL_SEED, 1), rows,
+                                   &a->shift));
+    if (a->u.n && isfinite(a->u.loss.value)) a->objective = a->u.loss;
+    else return final_objective(f, (*s)->x, &a->objective);
+    return IMP_OK;
+}
+
+static void last_progress(const struct imp__fit *f)
+{
+    const struct imp_progress last = {.size = sizeof last,
+                                      .stage = "fit",
+                                      .fraction = 1,
+                                      .elapsed_s = imp__now() - f->start_s,
+                                      .rate_unit = "iterations",
+                                      .note = f->note};
+    if (f->outer.progress) f->outer.progress(&last, f->outer.progress_payload);
+}
+
 enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
                         const struct imp_run *run, const struct imp_fit_result **result)
 {
@@ -176,11 +243,11 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     if (st != IMP_OK) return st;
     struct imp__fit f = {0};
     struct imp__search *s = NULL;
-    struct imp__uncertainty u = {0};
+    struct found a = {.shift = {.of_se = -1}, .objective = {NAN, NAN, 0}};
     struct imp_fit_variable *rows = NULL;
-    double *start = NULL, *x = NULL;
+    double *start = NULL;
     bool kept = false; /* the search, by the problem */
-    const char *why = NULL;
+    bool found;
 
     IMP_TRY(imp__fit_begin(p, options, run, &f));
     if (f.options.optimizer == IMP_LM && has_kink(p))
@@ -195,66 +262,33 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     imp__clip_reset(p);
     const struct imp__opt_options o = {f.options.max_iterations, f.options.learning_rate,
                                        f.options.tolerance, f.options.momentum, f.quiet};
-    x = imp__alloc_raw(ctx, p->n, sizeof *x);
-    if (!x) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu variables", p->n));
-    imp_problem_get_x(p, x);
-    IMP_TRY(imp__search_create(&f.goal, f.options.optimizer, &o, x, &s));
-    imp__release(ctx, x);
-    x = NULL;
-    bool found = false;
-    if (f.options.resume) IMP_TRY(imp__fit_checkpoint_read(&f, s, &found));
-    imp__fit_scales(&f, s);
-    f.first_iteration = s->iteration;
-    f.searching = true;
-    if (f.options.levels > 1 && !found) st = imp__fit_levels(&f, &o, s);
-    f.searching = false;
-    f.search = s;
-    if (st == IMP_OK) st = search(&f, &o, s);
-    if (st != IMP_OK && st != IMP_CANCELLED) goto out;
-    ended = st;
-    st = IMP_OK;
+    IMP_TRY(search_make(&f, &o, &s, &found));
+    ended = search_all(&f, &o, s, found);
+    if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     imp__search_settle(s);
     if (p->n <= IMP_SEARCH_FEW) {
         rows = imp__arena_array(&p->fit_arena, p->n, sizeof *rows);
         if (!rows)
             IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for the result of a fit"));
     }
-    struct imp_estimate objective = {NAN, NAN, 0};
     if (s->n_history > 0)
-        objective = (struct imp_estimate){s->history[s->n_history - 1],
-                                          s->history_se[s->n_history - 1], 0};
-    const bool biased = imp__fit_is_biased(p);
+        a.objective = (struct imp_estimate){s->history[s->n_history - 1],
+                                            s->history_se[s->n_history - 1], 0};
     f.final_calls = 0;
     f.final_total = final_total(&f);
-    if (ended == IMP_OK && f.options.intervals)
-        ended = search_look(&f, &o, s, rows, &u, &why);
-    if (ended == IMP_OK) ended = clipped_searches(&f, &o, &s, rows, &u, &why);
-    struct imp__fit_shift shift = {.of_se = -1};
-    if (ended == IMP_OK && u.n && biased)
-        ended = imp__fit_shift(&f, s->x, u.G, imp__search_seed(&f.goal, FINAL_SEED, 1),
-                               rows, &shift);
-    if (ended == IMP_OK && u.n && isfinite(u.loss.value)) objective = u.loss;
-    else if (ended == IMP_OK) ended = final_objective(&f, s->x, &objective);
+    if (ended == IMP_OK) ended = answers_find(&f, &o, &s, rows, &a);
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     IMP_TRY(imp_problem_set_x(p, s->x));
-    IMP_TRY(imp__fit_answer(&f, s, objective, &u, rows, start, why, &shift, result));
+    IMP_TRY(
+        imp__fit_answer(&f, s, a.objective, &a.u, rows, start, a.why, &a.shift, result));
     kept = !rows;
-    if (f.outer.progress && ended == IMP_OK) {
-        const struct imp_progress last = {.size = sizeof last,
-                                          .stage = "fit",
-                                          .fraction = 1,
-                                          .elapsed_s = imp__now() - f.start_s,
-                                          .rate_unit = "iterations",
-                                          .note = f.note};
-        f.outer.progress(&last, f.outer.progress_payload);
-    }
+    if (ended == IMP_OK) last_progress(&f);
     st = ended;
 out:
     if (st != IMP_OK && st != IMP_CANCELLED && start && s) /* x stays as it was */
         imp__fit_start_restore(p, f.spans != NULL, start, s);
-    imp__uncertainty_destroy(ctx, &u);
+    imp__uncertainty_destroy(ctx, &a.u);
     if (!kept) imp__search_destroy(s);
-    imp__release(ctx, x);
     imp__release(ctx, start);
     imp__fit_end(&f);
     return st;

@@ -57,7 +57,7 @@ struct imp__fit {
     char note[96];
 };
 
-/* fit_goal.c: the goal of `problem`; sets everything of `fit` but the search. */
+/* fit_begin.c: sets everything of `fit` but the search. */
 enum imp_status imp__fit_begin(struct imp_problem *problem,
                                const struct imp_fit_options *options,
                                const struct imp_run *run, struct imp__fit *fit);
@@ -81,6 +81,8 @@ void imp__fit_fingerprint(struct imp__fit *fit);
 /* Scales of the variables, from where the search starts. */
 void imp__fit_scales(struct imp__fit *fit, const struct imp__search *search);
 void imp__fit_end(struct imp__fit *fit);
+/* fit_goal.c: the goal of a search, which points to `fit`: it does not move any more. */
+void imp__fit_goal_make(struct imp__fit *fit);
 /* Scale of the block's numbers in x [n], for `spans`. */
 void imp__fit_span_scale(const struct imp__block *block, const double *x,
                          struct imp__span *span);

@@ -9,7 +9,6 @@
 #include "inverse/gradient/variate.h"
 #include "inverse/problem/loss.h"
 #include "walk/kept/store.h"
-#include "walk/lights/light_walk.h"
 #include "walk/run/run.h"
 #include <math.h>
 #include <stdio.h>
@@ -209,182 +208,29 @@ static void coarsen(bool fewer, void *payload)
     f->coarse = fewer;
 }
 
-/* Do tiles get samples by their share of the variance? Beside control variates of many numbers,
- * which have each their own pixels, nothing is gained by it: there they do if the options
- * demand it. */
-static bool allocates(const struct imp__fit *f)
+void imp__fit_goal_make(struct imp__fit *f)
 {
-    const bool many = f->variate && f->problem->n > IMP_TRAIL_MAX;
-    return f->options.optimizer == IMP_ADAM &&
-           f->options.allocation != IMP_ALLOCATION_EVEN &&
-           (!many || f->options.allocation == IMP_ALLOCATION_VARIANCE);
-}
-
-/* ---- From the beginning to the end ------------------------------------------------ */
-
-/* Bounds, by variable or by parameter. */
-static enum imp_status bounds_make(struct imp__fit *f)
-{
-    const struct imp_problem *p = f->problem;
-    const size_t n = p->n;
-    const bool many = f->options.optimizer == IMP_ADAM && n > IMP_SEARCH_FEW;
-    if (many) f->spans = imp__alloc(p->ctx, p->scene->n_params, sizeof *f->spans);
-    else {
-        f->lo = imp__alloc(p->ctx, 4 * n, sizeof *f->lo);
-        f->settles = imp__alloc(p->ctx, n, sizeof *f->settles);
+    const size_t n = f->problem->n;
+    f->run.progress = inner_progress;
+    f->run.progress_payload = f;
+    f->goal = (struct imp__goal){.ctx = f->problem->ctx,
+                                 .n = n,
+                                 .lo = f->lo,
+                                 .hi = f->hi,
+                                 .scale = f->scale,
+                                 .settles = f->settles,
+                                 .spans = f->spans,
+                                 .n_spans = f->n_spans,
+                                 .seed = f->outer.seed,
+                                 .eval = eval,
+                                 .normal = n <= IMP_DENSE_MAX ? normal : NULL,
+                                 .sparse = imp__fit_is_sparse(f) ? imp__fit_sparse : NULL,
+                                 .iterated = iterated,
+                                 .payload = f};
+    if (f->allocation.n > 0) f->goal.measure = measure;
+    if (imp__fit_coarse_spp(f) < imp__fit_spp(f)) f->goal.coarsen = coarsen;
+    if (imp__fit_keeps(f)) {
+        f->goal.draw = imp__fit_draw;
+        f->goal.is_stale = imp__fit_is_stale;
     }
-    if (!f->spans && !(f->lo && f->settles))
-        return imp__error(p->ctx, IMP_E_NOMEM, "no memory for %zu variables", n);
-    if (!many) {
-        f->hi = f->lo + n;
-        f->scale = f->lo + 2 * n;
-        f->g_se = f->lo + 3 * n;
-    }
-    for (size_t k = 0; k < p->n_blocks; k++) {
-        const struct imp__block *b = &p->blocks[k];
-        if (many)
-            f->spans[f->n_spans++] = (struct imp__span){
-                .end = b->first + b->count, .lo = b->lo, .hi = b->hi, .scale = 1};
-        for (size_t e = 0; !many && e < b->count; e++) {
-            f->lo[b->first + e] = b->lo;
-            f->hi[b->first + e] = b->hi;
-        }
-    }
-    return IMP_OK;
-}
-
-/* Walks from the lights do not bring everything that targets may hold. */
-static void missing_tell(struct imp_problem *p, enum imp_from end)
-{
-    const struct imp_scene *scene = p->scene;
-    const struct imp_walk_integrator *from = imp__walk_integrator(scene);
-    if (p->missing_told || !from || imp__walks_from(scene, from, end, &from) != IMP_OK)
-        return;
-    for (size_t i = 0; i < p->n_targets; i++)
-        imp__light_walks_tell(scene, scene->sensors[p->targets[i].desc.sensor], from);
-    p->missing_told = true;
-}
-
-/* What reads losses: trial steps beside the loss of a Gauss-Newton matrix, methods whose walks are
- * kept and traced in turn, or Adam, which needs no errors of a gradient. */
-static enum imp__loss_use use_of(const struct imp__fit *f)
-{
-    return f->options.optimizer == IMP_LM || imp__fit_keeps(f) ? IMP_LOSS_COMPARED
-                                                               : IMP_LOSS_SOUGHT;
-}
-
-enum imp_status imp__fit_begin(struct imp_problem *p,
-                               const struct imp_fit_options *options,
-                               const struct imp_run *run, struct imp__fit *out)
-{
-    enum imp_status st = IMP_OK;
-    imp_context *ctx = p->ctx;
-    const size_t n = p->n;
-    struct imp__fit f = {
-        .problem = p, .options = IMP_FIT_OPTIONS_INIT, .outer = IMP_RUN_INIT};
-
-    IMP_CHECKED(imp__options_take(ctx, "imp_fit", "options", options, &f.options,
-                                  sizeof f.options));
-    IMP_CHECKED(imp__run_take(ctx, "imp_fit", run, &f.outer));
-    IMP_CHECKED(imp__run_traces(ctx, "imp_fit", &f.outer));
-    /* Levenberg-Marquardt ends where its gradient is within its noise: of few sets that
-     * noise is known too badly. */
-    if (f.options.optimizer != IMP_LM) imp__points_of_losses(p, &f.outer);
-    if ((unsigned)f.options.optimizer > IMP_SLSQP)
-        return imp__error(ctx, IMP_E_ARG, "optimizer %d does not exist",
-                          (int)f.options.optimizer);
-    if (n == 0)
-        return imp__error(ctx, IMP_E_ARG, "nothing to fit: no parameter is active");
-    if (p->n_targets == 0)
-        return imp__error(ctx, IMP_E_ARG, "nothing to fit to: no target");
-    if (f.options.max_iterations < 0 || !(f.options.learning_rate >= 0) ||
-        !(f.options.tolerance >= 0) || isinf(f.options.tolerance) ||
-        f.options.learning_rate > 1 || !(f.options.momentum >= 0) ||
-        !(f.options.momentum < 1))
-        return imp__error(ctx, IMP_E_ARG,
-                          "max_iterations %d, learning_rate %g (0 to 1), tolerance %g, "
-                          "momentum %g (below 1): out of range",
-                          f.options.max_iterations, f.options.learning_rate,
-                          f.options.tolerance, f.options.momentum);
-    if ((unsigned)f.options.allocation > IMP_ALLOCATION_VARIANCE)
-        return imp__error(ctx, IMP_E_ARG, "allocation %d does not exist",
-                          (int)f.options.allocation);
-    if (!isfinite(f.options.memory))
-        return imp__error(ctx, IMP_E_ARG, "options: memory %g", f.options.memory);
-    IMP_CHECKED(imp__fit_levels_allowed(p, &f.options));
-    IMP_CHECKED(imp__fit_clipped_allowed(p, &f.options));
-    if (f.options.resume && !f.options.checkpoint)
-        return imp__error(ctx, IMP_E_ARG, "resume needs the name of a checkpoint");
-    if (f.options.max_iterations == 0)
-        f.options.max_iterations = f.options.optimizer == IMP_ADAM ? 200 : 30;
-    if (f.options.learning_rate == 0) f.options.learning_rate = 0.05;
-    if (f.options.tolerance == 0) f.options.tolerance = 1e-4;
-
-    p->use = use_of(&f);
-    IMP_TRY(bounds_make(&f));
-    if (n <= IMP_DENSE_MAX) {
-        f.H_prior = imp__alloc(ctx, n * n, sizeof *f.H_prior);
-        if (!f.H_prior)
-            IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for regularisers"));
-        IMP_TRY(imp__regularise_second(p, f.H_prior));
-    }
-    f.noise_known = true;
-    for (size_t i = 0; i < p->n_targets; i++)
-        f.noise_known &= p->targets[i].noise_se != NULL;
-    missing_tell(p, f.outer.from);
-    f.start_s = imp__now();
-    f.last_checkpoint_s = f.start_s;
-    f.deadline_s = f.outer.time_limit_s > 0 ? f.start_s + f.outer.time_limit_s : 0;
-    const bool errors = n <= IMP_DENSE_MAX || imp__fit_is_sparse(&f);
-    f.search_share = f.options.intervals && errors ? 0.7 : 0.98;
-    f.run = f.outer;
-    f.run.time_limit_s = 0;
-    IMP_TRY(imp__fit_variates(&f));
-    f.quiet = f.variate && n > IMP_TRAIL_MAX;
-    if (f.options.momentum == 0 && !f.quiet) f.options.momentum = IMP_ADAM_MOMENTUM;
-    if (allocates(&f)) IMP_TRY(imp__allocation_create(p, &f.run, &f.allocation));
-    if (f.options.checkpoint) imp__fit_fingerprint(&f);
-    *out = f;
-    /* Pointers to the fit itself: it does not move any more. */
-    out->run.progress = inner_progress;
-    out->run.progress_payload = out;
-    out->goal =
-        (struct imp__goal){.ctx = ctx,
-                           .n = n,
-                           .lo = out->lo,
-                           .hi = out->hi,
-                           .scale = out->scale,
-                           .settles = out->settles,
-                           .spans = out->spans,
-                           .n_spans = out->n_spans,
-                           .seed = out->outer.seed,
-                           .eval = eval,
-                           .normal = n <= IMP_DENSE_MAX ? normal : NULL,
-                           .sparse = imp__fit_is_sparse(out) ? imp__fit_sparse : NULL,
-                           .iterated = iterated,
-                           .payload = out};
-    if (out->allocation.n > 0) out->goal.measure = measure;
-    if (imp__fit_coarse_spp(out) < imp__fit_spp(out)) out->goal.coarsen = coarsen;
-    if (imp__fit_keeps(out)) {
-        out->goal.draw = imp__fit_draw;
-        out->goal.is_stale = imp__fit_is_stale;
-    }
-    return IMP_OK;
-out:
-    imp__fit_end(&f);
-    return st;
-}
-
-void imp__fit_end(struct imp__fit *f)
-{
-    if (!f->problem) return;
-    f->problem->use = IMP_LOSS_TOLD;
-    imp__walks_destroy(f->walks);
-    imp__variate_destroy(f->variate);
-    imp__allocation_destroy(&f->allocation);
-    imp__release(f->problem->ctx, f->lo);
-    imp__release(f->problem->ctx, f->settles);
-    imp__release(f->problem->ctx, f->spans);
-    imp__release(f->problem->ctx, f->H_prior);
-    imp__sparse_errors_destroy(f->problem->ctx, &f->errors);
 }
