@@ -15,7 +15,7 @@
 #define SEED     41
 #define VERTICES 16
 
-static char page[65536];
+static char page[65536], flat[65536]; /* flat: with blanks for line breaks */
 
 struct sum {
     struct imp_sink sink; /* first: the sweep gets a pointer to it */
@@ -43,8 +43,8 @@ static const char *id(const char *name) { return name ? name : "?"; }
 /* The page has this row. */
 static void row(const char *what, int k, const char *text)
 {
-    tap_ok(strstr(page, text) != NULL, "%s, vertex %d # %.*s", what, k,
-           (int)strcspn(text, "\n"), text);
+    tap_ok(strstr(page, text) != NULL || strstr(flat, text) != NULL,
+           "%s, vertex %d # %.*s", what, k, (int)strcspn(text, "\n"), text);
 }
 
 int main(int argc, char **argv)
@@ -58,6 +58,7 @@ int main(int argc, char **argv)
     }
     page[fread(page, 1, sizeof page - 1, f)] = 0;
     fclose(f);
+    for (size_t i = 0; page[i]; i++) flat[i] = page[i] == '\n' ? ' ' : page[i];
 
     uint8_t chosen[64] = {0};
     struct imp_active active;

@@ -14,6 +14,7 @@ def expect(what, shown, found):
         sys.exit(1)
 
 page = open('docs/walk-and-sweep.md').read()
+flat = ' '.join(page.split())  # wherever its lines break
 blocks = re.findall(r'```console\n\$ (importon [^\n]*)\n(.*?)```', page, re.S)
 assert len(blocks) == 4
 for command, output in blocks:
@@ -61,14 +62,14 @@ for k, row in enumerate(rows):
     P *= w[k]
 
 # The sums are the program's gradient.
-shown, sixth = re.search(r'of `white`, ([0-9.]+)/6 = ([0-9.]*\d)', page).groups()
+shown, sixth = re.search(r'of `white`, ([0-9.]+)/6 = ([0-9.]*\d)', flat).groups()
 expect('white', shown, total['white'])
 expect('white', sixth, total['white'] / 6)
 for name, (_, gradient) in value.items():
     if abs(gradient - total[name] / 6) > 1e-6 * abs(gradient):
         sys.exit(f'{name}: gradient {gradient}, sum of pieces {total[name] / 6}')
-expect('sum', re.search(r'pieces of Le, ([0-9.]*\d)', page).group(1), tangent[0])
-expect('product', re.search(r'20.710837 · [0-9.]+ = ([0-9.]*\d)', page).group(1), L[0])
+expect('sum', re.search(r'pieces of Le, ([0-9.]*\d)', flat).group(1), tangent[0])
+expect('product', re.search(r'20.710837 · [0-9.]+ = ([0-9.]*\d)', flat).group(1), L[0])
 
 # Through fog: transmittance from the places, pieces of albedo and of white.
 scene = open('scenes/fog.xml').read()
@@ -99,12 +100,12 @@ for k, row in enumerate(rows):
     P *= w[k]
 value = {name: float(d) for name, x, d, se in (line.split() for line in blocks[3][1].splitlines() if 'mean' not in line)}
 for what, times, name in (('fog', 2.4, 'fog.albedo.value'), ('white', 1, 'white.reflectance.value[0]')):
-    shown, result = re.search(r'%s([0-9.]+)/6 = ([0-9.]*\d)' % ('2\\.4 · ' if what == 'fog' else 'white has '), page).groups()
+    shown, result = re.search(r'%s([0-9.]+)/6 = ([0-9.]*\d)' % ('2\\.4 · ' if what == 'fog' else 'white has '), flat).groups()
     expect(what, shown, total[what])
     expect(what, result, times * total[what] / 6)
     if abs(value[name] - times * total[what] / 6) > 1e-6 * value[name]:
         sys.exit(f'{name}: gradient {value[name]}, sum of pieces {times * total[what] / 6}')
-sigma_t, scale = map(float, re.search(r'\.25 · ([0-9.]+) = ([0-9.]*\d)', page).groups())
+sigma_t, scale = map(float, re.search(r'\.25 · ([0-9.]+) = ([0-9.]*\d)', flat).groups())
 if sigma_t != value['fog.sigma_t.value'] or scale != value['fog.scale.value'] or abs(value['fog.scale.value'] - sigma * value['fog.sigma_t.value']) > 1e-6 * value['fog.scale.value']:
     sys.exit('scale is not sigma times sigma_t')
 PY
