@@ -8,6 +8,7 @@ In code, tests, manual pages and documents:
   - any other `NAME.md` is a document that exists;
   - `src/...`, `tests/...` and the like, in comments and documents, are files that exist.
 In Markdown also: relative links and pictures exist, and so does the heading after #.
+In the README of a room of src/ or cli/ also: `NAME.c`, `NAME.h` and `ROOM/` are in the room.
 
     tools/check_links.py [FOLDER, default the folder above]
 """
@@ -29,6 +30,7 @@ SECTIONS = re.compile(rf"{BREAK}({SECTION}(?:(?:,|[ ]-|[ ]and){BREAK}{SECTION}(?
 FILE = re.compile(r"(?<![\w/.$@{}-])((?:src|include|tests|tools|cli|bench|examples|fuzz|docs|man|"
                   r"scenes|packaging)/[\w./-]*\.(?:c|h|py|sh|xml|png|svg|txt))\b")
 LINK = re.compile(r"!?\[[^\]\n]*(?:\n[^\]\n]*)?\]\(([^)\s]+)\)")
+BESIDE = re.compile(r"`((?:\w+/)+|(?:\w+/)*\w+\.(?:c|h|js|css|html))`")
 HEADING = re.compile(r"^#{1,6}\s+(.*?)\s*#*$", re.M)
 
 
@@ -125,6 +127,12 @@ class Checker:
             if not (self.top / m.group(1)).exists() and not (path.parent / m.group(1)).exists():
                 self.complain(path, text, m.start(), f"there is no {m.group(1)}")
 
+    def beside(self, path, text):
+        for m in BESIDE.finditer(text):
+            self.checked += 1
+            if not (self.top / m.group(1)).exists() and not any(path.parent.rglob(m.group(1))):
+                self.complain(path, text, m.start(), f"there is no {m.group(1)} in this room")
+
     def links(self, path, text):
         for m in LINK.finditer(text):
             if re.match(r"[a-z]+:", m.group(1)):
@@ -149,6 +157,8 @@ class Checker:
                 self.paths(path, comments(text) if path.suffix in (".c", ".h") else text)
             if path.suffix == ".md":
                 self.links(path, without_code(text))
+            if path.name == "README.md" and name.startswith(("src/", "cli/")):
+                self.beside(path, text)
         print(f"{self.checked} citations and links, {self.bad} lead nowhere")
         return self.bad
 
