@@ -8,7 +8,7 @@
 #include "load.h"
 #include "search.h"
 #include "tree.h"
-#include "twin.h"
+#include "twin_scene.h"
 #include "xml.h"
 #include <string.h>
 

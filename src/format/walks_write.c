@@ -4,7 +4,7 @@
 #include "base/arguments.h"
 #include "base/team.h"
 #include "math/hash.h"
-#include "twin.h"
+#include "twin_scene.h"
 #include "walks_file.h"
 #include <errno.h>
 #include <string.h>

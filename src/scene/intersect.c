@@ -188,7 +188,7 @@ nearest(const struct imp_intersector *x, double time, const imp_v3 *o, const imp
     struct query q;
     struct RTCRayHit r;
     if (imp_unlikely(!ray_valid(o, d, tmin, tmax))) return false;
-    bool met = imp__few_nearest(&x->few, o, d, tmin, &tmax, hit);
+    bool met = imp__shape_balls_nearest(&x->balls, o, d, tmin, &tmax, hit);
     float far = met ? triangle_far(o, d, tmax) : (float)tmax;
     if (x->facets &&
         imp__facets_nearest(x->facets, o, d, tmin, met ? (double)far : tmax, hit)) {
@@ -223,7 +223,7 @@ anything(const struct imp_intersector *x, double time, const imp_v3 *o, const im
     struct query q;
     struct RTCRay r;
     if (imp_unlikely(!ray_valid(o, d, tmin, tmax))) return false;
-    if (imp__few_occluded(&x->few, o, d, tmin, tmax)) return true;
+    if (imp__shape_balls_occluded(&x->balls, o, d, tmin, tmax)) return true;
     if (x->facets && imp__facets_occluded(x->facets, o, d, tmin, tmax)) return true;
     if (!x->knows) return false;
     query_fill(&q, x, time, o, d, tmin, tmax);

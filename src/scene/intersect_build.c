@@ -284,7 +284,7 @@ static bool is_few(const struct imp_scene *scene, const struct content *c)
     int n = 0;
     for (int i = 0; !c->aims && i < c->n; i++)
         n += shape_at(scene, c, i)->geometry == IMP_ANALYTIC;
-    return !c->aims && n <= IMP_FEW;
+    return !c->aims && n <= IMP_SHAPE_BALLS;
 }
 
 static enum imp_status intersector_make(struct imp_scene *scene, const struct content *c,
@@ -319,7 +319,7 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
     for (int i = 0; x->rtc && i < c->n + instances && told.error == RTC_ERROR_NONE; i++) {
         const struct imp_shape *s = i < c->n ? shape_at(scene, c, i) : NULL;
         if (s && s->geometry == IMP_ANALYTIC && few) {
-            imp__few_add(&x->few, s);
+            imp__shape_balls_add(&x->balls, s);
             continue;
         }
         if (s && s->geometry == IMP_TRIANGLES && x->facets) continue;

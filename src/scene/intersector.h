@@ -5,13 +5,13 @@
 #define IMP_INTERSECTOR_H
 
 #include "facets.h"
-#include "few.h"
+#include "shape_balls.h"
 #include <embree3/rtcore.h>
 
 struct imp_intersector {
     RTCScene rtc;
     /* Outside of Embree: few analytic shapes, and few triangles (NULL: none). */
-    struct imp_few few;
+    struct imp_shape_balls balls;
     struct imp_facets *facets;
     bool knows;      /* Embree has something to look for */
     bool calls_back; /* for analytic shapes or instances */

@@ -111,7 +111,7 @@ struct imp_scene {
     struct imp_arena files; /* what files held and objects copy; freed by commit */
     struct imp_owned *owned;
     /* Another scene of the same objects and numbers, in which walks are evaluated and no ray
-     * meets anything. Set by the room that makes scenes from files and calls (format/twin.c); NULL:
+     * meets anything. Set by the room that makes scenes from files and calls (format/twin_scene.c); NULL:
      * no such room made it. */
     enum imp_status (*twin)(const struct imp_scene *scene, struct imp_scene **out);
 

@@ -3,7 +3,7 @@
  * Fit: an optimiser is run on a problem; covariance and intervals of its answer. */
 #include "fit.h"
 #include "base/arguments.h"
-#include "clip.h"
+#include "censor.h"
 #include "inverse/estimate/walks_make.h"
 #include "inverse/gradient/variate.h"
 #include "search/covariance.h"

@@ -5,7 +5,7 @@
  * count; with other weights the search goes on, until they stay. The objective of each
  * search has weights that do not change, so no optimiser sees it jump. */
 #include "base/arguments.h"
-#include "clip.h"
+#include "censor.h"
 #include "fit.h"
 #include <string.h>
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Levels between which the numbers of a target are known: beyond them they are clipped, and
- * fits take them as censored data (inverse/fit/clip.h). */
+ * fits take them as censored data (inverse/fit/censor.h). */
 #ifndef IMP_INVERSE_TARGET_LEVELS_H
 #define IMP_INVERSE_TARGET_LEVELS_H
 

@@ -2,8 +2,8 @@
  *
  * A second scene of the same objects and numbers, in which walks of the first one are
  * evaluated at other parameters. It has no geometry (tree_file.h). */
-#ifndef IMP_FORMAT_TWIN_H
-#define IMP_FORMAT_TWIN_H
+#ifndef IMP_FORMAT_TWIN_SCENE_H
+#define IMP_FORMAT_TWIN_SCENE_H
 
 #include "base/file.h"
 #include "scene/scene.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A second scene of the same objects and numbers, made from the first one's bytes. */
-#include "twin.h"
+#include "twin_scene.h"
 #include "scene/fingerprint.h"
 #include "tree_file.h"
 #include "walks_file.h"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Clipped numbers of targets as censored data (importon/clip.h, docs/estimators.md 20). */
-#ifndef IMP_INVERSE_CLIP_H
-#define IMP_INVERSE_CLIP_H
+#ifndef IMP_INVERSE_CENSOR_H
+#define IMP_INVERSE_CENSOR_H
 
 #include "inverse/problem/target_levels.h"
 #include <importon/clip.h>

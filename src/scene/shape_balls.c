@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The ball around an analytic shape joins the list that few.h searches. */
-#include "few.h"
+ * The ball around an analytic shape joins the list that shape_balls.h searches. */
+#include "shape_balls.h"
 #include "kind/shape/shape.h"
 
 /* The radius is enlarged by more than the rounding of what is computed with it. */
-void imp__few_add(struct imp_few *f, const struct imp_shape *shape)
+void imp__shape_balls_add(struct imp_shape_balls *f, const struct imp_shape *shape)
 {
     const int g = f->n / 4, k = f->n % 4;
     struct imp_round round;

@@ -21,7 +21,7 @@
  * which is linear in T; `at` is the gamma of J, and the last term is the mean of what the
  * noise of V adds. Where a scene follows gamma so that its photograph stays, that noise
  * enters by its square alone, at any gamma: it does not hold gamma at `at`. */
-#include "clip.h"
+#include "censor.h"
 #include "base/arguments.h"
 #include "inverse/problem/target_channels.h"
 #include "math/hash.h"
