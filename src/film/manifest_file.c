@@ -122,11 +122,8 @@ bool imp__manifest_bytes(const imp_manifest *m, struct imp_bytes *out)
                imp__bytes_add(ctx, out, &bytes, sizeof bytes) &&
                imp__bytes_add(ctx, out, i->name, bytes);
     }
-    for (size_t k = 0; k < head.n_messages && fits; k++) {
-        const uint64_t size = m->messages[k].size;
-        fits = imp__bytes_add(ctx, out, &size, sizeof size) &&
-               imp__bytes_add(ctx, out, m->bytes.data + m->messages[k].at, size);
-    }
+    for (size_t k = 0; k < head.n_messages && fits; k++)
+        fits = imp__message_put(ctx, out, &m->bytes, &m->messages[k]);
     const uint64_t sum = imp__hash(0, out->data, out->size);
     return fits && imp__bytes_add(ctx, out, &sum, sizeof sum);
 }

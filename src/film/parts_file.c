@@ -109,12 +109,8 @@ bool imp__parts_bytes(const struct imp_parts *p, struct imp_bytes *out)
         fits = imp__bytes_add(p->ctx, out, &s->index, sizeof s->index) &&
                imp__bytes_add(p->ctx, out, &s->count, sizeof s->count) &&
                imp__bytes_add(p->ctx, out, &n, sizeof n);
-        for (size_t m = 0; m < s->n_messages && fits; m++) {
-            const uint64_t size = s->messages[m].size;
-            fits = imp__bytes_add(p->ctx, out, &size, sizeof size) &&
-                   imp__bytes_add(p->ctx, out, p->files[s->file].data + s->messages[m].at,
-                                  s->messages[m].size);
-        }
+        for (size_t m = 0; m < s->n_messages && fits; m++)
+            fits = imp__message_put(p->ctx, out, &p->files[s->file], &s->messages[m]);
     }
     if (!fits) return false;
     const uint64_t sum = imp__hash(0, out->data, out->size);

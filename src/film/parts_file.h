@@ -25,6 +25,16 @@ struct imp__kept_message {
     size_t at, size; /* in the bytes of its file */
 };
 
+/* A message behind its size; false: no memory. */
+static inline bool imp__message_put(imp_context *ctx, struct imp_bytes *out,
+                                    const struct imp_bytes *file,
+                                    const struct imp__kept_message *m)
+{
+    const uint64_t size = m->size;
+    return imp__bytes_add(ctx, out, &size, sizeof size) &&
+           imp__bytes_add(ctx, out, file->data + m->at, m->size);
+}
+
 /* One part i of n, counted from 1. */
 struct imp__part_source {
     uint32_t index, count;

@@ -10,10 +10,12 @@
 /* The caller's options, complete for any `size`. @return IMP_E_ARG if malformed. */
 enum imp_status imp__load_options(imp_context *ctx, const struct imp_load_options *from,
                                   struct imp_load_options *to);
-/* A file to load: complete options, its text, and its folder. */
+/* What is loaded: complete options, a text, its name in messages, and its folder (NULL: none),
+ * the last that is searched. */
 struct imp__load_file {
     struct imp_load_options options;
     struct imp_bytes text;
+    const char *name;
     char *folder;
 };
 /* @return IMP_E_ARG without a path. To be closed also after a failure. */
@@ -21,6 +23,10 @@ enum imp_status imp__load_open(imp_context *ctx, const char *path,
                                const struct imp_load_options *options,
                                struct imp__load_file *out);
 void imp__load_close(imp_context *ctx, struct imp__load_file *file);
+/* A text of the caller's, which is only read: not to be closed. */
+enum imp_status imp__load_text(imp_context *ctx, const char *xml, size_t length,
+                               const char *name, const struct imp_load_options *options,
+                               struct imp__load_file *out);
 /* graded.c: attach the field of a <medium type="graded">; when the scene is built, make
  * ready to trace. */
 enum imp_status imp__graded_attach(struct imp_scene *scene, struct imp_node *node);

@@ -33,7 +33,7 @@ enum imp_status imp__load_open(imp_context *ctx, const char *path,
                                struct imp__load_file *f)
 {
     enum imp_status st = IMP_OK;
-    *f = (struct imp__load_file){.folder = NULL};
+    *f = (struct imp__load_file){.name = path};
     if (!path || !*path) return imp__error(ctx, IMP_E_ARG, "no scene file is named");
     IMP_TRY(imp__load_options(ctx, options, &f->options));
     IMP_TRY(imp__file_read(ctx, path, XML_FILE_BYTES_MAX, &f->text));
@@ -49,6 +49,16 @@ void imp__load_close(imp_context *ctx, struct imp__load_file *f)
 {
     imp__release(ctx, f->folder);
     imp__bytes_free(ctx, &f->text);
+}
+
+enum imp_status imp__load_text(imp_context *ctx, const char *xml, size_t length,
+                               const char *name, const struct imp_load_options *options,
+                               struct imp__load_file *f)
+{
+    *f =
+        (struct imp__load_file){.text = {(unsigned char *)(uintptr_t)xml, length, length},
+                                .name = name && *name ? name : "string"};
+    return imp__load_options(ctx, options, &f->options);
 }
 
 static void given_count(struct imp_node *node)
@@ -148,17 +158,16 @@ static enum imp_status bins_set(struct imp_scene *scene, const struct imp_node *
     return IMP_OK;
 }
 
-/* `name` of the scene file; its folder is the last that is searched. */
-static enum imp_status load(imp_context *ctx, const struct imp_bytes *text,
-                            const char *name, const char *folder,
-                            const struct imp_load_options *o, imp_scene **out)
+static enum imp_status load(imp_context *ctx, const struct imp__load_file *f,
+                            imp_scene **out)
 {
     enum imp_status st = IMP_OK;
+    const struct imp_load_options *o = &f->options;
     struct imp_scene *scene = NULL;
     IMP_TRY(imp__scene_new(ctx, o->mode, o->upsampling, &scene));
     scene->lenient = o->lenient;
-    IMP_TRY(imp__search_init(scene, o->search, o->n_search, folder));
-    IMP_TRY(imp__xml_read(scene, text, name, o));
+    IMP_TRY(imp__search_init(scene, o->search, o->n_search, f->folder));
+    IMP_TRY(imp__xml_read(scene, &f->text, f->name, o));
     if (o->weights) IMP_TRY(weights_set(scene, o->weights));
     if (o->bins) IMP_TRY(bins_set(scene, scene->root, o->bins));
     IMP_TRY(imp__scene_finish(scene));
@@ -178,7 +187,7 @@ enum imp_status imp_scene_load(imp_context *ctx, const char *path,
     IMP_FLOAT_MODE;
     struct imp__load_file f;
     enum imp_status st = imp__load_open(ctx, path, options, &f);
-    if (st == IMP_OK) st = load(ctx, &f.text, path, f.folder, &f.options, out);
+    if (st == IMP_OK) st = load(ctx, &f, out);
     imp__load_close(ctx, &f);
     return st;
 }
@@ -192,9 +201,7 @@ enum imp_status imp_scene_load_string(imp_context *ctx, const char *xml, size_t 
     IMP_REQUIRE(ctx, xml, "xml");
     IMP_REQUIRE(ctx, out, "out");
     IMP_FLOAT_MODE;
-    struct imp_load_options o;
-    const enum imp_status st = imp__load_options(ctx, options, &o);
-    if (st != IMP_OK) return st;
-    const struct imp_bytes text = {(unsigned char *)xml, length, length}; /* only read */
-    return load(ctx, &text, name && *name ? name : "string", NULL, &o, out);
+    struct imp__load_file f;
+    IMP_CHECKED(imp__load_text(ctx, xml, length, name, options, &f));
+    return load(ctx, &f, out);
 }

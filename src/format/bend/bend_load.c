@@ -174,15 +174,15 @@ out:
     return st;
 }
 
-static enum imp_status load(imp_context *ctx, const struct imp_bytes *text,
-                            const char *name, const char *folder,
-                            const struct imp_load_options *o, imp_bend **out)
+static enum imp_status load(imp_context *ctx, const struct imp__load_file *f,
+                            imp_bend **out)
 {
     enum imp_status st = IMP_OK;
+    const struct imp_load_options *o = &f->options;
     struct imp__bendfile l = {.ctx = ctx};
     IMP_TRY(imp__scene_new(ctx, o->mode, o->upsampling, &l.scene));
-    IMP_TRY(imp__search_init(l.scene, o->search, o->n_search, folder));
-    IMP_TRY(imp__xml_read(l.scene, text, name, o));
+    IMP_TRY(imp__search_init(l.scene, o->search, o->n_search, f->folder));
+    IMP_TRY(imp__xml_read(l.scene, &f->text, f->name, o));
     IMP_TRY(build(&l));
     *out = l.bend;
     l.bend = NULL;
@@ -205,7 +205,7 @@ enum imp_status imp_bend_load(imp_context *ctx, const char *path,
     IMP_FLOAT_MODE;
     struct imp__load_file f;
     enum imp_status st = imp__load_open(ctx, path, options, &f);
-    if (st == IMP_OK) st = load(ctx, &f.text, path, f.folder, &f.options, out);
+    if (st == IMP_OK) st = load(ctx, &f, out);
     imp__load_close(ctx, &f);
     return st;
 }
@@ -215,13 +215,11 @@ enum imp_status imp_bend_load_string(imp_context *ctx, const char *xml, size_t l
                                      const struct imp_load_options *options,
                                      imp_bend **out)
 {
-    struct imp_load_options o;
     IMP_REQUIRE(NULL, ctx, "context");
     IMP_REQUIRE(ctx, xml, "xml");
     IMP_REQUIRE(ctx, out, "out");
     IMP_FLOAT_MODE;
-    const enum imp_status st = imp__load_options(ctx, options, &o);
-    if (st != IMP_OK) return st;
-    const struct imp_bytes text = {(unsigned char *)(uintptr_t)xml, length, length};
-    return load(ctx, &text, name && *name ? name : "string", NULL, &o, out);
+    struct imp__load_file f;
+    IMP_CHECKED(imp__load_text(ctx, xml, length, name, options, &f));
+    return load(ctx, &f, out);
 }

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * Loader of problems of bent rays (docs/bend.md): bend_load.c reads the file, and
  * one file reads each element. */
 #ifndef IMP_FORMAT_BEND_LOAD_H

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * <medium type="graded">: the index field from <volume>s, the options of tracing, bounds
  * and held numbers of a fit. */
 #include "bend_load.h"

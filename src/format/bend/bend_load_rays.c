@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * <rays>: bundles, each with a frame whose z axis runs along the beam (or from a point
  * source to the centre). Children of <rays> are given in that frame and apply to every
  * bundle of the element. */

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * <surface>: where bent rays end, are refracted or reflected, or cross a tap. */
 #include "bend_load.h"
 #include "format/search.h"

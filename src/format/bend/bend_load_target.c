@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * <target>: what is minimised. */
 #include "bend_load.h"
 #include "format/search.h"

@@ -14,22 +14,11 @@ static const struct imp_input_desc inputs[] = {{.name = "reflectance",
                                                 .unit = "1"},
                                                {0}};
 
-static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
-                   struct imp_dirs *d)
-{
-    (void)b, (void)in;
-    return imp__lambert_sample(&u[1], d);
-}
 static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
                  imp_spec *f)
 {
     (void)b;
     *f = in[RHO] * imp__lambert(d);
-}
-static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
-{
-    (void)b, (void)in;
-    return imp__lambert(d);
 }
 static double pdf_eval(const struct imp_bsdf *b, const imp_spec *in,
                        const struct imp_dirs *d, imp_spec *f)
@@ -63,9 +52,9 @@ static bool directional_albedo(const struct imp_bsdf *b, const imp_spec *in,
 const struct imp_bsdf_ops imp__diffuse = {.size = sizeof(struct imp_bsdf_ops),
                                           .name = "diffuse",
                                           .inputs = inputs,
-                                          .sample = sample,
+                                          .sample = imp__lambert_only_sample,
                                           .eval = eval,
-                                          .pdf = pdf,
+                                          .pdf = imp__lambert_only_pdf,
                                           .eval_d = eval_d,
                                           .albedo = albedo,
                                           .directional_albedo = directional_albedo,

@@ -25,4 +25,18 @@ static inline bool imp__lambert_sample(const double u[2], struct imp_dirs *d)
     return d->wi[2] > 0;
 }
 
+/* Sampling and density of materials that are this lobe alone. */
+static inline bool imp__lambert_only_sample(const struct imp_bsdf *b, const imp_spec *in,
+                                            const double u[3], struct imp_dirs *d)
+{
+    (void)b, (void)in;
+    return imp__lambert_sample(&u[1], d);
+}
+static inline double imp__lambert_only_pdf(const struct imp_bsdf *b, const imp_spec *in,
+                                           const struct imp_dirs *d)
+{
+    (void)b, (void)in;
+    return imp__lambert(d);
+}
+
 #endif

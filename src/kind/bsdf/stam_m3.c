@@ -21,22 +21,11 @@ static enum imp_status build(const struct imp_build *build, void *self,
     b->flags = IMP_BSDF_SMOOTH | IMP_BSDF_EMIT | IMP_BSDF_LINEAR;
     return imp__stam_absorb_read(build, &b->absorb);
 }
-static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
-                   struct imp_dirs *d)
-{
-    (void)b, (void)in;
-    return imp__lambert_sample(&u[1], d);
-}
 static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
                  imp_spec *f)
 {
     (void)b;
     *f = in[DIFFUSE] * imp__lambert(d);
-}
-static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
-{
-    (void)b, (void)in;
-    return imp__lambert(d);
 }
 static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
                    imp_spec *df)
@@ -56,9 +45,9 @@ const struct imp_bsdf_ops imp__stam_m3 = {.size = sizeof(struct imp_bsdf_ops),
                                           .name = "stam_m3",
                                           .inputs = inputs,
                                           .build = build,
-                                          .sample = sample,
+                                          .sample = imp__lambert_only_sample,
                                           .eval = eval,
-                                          .pdf = pdf,
+                                          .pdf = imp__lambert_only_pdf,
                                           .eval_d = eval_d,
                                           .emit = imp__stam_emit,
                                           .emit_d = imp__stam_emit_d,

@@ -8,6 +8,7 @@
  * where s, t, n are the orthonormal frame of a circular one; of another one the images of the
  * axes, with length and radius 1. */
 #include "math/ellipse.h"
+#include "math/quadratic.h"
 #include "shape.h"
 
 struct cylinder {
@@ -108,9 +109,8 @@ static bool intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *
     const double lx = p[0] + w[0] * (b / a), ly = p[1] + w[1] * (b / a);
     const double r2 = k->radius * k->radius, e = r2 - (lx * lx + ly * ly);
     if (!(e >= 0)) return false; /* and rays along the axis, where a is 0 */
-    const double q = b + copysign(sqrt(a * e), b), c = p[0] * p[0] + p[1] * p[1] - r2;
-    const double ta = q / a, tb = q != 0 ? c / q : ta;
-    const double t[2] = {imp_min(ta, tb), imp_max(ta, tb)};
+    double t[2];
+    imp__quadratic_roots(a, b, p[0] * p[0] + p[1] * p[1] - r2, e, t);
     bool met = false;
     for (int i = 0; !met && i < 2; i++) {
         const double z = p[2] + t[i] * w[2];

@@ -2,6 +2,7 @@
  *
  * The sphere, in double precision. Seen from outside it is sampled by the cone of
  * directions it fills, from inside by area. */
+#include "math/quadratic.h"
 #include "math/trig.h"
 #include "math/warp.h"
 #include "shape.h"
@@ -50,9 +51,8 @@ out:
     return st;
 }
 
-/* Discriminant from the distance of the centre to the line, not from b^2 - ac, and the
- * small root from the product of the roots: no digits are lost far away or for small
- * spheres (Haines et al., Ray Tracing Gems, ch. 7). */
+/* Discriminant from the distance of the centre to the line, not from b^2 - ac: no digits are
+ * lost far away or for small spheres (Haines et al., Ray Tracing Gems, ch. 7). */
 static bool intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *d,
                       double tmin, double tmax, struct imp_hit *hit)
 {
@@ -62,10 +62,9 @@ static bool intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *
     const imp_v3 l = oc + *d * (b / a);
     const double r2 = p->radius * p->radius, e = r2 - imp__dot(l, l);
     if (!(e >= 0)) return false;
-    const double q = b + copysign(sqrt(a * e), b), c = imp__dot(oc, oc) - r2;
-    const double ta = q / a, tb = q != 0 ? c / q : ta;
-    const double t0 = imp_min(ta, tb), t1 = imp_max(ta, tb);
-    const double t = t0 > tmin ? t0 : t1;
+    double root[2];
+    imp__quadratic_roots(a, b, imp__dot(oc, oc) - r2, e, root);
+    const double t = root[0] > tmin ? root[0] : root[1];
     if (!(t > tmin && t < tmax)) return false;
     hit->t = t;
     hit->u = hit->v = 0;
