@@ -38,7 +38,7 @@ static void eval(const struct imp__el_material *m, imp_v3 wo, imp_v3 wi, imp_spe
     }
     if (!m->bsdf || !(m->bsdf->flags & IMP_BSDF_SMOOTH)) return;
     if (m->flipped) wo[2] = -wo[2], wi[2] = -wi[2];
-    const struct imp_dirs d = {wo, wi, IMP_SMOOTH, false};
+    const struct imp_dirs d = {wo, wi, IMP_SMOOTH, 0};
     const double inv = 1 / fabs(wi[2]); /* kinds include the cosine */
     imp_spec value;
     m->bsdf->ops->eval(m->bsdf, in, &d, &value);

@@ -30,19 +30,19 @@ static double power(const struct point *p, const struct imp_dirs *d, int lane)
 static double power_towards(imp_v3 wi, void *payload)
 {
     const struct point *p = payload;
-    return power(p, &(struct imp_dirs){p->wo, wi, IMP_SMOOTH, false}, p->lane);
+    return power(p, &(struct imp_dirs){p->wo, wi, IMP_SMOOTH, 0}, p->lane);
 }
 
 static double density(imp_v3 wi, void *payload)
 {
     const struct point *p = payload;
-    const struct imp_dirs d = {p->wo, wi, IMP_SMOOTH, false};
+    const struct imp_dirs d = {p->wo, wi, IMP_SMOOTH, 0};
     return p->b->ops->pdf(p->b, p->in, &d);
 }
 static bool draw(void *payload, const double u[3], imp_v3 *w, int *lobe)
 {
     struct point *p = payload;
-    struct imp_dirs d = {p->wo, {0}, IMP_SMOOTH, false};
+    struct imp_dirs d = {p->wo, {0}, IMP_SMOOTH, 0};
     if (!p->b->ops->sample(p->b, p->in, u, &d)) return false;
     if (d.lobe >= 0 && d.lobe < IMP_DRAWS_LOBES) p->lobe[d.lobe] = d;
     *w = d.wi;
@@ -126,7 +126,7 @@ static void smooth_answer(const struct imp__selftest *t, struct point *p,
 
     /* Radiance over n^2 is the same with the directions exchanged. */
     imp_spec g;
-    const struct imp_dirs e = {d.wi, d.wo, IMP_SMOOTH, false};
+    const struct imp_dirs e = {d.wi, d.wo, IMP_SMOOTH, 0};
     b->ops->eval(b, p->in, &e, &g);
     const bool cosine = !imp__is_in_medium(b); /* is in the value */
     for (int c = 0; c < t->scene->channels; c++) {
@@ -146,7 +146,7 @@ static void answers_take(const struct imp__selftest *t, struct point *p, int i,
     for (int k = 0; k < 200 && b->flags & IMP_BSDF_SMOOTH; k++) {
         const struct imp_key key =
             imp__key(t->options.seed, 100 + (uint64_t)i, (uint64_t)k);
-        struct imp_dirs d = {p->wo, any_direction(p, k, key), IMP_SMOOTH, false};
+        struct imp_dirs d = {p->wo, any_direction(p, k, key), IMP_SMOOTH, 0};
         smooth_answer(t, p, d, a);
         if (k < 7) { /* seen from the horizon and the normal, too */
             d.wo = any_direction(p, k, key);
@@ -158,7 +158,7 @@ static void answers_take(const struct imp__selftest *t, struct point *p, int i,
         const struct imp_key key =
             imp__key(t->options.seed, 200 + (uint64_t)i, (uint64_t)k);
         const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
-        struct imp_dirs d = {p->wo, {0}, IMP_SMOOTH, false};
+        struct imp_dirs d = {p->wo, {0}, IMP_SMOOTH, 0};
         if (!b->ops->sample(b, p->in, u, &d)) continue;
         if (d.lobe < 0) {
             a->n++;
@@ -172,7 +172,7 @@ static void answers_take(const struct imp__selftest *t, struct point *p, int i,
                                                       t->scene->channels, &a->tally));
     }
     if (!(b->flags & IMP_BSDF_EMIT)) return;
-    const struct imp_dirs d = {p->wo, p->wo, IMP_SMOOTH, false};
+    const struct imp_dirs d = {p->wo, p->wo, IMP_SMOOTH, 0};
     b->ops->emit_d(b, p->in, &p->wo, df);
     a->emission =
         fmax(a->emission, imp__bsdf_derivative_error(b, p->in, &d, emit_value, df,
@@ -198,7 +198,7 @@ static void albedo_take(const struct imp__selftest *t, struct point *p, int i, i
         const struct imp_key key =
             imp__key(t->options.seed, 300 + (uint64_t)i, (uint64_t)k);
         const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
-        struct imp_dirs d = {p->wo, {0}, IMP_SMOOTH, false};
+        struct imp_dirs d = {p->wo, {0}, IMP_SMOOTH, 0};
         const bool ok = p->b->ops->sample(p->b, p->in, u, &d);
         const double pdf = ok ? p->b->ops->pdf(p->b, p->in, &d) : 0;
         for (int c = 0; c < t->scene->channels; c++) {

@@ -36,7 +36,7 @@ const struct imp_bsdf_ops *const imp__bsdf_kinds[] = {BSDFS(ADDRESS) NULL};
 void imp__bsdf_albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                       imp_spec *albedo)
 {
-    const struct imp_dirs dirs = {*wo, imp__v3(0, 0, 1), IMP_SMOOTH, false};
+    const struct imp_dirs dirs = {*wo, imp__v3(0, 0, 1), IMP_SMOOTH, 0};
     *albedo = imp__spec(0);
     if (b->ops->albedo) {
         b->ops->albedo(b, in, wo, albedo);
