@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * Checks of a problem of bent rays: identities that its gradient must satisfy, and the
  * error of its step. */
 #include "bend_problem.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * Fits: a problem's objective is minimised level by level by the optimisers of
  * src/search. Each level refines the grid by a prolongation P that keeps the field, and
  * may carry the optimiser's memory: steps s become P s and gradients g become P g / 8,

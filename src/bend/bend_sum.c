@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * A sum of fields. Its theta is that of the parts, one after the other; each part's theta
  * points into it. */
 #include "bend_problem.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * Forward tracing. IMP_LANES rays take whole steps side by side. A step that crosses a
  * surface is shortened to end on it (landing.c); there the ray ends or is reflected. */
 #include "bend_rays.h"

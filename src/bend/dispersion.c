@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * Several wavelengths in one problem. The field is one material of varying density; at
  * wavelength lambda the index is
  *     eta_lambda(x) = 1 + k (eta(x) - 1),  k = (n(lambda) - 1)/(n(reference) - 1)

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * Numbers that a fit may not change, and the bounds of the others. Both are rules,
  * applied again at each level. */
 #include "bend_problem.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * A bent ray inside a body: the chord of each step is intersected with the scene, and the
  * step that hits a shape is shortened to end on it. Same steps and transposes as in
  * bend_trace.c and bend_adjoint.c, for one ray without reflections. */

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * Adjoint and tangent of a bent segment (inside.c), exact for its steps, with respect to
  * the medium's parameters in the scene. */
 #include "inside.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * The adjoint of a ray apart from its whole steps: exit, taps, reflections and start
  * (docs/bent-rays.md 2.3). */
 #include "bend_adjoint.h"

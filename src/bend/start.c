@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * Starts of rays: inside the field with v = eta d, or outside, along a straight line to
  * the surface where they enter. */
 #include "bend_rays.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
+ *
  * Targets: value, and cotangents of the rays' arrivals (docs/bent-rays.md 4). Means are
  * weighted by the shares of power w_i p_i. */
 #include "bend_problem.h"

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A checker of JSON texts without recursion: brackets that are open are a string, at most 64 of
+ * them. */
 #include "json_text.h"
 #include <string.h>
 

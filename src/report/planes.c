@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Base64, and the channels of a picture as 16-bit floats in planes of low and of high bytes. */
 #include "planes.h"
 #include <half.h> /* of Imath, which comes with OpenEXR */
 #include <math.h>
