@@ -36,13 +36,19 @@ static void print_usage(FILE *to)
                 " 'man importon' explains them.\n");
 }
 
+const struct command *cli_command(const char *name)
+{
+    for (size_t i = 0; i < N_COMMANDS; i++)
+        if (!strcmp(name, commands[i]->args.command)) return commands[i];
+    return NULL;
+}
+
 static const struct command *find(const char *name)
 {
     const char *names[N_COMMANDS + 1] = {0};
-    for (size_t i = 0; i < N_COMMANDS; i++) {
-        names[i] = commands[i]->args.command;
-        if (!strcmp(name, names[i])) return commands[i];
-    }
+    const struct command *command = cli_command(name);
+    if (command) return command;
+    for (size_t i = 0; i < N_COMMANDS; i++) names[i] = commands[i]->args.command;
     const char *near = args_nearest(name, names);
     fprintf(stderr, "importon: unknown command '%s'", name);
     if (near) fprintf(stderr, "; did you mean '%s'?", near);

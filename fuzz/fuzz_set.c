@@ -33,6 +33,12 @@ void *cli_alloc(size_t n, size_t size)
     if (!p) abort();
     return p;
 }
+char *cli_strdup(const char *text)
+{
+    char *copy = strdup(text);
+    if (!copy) abort();
+    return copy;
+}
 int cli_error(int code, const char *format, ...)
 {
     va_list args;

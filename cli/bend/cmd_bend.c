@@ -291,4 +291,5 @@ const struct command command_bend = {
     run,
     0,
     "check ",
-    0};
+    0,
+    REPLAYS_NEVER};

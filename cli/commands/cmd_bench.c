@@ -165,4 +165,5 @@ const struct command command_bench = {
     run_bench,
     1,
     " numbers with a gradient",
-    0};
+    0,
+    REPLAYS_NEVER};

@@ -85,4 +85,5 @@ const struct command command_check = {
     run_check,
     1,
     "method ",
-    1};
+    1,
+    REPLAYS_NEVER};

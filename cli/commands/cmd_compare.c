@@ -112,4 +112,5 @@ const struct command command_compare = {
     run_compare,
     1,
     "mean  ",
-    0};
+    0,
+    REPLAYS_NEVER};

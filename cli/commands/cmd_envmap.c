@@ -52,4 +52,5 @@ const struct command command_envmap = {
     run_envmap,
     0,
     NULL,
-    0};
+    0,
+    REPLAYS_NEVER};

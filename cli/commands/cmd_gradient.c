@@ -23,18 +23,18 @@ static double until;
 static int allocation;
 static const char *const allocation_words[] = {"variance", "even", NULL};
 static const struct arg_option options[] = {
-    {ARG_TEXT, 0, "adjoint", "FILE",
+    {ARG_TEXT | ARG_REPLAYS, 0, "adjoint", "FILE",
      "derivative of sum(FILE * picture), in place of a loss", &adjoint_path, 0, 0, NULL},
-    {ARG_TEXT, 0, "textures", "DIR", "write gradients of textures there, as pictures",
-     &textures, 0, 0, NULL},
-    {ARG_TEXT, 0, "spectra", "DIR",
+    {ARG_TEXT | ARG_ASIDE, 0, "textures", "DIR",
+     "write gradients of textures there, as pictures", &textures, 0, 0, NULL},
+    {ARG_TEXT | ARG_ASIDE, 0, "spectra", "DIR",
      "write gradients to spectra there, as plots over wavelengths", &spectra, 0, 0, NULL},
-    {ARG_NUMBER, 0, "until", "REL",
+    {ARG_NUMBER | ARG_REPLAYS, 0, "until", "REL",
      "take samples, at most --spp, until each parameter's gradient is this close, in 95 "
      "of "
      "100 cases",
      &until, 1e-6, 10, NULL},
-    {ARG_CHOICE, 0, "allocation", "HOW",
+    {ARG_CHOICE | ARG_REPLAYS, 0, "allocation", "HOW",
      "with --until, of samples to tiles of a target: variance (default; by the "
      "gradient's), or even",
      &allocation, 0, 0, allocation_words},
@@ -396,4 +396,5 @@ const struct command command_gradient = {
     run_gradient,
     1,
     " +- ",
-    1};
+    1,
+    REPLAYS_PARTS | REPLAYS_MANIFEST};

@@ -187,4 +187,5 @@ const struct command command_info = {{"info",
                                      run_info,
                                      1,
                                      " triangles)",
-                                     0};
+                                     0,
+                                     REPLAYS_NEVER};

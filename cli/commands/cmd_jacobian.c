@@ -18,11 +18,11 @@ static int separate;
 static const char *sheet_path, *layers_path;
 static struct sheet sheet;
 static const struct arg_option options[] = {
-    {ARG_FLAG, 0, "separate", NULL, "one picture per number, also for colours", &separate,
-     0, 0, NULL},
-    {ARG_TEXT, 0, "sheet", "FILE.png", "one PNG with all the pictures side by side",
-     &sheet_path, 0, 0, NULL},
-    {ARG_TEXT, 0, "layers", "FILE.exr",
+    {ARG_FLAG | ARG_REPLAYS, 0, "separate", NULL,
+     "one picture per number, also for colours", &separate, 0, 0, NULL},
+    {ARG_TEXT | ARG_ASIDE, 0, "sheet", "FILE.png",
+     "one PNG with all the pictures side by side", &sheet_path, 0, 0, NULL},
+    {ARG_TEXT | ARG_ASIDE, 0, "layers", "FILE.exr",
      "one EXR with the picture and its derivatives as layers d.NAME, for viewers",
      &layers_path, 0, 0, NULL},
     {0}};
@@ -277,4 +277,5 @@ const struct command command_jacobian = {
     run_jacobian,
     0,
     NULL,
-    1};
+    1,
+    REPLAYS_PARTS};

@@ -2,7 +2,7 @@
  *
  * importon merge: parts of a run to the whole, or to a larger part. */
 #include "shared/overwrite.h"
-#include "shared/part.h"
+#include "shared/replay.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -13,25 +13,16 @@ static int is_part(const char *path)
     return n > 5 && !strcmp(path + n - 5, ".part");
 }
 
-/* Run the command that made the parts; its walks are in them. */
-static int run_again(const struct imp_parts_info *info)
+/* Run the command that made the parts; its walks are in them. What was given here (-o, --json,
+ * --overwrite) stays as parsed. getopt reorders the words, whose memory is that of the first. */
+static int run_again(const char *path, int n, char **words)
 {
-    int n = 0, used = 0;
-    char **words = part_command_words(info->command, &n);
-    char **argv;
-    if (!words)
-        return cli_error(EXIT_USAGE, "these parts were not made by this command: %s",
-                         info->command);
+    char *const memory = words[0];
+    cli.carried = path;
     const enum imp_status st = imp_context_set_parts(cli.context, cli.parts);
-    if (st != IMP_OK) return cli_fail(st, NULL);
-    argv = cli_alloc((size_t)n + 2, sizeof *argv);
-    argv[used++] = words[0];
-    /* What was given here stays as parsed, but -o, whose place depends on the command. */
-    for (int k = 1; k < n; k++) argv[used++] = words[k];
-    const int rc = cli_run_command(used, argv);
-    free(words[0]);
+    const int rc = st == IMP_OK ? cli_run_command(n, words) : cli_fail(st, NULL);
+    free(memory);
     free(words);
-    free(argv);
     return rc;
 }
 
@@ -44,6 +35,14 @@ static int run_merge(int n, char **operand)
         imp_parts_read(cli.context, (const char *const *)operand, (size_t)n, &cli.parts);
     if (st == IMP_OK) st = imp_parts_get_info(cli.parts, &info);
     if (st != IMP_OK) return cli_fail(st, NULL);
+    char **words = NULL;
+    int n_words = 0;
+    rc = replay_words(operand[0], REPLAYS_PARTS, info.command, &n_words, &words);
+    if (rc) return rc;
+    if (is_part(cli.out) || info.missing) {
+        free(words[0]);
+        free(words);
+    }
     if (is_part(cli.out)) {
         rc = overwrite_check(cli.out, OUTPUT_PART);
         if (rc) return rc;
@@ -54,7 +53,7 @@ static int run_merge(int n, char **operand)
         return EXIT_DONE;
     }
     if (info.missing) return cli_error(EXIT_USAGE, "parts are missing: %s", info.holes);
-    return run_again(&info);
+    return run_again(operand[0], n_words, words);
 }
 
 const struct command command_merge = {
@@ -67,4 +66,5 @@ const struct command command_merge = {
     run_merge,
     0,
     NULL,
-    0};
+    0,
+    REPLAYS_NEVER};

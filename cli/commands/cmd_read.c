@@ -18,7 +18,7 @@ static struct {
 } o;
 
 static const struct arg_option options[] = {
-    {ARG_FLAG, 0, "ends", NULL,
+    {ARG_FLAG | ARG_REPLAYS, 0, "ends", NULL,
      "read from both ends, and compare: exit status 1 if they differ", &o.ends, 0, 0,
      NULL},
     {0}};
@@ -294,4 +294,5 @@ const struct command command_read = {
     run_read,
     1,
     NULL,
-    0};
+    0,
+    REPLAYS_PARTS};

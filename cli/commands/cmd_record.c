@@ -111,4 +111,5 @@ const struct command command_record = {
     run_record,
     0,
     NULL,
-    1};
+    1,
+    REPLAYS_NEVER};

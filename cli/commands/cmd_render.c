@@ -26,16 +26,17 @@ static struct {
 } o = {.pixel = {NO_PIXEL, NO_PIXEL}};
 
 static const struct arg_option options[] = {
-    {ARG_FLAG, 0, "se", NULL, "add the standard error of every channel to the EXR file",
-     &o.picture.standard_error, 0, 0, NULL},
-    {ARG_FLAG, 0, "denoise", NULL,
+    {ARG_FLAG | ARG_REPLAYS, 0, "se", NULL,
+     "add the standard error of every channel to the EXR file", &o.picture.standard_error,
+     0, 0, NULL},
+    {ARG_FLAG | ARG_REPLAYS, 0, "denoise", NULL,
      "without noise, by Open Image Denoise; such a picture has no standard errors",
      &o.denoise, 0, 0, NULL},
-    {ARG_FLAG, 0, "half", NULL, "16-bit floats in the EXR file", &o.picture.half, 0, 0,
-     NULL},
-    {ARG_NUMBER, 0, "exposure", "STOPS", "exposure of the PNG preview",
+    {ARG_FLAG | ARG_REPLAYS, 0, "half", NULL, "16-bit floats in the EXR file",
+     &o.picture.half, 0, 0, NULL},
+    {ARG_NUMBER | ARG_REPLAYS, 0, "exposure", "STOPS", "exposure of the PNG preview",
      &o.picture.exposure, -100, 100, NULL},
-    {ARG_FLAG, 0, "no-preview", NULL, "write no PNG beside the picture",
+    {ARG_FLAG | ARG_REPLAYS, 0, "no-preview", NULL, "write no PNG beside the picture",
      &o.picture.no_preview, 0, 0, NULL},
     {ARG_PAIR, 0, "pixel", "X,Y", "print one walk of this pixel, vertex by vertex",
      o.pixel, 0, 0, NULL},
@@ -46,7 +47,7 @@ static const struct arg_option options[] = {
      NULL},
     {ARG_INT, 0, "count", "N", "number of walks for --paths (default 100)", &o.count, 1,
      1e7, NULL},
-    {ARG_NUMBER, 0, "until", "REL",
+    {ARG_NUMBER | ARG_REPLAYS, 0, "until", "REL",
      "take samples, at most --spp, until the picture is this close, in 95 of 100 cases",
      &o.until, 1e-6, 10, NULL},
     {ARG_FLAG, 0, "verify-sampling", NULL,
@@ -90,7 +91,8 @@ static int write_paths(const struct imp_run *run)
     return rc ? rc : cli_done();
 }
 
-/* The scene's file name with the extension of its film's format, in the working folder. */
+/* The scene's file name, or that of the part that is merged, with the extension of its film's
+ * format, in the working folder. */
 static char *default_output(const struct imp_run *run)
 {
     struct imp_sensor_info info = {.size = sizeof info};
@@ -100,8 +102,10 @@ static char *default_output(const struct imp_run *run)
         if (!strcmp(info.file_format, "pfm")) extension = "pfm";
         if (!strcmp(info.file_format, "rgbe")) extension = "hdr";
     }
-    const char *base = strrchr(cli.scene_path, '/');
-    base = base ? base + 1 : cli.scene_path;
+    /* A part that somebody sent does not choose where the picture goes: its own name does. */
+    const char *from = cli.carried ? cli.carried : cli.scene_path;
+    const char *base = strrchr(from, '/');
+    base = base ? base + 1 : from;
     if (base[0] == '<') base = "render"; /* stdin */
     const char *dot = strrchr(base, '.');
     const int stem = dot && dot > base ? (int)(dot - base) : (int)strlen(base);
@@ -326,4 +330,5 @@ const struct command command_render = {
     run_render,
     0,
     "walk: pixel",
-    1};
+    1,
+    REPLAYS_PARTS | REPLAYS_MANIFEST};

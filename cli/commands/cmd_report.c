@@ -352,4 +352,5 @@ const struct command command_report = {
     run_report,
     0,
     NULL,
-    0};
+    0,
+    REPLAYS_NEVER};

@@ -116,4 +116,5 @@ const struct command command_selftest = {
     run_selftest,
     1,
     "object ",
-    0};
+    0,
+    REPLAYS_NEVER};

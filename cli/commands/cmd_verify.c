@@ -2,8 +2,8 @@
  *
  * importon verify: does a result agree with its manifest? Its files are compared with their
  * hashes, and the command that made it is run again, all of it or a random part. */
-#include "shared/part.h"
 #include "shared/ranks.h"
+#include "shared/replay.h"
 
 #include <fcntl.h>
 #include <stdlib.h>
@@ -59,15 +59,8 @@ static int verdict(const char *path, const struct imp_manifest_info *info, int r
 }
 
 /* Its answers are not printed a second time. */
-static int run_silently(const char *command)
+static int run_silently(int n, char **words)
 {
-    int n = 0, used = 0;
-    char **words = part_command_words(command, &n);
-    if (!words)
-        return cli_error(EXIT_USAGE, "this manifest was not made by this command: %s",
-                         command);
-    char **argv = cli_alloc((size_t)n + 1, sizeof *argv);
-    for (int k = 0; k < n; k++) argv[used++] = words[k];
     fflush(stdout);
     const int kept = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3),
               nothing = open("/dev/null", O_WRONLY | O_CLOEXEC), json = cli.json;
@@ -76,15 +69,12 @@ static int run_silently(const char *command)
     const int quiet = cli.quiet;
     cli.verifies = cli.quiet = 1;
     cli.out = NULL;
-    const int rc = cli_run_command(used, argv);
+    const int rc = cli_run_command(n, words);
     fflush(stdout);
     dup2(kept, STDOUT_FILENO);
     close(kept);
     cli.json = json;
     cli.quiet = quiet;
-    free(words[0]);
-    free(words);
-    free(argv);
     return rc;
 }
 
@@ -106,11 +96,19 @@ static int run_verify(int n, char **operand)
         imp_manifest_read(cli.context, path, o.fraction, o.seed, &cli.manifest);
     if (st == IMP_OK) st = imp_manifest_get_info(cli.manifest, &info);
     if (st != IMP_OK) return cli_fail(st, NULL);
+    char **words = NULL;
+    int n_words = 0;
+    rc = replay_words(path, REPLAYS_MANIFEST, info.command, &n_words, &words);
+    if (rc) return rc;
+    char *const memory = words[0]; /* getopt reorders the words */
     if (o.fraction < 1 && info.n_sums == 0) {
         cli_say("%s: has no sums of parts: all is computed again", path);
         o.fraction = 1;
     }
-    if (!info.refuted) rc = run_silently(info.command);
+    cli.carried = path;
+    if (!info.refuted) rc = run_silently(n_words, words);
+    free(memory);
+    free(words);
     imp_manifest_get_info(cli.manifest, &info);
     if (!rc && !info.refuted && o.fraction < 1 && info.n_verified == 0)
         return cli_error(EXIT_USAGE,
@@ -129,4 +127,5 @@ const struct command command_verify = {
     run_verify,
     1,
     NULL,
-    1};
+    1,
+    REPLAYS_NEVER};

@@ -362,4 +362,5 @@ const struct command command_whatif = {
     run_whatif,
     0,
     NULL,
-    0};
+    0,
+    REPLAYS_NEVER};

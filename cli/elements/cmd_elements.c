@@ -277,4 +277,5 @@ const struct command command_elements = {
     run_elements,
     0,
     NULL,
-    1};
+    1,
+    REPLAYS_NEVER};

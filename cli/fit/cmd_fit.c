@@ -22,13 +22,13 @@ static struct {
 } o;
 
 static const struct arg_option options[] = {
-    {ARG_TEXT, 0, "checkpoint", "FILE",
+    {ARG_TEXT | ARG_ASIDE, 0, "checkpoint", "FILE",
      "save the state while the fit runs, and at Ctrl-C", &o.checkpoint, 0, 0, NULL},
-    {ARG_FLAG, 0, "resume", NULL, "continue from the checkpoint, if it exists", &o.resume,
-     0, 0, NULL},
-    {ARG_INT, 0, "picture-spp", "N", "samples per pixel of the pictures written",
-     &o.picture_spp, 1, 1e9, NULL},
-    {ARG_TEXT, 0, "sheet", "FILE.png",
+    {ARG_FLAG | ARG_ASIDE, 0, "resume", NULL,
+     "continue from the checkpoint, if it exists", &o.resume, 0, 0, NULL},
+    {ARG_INT | ARG_REPLAYS, 0, "picture-spp", "N",
+     "samples per pixel of the pictures written", &o.picture_spp, 1, 1e9, NULL},
+    {ARG_TEXT | ARG_ASIDE, 0, "sheet", "FILE.png",
      "one PNG of before, target and recovered (with -o)", &o.sheet, 0, 0, NULL},
     {0}};
 
@@ -129,4 +129,5 @@ const struct command command_fit = {
     run_fit,
     0,
     NULL,
-    1};
+    1,
+    REPLAYS_MANIFEST};

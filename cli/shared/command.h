@@ -21,12 +21,16 @@ enum {
     EXIT_STOP = -1     /* inside: end now, all is done */
 };
 
+/* Files that may carry a command, which merge and verify run again (replay.h). */
+enum replays { REPLAYS_NEVER = 0, REPLAYS_PARTS = 1, REPLAYS_MANIFEST = 2 };
+
 struct command {
     struct args_spec args;
     int (*run)(int n, char **operand);
     int prints;         /* all its data is text, so -o replaces standard output */
     const char *answer; /* in the first line of that text; NULL: none is known */
     int shared;         /* may run in several processes, by mpirun */
+    int replays;        /* enum replays, or-ed */
 };
 extern const struct command command_render, command_gradient, command_jacobian,
     command_check, command_selftest, command_fit, command_compare, command_info,
@@ -60,10 +64,11 @@ struct cli {
     uint64_t seed;
     double time_s;
     const char *manifest_path;
-    int no_manifest;             /* none beside an output file */
-    imp_manifest *manifest;      /* in the making, or what is verified */
-    int verifies;                /* results are compared, and not written */
-    int mpi_files;               /* how ranks read files: as it is written */
+    int no_manifest;        /* none beside an output file */
+    imp_manifest *manifest; /* in the making, or what is verified */
+    const char *carried;    /* the file that carries this command; NULL: it was typed */
+    int verifies;           /* results are compared, and not written */
+    int mpi_files;          /* how ranks read files: as it is written */
     const char *part, *part_out; /* "I/N", and where it goes */
     imp_parts *parts;            /* the part in the making, or those that are merged */
     int upsampling, wavelengths, wavelength_set, from, points;
@@ -80,6 +85,8 @@ struct cli {
 };
 extern struct cli cli;
 
+/* The command of this name, or NULL. */
+const struct command *cli_command(const char *name);
 /* Run a command as if typed: argv[0] is its name. Returns an exit code. */
 int cli_run_command(int argc, char **argv);
 

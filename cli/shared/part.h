@@ -13,11 +13,4 @@ int part_open(void);
 /* The part is computed: write it. EXIT_STOP, or an exit code. */
 int part_end(void);
 
-/* The command without the names of its outputs, as a line; the caller frees it. NULL: no
- * memory. */
-char *part_command(void);
-/* The words that a command consists of, from the text that parts carry: argv, ends with
- * NULL, [*argc]. NULL if the text is none. The caller frees argv and argv[0]. */
-char **part_command_words(const char *text, int *argc);
-
 #endif

@@ -3,9 +3,9 @@
  * Manifests of render, gradient and fit. */
 #include "proof.h"
 #include "overwrite.h"
-#include "part.h"
 #include "problem_options.h"
 #include "ranks.h"
+#include "replay.h"
 #include "text/progress.h"
 
 #include <stdlib.h>
@@ -20,18 +20,11 @@ static char *beside; /* path of a manifest without --manifest; NULL: none */
 
 static int status(enum imp_status st) { return st == IMP_OK ? 0 : cli_fail(st, NULL); }
 
-static int is_manifest_command(void)
-{
-    static const char *const commands[] = {"render", "gradient", "fit"};
-    for (size_t k = 0; k < sizeof commands / sizeof *commands; k++)
-        if (!strcmp(cli.name, commands[k])) return 1;
-    return 0;
-}
-
 /* Why the run cannot be repeated; NULL: it can. */
 static const char *unrepeatable(void)
 {
-    if (!is_manifest_command()) return "--manifest is for render, gradient and fit";
+    if (!(cli_command(cli.name)->replays & REPLAYS_MANIFEST))
+        return "--manifest is for render, gradient and fit";
     if (cli.time_s > 0)
         return "--manifest and --time do not go together: a clock cannot be repeated";
     for (int k = 0; k < cli.n_operands; k++)
@@ -46,9 +39,17 @@ int manifest_open(void)
     const char *why = unrepeatable();
     if (!cli.manifest_path && (cli.no_manifest || why)) return 0;
     if (why) return cli_error(EXIT_USAGE, "%s: %s", cli.name, why);
+    const char *unfit = replay_unfit();
+    if (unfit && !cli.manifest_path) return 0;
+    if (unfit)
+        return cli_error(
+            EXIT_USAGE,
+            "%s: --manifest and %s do not go together: no manifest may carry "
+            "this option",
+            cli.name, unfit);
     int rc = cli.manifest_path ? overwrite_check(cli.manifest_path, OUTPUT_MANIFEST) : 0;
     if (rc) return rc;
-    char *text = part_command();
+    char *text = replay_line();
     if (!text) return cli_error(EXIT_RUN, "out of memory");
     rc = status(imp_manifest_create(cli.context, text, &cli.manifest));
     free(text);

@@ -7,6 +7,7 @@
 #include "ranks.h"
 
 #include <errno.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -79,21 +80,61 @@ out:
 
 #define SET_FILE_MAX ((size_t)256 << 20) /* ten million numbers of 17 digits */
 
+/* Files that were read before their settings are applied. */
+static struct held {
+    char *path, *text;
+    size_t length;
+} * held;
+static size_t n_held;
+
+static char *file_read(const char *path, size_t *length)
+{
+    FILE *f = fopen(path, "r");
+    if (!f) return NULL;
+    char *text = read_all(f, SET_FILE_MAX, length);
+    const int code = errno;
+    fclose(f);
+    errno = code;
+    return text;
+}
+
+const char *settings_hold(const char *path, size_t *length)
+{
+    char *text = file_read(path, length);
+    if (!text) return NULL;
+    struct held *grown = realloc(held, (n_held + 1) * sizeof *grown);
+    if (!grown) exit(cli_error(EXIT_RUN, "out of memory"));
+    held = grown;
+    held[n_held++] = (struct held){cli_strdup(path), text, *length};
+    return text;
+}
+
+/* The first of this name is given away; else the file is read. */
+static char *held_take(const char *path, size_t *length)
+{
+    for (size_t k = 0; k < n_held; k++) {
+        if (!held[k].text || strcmp(held[k].path, path) != 0) continue;
+        char *text = held[k].text;
+        *length = held[k].length;
+        free(held[k].path);
+        held[k] = (struct held){NULL, NULL, 0};
+        return text;
+    }
+    return file_read(path, length);
+}
+
 /* "@FILE": one ID=VALUE a line; empty lines and lines that begin with # are skipped. */
 static int apply_set_file(const char *path)
 {
-    FILE *f = ranks_reads() ? fopen(path, "r") : NULL;
+    const bool reads = ranks_reads();
     size_t length = 0, number = 0;
     int rc = 0;
-    if (!f && ranks_reads())
-        return cli_error(EXIT_USAGE, "--set @%s: %s", path, strerror(errno));
-    char *text = f ? read_all(f, SET_FILE_MAX, &length) : NULL;
+    char *text = reads ? held_take(path, &length) : NULL;
     const int code = errno;
-    if (f) fclose(f);
-    if (f && !text && code == EFBIG)
+    if (reads && !text && code == EFBIG)
         return cli_error(EXIT_USAGE, "--set @%s: not shorter than %zu MiB", path,
                          SET_FILE_MAX >> 20);
-    if (f && !text)
+    if (reads && !text)
         return cli_error(code == ENOMEM ? EXIT_RUN : EXIT_USAGE, "--set @%s: %s", path,
                          strerror(code));
     if (cli.mpi_files == 0 && (rc = ranks_broadcast(&text, &length))) return rc;

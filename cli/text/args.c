@@ -78,11 +78,28 @@ static int parse_int(const char *text, double lo, double hi, int *out)
     return 1;
 }
 
+static int is_flag(const struct arg_option *o)
+{
+    return (o->type & ARG_KIND) == ARG_FLAG;
+}
+
+const struct arg_option *args_find(const struct args_spec *spec, const char *word)
+{
+    if (strncmp(word, "--", 2) != 0) return NULL;
+    const size_t n = strcspn(word + 2, "=");
+    for (int g = 0; spec->group[g]; g++)
+        for (const struct arg_option *o = spec->group[g]; o->type; o++)
+            if (strlen(o->name) == n && !strncmp(o->name, word + 2, n) &&
+                is_flag(o) == !word[2 + n])
+                return o;
+    return NULL;
+}
+
 /* Store the value of one option; 0: the value is not good. */
 static int store(const struct arg_option *o, const char *text)
 {
     char *end;
-    switch (o->type) {
+    switch ((enum arg_type)(o->type & ARG_KIND)) {
     case ARG_END: return 0;
     case ARG_FLAG: *(int *)o->target = 1; return 1;
     case ARG_INT: return parse_int(text, o->lo, o->hi, o->target);
@@ -124,7 +141,7 @@ static void explain_value(const struct args_spec *spec, const struct arg_option 
 {
     fprintf(stderr, "importon: %s: --%s %s is not good: expected ", spec->command,
             o->name, text);
-    switch (o->type) {
+    switch ((enum arg_type)(o->type & ARG_KIND)) {
     case ARG_CHOICE:
         for (int i = 0; o->words[i]; i++)
             fprintf(stderr, "%s%s", i ? ", " : "one of ", o->words[i]);
@@ -175,7 +192,7 @@ static int takes_patterns(const struct args_spec *spec)
 {
     for (int g = 0; spec->group[g]; g++)
         for (const struct arg_option *o = spec->group[g]; o->type; o++)
-            if (o->type == ARG_LIST && !strncmp(o->value, "GLOB", 4) &&
+            if ((o->type & ARG_KIND) == ARG_LIST && !strncmp(o->value, "GLOB", 4) &&
                 ((const struct arg_list *)o->target)->n > 0)
                 return 1;
     return 0;
@@ -200,12 +217,12 @@ int args_parse(const struct args_spec *spec, int argc, char **argv, int *first,
     const int n = flatten(spec, all);
 
     for (int i = 0; i < n; i++) {
-        options[i] = (struct option){
-            all[i]->name, all[i]->type == ARG_FLAG ? no_argument : required_argument,
-            NULL, 256 + i};
+        options[i] = (struct option){all[i]->name,
+                                     is_flag(all[i]) ? no_argument : required_argument,
+                                     NULL, 256 + i};
         if (!all[i]->letter) continue;
         *letter++ = all[i]->letter;
-        if (all[i]->type != ARG_FLAG) *letter++ = ':';
+        if (!is_flag(all[i])) *letter++ = ':';
     }
     opterr = 0;
     optind = 1;
@@ -233,7 +250,7 @@ int args_parse(const struct args_spec *spec, int argc, char **argv, int *first,
             explain_value(spec, o, optarg);
             return usage_error(spec);
         }
-        typed_add(typed, o, o->type == ARG_FLAG ? NULL : optarg);
+        typed_add(typed, o, is_flag(o) ? NULL : optarg);
     }
     *first = optind;
     if (argc - optind < spec->min_operands) {
@@ -296,7 +313,7 @@ int args_help_option(const struct args_spec *spec, const char *name, FILE *to)
     for (int g = 0; spec->group[g]; g++)
         for (const struct arg_option *o = spec->group[g]; o->type; o++) {
             if (strcmp(name, o->name) && !(name[0] == o->letter && !name[1])) continue;
-            if (o->type == ARG_CHOICE)
+            if ((o->type & ARG_KIND) == ARG_CHOICE)
                 for (int i = 0; o->words[i]; i++) fprintf(to, "%s\n", o->words[i]);
             else if (o->value) fprintf(to, "%s\n", o->value);
             return 0;

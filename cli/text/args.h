@@ -20,14 +20,25 @@ enum arg_type {
     ARG_PAIR    /* int[2]: "x,y" */
 };
 
+/* Or-ed to the type. A file that another person sends (a part, a manifest) carries a command, and
+ * only options with ARG_REPLAYS: they choose what is computed, and never a place to write to, a
+ * place to send to, or how the user's files are treated. An option without either is refused
+ * there, and does not go together with --part and --manifest. */
+enum {
+    ARG_KIND = 0xf,
+    ARG_REPLAYS = 0x10,
+    ARG_ASIDE =
+        0x20 /* it does not change the result: it is left out of what is carried */
+};
+
 struct arg_list {
     const char **item;
     size_t n;
 };
 
 struct arg_option { /* tables end with {0} */
-    enum arg_type type;
-    char letter; /* 0: long name only */
+    int type;       /* enum arg_type, with ARG_REPLAYS or ARG_ASIDE */
+    char letter;    /* 0: long name only */
     const char *name;
     const char *value; /* what help calls the value; NULL for flags */
     const char *help;
@@ -55,6 +66,9 @@ void args_help(const struct args_spec *spec, FILE *to);
 int args_help_option(const struct args_spec *spec, const char *name, FILE *to);
 void args_list_add(struct arg_list *list, const char *item);
 void args_list_free(struct arg_list *list);
+
+/* The option that "--name" or "--name=value" spells out in full, or NULL. */
+const struct arg_option *args_find(const struct args_spec *spec, const char *word);
 
 /* The word of `words` (NULL-terminated) with the smallest edit distance, or NULL if none
  * is close. */

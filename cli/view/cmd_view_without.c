@@ -19,4 +19,5 @@ const struct command command_view = {
     run,
     0,
     NULL,
-    0};
+    0,
+    REPLAYS_NEVER};

@@ -216,7 +216,8 @@ imp_manifest_create(imp_context *context, const char *command, imp_manifest **ou
  * are kept of each. @return IMP_OK; IMP_E_ARG. */
 IMP_API enum imp_status imp_manifest_set_limit(imp_manifest *manifest, size_t bytes);
 /** Read one, to verify it: files that are read from now on are compared with its inputs,
- * and its output files are read and compared now.
+ * and its output files are read and compared now. What is no input of it, or has other
+ * bytes, is not taken: the call that reads it returns IMP_E_IO.
  * @param fraction of the chunks that the calls after imp_context_set_manifest compute
  *        again, 0 < fraction <= 1; 1 where the manifest has no sums.
  * @param seed which they are.

@@ -35,8 +35,9 @@ struct imp_context {
     struct imp__error_text *errors; /* list of all threads' texts, freed at the end */
     struct imp_pool *pool;          /* made on first use */
     struct imp__team *team;         /* NULL: alone */
-    /* Called with every file that is read whole; NULL: not called. */
-    void (*on_read)(void *payload, const char *path, const void *bytes, size_t n);
+    /* Called with every file that is read whole, and may refuse it; NULL: not called. */
+    enum imp_status (*on_read)(void *payload, const char *path, const void *bytes,
+                               size_t n);
     void *on_read_payload;
     struct imp_registered *kinds;
     bool has_scenes;      /* one was made: kinds are not registered any more */

@@ -106,9 +106,11 @@ enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
         st = imp__file_read_own(ctx, path, limit, &bytes);
     if (broadcasts) st = imp__team_broadcast(ctx, st, &bytes);
     if (st != IMP_OK) return st;
-    if (ctx->on_read) ctx->on_read(ctx->on_read_payload, path, bytes.data, bytes.size);
-    *out = bytes;
-    return IMP_OK;
+    if (ctx->on_read)
+        st = ctx->on_read(ctx->on_read_payload, path, bytes.data, bytes.size);
+    if (st == IMP_OK) *out = bytes;
+    else imp__bytes_free(ctx, &bytes);
+    return st;
 }
 
 bool imp__file_exists(imp_context *ctx, const char *path)

@@ -42,8 +42,8 @@ bool imp__manifest_add(imp_manifest *m, enum imp__item_kind kind, const char *na
     return i->name != NULL;
 }
 
-/* Keep it; or compare it with what was kept. */
-static void item_note(imp_manifest *m, enum imp__item_kind kind, const char *name,
+/* Keep it; or compare it with what was kept. False: it is not as it was. */
+static bool item_note(imp_manifest *m, enum imp__item_kind kind, const char *name,
                       const void *bytes, size_t n)
 {
     static const char *const what[] = {"the file", "the result", "the file"};
@@ -54,21 +54,26 @@ static void item_note(imp_manifest *m, enum imp__item_kind kind, const char *nam
         if (!i) m->no_memory |= !imp__manifest_add(m, kind, name, n, hash);
         else if (i->hash != hash || i->size != n)
             refute(m, what[kind], name, "changed while it was read");
-        return;
+        return true;
     }
     if (!i) {
         refute(m, what[kind], name, "is not one of the manifest");
-        return;
+        return false;
     }
     i->met = true;
-    if (i->hash != hash || i->size != n)
-        refute(m, what[kind], name,
-               kind == IMP_ITEM_RESULT ? "has other bits" : "was changed");
+    if (i->hash == hash && i->size == n) return true;
+    refute(m, what[kind], name,
+           kind == IMP_ITEM_RESULT ? "has other bits" : "was changed");
+    return false;
 }
 
-static void on_read(void *payload, const char *path, const void *bytes, size_t n)
+/* What a manifest does not list, or lists with other bytes, is not looked into. */
+static enum imp_status on_read(void *payload, const char *path, const void *bytes,
+                               size_t n)
 {
-    item_note(payload, IMP_ITEM_INPUT, path, bytes, n);
+    imp_manifest *m = payload;
+    if (item_note(m, IMP_ITEM_INPUT, path, bytes, n)) return IMP_OK;
+    return imp__error(m->ctx, IMP_E_IO, "%s", m->refuted);
 }
 
 /* ---- The team that keeps, and verifies ------------------------------------------------ */

@@ -17,14 +17,18 @@ enum { SIDE = 24, PIXELS = SIDE * SIDE * 3 };
 static char folder[64], scene_path[96], proof[96], output[96];
 static float target[PIXELS];
 
-static imp_scene *scene_load(imp_context *ctx)
+static enum imp_status scene_read(imp_context *ctx, imp_scene **s)
 {
-    imp_scene *s;
     const char *const defines[] = {"res=24"};
     struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
     o.defines = defines;
     o.n_defines = 1;
-    test_must(ctx, imp_scene_load(ctx, scene_path, &o, &s));
+    return imp_scene_load(ctx, scene_path, &o, s);
+}
+static imp_scene *scene_load(imp_context *ctx)
+{
+    imp_scene *s;
+    test_must(ctx, scene_read(ctx, &s));
     return s;
 }
 
@@ -98,8 +102,8 @@ static const char *verify(enum job job, double fraction, int threads,
     if (st != IMP_OK) {
         snprintf(found, sizeof found, "%s", imp_last_error(ctx));
     } else {
-        s = scene_load(ctx);
-        st = job_run(ctx, s, job, m, result, &n);
+        st = scene_read(ctx, &s);
+        if (st == IMP_OK) st = job_run(ctx, s, job, m, result, &n);
         snprintf(found, sizeof found, "%s", st == IMP_OK ? "" : imp_last_error(ctx));
         if (st == IMP_OK)
             test_must(ctx, imp_manifest_result(m, "numbers", result, n * sizeof *result));
