@@ -30,9 +30,15 @@ install_packages() {
         as_root=(sudo)
     fi
     log=$(mktemp)
-    "${as_root[@]}" apt-get update -qq >"$log" 2>&1 || true # an old list may still do
+    # Another program may hold the installer's lock: apt-get waits for it, for as long as this.
+    local wait=(-o DPkg::Lock::Timeout=600)
+    if ! "${as_root[@]}" apt-get check -qq >"$log" 2>&1 && grep -q 'get lock' "$log"; then
+        say "another program holds the installer's lock: waiting for it, 10 minutes at most"
+    fi
+    # An old list may still do.
+    "${as_root[@]}" apt-get "${wait[@]}" update -qq >"$log" 2>&1 || true
     "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-        apt-get install -y -qq --no-install-recommends "${missing[@]}" >>"$log" 2>&1 ||
+        apt-get "${wait[@]}" install -y -qq --no-install-recommends "${missing[@]}" >>"$log" 2>&1 ||
         { cat "$log" >&2; die "apt-get could not install ${missing[*]}"; }
     rm -f "$log"
 }
