@@ -217,7 +217,7 @@ static void unlit_tell(struct json *j, const int *sensor, int n)
         if (cli.json) json_text(j, NULL, info.name);
         cli_say(
             "importon: warning: sensor '%s' (%s): no walk brought light to it, and its "
-            "error of 0 tells nothing: is it in the dark, or do walks of the other end "
+            "error of 0 means nothing: is it in the dark, or do walks of the other end "
             "find it?",
             info.name, info.type);
     }

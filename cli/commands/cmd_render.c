@@ -51,7 +51,7 @@ static const struct arg_option options[] = {
      "take samples, at most --spp, until the picture is this close, in 95 of 100 cases",
      &o.until, 1e-6, 10, NULL},
     {ARG_FLAG, 0, "verify-sampling", NULL,
-     "compare the picture with one of uniform directions, and tell who delivers its "
+     "compare the picture with one of uniform directions, and show what delivers its "
      "light",
      &o.sampling, 0, 0, NULL},
     {0}};
@@ -264,8 +264,8 @@ static int run_render(int n, char **operand)
     if (o.count && !o.paths) return cli_error(EXIT_USAGE, "--count needs --paths");
     if (o.denoise && o.picture.standard_error)
         return cli_error(EXIT_USAGE,
-                         "--denoise and --se: how far a denoised picture is off "
-                         "nobody knows");
+                         "--denoise and --se: the error of a denoised picture "
+                         "is not known");
     if (o.denoise && (one || o.paths))
         return cli_error(EXIT_USAGE, "--denoise is of pictures, not of walks");
     if (o.denoise && !cli.part) { /* before the time of a picture is spent */

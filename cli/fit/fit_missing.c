@@ -51,7 +51,7 @@ void fit_missing_print(const struct fit_answer *a)
     for (size_t k = 0; k < a->n_missing && n < MOST; k++)
         if (a->missing[k].chance < CHANCE) named[n++] = &a->missing[k];
     if (n == 0) {
-        printf("no number that is not fitted stands out of the noise\n");
+        printf("no parameter that is not fitted is significant\n");
         return;
     }
     int width = 0;

@@ -88,12 +88,12 @@ const struct arg_option options_run[] = {
      "show pictures in a viewer that listens there (tev: port 14158)", &cli.display, 0, 0,
      NULL},
     {ARG_CHOICE | ARG_REPLAYS, 0, "from", "END",
-     "end at which walks begin: scene (as its integrator says, default), sensor or "
+     "end at which walks begin: scene (as its integrator has it, default), sensor or "
      "lights",
      &cli.from, 0, 0, from_words},
     {ARG_CHOICE | ARG_REPLAYS, 0, "points", "KIND",
-     "random numbers of a pixel's samples: independent, sobol, or scene (default: what "
-     "the scene's sampler says)",
+     "random numbers of a pixel's samples: independent, sobol, or scene (default: those "
+     "of the scene's sampler)",
      &cli.points, 0, 0, point_words},
     {0}};
 

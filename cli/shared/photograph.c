@@ -92,11 +92,10 @@ void photograph_warn_clipped(const char *spec, const struct imp_target *t)
         clipped += over && !(t->weights && t->weights[i] == 0);
     }
     if (clipped)
-        cli_say(
-            "importon: warning: %s: %zu of %zu pixels are as bright as the file can "
-            "hold, and may have been brighter: say so with --clip auto, or leave them "
-            "out with --mask",
-            spec, clipped, (size_t)t->width * (size_t)t->height);
+        cli_say("importon: warning: %s: %zu of %zu pixels are as bright as the file can "
+                "hold, and may have been brighter: give --clip auto, or leave them "
+                "out with --mask",
+                spec, clipped, (size_t)t->width * (size_t)t->height);
 }
 
 int photograph_levels(const char *spec, const char *text, const struct imp_target *t,
@@ -108,8 +107,8 @@ int photograph_levels(const char *spec, const char *text, const struct imp_targe
     if (!strcmp(text, "auto")) {
         if (!e.srgb)
             return cli_error(EXIT_USAGE,
-                             "--clip auto: %s holds floating-point numbers, and does not "
-                             "say where they were clipped: give --clip LOW,HIGH",
+                             "--clip auto: %s holds floating-point numbers, and not "
+                             "the level where they were clipped: give --clip LOW,HIGH",
                              spec);
         file_levels(&e, low, high);
     } else {

@@ -30,7 +30,7 @@ void until_say(const char *what, const struct imp_until_end *end)
 {
     cli_say("%s: within %.3g of itself in 95 of 100 cases%s (%lld sample%s, %d look%s)",
             what, end->relative,
-            end->reached ? "" : ", which is not what --until asks for",
+            end->reached ? "" : ", which is more than --until allows",
             (long long)end->spp, plural(end->spp), end->looks, plural(end->looks));
 }
 

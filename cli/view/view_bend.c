@@ -193,7 +193,7 @@ static int work(void)
             snprintf(text, sizeof text, "%s%s%s",
                      !b.fits ? "there is no target to fit to"
                      : whole ? "the fit has ended"
-                             : "the fit stands still",
+                             : "the fit is paused",
                      *said ? "; " : "", said);
             view_state(whole ? VIEW_DONE : VIEW_STOPPED, text);
         }

@@ -272,8 +272,8 @@ static int work(void)
         if (rc) return rc;
         if (!view_asked()) {
             snprintf(text, sizeof text, "%s%s%s",
-                     whole ? "the fit has ended" : "the fit stands still",
-                     *said ? "; " : "", said);
+                     whole ? "the fit has ended" : "the fit is paused", *said ? "; " : "",
+                     said);
             view_state(whole ? VIEW_DONE : VIEW_STOPPED, text);
         }
         moved = false;

@@ -249,7 +249,7 @@ imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
         IMP_TRY(imp__error(
             ctx, IMP_E_BIAS,
             "rays of scheme arc-index cannot be run backwards without bias: use "
-            "stored trajectories, or ask for the pseudo-reverse by name"));
+            "stored trajectories, or choose the pseudo-reverse by name"));
     if (plan.options.way == IMP_BEND_PSEUDO && !plan.scheme->index_form)
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "pseudo-reverse belongs to scheme arc-index"));
     if (job.tap_bars)

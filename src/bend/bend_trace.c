@@ -350,7 +350,7 @@ enum imp_status imp_bend_trace(const imp_field *field,
     enum imp_status st = imp__plan_create(field, options, rays, &plan);
     if (st != IMP_OK) return st;
     if (plan.n_taps > 0 && !taps)
-        IMP_TRY(imp__error(plan.ctx, IMP_E_ARG, "taps are asked for and have no room"));
+        IMP_TRY(imp__error(plan.ctx, IMP_E_ARG, "taps are wanted and have no room"));
     struct job job = {&plan, rays, exits, taps};
     const struct imp_loop loop = {.n_items = (rays->n + CHUNK - 1) / CHUNK,
                                   .work = job_work,

@@ -225,11 +225,11 @@ enum imp_status imp__el_roots(imp_elements *e)
     if (scene->world)
         IMP_TRY(imp__error(e->ctx, IMP_E_UNSUPPORTED,
                            "the scene has instances: finite elements keep numbers for "
-                           "each place, and take shapes that stand there by themselves"));
+                           "each place, and take shapes that are placed by themselves"));
     for (int i = 0; i < scene->n_emitters; i++)
         if (scene->emitters[i]->course)
             IMP_TRY(imp__error(e->ctx, IMP_E_UNSUPPORTED,
-                               "emitter '%s' varies in time: finite elements know one "
+                               "emitter '%s' varies in time: finite elements have one "
                                "time",
                                scene->emitters[i]->name));
     for (int i = 0; i < scene->n_emitters; i++)

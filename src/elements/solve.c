@@ -32,7 +32,7 @@ static void tick(imp_elements *e, const char *stage, double fraction, const char
                                    .note = note};
     if (e->opt.progress(&p, e->opt.progress_payload) && !e->stop) {
         e->stop = true;
-        e->reason = "asked to stop";
+        e->reason = "stopped by the caller";
     }
 }
 
@@ -230,8 +230,8 @@ enum imp_status imp_elements_solve(imp_elements *e)
         if (s->links > before + before / 8)
             still = s->change < e->opt.stop ? still + 1 : 0;
         if (still == 2) {
-            e->reason = e->opt.n_sources ? "what was asked for stands still"
-                                         : "the picture stands still";
+            e->reason = e->opt.n_sources ? "the measurements no longer change"
+                                         : "the picture no longer changes";
             break;
         }
     }

@@ -34,7 +34,7 @@ enum imp_status imp__light_films_make(const struct imp_light_picture *p,
     if (!films) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for films"));
     if (p->run->time_limit_s > 0 && p->run->spp == 0)
         IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
-                           "walks from the lights have no time limit; give the samples "
+                           "light tracing has no time limit; give the samples "
                            "per pixel"));
     for (int k = 0; k < n_films; k++)
         IMP_TRY(imp__film_describe(ctx, f->crop_w, f->crop_h, names, &films[k]));
@@ -83,7 +83,7 @@ enum imp_status imp__render_from_lights(const struct imp_measure *m,
         (f->pixel_format == IMP_PIXEL_LUMINANCE_ALPHA ||
          f->pixel_format == IMP_PIXEL_RGBA || f->pixel_format == IMP_PIXEL_XYZA))
         IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
-                           "walks from the lights know no alpha: use pixel_format rgb, "
+                           "light tracing has no alpha: use pixel_format rgb, "
                            "xyz or luminance"));
     struct imp_tracer tracer = {.scene = m->scene,
                                 .integrator = integrator,

@@ -132,7 +132,7 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
     const struct imp_walk_integrator *from = walks;
     if (run->from != IMP_FROM_SCENE && !walks)
         return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                          "integrator %s: the end at which walks begin is asked of "
+                          "integrator %s: the end at which walks begin is chosen for "
                           "integrators of walks alone",
                           scene->integrator->ops->name);
     st = imp__walks_from(scene, walks, run->from, &from);

@@ -89,8 +89,8 @@ enum imp_status imp_render_until(const imp_scene *scene, const struct imp_run *r
         if (!film || !film->se) {
             if (st == IMP_OK)
                 st = imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                                "%s: the picture has no standard errors, so nobody "
-                                "knows when its error is reached",
+                                "%s: the picture has no standard errors, by "
+                                "which a wanted error could be found reached",
                                 __func__);
             goto out;
         }

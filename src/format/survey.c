@@ -215,7 +215,7 @@ static enum imp_status look(struct survey *s, struct imp_node *node, bool *gone)
     }
     if (!r || imp__color_is_object(node) || is_kind(s->scene, r, node)) return IMP_OK;
     const bool nested = strcmp(node->tag, "bsdf") == 0 && node->n_children > 0;
-    IMP_TRY(note(s, node, nested ? "what is nested in it stands for it" : r->lost));
+    IMP_TRY(note(s, node, nested ? "what is nested in it replaces it" : r->lost));
     if (!lenient) return IMP_OK;
     *gone = !r->type;
     if (r->type) IMP_TRY(material_replace(s->scene, node, r->type));

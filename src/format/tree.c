@@ -102,7 +102,7 @@ static enum imp_status place_check(const struct imp_tree *t,
     if (strcmp(parent->tag, "scene") == 0 || (strcmp(parent->tag, "shape") == 0 && group))
         return IMP_OK;
     return imp__loc_error(t->ctx, loc, IMP_E_SCENE,
-                          "shape (%s): it stands in a %s (%s); instances stand in the "
+                          "shape (%s): it is inside a %s (%s); instances belong in the "
                           "scene, or in a shapegroup",
                           type, parent->tag, in);
 }

@@ -130,7 +130,7 @@ static void act_include(struct xml_file *f, const struct xml_attributes *a)
 static void act_path(struct xml_file *f, const struct xml_attributes *a)
 {
     if (f->depth != 1) {
-        imp__xml_fail(f, IMP_E_SCENE, "<path> may only stand in the root of a file");
+        imp__xml_fail(f, IMP_E_SCENE, "<path> belongs in the root of a file");
         return;
     }
     const char *folder;
@@ -265,7 +265,7 @@ void imp__xml_start(struct xml_file *f, const char *tag, const char **from)
         return;
     }
     if (l->kind == XML_LEAF) {
-        imp__xml_fail(f, IMP_E_SCENE, "<%s> cannot stand inside <%s>", tag, l->tag);
+        imp__xml_fail(f, IMP_E_SCENE, "<%s> cannot be inside <%s>", tag, l->tag);
         return;
     }
     if (f->depth >= IMP_DEPTH_MAX) {
@@ -306,8 +306,7 @@ void imp__xml_start(struct xml_file *f, const char *tag, const char **from)
                                          "scene", "sensor",  "sampler", "shape",
                                          "ref",   "texture", "rfilter", "transform"};
     for (size_t i = 0; i < imp_count(others); i++) imp__nearest_try(&near, others[i]);
-    if (known)
-        imp__xml_fail(f, IMP_E_SCENE, "<%s> cannot stand inside <%s>", tag, l->tag);
+    if (known) imp__xml_fail(f, IMP_E_SCENE, "<%s> cannot be inside <%s>", tag, l->tag);
     else if (near.best)
         imp__xml_fail(f, IMP_E_SCENE, "unknown tag <%s>; did you mean <%s>?", tag,
                       near.best);

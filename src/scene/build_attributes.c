@@ -48,13 +48,13 @@ enum imp_status imp__build_bumps_survey(struct imp_scene *scene,
     const bool bump = imp__is_bumped(scene, s->bsdf);
     if (bump && !s->ops->place)
         return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
-                               "a %s cannot have a bumpmap: its uv does not tell which "
-                               "of its points is meant",
+                               "a %s cannot have a bumpmap: one uv belongs to "
+                               "several of its points",
                                s->ops->name);
     if (bump && s->geometry == IMP_CURVES && s->curves.n_segments > BUMPED_SEGMENTS)
         return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
                                "has %zu segments, and with a bumpmap at most %zu: uv in "
-                               "single precision does not tell more of them apart; make "
+                               "single precision separates no more of them; make "
                                "it several shapes",
                                s->curves.n_segments, BUMPED_SEGMENTS);
     s->by_triangle |= bump && s->ops->flags & IMP_SHAPE_TRIANGLES;

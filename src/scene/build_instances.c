@@ -34,29 +34,29 @@ static enum imp_status member_check(struct imp_scene *scene, const struct imp_gr
                                g->name);
     if (imp__is_group(node))
         return imp__node_error(ctx, node, IMP_E_SCENE,
-                               "a shapegroup inside shapegroup '%s': it stands there by "
-                               "an instance",
+                               "a shapegroup inside shapegroup '%s': put an "
+                               "instance of it there",
                                g->name);
     if (node->object)
         return imp__node_error(ctx, node, IMP_E_SCENE,
-                               "the shape stands in the scene or in another group "
+                               "the shape is in the scene or in another group "
                                "already");
     for (size_t i = 0; i < node->n_children; i++) {
         const struct imp_child *c = &node->children[i];
         if (strcmp(c->node->tag, "emitter") == 0 || strcmp(c->node->tag, "sensor") == 0)
             return imp__node_error(ctx, c->node, IMP_E_UNSUPPORTED,
                                    "a shape of shapegroup '%s' has no %s: lights and "
-                                   "sensors stand in one place",
+                                   "sensors have one place",
                                    g->name, c->node->tag);
         if (strcmp(c->node->tag, "medium") == 0 && strcmp(c->node->type, "graded") == 0)
             return imp__node_error(ctx, c->node, IMP_E_UNSUPPORTED,
                                    "a shape of shapegroup '%s' is filled by no graded "
-                                   "index: its field stands in one place",
+                                   "index: its field has one place",
                                    g->name);
         if (imp__is_proxy(c))
             return imp__node_error(ctx, c->node, IMP_E_UNSUPPORTED,
                                    "a shape of shapegroup '%s' has no proxy: walks aim "
-                                   "at what stands in one place",
+                                   "at what has one place",
                                    g->name);
     }
     return IMP_OK;

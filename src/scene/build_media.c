@@ -243,7 +243,7 @@ enum imp_status imp__media_check(struct imp_scene *scene)
         const struct imp_node *node = found ? found : scene->root;
         return imp__prop_error(
             scene->ctx, node, imp__node_prop(node, "priority"), IMP_E_UNSUPPORTED,
-            "has a priority, which the integrator, %s, does not know: "
+            "has a priority, which the integrator, %s, does not support: "
             "volpath, photons, ptracer and bdpt do",
             scene->integrator ? scene->integrator->ops->name : "path by default");
     }

@@ -157,8 +157,8 @@ static enum imp_status children_make(struct imp_scene *scene, struct imp_node *n
         IMP_TRY(sensor_make(scene, c->node, name, NULL, &film, &made));
         if (!made || made->ops->flags & IMP_SENSOR_GROUP)
             IMP_TRY(imp__node_error(ctx, c->node, IMP_E_UNSUPPORTED,
-                                    made ? "stands in a batch, and is one"
-                                         : "stands in a batch, and is a surface"));
+                                    made ? "is nested in a batch, and is one"
+                                         : "is nested in a batch, and is a surface"));
         if (k > 0 && made->medium != s->medium)
             IMP_TRY(imp__node_error(ctx, c->node, IMP_E_UNSUPPORTED,
                                     "is in another medium than the sensors before it"));

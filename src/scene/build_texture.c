@@ -86,7 +86,7 @@ enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *nod
         } else if (imp__is_spectral(scene->mode) && !same_spectra(t->asked, asked)) {
             return imp__node_error(
                 scene->ctx, node, IMP_E_UNSUPPORTED,
-                "stands for '%s' and for '%s', which are different "
+                "is the value of '%s' and of '%s', which are different "
                 "spectra of the same colours: it must be written twice",
                 t->asked->name, asked->name);
         }

@@ -51,11 +51,12 @@ static enum imp_status nest_check(const struct imp_scene *scene,
                           sensor->name, IMP_NEST_MAX);
     const struct imp_shape *top = imp__nest_top(scene, &nest);
     if (top && sensor->medium && top->interior == sensor->medium)
-        return imp__error(scene->ctx, IMP_E_SCENE,
-                          "sensor '%s' is inside shape '%s', whose priority says which "
-                          "medium is there; the sensor names what lies around the shapes "
-                          "with priorities, or none",
-                          sensor->name, top->name);
+        return imp__error(
+            scene->ctx, IMP_E_SCENE,
+            "sensor '%s' is inside shape '%s', whose priority settles which "
+            "medium is there; the sensor names what lies around the shapes "
+            "with priorities, or none",
+            sensor->name, top->name);
     return IMP_OK;
 }
 
@@ -78,7 +79,7 @@ static enum imp_status camera_check(const struct imp_scene *scene,
     if (outwards)
         return imp__error(scene->ctx, IMP_E_SCENE,
                           "sensor '%s' is inside shape '%s', whose medium is %s, and "
-                          "names %s: <ref id=\"...\"/> in the sensor says which medium "
+                          "names %s: <ref id=\"...\"/> in the sensor names the medium "
                           "it is in",
                           sensor->name, s->name, name_of(around),
                           name_of(sensor->medium));

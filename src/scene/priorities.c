@@ -136,7 +136,7 @@ static enum imp_status shape_check(struct imp_scene *scene, const struct imp_sha
     if (s->exterior)
         return imp__error(ctx, IMP_E_SCENE,
                           "shape '%s' has a priority and an exterior: what lies around "
-                          "it is said by the other shapes there",
+                          "it follows from the other shapes there",
                           s->name);
     if (b->flags & IMP_BSDF_TRANSMIT && b->index_input < 0 && !(b->flags & IMP_BSDF_NULL))
         return imp__error(ctx, IMP_E_UNSUPPORTED,

@@ -178,10 +178,10 @@ int main(void)
     refused("a batch in a batch",
             "<sensor type='batch'>" FILM(8) "<sensor type='batch'><sensor "
                                             "type='perspective'/></sensor></sensor>",
-            "stands in a batch, and is one");
+            "is nested in a batch, and is one");
     refused("a surface in a batch",
             "<sensor type='batch'>" FILM(8) "<sensor type='irradiancemeter'/></sensor>",
-            "stands in a batch, and is a surface");
+            "is nested in a batch, and is a surface");
     refused("sensors in two media",
             "<medium type='homogeneous' id='fog'/><sensor type='batch'>" FILM(
                 8) "<sensor type='perspective'/><sensor type='perspective'><ref "

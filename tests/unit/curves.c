@@ -394,7 +394,7 @@ int main(void)
     heights_write();
     bumped();
     refused("bumps on cones", TUBES("linearcurve", "bent.txt", BUMPS("0")),
-            "a linearcurve cannot have a bumpmap: its uv does not tell");
+            "a linearcurve cannot have a bumpmap: one uv belongs to");
     many_segments();
     refused("a light on curves",
             TUBES("linearcurve", "bent.txt", "<emitter type='area'/>"),

@@ -247,12 +247,12 @@ int main(void)
             "is null or dielectric");
     refused("<scene version='3.0.0'><integrator type='path'/><shape type='sphere'>" RANK(
                 1) "</shape></scene>",
-            "does not know: volpath");
+            "does not support: volpath");
     refused(SCENE(VOLPATH MEDIUM("a", 1) CUBE(
                 0, 1, FOG("a", 1)) "<sensor type='perspective'><transform "
                                    "name='to_world'><translate z='0.5'/></transform>"
                                    "<ref id='a'/></sensor>"),
-            "whose priority says");
+            "whose priority settles");
     /* The integrator asks for priorities, so they are built before it is ready. */
     refused("<scene version='3.0.0'><integrator type='volpath'><integer name='split' "
             "value='2'/></integrator><shape type='sphere'>" RANK(1)

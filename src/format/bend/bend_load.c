@@ -123,7 +123,7 @@ static enum imp_status bounds_look(struct imp__bendfile *l, const struct imp_nod
         imp__warn(
             l->ctx,
             "%s:%d:%d: medium (graded): %zu of %zu numbers of the index are outside "
-            "index_min .. index_max (1 .. infinity if nothing is said)",
+            "index_min .. index_max (default 1 .. infinity)",
             medium->loc.file, medium->loc.line, medium->loc.column, beyond, n);
     imp__release(l->ctx, theta);
     return IMP_OK;

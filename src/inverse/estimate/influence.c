@@ -298,7 +298,7 @@ static enum imp_status pass_run(imp_context *ctx, const struct imp__functional *
     if (f->tracer.kept && (f->tracer.kept->source.set > 0 || f->tracer.kept->n < 2))
         IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
                            f->tracer.kept->n < 2
-                               ? "one kept walk of a pixel tells no error: keep more"
+                               ? "one recorded walk of a pixel has no error: record more"
                                : "these walks were kept for losses, in sets of points; "
                                  "means and pictures need walks that are kept for "
                                  "pictures (importon record --pictures)"));

@@ -84,7 +84,7 @@ enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
                           "use path, direct or stam");
     if (run->from != IMP_FROM_SCENE && !imp__walk_integrator_of(p->scene->integrator))
         return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                          "integrator %s: the end at which walks begin is asked of "
+                          "integrator %s: the end at which walks begin is chosen for "
                           "integrators of walks alone",
                           p->scene->integrator->ops->name);
     st = imp__walks_from(p->scene, integrator, run->from, &integrator);

@@ -340,7 +340,7 @@ enum imp_status imp_walks_keep(imp_scene *scene, const struct imp_run *run,
                           o.memory, o.survival, o.ess, o.headroom);
     if (own.walks || own.time_limit_s > 0)
         return imp__error(ctx, IMP_E_ARG,
-                          "walks that are kept are traced, as many as run->spp says");
+                          "recorded walks are traced, run->spp in each pixel");
     if (o.memory == 0) o.memory = MEMORY;
     if (o.survival == 0) o.survival = SURVIVAL;
     if (o.ess == 0) o.ess = ESS;

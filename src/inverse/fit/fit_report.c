@@ -121,7 +121,7 @@ const char *imp__fit_warning(const struct imp__fit *f, int bias_order,
         put(&t,
             "the scene does not explain the pictures: what is left is %.*f +- %.1g times "
             "what their noise leaves (chi-square per degree of freedom); this is another "
-            "minimum, or another number is wrong, and intervals do not know of that",
+            "minimum, or another parameter is wrong, which intervals do not include",
             residual->chi2 < 100, residual->chi2, residual->chi2_se);
     else if (much_left(residual))
         put(&t,
@@ -130,8 +130,8 @@ const char *imp__fit_warning(const struct imp__fit *f, int bias_order,
             100 * residual->relative);
     if (loosest && !f->noise_known && residual->freedom < FEW)
         put(&t,
-            "%sthe targets' noise is not known, and %.0f residuals less %zu numbers tell "
-            "%s of it: intervals %s. Give targets with their standard errors "
+            "%sthe targets' noise is not known, and %.0f residuals less %zu variables "
+            "determine %s of it: intervals %s. Give targets with their standard errors "
             "(render --se)",
             t.used ? "; " : "", residual->count, f->problem->n,
             residual->freedom > 0 ? "little" : "nothing",

@@ -182,7 +182,7 @@ enum imp_status imp_problem_functional(imp_problem *p, const float *adjoint,
     IMP_REQUIRE(NULL, p, "problem");
     imp_context *ctx = p->ctx;
     if (!value && !gradient)
-        return imp__error(ctx, IMP_E_ARG, "neither value nor gradient is asked for");
+        return imp__error(ctx, IMP_E_ARG, "neither value nor gradient is wanted");
     IMP_RUN(ctx, own, run);
     IMP_FLOAT_MODE;
     IMP_READS(p->scene);

@@ -207,7 +207,7 @@ enum imp_status imp__ties_equal_only(const struct imp_problem *p, const char *wh
         if (p->ties[i].kind != IMP_TIE_SAME)
             return imp__error(
                 p->ctx, IMP_E_UNSUPPORTED,
-                "%s knows numbers that are equal, but no common factors and "
+                "%s takes numbers that are equal, but no common factors and "
                 "no logarithms",
                 what);
     return IMP_OK;

@@ -60,7 +60,7 @@ enum imp_status imp__coefficients_build(const struct imp_build *b, void *self,
     if (form->apart && (imp_build_has(b, "sigma_t") || imp_build_has(b, "albedo")))
         IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
                                 "has sigma_s or sigma_a together with sigma_t or albedo: "
-                                "it is told by the one pair or by the other"));
+                                "give the one pair or the other"));
     m->emits = imp_build_has(b, "emission");
 out:
     return st;
