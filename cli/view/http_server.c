@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * libmicrohttpd opened by its name, and the functions of http_server.h found in it. */
 #include "http_server.h"
 
 #include "shared/command.h"
