@@ -26,7 +26,7 @@ static struct {
     void *library;
     imp_mpi *mpi;
     struct imp_team team;
-    double asked_s; /* when a signal asked to end; 0: it did not */
+    double asked_s; /* when a signal to end came; 0: none did */
     int failed;     /* an error was printed here */
     bool unable;    /* to meet the others */
     int heard;      /* what standard error is to be again */

@@ -45,7 +45,7 @@ static int set_error(const char *where, const char *text, const char *why)
     return cli_error(EXIT_USAGE, "--set %s: %s", text, why);
 }
 
-/* One --set: "name=v" or "name=v,v,..". Messages begin with `where` it stands; NULL: on
+/* One --set: "name=v" or "name=v,v,..". Messages begin with `where` it is written; NULL: on
  * the command line. */
 static int apply_set(const char *where, const char *text)
 {

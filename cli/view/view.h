@@ -82,8 +82,8 @@ void view_show_film(enum view_channel channel, const imp_film *film, const char 
 /* ---- view_pictures.c ---- */
 /* The pictures of --target, as VIEW_TARGET. */
 void view_targets(void);
-/* Pictures through the sensor of every target, at the scene's numbers. spp 0: as many as
- * the command says, with progress. */
+/* Pictures through the sensor of every target, at the scene's numbers. spp 0: the
+ * command's number, with progress. */
 void view_pictures(enum view_channel channel, const char *name, const char *role,
                    int spp);
 

@@ -42,7 +42,7 @@ int imp__pool_slots(const imp_context *ctx);
 
 /* Run the loop. Items are committed in order up to the first that failed; `*done` (may be
  * NULL) is how many, or without commits how many were done. @return the first failure in
- * item order, IMP_CANCELLED if progress asked to stop or the deadline passed, or IMP_OK.
+ * item order, IMP_CANCELLED if progress stopped it or the deadline passed, or IMP_OK.
  * A loop inside a loop runs on the calling worker alone. */
 enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop,
                               size_t *done);

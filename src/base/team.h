@@ -121,8 +121,8 @@ struct imp_bytes;
 enum imp_status imp__team_broadcast(imp_context *ctx, enum imp_status st,
                                     struct imp_bytes *bytes);
 
-/* Bytes that every rank has computed alike: parts keep them, and *known of a merge tells
- * that they have been read instead. */
+/* Bytes that every rank has computed alike: parts keep them, and *known: a merge
+ * has read them instead. */
 enum imp_status imp__team_keep(imp_context *ctx, void *bytes, size_t n, bool *known);
 
 /* The version, and the instruction sets by which Embree and libm choose their code: equal

@@ -196,7 +196,7 @@ nearest(const struct imp_intersector *x, double time, const imp_v3 *o, const imp
         tmax = hit->t;
         far = (float)tmax;
     }
-    if (!x->knows) return met;
+    if (!x->holds) return met;
     query_fill(&q, x, time, o, d, tmin, tmax);
     ray_fill(&r.ray, o, d, tmin, far);
     r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -225,7 +225,7 @@ anything(const struct imp_intersector *x, double time, const imp_v3 *o, const im
     if (imp_unlikely(!ray_valid(o, d, tmin, tmax))) return false;
     if (imp__shape_balls_occluded(&x->balls, o, d, tmin, tmax)) return true;
     if (x->facets && imp__facets_occluded(x->facets, o, d, tmin, tmax)) return true;
-    if (!x->knows) return false;
+    if (!x->holds) return false;
     query_fill(&q, x, time, o, d, tmin, tmax);
     ray_fill(&r, o, d, tmin, (float)tmax);
     rtcOccluded1(x->rtc, &q.context, &r);

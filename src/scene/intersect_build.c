@@ -328,7 +328,7 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
         if (!g) break;
         rtcAttachGeometryByID(x->rtc, g, (unsigned)i);
         rtcReleaseGeometry(g); /* the scene holds it now */
-        x->knows = true;
+        x->holds = true;
         primitives += s ? primitives_of(s) : (size_t)c->group->n_instances;
         x->calls_back |= !s || s->geometry == IMP_ANALYTIC;
     }

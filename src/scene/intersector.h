@@ -13,7 +13,7 @@ struct imp_intersector {
     /* Outside of Embree: few analytic shapes, and few triangles (NULL: none). */
     struct imp_shape_balls balls;
     struct imp_facets *facets;
-    bool knows;      /* Embree has something to look for */
+    bool holds;      /* Embree's scene is not empty */
     bool calls_back; /* for analytic shapes or instances */
     int first;       /* index of its first shape */
     int64_t bytes;

@@ -6,7 +6,7 @@
 
 #include "scene.h"
 
-/* The medium at p, as the next boundary along d says; `otherwise` if there is none. */
+/* The medium at p, by the next boundary along d; `otherwise` if there is none. */
 const struct imp_medium *imp__medium_around(const struct imp_scene *scene, imp_v3 p,
                                             imp_v3 d, const struct imp_medium *otherwise);
 

@@ -16,7 +16,7 @@
 #define IMP_DENSE_MAX     256  /* most variables of methods that hold [n][n] matrices */
 #define IMP_SEARCH_FEW    1024 /* variables, above which Adam's memory counts */
 #define IMP_ADAM_MOMENTUM 0.9
-/* For variables that converge between bounds, where gradients have little noise: */
+/* For variables whose scale is their whole range, where gradients have little noise: */
 #define IMP_ADAM_MOMENTUM_QUIET 0.5
 #define IMP_ADAM_FALLING_QUIET  10
 #define IMP_TRAIL_MAX           64 /* variables, up to which a search keeps where it was */

@@ -131,8 +131,8 @@ struct imp__uncertainty;
 enum imp_status imp__fit_start_keep(const struct imp_problem *p, bool many, double **out);
 void imp__fit_start_restore(struct imp_problem *p, bool many, const double *start,
                             struct imp__search *s);
-/* fit_result.c: what stays with the problem. rows [n] in fit_arena have what the
- * covariance knows; NULL: more than IMP_SEARCH_FEW numbers, and the problem owns the
+/* fit_result.c: what stays with the problem. rows [n] in fit_arena have errors and
+ * intervals; NULL: more than IMP_SEARCH_FEW numbers, and the problem owns the
  * search from then on. */
 struct imp__fit_shift;
 enum imp_status imp__fit_answer(struct imp__fit *fit, struct imp__search *s,

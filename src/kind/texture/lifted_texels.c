@@ -11,7 +11,7 @@
 #include <string.h>
 
 /* A texel that was made from the same colour, by a hash of it: pictures have far fewer
- * colours than texels. Of two colours with one place the later one stays. */
+ * colours than texels. Where two colours share a place, the later one stays. */
 struct known {
     uint32_t
         *texel; /* [1 << bits], 0: none, k + 1: texel k; NULL: no memory, none is known */
