@@ -195,6 +195,122 @@ enum imp_status imp__bend_options_take(imp_context *ctx, const char *function,
     return IMP_OK;
 }
 
+/* Numbers of the options, by default or as given. */
+static enum imp_status numbers_set(struct imp__plan *p, const struct imp_bend_rays *rays)
+{
+    const struct imp_bend_options *o = &p->options;
+    if ((int)o->scheme < 0 || o->scheme >= IMP_BEND_N_SCHEMES || (int)o->way < 0 ||
+        o->way > IMP_BEND_PSEUDO)
+        return imp__error(p->ctx, IMP_E_ARG, "no such scheme or way back");
+    p->scheme = &imp__schemes[o->scheme];
+    if (rays->n > 0 && (!rays->x || !rays->d))
+        return imp__error(p->ctx, IMP_E_ARG, "rays without origins or directions");
+    p->max_steps = o->max_steps ? o->max_steps : MAX_STEPS_DEFAULT;
+    p->grazing = o->grazing == 0 ? 0.05 : fmax(o->grazing, 0);
+    p->outside_index = o->outside_index == 0 ? 1 : o->outside_index;
+    p->reversal = o->reversal > 0 ? o->reversal : 1e-10;
+    if (!(p->outside_index > 0) || !isfinite(p->outside_index) || !isfinite(p->grazing))
+        return imp__error(p->ctx, IMP_E_ARG, "index outside %g", p->outside_index);
+    IMP_CHECKED(step_choose(p));
+    bounds_choose(p, rays);
+    if (p->field->spacing > 0 && p->t > p->size)
+        return imp__error(p->ctx, IMP_E_ARG, "step %g is longer than the field, %g", p->t,
+                          p->size);
+    return IMP_OK;
+}
+
+/* Without surfaces rays end at the field's box. */
+static enum imp_status box_of_field(const imp_field *field, struct imp_bend_surface *box)
+{
+    *box = (struct imp_bend_surface)IMP_BEND_SURFACE_INIT;
+    box->type = IMP_BEND_BOX;
+    for (int k = 0; k < 3; k++) {
+        box->lo[k] = field->lo[k], box->hi[k] = field->hi[k];
+        if (!isfinite(box->lo[k]) || !isfinite(box->hi[k]))
+            return imp__error(field->ctx, IMP_E_ARG,
+                              "a %s field has no end: give a surface where rays exit",
+                              field->ops->name);
+    }
+    return IMP_OK;
+}
+
+/* Surfaces as given, and as the tracer has them: those of surface i are all[first[i]] to
+ * all[first[i + 1] - 1]. */
+struct prepared {
+    struct imp_bend_surface *surfaces;
+    struct imp__surface *all;
+    int *first;
+    size_t shared, own; /* of all, those of every group, and those of one */
+};
+
+static enum imp_status surfaces_prepare(struct imp__plan *p, struct prepared *to)
+{
+    struct imp_bend_options *o = &p->options;
+    imp_context *ctx = p->ctx;
+    to->surfaces = imp__alloc(ctx, o->n_surfaces, sizeof *to->surfaces);
+    to->all = imp__alloc(ctx, 6 * o->n_surfaces, sizeof *to->all);
+    to->first = imp__alloc(ctx, o->n_surfaces + 1, sizeof *to->first);
+    if (!to->surfaces || !to->all || !to->first)
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for surfaces");
+    for (size_t i = 0; i < o->n_surfaces; i++) {
+        to->surfaces[i] = (struct imp_bend_surface)IMP_BEND_SURFACE_INIT;
+        IMP_CHECKED(imp__element_take(ctx, "bend", "surfaces", o->surfaces, i,
+                                      &to->surfaces[i], sizeof *to->surfaces));
+    }
+    o->surfaces = to->surfaces;
+    for (size_t i = 0; i < o->n_surfaces; i++) {
+        const int group = to->surfaces[i].group;
+        int n = 0;
+        IMP_CHECKED(
+            surface_make(ctx, &to->surfaces[i], (int)i, to->all + to->first[i], &n));
+        to->first[i + 1] = to->first[i] + n;
+        if (group > GROUPS_MAX)
+            return imp__error(ctx, IMP_E_ARG, "surface %zu: group %d", i, group);
+        p->n_groups = imp_max(p->n_groups, group + 1);
+        *(group < 0 ? &to->shared : &to->own) += (size_t)n;
+    }
+    return IMP_OK;
+}
+
+/* The surfaces of each group, and of rays without one. */
+static enum imp_status domains_make(struct imp__plan *p, const struct prepared *from)
+{
+    const size_t n_domains = (size_t)p->n_groups + 1;
+    p->domain = imp__alloc(p->ctx, n_domains, sizeof *p->domain);
+    p->surfaces =
+        imp__alloc(p->ctx, from->own + n_domains * from->shared + 1, sizeof *p->surfaces);
+    if (!p->domain || !p->surfaces)
+        return imp__error(p->ctx, IMP_E_NOMEM, "no memory for surfaces");
+    struct imp__surface *room = p->surfaces;
+    for (int g = 0; g <= p->n_groups; g++) {
+        domain_make(&p->options, from->all, from->first, g < p->n_groups ? g : -2, p,
+                    &p->domain[g], room);
+        room += p->domain[g].n;
+    }
+    return IMP_OK;
+}
+
+static enum imp_status taps_make(struct imp__plan *p)
+{
+    const struct imp_bend_options *o = &p->options;
+    p->n_taps = (int)o->n_taps;
+    for (int i = 0; i < p->n_taps; i++) {
+        struct imp__surface s = {.kind = IMP__PLANE,
+                                 .id = i,
+                                 .n = imp__v3_load(o->taps[i].normal),
+                                 .offset = o->taps[i].offset};
+        const double length = imp__length(s.n);
+        if (!(length > 0) || !isfinite(length) || !isfinite(s.offset))
+            return imp__error(p->ctx, IMP_E_ARG, "tap %d: the normal has no direction",
+                              i);
+        s.n *= 1 / length;
+        s.offset /= length;
+        p->taps[i] = s;
+        p->tap_group[i] = o->taps[i].group;
+    }
+    return IMP_OK;
+}
+
 enum imp_status imp__plan_create(const imp_field *field,
                                  const struct imp_bend_options *options,
                                  const struct imp_bend_rays *rays, struct imp__plan *out)
@@ -202,97 +318,27 @@ enum imp_status imp__plan_create(const imp_field *field,
     enum imp_status st = IMP_OK;
     imp_context *ctx = field->ctx;
     struct imp__plan p = {.ctx = ctx, .field = field, .options = IMP_BEND_OPTIONS_INIT};
-    struct imp_bend_surface *surfaces = NULL;
-    struct imp_bend_surface box = IMP_BEND_SURFACE_INIT;
-    struct imp__surface *all = NULL;
-    int *first = NULL;
-
     struct imp_bend_options *o = &p.options;
-    IMP_CHECKED(imp__bend_options_take(ctx, "bend", "options", options, o));
-    if ((int)o->scheme < 0 || o->scheme >= IMP_BEND_N_SCHEMES || (int)o->way < 0 ||
-        o->way > IMP_BEND_PSEUDO)
-        IMP_TRY(imp__error(ctx, IMP_E_ARG, "no such scheme or way back"));
-    p.scheme = &imp__schemes[o->scheme];
-    if (rays->n > 0 && (!rays->x || !rays->d))
-        IMP_TRY(imp__error(ctx, IMP_E_ARG, "rays without origins or directions"));
-    p.max_steps = o->max_steps ? o->max_steps : MAX_STEPS_DEFAULT;
-    p.grazing = o->grazing == 0 ? 0.05 : fmax(o->grazing, 0);
-    p.outside_index = o->outside_index == 0 ? 1 : o->outside_index;
-    p.reversal = o->reversal > 0 ? o->reversal : 1e-10;
-    if (!(p.outside_index > 0) || !isfinite(p.outside_index) || !isfinite(p.grazing))
-        IMP_TRY(imp__error(ctx, IMP_E_ARG, "index outside %g", p.outside_index));
-    IMP_TRY(step_choose(&p));
-    bounds_choose(&p, rays);
-    if (field->spacing > 0 && p.t > p.size)
-        IMP_TRY(imp__error(ctx, IMP_E_ARG, "step %g is longer than the field, %g", p.t,
-                           p.size));
+    struct imp_bend_surface box;
+    struct prepared prepared = {0};
 
+    IMP_CHECKED(imp__bend_options_take(ctx, "bend", "options", options, o));
+    IMP_TRY(numbers_set(&p, rays));
     if (o->n_surfaces == 0) {
-        box.type = IMP_BEND_BOX;
-        for (int k = 0; k < 3; k++) {
-            box.lo[k] = field->lo[k], box.hi[k] = field->hi[k];
-            if (!isfinite(box.lo[k]) || !isfinite(box.hi[k]))
-                IMP_TRY(
-                    imp__error(ctx, IMP_E_ARG,
-                               "a %s field has no end: give a surface where rays exit",
-                               field->ops->name));
-        }
+        IMP_TRY(box_of_field(field, &box));
         o->surfaces = &box;
         o->n_surfaces = 1;
     }
-    surfaces = imp__alloc(ctx, o->n_surfaces, sizeof *surfaces);
-    if (!surfaces) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for surfaces"));
-    for (size_t i = 0; i < o->n_surfaces; i++) {
-        surfaces[i] = (struct imp_bend_surface)IMP_BEND_SURFACE_INIT;
-        IMP_TRY(imp__element_take(ctx, "bend", "surfaces", o->surfaces, i, &surfaces[i],
-                                  sizeof *surfaces));
-    }
-    o->surfaces = surfaces;
-    all = imp__alloc(ctx, 6 * o->n_surfaces, sizeof *all);
-    first = imp__alloc(ctx, o->n_surfaces + 1, sizeof *first);
-    if (!all || !first) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for surfaces"));
-    size_t shared = 0, own = 0;
-    for (size_t i = 0; i < o->n_surfaces; i++) {
-        int n = 0;
-        IMP_TRY(surface_make(ctx, &o->surfaces[i], (int)i, all + first[i], &n));
-        first[i + 1] = first[i] + n;
-        if (o->surfaces[i].group > GROUPS_MAX)
-            IMP_TRY(imp__error(ctx, IMP_E_ARG, "surface %zu: group %d", i,
-                               o->surfaces[i].group));
-        p.n_groups = imp_max(p.n_groups, o->surfaces[i].group + 1);
-        *(o->surfaces[i].group < 0 ? &shared : &own) += (size_t)n;
-    }
-    const size_t n_domains = (size_t)p.n_groups + 1;
-    p.domain = imp__alloc(ctx, n_domains, sizeof *p.domain);
-    p.surfaces = imp__alloc(ctx, own + n_domains * shared + 1, sizeof *p.surfaces);
-    if (!p.domain || !p.surfaces)
-        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for surfaces"));
-    struct imp__surface *room = p.surfaces;
-    for (int g = 0; g <= p.n_groups; g++) {
-        domain_make(o, all, first, g < p.n_groups ? g : -2, &p, &p.domain[g], room);
-        room += p.domain[g].n;
-    }
-    p.n_taps = (int)o->n_taps;
-    for (int i = 0; i < p.n_taps; i++) {
-        struct imp__surface s = {.kind = IMP__PLANE,
-                                 .id = i,
-                                 .n = imp__v3_load(o->taps[i].normal),
-                                 .offset = o->taps[i].offset};
-        const double length = imp__length(s.n);
-        if (!(length > 0) || !isfinite(length) || !isfinite(s.offset))
-            IMP_TRY(imp__error(ctx, IMP_E_ARG, "tap %d: the normal has no direction", i));
-        s.n *= 1 / length;
-        s.offset /= length;
-        p.taps[i] = s;
-        p.tap_group[i] = o->taps[i].group;
-    }
+    IMP_TRY(surfaces_prepare(&p, &prepared));
+    IMP_TRY(domains_make(&p, &prepared));
+    IMP_TRY(taps_make(&p));
     o->surfaces = NULL; /* belong to the caller; copies are in p */
     o->taps = NULL;
     *out = p;
 out:
-    imp__release(ctx, surfaces);
-    imp__release(ctx, all);
-    imp__release(ctx, first);
+    imp__release(ctx, prepared.surfaces);
+    imp__release(ctx, prepared.all);
+    imp__release(ctx, prepared.first);
     if (st != IMP_OK) imp__plan_destroy(&p);
     return st;
 }
