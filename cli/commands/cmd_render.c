@@ -50,7 +50,7 @@ static const struct arg_option options[] = {
     {ARG_NUMBER | ARG_REPLAYS, 0, "until", "REL",
      "take samples, at most --spp, until the picture is this close, in 95 of 100 cases",
      &o.until, 1e-6, 10, NULL},
-    {ARG_FLAG, 0, "verify-sampling", NULL,
+    {ARG_FLAG | ARG_ASIDE, 0, "verify-sampling", NULL,
      "compare the picture with one of uniform directions, and show what delivers its "
      "light",
      &o.sampling, 0, 0, NULL},
@@ -329,6 +329,5 @@ const struct command command_render = {
      1},
     run_render,
     0,
-    "walk: pixel",
     1,
     REPLAYS_PARTS | REPLAYS_MANIFEST};
