@@ -83,6 +83,9 @@ int cli_redirect(void)
     const int rc = output_open(&redirected, cli.out, OUTPUT_ANSWER);
     if (rc == 0 && dup2(fileno(redirected.file), STDOUT_FILENO) < 0)
         return cli_error(EXIT_RUN, "%s: %s", cli.out, strerror(errno));
+    /* The mark of an answer in a file (overwrite.c); one in JSON begins with its own. */
+    if (rc == 0 && redirected.target && !cli.json)
+        printf("# importon %s %s\n", imp_version(), cli.name);
     return rc;
 }
 
@@ -95,7 +98,6 @@ int cli_run_command(int argc, char **argv)
     if (ranks_count() > 1 && !command->shared)
         return cli_error(EXIT_USAGE, "%s runs in one process, and mpirun started %d",
                          cli.name, ranks_count());
-    cli.answer = command->answer;
     cli.argc = argc;
     free(cli.argv); /* of merge, which runs another command */
     cli.argv = cli_alloc((size_t)argc + 1, sizeof *cli.argv);

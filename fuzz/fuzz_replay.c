@@ -43,9 +43,9 @@ static const struct arg_option options[] = {
     {ARG_PAIR, 0, "pixel", "X,Y", "", bad.pixel, 0, 0, NULL},
     {0}};
 static const struct command commands[] = {
-    {{"render", "SCENE", "", {options}, 1, 1}, NULL, 0, NULL, 0, REPLAYS_PARTS},
-    {{"fit", "SCENE", "", {options}, 1, 1}, NULL, 0, NULL, 0, REPLAYS_MANIFEST},
-    {{"report", "DIR", "", {options}, 1, 1}, NULL, 0, NULL, 0, REPLAYS_NEVER}};
+    {{"render", "SCENE", "", {options}, 1, 1}, NULL, 0, 0, REPLAYS_PARTS},
+    {{"fit", "SCENE", "", {options}, 1, 1}, NULL, 0, 0, REPLAYS_MANIFEST},
+    {{"report", "DIR", "", {options}, 1, 1}, NULL, 0, 0, REPLAYS_NEVER}};
 
 /* ---- What cli/shared/replay.c has from the command --------------------------------------- */
 

@@ -290,6 +290,5 @@ const struct command command_bend = {
      2},
     run,
     0,
-    "check ",
     0,
     REPLAYS_NEVER};

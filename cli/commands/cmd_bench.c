@@ -164,6 +164,5 @@ const struct command command_bench = {
      1},
     run_bench,
     1,
-    " numbers with a gradient",
     0,
     REPLAYS_NEVER};

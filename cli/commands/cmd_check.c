@@ -84,6 +84,5 @@ const struct command command_check = {
      1},
     run_check,
     1,
-    "method ",
     1,
     REPLAYS_NEVER};

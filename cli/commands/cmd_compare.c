@@ -111,6 +111,5 @@ const struct command command_compare = {
      2},
     run_compare,
     1,
-    "mean  ",
     0,
     REPLAYS_NEVER};

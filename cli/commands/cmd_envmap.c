@@ -36,6 +36,8 @@ static int run_envmap(int n, char **operand)
         st = imp_film_project(
             in, (enum imp_sky_projection)o.from, (enum imp_sky_projection)o.to,
             o.width ? o.width : info.width, o.height ? o.height : info.height, &out);
+    const struct imp_run run = cli_run();
+    if (st == IMP_OK) picture_stamp(out, &run);
     rc = st == IMP_OK ? picture_write(out, cli.out, &write) : cli_fail(st, operand[0]);
     imp_film_destroy(in);
     imp_film_destroy(out);
@@ -51,6 +53,5 @@ const struct command command_envmap = {
      1},
     run_envmap,
     0,
-    NULL,
     0,
     REPLAYS_NEVER};

@@ -395,6 +395,5 @@ const struct command command_gradient = {
      1},
     run_gradient,
     1,
-    " +- ",
     1,
     REPLAYS_PARTS | REPLAYS_MANIFEST};

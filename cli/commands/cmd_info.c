@@ -186,6 +186,5 @@ const struct command command_info = {{"info",
                                       1},
                                      run_info,
                                      1,
-                                     " triangles)",
                                      0,
                                      REPLAYS_NEVER};

@@ -276,6 +276,5 @@ const struct command command_jacobian = {
      1},
     run_jacobian,
     0,
-    NULL,
     1,
     REPLAYS_PARTS};

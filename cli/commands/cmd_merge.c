@@ -65,6 +65,5 @@ const struct command command_merge = {
      -1},
     run_merge,
     0,
-    NULL,
     0,
     REPLAYS_NEVER};

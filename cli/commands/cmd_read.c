@@ -293,6 +293,5 @@ const struct command command_read = {
      1},
     run_read,
     1,
-    NULL,
     0,
     REPLAYS_PARTS};

@@ -110,6 +110,5 @@ const struct command command_record = {
      1},
     run_record,
     0,
-    NULL,
     1,
     REPLAYS_NEVER};

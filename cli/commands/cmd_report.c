@@ -351,6 +351,5 @@ const struct command command_report = {
      1},
     run_report,
     0,
-    NULL,
     0,
     REPLAYS_NEVER};

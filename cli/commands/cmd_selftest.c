@@ -115,6 +115,5 @@ const struct command command_selftest = {
      2},
     run_selftest,
     1,
-    "object ",
     0,
     REPLAYS_NEVER};

@@ -126,6 +126,5 @@ const struct command command_verify = {
      1},
     run_verify,
     1,
-    NULL,
     1,
     REPLAYS_NEVER};

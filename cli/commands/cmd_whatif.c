@@ -361,6 +361,5 @@ const struct command command_whatif = {
      1},
     run_whatif,
     0,
-    NULL,
     0,
     REPLAYS_NEVER};

@@ -275,6 +275,5 @@ const struct command command_elements = {
      1},
     run_elements,
     0,
-    NULL,
     1,
     REPLAYS_NEVER};

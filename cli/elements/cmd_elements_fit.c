@@ -157,6 +157,7 @@ static int write_set(const struct block *blocks, size_t n_blocks)
     struct output to;
     const int rc = output_open(&to, o.recovered, OUTPUT_SETTINGS);
     if (rc) return rc;
+    fprintf(to.file, "# importon %s elements\n", imp_version());
     for (size_t b = 0; b < n_blocks; b++) {
         fprintf(to.file, "%s=", blocks[b].info.name);
         for (size_t i = 0; i < blocks[b].n; i++)

@@ -128,6 +128,5 @@ const struct command command_fit = {
      1},
     run_fit,
     0,
-    NULL,
     1,
     REPLAYS_MANIFEST};

@@ -211,6 +211,7 @@ static int write_set(const struct fit_answer *a)
     char *path = join_path(cli.out, "recovered.txt");
     struct output to;
     int rc = output_open(&to, path, OUTPUT_SETTINGS);
+    if (!rc) fprintf(to.file, "# importon %s fit\n", imp_version());
     for (size_t k = 0; !rc && k < a->n_blocks; k++) {
         const struct block *b = &a->blocks[k];
         if (block_is_large(b)) continue;

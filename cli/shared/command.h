@@ -27,10 +27,9 @@ enum replays { REPLAYS_NEVER = 0, REPLAYS_PARTS = 1, REPLAYS_MANIFEST = 2 };
 struct command {
     struct args_spec args;
     int (*run)(int n, char **operand);
-    int prints;         /* all its data is text, so -o replaces standard output */
-    const char *answer; /* in the first line of that text; NULL: none is known */
-    int shared;         /* may run in several processes, by mpirun */
-    int replays;        /* enum replays, or-ed */
+    int prints;  /* all its data is text, so -o replaces standard output */
+    int shared;  /* may run in several processes, by mpirun */
+    int replays; /* enum replays, or-ed */
 };
 extern const struct command command_render, command_gradient, command_jacobian,
     command_check, command_selftest, command_fit, command_compare, command_info,
@@ -45,8 +44,7 @@ extern const struct arg_option options_file[], options_folder[], options_file_or
 
 /* The running command. A process runs one, so there is one. */
 struct cli {
-    const char *name;   /* of the command */
-    const char *answer; /* its struct command's */
+    const char *name; /* of the command */
     int argc;
     char **argv;           /* as typed, for provenance */
     struct arg_list typed; /* the options of it, spelled out */

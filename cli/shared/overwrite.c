@@ -16,37 +16,60 @@
 
 #define HEAD 65536 /* bytes looked at; the header of an EXR file holds command lines */
 
-/* Files of a kind begin with one of `begins`, and hold `holds`. */
+/* Files of a kind begin with one of `begins`, and hold the mark in their first `within` bytes; 0:
+ * at their end. The mark is written by this program alone: the format's own magic is none. */
+#define MARK(text) text, sizeof text - 1
 static const struct {
     const char *name;
     const char *begins[5];
-    const char *holds;
+    const char *mark;
+    size_t mark_bytes, within;
 } kinds[] = {
-    [OUTPUT_ANSWER] = {"an answer of this command", {"{\"importon\":"}, NULL},
-    [OUTPUT_CHECKPOINT] = {"a checkpoint", {"importon checkpoint "}, NULL},
-    [OUTPUT_SOLUTION] = {"a saved solution", {"IMPELEM"}, NULL},
-    [OUTPUT_PART] = {"a part of a run", {"impparts"}, NULL},
-    [OUTPUT_RECORD] = {"a record of walks", {"impdrawn"}, NULL},
-    [OUTPUT_MANIFEST] = {"a manifest", {"impproof"}, NULL},
-    [OUTPUT_SETTINGS] = {"a list of settings (ID=VALUE)", {NULL}, NULL},
+    [OUTPUT_ANSWER] =
+        {"an answer of importon's", {"{\"importon\":", "# importon "}, NULL, 0, 0},
+    [OUTPUT_CHECKPOINT] = {"a checkpoint", {"importon checkpoint "}, NULL, 0, 0},
+    [OUTPUT_SOLUTION] = {"a saved solution", {"IMPELEM"}, NULL, 0, 0},
+    [OUTPUT_PART] = {"a part of a run", {"impparts"}, NULL, 0, 0},
+    [OUTPUT_RECORD] = {"a record of walks", {"impdrawn"}, NULL, 0, 0},
+    [OUTPUT_MANIFEST] = {"a manifest", {"impproof"}, NULL, 0, 0},
+    [OUTPUT_SETTINGS] = {"a list of settings of importon's", {"# importon "}, NULL, 0, 0},
     [OUTPUT_TABLE] = {"a table of importon's",
                       {"iteration,loss,se\n", "evaluation,objective\n", "ray,bundle,x,y,",
                        "file,mean,se,"},
-                      NULL},
-    [OUTPUT_CURVE] = {"a curve of importon's", {"<svg "}, "viewBox=\"0 0 720 440\""},
-    [OUTPUT_JSON] = {"an answer of importon's in JSON", {"{\"importon\":"}, NULL},
-    [OUTPUT_WALKS] = {"a list of walks", {"{\"pixel\":["}, NULL},
+                      NULL,
+                      0,
+                      0},
+    [OUTPUT_CURVE] = {"a curve of importon's",
+                      {"<svg "},
+                      MARK(">\n<metadata>importon</metadata>\n"),
+                      512},
+    [OUTPUT_JSON] = {"an answer of importon's in JSON", {"{\"importon\":"}, NULL, 0, 0},
+    [OUTPUT_WALKS] = {"a list of walks", {"{\"pixel\":["}, NULL, 0, 0},
     [OUTPUT_PAGE] = {"a report of importon's",
                      {"<!doctype html>"},
-                     "<title>importon report"},
-    [OUTPUT_PLY] = {"a mesh of importon's", {"ply\n"}, "comment importon"},
-    [OUTPUT_VOL] = {"a volume (.vol)", {"VOL"}, NULL},
-    [OUTPUT_PROFILE] = {"a profile of importon's", {"importon-profile"}, NULL},
-    [OUTPUT_EXR] = {"an EXR picture of importon's", {"\x76\x2f\x31\x01"}, "importon."},
-    [OUTPUT_PNG] = {"a PNG picture of importon's", {"\x89PNG"}, "importon"},
-    [OUTPUT_PFM] = {"a PFM picture", {"PF\n", "Pf\n"}, NULL},
-    [OUTPUT_HDR] = {"an HDR picture", {"#?"}, NULL},
-    [OUTPUT_NPY] = {"an array (.npy)", {"\x93NUMPY"}, NULL},
+                     MARK("<title>importon report"),
+                     HEAD},
+    [OUTPUT_PLY] = {"a mesh of importon's",
+                    {"ply\n"},
+                    MARK("\ncomment importon finite elements\n"),
+                    512},
+    [OUTPUT_VOL] = {"a volume of importon's", {"VOL"}, MARK("importon"), 0},
+    [OUTPUT_PROFILE] = {"a profile of importon's", {"importon-profile"}, NULL, 0, 0},
+    [OUTPUT_EXR] = {"an EXR picture of importon's",
+                    {"\x76\x2f\x31\x01"},
+                    MARK("importon.version\0string\0"),
+                    HEAD},
+    [OUTPUT_PNG] = {"a PNG picture of importon's",
+                    {"\x89PNG"},
+                    MARK("tEXtSoftware\0importon "),
+                    512},
+    [OUTPUT_PFM] = {"a PFM picture of importon's",
+                    {"PF\n", "Pf\n"},
+                    MARK("\n-0.1e+1\n"),
+                    64},
+    [OUTPUT_HDR] =
+        {"an HDR picture of importon's", {"#?RADIANCE\n# importon\n"}, NULL, 0, 0},
+    [OUTPUT_NPY] = {"an array of importon's", {"\x93NUMPY"}, MARK(" \t\t\t\t\n"), 128},
 };
 
 /* Files that this command reads, by what does not depend on their spelling. */
@@ -84,27 +107,27 @@ static bool begins(const char *head, size_t n, const char *with)
     return n >= m && !memcmp(head, with, m);
 }
 
-/* Does the first line read name=number? */
-static bool is_setting(const char *head)
+/* Does the file end with the mark? */
+static bool ends(FILE *file, const char *mark, size_t m)
 {
-    const size_t name = strcspn(head, "= \t\n<>\"");
-    return name > 0 && head[name] == '=' && head[name + 1] &&
-           strchr("0123456789-+.", head[name + 1]);
+    char tail[64];
+    return m <= sizeof tail && fseek(file, -(long)m, SEEK_END) == 0 &&
+           fread(tail, 1, m, file) == m && !memcmp(tail, mark, m);
 }
 
-static bool is_kind(enum output_kind kind, const char *head, size_t n)
+static bool is_kind(enum output_kind kind, FILE *file)
 {
+    const size_t m = kinds[kind].mark_bytes, within = kinds[kind].within;
+    char *head = cli_alloc(HEAD + 1, 1);
+    const size_t n = fread(head, 1, HEAD, file);
     bool good = false;
-    if (kind == OUTPUT_SETTINGS) return is_setting(head);
     for (const char *const *with = kinds[kind].begins; *with; with++)
         good |= begins(head, n, *with);
-    if (kind == OUTPUT_ANSWER && !good) {
-        const char *phrase = cli.answer, *line = strchr(head, '\n');
-        const char *found = phrase ? strstr(head, phrase) : NULL;
-        return is_setting(head) || (found && line && found < line);
-    }
-    if (!kinds[kind].holds) return good;
-    return good && memmem(head, n, kinds[kind].holds, strlen(kinds[kind].holds));
+    if (good && m)
+        good = within ? memmem(head, n < within ? n : within, kinds[kind].mark, m) != NULL
+                      : ends(file, kinds[kind].mark, m);
+    free(head);
+    return good;
 }
 
 static int cannot(const char *path, int code)
@@ -141,11 +164,8 @@ int overwrite_check(const char *path, enum output_kind kind)
 
     FILE *file = fopen(path, "rb");
     if (!file) return cannot(path, errno);
-    char *head = cli_alloc(HEAD + 1, 1);
-    const size_t n = fread(head, 1, HEAD, file);
-    const bool good = is_kind(kind, head, n);
+    const bool good = is_kind(kind, file);
     fclose(file);
-    free(head);
     if (good) return 0;
     return cli_error(EXIT_USAGE,
                      "%s: not overwritten: it exists and is not %s (--overwrite "

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What an output may replace: a file that begins as one of the same kind that this
- * program wrote, an empty file, or, with --overwrite, any file. Called before the work. */
+ * What an output may replace: a file of the same kind with the mark of this
+ * program, an empty file, or, with --overwrite, any file. Called before the work. */
 #ifndef IMP_CLI_OVERWRITE_H
 #define IMP_CLI_OVERWRITE_H
 
@@ -14,7 +14,7 @@ enum output_kind {
     OUTPUT_PART,
     OUTPUT_MANIFEST,
     OUTPUT_RECORD,
-    OUTPUT_SETTINGS, /* name=value,.. for --set @FILE */
+    OUTPUT_SETTINGS, /* "# importon ..", and name=value,.. for --set @FILE */
     OUTPUT_TABLE,
     OUTPUT_CURVE,
     OUTPUT_JSON,

@@ -18,6 +18,5 @@ const struct command command_view = {
      1},
     run,
     0,
-    NULL,
     0,
     REPLAYS_NEVER};

@@ -212,8 +212,8 @@ static enum imp_status grid_write(const imp_field *f, const char *path, bool npy
     const struct imp__grid *g = (const struct imp__grid *)f;
     const int m[3] = {g->desc.cells[0] + 1, g->desc.cells[1] + 1, g->desc.cells[2] + 1};
     const size_t n = (size_t)m[0] * m[1] * m[2], head = npy ? 128 : 48,
-                 bytes = npy ? 8 : 4;
-    unsigned char *data = imp__alloc(f->ctx, head + n * bytes, 1), *d;
+                 bytes = npy ? 8 : 4, mark = npy ? 0 : 8; /* as format/vol_file.c */
+    unsigned char *data = imp__alloc(f->ctx, head + n * bytes + mark, 1), *d;
     if (!data) return imp__error(f->ctx, IMP_E_NOMEM, "%s: no memory", path);
     if (npy) {
         memset(data, ' ', head);
@@ -224,7 +224,7 @@ static enum imp_status grid_write(const imp_field *f, const char *path, bool npy
                      "%d), }",
                      m[2], m[1], m[0]);
         data[10 + used] = ' ';
-        data[127] = '\n';
+        memcpy(data + 123, "\t\t\t\t\n", 5); /* as format/image_npy.c */
     } else {
         memcpy(data, "VOL\x03", 4);
         put_u32(data + 4, 1);
@@ -251,7 +251,9 @@ static enum imp_status grid_write(const imp_field *f, const char *path, bool npy
                 memcpy(&bits, &jet.eta, sizeof bits);
                 for (int q = 0; q < 8; q++) d[q] = (unsigned char)(bits >> (8 * q));
             }
-    const enum imp_status st = imp__file_write(f->ctx, path, data, head + n * bytes);
+    memcpy(d, "importon", mark);
+    const enum imp_status st =
+        imp__file_write(f->ctx, path, data, head + n * bytes + mark);
     imp__release(f->ctx, data);
     return st;
 }

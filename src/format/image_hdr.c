@@ -149,9 +149,10 @@ enum imp_status imp__hdr_encode(const imp_film *f, struct imp_bytes *out)
         return imp__error(f->ctx, IMP_E_ARG,
                           "HDR: the film has no R, G, B and no Y channel");
     char header[96];
-    const int n = snprintf(header, sizeof header,
-                           "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n",
-                           f->height, f->width);
+    const int n =
+        snprintf(header, sizeof header,
+                 "#?RADIANCE\n# importon\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n",
+                 f->height, f->width);
     const size_t pixels = (size_t)f->width * (size_t)f->height;
     struct imp_bytes b = {.size = (size_t)n + 4 * pixels};
     b.capacity = b.size;

@@ -115,7 +115,8 @@ enum imp_status imp__npy_encode(const imp_film *f, struct imp_bytes *out)
                  "{'descr': '<f4', 'fortran_order': False, 'shape': (%d, %d, %d), }",
                  f->height, f->width, f->channels);
     header[10 + n] = ' ';
-    header[127] = '\n';
+    memcpy(header + 123, "\t\t\t\t\n",
+           5); /* by this padding the command knows its own files */
     struct imp_bytes b = {.size = 128 + imp__film_values(f) * 4};
     b.capacity = b.size;
     b.data = imp__alloc(f->ctx, b.size, 1);

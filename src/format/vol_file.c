@@ -11,6 +11,16 @@
 
 enum { HEADER = 48 };
 
+/* Bytes of the mark behind the grid, which importon writes. */
+static size_t mark_bytes(const struct imp_bytes *bytes)
+{
+    const size_t n = sizeof IMP_VOL_MARK - 1;
+    return bytes->size >= HEADER + n &&
+                   !memcmp(bytes->data + bytes->size - n, IMP_VOL_MARK, n)
+               ? n
+               : 0;
+}
+
 enum imp_status imp__vol_parse(imp_context *ctx, struct imp_arena *keep, const char *name,
                                const struct imp_bytes *bytes, struct imp_grid_data *out)
 {
@@ -38,7 +48,7 @@ enum imp_status imp__vol_parse(imp_context *ctx, struct imp_arena *keep, const c
         return imp__error(ctx, IMP_E_UNSUPPORTED, "%s: %d channels; 1 or 3 are possible",
                           name, g.channels);
     if (__builtin_mul_overflow(n, (size_t)g.channels, &n) ||
-        n > (SIZE_MAX - HEADER) / 4 || bytes->size != HEADER + 4 * n)
+        n > (SIZE_MAX - HEADER) / 4 || bytes->size - mark_bytes(bytes) != HEADER + 4 * n)
         return imp__error(ctx, IMP_E_SCENE,
                           "%s: %zu bytes for %d x %d x %d cells of %d channels", name,
                           bytes->size, g.n[0], g.n[1], g.n[2], g.channels);
@@ -117,6 +127,8 @@ static void fill(struct imp_file_writer *w, const void *payload)
     for (int k = 0; k < 6; k++) put_number(w, v->param->box[k]);
     for (size_t i = 0; i < info->count; i++)
         put_number(w, (float)(v->values ? v->values[i] : imp__param_get(v->param, i)));
+    /* Behind the grid, where no reader looks: by it the command knows its own files. */
+    imp__file_put(w, IMP_VOL_MARK, sizeof IMP_VOL_MARK - 1);
 }
 
 enum imp_status imp_scene_write_volume(const imp_scene *scene, size_t index,

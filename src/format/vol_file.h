@@ -9,6 +9,8 @@
 #include "base/file.h"
 #include "base/props.h"
 
+/* Stands behind the values in files of our making, where other readers do not look. */
+#define IMP_VOL_MARK      "importon"
 #define IMP_VOL_BYTES_MAX ((size_t)1 << 34)
 
 /* Values are copied to the arena and finite. IMP_E_SCENE with what is wrong; IMP_E_UNSUPPORTED
