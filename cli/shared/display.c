@@ -4,16 +4,20 @@
 #include "display.h"
 
 #include "command.h"
+#include "text/progress.h"
 
 #include <errno.h>
 #include <netdb.h>
+#include <poll.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 enum { CREATE_IMAGE = 4, UPDATE_IMAGE = 6 }; /* packets */
 enum { ROWS_BYTES = 1 << 20 };               /* pixels of one packet, about */
+enum { PATIENCE_S = 10 }; /* longest wait for a viewer; then the run goes on alone */
 
 static struct {
     int socket;
@@ -63,12 +67,30 @@ static void lose(const char *what)
     shown.socket = -1;
 }
 
+/* Wait until the viewer takes more: for PATIENCE_S at most, and until a signal comes,
+ * which may reach any thread, so that poll alone need not hear it. */
+static void await_viewer(void)
+{
+    struct pollfd viewer = {.fd = shown.socket, .events = POLLOUT};
+    for (int slice = 0; slice < PATIENCE_S * 10; slice++) {
+        const int n = poll(&viewer, 1, 100);
+        if (n > 0) return;
+        if (progress_interrupted()) {
+            lose("interrupted");
+            return;
+        }
+    }
+    lose("it reads nothing");
+}
+
 static void send_packet(struct packet *p)
 {
     for (int k = 0; k < 4; k++) p->bytes[k] = (unsigned char)(p->n >> 8 * k);
     for (size_t done = 0; done < p->n && shown.socket >= 0;) {
-        const ssize_t n = send(shown.socket, p->bytes + done, p->n - done, MSG_NOSIGNAL);
+        const ssize_t n =
+            send(shown.socket, p->bytes + done, p->n - done, MSG_NOSIGNAL | MSG_DONTWAIT);
         if (n >= 0) done += (size_t)n;
+        else if (errno == EAGAIN || errno == EWOULDBLOCK) await_viewer();
         else if (errno != EINTR) lose(strerror(errno));
     }
 }
@@ -162,9 +184,14 @@ int display_open(void)
     int code = 0;
     for (struct addrinfo *a = found; a && !wrong && shown.socket < 0; a = a->ai_next) {
         shown.socket = socket(a->ai_family, a->ai_socktype, a->ai_protocol);
+        /* The time-out is that of connect. */
+        const struct timeval patience = {.tv_sec = PATIENCE_S};
+        if (shown.socket >= 0)
+            (void)setsockopt(shown.socket, SOL_SOCKET, SO_SNDTIMEO, &patience,
+                             sizeof patience);
         if (shown.socket >= 0 && connect(shown.socket, a->ai_addr, a->ai_addrlen) == 0)
             break;
-        code = errno;
+        code = errno == EINPROGRESS ? ETIMEDOUT : errno;
         if (shown.socket >= 0) close(shown.socket);
         shown.socket = -1;
     }

@@ -15,7 +15,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Most bytes read from a pipe or device, which has no size and may never end. */
+/* Most bytes read from a pipe, which has no size and may never end. */
 #define ENDLESS_MAX ((size_t)1 << 30)
 
 static enum imp_status io_error(imp_context *ctx, const char *path, const char *what,
@@ -83,6 +83,9 @@ enum imp_status imp__file_read_own(imp_context *ctx, const char *path, size_t li
         if (n < 0 && errno == EINTR) continue;
         if (n < 0) IMP_TRY(io_error(ctx, path, "cannot read", errno));
         if (n == 0) break;
+        if (S_ISCHR(info.st_mode) || S_ISBLK(info.st_mode))
+            IMP_TRY(imp__error(ctx, IMP_E_IO,
+                               "%s: a device is not read: it may never end", path));
         b.size += (size_t)n;
         if (b.size > limit)
             IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: longer than %zu bytes", path, limit));

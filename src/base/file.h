@@ -13,7 +13,7 @@ struct imp_bytes { /* growing memory; all zero is empty */
 };
 
 /* Read all of it, with a zero byte behind the end. @return IMP_E_IO if it cannot be read,
- * is a folder, or is longer than `limit`; IMP_E_NOMEM. */
+ * is a folder or a device with anything in it, or is longer than `limit`; IMP_E_NOMEM. */
 enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
                                struct imp_bytes *out);
 /* As imp__file_read, by this process for itself, of a file that is no input of a run. */

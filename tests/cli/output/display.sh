@@ -74,3 +74,32 @@ s.accept()[0].close()' &
 for ((k = 0; k < 100; k++)); do [[ -s port2 ]] && break; sleep 0.1; done
 importon render "$ROOT/scenes/furnace.xml" -D res=64 --spp 512 --display "127.0.0.1:$(<port2)" -o gone.exr 2>&1 | sed 's/is gone:.*/is gone/'
 ls gone.exr
+# Nor does one that takes nothing, and a run that it holds up hears a signal at once.
+cat >deaf.py <<'END'
+import socket, time
+s = socket.socket()
+s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+s.bind(("127.0.0.1", 0))
+s.listen()
+print(s.getsockname()[1], file=open("port3", "w"), flush=True)
+c = s.accept()[0]
+time.sleep(60)
+END
+python3 deaf.py &
+deaf=$!
+for ((k = 0; k < 100; k++)); do [[ -s port3 ]] && break; sleep 0.1; done
+importon render "$ROOT/scenes/furnace.xml" -D res=1024 --spp 1 --display "127.0.0.1:$(<port3)" -o deaf.pfm --no-preview 2>&1 | grep gone
+ls deaf.pfm
+kill $deaf
+rm port3
+python3 deaf.py &
+deaf=$!
+for ((k = 0; k < 100; k++)); do [[ -s port3 ]] && break; sleep 0.1; done
+SECONDS=0
+importon render "$ROOT/scenes/furnace.xml" -D res=1024 --spp 1 -q --display "127.0.0.1:$(<port3)" -o deaf.pfm --no-preview 2>/dev/null &
+run=$!
+sleep 4
+kill -TERM $run
+wait $run
+((SECONDS < 8)) && echo "heard"
+kill $deaf
