@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Whether a walk goes on, and where: the draw of a direction, and roulette. */
-#include "drawn.h"
+ * Whether a walk from the sensor goes on, and where: densities of directions by kernels and
+ * mixtures, and roulette. */
+#include "scatter_with.h"
 
 bool imp__throughput_part(struct imp_step *s, const struct imp_bsdf *b, imp_spec factor)
 {
@@ -38,9 +39,13 @@ static double photon_survival(const struct imp_step *s, const struct imp_bsdf *b
 /* Survival probability, as decided; false: the walk ends. Zero factors that still
  * have a derivative are left out of beta, so roulette sees the walk as if they were not
  * there (docs/estimators.md 9.1, 9.2). factor: weight of the step, without survival. */
-static bool roulette(struct imp_step *s, const struct imp_bsdf *b, imp_spec factor,
-                     double *survive)
+static inline bool roulette(struct imp_step *s, const struct imp_bsdf *b,
+                            const struct imp_dirs *dirs, imp_spec factor, double *survive)
 {
+    if (b->ops->index_ratio)
+        s->eta *= imp_likely(!b->shaped)
+                      ? b->ops->index_ratio(b, s->in, dirs)
+                      : imp__shaped_index_ratio(b, s->at.carried, s->in, dirs);
     const struct imp_walk_integrator *integrator = s->tracer->integrator;
     const bool guided = imp_unlikely(s->guided.reference > 0);
     if (integrator->absorbs) { /* `absorb` has drawn already */
@@ -60,16 +65,10 @@ static bool roulette(struct imp_step *s, const struct imp_bsdf *b, imp_spec fact
     return imp__step_number(s, IMP_DIM_SURVIVE) < *survive;
 }
 
-/* A direction as drawn: p, in all lanes together where they differ (0: the walk ends), and
- * the density that a light sample competes with. share, rest as of struct imp_decision. */
-struct drawn {
-    double pdf, competing, share, rest;
-};
-
-/* Of a vertex with a mixture: what the densities other than the BSDF's have, `all` being
+/* At a vertex with a mixture: what the densities other than the BSDF's have, `all` being
  * the whole and k the BSDF's. */
 static void mixed_parts(const struct imp_step *s, double all, double k, int by, int lobe,
-                        struct drawn *p)
+                        struct imp_drawn *p)
 {
     const struct imp_mixed *m = &s->mixed;
     const bool alone = m->only >= 0;
@@ -80,10 +79,14 @@ static void mixed_parts(const struct imp_step *s, double all, double k, int by, 
 
 /* f: the value. Where a vertex splits, the members' MIS weights are those of the lane that
  * drew, which add up to 1 for every lane. */
-static struct drawn density(struct imp_step *s, const struct imp_bsdf *b,
-                            const struct imp_dirs *dirs, imp_v3 w, int by, imp_spec *f)
+static inline struct imp_drawn density(struct imp_step *s, const struct imp_vertex *v,
+                                       const struct imp_surface *at,
+                                       const struct imp_dirs *dirs, imp_v3 w, int by,
+                                       imp_spec *f)
 {
-    struct drawn d = {.share = 1};
+    (void)at;
+    const struct imp_bsdf *b = v->bsdf;
+    struct imp_drawn d = {.share = 1};
     if (imp_likely(!b->shaped)) {
         const double k = imp__bsdf_pdf_eval(b, s->in, dirs, f);
         if (!(k > 0)) return d;
@@ -110,74 +113,31 @@ static struct drawn density(struct imp_step *s, const struct imp_bsdf *b,
     return d;
 }
 
-/* May nothing follow but what is no bounce? */
-static bool last_bounce(const struct imp_step *s)
+static inline bool bounces(const struct imp_step *s)
 {
     const int max_depth = s->tracer->integrator->max_depth;
-    return max_depth >= 0 && imp__bounces(s) + 1 >= max_depth;
+    return max_depth < 0 || imp__bounces(s) + 1 < max_depth;
 }
+
+static inline void left(struct imp_step *s, const struct imp_vertex *v,
+                        const struct imp_surface *at, const struct imp_dirs *dirs,
+                        bool straight, const struct imp_drawn *p, double pdf)
+{
+    imp__guided_leave(&s->guided);
+    if (imp_unlikely(straight)) return;
+    if (imp_unlikely(s->light_tree != NULL)) s->left = imp__light_place(s, v->bsdf, at);
+    const double competing = imp_likely(!s->mixed.splits) ? pdf : p->competing;
+    s->pdf = dirs->lobe == IMP_SMOOTH && s->segment->connects ? competing : 0;
+}
+
+static const struct imp_scatter_ops kernel = {
+    .bounces = bounces, .density = density, .survives = roulette, .left = left};
 
 bool imp__scatter_along(struct imp_step *s, struct imp_vertex *v,
                         const struct imp_surface *at, const struct imp_frame *frame,
                         struct imp_direction *direction)
 {
-    const struct imp_bsdf *b = v->bsdf;
-    struct imp_dirs *dirs = &direction->dirs;
-    const int by = direction->by;
-
-    /* Its density and its value. */
-    const imp_v3 w = imp__to_world(frame, dirs->wi);
-    dirs->wo = s->wo;
-    dirs->wi = imp__decide(dirs->wi);
-    const bool straight = imp_unlikely(b->straight) && s->segment->through &&
-                          dirs->lobe >= 0 && dirs->lobe < 64 &&
-                          b->straight >> dirs->lobe & 1;
-    if (imp_unlikely(!straight && b->straight) && last_bounce(s)) return false;
-    imp_spec f;
-    const struct drawn p = density(s, b, dirs, w, by, &f);
-    const double pdf = imp__decide1(p.pdf);
-    if (!(pdf > 0)) return false; /* structurally zero */
-
-    /* Does the walk go on? */
-    double survive = 1;
-    if (imp_unlikely(s->guided.guide != NULL)) s->guided.before = s->beta;
-    if (!imp__throughput_add(s, b, f * (1 / pdf))) return false;
-    if (b->ops->index_ratio)
-        s->eta *= imp_likely(!b->shaped)
-                      ? b->ops->index_ratio(b, s->in, dirs)
-                      : imp__shaped_index_ratio(b, s->at.carried, s->in, dirs);
-    if (!roulette(s, b, f * (1 / pdf), &survive)) return false;
-    s->beta *= imp__spec(1 / survive);
-    imp__step_weigh(v, f, pdf, survive);
-    if (s->recorded) {
-        imp__store_v3(v->d.wi, dirs->wi);
-        v->d.lobe = (int8_t)dirs->lobe;
-        v->d.drawn = (uint8_t)(by & 7);
-        v->d.alone = s->mixed.here && s->mixed.only >= 0;
-        v->d.pdf = (imp_decided)pdf;
-        v->d.share = (imp_decided)p.share;
-        v->d.rest = (imp_decided)p.rest;
-        v->d.survive = (imp_decided)survive;
-        v->d.goes_on = true;
-    }
-
-    /* The next ray. */
-    imp__guided_leave(&s->guided);
-    s->d = w;
-    s->o = imp__offset(at->p, at->ng, s->d);
-    s->t_min = 0;
-    s->t_max = INFINITY;
-    if (imp_unlikely(s->segment->leave != NULL)) s->segment->leave(s, v, at);
-    /* Where no connection could have been made, MIS has nothing to weigh. */
-    if (imp_unlikely(straight)) { /* it could have been made where the walk comes from */
-        s->straight++;
-        return true;
-    }
-    s->from = at->p;
-    if (imp_unlikely(s->light_tree != NULL)) s->left = imp__light_place(s, b, at);
-    const double competing = imp_likely(!s->mixed.splits) ? pdf : p.competing;
-    s->pdf = dirs->lobe == IMP_SMOOTH && s->segment->connects ? competing : 0;
-    return true;
+    return imp__scatter_with(&kernel, s, v, at, frame, direction);
 }
 
 bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_surface *at,

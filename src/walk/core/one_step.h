@@ -1,0 +1,77 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * One step of a walk, from the ray in flight to the next one. This is the only place where
+ * paths are made, whichever end they begin at: pictures, gradients and checks start from what
+ * it records. Each end instantiates it with its table (ends.h). */
+#ifndef IMP_WALK_ONE_STEP_H
+#define IMP_WALK_ONE_STEP_H
+
+#include "ends.h"
+#include "vertices.h"
+
+#define IMP_STEP_INLINE static inline __attribute__((always_inline))
+
+/* At a vertex: what is met, the connection, and where the walk goes on. False: it ends. hit
+ * NULL: the walk begins here. */
+IMP_STEP_INLINE bool imp__vertex_work(const struct imp_end_ops *end, struct imp_step *s,
+                                      struct imp_vertex *v, const struct imp_hit *hit,
+                                      const struct imp_surface *at,
+                                      const struct imp_frame *frame)
+{
+    const bool goes_on =
+        end->bounces(s) || (end->passes && imp_unlikely(v->bsdf->straight) &&
+                            s->segment->through && end->passes(s));
+    imp__step_numbers(s);
+    if (end->densities) end->densities(s, v, at);
+    if (!end->meet(s, v, hit, at) || (!end->connects_last && !goes_on)) return false;
+    if (end->goes_on) end->goes_on(s, v);
+
+    /* A point to be connected to, and a direction: both are drawn before either is weighed, and
+     * both are weighed before the point is looked for, so that neither waits for the other's
+     * roots and quotients. */
+    struct imp_link link;
+    const bool linked =
+        (v->bsdf->flags & IMP_BSDF_SMOOTH) && end->link_draw(s, v, at, &link);
+    struct imp_direction direction;
+    const bool splits = end->splits && end->splits(s);
+    const bool directions = goes_on && s->tracer->integrator->directions;
+    const bool drawn =
+        directions && !splits && end->direction_draw(s, v, frame, &direction);
+
+    link.shadow.wanted = false;
+    if (linked) end->link_weigh(s, v, at, frame, &link);
+    if (end->join) {
+        if (link.shadow.wanted) end->link_see(s, v, at, &link);
+        if (!end->join(s, v, at, frame)) return false;
+    }
+    const bool continues =
+        drawn ? end->scatter(s, v, at, frame, &direction)
+              : splits && directions && end->scatter_split(s, v, at, frame);
+    if (!end->join && link.shadow.wanted) end->link_see(s, v, at, &link);
+    return continues && !s->walk->dropped;
+}
+
+IMP_STEP_INLINE bool imp__one_step(const struct imp_end_ops *end, struct imp_step *s)
+{
+    struct imp_hit hit;
+    struct imp_surface at;
+    struct imp_frame frame;
+    struct imp_vertex *v;
+
+    /* Follow the ray to what it meets. */
+    switch (s->segment->meet(s, &hit)) {
+    case IMP_MEETS_SURFACE: v = imp__surface_meet(s, &hit, &at, &frame); break;
+    case IMP_MEETS_MEDIUM:
+        v = imp__medium_meet(s, s->flight.here->scatterer, s->flight.here->index,
+                             s->flight.at, s->flight.t, &at, &frame);
+        break;
+    case IMP_MEETS_NOTHING:
+        if (end->nothing) end->nothing(s);
+        return false;
+    default: return false;
+    }
+    return v && (!end->arrive || end->arrive(s, v, &hit, &at, &frame)) &&
+           imp__vertex_work(end, s, v, &hit, &at, &frame);
+}
+
+#endif
