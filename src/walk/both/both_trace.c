@@ -5,7 +5,7 @@
  * their time, their wavelengths and the lane that draws. */
 #include "both.h"
 #include "kind/bsdf/transport.h"
-#include "walk/core/drawn.h"
+#include "walk/core/one_step.h"
 #include "walk/path/first_segment.h"
 #include "walk/path/meter.h"
 
@@ -116,10 +116,52 @@ static void join(struct imp_step *s, struct imp_vertex *v, int k,
 
 /* ---- The walk from the sensor ------------------------------------------------------ */
 
-/* The light sample of v, if it is seen. */
-static void light_see(struct imp_step *s, struct imp_vertex *v,
-                      const struct imp_surface *at, const struct imp_shadow *shadow)
+static void nothing(struct imp_step *s)
 {
+    if (imp__both_eye_arrives(s, NULL)) imp__sky_meet(s);
+}
+
+static bool arrive(struct imp_step *s, struct imp_vertex *v, const struct imp_hit *hit,
+                   const struct imp_surface *at, const struct imp_frame *frame)
+{
+    (void)v, (void)hit, (void)frame;
+    return imp__both_eye_arrives(s, at);
+}
+
+/* Two segments more are within max_depth. */
+static bool bounces(const struct imp_step *s)
+{
+    return imp__light_depth_allows(s, s->depth + 2);
+}
+
+/* What a sensor that is a surface emits itself is not met where its walk begins. */
+static bool meet(struct imp_step *s, struct imp_vertex *v, const struct imp_hit *hit,
+                 const struct imp_surface *at)
+{
+    if (hit && v->shape && v->shape->emitter >= 0 &&
+        imp__light_depth_allows(s, s->depth + 1))
+        imp__emission_meet(s, v, v->shape->emitter, 1, hit, at);
+    return true;
+}
+
+static bool link_draw(struct imp_step *s, const struct imp_vertex *v,
+                      const struct imp_surface *at, struct imp_link *link)
+{
+    return imp__light_point(s, v->bsdf, at, &link->light);
+}
+
+static void link_weigh(struct imp_step *s, struct imp_vertex *v,
+                       const struct imp_surface *at, const struct imp_frame *frame,
+                       struct imp_link *link)
+{
+    imp__light_sample(s, v, at, frame, &link->light, &link->shadow);
+}
+
+/* Joints add to B, too. */
+static void link_see(struct imp_step *s, struct imp_vertex *v,
+                     const struct imp_surface *at, const struct imp_link *link)
+{
+    const struct imp_shadow *shadow = &link->shadow;
     imp_spec T = imp__spec(1);
     const bool seen = s->segment->sees
                           ? s->segment->sees(s, v, at, shadow, &T)
@@ -132,50 +174,36 @@ static void light_see(struct imp_step *s, struct imp_vertex *v,
     v->light_w *= T;
 }
 
-/* At a vertex that scatters: its light sample, its joints, and where the walk goes on;
- * false: it ends. */
-static bool scatter(struct imp_step *s, struct imp_vertex *v,
-                    const struct imp_surface *at, const struct imp_frame *frame)
+/* A sensor that is a surface, of depth -1, is connected by the walk from the light. */
+static bool join_all(struct imp_step *s, struct imp_vertex *v,
+                     const struct imp_surface *at, const struct imp_frame *frame)
 {
-    const struct imp_both *b = s->both;
-    const int segments = s->depth + 1;
-    imp__step_numbers(s);
-    if (!imp__light_depth_allows(s, segments + 1)) return false;
-    if (v->bsdf->flags & IMP_BSDF_SMOOTH) {
-        struct imp_shadow shadow = {.wanted = false};
-        struct imp_light_point point;
-        if (imp__light_point(s, v->bsdf, at, &point))
-            imp__light_sample(s, v, at, frame, &point, &shadow);
-        if (shadow.wanted) light_see(s, v, at, &shadow);
-        /* A sensor that is a surface is connected by the walk from the light. */
-        for (int k = 1; s->depth >= 0 && k < b->n_light && !s->walk->dropped; k++)
-            if (b->place[k].vertex && imp__light_depth_allows(s, segments + 1 + k))
+    if ((v->bsdf->flags & IMP_BSDF_SMOOTH) && s->depth >= 0)
+        for (int k = 1; k < s->both->n_light && !s->walk->dropped; k++)
+            if (s->both->place[k].vertex && imp__light_depth_allows(s, s->depth + 2 + k))
                 join(s, v, k, at, frame);
-    }
-    if (s->walk->dropped || !imp__scatter(s, v, at, frame)) return false;
-    imp__both_eye_leaves(s, v->bsdf, frame);
-    s->depth++;
     return !s->walk->dropped;
 }
 
-static bool step(struct imp_step *s)
+static bool scatter(struct imp_step *s, struct imp_vertex *v,
+                    const struct imp_surface *at, const struct imp_frame *frame,
+                    struct imp_direction *direction)
 {
-    struct imp_hit hit;
-    struct imp_surface at;
-    struct imp_frame frame;
-    const enum imp_meeting met = s->segment->meet(s, &hit);
-    if (met == IMP_MEETS_DROP) return false;
-    const bool nothing = met == IMP_MEETS_NOTHING;
-    struct imp_vertex *v = nothing ? NULL : imp__vertex_meet(s, met, &hit, &at, &frame);
-    if ((!nothing && !v) || !imp__both_eye_arrives(s, v ? &at : NULL)) return false;
-    if (nothing) {
-        imp__sky_meet(s);
-        return false;
-    }
-    if (v->shape && v->shape->emitter >= 0 && imp__light_depth_allows(s, s->depth + 1))
-        imp__emission_meet(s, v, v->shape->emitter, 1, &hit, &at);
-    return scatter(s, v, &at, &frame);
+    if (!imp__scatter_along(s, v, at, frame, direction)) return false;
+    imp__both_eye_leaves(s, v->bsdf, frame);
+    return true;
 }
+
+static const struct imp_end_ops eye_end = {.nothing = nothing,
+                                           .arrive = arrive,
+                                           .bounces = bounces,
+                                           .meet = meet,
+                                           .link_draw = link_draw,
+                                           .link_weigh = link_weigh,
+                                           .link_see = link_see,
+                                           .join = join_all,
+                                           .direction_draw = imp__direction_begin,
+                                           .scatter = scatter};
 
 /* A sensor that is a surface is the first vertex. */
 static bool meter_begin(struct imp_step *s)
@@ -187,7 +215,9 @@ static bool meter_begin(struct imp_step *s)
     struct imp_end *end = &s->both->from_eye[0];
     end->p = at.p;
     end->ng = at.ng;
-    return scatter(s, v, &at, &frame);
+    if (!imp__vertex_work(&eye_end, s, v, NULL, &at, &frame)) return false;
+    s->depth++;
+    return true;
 }
 
 /* ---- Both -------------------------------------------------------------------------- */
@@ -219,7 +249,7 @@ static void eye_follow(const struct imp_tracer *tracer, struct imp_both *b)
                        : s.segment->begin    ? s.segment->begin(&s)
                                              : true;
     if (begun)
-        while (step(&s)) {}
+        while (imp__one_step(&eye_end, &s)) s.depth++;
 }
 
 /* What the walk from the sensor brings is a reach like those of the other. */

@@ -42,7 +42,8 @@ struct imp_link {
         struct imp_light_point light;
         struct imp_sensor_sample sensor;
     };
-    imp_spec f; /* to the sensor: the value, and the weight with which it enters */
+    /* To the sensor: what enters is f le weight. */
+    imp_spec f, le;
     double weight;
 };
 

@@ -141,11 +141,6 @@ static inline void imp__store_v3(imp_decided out[3], imp_v3 v)
 /* A vertex behind the last one, with room for the inputs of its BSDF. NULL: the walk is
  * dropped. */
 struct imp_vertex *imp__vertex_add(struct imp_step *s, int n_in);
-/* The vertex where the ray in flight ended, as the segment's `meet` said; NULL: there is
- * none. */
-struct imp_vertex *imp__vertex_meet(struct imp_step *s, enum imp_meeting met,
-                                    struct imp_hit *hit, struct imp_surface *at,
-                                    struct imp_frame *frame);
 /* Where the surface is, as decided, and its inputs; d: direction of arrival, t: length of
  * the segment that leads there. */
 void imp__vertex_place(struct imp_step *s, struct imp_vertex *v,

@@ -35,17 +35,6 @@ struct imp_vertex *imp__medium_meet(struct imp_step *s, const struct imp_bsdf *s
     return v;
 }
 
-struct imp_vertex *imp__vertex_meet(struct imp_step *s, enum imp_meeting met,
-                                    struct imp_hit *hit, struct imp_surface *at,
-                                    struct imp_frame *frame)
-{
-    if (met == IMP_MEETS_SURFACE) return imp__surface_meet(s, hit, at, frame);
-    if (met == IMP_MEETS_MEDIUM)
-        return imp__medium_meet(s, s->flight.here->scatterer, s->flight.here->index,
-                                s->flight.at, s->flight.t, at, frame);
-    return NULL;
-}
-
 /* A vertex that scatters nothing, passed along d. */
 static void straight_on(struct imp_decision *v, imp_v3 d)
 {

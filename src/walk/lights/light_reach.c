@@ -135,25 +135,22 @@ void imp__light_shadow_aim(const struct imp_surface *from,
     shadow->wanted = true;
 }
 
-/* What connections have in common: v is connected with f le weight, if it is seen. */
-void imp__light_connect(struct imp_light_step *w, struct imp_vertex *v,
-                        const struct imp_surface *from, const struct imp_shadow *shadow,
-                        const struct imp_sensor_sample *to, imp_spec f, imp_spec le,
-                        double weight)
+void imp__light_link_see(struct imp_step *s, struct imp_vertex *v,
+                         const struct imp_surface *from, const struct imp_link *link)
 {
-    struct imp_step *s = &w->s;
+    struct imp_light_step *w = (struct imp_light_step *)s;
     imp_spec T;
     if (s->recorded) v->d.connection = IMP_OCCLUDED;
-    if (!sees(s, v, from, shadow, &T)) return;
-    v->b = f * le * weight * T;
+    if (!sees(s, v, from, &link->shadow, &T)) return;
+    v->b = link->f * link->le * link->weight * T;
     if (s->recorded) {
         v->d.connection = IMP_CONNECTED;
-        v->d.light.weight = (imp_decided)weight;
-        v->light_f = f;
-        v->light_e = le;
-        v->light_w = T * weight;
+        v->d.light.weight = (imp_decided)link->weight;
+        v->light_f = link->f;
+        v->light_e = link->le;
+        v->light_w = T * link->weight;
     }
-    reach_add(w, v, false, to->px, to->py);
+    reach_add(w, v, false, link->sensor.px, link->sensor.py);
 }
 
 /* Density with which the walk would go on that way. */
@@ -171,48 +168,45 @@ static double continues_pdf(const struct imp_step *s, const struct imp_bsdf *b,
     return imp__lane_mis_density(s, p);
 }
 
-/* A vertex that scatters, at `at`. */
-void imp__light_connect_vertex(struct imp_light_step *w, struct imp_vertex *v,
-                               const struct imp_surface *at,
-                               const struct imp_frame *frame)
+bool imp__light_link_draw(struct imp_step *s, const struct imp_vertex *v,
+                          const struct imp_surface *at, struct imp_link *link)
 {
-    struct imp_step *s = &w->s;
     const struct imp_sensor *sensor = s->tracer->sensor;
-    const struct imp_bsdf *b = v->bsdf;
     const struct imp_walk_integrator *i = s->tracer->integrator;
-    struct imp_sensor_sample to;
     double u[4];
-    if (!i->lights || !(b->flags & IMP_BSDF_SMOOTH) ||
-        !imp__light_depth_allows(s, s->depth + 1))
-        return;
+    if (!i->lights || !imp__light_depth_allows(s, s->depth + 1)) return false;
     if (!sensor->ops->connect || (i->hide_emitters && v->shape && v->shape->emitter >= 0))
-        return;
+        return false;
     imp__light_sensor_numbers(s, u);
-    if (!sensor->ops->connect(sensor, &at->p, false, u, &to) ||
-        !imp__light_on_film(sensor, &to))
-        return;
+    return sensor->ops->connect(sensor, &at->p, false, u, &link->sensor) &&
+           imp__light_on_film(sensor, &link->sensor);
+}
 
-    const struct imp_dirs dirs = {imp__decide(imp__to_local(frame, to.wo)), s->wo,
+void imp__light_link_weigh(struct imp_step *s, struct imp_vertex *v,
+                           const struct imp_surface *at, const struct imp_frame *frame,
+                           struct imp_link *link)
+{
+    struct imp_light_step *w = (struct imp_light_step *)s;
+    const struct imp_bsdf *b = v->bsdf;
+    const struct imp_sensor_sample *to = &link->sensor;
+    const struct imp_dirs dirs = {imp__decide(imp__to_local(frame, to->wo)), s->wo,
                                   IMP_SMOOTH, imp__derivative_wanted(s, b)};
     const double c = v->shape
-                         ? imp__bsdf_exchange(b, s->in, &dirs, imp__dot(to.wo, at->ng),
+                         ? imp__bsdf_exchange(b, s->in, &dirs, imp__dot(to->wo, at->ng),
                                               imp__dot(-s->d, at->ng))
                          : 1;
-    imp_spec f;
-    imp__bsdf_eval(b, s->at.carried, s->in, &dirs, &f);
+    imp__bsdf_eval(b, s->at.carried, s->in, &dirs, &link->f);
+    link->le = imp__spec(1);
     const double mis =
-        w->both ? imp__both_reach_weight(w, &to, b, &dirs)
-        : sensor->shape
-            ? imp__light_connect_weight(s, &to, continues_pdf(s, b, &dirs, to.wo), 0)
+        w->both ? imp__both_reach_weight(w, to, b, &dirs)
+        : s->tracer->sensor->shape
+            ? imp__light_connect_weight(s, to, continues_pdf(s, b, &dirs, to->wo), 0)
             : 1;
-    const double weight = imp__decide1(to.weight * c * mis);
-    if (!(weight > 0)) return;
-    if (imp__is_zero_used(f, s->at.carried) && !imp__wants_derivative(s, b)) return;
-    struct imp_shadow shadow;
-    imp__light_shadow_aim(at, &to, &shadow);
-    if (s->recorded) {
-        v->d.light.emitter = -1;
-        imp__store_v3(v->d.light.wi, dirs.wo);
-    }
-    imp__light_connect(w, v, at, &shadow, &to, f, imp__spec(1), weight);
+    link->weight = imp__decide1(to->weight * c * mis);
+    if (!(link->weight > 0)) return;
+    if (imp__is_zero_used(link->f, s->at.carried) && !imp__wants_derivative(s, b)) return;
+    imp__light_shadow_aim(at, to, &link->shadow);
+    if (!s->recorded) return;
+    v->d.light.emitter = -1;
+    imp__store_v3(v->d.light.wi, dirs.wo);
 }

@@ -107,13 +107,15 @@ static void light_itself_connect(struct imp_light_step *w, struct imp_vertex *v,
         imp__store_v3(l->p, p);
         imp__store_v3(l->wi, (imp_v3){0});
     }
+    const struct imp_link link = {
+        .shadow = shadow, .sensor = to, .f = imp__spec(1), .le = le, .weight = weight};
     if (!far) {
-        imp__light_connect(w, v, &from, &shadow, &to, imp__spec(1), le, weight);
+        imp__light_link_see(s, v, &from, &link);
         return;
     }
     const struct imp_flight of_light = s->flight;
     if (flight_begin(s, sensor->medium, shadow.o, shadow.d))
-        imp__light_connect(w, v, &from, &shadow, &to, imp__spec(1), le, weight);
+        imp__light_link_see(s, v, &from, &link);
     s->flight = of_light;
 }
 

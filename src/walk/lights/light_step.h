@@ -11,10 +11,11 @@
 #define IMP_WALK_LIGHT_STEP_H
 
 #include "light_walk.h"
+#include "walk/core/ends.h"
 #include "walk/core/guided.h"
 
 struct imp_light_step {
-    struct imp_step s;
+    struct imp_step s; /* first: ends are handed it */
     struct imp_light_walk *out;
     struct imp_reach **end; /* of the list */
     /* The ray in flight: its density per area across it, where the sky sent it; else 0. */
@@ -47,25 +48,25 @@ bool imp__light_start(struct imp_light_step *w);
 /* The surface of the sensor, met at v. */
 void imp__light_meet_sensor(struct imp_light_step *w, struct imp_vertex *v,
                             const struct imp_surface *at);
-/* A connection of a vertex that scatters, at `at`, to the sensor. */
-void imp__light_connect_vertex(struct imp_light_step *w, struct imp_vertex *v,
-                               const struct imp_surface *at,
-                               const struct imp_frame *frame);
+/* A connection of a vertex that scatters to the sensor (struct imp_end_ops). s is that of a
+ * struct imp_light_step. */
+bool imp__light_link_draw(struct imp_step *s, const struct imp_vertex *v,
+                          const struct imp_surface *at, struct imp_link *link);
+void imp__light_link_weigh(struct imp_step *s, struct imp_vertex *v,
+                           const struct imp_surface *at, const struct imp_frame *frame,
+                           struct imp_link *link);
+void imp__light_link_see(struct imp_step *s, struct imp_vertex *v,
+                         const struct imp_surface *from, const struct imp_link *link);
 /* Can a connection reach a pixel? */
 bool imp__light_on_film(const struct imp_sensor *s, const struct imp_sensor_sample *to);
 /* The parts of a connection, for vertices and for lights: the random numbers of the
  * point on the sensor; the weight against a walk that meets the sensor, which has density
- * `pdf` per steradian, or `across` per area across the ray; the shadow ray; and, if the
- * sensor is seen along it, the value f le weight. */
+ * `pdf` per steradian, or `across` per area across the ray; the shadow ray. */
 void imp__light_sensor_numbers(const struct imp_step *s, double u[4]);
 double imp__light_connect_weight(const struct imp_step *s,
                                  const struct imp_sensor_sample *to, double pdf,
                                  double across);
 void imp__light_shadow_aim(const struct imp_surface *from,
                            const struct imp_sensor_sample *to, struct imp_shadow *shadow);
-void imp__light_connect(struct imp_light_step *w, struct imp_vertex *v,
-                        const struct imp_surface *from, const struct imp_shadow *shadow,
-                        const struct imp_sensor_sample *to, imp_spec f, imp_spec le,
-                        double weight);
 
 #endif

@@ -1,20 +1,44 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * One walk from a light is decided (light_walk.h), from its start on. */
+ * The end of a walk that begins at a light (light_walk.h): what the one step
+ * (core/one_step.h) does there. Light scatters by transposed kernels, is connected to the
+ * sensor, and meets the sensor where that is a surface. */
 #include "kind/bsdf/transport.h"
 #include "walk/both/both.h"
+#include "walk/core/one_step.h"
+#include "walk/core/scatter_with.h"
 #include <float.h>
 
 /* In place of a pixel in the key: no pixel of a film has this number. */
 #define LIGHT_WALKS UINT64_C(0x4c69676874000000)
 
-/* ---- One step --------------------------------------------------------------------- */
+/* ---- The continuation -------------------------------------------------------------- */
 
-/* Draw where the light goes. False: nowhere. */
-static bool direction_draw(const struct imp_step *s, const struct imp_bsdf *b,
-                           const struct imp_frame *frame, double u[3],
-                           struct imp_dirs *dirs)
+static inline struct imp_light_step *of_light(struct imp_step *s)
 {
+    return (struct imp_light_step *)s; /* its first member */
+}
+
+/* Another vertex makes no path that is too long. */
+static inline bool bounces(const struct imp_step *s)
+{
+    return imp__light_depth_allows(s, s->depth + (s->tracer->sensor->shape ? 1 : 2));
+}
+
+static inline bool direction_draw(const struct imp_step *s, const struct imp_vertex *v,
+                                  const struct imp_frame *frame,
+                                  struct imp_direction *direction)
+{
+    const struct imp_bsdf *b = v->bsdf;
+    const struct imp_key key = s->walk->key;
+    double u[3] = {imp__u01(key, imp__dim(s->depth, IMP_DIM_LOBE)),
+                   imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_U)),
+                   imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_V))};
+    struct imp_dirs *dirs = &direction->dirs;
+    *dirs = (struct imp_dirs){.wi = s->wo_drawn,
+                              .lobe = IMP_SMOOTH,
+                              .derivative = imp__derivative_wanted(s, b)};
+    direction->by = IMP_DENSITY_KERNEL;
     if (imp_unlikely(s->guided.here) && imp__guided_light_draw(s, frame, u, dirs))
         return true;
     if (imp_likely(!b->shaped)) return imp__bsdf_transposed_sample(b, s->in, u, dirs);
@@ -40,123 +64,112 @@ static double direction_pdf(struct imp_step *s, const struct imp_bsdf *b,
     return *kernel = 1 / imp__lane_mis_decide(s, p);
 }
 
-/* Whether the walk goes on, and where. */
-static bool scatter(struct imp_light_step *w, struct imp_vertex *v,
-                    const struct imp_surface *at, const struct imp_frame *frame,
-                    bool bounces)
+/* The weight of the step is f c/p, c for the transposed kernel. Roulette goes by the weight
+ * without a guide: where that sends more walks, each is worth no less for it. */
+static inline struct imp_drawn density(struct imp_step *s, const struct imp_vertex *v,
+                                       const struct imp_surface *at,
+                                       const struct imp_dirs *dirs, imp_v3 w, int by,
+                                       imp_spec *f)
 {
-    struct imp_step *s = &w->s;
-    const struct imp_walk_integrator *integrator = s->tracer->integrator;
+    (void)by;
     const struct imp_bsdf *b = v->bsdf;
-    const struct imp_key key = s->walk->key;
-
-    /* Draw a direction. */
-    double u[3] = {imp__u01(key, imp__dim(s->depth, IMP_DIM_LOBE)),
-                   imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_U)),
-                   imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_V))};
-    struct imp_dirs dirs = {.wi = s->wo_drawn,
-                            .lobe = IMP_SMOOTH,
-                            .derivative = imp__derivative_wanted(s, b)};
-    if (!direction_draw(s, b, frame, u, &dirs)) return false;
-    const bool straight = imp_unlikely(b->straight) && s->segment->through &&
-                          dirs.lobe >= 0 && dirs.lobe < 64 &&
-                          b->straight >> dirs.lobe & 1;
-    if (!straight && !bounces) return false;
-    const imp_v3 d = imp__to_world(frame, dirs.wo);
-    dirs.wi = s->wo;
-    dirs.wo = imp__decide(dirs.wo);
-
-    /* The weight of the step: f c/p. */
+    struct imp_drawn p = {.share = 1};
     double kernel = 0;
-    const double density = direction_pdf(s, b, &dirs, d, &kernel);
-    const double c = v->shape ? imp__bsdf_exchange(b, s->in, &dirs, imp__dot(d, at->ng),
+    p.competing = direction_pdf(s, b, dirs, w, &kernel);
+    const double c = v->shape ? imp__bsdf_exchange(b, s->in, dirs, imp__dot(w, at->ng),
                                                    imp__dot(-s->d, at->ng))
                               : 1;
-    if (!(density > 0) || !(c > 0)) return false;
-    const double pdf = imp__decide1(density / c);
-    imp_spec f;
-    imp__bsdf_eval(b, s->at.carried, s->in, &dirs, &f);
-    if (!(pdf > 0)) return false;
-    /* Roulette goes by the weight without a guide: where that sends more walks, each is
-     * worth no less for it. */
-    const double drawn = imp_unlikely(s->guided.here && kernel > 0) ? kernel / c : pdf;
-    if (!imp__throughput_add(s, b, f * (1 / drawn))) return false;
+    if (!(p.competing > 0) || !(c > 0)) return p;
+    p.pdf = p.competing / c;
+    if (imp_unlikely(s->guided.here && kernel > 0)) p.unguided = kernel / c;
+    imp__bsdf_eval(b, s->at.carried, s->in, dirs, f);
+    return p;
+}
 
-    /* Russian roulette. */
-    double survive = 1;
-    if (s->depth >= integrator->rr_depth) {
-        survive = imp__decide1(fmin(imp__max_used(s->beta, s->at.carried), 0.95));
-        if (!(imp__u01(key, imp__dim(s->depth, IMP_DIM_SURVIVE)) < survive)) return false;
-        s->beta *= imp__spec(1 / survive);
-    }
-    imp__step_weigh(v, f, pdf, survive);
-    if (s->recorded) {
-        imp__store_v3(v->d.wo, dirs.wo);
-        v->d.lobe = (int8_t)dirs.lobe;
-        v->d.pdf = (imp_decided)pdf;
-        v->d.survive = (imp_decided)survive;
-        v->d.goes_on = true;
-    }
+static inline bool survives(struct imp_step *s, const struct imp_bsdf *b,
+                            const struct imp_dirs *dirs, imp_spec factor, double *survive)
+{
+    (void)b, (void)dirs, (void)factor;
+    if (s->depth < s->tracer->integrator->rr_depth) return true;
+    *survive = imp__decide1(fmin(imp__max_used(s->beta, s->at.carried), 0.95));
+    return imp__u01(s->walk->key, imp__dim(s->depth, IMP_DIM_SURVIVE)) < *survive;
+}
 
-    /* The ray in flight. */
-    s->d = d;
-    s->o = v->shape ? imp__offset(at->p, at->ng, d) : at->p;
-    s->t_min = 0;
-    s->t_max = INFINITY;
-    if (s->segment->leave) s->segment->leave(s, v, at);
-    if (imp_unlikely(straight)) { /* connections pass here: it goes on from before */
-        s->straight++;
+/* Connections pass a vertex where light goes straight on: the way goes on from before. */
+static inline void left(struct imp_step *s, const struct imp_vertex *v,
+                        const struct imp_surface *at, const struct imp_dirs *dirs,
+                        bool straight, const struct imp_drawn *p, double pdf)
+{
+    (void)at, (void)pdf;
+    struct imp_light_step *w = of_light(s);
+    if (imp_unlikely(straight)) {
         w->passed += v->t;
-        return true;
+        return;
     }
-    s->from = at->p;
     w->passed = 0;
-    s->pdf = dirs.lobe == IMP_SMOOTH ? density : 0;
+    s->pdf = dirs->lobe == IMP_SMOOTH ? p->competing : 0;
     w->pdf_across = 0;
-    if (w->both) imp__both_light_leaves(w, b, &dirs);
+    if (w->both) imp__both_light_leaves(w, v->bsdf, dirs);
+}
+
+static const struct imp_scatter_ops transposed_kernel = {.transposed = true,
+                                                         .bounces = bounces,
+                                                         .density = density,
+                                                         .survives = survives,
+                                                         .left = left};
+
+static inline bool scatter(struct imp_step *s, struct imp_vertex *v,
+                           const struct imp_surface *at, const struct imp_frame *frame,
+                           struct imp_direction *direction)
+{
+    return imp__scatter_with(&transposed_kernel, s, v, at, frame, direction);
+}
+
+/* ---- The end ----------------------------------------------------------------------- */
+
+static inline bool passes(const struct imp_step *s)
+{
+    (void)s;
     return true;
 }
 
-static bool step(struct imp_light_step *w)
+static inline bool arrive(struct imp_step *s, struct imp_vertex *v,
+                          const struct imp_hit *hit, const struct imp_surface *at,
+                          const struct imp_frame *frame)
 {
-    struct imp_step *s = &w->s;
-    struct imp_hit hit;
-    struct imp_surface at;
-    struct imp_frame frame;
-
-    /* Follow the ray to what it meets. */
-    struct imp_vertex *v =
-        imp__vertex_meet(s, s->segment->meet(s, &hit), &hit, &at, &frame);
-    if (!v) return false;
-    if (imp_unlikely(s->guided.guide != NULL)) imp__guided_light_arrive(s, v, &hit, &at);
+    struct imp_light_step *w = of_light(s);
+    if (imp_unlikely(s->guided.guide != NULL)) imp__guided_light_arrive(s, v, hit, at);
     if (s->recorded) {
         v->d.from_light = true;
         v->d.met.weight = 0;
         imp__store_v3(v->d.wi, s->wo);
         imp__store_v3(v->d.wo, (imp_v3){0});
     }
+    if (!w->both || imp__both_light_arrives(w, v, at, frame)) return true;
+    s->walk->dropped = IMP_DROP_MEMORY;
+    return false;
+}
 
-    if (w->both && !imp__both_light_arrives(w, v, &at, &frame)) {
-        s->walk->dropped = IMP_DROP_MEMORY;
-        return false;
-    }
-
-    /* Light that reaches the sensor from here: it is met, or connected to. */
+/* The surface of the sensor. */
+static inline bool meet(struct imp_step *s, struct imp_vertex *v,
+                        const struct imp_hit *hit, const struct imp_surface *at)
+{
+    (void)hit;
     if (v->shape && v->shape->sensor == s->tracer->sensor)
-        imp__light_meet_sensor(w, v, &at);
-    if (s->walk->dropped) return false;
-    imp__light_connect_vertex(w, v, &at, &frame);
-    if (s->walk->dropped || !s->tracer->integrator->directions) return false;
-
-    /* The continuation. */
-    const bool bounces =
-        imp__light_depth_allows(s, s->depth + (s->tracer->sensor->shape ? 1 : 2));
-    if (!bounces && !(imp_unlikely(v->bsdf->straight) && s->segment->through))
-        return false;
-    if (!scatter(w, v, &at, &frame, bounces)) return false;
-    s->depth++;
+        imp__light_meet_sensor(of_light(s), v, at);
     return !s->walk->dropped;
 }
+
+static const struct imp_end_ops light_end = {.arrive = arrive,
+                                             .bounces = bounces,
+                                             .passes = passes,
+                                             .connects_last = true,
+                                             .meet = meet,
+                                             .link_draw = imp__light_link_draw,
+                                             .link_weigh = imp__light_link_weigh,
+                                             .link_see = imp__light_link_see,
+                                             .direction_draw = direction_draw,
+                                             .scatter = scatter};
 
 /* ---- Walks ------------------------------------------------------------------------ */
 
@@ -201,7 +214,7 @@ void imp__light_walk_follow(const struct imp_tracer *tracer, struct imp_arena *a
     if (out->both)
         w.s.lanes.drew = imp__lane_drawn(out->both->eye.key, imp__lane_mis_count(&w.s));
     if (imp__light_start(&w))
-        while (step(&w)) {}
+        while (imp__one_step(&light_end, &w.s)) w.s.depth++;
 }
 
 void imp__light_walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
