@@ -40,6 +40,8 @@ struct imp_context {
                                size_t n);
     void *on_read_payload;
     struct imp_registered *kinds;
+    const struct imp_declared
+        *declared;        /* a feature with rules (walk/rules/features.h) */
     bool has_scenes;      /* one was made: kinds are not registered any more */
     _Atomic int held;     /* by the host, and by every object made from it */
     _Atomic long process; /* whose threads and locks these are; see imp__context_own */

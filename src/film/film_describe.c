@@ -5,6 +5,7 @@
 #include "base/text.h"
 #include "film_filter.h"
 #include "film_measure.h"
+#include "walk/rules/features.h"
 #include "walk/run/run.h"
 #include <stdio.h>
 #include <string.h>
@@ -211,13 +212,10 @@ enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *
                               : IMP_E_SCENE,
                           "the scene's integrator makes no walks; "
                           "use path, direct or stam");
-    st = imp__walks_from(scene, integrator, own.from, &integrator);
-    if (st != IMP_OK) return st;
-    if (integrator->from_lights)
-        return imp__error(
-            scene->ctx, IMP_E_UNSUPPORTED,
-            "walks from the lights belong to no pixel, and are not printed; "
-            "let walks begin at the sensor");
+    struct imp_job job = imp__job(scene, sensor, &own, NULL);
+    imp__job_state(&job, IMP_HAS_PRINTED_WALKS, NULL);
+    IMP_CHECKED(imp__job_allowed(&job));
+    integrator = job.walks;
     struct imp_tracer tracer = {.scene = scene,
                                 .integrator = integrator,
                                 .sensor = sensor,

@@ -73,18 +73,8 @@ enum imp_status imp__render_from_lights(const struct imp_measure *m,
                                         const struct imp_run *run, imp_film **out)
 {
     enum imp_status st = IMP_OK;
-    imp_context *ctx = m->scene->ctx;
-    const struct imp_film_desc *f = &m->sensor->film;
     const struct imp_walk_integrator *integrator = m->integrator;
-    IMP_TRY(imp__light_walks_allowed(m->scene, m->sensor, integrator, NULL));
-    IMP_TRY(imp__guide_lights_allowed(m->scene, integrator, run->guide));
     imp__light_walks_tell(m->scene, m->sensor, integrator);
-    if (f->n_responses == 0 &&
-        (f->pixel_format == IMP_PIXEL_LUMINANCE_ALPHA ||
-         f->pixel_format == IMP_PIXEL_RGBA || f->pixel_format == IMP_PIXEL_XYZA))
-        IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
-                           "light tracing has no alpha: use pixel_format rgb, "
-                           "xyz or luminance"));
     struct imp_tracer tracer = {.scene = m->scene,
                                 .integrator = integrator,
                                 .sensor = m->sensor,

@@ -2,11 +2,13 @@
  *
  * Channels of a sample: names, and values of radiance and moments. */
 #include "film_measure.h"
+#include "base/arguments.h"
 #include "base/film.h"
 #include "base/text.h"
 #include "color/rgb.h"
 #include "film_aov.h"
 #include "film_integrator.h"
+#include "walk/rules/features.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -19,10 +21,6 @@ enum imp_status imp__run_sensor(const struct imp_scene *scene, const struct imp_
         return imp__node_error(scene->ctx, scene->root, IMP_E_SCENE,
                                "there is no integrator in it; Mitsuba's default is "
                                "<integrator type=\"path\"/>");
-    if (scene->rayless && !run->walks)
-        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                          "a scene from a file of kept walks has no geometry: its walks "
-                          "are evaluated (run->walks), and none are traced");
     if (scene->n_sensors == 0)
         return imp__node_error(scene->ctx, scene->root, IMP_E_SCENE,
                                "there is no sensor in it");
@@ -34,18 +32,8 @@ enum imp_status imp__run_sensor(const struct imp_scene *scene, const struct imp_
         return imp__error(scene->ctx, IMP_E_ARG, "samples per pixel = %d is negative",
                           run->spp);
     const struct imp_sensor *sensor = scene->sensors[run->sensor];
-    const struct imp_walk_integrator *walks = imp__walk_integrator(scene);
-    if (sensor->shape &&
-        (!walks || walks->absorbs || imp__channels_of(scene->integrator)))
-        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                          "sensor '%s' (%s) is read by walks of path, direct, volpath, "
-                          "photons or ptracer",
-                          sensor->name, sensor->ops->name);
-    if (sensor->shape && walks->both && walks->hide_emitters)
-        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                          "integrator bdpt: sensor '%s' (%s) with hide_emitters is read "
-                          "by path, direct, volpath or photons",
-                          sensor->name, sensor->ops->name);
+    const struct imp_job job = imp__job(scene, sensor, run, NULL);
+    IMP_CHECKED(imp__job_allowed(&job));
     *out = sensor;
     return IMP_OK;
 }
@@ -123,20 +111,11 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
     const struct imp_sensor *sensor;
     enum imp_status st = imp__run_sensor(scene, run, &sensor);
     if (st != IMP_OK) return st;
-    if (sensor->film.n_responses > 0 &&
-        (imp__channels_of(scene->integrator) || !imp__walk_integrator(scene)))
-        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                          "a specfilm has the channels of its response curves alone: use "
-                          "an integrator of walks, without aov or moment");
+    struct imp_job job = imp__job(scene, sensor, run, NULL);
+    imp__job_state(&job, IMP_HAS_PICTURE, NULL);
+    IMP_CHECKED(imp__job_allowed(&job));
     const struct imp_walk_integrator *walks = imp__walk_integrator_of(scene->integrator);
-    const struct imp_walk_integrator *from = walks;
-    if (run->from != IMP_FROM_SCENE && !walks)
-        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                          "integrator %s: the end at which walks begin is chosen for "
-                          "integrators of walks alone",
-                          scene->integrator->ops->name);
-    st = imp__walks_from(scene, walks, run->from, &from);
-    if (st != IMP_OK) return st;
+    const struct imp_walk_integrator *from = imp__walks_from(walks, run->from);
     struct names names = {.text.ctx = scene->ctx};
     names_make(&names, scene, sensor);
     if (names.text.failed || names.n > IMP_MEASURE_MAX) {
@@ -161,11 +140,7 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
     if (run->walks) {
         tracer.integrator = from;
         tracer.sensor = sensor;
-        if (!walks || imp__channels_of(scene->integrator))
-            st = imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                            "kept walks make pictures of path, direct, volpath, photons "
-                            "and stam, without aov and moment");
-        else st = imp__walks_use(run, &tracer);
+        st = imp__walks_use(run, &tracer);
     }
     out->kept = tracer.kept;
     if (from) out->tracer = tracer_of(out, from);

@@ -6,6 +6,7 @@
 #include "film_measure.h"
 #include "film_picture.h"
 #include "parts.h"
+#include "walk/rules/features.h"
 #include "walk/run/run.h"
 
 enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
@@ -25,9 +26,11 @@ enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
         st = imp__team_same(scene->ctx, same, imp__same_run(scene, &own, "render", same));
     const bool solves =
         scene->integrator && scene->integrator->ops->flags & IMP_INTEGRATOR_SOLVES;
-    if (st == IMP_OK && solves && imp__team_apart(scene->ctx))
-        st = imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                        "a picture by finite elements cannot be made in parts");
+    if (st == IMP_OK && solves) {
+        struct imp_job job = imp__job(scene, sensor, &own, NULL);
+        imp__job_state(&job, IMP_HAS_ELEMENTS, NULL);
+        st = imp__job_allowed(&job);
+    }
     if (st != IMP_OK) return st;
     st = imp__measure_create(scene, &own, &measure);
     if (st != IMP_OK) return st;

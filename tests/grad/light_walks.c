@@ -9,6 +9,7 @@
 #include "imp_tap.h"
 #include "scene/scene.h"
 #include "walk/lights/light_walk.h"
+#include "walk/rules/features.h"
 #include <importon/elements.h>
 
 #define WALKS 4000
@@ -109,8 +110,8 @@ static void check(const char *integrator_name, const char *what, const char *bod
         chosen[i] = scene->params[i].info.flags & IMP_PARAM_DIFFERENTIABLE;
     test_must(ctx, imp__active_create(scene, chosen, &active));
     const struct imp_walk_integrator *integrator = imp__walk_integrator(scene);
-    test_must(ctx,
-              imp__light_walks_allowed(scene, scene->sensors[0], integrator, &active));
+    const struct imp_job job = imp__job(scene, scene->sensors[0], NULL, &active);
+    test_must(ctx, imp__job_allowed(&job));
     imp_elements *elements = NULL;
     imp_guide *guide = NULL;
     if (guided) {

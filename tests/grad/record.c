@@ -10,6 +10,7 @@
 #include "scene/guide.h"
 #include "vol_write.h"
 #include "walk/kept/reduced.h"
+#include "walk/rules/features.h"
 #include <importon/elements.h>
 #include <math.h>
 #include <stdbool.h>
@@ -624,8 +625,11 @@ static void not_kept(void)
 
     begin(&t, "stam.xml", "integrator=stam", true);
     t.integrator.alpha_gradient = IMP_ALPHA_ATTACHED;
-    tap_ok(imp__record_create(&t.tracer, PLENTY, &r) == IMP_E_UNSUPPORTED,
-           "and attached derivatives # %s", imp_last_error(ctx));
+    struct imp_job job = imp__job(t.tracer.scene, t.tracer.sensor, NULL, NULL);
+    job.walks = &t.integrator;
+    imp__job_state(&job, IMP_HAS_RECORDING, NULL);
+    tap_ok(imp__job_allowed(&job) == IMP_E_UNSUPPORTED, "and attached derivatives # %s",
+           imp_last_error(ctx));
     t.integrator.alpha_gradient = IMP_ALPHA_DETACHED;
     end(&t);
 

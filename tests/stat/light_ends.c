@@ -198,8 +198,8 @@ static double connection_sides(const struct imp_vertex *v)
 
 static struct imp_tracer tracer_of(imp_scene *scene, enum imp_from from)
 {
-    const struct imp_walk_integrator *i = imp__walk_integrator(scene);
-    test_must(ctx, imp__walks_from(scene, i, from, &i));
+    const struct imp_walk_integrator *i =
+        imp__walks_from(imp__walk_integrator(scene), from);
     return (struct imp_tracer){
         .scene = scene, .integrator = i, .sensor = scene->sensors[0], .seed = 21};
 }

@@ -4,6 +4,7 @@
 #include "check.h"
 #include "base/team.h"
 #include "inverse/estimate/problem_tracer.h"
+#include "walk/rules/features.h"
 #include "walk/run/run.h"
 #include <math.h>
 #include <stdio.h>
@@ -111,11 +112,11 @@ static enum imp_status check(imp_problem *p, const struct imp_check_options *opt
     if (c.options.fresh_spp > 0) c.run.spp = c.options.fresh_spp;
     IMP_TRY(imp__problem_tracer_of_any_end(p, &c.outer, NULL, &c.tracer));
     const bool lights = c.tracer.integrator->from_lights;
-    if (lights && c.options.sampling)
-        IMP_TRY(
-            imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                       "sampling is checked of walks from the sensor; let walks begin "
-                       "there"));
+    if (c.options.sampling) {
+        struct imp_job job = imp__job(p->scene, c.tracer.sensor, &c.outer, &p->active);
+        imp__job_state(&job, IMP_HAS_CHECKED_SAMPLING, NULL);
+        IMP_TRY(imp__job_allowed(&job));
+    }
     imp__arena_free(&p->check_arena);
 
     if (c.options.sampling) {

@@ -12,6 +12,7 @@
 #include "check_difference.h"
 #include "inverse/estimate/problem_tracer.h"
 #include "inverse/gradient/light_gradient.h"
+#include "walk/rules/features.h"
 #include <limits.h>
 #include <math.h>
 
@@ -49,18 +50,15 @@ static bool has_point_lights(const struct imp_scene *scene)
 /* May walks begin at either end, and meet the same light? */
 static bool both_ends(const struct imp__check *c)
 {
-    const struct imp_walk_integrator *from[2],
-        *own = imp__walk_integrator(c->problem->scene);
     const struct imp_scene *scene = c->problem->scene;
-    if (!own->other_end) return false;
-    if (imp__walks_from(scene, own, IMP_FROM_SENSOR, &from[0]) != IMP_OK ||
-        imp__walks_from(scene, own, IMP_FROM_LIGHTS, &from[1]) != IMP_OK)
-        return false;
+    if (!imp__walk_integrator(scene)->other_end) return false;
     if (imp__delta_bsdf(scene) && (!c->tracer.sensor->shape || has_point_lights(scene)))
         return false;
-    return imp__light_walks_allowed(scene, c->tracer.sensor, from[1],
-                                    &c->problem->active) == IMP_OK &&
-           imp__guide_lights_allowed(scene, from[1], c->run.guide) == IMP_OK;
+    struct imp_run run = c->run;
+    run.from = IMP_FROM_LIGHTS;
+    const struct imp_job job =
+        imp__job(scene, c->tracer.sensor, &run, &c->problem->active);
+    return imp__job_allowed(&job) == IMP_OK;
 }
 
 /* ---- From the lights --------------------------------------------------------------- */

@@ -6,6 +6,7 @@
 #define IMP_INVERSE_PROBLEM_TRACER_H
 
 #include "inverse/problem/problem.h"
+#include "walk/rules/features.h"
 
 /* The tracer of a sensor for this problem, with every reason to refuse checked. waves
  * [IMP_WAVES_DRAWN]: wavelengths and responses in place of the sensor's; or NULL. */
@@ -26,5 +27,10 @@ void imp__problem_tell(struct imp_problem *p, const struct imp_tracer *tracer);
 enum imp_status imp__target_tracer(const struct imp_problem *p,
                                    const struct imp__target *target, int part,
                                    struct imp_run *run, struct imp_tracer *out);
+
+/* The job of a run of the problem: with its active parameters. Refused where the scene's
+ * integrator has no derivative. */
+enum imp_status imp__problem_job(const struct imp_problem *problem,
+                                 const struct imp_run *run, struct imp_job *job);
 
 #endif

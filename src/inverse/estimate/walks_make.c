@@ -9,6 +9,7 @@
 #include "film/film_measure.h"
 #include "replicates.h"
 #include "scene/in_medium.h"
+#include "walk/rules/features.h"
 #include "walk/run/run.h"
 #include <string.h>
 
@@ -127,6 +128,9 @@ enum imp_status imp__walks_sensor(struct imp_walks *w, const struct imp_active *
     struct imp_run run = w->run;
     struct imp_store *store = &w->stores[w->n_stores];
     run.sensor = index;
+    struct imp_job job = imp__job(scene, sensor, &run, NULL);
+    imp__job_state(&job, IMP_HAS_RECORDING, NULL);
+    IMP_TRY(imp__job_allowed(&job));
     IMP_TRY(numbers_of(scene, index, w, &numbers));
     *tracer = (struct imp_tracer){.scene = scene,
                                   .integrator = w->integrator,
@@ -228,14 +232,10 @@ enum imp_status imp__walks_begin(imp_scene *scene, const struct imp_run *run,
     const struct imp_walk_integrator *integrator =
         scene->integrator ? imp__walk_integrator_of(scene->integrator) : NULL;
     struct imp_walks *w;
-    if (!integrator)
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "walks are kept of path, direct, volpath, photons and stam");
-    IMP_CHECKED(imp__walks_from(scene, integrator, run->from, &integrator));
-    if (integrator->from_lights)
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "walks from the lights are not kept; let them begin at the "
-                          "sensor");
+    struct imp_job job = imp__job(scene, NULL, run, NULL);
+    imp__job_state(&job, IMP_HAS_RECORDING, NULL);
+    IMP_CHECKED(imp__job_allowed(&job));
+    integrator = imp__walks_from(integrator, run->from);
     w = imp__alloc(ctx, 1, sizeof *w);
     if (!w) return imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks");
     imp__context_hold(ctx);
@@ -303,8 +303,6 @@ enum imp_status imp__walks_make(imp_scene *scene, const struct imp_run *run,
 {
     enum imp_status st = IMP_OK;
     struct imp_walks *w = NULL;
-    if (imp__team_apart(scene->ctx))
-        return imp__error(scene->ctx, IMP_E_UNSUPPORTED, "walks are not kept in parts");
     IMP_TRY(imp__walks_begin(scene, run, o, free, &w));
     IMP_TRY(spread_agree(w, sensors_keep(w, sensors, o->memory)));
     w->run.progress = NULL; /* of this call alone */

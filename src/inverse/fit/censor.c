@@ -25,6 +25,7 @@
 #include "base/arguments.h"
 #include "inverse/problem/target_channels.h"
 #include "math/hash.h"
+#include "walk/rules/features.h"
 #include "walk/run/run.h"
 #include <float.h>
 #include <math.h>
@@ -105,11 +106,11 @@ enum imp_status imp_problem_clip(imp_problem *p, int target, double low, double 
                           high);
     if (t->clip)
         return imp__error(ctx, IMP_E_ARG, "target %d has levels of clipping", target);
-    if (t->n_parts > 0)
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "target %d has response curves; clipped are pictures of one "
-                          "number or three colours",
-                          target);
+    struct imp_job job = {.ctx = ctx};
+    const struct imp_bearer by = {.number = (size_t)target};
+    imp__job_state(&job, IMP_HAS_CLIPPED_TARGET, &by);
+    if (t->n_parts > 0) imp__job_state(&job, IMP_HAS_RESPONSE_LOSS, &by);
+    IMP_CHECKED(imp__job_allowed(&job));
     const size_t n = numbers_of(t);
     c = imp__alloc(ctx, 1, sizeof *c);
     if (!c) return imp__error(ctx, IMP_E_NOMEM, "no memory for clipped numbers");

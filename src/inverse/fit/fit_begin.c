@@ -55,9 +55,9 @@ static enum imp_status bounds_make(struct imp__fit *f)
 static void missing_tell(struct imp_problem *p, enum imp_from end)
 {
     const struct imp_scene *scene = p->scene;
-    const struct imp_walk_integrator *from = imp__walk_integrator(scene);
-    if (p->missing_told || !from || imp__walks_from(scene, from, end, &from) != IMP_OK)
-        return;
+    const struct imp_walk_integrator *from =
+        imp__walks_from(imp__walk_integrator(scene), end);
+    if (p->missing_told || !from) return;
     for (size_t i = 0; i < p->n_targets; i++)
         imp__light_walks_tell(scene, scene->sensors[p->targets[i].desc.sensor], from);
     p->missing_told = true;

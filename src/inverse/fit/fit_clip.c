@@ -7,6 +7,7 @@
 #include "base/arguments.h"
 #include "censor.h"
 #include "fit.h"
+#include "walk/rules/features.h"
 #include <string.h>
 
 #define DECIDING_SEED 0x40000003
@@ -94,9 +95,8 @@ enum imp_status imp__fit_clipped(struct imp__fit *f, int round,
 enum imp_status imp__fit_clipped_allowed(const struct imp_problem *p,
                                          const struct imp_fit_options *o)
 {
-    if (!imp__problem_clips(p) || !o->checkpoint) return IMP_OK;
-    return imp__error(
-        p->ctx, IMP_E_UNSUPPORTED,
-        "a fit to clipped targets has no checkpoint: which numbers count is "
-        "decided between its searches, and not kept");
+    struct imp_job job = {.ctx = p->ctx};
+    if (imp__problem_clips(p)) imp__job_state(&job, IMP_HAS_CLIPPED_TARGET, NULL);
+    if (o->checkpoint) imp__job_state(&job, IMP_HAS_CHECKPOINT, NULL);
+    return imp__job_allowed(&job);
 }

@@ -19,12 +19,14 @@
  * and J^T J come from different halves of the units, so that their own noise is not
  * correlated. */
 #include "gauss_newton.h"
+#include "base/arguments.h"
 #include "film/film_filter.h"
 #include "film/parts.h"
 #include "inverse/estimate/adjoint.h"
 #include "inverse/estimate/problem_tracer.h"
 #include "inverse/problem/loss.h"
 #include "normal_tiles.h"
+#include "walk/rules/features.h"
 
 #define GAUSS_NEWTON_MAX 256
 
@@ -68,12 +70,11 @@ static enum imp_status target_add(struct imp__normal_job *j,
     enum imp_status st = imp__target_tracer(p, target, part, &own, &j->tracer);
     if (st != IMP_OK) return st;
     const struct imp_film_desc *film = &j->tracer.sensor->film;
-    if (j->tracer.integrator->from_lights && !imp__loss_quadratic(target->desc.loss))
-        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                          "Gauss-Newton matrices of walks from the lights, or from both "
-                          "ends, are those of losses that are quadratic in the picture "
-                          "(l2, relative): in others the noise of few walks a pixel is a "
-                          "bias; let walks begin at the sensor");
+    struct imp_job job = imp__job(p->scene, j->tracer.sensor, &own, &p->active);
+    imp__job_state(&job, IMP_HAS_GAUSS_NEWTON, NULL);
+    if (!imp__loss_quadratic(target->desc.loss))
+        imp__job_state(&job, IMP_HAS_NOT_QUADRATIC, NULL);
+    IMP_CHECKED(imp__job_allowed(&job));
     if (shares_walks(&j->tracer)) {
         struct imp__normal_sums total = imp__normal_at(j->total, j->K, j->deviate);
         return imp__gauss_newton_wide(p, &j->tracer, target, &own, rounds, lo, hi,

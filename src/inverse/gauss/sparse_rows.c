@@ -10,6 +10,7 @@
 #include "math/hash.h"
 #include "normal_tiles.h"
 #include "sparse_job.h"
+#include "walk/rules/features.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -165,11 +166,10 @@ static enum imp_status target_add(struct imp__rows_job *j, struct imp__rows *row
     struct imp_run own = *run;
     IMP_CHECKED(imp__target_tracer(p, target, part, &own, &j->tracer));
     const struct imp_film_desc *film = &j->tracer.sensor->film;
-    if (imp__film_border(film) > 0 || j->tracer.integrator->from_lights)
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "least squares of more than 256 numbers are for walks that "
-                          "belong to one pixel: walks from the sensor, and a filter no "
-                          "wider than a pixel (box); use Adam");
+    struct imp_job job = imp__job(p->scene, j->tracer.sensor, &own, &p->active);
+    imp__job_state(&job, IMP_HAS_SPARSE_ROWS, NULL);
+    if (imp__film_border(film) > 0) imp__job_state(&job, IMP_HAS_SHARED_PIXELS, NULL);
+    IMP_CHECKED(imp__job_allowed(&job));
     j->target = target;
     j->plan = imp__replicates_normal(p->scene, target, &own, rounds);
     j->tiles = (struct imp_tiles){.ctx = ctx,

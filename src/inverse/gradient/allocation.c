@@ -42,9 +42,8 @@ static void part_add(const struct imp_problem *p, const struct imp__target *targ
     const struct imp_sensor *sensor = p->scene->sensors[target->desc.sensor];
     const struct imp_walk_integrator *integrator = imp__walk_integrator(p->scene);
     struct imp_run most = *run;
-    if (!integrator ||
-        imp__walks_from(p->scene, integrator, run->from, &integrator) != IMP_OK ||
-        !allowed(target, sensor, integrator))
+    integrator = imp__walks_from(integrator, run->from);
+    if (!integrator || !allowed(target, sensor, integrator))
         return; /* what is wrong is the evaluation's to say */
     const struct imp_film_desc *film = &sensor->film;
     const size_t side = IMP_TILE_SIDE, across = ((size_t)film->crop_w + side - 1) / side,

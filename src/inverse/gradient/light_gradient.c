@@ -272,10 +272,6 @@ enum imp_status imp__light_objective(struct imp_problem *p,
     struct imp_splat_scale scale = {0};
     struct sets s = {.target = target, .channels = p->scene->channels};
     double *g = NULL, *sum = NULL, *square = NULL, value = 0, value2 = 0;
-    if (imp__team_shares(ctx))
-        IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
-                           "losses of walks from the lights are not divided between "
-                           "processes; let walks begin at the sensor"));
     const struct imp_film_desc *film = &tracer->sensor->film;
     const struct imp__light_plan plan = imp__light_plan_of(tracer->sensor, run->spp);
     s.pixels = (size_t)film->crop_w * (size_t)film->crop_h;

@@ -12,6 +12,7 @@
 #include "inverse/problem/loss.h"
 #include "light_gradient.h"
 #include "walk/kept/store.h"
+#include "walk/rules/features.h"
 #include "walk/run/run.h"
 #include <math.h>
 #include <string.h>
@@ -57,11 +58,12 @@ static enum imp_status target_estimate(struct imp_problem *p,
         .problem = p, .totals = totals, .target = target, .want_gradient = want_gradient};
     enum imp_status st = imp__target_tracer(p, target, part, &own, &j.tracer);
     if (st != IMP_OK) return st;
-    if (j.tracer.integrator->from_lights && want_gradient && totals->many)
-        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                          "losses of walks from the lights have gradients of at most %d "
-                          "numbers; let walks begin at the sensor",
-                          IMP_TALLY_DENSE);
+    struct imp_job job = imp__job(p->scene, j.tracer.sensor, &own, &p->active);
+    const struct imp_bearer dense = {.number = IMP_TALLY_DENSE};
+    imp__job_state(&job, IMP_HAS_LOSS, NULL);
+    if (want_gradient && totals->many)
+        imp__job_state(&job, IMP_HAS_MANY_PARAMETERS, &dense);
+    IMP_CHECKED(imp__job_allowed(&job));
     if (j.tracer.integrator->from_lights)
         return imp__light_objective(
             p, target, &j.tracer, &own, &totals->objective, &totals->variance,

@@ -13,6 +13,7 @@
 #include "film/film_picture.h"
 #include "inverse/estimate/problem_tracer.h"
 #include "inverse/estimate/replicates.h"
+#include "walk/rules/features.h"
 #include "walk/run/run.h"
 #include <importon/report.h>
 #include <math.h>
@@ -136,11 +137,9 @@ enum imp_status imp_problem_shares(imp_problem *problem, const struct imp_run *r
     if (n_walks < 0 || (n_walks > 0 && !walk_share))
         return imp__error(problem->ctx, IMP_E_ARG, "shares of %lld walks: no room",
                           (long long)n_walks);
-    if (own.walks || own.time_limit_s > 0)
-        return imp__error(
-            problem->ctx, IMP_E_UNSUPPORTED,
-            "shares are those of a number of walks that are traced: no kept "
-            "walks, no time limit");
+    struct imp_job job = imp__job(problem->scene, NULL, &own, &problem->active);
+    imp__job_state(&job, IMP_HAS_SHARES, NULL);
+    IMP_CHECKED(imp__job_allowed(&job));
     IMP_TRY(imp__problem_tracer(problem, &own, NULL, &tracer));
     const int64_t n = imp__walks_of(&own, tracer.sensor);
     const struct imp_film_desc *film = &tracer.sensor->film;

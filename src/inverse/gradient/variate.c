@@ -6,57 +6,30 @@
 #include "base/arguments.h"
 #include "film/film_filter.h"
 #include "inverse/problem/loss.h"
-#include "walk/core/walk_integrator.h"
+#include "walk/rules/features.h"
 #include <string.h>
 
 /* ---- Where they are possible ----------------------------------------------------- */
 
-static enum imp_status params_allowed(const struct imp_problem *p)
-{
-    for (size_t k = 0; k < p->scene->n_params; k++) {
-        const struct imp_param *q = &p->scene->params[k];
-        if (p->active.base[k] < 0 || !q->probed) continue;
-        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                          "control variate: collisions are drawn by %s, and where it "
-                          "is 0 none are drawn that other numbers need",
-                          q->info.name);
-    }
-    if (p->active.body)
-        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                          "control variate: an active number bends rays, so that walks "
-                          "are others at other numbers");
-    return IMP_OK;
-}
-
-static enum imp_status targets_allowed(const struct imp_problem *p)
-{
-    for (size_t t = 0; t < p->n_targets; t++) {
-        const struct imp_target *d = &p->targets[t].desc;
-        if (!imp__loss_quadratic(d->loss))
-            return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                              "control variate: the noise of earlier pictures would "
-                              "bias a loss that is not quadratic (use l2 or relative)");
-        if (imp__film_border(&p->scene->sensors[d->sensor]->film) > 0)
-            return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                              "control variate: pixels of sensor '%s' share walks "
-                              "through their filter (use rfilter box)",
-                              p->scene->sensors[d->sensor]->name);
-    }
-    return IMP_OK;
-}
-
 static enum imp_status allowed(const struct imp_problem *p, const struct imp_run *run)
 {
-    const struct imp_walk_integrator *i = imp__walk_integrator(p->scene);
-    if (i) IMP_CHECKED(imp__walks_from(p->scene, i, run->from, &i));
-    if (!i || i->from_lights)
-        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                          "control variate: walks have to begin at the sensor");
-    if (!p->scene->twin)
-        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                          "control variate: this scene cannot be made a second time");
-    IMP_CHECKED(targets_allowed(p));
-    return params_allowed(p);
+    struct imp_job job = imp__job(p->scene, NULL, run, &p->active);
+    imp__job_state(&job, IMP_HAS_CONTROL_VARIATE, NULL);
+    if (!p->scene->twin) imp__job_state(&job, IMP_HAS_ONE_MAKING, NULL);
+    const int n_stated = job.n_stated;
+    IMP_CHECKED(imp__job_allowed(&job));
+    for (size_t t = 0; t < p->n_targets; t++) {
+        const struct imp_target *d = &p->targets[t].desc;
+        const struct imp_sensor *sensor = p->scene->sensors[d->sensor];
+        const struct imp_bearer by = {.name = sensor->name, .kind = sensor->ops->name};
+        job.n_stated = n_stated;
+        if (!imp__loss_quadratic(d->loss))
+            imp__job_state(&job, IMP_HAS_NOT_QUADRATIC, NULL);
+        if (imp__film_border(&sensor->film) > 0)
+            imp__job_state(&job, IMP_HAS_SHARED_PIXELS, &by);
+        IMP_CHECKED(imp__job_allowed(&job));
+    }
+    return IMP_OK;
 }
 
 /* ---- From the beginning to the end ----------------------------------------------- */

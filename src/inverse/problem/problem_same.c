@@ -5,6 +5,7 @@
 #include "math/hash.h"
 #include "problem.h"
 #include "scene/fingerprint.h"
+#include "walk/rules/features.h"
 
 uint64_t imp__problem_targets_hash(const struct imp_problem *p)
 {
@@ -59,9 +60,7 @@ enum imp_status imp__problem_same(struct imp_problem *p, const struct imp_run *r
 
 enum imp_status imp__problem_no_parts(const struct imp_problem *p, const char *call)
 {
-    if (!imp__team_apart(p->ctx)) return IMP_OK;
-    return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                      "%s cannot be made in parts: what is computed next depends on what "
-                      "was before; a team of processes can",
-                      call);
+    struct imp_job job = {.ctx = p->ctx, .call = call};
+    imp__job_state(&job, IMP_HAS_SEQUENTIAL, NULL);
+    return imp__job_allowed(&job);
 }

@@ -34,32 +34,6 @@ double imp__guided_survival(const struct imp_step *s, double q)
 
 /* ---- Walks from the lights -------------------------------------------------------- */
 
-enum imp_status imp__guide_lights_allowed(const struct imp_scene *scene,
-                                          const struct imp_walk_integrator *i,
-                                          const struct imp_guide *guide)
-{
-    if (!guide) return IMP_OK;
-    if (i->both)
-        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                          "integrator bdpt: walks from both ends follow no guide; let "
-                          "them begin at one end (path or ptracer)");
-    if (!guide->importance)
-        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                          "walks from the lights: this guide knows no importance; solve "
-                          "the elements with it");
-    if (scene->n_media > 0)
-        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                          "walks from the lights: a guide knows surfaces alone, and not "
-                          "medium '%s'; leave the guide out",
-                          scene->media[0]->name);
-    if (guide->roulette > 0)
-        return imp__error(
-            scene->ctx, IMP_E_UNSUPPORTED,
-            "walks from the lights: roulette by a guide (guide-roulette) is "
-            "for walks from the sensor; leave it out, they have their own");
-    return IMP_OK;
-}
-
 double imp__guided_emit(const struct imp_step *s, int light, double u[4], double *point)
 {
     const struct imp_guide *g = s->guided.guide;

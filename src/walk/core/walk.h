@@ -202,11 +202,6 @@ static inline const struct imp_guide *imp__guide_of(const struct imp_scene *scen
                ? guide
                : NULL;
 }
-/* May walks from the lights follow the guide, NULL: none? */
-enum imp_status imp__guide_lights_allowed(const struct imp_scene *scene,
-                                          const struct imp_walk_integrator *i,
-                                          const struct imp_guide *guide);
-
 /* The points of a run through a sensor: independent, or Sobol's. Where neither says, a
  * picture has independent ones, since its errors are exact then. */
 static inline enum imp_points imp__points_of(const struct imp_sensor *sensor,

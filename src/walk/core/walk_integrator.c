@@ -32,21 +32,13 @@ uint64_t imp__walk_integrator_hash(const struct imp_walk_integrator *i)
     return imp__hash(h, i->mixing->weight, sizeof i->mixing->weight);
 }
 
-enum imp_status imp__walks_from(const struct imp_scene *scene,
-                                const struct imp_walk_integrator *of, enum imp_from from,
-                                const struct imp_walk_integrator **out)
+const struct imp_walk_integrator *imp__walks_from(const struct imp_walk_integrator *of,
+                                                  enum imp_from from)
 {
     if (of && of->both && from != IMP_FROM_SCENE) of = of->other_end; /* from one */
-    *out = of;
     if (from == IMP_FROM_SCENE || !of || (from == IMP_FROM_LIGHTS) == of->from_lights)
-        return IMP_OK;
-    if (!of->other_end)
-        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                          "integrator %s: its walks begin at the sensor alone; use path, "
-                          "volpath, photons or ptracer",
-                          scene->integrator->ops->name);
-    *out = of->other_end;
-    return IMP_OK;
+        return of;
+    return of->other_end;
 }
 
 /* ---- Kinds ----------------------------------------------------------------------- */

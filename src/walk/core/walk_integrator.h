@@ -59,11 +59,10 @@ imp__walk_integrator_of(const struct imp_integrator *i)
 /* The radiance integrator of a scene: itself, or the first in moment or aov; NULL: none
  * (depth alone). */
 const struct imp_walk_integrator *imp__walk_integrator(const struct imp_scene *scene);
-/* What walks of a run are made by, from the end that it asks for. *out is `of` where no end
- * is asked for. IMP_E_UNSUPPORTED, by name, where its walks have one end. */
-enum imp_status imp__walks_from(const struct imp_scene *scene,
-                                const struct imp_walk_integrator *of, enum imp_from from,
-                                const struct imp_walk_integrator **out);
+/* What walks are made by from the end that is asked for: `of` where none is, NULL where `of`
+ * has no such end. */
+const struct imp_walk_integrator *imp__walks_from(const struct imp_walk_integrator *of,
+                                                  enum imp_from from);
 /* Hash of the settings, for files made with walks (scene/fingerprint.h); NULL has one. */
 uint64_t imp__walk_integrator_hash(const struct imp_walk_integrator *integrator);
 

@@ -308,13 +308,6 @@ enum imp_status imp__walks_use(const struct imp_run *run, struct imp_tracer *tra
     imp_context *ctx = tracer->scene->ctx;
     if (w->scene != tracer->scene)
         return imp__error(ctx, IMP_E_ARG, "kept walks of another scene");
-    if (imp__team_apart(ctx))
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "kept walks are not evaluated in parts");
-    if (w->spread)
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "kept walks that are spread over ranks are written, and not "
-                          "evaluated");
     const struct imp_store *store = imp__walks_store(w, tracer->sensor);
     if (!store)
         return imp__error(ctx, IMP_E_ARG, "there are no kept walks of sensor '%s'",

@@ -29,22 +29,6 @@ enum imp_status imp__record_create(const struct imp_tracer *tracer, size_t budge
                                    struct imp_record *out)
 {
     imp_context *ctx = tracer->scene->ctx;
-    if (tracer->integrator->alpha_gradient != IMP_ALPHA_DETACHED)
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "walks are kept for detached derivatives only: "
-                          "alpha_gradient moves their directions");
-    if (tracer->sensor->shape)
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "walks from a sensor that is a surface (%s) are not kept",
-                          tracer->sensor->name);
-    if (tracer->integrator->transmittance == IMP_DELTA_TRACKING)
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "walks are not kept where light samples are blocked by chance "
-                          "(transmittance=delta): use ratio or residual");
-    if (tracer->scene->priorities)
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "walks are not kept where shapes have a priority: a boundary's "
-                          "index depends on what lies around it");
     *out = (struct imp_record){
         .ctx = ctx, .of = imp__record_made_with(tracer), .budget = budget};
     return IMP_OK;

@@ -61,13 +61,6 @@ bool imp__light_walk_tangent(const struct imp_tracer *tracer, struct imp_arena *
 bool imp__light_walk_evaluate(const struct imp_tracer *tracer, struct imp_arena *arena,
                               struct imp_light_walk *walk);
 
-/* May walks of this integrator begin at the lights and reach this sensor? If not, the error
- * says why. `active`: derivatives that are wanted, or NULL. */
-enum imp_status imp__light_walks_allowed(const struct imp_scene *scene,
-                                         const struct imp_sensor *sensor,
-                                         const struct imp_walk_integrator *integrator,
-                                         const struct imp_active *active);
-
 /* A material that sends light into single directions; NULL: there is none. */
 const struct imp_bsdf *imp__delta_bsdf(const struct imp_scene *scene);
 /* Such a material, where walks of this integrator bring no light by it to the sensor: one

@@ -4,6 +4,7 @@
 #include "base/team.h"
 #include "math/rng.h"
 #include "math/stat.h"
+#include "walk/rules/features.h"
 #include <math.h>
 
 #define RELATIVE 0.05
@@ -47,14 +48,9 @@ enum imp_status imp__looks_begin(imp_context *ctx, const char *function,
     if ((unsigned)o->allocation > IMP_ALLOCATION_VARIANCE)
         return imp__error(ctx, IMP_E_ARG, "%s: allocation %d does not exist", function,
                           (int)o->allocation);
-    if (imp__team_apart(ctx))
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "%s: a part cannot see when the error of the whole is reached",
-                          function);
-    if (imp__team_ranks(ctx) && run->time_limit_s > 0)
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "%s: ranks have a clock each, and would not stop together",
-                          function);
+    struct imp_job job = {.ctx = ctx, .run = run, .call = function};
+    imp__job_state(&job, IMP_HAS_UNTIL, NULL);
+    IMP_CHECKED(imp__job_allowed(&job));
     IMP_CHECKED(imp__run_traces(ctx, function, run));
     if (o->relative == 0) o->relative = RELATIVE;
     if (o->risk == 0) o->risk = RISK;
