@@ -6,7 +6,7 @@
 # A name means one thing: files below src/ and cli/ have different names, external symbols
 # of the static library begin with imp_ and are defined once, and no two headers define the
 # same struct, union, enum, inline function or macro. Each of these files begins with what it
-# holds, and no comment with "Of": its subject comes first (src/walk: not yet checked).
+# holds, and no comment with "Of": its subject comes first.
 set -uo pipefail
 library=$(realpath "$1")
 cd "$(dirname "$0")/.." || exit 1
@@ -26,12 +26,11 @@ twice() { LC_ALL=C sort | uniq -d; }
 none "files of one name" < <(find src cli -name '*.[ch]' -printf '%f\n' | twice)
 
 # Behind the licence and an empty line, a sentence.
-none "file that does not begin with what it holds" < <(find src cli mpi -name '*.[ch]' -not -path 'src/walk/*' |
+none "file that does not begin with what it holds" < <(find src cli mpi -name '*.[ch]' |
     while read -r file; do
         head -6 "$file" | tr '\n' '~' | grep -q 'SPDX-License-Identifier: Apache-2.0~ \*~ \* ' || echo "$file"
     done)
-none "comment that begins with Of" < <(grep -rnE --include='*.[ch]' '/\*+ Of ' src cli mpi |
-    grep -v '^src/walk/' | cut -c1-90)
+none "comment that begins with Of" < <(grep -rnE --include='*.[ch]' '/\*+ Of ' src cli mpi | cut -c1-90)
 
 # Sanitizers add names that begin with __.
 symbols=$(nm -g --defined-only "$library" | awk 'NF == 3 && $3 !~ /^__/ { print $3 }')

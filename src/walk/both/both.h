@@ -10,7 +10,7 @@
  *     t = 1          z_s is connected to the sensor                        (reach)
  *     t = 0          the walk from the light meets the sensor's surface    (reach)
  *
- * Of s = t = 1, a camera is connected to z_1, a sensor that is a surface to a light sample.
+ * With s = t = 1, a camera is connected to z_1, a sensor that is a surface to a light sample.
  * Each way has the weight of the
  * power heuristic with exponent 2 among all ways that can find the path, from the densities
  * p_s with which they draw its vertices,

@@ -22,7 +22,7 @@ static inline double imp__end_pdf(const struct imp_bsdf *b,
     return sum / carried->n;
 }
 
-/* Of `to`, where `from` draws it with pdf per steradian. */
+/* The density of `to`, where `from` draws it with pdf per steradian. */
 static inline double imp__end_arrives(const struct imp_end *from,
                                       const struct imp_end *to, double pdf)
 {
@@ -44,7 +44,7 @@ static inline bool imp__end_is_area(const struct imp_emitter *e)
     return e->ops->flags & IMP_EMITTER_AREA && !(e->ops->flags & IMP_EMITTER_DELTA);
 }
 
-/* Of a vertex that parallel light of a far light meets along d: it begins on a disk about
+/* That of a vertex that parallel light of a far light meets along d: it begins on a disk about
  * the scene, or on its surface. */
 static inline double imp__end_arrives_across(const struct imp_scene *scene, int light,
                                              const struct imp_end *to, imp_v3 d)
@@ -55,7 +55,7 @@ static inline double imp__end_arrives_across(const struct imp_scene *scene, int 
     return (shape ? 1 / shape->area : IMP_INV_PI / (r * r)) * c;
 }
 
-/* Of a vertex that the sensor's walks meet first: film area per area across the ray, as
+/* That of a vertex that the sensor's walks meet first: film area per area across the ray, as
  * `weight` of a connection has it. */
 static inline double imp__end_arrives_from_sensor(const struct imp_both *b, double weight,
                                                   const struct imp_end *to, imp_v3 d)

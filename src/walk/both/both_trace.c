@@ -26,7 +26,7 @@ static struct imp_joint *joint_add(struct imp_step *s, struct imp_vertex *y,
     return j;
 }
 
-/* Of the densities of all lanes, the joint's over the product of both walks'. */
+/* The joint's share of the densities of all lanes, over the product of both walks'. */
 static double lanes_join(const struct imp_step *s, const struct imp_lane_mis *z)
 {
     const struct imp_lane_mis *y = &s->lanes;

@@ -64,7 +64,7 @@ static double weight(const struct way *w)
     return x >= 0 ? x : 0; /* also of 0/0 */
 }
 
-/* Of two walks joined at y, the last of the walk from the sensor: `other` there. */
+/* `other` at y, the last vertex of the walk from the sensor, where two walks are joined. */
 static void other_eye(struct way *w, double arriving, const struct imp_step *s,
                       const struct imp_bsdf *b, const struct imp_dirs *dirs)
 {

@@ -46,7 +46,7 @@ static inline double imp__active_slope(const struct imp_active *a, int param, si
 }
 /* Does it depend on a parameter that is chosen? `chosen` [n_params]. */
 bool imp__input_depends(const struct imp_input *input, const uint8_t *chosen);
-/* Of a material's inputs, bit j: input j does. */
+/* The inputs of a material that do: bit j is input j. */
 uint64_t imp__inputs_depend(const struct imp_bsdf *b, const uint8_t *chosen);
 enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t *chosen,
                                    struct imp_active *out);

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Shares of lanes in a walk that one of them drew (lane_mis.h). */
 #include "step.h"
 
 int imp__lane_mis_count(const struct imp_step *s)
@@ -9,7 +11,7 @@ int imp__lane_mis_count(const struct imp_step *s)
 int imp__lane_mis_drew(struct imp_step *s)
 {
     struct imp_lane_mis *l = &s->lanes;
-    /* Of wavelengths the walk has chosen: its branches, and what follows a meter, have
+    /* Wavelengths that the walk has chosen: its branches, and what follows a meter, have
      * other keys. */
     if (l->drew < 0)
         l->drew = s->at.carried ? imp__waves_drew(s->at.carried)

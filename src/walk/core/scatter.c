@@ -18,7 +18,7 @@ bool imp__throughput_part(struct imp_step *s, const struct imp_bsdf *b, imp_spec
     return !imp__is_zero_used(s->beta, four);
 }
 
-/* Of adjoint photons: min(1, H h) in the brightest lane, H the directional albedo, or the
+/* Survival of adjoint photons: min(1, H h) in the brightest lane, H the directional albedo, or the
  * weight of the step where the kind does not know it (Morley et al. 2006, section 3). A lane
  * that is zero but has a derivative counts as one half. */
 static double photon_survival(const struct imp_step *s, const struct imp_bsdf *b,

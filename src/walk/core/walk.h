@@ -101,7 +101,7 @@ struct imp_walk {
     imp_spec L; /* radiance at the sensor, by the scene's channels; of a side walk its
                    values */
     imp_spec values; /* radiance at the sensor by lanes; channels are made of it */
-    /* Of its values: wavelengths, and what channels make of them. NULL: values are
+    /* How its values are read: wavelengths, and what channels make of them. NULL: values are
      * channels. */
     const struct imp_waves *waves;
     double wave;           /* number from which its wavelengths were drawn */
@@ -156,7 +156,7 @@ struct imp_tracer {
     bool value_only;               /* a walk's L is wanted, and no record of it */
     /* How walks draw the wavelengths they carry; NULL: they carry the scene's colours. */
     const struct imp_wavelengths *wavelengths;
-    /* Of the walks of a pixel, each whole of `period` is cut into sets of about `set`
+    /* The walks of a pixel: each whole `period` is cut into sets of about `set`
      * (imp__set_at), among which wavelengths are stratified; set 0 or 1: each walk is drawn
      * on its own. Sets are independent of each other, walks of a set are not. */
     int set;
@@ -331,7 +331,7 @@ imp_spec imp__walk_fold(struct imp_walk *walk);
 void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_walk *walk,
                             imp_spec adjoint, struct imp_sink *sink);
 
-/* Of an emitter's radiance at x, looked up at `at` (which changes): what bar gives to its
+/* The transpose of an emitter's radiance at x, looked up at `at` (which changes): what bar gives to its
  * parameters, and its tangent. */
 void imp__emitter_scatter(const struct imp_tracer *tracer, int emitter,
                           struct imp_emission *x, struct imp_texcoord *at, imp_spec bar,
@@ -340,7 +340,7 @@ imp_spec imp__emitter_tangent(const struct imp_tracer *tracer, int emitter,
                               struct imp_emission x, struct imp_texcoord at,
                               imp_dot_fn *dot, const void *x_dot);
 
-/* Of one vertex: do its BSDF's inputs count; what bar [n_in] gives to their parameters;
+/* One vertex: do its BSDF's inputs count; what bar [n_in] gives to their parameters;
  * their tangent, into in_dot [n_in]. */
 bool imp__vertex_active(const struct imp_tracer *tracer, const struct imp_vertex *v);
 void imp__vertex_scatter(const struct imp_tracer *tracer, const struct imp_vertex *v,

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The kinds of integrators that make walks: what each reads, and the end that walks
+ * begin at. */
 #include "math/hash.h"
 #include "scene/majorants.h"
 #include "scene/unlit.h"

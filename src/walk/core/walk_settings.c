@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Settings of integrators of walks, read from the scene and settled when all of it is
+ * there. */
 #include "walk_settings.h"
 
 enum imp_status imp__depth_read(const struct imp_build *build, int fallback,

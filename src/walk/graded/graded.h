@@ -13,7 +13,7 @@
 
 extern const struct imp_segment_ops imp__graded_outside, imp__graded_inside;
 
-/* Of a walk while it is decided. */
+/* The state of a walk while it is decided. */
 struct imp_graded_state {
     const struct imp_body *medium;  /* that the ray in flight is in; NULL: none */
     imp_v3 ng;                      /* of the surface it left */

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Records of walks made, kept and read back in memory (record.h). */
 #include "record.h"
 #include "bend/inside.h"
 #include "math/hash.h"

@@ -25,7 +25,7 @@ enum imp_reduction_class {
     IMP_REDUCES_NOT /* free_bsdf marks what it is of first degree in (trial.h) */
 };
 
-/* Of a scene, and parameters that may change. */
+/* The reduction for a scene and the parameters that may change. */
 struct imp_reduction {
     imp_context *ctx;
     const struct imp_scene *scene;
@@ -62,7 +62,7 @@ enum imp_op_kind {
     IMP_OP_TEXELS, /* up to four texels of an input that is a bitmap */
     IMP_OP_LOOKUP, /* an input with another texture, at a place */
     IMP_OP_ON,     /* the material at hand, for the direction of the continuation */
-    /* Of the next term alone: the material at hand, towards a light. */
+    /* The next term alone: the material at hand, towards a light. */
     IMP_OP_LIT,
     IMP_OP_MATERIAL /* which is at hand from here on */
 };

@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Of a material that is at hand. */
+/* The same for a material that is at hand. */
 struct imp_reduced_at_hand {
     const struct imp_bsdf *bsdf;
     const uint32_t *words; /* its struct imp_reduced_material: where it is */

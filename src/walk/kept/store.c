@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The recorded walks of a sensor: made, settled and destroyed (store.h). */
 #include "store.h"
 #include <assert.h>
 #include <string.h>

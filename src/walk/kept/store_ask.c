@@ -85,7 +85,7 @@ size_t imp__store_next(const struct imp_store *s, const struct imp_asking *a, si
                        size_t i, double *weight)
 {
     const size_t n = s->records[tile].n_walks;
-    /* Of all walks, as if tiles at the border were whole. */
+    /* All walks, as if tiles at the border were whole. */
     const size_t before = tile * IMP_STORE_SIDE * IMP_STORE_SIDE * s->n;
     size_t due = i + (a->every - (before + i) % a->every) % a->every;
     for (; a->rare && i < n; i++) {

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Inputs, directions and emissions tried at random, to find what kinds do not declare
+ * (trial.h). */
 #include "trial.h"
 #include "math/rng.h"
 #include "math/vec.h"

@@ -88,7 +88,7 @@ static bool uniform_fly(struct imp_free_flight *w, const struct imp_medium *m,
 
 /* ---- Media whose extinction varies -------------------------------------------------- */
 
-/* Of a walk, in all; extinctions without measure would go on for hours. */
+/* All events of a walk; extinctions without measure would go on for hours. */
 #define EVENTS_MAX (1 << 20)
 
 #define EMPTY 0.125 /* of the largest bound, where there is none */

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Probes of an extinction, drawn and evaluated (probe.h). */
 #include "probe.h"
 
 /* So many walks follow their probe, which costs about as much as the walk. On a plume

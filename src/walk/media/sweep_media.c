@@ -48,7 +48,7 @@ static imp_spec weight_before(const struct imp_vertex *v)
     return f * scale;
 }
 
-/* Of the segment that goes on, does something stand for its derivative? */
+/* Does something stand for the derivative of the segment that goes on? */
 static bool segment_counts(const struct imp_tracer *tracer, const struct imp_vertex *v)
 {
     return v->on && v->d.goes_on && imp__track_counts(tracer, v->on);

@@ -197,7 +197,7 @@ static struct product product_of(const struct imp_scene *scene,
     }
     return p;
 }
-/* Of all factors but this one. */
+/* The product of all factors but this one. */
 static imp_spec others(const struct product *p, imp_spec f)
 {
     imp_spec x;

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The baseline of what flights bring: measured by a few walks before a job, read by the
+ * rest. */
 #include "baseline.h"
 #include "walk/media/tracking.h"
 

@@ -104,7 +104,7 @@ decided_values(const struct imp_scene *scene, const struct decided *v,
             imp__emitter_radiance(scene, d->met.emitter, &p->met, p->at.p, v->carried);
 }
 
-/* Of the vertex at place p. */
+/* The inputs of the vertex at place p. */
 static void vertex_values(const struct imp_tracer *tracer, const struct imp_vertex *v,
                           const struct imp_place *p, imp_spec *in, struct values *x)
 {

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The first vertex of a walk from a sensor that is a surface: a white diffuse one, whose
+ * direction is drawn by the cosine. */
 #include "meter.h"
 #include "math/warp.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Looks at growing numbers of samples: when the next one is due, and when they end
+ * (looks.h). */
 #include "looks.h"
 #include "base/pool.h"
 #include "base/team.h"

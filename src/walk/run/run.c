@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A run as the host gives it, checked and copied (run.h). */
 #include "run.h"
 #include "walk/kept/store.h"
 #include <math.h>
