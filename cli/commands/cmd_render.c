@@ -40,7 +40,7 @@ static const struct arg_option options[] = {
      &o.picture.no_preview, 0, 0, NULL},
     {ARG_PAIR, 0, "pixel", "X,Y", "print one walk of this pixel, vertex by vertex",
      o.pixel, 0, 0, NULL},
-    {ARG_INT, 0, "sample", "K", "number of the walk in the pixel (default 0)", &o.sample,
+    {ARG_INT, 0, "sample", "K", "index of the walk in the pixel (default 0)", &o.sample,
      0, 1e9, NULL},
     {ARG_TEXT, 0, "paths", "FILE",
      "write walks from all over the picture, one JSON object per line", &o.paths, 0, 0,

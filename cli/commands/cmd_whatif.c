@@ -27,9 +27,9 @@ static struct {
 
 static const struct arg_option options[] = {
     {ARG_LIST, 0, "set", "ID=V[,V..]",
-     "evaluate with other numbers; @FILE: many (--gradient lists them)", &cli.sets, 0, 0,
+     "evaluate at other values; @FILE: many (--gradient lists them)", &cli.sets, 0, 0,
      NULL},
-    {ARG_INT, 's', "sensor", "N", "number of the sensor, from 0", &cli.sensor, 0, 1e6,
+    {ARG_INT, 's', "sensor", "N", "index of the sensor, from 0", &cli.sensor, 0, 1e6,
      NULL},
     {ARG_TEXT, 0, "region", "X0,Y0,X1,Y1",
      "mean over the pixels from X0 to before X1 and Y0 to before Y1 (default: all)",
@@ -37,7 +37,7 @@ static const struct arg_option options[] = {
     {ARG_FLAG, 0, "gradient", NULL, "derivatives by the active parameters, with errors",
      &o.gradient, 0, 0, NULL},
     {ARG_TEXT, 0, "sweep", "ID=FROM:TO:N",
-     "N values of a parameter, or of one of its numbers (ID[K]), and the answer at each",
+     "N values of a parameter, or of its value K (ID[K]), and the answer at each",
      &o.sweep, 0, 0, NULL},
     {ARG_NUMBER, 0, "memory", "MB", "for the walks (default 1074)", &o.memory, 1e-3, 1e12,
      NULL},

@@ -69,7 +69,7 @@ const struct arg_option options_scene[] = {
     {0}};
 
 const struct arg_option options_run[] = {
-    {ARG_INT | ARG_REPLAYS, 's', "sensor", "N", "number of the sensor, from 0",
+    {ARG_INT | ARG_REPLAYS, 's', "sensor", "N", "index of the sensor, from 0",
      &cli.sensor, 0, 1e6, NULL},
     {ARG_INT | ARG_REPLAYS, 0, "spp", "N",
      "samples per pixel (default: those of the scene)", &cli.spp, 1, 1e9, NULL},
