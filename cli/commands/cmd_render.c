@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon render: a picture with its standard errors; or single walks, to look at. */
+ * importon render: a picture with its standard errors; or single walks as text. */
 #include "shared/check_rows.h"
 #include "shared/command.h"
 #include "shared/display.h"
@@ -114,8 +114,8 @@ static char *default_output(const struct imp_run *run)
     return path;
 }
 
-/* How many walks of each cause, and the first of them to look at. More than the budget
- * fails the run. */
+/* Prints the number of dropped walks by cause, and the first of each. More than the
+ * budget fails the run. */
 static void report_drops(const struct imp_film_info *info)
 {
     if (!info->dropped) return;

@@ -60,7 +60,7 @@ static struct {
     imp_walks *walks;
     imp_problem *problem;
     struct imp_run run;
-    float *adjoint; /* of the mean over a region; NULL: of a loss */
+    float *adjoint; /* for the mean over a region; NULL: for a loss */
     float *mask;    /* [height][width] of the region; NULL: all */
     size_t n;
 } w;
@@ -141,7 +141,7 @@ static enum imp_status ask(struct answer *a, double *grad, double *se)
                  : imp_problem_objective(w.problem, NULL, &w.run, &a->value, grad, se);
     if (st == IMP_E_NUMERIC || st == IMP_E_UNSUPPORTED)
         snprintf(a->refused, sizeof a->refused, "%s", imp_last_error(cli.context));
-    /* Evaluation looks at all pixels, the weights at a subset of them. */
+    /* Answers are from all pixels, the weights from a subset of them. */
     return st == IMP_OK && a->refused[0] ? IMP_E_NUMERIC : st;
 }
 

@@ -32,8 +32,8 @@ static const struct arg_option options[] = {
      "one PNG of before, target and recovered (with -o)", &o.sheet, 0, 0, NULL},
     {0}};
 
-/* May everything be written? A checkpoint is begun over, or gone on from, when that is
- * said. */
+/* May everything be written? A checkpoint is replaced with --overwrite, and continued
+ * with --resume. */
 static int writable(const struct block *blocks, size_t n_blocks)
 {
     int rc = checkpoint_writable(o.checkpoint, o.resume);

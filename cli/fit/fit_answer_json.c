@@ -126,7 +126,7 @@ void fit_history_json(struct json *j, const struct fit_history *h,
     json_end_object(j);
 }
 
-/* The change that is determined least; of a logarithm, relative. */
+/* The change that is determined least; relative for a logarithm. */
 static void put_loosest(struct json *j, const struct fit_answer *a)
 {
     json_object(j, "undetermined");

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The options that say which parameters, which targets, which loss; and the imp_problem
- * they make. Shared by gradient, jacobian, check and fit. */
+ * The options for parameters, targets and loss, and the imp_problem made from them.
+ * Shared by gradient, jacobian, check and fit. */
 #ifndef IMP_CLI_CMD_PROBLEM_H
 #define IMP_CLI_CMD_PROBLEM_H
 

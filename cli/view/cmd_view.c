@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon view: a page on this machine that shows a render, a fit or bent rays while one
- * looks on. */
+ * importon view: a page on this machine that shows a render, a fit or bent rays as they
+ * run. */
 #include "bend/cmd_bend.h"
 #include "fit/fit_options.h"
 #include "shared/problem_options.h"

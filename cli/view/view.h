@@ -91,8 +91,9 @@ void view_pictures(enum view_channel channel, const char *name, const char *role
 /* Keep walks at the numbers as they are, at most `most` of a pixel, unless those that are
  * kept do; any wish ends it. */
 void view_kept_draw(int64_t most);
-/* The picture at these numbers by the walks that are kept, and their effective sample size;
- * the caller destroys it. NULL: there are none, or they are worth too little. */
+/* The picture at these numbers by the walks that are kept, and their effective sample
+ * size; the caller destroys it. NULL: there are none, or their effective sample size is
+ * too small. */
 imp_film *view_kept_picture(int64_t most, double *ess);
 void view_kept_close(void);
 

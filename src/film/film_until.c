@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A picture until its error is small enough: the mean over looks, each of its own walks.
+ * A picture until its error is small enough: the mean over stages, each of its own walks,
+ * after each of which the error is tested (sequential testing).
  *
  * With s the standard errors of normal errors, the squared error E = sum (I - truth)^2 has
  * the mean S = sum s^2. Whatever the errors share, E is beyond z^2 S no oftener than a normal

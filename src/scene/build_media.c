@@ -199,7 +199,7 @@ out:
     return st;
 }
 
-/* Does the integrator, or one that it contains, know media? */
+/* Does the integrator, or one that it contains, support media? */
 static bool knows_media(const struct imp_integrator *i)
 {
     if (i && i->ops->flags & IMP_INTEGRATOR_MEDIA) return true;

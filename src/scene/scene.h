@@ -77,7 +77,7 @@ struct imp_body {
 
 struct imp_light_tree;
 
-/* An object of a room above, which this one does not know: destroyed with the scene. */
+/* An object of a room above, opaque here: destroyed with the scene. */
 struct imp_owned {
     struct imp_owned *next; /* made earlier */
     void *object;
@@ -202,8 +202,8 @@ enum imp_status imp__theta_add(struct imp_scene *scene, const struct imp_param *
                                int *index);
 /* Give every parameter its offset, in order of addition. */
 void imp__theta_finish(struct imp_scene *scene);
-/* Number k of a parameter. Setting does not look at the bounds; who sets numbers calls
- * imp__theta_announce after the last of them, before anything is rendered. */
+/* Value k of a parameter. Setting does not check the bounds; the caller calls
+ * imp__theta_announce after the last value, before anything is rendered. */
 double imp__param_get(const struct imp_param *p, size_t k);
 void imp__param_set(struct imp_param *p, size_t k, double value);
 /* Call `changed` after numbers of this parameter have been set to others: once for all

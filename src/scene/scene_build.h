@@ -41,7 +41,7 @@ enum imp_status imp__build_watch(struct imp_scene *scene,
  * that. */
 enum imp_status imp__build_spectrum(struct imp_scene *scene, const struct imp_input *in,
                                     enum imp_role role);
-/* asked: the input that it is the value of; NULL: it is declared only. */
+/* asked: the input whose value it is; NULL: it is only declared. */
 enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *node,
                                    const char *parent, const char *slot,
                                    const struct imp_input_desc *asked,

@@ -7,7 +7,7 @@
 #include "format/search.h"
 #include <string.h>
 
-/* A glass that materials know by the same name. */
+/* A glass with the name that materials use. */
 static enum imp_status glass_read(struct imp__bendfile *l, struct imp_node *node)
 {
     enum imp_status st = IMP_OK;

@@ -69,7 +69,7 @@ int imp__fresh_batch(const struct imp__fresh *f)
     return (int)fmin(ceil(spp * f->more / IMP_CHECK_BATCHES), 1 << 24);
 }
 
-/* The same by walks from the lights. */
+/* The same by light tracing. */
 static enum imp_status functional_of_lights(struct imp__fresh *f, const double *x_dot,
                                             uint64_t seed, double *value)
 {

@@ -16,8 +16,8 @@
  * of its values, so nothing but rounding is left. A leave-one-out mean divided by n in
  * place of n - 1 is wrong by a factor 2 here.
  *
- * Pixels are looked at through a box filter, whatever the sensor's: through wider ones a
- * pixel is a ratio of sums over its neighbours' samples too. */
+ * Pixels have a box filter, whatever the sensor's: through wider ones a pixel is a ratio
+ * of sums over its neighbours' samples too. */
 #include "check.h"
 #include "film/film_picture.h"
 #include "inverse/problem/loss.h"

@@ -15,7 +15,7 @@ struct imp__totals {
     bool many, unit_known;
     bool wants_errors; /* of the gradient */
     struct imp_fixed_sum mean, spread;
-    double *own; /* where sums stand that are not in the caller's arrays */
+    double *own; /* sums that are not in the caller's arrays */
 };
 
 /* gradient, gradient_se: where the results go, either may be NULL. For many numbers they

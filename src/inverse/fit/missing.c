@@ -11,8 +11,8 @@
  *
  * Moved by -s_j/S_j, it would lower the loss by s_j^2/(2 S_j); in units of the pictures'
  * noise, which with weights 1/sigma^2 are those of chi^2, by s_j^2/V_j of the measurement
- * alone (the score test: Rao 1948). One sweep gives the scores of all numbers; those that
- * stand out of their Monte Carlo noise most have Gauss-Newton rows. */
+ * alone (the score test: Rao 1948). One sweep gives the scores of all values; those
+ * largest in units of their Monte Carlo noise have Gauss-Newton rows. */
 #include "base/arguments.h"
 #include "inverse/estimate/replicates.h"
 #include "inverse/gauss/gauss_newton.h"
@@ -99,7 +99,8 @@ static int by_z(const void *a, const void *b)
     return x->param < y->param ? -1 : x->param > y->param;
 }
 
-/* One sweep over all numbers; `chosen` becomes the caller's and those that stand out. */
+/* One sweep over all values; `chosen` becomes the caller's and those with the largest
+ * scores. */
 static enum imp_status rows_choose(struct missing *m, uint8_t *chosen)
 {
     enum imp_status st = IMP_OK;

@@ -51,9 +51,10 @@ struct imp__rows {
 /* Blocks are added up in groups, whose number is that of no threads: same bits. */
 enum { IMP_ROW_GROUPS = 8 };
 
-/* Rows at x (NULL: at the scene's values) from `rounds` times the samples of an evaluation,
- * for sensors whose pixels share no walks. look: first of some tiles, by whose rows the
- * memory of all is estimated. IMP_E_NOMEM: more than there is; IMP_E_UNSUPPORTED: pixels share walks. */
+/* Rows at x (NULL: at the scene's values) from `rounds` times the samples of an
+ * evaluation, for sensors whose pixels share no walks. look: first some tiles are
+ * sampled, by whose rows the memory of all is estimated. IMP_E_NOMEM: more than there is;
+ * IMP_E_UNSUPPORTED: pixels share walks. */
 enum imp_status imp__rows_take(struct imp_problem *p, const double *x,
                                const struct imp_run *run, int rounds, bool look,
                                struct imp__rows *out);

@@ -28,7 +28,7 @@ enum imp_status imp__sparse_sink_create(imp_context *ctx, const struct imp_activ
 void imp__sparse_sink_destroy(struct imp__sparse_sink *sink);
 /* To no numbers. */
 void imp__sparse_sink_clear(struct imp__sparse_sink *sink);
-/* Adds `scale` times the derivatives of the walk's channels; look at `failed` then. */
+/* Adds `scale` times the derivatives of the walk's channels; test `failed` afterwards. */
 void imp__sparse_sink_sweep(struct imp__sparse_sink *sink,
                             const struct imp_tracer *tracer, const struct imp_walk *walk,
                             double scale);

@@ -254,7 +254,7 @@ out:
     return st;
 }
 
-/* The same of walks from the lights, which need no pictures. */
+/* The same by light walks, which need no pictures. */
 static enum imp_status light_errors(imp_context *ctx, const struct imp__functional *f,
                                     const struct imp_run *run, double *se)
 {

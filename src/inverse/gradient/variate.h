@@ -7,12 +7,12 @@
  *
  *     I_t = F + w (I_{t-1} - H)       F, H: means of the walks at theta_t and theta_{t-1}
  *
- * The residual that weighs a walk's derivative is made of the other walks' F - w H, and of
- * I_{t-1}. w is cross-fitted, known before the walks are drawn and independent of the pixel:
- * that of the pixels where x + y is even is estimated from the others, and the other way round.
- * Where it promises too little, it is disabled for that half: its pictures are F alone, and of
- * the other half few pixels are evaluated at theta_{t-1}, which say when it is worth the time
- * again. */
+ * The residual that weighs a walk's derivative is made of the other walks' F - w H, and
+ * of I_{t-1}. w is cross-fitted, known before the walks are drawn and independent of the
+ * pixel: that of the pixels where x + y is even is estimated from the others, and the
+ * other way round. Where its expected gain is too small, it is disabled for that half:
+ * its pictures are F alone, and in the other half few pixels are evaluated at
+ * theta_{t-1}, by which it is enabled again. */
 #ifndef IMP_INVERSE_VARIATE_H
 #define IMP_INVERSE_VARIATE_H
 

@@ -125,7 +125,7 @@ struct imp_problem {
     struct imp__allocation *allocation; /* of its samples; NULL: all alike */
     struct imp__variate *variate; /* of the evaluation at work (variate.h); NULL: none */
     enum imp__loss_use use;
-    bool missing_told;          /* that walks from the lights miss some light */
+    bool missing_told;          /* that light tracing misses some light */
     bool same_known;            /* the ranks of a team have the same problem */
     struct imp_arena fit_arena; /* of the last fit's result */
     struct imp__fit_answer fit_answer;
