@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 Recorded walks read from a file. */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Recorded walks read from a file. */
 #include "base/arguments.h"
 #include "math/hash.h"
 #include "walks_file.h"

@@ -1,5 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 Recorded walks written into a file; under MPI the
- * ranks send theirs to the first. */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Recorded walks written into a file; under MPI the ranks send theirs to the first. */
 #include "base/arguments.h"
 #include "base/team.h"
 #include "math/hash.h"

@@ -1,6 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 Recorded walks evaluated at other parameters, with
- * their vertices as they were: central differences of their radiance against the gradient
- * of the sweep. */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Recorded walks evaluated at other parameters, with their vertices as they were: central
+ * differences of their radiance against the gradient of the sweep. */
 #include "check_walks.h"
 #include <math.h>
 #include <string.h>
