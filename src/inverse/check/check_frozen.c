@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-#define SINGLE_MAX 12 /* parameters of up to so many numbers: each is a direction; */
+#define SINGLE_MAX 12 /* parameters of up to so many values: each is a direction; */
 #define DIRECTIONS 6  /* larger ones: random directions */
 #define N_STEPS    4
 /* Central differences leave an error of step^2 times the third derivative, and rounding
@@ -53,7 +53,7 @@ static enum imp_status evaluate(const struct imp__kept *k, double *value)
     return imp__parallel(k->check->ctx, &loop, NULL);
 }
 
-/* A direction inside one parameter: number `only`, or all of them, with random sizes. */
+/* A direction inside one parameter: value `only`, or all of them, with random sizes. */
 struct direction {
     const struct imp_param *param;
     size_t only; /* SIZE_MAX: all */

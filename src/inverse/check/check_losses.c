@@ -96,7 +96,7 @@ out:
     return st;
 }
 
-/* Every number by about its size, to the side where the picture becomes brighter, so that
+/* Every value by about its size, to the side where the picture becomes brighter, so that
  * nothing cancels. */
 static enum imp_status direction_make(struct losses *l)
 {
@@ -222,7 +222,7 @@ static struct expected expected(const struct losses *l, enum imp_loss kind)
 
 /* ---- What imp_problem_objective makes of them ---------------------------------- */
 
-/* A problem with the same active numbers, and our target alone. */
+/* A problem with the same active values, and our target alone. */
 static enum imp_status problem_make(struct losses *l, enum imp_loss kind,
                                     imp_problem **out)
 {

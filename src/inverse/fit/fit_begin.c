@@ -9,9 +9,9 @@
 #include "walk/run/run.h"
 #include <math.h>
 
-/* Do tiles get samples by their share of the variance? Beside control variates of many numbers,
- * which have each their own pixels, nothing is gained by it: there they do if the options
- * demand it. */
+/* Do tiles get samples by their share of the variance? Beside control variates of many
+ * values, which have each their own pixels, nothing is gained by it: there they do if the
+ * options demand it. */
 static bool allocates(const struct imp__fit *f)
 {
     const bool many = f->variate && f->problem->n > IMP_TRAIL_MAX;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Normal equations of many numbers, as the optimiser sees them: rows of derivatives, and the
- * regularisers, which are quadratic. */
+ * Normal equations of many values, as the optimiser sees them: rows of derivatives, and
+ * the regularisers, which are quadratic. */
 #include "base/arguments.h"
 #include "base/team.h"
 #include "fit.h"

@@ -64,7 +64,7 @@ static void targets_add(const struct imp_problem *p, const struct imp_run *run,
             part_add(p, imp__target_part(&p->targets[t], k), run, a);
 }
 
-/* Numbers seen of a tile. */
+/* Statistics of a tile. */
 static size_t each(const struct imp__allocation *a)
 {
     return IMP_ALLOCATION_SEES * (size_t)a->parts;

@@ -13,7 +13,7 @@
 struct rows {
     const struct imp_tracer *tracer;
     int channels;
-    const double *x_dot; /* forward mode: the direction; NULL: all numbers */
+    const double *x_dot; /* forward mode: the direction; NULL: all values */
 };
 
 /* The one reach with an adjoint, which is 1 in every lane. NULL: no memory. */

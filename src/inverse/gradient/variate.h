@@ -93,7 +93,8 @@ void imp__variate_replicate(struct imp__variate_view *view, const struct imp__ta
                             struct imp__replicates plan, int k, size_t pixel,
                             const imp_spec *L, imp_spec *H, double *moments);
 
-/* All that an evaluation leaves to the next, as so many numbers: for checkpoints. */
+/* The state that an evaluation leaves to the next, as so many doubles: for
+ * checkpoints. */
 size_t imp__variate_numbers(const struct imp__variate *v, const struct imp_problem *p);
 void imp__variate_save(const struct imp__variate *v, const struct imp_problem *p,
                        double *numbers);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Problems: which numbers are free, and what they have to match. */
+ * Problems: which values are free, and what they have to match. */
 #include "problem.h"
 #include "match.h"
 #include "scene/theta_near.h"

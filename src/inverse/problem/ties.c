@@ -92,7 +92,7 @@ static enum imp_status members_find(imp_problem *p, const char *glob,
     return IMP_OK;
 }
 
-/* Sets tied numbers to the values of the first parameter. */
+/* Sets tied values to those of the first parameter. */
 static void made_equal(imp_problem *p, const struct imp__param_tie *t)
 {
     size_t first = 0;
