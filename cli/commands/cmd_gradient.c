@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon gradient: the derivative of a number with respect to the scene's parameters,
- * with standard errors. The number is a loss against target pictures; or the inner
- * product of the picture with a given adjoint image; or, with neither, the mean of the
- * picture over its pixels and channels. */
+ * importon gradient: the derivative of an objective with respect to the scene's
+ * parameters, with standard errors. The objective is a loss against target pictures; or
+ * the inner product of the picture with a given adjoint image; or, with neither, the mean
+ * of the picture over its pixels and channels. */
 #include "shared/command.h"
 #include "shared/overwrite.h"
 #include "shared/picture_files.h"

@@ -41,7 +41,7 @@ static void add_film(imp_film *sum, imp_film *film)
     }
 }
 
-/* A block is one control, or as many as it has numbers. */
+/* A block is one control, or as many as it has values. */
 static size_t n_controls(const struct block *b)
 {
     return !separate && b->n == 3 && (b->info.flags & IMP_PARAM_COLOR) ? 1 : b->n;

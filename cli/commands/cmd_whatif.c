@@ -241,7 +241,7 @@ static int answer_one(const char *picture)
 
 struct sweep {
     char name[256];
-    size_t param, first, n; /* numbers that move */
+    size_t param, first, n; /* values that change */
     size_t count;           /* of the parameter */
     double from, to;
     int points;

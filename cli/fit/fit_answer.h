@@ -13,7 +13,7 @@ struct fit_answer {
     size_t n_blocks;
     const char *optimizer;
     int no_intervals;                  /* they were not computed */
-    const struct imp_missing *missing; /* [n_missing] numbers that may be wrong */
+    const struct imp_missing *missing; /* [n_missing] values that may be wrong */
     size_t n_missing;
     int looked; /* they were searched for */
 };
@@ -48,7 +48,7 @@ struct fit_history {
 void fit_history_json(struct json *j, const struct fit_history *h,
                       const struct block *blocks, size_t n_blocks);
 
-/* Number i of the fit. */
+/* Value i of the fit. */
 struct imp_fit_variable fit_variable(const imp_problem *problem, size_t i);
 
 #endif

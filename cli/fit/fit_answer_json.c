@@ -143,8 +143,8 @@ static void put_loosest(struct json *j, const struct fit_answer *a)
     json_end_object(j);
 }
 
-/* What a report draws and a table does not print: the loss and the numbers by iteration,
- * the combination that is determined least, and the covariance of few numbers. */
+/* What a report draws and a table does not print: the loss and the values by iteration,
+ * the combination that is determined least, and the covariance of few values. */
 static void put_curves(struct json *j, const struct fit_answer *a)
 {
     enum { COVARIANCE_MAX = 64 };

@@ -199,7 +199,7 @@ static enum imp_status add_ties(imp_problem *problem)
     } ties[] = {
         {&o->same, IMP_TIE_SAME}, {&o->factor, IMP_TIE_FACTOR}, {&o->log, IMP_TIE_LOG}};
     enum imp_status st = IMP_OK;
-    /* Equal numbers that are logarithms become logarithms together: first these. */
+    /* Equal values that are logarithms become logarithms together: first these. */
     for (size_t k = 0; k < 3 && st == IMP_OK; k++)
         for (size_t i = 0; i < ties[k].globs->n && st == IMP_OK; i++)
             st = imp_problem_tie(problem, ties[k].globs->item[i], ties[k].kind);

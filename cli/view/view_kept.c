@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Recorded walks behind the sliders of a picture: when a value is moved, walks that were
- * drawn at other numbers are evaluated, without a ray, in a fraction of the time in which
- * as many are traced. Fresh ones follow. */
+ * recorded at other values are evaluated, without a ray, in a fraction of the time in
+ * which as many are traced. Fresh ones follow. */
 #include "view.h"
 
 #include <importon/walks.h>

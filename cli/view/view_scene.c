@@ -172,8 +172,8 @@ static int take(int64_t spp, bool merges)
     return 0;
 }
 
-/* The picture by walks that are kept from other numbers: it is shown until a fresh one has
- * more samples. */
+/* The picture by walks recorded at other values: it is shown until a fresh one has more
+ * samples. */
 static void take_kept(int64_t all)
 {
     char text[160];

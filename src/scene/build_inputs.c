@@ -7,7 +7,7 @@
 #include "color/rgb.h"
 #include "scene_build.h"
 
-/* A spectrum whose numbers are set. */
+/* A spectrum whose values are set. */
 struct spectrum_of {
     struct imp_spectrum *spectrum;
     struct imp_input *input;

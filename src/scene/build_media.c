@@ -129,7 +129,7 @@ out:
     return st;
 }
 
-/* Derivatives with respect to these numbers are not those of a walk whose collisions stay
+/* Derivatives with respect to these values are not those of a walk whose collisions stay
  * where they are. */
 static void probed(struct imp_scene *scene, const struct imp_input *in)
 {

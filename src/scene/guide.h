@@ -44,9 +44,9 @@ struct imp_guide {
     imp_v3 (*draw)(const struct imp_guide *g, const struct imp_guide_place *p,
                    const double u[2]);
     double (*pdf)(const struct imp_guide *g, const struct imp_guide_place *p, imp_v3 w);
-    /* Reflected radiance that is expected to leave towards w, as one number, and in
-     * *beyond the part of it that a continuation brings: light that has been reflected
-     * before. NULL: roulette goes by throughput. */
+    /* Reflected radiance that is expected to leave towards w, as a scalar, and in *beyond
+     * the part of it that a continuation brings: light that has been reflected before.
+     * NULL: roulette goes by throughput. */
     double (*expected)(const struct imp_guide *g, const struct imp_guide_place *p,
                        imp_v3 w, double *beyond);
     double roulette; /* survival = this * expected rest of the walk / expected walk */

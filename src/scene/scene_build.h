@@ -33,7 +33,7 @@ void imp__build_fix(struct imp_scene *scene, const struct imp_input *input);
 /* Does a scalar input differ between the lanes of walks? */
 bool imp__build_shaped(const struct imp_scene *scene,
                        const struct imp_input *const *input, int n);
-/* Call `changed` when a number behind these inputs is set: a constant's, or a texel. */
+/* Call `changed` when a value of these inputs is set: a constant's, or a texel. */
 enum imp_status imp__build_watch(struct imp_scene *scene,
                                  const struct imp_input *const *input, int n,
                                  void (*changed)(void *payload), void *payload);
