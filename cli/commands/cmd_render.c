@@ -51,8 +51,8 @@ static const struct arg_option options[] = {
      "take samples, at most --spp, until the picture is this close, in 95 of 100 cases",
      &o.until, 1e-6, 10, NULL},
     {ARG_FLAG | ARG_ASIDE, 0, "verify-sampling", NULL,
-     "compare the picture with one of uniform directions, and show what delivers its "
-     "light",
+     "compare the picture with one of uniform directions, and print the share of its "
+     "light by density",
      &o.sampling, 0, 0, NULL},
     {0}};
 

@@ -26,28 +26,28 @@ const struct arg_option options_search[] = {
      "of more than 64 values with control variates",
      &fit_choice.learning_rate, 1e-12, 1e6, NULL},
     {ARG_NUMBER | ARG_REPLAYS, 0, "momentum", "B",
-     "of adam: the decay factor of the mean gradient, beta1 (default 0.9; 0.5 for values "
+     "adam: the decay factor of the mean gradient, beta1 (default 0.9; 0.5 for values "
      "with two bounds in fits of more than 64 values with control variates)",
      &fit_choice.momentum, 1e-6, 0.999999, NULL},
     {ARG_INT | ARG_REPLAYS, 0, "levels", "N",
-     "of adam, and of bent rays: from coarse to fine, in N levels", &fit_choice.levels, 1,
-     16, NULL},
+     "adam, and bent rays: from coarse to fine, in N levels", &fit_choice.levels, 1, 16,
+     NULL},
     {ARG_CHOICE | ARG_REPLAYS, 0, "allocation", "HOW",
-     "of adam's samples to tiles: variance (by the gradient's), even, or auto (default: "
+     "adam: samples by tile: variance (of the gradient), even, or auto (default: "
      "even beside control variates of more than 64 values)",
      &fit_choice.allocation, 0, 0, allocation_words},
     {ARG_NUMBER | ARG_REPLAYS, 0, "tolerance", "T",
      "stop when relative steps stay below (default 1e-4)", &fit_choice.tolerance, 1e-15,
      1, NULL},
     {ARG_NUMBER | ARG_REPLAYS, 0, "memory", "MB",
-     "of lbfgs, mma and slsqp, for recorded walks (default 1074; 0: none)",
-     &fit_choice.memory, 0, 1e12, NULL},
+     "lbfgs, mma, slsqp: for recorded walks (default 1074; 0: none)", &fit_choice.memory,
+     0, 1e12, NULL},
     {ARG_NUMBER | ARG_REPLAYS, 0, "headroom", "H",
-     "of lbfgs, mma and slsqp: the factor by which extinctions of grids may grow with "
+     "lbfgs, mma, slsqp: the factor by which extinctions of grids may grow with "
      "recorded walks (default 1: such walks are traced)",
      &fit_choice.headroom, 1, 64, NULL},
     {ARG_CHOICE | ARG_REPLAYS, 0, "control-variate", "WHEN",
-     "of adam: walks are evaluated at the last parameters, too: auto (default: for more "
+     "adam: walks are evaluated at the last parameters, too: auto (default: for more "
      "than 64 values, where possible), on or off",
      &fit_choice.variate, 0, 0, variate_words},
     {ARG_FLAG | ARG_REPLAYS, 0, "no-intervals", NULL,
