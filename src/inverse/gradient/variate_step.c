@@ -10,12 +10,10 @@
 #include "variate.h"
 #include <string.h>
 
-#define W_MOST  (1 - 1. / 512) /* what is carried on is forgotten in so many evaluations */
-#define W_FIRST 0.5            /* where nothing is known */
-#define MEMORY  0.5            /* of moments, from one evaluation to the next */
-#define GAIN_LEAST                                                                       \
-    1.25 /* of a picture's variance, that repays the time of an evaluation
-                         * at theta_{t-1} */
+#define W_MOST     (1 - 1. / 512) /* an error carried on lasts so many evaluations */
+#define W_FIRST    0.5            /* without moments */
+#define MEMORY     0.5            /* of moments, from one evaluation to the next */
+#define GAIN_LEAST 1.25 /* variance gain that repays the evaluation at theta_{t-1} */
 
 /* ---- Before it -------------------------------------------------------------------- */
 
