@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Groups of shapes, and the instances by which they stand in a scene: each has a
- * placement of its own, and the shapes are there once. A group may hold instances of
- * others, so a hit lies at a place: one instance of the scene, one of its group, and so
- * on. Places are numbered from 1, depth first:
+ * Groups of shapes, and the instances that place them in a scene: each has a placement of
+ * its own, and the shapes are stored once. A group may contain instances of others, so a
+ * hit lies at a place: one instance of the scene, one of its group, and so on. Places are
+ * numbered from 1, depth first:
  *
  *     number of place (i, rest) of a group = before_i + 1 + number of `rest` in group i
  *

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the checkpoint of a fit belongs to: scene, targets, active numbers and options. */
+ * What the checkpoint of a fit belongs to: scene, targets, active values and options. */
 #include "bend/inside.h"
 #include "fit.h"
 #include "inverse/estimate/replicates.h"
@@ -12,7 +12,7 @@
 #define VARIATE_VERSION 3 /* of what control variates keep, and of steps with them */
 #define KEPT_VERSION    2 /* of how walks are drawn that are kept (fit_kept.c) */
 
-/* With an active number, the index of a medium differs from start to start. */
+/* With an active value, the index of a medium differs from start to start. */
 static bool medium_active(const struct imp_body *m, const int64_t *base)
 {
     for (int k = 0; k < m->n_numbers; k++)
