@@ -39,7 +39,8 @@ bool imp__located_surface(const struct imp_scene *scene, int shape,
                           struct imp_surface *out)
 {
     struct imp_map to_world, to_local;
-    if (x->prim < 0 || !surface_of(scene->shapes[shape], x, out)) return false;
+    if (scene->rayless || x->prim < 0 || !surface_of(scene->shapes[shape], x, out))
+        return false;
     if (place == 0) return true;
     imp__place_map(scene, place, time, &to_world, &to_local);
     imp__surface_move(out, &to_world, &to_local);
@@ -53,7 +54,8 @@ bool imp__located_fits(const struct imp_scene *scene, const struct imp_shape *sh
     const size_t n = shape->geometry == IMP_TRIANGLES ? shape->triangles.n_triangles
                      : shape->geometry == IMP_CURVES  ? shape->curves.n_segments
                                                       : 1;
-    if (place < 0 || place > (world ? world->n_places : 0)) return false;
-    return x->prim == -1 || (x->prim >= 0 && (size_t)x->prim < n && isfinite(x->at[0]) &&
-                             isfinite(x->at[1]));
+    if (x->prim < -1 || place < 0) return false;
+    if (x->prim >= 0 && !(isfinite(x->at[0]) && isfinite(x->at[1]))) return false;
+    if (scene->rayless) return true; /* nothing is looked up there */
+    return place <= (world ? world->n_places : 0) && (x->prim == -1 || (size_t)x->prim < n);
 }

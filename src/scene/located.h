@@ -33,7 +33,8 @@ static inline struct imp_located imp__located_hit(const struct imp_scene *scene,
 }
 
 /* The surface, world, of a shape in this instance (imp_hit.place) at this time. False: the
- * shape does not compute surfaces without a ray, or the point is not known. */
+ * shape does not compute surfaces without a ray, the point is not known, or the scene is
+ * that of a file of walks, which has no geometry. */
 bool imp__located_surface(const struct imp_scene *scene, int shape,
                           const struct imp_located *x, int64_t place, double time,
                           struct imp_surface *out);
