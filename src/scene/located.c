@@ -57,5 +57,6 @@ bool imp__located_fits(const struct imp_scene *scene, const struct imp_shape *sh
     if (x->prim < -1 || place < 0) return false;
     if (x->prim >= 0 && !(isfinite(x->at[0]) && isfinite(x->at[1]))) return false;
     if (scene->rayless) return true; /* nothing is looked up there */
-    return place <= (world ? world->n_places : 0) && (x->prim == -1 || (size_t)x->prim < n);
+    return place <= (world ? world->n_places : 0) &&
+           (x->prim == -1 || (size_t)x->prim < n);
 }

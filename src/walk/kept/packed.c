@@ -52,10 +52,10 @@ size_t imp__packed_put(const struct imp_decision *d, uint32_t *words)
     at = put(at, IMP_PACKED_FROM(d, uv), 5);
     if (h.scatterer != IMP_AT_SKY) at = put(at, d->wo, 3);
     if (h.goes_on) at = put(at, IMP_PACKED_FROM(d, wi), 5);
-    at = located_put(at, h.located, &d->located);
-    if (h.placed) at = put(at, &d->place, 1);
     if (h.mixed) at = put(at, IMP_PACKED_FROM(d, share), 2);
     if (h.rare) at = put(at, IMP_PACKED_FROM(d, passes), 2);
+    at = located_put(at, h.located, &d->located);
+    if (h.placed) at = put(at, &d->place, 1);
     if (h.met) at = put(at, &d->met, IMP_PACKED_MET);
     if (h.lit) {
         at = put(at, &d->light, IMP_PACKED_LIGHT);

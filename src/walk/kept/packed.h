@@ -5,12 +5,12 @@
  * transmittance that is 1 everywhere takes no room; neither do coordinates on a shape that are
  * its uv. A vertex with a light sample, on a mesh without texture coordinates, is 32 words.
  *
- *     2  struct imp_packed_head         2  share, rest               if mixed
- *     5  uv, p                          2  passes, glow_weight       if rare
- *     3  wo        unless at the sky    7  met                       if met
- *     5  wi, pdf, survive  if goes_on  15  light without located     if lit
- *     1  prim, 2  at       if located   1  prim, 2  at               if lit_located
- *     1  place             if placed                                                      */
+ *     2  struct imp_packed_head          1  prim, 2  at             if located
+ *     5  uv, p                           1  place                   if placed
+ *     3  wo       unless at the sky      7  met                     if met
+ *     5  wi, pdf, survive  if goes_on   15  light without located   if lit
+ *     2  share, rest       if mixed      1  prim, 2  at             if lit_located
+ *     2  passes, glow_weight  if rare                                               */
 #ifndef IMP_WALK_PACKED_H
 #define IMP_WALK_PACKED_H
 
@@ -77,7 +77,7 @@ static inline const uint32_t *imp__packed_located_take(const uint32_t *words,
                                                        struct imp_located *x)
 {
     if (kind == IMP_LOCATED_NOWHERE) {
-        x->prim = -1;
+        *x = (struct imp_located){.prim = -1};
         return words;
     }
     x->prim = 0;
@@ -87,37 +87,60 @@ static inline const uint32_t *imp__packed_located_take(const uint32_t *words,
     return words;
 }
 
-/* The decision again; what was left out is 0, or 1 or -1 where it was that. */
-static inline void imp__packed_get(const uint32_t *words, struct imp_decision *d)
+/* Where a decision lies and goes on: all of it but the instance, what was met and the light
+ * sample. Returns the words that follow. */
+static inline const uint32_t *imp__packed_step(const uint32_t *words,
+                                               struct imp_packed_head *head,
+                                               struct imp_decision *d)
 {
     struct imp_packed_head h;
     words = imp__packed_take(words, &h, 2);
-    memset(d, 0, sizeof *d);
     d->shape = h.shape;
     d->scatterer = h.scatterer;
     d->connection = h.connection & 3;
     d->drawn = h.drawn & 7;
     d->glows = h.glows;
     d->goes_on = h.goes_on;
+    d->stands = d->from_light = false;
     d->alone = h.alone;
     d->back = h.back;
+    d->lobe = (int8_t)h.lobe;
     words = imp__packed_take(words, IMP_PACKED_FROM(d, uv), 5);
-    if (h.scatterer != IMP_AT_SKY) words = imp__packed_take(words, d->wo, 3);
+    if (imp_likely(h.scatterer != IMP_AT_SKY)) words = imp__packed_take(words, d->wo, 3);
+    else memset(d->wo, 0, sizeof d->wo);
+    if (h.goes_on) words = imp__packed_take(words, IMP_PACKED_FROM(d, wi), 5);
+    else memset(IMP_PACKED_FROM(d, wi), 0, 5 * sizeof(imp_decided));
+    d->share = h.goes_on;
+    d->rest = 0;
+    if (imp_unlikely(h.mixed))
+        words = imp__packed_take(words, IMP_PACKED_FROM(d, share), 2);
     d->passes = d->glow_weight = 1;
-    if (h.goes_on) {
-        d->lobe = (int8_t)h.lobe;
-        words = imp__packed_take(words, IMP_PACKED_FROM(d, wi), 5);
-        d->share = 1;
+    if (imp_unlikely(h.rare))
+        words = imp__packed_take(words, IMP_PACKED_FROM(d, passes), 2);
+    *head = h;
+    return imp__packed_located_take(words, h.located, d->uv, &d->located);
+}
+
+/* The decision again; what was left out is 0, or 1 or -1 where it was that. */
+static inline void imp__packed_get(const uint32_t *words, struct imp_decision *d)
+{
+    struct imp_packed_head h;
+    words = imp__packed_step(words, &h, d);
+    d->place = 0;
+    if (imp_unlikely(h.placed)) words = imp__packed_take(words, &d->place, 1);
+    if (h.met) {
+        words = imp__packed_take(words, &d->met, IMP_PACKED_MET);
+    } else {
+        memset(&d->met, 0, sizeof d->met);
+        d->met.emitter = -1;
     }
-    words = imp__packed_located_take(words, h.located, d->uv, &d->located);
-    if (h.placed) words = imp__packed_take(words, &d->place, 1);
-    if (h.mixed) words = imp__packed_take(words, IMP_PACKED_FROM(d, share), 2);
-    if (h.rare) words = imp__packed_take(words, IMP_PACKED_FROM(d, passes), 2);
-    d->met.emitter = d->light.emitter = d->light.located.prim = -1;
-    if (h.met) words = imp__packed_take(words, &d->met, IMP_PACKED_MET);
-    if (!h.lit) return;
-    words = imp__packed_take(words, &d->light, IMP_PACKED_LIGHT);
-    imp__packed_located_take(words, h.lit_located, d->light.uv, &d->light.located);
+    if (h.lit) {
+        words = imp__packed_take(words, &d->light, IMP_PACKED_LIGHT);
+        imp__packed_located_take(words, h.lit_located, d->light.uv, &d->light.located);
+    } else {
+        memset(&d->light, 0, sizeof d->light);
+        d->light.emitter = d->light.located.prim = -1;
+    }
 }
 
 /* Members that are packed together follow each other. */

@@ -320,12 +320,11 @@ static bool is_plain(const struct imp_record *record, const struct imp_record_wa
 {
     if (k->n_items > 0 || k->n != k->n_vertices) return false;
     for (uint32_t j = 0; j < k->n; j++) {
-        struct imp_decision kept;
-        const struct imp_decision *d = &kept;
-        imp__record_vertex(record, k->first + j, &kept);
-        if (d->from_light || d->scatterer == IMP_AT_SENSOR ||
-            d->scatterer == IMP_AT_LIGHT || d->scatterer == IMP_IN_MEDIUM ||
-            (d->connection == IMP_CONNECTED && d->light.emitter < 0))
+        const uint32_t *words = imp__record_words(record, k->first + j);
+        struct imp_packed_head h;
+        memcpy(&h, words, sizeof h);
+        if (h.scatterer == IMP_AT_SENSOR || h.scatterer == IMP_AT_LIGHT ||
+            h.scatterer == IMP_IN_MEDIUM)
             return false;
     }
     return true;

@@ -27,7 +27,8 @@ static uint64_t walk_meets(const struct imp_scene *scene, const struct imp_recor
     bool settled = false;
     for (uint32_t j = 0; j < k->n_vertices; j++) {
         struct imp_decision d;
-        imp__record_vertex(r, k->first + j, &d);
+        struct imp_packed_head head;
+        imp__packed_step(imp__record_words(r, k->first + j), &head, &d);
         const struct imp_bsdf *b = imp__decided_bsdf(scene, &d);
         if (!d.goes_on || !b) continue;
         const int a = imp__store_class(b);

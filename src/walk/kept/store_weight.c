@@ -239,7 +239,8 @@ static double course_weight(struct course *c, uint64_t j, uint64_t end,
 {
     for (; at || j < end; at = at ? at->next : NULL, j++) {
         struct imp_decision kept;
-        if (!at) imp__record_vertex(c->record, j, &kept);
+        struct imp_packed_head head;
+        if (!at) imp__packed_step(imp__record_words(c->record, j), &head, &kept);
         const struct imp_decision *d = at ? &at->d : &kept;
         const struct imp_bsdf *next = NULL;
         double branches = 1;
