@@ -280,8 +280,8 @@ struct imp_texcoord {
     imp_v3 p;                          /* world position */
     const struct imp_carried *carried; /* what is looked up; NULL: the scene's colours */
     const struct imp_shape *shape;     /* that is looked up; NULL: none, or not known */
-    /* The primitive of the shape that is looked up. Where it is looked up by triangle, the
-     * surface there, too, of a shape in a group as it is in the group. */
+    /* The primitive of the shape that is looked up, -1: not known. Where it is looked up by
+     * triangle the surface there, too, of a shape in a group as it is in the group. */
     int prim;
     const struct imp_surface *surface;
 };

@@ -286,7 +286,11 @@ static const char fog[] =
     "<shape type='cube'><transform name='to_world'><scale x='5' y='5' z='4'/><translate "
     "z='1'/></transform><bsdf type='null'/><medium name='interior' type='homogeneous'>"
     "<float name='sigma_t' value='.03'/><rgb name='albedo' value='.9,.8,.7'/></medium>"
-    "</shape>";
+    "</shape>"
+    /* A veil before the lamps, which light samples pass. */
+    "<shape type='cube'><transform name='to_world'><scale x='4' y='.1' z='3'/><translate "
+    "y='3.3' z='1'/></transform><bsdf type='mask'><ref name='opacity' id='prims'/><bsdf "
+    "type='diffuse'/></bsdf></shape>";
 
 #define SHUTTER                                                                          \
     "<float name='shutter_open' value='0'/><float name='shutter_close' value='1'/>"

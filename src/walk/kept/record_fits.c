@@ -109,7 +109,8 @@ static bool event_fits(const struct imp_scene *scene, const struct imp_event *e,
 {
     if ((e->kind == IMP_PASSES_UV) != (before == IMP_PASSES)) return false;
     if ((e->kind == IMP_RESIDUAL_OF) != (before == IMP_RESIDUAL_AT)) return false;
-    if (e->kind == IMP_PASSES_UV) return isfinite(e->t) && isfinite(e->bound);
+    if (e->kind == IMP_PASSES_UV)
+        return e->medium >= 0 && isfinite(e->t) && isfinite(e->bound);
     if (e->kind == IMP_RESIDUAL_OF || e->kind == IMP_CONTROL)
         return isfinite(e->t) && e->t >= 0;
     if (e->kind == IMP_PASSES)
