@@ -12,7 +12,7 @@
 
 #define IMP_WALKS_MAGIC      "impdrawn"
 #define IMP_WALKS_BYTE_ORDER 0x01020304u
-#define IMP_WALKS_VERSION    4
+#define IMP_WALKS_VERSION    5
 
 struct imp_walks_head {
     char magic[8];

@@ -77,6 +77,9 @@ imp__instance_local(const struct imp_instance *p, double time, struct imp_map ro
 }
 /* The box of an instance at all times, in the world around it. */
 void imp__instance_box(const struct imp_instance *p, imp_v3 *lo, imp_v3 *hi);
+/* From the group that a place (> 0) is in to the world at a time, and back. */
+void imp__place_map(const struct imp_scene *scene, int64_t place, double time,
+                    struct imp_map *to_world, struct imp_map *to_local);
 /* The surface at a hit in an instance. */
 void imp__placed_surface(const struct imp_scene *scene, const struct imp_hit *hit,
                          const imp_v3 *o, const imp_v3 *d, struct imp_surface *out);

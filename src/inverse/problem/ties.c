@@ -190,13 +190,14 @@ enum imp_status imp_problem_get_tie(const imp_problem *p, size_t i,
 
 uint64_t imp__ties_hash(const struct imp_problem *p, uint64_t hash)
 {
+    hash = imp__hash(hash, &p->n_ties, sizeof p->n_ties);
     for (size_t i = 0; i < p->n_ties; i++) {
         const struct imp__param_tie *t = &p->ties[i];
-        const int kind = t->kind;
-        hash = imp__hash(hash, &kind, sizeof kind);
+        const int kind[2] = {t->kind, t->origin != NULL};
+        hash = imp__hash(hash, kind, sizeof kind);
         hash = imp__hash(hash, t->on, p->scene->n_params);
-        if (t->origin)
-            hash = imp__hash(hash, t->origin, p->scene->n_theta * sizeof *t->origin);
+        hash = imp__hash(hash, t->origin,
+                         t->origin ? p->scene->n_theta * sizeof *t->origin : 0);
     }
     return hash;
 }
