@@ -263,6 +263,8 @@ static void put_things(void)
     put("</shape>");
     put_instance("pair", "<scale x='.5' y='-.6' z='.5'/><translate x='-3' y='-2'/>",
                  NULL);
+    put("<shape type='instance'><ref id='pair'/><transform name='to_world'><scale "
+        "value='.4'/><translate x='-2.2' y='-3.2'/></transform>" PAINT "</shape>");
     put_instance("nest", "<scale value='.5'/><translate y='-2'/>", NULL);
     put_instance(
         "pair", "<scale value='.5'/><translate x='2' y='-2'/>",
