@@ -296,10 +296,10 @@ static void measure_fit(const char *file, const char *define, const char *glob,
             must(imp_problem_create(scene, &p));
             must(imp_problem_activate(p, glob));
             must(imp_problem_add_target(p, &t));
-            imp_problem_get_x(p, x);
             const size_t n = imp_problem_n(p);
             double *at = calloc(n, sizeof *at);
             if (!at || n > 256) exit(3);
+            imp_problem_get_x(p, x);
             for (size_t i = 0; i < n; i++) at[i] = 0.7 * x[i];
             must(imp_problem_set_x(p, at));
             run.seed = 9;
@@ -427,7 +427,7 @@ int main(int argc, char **argv)
     for (int k = 0; k < 3; k++) {
         measure_fit("cornell.xml", "res=64", "*", methods[k], names[k]);
         measure_fit("stam.xml", "integrator=path", "*", methods[k], names[k]);
-        measure_fit("textured.xml", NULL, "*", methods[k], names[k]);
+        measure_fit("textured.xml", NULL, "*.value", methods[k], names[k]);
         measure_fit("lamps.xml", NULL, "*", methods[k], names[k]);
     }
     static const double floors[] = {0, 0.3, 0.4, 0.45, 0.6};
