@@ -428,7 +428,6 @@ int main(int argc, char **argv)
         measure_fit("cornell.xml", "res=64", "*", methods[k], names[k]);
         measure_fit("stam.xml", "integrator=path", "*", methods[k], names[k]);
         measure_fit("textured.xml", NULL, "*.value", methods[k], names[k]);
-        measure_fit("lamps.xml", NULL, "*", methods[k], names[k]);
     }
     static const double floors[] = {0, 0.3, 0.4, 0.45, 0.6};
     for (int k = 0; k < 5; k++) measure_spread("stam.xml", "integrator=path", floors[k]);

@@ -97,15 +97,15 @@ static inline struct imp_dirs imp__reduced_lit_dirs(const struct imp_reduced_at_
     return (struct imp_dirs){m->wo, imp__decided_v3(wi), IMP_SMOOTH, false};
 }
 
-/* A term without the material at hand: c, times what it is a term of. words, end: the op's; m:
- * the material at hand. */
-static inline imp_spec imp__reduced_term_value(const struct imp_reduction *all,
-                                               struct imp_op op, const uint32_t *words,
-                                               const uint32_t *end,
-                                               const struct imp_reduced_at_hand *m)
+/* A term without the material at hand: c, times what it is a term of. kind: the op's, constant
+ * where this is called; words, end: the op's; m: the material at hand. */
+static inline __attribute__((always_inline)) imp_spec
+imp__reduced_term_value(const struct imp_reduction *all, enum imp_op_kind kind,
+                        struct imp_op op, const uint32_t *words, const uint32_t *end,
+                        const struct imp_reduced_at_hand *m)
 {
     const imp_spec c = imp__reduced_number(op, end);
-    switch ((enum imp_op_kind)op.kind) {
+    switch (kind) {
     case IMP_OP_INPUT: return c * all->slot[op.index]->value;
     case IMP_OP_EMITTER: {
         imp_v3 p;

@@ -28,39 +28,41 @@ struct taking {
     void (*material_end)(void *taker, const struct imp_reduced_at_hand *m);
 };
 
+#define PIECES_INLINE static inline __attribute__((always_inline))
+
 /* Goes from op to op, last to first, with the words of each and what was seen of it. */
 struct cursor {
     const struct imp_op *ops;
     uint32_t i;                  /* of the op */
     const uint32_t *words, *end; /* of the op */
     const struct imp_reduced_seen
-        *seen;                    /* of the op, if something was; else of one before */
-    imp_spec P[IMP_REDUCED_MOST]; /* factors before each op */
+        *seen; /* of the op, if something was; else of one before */
 };
 
-/* At its end, with P of every op. */
-static void cursor_begin(struct cursor *c, const struct imp_reduced_of *of, imp_spec P)
+/* At its end; before: the factors before each op. */
+PIECES_INLINE struct cursor cursor_begin(const struct imp_reduced_of *of, imp_spec P,
+                                         imp_spec *before)
 {
     const struct imp_input *const *slot = of->all->of->slot;
-    c->ops = of->all->ops + of->op;
-    c->i = of->n_ops;
-    c->words = of->all->words + of->word;
-    c->seen = of->seen;
+    const struct imp_op *ops = of->all->ops + of->op;
+    const struct imp_reduced_seen *seen = of->seen;
     for (uint32_t i = 0; i < of->n_ops; i++) {
-        const struct imp_op op = c->ops[i];
-        c->P[i] = P;
+        const struct imp_op op = ops[i];
+        before[i] = P;
         switch ((enum imp_op_kind)op.kind) {
         case IMP_OP_FACTOR: P *= slot[op.index]->value; break;
         case IMP_OP_TEXELS:
         case IMP_OP_LOOKUP:
-        case IMP_OP_ON: P *= (c->seen++)->value; break;
-        case IMP_OP_MATERIAL: c->seen++; break;
-        default: c->seen += op.lit;
+        case IMP_OP_ON: P *= (seen++)->value; break;
+        case IMP_OP_MATERIAL: seen++; break;
+        default: seen += op.lit;
         }
     }
+    const uint32_t *end = of->all->words + of->word;
+    return (struct cursor){ops, of->n_ops, end, end, seen};
 }
 
-static inline bool cursor_back(struct cursor *c, struct imp_op *op)
+PIECES_INLINE bool cursor_back(struct cursor *c, struct imp_op *op)
 {
     if (c->i == 0) return false;
     *op = c->ops[--c->i];
@@ -70,7 +72,7 @@ static inline bool cursor_back(struct cursor *c, struct imp_op *op)
 }
 
 /* A value of the material that was seen, for directions. */
-static inline void material_piece(const struct taking *to, void *taker,
+PIECES_INLINE void material_piece(const struct taking *to, void *taker,
                                   const struct imp_active *active,
                                   const struct imp_reduced_seen *seen,
                                   const struct imp_dirs *dirs, imp_spec bar)
@@ -86,53 +88,56 @@ static inline void material_piece(const struct taking *to, void *taker,
     to->material(taker, m, d, bar);
 }
 
-/* Pieces of a term, and its value. */
-static inline __attribute__((always_inline)) imp_spec
-term_pieces(const struct taking *to, void *taker, const struct imp_tracer *tracer,
-            const struct imp_reduction *all, struct cursor *c, struct imp_op o)
+/* Pieces of a term, and its value. kind: the op's, constant where this is called. */
+PIECES_INLINE imp_spec term_pieces(const struct taking *to, void *taker,
+                                   const struct imp_tracer *tracer,
+                                   const struct imp_reduction *all, enum imp_op_kind kind,
+                                   struct cursor *c, struct imp_op o, imp_spec P)
 {
     const struct imp_active *active = tracer->active;
     const imp_spec number = imp__reduced_number(o, c->end);
-    imp_spec bar = c->P[c->i];
+    imp_spec bar = P;
     if (imp_unlikely(o.lit)) bar *= (--c->seen)->value;
     const struct imp_reduced_at_hand *m = NULL;
-    if (o.kind == IMP_OP_GLOW) m = c->seen[-1].material;
-    imp_spec term = imp__reduced_term_value(all, o, c->words, c->end, m);
-    if (o.kind == IMP_OP_INPUT) {
+    if (kind == IMP_OP_GLOW) m = c->seen[-1].material;
+    imp_spec term = imp__reduced_term_value(all, kind, o, c->words, c->end, m);
+    if (kind == IMP_OP_INPUT) {
         const struct imp_input *input = all->slot[o.index];
         if (active->base[input->param] >= 0) to->number(taker, input, bar * number);
-    } else if (o.kind == IMP_OP_EMITTER && active->emitter[o.index]) {
+    } else if (kind == IMP_OP_EMITTER && active->emitter[o.index]) {
         imp_v3 p;
         struct imp_emission x =
             imp__reduced_emission_of(c->words + (o.lit ? IMP_OP_TOWARDS : 0), &p);
         struct imp_texcoord at = {.uv = {x.uv[0], x.uv[1]}, .p = p};
         to->emitter(taker, (int)o.index, &x, &at, bar * number);
-    } else if (o.kind == IMP_OP_GLOW && active->bsdf[m->bsdf->index]) {
+    } else if (kind == IMP_OP_GLOW && active->bsdf[m->bsdf->index]) {
         imp_spec d[IMP_INPUTS_MAX];
         m->bsdf->ops->emit_d(m->bsdf, m->in, &m->wo, d);
         to->material(taker, m, d, bar * number);
     }
     if (imp_unlikely(o.lit)) {
         const struct imp_dirs dirs = imp__reduced_lit_dirs(c->seen->material, c->words);
-        material_piece(to, taker, active, c->seen, &dirs, c->P[c->i] * term);
+        material_piece(to, taker, active, c->seen, &dirs, P * term);
         term *= c->seen->value;
     }
     return term;
 }
 
-static inline __attribute__((always_inline)) void
-pieces(const struct taking *to, void *taker, const struct imp_tracer *tracer,
-       const struct imp_walk *walk, imp_spec adjoint)
+PIECES_INLINE void pieces(const struct taking *to, void *taker,
+                          const struct imp_tracer *tracer, const struct imp_walk *walk,
+                          imp_spec adjoint)
 {
     const struct imp_reduced_of *of = (const struct imp_reduced_of *)walk->reduced;
     const struct imp_reduction *all = of->all->of;
     const struct imp_active *active = tracer->active;
-    imp_spec R = {0};
+    imp_spec before[IMP_REDUCED_MOST], R = {0};
     struct imp_op o;
-    struct cursor c;
-    cursor_begin(&c, of, adjoint);
+    struct cursor c = cursor_begin(of, adjoint, before);
+#define TERM(kind)                                                                       \
+    R += term_pieces(to, taker, tracer, all, kind, &c, o, P);                            \
+    break
     while (cursor_back(&c, &o)) {
-        const imp_spec P = c.P[c.i];
+        const imp_spec P = before[c.i];
         switch ((enum imp_op_kind)o.kind) {
         case IMP_OP_FACTOR: {
             const struct imp_input *input = all->slot[o.index];
@@ -165,12 +170,13 @@ pieces(const struct taking *to, void *taker, const struct imp_tracer *tracer,
             R *= c.seen->value;
             break;
         case IMP_OP_MATERIAL: to->material_end(taker, (--c.seen)->material); break;
-        case IMP_OP_CONSTANT:
-        case IMP_OP_INPUT:
-        case IMP_OP_EMITTER:
-        case IMP_OP_GLOW: R += term_pieces(to, taker, tracer, all, &c, o); break;
+        case IMP_OP_CONSTANT: TERM(IMP_OP_CONSTANT);
+        case IMP_OP_INPUT: TERM(IMP_OP_INPUT);
+        case IMP_OP_EMITTER: TERM(IMP_OP_EMITTER);
+        case IMP_OP_GLOW: TERM(IMP_OP_GLOW);
         }
     }
+#undef TERM
 }
 
 /* ---- Reverse --------------------------------------------------------------------- */

@@ -94,7 +94,7 @@ static inline bool seen_add(struct imp_arena *arena, struct imp_reduced_of *of, 
     return true;
 }
 
-/* The sum, of NULL: nothing will be swept. False: no memory. */
+/* The sum; of NULL: nothing will be swept. False: no memory. */
 static inline __attribute__((always_inline)) bool
 walk_sum(const struct imp_reduced *r, const struct imp_reduced_walk *begin,
          struct imp_arena *arena, struct imp_reduced_of *of, imp_spec *sum)
@@ -108,55 +108,57 @@ walk_sum(const struct imp_reduced *r, const struct imp_reduced_walk *begin,
     struct imp_reduced_at_hand own, *m = &own; /* set by the first material */
     size_t n = 0;
     own.in = in;
+#define TERM(kind)                                                                       \
+    term = imp__reduced_term_value(all, kind, o, at, words, m);                          \
+    break
     for (; op < end; op++) {
         const struct imp_op o = *op;
         const uint32_t *at = words;
-        imp_spec f, *d = NULL;
+        imp_spec f, term, *d = NULL;
         words += imp__op_words(o);
         switch ((enum imp_op_kind)o.kind) {
-        case IMP_OP_FACTOR: P *= all->slot[o.index]->value; break;
+        case IMP_OP_FACTOR: P *= all->slot[o.index]->value; continue;
         case IMP_OP_TEXELS:
             f = texels_value(all, o, at);
             if (!seen_add(arena, of, &n, f, NULL, NULL)) return false;
             P *= f;
-            break;
+            continue;
         case IMP_OP_LOOKUP: {
             const struct imp_texcoord place = imp__reduced_lookup_at(scene, at);
             imp__inputs_eval(&all->slot[o.index], 1, &place, &f);
             if (!seen_add(arena, of, &n, f, NULL, NULL)) return false;
             P *= f;
-            break;
+            continue;
         }
         case IMP_OP_MATERIAL:
             m = of ? material_take(scene, arena, o) : &own;
             if (!m || !seen_add(arena, of, &n, imp__spec(0), m, NULL)) return false;
             material_look(scene, o, at, m);
-            break;
+            continue;
         case IMP_OP_ON: {
             const struct imp_dirs dirs = imp__reduced_on_dirs(m, at);
             if (!material_eval(all, derivatives, m, &dirs, &f, &d) ||
                 !seen_add(arena, of, &n, f, m, d))
                 return false;
             P *= f;
-            break;
+            continue;
         }
-        case IMP_OP_CONSTANT:
-        case IMP_OP_INPUT:
-        case IMP_OP_EMITTER:
-        case IMP_OP_GLOW: {
-            imp_spec term = imp__reduced_term_value(all, o, at, words, m);
-            if (imp_unlikely(o.lit)) {
-                const struct imp_dirs dirs = imp__reduced_lit_dirs(m, at);
-                if (!material_eval(all, derivatives, m, &dirs, &f, &d) ||
-                    !seen_add(arena, of, &n, f, m, d))
-                    return false;
-                term *= f;
-            }
-            L += P * term;
-            break;
+        case IMP_OP_CONSTANT: TERM(IMP_OP_CONSTANT);
+        case IMP_OP_INPUT: TERM(IMP_OP_INPUT);
+        case IMP_OP_EMITTER: TERM(IMP_OP_EMITTER);
+        case IMP_OP_GLOW: TERM(IMP_OP_GLOW);
+        default: continue;
         }
+        if (imp_unlikely(o.lit)) {
+            const struct imp_dirs dirs = imp__reduced_lit_dirs(m, at);
+            if (!material_eval(all, derivatives, m, &dirs, &f, &d) ||
+                !seen_add(arena, of, &n, f, m, d))
+                return false;
+            term *= f;
         }
+        L += P * term;
     }
+#undef TERM
     *sum = L;
     return true;
 }
