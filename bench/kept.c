@@ -4,7 +4,9 @@
  * processor time; the median of pairs measured in turn (walks). Then pictures, searches (fits)
  * by L-BFGS, MMA and SLSQP, and how far values of N draws spread far away (spread).
  *
- *     kept [--repeats N] [--spp N] [--picture-spp N] [--scene NAME] [--only PART] */
+ *     kept [--repeats N] [--spp N] [--picture-spp N] [--scene NAME] [--only PART]
+ *
+ * Each but the last twice: vertex by vertex, and as sums of products (walk/kept/reduced.h). */
 #include "walk/kept/store.h"
 #include <importon/walks.h>
 #include <math.h>
@@ -16,6 +18,26 @@
 static int repeats = 5, spp = 16, picture_spp = 0; /* 0: the scene's */
 static const char *only = "", *scene_only = ""; /* parts, and scenes, whose name has it */
 static imp_context *ctx;
+
+/* Walks that are kept from here on: vertices alone, or sums of products beside them. */
+static bool as_vertices;
+enum imp_status __real_imp__reduction_create(const struct imp_scene *scene,
+                                             const struct imp_walk_integrator *integrator,
+                                             const uint8_t *free,
+                                             struct imp_reduction **out);
+enum imp_status __wrap_imp__reduction_create(const struct imp_scene *scene,
+                                             const struct imp_walk_integrator *integrator,
+                                             const uint8_t *free,
+                                             struct imp_reduction **out);
+enum imp_status __wrap_imp__reduction_create(const struct imp_scene *scene,
+                                             const struct imp_walk_integrator *integrator,
+                                             const uint8_t *free,
+                                             struct imp_reduction **out)
+{
+    *out = NULL;
+    return as_vertices ? IMP_OK
+                       : __real_imp__reduction_create(scene, integrator, free, out);
+}
 
 static void must(enum imp_status st)
 {
@@ -95,7 +117,7 @@ static void evaluate_all(struct job *j, bool swept)
     for (size_t i = 0; i < j->record.n_walks; i++) {
         const struct imp_arena_mark mark = imp__arena_mark(&j->arena);
         struct imp_walk w;
-        if (!j->reduced.of ||
+        if (as_vertices || !j->reduced.of ||
             !imp__reduced_walk(&j->reduced, &j->record, i, &j->tracer, &j->arena, &w))
             imp__record_walk(&j->record, i, &j->tracer, &j->arena, &w);
         if (swept) sweep(j, &w);
@@ -141,27 +163,32 @@ static void measure(const char *file, const char *define)
     if (j.reduction) imp__reduced_make(j.reduction, &j.record, &j.reduced);
     reducing = cpu() - reducing;
 
-    double both[64], value[64], ns[64];
+    double both[2][64], value[2][64], ns[64];
     for (int k = 0; k < repeats; k++) {
-        const double t0 = cpu();
+        double start = cpu();
         trace_all(&j, false, true);
-        const double t1 = cpu();
-        evaluate_all(&j, true);
-        const double t2 = cpu();
-        evaluate_all(&j, false);
-        const double t3 = cpu();
-        both[k] = (t2 - t1) / (t1 - t0);
-        value[k] = (t3 - t2) / (t1 - t0);
-        ns[k] = (t1 - t0) / (double)j.record.n_walks * 1e9;
+        const double traced = cpu() - start;
+        ns[k] = traced / (double)j.record.n_walks * 1e9;
+        for (int reduced = 0; reduced < 2; reduced++) {
+            as_vertices = !reduced;
+            start = cpu();
+            evaluate_all(&j, true);
+            both[reduced][k] = (cpu() - start) / traced;
+            start = cpu();
+            evaluate_all(&j, false);
+            value[reduced][k] = (cpu() - start) / traced;
+        }
     }
     printf("%-14s %-16s %5.2f vertices %5.0f bytes a walk, reduced %3.0f in %3.0f ns; "
-           "traced and swept %5.0f ns; kept: value %.3f, and swept %.3f of that\n",
+           "traced and swept %5.0f ns; vertices: value %.3f, and swept %.3f of that; "
+           "reduced: %.3f, %.3f\n",
            file, define ? define : "",
            (double)j.record.n_vertices / (double)j.record.n_walks,
            (double)imp__record_bytes(&j.record) / (double)j.record.n_walks,
            (double)imp__reduced_bytes(&j.reduced) / (double)j.record.n_walks,
            reducing / (double)j.record.n_walks * 1e9, median(ns, repeats),
-           median(value, repeats), median(both, repeats));
+           median(value[0], repeats), median(both[0], repeats), median(value[1], repeats),
+           median(both[1], repeats));
     fflush(stdout);
     imp__reduced_free(&j.reduced);
     imp__reduction_destroy(j.reduction);
@@ -198,31 +225,37 @@ static void measure_picture(const char *file, const char *define)
     struct imp_walks_options keep = IMP_WALKS_OPTIONS_INIT;
     char path[1024];
     imp_scene *scene;
-    imp_walks *walks;
-    double ratio[64];
+    imp_walks *walks[2]; /* as vertices, reduced */
+    double ratio[2][64];
     o.defines = &define;
     o.n_defines = define != NULL;
     snprintf(path, sizeof path, "%s/%s", IMP_SCENES, file);
     must(imp_scene_load(ctx, path, &o, &scene));
     keep.memory = 8e9;
     run.spp = picture_spp;
-    must(imp_walks_keep(scene, &run, &keep, &walks));
+    for (int reduced = 0; reduced < 2; reduced++) {
+        as_vertices = !reduced;
+        must(imp_walks_keep(scene, &run, &keep, &walks[reduced]));
+    }
     change(scene);
     for (int k = 0; k < repeats; k++) {
-        double took[2];
-        for (int kept = 0; kept < 2; kept++) {
+        double took[3];
+        for (int way = 0; way < 3; way++) {
             imp_film *film;
             const double start = cpu();
-            run.walks = kept ? walks : NULL;
+            run.walks = way > 0 ? walks[way - 1] : NULL;
             must(imp_render(scene, &run, &film));
-            took[kept] = cpu() - start;
+            took[way] = cpu() - start;
             imp_film_destroy(film);
         }
-        ratio[k] = took[1] / took[0];
+        for (int reduced = 0; reduced < 2; reduced++)
+            ratio[reduced][k] = took[1 + reduced] / took[0];
     }
-    printf("%-14s %-16s picture of kept walks %.3f of its render\n", file,
-           define ? define : "", median(ratio, repeats));
-    imp_walks_destroy(walks);
+    printf("%-14s %-16s picture of kept walks over its render: vertices %.3f, reduced "
+           "%.3f\n",
+           file, define ? define : "", median(ratio[0], repeats),
+           median(ratio[1], repeats));
+    for (int reduced = 0; reduced < 2; reduced++) imp_walks_destroy(walks[reduced]);
     imp_scene_destroy(scene);
 }
 
@@ -232,14 +265,14 @@ static void measure_fit(const char *file, const char *define, const char *glob,
                         enum imp_optimizer method, const char *name)
 {
     if (!wanted("fits", file)) return;
-    int evaluations[2] = {0, 0};
+    int evaluations[3] = {0, 0, 0};
     struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
     struct imp_run run = IMP_RUN_INIT;
     struct imp_target t = IMP_TARGET_INIT;
     char path[1024], said[256] = "";
     imp_scene *scene;
     imp_film *film;
-    double ratio[64];
+    double ratio[2][64];
     o.defines = &define;
     o.n_defines = define != NULL;
     snprintf(path, sizeof path, "%s/%s", IMP_SCENES, file);
@@ -253,8 +286,9 @@ static void measure_fit(const char *file, const char *define, const char *glob,
     t.channels = info.channels;
     t.pixels = imp_film_mean(film);
     for (int k = 0; k < repeats; k++) {
-        double took[2];
-        for (int kept = 0; kept < 2; kept++) {
+        double took[3];
+        for (int way = 0; way < 3; way++) {
+            const bool kept = way > 0;
             struct imp_fit_options f = IMP_FIT_OPTIONS_INIT;
             const struct imp_fit_result *r;
             imp_problem *p;
@@ -262,10 +296,10 @@ static void measure_fit(const char *file, const char *define, const char *glob,
             must(imp_problem_create(scene, &p));
             must(imp_problem_activate(p, glob));
             must(imp_problem_add_target(p, &t));
-            imp_problem_get_x(p, x);
             const size_t n = imp_problem_n(p);
             double *at = calloc(n, sizeof *at);
             if (!at || n > 256) exit(3);
+            imp_problem_get_x(p, x);
             for (size_t i = 0; i < n; i++) at[i] = 0.7 * x[i];
             must(imp_problem_set_x(p, at));
             run.seed = 9;
@@ -273,22 +307,23 @@ static void measure_fit(const char *file, const char *define, const char *glob,
             f.max_iterations = 15;
             f.tolerance = 1e-9;
             f.memory = kept ? 4e9 : -1;
+            as_vertices = way == 1;
             const double start = cpu();
             must(imp_fit(p, &f, &run, &r));
-            took[kept] = cpu() - start;
-            evaluations[kept] = r->iterations;
+            took[way] = cpu() - start;
+            evaluations[way] = r->iterations;
             if (kept) snprintf(said, sizeof said, "%s", r->walks);
             must(imp_problem_set_x(p, x));
             imp_problem_destroy(p);
             free(at);
         }
-        ratio[k] = took[0] / took[1];
+        for (int reduced = 0; reduced < 2; reduced++)
+            ratio[reduced][k] = took[0] / took[1 + reduced];
     }
-    printf(
-        "%-14s %-16s %-5s, %d evaluations (traced %d) and the last: %.2f times as fast; "
-        "%s\n",
-        file, define ? define : "", name, evaluations[1], evaluations[0],
-        median(ratio, repeats), said);
+    printf("%-14s %-16s %-5s, evaluations %d traced, %d as vertices, %d reduced, and the "
+           "last; times as fast: vertices %.2f, reduced %.2f; %s\n",
+           file, define ? define : "", name, evaluations[0], evaluations[1],
+           evaluations[2], median(ratio[0], repeats), median(ratio[1], repeats), said);
     fflush(stdout);
     imp_film_destroy(film);
     imp_scene_destroy(scene);
@@ -392,6 +427,7 @@ int main(int argc, char **argv)
     for (int k = 0; k < 3; k++) {
         measure_fit("cornell.xml", "res=64", "*", methods[k], names[k]);
         measure_fit("stam.xml", "integrator=path", "*", methods[k], names[k]);
+        measure_fit("textured.xml", NULL, "*.value", methods[k], names[k]);
     }
     static const double floors[] = {0, 0.3, 0.4, 0.45, 0.6};
     for (int k = 0; k < 5; k++) measure_spread("stam.xml", "integrator=path", floors[k]);

@@ -182,7 +182,7 @@ static enum imp_status check_reflectance(struct imp__kept *k, uint8_t *chosen)
 {
     enum imp_status st = IMP_OK;
     const struct imp_scene *s = k->check->problem->scene;
-    if (!k->check->tracer.integrator->absorbs) return IMP_OK;
+    if (k->check->tracer.integrator->ends_by != IMP_ENDS_BY_ABSORPTION) return IMP_OK;
     for (int i = 0; i < s->n_bsdfs; i++) {
         const struct imp_bsdf *b = s->bsdfs[i];
         if (!(b->flags & IMP_BSDF_LINEAR)) continue;

@@ -7,12 +7,13 @@
  *
  * P_y belongs to the walk from the sensor, whose B of y holds the rest as a factor; P_z to
  * the walk from the light, where A P_y f_y T m f_z enters at z as light that reaches the
- * film. What is left are the derivatives of f_y, f_z and T. */
+ * film. What is left are the derivatives of f_y, f_z and T: the pieces of a joint, which both modes
+ * take from one visitor, as those of a vertex. */
 #include "both.h"
 #include "walk/media/tracking.h"
+#include "walk/path/vertex_pieces.h"
 
 struct joints {
-    const struct imp_tracer *tracer;
     struct imp_both *both;
     imp_spec adjoint; /* A */
     imp_spec *P;      /* [light vertices] P_z */
@@ -81,29 +82,69 @@ static struct imp_dirs dirs_z(const struct imp_joint *j)
                              IMP_SMOOTH, false};
 }
 
+/* ---- Pieces of a joint --------------------------------------------------------------- */
+
+/* The value of a vertex towards the other one, whose value is `other`. */
+struct kernel {
+    const struct imp_vertex *v;
+    struct imp_dirs dirs;
+    imp_spec other;
+};
+struct joint_ops {
+    void (*kernels)(void *taker, const struct kernel of[2], imp_spec adjoint);
+    void (*track)(void *taker, const struct imp_joint *joint, imp_spec adjoint);
+};
+
+static inline __attribute__((always_inline)) void
+joint_pieces(const struct joint_ops *ops, void *taker, const struct joints *j,
+             const struct imp_joint *joint, imp_spec P_y)
+{
+    const imp_spec all = P_y * j->P[joint->z_number] * (double)joint->weight;
+    const struct kernel kernels[2] = {{joint->y, dirs_y(joint), joint->f_z},
+                                      {joint->z, dirs_z(joint), joint->f_y}};
+    ops->kernels(taker, kernels, all * joint->T);
+    if (joint->track) ops->track(taker, joint, all * joint->f_y * joint->f_z);
+}
+
+static const struct imp_bsdf *kernel_d(const struct kernel *k, imp_spec *d)
+{
+    imp__bsdf_eval_d(k->v->bsdf, k->v->carried, k->v->in, &k->dirs, d);
+    return k->v->bsdf;
+}
+
 /* ---- Reverse ------------------------------------------------------------------------ */
 
-static void kernel_sweep(const struct imp_tracer *tracer, const struct imp_vertex *v,
-                         const struct imp_dirs *dirs, imp_spec bar, struct imp_sink *sink)
+struct reverse {
+    const struct imp_tracer *tracer;
+    struct imp_sink *sink;
+};
+
+static void reverse_kernels(void *taker, const struct kernel of[2], imp_spec adjoint)
 {
+    const struct reverse *r = taker;
     imp_spec d[IMP_INPUTS_MAX];
-    if (!imp__vertex_active(tracer, v)) return;
-    imp__bsdf_eval_d(v->bsdf, v->carried, v->in, dirs, d);
-    for (int k = 0; k < v->bsdf->n_in; k++) d[k] *= bar;
-    imp__vertex_scatter(tracer, v, d, sink);
+    for (int k = 0; k < 2; k++) {
+        if (!imp__scatterer_active(r->tracer, of[k].v)) continue;
+        const imp_spec bar = adjoint * of[k].other;
+        const struct imp_bsdf *b = kernel_d(&of[k], d);
+        for (int i = 0; i < b->n_in; i++) d[i] *= bar;
+        imp__vertex_scatter(r->tracer, of[k].v, d, r->sink);
+    }
 }
+
+static void reverse_track(void *taker, const struct imp_joint *joint, imp_spec adjoint)
+{
+    const struct reverse *r = taker;
+    imp__track_sweep(r->tracer, joint->track, joint->y->carried, &joint->T, adjoint,
+                     r->sink);
+}
+
+static const struct joint_ops reverse_ops = {reverse_kernels, reverse_track};
 
 static void joint_sweep(const struct joints *j, struct imp_joint *joint, imp_spec P_y,
                         void *payload)
 {
-    struct imp_sink *sink = payload;
-    const imp_spec all = P_y * j->P[joint->z_number] * (double)joint->weight;
-    const struct imp_dirs y = dirs_y(joint), z = dirs_z(joint);
-    kernel_sweep(j->tracer, joint->y, &y, all * joint->T * joint->f_z, sink);
-    kernel_sweep(j->tracer, joint->z, &z, all * joint->T * joint->f_y, sink);
-    if (joint->track)
-        imp__track_sweep(j->tracer, joint->track, joint->y->carried, &joint->T,
-                         all * joint->f_y * joint->f_z, sink);
+    joint_pieces(&reverse_ops, payload, j, joint, P_y);
 }
 
 bool imp__light_walk_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
@@ -111,7 +152,8 @@ bool imp__light_walk_sweep(const struct imp_tracer *tracer, struct imp_arena *ar
                            double factor, struct imp_sink *sink)
 {
     if (w->n_reach == 0) return true;
-    struct joints j = {.tracer = tracer, .both = w->both};
+    struct joints j = {.both = w->both};
+    struct reverse r = {tracer, sink};
     j.entry = entries(arena, w, adjoint, &j.adjoint);
     if (!j.entry) return false;
     if (w->both) {
@@ -120,7 +162,7 @@ bool imp__light_walk_sweep(const struct imp_tracer *tracer, struct imp_arena *ar
         each_joint(&j, joint_enter, NULL);
         j.adjoint *= imp__spec(factor);
         imp__walk_sweep_values(tracer, &w->both->eye, j.adjoint, sink);
-        each_joint(&j, joint_sweep, sink);
+        each_joint(&j, joint_sweep, &r);
     }
     w->walk.entry = j.entry;
     imp__walk_fold(&w->walk);
@@ -131,35 +173,40 @@ bool imp__light_walk_sweep(const struct imp_tracer *tracer, struct imp_arena *ar
 /* ---- Forward ------------------------------------------------------------------------ */
 
 struct forward {
+    const struct imp_tracer *tracer;
     const double *x_dot;
     imp_spec L_dot;
 };
 
-static imp_spec kernel_tangent(const struct imp_tracer *tracer,
-                               const struct imp_vertex *v, const struct imp_dirs *dirs,
-                               const double *x_dot)
+static void forward_kernels(void *taker, const struct kernel of[2], imp_spec adjoint)
 {
-    imp_spec d[IMP_INPUTS_MAX], in_dot[IMP_INPUTS_MAX], sum = {0};
-    if (!imp__vertex_active(tracer, v)) return sum;
-    imp__vertex_tangent(tracer, v, x_dot, in_dot);
-    imp__bsdf_eval_d(v->bsdf, v->carried, v->in, dirs, d);
-    for (int k = 0; k < v->bsdf->n_in; k++) sum += d[k] * in_dot[k];
-    return sum;
+    struct forward *f = taker;
+    imp_spec d[IMP_INPUTS_MAX], in_dot[IMP_INPUTS_MAX], both = {0};
+    for (int k = 0; k < 2; k++) {
+        imp_spec sum = {0};
+        if (!imp__scatterer_active(f->tracer, of[k].v)) continue;
+        imp__vertex_tangent(f->tracer, of[k].v, f->x_dot, in_dot);
+        const struct imp_bsdf *b = kernel_d(&of[k], d);
+        for (int i = 0; i < b->n_in; i++) sum += d[i] * in_dot[i];
+        both += sum * of[k].other;
+    }
+    f->L_dot += adjoint * both;
 }
+
+static void forward_track(void *taker, const struct imp_joint *joint, imp_spec adjoint)
+{
+    struct forward *f = taker;
+    f->L_dot +=
+        adjoint * imp__track_tangent_along(f->tracer, joint->track, joint->y->carried,
+                                           &joint->T, f->x_dot);
+}
+
+static const struct joint_ops forward_ops = {forward_kernels, forward_track};
 
 static void joint_tangent(const struct joints *j, struct imp_joint *joint, imp_spec P_y,
                           void *payload)
 {
-    struct forward *f = payload;
-    const imp_spec all = P_y * j->P[joint->z_number] * (double)joint->weight;
-    const struct imp_dirs y = dirs_y(joint), z = dirs_z(joint);
-    f->L_dot += all * joint->T *
-                (kernel_tangent(j->tracer, joint->y, &y, f->x_dot) * joint->f_z +
-                 kernel_tangent(j->tracer, joint->z, &z, f->x_dot) * joint->f_y);
-    if (joint->track)
-        f->L_dot += all * joint->f_y * joint->f_z *
-                    imp__track_tangent_along(j->tracer, joint->track, joint->y->carried,
-                                             &joint->T, f->x_dot);
+    joint_pieces(&forward_ops, payload, j, joint, P_y);
 }
 
 bool imp__light_walk_tangent(const struct imp_tracer *tracer, struct imp_arena *arena,
@@ -168,8 +215,8 @@ bool imp__light_walk_tangent(const struct imp_tracer *tracer, struct imp_arena *
 {
     *L_dot = (imp_spec){0};
     if (w->n_reach == 0) return true;
-    struct joints j = {.tracer = tracer, .both = w->both};
-    struct forward f = {.x_dot = x_dot};
+    struct joints j = {.both = w->both};
+    struct forward f = {.tracer = tracer, .x_dot = x_dot};
     j.entry = entries(arena, w, adjoint, &j.adjoint);
     if (!j.entry) return false;
     if (w->both) {

@@ -11,24 +11,24 @@
 
 #define IMP_STEP_INLINE static inline __attribute__((always_inline))
 
-/* At a vertex: what is met, the connection, and where the walk goes on. False: it ends. hit
- * NULL: the walk begins here. */
-IMP_STEP_INLINE bool imp__vertex_work(const struct imp_end_ops *end, struct imp_step *s,
-                                      struct imp_vertex *v, const struct imp_hit *hit,
-                                      const struct imp_surface *at,
-                                      const struct imp_frame *frame)
+/* Is another vertex within max_depth, if only one behind a lobe that is no bounce? */
+IMP_STEP_INLINE bool imp__vertex_goes_on(const struct imp_end_ops *end,
+                                         const struct imp_step *s,
+                                         const struct imp_vertex *v)
 {
-    const bool goes_on =
-        end->bounces(s) || (end->passes && imp_unlikely(v->bsdf->straight) &&
-                            s->segment->through && end->passes(s));
-    imp__step_numbers(s);
-    if (end->densities) end->densities(s, v, at);
-    if (!end->meet(s, v, hit, at) || (!end->connects_last && !goes_on)) return false;
-    if (end->goes_on) end->goes_on(s, v);
+    return end->bounces(s) || (end->passes && imp_unlikely(v->bsdf->straight) &&
+                               s->segment->through && end->passes(s));
+}
 
-    /* A point to be connected to, and a direction: both are drawn before either is weighed, and
-     * both are weighed before the point is looked for, so that neither waits for the other's
-     * roots and quotients. */
+/* What leaves v: the connection, and the next ray if it goes_on. False: the walk ends.
+ *
+ * A point to be connected to, and a direction: both are drawn before either is weighed, and
+ * both are weighed before the point is looked for, so that neither waits for the other's
+ * roots and quotients. */
+IMP_STEP_INLINE bool imp__vertex_leave(const struct imp_end_ops *end, struct imp_step *s,
+                                       struct imp_vertex *v, const struct imp_surface *at,
+                                       const struct imp_frame *frame, bool goes_on)
+{
     struct imp_link link;
     const bool linked =
         (v->bsdf->flags & IMP_BSDF_SMOOTH) && end->link_draw(s, v, at, &link);
@@ -49,6 +49,21 @@ IMP_STEP_INLINE bool imp__vertex_work(const struct imp_end_ops *end, struct imp_
               : splits && directions && end->scatter_split(s, v, at, frame);
     if (!end->join && link.shadow.wanted) end->link_see(s, v, at, &link);
     return continues && !s->walk->dropped;
+}
+
+/* At a vertex: what is met, the connection, and where the walk goes on. False: it ends. hit
+ * NULL: the walk begins here. */
+IMP_STEP_INLINE bool imp__vertex_work(const struct imp_end_ops *end, struct imp_step *s,
+                                      struct imp_vertex *v, const struct imp_hit *hit,
+                                      const struct imp_surface *at,
+                                      const struct imp_frame *frame)
+{
+    const bool goes_on = imp__vertex_goes_on(end, s, v);
+    imp__step_numbers(s);
+    if (end->densities) end->densities(s, v, at);
+    if (!end->meet(s, v, hit, at) || (!end->connects_last && !goes_on)) return false;
+    if (end->goes_on) end->goes_on(s, v);
+    return imp__vertex_leave(end, s, v, at, frame, goes_on);
 }
 
 IMP_STEP_INLINE bool imp__one_step(const struct imp_end_ops *end, struct imp_step *s)

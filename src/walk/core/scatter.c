@@ -48,14 +48,14 @@ static inline bool roulette(struct imp_step *s, const struct imp_bsdf *b,
                       : imp__shaped_index_ratio(b, s->at.carried, s->in, dirs);
     const struct imp_walk_integrator *integrator = s->tracer->integrator;
     const bool guided = imp_unlikely(s->guided.reference > 0);
-    if (integrator->absorbs) { /* `absorb` has drawn already */
+    double q;
+    switch (integrator->ends_by) {
+    case IMP_ENDS_BY_ABSORPTION: /* `absorb` has drawn already */
         *survive = imp__decide1(1 - b->absorb);
         return true;
-    }
-    double q;
-    if (imp_unlikely(integrator->photons)) {
-        q = photon_survival(s, b, factor);
-    } else {
+    case IMP_ENDS_BY_ALBEDO: q = photon_survival(s, b, factor); break;
+    case IMP_ENDS_BY_ROULETTE:
+    default:
         if (imp__bounces(s) + 1 < integrator->rr_depth && !guided) return true;
         q = imp_min(imp__max_used(s->beta, s->at.carried) * s->eta * s->eta, 0.95);
         if (guided) q = imp__guided_survival(s, q);

@@ -340,9 +340,8 @@ imp_spec imp__emitter_tangent(const struct imp_tracer *tracer, int emitter,
                               struct imp_emission x, struct imp_texcoord at,
                               imp_dot_fn *dot, const void *x_dot);
 
-/* One vertex: do its BSDF's inputs count; what bar [n_in] gives to their parameters;
- * their tangent, into in_dot [n_in]. */
-bool imp__vertex_active(const struct imp_tracer *tracer, const struct imp_vertex *v);
+/* One vertex: what bar [n_in] of its scatterer's inputs gives to their parameters; their tangent,
+ * into in_dot [n_in]. */
 void imp__vertex_scatter(const struct imp_tracer *tracer, const struct imp_vertex *v,
                          const imp_spec *bar, struct imp_sink *sink);
 void imp__vertex_tangent(const struct imp_tracer *tracer, const struct imp_vertex *v,

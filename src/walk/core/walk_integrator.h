@@ -12,6 +12,18 @@ enum imp_stam_alpha { IMP_ALPHA_DETACHED, IMP_ALPHA_ATTACHED, IMP_ALPHA_PAPER };
 
 enum imp_transmittance { IMP_RATIO_TRACKING, IMP_RESIDUAL_TRACKING, IMP_DELTA_TRACKING };
 
+/* What ends a walk before max_depth. */
+enum imp_ending {
+    IMP_ENDS_BY_ROULETTE,   /* Russian roulette on the throughput, from rr_depth on */
+    IMP_ENDS_BY_ABSORPTION, /* of the material (stam.c): emission counts there alone */
+    IMP_ENDS_BY_ALBEDO /* survival min(1, H h) at every vertex, with H the directional
+                               albedo or, of a kind that has none, the weight of the
+                               direction drawn (photons) */
+};
+
+/* Do media scatter, so that surfaces of type null are no vertices? */
+enum imp_crossing { IMP_CROSSES_NOTHING, IMP_CROSSES_WHAT_IS_THERE, IMP_CROSSES_MEDIA };
+
 /* What walks are made by. */
 struct imp_walk_integrator {
     int max_depth; /* segments; -1: unlimited */
@@ -23,28 +35,37 @@ struct imp_walk_integrator {
     bool only_points; /* of lights, those that no direction meets: the others are met */
     bool directions;  /* walks go on behind the first vertex; false: lights alone */
     bool guided;      /* a guide's densities are made for these walks */
-    bool media;       /* media scatter, and surfaces of type null are no vertices */
+    enum imp_crossing media;
     enum imp_transmittance transmittance; /* on the way to light samples (tracking.h) */
-    bool absorbs;   /* emission counts where the walk is absorbed only (stam.c), which
-                        takes the place of Russian roulette */
+    enum imp_ending ends_by;
+    double h;       /* of IMP_ENDS_BY_ALBEDO */
     bool first_hit; /* alpha is 1 where the first ray meets a surface, and hide_emitters
                         hides lights from that ray alone (docs/scene-format.md 11) */
     enum imp_stam_alpha alpha_gradient;
-    bool photons; /* survival min(1, H h) at every vertex, with H the directional albedo
-                     or, of a kind that does not know it, the weight of the direction
-                     drawn: in place of Russian roulette */
-    double h;
     /* Densities of directions (direction.c). */
     struct imp_mixing *mixing; /* weights */
-    bool mixes;                /* some vertex may draw from more than its kernel */
-    int split;                 /* so many vertices of a walk draw from each density */
-    bool from_lights;          /* walks begin at the lights (light_walk.h) */
-    bool both; /* ... and as many at the sensor, joined with them (both.h) */
+    const struct imp_mixing
+        *mixes;       /* the same, where some vertex may draw from more than its
+                                       kernel; else NULL */
+    int split;        /* so many vertices of a walk draw from each density */
+    bool from_lights; /* walks begin at the lights (light_walk.h) */
+    bool both;        /* ... and as many at the sensor, joined with them (both.h) */
     struct imp_walk_integrator *other_end; /* the same numbers from the other end; NULL:
                                               there is none */
 };
 
-extern const struct imp_integrator_ops imp__integrator_path, imp__integrator_direct,
+/* A kind: its table, and what its name stands for (walk_kinds.c). */
+struct imp_walk_kind {
+    struct imp_integrator_ops ops;    /* first */
+    struct imp_walk_integrator start; /* before anything is read */
+    const char *read_as; /* the kind whose picture it makes; NULL: it is none of Mitsuba's
+                            other estimators */
+    int depth;           /* default of max_depth */
+    bool unconnected;    /* no vertex is connected to a light; walks from lights are */
+    /* Properties without effect here. */
+    bool reads_spectral_mis, reads_edges, reads_depths;
+};
+extern const struct imp_walk_kind imp__integrator_path, imp__integrator_direct,
     imp__integrator_stam, imp__integrator_photons, imp__integrator_volpath,
     imp__integrator_volpathmis, imp__integrator_prbvolpath, imp__integrator_prb,
     imp__integrator_prb_basic, imp__integrator_prb_projective,

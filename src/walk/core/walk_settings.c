@@ -71,7 +71,7 @@ enum imp_status imp__mixture_settle(struct imp_scene *scene,
         weight[IMP_DENSITY_KERNEL] = 1;
         weight[IMP_DENSITY_GUIDE] = -1;
         weight[IMP_DENSITY_PROXIES] = imp__mixing_possible(scene, IMP_DENSITY_PROXIES);
-        if (w->photons) {
+        if (w->ends_by == IMP_ENDS_BY_ALBEDO) { /* no connection helps them */
             weight[IMP_DENSITY_EMITTERS] =
                 imp__mixing_possible(scene, IMP_DENSITY_EMITTERS);
             weight[IMP_DENSITY_ENVIRONMENT] = varied;
@@ -79,7 +79,8 @@ enum imp_status imp__mixture_settle(struct imp_scene *scene,
     }
     imp__light_choice_ready(scene, w);
     const enum imp_status st = imp__mixing_settle(scene, w->mixing);
-    w->mixes = scene->materials_mix || imp__mixing_mixes(w->mixing);
+    const bool mixes = scene->materials_mix || imp__mixing_mixes(w->mixing);
+    w->mixes = mixes ? w->mixing : NULL;
     if (st == IMP_OK && w->split > 0 &&
         (scene->n_bodies > 0 || (w->media && (scene->n_media > 0 || scene->priorities))))
         return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
@@ -97,6 +98,7 @@ enum imp_status imp__other_end_make(const struct imp_build *build,
         return imp__error(build->ctx, IMP_E_NOMEM, "no memory for the integrator");
     *other = *w;
     other->from_lights = !w->from_lights;
+    if (other->from_lights && w->media) other->media = IMP_CROSSES_WHAT_IS_THERE;
     other->guided = false;
     other->mixing = NULL;
     other->split = 0;

@@ -44,11 +44,11 @@ static void level_end(struct reducing *g)
 {
     struct level *l = &g->level;
     if (!is_zero(g->r, l->constant))
-        imp__reduced_term(g->r, IMP_OP_CONSTANT, 0, l->constant, NULL, 0);
+        imp__reduced_term(g->r, IMP_OP_CONSTANT, 0, l->constant, NULL, NULL, 0);
     for (int k = 0; k < l->n; k++)
         if (!is_zero(g->r, l->input[k].c))
             imp__reduced_term(g->r, IMP_OP_INPUT, l->input[k].slot, l->input[k].c, NULL,
-                              0);
+                              NULL, 0);
     l->constant = (imp_spec){0};
     l->n = 0;
 }
@@ -96,7 +96,7 @@ static int single(const struct imp_reduction *of, const uint8_t *free, int n,
 /* c times the radiance of an emitter. `lit`: of the material at hand towards it, so that it
  * is no part of the level. */
 static void radiance_add(struct reducing *g, int index, const struct leaving *at,
-                         imp_spec c, const struct imp_reduced_on *lit)
+                         imp_spec c, const float lit[3])
 {
     const struct imp_reduction *of = g->r->of;
     const struct imp_emitter *e = g->scene->emitters[index];
@@ -119,16 +119,12 @@ static void radiance_add(struct reducing *g, int index, const struct leaving *at
         else if (!several) return;
     }
     if (is_zero(g->r, c)) return;
-    if (lit) {
-        imp__reduced_op(g->r, IMP_OP_LIT, false, 0);
-        imp__reduced_words(g->r, lit->wi, sizeof lit->wi);
-    }
     if (!several && j < 0) {
-        if (lit) imp__reduced_term(g->r, IMP_OP_CONSTANT, 0, c, NULL, 0);
+        if (lit) imp__reduced_term(g->r, IMP_OP_CONSTANT, 0, c, lit, NULL, 0);
         else g->level.constant += c;
     } else if (!several) {
         const int slot = of->emitter_slot[index] + j;
-        if (lit) imp__reduced_term(g->r, IMP_OP_INPUT, slot, c, NULL, 0);
+        if (lit) imp__reduced_term(g->r, IMP_OP_INPUT, slot, c, lit, NULL, 0);
         else input_add(g, slot, c);
     } else {
         const struct imp_emission *x = &at->x;
@@ -138,7 +134,7 @@ static void radiance_add(struct reducing *g, int index, const struct leaving *at
             (float)x->cos_light,
             {(float)x->d[0], (float)x->d[1], (float)x->d[2]},
             {(float)at->p[0], (float)at->p[1], (float)at->p[2]}};
-        imp__reduced_term(g->r, IMP_OP_EMITTER, index, c, &data, sizeof data);
+        imp__reduced_term(g->r, IMP_OP_EMITTER, index, c, lit, &data, sizeof data);
     }
 }
 
@@ -205,22 +201,18 @@ static void material_add(struct reducing *g, const struct vertex *v)
     const bool lit = d->connection == IMP_CONNECTED;
     if (!d->glows && !lit && !d->goes_on) return;
     memcpy(m.wo, d->wo, sizeof m.wo);
-    imp__reduced_op(g->r, IMP_OP_MATERIAL, false, v->bsdf->index);
+    imp__reduced_op(g->r, IMP_OP_MATERIAL, v->bsdf->index);
     imp__reduced_words(g->r, &m, sizeof m);
     if (d->glows)
         imp__reduced_term(g->r, IMP_OP_GLOW, 0, g->M * imp__spec((double)d->glow_weight),
-                          NULL, 0);
-    if (lit) {
-        struct imp_reduced_on to = {.lobe = IMP_SMOOTH};
-        memcpy(to.wi, d->light.wi, sizeof to.wi);
-        radiance_add(g, d->light.emitter, &v->light, g->M * v->light_w, &to);
-    }
+                          NULL, NULL, 0);
+    if (lit) radiance_add(g, d->light.emitter, &v->light, g->M * v->light_w, d->light.wi);
     g->M *= v->step;
     if (!d->goes_on) return;
     struct imp_reduced_on on = {.lobe = d->lobe};
     memcpy(on.wi, d->wi, sizeof on.wi);
     level_end(g);
-    imp__reduced_op(g->r, IMP_OP_ON, false, 0);
+    imp__reduced_op(g->r, IMP_OP_ON, 0);
     imp__reduced_words(g->r, &on, sizeof on);
 }
 
@@ -245,17 +237,17 @@ static void factor_add(struct reducing *g, const struct vertex *v, int slot)
         imp__inputs_eval(&input, 1, &v->at, &value);
         g->M *= value;
     } else if (input->plain) {
-        imp__reduced_op(g->r, IMP_OP_FACTOR, false, slot);
+        imp__reduced_op(g->r, IMP_OP_FACTOR, slot);
     } else if (of->texels[slot] && !input->scalar && !v->at.shape->by_triangle &&
                imp__bitmap_cell(input->texture, &v->at, &cell)) {
         for (int k = 0; k < 4; k++) texels.element[k] = cell.element[k < cell.n ? k : 0];
         texels.a = cell.a;
         texels.b = cell.b;
-        imp__reduced_op(g->r, IMP_OP_TEXELS, false, slot);
+        imp__reduced_op(g->r, IMP_OP_TEXELS, slot);
         imp__reduced_words(g->r, &texels, sizeof texels);
     } else {
         const struct imp_reduced_place at = place_of(v->d);
-        imp__reduced_op(g->r, IMP_OP_LOOKUP, false, slot);
+        imp__reduced_op(g->r, IMP_OP_LOOKUP, slot);
         imp__reduced_words(g->r, &at, sizeof at);
     }
 }
@@ -354,7 +346,7 @@ static void end_trim(struct imp_reduced *r, size_t first)
 {
     while (r->n_ops > first) {
         const struct imp_op *last = &r->ops[r->n_ops - 1];
-        if (last->kind < IMP_OP_FACTOR) return;
+        if (imp__op_is_term((enum imp_op_kind)last->kind)) return;
         r->n_words -= imp__op_words(*last);
         r->n_ops--;
     }

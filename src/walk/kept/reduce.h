@@ -6,12 +6,12 @@
 
 #include "reduced.h"
 
-struct imp_op *imp__reduced_op(struct imp_reduced *r, enum imp_op_kind kind,
-                               bool coloured, int index);
+void imp__reduced_op(struct imp_reduced *r, enum imp_op_kind kind, int index);
 void imp__reduced_words(struct imp_reduced *r, const void *data, size_t bytes);
-/* A term with its number; `data`: what stands before that. */
+/* A term with its number c; lit: the direction of the light, NULL: none. `data`: between these.
+ */
 void imp__reduced_term(struct imp_reduced *r, enum imp_op_kind kind, int index,
-                       imp_spec c, const void *data, size_t bytes);
+                       imp_spec c, const float lit[3], const void *data, size_t bytes);
 /* An array of what it holds alone; one that cannot be made stays as it is. */
 void *imp__reduced_trimmed(imp_context *ctx, void *array, size_t n, size_t size);
 

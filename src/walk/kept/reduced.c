@@ -4,19 +4,22 @@
 #include "reduce.h"
 #include <string.h>
 
-struct imp_op *imp__reduced_op(struct imp_reduced *r, enum imp_op_kind kind,
-                               bool coloured, int index)
+static void op_add(struct imp_reduced *r, struct imp_op op, int index)
 {
     struct imp_op *grown =
         imp__grow(r->of->ctx, r->ops, &r->cap_ops, r->n_ops + 1, sizeof *grown);
     if (grown) r->ops = grown; /* even if it is of no use: the old one is gone */
-    if (!grown || r->n_ops >= INT32_MAX || index >= 1 << 27) {
+    if (!grown || r->n_ops >= INT32_MAX || index >= IMP_OP_INDICES) {
         r->failed = true;
-        return NULL;
+        return;
     }
-    grown[r->n_ops] =
-        (struct imp_op){(uint32_t)kind & 15, coloured, (uint32_t)index & 0x7ffffff};
-    return &grown[r->n_ops++];
+    op.index = (uint32_t)index & (IMP_OP_INDICES - 1);
+    grown[r->n_ops++] = op;
+}
+
+void imp__reduced_op(struct imp_reduced *r, enum imp_op_kind kind, int index)
+{
+    op_add(r, (struct imp_op){.kind = (uint32_t)kind & 15}, index);
 }
 
 void imp__reduced_words(struct imp_reduced *r, const void *data, size_t bytes)
@@ -34,11 +37,12 @@ void imp__reduced_words(struct imp_reduced *r, const void *data, size_t bytes)
 }
 
 void imp__reduced_term(struct imp_reduced *r, enum imp_op_kind kind, int index,
-                       imp_spec c, const void *data, size_t bytes)
+                       imp_spec c, const float lit[3], const void *data, size_t bytes)
 {
     bool coloured = false;
     for (int k = 1; k < r->of->channels; k++) coloured |= c[k] != c[0];
-    imp__reduced_op(r, kind, coloured, index);
+    op_add(r, (struct imp_op){(uint32_t)kind & 15, coloured, lit != NULL, 0}, index);
+    if (lit) imp__reduced_words(r, lit, 3 * sizeof *lit);
     if (bytes > 0) imp__reduced_words(r, data, bytes);
     const double number[3] = {c[0], c[1], c[2]};
     imp__reduced_words(r, number, coloured ? sizeof number : sizeof *number);

@@ -60,18 +60,23 @@ enum imp_op_kind {
     IMP_OP_EMITTER,  /* c times the radiance of an emitter */
     IMP_OP_GLOW,     /* c times what the material at hand emits */
     /* Factors of all that follows. */
-    IMP_OP_FACTOR, /* a number */
-    IMP_OP_TEXELS, /* up to four texels of an input that is a bitmap */
-    IMP_OP_LOOKUP, /* an input with another texture, at a place */
-    IMP_OP_ON,     /* the material at hand, for the direction of the continuation */
-    /* The next term alone: the material at hand, towards a light. */
-    IMP_OP_LIT,
+    IMP_OP_FACTOR,  /* a number */
+    IMP_OP_TEXELS,  /* up to four texels of an input that is a bitmap */
+    IMP_OP_LOOKUP,  /* an input with another texture, at a place */
+    IMP_OP_ON,      /* the material at hand, for the direction of the continuation */
     IMP_OP_MATERIAL /* which is at hand from here on */
 };
+static inline bool imp__op_is_term(enum imp_op_kind kind) { return kind < IMP_OP_FACTOR; }
+
+/* lit: a term times the material at hand, towards a light. coloured: c has three numbers. */
 struct imp_op {
-    uint32_t kind : 4, coloured : 1, index : 27; /* coloured: c has three numbers */
+    uint32_t kind : 4, coloured : 1, lit : 1, index : 26;
 };
-enum { IMP_OP_NUMBER = sizeof(double) / sizeof(uint32_t) }; /* words of a number */
+#define IMP_OP_INDICES (1 << 26)
+enum {
+    IMP_OP_NUMBER = sizeof(double) / sizeof(uint32_t), /* words of a number */
+    IMP_OP_TOWARDS = 3                                 /* of a direction */
+};
 #define IMP_REDUCED_MOST 128 /* ops of a walk; one of more stays as it is */
 
 struct imp_reduced_place {
@@ -94,7 +99,7 @@ struct imp_reduced_on {
     int32_t lobe;
 };
 
-/* Words that belong to an op; of a term, c stands last. */
+/* Words that belong to an op; of a term, the direction of the light is first and c is last. */
 static inline size_t imp__op_words(struct imp_op op)
 {
     enum { WORD = sizeof(uint32_t) };
@@ -106,9 +111,9 @@ static inline size_t imp__op_words(struct imp_op op)
         [IMP_OP_TEXELS] = sizeof(struct imp_reduced_texels) / WORD,
         [IMP_OP_LOOKUP] = sizeof(struct imp_reduced_place) / WORD,
         [IMP_OP_ON] = sizeof(struct imp_reduced_on) / WORD,
-        [IMP_OP_LIT] = 3,
         [IMP_OP_MATERIAL] = sizeof(struct imp_reduced_material) / WORD};
-    return words[op.kind] + (op.coloured ? 2u * IMP_OP_NUMBER : 0);
+    return words[op.kind] + (op.coloured ? 2u * IMP_OP_NUMBER : 0) +
+           (op.lit ? IMP_OP_TOWARDS : 0);
 }
 
 /* Where a walk begins in the arrays; it ends where the next one does. */

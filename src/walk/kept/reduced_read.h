@@ -88,12 +88,38 @@ static inline struct imp_dirs imp__reduced_on_dirs(const struct imp_reduced_at_h
     memcpy(&on, words, sizeof on);
     return (struct imp_dirs){m->wo, imp__decided_v3(on.wi), on.lobe, false};
 }
+/* Towards the light of a term that is lit. */
 static inline struct imp_dirs imp__reduced_lit_dirs(const struct imp_reduced_at_hand *m,
                                                     const uint32_t *words)
 {
     float wi[3];
     memcpy(wi, words, sizeof wi);
     return (struct imp_dirs){m->wo, imp__decided_v3(wi), IMP_SMOOTH, false};
+}
+
+/* A term without the material at hand: c, times what it is a term of. kind: the op's, constant
+ * where this is called; words, end: the op's; m: the material at hand. */
+static inline __attribute__((always_inline)) imp_spec
+imp__reduced_term_value(const struct imp_reduction *all, enum imp_op_kind kind,
+                        struct imp_op op, const uint32_t *words, const uint32_t *end,
+                        const struct imp_reduced_at_hand *m)
+{
+    const imp_spec c = imp__reduced_number(op, end);
+    switch (kind) {
+    case IMP_OP_INPUT: return c * all->slot[op.index]->value;
+    case IMP_OP_EMITTER: {
+        imp_v3 p;
+        const struct imp_emission x =
+            imp__reduced_emission_of(words + (op.lit ? IMP_OP_TOWARDS : 0), &p);
+        return c * imp__emitter_radiance(all->scene, (int)op.index, &x, p, NULL);
+    }
+    case IMP_OP_GLOW: {
+        imp_spec glow;
+        m->bsdf->ops->emit(m->bsdf, m->in, &m->wo, &glow);
+        return c * glow;
+    }
+    default: return c;
+    }
 }
 
 #endif

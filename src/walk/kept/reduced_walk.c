@@ -59,8 +59,8 @@ material_take(const struct imp_scene *scene, struct imp_arena *arena, struct imp
     return m && m->in ? m : NULL;
 }
 
-/* The value of the material for directions; with an arena, derivatives will be asked for,
- * and where they tell the value they are made first. False: no memory. */
+/* The value of the material for directions; with an arena, derivatives will be wanted,
+ * and where they give the value they are made first. False: no memory. */
 static inline bool material_eval(const struct imp_reduction *all, struct imp_arena *arena,
                                  const struct imp_reduced_at_hand *m,
                                  const struct imp_dirs *dirs, imp_spec *f, imp_spec **d)
@@ -94,88 +94,71 @@ static inline bool seen_add(struct imp_arena *arena, struct imp_reduced_of *of, 
     return true;
 }
 
-/* `of` NULL: nothing will be swept. False: no memory. */
+/* The sum; of NULL: nothing will be swept. False: no memory. */
 static inline __attribute__((always_inline)) bool
 walk_sum(const struct imp_reduced *r, const struct imp_reduced_walk *begin,
          struct imp_arena *arena, struct imp_reduced_of *of, imp_spec *sum)
 {
     const struct imp_reduction *all = r->of;
     const struct imp_scene *scene = all->scene;
+    struct imp_arena *derivatives = of ? arena : NULL;
     const struct imp_op *op = r->ops + begin->op, *end = r->ops + begin[1].op;
     const uint32_t *words = r->words + begin->word;
-    imp_spec P = imp__spec(1), L = {0}, lit = {0};
-    bool is_lit = false;
-    imp_spec in[IMP_INPUTS_MAX];
+    imp_spec P = imp__spec(1), L = {0}, in[IMP_INPUTS_MAX];
     struct imp_reduced_at_hand own, *m = &own; /* set by the first material */
     size_t n = 0;
     own.in = in;
+#define TERM(kind)                                                                       \
+    term = imp__reduced_term_value(all, kind, o, at, words, m);                          \
+    break
     for (; op < end; op++) {
         const struct imp_op o = *op;
         const uint32_t *at = words;
-        imp_spec term;
+        imp_spec f, term, *d = NULL;
         words += imp__op_words(o);
         switch ((enum imp_op_kind)o.kind) {
         case IMP_OP_FACTOR: P *= all->slot[o.index]->value; continue;
-        case IMP_OP_INPUT:
-            term = imp__reduced_number(o, words) * all->slot[o.index]->value;
-            break;
-        case IMP_OP_CONSTANT: term = imp__reduced_number(o, words); break;
-        case IMP_OP_TEXELS: {
-            const imp_spec v = texels_value(all, o, at);
-            if (!seen_add(arena, of, &n, v, NULL, NULL)) return false;
-            P *= v;
+        case IMP_OP_TEXELS:
+            f = texels_value(all, o, at);
+            if (!seen_add(arena, of, &n, f, NULL, NULL)) return false;
+            P *= f;
             continue;
-        }
         case IMP_OP_LOOKUP: {
             const struct imp_texcoord place = imp__reduced_lookup_at(scene, at);
-            imp_spec v;
-            imp__inputs_eval(&all->slot[o.index], 1, &place, &v);
-            if (!seen_add(arena, of, &n, v, NULL, NULL)) return false;
-            P *= v;
+            imp__inputs_eval(&all->slot[o.index], 1, &place, &f);
+            if (!seen_add(arena, of, &n, f, NULL, NULL)) return false;
+            P *= f;
             continue;
-        }
-        case IMP_OP_EMITTER: {
-            imp_v3 p;
-            const struct imp_emission x = imp__reduced_emission_of(at, &p);
-            term = imp__reduced_number(o, words) *
-                   imp__emitter_radiance(scene, (int)o.index, &x, p, NULL);
-            break;
         }
         case IMP_OP_MATERIAL:
             m = of ? material_take(scene, arena, o) : &own;
             if (!m || !seen_add(arena, of, &n, imp__spec(0), m, NULL)) return false;
             material_look(scene, o, at, m);
             continue;
-        case IMP_OP_GLOW: {
-            imp_spec glow;
-            m->bsdf->ops->emit(m->bsdf, m->in, &m->wo, &glow);
-            term = imp__reduced_number(o, words) * glow;
-            break;
-        }
-        case IMP_OP_LIT: {
-            const struct imp_dirs dirs = imp__reduced_lit_dirs(m, at);
-            imp_spec *d = NULL;
-            if (!material_eval(all, of ? arena : NULL, m, &dirs, &lit, &d) ||
-                !seen_add(arena, of, &n, lit, m, d))
-                return false;
-            is_lit = true;
-            continue;
-        }
         case IMP_OP_ON: {
             const struct imp_dirs dirs = imp__reduced_on_dirs(m, at);
-            imp_spec f, *d = NULL;
-            if (!material_eval(all, of ? arena : NULL, m, &dirs, &f, &d) ||
+            if (!material_eval(all, derivatives, m, &dirs, &f, &d) ||
                 !seen_add(arena, of, &n, f, m, d))
                 return false;
             P *= f;
             continue;
         }
+        case IMP_OP_CONSTANT: TERM(IMP_OP_CONSTANT);
+        case IMP_OP_INPUT: TERM(IMP_OP_INPUT);
+        case IMP_OP_EMITTER: TERM(IMP_OP_EMITTER);
+        case IMP_OP_GLOW: TERM(IMP_OP_GLOW);
         default: continue;
         }
-        if (imp_unlikely(is_lit)) term *= lit;
-        is_lit = false;
+        if (imp_unlikely(o.lit)) {
+            const struct imp_dirs dirs = imp__reduced_lit_dirs(m, at);
+            if (!material_eval(all, derivatives, m, &dirs, &f, &d) ||
+                !seen_add(arena, of, &n, f, m, d))
+                return false;
+            term *= f;
+        }
         L += P * term;
     }
+#undef TERM
     *sum = L;
     return true;
 }

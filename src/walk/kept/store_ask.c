@@ -66,7 +66,7 @@ struct imp_asking imp__store_asking(const struct imp_store *s,
     if (most == 0 || d->flights) return a;
     a.every = n / most | 1;
     /* A step that roulette rarely let survive may count many times as much now. */
-    const bool rolls = s->roulette && !d->integrator->absorbs;
+    const bool rolls = s->roulette && d->integrator->ends_by != IMP_ENDS_BY_ABSORPTION;
     const uint64_t matters = d->matters | (rolls ? d->rolled : 0);
     for (int b = 0; b < 64; b++)
         if ((matters >> b & 1) && s->met[b] > 0 && s->met[b] / a.every < LEAST)

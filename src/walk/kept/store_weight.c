@@ -72,7 +72,7 @@ static double survival_now(const struct imp_densities *m, const struct looked *v
                            imp_spec factor, imp_spec beta, double eta, bool four)
 {
     double q;
-    if (m->integrator->photons) {
+    if (m->integrator->ends_by == IMP_ENDS_BY_ALBEDO) {
         imp_spec H;
         if (!v->bsdf->ops->directional_albedo ||
             !v->bsdf->ops->directional_albedo(v->bsdf, v->in, &v->dirs.wo, &H))
@@ -289,7 +289,8 @@ enum imp_status imp__store_moments(const struct imp_store *s,
     const int x0 = (int)(tile % (size_t)s->across) * IMP_STORE_SIDE - s->margin;
     const int y0 = (int)(tile / (size_t)s->across) * IMP_STORE_SIDE - s->margin;
     const int side = imp_min(IMP_STORE_SIDE, s->width + s->margin - x0);
-    const bool rolls = s->roulette && d->weights && !d->integrator->absorbs;
+    const bool rolls =
+        s->roulette && d->weights && d->integrator->ends_by != IMP_ENDS_BY_ABSORPTION;
     const bool tracks = (rolls && !d->guided) || d->flights || tracer->wavelengths;
     double of, of_next, of_after;
     size_t next = imp__store_next(s, asking, tile, 0, &of_next);

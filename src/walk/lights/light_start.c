@@ -30,98 +30,11 @@ static bool flight_begin(struct imp_step *s, const struct imp_medium *around, im
     return imp_likely(s->scene->priorities == NULL) || imp__nest_begin(s, around, o, d);
 }
 
-/* The light itself, seen by the sensor. per: the density of the point, with the choice of
- * the light; of the sky that of the direction. */
-static void light_itself_connect(struct imp_light_step *w, struct imp_vertex *v,
-                                 int light, const struct imp_emission_sample *start,
-                                 imp_v3 n, double per)
+/* Has light that is 0 a derivative? */
+static bool derives(const struct imp_step *s, int light)
 {
-    struct imp_step *s = &w->s;
-    const struct imp_emitter *e = s->scene->emitters[light];
-    const struct imp_sensor *sensor = s->tracer->sensor;
-    const struct imp_walk_integrator *i = s->tracer->integrator;
-    const bool far = is_far(e);
-    const bool point = e->ops->flags & IMP_EMITTER_DELTA;
-    if (w->both && sensor->shape) return; /* which has it as its light sample */
-    if (!i->lights || i->hide_emitters || !imp__light_depth_allows(s, 1) ||
-        !sensor->ops->connect || (point && !sensor->shape))
-        return;
-    struct imp_sensor_sample to;
-    double u[4], c = 1;
-    const imp_v3 ref = far ? -start->d : start->p;
-    imp__light_sensor_numbers(s, u);
-    if (!sensor->ops->connect(sensor, &ref, far, u, &to) ||
-        !imp__light_on_film(sensor, &to))
-        return;
-    const imp_v3 d = far ? start->d : to.wo;
-    const bool surface = !far && imp__dot(start->ng, start->ng) > 0;
-    if (surface) c = fabs(imp__dot(start->ng, d));
-    struct imp_emission x =
-        emission_of(start, far ? INFINITY : 1, surface ? imp__dot(n, d) : 1, d);
-    imp_v3 p = s->at.p;
-    struct imp_light_sample beam; /* parallel light from a surface: its point before the
-                                     sensor's */
-    const bool in_beam = far && e->shape;
-    if (in_beam) {
-        beam.located.prim = -1;
-        if (!e->ops->sample(e, &to.p, u, &beam)) return;
-        p = imp__decide(beam.p);
-        for (int k = 0; k < 2; k++) x.uv[k] = imp__decide1(beam.uv[k]);
-    }
-    double pdf = far ? 0 : e->ops->pdf_emission(e, &x);
-    if (!far && !(pdf > 0)) return; /* this way nothing is emitted */
-    if (imp_unlikely(s->guided.guide && s->guided.guide->emit) && surface)
-        pdf *= imp__guided_emit_pdf(s, light, w->point, n, d);
-    const double mis =
-        w->both ? imp__both_light_weight(w, light, start, &x, &to)
-                : imp__light_connect_weight(s, &to, pdf, far ? start->pdf_p : 0);
-    const double weight =
-        imp__decide1(imp__emitter_timed(e, s->walk->time, to.weight * c) * mis / per);
-    const imp_spec le = imp__emitter_radiance(s->scene, light, &x, p, s->at.carried);
     const struct imp_active *active = s->tracer->active;
-    if (!(weight > 0) ||
-        (imp__is_zero_used(le, s->at.carried) && !(active && active->emitter[light])))
-        return;
-    struct imp_shadow shadow;
-    struct imp_surface from = {.p = start->p, .ng = start->ng};
-    if (far) { /* from the sensor to the sky */
-        from = (struct imp_surface){.p = to.p, .ng = to.ng};
-        shadow = (struct imp_shadow){.o = sensor->shape ? imp__offset(to.p, to.ng, -to.wo)
-                                                        : to.p,
-                                     .d = -to.wo,
-                                     .reach = INFINITY,
-                                     .wanted = true};
-        if (in_beam) {
-            shadow.d = beam.p - shadow.o;
-            shadow.reach = 1 - 10 * IMP_RAY_EPSILON;
-        }
-    } else {
-        imp__light_shadow_aim(&from, &to, &shadow);
-    }
-    if (s->recorded) {
-        struct imp_light *l = &v->d.light;
-        l->emitter = light;
-        l->uv[0] = (imp_decided)x.uv[0];
-        l->uv[1] = (imp_decided)x.uv[1];
-        l->dist = (imp_decided)x.dist;
-        l->cos_light = (imp_decided)x.cos_light;
-        imp__store_v3(l->d, x.d);
-        imp__store_v3(l->p, p);
-        imp__store_v3(l->wi, (imp_v3){0});
-        l->located =
-            imp__located_drawn(e->shape, in_beam ? &beam.located : &start->located,
-                               in_beam ? beam.uv : start->uv);
-    }
-    const struct imp_link link = {
-        .shadow = shadow, .sensor = to, .f = imp__spec(1), .le = le, .weight = weight};
-    if (!far) {
-        imp__light_link_see(s, v, &from, &link);
-        return;
-    }
-    const struct imp_flight of_light = s->flight;
-    if (flight_begin(s, sensor->medium, shadow.o, shadow.d))
-        imp__light_link_see(s, v, &from, &link);
-    s->flight = of_light;
+    return active && active->emitter[light];
 }
 
 /* The medium that light enters from a point of its light. */
@@ -138,106 +51,276 @@ static const struct imp_medium *medium_at(const struct imp_step *s,
                               endless ? NULL : s->tracer->sensor->medium);
 }
 
-bool imp__light_start(struct imp_light_step *w)
+/* What is sent: drawn from all lights. */
+struct sent {
+    int light;
+    const struct imp_emitter *e;
+    struct imp_emission_sample start;
+    double pmf; /* of the light */
+    double per; /* density of the point, the direction and the light */
+    bool far, surface;
+    imp_v3 n; /* shading normal of a surface */
+};
+
+/* ---- The light itself, seen by the sensor ------------------------------------------ */
+
+/* How the sensor sees the point that was drawn; of the sky, its direction. */
+struct itself {
+    struct imp_sensor_sample to;
+    imp_v3 d;              /* of the light that it sees */
+    struct imp_emission x; /* that light */
+    imp_v3 p;              /* point of the light, as it is kept */
+    double cos;            /* at the light */
+    bool in_beam; /* parallel light from a surface: its point before the sensor's */
+    struct imp_light_sample beam;
+};
+
+static bool itself_counts(struct imp_light_step *w, const struct sent *l)
+{
+    const struct imp_step *s = &w->s;
+    const struct imp_sensor *sensor = s->tracer->sensor;
+    const struct imp_walk_integrator *i = s->tracer->integrator;
+    const bool point = l->e->ops->flags & IMP_EMITTER_DELTA;
+    if (w->both && sensor->shape) return false; /* which has it as its light sample */
+    return i->lights && !i->hide_emitters && imp__light_depth_allows(s, 1) &&
+           sensor->ops->connect && (!point || sensor->shape);
+}
+
+/* False: it is not on the film. */
+static bool itself_draw(const struct imp_step *s, const struct sent *l, struct itself *x)
+{
+    const struct imp_sensor *sensor = s->tracer->sensor;
+    const struct imp_emission_sample *start = &l->start;
+    const imp_v3 ref = l->far ? -start->d : start->p;
+    double u[4];
+    imp__light_sensor_numbers(s, u);
+    if (!sensor->ops->connect(sensor, &ref, l->far, u, &x->to) ||
+        !imp__light_on_film(sensor, &x->to))
+        return false;
+    const bool surface = !l->far && l->surface;
+    x->d = l->far ? start->d : x->to.wo;
+    x->cos = surface ? fabs(imp__dot(start->ng, x->d)) : 1;
+    x->x = emission_of(start, l->far ? INFINITY : 1, surface ? imp__dot(l->n, x->d) : 1,
+                       x->d);
+    x->p = s->at.p;
+    x->in_beam = l->far && l->e->shape;
+    if (!x->in_beam) return true;
+    x->beam.located.prim = -1;
+    if (!l->e->ops->sample(l->e, &x->to.p, u, &x->beam)) return false;
+    x->p = imp__decide(x->beam.p);
+    for (int k = 0; k < 2; k++) x->x.uv[k] = imp__decide1(x->beam.uv[k]);
+    return true;
+}
+
+/* MIS weight over the density of the point, with the choice of the light; of the sky that of
+ * the direction. 0: this way nothing is emitted. */
+static double itself_weigh(struct imp_light_step *w, const struct sent *l,
+                           const struct itself *x)
+{
+    const struct imp_step *s = &w->s;
+    const struct imp_emission_sample *start = &l->start;
+    const double per = l->pmf * (l->far ? start->pdf_d : start->pdf_p);
+    double pdf = l->far ? 0 : l->e->ops->pdf_emission(l->e, &x->x);
+    if (!l->far && !(pdf > 0)) return 0;
+    if (imp_unlikely(s->guided.guide && s->guided.guide->emit) && !l->far && l->surface)
+        pdf *= imp__guided_emit_pdf(s, l->light, w->point, l->n, x->d);
+    const double mis =
+        w->both ? imp__both_light_weight(w, l->light, start, &x->x, &x->to)
+                : imp__light_connect_weight(s, &x->to, pdf, l->far ? start->pdf_p : 0);
+    return imp__decide1(imp__emitter_timed(l->e, s->walk->time, x->to.weight * x->cos) *
+                        mis / per);
+}
+
+/* The shadow ray; from: where it begins, on the light, or for the sky on the sensor. */
+static void itself_aim(const struct imp_step *s, const struct sent *l,
+                       const struct itself *x, struct imp_surface *from,
+                       struct imp_shadow *shadow)
+{
+    const struct imp_sensor_sample *to = &x->to;
+    *from = (struct imp_surface){.p = l->start.p, .ng = l->start.ng};
+    if (!l->far) {
+        imp__light_shadow_aim(from, to, shadow);
+        return;
+    }
+    *from = (struct imp_surface){.p = to->p, .ng = to->ng};
+    *shadow = (struct imp_shadow){
+        .o = s->tracer->sensor->shape ? imp__offset(to->p, to->ng, -to->wo) : to->p,
+        .d = -to->wo,
+        .reach = INFINITY,
+        .wanted = true};
+    if (x->in_beam) {
+        shadow->d = x->beam.p - shadow->o;
+        shadow->reach = 1 - 10 * IMP_RAY_EPSILON;
+    }
+}
+
+static void itself_record(struct imp_vertex *v, const struct sent *sent,
+                          const struct itself *x)
+{
+    struct imp_light *l = &v->d.light;
+    l->emitter = sent->light;
+    l->uv[0] = (imp_decided)x->x.uv[0];
+    l->uv[1] = (imp_decided)x->x.uv[1];
+    l->dist = (imp_decided)x->x.dist;
+    l->cos_light = (imp_decided)x->x.cos_light;
+    imp__store_v3(l->d, x->x.d);
+    imp__store_v3(l->p, x->p);
+    imp__store_v3(l->wi, (imp_v3){0});
+    l->located = imp__located_drawn(sent->e->shape,
+                                    x->in_beam ? &x->beam.located : &sent->start.located,
+                                    x->in_beam ? x->beam.uv : sent->start.uv);
+}
+
+static void itself_connect(struct imp_light_step *w, struct imp_vertex *v,
+                           const struct sent *l)
+{
+    struct imp_step *s = &w->s;
+    struct itself x;
+    if (!itself_counts(w, l) || !itself_draw(s, l, &x)) return;
+    const double weight = itself_weigh(w, l, &x);
+    if (!(weight > 0)) return;
+    const imp_spec le =
+        imp__emitter_radiance(s->scene, l->light, &x.x, x.p, s->at.carried);
+    if (imp__is_zero_used(le, s->at.carried) && !derives(s, l->light)) return;
+
+    struct imp_link link = {
+        .sensor = x.to, .f = imp__spec(1), .le = le, .weight = weight};
+    struct imp_surface from;
+    itself_aim(s, l, &x, &from, &link.shadow);
+    if (s->recorded) itself_record(v, l, &x);
+    if (!l->far) {
+        imp__light_link_see(s, v, &from, &link);
+        return;
+    }
+    const struct imp_flight of_light = s->flight;
+    if (flight_begin(s, s->tracer->sensor->medium, link.shadow.o, link.shadow.d))
+        imp__light_link_see(s, v, &from, &link);
+    s->flight = of_light;
+}
+
+/* ---- The walk ---------------------------------------------------------------------- */
+
+/* Choose a light, and draw a point of it and a direction. False: nothing is sent. */
+static bool light_draw(struct imp_light_step *w, struct sent *l)
 {
     struct imp_step *s = &w->s;
     const struct imp_scene *scene = s->scene;
     const struct imp_key key = s->walk->key;
-    struct imp_emission_sample start;
-    double pmf;
-
-    /* Choose a light, and draw a point of it and a direction. */
+    struct imp_emission_sample *start = &l->start;
     if (scene->n_emitters == 0) return false;
     const struct imp_guide *guide =
         s->guided.guide && s->guided.guide->send ? s->guided.guide : NULL;
-    const int light = imp__light_pick_by(
+    l->light = imp__light_pick_by(
         scene, imp_unlikely(guide != NULL) ? guide->send : scene->light_cdf,
-        imp__u01(key, imp__dim_start(IMP_DIM_EMITTER)), &pmf);
-    const struct imp_emitter *e = scene->emitters[light];
+        imp__u01(key, imp__dim_start(IMP_DIM_EMITTER)), &l->pmf);
+    l->e = scene->emitters[l->light];
     double u[4] = {imp__u01(key, IMP_DIM_PIXEL_X), imp__u01(key, IMP_DIM_PIXEL_Y),
                    imp__u01(key, IMP_DIM_LENS_U), imp__u01(key, IMP_DIM_LENS_V)};
     double on_point = 1, on_direction = 1;
     if (imp_unlikely(guide != NULL))
-        on_direction = imp__guided_emit(s, light, u, &on_point);
-    if (!(pmf > 0) || !e->ops->sample_emission(e, &scene->ball, u, &start)) return false;
-    start.pdf_p *= on_point;
-    start.pdf_d *= on_direction;
+        on_direction = imp__guided_emit(s, l->light, u, &on_point);
+    if (!(l->pmf > 0) || !l->e->ops->sample_emission(l->e, &scene->ball, u, start))
+        return false;
+    start->pdf_p *= on_point;
+    start->pdf_d *= on_direction;
     w->point[0] = u[0];
     w->point[1] = u[1];
-    const bool far = is_far(e);
-    const double per = pmf * start.pdf_p * start.pdf_d;
-    if (!(per > 0)) return false;
-
-    /* Vertex 0 stands there, rounded as the record keeps it. */
-    struct imp_vertex *v = imp__vertex_add(s, 1);
-    if (!v) return false;
-    v->t = 0;
-    s->at.uv[0] = imp__decide1(start.uv[0]);
-    s->at.uv[1] = imp__decide1(start.uv[1]);
-    s->at.p = imp__decide(start.p);
-    const bool surface = imp__dot(start.ng, start.ng) > 0;
+    l->per = l->pmf * start->pdf_p * start->pdf_d;
+    l->far = is_far(l->e);
+    l->surface = imp__dot(start->ng, start->ng) > 0;
     /* The shading normal is not in the sample: a shape that is smooth gives it again. */
-    imp_v3 n = start.ng;
-    if (surface && e->shape->smooth) {
+    l->n = start->ng;
+    if (l->per > 0 && l->surface && l->e->shape->smooth) {
         struct imp_surface at;
-        e->shape->ops->sample_area(e->shape, u, &at);
-        n = at.n;
+        l->e->shape->ops->sample_area(l->e->shape, u, &at);
+        l->n = at.n;
     }
-    const struct imp_emission x =
-        emission_of(&start, far ? INFINITY : 1, start.cos_light, start.d);
-    const imp_v3 o = surface ? imp__offset(start.p, start.ng, start.d) : start.p;
-    if (!flight_begin(s, medium_at(s, e, &start), o, start.d)) return false;
-    if (s->recorded) {
-        v->ng = start.ng;
-        v->d.scatterer = IMP_AT_LIGHT;
-        v->d.from_light = true;
-        v->d.uv[0] = (imp_decided)s->at.uv[0];
-        v->d.uv[1] = (imp_decided)s->at.uv[1];
-        imp__store_v3(v->d.p, s->at.p);
-        v->d.located = imp__located_drawn(e->shape, &start.located, start.uv);
-        imp__store_v3(v->d.wo, (imp_v3){0});
-        imp__store_v3(v->d.wi, (imp_v3){0});
-        v->d.lobe = IMP_SMOOTH;
-        struct imp_met *m = &v->d.met;
-        m->emitter = light;
-        m->weight = 0;
-        m->dist = (imp_decided)x.dist;
-        m->cos_light = (imp_decided)x.cos_light;
-        imp__store_v3(m->d, x.d);
-    }
+    return l->per > 0;
+}
 
-    /* The sensor may see the point itself. */
-    light_itself_connect(w, v, light, &start, n, pmf * (far ? start.pdf_d : start.pdf_p));
-    if (s->walk->dropped || !s->tracer->integrator->directions) return false;
-    if (!imp__light_depth_allows(s, s->tracer->sensor->shape ? 1 : 2) ||
-        !(start.cos_p > 0))
-        return false;
+static void vertex_record(struct imp_vertex *v, const struct imp_step *s,
+                          const struct sent *l, const struct imp_emission *x)
+{
+    struct imp_met *m = &v->d.met;
+    v->ng = l->start.ng;
+    v->d.scatterer = IMP_AT_LIGHT;
+    v->d.from_light = true;
+    v->d.uv[0] = (imp_decided)s->at.uv[0];
+    v->d.uv[1] = (imp_decided)s->at.uv[1];
+    imp__store_v3(v->d.p, s->at.p);
+    v->d.located = imp__located_drawn(l->e->shape, &l->start.located, l->start.uv);
+    imp__store_v3(v->d.wo, (imp_v3){0});
+    imp__store_v3(v->d.wi, (imp_v3){0});
+    v->d.lobe = IMP_SMOOTH;
+    m->emitter = l->light;
+    m->weight = 0;
+    m->dist = (imp_decided)x->dist;
+    m->cos_light = (imp_decided)x->cos_light;
+    imp__store_v3(m->d, x->d);
+}
 
-    /* The weight of the ray: Le cos/p. */
-    const double shines = imp__emitter_timed(e, s->walk->time, 1);
+/* The weight of the ray: Le cos/p. False: it carries nothing. */
+static bool ray_weigh(struct imp_step *s, struct imp_vertex *v, const struct sent *l,
+                      const struct imp_emission *x)
+{
+    const double shines = imp__emitter_timed(l->e, s->walk->time, 1);
     if (!(shines > 0)) return false;
-    const double pdf = imp__decide1(per / (start.cos_p * shines));
-    const imp_spec le = imp__emitter_radiance(scene, light, &x, s->at.p, s->at.carried);
-    const struct imp_active *active = s->tracer->active;
-    if (imp__is_zero_used(le, s->at.carried) && !(active && active->emitter[light]))
-        return false;
+    const double pdf = imp__decide1(l->per / (l->start.cos_p * shines));
+    const imp_spec le =
+        imp__emitter_radiance(s->scene, l->light, x, s->at.p, s->at.carried);
+    if (imp__is_zero_used(le, s->at.carried) && !derives(s, l->light)) return false;
     imp__step_weigh(v, le, pdf, 1);
     if (s->recorded) {
         v->in[0] = le;
         v->d.pdf = (imp_decided)pdf;
         v->d.goes_on = true;
     }
+    return true;
+}
 
-    /* The ray in flight. */
-    s->d = start.d;
+static void ray_send(struct imp_light_step *w, const struct sent *l, imp_v3 o)
+{
+    struct imp_step *s = &w->s;
+    s->d = l->start.d;
     s->o = o;
-    s->from = start.p;
+    s->from = l->start.p;
     s->t_min = 0;
     s->t_max = INFINITY;
-    s->pdf = far ? 0 : start.pdf_d;
-    w->pdf_across = far ? start.pdf_p : 0;
+    s->pdf = l->far ? 0 : l->start.pdf_d;
+    w->pdf_across = l->far ? l->start.pdf_p : 0;
     s->depth = 1;
-    if (!w->both || imp__both_light_begins(w, light, &start)) return true;
+}
+
+bool imp__light_start(struct imp_light_step *w)
+{
+    struct imp_step *s = &w->s;
+    struct sent l;
+    const struct imp_emission_sample *start = &l.start;
+    if (!light_draw(w, &l)) return false;
+
+    /* Vertex 0 is there, rounded as the record keeps it. */
+    struct imp_vertex *v = imp__vertex_add(s, 1);
+    if (!v) return false;
+    v->t = 0;
+    s->at.uv[0] = imp__decide1(start->uv[0]);
+    s->at.uv[1] = imp__decide1(start->uv[1]);
+    s->at.p = imp__decide(start->p);
+    const struct imp_emission x =
+        emission_of(start, l.far ? INFINITY : 1, start->cos_light, start->d);
+    const imp_v3 o = l.surface ? imp__offset(start->p, start->ng, start->d) : start->p;
+    if (!flight_begin(s, medium_at(s, l.e, start), o, start->d)) return false;
+    if (s->recorded) vertex_record(v, s, &l, &x);
+
+    /* The sensor may see the point itself. */
+    itself_connect(w, v, &l);
+    if (s->walk->dropped || !s->tracer->integrator->directions) return false;
+    if (!imp__light_depth_allows(s, s->tracer->sensor->shape ? 1 : 2) ||
+        !(start->cos_p > 0))
+        return false;
+
+    if (!ray_weigh(s, v, &l, &x)) return false;
+    ray_send(w, &l, o);
+    if (!w->both || imp__both_light_begins(w, l.light, start)) return true;
     s->walk->dropped = IMP_DROP_MEMORY;
     return false;
 }

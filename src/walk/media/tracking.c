@@ -281,11 +281,40 @@ static bool arrived(struct imp_free_flight *w, struct imp_vertex *v, imp_spec *T
     return true;
 }
 
+/* A surface on the way to a light sample. */
+enum in_way {
+    IN_WAY_CLOSED,
+    IN_WAY_WRONG,    /* the ray is not in the medium that should be before it */
+    IN_WAY_LEFT,     /* the ray has left it already */
+    IN_WAY_HOLE,     /* passed as if it were not there, though media may change */
+    IN_WAY_STRAIGHT, /* it lets a part go straight on */
+};
+
+/* from: where the ray from o along d began, it may have left the surface already. at: set
+ * unless it is closed. */
+static enum in_way in_way(const struct imp_step *s, const struct imp_hit *hit, imp_v3 o,
+                          imp_v3 d, bool from, const struct imp_medium *m,
+                          struct imp_nest *nest, struct imp_surface *at)
+{
+    const struct imp_scene *scene = s->scene;
+    const struct imp_shape *shape = scene->shapes[hit->shape];
+    const bool straight = imp__shape_bsdf(scene, shape)->straight;
+    const bool ranks = shape->priority > 0;
+    bool hole = is_passed(scene, shape);
+    if (!hole && !ranks && !straight) return IN_WAY_CLOSED;
+    imp__hit_surface(scene, hit, &o, &d, at);
+    if (imp_unlikely(ranks)) {
+        const bool wrong = !consistent(s, shape, at->ng, d, nest, m);
+        if (wrong && from) return IN_WAY_LEFT;
+        if (wrong && !is_copy(shape, at->ng, d)) return IN_WAY_WRONG;
+        hole |= hidden(s, shape, at->ng, d, nest);
+    }
+    return hole ? IN_WAY_HOLE : straight ? IN_WAY_STRAIGHT : IN_WAY_CLOSED;
+}
+
 static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surface *from,
                  const struct imp_shadow *shadow, imp_spec *T)
 {
-    const struct imp_scene *scene = s->scene;
-    const double time = s->walk->time;
     const double length = imp__length(shadow->d);
     const imp_v3 d = shadow->d * (1 / length);
     const double back = imp__is_zero(from->ng) ? behind(from->p) : 0;
@@ -299,30 +328,27 @@ static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surf
     if (!side_take(s, v->shape, from->ng, d, &nest, &m)) return false;
     for (int passed = 0; passed <= IMP_WALK_MAX; passed++) {
         struct imp_hit hit;
-        const bool found = imp__intersect_at(scene, time, &o, &d, 0, end - base, &hit);
-        const struct imp_shape *shape = found ? scene->shapes[hit.shape] : NULL;
-        const bool ranks = found && shape->priority > 0;
         struct imp_surface at;
-        bool hole = found && is_passed(scene, shape), left = false;
-        if (found && !hole && !ranks && !imp__shape_bsdf(scene, shape)->straight)
-            return false;
-        if (found) imp__hit_surface(scene, &hit, &o, &d, &at);
-        if (imp_unlikely(ranks)) {
-            const bool wrong = !consistent(s, shape, at.ng, d, &nest, m);
-            left = wrong && hit.t <= 2 * back && !passed;
-            if (wrong && !left && !is_copy(shape, at.ng, d)) {
-                s->walk->dropped = IMP_DROP_MEDIUM;
-                return false;
-            }
-            hole |= left || hidden(s, shape, at.ng, d, &nest);
-            if (!hole && !imp__shape_bsdf(scene, shape)->straight) return false;
+        enum in_way surface = IN_WAY_HOLE;
+        const bool found =
+            imp__intersect_at(s->scene, s->walk->time, &o, &d, 0, end - base, &hit);
+        if (found) {
+            const bool at_start = !passed && hit.t <= 2 * back;
+            surface = in_way(s, &hit, o, d, at_start, m, &nest, &at);
         }
+        if (surface == IN_WAY_WRONG) s->walk->dropped = IMP_DROP_MEDIUM;
+        if (surface == IN_WAY_WRONG || surface == IN_WAY_CLOSED) return false;
+
+        /* The medium before it, and what is behind it. */
         if (m)
             imp__fly(&w, m, passed ? base : back, found ? base + hit.t : end, false, &t);
         if (s->walk->dropped) return false;
         if (!found) return arrived(&w, v, T);
-        if (!hole && !go_through(&w, shape, hit.prim, &at)) return false;
-        if (!left && !side_take(s, shape, at.ng, d, &nest, &m)) return false;
+        const struct imp_shape *shape = s->scene->shapes[hit.shape];
+        if (surface == IN_WAY_STRAIGHT && !go_through(&w, shape, hit.prim, &at))
+            return false;
+        if (surface != IN_WAY_LEFT && !side_take(s, shape, at.ng, d, &nest, &m))
+            return false;
         o = imp__offset(at.p, at.ng, d);
         base = imp__dot(o - start, d);
         if (!(base < end)) /* the last boundary lies within rounding of the light */

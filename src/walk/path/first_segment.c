@@ -6,13 +6,17 @@
 #include "walk/graded/graded.h"
 #include "walk/media/tracking.h"
 
-/* Adjoint photons cross media where there are some; else they are walks of surfaces alone,
- * as those of path. */
+/* Adjoint photons and walks from lights cross media where there are some; else they are walks
+ * of surfaces alone, as those of path. */
 static bool tracks(const struct imp_tracer *tracer)
 {
-    const struct imp_walk_integrator *i = tracer->integrator;
-    return i->media && (tracer->scene->n_media > 0 || tracer->scene->priorities ||
-                        !(i->photons || i->from_lights));
+    const bool any = tracer->scene->n_media > 0 || tracer->scene->priorities;
+    switch (tracer->integrator->media) {
+    case IMP_CROSSES_NOTHING: return false;
+    case IMP_CROSSES_WHAT_IS_THERE: return any;
+    case IMP_CROSSES_MEDIA: break;
+    }
+    return true;
 }
 
 const struct imp_segment_ops *imp__segment_first(const struct imp_tracer *tracer)

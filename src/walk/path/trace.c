@@ -95,7 +95,8 @@ static inline void densities(struct imp_step *s, const struct imp_vertex *v,
 static inline bool meet(struct imp_step *s, struct imp_vertex *v,
                         const struct imp_hit *hit, const struct imp_surface *at)
 {
-    const bool absorbs = s->tracer->integrator->absorbs, within = counts(s);
+    const bool absorbs = s->tracer->integrator->ends_by == IMP_ENDS_BY_ABSORPTION;
+    const bool within = counts(s);
     double emits = 1;
     const bool absorbed = absorbs && within && imp__absorb(s, v->bsdf, &emits);
     if (absorbs) s->walk->valid = true;

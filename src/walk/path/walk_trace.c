@@ -134,9 +134,7 @@ static inline void step_begin(const struct imp_tracer *tracer, struct imp_arena 
     s->guided.here = s->guided.left = false;
     s->guided.reference = 0;
     s->mixed.same = tracer->mixing != NULL;
-    s->mixed.all = tracer->mixing              ? tracer->mixing
-                   : tracer->integrator->mixes ? tracer->integrator->mixing
-                                               : NULL;
+    s->mixed.all = tracer->mixing ? tracer->mixing : tracer->integrator->mixes;
     s->mixed.here = s->mixed.splits = s->mixed.sphere = false;
     s->both = NULL;
 }

@@ -27,7 +27,7 @@
 OF_WALKS(LIGHT_TRACING, i->from_lights)
 OF_WALKS(BIDIRECTIONAL, i->both)
 OF_WALKS(LIGHT_PHOTONS, i->from_lights && !i->lights)
-OF_WALKS(ABSORPTION, i->absorbs)
+OF_WALKS(ABSORPTION, i->ends_by == IMP_ENDS_BY_ABSORPTION)
 OF_WALKS(ATTACHED, i->alpha_gradient == IMP_ALPHA_ATTACHED)
 OF_WALKS(MOVING_DIRECTIONS, i->alpha_gradient != IMP_ALPHA_DETACHED)
 OF_WALKS(LIGHTS_ALONE, !i->directions)

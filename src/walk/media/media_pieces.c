@@ -3,7 +3,7 @@
  * Derivatives of a walk through media with respect to coefficients of the media: at points
  * where they scatter, and along segments, from which a baseline of the arriving light is
  * subtracted (path/baseline.h). */
-#include "sweep_media.h"
+#include "media_pieces.h"
 #include "walk/core/vertex.h"
 
 /* What derivatives of flights that stand take from the light that arrives. */
@@ -66,50 +66,25 @@ static imp_spec to_light_value(const struct imp_vertex *v)
     return v->light_w * (1 / (double)v->d.light.weight);
 }
 
-void imp__media_scatter(const struct imp_tracer *tracer, const struct imp_vertex *v,
-                        imp_spec P, imp_spec own, struct imp_sink *sink)
+void imp__media_pieces(const struct imp_pieces_ops *ops, void *taker,
+                       const struct imp_tracer *tracer, const struct imp_vertex *v,
+                       const struct imp_adjoints *a)
 {
     if (v->to_light) {
         const imp_spec T = to_light_value(v);
-        imp__track_sweep(tracer, v->to_light, v->carried, &T, own * light_before(v),
-                         sink);
+        ops->track(taker, v->to_light, v->carried, &T, a->lit * light_before(v));
     }
     if (segment_counts(tracer, v))
-        imp__track_sweep(tracer, v->on, v->carried, NULL,
-                         P * weight_before(v) * (v->beyond - baseline(tracer)), sink);
+        ops->track(taker, v->on, v->carried, NULL,
+                   a->P * weight_before(v) * (v->beyond - baseline(tracer)));
     if (v->probe) {
         const struct imp_medium *m = v->probe->medium;
         imp_spec d[IMP_INPUTS_MAX];
         imp__probe_d(tracer, v, d);
         for (int j = 0; j < m->n_own; j++) {
-            d[j] *= P;
+            d[j] *= a->P;
             if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)
-                imp__inputs_scatter(&m->input[j], 1, &v->probe->at, &d[j], sink);
+                ops->input(taker, &m->input[j], &v->probe->at, &d[j]);
         }
     }
-}
-
-imp_spec imp__media_tangent(const struct imp_tracer *tracer, const struct imp_vertex *v,
-                            imp_spec own, imp_dot_fn *dot, const void *x_dot)
-{
-    imp_spec L_dot = {0};
-    if (v->to_light) {
-        const imp_spec T = to_light_value(v);
-        L_dot += own * light_before(v) *
-                 imp__track_tangent(tracer, v->to_light, v->carried, &T, dot, x_dot);
-    }
-    if (segment_counts(tracer, v))
-        L_dot += weight_before(v) * (v->beyond - baseline(tracer)) *
-                 imp__track_tangent(tracer, v->on, v->carried, NULL, dot, x_dot);
-    if (v->probe) {
-        const struct imp_medium *m = v->probe->medium;
-        imp_spec d[IMP_INPUTS_MAX], in_dot;
-        imp__probe_d(tracer, v, d);
-        for (int j = 0; j < m->n_own; j++) {
-            if (!(m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)) continue;
-            imp__inputs_tangent(&m->input[j], 1, &v->probe->at, dot, x_dot, &in_dot);
-            L_dot += d[j] * in_dot;
-        }
-    }
-    return L_dot;
 }
