@@ -50,8 +50,6 @@ static const struct {
     {"stam_m2", {"variant=paper", "sampling=phong"}},
 };
 
-#define KINDS_MAX_INPUTS 24
-
 struct kind_case {
     char label[128];
     const char *kind;
@@ -124,6 +122,9 @@ static bool kind_make(struct kind_factory *f, const struct imp_bsdf_ops *ops,
                              .index = 0,
                              .name = ops->name};
     while (ops->inputs[out->n_own].name) out->n_own++;
+    out->n_in = out->n_own;
+    for (int k = 0; k < n_child; k++) out->n_in += child[k].n_in;
+    if (out->n_in > IMP_INPUTS_MAX) return false; /* callers keep as many */
     out->n_in = out->n_own;
     out->input = input;
     for (int j = 0; j < out->n_own; j++) {

@@ -3,11 +3,13 @@
  * Grid of bounds and control extinctions over a medium's box, filled again where parameters
  * change; a ray's entry into it. */
 #include "majorants.h"
+#include "base/arguments.h"
 
 #define CELLS_MAX 64 /* along an axis */
 
-/* The extinction of the largest inputs in the world's box of a cell. An extinction does
- * not fall where an input rises (IMP_INPUT_EXTINCTION). */
+/* The extinction of the largest inputs in the world's box of a cell: it does not fall where
+ * an input rises (IMP_INPUT_EXTINCTION). Where it does (IMP_INPUT_FALLS), the input is one
+ * value, which is the largest and the smallest. */
 static double cell_bound(const struct imp_majorants *g, const int cell[3])
 {
     const struct imp_medium *m = g->medium;
@@ -23,7 +25,8 @@ static double cell_bound(const struct imp_majorants *g, const int cell[3])
     const struct imp_texcoord at = {.p = (lo + hi) * 0.5};
     imp__inputs_eval(m->input, m->n_own, &at, in);
     for (int j = 0; j < m->n_own; j++)
-        if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)
+        if ((m->ops->inputs[j].flags & (IMP_INPUT_EXTINCTION | IMP_INPUT_FALLS)) ==
+            IMP_INPUT_EXTINCTION)
             imp__input_most(m->input[j], &lo, &hi, &in[j]);
     m->ops->eval(m, in, &c);
     double most = 0;
@@ -83,6 +86,29 @@ static void fill(void *payload)
             }
 }
 
+/* Inputs by which the extinction falls: a texture has no known lower bound, nor has a
+ * spectrum. */
+static enum imp_status falling_check(struct imp_scene *scene, const struct imp_node *node,
+                                     const struct imp_medium *m, bool varies)
+{
+    for (int j = 0; j < m->n_own; j++) {
+        const struct imp_input *in = m->input[j];
+        if (!(m->ops->inputs[j].flags & IMP_INPUT_FALLS)) continue;
+        if (in->texture)
+            return imp__node_error(
+                scene->ctx, node, IMP_E_UNSUPPORTED,
+                "'%s': the extinction falls where it rises, and a "
+                "texture has no known lower bound: it must be constant",
+                m->ops->inputs[j].name);
+        if (varies && in->spectrum && in->spectrum->form != IMP_SPECTRUM_NUMBER)
+            return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
+                                   "'%s': the extinction varies in space and falls where "
+                                   "it rises: it must be one number, not a spectrum",
+                                   m->ops->inputs[j].name);
+    }
+    return IMP_OK;
+}
+
 enum imp_status imp__majorants_create(struct imp_scene *scene,
                                       const struct imp_node *node, struct imp_medium *m)
 {
@@ -101,6 +127,7 @@ enum imp_status imp__majorants_create(struct imp_scene *scene,
                                    "extinction",
                                    m->ops->inputs[j].name, t->ops->name);
     }
+    IMP_CHECKED(falling_check(scene, node, m, varies || m->ops->boxed));
     if (!varies && !m->ops->boxed) return IMP_OK;
     if (!box && !m->ops->boxed)
         return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,

@@ -43,7 +43,7 @@ static double point_error(const struct imp_bsdf *b, imp_spec *in,
 static struct tally check_case(const struct imp_bsdf *b, enum kind_set set)
 {
     struct tally t = {0};
-    imp_spec in[KINDS_MAX_INPUTS], df[KINDS_MAX_INPUTS];
+    imp_spec in[IMP_INPUTS_MAX], df[IMP_INPUTS_MAX];
     for (int i = 0; i < TRIALS; i++) {
         kind_inputs(b, set, 1000 + (uint64_t)i, in);
         struct imp_dirs d = {kind_direction(i, 5), {0}, IMP_SMOOTH, ~UINT64_C(0)};
@@ -112,7 +112,7 @@ static void visit_attached(const struct kind_case *c, void *payload)
 {
     const struct imp_bsdf *b = &c->bsdf;
     int *offered = payload;
-    imp_spec in[KINDS_MAX_INPUTS];
+    imp_spec in[IMP_INPUTS_MAX];
     double worst = 0;
     int n = 0;
     if (!b->ops->sample_d) return;

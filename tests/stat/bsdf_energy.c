@@ -56,7 +56,7 @@ static void albedo_visit(const struct kind_case *c, void *payload)
     struct tap_stat z = {0};
     (void)payload;
     for (int i = 0; i < 8; i++) {
-        imp_spec in[KINDS_MAX_INPUTS];
+        imp_spec in[IMP_INPUTS_MAX];
         kind_inputs(b, KIND_RANDOM, 70 + (uint64_t)i, in);
         struct imp_dirs d = {kind_direction(i, 31), {0}, IMP_SMOOTH, false};
         const imp_v3 wo = d.wo;
@@ -130,7 +130,7 @@ static void principled_visit(const struct kind_case *c, void *payload)
     const bool thin = strcmp(c->kind, "principledthin") == 0;
     const bool glass = b->flags & IMP_BSDF_TRANSMIT;
     for (int i = 0; i < 16; i++) {
-        imp_spec in[KINDS_MAX_INPUTS];
+        imp_spec in[IMP_INPUTS_MAX];
         const bool metal = !glass || (i % 2 == 0 && !thin);
         kind_inputs(b, KIND_RANDOM, 170 + (uint64_t)i, in);
         for (int j = 0; j < b->n_in; j++) {
@@ -167,7 +167,7 @@ static void reciprocity_visit(const struct kind_case *c, void *payload)
     /* Light that comes through two-sided glass has seen another material. */
     if (strcmp(c->kind, "twosided") == 0 && b->flags & IMP_BSDF_TRANSMIT) return;
     for (int i = 0; i < 400; i++) {
-        imp_spec in[KINDS_MAX_INPUTS], f, g;
+        imp_spec in[IMP_INPUTS_MAX], f, g;
         kind_inputs(b, KIND_RANDOM, 70 + (uint64_t)i, in);
         const imp_v3 wo = kind_direction(i, 31);
         imp_v3 wi = kind_direction(i, 32);

@@ -2,6 +2,7 @@
  *
  * Vertex 0 of a walk from a light: which light sends it, from where, and whither. The
  * point itself may be seen by the sensor, too. */
+#include "kind/cleared.h"
 #include "scene/media_around.h"
 #include "walk/both/both.h"
 
@@ -49,7 +50,7 @@ static void light_itself_connect(struct imp_light_step *w, struct imp_vertex *v,
     double u[4], c = 1;
     const imp_v3 ref = far ? -start->d : start->p;
     imp__light_sensor_numbers(s, u);
-    if (!sensor->ops->connect(sensor, &ref, far, u, &to) ||
+    if (!imp__sensor_connect(sensor, &ref, far, u, &to) ||
         !imp__light_on_film(sensor, &to))
         return;
     const imp_v3 d = far ? start->d : to.wo;
@@ -154,7 +155,7 @@ bool imp__light_start(struct imp_light_step *w)
     double on_point = 1, on_direction = 1;
     if (imp_unlikely(guide != NULL))
         on_direction = imp__guided_emit(s, light, u, &on_point);
-    if (!(pmf > 0) || !e->ops->sample_emission(e, &scene->ball, u, &start)) return false;
+    if (!(pmf > 0) || !imp__emission_sample(e, &scene->ball, u, &start)) return false;
     start.pdf_p *= on_point;
     start.pdf_d *= on_direction;
     w->point[0] = u[0];
