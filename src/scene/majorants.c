@@ -86,25 +86,22 @@ static void fill(void *payload)
             }
 }
 
-/* Inputs by which the extinction falls: a texture has no known lower bound, nor has a
- * spectrum. */
+/* An extinction that falls where an input rises is bounded by the least value of that, which
+ * is not known of textures, nor of spectra. */
 static enum imp_status falling_check(struct imp_scene *scene, const struct imp_node *node,
                                      const struct imp_medium *m, bool varies)
 {
     for (int j = 0; j < m->n_own; j++) {
         const struct imp_input *in = m->input[j];
+        const bool spectrum = in->spectrum && in->spectrum->form != IMP_SPECTRUM_NUMBER;
         if (!(m->ops->inputs[j].flags & IMP_INPUT_FALLS)) continue;
-        if (in->texture)
+        if (in->texture || (varies && spectrum))
             return imp__node_error(
                 scene->ctx, node, IMP_E_UNSUPPORTED,
-                "'%s': the extinction falls where it rises, and a "
-                "texture has no known lower bound: it must be constant",
-                m->ops->inputs[j].name);
-        if (varies && in->spectrum && in->spectrum->form != IMP_SPECTRUM_NUMBER)
-            return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
-                                   "'%s': the extinction varies in space and falls where "
-                                   "it rises: it must be one number, not a spectrum",
-                                   m->ops->inputs[j].name);
+                "'%s': the extinction %sfalls where it rises, and a %s has no known lower "
+                "bound: give it one value",
+                m->ops->inputs[j].name, in->texture ? "" : "varies, and ",
+                in->texture ? in->texture->ops->name : "spectrum");
     }
     return IMP_OK;
 }
@@ -115,11 +112,15 @@ enum imp_status imp__majorants_create(struct imp_scene *scene,
     enum imp_status st = IMP_OK;
     struct imp_majorants *g = NULL;
     const struct imp_texture *box = NULL;
-    bool varies = false;
+    bool varies = m->ops->boxed;
+    for (int j = 0; j < m->n_own; j++)
+        varies |= m->input[j]->texture &&
+                  m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION &&
+                  !(m->input[j]->texture->ops->flags & IMP_TEXTURE_CONSTANT);
+    IMP_CHECKED(falling_check(scene, node, m, varies));
     for (int j = 0; j < m->n_own; j++) {
         const struct imp_texture *t = m->input[j]->texture;
         if (!t || !(m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)) continue;
-        varies |= !(t->ops->flags & IMP_TEXTURE_CONSTANT);
         if (!box && t->ops->extent) box = t;
         if (!t->ops->bound)
             return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
@@ -127,8 +128,7 @@ enum imp_status imp__majorants_create(struct imp_scene *scene,
                                    "extinction",
                                    m->ops->inputs[j].name, t->ops->name);
     }
-    IMP_CHECKED(falling_check(scene, node, m, varies || m->ops->boxed));
-    if (!varies && !m->ops->boxed) return IMP_OK;
+    if (!varies) return IMP_OK;
     if (!box && !m->ops->boxed)
         return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
                                "its extinction varies, and has no box to look for it in");

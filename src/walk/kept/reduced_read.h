@@ -86,14 +86,14 @@ static inline struct imp_dirs imp__reduced_on_dirs(const struct imp_reduced_at_h
 {
     struct imp_reduced_on on;
     memcpy(&on, words, sizeof on);
-    return (struct imp_dirs){m->wo, imp__decided_v3(on.wi), on.lobe, false};
+    return (struct imp_dirs){m->wo, imp__decided_v3(on.wi), on.lobe, 0};
 }
 static inline struct imp_dirs imp__reduced_lit_dirs(const struct imp_reduced_at_hand *m,
                                                     const uint32_t *words)
 {
     float wi[3];
     memcpy(wi, words, sizeof wi);
-    return (struct imp_dirs){m->wo, imp__decided_v3(wi), IMP_SMOOTH, false};
+    return (struct imp_dirs){m->wo, imp__decided_v3(wi), IMP_SMOOTH, 0};
 }
 
 #endif
