@@ -96,12 +96,13 @@ static enum imp_status falling_check(struct imp_scene *scene, const struct imp_n
         const bool spectrum = in->spectrum && in->spectrum->form != IMP_SPECTRUM_NUMBER;
         if (!(m->ops->inputs[j].flags & IMP_INPUT_FALLS)) continue;
         if (in->texture || (varies && spectrum))
-            return imp__node_error(
-                scene->ctx, node, IMP_E_UNSUPPORTED,
-                "'%s': the extinction %sfalls where it rises, and a %s has no known lower "
-                "bound: give it one value",
-                m->ops->inputs[j].name, in->texture ? "" : "varies, and ",
-                in->texture ? in->texture->ops->name : "spectrum");
+            return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
+                                   "'%s': the extinction %sfalls where it rises, and a "
+                                   "%s has no known lower "
+                                   "bound: give it one value",
+                                   m->ops->inputs[j].name,
+                                   in->texture ? "" : "varies, and ",
+                                   in->texture ? in->texture->ops->name : "spectrum");
     }
     return IMP_OK;
 }

@@ -19,7 +19,7 @@ struct point {
 static double kernel(imp_v3 w, void *payload)
 {
     const struct point *p = payload;
-    const struct imp_dirs d = {w, p->wi, IMP_SMOOTH, false};
+    const struct imp_dirs d = {w, p->wi, IMP_SMOOTH, 0};
     imp_spec f;
     p->b->ops->eval(p->b, p->in, &d, &f);
     return f[0] * fabs(w[2] / p->wi[2]);

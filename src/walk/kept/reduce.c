@@ -172,8 +172,7 @@ static void vertex_look(const struct imp_scene *scene, const struct imp_decision
     v->at = (struct imp_texcoord){
         .uv = {d->uv[0], d->uv[1]}, .p = imp__decided_v3(d->p), .shape = shape};
     if (v->bsdf) imp__inputs_eval(v->bsdf->input, v->bsdf->n_in, &v->at, v->in);
-    v->on =
-        (struct imp_dirs){imp__decided_v3(d->wo), imp__decided_v3(d->wi), d->lobe, 0};
+    v->on = (struct imp_dirs){imp__decided_v3(d->wo), imp__decided_v3(d->wi), d->lobe, 0};
     v->lit = (struct imp_dirs){v->on.wo, imp__decided_v3(d->light.wi), IMP_SMOOTH, 0};
     if (d->connection == IMP_CONNECTED)
         v->light =
