@@ -7,6 +7,7 @@ nm -D "$BUILD/lib/libimporton.so" | grep -qE '__(asan|tsan|ubsan)' && exit 0 # n
 unset LD_LIBRARY_PATH
 cp -r "$ROOT/include" here
 cp "$ROOT/examples/own_material.c" "$ROOT/tests/cli/package/plugin.c" . || exit 9
+awk '/^```c$/ { n++; on = n == 2; next } /^```/ { on = 0 } on' "$ROOT/docs/kinds.md" >mist.c
 cat >sizes.c <<'C'
 #include <importon/kinds.h>
 #include <stdio.h>

@@ -342,50 +342,11 @@ static const struct imp_medium_ops haze = {.size = sizeof(struct imp_medium_ops)
                                            .eval = haze_eval,
                                            .eval_d = haze_eval_d};
 
-/* ---- A medium whose extinction falls with its input: Koschmieder's visibility ------- */
+/* ---- A medium whose extinction falls with its input: that of docs/kinds.md --------- */
 
-static const double contrast = 3.912; /* -ln 0.02: what a black object keeps of its own */
+#include "mist.c"
 
-static const struct imp_input_desc mist_inputs[] = {
-    {.name = "visibility",
-     .role = IMP_UNBOUNDED,
-     .flags = IMP_INPUT_EXTINCTION | IMP_INPUT_FALLS,
-     .fallback = 10,
-     .lo = 0.01,
-     .hi = 1e6,
-     .unit = "length"},
-    {.name = "density",
-     .role = IMP_UNBOUNDED,
-     .flags = IMP_INPUT_EXTINCTION | IMP_INPUT_AFFINE | IMP_INPUT_VOLUME,
-     .fallback = 1,
-     .unit = "1"},
-    {.name = "white", .role = IMP_REFLECTANCE, .fallback = 1, .hi = 1, .unit = "1"},
-    {0}};
-static void mist_eval(const struct imp_medium *m, const imp_spec *in,
-                      struct imp_coefficients *c)
-{
-    (void)m;
-    c->extinction = in[1] * contrast / in[0];
-    c->scattering = c->extinction * in[2];
-    imp_spec_fill(&c->emission, 0);
-}
-static void mist_eval_d(const struct imp_medium *m, const imp_spec *in,
-                        struct imp_coefficients *dc)
-{
-    (void)m;
-    memset(dc, 0, 3 * sizeof *dc);
-    dc[0].extinction = in[1] * -contrast / (in[0] * in[0]);
-    dc[0].scattering = dc[0].extinction * in[2];
-    dc[1].extinction = contrast / in[0];
-    dc[1].scattering = dc[1].extinction * in[2];
-    dc[2].scattering = in[1] * contrast / in[0];
-}
-static const struct imp_medium_ops mist = {.size = sizeof(struct imp_medium_ops),
-                                           .name = "mist",
-                                           .object_size = 1,
-                                           .inputs = mist_inputs,
-                                           .eval = mist_eval,
-                                           .eval_d = mist_eval_d};
+static const double contrast = 3.912; /* -ln 0.02 */
 
 /* ---- Scenes -------------------------------------------------------------------- */
 
@@ -443,7 +404,7 @@ static const char mist_text[] =
     "</sensor><emitter type='constant'/>"
     "<shape type='cube'><transform name='to_world'><scale value='.5'/>"
     "<translate x='.5' y='.5' z='.5'/></transform><bsdf type='null'/>"
-    "<medium type='mist' id='fog' name='interior'>%s%s<float name='white' value='%g'/>"
+    "<medium type='mist' id='fog' name='interior'>%s%s<float name='albedo' value='%g'/>"
     "</medium></shape></scene>";
 
 /* Mean of red and its derivatives by the first number of each parameter, within 4
