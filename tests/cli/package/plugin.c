@@ -484,6 +484,30 @@ static void falling(imp_context *ctx, const char *density, double d, const char 
     }
 }
 
+/* Mist that does not say that it falls may have a volume for its visibility: its bounds are
+ * too low, which selftest sees. */
+static void falling_unsaid(imp_context *ctx)
+{
+    char text[2048];
+    imp_scene *scene = NULL;
+    const struct imp_selftest_row *row;
+    size_t n;
+    bool seen_low = false;
+    snprintf(
+        text, sizeof text, mist_text, 1,
+        "<volume type='layers' name='visibility'><float name='a' value='3'/></volume>",
+        "", 1.);
+    memcpy(strstr(text, "'mist'"), "'blur'", 6);
+    enum imp_status st =
+        imp_scene_load_string(ctx, text, strlen(text), "blur.xml", NULL, &scene);
+    ok(st == IMP_OK, imp_last_error(ctx));
+    if (st == IMP_OK) st = imp_selftest(scene, IMP_SELFTEST_MEDIUM, NULL, &row, &n);
+    for (size_t k = 0; st == IMP_OK && k < n; k++)
+        seen_low |= strcmp(row[k].contract, "bounded") == 0 && row[k].ok == 0;
+    ok(seen_low, "an extinction that falls and does not say so is above its bound");
+    imp_scene_destroy(scene);
+}
+
 static void falling_not(imp_context *ctx)
 {
     char text[2048];
@@ -631,6 +655,12 @@ int main(void)
     refused(ctx, imp_register_medium(ctx, &other_way), "IMP_INPUT_FALLS goes with");
     falls[0].flags = IMP_INPUT_FALLS | IMP_INPUT_EXTINCTION | IMP_INPUT_VOLUME;
     refused(ctx, imp_register_medium(ctx, &other_way), "IMP_INPUT_FALLS goes with");
+    other_way.name = "blur";
+    struct imp_input_desc unsaid[] = {
+        mist_inputs[0], mist_inputs[1], mist_inputs[2], {0}};
+    other_way.inputs = unsaid;
+    unsaid[0].flags = IMP_INPUT_EXTINCTION | IMP_INPUT_VOLUME;
+    ok(imp_register_medium(ctx, &other_way) == IMP_OK, "mist that does not say it falls");
     struct imp_texture_ops t = ramp;
     struct imp_input_desc two[] = {blend_inputs[0], blend_inputs[0], {0}};
     t.inputs = two;
@@ -718,6 +748,7 @@ int main(void)
             "<volume type='layers' name='density'><float name='a' value='3'/></volume>",
             1.5, "mist in layers");
     falling_not(ctx);
+    falling_unsaid(ctx);
 
     st = load(ctx, "", "<float name='gain' value='-1'/>", &scene);
     ok(st == IMP_E_SCENE && strstr(imp_last_error(ctx), "plate.xml:1:") &&
