@@ -222,8 +222,9 @@ int main(int argc, char **argv)
     options.threads = 1;
     if (imp_context_create(&options, &ctx) != IMP_OK) return 3;
     printf(
-        "| scene | from the sensor, s | from the lights, s | both ends, s | 10^6 walks, "
-        "segments, rays a second from the sensor | from the lights | both ends | means "
+        "| scene | from the sensor, s | light tracing, s | bidirectional, s | 10^6 "
+        "walks, "
+        "segments, rays a second from the sensor | light tracing | bidirectional | means "
         "|\n|---|---|---|---|---|---|---|---|\n");
     for (size_t i = first; i < end && i < n; i++) {
         const int n_ends = cases[i].body ? 3 : 2; /* bdpt refuses thin glass in fog */

@@ -35,7 +35,7 @@ if wanted 1; then
     picture cottage scenes/photons/cottage.xml -D width=240 -D height=135 --spp 256
 fi
 if wanted 2; then
-    say "Figure 2: a ball of glass between two plates, from both ends"
+    say "Figure 2: a ball of glass between two plates, both ways"
     picture lens_sensor scenes/photons/lens.xml -D picture=pattern -D res=96 --spp 1000 --from sensor --exposure 2
     picture lens_lights scenes/photons/lens.xml -D picture=pattern -D res=96 --spp 3000 --from lights --exposure 2
     for emits in left right; do
@@ -138,8 +138,8 @@ if has("which_end.txt"):
         for e, mean in enumerate(means):
             if mean < 0.9 * means[0]:
                 r[1 + e] += " (lacks %.0f %% of the light)" % (100 * (1 - mean / means[0]))
-    for name, first, head in (("which_end", 1, "scene | from the sensor, s | from the lights, s | both ends, s"),
-                              ("rates", 4, "scene | from the sensor | from the lights | both ends")):
+    for name, first, head in (("which_end", 1, "scene | from the sensor, s | light tracing, s | bidirectional, s"),
+                              ("rates", 4, "scene | from the sensor | light tracing | bidirectional")):
         put(name, "\n".join(["| %s |" % head, "|---|---|---|---|"] +
                             ["| " + " | ".join([r[0]] + r[first:first + 3]) + " |" for r in cells]) + "\n")
 if has("headlamp_sensor.json"):

@@ -26,10 +26,10 @@ twice() { LC_ALL=C sort | uniq -d; }
 none "files of one name" < <(find src cli -name '*.[ch]' -printf '%f\n' | twice)
 
 # Behind the licence and an empty line, a sentence.
-none "file that does not begin with what it holds" < <(find src cli mpi -name '*.[ch]' |
-    while read -r file; do
-        head -6 "$file" | tr '\n' '~' | grep -q 'SPDX-License-Identifier: Apache-2.0~ \*~ \* ' || echo "$file"
-    done)
+none "file that does not begin with what it holds" < <(find src cli mpi -name '*.[ch]' -print0 | xargs -0 awk '
+    FNR == 1 { ok = /SPDX-License-Identifier: Apache-2.0$/ }
+    FNR == 2 { ok = ok && /^ \*$/ }
+    FNR == 3 { if (!ok || !/^ \* ./) print FILENAME; nextfile }')
 none "comment that begins with Of" < <(grep -rnE --include='*.[ch]' '/\*+ Of ' src cli mpi | cut -c1-90)
 
 # Sanitizers add names that begin with __.
@@ -38,15 +38,13 @@ symbols=$(nm -g --defined-only "$library" | awk 'NF == 3 && $3 !~ /^__/ { print 
 none "symbol defined twice" < <(twice <<<"$symbols")
 none "symbol without the prefix imp_" < <(grep -v '^imp_' <<<"$symbols")
 
-# headers SED-SCRIPT: what it prints, once for each header.
+# headers PATTERN SED-SCRIPT: what the script makes of matches, once for each header.
 headers() {
-    find src include -name '*.h' | while read -r header; do
-        sed -nE "$1" "$header" | LC_ALL=C sort -u
-    done
+    grep -rHoE --include='*.h' "$1" src include | sed -nE "s/^([^:]*):$2/\1 \2/p" | LC_ALL=C sort -u | cut -d' ' -f2
 }
-none "type in two headers" < <(headers 's/^(struct|union|enum) (\w+) \{.*/\2/p' | twice)
-inlines=$(headers 's/^static inline (\w+ |\*)*\**(\w+)\(.*/\2/p' | grep -v '^__attribute__$')
+none "type in two headers" < <(headers '^(struct|union|enum) \w+ \{' '\w+ (\w+) .*' | twice)
+inlines=$(headers '^static inline (\w+ |\*)*\**\w+\(' 'static inline.*\b(\w+)\(' | grep -v '^__attribute__$')
 none "inline function and another in two places" < <(printf '%s\n' "$symbols" "$inlines" | twice)
 none "inline function without the prefix imp_" < <(grep -v '^imp_' <<<"$inlines")
-none "macro in two headers" < <(headers 's/^#define (\w+).*/\1/p' | twice)
+none "macro in two headers" < <(headers '^#define \w+' '#define (\w+)' | twice)
 exit "$bad"

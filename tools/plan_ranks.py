@@ -68,7 +68,7 @@ def size(n):
 
 def main():
     ranks = [int(a) for a in sys.argv[1:]] or [64, 1000, 10000]
-    rows = [("gradient, %d numbers" % k, lambda r, k=k: gradient(r, k), ring) for k in (10, 100, 1000)]
+    rows = [("gradient, %d values" % k, lambda r, k=k: gradient(r, k), ring) for k in (10, 100, 1000)]
     rows += [("picture, %d x %d" % (WIDTH, HEIGHT), picture, ring),
              ("texture of 3.1 million, all touched", texture, pieces)]
     print("Depth of the tree over %d items: %d. Chunks of a rank: %s." % (

@@ -13,7 +13,7 @@ import textwrap
 PAGE = pathlib.Path("docs/what-goes-with-what.md")
 HEAD = """# What goes with what
 
-*For everybody who reads a refusal, or plans a run.* Each line is a rule: jobs that have the first
+For everybody who reads a refusal, or plans a run. Each line is a rule: jobs that have the first
 feature (and the second, where two are named) may not have the last one, or need it. The sentence is
 the message that the library gives, with names in place of the braces. One table decides, and this
 page is made from it by `tools/write_rules.py --write`.

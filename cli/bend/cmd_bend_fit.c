@@ -39,7 +39,7 @@ const struct arg_option bend_fit_options[] = {
     {ARG_TEXT, 0, "checkpoint", "FILE", "fit: save the state every few seconds",
      &o.checkpoint, 0, 0, NULL},
     {ARG_CHOICE, 0, "carry", "WHEN",
-     "fit: carry the optimiser's memory to the next level: auto (lbfgs), always, never",
+     "fit: keep the optimiser's history at the next level: auto (lbfgs), always, never",
      &o.carry, 0, 0, carry_words},
     {ARG_FLAG, 0, "resume", NULL, "fit: continue from the checkpoint", &o.resume, 0, 0,
      NULL},

@@ -21,7 +21,7 @@ struct times {
     int threads;
     double load, render, gradient;
     double samples; /* of one picture */
-    size_t n;       /* numbers with a gradient */
+    size_t n;       /* values with a gradient */
 };
 
 /* Loss against the scene's own picture, of other random numbers, with the gradient of

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon gradient: the derivative of a number with respect to the scene's parameters,
- * with standard errors. The number is a loss against target pictures; or the inner
- * product of the picture with a given adjoint image; or, with neither, the mean of the
- * picture over its pixels and channels. */
+ * importon gradient: the derivative of an objective with respect to the scene's
+ * parameters, with standard errors. The objective is a loss against target pictures; or
+ * the inner product of the picture with a given adjoint image; or, with neither, the mean
+ * of the picture over its pixels and channels. */
 #include "shared/command.h"
 #include "shared/overwrite.h"
 #include "shared/picture_files.h"
@@ -28,15 +28,13 @@ static const struct arg_option options[] = {
     {ARG_TEXT | ARG_ASIDE, 0, "textures", "DIR",
      "write gradients of textures there, as pictures", &textures, 0, 0, NULL},
     {ARG_TEXT | ARG_ASIDE, 0, "spectra", "DIR",
-     "write gradients to spectra there, as plots over wavelengths", &spectra, 0, 0, NULL},
+     "write gradients by spectra there, as plots over wavelengths", &spectra, 0, 0, NULL},
     {ARG_NUMBER | ARG_REPLAYS, 0, "until", "REL",
      "take samples, at most --spp, until each parameter's gradient is this close, in 95 "
-     "of "
-     "100 cases",
+     "of 100 cases",
      &until, 1e-6, 10, NULL},
     {ARG_CHOICE | ARG_REPLAYS, 0, "allocation", "HOW",
-     "with --until, of samples to tiles of a target: variance (default; by the "
-     "gradient's), or even",
+     "with --until: samples by tile: variance (default; of the gradient), or even",
      &allocation, 0, 0, allocation_words},
     {0}};
 

@@ -19,7 +19,7 @@ static const char *sheet_path, *layers_path;
 static struct sheet sheet;
 static const struct arg_option options[] = {
     {ARG_FLAG | ARG_REPLAYS, 0, "separate", NULL,
-     "one picture per number, also for colours", &separate, 0, 0, NULL},
+     "one picture per value, also for colours", &separate, 0, 0, NULL},
     {ARG_TEXT | ARG_ASIDE, 0, "sheet", "FILE.png",
      "one PNG with all the pictures side by side", &sheet_path, 0, 0, NULL},
     {ARG_TEXT | ARG_ASIDE, 0, "layers", "FILE.exr",
@@ -41,7 +41,7 @@ static void add_film(imp_film *sum, imp_film *film)
     }
 }
 
-/* A block is one control, or as many as it has numbers. */
+/* A block is one control, or as many as it has values. */
 static size_t n_controls(const struct block *b)
 {
     return !separate && b->n == 3 && (b->info.flags & IMP_PARAM_COLOR) ? 1 : b->n;

@@ -19,8 +19,8 @@ static struct {
 
 static const struct arg_option options[] = {
     {ARG_FLAG | ARG_REPLAYS, 0, "ends", NULL,
-     "read from both ends, and compare: exit status 1 if they differ", &o.ends, 0, 0,
-     NULL},
+     "read by light tracing, too, and compare: exit status 1 if they differ", &o.ends, 0,
+     0, NULL},
     {0}};
 
 struct findings {

@@ -27,14 +27,14 @@ static const struct arg_option options[] = {
     {ARG_NUMBER, 0, "memory", "MB", "for the walks (default 1074)", &o.memory, 1e-3, 1e12,
      NULL},
     {ARG_NUMBER, 0, "survival", "P",
-     "least probability with which roulette lets a walk go on (default 0.8; 0: what the "
-     "integrator decides)",
+     "lower limit of the survival probability in roulette (default 0.8; 0: that of the "
+     "integrator)",
      &o.survival, 0, 1, NULL},
     {ARG_NUMBER, 0, "ess", "F",
-     "least effective sample size, a fraction, with which they answer (default 0.5)",
-     &o.ess, 1e-6, 1, NULL},
+     "smallest effective sample size, a fraction, for an answer (default 0.5)", &o.ess,
+     1e-6, 1, NULL},
     {ARG_NUMBER, 0, "headroom", "H",
-     "extinctions of grids may grow, by this factor where they are largest, also from 0 "
+     "extinctions of grids may grow to this times the largest one, also from 0 "
      "(default 1: they may not)",
      &o.headroom, 1, 64, NULL},
     {0}};

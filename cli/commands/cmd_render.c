@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon render: a picture with its standard errors; or single walks, to look at. */
+ * importon render: a picture with its standard errors; or single walks as text. */
 #include "shared/check_rows.h"
 #include "shared/command.h"
 #include "shared/display.h"
@@ -40,7 +40,7 @@ static const struct arg_option options[] = {
      &o.picture.no_preview, 0, 0, NULL},
     {ARG_PAIR, 0, "pixel", "X,Y", "print one walk of this pixel, vertex by vertex",
      o.pixel, 0, 0, NULL},
-    {ARG_INT, 0, "sample", "K", "number of the walk in the pixel (default 0)", &o.sample,
+    {ARG_INT, 0, "sample", "K", "index of the walk in the pixel (default 0)", &o.sample,
      0, 1e9, NULL},
     {ARG_TEXT, 0, "paths", "FILE",
      "write walks from all over the picture, one JSON object per line", &o.paths, 0, 0,
@@ -51,8 +51,8 @@ static const struct arg_option options[] = {
      "take samples, at most --spp, until the picture is this close, in 95 of 100 cases",
      &o.until, 1e-6, 10, NULL},
     {ARG_FLAG | ARG_ASIDE, 0, "verify-sampling", NULL,
-     "compare the picture with one of uniform directions, and show what delivers its "
-     "light",
+     "compare the picture with one of uniform directions, and print the share of its "
+     "light by density",
      &o.sampling, 0, 0, NULL},
     {0}};
 
@@ -114,8 +114,8 @@ static char *default_output(const struct imp_run *run)
     return path;
 }
 
-/* How many walks of each cause, and the first of them to look at. More than the budget
- * fails the run. */
+/* Prints the number of dropped walks by cause, and the first of each. More than the
+ * budget fails the run. */
 static void report_drops(const struct imp_film_info *info)
 {
     if (!info->dropped) return;

@@ -158,7 +158,7 @@ static int add_picture(struct collection *c, const char *path, const char *name,
     /* The derivatives are there one by one. */
     if (imp_film_get_text(film, PICTURE_LAYERS)) return 0;
     char *stem = keep(c, strndup(name, strlen(name) - strlen(".exr")));
-    /* What the numbers do that a fit did not determine is a derivative, too. */
+    /* The effect of the values that a fit did not determine is a derivative, too. */
     const bool loose = !strncmp(name, "undetermined", strlen("undetermined"));
     const bool control = loose || (controls && is_control(controls, name));
     struct imp_report_item *item = add(c, control ? "derivative" : "picture");

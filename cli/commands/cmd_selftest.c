@@ -15,7 +15,7 @@ static const struct arg_option options[] = {
     {ARG_INT, 0, "samples", "N", "draws of every object (default 200000)", &o.samples,
      1000, 1e9, NULL},
     {ARG_INT, 0, "directions", "N",
-     "directions of sight, or places, of every object (default 12)", &o.directions, 1,
+     "outgoing directions, or places, of every object (default 12)", &o.directions, 1,
      1e6, NULL},
     {ARG_SEED, 0, "seed", "N", "seed of the random numbers (default 0)", &cli.seed, 0, 0,
      NULL},

@@ -27,9 +27,9 @@ static struct {
 
 static const struct arg_option options[] = {
     {ARG_LIST, 0, "set", "ID=V[,V..]",
-     "evaluate with other numbers; @FILE: many (--gradient lists them)", &cli.sets, 0, 0,
+     "evaluate at other values; @FILE: many (--gradient lists them)", &cli.sets, 0, 0,
      NULL},
-    {ARG_INT, 's', "sensor", "N", "number of the sensor, from 0", &cli.sensor, 0, 1e6,
+    {ARG_INT, 's', "sensor", "N", "index of the sensor, from 0", &cli.sensor, 0, 1e6,
      NULL},
     {ARG_TEXT, 0, "region", "X0,Y0,X1,Y1",
      "mean over the pixels from X0 to before X1 and Y0 to before Y1 (default: all)",
@@ -37,7 +37,7 @@ static const struct arg_option options[] = {
     {ARG_FLAG, 0, "gradient", NULL, "derivatives by the active parameters, with errors",
      &o.gradient, 0, 0, NULL},
     {ARG_TEXT, 0, "sweep", "ID=FROM:TO:N",
-     "N values of a parameter, or of one of its numbers (ID[K]), and the answer at each",
+     "N values of a parameter, or of its value K (ID[K]), and the answer at each",
      &o.sweep, 0, 0, NULL},
     {ARG_NUMBER, 0, "memory", "MB", "for the walks (default 1074)", &o.memory, 1e-3, 1e12,
      NULL},
@@ -60,7 +60,7 @@ static struct {
     imp_walks *walks;
     imp_problem *problem;
     struct imp_run run;
-    float *adjoint; /* of the mean over a region; NULL: of a loss */
+    float *adjoint; /* for the mean over a region; NULL: for a loss */
     float *mask;    /* [height][width] of the region; NULL: all */
     size_t n;
 } w;
@@ -141,7 +141,7 @@ static enum imp_status ask(struct answer *a, double *grad, double *se)
                  : imp_problem_objective(w.problem, NULL, &w.run, &a->value, grad, se);
     if (st == IMP_E_NUMERIC || st == IMP_E_UNSUPPORTED)
         snprintf(a->refused, sizeof a->refused, "%s", imp_last_error(cli.context));
-    /* Evaluation looks at all pixels, the weights at a subset of them. */
+    /* Answers are from all pixels, the weights from a subset of them. */
     return st == IMP_OK && a->refused[0] ? IMP_E_NUMERIC : st;
 }
 
@@ -241,7 +241,7 @@ static int answer_one(const char *picture)
 
 struct sweep {
     char name[256];
-    size_t param, first, n; /* numbers that move */
+    size_t param, first, n; /* values that change */
     size_t count;           /* of the parameter */
     double from, to;
     int points;

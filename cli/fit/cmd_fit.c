@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon fit: pictures go in, the scene's numbers come out. Writes, into -o DIR, the
- * picture before and after, the target, the loss curve and the parameters with their 95 %
+ * importon fit: the scene's parameters from pictures. Writes, into -o DIR, the picture
+ * before and after, the target, the loss curve and the parameters with their 95 %
  * intervals. */
 #include "fit_answer.h"
 #include "fit_options.h"
@@ -32,8 +32,8 @@ static const struct arg_option options[] = {
      "one PNG of before, target and recovered (with -o)", &o.sheet, 0, 0, NULL},
     {0}};
 
-/* May everything be written? A checkpoint is begun over, or gone on from, when that is
- * said. */
+/* May everything be written? A checkpoint is replaced with --overwrite, and continued
+ * with --resume. */
 static int writable(const struct block *blocks, size_t n_blocks)
 {
     int rc = checkpoint_writable(o.checkpoint, o.resume);
@@ -43,7 +43,7 @@ static int writable(const struct block *blocks, size_t n_blocks)
     return rc;
 }
 
-/* The numbers that were found, for the manifest. */
+/* The fitted values, for the manifest. */
 static int note_results(const imp_problem *problem, const struct imp_fit_result *r)
 {
     const size_t n = imp_problem_n(problem);

@@ -185,7 +185,7 @@ static int write_textures(const struct fit_answer *a, char **paths)
     return rc;
 }
 
-/* As the scene has it: of numbers that are tied, each parameter's own. */
+/* The scene's values: for tied parameters, each one's own. */
 static void write_member(FILE *file, const char *name)
 {
     struct block b = {.info.size = sizeof b.info};

@@ -13,9 +13,9 @@ struct fit_answer {
     size_t n_blocks;
     const char *optimizer;
     int no_intervals;                  /* they were not computed */
-    const struct imp_missing *missing; /* [n_missing] numbers that may be wrong */
+    const struct imp_missing *missing; /* [n_missing] values that may be wrong */
     size_t n_missing;
-    int looked; /* they were looked for */
+    int looked; /* they were searched for */
 };
 /* Print it, and write it into -o DIR. 0, or an exit code with the reason printed, as the
  * next two. */
@@ -32,8 +32,8 @@ void fit_answer_json(struct json *j, const struct fit_answer *a, char **paths);
 /* "clipped":{..}, where targets have levels */
 void fit_clipped_json(struct json *j, const imp_problem *problem);
 
-/* fit_missing.c: sets missing, n_missing and looked, if they are to be looked for. 0, or an
- * exit code with the reason printed. */
+/* fit_missing.c: sets missing, n_missing and looked, if they are to be searched for. 0,
+ * or an exit code with the reason printed. */
 void fit_missing_find(struct fit_answer *a);
 /* "missing":[..] */
 void fit_missing_json(struct json *j, const struct fit_answer *a);
@@ -48,7 +48,7 @@ struct fit_history {
 void fit_history_json(struct json *j, const struct fit_history *h,
                       const struct block *blocks, size_t n_blocks);
 
-/* Number i of the fit. */
+/* Value i of the fit. */
 struct imp_fit_variable fit_variable(const imp_problem *problem, size_t i);
 
 #endif

@@ -126,7 +126,7 @@ void fit_history_json(struct json *j, const struct fit_history *h,
     json_end_object(j);
 }
 
-/* The change that is determined least; of a logarithm, relative. */
+/* The change that is determined least; relative for a logarithm. */
 static void put_loosest(struct json *j, const struct fit_answer *a)
 {
     json_object(j, "undetermined");
@@ -143,8 +143,8 @@ static void put_loosest(struct json *j, const struct fit_answer *a)
     json_end_object(j);
 }
 
-/* What a report draws and a table does not print: the loss and the numbers by iteration,
- * the combination that is determined least, and the covariance of few numbers. */
+/* What a report draws and a table does not print: the loss and the values by iteration,
+ * the combination that is determined least, and the covariance of few values. */
 static void put_curves(struct json *j, const struct fit_answer *a)
 {
     enum { COVARIANCE_MAX = 64 };

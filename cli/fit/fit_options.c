@@ -22,35 +22,33 @@ const struct arg_option options_search[] = {
      "maximum number of iterations (default 200 for adam, else 30)",
      &fit_choice.iterations, 1, 1e9, NULL},
     {ARG_NUMBER | ARG_REPLAYS, 0, "lr", "RATE",
-     "learning rate of adam (default 0.05); of numbers between two bounds it falls in "
-     "fits "
-     "of more than 64 numbers with control variates",
+     "learning rate of adam (default 0.05); for values with two bounds it falls, in fits "
+     "of more than 64 values with control variates",
      &fit_choice.learning_rate, 1e-12, 1e6, NULL},
     {ARG_NUMBER | ARG_REPLAYS, 0, "momentum", "B",
-     "of adam: the part of the mean gradient that stays from iteration to iteration "
-     "(default 0.9; 0.5 for numbers between two bounds in fits of more than 64 numbers "
-     "with control variates)",
+     "adam: the decay factor of the mean gradient, beta1 (default 0.9; 0.5 for values "
+     "with two bounds in fits of more than 64 values with control variates)",
      &fit_choice.momentum, 1e-6, 0.999999, NULL},
     {ARG_INT | ARG_REPLAYS, 0, "levels", "N",
-     "of adam, and of bent rays: from coarse to fine, in N levels", &fit_choice.levels, 1,
-     16, NULL},
+     "adam, and bent rays: from coarse to fine, in N levels", &fit_choice.levels, 1, 16,
+     NULL},
     {ARG_CHOICE | ARG_REPLAYS, 0, "allocation", "HOW",
-     "of adam's samples to tiles: variance (by the gradient's), even, or auto (default: "
-     "even beside control variates of more than 64 numbers)",
+     "adam: samples by tile: variance (of the gradient), even, or auto (default: "
+     "even beside control variates of more than 64 values)",
      &fit_choice.allocation, 0, 0, allocation_words},
     {ARG_NUMBER | ARG_REPLAYS, 0, "tolerance", "T",
      "stop when relative steps stay below (default 1e-4)", &fit_choice.tolerance, 1e-15,
      1, NULL},
     {ARG_NUMBER | ARG_REPLAYS, 0, "memory", "MB",
-     "of lbfgs, mma and slsqp, for the walks that they keep (default 1074; 0: none)",
-     &fit_choice.memory, 0, 1e12, NULL},
+     "lbfgs, mma, slsqp: for recorded walks (default 1074; 0: none)", &fit_choice.memory,
+     0, 1e12, NULL},
     {ARG_NUMBER | ARG_REPLAYS, 0, "headroom", "H",
-     "of lbfgs, mma and slsqp, by which extinctions of grids may grow while walks are "
-     "kept (default 1: such walks are not kept)",
+     "lbfgs, mma, slsqp: the factor by which extinctions of grids may grow with "
+     "recorded walks (default 1: such walks are traced)",
      &fit_choice.headroom, 1, 64, NULL},
     {ARG_CHOICE | ARG_REPLAYS, 0, "control-variate", "WHEN",
-     "of adam, walks are evaluated at the last numbers, too: auto (default: for more "
-     "than 64 numbers, where possible), on or off",
+     "adam: walks are evaluated at the last parameters, too: auto (default: for more "
+     "than 64 values, where possible), on or off",
      &fit_choice.variate, 0, 0, variate_words},
     {ARG_FLAG | ARG_REPLAYS, 0, "no-intervals", NULL,
      "do not estimate 95 % intervals at the end", &fit_choice.no_intervals, 0, 0, NULL},
@@ -58,7 +56,8 @@ const struct arg_option options_search[] = {
 
 const struct arg_option options_missing[] = {
     {ARG_CHOICE | ARG_REPLAYS, 0, "missing", "WHEN",
-     "name numbers, not fitted, that may be wrong: auto (default: where the pictures are "
+     "name parameters that are not fitted and may be wrong: auto (default: where they "
+     "are "
      "not explained), always or never",
      &fit_choice.missing, 0, 0, missing_words},
     {0}};

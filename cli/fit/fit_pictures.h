@@ -16,7 +16,7 @@ int fit_pictures_write(const char *name, int spp);
 int fit_target_film(size_t i, imp_film **out);
 /* A copy of each target, so that the folder is complete. */
 int fit_targets_write(void);
-/* undetermined.exr: the change of each sensor's picture when the problem's numbers change
+/* undetermined.exr: the change of each sensor's picture when the problem's values change
  * by x_dot. */
 int fit_loosest_write(imp_problem *problem, const double *x_dot);
 /* One PNG with a row for each target. */

@@ -138,7 +138,7 @@ void *cli_alloc(size_t n, size_t size);
 /* strdup, the same. */
 char *cli_strdup(const char *text);
 
-/* "name" of a parameter, or "name[element]" when it has several numbers. */
+/* "name" of a parameter, or "name[element]" when it has several values. */
 const char *cli_number_name(const struct imp_param_info *info, size_t element, char *text,
                             size_t size);
 /* The same as a row's title: with the wavelength, where it is a sample of a spectrum. */

@@ -51,25 +51,25 @@ const struct arg_option options_scene[] = {
     {ARG_CHOICE | ARG_REPLAYS, 'm', "mode", "MODE",
      "colour: rgb (default), mono, spectral or single", &cli.mode, 0, 0, mode_words},
     {ARG_CHOICE | ARG_REPLAYS, 0, "upsampling", "HOW",
-     "of -m spectral and single: colours become spectra by a sigmoid (default), or by a "
+     "with -m spectral, single: colours become spectra by a sigmoid (default), or by a "
      "linear basis",
      &cli.upsampling, 0, 0, upsampling_words},
     {ARG_TEXT | ARG_REPLAYS, 0, "bins", "FROM,TO,N",
-     "of -m spectral and single: pictures have N bins of wavelengths in nm for channels",
+     "with -m spectral, single: pictures have N bins of wavelengths in nm as channels",
      &cli.bins, 0, 0, NULL},
     {ARG_TEXT | ARG_REPLAYS, 0, "weights", "NAME=W[,..]",
      "densities of directions, in place of those of the scene file: kernel, emitters, "
      "environment, proxies, guide, uniform",
      &cli.weights, 0, 0, NULL},
     {ARG_FLAG | ARG_REPLAYS, 0, "lenient", NULL,
-     "go on without plugins and properties that this version does not have", &cli.lenient,
-     0, 0, NULL},
+     "continue without plugins and properties that this version does not have",
+     &cli.lenient, 0, 0, NULL},
     {ARG_FLAG, 0, "dump", NULL, "print the parameters and their values, and stop",
      &cli.dump, 0, 0, NULL},
     {0}};
 
 const struct arg_option options_run[] = {
-    {ARG_INT | ARG_REPLAYS, 's', "sensor", "N", "number of the sensor, from 0",
+    {ARG_INT | ARG_REPLAYS, 's', "sensor", "N", "index of the sensor, from 0",
      &cli.sensor, 0, 1e6, NULL},
     {ARG_INT | ARG_REPLAYS, 0, "spp", "N",
      "samples per pixel (default: those of the scene)", &cli.spp, 1, 1e9, NULL},
@@ -79,7 +79,7 @@ const struct arg_option options_run[] = {
      "with mpirun: broadcast (default: rank 0 reads files for all) or shared (each does)",
      &cli.mpi_files, 0, 0, files_words},
     {ARG_CHOICE | ARG_REPLAYS, 0, "wavelengths", "HOW",
-     "of -m spectral and single: stratified (default), independent, or importance",
+     "with -m spectral, single: stratified (default), independent, or importance",
      &cli.wavelengths, 0, 0, wavelength_words},
     {ARG_INT | ARG_REPLAYS, 0, "wavelength-set", "N",
      "samples among which they are stratified (default: a quarter, at most 16)",
@@ -88,8 +88,8 @@ const struct arg_option options_run[] = {
      "show pictures in a viewer that listens there (tev: port 14158)", &cli.display, 0, 0,
      NULL},
     {ARG_CHOICE | ARG_REPLAYS, 0, "from", "END",
-     "end at which walks begin: scene (as its integrator has it, default), sensor or "
-     "lights",
+     "where walks begin: scene (by its integrator, default), sensor, or lights (light "
+     "tracing)",
      &cli.from, 0, 0, from_words},
     {ARG_CHOICE | ARG_REPLAYS, 0, "points", "KIND",
      "random numbers of a pixel's samples: independent, sobol, or scene (default: those "
@@ -104,7 +104,7 @@ const struct arg_option options_limits[] = {
      "compute part I of N (from 1), to the file of -o; 'importon merge' makes the whole",
      &cli.part, 0, 0, NULL},
     {ARG_TEXT | ARG_ASIDE, 0, "manifest", "FILE",
-     "write what 'importon verify' needs, with sums of parts (render, gradient, fit)",
+     "write a manifest for 'importon verify', with sums of parts (render, gradient, fit)",
      &cli.manifest_path, 0, 0, NULL},
     {ARG_FLAG | ARG_ASIDE, 0, "no-manifest", NULL, "none beside an output file",
      &cli.no_manifest, 0, 0, NULL},
@@ -112,7 +112,7 @@ const struct arg_option options_limits[] = {
 
 const struct arg_option options_guide[] = {
     {ARG_FLAG | ARG_REPLAYS, 0, "guide", NULL,
-     "solve by finite elements first: lights by what they send, walks by what they bring",
+     "solve by finite elements first, and choose lights by their light at each vertex",
      &cli.guide, 0, 0, NULL},
     {ARG_NUMBER | ARG_REPLAYS, 0, "guide-share", "S",
      "fraction of directions drawn towards light, or importance, below 1 (default 0)",

@@ -68,7 +68,7 @@ static void lose(const char *what)
 }
 
 /* Wait until the viewer takes more: for PATIENCE_S at most, and until a signal comes,
- * which may reach any thread, so that poll alone need not hear it. */
+ * which may reach any thread, so that poll alone need not be interrupted. */
 static void await_viewer(void)
 {
     struct pollfd viewer = {.fd = shown.socket, .events = POLLOUT};

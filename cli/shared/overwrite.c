@@ -14,7 +14,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define HEAD 65536 /* bytes looked at; the header of an EXR file holds command lines */
+#define HEAD 65536 /* bytes read; the header of an EXR file contains command lines */
 
 /* Files of a kind begin with one of `begins`, and hold the mark in their first `within` bytes; 0:
  * at their end. The mark is written by this program alone: the format's own magic is none. */

@@ -40,7 +40,7 @@ void overwrite_protect(const char *path);
 /* May a fit keep its state in `path`? An older checkpoint is gone on from with --resume,
  * and begun over with --overwrite. NULL: there is none. */
 int checkpoint_writable(const char *path, bool resume);
-/* After an interrupt, say how to go on. */
+/* After an interrupt, print how to continue. */
 void checkpoint_hint(const char *path);
 
 #endif

@@ -16,7 +16,7 @@
 /* JPEG's own noise makes white a little darker, and black a little brighter. */
 #define JPEG_LEVELS 5
 
-/* What the file's first bytes say, as imp_film_read takes them. */
+/* The format by the file's first bytes, as in imp_film_read. */
 struct encoding {
     bool srgb, jpeg; /* read as sRGB: not a file of floating-point numbers */
     double most;     /* largest number of a channel */

@@ -11,8 +11,9 @@ void photograph_warn_clipped(const char *spec, const struct imp_target *target);
 /* Where the film of target->sensor has a gamma, it is the numbers of the file that count:
  * what was read as sRGB is encoded again. The target's pixels are ours. */
 void photograph_undo_srgb(const char *spec, struct imp_target *target);
-/* --clip: levels in the target's numbers. `text`: "auto", by the file, or "LOW,HIGH" in the
- * file's numbers; either may be left out. 0, or an exit code with the reason printed. */
+/* --clip: levels in the target's values. `text`: "auto", by the file, or "LOW,HIGH" in
+ * the file's values; either may be left out. 0, or an exit code with the reason
+ * printed. */
 int photograph_levels(const char *spec, const char *text, const struct imp_target *target,
                       double *low, double *high);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Pictures in and out: targets, masks, EXR files that say how they were made, and the PNG
- * previews beside them. */
+ * Pictures in and out: targets, masks, EXR files with the command that made them, and the
+ * PNG previews beside them. */
 #ifndef IMP_CLI_CMD_PICTURE_H
 #define IMP_CLI_CMD_PICTURE_H
 

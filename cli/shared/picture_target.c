@@ -152,7 +152,7 @@ int picture_target(const char *spec, const char *mask, struct imp_target *target
     imp_film_get_info(film, &info);
     target->sensor = at ? picture_sensor(spec) : cli.sensor;
     if (imp_scene_get_sensor(cli.scene, target->sensor, &sensor) != IMP_OK)
-        sensor.n_responses = 0; /* which the problem will say */
+        sensor.n_responses = 0; /* which the problem will report */
     index = cli_alloc((size_t)sensor.n_responses + 3, sizeof *index);
     int channels = sensor.n_responses;
     if (channels) rc = curve_channels(film, path, &info, &sensor, index);

@@ -24,23 +24,24 @@ const struct arg_option options_params[] = {
      "active parameters: a name or a pattern (default '*')", &problem_options.params, 0,
      0, NULL},
     {ARG_LIST | ARG_REPLAYS, 0, "same", "GLOB,..",
-     "numbers of all these are equal: one paint", &problem_options.same, 0, 0, NULL},
+     "values of all these are equal: one paint", &problem_options.same, 0, 0, NULL},
     {ARG_LIST | ARG_REPLAYS, 0, "factor", "GLOB,..",
      "all these keep their ratios: one factor", &problem_options.factor, 0, 0, NULL},
     {ARG_LIST | ARG_REPLAYS, 0, "log", "GLOB,..",
-     "these move as logarithms, and stay positive", &problem_options.log, 0, 0, NULL},
+     "these are fitted as logarithms, and stay positive", &problem_options.log, 0, 0,
+     NULL},
     {0}};
 
 const struct arg_option options_targets[] = {
     {ARG_LIST | ARG_REPLAYS, 'T', "target", "FILE[@N]",
-     "picture to match, through sensor N; several without @N: one for each sensor, in "
+     "picture to match, of sensor N; several without @N: one for each sensor, in "
      "order",
      &problem_options.targets, 0, 0, NULL},
     {ARG_LIST | ARG_REPLAYS, 0, "mask", "FILE",
      "weights of the pixels, one for each --target in order", &problem_options.masks, 0,
      0, NULL},
     {ARG_TEXT | ARG_REPLAYS, 0, "clip", "auto|LOW,HIGH",
-     "numbers at these levels were clipped: white is at least, black at most",
+     "values at these levels were clipped: white is at least, black at most",
      &problem_options.clip, 0, 0, NULL},
     {ARG_CHOICE | ARG_REPLAYS, 0, "loss", "LOSS", "l2 (default), relative, l1 or log",
      &problem_options.loss, 0, 0, loss_words},
@@ -198,7 +199,7 @@ static enum imp_status add_ties(imp_problem *problem)
     } ties[] = {
         {&o->same, IMP_TIE_SAME}, {&o->factor, IMP_TIE_FACTOR}, {&o->log, IMP_TIE_LOG}};
     enum imp_status st = IMP_OK;
-    /* Equal numbers that are logarithms become logarithms together: first these. */
+    /* Equal values that are logarithms become logarithms together: first these. */
     for (size_t k = 0; k < 3 && st == IMP_OK; k++)
         for (size_t i = 0; i < ties[k].globs->n && st == IMP_OK; i++)
             st = imp_problem_tie(problem, ties[k].globs->item[i], ties[k].kind);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The options that say which parameters, which targets, which loss; and the imp_problem
- * they make. Shared by gradient, jacobian, check and fit. */
+ * The options for parameters, targets and loss, and the imp_problem made from them.
+ * Shared by gradient, jacobian, check and fit. */
 #ifndef IMP_CLI_CMD_PROBLEM_H
 #define IMP_CLI_CMD_PROBLEM_H
 
@@ -19,8 +19,8 @@ extern const struct arg_option options_params[], options_targets[];
 /* A problem on cli.scene with --param active ("*" if none is given), and --target,
  * --tikhonov, --stay and --smooth added. 0, or an exit code with the reason printed. */
 int problem_open(imp_problem **out);
-/* With --clip: decides which clipped numbers count, at the scene's present parameters. A fit
- * does that itself. 0, or an exit code with the reason printed. */
+/* With --clip: decides the weights of clipped values, at the scene's present parameters.
+ * A fit does that itself. 0, or an exit code with the reason printed. */
 int problem_censor(imp_problem *problem);
 void problem_close(imp_problem *problem);
 
@@ -41,10 +41,10 @@ void block_ties_json(struct json *j, const struct block *b);
 int block_writable(const struct block *b, const char *folder, int errors);
 /* What block_write wrote there in a former run, if anything; it was found writable. */
 void block_remove(const struct block *b, const char *folder);
-/* A texture's numbers as a picture in `folder`, named by the parameter: `x` in plain
+/* A texture's values as a picture in `folder`, named by the parameter: `x` in plain
  * colours, or, with `se` of the same length, signed. [h][w] or [h][w][1 or 3]; what has
- * another shape is a row; a volume is a .vol file. *path is to be freed. 0, or an exit code
- * with the reason printed. */
+ * another shape is a row; a volume is a .vol file. *path is to be freed. 0, or an exit
+ * code with the reason printed. */
 int block_write(const struct block *b, const double *x, const double *se,
                 const char *folder, char **path);
 const char *loss_word(void);

@@ -85,7 +85,7 @@ int manifest_whole(void)
     return cli.manifest ? status(imp_manifest_set_limit(cli.manifest, 0)) : 0;
 }
 
-/* Losses of walks from the lights are sums over all pixels: no parts of them are kept. */
+/* Losses by light tracing are sums over all pixels: no parts of them are kept. */
 static int loss_from_lights(void)
 {
     struct imp_scene_info info = {.size = sizeof info};

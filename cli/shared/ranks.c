@@ -108,7 +108,7 @@ int ranks_open(imp_context *context)
                          r.ranks);
     if (!r.mpi) {
         snprintf(file, sizeof file, "libimporton-%s.so.0", r.name);
-        /* Global: plug-ins of Open MPI look for its symbols there. */
+        /* Global: plug-ins of Open MPI search for its symbols there. */
         r.library = dlopen(file, RTLD_NOW | RTLD_GLOBAL);
         const __typeof__(&imp_mpi_open) open = FUNCTION(imp_mpi_open);
         if (!open) {

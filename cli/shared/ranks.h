@@ -34,7 +34,7 @@ double ranks_same(double number);
 void ranks_remember(bool error, const char *text);
 /* Why calls fail, where the reason is another rank: its exit code, and a text. 0: not. */
 int ranks_ended(const char **text);
-/* The same exit code for all, and what the others have to say. */
+/* The same exit code for all, with the messages of the others. */
 int ranks_close(int rc);
 
 #endif

@@ -11,8 +11,8 @@
  * printed. */
 int settings_apply(const char *text);
 
-/* The text of such a file, read now and kept for settings_apply, which reads no file twice (it may
- * be a pipe); NULL: it cannot be read, which settings_apply will say. */
+/* The text of such a file, read now and kept for settings_apply, which reads no file
+ * twice (it may be a pipe); NULL: it cannot be read, which settings_apply will report. */
 const char *settings_hold(const char *path, size_t *length);
 
 /* All of a file, with a zero byte behind the end; NULL with errno set: it cannot be read,

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon view: a page on this machine that shows a render, a fit or bent rays while one
- * looks on. */
+ * importon view: a page on this machine that shows a render, a fit or bent rays as they
+ * run. */
 #include "bend/cmd_bend.h"
 #include "fit/fit_options.h"
 #include "shared/problem_options.h"
@@ -12,7 +12,7 @@ struct view_options view_options;
 static const struct arg_option options[] = {
     {ARG_INT, 0, "port", "N", "listen on this port of 127.0.0.1 (default: any)",
      &view_options.port, 1, 65535, NULL},
-    {ARG_TEXT, 0, "checkpoint", "FILE", "where a fit that is stopped is kept",
+    {ARG_TEXT, 0, "checkpoint", "FILE", "where the state of a fit is saved",
      &view_options.checkpoint, 0, 0, NULL},
     {ARG_TEXT, 0, "truth", "FILE", "bent rays: the true field, to compare",
      &bend_truth_path, 0, 0, NULL},

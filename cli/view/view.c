@@ -108,7 +108,7 @@ struct view_wish view_take(void)
     return w;
 }
 
-/* Signals do not wake a thread that waits, so it looks up now and then. */
+/* Signals do not wake a thread that waits, so it polls. */
 struct view_wish view_wait(void)
 {
     pthread_mutex_lock(&v.lock);

@@ -9,7 +9,7 @@
 #include "shared/command.h"
 #include <importon/report.h>
 
-/* A number with a slider. */
+/* A value with a slider. */
 struct view_number {
     char *name; /* owned */
     const char *unit;
@@ -21,7 +21,7 @@ struct view_number {
 struct view_wish {
     int stop;  /* what runs */
     int go;    /* go on with it */
-    int again; /* begin it anew, with the numbers as they are */
+    int again; /* begin it anew, at the present values */
     int save;
     int moved;           /* numbers: see view_values */
     int walks, pixel[2]; /* random walks of a pixel */
@@ -34,7 +34,7 @@ enum view_state { VIEW_RUNNING, VIEW_STOPPED, VIEW_DONE };
 struct view_kind {
     const char *what;   /* "render", "fit", "bend fit" */
     const char *target; /* of "save": the file or folder; NULL: there is none */
-    int again;          /* may begin anew from the numbers as they are */
+    int again;          /* may begin anew from the present values */
     int walks;          /* has random walks: see view_walks */
 };
 
@@ -88,11 +88,12 @@ void view_pictures(enum view_channel channel, const char *name, const char *role
                    int spp);
 
 /* ---- view_kept.c ---- */
-/* Keep walks at the numbers as they are, at most `most` of a pixel, unless those that are
+/* Record walks at the present values, at most `most` of a pixel, unless those that are
  * kept do; any wish ends it. */
 void view_kept_draw(int64_t most);
-/* The picture at these numbers by the walks that are kept, and their effective sample size;
- * the caller destroys it. NULL: there are none, or they are worth too little. */
+/* The picture at these numbers by the walks that are kept, and their effective sample
+ * size; the caller destroys it. NULL: there are none, or their effective sample size is
+ * too small. */
 imp_film *view_kept_picture(int64_t most, double *ess);
 void view_kept_close(void);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Bent rays while one looks on: rays, slices of the index and spots follow the numbers of
- * the field, and a fit as it runs. */
+ * Bent rays in the live view: rays, slices of the index and spots for the values of the
+ * field, and a fit as it runs. */
 #include "view.h"
 
 #include "bend/bend_items.h"
@@ -16,7 +16,7 @@
 #include <string.h>
 
 enum { NUMBERS = 64 };
-#define SHOW_SHARE 0.25 /* of the time, at most, is for what is looked at */
+#define SHOW_SHARE 0.25 /* of the time, at most, is for pictures of the view */
 
 static struct {
     imp_bend *bend;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A fit while one looks on: after each iteration its numbers, its losses and, now and
- * then, a picture with few samples. What is stopped goes on from a checkpoint, with the
- * bits of a fit that was not stopped; or begins anew where the sliders are. */
+ * A fit in the live view: after each iteration its values, its losses and, now and then,
+ * a picture with few samples. What is stopped goes on from a checkpoint, with the bits of
+ * a fit that was not stopped; or begins anew where the sliders are. */
 #include "view.h"
 
 #include "fit/fit_answer.h"
@@ -18,7 +18,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#define PICTURE_SHARE 0.25 /* of the time, at most, is for pictures to be looked at */
+#define PICTURE_SHARE 0.25 /* of the time, at most, is for pictures of the view */
 
 static struct {
     imp_problem *problem;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Kept walks behind the sliders of a picture: when a number is moved, walks that were
- * drawn at other numbers are evaluated, without a ray, in a fraction of the time in which
- * as many are traced. Fresh ones follow. */
+ * Recorded walks behind the sliders of a picture: when a value is moved, walks that were
+ * recorded at other values are evaluated, without a ray, in a fraction of the time in
+ * which as many are traced. Fresh ones follow. */
 #include "view.h"
 
 #include <importon/walks.h>
@@ -17,7 +17,7 @@ enum { SPP = 16, LEAST_SPP = 1, BYTES = 256 << 20 };
 static struct {
     imp_walks *walks; /* NULL: none */
     int spp;
-    bool stale; /* worth less than a new draw, at the numbers as they are */
+    bool stale; /* at the present values, less useful than a new draw */
     bool never; /* this scene's walks are not kept */
 } k;
 

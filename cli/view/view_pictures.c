@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Pictures that a fit is compared by while one looks on: its targets, and what their
- * sensors see. */
+ * Pictures of a fit in the live view: its targets, and the renders of their sensors. */
 #include "fit/fit_pictures.h"
 #include "shared/picture_files.h"
 #include "shared/problem_options.h"

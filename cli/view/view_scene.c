@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A picture that is made while one looks on, and made again when a number is moved: with
- * few samples first, by kept walks where they can be had, then with more, at last as
- * importon render makes it. What is stopped goes on with new random numbers, and both
- * count. */
+ * A picture in the live view, made again when a value is moved: with few samples first,
+ * by recorded walks where they are available, then with more, at last as importon render
+ * makes it. What is stopped goes on with new random numbers, and both count. */
 #include "view.h"
 
 #include "shared/picture_files.h"
@@ -22,7 +21,7 @@ static struct {
     size_t n;
     const char *path; /* of "save" */
     imp_film *film;   /* the best so far; NULL: none */
-    bool kept;        /* it was made of kept walks */
+    bool kept;        /* it was made of recorded walks */
     bool said_so;     /* and the page shows it */
     int sessions;     /* seeds in use: each run that is merged has its own */
 } r;
@@ -173,8 +172,8 @@ static int take(int64_t spp, bool merges)
     return 0;
 }
 
-/* The picture by walks that are kept from other numbers: it is shown until a fresh one has
- * more samples. */
+/* The picture by walks recorded at other values: it is shown until a fresh one has more
+ * samples. */
 static void take_kept(int64_t all)
 {
     char text[160];
@@ -194,7 +193,7 @@ static void take_kept(int64_t all)
 }
 
 /* Rounds of 1, 4, 16, ... samples, each by itself, then all that are wanted: the last one
- * is what importon render makes. Those that kept walks take the place of are left out. */
+ * is what importon render makes. Those that recorded walks replace are left out. */
 static int rounds(int64_t all)
 {
     int rc = 0;

@@ -305,8 +305,8 @@ struct imp_texcoord {
     imp_v3 p;                          /* world position */
     const struct imp_carried *carried; /* what is looked up; NULL: the scene's colours */
     const struct imp_shape *shape;     /* that is looked up; NULL: none, or not known */
-    /* On a shape that is looked up by triangle: its number, and the surface there, of a
-     * shape in a group as it is in the group. */
+    /* The primitive of the shape that is looked up, -1: not known. Where it is looked up by
+     * triangle the surface there, too, of a shape in a group as it is in the group. */
     int prim;
     const struct imp_surface *surface;
 };
@@ -494,11 +494,19 @@ struct imp_hit {
     double time;
 };
 
+/* A point of a shape that is made of triangles: the triangle, and the barycentric weights of
+ * its second and third vertex. Of other shapes the engine knows a point by its uv. */
+struct imp_located {
+    int32_t prim; /* -1: not known */
+    float at[2];
+};
+
 struct imp_surface {
     imp_v3 p, ng;   /* position and geometric normal (unit), world */
     imp_v3 s, t, n; /* shading frame, world */
     imp_v3 dp_du, dp_dv;
     double uv[2];
+    struct imp_located located; /* of a point that sample_area drew */
 };
 
 /* A point on a light as seen from `ref`. */
@@ -510,6 +518,8 @@ struct imp_light_sample {
     double cos_light; /* signed cosine at the light's shading normal; 1 if it has none */
     imp_v3 p;         /* the point, world (not set for the environment) */
     imp_v3 ng;        /* its geometric normal */
+    struct imp_located located; /* the same point, of area lights. The engine sets prim to
+                                   -1 before it calls */
 };
 
 /* Where a light walk begins, and whither. Its throughput is
@@ -526,6 +536,7 @@ struct imp_emission_sample {
                          per area across d, or p is a point */
     double pdf_p; /* per area; 1: a point */
     double pdf_d; /* per steradian; 1: one direction alone */
+    struct imp_located located; /* as of struct imp_light_sample */
 };
 /* All of a scene lies in it. */
 struct imp_ball {
@@ -541,7 +552,8 @@ struct imp_sensor_sample {
     double px, py; /* film position */
     double weight; /* film area, in pixels, per steradian at ref and lens point drawn */
     imp_v3 ng;     /* of a sensor that is a surface: its geometric normal */
-    double cos_sensor; /* and the cosine there; of others 1 */
+    double cos_sensor;          /* and the cosine there; of others 1 */
+    struct imp_located located; /* of a sensor that is a surface: the same point */
 };
 
 enum imp_geometry { IMP_TRIANGLES, IMP_ANALYTIC, IMP_CURVES };
@@ -641,8 +653,8 @@ struct imp_shape_ops {
     /* The sphere or cylinder that it is part of, or the radius 0: of neither. NULL: flat
      * where it is hit. */
     void (*round)(const struct imp_shape *s, struct imp_round *out);
-    /* Draw a point uniformly by area, density 1/area; of IMP_SHAPE_SQUARE its uv is u.
-     * NULL: light walks cannot begin on it. */
+    /* Draw a point uniformly by area, density 1/area; of IMP_SHAPE_SQUARE its uv is u. Of
+     * triangles sets located, too. NULL: light walks cannot begin on it. */
     void (*sample_area)(const struct imp_shape *s, const double u[2],
                         struct imp_surface *out);
     /* The surface at a place that was met before, from what it had in uv, as floats. Sets

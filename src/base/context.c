@@ -94,7 +94,7 @@ const char *imp_status_text(enum imp_status status)
 
 const char *imp_version(void) { return IMP_VERSION_STRING; }
 
-/* Said where there is no memory for a text of its own. */
+/* The message if there is no memory for the text of another. */
 static const struct imp__error_text no_memory = {NULL, NULL, "out of memory"};
 
 /* A thread ends before the context: hosts may make a thread for every call. */

@@ -22,7 +22,7 @@ void imp__drops_merge(struct imp_drops *into, const struct imp_drops *from);
 uint64_t imp__drops_total(const struct imp_drops *drops);
 
 /* IMP_E_PATHS if more than 1 + budget * walks were dropped; budget 0: 1e-4. The message
- * has the count of each cause and the walk to look at first; `points`: an option that
+ * has the count of each cause and the key of the first walk; `points`: an option that
  * names its random numbers, or "". */
 enum imp_status imp__drops_budget(imp_context *ctx, const struct imp_drops *drops,
                                   double budget, double walks, const char *points);

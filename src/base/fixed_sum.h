@@ -19,7 +19,7 @@ typedef int64_t __attribute__((may_alias)) imp_fixed;
 
 struct imp_fixed_sum {
     size_t n;
-    imp_fixed *sum; /* [n]; NULL: terms are only looked at */
+    imp_fixed *sum; /* [n]; NULL: terms are measured, not added */
     /* [n] what is below the unit, in 2^-40 of it, for terms of many sizes; or NULL. */
     imp_fixed *fine;
     size_t apart; /* numbers that lie between two of sum, and of fine */

@@ -6,7 +6,7 @@
 
 #include <stddef.h>
 
-/* Levenshtein's distance; SIZE_MAX for long names, which are not worth it. */
+/* Levenshtein's distance; SIZE_MAX for long names, where it is not computed. */
 size_t imp__edit_distance(const char *a, const char *b);
 
 /* The nearest of the candidates shown to imp__nearest_try, if it is near. */

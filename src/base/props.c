@@ -293,7 +293,7 @@ enum imp_status imp__props_choice(imp_context *ctx, struct imp_node *node,
                            name, p->string, list);
 }
 
-/* Defaults that a kind added stand where the node does. */
+/* Defaults that a kind added have the node's own location. */
 static bool is_written(const struct imp_node *node, const char *name)
 {
     const struct imp_prop *p = imp__node_prop(node, name);

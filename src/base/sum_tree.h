@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Sums in a fixed binary tree. Items 0, 1, 2, ... are cut into groups of `group`; of one
- * group, node (l, i) is the sum of its items [i 2^l, (i + 1) 2^l):
+ * Sums in a fixed binary tree. Items 0, 1, 2, ... are cut into groups of `group`; node
+ * (l, i) of a group is the sum of its items [i 2^l, (i + 1) 2^l):
  *
  *     node(l, i) = node(l - 1, 2 i) + node(l - 1, 2 i + 1)
  *

@@ -81,7 +81,7 @@ static inline bool imp__team_writes(const imp_context *ctx)
     return !ctx->team || ctx->team->role != IMP_TEAM_RANK || ctx->team->host.rank == 0;
 }
 
-/* Do files come from rank 0? Then all ranks make every call that reads one, or looks
+/* Do files come from rank 0? Then all ranks make every call that reads a file or tests
  * whether it exists. */
 static inline bool imp__team_broadcasts(const imp_context *ctx)
 {

@@ -129,7 +129,8 @@ enum imp_status imp__chunks_keep(struct imp__sharing *s, const struct imp_loop *
     struct imp__team *team = ctx->team;
     const size_t n = s->desc->n_items, group = s->tree.desc.group;
     const size_t node = sizeof(struct imp__sum_place) + s->desc->size;
-    /* Sums of groups are kept each; of one group, a node for each chunk. */
+    /* With several groups the sum of each is kept; with one group, a node for each
+     * chunk. */
     const bool one = group >= n;
     size_t chunks = team->chunks(one ? 0 : ((n - 1) / group + 1 + KEPT_CHUNKS) * node,
                                  one ? node : 0, KEPT_CHUNKS, team->host.payload);

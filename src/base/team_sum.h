@@ -41,7 +41,7 @@ struct imp__sharing {
     uint64_t nodes; /* in the message */
     bool own;       /* this rank's items are being computed */
     bool no_memory;
-    struct imp__sum_head all; /* what all ranks say together */
+    struct imp__sum_head all; /* the messages of all ranks, combined */
     int failed;               /* the first rank that did */
     bool strange;
     int left; /* > 0: the first rank whose parameters are others, plus 1 */

@@ -37,7 +37,9 @@ void imp__bend_fingerprint(const imp_bend *b, const uint8_t *held,
     h = imp__hash(h, b->d, b->n * sizeof *b->d);
     h = imp__hash(h, b->power, b->n * sizeof *b->power);
     h = imp__hash(h, b->group, b->n * sizeof *b->group);
-    if (b->dispersion)
+    const bool disperses = b->dispersion != NULL;
+    HASH(h, disperses);
+    if (disperses)
         h = imp__hash(h, b->dispersion, b->cap_dispersion * sizeof *b->dispersion);
     HASH(h, o->scheme), HASH(h, o->way), HASH(h, o->step), HASH(h, o->max_steps);
     HASH(h, o->outside), HASH(h, o->outside_index), HASH(h, o->grazing);

@@ -70,8 +70,8 @@ struct imp_bend {
     size_t n_history, cap_history;
 };
 
-/* IMP_E_NUMERIC, with the counts in the message, if no ray came to its end: a value or a
- * check over no rays would look like a perfect one. */
+/* IMP_E_NUMERIC, with the counts in the message, if no ray reached an end: a value or a
+ * check over no rays would appear to be perfect. */
 enum imp_status imp__bend_traced(const imp_bend *b, const struct imp_bend_stats *s);
 /* The options, with the step chosen from the grid where none is given. */
 void imp__bend_options(const imp_bend *b, struct imp_bend_options *o);

@@ -33,7 +33,7 @@ void imp__color_number_set(const struct imp__color_ask *ask, double c,
         ask->role == IMP_EMISSION && !ask->scalar && ask->mode == IMP_RGB ? 3 : 1;
 }
 
-/* Equal-energy white: what a constant spectrum 1 looks like as light. */
+/* Equal-energy white: the colour of a constant spectrum 1 as light. */
 static void equal_energy_set(const struct imp__color_ask *ask, double c,
                              struct imp__color *out)
 {

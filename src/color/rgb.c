@@ -25,8 +25,8 @@ void imp__rgb_to_xyz(const double rgb[3], double xyz[3])
     matrix_apply(m, rgb, xyz);
 }
 
-/* 1000 points from end to end, each standing for 1/1000 (not 1/999) of the range: the
- * format fixes this, so that a constant 1 under D65 is 0.999 and not 1. */
+/* 1000 points from end to end, each with the weight of 1/1000 (not 1/999) of the range:
+ * the format fixes this, so that a constant 1 under D65 is 0.999 and not 1. */
 void imp__spectrum_to_rgb(size_t n, const double *nm, const double *value, int daylight,
                           double rgb[3])
 {

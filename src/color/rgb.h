@@ -29,8 +29,8 @@ static inline double imp__srgb_encode(double c)
 }
 
 /* Colour of a sampled spectrum (docs/scene-format.md 2.3), not clamped. Wavelengths
- * increase; the spectrum is linear between them and 0 outside. `daylight`: of a surface
- * of this reflectance under D65; else of a light of this power. */
+ * increase; the spectrum is linear between them and 0 outside. `daylight`: the colour of
+ * a surface of this reflectance under D65; else that of a light of this power. */
 void imp__spectrum_to_rgb(size_t n, const double *nm, const double *value, int daylight,
                           double rgb[3]);
 

@@ -151,7 +151,7 @@ void imp__spectrum_at(const struct imp_spectrum *s, double nm,
     for (int k = 0; k < out->n; k++) out->d[k] *= f;
 }
 
-/* Formulas have no bound that is simple: they are smooth, and looked at closely. */
+/* Formulas have no simple bound: they are smooth, and sampled every nm. */
 static double formula_most(const struct imp_spectrum *s)
 {
     const double lo = imp_max(s->lo, IMP_CIE_FIRST_NM - 100),

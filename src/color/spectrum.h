@@ -75,8 +75,8 @@ void imp__spectrum_at(const struct imp_spectrum *s, double nm,
 /* No less than the value at any wavelength. */
 double imp__spectrum_most(const struct imp_spectrum *s);
 
-/* Colour in linear sRGB (docs/scene-format.md 2.3), not clamped. `daylight`: of a surface
- * of this reflectance under D65; else of a light of this power. */
+/* Colour in linear sRGB (docs/scene-format.md 2.3), not clamped. `daylight`: the colour
+ * of a surface of this reflectance under D65; else that of a light of this power. */
 void imp__spectrum_color(const struct imp_spectrum *s, bool daylight, double rgb[3]);
 
 /* Sets color_d, of a form whose values are linear in its numbers, or a colour. False: no

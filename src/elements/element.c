@@ -188,7 +188,7 @@ static enum imp_status split_work(size_t item, int worker, int slot, void *paylo
     const size_t end = imp_min((item + 1) * SPLITS_PER_ITEM, s->n);
     for (size_t i = item * SPLITS_PER_ITEM; i < end; i++) {
         struct imp__element *x = &s->e->elements[s->element[i]];
-        double area = 0; /* the children know better how much of it is exposed */
+        double area = 0; /* the children's exposed areas are more accurate */
         for (uint32_t k = 0; k < 4; k++) {
             fill(s->e, x->child + k, (int)k);
             area += s->e->elements[x->child + k].area;

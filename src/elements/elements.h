@@ -1,4 +1,3 @@
-/* clang-format off */
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Finite elements with directional radiance and importance (Christensen, Salesin, DeRose
@@ -16,6 +15,7 @@
  *
  * where a is importance that arrives from the eye and s what a measuring patch emits. R is
  * symmetric and both sums are over the same links, so a.l = Le . (S^T g) to rounding. */
+/* clang-format off */
 /* clang-format on */
 #ifndef IMP_ELEMENTS_H
 #define IMP_ELEMENTS_H

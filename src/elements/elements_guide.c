@@ -12,11 +12,11 @@
  *   leaving     exitant radiance by direction, and the part of it that was reflected at
  *               least twice: for Russian roulette
  *
- * Where walks from the lights begin is in guide_send.c.
- * Histograms of directions are kept for a coarser level, so that they fit into the cache.
- * A cell receives over its own links and over those of its ancestors; of an ancestor's
- * link it receives the sample whose quarter contains the cell. Every distribution is
- * mixed with the one that is used without a guide, which bounds the density from below.
+ * Where light walks begin is in guide_send.c. Histograms of directions are kept for a
+ * coarser level, so that they fit into the cache. A cell receives over its own links and
+ * over those of its ancestors; from an ancestor's link it receives the sample whose
+ * quarter contains the cell. Every distribution is mixed with the one that is used
+ * without a guide, which bounds the density from below.
  */
 #include "elements_guide.h"
 #include "math/rng.h"

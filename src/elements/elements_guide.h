@@ -89,8 +89,7 @@ void imp__guide_smooth(int side, const double *in, double *out);
  * sums are 0. */
 void imp__guide_cumulate(const double *sum, int n, double base, float *cdf);
 
-/* guide_send.c, for walks from the lights: which light sends them, from where and
- * whither. */
+/* guide_send.c, for light walks: the choice of the light, of its point and direction. */
 enum imp_status imp__guide_send(struct imp__guide *g);
 
 #endif

@@ -119,7 +119,7 @@ static void below(const imp_elements *e, const struct imp__element *x, uint32_t 
         for (uint32_t q = 0; q < 4; q++) below(e, x, e->elements[i].child + q, to);
 }
 
-/* Links into what is above: of each the quarter that the cell lies in. */
+/* Links into the ancestors: the quarter of each that contains the cell. */
 static void above(const imp_elements *e, const struct imp__element *x, uint32_t cell,
                   struct arriving *to)
 {
@@ -301,7 +301,7 @@ enum imp_status imp__guide_wide_work(size_t item, int worker, int slot, void *pa
     struct arriving to = {.bins = bins};
     (void)slot;
     const double share = b->share * flatness(e, imp__el_material_of(e, x));
-    if (share < 0.5 * b->share) return IMP_OK; /* not worth its densities */
+    if (share < 0.5 * b->share) return IMP_OK; /* would cost more than it gains */
     memset(bins, 0, GUIDE_BINS * sizeof *bins);
     if (b->field == IMP_GUIDE_LIGHT) {
         below(e, x, index, &to);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Where a guide begins walks from the lights. They carry radiance, and
- * what guides them is the adjoint of that, the importance that the elements hold
- * (Christensen et al. 1993): flux that arrives at x from w brings the reading g(x->w).
+ * Where a guide begins light walks. They carry radiance, and are guided by its adjoint,
+ * the importance of the elements (Christensen et al. 1993): flux that arrives at x from w
+ * contributes g(x->w) to the reading.
  *
  *     light k           what it gives the sensor over links and rays of the eye,
  *                       sum of emission x importance

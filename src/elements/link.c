@@ -109,9 +109,8 @@ void imp__el_link_make(const imp_elements *e, uint32_t src, uint32_t rcv,
         if (imp__el_sees(e, ri, x, rj, y))
             out->k[s] = q * imp__polygon_area(i->corners, v);
     }
-    /* Kept even if no ray arrives: dropping those loses energy for good (about 0.3 % of
-     * the picture here), and the oracle looks at them with the kernel that they might
-     * have. */
+    /* Kept even if no ray arrives: dropping those loses energy (about 0.3 % of the
+     * picture here), and the oracle uses their unoccluded kernel. */
     *keep = true;
 }
 

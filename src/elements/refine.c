@@ -140,7 +140,7 @@ static double resolved_by_source(const imp_elements *e, const struct imp__el_lin
     return emitted > 0 ? reflected / (emitted + reflected) : 1;
 }
 
-/* ---- One wave: look at links [from, n), split, make their children's links ----- */
+/* ---- One wave: test links [from, n), split, make their children's links -------- */
 
 /* What becomes of a link: it stays, its receiver is to be split, its source is, or it goes.
  * FRESH: the element still needs to be split itself. */

@@ -9,7 +9,7 @@
 #define FORMAT_FLOAT3 3
 
 #ifndef IMP_OIDN
-#define IMP_OIDN "libOpenImageDenoise.so.2" /* where the loader looks */
+#define IMP_OIDN "libOpenImageDenoise.so.2" /* by the loader's search path */
 #endif
 
 typedef void *handle; /* of a device, or a filter */

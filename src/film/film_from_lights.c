@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The picture of a run by walks from the lights. */
+ * The picture of a run by light tracing or bidirectional walks. */
 #include "base/team.h"
 #include "film_light.h"
 #include "film_measure.h"

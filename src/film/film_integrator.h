@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * All kinds of integrators, and those that have no room but this one: depth, aov and
- * moment look at first hits and at others' radiance. */
+ * All kinds of integrators, and those that belong to this room: depth, aov and moment
+ * measure first hits and the radiance of nested integrators. */
 #ifndef IMP_FILM_INTEGRATOR_H
 #define IMP_FILM_INTEGRATOR_H
 

@@ -10,7 +10,7 @@
 #define ITEMS_MAX   64
 #define ITEM_WALKS  256 /* at least */
 #define CHECK_WALKS 1024
-#define GROUPS_MAX  256 /* of samples from both ends */
+#define GROUPS_MAX  256 /* of bidirectional samples */
 #define GROUP_ITEMS 16
 
 struct worker {
@@ -29,7 +29,7 @@ struct job {
     imp_context *ctx;
     struct imp_splat_scale scale;
     size_t pixels, n, items;
-    /* Samples from both ends: groups of `group` items each, whose spread is the error. */
+    /* Bidirectional samples: groups of `group` items each, whose spread is the error. */
     size_t groups, group;
     int64_t each;     /* walks of a pixel, in groups as even as can be */
     double *spread;   /* [pixels][n][2]: sums of S^2 and N S over groups of N walks */
@@ -89,8 +89,8 @@ static void walk_drop(const struct job *j, struct worker *w, enum imp_drop cause
     imp__drops_add(&w->drops, &key);
 }
 
-/* Adds walk `index` to the item's sums, [pixels][n][2]; of groups [pixels][n], since what is
- * wanted of them is the square of the sum. */
+/* Adds walk `index` to the item's sums, [pixels][n][2]; with groups [pixels][n], since
+ * the square of their sum is needed. */
 static enum imp_status walk_add(const struct job *j, struct worker *w, int64_t index,
                                 double *sums)
 {

@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Pictures by walks from the lights, each of which may reach any pixel. A pixel is
+ * Pictures by light walks, each of which may reach any pixel. A pixel is
  *
  *     I_p = 1/N sum_i c_ip,    c_ip = sum over the reaches of walk i of h(x - x_p) L / H_p
  *
  * with the filter h and its integral H_p over the part of the film that is sampled. Walks
  * are independent, c_ip is 0 in most pixels, and se^2 = (sum c^2 - (sum c)^2/N)/(N (N-1)).
  *
- * A sample from both ends (walk/both/both.h) adds what its walk from the sensor, which begins in
- * a pixel, brings: N of a pixel, not of the picture. The samples are cut into groups with as
- * many of each pixel, and the spread of the groups' pictures is the standard error.
+ * A bidirectional sample (walk/both/both.h) adds the contribution of its walk from the
+ * sensor, which begins in a pixel, with N the samples of the pixel, not of the picture.
+ * The samples are cut into groups with equal numbers for each pixel, and the spread of
+ * the groups' pictures is the standard error.
  *
  * Order of the sums: the walks are cut into a fixed number of items, each adds its walks up
  * one by one in a film of its own, and items are added in a fixed binary tree. */

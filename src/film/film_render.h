@@ -7,7 +7,7 @@
 
 #include "film_measure.h"
 
-/* Solve the scene by finite elements and look at it through the measure's sensor, in the
+/* Solve the scene by finite elements and render it with the measure's sensor, in the
  * pixel format of its film. IMP_CANCELLED with the picture of a coarser solution. */
 enum imp_status imp__render_elements(const struct imp_measure *measure,
                                      const struct imp_run *run, imp_film **out);

@@ -3,8 +3,9 @@
  * Sums of a picture's samples, from which means and errors follow.
  *
  * A sample counts in its own pixel where the filter is no wider than one (box): sums of v
- * and v^2 stand in two arrays, 16 bytes a value. Wider filters weight it into all pixels
- * within their radius (docs/scene-format.md 10), and the pixel is the ratio  sum w v / sum w.
+ * and v^2 are in two arrays, 16 bytes per value. Wider filters weight it into all pixels
+ * within their radius (docs/scene-format.md 10), and the pixel is the ratio sum w v / sum
+ * w.
  *
  * Error of the ratio, with e = w (v - mean):  sum e^2 / (sum w)^2  if the samples were
  * spread over the filter at random. But every pixel sends the same number of them, and

@@ -144,7 +144,7 @@ enum imp_status imp__tiles_run(struct imp_tiles *t, const struct imp_tiles_pass 
                                   .fraction_hi = pass->fraction_hi,
                                   .start_s = pass->start_s,
                                   .deadline_s = pass->deadline_s};
-    /* A look is what every rank takes by itself. */
+    /* Every rank takes the sample of items by itself. */
     const int alone = ctx->team && pass->every > 1;
     if (alone) ctx->team->alone++;
     if (imp__team_shares(ctx)) t->drops = (struct imp_drops){0};

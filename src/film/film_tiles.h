@@ -59,7 +59,7 @@ struct imp_tiles_pass {
     double units, fraction_lo, fraction_hi, start_s, deadline_s; /* as of imp_loop */
     size_t first_part, parts;                                    /* these of every tile */
     bool per_tile; /* a sum for every tile, not one over all items */
-    size_t every;  /* > 1: a look at one in so many items */
+    size_t every;  /* > 1: a sample, one in so many items */
 };
 
 enum imp_status imp__tiles_create(struct imp_tiles *t);

@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A picture until its error is small enough: the mean over looks, each of its own walks.
+ * A picture until its error is small enough: the mean over stages, each of its own walks,
+ * after each of which the error is tested (sequential testing).
  *
- * With s the standard errors of normal errors, the squared error E = sum (I - truth)^2 has
- * the mean S = sum s^2. Whatever the errors share, E is beyond z^2 S no oftener than a normal
- * number is beyond +-z, for z >= 1.54 (Szekely and Bakirov, Probab. Theory Relat. Fields
- * 126, 2003). Where no more than c values share walks, the eigenvalues of their covariance
- * have at most the sum of squares c Q, Q = sum s^4, and at most the size c max s^2, and
+ * With s the standard errors of normal errors, the squared error E = sum (I - truth)^2
+ * has the mean S = sum s^2. Whatever the errors share, E is beyond z^2 S no more often
+ * than a normal variable is beyond +-z, for z >= 1.54 (Szekely and Bakirov, Probab.
+ * Theory Relat. Fields 126, 2003). Where no more than c values share walks, the
+ * eigenvalues of their covariance have at most the sum of squares c Q, Q = sum s^4, and
+ * at most the size c max s^2, and
  *
  *     E > S + 2 (c Q x)^(1/2) + 2 x min(S, c max s^2)    with probability exp(-x) at most
  *

@@ -67,7 +67,8 @@ static bool item_note(imp_manifest *m, enum imp__item_kind kind, const char *nam
     return false;
 }
 
-/* What a manifest does not list, or lists with other bytes, is not looked into. */
+/* Files that a manifest does not list, or lists with other bytes, are not read
+ * further. */
 static enum imp_status on_read(void *payload, const char *path, const void *bytes,
                                size_t n)
 {
@@ -105,7 +106,7 @@ static enum imp_status keep(const void *message, size_t bytes,
 }
 
 /* The first sums of a run get much room, later ones little: one sum is verified in parts,
- * of many steps some. A step of a fit takes a thousandth of what is left. */
+ * of many sums only some. A step of a fit takes a thousandth of the remaining room. */
 static size_t chunks(size_t bytes, size_t each, size_t most, void *payload)
 {
     imp_manifest *m = payload;

@@ -6,7 +6,7 @@
 
 #define MAGIC          "impproof"
 #define MANIFEST_ORDER 0x01020304u
-#define VERSION        4
+#define VERSION        5
 
 struct head {
     char magic[8];

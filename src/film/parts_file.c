@@ -6,7 +6,7 @@
 
 #define MAGIC       "impparts"
 #define PARTS_ORDER 0x01020304u
-#define VERSION     3
+#define VERSION     4
 
 struct head {
     char magic[8];

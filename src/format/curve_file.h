@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Curves in space, as Mitsuba keeps them: one control point a line, four numbers, x, y, z and
- * radius; empty lines stand between curves. */
+ * Curves in space, in Mitsuba's format: one control point per line, x, y, z and radius;
+ * empty lines separate curves. */
 #ifndef IMP_FORMAT_CURVE_FILE_H
 #define IMP_FORMAT_CURVE_FILE_H
 

@@ -53,7 +53,7 @@ static int se_of(const struct exr_reader *r, int i)
     return of >= 0 && se_of(r, of) < 0 ? of : -1;
 }
 
-/* R, G, B, A stand in this order though files keep them by the alphabet; layers stay
+/* R, G, B, A are in this order though files have them in alphabetical order; layers stay
  * together, channels without a layer come first. */
 static int channel_rank(const char *last)
 {

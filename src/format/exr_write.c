@@ -22,7 +22,7 @@ struct exr_writer {
     exr_result_t (*compress)(exr_encode_pipeline_t *); /* the library's own */
     exr_context_t exr;
     const imp_film *film;
-    imp_film *rgb;          /* what a spectral film looks like; NULL: it is none */
+    imp_film *rgb;          /* preview of a spectral film; NULL: not spectral */
     const float *mean, *se; /* se NULL: not written */
     bool half;
 };
@@ -79,7 +79,7 @@ static enum imp_status header_write(struct exr_writer *w)
                             EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1));
     IMP_TRY(spectral_texts(w, part));
     if (imp__film_find(f, "X") >= 0 && imp__film_find(f, "Z") >= 0) {
-        /* Primaries that say: these numbers are X, Y, Z (equal-energy white). */
+        /* Primaries that declare the channels as X, Y, Z (equal-energy white). */
         const exr_attr_chromaticities_t xyz = {1, 0, 0, 1, 0, 0, 1 / 3.0f, 1 / 3.0f};
         EXR(exr_attr_set_chromaticities(w->exr, part, "chromaticities", &xyz));
     }

@@ -12,7 +12,7 @@
 imp_context *imp__hooks_enter(imp_context *ctx);
 void imp__hooks_leave(imp_context *previous);
 /* Has an allocation failed on this thread since the last call of this? Libraries do not
- * always say so themselves. */
+ * always report it themselves. */
 bool imp__hooks_failed(void);
 
 void *imp__hooks_malloc(size_t bytes);

@@ -73,7 +73,7 @@ static enum imp_status labels(struct reader *r, bool *factor, bool *tilt)
                     {"IESNA:LM-63-2019", false}, {"IES:LM-63-2019", false}};
     const char *line;
     size_t n;
-    *factor = true; /* files of 1986 do not say what they are */
+    *factor = true; /* files of 1986 have no signature */
     if (r->end - r->at >= 3 && memcmp(r->at, "\xef\xbb\xbf", 3) == 0) r->at += 3;
     while (next_line(r, &line, &n)) {
         if (r->line == 1 && (begins(line, n, "IESNA") || begins(line, n, "IES:"))) {

@@ -51,8 +51,8 @@ static bool decode(struct jpeg_job *j, const struct imp_bytes *file)
     const bool grey = j->jpeg.jpeg_color_space == JCS_GRAYSCALE;
     j->jpeg.out_color_space = grey ? JCS_GRAYSCALE : JCS_RGB;
     j->jpeg.dct_method = JDCT_ISLOW;
-    /* A block of 8 x 8 takes a bit at least (its DC coefficient), and a block may stand
-     * for four where colours are subsampled. */
+    /* A block of 8 x 8 takes a bit at least (its DC coefficient), and a block may cover
+     * four where colours are subsampled. */
     j->st = imp__image_film(j->ctx, j->name, j->jpeg.image_width, j->jpeg.image_height,
                             grey ? "Y" : "R,G,B", file->size, 4 * 512.0, &j->film);
     if (j->st != IMP_OK) return false;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * NumPy arrays (H, W, C) or (H, W): <f4 and <f8 in either order are read, <f4 is written. The
- * header is a Python dictionary, of which three entries are looked for. */
+ * NumPy arrays (H, W, C) or (H, W): <f4 and <f8 in either order are read, <f4 is written.
+ * The header is a Python dictionary, of which three entries are read. */
 #include "base/little.h"
 #include "base/number.h"
 #include "image.h"
@@ -116,7 +116,7 @@ enum imp_status imp__npy_encode(const imp_film *f, struct imp_bytes *out)
                  f->height, f->width, f->channels);
     header[10 + n] = ' ';
     memcpy(header + 123, "\t\t\t\t\n",
-           5); /* by this padding the command knows its own files */
+           5); /* by this padding the command recognises its own files */
     struct imp_bytes b = {.size = 128 + imp__film_values(f) * 4};
     b.capacity = b.size;
     b.data = imp__alloc(f->ctx, b.size, 1);

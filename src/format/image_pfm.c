@@ -57,8 +57,8 @@ enum imp_status imp__pfm_encode(const imp_film *f, struct imp_bytes *out)
     if (!pick.n)
         return imp__error(f->ctx, IMP_E_ARG,
                           "PFM: the film has no R, G, B and no Y channel");
-    /* The format has no comments. Nobody else spells -1 like this, and every parser of numbers reads
-     * it: by it the command knows its own files. */
+    /* The format has no comments. No other program spells -1 like this, and every parser
+     * of numbers reads it: the command recognises its own files by it. */
     char header[64];
     const int n = snprintf(header, sizeof header, "%s\n%d %d\n-0.1e+1\n",
                            pick.n == 3 ? "PF" : "Pf", f->width, f->height);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Headers of PLY files, and what they say about the body. */
+ * Headers of PLY files, and the layout of the body that they declare. */
 #include "base/number.h"
 #include "ply_file.h"
 #include <stdarg.h>

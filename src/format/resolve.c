@@ -26,7 +26,8 @@ static enum imp_status placed(struct imp_scene *scene, const struct imp_node *no
     return imp__prop_error(scene->ctx, node, p, st, "%s", imp_last_error(scene->ctx));
 }
 
-/* The file a node names. Included files look in their own folder first. */
+/* The file a node names. Files named in an included file are searched in its folder
+ * first. */
 static enum imp_status path_of(struct imp_scene *scene, struct imp_node *node,
                                const char **out)
 {

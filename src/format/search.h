@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Where files are looked for (docs/scene-format.md 1.5). scene->search holds, in the
- * order they are tried: <path> entries, latest first; the working folder; the caller's
+ * Where files are searched (docs/scene-format.md 1.5). scene->search contains, in the
+ * order of the search: <path> entries, latest first; the working folder; the caller's
  * folders; the folder of the scene file. */
 #ifndef IMP_FORMAT_SEARCH_H
 #define IMP_FORMAT_SEARCH_H

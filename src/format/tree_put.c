@@ -296,9 +296,8 @@ static const struct imp_node *member_of(const struct imp_node *root,
     return NULL;
 }
 
-/* Shapes of groups stand behind those of the scene, under the names that they have, and
- * so do those that an instance has covered with another material: as spheres, of which uv alone
- * is looked up. */
+/* Shapes of groups follow those of the scene, under their names, and so do those to which
+ * an instance gives another material: as spheres, since only their uv are used. */
 static enum imp_status members_put(struct putting *p)
 {
     const struct imp_scene *scene = p->scene;

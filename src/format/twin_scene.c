@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A second scene of the same objects and numbers, made from the first one's bytes. */
+ * A second scene with the same objects and values, made from the first one's bytes. */
 #include "twin_scene.h"
 #include "scene/fingerprint.h"
 #include "tree_file.h"

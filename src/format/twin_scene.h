@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A second scene of the same objects and numbers, in which walks of the first one are
+ * A second scene with the same objects and values, in which walks of the first one are
  * evaluated at other parameters. It has no geometry (tree_file.h). */
 #ifndef IMP_FORMAT_TWIN_SCENE_H
 #define IMP_FORMAT_TWIN_SCENE_H

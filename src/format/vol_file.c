@@ -127,7 +127,8 @@ static void fill(struct imp_file_writer *w, const void *payload)
     for (int k = 0; k < 6; k++) put_number(w, v->param->box[k]);
     for (size_t i = 0; i < info->count; i++)
         put_number(w, (float)(v->values ? v->values[i] : imp__param_get(v->param, i)));
-    /* Behind the grid, where no reader looks: by it the command knows its own files. */
+    /* Behind the grid, where no reader reads: the command recognises its own files by
+     * it. */
     imp__file_put(w, IMP_VOL_MARK, sizeof IMP_VOL_MARK - 1);
 }
 

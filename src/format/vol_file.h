@@ -9,7 +9,7 @@
 #include "base/file.h"
 #include "base/props.h"
 
-/* Stands behind the values in files of our making, where other readers do not look. */
+/* Written behind the values of our files, where other readers do not read. */
 #define IMP_VOL_MARK      "importon"
 #define IMP_VOL_BYTES_MAX ((size_t)1 << 34)
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Kept walks in a file: a head, the scene without its geometry (tree_file.h), the numbers
- * at which they were drawn, a checksum of these; then for each sensor a head and the
- * records of its tiles (walk/kept/record_file.c), each with a checksum of its own. */
+ * Recorded walks in a file: a head, the scene without its geometry (tree_file.h), the
+ * values at which they were drawn, a checksum of these; then for each sensor a head and
+ * the records of its tiles (walk/kept/record_file.c), each with a checksum of its own. */
 #ifndef IMP_FORMAT_WALKS_FILE_H
 #define IMP_FORMAT_WALKS_FILE_H
 
@@ -12,7 +12,7 @@
 
 #define IMP_WALKS_MAGIC      "impdrawn"
 #define IMP_WALKS_BYTE_ORDER 0x01020304u
-#define IMP_WALKS_VERSION    4
+#define IMP_WALKS_VERSION    5
 
 struct imp_walks_head {
     char magic[8];
@@ -36,7 +36,7 @@ static inline bool imp__walks_is_number(const struct imp_param *p)
 {
     return p->store != IMP_STORE_BULK;
 }
-/* All numbers of the scene, theta [n_theta]; of theta, those that are no texels. */
+/* All values of the scene, theta [n_theta]; and those of theta that are not texels. */
 void imp__walks_theta_get(const struct imp_scene *scene, double *theta);
 void imp__walks_theta_set(struct imp_scene *scene, const double *theta);
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Kept walks read from a file. */
+ * Recorded walks read from a file. */
 #include "base/arguments.h"
 #include "math/hash.h"
 #include "walks_file.h"
@@ -126,7 +126,7 @@ out:
     return st;
 }
 
-/* Are these the walks of a given scene? The records say so tile by tile as well. */
+/* Are these the walks of a given scene? The records are checked tile by tile as well. */
 static enum imp_status scene_same(const struct reading *r, const struct imp_scene *scene)
 {
     if (scene->n_theta == r->head.n_theta &&

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Kept walks written into a file; under MPI the ranks send theirs to the first. */
+ * Recorded walks written into a file; under MPI the ranks send theirs to the first. */
 #include "base/arguments.h"
 #include "base/team.h"
 #include "math/hash.h"

@@ -25,7 +25,7 @@ enum imp_status imp__xml_read(struct imp_scene *scene, const struct imp_bytes *t
 enum xml_level_kind {
     XML_OBJECT,
     XML_TRANSFORM,
-    XML_LEAF /* nothing may stand inside */
+    XML_LEAF /* no content is allowed inside */
 };
 struct xml_level {
     enum xml_level_kind kind;

@@ -30,7 +30,7 @@ struct pair { /* colour channels of both: index, and of the error; -1: none */
     bool noise[2];
 };
 
-/* Errors may stand in channels of their own, as in EXR files. */
+/* Errors may be in channels of their own, as in EXR files. */
 static int error_channel(const imp_film *f, const char *name)
 {
     char own[16];

@@ -112,7 +112,7 @@ static double intensity(const struct imp_scene *scene, const struct imp_emitter 
     return mean > 0 && mean < INFINITY ? mean : 0;
 }
 
-/* A light's numbers have changed: its strength follows, so that densities never aim at
+/* A light's values have changed: its strength follows, so that densities never aim at
  * what a light once was. */
 struct strength {
     struct imp_scene *scene;

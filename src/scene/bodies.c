@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Graded media: which shapes they fill, their numbers as parameters, and what of them can
- * be differentiated. */
+ * Graded media: which shapes they fill, their coefficients as parameters, and what of
+ * them can be differentiated. */
 #include "kind/shape/shape.h"
 #include "scene_build.h"
 

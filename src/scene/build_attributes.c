@@ -86,7 +86,7 @@ out:
     return st;
 }
 
-/* Bounds that an input sets to its texture's numbers hold for those of attributes. */
+/* Bounds that an input sets to its texture's values also apply to those of attributes. */
 static void inputs_bound(struct imp_scene *scene, const struct imp_input *const *input,
                          const struct imp_input_desc *desc, uint64_t fixed)
 {

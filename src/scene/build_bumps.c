@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Bump maps in instances. Their heights are lengths of the world, as in Mitsuba, and of a vertex
- * whose material is evaluated the shape and uv are known. So where the map M from a group to the
- * world changes lengths or mirrors, copies of the group's shapes stand in the scene's list for
- * that place, and know M. In the frame of the surface the raised normal depends on
+ * Bump maps in instances. Their heights are lengths of the world, as in Mitsuba, but the
+ * evaluation of a material has only the shape and uv of a vertex. So where the map M from
+ * a group to the world changes lengths or mirrors, the scene's list has copies of the
+ * group's shapes for that place, which contain M. In the frame of the surface the raised
+ * normal depends on
  *
  *     M^T M and the sign of det M                                                      (1)
  *

@@ -7,7 +7,7 @@
 #include "color/rgb.h"
 #include "scene_build.h"
 
-/* A spectrum whose numbers are set. */
+/* A spectrum whose values are set. */
 struct spectrum_of {
     struct imp_spectrum *spectrum;
     struct imp_input *input;
@@ -95,8 +95,8 @@ static enum imp_status param_add(struct imp_scene *scene, const char *name,
     return imp__theta_watch(scene, in->param, spectrum_changed, of);
 }
 
-/* Texels that stand for an input stay within its bounds, if they are there to begin with:
- * a search may not raise a reflectance above 1. */
+/* Texels of an input are bounded by its bounds, if they are within them at the start: a
+ * search may not raise a reflectance above 1. */
 void imp__build_texels_bound(struct imp_scene *scene, int param,
                              const struct imp_input_desc *d)
 {

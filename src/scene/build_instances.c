@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Groups and instances from nodes. The shapes of groups stand in the scene's list behind
- * those of the scene itself, which `n_shapes` counts; rays meet them through instances
- * alone. */
+ * Groups and instances from nodes. The shapes of groups follow those of the scene itself
+ * in its list, where `n_shapes` counts only the latter; rays meet them through instances
+ * only. */
 #include "instances.h"
 #include "scene_build.h"
 #include <stdlib.h>
@@ -100,7 +100,7 @@ static int by_index(const void *a, const void *b)
 static enum imp_status within_list(struct imp_scene *scene, struct imp_group *g)
 {
     size_t most = (size_t)g->n_shapes, n = 0;
-    for (int i = 0; i < g->n_instances; i++) { /* those of one group stand together */
+    for (int i = 0; i < g->n_instances; i++) { /* those of one group are adjacent */
         const struct imp_group *in = g->instance[i].group;
         if (i == 0 || in != g->instance[i - 1].group) most += (size_t)in->n_within;
     }

@@ -129,7 +129,7 @@ out:
     return st;
 }
 
-/* Derivatives with respect to these numbers are not those of a walk whose collisions stay
+/* Derivatives with respect to these values are not those of a walk whose collisions stay
  * where they are. */
 static void probed(struct imp_scene *scene, const struct imp_input *in)
 {
@@ -199,7 +199,7 @@ out:
     return st;
 }
 
-/* Does the integrator, or one that it contains, know media? */
+/* Does the integrator, or one that it contains, support media? */
 static bool knows_media(const struct imp_integrator *i)
 {
     if (i && i->ops->flags & IMP_INTEGRATOR_MEDIA) return true;

@@ -46,7 +46,7 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     const void *found;
     IMP_TRY(imp__kind_find(scene->ctx, IMP_CONCEPT_EMITTER, node, &found));
     const struct imp_emitter_ops *ops = found;
-    /* A name may stand for two kinds: a light of its own, and one in a shape. */
+    /* A name may be that of two kinds: a light of its own, and one in a shape. */
     for (size_t k = 0; shape && found; k++) {
         const struct imp_emitter_ops *other = found =
             imp__kind_at(ctx, IMP_CONCEPT_EMITTER, k);
@@ -82,7 +82,7 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     IMP_TRY(imp__props_float_in(ctx, node, "sampling_weight", 1, IMP_NOT_NEGATIVE,
                                 &e->weight));
     IMP_TRY(imp__build_course(scene, node, &e->course));
-    medium_child(node); /* walks know where they are */
+    medium_child(node); /* walks have the place */
     if (ops->build) IMP_TRY(ops->build(&b, self, e));
     for (int j = 0; j < e->n_in; j++)
         if (e->fixed >> j & 1) imp__build_fix(scene, e->input[j]);

@@ -21,7 +21,7 @@ enum imp_status imp__build_shape_bare(struct imp_scene *scene, struct imp_node *
     if (!s || !self) IMP_TRY(imp__build_no_memory(scene));
     *s = (struct imp_shape){
         .ops = ops, .self = self, .index = -1, .bsdf = -1, .emitter = -1, .name = name};
-    /* Has a say in gradients of geometry only; there are none yet. */
+    /* Affects gradients of geometry only; there are none yet. */
     double silhouette;
     IMP_TRY(imp__props_float(ctx, node, "silhouette_sampling_weight", 1, &silhouette));
     const struct imp_build b = imp__build_make(scene, node);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a camera makes of radiance before it is a number in a picture: exposure, white
+ * What a camera does to radiance before it is a value of a picture: exposure, white
  * balance, vignetting, and the power law of a photograph that is compared with it. For
  * channel c at film position (px, py)
  *

@@ -24,8 +24,8 @@ bool imp__facets_create(imp_context *ctx, struct imp_shape *const *shapes, int n
                         struct imp_facets **out, int64_t *bytes);
 void imp__facets_destroy(imp_context *ctx, struct imp_facets *f);
 
-/* The nearest hit at a distance in (tmin, tmax), in units of d; of facets at one place the first
- * in the order of the shapes. */
+/* The nearest hit at a distance in (tmin, tmax), in units of d; among coincident facets
+ * the first in the order of the shapes. */
 bool imp__facets_nearest(const struct imp_facets *f, const imp_v3 *o, const imp_v3 *d,
                          double tmin, double tmax, struct imp_hit *hit);
 bool imp__facets_occluded(const struct imp_facets *f, const imp_v3 *o, const imp_v3 *d,

@@ -13,6 +13,8 @@
 
 #define HASH(h, x) imp__hash(h, &(x), sizeof(x))
 
+static const int version = 2; /* raised with what is hashed */
+
 static uint64_t number_hash(uint64_t h, double x)
 {
     const float rounded = isnan(x) || x == 0 ? 0 : (float)x; /* NaN and 0 have signs */
@@ -51,6 +53,8 @@ static uint64_t node_hash(uint64_t h, const struct imp_node *node)
     h = imp__hash_text(h, node->tag);
     h = imp__hash_text(h, node->type);
     h = imp__hash_text(h, node->id);
+    const bool has[2] = {node->merl != NULL, node->measured != NULL};
+    h = HASH(h, has);
     if (node->merl)
         h = imp__hash_array(h, node->merl->rho,
                             3 * (size_t)node->merl->n_half *
@@ -99,6 +103,7 @@ static uint64_t shape_hash(uint64_t h, const struct imp_shape *s)
     h = vector_hash(vector_hash(h, s->lo), s->hi);
     if (s->geometry == IMP_CURVES) {
         const struct imp_curves *c = &s->curves;
+        h = HASH(h, c->degree);
         h = imp__hash_array(h, c->points, 4 * c->n_points * sizeof *c->points);
         return imp__hash_array(h, c->first, c->n_segments * sizeof *c->first);
     }
@@ -125,10 +130,12 @@ static uint64_t group_hash(uint64_t h, const struct imp_group *g)
     for (int k = 0; k < g->n_instances; k++) {
         const struct imp_instance *p = &g->instance[k];
         const int covered = p->covered ? p->covered->first : -1;
+        const bool moves = p->motion != NULL;
+        h = HASH(h, moves);
         for (int j = 0; j < 12; j++) h = number_hash(h, p->to_world.m[j]);
         h = HASH(h, p->group->first);
         h = HASH(h, covered);
-        if (!p->motion) continue;
+        if (!moves) continue;
         struct imp_map end, inverse;
         imp__motion_at(p->motion, p->motion->end, &end, &inverse);
         h = number_hash(number_hash(h, p->motion->start), p->motion->end);
@@ -163,14 +170,16 @@ static uint64_t emitter_hash(uint64_t h, const struct imp_emitter *e)
 
 uint64_t imp__fingerprint_objects(const struct imp_scene *scene)
 {
-    uint64_t h = HASH(0, scene->mode);
-    if (scene->linear_colors) h = HASH(h, scene->linear_colors);
+    uint64_t h = HASH(0, version);
+    h = HASH(h, scene->mode);
+    h = HASH(h, scene->linear_colors);
     for (size_t i = 0; i < scene->root->n_children; i++) {
         const struct imp_child *c = &scene->root->children[i];
         if (c->node && is_object(c->node)) h = node_hash(h, c->node);
     }
     for (int s = 0; s < scene->n_all_shapes; s++) h = shape_hash(h, scene->shapes[s]);
     for (int g = 0; g < scene->n_groups; g++) h = group_hash(h, scene->groups[g]);
+    h = HASH(h, scene->n_groups);
     if (scene->world) h = group_hash(h, scene->world);
     for (int e = 0; e < scene->n_emitters; e++) h = emitter_hash(h, scene->emitters[e]);
     for (size_t k = 0; k < scene->n_params; k++) {
@@ -184,10 +193,11 @@ uint64_t imp__fingerprint_objects(const struct imp_scene *scene)
 
 uint64_t imp__fingerprint_evaluated(const struct imp_scene *scene)
 {
-    uint64_t h = HASH(0, scene->mode);
+    uint64_t h = HASH(0, version);
+    h = HASH(h, scene->mode);
     h = HASH(h, scene->linear_colors);
-    h = HASH(h, scene->environment);
-    for (int k = 1; k < scene->n_environments; k++) h = HASH(h, scene->environments[k]);
+    h = HASH(h, scene->n_environments);
+    for (int k = 0; k < scene->n_environments; k++) h = HASH(h, scene->environments[k]);
     h = imp__hash_text(h, scene->integrator ? scene->integrator->ops->name : "");
     for (int s = 0; s < scene->n_all_shapes; s++) {
         const struct imp_shape *shape = scene->shapes[s];
@@ -229,15 +239,17 @@ uint64_t imp__fingerprint_sensor(const struct imp_sensor *sensor)
     const struct imp_film_desc *f = &sensor->film;
     const int size[] = {f->width,  f->height, f->crop_x,       f->crop_y,
                         f->crop_w, f->crop_h, f->sample_border};
-    uint64_t h = imp__hash_text(0, sensor->ops->name);
+    const size_t n_course = sensor->course ? sensor->course->n : 0;
+    uint64_t h = imp__hash_text(HASH(0, version), sensor->ops->name);
     h = HASH(h, size);
+    h = HASH(h, sensor->n_child);
     for (int k = 0; k < sensor->n_child; k++) {
         const uint64_t child = imp__fingerprint_sensor(sensor->child[k]);
         h = HASH(h, child);
     }
-    if (sensor->open != 0 || sensor->close != 0)
-        h = number_hash(number_hash(h, sensor->open), sensor->close);
-    for (size_t k = 0; sensor->course && k < sensor->course->n; k++)
+    h = number_hash(number_hash(h, sensor->open), sensor->close);
+    h = HASH(h, n_course);
+    for (size_t k = 0; k < n_course; k++)
         h = number_hash(number_hash(h, sensor->course->time[k]),
                         sensor->course->value[k]);
     h = imp__hash_text(h, f->filter.ops->name);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a file belongs to that was made with a scene: hashes of the scene, part by part,
- * so that a refusal can say what differs. None depends on theta but the last. */
+ * Identity of the scene that a file was made with: hashes of the scene, part by part, so
+ * that a refusal can name the difference. None depends on theta but the last. */
 #ifndef IMP_SCENE_FINGERPRINT_H
 #define IMP_SCENE_FINGERPRINT_H
 

@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Guides: approximate knowledge of light and importance in a scene (from src/elements) for
- * sampling. Walks from the sensor are guided by radiance: probabilities of lights at a
- * point, densities of indirect light, expected radiance. Walks from the lights are guided
- * by importance: which light sends them, from where and in which direction, and how they
- * go on. Only sampling uses them, and densities are constants to derivatives (detached),
- * so a bad guide costs variance, never bias. */
+ * Guides: approximate knowledge of light and importance in a scene (from src/elements)
+ * for sampling. Walks from the sensor are guided by radiance: probabilities of lights at
+ * a point, densities of indirect light, expected radiance. Light walks are guided by
+ * importance: which light sends them, from where and in which direction, and how they go
+ * on. Only sampling uses them, and densities are constants to derivatives (detached), so
+ * a bad guide costs variance, never bias. */
 #ifndef IMP_SCENE_GUIDE_H
 #define IMP_SCENE_GUIDE_H
 
 #include "scene.h"
 
-/* What directions are drawn towards: indirect light, by walks from the sensor; importance,
- * by walks from the lights that are connected to the sensor, and by those that have to
+/* What directions are drawn towards: indirect light, by walks from the sensor;
+ * importance, by light walks that are connected to the sensor, and by those that have to
  * meet it. */
 enum imp_guide_field {
     IMP_GUIDE_LIGHT,
@@ -44,14 +44,14 @@ struct imp_guide {
     imp_v3 (*draw)(const struct imp_guide *g, const struct imp_guide_place *p,
                    const double u[2]);
     double (*pdf)(const struct imp_guide *g, const struct imp_guide_place *p, imp_v3 w);
-    /* Reflected radiance that is expected to leave towards w, as one number, and in
-     * *beyond the part of it that a continuation brings: light that has been reflected
-     * before. NULL: roulette goes by throughput. */
+    /* Reflected radiance that is expected to leave towards w, as a scalar, and in *beyond
+     * the part of it that a continuation brings: light that has been reflected before.
+     * NULL: roulette goes by throughput. */
     double (*expected)(const struct imp_guide *g, const struct imp_guide_place *p,
                        imp_v3 w, double *beyond);
     double roulette; /* survival = this * expected rest of the walk / expected walk */
 
-    bool importance; /* is known; all that follows is for walks from the lights */
+    bool importance; /* is available; all that follows is for light walks */
     /* Cumulative probabilities of the light that sends a walk [scene->n_emitters], each
      * > 0 where that of scene->light_cdf is; NULL: those, and no `emit`. */
     const double *send;

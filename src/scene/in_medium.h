@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A point in a medium as a scatterer of walks, which know surfaces: a BSDF whose frame
- * has the axes of the world. Its value is a phase function, without a cosine, times the
- * albedo; what it emits is what the medium emits there, per collision. */
+ * A point in a medium as a scatterer, in the form of a BSDF whose frame has the axes of
+ * the world. Its value is a phase function, without a cosine, times the albedo; its
+ * emission is that of the medium there, per collision. */
 #ifndef IMP_SCENE_IN_MEDIUM_H
 #define IMP_SCENE_IN_MEDIUM_H
 

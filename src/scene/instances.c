@@ -48,6 +48,20 @@ void imp__placed_surface(const struct imp_scene *scene, const struct imp_hit *hi
     imp__surface_move(out, &to_world, &to_local);
 }
 
+void imp__place_map(const struct imp_scene *scene, int64_t place, double time,
+                    struct imp_map *to_world, struct imp_map *to_local)
+{
+    const struct imp_group *g = scene->world;
+    for (bool first = true; place > 0; first = false) {
+        const struct imp_instance *p = descend(g, &place);
+        struct imp_map at[2] = {p->to_world, p->to_local};
+        if (p->motion) imp__motion_at(p->motion, time, &at[0], &at[1]);
+        *to_world = first ? at[0] : imp__map_product(to_world, &at[0]);
+        *to_local = first ? at[1] : imp__map_product(&at[1], to_local);
+        g = p->group;
+    }
+}
+
 int imp__covered_shape(const struct imp_covered *c, int shape)
 {
     const struct imp_group *g = c->group;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Groups of shapes, and the instances by which they stand in a scene: each has a
- * placement of its own, and the shapes are there once. A group may hold instances of
- * others, so a hit lies at a place: one instance of the scene, one of its group, and so
- * on. Places are numbered from 1, depth first:
+ * Groups of shapes, and the instances that place them in a scene: each has a placement of
+ * its own, and the shapes are stored once. A group may contain instances of others, so a
+ * hit lies at a place: one instance of the scene, one of its group, and so on. Places are
+ * numbered from 1, depth first:
  *
  *     number of place (i, rest) of a group = before_i + 1 + number of `rest` in group i
  *
@@ -77,6 +77,9 @@ imp__instance_local(const struct imp_instance *p, double time, struct imp_map ro
 }
 /* The box of an instance at all times, in the world around it. */
 void imp__instance_box(const struct imp_instance *p, imp_v3 *lo, imp_v3 *hi);
+/* From the group that a place (> 0) is in to the world at a time, and back. */
+void imp__place_map(const struct imp_scene *scene, int64_t place, double time,
+                    struct imp_map *to_world, struct imp_map *to_local);
 /* The surface at a hit in an instance. */
 void imp__placed_surface(const struct imp_scene *scene, const struct imp_hit *hit,
                          const imp_v3 *o, const imp_v3 *d, struct imp_surface *out);

@@ -9,10 +9,10 @@
  * that commits: Embree makes no thread, since all places of its arena (`user_threads`) are for
  * those that come by themselves.
  *
- * Embree cuts its work by the number of these places, whoever comes, so a tree is the same on
- * any number of threads. On another number of processors the triangles of a leaf (no more
- * than four; in trees of some thousand) may stand in another order, which decides between two
- * of them that a ray meets at the same distance in all bits. */
+ * Embree cuts its work by the number of these places, whichever threads join, so a tree
+ * is the same on any number of threads. On another number of processors the triangles of
+ * a leaf (no more than four; in trees of some thousand) may be in another order, which
+ * decides between two of them that a ray meets at exactly the same distance. */
 #include "base/pool.h"
 #include "instances.h"
 #include "intersector.h"

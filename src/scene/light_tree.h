@@ -12,11 +12,11 @@
  * centre, of no less than half its diagonal. The importance is 0 only where no light of the
  * node can bring anything, so every light that counts has a probability.
  *
- * The leaves are lights, and triangles of lights that are meshes. The lights without end
- * (an environment, parallel light) stand beside the tree.
+ * The leaves are lights, and triangles of lights that are meshes. Infinite lights (an
+ * environment, parallel light) are not in the tree.
  *
- * The tree's shape follows from geometry alone, its strengths from theta: whoever sets theta
- * to the same numbers has the same probabilities. They are constants to derivatives. */
+ * The tree's shape follows from geometry alone, its strengths from theta: equal values of
+ * theta give equal probabilities. They are constants to derivatives. */
 #ifndef IMP_SCENE_LIGHT_TREE_H
 #define IMP_SCENE_LIGHT_TREE_H
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Bounds of the extinction of a medium that varies in space, in the cells of a coarse
- * grid over its box. They follow the numbers that they are made of. */
+ * grid over its box. They are updated when the values they depend on change. */
 #ifndef IMP_SCENE_MAJORANTS_H
 #define IMP_SCENE_MAJORANTS_H
 

@@ -15,7 +15,7 @@
 static const char *name_of(const struct imp_medium *m) { return m ? m->name : "none"; }
 
 /* The next surface that bounds media, from *o along d, opaque ones passed; those with a
- * priority say nothing of what is around them. */
+ * priority do not determine the medium around them. */
 static const struct imp_shape *boundary(const struct imp_scene *scene, imp_v3 *o,
                                         imp_v3 d, bool *outwards)
 {

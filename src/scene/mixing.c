@@ -150,7 +150,8 @@ enum imp_status imp__mixing_materials(struct imp_scene *scene)
         IMP_TRY(imp__mixing_settle(scene, m));
         scene->materials_mix = true;
     }
-    /* Children stand before what holds them: what is taken from one is its own. */
+    /* Children precede their parents in the list, so they are finished when a parent uses
+     * them. */
     for (int b = 0; b < scene->n_bsdfs; b++)
         scene->bsdf_mixing[b] = inherited(scene, scene->bsdfs[b]);
 out:

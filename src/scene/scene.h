@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The scene: what is there, and the numbers that describe it. Objects are made once from
- * a tree of nodes (scene_build.c), theta is a list of places where their numbers live
- * (theta.c), and rays are answered by intersect.c (intersector.h alone includes Embree). */
+ * The scene: its objects, and the parameters that describe it. Objects are made once from
+ * a tree of nodes (scene_build.c), theta is a list of places where their values are
+ * stored (theta.c), and rays are answered by intersect.c (intersector.h alone includes
+ * Embree). */
 #ifndef IMP_SCENE_H
 #define IMP_SCENE_H
 
@@ -21,17 +22,17 @@ struct imp_listener {
     struct imp_listener *next; /* began to listen later */
     void (*changed)(void *payload);
     void *payload;
-    bool due; /* a number that it watches has been set since the last call */
+    bool due; /* a value that it depends on has been set since the last call */
 };
 struct imp_watch { /* one of the listeners of a parameter */
     struct imp_watch *next;
     struct imp_listener *listener;
 };
 
-/* How the values of an input depend on its numbers. */
+/* How the lanes of an input depend on its parameter values. */
 enum imp_degree {
     IMP_DEGREE_LINEAR,
-    IMP_DEGREE_FIRST, /* k times the numbers give k times the value */
+    IMP_DEGREE_FIRST, /* k times the parameters give k times the value */
     IMP_DEGREE_OTHER
 };
 
@@ -51,8 +52,8 @@ struct imp_param {
 /* Ways of drawing wavelengths that a sensor has. */
 enum { IMP_WAVES_UNIFORM, IMP_WAVES_IMPORTANCE, IMP_WAVES_DRAWN };
 
-/* A graded index inside shapes. What it is, and how rays step through it, is known to
- * src/bend alone; its numbers are parameters like all others. */
+/* A graded index inside shapes. What it is, and how rays step through it, is internal to
+ * src/bend; its coefficients are parameters like all others. */
 struct imp_graded;
 struct imp_body_numbers {
     const char *key;     /* below the medium's name: "field.coefficients" */
@@ -77,7 +78,7 @@ struct imp_body {
 
 struct imp_light_tree;
 
-/* An object of a room above, which this one does not know: destroyed with the scene. */
+/* An object of a room above, opaque here: destroyed with the scene. */
 struct imp_owned {
     struct imp_owned *next; /* made earlier */
     void *object;
@@ -110,9 +111,9 @@ struct imp_scene {
     struct imp_tree *tree;  /* of the building calls, until commit (format/tree.h) */
     struct imp_arena files; /* what files held and objects copy; freed by commit */
     struct imp_owned *owned;
-    /* Another scene of the same objects and numbers, in which walks are evaluated and no ray
-     * meets anything. Set by the room that makes scenes from files and calls (format/twin_scene.c); NULL:
-     * no such room made it. */
+    /* Another scene with the same objects and values, in which walks are evaluated and no
+     * ray meets anything. Set by the room that makes scenes from files and calls
+     * (format/twin_scene.c); NULL: no such room made it. */
     enum imp_status (*twin)(const struct imp_scene *scene, struct imp_scene **out);
 
     int n_shapes, n_bsdfs, n_emitters, n_sensors, n_textures;
@@ -194,7 +195,7 @@ enum imp_status imp__waves_build(struct imp_scene *scene);
 enum imp_status imp__build_body(struct imp_scene *scene, struct imp_node *node,
                                 const char *parent, const struct imp_body **out);
 /* When all objects are there: may these media be where they are, and which of their
- * numbers have a derivative? */
+ * coefficients have a derivative? */
 enum imp_status imp__bodies_check(struct imp_scene *scene);
 
 /* ---- theta.c ------------------------------------------------------------------- */
@@ -202,8 +203,8 @@ enum imp_status imp__theta_add(struct imp_scene *scene, const struct imp_param *
                                int *index);
 /* Give every parameter its offset, in order of addition. */
 void imp__theta_finish(struct imp_scene *scene);
-/* Number k of a parameter. Setting does not look at the bounds; who sets numbers calls
- * imp__theta_announce after the last of them, before anything is rendered. */
+/* Value k of a parameter. Setting does not check the bounds; the caller calls
+ * imp__theta_announce after the last value, before anything is rendered. */
 double imp__param_get(const struct imp_param *p, size_t k);
 void imp__param_set(struct imp_param *p, size_t k, double value);
 /* Call `changed` after numbers of this parameter have been set to others: once for all

@@ -26,7 +26,7 @@ static bool is_id(const struct imp_node *node, const char *name)
     return false;
 }
 
-/* Exporters write `name` where an id would stand. */
+/* Exporters write `name` in place of an id. */
 static const char *top_name(struct imp_scene *scene, const struct imp_child *child,
                             struct tag_counts *counts)
 {

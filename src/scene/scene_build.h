@@ -33,7 +33,7 @@ void imp__build_fix(struct imp_scene *scene, const struct imp_input *input);
 /* Does a scalar input differ between the lanes of walks? */
 bool imp__build_shaped(const struct imp_scene *scene,
                        const struct imp_input *const *input, int n);
-/* Call `changed` when a number behind these inputs is set: a constant's, or a texel. */
+/* Call `changed` when a value of these inputs is set: a constant's, or a texel. */
 enum imp_status imp__build_watch(struct imp_scene *scene,
                                  const struct imp_input *const *input, int n,
                                  void (*changed)(void *payload), void *payload);
@@ -41,7 +41,7 @@ enum imp_status imp__build_watch(struct imp_scene *scene,
  * that. */
 enum imp_status imp__build_spectrum(struct imp_scene *scene, const struct imp_input *in,
                                     enum imp_role role);
-/* asked: the input that it is the value of; NULL: it is declared only. */
+/* asked: the input whose value it is; NULL: it is only declared. */
 enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *node,
                                    const char *parent, const char *slot,
                                    const struct imp_input_desc *asked,

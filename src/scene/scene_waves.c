@@ -68,7 +68,7 @@ struct range {
     double lo, hi;
 };
 
-/* Where a spectrum may be other than 0, whatever its numbers become. */
+/* Where a spectrum may be other than 0, whatever its values become. */
 static struct range range_of(const struct imp_spectrum *s)
 {
     struct range r = {s->lo, s->hi};
@@ -76,7 +76,7 @@ static struct range range_of(const struct imp_spectrum *s)
     const struct range t = range_of(s->times);
     return (struct range){fmax(r.lo, t.lo), fmin(r.hi, t.hi)};
 }
-/* The same of a curve, whose numbers stay: without the zeros at its ends. */
+/* The same for a curve, whose values are constant: without the zeros at its ends. */
 static struct range curve_range(const struct imp_spectrum *s)
 {
     struct range r = range_of(s);

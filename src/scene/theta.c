@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * theta: every number that describes the scene, in document order, as places to read and
- * write. A parameter's numbers live where rendering uses them (an input's lanes, a
+ * theta: every parameter value of the scene, in document order, as places to read and
+ * write. A parameter's values are stored where rendering uses them (an input's lanes, a
  * texture's texels); theta is a list of addresses, so setting it needs no rebuild. */
 #include "base/arguments.h"
 #include "theta_alias.h"

@@ -59,7 +59,7 @@ static const char *step(const struct imp_node *node, const struct imp_child *c, 
     return c->name ? behind(rest, c->name) : NULL;
 }
 
-/* The parameter `rest` of an object, whose numbers may be a level deeper there. */
+/* The parameter `rest` of an object, whose values may be a level deeper there. */
 static bool param_of(const struct imp_scene *scene, const char *object, const char *rest,
                      size_t *index)
 {

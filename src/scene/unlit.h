@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Scenes in which nothing emits: every reading is 0, and no walk need say so. */
+ * Scenes in which nothing emits: every reading is 0, without any walk. */
 #ifndef IMP_SCENE_UNLIT_H
 #define IMP_SCENE_UNLIT_H
 

@@ -17,8 +17,7 @@
 #define FIRST  2
 #define ENOUGH 0.2 /* Monte Carlo's variance over the measurement's: then no more */
 
-#define LEAPS                                                                            \
-    3 /* times that x moves to where the loss is lower, on the way to a Newton point */
+#define LEAPS  3 /* times that x moves to a lower loss, on the way to a Newton point */
 #define HALVES 3 /* of the way, that are tried */
 _Static_assert(LEAPS *LEAP_SEEDS + SEED_LAST < LOOK_SEEDS,
                "each look has numbers of its own");
@@ -99,7 +98,7 @@ static double over_noise(size_t n, const double *G, const double *g, const doubl
     return q <= 0 ? 0 : q / fmax(mean + 2 * sqrt(fmax(2 * half_var, 0)), DBL_MIN);
 }
 
-/* Is the Newton point worth going to? A model that fails at x (not converged, far outside
+/* Is the Newton point to be taken? A model that fails at x (not converged, far outside
  * its range) must not throw away what the search found. */
 static enum imp_status accept(const struct imp__goal *goal, const double *x,
                               uint64_t seed, const double *point, bool *yes)
@@ -188,7 +187,7 @@ enum imp_status imp__answer_create(imp_context *ctx, size_t n, struct imp__answe
     return IMP_OK;
 }
 
-/* u->x: Newton's point, bounds kept, not looked at yet. */
+/* u->x: Newton's point, within bounds, not evaluated yet. */
 static enum imp_status answer_find(const struct imp__goal *goal,
                                    const struct imp__sampled *s, const double *x,
                                    struct imp__answer *a, struct imp__uncertainty *u)

@@ -16,8 +16,8 @@ enum imp_status imp__basis_matrix(const struct imp__goal *goal, const double *x,
                                   uint64_t seed, double *A, bool *known);
 
 /* V [n][n], orthonormal rows, from A: row k is direction k. Variables that are `aligned`
- * (not 0), and those without any effect, keep axes of their own: row k is e_k.
- * R [n][n] = V V_old^T: what turns numbers along the old directions into the new ones. */
+ * (not 0), and those without any effect, keep axes of their own: row k is e_k. R [n][n] =
+ * V V_old^T: which converts components along the old directions into the new ones. */
 enum imp_status imp__basis_turn(imp_context *ctx, size_t n, const double *A,
                                 const double *aligned, double *V, double *R);
 

@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MAGIC "importon checkpoint 4\n"
+#define MAGIC "importon checkpoint 5\n"
 
 /* ---- Writing ------------------------------------------------------------------- */
 

@@ -10,7 +10,7 @@
 struct imp__uncertainty {
     size_t n;
     double *x;           /* [n] a last Newton step from the x handed in, made with random
-                            numbers of its own: its error is what the covariances say */
+                            numbers of its own: the covariances are those of its error */
     double *measurement; /* [n][n] covariance: noise of the data */
     double *monte_carlo; /* [n][n] covariance: noise of the estimator */
     double *G;           /* [n][n] inverse of H in the directions that are determined */

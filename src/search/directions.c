@@ -36,7 +36,7 @@ static double along(const struct imp__sampled *s, const struct imp__directions *
     return sum;
 }
 
-/* Eigenvalues of the scaled data matrix, and which of them stand out of their noise. */
+/* Eigenvalues of the scaled data matrix, and which of them exceed their noise. */
 static enum imp_status spectrum(const struct imp__sampled *s, struct imp__directions *a)
 {
     enum imp_status st = IMP_OK;

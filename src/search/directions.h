@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Which directions of the variables the data determine: the eigenvectors of the scaled
- * Gauss-Newton matrix whose eigenvalues stand out of their own noise, and the inverse of
- * the matrix within them. */
+ * The directions of the variables that the data determine: the eigenvectors of the scaled
+ * Gauss-Newton matrix whose eigenvalues exceed their own noise, and the inverse of the
+ * matrix within them. */
 #ifndef IMP_SEARCH_DIRECTIONS_H
 #define IMP_SEARCH_DIRECTIONS_H
 

@@ -49,7 +49,7 @@ enum imp_status imp__excess_take(imp_context *ctx, size_t n, double *covariance,
                                : 0;
     if (!imp__eigen_symmetric(n, M, part, P)) goto numeric;
 
-    /* Rows of P: u^T diag(values)^1/2; of M: (A^1/2 u)^T. */
+    /* Rows of P are u^T diag(values)^1/2, those of M (A^1/2 u)^T. */
     for (size_t e = 0; e < n; e++)
         for (size_t i = 0; i < n; i++) P[e * n + i] *= sqrt(fmax(values[i], 0));
     product(n, P, Q, false, M);

@@ -6,11 +6,11 @@
  *     (H + mu diag H_same) delta = -g
  *
  * Every iteration has its own random numbers; the trial steps of one iteration share
- * them, so that the gain is not drowned. The search ends when g^T H^-1 g is what noise in
- * g alone would give, twice in a row; the estimate is the average of the two Newton
- * points. A goal may offer fewer samples for all of this: then once is enough, since samples
- * of another kind follow, and after any other end the search goes on with the full
- * number. */
+ * them, so that the gain is not drowned. The search ends when g^T H^-1 g is within what
+ * noise in g alone would give, twice in a row; the estimate is the average of the two
+ * Newton points. A goal may offer fewer samples for all of this: then once is enough,
+ * since further samples follow (answer.c), and after any other end the search continues
+ * with the full number. */
 #include "lm_system.h"
 #include <math.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The linear systems of Levenberg and Marquardt's iterations, as lm.c sees them: of few
- * variables with matrices, of many by products with them. */
+ * The linear systems of Levenberg and Marquardt's iterations, as lm.c sees them: with
+ * matrices for few variables, by products with them for many. */
 #ifndef IMP_SEARCH_LM_SYSTEM_H
 #define IMP_SEARCH_LM_SYSTEM_H
 

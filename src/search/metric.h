@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * One number for the variance of a gradient g: that of the step which a search makes of it,
+ * A scalar measure of the variance of a gradient g: that of the step which a search makes
+ * of it,
  *
  *     sum over probes of Var <probe, g>,      or      sum over k of weight_k Var g_k
  *

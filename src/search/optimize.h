@@ -21,7 +21,8 @@
 #define IMP_ADAM_FALLING_QUIET  10
 #define IMP_TRAIL_MAX           64 /* variables, up to which a search keeps where it was */
 
-/* Jackknife groups: parts of the walks whose absence shows how noisy a matrix is. */
+/* Jackknife groups: parts of the walks that are left out in turn to estimate the noise of
+ * a matrix. */
 enum { IMP_DEVIATIONS = 8 };
 
 /* Normal equations at one x, from one set of random numbers. */
@@ -82,8 +83,9 @@ struct imp__goal {
     enum imp_status (*sparse)(const double *x, uint64_t seed, int rounds,
                               struct imp__sparse_normal *out, void *payload);
     /* Levenberg-Marquardt: from here on eval and normal take fewer samples, or the full
-     * number. A search that ends with fewer has to be looked at (imp__covariance) and may have
-     * to go on (imp__search_refine). NULL: they always take the full number. */
+     * number. A search that ends with fewer has to be tested (imp__covariance) and may
+     * have to be continued (imp__search_refine). NULL: they always take the full
+     * number. */
     void (*coarsen)(bool fewer, void *payload);
     /* For methods with common random numbers: those of `seed` are drawn at x, and are the
      * ones of all evaluations with this seed until the next draw. NULL: evaluations draw
@@ -166,7 +168,7 @@ void imp__search_finish(struct imp__search *search, enum imp__finish why);
 /* Variable k at the start of the search, and in its answer so far. */
 double imp__search_start(const struct imp__search *search, size_t k);
 double imp__search_answer(const struct imp__search *search, size_t k);
-/* x: the answer; of many variables, the memory of what led there is given back. */
+/* x: the answer; with many variables, the memory of the search is released. */
 void imp__search_settle(struct imp__search *search);
 
 /* For Adam, before its first iteration: go on from x, while `start` stays. */

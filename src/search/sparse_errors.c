@@ -13,7 +13,7 @@
 #define LOOSE      2    /* standard errors */
 #define TOLERANCE  1e-3 /* of an error that is known to 1/8 */
 #define ITERATIONS 2000
-#define TURNS      20 /* of numbers that a step pushes over their bounds */
+#define TURNS      20 /* of values that a step pushes over their bounds */
 
 enum { WIDTH = IMP_SPARSE_WIDTH, DRAWS = IMP_ERROR_DRAWS };
 

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Normal equations of many numbers, by products with their matrix. */
+ * Normal equations of many variables, by products with their matrix. */
 #ifndef IMP_SEARCH_SPARSE_NORMAL_H
 #define IMP_SEARCH_SPARSE_NORMAL_H
 
 #include "base/context.h"
 
-#define IMP_SPARSE_MAX 262144 /* numbers */
+#define IMP_SPARSE_MAX 262144 /* variables */
 
 enum { IMP_SPARSE_WIDTH = 8 }; /* vectors that are multiplied at once */
 

@@ -248,13 +248,14 @@ static void kept_same(struct traced *t, const char *name, struct imp_record *rea
     }
     test_must(ctx, imp__record_write(&kept, path));
     test_must(ctx, imp__record_read(&alone, path, PLENTY, read));
-    tap_ok(read->n_walks == N && read->n_vertices == kept.n_vertices &&
-               sizeof **read->vertices <= 164 &&
-               imp__record_bytes(read) <=
-                   164 * read->n_vertices + 16 * read->n_items + 72 * N,
-           "%s: %zu walks of %zu vertices and %zu items, %zu bytes a vertex, %.0f a walk",
-           name, read->n_walks, read->n_vertices, read->n_items, sizeof **read->vertices,
-           (double)imp__record_bytes(read) / N);
+    const double vertex = (double)(4 * read->n_words) / (double)read->n_vertices + 2;
+    tap_ok(
+        read->n_walks == N && read->n_vertices == kept.n_vertices && vertex <= 160 &&
+            imp__record_bytes(read) <=
+                160 * read->n_vertices + 16 * read->n_items + 80 * N,
+        "%s: %zu walks of %zu vertices and %zu items, %.1f bytes a vertex, %.0f a walk",
+        name, read->n_walks, read->n_vertices, read->n_items, vertex,
+        (double)imp__record_bytes(read) / N);
     imp__record_destroy(&kept);
 
     int values = 0, gradients = 0, lit = 0;
@@ -413,10 +414,12 @@ static void scene_test(const struct scene_case *c)
     for (int i = 0; i < N && tried < 100; i++) {
         struct imp_walk w, k;
         const struct imp_record_walk *head = imp__record_at(&read, (size_t)i);
-        struct imp_decision *d = imp__record_vertex(&read, head->first);
         trace(&t, i, &w);
         if (w.n > 0 && w.first->d.goes_on && weighed(w.first->beyond * w.first->w) > 0) {
-            d->pdf = nextafterf(d->pdf, INFINITY);
+            struct imp_decision d;
+            imp__record_vertex(&read, head->first, &d);
+            d.pdf = nextafterf(d.pdf, INFINITY);
+            imp__packed_put(&d, imp__record_words(&read, head->first));
             imp__record_walk(&read, (size_t)i, &t.tracer, &t.arena, &k);
             seen += !same_bits(w.L, k.L);
             tried++;
@@ -710,8 +713,17 @@ static void files(void)
     struct imp_record kept = some(&t, 20, PLENTY, &st);
     test_must(ctx, imp__record_write(&kept, path));
     unsigned char *b = bytes_read(&n);
-    tap_ok(n == 88 + imp__record_bytes(&kept) + 8 && file_read(&t) == IMP_OK,
-           "a head of 88 bytes, the walks, a checksum # %zu", n);
+    const size_t pages = (kept.n_vertices + IMP_RECORD_PAGE - 1) / IMP_RECORD_PAGE;
+    tap_ok(n == 96 + imp__record_bytes(&kept) - 2 * kept.n_vertices + 4 * pages + 8 &&
+               file_read(&t) == IMP_OK,
+           "a head of 96 bytes, the walks, a checksum # %zu", n);
+    b[12] = 6;
+    bytes_write(b, n);
+    tap_ok(
+        file_read(&t) == IMP_E_SCENE &&
+            strstr(imp_last_error(ctx), "kept walks of version 6; this program reads 7"),
+        "the version before: refused # %s", imp_last_error(ctx));
+    b[12] = 7;
 
     static const struct {
         size_t at;
@@ -768,24 +780,27 @@ static void impossible(void)
                                        "a negative length",
                                        "no direction",
                                        "a vertex in no medium",
-                                       "a sensor twice"};
+                                       "a sensor twice",
+                                       "a point on a surface in a medium"};
     enum { CASES = sizeof what / sizeof *what };
     struct traced t;
     enum imp_status st;
     begin(&t, "fog.xml", "res=32", true);
     struct imp_record r = some(&t, 200, PLENTY, &st);
     size_t i = 0; /* a walk that scatters in the fog first */
-    while (i < r.n_walks &&
-           !(imp__record_at(&r, i)->n > 2 &&
-             imp__record_vertex(&r, imp__record_at(&r, i)->first + 1)->scatterer ==
-                 IMP_IN_MEDIUM))
-        i++;
+    struct imp_decision second = {.scatterer = IMP_AT_SKY};
+    for (; i < r.n_walks; i++) {
+        const struct imp_record_walk *w = imp__record_at(&r, i);
+        if (w->n <= 2) continue;
+        imp__record_vertex(&r, w->first + 1, &second);
+        if (second.scatterer == IMP_IN_MEDIUM) break;
+    }
     const struct imp_record_walk *w = imp__record_at(&r, i);
     union imp_kept *head = imp__record_item(&r, w->first_item), *way = head + 1,
                    *event = head + 2;
-    struct imp_decision *second = imp__record_vertex(&r, w->first + 1);
+    uint32_t *words = imp__record_words(&r, w->first + 1), good_words[IMP_PACKED_MOST];
+    const size_t n_words = imp__packed_put(&second, good_words);
     const union imp_kept good[3] = {*head, *way, *event};
-    const struct imp_decision good_second = *second;
     int refused = 0;
     for (int k = 0; k < CASES; k++) {
         if (k == 0) head->head.at = w->n_vertices;
@@ -794,8 +809,12 @@ static void impossible(void)
         if (k == 3) event->event.kind = 4;
         if (k == 4) event->event.t = -1;
         if (k == 5) memset(way->way.d, 0, sizeof way->way.d);
-        if (k == 6) second->shape = 7;
-        if (k == 7) second->shape = -1, second->scatterer = IMP_AT_SENSOR;
+        struct imp_packed_head h;
+        memcpy(&h, words, sizeof h);
+        if (k == 6) h.shape = 7;
+        if (k == 7) h.shape = -1, h.scatterer = IMP_AT_SENSOR;
+        if (k == 8) h.located = IMP_LOCATED_UV;
+        memcpy(words, &h, sizeof h);
         test_must(ctx, imp__record_write(&r, path));
         st = file_read(&t);
         refused += st == IMP_E_SCENE && strstr(imp_last_error(ctx), "cannot have");
@@ -803,7 +822,7 @@ static void impossible(void)
         *head = good[0];
         *way = good[1];
         *event = good[2];
-        *second = good_second;
+        memcpy(words, good_words, 4 * n_words);
     }
     tap_ok(refused == CASES, "what no walk has is refused # %d of %d", refused, CASES);
     test_must(ctx, imp__record_write(&r, path));

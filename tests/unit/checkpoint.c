@@ -139,7 +139,7 @@ int main(void)
            harmless);
     tap_ok(!memcmp(s->x, before, sizeof before), "and changes nothing");
 
-    write_bytes("importon checkpoint 4\noptimizer 0\nvariables 4\n"
+    write_bytes("importon checkpoint 5\noptimizer 0\nvariables 4\n"
                 "of 1 2 3 4\niteration 1\nfinished 0\nstart 99999999999999\n",
                 101);
     tap_ok(imp__checkpoint_read(ctx, path, &of, &t.goal, s, &found) == IMP_E_SCENE,

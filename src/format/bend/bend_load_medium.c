@@ -7,7 +7,7 @@
 #include "format/search.h"
 #include <string.h>
 
-/* A glass that materials know by the same name. */
+/* A glass with the name that materials use. */
 static enum imp_status glass_read(struct imp__bendfile *l, struct imp_node *node)
 {
     enum imp_status st = IMP_OK;
@@ -155,7 +155,7 @@ enum imp_status imp__bendfile_rules(struct imp__bendfile *l, struct imp_node *no
     IMP_TRY(imp__bendfile_number(l, node, "smoothness_edge", 0, 0, 1e300, &edge));
     IMP_TRY(imp__props_int(l->ctx, node, "smoothness_order", 2, 1, 2, &order));
     if (weight > 0) IMP_TRY(imp_bend_add_smoothness(l->bend, weight, (int)order, edge));
-    /* Names of profile numbers that a fit leaves alone: "n0 x y z". */
+    /* Names of profile coefficients that a fit holds: "n0 x y z". */
     const char *hold;
     IMP_TRY(imp__props_string(l->ctx, node, "hold", "", &hold));
     for (const char *s = hold; *s;) {

@@ -141,7 +141,7 @@ out:
     return st;
 }
 
-/* Numbers are checked one by one, whatever ties they have. */
+/* Values are checked one by one, whatever ties they have. */
 enum imp_status imp_check(imp_problem *p, const struct imp_check_options *options,
                           const struct imp_run *run, const struct imp_check_row **rows,
                           size_t *n_rows)

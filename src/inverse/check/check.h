@@ -8,11 +8,11 @@
 
 #include "inverse/estimate/replicates.h"
 
-/* dF/d a number, or along a direction through all numbers of a parameter
+/* dF/d a value, or along a direction through all numbers of a parameter
  * (imp__check_direction), by walks from one end. */
 struct imp__slope {
     size_t param;
-    int64_t element; /* -1: the parameter's only number, or the direction */
+    int64_t element; /* -1: the parameter's only value, or the direction */
     struct imp_estimate d;
 };
 
@@ -38,13 +38,13 @@ enum imp_status imp__check_row(struct imp__check *c, const char *method,
 /* `work` more pieces are done; IMP_CANCELLED if the caller wants to stop. */
 enum imp_status imp__check_progress(struct imp__check *c, double work);
 
-/* Typical size of number e of a parameter: its value, not below 1e-3 of its range. */
+/* Typical size of value e of a parameter: its value, not below 1e-3 of its range. */
 double imp__check_scale(const struct imp_param *p, size_t e);
 
-/* Parameters of more numbers than this have one row, along a direction. */
+/* Parameters of more values than this have one row, along a direction. */
 #define IMP_CHECK_SINGLY 3
-/* That direction: each number moves to the side where it has more room, since texels may be
- * at both bounds. w [count] */
+/* That direction: each value moves to the side where it has more room, since texels may
+ * be at both bounds. w [count] */
 void imp__check_direction(const struct imp_param *p, double *w);
 
 enum imp_status imp__check_frozen(struct imp__check *c); /* frozen, dot, euler */

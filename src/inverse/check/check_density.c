@@ -9,7 +9,7 @@
  * are equal if p' = p; if p' = a p their ratio is a. The averaged fractions are between 0
  * and 1, so their variances are bounded. q is a mixture of a uniform density and lobes
  * about the mirror direction, so that it is not small where p is large. The test is made
- * at vertices of the kept walks. */
+ * at vertices of the recorded walks. */
 #include "check_walks.h"
 #include "math/rng.h"
 #include "math/warp.h"
@@ -20,7 +20,7 @@
 #define DRAWS   16 /* pairs of directions at a vertex, in the first round */
 #define MORE    4  /* factor from round to round, while the result is noisy */
 #define ROUNDS  3  /* at most */
-#define DEPTH   4  /* vertices of a walk looked at */
+#define DEPTH   4  /* vertices of a walk tested */
 #define Z_LIMIT 5  /* 6e-7 by chance */
 /* An SE above this part of the averages decides nothing: 5 SE are then 10 %. */
 #define RESOLVED 0.02
@@ -98,7 +98,7 @@ static struct imp_check_row judge(const struct density *d)
     return row;
 }
 
-/* Material `only`, or all of them (-1), at the kept walks' vertices. d [n_bsdfs] */
+/* Material `only`, or all of them (-1), at the recorded walks' vertices. d [n_bsdfs] */
 static void vertices_add(const struct imp__kept *k, int only, int draws,
                          struct density *d)
 {

@@ -11,8 +11,8 @@
 #include "film/film_picture.h"
 #include <math.h>
 
-/* Steps as fractions of the distance to the bounds, or of the number's scale where that
- * is smaller. They are large because noise falls with 1/step. F is exactly linear in
+/* Steps as fractions of the distance to the bounds, or of the value's scale where that is
+ * smaller. They are large because noise falls with 1/step. F is exactly linear in
  * emission. Elsewhere the error of Richardson's combination is 0.3^4 = 0.8 % of the term
  * of fifth order. */
 #define STEP           0.3
@@ -69,7 +69,7 @@ int imp__fresh_batch(const struct imp__fresh *f)
     return (int)fmin(ceil(spp * f->more / IMP_CHECK_BATCHES), 1 << 24);
 }
 
-/* The same by walks from the lights. */
+/* The same by light tracing. */
 static enum imp_status functional_of_lights(struct imp__fresh *f, const double *x_dot,
                                             uint64_t seed, double *value)
 {
@@ -209,7 +209,7 @@ out:
     return st;
 }
 
-/* Room of all moving numbers below and above, in units of their weights. */
+/* Room of all moving values below and above, in units of their weights. */
 static void room(const struct imp__motion *m, double *below, double *above)
 {
     *below = *above = INFINITY;

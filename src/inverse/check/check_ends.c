@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * F and its derivatives, as fresh rows have them, by walks from both ends, which share
- * neither a random number nor a density: R = R_A (docs/adjoint-photons.md). What one end
- * cannot find, however many walks it follows, is not compared: light that a mirror or
- * clear glass sends into a camera, or that comes from a point by such a material.
+ * F and its derivatives, as in fresh rows, by walks from the sensor and by light tracing,
+ * which share neither a random number nor a density: R = R_A (docs/adjoint-photons.md).
+ * Light that one of the two cannot find with any number of walks is not compared: that
+ * reflected or refracted into a camera by a mirror or clear glass, or from a point light
+ * by such a material.
  *
- * A walk from the lights is swept once into all rows, so one pass, of half as many samples as
- * a fresh picture, has their values and, from the spread of walks, their errors. From the
+ * A light walk is swept once into all rows, so one pass, of half as many samples as a
+ * fresh picture, has their values and, from the spread of walks, their errors. From the
  * sensor the derivatives are those of the fresh rows, where the check's own walks begin
  * there. */
 #include "check_difference.h"
@@ -25,9 +26,9 @@
 #define WALKS_LEAST 32768
 /* From the sensor, where a fresh row brings what it has: with fewer a row decides nothing. */
 #define SAMPLES_LEAST 4096
-/* A row that fails is measured again, with this many times as many walks from the lights: where
- * single walks bring much (a lamp in a blurred mirror), value and error of few are too low
- * together. */
+/* A row that fails is measured again, with this many times as many light walks: where
+ * single walks have large values (a lamp in a blurred mirror), value and error of few
+ * walks are too low together. */
 #define AGAIN 8
 
 struct ends {

@@ -35,10 +35,10 @@ struct rows {
     size_t n, cap;
 };
 
-/* A row while rounds are added: its number or direction, and the samples so far. */
+/* A row while rounds are added: its value or direction, and the samples so far. */
 struct comparison {
     size_t param, row;
-    int64_t element; /* -1: the parameter's only number, or a direction through all */
+    int64_t element; /* -1: the parameter's only value, or a direction through all */
     bool noisy;
     struct imp_estimate mine; /* of a direction: the tangent; else r->gradient */
     struct imp__quotient fd;

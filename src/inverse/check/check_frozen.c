@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Kept walks evaluated at other parameters, with their vertices as they were: central
+ * Recorded walks evaluated at other parameters, with their vertices as they were: central
  * differences of their radiance against the gradient of the sweep. */
 #include "check_walks.h"
 #include <math.h>
 #include <string.h>
 
-#define SINGLE_MAX 12 /* parameters of up to so many numbers: each is a direction; */
+#define SINGLE_MAX 12 /* parameters of up to so many values: each is a direction; */
 #define DIRECTIONS 6  /* larger ones: random directions */
 #define N_STEPS    4
 /* Central differences leave an error of step^2 times the third derivative, and rounding
@@ -53,7 +53,7 @@ static enum imp_status evaluate(const struct imp__kept *k, double *value)
     return imp__parallel(k->check->ctx, &loop, NULL);
 }
 
-/* A direction inside one parameter: number `only`, or all of them, with random sizes. */
+/* A direction inside one parameter: value `only`, or all of them, with random sizes. */
 struct direction {
     const struct imp_param *param;
     size_t only; /* SIZE_MAX: all */
@@ -208,14 +208,14 @@ static double judge_walk(const struct imp__kept *k, const struct quotients *q, s
     return error[*step];
 }
 
-/* A walk may stand on a kink, for example on the border of two texels. The slopes below
- * and above the parameter's value then differ, a central difference is their mean, and
- * the sweep must agree with one of them. The one-sided slope is taken at the two smallest
+/* A walk may be at a kink, for example at the border of two texels. The slopes below and
+ * above the parameter's value then differ, a central difference is their mean, and the
+ * sweep must agree with one of them. The one-sided slope is taken at the two smallest
  * steps, and extrapolated to step 0 from each and the step before, which removes the
- * error proportional to the step. The difference of the two slopes stays as the step
- * shrinks at a kink; it grows with 1/step at a jump, where no side is right (1.5 is
- * between 1 and 10).
- * @return the relative error of the side that agrees better; INFINITY at a jump. */
+ * error proportional to the step. At a kink the difference of the two slopes does not
+ * change as the step shrinks; at a jump it grows with 1/step, and no side is right (1.5
+ * is between 1 and 10). @return the relative error of the side that agrees better;
+ * INFINITY at a jump. */
 static double judge_sides(const struct imp__kept *k, const struct quotients *q, size_t i,
                           double *slope)
 {
@@ -245,8 +245,8 @@ static double judge_sides(const struct imp__kept *k, const struct quotients *q, 
     return best;
 }
 
-/* Puts the worst walk so far into *row. kinked [n]: walks that were counted as standing
- * on a kink. */
+/* Puts the worst walk so far into *row. kinked [n]: walks that were counted as being at a
+ * kink. */
 static void judge(const struct imp__kept *k, const struct quotients *q, uint8_t *kinked,
                   struct imp_check_row *row)
 {

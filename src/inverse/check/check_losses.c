@@ -16,8 +16,8 @@
  * of its values, so nothing but rounding is left. A leave-one-out mean divided by n in
  * place of n - 1 is wrong by a factor 2 here.
  *
- * Pixels are looked at through a box filter, whatever the sensor's: through wider ones a
- * pixel is a ratio of sums over its neighbours' samples too. */
+ * Pixels have a box filter, whatever the sensor's: through wider ones a pixel is a ratio
+ * of sums over its neighbours' samples too. */
 #include "check.h"
 #include "film/film_picture.h"
 #include "inverse/problem/loss.h"
@@ -96,7 +96,7 @@ out:
     return st;
 }
 
-/* Every number by about its size, to the side where the picture becomes brighter, so that
+/* Every value by about its size, to the side where the picture becomes brighter, so that
  * nothing cancels. */
 static enum imp_status direction_make(struct losses *l)
 {
@@ -222,7 +222,7 @@ static struct expected expected(const struct losses *l, enum imp_loss kind)
 
 /* ---- What imp_problem_objective makes of them ---------------------------------- */
 
-/* A problem with the same active numbers, and our target alone. */
+/* A problem with the same active values, and our target alone. */
 static enum imp_status problem_make(struct losses *l, enum imp_loss kind,
                                     imp_problem **out)
 {

@@ -8,7 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-#define MEMORY_MAX ((size_t)512 << 20) /* of kept walks */
+#define MEMORY_MAX ((size_t)512 << 20) /* of recorded walks */
 
 imp_spec imp__kept_fold_bar(const struct imp__check *c)
 {

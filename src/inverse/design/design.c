@@ -122,7 +122,7 @@ static void scales(struct imp__design *d, const double *x)
     }
 }
 
-/* Numbers that are free to move and that no regulariser weighs. */
+/* Values that are free to move and that no regulariser weighs. */
 static size_t unpriced(const struct imp__design *d)
 {
     const struct imp_problem *p = d->p;
@@ -196,7 +196,7 @@ out:
     return st;
 }
 
-/* Refine links at the scene's numbers, with every source weighted by its relative
+/* Refine links at the scene's values, with every source weighted by its relative
  * error. */
 static enum imp_status refine(struct imp__design *d)
 {
@@ -336,7 +336,7 @@ enum imp_status imp_elements_fit(imp_elements *e, imp_problem *p,
     }
     e->opt.time_limit_s = time_limit;
     if (ended != IMP_OK && ended != IMP_CANCELLED) {
-        (void)!imp_problem_set_x(p, start); /* the scene keeps its numbers */
+        (void)!imp_problem_set_x(p, start); /* the scene keeps its values */
         IMP_TRY(ended);
     }
     if (ended == IMP_CANCELLED) reason = e->reason;

@@ -92,7 +92,7 @@ enum imp_status imp__design_eval(const double *x, uint64_t seed, struct imp_esti
         *f = (struct imp_estimate){HUGE_VAL, 0, 0};
         if (g) memset(g, 0, d->n * sizeof *g);
         if (g_se) memset(g_se, 0, d->n * sizeof *g_se);
-        return imp__el_sweep(d->e, 1, true, true); /* not from those numbers */
+        return imp__el_sweep(d->e, 1, true, true); /* not from those values */
     }
     IMP_TRY(st);
     *f = (struct imp_estimate){imp__design_value(d), 0, 0};

@@ -15,7 +15,7 @@ struct imp_lanes {
     const struct imp_walk *walk;
     int channels;  /* 3 or 1 */
     double *x;     /* [active->n][channels] */
-    imp_spec gain; /* the camera's; of walks with wavelengths it comes after them */
+    imp_spec gain; /* the camera's; applied after the wavelengths, if walks have them */
     bool own;      /* pieces are of channels, of the camera's own numbers */
 };
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Standard errors of numbers made of a picture, F = sum_p s_p I_p.
+ * Standard errors of functionals of a picture, F = sum_p s_p I_p.
  *
  * Pixels of a filter wider than a pixel share samples, so their errors may not be added
  * as if they were independent. A pixel is a ratio, I_p = sum_i w_ip L_i / W_p with W_p =

@@ -25,7 +25,7 @@ static bool curved(const struct imp__target *t)
 {
     return t && !imp__loss_quadratic(t->desc.loss);
 }
-/* Kept walks serve all kinds of loss, with one number of sets. */
+/* Recorded walks have one number of sets for all kinds of loss. */
 static int sets_of(const struct imp__target *t, const struct imp_run *run)
 {
     if (run->walks) return SETS;

@@ -21,7 +21,7 @@ static void add_dense(struct imp_sink *sink, int param, size_t element, int chan
     else batch[0] += imp__sum_used(*bar, t->lanes);
 }
 
-/* Where some numbers are tied to others. */
+/* Where some values are tied to others. */
 static void add_dense_tied(struct imp_sink *sink, int param, size_t element, int channels,
                            const imp_spec *bar)
 {
@@ -184,7 +184,7 @@ static void add_hashed(struct imp_sink *sink, int param, size_t element, int cha
     if (base >= 0) add_entry(t, (size_t)base + element, channels != 3, bar);
 }
 
-/* Where some numbers are tied to others. */
+/* Where some values are tied to others. */
 static void add_hashed_tied(struct imp_sink *sink, int param, size_t element,
                             int channels, const imp_spec *bar)
 {

@@ -5,9 +5,9 @@
  * The samples of a pixel come in R independent replicates of n, each with its own
  * leave-one-out adjoint; a pixel's gradient is their mean, its variance comes from their
  * spread, and pixels are independent, so variances add (docs/estimators.md 14). Where
- * pixels share walks, replicates are also added up over the tile (overlap.h). Few
- * numbers are kept in arrays; many (textures) in a hash table of what a tile of pixels
- * touched, so memory and time follow the touched texels and not the texture. */
+ * pixels share walks, replicates are also added up over the tile (overlap.h). Few values
+ * are kept in arrays; many (textures) in a hash table of what a tile of pixels touched,
+ * so memory and time follow the touched texels and not the texture. */
 #ifndef IMP_INVERSE_TALLY_H
 #define IMP_INVERSE_TALLY_H
 
@@ -15,10 +15,10 @@
 #include "search/metric.h"
 #include "walk/core/walk.h"
 
-#define IMP_TALLY_DENSE 1024 /* numbers, above which the hash table is used */
+#define IMP_TALLY_DENSE 1024 /* values, above which the hash table is used */
 #define IMP_TALLY_FULL  16384
 
-struct imp__tally_triple { /* three neighbouring numbers */
+struct imp__tally_triple { /* three adjacent values */
     /* Sums of the present pixel. What an addition needs is on one cache line. */
     imp_spec batch;
     uint32_t key;
@@ -58,7 +58,7 @@ struct imp_tally {
         uint32_t *index;
         size_t n, cap;
     } touched_triples, touched_singles;
-    /* What the variance is measured by, as one number; NULL: it is not. */
+    /* The scalar measure of the variance; NULL: none. */
     const struct imp__metric *metric;
     double probe_sum[IMP_PROBES_MOST], probe_square[IMP_PROBES_MOST]; /* of the pixel */
     double measured; /* of the tile so far */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The variance of a tally as one number, for whoever allocates samples. */
+ * The variance of a tally as one scalar, for the allocation of samples. */
 #include "tally.h"
 
 void imp__tally_probe_batch(struct imp_tally *t)

@@ -26,7 +26,7 @@ enum imp_status imp__totals_begin(struct imp_problem *p, bool in_place, double *
         t->gradient_variance = t->own + n;
         return IMP_OK;
     }
-    /* What belongs to a number lies together: additions wait for memory. */
+    /* The sums of a value lie together: additions wait for memory. */
     imp_fixed *mean = in_place ? (imp_fixed *)gradient : (imp_fixed *)t->own;
     imp_fixed *spread =
         in_place ? (imp_fixed *)gradient_se : (imp_fixed *)t->own + !!gradient;

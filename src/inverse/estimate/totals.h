@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Sums over the targets of a problem: the objective, and its gradient with variances, in
- * doubles for few numbers, in fixed point for many (base/fixed_sum.h). */
+ * doubles for few values, in fixed point for many (base/fixed_sum.h). */
 #ifndef IMP_INVERSE_TOTALS_H
 #define IMP_INVERSE_TOTALS_H
 
@@ -10,15 +10,15 @@
 
 struct imp__totals {
     double objective, variance;
-    double *gradient, *gradient_variance; /* [n] of few numbers */
-    /* For many numbers: fixed point, in the place of the caller's arrays. */
+    double *gradient, *gradient_variance; /* [n] of few values */
+    /* For many values: fixed point, in place of the caller's arrays. */
     bool many, unit_known;
     bool wants_errors; /* of the gradient */
     struct imp_fixed_sum mean, spread;
-    double *own; /* where sums stand that are not in the caller's arrays */
+    double *own; /* sums that are not in the caller's arrays */
 };
 
-/* gradient, gradient_se: where the results go, either may be NULL. For many numbers they
+/* gradient, gradient_se: where the results go, either may be NULL. For many values they
  * hold the sums in the meantime, unless they are to keep their contents on failure. */
 enum imp_status imp__totals_begin(struct imp_problem *p, bool in_place, double *gradient,
                                   double *gradient_se, struct imp__totals *t);

@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Which numbers of a clipped target count. V is the number that the scene would give, from a
- * picture J of other random numbers than the loss has, s_V its standard error and s that of
- * the target's noise. With the level `high` at white
+ * Which values of a clipped target have a weight. V is the scene's value, from a picture
+ * J of other random numbers than the loss has, s_V its standard error and s that of the
+ * target's noise. With the level `high` at white
  *
  *     no weight      where V + 3 s_V > high - 3 s  and  T > high - 6 s - 3 s_V
  *     T = high       where V + 3 s_V <= high - 3 s and  T >= high
  *     as it is       else
  *
- * At the truth, |V - T| < 3 s but for 3 numbers in 1000 where V is well known, so the second
- * condition of the first line hardly ever decides, and weights depend on J alone, not on the
- * noise of T: numbers near the level are neither taken nor left by what their noise is. The
- * second condition lets a number count that is far from the level, where the scene is wrong.
+ * At the truth, |V - T| < 3 s but for 3 values in 1000 where V is well known, so the
+ * second condition of the first line hardly ever decides, and weights depend on J alone,
+ * not on the noise of T: values near the level are neither used nor left out by their
+ * noise. The second condition gives a weight to a value that is far from the level, where
+ * the scene is wrong.
  *
  * A photograph (docs/photographs.md) is compared by a power of T, whose noise is in the
  * power. Here the power is expanded about V instead,
@@ -35,9 +36,9 @@
 #define SIGMAS      3
 #define MORE        4   /* samples of the deciding picture, over those of a loss */
 #define LEAST_SPP   64  /* of it */
-#define FEW         30  /* numbers, of which a noise is not estimated */
+#define FEW         30  /* values, below which the noise is not estimated */
 #define LEAST_NOISE 0.1 /* part of the variance of T - V that is the target's, at least */
-#define MOST_NOISE  0.03 /* of the range of the numbers: more is a scene that is wrong */
+#define MOST_NOISE  0.03 /* of the range of the values: more is a scene that is wrong */
 #define KNOWN_SE    0.25 /* V is expanded about where its relative error is smaller */
 
 bool imp__problem_clips(const struct imp_problem *p)
@@ -221,8 +222,8 @@ static double noise_of(struct decision *d, int half)
                 MOST_NOISE * (hi - lo));
 }
 
-/* A photograph's number, expanded about V. Far from T, where the scene is not yet right, the
- * expansion may fall below 0, and the power is that of T. */
+/* A photograph's value, expanded about V. Far from T, where the scene is not yet right,
+ * the expansion may fall below 0, and the power is that of T. */
 static void photograph_set(struct decision *d, size_t i)
 {
     struct imp__target *t = d->t;

@@ -9,9 +9,9 @@
 
 /* Has the problem targets with levels? */
 bool imp__problem_clips(const struct imp_problem *p);
-/* Back to what is known without a picture: clipped numbers have no weight. */
+/* Back to the weights without a picture: clipped values have none. */
 void imp__clip_reset(struct imp_problem *p);
-/* imp_problem_censor; sums up how many weights changed, and how many numbers there are. */
+/* imp_problem_censor; sums up how many weights changed, and how many values there are. */
 enum imp_status imp__censor(struct imp_problem *p, const struct imp_run *run,
                             size_t *changed, size_t *numbers);
 

@@ -53,7 +53,7 @@ struct imp__fit {
     bool searching;               /* evaluations are those of the search */
     bool quiet;                   /* imp__opt_options */
     const char *without_variate;  /* why not; NULL: there is one, or none was wanted */
-    struct imp__sparse_errors errors; /* of many numbers; x NULL: there are none */
+    struct imp__sparse_errors errors; /* of many values; x NULL: there are none */
     char note[96];
 };
 
@@ -83,7 +83,7 @@ void imp__fit_scales(struct imp__fit *fit, const struct imp__search *search);
 void imp__fit_end(struct imp__fit *fit);
 /* fit_goal.c: the goal of a search, which points to `fit`: it does not move any more. */
 void imp__fit_goal_make(struct imp__fit *fit);
-/* Scale of the block's numbers in x [n], for `spans`. */
+/* Scale of the block's values in x [n], for `spans`. */
 void imp__fit_span_scale(const struct imp__block *block, const double *x,
                          struct imp__span *span);
 
@@ -126,14 +126,14 @@ enum imp_status imp__fit_checkpoint_read(struct imp__fit *fit, struct imp__searc
 
 struct imp__uncertainty;
 
-/* fit_result.c: the numbers before the fit, for its report and to restore them. `many`:
+/* fit_result.c: the values before the fit, for its report and to restore them. `many`:
  * only those that are not stored as floats; the search keeps the others. */
 enum imp_status imp__fit_start_keep(const struct imp_problem *p, bool many, double **out);
 void imp__fit_start_restore(struct imp_problem *p, bool many, const double *start,
                             struct imp__search *s);
 /* fit_result.c: what stays with the problem. rows [n] in fit_arena have errors and
- * intervals; NULL: more than IMP_SEARCH_FEW numbers, and the problem owns the
- * search from then on. */
+ * intervals; NULL: more than IMP_SEARCH_FEW values, and the problem owns the search from
+ * then on. */
 struct imp__fit_shift;
 enum imp_status imp__fit_answer(struct imp__fit *fit, struct imp__search *s,
                                 struct imp_estimate objective,
@@ -147,7 +147,7 @@ struct imp__fit_residual {
     double relative;       /* root of sum w (I - T)^2 / sum w T^2, */
     double relative_hi;    /* and with two standard errors added to the loss */
     double chi2, chi2_se;  /* per degree of freedom */
-    double count, freedom; /* residuals; and those less the determined numbers */
+    double count, freedom; /* residuals; and those less the determined values */
 };
 struct imp__fit_residual imp__fit_residual(const struct imp__fit *fit, const double *x,
                                            struct imp_estimate objective,

@@ -9,9 +9,9 @@
 #include "walk/run/run.h"
 #include <math.h>
 
-/* Do tiles get samples by their share of the variance? Beside control variates of many numbers,
- * which have each their own pixels, nothing is gained by it: there they do if the options
- * demand it. */
+/* Do tiles get samples by their share of the variance? Beside control variates of many
+ * values, which have each their own pixels, nothing is gained by it: there they do if the
+ * options demand it. */
 static bool allocates(const struct imp__fit *f)
 {
     const bool many = f->variate && f->problem->n > IMP_TRAIL_MAX;
@@ -51,7 +51,7 @@ static enum imp_status bounds_make(struct imp__fit *f)
     return IMP_OK;
 }
 
-/* Walks from the lights do not bring everything that targets may hold. */
+/* Light tracing does not support everything that targets may contain. */
 static void missing_tell(struct imp_problem *p, enum imp_from end)
 {
     const struct imp_scene *scene = p->scene;
@@ -144,8 +144,8 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
                                   sizeof f.options));
     IMP_CHECKED(imp__run_take(ctx, "imp_fit", run, &f.outer));
     IMP_CHECKED(imp__run_traces(ctx, "imp_fit", &f.outer));
-    /* Levenberg-Marquardt ends where its gradient is within its noise: of few sets that
-     * noise is known too badly. */
+    /* Levenberg-Marquardt ends where its gradient is within its noise, of which few sets
+     * give too poor an estimate. */
     if (f.options.optimizer != IMP_LM) imp__points_of_losses(p, &f.outer);
     IMP_CHECKED(options_check(p, &f.options));
     options_default(&f.options);

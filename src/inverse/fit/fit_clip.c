@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A fit with clipped numbers (clip.h). It begins with what is known without a picture:
- * clipped numbers have no weight. Where that search ends, pictures decide which of them
- * count; with other weights the search goes on, until they stay. The objective of each
- * search has weights that do not change, so no optimiser sees it jump. */
+ * A fit with clipped values (clip.h). It begins with the weights without a picture:
+ * clipped values have none. Where that search ends, pictures decide which of them count;
+ * with other weights the search goes on, until they stay. The objective of each search
+ * has weights that do not change, so no optimiser sees it jump. */
 #include "base/arguments.h"
 #include "censor.h"
 #include "fit.h"

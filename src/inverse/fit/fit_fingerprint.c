@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the checkpoint of a fit belongs to: scene, targets, active numbers and options. */
+ * What the checkpoint of a fit belongs to: scene, targets, active values and options. */
 #include "bend/inside.h"
 #include "fit.h"
 #include "inverse/estimate/replicates.h"
@@ -8,16 +8,52 @@
 #include "scene/fingerprint.h"
 #include <string.h>
 
-#define PAIRS_VERSION   3 /* of what Levenberg-Marquardt estimates from its samples */
-#define VARIATE_VERSION 3 /* of what control variates keep, and of steps with them */
-#define KEPT_VERSION    2 /* of how walks are drawn that are kept (fit_kept.c) */
+/* Raised with what is hashed, and with whatever makes other numbers from the same hash: what
+ * Levenberg-Marquardt estimates from its samples, what control variates keep, steps with
+ * them, how walks are drawn that are kept (fit_kept.c). */
+#define VERSION 4
 
-/* With an active number, the index of a medium differs from start to start. */
+/* With an active value, the index of a medium differs from start to start. */
 static bool medium_active(const struct imp_body *m, const int64_t *base)
 {
     for (int k = 0; k < m->n_numbers; k++)
         if (m->numbers[k].param >= 0 && base[m->numbers[k].param] >= 0) return true;
     return false;
+}
+
+/* What does not apply is 0. */
+static uint64_t options_hash(const struct imp__fit *f)
+{
+    const struct imp_problem *p = f->problem;
+    const struct imp_sensor *sensor = p->scene->sensors[p->targets[0].desc.sensor];
+    const bool keeps = imp__fit_keeps(f);
+    const double number[] = {f->options.optimizer,
+                             f->options.learning_rate,
+                             f->options.tolerance,
+                             f->options.momentum,
+                             f->run.spp > 0 ? f->run.spp : sensor->spp,
+                             keeps ? f->options.memory : 0,
+                             keeps && f->options.headroom > 1 ? f->options.headroom : 0};
+    int how[] = {VERSION,
+                 (int)f->outer.from,
+                 f->options.optimizer == IMP_LM ? imp__fit_coarse_spp(f) : 0,
+                 keeps,
+                 f->variate != NULL,
+                 0,
+                 0,
+                 0};
+    if (imp__points_of(sensor, &f->outer) == IMP_POINTS_SOBOL) {
+        const struct imp__replicates plan =
+            imp__replicates_loss(p, &p->targets[0], &f->outer);
+        how[5] = plan.n;
+        how[6] = plan.m;
+        how[7] = IMP_SET_POINTS;
+    }
+    const uint64_t numbers =
+        f->allocation.n > 0 ? imp__allocation_numbers(&f->allocation) : 0;
+    uint64_t h = imp__hash(f->outer.seed, number, sizeof number);
+    h = imp__hash(h, how, sizeof how);
+    return imp__hash(h, &numbers, sizeof numbers);
 }
 
 void imp__fit_fingerprint(struct imp__fit *f)
@@ -51,41 +87,7 @@ void imp__fit_fingerprint(struct imp__fit *f)
     for (int m = 0; m < p->scene->n_bodies; m++)
         if (!medium_active(p->scene->bodies[m], p->active.base))
             h->scene = imp__graded_hash(h->scene, p->scene->bodies[m]);
-    if (p->n_ties > 0) h->parameters = imp__ties_hash(p, h->parameters);
+    h->parameters = imp__ties_hash(p, h->parameters);
     h->targets = imp__problem_targets_hash(p);
-    const struct imp_sensor *sensor = p->scene->sensors[p->targets[0].desc.sensor];
-    const double number[4] = {f->options.optimizer, f->options.learning_rate,
-                              f->options.tolerance,
-                              f->run.spp > 0 ? f->run.spp : sensor->spp};
-    h->options = imp__hash(f->outer.seed, number, sizeof number);
-    if (f->options.momentum != IMP_ADAM_MOMENTUM)
-        h->options =
-            imp__hash(h->options, &f->options.momentum, sizeof f->options.momentum);
-    if (f->outer.from != IMP_FROM_SCENE)
-        h->options = imp__hash(h->options, &f->outer.from, sizeof f->outer.from);
-    if (f->options.optimizer == IMP_LM) {
-        const int version[2] = {PAIRS_VERSION, imp__fit_coarse_spp(f)};
-        h->options = imp__hash(h->options, version, sizeof version);
-    }
-    if (f->allocation.n > 0) {
-        const uint64_t numbers = imp__allocation_numbers(&f->allocation);
-        h->options = imp__hash(h->options, &numbers, sizeof numbers);
-    }
-    if (imp__fit_keeps(f)) {
-        const double kept[2] = {f->options.memory, KEPT_VERSION};
-        h->options = imp__hash(h->options, kept, sizeof kept);
-    }
-    if (imp__fit_keeps(f) && f->options.headroom > 1)
-        h->options =
-            imp__hash(h->options, &f->options.headroom, sizeof f->options.headroom);
-    if (f->variate) {
-        const int version = VARIATE_VERSION;
-        h->options = imp__hash(h->options, &version, sizeof version);
-    }
-    if (imp__points_of(sensor, &f->outer) == IMP_POINTS_SOBOL) {
-        const struct imp__replicates plan =
-            imp__replicates_loss(p, &p->targets[0], &f->outer);
-        const int sets[3] = {plan.n, plan.m, IMP_SET_POINTS};
-        h->options = imp__hash(h->options, sets, sizeof sets);
-    }
+    h->options = options_hash(f);
 }

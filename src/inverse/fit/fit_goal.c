@@ -174,7 +174,7 @@ static enum imp_status normal(const double *x, uint64_t seed, int rounds,
     out->n_residuals = gn.n_residuals;
     out->noise_known = true;
     /* A fit of n variables reduces the squared residuals of M pixels by (M - n)/M on
-     * average; undone where they stand in for the noise. */
+     * average; corrected where they are used as estimates of the noise. */
     const double freedom = gn.n_residuals - (double)n;
     const double widen = fit->noise_known || freedom < 1 ? 1 : gn.n_residuals / freedom;
     for (size_t i = 0; i < n * n; i++) out->H_meas[i] *= widen;
@@ -186,9 +186,9 @@ static enum imp_status normal(const double *x, uint64_t seed, int rounds,
     return IMP_OK;
 }
 
-/* A search by Levenberg-Marquardt whose end is looked at and gone on from takes a quarter of
- * the samples: half of its time would otherwise go to where it only passes. A loss that is
- * not quadratic has a bias that grows. */
+/* A search by Levenberg-Marquardt whose end is tested and may be continued takes a
+ * quarter of the samples: otherwise half of its time would be spent far from the answer.
+ * A loss that is not quadratic has a bias that grows. */
 int imp__fit_coarse_spp(const struct imp__fit *f)
 {
     const struct imp_problem *p = f->problem;

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Methods with common random numbers (L-BFGS, MMA, SLSQP) evaluate one draw of walks many
- * times: the walks are kept, and evaluated at other numbers without a ray. A new draw is
- * made when the effective sample size of n walks falls below REDRAW_ESS n
+ * times: the walks are recorded, and evaluated at other values without a ray. A new draw
+ * is made when the effective sample size of n walks falls below REDRAW_ESS n
  * (walk/kept/store_weight.c), or an extinction leaves its headroom. The objective and the
- * intervals of an answer come from fresh walks (fit.c): the search has fitted the noise of its
- * own walks, whose errors would be too small. */
+ * intervals of an answer come from fresh walks (fit.c): the search has fitted the noise
+ * of its own walks, whose errors would be too small. */
 #include "base/team.h"
 #include "fit.h"
 #include "inverse/estimate/walks_make.h"

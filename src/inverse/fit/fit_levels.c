@@ -13,13 +13,13 @@ struct level {
     struct imp__fit *fit;
     int level;
     size_t n;                /* variables */
-    double *x, *g;           /* [problem->n] fine numbers, and the gradient */
+    double *x, *g;           /* [problem->n] fine values, and the gradient */
     struct imp__span *spans; /* [n_blocks] of the variables */
     double *trail;           /* [n_trail][problem->n] of the fine search's history_x */
     size_t n_trail, cap_trail;
 };
 
-/* The grid of a block's numbers: its parameter's, unless it is a factor of many. */
+/* The grid of a block's values: its parameter's, unless it is a factor of many. */
 static struct imp__cells cells_of(const struct imp_problem *p, size_t block)
 {
     const struct imp__block *b = &p->blocks[block];

@@ -5,11 +5,11 @@
  *
  *     chi^2 per degree of freedom = J / [ sum 1/2 w sigma^2 (M - m)/M ]
  *
- * of M residuals and m determined numbers: with weights w = 1/sigma^2 the usual one, with
- * others its weighted form. It is 1 for a scene that can make the picture, and its spread
- * for Gaussian noise follows from sum 1/2 w^2 sigma^4, taken for fully correlated colour
- * channels, and for what filters wider than a pixel correlate (up to CORRELATED pixels).
- * The log loss has w = 1/(T + e)^2, to first order in the noise. */
+ * with M residuals and m determined values: with weights w = 1/sigma^2 the usual one,
+ * with others its weighted form. It is 1 for a scene that can make the picture, and its
+ * spread for Gaussian noise follows from sum 1/2 w^2 sigma^4, taken for fully correlated
+ * colour channels, and for what filters wider than a pixel correlate (up to CORRELATED
+ * pixels). The log loss has w = 1/(T + e)^2, to first order in the noise. */
 #include "film/film_picture.h"
 #include "fit.h"
 #include "inverse/problem/loss.h"
@@ -20,7 +20,7 @@
 struct sums {
     double expected; /* loss by noise of the target; NAN: not known */
     double variance; /* of that loss */
-    double signal;   /* sum w T^2; of the log loss: sum w */
+    double signal;   /* sum w T^2; for the log loss sum w */
     double count;    /* residuals */
 };
 

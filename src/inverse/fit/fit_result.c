@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The result that a fit leaves with its problem, and the numbers at its start. Rows of 48
- * bytes for millions of numbers would take more memory than the fit: they are made on
+ * The result that a fit leaves with its problem, and the values at its start. Rows of 48
+ * bytes for millions of values would take more memory than the fit: they are made on
  * request, from the search, which is kept. */
 #include "base/arguments.h"
 #include "fit.h"
@@ -13,7 +13,7 @@
 
 /* ---- Where it began ------------------------------------------------------------ */
 
-/* Are the block's numbers kept in doubles? */
+/* Are the block's values kept in doubles? */
 static bool is_double(const struct imp_problem *p, const struct imp__block *b)
 {
     return p->scene->params[b->param].store != IMP_STORE_BULK;
@@ -64,8 +64,8 @@ void imp__fit_start_restore(struct imp_problem *p, bool many, const double *star
 
 /* ---- Its answer ---------------------------------------------------------------- */
 
-/* One entry an active parameter. Numbers kept in doubles start at `start`; those
- * of textures where the search does, which has them as floats. */
+/* One entry per active parameter. Values kept in doubles start at `start`; those of
+ * textures where the search does, which has them as floats. */
 static enum imp_status blocks_make(struct imp__fit *f, const double *start)
 {
     struct imp_problem *p = f->problem;
@@ -103,7 +103,7 @@ static void error_of(const struct imp__fit_block *b, double x, double se,
     v->hi95 = b->log ? exp(hi) : hi;
 }
 
-/* The row of a number, without standard error and interval where those are of matrices. */
+/* The row of a value, without standard error and interval where those are of matrices. */
 static struct imp_fit_variable variable_of(const struct imp__fit_answer *a, size_t i)
 {
     size_t at = 0, end = a->n_blocks;
@@ -198,7 +198,7 @@ static enum imp_status covariance_give(struct imp__fit *f,
     return IMP_OK;
 }
 
-/* In units of x; NULL where all numbers are determined. */
+/* In units of x; NULL where all values are determined. */
 static enum imp_status loosest_give(struct imp__fit *f, const struct imp__uncertainty *u,
                                     bool missing, const double **out)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Normal equations of many numbers, as the optimiser sees them: rows of derivatives, and the
- * regularisers, which are quadratic. */
+ * Normal equations of many values, as the optimiser sees them: rows of derivatives, and
+ * the regularisers, which are quadratic. */
 #include "base/arguments.h"
 #include "base/team.h"
 #include "fit.h"
@@ -126,7 +126,7 @@ enum imp_status imp__fit_sparse(const double *x, uint64_t seed, int rounds,
     eq.f.value += imp__regularise(p, x, eq.g);
     eq.n_residuals = e->rows.n_residuals;
     /* A fit of n variables reduces the squared residuals of M pixels by (M - n)/M on
-     * average; undone where they stand in for the noise. */
+     * average; corrected where they are used as estimates of the noise. */
     const double freedom = eq.n_residuals - (double)n;
     e->widen = f->noise_known || freedom < 1 ? 1 : sqrt(eq.n_residuals / freedom);
     *out = eq;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Control variates of a fit by Adam (variate.h): where they are possible, the search has
- * them; intervals and the loss of the answer are of fresh walks. Checkpoints hold what they and
- * the allocation know. */
+ * Control variates of a fit by Adam (variate.h), used in the search where they are
+ * possible; intervals and the loss of the answer are of fresh walks. Checkpoints contain
+ * their state and that of the allocation. */
 #include "base/team.h"
 #include "fit.h"
 #include "inverse/gradient/variate.h"

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Which number that is not fitted may be wrong? Where the active numbers a are fitted, the
- * loss J has the gradient g = J^T W r with respect to all numbers and the Gauss-Newton matrix
- * H = J^T W J, both unbiased (docs/estimators.md 15.1). With the active ones free to follow, a
- * number j has the score, its noise and its information
+ * Which parameter value that is not fitted may be wrong? Where the active values a are
+ * fitted, the loss J has the gradient g = J^T W r with respect to all values and the
+ * Gauss-Newton matrix H = J^T W J, both unbiased (docs/estimators.md 15.1). With the
+ * active ones free to follow, a value j has the score, its noise and its information
  *
  *     score  s_j = g_j - b^T g_a,         b = H_aa^-1 H_aj
  *     noise  V_j = (e_j - b)^T (J^T W Sigma W J + Cov g) (e_j - b)
@@ -11,8 +11,8 @@
  *
  * Moved by -s_j/S_j, it would lower the loss by s_j^2/(2 S_j); in units of the pictures'
  * noise, which with weights 1/sigma^2 are those of chi^2, by s_j^2/V_j of the measurement
- * alone (the score test: Rao 1948). One sweep gives the scores of all numbers; those that
- * stand out of their Monte Carlo noise most have Gauss-Newton rows. */
+ * alone (the score test: Rao 1948). One sweep gives the scores of all values; those
+ * largest in units of their Monte Carlo noise have Gauss-Newton rows. */
 #include "base/arguments.h"
 #include "inverse/estimate/replicates.h"
 #include "inverse/gauss/gauss_newton.h"
@@ -27,7 +27,7 @@
 
 #define ROWS       20 /* numbers with Gauss-Newton rows, at least; less if there are less */
 #define REPLICATES 6
-#define APART      8 /* a parameter of more numbers is tested through one common factor */
+#define APART      8 /* a parameter of more values is tested through one common factor */
 #define LOOSE      1e-6 /* directions of H_aa below this, scaled, are not followed */
 #define SEED       0x5c03e
 
@@ -37,7 +37,7 @@ struct missing {
     uint8_t *own;  /* [n_params] chosen by the caller */
     uint8_t *able; /* [n_params] may be tested */
     size_t own_ties;
-    /* Numbers that have been tested: the factor of Bonferroni's correction. */
+    /* Values that have been tested: the factor of Bonferroni's correction. */
     size_t asked;
     /* For the present layout: */
     size_t n;
@@ -65,8 +65,8 @@ out:
     return st;
 }
 
-/* May this parameter be tested? Its numbers within their bounds; one that is 0 everywhere has
- * no factor. */
+/* May this parameter be tested? Its values within their bounds; one that is 0 everywhere
+ * has no factor. */
 static bool may_ask(const struct imp_scene *s, size_t k)
 {
     const struct imp_param *q = &s->params[k];
@@ -99,7 +99,8 @@ static int by_z(const void *a, const void *b)
     return x->param < y->param ? -1 : x->param > y->param;
 }
 
-/* One sweep over all numbers; `chosen` becomes the caller's and those that stand out. */
+/* One sweep over all values; `chosen` becomes the caller's and those with the largest
+ * scores. */
 static enum imp_status rows_choose(struct missing *m, uint8_t *chosen)
 {
     enum imp_status st = IMP_OK;
@@ -249,7 +250,7 @@ static int by_drop(const void *a, const void *b)
     return x->element < y->element ? -1 : x->element > y->element;
 }
 
-/* One row, of number j; false: it can lower nothing. */
+/* The row of value j; false: it cannot lower the loss. */
 static bool row_make(const struct missing *m, const double *v, size_t j,
                      struct imp_missing *row)
 {

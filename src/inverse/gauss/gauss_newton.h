@@ -25,8 +25,8 @@ struct imp__gauss_newton {
     double *deviations; /* [IMP_DEVIATIONS][K*K] of H (search/optimize.h); or NULL */
     int rounds;         /* set by the caller: so many times the samples; 0: once */
     struct imp_estimate objective; /* data term */
-    /* sum w (mean - T)^2 - w Var(mean), unbiased; of losses that are quadratic in the
-     * picture its standard error, too */
+    /* sum w (mean - T)^2 - w Var(mean), unbiased; with its standard error for losses that
+     * are quadratic in the picture */
     double chi2, chi2_se;
     double n_residuals;
 };
@@ -49,8 +49,8 @@ enum {
     IMP_NORMAL_SCALARS
 };
 
-/* Adds H, H_same, H_meas, g, cov_g, cov_excess, deviations and chi2 of a target whose pixels
- * share walks (a filter wider than a pixel, or walks from the lights), from `rounds` times
+/* Adds H, H_same, H_meas, g, cov_g, cov_excess, deviations and chi2 of a target whose
+ * pixels share walks (a filter wider than a pixel, or light walks), from `rounds` times
  * the samples of an evaluation; lo, hi: the part of the caller's progress. */
 enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                                        const struct imp_tracer *tracer,

@@ -50,7 +50,7 @@ struct pixel {
     struct imp__normal_worker *w;
     size_t index;         /* of the pixel */
     int M;                /* units */
-    size_t T;             /* numbers touched */
+    size_t T;             /* values touched */
     double share;         /* of the samples of the pixel that these are */
     double value, square; /* sums over replicates of the loss, and of its square */
 };
@@ -85,7 +85,7 @@ static void units_gather(const struct imp__normal_job *j, struct imp_tile_worker
     }
 }
 
-/* X without the numbers that are 0 in all units. */
+/* X without the values whose entries are 0 in all units. */
 static void touched_find(const struct imp__normal_job *j, struct pixel *p)
 {
     struct imp__normal_worker *w = p->w;
@@ -222,7 +222,7 @@ static void pair(const struct imp__normal_job *j, const struct pixel *p, int a, 
     }
 }
 
-/* Adds v v^T over the numbers touched, v [T]. */
+/* Adds v v^T over the values touched, v [T]. */
 static void square_add(const struct imp__normal_job *j, const struct pixel *p,
                        double scale, const double *v, double *out)
 {

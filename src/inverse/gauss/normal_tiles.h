@@ -26,8 +26,8 @@ struct imp__normal_job {
     struct imp__normal_worker {
         double *x;              /* [K][channels] of one set: mean */
         double *X;              /* [units][seen][K] of a pixel, then [units][seen][T] */
-        size_t *touched;        /* [T] in increasing order: numbers that the pixel's walks
-                                   contribute to; of others all is 0 */
+        size_t *touched;        /* [T] in increasing order: values with a derivative in
+                                 * the pixel's walks; the others' entries are 0 */
         double *sum, *sum_xx;   /* [T], [T*T] of a channel: over half of the units */
         double *sum1, *sum1_xx; /* and over the other half */
         double *own;            /* [T], [T*T] of a group of units */
@@ -60,8 +60,8 @@ static inline struct imp__normal_sums imp__normal_at(double *p, size_t K, bool d
 /* normal_units.c: units of a pixel that has so many sets. */
 int imp__normal_units(int sets);
 /* r[unit][c], in: radiance of channel c, out: residual, so that the loss is 1/2 w r^2;
- * @return w. factor [units]: of a loss that is not quadratic, what a unit's derivatives
- * are multiplied with; of others not set. */
+ * @return w. factor [units]: for a loss that is not quadratic, the factor of each unit's
+ * derivatives; not set for others. */
 double imp__normal_residuals(const struct imp__target *target, size_t pixel, size_t c,
                              int units, double r[][3], double *factor);
 

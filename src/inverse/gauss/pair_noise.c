@@ -49,8 +49,8 @@ void imp__pair_noise_add(struct imp__pair_noise *n, int x, int y, double w,
         }
 }
 
-/* Hoeffding decomposition of one tile and number: with m the mean over pairs, h_ab
- * becomes h_ab - m - e_a - e_b, in place, and e [R] the first-order terms. */
+/* Hoeffding decomposition of one tile and value: with m the mean over pairs, h_ab becomes
+ * h_ab - m - e_a - e_b, in place, and e [R] the first-order terms. */
 static void split(const struct imp__pair_noise *n, double *h, double *e)
 {
     const int R = n->R;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Diagonals of the matrices made of rows, and how noisy they are: of a pixel's number,
+ * Diagonals of the matrices made of rows, and their noise: for a value met in a pixel,
  * with x_a its derivative in unit a,
  *
  *     H_kk        w [(sum x)^2 - sum x^2] / (M (M - 1)),        same samples:  w (sum x)^2/M^2
@@ -14,7 +14,7 @@
 
 enum { UNITS = IMP_NORMAL_UNITS };
 
-struct entry { /* a number that a pixel's walks contribute to */
+struct entry { /* a value with a derivative in a pixel's walks */
     uint32_t number;
     double x[UNITS];       /* of a channel */
     double without[UNITS]; /* H_kk of all channels, but for this unit */

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Normal equations of many numbers, whose matrix is never formed: the derivatives of
- * each pixel's walks with respect to the few numbers that they met are stored as rows, and
- * multiplied with vectors. With X_a the
- * derivatives of unit a of a pixel's samples (gauss_newton.c), that of a vector v is
+ * Normal equations of many values, whose matrix is never formed: the derivatives of each
+ * pixel's walks with respect to the few values that they met are stored as rows, and
+ * multiplied with vectors. With X_a the derivatives of unit a of a pixel's samples
+ * (gauss_newton.c), that of a vector v is
  *
  *     H v = sum over pixels  w sum_a X_a (D - d_a) / (M (M - 1)),    d_a = X_a . v,   D = sum d_a
  *
- * the product with the same unbiased matrix as of few numbers: only pairs of different
+ * the product with the same unbiased matrix as for few values: only pairs of different
  * units count. */
 #ifndef IMP_INVERSE_SPARSE_ROWS_H
 #define IMP_INVERSE_SPARSE_ROWS_H
@@ -41,7 +41,7 @@ struct imp__row_block {
 
 struct imp__rows {
     imp_context *ctx;
-    size_t n; /* numbers */
+    size_t n; /* values */
     size_t n_blocks;
     struct imp__row_block *block;
     double n_residuals;
@@ -51,9 +51,10 @@ struct imp__rows {
 /* Blocks are added up in groups, whose number is that of no threads: same bits. */
 enum { IMP_ROW_GROUPS = 8 };
 
-/* Rows at x (NULL: at the scene's values) from `rounds` times the samples of an evaluation,
- * for sensors whose pixels share no walks. look: first of some tiles, by whose rows the
- * memory of all is estimated. IMP_E_NOMEM: more than there is; IMP_E_UNSUPPORTED: pixels share walks. */
+/* Rows at x (NULL: at the scene's values) from `rounds` times the samples of an
+ * evaluation, for sensors whose pixels share no walks. look: first some tiles are
+ * sampled, by whose rows the memory of all is estimated. IMP_E_NOMEM: more than there is;
+ * IMP_E_UNSUPPORTED: pixels share walks. */
 enum imp_status imp__rows_take(struct imp_problem *p, const double *x,
                                const struct imp_run *run, int rounds, bool look,
                                struct imp__rows *out);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Channels of the numbers of theta that a sweep has met: a list in the order met, and each number's
- * slot in it. */
+ * Channels of the numbers of theta that a sweep has met: a list in the order met, and
+ * each value's slot in it. */
 #include "sparse_sink.h"
 
 static double *place_new(struct imp__sparse_sink *s, size_t number)

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * J^T W J where a walk has a part in several pixels and pixels share walks: through filters
- * wider than a pixel, and of walks from the lights or from both ends. R independent
- * replicates, each a picture L and a derivative picture X_k for every number, take the
- * place of walks (docs/estimators.md 15):
+ * J^T W J where a walk has a part in several pixels and pixels share walks: with filters
+ * wider than a pixel, light walks or bidirectional walks. R independent replicates, each
+ * a picture L and a derivative picture X_k for every value, are used in place of walks
+ * (docs/estimators.md 15):
  *
  *     (J^T J)_kl ~ w [ (sum_b X_k)(sum_b X_l) - sum_b X_k X_l ] / (R (R-1))
  *     (J^T r)_k  ~ w [ (sum_b L)(sum_b X_k) - sum_b L X_k ] / (R (R-1)) - w T mean(X_k)

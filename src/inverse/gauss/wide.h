@@ -19,7 +19,7 @@ struct imp__wide {
     int R;
     size_t K;
     imp_film *films[IMP_WIDE_REPLICATES]; /* channels: the radiance, then [K][channels] */
-    double *rows[IMP_WIDE_REPLICATES];    /* the same of walks from the lights */
+    double *rows[IMP_WIDE_REPLICATES];    /* the same of light walks */
     double *L, *X;                        /* of a pixel and channel: [R], [R][K] */
     double *sum;                          /* [K] */
     struct imp__pair_noise noise, loss_noise; /* of the gradient; of chi^2 */

@@ -14,7 +14,7 @@
 #define LEAST  4    /* samples of a pixel: two sets, or two replicates, of two */
 #define FLOOR  0.25 /* of the given samples */
 #define CAP    16
-#define MEMORY 0.8 /* weight of what was seen before; a look's noise is 20 to 50 % */
+#define MEMORY 0.8 /* weight of earlier estimates; the noise of one is 20 to 50 % */
 /* Weight of the loss's variance beside the gradient's: searches go by how it falls. */
 #define LOSS   0.1
 #define LEVELS 48
@@ -44,7 +44,7 @@ static void part_add(const struct imp_problem *p, const struct imp__target *targ
     struct imp_run most = *run;
     integrator = imp__walks_from(integrator, run->from);
     if (!integrator || !allowed(target, sensor, integrator))
-        return; /* what is wrong is the evaluation's to say */
+        return; /* the evaluation reports the error */
     const struct imp_film_desc *film = &sensor->film;
     const size_t side = IMP_TILE_SIDE, across = ((size_t)film->crop_w + side - 1) / side,
                  down = ((size_t)film->crop_h + side - 1) / side;
@@ -64,7 +64,7 @@ static void targets_add(const struct imp_problem *p, const struct imp_run *run,
             part_add(p, imp__target_part(&p->targets[t], k), run, a);
 }
 
-/* Numbers seen of a tile. */
+/* Statistics of a tile. */
 static size_t each(const struct imp__allocation *a)
 {
     return IMP_ALLOCATION_SEES * (size_t)a->parts;

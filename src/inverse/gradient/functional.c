@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Numbers made of a picture, F = sum_p s_p I_p, with standard errors (influence.h). */
+ * Functionals of a picture, F = sum_p s_p I_p, with standard errors (influence.h). */
 #include "base/team.h"
 #include "inverse/estimate/influence.h"
 #include "inverse/estimate/problem_tracer.h"
@@ -192,7 +192,7 @@ enum imp_status imp_problem_functional(imp_problem *p, const float *adjoint,
     float *ones = NULL;
     IMP_TRY(begin(p, adjoint, &own, &f, &weights, &ones));
     if (gradient) {
-        /* What may fail behind it must not find the caller's numbers overwritten. */
+        /* A later failure must leave the caller's values unchanged. */
         if (value) g = imp__alloc(ctx, 2 * p->n, sizeof *g);
         if (value && !g) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for gradients"));
         double *mean = g ? g : gradient, *se = g ? g + p->n : gradient_se;
@@ -254,7 +254,7 @@ out:
     return st;
 }
 
-/* The same of walks from the lights, which need no pictures. */
+/* The same by light walks, which need no pictures. */
 static enum imp_status light_errors(imp_context *ctx, const struct imp__functional *f,
                                     const struct imp_run *run, double *se)
 {

@@ -11,7 +11,7 @@
 /* An item's result, and the sum of several. */
 struct part {
     double objective, variance;
-    double dense[]; /* [2 or 3][n] of few numbers, as of imp__tally_dense; then moments of
+    double dense[]; /* [2 or 3][n] of few values, as of imp__tally_dense; then moments of
                        the variate, if there is one */
 };
 

@@ -42,7 +42,7 @@ struct imp__gradient_job {
     struct imp__overlap overlap;
     bool look;                           /* only the size of terms is wanted */
     struct imp_active nothing;           /* what the tally keeps without want_gradient */
-    struct imp_fixed_sum *mean, *spread; /* of many numbers; spread NULL: not wanted */
+    struct imp_fixed_sum *mean, *spread; /* of many values; spread NULL: not wanted */
     struct imp_tiles tiles;
     struct imp_tally *tallies; /* [threads] */
 };

@@ -53,7 +53,8 @@ static void sweep_each(const struct replicate *r)
 
 /* ---- Adjoints made of residuals ----------------------------------------------------- */
 
-/* The means of the sets' walks: L, and H at the numbers before, where the variate looks. */
+/* The means of the sets' walks: L, and H at the previous parameters, where the variate
+ * needs it. */
 static void sets_trace(const struct replicate *r, struct imp_walk *walks, imp_spec *L,
                        imp_spec *H)
 {

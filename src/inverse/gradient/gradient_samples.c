@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * How many samples a job takes where: of all tiles alike, or as an allocation has it. */
+ * The samples of each tile of a job: the same everywhere, or those of an allocation. */
 #include "allocation.h"
 #include "gradient_job.h"
 

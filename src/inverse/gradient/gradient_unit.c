@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The unit in which a job adds up many numbers in fixed point: a few of its items are run first,
- * to find the size of their terms. */
+ * The unit in which a job sums gradients of many values in fixed point: a few of its
+ * items are run first, to find the size of their terms. */
 #include "gradient_job.h"
 
 #define LOOKS      64 /* one item in so many is run to find the size of terms, */

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A number and its gradient until they are known well enough: the mean over looks, each of
- * its own walks. For a parameter with standard errors s_i, |g - truth|^2 is beyond z^2 sum
- * s_i^2 no oftener than a normal number is beyond +-z, for z >= 1.54 and however the errors
- * depend on each other (Szekely and Bakirov, Probab. Theory Relat. Fields 126, 2003). */
+ * A value and its gradient until their errors are small enough: the mean over stages,
+ * each of its own walks, after each of which the errors are tested. For a parameter with
+ * standard errors s_i, |g - truth|^2 is beyond z^2 sum s_i^2 no more often than a normal
+ * variable is beyond +-z, for z >= 1.54 and however the errors depend on each other
+ * (Szekely and Bakirov, Probab. Theory Relat. Fields 126, 2003). */
 #include "allocation.h"
 #include "base/arguments.h"
 #include "walk/run/looks.h"
@@ -15,7 +16,7 @@ static double over(double error, double of)
     return of > 0 ? error / of : INFINITY; /* what is 0 may not have been found yet */
 }
 
-/* Error bound of the least certain parameter; of the value, if there is no gradient. */
+/* Error bound of the least certain parameter, or of the value if there is no gradient. */
 static double bound(const struct imp__looks *l, const struct imp_problem *p,
                     const struct imp_estimate *value, const double *g, const double *se)
 {
@@ -35,8 +36,9 @@ static double bound(const struct imp__looks *l, const struct imp_problem *p,
     return worst;
 }
 
-/* What the variance of a look counts by. With q_b the squared error of parameter b over its
- * squared length, the largest of which ends the sequence, sum q_b^4 estimates it:
+/* The variance by which a stage's samples are allocated. With q_b the squared error of
+ * parameter b over its squared length, the largest of which ends the sequence, sum q_b^4
+ * estimates it:
  *
  *     d q_b^4 / d Var g_k  ~  q_b^3 / |g_b|^2
  */
@@ -120,7 +122,8 @@ enum imp_status imp_problem_until(imp_problem *p, const float *adjoint,
         IMP_TRY(st);
         const double w = imp__looks_weight(&l);
         mix(w, f.value, f.se, &all.value, &all.se);
-        /* Each look has its own bias, of its own samples: the mean's is that of the first. */
+        /* Each stage has the bias of its own number of samples: the mean's is that of the
+         * first. */
         all.bias_order = l.end.looks > 1 && f.bias_order ? 1 : f.bias_order;
         for (size_t i = 0; i < n; i++) mix(w, g[i], se[i], &mean[i], &mean_se[i]);
         if (allocation.n > 0) {

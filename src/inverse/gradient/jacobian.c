@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Derivative pictures: in one direction (tangent along each walk), or one for every
- * active number from the same walks (sweep with adjoint 1, channels kept apart). */
+ * active value from the same walks (sweep with adjoint 1, channels kept apart). */
 #include "film/film_picture.h"
 #include "inverse/estimate/channel_sink.h"
 #include "inverse/estimate/problem_tracer.h"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Losses and gradients of pictures made by walks from the lights. A walk reaches many
- * pixels, so the adjoint of a pixel cannot leave out one walk at a time; it leaves out a
- * set of walks. A group has two sets A, B, of n walks a pixel each, and estimates
+ * Losses and gradients of pictures made by light walks. A walk reaches many pixels, so
+ * the adjoint of a pixel cannot leave out one walk at a time; it leaves out a set of
+ * walks. A group has two sets A, B, of n walks a pixel each, and estimates
  *
  *     loss   of a quadratic l:  w/2 (I_A - T)(I_B - T)
  *     gradient:                 1/2 [ l'(I_A) dI_B + l'(I_B) dI_A ]

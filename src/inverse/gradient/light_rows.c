@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Pictures by walks from the lights, or from both ends, with their derivative pictures.
- * What a walk adds to a pixel has a derivative of its own: each reach of a walk is swept by
- * itself, over the vertices up to the one it comes from. What the walk from the sensor
- * brings of a sample from both ends is swept with all that it is joined with. */
+ * Pictures by light walks, or bidirectional walks, with their derivative pictures. Each
+ * contribution of a walk to a pixel has a derivative of its own: it is swept by itself,
+ * over the vertices up to the one it comes from. In a bidirectional sample the
+ * contribution of the walk from the sensor is swept with all its connections. */
 #include "film/film_picture.h"
 #include "inverse/estimate/channel_sink.h"
 #include "light_gradient.h"
@@ -13,7 +13,7 @@
 struct rows {
     const struct imp_tracer *tracer;
     int channels;
-    const double *x_dot; /* forward mode: the direction; NULL: all numbers */
+    const double *x_dot; /* forward mode: the direction; NULL: all values */
 };
 
 /* The one reach with an adjoint, which is 1 in every lane. NULL: no memory. */

@@ -6,7 +6,7 @@
 
 #include "inverse/problem/problem.h"
 
-/* imp_problem_objective; `in_place`: sums of many numbers are made in gradient and
+/* imp_problem_objective; `in_place`: sums of many values are made in gradient and
  * gradient_se, which a failure then leaves undefined. */
 enum imp_status imp__problem_objective(struct imp_problem *p, const double *x,
                                        const struct imp_run *run, bool in_place,

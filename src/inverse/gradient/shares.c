@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What parameters do to one pixel: elasticities x dR/dx / R, summed over a parameter's
- * numbers, where R is the mean over channels and walks. R is of first degree in what lights
- * emit, so the shares of all emission add up to 1 (Euler); the share of a reflectance is
- * the mean number of reflections by it, weighted by what they carried. Standard errors are
- * those of a ratio of means, by the delta method:
+ * values, where R is the mean over channels and walks. R is of first degree in what
+ * lights emit, so the shares of all emission add up to 1 (Euler); the share of a
+ * reflectance is the mean number of reflections by it, weighted by what they carried.
+ * Standard errors are those of a ratio of means, by the delta method:
  *
  *     r = sum g/sum L,   var r = n/(n - 1) sum (g - r L)^2 / (sum L)^2
  *

@@ -7,12 +7,12 @@
  *
  *     I_t = F + w (I_{t-1} - H)       F, H: means of the walks at theta_t and theta_{t-1}
  *
- * The residual that weighs a walk's derivative is made of the other walks' F - w H, and of
- * I_{t-1}. w is cross-fitted, known before the walks are drawn and independent of the pixel:
- * that of the pixels where x + y is even is estimated from the others, and the other way round.
- * Where it promises too little, it is disabled for that half: its pictures are F alone, and of
- * the other half few pixels are evaluated at theta_{t-1}, which say when it is worth the time
- * again. */
+ * The residual that weighs a walk's derivative is made of the other walks' F - w H, and
+ * of I_{t-1}. w is cross-fitted, known before the walks are drawn and independent of the
+ * pixel: that of the pixels where x + y is even is estimated from the others, and the
+ * other way round. Where its expected gain is too small, it is disabled for that half:
+ * its pictures are F alone, and in the other half few pixels are evaluated at
+ * theta_{t-1}, by which it is enabled again. */
 #ifndef IMP_INVERSE_VARIATE_H
 #define IMP_INVERSE_VARIATE_H
 
@@ -93,7 +93,8 @@ void imp__variate_replicate(struct imp__variate_view *view, const struct imp__ta
                             struct imp__replicates plan, int k, size_t pixel,
                             const imp_spec *L, imp_spec *H, double *moments);
 
-/* All that an evaluation leaves to the next, as so many numbers: for checkpoints. */
+/* The state that an evaluation leaves to the next, as so many doubles: for
+ * checkpoints. */
 size_t imp__variate_numbers(const struct imp__variate *v, const struct imp_problem *p);
 void imp__variate_save(const struct imp__variate *v, const struct imp_problem *p,
                        double *numbers);

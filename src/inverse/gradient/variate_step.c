@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * An evaluation with a control variate: what its walks say of the pictures, and what the next one
- * does with that. */
+ * An evaluation with a control variate: the moments of its walks, and the weight that the
+ * next one derives from them. */
 #include "base/arguments.h"
 #include "base/team.h"
 #include "inverse/estimate/adjoint.h"
@@ -10,15 +10,15 @@
 #include "variate.h"
 #include <string.h>
 
-#define W_MOST     (1 - 1. / 512) /* what is carried on is forgotten in so many evaluations */
-#define W_FIRST    0.5            /* where nothing is known */
+#define W_MOST     (1 - 1. / 512) /* an error carried on lasts so many evaluations */
+#define W_FIRST    0.5            /* without moments */
 #define MEMORY     0.5            /* of moments, from one evaluation to the next */
-#define GAIN_LEAST 1.25 /* of a picture's variance, that is worth the time of a look */
+#define GAIN_LEAST 1.25 /* variance gain that repays the evaluation at theta_{t-1} */
 
 /* ---- Before it -------------------------------------------------------------------- */
 
-/* The w that makes the variance of F + w (I - H) least, by what earlier walks of the other
- * half say. */
+/* The w that minimises the variance of F + w (I - H), by moments of earlier walks of the
+ * other half. */
 static double weight_of(const struct imp__variate_view *view, int half)
 {
     const double *m = view->half[half].before;
@@ -26,7 +26,7 @@ static double weight_of(const struct imp__variate_view *view, int half)
     return all > 0 ? imp_clamp(m[IMP_VARIATE_BOTH] / all, 0.0, W_MOST) : W_FIRST;
 }
 
-/* Does that leave so little of F's variance that it is worth a look at every pixel? */
+/* Does that remove enough of F's variance to evaluate every pixel at theta_{t-1}? */
 static bool pays(const struct imp__variate_view *view, int half)
 {
     const double *m = view->half[half].before, w = weight_of(view, half);
@@ -78,7 +78,7 @@ enum imp_status imp__variate_room(imp_context *ctx, struct imp__variate_view *vi
 
 /* ---- Its walks -------------------------------------------------------------------- */
 
-/* Adds what the m sets of a replicate say of the variance of a pixel's mean. */
+/* Adds the estimate of the variance of a pixel's mean from the m sets of a replicate. */
 static void moments_add(int m, double scale, const double *f, const double *h,
                         double *moments)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Problems: which numbers are free, and what they have to match. */
+ * Problems: which values are free, and what they have to match. */
 #include "problem.h"
 #include "match.h"
 #include "scene/theta_near.h"
@@ -192,7 +192,7 @@ enum imp_status imp_problem_set_x(imp_problem *p, const double *x)
     IMP_REQUIRE(p->ctx, x, "x");
     IMP_SETS(p->scene, st);
     if (st != IMP_OK) return st;
-    /* All or nothing: look at everything before the first is set. */
+    /* All or nothing: check everything before the first is set. */
     for (size_t k = 0; k < p->n_blocks; k++) {
         const struct imp__block *b = &p->blocks[k];
         for (size_t e = 0; e < b->count; e++) {

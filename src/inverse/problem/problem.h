@@ -61,7 +61,7 @@ struct imp__regulariser {
     double *origin; /* [n_theta] x0, or NULL for 0 */
 };
 
-/* Parameters that follow common numbers (ties.c). */
+/* Parameters tied to common values (ties.c). */
 struct imp__param_tie {
     enum imp_tie kind;
     uint8_t *on; /* [n_params] its parameters, two or more but for logarithms */
@@ -95,7 +95,7 @@ struct imp__fit_block { /* numbers of one parameter */
     size_t first;
     double lo, hi; /* of x */
     bool log;
-    const double *start; /* of numbers kept in doubles; NULL: the search's */
+    const double *start; /* of values kept in doubles; NULL: the search's */
 };
 struct imp__fit_answer {
     size_t n;                            /* 0: there is none */
@@ -103,7 +103,7 @@ struct imp__fit_answer {
     struct imp__search *search;          /* settled; owned */
     size_t n_blocks;
     struct imp__fit_block *blocks; /* in fit_arena */
-    const double *se; /* [n] in fit_arena, of lm with many numbers; NULL: none */
+    const double *se; /* [n] in fit_arena, of lm with many values; NULL: none */
 };
 void imp__fit_answer_free(struct imp_problem *p);
 
@@ -112,7 +112,7 @@ struct imp_problem {
     struct imp_scene *scene;
     uint8_t *chosen;          /* [n_params] */
     struct imp_active active; /* follows chosen */
-    size_t n;                 /* active numbers */
+    size_t n;                 /* active values */
     size_t n_blocks;
     struct imp__block *blocks; /* in the order of their numbers */
     size_t n_ties, cap_ties;
@@ -125,7 +125,7 @@ struct imp_problem {
     struct imp__allocation *allocation; /* of its samples; NULL: all alike */
     struct imp__variate *variate; /* of the evaluation at work (variate.h); NULL: none */
     enum imp__loss_use use;
-    bool missing_told;          /* that walks from the lights miss some light */
+    bool missing_told;          /* that light tracing misses some light */
     bool same_known;            /* the ranks of a team have the same problem */
     struct imp_arena fit_arena; /* of the last fit's result */
     struct imp__fit_answer fit_answer;
@@ -137,7 +137,7 @@ struct imp_problem {
 /* Make the parameters `chosen` [n_params] active, and lay out x by the problem's ties.
  * Replaces active and blocks; after a failure they are as before. */
 enum imp_status imp__problem_layout(struct imp_problem *p, const uint8_t *chosen);
-/* Number i of x: its block. */
+/* The block of component i of x. */
 const struct imp__block *imp__problem_block(const struct imp_problem *p, size_t i);
 static inline const struct imp__param_tie *imp__block_tie(const struct imp_problem *p,
                                                           const struct imp__block *b)
@@ -153,16 +153,16 @@ static inline bool imp__block_factor(const struct imp_problem *p,
 const char *imp__block_name(const struct imp_problem *p, const struct imp__block *b);
 /* The tie that parameter k has, in logarithms or not; -1: none. */
 int imp__tie_of(const struct imp_problem *p, size_t k, bool log);
-/* Number e of a block, as x has it, from the scene. */
+/* Value e of a block, as x has it, from the scene. */
 double imp__block_get(const struct imp_problem *p, const struct imp__block *b, size_t e);
-/* Parameter k takes its numbers from x. */
+/* Parameter k takes its values from x. */
 void imp__tied_set(const struct imp_active *active, struct imp_param *param, size_t k,
                    const double *x);
 void imp__ties_free(struct imp_problem *p);
 /* Forgets the tie that was made last; the layout is the caller's. */
 void imp__tie_last_free(struct imp_problem *p);
 uint64_t imp__ties_hash(const struct imp_problem *p, uint64_t hash);
-/* IMP_E_UNSUPPORTED where `what` supports ties of equal numbers alone. */
+/* IMP_E_UNSUPPORTED where `what` supports ties of equal values only. */
 enum imp_status imp__ties_equal_only(const struct imp_problem *p, const char *what);
 
 /* Hash of pixels, weights, losses and regularisers. */

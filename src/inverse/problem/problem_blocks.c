@@ -13,7 +13,7 @@
 
 const struct imp__block *imp__problem_block(const struct imp_problem *p, size_t i)
 {
-    /* The last block that begins at i or before. Blocks of no numbers share their place
+    /* The last block that begins at i or before. Blocks without values share their place
      * with the next, and come before it. */
     size_t at = 0, end = p->n_blocks;
     while (end - at > 1) {
@@ -36,7 +36,7 @@ double imp__block_get(const struct imp_problem *p, const struct imp__block *b, s
     double v;
     if (b->tie < 0 && !b->log) return imp__param_get(q, e);
     if (imp__block_factor(p, b)) {
-        /* From the largest number that the factor multiplies: its relative rounding is
+        /* From the largest value that the factor multiplies: its relative rounding is
          * least. */
         const double *origin = imp__block_tie(p, b)->origin + q->info.offset;
         size_t most = 0;
@@ -76,7 +76,7 @@ int imp__tie_of(const struct imp_problem *p, size_t k, bool log)
     return -1;
 }
 
-/* The bounds of a parameter's numbers, as bounds of x. */
+/* The bounds of a parameter's values, as bounds of x. */
 static void narrow(const struct imp_problem *p, const struct imp__param_tie *tie,
                    size_t k, struct imp__block *b)
 {

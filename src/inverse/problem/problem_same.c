@@ -14,21 +14,22 @@ uint64_t imp__problem_targets_hash(const struct imp_problem *p)
         const struct imp__target *t = &p->targets[i];
         const size_t n = (size_t)t->desc.width * (size_t)t->desc.height;
         const size_t c = n * (size_t)t->desc.channels * sizeof(float);
-        const double number[8] = {t->desc.sensor,   t->desc.width,     t->desc.height,
-                                  t->desc.channels, t->desc.loss,      t->desc.epsilon,
-                                  t->desc.scale,    t->weights != NULL};
+        const double number[9] = {
+            t->desc.sensor,   t->desc.width,      t->desc.height,
+            t->desc.channels, t->desc.loss,       t->desc.epsilon,
+            t->desc.scale,    t->weights != NULL, t->noise_se != NULL};
         hash = imp__hash(hash, number, sizeof number);
         hash = imp__hash(hash, t->pixels, c);
-        if (t->weights) hash = imp__hash(hash, t->weights, n * sizeof(float));
-        if (t->noise_se) hash = imp__hash(hash, t->noise_se, c);
+        hash = imp__hash(hash, t->weights, t->weights ? n * sizeof(float) : 0);
+        hash = imp__hash(hash, t->noise_se, t->noise_se ? c : 0);
     }
     for (size_t i = 0; i < p->n_regularisers; i++) {
         const struct imp__regulariser *r = &p->regularisers[i];
-        const double number[2] = {r->kind, r->weight};
+        const double number[3] = {r->kind, r->weight, r->origin != NULL};
         hash = imp__hash(hash, number, sizeof number);
         hash = imp__hash(hash, r->on, p->scene->n_params);
-        if (r->origin)
-            hash = imp__hash(hash, r->origin, p->scene->n_theta * sizeof *r->origin);
+        hash = imp__hash(hash, r->origin,
+                         r->origin ? p->scene->n_theta * sizeof *r->origin : 0);
     }
     return hash;
 }
@@ -44,8 +45,7 @@ enum imp_status imp__problem_same(struct imp_problem *p, const struct imp_run *r
     imp__team_state(p->scene, run);
     if (!imp__team_apart(p->ctx) && p->same_known) return IMP_OK;
     int n = imp__same_run(p->scene, run, call, same);
-    uint64_t what = imp__hash(0, p->chosen, p->scene->n_params);
-    if (p->n_ties > 0) what = imp__ties_hash(p, what);
+    uint64_t what = imp__ties_hash(p, imp__hash(0, p->chosen, p->scene->n_params));
     for (size_t i = 0; i < p->n_targets; i++) {
         const uint64_t sensor =
             imp__fingerprint_sensor(p->scene->sensors[p->targets[i].desc.sensor]);

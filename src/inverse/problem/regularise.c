@@ -91,7 +91,7 @@ static double at(const struct numbers *v, size_t e)
     return v->x ? v->x[e] : imp__block_get(v->problem, v->block, e);
 }
 
-/* x0 of element e: 0 without `origin` [n_theta], else its number there; a common factor
+/* x0 of element e: 0 without `origin` [n_theta], else its value there; a common factor
  * starts at 1. */
 static double origin_of(const struct numbers *v, const double *origin, size_t e)
 {

@@ -12,7 +12,7 @@ struct imp__clip {
     float *measured; /* [height][width][channels] of the target, as it came */
     float *base;     /* of a photograph: what its powers are taken of; else NULL */
     uint8_t *silent; /* [height][width][channels]: has no weight */
-    size_t changed;  /* numbers whose weight the last decision changed */
+    size_t changed;  /* values whose weight the last decision changed */
 };
 void imp__clip_free(imp_context *ctx, struct imp__clip *clip);
 

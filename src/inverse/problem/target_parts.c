@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Targets of films with response curves. A walk carries three channels; of a film with
- * another number of curves a loss is the sum of losses of up to three curves each, made
+ * Targets of films with response curves. A walk carries three channels; the loss of a
+ * film with another number of curves is the sum of losses of up to three curves each,
  * from independent walks. */
 #include "target_levels.h"
 #include <string.h>

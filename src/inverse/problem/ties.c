@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Ties: numbers of several parameters that are one number of x, common factors, and
- * logarithms. Walks add what each number is worth to the number of x that it follows
- * (imp__active_at, imp__active_slope), so standard errors and covariances of x hold as
- * they do without ties. */
+ * Ties: values of several parameters that are one component of x, common factors, and
+ * logarithms. Walks add the derivative with respect to each value, times dv/dx, to its
+ * component of x (imp__active_at, imp__active_slope), so standard errors and covariances
+ * of x are as valid as without ties. */
 #include "base/arguments.h"
 #include "match.h"
 #include "math/hash.h"
@@ -92,7 +92,7 @@ static enum imp_status members_find(imp_problem *p, const char *glob,
     return IMP_OK;
 }
 
-/* Sets tied numbers to the values of the first parameter. */
+/* Sets tied values to those of the first parameter. */
 static void made_equal(imp_problem *p, const struct imp__param_tie *t)
 {
     size_t first = 0;
@@ -190,13 +190,14 @@ enum imp_status imp_problem_get_tie(const imp_problem *p, size_t i,
 
 uint64_t imp__ties_hash(const struct imp_problem *p, uint64_t hash)
 {
+    hash = imp__hash(hash, &p->n_ties, sizeof p->n_ties);
     for (size_t i = 0; i < p->n_ties; i++) {
         const struct imp__param_tie *t = &p->ties[i];
-        const int kind = t->kind;
-        hash = imp__hash(hash, &kind, sizeof kind);
+        const int kind[2] = {t->kind, t->origin != NULL};
+        hash = imp__hash(hash, kind, sizeof kind);
         hash = imp__hash(hash, t->on, p->scene->n_params);
-        if (t->origin)
-            hash = imp__hash(hash, t->origin, p->scene->n_theta * sizeof *t->origin);
+        hash = imp__hash(hash, t->origin,
+                         t->origin ? p->scene->n_theta * sizeof *t->origin : 0);
     }
     return hash;
 }

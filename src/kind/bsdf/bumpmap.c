@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * bumpmap: a material whose normal is that of a surface raised by a texture, times `scale`
- * (Blinn 1978; turned.h). The texture may stand in any slot. It has no derivative, as that
- * of normalmap. */
+ * bumpmap: a material whose normal is that of a surface raised by a texture, times
+ * `scale` (Blinn 1978; turned.h). The texture may be in any slot. It has no derivative,
+ * for the reason given in normalmap. */
 #include "math/vec.h"
 #include "turned.h"
 #include <string.h>

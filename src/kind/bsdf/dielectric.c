@@ -4,7 +4,7 @@
  * reflectance, F tint_r is reflected and (1 - F) tint_t (n_wo/n_wi)^2 refracted: radiance
  * is compressed where the index is higher. Lobes are drawn with probabilities F and 1 -
  * F, whatever the tints are, so that a tint of 0 keeps its derivative. The index bends
- * paths and has no gradient: it can be set, and asking for its derivative is refused
+ * paths and has no gradient: it can be set, and a request for its derivative is refused
  * (docs/estimators.md 9.3). */
 #include "fresnel.h"
 #include "kind/build.h"

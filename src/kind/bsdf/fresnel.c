@@ -150,7 +150,8 @@ static imp_spec conductors(double c, imp_spec eta, imp_spec k)
     return 0.5 * Rs * (1 + ratio);
 }
 
-/* Lanes that differ: one where all are equal; of colours, whose fourth is 0, three. */
+/* Lanes that differ: one where all are equal; three for colours, whose fourth lane is
+ * 0. */
 static int lanes_of(const imp_spec *eta, const imp_spec *k)
 {
     bool equal = true;

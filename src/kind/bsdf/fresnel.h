@@ -23,7 +23,8 @@ double imp__fresnel_diffuse(double e, double *d_e);
 void imp__fresnel_conductor(double c, const imp_spec *eta, const imp_spec *k,
                             imp_spec *f);
 /* With derivatives. At eta = 0 or k = 0 they are the one-sided ones: F depends on eta k
- * where the root vanishes, and a mirror (eta = 0, k = 1) must know how it could absorb.
+ * where the root vanishes, so a mirror (eta = 0, k = 1) has a derivative towards
+ * absorption.
  */
 void imp__fresnel_conductor_d(double c, const imp_spec *eta, const imp_spec *k,
                               imp_spec *f, imp_spec *df_deta, imp_spec *df_dk);

@@ -11,8 +11,8 @@
  *
  * Directions are drawn by half-vectors, with the table's own lobe for the direction of
  * sight, and by the cosine: p = s cos/pi + (1 - s) p(h)/(4 wo.h). The cosine's share s
- * takes what is Lambertian in the lobe, and covers what the table, made of some half-vectors
- * of every cell, does not see. */
+ * samples the Lambertian part of the lobe, and covers directions that the table, made of
+ * some half-vectors of every cell, misses. */
 #include "merl.h"
 #include "base/required.h"
 #include "kind/build.h"

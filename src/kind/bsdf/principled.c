@@ -33,7 +33,7 @@ static void inputs_cut(const imp_spec *in, imp_spec x[N_INPUTS])
         x[j] = is_number(j) ? imp__spec(imp_clamp(in[j][0], 0, 1)) : in[j];
 }
 
-/* ---- Where it is looked at ------------------------------------------------------- */
+/* ---- Directions and facets ------------------------------------------------------- */
 
 /* Seen from behind, z is reversed and the index inverted: below wo is always above. */
 struct look {

@@ -125,7 +125,8 @@ static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double 
                                      .uv = {at.uv[0], at.uv[1]},
                                      .cos_light = 1,
                                      .p = at.p,
-                                     .ng = at.ng};
+                                     .ng = at.ng,
+                                     .located = {hit.prim, {(float)hit.u, (float)hit.v}}};
     return true;
 }
 
@@ -135,6 +136,7 @@ static bool sample_emission(const struct imp_emitter *e, const struct imp_ball *
     (void)scene;
     const struct beam *l = e->self;
     struct imp_surface at;
+    at.located.prim = -1;
     e->shape->ops->sample_area(e->shape, u, &at);
     *out = (struct imp_emission_sample){.p = at.p,
                                         .ng = at.ng,
@@ -143,7 +145,8 @@ static bool sample_emission(const struct imp_emitter *e, const struct imp_ball *
                                         .cos_light = 1,
                                         .cos_p = 1,
                                         .pdf_p = 1 / e->shape->area,
-                                        .pdf_d = 1};
+                                        .pdf_d = 1,
+                                        .located = at.located};
     return true;
 }
 

@@ -32,6 +32,7 @@ bool imp__surface_emission_sample(const struct imp_emitter *e,
     const struct imp_shape *s = e->shape;
     struct imp_surface at;
     if (!s->ops->sample_area) return false;
+    at.located.prim = -1;
     s->ops->sample_area(s, u, &at);
     const imp_v3 local = imp__cosine_hemisphere(u + 2);
     const struct imp_frame frame = imp__frame_from_normal(at.n);
@@ -43,7 +44,8 @@ bool imp__surface_emission_sample(const struct imp_emitter *e,
                                         .cos_light = imp__dot(at.n, d),
                                         .cos_p = fabs(imp__dot(at.ng, d)),
                                         .pdf_p = 1 / s->area,
-                                        .pdf_d = local[2] * IMP_INV_PI};
+                                        .pdf_d = local[2] * IMP_INV_PI,
+                                        .located = at.located};
     return local[2] > 0;
 }
 

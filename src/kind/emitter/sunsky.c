@@ -190,7 +190,7 @@ static void eval_d(const struct imp_emitter *e, const imp_spec *in,
 
 /* ---- Sampling -------------------------------------------------------------------- */
 
-/* Luminance of the sky, and of the sun, in a direction, at the numbers as they stand. */
+/* Luminance of the sky, and of the sun, in a direction, at the present parameters. */
 static void luminances(const struct imp_emitter *e, imp_v3 w, double *sky, double *sun)
 {
     const struct sunsky *s = e->self;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the lights that are surfaces share: they stand on a shape that has area, and their
- * points are drawn as the shape draws them. */
+ * Functions shared by lights that are surfaces: they belong to a shape with an area, and
+ * their points are drawn by the shape's own sampling. */
 #ifndef IMP_KIND_EMITTER_SURFACE_H
 #define IMP_KIND_EMITTER_SURFACE_H
 

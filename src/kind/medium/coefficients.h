@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * How scenes say what a medium is: by extinction and albedo, or by scattering and
+ * How scenes describe a medium: by extinction and albedo, or by scattering and
  * absorption, times one scale,
  *
  *     sigma_t, albedo:    extinction = scale sigma_t,  scattering = extinction albedo

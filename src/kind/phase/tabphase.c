@@ -10,9 +10,10 @@
  *
  *     dp/dv_k = (h_k - 2 pi p w_k)/(2 pi N)
  *
- * Values of up to NUMBERS are inputs, each with a derivative; longer tables stand. A value
- * that is 0 has a derivative where p is 0, or so small that h_k^2/p has no integral: where
- * there is one, a part e of the directions is drawn evenly, with the density
+ * Up to NUMBERS values are inputs, each with a derivative; longer tables are constant. A
+ * value that is 0 has a derivative where p is 0, or so small that h_k^2/p has no
+ * integral: if there is one, a fraction e of the directions is drawn uniformly, with the
+ * density
  *
  *     q(c) = (1 - e) p(c) + e/(4 pi) */
 #include "base/number.h"

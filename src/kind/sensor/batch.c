@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Several sensors, whose pictures stand side by side in one film: columns [k w, (k + 1) w)
+ * Several sensors, whose pictures are side by side in one film: columns [k w, (k + 1) w)
  * are those of sensor k, with w the width over the number of sensors. */
 #include "kind/build.h"
 

@@ -48,6 +48,7 @@ static bool connect(const struct imp_sensor *s, const imp_v3 *ref, bool far,
                     const double u[4], struct imp_sensor_sample *out)
 {
     struct imp_surface at;
+    at.located.prim = -1;
     s->shape->ops->sample_area(s->shape, u, &at);
     const imp_v3 d = far ? *ref : *ref - at.p;
     const double r2 = imp__dot(d, d), r = sqrt(r2);
@@ -55,14 +56,16 @@ static bool connect(const struct imp_sensor *s, const imp_v3 *ref, bool far,
     const imp_v3 w = d * (1 / r);
     const double c = imp__dot(w, at.ng), pixels = (double)s->film.width * s->film.height;
     if (!(c > 0)) return false;
-    *out = (struct imp_sensor_sample){.wo = -w,
-                                      .p = at.p,
-                                      .dist = far ? INFINITY : r,
-                                      .px = u[0] * s->film.width,
-                                      .py = u[1] * s->film.height,
-                                      .weight = pixels * c / (far ? 1 : r2),
-                                      .ng = at.ng,
-                                      .cos_sensor = c};
+    *out = (struct imp_sensor_sample){
+        .wo = -w,
+        .p = at.p,
+        .dist = far ? INFINITY : r,
+        .px = u[0] * s->film.width,
+        .py = u[1] * s->film.height,
+        .weight = pixels * c / (far ? 1 : r2),
+        .ng = at.ng,
+        .cos_sensor = c,
+        .located = imp__located_drawn(s->shape, &at.located, at.uv)};
     return true;
 }
 

@@ -98,7 +98,8 @@ bool imp__projection_connect(const struct imp_projection *p,
     if (!(q[2] > 0) || (!far && !(q[2] > p->near_clip && q[2] < p->far_clip)))
         return false;
     const double ox = o[0] / focus, oy = o[1] / focus;
-    /* Most of what walks from the lights meet is beside the film: no division before. */
+    /* Most connections of light walks miss the film: they are rejected before the
+     * division. */
     if (q[0] + ox * q[2] < film->x_least * q[2] ||
         q[0] + ox * q[2] > film->x_most * q[2] ||
         q[1] + oy * q[2] < film->y_least * q[2] || q[1] + oy * q[2] > film->y_most * q[2])

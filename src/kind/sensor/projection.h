@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What sensors share: placement; of projective ones clipping planes, field of view.
+ * What sensors share: placement, and for projective ones clipping planes and field of
+ * view.
  */
 #ifndef IMP_KIND_PROJECTION_H
 #define IMP_KIND_PROJECTION_H

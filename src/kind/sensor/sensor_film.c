@@ -66,7 +66,7 @@ static enum imp_status format_read(const struct imp_build *b, struct imp_film_de
     f->file_format = file <= 1 ? "openexr" : files[file];
     f->pixel_format = (enum imp_pixel_format)pixel;
     f->half = component == 0;
-    if (file >= 2) { /* these know nothing else */
+    if (file >= 2) { /* these formats have nothing else */
         f->pixel_format = IMP_PIXEL_RGB;
         f->half = false;
     }

@@ -196,6 +196,49 @@ static void place(const struct imp_shape *s, const double uv[2], struct imp_surf
     surface_at(k, &at, &x, x.start * cos(turn) + x.turned * sin(turn), out);
 }
 
+/* Nearer to an end of a cone than this it is the ball there that was met. */
+#define AT_END 1e-9
+
+struct imp_located imp__curve_locate(const struct imp_curves *k, int segment,
+                                     const double uv[2], imp_v3 normal)
+{
+    const double v = imp_clamp(uv[1] * (double)k->n_segments - segment, 0.0, 1.0);
+    struct imp_located x = {segment, {(float)uv[0], (float)v}};
+    if (k->degree != 1 || (v > AT_END && v < 1 - AT_END)) return x;
+    struct imp__curve_at at;
+    imp__curve_at(k, segment, v < 0.5 ? 0 : 1, &at);
+    const imp_v3 axis = imp__curve_axis(&at);
+    const double angle =
+        atan2(imp__length(imp__cross(axis, normal)), imp__dot(axis, normal));
+    x.at[1] = (float)(v < 0.5 ? -1 - angle : 2 + angle);
+    return x;
+}
+
+void imp__curve_surface(const struct imp_curves *k, int segment, const float at[2],
+                        struct imp_surface *out)
+{
+    const double turn = IMP_2PI * at[0];
+    const bool ball = at[1] < 0 || at[1] > 1;
+    const double v = imp_clamp((double)at[1], 0.0, 1.0);
+    struct imp__curve_at here;
+    imp__curve_at(k, segment, v, &here);
+    const struct across x = across_of(&here);
+    double along = 0, across = 1; /* outward, which on a cone leans */
+    if (ball) {
+        const double angle = at[1] < 0 ? -1 - (double)at[1] : (double)at[1] - 2;
+        along = cos(angle);
+        across = sin(angle);
+    } else if (k->degree == 1) {
+        const double length = imp__length(here.d1);
+        along = length > 0 ? imp_clamp(-here.r1 / length, -1.0, 1.0) : 0;
+        across = sqrt(1 - along * along);
+    }
+    out->uv[0] = at[0];
+    out->uv[1] = (v + segment) / (double)k->n_segments;
+    const imp_v3 round = x.start * cos(turn) + x.turned * sin(turn);
+    surface_at(k, &here, &x, x.axis * along + round * across, out);
+}
+
 #define CURVE_OPS(name_, build_, place_)                                                 \
     {                                                                                    \
         .size = sizeof(struct imp_shape_ops), .name = name_, .build = build_,            \

@@ -36,4 +36,11 @@ static inline imp_v3 imp__curve_normal(const struct imp_curves *k,
 imp_v3 imp__curve_meet(const struct imp_curves *k, int segment, double t, double *v,
                        imp_v3 o, imp_v3 d, struct imp__curve_at *out);
 
+/* Coordinates of a point with this uv and normal on a segment, and the surface there
+ * (scene/located.h). */
+struct imp_located imp__curve_locate(const struct imp_curves *k, int segment,
+                                     const double uv[2], imp_v3 normal);
+void imp__curve_surface(const struct imp_curves *k, int segment, const float at[2],
+                        struct imp_surface *out);
+
 #endif

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * With q from the line to the point p = o + t d, both tubes have |q| = r(v). Where the circles
- * are swept across the line, q c' = 0; of an envelope of balls, q c' + r r' = 0. Embree's t
- * and v are near the root of both equations, which Newton's rule finds. */
+ * With q from the line to the point p = o + t d, both tubes have |q| = r(v). Where the
+ * circles are swept across the line, q c' = 0; for an envelope of balls, q c' + r r' = 0.
+ * Embree's t and v are near the root of both equations, which Newton's rule finds. */
 #include "curve.h"
 
 static imp_v3 load(const struct imp_curves *k, size_t i)

@@ -5,8 +5,8 @@
  *
  *     base + n length v + radius (s cos(phi) + t sin(phi))                             (1)
  *
- * where s, t, n are the orthonormal frame of a circular one; of another one the images of the
- * axes, with length and radius 1. */
+ * where s, t, n are the orthonormal frame of a circular one; for another one they are the
+ * images of the axes, with length and radius 1. */
 #include "math/ellipse.h"
 #include "math/quadratic.h"
 #include "shape.h"

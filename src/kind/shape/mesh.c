@@ -130,6 +130,11 @@ static inline struct imp_hit draw(const struct imp_shape *s, const struct imp__m
     return (struct imp_hit){.prim = (int)lo, .u = b[0], .v = b[1]};
 }
 
+static inline struct imp_located located(const struct imp_hit *hit)
+{
+    return (struct imp_located){hit->prim, {(float)hit->u, (float)hit->v}};
+}
+
 /* The point of a hit as a light sample: density inv_area. */
 static inline bool sample_at(const struct imp_shape *s, const struct imp_hit *hit,
                              const imp_v3 *ref, const double *inv_area,
@@ -145,6 +150,7 @@ static inline bool sample_at(const struct imp_shape *s, const struct imp_hit *hi
     if (imp_unlikely(s->by_triangle)) point_write(s, hit, at.uv);
     out->uv[0] = at.uv[0];
     out->uv[1] = at.uv[1];
+    out->located = located(hit);
     const double one = inv_area ? *inv_area : 2 / imp__length(imp__cross(c.e1, c.e2));
     return imp__light_from_area(*ref, at.p, at.ng, at.n, one, out);
 }
@@ -172,6 +178,7 @@ void imp__mesh_sample_area(const struct imp_shape *s, const double u[2],
 {
     const struct imp_hit hit = draw(s, s->self, u);
     imp__mesh_surface(s, &hit, NULL, NULL, out);
+    out->located = located(&hit);
 }
 
 double imp__mesh_pdf(const struct imp_shape *s, const imp_v3 *ref,

@@ -188,7 +188,7 @@ enum imp_status imp__shape_measure(imp_context *ctx, struct imp_arena *arena,
     return IMP_OK;
 }
 
-/* Do all vertex normals say what the faces say? Then they are not worth looking up. */
+/* Are all vertex normals equal to those of the faces? Then they need no lookup. */
 static bool is_flat(const struct imp__mesh *m, const float *normals, size_t n)
 {
     for (size_t k = 0; k < n; k++) {

@@ -4,9 +4,9 @@
  * at the vertex (Thuermer and Wuethrich 1998). Files split a vertex where its uv differ,
  * so the sum runs over all vertices at one position, not over one index.
  *
- * All threads work, each for a range of vertices, or of slots of the hash table: it looks at
- * everything, in order, and takes what belongs to its range. So the sums do not depend on how
- * many threads there are. */
+ * All threads work, each for a range of vertices, or of slots of the hash table: it reads
+ * everything, in order, and adds what belongs to its range. So the sums do not depend on
+ * the number of threads. */
 #include "base/pool.h"
 #include "math/trig.h"
 #include "shape.h"

@@ -87,6 +87,12 @@ static void place(const struct imp_shape *s, const double uv[2], struct imp_surf
     surface(s, &hit, NULL, NULL, out);
 }
 
+/* By the first triangle, whose weights may leave it. */
+static inline struct imp_located located(double u, double v)
+{
+    return (struct imp_located){0, {(float)(u - v), (float)v}};
+}
+
 static void sample_area(const struct imp_shape *s, const double u[2],
                         struct imp_surface *out)
 {
@@ -96,6 +102,7 @@ static void sample_area(const struct imp_shape *s, const double u[2],
     const imp_pair uv = imp__pair_choose(imp__pair_exceeds(u[1], u[0]),
                                          (imp_pair){u[0], sum}, (imp_pair){sum, u[1]});
     surface_at(s->self, uv[0], uv[1], out);
+    out->located = located(uv[0], uv[1]);
 }
 
 static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
@@ -104,6 +111,7 @@ static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const do
     const struct rectangle *r = s->self;
     out->uv[0] = u[0];
     out->uv[1] = u[1];
+    out->located = located(u[0], u[1]);
     return imp__light_from_area(*ref, r->corner + r->eu * u[0] + r->ev * u[1], r->n, r->n,
                                 r->inv_area, out);
 }

@@ -67,6 +67,17 @@ static inline void imp__surface_move(struct imp_surface *x,
     imp__surface_frame(x);
 }
 
+/* A point of the shape as decisions name it (scene/located.h); drawn: what drew it set, uv
+ * there. */
+static inline struct imp_located imp__located_drawn(const struct imp_shape *s,
+                                                    const struct imp_located *drawn,
+                                                    const double uv[2])
+{
+    if (!s) return (struct imp_located){.prim = -1, .at = {0, 0}};
+    if (imp_likely(s->geometry == IMP_TRIANGLES)) return *drawn;
+    return (struct imp_located){0, {(float)uv[0], (float)uv[1]}};
+}
+
 /* Points nearer to edge-on than this are neither drawn nor given a density. */
 #define IMP_GRAZING 1e-12
 

@@ -33,7 +33,7 @@ struct bitmap {
     struct imp__lifted_texels lifted; /* of three channels in a spectral mode */
 };
 
-/* Pixels in one more number than needed: three channels are read with one load of four.
+/* Pixels with one more value than needed: three channels are read with one load of four.
  */
 static enum imp_status data_convert(const struct imp_build *b,
                                     const struct imp_image_data *im, bool raw,

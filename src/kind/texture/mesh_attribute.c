@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * mesh_attribute: the texture that the shape at hand has under the name `name`, times
- * `scale`; 0 where it has none. A mesh has numbers of its vertices or triangles
- * (attribute_data.c), any shape the textures that stand in it under such names. When the
- * scene is whole these textures are its inputs (scene/build_attributes.c). */
+ * mesh_attribute: the texture of the hit shape with the name `name`, times `scale`; 0
+ * where it has none. A mesh has values of its vertices or triangles (attribute_data.c),
+ * any shape the textures in it with such names. When the scene is complete these textures
+ * are its inputs (scene/build_attributes.c). */
 #include "mesh_attribute.h"
 #include "base/required.h"
 #include "input.h"

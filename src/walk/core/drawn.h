@@ -31,6 +31,7 @@ static inline bool imp__light_point(const struct imp_step *s, const struct imp_b
         return imp__light_point_of(s, b, at, u, out);
     /* Nothing to choose. */
     const struct imp_emitter *e = scene->emitters[0];
+    out->there.located.prim = -1;
     out->light = 0;
     out->pmf = scene->light_cdf[0];
     return out->pmf > 0 && e->ops->sample(e, &at->p, u, &out->there) &&

@@ -3,6 +3,7 @@
  * Emission: met by chance, and asked for by light samples, each with the weight of the
  * power heuristic (Veach 1997) against the other. */
 #include "drawn.h"
+#include "scene/located.h"
 #include "walk/both/both.h"
 
 static double light_pmf(const struct imp_scene *s, int light)
@@ -143,7 +144,8 @@ static inline imp_spec sample_radiance(const struct imp_step *s, int light,
 }
 
 /* wi: towards it, in the frame of the vertex. */
-static inline void record(struct imp_vertex *v, int emitter, double weight,
+static inline void record(struct imp_vertex *v, int emitter,
+                          const struct imp_shape *shape, double weight,
                           const struct imp_light_sample *ls, imp_v3 wi)
 {
     struct imp_light *l = &v->d.light;
@@ -158,6 +160,7 @@ static inline void record(struct imp_vertex *v, int emitter, double weight,
     imp__store_v3(l->d, -ls->wi);
     imp__store_v3(l->p, point_of(ls));
     imp__store_v3(l->wi, wi);
+    l->located = imp__located_drawn(shape, &ls->located, ls->uv);
     v->d.connection = IMP_OCCLUDED; /* until it is seen */
 }
 
@@ -189,6 +192,7 @@ bool imp__light_point_of(const struct imp_step *s, const struct imp_bsdf *b,
                          const struct imp_surface *at, double u[2],
                          struct imp_light_point *out)
 {
+    out->there.located.prim = -1;
     out->light = imp_unlikely(s->light_tree != NULL && !s->guided.here)
                      ? tree_sample(s, b, at, u, &out->pmf, &out->there)
                      : weights_sample(s, at, u, &out->pmf, &out->there);
@@ -233,7 +237,7 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
     if (imp__is_zero_used(f * le, s->at.carried) && !differentiable) return;
     shadow->brings = f * le * weight;
     if (s->recorded) {
-        record(v, light, weight, ls, dirs.wi);
+        record(v, light, e->shape, weight, ls, dirs.wi);
         v->light_f = f;
         v->light_e = le;
         v->light_w = imp__spec(weight);

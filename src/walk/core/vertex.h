@@ -13,7 +13,8 @@ static inline struct imp_texcoord imp__vertex_at(const struct imp_vertex *v)
     return (struct imp_texcoord){.uv = {v->d.uv[0], v->d.uv[1]},
                                  .p = imp__decided_v3(v->d.p),
                                  .carried = v->carried,
-                                 .shape = v->shape};
+                                 .shape = v->shape,
+                                 .prim = v->d.located.prim};
 }
 static inline imp_v3 imp__vertex_wo(const struct imp_vertex *v)
 {
@@ -39,7 +40,8 @@ static inline struct imp_texcoord imp__light_at(const struct imp_scene *scene,
     return (struct imp_texcoord){.uv = {l->uv[0], l->uv[1]},
                                  .p = imp__decided_v3(l->p),
                                  .carried = v->carried,
-                                 .shape = scene->emitters[l->emitter]->shape};
+                                 .shape = scene->emitters[l->emitter]->shape,
+                                 .prim = l->located.prim};
 }
 static inline struct imp_dirs imp__light_dirs(const struct imp_vertex *v)
 {

@@ -29,6 +29,7 @@ struct imp_vertex *imp__medium_meet(struct imp_step *s, const struct imp_bsdf *s
         v->d.stands = s->flight.stands;
     }
     *at = (struct imp_surface){.p = p};
+    s->at.prim = 0;
     *frame = (struct imp_frame){{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
     imp__vertex_place_here(s, v, at, frame, s->d, t);
     s->walk->valid = true;
@@ -54,6 +55,7 @@ void imp__sky_meet(struct imp_step *s)
     s->at.p = imp__decide(s->d);
     s->at.uv[0] = s->at.uv[1] = 0;
     s->at.shape = NULL;
+    s->at.prim = 0;
     /* A vertex to each: past all but the last the walk goes straight on. */
     for (int k = 0; k < n; k++) {
         struct imp_vertex *v = imp__vertex_add_here(s, 0);

@@ -6,7 +6,7 @@
 #ifndef IMP_WALK_VERTICES_H
 #define IMP_WALK_VERTICES_H
 
-#include "scene/instances.h"
+#include "scene/located.h"
 #include "step.h"
 #include <stddef.h>
 
@@ -46,6 +46,9 @@ static inline struct imp_vertex *imp__vertex_add_here(struct imp_step *s, int n_
     struct imp_decision *d = &v->d;
     d->shape = d->met.emitter = -1;
     d->connection = IMP_NOT_CONNECTED;
+    d->located.prim = -1;
+    d->place = 0;
+    d->back = false;
     d->glows = d->goes_on = d->stands = d->from_light = d->alone = false;
     d->drawn = IMP_DENSITY_KERNEL;
     d->pdf = d->rest = 0;
@@ -76,6 +79,17 @@ static inline void imp__vertex_place_here(struct imp_step *s, struct imp_vertex 
     imp__store_v3(v->d.p, s->at.p);
     imp__store_v3(v->d.wo, s->wo);
 }
+/* The point of the shape that was met, in decisions: what uv and p do not say. */
+static inline void imp__vertex_locate(const struct imp_step *s, struct imp_vertex *v,
+                                      const struct imp_hit *hit,
+                                      const struct imp_surface *at)
+{
+    struct imp_decision *d = &v->d;
+    d->located = imp__located_hit(s->scene, v->shape, hit, at);
+    d->place = imp__place_decided(hit->place);
+    d->back = imp__dot(at->ng, s->d) > 0;
+}
+
 /* The surface that was met, and its material there. NULL: the walk is dropped. */
 static inline __attribute__((always_inline)) struct imp_vertex *
 imp__surface_meet(struct imp_step *s, struct imp_hit *hit, struct imp_surface *at,
@@ -96,11 +110,13 @@ imp__surface_meet(struct imp_step *s, struct imp_hit *hit, struct imp_surface *a
         v->d.scatterer = bsdf->flags & IMP_BSDF_NULL ? IMP_AT_BOUNDARY : IMP_AT_SURFACE;
     }
     *frame = (struct imp_frame){at->s, at->t, at->n};
+    s->at.prim = hit->prim;
     imp__vertex_place_here(s, v, at, frame, s->d, hit->t);
     if (imp_unlikely(s->segment->arrive != NULL)) {
         if (!s->segment->arrive(s, v, hit, at)) return NULL;
         *frame = (struct imp_frame){at->s, at->t, at->n};
     }
+    if (s->recorded) imp__vertex_locate(s, v, hit, at);
     return v;
 }
 

@@ -17,22 +17,36 @@ const struct imp_walk_integrator *imp__walk_integrator(const struct imp_scene *s
     return walk;
 }
 
+#define HASH_VERSION 2 /* raised with what is hashed */
+
 uint64_t imp__walk_integrator_hash(const struct imp_walk_integrator *i)
 {
+    static const struct imp_mixing none = {.weight = {0}};
     if (!i) return 0;
-    const int number[] = {i->max_depth, i->rr_depth,   i->hide_emitters,
-                          i->lights,    i->directions, i->guided,
-                          i->absorbs,   i->first_hit,  (int)i->alpha_gradient,
-                          i->media};
-    uint64_t h = imp__hash(0, number, sizeof number);
-    if (i->light_tree) h = imp__hash(h, &i->light_tree, sizeof i->light_tree);
-    if (i->transmittance) h = imp__hash(h, &i->transmittance, sizeof i->transmittance);
-    if (i->from_lights) h = imp__hash(h, &i->rr_depth, sizeof i->rr_depth);
-    if (i->both) h = imp__hash(h, &i->both, sizeof i->both);
-    if (!i->mixes && !i->photons) return h;
-    const double other[] = {i->photons ? i->h : 0, i->split};
-    h = imp__hash(h, other, sizeof other);
-    return imp__hash(h, i->mixing->weight, sizeof i->mixing->weight);
+    const bool draws = i->mixes || i->photons;
+    const int number[] = {HASH_VERSION,
+                          i->max_depth,
+                          i->rr_depth,
+                          i->hide_emitters,
+                          i->lights,
+                          i->directions,
+                          i->guided,
+                          i->absorbs,
+                          i->first_hit,
+                          (int)i->alpha_gradient,
+                          i->media,
+                          i->light_tree,
+                          (int)i->transmittance,
+                          i->from_lights,
+                          i->both,
+                          i->mixes,
+                          i->photons,
+                          draws ? i->split : 0};
+    const double h = i->photons ? i->h : 0;
+    const struct imp_mixing *mixing = draws ? i->mixing : &none;
+    uint64_t hash = imp__hash(0, number, sizeof number);
+    hash = imp__hash(hash, &h, sizeof h);
+    return imp__hash(hash, mixing->weight, sizeof mixing->weight);
 }
 
 const struct imp_walk_integrator *imp__walks_from(const struct imp_walk_integrator *of,

@@ -8,8 +8,7 @@
 #include "walk/core/segment.h"
 #include <string.h>
 
-_Static_assert(sizeof(struct imp_decision) <= 164, "a kept vertex");
-_Static_assert(sizeof(struct imp_record_walk) == 72, "no padding: it is written");
+_Static_assert(sizeof(struct imp_record_walk) == 80, "no padding: it is written");
 _Static_assert(sizeof(union imp_kept) == 16, "a kept event");
 _Static_assert(IMP_WALK_MAX <= UINT16_MAX, "imp_record_walk.n");
 
@@ -36,11 +35,31 @@ enum imp_status imp__record_create(const struct imp_tracer *tracer, size_t budge
     return IMP_OK;
 }
 
+static void page_release(imp_context *ctx, struct imp_record_page *page)
+{
+    if (!page) return;
+    imp__release(ctx, page->words);
+    imp__release(ctx, page->start);
+    imp__release(ctx, page);
+}
+
+static struct imp_record_page *page_make(imp_context *ctx)
+{
+    struct imp_record_page *page = imp__alloc(ctx, 1, sizeof *page);
+    if (!page) return NULL;
+    page->words = imp__alloc_raw(ctx, (size_t)IMP_RECORD_PAGE * IMP_PACKED_MOST,
+                                 sizeof *page->words);
+    page->start = imp__alloc_raw(ctx, IMP_RECORD_PAGE, sizeof *page->start);
+    if (page->words && page->start) return page;
+    page_release(ctx, page);
+    return NULL;
+}
+
 void imp__record_destroy(struct imp_record *r)
 {
     if (!r->ctx) return;
     for (size_t k = 0; k < r->n_walk_pages; k++) imp__release(r->ctx, r->walks[k]);
-    for (size_t k = 0; k < r->n_vertex_pages; k++) imp__release(r->ctx, r->vertices[k]);
+    for (size_t k = 0; k < r->n_vertex_pages; k++) page_release(r->ctx, r->vertices[k]);
     for (size_t k = 0; k < r->n_item_pages; k++) imp__release(r->ctx, r->items[k]);
     imp__release(r->ctx, r->walks);
     imp__release(r->ctx, r->vertices);
@@ -48,22 +67,26 @@ void imp__record_destroy(struct imp_record *r)
     *r = (struct imp_record){.ctx = NULL};
 }
 
-static size_t bytes_of(size_t walks, size_t vertices, size_t items)
+static size_t bytes_of(size_t walks, size_t vertices, size_t words, size_t items)
 {
-    return walks * sizeof(struct imp_record_walk) +
-           vertices * sizeof(struct imp_decision) + items * sizeof(union imp_kept);
+    return walks * sizeof(struct imp_record_walk) + vertices * sizeof(uint16_t) +
+           words * sizeof(uint32_t) + items * sizeof(union imp_kept);
 }
 size_t imp__record_bytes(const struct imp_record *r)
 {
-    return bytes_of(r->n_walks, r->n_vertices, r->n_items);
+    return bytes_of(r->n_walks, r->n_vertices, r->n_words, r->n_items);
+}
+
+static size_t pages_of(size_t n)
+{
+    return n / IMP_RECORD_PAGE + (n % IMP_RECORD_PAGE != 0);
 }
 
 /* Pages for n elements in all. False: no memory. */
 static bool pages_add(imp_context *ctx, void ***pages, size_t *n_pages, size_t *cap,
                       size_t n, size_t size)
 {
-    const size_t wanted = n / IMP_RECORD_PAGE + (n % IMP_RECORD_PAGE != 0);
-    while (*n_pages < wanted) {
+    while (*n_pages < pages_of(n)) {
         void **grown = imp__grow(ctx, *pages, cap, *n_pages + 1, sizeof *grown);
         if (!grown) return false;
         *pages = grown;
@@ -73,13 +96,26 @@ static bool pages_add(imp_context *ctx, void ***pages, size_t *n_pages, size_t *
     }
     return true;
 }
+static bool vertex_pages_add(struct imp_record *r, size_t n)
+{
+    while (r->n_vertex_pages < pages_of(n)) {
+        void **grown = imp__grow(r->ctx, (void **)r->vertices, &r->cap_vertex_pages,
+                                 r->n_vertex_pages + 1, sizeof *grown);
+        if (!grown) return false;
+        r->vertices = (struct imp_record_page **)grown;
+        struct imp_record_page *page = page_make(r->ctx);
+        if (!page) return false;
+        r->vertices[r->n_vertex_pages++] = page;
+    }
+    return true;
+}
 
 enum imp_status imp__record_reserve(struct imp_record *r, size_t walks, size_t vertices,
-                                    size_t items)
+                                    size_t words, size_t items)
 {
     const size_t n_walks = r->n_walks + walks, n_vertices = r->n_vertices + vertices,
                  n_items = r->n_items + items;
-    const size_t needed = bytes_of(n_walks, n_vertices, n_items);
+    const size_t needed = bytes_of(n_walks, n_vertices, r->n_words + words, n_items);
     if (needed > r->budget)
         return imp__error(r->ctx, IMP_E_NOMEM,
                           "%zu kept walks of %zu vertices need %zu bytes; "
@@ -87,8 +123,7 @@ enum imp_status imp__record_reserve(struct imp_record *r, size_t walks, size_t v
                           n_walks, n_vertices, needed, r->budget);
     if (!pages_add(r->ctx, (void ***)&r->walks, &r->n_walk_pages, &r->cap_walk_pages,
                    n_walks, sizeof **r->walks) ||
-        !pages_add(r->ctx, (void ***)&r->vertices, &r->n_vertex_pages,
-                   &r->cap_vertex_pages, n_vertices, sizeof **r->vertices) ||
+        !vertex_pages_add(r, n_vertices) ||
         !pages_add(r->ctx, (void ***)&r->items, &r->n_item_pages, &r->cap_item_pages,
                    n_items, sizeof **r->items))
         return imp__error(r->ctx, IMP_E_NOMEM, "no memory for %zu bytes of kept walks",
@@ -96,40 +131,9 @@ enum imp_status imp__record_reserve(struct imp_record *r, size_t walks, size_t v
     return IMP_OK;
 }
 
-/* What was never decided is 0. */
-static struct imp_decision decided(const struct imp_decision *d)
-{
-    struct imp_decision k;
-    memset(&k, 0, sizeof k);
-    k.shape = d->shape;
-    k.scatterer = d->scatterer;
-    k.connection = d->connection;
-    k.glows = d->glows;
-    k.goes_on = d->goes_on;
-    k.drawn = d->goes_on ? d->drawn : 0;
-    k.alone = d->goes_on && d->alone;
-    memcpy(k.uv, d->uv, sizeof k.uv);
-    memcpy(k.p, d->p, sizeof k.p);
-    if (d->scatterer != IMP_AT_SKY) memcpy(k.wo, d->wo, sizeof k.wo);
-    k.passes = d->passes;
-    k.glow_weight = d->glow_weight;
-    k.met.emitter = k.light.emitter = -1;
-    if (d->goes_on) {
-        memcpy(k.wi, d->wi, sizeof k.wi);
-        k.lobe = d->lobe;
-        k.pdf = d->pdf;
-        k.share = d->share;
-        k.rest = d->rest;
-        k.survive = d->survive;
-    }
-    if (d->met.emitter >= 0) k.met = d->met;
-    if (d->connection != IMP_NOT_CONNECTED) k.light = d->light;
-    return k;
-}
-
-/* Vertices and items of a walk and what hangs on it. */
+/* Vertices, their words, and items of a walk and what hangs on it. */
 struct extent {
-    size_t vertices, items;
+    size_t vertices, words, items;
 };
 
 static enum imp_status walk_measure(imp_context *ctx, const struct imp_walk *walk,
@@ -148,6 +152,8 @@ static enum imp_status walk_measure(imp_context *ctx, const struct imp_walk *wal
             return imp__error(ctx, IMP_E_UNSUPPORTED,
                               "a walk with a probe of an extinction cannot be kept: its "
                               "derivative is not that of its collisions");
+        const struct imp_packed_head head = imp__packed_head(&v->d);
+        extent->words += imp__packed_words(&head);
         if (v->on) extent->items += 2 + (size_t)v->on->n;
         if (v->to_light) extent->items += 2 + (size_t)v->to_light->n;
         for (const struct imp_side *s = v->side; s && st == IMP_OK; s = s->next) {
@@ -180,12 +186,32 @@ static void track_put(struct imp_record *r, const struct imp_track *track,
     for (int i = 0; i < track->n; i++) item_put(r)->event = track->event[i];
 }
 
+bool imp__record_page_trim(imp_context *ctx, struct imp_record_page *page)
+{
+    uint32_t *small = imp__alloc_raw(ctx, imp_max(page->n_words, 1u), sizeof *small);
+    if (!small) return false;
+    memcpy(small, page->words, page->n_words * sizeof *small);
+    imp__release(ctx, page->words);
+    page->words = small;
+    return true;
+}
+
+static void vertex_put(struct imp_record *r, const struct imp_decision *d)
+{
+    struct imp_record_page *page = r->vertices[r->n_vertices / IMP_RECORD_PAGE];
+    const size_t n = imp__packed_put(d, page->words + page->n_words);
+    page->start[r->n_vertices % IMP_RECORD_PAGE] = (uint16_t)page->n_words;
+    page->n_words += (uint32_t)n;
+    r->n_words += n;
+    /* A full page stays as it is where there is no memory for a smaller one. */
+    if (++r->n_vertices % IMP_RECORD_PAGE == 0) (void)imp__record_page_trim(r->ctx, page);
+}
+
 /* Its vertices, then what belongs to each; `first`: of the walk that it hangs on. */
 static void walk_put(struct imp_record *r, const struct imp_walk *walk, uint64_t first)
 {
     uint32_t at = (uint32_t)(r->n_vertices - first);
-    for (const struct imp_vertex *v = walk->first; v; v = v->next)
-        *imp__record_vertex(r, r->n_vertices++) = decided(&v->d);
+    for (const struct imp_vertex *v = walk->first; v; v = v->next) vertex_put(r, &v->d);
     for (const struct imp_vertex *v = walk->first; v; v = v->next, at++) {
         track_put(r, v->on, IMP_KEPT_ON, at);
         track_put(r, v->to_light, IMP_KEPT_TO_LIGHT, at);
@@ -205,7 +231,7 @@ enum imp_status imp__record_keep(struct imp_record *r, const struct imp_walk *wa
                                  int64_t sample)
 {
     enum imp_status st;
-    struct extent extent = {0, 0};
+    struct extent extent = {0, 0, 0};
     if (walk->moving)
         return imp__error(r->ctx, IMP_E_UNSUPPORTED,
                           "a walk through a medium whose numbers are active cannot be "
@@ -213,16 +239,17 @@ enum imp_status imp__record_keep(struct imp_record *r, const struct imp_walk *wa
     st = walk_measure(r->ctx, walk, 0, &extent);
     if (st != IMP_OK) return st;
     const bool counts = walk->valid && walk->dropped == IMP_DROP_NONE;
-    if (!counts) extent = (struct extent){0, 0};
+    if (!counts) extent = (struct extent){0, 0, 0};
     if (extent.vertices >= 1u << 30 || extent.items > UINT32_MAX)
         return imp__error(r->ctx, IMP_E_UNSUPPORTED,
                           "a walk of %zu vertices cannot be kept", extent.vertices);
-    st = imp__record_reserve(r, 1, extent.vertices, extent.items);
+    st = imp__record_reserve(r, 1, extent.vertices, extent.words, extent.items);
     if (st != IMP_OK) return st;
     *imp__record_at(r, r->n_walks++) =
         (struct imp_record_walk){.px = walk->px,
                                  .py = walk->py,
                                  .wave = walk->wave,
+                                 .time = walk->time,
                                  .key = walk->key,
                                  .sample = sample,
                                  .first = r->n_vertices,
@@ -251,12 +278,19 @@ static bool page_trim(imp_context *ctx, void **pages, size_t n_pages, size_t n,
     return true;
 }
 
+static bool vertices_trim(imp_context *ctx, struct imp_record_page *page, size_t n)
+{
+    return imp__record_page_trim(ctx, page) &&
+           page_trim(ctx, (void **)&page->start, 1, n, sizeof *page->start);
+}
+
 enum imp_status imp__record_trim(struct imp_record *r)
 {
+    const bool open = r->n_vertex_pages > 0 && r->n_vertices % IMP_RECORD_PAGE != 0;
     if (page_trim(r->ctx, (void **)r->walks, r->n_walk_pages, r->n_walks,
                   sizeof **r->walks) &&
-        page_trim(r->ctx, (void **)r->vertices, r->n_vertex_pages, r->n_vertices,
-                  sizeof **r->vertices) &&
+        (!open || vertices_trim(r->ctx, r->vertices[r->n_vertex_pages - 1],
+                                r->n_vertices % IMP_RECORD_PAGE)) &&
         page_trim(r->ctx, (void **)r->items, r->n_item_pages, r->n_items,
                   sizeof **r->items))
         return IMP_OK;

@@ -9,6 +9,7 @@
 #define IMP_WALK_RECORD_H
 
 #include "base/file.h"
+#include "packed.h"
 #include "walk/media/tracking.h"
 
 /* ---- What is kept ---------------------------------------------------------------- */
@@ -18,6 +19,7 @@
 struct imp_record_walk {
     double px, py; /* film position */
     double wave;   /* number from which its wavelengths were drawn; 0: it has none */
+    double time;   /* when its light reaches the sensor */
     struct imp_key key;
     int64_t sample;
     uint64_t first, first_item; /* of all in the record */
@@ -62,14 +64,24 @@ struct imp_record_of {
 
 #define IMP_RECORD_PAGE 1024 /* walks, vertices, or items */
 
+/* Vertices of a page, packed (packed.h). The last page, to which some are added, has room for
+ * any. */
+struct imp_record_page {
+    uint32_t *words;
+    uint16_t *start; /* [IMP_RECORD_PAGE] of each, in words */
+    uint32_t n_words;
+};
+_Static_assert(IMP_RECORD_PAGE *IMP_PACKED_MOST <= UINT16_MAX, "imp_record_page.start");
+
 /* Not for sharing between threads while walks are added. */
 struct imp_record {
     imp_context *ctx;
     struct imp_record_of of;
     size_t budget; /* bytes that walks, vertices and items may take */
     size_t n_walks, n_vertices, n_items;
+    size_t n_words;                 /* of all vertices */
     struct imp_record_walk **walks; /* pages, which never move */
-    struct imp_decision **vertices;
+    struct imp_record_page **vertices;
     union imp_kept **items;
     size_t n_walk_pages, cap_walk_pages, n_vertex_pages, cap_vertex_pages, n_item_pages,
         cap_item_pages;
@@ -107,14 +119,33 @@ static inline struct imp_record_walk *imp__record_at(const struct imp_record *r,
 {
     return &r->walks[i / IMP_RECORD_PAGE][i % IMP_RECORD_PAGE];
 }
-static inline struct imp_decision *imp__record_vertex(const struct imp_record *r,
-                                                      uint64_t i)
+#define IMP_RECORD_FETCH                                                                 \
+    128 /* bytes of a vertex that are fetched ahead: most have few more */
+
+/* The words of vertex i, and its decisions. */
+static inline uint32_t *imp__record_words(const struct imp_record *r, uint64_t i)
 {
-    return &r->vertices[i / IMP_RECORD_PAGE][i % IMP_RECORD_PAGE];
+    const struct imp_record_page *page = r->vertices[i / IMP_RECORD_PAGE];
+    return page->words + page->start[i % IMP_RECORD_PAGE];
+}
+static inline void imp__record_vertex(const struct imp_record *r, uint64_t i,
+                                      struct imp_decision *out)
+{
+    imp__packed_get(imp__record_words(r, i), out);
 }
 static inline union imp_kept *imp__record_item(const struct imp_record *r, uint64_t i)
 {
     return &r->items[i / IMP_RECORD_PAGE][i % IMP_RECORD_PAGE];
+}
+
+/* The scatterer of a packed vertex; NULL at the sky and the sensor. */
+static inline const struct imp_bsdf *imp__packed_bsdf(const struct imp_scene *scene,
+                                                      const uint32_t *words)
+{
+    struct imp_packed_head h;
+    memcpy(&h, words, sizeof h);
+    const struct imp_decision d = {.shape = h.shape, .scatterer = h.scatterer};
+    return imp__decided_bsdf(scene, &d);
 }
 
 /* Walk i in the arena, with its values at the scene's present parameters, folded, to be
@@ -159,9 +190,11 @@ bool imp__record_walk_fits(const struct imp_scene *scene, const struct imp_recor
                            uint64_t first_item);
 struct imp_record_of imp__record_made_with(const struct imp_tracer *tracer);
 
-/* Room for so many walks, vertices and items more. */
+/* Room for so many walks and items, and vertices of so many words, more. */
 enum imp_status imp__record_reserve(struct imp_record *record, size_t walks,
-                                    size_t vertices, size_t items);
+                                    size_t vertices, size_t words, size_t items);
+/* What a page has room for beyond its words is given back. False: no memory. */
+bool imp__record_page_trim(imp_context *ctx, struct imp_record_page *page);
 enum imp_status imp__record_same(imp_context *ctx, const char *what,
                                  const struct imp_record_of *is,
                                  const struct imp_record_of *of);

@@ -3,6 +3,7 @@
  * Are the decisions of a walk that was read from a file such as the scene allows? Then
  * evaluating it is safe, whatever the bytes of the file are. */
 #include "record.h"
+#include "scene/located.h"
 #include <math.h>
 
 static bool all_finite(const imp_decided *x, int n)
@@ -31,6 +32,14 @@ static bool met_fits(const struct imp_scene *scene, const struct imp_decision *d
            unit(m->d);
 }
 
+/* shape NULL: there is none to have a point. */
+static bool located_fits(const struct imp_scene *scene, const struct imp_shape *shape,
+                         const struct imp_located *x, uint32_t place)
+{
+    if (!shape) return x->prim == -1 && place == 0;
+    return imp__located_fits(scene, shape, x, place == IMP_PLACE_MOST ? 0 : place);
+}
+
 static bool light_fits(const struct imp_scene *scene, const struct imp_bsdf *b,
                        const struct imp_decision *d)
 {
@@ -38,6 +47,7 @@ static bool light_fits(const struct imp_scene *scene, const struct imp_bsdf *b,
     if (d->connection == IMP_NOT_CONNECTED) return true;
     return d->connection <= IMP_CONNECTED && (b->flags & IMP_BSDF_SMOOTH) &&
            l->emitter >= 0 && l->emitter < scene->n_emitters && weight(l->weight) &&
+           located_fits(scene, scene->emitters[l->emitter]->shape, &l->located, 0) &&
            all_finite(l->uv, 2) && all_finite(l->p, 3) && l->dist >= 0 &&
            isfinite(l->cos_light) && unit(l->d) && unit(l->wi);
 }
@@ -85,7 +95,9 @@ static bool vertex_fits(const struct imp_scene *scene, const struct imp_decision
     const struct imp_bsdf *b = inside ? scene->media[d->shape]->scatterer
                                       : imp__shape_bsdf(scene, scene->shapes[d->shape]);
     const bool null = b->flags & IMP_BSDF_NULL;
-    return (inside || d->scatterer == (null ? IMP_AT_BOUNDARY : IMP_AT_SURFACE)) &&
+    return located_fits(scene, inside ? NULL : scene->shapes[d->shape], &d->located,
+                        d->place) &&
+           (inside || d->scatterer == (null ? IMP_AT_BOUNDARY : IMP_AT_SURFACE)) &&
            unit(d->wo) && (!d->glows || (b->flags & IMP_BSDF_EMIT)) &&
            (inside ? d->met.emitter == -1 : met_fits(scene, d)) &&
            light_fits(scene, b, d) && continuation_fits(b, d);
@@ -97,7 +109,8 @@ static bool event_fits(const struct imp_scene *scene, const struct imp_event *e,
 {
     if ((e->kind == IMP_PASSES_UV) != (before == IMP_PASSES)) return false;
     if ((e->kind == IMP_RESIDUAL_OF) != (before == IMP_RESIDUAL_AT)) return false;
-    if (e->kind == IMP_PASSES_UV) return isfinite(e->t) && isfinite(e->bound);
+    if (e->kind == IMP_PASSES_UV)
+        return e->medium >= 0 && isfinite(e->t) && isfinite(e->bound);
     if (e->kind == IMP_RESIDUAL_OF || e->kind == IMP_CONTROL)
         return isfinite(e->t) && e->t >= 0;
     if (e->kind == IMP_PASSES)
@@ -138,11 +151,11 @@ static bool chain_fits(struct fitting *f, uint32_t first, uint32_t n, bool side)
         return false;
     bool sky = false;
     for (uint32_t k = 0; k < n; k++) {
-        const struct imp_decision *d =
-            imp__record_vertex(f->record, f->walk->first + first + k);
-        if (!vertex_fits(f->scene, d, k == 0 && !side, k + 1 == n)) return false;
-        if (sky && d->scatterer != IMP_AT_SKY) return false;
-        sky = d->scatterer == IMP_AT_SKY;
+        struct imp_decision d;
+        imp__record_vertex(f->record, f->walk->first + first + k, &d);
+        if (!vertex_fits(f->scene, &d, k == 0 && !side, k + 1 == n)) return false;
+        if (sky && d.scatterer != IMP_AT_SKY) return false;
+        sky = d.scatterer == IMP_AT_SKY;
     }
     f->end = first + n;
     return true;
@@ -195,7 +208,8 @@ bool imp__record_walk_fits(const struct imp_scene *scene, const struct imp_recor
         w->first_item != first_item || w->n_items > r->n_items - first_item ||
         w->valid > 1 || w->absorbed > 1 || w->dropped >= IMP_DROP_CAUSES ||
         (w->n_vertices > 0 && !counts) || (w->n == 0 && w->n_vertices > 0) ||
-        !isfinite(w->px) || !isfinite(w->py) || !(w->wave >= 0 && w->wave < 1))
+        !isfinite(w->px) || !isfinite(w->py) || !isfinite(w->time) ||
+        !(w->wave >= 0 && w->wave < 1))
         return false;
     if (w->n > 0 && !chain_fits(&f, 0, w->n, false)) return false;
     return items_fit(&f);

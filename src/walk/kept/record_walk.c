@@ -10,9 +10,9 @@
 
 static struct imp_vertex *vertex_add(const struct imp_scene *scene,
                                      struct imp_arena *arena, struct imp_walk *walk,
-                                     const struct imp_decision *d)
+                                     const uint32_t *kept)
 {
-    const struct imp_bsdf *bsdf = imp__decided_bsdf(scene, d);
+    const struct imp_bsdf *bsdf = imp__packed_bsdf(scene, kept);
     const size_t n_in = bsdf ? (size_t)bsdf->n_in : 0;
     struct imp_vertex *v = imp__arena_take(arena, 1, sizeof *v + n_in * sizeof *v->in);
     if (imp_unlikely(!v)) return NULL;
@@ -23,7 +23,8 @@ static struct imp_vertex *vertex_add(const struct imp_scene *scene,
     walk->last = v;
     walk->n++;
     v->bsdf = bsdf;
-    v->shape = bsdf && d->scatterer != IMP_IN_MEDIUM ? scene->shapes[d->shape] : NULL;
+    imp__packed_get(kept, &v->d);
+    v->shape = bsdf && v->d.scatterer != IMP_IN_MEDIUM ? scene->shapes[v->d.shape] : NULL;
     v->side = NULL;
     v->carried = walk->waves ? &walk->waves->carried : NULL;
     v->t = 0;
@@ -32,7 +33,6 @@ static struct imp_vertex *vertex_add(const struct imp_scene *scene,
     v->on = v->to_light = NULL;
     v->probe = NULL;
     v->in = (imp_spec *)(v + 1);
-    v->d = *d;
     return v;
 }
 
@@ -56,7 +56,7 @@ static bool vertices_get(struct reading *g, struct imp_walk *walk, uint32_t firs
 {
     for (uint32_t k = first; k < first + n; k++) {
         struct imp_vertex *v = vertex_add(
-            g->scene, g->arena, walk, imp__record_vertex(g->record, g->kept->first + k));
+            g->scene, g->arena, walk, imp__record_words(g->record, g->kept->first + k));
         if (imp_unlikely(!v)) return false;
         if (imp_likely(g->vertex == NULL)) continue;
         g->vertex[k].v = v;
@@ -93,6 +93,7 @@ static struct imp_side *side_add(struct reading *g, struct imp_side ***end)
     if (!side) return NULL;
     *side = (struct imp_side){.walk = {.px = g->walk->px,
                                        .py = g->walk->py,
+                                       .time = g->walk->time,
                                        .waves = g->walk->waves,
                                        .wave = g->walk->wave,
                                        .valid = true}};
@@ -131,8 +132,9 @@ static void value_fold(const struct imp_record *r, const struct imp_record_walk 
     struct imp_values v[SHORT];
     imp_spec L = {0};
     for (int j = 0; j < k->n; j++) { /* in the order of memory */
-        const struct imp_decision *d = imp__record_vertex(r, k->first + (uint64_t)j);
-        imp__decided_values(tracer, d, imp__decided_bsdf(tracer->scene, d), carried,
+        struct imp_decision d;
+        imp__record_vertex(r, k->first + (uint64_t)j, &d);
+        imp__decided_values(tracer, &d, imp__decided_bsdf(tracer->scene, &d), carried,
                             &v[j]);
     }
     for (int j = k->n; j-- > 0;) L = v[j].e + v[j].w * L + v[j].b;
@@ -146,8 +148,8 @@ static inline void fetch_ahead(const struct imp_record *r, size_t i,
     const uint64_t first = k->first + k->n_vertices;
     const uint64_t end = imp_min(first + AHEAD, (uint64_t)r->n_vertices);
     for (uint64_t j = first; j < end; j++) {
-        const char *d = (const char *)imp__record_vertex(r, j);
-        for (size_t b = 0; b < sizeof(struct imp_decision); b += IMP_CACHE_LINE)
+        const char *d = (const char *)imp__record_words(r, j);
+        for (size_t b = 0; b < IMP_RECORD_FETCH; b += IMP_CACHE_LINE)
             __builtin_prefetch(d + b);
     }
     if (i + 2 < r->n_walks) __builtin_prefetch(imp__record_at(r, i + 2));
@@ -164,6 +166,7 @@ void imp__record_walk(const struct imp_record *r, size_t i,
     *walk = (struct imp_walk){.px = k->px,
                               .py = k->py,
                               .key = k->key,
+                              .time = k->time,
                               .valid = k->valid,
                               .absorbed = k->absorbed,
                               .dropped = (enum imp_drop)k->dropped};

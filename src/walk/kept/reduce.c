@@ -169,8 +169,10 @@ static void vertex_look(const struct imp_scene *scene, const struct imp_decision
     v->d = d;
     v->bsdf = imp__decided_bsdf(scene, d);
     const struct imp_shape *shape = v->bsdf ? scene->shapes[d->shape] : NULL;
-    v->at = (struct imp_texcoord){
-        .uv = {d->uv[0], d->uv[1]}, .p = imp__decided_v3(d->p), .shape = shape};
+    v->at = (struct imp_texcoord){.uv = {d->uv[0], d->uv[1]},
+                                  .p = imp__decided_v3(d->p),
+                                  .shape = shape,
+                                  .prim = d->located.prim};
     if (v->bsdf) imp__inputs_eval(v->bsdf->input, v->bsdf->n_in, &v->at, v->in);
     v->on = (struct imp_dirs){imp__decided_v3(d->wo), imp__decided_v3(d->wi), d->lobe, 0};
     v->lit = (struct imp_dirs){v->on.wo, imp__decided_v3(d->light.wi), IMP_SMOOTH, 0};
@@ -317,10 +319,11 @@ static bool is_plain(const struct imp_record *record, const struct imp_record_wa
 {
     if (k->n_items > 0 || k->n != k->n_vertices) return false;
     for (uint32_t j = 0; j < k->n; j++) {
-        const struct imp_decision *d = imp__record_vertex(record, k->first + j);
-        if (d->from_light || d->scatterer == IMP_AT_SENSOR ||
-            d->scatterer == IMP_AT_LIGHT || d->scatterer == IMP_IN_MEDIUM ||
-            (d->connection == IMP_CONNECTED && d->light.emitter < 0))
+        const uint32_t *words = imp__record_words(record, k->first + j);
+        struct imp_packed_head h;
+        memcpy(&h, words, sizeof h);
+        if (h.scatterer == IMP_AT_SENSOR || h.scatterer == IMP_AT_LIGHT ||
+            h.scatterer == IMP_IN_MEDIUM)
             return false;
     }
     return true;
@@ -331,7 +334,9 @@ static void walk_reduce(struct reducing *g, const struct imp_record *record,
 {
     struct vertex v;
     for (uint32_t j = 0; j < k->n && !is_zero(g->r, g->M); j++) {
-        vertex_look(g->scene, imp__record_vertex(record, k->first + j), &v);
+        struct imp_decision d;
+        imp__record_vertex(record, k->first + j, &d);
+        vertex_look(g->scene, &d, &v);
         const enum imp_reduction_class class =
             v.bsdf && v.bsdf->index >= 0
                 ? (enum imp_reduction_class)g->r->of->bsdf[v.bsdf->index]

@@ -10,6 +10,8 @@
  * vertices of such materials vanish. Materials that are not linear in an input that may
  * change (a roughness) stay as they are, with directions and inputs.
  *
+ * Where vertices lie is in the record alone: what moves with a shape is not evaluated here.
+ *
  * Which kinds are linear is found by trying (trial.h). Numbers c are doubles, so that L
  * and derivatives differ from those of the walk's vertices by rounding alone. */
 #ifndef IMP_WALK_REDUCED_H

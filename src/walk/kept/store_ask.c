@@ -26,12 +26,14 @@ static uint64_t walk_meets(const struct imp_scene *scene, const struct imp_recor
     uint64_t meets = 0;
     bool settled = false;
     for (uint32_t j = 0; j < k->n_vertices; j++) {
-        const struct imp_decision *d = imp__record_vertex(r, k->first + j);
-        const struct imp_bsdf *b = imp__decided_bsdf(scene, d);
-        if (!d->goes_on || !b) continue;
+        struct imp_decision d;
+        struct imp_packed_head head;
+        imp__packed_step(imp__record_words(r, k->first + j), &head, &d);
+        const struct imp_bsdf *b = imp__decided_bsdf(scene, &d);
+        if (!d.goes_on || !b) continue;
         const int a = imp__store_class(b);
         meets |= UINT64_C(1) << a;
-        if (j >= k->n || !(d->survive < 1)) continue;
+        if (j >= k->n || !(d.survive < 1)) continue;
         if (settled) meets |= UINT64_C(1) << (IMP_STORE_CLASSES + a);
         settled = true;
     }

@@ -59,7 +59,8 @@ static void look(const struct imp_densities *m, const struct imp_decision *d,
     const struct imp_texcoord at = {.uv = {d->uv[0], d->uv[1]},
                                     .p = imp__decided_v3(d->p),
                                     .carried = v->carried,
-                                    .shape = shape};
+                                    .shape = shape,
+                                    .prim = d->located.prim};
     imp__evaluate_inputs(v->bsdf, shape, &at, v->in);
     const int of = v->bsdf->index;
     v->dirs = (struct imp_dirs){imp__decided_v3(d->wo), imp__decided_v3(d->wi), d->lobe,
@@ -237,8 +238,11 @@ static double course_weight(struct course *c, uint64_t j, uint64_t end,
                             const struct imp_vertex *at)
 {
     for (; at || j < end; at = at ? at->next : NULL, j++) {
-        const struct imp_decision *d = at ? &at->d : imp__record_vertex(c->record, j);
-        const struct imp_decision *next = NULL;
+        struct imp_decision kept;
+        struct imp_packed_head head;
+        if (!at) imp__packed_step(imp__record_words(c->record, j), &head, &kept);
+        const struct imp_decision *d = at ? &at->d : &kept;
+        const struct imp_bsdf *next = NULL;
         double branches = 1;
         for (const struct imp_side *s = at ? at->side : NULL; s; s = s->next) {
             struct course side = *c;
@@ -248,9 +252,10 @@ static double course_weight(struct course *c, uint64_t j, uint64_t end,
         }
         c->w *= branches;
         if (!d->goes_on) continue;
-        if (at && at->next) next = &at->next->d;
-        else if (!at && j + 1 < end) next = imp__record_vertex(c->record, j + 1);
-        step_on(c, d, at, next ? imp__decided_bsdf(c->m->scene, next) : NULL);
+        if (at && at->next) next = imp__decided_bsdf(c->m->scene, &at->next->d);
+        else if (!at && j + 1 < end)
+            next = imp__packed_bsdf(c->m->scene, imp__record_words(c->record, j + 1));
+        step_on(c, d, at, next);
     }
     return c->w;
 }
@@ -267,8 +272,8 @@ static void fetch(const struct imp_record *r, size_t next, size_t after)
     if (next >= r->n_walks) return;
     const struct imp_record_walk *k = imp__record_at(r, next);
     for (uint32_t j = 0; j < k->n; j++) {
-        const char *d = (const char *)imp__record_vertex(r, k->first + j);
-        for (size_t b = 0; b < sizeof(struct imp_decision); b += IMP_CACHE_LINE)
+        const char *d = (const char *)imp__record_words(r, k->first + j);
+        for (size_t b = 0; b < IMP_RECORD_FETCH; b += IMP_CACHE_LINE)
             __builtin_prefetch(d + b);
     }
 }

@@ -208,6 +208,10 @@ void imp__light_link_weigh(struct imp_step *s, struct imp_vertex *v,
     if (imp__is_zero_used(link->f, s->at.carried) && !imp__wants_derivative(s, b)) return;
     imp__light_shadow_aim(at, to, &link->shadow);
     if (!s->recorded) return;
-    v->d.light.emitter = -1;
-    imp__store_v3(v->d.light.wi, dirs.wo);
+    struct imp_light *l = &v->d.light;
+    l->emitter = -1;
+    imp__store_v3(l->wi, dirs.wo);
+    imp__store_v3(l->p, to->p);
+    l->located =
+        s->tracer->sensor->shape ? to->located : (struct imp_located){.prim = -1};
 }

@@ -3,6 +3,7 @@
  * Vertex 0 of a walk from a light: which light sends it, from where, and whither. The
  * point itself may be seen by the sensor, too. */
 #include "kind/cleared.h"
+#include "scene/located.h"
 #include "scene/media_around.h"
 #include "walk/both/both.h"
 
@@ -63,6 +64,7 @@ static void light_itself_connect(struct imp_light_step *w, struct imp_vertex *v,
                                      sensor's */
     const bool in_beam = far && e->shape;
     if (in_beam) {
+        beam.located.prim = -1;
         if (!e->ops->sample(e, &to.p, u, &beam)) return;
         p = imp__decide(beam.p);
         for (int k = 0; k < 2; k++) x.uv[k] = imp__decide1(beam.uv[k]);
@@ -107,6 +109,9 @@ static void light_itself_connect(struct imp_light_step *w, struct imp_vertex *v,
         imp__store_v3(l->d, x.d);
         imp__store_v3(l->p, p);
         imp__store_v3(l->wi, (imp_v3){0});
+        l->located =
+            imp__located_drawn(e->shape, in_beam ? &beam.located : &start->located,
+                               in_beam ? beam.uv : start->uv);
     }
     const struct imp_link link = {
         .shadow = shadow, .sensor = to, .f = imp__spec(1), .le = le, .weight = weight};
@@ -190,6 +195,7 @@ bool imp__light_start(struct imp_light_step *w)
         v->d.uv[0] = (imp_decided)s->at.uv[0];
         v->d.uv[1] = (imp_decided)s->at.uv[1];
         imp__store_v3(v->d.p, s->at.p);
+        v->d.located = imp__located_drawn(e->shape, &start.located, start.uv);
         imp__store_v3(v->d.wo, (imp_v3){0});
         imp__store_v3(v->d.wi, (imp_v3){0});
         v->d.lobe = IMP_SMOOTH;

@@ -89,7 +89,8 @@ static struct imp_texcoord passed_at(const struct imp_shape *shape,
     return (struct imp_texcoord){.uv = {e[1].t, e[1].bound},
                                  .p = event_place(track, e),
                                  .carried = carried,
-                                 .shape = shape};
+                                 .shape = shape,
+                                 .prim = e[1].medium};
 }
 /* Lobe by lobe, directions in its frame, about the normal as one likes. */
 static struct imp_dirs passed_dirs(const struct imp_event *e, int lobe)

@@ -250,7 +250,7 @@ static void leave(struct imp_step *s, const struct imp_vertex *v,
 /* ---- To light samples ---------------------------------------------------------------- */
 
 /* Past a surface that lets a part go straight on. False: nothing, or no memory. */
-static bool go_through(struct imp_free_flight *w, const struct imp_shape *shape,
+static bool go_through(struct imp_free_flight *w, const struct imp_shape *shape, int prim,
                        const struct imp_surface *at)
 {
     struct imp_step *s = w->s;
@@ -262,6 +262,7 @@ static bool go_through(struct imp_free_flight *w, const struct imp_shape *shape,
                                     .kind = IMP_PASSES},
                                    {.t = (imp_decided)at->uv[0],
                                     .bound = (imp_decided)at->uv[1],
+                                    .medium = prim,
                                     .kind = IMP_PASSES_UV}};
     imp__store_v3(here.o, w->o);
     imp__store_v3(here.d, w->d);
@@ -320,7 +321,7 @@ static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surf
             imp__fly(&w, m, passed ? base : back, found ? base + hit.t : end, false, &t);
         if (s->walk->dropped) return false;
         if (!found) return arrived(&w, v, T);
-        if (!hole && !go_through(&w, shape, &at)) return false;
+        if (!hole && !go_through(&w, shape, hit.prim, &at)) return false;
         if (!left && !side_take(s, shape, at.ng, d, &nest, &m)) return false;
         o = imp__offset(at.p, at.ng, d);
         base = imp__dot(o - start, d);

@@ -43,7 +43,7 @@ enum imp_event_kind {
     IMP_REAL_AT,
     IMP_PASSES,    /* bound: cosine at the shading normal of the side that it comes from,
                      medium: the shape */
-    IMP_PASSES_UV, /* follows it; t, bound: u, v */
+    IMP_PASSES_UV, /* follows it; t, bound: u, v, medium: the primitive */
     IMP_RESIDUAL_AT, /* bound: r */
     IMP_RESIDUAL_OF, /* follows it; t: c */
     IMP_DELTA_AT,    /* bound: b */

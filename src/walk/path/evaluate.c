@@ -17,7 +17,7 @@ static inline void place_set(const struct imp_decision *d, const struct imp_shap
     p->at.p = imp__decided_v3(d->p);
     p->at.carried = carried;
     p->at.shape = shape;
-    p->at.prim = 0;
+    p->at.prim = d->located.prim;
     p->at.surface = NULL;
     p->dirs.wo = imp__decided_v3(d->wo);
     p->dirs.wi = imp__decided_v3(d->wi);

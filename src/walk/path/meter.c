@@ -4,6 +4,7 @@
  * direction is drawn by the cosine. */
 #include "meter.h"
 #include "math/warp.h"
+#include "scene/located.h"
 
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
                    struct imp_dirs *d)
@@ -71,7 +72,9 @@ struct imp_vertex *imp__meter_begin(struct imp_step *s, struct imp_surface *at,
     walk->depth = -2;
     walk->key = imp__key_branch(walk->key, 0, 1);
     s->depth = -1;
+    at->located.prim = -1;
     sensor->shape->ops->sample_area(sensor->shape, u, at);
+    s->at.prim = at->located.prim;
     *frame = imp__frame_from_normal(at->ng);
     at->n = at->ng;
     at->s = frame->s;
@@ -86,6 +89,7 @@ struct imp_vertex *imp__meter_begin(struct imp_step *s, struct imp_surface *at,
     if (s->recorded) {
         v->d.shape = sensor->shape->index;
         v->d.scatterer = IMP_AT_SURFACE;
+        v->d.located = imp__located_drawn(sensor->shape, &at->located, at->uv);
     }
     imp__vertex_place(s, v, at, frame, -at->ng, 0);
     return v;

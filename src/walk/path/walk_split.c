@@ -79,6 +79,9 @@ static void split(const struct imp_step *before, struct imp_vertex *v,
             u->ng = v->ng;
             u->d.shape = v->d.shape;
             u->d.scatterer = v->d.scatterer;
+            u->d.located = v->d.located;
+            u->d.place = v->d.place;
+            u->d.back = v->d.back;
             u->d.uv[0] = v->d.uv[0];
             u->d.uv[1] = v->d.uv[1];
             imp__store_v3(u->d.p, s.at.p);

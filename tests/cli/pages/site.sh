@@ -11,7 +11,7 @@ while read -r page; do
     grep -qF "]($page)" docs/index.md || echo "docs/index.md does not lead to $page"
 done <"$OUT/pages"
 while read -r page; do
-    sed -n '1,/^## /p' "docs/$page" | tr '\n' ' ' | grep -qE '(^|[ .])For (who|a |every|those|packagers)' ||
+    sed -n '1,/^## /p' "docs/$page" | tr '\n' ' ' | grep -qE '(^|[ .*])For (anyone|a |every|those|packagers)' ||
         echo "$page does not say for whom it is"
 done <"$OUT/pages"
 if command -v mkdocs >/dev/null; then
