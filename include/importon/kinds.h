@@ -891,8 +891,9 @@ struct imp_sensor_ops {
                         second(imp_curves) second(imp_dirs) second(imp_emitter_profile)  \
                             second(imp_film_desc) second(imp_filter) second(imp_hit)     \
                                 second(imp_input_desc) second(imp_light_sample)          \
-                                    second(imp_sink) second(imp_surface)                 \
-                                        second(imp_texcoord) second(imp_triangles)
+                                    second(imp_located) second(imp_sink)                 \
+                                        second(imp_surface) second(imp_texcoord)         \
+                                            second(imp_triangles)
 
 /* The version and the sizes that somebody was compiled with. These two structs never
  * change. */

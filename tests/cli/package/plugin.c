@@ -557,8 +557,8 @@ static void layouts(void)
     static const char *const stay[] = {
         "imp_attribute", "imp_carried",         "imp_coefficients", "imp_curves",
         "imp_dirs",      "imp_emitter_profile", "imp_film_desc",    "imp_filter",
-        "imp_hit",       "imp_input_desc",      "imp_light_sample", "imp_sink",
-        "imp_surface",   "imp_texcoord",        "imp_triangles"};
+        "imp_hit",       "imp_input_desc",      "imp_light_sample", "imp_located",
+        "imp_sink",      "imp_surface",         "imp_texcoord",     "imp_triangles"};
     const int version = IMP_KINDS_VERSION;
     char text[200];
     imp_context *ctx;
@@ -570,7 +570,7 @@ static void layouts(void)
         imp_context_destroy(ctx);
     }
     if (imp_context_create(NULL, &ctx) != IMP_OK) return;
-    for (int i = 0; i < 15; i++)
+    for (int i = 0; i < 16; i++)
         for (int change = -8; change <= 8; change += 16) {
             snprintf(text, sizeof text, "layout: struct %s has ", stay[i]);
             refused(ctx, of_another(ctx, stay[i], change, version), text);
