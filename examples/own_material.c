@@ -11,7 +11,7 @@
  *
  *     cc own_material.c $(pkg-config --cflags --libs importon) -lm
  */
-#include <importon/kinds.h>
+#include <importon/lobes.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -49,18 +49,18 @@ static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_
     *f = in[RHO] * lobe(in, d);
 }
 
-/* Directions are drawn by cosine. */
+/* Directions are drawn by the cosine, a lobe of exponent 1 about the normal. */
 static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
 {
     (void)b, (void)in;
-    return d->wi[2] > 0 && d->wo[2] > 0 ? d->wi[2] / pi : 0;
+    return d->wo[2] > 0 ? imp_lobe_pdf(1, d->wi[2]) : 0;
 }
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
                    struct imp_dirs *d)
 {
     (void)b, (void)in;
-    const double r = sqrt(u[1]), phi = 2 * pi * u[2];
-    d->wi = (imp_v3){r * cos(phi), r * sin(phi), sqrt(1 - u[1])};
+    const imp_v3 normal = {0, 0, 1};
+    imp_lobe_sample(&normal, 1, u + 1, &d->wi);
     d->lobe = IMP_SMOOTH;
     return d->wo[2] > 0 && d->wi[2] > 0;
 }

@@ -50,8 +50,6 @@ static const struct {
     {"stam_m2", {"variant=paper", "sampling=phong"}},
 };
 
-#define KINDS_MAX_INPUTS 24
-
 struct kind_case {
     char label[128];
     const char *kind;
@@ -116,14 +114,17 @@ static bool kind_make(struct kind_factory *f, const struct imp_bsdf_ops *ops,
         node->measured = &tables.data;
     }
     void *self = imp__arena_array(&f->arena, 1, ops->object_size + 1);
-    const struct imp_input **input =
-        imp__arena_array(&f->arena, IMP_INPUTS_MAX + 1, sizeof *input);
     *out = (struct imp_bsdf){.ops = ops,
                              .self = self,
                              .flags = IMP_BSDF_SMOOTH,
                              .index = 0,
                              .name = ops->name};
     while (ops->inputs[out->n_own].name) out->n_own++;
+    if (out->n_own > IMP_INPUTS_MAX) return false;
+    out->n_in = out->n_own;
+    for (int k = 0; k < n_child; k++) out->n_in += child[k].n_in;
+    const struct imp_input **input =
+        imp__arena_array(&f->arena, (size_t)out->n_in + 1, sizeof *input);
     out->n_in = out->n_own;
     out->input = input;
     for (int j = 0; j < out->n_own; j++) {
@@ -181,6 +182,10 @@ static inline void kind_inputs(const struct imp_bsdf *b, enum kind_set set, uint
                                imp_spec *in)
 {
     const struct imp_key key = imp__key(seed, (uint64_t)set, 0);
+    if (b->n_in > IMP_INPUTS_MAX) { /* callers have room for as many */
+        fprintf(stderr, "%s has %d inputs\n", b->name, b->n_in);
+        abort();
+    }
     /* Numbers that tables are made for stay for a while: making them takes long. */
     const struct imp_key slow = imp__key(seed / 50, (uint64_t)set, 0);
     for (int j = 0; j < b->n_in; j++) {

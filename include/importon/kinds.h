@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * kinds.h: what the author of a new kind needs. A kind is a const table of functions that
- * agree with each other: a material's value, sampling, density and derivative stand side
+ * agree with each other: a material's value, sampling, density and derivative are side
  * by side in one file, and one line in the concept's table (src/kind/<concept>/)
  * registers it. Tests visit every kind through these tables: a new kind is tested by
  * existing.
@@ -19,12 +19,22 @@
  *
  * Directions. wo points to the sensor side, wi to the light side, both away from the
  * surface, in the local shading frame whose z is the shading normal (CONVENTIONS.md).
+ *
+ * Versions. A plug-in and the library may be compiled with different versions of this
+ * header: registering compares them (IMP_KINDS_VERSION and IMP_KINDS_STRUCTS, below, with
+ * the rules by which structs grow). Tables and descriptions are written with designated
+ * initialisers, {.name = "rho", .hi = 1}: what is not written is zero, also what later
+ * versions add.
  */
 #ifndef IMPORTON_KINDS_H
 #define IMPORTON_KINDS_H
 
 #include <importon/importon.h>
 #include <stdbool.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 #if defined(__GNUC__)
 #define IMP_FORMAT(text, first) __attribute__((__format__(__printf__, text, first)))
@@ -51,40 +61,48 @@ static inline double imp_v3_dot(const imp_v3 *a, const imp_v3 *b)
 enum imp_role { IMP_REFLECTANCE, IMP_UNBOUNDED, IMP_EMISSION };
 
 enum imp_input_flags {
-    IMP_INPUT_SCALAR = 1,   /* one number: textures are read as scalars */
-    IMP_INPUT_OPTIONAL = 2, /* absent: the fallback, and no parameter */
-    IMP_INPUT_REQUIRED = 4,
-    IMP_INPUT_FIXED = 8,  /* no gradient: changing it bends or moves things */
-    IMP_INPUT_EDGES = 16, /* differentiable, and may move discontinuities */
-    IMP_INPUT_SOFT = 32,  /* a number above hi is taken as it is, and then has no bound:
-                             what it is for decides */
-    IMP_INPUT_INDEX = 64, /* refractive index behind the surface over the one before it:
-                             where a medium fills the shape, the medium's */
-    IMP_INPUT_LUMINANCE = 128,   /* no property: the luminance, in all lanes, of the input
-                                 declared before it under the same name. A kind whose
-                                 lanes couple (a tint divided by its luminance) reads
-                                 it, and the engine has its derivative */
-    IMP_INPUT_NUMBER = 256,      /* a texture is refused */
-    IMP_INPUT_VECTOR = 512,      /* a texture, whose three channels are lanes 0..2 as they
-                                    are, in all modes: not a colour */
-    IMP_INPUT_EXTINCTION = 4096, /* of a medium: the extinction depends on it, and does
-                                       not fall where it rises */
-    IMP_INPUT_VOLUME = 8192,     /* may be a volume */
-    /* In spectral modes: */
-    IMP_INPUT_DAYLIGHT = 16384, /* a bitmap's texels are daylight of their colours, of any
+    /* What a scene may write. */
+    IMP_INPUT_OPTIONAL = 1, /* absent: the fallback, and no parameter */
+    IMP_INPUT_REQUIRED = 2,
+    IMP_INPUT_SCALAR = 4,  /* one number: textures are read as scalars */
+    IMP_INPUT_NUMBER = 8,  /* a texture is refused */
+    IMP_INPUT_VOLUME = 16, /* may be a volume */
+    IMP_INPUT_VECTOR = 32, /* a texture, whose three channels are lanes 0..2 as they are,
+                              in all modes: not a colour */
+    IMP_INPUT_BUMP = 64,   /* a texture, read as one number, of which the slope counts:
+                              lanes 0..2 are the normal, not unit, of the surface that is
+                              raised by the texture times the property scale, in the
+                              shading frame */
+    IMP_INPUT_SOFT = 128,  /* a number above hi is taken as it is, and then has no bound:
+                              what it is for decides */
+    /* No property: the engine has its value, and its derivative. */
+    IMP_INPUT_LUMINANCE =
+        256, /* the luminance, in all lanes, of the input declared before
+                                   it under the same name. A kind whose lanes couple (a
+                                   tint divided by its luminance) reads it */
+    IMP_INPUT_WAVELENGTH =
+        512, /* the wavelength of each lane, in nm, of a kind whose rule
+                                   depends on it; 0 where lanes are colours */
+    /* What follows from it. */
+    IMP_INPUT_FIXED = 1024, /* no gradient: changing it bends or moves things */
+    IMP_INPUT_EDGES = 2048, /* differentiable, and may move discontinuities */
+    IMP_INPUT_INDEX = 4096, /* refractive index behind the surface over the one before it:
+                               where a medium fills the shape, the medium's */
+    /* Inputs of media. */
+    IMP_INPUT_EXTINCTION = 8192, /* the extinction depends on it, and does not fall where
+                                    it rises */
+    IMP_INPUT_FALLS = 16384, /* with IMP_INPUT_EXTINCTION: does not rise where it rises (a
+                                 visibility). Not a texture, and not a spectrum where the
+                                 extinction varies: those have no known lower bound */
+    IMP_INPUT_AFFINE =
+        32768, /* extinction and scattering are affine in it, and the emission
+                                 does not depend on it. Derivatives with respect to it alone
+                                 are made without looking it up */
+    /* In spectral modes. */
+    IMP_INPUT_DAYLIGHT = 65536, /* a bitmap's texels are daylight of their colours, of any
                                    size */
-    IMP_INPUT_LINEAR = 32768,   /* colours become spectra by the linear basis, so that
+    IMP_INPUT_LINEAR = 131072   /* colours become spectra by the linear basis, so that
                                    inputs add as their colours do */
-    IMP_INPUT_WAVELENGTH = 131072, /* no property: the wavelength of each lane, in nm, of
-                                      a kind whose rule depends on it; 0 where lanes are
-                                      colours */
-    IMP_INPUT_AFFINE = 262144, /* of a medium: extinction and scattering are affine in it,
-                                  and the emission does not depend on it. Derivatives with
-                                  respect to it alone are made without looking it up */
-    IMP_INPUT_BUMP = 65536 /* a texture, read as one number, of which the slope counts:
-                                   lanes 0..2 are the normal, not unit, of the surface that
-                                   is raised by the texture times the property scale, in
-                                   the shading frame */
 };
 
 struct imp_input_desc { /* the list ends with {0} */
@@ -96,8 +114,9 @@ struct imp_input_desc { /* the list ends with {0} */
     const char *unit;
 };
 
-/* Inputs of one object, its children's included: more is an error when it is built, so
- * that whoever visits an object has room for them on the stack. */
+/* Inputs of one object, its children's included: more is an error when the kind is
+ * registered or the object built, so that whoever visits an object has room for them on the
+ * stack, and a bit for each in a uint64_t. */
 #define IMP_INPUTS_MAX 64
 
 /* What the lanes of a walk are where they are not the scene's colours: up to four
@@ -107,8 +126,14 @@ struct imp_carried {
     double nm[4];
 };
 
-struct imp_course;   /* a value at every time (src/math/course.h) */
-struct imp_spectrum; /* a value at every wavelength (src/color/spectrum.h) */
+/* Opaque; imp_course_value and imp_spectrum_value evaluate them. */
+struct imp_course; /* a factor over time: linear between given times, constant outside */
+struct imp_spectrum; /* a value at every wavelength */
+/* Opaque, and the engine's alone. */
+struct imp_body;        /* a region of graded index, in which light goes on bent lines */
+struct imp_camera_gain; /* exposure, white balance, vignetting, and their derivatives */
+struct imp_majorants;   /* a grid of bounds of an extinction */
+struct imp_map;         /* an affine map */
 struct imp_texture;
 /* One input of one object: a constant or a texture. */
 struct imp_input {
@@ -119,7 +144,7 @@ struct imp_input {
     bool plain;      /* a constant: `value` as it is, unless lanes are wavelengths */
     bool vector;     /* declared IMP_INPUT_VECTOR */
     bool bump;       /* declared IMP_INPUT_BUMP */
-    int luminance;   /* > 0: the luminance of the input that stands so many before it */
+    int luminance;   /* > 0: the luminance of the input that many before it */
     imp_spec value;  /* the constant, in all used lanes */
     imp_spec weight; /* of a luminance: of that input's lanes */
     const struct imp_spectrum *spectrum; /* what walks that carry wavelengths look up;
@@ -161,16 +186,16 @@ enum imp_bsdf_flags {
     IMP_BSDF_SMOOTH = 1, /* has lobes with a density */
     IMP_BSDF_DELTA = 2,  /* has delta lobes */
     IMP_BSDF_TRANSMIT = 4,
-    IMP_BSDF_EMIT = 8,     /* has emit: Stam's ambient terms */
-    IMP_BSDF_JUMP = 16,    /* f/pdf of sample jumps at the horizon: sample_d, which has no
+    IMP_BSDF_EMIT = 8,    /* has emit: Stam's ambient terms */
+    IMP_BSDF_JUMP = 16,   /* f/pdf of sample jumps at the horizon: sample_d, which has no
                            boundary term, is not the whole derivative */
-    IMP_BSDF_NULL = 32,    /* light passes as if nothing were there */
-    IMP_BSDF_TURNED = 128, /* its kernel has no transpose that `sample` could draw (own
-                              normals; a fibre, which light enters where it is seen):
-                              walks from the lights refuse it */
-    IMP_BSDF_LINEAR = 64   /* eval is of first degree in its own inputs of role
+    IMP_BSDF_NULL = 32,   /* light passes as if nothing were there */
+    IMP_BSDF_LINEAR = 64, /* eval is of first degree in its own inputs of role
                             IMP_REFLECTANCE together, and emit is free of them: an
                             identity of integrator stam that `check` tests */
+    IMP_BSDF_TURNED = 128 /* its kernel has no transpose that `sample` could draw (it has
+                              normals of its own, or light leaves a fibre elsewhere than it
+                              entered): light tracing refuses it */
 };
 
 struct imp_bsdf {
@@ -293,7 +318,7 @@ struct imp_texture {
     const struct imp_input **input;
     int param; /* of its bulk data; -1: none */
     const char *name;
-    const struct imp_input_desc *asked; /* an input that it stands for; NULL: none yet.
+    const struct imp_input_desc *asked; /* the first input that it serves; NULL: none yet.
                                            `changed` is called when it is known */
 };
 
@@ -331,7 +356,7 @@ struct imp_texture_ops {
     /* As imp_bsdf_ops.changed; of its own texels too. */
     void (*changed)(const struct imp_texture *t);
 
-    /* Of volumes. A volume is a texture that looks at `at->p` alone. */
+    /* For volumes. A volume is a texture that looks at `at->p` alone. */
     /* Lane by lane, no less than any value in the box from lo to hi of the world. NULL:
      * not known, and no extinction can be made of it. */
     void (*bound)(const struct imp_texture *t, const imp_v3 *lo, const imp_v3 *hi,
@@ -564,7 +589,7 @@ struct imp_shape {
     int bsdf;    /* index; -1: the scene's default, -2: black (emitters' default) */
     int emitter; /* index or -1 */
     bool flip_normals;
-    double area; /* world units; build sets it. Of a mesh from which nothing is sent: 0 */
+    double area; /* world units; build sets it. 0: a mesh from which nothing is sent */
     enum imp_geometry geometry;
     struct imp_triangles triangles; /* if geometry is IMP_TRIANGLES */
     struct imp_curves curves;       /* if it is IMP_CURVES */
@@ -574,14 +599,14 @@ struct imp_shape {
     const struct imp_body *body; /* of graded index, behind ng; NULL: none */
     /* Behind ng and before it; both NULL at a surface that bounds no medium. */
     const struct imp_medium *interior, *exterior;
-    int priority; /* where shapes overlap, the highest is there (scene/priorities.h); 0: it
-                     has none */
+    int priority; /* where closed shapes overlap, that of the highest priority fills the
+                     place, the later one of equals; 0: it has none */
     const struct imp_sensor *sensor; /* that it is the surface of; NULL: none */
     /* Textures by name that mesh_attribute looks up on this shape. */
     int n_attributes;
     const struct imp_attribute *attribute;
-    /* Its textures ask for more than uv: what `surface` and the draws of points write to uv
-     * then stands for the triangle and the point in it, and `place` gives uv back. */
+    /* Its textures need more than uv: what `surface` and the draws of points write to uv
+     * is then a code of the triangle and the point in it, and `place` gives uv back. */
     bool by_triangle;
     /* [2] of a shape that is there for instances alone which stretch or mirror its group, and
      * has a bump map: from the group to the world, and back. Else NULL. */
@@ -675,11 +700,11 @@ struct imp_emitter {
     double weight; /* sampling_weight */
     const char *name;
     bool shaped;    /* as of imp_bsdf */
-    unsigned fixed; /* bit j: input j has no derivative in this object; build sets it */
+    uint64_t fixed; /* bit j: input j has no derivative in this object; build sets it */
     const struct imp_course *course; /* the scene's: factor over time; NULL: 1 */
 };
 
-/* Of a light that is its first input times a function of the direction alone: what solvers
+/* A light that is its first input times a function of the direction alone: what solvers
  * other than walks need. Directions are unit vectors of the world, away from the light. */
 struct imp_emitter_profile {
     double (*value)(const struct imp_emitter *e, const imp_v3 *w);
@@ -710,7 +735,7 @@ struct imp_emitter_ops {
     double (*pdf)(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *wi,
                   const struct imp_hit *hit, const struct imp_surface *at);
 
-    /* Of a light that is its first input times max(0, w . axis)^n: sets the axis, of a
+    /* For a light that is its first input times max(0, w . axis)^n: sets the axis, of a
      * surface with this normal, and returns which input n is. NULL: another light. */
     int (*lobe)(const struct imp_emitter *e, const imp_v3 *normal, imp_v3 *axis);
     const struct imp_emitter_profile *profile; /* NULL: another light */
@@ -734,7 +759,7 @@ struct imp_emitter_ops {
                             const double u[4], struct imp_emission_sample *out);
     /* pdf_d of direction x->d, from the point that x describes. With sample_emission. */
     double (*pdf_emission)(const struct imp_emitter *e, const struct imp_emission *x);
-    /* Of a delta light: light leaves within a cone about `axis` alone, of this cosine, as
+    /* For a delta light: light leaves within a cone about `axis` alone, of this cosine, as
      * its inputs are now. NULL: all around. */
     void (*cone)(const struct imp_emitter *e, imp_v3 *axis, double *cosine);
 };
@@ -776,7 +801,7 @@ struct imp_film_desc {
     enum imp_pixel_format pixel_format;
     const char *file_format; /* "openexr", "rgbe", "pfm" */
     struct imp_filter filter;
-    /* Of a specfilm: its channels are these curves, per nm, and not the pixel_format. */
+    /* In a specfilm: its channels are these curves, per nm, and not the pixel_format. */
     int n_responses;
     const struct imp_spectrum *response; /* [n_responses] */
     const char *const *response_name;
@@ -803,12 +828,12 @@ struct imp_sensor {
     /* The scene's: its rays have times from `open` to `close`, evenly or as `course`. */
     double open, close;
     const struct imp_course *course;
-    /* With IMP_SENSOR_GROUP: sensors whose pictures stand side by side in its film. */
+    /* With IMP_SENSOR_GROUP: sensors whose pictures are side by side in its film. */
     int n_child;
     const struct imp_sensor *const *child;
 };
 enum imp_sensor_flags {
-    IMP_SENSOR_AREA = 1,     /* its rays start on the shape that it stands in */
+    IMP_SENSOR_AREA = 1,     /* its rays start on the shape that it belongs to */
     IMP_SENSOR_PARALLEL = 2, /* its rays are parallel: `connect` knows no point without
                                 end */
     IMP_SENSOR_GROUP = 4     /* its children are sensors */
@@ -833,36 +858,156 @@ struct imp_sensor_ops {
                     const double u[4], struct imp_sensor_sample *out);
 };
 
+/* ---- Versions of this header ----------------------------------------------------- */
+
+/* The version is raised where a plug-in of the former header could not run any more:
+ *   - a struct of the second list changes its size,
+ *   - a field moves, goes, or changes its type or meaning,
+ *   - a flag or another constant changes its number,
+ *   - a function gets other parameters or another duty, or becomes required.
+ * It is not raised where
+ *   - a struct of the first list grows at its end, beyond its former size (a field in the
+ *     padding there would be seen by no check),
+ *   - a table of functions (imp_..._ops) grows at its end: `size` says what a plug-in has,
+ *     and what is absent is NULL,
+ *   - a struct, a flag or an imp_build function is new.
+ * Registration takes a plug-in of the same version whose structs of the first list are not
+ * larger than the library's, and whose structs of the second list have the same size. */
+#define IMP_KINDS_VERSION 1
+
+/* First list: the library makes them, and a kind gets them by pointer. A kind of an older
+ * header does not look at what is new; of what a kind fills (rays and samples), the library
+ * clears everything before the call. A kind hands on the pointer that it was given, and
+ * makes none of its own for the functions of another kind.
+ *
+ * Second list: they are elements of arrays or fields of other structs, or kinds make them
+ * to call the library or another kind (a child's directions, a point on a shape). */
+#define IMP_KINDS_STRUCTS(first, second)                                                 \
+    first(imp_ball) first(imp_bsdf) first(imp_emission) first(imp_emission_sample)       \
+        first(imp_emitter) first(imp_input) first(imp_medium) first(imp_phase)           \
+            first(imp_round) first(imp_sensor) first(imp_sensor_ray)                     \
+                first(imp_sensor_sample) first(imp_shape) first(imp_texture)             \
+                    second(imp_attribute) second(imp_carried) second(imp_coefficients)   \
+                        second(imp_curves) second(imp_dirs) second(imp_emitter_profile)  \
+                            second(imp_film_desc) second(imp_filter) second(imp_hit)     \
+                                second(imp_input_desc) second(imp_light_sample)          \
+                                    second(imp_located) second(imp_sink)                 \
+                                        second(imp_surface) second(imp_texcoord)         \
+                                            second(imp_triangles)
+
+/* The version and the sizes that somebody was compiled with. These two structs never
+ * change. */
+struct imp_struct_size {
+    const char *name; /* "imp_surface" */
+    size_t size;
+};
+struct imp_kinds_layout {
+    int version;
+    int n;
+    const struct imp_struct_size *structs; /* [n], in any order */
+};
+
+/** The layout of the header that this is compiled with; it lives for ever. */
+static inline const struct imp_kinds_layout *imp_kinds_here(void)
+{
+#define IMP_KINDS_SIZE(name) {#name, sizeof(struct name)},
+    static const struct imp_struct_size sizes[] = {
+        IMP_KINDS_STRUCTS(IMP_KINDS_SIZE, IMP_KINDS_SIZE)};
+#undef IMP_KINDS_SIZE
+    static const struct imp_kinds_layout layout = {
+        IMP_KINDS_VERSION, (int)(sizeof sizes / sizeof sizes[0]), sizes};
+    return &layout;
+}
+
+/** The layout that the library was compiled with; it lives for ever. A host in a language
+ * that cannot compile this header compares its own definitions with it. */
+IMP_API const struct imp_kinds_layout *imp_kinds_of_library(void);
+
 /* ---- Registering ---------------------------------------------------------------- */
 
-/** Add a kind to those that scenes of this context can name. Before its first scene. The
- * table is copied; its strings, inputs and functions must live as long as the context.
- * A table of an older header (a smaller `size`) is taken if it has all functions that
- * are required.
- * @return IMP_OK, IMP_E_ARG (another `size`, a required function or the name missing, the
- * name taken by a built-in kind or one registered before, a scene made before; the message
- * says which) or IMP_E_NOMEM. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_register_bsdf(imp_context *context,
-                                                         const struct imp_bsdf_ops *ops);
+enum imp_concept {
+    IMP_CONCEPT_BSDF,
+    IMP_CONCEPT_TEXTURE,
+    IMP_CONCEPT_SHAPE,
+    IMP_CONCEPT_EMITTER,
+    IMP_CONCEPT_SENSOR,
+    IMP_CONCEPT_FILTER,
+    IMP_CONCEPT_VOLUME,
+    IMP_CONCEPT_PHASE,
+    IMP_CONCEPT_MEDIUM
+};
+
+/** What the functions below call: add a kind to those that scenes of this context can
+ * name. Before its first scene. The table is copied; its strings, inputs and functions must
+ * live as long as the context. A table of an older header (a smaller `size`) is taken if it
+ * has all functions that are required.
+ * @param ops  the table of the concept, struct imp_bsdf_ops, ...; a volume has that of a
+ *             texture, and `bound` makes it fit for an extinction.
+ * @param layout  what the table was compiled with; read during the call alone.
+ * @return IMP_OK, IMP_E_ARG (another version of this header, a struct of another size, no
+ * such concept, a table of another `size`, a required function or the name missing, more
+ * than IMP_INPUTS_MAX inputs, the name taken by a built-in kind or one registered before, a
+ * scene made before; the message says which) or IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
-imp_register_texture(imp_context *context, const struct imp_texture_ops *ops);
-/** A volume has the table of a texture; `bound` makes it fit for an extinction. */
-IMP_API IMP_MUST_CHECK enum imp_status
-imp_register_volume(imp_context *context, const struct imp_texture_ops *ops);
-IMP_API IMP_MUST_CHECK enum imp_status
-imp_register_phase(imp_context *context, const struct imp_phase_ops *ops);
-IMP_API IMP_MUST_CHECK enum imp_status
-imp_register_medium(imp_context *context, const struct imp_medium_ops *ops);
-IMP_API IMP_MUST_CHECK enum imp_status
-imp_register_shape(imp_context *context, const struct imp_shape_ops *ops);
+imp_register_kind(imp_context *context, enum imp_concept concept, const void *ops,
+                  const struct imp_kinds_layout *layout);
+
+/* One of each concept, with the layout of the caller's header. */
+static inline IMP_MUST_CHECK enum imp_status
+imp_register_bsdf(imp_context *context, const struct imp_bsdf_ops *ops)
+{
+    return imp_register_kind(context, IMP_CONCEPT_BSDF, ops, imp_kinds_here());
+}
+static inline IMP_MUST_CHECK enum imp_status
+imp_register_texture(imp_context *context, const struct imp_texture_ops *ops)
+{
+    return imp_register_kind(context, IMP_CONCEPT_TEXTURE, ops, imp_kinds_here());
+}
+static inline IMP_MUST_CHECK enum imp_status
+imp_register_volume(imp_context *context, const struct imp_texture_ops *ops)
+{
+    return imp_register_kind(context, IMP_CONCEPT_VOLUME, ops, imp_kinds_here());
+}
+static inline IMP_MUST_CHECK enum imp_status
+imp_register_phase(imp_context *context, const struct imp_phase_ops *ops)
+{
+    return imp_register_kind(context, IMP_CONCEPT_PHASE, ops, imp_kinds_here());
+}
+static inline IMP_MUST_CHECK enum imp_status
+imp_register_medium(imp_context *context, const struct imp_medium_ops *ops)
+{
+    return imp_register_kind(context, IMP_CONCEPT_MEDIUM, ops, imp_kinds_here());
+}
+static inline IMP_MUST_CHECK enum imp_status
+imp_register_shape(imp_context *context, const struct imp_shape_ops *ops)
+{
+    return imp_register_kind(context, IMP_CONCEPT_SHAPE, ops, imp_kinds_here());
+}
 /** A name may have two tables: one with IMP_EMITTER_AREA, for lights in shapes, and one
  * without. */
-IMP_API IMP_MUST_CHECK enum imp_status
-imp_register_emitter(imp_context *context, const struct imp_emitter_ops *ops);
-IMP_API IMP_MUST_CHECK enum imp_status
-imp_register_sensor(imp_context *context, const struct imp_sensor_ops *ops);
-IMP_API IMP_MUST_CHECK enum imp_status
-imp_register_filter(imp_context *context, const struct imp_filter_ops *ops);
+static inline IMP_MUST_CHECK enum imp_status
+imp_register_emitter(imp_context *context, const struct imp_emitter_ops *ops)
+{
+    return imp_register_kind(context, IMP_CONCEPT_EMITTER, ops, imp_kinds_here());
+}
+static inline IMP_MUST_CHECK enum imp_status
+imp_register_sensor(imp_context *context, const struct imp_sensor_ops *ops)
+{
+    return imp_register_kind(context, IMP_CONCEPT_SENSOR, ops, imp_kinds_here());
+}
+static inline IMP_MUST_CHECK enum imp_status
+imp_register_filter(imp_context *context, const struct imp_filter_ops *ops)
+{
+    return imp_register_kind(context, IMP_CONCEPT_FILTER, ops, imp_kinds_here());
+}
+
+/* ---- What kinds cannot look into ------------------------------------------------- */
+
+/** The factor at a time; NAN where course is NULL. */
+IMP_API double imp_course_value(const struct imp_course *course, double time);
+/** The value at a wavelength in nm, 0 outside of where it is given; NAN where spectrum is
+ * NULL. */
+IMP_API double imp_spectrum_value(const struct imp_spectrum *spectrum, double nm);
 
 /* ---- Reading properties: what build functions call ------------------------------ */
 
@@ -916,12 +1061,16 @@ IMP_API enum imp_color_mode imp_build_color_mode(const struct imp_build *build);
 IMP_API IMP_MUST_CHECK enum imp_status imp_build_set(const struct imp_build *build,
                                                      const char *name, size_t n,
                                                      const double *values);
-/** Of a texture: make `data` [dims[0]]..[dims[n_dims - 1]] a parameter <name>.<key>. The
+/** In `build` of a texture: make `data` [dims[0]]..[dims[n_dims - 1]] a parameter <name>.<key>. The
  * numbers are read and set in place; `flags` are IMP_PARAM_*. *param is what an
  * imp_sink gets. n_dims is 1 to 3; of a volume (IMP_PARAM_VOLUME) 3, [z][y][x], or 4,
  * [z][y][x][channels]. Where rows have no order, say so (IMP_PARAM_LIST). */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_build_texels(const struct imp_build *build, const char *key, float *data, int n_dims,
                  const size_t *dims, unsigned flags, double lo, double hi, int *param);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

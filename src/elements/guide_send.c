@@ -14,6 +14,7 @@
  * point is connected to the sensor, whatever direction is drawn. Walks that have to meet
  * the sensor have that in the second, too. */
 #include "elements_guide.h"
+#include "kind/cleared.h"
 #include "math/offset.h"
 #include "math/rng.h"
 
@@ -129,7 +130,7 @@ static void bin_fill(const struct imp__guide *g, int light, int place, double *r
                                      m->side};
             struct imp_emission_sample s;
             double meets;
-            if (!em->ops->sample_emission(em, &scene->ball, u, &s) || !(s.cos_p > 0))
+            if (!imp__emission_sample(em, &scene->ball, u, &s) || !(s.cos_p > 0))
                 continue;
             const double per = s.pdf_p * s.pdf_d / s.cos_p;
             if (!(per > 0)) continue;

@@ -55,7 +55,7 @@ static bool reflects_behind(const struct imp_bsdf *b)
     for (int k = 1; k < 8; k++) {
         const double z = -k / 8.0, x = sqrt(1 - z * z);
         const struct imp_dirs d = {imp__v3(x, 0, z), imp__v3(-x * cos(k), x * sin(k), z),
-                                   IMP_SMOOTH, false};
+                                   IMP_SMOOTH, 0};
         b->ops->eval(b, in, &d, &f);
         if (!imp__is_zero(f)) return true;
     }

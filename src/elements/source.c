@@ -5,6 +5,7 @@
  * that the paper speaks of. Measuring patches emit a constant importance (elements.h: s).
  */
 #include "elements.h"
+#include "kind/cleared.h"
 #include <string.h>
 
 /* (u, v) of a point of a root: Newton's method on the bilinear map, exact after one step
@@ -44,7 +45,7 @@ static void meter_ray(const struct imp_sensor *s, double px, double py, int k, i
         u[i] = 0.5 + index * step[i];
         u[i] -= floor(u[i]);
     }
-    s->ops->ray(s, px + u[0], py + u[1], &u[2], ray);
+    imp__sensor_ray(s, px + u[0], py + u[1], &u[2], ray);
 }
 
 /* Ray k of a pixel's side x side. A plain grid aliases with what is upright in the
@@ -65,8 +66,8 @@ void imp__el_ray(const struct imp_sensor *s, int x, int y, int k, int side,
     double u = (py * side + row) * golden + 0.5, v = (px * side + column) * golden + 0.5;
     u -= floor(u);
     v -= floor(v);
-    s->ops->ray(s, px + (column + u) / side, py + (row + v) / side, (double[2]){0.5, 0.5},
-                ray);
+    imp__sensor_ray(s, px + (column + u) / side, py + (row + v) / side,
+                    (double[2]){0.5, 0.5}, ray);
 }
 
 bool imp__el_trace(const imp_elements *e, const struct imp_sensor_ray *ray,

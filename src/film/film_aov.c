@@ -3,6 +3,7 @@
  * Albedo, depth, position, normals, texture coordinates and their slopes at a sample's first hit,
  * by type of channel. */
 #include "film_aov.h"
+#include "kind/cleared.h"
 #include "scene/instances.h"
 #include "walk/core/dims.h"
 
@@ -18,7 +19,7 @@ static bool first_surface(const struct imp_measure *m, double time, double px, d
                           const double lens[2], struct imp_sensor_ray *ray,
                           struct imp_hit *hit, struct imp_surface *at)
 {
-    m->sensor->ops->ray(m->sensor, px, py, lens, ray);
+    imp__sensor_ray(m->sensor, px, py, lens, ray);
     if (!imp__intersect_at(m->scene, time, &ray->o, &ray->d, ray->t_near, ray->t_far,
                            hit))
         return false;
@@ -32,7 +33,7 @@ static void uv_slope(const struct imp_measure *m, double px, double py,
                      const double lens[2], const struct imp_surface *at, double duv[2])
 {
     struct imp_sensor_ray ray;
-    m->sensor->ops->ray(m->sensor, px, py, lens, &ray);
+    imp__sensor_ray(m->sensor, px, py, lens, &ray);
     const double t = imp__dot(at->ng, at->p - ray.o) / imp__dot(at->ng, ray.d);
     const imp_v3 dp = ray.o + ray.d * t - at->p;
     const double a = imp__dot(at->dp_du, at->dp_du), b = imp__dot(at->dp_du, at->dp_dv);

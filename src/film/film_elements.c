@@ -7,6 +7,7 @@
 #include "base/pool.h"
 #include "elements/elements_integrator.h"
 #include "film_render.h"
+#include "kind/cleared.h"
 
 struct convert {
     const struct imp_measure *measure;
@@ -26,7 +27,7 @@ static double alpha_of(const struct convert *c, int x, int y)
         const double py = s->film.crop_y + y + (k / c->side + 0.5) / c->side;
         struct imp_sensor_ray ray;
         struct imp_hit hit;
-        s->ops->ray(s, px, py, (double[2]){0.5, 0.5}, &ray);
+        imp__sensor_ray(s, px, py, (double[2]){0.5, 0.5}, &ray);
         count += imp__intersect(c->measure->scene, &ray.o, &ray.d, ray.t_near, ray.t_far,
                                 &hit);
     }

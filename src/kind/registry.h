@@ -1,25 +1,29 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * All kinds of a concept: the built-in ones, then those that a host registered in a
- * context (imp_register_bsdf and its like, kinds.h). */
+ * context (imp_register_kind, kinds.h). */
 #ifndef IMP_KIND_REGISTRY_H
 #define IMP_KIND_REGISTRY_H
 
 #include "base/nearest.h"
 #include "build.h"
+#include <string.h>
 
-enum imp_concept {
-    IMP_CONCEPT_BSDF,
-    IMP_CONCEPT_TEXTURE,
-    IMP_CONCEPT_SHAPE,
-    IMP_CONCEPT_EMITTER,
-    IMP_CONCEPT_SENSOR,
-    IMP_CONCEPT_FILTER,
-    IMP_CONCEPT_VOLUME,
-    IMP_CONCEPT_PHASE,
-    IMP_CONCEPT_MEDIUM
+/* What all tables begin with. */
+struct imp_kind_head {
+    size_t size;
+    const char *name;
+    size_t object_size;
 };
+static inline struct imp_kind_head imp__kind_head(const void *ops)
+{
+    struct imp_kind_head h;
+    memcpy(&h, ops, sizeof h);
+    return h;
+}
 
+/* Table i of those that the library has; NULL after the last. */
+const void *imp__kind_built_in(enum imp_concept concept, size_t i);
 /* Table i of a concept (struct imp_bsdf_ops, ...); NULL after the last. */
 const void *imp__kind_at(const imp_context *ctx, enum imp_concept concept, size_t i);
 /* The tag of the first concept that has a kind of this type ("bsdf", ..., "rfilter");

@@ -88,7 +88,7 @@ out:
 
 /* Bounds that an input sets to its texture's values also apply to those of attributes. */
 static void inputs_bound(struct imp_scene *scene, const struct imp_input *const *input,
-                         const struct imp_input_desc *desc, unsigned fixed)
+                         const struct imp_input_desc *desc, uint64_t fixed)
 {
     for (int j = 0; desc && desc[j].name; j++) {
         if (desc[j].flags & IMP_INPUT_FIXED || fixed >> j & 1)

@@ -5,6 +5,7 @@
 #include "fingerprint.h"
 #include "instances.h"
 #include "kind/bsdf/measured.h"
+#include "kind/cleared.h"
 #include "kind/shape/shape.h"
 #include "math/course.h"
 #include "math/hash.h"
@@ -259,7 +260,7 @@ uint64_t imp__fingerprint_sensor(const struct imp_sensor *sensor)
         const double px = k % 3 * 0.5 * f->width, py = k / 3 % 3 * 0.5 * f->height;
         const double lens[2] = {k < 9 ? 0.2 : 0.7, 0.4};
         struct imp_sensor_ray ray;
-        sensor->ops->ray(sensor, px, py, lens, &ray);
+        imp__sensor_ray(sensor, px, py, lens, &ray);
         h = vector_hash(vector_hash(h, ray.o), ray.d);
         h = number_hash(number_hash(h, ray.t_near), ray.t_far);
     }

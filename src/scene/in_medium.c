@@ -57,10 +57,11 @@ bool imp__in_medium_has_albedo(const struct imp_medium *m)
     m->ops->eval(m, in, &c);
     m->ops->eval_d(m, in, dc);
     for (int j = 0; j < m->n_own; j++) {
-        if (!(dc[j].extinction[0] > 0)) continue;
+        if (dc[j].extinction[0] == 0) continue;
         const double apart =
             dc[j].scattering[0] * c.extinction[0] - dc[j].extinction[0] * c.scattering[0];
-        if (fabs(apart) > 1e-9 * c.extinction[0] * dc[j].extinction[0]) return false;
+        if (fabs(apart) > 1e-9 * c.extinction[0] * fabs(dc[j].extinction[0]))
+            return false;
     }
     return true;
 }

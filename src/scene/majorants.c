@@ -3,11 +3,13 @@
  * Grid of bounds and control extinctions over a medium's box, filled again where parameters
  * change; a ray's entry into it. */
 #include "majorants.h"
+#include "base/arguments.h"
 
 #define CELLS_MAX 64 /* along an axis */
 
-/* The extinction of the largest inputs in the world's box of a cell. An extinction does
- * not fall where an input rises (IMP_INPUT_EXTINCTION). */
+/* The extinction of the largest inputs in the world's box of a cell: it does not fall where
+ * an input rises (IMP_INPUT_EXTINCTION). Where it does (IMP_INPUT_FALLS), the input is one
+ * value, which is the largest and the smallest. */
 static double cell_bound(const struct imp_majorants *g, const int cell[3])
 {
     const struct imp_medium *m = g->medium;
@@ -23,7 +25,8 @@ static double cell_bound(const struct imp_majorants *g, const int cell[3])
     const struct imp_texcoord at = {.p = (lo + hi) * 0.5};
     imp__inputs_eval(m->input, m->n_own, &at, in);
     for (int j = 0; j < m->n_own; j++)
-        if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)
+        if ((m->ops->inputs[j].flags & (IMP_INPUT_EXTINCTION | IMP_INPUT_FALLS)) ==
+            IMP_INPUT_EXTINCTION)
             imp__input_most(m->input[j], &lo, &hi, &in[j]);
     m->ops->eval(m, in, &c);
     double most = 0;
@@ -83,17 +86,42 @@ static void fill(void *payload)
             }
 }
 
+/* An extinction that falls where an input rises is bounded by the least value of that, which
+ * is not known of textures, nor of spectra. */
+static enum imp_status falling_check(struct imp_scene *scene, const struct imp_node *node,
+                                     const struct imp_medium *m, bool varies)
+{
+    for (int j = 0; j < m->n_own; j++) {
+        const struct imp_input *in = m->input[j];
+        const bool spectrum = in->spectrum && in->spectrum->form != IMP_SPECTRUM_NUMBER;
+        if (!(m->ops->inputs[j].flags & IMP_INPUT_FALLS)) continue;
+        if (in->texture || (varies && spectrum))
+            return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
+                                   "'%s': the extinction %sfalls where it rises, and a "
+                                   "%s has no known lower "
+                                   "bound: give it one value",
+                                   m->ops->inputs[j].name,
+                                   in->texture ? "" : "varies, and ",
+                                   in->texture ? in->texture->ops->name : "spectrum");
+    }
+    return IMP_OK;
+}
+
 enum imp_status imp__majorants_create(struct imp_scene *scene,
                                       const struct imp_node *node, struct imp_medium *m)
 {
     enum imp_status st = IMP_OK;
     struct imp_majorants *g = NULL;
     const struct imp_texture *box = NULL;
-    bool varies = false;
+    bool varies = m->ops->boxed;
+    for (int j = 0; j < m->n_own; j++)
+        varies |= m->input[j]->texture &&
+                  m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION &&
+                  !(m->input[j]->texture->ops->flags & IMP_TEXTURE_CONSTANT);
+    IMP_CHECKED(falling_check(scene, node, m, varies));
     for (int j = 0; j < m->n_own; j++) {
         const struct imp_texture *t = m->input[j]->texture;
         if (!t || !(m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)) continue;
-        varies |= !(t->ops->flags & IMP_TEXTURE_CONSTANT);
         if (!box && t->ops->extent) box = t;
         if (!t->ops->bound)
             return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
@@ -101,7 +129,7 @@ enum imp_status imp__majorants_create(struct imp_scene *scene,
                                    "extinction",
                                    m->ops->inputs[j].name, t->ops->name);
     }
-    if (!varies && !m->ops->boxed) return IMP_OK;
+    if (!varies) return IMP_OK;
     if (!box && !m->ops->boxed)
         return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
                                "its extinction varies, and has no box to look for it in");

@@ -5,6 +5,7 @@
  * the fog leaves a vacuum behind it, which is what the format defines and Mitsuba does, and
  * seldom what is meant. */
 #include "instances.h"
+#include "kind/cleared.h"
 #include "media_around.h"
 #include "priorities.h"
 #include "scene_build.h"
@@ -66,8 +67,8 @@ static enum imp_status camera_check(const struct imp_scene *scene,
     const double lens[2] = {0.5, 0.5};
     struct imp_sensor_ray ray;
     bool outwards;
-    sensor->ops->ray(sensor, 0.5 * sensor->film.width, 0.5 * sensor->film.height, lens,
-                     &ray);
+    imp__sensor_ray(sensor, 0.5 * sensor->film.width, 0.5 * sensor->film.height, lens,
+                    &ray);
     if (scene->priorities) {
         const enum imp_status st = nest_check(scene, sensor, &ray);
         if (st != IMP_OK) return st;

@@ -28,7 +28,7 @@ struct setting {
 static double primal(imp_v3 wi, void *payload)
 {
     const struct setting *s = payload;
-    const struct imp_dirs d = {wo, wi, IMP_SMOOTH, false};
+    const struct imp_dirs d = {wo, wi, IMP_SMOOTH, 0};
     imp_spec f;
     s->b->ops->eval(s->b, s->in, &d, &f);
     return f[0] * L(wi);
@@ -36,7 +36,7 @@ static double primal(imp_v3 wi, void *payload)
 static double derivative(imp_v3 wi, void *payload)
 {
     const struct setting *s = payload;
-    const struct imp_dirs d = {wo, wi, IMP_SMOOTH, false};
+    const struct imp_dirs d = {wo, wi, IMP_SMOOTH, 0};
     imp_spec df[4];
     s->b->ops->eval_d(s->b, s->in, &d, df);
     return df[EXPONENT][0] * L(wi);
@@ -62,7 +62,7 @@ static struct estimates estimate(const struct setting *s, uint32_t n, uint64_t s
     for (uint32_t i = 0; i < n; i++) {
         const struct imp_key key = imp__key(seed, 0, i);
         const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
-        struct imp_dirs d = {wo, {0}, IMP_SMOOTH, false};
+        struct imp_dirs d = {wo, {0}, IMP_SMOOTH, 0};
         struct kind_draw q;
         double detached = 0, attached = 0, stam = 0;
         if (kind_draw(s->b, s->in, u, &d, &q)) {

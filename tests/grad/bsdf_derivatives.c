@@ -43,7 +43,7 @@ static double point_error(const struct imp_bsdf *b, imp_spec *in,
 static struct tally check_case(const struct imp_bsdf *b, enum kind_set set)
 {
     struct tally t = {0};
-    imp_spec in[KINDS_MAX_INPUTS], df[KINDS_MAX_INPUTS];
+    imp_spec in[IMP_INPUTS_MAX], df[IMP_INPUTS_MAX];
     for (int i = 0; i < TRIALS; i++) {
         kind_inputs(b, set, 1000 + (uint64_t)i, in);
         struct imp_dirs d = {kind_direction(i, 5), {0}, IMP_SMOOTH, ~UINT64_C(0)};
@@ -97,7 +97,7 @@ static void visit(const struct kind_case *c, void *payload)
 static bool weight_at(const struct imp_bsdf *b, imp_spec *in, int j, double x,
                       const double u[3], imp_v3 wo, imp_spec *w, imp_v3 *wi)
 {
-    struct imp_dirs d = {wo, {0}, IMP_SMOOTH, false};
+    struct imp_dirs d = {wo, {0}, IMP_SMOOTH, 0};
     struct kind_draw s;
     const imp_spec old = in[j];
     in[j] = imp__spec(x);
@@ -112,7 +112,7 @@ static void visit_attached(const struct kind_case *c, void *payload)
 {
     const struct imp_bsdf *b = &c->bsdf;
     int *offered = payload;
-    imp_spec in[KINDS_MAX_INPUTS];
+    imp_spec in[IMP_INPUTS_MAX];
     double worst = 0;
     int n = 0;
     if (!b->ops->sample_d) return;
@@ -120,7 +120,7 @@ static void visit_attached(const struct kind_case *c, void *payload)
         kind_inputs(b, KIND_RANDOM, 40 + (uint64_t)i, in);
         const struct imp_key key = imp__key(11, (uint64_t)i, 0);
         const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
-        struct imp_dirs d = {kind_direction(i, 12), {0}, IMP_SMOOTH, false};
+        struct imp_dirs d = {kind_direction(i, 12), {0}, IMP_SMOOTH, 0};
         struct kind_draw s;
         if (!kind_draw(b, in, u, &d, &s)) continue;
         for (int j = 0; j < b->n_in; j++) {

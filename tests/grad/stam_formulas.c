@@ -138,7 +138,7 @@ struct lobe {
 
 static double f_of(const struct lobe *l, imp_v3 wi, imp_v3 wo)
 {
-    const struct imp_dirs d = {wo, wi, IMP_SMOOTH, false};
+    const struct imp_dirs d = {wo, wi, IMP_SMOOTH, 0};
     imp_spec f;
     l->b->ops->eval(l->b, l->in, &d, &f);
     return f[0] / wi[2];

@@ -27,7 +27,7 @@ static void delta_eval(const struct imp_bsdf *b, const imp_spec *in, const struc
     bool seen[128] = {false};
     *sum = imp__spec(0);
     for (int k = 0; k < 200; k++) {
-        struct imp_dirs d = {r->wo, {0}, IMP_SMOOTH, false};
+        struct imp_dirs d = {r->wo, {0}, IMP_SMOOTH, 0};
         const double u[3] = {(k + 0.5) / 200, 0.3, 0.6};
         imp_spec f;
         if (!b->ops->sample(b, in, u, &d) || d.lobe < 0 || seen[d.lobe]) continue;
@@ -49,7 +49,7 @@ static void row_check(const struct imp_bsdf *b, const struct imp_shape *shape,
 {
     imp_spec in[IMP_INPUTS_MAX], f;
     const struct imp_texcoord at = {.uv = {r->uv[0], r->uv[1]}, .shape = shape};
-    const struct imp_dirs d = {r->wo, r->wi, IMP_SMOOTH, false};
+    const struct imp_dirs d = {r->wo, r->wi, IMP_SMOOTH, 0};
     imp__inputs_eval(b->input, b->n_in, &at, in);
     if (delta) delta_eval(b, in, r, &f);
     else if (b->flags & IMP_BSDF_SMOOTH) b->ops->eval(b, in, &d, &f);

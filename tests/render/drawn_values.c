@@ -123,8 +123,7 @@ static void row_check(const struct peer_case *k, const struct imp_bsdf *b, bool 
         if (end == p) break;
     }
     imp__inputs_eval(b->input, b->n_in, &at, in);
-    struct imp_dirs d = {
-        imp__normalize(imp__v3(v[0], v[1], v[2])), {0}, IMP_SMOOTH, false};
+    struct imp_dirs d = {imp__normalize(imp__v3(v[0], v[1], v[2])), {0}, IMP_SMOOTH, 0};
     if (draw && n == 9) {
         const double u[3] = {share > 0 ? 0.99 : v[3], v[4], v[5]};
         const bool drawn = b->ops->sample(b, in, u, &d);

@@ -28,9 +28,9 @@ static double index_ratio(const struct imp_bsdf *b, const imp_spec *in,
 static double value(imp_v3 w, void *payload)
 {
     const struct point *p = payload;
-    struct imp_dirs d = {p->fixed, w, IMP_SMOOTH, false};
+    struct imp_dirs d = {p->fixed, w, IMP_SMOOTH, 0};
     imp_spec f;
-    if (p->from_light) d = (struct imp_dirs){w, p->fixed, IMP_SMOOTH, false};
+    if (p->from_light) d = (struct imp_dirs){w, p->fixed, IMP_SMOOTH, 0};
     p->b->ops->eval(p->b, p->in, &d, &f);
     /* Power: radiance that passes a refraction is divided by the squared index ratio. */
     const double e = index_ratio(p->b, p->in, &d);
@@ -56,9 +56,9 @@ static void albedo_visit(const struct kind_case *c, void *payload)
     struct tap_stat z = {0};
     (void)payload;
     for (int i = 0; i < 8; i++) {
-        imp_spec in[KINDS_MAX_INPUTS];
+        imp_spec in[IMP_INPUTS_MAX];
         kind_inputs(b, KIND_RANDOM, 70 + (uint64_t)i, in);
-        struct imp_dirs d = {kind_direction(i, 31), {0}, IMP_SMOOTH, false};
+        struct imp_dirs d = {kind_direction(i, 31), {0}, IMP_SMOOTH, 0};
         const imp_v3 wo = d.wo;
         struct kind_draw s;
         /* One reflectance at a time is 1 and the others are 0: the lobes one by one. */
@@ -130,7 +130,7 @@ static void principled_visit(const struct kind_case *c, void *payload)
     const bool thin = strcmp(c->kind, "principledthin") == 0;
     const bool glass = b->flags & IMP_BSDF_TRANSMIT;
     for (int i = 0; i < 16; i++) {
-        imp_spec in[KINDS_MAX_INPUTS];
+        imp_spec in[IMP_INPUTS_MAX];
         const bool metal = !glass || (i % 2 == 0 && !thin);
         kind_inputs(b, KIND_RANDOM, 170 + (uint64_t)i, in);
         for (int j = 0; j < b->n_in; j++) {
@@ -167,15 +167,14 @@ static void reciprocity_visit(const struct kind_case *c, void *payload)
     /* Light that comes through two-sided glass has seen another material. */
     if (strcmp(c->kind, "twosided") == 0 && b->flags & IMP_BSDF_TRANSMIT) return;
     for (int i = 0; i < 400; i++) {
-        imp_spec in[KINDS_MAX_INPUTS], f, g;
+        imp_spec in[IMP_INPUTS_MAX], f, g;
         kind_inputs(b, KIND_RANDOM, 70 + (uint64_t)i, in);
         const imp_v3 wo = kind_direction(i, 31);
         imp_v3 wi = kind_direction(i, 32);
         if (i % 4 < 2) wi = imp__v3(-wo[0] + 0.1 * wi[0], -wo[1] + 0.1 * wi[1], wo[2]);
         if (i % 8 > 4 && b->flags & IMP_BSDF_TRANSMIT) wi[2] = -wi[2];
         wi = imp__normalize(wi);
-        const struct imp_dirs d = {wo, wi, IMP_SMOOTH, false},
-                              e = {wi, wo, IMP_SMOOTH, false};
+        const struct imp_dirs d = {wo, wi, IMP_SMOOTH, 0}, e = {wi, wo, IMP_SMOOTH, 0};
         b->ops->eval(b, in, &d, &f);
         b->ops->eval(b, in, &e, &g);
         for (int l = 0; l < 3; l++) {

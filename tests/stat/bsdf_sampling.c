@@ -17,7 +17,7 @@ static double level; /* of one chi-square, so that all together fail 1 % (Sidak)
 
 struct point {
     const struct imp_bsdf *b;
-    imp_spec in[KINDS_MAX_INPUTS];
+    imp_spec in[IMP_INPUTS_MAX];
     imp_v3 wo;
     struct imp_dirs lobe[IMP_DRAWS_LOBES]; /* as drawn */
     long draws;

@@ -61,7 +61,7 @@ struct point {
 static double value(imp_v3 wi, void *payload)
 {
     const struct point *p = payload;
-    const struct imp_dirs d = {p->wo, wi, IMP_SMOOTH, false};
+    const struct imp_dirs d = {p->wo, wi, IMP_SMOOTH, 0};
     imp_spec f;
     p->b->ops->eval(p->b, p->in, &d, &f);
     return f[1];
@@ -92,7 +92,7 @@ static void furnace(double m, double n, double sigma)
         for (uint32_t i = 0; i < 500 && sigma == 0; i++) {
             const struct imp_key key = imp__key(7, (uint64_t)k, i);
             const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
-            struct imp_dirs d = {wo, {0}, IMP_SMOOTH, false};
+            struct imp_dirs d = {wo, {0}, IMP_SMOOTH, 0};
             if (!b->ops->sample(b, in, u, &d)) weight = INFINITY;
             b->ops->eval(b, in, &d, &f);
             in[4] = imp__spec(0); /* of all lanes: chances are the lobes' parts */

@@ -81,7 +81,7 @@ struct point {
 static double table_value(imp_v3 wi, void *payload)
 {
     const struct point *p = payload;
-    const struct imp_dirs d = {p->wo, wi, IMP_SMOOTH, false};
+    const struct imp_dirs d = {p->wo, wi, IMP_SMOOTH, 0};
     imp_spec f;
     p->b->ops->eval(p->b, p->in, &d, &f);
     return f[0];
@@ -122,7 +122,7 @@ static void model(int k)
     for (uint32_t i = 0; i < 20000; i++) {
         const imp_v3 wo = upwards(1, i), wi = upwards(2, i);
         double rho[3];
-        const struct imp_dirs d = {wo, wi, IMP_SMOOTH, false};
+        const struct imp_dirs d = {wo, wi, IMP_SMOOTH, 0};
         merl_model_rho(m, wo, wi, rho);
         b->ops->eval(b, in, &d, &f);
         const double range = range_in_cell(t, m, wo, wi);
@@ -136,7 +136,7 @@ static void model(int k)
                         &wi);
         if (!(wo[2] > 0 && wi[2] > 0)) continue;
         merl_model_rho(m, wo, wi, rho);
-        const struct imp_dirs d = {wo, wi, IMP_SMOOTH, false};
+        const struct imp_dirs d = {wo, wi, IMP_SMOOTH, 0};
         b->ops->eval(b, in, &d, &f);
         for (int c = 0; c < 3; c++)
             middle = fmax(middle, fabs(f[c] / wi[2] / rho[c] - 1));
@@ -156,7 +156,7 @@ static void model(int k)
         for (uint32_t i = 0; i < 60000; i++) {
             const struct imp_key key = imp__key(7, (uint64_t)angle, i);
             const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
-            struct imp_dirs d = {p.wo, {0}, IMP_SMOOTH, false};
+            struct imp_dirs d = {p.wo, {0}, IMP_SMOOTH, 0};
             double value = 0;
             if (b->ops->sample(b, in, u, &d)) {
                 b->ops->eval(b, in, &d, &f);

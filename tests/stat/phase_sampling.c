@@ -61,7 +61,7 @@ static void check(const struct imp_phase *p, uint64_t stream, const char *name)
             total += pdf * area;
             expected[z / FINE * NPHI + k / 16] += pdf * area * DRAWS;
             if (k % 37 == 0 && z % 11 == 0) {
-                const struct imp_dirs back = {d.wi, d.wo, IMP_SMOOTH, false};
+                const struct imp_dirs back = {d.wi, d.wo, IMP_SMOOTH, 0};
                 imp_spec g;
                 p->ops->eval(p, in, &back, &g);
                 asymmetry = fmax(asymmetry, fabs(g[1] - f[1]) / f[1]);

@@ -77,7 +77,7 @@ static void normals(void)
 
 struct point {
     const struct imp_bsdf *b;
-    imp_spec in[KINDS_MAX_INPUTS];
+    imp_spec in[IMP_INPUTS_MAX];
     imp_v3 wo;
 };
 static double density(imp_v3 wi, void *payload)

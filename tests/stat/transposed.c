@@ -19,7 +19,7 @@ struct point {
 static double kernel(imp_v3 w, void *payload)
 {
     const struct point *p = payload;
-    const struct imp_dirs d = {w, p->wi, IMP_SMOOTH, false};
+    const struct imp_dirs d = {w, p->wi, IMP_SMOOTH, 0};
     imp_spec f;
     p->b->ops->eval(p->b, p->in, &d, &f);
     return f[0] * fabs(w[2] / p->wi[2]);
@@ -39,7 +39,7 @@ static void smooth_visit(const struct kind_case *c, void *payload)
      * through the one in front. */
     if (strcmp(c->kind, "twosided") == 0 && b->flags & IMP_BSDF_TRANSMIT) return;
     for (int i = 0; i < 6; i++) {
-        imp_spec in[KINDS_MAX_INPUTS];
+        imp_spec in[IMP_INPUTS_MAX];
         kind_inputs(b, KIND_RANDOM, 300 + (uint64_t)i, in);
         struct point p = {b, in, kind_direction(i, 77)};
         const double whole =

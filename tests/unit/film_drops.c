@@ -97,8 +97,11 @@ static double lobes_eval(const struct imp_filter *f, double x)
     x = fabs(x);
     return x < 1 ? 1 + x * x * (1.5 * x - 2.5) : 2 + x * (-4 + x * (2.5 - 0.5 * x));
 }
-static const struct imp_filter_ops lobes = {sizeof lobes, "lobes", 1, lobes_build,
-                                            lobes_eval};
+static const struct imp_filter_ops lobes = {.size = sizeof lobes,
+                                            .name = "lobes",
+                                            .object_size = 1,
+                                            .build = lobes_build,
+                                            .eval = lobes_eval};
 
 /* Values that a float holds, and a pixel between them that it does not: weights of both
  * signs can add up to next to nothing. */

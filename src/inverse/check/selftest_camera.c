@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Cameras: the rays of a whole film, its corners and the lens' too. */
+#include "kind/cleared.h"
 #include "selftest.h"
 
 static enum imp_status camera(struct imp__selftest *t, const struct imp_sensor *s)
@@ -19,7 +20,8 @@ static enum imp_status camera(struct imp__selftest *t, const struct imp_sensor *
         }
         const double px = f->crop_x + x[0] * f->crop_w, py = f->crop_y + x[1] * f->crop_h;
         struct imp_sensor_ray ray[3];
-        for (int i = 0; i < 3; i++) s->ops->ray(s, px + i * h, py - i * h, lens, &ray[i]);
+        for (int i = 0; i < 3; i++)
+            imp__sensor_ray(s, px + i * h, py - i * h, lens, &ray[i]);
         n++;
         bool sane = ray[0].t_near >= 0 && ray[0].t_near < ray[0].t_far;
         for (int c = 0; c < 3; c++)

@@ -9,6 +9,7 @@
  * the mirror direction; those that fall behind the horizon are lost. */
 #include "kind/build.h"
 #include "lambert.h"
+#include <importon/lobes.h>
 
 enum { DIFFUSE, SPECULAR, EXPONENT, N_INPUTS };
 
@@ -56,7 +57,7 @@ static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp
     const double n = in[EXPONENT][0], t = mirror_dot(d);
     (void)b;
     if (!imp__front(d)) return 0;
-    return 0.5 * imp__lambert(d) + (t > 0 ? 0.5 * (n + 1) / IMP_2PI * pow(t, n) : 0);
+    return 0.5 * imp__lambert(d) + 0.5 * imp_lobe_pdf(n, t);
 }
 
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
@@ -67,11 +68,8 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
     if (u[0] < 0.5) {
         if (!imp__lambert_sample(&u[1], d)) return false;
     } else {
-        const double t = pow(1 - u[1], 1 / (in[EXPONENT][0] + 1)), phi = IMP_2PI * u[2];
-        const double r = sqrt(fmax(0, 1 - t * t));
-        const struct imp_frame mirror =
-            imp__frame_from_normal(imp__v3(-d->wo[0], -d->wo[1], d->wo[2]));
-        d->wi = imp__to_world(&mirror, imp__v3(r * cos(phi), r * sin(phi), t));
+        const imp_v3 mirror = imp__v3(-d->wo[0], -d->wo[1], d->wo[2]);
+        imp_lobe_sample(&mirror, in[EXPONENT][0], u + 1, &d->wi);
         d->lobe = IMP_SMOOTH;
         if (!(d->wi[2] > 0)) return false;
     }

@@ -70,7 +70,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
                                "cutoff_angle = %g: a spot with a texture needs less than "
                                "90 degrees",
                                e->input[CUTOFF]->value[0]);
-    if (imp__input_jumps(e->input[TEXTURE])) e->fixed = 1u << CUTOFF;
+    if (imp__input_jumps(e->input[TEXTURE])) e->fixed = UINT64_C(1) << CUTOFF;
     return imp__light_frame_read(b, self);
 }
 

@@ -2,6 +2,7 @@
  *
  * Both walks of a sample note the densities of their vertices as they are decided. */
 #include "both_density.h"
+#include "kind/cleared.h"
 #include <string.h>
 
 /* ---- Ends ------------------------------------------------------------------------ */
@@ -136,7 +137,7 @@ bool imp__both_eye_arrives(struct imp_step *s, const struct imp_surface *at)
     }
     const double u[4] = {b->lens[0], b->lens[1], 0, 0};
     struct imp_sensor_sample to;
-    b->sees = sensor->ops->connect(sensor, &end->p, end->far, u, &to);
+    b->sees = imp__sensor_connect(sensor, &end->p, end->far, u, &to);
     if (b->sees) end->own = imp__end_arrives_from_sensor(b, to.weight, end, s->d);
     return true;
 }

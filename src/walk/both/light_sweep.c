@@ -74,12 +74,12 @@ static void joint_enter(const struct joints *j, struct imp_joint *joint, imp_spe
 static struct imp_dirs dirs_y(const struct imp_joint *j)
 {
     return (struct imp_dirs){imp__decided_v3(j->y->d.wo), imp__decided_v3(j->wi),
-                             IMP_SMOOTH, false};
+                             IMP_SMOOTH, 0};
 }
 static struct imp_dirs dirs_z(const struct imp_joint *j)
 {
     return (struct imp_dirs){imp__decided_v3(j->wo), imp__decided_v3(j->z->d.wi),
-                             IMP_SMOOTH, false};
+                             IMP_SMOOTH, 0};
 }
 
 /* ---- Pieces of a joint --------------------------------------------------------------- */

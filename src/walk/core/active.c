@@ -31,15 +31,15 @@ uint64_t imp__inputs_depend(const struct imp_bsdf *b, const uint8_t *chosen)
 
 /* Inputs of the medium that need not be looked up for derivatives by its extinction: where
  * one input alone is active, itself. */
-static uint32_t medium_unseen(const struct imp_medium *m, const uint8_t *chosen)
+static uint64_t medium_unseen(const struct imp_medium *m, const uint8_t *chosen)
 {
-    uint32_t only = 0;
+    uint64_t only = 0;
     for (int k = 0; k < m->n_own; k++) {
         const unsigned flags = m->ops->inputs[k].flags;
         if (!imp__input_depends(m->input[k], chosen)) continue;
         if (!(flags & IMP_INPUT_EXTINCTION)) continue;
         if (only || !(flags & IMP_INPUT_AFFINE)) return 0;
-        only = UINT32_C(1) << k;
+        only = UINT64_C(1) << k;
     }
     return only;
 }

@@ -29,7 +29,7 @@ struct imp_active {
     uint8_t *emitter; /* [n_emitters] */
     uint8_t *body;    /* [n_bodies]; NULL: none of them */
     uint8_t *medium;  /* [n_media] does its extinction; NULL: none of them */
-    uint32_t *unseen; /* [n_media] inputs, by bits, that derivatives with respect to its
+    uint64_t *unseen; /* [n_media] inputs, by bits, that derivatives with respect to its
                          extinction do without; NULL with medium */
 };
 /* Where in x number e of an active parameter is. */

@@ -47,9 +47,9 @@ static inline struct imp_dirs imp__light_dirs(const struct imp_vertex *v)
 {
     if (imp_unlikely(v->d.from_light))
         return (struct imp_dirs){imp__decided_v3(v->d.light.wi), imp__decided_v3(v->d.wi),
-                                 IMP_SMOOTH, false};
+                                 IMP_SMOOTH, 0};
     return (struct imp_dirs){imp__vertex_wo(v), imp__decided_v3(v->d.light.wi),
-                             IMP_SMOOTH, false};
+                             IMP_SMOOTH, 0};
 }
 
 #endif

@@ -170,9 +170,8 @@ static void vertex_look(const struct imp_scene *scene, const struct imp_decision
                                   .shape = shape,
                                   .prim = d->located.prim};
     if (v->bsdf) imp__inputs_eval(v->bsdf->input, v->bsdf->n_in, &v->at, v->in);
-    v->on =
-        (struct imp_dirs){imp__decided_v3(d->wo), imp__decided_v3(d->wi), d->lobe, false};
-    v->lit = (struct imp_dirs){v->on.wo, imp__decided_v3(d->light.wi), IMP_SMOOTH, false};
+    v->on = (struct imp_dirs){imp__decided_v3(d->wo), imp__decided_v3(d->wi), d->lobe, 0};
+    v->lit = (struct imp_dirs){v->on.wo, imp__decided_v3(d->light.wi), IMP_SMOOTH, 0};
     if (d->connection == IMP_CONNECTED)
         v->light =
             (struct leaving){imp__light_emission(&d->light), imp__decided_v3(d->light.p)};

@@ -86,7 +86,7 @@ static inline struct imp_dirs imp__reduced_on_dirs(const struct imp_reduced_at_h
 {
     struct imp_reduced_on on;
     memcpy(&on, words, sizeof on);
-    return (struct imp_dirs){m->wo, imp__decided_v3(on.wi), on.lobe, false};
+    return (struct imp_dirs){m->wo, imp__decided_v3(on.wi), on.lobe, 0};
 }
 /* Towards the light of a term that is lit. */
 static inline struct imp_dirs imp__reduced_lit_dirs(const struct imp_reduced_at_hand *m,
@@ -94,7 +94,7 @@ static inline struct imp_dirs imp__reduced_lit_dirs(const struct imp_reduced_at_
 {
     float wi[3];
     memcpy(wi, words, sizeof wi);
-    return (struct imp_dirs){m->wo, imp__decided_v3(wi), IMP_SMOOTH, false};
+    return (struct imp_dirs){m->wo, imp__decided_v3(wi), IMP_SMOOTH, 0};
 }
 
 /* A term without the material at hand: c, times what it is a term of. kind: the op's, constant

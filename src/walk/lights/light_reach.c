@@ -3,6 +3,7 @@
  * How a walk from a light reaches the sensor: its vertices are connected to a point of
  * the sensor, or meet its surface. Of both ways, weights of MIS (Veach 1997, 9.2). */
 #include "kind/bsdf/transport.h"
+#include "kind/cleared.h"
 #include "walk/both/both.h"
 
 static void reach_add(struct imp_light_step *w, struct imp_vertex *v, bool met, double px,
@@ -178,8 +179,7 @@ bool imp__light_link_draw(struct imp_step *s, const struct imp_vertex *v,
     if (!sensor->ops->connect || (i->hide_emitters && v->shape && v->shape->emitter >= 0))
         return false;
     imp__light_sensor_numbers(s, u);
-    link->sensor.located.prim = -1;
-    return sensor->ops->connect(sensor, &at->p, false, u, &link->sensor) &&
+    return imp__sensor_connect(sensor, &at->p, false, u, &link->sensor) &&
            imp__light_on_film(sensor, &link->sensor);
 }
 

@@ -2,6 +2,7 @@
  *
  * Vertex 0 of a walk from a light: which light sends it, from where, and whither. The
  * point itself may be seen by the sensor, too. */
+#include "kind/cleared.h"
 #include "scene/located.h"
 #include "scene/media_around.h"
 #include "walk/both/both.h"
@@ -94,7 +95,7 @@ static bool itself_draw(const struct imp_step *s, const struct sent *l, struct i
     const imp_v3 ref = l->far ? -start->d : start->p;
     double u[4];
     imp__light_sensor_numbers(s, u);
-    if (!sensor->ops->connect(sensor, &ref, l->far, u, &x->to) ||
+    if (!imp__sensor_connect(sensor, &ref, l->far, u, &x->to) ||
         !imp__light_on_film(sensor, &x->to))
         return false;
     const bool surface = !l->far && l->surface;
@@ -219,7 +220,7 @@ static bool light_draw(struct imp_light_step *w, struct sent *l)
     double on_point = 1, on_direction = 1;
     if (imp_unlikely(guide != NULL))
         on_direction = imp__guided_emit(s, l->light, u, &on_point);
-    if (!(l->pmf > 0) || !l->e->ops->sample_emission(l->e, &scene->ball, u, start))
+    if (!(l->pmf > 0) || !imp__emission_sample(l->e, &scene->ball, u, start))
         return false;
     start->pdf_p *= on_point;
     start->pdf_d *= on_direction;

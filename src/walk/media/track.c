@@ -29,7 +29,7 @@ imp_spec imp__extinction_at(const struct imp_medium *m, imp_v3 p,
 void imp__seen_inputs(const struct imp_tracer *tracer, const struct imp_medium *m,
                       const struct imp_texcoord *at, imp_spec *in)
 {
-    const uint32_t unseen = tracer->active->unseen[m->index];
+    const uint64_t unseen = tracer->active->unseen[m->index];
     for (int j = 0; j < m->n_own; j++)
         if (unseen >> j & 1) in[j] = (imp_spec){0};
         else imp__inputs_eval(&m->input[j], 1, at, &in[j]);

@@ -80,9 +80,9 @@ decided_values(const struct imp_scene *scene, const struct decided *v,
     if (d->connection == IMP_CONNECTED) {
         const struct imp_emission to = imp__light_emission(&d->light);
         const imp_v3 wi = imp__decided_v3(d->light.wi);
-        struct imp_dirs dirs = {p->dirs.wo, wi, IMP_SMOOTH, false};
+        struct imp_dirs dirs = {p->dirs.wo, wi, IMP_SMOOTH, 0};
         if (imp_unlikely(d->from_light))
-            dirs = (struct imp_dirs){wi, imp__decided_v3(d->wi), IMP_SMOOTH, false};
+            dirs = (struct imp_dirs){wi, imp__decided_v3(d->wi), IMP_SMOOTH, 0};
         if (imp_likely(!light)) imp__bsdf_eval(b, v->carried, in, &dirs, &x->light_f);
         else x->light_f = imp__spec(1);
         x->light_e = imp_unlikely(d->light.emitter < 0)

@@ -3,6 +3,7 @@
  * One walk from a sensor, from its number to its radiance: key, film position, ray, time
  * and wavelengths; its steps (trace.c); the fold. */
 #include "first_segment.h"
+#include "kind/cleared.h"
 #include "meter.h"
 #include "walk/media/probe.h"
 #include <float.h>
@@ -83,7 +84,7 @@ walk_begin(const struct imp_tracer *tracer, int x, int y, int64_t sample,
     position(tracer, walk, x, y, &walk->px, &walk->py);
     lens[0] = imp__start_number(walk->key, walk->point, IMP_DIM_LENS_U);
     lens[1] = imp__start_number(walk->key, walk->point, IMP_DIM_LENS_V);
-    sensor->ops->ray(sensor, walk->px, walk->py, lens, &walk->ray);
+    imp__sensor_ray(sensor, walk->px, walk->py, lens, &walk->ray);
     walk->time = imp__walk_time(tracer, walk);
 }
 

@@ -296,14 +296,8 @@ static void tilted_sample(const struct imp_phase *p, const imp_spec *in,
     (void)p;
     const double b = in[0][0], root = sqrt(0.25 - b * (0.5 - b / 4 - u[1]));
     const double c = b == 0 ? 2 * u[1] - 1 : (root - 0.5) / (b / 2);
-    const double turn = fmin(fmax(c, -1), 1);
-    const imp_v3 w = -d->wo;
-    imp_v3 s = fabs(w[0]) > 0.5 ? (imp_v3){-w[1], w[0], 0} : (imp_v3){0, -w[2], w[1]};
-    s *= 1 / sqrt(imp_v3_dot(&s, &s));
-    const imp_v3 t = {w[1] * s[2] - w[2] * s[1], w[2] * s[0] - w[0] * s[2],
-                      w[0] * s[1] - w[1] * s[0]};
-    const double out = sqrt(1 - turn * turn), phi = 2 * pi * u[2];
-    d->wi = w * turn + (s * cos(phi) + t * sin(phi)) * out;
+    const imp_v3 along = -d->wo;
+    imp_about(&along, fmin(fmax(c, -1), 1), u[2], &d->wi);
 }
 static const struct imp_phase_ops tilted = {.size = sizeof(struct imp_phase_ops),
                                             .name = "tilted",
@@ -348,6 +342,12 @@ static const struct imp_medium_ops haze = {.size = sizeof(struct imp_medium_ops)
                                            .eval = haze_eval,
                                            .eval_d = haze_eval_d};
 
+/* ---- A medium whose extinction falls with its input: that of docs/kinds.md --------- */
+
+#include "mist.c"
+
+static const double contrast = 3.912; /* -ln 0.02 */
+
 /* ---- Scenes -------------------------------------------------------------------- */
 
 enum { W = 8, N = W * W };
@@ -391,6 +391,21 @@ static const char haze_text[] =
     "<float name='a' value='1.5'/></volume><float name='white' value='%g'/>"
     "<phase type='tilted' id='turn'><float name='b' value='.6'/></phase></medium>"
     "</shape></scene>";
+
+/* The same of mist with this visibility and density. */
+static const char mist_text[] =
+    "<scene version='3.0.0'><integrator type='volpath'><integer name='max_depth' "
+    "value='%d'/></integrator>"
+    "<sensor type='orthographic'><transform name='to_world'><scale value='0.1'/>"
+    "<lookat origin='.5,.5,-2' target='.5,.5,0' up='0,1,0'/></transform>"
+    "<film type='hdrfilm'><integer name='width' value='8'/>"
+    "<integer name='height' value='8'/><rfilter type='box'/></film>"
+    "<sampler type='independent'><integer name='sample_count' value='1024'/></sampler>"
+    "</sensor><emitter type='constant'/>"
+    "<shape type='cube'><transform name='to_world'><scale value='.5'/>"
+    "<translate x='.5' y='.5' z='.5'/></transform><bsdf type='null'/>"
+    "<medium type='mist' id='fog' name='interior'>%s%s<float name='albedo' value='%g'/>"
+    "</medium></shape></scene>";
 
 /* Mean of red and its derivatives by the first number of each parameter, within 4
  * standard errors. */
@@ -439,6 +454,74 @@ static void compare(imp_scene *scene, const char *what, double value, size_t n_a
     imp_film_destroy(film);
 }
 
+/* What passes a length of 1: T = exp(-3.912 d/V), dT/dV = 3.912 d T/V^2; and white mist
+ * before a sky of 1, which is 1 for every V. */
+static void falling(imp_context *ctx, const char *density, double d, const char *what)
+{
+    static const char *const by[] = {"fog.visibility.value"};
+    const double V = 4, T = exp(-contrast * d / V);
+    char text[2048];
+    imp_scene *scene = NULL;
+    for (int white = 0; white < 2; white++) {
+        snprintf(text, sizeof text, mist_text, white ? -1 : 1,
+                 "<float name='visibility' value='4'/>", density, (double)white);
+        enum imp_status st =
+            imp_scene_load_string(ctx, text, strlen(text), "mist.xml", NULL, &scene);
+        ok(st == IMP_OK, imp_last_error(ctx));
+        if (st == IMP_OK)
+            compare(scene, what, white ? 1 : T, 1, 1, by,
+                    (double[]){white ? 0 : contrast * d * T / (V * V)});
+        const struct imp_selftest_row *row;
+        size_t n;
+        if (st == IMP_OK) st = imp_selftest(scene, IMP_SELFTEST_MEDIUM, NULL, &row, &n);
+        ok(st == IMP_OK && n > 0, "selftest of mist");
+        for (size_t k = 0; st == IMP_OK && k < n; k++) {
+            snprintf(text, sizeof text, "%s: selftest %s, %g", what, row[k].contract,
+                     row[k].error);
+            ok(row[k].ok == 1, text);
+        }
+        imp_scene_destroy(scene);
+    }
+}
+
+/* Mist that does not say that it falls may have a volume for its visibility: its bounds are
+ * too low, which selftest sees. */
+static void falling_unsaid(imp_context *ctx)
+{
+    char text[2048];
+    imp_scene *scene = NULL;
+    const struct imp_selftest_row *row;
+    size_t n;
+    bool seen_low = false;
+    snprintf(
+        text, sizeof text, mist_text, 1,
+        "<volume type='layers' name='visibility'><float name='a' value='3'/></volume>",
+        "", 1.);
+    memcpy(strstr(text, "'mist'"), "'blur'", 6);
+    enum imp_status st =
+        imp_scene_load_string(ctx, text, strlen(text), "blur.xml", NULL, &scene);
+    ok(st == IMP_OK, imp_last_error(ctx));
+    if (st == IMP_OK) st = imp_selftest(scene, IMP_SELFTEST_MEDIUM, NULL, &row, &n);
+    for (size_t k = 0; st == IMP_OK && k < n; k++)
+        seen_low |= strcmp(row[k].contract, "bounded") == 0 && row[k].ok == 0;
+    ok(seen_low, "an extinction that falls and does not say so is above its bound");
+    imp_scene_destroy(scene);
+}
+
+static void falling_not(imp_context *ctx)
+{
+    char text[2048];
+    imp_scene *scene = NULL;
+    snprintf(
+        text, sizeof text, mist_text, 1,
+        "<texture type='ramp' name='visibility'><float name='a' value='1'/></texture>",
+        "", 1.);
+    const enum imp_status st =
+        imp_scene_load_string(ctx, text, strlen(text), "mist.xml", NULL, &scene);
+    ok(st == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "no known lower bound"),
+       imp_last_error(ctx));
+}
+
 static void refused(imp_context *ctx, enum imp_status st, const char *message)
 {
     char text[400];
@@ -446,10 +529,79 @@ static void refused(imp_context *ctx, enum imp_status st, const char *message)
     ok(st == IMP_E_ARG && strstr(imp_last_error(ctx), message), text);
 }
 
+/* The layout of another header: `change` in the size of the struct. */
+static enum imp_status of_another(imp_context *ctx, const char *name, int change,
+                                  int version)
+{
+    const struct imp_kinds_layout *here = imp_kinds_of_library();
+    struct imp_struct_size sizes[64];
+    const struct imp_kinds_layout there = {version, here->n, sizes};
+    bool found = false;
+    for (int i = 0; i < here->n; i++) {
+        sizes[i] = here->structs[i];
+        if (strcmp(sizes[i].name, name) != 0) continue;
+        sizes[i].size += (size_t)change;
+        found = true;
+    }
+    ok(found || version != IMP_KINDS_VERSION, name);
+    return imp_register_kind(ctx, IMP_CONCEPT_BSDF, &minnaert, &there);
+}
+
+static void layouts(void)
+{
+    static const char *const grow[] = {
+        "imp_ball",    "imp_bsdf",   "imp_emission",   "imp_emission_sample",
+        "imp_emitter", "imp_input",  "imp_medium",     "imp_phase",
+        "imp_round",   "imp_sensor", "imp_sensor_ray", "imp_sensor_sample",
+        "imp_shape",   "imp_texture"};
+    static const char *const stay[] = {
+        "imp_attribute", "imp_carried",         "imp_coefficients", "imp_curves",
+        "imp_dirs",      "imp_emitter_profile", "imp_film_desc",    "imp_filter",
+        "imp_hit",       "imp_input_desc",      "imp_light_sample", "imp_located",
+        "imp_sink",      "imp_surface",         "imp_texcoord",     "imp_triangles"};
+    const int version = IMP_KINDS_VERSION;
+    char text[200];
+    imp_context *ctx;
+    for (int i = 0; i < 14; i++) {
+        if (imp_context_create(NULL, &ctx) != IMP_OK) return;
+        snprintf(text, sizeof text, "layout: struct %s has ", grow[i]);
+        refused(ctx, of_another(ctx, grow[i], 8, version), text);
+        ok(of_another(ctx, grow[i], -8, version) == IMP_OK, grow[i]);
+        imp_context_destroy(ctx);
+    }
+    if (imp_context_create(NULL, &ctx) != IMP_OK) return;
+    for (int i = 0; i < 16; i++)
+        for (int change = -8; change <= 8; change += 16) {
+            snprintf(text, sizeof text, "layout: struct %s has ", stay[i]);
+            refused(ctx, of_another(ctx, stay[i], change, version), text);
+        }
+    snprintf(text, sizeof text, "of version %d, and this library with version %d",
+             version + 1, version);
+    refused(ctx, of_another(ctx, "", 0, version + 1), text);
+    refused(ctx, of_another(ctx, "imp_surface", 8, version + 1), text);
+    struct imp_struct_size unknown = {"imp_later", 8};
+    struct imp_kinds_layout there = {version, 1, &unknown};
+    refused(ctx, imp_register_kind(ctx, IMP_CONCEPT_BSDF, &minnaert, &there),
+            "struct imp_later has 8 bytes there and 0 here");
+    unknown.name = NULL;
+    refused(ctx, imp_register_kind(ctx, IMP_CONCEPT_BSDF, &minnaert, &there),
+            "struct 0 has no name");
+    there.n = 0;
+    refused(ctx, imp_register_kind(ctx, IMP_CONCEPT_BSDF, &minnaert, &there),
+            "layout has no sizes");
+    refused(ctx,
+            imp_register_kind(ctx, (enum imp_concept)99, &minnaert, imp_kinds_here()),
+            "concept is 99");
+    refused(ctx, imp_register_kind(ctx, IMP_CONCEPT_BSDF, &minnaert, NULL),
+            "layout is NULL");
+    imp_context_destroy(ctx);
+}
+
 int main(void)
 {
     imp_context *ctx, *other;
     imp_scene *scene;
+    layouts();
     if (imp_context_create(NULL, &ctx) != IMP_OK ||
         imp_context_create(NULL, &other) != IMP_OK)
         return 99;
@@ -486,6 +638,7 @@ int main(void)
     ok(imp_register_volume(ctx, &layers) == IMP_OK, "a volume");
     ok(imp_register_phase(ctx, &tilted) == IMP_OK, "a phase function");
     ok(imp_register_medium(ctx, &haze) == IMP_OK, "a medium");
+    ok(imp_register_medium(ctx, &mist) == IMP_OK, "a medium that thins");
     refused(ctx, imp_register_volume(ctx, &layers), "registered already");
     refused(ctx, imp_register_phase(ctx, &tilted), "registered already");
     refused(ctx, imp_register_medium(ctx, &haze), "registered already");
@@ -495,6 +648,19 @@ int main(void)
     struct imp_medium_ops no_d = haze;
     no_d.eval_d = NULL;
     refused(ctx, imp_register_medium(ctx, &no_d), "has no eval_d");
+    struct imp_medium_ops other_way = mist;
+    struct imp_input_desc falls[] = {mist_inputs[0], {0}};
+    other_way.inputs = falls;
+    falls[0].flags = IMP_INPUT_FALLS;
+    refused(ctx, imp_register_medium(ctx, &other_way), "IMP_INPUT_FALLS goes with");
+    falls[0].flags = IMP_INPUT_FALLS | IMP_INPUT_EXTINCTION | IMP_INPUT_VOLUME;
+    refused(ctx, imp_register_medium(ctx, &other_way), "IMP_INPUT_FALLS goes with");
+    other_way.name = "blur";
+    struct imp_input_desc unsaid[] = {
+        mist_inputs[0], mist_inputs[1], mist_inputs[2], {0}};
+    other_way.inputs = unsaid;
+    unsaid[0].flags = IMP_INPUT_EXTINCTION | IMP_INPUT_VOLUME;
+    ok(imp_register_medium(ctx, &other_way) == IMP_OK, "mist that does not say it falls");
     struct imp_texture_ops t = ramp;
     struct imp_input_desc two[] = {blend_inputs[0], blend_inputs[0], {0}};
     t.inputs = two;
@@ -576,6 +742,13 @@ int main(void)
     if (st == IMP_OK)
         compare(scene, "own phase function", 1, 2, 2, numbers, (double[]){0, 0});
     imp_scene_destroy(scene);
+
+    falling(ctx, "", 1, "mist, the same everywhere");
+    falling(ctx,
+            "<volume type='layers' name='density'><float name='a' value='3'/></volume>",
+            1.5, "mist in layers");
+    falling_not(ctx);
+    falling_unsaid(ctx);
 
     st = load(ctx, "", "<float name='gain' value='-1'/>", &scene);
     ok(st == IMP_E_SCENE && strstr(imp_last_error(ctx), "plate.xml:1:") &&

@@ -7,6 +7,7 @@ DESTDIR=$OUT/root meson install -C "$BUILD" --no-rebuild --quiet >/dev/null || e
 header=$(find "$OUT/root" -name kinds.h)
 prefix=${header%/include/importon/kinds.h}
 cp "$prefix/share/doc/importon/examples/own_material.c" "$ROOT/tests/cli/package/plugin.c" . || exit 9
+awk '/^```c$/ { n++; on = n == 2; next } /^```/ { on = 0 } on' "$ROOT/docs/kinds.md" >mist.c
 for level in x86-64 x86-64-v3; do # the library's own build need not be the plug-in's
     case $(uname -m) in x86_64) arch=-march=$level ;; *) arch= ;; esac
     [[ $level == x86-64-v3 ]] && ! grep -qw avx2 /proc/cpuinfo && continue
@@ -15,5 +16,5 @@ for level in x86-64 x86-64-v3; do # the library's own build need not be the plug
     "./plugin-$level" | grep -vE '^ok|^1\.\.'
 done
 # A vector by value would be an interface that depends on those flags.
-grep -vE '^ +imp_v3 [a-z_, ]+;' "$header" | grep -E '(imp_spec|imp_v3) +\w+ *[,)]|^(imp_spec|imp_v3) +\w+\('
+grep -hvE '^ +imp_v3 [a-z_, ]+;' "$header" "${header%kinds.h}lobes.h" | grep -E '(imp_spec|imp_v3) +\w+ *[,)]|^(imp_spec|imp_v3) +\w+\('
 true
