@@ -42,15 +42,11 @@ struct imp_field_grid {
     enum imp_field_param param;
     int cells[3];          /**< x, y, z */
     double lo[3], hi[3];   /**< the box the cells fill */
-    int single;            /**< trace with float samples; theta stays double */
+    bool single;           /**< trace with float samples; theta stays double */
     double gladstone_dale; /**< K: samples are densities rho, index 1 + K rho (Gladstone
                                 and Dale); 0: samples are the index */
 };
-#define IMP_FIELD_GRID_INIT                                                              \
-    {                                                                                    \
-        sizeof(struct imp_field_grid), IMP_FIELD_SPLINE, IMP_FIELD_ETA, {0}, {0}, {0},   \
-            0, 0                                                                         \
-    }
+#define IMP_FIELD_GRID_INIT IMP_INIT_ZERO(struct imp_field_grid)
 
 /** A grid with the same index everywhere. theta: [z][y][x] coefficients, cells + 3 along
  * an axis for splines (the first node lies one spacing before lo), cells + 1 for
@@ -73,15 +69,13 @@ IMP_API size_t imp_field_profile_count(const char *kind);
 
 struct imp_field_radial {
     size_t size;
-    int cylinder; /**< 1: r is the distance from an axis; 0: from the centre */
+    bool cylinder; /**< 1: r is the distance from an axis; 0: from the centre */
     double centre[3], axis[3];
     double radius; /**< of the last cell; beyond it the outermost polynomial goes on */
     int cells;     /**< of the cubic spline in r^2: cells + 3 coefficients */
 };
 #define IMP_FIELD_RADIAL_INIT                                                            \
-    {                                                                                    \
-        sizeof(struct imp_field_radial), 0, {0}, {0, 0, 1}, 1, 16                        \
-    }
+    IMP_INIT(struct imp_field_radial, .axis[2] = 1, .radius = 1, .cells = 16)
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_field_radial_create(imp_context *context, const struct imp_field_radial *radial,
                         double index, imp_field **out);
@@ -94,9 +88,8 @@ struct imp_field_rz {
     int cells_r, cells_z; /**< of the cubic spline in r^2 and along the axis */
 };
 #define IMP_FIELD_RZ_INIT                                                                \
-    {                                                                                    \
-        sizeof(struct imp_field_rz), {0}, {0, 0, 1}, 1, -1, 1, 8, 16                     \
-    }
+    IMP_INIT(struct imp_field_rz, .axis[2] = 1, .radius = 1, .lo = -1, .hi = 1,          \
+             .cells_r = 8, .cells_z = 16)
 /** Symmetric about an axis: a tensor cubic spline in r^2 and z. theta:
  * [cells_z + 3][cells_r + 3]. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_rz_create(imp_context *context,
@@ -108,15 +101,12 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_field_get_rz(const imp_field *field,
 #define IMP_FIELD_AXIAL (-1)
 struct imp_field_symmetry {
     size_t size;
-    int mirror[3]; /**< across the middle planes of x, y, z */
-    int axis;      /**< 0, 1, 2: of turns about the middle */
-    int fold;      /**< turns: 2 halves, 4 quarters, IMP_FIELD_AXIAL: nodes at one
+    bool mirror[3]; /**< across the middle planes of x, y, z */
+    int axis;       /**< 0, 1, 2: of turns about the middle */
+    int fold;       /**< turns: 2 halves, 4 quarters, IMP_FIELD_AXIAL: nodes at one
                         distance from the axis are one number; 0: none */
 };
-#define IMP_FIELD_SYMMETRY_INIT                                                          \
-    {                                                                                    \
-        sizeof(struct imp_field_symmetry), {0}, 2, 0                                     \
-    }
+#define IMP_FIELD_SYMMETRY_INIT IMP_INIT(struct imp_field_symmetry, .axis = 2)
 /** A grid that keeps a symmetry: nodes that are taken into each other have one number.
  * Takes the grid over, also on failure; its coefficients become their means. Quarter and
  * all turns need as many cells of one size in both directions. Refining keeps
@@ -157,14 +147,15 @@ IMP_API void imp_field_destroy(imp_field *field);
  * name. */
 IMP_API const char *imp_field_kind(const imp_field *field);
 IMP_API size_t imp_field_n_theta(const imp_field *field);
-IMP_API void imp_field_get_theta(const imp_field *field, double *theta);
+IMP_API enum imp_status imp_field_get_theta(const imp_field *field, double *theta);
 /** @return IMP_OK; IMP_E_ARG if a number is not finite: nothing is set. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_set_theta(imp_field *field,
                                                            const double *theta);
 /** Name of number i, NULL for grids. */
 IMP_API const char *imp_field_param_name(const imp_field *field, size_t i);
 /** The box where the field is defined; infinite for profiles. */
-IMP_API void imp_field_bounds(const imp_field *field, double lo[3], double hi[3]);
+IMP_API enum imp_status imp_field_get_bounds(const imp_field *field, double lo[3],
+                                             double hi[3]);
 /** The grid (of a tied one, too), or IMP_E_ARG if it is not one. Set grid->size first. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_get_grid(const imp_field *field,
                                                           struct imp_field_grid *grid);
@@ -255,16 +246,16 @@ struct imp_bend_surface {
         *scene; /**< of a mesh: committed, its shapes are closed; shared, not copied */
 };
 #define IMP_BEND_SURFACE_INIT                                                            \
-    {                                                                                    \
-        sizeof(struct imp_bend_surface), IMP_BEND_PLANE, IMP_BEND_END, -1, {0, 0, 1}, 0, \
-            {0}, 1, {0}, {0}, 1, 0, 0                                                    \
-    }
+    IMP_INIT(struct imp_bend_surface, .group = -1, .normal[2] = 1, .radius = 1,          \
+             .index = 1)
 
 /** A plane whose crossing is recorded and does not end the ray. */
 struct imp_bend_tap {
+    size_t size;
     double normal[3], offset;
-    int group;
+    int group; /**< as of a surface */
 };
+#define IMP_BEND_TAP_INIT IMP_INIT(struct imp_bend_tap, .normal[2] = 1, .group = -1)
 
 struct imp_bend_options {
     size_t size;
@@ -273,7 +264,7 @@ struct imp_bend_options {
     double step;        /**< in sigma, or in length for arc-length schemes; 0: half a cell
                              (trilinear) or one cell (spline) over the greatest index */
     uint32_t max_steps; /**< a ray that needs more is dropped and counted; 0: 100000 */
-    int outside;        /**< rays start outside the surfaces, in a medium of index
+    bool outside;       /**< rays start outside the surfaces, in a medium of index
                              `outside_index`: they go straight to the first and enter */
     double outside_index; /**< 0: 1 */
     double grazing;       /**< |cos| at the exit below which a ray is dropped; 0: 0.05;
@@ -287,11 +278,7 @@ struct imp_bend_options {
     imp_progress_fn progress;
     void *progress_payload;
 };
-#define IMP_BEND_OPTIONS_INIT                                                            \
-    {                                                                                    \
-        sizeof(struct imp_bend_options), IMP_BEND_LEAPFROG, IMP_BEND_REVERSE, 0, 0, 0,   \
-            0, 0, 0, 0, 0, 0, 0, 0, 0                                                    \
-    }
+#define IMP_BEND_OPTIONS_INIT IMP_INIT_ZERO(struct imp_bend_options)
 
 enum imp_bend_flags { /* flags of an exit; rays with one of DROPPED have no derivative */
                       IMP_BEND_TRUNCATED = 1, /**< more than max_steps */
@@ -334,17 +321,16 @@ struct imp_bend_stats {
     double worst_energy;   /**< max | |v|^2 - eta^2 | / eta^2 at exits */
     double worst_reversal; /**< max |x - x0| / size */
 };
-#define IMP_BEND_STATS_INIT                                                              \
-    {                                                                                    \
-        sizeof(struct imp_bend_stats), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0          \
-    }
+#define IMP_BEND_STATS_INIT IMP_INIT_ZERO(struct imp_bend_stats)
 
 /** Rays: arrays of n. group may be NULL (all 0). Directions need not be unit. */
 struct imp_bend_rays {
+    size_t size;
     size_t n;
     const double (*x)[3], (*d)[3];
     const uint16_t *group;
 };
+#define IMP_BEND_RAYS_INIT IMP_INIT_ZERO(struct imp_bend_rays)
 
 /**
  * Trace. Same bits for any number of threads.
@@ -376,10 +362,7 @@ struct imp_bend_gradient {
                                   radius, 4 index outside; not for box, SDF and mesh */
     double *energy;          /**< [n] K = lam.v + mu.F at the start: 0 up to truncation */
 };
-#define IMP_BEND_GRADIENT_INIT                                                           \
-    {                                                                                    \
-        sizeof(struct imp_bend_gradient), 0, 0, 0, 0, 0                                  \
-    }
+#define IMP_BEND_GRADIENT_INIT IMP_INIT_ZERO(struct imp_bend_gradient)
 
 /** The exact derivative of imp_bend_trace with the same arguments. Dropped rays give
  * nothing. exits, taps as traced; bars [n], tap_bars [n][n_taps] (NULL: zero).
@@ -450,10 +433,7 @@ struct imp_dispersion {
     double coefficient[6];
     double reference; /**< wavelength at which the field is the index */
 };
-#define IMP_DISPERSION_INIT                                                              \
-    {                                                                                    \
-        sizeof(struct imp_dispersion), IMP_CAUCHY, {0}, 0.5875618                        \
-    }
+#define IMP_DISPERSION_INIT IMP_INIT(struct imp_dispersion, .reference = 0.5875618)
 /** The formula. */
 IMP_API double imp_dispersion_index(const struct imp_dispersion *d, double um);
 /** Rays of a bundle have this wavelength: they see the index 1 + k (eta - 1), with
@@ -488,7 +468,7 @@ struct imp_bend_target {
     int bundle;    /**< -1: all rays */
     int tap;       /**< -1: where rays exit; else the tap they cross */
     double weight; /**< 0: 1 */
-    int at_plane;  /**< go on straight, in index `outside`, to normal.x = offset */
+    bool at_plane; /**< go on straight, in index `outside`, to normal.x = offset */
     double normal[3], offset, outside;
     double point[3];
     const double *data;   /**< copied */
@@ -501,10 +481,8 @@ struct imp_bend_target {
     const float *pixels;
 };
 #define IMP_BEND_TARGET_INIT                                                             \
-    {                                                                                    \
-        sizeof(struct imp_bend_target), IMP_BEND_FOCUS, -1, -1, 0, 0, {0, 0, 1}, 0, 1,   \
-            {0}, 0, 0, 0, 0, {0}, {0}, {0}, 0                                            \
-    }
+    IMP_INIT(struct imp_bend_target, .bundle = -1, .tap = -1, .normal[2] = 1,            \
+             .outside = 1)
 /** A plane's normal is turned to look along the rays' first directions. Rays that meet it
  * at a slant (cosine) below 0.05, or go backwards, do not count; between 0.05 and 0.15
  * they count less and less: a smooth weight, differentiated. */
@@ -563,7 +541,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_bend_image(imp_bend *bend, size_t tar
 IMP_API size_t imp_bend_n_targets(const imp_bend *bend);
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_get_target(const imp_bend *bend, size_t i, struct imp_bend_target *target);
-IMP_API void imp_bend_get_rays(const imp_bend *bend, struct imp_bend_rays *rays);
+IMP_API enum imp_status imp_bend_get_rays(const imp_bend *bend,
+                                          struct imp_bend_rays *rays);
 /** The options in use, with the step that rays take. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_get_options(const imp_bend *bend,
                                                             struct imp_bend_options *o);
@@ -580,6 +559,13 @@ struct imp_bend_fit_step {
 typedef int (*imp_bend_fit_step_fn)(const struct imp_bend_fit_step *step, void *payload);
 
 #define IMP_BEND_LEVELS_MAX 8
+/** Does the optimiser's memory of one level serve the next? L-BFGS has its pairs, Adam its
+ * moments, MMA none. */
+enum imp_bend_carry {
+    IMP_BEND_CARRY_AUTO = 0, /**< of L-BFGS alone */
+    IMP_BEND_CARRY_ON = 1,
+    IMP_BEND_CARRY_OFF = -1
+};
 struct imp_bend_fit_options {
     size_t size;
     enum imp_optimizer optimizer;        /**< IMP_LBFGS, IMP_ADAM, IMP_MMA */
@@ -589,20 +575,14 @@ struct imp_bend_fit_options {
     double tolerance;       /**< of `scale`; 0: 1e-6 */
     double scale;           /**< a large change of a number; 0: 0.1 */
     const char *checkpoint; /**< rewritten at every level and every few seconds */
-    int resume;
+    bool resume;
     imp_progress_fn progress;
     void *progress_payload;
-    int carry; /**< what the optimiser learnt at a level, at the next: 1: is carried on
-                    (L-BFGS: pairs, Adam: moments; MMA keeps nothing), -1: is not, 0: of
-                    L-BFGS only */
+    enum imp_bend_carry carry;
     imp_bend_fit_step_fn step; /**< NULL: nobody looks */
     void *step_payload;
 };
-#define IMP_BEND_FIT_OPTIONS_INIT                                                        \
-    {                                                                                    \
-        sizeof(struct imp_bend_fit_options), IMP_LBFGS, 0, {0}, 0, 0, 0, 0, 0, 0, 0, 0,  \
-            0, 0                                                                         \
-    }
+#define IMP_BEND_FIT_OPTIONS_INIT IMP_INIT_ZERO(struct imp_bend_fit_options)
 
 struct imp_bend_fit_result {
     size_t size;

@@ -45,10 +45,7 @@ struct imp_clipped {
                          or nearly */
     size_t against; /**< clipped numbers that count: the scene disagrees */
 };
-#define IMP_CLIPPED_INIT                                                                 \
-    {                                                                                    \
-        sizeof(struct imp_clipped), 0, 0, 0, 0                                           \
-    }
+#define IMP_CLIPPED_INIT IMP_INIT_ZERO(struct imp_clipped)
 /** Set out->size first. @return IMP_OK; IMP_E_ARG. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_get_clipped(const imp_problem *problem,
                                                                struct imp_clipped *out);

@@ -22,21 +22,8 @@
 
 #include <importon/importon.h>
 
-/* An options struct with its size set and every other member zero. */
 #ifdef __cplusplus
-template <class T> inline T imp_elements_sized()
-{
-    T t = T();
-    t.size = sizeof(T);
-    return t;
-}
-#define IMP_ELEMENTS_SIZED(type) imp_elements_sized<type>()
 extern "C" {
-#else
-#define IMP_ELEMENTS_SIZED(type)                                                         \
-    {                                                                                    \
-        .size = sizeof(type)                                                             \
-    }
 #endif
 
 typedef struct imp_elements imp_elements;
@@ -59,7 +46,7 @@ struct imp_elements_source {
         edge_v[3];     /**< plane; its front is along edge_u x edge_v */
     const char *shape; /**< shape: its name */
 };
-#define IMP_ELEMENTS_SOURCE_INIT IMP_ELEMENTS_SIZED(struct imp_elements_source)
+#define IMP_ELEMENTS_SOURCE_INIT IMP_INIT_ZERO(struct imp_elements_source)
 
 /** Reciprocal modified Phong in place of a shape's material, seen from its front:
  * kd/pi + ks (n+2)/(2 pi) max(0, mirror(wi).wo)^n. */
@@ -75,14 +62,14 @@ struct imp_elements_beam {
     double axis[3]; /**< world; all 0: the shape's normal */
     double exponent;
 };
-#define IMP_ELEMENTS_PHONG_INIT IMP_ELEMENTS_SIZED(struct imp_elements_phong)
-#define IMP_ELEMENTS_BEAM_INIT  IMP_ELEMENTS_SIZED(struct imp_elements_beam)
+#define IMP_ELEMENTS_PHONG_INIT IMP_INIT_ZERO(struct imp_elements_phong)
+#define IMP_ELEMENTS_BEAM_INIT  IMP_INIT_ZERO(struct imp_elements_beam)
 
 struct imp_elements_options {
     size_t size;
-    int order;         /**< of the directional basis, 2..12; 0: by the materials */
-    int no_importance; /**< refine by radiance alone (the baseline of 1993) */
-    int sensor;        /**< of the picture that decides when to stop */
+    int order;          /**< of the directional basis, 2..12; 0: by the materials */
+    bool no_importance; /**< refine by radiance alone (the baseline of 1993) */
+    int sensor;         /**< of the picture that decides when to stop */
     int rays;    /**< per side of a pixel's grid; 0: 3 to 24, more in small pictures;
                       to 64 of a meter on a shape */
     double stop; /**< relative change of what is asked for: of the measurements if there
@@ -104,9 +91,9 @@ struct imp_elements_options {
     const struct imp_elements_beam *beams; /**< likewise */
     imp_progress_fn progress;
     void *progress_payload;
-    int picture; /**< beside its sources the sensor's picture decides when to stop */
+    bool picture; /**< beside its sources the sensor's picture decides when to stop */
 };
-#define IMP_ELEMENTS_OPTIONS_INIT IMP_ELEMENTS_SIZED(struct imp_elements_options)
+#define IMP_ELEMENTS_OPTIONS_INIT IMP_INIT_ZERO(struct imp_elements_options)
 
 /**
  * Take the scene's polygons and project its materials. The scene must outlive the result
@@ -128,8 +115,10 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_elements_solve(imp_elements *elements
 /** Read the scene's parameters again and solve on the same links, without refining. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_elements_update(imp_elements *elements);
 
-struct imp_elements_step { /**< one line of the schedule's log */
-    double eps;            /**< absolute */
+/** One line of the schedule's log. */
+struct imp_elements_step {
+    size_t size;
+    double eps; /**< absolute */
     size_t links, elements, leaves;
     int64_t rays;
     double measure;
@@ -173,10 +162,11 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_elements_image(const imp_elements *el
 
 /** One derivative of the measurement. */
 struct imp_elements_row {
+    size_t size;
     const char *name; /**< parameter; of overrides "SHAPE.phong.kd" ... */
     int param;        /**< index in the scene, -1: an override */
     size_t element;   /**< number inside it */
-    int emission;     /**< it scales a light, linearly */
+    bool emission;    /**< it scales a light, linearly */
     double value, derivative;
     double share;       /**< value x derivative / measure; those of emission sum to 1 */
     double share_error; /**< of imp_elements_share_errors, else NaN */
@@ -206,7 +196,7 @@ struct imp_elements_bounds {
     const char *glob;
     double lo, hi;
 };
-#define IMP_ELEMENTS_BOUNDS_INIT IMP_ELEMENTS_SIZED(struct imp_elements_bounds)
+#define IMP_ELEMENTS_BOUNDS_INIT IMP_INIT_ZERO(struct imp_elements_bounds)
 struct imp_elements_fit_options {
     size_t size;
     enum imp_optimizer optimizer; /**< IMP_ADAM, the 0: IMP_LM up to 256 numbers, else
@@ -218,15 +208,16 @@ struct imp_elements_fit_options {
     size_t n_bounds;
     const struct imp_elements_bounds *bounds; /**< each as long as its own `size` */
 };
-#define IMP_ELEMENTS_FIT_OPTIONS_INIT IMP_ELEMENTS_SIZED(struct imp_elements_fit_options)
+#define IMP_ELEMENTS_FIT_OPTIONS_INIT IMP_INIT_ZERO(struct imp_elements_fit_options)
 struct imp_elements_goal {
+    size_t size;
     double target, before, after; /**< a source's measurement, without its weight */
 };
 struct imp_elements_fit_result {
     size_t size;
     int iterations, rounds;
     double objective;
-    int linear; /**< only lights were active: the measurements are linear in x */
+    bool linear; /**< only lights were active: the measurements are linear in x */
     size_t n_goals;
     const struct imp_elements_goal *goals; /**< [n_goals] */
     size_t n;
@@ -263,7 +254,8 @@ imp_elements_fit(imp_elements *elements, imp_problem *problem,
 
 struct imp_elements_guide_options {
     size_t size;
-    int no_lights; /**< light samples, and where walks from the lights begin, as without */
+    bool
+        no_lights; /**< light samples, and where walks from the lights begin, as without */
     double share;  /**< of continuations drawn towards indirect light, or importance, 0 to
                         1 exclusive */
     /** Russian roulette by expected contribution instead of throughput: a walk continues
@@ -272,8 +264,7 @@ struct imp_elements_guide_options {
      * is direct, 4 where little is. */
     double roulette;
 };
-#define IMP_ELEMENTS_GUIDE_OPTIONS_INIT                                                  \
-    IMP_ELEMENTS_SIZED(struct imp_elements_guide_options)
+#define IMP_ELEMENTS_GUIDE_OPTIONS_INIT IMP_INIT_ZERO(struct imp_elements_guide_options)
 /** The solution as a guide for walks: set imp_run.guide. Light samples follow what every
  * light sends to a place; drawing directions by it, or roulette, pays in some scenes only
  * (docs/elements.md) and is off unless asked for. Walks from the lights follow the
@@ -307,7 +298,7 @@ struct imp_elements_element {
     size_t polygon;    /**< of the input; the sides of a two-sided one are two */
     size_t parent;     /**< index of an element, or IMP_ELEMENTS_NO_PARENT */
     int level;         /**< of subdivision, 0: the whole polygon */
-    int leaf;
+    bool leaf;
     int source;  /**< the first source of the options that measures it; -1: none does */
     int corners; /**< 3 or 4 */
     double corner[4][3];  /**< counterclockwise, seen from the front */
@@ -317,14 +308,16 @@ struct imp_elements_element {
     double irradiance[3]; /**< NaN: black and not measured, or covered */
     double illuminance;   /**< luminance of the irradiance */
 };
-#define IMP_ELEMENTS_ELEMENT_INIT IMP_ELEMENTS_SIZED(struct imp_elements_element)
+#define IMP_ELEMENTS_ELEMENT_INIT IMP_INIT_ZERO(struct imp_elements_element)
 /** Element `index`, below imp_elements_info.elements. Strings belong to the scene. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_get_element(const imp_elements *elements, size_t index,
                          struct imp_elements_element *out);
 
-struct imp_elements_arrival { /**< what one link brings */
-    size_t from;              /**< index of the element that sends */
+/** What one link brings. */
+struct imp_elements_arrival {
+    size_t size;
+    size_t from; /**< index of the element that sends */
     double irradiance[3];
     double illuminance;
     double measure; /**< of the measurement: what passes here, radiance x importance */

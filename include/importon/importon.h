@@ -12,21 +12,43 @@
  *     imp_problem_objective   loss, gradient and the standard errors of both
  *     imp_fit                 parameters back from pictures
  *
- * Conventions, for the whole header. Functions that can fail return enum imp_status; the
- * message belongs to the context and the calling thread (imp_last_error) and names the
- * argument. On failure, outputs keep their contents. `destroy(NULL)` does nothing; any
- * other pointer that is NULL, and a number that is not finite, is IMP_E_ARG where nothing
- * else is said. Strings and arrays handed in are copied unless a comment says otherwise;
- * pointers handed out belong to the object and live until it is destroyed or changed.
- * Structs that may grow start with `size`: use their initialisers, or set it before a
- * getter writes; fields that an older caller does not have keep their defaults. Zero in
- * an options struct means the default. Images are [height][width][channels], row 0 at the
- * top. A scene may be used by several threads at once; calls that set its parameters wait
- * for those that read them.
+ * Conventions, for all public headers.
+ *
+ *   Errors     Functions that can fail return enum imp_status; the message belongs to the
+ *              context and the calling thread (imp_last_error) and names the argument. On
+ *              failure, outputs keep their contents. `destroy(NULL)` does nothing; any other
+ *              pointer that is NULL, and a number that is not finite, is IMP_E_ARG where
+ *              nothing else is said. IMP_E_NOMEM is possible wherever something is made.
+ *   Memory     Strings and arrays handed in are copied unless a comment says otherwise;
+ *              pointers handed out belong to the object and live until it is destroyed or
+ *              changed. What the caller has to free is said.
+ *   Threads    A scene may be used by several threads at once; calls that set its parameters
+ *              wait for those that read them. Any other object is used by one thread at a
+ *              time. Results have the same bits on any number of threads.
+ *   Images     [height][width][channels], row 0 at the top, linear.
+ *   Names      imp_OBJECT_n_THINGS counts, imp_OBJECT_get_THING copies to the caller,
+ *              imp_OBJECT_THING returns a value or what belongs to the object,
+ *              imp_OBJECT_set_THING changes it. `bool` is a yes or no; an int has its
+ *              values beside it; callbacks return int, and other than 0 stops the call.
+ *
+ * Structs are of three kinds, and a test compares them with those of the last release:
+ *
+ *   sized      begin with `size` and may grow at their end. Start from the initialiser
+ *              (IMP_RUN_INIT), or set `size` before a getter writes. Fields that an older
+ *              caller does not have keep their defaults, and are not written. Zero in an
+ *              options struct is the default.
+ *   rows       sized structs in an array. Handed in, all have the size of the first. Handed
+ *              out, the library's rows may be longer than the caller's struct: step through
+ *              them by IMP_ROW, not by an index; IMP_ROW_HAS is for fields that an older
+ *              library does not have.
+ *   closed     have no `size` and never change: imp_allocator, imp_estimate,
+ *              imp_bend_exit, imp_bend_cotangent, imp_bend_arrival, of which hosts keep
+ *              arrays of their own.
  */
 #ifndef IMPORTON_H
 #define IMPORTON_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -34,18 +56,64 @@
 #define IMP_VERSION_MINOR  2
 #define IMP_VERSION_PATCH  0
 #define IMP_VERSION_STRING "0.2.0"
+/* 200 is 0.2.0; imp_version_number is that of the library. */
+#define IMP_VERSION_NUMBER                                                               \
+    (10000 * IMP_VERSION_MAJOR + 100 * IMP_VERSION_MINOR + IMP_VERSION_PATCH)
 
 #if defined(__GNUC__)
-#define IMP_API        __attribute__((visibility("default")))
-#define IMP_MUST_CHECK __attribute__((warn_unused_result))
+#define IMP_API                 __attribute__((visibility("default")))
+#define IMP_MUST_CHECK          __attribute__((warn_unused_result))
+#define IMP_DEPRECATED(instead) __attribute__((deprecated(instead)))
 #else
 #define IMP_API
 #define IMP_MUST_CHECK
+#define IMP_DEPRECATED(instead)
 #endif
 
+/* Initial values of a sized struct: its size, what is named, and zeros for the rest;
+ * IMP_INIT(struct imp_team, .ranks = 1). At most 6 values. In C++, where designated
+ * initialisers are of 2020, a function sets the members. */
 #ifdef __cplusplus
+template <class T, class Set> inline T imp_init(Set set)
+{
+    T t = T();
+    t.size = sizeof(T);
+    set(t);
+    return t;
+}
+#define IMP_SET_1(t, a, z)                    t a;
+#define IMP_SET_2(t, a, b, z)                 t a, t b;
+#define IMP_SET_3(t, a, b, c, z)              t a, t b, t c;
+#define IMP_SET_4(t, a, b, c, d, z)           t a, t b, t c, t d;
+#define IMP_SET_5(t, a, b, c, d, e, z)        t a, t b, t c, t d, t e;
+#define IMP_SET_6(t, a, b, c, d, e, f, z)     t a, t b, t c, t d, t e, t f;
+#define IMP_SET_N(a, b, c, d, e, f, set, ...) set
+#define IMP_INIT(type, ...)                                                              \
+    imp_init<type>([](type &t) {                                                         \
+        IMP_SET_N(__VA_ARGS__, IMP_SET_6, IMP_SET_5, IMP_SET_4, IMP_SET_3, IMP_SET_2,    \
+                  IMP_SET_1, 0)                                                          \
+        (t, __VA_ARGS__, 0)                                                              \
+    })
+#define IMP_INIT_ZERO(type) imp_init<type>([](type &) {})
 extern "C" {
+#else
+#define IMP_INIT(type, ...)                                                              \
+    {                                                                                    \
+        .size = sizeof(type), __VA_ARGS__                                                \
+    }
+#define IMP_INIT_ZERO(type)                                                              \
+    {                                                                                    \
+        .size = sizeof(type)                                                             \
+    }
 #endif
+
+/* Row k of an array of sized structs that was handed out, a const struct TAG *; and whether
+ * the library that made the row has this field: IMP_ROW(imp_check_row, rows, k). */
+#define IMP_ROW(tag, rows, k)                                                            \
+    ((const struct tag *)(const void *)((const char *)(rows) +                           \
+                                        (size_t)(k) * (rows)->size))
+#define IMP_ROW_HAS(tag, row, field)                                                     \
+    (offsetof(struct tag, field) + sizeof((row)->field) <= (row)->size)
 
 /* ---- Status -------------------------------------------------------------------- */
 
@@ -68,8 +136,17 @@ enum imp_status { IMP_STATUS_LIST(IMP_STATUS_ENUM) };
 /** The sentence that belongs to a status, never NULL. */
 IMP_API const char *imp_status_text(enum imp_status status);
 
-/** "major.minor.patch" of the library that is loaded. */
+/** "major.minor.patch" of the library that is loaded, never NULL. */
 IMP_API const char *imp_version(void);
+/** The same as 10000 major + 100 minor + patch: IMP_VERSION_NUMBER of its header. */
+IMP_API int imp_version_number(void);
+/** Does the library that is loaded have all that this header declares? The interface of a
+ * major version only grows; before 1.0, that of a minor version. */
+static inline bool imp_version_fits(void)
+{
+    const int library = imp_version_number(), step = IMP_VERSION_MAJOR ? 10000 : 100;
+    return library / step == IMP_VERSION_NUMBER / step && library >= IMP_VERSION_NUMBER;
+}
 
 /* ---- Context ------------------------------------------------------------------- */
 
@@ -91,10 +168,7 @@ struct imp_context_options {
     void (*log)(enum imp_log_level level, const char *message, void *payload);
     void *log_payload; /**< log NULL: warnings are dropped */
 };
-#define IMP_CONTEXT_OPTIONS_INIT                                                         \
-    {                                                                                    \
-        sizeof(struct imp_context_options), 0, {0, 0, 0}, 0, 0                           \
-    }
+#define IMP_CONTEXT_OPTIONS_INIT IMP_INIT_ZERO(struct imp_context_options)
 
 /**
  * @param options  NULL for the defaults.
@@ -138,17 +212,14 @@ struct imp_team {
     int64_t (*next)(uint64_t round, void *payload);
     void *payload;
     /** Non-zero: rank 0 reads files and gives their bytes to all. 0: each reads them. */
-    int broadcast;
+    bool broadcast;
     /** Put the sums over all ranks in the place of numbers [n]: what an MPI_Allreduce of
      * MPI_INT64_T does. Gradients of textures and grids then cost a rank bytes that do not
      * grow with the ranks. All ranks have equal n. NULL: they are gathered.
      * @return as gather. */
     enum imp_status (*sum)(int64_t *numbers, size_t n, void *payload);
 };
-#define IMP_TEAM_INIT                                                                    \
-    {                                                                                    \
-        sizeof(struct imp_team), 0, 1, 0, 0, 0, 0, 0                                     \
-    }
+#define IMP_TEAM_INIT IMP_INIT(struct imp_team, .ranks = 1)
 
 /** Work on this context's calls from now on as one rank of a team; NULL: alone again.
  * Waits for the other ranks.
@@ -303,17 +374,13 @@ struct imp_load_options {
     const char *weights;
     /** Not 0: the scene goes on without plugins and properties that this version does not
      * have, and imp_scene_info lists them. 1: each is a warning, too. */
-    int lenient;
+    bool lenient;
     enum imp_upsampling upsampling;
     /** Of scene files in spectral modes: "from, to, n" in nm: films have n bins of
      * wavelengths for channels (docs/spectra.md 5), in place of what they have; NULL: that. */
     const char *bins;
 };
-#define IMP_LOAD_OPTIONS_INIT                                                            \
-    {                                                                                    \
-        sizeof(struct imp_load_options), IMP_RGB, 0, 0, 0, 0, 0, 0,                      \
-            IMP_UPSAMPLING_SIGMOID, 0                                                    \
-    }
+#define IMP_LOAD_OPTIONS_INIT IMP_INIT_ZERO(struct imp_load_options)
 
 /** Load a scene file (Mitsuba 3 XML). The scene is committed and ready. `options` may be
  * NULL.
@@ -333,8 +400,10 @@ imp_scene_load_string(imp_context *context, const char *xml, size_t length,
 
 /**
  * A scene built by calls. The calls mirror the file format: begin/end open and close an
- * object (tag "shape", type "sphere", ...), the property calls give it values. Errors of
- * a build are kept: later calls do nothing, and imp_scene_commit returns the first.
+ * object (tag "shape", type "sphere", ...), the property calls give it values. The first
+ * error of a build is kept: the call returns it, so do all later ones, which do nothing,
+ * and imp_scene_commit. A host may look at the last of them alone.
+ * @return IMP_OK; IMP_E_UNSUPPORTED; IMP_E_NOMEM.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_create(imp_context *context, const struct imp_load_options *options,
@@ -344,40 +413,47 @@ IMP_API void imp_scene_destroy(imp_scene *scene);
 /** Open an object, and close the one opened last. `id` and `name` may be NULL; `name` is
  * the slot under the parent. tag NULL: what objects of this type are ("diffuse": "bsdf"). The calls in between set properties of the open object, in
  * the units of the file format (degrees, scene units). */
-IMP_API void imp_scene_begin(imp_scene *scene, const char *tag, const char *type,
-                             const char *id, const char *name);
-IMP_API void imp_scene_end(imp_scene *scene);
-IMP_API void imp_scene_bool(imp_scene *scene, const char *name, int value);
-IMP_API void imp_scene_integer(imp_scene *scene, const char *name, int64_t value);
-IMP_API void imp_scene_float(imp_scene *scene, const char *name, double value);
-IMP_API void imp_scene_string(imp_scene *scene, const char *name, const char *value);
-IMP_API void imp_scene_vector(imp_scene *scene, const char *name, const double value[3]);
-IMP_API void imp_scene_rgb(imp_scene *scene, const char *name, const double value[3]);
+IMP_API enum imp_status imp_scene_begin(imp_scene *scene, const char *tag,
+                                        const char *type, const char *id,
+                                        const char *name);
+IMP_API enum imp_status imp_scene_end(imp_scene *scene);
+IMP_API enum imp_status imp_scene_bool(imp_scene *scene, const char *name, bool value);
+IMP_API enum imp_status imp_scene_integer(imp_scene *scene, const char *name,
+                                          int64_t value);
+IMP_API enum imp_status imp_scene_float(imp_scene *scene, const char *name, double value);
+IMP_API enum imp_status imp_scene_string(imp_scene *scene, const char *name,
+                                         const char *value);
+IMP_API enum imp_status imp_scene_vector(imp_scene *scene, const char *name,
+                                         const double value[3]);
+IMP_API enum imp_status imp_scene_rgb(imp_scene *scene, const char *name,
+                                      const double value[3]);
 /** A spectrum by samples: n >= 2 strictly increasing wavelengths in nm; or, with n == 1
  * and wavelengths_nm NULL, the same value at all of them. */
-IMP_API void imp_scene_spectrum(imp_scene *scene, const char *name, size_t n,
-                                const double *wavelengths_nm, const double *values);
+IMP_API enum imp_status imp_scene_spectrum(imp_scene *scene, const char *name, size_t n,
+                                           const double *wavelengths_nm,
+                                           const double *values);
 /** Local-to-world matrix, row-major. */
-IMP_API void imp_scene_transform(imp_scene *scene, const char *name,
-                                 const double value[16]);
+IMP_API enum imp_status imp_scene_transform(imp_scene *scene, const char *name,
+                                            const double value[16]);
 /** Refer to the object with this id; `name` may be NULL. Forward references are fine. */
-IMP_API void imp_scene_ref(imp_scene *scene, const char *id, const char *name);
+IMP_API enum imp_status imp_scene_ref(imp_scene *scene, const char *id, const char *name);
 /** Triangles for the open shape of type "mesh". normals and uvs may be NULL.
  * positions [3*n_vertices], normals [3*n_vertices], uvs [2*n_vertices],
  * indices [3*n_triangles]. */
-IMP_API void imp_scene_mesh(imp_scene *scene, size_t n_vertices, size_t n_triangles,
-                            const float *positions, const float *normals,
-                            const float *uvs, const uint32_t *indices);
+IMP_API enum imp_status imp_scene_mesh(imp_scene *scene, size_t n_vertices,
+                                       size_t n_triangles, const float *positions,
+                                       const float *normals, const float *uvs,
+                                       const uint32_t *indices);
 /** Linear pixels for the open texture of type "bitmap" or emitter of type "envmap", in
  * place of `filename`.
  * pixels [height][width][channels], channels 1 or 3. */
-IMP_API void imp_scene_image(imp_scene *scene, int width, int height, int channels,
-                             const float *pixels);
+IMP_API enum imp_status imp_scene_image(imp_scene *scene, int width, int height,
+                                        int channels, const float *pixels);
 /** Values of the cells of the open volume of type "gridvolume", in place of `filename`, in the
  * order of its files: values [nz][ny][nx][channels], channels 1 or 3, finite. The grid fills
  * the unit cube, to which `to_world` applies; they are copied. */
-IMP_API void imp_scene_grid(imp_scene *scene, int nx, int ny, int nz, int channels,
-                            const float *values);
+IMP_API enum imp_status imp_scene_grid(imp_scene *scene, int nx, int ny, int nz,
+                                       int channels, const float *values);
 /** Finish a scene built by calls: make all objects, check them, build what rays need.
  * @return IMP_OK; the first error of the calls before; IMP_E_SCENE; IMP_E_UNSUPPORTED;
  *         IMP_E_NOMEM; IMP_E_ARG if it has been committed already. */
@@ -420,7 +496,8 @@ struct imp_sensor_info {
     /** Of a specfilm: the names of its response curves, which are its channels; else 0. */
     int n_responses;
     const char *const *response_names; /**< [n_responses] */
-    int photograph; /**< its film has a gamma: targets hold the values of a photograph, from
+    bool
+        photograph; /**< its film has a gamma: targets hold the values of a photograph, from
                          0 to 1, not linear in light */
 };
 /** Set info->size first; strings belong to the scene.
@@ -470,7 +547,7 @@ imp_scene_get_param(const imp_scene *scene, size_t index, struct imp_param_info 
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
 /** theta [imp_scene_n_theta], in the units of imp_param_info; written, and read. */
-IMP_API void imp_scene_get_theta(const imp_scene *scene, double *theta);
+IMP_API enum imp_status imp_scene_get_theta(const imp_scene *scene, double *theta);
 /** @return IMP_OK; IMP_E_ARG if a value is not finite or outside its bounds: nothing is
  * set. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_set_theta(imp_scene *scene,
@@ -522,6 +599,7 @@ IMP_API const char *imp_drop_text(enum imp_drop cause);
 /** A dropped walk. imp_walk_describe with the same sensor, seed, pixel and sample is that
  * walk, vertex by vertex (IMP_DROP_MOVED: the walk, but not what was dropped of it). */
 struct imp_drop_key {
+    size_t size;
     uint64_t seed;
     int64_t sample;
     int32_t x, y;   /**< pixel of the picture; outside of it within the filter's radius */
@@ -533,12 +611,13 @@ struct imp_film_info {
     size_t size;
     int width, height, channels;
     int64_t spp;      /**< samples per pixel in it */
-    int has_se;       /**< standard errors are there */
+    bool has_se;      /**< standard errors are there */
     uint64_t dropped; /**< walks dropped, of all causes */
     /** The same by enum imp_drop. All 0 for a picture that was read from a file. */
     uint64_t dropped_by_cause[IMP_DROP_CAUSES];
-    int n_drop_keys;                              /**< at most IMP_DROP_KEYS */
-    struct imp_drop_key drop_keys[IMP_DROP_KEYS]; /**< the first by sample, row, column */
+    int n_drop_keys; /**< at most IMP_DROP_KEYS */
+    /** [n_drop_keys] the first by sample, row, column: rows, which belong to the film. */
+    const struct imp_drop_key *drop_keys;
 };
 
 /** An empty picture to fill by hand, zeros. `names` is "R,G,B", "Y", "albedo.R,..." .
@@ -574,20 +653,17 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_film_set_text(imp_film *film, const c
 
 /** The text attribute with this key, made here or read from an EXR file; belongs to the
  * film. NULL if there is none. */
-IMP_API const char *imp_film_get_text(const imp_film *film, const char *key);
+IMP_API const char *imp_film_text(const imp_film *film, const char *key);
 
 struct imp_write_options {
     size_t size;
-    int half;           /**< 16-bit floats instead of 32 (EXR) */
-    int standard_error; /**< add channels se.R, se.G ... (EXR) */
-    double exposure;    /**< stops, for PNG */
-    int diverging;      /**< PNG of a signed picture: blue-white-red, symmetric about 0 */
-    double range;       /**< of a signed picture; 0: its 99.5 percentile of |value| */
+    bool half;           /**< 16-bit floats instead of 32 (EXR) */
+    bool standard_error; /**< add channels se.R, se.G ... (EXR) */
+    double exposure;     /**< stops, for PNG */
+    bool diverging; /**< PNG of a signed picture: blue-white-red, symmetric about 0 */
+    double range;   /**< of a signed picture; 0: its 99.5 percentile of |value| */
 };
-#define IMP_WRITE_OPTIONS_INIT                                                           \
-    {                                                                                    \
-        sizeof(struct imp_write_options), 0, 0, 0, 0, 0                                  \
-    }
+#define IMP_WRITE_OPTIONS_INIT IMP_INIT_ZERO(struct imp_write_options)
 
 /** Write by extension: .exr, .pfm, .hdr, .png (sRGB), .npy. The file appears whole or not
  * at all. options may be NULL.
@@ -687,11 +763,7 @@ struct imp_run {
      * walks are traced. */
     const imp_walks *walks;
 };
-#define IMP_RUN_INIT                                                                     \
-    {                                                                                    \
-        sizeof(struct imp_run), 0, 0, 0, 0, 0, 0, 0, 0, IMP_WAVELENGTHS_STRATIFIED, 0,   \
-            0, 0, IMP_FROM_SCENE, IMP_POINTS_SCENE, 0                                    \
-    }
+#define IMP_RUN_INIT IMP_INIT_ZERO(struct imp_run)
 
 /** Render the scene's integrator through a sensor.
  * @return IMP_OK; IMP_CANCELLED (*out is valid, with the passes done; or NULL, if less
@@ -730,7 +802,7 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_denoiser_check(imp_context *context);
  * integrator makes no walks; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_walk_describe(const imp_scene *scene,
                                                          const struct imp_run *run, int x,
-                                                         int y, int64_t sample, int json,
+                                                         int y, int64_t sample, bool json,
                                                          char **text);
 IMP_API void imp_free(imp_context *context, void *memory);
 
@@ -782,31 +854,36 @@ imp_problem_tie(imp_problem *problem, const char *glob, enum imp_tie kind);
 struct imp_tie_info {
     size_t size;
     const char *name; /**< the parameter's, or factor(GLOB) */
-    int factor;       /**< x multiplies what the members had when they were tied */
-    int log;          /**< x is a logarithm */
+    bool factor;      /**< x multiplies what the members had when they were tied */
+    bool log;         /**< x is a logarithm */
     size_t count;     /**< numbers of x that belong together */
     size_t n_members; /**< parameters that follow them */
     const char *const *members; /**< [n_members] their names; owned by the problem */
 };
-#define IMP_TIE_INFO_INIT                                                                \
-    {                                                                                    \
-        sizeof(struct imp_tie_info), 0, 0, 0, 0, 0, 0                                    \
-    }
+#define IMP_TIE_INFO_INIT IMP_INIT_ZERO(struct imp_tie_info)
 
-/** What number i < imp_problem_n of x stands for. */
+/** What number i < imp_problem_n_variables of x stands for. */
 IMP_API IMP_MUST_CHECK enum imp_status
-imp_problem_get_tie(const imp_problem *problem, size_t i, struct imp_tie_info *out);
+imp_problem_get_tie(const imp_problem *problem, size_t i, struct imp_tie_info *info);
 
-/** Length of x: how many numbers are active. */
-IMP_API size_t imp_problem_n(const imp_problem *problem);
-/** Of active number i: its parameter (the first that follows it, if several do), its
- * index inside it, its bounds. Outputs may be NULL. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_problem_variable(const imp_problem *problem,
-                                                            size_t i, size_t *param,
-                                                            size_t *element, double *lo,
-                                                            double *hi);
-/** x [imp_problem_n] from and to the scene. Setting refuses values outside bounds. */
-IMP_API void imp_problem_get_x(const imp_problem *problem, double *x);
+/** Length of x: the number of active variables. */
+IMP_API size_t imp_problem_n_variables(const imp_problem *problem);
+/** An active variable. */
+struct imp_variable_info {
+    size_t size;
+    size_t param; /**< index of its parameter: the first that follows it, if several do */
+    size_t element; /**< index inside the parameter */
+    double lo, hi;  /**< bounds; may be infinite */
+};
+#define IMP_VARIABLE_INFO_INIT IMP_INIT_ZERO(struct imp_variable_info)
+/** Variable i < imp_problem_n_variables.
+ * @param[out] info set its size first.
+ * @return IMP_OK; IMP_E_ARG. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_problem_get_variable(const imp_problem *problem, size_t i,
+                         struct imp_variable_info *info);
+/** x [imp_problem_n_variables] from and to the scene. Setting refuses values outside bounds. */
+IMP_API enum imp_status imp_problem_get_x(const imp_problem *problem, double *x);
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_set_x(imp_problem *problem,
                                                          const double *x);
 
@@ -831,10 +908,7 @@ struct imp_target {
     const float *noise_se; /**< [height][width][channels], 1 sigma of the picture's own
                                 noise, for covariances; NULL: estimated from residuals */
 };
-#define IMP_TARGET_INIT                                                                  \
-    {                                                                                    \
-        sizeof(struct imp_target), 0, 0, 0, 0, 0, 0, IMP_LOSS_L2, 0, 0, 0                \
-    }
+#define IMP_TARGET_INIT IMP_INIT_ZERO(struct imp_target)
 /** The target's arrays are copied.
  * @return IMP_OK; IMP_E_ARG if sizes differ from the sensor's, a number is not finite, or
  *         all weights are 0; IMP_E_NOMEM. */
@@ -848,7 +922,7 @@ imp_problem_add_target(imp_problem *problem, const struct imp_target *target);
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_add_tikhonov(imp_problem *problem,
                                                                 const char *glob,
                                                                 double weight,
-                                                                int from_here);
+                                                                bool from_here);
 /** 1/2 weight |grad x|^2, forward differences between neighbouring texels of textures, or
  * samples of spectra, that match `glob`. @return IMP_E_ARG if none has neighbours. */
 IMP_API IMP_MUST_CHECK enum imp_status
@@ -858,10 +932,10 @@ imp_problem_add_smoothness(imp_problem *problem, const char *glob, double weight
  * for target -1), where this run asks for run->spp: they are cut into replicates of equal
  * size, or into two sets of equal size, so it may be a few more.
  * @return IMP_OK; IMP_E_ARG if there is no such target or sensor. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_problem_spp(const imp_problem *problem,
-                                                       int target,
-                                                       const struct imp_run *run,
-                                                       int *spp);
+IMP_API IMP_MUST_CHECK enum imp_status imp_problem_get_spp(const imp_problem *problem,
+                                                           int target,
+                                                           const struct imp_run *run,
+                                                           int *spp);
 
 /**
  * Objective and gradient in one call, from the same walks.
@@ -869,9 +943,9 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_problem_spp(const imp_problem *proble
  * Quadratic losses through box filters take one pass with leave-one-out adjoints, so that
  * value and gradient have no bias (docs: estimators); others take two passes, and
  * objective->bias_order says what is left. spp is rounded up to at least 2,
- * and so that replicates and sets have one size (imp_problem_spp).
+ * and so that replicates and sets have one size (imp_problem_get_spp).
  *
- * @param x         [imp_problem_n]; NULL: the scene's values.
+ * @param x         [imp_problem_n_variables]; NULL: the scene's values.
  * @param run       run->sensor is ignored; NULL for defaults.
  * @param[out] objective   may be NULL.
  * @param[out] gradient    [n], objective per unit of x; NULL: value only.
@@ -1016,9 +1090,9 @@ struct imp_fit_options {
     double learning_rate;   /**< Adam, as a fraction of each variable's scale; 0: 0.05. It
                                  falls with control variates (momentum) */
     double tolerance;       /**< stop when steps stay below this, relative; 0: 1e-4 */
-    int intervals;          /**< estimate covariance and 95 % intervals at the end */
+    bool intervals;         /**< estimate covariance and 95 % intervals at the end */
     const char *checkpoint; /**< file, rewritten every few seconds; NULL: none */
-    int resume;             /**< start from the checkpoint if it is there */
+    bool resume;            /**< start from the checkpoint if it is there */
     /** Adam: textures and volumes are fitted from coarse to fine. Level k of `levels` (at
      * most 16) has one variable for 2^(levels - k) cells along each axis, between which
      * the cells are linear, and an equal share of the iterations; a checkpoint holds the
@@ -1027,10 +1101,9 @@ struct imp_fit_options {
     imp_fit_step_fn step; /**< NULL: nobody looks */
     void *step_payload;
     /** IMP_LBFGS, IMP_MMA and IMP_SLSQP evaluate one draw of walks, which is kept (walks.h)
-     * in so many bytes; 0: 2^30; negative: walks are traced each time, as they are where
-     * the memory does not suffice. Objective and intervals of the answer are of fresh
-     * walks. */
-    double memory;
+     * in at most so many bytes; 0: 2^30. Walks are traced each time where these do not
+     * suffice. Objective and intervals of the answer are of fresh walks. */
+    size_t memory;
     enum imp_variates control_variate;
     /** Of IMP_ADAM, quadratic losses, box filters and walks from the sensor; others have the
      * same samples everywhere. */
@@ -1044,22 +1117,21 @@ struct imp_fit_options {
      * in space are fitted, with so much room to grow (imp_walks_options.headroom); 0 or 1:
      * none, and such walks are traced each time. */
     double headroom;
+    bool no_recording; /**< walks are traced in each evaluation, none are kept */
 };
-#define IMP_FIT_OPTIONS_INIT                                                             \
-    {                                                                                    \
-        sizeof(struct imp_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,          \
-            IMP_VARIATES_AUTO, IMP_ALLOCATION_DEFAULT, 0, 0                              \
-    }
+#define IMP_FIT_OPTIONS_INIT IMP_INIT_ZERO(struct imp_fit_options)
 
 struct imp_fit_variable {
+    size_t size;
     double start, value;
     double se; /**< one standard error: measurement and Monte Carlo together */
     double lo95,
         hi95;     /**< 95 % interval; NaN if neither pictures nor a prior determine it */
     int at_bound; /**< -1: at the lower bound, 1: at the upper */
-    int determined; /**< 0: the picture does not determine it; an interval is then that
+    bool determined; /**< 0: the picture does not determine it; an interval is then that
                             of the posterior */
 };
+#define IMP_FIT_VARIABLE_INIT IMP_INIT_ZERO(struct imp_fit_variable)
 
 struct imp_fit_result {
     size_t size;
@@ -1071,7 +1143,7 @@ struct imp_fit_result {
     size_t n;
     const struct imp_fit_variable *variables; /**< [n]; NULL if n > 1024, where rows of
                                                    this size would take more memory than
-                                                   the fit: imp_problem_fit_variable */
+                                                   the fit: imp_problem_get_fit_variable */
     double condition;                         /**< of the scaled J^T J; 0: not computed */
     const char *reason;                       /**< why it stopped */
     const char *warning; /**< e.g. what is not determined; NULL: none */
@@ -1117,13 +1189,14 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_fit(imp_problem *problem,
 /** Number i < n of the problem's last fit, whatever n.
  * @return IMP_E_ARG also if there was no fit. */
 IMP_API IMP_MUST_CHECK enum imp_status
-imp_problem_fit_variable(const imp_problem *problem, size_t i,
-                         struct imp_fit_variable *variable);
+imp_problem_get_fit_variable(const imp_problem *problem, size_t i,
+                             struct imp_fit_variable *variable);
 
 /** A number that is not active, and what it would bring to fit it too. */
 struct imp_missing {
+    size_t size;
     size_t param, element; /**< of the scene */
-    int factor;   /**< 1: the common factor of all numbers of a texture, volume or
+    bool factor;  /**< 1: the common factor of all numbers of a texture, volume or
                                 list, which is 1 now; element is 0 */
     double value; /**< now */
     double step,
@@ -1165,9 +1238,8 @@ struct imp_optimizer_rule {
     double momentum;      /**< SGD: in [0, 1) */
 };
 #define IMP_OPTIMIZER_RULE_INIT                                                          \
-    {                                                                                    \
-        sizeof(struct imp_optimizer_rule), IMP_RULE_ADAM, 0.05, 0.9, 0.999, 1e-8, 0      \
-    }
+    IMP_INIT(struct imp_optimizer_rule, .learning_rate = 0.05, .beta1 = 0.9,             \
+             .beta2 = 0.999, .epsilon = 1e-8)
 
 /** Length of the state of imp_optimizer_step for n numbers. */
 #define IMP_OPTIMIZER_STATE(n) (1 + 2 * (n))
@@ -1193,8 +1265,15 @@ imp_optimizer_step(const struct imp_optimizer_rule *rule, size_t n,
 
 /* ---- Checking ------------------------------------------------------------------ */
 
+/** The outcome of a check. */
+enum imp_verdict {
+    IMP_VERDICT_OPEN = -1, /**< the check does not decide */
+    IMP_VERDICT_WRONG = 0,
+    IMP_VERDICT_RIGHT = 1
+};
 /** One line of a gradient check: a method, a parameter, two numbers that must agree. */
 struct imp_check_row {
+    size_t size;
     const char *method; /**< "frozen", "fresh", "dot", "euler", "density", "loss", "ends";
                              "uniform", "energy", "aim" (imp_check_options.sampling) */
     const char *param;
@@ -1202,7 +1281,7 @@ struct imp_check_row {
     double value, reference, se; /**< se of the difference; 0: deterministic */
     double error; /**< relative error; where se > 0: |z|, z = (value - reference) / se */
     double limit; /**< of error; 0: a row for information (a step that is not the best) */
-    int ok;       /**< 1: they agree; 0: they do not; -1: too noisy to tell */
+    enum imp_verdict ok; /**< they agree; they do not; too noisy to decide */
     int kinks; /**< frozen walks that stand on a kink, and agree with one of its sides */
 };
 struct imp_check_options {
@@ -1216,12 +1295,9 @@ struct imp_check_options {
      * of a walk (value), and the part of these directions (reference); also of
      * each light and proxy, where there are several, 16 at most. Rows "aim": the part of
      * the directions towards a proxy in which anything lies. */
-    int sampling;
+    bool sampling;
 };
-#define IMP_CHECK_OPTIONS_INIT                                                           \
-    {                                                                                    \
-        sizeof(struct imp_check_options), 0, 0, 0                                        \
-    }
+#define IMP_CHECK_OPTIONS_INIT IMP_INIT_ZERO(struct imp_check_options)
 /** Check the gradients of all active parameters (docs: gradient checks). Rows belong to
  * the problem until its next check. @return IMP_OK also when rows fail: look at `ok`. */
 IMP_API IMP_MUST_CHECK enum imp_status
@@ -1253,6 +1329,7 @@ enum imp_selftest_subject {
  *   part        scattering is not above the extinction
  *   bounded     extinction is not above what flights take for its bound */
 struct imp_selftest_row {
+    size_t size;
     const char *object, *kind, *contract;
     double value, reference;
     double se;      /**< of the difference; 0: none */
@@ -1260,7 +1337,7 @@ struct imp_selftest_row {
     double error;   /**< a count of failures, a relative error, or |z| */
     double limit;   /**< of error */
     double chance;  /**< of a value so far off, if all is right; -1: not statistical */
-    int ok;         /**< 1: it holds; 0: it does not; -1: not promised, and not so */
+    enum imp_verdict ok; /**< open: not promised, and not so */
 };
 struct imp_selftest_options {
     size_t size;
@@ -1268,10 +1345,7 @@ struct imp_selftest_options {
     int directions; /**< of sight, or places of reference, of an object; 0: 12 */
     uint64_t seed;
 };
-#define IMP_SELFTEST_OPTIONS_INIT                                                        \
-    {                                                                                    \
-        sizeof(struct imp_selftest_options), 0, 0, 0                                     \
-    }
+#define IMP_SELFTEST_OPTIONS_INIT IMP_INIT_ZERO(struct imp_selftest_options)
 /** Test the contracts of kinds on the scene's own objects. Rows belong to the scene until
  * its next self-test; their names live as long as the scene.
  * @return IMP_OK also where rows fail: look at `ok`; IMP_E_ARG (an unknown subject, too few
@@ -1292,30 +1366,67 @@ struct imp_compare_result {
     double p_fail_fraction;
     double mean_z; /**< |z| of the picture's mean, worst channel */
     double over2;  /**< fraction of pixels with |z| > 2; 0.0455 expected */
-    int has_z;     /**< standard errors or a variance are there: z means something */
-    int agree;     /**< by z where it is there, else by relative_rmse */
+    bool has_z;    /**< standard errors or a variance are there: z means something */
+    bool agree;    /**< by z where it is there, else by relative_rmse */
 };
 struct imp_compare_options {
     size_t size;
     const imp_film *variance; /**< per sample, of `reference`; NULL: use the films' se */
     double n_test, n_reference; /**< samples per pixel; 0: unknown / exact */
     double floor; /**< of the variance; 0: 1e-4 * squared mean of the channel */
-    int xyz;      /**< compare X, Y, Z: pictures and variance are made to them from
+    bool xyz;     /**< compare X, Y, Z: pictures and variance are made to them from
                        R, G, B (or Y alone). Mitsuba's references keep the variance
                        of X, Y, Z so, as if it were a colour */
 };
-#define IMP_COMPARE_OPTIONS_INIT                                                         \
-    {                                                                                    \
-        sizeof(struct imp_compare_options), 0, 0, 0, 0, 0                                \
-    }
+#define IMP_COMPARE_OPTIONS_INIT IMP_INIT_ZERO(struct imp_compare_options)
 /** Do two pictures of one size show the same, within their noise? Every channel of
  * `reference` is looked for in `test` by name, else by place. options may be NULL;
  * neither picture is changed.
  * @return IMP_OK also where they differ: look at `agree`; IMP_E_ARG if sizes or channels
  *         do not go together; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
-imp_compare(imp_context *context, imp_film *test, imp_film *reference,
+imp_compare(imp_context *context, const imp_film *test, const imp_film *reference,
             const struct imp_compare_options *options, struct imp_compare_result *result);
+
+/* ---- Names of 0.1 -------------------------------------------------------------- */
+
+IMP_DEPRECATED("imp_problem_n_variables")
+static inline size_t imp_problem_n(const imp_problem *problem)
+{
+    return imp_problem_n_variables(problem);
+}
+IMP_DEPRECATED("imp_problem_get_fit_variable")
+static inline enum imp_status imp_problem_fit_variable(const imp_problem *problem,
+                                                       size_t i,
+                                                       struct imp_fit_variable *variable)
+{
+    return imp_problem_get_fit_variable(problem, i, variable);
+}
+IMP_DEPRECATED("imp_film_text")
+static inline const char *imp_film_get_text(const imp_film *film, const char *key)
+{
+    return imp_film_text(film, key);
+}
+IMP_DEPRECATED("imp_problem_get_spp")
+static inline enum imp_status imp_problem_spp(const imp_problem *problem, int target,
+                                              const struct imp_run *run, int *spp)
+{
+    return imp_problem_get_spp(problem, target, run, spp);
+}
+IMP_DEPRECATED("imp_problem_get_variable")
+static inline enum imp_status imp_problem_variable(const imp_problem *problem, size_t i,
+                                                   size_t *param, size_t *element,
+                                                   double *lo, double *hi)
+{
+    struct imp_variable_info info = IMP_VARIABLE_INFO_INIT;
+    const enum imp_status st = imp_problem_get_variable(problem, i, &info);
+    if (st != IMP_OK) return st;
+    if (param) *param = info.param;
+    if (element) *element = info.element;
+    if (lo) *lo = info.lo;
+    if (hi) *hi = info.hi;
+    return IMP_OK;
+}
 
 #ifdef __cplusplus
 }

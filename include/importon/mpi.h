@@ -30,10 +30,7 @@ struct imp_mpi_options {
     int (*give_up)(void *payload);
     void *payload;
 };
-#define IMP_MPI_OPTIONS_INIT                                                             \
-    {                                                                                    \
-        sizeof(struct imp_mpi_options), 0, 0, 0                                          \
-    }
+#define IMP_MPI_OPTIONS_INIT IMP_INIT_ZERO(struct imp_mpi_options)
 
 /** Join: MPI_Init_thread with MPI_THREAD_SERIALIZED unless the host has done it, and then
  * MPI_Finalize when closed. `team` gets rank, ranks, gather, next, sum and payload; it is

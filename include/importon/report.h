@@ -31,10 +31,7 @@ struct imp_report_item {
     const void *image;    /**< [image_size] a PNG or SVG file */
     size_t image_size;
 };
-#define IMP_REPORT_ITEM_INIT                                                             \
-    {                                                                                    \
-        sizeof(struct imp_report_item), 0, 0, 0, 0, 0, 0, 0, 0, 0                        \
-    }
+#define IMP_REPORT_ITEM_INIT IMP_INIT_ZERO(struct imp_report_item)
 
 struct imp_report {
     size_t size;
@@ -42,13 +39,11 @@ struct imp_report {
     const char *command; /**< that made the result, to be copied; NULL: not known */
     const struct imp_report_item *items; /**< [n_items]; all are copied into the page */
     size_t n_items;
-    int live; /**< not 0: the page is served, and hears from its server while work goes on
+    bool
+        live; /**< not 0: the page is served, and hears from its server while work goes on
                    (docs/report.md, section 5). 0: it may use no network */
 };
-#define IMP_REPORT_INIT                                                                  \
-    {                                                                                    \
-        sizeof(struct imp_report), 0, 0, 0, 0, 0                                         \
-    }
+#define IMP_REPORT_INIT IMP_INIT_ZERO(struct imp_report)
 
 /** Write the page; it appears whole or not at all. Pictures are stored as 16-bit floats,
  * scaled by a power of two to their largest value: 11 significant bits, 8/3 bytes a

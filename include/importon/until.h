@@ -28,23 +28,17 @@ struct imp_until_options {
      * that are known least. */
     enum imp_allocation allocation;
 };
-#define IMP_UNTIL_OPTIONS_INIT                                                           \
-    {                                                                                    \
-        sizeof(struct imp_until_options), 0, 0, 0, IMP_ALLOCATION_DEFAULT                \
-    }
+#define IMP_UNTIL_OPTIONS_INIT IMP_INIT_ZERO(struct imp_until_options)
 
 /** How a sequence ended. */
 struct imp_until_end {
     size_t size;
-    int reached;     /**< 1: the wanted error was; 0: the samples or the time were up */
+    bool reached;    /**< 1: the wanted error was; 0: the samples or the time were up */
     int looks;       /**< so many */
     int64_t spp;     /**< samples per pixel of all of them */
     double relative; /**< bound of the error at the last look, as a part of the answer */
 };
-#define IMP_UNTIL_END_INIT                                                               \
-    {                                                                                    \
-        sizeof(struct imp_until_end), 0, 0, 0, 0                                         \
-    }
+#define IMP_UNTIL_END_INIT IMP_INIT_ZERO(struct imp_until_end)
 
 /**
  * A picture whose error is a part `relative` of it: with probability 1 - risk

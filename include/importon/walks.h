@@ -30,15 +30,15 @@ extern "C" {
 
 struct imp_walks_options {
     size_t size;
-    double memory; /**< bytes that the walks may take; 0: 2^30 */
+    size_t memory; /**< bytes that the walks may take; 0: 2^30 */
     /** 0: the walks of imp_render with this run. 1: walks of losses and their gradients
      * (imp_problem_objective), of which pictures can be made too. They are the same walks
      * unless wavelengths are stratified or points are those of Sobol's sequence, whose sets
      * have to be independent of each other for a loss. Kept walks are then two or more
      * replicates of two sets; a quadratic loss that is traced may have one replicate, and
      * one that is not quadratic has four sets. */
-    int losses;
-    int all_sensors; /**< not 0: of all sensors; 0: of run->sensor alone */
+    bool losses;
+    bool all_sensors; /**< not 0: of all sensors; 0: of run->sensor alone */
     /** Least probability with which roulette lets a walk go on: reflectances up to its root
      * keep a finite variance however long walks are. 0: .8; negative: what the integrator
      * decides, as for walks that are not kept. */
@@ -48,7 +48,7 @@ struct imp_walks_options {
     double ess;
     /** Ranks of a team keep a share each, to be written (imp_walks_write) and not evaluated:
      * memory and work are divided. 0: each keeps all of them. */
-    int spread;
+    bool spread;
     /** Room for extinctions that vary in space, of grids: collisions are drawn under bounds
      * that many times as high, at least an eighth of the medium's largest and one over the
      * size of its box before they are raised by this factor less 1, and a tenth of them at
@@ -57,10 +57,7 @@ struct imp_walks_options {
      * variance larger. 0 or 1: none; at most 64. */
     double headroom;
 };
-#define IMP_WALKS_OPTIONS_INIT                                                           \
-    {                                                                                    \
-        sizeof(struct imp_walks_options), 0, 0, 0, 0, 0, 0, 0                            \
-    }
+#define IMP_WALKS_OPTIONS_INIT IMP_INIT_ZERO(struct imp_walks_options)
 
 /** Draw walks at the scene's present parameters and keep them: about 164 bytes a vertex.
  * The scene must outlive them. Parameters with a gradient may change afterwards, but for
@@ -112,7 +109,7 @@ struct imp_walks_info {
     uint64_t seed;
     double n_walks, n_vertices, bytes;
     double survival; /**< floor of roulette; 0: none */
-    int losses;      /**< as of imp_walks_options */
+    bool losses;     /**< as of imp_walks_options */
 };
 /** Set info->size first. @return IMP_OK; IMP_E_ARG. */
 IMP_API enum imp_status imp_walks_get_info(const imp_walks *walks,
@@ -135,10 +132,7 @@ struct imp_walks_weight {
     const char *refused; /**< why they are not evaluated at these parameters; NULL: they
                               are. Of this thread, until its next call. */
 };
-#define IMP_WALKS_WEIGHT_INIT                                                            \
-    {                                                                                    \
-        sizeof(struct imp_walks_weight), 0, 0, 0, 0                                      \
-    }
+#define IMP_WALKS_WEIGHT_INIT IMP_INIT_ZERO(struct imp_walks_weight)
 /** What the walks of a sensor are worth at the scene's present parameters.
  * @param mask [height][width]: pixels with 0 are left out; NULL: none are.
  * @param[out] weight set its size first.

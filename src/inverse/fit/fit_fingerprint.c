@@ -72,7 +72,7 @@ void imp__fit_fingerprint(struct imp__fit *f)
         h->options = imp__hash(h->options, &numbers, sizeof numbers);
     }
     if (imp__fit_keeps(f)) {
-        const double kept[2] = {f->options.memory, KEPT_VERSION};
+        const double kept[2] = {(double)f->options.memory, KEPT_VERSION};
         h->options = imp__hash(h->options, kept, sizeof kept);
     }
     if (imp__fit_keeps(f) && f->options.headroom > 1)

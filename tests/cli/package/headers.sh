@@ -2,7 +2,7 @@
 # Each public header compiles alone, as C11 and as C++, under strict warnings, and with it every
 # initialiser: IMP_RUN_INIT is one of struct imp_run.
 n=0
-for header in importon kinds elements bend; do
+for header in importon kinds elements bend clip until walks report mpi; do
     echo "#include <importon/$header.h>" >alone.c
     for init in $(sed -nE 's/^#define (IMP_\w+_INIT)( .*|)$/\1/p' "$ROOT/include/importon/$header.h"); do
         name=${init%_INIT}
