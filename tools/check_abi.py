@@ -4,7 +4,7 @@
 
 Usage: check_abi.py [--update [--break]] [LIBRARY]
 
-tests/abi/HEADER.txt has, of each public header, every struct with its size (x86-64, LP64)
+A file of each public header in tests/abi has every struct with its size (x86-64, LP64)
 and the offset, size and declaration of its members, every enumerator and constant with its
 value, and every function and callback with its prototype. Each has the version since which
 it is so. The headers are read here, and a C compiler says sizes and values.
