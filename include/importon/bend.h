@@ -209,7 +209,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_field_set_samples(imp_field *field,
 /** Transpose of imp_field_set_samples, for param eta: samples_bar = (d theta/d samples)^T
  * theta_bar.
  * theta_bar [imp_field_n_theta]; samples_bar [z][y][x] is overwritten.
- * @return IMP_OK; IMP_E_ARG if the field is no grid; IMP_E_NOMEM. */
+ * @return IMP_OK; IMP_E_ARG if the field is no grid; IMP_E_UNSUPPORTED for grids of
+ *         eta^2/2; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_samples_vjp(const imp_field *field,
                                                              const double *theta_bar,
                                                              double *samples_bar);
@@ -538,7 +539,8 @@ imp_bend_add_target(imp_bend *bend, const struct imp_bend_target *t);
 
 /** weight/2 sum of squared differences of grid coefficients along each axis, of order 1
  * or 2; edge > 0: sum sqrt(D^2 + edge^2) instead.
- * @return IMP_OK; IMP_E_ARG for another field or order, or a negative number. */
+ * @return IMP_OK; IMP_E_ARG for another field or order, or a negative weight;
+ *         IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_add_smoothness(imp_bend *bend, double weight, int order, double edge);
 /** Bounds of every value of the field; default for grids of the index: 1 .. infinity.

@@ -283,7 +283,8 @@ struct imp_elements_guide_options {
  * sensor. The elements must outlive it; a guide
  * of an old solution stays correct, and helps less. Destroy it with imp_guide_destroy.
  * options may be NULL.
- * @return IMP_OK; IMP_E_ARG for a share or roulette outside its range; IMP_E_NOMEM. */
+ * @return IMP_OK; IMP_E_ARG for a share or roulette outside its range, or before
+ *         imp_elements_solve; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_guide(const imp_elements *elements,
                    const struct imp_elements_guide_options *options, imp_guide **out);

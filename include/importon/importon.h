@@ -366,6 +366,15 @@ enum imp_color_mode { IMP_RGB = 0, IMP_MONO = 1, IMP_SPECTRAL = 2, IMP_SINGLE = 
  * so that all is linear in the values. */
 enum imp_upsampling { IMP_UPSAMPLING_SIGMOID = 0, IMP_UPSAMPLING_LINEAR = 1 };
 
+/** A scene with plugins or properties that this version does not have. */
+enum imp_lenience {
+    IMP_LENIENT_OFF = 0, /**< an error */
+    IMP_LENIENT_WARN =
+        1, /**< it goes on without them: imp_scene_info lists them, and each
+                               is a warning */
+    IMP_LENIENT_QUIET = 2 /**< the same without warnings */
+};
+
 struct imp_load_options {
     size_t size;
     enum imp_color_mode mode;
@@ -377,9 +386,7 @@ struct imp_load_options {
     /** The property `weights` of a file's integrator (of the first one in aov
      * and moment), in place of the file's; NULL: the file's. */
     const char *weights;
-    /** Not 0: the scene goes on without plugins and properties that this version does not
-     * have, and imp_scene_info lists them. 1: each is a warning, too. */
-    bool lenient;
+    enum imp_lenience lenient;
     enum imp_upsampling upsampling;
     /** For files in spectral modes, "from, to, n" in nm: films have n bins of
      * wavelengths for channels (docs/spectra.md 5), in place of what they have; NULL:
