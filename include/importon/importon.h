@@ -779,7 +779,7 @@ enum imp_from {
     IMP_FROM_LIGHTS
 };
 
-/** Walks whose decisions were kept (walks.h). */
+/** Recorded walks (walks.h). */
 typedef struct imp_walks imp_walks;
 
 /** How Monte Carlo is run. The same (seed, spp) give the same bits on any thread count.
@@ -812,7 +812,7 @@ struct imp_run {
      * film. */
     enum imp_from from;
     enum imp_points points;
-    /** Kept walks, which are evaluated in place of tracing new ones. Seed, samples,
+    /** Recorded walks, which are evaluated in place of tracing new ones. Seed, samples,
      * points and wavelengths are those that they were drawn with, whatever these fields
      * are. NULL: walks are traced. */
     const imp_walks *walks;
@@ -1236,7 +1236,7 @@ struct imp_fit_result {
      * determined, or there are no intervals. */
     const double *loosest;
     const char
-        *walks; /**< which evaluations of the search were of kept walks, or why none
+        *walks; /**< which evaluations of the search were of recorded walks, or why none
                             were; NULL: the optimizer draws new ones each time */
     const char *control_variate; /**< Adam: what it brought, or why there was none; NULL:
                                       not wanted */

@@ -68,7 +68,7 @@ imp_render_until(const imp_scene *scene, const struct imp_run *run,
  * @param run      as in imp_render_until, but that the first look takes its time.
  * @param options  NULL for defaults.
  * @param value    may be NULL.
- * @param gradient,gradient_se [n]; NULL both: the value alone.
+ * @param gradient,gradient_se [n]; both NULL: the value alone.
  * @param[out] end may be NULL.
  * @return as imp_problem_objective or imp_problem_functional; IMP_CANCELLED with what the
  *         looks before gave, if there were any.

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon: kept walks. What rays and random numbers have settled of a walk (where it
+ * importon: recorded walks. What rays and random numbers have settled of a walk (where it
  * scattered, its directions, densities, light samples and what stood in their way) does
  * not depend on reflectances, lamps and roughness. It can be kept, and evaluated at other
  * parameters without a ray:
@@ -11,14 +11,14 @@
  *                             an imp_run then evaluate these walks in place of tracing
  *     imp_walks_weigh         how many of them still count
  *
- * At the parameters that they were drawn at, kept walks give what tracing gives, to the
- * bit, unless roulette was given a floor (imp_walks_options) or they are those of a loss
- * with points of Sobol's sequence: kept walks serve losses of all kinds with one number
- * of sets, and a loss that is traced has the sets that are best for it. At others they
- * are unbiased, and their variance grows where densities move away: with a narrower lobe
- * much, with reflectances and lamps not at all. Many evaluations of the same walks share
- * their noise, so that a fit's errors have to come from fresh ones (imp_fit takes care
- * of that).
+ * At the parameters that they were drawn at, recorded walks give what tracing gives, to
+ * the bit, unless roulette was given a floor (imp_walks_options) or they are those of a
+ * loss with points of Sobol's sequence: recorded walks serve losses of all kinds with
+ * one number of sets, and a loss that is traced has the sets that are best for it. At
+ * others they are unbiased, and their variance grows where densities move away: with a
+ * narrower lobe much, with reflectances and lamps not at all. Many evaluations of the
+ * same walks share their noise, so that a fit's errors have to come from fresh ones
+ * (imp_fit takes care of that).
  */
 #ifndef IMPORTON_WALKS_H
 #define IMPORTON_WALKS_H
@@ -35,7 +35,7 @@ struct imp_walks_options {
     /** 0: the walks of imp_render with this run. 1: walks of losses and their gradients
      * (imp_problem_objective), of which pictures can be made too. They are the same walks
      * unless wavelengths are stratified or points are those of Sobol's sequence, whose
-     * sets have to be independent of each other for a loss. Kept walks are then two or
+     * sets have to be independent of each other for a loss. Recorded walks are then two or
      * more replicates of two sets; a quadratic loss that is traced may have one
      * replicate, and one that is not quadratic has four sets. */
     bool losses;
@@ -108,7 +108,7 @@ imp_walks_read(imp_context *context, imp_scene *scene, const char *path,
 
 struct imp_walks_info {
     size_t size;
-    int n_sensors; /**< with kept walks */
+    int n_sensors; /**< with recorded walks */
     int spp;       /**< walks of a pixel, of the first of these sensors */
     uint64_t seed;
     double n_walks, n_vertices, bytes;
