@@ -538,9 +538,9 @@ struct imp_sensor_info {
     /** A specfilm's: its response curves, which are its channels; else 0. */
     int n_responses;
     const char *const *response_names; /**< [n_responses] */
-    bool
-        photograph; /**< its film has a gamma: targets hold the values of a photograph, from
-                         0 to 1, not linear in light */
+    /** Its film has a gamma: targets hold the values of a photograph, from 0 to 1, not
+     * linear in light. */
+    bool photograph;
 };
 /** Set info->size first; strings belong to the scene.
  * @return IMP_OK; IMP_E_ARG if there is no such sensor. */

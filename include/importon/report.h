@@ -39,9 +39,9 @@ struct imp_report {
     const char *command; /**< that made the result, to be copied; NULL: not known */
     const struct imp_report_item *items; /**< [n_items]; all are copied into the page */
     size_t n_items;
-    bool
-        live; /**< not 0: the page is served, and updated while work goes on
-                   (docs/report.md, section 5). 0: it may use no network */
+    /** The page is served, and updated while work goes on (docs/report.md, section 5).
+     * false: it may use no network. */
+    bool live;
 };
 #define IMP_REPORT_INIT IMP_INIT_ZERO(struct imp_report)
 
