@@ -264,9 +264,9 @@ imp_elements_fit(imp_elements *elements, imp_problem *problem,
 
 struct imp_elements_guide_options {
     size_t size;
-    bool
-        no_lights; /**< light samples, and where walks from the lights begin, as without */
-    double share;  /**< of continuations drawn towards indirect light, or importance, 0 to
+    /** Light samples, and where walks from the lights begin, as without a guide. */
+    bool no_lights;
+    double share; /**< of continuations drawn towards indirect light, or importance, 0 to
                         1 exclusive */
     /** Russian roulette by expected contribution instead of throughput: a walk continues
      * with probability roulette x (radiance expected after this vertex) / (radiance

@@ -1220,10 +1220,9 @@ struct imp_fit_result {
     double chi2, chi2_se; /**< per degree of freedom: the loss over what the targets'
                                noise alone leaves; 1 where the scene explains the
                                pictures. NaN where that noise is not known, or l1 */
-    double
-        shift; /**< where a bias is left: bound of the change of an answer by four times
-                       the samples, in standard errors; NaN: no bias, or no
-                       intervals */
+    /** Where a bias is left: bound of the change of an answer by four times the samples, in
+     * standard errors. NaN: no bias, or no intervals. */
+    double shift;
     /** [n][n] of the variables, measurement and Monte Carlo together, in the directions
      * that the pictures determine and no bound holds. NULL: no intervals. */
     const double *covariance;
@@ -1235,9 +1234,9 @@ struct imp_fit_result {
      * imp_problem_forward makes the picture of it. NULL where all variables are
      * determined, or there are no intervals. */
     const double *loosest;
-    const char
-        *walks; /**< which evaluations of the search were of recorded walks, or why none
-                            were; NULL: the optimizer draws new ones each time */
+    /** Which evaluations of the search were of recorded walks, or why none were; NULL: the
+     * optimizer draws new ones each time. */
+    const char *walks;
     const char *control_variate; /**< Adam: what it brought, or why there was none; NULL:
                                       not wanted */
 };
