@@ -428,9 +428,9 @@ IMP_API void imp_scene_destroy(imp_scene *scene);
  * the slot under the parent. tag NULL: what objects of this type are ("diffuse":
  * "bsdf"). The calls in between set properties of the open object, in the units of the
  * file format (degrees, scene units).
- * @return IMP_OK; IMP_E_ARG for a type that does not exist, or a scene that is
- *         committed; IMP_E_SCENE for objects too deep or an id that is there already;
- *         IMP_E_NOMEM. */
+ * @return IMP_OK; IMP_E_ARG for a tag that is none, or a scene that is committed;
+ *         IMP_E_UNSUPPORTED, without a tag, for a type that does not exist; IMP_E_SCENE for
+ *         an id that is there already; IMP_E_NOMEM. */
 IMP_API enum imp_status imp_scene_begin(imp_scene *scene, const char *tag,
                                         const char *type, const char *id,
                                         const char *name);
