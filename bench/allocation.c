@@ -152,7 +152,7 @@ static void task_make(const struct job *job, struct task *t)
     target.channels = 3;
     must(imp_problem_add_target(t->p, &target));
     imp_film_destroy(film);
-    t->n = imp_problem_n(t->p);
+    t->n = imp_problem_n_variables(t->p);
     t->truth = room(t->n, sizeof *t->truth);
     t->x = room(t->n, sizeof *t->x);
     imp_problem_get_x(t->p, t->truth);

@@ -193,7 +193,8 @@ static double time_gradient(imp_context *ctx, imp_problem *p, double *g, uint64_
     run.spp = spp;
     run.seed = seed;
     const double start = imp__now();
-    must(ctx, imp_problem_objective(p, NULL, &run, &J, g, g + imp_problem_n(p)));
+    must(ctx,
+         imp_problem_objective(p, NULL, &run, &J, g, g + imp_problem_n_variables(p)));
     return imp__now() - start;
 }
 
@@ -220,7 +221,7 @@ static void bench_gradient(const char *key, imp_context *ctx, imp_scene *scene)
 {
     imp_problem *p = problem(ctx, scene);
     double ratio[64];
-    double *g = calloc(2 * imp_problem_n(p) + 1, sizeof *g);
+    double *g = calloc(2 * imp_problem_n_variables(p) + 1, sizeof *g);
     if (!g) exit(3);
     time_gradient(ctx, p, g, 1);
     for (int k = 0; k < repeats; k++) {
@@ -228,7 +229,7 @@ static void bench_gradient(const char *key, imp_context *ctx, imp_scene *scene)
         ratio[k] = a / b;
     }
     printf("  \"%s\": %.3f,\n  \"%s_numbers\": %zu,\n", key, median(ratio, repeats), key,
-           imp_problem_n(p));
+           imp_problem_n_variables(p));
     free(g);
     imp_problem_destroy(p);
 }
@@ -300,7 +301,7 @@ static int child(int res, int child_spp)
     imp_context *ctx = context(2);
     imp_scene *scene = load(ctx, scene_file, res);
     imp_problem *p = problem(ctx, scene);
-    double *g = calloc(2 * imp_problem_n(p) + 1, sizeof *g);
+    double *g = calloc(2 * imp_problem_n_variables(p) + 1, sizeof *g);
     time_gradient(ctx, p, g, 1);
     free(g);
     imp_problem_destroy(p);

@@ -127,8 +127,11 @@ static void work_make(struct work *w, int threads, enum imp_field_interp interp,
         w->x[i][0] = 0.63 * u, w->x[i][1] = 0.63 * v, w->x[i][2] = -0.99999;
         w->d[i][2] = 1;
     }
-    w->rays = (struct imp_bend_rays){n, (const double(*)[3])w->x,
-                                     (const double(*)[3])w->d, NULL};
+    w->rays = (struct imp_bend_rays){.size = sizeof(struct imp_bend_rays),
+                                     .n = n,
+                                     .x = (const double(*)[3])w->x,
+                                     .d = (const double(*)[3])w->d,
+                                     .group = NULL};
     w->exits = calloc(n, sizeof *w->exits);
     w->bars = calloc(n, sizeof *w->bars);
     w->theta_bar = calloc(imp_field_n_theta(w->f), sizeof(double));

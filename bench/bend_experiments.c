@@ -315,8 +315,11 @@ static double lens_adjoint(const struct lens *l, double *bar, double *forward_s,
 {
     struct imp_bend_surface s = IMP_BEND_SURFACE_INIT;
     struct imp_bend_options o = IMP_BEND_OPTIONS_INIT;
-    struct imp_bend_rays r = {l->n, (const double(*)[3])l->x, (const double(*)[3])l->d,
-                              NULL};
+    struct imp_bend_rays r = {.size = sizeof(struct imp_bend_rays),
+                              .n = l->n,
+                              .x = (const double(*)[3])l->x,
+                              .d = (const double(*)[3])l->d,
+                              .group = NULL};
     struct imp_bend_exit *e = calloc(l->n, sizeof *e);
     struct imp_bend_cotangent *c = calloc(l->n, sizeof *c);
     struct imp_bend_gradient g = IMP_BEND_GRADIENT_INIT;
@@ -468,7 +471,8 @@ static void fibre_run(const char *name, double curve, int cells)
     }
     must(imp_bend_create(ctx, f, &b));
     struct imp_bend_surface s = IMP_BEND_SURFACE_INIT;
-    struct imp_bend_tap tap = {{0, 0, 1}, acos(-1), -1};
+    struct imp_bend_tap tap = IMP_BEND_TAP_INIT;
+    tap.offset = acos(-1);
     struct imp_bend_options o = IMP_BEND_OPTIONS_INIT;
     s.offset = 2 * acos(-1);
     o.surfaces = &s, o.n_surfaces = 1, o.taps = &tap, o.n_taps = 1, o.step = 0.02;
@@ -727,8 +731,11 @@ static void gas(void)
         must(imp_field_sum_create(ctx, 6, parts, &truth));
         struct imp_bend_options o = g.o;
         o.scheme = IMP_BEND_YOSHIDA4, o.step = 0.02;
-        struct imp_bend_rays r = {g.n, (const double(*)[3])g.x, (const double(*)[3])g.d,
-                                  NULL};
+        struct imp_bend_rays r = {.size = sizeof(struct imp_bend_rays),
+                                  .n = g.n,
+                                  .x = (const double(*)[3])g.x,
+                                  .d = (const double(*)[3])g.d,
+                                  .group = NULL};
         struct imp_bend_exit *e = calloc(g.n, sizeof *e);
         must(imp_bend_trace(truth, &o, &r, e, NULL, NULL));
         for (size_t i = 0; i < g.n; i++) {
@@ -803,7 +810,8 @@ static void rod(void)
         const double x[3][3] = {{1e-4, 0, -1}, {1e-4, 0, -10}, {1e-4, 0, -10}};
         const double d[3][3] = {{0, 0, 1}, {1e-5, 0, 1}, {-1e-5, 0, 1}};
         struct imp_bend_exit e[3];
-        const struct imp_bend_rays r = {3, x, d, NULL};
+        const struct imp_bend_rays r = {
+            .size = sizeof(struct imp_bend_rays), .n = 3, .x = x, .d = d, .group = NULL};
         must(imp_bend_trace(f, &o, &r, e, NULL, NULL));
         double h = 0;
         for (int q = 1; q < 3; q++) h += 0.5 * (e[q].x[0] + l2 * e[q].v[0] / e[q].v[2]);

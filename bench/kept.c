@@ -206,7 +206,7 @@ static void change(imp_scene *scene)
     imp_problem *p;
     must(imp_problem_create(scene, &p));
     must(imp_problem_activate(p, "*"));
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     double *x = calloc(n, sizeof *x);
     if (!x) exit(3);
     imp_problem_get_x(p, x);
@@ -231,7 +231,7 @@ static void measure_picture(const char *file, const char *define)
     o.n_defines = define != NULL;
     snprintf(path, sizeof path, "%s/%s", IMP_SCENES, file);
     must(imp_scene_load(ctx, path, &o, &scene));
-    keep.memory = 8e9;
+    keep.memory = 8000000000u;
     run.spp = picture_spp;
     for (int reduced = 0; reduced < 2; reduced++) {
         as_vertices = !reduced;
@@ -296,7 +296,7 @@ static void measure_fit(const char *file, const char *define, const char *glob,
             must(imp_problem_create(scene, &p));
             must(imp_problem_activate(p, glob));
             must(imp_problem_add_target(p, &t));
-            const size_t n = imp_problem_n(p);
+            const size_t n = imp_problem_n_variables(p);
             double *at = calloc(n, sizeof *at);
             if (!at || n > 256) exit(3);
             imp_problem_get_x(p, x);
@@ -306,7 +306,8 @@ static void measure_fit(const char *file, const char *define, const char *glob,
             f.optimizer = method;
             f.max_iterations = 15;
             f.tolerance = 1e-9;
-            f.memory = kept ? 4e9 : -1;
+            f.memory = 4000000000u;
+            f.no_recording = !kept;
             as_vertices = way == 1;
             const double start = cpu();
             must(imp_fit(p, &f, &run, &r));
@@ -359,7 +360,7 @@ static void measure_spread(const char *file, const char *define, double floor)
     must(imp_problem_create(scene, &p));
     must(imp_problem_activate(p, "*"));
     must(imp_problem_add_target(p, &t));
-    if (imp_problem_n(p) != N) exit(3);
+    if (imp_problem_n_variables(p) != N) exit(3);
     imp_problem_get_x(p, near);
     for (int i = 0; i < N; i++) near[i] *= 0.7;
     for (int k = 0; k < repeats; k++) {

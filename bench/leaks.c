@@ -143,9 +143,11 @@ int main(int argc, char **argv)
         if (info.dropped_by_cause[c])
             printf("  %llu: %s\n", (unsigned long long)info.dropped_by_cause[c],
                    imp_drop_text((enum imp_drop)c));
-    for (int k = 0; k < info.n_drop_keys; k++)
-        printf("  column %d, row %d, sample %lld\n", info.drop_keys[k].x,
-               info.drop_keys[k].y, (long long)info.drop_keys[k].sample);
+    for (int k = 0; k < info.n_drop_keys; k++) {
+        const struct imp_drop_key *key = IMP_ROW(imp_drop_key, info.drop_keys, k);
+        printf("  column %d, row %d, sample %lld\n", key->x, key->y,
+               (long long)key->sample);
+    }
     printf("largest difference of a pixel from 1: %.2e\n", worst);
     imp_film_destroy(film);
     imp_scene_destroy(scene);

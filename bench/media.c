@@ -194,7 +194,7 @@ static void measure(const char *name, const char *path, const char *numbers, int
     must(imp_scene_load(ctx, path, NULL, &scene));
     must(imp_problem_create(scene, &p));
     must(imp_problem_activate(p, numbers));
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     g = malloc(n * sizeof *g);
     se = malloc(n * sizeof *se);
     target_add(scene, p);

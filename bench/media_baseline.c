@@ -124,7 +124,7 @@ static int by_value(const void *a, const void *b)
 static void compare(imp_problem *p, bool loss, int repeats, int spp)
 {
     double g[8], se[8], time[2] = {1e300, 1e300}, mean = 0, squares = 0;
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     double *ratio = malloc((size_t)repeats * sizeof *ratio);
     for (int r = 0; r < repeats; r++) {
         double variance[2] = {0};

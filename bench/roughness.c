@@ -248,7 +248,7 @@ static void pictures(imp_problem *p, int seed, struct moments *I,
     test_must(ctx, imp_problem_jacobian(p, &run, &primal, films));
     for (int i = 0; i < PIXELS; i++) moment_add(&I[i], imp_film_mean(primal)[i]);
     imp_film_destroy(primal);
-    for (size_t j = 0; j < imp_problem_n(p); j++) {
+    for (size_t j = 0; j < imp_problem_n_variables(p); j++) {
         for (int i = 0; i < PIXELS; i++)
             moment_add(&dI[j][i], imp_film_mean(films[j])[i]);
         imp_film_destroy(films[j]);
@@ -263,13 +263,13 @@ static void losses(imp_problem *p, int seed, struct moments *dJ)
     run.spp = spp;
     run.points = points;
     test_must(ctx, imp_problem_objective(p, NULL, &run, &J, g, NULL));
-    for (size_t j = 0; j < imp_problem_n(p); j++) moment_add(&dJ[j], g[j]);
+    for (size_t j = 0; j < imp_problem_n_variables(p); j++) moment_add(&dJ[j], g[j]);
 }
 /* With draws for the derivative, over without; and the jackknife's standard errors. */
 static struct spread compare(imp_problem *const p[2], struct spread *se, double *slower)
 {
     static struct seen seen[2];
-    const size_t n = imp_problem_n(p[0]);
+    const size_t n = imp_problem_n_variables(p[0]);
     memset(seen, 0, sizeof seen);
     for (int r = 0; r < rounds; r++)
         for (int k = 0; k < 2; k++) {

@@ -85,7 +85,7 @@ static void task_make(const char *file, const char *glob, const char *const *def
     must(imp_scene_load(ctx, path, &o, &t->scene));
     must(imp_problem_create(t->scene, &t->problem));
     must(imp_problem_activate(t->problem, glob));
-    t->n = imp_problem_n(t->problem);
+    t->n = imp_problem_n_variables(t->problem);
     t->truth = room(t->n), t->start = room(t->n);
     t->lo = room(t->n), t->hi = room(t->n);
     imp_problem_get_x(t->problem, t->truth);

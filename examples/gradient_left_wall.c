@@ -35,7 +35,7 @@ int main(int argc, char **argv)
     if (st == IMP_OK) st = imp_scene_load(context, argv[1], NULL, &scene);
     if (st == IMP_OK) st = imp_problem_create(scene, &problem);
     if (st == IMP_OK) st = imp_problem_activate(problem, "red.reflectance.value");
-    if (st == IMP_OK && imp_problem_n(problem) != 3) st = IMP_E_ARG;
+    if (st == IMP_OK && imp_problem_n_variables(problem) != 3) st = IMP_E_ARG;
     if (st == IMP_OK) st = imp_problem_forward(problem, v, &run, &film);
     write.standard_error = 1;
     write.diverging = 1;

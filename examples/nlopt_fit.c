@@ -58,9 +58,10 @@ static enum imp_status minimise(imp_problem *problem, double x[2])
     struct imp_run run = IMP_RUN_INIT;
     double lo[2], hi[2], least;
     for (size_t i = 0; i < 2; i++) {
-        const enum imp_status st =
-            imp_problem_variable(problem, i, NULL, NULL, &lo[i], &hi[i]);
+        struct imp_variable_info variable = IMP_VARIABLE_INFO_INIT;
+        const enum imp_status st = imp_problem_get_variable(problem, i, &variable);
         if (st != IMP_OK) return st;
+        lo[i] = variable.lo, hi[i] = variable.hi;
     }
     run.spp = 64;
     imp_problem_set_run(problem, &run);
@@ -91,7 +92,8 @@ int main(void)
     imp_problem *problem = NULL;
     imp_film *film = NULL;
     double x[2] = {1, 0.5};
-    size_t first = 0, ball = 0;
+    struct imp_variable_info first = IMP_VARIABLE_INFO_INIT;
+    size_t ball = 0;
     enum imp_status st = imp_context_create(NULL, &context);
 
     options.mode = IMP_MONO; /* one number each */
@@ -111,8 +113,8 @@ int main(void)
         st = imp_problem_add_target(problem, &target);
     }
     if (st == IMP_OK) st = imp_scene_find_param(scene, "ball.reflectance.value", &ball);
-    if (st == IMP_OK) st = imp_problem_variable(problem, 0, &first, NULL, NULL, NULL);
-    const int at_ball = first == ball ? 0 : 1;
+    if (st == IMP_OK) st = imp_problem_get_variable(problem, 0, &first);
+    const int at_ball = first.param == ball ? 0 : 1;
     x[at_ball] = 0.7;
     x[1 - at_ball] = 1;
     if (st == IMP_OK) st = minimise(problem, x);

@@ -181,7 +181,7 @@ static void use(imp_scene *s)
     for (int k = 0; k < info.width * info.height * info.channels; k++)
         if (!isfinite(imp_film_mean(film)[k])) __builtin_trap();
     if (imp_problem_create(s, &p) == IMP_OK && imp_problem_activate(p, "*") == IMP_OK) {
-        const size_t n = imp_problem_n(p);
+        const size_t n = imp_problem_n_variables(p);
         double *g = malloc(2 * n * sizeof *g);
         if (g && imp_problem_functional(p, NULL, &run, &v, g, g + n) == IMP_OK)
             for (size_t k = 0; k < n && fabs(v.value) < 1e100; k++)

@@ -83,7 +83,7 @@ static enum imp_status job(int many)
         must(imp_problem_create(scene, &p));
         must(imp_problem_activate(p, active[k]));
         must(imp_problem_add_target(p, &t));
-        if (imp_problem_n(p) > NUMBERS) abort();
+        if (imp_problem_n_variables(p) > NUMBERS) abort();
         last = imp_problem_objective(p, NULL, NULL, &e, g, se);
         imp_problem_destroy(p);
     }

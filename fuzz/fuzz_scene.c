@@ -217,7 +217,7 @@ static void use(imp_context *ctx, imp_scene *s)
             fabsf(imp_film_mean(film)[k]) != INFINITY)
             __builtin_trap();
     if (imp_problem_create(s, &p) == IMP_OK && imp_problem_activate(p, "*") == IMP_OK) {
-        const size_t n = imp_problem_n(p);
+        const size_t n = imp_problem_n_variables(p);
         struct imp_target t = IMP_TARGET_INIT;
         struct imp_estimate J;
         double *g = malloc(2 * n * sizeof *g);

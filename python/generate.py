@@ -18,7 +18,7 @@ import sys
 SCALARS = {"size_t": "c_size_t", "int": "c_int", "unsigned": "c_uint", "double": "c_double",
            "float": "c_float", "int64_t": "c_int64", "uint64_t": "c_uint64",
            "int32_t": "c_int32", "uint32_t": "c_uint32", "uint16_t": "c_uint16",
-           "uint8_t": "c_uint8"}
+           "uint8_t": "c_uint8", "bool": "c_bool"}
 
 
 def split(text):
@@ -134,25 +134,16 @@ class Headers:
     def initial(self, struct):
         """The fields that an initialiser does not leave 0."""
         body = self.initialisers.get("IMP_" + re.sub("^imp_", "", struct).upper() + "_INIT", "")
-        values = re.search(r"\{(.*)\}", body, re.S)
-        if not values or "." in values[1].split(",")[0]:
-            return {}
+        fields = {name: (ctype, sizes) for name, ctype, sizes in self.structs[struct]}
         out = {}
-        for (name, _, sizes), text in zip(self.structs[struct], split(values[1])):
-            if text.startswith("sizeof"):
-                continue
-            if text.startswith("{"):
-                if sizes:
-                    numbers = [float(x) for x in split(text[1:-1])]
-                    if any(numbers):
-                        out[name] = tuple(numbers)
-                continue
-            try:
-                value = self.number(text)
-            except ValueError:
-                value = float(text)
-            if value:
-                out[name] = value
+        for name, at, text in re.findall(r"\.(\w+)(?:\[(\d+)\])? = ([^,)]+)", body):
+            ctype, sizes = fields[name]
+            value = float(text) if ctype in ("c_double", "c_float") else self.number(text)
+            if at:
+                values = list(out.get(name, (0.0,) * sizes[0]))
+                values[int(at)] = value
+                value = tuple(values)
+            out[name] = value
         return out
 
 
@@ -172,7 +163,7 @@ def write(headers, out):
         '"""Declarations of the C library, made from its headers by python/generate.py."""',
         "from __future__ import annotations", "",
         "import ctypes",
-        "from ctypes import (CFUNCTYPE, POINTER, Structure, c_char_p, c_double, c_float, c_int, c_int32,",
+        "from ctypes import (CFUNCTYPE, POINTER, Structure, c_bool, c_char_p, c_double, c_float, c_int, c_int32,",
         "                    c_int64, c_size_t, c_uint, c_uint8, c_uint16, c_uint32, c_uint64, c_void_p)",
         "from typing import Any", "",
         'VERSION = "%s"' % headers.strings["IMP_VERSION_STRING"], "")

@@ -185,7 +185,11 @@ static inline struct imp_bend_rays kit_beam(size_t n, double z0, double radius,
         x[i][0] = r * cos(a), x[i][1] = r * sin(a), x[i][2] = z0;
         d[i][0] = tilt * kit_pm(5, i), d[i][1] = tilt * kit_pm(6, i), d[i][2] = 1;
     }
-    return (struct imp_bend_rays){n, (const double(*)[3])x, (const double(*)[3])d, NULL};
+    return (struct imp_bend_rays){.size = sizeof(struct imp_bend_rays),
+                                  .n = n,
+                                  .x = (const double(*)[3])x,
+                                  .d = (const double(*)[3])d,
+                                  .group = NULL};
 }
 static inline void kit_rays_free(struct imp_bend_rays *r)
 {

@@ -115,15 +115,21 @@ static inline void test_target(imp_context *ctx, imp_problem *p, int sensor, int
 }
 
 /* Index in x of the first number of a parameter. */
+/* The index of the parameter that variable i is of. */
+static inline size_t test_param_of(imp_context *ctx, const imp_problem *p, size_t i)
+{
+    struct imp_variable_info v = IMP_VARIABLE_INFO_INIT;
+    test_must(ctx, imp_problem_get_variable(p, i, &v));
+    return v.param;
+}
+
 static inline size_t test_variable(imp_problem *p, imp_scene *scene, imp_context *ctx,
                                    const char *name)
 {
     size_t index;
     test_must(ctx, imp_scene_find_param(scene, name, &index));
-    for (size_t i = 0; i < imp_problem_n(p); i++) {
-        size_t param;
-        test_must(ctx, imp_problem_variable(p, i, &param, NULL, NULL, NULL));
-        if (param == index) return i;
+    for (size_t i = 0; i < imp_problem_n_variables(p); i++) {
+        if (test_param_of(ctx, p, i) == index) return i;
     }
     printf("Bail out! %s is not active\n", name);
     exit(99);

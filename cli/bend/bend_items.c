@@ -16,8 +16,8 @@ static const char *const axes[3] = {"x", "y", "z"};
 
 void bend_box(imp_bend *b, double lo[3], double hi[3])
 {
-    struct imp_bend_rays r;
-    imp_field_bounds(imp_bend_field(b), lo, hi);
+    struct imp_bend_rays r = IMP_BEND_RAYS_INIT;
+    imp_field_get_bounds(imp_bend_field(b), lo, hi);
     imp_bend_get_rays(b, &r);
     struct imp_bend_exit *e = cli_alloc(r.n, sizeof *e);
     const int traced = imp_bend_run(b, e, NULL, NULL) == IMP_OK;
@@ -77,7 +77,7 @@ static void put_short(struct json *j, double v)
 
 static void put_paths(struct json *j, imp_bend *b, int n_um, const double *um)
 {
-    struct imp_bend_rays r;
+    struct imp_bend_rays r = IMP_BEND_RAYS_INIT;
     imp_bend_get_rays(b, &r);
     const size_t shown = r.n < RAYS ? r.n : RAYS;
     json_integer(j, "n_rays", (int64_t)r.n);
@@ -153,7 +153,7 @@ static int put_spot(struct json *j, imp_bend *b, size_t i,
                     const struct imp_bend_target *t, int n_um, const double *um)
 {
     struct imp_bend_arrival *a = cli_alloc(imp_bend_n_rays(b), sizeof *a);
-    struct imp_bend_rays rays;
+    struct imp_bend_rays rays = IMP_BEND_RAYS_INIT;
     size_t n = 0;
     const enum imp_status st = imp_bend_arrivals(b, i, a, &n);
     imp_bend_get_rays(b, &rays);

@@ -98,7 +98,7 @@ static int write_exits(const char *path)
 {
     const size_t n = imp_bend_n_rays(bend);
     struct imp_bend_exit *e = cli_alloc(n, sizeof *e);
-    struct imp_bend_rays rays;
+    struct imp_bend_rays rays = IMP_BEND_RAYS_INIT;
     int rc = 0;
     const enum imp_status st = imp_bend_run(bend, e, NULL, NULL);
     if (st != IMP_OK) {
@@ -184,11 +184,13 @@ static int check(void)
     if (rc) return rc;
     const enum imp_status st = imp_bend_check(bend, &rows, &n);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
-    for (size_t i = 0; i < n; i++)
-        if (!strcmp(rows[i].method, "rays") && rows[i].value < rows[i].reference)
+    for (size_t i = 0; i < n; i++) {
+        const struct imp_check_row *r = IMP_ROW(imp_check_row, rows, i);
+        if (!strcmp(r->method, "rays") && r->value < r->reference)
             cli_say("%.0f of %.0f rays are lost and not checked: 'bend trace' counts the "
                     "reasons",
-                    rows[i].reference - rows[i].value, rows[i].reference);
+                    r->reference - r->value, r->reference);
+    }
     struct json j = {0};
     if (cli.json) {
         j = cli_json();
@@ -198,7 +200,7 @@ static int check(void)
                "reference", "error", "limit");
     }
     for (size_t i = 0; i < n; i++) {
-        const struct imp_check_row *r = &rows[i];
+        const struct imp_check_row *r = IMP_ROW(imp_check_row, rows, i);
         ok = ok && r->ok;
         if (cli.json) {
             json_object(&j, NULL);

@@ -193,7 +193,9 @@ int bend_fit(imp_bend *bend)
     fo.scale = o.scale;
     fo.checkpoint = o.checkpoint;
     fo.resume = o.resume;
-    fo.carry = o.carry == 1 ? 1 : o.carry == 2 ? -1 : 0;
+    fo.carry = o.carry == 1   ? IMP_BEND_CARRY_ON
+               : o.carry == 2 ? IMP_BEND_CARRY_OFF
+                              : IMP_BEND_CARRY_AUTO;
     fo.progress = progress_report;
     const double start = cli_now();
     const enum imp_status st = imp_bend_fit(bend, &fo, &r);

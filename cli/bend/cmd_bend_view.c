@@ -142,7 +142,7 @@ static void slice(const imp_field *f, struct chart *c, int u, int v, const doubl
 static void paths_draw(imp_bend *b, const struct palette *palette, struct chart *c, int u,
                        int v)
 {
-    struct imp_bend_rays r;
+    struct imp_bend_rays r = IMP_BEND_RAYS_INIT;
     imp_bend_get_rays(b, &r);
     const size_t stride = r.n > PATHS ? r.n / PATHS : 1;
     for (size_t i = stride / 2; i < r.n; i += stride) {
@@ -212,7 +212,7 @@ static int spots(imp_bend *b, const struct palette *palette, size_t target,
     static const chart_colour ink = {0.02f, 0.05f, 0.2f}, light = {.6f, .6f, .6f};
     size_t n = 0;
     struct chart c;
-    struct imp_bend_rays rays;
+    struct imp_bend_rays rays = IMP_BEND_RAYS_INIT;
     struct imp_bend_arrival *a = cli_alloc(imp_bend_n_rays(b), sizeof *a);
     const enum imp_status st = imp_bend_arrivals(b, target, a, &n);
     imp_bend_get_rays(b, &rays);

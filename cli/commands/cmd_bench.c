@@ -43,7 +43,7 @@ static int time_gradient(const struct imp_run *run, imp_film *film, struct times
     target.pixels = imp_film_mean(film);
     if (st == IMP_OK) st = imp_problem_add_target(problem, &target);
     if (st == IMP_OK) {
-        t->n = imp_problem_n(problem);
+        t->n = imp_problem_n_variables(problem);
         grad = cli_alloc(t->n, sizeof *grad);
     }
     t->gradient = INFINITY;

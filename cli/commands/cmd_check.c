@@ -62,7 +62,7 @@ static int run_check(int n, char **operand)
         int taken = 0;
         if (o.fresh_spp > 0) fresh.spp = o.fresh_spp;
         if (!cli.json) check_rows_print(rows, n_rows);
-        else if (!cli_failed(imp_problem_spp(problem, -1, &fresh, &taken)))
+        else if (!cli_failed(imp_problem_get_spp(problem, -1, &fresh, &taken)))
             print_json(&run, taken, rows, n_rows);
         cli_say("%zu check%s, %zu failed, %zu too noisy to tell%s", n_rows,
                 plural((long long)n_rows), failed, noisy,

@@ -112,7 +112,7 @@ static int estimate_for(imp_problem *problem, struct imp_run run, const float *s
                         struct result *sum)
 {
     enum { SMALL = 4 }; /* replicates need two */
-    const size_t n = imp_problem_n(problem);
+    const size_t n = imp_problem_n_variables(problem);
     const double start = ranks_same(cli_now());
     struct result r = *sum;
     enum imp_status st = IMP_OK;
@@ -177,7 +177,7 @@ static int compute(imp_problem *problem, const struct imp_run *run, struct resul
     r->spp = cli_spp(run);
     for (int t = loss ? 0 : -1; t < (int)problem_options.targets.n; t++) {
         int taken = 0;
-        const enum imp_status st = imp_problem_spp(problem, t, run, &taken);
+        const enum imp_status st = imp_problem_get_spp(problem, t, run, &taken);
         if (st != IMP_OK) return cli_fail(st, cli.scene_path);
         if (taken > r->spp_taken) r->spp_taken = taken;
     }
@@ -330,7 +330,7 @@ static int run_gradient(int n, char **operand)
     if (!rc) rc = problem_open(&problem);
     if (!rc && (rc = problem_censor(problem))) problem_close(problem);
     if (rc) return rc;
-    const size_t n_x = imp_problem_n(problem);
+    const size_t n_x = imp_problem_n_variables(problem);
     struct imp_run run = cli_run();
     if (cli_spp(&run) == 1) run.spp = 2; /* replicates need two, which are reported */
     r.x = cli_alloc(n_x, sizeof *r.x);

@@ -116,7 +116,7 @@ static int run_info(int n, char **operand)
 {
     struct imp_scene_info s = {.size = sizeof s};
     (void)n;
-    cli.lenient = 2; /* listed, without warnings */
+    cli.lenient = IMP_LENIENT_QUIET; /* listed, without warnings */
     int rc = cli_load(operand[0]);
     if (rc) return rc;
     imp_scene_get_info(cli.scene, &s);

@@ -240,7 +240,7 @@ static int run_jacobian(int n, char **operand)
     }
     const struct imp_run run = cli_run();
     progress_deadline(cli.time_s);
-    const size_t n_x = imp_problem_n(problem);
+    const size_t n_x = imp_problem_n_variables(problem);
     films = cli_alloc(n_x, sizeof *films);
     means = cli_alloc(n_x, sizeof *means);
     group = cli_alloc(n_x, sizeof *group);

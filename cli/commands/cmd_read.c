@@ -120,7 +120,7 @@ static int number_read(imp_problem *problem, struct json *j, struct imp_run run,
                        const float *adjoint, const struct block *blocks, size_t n_blocks,
                        struct findings *found)
 {
-    const size_t n = n_blocks ? imp_problem_n(problem) : 0;
+    const size_t n = n_blocks ? imp_problem_n_variables(problem) : 0;
     struct reading r = {.grad = n ? cli_alloc(n, sizeof(double)) : NULL,
                         .se = n ? cli_alloc(n, sizeof(double)) : NULL};
     struct imp_estimate other = {0, 0, 0};

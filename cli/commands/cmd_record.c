@@ -81,7 +81,7 @@ static int run_record(int n, char **operand)
     char *path = cli.out ? cli_strdup(cli.out) : default_output();
     rc = overwrite_check(path, OUTPUT_RECORD);
     if (!rc) {
-        options_of.memory = 1e6 * o.memory;
+        options_of.memory = (size_t)(1e6 * o.memory);
         options_of.losses = !o.pictures;
         options_of.all_sensors = o.all_sensors;
         options_of.survival = o.survival > 0 ? o.survival : -1;

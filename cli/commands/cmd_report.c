@@ -156,7 +156,7 @@ static int add_picture(struct collection *c, const char *path, const char *name,
     c->film = grown(c->film, c->n_films + 1, sizeof *c->film);
     c->film[c->n_films++] = film;
     /* The derivatives are there one by one. */
-    if (imp_film_get_text(film, PICTURE_LAYERS)) return 0;
+    if (imp_film_text(film, PICTURE_LAYERS)) return 0;
     char *stem = keep(c, strndup(name, strlen(name) - strlen(".exr")));
     /* The effect of the values that a fit did not determine is a derivative, too. */
     const bool loose = !strncmp(name, "undetermined", strlen("undetermined"));
@@ -175,7 +175,7 @@ static int add_picture(struct collection *c, const char *path, const char *name,
             continue;
         item->role = known[k].role;
         if (item->role && !strcmp(item->role, "picture") && !c->command)
-            c->command = imp_film_get_text(film, "importon.command");
+            c->command = imp_film_text(film, "importon.command");
         item->name = known[k].shown;
         item->view = view_of(stem);
     }

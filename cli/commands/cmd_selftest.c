@@ -33,13 +33,14 @@ static void print_text(const struct imp_selftest_row *rows, size_t n)
 {
     int width = 6, kind = 4;
     for (size_t i = 0; i < n; i++) {
-        if ((int)strlen(rows[i].object) > width) width = (int)strlen(rows[i].object);
-        if ((int)strlen(rows[i].kind) > kind) kind = (int)strlen(rows[i].kind);
+        const struct imp_selftest_row *r = IMP_ROW(imp_selftest_row, rows, i);
+        if ((int)strlen(r->object) > width) width = (int)strlen(r->object);
+        if ((int)strlen(r->kind) > kind) kind = (int)strlen(r->kind);
     }
     printf("%-*s %-*s %-10s %-12s %-12s %-9s %-10s %s\n", width, "object", kind, "kind",
            "contract", "value", "reference", "p", "error", "verdict");
     for (size_t i = 0; i < n; i++) {
-        const struct imp_selftest_row *r = &rows[i];
+        const struct imp_selftest_row *r = IMP_ROW(imp_selftest_row, rows, i);
         char p[16] = "", reference[24], error[24];
         if (r->chance >= 0) snprintf(p, sizeof p, "%.2g", r->chance);
         snprintf(reference, sizeof reference, r->answers > 0 ? "0 of %.0f" : "%.6g",
@@ -57,7 +58,7 @@ static void print_json(const char *subject, const struct imp_selftest_row *rows,
     json_text(&j, "subject", subject);
     json_array(&j, "rows");
     for (size_t i = 0; i < n; i++) {
-        const struct imp_selftest_row *r = &rows[i];
+        const struct imp_selftest_row *r = IMP_ROW(imp_selftest_row, rows, i);
         json_object(&j, NULL);
         json_text(&j, "object", r->object);
         json_text(&j, "kind", r->kind);
@@ -98,7 +99,8 @@ static int run_selftest(int n, char **operand)
     const enum imp_status st = imp_selftest(cli.scene, (enum imp_selftest_subject)subject,
                                             &selftest, &rows, &n_rows);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
-    for (size_t i = 0; i < n_rows; i++) failed += rows[i].ok == 0;
+    for (size_t i = 0; i < n_rows; i++)
+        failed += IMP_ROW(imp_selftest_row, rows, i)->ok == IMP_VERDICT_WRONG;
     if (cli.json) print_json(subjects[subject], rows, n_rows, failed);
     else print_text(rows, n_rows);
     cli_say("%zu contract%s, %zu broken", n_rows, plural((long long)n_rows), failed);

@@ -71,7 +71,7 @@ static int open_all(const char *path)
     int rc = cli_open();
     if (rc) return rc;
     cli.scene_path = path;
-    read.memory = 1e6 * o.memory;
+    read.memory = (size_t)(1e6 * o.memory);
     read.ess = o.ess;
     const enum imp_status st = imp_walks_read(cli.context, NULL, path, &read, &w.walks);
     if (st != IMP_OK) return cli_fail(st, NULL);
@@ -88,7 +88,7 @@ static int open_all(const char *path)
     w.run.walks = w.walks;
     if (!rc) rc = problem_open(&w.problem);
     if (rc) return rc;
-    w.n = imp_problem_n(w.problem);
+    w.n = imp_problem_n_variables(w.problem);
     return problem_options.targets.n
                ? 0
                : region_take(o.region, w.run.sensor, &w.adjoint, &w.mask);

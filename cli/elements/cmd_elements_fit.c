@@ -105,16 +105,17 @@ static void put_json(struct json *j, const struct elements_sources *s,
     for (size_t k = 0; k < r->n_goals; k++) {
         json_object(j, NULL);
         json_text(j, "goal", elements_source_name(s, k));
-        json_number(j, "target", r->goals[k].target);
-        json_number(j, "before", r->goals[k].before);
-        json_number(j, "after", r->goals[k].after);
+        json_number(j, "target", IMP_ROW(imp_elements_goal, r->goals, k)->target);
+        json_number(j, "before", IMP_ROW(imp_elements_goal, r->goals, k)->before);
+        json_number(j, "after", IMP_ROW(imp_elements_goal, r->goals, k)->after);
         json_end_object(j);
     }
     json_end_array(j);
     json_array(j, "params");
     for (size_t b = 0; b < n_blocks; b++)
         for (size_t i = 0; i < blocks[b].n; i++) {
-            const struct imp_fit_variable *v = &r->variables[blocks[b].first + i];
+            const struct imp_fit_variable *v =
+                IMP_ROW(imp_fit_variable, r->variables, blocks[b].first + i);
             char name[512];
             json_object(j, NULL);
             json_text(j, "name", cli_number_name(&blocks[b].info, i, name, sizeof name));
@@ -135,11 +136,14 @@ static void print(const struct elements_sources *s, const struct block *blocks,
     printf("%-44s %13s %13s %13s\n", "measurement", "target", "before", "after");
     for (size_t k = 0; k < r->n_goals; k++)
         printf("%-44s %13.6g %13.6g %13.6g\n", elements_source_name(s, k),
-               r->goals[k].target, r->goals[k].before, r->goals[k].after);
+               IMP_ROW(imp_elements_goal, r->goals, k)->target,
+               IMP_ROW(imp_elements_goal, r->goals, k)->before,
+               IMP_ROW(imp_elements_goal, r->goals, k)->after);
     printf("\n%-44s %13s %13s\n", "parameter", "start", "value");
     for (size_t b = 0; b < n_blocks; b++)
         for (size_t i = 0; i < blocks[b].n; i++) {
-            const struct imp_fit_variable *v = &r->variables[blocks[b].first + i];
+            const struct imp_fit_variable *v =
+                IMP_ROW(imp_fit_variable, r->variables, blocks[b].first + i);
             char name[512];
             printf("%-44s %13.6g %13.6g%s\n",
                    cli_number_name(&blocks[b].info, i, name, sizeof name), v->start,
@@ -161,8 +165,10 @@ static int write_set(const struct block *blocks, size_t n_blocks)
     for (size_t b = 0; b < n_blocks; b++) {
         fprintf(to.file, "%s=", blocks[b].info.name);
         for (size_t i = 0; i < blocks[b].n; i++)
-            fprintf(to.file, "%s%.17g", i ? "," : "",
-                    found.result->variables[blocks[b].first + i].value);
+            fprintf(
+                to.file, "%s%.17g", i ? "," : "",
+                IMP_ROW(imp_fit_variable, found.result->variables, blocks[b].first + i)
+                    ->value);
         fprintf(to.file, "\n");
     }
     return output_close(&to, 0);

@@ -45,7 +45,9 @@ void elements_answer_info(const struct elements_answer *a, struct json *j)
                 i->leaves == 1 ? "leaf" : "leaves", i->links, plural((long long)i->links),
                 (long long)i->rays, plural(i->rays), i->order);
         print_measures(a);
-        const double change = i->n_steps > 1 ? i->steps[i->n_steps - 2].change : NAN;
+        const double change =
+            i->n_steps > 1 ? IMP_ROW(imp_elements_step, i->steps, i->n_steps - 2)->change
+                           : NAN;
         if (isfinite(change))
             cli_say("%s (last change %.2g %%)", i->reason, 100 * change);
         else cli_say("%s", i->reason);
@@ -79,7 +81,7 @@ void elements_answer_info(const struct elements_answer *a, struct json *j)
     json_number(j, "lobe_error", i->worst_residual);
     json_array(j, "steps");
     for (size_t k = 0; k < i->n_steps; k++) {
-        const struct imp_elements_step *s = &i->steps[k];
+        const struct imp_elements_step *s = IMP_ROW(imp_elements_step, i->steps, k);
         json_object(j, NULL);
         json_number(j, "eps", s->eps);
         json_integer(j, "links", (int64_t)s->links);
@@ -110,7 +112,7 @@ void elements_answer_sensitivity(const struct elements_answer *a, struct json *j
     if (j) json_array(j, "sensitivity");
     else printf("%-44s %13s %13s %10s\n", "number", "value", "derivative", "elasticity");
     for (size_t k = 0; k < a->n_rows; k++) {
-        const struct imp_elements_row *r = &a->rows[k];
+        const struct imp_elements_row *r = IMP_ROW(imp_elements_row, a->rows, k);
         const char *name = elements_row_name(r, text, sizeof text);
         if (r->emission) sum += r->share;
         if (j) {

@@ -218,7 +218,7 @@ static void put_ranks(struct json *j, const struct elements_answer *a)
     struct rank *r = cli_alloc(a->n_rows, sizeof *r);
     size_t n = 0;
     for (size_t k = 0; k < a->n_rows; k++) {
-        const struct imp_elements_row *row = &a->rows[k];
+        const struct imp_elements_row *row = IMP_ROW(imp_elements_row, a->rows, k);
         size_t at = 0;
         while (at < n &&
                (r[at].row->emission != row->emission || r[at].row->param != row->param ||

@@ -46,7 +46,7 @@ static int writable(const struct block *blocks, size_t n_blocks)
 /* The fitted values, for the manifest. */
 static int note_results(const imp_problem *problem, const struct imp_fit_result *r)
 {
-    const size_t n = imp_problem_n(problem);
+    const size_t n = imp_problem_n_variables(problem);
     if (!cli.manifest) return 0;
     double *x = cli_alloc(3 * n, sizeof *x);
     for (size_t i = 0; i < n; i++) {

@@ -144,7 +144,7 @@ static void print_table(const struct fit_answer *a, char **paths)
  * any: NAME.interval.exr; where there are none, that of an earlier fit goes. Volumes have none. */
 static int write_intervals(const struct fit_answer *a, const struct block *b)
 {
-    double *half = cli_alloc(imp_problem_n(a->problem), sizeof *half);
+    double *half = cli_alloc(imp_problem_n_variables(a->problem), sizeof *half);
     char name[512], *path = NULL;
     struct block of = *b;
     int known = 0, rc = 0;
@@ -169,7 +169,7 @@ static int write_intervals(const struct fit_answer *a, const struct block *b)
 static int write_textures(const struct fit_answer *a, char **paths)
 {
     int rc = 0;
-    double *x = cli_alloc(imp_problem_n(a->problem), sizeof *x);
+    double *x = cli_alloc(imp_problem_n_variables(a->problem), sizeof *x);
     imp_problem_get_x(a->problem, x);
     for (size_t k = 0; k < a->n_blocks; k++) {
         const struct block *b = &a->blocks[k];

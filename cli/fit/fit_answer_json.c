@@ -9,8 +9,8 @@
 
 struct imp_fit_variable fit_variable(const imp_problem *problem, size_t i)
 {
-    struct imp_fit_variable v = {0};
-    (void)!imp_problem_fit_variable(problem, i, &v); /* it is there */
+    struct imp_fit_variable v = IMP_FIT_VARIABLE_INIT;
+    (void)!imp_problem_get_fit_variable(problem, i, &v); /* it is there */
     return v;
 }
 

@@ -26,7 +26,7 @@ void fit_missing_json(struct json *j, const struct fit_answer *a)
     char name[576];
     json_array(j, "missing");
     for (size_t k = 0; k < a->n_missing; k++) {
-        const struct imp_missing *m = &a->missing[k];
+        const struct imp_missing *m = IMP_ROW(imp_missing, a->missing, k);
         json_object(j, NULL);
         json_text(j, "name", missing_name(m, name, sizeof name));
         json_number(j, "value", m->value);
@@ -49,7 +49,8 @@ void fit_missing_print(const struct fit_answer *a)
     size_t n = 0;
     char name[576];
     for (size_t k = 0; k < a->n_missing && n < MOST; k++)
-        if (a->missing[k].chance < CHANCE) named[n++] = &a->missing[k];
+        if (IMP_ROW(imp_missing, a->missing, k)->chance < CHANCE)
+            named[n++] = IMP_ROW(imp_missing, a->missing, k);
     if (n == 0) {
         printf("no parameter that is not fitted is significant\n");
         return;

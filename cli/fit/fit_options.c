@@ -73,9 +73,8 @@ struct imp_fit_options fit_choice_options(void)
     fit.tolerance = fit_choice.tolerance;
     fit.momentum = fit_choice.momentum;
     fit.levels = fit_choice.levels;
-    fit.memory = fit_choice.memory < 0    ? 0
-                 : fit_choice.memory == 0 ? -1
-                                          : 1e6 * fit_choice.memory;
+    fit.memory = fit_choice.memory > 0 ? (size_t)(1e6 * fit_choice.memory) : 0;
+    fit.no_recording = fit_choice.memory == 0;
     fit.headroom = fit_choice.headroom;
     static const enum imp_variates variates[] = {IMP_VARIATES_AUTO, IMP_VARIATES_ON,
                                                  IMP_VARIATES_OFF};

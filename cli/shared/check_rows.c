@@ -17,13 +17,14 @@ static const char *verdict(const struct imp_check_row *r)
 void check_rows_print(const struct imp_check_row *rows, size_t n)
 {
     int width = 9;
-    for (size_t i = 0; i < n; i++)
-        if (rows[i].param && (int)strlen(rows[i].param) > width)
-            width = (int)strlen(rows[i].param);
+    for (size_t i = 0; i < n; i++) {
+        const char *param = IMP_ROW(imp_check_row, rows, i)->param;
+        if (param && (int)strlen(param) > width) width = (int)strlen(param);
+    }
     printf("%-7s %-*s %-8s %-15s %-15s %-9s %-9s %s\n", "method", width, "parameter",
            "step", "value", "reference", "se", "error", "verdict");
     for (size_t i = 0; i < n; i++) {
-        const struct imp_check_row *r = &rows[i];
+        const struct imp_check_row *r = IMP_ROW(imp_check_row, rows, i);
         char step[16] = "", se[16] = "";
         if (r->step > 0) snprintf(step, sizeof step, "%.0e", r->step);
         if (r->se > 0) snprintf(se, sizeof se, "%.1e", r->se);
@@ -39,7 +40,7 @@ void check_rows_json(struct json *j, const struct imp_check_row *rows, size_t n)
 {
     json_array(j, "rows");
     for (size_t i = 0; i < n; i++) {
-        const struct imp_check_row *r = &rows[i];
+        const struct imp_check_row *r = IMP_ROW(imp_check_row, rows, i);
         json_object(j, NULL);
         json_text(j, "method", r->method);
         json_text(j, "param", r->param);
@@ -62,6 +63,9 @@ void check_rows_json(struct json *j, const struct imp_check_row *rows, size_t n)
 size_t check_rows_count(const struct imp_check_row *rows, size_t n, int ok)
 {
     size_t count = 0;
-    for (size_t i = 0; i < n; i++) count += ok < 0 ? rows[i].ok < 0 : rows[i].ok == ok;
+    for (size_t i = 0; i < n; i++) {
+        const int is = IMP_ROW(imp_check_row, rows, i)->ok;
+        count += ok < 0 ? is < 0 : is == ok;
+    }
     return count;
 }

@@ -237,7 +237,7 @@ int cli_load(const char *path)
     options.n_defines = cli.defines.n;
     options.weights = cli.weights;
     options.bins = cli.bins;
-    options.lenient = cli.lenient;
+    options.lenient = (enum imp_lenience)cli.lenient;
     if (cli.search) split_search(cli.search, &search);
     options.search = search.item;
     options.n_search = search.n;

@@ -56,7 +56,8 @@ struct cli {
     /* options_scene */
     struct arg_list defines, sets;
     const char *search, *weights, *bins;
-    int mode, dump, lenient;
+    int mode, dump;
+    int lenient; /* enum imp_lenience; an option sets 1, IMP_LENIENT_WARN */
     /* options_run */
     int sensor, spp;
     uint64_t seed;

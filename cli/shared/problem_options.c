@@ -255,17 +255,17 @@ void problem_close(imp_problem *problem)
 
 struct block *problem_blocks(const imp_problem *problem, size_t *n_blocks)
 {
-    const size_t n = imp_problem_n(problem);
+    const size_t n = imp_problem_n_variables(problem);
     struct block *blocks = cli_alloc(imp_scene_n_params(cli.scene), sizeof *blocks);
     *n_blocks = 0;
     for (size_t i = 0; i < n;) {
         struct block *b = &blocks[*n_blocks];
-        size_t param;
+        struct imp_variable_info v = IMP_VARIABLE_INFO_INIT;
         b->info.size = sizeof b->info;
         b->tie.size = sizeof b->tie;
-        if (imp_problem_variable(problem, i, &param, NULL, NULL, NULL) != IMP_OK ||
+        if (imp_problem_get_variable(problem, i, &v) != IMP_OK ||
             imp_problem_get_tie(problem, i, &b->tie) != IMP_OK ||
-            imp_scene_get_param(cli.scene, param, &b->info) != IMP_OK || !b->info.count)
+            imp_scene_get_param(cli.scene, v.param, &b->info) != IMP_OK || !b->info.count)
             break;
         if (b->tie.factor) {
             b->info.name = b->tie.name;

@@ -32,10 +32,9 @@ static void shares_open(struct shares *s, int count)
     s->walk = cli_alloc(s->n * (size_t)count, sizeof *s->walk);
     s->on = cli_alloc(s->n, sizeof *s->on);
     char *active = cli_alloc(s->n, 1);
-    for (size_t i = 0; i < imp_problem_n(s->problem); i++) {
-        size_t param;
-        if (imp_problem_variable(s->problem, i, &param, NULL, NULL, NULL) == IMP_OK)
-            active[param] = 1;
+    for (size_t i = 0; i < imp_problem_n_variables(s->problem); i++) {
+        struct imp_variable_info v = IMP_VARIABLE_INFO_INIT;
+        if (imp_problem_get_variable(s->problem, i, &v) == IMP_OK) active[v.param] = 1;
     }
     for (size_t k = 0; k < s->n; k++)
         if (active[k]) s->on[s->n_on++] = k;

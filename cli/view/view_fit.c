@@ -43,9 +43,10 @@ static double shown(const struct block *b, const double *x, size_t i)
 /* And back: number i of x from one that is shown, inside its bounds. */
 static double hidden(const struct block *b, double v, size_t i)
 {
-    double lo = -INFINITY, hi = INFINITY;
-    (void)!imp_problem_variable(f.problem, i, NULL, NULL, &lo, &hi); /* it is there */
-    return fmin(fmax(b->tie.log ? log(v) : v, lo), hi);
+    struct imp_variable_info bounds = IMP_VARIABLE_INFO_INIT;
+    bounds.lo = -INFINITY, bounds.hi = INFINITY;
+    (void)!imp_problem_get_variable(f.problem, i, &bounds); /* it is there */
+    return fmin(fmax(b->tie.log ? log(v) : v, bounds.lo), bounds.hi);
 }
 
 /* Values of all blocks but textures, in the order of x. */
@@ -329,7 +330,7 @@ int view_fit(void)
     int rc = problem_open(&f.problem);
     if (rc) return rc;
     f.blocks = problem_blocks(f.problem, &f.n_blocks);
-    f.n = imp_problem_n(f.problem);
+    f.n = imp_problem_n_variables(f.problem);
     f.start = cli_alloc(f.n, sizeof *f.start);
     imp_problem_get_x(f.problem, f.start);
     if (cli.out) rc = fit_answer_writable(f.blocks, f.n_blocks);

@@ -7,7 +7,7 @@
  *     imp_bend_trace          rays through it -> exits
  *     imp_bend_adjoint        dC/d(exit) of every ray -> dC/d(field, origins, directions)
  *     imp_bend_load           or all of it from a file: field, rays, targets
- *     imp_bend_fit            a field that does what the targets ask
+ *     imp_bend_fit            a field that minimises the distance to the targets
  *
  * A ray has position x and optical momentum v, |v| = eta(x), and follows the canonical
  * equations x' = v, v' = eta grad eta. The gradient is the derivative of the program that
@@ -42,15 +42,11 @@ struct imp_field_grid {
     enum imp_field_param param;
     int cells[3];          /**< x, y, z */
     double lo[3], hi[3];   /**< the box the cells fill */
-    int single;            /**< trace with float samples; theta stays double */
+    bool single;           /**< trace with float samples; theta stays double */
     double gladstone_dale; /**< K: samples are densities rho, index 1 + K rho (Gladstone
                                 and Dale); 0: samples are the index */
 };
-#define IMP_FIELD_GRID_INIT                                                              \
-    {                                                                                    \
-        sizeof(struct imp_field_grid), IMP_FIELD_SPLINE, IMP_FIELD_ETA, {0}, {0}, {0},   \
-            0, 0                                                                         \
-    }
+#define IMP_FIELD_GRID_INIT IMP_INIT_ZERO(struct imp_field_grid)
 
 /** A grid with the same index everywhere. theta: [z][y][x] coefficients, cells + 3 along
  * an axis for splines (the first node lies one spacing before lo), cells + 1 for
@@ -63,8 +59,11 @@ imp_field_grid_create(imp_context *context, const struct imp_field_grid *grid,
 
 /** Profiles by name: "constant", "luneburg", "maxwell", "rod" (n^2 parabolic),
  * "rod-vendor", "rod-power", "sech", "plume", "polynomial", "axial", "linear". Parameters
- * in the order that imp_field_param_name tells; imp_field_profile_count says how many
- * there are. axis: unit vector of kinds that have one; NULL: z. */
+ * in the order of imp_field_param_name, imp_field_profile_count of
+ * them. axis: unit vector of kinds that have one; NULL: z.
+ * params [imp_field_profile_count(kind)], axis [3]; both are copied.
+ * @return IMP_OK; IMP_E_ARG for an unknown kind or parameters without an index;
+ *         IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_field_profile_create(imp_context *context, const char *kind, const double *params,
                          const double *axis, imp_field **out);
@@ -73,15 +72,16 @@ IMP_API size_t imp_field_profile_count(const char *kind);
 
 struct imp_field_radial {
     size_t size;
-    int cylinder; /**< 1: r is the distance from an axis; 0: from the centre */
+    bool cylinder; /**< 1: r is the distance from an axis; 0: from the centre */
     double centre[3], axis[3];
     double radius; /**< of the last cell; beyond it the outermost polynomial goes on */
     int cells;     /**< of the cubic spline in r^2: cells + 3 coefficients */
 };
 #define IMP_FIELD_RADIAL_INIT                                                            \
-    {                                                                                    \
-        sizeof(struct imp_field_radial), 0, {0}, {0, 0, 1}, 1, 16                        \
-    }
+    IMP_INIT(struct imp_field_radial, .axis[2] = 1, .radius = 1, .cells = 16)
+/** The same index everywhere, symmetric about a point or an axis: a cubic spline in
+ * r^2. theta: [cells + 3].
+ * @return IMP_OK; IMP_E_ARG for sizes or an index that are not positive; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_field_radial_create(imp_context *context, const struct imp_field_radial *radial,
                         double index, imp_field **out);
@@ -94,29 +94,28 @@ struct imp_field_rz {
     int cells_r, cells_z; /**< of the cubic spline in r^2 and along the axis */
 };
 #define IMP_FIELD_RZ_INIT                                                                \
-    {                                                                                    \
-        sizeof(struct imp_field_rz), {0}, {0, 0, 1}, 1, -1, 1, 8, 16                     \
-    }
+    IMP_INIT(struct imp_field_rz, .axis[2] = 1, .radius = 1, .lo = -1, .hi = 1,          \
+             .cells_r = 8, .cells_z = 16)
 /** Symmetric about an axis: a tensor cubic spline in r^2 and z. theta:
- * [cells_z + 3][cells_r + 3]. */
+ * [cells_z + 3][cells_r + 3].
+ * @return as imp_field_radial_create. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_rz_create(imp_context *context,
                                                            const struct imp_field_rz *rz,
                                                            double index, imp_field **out);
+/** Set rz->size first.
+ * @return IMP_OK; IMP_E_ARG if the field is another kind. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_get_rz(const imp_field *field,
                                                         struct imp_field_rz *rz);
 
 #define IMP_FIELD_AXIAL (-1)
 struct imp_field_symmetry {
     size_t size;
-    int mirror[3]; /**< across the middle planes of x, y, z */
-    int axis;      /**< 0, 1, 2: of turns about the middle */
-    int fold;      /**< turns: 2 halves, 4 quarters, IMP_FIELD_AXIAL: nodes at one
+    bool mirror[3]; /**< across the middle planes of x, y, z */
+    int axis;       /**< 0, 1, 2: of turns about the middle */
+    int fold;       /**< turns: 2 halves, 4 quarters, IMP_FIELD_AXIAL: nodes at one
                         distance from the axis are one number; 0: none */
 };
-#define IMP_FIELD_SYMMETRY_INIT                                                          \
-    {                                                                                    \
-        sizeof(struct imp_field_symmetry), {0}, 2, 0                                     \
-    }
+#define IMP_FIELD_SYMMETRY_INIT IMP_INIT(struct imp_field_symmetry, .axis = 2)
 /** A grid that keeps a symmetry: nodes that are taken into each other have one number.
  * Takes the grid over, also on failure; its coefficients become their means. Quarter and
  * all turns need as many cells of one size in both directions. Refining keeps
@@ -127,74 +126,103 @@ imp_field_tie_create(imp_context *context, imp_field *grid,
                      const struct imp_field_symmetry *symmetry, imp_field **out);
 
 /** 1 + k (eta - 1): a field at another wavelength. Takes the field over, also on failure;
- * theta is the field's. */
+ * theta is the field's.
+ * @return IMP_OK; IMP_E_ARG for a k that is not finite; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_scaled_create(imp_context *context,
                                                                imp_field *field, double k,
                                                                imp_field **out);
 
 /** eta = sum of the parts. Takes them over, also on failure; theta is theirs, one after
- * the other. */
+ * the other.
+ * parts [n].
+ * @return IMP_OK; IMP_E_ARG for n = 0; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_field_sum_create(imp_context *context, size_t n, imp_field **parts, imp_field **out);
 
 /** Read .vol (Mitsuba's grid volume), .npy (3-D, [z][y][x], float32 or float64) or a
  * profile as text (docs/bend.md). Volumes hold samples at the cell corners; `grid`
  * gives the box of a .npy and the interpolation of both (its `cells` are ignored); NULL:
- * the defaults. */
+ * the defaults.
+ * @return IMP_OK; IMP_E_IO; IMP_E_SCENE for a damaged file; IMP_E_ARG for a grid
+ *         without a box; IMP_E_UNSUPPORTED; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_read(imp_context *context,
                                                       const char *path,
                                                       const struct imp_field_grid *grid,
                                                       imp_field **out);
-/** Write samples at cell corners (.vol, .npy), or a radial or rz profile (any other name).
- * @return IMP_E_ARG for other fields; IMP_E_UNSUPPORTED for profiles that could not be read
- *         again: numbers beyond 1e12, a radius or height below 1e-12 (docs/bend.md). */
+/** Write samples at cell corners (.vol, .npy), or a radial or rz profile (any other
+ * name).
+ * @return IMP_E_ARG for other fields; IMP_E_UNSUPPORTED for profiles that could not be
+ *         read again: numbers beyond 1e12, a radius or height below 1e-12
+ *         (docs/bend.md). */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_write(const imp_field *field,
                                                        const char *path);
 
+/** field may be NULL. Surfaces must not use it any more. */
 IMP_API void imp_field_destroy(imp_field *field);
 
 /** "spline", "trilinear", "radial", "rz", "tied grid", "scaled", "sum", or the profile's
  * name. */
 IMP_API const char *imp_field_kind(const imp_field *field);
+/** Length of theta. 0 for NULL. */
 IMP_API size_t imp_field_n_theta(const imp_field *field);
-IMP_API void imp_field_get_theta(const imp_field *field, double *theta);
-/** @return IMP_OK; IMP_E_ARG if a number is not finite: nothing is set. */
+/** theta [imp_field_n_theta].
+ * @return IMP_OK; IMP_E_ARG. */
+IMP_API enum imp_status imp_field_get_theta(const imp_field *field, double *theta);
+/** @return IMP_OK; IMP_E_ARG if a value is not finite: nothing is set.
+ * theta [imp_field_n_theta] is copied. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_set_theta(imp_field *field,
                                                            const double *theta);
 /** Name of number i, NULL for grids. */
 IMP_API const char *imp_field_param_name(const imp_field *field, size_t i);
-/** The box where the field is defined; infinite for profiles. */
-IMP_API void imp_field_bounds(const imp_field *field, double lo[3], double hi[3]);
-/** The grid (of a tied one, too), or IMP_E_ARG if it is not one. Set grid->size first. */
+/** The box where the field is defined; infinite for profiles.
+ * @return IMP_OK; IMP_E_ARG. */
+IMP_API enum imp_status imp_field_get_bounds(const imp_field *field, double lo[3],
+                                             double hi[3]);
+/** The grid (of a tied one, too), or IMP_E_ARG if it is not one. Set grid->size first.
+ * @return IMP_OK; IMP_E_ARG. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_get_grid(const imp_field *field,
                                                           struct imp_field_grid *grid);
 
 /** Index, gradient [3], Hessian [6] = xx yy zz xy xz yz. gradient and hessian may be
  * NULL. As functions of a point, this and the next two take any number and give what
- * comes of it. */
+ * comes of it.
+ * eta [1], gradient [3], hessian [6]. */
 IMP_API void imp_field_eval(const imp_field *field, const double x[3], double *eta,
                             double *gradient, double *hessian);
-/** The transpose: theta_bar += a d eta/d theta + b . d grad eta/d theta. */
+/** The transpose: theta_bar += a d eta/d theta + b . d grad eta/d theta.
+ * theta_bar [imp_field_n_theta] is added to. */
 IMP_API void imp_field_splat(const imp_field *field, const double x[3], double a,
                              const double b[3], double *theta_bar);
-/** The derivative along theta_dot. */
+/** The derivative along theta_dot.
+ * theta_dot [imp_field_n_theta]; eta_dot [1]. */
 IMP_API void imp_field_tangent(const imp_field *field, const double x[3],
                                const double *theta_dot, double *eta_dot,
                                double gradient_dot[3]);
 
 /** Samples of the index (or of density, see imp_field_grid) at the corners of cells,
- * [z][y][x], cells + 1 along an axis. A spline passes through them. */
+ * [z][y][x], cells + 1 along an axis. A spline passes through them.
+ * samples [z][y][x].
+ * @return IMP_OK; IMP_E_ARG if the field is no grid, or an index is not positive;
+ *         IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_set_samples(imp_field *field,
                                                              const double *samples);
 /** Transpose of imp_field_set_samples, for param eta: samples_bar = (d theta/d samples)^T
- * theta_bar. */
+ * theta_bar.
+ * theta_bar [imp_field_n_theta]; samples_bar [z][y][x] is overwritten.
+ * @return IMP_OK; IMP_E_ARG if the field is no grid; IMP_E_UNSUPPORTED for grids of
+ *         eta^2/2; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_samples_vjp(const imp_field *field,
                                                              const double *theta_bar,
                                                              double *samples_bar);
 /** The same function on twice as many cells along each axis; its transpose takes
- * fine_bar [imp_field_n_theta(fine)] to coarse_bar. */
+ * fine_bar [imp_field_n_theta(fine)] to coarse_bar.
+ * @param[out] out the caller destroys it.
+ * @return IMP_OK; IMP_E_ARG if the field is no grid; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_refine(const imp_field *field,
                                                         imp_field **out);
+/** fine_bar [imp_field_n_theta(fine)], coarse_bar [imp_field_n_theta(field)], which is
+ * overwritten.
+ * @return as imp_field_refine. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_field_refine_vjp(const imp_field *field, const double *fine_bar, double *coarse_bar);
 
@@ -255,16 +283,16 @@ struct imp_bend_surface {
         *scene; /**< of a mesh: committed, its shapes are closed; shared, not copied */
 };
 #define IMP_BEND_SURFACE_INIT                                                            \
-    {                                                                                    \
-        sizeof(struct imp_bend_surface), IMP_BEND_PLANE, IMP_BEND_END, -1, {0, 0, 1}, 0, \
-            {0}, 1, {0}, {0}, 1, 0, 0                                                    \
-    }
+    IMP_INIT(struct imp_bend_surface, .group = -1, .normal[2] = 1, .radius = 1,          \
+             .index = 1)
 
 /** A plane whose crossing is recorded and does not end the ray. */
 struct imp_bend_tap {
+    size_t size;
     double normal[3], offset;
-    int group;
+    int group; /**< as of a surface */
 };
+#define IMP_BEND_TAP_INIT IMP_INIT(struct imp_bend_tap, .normal[2] = 1, .group = -1)
 
 struct imp_bend_options {
     size_t size;
@@ -273,7 +301,7 @@ struct imp_bend_options {
     double step;        /**< in sigma, or in length for arc-length schemes; 0: half a cell
                              (trilinear) or one cell (spline) over the greatest index */
     uint32_t max_steps; /**< a ray that needs more is dropped and counted; 0: 100000 */
-    int outside;        /**< rays start outside the surfaces, in a medium of index
+    bool outside;       /**< rays start outside the surfaces, in a medium of index
                              `outside_index`: they go straight to the first and enter */
     double outside_index; /**< 0: 1 */
     double grazing;       /**< |cos| at the exit below which a ray is dropped; 0: 0.05;
@@ -287,11 +315,7 @@ struct imp_bend_options {
     imp_progress_fn progress;
     void *progress_payload;
 };
-#define IMP_BEND_OPTIONS_INIT                                                            \
-    {                                                                                    \
-        sizeof(struct imp_bend_options), IMP_BEND_LEAPFROG, IMP_BEND_REVERSE, 0, 0, 0,   \
-            0, 0, 0, 0, 0, 0, 0, 0, 0                                                    \
-    }
+#define IMP_BEND_OPTIONS_INIT IMP_INIT_ZERO(struct imp_bend_options)
 
 enum imp_bend_flags { /* flags of an exit; rays with one of DROPPED have no derivative */
                       IMP_BEND_TRUNCATED = 1, /**< more than max_steps */
@@ -334,17 +358,16 @@ struct imp_bend_stats {
     double worst_energy;   /**< max | |v|^2 - eta^2 | / eta^2 at exits */
     double worst_reversal; /**< max |x - x0| / size */
 };
-#define IMP_BEND_STATS_INIT                                                              \
-    {                                                                                    \
-        sizeof(struct imp_bend_stats), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0          \
-    }
+#define IMP_BEND_STATS_INIT IMP_INIT_ZERO(struct imp_bend_stats)
 
 /** Rays: arrays of n. group may be NULL (all 0). Directions need not be unit. */
 struct imp_bend_rays {
+    size_t size;
     size_t n;
     const double (*x)[3], (*d)[3];
     const uint16_t *group;
 };
+#define IMP_BEND_RAYS_INIT IMP_INIT_ZERO(struct imp_bend_rays)
 
 /**
  * Trace. Same bits for any number of threads.
@@ -376,10 +399,7 @@ struct imp_bend_gradient {
                                   radius, 4 index outside; not for box, SDF and mesh */
     double *energy;          /**< [n] K = lam.v + mu.F at the start: 0 up to truncation */
 };
-#define IMP_BEND_GRADIENT_INIT                                                           \
-    {                                                                                    \
-        sizeof(struct imp_bend_gradient), 0, 0, 0, 0, 0                                  \
-    }
+#define IMP_BEND_GRADIENT_INIT IMP_INIT_ZERO(struct imp_bend_gradient)
 
 /** The exact derivative of imp_bend_trace with the same arguments. Dropped rays give
  * nothing. exits, taps as traced; bars [n], tap_bars [n][n_taps] (NULL: zero).
@@ -392,7 +412,9 @@ imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
                  struct imp_bend_stats *stats);
 
 /** Forward derivative along (theta_dot, x_dot, d_dot), each may be NULL: dots [n],
- * tap_dots [n][n_taps] in the same layout as cotangents. */
+ * tap_dots [n][n_taps] in the same layout as cotangents.
+ * theta_dot [n_theta], x_dot and d_dot [n].
+ * @return as imp_bend_trace. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_tangent(const imp_field *field, const struct imp_bend_options *options,
                  const struct imp_bend_rays *rays, const double *theta_dot,
@@ -400,7 +422,8 @@ imp_bend_tangent(const imp_field *field, const struct imp_bend_options *options,
                  struct imp_bend_cotangent *dots, struct imp_bend_cotangent *tap_dots);
 
 /** One ray as points (x, y, z, path), for drawing: the caller frees *points with
- * imp_free. */
+ * imp_free.
+ * @return IMP_OK; IMP_E_ARG if there is no such ray; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_path(const imp_field *field, const struct imp_bend_options *options,
               const struct imp_bend_rays *rays, size_t ray, double (**points)[4],
@@ -411,15 +434,17 @@ imp_bend_path(const imp_field *field, const struct imp_bend_options *options,
 typedef struct imp_bend imp_bend;
 
 /** Takes the field over, also on failure. The theta of the field is what a fit changes.
- */
+ * @return IMP_OK; IMP_E_ARG; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_create(imp_context *context,
                                                        imp_field *field, imp_bend **out);
+/** bend may be NULL. Its field ends with it. */
 IMP_API void imp_bend_destroy(imp_bend *bend);
 /** The field: lives until the bend is destroyed or a fit refines it. */
 IMP_API imp_field *imp_bend_field(imp_bend *bend);
 
 /** Scheme, step, ... of all rays; surfaces and taps are copied. `step` 0 follows the
- * grid: min(step_max, step_cells * cell), see imp_bend_set_step. */
+ * grid: min(step_max, step_cells * cell), see imp_bend_set_step.
+ * @return IMP_OK; IMP_E_ARG for a number out of its range; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_set_options(imp_bend *bend, const struct imp_bend_options *o);
 /** Called while the rays of imp_bend_objective, _run, _check, _step_error, _arrivals and
@@ -432,28 +457,30 @@ IMP_API void imp_bend_set_progress(imp_bend *bend, imp_progress_fn progress,
 IMP_API enum imp_status imp_bend_set_step(imp_bend *bend, double cells, double most);
 
 /** A bundle: rays that share surfaces, taps and targets by its number (their group).
- * x, d [n]; power [n] or NULL (1/n each). *bundle may be NULL. */
+ * x, d [n]; power [n] or NULL (1/n each). *bundle may be NULL.
+ * All are copied; bundle [1].
+ * @return IMP_OK; IMP_E_ARG for a number that is not finite, or a direction of length
+ *         0; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_add_rays(imp_bend *bend, size_t n, const double (*x)[3], const double (*d)[3],
                   const double *power, int *bundle);
+/** Rays of all bundles. 0 for NULL. */
 IMP_API size_t imp_bend_n_rays(const imp_bend *bend);
+/** 0 for NULL. */
 IMP_API int imp_bend_n_bundles(const imp_bend *bend);
 
 enum imp_dispersion_model {
     IMP_CAUCHY = 0, /**< n = c0 + c1/l^2 + c2/l^4 */
     IMP_SELLMEIER   /**< n^2 = 1 + sum_k c_k l^2/(l^2 - c_{3+k}), k = 0, 1, 2 */
 };
-/** Of a material; wavelengths l in micrometres. */
+/** The index of a material; wavelengths l in micrometres. */
 struct imp_dispersion {
     size_t size;
     enum imp_dispersion_model model;
     double coefficient[6];
     double reference; /**< wavelength at which the field is the index */
 };
-#define IMP_DISPERSION_INIT                                                              \
-    {                                                                                    \
-        sizeof(struct imp_dispersion), IMP_CAUCHY, {0}, 0.5875618                        \
-    }
+#define IMP_DISPERSION_INIT IMP_INIT(struct imp_dispersion, .reference = 0.5875618)
 /** The formula. */
 IMP_API double imp_dispersion_index(const struct imp_dispersion *d, double um);
 /** Rays of a bundle have this wavelength: they see the index 1 + k (eta - 1), with
@@ -488,7 +515,7 @@ struct imp_bend_target {
     int bundle;    /**< -1: all rays */
     int tap;       /**< -1: where rays exit; else the tap they cross */
     double weight; /**< 0: 1 */
-    int at_plane;  /**< go on straight, in index `outside`, to normal.x = offset */
+    bool at_plane; /**< go on straight, in index `outside`, to normal.x = offset */
     double normal[3], offset, outside;
     double point[3];
     const double *data;   /**< copied */
@@ -501,49 +528,60 @@ struct imp_bend_target {
     const float *pixels;
 };
 #define IMP_BEND_TARGET_INIT                                                             \
-    {                                                                                    \
-        sizeof(struct imp_bend_target), IMP_BEND_FOCUS, -1, -1, 0, 0, {0, 0, 1}, 0, 1,   \
-            {0}, 0, 0, 0, 0, {0}, {0}, {0}, 0                                            \
-    }
-/** A plane's normal is turned to look along the rays' first directions. Rays that meet it
+    IMP_INIT(struct imp_bend_target, .bundle = -1, .tap = -1, .normal[2] = 1,            \
+             .outside = 1)
+/** A plane's normal is turned towards the rays' first directions. Rays that meet it
  * at a slant (cosine) below 0.05, or go backwards, do not count; between 0.05 and 0.15
- * they count less and less: a smooth weight, differentiated. */
+ * they count less and less: a smooth weight, differentiated.
+ * @return IMP_OK; IMP_E_ARG for a bundle, tap or data that do not exist; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_add_target(imp_bend *bend, const struct imp_bend_target *t);
 
 /** weight/2 sum of squared differences of grid coefficients along each axis, of order 1
- * or 2; edge > 0: sum sqrt(D^2 + edge^2) instead. */
+ * or 2; edge > 0: sum sqrt(D^2 + edge^2) instead.
+ * @return IMP_OK; IMP_E_ARG for another field or order, or a negative weight;
+ *         IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_add_smoothness(imp_bend *bend, double weight, int order, double edge);
-/** Bounds of every number of the field; default for grids of the index: 1 .. infinity. */
+/** Bounds of every value of the field; default for grids of the index: 1 .. infinity.
+ * @return IMP_OK; IMP_E_ARG if not lo < hi. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_set_bounds(imp_bend *bend, double lo,
                                                            double hi);
-/** Hold numbers, which a fit then does not change at any level: grid coefficients in the
+/** Hold values, which a fit then does not change at any level: grid coefficients in the
  * `layers` outermost layers, those whose node is outside a sphere, or one number; each is
- * set to `value` (NaN: unchanged). */
+ * set to `value` (NaN: unchanged).
+ * @return IMP_OK; IMP_E_ARG for another field; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_hold_rim(imp_bend *bend, int layers,
                                                          double value);
+/** The same of the nodes outside a sphere.
+ * @return as imp_bend_hold_rim. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_hold_outside(imp_bend *bend,
                                                              const double centre[3],
                                                              double radius, double value);
+/** The same of value i of theta.
+ * @return IMP_OK; IMP_E_ARG if there is none; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_hold_number(imp_bend *bend, size_t i,
                                                             double value);
 
-/** Objective and its gradient with respect to all numbers of the field (held ones: 0).
+/** Objective and its gradient with respect to all values of the field (held ones: 0).
  * The rays are fixed, so both are exact: no standard error belongs to them. gradient
  * [n_theta], stats may be NULL. targets [n targets]: their parts; may be NULL.
  * @return IMP_OK, also if a part of the rays is lost (look at stats); IMP_E_NUMERIC if no
- * ray comes to its end (stats is set); IMP_E_ARG; IMP_E_NOMEM; IMP_CANCELLED. */
+ * ray comes to its end (stats is set); IMP_E_ARG; IMP_E_NOMEM; IMP_CANCELLED.
+ * value [1], may be NULL. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_objective(imp_bend *bend, double *value,
                                                           double *gradient,
                                                           double *targets,
                                                           struct imp_bend_stats *stats);
-/** Exits of all rays with the field as it is; taps [n][n_taps] may be NULL. */
+/** Exits of all rays with the field as it is; taps [n][n_taps] may be NULL.
+ * exits [imp_bend_n_rays].
+ * @return as imp_bend_trace. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_run(imp_bend *bend,
                                                     struct imp_bend_exit *exits,
                                                     struct imp_bend_exit *taps,
                                                     struct imp_bend_stats *stats);
-/** imp_bend_path of one ray of the problem. */
+/** imp_bend_path of one ray of the problem.
+ * @return as imp_bend_path. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_ray(imp_bend *bend, size_t ray, double (**points)[4], size_t *n_points);
 /** Position, direction and path of a ray at a target's plane, and its share of the
@@ -552,19 +590,30 @@ struct imp_bend_arrival {
     double x[3], d[3], path, weight;
     uint32_t ray;
 };
-/** arrivals [imp_bend_n_rays]; *n is set. */
+/** arrivals [imp_bend_n_rays]; *n is set.
+ * @return IMP_OK; IMP_E_ARG if there is no such target; IMP_E_NOMEM; IMP_CANCELLED. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_arrivals(imp_bend *bend, size_t target, struct imp_bend_arrival *arrivals,
                   size_t *n);
 /** Irradiance that an image target sees, [height][width], mean 1 when all power arrives.
- */
+ * pixels [height][width] of the target.
+ * @return IMP_OK; IMP_E_ARG if it is no image; IMP_E_NOMEM; IMP_CANCELLED. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_image(imp_bend *bend, size_t target,
                                                       float *pixels);
+/** 0 for NULL. */
 IMP_API size_t imp_bend_n_targets(const imp_bend *bend);
+/** Target i as it was added; arrays belong to the bend. Set target->size first.
+ * @return IMP_OK; IMP_E_ARG if there is none. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_get_target(const imp_bend *bend, size_t i, struct imp_bend_target *target);
-IMP_API void imp_bend_get_rays(const imp_bend *bend, struct imp_bend_rays *rays);
-/** The options in use, with the step that rays take. */
+/** All rays, with their bundles as groups; arrays belong to the bend. Set rays->size
+ * first.
+ * @return IMP_OK; IMP_E_ARG. */
+IMP_API enum imp_status imp_bend_get_rays(const imp_bend *bend,
+                                          struct imp_bend_rays *rays);
+/** The options in use, with the step that rays take.
+ * Set o->size first; arrays belong to the bend.
+ * @return IMP_OK; IMP_E_ARG if no step can be chosen. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_get_options(const imp_bend *bend,
                                                             struct imp_bend_options *o);
 
@@ -576,10 +625,17 @@ struct imp_bend_fit_step {
     double value;      /**< objective, the last of its history */
 };
 /** Called after each iteration from the thread that called imp_bend_fit; the field is the
- * best so far, and may be traced and drawn, not changed. Non-zero asks to stop. */
+ * best so far, and may be traced and drawn, not changed. Non-zero stops the fit. */
 typedef int (*imp_bend_fit_step_fn)(const struct imp_bend_fit_step *step, void *payload);
 
 #define IMP_BEND_LEVELS_MAX 8
+/** Does the optimiser's memory of one level serve the next? L-BFGS has its pairs, Adam
+ * its moments, MMA none. */
+enum imp_bend_carry {
+    IMP_BEND_CARRY_AUTO = 0, /**< of L-BFGS alone */
+    IMP_BEND_CARRY_ON = 1,
+    IMP_BEND_CARRY_OFF = -1
+};
 struct imp_bend_fit_options {
     size_t size;
     enum imp_optimizer optimizer;        /**< IMP_LBFGS, IMP_ADAM, IMP_MMA */
@@ -589,20 +645,14 @@ struct imp_bend_fit_options {
     double tolerance;       /**< of `scale`; 0: 1e-6 */
     double scale;           /**< a large change of a number; 0: 0.1 */
     const char *checkpoint; /**< rewritten at every level and every few seconds */
-    int resume;
+    bool resume;
     imp_progress_fn progress;
     void *progress_payload;
-    int carry; /**< what the optimiser learnt at a level, at the next: 1: is carried on
-                    (L-BFGS: pairs, Adam: moments; MMA keeps nothing), -1: is not, 0: of
-                    L-BFGS only */
-    imp_bend_fit_step_fn step; /**< NULL: nobody looks */
+    enum imp_bend_carry carry;
+    imp_bend_fit_step_fn step; /**< NULL: not called */
     void *step_payload;
 };
-#define IMP_BEND_FIT_OPTIONS_INIT                                                        \
-    {                                                                                    \
-        sizeof(struct imp_bend_fit_options), IMP_LBFGS, 0, {0}, 0, 0, 0, 0, 0, 0, 0, 0,  \
-            0, 0                                                                         \
-    }
+#define IMP_BEND_FIT_OPTIONS_INIT IMP_INIT_ZERO(struct imp_bend_fit_options)
 
 struct imp_bend_fit_result {
     size_t size;
@@ -620,8 +670,8 @@ imp_bend_fit(imp_bend *bend, const struct imp_bend_fit_options *options,
              struct imp_bend_fit_result *result);
 
 /**
- * Check a problem as it stands: splat against tangent ("transpose"), reverse against
- * forward ("dot"), the gradient against central differences of steps 1e-2 to 1e-8
+ * Check a problem at its present field: splat against tangent ("transpose"), reverse
+ * against forward ("dot"), the gradient against central differences of steps 1e-2 to 1e-8
  * ("difference"), reversal, energy, the error of the step by halving it ("step": value is
  * the order seen, error the rms error of exits), and how many rays come to their end
  * ("rays": value of reference, error the part that is lost). Rows belong to the bend
@@ -633,15 +683,20 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_check(imp_bend *bend, const struct imp_check_row **rows, size_t *n_rows);
 /** Error of exits by the step, from about `pilots` rays traced with t, t/2, t/4: rms over
  * rays, and the order seen (0: not to be seen). Outputs may be NULL.
- * @return IMP_E_NUMERIC if no ray comes to its end with all three steps. */
+ * @return IMP_E_NUMERIC if no ray comes to its end with all three steps.
+ * error [1], order [1]. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_step_error(imp_bend *bend, size_t pilots,
                                                            double *error, double *order);
 
 /** A bend from a file: <scene> with a <medium type="graded">, <rays> and <target>s
- * (docs/bend.md). options may be NULL. */
+ * (docs/bend.md). options may be NULL.
+ * @param[out] out the caller destroys it.
+ * @return as imp_scene_load. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_load(imp_context *context, const char *path,
               const struct imp_load_options *options, imp_bend **out);
+/** The same from memory: xml [length]; name (may be NULL) is the file of messages.
+ * @return as imp_bend_load. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_load_string(imp_context *context, const char *xml, size_t length,
                      const char *name, const struct imp_load_options *options,

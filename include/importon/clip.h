@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon: numbers of a target that were clipped. A photograph's white says "at least", its
- * black "at most": such numbers are censored data. They have no weight where the scene agrees
- * with them, and count as the level itself where it does not. Which they are is decided by
- * pictures of other random numbers than those of losses, so that losses, gradients and
- * Gauss-Newton matrices stay unbiased for the weights that were decided
- * (docs/estimators.md, 20; docs/photographs.md).
+ * importon: values of a target that were clipped. A photograph's white means "at least",
+ * its black "at most": such values are censored data. They have no weight where the
+ * scene agrees with them, and count as the level itself where it does not. Which they
+ * are is decided by pictures of other random numbers than those of losses, so that
+ * losses, gradients and Gauss-Newton matrices stay unbiased for the weights that were
+ * decided (docs/estimators.md, 20; docs/photographs.md).
  */
 #ifndef IMPORTON_CLIP_H
 #define IMPORTON_CLIP_H
@@ -16,9 +16,9 @@
 extern "C" {
 #endif
 
-/** Numbers <= low or >= high of a target were clipped there. Levels are in the target's own
- * numbers; of a file of 8 bits that goes from 0 to 1 they are .5/255 and 254.5/255. Until
- * imp_problem_censor or imp_fit decides, clipped numbers have no weight.
+/** Values <= low or >= high of a target were clipped there. Levels are in the target's
+ * own numbers; of a file of 8 bits that goes from 0 to 1 they are .5/255 and 254.5/255.
+ * Until imp_problem_censor or imp_fit decides, clipped values have no weight.
  * @param target in the order of imp_problem_add_target.
  * @param low    below all numbers: none are clipped there. @param high the same above.
  * @return IMP_OK; IMP_E_ARG if there is no such target, it has levels, not low < high, or
@@ -27,7 +27,7 @@ extern "C" {
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_clip(imp_problem *problem, int target,
                                                         double low, double high);
 
-/** Decide which numbers of clipped targets count, where the scene stands now: by pictures
+/** Decide which values of clipped targets count, at the present parameters: by pictures
  * with four times the samples of `run`, at least 64, and a seed made from run->seed. For
  * own optimisers, now and then; imp_fit does it by itself. Targets without levels stay as
  * they are.
@@ -36,19 +36,16 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_problem_clip(imp_problem *problem, in
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_censor(imp_problem *problem,
                                                           const struct imp_run *run);
 
-/** Of all targets with levels, as they were decided last. */
+/** All targets with levels, as decided last. */
 struct imp_clipped {
     size_t size;
     size_t numbers; /**< of these targets that have a weight */
     size_t clipped; /**< of these, at the levels or beyond */
     size_t silent;  /**< that have no weight now: the scene agrees that they are clipped,
                          or nearly */
-    size_t against; /**< clipped numbers that count: the scene disagrees */
+    size_t against; /**< clipped values that count: the scene disagrees */
 };
-#define IMP_CLIPPED_INIT                                                                 \
-    {                                                                                    \
-        sizeof(struct imp_clipped), 0, 0, 0, 0                                           \
-    }
+#define IMP_CLIPPED_INIT IMP_INIT_ZERO(struct imp_clipped)
 /** Set out->size first. @return IMP_OK; IMP_E_ARG. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_get_clipped(const imp_problem *problem,
                                                                struct imp_clipped *out);

@@ -22,21 +22,8 @@
 
 #include <importon/importon.h>
 
-/* An options struct with its size set and every other member zero. */
 #ifdef __cplusplus
-template <class T> inline T imp_elements_sized()
-{
-    T t = T();
-    t.size = sizeof(T);
-    return t;
-}
-#define IMP_ELEMENTS_SIZED(type) imp_elements_sized<type>()
 extern "C" {
-#else
-#define IMP_ELEMENTS_SIZED(type)                                                         \
-    {                                                                                    \
-        .size = sizeof(type)                                                             \
-    }
 #endif
 
 typedef struct imp_elements imp_elements;
@@ -59,7 +46,7 @@ struct imp_elements_source {
         edge_v[3];     /**< plane; its front is along edge_u x edge_v */
     const char *shape; /**< shape: its name */
 };
-#define IMP_ELEMENTS_SOURCE_INIT IMP_ELEMENTS_SIZED(struct imp_elements_source)
+#define IMP_ELEMENTS_SOURCE_INIT IMP_INIT_ZERO(struct imp_elements_source)
 
 /** Reciprocal modified Phong in place of a shape's material, seen from its front:
  * kd/pi + ks (n+2)/(2 pi) max(0, mirror(wi).wo)^n. */
@@ -75,17 +62,17 @@ struct imp_elements_beam {
     double axis[3]; /**< world; all 0: the shape's normal */
     double exponent;
 };
-#define IMP_ELEMENTS_PHONG_INIT IMP_ELEMENTS_SIZED(struct imp_elements_phong)
-#define IMP_ELEMENTS_BEAM_INIT  IMP_ELEMENTS_SIZED(struct imp_elements_beam)
+#define IMP_ELEMENTS_PHONG_INIT IMP_INIT_ZERO(struct imp_elements_phong)
+#define IMP_ELEMENTS_BEAM_INIT  IMP_INIT_ZERO(struct imp_elements_beam)
 
 struct imp_elements_options {
     size_t size;
-    int order;         /**< of the directional basis, 2..12; 0: by the materials */
-    int no_importance; /**< refine by radiance alone (the baseline of 1993) */
-    int sensor;        /**< of the picture that decides when to stop */
+    int order;          /**< of the directional basis, 2..12; 0: by the materials */
+    bool no_importance; /**< refine by radiance alone (the baseline of 1993) */
+    int sensor;         /**< of the picture that decides when to stop */
     int rays;    /**< per side of a pixel's grid; 0: 3 to 24, more in small pictures;
                       to 64 of a meter on a shape */
-    double stop; /**< relative change of what is asked for: of the measurements if there
+    double stop; /**< relative change of the goal: of the measurements if there
                     are sources, RMS of the picture if there are none or `picture` is
                     set; 0: 0.01; < 0: never stop for that */
     double eps_first,
@@ -104,9 +91,9 @@ struct imp_elements_options {
     const struct imp_elements_beam *beams; /**< likewise */
     imp_progress_fn progress;
     void *progress_payload;
-    int picture; /**< beside its sources the sensor's picture decides when to stop */
+    bool picture; /**< beside its sources the sensor's picture decides when to stop */
 };
-#define IMP_ELEMENTS_OPTIONS_INIT IMP_ELEMENTS_SIZED(struct imp_elements_options)
+#define IMP_ELEMENTS_OPTIONS_INIT IMP_INIT_ZERO(struct imp_elements_options)
 
 /**
  * Take the scene's polygons and project its materials. The scene must outlive the result
@@ -118,6 +105,7 @@ struct imp_elements_options {
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_create(const imp_scene *scene, const struct imp_elements_options *options,
                     imp_elements **out);
+/** elements may be NULL. Guides made from it go first. */
 IMP_API void imp_elements_destroy(imp_elements *elements);
 
 /** Refine and solve. @return IMP_OK; IMP_CANCELLED (progress or time limit): what was
@@ -125,15 +113,18 @@ IMP_API void imp_elements_destroy(imp_elements *elements);
  * IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_elements_solve(imp_elements *elements);
 
-/** Read the scene's parameters again and solve on the same links, without refining. */
+/** Read the scene's parameters again and solve on the same links, without refining.
+ * @return as imp_elements_solve. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_elements_update(imp_elements *elements);
 
-struct imp_elements_step { /**< one line of the schedule's log */
-    double eps;            /**< absolute */
+/** One line of the schedule's log. */
+struct imp_elements_step {
+    size_t size;
+    double eps; /**< absolute */
     size_t links, elements, leaves;
     int64_t rays;
     double measure;
-    double change; /**< of what is asked for, as `stop` has it; NaN at first */
+    double change; /**< of the goal, as in `stop`; NaN at first */
     double elapsed_s;
 };
 struct imp_elements_info {
@@ -155,6 +146,9 @@ struct imp_elements_info {
     size_t n_measures; /**< sources, 1 if none was given */
     const double *measures; /**< [n_measures] of each by itself, without its weight */
 };
+/** Set info->size first; strings and arrays belong to the elements, until they are
+ * solved again.
+ * @return IMP_OK; IMP_E_ARG. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_get_info(const imp_elements *elements, struct imp_elements_info *info);
 
@@ -165,7 +159,9 @@ enum imp_elements_image {
     IMP_ELEMENTS_IMPORTANCE /**< mean exitant importance, one channel "importance" */
 };
 /** A picture through a sensor; `rays` per side of a pixel's grid, 0: as in the options.
- */
+ * @param[out] out the caller destroys it.
+ * @return IMP_OK; IMP_E_ARG if there is no such sensor or kind, or nothing was
+ *         solved; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_elements_image(const imp_elements *elements,
                                                           int sensor,
                                                           enum imp_elements_image kind,
@@ -173,16 +169,20 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_elements_image(const imp_elements *el
 
 /** One derivative of the measurement. */
 struct imp_elements_row {
+    size_t size;
     const char *name; /**< parameter; of overrides "SHAPE.phong.kd" ... */
     int param;        /**< index in the scene, -1: an override */
     size_t element;   /**< number inside it */
-    int emission;     /**< it scales a light, linearly */
+    bool emission;    /**< it scales a light, linearly */
     double value, derivative;
     double share;       /**< value x derivative / measure; those of emission sum to 1 */
     double share_error; /**< of imp_elements_share_errors, else NaN */
 };
-/** Derivatives of the measurement to every light and material number, links fixed,
- * largest |value x derivative| first. Rows belong to the object until the next call. */
+/** Derivatives of the measurement to every light and material value, links fixed,
+ * largest |value x derivative| first. Rows belong to the object until the next call.
+ * @param[out] rows [n_rows] (IMP_ROW).
+ * @return IMP_OK; IMP_E_ARG; IMP_CANCELLED; IMP_E_NUMERIC if reflections do not die
+ *         away; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_sensitivity(imp_elements *elements, const struct imp_elements_row **rows,
                          size_t *n_rows);
@@ -193,23 +193,23 @@ imp_elements_sensitivity(imp_elements *elements, const struct imp_elements_row *
  * 4, or the order below too small for a lobe, order l + 2 takes its place; NaN where that
  * is above 12. 0 where nothing is glossy. Takes the memory of the elements again, and the
  * time of solving without refinement.
- */
+ * @return as imp_elements_sensitivity. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_share_errors(imp_elements *elements, const struct imp_elements_row **rows,
                           size_t *n_rows);
 
-/* ---- Design: numbers of the scene for wanted measurements ----------------------- */
+/* ---- Design: parameters of the scene for wanted measurements ----------------------- */
 
-/** Bounds for the active numbers of parameters that match; inside the scene's own. */
+/** Bounds for the active variables of parameters that match; inside the scene's own. */
 struct imp_elements_bounds {
     size_t size;
     const char *glob;
     double lo, hi;
 };
-#define IMP_ELEMENTS_BOUNDS_INIT IMP_ELEMENTS_SIZED(struct imp_elements_bounds)
+#define IMP_ELEMENTS_BOUNDS_INIT IMP_INIT_ZERO(struct imp_elements_bounds)
 struct imp_elements_fit_options {
     size_t size;
-    enum imp_optimizer optimizer; /**< IMP_ADAM, the 0: IMP_LM up to 256 numbers, else
+    enum imp_optimizer optimizer; /**< IMP_ADAM, the 0: IMP_LM up to 256 variables, else
                                        IMP_LBFGS */
     int max_iterations;           /**< of every round; 0: 100 */
     double tolerance;             /**< of steps, relative; 0: 1e-8 */
@@ -218,15 +218,16 @@ struct imp_elements_fit_options {
     size_t n_bounds;
     const struct imp_elements_bounds *bounds; /**< each as long as its own `size` */
 };
-#define IMP_ELEMENTS_FIT_OPTIONS_INIT IMP_ELEMENTS_SIZED(struct imp_elements_fit_options)
+#define IMP_ELEMENTS_FIT_OPTIONS_INIT IMP_INIT_ZERO(struct imp_elements_fit_options)
 struct imp_elements_goal {
+    size_t size;
     double target, before, after; /**< a source's measurement, without its weight */
 };
 struct imp_elements_fit_result {
     size_t size;
     int iterations, rounds;
     double objective;
-    int linear; /**< only lights were active: the measurements are linear in x */
+    bool linear; /**< only lights were active: the measurements are linear in x */
     size_t n_goals;
     const struct imp_elements_goal *goals; /**< [n_goals] */
     size_t n;
@@ -238,8 +239,8 @@ struct imp_elements_fit_result {
 
 /* clang-format off */
 /**
- * Find the problem's active numbers (lights, reflectances) for which every source of the
- * elements measures its target, inside bounds: the least value of
+ * Find the problem's active variables (lights, reflectances) for which every source of
+ * the elements measures its target, inside bounds: the least value of
  *
  *     1/2 sum over sources of weight ((J - target) / scale)^2
  *         + the problem's regularisers
@@ -249,10 +250,10 @@ struct imp_elements_fit_result {
  * source. The problem needs no targets of its own. Progress and time limit are those of
  * the elements' options. The scene and the elements end at the answer; the result belongs
  * to the problem and lives until its next fit.
- * More numbers than targets, without a regulariser on them, is a warning: many answers
+ * More variables than targets, without a regulariser on them, is a warning: many answers
  * meet the targets.
  * @return IMP_OK; IMP_CANCELLED (the state reached is set); IMP_E_ARG, also for a
- * negative target; IMP_E_UNSUPPORTED for an active number of which finite elements have
+ * negative target; IMP_E_UNSUPPORTED for an active variable of which finite elements have
  * no derivative.
  */
 /* clang-format on */
@@ -263,8 +264,9 @@ imp_elements_fit(imp_elements *elements, imp_problem *problem,
 
 struct imp_elements_guide_options {
     size_t size;
-    int no_lights; /**< light samples, and where walks from the lights begin, as without */
-    double share;  /**< of continuations drawn towards indirect light, or importance, 0 to
+    /** Light samples, and where walks from the lights begin, as without a guide. */
+    bool no_lights;
+    double share; /**< of continuations drawn towards indirect light, or importance, 0 to
                         1 exclusive */
     /** Russian roulette by expected contribution instead of throughput: a walk continues
      * with probability roulette x (radiance expected after this vertex) / (radiance
@@ -272,17 +274,17 @@ struct imp_elements_guide_options {
      * is direct, 4 where little is. */
     double roulette;
 };
-#define IMP_ELEMENTS_GUIDE_OPTIONS_INIT                                                  \
-    IMP_ELEMENTS_SIZED(struct imp_elements_guide_options)
+#define IMP_ELEMENTS_GUIDE_OPTIONS_INIT IMP_INIT_ZERO(struct imp_elements_guide_options)
 /** The solution as a guide for walks: set imp_run.guide. Light samples follow what every
  * light sends to a place; drawing directions by it, or roulette, pays in some scenes only
- * (docs/elements.md) and is off unless asked for. Walks from the lights follow the
+ * (docs/elements.md) and is off by default. Walks from the lights follow the
  * importance of the elements' sensor, unless that was not solved: which light sends them,
  * from where and whither, and `share` of their directions; roulette is for walks from the
  * sensor. The elements must outlive it; a guide
  * of an old solution stays correct, and helps less. Destroy it with imp_guide_destroy.
  * options may be NULL.
- */
+ * @return IMP_OK; IMP_E_ARG for a share or roulette outside its range, or before
+ *         imp_elements_solve; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_guide(const imp_elements *elements,
                    const struct imp_elements_guide_options *options, imp_guide **out);
@@ -292,6 +294,11 @@ imp_elements_guide(const imp_elements *elements,
  * another scene, IMP_E_UNSUPPORTED if another version of importon wrote it. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_elements_save(const imp_elements *elements,
                                                          const char *path);
+/** Read what imp_elements_save wrote.
+ * @param[out] out the caller destroys it.
+ * @return as imp_elements_create; IMP_E_IO; IMP_E_SCENE for a damaged file (it has a
+ *         checksum) or another scene; IMP_E_UNSUPPORTED if another version of
+ *         importon wrote it. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_open(const imp_scene *scene, const struct imp_elements_options *options,
                   const char *path, imp_elements **out);
@@ -307,7 +314,7 @@ struct imp_elements_element {
     size_t polygon;    /**< of the input; the sides of a two-sided one are two */
     size_t parent;     /**< index of an element, or IMP_ELEMENTS_NO_PARENT */
     int level;         /**< of subdivision, 0: the whole polygon */
-    int leaf;
+    bool leaf;
     int source;  /**< the first source of the options that measures it; -1: none does */
     int corners; /**< 3 or 4 */
     double corner[4][3];  /**< counterclockwise, seen from the front */
@@ -317,14 +324,18 @@ struct imp_elements_element {
     double irradiance[3]; /**< NaN: black and not measured, or covered */
     double illuminance;   /**< luminance of the irradiance */
 };
-#define IMP_ELEMENTS_ELEMENT_INIT IMP_ELEMENTS_SIZED(struct imp_elements_element)
-/** Element `index`, below imp_elements_info.elements. Strings belong to the scene. */
+#define IMP_ELEMENTS_ELEMENT_INIT IMP_INIT_ZERO(struct imp_elements_element)
+/** Element `index`, below imp_elements_info.elements. Strings belong to the scene.
+ * Set out->size first.
+ * @return IMP_OK; IMP_E_ARG if there is no such element. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_get_element(const imp_elements *elements, size_t index,
                          struct imp_elements_element *out);
 
-struct imp_elements_arrival { /**< what one link brings */
-    size_t from;              /**< index of the element that sends */
+/** What one link brings. */
+struct imp_elements_arrival {
+    size_t size;
+    size_t from; /**< index of the element that sends */
     double irradiance[3];
     double illuminance;
     double measure; /**< of the measurement: what passes here, radiance x importance */
@@ -334,7 +345,7 @@ struct imp_elements_arrival { /**< what one link brings */
  * all above it (their part for this element) and those of its parts. Irradiances add up
  * to the element's, but for what the last sweep of the solution moved.
  * @param[out] arrivals [*n], to be freed with imp_free.
- */
+ * @return IMP_OK; IMP_E_ARG if there is no such element; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_arrivals(const imp_elements *elements, size_t index,
                       struct imp_elements_arrival **arrivals, size_t *n);
@@ -344,12 +355,14 @@ imp_elements_arrivals(const imp_elements *elements, size_t index,
  * each point itself instead of means over elements: the middles of width x height cells,
  * along the polygon's first edge (x) and its last (y, from the first corner).
  * @param[out] illuminance [height][width]; NaN outside a triangle.
- */
+ * @return IMP_OK; IMP_E_ARG if there is no such element, or for sizes below 1;
+ *         IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_illuminance(const imp_elements *elements, size_t index, int width,
                          int height, double *illuminance);
 
-/** Leaves with their mean exitant radiance and importance, by extension: .ply, .json. */
+/** Leaves with their mean exitant radiance and importance, by extension: .ply, .json.
+ * @return IMP_OK; IMP_E_ARG for another extension; IMP_E_IO; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_elements_export(const imp_elements *elements,
                                                            const char *path);
 

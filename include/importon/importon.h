@@ -2,7 +2,7 @@
  *
  * importon: adjoint and differentiable light transport.
  *
- * A host creates a context, loads or builds a scene, renders it, asks for derivatives of
+ * A host creates a context, loads or builds a scene, renders it, computes derivatives of
  * what its sensors see, or fits it to pictures. In the order of a first program:
  *
  *     imp_context_create      threads, memory, errors
@@ -12,21 +12,44 @@
  *     imp_problem_objective   loss, gradient and the standard errors of both
  *     imp_fit                 parameters back from pictures
  *
- * Conventions, for the whole header. Functions that can fail return enum imp_status; the
- * message belongs to the context and the calling thread (imp_last_error) and names the
- * argument. On failure, outputs keep their contents. `destroy(NULL)` does nothing; any
- * other pointer that is NULL, and a number that is not finite, is IMP_E_ARG where nothing
- * else is said. Strings and arrays handed in are copied unless a comment says otherwise;
- * pointers handed out belong to the object and live until it is destroyed or changed.
- * Structs that may grow start with `size`: use their initialisers, or set it before a
- * getter writes; fields that an older caller does not have keep their defaults. Zero in
- * an options struct means the default. Images are [height][width][channels], row 0 at the
- * top. A scene may be used by several threads at once; calls that set its parameters wait
- * for those that read them.
+ * Conventions, for all public headers.
+ *
+ *   Errors     Functions that can fail return enum imp_status; the message belongs to the
+ *              context and the calling thread (imp_last_error) and names the argument. On
+ *              failure, outputs keep their contents. `destroy(NULL)` does nothing; any
+ *              other pointer that is NULL, and a number that is not finite, is IMP_E_ARG
+ *              where not documented otherwise. IMP_E_NOMEM is possible wherever
+ *              something is made.
+ *   Memory     Strings and arrays handed in are copied unless documented otherwise;
+ *              pointers handed out belong to the object and live until it is destroyed or
+ *              changed. The comment of a function names what the caller frees.
+ *   Threads    A scene may be used by several threads at once; calls that set its
+ *              parameters wait for those that read them. Any other object is used by one
+ *              thread at a time. Results have the same bits on any number of threads.
+ *   Images     [height][width][channels], row 0 at the top, linear.
+ *   Names      imp_OBJECT_n_THINGS counts, imp_OBJECT_get_THING copies to the caller,
+ *              imp_OBJECT_THING returns a value or what belongs to the object,
+ *              imp_OBJECT_set_THING changes it. `bool` is a yes or no; an int has its
+ *              values beside it; callbacks return int, and other than 0 stops the call.
+ *
+ * Structs are of three kinds, and a test compares them with those of the last release:
+ *
+ *   sized      begin with `size` and may grow at their end. Start from the initialiser
+ *              (IMP_RUN_INIT), or set `size` before a getter writes. Fields that an older
+ *              caller does not have keep their defaults, and are not written. Zero in an
+ *              options struct is the default.
+ *   rows       sized structs in an array. Handed in, all have the size of the first.
+ *              Handed out, the library's rows may be longer than the caller's struct:
+ *              step through them by IMP_ROW, not by an index; IMP_ROW_HAS is for fields
+ *              that an older library does not have.
+ *   closed     have no `size` and never change: imp_allocator, imp_estimate,
+ *              imp_bend_exit, imp_bend_cotangent, imp_bend_arrival, of which hosts keep
+ *              arrays of their own.
  */
 #ifndef IMPORTON_H
 #define IMPORTON_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -34,18 +57,65 @@
 #define IMP_VERSION_MINOR  2
 #define IMP_VERSION_PATCH  0
 #define IMP_VERSION_STRING "0.2.0"
+/* 200 is 0.2.0; imp_version_number is that of the library. */
+#define IMP_VERSION_NUMBER                                                               \
+    (10000 * IMP_VERSION_MAJOR + 100 * IMP_VERSION_MINOR + IMP_VERSION_PATCH)
 
 #if defined(__GNUC__)
-#define IMP_API        __attribute__((visibility("default")))
-#define IMP_MUST_CHECK __attribute__((warn_unused_result))
+#define IMP_API                 __attribute__((visibility("default")))
+#define IMP_MUST_CHECK          __attribute__((warn_unused_result))
+#define IMP_DEPRECATED(instead) __attribute__((deprecated(instead)))
 #else
 #define IMP_API
 #define IMP_MUST_CHECK
+#define IMP_DEPRECATED(instead)
 #endif
 
+/* Initial values of a sized struct: its size, what is named, and zeros for the rest;
+ * IMP_INIT(struct imp_team, .ranks = 1). At most 6 values. In C++, where designated
+ * initialisers are of 2020, a function sets the members. */
 #ifdef __cplusplus
+template <class T, class Set> inline T imp_init(Set set)
+{
+    T t = T();
+    t.size = sizeof(T);
+    set(t);
+    return t;
+}
+#define IMP_SET_1(t, a, z)                    t a;
+#define IMP_SET_2(t, a, b, z)                 t a, t b;
+#define IMP_SET_3(t, a, b, c, z)              t a, t b, t c;
+#define IMP_SET_4(t, a, b, c, d, z)           t a, t b, t c, t d;
+#define IMP_SET_5(t, a, b, c, d, e, z)        t a, t b, t c, t d, t e;
+#define IMP_SET_6(t, a, b, c, d, e, f, z)     t a, t b, t c, t d, t e, t f;
+#define IMP_SET_N(a, b, c, d, e, f, set, ...) set
+#define IMP_INIT(type, ...)                                                              \
+    imp_init<type>([](type &t) {                                                         \
+        IMP_SET_N(__VA_ARGS__, IMP_SET_6, IMP_SET_5, IMP_SET_4, IMP_SET_3, IMP_SET_2,    \
+                  IMP_SET_1, 0)                                                          \
+        (t, __VA_ARGS__, 0)                                                              \
+    })
+#define IMP_INIT_ZERO(type) imp_init<type>([](type &) {})
 extern "C" {
+#else
+#define IMP_INIT(type, ...)                                                              \
+    {                                                                                    \
+        .size = sizeof(type), __VA_ARGS__                                                \
+    }
+#define IMP_INIT_ZERO(type)                                                              \
+    {                                                                                    \
+        .size = sizeof(type)                                                             \
+    }
 #endif
+
+/* Row k of an array of sized structs that was handed out, a const struct TAG *; and
+ * whether the library that made the row has this field: IMP_ROW(imp_check_row, rows,
+ * k). */
+#define IMP_ROW(tag, rows, k)                                                            \
+    ((const struct tag *)(const void *)((const char *)(rows) +                           \
+                                        (size_t)(k) * (rows)->size))
+#define IMP_ROW_HAS(tag, row, field)                                                     \
+    (offsetof(struct tag, field) + sizeof((row)->field) <= (row)->size)
 
 /* ---- Status -------------------------------------------------------------------- */
 
@@ -68,8 +138,17 @@ enum imp_status { IMP_STATUS_LIST(IMP_STATUS_ENUM) };
 /** The sentence that belongs to a status, never NULL. */
 IMP_API const char *imp_status_text(enum imp_status status);
 
-/** "major.minor.patch" of the library that is loaded. */
+/** "major.minor.patch" of the library that is loaded, never NULL. */
 IMP_API const char *imp_version(void);
+/** The same as 10000 major + 100 minor + patch: IMP_VERSION_NUMBER of its header. */
+IMP_API int imp_version_number(void);
+/** Does the library that is loaded have all that this header declares? The interface of a
+ * major version only grows; before 1.0, that of a minor version. */
+static inline bool imp_version_fits(void)
+{
+    const int library = imp_version_number(), step = IMP_VERSION_MAJOR ? 10000 : 100;
+    return library / step == IMP_VERSION_NUMBER / step && library >= IMP_VERSION_NUMBER;
+}
 
 /* ---- Context ------------------------------------------------------------------- */
 
@@ -91,10 +170,7 @@ struct imp_context_options {
     void (*log)(enum imp_log_level level, const char *message, void *payload);
     void *log_payload; /**< log NULL: warnings are dropped */
 };
-#define IMP_CONTEXT_OPTIONS_INIT                                                         \
-    {                                                                                    \
-        sizeof(struct imp_context_options), 0, {0, 0, 0}, 0, 0                           \
-    }
+#define IMP_CONTEXT_OPTIONS_INIT IMP_INIT_ZERO(struct imp_context_options)
 
 /**
  * @param options  NULL for the defaults.
@@ -104,6 +180,7 @@ struct imp_context_options {
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_context_create(const struct imp_context_options *options, imp_context **out);
+/** End the context, when all that was made from it has ended. context may be NULL. */
 IMP_API void imp_context_destroy(imp_context *context);
 
 /** Message of the last failure in this context on this thread; "" if none. Never NULL.
@@ -120,8 +197,8 @@ IMP_API int imp_context_threads(const imp_context *context);
  * same order with the same arguments, on scenes and targets that are the same. Each
  * computes a share of the walks, and all get the whole result, with the bits that one
  * process alone gives; what is not walks is computed by each. A failure, a cancel or a
- * time limit of one ends the call on all. Rank 0 writes files; where others are asked to,
- * nothing happens. Calls come from one thread a rank at a time. */
+ * time limit of one ends the call on all. Rank 0 writes files; on others,
+ * such a call does nothing. Calls come from one thread a rank at a time. */
 struct imp_team {
     size_t size;
     int rank, ranks; /**< this one, of how many */
@@ -138,17 +215,14 @@ struct imp_team {
     int64_t (*next)(uint64_t round, void *payload);
     void *payload;
     /** Non-zero: rank 0 reads files and gives their bytes to all. 0: each reads them. */
-    int broadcast;
+    bool broadcast;
     /** Put the sums over all ranks in the place of numbers [n]: what an MPI_Allreduce of
-     * MPI_INT64_T does. Gradients of textures and grids then cost a rank bytes that do not
-     * grow with the ranks. All ranks have equal n. NULL: they are gathered.
+     * MPI_INT64_T does. Gradients of textures and grids then cost a rank bytes that do
+     * not grow with the ranks. All ranks have equal n. NULL: they are gathered.
      * @return as gather. */
     enum imp_status (*sum)(int64_t *numbers, size_t n, void *payload);
 };
-#define IMP_TEAM_INIT                                                                    \
-    {                                                                                    \
-        sizeof(struct imp_team), 0, 1, 0, 0, 0, 0, 0                                     \
-    }
+#define IMP_TEAM_INIT IMP_INIT(struct imp_team, .ranks = 1)
 
 /** Work on this context's calls from now on as one rank of a team; NULL: alone again.
  * Waits for the other ranks.
@@ -162,8 +236,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_context_set_team(imp_context *context
  * kept in files; a part is made by making all calls of the run with this part set. */
 typedef struct imp_parts imp_parts;
 
-/** Part `index`, from 1, of `count`; nothing is computed yet. `command`: how the run was
- * asked for, kept as it is. Parts go together only with equal commands.
+/** Part `index`, from 1, of `count`; nothing is computed yet. `command`: the command
+ * line of the run, stored as it is. Parts go together only with equal commands.
  * @return IMP_OK; IMP_E_ARG; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_parts_create(imp_context *context, int index,
                                                         int count, const char *command,
@@ -178,6 +252,7 @@ imp_parts_read(imp_context *context, const char *const *paths, size_t n, imp_par
  * @return IMP_OK; IMP_E_IO; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_parts_write(const imp_parts *parts,
                                                        const char *path);
+/** parts may be NULL; a context must not use them any more. */
 IMP_API void imp_parts_destroy(imp_parts *parts);
 
 struct imp_parts_info {
@@ -207,13 +282,13 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_context_set_parts(imp_context *contex
 typedef struct imp_manifest imp_manifest;
 
 /** A manifest in the making: files that are read from now on are inputs of the last
- * that was made in the context. `command`: how the result was asked for, kept as it is.
+ * that was made in the context. `command`: that made the result, stored as it is.
  * @return IMP_OK; IMP_E_ARG; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_manifest_create(imp_context *context, const char *command, imp_manifest **out);
 /** Keep sums while all of them take no more than `bytes` (256 MiB before this call); a
- * run whose sums take more is verified as a whole. The more sums a run has, the fewer chunks
- * are kept of each. @return IMP_OK; IMP_E_ARG. */
+ * run whose sums take more is verified as a whole. The more sums a run has, the fewer
+ * chunks are kept of each. @return IMP_OK; IMP_E_ARG. */
 IMP_API enum imp_status imp_manifest_set_limit(imp_manifest *manifest, size_t bytes);
 /** Read one, to verify it: files that are read from now on are compared with its inputs,
  * and its output files are read and compared now. What is no input of it, or has other
@@ -227,6 +302,7 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_manifest_read(imp_context *context,
                                                          const char *path,
                                                          double fraction, uint64_t seed,
                                                          imp_manifest **out);
+/** manifest may be NULL; a context must not use it any more. */
 IMP_API void imp_manifest_destroy(imp_manifest *manifest);
 /** The sums of the calls that follow are kept, or verified; NULL: no more. In a team of
  * ranks sums are not kept. @return IMP_OK; IMP_E_ARG; IMP_E_NOMEM. */
@@ -270,7 +346,7 @@ struct imp_progress {
     const char *note; /**< e.g. "loss 3.1e-4 +- 2e-5"; may be NULL */
 };
 
-/** Called from one thread at a time, a few times a second. Non-zero asks to stop: the
+/** Called from one thread at a time, a few times a second. Non-zero stops: the
  * call in progress returns IMP_CANCELLED. Pictures then hold the samples taken so far and
  * fits the state reached, both valid; a loss or gradient of a part of the picture would
  * mean nothing, so those outputs keep their contents. */
@@ -285,10 +361,19 @@ typedef struct imp_scene imp_scene;
  * film's response curves make of spectra (docs/spectra.md). */
 enum imp_color_mode { IMP_RGB = 0, IMP_MONO = 1, IMP_SPECTRAL = 2, IMP_SINGLE = 3 };
 
-/** How three numbers become a spectrum in spectral modes (docs/spectra.md): by the sigmoid
- * of a quadratic, smooth as measured spectra are; or as the sum of three fixed spectra, so
- * that all is linear in the numbers. */
+/** How three values become a spectrum in spectral modes (docs/spectra.md): by the sigmoid
+ * of a quadratic, smooth as measured spectra are; or as the sum of three fixed spectra,
+ * so that all is linear in the values. */
 enum imp_upsampling { IMP_UPSAMPLING_SIGMOID = 0, IMP_UPSAMPLING_LINEAR = 1 };
+
+/** A scene with plugins or properties that this version does not have. */
+enum imp_lenience {
+    IMP_LENIENT_OFF = 0, /**< an error */
+    IMP_LENIENT_WARN =
+        1, /**< it goes on without them: imp_scene_info lists them, and each
+                               is a warning */
+    IMP_LENIENT_QUIET = 2 /**< the same without warnings */
+};
 
 struct imp_load_options {
     size_t size;
@@ -298,22 +383,17 @@ struct imp_load_options {
     size_t n_defines;
     const char *const *search; /**< [n_search] folders searched for files */
     size_t n_search;
-    /** Of scene files: the property `weights` of the integrator (of the first one in aov
-     * and moment), in place of what the file says; NULL: that. */
+    /** The property `weights` of a file's integrator (of the first one in aov
+     * and moment), in place of the file's; NULL: the file's. */
     const char *weights;
-    /** Not 0: the scene goes on without plugins and properties that this version does not
-     * have, and imp_scene_info lists them. 1: each is a warning, too. */
-    int lenient;
+    enum imp_lenience lenient;
     enum imp_upsampling upsampling;
-    /** Of scene files in spectral modes: "from, to, n" in nm: films have n bins of
-     * wavelengths for channels (docs/spectra.md 5), in place of what they have; NULL: that. */
+    /** For files in spectral modes, "from, to, n" in nm: films have n bins of
+     * wavelengths for channels (docs/spectra.md 5), in place of what they have; NULL:
+     * that. */
     const char *bins;
 };
-#define IMP_LOAD_OPTIONS_INIT                                                            \
-    {                                                                                    \
-        sizeof(struct imp_load_options), IMP_RGB, 0, 0, 0, 0, 0, 0,                      \
-            IMP_UPSAMPLING_SIGMOID, 0                                                    \
-    }
+#define IMP_LOAD_OPTIONS_INIT IMP_INIT_ZERO(struct imp_load_options)
 
 /** Load a scene file (Mitsuba 3 XML). The scene is committed and ready. `options` may be
  * NULL.
@@ -323,7 +403,7 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_load(imp_context *context, const char *path,
                const struct imp_load_options *options, imp_scene **out);
 
-/** The same from memory: xml [length]; `name` stands for the file in messages, files are
+/** The same from memory: xml [length]; `name` is the file in messages, files are
  * searched for in the working folder.
  * @return as imp_scene_load. */
 IMP_API IMP_MUST_CHECK enum imp_status
@@ -333,51 +413,89 @@ imp_scene_load_string(imp_context *context, const char *xml, size_t length,
 
 /**
  * A scene built by calls. The calls mirror the file format: begin/end open and close an
- * object (tag "shape", type "sphere", ...), the property calls give it values. Errors of
- * a build are kept: later calls do nothing, and imp_scene_commit returns the first.
+ * object (tag "shape", type "sphere", ...), the property calls give it values. The first
+ * error of a build is kept: the call returns it, so do all later ones, which do nothing,
+ * and imp_scene_commit. A host may test the last of them alone.
+ * @return IMP_OK; IMP_E_UNSUPPORTED; IMP_E_NOMEM.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_create(imp_context *context, const struct imp_load_options *options,
                  imp_scene **out);
+/** scene may be NULL. Problems, walks and elements made from it go first. */
 IMP_API void imp_scene_destroy(imp_scene *scene);
 
 /** Open an object, and close the one opened last. `id` and `name` may be NULL; `name` is
- * the slot under the parent. tag NULL: what objects of this type are ("diffuse": "bsdf"). The calls in between set properties of the open object, in
- * the units of the file format (degrees, scene units). */
-IMP_API void imp_scene_begin(imp_scene *scene, const char *tag, const char *type,
-                             const char *id, const char *name);
-IMP_API void imp_scene_end(imp_scene *scene);
-IMP_API void imp_scene_bool(imp_scene *scene, const char *name, int value);
-IMP_API void imp_scene_integer(imp_scene *scene, const char *name, int64_t value);
-IMP_API void imp_scene_float(imp_scene *scene, const char *name, double value);
-IMP_API void imp_scene_string(imp_scene *scene, const char *name, const char *value);
-IMP_API void imp_scene_vector(imp_scene *scene, const char *name, const double value[3]);
-IMP_API void imp_scene_rgb(imp_scene *scene, const char *name, const double value[3]);
+ * the slot under the parent. tag NULL: what objects of this type are ("diffuse":
+ * "bsdf"). The calls in between set properties of the open object, in the units of the
+ * file format (degrees, scene units).
+ * @return IMP_OK; IMP_E_ARG for a tag that is none, or a scene that is committed;
+ *         IMP_E_UNSUPPORTED, without a tag, for a type that does not exist; IMP_E_SCENE for
+ *         an id that is there already; IMP_E_NOMEM. */
+IMP_API enum imp_status imp_scene_begin(imp_scene *scene, const char *tag,
+                                        const char *type, const char *id,
+                                        const char *name);
+/** Close the open object.
+ * @return IMP_OK; IMP_E_ARG without imp_scene_begin. */
+IMP_API enum imp_status imp_scene_end(imp_scene *scene);
+/** A property of the open object, in the units of the file format. Which properties
+ * there are is checked by imp_scene_commit.
+ * @return IMP_OK; IMP_E_ARG for a name that is NULL; IMP_E_SCENE for one that is
+ *         there already; IMP_E_NOMEM. */
+IMP_API enum imp_status imp_scene_bool(imp_scene *scene, const char *name, bool value);
+/** @return as imp_scene_bool. */
+IMP_API enum imp_status imp_scene_integer(imp_scene *scene, const char *name,
+                                          int64_t value);
+/** @return as imp_scene_bool; IMP_E_ARG also for a value that is not finite. */
+IMP_API enum imp_status imp_scene_float(imp_scene *scene, const char *name, double value);
+/** The text is copied.
+ * @return as imp_scene_bool; IMP_E_ARG also for a value that is NULL. */
+IMP_API enum imp_status imp_scene_string(imp_scene *scene, const char *name,
+                                         const char *value);
+/** value [3]: a point or a vector.
+ * @return as imp_scene_float. */
+IMP_API enum imp_status imp_scene_vector(imp_scene *scene, const char *name,
+                                         const double value[3]);
+/** value [3]: linear sRGB.
+ * @return as imp_scene_float. */
+IMP_API enum imp_status imp_scene_rgb(imp_scene *scene, const char *name,
+                                      const double value[3]);
 /** A spectrum by samples: n >= 2 strictly increasing wavelengths in nm; or, with n == 1
- * and wavelengths_nm NULL, the same value at all of them. */
-IMP_API void imp_scene_spectrum(imp_scene *scene, const char *name, size_t n,
-                                const double *wavelengths_nm, const double *values);
-/** Local-to-world matrix, row-major. */
-IMP_API void imp_scene_transform(imp_scene *scene, const char *name,
-                                 const double value[16]);
-/** Refer to the object with this id; `name` may be NULL. Forward references are fine. */
-IMP_API void imp_scene_ref(imp_scene *scene, const char *id, const char *name);
+ * and wavelengths_nm NULL, the same value at all of them.
+ * wavelengths_nm [n] and values [n] are copied.
+ * @return as imp_scene_float; IMP_E_ARG also for wavelengths that do not rise. */
+IMP_API enum imp_status imp_scene_spectrum(imp_scene *scene, const char *name, size_t n,
+                                           const double *wavelengths_nm,
+                                           const double *values);
+/** Local-to-world matrix, row-major.
+ * @return as imp_scene_float. */
+IMP_API enum imp_status imp_scene_transform(imp_scene *scene, const char *name,
+                                            const double value[16]);
+/** Refer to the object with this id; `name` may be NULL. Forward references are fine.
+ * @return IMP_OK; IMP_E_ARG for an id that is NULL; IMP_E_NOMEM. */
+IMP_API enum imp_status imp_scene_ref(imp_scene *scene, const char *id, const char *name);
 /** Triangles for the open shape of type "mesh". normals and uvs may be NULL.
  * positions [3*n_vertices], normals [3*n_vertices], uvs [2*n_vertices],
- * indices [3*n_triangles]. */
-IMP_API void imp_scene_mesh(imp_scene *scene, size_t n_vertices, size_t n_triangles,
-                            const float *positions, const float *normals,
-                            const float *uvs, const uint32_t *indices);
+ * indices [3*n_triangles].
+ * @return IMP_OK; IMP_E_ARG for another open object, no vertices or triangles, or
+ *         numbers that are not finite; IMP_E_NOMEM. Indices are checked by
+ *         imp_scene_commit. */
+IMP_API enum imp_status imp_scene_mesh(imp_scene *scene, size_t n_vertices,
+                                       size_t n_triangles, const float *positions,
+                                       const float *normals, const float *uvs,
+                                       const uint32_t *indices);
 /** Linear pixels for the open texture of type "bitmap" or emitter of type "envmap", in
  * place of `filename`.
- * pixels [height][width][channels], channels 1 or 3. */
-IMP_API void imp_scene_image(imp_scene *scene, int width, int height, int channels,
-                             const float *pixels);
-/** Values of the cells of the open volume of type "gridvolume", in place of `filename`, in the
- * order of its files: values [nz][ny][nx][channels], channels 1 or 3, finite. The grid fills
- * the unit cube, to which `to_world` applies; they are copied. */
-IMP_API void imp_scene_grid(imp_scene *scene, int nx, int ny, int nz, int channels,
-                            const float *values);
+ * pixels [height][width][channels], channels 1 or 3.
+ * @return IMP_OK; IMP_E_ARG for another open object, sizes below 1, other channels,
+ *         or pixels that are not finite; IMP_E_NOMEM. */
+IMP_API enum imp_status imp_scene_image(imp_scene *scene, int width, int height,
+                                        int channels, const float *pixels);
+/** Values of the cells of the open volume of type "gridvolume", in place of `filename`,
+ * in the order of its files: values [nz][ny][nx][channels], channels 1 or 3, finite. The
+ * grid fills the unit cube, to which `to_world` applies; they are copied.
+ * @return as imp_scene_image. */
+IMP_API enum imp_status imp_scene_grid(imp_scene *scene, int nx, int ny, int nz,
+                                       int channels, const float *values);
 /** Finish a scene built by calls: make all objects, check them, build what rays need.
  * @return IMP_OK; the first error of the calls before; IMP_E_SCENE; IMP_E_UNSUPPORTED;
  *         IMP_E_NOMEM; IMP_E_ARG if it has been committed already. */
@@ -398,8 +516,8 @@ struct imp_scene_info {
      * what is lost. */
     const char *const *missing;
     int n_missing;
-    /** Instances of groups, those inside groups counted once; and the triangles that a ray
-     * can meet, each as often as it stands in the scene. */
+    /** Instances of groups, those inside groups counted once; and the triangles that a
+     * ray can meet, each as often as it occurs in the scene. */
     int n_instances;
     double triangles_met;
 };
@@ -411,17 +529,18 @@ struct imp_sensor_info {
     size_t size;
     const char *name, *type;
     int width, height; /**< of the picture: the crop window */
-    int spp;           /**< samples per pixel that the file asks for */
+    int spp;           /**< samples per pixel of its sampler */
     const char *filter;
     double filter_radius;
     const char *file_format; /**< "openexr", "rgbe" or "pfm" */
     const char *unit;        /**< of its numbers: "W m^-2 sr^-1", of an irradiancemeter
-                                "W m^-2"; or "cd m^-2", "lx" where the scene says so */
-    /** Of a specfilm: the names of its response curves, which are its channels; else 0. */
+                                "W m^-2"; or "cd m^-2", "lx" of photometric scenes */
+    /** A specfilm's: its response curves, which are its channels; else 0. */
     int n_responses;
     const char *const *response_names; /**< [n_responses] */
-    int photograph; /**< its film has a gamma: targets hold the values of a photograph, from
-                         0 to 1, not linear in light */
+    /** Its film has a gamma: targets hold the values of a photograph, from 0 to 1, not
+     * linear in light. */
+    bool photograph;
 };
 /** Set info->size first; strings belong to the scene.
  * @return IMP_OK; IMP_E_ARG if there is no such sensor. */
@@ -444,35 +563,39 @@ struct imp_param_info {
     size_t size;
     const char *name; /**< stable dotted name, e.g. "red.reflectance.value" */
     const char *unit; /**< "1", "W m^-2 sr^-1", ... */
-    size_t offset;    /**< of its first number in theta */
-    size_t count;     /**< of numbers: the product of dims */
+    size_t offset;    /**< of its first value in theta */
+    size_t count;     /**< of values: the product of dims */
     size_t dims[3];   /**< [n_dims], row-major */
     int n_dims;       /**< 0: a scalar */
-    double lo, hi;    /**< bounds of every number; may be infinite */
+    double lo, hi;    /**< bounds of every value; may be infinite */
     unsigned flags;   /**< enum imp_param_flags */
-    const char *why;  /**< why it has no gradient, where more can be said; or NULL */
-    /** [count] of a spectrum given by its values at wavelengths: those, in nm; else NULL. */
+    const char *why;  /**< why it has no gradient; NULL: no more is known */
+    /** [count] of a spectrum given by its values at wavelengths: those, in nm; else
+     * NULL. */
     const double *wavelengths_nm;
-    /** Of a grid in space: its sizes are dims [layers][y][x], or of colours
+    /** A grid in space has sizes dims [layers][y][x], or of colours
      * [layers y][x][3]; else 0. */
     size_t layers;
 };
 
-/** Number of parameters, and of numbers in all of them together. */
+/** Number of parameters. */
 IMP_API size_t imp_scene_n_params(const imp_scene *scene);
+/** Values in all parameters together: the length of theta. 0 for NULL. */
 IMP_API size_t imp_scene_n_theta(const imp_scene *scene);
 /** Set info->size first; strings belong to the scene. @return IMP_OK; IMP_E_ARG if there
  * is no such parameter. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_get_param(const imp_scene *scene, size_t index, struct imp_param_info *info);
-/** Find by name; a final ".value" may be left out, and names of parents may stand in
- * front. @return IMP_OK; IMP_E_ARG with a message that names the nearest ones. */
+/** Find by name; a final ".value" may be left out, and names of parents may come
+ * first. @return IMP_OK; IMP_E_ARG with a message that names the nearest ones. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
-/** theta [imp_scene_n_theta], in the units of imp_param_info; written, and read. */
-IMP_API void imp_scene_get_theta(const imp_scene *scene, double *theta);
+/** theta [imp_scene_n_theta], in the units of imp_param_info; written, and read.
+ * @return IMP_OK; IMP_E_ARG. */
+IMP_API enum imp_status imp_scene_get_theta(const imp_scene *scene, double *theta);
 /** @return IMP_OK; IMP_E_ARG if a value is not finite or outside its bounds: nothing is
- * set. */
+ * set.
+ * theta [imp_scene_n_theta] is copied. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_set_theta(imp_scene *scene,
                                                            const double *theta);
 /** One parameter: values [info.count], or n == 1 to set all of them to one value.
@@ -480,11 +603,13 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_scene_set_theta(imp_scene *scene,
  *         outside its bounds: nothing is set. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_set_values(imp_scene *scene, size_t index, size_t n, const double *values);
+/** values [info.count] of one parameter, in its unit.
+ * @return IMP_OK; IMP_E_ARG if there is no such parameter. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_get_values(const imp_scene *scene,
                                                             size_t index, double *values);
-/** Write a grid in space (IMP_PARAM_VOLUME) as a .vol file of version 3, in 32-bit floats,
- * with the box of the file that it was read from: what a fit has found becomes the file of
- * another scene.
+/** Write a grid in space (IMP_PARAM_VOLUME) as a .vol file of version 3, in 32-bit
+ * floats, with the box of the file that it was read from: what a fit has found becomes
+ * the file of another scene.
  * @param values [info.count]; NULL: those that the scene has.
  * @return IMP_OK; IMP_E_ARG if there is no such parameter or it is no grid in space;
  *         IMP_E_IO. */
@@ -522,6 +647,7 @@ IMP_API const char *imp_drop_text(enum imp_drop cause);
 /** A dropped walk. imp_walk_describe with the same sensor, seed, pixel and sample is that
  * walk, vertex by vertex (IMP_DROP_MOVED: the walk, but not what was dropped of it). */
 struct imp_drop_key {
+    size_t size;
     uint64_t seed;
     int64_t sample;
     int32_t x, y;   /**< pixel of the picture; outside of it within the filter's radius */
@@ -533,12 +659,13 @@ struct imp_film_info {
     size_t size;
     int width, height, channels;
     int64_t spp;      /**< samples per pixel in it */
-    int has_se;       /**< standard errors are there */
+    bool has_se;      /**< standard errors are there */
     uint64_t dropped; /**< walks dropped, of all causes */
     /** The same by enum imp_drop. All 0 for a picture that was read from a file. */
     uint64_t dropped_by_cause[IMP_DROP_CAUSES];
-    int n_drop_keys;                              /**< at most IMP_DROP_KEYS */
-    struct imp_drop_key drop_keys[IMP_DROP_KEYS]; /**< the first by sample, row, column */
+    int n_drop_keys; /**< at most IMP_DROP_KEYS */
+    /** [n_drop_keys] the first by sample, row, column: rows, which belong to the film. */
+    const struct imp_drop_key *drop_keys;
 };
 
 /** An empty picture to fill by hand, zeros. `names` is "R,G,B", "Y", "albedo.R,..." .
@@ -547,6 +674,7 @@ struct imp_film_info {
 IMP_API IMP_MUST_CHECK enum imp_status imp_film_create(imp_context *context, int width,
                                                        int height, const char *names,
                                                        imp_film **out);
+/** film may be NULL. What it handed out (means, names, rows) ends with it. */
 IMP_API void imp_film_destroy(imp_film *film);
 /** Set info->size first. @return IMP_OK; IMP_E_ARG. */
 IMP_API enum imp_status imp_film_get_info(const imp_film *film,
@@ -557,37 +685,36 @@ IMP_API const char *imp_film_channel(const imp_film *film, int channel);
 IMP_API float *imp_film_mean(imp_film *film);
 /** One standard error of each mean, in the same order; NULL if there are none. */
 IMP_API float *imp_film_se(imp_film *film);
-/** Take the samples of another picture of the same scene, made with another seed, too: means
- * by samples per pixel, and their standard errors where both have them.
+/** Take the samples of another picture of the same scene, made with another seed, too:
+ * means by samples per pixel, and their standard errors where both have them.
  * @return IMP_OK; IMP_E_ARG if sizes or channels differ, or one has no samples. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_film_merge(imp_film *film,
                                                       const imp_film *other);
-/** Append the channels of another picture of the same size as "layer.NAME": viewers show them
- * as a layer. Standard errors stay where both have them.
- * @return IMP_OK; IMP_E_ARG if sizes differ, the name is no layer's or is there; IMP_E_NOMEM.
- * On an error the picture is what it was. */
+/** Append the channels of another picture of the same size as "layer.NAME": viewers show
+ * them as a layer. Standard errors stay where both have them.
+ * @return IMP_OK; IMP_E_ARG if sizes differ, the name is no layer's or is there;
+ * IMP_E_NOMEM. On an error the picture is what it was. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_film_add_layer(imp_film *film, const imp_film *other, const char *layer);
-/** Attach a text attribute (provenance); it is written to EXR files. */
+/** Attach a text attribute (provenance); it is written to EXR files.
+ * key and value are copied.
+ * @return IMP_OK; IMP_E_ARG; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_film_set_text(imp_film *film, const char *key,
                                                          const char *value);
 
 /** The text attribute with this key, made here or read from an EXR file; belongs to the
  * film. NULL if there is none. */
-IMP_API const char *imp_film_get_text(const imp_film *film, const char *key);
+IMP_API const char *imp_film_text(const imp_film *film, const char *key);
 
 struct imp_write_options {
     size_t size;
-    int half;           /**< 16-bit floats instead of 32 (EXR) */
-    int standard_error; /**< add channels se.R, se.G ... (EXR) */
-    double exposure;    /**< stops, for PNG */
-    int diverging;      /**< PNG of a signed picture: blue-white-red, symmetric about 0 */
-    double range;       /**< of a signed picture; 0: its 99.5 percentile of |value| */
+    bool half;           /**< 16-bit floats instead of 32 (EXR) */
+    bool standard_error; /**< add channels se.R, se.G ... (EXR) */
+    double exposure;     /**< stops, for PNG */
+    bool diverging; /**< PNG of a signed picture: blue-white-red, symmetric about 0 */
+    double range;   /**< of a signed picture; 0: its 99.5 percentile of |value| */
 };
-#define IMP_WRITE_OPTIONS_INIT                                                           \
-    {                                                                                    \
-        sizeof(struct imp_write_options), 0, 0, 0, 0, 0                                  \
-    }
+#define IMP_WRITE_OPTIONS_INIT IMP_INIT_ZERO(struct imp_write_options)
 
 /** Write by extension: .exr, .pfm, .hdr, .png (sRGB), .npy. The file appears whole or not
  * at all. options may be NULL.
@@ -603,11 +730,11 @@ imp_film_write(const imp_film *film, const char *path,
 IMP_API IMP_MUST_CHECK enum imp_status imp_film_read(imp_context *context,
                                                      const char *path, imp_film **out);
 
-/** How a picture holds all directions: rows at equal angles from up to down, the first and
- * the last at the poles, or rows at equal cosines, all texels of one solid angle. */
+/** How a picture holds all directions: rows at equal angles from up to down, the first
+ * and the last at the poles, or rows at equal cosines, all texels of one solid angle. */
 enum imp_sky_projection { IMP_LATLONG, IMP_EQUAL_AREA };
-/** A map of the sky (an envmap's picture) in another projection or size. Its light as it is
- * interpolated, the integral over all directions, is kept.
+/** A map of the sky (an envmap's picture) in another projection or size. Its light as it
+ * is interpolated, the integral over all directions, is kept.
  * @return IMP_OK; IMP_E_ARG for maps below 2 x 2; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_film_project(const imp_film *map, enum imp_sky_projection from,
@@ -615,9 +742,10 @@ imp_film_project(const imp_film *map, enum imp_sky_projection from,
 
 /* ---- Rendering ----------------------------------------------------------------- */
 
-/** What walks are told about the light, to draw from (imp_elements_guide of elements.h).
+/** A distribution of the light, from which walks draw (imp_elements_guide of elements.h).
  * It changes the noise, never the mean. */
 typedef struct imp_guide imp_guide;
+/** guide may be NULL. No run may use it any more. */
 IMP_API void imp_guide_destroy(imp_guide *guide);
 
 /** How walks draw their wavelengths. */
@@ -632,14 +760,14 @@ enum imp_wavelength_sampling {
 typedef void (*imp_preview_fn)(const imp_film *picture, void *payload);
 /** The random numbers of a pixel's walks. */
 enum imp_points {
-    /** As the sampler of the sensor says; where there is none, independent for pictures, of
+    /** Those of the sensor's sampler; where there is none, independent for pictures, of
      * Sobol's sequence for losses, and fits but IMP_LM, of scenes without media. */
     IMP_POINTS_SCENE = 0,
     IMP_POINTS_INDEPENDENT, /**< independent */
-    /** Sets of up to 64 points of Sobol's sequence, scrambled by Owen's method. Pixels and
-     * sets are independent of each other. Means stay what they are, errors shrink; standard
-     * errors of gradients come from independent sets, those of pictures from parts of sets,
-     * and are a little too large. */
+    /** Sets of up to 64 points of Sobol's sequence, scrambled by Owen's method. Pixels
+     * and sets are independent of each other. Means stay what they are, errors shrink;
+     * standard errors of gradients come from independent sets, those of pictures from
+     * parts of sets, and are a little too large. */
     IMP_POINTS_SOBOL
 };
 
@@ -651,7 +779,7 @@ enum imp_from {
     IMP_FROM_LIGHTS
 };
 
-/** Walks whose decisions were kept (walks.h). */
+/** Recorded walks (walks.h). */
 typedef struct imp_walks imp_walks;
 
 /** How Monte Carlo is run. The same (seed, spp) give the same bits on any thread count.
@@ -659,39 +787,37 @@ typedef struct imp_walks imp_walks;
 struct imp_run {
     size_t size;
     int sensor; /**< index; default 0 */
-    int spp;    /**< samples per pixel; 0: what the scene asks for */
+    int spp;    /**< samples per pixel; 0: those of the scene */
     uint64_t seed;
-    /** Of pictures, 0: none; else samples are taken until then (every pixel gets at least
-     * one pass), at most spp if that is given. */
+    /** For pictures. 0: none; else samples are taken until then (every pixel gets at
+     * least one pass), at most spp if that is given. */
     double time_limit_s;
     double drop_budget; /**< fraction of walks that may be dropped, 0 to 1; 0: 1e-4 */
     imp_progress_fn progress;
     void *progress_payload;
     const imp_guide *guide; /**< NULL: none; for path, and for walks from the lights */
-    /** Of scenes in a spectral mode. */
+    /** For spectral modes. */
     enum imp_wavelength_sampling wavelengths;
     /** Walks of a pixel among which wavelengths are stratified; 0: a quarter of the
-     * samples per pixel, at most 16. Standard errors come from the spread of such sets. */
+     * samples per pixel, at most 16. Standard errors come from the spread of such
+     * sets. */
     int wavelength_set;
-    /** Of pictures: shown what is there after 1, 2, 4, ... passes of 64 samples (with a time limit,
-     * of 4);
-     * NULL: nobody looks. */
+    /** For pictures: called with the picture after 1, 2, 4, ... passes of 64 samples
+     * (with a time limit, of 4);
+     * NULL: not called. */
     imp_preview_fn preview;
     void *preview_payload;
-    /** Both ends give the same numbers; what cannot begin there is refused with its name. Of
-     * walks from the lights spp times the pixels are made for the whole film. */
+    /** Both ends give the same numbers; what cannot begin there is refused with its
+     * name. With walks from the lights spp times the pixels are made for the whole
+     * film. */
     enum imp_from from;
     enum imp_points points;
-    /** Kept walks, which are evaluated in place of tracing new ones. Seed, samples, points
-     * and wavelengths are those that they were drawn with, whatever stands here. NULL:
-     * walks are traced. */
+    /** Recorded walks, which are evaluated in place of tracing new ones. Seed, samples,
+     * points and wavelengths are those that they were drawn with, whatever these fields
+     * are. NULL: walks are traced. */
     const imp_walks *walks;
 };
-#define IMP_RUN_INIT                                                                     \
-    {                                                                                    \
-        sizeof(struct imp_run), 0, 0, 0, 0, 0, 0, 0, 0, IMP_WAVELENGTHS_STRATIFIED, 0,   \
-            0, 0, IMP_FROM_SCENE, IMP_POINTS_SCENE, 0                                    \
-    }
+#define IMP_RUN_INIT IMP_INIT_ZERO(struct imp_run)
 
 /** Render the scene's integrator through a sensor.
  * @return IMP_OK; IMP_CANCELLED (*out is valid, with the passes done; or NULL, if less
@@ -702,9 +828,9 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_render(const imp_scene *scene, const struct imp_run *run, imp_film **out);
 
 /**
- * A picture without its noise, by Intel's Open Image Denoise (version 2, found when this is
- * called) from the colours and the albedo and normal of first surfaces, for people to look
- * at. How far it is off nobody knows, so it has no standard errors, and it is no target for
+ * A picture without its noise, by Intel's Open Image Denoise (version 2, found when this
+ * is called) from the colours and the albedo and normal of first surfaces, for viewing
+ * only. Its error is unknown: it has no standard errors, and it is no target for
  * a fit. Channels other than R, G, B or Y are copied.
  * @param run     of the picture: its sensor and seed; NULL for defaults.
  * @param picture that imp_render made of the scene; borrowed.
@@ -717,21 +843,23 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_denoise(const imp_scene *scene,
                                                    const imp_film *picture,
                                                    imp_film **out);
 
-/** Is there a library for imp_denoise? To be asked before a long render.
+/** Is there a library for imp_denoise? To be called before a long render.
  * @return IMP_OK; IMP_E_UNSUPPORTED, with what to do, if there is none. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_denoiser_check(imp_context *context);
 
 /** One walk, vertex by vertex, as text (json 0) or JSON: sample number `sample` of pixel
- * (x, y) of the picture, the same walk that renders and gradients of run->seed use (losses
- * of scenes without a sampler: with run->points IMP_POINTS_SOBOL). Pixels
- * of the border that a film with sample_border samples for its filter have numbers below 0
- * and from the width, or height, on. The caller frees *text with imp_free.
+ * (x, y) of the picture, the same walk that renders and gradients of run->seed use
+ * (losses of scenes without a sampler: with run->points IMP_POINTS_SOBOL). Pixels
+ * of the border that a film with sample_border samples for its filter have numbers below
+ * 0 and from the width, or height, on. The caller frees *text with imp_free.
  * @return IMP_OK; IMP_E_ARG for a pixel outside these; IMP_E_SCENE if the
  * integrator makes no walks; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_walk_describe(const imp_scene *scene,
                                                          const struct imp_run *run, int x,
-                                                         int y, int64_t sample, int json,
+                                                         int y, int64_t sample, bool json,
                                                          char **text);
+/** Free what a function of this context handed to the caller (a text, points,
+ * arrivals). memory may be NULL. */
 IMP_API void imp_free(imp_context *context, void *memory);
 
 /* ---- Problems: parameters, targets, derivatives -------------------------------- */
@@ -749,6 +877,7 @@ struct imp_estimate {
  * @return IMP_OK; IMP_E_ARG if the scene is not committed; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_create(imp_scene *scene,
                                                           imp_problem **out);
+/** problem may be NULL. Its scene stays. */
 IMP_API void imp_problem_destroy(imp_problem *problem);
 
 /** Make parameters active: a name or a glob ("*.reflectance.value"; "*" is everything
@@ -760,17 +889,17 @@ IMP_API void imp_problem_destroy(imp_problem *problem);
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_activate(imp_problem *problem,
                                                             const char *glob);
 enum imp_tie {
-    IMP_TIE_SAME =
-        0,          /**< equal numbers: one x for all of them, from the first's values */
-    IMP_TIE_FACTOR, /**< one x, from 1, multiplies all of them as they are now */
-    IMP_TIE_LOG     /**< v = exp(x), each number by itself: it stays positive */
+    IMP_TIE_SAME = 0, /**< equal values: one x for all of them, from the first's values */
+    IMP_TIE_FACTOR,   /**< one x, from 1, multiplies all of them as they are now */
+    IMP_TIE_LOG       /**< v = exp(x), each value by itself: it stays positive */
 };
 
-/** Tie all active parameters that match: numbers that are the same paint, lamps of one
- * dimmer. x, gradients, Jacobians, covariances and bounds are then of the tied numbers, with
- * their standard errors; regularisers weigh x. A parameter has at most one tie of equality
- * or factor, and one logarithm; checks look at every number by itself. A fit's rows have
- * numbers in the parameter's own unit also where x is a logarithm, a factor's are factors.
+/** Tie all active parameters that match: parameters that are the same paint, lamps of one
+ * dimmer. x, gradients, Jacobians, covariances and bounds are then of the tied
+ * variables, with their standard errors; regularisers weigh x. A parameter has at most
+ * one tie of equality or factor, and one logarithm; checks test every value by itself. A
+ * fit's rows have numbers in the parameter's own unit also where x is a logarithm, a
+ * factor's are factors.
  * @param glob  as for imp_problem_activate, which comes first; or several, with commas
  *              between them: "left.*,right.*".
  * @return IMP_OK; IMP_E_ARG if nothing is tied by it, sizes or bounds do not agree, a
@@ -782,31 +911,43 @@ imp_problem_tie(imp_problem *problem, const char *glob, enum imp_tie kind);
 struct imp_tie_info {
     size_t size;
     const char *name; /**< the parameter's, or factor(GLOB) */
-    int factor;       /**< x multiplies what the members had when they were tied */
-    int log;          /**< x is a logarithm */
-    size_t count;     /**< numbers of x that belong together */
+    bool factor;      /**< x multiplies what the members had when they were tied */
+    bool log;         /**< x is a logarithm */
+    size_t count;     /**< variables that belong together */
     size_t n_members; /**< parameters that follow them */
     const char *const *members; /**< [n_members] their names; owned by the problem */
 };
-#define IMP_TIE_INFO_INIT                                                                \
-    {                                                                                    \
-        sizeof(struct imp_tie_info), 0, 0, 0, 0, 0, 0                                    \
-    }
+#define IMP_TIE_INFO_INIT IMP_INIT_ZERO(struct imp_tie_info)
 
-/** What number i < imp_problem_n of x stands for. */
+/** What variable i < imp_problem_n_variables of x is.
+ * Set info->size first.
+ * @return IMP_OK; IMP_E_ARG if i is not below. */
 IMP_API IMP_MUST_CHECK enum imp_status
-imp_problem_get_tie(const imp_problem *problem, size_t i, struct imp_tie_info *out);
+imp_problem_get_tie(const imp_problem *problem, size_t i, struct imp_tie_info *info);
 
-/** Length of x: how many numbers are active. */
-IMP_API size_t imp_problem_n(const imp_problem *problem);
-/** Of active number i: its parameter (the first that follows it, if several do), its
- * index inside it, its bounds. Outputs may be NULL. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_problem_variable(const imp_problem *problem,
-                                                            size_t i, size_t *param,
-                                                            size_t *element, double *lo,
-                                                            double *hi);
-/** x [imp_problem_n] from and to the scene. Setting refuses values outside bounds. */
-IMP_API void imp_problem_get_x(const imp_problem *problem, double *x);
+/** Length of x: the count of active variables. */
+IMP_API size_t imp_problem_n_variables(const imp_problem *problem);
+/** An active variable. */
+struct imp_variable_info {
+    size_t size;
+    size_t param; /**< index of its parameter: the first that follows it, if several do */
+    size_t element; /**< index inside the parameter */
+    double lo, hi;  /**< bounds; may be infinite */
+};
+#define IMP_VARIABLE_INFO_INIT IMP_INIT_ZERO(struct imp_variable_info)
+/** Variable i < imp_problem_n_variables.
+ * @param[out] info set its size first.
+ * @return IMP_OK; IMP_E_ARG. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_problem_get_variable(const imp_problem *problem, size_t i,
+                         struct imp_variable_info *info);
+/** x [imp_problem_n_variables] from and to the scene. Setting refuses values outside
+ * bounds.
+ * @return IMP_OK; IMP_E_ARG. */
+IMP_API enum imp_status imp_problem_get_x(const imp_problem *problem, double *x);
+/** x [imp_problem_n_variables] is copied to the scene.
+ * @return IMP_OK; IMP_E_ARG for a value that is not finite or outside its bounds:
+ *         nothing is set. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_set_x(imp_problem *problem,
                                                          const double *x);
 
@@ -831,47 +972,44 @@ struct imp_target {
     const float *noise_se; /**< [height][width][channels], 1 sigma of the picture's own
                                 noise, for covariances; NULL: estimated from residuals */
 };
-#define IMP_TARGET_INIT                                                                  \
-    {                                                                                    \
-        sizeof(struct imp_target), 0, 0, 0, 0, 0, 0, IMP_LOSS_L2, 0, 0, 0                \
-    }
+#define IMP_TARGET_INIT IMP_INIT_ZERO(struct imp_target)
 /** The target's arrays are copied.
- * @return IMP_OK; IMP_E_ARG if sizes differ from the sensor's, a number is not finite, or
+ * @return IMP_OK; IMP_E_ARG if sizes differ from the sensor's, a value is not finite, or
  *         all weights are 0; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_problem_add_target(imp_problem *problem, const struct imp_target *target);
 
-/** 1/2 weight |x - x0|^2 over the active numbers that match `glob` (Tikhonov, the term
+/** 1/2 weight |x - x0|^2 over the active variables that match `glob` (Tikhonov, the term
  * 1/2 eps |theta|^2 of Stam's Eq. 10); x0 is 0, or the values at this call if
  * `from_here`. @return IMP_OK; IMP_E_ARG if nothing matches or the weight is negative;
  * IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_add_tikhonov(imp_problem *problem,
                                                                 const char *glob,
                                                                 double weight,
-                                                                int from_here);
+                                                                bool from_here);
 /** 1/2 weight |grad x|^2, forward differences between neighbouring texels of textures, or
  * samples of spectra, that match `glob`. @return IMP_E_ARG if none has neighbours. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_problem_add_smoothness(imp_problem *problem, const char *glob, double weight);
 
 /** Samples per pixel that imp_problem_objective takes for a target (imp_problem_reverse
- * for target -1), where this run asks for run->spp: they are cut into replicates of equal
+ * for target -1), in place of run->spp: they are cut into replicates of equal
  * size, or into two sets of equal size, so it may be a few more.
  * @return IMP_OK; IMP_E_ARG if there is no such target or sensor. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_problem_spp(const imp_problem *problem,
-                                                       int target,
-                                                       const struct imp_run *run,
-                                                       int *spp);
+IMP_API IMP_MUST_CHECK enum imp_status imp_problem_get_spp(const imp_problem *problem,
+                                                           int target,
+                                                           const struct imp_run *run,
+                                                           int *spp);
 
 /**
  * Objective and gradient in one call, from the same walks.
  *
  * Quadratic losses through box filters take one pass with leave-one-out adjoints, so that
  * value and gradient have no bias (docs: estimators); others take two passes, and
- * objective->bias_order says what is left. spp is rounded up to at least 2,
- * and so that replicates and sets have one size (imp_problem_spp).
+ * objective->bias_order is the order of what is left. spp is rounded up to at least 2,
+ * and so that replicates and sets have one size (imp_problem_get_spp).
  *
- * @param x         [imp_problem_n]; NULL: the scene's values.
+ * @param x         [imp_problem_n_variables]; NULL: the scene's values.
  * @param run       run->sensor is ignored; NULL for defaults.
  * @param[out] objective   may be NULL.
  * @param[out] gradient    [n], objective per unit of x; NULL: value only.
@@ -886,7 +1024,8 @@ imp_problem_objective(imp_problem *problem, const double *x, const struct imp_ru
                       double *gradient_se);
 
 /** The same with NLopt's callback shape (payload: the problem). The run is the one set by
- * imp_problem_set_run; equal seeds make common random numbers. Failure gives HUGE_VAL. */
+ * imp_problem_set_run; equal seeds make common random numbers. Failure gives HUGE_VAL.
+ * x [n] and gradient [n], which may be NULL. */
 IMP_API double imp_problem_nlopt(unsigned n, const double *x, double *gradient,
                                  void *problem);
 /** Copied; NULL: the defaults. @return IMP_OK; IMP_E_ARG: the run before stays. */
@@ -932,8 +1071,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_problem_forward(imp_problem *problem,
                                                            const struct imp_run *run,
                                                            imp_film **out);
 
-/** One picture dI/dx_i for every active number, from one set of walks: films [n], each to
- * be destroyed by the caller. n is limited to 256. primal, the picture itself in the
+/** One picture dI/dx_i for every active variable, from one set of walks: films [n], each
+ * to be destroyed by the caller. n is limited to 256. primal, the picture itself in the
  * scene's channels whatever the film's pixel format, may be NULL; with nothing active and
  * films NULL it is all that is made. @return as imp_problem_forward. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_jacobian(imp_problem *problem,
@@ -947,7 +1086,7 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_problem_jacobian(imp_problem *problem
  * itself, and of groups of derivative pictures, such as the three numbers of a colour. At
  * most a quarter of the pictures' walks (but 16 per pixel) are made again, without the
  * pictures: a part of them (imp_parts_create) is made with primal and films NULL.
- * @param adjoint  as imp_problem_functional's.
+ * @param adjoint  [height][width][channels], as imp_problem_functional's.
  * @param run      that of imp_problem_jacobian; with a time limit, it is not one here.
  * @param primal   the picture; borrowed.
  * @param films    [n] the derivative pictures, as they came; borrowed.
@@ -978,34 +1117,35 @@ enum imp_optimizer {
 /** A fit between two iterations. Pointers live during the call. */
 struct imp_fit_step {
     size_t size;
-    int iteration;   /**< completed ones */
-    size_t n;        /**< of the problem; 0 for Adam of more than 1024 numbers, and of all
+    int iteration; /**< completed ones */
+    size_t n;      /**< of the problem; 0 for Adam of more than 1024 variables, and of all
                           levels but the last: then x and history_x are NULL */
     const double *x; /**< [n] the best estimate so far */
     size_t n_history;
     const double *history, *history_se, *history_x; /**< as in imp_fit_result */
 };
 /** Called after each iteration from the thread that called imp_fit. The scene may be
- * rendered at these numbers (imp_problem_set_x, imp_render). Non-zero asks to stop. */
+ * rendered at these values (imp_problem_set_x, imp_render). Non-zero stops the fit. */
 typedef int (*imp_fit_step_fn)(const struct imp_fit_step *step, void *payload);
 
-/** Recursive control variates (docs/fitting.md): the walks of an iteration are evaluated at
- * the numbers of the one before, too, and what was known of the pictures there is carried on.
- * They are for IMP_ADAM, with losses L2 and relative L2, pixels of their own (rfilter box),
- * walks from the sensor, and numbers that neither move rays nor are extinctions. */
+/** Recursive control variates (docs/fitting.md): the walks of an iteration are evaluated
+ * at the numbers of the one before, too, and what was known of the pictures there is
+ * carried on. They are for IMP_ADAM, with losses L2 and relative L2, box filters,
+ * walks from the sensor, and parameters that neither move rays nor are extinctions. */
 enum imp_variates {
-    IMP_VARIATES_AUTO = 0, /**< of more than 64 numbers, where they are possible */
-    IMP_VARIATES_ON,       /**< where not: the error says why */
+    IMP_VARIATES_AUTO = 0, /**< of more than 64 variables, where they are possible */
+    IMP_VARIATES_ON,       /**< where not: an error with the reason */
     IMP_VARIATES_OFF
 };
 
-/** How the samples of a search are divided among the tiles (8 x 8 pixels) of its targets. */
+/** How the samples of a search are divided among the tiles (8 x 8 pixels) of its
+ * targets. */
 enum imp_allocation {
-    IMP_ALLOCATION_DEFAULT = 0, /**< by variance; with variates of > 64 numbers, even */
+    IMP_ALLOCATION_DEFAULT = 0, /**< by variance; with variates of > 64 variables, even */
     IMP_ALLOCATION_EVEN,        /**< every pixel has the same */
-    /** By the root of what a tile adds to the variance of the gradient, over what its samples
-     * cost, as the iterations before have seen it: between 1/4 and 16 times the samples asked
-     * for, at their cost. */
+    /** By the root of what a tile adds to the variance of the gradient, over what its
+     * samples cost, as the iterations before have seen it: between 1/4 and 16 times the
+     * samples of the run, at their cost. */
     IMP_ALLOCATION_VARIANCE
 };
 
@@ -1016,50 +1156,49 @@ struct imp_fit_options {
     double learning_rate;   /**< Adam, as a fraction of each variable's scale; 0: 0.05. It
                                  falls with control variates (momentum) */
     double tolerance;       /**< stop when steps stay below this, relative; 0: 1e-4 */
-    int intervals;          /**< estimate covariance and 95 % intervals at the end */
+    bool intervals;         /**< estimate covariance and 95 % intervals at the end */
     const char *checkpoint; /**< file, rewritten every few seconds; NULL: none */
-    int resume;             /**< start from the checkpoint if it is there */
+    bool resume;            /**< start from the checkpoint if it is there */
     /** Adam: textures and volumes are fitted from coarse to fine. Level k of `levels` (at
      * most 16) has one variable for 2^(levels - k) cells along each axis, between which
      * the cells are linear, and an equal share of the iterations; a checkpoint holds the
      * last level. 0, 1: cells alone. */
     int levels;
-    imp_fit_step_fn step; /**< NULL: nobody looks */
+    imp_fit_step_fn step; /**< NULL: not called */
     void *step_payload;
-    /** IMP_LBFGS, IMP_MMA and IMP_SLSQP evaluate one draw of walks, which is kept (walks.h)
-     * in so many bytes; 0: 2^30; negative: walks are traced each time, as they are where
-     * the memory does not suffice. Objective and intervals of the answer are of fresh
-     * walks. */
-    double memory;
+    /** IMP_LBFGS, IMP_MMA and IMP_SLSQP evaluate one draw of walks, which is kept
+     * (walks.h) in at most so many bytes; 0: 2^30. Walks are traced each time where
+     * these do not suffice. Objective and intervals of the answer are of fresh walks. */
+    size_t memory;
     enum imp_variates control_variate;
-    /** Of IMP_ADAM, quadratic losses, box filters and walks from the sensor; others have the
-     * same samples everywhere. */
+    /** For IMP_ADAM, quadratic losses, box filters and walks from the sensor; others
+     * have the same samples everywhere. */
     enum imp_allocation allocation;
     /** Adam: the part of the mean gradient that stays from one iteration to the next, its
-     * beta1, in (0, 1); 0: 0.9, but 0.5 for numbers between two bounds in fits of more than 64
-     * numbers with control variates, whose gradients have little noise. The learning rate of
-     * these falls as (1 + i/10)^-1/2 with iterations i, whatever momentum is (docs/fitting.md). */
+     * beta1, in (0, 1); 0: 0.9, but 0.5 for numbers between two bounds in fits of more
+     * than 64 numbers with control variates, whose gradients have little noise. The
+     * learning rate of these falls as (1 + i/10)^-1/2 with iterations i, whatever
+     * momentum is (docs/fitting.md). */
     double momentum;
-    /** Of IMP_LBFGS, IMP_MMA and IMP_SLSQP: walks are kept, too, where extinctions that vary
-     * in space are fitted, with so much room to grow (imp_walks_options.headroom); 0 or 1:
-     * none, and such walks are traced each time. */
+    /** For IMP_LBFGS, IMP_MMA and IMP_SLSQP: walks are kept, too, where extinctions that
+     * vary in space are fitted, with so much room to grow (imp_walks_options.headroom);
+     * 0 or 1: none, and such walks are traced each time. */
     double headroom;
+    bool no_recording; /**< walks are traced in each evaluation, none are kept */
 };
-#define IMP_FIT_OPTIONS_INIT                                                             \
-    {                                                                                    \
-        sizeof(struct imp_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,          \
-            IMP_VARIATES_AUTO, IMP_ALLOCATION_DEFAULT, 0, 0                              \
-    }
+#define IMP_FIT_OPTIONS_INIT IMP_INIT_ZERO(struct imp_fit_options)
 
 struct imp_fit_variable {
+    size_t size;
     double start, value;
     double se; /**< one standard error: measurement and Monte Carlo together */
     double lo95,
         hi95;     /**< 95 % interval; NaN if neither pictures nor a prior determine it */
     int at_bound; /**< -1: at the lower bound, 1: at the upper */
-    int determined; /**< 0: the picture does not determine it; an interval is then that
+    bool determined; /**< 0: the picture does not determine it; an interval is then that
                             of the posterior */
 };
+#define IMP_FIT_VARIABLE_INIT IMP_INIT_ZERO(struct imp_fit_variable)
 
 struct imp_fit_result {
     size_t size;
@@ -1071,7 +1210,7 @@ struct imp_fit_result {
     size_t n;
     const struct imp_fit_variable *variables; /**< [n]; NULL if n > 1024, where rows of
                                                    this size would take more memory than
-                                                   the fit: imp_problem_fit_variable */
+                                                   the fit: imp_problem_get_fit_variable */
     double condition;                         /**< of the scaled J^T J; 0: not computed */
     const char *reason;                       /**< why it stopped */
     const char *warning; /**< e.g. what is not determined; NULL: none */
@@ -1081,9 +1220,9 @@ struct imp_fit_result {
     double chi2, chi2_se; /**< per degree of freedom: the loss over what the targets'
                                noise alone leaves; 1 where the scene explains the
                                pictures. NaN where that noise is not known, or l1 */
-    double shift; /**< where a bias is left: how far four times the samples would move
-                       an answer, in standard errors, at most; NaN: no bias, or no
-                       intervals */
+    /** Where a bias is left: bound of the change of an answer by four times the samples, in
+     * standard errors. NaN: no bias, or no intervals. */
+    double shift;
     /** [n][n] of the variables, measurement and Monte Carlo together, in the directions
      * that the pictures determine and no bound holds. NULL: no intervals. */
     const double *covariance;
@@ -1091,13 +1230,13 @@ struct imp_fit_result {
                   target with most of them */
     /** [n_history][n] where the objective was evaluated; NULL for n > 64. */
     const double *history_x;
-    /** [n] the change of the numbers that the pictures determine least, in units of x;
-     * imp_problem_forward makes the picture of it. NULL where all numbers are determined,
-     * or there are no intervals. */
+    /** [n] the change of the variables that the pictures determine least, in units of x;
+     * imp_problem_forward makes the picture of it. NULL where all variables are
+     * determined, or there are no intervals. */
     const double *loosest;
-    const char
-        *walks; /**< which evaluations of the search were of kept walks, or why none
-                            were; NULL: the optimizer draws new ones each time */
+    /** Which evaluations of the search were of recorded walks, or why none were; NULL: the
+     * optimizer draws new ones each time. */
+    const char *walks;
     const char *control_variate; /**< Adam: what it brought, or why there was none; NULL:
                                       not wanted */
 };
@@ -1114,37 +1253,40 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_fit(imp_problem *problem,
                                                const struct imp_run *run,
                                                const struct imp_fit_result **result);
 
-/** Number i < n of the problem's last fit, whatever n.
+/** Variable i < n of the problem's last fit, whatever n.
  * @return IMP_E_ARG also if there was no fit. */
 IMP_API IMP_MUST_CHECK enum imp_status
-imp_problem_fit_variable(const imp_problem *problem, size_t i,
-                         struct imp_fit_variable *variable);
+imp_problem_get_fit_variable(const imp_problem *problem, size_t i,
+                             struct imp_fit_variable *variable);
 
-/** A number that is not active, and what it would bring to fit it too. */
+/** A variable that is not active, and what it would bring to fit it too. */
 struct imp_missing {
+    size_t size;
     size_t param, element; /**< of the scene */
-    int factor;   /**< 1: the common factor of all numbers of a texture, volume or
+    bool factor;           /**< 1: the common factor of all values of a texture, volume or
                                 list, which is 1 now; element is 0 */
-    double value; /**< now */
+    double value;          /**< now */
     double step,
-        step_se; /**< by which it would move, the active numbers following; in its
+        step_se; /**< by which it would move, the active variables following; in its
                                 unit; by measurement and Monte Carlo */
     double chi2,
         chi2_se;   /**< expected drop of chi-square, in units of the pictures' noise,
                                 and its Monte Carlo error */
-    double chance; /**< probability, at most, that some number stands out like this
-                                where all are right: that of this one, for Gaussian noise,
-                                times the numbers that were looked at */
+    double chance; /**< Bonferroni-corrected p-value, for Gaussian noise: at most the
+                                probability that any of the tested values differs so much
+                                where all are right */
 };
 
-/** Which number may be wrong? One sweep gives the score of all numbers that are not active
- * and have a derivative; about 20 that stand out of their Monte Carlo noise have
- * Gauss-Newton rows, by which the active ones follow them (docs/estimators.md 15.1). To be
- * asked where the active numbers are fitted, as they stand in the scene. A parameter of more than 8
- * numbers is looked at as a common factor.
+/** Which variable may be wrong? One sweep gives the score of all variables that are not
+ * active and have a derivative; about 20 that exceed their Monte Carlo noise have
+ * Gauss-Newton rows, by which the active ones follow them (docs/estimators.md 15.1). To
+ * be called where the active values are fitted, and set in the scene. A parameter of
+ * more than 8 values is tested through one common factor.
  * @param run       run->sensor is ignored; NULL for defaults.
- * @param[out] rows [n] in order of chi2 - 2 chi2_se; they belong to the problem, until the next call.
- * @return as imp_problem_objective; IMP_E_UNSUPPORTED with more than 236 active numbers. */
+ * @param[out] rows [n] in order of chi2 - 2 chi2_se; they belong to the problem, until
+ *                the next call.
+ * @return as imp_problem_objective; IMP_E_UNSUPPORTED with more than 236 active
+ *         variables. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_problem_missing(imp_problem *problem, const struct imp_run *run,
                     const struct imp_missing **rows, size_t *n);
@@ -1165,26 +1307,25 @@ struct imp_optimizer_rule {
     double momentum;      /**< SGD: in [0, 1) */
 };
 #define IMP_OPTIMIZER_RULE_INIT                                                          \
-    {                                                                                    \
-        sizeof(struct imp_optimizer_rule), IMP_RULE_ADAM, 0.05, 0.9, 0.999, 1e-8, 0      \
-    }
+    IMP_INIT(struct imp_optimizer_rule, .learning_rate = 0.05, .beta1 = 0.9,             \
+             .beta2 = 0.999, .epsilon = 1e-8)
 
 /** Length of the state of imp_optimizer_step for n numbers. */
 #define IMP_OPTIMIZER_STATE(n) (1 + 2 * (n))
 
 /**
  * One step of a plain optimiser, for loops of a host's own: x [n] moves against gradient
- * [n], and is then put inside its bounds. imp_fit searches better: it knows the errors of
+ * [n], and is then put inside its bounds. imp_fit searches better: it has the errors of
  * gradients, chooses its pace by them, and ends with intervals.
  * @param rule  NULL for the defaults.
  * @param lo    [n]; NULL: no lower bounds.
  * @param hi    [n]; NULL: no upper bounds.
- * @param[in,out] state [IMP_OPTIMIZER_STATE(n)], of the caller: all zeros before the first
- *              step. state[0] is the number of steps taken.
+ * @param[in,out] state [IMP_OPTIMIZER_STATE(n)], of the caller: all zeros before the
+ *              first step. state[0] is the number of steps taken.
  * @param[in,out] x     [n].
  * @return IMP_OK; IMP_E_ARG (message: imp_last_error(NULL)) for a number of the rule
- *         outside its range, a gradient that is not finite or a bound that no number keeps:
- *         nothing is changed.
+ *         outside its range, a gradient that is not finite or a bound that no number
+ *         keeps: nothing is changed.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_optimizer_step(const struct imp_optimizer_rule *rule, size_t n,
@@ -1193,8 +1334,15 @@ imp_optimizer_step(const struct imp_optimizer_rule *rule, size_t n,
 
 /* ---- Checking ------------------------------------------------------------------ */
 
+/** The outcome of a check. */
+enum imp_verdict {
+    IMP_VERDICT_OPEN = -1, /**< the check does not decide */
+    IMP_VERDICT_WRONG = 0,
+    IMP_VERDICT_RIGHT = 1
+};
 /** One line of a gradient check: a method, a parameter, two numbers that must agree. */
 struct imp_check_row {
+    size_t size;
     const char *method; /**< "frozen", "fresh", "dot", "euler", "density", "loss", "ends";
                              "uniform", "energy", "aim" (imp_check_options.sampling) */
     const char *param;
@@ -1202,26 +1350,23 @@ struct imp_check_row {
     double value, reference, se; /**< se of the difference; 0: deterministic */
     double error; /**< relative error; where se > 0: |z|, z = (value - reference) / se */
     double limit; /**< of error; 0: a row for information (a step that is not the best) */
-    int ok;       /**< 1: they agree; 0: they do not; -1: too noisy to tell */
-    int kinks; /**< frozen walks that stand on a kink, and agree with one of its sides */
+    enum imp_verdict ok; /**< they agree; they do not; too noisy to decide */
+    int kinks;           /**< frozen walks at a kink that agree with one of its sides */
 };
 struct imp_check_options {
     size_t size;
-    int paths;     /**< frozen walks looked at; 0: 1000 */
+    int paths;     /**< frozen walks; 0: 1000 */
     int fresh_spp; /**< samples per pixel of fresh-seed differences; 0: the run's */
-    /** 1: check sampling in place of gradients. The picture, and one with directions drawn
-     * uniformly and lights met by chance, are compared in 8 x 8 blocks: rows "uniform",
-     * the worst block of each channel, and chi-square of all. Rows "energy": the part of
-     * the light that arrives through directions that a density drew at the first choice
-     * of a walk (value), and the part of these directions (reference); also of
-     * each light and proxy, where there are several, 16 at most. Rows "aim": the part of
-     * the directions towards a proxy in which anything lies. */
-    int sampling;
+    /** 1: check sampling in place of gradients. The picture, and one with directions
+     * drawn uniformly and lights met by chance, are compared in 8 x 8 blocks: rows
+     * "uniform", the worst block of each channel, and chi-square of all. Rows "energy":
+     * the part of the light that arrives through directions that a density drew at the
+     * first choice of a walk (value), and the part of these directions (reference); also
+     * of each light and proxy, where there are several, 16 at most. Rows "aim": the part
+     * of the directions towards a proxy in which anything lies. */
+    bool sampling;
 };
-#define IMP_CHECK_OPTIONS_INIT                                                           \
-    {                                                                                    \
-        sizeof(struct imp_check_options), 0, 0, 0                                        \
-    }
+#define IMP_CHECK_OPTIONS_INIT IMP_INIT_ZERO(struct imp_check_options)
 /** Check the gradients of all active parameters (docs: gradient checks). Rows belong to
  * the problem until its next check. @return IMP_OK also when rows fail: look at `ok`. */
 IMP_API IMP_MUST_CHECK enum imp_status
@@ -1245,7 +1390,7 @@ enum imp_selftest_subject {
  *   draws       chi-square of draws against the density
  *   albedo      by draws against quadrature
  *   energy      power that leaves, of 1 that comes in: at most 1
- *   reciprocal  directions exchanged (radiance over n^2); told only (ok -1) where not
+ *   reciprocal  directions exchanged (radiance over n^2); where not, IMP_VERDICT_OPEN
  *   derivative  against differences
  *   density     of a light's draws against its density for the same point
  *   light       by a light's own draws against directions drawn without it
@@ -1253,14 +1398,15 @@ enum imp_selftest_subject {
  *   part        scattering is not above the extinction
  *   bounded     extinction is not above what flights take for its bound */
 struct imp_selftest_row {
+    size_t size;
     const char *object, *kind, *contract;
     double value, reference;
     double se;      /**< of the difference; 0: none */
-    double answers; /**< of a count: how many were looked at */
+    double answers; /**< of a count: out of how many */
     double error;   /**< a count of failures, a relative error, or |z| */
     double limit;   /**< of error */
     double chance;  /**< of a value so far off, if all is right; -1: not statistical */
-    int ok;         /**< 1: it holds; 0: it does not; -1: not promised, and not so */
+    enum imp_verdict ok; /**< open: not promised, and not so */
 };
 struct imp_selftest_options {
     size_t size;
@@ -1268,14 +1414,11 @@ struct imp_selftest_options {
     int directions; /**< of sight, or places of reference, of an object; 0: 12 */
     uint64_t seed;
 };
-#define IMP_SELFTEST_OPTIONS_INIT                                                        \
-    {                                                                                    \
-        sizeof(struct imp_selftest_options), 0, 0, 0                                     \
-    }
+#define IMP_SELFTEST_OPTIONS_INIT IMP_INIT_ZERO(struct imp_selftest_options)
 /** Test the contracts of kinds on the scene's own objects. Rows belong to the scene until
  * its next self-test; their names live as long as the scene.
- * @return IMP_OK also where rows fail: look at `ok`; IMP_E_ARG (an unknown subject, too few
- * samples) or IMP_E_NOMEM. */
+ * @return IMP_OK also where rows fail: look at `ok`; IMP_E_ARG (an unknown subject, too
+ * few samples) or IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_selftest(imp_scene *scene, enum imp_selftest_subject subject,
              const struct imp_selftest_options *options,
@@ -1292,30 +1435,67 @@ struct imp_compare_result {
     double p_fail_fraction;
     double mean_z; /**< |z| of the picture's mean, worst channel */
     double over2;  /**< fraction of pixels with |z| > 2; 0.0455 expected */
-    int has_z;     /**< standard errors or a variance are there: z means something */
-    int agree;     /**< by z where it is there, else by relative_rmse */
+    bool has_z;    /**< standard errors or a variance are there: z means something */
+    bool agree;    /**< by z where it is there, else by relative_rmse */
 };
 struct imp_compare_options {
     size_t size;
     const imp_film *variance; /**< per sample, of `reference`; NULL: use the films' se */
     double n_test, n_reference; /**< samples per pixel; 0: unknown / exact */
     double floor; /**< of the variance; 0: 1e-4 * squared mean of the channel */
-    int xyz;      /**< compare X, Y, Z: pictures and variance are made to them from
+    bool xyz;     /**< compare X, Y, Z: pictures and variance are made to them from
                        R, G, B (or Y alone). Mitsuba's references keep the variance
                        of X, Y, Z so, as if it were a colour */
 };
-#define IMP_COMPARE_OPTIONS_INIT                                                         \
-    {                                                                                    \
-        sizeof(struct imp_compare_options), 0, 0, 0, 0, 0                                \
-    }
+#define IMP_COMPARE_OPTIONS_INIT IMP_INIT_ZERO(struct imp_compare_options)
 /** Do two pictures of one size show the same, within their noise? Every channel of
- * `reference` is looked for in `test` by name, else by place. options may be NULL;
+ * `reference` is matched with one of `test` by name, else by place. options may be NULL;
  * neither picture is changed.
  * @return IMP_OK also where they differ: look at `agree`; IMP_E_ARG if sizes or channels
  *         do not go together; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
-imp_compare(imp_context *context, imp_film *test, imp_film *reference,
+imp_compare(imp_context *context, const imp_film *test, const imp_film *reference,
             const struct imp_compare_options *options, struct imp_compare_result *result);
+
+/* ---- Names of 0.1 -------------------------------------------------------------- */
+
+IMP_DEPRECATED("imp_problem_n_variables")
+static inline size_t imp_problem_n(const imp_problem *problem)
+{
+    return imp_problem_n_variables(problem);
+}
+IMP_DEPRECATED("imp_problem_get_fit_variable")
+static inline enum imp_status imp_problem_fit_variable(const imp_problem *problem,
+                                                       size_t i,
+                                                       struct imp_fit_variable *variable)
+{
+    return imp_problem_get_fit_variable(problem, i, variable);
+}
+IMP_DEPRECATED("imp_film_text")
+static inline const char *imp_film_get_text(const imp_film *film, const char *key)
+{
+    return imp_film_text(film, key);
+}
+IMP_DEPRECATED("imp_problem_get_spp")
+static inline enum imp_status imp_problem_spp(const imp_problem *problem, int target,
+                                              const struct imp_run *run, int *spp)
+{
+    return imp_problem_get_spp(problem, target, run, spp);
+}
+IMP_DEPRECATED("imp_problem_get_variable")
+static inline enum imp_status imp_problem_variable(const imp_problem *problem, size_t i,
+                                                   size_t *param, size_t *element,
+                                                   double *lo, double *hi)
+{
+    struct imp_variable_info info = IMP_VARIABLE_INFO_INIT;
+    const enum imp_status st = imp_problem_get_variable(problem, i, &info);
+    if (st != IMP_OK) return st;
+    if (param) *param = info.param;
+    if (element) *element = info.element;
+    if (lo) *lo = info.lo;
+    if (hi) *hi = info.hi;
+    return IMP_OK;
+}
 
 #ifdef __cplusplus
 }

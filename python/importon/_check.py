@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Optional
 
 from . import _c
-from ._library import choice, context, integer, lib, make, not_inside, warn_said
+from ._library import choice, context, integer, lib, make, not_inside, rows_of, warn_said
 from ._picture import read, to_film
 from ._problem import Problem, check_scene, run_options
 from ._scene import Scene
@@ -149,8 +149,7 @@ class Check(Sequence):  # type: ignore[type-arg]
 
 
 def check_rows(address: Optional[int], n: int, struct: Any = _c.imp_check_row, row: Any = CheckRow) -> Check:
-    rows: Any = (struct * n).from_address(address) if n and address else []
-    return Check([row(r) for r in rows])
+    return Check([row(r) for r in rows_of(struct, address, n)])
 
 
 def check(scene: Scene, params: Any = None, target: Any = None, *, spp: int = 0, seed: int = 0, sensor: Any = 0,

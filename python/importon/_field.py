@@ -375,7 +375,7 @@ class Field:
     def bounds(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Lowest and highest corner of where it is defined; infinite for profiles."""
         lo, hi = (ctypes.c_double * 3)(), (ctypes.c_double * 3)()
-        lib.imp_field_bounds(self.pointer, lo, hi)
+        lib.imp_field_get_bounds(self.pointer, lo, hi)
         return tuple(lo), tuple(hi)
 
     def eval(self, x: Any, hessian: bool = False) -> Any:

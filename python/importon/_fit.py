@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _c
 from ._array import copy_doubles
-from ._library import choice, decode, failure, integer, lib, make, run, text
+from ._library import choice, decode, failure, integer, lib, make, memory_bytes, rows_of, run, text
 from ._params import Values
 from ._picture import read
 from ._problem import Problem, run_options, target_list
@@ -192,7 +192,7 @@ def variables(result: Any, blocks: Any, start: Any, value: Any) -> dict[str, Fit
     """imp_fit_variables [n] by parameter. Of more than 1024 there are no rows, and no
     errors either."""
     if result.variables:
-        rows = (_c.imp_fit_variable * result.n).from_address(result.variables)
+        rows = rows_of(_c.imp_fit_variable, result.variables, result.n)
         column = {f: np.array([getattr(r, f) for r in rows]) for f in (q[0] for q in _c.imp_fit_variable._fields_)}
     else:
         lo, hi = (np.concatenate([np.full(i.size, b) for i, b in pairs]) for pairs in (
@@ -309,7 +309,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         wanted = make(_c.imp_fit_options, optimizer=choice("imp_optimizer", optimizer, "optimizer"),
                       max_iterations=integer(max_iterations, "max_iterations"), learning_rate=float(learning_rate),
                       tolerance=float(tolerance), intervals=bool(intervals), checkpoint=path, resume=bool(resume),
-                      levels=integer(levels, "levels"), memory=float(memory),
+                      levels=integer(levels, "levels"), memory=memory_bytes(max(memory, 0)), no_recording=memory < 0,
                       headroom=float(headroom), control_variate=choice("imp_variates", control_variate, "control_variate"),
                       allocation=choice("imp_allocation", allocation, "allocation"), momentum=float(momentum))
         out, start = ctypes.c_void_p(), p.x()

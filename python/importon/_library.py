@@ -237,6 +237,14 @@ def make(struct: Any, **values: Any) -> Any:
     return s
 
 
+def rows_of(struct: Any, address: Optional[int], n: int) -> list[Any]:
+    """Rows that the library handed out, each as long as its own size says (IMP_ROW)."""
+    if not n or not address:
+        return []
+    size = ctypes.c_size_t.from_address(address).value
+    return [struct.from_address(address + k * size) for k in range(n)]
+
+
 def decode(value: Optional[bytes]) -> str:
     """A string of C; NULL: empty."""
     return (value or b"").decode(errors="replace")
@@ -285,6 +293,14 @@ def integer(value: Any, name: str, lo: int = -2**31, hi: int = 2**31 - 1) -> int
         raise TypeError("%s is %r, not a whole number" % (name, value)) from None
     if not lo <= n <= hi:
         raise ArgumentError("%s = %d is outside [%d, %d]" % (name, n, lo, hi))
+    return int(n)
+
+
+def memory_bytes(value: Any) -> int:
+    """A limit of memory; 0: the default."""
+    n = float(value)
+    if not 0 <= n <= 2.0**63:
+        raise ArgumentError("memory = %g is outside [0, 2^63] bytes" % n)
     return int(n)
 
 

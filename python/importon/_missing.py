@@ -8,7 +8,7 @@ from typing import Any, Optional
 
 from . import _c
 from ._check import Row
-from ._library import lib, make
+from ._library import lib, make, rows_of
 from ._problem import Problem, run_options
 from ._scene import Scene
 
@@ -22,8 +22,8 @@ class Missing(Row):
         Its parameter.
     element : int
         Of the parameter's numbers.
-    factor : int
-        1: the common factor of all numbers of a texture, volume or list.
+    factor : bool
+        It is the common factor of all numbers of a texture, volume or list.
     value : float
         Now.
     step, step_se : float
@@ -37,7 +37,7 @@ class Missing(Row):
     FIELDS = ("element", "factor", "value", "step", "step_se", "chi2", "chi2_se", "chance")
     name: str
     element: int
-    factor: int
+    factor: bool
     step: float
     step_se: float
     chi2: float
@@ -94,7 +94,7 @@ def missing(scene: Scene, params: Any = None, target: Any = None, *, spp: int = 
         rows, n = ctypes.c_void_p(), ctypes.c_size_t()
         p.run(options, progress, lib.imp_problem_missing, p.pointer, ctypes.byref(options), ctypes.byref(rows),
               ctypes.byref(n))
-        found: Any = (_c.imp_missing * n.value).from_address(rows.value) if n.value and rows.value else []
+        found = rows_of(_c.imp_missing, rows.value, n.value)
         out = []
         for row in found:
             info = make(_c.imp_param_info)

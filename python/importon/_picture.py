@@ -11,7 +11,8 @@ import numpy as np
 
 from . import _c
 from ._array import numbers, view
-from ._library import ArgumentError, Context, Handle, choice, context, decode, integer, lib, make, text, warn_said, word
+from ._library import (ArgumentError, Context, Handle, choice, context, decode, integer, lib, make, rows_of,
+                       text, warn_said, word)
 
 
 class DroppedWalk(NamedTuple):
@@ -140,7 +141,7 @@ class Picture(np.ndarray):  # type: ignore[type-arg,unused-ignore]
         >>> importon.read("grey.exr").attribute("comment")
         'grey'
         """
-        found = None if self._film is None else lib.imp_film_get_text(self._film.pointer, text(key, "key"))
+        found = None if self._film is None else lib.imp_film_text(self._film.pointer, text(key, "key"))
         return None if found is None else decode(found)
 
     def _repr_png_(self) -> Optional[bytes]:
@@ -174,7 +175,7 @@ def from_film(pointer: Optional[int], signed: bool = False) -> Picture:
     counted = {word("imp_drop", c): int(n) for c, n in enumerate(info.dropped_by_cause) if n}
     made.dropped = counted or ({"unknown": int(info.dropped)} if info.dropped else {})
     made.dropped_walks = tuple(DroppedWalk(k.seed, k.sample, k.x, k.y, k.sensor, word("imp_drop", k.cause))
-                               for k in info.drop_keys[:info.n_drop_keys])
+                               for k in rows_of(_c.imp_drop_key, info.drop_keys, info.n_drop_keys))
     made.signed = signed
     made._film = film
     return made

@@ -89,12 +89,12 @@ class Problem:
                 self.check(lib.imp_problem_activate(self.pointer, text(name, "params")))
             for glob, kind, name in self.ties:
                 self.check(lib.imp_problem_tie(self.pointer, text(glob, name), kind))
-            self.n = lib.imp_problem_n(self.pointer)
+            self.n = lib.imp_problem_n_variables(self.pointer)
             infos = list(table(scene).values())
-            i, index = 0, ctypes.c_size_t()
+            i, variable = 0, make(_c.imp_variable_info)
             while i < self.n:
-                self.check(lib.imp_problem_variable(self.pointer, i, ctypes.byref(index), None, None, None))
-                info, log = infos[index.value], False
+                self.check(lib.imp_problem_get_variable(self.pointer, i, ctypes.byref(variable)))
+                info, log = infos[variable.param], False
                 if self.ties:
                     tie = make(_c.imp_tie_info)
                     self.check(lib.imp_problem_get_tie(self.pointer, i, ctypes.byref(tie)))
@@ -168,7 +168,7 @@ class Problem:
     def spp(self, target: int, options: Any) -> int:
         """Samples per pixel that a loss takes for a target."""
         taken = ctypes.c_int()
-        self.check(lib.imp_problem_spp(self.pointer, target, ctypes.byref(options), ctypes.byref(taken)))
+        self.check(lib.imp_problem_get_spp(self.pointer, target, ctypes.byref(options), ctypes.byref(taken)))
         return taken.value
 
     def gradient(self) -> tuple[Any, Any]:

@@ -78,7 +78,7 @@ class Options:
         self.surfaces = (_c.imp_bend_surface * max(len(rows), 1))(*rows)
         self.struct.n_surfaces = len(rows)
         self.struct.surfaces = ctypes.addressof(self.surfaces) if rows else None
-        planes = [_struct(_c.imp_bend_tap, {"group": -1, **t}, "a tap")[0] for t in taps]
+        planes = [_struct(_c.imp_bend_tap, t, "a tap")[0] for t in taps]
         self.taps = (_c.imp_bend_tap * max(len(planes), 1))(*planes)
         self.n_taps = self.struct.n_taps = len(planes)
         self.struct.taps = ctypes.addressof(self.taps) if planes else None

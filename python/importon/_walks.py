@@ -9,7 +9,8 @@ import numpy as np
 
 from . import _c
 from ._array import address, numbers
-from ._library import ArgumentError, Handle, context, decode, failure, lib, make, not_inside, run, text, warn_said
+from ._library import (ArgumentError, Handle, context, decode, failure, lib, make, memory_bytes, not_inside, run,
+                       text, warn_said)
 from ._problem import check_scene, push, run_options
 from ._scene import Scene
 
@@ -165,7 +166,7 @@ def read_walks(path: Any, scene: Optional[Scene] = None, *, memory: float = 0, e
     """
     not_inside()
     ctx = context() if scene is None else check_scene(scene)._context
-    options = make(_c.imp_walks_options, memory=float(memory), ess=float(ess))
+    options = make(_c.imp_walks_options, memory=memory_bytes(memory), ess=float(ess))
     out = ctypes.c_void_p()
     status = lib.imp_walks_read(ctx.pointer, None if scene is None else scene.pointer, text(path, "path"),
                                 ctypes.byref(options), ctypes.byref(out))
@@ -231,7 +232,7 @@ def keep(scene: Scene, params: Any = None, sensor: Any = 0, seed: int = 0, spp: 
     scene = check_scene(scene)
     options = run_options(scene, sensor=sensor, seed=seed, spp=spp, guide=guide, wavelengths=wavelengths,
                           wavelength_set=wavelength_set, points=points)
-    wanted = make(_c.imp_walks_options, memory=float(memory), losses=bool(losses), survival=float(survival),
+    wanted = make(_c.imp_walks_options, memory=memory_bytes(memory), losses=bool(losses), survival=float(survival),
                   ess=float(ess), headroom=float(headroom))
     not_inside()
     with scene.lock:

@@ -14,7 +14,8 @@ import numpy as np
 
 from . import _c
 from ._array import copy_doubles, numbers
-from ._library import ArgumentError, Handle, choice, explained, failure, integer, lib, make, not_inside, run, text, warn_said
+from ._library import (ArgumentError, Handle, choice, explained, failure, integer, lib, make, not_inside,
+                       rows_of, run, text, warn_said)
 from ._params import Values
 from ._picture import Picture, from_film
 from ._problem import Problem, check_scene
@@ -52,6 +53,8 @@ def _struct(kind: Any, given: Any, what: str, words: Mapping[str, str] = {}) -> 
             value = known[name](*[known[name]._type_(v) if known[name]._type_ is ctypes.c_int else v for v in (
                 [integer(x, name) for x in value] if known[name]._type_ is ctypes.c_int
                 else numbers(value, name, shape=(known[name]._length_,)).tolist())])
+        elif known[name] is ctypes.c_bool:
+            value = bool(value)
         elif known[name] is ctypes.c_int:
             value = integer(int(value) if isinstance(value, bool) else value, name)
         elif known[name] is ctypes.c_double:
@@ -226,8 +229,8 @@ class Elements:
             made = {f[0]: getattr(i, f[0]) for f in i._fields_ if f[0] not in ("size", "steps", "n_steps")}
             made["measures"] = copy_doubles(i.measures, (i.n_measures,))
             made["reason"] = (i.reason or b"").decode(errors="replace")
-            steps = (_c.imp_elements_step * i.n_steps).from_address(i.steps) if i.n_steps else []
-            made["steps"] = [{f[0]: getattr(s, f[0]) for f in s._fields_} for s in steps]
+            steps = rows_of(_c.imp_elements_step, i.steps, i.n_steps)
+            made["steps"] = [{f[0]: getattr(s, f[0]) for f in s._fields_ if f[0] != "size"} for s in steps]
             return made
 
     @property
@@ -266,7 +269,7 @@ class Elements:
         with self.scene.lock:
             rows, n = ctypes.c_void_p(), ctypes.c_size_t()
             self._context.check(function(self.pointer, ctypes.byref(rows), ctypes.byref(n)))
-            found: Any = (_c.imp_elements_row * n.value).from_address(rows.value) if n.value and rows.value else []
+            found = rows_of(_c.imp_elements_row, rows.value, n.value)
             return [Sensitivity(r.name.decode(errors="replace"), r.param, r.element, bool(r.emission), r.value,
                                 r.derivative, r.share, r.share_error) for r in found]
 
@@ -326,15 +329,15 @@ class Elements:
         True
         """
         kind = np.dtype([("from", np.uintp), ("irradiance", float, 3), ("illuminance", float), ("measure", float)])
-        assert kind.itemsize == ctypes.sizeof(_c.imp_elements_arrival)
         not_inside()
         with self.scene.lock:
             rows, n = ctypes.c_void_p(), ctypes.c_size_t()
             self._context.check(lib.imp_elements_arrivals(self.pointer, integer(index, "index", 0, 2**64 - 1),
                                                           ctypes.byref(rows), ctypes.byref(n)))
-            data = ctypes.string_at(rows.value, n.value * kind.itemsize) if rows.value else b""
+            found = rows_of(_c.imp_elements_arrival, rows.value, n.value)
+            made = np.array([(getattr(r, "from"), tuple(r.irradiance), r.illuminance, r.measure) for r in found], kind)
             lib.imp_free(self._context.pointer, rows)
-            return np.frombuffer(data, kind).copy()
+            return made
 
     def illuminance(self, index: int, width: int, height: int) -> Any:
         """Illuminance at points of the polygon of an element, each with its own visibility.
@@ -501,7 +504,7 @@ class ElementsFit(Values):
     def __init__(self, problem: Any, result: Any) -> None:
         from ._fit import variables
         super().__init__(problem.scene, variables(result, problem.blocks, None, problem.x()))
-        goals = (_c.imp_elements_goal * result.n_goals).from_address(result.goals) if result.n_goals else []
+        goals = rows_of(_c.imp_elements_goal, result.goals, result.n_goals)
         self.goals = [(g.target, g.before, g.after) for g in goals]
         self.objective: float = result.objective
         self.iterations: int = result.iterations

@@ -94,6 +94,8 @@ const char *imp_status_text(enum imp_status status)
 
 const char *imp_version(void) { return IMP_VERSION_STRING; }
 
+int imp_version_number(void) { return IMP_VERSION_NUMBER; }
+
 /* The message if there is no memory for the text of another. */
 static const struct imp__error_text no_memory = {NULL, NULL, "out of memory"};
 

@@ -44,6 +44,7 @@ static void key_insert(struct imp_drops *d, const struct imp_drop_key *key)
     memmove(&d->keys[at + 1], &d->keys[at],
             (size_t)(d->n_keys - at - 1) * sizeof *d->keys);
     d->keys[at] = *key;
+    d->keys[at].size = sizeof *key;
 }
 
 void imp__drops_add(struct imp_drops *d, const struct imp_drop_key *key)

@@ -177,7 +177,7 @@ enum imp_status imp_film_get_info(const imp_film *f, struct imp_film_info *info)
                                 .dropped = f->dropped,
                                 .n_drop_keys = f->drops.n_keys};
     memcpy(all.dropped_by_cause, f->drops.by_cause, sizeof all.dropped_by_cause);
-    memcpy(all.drop_keys, f->drops.keys, sizeof all.drop_keys);
+    all.drop_keys = f->drops.keys;
     IMP_GIVE(f->ctx, info, all, "info");
     return IMP_OK;
 }
@@ -190,7 +190,7 @@ const char *imp_film_channel(const imp_film *f, int channel)
 float *imp_film_mean(imp_film *f) { return f ? f->mean : NULL; }
 float *imp_film_se(imp_film *f) { return f ? f->se : NULL; }
 
-const char *imp_film_get_text(const imp_film *f, const char *key)
+const char *imp_film_text(const imp_film *f, const char *key)
 {
     for (size_t i = 0; f && key && i < f->n_texts; i++)
         if (strcmp(f->texts[i].key, key) == 0) return f->texts[i].value;

@@ -216,6 +216,9 @@ imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
 {
     IMP_REQUIRE(NULL, field, "field");
     IMP_REQUIRE(field->ctx, rays, "rays");
+    struct imp_bend_rays own_rays = IMP_BEND_RAYS_INIT;
+    IMP_OPTIONS(field->ctx, own_rays, rays, "rays");
+    rays = &own_rays;
     IMP_REQUIRE(field->ctx, exits, "exits");
     IMP_REQUIRE(field->ctx, bars, "bars");
     IMP_REQUIRE(field->ctx, gradient, "out");

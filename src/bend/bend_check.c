@@ -17,7 +17,9 @@ static enum imp_status row_add(imp_bend *b, struct imp_check_row row)
         imp__grow(b->ctx, b->rows, &b->cap_rows, b->n_rows + 1, sizeof *b->rows);
     if (!grown) return imp__error(b->ctx, IMP_E_NOMEM, "no memory for a check");
     b->rows = grown;
-    row.ok = row.limit <= 0 || row.error <= row.limit;
+    row.size = sizeof row;
+    row.ok =
+        row.limit <= 0 || row.error <= row.limit ? IMP_VERDICT_RIGHT : IMP_VERDICT_WRONG;
     b->rows[b->n_rows++] = row;
     return IMP_OK;
 }
@@ -47,8 +49,11 @@ enum imp_status imp_bend_step_error(imp_bend *b, size_t pilots, double *error,
         memcpy(d[i], b->d[i * stride], sizeof *d);
         group[i] = b->group[i * stride];
     }
-    const struct imp_bend_rays r = {n, (const double(*)[3])x, (const double(*)[3])d,
-                                    group};
+    const struct imp_bend_rays r = {.size = sizeof(struct imp_bend_rays),
+                                    .n = n,
+                                    .x = (const double(*)[3])x,
+                                    .d = (const double(*)[3])d,
+                                    .group = group};
     for (int k = 0; k < 3; k++, o.step /= 2)
         IMP_TRY(imp__bundles_trace(b, b->field, &o, &r, e + (size_t)k * n, NULL, NULL));
     for (size_t i = 0; i < n; i++) {

@@ -57,11 +57,13 @@ imp_field *imp_bend_field(imp_bend *b) { return b ? b->field : NULL; }
 size_t imp_bend_n_rays(const imp_bend *b) { return b ? b->n : 0; }
 int imp_bend_n_bundles(const imp_bend *b) { return b ? b->n_bundles : 0; }
 size_t imp_bend_n_targets(const imp_bend *b) { return b ? b->n_targets : 0; }
-void imp_bend_get_rays(const imp_bend *b, struct imp_bend_rays *r)
+enum imp_status imp_bend_get_rays(const imp_bend *b, struct imp_bend_rays *r)
 {
-    IMP_REQUIRE_OR(NULL, b, "bend", );
-    IMP_REQUIRE_OR(b->ctx, r, "rays", );
-    *r = imp__bend_rays(b);
+    IMP_REQUIRE(NULL, b, "bend");
+    IMP_REQUIRE(b->ctx, r, "rays");
+    const struct imp_bend_rays all = imp__bend_rays(b);
+    IMP_GIVE(b->ctx, r, all, "rays");
+    return IMP_OK;
 }
 
 enum imp_status imp_bend_get_target(const imp_bend *b, size_t i,
@@ -93,7 +95,10 @@ enum imp_status imp_bend_set_options(imp_bend *b, const struct imp_bend_options 
         IMP_TRY(imp__element_take(ctx, __func__, "surfaces", o->surfaces, i, &s[i],
                                   sizeof *s));
     }
-    if (o->n_taps) memcpy(t, o->taps, o->n_taps * sizeof *t);
+    for (size_t i = 0; i < o->n_taps; i++) {
+        t[i] = (struct imp_bend_tap)IMP_BEND_TAP_INIT;
+        IMP_TRY(imp__element_take(ctx, __func__, "taps", o->taps, i, &t[i], sizeof *t));
+    }
     imp__release(ctx, b->surfaces), imp__release(ctx, b->taps);
     b->surfaces = s, b->taps = t;
     b->options = *o;

@@ -79,8 +79,11 @@ void imp__bend_options(const imp_bend *b, struct imp_bend_options *o);
 enum imp_status imp__bend_options_ready(const imp_bend *b, struct imp_bend_options *o);
 static inline struct imp_bend_rays imp__bend_rays(const imp_bend *b)
 {
-    return (struct imp_bend_rays){b->n, (const double(*)[3])b->x,
-                                  (const double(*)[3])b->d, b->group};
+    return (struct imp_bend_rays){.size = sizeof(struct imp_bend_rays),
+                                  .n = b->n,
+                                  .x = (const double(*)[3])b->x,
+                                  .d = (const double(*)[3])b->d,
+                                  .group = b->group};
 }
 
 /* dispersion.c: a field at another wavelength; its numbers are those of `of`. */

@@ -169,6 +169,9 @@ imp_bend_tangent(const imp_field *field, const struct imp_bend_options *options,
 {
     IMP_REQUIRE(NULL, field, "field");
     IMP_REQUIRE(field->ctx, rays, "rays");
+    struct imp_bend_rays own_rays = IMP_BEND_RAYS_INIT;
+    IMP_OPTIONS(field->ctx, own_rays, rays, "rays");
+    rays = &own_rays;
     IMP_REQUIRE(field->ctx, dots, "dots");
     if (theta_dot) IMP_FINITE_ALL(field->ctx, theta_dot, field->n_theta, "theta_dot");
     if (x_dot) IMP_FINITE_ALL(field->ctx, x_dot[0], 3 * rays->n, "x_dot");
@@ -201,6 +204,9 @@ enum imp_status imp_bend_path(const imp_field *field,
 {
     IMP_REQUIRE(NULL, field, "field");
     IMP_REQUIRE(field->ctx, rays, "rays");
+    struct imp_bend_rays own_rays = IMP_BEND_RAYS_INIT;
+    IMP_OPTIONS(field->ctx, own_rays, rays, "rays");
+    rays = &own_rays;
     IMP_REQUIRE(field->ctx, points, "points");
     IMP_REQUIRE(field->ctx, n_points, "n_points");
     IMP_FLOAT_MODE;

@@ -342,6 +342,9 @@ enum imp_status imp_bend_trace(const imp_field *field,
 {
     IMP_REQUIRE(NULL, field, "field");
     IMP_REQUIRE(field->ctx, rays, "rays");
+    struct imp_bend_rays own_rays = IMP_BEND_RAYS_INIT;
+    IMP_OPTIONS(field->ctx, own_rays, rays, "rays");
+    rays = &own_rays;
     IMP_REQUIRE(field->ctx, exits, "exits");
     if (stats) IMP_SIZED(field->ctx, stats, "stats");
     IMP_FLOAT_MODE;

@@ -181,8 +181,11 @@ static size_t run_end(const imp_bend *b, const struct imp_bend_rays *rays, size_
 static struct imp_bend_rays run_rays(const struct imp_bend_rays *r, size_t first,
                                      size_t last)
 {
-    return (struct imp_bend_rays){last - first, r->x + first, r->d + first,
-                                  r->group ? r->group + first : NULL};
+    return (struct imp_bend_rays){.size = sizeof(struct imp_bend_rays),
+                                  .n = last - first,
+                                  .x = r->x + first,
+                                  .d = r->d + first,
+                                  .group = r->group ? r->group + first : NULL};
 }
 static void stats_add(struct imp_bend_stats *sum, const struct imp_bend_stats *s)
 {

@@ -39,11 +39,12 @@ void imp_field_destroy(imp_field *f)
 const char *imp_field_kind(const imp_field *f) { return f ? f->ops->name : ""; }
 size_t imp_field_n_theta(const imp_field *f) { return f ? f->n_theta : 0; }
 
-void imp_field_get_theta(const imp_field *f, double *theta)
+enum imp_status imp_field_get_theta(const imp_field *f, double *theta)
 {
-    IMP_REQUIRE_OR(NULL, f, "field", );
-    IMP_REQUIRE_OR(f->ctx, theta, "theta", );
+    IMP_REQUIRE(NULL, f, "field");
+    IMP_REQUIRE(f->ctx, theta, "theta");
     memcpy(theta, f->theta, f->n_theta * sizeof *theta);
+    return IMP_OK;
 }
 
 enum imp_status imp_field_set_theta(imp_field *f, const double *theta)
@@ -65,13 +66,14 @@ const char *imp_field_param_name(const imp_field *f, size_t i)
     return f && f->ops->param_name && i < f->n_theta ? f->ops->param_name(f, i) : NULL;
 }
 
-void imp_field_bounds(const imp_field *f, double lo[3], double hi[3])
+enum imp_status imp_field_get_bounds(const imp_field *f, double lo[3], double hi[3])
 {
-    IMP_REQUIRE_OR(NULL, f, "field", );
-    IMP_REQUIRE_OR(f->ctx, lo, "lo", );
-    IMP_REQUIRE_OR(f->ctx, hi, "hi", );
+    IMP_REQUIRE(NULL, f, "field");
+    IMP_REQUIRE(f->ctx, lo, "lo");
+    IMP_REQUIRE(f->ctx, hi, "hi");
     imp__v3_store(f->lo, lo);
     imp__v3_store(f->hi, hi);
+    return IMP_OK;
 }
 
 void imp_field_eval(const imp_field *f, const double x[3], double *eta, double *gradient,

@@ -62,8 +62,11 @@ enum imp_status imp__graded_ready(struct imp_graded *g, imp_v3 lo, imp_v3 hi)
     double corner[2][3];
     imp__v3_store(lo, corner[0]);
     imp__v3_store(hi, corner[1]);
-    const struct imp_bend_rays box = {2, (const double(*)[3])corner,
-                                      (const double(*)[3])corner, NULL};
+    const struct imp_bend_rays box = {.size = sizeof(struct imp_bend_rays),
+                                      .n = 2,
+                                      .x = (const double(*)[3])corner,
+                                      .d = (const double(*)[3])corner,
+                                      .group = NULL};
     if (!(o.step > 0)) {
         double most = 0; /* the greatest index on a diagonal */
         for (int i = 0; i <= 64; i++) {

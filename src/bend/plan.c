@@ -295,10 +295,13 @@ static enum imp_status taps_make(struct imp__plan *p)
     const struct imp_bend_options *o = &p->options;
     p->n_taps = (int)o->n_taps;
     for (int i = 0; i < p->n_taps; i++) {
+        struct imp_bend_tap tap = IMP_BEND_TAP_INIT;
+        IMP_CHECKED(imp__element_take(p->ctx, "bend", "taps", o->taps, (size_t)i, &tap,
+                                      sizeof tap));
         struct imp__surface s = {.kind = IMP__PLANE,
                                  .id = i,
-                                 .n = imp__v3_load(o->taps[i].normal),
-                                 .offset = o->taps[i].offset};
+                                 .n = imp__v3_load(tap.normal),
+                                 .offset = tap.offset};
         const double length = imp__length(s.n);
         if (!(length > 0) || !isfinite(length) || !isfinite(s.offset))
             return imp__error(p->ctx, IMP_E_ARG, "tap %d: the normal has no direction",
@@ -306,7 +309,7 @@ static enum imp_status taps_make(struct imp__plan *p)
         s.n *= 1 / length;
         s.offset /= length;
         p->taps[i] = s;
-        p->tap_group[i] = o->taps[i].group;
+        p->tap_group[i] = tap.group;
     }
     return IMP_OK;
 }

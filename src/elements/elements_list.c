@@ -116,7 +116,7 @@ static void link_take(struct arrivals *a, const struct imp__el_link *link)
 {
     const imp_elements *e = a->e;
     const struct imp__element *i = &e->elements[link->rcv], *to = a->to;
-    struct imp_elements_arrival out = {.from = link->src};
+    struct imp_elements_arrival out = {.size = sizeof out, .from = link->src};
     imp_spec light[3];
     if (!a->row) {
         a->n++;

@@ -28,6 +28,7 @@ static enum imp_status row_find(imp_elements *e, const char *name, int param,
     e->rows = grown;
     *out = &grown[e->n_rows++];
     **out = (struct imp_elements_row){
+        .size = sizeof **out,
         .name = param >= 0 ? e->scene->params[param].info.name : name,
         .param = param,
         .element = element,

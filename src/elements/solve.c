@@ -119,7 +119,8 @@ static size_t leaves_of(const imp_elements *e)
 static enum imp_status log_add(imp_elements *e)
 {
     enum imp_status st = IMP_OK;
-    struct imp_elements_step s = {.eps = e->eps,
+    struct imp_elements_step s = {.size = sizeof s,
+                                  .eps = e->eps,
                                   .links = e->n_links,
                                   .elements = e->n_elements,
                                   .leaves = leaves_of(e),

@@ -180,7 +180,7 @@ static void plain(struct imp_text *t, const struct imp_scene *scene,
 }
 
 enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *run,
-                                  int x, int y, int64_t sample, int as_json, char **out)
+                                  int x, int y, int64_t sample, bool as_json, char **out)
 {
     struct imp_run own;
     IMP_REQUIRE(NULL, scene, "scene");

@@ -44,7 +44,7 @@ static enum imp_status spectral_texts(struct exr_writer *w, int part)
         emissive = emissive || light;
     }
     for (int k = 0; any && k < (emissive ? 3 : 1); k++)
-        if (!imp_film_get_text(f, texts[k][0]))
+        if (!imp_film_text(f, texts[k][0]))
             EXR(exr_attr_set_string(w->exr, part, texts[k][0], texts[k][1]));
     if (w->rgb) EXR(exr_attr_set_string(w->exr, part, IMP_EXR_RGB_OF, "spectrum"));
 out:

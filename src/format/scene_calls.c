@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Scenes built by calls: the same tree that the XML reader makes. The first failure is
- * kept; later calls do nothing, and commit returns it. */
+ * kept; later calls do nothing, and return it as commit does. */
 #include "base/arguments.h"
 #include "base/film.h"
 #include "load.h"
@@ -16,10 +16,21 @@
 
 static const struct imp_loc nowhere = {NULL, 0, 0};
 
+static enum imp_status failed_before(const struct imp_scene *scene)
+{
+    return imp__error(scene->ctx, scene->build_status, "%s",
+                      scene->build_error ? scene->build_error : "scene: out of memory");
+}
+
+/* May the build go on? If not, the message is that of the first failure. */
 static bool ready(struct imp_scene *scene)
 {
     if (!scene) imp__error(NULL, IMP_E_ARG, "imp_scene_begin ...: scene is NULL");
-    if (!scene || scene->build_status != IMP_OK) return false;
+    if (!scene) return false;
+    if (scene->build_status != IMP_OK) {
+        failed_before(scene);
+        return false;
+    }
     if (!scene->tree) imp__error(scene->ctx, IMP_E_ARG, "scene: it is committed already");
     return scene->tree != NULL;
 }
@@ -29,6 +40,14 @@ static void keep(struct imp_scene *scene, enum imp_status st)
     if (st == IMP_OK) return;
     scene->build_status = st;
     scene->build_error = imp__strdup(scene->ctx, imp_last_error(scene->ctx));
+}
+
+/* What a call of a build returns: its own failure, or the first one before it. */
+static enum imp_status outcome(const struct imp_scene *scene)
+{
+    if (!scene) return IMP_E_ARG;
+    if (scene->build_status != IMP_OK) return scene->build_status;
+    return scene->tree ? IMP_OK : IMP_E_ARG; /* it is committed */
 }
 
 static struct imp_node *top(const struct imp_scene *scene)
@@ -104,18 +123,20 @@ static enum imp_status begin(struct imp_scene *scene, const char *tag, const cha
     return st == IMP_OK ? push(scene, node) : st;
 }
 
-void imp_scene_begin(imp_scene *scene, const char *tag, const char *type, const char *id,
-                     const char *name)
+enum imp_status imp_scene_begin(imp_scene *scene, const char *tag, const char *type,
+                                const char *id, const char *name)
 {
     if (ready(scene)) keep(scene, begin(scene, tag, type, id, name));
+    return outcome(scene);
 }
 
-void imp_scene_end(imp_scene *scene)
+enum imp_status imp_scene_end(imp_scene *scene)
 {
-    if (!ready(scene)) return;
+    if (!ready(scene)) return outcome(scene);
     if (scene->n_stack == 1)
         keep(scene, imp__error(scene->ctx, IMP_E_ARG, "scene: end without begin"));
     else scene->n_stack--;
+    return outcome(scene);
 }
 
 /* ---- Properties ---------------------------------------------------------------- */
@@ -151,50 +172,59 @@ static void numbers(struct imp_scene *scene, const char *name, enum imp_prop_typ
     }
 }
 
-void imp_scene_bool(imp_scene *scene, const char *name, int value)
+enum imp_status imp_scene_bool(imp_scene *scene, const char *name, bool value)
 {
     struct imp_prop *p = prop(scene, name, IMP_PROP_BOOL);
-    if (p) p->integer = value != 0;
+    if (p) p->integer = value;
+    return outcome(scene);
 }
 
-void imp_scene_integer(imp_scene *scene, const char *name, int64_t value)
+enum imp_status imp_scene_integer(imp_scene *scene, const char *name, int64_t value)
 {
     struct imp_prop *p = prop(scene, name, IMP_PROP_INTEGER);
     if (p) p->integer = value;
+    return outcome(scene);
 }
 
-void imp_scene_float(imp_scene *scene, const char *name, double value)
+enum imp_status imp_scene_float(imp_scene *scene, const char *name, double value)
 {
     numbers(scene, name, IMP_PROP_FLOAT, &value, 1);
+    return outcome(scene);
 }
 
-void imp_scene_vector(imp_scene *scene, const char *name, const double value[3])
+enum imp_status imp_scene_vector(imp_scene *scene, const char *name,
+                                 const double value[3])
 {
     numbers(scene, name, IMP_PROP_VECTOR, value, 3);
+    return outcome(scene);
 }
 
-void imp_scene_rgb(imp_scene *scene, const char *name, const double value[3])
+enum imp_status imp_scene_rgb(imp_scene *scene, const char *name, const double value[3])
 {
     numbers(scene, name, IMP_PROP_RGB, value, 3);
+    return outcome(scene);
 }
 
-void imp_scene_transform(imp_scene *scene, const char *name, const double value[16])
+enum imp_status imp_scene_transform(imp_scene *scene, const char *name,
+                                    const double value[16])
 {
     numbers(scene, name, IMP_PROP_TRANSFORM, value, 16);
+    return outcome(scene);
 }
 
-void imp_scene_string(imp_scene *scene, const char *name, const char *value)
+enum imp_status imp_scene_string(imp_scene *scene, const char *name, const char *value)
 {
     struct imp_prop *p = prop(scene, name, IMP_PROP_STRING);
-    if (!p) return;
+    if (!p) return outcome(scene);
     if (!value) {
         keep(scene,
              imp__error(scene->ctx, IMP_E_ARG, "scene: value of '%s' is NULL", name));
-        return;
+        return outcome(scene);
     }
     p->string = imp__arena_strdup(&scene->arena, value);
     if (!p->string)
         keep(scene, imp__error(scene->ctx, IMP_E_NOMEM, "scene: out of memory"));
+    return outcome(scene);
 }
 
 static enum imp_status spectrum(struct imp_scene *scene, struct imp_prop *p, size_t n,
@@ -212,28 +242,31 @@ static enum imp_status spectrum(struct imp_scene *scene, struct imp_prop *p, siz
     if (n) memcpy(list, nm, n * sizeof *list);
     if (n) memcpy(list + n, values, n * sizeof *list);
     const enum imp_status st = imp__samples_check(ctx, &(struct imp_samples){n, list});
-    if (st != IMP_OK) return imp__error_prefix(ctx, st, "scene: spectrum '%s'", p->name);
+    if (st != IMP_OK)
+        return imp__error_prefix(ctx, IMP_E_ARG, "scene: spectrum '%s'", p->name);
     p->list = list;
     p->n = n;
     return IMP_OK;
 }
 
-void imp_scene_spectrum(imp_scene *scene, const char *name, size_t n,
-                        const double *wavelengths_nm, const double *values)
+enum imp_status imp_scene_spectrum(imp_scene *scene, const char *name, size_t n,
+                                   const double *wavelengths_nm, const double *values)
 {
     if (n == 1 && !wavelengths_nm) {
         numbers(scene, name, IMP_PROP_UNIFORM, values, 1);
-        return;
+        return outcome(scene);
     }
     struct imp_prop *p = prop(scene, name, IMP_PROP_SPECTRUM);
     if (p) keep(scene, spectrum(scene, p, n, wavelengths_nm, values));
+    return outcome(scene);
 }
 
-void imp_scene_ref(imp_scene *scene, const char *id, const char *name)
+enum imp_status imp_scene_ref(imp_scene *scene, const char *id, const char *name)
 {
-    if (!ready(scene)) return;
+    if (!ready(scene)) return outcome(scene);
     if (!id) keep(scene, imp__error(scene->ctx, IMP_E_ARG, "imp_scene_ref: id is NULL"));
     else keep(scene, imp__tree_ref(scene->tree, top(scene), id, name, nowhere));
+    return outcome(scene);
 }
 
 /* ---- Bulk data ----------------------------------------------------------------- */
@@ -291,13 +324,14 @@ static enum imp_status mesh(struct imp_scene *scene, size_t n_vertices,
     return IMP_OK;
 }
 
-void imp_scene_mesh(imp_scene *scene, size_t n_vertices, size_t n_triangles,
-                    const float *positions, const float *normals, const float *uvs,
-                    const uint32_t *indices)
+enum imp_status imp_scene_mesh(imp_scene *scene, size_t n_vertices, size_t n_triangles,
+                               const float *positions, const float *normals,
+                               const float *uvs, const uint32_t *indices)
 {
     if (ready(scene))
         keep(scene,
              mesh(scene, n_vertices, n_triangles, positions, normals, uvs, indices));
+    return outcome(scene);
 }
 
 static enum imp_status image(struct imp_scene *scene, int width, int height, int channels,
@@ -327,10 +361,11 @@ static enum imp_status image(struct imp_scene *scene, int width, int height, int
     return IMP_OK;
 }
 
-void imp_scene_image(imp_scene *scene, int width, int height, int channels,
-                     const float *pixels)
+enum imp_status imp_scene_image(imp_scene *scene, int width, int height, int channels,
+                                const float *pixels)
 {
     if (ready(scene)) keep(scene, image(scene, width, height, channels, pixels));
+    return outcome(scene);
 }
 
 static enum imp_status grid(struct imp_scene *scene, const int n[3], int channels,
@@ -363,11 +398,12 @@ static enum imp_status grid(struct imp_scene *scene, const int n[3], int channel
     return IMP_OK;
 }
 
-void imp_scene_grid(imp_scene *scene, int nx, int ny, int nz, int channels,
-                    const float *values)
+enum imp_status imp_scene_grid(imp_scene *scene, int nx, int ny, int nz, int channels,
+                               const float *values)
 {
     if (ready(scene))
         keep(scene, grid(scene, (const int[3]){nx, ny, nz}, channels, values));
+    return outcome(scene);
 }
 
 /* ---- Commit -------------------------------------------------------------------- */
@@ -377,10 +413,7 @@ enum imp_status imp_scene_commit(imp_scene *scene)
     IMP_REQUIRE(NULL, scene, "scene");
     IMP_FLOAT_MODE;
     imp_context *ctx = scene->ctx;
-    if (scene->build_status != IMP_OK)
-        return imp__error(ctx, scene->build_status, "%s",
-                          scene->build_error ? scene->build_error
-                                             : "scene: out of memory");
+    if (scene->build_status != IMP_OK) return failed_before(scene);
     if (!scene->tree) return imp__error(ctx, IMP_E_ARG, "scene: it is committed already");
     enum imp_status st = IMP_OK;
     if (scene->n_stack > 1)

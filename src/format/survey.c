@@ -85,7 +85,7 @@ static enum imp_status lost_add(struct imp_scene *scene, const char *text)
 {
     char *copy = imp__arena_strdup(&scene->arena, text);
     if (!copy) return imp__error(scene->ctx, IMP_E_NOMEM, "scene: out of memory");
-    if (scene->lenient == 1) imp__warn(scene->ctx, "%s", text);
+    if (scene->lenient == IMP_LENIENT_WARN) imp__warn(scene->ctx, "%s", text);
     return imp__build_list_add(scene, (void ***)&scene->missing, &scene->n_missing, copy);
 }
 

@@ -7,7 +7,8 @@
 #include <errno.h>
 #include <string.h>
 
-#define MEMORY 0x1p30
+#define MEMORY      ((size_t)1 << 30)
+#define BUDGET_MOST ((size_t)1 << 62)
 
 void imp__walks_theta_get(const struct imp_scene *scene, double *theta)
 {
@@ -147,7 +148,7 @@ static bool has_room(const struct reading *r, const struct imp_sensor *sensor)
            (double)r->size;
 }
 
-static enum imp_status stores_take(struct reading *r, struct imp_walks *w, double memory)
+static enum imp_status stores_take(struct reading *r, struct imp_walks *w, size_t memory)
 {
     enum imp_status st = IMP_OK;
     int last = -1;
@@ -161,12 +162,13 @@ static enum imp_status stores_take(struct reading *r, struct imp_walks *w, doubl
             IMP_TRY(damaged(r, "its sensors"));
         last = h.index;
         IMP_TRY(
-            imp__walks_sensor(w, NULL, h.index, (size_t)fmin(memory, 0x1p62), &tracer));
+            imp__walks_sensor(w, NULL, h.index, imp_min(memory, BUDGET_MOST), &tracer));
         struct imp_store *s = &w->stores[k];
         atomic_store(&s->roulette, h.roulette != 0);
         s->left = r->head.n_stores - k;
         IMP_TRY(imp__store_take(&r->from, s, &tracer, own ? &h.of : NULL));
-        memory -= (double)s->bytes + (double)s->reduced_bytes;
+        const size_t taken = s->bytes + s->reduced_bytes;
+        memory -= imp_min(memory, taken);
     }
     if (fgetc(r->from.f) != EOF) IMP_TRY(damaged(r, "it goes on behind its end"));
 out:
@@ -188,7 +190,7 @@ static enum imp_status reduction_check(struct imp_walks *w)
 }
 
 /* `scene`: NULL, or whose walks these have to be. */
-static enum imp_status walks_take(struct reading *r, imp_scene *scene, double memory,
+static enum imp_status walks_take(struct reading *r, imp_scene *scene, size_t memory,
                                   double ess, imp_walks **out)
 {
     enum imp_status st = IMP_OK;
@@ -246,9 +248,8 @@ enum imp_status imp_walks_read(imp_context *ctx, imp_scene *scene, const char *p
     if (scene && (scene->ctx != ctx || !scene->committed))
         return imp__error(ctx, IMP_E_ARG,
                           "the scene has not been committed, or is another context's");
-    if (!(o.memory >= 0) || isinf(o.memory) || !(o.ess >= 0 && o.ess <= 1))
-        return imp__error(ctx, IMP_E_ARG, "options: memory %g or ess %g is out of range",
-                          o.memory, o.ess);
+    if (!(o.ess >= 0 && o.ess <= 1))
+        return imp__error(ctx, IMP_E_ARG, "options: ess %g is out of range", o.ess);
     if (o.survival != 0 || o.headroom != 0)
         return imp__error(ctx, IMP_E_ARG,
                           "options: the file has its own survival and headroom, not %g "

@@ -97,7 +97,8 @@ struct imp_scene {
     bool committed;
     /* The scene in a file of recorded walks, which no ray meets: shapes have no geometry. */
     bool rayless;
-    int lenient; /* not 0: it goes on without what there is not; 1: with warnings */
+    enum imp_lenience
+        lenient;          /* not IMP_LENIENT_OFF: it goes on without what there is not */
     const char **missing; /* [n_missing] a line for each */
     int n_missing;
 

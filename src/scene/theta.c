@@ -157,16 +157,17 @@ enum imp_status imp_scene_find_param(const imp_scene *scene, const char *name,
                       scene->n_params ? near.text : "; the scene has none");
 }
 
-void imp_scene_get_theta(const imp_scene *scene, double *theta)
+enum imp_status imp_scene_get_theta(const imp_scene *scene, double *theta)
 {
-    IMP_REQUIRE_OR(NULL, scene, "scene", );
-    IMP_REQUIRE_OR(scene->ctx, theta, "theta", );
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, theta, "theta");
     IMP_READS(scene);
     for (size_t i = 0; i < scene->n_params; i++) {
         const struct imp_param *p = &scene->params[i];
         for (size_t k = 0; k < p->info.count; k++)
             theta[p->info.offset + k] = imp__param_get(p, k);
     }
+    return IMP_OK;
 }
 
 enum imp_status imp__param_check(const struct imp_scene *scene, const struct imp_param *p,

@@ -90,8 +90,9 @@ static void setups_make(void)
     n_setups = n;
 }
 
-static const struct imp_bend_tap taps[TAPS] = {{{0.1, 0, 1}, -0.3, -1},
-                                               {{0, 0.1, 1}, 0.1, -1}};
+static const struct imp_bend_tap taps[TAPS] = {
+    {.size = sizeof *taps, .normal = {0.1, 0, 1}, .offset = -0.3, .group = -1},
+    {.size = sizeof *taps, .normal = {0, 0.1, 1}, .offset = 0.1, .group = -1}};
 
 static void options_of(const struct setup *s, enum imp_bend_scheme scheme,
                        struct imp_bend_options *o)

@@ -98,7 +98,7 @@ static void lanes(void)
 {
     imp_scene *s = make(ctx, LOOK("18", "-1") BALL("null", PLUME) SCREEN("3"));
     imp_problem *p = test_problem(ctx, s, "lens*");
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     imp_film *film[16];
     struct imp_run run = IMP_RUN_INIT;
     float seed[16 * 16 * 3];

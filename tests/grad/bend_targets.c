@@ -17,7 +17,8 @@ static imp_bend *bend_make(bool grid)
     KIT_CHECK(imp_bend_create(kit_ctx, f, &b));
     struct imp_bend_options o = IMP_BEND_OPTIONS_INIT;
     struct imp_bend_surface s[2] = {IMP_BEND_SURFACE_INIT, IMP_BEND_SURFACE_INIT};
-    static const struct imp_bend_tap tap[1] = {{{0, 0.1, 1}, 0, -1}};
+    static const struct imp_bend_tap tap[1] = {
+        {.size = sizeof *tap, .normal = {0, 0.1, 1}, .group = -1}};
     s[0].offset = 0.7, s[0].normal[0] = 0.1;
     s[1].type = IMP_BEND_BOX, s[1].event = IMP_BEND_STOP;
     for (int k = 0; k < 3; k++) s[1].lo[k] = -1, s[1].hi[k] = 1;

@@ -69,7 +69,7 @@ static void begin(struct setting *s, imp_scene *scene, const char *active, int s
     s->run.points = IMP_POINTS_INDEPENDENT; /* the sums below are over walks */
     s->run.seed = 11;
     s->problem = test_problem(ctx, s->scene, active);
-    s->K = imp_problem_n(s->problem);
+    s->K = imp_problem_n_variables(s->problem);
     for (int p = 0; p < PIXELS; p++) {
         s->weight[p] = (float)(0.5 + 0.25 * p);
         for (int c = 0; c < C; c++) {

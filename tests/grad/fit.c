@@ -121,11 +121,11 @@ static void ball(void)
     if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
     double at_sky = 0, at_ball = 0;
     for (size_t k = 0; st == IMP_OK && k < 6; k++) {
-        size_t param, c;
-        if (imp_problem_variable(p, k, &param, &c, NULL, NULL) != IMP_OK) break;
+        struct imp_variable_info of = IMP_VARIABLE_INFO_INIT;
+        if (imp_problem_get_variable(p, k, &of) != IMP_OK) break;
         const double v = r->variables[k].value;
-        if (param == sky) at_sky = fmax(at_sky, fabs(v - 2));
-        else at_ball = fmax(at_ball, fabs(v / rho[c] - 1));
+        if (of.param == sky) at_sky = fmax(at_sky, fabs(v - 2));
+        else at_ball = fmax(at_ball, fabs(v / rho[of.element] - 1));
     }
     tap_ok(st == IMP_OK && at_sky < 0.02 && at_ball < 0.03,
            "with a prior on the sky # sky off by %.4f, ball by %.2f %%", at_sky,

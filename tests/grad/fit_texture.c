@@ -179,7 +179,8 @@ int main(void)
     test_must(ctx, imp_problem_create(s, &p));
     test_must(ctx, imp_problem_activate(p, "picture.*"));
     test_must(ctx, imp_problem_add_target(p, &t));
-    tap_ok(imp_problem_n(p) == N, "%zu numbers are active", imp_problem_n(p));
+    tap_ok(imp_problem_n_variables(p) == N, "%zu numbers are active",
+           imp_problem_n_variables(p));
     struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
     const struct imp_fit_result *r = NULL;
     static double x[N];
@@ -189,18 +190,18 @@ int main(void)
     o.intervals = 1;
     test_must(ctx, imp_fit(p, &o, &run, &r));
     imp_problem_get_x(p, x);
-    struct imp_fit_variable variable = {0};
+    struct imp_fit_variable variable = IMP_FIT_VARIABLE_INIT;
     double outside = 0;
     int other = 0;
     for (size_t i = 0; i < N; i++) {
         outside += x[i] < 0 || x[i] > 1;
-        test_must(ctx, imp_problem_fit_variable(p, i, &variable));
+        test_must(ctx, imp_problem_get_fit_variable(p, i, &variable));
         other += variable.value != x[i] || variable.start != 0.5 ||
                  variable.at_bound != (x[i] <= 0 ? -1 : x[i] >= 1) ||
                  !variable.determined || !isnan(variable.se) || !isnan(variable.hi95);
     }
     tap_ok(other == 0 && !r->variables &&
-               imp_problem_fit_variable(p, N, &variable) == IMP_E_ARG,
+               imp_problem_get_fit_variable(p, N, &variable) == IMP_E_ARG,
            "each of them is asked for by its number # %d differ", other);
     tap_ok(rmse(x, truth) < 0.02 && outside == 0,
            "a texture of %d numbers # rms error %.4f, from %.4f: %s", N, rmse(x, truth),

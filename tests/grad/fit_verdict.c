@@ -62,7 +62,7 @@ static struct verdict fit(const char *filter, const char *glob, const char *wron
         for (int c = 0; c < 3; c++) value[c] *= 1.3;
         if (v.st == IMP_OK) v.st = imp_scene_set_values(s, k, 3, value);
     }
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     imp_problem_get_x(p, truth);
     for (size_t k = 0; k < n; k++) x[k] = 0.6 * truth[k];
     if (v.st == IMP_OK) v.st = imp_problem_set_x(p, x);
@@ -136,7 +136,7 @@ static void closing_losses(void)
         o.max_iterations = 1 + k % 2;
         run.spp = 2;
         run.seed = 900 + (uint64_t)k / 2;
-        for (size_t i = 0; i < imp_problem_n(p); i++) x[i] = truth[i];
+        for (size_t i = 0; i < imp_problem_n_variables(p); i++) x[i] = truth[i];
         st = imp_problem_set_x(p, x);
         if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
         if (st == IMP_OK) a[k % 2][k / 2] = r->objective.value;

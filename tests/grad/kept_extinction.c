@@ -136,7 +136,7 @@ static void derivatives(imp_scene *scene, const char *name, const char *active,
     t.channels = 3;
     t.pixels = pixels;
     test_must(ctx, imp_problem_add_target(p, &t));
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     const struct answer before = loss(p, walks, 0, 0);
     scale(scene, name, factor, INFINITY);
     const struct answer kept = loss(p, walks, 0, 0);

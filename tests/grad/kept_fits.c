@@ -55,10 +55,11 @@ static struct fitted fit(imp_context *ctx, const char *file, const char *defines
     t.noise_se = imp_film_se(film);
     test_must(ctx, imp_problem_add_target(p, &t));
     imp_problem_get_x(p, x);
-    for (size_t k = 0; k < imp_problem_n(p); k++) x[k] *= start;
+    for (size_t k = 0; k < imp_problem_n_variables(p); k++) x[k] *= start;
     test_must(ctx, imp_problem_set_x(p, x));
     o.optimizer = optimizer;
-    o.memory = memory;
+    o.memory = memory > 0 ? (size_t)memory : 0;
+    o.no_recording = memory < 0;
     o.intervals = iterations > 2;
     o.max_iterations = iterations;
     run.spp = 32;

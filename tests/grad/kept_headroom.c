@@ -130,7 +130,7 @@ static void derivatives(const char *vol, struct change c, const char *what)
     imp_walks *walks = keep(scene, 256, true, 3);
     change_grid(scene, name, c);
     imp_problem *p = problem_of(scene, name, NULL);
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     for (int k = 0; k < 2; k++) {
         struct imp_run run = IMP_RUN_INIT;
         run.spp = 256;

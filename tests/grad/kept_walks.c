@@ -237,7 +237,7 @@ static void both_modes(const char *file, const char *defines, enum imp_color_mod
     imp_problem *p = problem_of(scene, glob);
     struct imp_run run = IMP_RUN_INIT;
     struct imp_sensor_info info = {.size = sizeof info};
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     double g[NUMBERS], v[NUMBERS], x[NUMBERS], forward = 0, reverse = 0, size = 0;
     imp_film *jv;
     set(scene, moved, 0.9);

@@ -114,7 +114,7 @@ static void cases(int n, int right)
         if (!right) values_scale(s, wrong, e, 1 / by);
         struct outcome out;
         imp_problem *p = fitted(s, pixels, se, weights, 50 + 2 * (uint64_t)k, &out);
-        if (imp_problem_n(p) != 3) abort(); /* its own numbers are back */
+        if (imp_problem_n_variables(p) != 3) abort(); /* its own numbers are back */
         if (right) {
             alarms += out.n > 0 && out.rows[0].chance < 0.05;
         } else {

@@ -100,7 +100,7 @@ static void check(const struct setup *q)
     snprintf(text, sizeof text, xml, q->integrator, q->film, q->filter, IMP_SCENES);
     imp_scene *s = test_scene_text(ctx, text, IMP_RGB);
     imp_problem *p = test_problem(ctx, s, "*");
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     const int channels = q->luminance ? 1 : 3;
 
     /* Darker than the picture by more than noise: L1 has its kink elsewhere. */

@@ -148,7 +148,7 @@ static void loss(void)
     imp_scene *s = test_scene_text(
         ctx, ROOM CAMERA("cam", "0", ALL NUMBER("gamma", "1.8")) "</scene>", IMP_RGB);
     imp_problem *p = test_problem(ctx, s, "cam.*");
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     float T[3 * PIXELS];
     double x[6], g[6], seen = 0;
     struct tap_stat of = {0};
@@ -209,7 +209,8 @@ static void room(void)
     test_must(ctx, imp_problem_create(s, &p));
     for (int i = 0; i < 4; i++) test_must(ctx, imp_problem_activate(p, names[i]));
     for (int i = 0; i < 2; i++) test_target(ctx, p, i, WIDTH, HEIGHT, T[i]);
-    tap_ok(imp_problem_n(p) == 10, "six reflectances, two cameras of two numbers");
+    tap_ok(imp_problem_n_variables(p) == 10,
+           "six reflectances, two cameras of two numbers");
     struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
     const struct imp_fit_result *r;
     const struct imp_run run = run_of(256, 5, 0);

@@ -59,9 +59,8 @@ int main(void)
                "%s # %d iterations, condition %.0f: %s", name, r->iterations,
                r->condition, r->reason);
         for (int k = 0; k < 7; k++) {
-            size_t param;
             struct imp_param_info info = {.size = sizeof info};
-            test_must(ctx, imp_problem_variable(p, (size_t)k, &param, NULL, NULL, NULL));
+            const size_t param = test_param_of(ctx, p, (size_t)k);
             test_must(ctx, imp_scene_get_param(s, param, &info));
             const struct imp_fit_variable *v = &r->variables[k];
             const double off = v->value / truth[k] - 1, z = (v->value - truth[k]) / v->se;

@@ -427,15 +427,14 @@ static void fresh(imp_scene *s, imp_problem *p, size_t param, const double *v,
     uint64_t seed = imp__hash_text(imp__hash_text(1000, what), "fresh") >> 16;
     imp_film *film;
     test_must(ctx, imp_scene_get_param(s, param, &info));
-    const size_t n = imp_problem_n(p), count = info.count;
+    const size_t n = imp_problem_n_variables(p), count = info.count;
     double *old = calloc(count, sizeof *old), *x_dot = calloc(n, sizeof *x_dot),
            *g = calloc(n, sizeof *g);
     test_must(ctx, imp_scene_get_values(s, param, old));
 
     size_t base = n;
     for (size_t i = n; i-- > 0;) {
-        size_t at;
-        test_must(ctx, imp_problem_variable(p, i, &at, NULL, NULL, NULL));
+        const size_t at = test_param_of(ctx, p, i);
         if (at == param) base = i;
     }
     /* A sky's density changes with its numbers, and with it a few decisions, whose jumps are a
@@ -581,10 +580,9 @@ static void frozen(imp_problem *p, const char *what, bool at_bound)
 
 static bool active_has(imp_problem *p, imp_scene *s, const char *part)
 {
-    for (size_t i = 0; i < imp_problem_n(p); i++) {
+    for (size_t i = 0; i < imp_problem_n_variables(p); i++) {
         struct imp_param_info info = {.size = sizeof info};
-        size_t param;
-        test_must(ctx, imp_problem_variable(p, i, &param, NULL, NULL, NULL));
+        const size_t param = test_param_of(ctx, p, i);
         test_must(ctx, imp_scene_get_param(s, param, &info));
         if (strstr(info.name, part)) return true;
     }

@@ -26,7 +26,7 @@ static void against_reverse(imp_context *ctx)
     struct imp_estimate radiance, again;
     test_must(ctx, imp_problem_create(s, &p));
     test_must(ctx, imp_problem_activate(p, "*"));
-    const size_t n = imp_scene_n_params(s), n_x = imp_problem_n(p);
+    const size_t n = imp_scene_n_params(s), n_x = imp_problem_n_variables(p);
     double *share = calloc(n, sizeof *share), *se = calloc(n, sizeof *se),
            *walks = calloc(4 * n, sizeof *walks), *all = calloc(SPP * n, sizeof *all);
     double *x = calloc(n_x, sizeof *x), *g = calloc(n_x, sizeof *g);
@@ -38,8 +38,7 @@ static void against_reverse(imp_context *ctx)
     imp_problem_get_x(p, x);
     double worst = 0, lights = 0, *sum = calloc(n, sizeof *sum);
     for (size_t i = 0; i < n_x; i++) {
-        size_t param;
-        test_must(ctx, imp_problem_variable(p, i, &param, NULL, NULL, NULL));
+        const size_t param = test_param_of(ctx, p, i);
         sum[param] += x[i] * g[i] / radiance.value;
     }
     for (size_t k = 0; k < n; k++) {

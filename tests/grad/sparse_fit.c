@@ -86,9 +86,9 @@ struct score {
 static void score_add(imp_context *ctx, const struct room *r, struct score *s)
 {
     struct tap_stat square = {0}, inside = {0};
-    for (size_t k = 0; k < imp_problem_n(r->problem); k++) {
-        struct imp_fit_variable v;
-        test_must(ctx, imp_problem_fit_variable(r->problem, k, &v));
+    for (size_t k = 0; k < imp_problem_n_variables(r->problem); k++) {
+        struct imp_fit_variable v = IMP_FIT_VARIABLE_INIT;
+        test_must(ctx, imp_problem_get_fit_variable(r->problem, k, &v));
         if (isnan(v.se)) {
             s->without++;
             continue;
@@ -163,8 +163,8 @@ static void recover(imp_context *ctx, int seeds, int known, int of, int spp)
         run.spp = 8;
         test_must(ctx, imp_fit(room.problem, &o, &run, &r));
         for (size_t c = 0; c < 3; c++) {
-            struct imp_fit_variable v;
-            test_must(ctx, imp_problem_fit_variable(room.problem, room.sky + c, &v));
+            struct imp_fit_variable v = IMP_FIT_VARIABLE_INIT;
+            test_must(ctx, imp_problem_get_fit_variable(room.problem, room.sky + c, &v));
             tap_add(&sky_off, v.value - 1);
         }
         tap_ok(8.0 * r->iterations > 1.1 * most && fabs(sky_off.mean) > 5 * s.sky_se.mean,
@@ -213,8 +213,8 @@ static void same_bits(void)
         run.spp = 4;
         test_must(ctx, imp_fit(room.problem, &o, &run, &r));
         for (size_t i = 0; i < MOST; i++) {
-            struct imp_fit_variable v;
-            test_must(ctx, imp_problem_fit_variable(room.problem, i, &v));
+            struct imp_fit_variable v = IMP_FIT_VARIABLE_INIT;
+            test_must(ctx, imp_problem_get_fit_variable(room.problem, i, &v));
             x[k][i] = isnan(v.se) ? v.value : v.value + v.se;
         }
         room_free(&room);
@@ -276,7 +276,7 @@ static void refused(imp_context *ctx, imp_problem *p, int spp, enum imp_status e
     struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
     const struct imp_fit_result *r;
     double before[MOST], after[MOST];
-    const int few = imp_problem_n(p) <= MOST;
+    const int few = imp_problem_n_variables(p) <= MOST;
     run.spp = spp;
     o.optimizer = IMP_LM;
     if (few) imp_problem_get_x(p, before);

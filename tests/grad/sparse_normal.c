@@ -108,7 +108,7 @@ static void compare(imp_context *ctx, const struct trial *t)
 {
     imp_scene *scene;
     imp_problem *p = problem_make(ctx, t, &scene);
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
     struct imp_run run = IMP_RUN_INIT;
     struct imp__fit f = {0};

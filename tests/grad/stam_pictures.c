@@ -43,10 +43,8 @@ static struct pictures pictures(imp_context *ctx, const char *defines, int spp,
     blocks(primal, p.mean[0], p.var[0]);
     snprintf(name[0], 64, "picture");
     for (int k = 0; k < N_CONTROLS; k++) {
-        size_t param;
         struct imp_param_info info = {.size = sizeof info};
-        test_must(ctx,
-                  imp_problem_variable(problem, (size_t)k, &param, NULL, NULL, NULL));
+        const size_t param = test_param_of(ctx, problem, (size_t)k);
         test_must(ctx, imp_scene_get_param(scene, param, &info));
         snprintf(name[k + 1], 64, "%s", info.name);
         blocks(films[k], p.mean[k + 1], p.var[k + 1]);

@@ -80,7 +80,7 @@ static void chain_rule(void)
     double theta[15], x[10], g[10], se[10], each[15], want[10];
     aim(p, pixels, 12, 0.3f);
     aim(q, pixels, 12, 0.3f);
-    tap_ok(imp_problem_n(p) == 10, "ties: 15 numbers are 10");
+    tap_ok(imp_problem_n_variables(p) == 10, "ties: 15 numbers are 10");
     imp_problem_get_x(q, theta);
     imp_problem_get_x(p, x);
     double wrong = 0;
@@ -186,7 +186,7 @@ static void textures(void)
     imp_problem *q = test_problem(ctx, s, "floor.*"),
                 *p = test_problem(ctx, s, "floor.*"),
                 *r = test_problem(ctx, s, "floor.*");
-    const size_t n = imp_problem_n(q);
+    const size_t n = imp_problem_n_variables(q);
     const struct imp_run run = run_of(2, 5);
     double *theta = malloc(3 * n * sizeof *theta), *each = theta + n, *logs = each + n;
     double one, sum = 0, worst = 0, size = 0;
@@ -279,7 +279,7 @@ static void checks(void)
     o.fresh_spp = 16;
     test_must(ctx, imp_check(p, &o, &run, &rows, &n_rows));
     for (size_t i = 0; i < n_rows; i++) ok += rows[i].ok != 0;
-    tap_ok(n_rows > 15 && ok == n_rows && imp_problem_n(p) == 10,
+    tap_ok(n_rows > 15 && ok == n_rows && imp_problem_n_variables(p) == 10,
            "check: %zu of %zu rows, and still 10 numbers", ok, n_rows);
     imp_problem_destroy(p);
     imp_scene_destroy(s);
@@ -288,9 +288,10 @@ static void checks(void)
 static void refuses(imp_problem *p, const char *glob, enum imp_tie kind,
                     enum imp_status want, const char *words)
 {
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     const enum imp_status st = imp_problem_tie(p, glob, kind);
-    tap_ok(st == want && strstr(imp_last_error(ctx), words) && imp_problem_n(p) == n,
+    tap_ok(st == want && strstr(imp_last_error(ctx), words) &&
+               imp_problem_n_variables(p) == n,
            "refused: %s", imp_last_error(ctx));
 }
 

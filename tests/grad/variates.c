@@ -125,7 +125,7 @@ static const char *const how_words[] = {"", " masked", " in sets of points",
 static void errors_told(imp_problem *p, int t, const double *x, struct imp_run run,
                         struct chain_sums *sums)
 {
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     double *before = calloc(imp__variate_numbers(p->variate, p), sizeof *before);
     double g[2][MOST], se[2][MOST];
     if (!before) exit(99);
@@ -187,7 +187,7 @@ static void along_a_path(const char *file, const char *defines, const char *glob
     test_must(ctx, imp_problem_create(scene, &p));
     test_must(ctx, imp_problem_activate(p, glob));
     const struct imp_film_desc *film = &scene->sensors[0]->film;
-    const size_t n = imp_problem_n(p),
+    const size_t n = imp_problem_n_variables(p),
                  pixels = (size_t)film->crop_w * (size_t)film->crop_h;
     float *pixel = calloc(3 * pixels, sizeof *pixel),
           *mask = calloc(pixels, sizeof *mask);
@@ -300,7 +300,7 @@ static void rests(void)
     imp_scene *scene = test_scene(ctx, "textured.xml", IMP_RGB, "width=48 height=36");
     imp_problem *p = test_problem(ctx, scene, "metal.alpha*");
     float *grey = calloc((size_t)3 * 48 * 36, sizeof *grey);
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     struct imp__variate *v;
     struct imp_run run = IMP_RUN_INIT;
     double x[4], g[4];

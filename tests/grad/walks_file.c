@@ -56,7 +56,7 @@ static struct answer answer_of(imp_scene *scene, const imp_walks *walks)
     t.pixels = pixels;
     test_must(own, imp_problem_add_target(p, &t));
     free(pixels);
-    a.n = imp_problem_n(p);
+    a.n = imp_problem_n_variables(p);
     a.g = calloc(2 * a.n + 2, sizeof *a.g);
     a.se = a.g + a.n;
     test_must(own, imp_problem_objective(p, NULL, &run, &a.f, a.g, a.se));

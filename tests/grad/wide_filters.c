@@ -80,7 +80,7 @@ static void moments(int filter)
         .H = H, .H_same = same, .H_meas = meas, .g = g, .g_se = se, .cov_g = C};
     struct tap_stat h_stat[K * K] = {{0}}, g_stat[K] = {{0}}, c_stat[K] = {{0}},
                                m_stat[K] = {{0}};
-    bool fine = imp_problem_n(p) == K;
+    bool fine = imp_problem_n_variables(p) == K;
     for (int seed = 0; fine && seed < SEEDS; seed++) {
         run.spp = 32;
         run.seed = 100 + (uint64_t)seed;
@@ -134,7 +134,7 @@ static void fits(int filter, enum imp_color_mode mode, int noise_given)
         struct imp_target t = target_of(ctx, s, 0, 16, 50 + (uint64_t)seed, &film);
         if (!noise_given) t.noise_se = NULL;
         imp_problem *p = problem(s, &t);
-        const size_t n = imp_problem_n(p);
+        const size_t n = imp_problem_n_variables(p);
         double truth[3 * K], x[3 * K];
         imp_problem_get_x(p, truth);
         for (size_t k = 0; k < n; k++) x[k] = truth[k] * (k % 2 ? 1.25 : 0.8);

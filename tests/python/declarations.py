@@ -100,10 +100,10 @@ def test_functions():
             return "pointer"
         if "*" in text:
             return "string" if re.match(r"const char \*$", text) else "pointer"
-        return {"enum": "int"}.get(text.split()[0], {"size_t": "long unsigned int", "uint64_t": "long unsigned int",
+        return {"enum": "int", "_Bool": "bool"}.get(text.split()[0], {"size_t": "long unsigned int", "uint64_t": "long unsigned int",
                 "int64_t": "long int", "unsigned": "unsigned int"}.get(text, text))
 
-    names = {ctypes.c_void_p: "pointer", ctypes.c_char_p: "string", ctypes.c_int: "int", ctypes.c_double: "double",
+    names = {ctypes.c_void_p: "pointer", ctypes.c_char_p: "string", ctypes.c_int: "int", ctypes.c_bool: "bool", ctypes.c_double: "double",
              ctypes.c_ulong: "long unsigned int", ctypes.c_long: "long int", ctypes.c_uint: "unsigned int", None: "void"}
     for name, result, arguments in _c._FUNCTIONS:
         declaration = listed.pop(name)
@@ -129,6 +129,7 @@ WITHOUT = {
     "imp_scene_get_theta": "the same",
     "imp_scene_set_theta": "the same",
     "imp_denoiser_check": "importon.denoise is called with a picture that is there already, and says so itself",
+    "imp_version_number": "the package brings its own library, and compares the text (imp_version)",
     "imp_drop_text": "the header's sentences are in the declarations; Picture.dropped has the words",
     "imp_problem_nlopt": "NLopt's callback in C: importon.loss is a function of Python, for any optimiser",
     "imp_problem_set_run": "of that callback: functions take the run as keywords",
@@ -140,7 +141,7 @@ WITHOUT = {
     "imp_report_page": "for servers of a live page: importon view",
     "imp_report_data": "the same",
     "imp_problem_shares": "of one pixel, for pages of walks: importon report --scene; render_backward has its gradient",
-    "imp_problem_fit_variable": "one number of a fit: Fit has arrays; numbers beyond 1,024 have no errors",
+    "imp_problem_get_fit_variable": "one number of a fit: Fit has arrays; numbers beyond 1,024 have no errors",
 }
 
 

@@ -187,7 +187,7 @@ int main(void)
         problem = test_problem(ctx, scene, "*");
         t.width = W, t.height = H, t.channels = C, t.pixels = pixels;
         test_must(ctx, imp_problem_add_target(problem, &t));
-        if (imp_problem_n(problem) != N) return 99;
+        if (imp_problem_n_variables(problem) != N) return 99;
         printf("# %s filter\n", f ? "gaussian" : "box");
         numbers(before);
         for (int at = 1; at <= 2; at++) {

@@ -234,7 +234,7 @@ static void gradients(imp_context *ctx)
         test_scene(ctx, "elements/glossy.xml", IMP_MONO, "res=12 kd=0.6 ks=0.05");
     imp_elements *e = solved(s); /* of the scene as it was: a guide may be old */
     imp_problem *p = test_problem(ctx, s, "*");
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     static float seed[12 * 12];
     static const struct {
         const char *name;

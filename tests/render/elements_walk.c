@@ -102,7 +102,7 @@ static void gradient(imp_context *ctx)
     static float seed[RES * RES];
     double g[64], se[64];
     struct imp_run run = IMP_RUN_INIT;
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     for (int k = 0; k < RES * RES; k++) seed[k] = 1.0f / (RES * RES);
     run.spp = 256;
     if (n > 64) return;
@@ -118,8 +118,7 @@ static void gradient(imp_context *ctx)
     test_must(ctx, imp_elements_solve(e));
     test_must(ctx, imp_elements_sensitivity(e, &rows, &n_rows));
     for (size_t i = 0; i < n; i++) {
-        size_t param;
-        test_must(ctx, imp_problem_variable(p, i, &param, NULL, NULL, NULL));
+        const size_t param = test_param_of(ctx, p, i);
         for (size_t k = 0; k < n_rows; k++)
             if (rows[k].param == (int)param) {
                 const double off = rows[k].derivative - g[i];

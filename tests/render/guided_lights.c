@@ -159,7 +159,7 @@ static void gradients(imp_context *ctx)
     imp_elements *e;
     imp_guide *guide = guide_of(s, 0, 0, 0.4, &e);
     imp_problem *p = test_problem(ctx, s, "*");
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     struct imp_run run = IMP_RUN_INIT;
     run.from = IMP_FROM_LIGHTS;
     run.spp = 256;

@@ -40,7 +40,7 @@ static enum imp_status work(struct host *h)
     if (st == IMP_OK) st = imp_problem_activate(p, "*");
     if (st == IMP_OK) st = imp_problem_add_target(p, &t);
     run.seed = 12;
-    if (st == IMP_OK && imp_problem_n(p) > N_MAX) st = IMP_E_ARG;
+    if (st == IMP_OK && imp_problem_n_variables(p) > N_MAX) st = IMP_E_ARG;
     if (st == IMP_OK)
         st = imp_problem_objective(p, NULL, &run, &J, h->gradient, h->gradient + N_MAX);
     h->gradient[2 * N_MAX] = J.value;

@@ -269,9 +269,8 @@ static void elements(imp_context *ctx)
     test_must(ctx, imp_problem_reverse(p, seed, &run, g, se));
     test_must(ctx, imp_elements_sensitivity(e, &rows, &n_rows));
     int compared = 0;
-    for (size_t i = 0; i < imp_problem_n(p); i++) {
-        size_t param;
-        test_must(ctx, imp_problem_variable(p, i, &param, NULL, NULL, NULL));
+    for (size_t i = 0; i < imp_problem_n_variables(p); i++) {
+        const size_t param = test_param_of(ctx, p, i);
         for (size_t k = 0; k < n_rows; k++)
             if (rows[k].param == (int)param) {
                 const double off = rows[k].derivative - g[i];

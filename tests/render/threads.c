@@ -57,7 +57,7 @@ static void run_all(int threads, imp_scene *(*make)(imp_context *), bool few,
     test_must(ctx, imp_render(scene, &run, &film));
     imp_film_get_info(film, &info);
     const size_t values = (size_t)info.width * info.height * info.channels,
-                 n = imp_problem_n(p);
+                 n = imp_problem_n_variables(p);
     keep(out, imp_film_mean(film), values, 4);
     keep(out, imp_film_se(film), values, 4);
 

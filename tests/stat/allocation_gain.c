@@ -120,7 +120,7 @@ static void task_make(enum which which, int spp, enum imp_points points, struct 
     test_must(ctx, imp_problem_add_target(t->p, &target));
     free(mask);
     imp_film_destroy(film);
-    t->n = imp_problem_n(t->p);
+    t->n = imp_problem_n_variables(t->p);
     imp_problem_get_x(t->p, t->x);
     for (size_t k = 0; k < t->n; k++)
         if (t->x[k] < 1) t->x[k] = t->x[k] < 0.25 && which != CORNELL ? .3 : .4;

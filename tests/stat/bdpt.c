@@ -406,7 +406,7 @@ static void threads(void)
         struct imp_run run = IMP_RUN_INIT;
         struct imp_estimate value;
         run.spp = 64;
-        m = imp_problem_n(p);
+        m = imp_problem_n_variables(p);
         if (m < imp_count(grad[0]))
             test_must(ctx, imp_problem_functional(p, NULL, &run, &value, grad[k], NULL));
         imp_problem_destroy(p);

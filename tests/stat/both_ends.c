@@ -257,7 +257,7 @@ static void ends(const char *what, const char *xml, enum imp_color_mode mode,
     imp_scene *scene = test_scene_text(ctx, xml, mode);
     imp_problem *p = test_problem(ctx, scene, *globs);
     while (*++globs) test_must(ctx, imp_problem_activate(p, *globs));
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     struct imp_estimate R[2];
     double g[2][MOST], se[2][MOST], worst = 0;
     size_t resolved = 0;

@@ -277,7 +277,7 @@ static void gradients(void)
     struct imp_run run = IMP_RUN_INIT;
     double x[8], g[8];
     test_must(ctx, imp_problem_activate(p, "left.*"));
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     photograph(s, 0, 1, 1.8, .01, T);
     test_target(ctx, p, 0, WIDTH, HEIGHT, T);
     test_must(ctx, imp_problem_clip(p, 0, .5 / 255, 254.5 / 255));
@@ -332,7 +332,7 @@ static void grey_wall(int channels)
     t.pixels = T;
     test_must(ctx, imp_problem_add_target(p, &t));
     test_must(ctx, imp_problem_clip(p, 0, .5 / 255, 254.5 / 255));
-    tap_ok(imp_problem_n(p) == 2, "exposure and gamma");
+    tap_ok(imp_problem_n_variables(p) == 2, "exposure and gamma");
     test_must(ctx, imp_problem_set_x(p, (double[]){pow(V, 2.2) / mean, 2.2}));
     run.spp = 16;
     test_must(ctx, imp_problem_censor(p, &run));

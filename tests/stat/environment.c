@@ -624,7 +624,7 @@ static void gaps(void)
             test_must(ctx, imp_scene_commit(s));
             imp_problem *problem = test_problem(ctx, s, parts[k]);
             run.spp = 2;
-            const size_t n = imp_problem_n(problem);
+            const size_t n = imp_problem_n_variables(problem);
             float adjoint[2 * 2 * 3] = {0};
             const enum imp_status st =
                 n <= 64 ? imp_problem_reverse(problem, adjoint, &run, g, NULL) : IMP_OK;

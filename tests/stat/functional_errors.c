@@ -79,7 +79,7 @@ static void errors(const char *filter, enum imp_color_mode mode, int spp)
 {
     imp_scene *scene = scene_of(filter, mode);
     imp_problem *p = test_problem(ctx, scene, "*");
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     const int channels = mode == IMP_RGB ? 3 : 1, n_groups = (int)n / channels;
     static float adjoint[RES * RES * 3], flat[RES * RES * 3];
     static struct spread mean, given, table[N_MAX + 1];
@@ -127,7 +127,7 @@ static void values(const char *filter)
 {
     imp_scene *scene = scene_of(filter, IMP_RGB);
     imp_problem *p = test_problem(ctx, scene, "*");
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     struct imp_run run = IMP_RUN_INIT;
     struct imp_estimate e, sums[N_MAX], one;
     imp_film *primal = NULL, *films[N_MAX];

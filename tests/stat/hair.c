@@ -208,7 +208,8 @@ static void gradients(const char *material, enum imp_color_mode mode, size_t num
     o.paths = 40;
     o.fresh_spp = 32;
     test_check(ctx, p, &o, "gradients on curves");
-    tap_ok(imp_problem_n(p) == numbers, "all numbers # %zu", imp_problem_n(p));
+    tap_ok(imp_problem_n_variables(p) == numbers, "all numbers # %zu",
+           imp_problem_n_variables(p));
     imp_problem_destroy(p);
     imp_scene_destroy(s);
 }

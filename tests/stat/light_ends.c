@@ -542,7 +542,7 @@ static void gradients(const char *what, const char *body, const char *glob, int 
 {
     imp_scene *scene = scene_of(5, body, IMP_RGB);
     imp_problem *p = test_problem(ctx, scene, glob);
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     struct imp_run run = IMP_RUN_INIT;
     double g[2][128], se[2][128], worst = 0, loudest = 0;
     for (int k = 0; k < 2; k++) {

@@ -139,7 +139,7 @@ static void compare(const char *integrator, const char *filter, const float *tar
     struct answer truth, a;
     struct tap_stat value = {0}, g[N] = {{0}};
     double told = 0, told_g[N] = {0}, worst = 0, least = 9, most = 0;
-    if (imp_problem_n(p) != N) test_must(ctx, IMP_E_ARG);
+    if (imp_problem_n_variables(p) != N) test_must(ctx, IMP_E_ARG);
     ask(q, adjoint, 4096, 5, &truth);
     for (int i = 0; i < SEEDS; i++) {
         ask(p, adjoint, SPP, 1000 + (uint64_t)i, &a);
@@ -223,7 +223,7 @@ static void curves(int n, enum imp_from from, const char *name)
     run.from = from;
     run.seed = 4;
     test_must(ctx, imp_problem_objective(p, NULL, &run, &other.value, other.g, other.se));
-    for (size_t k = 0; k < imp_problem_n(p); k++) {
+    for (size_t k = 0; k < imp_problem_n_variables(p); k++) {
         const double se = hypot(eye.se[k], other.se[k]);
         worst = fmax(worst, fabs(eye.g[k] - other.g[k]) / se);
         resolved += fabs(eye.g[k]) > 10 * se;
@@ -233,7 +233,8 @@ static void curves(int n, enum imp_from from, const char *name)
     /* Errors from 8 groups: t of 7 degrees of freedom, of which 1 in 10^4 is beyond 7.9. */
     tap_ok(fabs(z) < 7.9 && worst < 7.9 && resolved > 0,
            "%d curves from %s: loss %.5g and %.5g, %zu derivatives # z %.2f, worst %.2f",
-           n, name, eye.value.value, other.value.value, imp_problem_n(p), z, worst);
+           n, name, eye.value.value, other.value.value, imp_problem_n_variables(p), z,
+           worst);
     imp_problem_destroy(p);
 
     p = test_problem(ctx, scene, "lamp.*");

@@ -78,7 +78,7 @@ struct pictures {
 
 static struct pictures pictures_of(imp_problem *p, int from, int spp, uint64_t seed)
 {
-    struct pictures out = {.n = imp_problem_n(p)};
+    struct pictures out = {.n = imp_problem_n_variables(p)};
     const struct imp_run run = run_of(from, spp, seed);
     test_must(ctx, imp_problem_jacobian(p, &run, &out.film[0], out.film + 1));
     return out;
@@ -181,8 +181,8 @@ static void check(const char *name, const char *xml, const char *more, const cha
     imp_scene *scene = test_scene_text(ctx, text, mode);
     imp_problem *p = test_problem(ctx, scene, "*");
     const int channels = mode == IMP_MONO ? 1 : 3;
-    if (imp_problem_n(p) > MANY) {
-        tap_ok(0, "%s: %zu numbers are too many here", name, imp_problem_n(p));
+    if (imp_problem_n_variables(p) > MANY) {
+        tap_ok(0, "%s: %zu numbers are too many here", name, imp_problem_n_variables(p));
         return;
     }
     struct pictures eye = pictures_of(p, 0, spp, 1);

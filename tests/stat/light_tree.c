@@ -301,7 +301,7 @@ static void gradients(imp_scene *a, imp_scene *b, int spp, const char *what)
     for (int k = 0; k < 2; k++) {
         imp_problem *p = test_problem(ctx, s[k], "*");
         struct imp_run run = IMP_RUN_INIT;
-        n = imp_problem_n(p);
+        n = imp_problem_n_variables(p);
         if (n > MOST) abort();
         run.spp = spp;
         run.seed = (uint64_t)(40 + k);

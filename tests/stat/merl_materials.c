@@ -199,7 +199,8 @@ static void modes(void)
     o.paths = 200;
     o.fresh_spp = 256;
     test_check(ctx, p, &o, "gradients of scale and sky");
-    tap_ok(imp_problem_n(p) == 4, "all numbers # %zu", imp_problem_n(p));
+    tap_ok(imp_problem_n_variables(p) == 4, "all numbers # %zu",
+           imp_problem_n_variables(p));
     imp_problem_destroy(p);
     imp_scene_destroy(s);
 }

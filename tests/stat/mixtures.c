@@ -162,7 +162,7 @@ static struct result functional(imp_scene *s, int spp, uint64_t seed)
     imp_problem *p = test_problem(ctx, s, "*");
     run.spp = spp;
     run.seed = seed;
-    r.n = imp_problem_n(p);
+    r.n = imp_problem_n_variables(p);
     if (r.n > N_PARAMS_MAX) {
         printf("Bail out! too many parameters\n");
         exit(99);

@@ -109,7 +109,7 @@ static void one_fit(imp_context *ctx, const struct experiment *e, int seed, int 
     test_must(ctx, imp_problem_create(e->scene, &p));
     for (int k = 0; k < e->n_active; k++)
         test_must(ctx, imp_problem_activate(p, e->active[k]));
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     imp_problem_get_x(p, begin);
     for (size_t k = 0; k < n; k++) truth[k] = fmax(begin[k], e->least);
     test_must(ctx, imp_problem_set_x(p, truth));

@@ -146,7 +146,7 @@ static void gradient(enum which which, int side, int spp, bool away, double most
     imp_film *film;
     struct imp_run run;
     imp_problem *p = problem_of(scene, which, &film);
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     double x[PARAMS], g[PARAMS], se[PARAMS], ratio[PARAMS], error[PARAMS];
     double stated[PARAMS + 1] = {0}, z_most = 0, lowest = INFINITY, highest = 0;
     imp_problem_get_x(p, x);
@@ -206,7 +206,7 @@ static void pairs(enum which which, int spp, enum imp_points points)
     imp_scene *scene = scene_of(which, 32);
     imp_film *film;
     imp_problem *p = problem_of(scene, which, &film);
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     double *H = calloc(4 * n * n, sizeof *H);
     double g[PARAMS], se[PARAMS], sum[2][PARAMS] = {{0}}, ratio[PARAMS];
     for (int seed = 0; seed < RUNS; seed++) {

@@ -85,7 +85,7 @@ int main(int argc, char **argv)
     test_must(ctx, imp_problem_create(scene, &problem));
     test_must(ctx, imp_problem_activate(problem, "floor.*"));
     test_must(ctx, imp_problem_add_target(problem, &target));
-    n = imp_problem_n(problem);
+    n = imp_problem_n_variables(problem);
 
     double *path = room((size_t)steps * n), *g = room(n);
     double *sum[2][2]; /* without, with; of g and of its squares: [steps][n] */

@@ -74,7 +74,7 @@ static imp_problem *problem_of(const struct setting *s, imp_scene *scene, imp_fi
     target.epsilon = 0.05;
     test_must(ctx, imp_problem_add_target(p, &target));
     imp_problem_get_x(p, x);
-    for (size_t k = 0; k < imp_problem_n(p); k++) x[k] *= s->away;
+    for (size_t k = 0; k < imp_problem_n_variables(p); k++) x[k] *= s->away;
     test_must(ctx, imp_problem_set_x(p, x));
     return p;
 }
@@ -87,7 +87,7 @@ static struct draws {
 static void evaluate(const struct setting *s, imp_problem *p, const float *adjoint,
                      int from, int to)
 {
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     struct imp_run run = IMP_RUN_INIT;
     double g[MOST], se[MOST];
     run.spp = s->spp;
@@ -145,7 +145,7 @@ static void errors(const struct setting *s)
     imp_film *film;
     imp_scene *scene = test_cornell_through(ctx, s->filter, s->side);
     imp_problem *p = problem_of(s, scene, &film);
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     struct ratio ratio[MOST], loss = {1, 0};
     double z[2] = {0, 0};
     int seeds = 0;
@@ -236,7 +236,7 @@ static void texels(const char *filter, enum imp_points points, int spp, int seed
     target.width = target.height = SIDE;
     target.channels = 3;
     test_must(ctx, imp_problem_add_target(p, &target));
-    if (imp_problem_n(p) != N) exit(99);
+    if (imp_problem_n_variables(p) != N) exit(99);
     memset(value, 0, sizeof value);
     memset(told, 0, sizeof told);
     for (int seed = 0; seed < seeds; seed++) {

@@ -188,7 +188,7 @@ static void problems(void)
                imp_bend_n_targets(b) == 7 && b->options.n_taps == 3,
            "problem: %zu rays, %d bundles, %zu targets", imp_bend_n_rays(b),
            imp_bend_n_bundles(b), imp_bend_n_targets(b));
-    struct imp_bend_rays r;
+    struct imp_bend_rays r = IMP_BEND_RAYS_INIT;
     imp_bend_get_rays(b, &r);
     const double want[3] = {-0.7 * sin(IMP_PI / 3), 0, -0.7 * cos(IMP_PI / 3)};
     double mid[3] = {0};

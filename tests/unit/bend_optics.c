@@ -9,8 +9,11 @@ static struct imp_bend_exit trace_one(const imp_field *f, struct imp_bend_option
 {
     struct imp_bend_exit e;
     double xs[1][3] = {{x[0], x[1], x[2]}}, ds[1][3] = {{d[0], d[1], d[2]}};
-    const struct imp_bend_rays r = {1, (const double(*)[3])xs, (const double(*)[3])ds,
-                                    NULL};
+    const struct imp_bend_rays r = {.size = sizeof(struct imp_bend_rays),
+                                    .n = 1,
+                                    .x = (const double(*)[3])xs,
+                                    .d = (const double(*)[3])ds,
+                                    .group = NULL};
     KIT_CHECK(imp_bend_trace(f, o, &r, &e, NULL, NULL));
     return e;
 }

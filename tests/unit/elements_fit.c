@@ -179,8 +179,7 @@ static void bounded(imp_context *ctx, enum imp_optimizer optimizer, const double
         test_must(ctx, imp_elements_sensitivity(e, &rows, &n_rows));
         for (size_t i = 0; i < n_rows; i++)
             for (size_t j = 0; j < LAMPS; j++) {
-                size_t param;
-                test_must(ctx, imp_problem_variable(p, j, &param, NULL, NULL, NULL));
+                const size_t param = test_param_of(ctx, p, j);
                 if (rows[i].param == (int)param) A[k][j] += rows[i].derivative;
             }
     }

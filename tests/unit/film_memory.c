@@ -59,7 +59,7 @@ static double peak(enum job job, int side, const char *filter, int spp, int *cha
     imp_scene *s = test_scene_text(ctx, xml, IMP_RGB);
     test_must(ctx, imp_problem_create(s, &p));
     test_must(ctx, imp_problem_activate(p, "*"));
-    n = imp_problem_n(p);
+    n = imp_problem_n_variables(p);
     run.spp = spp;
     heap.peak = heap.live;
     const size_t before = heap.live;

@@ -237,8 +237,8 @@ static void fits(void)
     double least = INFINITY;
     for (int k = 0; k < CELLS; k++) least = fmin(least, x[k]);
     tap_ok(least >= 0, "and is nowhere negative");
-    struct imp_fit_variable v;
-    test_must(ctx, imp_problem_fit_variable(p, 3, &v));
+    struct imp_fit_variable v = IMP_FIT_VARIABLE_INIT;
+    test_must(ctx, imp_problem_get_fit_variable(p, 3, &v));
     tap_near(v.start, .5, 1e-6, 0, "its start is that of the fit, not of a level");
 
     o.levels = 2;

@@ -82,7 +82,7 @@ static void gradient(int threads, float all, float one, double *g, double *se)
     test_must(ctx, imp_problem_activate(p, "*data*"));
     test_must(ctx, imp_problem_add_target(p, &t));
     test_must(ctx, imp_problem_objective(p, NULL, &run, NULL, g, se));
-    if (imp_problem_n(p) != N) exit(99);
+    if (imp_problem_n_variables(p) != N) exit(99);
     imp_problem_destroy(p);
     imp_scene_destroy(s);
     imp_context_destroy(ctx);
@@ -125,7 +125,7 @@ static void read_twice(void)
         imp_scene_end(s);
         test_must(ctx, imp_scene_commit(s));
         imp_problem *p = test_problem(ctx, s, "*data*");
-        if (imp_problem_n(p) != (shared ? N : TWICE)) exit(99);
+        if (imp_problem_n_variables(p) != (shared ? N : TWICE)) exit(99);
         t.width = t.height = SIDE, t.channels = 3, t.pixels = target;
         run.spp = 4;
         test_must(ctx, imp_problem_add_target(p, &t));

@@ -298,7 +298,7 @@ static void empty(void)
             for (int i = 0; i < 48; i++) seed[i] = 1;
             test_must(ctx, imp_problem_reverse(p, seed, &run, g, x));
             bool finite = true;
-            for (size_t i = 0; i < imp_problem_n(p); i++)
+            for (size_t i = 0; i < imp_problem_n_variables(p); i++)
                 finite &= isfinite(g[i]) && isfinite(x[i]);
             tap_ok(finite, "%s: finite gradients", cases[k].what);
         }
@@ -409,7 +409,7 @@ static void nested(void)
         for (int i = 0; i < 48; i++) seed[i] = 1;
         test_must(ctx, imp_problem_reverse(p, seed, &run, g, NULL));
         bool finite = true;
-        for (size_t i = 0; i < imp_problem_n(p); i++) finite &= isfinite(g[i]);
+        for (size_t i = 0; i < imp_problem_n_variables(p); i++) finite &= isfinite(g[i]);
         tap_ok(finite, "%d levels of materials have a gradient", levels);
         imp_problem_destroy(p);
         imp_scene_destroy(s);

@@ -85,15 +85,21 @@ static uint64_t work(imp_context *ctx)
     options.intervals = 1;
     run.seed = 5;
     if (imp_problem_create(s, &p) != IMP_OK ||
-        imp_problem_activate(p, "*reflectance*") != IMP_OK || imp_problem_n(p) > 256 ||
+        imp_problem_activate(p, "*reflectance*") != IMP_OK ||
+        imp_problem_n_variables(p) > 256 ||
         imp_problem_add_target(p, &target) != IMP_OK ||
         imp_problem_objective(p, NULL, &run, &loss, g, se) != IMP_OK)
         goto failed;
     h = hash(h, &loss.value, sizeof loss.value);
-    h = hash(h, g, imp_problem_n(p) * sizeof *g);
-    h = hash(h, se, imp_problem_n(p) * sizeof *se);
+    h = hash(h, g, imp_problem_n_variables(p) * sizeof *g);
+    h = hash(h, se, imp_problem_n_variables(p) * sizeof *se);
     if (imp_fit(p, &options, &run, &result) != IMP_OK) goto failed;
-    h = hash(h, result->variables, result->n * sizeof *result->variables);
+    for (size_t i = 0; i < result->n; i++) { /* without the padding */
+        const struct imp_fit_variable *v = &result->variables[i];
+        const double all[] = {v->start, v->value,    v->se,        v->lo95,
+                              v->hi95,  v->at_bound, v->determined};
+        h = hash(h, all, sizeof all);
+    }
     imp_problem_destroy(p), imp_film_destroy(film), imp_scene_destroy(s);
     return h;
 failed:
@@ -405,7 +411,7 @@ static void *use(void *payload)
     run.spp = 8;
     u->fine = imp_problem_create(u->scene, &p) == IMP_OK &&
               imp_problem_activate(p, "white.reflectance.value") == IMP_OK &&
-              imp_problem_add_target(p, &t) == IMP_OK && imp_problem_n(p) == 3;
+              imp_problem_add_target(p, &t) == IMP_OK && imp_problem_n_variables(p) == 3;
     for (int i = 0; i < 20 && u->fine; i++) {
         double g[3];
         u->fine = imp_problem_objective(p, u->x, &run, &loss, g, NULL) == IMP_OK;

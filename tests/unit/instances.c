@@ -184,7 +184,7 @@ static void outputs_compare(const char *what, imp_scene *a, imp_scene *b)
         imp_problem *p = test_problem(ctx, scene[k], "*_paint.*");
         struct imp_estimate value;
         double se[16];
-        n[k] = imp_problem_n(p);
+        n[k] = imp_problem_n_variables(p);
         test_must(ctx, imp_problem_functional(p, NULL, &run, &value, g[k], se));
         imp_problem_destroy(p);
     }

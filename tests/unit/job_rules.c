@@ -83,7 +83,7 @@ static enum imp_status problem_run(imp_scene *scene, const struct imp_run *run,
     t.height = s->film.crop_h;
     t.channels = scene->channels;
     const size_t n = (size_t)t.width * (size_t)t.height * (size_t)t.channels,
-                 n_x = imp_problem_n(p);
+                 n_x = imp_problem_n_variables(p);
     pixels = calloc(n, sizeof *pixels);
     g = calloc(n_x + 1, sizeof *g);
     se = calloc(n_x + 1, sizeof *se);

@@ -45,10 +45,9 @@ static void compare(const char *text, double (*truth)(const double fog[NUMBERS])
     run.spp = spp;
     run.seed = 11;
     test_must(ctx, imp_problem_functional(p, NULL, &run, &v, g, g_se));
-    for (size_t i = 0; i < imp_problem_n(p); i++) {
-        size_t param;
+    for (size_t i = 0; i < imp_problem_n_variables(p); i++) {
         struct imp_param_info info = {.size = sizeof info};
-        test_must(ctx, imp_problem_variable(p, i, &param, NULL, NULL, NULL));
+        const size_t param = test_param_of(ctx, p, i);
         test_must(ctx, imp_scene_get_param(s, param, &info));
         const int k = strstr(info.name, "sigma")    ? SIGMA
                       : strstr(info.name, "albedo") ? ALBEDO

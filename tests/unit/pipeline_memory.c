@@ -76,7 +76,7 @@ static enum imp_status render_wide(void)
 }
 static enum imp_status objective_of(imp_problem *p)
 {
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     struct imp_estimate J = {-1, -1, -1};
     double *g = calloc(2 * n, sizeof *g);
     g[0] = -7;
@@ -107,12 +107,13 @@ static enum imp_status jacobian(void)
 {
     imp_film *films[64] = {0}, *primal = NULL;
     enum imp_status st = imp_problem_jacobian(problem, &run, &primal, films);
-    for (size_t k = 0; k < imp_problem_n(problem); k++) st = keep_nothing(st, &films[k]);
+    for (size_t k = 0; k < imp_problem_n_variables(problem); k++)
+        st = keep_nothing(st, &films[k]);
     return keep_nothing(st, &primal);
 }
 static enum imp_status gauss_newton_of(imp_problem *p)
 {
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     struct imp__gauss_newton gn = {0};
     gn.H = calloc(2 * n * n, sizeof(double));
     gn.cov_g = gn.H + n * n;

@@ -60,7 +60,7 @@ static void lengths_from(const char *integrator, const char *text, double T, dou
     run.spp = spp / 2;
     test_must(ctx, imp_problem_functional(p, NULL, &run, &v, g, g_se));
     media_near(g[0], g_se[0] + 1e-9, -la * T, .03 * T, "... its derivative by the first");
-    if (imp_problem_n(p) > 1)
+    if (imp_problem_n_variables(p) > 1)
         media_near(g[1], g_se[1] + 1e-9, -lb * T, .03 * T, "... and by the second");
     imp_problem_destroy(p);
     imp_scene_destroy(s);

@@ -37,40 +37,41 @@ static void globs(void)
 static void activation(imp_scene *s)
 {
     imp_problem *p = NULL;
-    size_t param, element;
-    double lo, hi, x[16];
-    tap_ok(imp_problem_create(s, &p) == IMP_OK && imp_problem_n(p) == 0,
+    struct imp_variable_info v = IMP_VARIABLE_INFO_INIT;
+    double x[16];
+    tap_ok(imp_problem_create(s, &p) == IMP_OK && imp_problem_n_variables(p) == 0,
            "nothing is active");
     tap_ok(imp_problem_activate(p, "sky.radiance.value") == IMP_OK &&
-               imp_problem_n(p) == 3,
+               imp_problem_n_variables(p) == 3,
            "by name");
-    tap_ok(imp_problem_activate(p, "ball.*") == IMP_OK && imp_problem_n(p) == 6,
+    tap_ok(imp_problem_activate(p, "ball.*") == IMP_OK && imp_problem_n_variables(p) == 6,
            "by glob");
     tap_ok(imp_problem_activate(p, "sky.radiance.value") == IMP_OK &&
-               imp_problem_n(p) == 6,
+               imp_problem_n_variables(p) == 6,
            "twice is once");
     imp_problem_get_x(p, x);
     struct imp_param_info info = {.size = sizeof info}, before = {.size = sizeof before};
     int ordered = 1;
     for (size_t i = 0; i < 6; i++) {
-        if (imp_problem_variable(p, i, &param, &element, &lo, &hi) != IMP_OK ||
-            imp_scene_get_param(s, param, &info) != IMP_OK)
+        if (imp_problem_get_variable(p, i, &v) != IMP_OK ||
+            imp_scene_get_param(s, v.param, &info) != IMP_OK)
             return;
-        ordered &= i == 0 || info.offset + element > before.offset;
+        ordered &= i == 0 || info.offset + v.element > before.offset;
         before = info;
-        before.offset += element;
+        before.offset += v.element;
     }
     tap_ok(ordered, "the scene's order, whatever the order of calls");
-    tap_ok(imp_problem_variable(p, 6, NULL, NULL, NULL, NULL) == IMP_E_ARG,
-           "no number 6 # %s", imp_last_error(ctx));
+    tap_ok(imp_problem_get_variable(p, 6, &v) == IMP_E_ARG, "no number 6 # %s",
+           imp_last_error(ctx));
     size_t ball;
     if (imp_scene_find_param(s, "ball.reflectance", &ball) != IMP_OK) return;
     for (size_t i = 0; i < 6; i++) {
-        if (imp_problem_variable(p, i, &param, &element, &lo, &hi) != IMP_OK) return;
-        if (param == ball)
-            tap_ok(fabs(x[i] - (0.3 + 0.2 * (double)element)) < 1e-7 && lo == 0 &&
-                       hi == 1,
-                   "value and bounds of number %zu # %g in [%g, %g]", i, x[i], lo, hi);
+        if (imp_problem_get_variable(p, i, &v) != IMP_OK) return;
+        if (v.param == ball)
+            tap_ok(fabs(x[i] - (0.3 + 0.2 * (double)v.element)) < 1e-7 && v.lo == 0 &&
+                       v.hi == 1,
+                   "value and bounds of number %zu # %g in [%g, %g]", i, x[i], v.lo,
+                   v.hi);
     }
 
     tap_ok(imp_problem_activate(p, "bal.reflectance.value") == IMP_E_ARG &&
@@ -90,11 +91,11 @@ static void activation(imp_scene *s)
         tap_ok(imp_problem_activate(p, info.name) == IMP_E_BIAS, "biased by name # %s",
                imp_last_error(ctx));
     }
-    tap_ok(imp_problem_n(p) == 6, "failures change nothing");
+    tap_ok(imp_problem_n_variables(p) == 6, "failures change nothing");
     tap_ok(imp_problem_activate(p, "*") == IMP_OK, "* takes what has a gradient");
 
     double y[16];
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     imp_problem_get_x(p, x);
     memcpy(y, x, sizeof y);
     for (size_t i = 0; i < n; i++) y[i] *= 0.5;
@@ -172,7 +173,7 @@ static void regularisers(imp_scene *s)
     imp_problem *p = NULL;
     if (imp_problem_create(s, &p) != IMP_OK || imp_problem_activate(p, "*") != IMP_OK)
         return;
-    const size_t n = imp_problem_n(p);
+    const size_t n = imp_problem_n_variables(p);
     tap_ok(imp_problem_add_tikhonov(p, "nothing*", 1, 0) == IMP_E_ARG, "no match # %s",
            imp_last_error(ctx));
     tap_ok(imp_problem_add_tikhonov(p, "*", NAN, 0) == IMP_E_ARG, "NaN # %s",
@@ -184,13 +185,15 @@ static void regularisers(imp_scene *s)
            "added");
     double x[16], g[16] = {0}, expect = 0;
     imp_problem_get_x(p, x);
-    size_t ball, k;
+    size_t ball;
     if (imp_scene_find_param(s, "ball.reflectance", &ball) != IMP_OK) return;
     for (size_t i = 0; i < n; i++) x[i] += 0.01 * (double)(i + 1);
     double error = 0;
     const double value = imp__regularise(p, x, g);
     for (size_t i = 0; i < n; i++) {
-        if (imp_problem_variable(p, i, &k, NULL, NULL, NULL) != IMP_OK) return;
+        struct imp_variable_info v = IMP_VARIABLE_INFO_INIT;
+        if (imp_problem_get_variable(p, i, &v) != IMP_OK) return;
+        const size_t k = v.param;
         const double d = k == ball ? x[i] : 0.01 * (double)(i + 1), w = k == ball ? 3 : 2;
         const char *name = s->params[k].info.name;
         if (k != ball && strncmp(name, "sky", 3) != 0) continue;

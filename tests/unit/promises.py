@@ -94,20 +94,13 @@ def initial(struct):
     if name not in defines:
         if struct._fields_[0][0] == "size": s.size = C.sizeof(s)
         return s
-    if "_SIZED(struct " in defines[name]:  # its size, and zeros
-        s.size = C.sizeof(s)
-        return s
-    values = split(re.search(r"\{(.*)\}", defines[name], re.S)[1])
-    if len(values) != len(struct._fields_):
-        raise ValueError("%s has %d values for %d fields" % (name, len(values), len(struct._fields_)))
-    for (field, t), v in zip(struct._fields_, values):
-        if v.startswith("sizeof"): v = C.sizeof(s)
-        elif v.startswith("{"):
-            if issubclass(t, C.Structure): continue
-            v = t(*[number(x) for x in split(v[1:-1])])
-        elif t is C.c_double: v = float(v) if v not in constants else constants[v]
-        else: v = number(v)
-        if not (t is C.c_void_p and v == 0): setattr(s, field, v)
+    s.size = C.sizeof(s)  # and zeros, but for what is named
+    if not re.search(r"IMP_INIT(_ZERO)?\(struct %s\b" % struct.__name__, defines[name]):
+        raise ValueError("%s: %s" % (name, defines[name]))
+    for field, at, v in re.findall(r"\.(\w+)(?:\[(\d+)\])? = ([^,)]+)", defines[name]):
+        t = dict(struct._fields_)[field]
+        if at: getattr(s, field)[int(at)] = float(v)
+        else: setattr(s, field, float(v) if t is C.c_double else number(v))
     return s
 
 class Argument:
@@ -169,7 +162,7 @@ PARAM = "floor.bsdf.reflectance.value"
 NOT_OK = {
     "imp_scene_commit": "the scene is committed",
     "imp_problem_add_smoothness": "the scene has no texture",
-    "imp_problem_fit_variable": "there was no fit",
+    "imp_problem_get_fit_variable": "there was no fit",
     "imp_scene_write_volume": "the scene has no volume",
 }
 try: C.CDLL("libOpenImageDenoise.so.2")
@@ -178,11 +171,11 @@ except OSError: NOT_OK["imp_denoise"] = NOT_OK["imp_denoiser_check"] = "there is
 NULLABLE = {"imp_report_page.length", "imp_problem_shares.walk_share", "imp_render_until.end", "imp_problem_until.end", "imp_problem_until.adjoint",
             "imp_problem_until.value", "imp_problem_until.gradient", "imp_report_data.length", "options", "run", "stats", "id", "objective", "gradient_se", "primal", "normals", "uvs",
             "axis", "hessian", "taps", "tap_bars", "tap_dots", "power", "bundle", "exit", "targets",
-            "error", "order", "param", "element", "memory",
+            "error", "order", "memory",
             "imp_optimizer_step.rule", "imp_optimizer_step.lo", "imp_optimizer_step.hi",
             "imp_context_set_team.team", "imp_context_set_parts.parts", "imp_context_set_manifest.manifest",
             "imp_scene_begin.name", "imp_scene_begin.tag", "imp_scene_ref.name", "imp_scene_load_string.name",
-            "imp_bend_load_string.name", "imp_problem_variable.lo", "imp_problem_variable.hi",
+            "imp_bend_load_string.name",
             "imp_problem_objective.x", "imp_problem_objective.gradient",
             "imp_problem_functional.adjoint", "imp_problem_functional.value",
             "imp_problem_functional.gradient", "imp_problem_jacobian_sums.adjoint",
@@ -554,9 +547,6 @@ class Call:
         self.status = getattr(lib, self.name)(*self.values)
         said = self.fx.said()
         self.said = said if said != marker else ""
-        if self.result == "void" and self.name.startswith("imp_scene_") and self.arguments[0].text == "imp_scene *scene" \
-                and "destroy" not in self.name and "get" not in self.name and self.values[0]:
-            self.status = E_ARG if self.said else OK  # kept until the commit
         return self.status
 
     def refuses(self, *names):

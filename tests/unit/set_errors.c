@@ -168,7 +168,7 @@ static void plan(const imp_problem *p, int spp, enum imp_points points, int R, i
     int taken;
     run.spp = spp;
     run.points = points;
-    test_must(p->ctx, imp_problem_spp(p, 0, &run, &taken));
+    test_must(p->ctx, imp_problem_get_spp(p, 0, &run, &taken));
     run.points = points == IMP_POINTS_SCENE ? IMP_POINTS_SOBOL : points;
     const struct imp__replicates r = imp__replicates_loss(p, &p->targets[0], &run);
     tap_ok(taken == r.n * r.R && r.R == R && r.lone == (R == 1) && r.n / r.m == q,

@@ -26,9 +26,9 @@ enum imp_status imp__bendfile_number(struct imp__bendfile *l, struct imp_node *n
  * with yoshida4 and a quarter of the step. */
 static enum imp_status truth_trace(struct imp__bendfile *l, struct imp_bend_exit **out)
 {
-    struct imp_bend_rays r;
+    struct imp_bend_rays r = IMP_BEND_RAYS_INIT;
     struct imp_bend_options o = l->options;
-    imp_bend_get_rays(l->bend, &r);
+    IMP_CHECKED(imp_bend_get_rays(l->bend, &r));
     o.surfaces = l->surfaces, o.n_surfaces = l->n_surfaces;
     o.taps = l->taps, o.n_taps = 0;
     o.scheme = IMP_BEND_YOSHIDA4;

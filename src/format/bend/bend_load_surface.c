@@ -109,6 +109,7 @@ enum imp_status imp__bendfile_surface(struct imp__bendfile *l, struct imp_node *
             IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
                                     "taps are planes, at most 16"));
         struct imp_bend_tap *t = &l->taps[l->n_taps++];
+        *t = (struct imp_bend_tap)IMP_BEND_TAP_INIT;
         memcpy(t->normal, s.normal, sizeof t->normal);
         t->offset = s.offset;
         t->group = group;

@@ -23,6 +23,7 @@ enum imp_status imp__check_row(struct imp__check *c, const char *method,
     char *copy = imp__arena_strdup(&c->problem->check_arena, name);
     if (!grown || !copy) return imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check");
     c->rows[c->n_rows] = *row;
+    c->rows[c->n_rows].size = sizeof *row;
     c->rows[c->n_rows].method = method;
     c->rows[c->n_rows++].param = copy;
     return IMP_OK;

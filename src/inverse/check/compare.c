@@ -159,7 +159,8 @@ static enum imp_status xyz_make(imp_context *ctx, const imp_film *from, const ch
     return IMP_OK;
 }
 
-enum imp_status imp_compare(imp_context *ctx, imp_film *test, imp_film *reference,
+enum imp_status imp_compare(imp_context *ctx, const imp_film *test,
+                            const imp_film *reference,
                             const struct imp_compare_options *options,
                             struct imp_compare_result *result)
 {

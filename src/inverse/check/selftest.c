@@ -20,7 +20,9 @@ enum imp_status imp__selftest_row(struct imp__selftest *t,
     t->rows = rows;
     struct imp_selftest_row *r = &rows[t->n_rows++];
     *r = *row;
-    if (r->ok >= 0) r->ok = r->error <= r->limit;
+    r->size = sizeof *r;
+    if (r->ok != IMP_VERDICT_OPEN)
+        r->ok = r->error <= r->limit ? IMP_VERDICT_RIGHT : IMP_VERDICT_WRONG;
     return IMP_OK;
 }
 

@@ -259,15 +259,19 @@ static enum imp_status result_make(const struct imp__design *d, const double *st
     if (!r || !v || !g || !history)
         return imp__error(d->goal.ctx, IMP_E_NOMEM, "no memory for the result of a fit");
     for (size_t i = 0; i < d->n; i++)
-        v[i] = (struct imp_fit_variable){.start = start[i],
+        v[i] = (struct imp_fit_variable){.size = sizeof *v,
+                                         .start = start[i],
                                          .value = x[i],
                                          .lo95 = NAN,
                                          .hi95 = NAN,
                                          .at_bound = imp__at_bound(&d->goal, x, i),
                                          .determined = 1};
     for (size_t k = 0; k < d->goals; k++)
-        g[k] = (struct imp_elements_goal){d->t[k], isnan(before[k]) ? d->J[k] : before[k],
-                                          d->J[k]}; /* no step yet */
+        g[k] = (struct imp_elements_goal){
+            .size = sizeof *g,
+            .target = d->t[k],
+            .before = isnan(before[k]) ? d->J[k] : before[k], /* no step yet */
+            .after = d->J[k]};
     if (n_history) memcpy(history, s->history, n_history * sizeof *history);
     *r = (struct imp_elements_fit_result){.size = sizeof *r,
                                           .iterations = iterations,

@@ -165,8 +165,8 @@ enum imp_status imp__replicates_kept(const struct imp_tracer *tracer,
     return IMP_OK;
 }
 
-enum imp_status imp_problem_spp(const imp_problem *p, int target,
-                                const struct imp_run *run, int *spp)
+enum imp_status imp_problem_get_spp(const imp_problem *p, int target,
+                                    const struct imp_run *run, int *spp)
 {
     struct imp_run own;
     IMP_REQUIRE(NULL, p, "problem");

@@ -13,9 +13,10 @@
 #include "walk/run/run.h"
 #include <string.h>
 
-#define SURVIVAL 0.8
-#define ESS      0.5
-#define MEMORY   0x1p30
+#define SURVIVAL    0.8
+#define ESS         0.5
+#define MEMORY      ((size_t)1 << 30)
+#define BUDGET_MOST ((size_t)1 << 62)
 
 /* ---- Their numbers --------------------------------------------------------------- */
 
@@ -264,7 +265,7 @@ out:
 }
 
 static enum imp_status sensors_keep(struct imp_walks *w, const uint8_t *sensors,
-                                    double memory)
+                                    size_t memory)
 {
     enum imp_status st = IMP_OK;
     struct imp_active active = {0};
@@ -273,9 +274,10 @@ static enum imp_status sensors_keep(struct imp_walks *w, const uint8_t *sensors,
     for (int k = 0; k < w->scene->n_sensors; k++) left += sensors[k] != 0;
     for (int k = 0; k < w->scene->n_sensors; k++) {
         if (!sensors[k]) continue;
-        IMP_TRY(sensor_keep(w, &active, k, (size_t)fmin(memory, 0x1p62), left--));
+        IMP_TRY(sensor_keep(w, &active, k, imp_min(memory, BUDGET_MOST), left--));
         const struct imp_store *s = &w->stores[w->n_stores - 1];
-        memory -= (double)s->bytes + (double)s->reduced_bytes;
+        const size_t taken = s->bytes + s->reduced_bytes;
+        memory -= imp_min(memory, taken);
     }
 out:
     imp__active_destroy(w->ctx, &active);
@@ -329,13 +331,11 @@ enum imp_status imp_walks_keep(imp_scene *scene, const struct imp_run *run,
     enum imp_status st = IMP_OK;
     const struct imp_sensor *sensor;
     uint8_t *sensors = NULL;
-    if (!(o.memory >= 0) || !(o.survival <= 1) || isinf(o.survival) ||
-        !(o.ess >= 0 && o.ess <= 1) || isinf(o.memory) ||
+    if (!(o.survival <= 1) || isinf(o.survival) || !(o.ess >= 0 && o.ess <= 1) ||
         !(o.headroom >= 0 && o.headroom <= IMP_HEADROOM_MOST))
         return imp__error(ctx, IMP_E_ARG,
-                          "options: memory %g, survival %g, ess %g or headroom %g is out "
-                          "of range",
-                          o.memory, o.survival, o.ess, o.headroom);
+                          "options: survival %g, ess %g or headroom %g is out of range",
+                          o.survival, o.ess, o.headroom);
     if (own.walks || own.time_limit_s > 0)
         return imp__error(ctx, IMP_E_ARG,
                           "recorded walks are traced, run->spp in each pixel");

@@ -92,8 +92,6 @@ static enum imp_status options_check(const struct imp_problem *p,
     if ((unsigned)o->allocation > IMP_ALLOCATION_VARIANCE)
         return imp__error(ctx, IMP_E_ARG, "allocation %d does not exist",
                           (int)o->allocation);
-    if (!isfinite(o->memory))
-        return imp__error(ctx, IMP_E_ARG, "options: memory %g", o->memory);
     IMP_CHECKED(imp__fit_levels_allowed(p, o));
     IMP_CHECKED(imp__fit_clipped_allowed(p, o));
     if (o->resume && !o->checkpoint)

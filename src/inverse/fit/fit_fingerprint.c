@@ -32,7 +32,7 @@ static uint64_t options_hash(const struct imp__fit *f)
                              f->options.tolerance,
                              f->options.momentum,
                              f->run.spp > 0 ? f->run.spp : sensor->spp,
-                             keeps ? f->options.memory : 0,
+                             keeps ? (double)f->options.memory : 0,
                              keeps && f->options.headroom > 1 ? f->options.headroom : 0};
     int how[] = {VERSION,
                  (int)f->outer.from,

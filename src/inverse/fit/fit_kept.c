@@ -18,12 +18,12 @@
 #define ROOM           1.7 /* to which the second moment of a step may grow under the floor */
 #define PILOT          2         /* samples of a pixel by which it is found, */
 #define PILOT_SHARE    (1. / 16) /* of all at most */
-#define MEMORY         0x1p30
+#define MEMORY         ((size_t)1 << 30)
 
 bool imp__fit_keeps(const struct imp__fit *f)
 {
     const enum imp_optimizer o = f->options.optimizer;
-    return (o == IMP_LBFGS || o == IMP_MMA || o == IMP_SLSQP) && f->options.memory >= 0;
+    return (o == IMP_LBFGS || o == IMP_MMA || o == IMP_SLSQP) && !f->options.no_recording;
 }
 
 /* No walks are kept from here on; the last error is the reason that is reported. */

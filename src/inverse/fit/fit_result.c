@@ -116,7 +116,8 @@ static struct imp_fit_variable variable_of(const struct imp__fit_answer *a, size
     const double x = a->search->x[i];
     const double start =
         b->start ? b->start[i - b->first] : imp__search_start(a->search, i);
-    struct imp_fit_variable v = {.start = b->log ? exp(start) : start,
+    struct imp_fit_variable v = {.size = sizeof v,
+                                 .start = b->log ? exp(start) : start,
                                  .value = b->log ? exp(x) : x,
                                  .se = NAN,
                                  .lo95 = NAN,
@@ -130,18 +131,20 @@ static struct imp_fit_variable variable_of(const struct imp__fit_answer *a, size
     return v;
 }
 
-enum imp_status imp_problem_fit_variable(const imp_problem *p, size_t i,
-                                         struct imp_fit_variable *variable)
+enum imp_status imp_problem_get_fit_variable(const imp_problem *p, size_t i,
+                                             struct imp_fit_variable *variable)
 {
     IMP_REQUIRE(NULL, p, "problem");
     IMP_REQUIRE(p->ctx, variable, "variable");
+    IMP_SIZED(p->ctx, variable, "variable");
     const struct imp__fit_answer *a = &p->fit_answer;
     if (i >= a->n)
         return imp__error(p->ctx, IMP_E_ARG,
                           a->n ? "there is no number i = %zu in the last fit (it has %zu)"
                                : "number i = %zu: there is no fit yet",
                           i, a->n);
-    *variable = a->rows ? a->rows[i] : variable_of(a, i);
+    const struct imp_fit_variable all = a->rows ? a->rows[i] : variable_of(a, i);
+    IMP_GIVE(p->ctx, variable, all, "variable");
     return IMP_OK;
 }
 

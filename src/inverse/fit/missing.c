@@ -267,6 +267,7 @@ static bool row_make(const struct missing *m, const double *v, size_t j,
     if (!(step / free > 0)) return false;
     const double part = step / free * (2 - step / free); /* of the drop, at a bound */
     *row = (struct imp_missing){
+        .size = sizeof *row,
         .param = b->param,
         .element = j - b->first,
         .factor = imp__block_factor(m->p, b),

@@ -157,32 +157,36 @@ out:
     return st;
 }
 
-size_t imp_problem_n(const imp_problem *p) { return p ? p->n : 0; }
+size_t imp_problem_n_variables(const imp_problem *p) { return p ? p->n : 0; }
 
-enum imp_status imp_problem_variable(const imp_problem *p, size_t i, size_t *param,
-                                     size_t *element, double *lo, double *hi)
+enum imp_status imp_problem_get_variable(const imp_problem *p, size_t i,
+                                         struct imp_variable_info *info)
 {
     IMP_REQUIRE(NULL, p, "problem");
+    IMP_REQUIRE(p->ctx, info, "info");
     if (i >= p->n)
         return imp__error(p->ctx, IMP_E_ARG,
                           "there is no active number %zu (there are %zu)", i, p->n);
     const struct imp__block *b = imp__problem_block(p, i);
-    if (param) *param = b->param;
-    if (element) *element = i - b->first;
-    if (lo) *lo = b->lo;
-    if (hi) *hi = b->hi;
+    const struct imp_variable_info all = {.size = sizeof all,
+                                          .param = b->param,
+                                          .element = i - b->first,
+                                          .lo = b->lo,
+                                          .hi = b->hi};
+    IMP_GIVE(p->ctx, info, all, "info");
     return IMP_OK;
 }
 
-void imp_problem_get_x(const imp_problem *p, double *x)
+enum imp_status imp_problem_get_x(const imp_problem *p, double *x)
 {
-    IMP_REQUIRE_OR(NULL, p, "problem", );
-    IMP_REQUIRE_OR(p->ctx, x, "x", );
+    IMP_REQUIRE(NULL, p, "problem");
+    IMP_REQUIRE(p->ctx, x, "x");
     IMP_READS(p->scene);
     for (size_t k = 0; k < p->n_blocks; k++) {
         const struct imp__block *b = &p->blocks[k];
         for (size_t e = 0; e < b->count; e++) x[b->first + e] = imp__block_get(p, b, e);
     }
+    return IMP_OK;
 }
 
 enum imp_status imp_problem_set_x(imp_problem *p, const double *x)

@@ -90,7 +90,7 @@ enum imp__loss_use {
     IMP_LOSS_COMPARED /* with those of the same walks in Gauss-Newton matrices, or kept */
 };
 
-/* The last fit, as imp_problem_fit_variable returns it (fit_result.c). */
+/* The last fit, as imp_problem_get_fit_variable returns it (fit_result.c). */
 struct imp__fit_block { /* numbers of one parameter */
     size_t first;
     double lo, hi; /* of x */

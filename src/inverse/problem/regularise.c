@@ -69,9 +69,9 @@ out:
 }
 
 enum imp_status imp_problem_add_tikhonov(imp_problem *p, const char *glob, double weight,
-                                         int from_here)
+                                         bool from_here)
 {
-    return add(p, glob, weight, IMP_TIKHONOV, from_here != 0);
+    return add(p, glob, weight, IMP_TIKHONOV, from_here);
 }
 
 enum imp_status imp_problem_add_smoothness(imp_problem *p, const char *glob,

@@ -167,24 +167,24 @@ out:
 }
 
 enum imp_status imp_problem_get_tie(const imp_problem *p, size_t i,
-                                    struct imp_tie_info *out)
+                                    struct imp_tie_info *info)
 {
     IMP_REQUIRE(NULL, p, "problem");
-    IMP_REQUIRE(p->ctx, out, "out");
+    IMP_REQUIRE(p->ctx, info, "info");
     if (i >= p->n)
         return imp__error(p->ctx, IMP_E_ARG,
                           "there is no active number %zu (there are %zu)", i, p->n);
     const struct imp__block *b = imp__problem_block(p, i);
     const struct imp__param_tie *tie = imp__block_tie(p, b);
-    const struct imp_tie_info info = {
-        .size = sizeof info,
+    const struct imp_tie_info all = {
+        .size = sizeof all,
         .name = imp__block_name(p, b),
         .factor = imp__block_factor(p, b),
         .log = b->log,
         .count = b->count,
         .n_members = tie ? tie->n_members : 1,
         .members = tie ? tie->members : &p->scene->params[b->param].info.name};
-    IMP_GIVE(p->ctx, out, info, "out");
+    IMP_GIVE(p->ctx, info, all, "info");
     return IMP_OK;
 }
 

@@ -430,8 +430,9 @@ static void compare(imp_scene *scene, const char *what, double value, size_t n_a
     for (int i = 0; i < 3 * N; i++) seed[i] = i % 3 == 0 ? 1.0f / N : 0;
     if (st == IMP_OK) st = imp_problem_create(scene, &p);
     for (size_t k = 0; k < n && st == IMP_OK; k++) st = imp_problem_activate(p, name[k]);
-    snprintf(text, sizeof text, "%s: %zu numbers are active", what, imp_problem_n(p));
-    ok(st == IMP_OK && imp_problem_n(p) == n_active, text);
+    snprintf(text, sizeof text, "%s: %zu numbers are active", what,
+             imp_problem_n_variables(p));
+    ok(st == IMP_OK && imp_problem_n_variables(p) == n_active, text);
     if (st == IMP_OK) st = imp_problem_reverse(p, seed, &run, g, se);
     for (size_t k = 0; k < n; k++) {
         snprintf(text, sizeof text, "%s: derivative by %s %.5f (se %.1e), %.5f", what,

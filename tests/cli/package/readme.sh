@@ -17,11 +17,3 @@ if ! nm -D "$BUILD/lib/libimporton.so" | grep -qE '__(asan|tsan|ubsan)'; then # 
     LD_LIBRARY_PATH=$BUILD/lib ./program >answer || exit 9
     grep -qE '^loss [-0-9.e]+ \+- [0-9.e-]+, gradient [-0-9.e]+ [-0-9.e]+ [-0-9.e]+$' answer || cat answer
 fi
-# The C in libimporton.3 compiles.
-{
-    printf '#include <importon/importon.h>\nint main(void)\n{\n'
-    sed -n '/^\.Ss A picture/,/^\.Ed/p' "$ROOT/man/libimporton.3" | grep -v '^\.'
-    printf 'return 0;\n}\n'
-} >manual.c
-cc -std=c11 -Wall -Wno-unused-variable -Wno-unused-result -Wno-unused-but-set-variable -Werror \
-    -I"$ROOT/include" -fsyntax-only manual.c || exit 9
