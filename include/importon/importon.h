@@ -237,7 +237,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_context_set_manifest(imp_context *con
 IMP_API IMP_MUST_CHECK enum imp_status imp_manifest_result(imp_manifest *manifest,
                                                            const char *name,
                                                            const void *bytes, size_t n);
-/** A file that was written. @return IMP_OK; IMP_E_ARG; IMP_E_IO; IMP_E_NOMEM. */
+/** A file that was written; written again, its last bytes count. Read again by the same run, it is
+ * no input. @return IMP_OK; IMP_E_ARG; IMP_E_IO; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_manifest_output(imp_manifest *manifest,
                                                            const char *path);
 /** Whole or not at all. @return IMP_OK; IMP_E_ARG; IMP_E_IO; IMP_E_NOMEM. */
