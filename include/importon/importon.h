@@ -1109,11 +1109,19 @@ struct imp_fit_result {
  * @return IMP_OK; IMP_CANCELLED (the state reached is set, the checkpoint is written);
  *         IMP_E_ARG if nothing is active, there is no target, an option is out of its
  *         range or the checkpoint is another fit's; IMP_E_NUMERIC; and what
- *         imp_problem_objective returns. */
+ *         imp_problem_objective returns; IMP_E_IO where another fit that runs writes the
+ *         checkpoint. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_fit(imp_problem *problem,
                                                const struct imp_fit_options *options,
                                                const struct imp_run *run,
                                                const struct imp_fit_result **result);
+/** May a fit begin to keep its state in this file? A fit, of bent rays too, holds PATH.lock while it
+ * runs, so that a checkpoint has one writer; the lock ends with its process. Between machines it
+ * counts where their common file system has locks (NFS without nolock has).
+ * @return IMP_OK; IMP_E_ARG; IMP_E_IO: a fit that runs writes it (the message has its process);
+ *         IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_checkpoint_free(imp_context *context,
+                                                           const char *path);
 
 /** Number i < n of the problem's last fit, whatever n.
  * @return IMP_E_ARG also if there was no fit. */
