@@ -170,7 +170,7 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_parts_create(imp_context *context, in
                                                         imp_parts **out);
 /** Read files of parts, paths [n], each of one part or of several. They may be of
  * different cuts, such as 1/2, 3/4 and 4/4.
- * @return IMP_OK; IMP_E_IO; IMP_E_SCENE for what is damaged or of another version;
+ * @return IMP_OK; IMP_E_IO, also for what is damaged; IMP_E_SCENE for another version;
  *         IMP_E_ARG for parts that overlap, or do not belong together; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_parts_read(imp_context *context, const char *const *paths, size_t n, imp_parts **out);
@@ -221,7 +221,7 @@ IMP_API enum imp_status imp_manifest_set_limit(imp_manifest *manifest, size_t by
  * @param fraction of the chunks that the calls after imp_context_set_manifest compute
  *        again, 0 < fraction <= 1; 1 where the manifest has no sums.
  * @param seed which they are.
- * @return IMP_OK; IMP_E_ARG; IMP_E_IO; IMP_E_SCENE if it is damaged or of another
+ * @return IMP_OK; IMP_E_ARG; IMP_E_IO, also if it is damaged; IMP_E_SCENE if it is of another
  *         version; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_manifest_read(imp_context *context,
                                                          const char *path,

@@ -90,3 +90,4 @@ cp scene.xml $'e\033[31m/s.xml'
 importon render $'e\033[31m/s.xml' -D res=4 --spp 1 -q -o esc.exr --no-preview
 echo x >$'e\033[31m/s.xml'
 importon verify esc.exr.manifest 2>&1
+echo "exit $?"
