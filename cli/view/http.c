@@ -54,7 +54,7 @@ static struct {
     uint64_t number;
     struct stream *streams;
     int closing;
-    /* Of the server's thread alone: the oldest first. */
+    /* The oldest first; used by the server's thread alone. */
     struct guest *guests;
     int n_guests;
 } s = {.lock = PTHREAD_MUTEX_INITIALIZER};
