@@ -4,7 +4,7 @@
 cp "$ROOT/scenes/furnace.xml" scene.xml
 importon render scene.xml -D res=8 --spp 8 --seed 3 -q -o target.exr --no-preview
 fit() { importon fit scene.xml -D res=8 -T target.exr -p 'ball.*' --spp 8 -q "$@" >out 2>err; echo "exit $?"; sed 's/process [0-9]* on [^)]*/process N on HOST/' err >&2; }
-importon fit scene.xml -D res=8 -T target.exr -p 'ball.*' --spp 64 -n 1000000 --checkpoint state -q >first 2>&1 &
+importon fit scene.xml -D res=8 -T target.exr -p 'ball.*' --spp 4096 -n 1000000 --checkpoint state -q >first 2>&1 &
 first=$!
 for ((k = 0; k < 600; k++)); do [[ -s state && -s state.lock ]] && break; sleep 0.1; done
 fit -n 1 --checkpoint state
