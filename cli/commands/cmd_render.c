@@ -306,7 +306,6 @@ static int run_render(int n, char **operand)
         picture_stamp(film, &run);
         rc = picture_write(film, path, &o.picture);
         if (!rc) rc = noisy;
-        if (!rc) rc = manifest_output(path);
         if (!rc && o.sampling && !progress_interrupted())
             rc = sampling_check(&run, &sampling);
         if (!rc) report(path, film, &run, &sampling, &end);

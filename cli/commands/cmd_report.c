@@ -16,12 +16,15 @@
 
 #define JSON_MAX ((size_t)1 << 28) /* bytes of one answer */
 
-static const char *title, *scene_file;
+static const char *title, *scene_file, *truth_file;
 static struct arg_list walks;
 
 static const struct arg_option options[] = {
     {ARG_TEXT, 0, "title", "TEXT", "title of the page (default: the folder's name)",
      &title, 0, 0, NULL},
+    {ARG_TEXT, 0, "truth", "FILE",
+     "draw what is true beside what a fit found: NAME=V[,V..] a line", &truth_file, 0, 0,
+     NULL},
     {ARG_TEXT, 0, "scene", "SCENE", "show random walks of this scene", &scene_file, 0, 0,
      NULL},
     {ARG_LIST, 0, "walks", "N|X,Y",
@@ -256,6 +259,45 @@ static int collect(struct collection *c, const char *folder)
     return rc;
 }
 
+/* ---- Truth ------------------------------------------------------------------------ */
+
+/* Lines NAME=V[,V..], as --set takes them, as an object: of one value NAME, of more NAME[0], .. */
+static int add_truth(struct collection *c)
+{
+    size_t length, room;
+    char *text = file_text(truth_file, &length), *out = NULL, *save = NULL, name[256];
+    if (!text) return EXIT_RUN;
+    keep(c, text);
+    FILE *f = open_memstream(&out, &room);
+    if (!f) exit(cli_error(EXIT_RUN, "out of memory"));
+    struct json j = {f, 0};
+    int rc = 0;
+    json_object(&j, NULL);
+    for (char *line = strtok_r(text, "\r\n", &save); line && !rc;
+         line = strtok_r(NULL, "\r\n", &save)) {
+        if (*line == '#') continue;
+        char *at = strchr(line, '='), *end = at;
+        const int many = at && strchr(at, ',') != NULL;
+        if (at) *at = 0;
+        for (int k = 0; end && (!k || *end == ',') && !rc; k++) {
+            char *const from = end + 1;
+            const double value = strtod(from, &end);
+            if (end == from) end = NULL;
+            snprintf(name, sizeof name, many ? "%s[%d]" : "%s", line, k);
+            if (end) json_number(&j, name, value);
+        }
+        if (!end || *end || at == line)
+            rc = cli_error(EXIT_USAGE, "%s: '%.60s': expected NAME=NUMBER[,NUMBER..]",
+                           truth_file, line);
+    }
+    json_end_object(&j);
+    fclose(f);
+    struct imp_report_item *item = add(c, "truth");
+    item->json = keep(c, out);
+    item->name = truth_file;
+    return rc;
+}
+
 /* ---- Walks ------------------------------------------------------------------------ */
 
 /* --walks: a grid's side, or pixels; 0, or an exit code with the reason printed. */
@@ -323,6 +365,7 @@ static int run_report(int n, char **operand)
     char *automatic = cli.out ? NULL : join_path(operand[0], "report.html");
     const char *path = cli.out ? cli.out : automatic;
     rc = collect(&all, operand[0]);
+    if (!rc && truth_file) rc = add_truth(&all);
     if (!rc && scene_file) rc = add_walks(&all);
     if (!rc && strcmp(path, "-")) rc = overwrite_check(path, OUTPUT_PAGE);
     if (!rc) {

@@ -41,7 +41,9 @@ static int verdict(const char *path, const struct imp_manifest_info *info, int r
         json_seed(&j, "seed", o.seed);
         cli_json_end(&j);
     } else if (why) {
-        printf("%s: refuted: %s\n", path, why);
+        char *text = cli_plain(why); /* it names files of the manifest's */
+        printf("%s: refuted: %s\n", path, text);
+        free(text);
     } else if (o.fraction < 1) {
         printf("%s: verified: %d input file%s, %d output file%s, %llu of %llu sum%s "
                "computed "

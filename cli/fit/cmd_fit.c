@@ -108,7 +108,6 @@ static int run_fit(int n, char **operand)
         rc = fit_pictures_write("recovered", o.picture_spp);
         if (!rc && o.sheet) rc = fit_sheet_write(o.sheet);
     }
-    if (!rc && cli.out) rc = fit_answer_manifest();
     free(blocks);
     problem_close(problem);
     const char *ended;

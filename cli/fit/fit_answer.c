@@ -8,7 +8,6 @@
 #include "shared/output.h"
 #include "shared/picture_files.h"
 #include "shared/plot.h"
-#include "shared/proof.h"
 
 #include <importon/clip.h>
 #include <math.h>
@@ -240,17 +239,6 @@ int fit_answer_writable(const struct block *blocks, size_t n_blocks)
     if (!rc) rc = fit_pictures_writable();
     for (size_t k = 0; k < n_blocks && !rc; k++)
         if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], cli.out, 0);
-    return rc;
-}
-
-int fit_answer_manifest(void)
-{
-    int rc = 0;
-    for (size_t k = 0; k < sizeof outputs / sizeof *outputs && !rc; k++) {
-        char *path = join_path(cli.out, outputs[k].name);
-        rc = manifest_output(path);
-        free(path);
-    }
     return rc;
 }
 

@@ -24,8 +24,6 @@ int fit_answer_give(const struct fit_answer *a);
 int fit_answer_write(const struct fit_answer *a);
 /* May that, and the pictures of a fit, be written? */
 int fit_answer_writable(const struct block *blocks, size_t n_blocks);
-/* Name these files in the manifest. */
-int fit_answer_manifest(void);
 /* The members of its JSON. paths [n_blocks]: files of large blocks; NULL: none. */
 void fit_answer_json(struct json *j, const struct fit_answer *a, char **paths);
 

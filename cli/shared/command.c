@@ -21,14 +21,28 @@ struct cli cli;
 
 /* ---- Talking ------------------------------------------------------------------- */
 
-/* Messages quote files and arguments, which may hold what moves a terminal's cursor. */
+/* Messages quote files and arguments, which may hold what moves a terminal's cursor: control
+ * characters, in UTF-8 those of C1 too. */
+static void plain(char *text)
+{
+    for (unsigned char *p = (unsigned char *)text; *p; p++)
+        if ((*p < 32 && *p != '\n' && *p != '\t') || *p == 127) *p = '?';
+        else if (*p == 0xc2 && p[1] >= 0x80 && p[1] < 0xa0) p[0] = p[1] = '?';
+}
+
+char *cli_plain(const char *text)
+{
+    char *copy = cli_strdup(text);
+    plain(copy);
+    return copy;
+}
+
 static void print(bool error, const char *format, va_list args)
 {
     char *text = NULL;
     progress_clear();
     if (vasprintf(&text, format, args) < 0) return;
-    for (char *p = text; *p; p++)
-        if (((unsigned char)*p < 32 && *p != '\n' && *p != '\t') || *p == 127) *p = '?';
+    plain(text);
     if (ranks_first()) fprintf(stderr, "%s%s\n", error ? "importon: " : "", text);
     if (error) ranks_remember(true, text);
     free(text);

@@ -138,6 +138,8 @@ double cli_now(void);
 void *cli_alloc(size_t n, size_t size);
 /* strdup, the same. */
 char *cli_strdup(const char *text);
+/* A copy without control characters, for a terminal. */
+char *cli_plain(const char *text);
 
 /* "name" of a parameter, or "name[element]" when it has several values. */
 const char *cli_number_name(const struct imp_param_info *info, size_t element, char *text,

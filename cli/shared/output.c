@@ -5,6 +5,7 @@
 #include "output.h"
 
 #include "command.h"
+#include "proof.h"
 
 #include <errno.h>
 #include <limits.h>
@@ -72,6 +73,7 @@ int output_close(struct output *o, int rc)
     if (fclose(o->file) != 0 && !code) code = errno;
     if (o->target && !code && !rc && rename(o->temporary, o->target) != 0) code = errno;
     if (o->target && (code || rc)) unlink(o->temporary);
+    else if (o->target) manifest_wrote(o->path);
     free(o->target);
     free(o->temporary);
     o->file = NULL;

@@ -184,7 +184,11 @@ int overwrite_check_in(const char *folder, const char *name, enum output_kind ki
 int checkpoint_writable(const char *path, bool resume)
 {
     struct stat info;
-    const int rc = path ? overwrite_check(path, OUTPUT_CHECKPOINT) : 0;
+    int rc = path ? overwrite_check(path, OUTPUT_CHECKPOINT) : 0;
+    if (!rc && path && !cli.verifies) { /* of all ranks */
+        const enum imp_status st = imp_checkpoint_free(cli.context, path);
+        if (st != IMP_OK) rc = cli_fail(st, NULL);
+    }
     if (rc || !path || resume || cli.overwrite || !ranks_first()) return rc;
     if (stat(path, &info) != 0 || !S_ISREG(info.st_mode) || info.st_size == 0) return 0;
     return cli_error(EXIT_USAGE,

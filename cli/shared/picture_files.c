@@ -7,6 +7,7 @@
 #include "command.h"
 #include "display.h"
 #include "overwrite.h"
+#include "proof.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -181,7 +182,9 @@ int picture_write(const imp_film *film, const char *path, const struct picture_o
 
     enum imp_status st = imp_film_write(film, path, &options);
     char *preview = o->no_preview ? NULL : preview_path(path);
+    if (st == IMP_OK) manifest_wrote(path);
     if (st == IMP_OK && preview) st = imp_film_write(film, preview, &options);
+    if (st == IMP_OK && preview) manifest_wrote(preview);
     free(preview);
     return st == IMP_OK ? 0 : cli_fail(st, NULL);
 }

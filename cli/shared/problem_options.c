@@ -7,6 +7,7 @@
 #include "overwrite.h"
 #include "photograph.h"
 #include "picture_files.h"
+#include "proof.h"
 
 #include <importon/clip.h>
 #include <math.h>
@@ -347,8 +348,10 @@ static int volume_write(const struct block *b, const double *x, const double *se
     char *errors = se ? block_path(b, folder, ".se") : NULL;
     *path = block_path(b, folder, "");
     if (st == IMP_OK) st = imp_scene_write_volume(cli.scene, param, x + b->first, *path);
+    if (st == IMP_OK) manifest_wrote(*path);
     if (st == IMP_OK && se)
         st = imp_scene_write_volume(cli.scene, param, se + b->first, errors);
+    if (st == IMP_OK && se) manifest_wrote(errors);
     free(errors);
     return st == IMP_OK ? 0 : cli_fail(st, *path);
 }

@@ -147,10 +147,16 @@ int manifest_film(const char *name, const imp_film *film)
     return status(st);
 }
 
-int manifest_output(const char *path)
+void manifest_wrote(const char *path)
 {
-    if (!cli.manifest || !cli_writes() || !strcmp(path, "-")) return 0;
-    return status(imp_manifest_output(cli.manifest, path));
+    struct stat info;
+    if (!cli.manifest || !cli_writes() || stat(path, &info) != 0 ||
+        !S_ISREG(info.st_mode))
+        return;
+    const enum imp_status st = imp_manifest_output(cli.manifest, path);
+    if (st != IMP_OK)
+        cli_say("importon: warning: not in the manifest: %s",
+                imp_last_error(cli.context));
 }
 
 int manifest_end(int rc)
@@ -159,13 +165,11 @@ int manifest_end(int rc)
     if (!cli.manifest || cli.verifies || rc != EXIT_DONE || progress_interrupted() ||
         !(beside || cli.manifest_path))
         goto out;
-    /* The answer of a command that prints. */
-    if (!strcmp(cli.name, "gradient") && cli.out) rc = manifest_output(cli.out);
-    if (!rc) st = imp_manifest_write(cli.manifest, beside ? beside : cli.manifest_path);
+    st = imp_manifest_write(cli.manifest, beside ? beside : cli.manifest_path);
     /* The result is there; without a manifest that was wanted, the run has failed. */
     if (st != IMP_OK && beside)
         cli_say("importon: warning: no manifest: %s", imp_last_error(cli.context));
-    else rc = rc ? rc : status(st);
+    else rc = status(st);
 out:
     free(beside);
     beside = NULL;

@@ -18,8 +18,8 @@ int manifest_whole(void);
 /* Results, by name; nothing where there is no manifest. 0, or an exit code. */
 int manifest_numbers(const char *name, const double *x, size_t n);
 int manifest_film(const char *name, const imp_film *film);
-/* A file that was written. */
-int manifest_output(const char *path);
+/* A file was written; written again, its last bytes count. */
+void manifest_wrote(const char *path);
 /* Write it, if the run was not refused. The exit code. */
 int manifest_end(int rc);
 

@@ -5,6 +5,7 @@
 
 #include "command.h"
 #include "picture_files.h"
+#include "proof.h"
 #include "ranks.h"
 
 #include <math.h>
@@ -103,6 +104,7 @@ int sheet_write(const struct sheet *s, size_t columns, const char *path)
     if (!rc) {
         const enum imp_status st = imp_film_write(sheet, path, &options);
         if (st != IMP_OK) rc = cli_fail(st, NULL);
+        else manifest_wrote(path);
     }
     imp_film_destroy(sheet);
     return rc;

@@ -18,7 +18,9 @@
 
 static struct http_server mhd; /* since http_start */
 
-enum { TOKEN_BYTES = 16, CONNECTIONS = 32 };
+/* Connections in all; of them without a request with the token, whose oldest goes when another
+ * comes; seconds without a byte after which one is closed (not that of a page that listens). */
+enum { TOKEN_BYTES = 16, CONNECTIONS = 64, GUESTS = 32, IDLE_S = 10 };
 
 /* The last news of a channel. */
 struct news {
@@ -37,6 +39,12 @@ struct stream {
     int waits; /* its connection is suspended */
 };
 
+/* A connection; in the list of guests until a request with the token came by it. */
+struct guest {
+    int fd, listed;
+    struct guest *next;
+};
+
 static struct {
     struct MHD_Daemon *daemon;
     struct http_service service;
@@ -46,6 +54,9 @@ static struct {
     uint64_t number;
     struct stream *streams;
     int closing;
+    /* The oldest first; used by the server's thread alone. */
+    struct guest *guests;
+    int n_guests;
 } s = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
 /* ---- Access ------------------------------------------------------------------------ */
@@ -79,6 +90,59 @@ static const char *allowed(struct MHD_Connection *c, const char *path, unsigned 
     *status = MHD_HTTP_NOT_FOUND;
     if (path[0] != '/' || !is_token(path + 1)) return NULL;
     return path + 1 + 2 * TOKEN_BYTES;
+}
+
+/* ---- Guests ------------------------------------------------------------------------- */
+
+/* Whoever can connect to this machine's loopback could hold all connections and send nothing: the
+ * page would not be answered. So guests are few, and the oldest leaves for the next. */
+static void guest_unlist(struct guest *g)
+{
+    struct guest **at = &s.guests;
+    if (!g->listed) return;
+    while (*at != g) at = &(*at)->next;
+    *at = g->next;
+    g->listed = 0;
+    s.n_guests--;
+}
+
+static void guest_list(struct guest *g)
+{
+    struct guest **at = &s.guests;
+    while (*at) at = &(*at)->next;
+    *at = g;
+    g->listed = 1;
+    if (++s.n_guests <= GUESTS) return;
+    struct guest *oldest = s.guests;
+    guest_unlist(oldest);
+    shutdown(oldest->fd, SHUT_RDWR); /* the server sees its end, and closes it */
+}
+
+static void on_connection(void *payload, struct MHD_Connection *c, void **context,
+                          enum MHD_ConnectionNotificationCode what)
+{
+    (void)payload;
+    if (what == MHD_CONNECTION_NOTIFY_STARTED) {
+        const union MHD_ConnectionInfo *info =
+            mhd.get_connection_info(c, MHD_CONNECTION_INFO_CONNECTION_FD);
+        struct guest *g = info ? calloc(1, sizeof *g) : NULL;
+        *context = g;
+        if (!g) return;
+        g->fd = info->connect_fd;
+        guest_list(g);
+    } else if (*context) {
+        guest_unlist(*context);
+        free(*context);
+        *context = NULL;
+    }
+}
+
+/* A request with the token came by this connection. */
+static void guest_known(struct MHD_Connection *c)
+{
+    const union MHD_ConnectionInfo *info =
+        mhd.get_connection_info(c, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
+    if (info && info->socket_context) guest_unlist(info->socket_context);
 }
 
 /* ---- Answers ------------------------------------------------------------------------ */
@@ -232,6 +296,7 @@ static enum MHD_Result handle(void *payload, struct MHD_Connection *c, const cha
                            status == MHD_HTTP_FORBIDDEN
                                ? "This address is for the page of importon alone.\n"
                                : "There is nothing here.\n");
+    guest_known(c);
     const int gets = !strcmp(method, "GET"), posts = !strcmp(method, "POST");
     if (!strcmp(rest, "/") && gets)
         return answer(c, MHD_HTTP_OK,
@@ -280,7 +345,8 @@ int http_open(const struct http_service *service, int port)
     s.daemon = mhd.start_daemon(
         MHD_USE_INTERNAL_POLLING_THREAD | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL, handle,
         NULL, MHD_OPTION_SOCK_ADDR, &at, MHD_OPTION_CONNECTION_LIMIT,
-        (unsigned)CONNECTIONS, MHD_OPTION_END);
+        (unsigned)CONNECTIONS, MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)IDLE_S,
+        MHD_OPTION_NOTIFY_CONNECTION, on_connection, NULL, MHD_OPTION_END);
     if (!s.daemon)
         return cli_error(EXIT_RUN, "127.0.0.1:%d cannot be listened on: %s", port,
                          errno ? strerror(errno) : "the server does not start");

@@ -18,6 +18,7 @@
     X(resume_connection)                                                                 \
     X(start_daemon)                                                                      \
     X(get_daemon_info)                                                                   \
+    X(get_connection_info)                                                               \
     X(stop_daemon)
 
 struct http_server {

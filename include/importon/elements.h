@@ -290,8 +290,8 @@ imp_elements_guide(const imp_elements *elements,
                    const struct imp_elements_guide_options *options, imp_guide **out);
 
 /** Write elements and links to a file; open it again with the same scene and options.
- * @return of opening also IMP_E_SCENE if the file is damaged (it has a checksum) or of
- * another scene, IMP_E_UNSUPPORTED if another version of importon wrote it. */
+ * @return of opening also IMP_E_IO if the file is damaged (it has a checksum), IMP_E_SCENE if it is
+ * of another scene, IMP_E_UNSUPPORTED if another version of importon wrote it. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_elements_save(const imp_elements *elements,
                                                          const char *path);
 /** Read what imp_elements_save wrote.

@@ -244,7 +244,7 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_parts_create(imp_context *context, in
                                                         imp_parts **out);
 /** Read files of parts, paths [n], each of one part or of several. They may be of
  * different cuts, such as 1/2, 3/4 and 4/4.
- * @return IMP_OK; IMP_E_IO; IMP_E_SCENE for what is damaged or of another version;
+ * @return IMP_OK; IMP_E_IO, also for what is damaged; IMP_E_SCENE for another version;
  *         IMP_E_ARG for parts that overlap, or do not belong together; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_parts_read(imp_context *context, const char *const *paths, size_t n, imp_parts **out);
@@ -296,7 +296,7 @@ IMP_API enum imp_status imp_manifest_set_limit(imp_manifest *manifest, size_t by
  * @param fraction of the chunks that the calls after imp_context_set_manifest compute
  *        again, 0 < fraction <= 1; 1 where the manifest has no sums.
  * @param seed which they are.
- * @return IMP_OK; IMP_E_ARG; IMP_E_IO; IMP_E_SCENE if it is damaged or of another
+ * @return IMP_OK; IMP_E_ARG; IMP_E_IO, also if it is damaged; IMP_E_SCENE if it is of another
  *         version; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_manifest_read(imp_context *context,
                                                          const char *path,
@@ -313,7 +313,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_context_set_manifest(imp_context *con
 IMP_API IMP_MUST_CHECK enum imp_status imp_manifest_result(imp_manifest *manifest,
                                                            const char *name,
                                                            const void *bytes, size_t n);
-/** A file that was written. @return IMP_OK; IMP_E_ARG; IMP_E_IO; IMP_E_NOMEM. */
+/** A file that was written; written again, its last bytes count. Read again by the same run, it is
+ * no input. @return IMP_OK; IMP_E_ARG; IMP_E_IO; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_manifest_output(imp_manifest *manifest,
                                                            const char *path);
 /** Whole or not at all. @return IMP_OK; IMP_E_ARG; IMP_E_IO; IMP_E_NOMEM. */
@@ -1247,11 +1248,19 @@ struct imp_fit_result {
  * @return IMP_OK; IMP_CANCELLED (the state reached is set, the checkpoint is written);
  *         IMP_E_ARG if nothing is active, there is no target, an option is out of its
  *         range or the checkpoint is another fit's; IMP_E_NUMERIC; and what
- *         imp_problem_objective returns. */
+ *         imp_problem_objective returns; IMP_E_IO where another fit that runs writes the
+ *         checkpoint. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_fit(imp_problem *problem,
                                                const struct imp_fit_options *options,
                                                const struct imp_run *run,
                                                const struct imp_fit_result **result);
+/** May a fit begin to keep its state in this file? A fit, of bent rays too, holds PATH.lock while it
+ * runs, so that a checkpoint has one writer; the lock ends with its process. Between machines it
+ * counts where their common file system has locks (NFS without nolock has).
+ * @return IMP_OK; IMP_E_ARG; IMP_E_IO: a fit that runs writes it (the message has its process);
+ *         IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_checkpoint_free(imp_context *context,
+                                                           const char *path);
 
 /** Variable i < n of the problem's last fit, whatever n.
  * @return IMP_E_ARG also if there was no fit. */

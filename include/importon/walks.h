@@ -100,8 +100,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_walks_write(const imp_walks *walks,
  * @param[out] out the caller destroys it. The parameters are those of the draw if the
  *                scene is the file's.
  * @return IMP_OK; IMP_E_ARG: walks of another scene, and what differs; IMP_E_SCENE: the
- *         file is damaged, or of another version, byte order or build; IMP_E_IO;
- *         IMP_E_NOMEM: they need more than options->memory. */
+ *         file is of another version, byte order or build; IMP_E_IO, also if it is
+ *         damaged; IMP_E_NOMEM: they need more than options->memory. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_walks_read(imp_context *context, imp_scene *scene, const char *path,
                const struct imp_walks_options *options, imp_walks **out);

@@ -165,7 +165,7 @@ def merge(function: Callable[..., Any], parts: Sequence[Any], *arguments: Any, *
     ArgumentError
         Parts are missing (the message says which), overlap, or do not belong together: of
         another function, scene, target, number of samples, version or kind of processor.
-    SceneError
+    FileError
         A part is damaged.
 
     Examples

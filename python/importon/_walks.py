@@ -150,8 +150,9 @@ def read_walks(path: Any, scene: Optional[Scene] = None, *, memory: float = 0, e
     Raises
     ------
     FileError
+        The file is missing or damaged.
     SceneError
-        The file is damaged, or of another version, byte order or build.
+        It is of another version, byte order or build.
     ArgumentError
         They are walks of another scene; the message says what differs.
     OutOfMemoryError

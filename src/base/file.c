@@ -7,16 +7,24 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
+#include <poll.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/vfs.h>
 #include <time.h>
 #include <unistd.h>
 
 /* Most bytes read from a pipe, which has no size and may never end. */
-#define ENDLESS_MAX ((size_t)1 << 30)
+#define ENDLESS_MAX ((size_t)1 << 28)
+
+/* A pipe with a name into which nobody writes, and any in which nothing comes, is given up. */
+#define WRITER_S 10
+#define SILENT_S 60
+
+#define PIPES 0x50495045 /* statfs: pipes without a name, whose writer was there before */
 
 static enum imp_status io_error(imp_context *ctx, const char *path, const char *what,
                                 int code)
@@ -47,15 +55,77 @@ void imp__bytes_free(imp_context *ctx, struct imp_bytes *b)
     *b = (struct imp_bytes){0};
 }
 
+enum imp_status imp__unpacks(imp_context *ctx, const char *name, double packed,
+                             double unpacked, double always)
+{
+    if (unpacked <= always || unpacked <= IMP_UNPACKS_TO * packed) return IMP_OK;
+    return imp__error(ctx, IMP_E_SCENE,
+                      "%s: %.0f bytes would become %.0f, more than %d times as many: "
+                      "refused",
+                      name, packed, unpacked, IMP_UNPACKS_TO);
+}
+
+/* Pipes are opened without waiting for a writer, and waited for with an end. */
+static enum imp_status pipe_wait(imp_context *ctx, const char *path, int fd, int seconds,
+                                 bool *came)
+{
+    struct pollfd p = {.fd = fd, .events = POLLIN};
+    int n;
+    do n = poll(&p, 1, 1000 * seconds);
+    while (n < 0 && errno == EINTR);
+    *came = n > 0;
+    return n < 0 ? io_error(ctx, path, "cannot read", errno) : IMP_OK;
+}
+
+/* As read(), of a pipe: waits for a writer, and for its bytes. `begun`: there was a writer. */
+static enum imp_status pipe_read(imp_context *ctx, const char *path, int fd, void *to,
+                                 size_t room, bool *begun, ssize_t *n)
+{
+    for (int waited = 0;;) {
+        bool came;
+        *n = read(fd, to, room);
+        if (*n < 0 && errno == EINTR) continue;
+        const bool silent = *n < 0 && errno == EAGAIN; /* there is a writer */
+        *begun |= *n > 0 || silent;
+        if (!silent && (*n != 0 || *begun)) return IMP_OK;
+        const int limit = silent ? SILENT_S : WRITER_S;
+        if (waited >= limit)
+            return imp__error(ctx, IMP_E_IO,
+                              "%s: nothing came through this pipe for %d s", path, limit);
+        const enum imp_status st = pipe_wait(ctx, path, fd, limit - waited, &came);
+        if (st != IMP_OK) return st;
+        if (came) *begun = true;
+        else waited = limit;
+    }
+}
+
+/* More than this machine has, or holes: what no disk holds is not read into memory. */
+static enum imp_status size_check(imp_context *ctx, const char *path, int fd,
+                                  const struct stat *info)
+{
+    const double size = (double)info->st_size,
+                 memory = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
+    if (memory > 0 && size > memory)
+        return imp__error(ctx, IMP_E_NOMEM,
+                          "%s: %.0f bytes, and this machine has %.0f of memory", path,
+                          size, memory);
+    double held = 512.0 * (double)info->st_blocks;
+    if (held == 0 && lseek(fd, 0, SEEK_DATA) == 0)
+        held = size; /* blocks are not counted here */
+    return imp__unpacks(ctx, path, held, size, 0x1p30);
+}
+
 enum imp_status imp__file_read_own(imp_context *ctx, const char *path, size_t limit,
                                    struct imp_bytes *out)
 {
     enum imp_status st = IMP_OK;
     struct imp_bytes b = {0};
-    const int fd = open(path, O_RDONLY | O_CLOEXEC);
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (fd < 0) return io_error(ctx, path, "cannot open", errno);
 
     struct stat info;
+    struct statfs where;
+    bool begun = fstatfs(fd, &where) == 0 && where.f_type == PIPES;
     if (fstat(fd, &info) != 0) IMP_TRY(io_error(ctx, path, "cannot read", errno));
     if (S_ISDIR(info.st_mode)) IMP_TRY(io_error(ctx, path, "cannot read", EISDIR));
     size_t room = 1 << 16; /* pipes say 0 */
@@ -63,6 +133,7 @@ enum imp_status imp__file_read_own(imp_context *ctx, const char *path, size_t li
     else {
         if ((uint64_t)info.st_size > limit)
             IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: longer than %zu bytes", path, limit));
+        IMP_TRY(size_check(ctx, path, fd, &info));
         room = (size_t)info.st_size +
                2; /* one to see the end of the file, one for the zero */
     }
@@ -78,9 +149,17 @@ enum imp_status imp__file_read_own(imp_context *ctx, const char *path, size_t li
                     imp__error(ctx, IMP_E_NOMEM, "%s: no memory for its contents", path));
             b.data = grown;
         }
-        const ssize_t n =
-            read(fd, b.data + b.size, imp_min(b.capacity - b.size - 1, (size_t)1 << 30));
+        ssize_t n;
+        void *const to = b.data + b.size;
+        const size_t most = imp_min(b.capacity - b.size - 1, (size_t)1 << 30);
+        if (!S_ISFIFO(info.st_mode)) n = read(fd, to, most);
+        else IMP_TRY(pipe_read(ctx, path, fd, to, most, &begun, &n));
         if (n < 0 && errno == EINTR) continue;
+        if (n < 0 &&
+            errno == EAGAIN) { /* a terminal, whose first line is refused below */
+            (void)fcntl(fd, F_SETFL, 0);
+            continue;
+        }
         if (n < 0) IMP_TRY(io_error(ctx, path, "cannot read", errno));
         if (n == 0) break;
         if (S_ISCHR(info.st_mode) || S_ISBLK(info.st_mode))
@@ -140,8 +219,14 @@ enum imp_status imp__file_open(imp_context *ctx, const char *path, struct imp_by
         if (st != IMP_OK) return st;
         *out = fmemopen(held->data, held->size, "rb");
     } else {
-        *out = fopen(path, "rbe");
-        if (!*out && errno == ENOENT) return IMP_OK;
+        const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+        if (fd < 0 && errno == ENOENT) return IMP_OK;
+        struct stat info;
+        if (fd >= 0 && fstat(fd, &info) == 0 && !S_ISREG(info.st_mode)) {
+            close(fd);
+            return imp__error(ctx, IMP_E_IO, "%s: this is no regular file", path);
+        }
+        *out = fd >= 0 ? fdopen(fd, "rb") : NULL;
     }
     if (*out) return IMP_OK;
     imp__bytes_free(ctx, held);

@@ -12,8 +12,16 @@ struct imp_bytes { /* growing memory; all zero is empty */
     size_t size, capacity;
 };
 
+/* What a small file may become: `unpacked` bytes in memory, of `packed` in the file, are refused
+ * where they are more than `always` and than IMP_UNPACKS_TO times as many. @return IMP_E_SCENE with
+ * both numbers. */
+#define IMP_UNPACKS_TO 100
+enum imp_status imp__unpacks(imp_context *ctx, const char *name, double packed,
+                             double unpacked, double always);
+
 /* Read all of it, with a zero byte behind the end. @return IMP_E_IO if it cannot be read,
- * is a folder or a device with anything in it, or is longer than `limit`; IMP_E_NOMEM. */
+ * is a folder or a device with anything in it, is longer than `limit`, or is a pipe in which nothing
+ * comes for long; IMP_E_SCENE if it is all holes; IMP_E_NOMEM. */
 enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
                                struct imp_bytes *out);
 /* As imp__file_read, by this process for itself, of a file that is no input of a run. */

@@ -5,6 +5,7 @@
  * may carry the optimiser's memory: steps s become P s and gradients g become P g / 8,
  * because eight fine coefficients share the gradient of a coarse one. Adam's rate is
  * halved. */
+#include "base/lock.h"
 #include "bend_fingerprint.h"
 #include "lbfgs.h"
 #include <math.h>
@@ -322,6 +323,8 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     if (f.levels > 1 && !imp__field_nodes(b->field, &number))
         return imp__error(b->ctx, IMP_E_ARG, "levels are for grids, not for a %s field",
                           b->field->ops->name);
+    struct imp_file_lock lock;
+    IMP_CHECKED(imp__file_lock(b->ctx, o->checkpoint, &lock));
     b->n_history = 0;
     b->options.progress = NULL; /* a fit is cancelled between iterations only */
     IMP_TRY(level_begin(&f));
@@ -373,6 +376,7 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     st = ended;
 out:
     b->options.progress = progress;
+    imp__file_unlock(b->ctx, &lock);
     last_free(&f);
     level_free(&f);
     return st;

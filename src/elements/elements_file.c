@@ -133,13 +133,13 @@ enum imp_status imp_elements_open(const imp_scene *scene,
                            "again",
                            path));
     if (in.size < sizeof h)
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: is cut short or damaged", path));
+        IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: is cut short or damaged", path));
     memcpy(&h, in.data, sizeof h);
     if (h.order_mark != 0x01020304 || h.link_bytes != sizeof *e->links)
         IMP_TRY(
             imp__error(ctx, IMP_E_UNSUPPORTED, "%s: from another kind of machine", path));
     if (h.checksum != checksum_of(in.data, in.size))
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE,
+        IMP_TRY(imp__error(ctx, IMP_E_IO,
                            "%s: is cut short or damaged: its checksum is wrong", path));
     if (h.order != (uint32_t)e->basis.order || h.channels != (uint32_t)e->ch ||
         h.polygons != e->n_roots || h.geometry != geometry_of(e))
@@ -152,7 +152,7 @@ enum imp_status imp_elements_open(const imp_scene *scene,
         h.coefficients > limit * EL_N_MAX * 3 ||
         in.size != sizeof h + h.splits * sizeof(uint32_t) +
                        4 * h.coefficients * sizeof(double) + h.links * sizeof *e->links)
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: is cut short or damaged", path));
+        IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: is cut short or damaged", path));
 
     const unsigned char *at = in.data + sizeof h;
     for (uint64_t k = 0; k < h.splits; k++, at += sizeof(uint32_t)) {
@@ -167,7 +167,7 @@ enum imp_status imp_elements_open(const imp_scene *scene,
         IMP_TRY(imp__el_split(e, &parent, 1));
     }
     if (h.coefficients != (size_t)e->ch * e->n_coef)
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: is cut short or damaged", path));
+        IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: is cut short or damaged", path));
     double *const all[] = {e->l, e->g, e->c, e->b};
     for (size_t k = 0; k < imp_count(all); k++, at += h.coefficients * sizeof(double))
         memcpy(all[k], at, h.coefficients * sizeof(double));

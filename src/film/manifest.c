@@ -50,8 +50,9 @@ static bool item_note(imp_manifest *m, enum imp__item_kind kind, const char *nam
     const uint64_t hash = imp__hash_array(0, bytes, n);
     struct imp__item *i = item_find(m, kind, name);
     if (m->making) {
-        /* Read again, a file must still be the same. */
-        if (!i) m->no_memory |= !imp__manifest_add(m, kind, name, n, hash);
+        /* Read again, a file must still be the same; written again, its last bytes count. */
+        if (i && kind == IMP_ITEM_OUTPUT) i->hash = hash, i->size = n;
+        else if (!i) m->no_memory |= !imp__manifest_add(m, kind, name, n, hash);
         else if (i->hash != hash || i->size != n)
             refute(m, what[kind], name, "changed while it was read");
         return true;
@@ -67,12 +68,13 @@ static bool item_note(imp_manifest *m, enum imp__item_kind kind, const char *nam
     return false;
 }
 
-/* Files that a manifest does not list, or lists with other bytes, are not read
- * further. */
+/* Files that a manifest does not list, or lists with other bytes, are not read further.
+ * What a run reads of its own results (a sheet of its pictures) is no input. */
 static enum imp_status on_read(void *payload, const char *path, const void *bytes,
                                size_t n)
 {
     imp_manifest *m = payload;
+    if (m->making && item_find(m, IMP_ITEM_OUTPUT, path)) return IMP_OK;
     if (item_note(m, IMP_ITEM_INPUT, path, bytes, n)) return IMP_OK;
     return imp__error(m->ctx, IMP_E_IO, "%s", m->refuted);
 }

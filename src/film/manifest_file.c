@@ -88,14 +88,14 @@ enum imp_status imp__manifest_take(imp_manifest *m, const char *path)
                           "%08x, version %u",
                           path, head.byte_order, head.version, MANIFEST_ORDER, VERSION);
     if (sum != imp__hash(0, file->data, r.end))
-        return imp__error(m->ctx, IMP_E_SCENE, "%s: damaged: its checksum differs", path);
+        return imp__error(m->ctx, IMP_E_IO, "%s: damaged: its checksum differs", path);
     head.machine[sizeof head.machine - 1] = 0;
     if (strcmp(head.machine, m->machine))
         return imp__error(m->ctx, IMP_E_ARG,
                           "%s: made on \"%s\", this is \"%s\": bits cannot be compared",
                           path, head.machine, m->machine);
     const enum imp_status st = contents_read(m, &r, &head);
-    return st == IMP_E_SCENE ? imp__error(m->ctx, st, "%s: damaged", path) : st;
+    return st == IMP_E_SCENE ? imp__error(m->ctx, IMP_E_IO, "%s: damaged", path) : st;
 }
 
 bool imp__manifest_bytes(const imp_manifest *m, struct imp_bytes *out)

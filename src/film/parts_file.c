@@ -62,10 +62,10 @@ enum imp_status imp__parts_file_read(struct imp_parts *p, const char *path, size
             "version %u",
             path, head.byte_order, head.version, PARTS_ORDER, VERSION);
     if (sum != imp__hash(0, file->data, r.end))
-        return imp__error(p->ctx, IMP_E_SCENE, "%s: damaged: its checksum differs", path);
+        return imp__error(p->ctx, IMP_E_IO, "%s: damaged: its checksum differs", path);
     head.machine[sizeof head.machine - 1] = 0;
     if (head.command_bytes > r.end - r.at)
-        return imp__error(p->ctx, IMP_E_SCENE, "%s: damaged", path);
+        return imp__error(p->ctx, IMP_E_IO, "%s: damaged", path);
     const char *command = (const char *)file->data + r.at;
     const size_t bytes = (size_t)head.command_bytes;
     if (!p->command) {
@@ -87,7 +87,7 @@ enum imp_status imp__parts_file_read(struct imp_parts *p, const char *path, size
         st = source_read(p, &r, k);
     if (st == IMP_E_NOMEM) return st;
     if (st != IMP_OK || r.at != r.end || head.n_sources == 0)
-        return imp__error(p->ctx, IMP_E_SCENE, "%s: damaged", path);
+        return imp__error(p->ctx, IMP_E_IO, "%s: damaged", path);
     return IMP_OK;
 }
 

@@ -123,6 +123,8 @@ static enum imp_status header_read(struct exr_reader *r, size_t bytes)
         IMP_TRY(imp__error(ctx, IMP_E_SCENE,
                            "%s: cut off: %lld x %lld pixels in %zu bytes", r->io->name,
                            (long long)w, (long long)h, bytes));
+    IMP_TRY(imp__unpacks(ctx, r->io->name, (double)bytes, 4.0 * (double)w * (double)h * n,
+                         IMP_IMAGE_ALWAYS));
     r->width = (int)w;
     r->height = (int)h;
 out:

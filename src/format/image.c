@@ -19,8 +19,13 @@ enum imp_status imp__image_film(imp_context *ctx, const char *name, uint64_t wid
         return imp__error(ctx, IMP_E_SCENE,
                           "%s: cut off: %llu x %llu pixels in %zu bytes", name,
                           (unsigned long long)width, (unsigned long long)height, bytes);
-    const enum imp_status st =
-        imp__film_create(ctx, (int)width, (int)height, names, false, out);
+    double channels = 1;
+    for (const char *c = names; *c; c++) channels += *c == ',';
+    enum imp_status st =
+        imp__unpacks(ctx, name, (double)bytes,
+                     4 * channels * (double)width * (double)height, IMP_IMAGE_ALWAYS);
+    if (st != IMP_OK) return st;
+    st = imp__film_create(ctx, (int)width, (int)height, names, false, out);
     return st == IMP_OK
                ? st
                : imp__error_prefix(ctx, st == IMP_E_ARG ? IMP_E_SCENE : st, "%s", name);

@@ -9,6 +9,7 @@
 #include "base/film.h"
 
 #define IMP_IMAGE_BYTES_MAX ((size_t)1 << 36)
+#define IMP_IMAGE_ALWAYS    0x1p30 /* bytes in memory that a file of any size may become */
 
 /* *srgb: an 8- or 16-bit file, values in [0,1] and still encoded. Messages begin with
  * `name`. @return IMP_E_SCENE for what is not a valid picture. */

@@ -11,6 +11,8 @@
 #define MAGIC 0x041c
 /* More than a deflate stream can grow: bounds counts by the size of the file. */
 #define GROWS 1040.0
+/* Bytes that a stream of any size may become: with its tree a mesh takes some times as many. */
+#define MESH_ALWAYS 0x1p28
 
 enum { NORMALS = 1, UVS = 2, COLORS = 8, DOUBLES = 0x2000, SINGLES = 0x1000 };
 
@@ -168,6 +170,10 @@ static enum imp_status counts_read(struct serialized *s, int version, uint64_t *
                            "%s: %llu vertices and %llu triangles in %zu bytes",
                            s->source->name, (unsigned long long)*n_vertices,
                            (unsigned long long)*n_triangles, s->packed));
+    const double floats = 3 + (*flags & NORMALS ? 3 : 0) + (*flags & UVS ? 2 : 0);
+    IMP_TRY(imp__unpacks(s->ctx, s->source->name, (double)s->packed,
+                         4 * floats * (double)*n_vertices + 12 * (double)*n_triangles,
+                         MESH_ALWAYS));
     if (*flags & SINGLES && *flags & DOUBLES)
         IMP_TRY(imp__error(s->ctx, IMP_E_SCENE, "%s: numbers are single and double",
                            s->source->name));

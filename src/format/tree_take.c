@@ -274,13 +274,13 @@ enum imp_status imp__tree_take(imp_context *ctx, const char *name,
     t->at = bytes;
     t->end = bytes + n;
     if (!take(t, how, sizeof how) || how[0] > IMP_SINGLE || how[1] > 1)
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: damaged (its scene)", name));
+        IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: damaged (its scene)", name));
     o.mode = (enum imp_color_mode)how[0];
     o.upsampling = how[1] ? IMP_UPSAMPLING_LINEAR : IMP_UPSAMPLING_SIGMOID;
     IMP_TRY(imp_scene_create(ctx, &o, &t->scene));
     t->scene->rayless = true;
     if (!take_calls(t))
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: damaged (its scene)", name));
+        IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: damaged (its scene)", name));
     st = imp_scene_commit(t->scene);
     if (st != IMP_OK) IMP_TRY(imp__error_prefix(ctx, st, "%s: its scene", name));
     *out = t->scene;

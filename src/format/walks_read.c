@@ -38,7 +38,7 @@ struct reading {
 
 static enum imp_status damaged(const struct reading *r, const char *what)
 {
-    return imp__error(r->from.ctx, IMP_E_SCENE, "%s: damaged file of kept walks (%s)",
+    return imp__error(r->from.ctx, IMP_E_IO, "%s: damaged file of kept walks (%s)",
                       r->from.path, what);
 }
 

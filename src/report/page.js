@@ -24,7 +24,7 @@ function all_layers(items) {
 
 /* Sections in their order: the kinds of items that each is made of, and the elements that
  * it makes. A section whose items change is made again, and the others stay. */
-const known_kinds = ["picture", "explained", "derivative", "fit", "check", "walks", "rays", "bend", "elements", "mesh", "image"];
+const known_kinds = ["picture", "explained", "derivative", "fit", "check", "walks", "rays", "bend", "elements", "mesh", "image", "truth"];
 const listed_kinds = ["bend", "elements"]; /* they have sections, and the answer is a table besides */
 const sections = [
     {kinds: ["fit", "elements", "explained"], make: (report, of, page) => [make("header", {}, make("h1", {}, report.title || "importon report"), ...explained_lines(of("explained"), of("picture"), (r, view) => { if (page.pictures) page.pictures.show(view, "residual", Math.floor(r.x + r.width / 2), Math.floor(r.y + r.height / 2)); }),
@@ -57,6 +57,13 @@ const sections = [
     {kinds: null, make: (report) => [provenance_section(report.command, report, report.items)]},
 ];
 
+/* Numbers of fits get their truth, where it is known, by name. */
+function truths_set(items) {
+    for (const truth of items.filter((i) => i && i.kind === "truth" && i.data))
+        for (const fit of items.filter((i) => i && i.kind === "fit" && i.data && Array.isArray(i.data.params)))
+            for (const p of fit.data.params) if (p.truth === undefined && Object.hasOwn(truth.data, String(p.name))) p.truth = truth.data[String(p.name)];
+}
+
 function page_of(report) {
     const page = {live: null, places: sections.map(() => make("div"))}, main = document.getElementById("page");
     const empty = make("p", {class: "warning"}, "This report holds nothing: no picture, no fit, no check.");
@@ -77,6 +84,7 @@ function page_of(report) {
         empty.hidden = report.items.length > 0 || Boolean(report.live);
     };
     if (!Array.isArray(report.items)) report.items = [];
+    truths_set(report.items);
     document.title = report.title || "importon report";
     main.replaceChildren(page.places[0]);
     if (report.live) main.append(live_section(report, page));
@@ -86,7 +94,7 @@ function page_of(report) {
 }
 
 async function begin() {
-    document.getElementById("wait").textContent = "Reading the pictures.";
+    document.getElementById("wait").textContent = "The pictures are being read.";
     try {
         const report = JSON.parse(document.getElementById("data").textContent);
         if (report.schema !== "importon-report" || report.version !== 2) throw new Error(`the data is of schema ${report.schema}, version ${report.version}; this page shows importon-report, version 2`);

@@ -8,26 +8,39 @@ const rows_shown = 200; /* a table of a million rows helps nobody: the rest is s
 
 /* ---- Parameters ----------------------------------------------------------------------- */
 
+/* Marks on an axis from lo to hi at height y: the interval, the start, what is true, the value. */
+function axis_marks(svg, p, y, at, inside) {
+    svg.append(make_svg("line", {x1: 6, y1: y, x2: 214, y2: y, class: "axis"}));
+    if (is_number(p.lo95) && is_number(p.hi95))
+        svg.append(make_svg("rect", {x: at(p.lo95), y: y - 5, width: Math.max(at(p.hi95) - at(p.lo95), 1.5), height: 10, class: "band"}));
+    if (is_number(p.start) && inside(p.start)) svg.append(make_svg("line", {x1: at(p.start), y1: y - 7, x2: at(p.start), y2: y + 7, class: "mark"}));
+    if (is_number(p.truth) && inside(p.truth)) svg.append(make_svg("path", {d: `M${at(p.truth)} ${y - 6}l4 6l-4 6l-4 -6Z`, class: "true"}));
+    if (is_number(p.value)) svg.append(make_svg("circle", {cx: at(p.value), cy: y, r: 3.5, fill: "var(--accent)"}));
+}
+
 /* Start, value and interval on one axis; the bounds of the parameter are its ends where
- * they are near. */
+ * they are near. An interval far narrower than the way from the start has a second axis, below. */
 function interval_bar(p) {
-    const svg = make_svg("svg", {width: 220, height: 20, viewBox: "0 0 220 20", role: "img", "aria-label": "interval"});
-    const known = [p.start, p.value, p.lo95, p.hi95].filter(is_number);
-    if (known.length < 2) return svg;
+    const known = [p.start, p.value, p.lo95, p.hi95, p.truth].filter(is_number), all = () => true;
     let lo = Math.min(...known), hi = Math.max(...known);
+    const width = p.hi95 - p.lo95, close = known.length > 1 && is_number(p.lo95) && is_number(p.hi95) && width > 0 && width < 0.05 * (hi - lo), height = close ? 48 : 20;
+    const svg = make_svg("svg", {width: 220, height, viewBox: `0 0 220 ${height}`, role: "img", "aria-label": close ? "interval, and again on an axis of its own" : "interval"});
+    if (known.length < 2) return svg;
     const margin = (hi - lo || Math.abs(hi) || 1) * 0.1;
     [lo, hi] = [lo - margin, hi + margin];
     if (is_number(p.min)) lo = Math.max(lo, p.min);
     if (is_number(p.max)) hi = Math.min(hi, p.max);
     if (!(hi > lo)) return svg;
-    const at = (v) => 6 + 208 * Math.min(Math.max((v - lo) / (hi - lo), 0), 1);
+    const scale = (lo, hi) => (v) => 6 + 208 * Math.min(Math.max((v - lo) / (hi - lo), 0), 1), at = scale(lo, hi);
     const then = make_svg("circle", {cx: 0, cy: 10, r: 5, class: "then", visibility: "hidden"});
     svg.at_iteration = (v) => { then.setAttribute("visibility", is_number(v) ? "visible" : "hidden"); if (is_number(v)) then.setAttribute("cx", at(v)); };
-    svg.append(make_svg("line", {x1: 6, y1: 10, x2: 214, y2: 10, class: "axis"}));
-    if (is_number(p.lo95) && is_number(p.hi95))
-        svg.append(make_svg("rect", {x: at(p.lo95), y: 5, width: Math.max(at(p.hi95) - at(p.lo95), 1.5), height: 10, class: "band"}));
-    if (is_number(p.start)) svg.append(make_svg("line", {x1: at(p.start), y1: 3, x2: at(p.start), y2: 17, class: "mark"}));
-    if (is_number(p.value)) svg.append(make_svg("circle", {cx: at(p.value), cy: 10, r: 3.5, fill: "var(--accent)"}));
+    if (close) {
+        const near = is_number(p.truth) && p.truth > p.lo95 - 3 * width && p.truth < p.hi95 + 3 * width ? p.truth : p.value;
+        const from = Math.min(p.lo95, near) - width / 4, to = Math.max(p.hi95, near) + width / 4;
+        svg.append(make_svg("path", {d: `M${at(from)} 16L6 30M${at(to)} 16L214 30`, class: "zoom"}));
+        axis_marks(svg, p, 38, scale(from, to), (v) => v >= from && v <= to);
+    }
+    axis_marks(svg, p, 10, at, all);
     svg.append(then);
     return svg;
 }
@@ -54,6 +67,7 @@ function field_summary(p) {
 
 function parameter_section(fit) {
     const numbers = fit.params.filter((p) => p.name !== undefined && p.file === undefined);
+    const truth = numbers.some((p) => is_number(p.truth));
     const files = fit.params.filter((p) => p.file !== undefined);
     const body = make("tbody"), told = make("p", {class: "faint"});
     let rows = [];
@@ -82,7 +96,7 @@ function parameter_section(fit) {
                 make("td", {}, is_number(relative) ? percent(relative) : "–"),
                 make("td", {}, is_number(p.lo95) ? `${show(p.lo95)} to ${show(p.hi95)}` : text ? "" : "–",
                     text ? make("div", {class: `note ${colour}`}, text) : null),
-                make("td", {}, bar), make("td", {class: "unit"}, p.unit === "1" ? "" : p.unit || ""));
+                truth ? make("td", {}, show(p.truth)) : null, make("td", {}, bar), make("td", {class: "unit"}, p.unit === "1" ? "" : p.unit || ""));
         }));
         told.textContent = match.length > rows_shown ? `${rows_shown} of ${match.length} are shown; the field above finds others.` : "";
     }
@@ -95,8 +109,8 @@ function parameter_section(fit) {
         least ? make("p", {}, `Least certain, relative to its value: ${least.name}, ± ${percent(Math.abs(least.se / least.value))} (one standard error).`) : null,
         numbers.length > 12 ? make("div", {class: "bar noprint"}, find) : null,
         numbers.length ? make("div", {class: "scroll"}, make("table", {}, make("thead", {}, make("tr", {},
-            ...["name", "start", "value", "se", "relative", "95 % interval", "start (tick), value (dot), interval", "unit"].map((t, i) =>
-                (i === 2 ? heading : make("th", {class: i > 6 ? "text" : null, scope: "col"}, t))))), body)) : make("p", {}, "No single numbers were fitted."),
+            ...["name", "start", "value", "se", "relative", "95 % interval", ...(truth ? ["truth"] : []), truth ? "start (tick), value (dot), truth (diamond)" : "start (tick), value (dot), interval", "unit"].map((t, i) =>
+                (i === 2 ? heading : make("th", {class: t === "unit" ? "text" : null, scope: "col"}, t))))), body)) : make("p", {}, "No single numbers were fitted."),
         told, ...files.map(field_summary));
 }
 

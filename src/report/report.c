@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The page of a report: template, data, template. The data is JSON in a script element of
+ * The page of a report: template, answer in HTML, template, data, template. The data is JSON in a script element of
  * the page; '<' occurs only in its strings and is written as \u003c, so that no text can
  * end the element. */
 #include "base/arguments.h"
@@ -8,6 +8,7 @@
 #include "base/text.h"
 #include "explained.h"
 #include "json_text.h"
+#include "page_static.h"
 #include "page_text.h"
 #include "planes.h"
 #include <importon/report.h>
@@ -99,7 +100,7 @@ static enum imp_status put_item(struct imp_text *t, const struct imp_report_item
 typedef void (*put_fn)(void *to, const void *bytes, size_t n);
 
 struct page {
-    const struct imp_bytes *data;
+    const struct imp_bytes *data, *answer; /* in HTML */
     bool live;
 };
 
@@ -110,6 +111,8 @@ static void page_put(const struct page *p, put_fn put, void *to)
     put(to, imp__page_head, strlen(imp__page_head));
     put(to, connect, strlen(connect));
     put(to, imp__page_body, strlen(imp__page_body));
+    put(to, p->answer->data, p->answer->size);
+    put(to, imp__page_data, strlen(imp__page_data));
     while (at < end) {
         const char *bracket = memchr(at, '<', (size_t)(end - at));
         const size_t n = (size_t)((bracket ? bracket : end) - at);
@@ -220,12 +223,14 @@ enum imp_status imp_report_write(imp_context *context, const struct imp_report *
     IMP_OPTIONS(context, own, report, "report");
     if (own.n_items) IMP_REQUIRE(context, own.items, "report->items");
     IMP_FLOAT_MODE;
-    struct imp_text data = {.ctx = context};
+    struct imp_text data = {.ctx = context}, answer = {.ctx = context};
     IMP_TRY(data_make(context, __func__, &own, &data));
-    const struct page page = {&data.bytes, own.live};
+    IMP_TRY(imp__page_static(&answer, &own, (const char *)data.bytes.data));
+    const struct page page = {&data.bytes, &answer.bytes, own.live};
     IMP_TRY(imp__file_write_by(context, path, fill, &page));
 out:
     imp__bytes_free(context, &data.bytes);
+    imp__bytes_free(context, &answer.bytes);
     return st;
 }
 
@@ -248,14 +253,17 @@ enum imp_status imp_report_page(imp_context *context, const struct imp_report *r
     IMP_OPTIONS(context, own, report, "report");
     if (own.n_items) IMP_REQUIRE(context, own.items, "report->items");
     IMP_FLOAT_MODE;
-    struct imp_text data = {.ctx = context}, page = {.ctx = context};
+    struct imp_text data = {.ctx = context}, answer = {.ctx = context},
+                    page = {.ctx = context};
     IMP_TRY(data_make(context, __func__, &own, &data));
-    page_put(&(struct page){&data.bytes, own.live}, put_text, &page);
+    IMP_TRY(imp__page_static(&answer, &own, (const char *)data.bytes.data));
+    page_put(&(struct page){&data.bytes, &answer.bytes, own.live}, put_text, &page);
     if (page.failed)
         IMP_TRY(imp__error(context, IMP_E_NOMEM, "no memory for the page of a report"));
     give(&page, text, length);
 out:
     imp__bytes_free(context, &data.bytes);
+    imp__bytes_free(context, &answer.bytes);
     imp__bytes_free(context, &page.bytes);
     return st;
 }

@@ -106,7 +106,7 @@ struct source {
 
 static enum imp_status damaged(const struct source *s, const char *what)
 {
-    return imp__error(s->ctx, IMP_E_SCENE, "%s: damaged checkpoint (%s)", s->path, what);
+    return imp__error(s->ctx, IMP_E_IO, "%s: damaged checkpoint (%s)", s->path, what);
 }
 
 /* "name count" with a count that fits the file. */

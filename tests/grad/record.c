@@ -754,7 +754,7 @@ static void files(void)
     tap_ok(read == 0, "cut short: refused # %s", imp_last_error(ctx));
     b[n] = 0;
     bytes_write(b, n + 1);
-    tap_ok(file_read(&t) == IMP_E_SCENE, "a byte too much: refused # %s",
+    tap_ok(file_read(&t) == IMP_E_IO, "a byte too much: refused # %s",
            imp_last_error(ctx));
     bytes_write(b, n);
     tap_ok(file_read(&t) == IMP_OK, "control: unchanged it is read");
@@ -817,7 +817,7 @@ static void impossible(void)
         memcpy(words, &h, sizeof h);
         test_must(ctx, imp__record_write(&r, path));
         st = file_read(&t);
-        refused += st == IMP_E_SCENE && strstr(imp_last_error(ctx), "cannot have");
+        refused += st == IMP_E_IO && strstr(imp_last_error(ctx), "cannot have");
         if (st == IMP_OK) printf("# read: %s\n", what[k]);
         *head = good[0];
         *way = good[1];
@@ -846,7 +846,7 @@ static void impossible(void)
         if (k == 4) head->head.at = head->head.side.first;
         test_must(ctx, imp__record_write(&r, path));
         st = file_read(&t);
-        refused += st == IMP_E_SCENE && strstr(imp_last_error(ctx), "cannot have");
+        refused += st == IMP_E_IO && strstr(imp_last_error(ctx), "cannot have");
         *head = side;
     }
     tap_ok(refused == 5, "and side walks that are none # %d of 5", refused);

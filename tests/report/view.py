@@ -5,6 +5,7 @@
 Usage: view.py IMPORTON SCENES
 """
 import base64
+import hashlib
 import http.client
 import json
 import os
@@ -147,6 +148,25 @@ try:
         except OSError:
             answer = b""
     ok(b" 200 " not in answer and view.ask()[0] == 200, "garbage is answered with an error, and the view goes on")
+
+    # ---- Who holds connections and says nothing -------------------------------------------
+    held = []
+    for k in range(300):
+        held.append(socket.create_connection((view.host, view.port)))
+        if k % 3: held[-1].sendall(b"GET / HTTP/1.1\r\nHost: " [:k % 20])  # nothing, or half of a request
+    since = time.monotonic()
+    good = [view.ask()[0] for _ in range(20)]
+    ok(good == [200] * 20 and time.monotonic() - since < 9, "300 connections that say nothing lock nobody out # %.1f s" % (time.monotonic() - since))
+    def is_closed(c):
+        c.settimeout(PATIENCE)
+        try: return c.recv(1000) is not None
+        except TimeoutError: return False
+        except OSError: return True
+    ok(all(map(is_closed, held)), "and they end without a word of theirs # %.1f s" % (time.monotonic() - since))
+    ok(not view.ended and view.act("walks", x=0, y=0) == 200, "while the page that listens stays")
+    policy = re.search(r'script-src ([^;]*);', page)[1]
+    script = re.search(r"<script>(.*?)</script>", page, re.S)[1]
+    ok(policy == "'sha256-%s'" % base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(), "its policy allows its own script alone, by its hash # %s" % policy)
 
     # ---- A render ---------------------------------------------------------------------------
     ok(view.state("done") is not None, "the picture is done")

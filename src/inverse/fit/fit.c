@@ -3,6 +3,7 @@
  * Fit: an optimiser is run on a problem; covariance and intervals of its answer. */
 #include "fit.h"
 #include "base/arguments.h"
+#include "base/lock.h"
 #include "censor.h"
 #include "inverse/estimate/walks_make.h"
 #include "inverse/gradient/variate.h"
@@ -243,6 +244,7 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     if (st != IMP_OK) return st;
     struct imp__fit f = {0};
     struct imp__search *s = NULL;
+    struct imp_file_lock lock = {0};
     struct found a = {.shift = {.of_se = -1}, .objective = {NAN, NAN, 0}};
     struct imp_fit_variable *rows = NULL;
     double *start = NULL;
@@ -250,6 +252,7 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     bool found;
 
     IMP_TRY(imp__fit_begin(p, options, run, &f));
+    IMP_TRY(imp__file_lock(ctx, f.options.checkpoint, &lock));
     if (f.options.optimizer == IMP_LM && has_kink(p))
         IMP_TRY(imp__error(ctx, IMP_E_ARG,
                            "Levenberg-Marquardt needs a second derivative of the loss, "
@@ -290,6 +293,17 @@ out:
     imp__uncertainty_destroy(ctx, &a.u);
     if (!kept) imp__search_destroy(s);
     imp__release(ctx, start);
+    imp__file_unlock(ctx, &lock);
     imp__fit_end(&f);
+    return st;
+}
+
+enum imp_status imp_checkpoint_free(imp_context *ctx, const char *path)
+{
+    struct imp_file_lock lock;
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, path, "path");
+    const enum imp_status st = imp__file_lock(ctx, path, &lock);
+    imp__file_unlock(ctx, &lock);
     return st;
 }

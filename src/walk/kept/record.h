@@ -163,7 +163,7 @@ void imp__record_walk(const struct imp_record *record, size_t i,
 /* Whole or not at all. */
 enum imp_status imp__record_write(const struct imp_record *record, const char *path);
 /* IMP_E_ARG: of another scene, sensor or integrator, or parameters that move rays have
- * other values; IMP_E_SCENE: damaged, or of another version, byte order or build;
+ * other values; IMP_E_IO: damaged; IMP_E_SCENE: of another version, byte order or build;
  * IMP_E_NOMEM: more than the budget. */
 enum imp_status imp__record_read(const struct imp_tracer *tracer, const char *path,
                                  size_t budget, struct imp_record *out);

@@ -97,7 +97,7 @@ enum imp_status imp__record_write(const struct imp_record *r, const char *path)
 
 static enum imp_status damaged(const struct imp_record_source *s, const char *what)
 {
-    return imp__error(s->ctx, IMP_E_SCENE, "%s: damaged file of kept walks (%s)", s->path,
+    return imp__error(s->ctx, IMP_E_IO, "%s: damaged file of kept walks (%s)", s->path,
                       what);
 }
 

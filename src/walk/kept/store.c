@@ -207,7 +207,7 @@ enum imp_status imp__store_take(struct imp_record_source *from, struct imp_store
         for (size_t i = 0; i < n && placed; i++)
             placed = is_placed(s, tracer, &t, imp__record_at(r, i), i);
         if (!placed)
-            IMP_TRY(imp__error(s->ctx, IMP_E_SCENE,
+            IMP_TRY(imp__error(s->ctx, IMP_E_IO,
                                "%s: damaged (walks that are not those of their pixels)",
                                from->path));
         IMP_TRY(imp__record_trim(r));

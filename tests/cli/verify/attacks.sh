@@ -84,3 +84,10 @@ importon compare whole.exr mine1.exr | grep max
 importon verify whole.exr.manifest
 importon render scene.xml --spp 8 --pixel 1,1 --part 1/2 -o x.part
 ls
+# Names of others move no cursor.
+mkdir $'e\033[31m'
+cp scene.xml $'e\033[31m/s.xml'
+importon render $'e\033[31m/s.xml' -D res=4 --spp 1 -q -o esc.exr --no-preview
+echo x >$'e\033[31m/s.xml'
+importon verify esc.exr.manifest 2>&1
+echo "exit $?"
