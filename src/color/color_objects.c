@@ -46,6 +46,11 @@ bool imp__color_is_object(const struct imp_node *node)
     return kind != N_OBJECTS;
 }
 
+bool imp__color_is_raw(const struct imp_node *node)
+{
+    return object_kind(node) == RAWCONSTANT;
+}
+
 enum imp_status imp__color_list(imp_context *ctx, struct imp_node *node, const char *name,
                                 double **list, size_t *n)
 {
