@@ -3,11 +3,13 @@
  * Spectra: upsampling of colours against their colour under daylight, against Mitsuba's
  * table and against differences; every form's derivatives; wavelengths of walks. */
 #include "color/cie.h"
+#include "color/color_tables.h"
 #include "color/convert.h"
 #include "color/rgb.h"
 #include "color/rgb_basis.h"
 #include "color/wavelength.h"
 #include "imp_tap.h"
+#include "kind/bsdf/presets.h"
 #include "kind/texture/lifted_texels.h"
 #include "math/rng.h"
 #include <string.h>
@@ -240,6 +242,33 @@ static void texels(int threads)
     imp_context_destroy(with);
 }
 
+/* ---- Metals by name -------------------------------------------------------------------- */
+
+/* Amorphous carbon: its table by wavelengths, integrated against the observer without an
+ * illuminant, is its colour in the mode rgb. */
+static void carbon(void)
+{
+    const struct imp__metal *m = imp__metal_find("a-C");
+    const struct imp__conductor *preset = imp__conductor_find("a-C");
+    double worst = 0;
+    for (int part = 0; part < 2; part++) {
+        const double *value = part ? m->k : m->eta, *want = part ? preset->k : preset->eta;
+        double xyz[3] = {0, 0, 0}, y = 0, rgb[3];
+        for (int nm = 365, i = 0; nm <= 830; nm++) {
+            while (m->nm[i + 1] < nm) i++;
+            const double t = (nm - m->nm[i]) / (m->nm[i + 1] - m->nm[i]);
+            for (int c = 0; c < 3; c++)
+                xyz[c] += imp__cie_lookup(imp__cie_xyz[c], nm) *
+                          (value[i] + t * (value[i + 1] - value[i]));
+            y += imp__cie_lookup(imp__cie_xyz[1], nm);
+        }
+        for (int c = 0; c < 3; c++) xyz[c] /= y;
+        imp__xyz_to_rgb(xyz, rgb);
+        for (int c = 0; c < 3; c++) worst = fmax(worst, fabs(rgb[c] - want[c]));
+    }
+    tap_ok(worst < 2e-3, "a-C is its preset # within %.2g", worst);
+}
+
 int main(void)
 {
     const struct imp_context_options options = {.size = sizeof options, .threads = 1};
@@ -251,6 +280,7 @@ int main(void)
     lanes();
     texels(1);
     texels(3);
+    carbon();
     for (int q = 0; q < 6; q++) {
         static const double rgb[6][3] = {{.2, .5, .9}, {.9, .05, .05}, {1, 0, 0},
                                          {.1, .8, .1}, {.5, .5, .1},   {.73, .72, .69}};
