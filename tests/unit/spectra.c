@@ -2,6 +2,7 @@
  *
  * Spectra: upsampling of colours against their colour under daylight, against Mitsuba's
  * table and against differences; every form's derivatives; wavelengths of walks. */
+#include "base/pool.h"
 #include "color/cie.h"
 #include "color/color_tables.h"
 #include "color/convert.h"
@@ -12,6 +13,8 @@
 #include "kind/bsdf/presets.h"
 #include "kind/texture/lifted_texels.h"
 #include "math/rng.h"
+#include <stdatomic.h>
+#include <stdlib.h>
 #include <string.h>
 
 static imp_context *ctx;
@@ -202,7 +205,8 @@ static bool lifted_alike(const struct imp__lifted_texels *t, enum imp__lift_rule
         if (rule == IMP__LIFT_ANY_SIZE || (rule == IMP__LIFT_BY_SIZE && beyond))
             imp__lift_unbounded(rgb, &l);
         else imp__lift_reflectance(rgb, &l);
-        const struct imp__lifted *is = &t->texel[i].lifted;
+        struct imp__lifted own;
+        const struct imp__lifted *is = imp__lifted_texel(t, i, &own);
         if (l.scale != is->scale || memcmp(l.c, is->c, sizeof l.c) != 0 ||
             memcmp(l.d_c, is->d_c, sizeof l.d_c) != 0)
             return false;
@@ -240,6 +244,72 @@ static void texels(int threads)
     tap_ok(good, "texels have the spectra of their colours on %d threads", threads);
     imp__arena_free(&own);
     imp_context_destroy(with);
+}
+
+/* Texels that differ all: part of them is lifted by the walks that look them up. Threads look
+ * up the same ones at the same time, and each finds its colour's spectrum. */
+struct racing {
+    const struct imp__lifted_texels *t;
+    _Atomic int wrong;
+};
+static enum imp_status race(size_t first, size_t end, void *payload)
+{
+    struct racing *r = payload;
+    (void)first, (void)end;
+    for (size_t i = 0; i < r->t->n; i++) {
+        const double rgb[3] = {r->t->data[3 * i], r->t->data[3 * i + 1],
+                               r->t->data[3 * i + 2]};
+        struct imp__lifted own, l;
+        const struct imp__lifted *is = imp__lifted_texel(r->t, i, &own);
+        if (i % 64) continue; /* to find is 1000 times as fast as to lift */
+        imp__lift_reflectance(rgb, &l);
+        if (memcmp(l.c, is->c, sizeof l.c) != 0 ||
+            memcmp(l.d_c, is->d_c, sizeof l.d_c) != 0)
+            r->wrong++;
+    }
+    return IMP_OK;
+}
+
+static size_t there(const struct imp__lifted_texels *t)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < t->n; i++) n += t->state[i] != 0;
+    return n;
+}
+
+static void texels_of_many_colours(void)
+{
+    enum { N = 100000 };
+    struct imp_context_options options = IMP_CONTEXT_OPTIONS_INIT;
+    struct imp_arena own;
+    struct imp__lifted_texels t, same;
+    options.threads = 4;
+    imp_context *with = NULL;
+    float *data = malloc(3 * N * sizeof *data);
+    if (!data || imp_context_create(&options, &with) != IMP_OK) return;
+    imp__arena_init(&own, with);
+    const struct imp_build b = {.ctx = with, .arena = &own};
+    for (uint32_t i = 0; i < 3 * N; i++)
+        data[i] = (float)imp__u01(imp__key(9, i, 0), 0);
+    bool good = imp__lifted_texels_make(&b, data, N, &t) == IMP_OK &&
+                imp__lifted_texels_make(&b, data, N, &same) == IMP_OK;
+    if (good) imp__lifted_texels_update(&t, IMP__LIFT_REFLECTANCE);
+    const size_t before = good ? there(&t) : 0;
+    struct racing r = {&t, 0};
+    good = good && before > 0 && before < N / 2 &&
+           imp__parallel_ranges(with, 4, 1, race, &r) == IMP_OK;
+    tap_ok(good && r.wrong == 0 && there(&t) == N,
+           "texels of 100,000 colours are lifted when looked up # %zu before", before);
+    same.whole = true;
+    if (good) imp__lifted_texels_update(&same, IMP__LIFT_REFLECTANCE);
+    tap_ok(good && there(&same) == N, "or all at once");
+    /* A colour that changes is lifted anew. */
+    data[0] = 0.75f;
+    if (good) imp__lifted_texels_update(&t, IMP__LIFT_REFLECTANCE);
+    tap_ok(good && race(0, 0, &r) == IMP_OK && r.wrong == 0, "and anew when they change");
+    imp__arena_free(&own);
+    imp_context_destroy(with);
+    free(data);
 }
 
 /* ---- Metals by name -------------------------------------------------------------------- */
@@ -280,6 +350,7 @@ int main(void)
     lanes();
     texels(1);
     texels(3);
+    texels_of_many_colours();
     carbon();
     for (int q = 0; q < 6; q++) {
         static const double rgb[6][3] = {{.2, .5, .9}, {.9, .05, .05}, {1, 0, 0},
