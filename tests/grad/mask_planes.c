@@ -46,8 +46,8 @@ static void numbers(imp_scene *s, const char *slot, double half, int side, int c
                     double value)
 {
     float texel[64 * 3];
-    const double tile[16] = {half, 0, 0, .5 - half / 2, 0, half, 0, .5 - half / 2,
-                             0,    0, 1, 0,             0, 0,    0, 1};
+    const double tile[16] = {
+        half, 0, 0, .5 - half / 2, 0, half, 0, .5 - half / 2, 0, 0, 1, 0, 0, 0, 0, 1};
     if (side == 0) {
         imp_scene_float(s, slot, value);
         return;
@@ -147,7 +147,8 @@ static void sheet(double a)
     snprintf(what, sizeof what, "opacity %g: by the floor", a);
     one(s, "floor.reflectance.value", I, by_floor(a, r, q), what);
     snprintf(what, sizeof what, "opacity %g: by the sheet", a);
-    one(s, "sheet.reflectance.value", I, a + (1 - a) * q * (1 - a) * q * a / (d * d), what);
+    one(s, "sheet.reflectance.value", I, a + (1 - a) * q * (1 - a) * q * a / (d * d),
+        what);
     imp_scene_destroy(s);
 }
 
@@ -162,7 +163,7 @@ static void many(imp_scene *s, const char *which, double truth, double most_se,
         for (size_t k = 0; k < r.n && r.n <= VALUES; k++, n++) {
             const double z = r.se[k] > 0 ? (r.g[k] - truth) / r.se[k]
                              : fabs(r.g[k] - truth) < 1e-6 * fabs(truth) ? 0
-                                                                    : INFINITY;
+                                                                         : INFINITY;
             worst = fmax(worst, fabs(z));
             square += z * z;
             se = fmax(se, r.se[k]);
@@ -181,7 +182,8 @@ int main(void)
     sheet(.3);
     sheet(.85);
     /* At the ends of the range. */
-    imp_scene *open = planes(0, 0, .4, .6, 0, false), *shut = planes(1, 0, .4, .6, 0, false);
+    imp_scene *open = planes(0, 0, .4, .6, 0, false),
+              *shut = planes(1, 0, .4, .6, 0, false);
     one(open, "veil.opacity.value", .6, by_opacity(0, .4, .6), "opacity 0: by it");
     one(shut, "veil.opacity.value", .4, by_opacity(1, .4, .6), "opacity 1: by it");
     imp_scene_destroy(open);

@@ -134,8 +134,7 @@ static void disc_by_quadrature(imp_context *ctx)
               *wave = test_scene_text(ctx, text[2], IMP_SPECTRAL);
     double xyz[3] = {0}, rgb[3], mean[3] = {0}, y = 0;
     for (int nm = 360; nm <= 830; nm++) {
-        const double l =
-            radiance(wave, imp__v3(cos(high), 0, sin(high)), nm)[0];
+        const double l = radiance(wave, imp__v3(cos(high), 0, sin(high)), nm)[0];
         for (int c = 0; c < 3; c++) xyz[c] += l * imp__cie_lookup(imp__cie_xyz[c], nm);
         y += imp__cie_lookup(imp__cie_xyz[1], nm);
     }

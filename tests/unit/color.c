@@ -214,7 +214,8 @@ static void planck_colour(double T, double rgb[3])
     double xyz[3] = {0}, y = 0;
     for (int nm = 360; nm <= 830; nm++) {
         const double l = nm * 1e-9;
-        const double B = 2 * h * c * c / pow(l, 5) / (exp(h * c / (l * k * T)) - 1) * 1e-9;
+        const double B =
+            2 * h * c * c / pow(l, 5) / (exp(h * c / (l * k * T)) - 1) * 1e-9;
         for (int a = 0; a < 3; a++) xyz[a] += B * imp__cie_lookup(imp__cie_xyz[a], nm);
         y += imp__cie_lookup(imp__cie_xyz[1], nm);
     }

@@ -78,11 +78,11 @@ static void overlap(imp_context *ctx)
     imp_scene_begin(s, "integrator", "volpath", NULL, NULL);
     imp_scene_end(s);
     imp_scene_begin(s, "sensor", "perspective", NULL, NULL);
-    imp_scene_transform(s, "to_world",
-                        (double[16]){-.7071067811865476, -.408248290463863,
-                                     -.5773502691896258, 4, 0, .816496580927726,
-                                     -.5773502691896258, 4, .7071067811865476,
-                                     -.408248290463863, -.5773502691896258, 4, 0, 0, 0, 1});
+    imp_scene_transform(
+        s, "to_world",
+        (double[16]){-.7071067811865476, -.408248290463863, -.5773502691896258, 4, 0,
+                     .816496580927726, -.5773502691896258, 4, .7071067811865476,
+                     -.408248290463863, -.5773502691896258, 4, 0, 0, 0, 1});
     imp_scene_begin(s, "film", "hdrfilm", NULL, NULL);
     imp_scene_integer(s, "width", 32);
     imp_scene_integer(s, "height", 32);
@@ -107,14 +107,15 @@ static void overlap(imp_context *ctx)
            st == IMP_OK ? "" : imp_last_error(ctx));
     if (st == IMP_OK) {
         test_must(ctx, imp_film_get_info(film, &info));
-        for (int k = 0; k < 32 * 32 * 3; k++) mean += imp_film_mean(film)[k] / (32 * 32 * 3.);
+        for (int k = 0; k < 32 * 32 * 3; k++)
+            mean += imp_film_mean(film)[k] / (32 * 32 * 3.);
         const double share = (double)info.dropped / (32 * 32 * 64);
-        tap_ok(info.dropped > 2 && info.dropped == info.dropped_by_cause[IMP_DROP_MEDIUM] &&
-                   share < 1e-3,
+        tap_ok(info.dropped > 2 &&
+                   info.dropped == info.dropped_by_cause[IMP_DROP_MEDIUM] && share < 1e-3,
                "some walks are dropped there, and counted # %llu of 65536",
                (unsigned long long)info.dropped);
-        tap_ok(fabs(mean - (1 - share)) < 1e-6, "their share is missing # %.8f, %.8f", mean,
-               1 - share);
+        tap_ok(fabs(mean - (1 - share)) < 1e-6, "their share is missing # %.8f, %.8f",
+               mean, 1 - share);
     }
     imp_film_destroy(film);
     imp_scene_destroy(s);

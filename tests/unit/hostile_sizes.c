@@ -428,14 +428,15 @@ static void unread(void)
     struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
     imp_scene *s = NULL;
     if (!xml) return;
-    size_t n = (size_t)snprintf(xml, size, "<scene version='3.0.0'><shape type='sphere'>");
+    size_t n =
+        (size_t)snprintf(xml, size, "<scene version='3.0.0'><shape type='sphere'>");
     for (int k = 0; k < N; k++) n += (size_t)snprintf(xml + n, size - n, one, k);
     n += (size_t)snprintf(xml + n, size - n, "</shape></scene>");
     const clock_t begun = clock();
     const enum imp_status st = imp_scene_load_string(ctx, xml, n, "test", &o, &s);
     const double seconds = (double)(clock() - begun) / CLOCKS_PER_SEC;
-    tap_ok(st == IMP_E_SCENE && strstr(imp_last_error(ctx), "'radiu00000', 'radiu00001'") &&
-               seconds < 5,
+    tap_ok(st == IMP_E_SCENE &&
+               strstr(imp_last_error(ctx), "'radiu00000', 'radiu00001'") && seconds < 5,
            "%d unknown properties are refused # %.2g s", N, seconds);
     free(xml);
 }

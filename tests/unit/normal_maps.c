@@ -17,7 +17,7 @@
     "<film type='hdrfilm'><integer name='width' value='2'/>"                             \
     "<integer name='height' value='2'/><rfilter type='box'/></film></sensor>"            \
     "<emitter type='directional'><vector name='direction' value='-.48, -.36, -.8'/>"     \
-    "<rgb name='irradiance' value='2'/></emitter>"                                  \
+    "<rgb name='irradiance' value='2'/></emitter>"                                       \
     "<shape type='rectangle'><transform name='to_world'><scale value='4'/></transform>"  \
     "<bsdf type='normalmap' id='bent'>%s<bsdf type='diffuse'>"                           \
     "<spectrum name='reflectance' value='.5'/></bsdf></bsdf></shape></scene>"

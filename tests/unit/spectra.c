@@ -289,8 +289,7 @@ static void texels_of_many_colours(void)
     if (!data || imp_context_create(&options, &with) != IMP_OK) return;
     imp__arena_init(&own, with);
     const struct imp_build b = {.ctx = with, .arena = &own};
-    for (uint32_t i = 0; i < 3 * N; i++)
-        data[i] = (float)imp__u01(imp__key(9, i, 0), 0);
+    for (uint32_t i = 0; i < 3 * N; i++) data[i] = (float)imp__u01(imp__key(9, i, 0), 0);
     bool good = imp__lifted_texels_make(&b, data, N, &t) == IMP_OK &&
                 imp__lifted_texels_make(&b, data, N, &same) == IMP_OK;
     if (good) imp__lifted_texels_update(&t, IMP__LIFT_REFLECTANCE);
@@ -322,7 +321,8 @@ static void carbon(void)
     const struct imp__conductor *preset = imp__conductor_find("a-C");
     double worst = 0;
     for (int part = 0; part < 2; part++) {
-        const double *value = part ? m->k : m->eta, *want = part ? preset->k : preset->eta;
+        const double *value = part ? m->k : m->eta,
+                     *want = part ? preset->k : preset->eta;
         double xyz[3] = {0, 0, 0}, y = 0, rgb[3];
         for (int nm = 365, i = 0; nm <= 830; nm++) {
             while (m->nm[i + 1] < nm) i++;

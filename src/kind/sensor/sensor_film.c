@@ -2,9 +2,9 @@
  *
  * Reads film and sampler of a sensor: size, crop, filter, samples per pixel. */
 #include "sensor_film.h"
-#include "kind/registry.h"
 #include "base/compiler.h"
 #include "kind/filter/filter.h"
+#include "kind/registry.h"
 #include "sensor_response.h"
 #include <string.h>
 

@@ -130,8 +130,9 @@ static const struct imp__lifted *lift_now(const struct imp__lifted_texels *t, si
     uint8_t was = IS_NOT;
     const float *p = t->data + 3 * k;
     lift(t, t->by, p, own);
-    if (atomic_compare_exchange_strong_explicit(
-            state_of(t, k), &was, IS_WRITTEN, memory_order_relaxed, memory_order_relaxed)) {
+    if (atomic_compare_exchange_strong_explicit(state_of(t, k), &was, IS_WRITTEN,
+                                                memory_order_relaxed,
+                                                memory_order_relaxed)) {
         t->texel[k].lifted = *own;
         memcpy(t->texel[k].of, p, sizeof t->texel[k].of);
         atomic_store_explicit(state_of(t, k), IS_THERE, memory_order_release);
@@ -142,7 +143,8 @@ static const struct imp__lifted *lift_now(const struct imp__lifted_texels *t, si
 const struct imp__lifted *imp__lifted_texel(const struct imp__lifted_texels *t, size_t k,
                                             struct imp__lifted *own)
 {
-    if (imp_likely(atomic_load_explicit(state_of(t, k), memory_order_acquire) == IS_THERE))
+    if (imp_likely(atomic_load_explicit(state_of(t, k), memory_order_acquire) ==
+                   IS_THERE))
         return &t->texel[k].lifted;
     return lift_now(t, k, own);
 }

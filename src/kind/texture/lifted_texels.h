@@ -28,7 +28,7 @@ struct imp__lifted_texels {
     const float *data; /* [n][3] */
     size_t n;
     enum imp__lift_rule rule;
-    bool made;                       /* by this rule */
+    bool made;  /* by this rule */
     bool whole; /* all texels are looked up at once, as bounds need them; 0 after make */
     struct imp__lifted_texel *texel; /* [n]; NULL: linear */
     uint8_t *state;                  /* [n] of texel, atomic: 0 not lifted, ... */
