@@ -30,7 +30,7 @@ struct known {
 #define LIFTED_FIRST 8192
 #define LIFTED_PART  32
 
-/* Of a texel. The second is for the time in which one thread writes it. */
+/* State of a texel's spectrum; IS_WRITTEN while one thread writes it. */
 enum { IS_NOT, IS_WRITTEN, IS_THERE };
 
 static _Atomic uint8_t *state_of(const struct imp__lifted_texels *t, size_t k)
