@@ -24,7 +24,7 @@ struct known {
 #define KNOWN_BITS 17
 #define LEAST      1024 /* texels of a thread */
 
-/* Colours that a thread lifts of its texels before walks ask: so many, and a part of them.
+/* Colours that a thread lifts of its texels before walks look them up: so many, and a part of them.
  * Where colours are met again these are all; where they are not, a picture of millions of
  * colours would take its time before the first walk. */
 #define LIFTED_FIRST 8192
