@@ -89,6 +89,13 @@ METALS = [('Ag', 'Rakic-BB', 'Rakic et al. 1998'), ('Al', 'Rakic', 'Rakic 1995')
           ('Cr', 'Rakic-BB', 'Rakic et al. 1998'), ('W', 'Rakic-BB', 'Rakic et al. 1998')]
 
 
+# Amorphous carbon, arc-evaporated: Palik's handbook, vol. II, by way of luxpop.com (a-C); n and k every
+# .2 eV from 4 down to 1.4, at 1239.8 nm eV.
+CARBON_N = [1.84, 1.9, 1.94, 2.0, 2.06, 2.11, 2.17, 2.24, 2.3, 2.38, 2.43, 2.43, 2.33, 2.24]
+CARBON_K = [0.808, 0.91, 0.92, 0.92, 0.91, 0.9, 0.89, 0.88, 0.87, 0.82, 0.75, 0.7, 0.71, 0.8]
+CARBON = [(1.2398 / (4 - 0.2 * i), n, k) for i, (n, k) in enumerate(zip(CARBON_N, CARBON_K))]
+
+
 def floats(b):
     return [published(v) for v in struct.unpack('%df' % (len(b) // 4), b)]
 
@@ -110,6 +117,11 @@ def metals():
         step = max(1, len(rows) // 60)
         keep = [r for i, r in enumerate(rows) if i % step == 0 or i == len(rows) - 1]
         yield name, source, keep
+    yield 'a-C', "Palik's handbook, by way of luxpop.com", CARBON[3:]
+
+
+def symbol(name):
+    return name.replace('-', '_')
 
 
 def write_tables(out):
@@ -143,11 +155,11 @@ def write_tables(out):
             values = [r[column] * (1000 if column == 0 else 1) for r in table]
             note = '/* %s */\n' % source if column == 0 else ''
             out.write('%sstatic const double %s_%s[%d] = {\n%s\n};\n' %
-                      (note, name, key, len(values), wrap(values, '%.7g')))
+                      (note, symbol(name), key, len(values), wrap(values, '%.7g')))
         rows.append((name, len(table)))
     out.write('const struct imp__metal imp__metals[] = {\n')
     for name, n in rows:
-        out.write('    {"%s", %d, %s_nm, %s_eta, %s_k},\n' % (name, n, name, name, name))
+        out.write('    {"%s", %d, %s_nm, %s_eta, %s_k},\n' % (name, n, symbol(name), symbol(name), symbol(name)))
     out.write('    {0}};\n/* clang-format on */\n')
 
 

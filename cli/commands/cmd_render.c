@@ -119,7 +119,8 @@ static char *default_output(const struct imp_run *run)
 static void report_drops(const struct imp_film_info *info)
 {
     if (!info->dropped) return;
-    cli_say("%llu of %.3g walks were left out, within the budget of 1 in 10000:",
+    cli_say("%llu of %.3g walks were left out, and their light is missing (at most 1 in "
+            "10000 may be, at holes in the boundary of a medium 1 in 1000):",
             (unsigned long long)info->dropped,
             (double)info->width * info->height * (double)info->spp);
     for (int c = 0; c < IMP_DROP_CAUSES; c++)

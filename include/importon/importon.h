@@ -793,7 +793,9 @@ struct imp_run {
     /** For pictures. 0: none; else samples are taken until then (every pixel gets at
      * least one pass), at most spp if that is given. */
     double time_limit_s;
-    double drop_budget; /**< fraction of walks that may be dropped, 0 to 1; 0: 1e-4 */
+    /** Fraction of walks that may be dropped, 0 to 1; 0: 1e-4, and 1e-3 of those that met a
+     * hole in the boundary of a medium (IMP_DROP_MEDIUM). */
+    double drop_budget;
     imp_progress_fn progress;
     void *progress_payload;
     const imp_guide *guide; /**< NULL: none; for path, and for walks from the lights */

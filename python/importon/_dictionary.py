@@ -22,8 +22,9 @@ _GRID = ("grid", "data", "filename")
 
 
 class _Builder:
-    def __init__(self, scene: int) -> None:
+    def __init__(self, scene: int, ids: Mapping[str, str]) -> None:
         self.scene = scene
+        self.ids = ids  # by the keys of objects at the top that have an id of their own
 
     def number(self, name: str, value: Any) -> None:
         key = text(name, "name")
@@ -92,7 +93,7 @@ class _Builder:
                 g = grid_of(d.pop(key), "%s: %s" % (name, key))
                 lib.imp_scene_grid(self.scene, g.shape[2], g.shape[1], g.shape[0], g.shape[3], address(g))
 
-    def value(self, name: str, value: Any, top: bool) -> None:
+    def value(self, name: str, value: Any, top: bool, of: str = "scene") -> None:
         matrix = None
         if isinstance(value, Mapping):
             self.object(name, dict(value), top)
@@ -111,20 +112,21 @@ class _Builder:
             elif v.size == 3:
                 self.three(lib.imp_scene_vector, name, v.reshape(3))
             else:
-                raise ArgumentError("%s is an array of shape %s: a number, three numbers or a [4][4] matrix are values "
-                                    "here; pictures, grids and meshes are given to objects of type 'bitmap', 'envmap', "
-                                    "'gridvolume' and 'mesh'" % (name, v.shape))
+                raise ArgumentError("%s: %s is an array of shape %s: a number, three numbers or a [4][4] matrix are "
+                                    "values here; pictures, grids and meshes are given to objects of type 'bitmap', "
+                                    "'envmap', 'gridvolume' and 'mesh'" % (of, name, v.shape))
         else:
-            raise ArgumentError("%s is a %s: numbers, strings, arrays, transforms and dictionaries are values; for an "
-                                "object of another program give the dictionary that it was made from"
-                                % (name, builtins.type(value).__name__))
+            raise ArgumentError("%s: %s is a %s: numbers, strings, arrays, transforms and dictionaries are values; for "
+                                "an object of another program give the dictionary that it was made from"
+                                % (of, name, builtins.type(value).__name__))
 
     def object(self, name: str, d: dict[str, Any], top: bool) -> None:
         type = d.pop("type", None)
         if not isinstance(type, str):
             raise ArgumentError("'%s' is a dictionary without a 'type'" % name)
         if type == "ref":
-            lib.imp_scene_ref(self.scene, text(d.pop("id", ""), "id"), None if top else text(name, "name"))
+            id = d.pop("id", "")
+            lib.imp_scene_ref(self.scene, text(self.ids.get(id, id), "id"), None if top else text(name, "name"))
         elif type == "rgb":
             self.three(lib.imp_scene_rgb, name, d.pop("value", None))
         elif type == "spectrum":
@@ -134,7 +136,7 @@ class _Builder:
             self.begin(type, d.pop("id", name if top else None), None if top else name)
             self.bulk(type, name, d)
             for key, v in d.items():
-                self.value(key, v, False)
+                self.value(key, v, False, "'%s' (%s)" % (name, type))
             self.end()
             return
         if d:
@@ -149,7 +151,7 @@ def load_dict(dictionary: Mapping[str, Any], *, mode: Optional[str] = None, sear
     ----------
     dictionary : mapping
         ``{"type": "scene", ...}``. Objects are dictionaries with a "type"; at the top
-        their keys are their ids. Values are numbers, strings, three numbers (points and
+        their keys are their ids, beside an "id" of their own. Values are numbers, strings, three numbers (points and
         vectors), transforms (`ScalarTransform4f`, any object with a `matrix`, or [4][4]),
         colours ``{"type": "rgb", "value": ...}``, spectra ``{"type": "spectrum", "value":
         number or pairs}`` and references ``{"type": "ref", "id": ...}``. Arrays are taken
@@ -197,7 +199,8 @@ def load_dict(dictionary: Mapping[str, Any], *, mode: Optional[str] = None, sear
     out = ctypes.c_void_p()
     ctx.check(lib.imp_scene_create(ctx.pointer, ctypes.byref(options), ctypes.byref(out)))
     handle = Handle(out.value or 0, lib.imp_scene_destroy)
-    builder = _Builder(handle.pointer)
+    own = {k: v["id"] for k, v in d.items() if isinstance(v, Mapping) and isinstance(v.get("id"), str)}
+    builder = _Builder(handle.pointer, {k: id for k, id in own.items() if k not in own.values()})
     for name, value in d.items():
         if not isinstance(name, str):
             raise TypeError("the key %r is no string" % (name,))

@@ -32,7 +32,7 @@ def is_array(value: Any) -> bool:
 
 def matrix_of(value: Any, name: str) -> Optional[Any]:
     """The [4][4] matrix of a transform: an object with `.matrix`, or such an array; else None."""
-    matrix = getattr(value, "matrix", value)
+    matrix = value if is_array(value) else getattr(value, "matrix", value)
     if matrix is value and not is_array(value):
         return None
     array = np.asarray(_import(matrix, name))

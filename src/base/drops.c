@@ -70,8 +70,11 @@ uint64_t imp__drops_total(const struct imp_drops *d)
 enum imp_status imp__drops_budget(imp_context *ctx, const struct imp_drops *d,
                                   double budget, double walks, const char *points)
 {
-    const uint64_t total = imp__drops_total(d);
-    if ((double)total <= 1 + (budget > 0 ? budget : 1e-4) * walks) return IMP_OK;
+    const uint64_t total = imp__drops_total(d), boundary = d->by_cause[IMP_DROP_MEDIUM];
+    if (budget > 0 ? (double)total <= 1 + budget * walks
+                   : (double)(total - boundary) <= 1 + IMP_DROP_SHARE * walks &&
+                         (double)boundary <= 1 + IMP_DROP_SHARE_BOUNDARY * walks)
+        return IMP_OK;
     char causes[1024] = "", first[128] = "";
     size_t used = 0;
     for (int c = 0; c < IMP_DROP_CAUSES && used < sizeof causes; c++)

@@ -21,9 +21,15 @@ void imp__drops_add(struct imp_drops *drops, const struct imp_drop_key *key);
 void imp__drops_merge(struct imp_drops *into, const struct imp_drops *from);
 uint64_t imp__drops_total(const struct imp_drops *drops);
 
-/* IMP_E_PATHS if more than 1 + budget * walks were dropped; budget 0: 1e-4. The message
- * has the count of each cause and the key of the first walk; `points`: an option that
- * names its random numbers, or "". */
+/* Shares of walks that may be dropped where a run names none: of one cause, a boundary that
+ * a scanned mesh crosses or leaves open in a few places, more. They are missing from the
+ * picture, whose mean is too dark by their share if they carry as much as others. */
+#define IMP_DROP_SHARE          1e-4
+#define IMP_DROP_SHARE_BOUNDARY 1e-3
+
+/* IMP_E_PATHS if more than 1 + budget * walks were dropped; budget 0: the shares above, each
+ * of its causes. The message has the count of each cause and the key of the walk to look at
+ * first; `points`: an option that names its random numbers, or "". */
 enum imp_status imp__drops_budget(imp_context *ctx, const struct imp_drops *drops,
                                   double budget, double walks, const char *points);
 

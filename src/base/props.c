@@ -303,9 +303,13 @@ static bool is_written(const struct imp_node *node, const char *name)
 const char *imp__node_meant(const struct imp_node *node, const char *name)
 {
     struct imp_nearest near = imp__nearest(name);
-    for (int k = 0; k < node->n_asked; k++)
-        if (!is_written(node, node->asked[k]) && !imp__node_child(node, node->asked[k]))
-            imp__nearest_try(&near, node->asked[k]);
+    for (int k = 0; k < node->n_asked; k++) {
+        struct imp_nearest closer = near;
+        imp__nearest_try(&closer, node->asked[k]);
+        if (closer.distance < near.distance && !is_written(node, node->asked[k]) &&
+            !imp__node_child(node, node->asked[k]))
+            near = closer;
+    }
     return near.best;
 }
 
@@ -313,7 +317,8 @@ enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node)
 {
     char list[768] = "", where[256], meant[80] = "";
     const struct imp_prop *first = NULL;
-    for (size_t i = 0; i < node->n_props; i++) {
+    /* The message has room for some: how many there are may not count. */
+    for (size_t i = 0; i < node->n_props && strlen(list) + 1 < sizeof list; i++) {
         const struct imp_prop *p = &node->props[i];
         if (p->used) continue;
         const size_t n = strlen(list);
@@ -328,7 +333,7 @@ enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node)
         first = p; /* whose place the message begins with */
         snprintf(list, sizeof list, "'%s'", p->name);
     }
-    for (size_t i = 0; i < node->n_children; i++) {
+    for (size_t i = 0; i < node->n_children && strlen(list) + 1 < sizeof list; i++) {
         const struct imp_child *c = &node->children[i];
         if (c->used) continue;
         const size_t n = strlen(list);

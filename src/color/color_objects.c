@@ -46,6 +46,11 @@ bool imp__color_is_object(const struct imp_node *node)
     return kind != N_OBJECTS;
 }
 
+bool imp__color_is_raw(const struct imp_node *node)
+{
+    return object_kind(node) == RAWCONSTANT;
+}
+
 enum imp_status imp__color_list(imp_context *ctx, struct imp_node *node, const char *name,
                                 double **list, size_t *n)
 {
@@ -258,18 +263,14 @@ out:
     return st;
 }
 
-/* Radiance of a black body, in W m^-2 sr^-1 nm^-1, times `scale`. */
+/* Radiance of a black body, in W m^-2 sr^-1 nm^-1, times `scale`; in modes without spectra
+ * its colour, as that of any list of wavelengths. */
 static enum imp_status blackbody_object(const struct imp__color_ask *ask,
                                         struct imp_node *node, struct imp__color *out)
 {
     imp_context *ctx = ask->ctx;
     enum imp_status st = IMP_OK;
     double T, scale, lo, hi;
-    if (!imp__color_wants_spectrum(ask))
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_UNSUPPORTED,
-                                "blackbody exists in spectral modes only "
-                                "(-m spectral, -m single); in others write the light's "
-                                "colour, as <rgb>"));
     IMP_TRY(imp__color_require(ctx, node, "temperature"));
     IMP_TRY(imp__props_float_in(ctx, node, "temperature", 0, IMP_POSITIVE, &T));
     IMP_TRY(imp__props_float_in(ctx, node, "scale", 1, IMP_NOT_NEGATIVE, &scale));
@@ -287,6 +288,11 @@ static enum imp_status blackbody_object(const struct imp__color_ask *ask,
     imp__color_preview(out->spectrum, ask->role, ask->scalar, &out->value);
     out->count = 3;
     out->key = "temperature";
+    if (!imp__color_wants_spectrum(ask)) {
+        const double rgb[3] = {out->value[0], out->value[1], out->value[2]};
+        *out = (struct imp__color){.key = "value", .count = 1};
+        imp__color_rgb_set(ask, rgb, out);
+    }
 out:
     return st;
 }

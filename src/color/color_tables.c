@@ -356,6 +356,17 @@ static const double W_k[45] = {
     2.7955, 2.7944, 2.7929, 2.7915, 2.7904, 2.79, 2.7908, 2.7932, 2.7977, 2.8047, 2.8148,
     2.8285, 2.8464, 2.869,
 };
+/* Palik's handbook, by way of luxpop.com */
+static const double a_C_nm[11] = {
+    364.6471, 387.4375, 413.2667, 442.7857, 476.8462, 516.5833, 563.5455, 619.9, 688.7778,
+    774.875, 885.5714,
+};
+static const double a_C_eta[11] = {
+    2, 2.06, 2.11, 2.17, 2.24, 2.3, 2.38, 2.43, 2.43, 2.33, 2.24,
+};
+static const double a_C_k[11] = {
+    0.92, 0.91, 0.9, 0.89, 0.88, 0.87, 0.82, 0.75, 0.7, 0.71, 0.8,
+};
 const struct imp__metal imp__metals[] = {
     {"Ag", 45, Ag_nm, Ag_eta, Ag_k},
     {"Al", 15, Al_nm, Al_eta, Al_k},
@@ -363,5 +374,6 @@ const struct imp__metal imp__metals[] = {
     {"Cu", 18, Cu_nm, Cu_eta, Cu_k},
     {"Cr", 32, Cr_nm, Cr_eta, Cr_k},
     {"W", 45, W_nm, W_eta, W_k},
+    {"a-C", 11, a_C_nm, a_C_eta, a_C_k},
     {0}};
 /* clang-format on */

@@ -244,9 +244,12 @@ enum imp_status imp__color_convert(const struct imp__color_ask *ask,
                                             [IMP_PROP_VECTOR] = "vector",
                                             [IMP_PROP_TRANSFORM] = "transform",
                                             [IMP_PROP_REF] = "reference"};
-        IMP_TRY(imp__prop_error(ask->ctx, node, prop, IMP_E_SCENE,
-                                "'%s' must be a number, a colour or a texture, not a %s",
-                                prop->name, names[prop->type]));
+        IMP_TRY(imp__prop_error(
+            ask->ctx, node, prop, IMP_E_SCENE,
+            "'%s' must be a number, a colour or a texture, not a %s%s", prop->name,
+            names[prop->type],
+            prop->type == IMP_PROP_VECTOR ? "; three numbers of a colour are an rgb"
+                                          : ""));
     }
     }
     *out = color;

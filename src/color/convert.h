@@ -51,6 +51,8 @@ enum imp_status imp__color_default(const struct imp__color_ask *ask, double fall
 
 /* Is this node a colour that is written as an object (uniform, srgb, d65, ...)? */
 bool imp__color_is_object(const struct imp_node *node);
+/* Is it a rawconstant: numbers that need not be a colour? */
+bool imp__color_is_raw(const struct imp_node *node);
 /* The property that has the numbers of such an object; NULL: none is written. */
 const struct imp_prop *imp__color_written(const struct imp_node *node);
 /* The same for such a node (docs/scene-format.md 2.4). Reads and checks all its

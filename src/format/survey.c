@@ -6,6 +6,7 @@
 #include "color/color_set.h"
 #include "film/film_integrator.h"
 #include "kind/registry.h"
+#include "kind/sensor/sensor_film.h"
 #include "load.h"
 #include "scene/instances.h"
 #include "scene/scene_build.h"
@@ -63,10 +64,41 @@ static const void *integrator_at(const void *payload, size_t i)
     (void)payload;
     return imp__integrator_kinds[i];
 }
-static bool integrator_exists(const char *type)
+
+/* Tags without a concept: what replaces an object of a kind that there is not, and the
+ * properties that it keeps, between blanks. */
+static const struct stand_in {
+    const char *tag;
+    const void *(*at)(const void *payload, size_t i);
+    const char *lost, *type, *kept;
+} stand_ins[] = {
+    {"integrator", integrator_at, "the picture is that of path", "path",
+     " max_depth hide_emitters "},
+    {"film", imp__film_at, "a hdrfilm in its place, with its size", "hdrfilm",
+     " width height crop_offset_x crop_offset_y crop_width crop_height "},
+    {"sampler", imp__sampler_at, "an independent one in its place", "independent",
+     " sample_count "},
+};
+
+static const struct stand_in *stand_in_of(const struct imp_node *node)
 {
-    for (size_t k = 0; imp__integrator_kinds[k]; k++)
-        if (strcmp(imp__integrator_kinds[k]->name, type) == 0) return true;
+    for (size_t k = 0; k < imp_count(stand_ins); k++)
+        if (strcmp(stand_ins[k].tag, node->tag) == 0) return &stand_ins[k];
+    return NULL;
+}
+static const char *stand_in_name(const struct stand_in *s, size_t i)
+{
+    const struct {
+        size_t size;
+        const char *name;
+    } *head = s->at(NULL, i);
+    return head ? head->name : NULL;
+}
+static bool is_there(const struct stand_in *s, const char *type)
+{
+    const char *name;
+    for (size_t i = 0; (name = stand_in_name(s, i)); i++)
+        if (strcmp(name, type) == 0) return true;
     return false;
 }
 
@@ -93,12 +125,13 @@ static enum imp_status lost_add(struct imp_scene *scene, const char *text)
 static const char *kind_meant(const struct imp_scene *scene, const struct imp_node *node)
 {
     const struct rule *r = rule_of(node);
+    const struct stand_in *s = stand_in_of(node);
     const char *name;
     struct imp_nearest near = imp__nearest(node->type);
     for (size_t i = 0; r && (name = kind_name(scene, r, i)); i++)
         imp__nearest_try(&near, name);
-    for (size_t i = 0; !r && imp__integrator_kinds[i]; i++)
-        imp__nearest_try(&near, imp__integrator_kinds[i]->name);
+    for (size_t i = 0; s && (name = stand_in_name(s, i)); i++)
+        imp__nearest_try(&near, name);
     return near.best;
 }
 
@@ -157,17 +190,19 @@ static enum imp_status material_replace(struct imp_scene *scene, struct imp_node
     return IMP_OK;
 }
 
-/* The integrator becomes path, with its max_depth. */
-static void integrator_replace(struct imp_node *node)
+/* The node becomes what replaces it, with the properties that both have; a film keeps its
+ * filter. */
+static void stand_in_take(struct imp_node *node, const struct stand_in *s)
 {
     size_t kept = 0;
-    for (size_t i = 0; i < node->n_props; i++)
-        if (strcmp(node->props[i].name, "max_depth") == 0 ||
-            strcmp(node->props[i].name, "hide_emitters") == 0)
+    for (size_t i = 0; i < node->n_props; i++) {
+        const char *name = node->props[i].name, *at = strstr(s->kept, name);
+        if (at && at[-1] == ' ' && at[strlen(name)] == ' ')
             node->props[kept++] = node->props[i];
+    }
     node->n_props = kept;
-    node->n_children = 0;
-    node->type = "path";
+    if (strcmp(node->tag, "film") != 0) node->n_children = 0;
+    node->type = s->type;
 }
 
 /* Child i, a `merge`, is replaced by the shapes in it, in its place: Mitsuba
@@ -209,9 +244,10 @@ static enum imp_status look(struct survey *s, struct imp_node *node, bool *gone)
     const struct rule *r = rule_of(node);
     enum imp_status st = IMP_OK;
     *gone = false;
-    if (strcmp(node->tag, "integrator") == 0 && !integrator_exists(node->type)) {
-        IMP_TRY(note(s, node, "the picture is that of path"));
-        if (lenient) integrator_replace(node);
+    const struct stand_in *other = stand_in_of(node);
+    if (other && !is_there(other, node->type)) {
+        IMP_TRY(note(s, node, other->lost));
+        if (lenient) stand_in_take(node, other);
     }
     if (!r || imp__color_is_object(node) || is_kind(s->scene, r, node)) return IMP_OK;
     const bool nested = strcmp(node->tag, "bsdf") == 0 && node->n_children > 0;
@@ -260,7 +296,7 @@ enum imp_status imp__survey(struct imp_scene *scene)
     const struct rule *r = rule_of(node);
     const enum imp_status why =
         r ? imp__kind_find(scene->ctx, (enum imp_concept)r->concept, node, &none)
-          : imp__kind_choose(scene->ctx, node, integrator_at, NULL, &none);
+          : imp__kind_choose(scene->ctx, node, stand_in_of(node)->at, NULL, &none);
     snprintf(first, sizeof first, "%s", imp_last_error(scene->ctx));
     int k = 1;
     for (size_t n = 0; k < s.n; k++) {

@@ -16,7 +16,7 @@ static const struct {
      "path direct depth aov moment stam elements prb prb_basic "
      "direct_projective prb_projective prbvolpath volpath volpathmis ptracer "
      "photons light bdpt stokes"},
-    {"film", "hdrfilm specfilm"},
+    {"film", "hdrfilm specfilm ldrfilm tiledhdrfilm mfilm"},
     {"sampler", "independent stratified multijitter orthogonal ldsampler"},
     {"medium", "graded homogeneous heterogeneous"},
     {"phase", "isotropic hg rayleigh tabphase sggx blendphase"},

@@ -245,7 +245,7 @@ static enum imp_status constant_input(struct imp_scene *scene, const struct writ
     struct imp__color color = {.count = 1};
     struct imp__color_ask ask = {.ctx = ctx,
                                  .arena = &scene->arena,
-                                 .mode = scene->mode,
+                                 .mode = in->vector ? IMP_RGB : scene->mode,
                                  .role = d->role,
                                  .scalar = in->scalar,
                                  .any_size = d->flags & IMP_INPUT_EXTINCTION,
@@ -290,9 +290,13 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
                         .child = imp__node_child(node, d->name)};
     imp__node_ask(node, d->name);
     w.object = w.child && imp__color_is_object(w.child->node);
-    if (d->flags & (IMP_INPUT_BUMP | IMP_INPUT_VECTOR) && (w.prop || w.object))
+    in->vector = d->flags & IMP_INPUT_VECTOR && w.object && !w.prop &&
+                 imp__color_is_raw(w.child->node);
+    if (d->flags & (IMP_INPUT_BUMP | IMP_INPUT_VECTOR) && (w.prop || w.object) &&
+        !in->vector)
         return imp__prop_error(scene->ctx, node, w.prop, IMP_E_SCENE,
-                               "'%s' must be a texture", d->name);
+                               "'%s' must be a texture%s", d->name,
+                               d->flags & IMP_INPUT_VECTOR ? ", or a rawconstant" : "");
     if (!w.prop && w.child && !w.object) {
         w.child->used = true;
         return texture_input(scene, node, w.child->node, name, d, in);

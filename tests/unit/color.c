@@ -207,6 +207,22 @@ static enum imp_status object(struct imp_node *n, enum imp_role role, imp_spec *
     return strcmp(c.key, "value") != 0 ? IMP_E_ARG : st;
 }
 
+/* Linear sRGB of Planck's law, W m^-2 sr^-1 nm^-1, by 1 nm; Y of 1 at all wavelengths is 1. */
+static void planck_colour(double T, double rgb[3])
+{
+    const double h = 6.62607015e-34, c = 299792458, k = 1.380649e-23;
+    double xyz[3] = {0}, y = 0;
+    for (int nm = 360; nm <= 830; nm++) {
+        const double l = nm * 1e-9;
+        const double B =
+            2 * h * c * c / pow(l, 5) / (exp(h * c / (l * k * T)) - 1) * 1e-9;
+        for (int a = 0; a < 3; a++) xyz[a] += B * imp__cie_lookup(imp__cie_xyz[a], nm);
+        y += imp__cie_lookup(imp__cie_xyz[1], nm);
+    }
+    for (int a = 0; a < 3; a++) xyz[a] /= y;
+    imp__xyz_to_rgb(xyz, rgb);
+}
+
 static void objects(void)
 {
     imp_spec v;
@@ -251,8 +267,18 @@ static void objects(void)
     tap_ok(object(raw, IMP_REFLECTANCE, &v, &n) == IMP_OK && n == 3 && v[2] == 6,
            "rawconstant");
 
-    tap_ok(object(node_make("blackbody"), IMP_EMISSION, &v, &n) == IMP_E_UNSUPPORTED,
-           "blackbody # %s", imp_last_error(ctx));
+    tap_ok(object(node_make("blackbody"), IMP_EMISSION, &v, &n) == IMP_E_SCENE &&
+               strstr(imp_last_error(ctx), "temperature"),
+           "blackbody without temperature # %s", imp_last_error(ctx));
+    struct imp_node *hot = node_make("blackbody");
+    prop_add(hot, "temperature", IMP_PROP_FLOAT)->number[0] = 5000;
+    prop_add(hot, "scale", IMP_PROP_FLOAT)->number[0] = 2;
+    double rgb[3], worst = 0;
+    planck_colour(5000, rgb);
+    const bool made = object(hot, IMP_EMISSION, &v, &n) == IMP_OK && n == 3;
+    for (int c = 0; c < 3; c++) worst = fmax(worst, fabs(v[c] / (2 * rgb[c]) - 1));
+    tap_ok(made && worst < 2e-3, "blackbody in rgb is its colour # %g %g %g, within %.1e",
+           v[0], v[1], v[2], worst);
     tap_ok(object(node_make("srgb"), IMP_EMISSION, &v, &n) == IMP_E_SCENE,
            "srgb without colour # %s", imp_last_error(ctx));
     prop_add(u, "vlaue", IMP_PROP_FLOAT);

@@ -5,6 +5,7 @@
 #include "base/drops.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include <math.h>
 
 enum { WALKS = 60, PARTS = 5 };
 
@@ -43,6 +44,81 @@ static enum imp_status sky(imp_context *ctx, const char *radiance, float *pixel)
     imp_film_destroy(film);
     imp_scene_destroy(s);
     return st;
+}
+
+/* A box at c, of half a side h, as vertices and triangles n to n + 7 and so on. */
+static void box_add(float c, float h, uint32_t n, float *p, uint32_t *triangle)
+{
+    static const uint32_t side[6][4] = {{0, 1, 3, 2}, {4, 6, 7, 5}, {0, 4, 5, 1},
+                                        {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 5, 7, 3}};
+    for (uint32_t k = 0; k < 8; k++)
+        for (uint32_t a = 0; a < 3; a++) p[3 * k + a] = c + (k >> (2 - a) & 1 ? h : -h);
+    for (uint32_t k = 0; k < 6; k++)
+        for (uint32_t a = 0; a < 6; a++) {
+            static const uint32_t corner[6] = {0, 1, 2, 0, 2, 3};
+            triangle[6 * k + a] = n + side[k][corner[a]];
+        }
+}
+
+/* Two boxes of one mesh overlap in a corner, as parts of scanned meshes do: where the second
+ * begins, the first has not ended, and a walk is dropped. The fog is none (sigma_t 0), the sky
+ * is 1: every other walk carries 1, so the mean of the picture is one less their share. */
+static void overlap(imp_context *ctx)
+{
+    float position[48];
+    uint32_t triangle[72];
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_film_info info = {.size = sizeof info};
+    imp_scene *s;
+    imp_film *film = NULL;
+    double mean = 0;
+    box_add(0, 1, 0, position, triangle);
+    box_add(1.02f, .05f, 8, position + 24, triangle + 36);
+    test_must(ctx, imp_scene_create(ctx, NULL, &s));
+    imp_scene_begin(s, "integrator", "volpath", NULL, NULL);
+    imp_scene_end(s);
+    imp_scene_begin(s, "sensor", "perspective", NULL, NULL);
+    imp_scene_transform(
+        s, "to_world",
+        (double[16]){-.7071067811865476, -.408248290463863, -.5773502691896258, 4, 0,
+                     .816496580927726, -.5773502691896258, 4, .7071067811865476,
+                     -.408248290463863, -.5773502691896258, 4, 0, 0, 0, 1});
+    imp_scene_begin(s, "film", "hdrfilm", NULL, NULL);
+    imp_scene_integer(s, "width", 32);
+    imp_scene_integer(s, "height", 32);
+    imp_scene_begin(s, "rfilter", "box", NULL, NULL);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_begin(s, "emitter", "constant", NULL, NULL);
+    imp_scene_end(s);
+    imp_scene_begin(s, "shape", "mesh", NULL, NULL);
+    imp_scene_mesh(s, 16, 24, position, NULL, NULL, triangle);
+    imp_scene_begin(s, "bsdf", "null", NULL, NULL);
+    imp_scene_end(s);
+    imp_scene_begin(s, "medium", "homogeneous", NULL, "interior");
+    imp_scene_float(s, "sigma_t", 0);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    test_must(ctx, imp_scene_commit(s));
+    run.spp = 64;
+    const enum imp_status st = imp_render(s, &run, &film);
+    tap_ok(st == IMP_OK, "overlapping parts of a mesh leave a picture # %s",
+           st == IMP_OK ? "" : imp_last_error(ctx));
+    if (st == IMP_OK) {
+        test_must(ctx, imp_film_get_info(film, &info));
+        for (int k = 0; k < 32 * 32 * 3; k++)
+            mean += imp_film_mean(film)[k] / (32 * 32 * 3.);
+        const double share = (double)info.dropped / (32 * 32 * 64);
+        tap_ok(info.dropped > 2 &&
+                   info.dropped == info.dropped_by_cause[IMP_DROP_MEDIUM] && share < 1e-3,
+               "some walks are dropped there, and counted # %llu of 65536",
+               (unsigned long long)info.dropped);
+        tap_ok(fabs(mean - (1 - share)) < 1e-6, "their share is missing # %.8f, %.8f",
+               mean, 1 - share);
+    }
+    imp_film_destroy(film);
+    imp_scene_destroy(s);
 }
 
 int main(void)
@@ -89,12 +165,22 @@ int main(void)
                strstr(said, "--pixel 0,0 --sample 0 --seed 3") &&
                strstr(said, " --points sobol"),
            "too many for the budget # %s", said);
+    struct imp_drops holes = {.by_cause = {[IMP_DROP_MEDIUM] = 1000}};
+    tap_ok(imp__drops_budget(ctx, &holes, 0, 1e6, "") == IMP_OK &&
+               imp__drops_budget(ctx, &holes, 1e-4, 1e6, "") == IMP_E_PATHS,
+           "1 of 1000 walks at holes are few, unless the run has a budget");
+    holes.by_cause[IMP_DROP_NAN] = 102;
+    tap_ok(imp__drops_budget(ctx, &holes, 0, 1e6, "") == IMP_E_PATHS,
+           "they make no room for other causes");
+    holes = (struct imp_drops){.by_cause = {[IMP_DROP_MEDIUM] = 1002}};
+    tap_ok(imp__drops_budget(ctx, &holes, 0, 1e6, "") == IMP_E_PATHS, "more are many");
     float pixel = 0;
     tap_ok(sky(ctx, "1e38", &pixel) == IMP_OK && pixel == 1e38f, "radiance 1e38 # %g",
            (double)pixel);
     tap_ok(sky(ctx, "1e39", &pixel) == IMP_E_PATHS &&
                sky(ctx, "1e200", &pixel) == IMP_E_PATHS,
            "radiance that a float cannot hold is a bad walk # %s", imp_last_error(ctx));
+    overlap(ctx);
     imp_context_destroy(ctx);
     return tap_done();
 }

@@ -7,6 +7,7 @@
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "walk/core/walk.h"
+#include <time.h>
 
 static imp_context *ctx;
 static size_t live, peak;
@@ -416,6 +417,30 @@ static void nested(void)
     }
 }
 
+/* Properties that nobody reads: 65,536 of them took over a minute of processor time when each
+ * was looked at beside all others. */
+static void unread(void)
+{
+    enum { N = 65536 };
+    static const char one[] = "<float name='radiu%05d' value='1'/>";
+    const size_t size = 256 + N * sizeof one;
+    char *xml = malloc(size);
+    struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
+    imp_scene *s = NULL;
+    if (!xml) return;
+    size_t n =
+        (size_t)snprintf(xml, size, "<scene version='3.0.0'><shape type='sphere'>");
+    for (int k = 0; k < N; k++) n += (size_t)snprintf(xml + n, size - n, one, k);
+    n += (size_t)snprintf(xml + n, size - n, "</shape></scene>");
+    const clock_t begun = clock();
+    const enum imp_status st = imp_scene_load_string(ctx, xml, n, "test", &o, &s);
+    const double seconds = (double)(clock() - begun) / CLOCKS_PER_SEC;
+    tap_ok(st == IMP_E_SCENE &&
+               strstr(imp_last_error(ctx), "'radiu00000', 'radiu00001'") && seconds < 5,
+           "%d unknown properties are refused # %.2g s", N, seconds);
+    free(xml);
+}
+
 int main(void)
 {
     struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
@@ -431,6 +456,7 @@ int main(void)
     many_shapes();
     small_texture();
     nested();
+    unread();
     imp_context_destroy(ctx);
     tap_ok(live == 0, "all memory is given back");
     return tap_done();

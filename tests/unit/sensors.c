@@ -379,7 +379,7 @@ static void films(void)
         film_refused(n, IMP_E_SCENE, strings[k].words);
     }
     film_refused(node_new("film", "tapefilm"), IMP_E_UNSUPPORTED,
-                 "there are: hdrfilm, specfilm");
+                 "it has hdrfilm, specfilm");
     n = node_new("film", "hdrfilm");
     imp__node_add_child(&world.arena, n, node_new("rfilter", "sinc"), NULL, n->loc);
     film_refused(n, IMP_E_UNSUPPORTED, "it has box, tent, gaussian");

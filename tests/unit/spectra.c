@@ -2,14 +2,19 @@
  *
  * Spectra: upsampling of colours against their colour under daylight, against Mitsuba's
  * table and against differences; every form's derivatives; wavelengths of walks. */
+#include "base/pool.h"
 #include "color/cie.h"
+#include "color/color_tables.h"
 #include "color/convert.h"
 #include "color/rgb.h"
 #include "color/rgb_basis.h"
 #include "color/wavelength.h"
 #include "imp_tap.h"
+#include "kind/bsdf/presets.h"
 #include "kind/texture/lifted_texels.h"
 #include "math/rng.h"
+#include <stdatomic.h>
+#include <stdlib.h>
 #include <string.h>
 
 static imp_context *ctx;
@@ -200,7 +205,8 @@ static bool lifted_alike(const struct imp__lifted_texels *t, enum imp__lift_rule
         if (rule == IMP__LIFT_ANY_SIZE || (rule == IMP__LIFT_BY_SIZE && beyond))
             imp__lift_unbounded(rgb, &l);
         else imp__lift_reflectance(rgb, &l);
-        const struct imp__lifted *is = &t->texel[i].lifted;
+        struct imp__lifted own;
+        const struct imp__lifted *is = imp__lifted_texel(t, i, &own);
         if (l.scale != is->scale || memcmp(l.c, is->c, sizeof l.c) != 0 ||
             memcmp(l.d_c, is->d_c, sizeof l.d_c) != 0)
             return false;
@@ -240,6 +246,99 @@ static void texels(int threads)
     imp_context_destroy(with);
 }
 
+/* Texels that differ all: part of them is lifted by the walks that look them up. Threads look
+ * up the same ones at the same time, and each finds its colour's spectrum. */
+struct racing {
+    const struct imp__lifted_texels *t;
+    _Atomic int wrong;
+};
+static enum imp_status race(size_t first, size_t end, void *payload)
+{
+    struct racing *r = payload;
+    (void)first, (void)end;
+    for (size_t i = 0; i < r->t->n; i++) {
+        const double rgb[3] = {r->t->data[3 * i], r->t->data[3 * i + 1],
+                               r->t->data[3 * i + 2]};
+        struct imp__lifted own, l;
+        const struct imp__lifted *is = imp__lifted_texel(r->t, i, &own);
+        if (i % 64) continue; /* to find is 1000 times as fast as to lift */
+        imp__lift_reflectance(rgb, &l);
+        if (memcmp(l.c, is->c, sizeof l.c) != 0 ||
+            memcmp(l.d_c, is->d_c, sizeof l.d_c) != 0)
+            r->wrong++;
+    }
+    return IMP_OK;
+}
+
+static size_t there(const struct imp__lifted_texels *t)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < t->n; i++) n += t->state[i] != 0;
+    return n;
+}
+
+static void texels_of_many_colours(void)
+{
+    enum { N = 100000 };
+    struct imp_context_options options = IMP_CONTEXT_OPTIONS_INIT;
+    struct imp_arena own;
+    struct imp__lifted_texels t, same;
+    options.threads = 4;
+    imp_context *with = NULL;
+    float *data = malloc(3 * N * sizeof *data);
+    if (!data || imp_context_create(&options, &with) != IMP_OK) return;
+    imp__arena_init(&own, with);
+    const struct imp_build b = {.ctx = with, .arena = &own};
+    for (uint32_t i = 0; i < 3 * N; i++) data[i] = (float)imp__u01(imp__key(9, i, 0), 0);
+    bool good = imp__lifted_texels_make(&b, data, N, &t) == IMP_OK &&
+                imp__lifted_texels_make(&b, data, N, &same) == IMP_OK;
+    if (good) imp__lifted_texels_update(&t, IMP__LIFT_REFLECTANCE);
+    const size_t before = good ? there(&t) : 0;
+    struct racing r = {&t, 0};
+    good = good && before > 0 && before < N / 2 &&
+           imp__parallel_ranges(with, 4, 1, race, &r) == IMP_OK;
+    tap_ok(good && r.wrong == 0 && there(&t) == N,
+           "texels of 100,000 colours are lifted when looked up # %zu before", before);
+    same.whole = true;
+    if (good) imp__lifted_texels_update(&same, IMP__LIFT_REFLECTANCE);
+    tap_ok(good && there(&same) == N, "or all at once");
+    /* A colour that changes is lifted anew. */
+    data[0] = 0.75f;
+    if (good) imp__lifted_texels_update(&t, IMP__LIFT_REFLECTANCE);
+    tap_ok(good && race(0, 0, &r) == IMP_OK && r.wrong == 0, "and anew when they change");
+    imp__arena_free(&own);
+    imp_context_destroy(with);
+    free(data);
+}
+
+/* ---- Metals by name -------------------------------------------------------------------- */
+
+/* Amorphous carbon: its table by wavelengths, integrated against the observer without an
+ * illuminant, is its colour in the mode rgb. */
+static void carbon(void)
+{
+    const struct imp__metal *m = imp__metal_find("a-C");
+    const struct imp__conductor *preset = imp__conductor_find("a-C");
+    double worst = 0;
+    for (int part = 0; part < 2; part++) {
+        const double *value = part ? m->k : m->eta,
+                     *want = part ? preset->k : preset->eta;
+        double xyz[3] = {0, 0, 0}, y = 0, rgb[3];
+        for (int nm = 365, i = 0; nm <= 830; nm++) {
+            while (m->nm[i + 1] < nm) i++;
+            const double t = (nm - m->nm[i]) / (m->nm[i + 1] - m->nm[i]);
+            for (int c = 0; c < 3; c++)
+                xyz[c] += imp__cie_lookup(imp__cie_xyz[c], nm) *
+                          (value[i] + t * (value[i + 1] - value[i]));
+            y += imp__cie_lookup(imp__cie_xyz[1], nm);
+        }
+        for (int c = 0; c < 3; c++) xyz[c] /= y;
+        imp__xyz_to_rgb(xyz, rgb);
+        for (int c = 0; c < 3; c++) worst = fmax(worst, fabs(rgb[c] - want[c]));
+    }
+    tap_ok(worst < 2e-3, "a-C is its preset # within %.2g", worst);
+}
+
 int main(void)
 {
     const struct imp_context_options options = {.size = sizeof options, .threads = 1};
@@ -251,6 +350,8 @@ int main(void)
     lanes();
     texels(1);
     texels(3);
+    texels_of_many_colours();
+    carbon();
     for (int q = 0; q < 6; q++) {
         static const double rgb[6][3] = {{.2, .5, .9}, {.9, .05, .05}, {1, 0, 0},
                                          {.1, .8, .1}, {.5, .5, .1},   {.73, .72, .69}};

@@ -127,8 +127,8 @@ enum imp_status imp__conductor_prepare(const struct imp_build *b)
         if (!m)
             IMP_TRY(imp_build_error(b, "material", IMP_E_UNSUPPORTED,
                                     "'%s' has no table of wavelengths; in spectral modes "
-                                    "there are Ag, Al, Au, Cr and Cu: give 'eta' and 'k' "
-                                    "as spectra",
+                                    "there are Ag, Al, Au, Cr, Cu, W and a-C: give 'eta' "
+                                    "and 'k' as spectra",
                                     name));
         IMP_TRY(spectrum_add(b, "eta", loc, m->n, m->nm, m->eta));
         IMP_TRY(spectrum_add(b, "k", loc, m->n, m->nm, m->k));

@@ -4,6 +4,7 @@
  * are as many samples as the kind rounds up to, so that a file costs the same everywhere
  * (docs/scene-format.md 10). */
 #include "base/compiler.h"
+#include "kind/registry.h"
 #include "sensor_film.h"
 #include <string.h>
 
@@ -47,22 +48,32 @@ static int64_t round_ldsampler(int64_t n)
     return r;
 }
 
+#define SIZE sizeof(struct sampler)
+static const struct sampler {
+    size_t size;
+    const char *name;
+    int64_t (*round)(int64_t n);
+    bool jitter, strength;
+} kinds[] = {{SIZE, "independent", round_none, false, false},
+             {SIZE, "stratified", round_square, true, false},
+             {SIZE, "multijitter", round_multijitter, true, false},
+             {SIZE, "orthogonal", round_orthogonal, true, true},
+             {SIZE, "ldsampler", round_ldsampler, false, false}};
+
+const void *imp__sampler_at(const void *payload, size_t i)
+{
+    (void)payload;
+    return i < imp_count(kinds) ? &kinds[i] : NULL;
+}
+
 enum imp_status imp__sampler_build(const struct imp_build *b, int *spp,
                                    enum imp_points *points)
 {
-    static const struct {
-        const char *name;
-        int64_t (*round)(int64_t n);
-        bool jitter, strength;
-    } kinds[] = {{"independent", round_none, false, false},
-                 {"stratified", round_square, true, false},
-                 {"multijitter", round_multijitter, true, false},
-                 {"orthogonal", round_orthogonal, true, true},
-                 {"ldsampler", round_ldsampler, false, false}};
     enum imp_status st = IMP_OK;
     int64_t count = 4, ignored;
     bool jitter = true;
     size_t kind = 0;
+    const void *none;
 
     if (!b->node) {
         *spp = 4;
@@ -72,10 +83,7 @@ enum imp_status imp__sampler_build(const struct imp_build *b, int *spp,
     while (kind < imp_count(kinds) && strcmp(kinds[kind].name, b->node->type) != 0)
         kind++;
     if (kind == imp_count(kinds))
-        IMP_TRY(
-            imp_build_error(b, NULL, IMP_E_UNSUPPORTED,
-                            "no such sampler in this version; there are: independent, "
-                            "stratified, multijitter, orthogonal, ldsampler"));
+        IMP_TRY(imp__kind_choose(b->ctx, b->node, imp__sampler_at, NULL, &none));
     IMP_TRY(imp_build_int(b, "sample_count", 4, 1, SPP_MAX, &count));
     IMP_TRY(imp_build_int(b, "seed", 0, 0, INT64_MAX, &ignored));
     if (kinds[kind].jitter) IMP_TRY(imp_build_bool(b, "jitter", true, &jitter));

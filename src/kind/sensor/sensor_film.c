@@ -4,6 +4,7 @@
 #include "sensor_film.h"
 #include "base/compiler.h"
 #include "kind/filter/filter.h"
+#include "kind/registry.h"
 #include "sensor_response.h"
 #include <string.h>
 
@@ -93,11 +94,23 @@ static enum imp_status filter_read(const struct imp_build *b, struct imp_film_de
     return imp__filter_build(b, filter, &f->filter);
 }
 
+static const struct film {
+    size_t size;
+    const char *name;
+} films[] = {{sizeof(struct film), "hdrfilm"}, {sizeof(struct film), "specfilm"}};
+
+const void *imp__film_at(const void *payload, size_t i)
+{
+    (void)payload;
+    return i < imp_count(films) ? &films[i] : NULL;
+}
+
 enum imp_status imp__film_desc_build(const struct imp_build *b, struct imp_film_desc *out)
 {
     enum imp_status st = IMP_OK;
     struct imp_film_desc f = {0};
     struct imp_build own = *b;
+    const void *kind;
     bool ignored;
 
     if (!own.node) {
@@ -106,11 +119,8 @@ enum imp_status imp__film_desc_build(const struct imp_build *b, struct imp_film_
         if (!own.node)
             IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "out of memory for a film"));
     }
-    const bool curves = strcmp(own.node->type, "specfilm") == 0;
-    if (!curves && strcmp(own.node->type, "hdrfilm") != 0)
-        IMP_TRY(imp_build_error(&own, NULL, IMP_E_UNSUPPORTED,
-                                "no such film in this version; there are: hdrfilm, "
-                                "specfilm"));
+    IMP_TRY(imp__kind_choose(b->ctx, own.node, imp__film_at, NULL, &kind));
+    const bool curves = kind == &films[1];
     IMP_TRY(size_read(&own, &f));
     if (curves) IMP_TRY(imp__responses_read(&own, &f));
     IMP_TRY(format_read(&own, &f));

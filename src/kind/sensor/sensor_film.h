@@ -21,4 +21,8 @@ enum imp_status imp__film_bins_build(const struct imp_build *b, const char *text
 enum imp_status imp__sampler_build(const struct imp_build *b, int *spp,
                                    enum imp_points *points);
 
+/* The films and the samplers that there are, for imp__kind_choose. */
+const void *imp__film_at(const void *payload, size_t i);
+const void *imp__sampler_at(const void *payload, size_t i);
+
 #endif

@@ -176,7 +176,8 @@ static void input_eval(const struct imp_input *input, const struct imp_texcoord 
 {
     if (imp_unlikely(input->bump)) {
         *value = bumped(input, at);
-    } else if (imp_unlikely(input->vector)) { /* no colour: whatever the walk carries */
+    } else if (imp_unlikely(input->vector) &&
+               input->texture) { /* no colour: whatever the walk carries */
         struct imp_texcoord plain = *at;
         plain.carried = NULL;
         input->texture->ops->eval(input->texture, &plain, false, value);

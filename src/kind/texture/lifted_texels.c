@@ -1,13 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Spectra of RGB texels: lifted when texels change, on all threads, each colour once where
- * it is met again; value, reverse and forward derivatives of their interpolation at a
- * wavelength. */
+ * it is met again, or by the first walk that looks one up; value, reverse and forward
+ * derivatives of their interpolation at a wavelength.
+ *
+ * What a texel is lifted to depends on its colour alone, so it does not count when that is
+ * done, nor by whom. */
 #include "lifted_texels.h"
 #include "base/context.h"
 #include "base/pool.h"
 #include "color/rgb_basis.h"
 #include "math/vec.h"
+#include <stdatomic.h>
 #include <string.h>
 
 /* A texel that was made from the same colour, by a hash of it: pictures have far fewer
@@ -19,6 +23,20 @@ struct known {
 };
 #define KNOWN_BITS 17
 #define LEAST      1024 /* texels of a thread */
+
+/* Colours that a thread lifts of its texels before walks look them up: so many, and a part of them.
+ * Where colours are met again these are all; where they are not, a picture of millions of
+ * colours would take its time before the first walk. */
+#define LIFTED_FIRST 8192
+#define LIFTED_PART  32
+
+/* State of a texel's spectrum; IS_WRITTEN while one thread writes it. */
+enum { IS_NOT, IS_WRITTEN, IS_THERE };
+
+static _Atomic uint8_t *state_of(const struct imp__lifted_texels *t, size_t k)
+{
+    return (_Atomic uint8_t *)&t->state[k];
+}
 
 static uint32_t *known_at(const struct known *k, const float colour[3])
 {
@@ -50,24 +68,29 @@ static enum imp_status texels_lift(size_t first, size_t end, void *payload)
     const struct lifting *l = payload;
     struct imp__lifted_texels *t = l->texels;
     struct known known = {.bits = 4};
-    struct imp__lifter by;
+    size_t left = LIFTED_FIRST + (end - first) / LIFTED_PART;
     while (known.bits < KNOWN_BITS && (size_t)1 << known.bits < 2 * (end - first))
         known.bits++;
     if (t->n < UINT32_MAX)
         known.texel = imp__alloc(t->ctx, (size_t)1 << known.bits, sizeof *known.texel);
-    imp__lifter_make(&by);
     for (size_t i = first; i < end; i++) {
         struct imp__lifted_texel *to = &t->texel[i];
         const float *p = t->data + 3 * i;
-        if (!l->all && memcmp(p, to->of, sizeof to->of) == 0) continue;
+        if (!l->all && t->state[i] == IS_THERE && memcmp(p, to->of, sizeof to->of) == 0)
+            continue;
+        t->state[i] = IS_NOT;
         uint32_t *at = known.texel ? known_at(&known, p) : NULL;
         const struct imp__lifted_texel *same = at && *at ? &t->texel[*at - 1] : NULL;
         if (same && memcmp(p, same->of, sizeof same->of) == 0) {
             *to = *same;
+            t->state[i] = IS_THERE;
             continue;
         }
-        lift(t, &by, p, &to->lifted);
+        if (left == 0 && !t->whole) continue;
+        left -= left > 0;
+        lift(t, t->by, p, &to->lifted);
         memcpy(to->of, p, sizeof to->of);
+        t->state[i] = IS_THERE;
         if (at) *at = (uint32_t)i + 1;
     }
     imp__release(t->ctx, known.texel);
@@ -80,8 +103,12 @@ enum imp_status imp__lifted_texels_make(const struct imp_build *b, const float *
     *out = (struct imp__lifted_texels){.ctx = b->ctx, .data = data, .n = n};
     if (b->linear_colors) return IMP_OK;
     out->texel = imp__arena_take(b->arena, n, sizeof *out->texel);
-    if (!out->texel)
+    out->state = imp__arena_array(b->arena, n, sizeof *out->state);
+    struct imp__lifter *by = imp__arena_take(b->arena, 1, sizeof *by);
+    if (!out->texel || !out->state || !by)
         return imp__error(b->ctx, IMP_E_NOMEM, "texels do not fit as spectra");
+    imp__lifter_make(by);
+    out->by = by;
     return IMP_OK;
 }
 
@@ -97,11 +124,37 @@ void imp__lifted_texels_update(struct imp__lifted_texels *t, enum imp__lift_rule
         (void)texels_lift(0, t->n, &l);
 }
 
+static const struct imp__lifted *lift_now(const struct imp__lifted_texels *t, size_t k,
+                                          struct imp__lifted *own)
+{
+    uint8_t was = IS_NOT;
+    const float *p = t->data + 3 * k;
+    lift(t, t->by, p, own);
+    if (atomic_compare_exchange_strong_explicit(state_of(t, k), &was, IS_WRITTEN,
+                                                memory_order_relaxed,
+                                                memory_order_relaxed)) {
+        t->texel[k].lifted = *own;
+        memcpy(t->texel[k].of, p, sizeof t->texel[k].of);
+        atomic_store_explicit(state_of(t, k), IS_THERE, memory_order_release);
+    }
+    return own;
+}
+
+const struct imp__lifted *imp__lifted_texel(const struct imp__lifted_texels *t, size_t k,
+                                            struct imp__lifted *own)
+{
+    if (imp_likely(atomic_load_explicit(state_of(t, k), memory_order_acquire) ==
+                   IS_THERE))
+        return &t->texel[k].lifted;
+    return lift_now(t, k, own);
+}
+
 /* Value of a texel at one wavelength and its derivatives by its three numbers. */
 static double texel_at(const struct imp__lifted_texels *t, size_t k, double nm,
                        double d[3])
 {
-    if (t->texel) return imp__lifted_value_d(&t->texel[k].lifted, nm, d);
+    struct imp__lifted own;
+    if (t->texel) return imp__lifted_value_d(imp__lifted_texel(t, k, &own), nm, d);
     imp__rgb_basis(nm, d);
     const float *p = t->data + 3 * k;
     return p[0] * d[0] + p[1] * d[1] + p[2] * d[2];
@@ -128,13 +181,14 @@ void imp__lifted_texels_eval(const struct imp__lifted_texels *t,
     if (!t->texel) {
         linear_eval(t, sum, carried, value);
     } else {
-        for (int j = 0; j < carried->n; j++) {
-            double at = 0;
-            for (int k = 0; k < sum->n; k++)
-                at += sum->weight[k] *
-                      imp__lifted_value(&t->texel[sum->texel[k]].lifted, carried->nm[j]);
-            (*value)[j] = at;
+        double at[4] = {0, 0, 0, 0};
+        for (int k = 0; k < sum->n; k++) {
+            struct imp__lifted own;
+            const struct imp__lifted *l = imp__lifted_texel(t, sum->texel[k], &own);
+            for (int j = 0; j < carried->n; j++)
+                at[j] += sum->weight[k] * imp__lifted_value(l, carried->nm[j]);
         }
+        for (int j = 0; j < carried->n; j++) (*value)[j] = at[j];
     }
     for (int j = carried->n; j < 4; j++) (*value)[j] = (*value)[0];
 }
@@ -176,6 +230,7 @@ void imp__lifted_texels_tangent(const struct imp__lifted_texels *t,
 double imp__lifted_texels_most(const struct imp__lifted_texels *t, size_t k)
 {
     const float *p = t->data + 3 * k;
-    if (t->texel) return imp__lifted_most(&t->texel[k].lifted);
+    struct imp__lifted own;
+    if (t->texel) return imp__lifted_most(imp__lifted_texel(t, k, &own));
     return fmax(fmax(p[0], p[1]), p[2]);
 }

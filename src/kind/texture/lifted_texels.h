@@ -2,7 +2,10 @@
  *
  * Texels of three channels where walks carry wavelengths: each is lifted to a spectrum,
  * and the spectra are interpolated. With the linear basis a texel's spectrum is linear in
- * its numbers, and nothing is kept. */
+ * its numbers, and nothing is kept.
+ *
+ * A texel is lifted when texels change, while colours are met again; in a picture of more
+ * colours, when a walk first looks the texel up. */
 #ifndef IMP_KIND_TEXTURE_LIFTED_TEXELS_H
 #define IMP_KIND_TEXTURE_LIFTED_TEXELS_H
 
@@ -25,8 +28,11 @@ struct imp__lifted_texels {
     const float *data; /* [n][3] */
     size_t n;
     enum imp__lift_rule rule;
-    bool made;                       /* by this rule */
+    bool made;  /* by this rule */
+    bool whole; /* all texels are looked up at once, as bounds need them; 0 after make */
     struct imp__lifted_texel *texel; /* [n]; NULL: linear */
+    uint8_t *state;                  /* [n] of texel, atomic: 0 not lifted, ... */
+    const struct imp__lifter *by;
 };
 
 /* The texels that a lookup sees, and their weights: n of them. */
@@ -54,6 +60,9 @@ void imp__lifted_texels_tangent(const struct imp__lifted_texels *t,
                                 const struct imp__texel_sum *sum,
                                 const struct imp_carried *carried, int param,
                                 imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot);
+/* The spectrum of texel k, unless linear; *own has it if the texel does not keep it yet. */
+const struct imp__lifted *imp__lifted_texel(const struct imp__lifted_texels *t, size_t k,
+                                            struct imp__lifted *own);
 /* No less than texel k at any wavelength. */
 double imp__lifted_texels_most(const struct imp__lifted_texels *t, size_t k);
 

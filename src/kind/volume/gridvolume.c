@@ -99,6 +99,7 @@ static enum imp_status build(const struct imp_build *b, void *self,
                                 max_value, most));
     v->spectral = v->channels == 3 && (b->mode == IMP_SPECTRAL || b->mode == IMP_SINGLE);
     if (v->spectral) IMP_TRY(imp__lifted_texels_make(b, v->data, cells, &v->lifted));
+    v->lifted.whole = true; /* for majorants */
     changed(tex);
     const size_t grid[4] = {(size_t)v->n[2], (size_t)v->n[1], (size_t)v->n[0], 3};
     IMP_TRY(imp_build_texels(b, "data", v->data, v->channels == 1 ? 3 : 4, grid,

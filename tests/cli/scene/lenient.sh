@@ -18,6 +18,14 @@ echo "+ all of it at once" >&2
 importon render -q -o none.exr lenient.xml 2>&1 | sed 's/; it has [^;]*//' >&2
 echo "+ lenient" >&2
 importon render --lenient --spp 4 -o lenient.exr lenient.xml > /dev/null || exit 9
+echo "+ a film and a sampler of old versions" >&2
+sed -e 's/hdrfilm/ldrfilm/' -e 's|<rfilter type="sinc"/></film>|<string name="file_format" value="png"/><float name="gamma" value="2.2"/><rfilter type="box"/></film><sampler type="halton"><integer name="sample_count" value="2"/></sampler>|' lenient.xml > old.xml || exit 9
+importon render -q -o none.exr old.xml 2>&1 | sed 's/; it has [^;]*//' >&2
+importon render --lenient --spp 4 -o lenient.exr old.xml 2>&1 > /dev/null | grep -e film -e sampler >&2
+importon info old.xml | grep -e without -e integrator -e shapes || exit 9
+grep -v -e stokes -e pplastic -e polarised -e shiny -e timed -e ellipsoids old.xml | sed -e 's|<ref.*/></shape>|</shape>|' -e 's/halton/independent/' > film.xml || exit 9
+importon render -q -o none.exr film.xml
+importon info film.xml | grep -e without -e sensor -e shapes || exit 9
 echo "+ info" >&2
 importon info lenient.xml | grep -e without -e integrator -e shapes || exit 9
-rm lenient.xml lenient.exr
+rm lenient.xml old.xml film.xml lenient.exr
