@@ -941,7 +941,8 @@ enum imp_concept {
  * name. Before its first scene. The table is copied; its strings, inputs and functions must
  * live as long as the context. A table of an older header (a smaller `size`) is taken if it
  * has all functions that are required.
- * @param ops  the table of the concept, struct imp_bsdf_ops, ...; a volume has that of a
+ * @param of  the concept.
+ * @param ops  its table, struct imp_bsdf_ops, ...; a volume has that of a
  *             texture, and `bound` makes it fit for an extinction.
  * @param layout  what the table was compiled with; read during the call alone.
  * @return IMP_OK, IMP_E_ARG (another version of this header, a struct of another size, no
@@ -949,7 +950,7 @@ enum imp_concept {
  * than IMP_INPUTS_MAX inputs, the name taken by a built-in kind or one registered before, a
  * scene made before; the message says which) or IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
-imp_register_kind(imp_context *context, enum imp_concept concept, const void *ops,
+imp_register_kind(imp_context *context, enum imp_concept of, const void *ops,
                   const struct imp_kinds_layout *layout);
 
 /* One of each concept, with the layout of the caller's header. */
