@@ -4,6 +4,7 @@
  * the first 2^k passes are a node of the tree over passes, so what is there and the next
  * sweep are its two children, and one set of sums is enough for a picture that can be had
  * at any time. */
+#include "film_nets.h"
 #include "film_patch.h"
 #include <float.h>
 #include <stdio.h>
@@ -36,6 +37,7 @@ struct render {
     int sets, pass_sets; /* in all of them, in a pass */
     double *set_values;  /* [threads][n] box: sums of a set */
     double *set_patches; /* [threads] as patches, of a set: sums of w and w v alone */
+    double *parts;       /* [threads][IMP_NET_PARTS][n] nets: sums of the quarters */
     int sweep_spp;       /* samples of a pixel in the sweep at work */
 };
 
@@ -109,6 +111,18 @@ static void set_take(const struct render *r, const struct imp_tile *t, int worke
     }
 }
 
+/* Sample k of a pixel, in the quarter of its net; the net's last adds to the tile's sums. */
+static void net_take(const struct render *r, int worker, const struct imp_sample *s,
+                     int k, double *sums)
+{
+    const int n = r->patch.n, of = r->set * IMP_NET_PARTS, at = k % of;
+    const size_t size = IMP_NET_PARTS * (size_t)n;
+    double *parts = r->parts + (size_t)worker * apart(size);
+    if (at == 0) memset(parts, 0, size * sizeof *parts);
+    for (int c = 0; c < n; c++) parts[at / r->set * n + c] += s->value[c];
+    if (at + 1 == of) imp__nets_add(sums, parts, n);
+}
+
 /* First sample of a pass; passes end with sets. */
 static int pass_begin(const struct render *r, int pass)
 {
@@ -139,6 +153,8 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
             for (int k = s0; k < s1; k++) {
                 s.index = r->picture->first + (int64_t)k * step;
                 sample_take(r, w, &s);
+                if (r->sums.nets)
+                    net_take(r, w->index, &s, k, tile + imp__film_sums_pixels(&r->sums));
                 if (imp_unlikely(r->set > 1)) {
                     if (k == s0 || k >= first + n_set)
                         imp__set_at(r->set, r->period, k, &first, &n_set);
@@ -226,6 +242,7 @@ static enum imp_status render_plan(struct render *r, imp_context *ctx)
                                .margin = r->tiles.margin,
                                .side = r->patch.tile_side,
                                .set = r->sets > 0 ? (double)r->period / r->sets : r->set,
+                               .nets = p->nets && imp__nets_whole(r->period, r->set),
                                .across = r->tiles.across,
                                .down = r->tiles.down};
     r->tiles.size = imp__film_sums_tile(&r->sums) * sizeof(double);
@@ -248,6 +265,12 @@ static enum imp_status buffers_create(struct render *r, imp_context *ctx)
                                    apart((size_t)r->patch.n) * sizeof(double));
         r->set_patches = imp__alloc(ctx, (size_t)ctx->threads,
                                     apart(imp__patch_size(&r->patch)) * sizeof(double));
+    }
+    if (r->sums.nets) {
+        r->parts = imp__alloc(ctx, (size_t)ctx->threads,
+                              apart(IMP_NET_PARTS * (size_t)r->patch.n) * sizeof(double));
+        if (!r->parts)
+            return imp__error(ctx, IMP_E_NOMEM, "no memory for sets of samples");
     }
     if (!r->values || !r->patches || (r->set > 1 && (!r->set_values || !r->set_patches)))
         return imp__error(ctx, IMP_E_NOMEM, "no memory for samples of %d channels",
@@ -323,9 +346,9 @@ static enum imp_status render_run(struct render *r, imp_film *preview, int64_t *
     }
     if (st == IMP_OK || st == IMP_CANCELLED) {
         const double walks = pixels * (double)imp_max(*spp, (int64_t)r->pass_spp);
-        const enum imp_status dropped = imp__drops_budget(
-            r->tiles.ctx, &r->tiles.drops, r->run->drop_budget, walks,
-            r->run->points == IMP_POINTS_SOBOL ? " --points sobol" : "");
+        const enum imp_status dropped =
+            imp__drops_budget(r->tiles.ctx, &r->tiles.drops, r->run->drop_budget, walks,
+                              imp__points_word(r->run));
         if (dropped != IMP_OK) st = dropped;
     }
     return st;
@@ -377,5 +400,6 @@ out:
     imp__release(ctx, r.patches);
     imp__release(ctx, r.set_values);
     imp__release(ctx, r.set_patches);
+    imp__release(ctx, r.parts);
     return st;
 }

@@ -34,6 +34,7 @@ struct imp_picture {
     /* Consecutive samples of a pixel that depend on each other, from the first on: errors
      * come from the spread of such sets. 0: none do. */
     int set;
+    bool nets; /* a pixel's samples are nets of points */
 };
 
 /* out [n_films]. A value that is not finite or beyond float is a dropped walk

@@ -45,7 +45,8 @@ enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
                                             .n = measure.n,
                                             .sample = imp__measure_sample,
                                             .payload = &measure,
-                                            .set = measure.set};
+                                            .set = measure.set,
+                                            .nets = measure.tracer.points != NULL};
         st = imp__picture_make(scene->ctx, &picture, &own, out);
     }
     imp__measure_destroy(&measure);

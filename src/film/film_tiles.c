@@ -48,10 +48,11 @@ void imp__tile_drop(struct imp_tile_worker *w, enum imp_drop cause, int x, int y
     w->no_memory |= cause == IMP_DROP_MEMORY;
 }
 
-/* Losses have Sobol's points where the scene names no sampler, and pictures there have not. */
-static const char *points_of(const struct imp_tiles *t)
+const char *imp__points_word(const struct imp_run *run)
 {
-    return t->run->points == IMP_POINTS_SOBOL ? " --points sobol" : "";
+    return run->points == IMP_POINTS_SCENE   ? ""
+           : run->points == IMP_POINTS_SOBOL ? " --points sobol"
+                                             : " --points independent";
 }
 
 enum imp_status imp__tile_check(struct imp_tile_worker *w)
@@ -62,7 +63,7 @@ enum imp_status imp__tile_check(struct imp_tile_worker *w)
         return imp__error(t->ctx, IMP_E_NOMEM, "no memory to record a walk");
     if (imp_likely(w->n_drops == 0)) return IMP_OK;
     return imp__drops_budget(t->ctx, &w->drops, t->run->drop_budget, t->walks,
-                             points_of(t));
+                             imp__points_word(t->run));
 }
 
 struct running {
@@ -99,7 +100,7 @@ static enum imp_status item_work(size_t item, int worker, void *result, void *pa
         imp__drops_merge(&t->drops, &w->drops);
         if (st == IMP_OK)
             st = imp__drops_budget(t->ctx, &t->drops, t->run->drop_budget, t->walks,
-                                   points_of(t));
+                                   imp__points_word(t->run));
         pthread_mutex_unlock(&t->lock);
         memset(&w->drops, 0, sizeof w->drops);
         w->n_drops = 0;
@@ -154,6 +155,6 @@ enum imp_status imp__tiles_run(struct imp_tiles *t, const struct imp_tiles_pass 
     t->late = shared.late;
     if (st == IMP_OK)
         st = imp__drops_budget(ctx, &t->drops, t->run->drop_budget, t->walks,
-                               points_of(t));
+                               imp__points_word(t->run));
     return st;
 }

@@ -54,6 +54,9 @@ struct imp_tiles {
     bool late;              /* the last pass was stopped by its deadline */
 };
 
+/* The option of `render --pixel` that shows a walk of this run again. */
+const char *imp__points_word(const struct imp_run *run);
+
 struct imp_tiles_pass {
     const char *stage, *rate_unit;
     double units, fraction_lo, fraction_hi, start_s, deadline_s; /* as of imp_loop */

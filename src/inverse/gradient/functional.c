@@ -100,7 +100,8 @@ static enum imp_status weights_make(imp_context *ctx, const struct imp__function
         .payload = f,
         .weights = weights,
         /* in the order in which the picture adds them */
-        .set = imp__tracer_set(&f->tracer, imp__walks_of(run, f->tracer.sensor))};
+        .set = imp__tracer_set(&f->tracer, imp__walks_of(run, f->tracer.sensor)),
+        .nets = f->tracer.points != NULL};
     const enum imp_status st = imp__picture_make(ctx, &picture, &own, &film);
     imp_film_destroy(film);
     return st;
@@ -149,7 +150,8 @@ static enum imp_status picture_value(imp_context *ctx, struct imp__functional *f
         .sample = sample_value,
         .payload = f,
         .weights = weights,
-        .set = imp__tracer_set(&f->tracer, imp__walks_of(run, f->tracer.sensor))};
+        .set = imp__tracer_set(&f->tracer, imp__walks_of(run, f->tracer.sensor)),
+        .nets = f->tracer.points != NULL};
     /* Through a box filter errors are the pixels', if these have any. */
     const int spp = (int)imp_max(imp__walks_of(run, f->tracer.sensor), (int64_t)1);
     const bool one_pass = box && spp > 1;

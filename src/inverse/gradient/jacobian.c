@@ -52,7 +52,8 @@ enum imp_status imp_problem_forward(imp_problem *p, const double *x_dot,
         .n = f.channels,
         .sample = sample_tangent,
         .payload = &f,
-        .set = imp__tracer_set(&f.tracer, imp__walks_of(&own, f.tracer.sensor))};
+        .set = imp__tracer_set(&f.tracer, imp__walks_of(&own, f.tracer.sensor)),
+        .nets = f.tracer.points != NULL};
     return imp__picture_make(p->ctx, &picture, &own, out);
 }
 
@@ -94,7 +95,8 @@ enum imp_status imp_problem_jacobian(imp_problem *p, const struct imp_run *run,
         .sample = sample_jacobian,
         .payload = &tracer,
         .n_films = n,
-        .set = imp__tracer_set(&tracer, imp__walks_of(&own, tracer.sensor))};
+        .set = imp__tracer_set(&tracer, imp__walks_of(&own, tracer.sensor)),
+        .nets = tracer.points != NULL};
     st = tracer.integrator->from_lights ? imp__light_jacobian(&tracer, &own, made)
                                         : imp__picture_make(ctx, &picture, &own, made);
     if (st != IMP_OK && st != IMP_CANCELLED) goto out;
