@@ -104,7 +104,7 @@ static struct result mean_of(imp_scene *s, const char *which, int spp, uint64_t 
     struct result r = {0};
     struct imp_run run = IMP_RUN_INIT;
     imp_problem *p = test_problem(ctx, s, which);
-    r.n = imp_problem_n(p);
+    r.n = imp_problem_n_variables(p);
     run.spp = spp;
     run.seed = seed;
     if (r.n <= VALUES)
