@@ -226,7 +226,7 @@ static const struct {
     [F_NULL] = {"scene: a property's name is NULL", IMP_E_ARG},
     [F_SPECTRUM] =
         {"scene: spectrum 'radiance': a spectrum needs at least two wavelengths",
-         IMP_E_SCENE},
+         IMP_E_ARG},
     [F_MESH_PLACE] =
         {"scene: shape (sphere): triangles are for a shape of type 'mesh', once",
          IMP_E_ARG},
