@@ -389,7 +389,7 @@ class Fixture:
                        "n_vertices": 3, "n_triangles": 1, "layers": 1, "nx": 1, "ny": 1, "nz": 1, "a": 1., "pilots": 2, "n_groups": 1, "low": .1, "high": .9,
                        "n": {"imp_scene_set_values": 1, "imp_scene_spectrum": 2, "imp_problem_nlopt": 3}.get(function, 1)}
             zeros = {"scalar", "status", "cause", "sensor", "channel", "x", "y", "sample", "json", "i", "from_here",
-                     "kind", "concept", "time", "nm", "progress", "rays", "ray", "bundle", "n_walks", "target", "edge", "most", "subject", "from", "to"}
+                     "kind", "of", "time", "nm", "progress", "rays", "ray", "bundle", "n_walks", "target", "edge", "most", "subject", "from", "to"}
             if key == "imp_problem_tie.kind": return constants["IMP_TIE_LOG"], None
             if key == "imp_bend_image.target": return 4, None  # the fixture adds it
             if function == "imp_parts_create": return {"index": 1, "count": 2}[a.name], None
@@ -401,7 +401,7 @@ class Fixture:
                      "imp_bend_load": os.path.join(top, "scenes", "bend", "maxwell.xml"),
                      "imp_film_write": self.folder + "/x.exr", "imp_elements_save": self.folder + "/x.el",
                      "imp_elements_export": self.folder + "/x.ply", "imp_field_write": self.folder + "/x.npy",
-                     "imp_parts_write": self.folder + "/x.part", "imp_scene_write_volume": self.folder + "/x.vol", "imp_report_write": self.folder + "/x.html",
+                     "imp_parts_write": self.folder + "/x.part", "imp_checkpoint_free": self.folder + "/x.checkpoint", "imp_scene_write_volume": self.folder + "/x.vol", "imp_report_write": self.folder + "/x.html",
                      "imp_manifest_write": self.folder + "/x.proof", "imp_walks_write": self.folder + "/x.walks"}
             if key == "imp_manifest_output.path": return os.path.join(top, "scenes", "furnace.xml").encode(), None
             if key == "imp_manifest_read.path":
