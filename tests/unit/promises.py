@@ -388,7 +388,7 @@ class Fixture:
                      "imp_bend_load": os.path.join(top, "scenes", "bend", "maxwell.xml"),
                      "imp_film_write": self.folder + "/x.exr", "imp_elements_save": self.folder + "/x.el",
                      "imp_elements_export": self.folder + "/x.ply", "imp_field_write": self.folder + "/x.npy",
-                     "imp_parts_write": self.folder + "/x.part", "imp_scene_write_volume": self.folder + "/x.vol", "imp_report_write": self.folder + "/x.html",
+                     "imp_parts_write": self.folder + "/x.part", "imp_checkpoint_free": self.folder + "/x.checkpoint", "imp_scene_write_volume": self.folder + "/x.vol", "imp_report_write": self.folder + "/x.html",
                      "imp_manifest_write": self.folder + "/x.proof", "imp_walks_write": self.folder + "/x.walks"}
             if key == "imp_manifest_output.path": return os.path.join(top, "scenes", "furnace.xml").encode(), None
             if key == "imp_manifest_read.path":
