@@ -136,6 +136,7 @@ WITHOUT = {
     **{"imp_manifest_" + word: "a manifest says what a command line computed; importon verify reads it"
        for word in ("create", "destroy", "get_info", "output", "read", "result", "set_limit", "write")},
     "imp_context_set_manifest": "the same",
+    "imp_checkpoint_free": "it asks before pictures are rendered, importon fit; a fit of Python begins with that question",
     "imp_film_merge": "pictures are arrays, whose means are one line",
     "imp_film_add_layer": "of one file for viewers: arrays are written one by one",
     "imp_report_page": "for servers of a live page: importon view",
