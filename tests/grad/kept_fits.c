@@ -77,8 +77,15 @@ static struct fitted fit(imp_context *ctx, const char *file, const char *defines
 
 static bool same(const struct fitted *a, const struct fitted *b)
 {
-    return a->n == b->n && memcmp(a->v, b->v, a->n * sizeof *a->v) == 0 &&
-           a->objective.value == b->objective.value && a->objective.se == b->objective.se;
+    bool all = a->n == b->n && a->objective.value == b->objective.value &&
+               a->objective.se == b->objective.se;
+    for (size_t k = 0; k < a->n && all; k++) /* NaN of a bound is like NaN */
+        all = memcmp(&a->v[k].start, &b->v[k].start,
+                     offsetof(struct imp_fit_variable, at_bound) -
+                         offsetof(struct imp_fit_variable, start)) == 0 &&
+              a->v[k].at_bound == b->v[k].at_bound &&
+              a->v[k].determined == b->v[k].determined;
+    return all;
 }
 
 /* Largest |difference| over the standard errors of both. */

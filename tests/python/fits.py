@@ -42,7 +42,7 @@ def test_walks_in_files():
     del walks
     assert len(im.traverse(scene)) == len(p)  # lives as long as somebody has it
     open("bad.walks", "wb").write(open("box.walks", "rb").read()[:-100])
-    raises(im.SceneError, lambda: im.read_walks("bad.walks"), "ends early")
+    raises(im.FileError, lambda: im.read_walks("bad.walks"), "ends early")
 
 
 def photographed():

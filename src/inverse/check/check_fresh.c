@@ -97,6 +97,7 @@ static enum imp_status compare(struct rows *r, struct comparison *c,
     judge(c, &row);
     if (before) {
         struct imp_check_row *out = &r->fresh.check->rows[c->row];
+        row.size = out->size;
         row.method = out->method;
         row.param = out->param;
         *out = row;
