@@ -132,6 +132,7 @@ PIECES_INLINE void pieces(const struct taking *to, void *taker,
     const struct imp_active *active = tracer->active;
     imp_spec before[IMP_REDUCED_MOST], R = {0};
     struct imp_op o;
+    if (of->n_ops == 0) return; /* dark; where all are, there is no array */
     struct cursor c = cursor_begin(of, adjoint, before);
 #define TERM(kind)                                                                       \
     R += term_pieces(to, taker, tracer, all, kind, &c, o, P);                            \
