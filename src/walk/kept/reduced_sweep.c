@@ -55,7 +55,8 @@ PIECES_INLINE struct cursor cursor_begin(const struct imp_reduced_of *of, imp_sp
         case IMP_OP_LOOKUP:
         case IMP_OP_ON: P *= (seen++)->value; break;
         case IMP_OP_MATERIAL: seen++; break;
-        default: seen += op.lit;
+        default:
+            if (op.lit) seen++; /* where nothing was seen it is NULL */
         }
     }
     const uint32_t *end = of->all->words + of->word;
@@ -132,7 +133,6 @@ PIECES_INLINE void pieces(const struct taking *to, void *taker,
     const struct imp_active *active = tracer->active;
     imp_spec before[IMP_REDUCED_MOST], R = {0};
     struct imp_op o;
-    if (of->n_ops == 0) return; /* dark; where all are, there is no array */
     struct cursor c = cursor_begin(of, adjoint, before);
 #define TERM(kind)                                                                       \
     R += term_pieces(to, taker, tracer, all, kind, &c, o, P);                            \
