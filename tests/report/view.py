@@ -176,7 +176,7 @@ try:
     ok([n["name"] for n in numbers] == ["red.reflectance.value[%d]" % k for k in range(3)] + ["light.radiance.value[%d]" % k for k in range(3)]
        and numbers[0]["min"] == 0 and numbers[3]["max"] is None, "a slider for each number of -p, with its bounds")
     n = len(view.news)
-    ok(view.act("walks", x=8, y=12) == 200 and (walks := view.wait(lambda e, v: e == "report" and v["items"][0]["kind"] == "walks", n))
+    ok(view.act("walks", x=8, y=12) == 200 and (walks := view.wait(lambda e, v: e == "report" and v["items"][0]["name"] == "pixel 8, 12", n))
        and all(w["pixel"] == [8, 12] for w in walks["items"][0]["data"]["walks"]) and len(walks["items"][0]["data"]["walks"]) == 16,
        "random walks of a pixel")
     ok(view.act("save") == 200 and view.wait(lambda e, v: e == "state" and "saved" in (v["message"] or "")) is not None, "saved")
