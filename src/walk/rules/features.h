@@ -3,8 +3,9 @@
  * What goes with what. A job is what a call asks for: a scene, one of its sensors, how walks are
  * made, and what becomes of them. A feature is something that a job has or has not, found in
  * it by a predicate (features.c) or stated by the call that asks. A rule (rules.def) says
- * that a feature excludes or needs another one, and why; imp__job_allowed is the one place
- * that decides and refuses.
+ * that a feature excludes or needs another one, and why; imp__job_allowed decides and
+ * refuses. What is no pair of features (a missing end, no walks at all) is refused where it
+ * is found.
  *
  * A new feature is a line here, a predicate, and its rules. */
 #ifndef IMP_WALK_FEATURES_H
