@@ -6,7 +6,7 @@
  *     guide [NAME=VALUE ...] [SCENE.xml ...] > table.json
  *     guide lights > table.json
  *
- * The second is of walks from the lights, guided by importance: a camera and a meter in a
+ * The second is of light walks, guided by importance: a camera and a meter in a
  * corner of sixteen rooms, the same meter by photons that have to meet it, and a room that
  * the camera sees whole. Of the pixels and of their mean there are means over seeds.
  *
@@ -126,7 +126,7 @@ static void scene(const char *path, int spp)
     imp_scene_destroy(s);
 }
 
-/* ---- Walks from the lights -------------------------------------------------------- */
+/* ---- Light walks -------------------------------------------------------- */
 
 /* Readings of the sensor: mean over its pixels, its variance over seeds, and time. */
 static struct result readings(const imp_scene *s, int sensor, const imp_guide *guide,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a kept walk costs: evaluated, folded and swept, over traced and swept, one thread,
+ * What a recorded walk costs: evaluated, folded and swept, over traced and swept, one thread,
  * processor time; the median of pairs measured in turn (walks). Then pictures, searches (fits)
  * by L-BFGS, MMA and SLSQP, and how far values of N draws spread far away (spread).
  *
@@ -251,15 +251,15 @@ static void measure_picture(const char *file, const char *define)
         for (int reduced = 0; reduced < 2; reduced++)
             ratio[reduced][k] = took[1 + reduced] / took[0];
     }
-    printf("%-14s %-16s picture of kept walks over its render: vertices %.3f, reduced "
-           "%.3f\n",
-           file, define ? define : "", median(ratio[0], repeats),
-           median(ratio[1], repeats));
+    printf(
+        "%-14s %-16s picture of recorded walks over its render: vertices %.3f, reduced "
+        "%.3f\n",
+        file, define ? define : "", median(ratio[0], repeats), median(ratio[1], repeats));
     for (int reduced = 0; reduced < 2; reduced++) imp_walks_destroy(walks[reduced]);
     imp_scene_destroy(scene);
 }
 
-/* A search of 15 evaluations with kept walks over one that traces them, without what comes
+/* A search of 15 evaluations with recorded walks over one that traces them, without what comes
  * after it. */
 static void measure_fit(const char *file, const char *define, const char *glob,
                         enum imp_optimizer method, const char *name)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Files of kept walks. A good file is made here, and the bytes say where it is changed:
+ * Files of recorded walks. A good file is made here, and the bytes say where it is changed:
  * every three are a place (two bytes) and what is xored there. With an odd first byte the
  * checksum is made to fit again, so that decisions no tracer makes are looked at one by
  * one. What is read is evaluated and swept. */
@@ -72,7 +72,7 @@ static void begin(void)
                                  .integrator = imp__walk_integrator(scene),
                                  .sensor = scene->sensors[0],
                                  .active = &active,
-                                 .collisions_stand = true};
+                                 .collisions_fixed = true};
     imp__arena_init(&arena, ctx);
     must(imp__record_create(&tracer, sizeof good, &record));
     for (int i = 0; i < WALKS; i++) {

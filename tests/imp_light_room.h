@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Pieces of the rooms in which walks from both ends are compared. */
+ * Pieces of the rooms in which bidirectional walks are compared. */
 #ifndef IMP_LIGHT_ROOM_H
 #define IMP_LIGHT_ROOM_H
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Walks from the lights beside Mitsuba 3's ptracer: walks a second, and processor time to an error of 1 %.
+"""Light walks beside Mitsuba 3's ptracer: walks a second, and processor time to an error of 1 %.
 
     python3 bench/peers/light_walks.py [-i IMPORTON] [--spp N] [--runs N]
 

@@ -516,7 +516,7 @@ class Maker:
         around = [k for k in chosen if k in ("constant", "envmap", "sunsky")]
         chosen = [k for k in chosen if k not in around[1:]]
         beam = not (media or holes) and self.maybe(.12)
-        if beam:  # only walks from the lights find it in Mitsuba
+        if beam:  # only light walks find it in Mitsuba
             integrator, chosen, self.from_lights = "ptracer", ["directionalarea"], True
         out = '<scene version="3.0.0">\n'
         self.kind(integrator)

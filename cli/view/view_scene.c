@@ -183,11 +183,11 @@ static void take_kept(int64_t all)
     r.film = film;
     r.kept = true;
     show(film, NULL);
-    snprintf(
-        text, sizeof text,
-        "this picture: %lld kept walk%s per pixel, of which %.2g count; fresh ones are "
-        "on their way",
-        (long long)spp_of(film), plural(spp_of(film)), ess);
+    snprintf(text, sizeof text,
+             "this picture: %lld recorded walk%s per pixel, of which %.2g count; fresh "
+             "ones are "
+             "on their way",
+             (long long)spp_of(film), plural(spp_of(film)), ess);
     view_state(VIEW_RUNNING, text);
     r.said_so = true;
 }
@@ -218,7 +218,8 @@ static void save(char *said, size_t size)
         return;
     }
     if (r.kept) {
-        snprintf(said, size, "not saved: the picture is one of kept walks; resume first");
+        snprintf(said, size,
+                 "not saved: the picture is one of recorded walks; resume first");
         return;
     }
     picture_stamp(r.film, &run);

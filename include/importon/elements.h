@@ -264,7 +264,7 @@ imp_elements_fit(imp_elements *elements, imp_problem *problem,
 
 struct imp_elements_guide_options {
     size_t size;
-    /** Light samples, and where walks from the lights begin, as without a guide. */
+    /** Light samples, and where light walks begin, as without a guide. */
     bool no_lights;
     double share; /**< of continuations drawn towards indirect light, or importance, 0 to
                         1 exclusive */
@@ -277,7 +277,7 @@ struct imp_elements_guide_options {
 #define IMP_ELEMENTS_GUIDE_OPTIONS_INIT IMP_INIT_ZERO(struct imp_elements_guide_options)
 /** The solution as a guide for walks: set imp_run.guide. Light samples follow what every
  * light sends to a place; drawing directions by it, or roulette, pays in some scenes only
- * (docs/elements.md) and is off by default. Walks from the lights follow the
+ * (docs/elements.md) and is off by default. Light walks follow the
  * importance of the elements' sensor, unless that was not solved: which light sends them,
  * from where and whither, and `share` of their directions; roulette is for walks from the
  * sensor. The elements must outlive it; a guide

@@ -798,7 +798,7 @@ struct imp_run {
     double drop_budget;
     imp_progress_fn progress;
     void *progress_payload;
-    const imp_guide *guide; /**< NULL: none; for path, and for walks from the lights */
+    const imp_guide *guide; /**< NULL: none; for path, and for light walks */
     /** For spectral modes. */
     enum imp_wavelength_sampling wavelengths;
     /** Walks of a pixel among which wavelengths are stratified; 0: a quarter of the
@@ -811,7 +811,7 @@ struct imp_run {
     imp_preview_fn preview;
     void *preview_payload;
     /** Both ends give the same numbers; what cannot begin there is refused with its
-     * name. With walks from the lights spp times the pixels are made for the whole
+     * name. With light walks spp times the pixels are made for the whole
      * film. */
     enum imp_from from;
     enum imp_points points;

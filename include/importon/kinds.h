@@ -495,7 +495,7 @@ struct imp_hit {
 };
 
 /* A point of a shape that is made of triangles: the triangle, and the barycentric weights of
- * its second and third vertex. Of other shapes the engine knows a point by its uv. */
+ * its second and third vertex. Points of other shapes are identified by uv. */
 struct imp_located {
     int32_t prim; /* -1: not known */
     float at[2];
@@ -834,7 +834,7 @@ struct imp_sensor {
 };
 enum imp_sensor_flags {
     IMP_SENSOR_AREA = 1,     /* its rays start on the shape that it belongs to */
-    IMP_SENSOR_PARALLEL = 2, /* its rays are parallel: `connect` knows no point without
+    IMP_SENSOR_PARALLEL = 2, /* its rays are parallel: `connect` has no point without
                                 end */
     IMP_SENSOR_GROUP = 4     /* its children are sensors */
 };

@@ -71,7 +71,7 @@ struct imp_walks_options {
  * @param[out] out the caller destroys it.
  * @return IMP_OK; IMP_CANCELLED; IMP_E_ARG; IMP_E_NOMEM if they need more than
  *         options->memory (the message says how much); IMP_E_UNSUPPORTED, with the
- *         reason, for walks from the lights, through graded indices that are active,
+ *         reason, for light walks, through graded indices that are active,
  *         past shapes with a priority, from sensors that are surfaces, integrators that
  *         make no walks or have transmittance=delta, and in parts. Ranks of a team keep
  *         all walks each. */

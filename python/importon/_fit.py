@@ -61,7 +61,7 @@ class Fit(Values):
         With `clip`: how many "numbers" there are, how many are "clipped", how many have no
         weight ("silent"), and in how many the scene disagrees ("against").
     walks : str
-        Which evaluations of lbfgs, mma and slsqp were of kept walks, or why none were.
+        Which evaluations of lbfgs, mma and slsqp were of recorded walks, or why none were.
     control_variate : str
         Of adam: what it brought, or why there was none.
     """

@@ -55,7 +55,7 @@ def render(scene: Scene, params: Any = None, sensor: Any = 0, integrator: None =
         The end at which walks begin: "scene" (what its integrator says), "sensor" or
         "lights".
     walks : Walks, optional
-        From `keep`: kept walks that are evaluated in place of tracing; seed, samples, points
+        From `keep`: recorded walks that are evaluated in place of tracing; seed, samples, points
         and wavelengths are theirs.
     progress : bool or callable, optional
         See `set_progress`.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Kept walks: evaluated at other parameters without a ray."""
+"""Recorded walks: evaluated at other parameters without a ray."""
 from __future__ import annotations
 
 import ctypes
@@ -48,12 +48,12 @@ class Walks:
 
     def _walks_pointer(self, scene: Scene) -> int:
         if scene is not self.scene:
-            raise ArgumentError("kept walks of another scene")
+            raise ArgumentError("recorded walks of another scene")
         scene.pointer
         return self._handle.pointer
 
     def __repr__(self) -> str:
-        return "%.4g kept walks, %.3g MB" % (self.n_walks, self.bytes / 1e6)
+        return "%.4g recorded walks, %.3g MB" % (self.n_walks, self.bytes / 1e6)
 
     def weigh(self, params: Any = None, *, sensor: Any = 0, mask: Any = None) -> tuple[float, float, Optional[str]]:
         """What the walks are worth at the scene's present parameters.

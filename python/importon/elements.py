@@ -540,9 +540,9 @@ def guide(elements: Elements, *, lights: bool = True, share: float = 0, roulette
     ----------
     elements : Elements
     lights : bool
-        Light samples follow what every light sends to a place; walks from the lights begin by importance.
+        Light samples follow what every light sends to a place; light walks begin by importance.
     share : float
-        Of continuations drawn towards indirect light, or importance by walks from the lights, 0 to 1.
+        Of continuations drawn towards indirect light, or importance by light walks, 0 to 1.
     roulette : float
         Russian roulette of walks from the sensor by expected contribution; 0: off.
 

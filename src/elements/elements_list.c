@@ -16,8 +16,7 @@ static enum imp_status ready(const imp_elements *e, size_t index)
     return IMP_OK;
 }
 
-/* Area of all leaves in an element: where solids cover corners, its own estimate of the same
- * area is another one. */
+/* Area of all leaves in an element. Its stored area may differ where solids cover corners. */
 static double leaf_area(const imp_elements *e, const struct imp__element *x)
 {
     double sum = x->child ? 0 : x->area;

@@ -88,7 +88,7 @@ enum imp_status imp_elements_create(const imp_scene *scene,
     IMP_REQUIRE(scene->ctx, out, "out");
     if (scene->rayless)
         return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                          "a scene from a file of kept walks has no geometry, and no "
+                          "a scene from a file of recorded walks has no geometry, and no "
                           "finite elements");
     return imp__el_create(scene, options, false, out);
 }

@@ -281,7 +281,7 @@ static enum imp_status workers_create(struct job *j)
     char what[96];
     int levels = 2;
     while ((size_t)1 << levels < j->items) levels++;
-    snprintf(what, sizeof what, "walks from the lights to %d x %d pixels of %zu values",
+    snprintf(what, sizeof what, "light walks to %d x %d pixels of %zu values",
              j->film->crop_w, j->film->crop_h, j->n);
     const double sums = (double)(j->pixels * j->n * 2) * sizeof(double);
     const enum imp_status st = imp__memory_check(
@@ -331,8 +331,7 @@ enum imp_status imp__light_picture_make(const struct imp_light_picture *p, doubl
                     .se = se};
     j.items = (size_t)imp_clamp(p->walks / ITEM_WALKS, (int64_t)1, (int64_t)ITEMS_MAX);
     if (j.pixels > INT32_MAX)
-        IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
-                           "walks from the lights: more than 2^31 pixels"));
+        IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED, "light walks: more than 2^31 pixels"));
     if (p->tracer->integrator->both) {
         const int64_t pixels = (int64_t)film->crop_w * film->crop_h;
         j.each = p->walks / pixels;

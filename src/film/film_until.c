@@ -18,7 +18,7 @@
 #include "film_filter.h"
 #include "film_measure.h"
 #include "walk/core/walk_integrator.h"
-#include "walk/run/looks.h"
+#include "walk/run/interim_looks.h"
 #include <math.h>
 
 /* Values whose errors depend on each other with one of them; 0: any may. */

@@ -79,7 +79,7 @@ static enum imp_status prop_put(struct putting *p, const struct imp_node *node,
         break;
     case IMP_PROP_REF:
         return imp__prop_error(p->scene->ctx, node, prop, IMP_E_UNSUPPORTED,
-                               "this reference is not written with kept walks");
+                               "this reference is not written with recorded walks");
     }
     return IMP_OK;
 }
@@ -203,7 +203,7 @@ static enum imp_status mesh_put(struct putting *p, const struct imp_node *node)
     if (!s || s->geometry != IMP_TRIANGLES || s->by_triangle)
         return imp__node_error(p->scene->ctx, node, IMP_E_UNSUPPORTED,
                                s ? "its triangles count for its material (attributes, "
-                                   "bump maps), and files of kept walks have none"
+                                   "bump maps), and files of recorded walks have none"
                                  : "triangles of no shape are not written with kept "
                                    "walks");
     put_mark(p, MARK_MESH);
@@ -237,7 +237,7 @@ static enum imp_status data_put(struct putting *p, const struct imp_node *node)
     const bool texture = strcmp(node->tag, "texture") == 0;
     if (node->attribute || node->body || strcmp(node->type, "graded") == 0)
         return imp__node_error(p->scene->ctx, node, IMP_E_UNSUPPORTED,
-                               "it is not written with kept walks");
+                               "it is not written with recorded walks");
     if (is_mesh(node)) return mesh_put(p, node);
     if (node->ies) ies_put(p, node->ies);
     if (node->merl) merl_put(p, node->merl);
@@ -258,7 +258,7 @@ static enum imp_status child_put(struct putting *p, const struct imp_child *c)
     if (!c->ref) return node_put(p, c->node, NULL, c->name);
     if (!c->node->id)
         return imp__node_error(p->scene->ctx, c->node, IMP_E_UNSUPPORTED,
-                               "a reference to it is not written with kept walks");
+                               "a reference to it is not written with recorded walks");
     put_mark(p, MARK_REF);
     put_text(p, c->node->id);
     put_text(p, c->name);
@@ -312,7 +312,7 @@ static enum imp_status members_put(struct putting *p)
         if (imp__is_bumped(scene, s->bsdf))
             return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
                               "shape '%s': a bump map that its instance brings or "
-                              "stretches is not written with kept walks",
+                              "stretches is not written with recorded walks",
                               s->name);
         char id[32];
         snprintf(id, sizeof id, "covered shape %d", k);

@@ -15,7 +15,7 @@ enum imp_status imp__twin_take(const struct imp_scene *scene, const double *thet
     imp_scene *twin = NULL;
     double *taken = imp__alloc(ctx, scene->n_theta + 1, sizeof *taken);
     if (!taken) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a second scene"));
-    IMP_TRY(imp__tree_take(ctx, "kept walks", bytes->data, bytes->size, &twin));
+    IMP_TRY(imp__tree_take(ctx, "recorded walks", bytes->data, bytes->size, &twin));
     bool same = twin->n_theta == scene->n_theta;
     if (same) imp__walks_theta_set(twin, theta);
     if (same) imp__walks_theta_get(twin, taken);
@@ -23,7 +23,7 @@ enum imp_status imp__twin_take(const struct imp_scene *scene, const double *thet
            imp__fingerprint_evaluated(twin) == imp__fingerprint_evaluated(scene);
     if (!same)
         IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
-                           "kept walks: this scene is not whole without its geometry "
+                           "recorded walks: this scene is not whole without its geometry "
                            "(a light that derives something from its shape, or "
                            "instances in instances)"));
     *out = twin;

@@ -38,7 +38,7 @@ struct reading {
 
 static enum imp_status damaged(const struct reading *r, const char *what)
 {
-    return imp__error(r->from.ctx, IMP_E_IO, "%s: damaged file of kept walks (%s)",
+    return imp__error(r->from.ctx, IMP_E_IO, "%s: damaged file of recorded walks (%s)",
                       r->from.path, what);
 }
 
@@ -63,18 +63,20 @@ static enum imp_status head_take(struct reading *r)
     r->size = (uint64_t)ftello(r->from.f);
     rewind(r->from.f);
     if (r->size < sizeof *h)
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: not a file of kept walks", path));
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: not a file of recorded walks", path));
     IMP_TRY(take(r, h, sizeof *h));
     if (memcmp(h->magic, IMP_WALKS_MAGIC, sizeof h->magic) != 0)
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: not a file of kept walks", path));
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: not a file of recorded walks", path));
     if (h->byte_order != IMP_WALKS_BYTE_ORDER)
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE,
-                           "%s: kept walks of byte order %08x; this machine's is %08x",
-                           path, h->byte_order, IMP_WALKS_BYTE_ORDER));
+        IMP_TRY(
+            imp__error(ctx, IMP_E_SCENE,
+                       "%s: recorded walks of byte order %08x; this machine's is %08x",
+                       path, h->byte_order, IMP_WALKS_BYTE_ORDER));
     if (h->version != IMP_WALKS_VERSION)
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE,
-                           "%s: kept walks of version %u; this program reads version %d",
-                           path, h->version, IMP_WALKS_VERSION));
+        IMP_TRY(
+            imp__error(ctx, IMP_E_SCENE,
+                       "%s: recorded walks of version %u; this program reads version %d",
+                       path, h->version, IMP_WALKS_VERSION));
     if (h->spp < 0 || h->points < 0 || h->points > IMP_POINTS_SOBOL ||
         h->wavelengths < 0 || h->wavelengths > IMP_WAVELENGTHS_IMPORTANCE ||
         h->wavelength_set < 0 || h->losses < 0 || h->losses > 1 || h->n_stores < 1 ||
@@ -180,7 +182,7 @@ out:
 static enum imp_status reduction_check(struct imp_walks *w)
 {
     uint8_t *changed = imp__alloc(w->ctx, w->scene->n_params + 1, 1);
-    if (!changed) return imp__error(w->ctx, IMP_E_NOMEM, "no memory for kept walks");
+    if (!changed) return imp__error(w->ctx, IMP_E_NOMEM, "no memory for recorded walks");
     if (imp__walks_changed(w, changed) != IMP_OK) {
         imp__reduction_destroy(w->reduction);
         w->reduction = NULL;

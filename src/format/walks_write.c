@@ -151,7 +151,8 @@ enum imp_status imp_walks_write(const imp_walks *w, const char *path)
         st = imp__file_write_by(ctx, path, walks_fill, &payload);
         if (w->spread && !x.begun) stores_put(&x); /* the others wait for it */
         if (x.status != IMP_OK)
-            st = imp__error(ctx, x.status, "%s: kept walks did not come together", path);
+            st = imp__error(ctx, x.status, "%s: recorded walks did not come together",
+                            path);
         if (team) {
             const enum imp_status first = imp__team_broadcast(ctx, st, &none);
             if (st == IMP_OK) st = first;

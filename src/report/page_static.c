@@ -156,7 +156,7 @@ static void explained_put(struct imp_text *t, const char *item, const char *data
     if (view > 0) imp__put(t, "View %g: ", view);
     imp__put(t, imp__json_is_true(is)    ? "Yes: what is left over is what noise makes."
                 : imp__json_is_false(is) ? "No: more is left over than noise makes."
-                                         : "This cannot be told from its errors.");
+                                         : "Its standard errors do not decide this.");
     if (isfinite(chi2)) imp__put(t, " Chi-square per number is %.4g.", chi2);
     imp__put(t, "</p>\n");
 }

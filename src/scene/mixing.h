@@ -2,7 +2,7 @@
  *
  * From which densities walks draw their directions, and with which weights
  * (walk/core/direction.c). Weights are written for the integrator and for single materials; what
- * directions are aimed at, lights and proxies, is in aims.h. */
+ * directions are aimed at, lights and proxies, is in aimed_directions.h. */
 #ifndef IMP_SCENE_MIXING_H
 #define IMP_SCENE_MIXING_H
 

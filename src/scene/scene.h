@@ -8,7 +8,7 @@
 #define IMP_SCENE_H
 
 #include "access.h"
-#include "aims.h"
+#include "aimed_directions.h"
 #include "color/convert.h"
 #include "color/wavelength.h"
 #include "integrator.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Kept walks at another extinction. Their collisions are weighed anew: pictures agree with
+ * Recorded walks at another extinction. Their collisions are weighed anew: pictures agree with
  * fresh ones within their errors, in uniform media and grids, with and without a colour;
  * so do derivatives with respect to what is no extinction. At the extinction of the draw
  * they are those of tracing, to the bit. Where no collision was drawn, or none could be
@@ -57,7 +57,7 @@ static bool same(imp_film *a, imp_film *b)
 
 /* ---- Values ---------------------------------------------------------------------- */
 
-/* Kept walks against fresh ones. */
+/* Recorded walks against fresh ones. */
 static void elsewhere(imp_scene *scene, const char *name, double factor, double only,
                       const char *what)
 {

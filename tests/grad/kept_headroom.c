@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Kept walks with room for extinctions to grow. Pictures agree with fresh ones within their
+ * Recorded walks with room for extinctions to grow. Pictures agree with fresh ones within their
  * errors at the draw, where all of a grid is larger, and where cells that had none have
  * some; so do derivatives with respect to the grid, cells without any among them. Above
  * the bounds they are refused, and without headroom. A search for a denser cloud evaluates
- * kept walks, and finds it. */
+ * recorded walks, and finds it. */
 #include "kept_media.h"
 #include <unistd.h>
 
@@ -73,7 +73,7 @@ static double variance(imp_film *film)
 }
 
 /* A cloud with holes, by walks that meet many collisions in emptiness: where hardly anything
- * has changed all of them count, and elsewhere as many as the variance says, of kept walks
+ * has changed all of them count, and elsewhere as many as the variance says, of recorded walks
  * over that of walks which are drawn there in the same way, or under the same bounds: with
  * the headroom 4/factor. */
 static void worth(double factor, double headroom)

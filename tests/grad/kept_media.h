@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Kept walks through media: a cloud of a grid, and pictures side by side. */
+ * Recorded walks through media: a cloud of a grid, and pictures side by side. */
 #ifndef KEPT_MEDIA_H
 #define KEPT_MEDIA_H
 

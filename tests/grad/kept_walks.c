@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Kept walks as a host uses them. At the parameters of the draw, pictures, losses and
+ * Recorded walks as a host uses them. At the parameters of the draw, pictures, losses and
  * gradients are those of tracing, but for rounding, on any number of threads. At others they
  * agree with fresh ones within their errors, and gradients in both modes agree with each
  * other and with differences. The effective sample size is compared with a closed form.
@@ -179,7 +179,7 @@ static void set(imp_scene *scene, const char *name, double factor)
     free(x);
 }
 
-/* Means over blocks of the picture, kept walks against fresh ones, with both errors. */
+/* Means over blocks of the picture, recorded walks against fresh ones, with both errors. */
 static void elsewhere(const char *file, const char *defines, enum imp_color_mode mode,
                       const char *name, double factor, double least)
 {
@@ -326,7 +326,7 @@ static void walk_by_walk(const char *file, const char *defines, const char *move
                                       .sensor = scene->sensors[0],
                                       .active = &active,
                                       .kept = &walks->stores[0],
-                                      .collisions_stand = true};
+                                      .collisions_fixed = true};
     for (int i = 0; i < 1000; i++) {
         const struct imp_arena_mark mark = imp__arena_mark(&arena);
         struct dotted d = {{.add = dotted_add}, &active, v, 0};
@@ -694,7 +694,7 @@ static void refusals(void)
     const struct imp_fit_result *r;
     tap_ok(imp_fit(p, NULL, &run, &r) == IMP_E_ARG &&
                strstr(imp_last_error(ctx), "run->walks"),
-           "a fit of kept walks, whose intervals would be too short # %s",
+           "a fit of recorded walks, whose intervals would be too short # %s",
            imp_last_error(ctx));
     imp_problem_destroy(p);
     imp_walks_destroy(walks);

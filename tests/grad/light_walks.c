@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Derivatives of walks from the lights, and of samples from both ends, walk by walk, with
+ * Derivatives of light walks, and of samples from both ends, walk by walk, with
  * another adjoint wherever they reach the sensor: reverse against forward mode, and both
  * against central differences of frozen walks, which are linear in lamps and smooth in all
  * else. */
@@ -127,7 +127,7 @@ static void check(const char *integrator_name, const char *what, const char *bod
                                       .active = &active,
                                       .seed = 5,
                                       .guide = guide,
-                                      .collisions_stand = true};
+                                      .collisions_fixed = true};
     imp__arena_init(&arena, ctx);
     for (int i = 0; i < WALKS; i++) {
         const struct imp_arena_mark mark = imp__arena_mark(&arena);

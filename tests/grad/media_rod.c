@@ -152,7 +152,7 @@ int main(void)
     test_must(ctx, imp_scene_find_param(scene, "sigma.data", &param));
     sums.param = (int)param;
     test_must(ctx, imp__problem_tracer(p, &run, NULL, &tracer));
-    tracer.collisions_stand = true;
+    tracer.collisions_fixed = true;
     imp__arena_init(&arena, ctx);
     const int walks = 400000;
     struct tap_stat empty = {0, 0, 0};

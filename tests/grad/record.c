@@ -62,7 +62,7 @@ static void begin(struct traced *t, const char *file, const char *defines, bool 
                                     .integrator = &t->integrator,
                                     .sensor = sensor,
                                     .active = &t->active,
-                                    .collisions_stand = true,
+                                    .collisions_fixed = true,
                                     .seed = 11};
     imp__arena_init(&t->arena, ctx);
 }
@@ -637,7 +637,7 @@ static void not_kept(void)
     end(&t);
 
     begin(&t, "fog.xml", "res=32", true);
-    t.tracer.collisions_stand = false;
+    t.tracer.collisions_fixed = false;
     r = some(&t, 100, PLENTY, &st);
     tap_ok(st == IMP_E_UNSUPPORTED, "and probes of extinctions # %s",
            imp_last_error(ctx));
@@ -719,10 +719,10 @@ static void files(void)
            "a head of 96 bytes, the walks, a checksum # %zu", n);
     b[12] = 6;
     bytes_write(b, n);
-    tap_ok(
-        file_read(&t) == IMP_E_SCENE &&
-            strstr(imp_last_error(ctx), "kept walks of version 6; this program reads 7"),
-        "the version before: refused # %s", imp_last_error(ctx));
+    tap_ok(file_read(&t) == IMP_E_SCENE &&
+               strstr(imp_last_error(ctx),
+                      "recorded walks of version 6; this program reads 7"),
+           "the version before: refused # %s", imp_last_error(ctx));
     b[12] = 7;
 
     static const struct {

@@ -4,7 +4,7 @@
  * texture in a room lit directly and indirectly, through every integrator that has
  * derivatives, in colour, in mono and by wavelengths. For each of its parameters
  *
- *   frozen   sweep against central differences of kept walks, 1e-6; forward against
+ *   frozen   sweep against central differences of recorded walks, 1e-6; forward against
  *            reverse per walk, 1e-12; Euler identities, 1e-12 (imp_check)
  *   dot      forward picture against reverse gradient of the same seed
  *   fresh    forward picture against differences of renders with other seeds: z-scores,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Kept walks in files. Read without their scene they give the pictures, losses, gradients
+ * Recorded walks in files. Read without their scene they give the pictures, losses, gradients
  * and errors that they gave before they were written, to the bit: at the parameters of the
  * draw and at others, on any number of threads, in scenes with textures, skies, measured
  * lamps, media, meshes, groups and wavelengths. No ray is traced in what a file holds, and

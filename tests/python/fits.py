@@ -26,7 +26,7 @@ def setting(noise_spp=256, res=16):
 
 
 def test_walks_in_files():
-    """Kept walks come back from a file, and answer without their scene, to the bit"""
+    """Recorded walks come back from a file, and answer without their scene, to the bit"""
     s = box(8)
     im.keep(s, spp=8, seed=3, losses=True).write("box.walks")
     kept, walks = im.keep(s, spp=8, seed=3, losses=True), im.read_walks("box.walks")

@@ -52,7 +52,7 @@ def test_modes():
 
 
 def test_kept_walks():
-    """Kept walks: the same picture and loss, others within their errors, and refusals"""
+    """Recorded walks: the same picture and loss, others within their errors, and refusals"""
     s = im.load_file(CORNELL, res=12)
     params = im.traverse(s)
     walks = im.keep(s, spp=64, seed=3, losses=True, survival=-1)
@@ -60,7 +60,7 @@ def test_kept_walks():
     assert im.render(s, walks=walks).tobytes() == im.render(s, spp=64, seed=3).tobytes()
     target = im.render(s, spp=16, seed=9)
     a, b = (im.loss(s, target, RED, **key) for key in ({"walks": walks}, {"spp": 64, "seed": 3}))
-    # Kept walks are sums of products here, which round in another order.
+    # Recorded walks are sums of products here, which round in another order.
     for x, y in ((a.value, b.value), (a.se, b.se), (a.grad[RED], b.grad[RED])):
         assert np.allclose(x, y, rtol=1e-9, atol=0)
     assert walks.weigh() == (1, 0, None)
@@ -81,7 +81,7 @@ def test_kept_walks():
 
 
 def test_walks():
-    """Points in sets, and walks from the lights: other noise, the same picture and loss"""
+    """Points in sets, and light walks: other noise, the same picture and loss"""
     s = im.load_file(CORNELL, res=12)
     plain = im.render(s, spp=256, seed=1)
     said = []

@@ -35,7 +35,7 @@ def test_opcheck():
 
 
 def test_gradcheck():
-    """gradcheck on kept walks: the same seed forwards and backwards"""
+    """gradcheck on recorded walks: the same seed forwards and backwards"""
     s = box(res=4)
     x = torch.tensor([.5, .3, .4], dtype=torch.float64, requires_grad=True)
     y = torch.tensor([18., 14., 7.], dtype=torch.float64, requires_grad=True)

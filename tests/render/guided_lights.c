@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Importance by finite elements guides walks from the lights: less noise, the same means
+ * Importance by finite elements guides light walks: less noise, the same means
  * of pictures, readings and gradients. */
 #include "base/film.h"
 #include "elements/elements.h"
@@ -184,7 +184,7 @@ static void gradients(imp_context *ctx)
     imp_scene_destroy(s);
 }
 
-/* Walks from both ends, a guide without importance. */
+/* Bidirectional walks, a guide without importance. */
 static void refused(imp_context *ctx)
 {
     struct imp_run run = IMP_RUN_INIT;
@@ -196,7 +196,7 @@ static void refused(imp_context *ctx)
     run.guide = g;
     tap_ok(imp_render(s, &run, &f) == IMP_E_UNSUPPORTED &&
                strstr(imp_last_error(ctx), "bdpt"),
-           "refused: walks from both ends");
+           "refused: bidirectional walks");
     imp_guide_destroy(g);
     imp_elements_destroy(e);
     imp_scene_destroy(s);

@@ -189,11 +189,11 @@ try:
        "a slider is moved, and the picture made again")
     moved = view.items("picture")[-1]
     ok(moved["pixels"] != bright["pixels"] and view.wait(lambda e, v: e == "numbers" and v[3]["value"] == 40, n), "with the light that was asked for")
-    told = view.wait(lambda e, v: e == "state" and "kept walks" in (v["message"] or ""), n)
+    told = view.wait(lambda e, v: e == "state" and "recorded walks" in (v["message"] or ""), n)
     first = view.wait(lambda e, v: e == "report" and v["items"][0]["kind"] == "picture", n)["items"][0]
     ratio = mean(first) / mean(moved)
     ok(told is not None and first["spp"] == 16 and abs(ratio - 1) < .1,
-       "first by kept walks, as the page says # %d samples, %.3f of the mean of fresh ones" % (first["spp"], ratio))
+       "first by recorded walks, as the page says # %d samples, %.3f of the mean of fresh ones" % (first["spp"], ratio))
     view.act("save")
     view.wait(lambda e, v: e == "state" and "saved" in (v["message"] or ""), n)
     light = next(p["value"] for p in json.loads(run("info", cornell, "-D", "res=16", "--json"))["params"] if p["name"] == "light.radiance.value")

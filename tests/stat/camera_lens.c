@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Distortion of a camera's lens: rays against numbers of OpenCV 5.0 (projectPoints and
- * undistortPointsIter), walks from the lights as the inverse of rays, a picture of a grid
+ * undistortPointsIter), light walks as the inverse of rays, a picture of a grid
  * beside the warped one of a pinhole, and light from all three ends. */
 #include "film/film_picture.h"
 #include "imp_scene.h"

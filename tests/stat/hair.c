@@ -224,7 +224,7 @@ static void from_lights(void)
     run.from = IMP_FROM_LIGHTS;
     const enum imp_status st = imp_render(s, &run, &film);
     tap_ok(st == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "fibre"),
-           "walks from the lights are refused # %s", imp_last_error(ctx));
+           "light walks are refused # %s", imp_last_error(ctx));
     imp_film_destroy(film);
     imp_scene_destroy(s);
 }

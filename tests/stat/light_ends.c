@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Walks from the lights against walks from the sensor, and both against what is known: a
+ * Light walks against walks from the sensor, and both against what is known: a
  * reading is the same number from either end, R = R_A (Veach 1997, 3.7; Morley et al.
  * 2006, section 1). No factor stands between them but those of the scattering functions;
  * each of these, left out of a walk, must be missed (planted). */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Fits by walks from the lights, and from both ends, with Gauss-Newton matrices: J^T J and
+ * Fits by light walks, and from both ends, with Gauss-Newton matrices: J^T J and
  * the gradient are those of walks from the sensor, and intervals hold the truth as often as
  * they say. */
 #include "imp_light_room.h"

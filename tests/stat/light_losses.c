@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Losses of walks from the lights and from both ends, and of linear functions of their
+ * Losses of light walks and from both ends, and of linear functions of their
  * pictures: values and gradients against those of walks from the sensor, whose adjoints
  * leave out one walk at a time, and standard errors against the spread of fresh seeds; at
  * the optimum and away from it, through a box and through filters that share walks. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Derivative pictures by walks from the lights, and from both ends, against those of walks
+ * Derivative pictures by light walks, and from both ends, against those of walks
  * from the sensor pixel by pixel; the picture along a direction against the sum of all; and
  * sums over pictures, whose errors are those of seeds. */
 #include "imp_light_room.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Derivative pictures of walks from the lights are held whole, for each number and
+ * Derivative pictures of light walks are held whole, for each number and
  * replicate: where they do not fit into the machine's memory, the fit says so before
  * anything is traced. */
 #include "base/context.h"

@@ -444,7 +444,7 @@ static void begin(struct traced *t, const char *integrator, const char *sensor,
                                     .integrator = imp__walk_integrator(scene),
                                     .sensor = scene->sensors[0],
                                     .active = &t->active,
-                                    .collisions_stand = true,
+                                    .collisions_fixed = true,
                                     .seed = 5};
     imp__arena_init(&t->arena, ctx);
 }
@@ -513,7 +513,7 @@ static void from_sensor(const char *name, const char *integrator, const char *se
         seen_report("kept", &m);
         tap_ok(m.vertices == n.vertices && m.placed == n.placed && m.lights == n.lights &&
                    m.backs == n.backs,
-               "%s: kept walks name the same places", name);
+               "%s: recorded walks name the same places", name);
         tap_ok(same == N && values > N / 3,
                "%s: a texture that reads the primitive gives the same bits again # %d",
                name, same);

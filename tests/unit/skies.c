@@ -141,7 +141,7 @@ static void checked(const char *integrator, const char *things)
     imp_scene_destroy(s);
 }
 
-/* The same picture from kept walks, from their file, and at other radiances. */
+/* The same picture from recorded walks, from their file, and at other radiances. */
 static void kept(void)
 {
     imp_scene *s = world("path", EYE THINGS, 7);
@@ -173,7 +173,7 @@ static void kept(void)
     for (int k = 1; k < 3; k++)
         tap_ok(memcmp(imp_film_mean(film[k]), imp_film_mean(film[0]),
                       n * sizeof *imp_film_mean(film[0])) == 0,
-               "kept walks%s: the bits of those drawn", k == 2 ? " in a file" : "");
+               "recorded walks%s: the bits of those drawn", k == 2 ? " in a file" : "");
     double mean = 0, se = 0, of[3], of_se[3];
     for (size_t k = 0; k < n; k += (size_t)info.channels) {
         mean += (double)imp_film_mean(film[3])[k] / 36;

@@ -4,7 +4,7 @@
  * that hits anything, surface or environment. A proxy that no ray hits draws directions
  * in vain. */
 #include "check.h"
-#include "scene/aims.h"
+#include "scene/aimed_directions.h"
 
 #define VERTICES 2000 /* from which rays are sent towards lights and proxies */
 

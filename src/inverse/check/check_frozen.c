@@ -350,7 +350,7 @@ enum imp_status imp__check_frozen(struct imp__check *c)
     struct imp__kept k = {.check = c};
 
     imp__arena_init(&k.arena, c->ctx);
-    c->tracer.collisions_stand = true; /* extinctions: with frozen collisions too */
+    c->tracer.collisions_fixed = true; /* extinctions: with frozen collisions too */
     IMP_TRY(imp__kept_create(&k));
     if (k.n == 0)
         IMP_TRY(imp__error(c->ctx, IMP_E_NUMERIC,
@@ -366,7 +366,7 @@ enum imp_status imp__check_frozen(struct imp__check *c)
     IMP_TRY(imp__check_identities(&k));
     IMP_TRY(imp__check_density(&k));
 out:
-    c->tracer.collisions_stand = false;
+    c->tracer.collisions_fixed = false;
     imp__kept_destroy(&k);
     return st;
 }

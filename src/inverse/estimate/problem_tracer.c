@@ -57,7 +57,7 @@ enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
                                .active = &p->active,
                                .seed = run->seed,
                                .guide = imp__guide_of(p->scene, integrator, run->guide),
-                               .collisions_stand = integrator->from_lights};
+                               .collisions_fixed = integrator->from_lights};
     imp__tracer_numbers(out, run, 0);
     if (integrator->from_lights) out->points = NULL; /* groups would share a set */
     if (waves)
@@ -66,7 +66,7 @@ enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
                                                                   : IMP_WAVES_UNIFORM];
     out->set = 1; /* leave-one-out needs independent walks, or sets */
     if (run->walks) {
-        out->collisions_stand = true;
+        out->collisions_fixed = true;
         return imp__walks_use(run, out);
     }
     st = imp__baseline_set(out, imp__walks_of(run, sensor) * sensor->film.crop_w *
@@ -77,9 +77,9 @@ enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
 
 void imp__problem_tell(struct imp_problem *p, const struct imp_tracer *tracer)
 {
-    if (!p->missing_told)
+    if (!p->misses_reported)
         imp__light_walks_tell(p->scene, tracer->sensor, tracer->integrator);
-    p->missing_told = true;
+    p->misses_reported = true;
 }
 
 enum imp_status imp__target_tracer(const struct imp_problem *p,

@@ -29,7 +29,7 @@ struct numbers {
 static enum imp_status number_add(struct numbers *s, int64_t k)
 {
     int64_t *grown = imp__grow(s->ctx, s->sample, &s->cap, s->n + 1, sizeof *grown);
-    if (!grown) return imp__error(s->ctx, IMP_E_NOMEM, "no memory for kept walks");
+    if (!grown) return imp__error(s->ctx, IMP_E_NOMEM, "no memory for recorded walks");
     s->sample = grown;
     grown[s->n++] = k;
     return IMP_OK;
@@ -111,7 +111,7 @@ static enum imp_status store_fill(const struct imp_walks *w, struct filling *f)
                                   .fraction_hi = 1,
                                   .start_s = imp__now()};
     f->arenas = imp__alloc(ctx, (size_t)ctx->threads, sizeof *f->arenas);
-    if (!f->arenas) return imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks");
+    if (!f->arenas) return imp__error(ctx, IMP_E_NOMEM, "no memory for recorded walks");
     for (int k = 0; k < ctx->threads; k++) imp__arena_init(&f->arenas[k], ctx);
     st = imp__parallel(ctx, &loop, NULL);
     for (int k = 0; k < ctx->threads; k++) imp__arena_free(&f->arenas[k]);
@@ -139,7 +139,7 @@ enum imp_status imp__walks_sensor(struct imp_walks *w, const struct imp_active *
                                   .active = active,
                                   .seed = run.seed,
                                   .guide = imp__guide_of(scene, w->integrator, run.guide),
-                                  .collisions_stand = true,
+                                  .collisions_fixed = true,
                                   .survival = w->survival,
                                   .headroom = w->headroom};
     imp__tracer_numbers(tracer, &run, w->losses ? 0 : (int64_t)numbers.n);
@@ -204,7 +204,7 @@ static enum imp_status chosen_make(struct imp_walks *w, const uint8_t *free)
     uint8_t *one = imp__alloc(w->ctx, scene->n_params + 1, 1);
     if (!w->chosen || !w->flights || !w->theta || !one) {
         imp__release(w->ctx, one);
-        return imp__error(w->ctx, IMP_E_NOMEM, "no memory for kept walks");
+        return imp__error(w->ctx, IMP_E_NOMEM, "no memory for recorded walks");
     }
     for (size_t k = 0; k < scene->n_params; k++) {
         const struct imp_param *p = &scene->params[k];
@@ -238,7 +238,7 @@ enum imp_status imp__walks_begin(imp_scene *scene, const struct imp_run *run,
     IMP_CHECKED(imp__job_allowed(&job));
     integrator = imp__walks_from(integrator, run->from);
     w = imp__alloc(ctx, 1, sizeof *w);
-    if (!w) return imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks");
+    if (!w) return imp__error(ctx, IMP_E_NOMEM, "no memory for recorded walks");
     imp__context_hold(ctx);
     *w = (struct imp_walks){.ctx = ctx,
                             .scene = scene,
@@ -251,7 +251,7 @@ enum imp_status imp__walks_begin(imp_scene *scene, const struct imp_run *run,
                             .ess = o->ess,
                             .integrator = integrator};
     w->stores = imp__alloc(ctx, (size_t)scene->n_sensors + 1, sizeof *w->stores);
-    if (!w->stores) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks"));
+    if (!w->stores) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for recorded walks"));
     IMP_TRY(chosen_make(w, free));
     IMP_TRY(
         imp__densities_create(scene, integrator, w->chosen, w->survival, &w->densities));
@@ -344,7 +344,7 @@ enum imp_status imp_walks_keep(imp_scene *scene, const struct imp_run *run,
     if (o.ess == 0) o.ess = ESS;
     IMP_TRY(imp__run_sensor(scene, &own, &sensor));
     sensors = imp__alloc(ctx, (size_t)scene->n_sensors, 1);
-    if (!sensors) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks"));
+    if (!sensors) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for recorded walks"));
     bool told = own.points != IMP_POINTS_SCENE;
     for (int k = 0; k < scene->n_sensors; k++) {
         sensors[k] = o.all_sensors || k == own.sensor;

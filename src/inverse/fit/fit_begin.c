@@ -57,10 +57,10 @@ static void missing_tell(struct imp_problem *p, enum imp_from end)
     const struct imp_scene *scene = p->scene;
     const struct imp_walk_integrator *from =
         imp__walks_from(imp__walk_integrator(scene), end);
-    if (p->missing_told || !from) return;
+    if (p->misses_reported || !from) return;
     for (size_t i = 0; i < p->n_targets; i++)
         imp__light_walks_tell(scene, scene->sensors[p->targets[i].desc.sensor], from);
-    p->missing_told = true;
+    p->misses_reported = true;
 }
 
 /* What reads losses: trial steps beside the loss of a Gauss-Newton matrix, methods whose walks are

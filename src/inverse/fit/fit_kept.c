@@ -106,7 +106,7 @@ enum imp_status imp__fit_draw(const double *x, uint64_t seed, void *payload)
         }
     const size_t n_sensors = (size_t)p->scene->n_sensors, n_params = p->scene->n_params;
     uint8_t *sensors = imp__alloc(p->ctx, n_sensors + n_params + 1, 1);
-    if (!sensors) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for kept walks");
+    if (!sensors) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for recorded walks");
     uint8_t *free = sensors + n_sensors;
     for (size_t k = 0; k < n_params; k++) free[k] = p->active.base[k] >= 0;
     for (size_t t = 0; t < p->n_targets; t++) sensors[p->targets[t].desc.sensor] = 1;
@@ -184,7 +184,7 @@ const char *imp__fit_walks_text(const struct imp__fit *f)
         snprintf(text, sizeof text, "every evaluation traced its walks: %s", f->untaken);
     else
         snprintf(text, sizeof text,
-                 "%d of %d evaluations are of kept walks, which were drawn %d time%s "
+                 "%d of %d evaluations are of recorded walks, which were drawn %d time%s "
                  "(%.3g MB)",
                  f->evaluated, f->evaluated + f->traced, f->draws,
                  f->draws == 1 ? "" : "s", f->walks_bytes / 1e6);

@@ -25,7 +25,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define ROWS       20 /* numbers with Gauss-Newton rows, at least; less if there are less */
+#define ROWS       20 /* values with Gauss-Newton rows, at least; fewer if there are fewer */
 #define REPLICATES 6
 #define APART      8 /* a parameter of more values is tested through one common factor */
 #define LOOSE      1e-6 /* directions of H_aa below this, scaled, are not followed */

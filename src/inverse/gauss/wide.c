@@ -95,7 +95,7 @@ static enum imp_status light_plan(struct imp__wide *w, const struct imp_tracer *
     w->R = light_spp(tracer, run, rounds) < 8 ? 4 : IMP_WIDE_REPLICATES;
     return imp__memory_check(
         w->ctx, pixels * (w->R * (K + 1) * w->channels + 2 * K + 1) * sizeof(double),
-        "derivative pictures of walks from the lights");
+        "derivative pictures of light walks");
 }
 
 /* A walk from a light reaches many pixels, whatever the filter. */

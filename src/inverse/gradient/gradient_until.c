@@ -7,7 +7,7 @@
  * (Szekely and Bakirov, Probab. Theory Relat. Fields 126, 2003). */
 #include "allocation.h"
 #include "base/arguments.h"
-#include "walk/run/looks.h"
+#include "walk/run/interim_looks.h"
 #include <math.h>
 #include <string.h>
 

@@ -61,7 +61,7 @@ struct imp__regulariser {
     double *origin; /* [n_theta] x0, or NULL for 0 */
 };
 
-/* Parameters tied to common values (ties.c). */
+/* Parameters tied to common values (tied_parameters.c). */
 struct imp__param_tie {
     enum imp_tie kind;
     uint8_t *on; /* [n_params] its parameters, two or more but for logarithms */
@@ -125,15 +125,16 @@ struct imp_problem {
     struct imp__allocation *allocation; /* of its samples; NULL: all alike */
     struct imp__variate *variate; /* of the evaluation at work (variate.h); NULL: none */
     enum imp__loss_use use;
-    bool missing_told;          /* that light tracing misses some light */
-    bool same_known;            /* the ranks of a team have the same problem */
+    bool
+        misses_reported; /* the user has been warned of light that light tracing misses */
+    bool same_known;     /* the ranks of a team have the same problem */
     struct imp_arena fit_arena; /* of the last fit's result */
     struct imp__fit_answer fit_answer;
     struct imp_arena check_arena;   /* of the last check's rows */
     struct imp_arena missing_arena; /* of rows of imp_problem_missing */
 };
 
-/* ---- ties.c ---- */
+/* ---- tied_parameters.c ---- */
 /* Make the parameters `chosen` [n_params] active, and lay out x by the problem's ties.
  * Replaces active and blocks; after a failure they are as before. */
 enum imp_status imp__problem_layout(struct imp_problem *p, const uint8_t *chosen);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Walks from both ends (Veach 1997, 10). A sample is a walk from the sensor and one from a
+ * Bidirectional walks (Veach 1997, 10). A sample is a walk from the sensor and one from a
  * light. With vertices y_1 .. y_t of the first and z_1 .. z_s of the second, y_1 on the
  * sensor and z_1 on the light, a path of n = s + t vertices is found in up to n + 1 ways:
  *

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Densities of the vertices of walks from both ends, drawn from either end. Densities per
+ * Densities of the vertices of bidirectional walks, drawn from either end. Densities per
  * steradian become densities per area with |cos|/r^2 at the geometric normal. Where the
  * wavelengths of a walk have densities of their own the mean over them is taken, which does
  * not depend on the one that drew. */

@@ -7,7 +7,7 @@
 #include "kind/bsdf/transport.h"
 #include "walk/core/one_step.h"
 #include "walk/path/first_segment.h"
-#include "walk/path/meter.h"
+#include "walk/path/surface_sensor.h"
 
 /* ---- Joints ------------------------------------------------------------------------ */
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Weights of the ways in which walks from both ends find a path. With L_k the density of
+ * Weights of the ways in which bidirectional walks find a path. With L_k the density of
  * vertex k, counted from the light, drawn by a walk from there, and Y_k drawn by one from
  * the sensor,
  *

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Derivatives of what walks from the lights bring, and of samples from both ends. Wherever
+ * Derivatives of what light walks bring, and of samples from both ends. Wherever
  * light reaches the film it has an adjoint of its own. A joint of y and z (both.h) brings
  *
  *     A  P_y f_y T m f_z P_z,    A: adjoint,  P: products of the weights up to y and z

@@ -10,7 +10,7 @@
 enum { IMP_BY_EXTINCTION = 2 };
 
 /* How the numbers v of a parameter follow x, where they are not x[base + e]
- * (inverse/ties.c). */
+ * (inverse/problem/tied_parameters.c). */
 struct imp_tied {
     const struct imp_param *param; /* NULL: they are */
     const double *factor;          /* [count]: v[e] = factor[e] x[base], or with log
@@ -23,14 +23,15 @@ struct imp_active {
     int64_t *base;         /* [n_params] index in x of a parameter's first number, or -1;
                          parameters with the same numbers share it */
     struct imp_tied *tied; /* [n_params]; NULL: none of them is */
-    uint8_t *bsdf;    /* [n_bsdfs] does it depend on an active number; IMP_BY_EXTINCTION:
-                         by extinctions alone, of which probes know */
+    uint8_t *bsdf;    /* [n_bsdfs] does it depend on an active value; IMP_BY_EXTINCTION:
+                         by extinctions alone, which probes differentiate */
     uint64_t *inputs; /* [n_bsdfs] bit j: its input j does, children's included */
     uint8_t *emitter; /* [n_emitters] */
     uint8_t *body;    /* [n_bodies]; NULL: none of them */
     uint8_t *medium;  /* [n_media] does its extinction; NULL: none of them */
-    uint64_t *unseen; /* [n_media] inputs, by bits, that derivatives with respect to its
-                         extinction do without; NULL with medium */
+    uint64_t
+        *unseen; /* [n_media] mask of inputs that are not looked up for derivatives with
+                         respect to its extinction; NULL with medium */
 };
 /* Where in x number e of an active parameter is. */
 static inline size_t imp__active_at(const struct imp_active *a, int param, size_t e)

@@ -56,8 +56,8 @@ struct imp_decision {
     bool back : 1;          /* the ray came from behind the geometric normal */
     bool glows : 1;         /* the BSDF's own emission counts */
     bool goes_on : 1;       /* the walk continues */
-    bool stands : 1;        /* in a medium: this collision stands for derivatives with
-                                 respect to the extinction (tracking.h) */
+    bool fixed : 1;         /* in a medium: a fixed collision, whose factor is
+                                 differentiated by the extinction (tracking.h) */
     uint8_t drawn : 3;      /* enum imp_density that drew the continuation */
     bool alone : 1;         /* its vertex splits, and one member of the mixture drew it */
     bool from_light : 1;    /* of a walk from a light: the light sample is a connection to
@@ -70,9 +70,9 @@ struct imp_decision {
     imp_decided uv[2], p[3];
     imp_decided wo[3], wi[3]; /* of the continuation, shading frame */
     imp_decided pdf, survive; /* p, s of the continuation */
-    imp_decided share, rest;  /* p before roulette, by k, the density of wi by the BSDF
-                                 alone: share k + rest, in each lane where lanes differ;
-                                 alone: in the lane that drew */
+    imp_decided share, rest;  /* p before roulette = share k + rest, k: the BSDF's own
+                                 density of wi; in each lane, if lanes differ; with
+                                 `alone` in the lane that drew */
     imp_decided passes;       /* T of the segment that follows, where no parameter that
                                  is differentiated changes it */
     imp_decided glow_weight;  /* of the BSDF's own emission: 1, or 1/absorb */

@@ -13,7 +13,7 @@ struct imp_light_point {
     double pmf; /* of the light, or of the triangle that there.pdf is that of */
     struct imp_light_sample there;
 };
-/* Where there are several lights, or a guide knows the place (light.c); u: what draws the
+/* Where there are several lights, or a guide covers the place (light.c); u: what draws the
  * point. */
 bool imp__light_point_of(const struct imp_step *s, const struct imp_bsdf *b,
                          const struct imp_surface *at, double u[2],

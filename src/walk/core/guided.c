@@ -32,7 +32,7 @@ double imp__guided_survival(const struct imp_step *s, double q)
     return imp_clamp(g->guide->roulette * rest / g->reference, 0.2, 1.0);
 }
 
-/* ---- Walks from the lights -------------------------------------------------------- */
+/* ---- Light walks -------------------------------------------------------- */
 
 double imp__guided_emit(const struct imp_step *s, int light, double u[4], double *point)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a guide does for walks from the lights (scene/guide.h): it takes part in the choice
+ * What a guide does for light walks (scene/guide.h): it takes part in the choice
  * of the light, of the point and direction that it sends, and of directions on the way, in
  * mixtures whose densities hold the unguided ones. For walks from the sensor see step.h. */
 #ifndef IMP_WALK_GUIDED_H

@@ -11,7 +11,8 @@
 
 #define IMP_STEP_INLINE static inline __attribute__((always_inline))
 
-/* Is another vertex within max_depth, if only one behind a lobe that is no bounce? */
+/* Is another vertex within max_depth, even if only one reached by going straight on, which is
+ * no bounce? */
 IMP_STEP_INLINE bool imp__vertex_goes_on(const struct imp_end_ops *end,
                                          const struct imp_step *s,
                                          const struct imp_vertex *v)
@@ -22,9 +23,9 @@ IMP_STEP_INLINE bool imp__vertex_goes_on(const struct imp_end_ops *end,
 
 /* What leaves v: the connection, and the next ray if it goes_on. False: the walk ends.
  *
- * A point to be connected to, and a direction: both are drawn before either is weighed, and
- * both are weighed before the point is looked for, so that neither waits for the other's
- * roots and quotients. */
+ * The point of the connection and the direction are both drawn, then both weighed, and only
+ * then the visibility of the point is tested: neither waits for the other's roots and
+ * quotients. */
 IMP_STEP_INLINE bool imp__vertex_leave(const struct imp_end_ops *end, struct imp_step *s,
                                        struct imp_vertex *v, const struct imp_surface *at,
                                        const struct imp_frame *frame, bool goes_on)

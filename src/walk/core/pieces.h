@@ -2,7 +2,7 @@
  *
  * The pieces of a walk's gradient: derivatives of a vertex's values by inputs, each with the
  * adjoint that it is multiplied by. They are listed once, by the visitor of a vertex
- * (path/vertex_pieces.h); a table here says what becomes of them: into a sink (reverse mode), or
+ * (path/vertex_pieces.h); a table here takes them: into a sink (reverse mode), or
  * along a direction (forward mode). The visitor is one text, which each mode instantiates with a
  * constant table, as ends do with the step (one_step.h). */
 #ifndef IMP_WALK_PIECES_H
@@ -39,8 +39,8 @@ struct imp_pieces_ops {
     /* An input alone; the adjoint is in d. */
     void (*input)(void *taker, const struct imp_input *const *input,
                   const struct imp_texcoord *at, const imp_spec *d);
-    /* Segments that begin at the vertex come before its scatterer, as it is where a walk is read
-     * from its last vertex to its first; segments_end: after them. */
+    /* True: segments that begin at the vertex come before its scatterer (forward mode, which
+     * reads last to first); segments_end: after them. */
     bool segments_first;
     void (*segments_end)(void *taker);
 };

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Kinds asked once a lane, with the scalar inputs of that lane (shaped.h). */
+ * Kinds evaluated once a lane, with the scalar inputs of that lane (shaped.h). */
 #include "shaped.h"
 #include "math/vec.h"
 

@@ -2,7 +2,7 @@
  *
  * Materials and lights whose scalar inputs (a roughness, an index) depend on the
  * wavelength, so that each lane of a walk has a function of its own. Kinds read a scalar
- * from lane 0; here they are asked once a lane, with that lane's scalars, and the lane is
+ * from lane 0; here they are evaluated once a lane, with that lane's scalars, and the lane is
  * taken from the answer. Everything else goes to the kind as it is.
  *
  * A delta lobe that bends light by the index leads every lane elsewhere: the lane that

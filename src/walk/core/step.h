@@ -18,10 +18,11 @@ struct imp_both;
 struct imp_direction;
 struct imp_light_point;
 
-/* What a guide knows of the walk (guided.c). */
+/* State of a guided walk (guided.c). */
 struct imp_guided {
     const struct imp_guide *guide; /* NULL: none */
-    bool here, left; /* known at this vertex; where the ray in flight left */
+    bool here,
+        left; /* the guide covers this vertex; the one where the ray in flight left */
     struct imp_guide_place at, from;
     double reference; /* radiance that it expects of this walk; 0: none */
     double rest;      /* what it expects of the continuation here, at throughput 1 */
@@ -35,22 +36,22 @@ struct imp_mixed {
     /* At the vertex at work: */
     bool here;   /* more than the kernel draws */
     bool splits; /* one continuation from each member, with MIS */
-    bool sphere; /* the uniform member draws both sides */
-    int only; /* the member that draws, of a vertex that splits; -1: one by its share */
+    bool sphere; /* the uniform member samples the full sphere */
+    int only; /* at a vertex that splits, the member that draws; -1: chosen by its share */
     int members;
     double share[IMP_DENSITIES];
     double strength[2]; /* sums of lights' and proxies' strengths, seen from p */
     imp_v3 p;
 };
 
-/* What a walk through media knows of where it is (tracking.c). */
+/* Position of a walk in media (tracking.c). */
 struct imp_flight {
     const struct imp_medium *medium; /* that the ray in flight is in; NULL: none */
     const struct imp_medium
         *here;      /* that the vertex at work lies in, or is reached from */
     imp_v3 at;      /* of the last collision */
     double t, base; /* of the collision; length before the last surface that was passed */
-    bool stands;    /* the collision, for derivatives */
+    bool fixed;     /* a fixed collision (tracking.h) */
     int events;     /* tentative collisions of the walk */
     /* Where shapes have priorities: around the ray in flight, and around the vertex at work
      * without the surface that it lies on. */
@@ -243,7 +244,7 @@ void imp__attached_d(const struct imp_walk *walk, const struct imp_vertex *v, in
 
 /* ---- direction.c ---- */
 /* The densities that take part at a vertex at p, of material b; with s->mixed.all set, or
- * where a guide knows the place. */
+ * where a guide covers the place. */
 void imp__mixture_prepare(struct imp_step *s, const struct imp_bsdf *b, imp_v3 p);
 /* Draw the continuation, as imp_bsdf_ops.sample does, and which member drew it (enum
  * imp_density). */

@@ -26,7 +26,7 @@ struct imp_vertex *imp__medium_meet(struct imp_step *s, const struct imp_bsdf *s
     if (s->recorded) {
         v->d.shape = medium;
         v->d.scatterer = IMP_IN_MEDIUM;
-        v->d.stands = s->flight.stands;
+        v->d.fixed = s->flight.fixed;
     }
     *at = (struct imp_surface){.p = p};
     s->at.prim = 0;

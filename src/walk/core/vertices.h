@@ -49,7 +49,7 @@ static inline struct imp_vertex *imp__vertex_add_here(struct imp_step *s, int n_
     d->located.prim = -1;
     d->place = 0;
     d->back = false;
-    d->glows = d->goes_on = d->stands = d->from_light = d->alone = false;
+    d->glows = d->goes_on = d->fixed = d->from_light = d->alone = false;
     d->drawn = IMP_DENSITY_KERNEL;
     d->pdf = d->rest = 0;
     d->survive = d->passes = d->share = 1;

@@ -86,7 +86,7 @@ struct imp_vertex {
 
 struct imp_entry {
     imp_spec e, b;
-    imp_spec joints; /* what reaches the sensor otherwise from there (both.h) */
+    imp_spec joints; /* from connections to the other walk (both.h) */
 };
 
 struct imp_walk {
@@ -163,11 +163,11 @@ struct imp_tracer {
     bool stratified; /* walks of a set of points have stratified wavelengths */
     int64_t period;  /* 0: endless */
     /* NULL: a pixel's walks are independent. Else those with the numbers 64 s to 64 s + 63
-     * are set s of points, of which any number from the first on may be used. */
+     * are set s of points, of which any prefix may be used. */
     const struct imp_point_table *points;
     const struct imp_mixing *mixing; /* densities in place of the integrator's and the
                                         materials'; NULL: those */
-    bool collisions_stand; /* the derivative of a frozen walk is wanted, whose collisions
+    bool collisions_fixed; /* the derivative of a frozen walk is wanted, whose collisions
                               stay where they are, also of extinctions: no probes */
     const struct imp_photograph *photograph; /* that is compared with; NULL: none */
     int split; /* continuations of the first vertex, each with its share; 0: one. Scenes
@@ -177,13 +177,13 @@ struct imp_tracer {
     double
         headroom; /* collisions are drawn under bounds so much higher (flight.h); 0 or 1:
                         as they are */
-    imp_spec baseline; /* by lanes: what derivatives of flights take from the light that
-                          arrives (baseline.h) */
+    imp_spec baseline;            /* by lanes: subtracted from the light that arrives, in
+                          derivatives of flights (baseline.h) */
     const struct imp_store *kept; /* walks that are evaluated in place of tracing
                                     (store.h); NULL: they are traced */
-    bool
-        elsewhere; /* walks are evaluated at other numbers, too (imp__walk_elsewhere): any
-                       number of factors that are zero, but have a derivative, ends none */
+    bool elsewhere;               /* walks are evaluated at other parameter values, too
+                       (imp__walk_elsewhere): factors that are zero, but have a
+                       derivative, end no walk, however many there are */
 };
 
 static inline const struct imp_walk_source *imp__walk_source(const struct imp_tracer *t)
@@ -192,7 +192,7 @@ static inline const struct imp_walk_source *imp__walk_source(const struct imp_tr
 }
 
 /* The guide that walks of this integrator follow: its densities are made for paths and for
- * walks from the lights, in scenes that finite elements know. */
+ * light walks, in scenes that finite elements know. */
 static inline const struct imp_guide *imp__guide_of(const struct imp_scene *scene,
                                                     const struct imp_walk_integrator *i,
                                                     const struct imp_guide *guide)

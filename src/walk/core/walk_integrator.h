@@ -54,7 +54,7 @@ struct imp_walk_integrator {
                                               there is none */
 };
 
-/* A kind: its table, and what its name stands for (walk_kinds.c). */
+/* A kind: its table, and the settings of its name (walk_kinds.c). */
 struct imp_walk_kind {
     struct imp_integrator_ops ops;    /* first */
     struct imp_walk_integrator start; /* before anything is read */
@@ -80,7 +80,7 @@ imp__walk_integrator_of(const struct imp_integrator *i)
 /* The radiance integrator of a scene: itself, or the first in moment or aov; NULL: none
  * (depth alone). */
 const struct imp_walk_integrator *imp__walk_integrator(const struct imp_scene *scene);
-/* What walks are made by from the end that is asked for: `of` where none is, NULL where `of`
+/* The settings of walks from the end `from`: `of` for IMP_FROM_SCENE, NULL where `of`
  * has no such end. */
 const struct imp_walk_integrator *imp__walks_from(const struct imp_walk_integrator *of,
                                                   enum imp_from from);

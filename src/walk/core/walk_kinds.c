@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The kinds of integrators that make walks: one table of what each name stands for, and how
+ * The kinds of integrators that make walks: one table of the settings of each name, and how
  * their properties are read. A name that differs from another by settings alone is a row. */
 #include "scene/majorants.h"
 #include "scene/unlit.h"
@@ -188,7 +188,7 @@ static enum imp_status photons_ready(struct imp_scene *scene,
     return mixture_ready(scene, i);
 }
 
-/* Walks from the lights, connected to the sensor (Mitsuba's name). */
+/* Light walks, connected to the sensor (Mitsuba's name). */
 static enum imp_status ptracer_build(const struct imp_build *build,
                                      struct imp_integrator *i)
 {
@@ -216,7 +216,7 @@ static enum imp_status ptracer_ready(struct imp_scene *scene,
     return imp__mixture_settle(scene, i, w->other_end->other_end);
 }
 
-/* Walks from both ends, joined. Its other ends are ptracer's, and of that path's. */
+/* Bidirectional walks, joined. Its other ends are ptracer's, and of that path's. */
 static enum imp_status bdpt_build(const struct imp_build *build, struct imp_integrator *i)
 {
     struct imp_walk_integrator *w = i->self;

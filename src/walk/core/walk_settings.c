@@ -34,7 +34,7 @@ enum imp_status imp__light_choice_read(const struct imp_build *build,
 
 void imp__light_choice_ready(struct imp_scene *scene, struct imp_walk_integrator *w)
 {
-    w->light_tree = /* walks from both ends are weighed by the lights' weights */
+    w->light_tree = /* bidirectional walks are weighed by the lights' weights */
         w->lights && !w->both &&
         (w->light_choice == BY_TREE ||
          (w->light_choice == BY_COUNT && scene->n_emitters >= LIGHTS_MANY));

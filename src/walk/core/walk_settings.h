@@ -7,7 +7,7 @@
 
 #include "walk_integrator.h"
 
-/* hide_emitters and max_depth, which is `fallback` if nobody says. */
+/* hide_emitters and max_depth; `fallback`: the default of max_depth. */
 enum imp_status imp__depth_read(const struct imp_build *build, int fallback,
                                 struct imp_integrator *i, struct imp_walk_integrator *w);
 

@@ -4,7 +4,7 @@
 #include "lane_mis.h"
 #include "walk.h"
 
-/* Walks of a set, where none is asked for: of at least four sets, whose spread is the
+/* Default number of walks in a set: there are at least four sets, whose spread is the
  * standard error. */
 #define SET_MAX   16
 #define SET_TIMED 4 /* where it is not known how many there will be */

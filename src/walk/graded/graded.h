@@ -2,7 +2,7 @@
  *
  * Segments in scenes with bodies of graded index (docs/bend.md, "In scenes"). A
  * walk that is refracted into a body follows its bent ray to the next shape; nothing else
- * of the walk knows. Not possible, and dropped: bodies in bodies, shapes inside that let
+ * of the walk changes. Not possible, and dropped: bodies in bodies, shapes inside that let
  * light through, cameras inside. No light samples are taken inside, where a straight line
  * leads nowhere; lights are met by chance there. */
 #ifndef IMP_WALK_GRADED_H

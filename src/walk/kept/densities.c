@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the densities that kept walks were drawn with depend on: inputs of materials, by
+ * What the densities that recorded walks were drawn with depend on: inputs of materials, by
  * trial, and extinctions of media. */
+#include "kind_trials.h"
 #include "store.h"
-#include "trial.h"
 #include "walk/core/step.h"
 
 _Static_assert(IMP_INPUTS_MAX <= 64, "masks of inputs have 64 bits");
@@ -47,7 +47,7 @@ enum imp_status imp__densities_create(const struct imp_scene *scene,
     d.moved = imp__alloc(scene->ctx, n, sizeof *d.moved);
     if (!d.wanted || !d.inputs || !d.moved) {
         imp__densities_destroy(scene->ctx, &d);
-        return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for kept walks");
+        return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for recorded walks");
     }
     for (int b = 0; b < scene->n_bsdfs; b++) {
         const struct imp_bsdf *bsdf = scene->bsdfs[b];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Whether kept walks may be evaluated at the scene's present parameters, and what they are
+ * Whether recorded walks may be evaluated at the scene's present parameters, and what they are
  * worth there. */
 #include "base/arguments.h"
 #include "base/team.h"
@@ -10,8 +10,8 @@
 
 #define TILES_AT_ONCE 16
 #define SEEN_LEAST                                                                       \
-    0.5            /* mean ratio of densities, which is 1 where all of them was drawn */
-#define CLEAR 1.25 /* what some walks say is enough by this factor */
+    0.5 /* least mean of new over old density; 1 if the walks cover the new one */
+#define CLEAR 1.25 /* the subset decides if it clears a limit by this factor */
 /* Roulette's growth, over all its steps of walks that have a last depth. */
 #define GROWTH_MOST 4
 
@@ -46,10 +46,11 @@ enum imp_status imp__walks_run(imp_context *ctx, const char *function,
     if (run->time_limit_s > 0)
         return imp__error(ctx, IMP_E_ARG,
                           "%s: run->time_limit_s is of pictures that are traced; the "
-                          "number of kept walks is what it is",
+                          "number of recorded walks is what it is",
                           function);
     if (run->from == IMP_FROM_LIGHTS)
-        return imp__error(ctx, IMP_E_ARG, "%s: kept walks begin at the sensor", function);
+        return imp__error(ctx, IMP_E_ARG, "%s: recorded walks begin at the sensor",
+                          function);
     run->seed = w->run.seed;
     run->spp = w->run.spp;
     run->points = w->run.points;
@@ -65,10 +66,11 @@ static enum imp_status zeros_check(const struct imp_walks *w, const struct imp_p
 {
     for (size_t e = 0; e < p->info.count; e++)
         if (w->theta[p->info.offset + e] == 0 && imp__param_get(p, e) != 0)
-            return imp__error(w->ctx, IMP_E_UNSUPPORTED,
-                              "kept walks: number %zu of %s was 0 when they were drawn, "
-                              "so that no collision was, and is %g now",
-                              e, p->info.name, imp__param_get(p, e));
+            return imp__error(
+                w->ctx, IMP_E_UNSUPPORTED,
+                "recorded walks: number %zu of %s was 0 when they were drawn, "
+                "so that no collision was, and is %g now",
+                e, p->info.name, imp__param_get(p, e));
     return IMP_OK;
 }
 
@@ -83,7 +85,7 @@ enum imp_status imp__walks_changed(const struct imp_walks *w, uint8_t *changed)
         if (!changed[k] || w->chosen[k]) continue;
         if (!w->flights[k])
             return imp__error(w->ctx, IMP_E_UNSUPPORTED,
-                              "kept walks: %s has another value than when they were "
+                              "recorded walks: %s has another value than when they were "
                               "drawn, and rays or densities follow it that were not kept",
                               p->info.name);
         IMP_CHECKED(zeros_check(w, p));
@@ -142,7 +144,7 @@ static enum imp_status moments_sum(const struct imp_walks *all, struct weighing 
     struct imp_drops drops = {0};
     struct imp_shared shared = {.drops = &drops};
     w->arenas = imp__alloc(ctx, (size_t)ctx->threads, sizeof *w->arenas);
-    if (!w->arenas) return imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks");
+    if (!w->arenas) return imp__error(ctx, IMP_E_NOMEM, "no memory for recorded walks");
     for (int k = 0; k < ctx->threads; k++) imp__arena_init(&w->arenas[k], ctx);
     if (ctx->team) ctx->team->alone++;
     st = imp__shared_sum(ctx, &loop, &desc, tiles_weigh, &shared);
@@ -184,13 +186,14 @@ static enum imp_status collisions_check(const struct imp_walks *w,
     const char *medium = "";
     double n;
     if (collisions_of(w->scene, sum->passed, &medium, &n))
-        return imp__error(w->ctx, IMP_E_UNSUPPORTED,
-                          "kept walks: the extinction of medium '%s' is above the bound "
-                          "under which %g collisions were drawn; draw new ones",
-                          medium, n);
+        return imp__error(
+            w->ctx, IMP_E_UNSUPPORTED,
+            "recorded walks: the extinction of medium '%s' is above the bound "
+            "under which %g collisions were drawn; draw new ones",
+            medium, n);
     if (collisions_of(w->scene, sum->certain, &medium, &n))
         return imp__error(w->ctx, IMP_E_UNSUPPORTED,
-                          "kept walks: the extinction of medium '%s' had reached its "
+                          "recorded walks: the extinction of medium '%s' had reached its "
                           "bound where it is smaller now, so that no null collisions "
                           "were drawn beside %g real ones; draw new ones",
                           medium, n);
@@ -202,16 +205,16 @@ static enum imp_status worth_check(const struct imp_walks *w,
                                    const struct imp_walks_weight *x)
 {
     if (!imp__walks_finite(w, x))
-        return imp__error(w->ctx, IMP_E_NUMERIC,
-                          "kept walks: by roulette their second moment grows by %.3g a "
-                          "step at these parameters%s; draw new ones",
-                          x->growth,
-                          growing_steps(w->integrator) < 0
-                              ? ", so that their variance is infinite"
-                              : "");
+        return imp__error(
+            w->ctx, IMP_E_NUMERIC,
+            "recorded walks: by roulette their second moment grows by %.3g a "
+            "step at these parameters%s; draw new ones",
+            x->growth,
+            growing_steps(w->integrator) < 0 ? ", so that their variance is infinite"
+                                             : "");
     if (x->ess < w->ess)
         return imp__error(w->ctx, IMP_E_NUMERIC,
-                          "kept walks: at these parameters %.2g of them count "
+                          "recorded walks: at these parameters %.2g of them count "
                           "(effective sample size), less than %.2g; draw new ones",
                           x->ess, w->ess);
     return IMP_OK;
@@ -249,7 +252,7 @@ enum imp_status imp__walks_weigh(const struct imp_walks *w, const struct imp_sto
     if (all) *all = true;
     for (size_t k = 0; k < walks; k++) out->n_walks += (double)store->records[k].n_walks;
     if (!changed || !own.moved)
-        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks"));
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for recorded walks"));
     IMP_TRY(imp__walks_changed(w, changed));
     imp__densities_move(&own, changed);
     /* Roulette's own growth is of interest at the parameters of the draw, too. */
@@ -295,7 +298,7 @@ static enum imp_status active_check(const struct imp_walks *w,
     for (size_t k = 0; active && k < w->scene->n_params; k++)
         if (active->base[k] >= 0 && !w->chosen[k])
             return imp__error(w->ctx, IMP_E_UNSUPPORTED,
-                              "kept walks have no derivative with respect to %s: %s",
+                              "recorded walks have no derivative with respect to %s: %s",
                               w->scene->params[k].info.name,
                               w->flights[k] ? "their collisions were drawn by it"
                                             : "rays or densities follow it");
@@ -307,13 +310,13 @@ enum imp_status imp__walks_use(const struct imp_run *run, struct imp_tracer *tra
     const struct imp_walks *w = run->walks;
     imp_context *ctx = tracer->scene->ctx;
     if (w->scene != tracer->scene)
-        return imp__error(ctx, IMP_E_ARG, "kept walks of another scene");
+        return imp__error(ctx, IMP_E_ARG, "recorded walks of another scene");
     const struct imp_store *store = imp__walks_store(w, tracer->sensor);
     if (!store)
-        return imp__error(ctx, IMP_E_ARG, "there are no kept walks of sensor '%s'",
+        return imp__error(ctx, IMP_E_ARG, "there are no recorded walks of sensor '%s'",
                           tracer->sensor->name);
     if (tracer->integrator != w->integrator)
-        return imp__error(ctx, IMP_E_ARG, "kept walks of another integrator");
+        return imp__error(ctx, IMP_E_ARG, "recorded walks of another integrator");
     IMP_CHECKED(active_check(w, tracer->active));
     if (w->ess >= 0) IMP_CHECKED(use_check(w, store)); /* else whoever made them has */
     tracer->kept = store;
@@ -364,7 +367,7 @@ enum imp_status imp_walks_weigh(const imp_walks *w, int sensor, const float *mas
     for (int k = 0; k < w->n_stores; k++)
         if (w->stores[k].index == sensor) store = &w->stores[k];
     if (!store)
-        return imp__error(w->ctx, IMP_E_ARG, "there are no kept walks of sensor %d",
+        return imp__error(w->ctx, IMP_E_ARG, "there are no recorded walks of sensor %d",
                           sensor);
     const struct imp_film_desc *film = &store->sensor->film;
     const size_t pixels = (size_t)film->crop_w * (size_t)film->crop_h;

@@ -101,7 +101,7 @@ static inline const uint32_t *imp__packed_step(const uint32_t *words,
     d->drawn = h.drawn & 7;
     d->glows = h.glows;
     d->goes_on = h.goes_on;
-    d->stands = d->from_light = false;
+    d->fixed = d->from_light = false;
     d->alone = h.alone;
     d->back = h.back;
     d->lobe = (int8_t)h.lobe;

@@ -118,7 +118,7 @@ enum imp_status imp__record_reserve(struct imp_record *r, size_t walks, size_t v
     const size_t needed = bytes_of(n_walks, n_vertices, r->n_words + words, n_items);
     if (needed > r->budget)
         return imp__error(r->ctx, IMP_E_NOMEM,
-                          "%zu kept walks of %zu vertices need %zu bytes; "
+                          "%zu recorded walks of %zu vertices need %zu bytes; "
                           "the budget is %zu",
                           n_walks, n_vertices, needed, r->budget);
     if (!pages_add(r->ctx, (void ***)&r->walks, &r->n_walk_pages, &r->cap_walk_pages,
@@ -126,8 +126,8 @@ enum imp_status imp__record_reserve(struct imp_record *r, size_t walks, size_t v
         !vertex_pages_add(r, n_vertices) ||
         !pages_add(r->ctx, (void ***)&r->items, &r->n_item_pages, &r->cap_item_pages,
                    n_items, sizeof **r->items))
-        return imp__error(r->ctx, IMP_E_NOMEM, "no memory for %zu bytes of kept walks",
-                          needed);
+        return imp__error(r->ctx, IMP_E_NOMEM,
+                          "no memory for %zu bytes of recorded walks", needed);
     return IMP_OK;
 }
 
@@ -294,7 +294,7 @@ enum imp_status imp__record_trim(struct imp_record *r)
         page_trim(r->ctx, (void **)r->items, r->n_item_pages, r->n_items,
                   sizeof **r->items))
         return IMP_OK;
-    return imp__error(r->ctx, IMP_E_NOMEM, "no memory for kept walks");
+    return imp__error(r->ctx, IMP_E_NOMEM, "no memory for recorded walks");
 }
 
 /* ---- Evaluating ------------------------------------------------------------------ */
@@ -317,5 +317,5 @@ enum imp_status imp__record_check(const struct imp_record *r,
                                   const struct imp_tracer *tracer)
 {
     const struct imp_record_of of = imp__record_made_with(tracer);
-    return imp__record_same(r->ctx, "kept walks", &r->of, &of);
+    return imp__record_same(r->ctx, "recorded walks", &r->of, &of);
 }

@@ -89,8 +89,8 @@ struct imp_record {
 
 /* An empty record for walks of this tracer, whose scene outlives it. `budget`: bytes of
  * walks, vertices and items; memory exceeds it by a page of each at most.
- * IMP_E_UNSUPPORTED if derivatives follow directions (alpha_gradient), since kept
- * directions stand still. */
+ * IMP_E_UNSUPPORTED if derivatives follow directions (alpha_gradient), since
+ * recorded directions are fixed. */
 enum imp_status imp__record_create(const struct imp_tracer *tracer, size_t budget,
                                    struct imp_record *out);
 void imp__record_destroy(struct imp_record *record);
@@ -99,8 +99,8 @@ size_t imp__record_bytes(const struct imp_record *record);
 /* Append a walk that was traced with a record (not value_only), with what hangs on it;
  * `sample` is its number. IMP_E_UNSUPPORTED if its vertices move with a field, if an
  * extinction has a probe (probe.h), which is no decision of the walk's value: trace with
- * `collisions_stand`; or if light enters at its vertices (imp_walk.entry). IMP_E_NOMEM
- * beyond the budget, the message says how much is needed. Then nothing is appended. A
+ * `collisions_fixed`; or if light enters at its vertices (imp_walk.entry). IMP_E_NOMEM
+ * beyond the budget, with the size needed in the message. Then nothing is appended. A
  * guide decides as anything else does, and is not needed again. */
 enum imp_status imp__record_keep(struct imp_record *record, const struct imp_walk *walk,
                                  int64_t sample);
@@ -150,7 +150,7 @@ static inline const struct imp_bsdf *imp__packed_bsdf(const struct imp_scene *sc
 
 /* Walk i in the arena, with its values at the scene's present parameters, folded, to be
  * swept like any other; it has no camera ray, normals and lengths. The derivative with
- * respect to extinctions is that of frozen collisions: the tracer's `collisions_stand` is
+ * respect to extinctions is that of frozen collisions: the tracer's `collisions_fixed` is
  * set. Where an extinction is now above the bound under which collisions were drawn, L may
  * be negative; it is right in the mean. Running out of memory drops it. With a tracer that
  * wants no derivatives, it may have no vertices. */

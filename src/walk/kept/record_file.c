@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Files of kept walks: a head, the walks, their vertices, page by page with the number of
+ * Files of recorded walks: a head, the walks, their vertices, page by page with the number of
  * words before each, what belongs to these, and a checksum of all, as they are in memory.
  * What is read is checked vertex by vertex against the scene (record_fits.c). */
 #include "math/hash.h"
@@ -97,8 +97,8 @@ enum imp_status imp__record_write(const struct imp_record *r, const char *path)
 
 static enum imp_status damaged(const struct imp_record_source *s, const char *what)
 {
-    return imp__error(s->ctx, IMP_E_IO, "%s: damaged file of kept walks (%s)", s->path,
-                      what);
+    return imp__error(s->ctx, IMP_E_IO, "%s: damaged file of recorded walks (%s)",
+                      s->path, what);
 }
 
 static enum imp_status take(struct imp_record_source *s, void *data, size_t size)
@@ -118,20 +118,23 @@ static enum imp_status head_take(struct imp_record_source *s, struct head *h)
         memcmp(h->magic, MAGIC, sizeof h->magic) == 0)
         return damaged(s, "it ends early");
     if (memcmp(h->magic, MAGIC, sizeof h->magic) != 0)
-        return imp__error(s->ctx, IMP_E_SCENE, "%s: not a file of kept walks", s->path);
+        return imp__error(s->ctx, IMP_E_SCENE, "%s: not a file of recorded walks",
+                          s->path);
     if (h->byte_order != BYTE_ORDER)
         return imp__error(s->ctx, IMP_E_SCENE,
-                          "%s: kept walks of a machine with another byte order", s->path);
+                          "%s: recorded walks of a machine with another byte order",
+                          s->path);
     if (h->version != VERSION)
         return imp__error(s->ctx, IMP_E_SCENE,
-                          "%s: kept walks of version %u; this program reads %d", s->path,
-                          h->version, VERSION);
+                          "%s: recorded walks of version %u; this program reads %d",
+                          s->path, h->version, VERSION);
     if (h->walk_bytes != sizeof(struct imp_record_walk) ||
         h->vertex_bytes != VERTEX_BYTES || h->item_bytes != sizeof(union imp_kept) ||
         h->reserved != 0)
-        return imp__error(s->ctx, IMP_E_SCENE,
-                          "%s: kept walks of another build: %u bytes a vertex, here %d",
-                          s->path, h->vertex_bytes, VERTEX_BYTES);
+        return imp__error(
+            s->ctx, IMP_E_SCENE,
+            "%s: recorded walks of another build: %u bytes a vertex, here %d", s->path,
+            h->vertex_bytes, VERTEX_BYTES);
     s->sum = imp__hash(0, h, sizeof *h);
     return IMP_OK;
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Kept walks read back: vertices, tracks and side walks from their decisions, and the
+ * Recorded walks read back: vertices, tracks and side walks from their decisions, and the
  * values that the scene's present parameters give them. */
 #include "record.h"
 #include <string.h>
@@ -50,7 +50,7 @@ struct reading {
     uint32_t item;
 };
 
-/* Vertices [first, first + n) of the kept walk become those of `walk`. */
+/* Vertices [first, first + n) of the recorded walk become those of `walk`. */
 static bool vertices_get(struct reading *g, struct imp_walk *walk, uint32_t first,
                          uint32_t n)
 {

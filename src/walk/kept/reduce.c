@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Kept walks are reduced: from the first vertex to the last, with M the product of all
+ * Recorded walks are reduced: from the first vertex to the last, with M the product of all
  * factors so far that cannot change,
  *
  *     a term of the walk is  M c  times the inputs that may change.
  *
  * Terms between two factors that may change are at one level: constants are added up, and
- * so is what one input stands in. */
+ * so are the coefficients of one input. */
 #include "reduce.h"
 #include "kind/texture/bitmap.h"
 #include "kind/texture/input.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Kept walks written as sums of products. Most values are linear in what may still change:
+ * Recorded walks written as sums of products. Most values are linear in what may still change:
  * a reflectance, the radiance of a lamp, the scale of a table. All else of a walk is one
  * number c in front of each term,
  *
@@ -12,7 +12,7 @@
  *
  * Where vertices lie is in the record alone: what moves with a shape is not evaluated here.
  *
- * Which kinds are linear is found by trying (trial.h). Numbers c are doubles, so that L
+ * Which kinds are linear is found by trying (kind_trials.h). Numbers c are doubles, so that L
  * and derivatives differ from those of the walk's vertices by rounding alone. */
 #ifndef IMP_WALK_REDUCED_H
 #define IMP_WALK_REDUCED_H
@@ -24,7 +24,7 @@
 enum imp_reduction_class {
     IMP_REDUCES_CONSTANT, /* no input may change */
     IMP_REDUCES_LINEAR,
-    IMP_REDUCES_NOT /* free_bsdf marks what it is of first degree in (trial.h) */
+    IMP_REDUCES_NOT /* free_bsdf marks what it is of first degree in (kind_trials.h) */
 };
 
 /* The reduction for a scene and the parameters that may change. */

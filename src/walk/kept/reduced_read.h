@@ -25,7 +25,7 @@ struct imp_reduced_seen {
 
 /* ---- Reading --------------------------------------------------------------------- */
 
-/* The number that stands last in the words of a term, which end here. */
+/* The last number of a term, whose words end here. */
 static inline imp_spec imp__reduced_number(struct imp_op op, const uint32_t *end)
 {
     double c[3];

@@ -6,7 +6,7 @@
  *     d L/d v = P R,      R <- R v,      and of a term c v     d L/d v = P c,   R <- R + c v
  *
  * Each is a piece, as those of vertices are (path/vertex_pieces.h): the visitor lists them, and
- * a table says what becomes of them, in a sink or along a direction. */
+ * a table takes them, in a sink or along a direction. */
 #include "reduced_read.h"
 
 /* ---- The visitor ----------------------------------------------------------------- */

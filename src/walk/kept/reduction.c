@@ -3,8 +3,8 @@
  * Which materials and lights of a scene are constant or linear while some parameters may
  * change. */
 #include "kind/texture/bitmap.h"
+#include "kind_trials.h"
 #include "reduced.h"
-#include "trial.h"
 
 /* Which of these inputs may change. False: one of them is more than its own number. */
 static bool free_find(const struct imp_input *const *input, int n, const uint8_t *free,
@@ -150,5 +150,5 @@ enum imp_status imp__reduction_create(const struct imp_scene *scene,
     return IMP_OK;
 no_memory:
     imp__reduction_destroy(r);
-    return imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks");
+    return imp__error(ctx, IMP_E_NOMEM, "no memory for recorded walks");
 }

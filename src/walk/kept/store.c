@@ -30,7 +30,7 @@ enum imp_status imp__store_create(const struct imp_tracer *tracer, int index, in
     s.reduced = imp__alloc(ctx, imp__store_tiles(&s), sizeof *s.reduced);
     s.meets = imp__alloc(ctx, imp__store_tiles(&s), sizeof *s.meets);
     if (!s.sample || !s.records || !s.reduced || !s.meets)
-        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks"));
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for recorded walks"));
     memcpy(s.sample, samples, n * sizeof *samples);
     IMP_TRY(imp__record_create(tracer, budget, &s.records[0]));
     for (size_t k = 1; k < imp__store_tiles(&s); k++) s.records[k] = s.records[0];
@@ -126,7 +126,8 @@ full:;
     const double walks = (double)(s->width + 2 * s->margin) *
                          (double)(s->height + 2 * s->margin) * (double)s->n;
     return imp__error(s->ctx, IMP_E_NOMEM,
-                      "%.4g kept walks need about %.3g MB; %.3g MB are allowed", walks,
+                      "%.4g recorded walks need about %.3g MB; %.3g MB are allowed",
+                      walks,
                       walks * (double)imp__record_bytes(r) /
                           (double)imp_max(r->n_walks, (size_t)1) / 1e6,
                       (double)s->budget / 1e6);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * All kept walks of one sensor: a record for each tile of its film, made by one thread
+ * All recorded walks of one sensor: a record for each tile of its film, made by one thread
  * each, so that walks and their order do not depend on the number of threads. A tracer
  * with `kept` set evaluates them where it would trace. */
 #ifndef IMP_WALK_STORE_H
@@ -12,7 +12,7 @@
 
 #define IMP_STORE_SIDE    8 /* pixels of a tile */
 #define IMP_HEADROOM_MOST 64
-#define IMP_WALKS_ASKED   1024 /* that say what all are worth (store_ask.c) */
+#define IMP_WALKS_ASKED   1024 /* that say what all are worth (store_subset.c) */
 
 /* Steps from materials of class a to class b, of those that roulette looked at. */
 #define IMP_STORE_CLASSES 32
@@ -33,8 +33,8 @@ struct imp_store {
                                      without `of`: none of them does */
     const struct imp_reduction *reduction; /* NULL: walks are not reduced */
     size_t budget;
-    int left; /* sensors to come that share it, this one too: reduced walks leave them room */
-    uint64_t **meets;            /* [across down][walks] store_ask.c */
+    int left;         /* remaining sensors that share the budget, this one included */
+    uint64_t **meets; /* [across down][walks] store_subset.c */
     atomic_size_t met[64];       /* walks that meet each of its bits */
     atomic_size_t bytes;         /* of records so far, and of `meets` */
     atomic_size_t reduced_bytes; /* and of what they are reduced to */
@@ -71,7 +71,7 @@ void imp__store_settle(struct imp_store *store);
 /* Place of a walk with this number in its pixel; -1: it was not kept. */
 int64_t imp__store_find(const struct imp_store *store, int64_t sample);
 
-/* As imp__walk_trace, of the tracer's kept walks: with that number, or the k-th of its
+/* As imp__walk_trace, of the tracer's recorded walks: with that number, or the k-th of its
  * pixel. */
 void imp__store_walk(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
                      int y, int64_t sample, struct imp_walk *walk);
@@ -127,14 +127,14 @@ struct imp_moments {
                            its ratios alone */
     double steps[IMP_STORE_CLASSES];                        /* from class a */
     double growth[IMP_STORE_CLASSES][IMP_STORE_CLASSES][4]; /* from a to b, by lane */
-    /* Tentative collisions that say nothing of the present extinction, by media modulo
+    /* Tentative collisions whose weight at the present extinction is not valid, by media modulo
      * IMP_STORE_CLASSES. */
     double
         passed[IMP_STORE_CLASSES]; /* it is above the bound that they were drawn under */
     double certain[IMP_STORE_CLASSES]; /* it is below a bound that it had reached, so that
                                           no null collision was drawn */
 };
-/* ---- Which are asked (store_ask.c) ------------------------------------------------- */
+/* ---- The subset that is weighed (store_subset.c) --------------------------------------- */
 
 static inline int imp__store_class(const struct imp_bsdf *b)
 {
@@ -144,19 +144,19 @@ static inline int imp__store_class(const struct imp_bsdf *b)
 enum imp_status imp__store_look(struct imp_store *store, const struct imp_scene *scene,
                                 size_t tile);
 struct imp_asking {
-    size_t every;  /* walk is asked; 1: all of them are */
+    size_t every;  /* walk is weighed; 1: all of them are */
     uint64_t rare; /* but of those that meet one of these bits, more */
 };
 /* About `most` walks, and enough of those that meet what matters now. 0: all; and all
  * where collisions are weighed. */
 struct imp_asking imp__store_asking(const struct imp_store *store,
                                     const struct imp_densities *d, size_t most);
-/* The next walk of a tile that is asked, from i on; n_walks: none is. It stands for
+/* The next walk of the subset in a tile, from i on; n_walks: there is none. It counts as
  * `weight` walks. */
 size_t imp__store_next(const struct imp_store *store, const struct imp_asking *asking,
                        size_t tile, size_t i, double *weight);
 
-/* Adds the walks of a tile that are asked; mask [height][width]: pixels with 0 are left
+/* Adds the walks of the subset in a tile; mask [height][width]: pixels with 0 are left
  * out; NULL: none are. */
 enum imp_status imp__store_moments(const struct imp_store *store,
                                    const struct imp_densities *d,
@@ -196,10 +196,10 @@ enum imp_status imp__walks_run(imp_context *ctx, const char *function,
                                struct imp_run *run);
 /* tracer->kept, where run->walks is set. IMP_E_ARG: they are another scene's, or none of
  * this sensor. IMP_E_UNSUPPORTED: a parameter has changed, or is active, of which they
- * say nothing. IMP_E_NUMERIC: too few of them count now, or their variance is infinite. */
+ * have no weight. IMP_E_NUMERIC: too few of them count now, or their variance is infinite. */
 enum imp_status imp__walks_use(const struct imp_run *run, struct imp_tracer *tracer);
 /* What they are worth at the scene's present parameters; mask as of imp__store_moments,
- * `most` as of imp__store_asking. all: were all of them asked? May be NULL. */
+ * `most` as of imp__store_asking. all: were all of them weighed? May be NULL. */
 enum imp_status imp__walks_weigh(const struct imp_walks *walks,
                                  const struct imp_store *store, const float *mask,
                                  size_t most, struct imp_walks_weight *out, bool *all);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * How far kept walks are from those that would be drawn now. The densities of a walk at
+ * How far recorded walks are from those that would be drawn now. The densities of a walk at
  * theta' over those at theta, that it was drawn with, are
  *
  *     w = prod over steps of  p(theta')/p(theta)  s(theta')/s(theta)
@@ -15,7 +15,7 @@
  * since r is part of the draw. A step whose survival a guide decided counts 1.
  *
  * The ratios of densities alone have the mean 1, as far as walks were drawn where the new
- * density is. A mean far below 1 says that they were not: then they count no more than it.
+ * density is. If the mean is far below 1 they were not, and count no more than it.
  *
  * Free flights, and directions that depend on the wavelength, have the density of all
  * that was decided so far, in the mean over the lanes of a walk (lane_mis.h), and
@@ -133,8 +133,8 @@ struct course {
     imp_spec p;    /* density of what lanes may decide otherwise, its mean is 1 */
     imp_spec beta; /* as roulette would see it now */
     double w, eta;
-    double stands_for; /* so many walks */
-    double seen;       /* ratio of its directions alone */
+    double stratum_weight; /* so many walks */
+    double seen;           /* ratio of its directions alone */
     int zeros[4];
     bool settled; /* roulette's first step answers for all before it */
     bool any;     /* a direction's density has changed */
@@ -196,10 +196,10 @@ static void roll(struct course *c, const struct looked *v, const struct imp_deci
     c->settled = true;
     if (first || !c->own) return;
     const int a = imp__store_class(v->bsdf);
-    sum->steps[a] += c->stands_for;
+    sum->steps[a] += c->stratum_weight;
     for (int k = 0; next && k < 4; k++)
         sum->growth[a][imp__store_class(next)][k] +=
-            c->stands_for * step[k] * step[k] / (double)d->survive;
+            c->stratum_weight * step[k] * step[k] / (double)d->survive;
 }
 
 /* The continuation of a vertex. */
@@ -260,8 +260,8 @@ static double course_weight(struct course *c, uint64_t j, uint64_t end,
     return c->w;
 }
 
-/* Walks that are asked are far from each other, and would be waited for: the next but one's
- * head, which says where its vertices are, and the next one's vertices come meanwhile. */
+/* Walks of the subset are far from each other in memory: the head of the next but one, which
+ * points to its vertices, and the vertices of the next one are prefetched. */
 static void fetch(const struct imp_record *r, size_t next, size_t after)
 {
     if (after < r->n_walks) {
@@ -325,7 +325,7 @@ enum imp_status imp__store_moments(const struct imp_store *s,
                            .beta = imp__spec(1),
                            .w = 1,
                            .eta = 1,
-                           .stands_for = of,
+                           .stratum_weight = of,
                            .seen = 1};
         c.lanes = c.carried ? c.carried->n : tracer->scene->channels;
         const double w = course_weight(&c, k->first, k->first + k->n, walk.first);

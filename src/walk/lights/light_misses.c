@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What walks from the lights cannot find: light that a mirror or a lens sends straight to a
+ * What light walks cannot find: light that a mirror or a lens sends straight to a
  * sensor that is no surface. */
 #include "light_walk.h"
 
@@ -28,7 +28,7 @@ void imp__light_walks_tell(const struct imp_scene *scene, const struct imp_senso
     if (b)
         imp__warn(
             scene->ctx,
-            "walks from the lights: light that material '%s' (%s) mirrors or refracts "
+            "light walks: light that material '%s' (%s) mirrors or refracts "
             "straight to sensor '%s' (%s) is missing; let walks begin at the sensor, "
             "or at both ends (bdpt)",
             b->name, b->ops->name, sensor->name, sensor->ops->name);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Walks from the lights. Of a reading R = sum over paths of We K .. K Le, a walk may carry
- * either end to the other (Veach 1997, 3.7). One from a light begins with its emission, is
+ * Light tracing. In a reading R = sum over paths of We K .. K Le, a walk may carry either
+ * end to the other (Veach 1997, 3.7). A light walk begins with its emission, is
  * scattered by transposed kernels (kind/bsdf/transport.h), and reaches the sensor where it
- * is connected to it or meets its surface. No other factor stands between the directions.
+ * is connected to it or meets its surface. There is no other factor between the directions.
  *
  * The record is that of all walks. Vertex 0 lies on the light, of the others wi is where
  * the walk came from, and wo, drawn, where it goes. What a transposed kernel has more than

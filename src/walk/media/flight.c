@@ -51,23 +51,22 @@ no_memory:
 
 /* ---- Media of uniform extinction --------------------------------------------------- */
 
-#define DEEP 0.5 /* optical depth from which on a stretch stands */
+#define DEEP 0.5 /* least optical depth of a stretch of fixed collisions */
 /* ... and that of the scene's radius, for a stretch without an end: all of these are deep,
  * but what light there is to scatter is near the scene. */
 #define DEEP_OPEN 0.1
 
 static bool uniform_fly(struct imp_free_flight *w, const struct imp_medium *m,
-                        double near, double far, bool collides, double *t, bool *stands)
+                        double near, double far, bool collides, double *t, bool *fixed)
 {
     imp_spec in[IMP_INPUTS_MAX];
     const imp_spec sigma = imp__extinction_at(m, w->o, w->s->at.carried, in);
     double length = far - near, sum = 0;
     bool hit = false;
     for (int c = 0; c < imp__lane_mis_count(w->s); c++) sum += sigma[c];
-    *stands =
-        collides && (isfinite(far) ? sum * length >= DEEP * imp__lane_mis_count(w->s)
-                                   : sum * w->s->scene->ball.radius >=
-                                         DEEP_OPEN * imp__lane_mis_count(w->s));
+    *fixed = collides && (isfinite(far) ? sum * length >= DEEP * imp__lane_mis_count(w->s)
+                                        : sum * w->s->scene->ball.radius >=
+                                              DEEP_OPEN * imp__lane_mis_count(w->s));
     if (collides) {
         const double path = free_path(w), mine = sigma[imp__lane_mis_drew(w->s)];
         hit = mine > 0 && path < length * mine;
@@ -80,7 +79,7 @@ static bool uniform_fly(struct imp_free_flight *w, const struct imp_medium *m,
     w->f *= value;
     w->p *= value;
     imp__flight_event(w, (struct imp_event){.t = (imp_decided)length,
-                                            .bound = *stands,
+                                            .bound = *fixed,
                                             .medium = m->index,
                                             .kind = hit ? IMP_COLLIDES : IMP_CROSSES});
     return hit;
@@ -88,7 +87,7 @@ static bool uniform_fly(struct imp_free_flight *w, const struct imp_medium *m,
 
 /* ---- Media whose extinction varies -------------------------------------------------- */
 
-/* All events of a walk; extinctions without measure would go on for hours. */
+/* All events of a walk; an unbounded extinction would go on for hours. */
 #define EVENTS_MAX (1 << 20)
 
 #define EMPTY 0.125 /* of the largest bound, where there is none */
@@ -285,10 +284,10 @@ bool imp__fly(struct imp_free_flight *w, const struct imp_medium *m, double near
     struct imp_majorant_walk cells;
     const imp_spec before = w->f;
     const int first = w->track ? w->track->n : 0;
-    bool hit, stands = false;
+    bool hit, fixed = false;
     if (!(near < far)) return false;
     if (!m->majorants) {
-        hit = uniform_fly(w, m, near, far, collides, t, &stands);
+        hit = uniform_fly(w, m, near, far, collides, t, &fixed);
     } else {
         if (!imp__majorants_enter(m->majorants, w->o, w->d, near, far, &cells))
             return false;
@@ -306,15 +305,15 @@ bool imp__fly(struct imp_free_flight *w, const struct imp_medium *m, double near
         }
     }
     if (s->walk->dropped) return false;
-    if (collides) s->flight.stands = stands;
+    if (collides) s->flight.fixed = fixed;
     if (!s->probing || !s->tracer->active->medium[m->index]) return hit;
     if (imp_unlikely(isinf(far)) && !hit && !imp__is_zero_used(w->f, s->at.carried) &&
         (!collides || imp__probe_diverges(s, m))) {
         s->walk->dropped = IMP_DROP_INFINITE;
         return false;
     }
-    if (stands) s->walk->valid |= !imp__is_zero_used(s->tracer->baseline, true);
-    if (collides && !stands)
+    if (fixed) s->walk->valid |= !imp__is_zero_used(s->tracer->baseline, true);
+    if (collides && !fixed)
         imp__probe_offer(s, m, w->track, first, before, near, hit ? *t : far, w->open);
     return hit;
 }

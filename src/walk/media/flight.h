@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A free flight through media while it is decided (tracking.h says what its events
+ * A free flight through media while it is decided (tracking.h lists its events
  * are).
  *
- * With headroom h > 1, so that kept walks can be evaluated where extinctions are larger,
+ * With headroom h > 1, so that recorded walks can be evaluated where extinctions are larger,
  * tentative collisions are drawn under b' = max(h b, (h - 1) e), e an eighth of the largest
  * bound or one over the size of the box, and are real with the probability max(sigma/b',
  * 1/10) of a lane. Then there is a density wherever 0 <= sigma <= b', also where sigma is

@@ -6,18 +6,17 @@
 #include "media_pieces.h"
 #include "walk/core/vertex.h"
 
-/* What derivatives of flights that stand take from the light that arrives. */
+/* What derivatives of fixed flights take from the light that arrives. */
 static imp_spec baseline(const struct imp_tracer *tracer)
 {
-    return tracer->collisions_stand ? (imp_spec){0} : tracer->baseline;
+    return tracer->collisions_fixed ? (imp_spec){0} : tracer->baseline;
 }
 
 void imp__extinction_drop(const struct imp_tracer *tracer, const struct imp_vertex *v,
                           imp_spec *x)
 {
     const struct imp_medium *m;
-    if (v->d.scatterer != IMP_IN_MEDIUM || tracer->collisions_stand || v->d.stands)
-        return;
+    if (v->d.scatterer != IMP_IN_MEDIUM || tracer->collisions_fixed || v->d.fixed) return;
     m = v->bsdf->self;
     for (int j = 0; j < m->n_own; j++)
         if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION) x[j] = (imp_spec){0};
@@ -29,7 +28,7 @@ void imp__point_scatter(const struct imp_tracer *tracer, const struct imp_vertex
 {
     const struct imp_medium *m = v->bsdf->self;
     for (int j = 0; j < m->n_in; j++)
-        if (j >= m->n_own || tracer->collisions_stand || v->d.stands ||
+        if (j >= m->n_own || tracer->collisions_fixed || v->d.fixed ||
             !(m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION))
             imp__inputs_scatter(&m->input[j], 1, at, &bar[j], sink);
 }
@@ -48,7 +47,7 @@ static imp_spec weight_before(const struct imp_vertex *v)
     return f * scale;
 }
 
-/* Does something stand for the derivative of the segment that goes on? */
+/* Does a term of its own give the derivative of the segment that goes on? */
 static bool segment_counts(const struct imp_tracer *tracer, const struct imp_vertex *v)
 {
     return v->on && v->d.goes_on && imp__track_counts(tracer, v->on);

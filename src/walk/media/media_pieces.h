@@ -19,8 +19,8 @@ void imp__media_pieces(const struct imp_pieces_ops *ops, void *taker,
                        const struct imp_tracer *tracer, const struct imp_vertex *v,
                        const struct imp_adjoints *a);
 
-/* Where collisions are does not stand for the derivative with respect to an extinction:
- * probes give it, and a collision's albedo none of it. x [b->n_in] */
+/* The places of collisions carry no derivative with respect to an extinction: probes give
+ * it, and a collision's albedo none of it. x [b->n_in] */
 void imp__extinction_drop(const struct imp_tracer *tracer, const struct imp_vertex *v,
                           imp_spec *x);
 /* The transpose: what a point of a medium gives to the inputs of its scatterer. */

@@ -221,20 +221,20 @@ struct derived {
 
 /* Is the factor of an event in a medium differentiated as it is? To a light sample it does
  * not matter for uniform media: nothing is drawn. */
-static bool stands(const struct derived *x, const struct imp_event *e)
+static bool fixed(const struct derived *x, const struct imp_event *e)
 {
     return (e->kind <= IMP_REAL_AT || e->kind == IMP_RESIDUAL_AT ||
             e->kind == IMP_DELTA_AT) &&
-           (x->tracer->collisions_stand || (e->kind <= IMP_COLLIDES && e->bound > 0));
+           (x->tracer->collisions_fixed || (e->kind <= IMP_COLLIDES && e->bound > 0));
 }
 
 /* Factors of the events that surfaces have are differentiated as they are, and those of
- * tentative collisions where these stand; else IMP_LINE_AT takes their place. */
+ * tentative collisions where these are fixed; else IMP_LINE_AT takes their place. */
 static bool apart(const struct derived *x)
 {
-    if (x->tracer->collisions_stand) return true;
+    if (x->tracer->collisions_fixed) return true;
     for (int i = 0; i < x->track->n; i++)
-        if (x->track->event[i].kind == IMP_PASSES || stands(x, &x->track->event[i]))
+        if (x->track->event[i].kind == IMP_PASSES || fixed(x, &x->track->event[i]))
             return true;
     return false;
 }
@@ -262,7 +262,7 @@ static bool extinction_slope(const struct derived *x, const struct imp_event *e,
                              const struct imp_texcoord *at, imp_spec *in, imp_spec *slope)
 {
     const struct imp_medium *m = x->tracer->scene->media[e->medium];
-    const bool as_is = stands(x, e);
+    const bool as_is = fixed(x, e);
     if (!as_is && e->kind != IMP_LINE_AT && (e->kind != IMP_CROSSES || !x->value))
         return false;
     if (as_is) {

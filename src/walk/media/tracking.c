@@ -66,7 +66,7 @@ static bool hidden(const struct imp_step *s, const struct imp_shape *shape, imp_
     return !imp__nest_sees(s->scene, nest, shape);
 }
 
-/* Entered while it is in the nest, the shape stands there more than once. */
+/* Entered while it is in the nest already, the shape is there more than once. */
 static bool is_copy(const struct imp_shape *shape, imp_v3 ng, imp_v3 d)
 {
     return shape->priority > 0 && imp__dot(ng, d) < 0;

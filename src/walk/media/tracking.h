@@ -4,11 +4,11 @@
  * medium, which is a vertex like any other, or at a surface. Surfaces of type null are
  * passed on the way: they only say where media begin and end.
  *
- * For the derivative with respect to an extinction a stretch of a uniform medium that is
- * deep enough to collide in stands as it is decided, factor by factor. Shallow ones and
- * media that vary, where a division by sigma has an unbounded variance, are probed
- * (probe.h). Which it is depends on sigma times the length of the whole stretch, and not on
- * the flight.
+ * The derivative with respect to an extinction has two forms. In uniform media, on stretches
+ * deep enough to collide in, the sampled collisions are kept and each factor below is
+ * differentiated (a fixed collision). Shallow stretches and heterogeneous media are probed
+ * (probe.h), since a division by sigma has an unbounded variance there. Optical depth of the
+ * whole stretch chooses the form, not the flight.
  *
  * What a flight decided is kept as its events, at distances along the segment. The
  * segment's value is a product over them,
@@ -56,7 +56,7 @@ enum imp_event_kind {
 
 struct imp_event {
     imp_decided t;     /* a length in a uniform medium; else distance from the start */
-    imp_decided bound; /* b; of a uniform medium 1 where the event stands, else 0 */
+    imp_decided bound; /* b; in a uniform medium 1: a fixed collision, else 0 */
     int32_t medium;
     int32_t kind;
 };

@@ -21,7 +21,7 @@ static bool wanted(const struct imp_tracer *t)
     const struct imp_active *active = t->active;
     /* A light that is hidden from the camera makes walks that do not count, and these would
      * lack the baseline. */
-    if (t->collisions_stand || !active || !active->medium || !t->integrator->media ||
+    if (t->collisions_fixed || !active || !active->medium || !t->integrator->media ||
         t->integrator->both || t->integrator->hide_emitters)
         return false;
     for (int i = 0; i < t->scene->n_media; i++)
@@ -29,7 +29,7 @@ static bool wanted(const struct imp_tracer *t)
     return false;
 }
 
-/* d log p/d sigma of the flight's stretches that stand. */
+/* d log p/d sigma of the flight's fixed stretches. */
 static imp_spec slope_of(const struct imp_tracer *t, const struct imp_vertex *v)
 {
     imp_spec slope = {0}, in[IMP_INPUTS_MAX];

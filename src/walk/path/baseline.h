@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A baseline of the light that flights bring, for derivatives with respect to an extinction
- * (docs/media.md 4). Where a stretch of a uniform medium stands as it is decided
- * (tracking.h), its derivative is L d log p, with p the density of the flight and L what
- * arrives from beyond. The density is normalised, so that for any b which does not depend
- * on the flight
+ * (docs/media.md 4). The derivative of a fixed collision (tracking.h) is L d log p, with p the
+ * density of the flight and L what arrives from beyond. The density is normalised, so that for
+ * any b which does not depend on the flight
  *
  *     E[d log p] = 0,    E[(L - b) d log p] = E[L d log p]
  *
@@ -18,7 +17,7 @@
 
 #include "walk/core/walk.h"
 
-/* Sets the tracer's baseline for a run of so many walks; 0 where no flight of it stands or
+/* Sets the tracer's baseline for a run of so many walks; 0 where it has no fixed collision or
  * the run is too short. IMP_E_NOMEM. */
 enum imp_status imp__baseline_set(struct imp_tracer *tracer, int64_t walks);
 

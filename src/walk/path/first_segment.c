@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Which kind of segment the walks of a tracer begin with: the kinds lie in rooms below, and
- * this is the one place that knows them all. */
+ * no other file includes them all. */
 #include "first_segment.h"
 #include "walk/graded/graded.h"
 #include "walk/media/tracking.h"

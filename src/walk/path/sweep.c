@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The record read again, behind the fold (fold.c). Sweep: the
- * adjoint, from the first vertex to the last (reverse mode, not reverse order), and a
- * piece of gradient falls off at every vertex. Tangent: derivative and radiance together,
- * from the last vertex to the first. The three differ only in the order in which the
- * product rule is read, and both modes take the same pieces (vertex_pieces.h). */
+ * Reads the record after the fold (fold.c). Sweep: the adjoint, from the first vertex to the
+ * last (reverse mode, not reverse order), and a piece of gradient falls off at every vertex.
+ * Tangent: derivative and radiance together, from the last vertex to the first. Fold, sweep
+ * and tangent differ only in the order in which the product rule is read; sweep and tangent
+ * take the same pieces (vertex_pieces.h). */
 #include "vertex_pieces.h"
 
 /* ---- d radiance of an emitter / d its inputs ------------------------------------- */
 
-/* d[j] of a constant that moves the lookup of the textures: the sum over these of
- * d[k] (slope . d uv/d input j). */
+/* If input j is a constant that shifts texture lookups, adds to d[j] the sum over textured
+ * inputs k of d[k] (slope_k . d uv/d input j). */
 static void lookup_d(const struct imp_emitter *e, const struct imp_active *active,
                      const struct imp_emission *x, const struct imp_texcoord *at,
                      imp_spec *d)

@@ -8,7 +8,7 @@
  * Le/p^e for a light sample, power heuristic with exponent 2, w^B = 1 at the first vertex
  * and after a delta lobe. Depth: emission at vertex k counts if k < max_depth, scattering
  * goes on and samples lights if k + 1 < max_depth (docs/scene-format.md 11). */
-#include "meter.h"
+#include "surface_sensor.h"
 #include "walk/core/one_step.h"
 
 /* Light that leaves the vertex by itself: what its BSDF glows with, and its emitter. */

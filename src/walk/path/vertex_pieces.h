@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The visitor of a vertex: every piece of gradient that falls off there (walk.h). A value that
- * gets a derivative by something else adds its piece here, once for all modes. */
+ * The visitor of a vertex: every piece of gradient that falls off there (walk.h). A value whose
+ * derivative another estimator gives adds that piece here, once for all modes. */
 #ifndef IMP_WALK_VERTEX_PIECES_H
 #define IMP_WALK_VERTEX_PIECES_H
 
@@ -17,8 +17,8 @@ static inline bool imp__scatterer_active(const struct imp_tracer *t,
 {
     const struct imp_bsdf *b = v->bsdf;
     if (!b || b->index < 0 || !t->active->bsdf[b->index]) return false;
-    return t->active->bsdf[b->index] != IMP_BY_EXTINCTION || t->collisions_stand ||
-           v->d.stands;
+    return t->active->bsdf[b->index] != IMP_BY_EXTINCTION || t->collisions_fixed ||
+           v->d.fixed;
 }
 
 static inline struct imp_adjoints imp__adjoints_at(const struct imp_walk *walk, int depth,

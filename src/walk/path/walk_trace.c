@@ -4,7 +4,7 @@
  * and wavelengths; its steps (trace.c); the fold. */
 #include "first_segment.h"
 #include "kind/cleared.h"
-#include "meter.h"
+#include "surface_sensor.h"
 #include "walk/media/probe.h"
 #include <float.h>
 #include <string.h>
@@ -94,8 +94,8 @@ void imp__walk_begin(const struct imp_tracer *tracer, int x, int y, int64_t samp
     walk_begin(tracer, x, y, sample, walk, lens);
 }
 
-/* The first ray in flight. What a guide and a mixture know is written where they are
- * asked, and read behind that only. */
+/* The first ray in flight. The states of guide and mixture are written where they
+ * are evaluated, and read behind that only. */
 static inline void step_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
                               struct imp_walk *walk, imp_spec *scratch,
                               struct imp_step *s)
@@ -125,7 +125,7 @@ static inline void step_begin(const struct imp_tracer *tracer, struct imp_arena 
     s->flight.medium = s->flight.here = NULL;
     s->flight.at = (imp_v3){0};
     s->flight.t = s->flight.base = s->flight.behind = 0;
-    s->flight.stands = false;
+    s->flight.fixed = false;
     s->flight.events = 0;
     s->flight.nest.around = s->flight.nest_here.around = NULL;
     s->flight.nest.n = s->flight.nest_here.n = 0;
@@ -178,7 +178,7 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
     step_begin(tracer, arena, walk, scratch, &s);
     struct imp_probing probing;
     if (imp_unlikely(tracer->active && tracer->active->medium) && s.recorded &&
-        !tracer->collisions_stand && tracer->integrator->media) {
+        !tracer->collisions_fixed && tracer->integrator->media) {
         imp__probe_begin(walk, &probing);
         probing.scattered = imp__walk_scattered;
         s.probing = &probing;

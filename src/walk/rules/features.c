@@ -304,8 +304,8 @@ OF_RUN(RANKS, imp__team_ranks(j->ctx))
 
 /* ---- Active parameters ------------------------------------------------------------- */
 
-/* Where collisions are drawn depends on the extinction. That they stand still makes a
- * derivative that is whole only where every collision had a chance to be drawn. */
+/* Where collisions are drawn depends on the extinction. With fixed collisions the
+ * derivative is complete only where every collision had a chance to be drawn. */
 static const struct imp_medium *extinction_active(const struct imp_job *j, bool field)
 {
     for (int m = 0; j->active && j->active->medium && m < j->scene->n_media; m++) {

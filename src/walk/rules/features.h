@@ -2,8 +2,8 @@
  *
  * What goes with what. A job is what a call asks for: a scene, one of its sensors, how walks are
  * made, and what becomes of them. A feature is something that a job has or has not, found in
- * it by a predicate (features.c) or stated by the call that asks. A rule (rules.def) says
- * that a feature excludes or needs another one, and why; imp__job_allowed decides and
+ * it by a predicate (features.c) or stated by the call. A rule (rules.def): a
+ * feature excludes or needs another one, and why; imp__job_allowed decides and
  * refuses. What is no pair of features (a missing end, no walks at all) is refused where it
  * is found.
  *
@@ -17,8 +17,8 @@ struct imp_active;
 
 /* X(NAME, what users call it): found in a job by a predicate (features.c). */
 #define IMP_FOUND_FEATURES(X)                                                            \
-    X(LIGHT_TRACING, "walks from the lights")                                            \
-    X(BIDIRECTIONAL, "walks from both ends (bdpt)")                                      \
+    X(LIGHT_TRACING, "light walks")                                                      \
+    X(BIDIRECTIONAL, "bidirectional walks (bdpt)")                                       \
     X(LIGHT_PHOTONS, "photons from the lights")                                          \
     X(NO_WALKS, "an integrator without walks (elements, depth)")                         \
     X(NO_PLAIN_WALKS,                                                                    \
@@ -119,7 +119,7 @@ struct imp_job {
     imp_context *ctx;
     const struct imp_scene *scene;
     const struct imp_sensor *sensor;
-    const struct imp_walk_integrator *walks; /* from the end that is asked for */
+    const struct imp_walk_integrator *walks; /* from the end of the run */
     const struct imp_run *run;
     const struct imp_active *active;
     const char *call; /* its name, for the sentence */

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Walks guided by finite elements: another picture with the same mean and less noise; scenes that
-# elements cannot take say so. Walks from the lights take it in every command, those from both ends in none.
+# elements cannot take say so. Light walks take it in every command, those from both ends in none.
 scene=$ROOT/scenes/elements/b.xml
 importon render "$scene" -m mono -D res=16 --spp 256 -q -o a.exr --json >a.json || exit 9
 importon render "$scene" -m mono -D res=16 --spp 256 -q -o b.exr --guide --json >b.json || exit 9

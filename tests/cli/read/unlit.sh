@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Sensors in the dark, and what walks from the lights cannot bring: an error or a warning.
+# Sensors in the dark, and what light walks cannot bring: an error or a warning.
 cat >unlit.xml <<'X'
 <scene version="3.0.0"><integrator type="path"/>
 <shape type="rectangle"><sensor type="irradiancemeter" id="meter"><film type="hdrfilm">

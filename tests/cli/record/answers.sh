@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Recorded walks answer without the scene: what render and gradient of its kept walks would say.
+# Recorded walks answer without the scene: what render and gradient of its recorded walks would say.
 mkdir in && cp "$ROOT/scenes/cornell.xml" in && cp -r "$ROOT/scenes/cornell" in
 importon record in/cornell.xml -D res=16 --spp 8 --seed 3 --points independent --survival 0 -q -o room.walks
 importon gradient in/cornell.xml -D res=16 --spp 8 --seed 3 --points independent --json >traced.json
@@ -13,7 +13,7 @@ echo "- at the parameters of the draw"
 importon what-if room.walks --gradient --json >kept.json
 [[ $(number kept.json value) == "$(number traced.json value)" && $(number kept.json se) == "$(number traced.json se)" ]] && echo mean: equal
 importon what-if room.walks -T target.exr --gradient --json >kept_loss.json
-# Kept walks are sums of products here, which round in another order.
+# Recorded walks are sums of products here, which round in another order.
 numbers() { params "$1" | grep -oE '[-+]?[0-9][-+.0-9e]*'; }
 paste <(number loss.json value | cut -d: -f2; numbers loss.json) <(number kept_loss.json value | cut -d: -f2; numbers kept_loss.json) |
     awk '{ d = $1 - $2; s = $1 * 1e-9; if (d * d > s * s) bad++ } END { if (NR > 20 && !bad) print "loss and gradient: equal to 1e-9" }'

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Inputs, directions and emissions tried at random, to find what kinds do not declare
- * (trial.h). */
-#include "trial.h"
+ * (kind_trials.h). */
+#include "kind_trials.h"
 #include "math/rng.h"
 #include "math/vec.h"
 #include <string.h>

@@ -1,17 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Which kept walks are asked what they are worth elsewhere. Some thousand of many say it,
- * if those that meet what matters are among them: a material in few pixels that has changed
- * may refuse all. Of each walk it is known what it meets, in 64 bits: bit a, it goes on at
- * a material of class a; bit 32 + a, roulette looks at such a step, beyond the first that it
- * looks at (store_weight.c). With n_a walks that meet a, a is rare if each `every`-th walk
- * brings fewer than LEAST of them. Walks that meet something rare are asked each with the
- * probability
+ * Importance weights at other parameters are evaluated for a subset of the recorded walks. Some
+ * thousand suffice if the subset contains walks that meet what has changed: one material in few
+ * pixels may refuse all. 64 bits of each walk are what it meets: bit a, it goes on at a material
+ * of class a; bit 32 + a, roulette is played at such a step, beyond the first (store_weight.c).
+ * With n_a walks that meet a, a is rare if each `every`-th walk brings fewer than LEAST of
+ * them. A walk that meets something rare is in the subset with the probability
  *
  *     P = min(1, LEAST/n_a),   a the rarest that it meets
  *
- * others every `every`-th, and sums weigh walks by 1/P. Of materials that share a class,
- * with more than IMP_STORE_CLASSES of them, a rare one is met with the others alone. */
+ * others every `every`-th, and sums weigh walks by 1/P. Where more than IMP_STORE_CLASSES
+ * materials share classes, a rare one counts with those of its class. */
 #include "math/rng.h"
 #include "store.h"
 
@@ -46,7 +45,7 @@ enum imp_status imp__store_look(struct imp_store *s, const struct imp_scene *sce
     const struct imp_record *r = &s->records[tile];
     uint64_t met[64] = {0};
     uint64_t *meets = imp__alloc(s->ctx, r->n_walks + 1, sizeof *meets);
-    if (!meets) return imp__error(s->ctx, IMP_E_NOMEM, "no memory for kept walks");
+    if (!meets) return imp__error(s->ctx, IMP_E_NOMEM, "no memory for recorded walks");
     for (size_t i = 0; i < r->n_walks; i++) {
         meets[i] = walk_meets(scene, r, imp__record_at(r, i));
         for (uint64_t m = meets[i]; m; m &= m - 1) met[__builtin_ctzll(m)]++;
@@ -74,8 +73,8 @@ struct imp_asking imp__store_asking(const struct imp_store *s,
     return a;
 }
 
-/* Walks of a stratum that one of them stands for. */
-static double stands_for(const struct imp_store *s, uint64_t rare)
+/* Walks of a stratum for each that is drawn. */
+static double stratum_weight(const struct imp_store *s, uint64_t rare)
 {
     size_t least = SIZE_MAX;
     for (; rare; rare &= rare - 1)
@@ -93,7 +92,7 @@ size_t imp__store_next(const struct imp_store *s, const struct imp_asking *a, si
     for (; a->rare && i < n; i++) {
         const uint64_t rare = s->meets[tile][i] & a->rare;
         if (rare) {
-            const double of = stands_for(s, rare);
+            const double of = stratum_weight(s, rare);
             *weight = of;
             if (of * 0x1p-64 * (double)imp__mix64(before + i) <= 1) return i;
         } else if (i == due) {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Looks at growing numbers of samples: when the next one is due, and when they end
- * (looks.h). */
-#include "looks.h"
+ * (interim_looks.h). */
+#include "interim_looks.h"
 #include "base/pool.h"
 #include "base/team.h"
 #include "math/rng.h"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Proxies of a scene file made into aims, strengths that follow the lights' parameters, and the
- * density p(w) of aims.h with its draws. */
-#include "aims.h"
+ * density p(w) of aimed_directions.h with its draws. */
+#include "aimed_directions.h"
 #include "color/rgb.h"
 #include "kind/shape/shape.h"
 #include "math/rng.h"

@@ -26,7 +26,7 @@ enum imp_status imp__looks_begin(imp_context *ctx, const char *function,
 bool imp__looks_next(struct imp__looks *looks);
 /* What the last look weighs in the mean over all. */
 double imp__looks_weight(const struct imp__looks *looks);
-/* The probability that the last look may go wrong with. */
+/* Significance level of the last look. */
 double imp__looks_risk(const struct imp__looks *looks);
 /* Standard errors that a normal number exceeds, on either side, with that probability. */
 double imp__looks_z(const struct imp__looks *looks);

@@ -2,7 +2,7 @@
  *
  * The first vertex of a walk from a sensor that is a surface: a white diffuse one, whose
  * direction is drawn by the cosine. */
-#include "meter.h"
+#include "surface_sensor.h"
 #include "math/warp.h"
 #include "scene/located.h"
 
