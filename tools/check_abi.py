@@ -6,7 +6,7 @@ Usage: check_abi.py [--update [--break]] [LIBRARY]
 
 A file of each public header in tests/abi has every struct with its size (x86-64, LP64)
 and the offset, size and declaration of its members, every enumerator and constant with its
-value, and every function and callback with its prototype. Each has the version since which
+value, every function and callback with its prototype, and what initialisers set. Each has the version since which
 it is so. The headers are read here, and a C compiler says sizes and values.
 
 What is of an earlier version than the headers' is released, and may only grow: a struct
@@ -55,6 +55,8 @@ class Header:
             text = re.sub(r"/\*.*?\*/", " ", f.read(), flags=re.S)
         self.version = re.findall(r'#define IMP_VERSION_STRING "(.*)"', text)
         self.constants = re.findall(r"^#define (IMP_\w+)[ \t]+\(?(?:-?\d+|SIZE_MAX)\)?[ \t]*$", text, re.M)
+        self.initialisers = {n: words(body.replace("\\\n", " ")).replace("]=", "] =")
+                             for n, body in re.findall(r"#define (IMP_\w+_INIT)\b((?:.*\\\n)*.*)", text)}
         lists = re.findall(r"#define IMP_(\w+)_LIST\(X\)((?:.*\\\n)*.*)", text)
         self.enums = {"imp_" + n.lower(): re.findall(r"X\((IMP_\w+),", body) for n, body in lists}
         code = re.sub(r"^[ \t]*#(?:.*\\\n)*.*$", "", text, flags=re.M)
@@ -143,6 +145,8 @@ def interface(h, said):
             out["%s: %s" % (e, n)] = str(said[n][0])
     for c in h.constants:
         out["constant " + c] = str(said[c][0])
+    for n, text in h.initialisers.items():
+        out["initialiser " + n] = text
     for n, text in h.callbacks.items():
         out["callback " + n] = text
     for n, text in h.functions.items():

@@ -652,7 +652,8 @@ struct imp_bend_fit_options {
     imp_bend_fit_step_fn step; /**< NULL: not called */
     void *step_payload;
 };
-#define IMP_BEND_FIT_OPTIONS_INIT IMP_INIT_ZERO(struct imp_bend_fit_options)
+#define IMP_BEND_FIT_OPTIONS_INIT                                                        \
+    IMP_INIT(struct imp_bend_fit_options, .optimizer = IMP_LBFGS)
 
 struct imp_bend_fit_result {
     size_t size;

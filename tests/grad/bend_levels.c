@@ -7,14 +7,16 @@
 #include "bend_kit.h"
 #include <math.h>
 
+enum { DEFAULT = -1 }; /* the optimiser of IMP_BEND_FIT_OPTIONS_INIT */
+
 /* Two levels of the lens of scenes/bend/focus.xml, `second` iterations on the second. */
-static double fit(enum imp_optimizer kind, int carry, int first, int second)
+static double fit(int kind, int carry, int first, int second)
 {
     struct imp_bend_fit_options o = IMP_BEND_FIT_OPTIONS_INIT;
     struct imp_bend_fit_result r = {.size = sizeof r};
     imp_bend *b;
     KIT_CHECK(imp_bend_load(kit_ctx, IMP_SCENES "/bend/focus.xml", NULL, &b));
-    o.optimizer = kind;
+    if (kind != DEFAULT) o.optimizer = (enum imp_optimizer)kind;
     o.carry = carry;
     o.levels = 2;
     o.iterations[0] = first, o.iterations[1] = second;
@@ -136,6 +138,7 @@ int main(void)
     const double l0 = fit(IMP_LBFGS, 0, 20, 10), l1 = fit(IMP_LBFGS, -1, 20, 10);
     tap_ok(l0 < 0.8 * l1, "L-BFGS carries its pairs # %.2e, anew %.2e", l0, l1);
     tap_ok(l0 == fit(IMP_LBFGS, 1, 20, 10), "as when asked to");
+    tap_ok(l0 == fit(DEFAULT, 0, 20, 10), "and L-BFGS is what nobody has to choose");
     const double a0 = fit(IMP_ADAM, 0, 20, 10), a1 = fit(IMP_ADAM, 1, 20, 10);
     tap_ok(a0 == fit(IMP_ADAM, -1, 20, 10), "Adam begins anew # %.2e", a0);
     tap_ok(a1 != a0 && a1 < 0.01, "Adam with its moments, if asked # %.2e", a1);
