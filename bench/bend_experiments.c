@@ -2,7 +2,7 @@
  *
  * The experiments of docs/bend.md, each a table on standard output:
  *
- *     bend_experiments luneburg|maxwell|focus|slice|tape|fibre|display|gas|rod ...
+ *     bend_experiments luneburg|maxwell|maxwell-rough|focus|slice|tape|fibre|display|gas|rod ...
  *                      [--full] [--figures DIR]
  *
  * Settings are scaled to minutes on two cores; --full takes the published sizes. How long
@@ -133,7 +133,7 @@ static void figure(const char *name, double (*truth)(double), double eta[LEVELS]
 }
 
 static void recover(const char *name, const char *file, double (*truth)(double),
-                    const int iterations[3])
+                    double smooth_length, const int iterations[3])
 {
     double eta[LEVELS][RADII];
     imp_bend *b;
@@ -151,6 +151,7 @@ static void recover(const char *name, const char *file, double (*truth)(double),
         must(imp_bend_load(ctx, file, &lo, &b));
         fo.levels = levels;
         memcpy(fo.iterations, iterations, 3 * sizeof(int));
+        fo.smooth_length = smooth_length;
         if (levels == 1) /* the step halves with the third level's cells */
             expect(file, evaluation(b) *
                              (3 * iterations[0] + 2 * iterations[1] + 2 * iterations[2]));
@@ -841,9 +842,11 @@ int main(int argc, char **argv)
         }
         did++;
         if (!strcmp(a, "luneburg"))
-            recover(a, IMP_SCENES "/bend/luneburg.xml", luneburg, it);
+            recover(a, IMP_SCENES "/bend/luneburg.xml", luneburg, 0, it);
         else if (!strcmp(a, "maxwell"))
-            recover(a, IMP_SCENES "/bend/maxwell.xml", maxwell, it);
+            recover(a, IMP_SCENES "/bend/maxwell.xml", maxwell, 0.1, it);
+        else if (!strcmp(a, "maxwell-rough"))
+            recover(a, IMP_SCENES "/bend/maxwell.xml", maxwell, 0, it);
         else if (!strcmp(a, "focus")) focus();
         else if (!strcmp(a, "slice")) slice();
         else if (!strcmp(a, "tape")) tape();
@@ -855,9 +858,9 @@ int main(int argc, char **argv)
     }
     imp_context_destroy(ctx);
     if (did > 0) return 0;
-    fprintf(
-        stderr,
-        "usage: bend_experiments luneburg|maxwell|focus|slice|tape|fibre|display|gas|rod "
-        "... [--full] [--figures DIR]\n");
+    fprintf(stderr,
+            "usage: bend_experiments "
+            "luneburg|maxwell|maxwell-rough|focus|slice|tape|fibre|display|gas|rod "
+            "... [--full] [--figures DIR]\n");
     return 2;
 }

@@ -17,7 +17,7 @@ static const char *const optimizer_words[] = {"lbfgs", "adam", "mma", NULL};
 static struct {
     int optimizer, levels, resume, carry;
     const char *iterations, *checkpoint;
-    double learning_rate, tolerance, scale;
+    double learning_rate, tolerance, scale, smooth_length;
 } o;
 
 const struct arg_option bend_fit_options[] = {
@@ -36,6 +36,11 @@ const struct arg_option bend_fit_options[] = {
      1e-300, 1, NULL},
     {ARG_NUMBER, 0, "scale", "X", "fit: a large change of an index (default 0.1)",
      &o.scale, 1e-12, 1e12, NULL},
+    {ARG_NUMBER, 0, "smooth-length", "X",
+     "fit, lbfgs: changes of a grid are smooth over this length as long as the rays "
+     "allow "
+     "it (default 0)",
+     &o.smooth_length, 1e-12, 1e12, NULL},
     {ARG_TEXT, 0, "checkpoint", "FILE", "fit: save the state every few seconds",
      &o.checkpoint, 0, 0, NULL},
     {ARG_CHOICE, 0, "carry", "WHEN",
@@ -191,6 +196,7 @@ int bend_fit(imp_bend *bend)
     fo.learning_rate = o.learning_rate;
     fo.tolerance = o.tolerance;
     fo.scale = o.scale;
+    fo.smooth_length = o.smooth_length;
     fo.checkpoint = o.checkpoint;
     fo.resume = o.resume;
     fo.carry = o.carry == 1   ? IMP_BEND_CARRY_ON

@@ -651,6 +651,10 @@ struct imp_bend_fit_options {
     enum imp_bend_carry carry;
     imp_bend_fit_step_fn step; /**< NULL: not called */
     void *step_payload;
+    /** L-BFGS on grids: a length of the scene, over which the field's changes are smooth as
+     * long as the rays allow it: steps are steepest in the metric (I - l^2 Laplace)^-1 (the
+     * Sobolev gradient; Neuberger 1997). 0: every coefficient for itself. */
+    double smooth_length;
 };
 #define IMP_BEND_FIT_OPTIONS_INIT                                                        \
     IMP_INIT(struct imp_bend_fit_options, .optimizer = IMP_LBFGS)

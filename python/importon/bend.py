@@ -688,7 +688,7 @@ class Bend:
     @explained
     def fit(self, *, optimizer: str = "lbfgs", levels: int = 1, iterations: Any = 0, learning_rate: float = 0,
             tolerance: float = 0, scale: float = 0, checkpoint: Any = None, resume: bool = False, carry: int = 0,
-            progress: Any = None) -> BendFit:
+            smooth_length: float = 0, progress: Any = None) -> BendFit:
         """Change the field until rays do what the targets ask.
 
         Parameters
@@ -709,6 +709,9 @@ class Bend:
         carry : int
             What the optimiser learnt at a level, at the next: 1: is carried on, -1: is not, 0: of
             L-BFGS only.
+        smooth_length : float
+            Of "lbfgs" on grids: changes are smooth over this length as long as the rays allow it.
+            0: every coefficient for itself.
         progress : bool or callable, optional
 
         Returns
@@ -736,7 +739,8 @@ class Bend:
         path = None if checkpoint is None else text(checkpoint, "checkpoint")
         options = make(_c.imp_bend_fit_options, optimizer=choice("imp_optimizer", optimizer, "optimizer"),
                        levels=integer(levels, "levels"), learning_rate=float(learning_rate), tolerance=float(tolerance),
-                       scale=float(scale), checkpoint=path, resume=bool(resume), carry=integer(carry, "carry"))
+                       scale=float(scale), checkpoint=path, resume=bool(resume), carry=integer(carry, "carry"),
+                       smooth_length=float(smooth_length))
         for i, n in enumerate(each):
             options.iterations[i] = integer(n, "iterations")
         result = make(_c.imp_bend_fit_result)

@@ -28,7 +28,7 @@ static uint64_t surface_hash(uint64_t h, const struct imp_bend_surface *s)
 }
 
 void imp__bend_fingerprint(const imp_bend *b, const uint8_t *held,
-                           enum imp_optimizer optimizer, int level,
+                           enum imp_optimizer optimizer, double smooth_length, int level,
                            struct imp__fingerprint *out)
 {
     const struct imp_bend_options *o = &b->options;
@@ -62,5 +62,6 @@ void imp__bend_fingerprint(const imp_bend *b, const uint8_t *held,
     h = imp__hash(h, held, b->field->n_theta);
     out->parameters = h;
     h = imp__hash(3, &optimizer, sizeof optimizer);
+    HASH(h, smooth_length);
     out->options = HASH(h, level);
 }

@@ -8,6 +8,7 @@
 #include "base/lock.h"
 #include "bend_fingerprint.h"
 #include "lbfgs.h"
+#include "sobolev.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -18,6 +19,7 @@ struct fit {
     struct imp__goal goal;
     struct imp__opt_options opt;
     struct imp__fingerprint print;
+    struct imp__sobolev metric;
     uint8_t *held;
     double *theta, *bar, *lo, *hi, *scale,
         *x0;    /* [n_theta], of active numbers where [n] */
@@ -37,6 +39,7 @@ struct fit {
 static void level_free(struct fit *f)
 {
     imp_context *ctx = f->b->ctx;
+    imp__sobolev_destroy(&f->metric);
     void *const owned[] = {f->held, f->theta, f->bar, f->lo,
                            f->hi,   f->scale, f->x0,  f->at};
     for (size_t i = 0; i < imp_count(owned); i++) imp__release(ctx, owned[i]);
@@ -125,6 +128,15 @@ static enum imp_status goal_iterated(const struct imp__search *s, void *payload)
     return report(f, false) || stops ? IMP_CANCELLED : IMP_OK;
 }
 
+/* Active numbers by M of sobolev.h. */
+static void smoothed(double *x, void *payload)
+{
+    struct fit *f = payload;
+    for (size_t k = 0; k < f->goal.n; k++) f->bar[f->at[k]] = x[k];
+    imp__sobolev_apply(&f->metric, f->bar);
+    for (size_t k = 0; k < f->goal.n; k++) x[k] = f->bar[f->at[k]];
+}
+
 static enum imp_status level_begin(struct fit *f)
 {
     enum imp_status st = IMP_OK;
@@ -173,7 +185,10 @@ static enum imp_status level_begin(struct fit *f)
     f->opt = (struct imp__opt_options){
         iterations, rate, f->o->tolerance > 0 ? f->o->tolerance : 1e-6, 0, false};
     f->done_iterations = 0;
-    imp__bend_fingerprint(b, f->held, f->o->optimizer, f->level, &f->print);
+    if (f->o->smooth_length > 0)
+        IMP_TRY(imp__sobolev_create(b, f->held, f->o->smooth_length, &f->metric));
+    imp__bend_fingerprint(b, f->held, f->o->optimizer, f->o->smooth_length, f->level,
+                          &f->print);
 out:
     return st;
 }
@@ -223,8 +238,10 @@ static enum imp_status level_run(struct fit *f, bool resume, bool *found,
         else IMP_TRY(imp__search_carry(f->last, &carry, s));
     }
     f->best_value = INFINITY;
-    ended = f->o->optimizer == IMP_LBFGS ? imp__lbfgs(&f->goal, &f->opt, s)
-                                         : imp__optimize(&f->goal, &f->opt, s);
+    const struct imp__lbfgs_metric metric = {smoothed, f};
+    ended = f->o->optimizer == IMP_LBFGS
+                ? imp__lbfgs(&f->goal, &f->opt, f->metric.work ? &metric : NULL, s)
+                : imp__optimize(&f->goal, &f->opt, s);
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     IMP_TRY(theta_set(f, s->x));
     *reason = s->reason                ? s->reason
@@ -293,11 +310,16 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     if (result) IMP_SIZED(b->ctx, result, "result");
     IMP_FLOAT_MODE;
     if (!(o->learning_rate >= 0) || !(o->tolerance >= 0) || !(o->scale >= 0) ||
-        !isfinite(o->learning_rate + o->tolerance + o->scale))
-        return imp__error(
-            b->ctx, IMP_E_ARG,
-            "learning_rate %g, tolerance %g and scale %g must be numbers >= 0",
-            o->learning_rate, o->tolerance, o->scale);
+        !(o->smooth_length >= 0) ||
+        !isfinite(o->learning_rate + o->tolerance + o->scale + o->smooth_length))
+        return imp__error(b->ctx, IMP_E_ARG,
+                          "learning_rate %g, tolerance %g, scale %g and smooth_length %g "
+                          "must be numbers >= 0",
+                          o->learning_rate, o->tolerance, o->scale, o->smooth_length);
+    if (o->smooth_length > 0 && o->optimizer != IMP_LBFGS)
+        return imp__error(b->ctx, IMP_E_UNSUPPORTED,
+                          "smooth_length %g: only lbfgs takes smooth steps",
+                          o->smooth_length);
     struct fit f = {.b = b,
                     .o = o,
                     .levels = imp_max(o->levels, 1),

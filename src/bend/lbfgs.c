@@ -20,6 +20,7 @@ enum { PAIRS, VALUE, HAVE };
 
 struct run {
     const struct imp__goal *goal;
+    const struct imp__lbfgs_metric *metric; /* or NULL */
     struct imp__search *s;
     size_t n;
     double *d, *trial, *g_trial;
@@ -39,6 +40,24 @@ static bool pinned(const struct imp__goal *goal, const double *x, const double *
     return (x[k] <= goal->lo[k] && g[k] > 0) || (x[k] >= goal->hi[k] && g[k] < 0);
 }
 
+/* d = gamma M d with the newest pair's gamma = s.y / y.M y; without pairs d = M d. */
+static void initial(struct run *r)
+{
+    const struct imp__search *s = r->s;
+    const struct imp__lbfgs_metric *metric = r->metric;
+    const size_t n = r->n;
+    const int m = (int)s->scalar[PAIRS];
+    if (m > 0) {
+        const double *sl = s->array[S] + (size_t)(m - 1) * n,
+                     *yl = s->array[Y] + (size_t)(m - 1) * n;
+        memcpy(r->trial, yl, n * sizeof *yl);
+        if (metric) metric->apply(r->trial, metric->payload);
+        const double gamma = dot(n, sl, yl) / dot(n, yl, r->trial);
+        for (size_t k = 0; k < n; k++) r->d[k] *= gamma;
+    }
+    if (metric) metric->apply(r->d, metric->payload);
+}
+
 /* d = -H g on the free variables (Nocedal, Wright 2006, algorithm 7.4); pairs newest
  * last. */
 static void direction(struct run *r)
@@ -55,12 +74,7 @@ static void direction(struct run *r)
         alpha[i] = rho[i] * dot(n, si, r->d);
         for (size_t k = 0; k < n; k++) r->d[k] -= alpha[i] * yi[k];
     }
-    if (m > 0) {
-        const double *sl = s->array[S] + (size_t)(m - 1) * n,
-                     *yl = s->array[Y] + (size_t)(m - 1) * n;
-        const double gamma = dot(n, sl, yl) / dot(n, yl, yl);
-        for (size_t k = 0; k < n; k++) r->d[k] *= gamma;
-    }
+    initial(r);
     for (int i = 0; i < m; i++) {
         const double *si = s->array[S] + (size_t)i * n, *yi = s->array[Y] + (size_t)i * n;
         const double beta = rho[i] * dot(n, yi, r->d);
@@ -136,11 +150,12 @@ static enum imp_status line(struct run *r, bool *found)
 }
 
 enum imp_status imp__lbfgs(const struct imp__goal *goal,
-                           const struct imp__opt_options *options, struct imp__search *s)
+                           const struct imp__opt_options *options,
+                           const struct imp__lbfgs_metric *metric, struct imp__search *s)
 {
     enum imp_status st = IMP_OK;
     const size_t n = goal->n;
-    struct run r = {.goal = goal, .s = s, .n = n};
+    struct run r = {.goal = goal, .metric = metric, .s = s, .n = n};
     IMP_TRY(imp__search_array(s, S, MEMORY * n));
     IMP_TRY(imp__search_array(s, Y, MEMORY * n));
     IMP_TRY(imp__search_array(s, X, n));

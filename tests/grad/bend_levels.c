@@ -74,7 +74,7 @@ static void curvature(void)
                                      .payload = &goal[k]};
         KIT_CHECK(imp__search_create(&goal[k], IMP_LBFGS, &options, x[k], &s[k]));
     }
-    KIT_CHECK(imp__lbfgs(&goal[0], &options, s[0]));
+    KIT_CHECK(imp__lbfgs(&goal[0], &options, NULL, s[0]));
     const struct imp__carry carry = {prolong, f, 1.0 / 8};
     KIT_CHECK(imp__lbfgs_carry(s[0], &carry, s[1]));
     /* Arrays 0 and 1: s and y; scalar 0: pairs. */
