@@ -179,6 +179,40 @@ static void fixed(const char *filter, const char *name)
     imp_scene_destroy(scene);
 }
 
+/* A meter on a disk of radius 1 before a lamp like it, both of reflectance 1/2, at a distance of 1.
+ * With F = (3 - sqrt 5)/2 between them, and light that returns once, E = pi F (1 + F^2/4). */
+static void meter(void)
+{
+    static const char xml[] =
+        "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' "
+        "value='3'/></integrator><shape type='disk'><bsdf type='diffuse'><float "
+        "name='reflectance' value='.5'/></bsdf><sensor type='irradiancemeter'><film "
+        "type='hdrfilm'><integer name='width' value='1'/><integer name='height' "
+        "value='1'/><rfilter type='box'/></film></sensor></shape><shape type='disk'>"
+        "<transform name='to_world'><rotate y='1' angle='180'/><translate z='1'/>"
+        "</transform><bsdf type='diffuse'><float name='reflectance' value='.5'/></bsdf>"
+        "<emitter type='area'><float name='radiance' "
+        "value='1'/></emitter></shape></scene>";
+    const double F = (3 - sqrt(5)) / 2, truth = IMP_PI * F * (1 + F * F / 4);
+    imp_scene *scene = test_scene_text(ctx, xml, IMP_MONO);
+    struct tap_stat value = {0};
+    imp_problem *p;
+    test_must(ctx, imp_problem_create(scene, &p));
+    for (int seed = 0; seed < 40; seed++) {
+        struct imp_run run = IMP_RUN_INIT;
+        struct imp_estimate e;
+        run.spp = 1024;
+        run.seed = (uint64_t)seed;
+        run.points = IMP_POINTS_SOBOL;
+        test_must(ctx, imp_problem_functional(p, NULL, &run, &e, NULL, NULL));
+        tap_add(&value, e.value);
+    }
+    tap_z(&value, truth, 3e-3 * truth,
+          "a meter's directions do not depend on its places");
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+}
+
 /* Where nothing is said, a loss has points in sets and a picture independent ones. */
 static void unsaid(void)
 {
@@ -229,6 +263,7 @@ int main(void)
     losses(wide, "wide, log", IMP_LOSS_LOG, 32);
     fixed(box, "box");
     fixed(wide, "wide");
+    meter();
     unsaid();
     imp_context_destroy(ctx);
     return tap_done();

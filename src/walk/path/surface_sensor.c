@@ -68,9 +68,11 @@ struct imp_vertex *imp__meter_begin(struct imp_step *s, struct imp_surface *at,
     imp__step_weigh(v, imp__spec(1), density, 1);
     if (s->recorded) v->d.pdf = (imp_decided)density;
 
-    /* Its numbers are those of another walk: depth -1 has none. */
+    /* Its numbers are those of another walk: depth -1 has none, and its block of a point would
+     * be that of the start, so that directions would depend on places. */
     walk->depth = -2;
     walk->key = imp__key_branch(walk->key, 0, 1);
+    walk->point.set = imp__key_branch((struct imp_key){walk->point.set}, 0, 1).state;
     s->depth = -1;
     at->located.prim = -1;
     sensor->shape->ops->sample_area(sensor->shape, u, at);
