@@ -35,6 +35,9 @@ struct imp__functional {
     const struct imp_film_desc *film;
     int channels, margin; /* extra pixels sampled on every side */
     int spp;              /* of the picture */
+    int set; /* samples of a set of points of its own, of `period` in a pixel;
+                             0: sets are whole */
+    int64_t period;
     const float *adjoint; /* s [height][width][channels] */
     double norm;          /* F = sum(adjoint * picture) / norm */
     const double *W;      /* [height][width]; NULL: box filter, spp everywhere */
