@@ -142,6 +142,7 @@ enum imp_status imp_film_merge(imp_film *f, const imp_film *other)
     for (size_t i = 0; f->se && i < n; i++)
         f->se[i] = (float)hypot((1 - w) * f->se[i], w * other->se[i]);
     f->spp += other->spp;
+    f->sets += other->sets;
     f->dropped += other->dropped;
     imp__drops_merge(&f->drops, &other->drops);
     return IMP_OK;

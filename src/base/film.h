@@ -18,7 +18,8 @@ struct imp_film {
     float *mean;
     float *se; /* one standard error of each mean; NULL: there are none */
     int64_t spp;
-    uint64_t dropped;       /* walks that count as 0, in a picture read from a file too */
+    int64_t sets;     /* of a pixel, whose spread its errors come from; 0: its samples' */
+    uint64_t dropped; /* walks that count as 0, in a picture read from a file too */
     struct imp_drops drops; /* the same by cause, of a picture made here */
     size_t n_texts, cap_texts;
     struct imp_film_text {

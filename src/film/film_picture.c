@@ -384,6 +384,7 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
     IMP_TRY(imp__film_sums_finish(&r.sums, in_strata(&r), picture->weights, films));
     for (int k = 0; k < n_films; k++) {
         films[k]->spp = spp;
+        films[k]->sets = r.set > 1 ? spp / r.set : 0;
         films[k]->drops = r.tiles.drops;
         films[k]->dropped = imp__drops_total(&r.tiles.drops);
     }

@@ -61,6 +61,7 @@ static void film_mix(imp_film *all, const imp_film *film, double w)
         all->se[i] = (float)se;
     }
     all->spp += film->spp;
+    all->sets += film->sets;
     all->dropped += film->dropped;
     imp__drops_merge(&all->drops, &film->drops);
 }

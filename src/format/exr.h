@@ -26,5 +26,6 @@ enum imp_status imp__exr_error(const struct imp_exr *io, exr_result_t code);
 
 #define IMP_EXR_SPP     "importon.spp"
 #define IMP_EXR_DROPPED "importon.dropped"
+#define IMP_EXR_SETS    "importon.sets"
 
 #endif

@@ -268,6 +268,8 @@ static enum imp_status texts_read(struct exr_reader *r)
         int64_t value;
         if (strcmp(a->name, IMP_EXR_SPP) == 0 && imp__integer(&s, end, &value)) {
             r->film->spp = imp_max(value, (int64_t)0);
+        } else if (strcmp(a->name, IMP_EXR_SETS) == 0 && imp__integer(&s, end, &value)) {
+            r->film->sets = imp_max(value, (int64_t)0);
         } else if (strcmp(a->name, IMP_EXR_DROPPED) == 0 &&
                    imp__integer(&s, end, &value)) {
             r->film->dropped = (uint64_t)imp_max(value, (int64_t)0);

@@ -95,6 +95,10 @@ static enum imp_status header_write(struct exr_writer *w)
         snprintf(text, sizeof text, "%lld", (long long)f->spp);
         EXR(exr_attr_set_string(w->exr, part, IMP_EXR_SPP, text));
     }
+    if (f->sets > 0) {
+        snprintf(text, sizeof text, "%lld", (long long)f->sets);
+        EXR(exr_attr_set_string(w->exr, part, IMP_EXR_SETS, text));
+    }
     if (f->dropped > 0) {
         snprintf(text, sizeof text, "%llu", (unsigned long long)f->dropped);
         EXR(exr_attr_set_string(w->exr, part, IMP_EXR_DROPPED, text));

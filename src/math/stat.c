@@ -65,3 +65,10 @@ double imp__chi2_tail(double x, double k)
 }
 
 double imp__sidak(double alpha, double n) { return -expm1(log1p(-alpha) / n); }
+
+double imp__normal_of_student(double t, double k)
+{
+    if (isinf(k) || t == 0 || isinf(t)) return t;
+    const double z = (8 * k + 1) / (8 * k + 3) * sqrt(k * log1p(t * t / k));
+    return copysign(z, t);
+}

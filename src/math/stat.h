@@ -7,6 +7,10 @@
 /* Standard normal: P(X <= x), and its inverse (p in (0,1); +-inf at the ends). */
 double imp__normal_cdf(double x);
 double imp__normal_quantile(double p);
+/* Standard normal with the probability of t in Student's distribution with k > 0 degrees of
+ * freedom (Wallace 1959, Ann. Math. Statist. 30, 1124): to 2 %
+ * for k >= 3. */
+double imp__normal_of_student(double t, double k);
 /* Regularised upper incomplete gamma function Q(a, x), a > 0, x >= 0. */
 double imp__gamma_q(double a, double x);
 /* P(X >= x) for chi-square with k degrees of freedom. */

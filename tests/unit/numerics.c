@@ -31,6 +31,12 @@ static void distributions(void)
     tap_near(imp__chi2_tail(124.342113404004, 100), 0.05, 1e-11, 0,
              "chi-square, 100, 5 %");
     tap_near(imp__chi2_tail(3.841458820694124, 1), 0.05, 1e-13, 0, "chi-square, 1, 5 %");
+    /* 99.5 % of Student's t with 3 and 6 degrees of freedom, and 99.9 % with 6 */
+    tap_near(imp__normal_of_student(5.840909, 3), 2.575829, .02, 0, "Student's t, 3");
+    tap_near(imp__normal_of_student(-3.707428, 6), -2.575829, .01, 0, "Student's t, 6");
+    tap_near(imp__normal_of_student(5.207626, 6), 3.090232, .01, 0,
+             "Student's t, 6, far");
+    tap_ok(imp__normal_of_student(3, INFINITY) == 3, "Student's t, normal in the limit");
     /* Q(n, x) is a Poisson sum, also where both expansions meet. */
     double sum = 0;
     for (int k = 0; k < 2000; k++) {

@@ -57,10 +57,19 @@ static enum imp_status match(imp_context *ctx, const imp_film *film,
     return IMP_OK;
 }
 
-/* Variance of test - reference in value i of channel c, from the variances that are
- * known; < 0: none is. `floor`: the least variance of one sample. */
-static double variance_at(const struct pair *p, size_t pixel, int c, double floor)
+/* Degrees of freedom of a picture's errors; those from samples one by one have many. */
+static double freedom_of(const imp_film *film)
 {
+    return film->sets > 1 ? (double)(film->sets - 1) : INFINITY;
+}
+
+/* Variance of test - reference in value i of channel c, from the variances that are
+ * known; < 0: none is. `floor`: the least variance of one sample. *freedom: its degrees of
+ * freedom (Welch 1947). */
+static double variance_at(const struct pair *p, size_t pixel, int c, double floor,
+                          double *freedom)
+{
+    *freedom = INFINITY;
     const struct imp_compare_options *o = p->options;
     const size_t r = pixel * (size_t)p->reference->channels + (size_t)c;
     const size_t t = pixel * (size_t)p->test->channels + (size_t)p->of_test[c];
@@ -72,10 +81,13 @@ static double variance_at(const struct pair *p, size_t pixel, int c, double floo
     }
     if (!p->test->se && !p->reference->se) return -1;
     const double n = fmax(o->n_test > 0 ? o->n_test : (double)p->test->spp, 1);
-    double var = 0;
-    if (p->test->se) var += (double)p->test->se[t] * p->test->se[t];
-    if (p->reference->se) var += (double)p->reference->se[r] * p->reference->se[r];
-    return fmax(var, floor / n);
+    double a = 0, b = 0;
+    if (p->test->se) a = (double)p->test->se[t] * p->test->se[t];
+    if (p->reference->se) b = (double)p->reference->se[r] * p->reference->se[r];
+    if (a + b >= floor / n && a + b > 0)
+        *freedom = (a + b) * (a + b) /
+                   (a * a / freedom_of(p->test) + b * b / freedom_of(p->reference));
+    return fmax(a + b, floor / n);
 }
 
 static void channel(const struct pair *p, int c, double level, struct sums *s)
@@ -99,14 +111,15 @@ static void channel(const struct pair *p, int c, double level, struct sums *s)
             s->broken |= isfinite(t) != isfinite(r) || (isinf(t) && t != r);
             continue;
         }
-        const double d = t - r, v = variance_at(p, i, c, floor);
+        double freedom;
+        const double d = t - r, v = variance_at(p, i, c, floor, &freedom);
         a += t, b += r, n++;
         s->square += d * d;
         s->reference_square += r * r;
         s->max_abs = fmax(s->max_abs, fabs(d));
         has_z &= v >= 0;
         if (v < 0 || (v == 0 && d == 0)) continue;
-        const double z = fabs(d) / sqrt(v);
+        const double z = imp__normal_of_student(fabs(d) / sqrt(v), freedom);
         s->n_z++;
         s->fail += !(erfc(z / sqrt(2)) > level);
         s->over2 += z > 2;
