@@ -195,8 +195,14 @@ static inline void kind_inputs(const struct imp_bsdf *b, enum kind_set set, uint
         kind_bounds(d, &lo, &hi);
         in[j] = imp__spec(0);
         for (int c = 0; c < 3; c++) {
-            const double u =
-                imp__u01(key_j, (uint32_t)(4 * j + (kind_is_scalar(d) ? 0 : c)));
+            /* A normal, and its components, which are drawn as those of the normal are. */
+            int k = 0, at = 0; /* `at`: index without components */
+            while (kind_input(b, j - k)->flags & IMP_INPUT_COMPONENT) k++;
+            for (int i = 0; i < j - k; i++)
+                at += !(kind_input(b, i)->flags & IMP_INPUT_COMPONENT);
+            const unsigned vector = kind_input(b, j - k)->flags;
+            const int lane = k ? k - 1 : kind_is_scalar(d) ? 0 : c;
+            const double u = imp__u01(key_j, (uint32_t)(4 * at + lane));
             double v = d->fallback;
             /* What has no gradient does not take the others' away. */
             const bool fixed = d->flags & IMP_INPUT_FIXED && d->role == IMP_REFLECTANCE;
@@ -206,12 +212,9 @@ static inline void kind_inputs(const struct imp_bsdf *b, enum kind_set set, uint
             else if (d->fallback > 0)
                 v = d->fallback * exp2(set == KIND_WIDE ? 7 * u - 3.5 : 3 * u - 1.5);
             else v = lo + 3 * u;
-            /* A normal, on the side of the surface; or one of its components. */
-            int k = 0;
-            while (kind_input(b, j - k)->flags & IMP_INPUT_COMPONENT) k++;
-            const unsigned vector = kind_input(b, j - k)->flags;
+            /* On the side of the surface. */
             if (vector & (IMP_INPUT_VECTOR | IMP_INPUT_BUMP))
-                v = (k ? k - 1 : c) == 2 ? 0.75 + 0.25 * u : 0.2 + 0.6 * u;
+                v = lane == 2 ? 0.75 + 0.25 * u : 0.2 + 0.6 * u;
             in[j][c] = vector & IMP_INPUT_BUMP ? 2 * v - 1 : imp_clamp(v, lo, hi);
         }
         in[j][3] = kind_is_scalar(d) ? in[j][0] : NAN; /* nobody may read it */

@@ -9,6 +9,7 @@
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "math/rng.h"
+#include <importon/walks.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -332,6 +333,48 @@ static void rows_of(bool bump, const char *nested, enum imp_color_mode mode)
     imp_scene_destroy(s);
 }
 
+/* Gradient of the mean with respect to the texels, of new walks or of recorded ones. */
+static void reverse(imp_problem *p, const imp_walks *walks, double *g)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    float adjoint[SIDE * SIDE * 3];
+    for (int k = 0; k < 3 * SIDE * SIDE; k++)
+        adjoint[k] = (float)(weights[k % 3] / (SIDE * SIDE));
+    run.spp = 64;
+    run.seed = 5;
+    run.walks = walks;
+    test_must(ctx, imp_problem_reverse(p, adjoint, &run, g, NULL));
+}
+
+/* Recorded walks are those of the same numbers, and their texels' derivatives, too. */
+static void recorded(bool bump)
+{
+    imp_scene *s = scene_make(bump, "roughconductor", true, true, IMP_RGB);
+    double texel[3 * TEXELS * TEXELS], g[2][3 * TEXELS * TEXELS], worst = 0, size = 0;
+    struct imp_walks_options o = IMP_WALKS_OPTIONS_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_param_info info;
+    imp_problem *p;
+    imp_walks *walks;
+    texels_of(s, texel, &info);
+    test_must(ctx, imp_problem_create(s, &p));
+    test_must(ctx, imp_problem_activate(p, info.name));
+    run.spp = 64;
+    run.seed = 5;
+    test_must(ctx, imp_walks_keep(s, &run, &o, &walks));
+    reverse(p, NULL, g[0]);
+    reverse(p, walks, g[1]);
+    for (size_t e = 0; e < info.count; e++) {
+        worst = fmax(worst, fabs(g[1][e] - g[0][e]));
+        size = fmax(size, fabs(g[0][e]));
+    }
+    tap_ok(worst < 1e-5 * size && size > 0, "%s: recorded walks # %.1e of %.3g",
+           bump ? "bump map" : "normal map", worst, size);
+    imp_walks_destroy(walks);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
 static void refused(const char *nested, bool clamp, const char *words)
 {
     imp_scene *s = scene_make(false, nested, clamp, false, IMP_RGB);
@@ -359,6 +402,8 @@ int main(void)
         rows_of(bump, "roughconductor", IMP_MONO);
         rows_of(bump, "roughplastic", IMP_SPECTRAL);
     }
+    recorded(false);
+    recorded(true);
     refused("diffuse", false, "clamp_invalid_normals");
     refused("conductor", true, "'nested' (conductor) has ideal lobes");
     refused("principledthin", true,

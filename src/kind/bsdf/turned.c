@@ -204,7 +204,7 @@ static void add_to(struct by_vector *v, imp_v3 w, imp_spec x)
 {
     for (int k = 0; k < 3; k++) v->k[k] += x * w[k];
 }
-/* Of a unit vector, by the vector of this length that it was made of. */
+/* The derivative by a unit vector becomes that by the vector of this length that it was made of. */
 static void by_length(struct by_vector *v, imp_v3 unit, double length)
 {
     add_to(v, unit, -along(v, unit));

@@ -349,7 +349,7 @@ static bool slope_weights(const struct bitmap *t, const struct imp_texcoord *at,
     return true;
 }
 
-/* Of numbers alone: slopes of colours are not asked for. */
+/* Bump maps alone call it, for numbers: slopes of colours have no derivative. */
 static void slope_scatter(const struct imp_texture *tex, const struct imp_texcoord *at,
                           bool scalar, const imp_spec bar[2], struct imp_sink *sink)
 {
