@@ -157,7 +157,7 @@ static inline const struct imp_input_desc *kind_input(const struct imp_bsdf *b, 
 static inline bool kind_is_scalar(const struct imp_input_desc *d)
 {
     return !(d->flags & IMP_INPUT_BUMP) &&
-           d->flags & (IMP_INPUT_SCALAR | IMP_INPUT_LUMINANCE);
+           d->flags & (IMP_INPUT_SCALAR | IMP_INPUT_LUMINANCE | IMP_INPUT_COMPONENT);
 }
 static inline void kind_bounds(const struct imp_input_desc *d, double *lo, double *hi)
 {
@@ -195,8 +195,14 @@ static inline void kind_inputs(const struct imp_bsdf *b, enum kind_set set, uint
         kind_bounds(d, &lo, &hi);
         in[j] = imp__spec(0);
         for (int c = 0; c < 3; c++) {
-            const double u =
-                imp__u01(key_j, (uint32_t)(4 * j + (kind_is_scalar(d) ? 0 : c)));
+            /* A normal, and its components, which are drawn as those of the normal are. */
+            int k = 0, at = 0; /* `at`: index without components */
+            while (kind_input(b, j - k)->flags & IMP_INPUT_COMPONENT) k++;
+            for (int i = 0; i < j - k; i++)
+                at += !(kind_input(b, i)->flags & IMP_INPUT_COMPONENT);
+            const unsigned vector = kind_input(b, j - k)->flags;
+            const int lane = k ? k - 1 : kind_is_scalar(d) ? 0 : c;
+            const double u = imp__u01(key_j, (uint32_t)(4 * at + lane));
             double v = d->fallback;
             /* What has no gradient does not take the others' away. */
             const bool fixed = d->flags & IMP_INPUT_FIXED && d->role == IMP_REFLECTANCE;
@@ -206,10 +212,10 @@ static inline void kind_inputs(const struct imp_bsdf *b, enum kind_set set, uint
             else if (d->fallback > 0)
                 v = d->fallback * exp2(set == KIND_WIDE ? 7 * u - 3.5 : 3 * u - 1.5);
             else v = lo + 3 * u;
-            if (d->flags & (IMP_INPUT_VECTOR |
-                            IMP_INPUT_BUMP)) /* a normal, on the side of the surface */
-                v = c == 2 ? 0.75 + 0.25 * u : 0.2 + 0.6 * u;
-            in[j][c] = d->flags & IMP_INPUT_BUMP ? 2 * v - 1 : imp_clamp(v, lo, hi);
+            /* On the side of the surface. */
+            if (vector & (IMP_INPUT_VECTOR | IMP_INPUT_BUMP))
+                v = lane == 2 ? 0.75 + 0.25 * u : 0.2 + 0.6 * u;
+            in[j][c] = vector & IMP_INPUT_BUMP ? 2 * v - 1 : imp_clamp(v, lo, hi);
         }
         in[j][3] = kind_is_scalar(d) ? in[j][0] : NAN; /* nobody may read it */
         ((struct imp_input *)b->input[j])->value = in[j];
@@ -264,6 +270,7 @@ static inline int kinds_visit(struct kind_factory *f,
         for (int i = 0; ops->max_children && imp__bsdf_kinds[i]; i++) {
             const struct imp_bsdf_ops *front = imp__bsdf_kinds[i];
             const char *allow[] = {"allow_transmission=true", NULL};
+            const char *clamp[] = {"clamp_invalid_normals=true", NULL};
             if (front->max_children) continue;
             const int n = imp_max(ops->min_children, /* one and two in turn */
                                   imp_min(ops->max_children, 1 + i % 2));
@@ -279,6 +286,13 @@ static inline int kinds_visit(struct kind_factory *f,
             snprintf(c.label, sizeof c.label, "%s(%s%s%s)", ops->name, front->name,
                      n > 1 ? ", " : "", n > 1 ? back->name : "");
             if (!kind_make(f, ops, allow, transmits, c.child, n, &c.bsdf)) return -1;
+            visit(&c, payload);
+            visited++;
+            if (!(ops->inputs[0].flags & (IMP_INPUT_VECTOR | IMP_INPUT_BUMP)) ||
+                imp__bsdf_without_directions_d(&c.child[0]))
+                continue;
+            strcat(c.label, " clamped"); /* normals that have a derivative */
+            if (!kind_make(f, ops, clamp, 1, c.child, n, &c.bsdf)) return -1;
             visit(&c, payload);
             visited++;
         }

@@ -15,7 +15,8 @@
  * Lane rule. Lane c of every value depends on lane c of each input only. The Jacobian of
  * eval is therefore diagonal in the lanes, and one function (`eval_d`: lane-wise
  * derivatives with respect to each input) serves the reverse sweep, the forward tangent
- * and the tests.
+ * and the tests. A vector, of which every component moves all lanes, is read by its
+ * components (IMP_INPUT_COMPONENT): each is one number in all lanes.
  *
  * Directions. wo points to the sensor side, wi to the light side, both away from the
  * surface, in the local shading frame whose z is the shading normal (CONVENTIONS.md).
@@ -101,8 +102,14 @@ enum imp_input_flags {
     /* In spectral modes. */
     IMP_INPUT_DAYLIGHT = 65536, /* a bitmap's texels are daylight of their colours, of any
                                    size */
-    IMP_INPUT_LINEAR = 131072   /* colours become spectra by the linear basis, so that
+    IMP_INPUT_LINEAR = 131072,  /* colours become spectra by the linear basis, so that
                                    inputs add as their colours do */
+    /* No property: the engine has its value, and its derivative. */
+    IMP_INPUT_COMPONENT = 262144 /* a component, in all lanes, of the input with
+                                    IMP_INPUT_VECTOR or IMP_INPUT_BUMP declared before it
+                                    under the same name: three in a row, x, y and z. A kind
+                                    whose lanes all depend on a normal reads them, and not
+                                    the vector */
 };
 
 struct imp_input_desc { /* the list ends with {0} */
@@ -140,15 +147,18 @@ struct imp_input {
     const struct imp_texture *texture; /* NULL: constant */
     int param;                         /* index of its parameter, -1: none */
     int count;                         /* numbers of a constant: 3, or 1 (in all lanes) */
-    bool scalar;     /* declared IMP_INPUT_SCALAR: textures give one number */
-    bool plain;      /* a constant: `value` as it is, unless lanes are wavelengths */
-    bool vector;     /* declared IMP_INPUT_VECTOR */
-    bool bump;       /* declared IMP_INPUT_BUMP */
-    int luminance;   /* > 0: the luminance of the input that many before it */
-    imp_spec value;  /* the constant, in all used lanes */
-    imp_spec weight; /* of a luminance: of that input's lanes */
+    bool scalar;    /* declared IMP_INPUT_SCALAR: textures give one number */
+    bool plain;     /* a constant: `value` as it is, unless lanes are wavelengths */
+    bool vector;    /* declared IMP_INPUT_VECTOR */
+    bool bump;      /* declared IMP_INPUT_BUMP */
+    int luminance;  /* > 0: the luminance of the input that many before it */
+    imp_spec value; /* the constant, in all used lanes */
+    imp_spec
+        weight; /* of a luminance: of that input's lanes. Of a component: 1 in the lanes
+                        that colours use */
     const struct imp_spectrum *spectrum; /* what walks that carry wavelengths look up;
                                             NULL: the constant, at all of them */
+    int component; /* > 0: component - 1 of the vector that many before it */
 };
 
 struct imp_build; /* what build functions get; read by imp_build_*, below */
@@ -186,16 +196,18 @@ enum imp_bsdf_flags {
     IMP_BSDF_SMOOTH = 1, /* has lobes with a density */
     IMP_BSDF_DELTA = 2,  /* has delta lobes */
     IMP_BSDF_TRANSMIT = 4,
-    IMP_BSDF_EMIT = 8,    /* has emit: Stam's ambient terms */
-    IMP_BSDF_JUMP = 16,   /* f/pdf of sample jumps at the horizon: sample_d, which has no
+    IMP_BSDF_EMIT = 8,     /* has emit: Stam's ambient terms */
+    IMP_BSDF_JUMP = 16,    /* f/pdf of sample jumps at the horizon: sample_d, which has no
                            boundary term, is not the whole derivative */
-    IMP_BSDF_NULL = 32,   /* light passes as if nothing were there */
-    IMP_BSDF_LINEAR = 64, /* eval is of first degree in its own inputs of role
+    IMP_BSDF_NULL = 32,    /* light passes as if nothing were there */
+    IMP_BSDF_LINEAR = 64,  /* eval is of first degree in its own inputs of role
                             IMP_REFLECTANCE together, and emit is free of them: an
                             identity of integrator stam that `check` tests */
-    IMP_BSDF_TURNED = 128 /* its kernel has no transpose that `sample` could draw (it has
+    IMP_BSDF_TURNED = 128, /* its kernel has no transpose that `sample` could draw (it has
                               normals of its own, or light leaves a fibre elsewhere than it
                               entered): light tracing refuses it */
+    IMP_BSDF_STEPS = 256   /* eval jumps where wo moves, also away from the horizon:
+                              eval_directions_d is not the whole derivative */
 };
 
 struct imp_bsdf {
@@ -218,6 +230,10 @@ struct imp_bsdf {
      * volpath does not count it as a bounce, and light samples pass it. Its coefficient
      * depends on the angle to the normal alone. */
     uint64_t straight;
+    /* Bit j: own input j has no derivative in this object, though its kind has one; build
+     * sets it, and the reason, a sentence without a full stop. */
+    uint64_t fixed;
+    const char *why;
 };
 
 struct imp_bsdf_ops {
@@ -294,6 +310,16 @@ struct imp_bsdf_ops {
      * to the bit; *f is anything where the density is 0. NULL: they are called in turn. */
     double (*pdf_eval)(const struct imp_bsdf *b, const imp_spec *in,
                        const struct imp_dirs *d, imp_spec *f);
+
+    /* Derivatives of eval for d->lobe == IMP_SMOOTH with respect to the directions, lane by
+     * lane: where they turn by dwo and dwi (at right angles to them, to first order), the
+     * value changes by sum over k of d_wo[k] dwo[k] + d_wi[k] dwi[k]. The part of d_wo along
+     * wo, and that of d_wi along wi, is anything finite. A kind with children calls theirs: it
+     * is called only where all that is nested has it. NULL: not offered, and nothing that turns
+     * the directions has a derivative. */
+    void (*eval_directions_d)(const struct imp_bsdf *b, const imp_spec *in,
+                              const struct imp_dirs *d, imp_spec d_wo[3],
+                              imp_spec d_wi[3]);
 };
 
 /* ---- Texture ------------------------------------------------------------------- */
@@ -365,6 +391,14 @@ struct imp_texture_ops {
      * it is the unit cube; and in how many cells along each axis its bounds are worth
      * knowing. NULL: it has no end. */
     void (*extent)(const struct imp_texture *t, double to_unit[12], int cells[3]);
+
+    /* As scatter and tangent, of slope: bar[0] and bar[1] belong to d value/du and
+     * d value/dv. Both or neither; NULL: slopes have no derivative. */
+    void (*slope_scatter)(const struct imp_texture *t, const struct imp_texcoord *at,
+                          bool scalar, const imp_spec bar[2], struct imp_sink *sink);
+    void (*slope_tangent)(const struct imp_texture *t, const struct imp_texcoord *at,
+                          bool scalar, imp_dot_fn *dot, const void *x_dot,
+                          imp_spec d_uv_dot[2]);
 };
 
 /* ---- Phase function ------------------------------------------------------------ */

@@ -47,6 +47,10 @@ extern const struct imp_bsdf_ops imp__black;
 void imp__bsdf_albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                       imp_spec *albedo);
 
+/* Does the material have the derivative of its smooth lobes with respect to directions, as a
+ * whole? NULL: yes; else what lacks it, the material or one that is nested in it. */
+const struct imp_bsdf *imp__bsdf_without_directions_d(const struct imp_bsdf *b);
+
 /* Density and value of a direction; *f is anything where the density is not positive. */
 static inline double imp__bsdf_pdf_eval(const struct imp_bsdf *b, const imp_spec *in,
                                         const struct imp_dirs *d, imp_spec *f)

@@ -66,6 +66,41 @@ static bool name_fits(const char *name)
     return true;
 }
 
+/* Components in a row that end before input n, all of one name. */
+static size_t components_before(const struct imp_input_desc *inputs, size_t n)
+{
+    size_t k = 0;
+    while (k < n && inputs[n - 1 - k].flags & IMP_INPUT_COMPONENT &&
+           strcmp(inputs[n - 1 - k].name, inputs[n - 1].name) == 0)
+        k++;
+    return k;
+}
+/* Three in a row, after their vector. */
+static enum imp_status component_check(imp_context *ctx, const char *function,
+                                       const struct imp_input_desc *inputs, size_t n)
+{
+    const char *name = inputs[n].name;
+    if (name && inputs[n].flags & IMP_INPUT_COMPONENT) {
+        size_t k = 0;
+        while (k < n && inputs[n - 1 - k].flags & IMP_INPUT_COMPONENT &&
+               strcmp(inputs[n - 1 - k].name, name) == 0)
+            k++;
+        const struct imp_input_desc *of = k < n ? &inputs[n - 1 - k] : NULL;
+        if (k < 3 && of && strcmp(of->name, name) == 0 &&
+            of->flags & (IMP_INPUT_VECTOR | IMP_INPUT_BUMP))
+            return IMP_OK;
+    } else if (components_before(inputs, n) == 3) {
+        return IMP_OK;
+    } else {
+        name = inputs[n - 1].name;
+    }
+    return imp__error(
+        ctx, IMP_E_ARG,
+        "%s: ops: input '%s': IMP_INPUT_COMPONENT is of three in a row after "
+        "the vector of this name",
+        function, name);
+}
+
 static enum imp_status input_check(imp_context *ctx, const char *function,
                                    const struct imp_input_desc *inputs, size_t n)
 {
@@ -86,6 +121,9 @@ static enum imp_status input_check(imp_context *ctx, const char *function,
     bool before = false; /* under the same name */
     for (size_t k = 0; k < n; k++) before |= strcmp(inputs[k].name, d->name) == 0;
     const bool luminance = d->flags & IMP_INPUT_LUMINANCE;
+    if (d->flags & IMP_INPUT_COMPONENT || components_before(inputs, n) > 0)
+        IMP_CHECKED(component_check(ctx, function, inputs, n));
+    if (d->flags & IMP_INPUT_COMPONENT) return IMP_OK;
     if (before && !luminance)
         return imp__error(ctx, IMP_E_ARG, "%s: ops: two inputs '%s'", function, d->name);
     if (!before && luminance)
@@ -100,6 +138,8 @@ static enum imp_status inputs_check(imp_context *ctx, const char *function,
     size_t n = 0;
     for (; inputs && inputs[n].name; n++)
         IMP_CHECKED(input_check(ctx, function, inputs, n));
+    if (components_before(inputs, n) > 0)
+        IMP_CHECKED(component_check(ctx, function, inputs, n));
     if (n > IMP_INPUTS_MAX)
         return imp__error(ctx, IMP_E_ARG, "%s: ops: %zu inputs; at most %d", function, n,
                           IMP_INPUTS_MAX);
@@ -149,11 +189,13 @@ static enum imp_status texture_check(imp_context *ctx, const char *function,
 {
     IMP_CHECKED(inputs_check(ctx, function, own->texture.inputs));
     for (const struct imp_input_desc *d = own->texture.inputs; d && d->name; d++)
-        if (d->flags & (IMP_INPUT_LUMINANCE | IMP_INPUT_WAVELENGTH))
-            return imp__error(
-                ctx, IMP_E_ARG, "%s: ops: input '%s': IMP_INPUT_%s in a texture",
-                function, d->name,
-                d->flags & IMP_INPUT_LUMINANCE ? "LUMINANCE" : "WAVELENGTH");
+        if (d->flags & (IMP_INPUT_LUMINANCE | IMP_INPUT_WAVELENGTH | IMP_INPUT_COMPONENT))
+            return imp__error(ctx, IMP_E_ARG,
+                              "%s: ops: input '%s': IMP_INPUT_%s in a texture", function,
+                              d->name,
+                              d->flags & IMP_INPUT_LUMINANCE    ? "LUMINANCE"
+                              : d->flags & IMP_INPUT_WAVELENGTH ? "WAVELENGTH"
+                                                                : "COMPONENT");
     return IMP_OK;
 }
 
@@ -195,6 +237,8 @@ static const struct row rows[] = {
     [IMP_CONCEPT_TEXTURE] = {ROW(texture),
                              .needs = {NEEDED(texture, eval), NEEDED(texture, scatter),
                                        NEEDED(texture, tangent)},
+                             .pair = {NEEDED(texture, slope_scatter),
+                                      NEEDED(texture, slope_tangent)},
                              .check = texture_check},
     [IMP_CONCEPT_VOLUME] = {.function = "imp_register_volume",
                             .size = sizeof(struct imp_texture_ops),

@@ -88,11 +88,12 @@ out:
 
 /* Bounds that an input sets to its texture's values also apply to those of attributes. */
 static void inputs_bound(struct imp_scene *scene, const struct imp_input *const *input,
-                         const struct imp_input_desc *desc, uint64_t fixed)
+                         const struct imp_input_desc *desc, uint64_t fixed,
+                         const char *why)
 {
     for (int j = 0; desc && desc[j].name; j++) {
         if (desc[j].flags & IMP_INPUT_FIXED || fixed >> j & 1)
-            imp__build_fix(scene, input[j]);
+            imp__build_fix(scene, input[j], why);
         const struct imp_texture *t = input[j]->texture;
         const double scale = t ? imp__attribute_scale(t) : 0;
         struct imp_input_desc d = desc[j];
@@ -117,14 +118,14 @@ enum imp_status imp__build_attributes(struct imp_scene *scene)
             IMP_TRY(link_inputs(scene, scene->textures[i]));
     for (int i = 0; i < scene->n_bsdfs; i++) {
         const struct imp_bsdf *b = scene->bsdfs[i];
-        inputs_bound(scene, b->input, b->ops->inputs, 0);
+        inputs_bound(scene, b->input, b->ops->inputs, b->fixed, b->why);
         if (b->ops->changed)
             IMP_TRY(
                 imp__build_watch(scene, b->input, b->n_in, imp__bsdf_changed, (void *)b));
     }
     for (int i = 0; i < scene->n_emitters; i++) {
         const struct imp_emitter *e = scene->emitters[i];
-        inputs_bound(scene, e->input, e->ops->inputs, e->fixed);
+        inputs_bound(scene, e->input, e->ops->inputs, e->fixed, NULL);
         if (e->ops->changed)
             IMP_TRY(imp__build_watch(scene, e->input, e->n_in, imp__emitter_changed,
                                      (void *)e));

@@ -88,6 +88,8 @@ enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
 
     struct imp_mixing *mixing;
     if (ops->build) IMP_TRY(ops->build(&build, self, b));
+    for (int j = 0; j < b->n_own; j++)
+        if (b->fixed >> j & 1) imp__build_fix(scene, b->input[j], b->why);
     IMP_TRY(imp__mixing_read(&build, &mixing));
     IMP_TRY(imp__props_finish(ctx, node));
     if (ops->changed)

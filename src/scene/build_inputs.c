@@ -200,7 +200,9 @@ static enum imp_status texture_input(struct imp_scene *scene, struct imp_node *n
         return imp__node_error(ctx, child, IMP_E_UNSUPPORTED,
                                "the slope of such a texture is not known: it raises "
                                "nothing");
-    if (d->flags & IMP_INPUT_FIXED) imp__build_fix(scene, in);
+    if (d->flags & IMP_INPUT_FIXED) imp__build_fix(scene, in, NULL);
+    else if (bump && !t->ops->slope_scatter)
+        imp__build_fix(scene, in, "the slope of such a texture has no derivative");
     imp__build_texels_bound(scene, t->param, d);
     return d->flags & IMP_INPUT_VOLUME ? volume_check(scene, child, t, d) : IMP_OK;
 }
@@ -280,7 +282,7 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
                                    struct imp_input *in)
 {
     *in = (struct imp_input){.param = -1, .scalar = d->flags & IMP_INPUT_SCALAR};
-    if (d->flags & (IMP_INPUT_LUMINANCE | IMP_INPUT_WAVELENGTH)) {
+    if (d->flags & (IMP_INPUT_LUMINANCE | IMP_INPUT_WAVELENGTH | IMP_INPUT_COMPONENT)) {
         in->count = 1;
         if (d->flags & IMP_INPUT_WAVELENGTH) in->spectrum = &imp__wavelength;
         return IMP_OK;
@@ -323,7 +325,12 @@ enum imp_status imp__build_inputs(struct imp_scene *scene, struct imp_node *node
             const int colour = count - in->luminance;
             IMP_TRY(imp__build_spectrum(scene, out[colour], desc[colour].role));
         }
-        in->plain = !in->texture && !in->luminance && !(in->scalar && in->count == 3);
+        if (d->flags & IMP_INPUT_COMPONENT) {
+            in->weight = scene->mode == IMP_MONO ? (imp_spec){1} : (imp_spec){1, 1, 1, 0};
+            in->component = count > 0 ? imp_max(out[count - 1]->component, 0) + 1 : 1;
+        }
+        in->plain = !in->texture && !in->luminance && !in->component &&
+                    !(in->scalar && in->count == 3);
         out[count++] = in;
     }
     *n = count;
@@ -331,7 +338,8 @@ out:
     return st;
 }
 
-void imp__build_fix(struct imp_scene *scene, const struct imp_input *input)
+void imp__build_fix(struct imp_scene *scene, const struct imp_input *input,
+                    const char *why)
 {
     const struct imp_texture *t = input->texture;
     const int param = t ? t->param : input->param;
@@ -339,8 +347,9 @@ void imp__build_fix(struct imp_scene *scene, const struct imp_input *input)
         struct imp_param_info *info = &scene->params[param].info;
         info->flags &= ~(unsigned)IMP_PARAM_DIFFERENTIABLE;
         info->flags |= IMP_PARAM_DISCONTINUOUS;
+        if (!info->why) info->why = why;
     }
-    for (int k = 0; t && k < t->n_in; k++) imp__build_fix(scene, t->input[k]);
+    for (int k = 0; t && k < t->n_in; k++) imp__build_fix(scene, t->input[k], why);
 }
 
 bool imp__build_shaped(const struct imp_scene *scene,

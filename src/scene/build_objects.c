@@ -85,7 +85,7 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     medium_child(node); /* walks have the place */
     if (ops->build) IMP_TRY(ops->build(&b, self, e));
     for (int j = 0; j < e->n_in; j++)
-        if (e->fixed >> j & 1) imp__build_fix(scene, e->input[j]);
+        if (e->fixed >> j & 1) imp__build_fix(scene, e->input[j], NULL);
     IMP_TRY(imp__proxies_take(scene, node, e->name));
     IMP_TRY(imp__props_finish(ctx, node));
     if (ops->changed)

@@ -28,8 +28,10 @@ struct imp_build imp__build_make(struct imp_scene *scene, struct imp_node *node)
 enum imp_status imp__build_inputs(struct imp_scene *scene, struct imp_node *node,
                                   const char *name, const struct imp_input_desc *desc,
                                   const struct imp_input **out, int *n);
-/* No gradient with respect to what the input is made of: it would be biased. */
-void imp__build_fix(struct imp_scene *scene, const struct imp_input *input);
+/* No gradient with respect to what the input is made of: it would be biased. why: as
+ * imp_param_info.why; NULL: no more is known. */
+void imp__build_fix(struct imp_scene *scene, const struct imp_input *input,
+                    const char *why);
 /* Does a scalar input differ between the lanes of walks? */
 bool imp__build_shaped(const struct imp_scene *scene,
                        const struct imp_input *const *input, int n);

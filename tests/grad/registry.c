@@ -174,7 +174,9 @@ static void inputs_make(imp_scene *s, const struct subject *q, const char *kind_
         double v[3];
         if (d->flags & IMP_INPUT_FIXED || config_has(props, d->name)) continue;
         if (is_left_out(kind_name, props, d->name)) continue;
-        if (d->flags & (IMP_INPUT_LUMINANCE | IMP_INPUT_WAVELENGTH)) continue;
+        if (d->flags & (IMP_INPUT_LUMINANCE | IMP_INPUT_WAVELENGTH | IMP_INPUT_COMPONENT))
+            continue;
+        if (d->flags & (IMP_INPUT_VECTOR | IMP_INPUT_BUMP)) continue; /* bsdf_make's */
         for (uint32_t k = 0; k < 3; k++) v[k] = random_in(d, seed, 3 * (uint32_t)j + k);
         if (strcmp(d->name, "eta") == 0 && d->flags & IMP_INPUT_NUMBER &&
             strncmp(kind_name, "principled", 10) != 0) {
@@ -222,7 +224,8 @@ static void bsdf_make(imp_scene *s, const struct subject *q,
         props_make(s, q->props);
     }
     const bool bump = strcmp(ops->name, "bumpmap") == 0;
-    if (bump || strcmp(ops->name, "normalmap") == 0) { /* it has no gradient */
+    if (bump || strcmp(ops->name, "normalmap") == 0) {
+        imp_scene_bool(s, "clamp_invalid_normals", 1);
         float pixels[27];
         for (uint32_t k = 0; k < 27; k++)
             pixels[k] =
@@ -624,10 +627,18 @@ static void check_one(const struct subject *q, const char *integrator,
     for (int j = 0; inputs && inputs[j].name; j++) {
         char part[128];
         snprintf(part, sizeof part, "subject.%s", inputs[j].name);
-        if (inputs[j].flags & (IMP_INPUT_FIXED | IMP_INPUT_WAVELENGTH) ||
+        if (inputs[j].flags &
+                (IMP_INPUT_FIXED | IMP_INPUT_WAVELENGTH | IMP_INPUT_COMPONENT) ||
             is_left_out(what, q->props, inputs[j].name))
             continue;
         if (q->bsdf && is_left_out(q->bsdf->name, q->props, inputs[j].name)) continue;
+        /* Where the nested material has no derivative with respect to directions. */
+        if (inputs[j].flags & (IMP_INPUT_VECTOR | IMP_INPUT_BUMP) &&
+            (!q->back || !q->back->eval_directions_d ||
+             strcmp(q->back->name, "plastic") == 0)) { /* or has ideal lobes */
+            tap_ok(!active_has(p, s, part), "%s: %s has no gradient", what, part);
+            continue;
+        }
         /* Its texture moves, and has no slope there. */
         if (strcmp(part, "subject.cutoff_angle") == 0 && q->texture &&
             strcmp(q->texture->name, "bitmap") != 0) {

@@ -57,6 +57,8 @@ struct imp__derivative_tally {
 };
 /* Input j as its kind declares it, children's included. */
 const struct imp_input_desc *imp__bsdf_input(const struct imp_bsdf *b, int j);
+/* Has it no gradient, by its kind or in this object? */
+bool imp__bsdf_input_fixed(const struct imp_bsdf *b, int j);
 /* Largest error of df, relative to the derivative and to what rounding of f allows a
  * difference to see. `in` is moved and put back. */
 double imp__bsdf_derivative_error(const struct imp_bsdf *b, imp_spec *in,

@@ -13,6 +13,16 @@ const struct imp_input_desc *imp__bsdf_input(const struct imp_bsdf *b, int j)
     return NULL;
 }
 
+bool imp__bsdf_input_fixed(const struct imp_bsdf *b, int j)
+{
+    const struct imp_input_desc *d = imp__bsdf_input(b, j);
+    if (d->flags & (IMP_INPUT_FIXED | IMP_INPUT_WAVELENGTH)) return true;
+    for (int k = b->n_child - 1; k >= 0; k--)
+        if (j >= b->child_in[k])
+            return imp__bsdf_input_fixed(b->child[k], j - b->child_in[k]);
+    return b->fixed >> j & 1;
+}
+
 /* Fourth-order differences of lane c, central where there is room and one-sided at a
  * bound, with steps `scale` times the usual. The base value is taken off first, so that
  * what does not move gives exactly 0. */
@@ -24,7 +34,8 @@ static double difference(const struct imp_bsdf *b, imp_spec *in, const struct im
         {-2, 1.0 / 12}, {-1, -8.0 / 12}, {1, 8.0 / 12}, {2, -1.0 / 12}};
     static const double forward[4][2] = {{1, 4}, {2, -3}, {3, 4.0 / 3}, {4, -0.25}};
     const struct imp_input_desc *desc = imp__bsdf_input(b, j);
-    const bool scalar = desc->flags & (IMP_INPUT_SCALAR | IMP_INPUT_LUMINANCE);
+    const bool scalar =
+        desc->flags & (IMP_INPUT_SCALAR | IMP_INPUT_LUMINANCE | IMP_INPUT_COMPONENT);
     const imp_spec x = in[j];
     const double lo = desc->lo, hi = desc->lo == 0 && desc->hi == 0 ? INFINITY : desc->hi;
     const double h = scale * 4e-5 * fmax(fabs(x[c]), 0.02);
@@ -58,7 +69,7 @@ double imp__bsdf_derivative_error(const struct imp_bsdf *b, imp_spec *in,
     double worst = 0;
     value(b, in, d, &f);
     for (int j = 0; j < b->n_in; j++) {
-        if (imp__bsdf_input(b, j)->flags & (IMP_INPUT_FIXED | IMP_INPUT_WAVELENGTH)) {
+        if (imp__bsdf_input_fixed(b, j)) {
             /* no gradient is offered */
             if (!imp__is_zero(df[j])) worst = INFINITY;
             continue;

@@ -133,6 +133,20 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
         for (int j = 0; j < c->n_in; j++) df[b->child_in[k] + j] *= k ? w : 1 - w;
     }
 }
+static void eval_directions_d(const struct imp_bsdf *b, const imp_spec *in,
+                              const struct imp_dirs *d, imp_spec d_wo[3],
+                              imp_spec d_wi[3])
+{
+    const double w = imp__mixing_weight(in[WEIGHT][0]);
+    imp_spec second_wo[3], second_wi[3];
+    const struct imp_bsdf *const *c = b->child;
+    c[0]->ops->eval_directions_d(c[0], in + b->child_in[0], d, d_wo, d_wi);
+    c[1]->ops->eval_directions_d(c[1], in + b->child_in[1], d, second_wo, second_wi);
+    for (int k = 0; k < 3; k++) {
+        d_wo[k] = d_wo[k] * (1 - w) + second_wo[k] * w;
+        d_wi[k] = d_wi[k] * (1 - w) + second_wi[k] * w;
+    }
+}
 static void emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                  imp_spec *e)
 {
@@ -185,4 +199,5 @@ const struct imp_bsdf_ops imp__blendbsdf = {.size = sizeof(struct imp_bsdf_ops),
                                             .eval_d = eval_d,
                                             .emit = emit,
                                             .emit_d = emit_d,
-                                            .albedo = albedo};
+                                            .albedo = albedo,
+                                            .eval_directions_d = eval_directions_d};

@@ -33,6 +33,16 @@ BSDFS(DECLARE)
 #define ADDRESS(kind) &kind,
 const struct imp_bsdf_ops *const imp__bsdf_kinds[] = {BSDFS(ADDRESS) NULL};
 
+const struct imp_bsdf *imp__bsdf_without_directions_d(const struct imp_bsdf *b)
+{
+    if (!b->ops->eval_directions_d || b->flags & IMP_BSDF_STEPS) return b;
+    for (int k = 0; k < b->n_child; k++) {
+        const struct imp_bsdf *c = imp__bsdf_without_directions_d(b->child[k]);
+        if (c) return c;
+    }
+    return NULL;
+}
+
 void imp__bsdf_albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                       imp_spec *albedo)
 {

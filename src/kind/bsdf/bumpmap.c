@@ -1,19 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * bumpmap: a material whose normal is that of a surface raised by a texture, times
- * `scale` (Blinn 1978; turned.h). The texture may be in any slot. It has no derivative,
- * for the reason given in normalmap. */
-#include "math/vec.h"
+ * `scale` (Blinn 1978; turned.h). The texture may be in any slot. */
 #include "turned.h"
 #include <string.h>
-
-enum { HEIGHT };
 
 static const struct imp_input_desc inputs[] = {
     {.name = "nested_texture",
      .role = IMP_UNBOUNDED,
-     .flags = IMP_INPUT_SCALAR | IMP_INPUT_BUMP | IMP_INPUT_FIXED | IMP_INPUT_REQUIRED,
+     .flags = IMP_INPUT_SCALAR | IMP_INPUT_BUMP | IMP_INPUT_REQUIRED,
      .unit = "1"},
+    IMP_TURNED_COMPONENT("nested_texture"),
+    IMP_TURNED_COMPONENT("nested_texture"),
+    IMP_TURNED_COMPONENT("nested_texture"),
     {0}};
 
 static enum imp_status prepare(const struct imp_build *b)
@@ -27,18 +26,13 @@ static enum imp_status prepare(const struct imp_build *b)
                                    "is a second texture; a bumpmap has one");
         texture = c;
     }
-    if (texture) texture->name = inputs[HEIGHT].name;
+    if (texture) texture->name = inputs[IMP_TURNED_VECTOR].name;
     return IMP_OK;
-}
-
-static imp_v3 normal(const imp_spec *in)
-{
-    return imp__v3(in[HEIGHT][0], in[HEIGHT][1], in[HEIGHT][2]);
 }
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_bsdf *bsdf)
 {
-    return imp__turning_build(b, self, normal, bsdf);
+    return imp__turning_build(b, self, false, bsdf);
 }
 
 const struct imp_bsdf_ops imp__bumpmap = {IMP__TURNED_OPS, .name = "bumpmap",

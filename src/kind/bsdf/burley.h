@@ -40,6 +40,32 @@ static inline struct imp__burley imp__burley(double cos_o, double cos_i, double 
                                 flat - full};
 }
 
+/* Its derivatives by the three cosines. */
+struct imp__burley_turns {
+    double by_o, by_i, by_d;
+};
+static inline struct imp__burley_turns imp__burley_turns(double cos_o, double cos_i,
+                                                         double cos_d, double roughness,
+                                                         double flatness)
+{
+    double dFo, dFi;
+    const double Fo = imp__schlick(cos_o, &dFo), Fi = imp__schlick(cos_i, &dFi);
+    const double R = 2 * roughness * cos_d * cos_d, dR = 4 * roughness * cos_d;
+    const double q_o = 1 + Fo * (0.5 * R - 1), q_i = 1 + Fi * (0.5 * R - 1);
+    const double sum = cos_o + cos_i, slab = 1 / sum - 0.5;
+    const double full_o = -0.5 * (1 - 0.5 * Fi) + R * (1 + Fi * (R - 1)),
+                 full_i = -0.5 * (1 - 0.5 * Fo) + R * (1 + Fo * (R - 1)),
+                 full_R = Fo + Fi + Fo * Fi * (2 * R - 1);
+    const double flat_o = 1.25 * (0.5 * R - 1) * q_i * slab,
+                 flat_i = 1.25 * (0.5 * R - 1) * q_o * slab,
+                 flat_R = 1.25 * slab * 0.5 * (Fo * q_i + Fi * q_o),
+                 flat_sum = -1.25 * q_o * q_i / (sum * sum);
+    return (struct imp__burley_turns){
+        (full_o + (flat_o - full_o) * flatness) * dFo + flat_sum * flatness,
+        (full_i + (flat_i - full_i) * flatness) * dFi + flat_sum * flatness,
+        (full_R + (flat_R - full_R) * flatness) * dR};
+}
+
 /* Roughness along s and t of the GGX lobe, by `roughness` and `anisotropic`. */
 struct imp__burley_facets {
     struct imp__microfacet f;

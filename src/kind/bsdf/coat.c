@@ -258,3 +258,10 @@ imp__dual imp__coat_T(const struct imp__coat *c, double mu)
     const int k = imp_min((int)x, IMP_COAT_NODES - 2);
     return c->T[k] + (c->T[k + 1] - c->T[k]) * (x - k);
 }
+
+imp__dual imp__coat_T_slope(const struct imp__coat *c, double mu)
+{
+    const double x = imp_clamp(mu, 0, 1) * (IMP_COAT_NODES - 1);
+    const int k = imp_min((int)x, IMP_COAT_NODES - 2);
+    return (c->T[k + 1] - c->T[k]) * (IMP_COAT_NODES - 1);
+}

@@ -28,6 +28,8 @@ struct imp__coat {
 void imp__coat_make(struct imp__coat *c, enum imp__distribution type, double alpha,
                     double eta);
 imp__dual imp__coat_T(const struct imp__coat *c, double mu);
+/* Its derivative by mu. */
+imp__dual imp__coat_T_slope(const struct imp__coat *c, double mu);
 
 /* The number at alpha and eta: they are those of the table, or near. */
 static inline double imp__coat_at(const struct imp__coat *c, imp__dual x, double alpha,

@@ -34,6 +34,14 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     (void)b, (void)in;
     df[RHO] = imp__spec(imp__lambert(d));
 }
+static void eval_directions_d(const struct imp_bsdf *b, const imp_spec *in,
+                              const struct imp_dirs *d, imp_spec d_wo[3],
+                              imp_spec d_wi[3])
+{
+    (void)b;
+    for (int k = 0; k < 3; k++) d_wo[k] = d_wi[k] = imp__spec(0);
+    if (imp__front(d)) d_wi[2] = in[RHO] * IMP_INV_PI;
+}
 static void albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                    imp_spec *rho)
 {
@@ -58,4 +66,5 @@ const struct imp_bsdf_ops imp__diffuse = {.size = sizeof(struct imp_bsdf_ops),
                                           .eval_d = eval_d,
                                           .albedo = albedo,
                                           .directional_albedo = directional_albedo,
-                                          .pdf_eval = pdf_eval};
+                                          .pdf_eval = pdf_eval,
+                                          .eval_directions_d = eval_directions_d};

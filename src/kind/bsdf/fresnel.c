@@ -182,3 +182,34 @@ void imp__fresnel_conductor_d(double c, const imp_spec *eta, const imp_spec *k,
         (*df_dk)[i] = dk;
     }
 }
+
+/* As in `conductor`; of what is there, dt/dc = 2 c, and eta k does not move. */
+static double conductor_by_c(double c, double eta, double k)
+{
+    const double c2 = c * c, s2 = imp_max(1 - c2, 0);
+    const double ek = eta * k, t = eta * eta - k * k - s2;
+    const double A = sqrt(t * t + 4 * ek * ek);
+    const double a = t < 0 ? ek * sqrt(2 / (A - t)) : sqrt(0.5 * (A + t));
+    const double P = A + c2, Q = 2 * a * c, U = A * c2 + s2 * s2, V = Q * s2;
+    const double s_sum = P + Q, p_sum = U + V;
+    if (!(s_sum > 0) || !(p_sum > 0)) return 0;
+    const double Rs = imp_max(P - Q, 0) / s_sum, ratio = (U - V) / p_sum;
+    const double dt = 2 * c, dA = A > 0 ? t * dt / A : 0;
+    double da = 0;
+    if (t < 0) da = -0.5 * a * (dA - dt) / (A - t);
+    else if (a > 0) da = 0.25 * (dA + dt) / a;
+    const double dP = dA + 2 * c, dQ = 2 * (da * c + a);
+    const double dU = dA * c2 + 2 * A * c - 4 * s2 * c, dV = dQ * s2 - 2 * Q * c;
+    const double dRs = 2 * (Q * dP - P * dQ) / (s_sum * s_sum);
+    const double dr = 2 * (V * dU - U * dV) / (p_sum * p_sum);
+    return 0.5 * (dRs * (1 + ratio) + Rs * dr);
+}
+
+void imp__fresnel_conductor_turned(double c, const imp_spec *eta, const imp_spec *k,
+                                   imp_spec *f, imp_spec *df_dc)
+{
+    *df_dc = imp__spec(0);
+    imp__fresnel_conductor(c, eta, k, f);
+    const int n = lanes_of(eta, k) == 3 ? 3 : 4;
+    for (int i = 0; i < n; i++) (*df_dc)[i] = conductor_by_c(c, (*eta)[i], (*k)[i]);
+}

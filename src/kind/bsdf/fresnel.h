@@ -28,5 +28,8 @@ void imp__fresnel_conductor(double c, const imp_spec *eta, const imp_spec *k,
  */
 void imp__fresnel_conductor_d(double c, const imp_spec *eta, const imp_spec *k,
                               imp_spec *f, imp_spec *df_deta, imp_spec *df_dk);
+/* With the derivative by c. */
+void imp__fresnel_conductor_turned(double c, const imp_spec *eta, const imp_spec *k,
+                                   imp_spec *f, imp_spec *df_dc);
 
 #endif

@@ -106,6 +106,19 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     }
     if (o != raw) df[OPACITY] = imp__spec(0); /* cut at 0 or 1 */
 }
+static void eval_directions_d(const struct imp_bsdf *b, const imp_spec *in,
+                              const struct imp_dirs *d, imp_spec d_wo[3],
+                              imp_spec d_wi[3])
+{
+    struct imp_dirs e;
+    const double o = imp__mixing_weight(in[OPACITY][0]);
+    const struct imp_bsdf *c = nested(b, &in, d, &e);
+    c->ops->eval_directions_d(c, in, &e, d_wo, d_wi);
+    for (int k = 0; k < 3; k++) {
+        d_wo[k] *= o;
+        d_wi[k] *= o;
+    }
+}
 static void emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                  imp_spec *e)
 {
@@ -146,4 +159,5 @@ const struct imp_bsdf_ops imp__mask = {.size = sizeof(struct imp_bsdf_ops),
                                        .eval_d = eval_d,
                                        .emit = emit,
                                        .emit_d = emit_d,
-                                       .albedo = albedo};
+                                       .albedo = albedo,
+                                       .eval_directions_d = eval_directions_d};

@@ -40,11 +40,8 @@ double imp__microfacet_d_turned(const struct imp__microfacet *f, const imp_v3 *m
     return (2 * q * dz / z - dq) / (z * z) - 4 * dz / z;
 }
 
-double imp__microfacet_g1(const struct imp__microfacet *f, const imp_v3 *v, double d[2])
+static inline double g1_of(const struct imp__microfacet *f, double t2, double *slope)
 {
-    const double z2 = (*v)[2] * (*v)[2], au = f->au, av = f->av;
-    const double x2 = (*v)[0] * (*v)[0] / z2, y2 = (*v)[1] * (*v)[1] / z2;
-    const double t2 = au * au * x2 + av * av * y2;
     double g, dg_dt2 = 0;
     if (f->type == IMP_GGX) {
         const double r = sqrt(1 + t2);
@@ -61,6 +58,20 @@ double imp__microfacet_g1(const struct imp__microfacet *f, const imp_v3 *v, doub
                      (-0.5 * a / t2);
         }
     }
+    *slope = dg_dt2;
+    return g;
+}
+double imp__microfacet_g1_of(const struct imp__microfacet *f, double t2, double *slope)
+{
+    return g1_of(f, t2, slope);
+}
+
+double imp__microfacet_g1(const struct imp__microfacet *f, const imp_v3 *v, double d[2])
+{
+    const double z2 = (*v)[2] * (*v)[2], au = f->au, av = f->av;
+    const double x2 = (*v)[0] * (*v)[0] / z2, y2 = (*v)[1] * (*v)[1] / z2;
+    double dg_dt2;
+    const double g = g1_of(f, au * au * x2 + av * av * y2, &dg_dt2);
     if (d) {
         d[0] = dg_dt2 * 2 * au * x2;
         d[1] = dg_dt2 * 2 * av * y2;

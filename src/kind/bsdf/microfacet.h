@@ -48,6 +48,19 @@ double imp__microfacet_d_turned(const struct imp__microfacet *f, const imp_v3 *m
 /* G1(v) on the side of m (v.m > 0 is the caller's business); d (may be NULL): dG1/d(au,
  * av). */
 double imp__microfacet_g1(const struct imp__microfacet *f, const imp_v3 *v, double d[2]);
+/* G1 and its slope as a function of t2 = (au^2 x^2 + av^2 y^2)/z^2. */
+double imp__microfacet_g1_of(const struct imp__microfacet *f, double t2, double *slope);
+/* G1(v), and its derivative by v. */
+double imp__microfacet_g1_turned(const struct imp__microfacet *f, const imp_v3 *v,
+                                 imp_v3 *d_v);
+/* D(h) G1(wo) G1(wi) for the half-vector h of wo and wi, and its derivatives by the two
+ * directions; c = wo.h = wi.h, of which either derivative is h/2. */
+struct imp__facet_turns {
+    imp_v3 h, by_wo, by_wi;
+    double c, DG;
+};
+struct imp__facet_turns imp__microfacet_turns(const struct imp__microfacet *f,
+                                              const imp_v3 *wo, const imp_v3 *wi);
 /* A normal for direction v (v.z > 0), and its density per steradian of normals. */
 imp_v3 imp__microfacet_sample(const struct imp__microfacet *f, const imp_v3 *v,
                               const double u[2]);

@@ -88,10 +88,29 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     if (t > 0) df[EXPONENT] = in[SPECULAR] * (s * (1 / (n + 2) + log(t)));
 }
 
+static void eval_directions_d(const struct imp_bsdf *b, const imp_spec *in,
+                              const struct imp_dirs *d, imp_spec d_wo[3],
+                              imp_spec d_wi[3])
+{
+    (void)b;
+    for (int k = 0; k < 3; k++) d_wo[k] = d_wi[k] = imp__spec(0);
+    if (!imp__front(d)) return;
+    const double n = in[EXPONENT][0], t = mirror_dot(d), s = lobe(n, t, d);
+    d_wi[2] = in[DIFFUSE] * IMP_INV_PI;
+    if (!(t > 0)) return;
+    for (int k = 0; k < 3; k++) {
+        const imp_spec by_t = in[SPECULAR] * (s * n / t * (k == 2 ? 1 : -1));
+        d_wo[k] += by_t * d->wi[k];
+        d_wi[k] += by_t * d->wo[k];
+    }
+    d_wi[2] += in[SPECULAR] * (s / d->wi[2]);
+}
+
 const struct imp_bsdf_ops imp__phong = {.size = sizeof(struct imp_bsdf_ops),
                                         .name = "phong",
                                         .inputs = inputs,
                                         .sample = sample,
                                         .eval = eval,
                                         .pdf = pdf,
-                                        .eval_d = eval_d};
+                                        .eval_d = eval_d,
+                                        .eval_directions_d = eval_directions_d};

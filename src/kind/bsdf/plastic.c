@@ -123,6 +123,25 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
               d_r * (dr_de * inv2 * T * lambert);
 }
 
+/* The smooth lobe alone: rho (1 - Fo) (1 - Fi)/eta^2 cos_i/pi. */
+static void eval_directions_d(const struct imp_bsdf *b, const imp_spec *in,
+                              const struct imp_dirs *d, imp_spec d_wo[3],
+                              imp_spec d_wi[3])
+{
+    double d_e, dFo, dFi;
+    imp_spec d_rho, d_r;
+    for (int k = 0; k < 3; k++) d_wo[k] = d_wi[k] = imp__spec(0);
+    if (!imp__front(d)) return;
+    const double eta = in[ETA][0], z = d->wi[2];
+    const double Fo = imp__fresnel_dielectric_d(d->wo[2], eta, &dFo, &d_e),
+                 Fi = imp__fresnel_dielectric_d(z, eta, &dFi, &d_e);
+    const imp_spec rho =
+        base(b->self, in, imp__fresnel_diffuse(1 / eta, &d_e), &d_rho, &d_r) *
+        (IMP_INV_PI / (eta * eta));
+    d_wo[2] = rho * (-dFo * (1 - Fi) * z);
+    d_wi[2] = rho * ((1 - Fo) * (1 - Fi - dFi * z));
+}
+
 static void albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                    imp_spec *rho)
 {
@@ -140,4 +159,5 @@ const struct imp_bsdf_ops imp__plastic = {.size = sizeof(struct imp_bsdf_ops),
                                           .eval = eval,
                                           .pdf = pdf,
                                           .eval_d = eval_d,
-                                          .albedo = albedo};
+                                          .albedo = albedo,
+                                          .eval_directions_d = eval_directions_d};

@@ -25,26 +25,14 @@
 #include "fresnel.h"
 #include "lambert.h"
 
-/* Textures may leave [0, 1]: there they are cut, and constant. */
 static bool is_number(int j) { return j >= ROUGHNESS && j != ETA; }
-static void inputs_cut(const imp_spec *in, imp_spec x[N_INPUTS])
+void imp__principled_cut(const imp_spec *in, imp_spec x[N_INPUTS])
 {
     for (int j = 0; j < N_INPUTS; j++)
         x[j] = is_number(j) ? imp__spec(imp_clamp(in[j][0], 0, 1)) : in[j];
 }
 
 /* ---- Directions and facets ------------------------------------------------------- */
-
-/* Seen from behind, z is reversed and the index inverted: below wo is always above. */
-struct look {
-    const struct imp__principled_self *p;
-    imp_v3 wo, wi, m; /* m: half-vector, upwards */
-    bool back, reflects;
-    double e, de;     /* index behind over before; d e/d(eta or specular) */
-    double n, om, im; /* |wo + e wi| with the sign that turns m up; wo.m, wi.m */
-    double metallic, trans;
-    struct imp__burley_facets facets;
-};
 
 /* 2/(1 - q) - 1 with q^2 = 0.08 specular, not below what glass must have. F begins with (eta -
  * 1)^2, hence with specular: far below any effect, the root keeps a slope. */
@@ -60,11 +48,13 @@ static double eta_of(const struct imp__principled_self *p, const imp_spec *in,
     return 2 / (1 - q) - 1;
 }
 
-static struct look look_at(const struct imp_bsdf *b, const imp_spec *in,
-                           const struct imp_dirs *d)
+struct imp__principled_look imp__principled_look(const struct imp_bsdf *b,
+                                                 const imp_spec *in,
+                                                 const struct imp_dirs *d)
 {
     const struct imp__principled_self *p = b->self;
-    struct look l = {.p = p, .wo = d->wo, .wi = d->wi, .back = d->wo[2] < 0};
+    struct imp__principled_look l = {
+        .p = p, .wo = d->wo, .wi = d->wi, .back = d->wo[2] < 0};
     l.e = eta_of(p, in, &l.de);
     if (l.back) {
         l.wo[2] = -l.wo[2];
@@ -80,8 +70,7 @@ static struct look look_at(const struct imp_bsdf *b, const imp_spec *in,
                                            d->derivative & IMP_INPUT_BIT(ANISOTROPIC));
     return l;
 }
-/* Sets the half-vector. False: structurally zero. */
-static bool half_set(struct look *l)
+bool imp__principled_half(struct imp__principled_look *l)
 {
     if (!(l->wo[2] > 0) || l->wi[2] == 0) return false;
     if ((l->back || !l->reflects) && !l->p->transmits) return false;
@@ -93,8 +82,8 @@ static bool half_set(struct look *l)
     return fabs(l->n) > 0 && l->om > 0 && (l->im > 0) == l->reflects && l->im != 0;
 }
 
-/* D1 of the clearcoat (GTR1 with A = alpha^2) and d ln D1/d gloss. */
 static double coat_alpha(const imp_spec *in) { return 0.1 - 0.099 * in[GLOSS][0]; }
+/* D1 of the clearcoat (GTR1 with A = alpha^2) and d ln D1/d gloss. */
 static double coat_d(double alpha, double z, double *d_log)
 {
     const double A = alpha * alpha, q = 1 + (A - 1) * z * z, l = log(A);
@@ -105,7 +94,7 @@ static double coat_d(double alpha, double z, double *d_log)
 /* ---- Value and derivatives ------------------------------------------------------- */
 
 /* Schlick's weight, at the angle on the side of the lower index; its derivative by e. */
-static double weight(const struct look *l, double *d_e)
+static double weight(const struct imp__principled_look *l, double *d_e)
 {
     double slope;
     *d_e = 0;
@@ -117,7 +106,8 @@ static double weight(const struct look *l, double *d_e)
     return w;
 }
 
-static void front_add(const struct look *l, const imp_spec *in, imp_spec *f, imp_spec *df)
+static void front_add(const struct imp__principled_look *l, const imp_spec *in,
+                      imp_spec *f, imp_spec *df)
 {
     const double m = l->metallic, t = l->trans, cos_i = l->wi[2];
     double W_e, F_c, F_e, slope, dlog_coat;
@@ -178,7 +168,8 @@ static void front_add(const struct look *l, const imp_spec *in, imp_spec *f, imp
 }
 
 /* Reflection from inside, and transmission either way. */
-static void glass_add(const struct look *l, const imp_spec *in, imp_spec *f, imp_spec *df)
+static void glass_add(const struct imp__principled_look *l, const imp_spec *in,
+                      imp_spec *f, imp_spec *df)
 {
     double F_c, F_e;
     const double m = l->metallic, t = l->trans;
@@ -216,9 +207,9 @@ static void lobes_add(const struct imp_bsdf *b, const imp_spec *in,
                       const struct imp_dirs *d, imp_spec *f, imp_spec *df)
 {
     imp_spec x[N_INPUTS];
-    inputs_cut(in, x);
-    struct look l = look_at(b, x, d);
-    if (d->lobe != IMP_SMOOTH || !half_set(&l)) return;
+    imp__principled_cut(in, x);
+    struct imp__principled_look l = imp__principled_look(b, x, d);
+    if (d->lobe != IMP_SMOOTH || !imp__principled_half(&l)) return;
     if (l.reflects && !l.back) front_add(&l, x, f, df);
     else glass_add(&l, x, f, df);
     for (int j = 0; df && j < N_INPUTS; j++)
@@ -252,7 +243,7 @@ static double least(uint64_t derivative, uint64_t of)
 {
     return derivative & of ? IMP_WANTED_PART : derivative ? 0.1 : 0.02;
 }
-static struct chances chances_of(const struct look *l, const imp_spec *in,
+static struct chances chances_of(const struct imp__principled_look *l, const imp_spec *in,
                                  uint64_t derivative)
 {
     double cos_t, eta_t;
@@ -275,10 +266,10 @@ static struct chances chances_of(const struct look *l, const imp_spec *in,
 static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
 {
     imp_spec x[N_INPUTS];
-    inputs_cut(in, x);
-    struct look l = look_at(b, x, d);
+    imp__principled_cut(in, x);
+    struct imp__principled_look l = imp__principled_look(b, x, d);
     double d_log;
-    if (d->lobe != IMP_SMOOTH || !half_set(&l)) return 0;
+    if (d->lobe != IMP_SMOOTH || !imp__principled_half(&l)) return 0;
     const struct chances q = chances_of(&l, x, d->derivative);
     const double p = imp__microfacet_pdf(&l.facets.f, &l.wo, &l.m);
     if (!l.reflects) return q.glass * p * l.e * l.e * -l.im / (l.n * l.n);
@@ -301,8 +292,8 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
     d->wi = imp__v3(0, 0, 1);
     d->lobe = IMP_SMOOTH;
     imp_spec x[N_INPUTS];
-    inputs_cut(in, x);
-    const struct look l = look_at(b, x, d);
+    imp__principled_cut(in, x);
+    const struct imp__principled_look l = imp__principled_look(b, x, d);
     if (!(l.wo[2] > 0) || (l.back && !l.p->transmits)) return false;
     const struct chances q = chances_of(&l, x, d->derivative);
     imp_v3 wi;
@@ -331,7 +322,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
 static double index_ratio(const struct imp_bsdf *b, const imp_spec *in,
                           const struct imp_dirs *d)
 {
-    const struct look l = look_at(b, in, d);
+    const struct imp__principled_look l = imp__principled_look(b, in, d);
     return l.reflects ? 1 : l.e;
 }
 static void albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
@@ -341,16 +332,17 @@ static void albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *w
     *rho = in[BASE];
 }
 
-const struct imp_bsdf_ops imp__principled = {.size = sizeof(struct imp_bsdf_ops),
-                                             .name = "principled",
-                                             .object_size =
-                                                 sizeof(struct imp__principled_self),
-                                             .inputs = imp__principled_inputs,
-                                             .prepare = imp__principled_prepare,
-                                             .build = imp__principled_build,
-                                             .sample = sample,
-                                             .eval = eval,
-                                             .pdf = pdf,
-                                             .index_ratio = index_ratio,
-                                             .eval_d = eval_d,
-                                             .albedo = albedo};
+const struct imp_bsdf_ops imp__principled = {
+    .size = sizeof(struct imp_bsdf_ops),
+    .name = "principled",
+    .object_size = sizeof(struct imp__principled_self),
+    .inputs = imp__principled_inputs,
+    .prepare = imp__principled_prepare,
+    .build = imp__principled_build,
+    .sample = sample,
+    .eval = eval,
+    .pdf = pdf,
+    .index_ratio = index_ratio,
+    .eval_d = eval_d,
+    .albedo = albedo,
+    .eval_directions_d = imp__principled_directions_d};

@@ -4,6 +4,7 @@
 #ifndef IMP_PRINCIPLED_H
 #define IMP_PRINCIPLED_H
 
+#include "burley.h"
 #include "kind/registry.h"
 
 enum {
@@ -27,6 +28,29 @@ enum {
 struct imp__principled_self {
     bool transmits, coated, by_eta;
 };
+
+/* Seen from behind, z is reversed and the index inverted: below wo is always above. */
+struct imp__principled_look {
+    const struct imp__principled_self *p;
+    imp_v3 wo, wi, m; /* m: half-vector, upwards */
+    bool back, reflects;
+    double e, de;     /* index behind over before; d e/d(eta or specular) */
+    double n, om, im; /* |wo + e wi| with the sign that turns m up; wo.m, wi.m */
+    double metallic, trans;
+    struct imp__burley_facets facets;
+};
+/* Textures may leave [0, 1]: there they are cut, and constant. */
+void imp__principled_cut(const imp_spec *in, imp_spec x[N_INPUTS]);
+/* in: cut. */
+struct imp__principled_look imp__principled_look(const struct imp_bsdf *b,
+                                                 const imp_spec *in,
+                                                 const struct imp_dirs *d);
+/* Sets the half-vector. False: structurally zero. */
+bool imp__principled_half(struct imp__principled_look *l);
+/* For imp_bsdf_ops. */
+void imp__principled_directions_d(const struct imp_bsdf *b, const imp_spec *in,
+                                  const struct imp_dirs *d, imp_spec d_wo[3],
+                                  imp_spec d_wi[3]);
 
 extern const struct imp_input_desc imp__principled_inputs[];
 enum imp_status imp__principled_prepare(const struct imp_build *b);

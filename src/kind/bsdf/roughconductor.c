@@ -106,6 +106,27 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     imp__roughness_d(b->self, &in[ALPHA], d_alpha, &df[ALPHA]);
 }
 
+/* f = tint F(c) DG/(4 wo_z). */
+static void eval_directions_d(const struct imp_bsdf *b, const imp_spec *in,
+                              const struct imp_dirs *d, imp_spec d_wo[3],
+                              imp_spec d_wi[3])
+{
+    for (int k = 0; k < 3; k++) d_wo[k] = d_wi[k] = imp__spec(0);
+    if (!imp__front(d)) return;
+    const struct imp__microfacet m = imp__roughness_at(b->self, &in[ALPHA]);
+    const struct imp__facet_turns x = imp__microfacet_turns(&m, &d->wo, &d->wi);
+    const double by = 1 / (4 * d->wo[2]);
+    imp_spec F, F_c;
+    imp__fresnel_conductor_turned(imp_min(x.c, 1), &in[ETA], &in[K], &F, &F_c);
+    F *= in[TINT] * by;
+    F_c *= in[TINT] * (by * 0.5 * x.DG);
+    for (int k = 0; k < 3; k++) {
+        d_wo[k] = F * x.by_wo[k] + F_c * x.h[k];
+        d_wi[k] = F * x.by_wi[k] + F_c * x.h[k];
+    }
+    d_wo[2] -= F * (x.DG / d->wo[2]);
+}
+
 const struct imp_bsdf_ops imp__roughconductor = {.size = sizeof(struct imp_bsdf_ops),
                                                  .name = "roughconductor",
                                                  .object_size =
@@ -117,4 +138,5 @@ const struct imp_bsdf_ops imp__roughconductor = {.size = sizeof(struct imp_bsdf_
                                                  .eval = eval,
                                                  .pdf = pdf,
                                                  .eval_d = eval_d,
-                                                 .pdf_eval = pdf_eval};
+                                                 .pdf_eval = pdf_eval,
+                                                 .eval_directions_d = eval_directions_d};

@@ -186,6 +186,35 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
                d_R * (R[2] * T * lambert);
 }
 
+static void eval_directions_d(const struct imp_bsdf *b, const imp_spec *in,
+                              const struct imp_dirs *d, imp_spec d_wo[3],
+                              imp_spec d_wi[3])
+{
+    imp_spec d_rho, d_R;
+    double F_c, F_e;
+    for (int k = 0; k < 3; k++) d_wo[k] = d_wi[k] = imp__spec(0);
+    if (!imp__front(d)) return;
+    const struct at a = at_inputs(b, in);
+    const struct imp__facet_turns x = imp__microfacet_turns(&a.facets, &d->wo, &d->wi);
+    const double F = imp__fresnel_dielectric_d(imp_min(x.c, 1), a.eta, &F_c, &F_e);
+    const imp_spec tint = in[TINT] * (1 / (4 * d->wo[2]));
+    for (int k = 0; k < 3; k++) {
+        d_wo[k] = tint * (F * x.by_wo[k] + 0.5 * F_c * x.h[k] * x.DG);
+        d_wi[k] = tint * (F * x.by_wi[k] + 0.5 * F_c * x.h[k] * x.DG);
+    }
+    d_wo[2] -= tint * (F * x.DG / d->wo[2]);
+
+    const double mu[2] = {d->wo[2], d->wi[2]};
+    double T[2], slope[2];
+    for (int k = 0; k < 2; k++) {
+        T[k] = number(&a, imp__coat_T(&a.p->coat, mu[k]));
+        slope[k] = number(&a, imp__coat_T_slope(&a.p->coat, mu[k]));
+    }
+    const imp_spec rho = base(&a, in, &d_rho, &d_R) * (IMP_INV_PI / (a.eta * a.eta));
+    d_wo[2] += rho * (slope[0] * T[1] * mu[1]);
+    d_wi[2] += rho * (T[0] * (slope[1] * mu[1] + T[1]));
+}
+
 static void albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                    imp_spec *rho)
 {
@@ -204,4 +233,5 @@ const struct imp_bsdf_ops imp__roughplastic = {.size = sizeof(struct imp_bsdf_op
                                                .pdf = pdf,
                                                .eval_d = eval_d,
                                                .albedo = albedo,
-                                               .changed = changed};
+                                               .changed = changed,
+                                               .eval_directions_d = eval_directions_d};

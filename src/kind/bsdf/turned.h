@@ -5,30 +5,41 @@
  *
  *     g(wi) f(wo', wi')        where wi is on the same side of n as of n', 0 elsewhere
  *
- * f includes the cosine to n'. `flip` mirrors n' about n where wo would be behind it, and
- * g is the shadowing of Estevez, Lecocq and Stein (2019),
+ * f includes the cosine to n', and g is the shadowing of Estevez, Lecocq and Stein (2019),
  *
- *     g = 2/(1 + sqrt(1 + A tan^2 wi)),    A = min(1, tan^2 n'/8) */
+ *     g = 2/(1 + sqrt(1 + A tan^2 wi)),    A = min(1, tan^2 n'/8)
+ *
+ * Where wo is behind n', `flip` mirrors n' about n, and `clamp` moves it towards wo until the
+ * cosine between them is that of IMP_TURNED_LEAST. With `clamp` the value is continuous in n',
+ * and the derivative of the value is the whole derivative of a picture; without it the value
+ * jumps where wo passes the plane of n', and the jump moves with n'. */
 #ifndef IMP_KIND_BSDF_TURNED_H
 #define IMP_KIND_BSDF_TURNED_H
 
 #include "kind/build.h"
 
-/* Normal of the nested material, in the frame of the surface, from the inputs: the only
- * thing in which kinds differ. It need not be unit. */
-typedef imp_v3 imp__turned_normal(const imp_spec *in);
+/* Inputs of such a kind: a vector and its components. */
+enum { IMP_TURNED_VECTOR, IMP_TURNED_X, IMP_TURNED_Y, IMP_TURNED_Z, IMP_TURNED_OWN };
+#define IMP_TURNED_COMPONENT(key)                                                        \
+    {                                                                                    \
+        .name = key, .role = IMP_UNBOUNDED, .flags = IMP_INPUT_COMPONENT                 \
+    }
 
-/* What an object of such a kind begins with. */
+/* With `clamp`: the least cosine of wo to n' over its length before it is unit. */
+#define IMP_TURNED_LEAST 0.01
+
+/* What an object of such a kind is. */
 struct imp__turning {
-    imp__turned_normal *normal;
-    bool flip, shadow;
+    bool
+        coded; /* components c are of a picture: n' = normalize(2 c - 1); else of n', not unit */
+    bool flip, clamp, shadow;
+    bool moves; /* n' has a derivative */
 };
-/* For imp_bsdf_ops.build: `normal`, flip_invalid_normals and use_shadowing_function; flags
- * are the nested material's. */
+/* For imp_bsdf_ops.build: switches of the scene; flags are the nested material's. */
 enum imp_status imp__turning_build(const struct imp_build *b, struct imp__turning *self,
-                                   imp__turned_normal *normal, struct imp_bsdf *bsdf);
+                                   bool coded, struct imp_bsdf *bsdf);
 
-/* The functions of a table. The inputs that turn have no derivative: 0. */
+/* The functions of a table. */
 bool imp__turned_sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
                         struct imp_dirs *d);
 void imp__turned_eval(const struct imp_bsdf *b, const imp_spec *in,
@@ -39,6 +50,9 @@ double imp__turned_index_ratio(const struct imp_bsdf *b, const imp_spec *in,
                                const struct imp_dirs *d);
 void imp__turned_eval_d(const struct imp_bsdf *b, const imp_spec *in,
                         const struct imp_dirs *d, imp_spec *df);
+void imp__turned_eval_directions_d(const struct imp_bsdf *b, const imp_spec *in,
+                                   const struct imp_dirs *d, imp_spec d_wo[3],
+                                   imp_spec d_wi[3]);
 void imp__turned_emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                       imp_spec *e);
 void imp__turned_emit_d(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
@@ -52,6 +66,7 @@ void imp__turned_albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_
     .min_children = 1, .max_children = 1, .sample = imp__turned_sample,                  \
     .eval = imp__turned_eval, .pdf = imp__turned_pdf,                                    \
     .index_ratio = imp__turned_index_ratio, .eval_d = imp__turned_eval_d,                \
-    .emit = imp__turned_emit, .emit_d = imp__turned_emit_d, .albedo = imp__turned_albedo
+    .emit = imp__turned_emit, .emit_d = imp__turned_emit_d,                              \
+    .albedo = imp__turned_albedo, .eval_directions_d = imp__turned_eval_directions_d
 
 #endif

@@ -92,6 +92,19 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     for (int j = 0; j < b->n_in; j++) df[j] = imp__spec(0);
     c->ops->eval_d(c, in + first, &e, df + first);
 }
+static void eval_directions_d(const struct imp_bsdf *b, const imp_spec *in,
+                              const struct imp_dirs *d, imp_spec d_wo[3],
+                              imp_spec d_wi[3])
+{
+    bool back;
+    int first;
+    const struct imp_bsdf *c = side(b, &d->wo, &back, &first);
+    const struct imp_dirs e = {flip(d->wo, back), flip(d->wi, back), d->lobe, 0};
+    c->ops->eval_directions_d(c, in + first, &e, d_wo, d_wi);
+    if (!back) return;
+    d_wo[2] = -d_wo[2];
+    d_wi[2] = -d_wi[2];
+}
 static void emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                  imp_spec *e)
 {
@@ -163,4 +176,5 @@ const struct imp_bsdf_ops imp__twosided = {.size = sizeof(struct imp_bsdf_ops),
                                            .sample_d = sample_d,
                                            .albedo = albedo,
                                            .directional_albedo = directional_albedo,
-                                           .pdf_eval = pdf_eval};
+                                           .pdf_eval = pdf_eval,
+                                           .eval_directions_d = eval_directions_d};

@@ -333,6 +333,59 @@ static bool slope(const struct imp_texture *tex, const struct imp_texcoord *at,
     return true;
 }
 
+/* d slope/d texel, as `slope` has it: the texels' numbers times these are d value/du', dv'. */
+static bool slope_weights(const struct bitmap *t, const struct imp_texcoord *at,
+                          struct footprint *f, double weight[2][4])
+{
+    if (t->filter != FILTER_BILINEAR) return false;
+    footprint(t, at, f);
+    const double a = f->weight[1] + f->weight[3], b = f->weight[2] + f->weight[3];
+    const double by[2][4] = {{b - 1, 1 - b, -b, b}, {a - 1, -a, 1 - a, a}};
+    const double size[2] = {t->width, t->height};
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; k < 4; k++)
+            weight[i][k] = by[0][k] * size[0] * t->to_uv.m[0][i] +
+                           by[1][k] * size[1] * t->to_uv.m[1][i];
+    return true;
+}
+
+/* Bump maps alone call it, for numbers: slopes of colours have no derivative. */
+static void slope_scatter(const struct imp_texture *tex, const struct imp_texcoord *at,
+                          bool scalar, const imp_spec bar[2], struct imp_sink *sink)
+{
+    const struct bitmap *t = tex->self;
+    struct footprint f;
+    double weight[2][4];
+    if (tex->param < 0 || !slope_weights(t, at, &f, weight)) return;
+    for (int k = 0; k < 4; k++) {
+        const imp_spec part = bar[0] * weight[0][k] + bar[1] * weight[1][k];
+        if (t->channels == 1) sink->add(sink, tex->param, f.texel[k], 1, &part);
+        else if (scalar) imp__luminance_scatter(sink, tex->param, 3 * f.texel[k], part);
+        else sink->add(sink, tex->param, 3 * f.texel[k], 3, &part);
+    }
+}
+
+static void slope_tangent(const struct imp_texture *tex, const struct imp_texcoord *at,
+                          bool scalar, imp_dot_fn *dot, const void *x_dot,
+                          imp_spec d_uv_dot[2])
+{
+    const struct bitmap *t = tex->self;
+    struct footprint f;
+    double weight[2][4];
+    d_uv_dot[0] = d_uv_dot[1] = imp__spec(0);
+    if (tex->param < 0 || !slope_weights(t, at, &f, weight)) return;
+    for (int k = 0; k < 4; k++) {
+        const size_t e = (size_t)t->channels * f.texel[k];
+        imp_spec p = imp__spec(dot(x_dot, tex->param, e));
+        if (t->channels == 3) {
+            p[1] = dot(x_dot, tex->param, e + 1);
+            p[2] = dot(x_dot, tex->param, e + 2);
+            if (scalar) p = imp__spec(imp__luminance(p[0], p[1], p[2]));
+        }
+        for (int i = 0; i < 2; i++) d_uv_dot[i] += p * weight[i][k];
+    }
+}
+
 bool imp__bitmap_cell(const struct imp_texture *tex, const struct imp_texcoord *at,
                       struct imp__cell *out)
 {
@@ -376,4 +429,6 @@ const struct imp_texture_ops imp__bitmap = {.size = sizeof(struct imp_texture_op
                                             .scatter = scatter,
                                             .tangent = tangent,
                                             .slope = slope,
-                                            .changed = changed};
+                                            .changed = changed,
+                                            .slope_scatter = slope_scatter,
+                                            .slope_tangent = slope_tangent};

@@ -140,16 +140,22 @@ static const struct imp_texcoord *site_of(const struct imp_texcoord *at,
  * place of what they had (Blinn 1978; along the normal a surface's own slopes vanish, but
  * where normals are interpolated): the normal is their cross product, on the side of the
  * geometric one. */
-static imp_spec bumped(const struct imp_input *input, const struct imp_texcoord *at)
+struct bump {
+    imp_spec normal;
+    bool raised;    /* the texture has a slope there; false: the normal is z */
+    imp_v3 d_uv[2]; /* d normal/d slope */
+};
+static struct bump bump_at(const struct imp_input *input, const struct imp_texcoord *at)
 {
     struct imp_texcoord plain = *at;
     struct imp_surface made;
     const struct imp_surface *x = at->surface;
     imp_spec slope[2];
     int prim;
+    struct bump b = {.normal = {0, 0, 1, 0}};
     plain.carried = NULL;
     if (!at->shape || !input->texture->ops->slope(input->texture, &plain, true, slope))
-        return (imp_spec){0, 0, 1, 0};
+        return b;
     if (!x) {
         at->shape->ops->place(at->shape, at->uv, &made, &prim);
         x = &made;
@@ -166,7 +172,12 @@ static imp_spec bumped(const struct imp_input *input, const struct imp_texcoord 
                              scale * slope[1][0]);
     const imp_v3 n = imp__cross(u, v);
     const imp_v3 world = x->s * n[0] + x->t * n[1] + x->n * n[2];
-    return imp__dot(world, x->ng) < 0 ? -n : n;
+    const double side = imp__dot(world, x->ng) < 0 ? -1 : 1;
+    b.raised = true;
+    b.normal = n * side;
+    b.d_uv[0] = imp__v3(-v[1], v[0], 0) * (side * scale);
+    b.d_uv[1] = imp__v3(u[1], -u[0], 0) * (side * scale);
+    return b;
 }
 
 /* ---- One input ------------------------------------------------------------------- */
@@ -175,7 +186,7 @@ static void input_eval(const struct imp_input *input, const struct imp_texcoord 
                        bool scalar, imp_spec *value)
 {
     if (imp_unlikely(input->bump)) {
-        *value = bumped(input, at);
+        *value = bump_at(input, at).normal;
     } else if (imp_unlikely(input->vector) &&
                input->texture) { /* no colour: whatever the walk carries */
         struct imp_texcoord plain = *at;
@@ -331,6 +342,74 @@ static void luminance_scatter(const struct imp_input *colour, imp_spec weight,
     }
 }
 
+/* ---- Components of vectors ------------------------------------------------------- */
+
+/* A component is a number of all lanes, and no lane of a colour: what a texel gets is the sum
+ * over the lanes, each of which belongs to its lane of the picture. bar [3]. */
+static void vector_scatter(const struct imp_input *vector, imp_spec used,
+                           const struct imp_texcoord *at, const imp_spec *bar,
+                           struct imp_sink *sink)
+{
+    const struct imp_texcoord plain = as_colour(at);
+    const int lanes = at->carried ? at->carried->n : 4;
+    /* As a colour, whose lane c is number c: where lanes are those of three colours. */
+    const bool together = !sink->apart && !at->carried && used[1] != 0;
+    imp_spec sum = {0};
+    for (int lane = 0; lane < lanes; lane++) {
+        struct one_lane one = {{one_lane_add, sink->apart}, sink, lane};
+        const imp_spec part = {bar[0][lane], bar[1][lane], bar[2][lane], 0};
+        if (!at->carried && used[lane] == 0) continue;
+        if (together) sum += part;
+        else if (part[0] != 0 || part[1] != 0 || part[2] != 0)
+            input_scatter(vector, &plain, false, &part, &one.sink);
+    }
+    if (sum[0] != 0 || sum[1] != 0 || sum[2] != 0)
+        input_scatter(vector, &plain, false, &sum, sink);
+}
+
+/* Slopes are numbers of one channel, so that lanes stay apart. */
+static void bump_scatter(const struct imp_input *bumped, const struct imp_texcoord *at,
+                         const imp_spec *bar, struct imp_sink *sink)
+{
+    const struct imp_texture *t = bumped->texture;
+    const struct imp_texcoord plain = as_colour(at);
+    const struct bump b = bump_at(bumped, at);
+    imp_spec slope_bar[2] = {{0}, {0}};
+    if (!b.raised || !t->ops->slope_scatter) return;
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; k < 3; k++) slope_bar[i] += bar[k] * b.d_uv[i][k];
+    t->ops->slope_scatter(t, &plain, true, slope_bar, sink);
+}
+
+/* bar [3]: of the components of the vector before them. */
+static void components_scatter(const struct imp_input *vector, imp_spec used,
+                               const struct imp_texcoord *at, const imp_spec *bar,
+                               struct imp_sink *sink)
+{
+    bool none = true;
+    for (int k = 0; k < 3; k++) none &= imp__is_zero_used(bar[k], at->carried);
+    if (none) return;
+    if (vector->bump) bump_scatter(vector, at, bar, sink);
+    else vector_scatter(vector, used, at, bar, sink);
+}
+
+static imp_spec vector_tangent(const struct imp_input *vector,
+                               const struct imp_texcoord *at, imp_dot_fn *dot,
+                               const void *x_dot)
+{
+    const struct imp_texcoord plain = as_colour(at);
+    imp_spec value_dot = {0}, slope_dot[2];
+    if (!vector->bump) {
+        input_tangent(vector, &plain, false, dot, x_dot, &value_dot);
+        return value_dot;
+    }
+    const struct imp_texture *t = vector->texture;
+    const struct bump b = bump_at(vector, at);
+    if (!b.raised || !t->ops->slope_tangent) return value_dot;
+    t->ops->slope_tangent(t, &plain, true, dot, x_dot, slope_dot);
+    return b.d_uv[0] * slope_dot[0][0] + b.d_uv[1] * slope_dot[1][0];
+}
+
 /* ---- All inputs of an object ----------------------------------------------------- */
 
 void imp__inputs_look_up(const struct imp_input *const *input, int n,
@@ -347,6 +426,7 @@ void imp__inputs_look_up(const struct imp_input *const *input, int n,
         else if (i->luminance)
             in[j] = imp__spec(luminance_of(input[j - i->luminance], i->weight, at,
                                            in[j - i->luminance]));
+        else if (i->component) in[j] = imp__spec(in[j - i->component][i->component - 1]);
         else input_eval(i, at, i->scalar, &in[j]);
     }
 }
@@ -364,6 +444,9 @@ void imp__inputs_give_back(const struct imp_input *const *input, int n,
             imp__plain_scatter(i, &in_bar[j], sink);
         } else if (i->luminance) {
             luminance_scatter(input[j - i->luminance], i->weight, at, &in_bar[j], sink);
+        } else if (i->component) { /* the three at once */
+            if (i->component == 3)
+                components_scatter(input[j - 3], i->weight, at, &in_bar[j - 2], sink);
         } else {
             input_scatter(i, at, i->scalar, &in_bar[j], sink);
         }
@@ -386,6 +469,10 @@ void imp__inputs_tangent(const struct imp_input *const *input, int n,
                               &colour_dot);
             }
             in_dot[j] = imp__spec(weighted(i->weight, colour_dot));
+        } else if (imp_unlikely(i->component)) { /* the three at once */
+            if (i->component != 1) continue;
+            const imp_spec v_dot = vector_tangent(input[j - 1], at, dot, x_dot);
+            for (int k = 0; k < 3; k++) in_dot[j + k] = imp__spec(v_dot[k]);
         } else input_tangent(i, at, i->scalar, dot, x_dot, &in_dot[j]);
     }
 }

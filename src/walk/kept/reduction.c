@@ -14,10 +14,12 @@ static bool free_find(const struct imp_input *const *input, int n, const uint8_t
     *any = false;
     for (int j = 0; j < n; j++) {
         const struct imp_input *i = input[j];
-        const struct imp_input *of = i->luminance ? input[j - i->luminance] : i;
+        const struct imp_input *of = i->luminance   ? input[j - i->luminance]
+                                     : i->component ? input[j - i->component]
+                                                    : i;
         out[j] = imp__input_depends(of, free);
         *any |= out[j];
-        simple &= !out[j] || !(i->luminance || i->bump || i->vector);
+        simple &= !out[j] || !(i->luminance || i->component || i->bump || i->vector);
     }
     return simple;
 }

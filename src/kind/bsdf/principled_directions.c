@@ -1,0 +1,154 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Derivatives of the principled material with respect to directions, lobe by lobe as in
+ * principled.c. On reflection om = wo.m has the derivative m/2 by either direction. */
+#include "fresnel.h"
+#include "principled.h"
+
+/* A derivative by wo and wi, as `look` has them. */
+struct turns {
+    imp_spec wo[3], wi[3];
+};
+static void add(struct turns *t, imp_spec factor, imp_v3 by_wo, imp_v3 by_wi)
+{
+    for (int k = 0; k < 3; k++) {
+        t->wo[k] += factor * by_wo[k];
+        t->wi[k] += factor * by_wi[k];
+    }
+}
+static void add_om(struct turns *t, imp_spec by_om, imp_v3 m)
+{
+    add(t, by_om, m * 0.5, m * 0.5);
+}
+
+/* Schlick's weight as principled.c has it, and its slope by om. */
+static double weight_turned(const struct imp__principled_look *l, double *d_om)
+{
+    double slope;
+    *d_om = 0;
+    if (l->e > 1) return imp__schlick(l->om, d_om);
+    const double s2 = 1 - l->om * l->om, ct2 = 1 - s2 / (l->e * l->e);
+    if (!(ct2 > 0)) return 1;
+    const double ct = sqrt(ct2), w = imp__schlick(ct, &slope);
+    *d_om = slope * l->om / (l->e * l->e * ct);
+    return w;
+}
+
+/* 0.25 clearcoat D1(m) G(wo) G(wi) cos_i (0.04 + 0.96 W), with D1 of the form c/q. */
+static void coat_turns(const struct imp__principled_look *l, const imp_spec *in, double W,
+                       double W_om, struct turns *t)
+{
+    const struct imp__microfacet quarter = {IMP_GGX, true, 0.25, 0.25, 0};
+    const double alpha = 0.1 - 0.099 * in[GLOSS][0], A = alpha * alpha, z = l->m[2];
+    const double q = 1 + (A - 1) * z * z, D = (A - 1) / (IMP_PI * log(A) * q);
+    imp_v3 dGo, dGi;
+    const double Go = imp__microfacet_g1_turned(&quarter, &l->wo, &dGo),
+                 Gi = imp__microfacet_g1_turned(&quarter, &l->wi, &dGi);
+    const double k = 0.25 * in[CLEARCOAT][0], F = 0.04 + 0.96 * W, cos_i = l->wi[2];
+    const double by_z = D * -2 * (A - 1) * z / q;
+    const imp_v3 by_sum = (imp__v3(0, 0, by_z) - l->m * (z * by_z)) * (1 / l->n);
+    add(t, imp__spec(k * F * cos_i), by_sum * (Go * Gi) + dGo * (D * Gi),
+        by_sum * (Go * Gi) + dGi * (D * Go));
+    t->wi[2] += k * F * D * Go * Gi;
+    add_om(t, imp__spec(k * D * Go * Gi * cos_i * 0.96 * W_om), l->m);
+}
+
+static void front_turns(const struct imp__principled_look *l, const imp_spec *in,
+                        struct turns *t)
+{
+    const double m = l->metallic, cos_o = l->wo[2], cos_i = l->wi[2];
+    double W_om, F_c, F_e, gloss_om;
+    const double W = weight_turned(l, &W_om),
+                 F = imp__fresnel_dielectric_d(l->om, l->e, &F_c, &F_e);
+    const double r = (l->e - 1) / (l->e + 1), R0 = r * r, st = in[SPEC_TINT][0];
+    const imp_spec one = imp__spec(1), base = in[BASE];
+    imp_spec T_base, T_lum;
+    const imp_spec tint = imp__burley_tint(&base, in[LUM][0], &T_base, &T_lum);
+    const imp_spec metal = base + (one - base) * W,
+                   dyed = tint * R0 + (one - tint * R0) * W;
+    const imp_spec Fp = metal * m + dyed * ((1 - m) * st) + (1 - m) * (1 - st) * F;
+    const imp_spec Fp_om =
+        ((one - base) * m + (one - tint * R0) * ((1 - m) * st)) * W_om +
+        (1 - m) * (1 - st) * F_c;
+
+    const struct imp__facet_turns x = imp__microfacet_turns(&l->facets.f, &l->wo, &l->wi);
+    const double c = 1 / (4 * cos_o);
+    add(t, Fp * c, x.by_wo, x.by_wi);
+    add_om(t, Fp_om * (x.DG * c), l->m);
+    t->wo[2] -= Fp * (x.DG * c / cos_o);
+
+    const struct imp__burley burley =
+        imp__burley(cos_o, cos_i, l->om, in[ROUGHNESS][0], in[FLATNESS][0]);
+    const struct imp__burley_turns by =
+        imp__burley_turns(cos_o, cos_i, l->om, in[ROUGHNESS][0], in[FLATNESS][0]);
+    const imp_spec diffuse = base * (IMP_INV_PI * (1 - m) * (1 - l->trans));
+    t->wo[2] += diffuse * (cos_i * by.by_o);
+    t->wi[2] += diffuse * (burley.value + cos_i * by.by_i);
+    add_om(t, diffuse * (cos_i * by.by_d), l->m);
+
+    const imp_spec dye = one + (tint - one) * in[SHEEN_TINT][0],
+                   sheen = dye * (in[SHEEN][0] * (1 - m));
+    t->wi[2] += sheen * imp__schlick(l->om, &gloss_om);
+    add_om(t, sheen * (cos_i * gloss_om), l->m);
+    coat_turns(l, in, W, W_om, t);
+}
+
+/* Reflection from inside. */
+static void inside_turns(const struct imp__principled_look *l, struct turns *t)
+{
+    double F_c, F_e;
+    const double F = imp__fresnel_dielectric_d(l->om, l->e, &F_c, &F_e);
+    const struct imp__facet_turns x = imp__microfacet_turns(&l->facets.f, &l->wo, &l->wi);
+    const double c = (1 - l->metallic) * l->trans / (4 * l->wo[2]);
+    add(t, imp__spec(F * c), x.by_wo, x.by_wi);
+    add_om(t, imp__spec(F_c * x.DG * c), l->m);
+    t->wo[2] -= F * x.DG * c / l->wo[2];
+}
+
+/* (1 - F) c D G, c = |om im|/(wo_z n^2): of m, om, im and n, and n m = wo + e wi. */
+static void through_turns(const struct imp__principled_look *l, const imp_spec *in,
+                          struct turns *t)
+{
+    double F_c, F_e;
+    const double F = imp__fresnel_dielectric_d(l->om, l->e, &F_c, &F_e);
+    const double c = l->om * -l->im / (l->wo[2] * l->n * l->n), S = (1 - F) * c;
+    const double S_om = S / l->om - F_c * c, S_im = S / l->im;
+    imp_v3 dGo, dGi, dlog_D = imp__v3(0, 0, 0);
+    const double D = imp__microfacet_d(&l->facets.f, &l->m, NULL);
+    const double Go = imp__microfacet_g1_turned(&l->facets.f, &l->wo, &dGo),
+                 Gi = imp__microfacet_g1_turned(&l->facets.f, &l->wi, &dGi);
+    const double DG = D * Go * Gi;
+    for (int k = 0; k < 3; k++) {
+        imp_v3 e = imp__v3(0, 0, 0);
+        e[k] = 1;
+        dlog_D[k] = imp__microfacet_d_turned(&l->facets.f, &l->m, &e);
+    }
+    const imp_v3 by_m = (dlog_D * S + l->wo * S_om + l->wi * S_im) * DG;
+    const imp_v3 by_h =
+        (by_m - l->m * imp__dot(by_m, l->m)) * (1 / l->n) - l->m * (2 * S * DG / l->n);
+    imp_spec color = imp__spec((1 - l->metallic) * l->trans);
+    for (int k = 0; k < 4; k++) color[k] *= sqrt(in[BASE][k]);
+    add(t, color, by_h + l->m * (DG * S_om) + dGo * (S * D * Gi),
+        by_h * l->e + l->m * (DG * S_im) + dGi * (S * D * Go));
+    t->wo[2] -= color * (S * DG / l->wo[2]);
+}
+
+void imp__principled_directions_d(const struct imp_bsdf *b, const imp_spec *in,
+                                  const struct imp_dirs *d, imp_spec d_wo[3],
+                                  imp_spec d_wi[3])
+{
+    imp_spec x[N_INPUTS];
+    struct turns t = {{{0}, {0}, {0}}, {{0}, {0}, {0}}};
+    imp__principled_cut(in, x);
+    struct imp__principled_look l = imp__principled_look(b, x, d);
+    if (imp__principled_half(&l)) {
+        if (!l.reflects) through_turns(&l, x, &t);
+        else if (l.back) inside_turns(&l, &t);
+        else front_turns(&l, x, &t);
+    }
+    for (int k = 0; k < 3; k++) {
+        const double side = k == 2 && l.back ? -1 : 1;
+        d_wo[k] = t.wo[k] * side;
+        d_wi[k] = t.wi[k] * side;
+    }
+}
