@@ -106,6 +106,67 @@ static void wrong_phase(void)
     imp_scene_destroy(s);
 }
 
+/* ---- What else is drawn ---------------------------------------------------------------- */
+
+/* Rows of a scene, all of them right. */
+static void right_rows(const char *file, enum imp_color_mode mode, const char *size,
+                       const char *only, int rows)
+{
+    imp_scene *s = test_scene(ctx, file, mode, size);
+    imp_problem *p = test_problem(ctx, s, "*");
+    for (uint64_t seed = 1; seed < 4; seed++) {
+        check(p, only, seed);
+        tap_ok(n.failed == 0 && n.blind == 0 && n.rows == rows,
+               "%s, %s: right # %d rows, %d fail, sees %.3g", file, only, n.rows,
+               n.failed, n.worst_sees);
+    }
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
+static bool wrong_leaves(const struct imp_emitter *e, const struct imp_ball *scene,
+                         const double u[4], struct imp_emission_sample *out)
+{
+    const bool drawn = right->sample_emission(e, scene, u, out);
+    out->pdf_p *= 1.03;
+    return drawn;
+}
+
+static void wrong_areas(void)
+{
+    imp_scene *s = test_scene(ctx, "headlamp.xml", IMP_RGB, NULL);
+    imp_problem *p = test_problem(ctx, s, "*");
+    struct imp_shape *meter = (struct imp_shape *)(uintptr_t)s->sensors[0]->shape;
+    struct imp_emitter *lamp = s->emitters[0];
+    meter->area *= 1.05;
+    check(p, "areas", 3);
+    meter->area /= 1.05;
+    tap_ok(n.failed == 1, "a meter's area times 1.05 is caught");
+    right = lamp->ops;
+    struct imp_emitter_ops wrong = *right;
+    wrong.sample_emission = wrong_leaves;
+    lamp->ops = &wrong;
+    check(p, "leaves", 3);
+    lamp->ops = right;
+    tap_ok(n.failed == 1, "points of light walks with another density are caught");
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
+/* Weights of wavelengths, by a cumulative distribution that is not what it was. */
+static void wrong_waves(void)
+{
+    imp_scene *s = test_scene(ctx, "cornell.xml", IMP_SPECTRAL, "res=16");
+    imp_problem *p = test_problem(ctx, s, "*");
+    struct imp_wavelengths *w = (struct imp_wavelengths *)(uintptr_t)s->wavelengths;
+    for (int k = 0; k < 2; k++) w[k].lo += 80; /* drawn evenly, and by importance */
+    check(p, "waves", 3);
+    for (int k = 0; k < 2; k++) w[k].lo -= 80;
+    tap_ok(n.failed == 1, "a spectrum that begins too late is caught");
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
 /* ---- Options --------------------------------------------------------------------------- */
 
 static void options(void)
@@ -137,6 +198,10 @@ int main(void)
     wrong_light("textured.xml", "width=24 height=16", 0);
     wrong_light("textured.xml", "width=24 height=16", 1);
     wrong_phase();
+    right_rows("cornell.xml", IMP_SPECTRAL, "res=16", "areas,leaves,film,waves", 4);
+    right_rows("fog.xml", IMP_RGB, "res=16", "flights,passes,areas,leaves,film", 5);
+    wrong_areas();
+    wrong_waves();
     options();
     imp_context_destroy(ctx);
     return tap_done();

@@ -15,6 +15,8 @@
 #define Z_LIMIT  4.5  /* and is wrong beyond this */
 /* Parts that fewer pairs than this have reached are not judged: their sums are not normal. */
 #define REACHED 100
+/* Nor are parts that are less than this of everything. */
+#define SMALL 1e-4
 
 struct imp__part_answer imp__compared_part(const struct imp__compared *c, int part,
                                            double slack)
@@ -24,6 +26,7 @@ struct imp__part_answer imp__compared_part(const struct imp__compared *c, int pa
                  square = c->part[part].square, n = c->n;
     if (!(n > 1) || !(drawn + claimed > 0)) return a;
     const double off = (drawn - claimed) / n, size = fmax(drawn, claimed) / n;
+    if (size * n < SMALL * fmax(c->part[0].drawn, c->part[0].claimed)) return a;
     a.drawn = drawn / n;
     a.claimed = claimed / n;
     a.se = sqrt(fmax(square / n - off * off, 0) / (n - 1));

@@ -16,4 +16,14 @@ enum imp_status imp__check_directions(struct imp__draw_list *l,
 enum imp_status imp__check_lights(struct imp__draw_list *l,
                                   const struct imp__places *places);
 
+/* Rows for every medium: flights, passes. */
+enum imp_status imp__check_flights(struct imp__draw_list *l,
+                                   const struct imp__places *places);
+/* Rows for meters and for kinds of lights: areas, leaves. */
+enum imp_status imp__check_areas(struct imp__draw_list *l,
+                                 const struct imp__places *places);
+/* Rows for what a walk begins with: film, waves. */
+enum imp_status imp__check_film(struct imp__draw_list *l,
+                                const struct imp__places *places);
+
 #endif
