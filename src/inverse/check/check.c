@@ -202,12 +202,13 @@ static enum imp_status check(imp_problem *p, const struct imp_check_options *opt
     if (c.options.sampling) {
         ended = imp__check_sampling(&c);
     } else {
-        if (!lights && wants_any(&c, "frozen,dot,euler")) ended = imp__check_frozen(&c);
+        ended = imp__check_densities(&c); /* first: all that follows rests on them */
+        if (ended == IMP_OK && !lights && wants_any(&c, "frozen,dot,euler"))
+            ended = imp__check_frozen(&c);
         if (ended == IMP_OK && wants_any(&c, "fresh,ends")) ended = imp__check_fresh(&c);
         if (ended == IMP_OK && !lights && wants_any(&c, "loss"))
             ended = imp__check_losses(&c);
         if (ended == IMP_OK && wants_any(&c, "ends")) ended = imp__check_ends(&c);
-        if (ended == IMP_OK) ended = imp__check_densities(&c);
     }
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     struct imp_check_row *kept =

@@ -27,7 +27,15 @@
 
 #define PILOTS 4  /* directions drawn for the lobes of q */
 #define LOOKED 32 /* draws that find delta lobes */
-enum { WHOLE, RATIOS, CELLS = RATIOS + 6, LOBE = CELLS + 8, UNCOVERED = LOBE + 6, VALUE };
+enum {
+    WHOLE,
+    RATIOS,
+    CELLS = RATIOS + 6,
+    LOBE = CELLS + 8,
+    UNCOVERED = LOBE + 6,
+    VALUE,
+    SAME
+};
 #define DELTAS (UNCOVERED - LOBE)
 
 /* One place, and what q is there. */
@@ -83,11 +91,18 @@ static bool work_draw(const struct at_work *w, const double u[3], struct imp_dir
         (struct imp_dirs){.wo = w->s.wo, .lobe = IMP_SMOOTH, .derivative = w->derivative};
     return imp__direction_draw(&w->s, w->b, &w->x->place->frame, u, d, &by);
 }
+/* The kernel's density as walks ask for it. */
+static double kernel_pdf(const struct at_work *w, const struct imp_dirs *d)
+{
+    imp_spec f;
+    return w->b->shaped ? w->b->ops->pdf(w->b, w->in, d)
+                        : imp__bsdf_pdf_eval(w->b, w->in, d, &f);
+}
 /* The density that is claimed; of a delta lobe its probability. */
 static double work_pdf(const struct at_work *w, struct imp_dirs *d)
 {
     double competing;
-    const double kernel = w->b->ops->pdf(w->b, w->in, d);
+    const double kernel = kernel_pdf(w, d);
     if (!(kernel > 0)) return 0; /* as the walk has it, whatever else could draw it */
     const imp_v3 world = imp__to_world(&w->x->place->frame, d->wi);
     return imp__direction_pdf(&w->s, kernel, world, IMP_DENSITY_KERNEL, d->lobe,
@@ -130,6 +145,9 @@ static void drawn_add(const struct at_work *w, const double u[3], struct imp__pa
     imp__pair_add(p, WHOLE, part, 0);
     imp__pair_add(p, ratio_part(pdf, q), part, 0);
     imp__pair_add(p, cell_part(w->x, d.wi), part, 0);
+    /* Two functions of the kind say it. */
+    const double one = kernel_pdf(w, &d), other = w->b->ops->pdf(w->b, w->in, &d);
+    imp__pair_add(p, SAME, other > 0 ? fmin(one / other, 2) : 2, 1);
 }
 
 static void claimed_add(const struct asked_kind *a, struct at_work *w, const double u[3],

@@ -16,7 +16,7 @@
 /* Parts that fewer pairs than this have reached are not judged: their sums are not normal. */
 #define REACHED 100
 /* Nor are parts that are less than this of everything. */
-#define SMALL 1e-4
+#define SMALL 1e-3
 
 struct imp__part_answer imp__compared_part(const struct imp__compared *c, int part,
                                            double slack)
@@ -64,6 +64,7 @@ static enum imp_status draw_work(size_t item, int worker, int slot, void *payloa
             c->part[k].drawn += p.drawn[k];
             c->part[k].claimed += p.claimed[k];
             c->part[k].square += imp__sqr(p.drawn[k] - p.claimed[k]);
+            c->part[k].hits += p.drawn[k] > 0;
         }
     }
     c->n = (double)(to - from);
@@ -88,6 +89,7 @@ static enum imp_status draw(const struct imp__draw_list *l,
             sum->part[k].drawn += j.item[i].part[k].drawn;
             sum->part[k].claimed += j.item[i].part[k].claimed;
             sum->part[k].square += j.item[i].part[k].square;
+            sum->part[k].hits += j.item[i].part[k].hits;
         }
     }
 out:
@@ -105,6 +107,18 @@ static int worst_part(const struct imp__compared *c, double slack)
         if (z > most) most = z, worst = k;
     }
     return worst;
+}
+
+/* What the row would see: of everything, and of the parts that are often drawn. */
+static double row_sees(const struct imp__compared *c, double slack)
+{
+    double sees = imp__compared_part(c, 0, slack).sees;
+    for (int k = 1; k < IMP_DRAW_PARTS; k++) {
+        const double part = imp__compared_part(c, k, slack).sees;
+        if (c->part[k].hits >= IMP_DRAW_OFTEN * c->n && isfinite(part))
+            sees = fmax(sees, part / IMP_DRAW_COARSE);
+    }
+    return sees;
 }
 
 /* Parts in which a density is wrong: with twice as many new pairs the same part is off
@@ -140,47 +154,62 @@ static int64_t pairs_next(const struct imp__compared *c, double sees)
     return (int64_t)(c->n * imp_clamp(more, 0.25, GROWS));
 }
 
-/* One row, in at most left_s seconds. */
-static enum imp_status row_draw(const struct imp__draw_list *l, size_t k, double left_s)
+/* A row while it draws. */
+struct drawing {
+    struct imp__compared c, again;
+    double sees, used_s;
+    int looks, part;
+    int64_t more; /* pairs of the next look */
+    bool wrong;
+};
+
+/* More looks at a row, in at most left_s seconds. */
+static enum imp_status row_draw(const struct imp__draw_list *l, size_t k, double left_s,
+                                struct drawing *d)
 {
     enum imp_status st = IMP_OK;
     struct imp__check *check = l->check;
     const struct imp__draw_row *row = &l->row[k];
     const uint64_t seed = imp__mix64(check->outer.seed ^ (0xd5a7 + 0x10000 * k));
     const double start = imp__now();
-    struct imp__compared c = {0}, again;
-    struct imp__part_answer whole = {0};
-    bool wrong = false;
-    int part = 0;
-    int64_t more = FIRST;
-    for (int look = 0; look < LOOKS && more > 0 && !wrong; look++) {
-        IMP_TRY(draw(l, row, seed, (int64_t)c.n, more, &c));
-        const int worst = worst_part(&c, row->slack);
-        if (fabs(imp__compared_part(&c, worst, row->slack).z) > Z_LOOK)
-            IMP_TRY(confirm(l, row, seed + (uint64_t)look, &c, &wrong, &part, &again));
-        whole = imp__compared_part(&c, 0, row->slack);
-        more = pairs_next(&c, whole.sees);
+    while (d->looks < LOOKS && d->more > 0 && !d->wrong) {
         const double used = imp__now() - start;
-        bool over = used * (1 + (double)more / c.n) > left_s;
+        const double all = d->used_s + used; /* of what has been drawn */
+        bool over = d->looks > 0 && used + all * (double)d->more / d->c.n > left_s;
         IMP_TRY(imp__team_any(check->ctx, over, &over));
-        if (over) more = 0;
+        if (over) break;
+        IMP_TRY(draw(l, row, seed, (int64_t)d->c.n, d->more, &d->c));
+        const int worst = worst_part(&d->c, row->slack);
+        if (fabs(imp__compared_part(&d->c, worst, row->slack).z) > Z_LOOK)
+            IMP_TRY(confirm(l, row, seed + (uint64_t)d->looks, &d->c, &d->wrong, &d->part,
+                            &d->again));
+        d->looks++;
+        d->sees = row_sees(&d->c, row->slack);
+        d->more = pairs_next(&d->c, d->sees);
         IMP_TRY(imp__check_progress(check, 0));
     }
+    d->used_s += imp__now() - start;
+out:
+    return st;
+}
+
+static enum imp_status row_report(const struct imp__draw_list *l, size_t k,
+                                  const struct drawing *d)
+{
+    const struct imp__draw_row *row = &l->row[k];
     const struct imp__part_answer a =
-        wrong ? imp__compared_part(&again, part, row->slack) : whole;
+        imp__compared_part(d->wrong ? &d->again : &d->c, d->part, row->slack);
     const struct imp_check_row out = {.value = a.drawn,
                                       .reference = a.claimed,
                                       .se = a.se,
                                       .error = fabs(a.z),
                                       .limit = Z_LIMIT,
-                                      .sees = isfinite(whole.sees) ? whole.sees : 1,
-                                      .ok = wrong ? IMP_VERDICT_WRONG
-                                            : whole.sees <= IMP_DRAW_WANTED
+                                      .sees = isfinite(d->sees) ? d->sees : 1,
+                                      .ok = d->wrong ? IMP_VERDICT_WRONG
+                                            : d->sees <= IMP_DRAW_WANTED
                                                 ? IMP_VERDICT_RIGHT
                                                 : IMP_VERDICT_OPEN};
-    st = imp__check_row(check, row->method, row->name, -1, &out);
-out:
-    return st;
+    return imp__check_row(l->check, row->method, row->name, -1, &out);
 }
 
 enum imp_status imp__draw_add(struct imp__draw_list *l, const struct imp__draw_row *row)
@@ -194,15 +223,34 @@ enum imp_status imp__draw_add(struct imp__draw_list *l, const struct imp__draw_r
     return IMP_OK;
 }
 
-/* What a row leaves of its share, those behind it have. */
+static bool unfinished(const struct drawing *d)
+{
+    return d->more > 0 && d->looks < LOOKS && !d->wrong;
+}
+
+/* Each row first has its share of the time; what rows have left, the unfinished ones share
+ * then. */
 enum imp_status imp__draw_all(struct imp__draw_list *l)
 {
     enum imp_status st = IMP_OK;
-    const double start = imp__now();
-    for (size_t k = 0; k < l->n; k++) {
-        const double left = l->check->options.draws_s - (imp__now() - start);
-        IMP_TRY(row_draw(l, k, fmax(left, 0) / (double)(l->n - k)));
+    const double start = imp__now(), all = l->check->options.draws_s;
+    struct drawing *d = imp__alloc(l->check->ctx, l->n + 1, sizeof *d);
+    if (!d) return imp__error(l->check->ctx, IMP_E_NOMEM, "no memory for a check");
+    for (size_t k = 0; k < l->n; k++)
+        d[k] = (struct drawing){.sees = INFINITY, .more = FIRST};
+    for (int turn = 0; turn < 2; turn++) {
+        size_t left = 0;
+        for (size_t k = 0; k < l->n; k++) left += unfinished(&d[k]);
+        for (size_t k = 0; k < l->n; k++) {
+            if (!unfinished(&d[k])) continue;
+            const double rest = fmax(all - (imp__now() - start), 0);
+            IMP_TRY(row_draw(l, k, turn == 0 ? all / (double)l->n : rest / (double)left,
+                             &d[k]));
+            left--;
+        }
     }
+    for (size_t k = 0; k < l->n; k++) IMP_TRY(row_report(l, k, &d[k]));
 out:
+    imp__release(l->check->ctx, d);
     return st;
 }

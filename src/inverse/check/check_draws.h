@@ -20,14 +20,18 @@
 /* A bias of this many standard errors is seen: the limit of the first look is 3.5, so that 96
  * of 100 such biases pass it. */
 #define IMP_DRAW_SEEN 5.3
-/* The relative bias that rows want to see. */
+/* The relative bias that rows want to see, of everything; and that of a part into which this
+ * share of the draws falls, such as a sun in a sky, over that of everything. */
 #define IMP_DRAW_WANTED 0.02
+#define IMP_DRAW_OFTEN  0.2
+#define IMP_DRAW_COARSE 5
 
 struct imp__compared {
     double n; /* pairs */
     struct {
         double drawn, claimed; /* sums */
         double square;         /* of (drawn - claimed) of a pair */
+        double hits;           /* pairs whose draw fell into the part */
     } part[IMP_DRAW_PARTS];
 };
 
