@@ -13,6 +13,8 @@
 
 static struct {
     int paths, fresh_spp, sampling;
+    double draws_s;
+    const char *only;
 } o;
 
 static const struct arg_option options[] = {
@@ -20,6 +22,11 @@ static const struct arg_option options[] = {
      NULL},
     {ARG_INT, 0, "fresh-spp", "N", "samples per pixel of fresh-seed differences",
      &o.fresh_spp, 1, 1e9, NULL},
+    {ARG_NUMBER, 0, "draws-time", "S",
+     "seconds for rows that compare draws with densities (default 20)", &o.draws_s, 1e-3,
+     1e9, NULL},
+    {ARG_TEXT, 0, "only", "ROWS", "rows of these methods alone: frozen,fresh,...",
+     &o.only, 0, 0, NULL},
     {ARG_FLAG, 0, "verify-sampling", NULL,
      "compare the picture with one of uniform directions, in place of gradients",
      &o.sampling, 0, 0, NULL},
@@ -52,6 +59,8 @@ static int run_check(int n, char **operand)
     check.paths = o.paths;
     check.fresh_spp = o.fresh_spp;
     check.sampling = o.sampling;
+    check.only = o.only;
+    check.draws_s = o.draws_s;
     const enum imp_status st = imp_check(problem, &check, &run, &rows, &n_rows);
     if (cli_failed(st)) {
         rc = cli_fail(st, cli.scene_path);
@@ -66,7 +75,7 @@ static int run_check(int n, char **operand)
             print_json(&run, taken, rows, n_rows);
         cli_say("%zu check%s, %zu failed, %zu too noisy to tell%s", n_rows,
                 plural((long long)n_rows), failed, noisy,
-                noisy ? " (more --fresh-spp)" : "");
+                noisy ? " (more --fresh-spp or --draws-time)" : "");
         rc = cli_done();
         if (!rc && failed) rc = EXIT_NO;
     }

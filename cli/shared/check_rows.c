@@ -21,17 +21,18 @@ void check_rows_print(const struct imp_check_row *rows, size_t n)
         const char *param = IMP_ROW(imp_check_row, rows, i)->param;
         if (param && (int)strlen(param) > width) width = (int)strlen(param);
     }
-    printf("%-7s %-*s %-8s %-15s %-15s %-9s %-9s %s\n", "method", width, "parameter",
+    printf("%-10s %-*s %-8s %-15s %-15s %-9s %-9s %s\n", "method", width, "parameter",
            "step", "value", "reference", "se", "error", "verdict");
     for (size_t i = 0; i < n; i++) {
         const struct imp_check_row *r = IMP_ROW(imp_check_row, rows, i);
         char step[16] = "", se[16] = "";
         if (r->step > 0) snprintf(step, sizeof step, "%.0e", r->step);
         if (r->se > 0) snprintf(se, sizeof se, "%.1e", r->se);
-        printf("%-7s %-*s %-8s %-15.8g %-15.8g %-9s %s%-9.2g %s", r->method, width,
+        printf("%-10s %-*s %-8s %-15.8g %-15.8g %-9s %s%-9.2g %s", r->method, width,
                r->param ? r->param : "", step, r->value, r->reference, se,
                r->se > 0 ? "z " : "", r->error, verdict(r));
         if (r->kinks > 0) printf(" (%d walk%s)", r->kinks, plural(r->kinks));
+        if (r->sees > 0 && r->ok != 0) printf(" (sees %.2g %%)", 100 * r->sees);
         printf("\n");
     }
 }
@@ -53,6 +54,7 @@ void check_rows_json(struct json *j, const struct imp_check_row *rows, size_t n)
         json_bool(j, "ok", r->ok != 0);
         json_bool(j, "resolved", r->ok >= 0);
         json_integer(j, "kinks", r->kinks);
+        json_number(j, "sees", r->sees);
         json_end_object(j);
     }
     json_end_array(j);

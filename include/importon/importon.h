@@ -1354,8 +1354,9 @@ enum imp_verdict {
 /** One line of a gradient check: a method, a parameter, two numbers that must agree. */
 struct imp_check_row {
     size_t size;
-    const char *method; /**< "frozen", "fresh", "dot", "euler", "density", "loss", "ends";
-                             "uniform", "energy", "aim" (imp_check_options.sampling) */
+    const char *method; /**< "frozen", "fresh", "dot", "euler", "loss", "ends"; "uniform",
+                             "energy", "aim" (imp_check_options.sampling); rows that
+                             compare draws with a density (docs/estimators.md 13 H) */
     const char *param;
     double step;                 /**< of a difference; 0: none */
     double value, reference, se; /**< se of the difference; 0: deterministic */
@@ -1363,6 +1364,10 @@ struct imp_check_row {
     double limit; /**< of error; 0: a row for information (a step that is not the best) */
     enum imp_verdict ok; /**< they agree; they do not; too noisy to decide */
     int kinks;           /**< frozen walks at a kink that agree with one of its sides */
+    double sees; /**< of a row that compares draws with a density: the smallest relative
+                      error of the density that it would have found, with a probability of
+                      0.9. Above 0.02 such a row does not decide, unless it fails. 0: of
+                      other rows */
 };
 struct imp_check_options {
     size_t size;
@@ -1376,6 +1381,13 @@ struct imp_check_options {
      * of each light and proxy, where there are several, 16 at most. Rows "aim": the part
      * of the directions towards a proxy in which anything lies. */
     bool sampling;
+    /** The methods that are wanted, separated by commas: "frozen,directions"; NULL: all.
+     * What no wanted row needs is not computed. */
+    const char *only;
+    /** Seconds that all rows together may take that compare draws with a density, before
+     * those that fail are confirmed; 0: 20. A row ends when it sees an error of 2 %
+     * (imp_check_row.sees), so that its numbers depend on the clock only where it does not. */
+    double draws_s;
 };
 #define IMP_CHECK_OPTIONS_INIT IMP_INIT_ZERO(struct imp_check_options)
 /** Check the gradients of all active parameters (docs: gradient checks). Rows belong to

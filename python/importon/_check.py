@@ -47,15 +47,19 @@ class CheckRow(Row):
         1: they agree; 0: they do not; -1: too noisy to tell.
     kinks : int
         Frozen walks that stand on a kink, and agree with one of its sides.
+    sees : float
+        Of a row that compares draws with a density: the smallest relative error of the density
+        that it would have found; 0: of other rows.
     verdict : str
         "ok", "FAIL" or "noisy".
     """
 
-    FIELDS = ("method", "param", "step", "value", "reference", "se", "error", "limit", "ok", "kinks")
+    FIELDS = ("method", "param", "step", "value", "reference", "se", "error", "limit", "ok", "kinks", "sees")
     method: str
     param: str
     step: float
     kinks: int
+    sees: float
 
     @property
     def verdict(self) -> str:
@@ -154,7 +158,7 @@ def check_rows(address: Optional[int], n: int, struct: Any = _c.imp_check_row, r
 
 def check(scene: Scene, params: Any = None, target: Any = None, *, spp: int = 0, seed: int = 0, sensor: Any = 0,
           loss: str = "l2", epsilon: float = 0, paths: int = 0, fresh_spp: int = 0, sampling: bool = False,
-          drop_budget: float = 0, wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene",
+          only: Any = None, draws_time: float = 0, drop_budget: float = 0, wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene",
           progress: Any = None) -> Check:
     """Check gradients: each walk against differences with its decisions frozen, pictures
     against differences with fresh random numbers, forward against reverse, densities
@@ -178,6 +182,10 @@ def check(scene: Scene, params: Any = None, target: Any = None, *, spp: int = 0,
         drawn uniformly and whose lights are met by chance, in blocks of 8 x 8 pixels
         ("uniform"); the part of the light that each density brought ("energy"); the part of
         the directions towards a proxy in which anything lies ("aim").
+    only : str or list of str, optional
+        Methods of the rows that are wanted, as "frozen" or ["fresh", "directions"]; None: all.
+    draws_time : float
+        Seconds that all rows together may take that compare draws with densities; 0: 20.
 
     Returns
     -------
@@ -196,7 +204,9 @@ def check(scene: Scene, params: Any = None, target: Any = None, *, spp: int = 0,
         if target is not None:
             p.add_targets(target, sensor=sensor, loss=loss, epsilon=epsilon)
         wanted = make(_c.imp_check_options, paths=integer(paths, "paths"), fresh_spp=integer(fresh_spp, "fresh_spp"),
-                      sampling=bool(sampling))
+                      sampling=bool(sampling), draws_s=float(draws_time))
+        if only is not None:
+            wanted.only = (only if isinstance(only, str) else ",".join(only)).encode()
         rows, n = ctypes.c_void_p(), ctypes.c_size_t()
         p.run(options, progress, lib.imp_check, p.pointer, ctypes.byref(wanted), ctypes.byref(options),
               ctypes.byref(rows), ctypes.byref(n))

@@ -69,7 +69,7 @@ static double aimed_pdf(const imp_scene *s, int group, const double sum[2], imp_
 }
 
 /* With q uniform over the sphere, E_p[q/(q + p')] = E_q[p'/(q + p')] if p' is the density
- * that is drawn with (src/inverse/check/check_density.c). */
+ * that is drawn with (src/inverse/check/check_directions.c). */
 static void density(const imp_scene *s, int group, imp_v3 from, const char *where)
 {
     const struct imp_aims *a = &s->aims;

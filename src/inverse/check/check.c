@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * imp_check: options, the order of its checks, rows of the answer, progress. */
-#include "check.h"
 #include "base/team.h"
+#include "check_sources.h"
 #include "inverse/estimate/problem_tracer.h"
 #include "walk/rules/features.h"
 #include "walk/run/run.h"
@@ -10,11 +10,64 @@
 #include <stdio.h>
 #include <string.h>
 
+/* ---- Which rows are wanted --------------------------------------------------------- */
+
+#define DRAWS_S 20 /* default of imp_check_options.draws_s */
+
+static const char *const methods[] = {
+    "frozen",  "dot",    "euler", "fresh",      "loss",    "ends",
+    "uniform", "energy", "aim",   "directions", "choices", "points",
+    "flights", "passes", "areas", "leaves",     "film",    "waves"};
+
+/* Is `word` [n] one of the comma-separated words of `list`? */
+static bool listed(const char *list, const char *word, size_t n)
+{
+    for (const char *at = list; *at;) {
+        const size_t length = strcspn(at, ",");
+        if (length == n && memcmp(at, word, n) == 0) return true;
+        at += length + (at[length] == ',');
+    }
+    return false;
+}
+
+bool imp__check_wants(const struct imp__check *c, const char *method)
+{
+    return !c->options.only || listed(c->options.only, method, strlen(method));
+}
+
+static bool wants_any(const struct imp__check *c, const char *list)
+{
+    for (const char *at = list; *at;) {
+        const size_t n = strcspn(at, ",");
+        if (!c->options.only || listed(c->options.only, at, n)) return true;
+        at += n + (at[n] == ',');
+    }
+    return false;
+}
+
+static enum imp_status only_verify(const struct imp__check *c)
+{
+    for (const char *at = c->options.only; at && *at;) {
+        const size_t n = strcspn(at, ",");
+        bool known = false;
+        for (size_t k = 0; k < imp_count(methods); k++)
+            known |= strlen(methods[k]) == n && memcmp(methods[k], at, n) == 0;
+        if (!known)
+            return imp__error(c->ctx, IMP_E_ARG, "no rows of a check are called '%.*s'",
+                              (int)n, at);
+        at += n + (at[n] == ',');
+    }
+    return IMP_OK;
+}
+
+/* ---- Rows ---------------------------------------------------------------------------- */
+
 enum imp_status imp__check_row(struct imp__check *c, const char *method,
                                const char *param, int64_t element,
                                const struct imp_check_row *row)
 {
     char name[512];
+    if (!imp__check_wants(c, method)) return IMP_OK;
     struct imp_check_row *grown =
         imp__grow(c->ctx, c->rows, &c->cap_rows, c->n_rows + 1, sizeof *grown);
     if (grown) c->rows = grown;
@@ -80,6 +133,28 @@ static int inner_progress(const struct imp_progress *p, void *payload)
     return report(c, (c->done + p->fraction) / fmax(c->total, 1));
 }
 
+enum imp_status imp__check_densities(struct imp__check *c)
+{
+    enum imp_status st = IMP_OK;
+    struct imp__draw_list l = {.check = c};
+    struct imp__places places = {.check = c};
+    if (!wants_any(c, "directions,choices,points,flights,passes,areas,leaves,film,waves"))
+        return IMP_OK;
+    imp__arena_init(&l.arena, c->ctx);
+    IMP_TRY(imp__places_find(&places));
+    IMP_TRY(imp__check_directions(&l, &places));
+    IMP_TRY(imp__check_lights(&l, &places));
+    IMP_TRY(imp__check_flights(&l, &places));
+    IMP_TRY(imp__check_areas(&l, &places));
+    IMP_TRY(imp__check_film(&l, &places));
+    IMP_TRY(imp__draw_all(&l));
+out:
+    imp__places_destroy(&places);
+    imp__arena_free(&l.arena);
+    imp__release(c->ctx, l.row);
+    return st;
+}
+
 static enum imp_status check(imp_problem *p, const struct imp_check_options *options,
                              const struct imp_run *run, const struct imp_check_row **rows,
                              size_t *n_rows)
@@ -104,7 +179,11 @@ static enum imp_status check(imp_problem *p, const struct imp_check_options *opt
             imp__error(p->ctx, IMP_E_ARG, "nothing to check: no parameter is active"));
     if (c.options.paths < 0 || c.options.fresh_spp < 0)
         IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "paths and fresh_spp must be >= 0"));
+    if (!(c.options.draws_s >= 0) || isinf(c.options.draws_s))
+        IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "draws_s must be finite and >= 0"));
+    IMP_TRY(only_verify(&c));
     if (c.options.paths == 0) c.options.paths = 1000;
+    if (c.options.draws_s == 0) c.options.draws_s = DRAWS_S;
     c.outer.points = IMP_POINTS_INDEPENDENT; /* samples are compared one by one */
     c.run = c.outer;
     c.run.time_limit_s = 0;
@@ -123,10 +202,13 @@ static enum imp_status check(imp_problem *p, const struct imp_check_options *opt
     if (c.options.sampling) {
         ended = imp__check_sampling(&c);
     } else {
-        if (!lights) ended = imp__check_frozen(&c);
-        if (ended == IMP_OK) ended = imp__check_fresh(&c);
-        if (ended == IMP_OK && !lights) ended = imp__check_losses(&c);
-        if (ended == IMP_OK) ended = imp__check_ends(&c);
+        ended = imp__check_densities(&c); /* first: all that follows rests on them */
+        if (ended == IMP_OK && !lights && wants_any(&c, "frozen,dot,euler"))
+            ended = imp__check_frozen(&c);
+        if (ended == IMP_OK && wants_any(&c, "fresh,ends")) ended = imp__check_fresh(&c);
+        if (ended == IMP_OK && !lights && wants_any(&c, "loss"))
+            ended = imp__check_losses(&c);
+        if (ended == IMP_OK && wants_any(&c, "ends")) ended = imp__check_ends(&c);
     }
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     struct imp_check_row *kept =

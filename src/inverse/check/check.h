@@ -35,6 +35,8 @@ struct imp__check {
 enum imp_status imp__check_row(struct imp__check *c, const char *method,
                                const char *param, int64_t element,
                                const struct imp_check_row *row);
+/* Does the caller want rows of this method? */
+bool imp__check_wants(const struct imp__check *c, const char *method);
 /* `work` more pieces are done; IMP_CANCELLED if the caller wants to stop. */
 enum imp_status imp__check_progress(struct imp__check *c, double work);
 
@@ -51,6 +53,7 @@ enum imp_status imp__check_frozen(struct imp__check *c); /* frozen, dot, euler *
 enum imp_status imp__check_fresh(struct imp__check *c);
 enum imp_status imp__check_losses(struct imp__check *c);
 enum imp_status imp__check_ends(struct imp__check *c);
+enum imp_status imp__check_densities(struct imp__check *c);
 enum imp_status imp__check_sampling(struct imp__check *c); /* uniform, energy, aim */
 enum imp_status imp__check_aims(struct imp__check *c, const struct imp_tracer *tracer);
 

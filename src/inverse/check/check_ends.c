@@ -10,6 +10,7 @@
  * fresh picture, has their values and, from the spread of walks, their errors. From the
  * sensor the derivatives are those of the fresh rows, where the check's own walks begin
  * there. */
+#include "base/team.h"
 #include "check_difference.h"
 #include "inverse/estimate/problem_tracer.h"
 #include "inverse/gradient/light_gradient.h"
@@ -254,6 +255,54 @@ static struct imp_check_row judged_row(const struct ends *e, size_t k)
                   e->sensor[k]);
 }
 
+/* Relative error that both ends together should have of the reading, so that a bias of 5 %
+ * of what they do not share is seen; the part of the time of rows that draw (draws_s) that a
+ * measurement for it may take; factors of the walks that are tried. */
+#define WANTED 0.01
+#define PART   0.25
+#define MORE   4
+#define MOST   64
+
+/* The reading from the sensor, by `times` as many samples. */
+static enum imp_status reading_measure(struct ends *e, int times)
+{
+    enum imp_status st = IMP_OK;
+    struct imp__check *c = e->check;
+    const struct imp_run run = c->run;
+    const struct imp_tracer own = c->tracer;
+    const int more = e->fresh.more;
+    c->run.from = IMP_FROM_SENSOR;
+    e->fresh.more = more * times;
+    IMP_TRY(imp__problem_tracer_of_any_end(c->problem, &c->run, NULL, &c->tracer));
+    IMP_TRY(imp__fresh_value(&e->fresh, &e->sensor[0]));
+out:
+    e->fresh.more = more;
+    c->run = run;
+    c->tracer = own;
+    return st;
+}
+
+/* More walks from both ends; used_s: seconds of the first measurement. */
+static enum imp_status reading_refine(struct ends *e, double used_s)
+{
+    enum imp_status st = IMP_OK;
+    struct imp__check *c = e->check;
+    for (int times = MORE; times <= MOST; times *= MORE) {
+        const struct imp_check_row row = judged_row(e, 0);
+        const double size = fmax(fabs(row.value), fabs(row.reference));
+        bool enough =
+            !(row.se > WANTED * size) || used_s * MORE > PART * c->options.draws_s;
+        IMP_TRY(imp__team_any(c->ctx, enough, &enough));
+        if (enough) return IMP_OK;
+        const double start = imp__now();
+        IMP_TRY(reading_measure(e, times));
+        IMP_TRY(lights_measure(e, times));
+        used_s = imp__now() - start;
+    }
+out:
+    return st;
+}
+
 enum imp_status imp__check_ends(struct imp__check *c)
 {
     enum imp_status st = IMP_OK;
@@ -270,8 +319,10 @@ enum imp_status imp__check_ends(struct imp__check *c)
         if (p->active.base[k] >= 0 && p->scene->params[k].info.count > IMP_CHECK_SINGLY)
             imp__check_direction(&p->scene->params[k], e.weight + p->active.base[k]);
     IMP_TRY(imp__fresh_begin(&e.fresh, c));
+    const double start = imp__now();
     IMP_TRY(sensor_measure(&e));
     IMP_TRY(lights_measure(&e, 1));
+    IMP_TRY(reading_refine(&e, imp__now() - start));
     for (size_t k = 0; k < e.n; k++)
         if (judged_row(&e, k).ok == 0) {
             IMP_TRY(lights_measure(&e, AGAIN));

@@ -364,7 +364,6 @@ enum imp_status imp__check_frozen(struct imp__check *c)
             IMP_TRY(imp__check_progress(c, 0));
         }
     IMP_TRY(imp__check_identities(&k));
-    IMP_TRY(imp__check_density(&k));
 out:
     c->tracer.collisions_fixed = false;
     imp__kept_destroy(&k);

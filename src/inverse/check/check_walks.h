@@ -56,7 +56,5 @@ void imp__kept_destroy(struct imp__kept *k);
 
 /* check_identities.c: dot and euler rows. */
 enum imp_status imp__check_identities(struct imp__kept *k);
-/* check_density.c: a row for every material that the walks met. */
-enum imp_status imp__check_density(struct imp__kept *k);
 
 #endif

@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A second density of directions, which can be drawn, and is known in closed form: uniform, and
+ * lobes about axes where the density under test may have peaks, each in five widths from a
+ * half sphere to half a degree (von Mises and Fisher's density). */
+#ifndef IMP_INVERSE_CHECK_LOBES_H
+#define IMP_INVERSE_CHECK_LOBES_H
+
+#include "math/vec.h"
+
+#define IMP_LOBE_AXES 8
+struct imp__lobes {
+    int n;
+    imp_v3 axis[IMP_LOBE_AXES];
+};
+/* An axis more, while there is room. */
+void imp__lobes_add(struct imp__lobes *q, imp_v3 axis);
+/* Per steradian, over the whole sphere. */
+double imp__lobes_pdf(const struct imp__lobes *q, imp_v3 w);
+imp_v3 imp__lobes_sample(const struct imp__lobes *q, const double u[3]);
+
+#endif
