@@ -15,7 +15,7 @@ import subprocess
 import sys
 
 # From the ground up.
-ROOMS = "base math color kind scene search bend elements walk film inverse format render report"
+ROOMS = "base math color kind scene move search bend elements walk film inverse format render report"
 INSIDE = {
     "src/walk": "core media graded path lights both kept rules run",
     "src/inverse": "problem estimate gradient gauss fit check design",
