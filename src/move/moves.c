@@ -16,9 +16,8 @@ void imp__moves_free(struct imp__moves *moves)
     *moves = (struct imp__moves){0};
 }
 
-/* Where the rays through two corners of the film are nearest to each other. False: they do not
- * meet, as those of a lens with an aperture or of parallel light. */
-static bool camera_centre(const struct imp_sensor *s, imp_v3 *centre)
+/* By the rays through two corners of the film, and one through another point of the lens. */
+bool imp__camera_centre(const struct imp_sensor *s, imp_v3 *centre)
 {
     const double w = s->film.width, h = s->film.height, lens[2] = {0.3, 0.8};
     struct imp_sensor_ray a, b;
@@ -45,7 +44,7 @@ enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kin
     imp_context *ctx = moves->scene->ctx;
     struct imp__mover m = {.kind = kind, .shape = shape, .first = moves->n};
     if (shape == IMP_MOVE_CAMERA) {
-        if (kind != IMP_MOVE_POSE || !camera_centre(moves->sensor, &m.centre))
+        if (kind != IMP_MOVE_POSE || !imp__camera_centre(moves->sensor, &m.centre))
             return imp__error(ctx, IMP_E_UNSUPPORTED,
                               "sensor '%s': its rays meet in no point, and it has no "
                               "derivative by its pose",

@@ -8,6 +8,7 @@
 #include "math/rng.h"
 #include "math/warp.h"
 #include "move/edges.h"
+#include "moves_kit.h"
 #include <stdarg.h>
 
 static imp_context *ctx;
@@ -40,65 +41,11 @@ static imp_scene *scene_of(const char *format, ...)
 
 /* ---- Velocities against differences ---------------------------------------------------- */
 
-typedef long double real;
-struct triangle {
-    real p[3][3];
-};
-
-/* Rodrigues about the centre, then the scale, then the translation; vertices on top. */
-static void triangle_move(const struct imp__moves *m, int shape, const uint32_t *index,
-                          const double *theta, real h, struct triangle *t)
-{
-    for (int k = 0; k < m->n_movers; k++) {
-        const struct imp__mover *x = &m->mover[k];
-        if (x->shape != shape) continue;
-        const double *n = theta + x->first;
-        for (int c = 0; c < 3; c++) {
-            real *p = t->p[c], r[3], out[3];
-            for (int i = 0; i < 3; i++) r[i] = p[i] - (real)x->centre[i];
-            switch (x->kind) {
-            case IMP_MOVE_POSE: {
-                real a[3], angle = 0, along = 0;
-                for (int i = 0; i < 3; i++) a[i] = h * n[3 + i];
-                for (int i = 0; i < 3; i++) angle += a[i] * a[i];
-                angle = sqrtl(angle);
-                for (int i = 0; i < 3; i++) along += (a[i] /= angle) * r[i];
-                for (int i = 0; i < 3; i++) {
-                    const int j = (i + 1) % 3, l = (i + 2) % 3;
-                    out[i] = r[i] * cosl(angle) +
-                             (a[j] * r[l] - a[l] * r[j]) * sinl(angle) +
-                             a[i] * along * (1 - cosl(angle)) + h * n[i];
-                }
-                break;
-            }
-            case IMP_MOVE_SCALE:
-                for (int i = 0; i < 3; i++) out[i] = r[i] * (1 + h * n[0]);
-                break;
-            case IMP_MOVE_VERTICES:
-                for (int i = 0; i < 3; i++)
-                    out[i] = r[i] + h * n[3 * (size_t)index[c] + (size_t)i];
-                break;
-            }
-            for (int i = 0; i < 3; i++) p[i] = (real)x->centre[i] + out[i];
-        }
-    }
-}
-
 /* Point with weights b, unit normal, logarithm of the area: [7]. */
 static void triangle_read(const struct triangle *t, const double b[3], real *out)
 {
-    real e[2][3], c[3], length = 0;
-    for (int i = 0; i < 3; i++) {
-        out[i] = b[0] * t->p[0][i] + b[1] * t->p[1][i] + b[2] * t->p[2][i];
-        for (int k = 0; k < 2; k++) e[k][i] = t->p[k + 1][i] - t->p[0][i];
-    }
-    for (int i = 0; i < 3; i++) {
-        const int j = (i + 1) % 3, l = (i + 2) % 3;
-        c[i] = e[0][j] * e[1][l] - e[0][l] * e[1][j];
-        length += c[i] * c[i];
-    }
-    for (int i = 0; i < 3; i++) out[3 + i] = c[i] / sqrtl(length);
-    out[6] = 0.5L * logl(length);
+    triangle_point(t, b, out);
+    out[6] = logl(triangle_normal(t, out + 3));
 }
 
 static void kind_test(enum imp__move_kind kind, const char *name)
@@ -123,20 +70,18 @@ static void kind_test(enum imp__move_kind kind, const char *name)
         const imp_v3 side = imp__v3(imp__u01(key, 2) - 0.5, imp__u01(key, 3) - 0.5, 0.1);
         const struct imp__glued x = imp__glued_at(scene, 0, &at, side);
         const struct imp__velocity v = imp__velocity_of(&m, &x, theta);
-        const uint32_t *index = t->indices + 3 * at.prim;
         real out[4][7];
-        const real h = 1e-4L, steps[4] = {h, -h, 2 * h, -2 * h};
-        for (int s = 0; s < 4; s++) {
-            struct triangle moved;
-            for (int c = 0; c < 9; c++)
-                moved.p[c / 3][c % 3] = (real)t->positions[3 * index[c / 3] + c % 3];
-            triangle_move(&m, 0, index, theta, steps[s], &moved);
-            triangle_read(&moved, x.b, out[s]);
+        const real h = 1e-4L;
+        for (int k = 0; k < 4; k++) {
+            const struct triangle moved =
+                triangle_moved(&m, 0, at.prim, theta, difference_at[k] * h);
+            triangle_read(&moved, x.b, out[k]);
         }
         double d[7];
-        for (int k = 0; k < 7; k++)
-            d[k] = (double)((8 * (out[0][k] - out[1][k]) - (out[2][k] - out[3][k])) /
-                            (12 * h));
+        for (int k = 0; k < 7; k++) {
+            const real f[4] = {out[0][k], out[1][k], out[2][k], out[3][k]};
+            d[k] = (double)difference(f, h);
+        }
         /* The normal is on the side that was asked for. */
         const double turn = imp__dot(x.n, imp__v3((double)out[0][3], (double)out[0][4],
                                                   (double)out[0][5])) < 0
