@@ -93,7 +93,7 @@ static const int difference_at[4] = {1, -1, 2, -2};
 /* A floor, a wall, a block above the floor and a lamp; SHAPES: in place of the block's
  * transform; REST: sky, integrator. Camera: 24 x 16 pixels. */
 #define ROOM_CAMERA                                                                      \
-    "<sensor type='perspective'><float name='fov' value='50'/>"                          \
+    "<sensor type='perspective' id='camera'><float name='fov' value='50'/>"              \
     "<transform name='to_world'>%s<lookat origin='.4,-5.5,2.3' target='0,0,.6' "         \
     "up='0,0,1'/>%s</transform><film type='hdrfilm'><integer name='width' value='24'/>"  \
     "<integer name='height' value='16'/><rfilter type='box'/></film></sensor>"

@@ -3,6 +3,7 @@
  * Movers, the velocities that they give, and the transposes (moves.h). */
 #include "moves.h"
 #include "base/context.h"
+#include "scene/pose.h"
 
 struct imp__moves imp__moves_begin(const struct imp_scene *scene,
                                    const struct imp_sensor *sensor)
@@ -16,35 +17,13 @@ void imp__moves_free(struct imp__moves *moves)
     *moves = (struct imp__moves){0};
 }
 
-/* By the rays through two corners of the film, and one through another point of the lens. */
-bool imp__camera_centre(const struct imp_sensor *s, imp_v3 *centre)
-{
-    const double w = s->film.width, h = s->film.height, lens[2] = {0.3, 0.8};
-    struct imp_sensor_ray a, b;
-    if (!s->ops->ray || s->shape) return false;
-    s->ops->ray(s, 0, 0, lens, &a);
-    s->ops->ray(s, w, h, lens, &b);
-    const imp_v3 d = b.o - a.o, n = imp__cross(a.d, b.d);
-    const double n2 = imp__dot(n, n), size = imp__length(d) + imp__length(a.o);
-    if (!(n2 > 1e-20)) return false;
-    const double ta = imp__dot(imp__cross(d, b.d), n) / n2,
-                 tb = imp__dot(imp__cross(d, a.d), n) / n2;
-    *centre = a.o + a.d * ta;
-    const imp_v3 other = b.o + b.d * tb;
-    struct imp_sensor_ray elsewhere; /* through another point of the lens */
-    s->ops->ray(s, 0, 0, (const double[2]){0.9, 0.1}, &elsewhere);
-    const imp_v3 apart = imp__cross(elsewhere.o - *centre, elsewhere.d);
-    return imp__length(other - *centre) <= 1e-7 * size &&
-           imp__length(apart) <= 1e-7 * size;
-}
-
 enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kind,
                                int shape)
 {
     imp_context *ctx = moves->scene->ctx;
     struct imp__mover m = {.kind = kind, .shape = shape, .first = moves->n};
     if (shape == IMP_MOVE_CAMERA) {
-        if (kind != IMP_MOVE_POSE || !imp__camera_centre(moves->sensor, &m.centre))
+        if (kind != IMP_MOVE_POSE || !imp__pinhole(moves->sensor, &m.centre))
             return imp__error(ctx, IMP_E_UNSUPPORTED,
                               "sensor '%s': its rays meet in no point, and it has no "
                               "derivative by its pose",

@@ -58,10 +58,6 @@ enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kin
 bool imp__moves_shape(const struct imp__moves *moves, int shape,
                       const struct imp__mover *but);
 
-/* Where the rays of a camera meet. False: in no point, as those of a lens with an aperture or of
- * parallel light. */
-bool imp__camera_centre(const struct imp_sensor *sensor, imp_v3 *centre);
-
 /* The point of a triangle with these weights of its second and third vertex (located.h), or the
  * one next to p. n: the side of the normal that is wanted. */
 struct imp__glued imp__glued_at(const struct imp_scene *scene, int shape,

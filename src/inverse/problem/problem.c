@@ -3,6 +3,7 @@
  * Problems: which values are free, and what they have to match. */
 #include "problem.h"
 #include "match.h"
+#include "scene/pose.h"
 #include "scene/theta_near.h"
 #include "search/optimize.h"
 #include "walk/run/run.h"
@@ -25,6 +26,7 @@ enum imp_status imp_problem_create(imp_scene *scene, imp_problem **out)
     p->ctx = ctx;
     imp__context_hold(ctx);
     p->scene = scene;
+    scene->in_problem = true;
     p->run = (struct imp_run)IMP_RUN_INIT;
     imp__arena_init(&p->fit_arena, ctx);
     imp__arena_init(&p->check_arena, ctx);
@@ -209,7 +211,7 @@ enum imp_status imp_problem_set_x(imp_problem *p, const double *x)
     for (size_t k = 0; k < p->scene->n_params; k++)
         if (p->active.base[k] >= 0) imp__tied_set(&p->active, &p->scene->params[k], k, x);
     imp__theta_announce(p->scene);
-    return IMP_OK;
+    return imp__poses_settle(p->scene);
 }
 
 /* ---- Targets ------------------------------------------------------------------- */

@@ -3,6 +3,7 @@
  * Draws of the boundary, and what they bring as derivatives (boundary.h). */
 #include "base/context.h"
 #include "boundary_parts.h"
+#include "scene/pose.h"
 
 /* Area lights by area times radiance. */
 static enum imp_status lights_make(struct imp__boundary *b)
@@ -60,7 +61,7 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
     out->size = imp__length(scene->hi - scene->lo);
     enum imp_status st = imp__moved_allowed(tracer);
     if (st == IMP_OK) st = edges_allowed(out);
-    imp__camera_centre(tracer->sensor, &out->camera);
+    imp__pinhole(tracer->sensor, &out->camera);
     if (st == IMP_OK) st = lights_make(out);
     return st;
 }

@@ -4,6 +4,7 @@
 #include "base/context.h"
 #include "moved.h"
 #include "scene/instances.h"
+#include "scene/pose.h"
 
 extern const struct imp_bsdf_ops imp__diffuse, imp__twosided, imp__black;
 extern const struct imp_emitter_ops imp__area, imp__constant;
@@ -87,7 +88,7 @@ static enum imp_status sensor_allowed(const struct imp_tracer *t)
 {
     const struct imp_sensor *s = t->sensor;
     imp_v3 centre;
-    if (!imp__camera_centre(s, &centre))
+    if (!imp__pinhole(s, &centre))
         return refuse(t, "sensor", s->name, s->ops->name,
                       "has no point in which its rays meet");
     if (s->gain) return refuse(t, "sensor", s->name, s->ops->name, "has an exposure");
