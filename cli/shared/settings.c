@@ -45,9 +45,7 @@ static int set_error(const char *where, const char *text, const char *why)
     return cli_error(EXIT_USAGE, "--set %s: %s", text, why);
 }
 
-/* Where NAME is OBJECT.pose, the pose becomes a parameter. A failure is told by the search for
- * the name, but for objects that cannot move. */
-static enum imp_status pose_add(const char *name)
+enum imp_status settings_pose(const char *name)
 {
     const char *end = strrchr(name, '.');
     size_t index;
@@ -85,7 +83,7 @@ static int apply_set(const char *where, const char *text)
         }
         if (!*end) break;
     }
-    st = pose_add(name);
+    st = settings_pose(name);
     if (st == IMP_OK) st = imp_scene_find_param(cli.scene, name, &index);
     if (st == IMP_OK) st = imp_scene_set_values(cli.scene, index, n, values);
     if (st != IMP_OK) rc = cli_fail(st, where ? where : cli.scene_path);

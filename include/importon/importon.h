@@ -595,7 +595,8 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  * numbers, a translation in scene units and a rotation vector in radians about the middle of the
  * shape's box, or the camera's own place, away from where the scene file has it. Setting it moves
  * the object. Theta, and offsets in it, are longer afterwards; a pose that is there already
- * stays as it is.
+ * stays as it is. imp_problem_reverse and imp_problem_functional have its gradient; patterns of
+ * imp_problem_activate pass it over unless they end in ".pose".
  * @param object  its name, as of imp_param_info.
  * @return IMP_OK; IMP_E_ARG if there is no such object, the scene is not committed, or a problem
  *         has been created with it; IMP_E_UNSUPPORTED, with the reason, of one that cannot

@@ -235,19 +235,17 @@ static enum imp_status param_add(struct imp_scene *scene, const char *object,
     if (!name) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
     memcpy(name, object, length);
     memcpy(name + length, ".pose", sizeof ".pose");
-    const struct imp_param param = {
-        .info = {.size = sizeof param.info,
-                 .name = name,
-                 .unit = "scene units, radians",
-                 .dims = {6},
-                 .n_dims = 1,
-                 .lo = -INFINITY,
-                 .hi = INFINITY,
-                 .why = "it moves edges, and the terms of their motion are not part of "
-                        "gradients yet"},
-        .store = IMP_STORE_DOUBLES,
-        .degree = IMP_DEGREE_OTHER,
-        .doubles = p->number};
+    const struct imp_param param = {.info = {.size = sizeof param.info,
+                                             .name = name,
+                                             .unit = "scene units, radians",
+                                             .dims = {6},
+                                             .n_dims = 1,
+                                             .lo = -INFINITY,
+                                             .hi = INFINITY,
+                                             .flags = IMP_PARAM_DIFFERENTIABLE},
+                                    .store = IMP_STORE_DOUBLES,
+                                    .degree = IMP_DEGREE_OTHER,
+                                    .doubles = p->number};
     IMP_CHECKED(imp__theta_add(scene, &param, &p->param));
     imp__theta_finish(scene);
     return imp__theta_watch(scene, p->param, pose_changed, p);

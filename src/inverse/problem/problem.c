@@ -120,6 +120,16 @@ static enum imp_status activate_named(imp_problem *p, const char *name, uint8_t 
     return IMP_OK;
 }
 
+/* Poses are what a pattern means that names them, "*.pose". */
+static bool is_passed_over(const struct imp_scene *scene, size_t param, const char *glob)
+{
+    const char *tail = strrchr(glob, '.');
+    if (tail && strcmp(tail, ".pose") == 0) return false;
+    for (const struct imp_pose *q = scene->poses; q; q = q->next)
+        if (q->param == (int)param) return true;
+    return false;
+}
+
 enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
 {
     enum imp_status st = IMP_OK;
@@ -140,7 +150,9 @@ enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
             if (!imp__glob(glob, s->params[k].info.name)) continue;
             met++;
             last = k;
-            if (!(s->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE)) continue;
+            if (!(s->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE) ||
+                is_passed_over(s, k, glob))
+                continue;
             usable++;
             chosen[k] = 1;
         }
