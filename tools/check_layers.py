@@ -15,9 +15,9 @@ import subprocess
 import sys
 
 # From the ground up.
-ROOMS = "base math color kind scene search bend elements walk film inverse format render report"
+ROOMS = "base math color kind scene move search bend elements walk film inverse format render report"
 INSIDE = {
-    "src/walk": "core media graded path lights both kept rules run",
+    "src/walk": "core media graded path lights both moved kept rules run",
     "src/inverse": "problem estimate gradient gauss fit check design",
     "cli": "text shared bend elements fit view commands",
 }

@@ -8,6 +8,7 @@
 #include "photograph.h"
 #include "picture_files.h"
 #include "proof.h"
+#include "settings.h"
 
 #include <importon/clip.h>
 #include <math.h>
@@ -213,7 +214,10 @@ int problem_open(imp_problem **out)
     imp_problem *problem = NULL;
     int rc = needs_target();
     if (rc) return rc;
-    enum imp_status st = imp_problem_create(cli.scene, &problem);
+    enum imp_status st = IMP_OK;
+    for (size_t i = 0; i < o->params.n && st == IMP_OK; i++)
+        if (!strpbrk(o->params.item[i], "*?[")) st = settings_pose(o->params.item[i]);
+    if (st == IMP_OK) st = imp_problem_create(cli.scene, &problem);
     for (size_t i = 0; i < o->params.n && st == IMP_OK; i++)
         st = imp_problem_activate(problem, o->params.item[i]);
     if (st == IMP_OK && o->params.n == 0) st = imp_problem_activate(problem, "*");

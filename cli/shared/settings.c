@@ -45,6 +45,20 @@ static int set_error(const char *where, const char *text, const char *why)
     return cli_error(EXIT_USAGE, "--set %s: %s", text, why);
 }
 
+enum imp_status settings_pose(const char *name)
+{
+    const char *end = strrchr(name, '.');
+    size_t index;
+    if (!end || strcmp(end, ".pose") != 0 ||
+        imp_scene_find_param(cli.scene, name, &index) == IMP_OK)
+        return IMP_OK;
+    char *object = cli_strdup(name);
+    object[end - name] = 0;
+    const enum imp_status st = imp_scene_add_pose(cli.scene, object);
+    free(object);
+    return st;
+}
+
 /* One --set: "name=v" or "name=v,v,..". Messages begin with `where` it is written; NULL: on
  * the command line. */
 static int apply_set(const char *where, const char *text)
@@ -69,7 +83,8 @@ static int apply_set(const char *where, const char *text)
         }
         if (!*end) break;
     }
-    st = imp_scene_find_param(cli.scene, name, &index);
+    st = settings_pose(name);
+    if (st == IMP_OK) st = imp_scene_find_param(cli.scene, name, &index);
     if (st == IMP_OK) st = imp_scene_set_values(cli.scene, index, n, values);
     if (st != IMP_OK) rc = cli_fail(st, where ? where : cli.scene_path);
 out:

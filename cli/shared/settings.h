@@ -4,6 +4,7 @@
 #ifndef IMP_CLI_SETTINGS_H
 #define IMP_CLI_SETTINGS_H
 
+#include <importon/importon.h>
 #include <stddef.h>
 #include <stdio.h>
 
@@ -11,6 +12,8 @@
  * printed. */
 int settings_apply(const char *text);
 
+/* Where the name is OBJECT.pose and no parameter yet, that pose becomes one. */
+enum imp_status settings_pose(const char *name);
 /* The text of such a file, read now and kept for settings_apply, which reads no file
  * twice (it may be a pipe); NULL: it cannot be read, which settings_apply will report. */
 const char *settings_hold(const char *path, size_t *length);

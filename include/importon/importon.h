@@ -591,6 +591,19 @@ imp_scene_get_param(const imp_scene *scene, size_t index, struct imp_param_info 
  * first. @return IMP_OK; IMP_E_ARG with a message that names the nearest ones. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
+/** Make the pose of a shape or of a camera a parameter, `OBJECT.pose`, behind all others: six
+ * numbers, a translation in scene units and a rotation vector in radians about the middle of the
+ * shape's box, or the camera's own place, away from where the scene file has it. Setting it moves
+ * the object. Theta, and offsets in it, are longer afterwards; a pose that is there already
+ * stays as it is. imp_problem_reverse and imp_problem_functional have its gradient; patterns of
+ * imp_problem_activate pass it over unless they end in ".pose".
+ * @param object  its name, as of imp_param_info.
+ * @return IMP_OK; IMP_E_ARG if there is no such object, the scene is not committed, or a problem
+ *         has been created with it; IMP_E_UNSUPPORTED, with the reason, of one that cannot
+ *         move: it is not made of triangles or no perspective camera, or the scene has
+ *         instances, media, or what else is made from places; IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_scene_add_pose(imp_scene *scene,
+                                                          const char *object);
 /** theta [imp_scene_n_theta], in the units of imp_param_info; written, and read.
  * @return IMP_OK; IMP_E_ARG. */
 IMP_API enum imp_status imp_scene_get_theta(const imp_scene *scene, double *theta);

@@ -699,6 +699,10 @@ struct imp_shape_ops {
      * triangles of a light are not chosen one by one. */
     bool (*sample_triangle)(const struct imp_shape *s, int prim, const imp_v3 *ref,
                             const double u[2], struct imp_light_sample *out);
+    /* Turns and shifts the shape as it is now by an affine map of the world that is rigid:
+     * three rows of four. Positions of triangles are written where `triangles` has them. NULL:
+     * its pose is no parameter. */
+    void (*move)(struct imp_shape *s, const double to_world[12]);
 };
 
 /* ---- Emitter ------------------------------------------------------------------- */
@@ -890,6 +894,8 @@ struct imp_sensor_ops {
      * be connected to it. */
     bool (*connect)(const struct imp_sensor *s, const imp_v3 *ref, bool far,
                     const double u[4], struct imp_sensor_sample *out);
+    /* As imp_shape_ops.move. */
+    void (*move)(struct imp_sensor *s, const double to_world[12]);
 };
 
 /* ---- Versions of this header ----------------------------------------------------- */

@@ -155,6 +155,9 @@ struct imp_scene {
     struct imp_param *params;
     size_t n_theta;
     struct imp_listener *listeners;
+    struct imp_pose *poses; /* in the order in which they were added (pose.h) */
+    bool moved, reshaped; /* some pose has changed; a shape's, since the tree was made */
+    bool in_problem;      /* a problem has been created: no parameter is added any more */
 
     void *intersector;
     imp_v3 lo, hi;        /* bounds of all shapes */
@@ -177,6 +180,9 @@ void imp__scene_release_files(struct imp_scene *scene);
  * must have been attached to the nodes (format/resolve.c). `integrators` ends with NULL. */
 enum imp_status imp__scene_build(struct imp_scene *scene,
                                  const struct imp_integrator_ops *const *integrators);
+
+/* Around all shapes, with room for rays to start outside. */
+struct imp_ball imp__ball_around(const struct imp_scene *scene);
 
 /* ---- integrator.c -------------------------------------------------------------- */
 enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *node,

@@ -124,8 +124,7 @@ static enum imp_status lights_build(struct imp_scene *scene)
     return IMP_OK;
 }
 
-/* Around all shapes, with room for rays to start outside. */
-static struct imp_ball ball_around(const struct imp_scene *scene)
+struct imp_ball imp__ball_around(const struct imp_scene *scene)
 {
     if (!(scene->lo[0] <= scene->hi[0])) return (struct imp_ball){{0}, 1};
     const imp_v3 size = scene->hi - scene->lo;
@@ -152,7 +151,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
     IMP_TRY(imp__instances_build(scene));
     IMP_TRY(imp__props_finish(scene->ctx, scene->root));
     IMP_TRY(imp__build_attributes(scene));
-    scene->ball = ball_around(scene);
+    scene->ball = imp__ball_around(scene);
     IMP_TRY(lights_build(scene));
     IMP_TRY(imp__aims_build(scene));
     IMP_TRY(imp__mixing_materials(scene));

@@ -4,6 +4,7 @@
  * write. A parameter's values are stored where rendering uses them (an input's lanes, a
  * texture's texels); theta is a list of addresses, so setting it needs no rebuild. */
 #include "base/arguments.h"
+#include "pose.h"
 #include "theta_alias.h"
 #include "theta_near.h"
 #include <stdio.h>
@@ -150,7 +151,8 @@ enum imp_status imp_scene_find_param(const imp_scene *scene, const char *name,
     if (is_geometry(name))
         return imp__error(scene->ctx, IMP_E_ARG,
                           "there is no parameter '%s': vertices, transformations and "
-                          "cameras are not among them",
+                          "cameras are not among them (the pose of a shape or camera is, "
+                          "where it is asked for: NAME.pose)",
                           name);
     const struct imp_near_names near = imp__theta_near(scene, name);
     return imp__error(scene->ctx, IMP_E_ARG, "there is no parameter '%s'%s", name,
@@ -198,7 +200,7 @@ enum imp_status imp_scene_set_theta(imp_scene *scene, const double *theta)
             imp__param_set(p, k, theta[p->info.offset + k]);
     }
     imp__theta_announce(scene);
-    return IMP_OK;
+    return imp__poses_settle(scene);
 }
 
 enum imp_status imp_scene_set_values(imp_scene *scene, size_t index, size_t n,
@@ -219,7 +221,7 @@ enum imp_status imp_scene_set_values(imp_scene *scene, size_t index, size_t n,
     for (size_t k = 0; k < p->info.count; k++)
         imp__param_set(p, k, values[n == 1 ? 0 : k]);
     imp__theta_announce(scene);
-    return IMP_OK;
+    return imp__poses_settle(scene);
 }
 
 enum imp_status imp_scene_get_values(const imp_scene *scene, size_t index, double *values)

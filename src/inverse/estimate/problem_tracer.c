@@ -46,6 +46,7 @@ enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
     enum imp_status st = IMP_OK;
     struct imp_job job;
     IMP_CHECKED(imp__problem_job(p, run, &job));
+    if (p->edge_terms) imp__job_state(&job, IMP_HAS_EDGE_TERMS, NULL);
     imp__job_state(&job, waves ? IMP_HAS_RESPONSE_LOSS : IMP_HAS_PICTURE_DERIVATIVE,
                    NULL);
     IMP_CHECKED(imp__job_allowed(&job));

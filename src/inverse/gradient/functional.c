@@ -54,7 +54,9 @@ static enum imp_status begin(imp_problem *p, const float *adjoint,
                              double **weights, float **ones)
 {
     imp_context *ctx = p->ctx;
+    p->edge_terms = true; /* of the gradient, which is made in its own place */
     enum imp_status st = imp__problem_tracer_of_any_end(p, run, NULL, &f->tracer);
+    p->edge_terms = false;
     if (st == IMP_OK) st = imp__sensor_lit(p->scene, f->tracer.sensor);
     if (st != IMP_OK) return st;
     imp__problem_tell(p, &f->tracer);

@@ -17,6 +17,7 @@
 #include "variate.h"
 
 struct imp__allocation;
+struct imp__moved_gradient;
 
 struct imp__gradient_job {
     const struct imp_problem *problem;
@@ -28,6 +29,8 @@ struct imp__gradient_job {
     const struct imp__splat *splat;   /* wide filters: pass 2; NULL: box */
     /* Adjoints in light tracing; NULL: walks begin at the sensor. */
     const struct imp__light_adjoints *light;
+    const struct imp__moved_gradient
+        *moved;                        /* of a fixed adjoint; NULL: no pose is active */
     struct imp__variate_view *variate; /* NULL: none */
     struct imp_tracer there;           /* of the variate; scene NULL: nowhere yet */
     bool want_gradient;

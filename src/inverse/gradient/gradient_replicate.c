@@ -5,6 +5,7 @@
 #include "gradient_job.h"
 #include "inverse/estimate/adjoint.h"
 #include "light_gradient.h"
+#include "moved_gradient.h"
 
 struct replicate {
     struct imp__gradient_job *job;
@@ -45,10 +46,17 @@ static void sweep_each(const struct replicate *r)
             const struct imp_arena_mark mark = imp__arena_mark(&r->worker->arena);
             struct imp_walk walk;
             trace(r, s, i, &walk);
-            imp__walk_sweep(&j->tracer, &walk, adjoint_of(r, s, &walk), &r->tally->sink);
+            const imp_spec P = adjoint_of(r, s, &walk);
+            imp__walk_sweep(&j->tracer, &walk, P, &r->tally->sink);
+            if (imp_unlikely(j->moved != NULL))
+                r->worker->no_memory |= !imp__moved_walk(j->moved, &r->worker->arena,
+                                                         &walk, P, &r->tally->sink);
             imp__arena_rewind(&r->worker->arena, mark);
         }
     }
+    if (imp_unlikely(j->moved != NULL))
+        r->worker->no_memory |= !imp__moved_draws(j->moved, &r->worker->arena, r->plan,
+                                                  r->x, r->y, r->b, &r->tally->sink);
 }
 
 /* ---- Adjoints made of residuals ----------------------------------------------------- */

@@ -11,6 +11,7 @@
 #include "inverse/estimate/replicates.h"
 #include "inverse/problem/loss.h"
 #include "light_gradient.h"
+#include "moved_gradient.h"
 #include "walk/kept/store.h"
 #include "walk/rules/features.h"
 #include "walk/run/run.h"
@@ -209,13 +210,21 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
     IMP_READS(p->scene);
     struct imp__splat splat = {0};
     struct imp__totals totals = {0};
+    struct imp__moved_gradient moved = {0};
     bool again = false;
     struct imp__gradient_job j = {
         .problem = p, .totals = &totals, .seed = seed_image, .want_gradient = true};
     IMP_TRY(imp__problem_same(p, &own, "reverse"));
     IMP_TRY(imp__totals_begin(p, false, gradient, gradient_se, &totals));
-    IMP_TRY(imp__problem_tracer_of_any_end(p, &own, NULL, &j.tracer));
+    p->edge_terms = true;
+    st = imp__problem_tracer_of_any_end(p, &own, NULL, &j.tracer);
+    p->edge_terms = false;
+    IMP_TRY(st);
     IMP_TRY(imp__adjoint_check(p, &j.tracer.sensor->film, seed_image, "seed_image"));
+    if (imp__moved_wanted(p)) {
+        IMP_TRY(imp__moved_begin(p, &j.tracer, seed_image, &moved));
+        j.moved = &moved;
+    }
     if (j.tracer.integrator->from_lights) {
         IMP_TRY(imp__light_reverse(p, &j.tracer, seed_image, &own, &totals));
         IMP_TRY(imp__totals_share(p, &totals));
@@ -246,6 +255,7 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
     }
     imp__totals_end(p, &totals, gradient, gradient_se);
 out:
+    imp__moved_end(&moved);
     imp__splat_destroy(p->ctx, &splat);
     imp__totals_free(p, &totals);
     return st;

@@ -3,6 +3,7 @@
  * Problems: which values are free, and what they have to match. */
 #include "problem.h"
 #include "match.h"
+#include "scene/pose.h"
 #include "scene/theta_near.h"
 #include "search/optimize.h"
 #include "walk/run/run.h"
@@ -25,6 +26,7 @@ enum imp_status imp_problem_create(imp_scene *scene, imp_problem **out)
     p->ctx = ctx;
     imp__context_hold(ctx);
     p->scene = scene;
+    scene->in_problem = true;
     p->run = (struct imp_run)IMP_RUN_INIT;
     imp__arena_init(&p->fit_arena, ctx);
     imp__arena_init(&p->check_arena, ctx);
@@ -118,6 +120,16 @@ static enum imp_status activate_named(imp_problem *p, const char *name, uint8_t 
     return IMP_OK;
 }
 
+/* Poses are what a pattern means that names them, "*.pose". */
+static bool is_passed_over(const struct imp_scene *scene, size_t param, const char *glob)
+{
+    const char *tail = strrchr(glob, '.');
+    if (tail && strcmp(tail, ".pose") == 0) return false;
+    for (const struct imp_pose *q = scene->poses; q; q = q->next)
+        if (q->param == (int)param) return true;
+    return false;
+}
+
 enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
 {
     enum imp_status st = IMP_OK;
@@ -138,7 +150,9 @@ enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
             if (!imp__glob(glob, s->params[k].info.name)) continue;
             met++;
             last = k;
-            if (!(s->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE)) continue;
+            if (!(s->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE) ||
+                is_passed_over(s, k, glob))
+                continue;
             usable++;
             chosen[k] = 1;
         }
@@ -209,7 +223,7 @@ enum imp_status imp_problem_set_x(imp_problem *p, const double *x)
     for (size_t k = 0; k < p->scene->n_params; k++)
         if (p->active.base[k] >= 0) imp__tied_set(&p->active, &p->scene->params[k], k, x);
     imp__theta_announce(p->scene);
-    return IMP_OK;
+    return imp__poses_settle(p->scene);
 }
 
 /* ---- Targets ------------------------------------------------------------------- */

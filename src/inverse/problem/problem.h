@@ -126,6 +126,8 @@ struct imp_problem {
     struct imp__variate *variate; /* of the evaluation at work (variate.h); NULL: none */
     enum imp__loss_use use;
     bool
+        edge_terms; /* the evaluation at work has what moving edges give (moved_gradient.h) */
+    bool
         misses_reported; /* the user has been warned of light that light tracing misses */
     bool same_known;     /* the ranks of a team have the same problem */
     struct imp_arena fit_arena; /* of the last fit's result */

@@ -41,9 +41,16 @@ static bool connect(const struct imp_sensor *s, const imp_v3 *ref, bool far,
                                    far, out);
 }
 
+static void move(struct imp_sensor *s, const double to_world[12])
+{
+    struct perspective *p = s->self;
+    imp__projection_move(&p->projection, to_world);
+}
+
 const struct imp_sensor_ops imp__perspective = {.size = sizeof(struct imp_sensor_ops),
                                                 .name = "perspective",
                                                 .object_size = sizeof(struct perspective),
                                                 .build = build,
                                                 .ray = ray,
-                                                .connect = connect};
+                                                .connect = connect,
+                                                .move = move};

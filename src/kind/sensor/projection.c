@@ -69,6 +69,15 @@ out:
     return st;
 }
 
+void imp__projection_move(struct imp_projection *p, const double to_world[12])
+{
+    struct imp_mat4 m = {{0}};
+    for (int k = 0; k < 12; k++) m.m[k] = to_world[k];
+    m.m[15] = 1;
+    p->to_world = imp__mat4_multiply(&m, &p->to_world);
+    imp__mat4_inverse(&p->to_world, &p->to_local);
+}
+
 /* Where the pinhole's x, y is seen, and film area over that without the lens. False: not
  * on the film, or only where the polynomials have folded the plane back onto it. */
 static bool seen_by_lens(const struct imp_film_plane *film, double *x, double *y,

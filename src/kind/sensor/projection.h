@@ -29,6 +29,9 @@ enum imp_status imp__projection_build(const struct imp_build *b, bool rigid,
 enum imp_status imp__fov_build(const struct imp_build *b, double aspect,
                                double *tan_half_x);
 
+/* Moves its place in the world (imp_sensor_ops.move). */
+void imp__projection_move(struct imp_projection *p, const double to_world[12]);
+
 /* A ray through local point o along v (v_z > 0), starting on the near plane: t is
  * measured from there. */
 static inline void imp__projection_ray(const struct imp_projection *p, imp_v3 o, imp_v3 v,

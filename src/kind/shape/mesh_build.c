@@ -202,12 +202,9 @@ static bool is_flat(const struct imp__mesh *m, const float *normals, size_t n)
     return true;
 }
 
-/* Frames of a mesh whose normals are its faces': made once. */
-static enum imp_status tangents_make(const struct imp_build *b, struct imp__mesh *m,
-                                     size_t n)
+/* Frames of a mesh whose normals are its faces'. tangents [3 n]. */
+static void tangents_fill(const struct imp__mesh *m, size_t n, double *tangents)
 {
-    double *tangents = imp__arena_take(b->arena, 3 * n, sizeof *tangents);
-    if (!tangents) return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
     for (size_t k = 0; k < n; k++) {
         const struct imp_hit hit = {.prim = (int)k};
         const struct imp__mesh_corner c = imp__mesh_corner(m, k);
@@ -217,15 +214,19 @@ static enum imp_status tangents_make(const struct imp_build *b, struct imp__mesh
         imp__surface_frame(&at);
         for (int j = 0; j < 3; j++) tangents[3 * k + (size_t)j] = at.s[j];
     }
+}
+static enum imp_status tangents_make(const struct imp_build *b, struct imp__mesh *m,
+                                     size_t n)
+{
+    double *tangents = imp__arena_take(b->arena, 3 * n, sizeof *tangents);
+    if (!tangents) return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
+    tangents_fill(m, n, tangents);
     m->face_tangents = tangents;
     return IMP_OK;
 }
 
-static enum imp_status facets_make(const struct imp_build *b, struct imp__mesh *m,
-                                   size_t n)
+static void facets_fill(const struct imp__mesh *m, size_t n, struct imp__facet *facets)
 {
-    struct imp__facet *facets = imp__arena_take(b->arena, n, sizeof *facets);
-    if (!facets) return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
     for (size_t k = 0; k < n; k++) {
         const struct imp_hit hit = {.prim = (int)k};
         const struct imp__mesh_corner c = imp__mesh_corner(m, k);
@@ -234,6 +235,13 @@ static enum imp_status facets_make(const struct imp_build *b, struct imp__mesh *
         facets[k] =
             (struct imp__facet){c.p0, c.e1, c.e2, at.ng, at.dp_du, at.dp_dv, at.s, at.t};
     }
+}
+static enum imp_status facets_make(const struct imp_build *b, struct imp__mesh *m,
+                                   size_t n)
+{
+    struct imp__facet *facets = imp__arena_take(b->arena, n, sizeof *facets);
+    if (!facets) return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
+    facets_fill(m, n, facets);
     m->facets = facets;
     return IMP_OK;
 }
@@ -294,4 +302,34 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
     s->triangles.indices = m->indices;
 out:
     return st;
+}
+
+void imp__mesh_move(struct imp_shape *s, const double to_world[12])
+{
+    struct imp__mesh *m = s->self;
+    const size_t n = s->triangles.n_vertices;
+    /* Arrays that build made: constant but for this. */
+    float *positions = (float *)(uintptr_t)m->positions,
+          *normals = (float *)(uintptr_t)m->normals;
+    s->lo = imp__v3(INFINITY, INFINITY, INFINITY);
+    s->hi = -s->lo;
+    for (size_t k = 0; k < n; k++) {
+        const imp_v3 p =
+            imp__rows_point(to_world, imp__mesh_load(m->positions, (uint32_t)k));
+        const imp_v3 t =
+            normals ? imp__rows_vector(to_world, imp__mesh_load(m->normals, (uint32_t)k))
+                    : p;
+        for (int i = 0; i < 3; i++) {
+            positions[3 * k + (size_t)i] = (float)p[i];
+            if (normals) normals[3 * k + (size_t)i] = (float)t[i];
+            s->lo[i] = fmin(s->lo[i], positions[3 * k + (size_t)i]);
+            s->hi[i] = fmax(s->hi[i], positions[3 * k + (size_t)i]);
+        }
+    }
+    s->lo[3] = s->hi[3] = 0;
+    if (m->face_tangents)
+        tangents_fill(m, s->triangles.n_triangles, (double *)(uintptr_t)m->face_tangents);
+    if (m->facets)
+        facets_fill(m, s->triangles.n_triangles,
+                    (struct imp__facet *)(uintptr_t)m->facets);
 }

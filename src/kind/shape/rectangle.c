@@ -14,6 +14,27 @@ struct rectangle {
     uint32_t indices[6];
 };
 
+/* What follows from corner, edges and normal. */
+static void settle(struct rectangle *r, struct imp_shape *s)
+{
+    struct imp_surface frame = {.n = r->n, .dp_du = r->eu};
+    imp__surface_frame(&frame);
+    r->s = frame.s;
+    r->t = frame.t;
+    s->lo = imp__v3(INFINITY, INFINITY, INFINITY);
+    s->hi = -s->lo;
+    for (int k = 0; k < 4; k++) {
+        const imp_v3 p =
+            r->corner + r->eu * (double)(k == 1 || k == 2) + r->ev * (double)(k >= 2);
+        for (int i = 0; i < 3; i++) {
+            r->positions[3 * k + i] = (float)p[i];
+            s->lo[i] = fmin(s->lo[i], p[i]);
+            s->hi[i] = fmax(s->hi[i], p[i]);
+        }
+    }
+    s->lo[3] = s->hi[3] = 0;
+}
+
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_shape *s)
 {
     struct rectangle *r = self;
@@ -32,28 +53,23 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
      */
     r->n = imp__normalize(imp__cross(r->eu, r->ev)) *
            ((at.mirrored != s->flip_normals) ? -1.0 : 1.0);
-    struct imp_surface frame = {.n = r->n, .dp_du = r->eu};
-    imp__surface_frame(&frame);
-    r->s = frame.s;
-    r->t = frame.t;
 
     static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
     memcpy(r->indices, indices, sizeof indices);
-    s->lo = imp__v3(INFINITY, INFINITY, INFINITY);
-    s->hi = -s->lo;
-    for (int k = 0; k < 4; k++) {
-        const imp_v3 p =
-            r->corner + r->eu * (double)(k == 1 || k == 2) + r->ev * (double)(k >= 2);
-        for (int i = 0; i < 3; i++) {
-            r->positions[3 * k + i] = (float)p[i];
-            s->lo[i] = fmin(s->lo[i], p[i]);
-            s->hi[i] = fmax(s->hi[i], p[i]);
-        }
-    }
-    s->lo[3] = s->hi[3] = 0;
+    settle(r, s);
     s->geometry = IMP_TRIANGLES;
     s->triangles = (struct imp_triangles){4, 2, r->positions, r->indices, 0};
     return IMP_OK;
+}
+
+static void move(struct imp_shape *s, const double to_world[12])
+{
+    struct rectangle *r = s->self;
+    r->corner = imp__rows_point(to_world, r->corner);
+    r->eu = imp__rows_vector(to_world, r->eu);
+    r->ev = imp__rows_vector(to_world, r->ev);
+    r->n = imp__normalize(imp__rows_vector(to_world, r->n));
+    settle(r, s);
 }
 
 static inline void surface_at(const struct rectangle *r, double u, double v,
@@ -134,4 +150,5 @@ const struct imp_shape_ops imp__rectangle = {.size = sizeof(struct imp_shape_ops
                                              .sample_toward = sample_toward,
                                              .pdf_toward = pdf_toward,
                                              .sample_area = sample_area,
-                                             .place = place};
+                                             .place = place,
+                                             .move = move};

@@ -147,6 +147,8 @@ struct imp__mesh {
 };
 void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit,
                        const imp_v3 *o, const imp_v3 *d, struct imp_surface *out);
+/* As imp_shape_ops.move (mesh_build.c). */
+void imp__mesh_move(struct imp_shape *s, const double to_world[12]);
 /* As imp_shape_ops.place. */
 void imp__mesh_place(const struct imp_shape *s, const double uv[2],
                      struct imp_surface *out, int *prim);

@@ -158,6 +158,26 @@ void imp__step_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
     step_begin(tracer, arena, walk, scratch, s);
 }
 
+void imp__walk_along(const struct imp_tracer *tracer, struct imp_arena *arena,
+                     struct imp_key key, const struct imp_sensor_ray *ray, int depth,
+                     struct imp_walk *walk)
+{
+    imp_spec scratch[IMP_INPUTS_MAX];
+    struct imp_step s;
+    FILL(walk);
+    imp__walk_clear(walk);
+    walk->key = key;
+    walk->point = (struct imp_point){0};
+    walk->px = walk->py = 0;
+    walk->ray = *ray;
+    walk->depth = depth;
+    walk->time = imp__walk_time(tracer, walk);
+    step_begin(tracer, arena, walk, scratch, &s);
+    s.depth = depth;
+    if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s)) imp__walk_on(&s);
+    walk_close(tracer, walk);
+}
+
 void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
                      int y, int64_t sample, struct imp_walk *walk)
 {

@@ -6,6 +6,7 @@
 #include "base/team.h"
 #include "scene/guide.h"
 #include "scene/media_around.h"
+#include "scene/pose.h"
 #include "walk/kept/store.h"
 #include "walk/media/tracking.h"
 
@@ -330,6 +331,15 @@ FOUND(EXTINCTION_ZERO_ACTIVE)
     const struct imp_medium *m = extinction_active(j, false);
     if (m) *by = (struct imp_bearer){.name = m->name};
     return m != NULL;
+}
+FOUND(POSE_ACTIVE)
+{
+    for (const struct imp_pose *p = j->active ? j->scene->poses : NULL; p; p = p->next) {
+        if (j->active->base[p->param] < 0) continue;
+        *by = (struct imp_bearer){.name = j->scene->params[p->param].info.name};
+        return true;
+    }
+    return false;
 }
 FOUND(RAYS_ACTIVE)
 {

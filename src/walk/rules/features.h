@@ -69,6 +69,7 @@ struct imp_active;
     X(RANKS, "ranks (mpirun)")                                                           \
     X(EXTINCTION_FIELD_ACTIVE, "an active extinction that varies in space")              \
     X(EXTINCTION_ZERO_ACTIVE, "an active extinction that is 0")                          \
+    X(POSE_ACTIVE, "an active pose")                                                     \
     X(RAYS_ACTIVE, "active parameters that bend rays")                                   \
     X(COLLISIONS_ACTIVE, "active parameters by which collisions are drawn")
 /* ... and stated by the call that asks. */
@@ -77,6 +78,7 @@ struct imp_active;
     X(PRINTED_WALKS, "printed walks (render --paths)")                                   \
     X(DERIVATIVE, "derivatives")                                                         \
     X(PICTURE_DERIVATIVE, "derivatives of pictures")                                     \
+    X(EDGE_TERMS, "a gradient of a linear function of the picture")                      \
     X(LOSS, "a loss")                                                                    \
     X(RESPONSE_LOSS, "a loss of other than three response curves")                       \
     X(MANY_PARAMETERS, "a gradient of very many parameters")                             \

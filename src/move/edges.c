@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What is asked of the list of edges (edges.h): points, sides, and whether it is whole. */
+#include "edges.h"
+#include "base/context.h"
+#include "math/offset.h"
+
+void imp__edges_free(struct imp__edges *edges)
+{
+    imp__release(edges->ctx, edges->edge);
+    imp__release(edges->ctx, edges->face);
+    imp__release(edges->ctx, edges->until);
+    *edges = (struct imp__edges){0};
+}
+
+const struct imp__edge *imp__edges_draw(const struct imp__edges *edges, double u,
+                                        imp_v3 *p)
+{
+    const double x = u * edges->until[edges->n - 1];
+    size_t lo = 0, hi = edges->n - 1;
+    while (lo < hi) {
+        const size_t half = lo + (hi - lo) / 2;
+        if (edges->until[half] > x) hi = half;
+        else lo = half + 1;
+    }
+    const struct imp__edge *e = &edges->edge[lo];
+    const double before = lo > 0 ? edges->until[lo - 1] : 0;
+    const double t = imp_clamp((x - before) / (edges->until[lo] - before), 0.0, 1.0);
+    *p = e->a + (e->b - e->a) * t;
+    return e;
+}
+
+struct imp__glued imp__edge_glued(const struct imp__edges *edges,
+                                  const struct imp_scene *scene,
+                                  const struct imp__edge *e, imp_v3 p)
+{
+    const struct imp__edge_face *f = &edges->face[e->first];
+    return imp__glued_near(scene, f->shape, f->prim, p, f->n);
+}
+
+int imp__edge_side(const struct imp__edges *edges, const struct imp__edge *e, imp_v3 m)
+{
+    bool before = false, behind = false;
+    for (int k = 0; k < e->n_faces; k++) {
+        const double side = imp__dot(edges->face[e->first + (size_t)k].in, m);
+        before |= side > 0;
+        behind |= side <= 0;
+    }
+    return before && behind ? 0 : before ? -1 : 1;
+}
+
+static bool vertices_move(const struct imp__moves *moves, int shape)
+{
+    for (int k = 0; k < moves->n_movers; k++)
+        if (moves->mover[k].shape == shape && moves->mover[k].kind == IMP_MOVE_VERTICES)
+            return true;
+    return false;
+}
+
+/* Have two triangles of a shape a side in common, and not only places? */
+static bool is_welded(const struct imp_scene *scene, int shape, int prim, int other)
+{
+    const uint32_t *i = scene->shapes[shape]->triangles.indices;
+    int common = 0;
+    for (int k = 0; k < 9; k++) common += i[3 * prim + k / 3] == i[3 * other + k % 3];
+    return common == 2;
+}
+
+/* Do two faces at an edge move with different velocities? */
+static bool move_apart(const struct imp__moves *moves, const struct imp__edge_face *f,
+                       const struct imp__edge_face *g)
+{
+    if (f->shape == g->shape)
+        return vertices_move(moves, f->shape) &&
+               !is_welded(moves->scene, f->shape, f->prim, g->prim);
+    return imp__moves_shape(moves, f->shape, NULL) ||
+           imp__moves_shape(moves, g->shape, NULL);
+}
+
+const struct imp__edge *imp__edges_torn(const struct imp__edges *edges,
+                                        const struct imp__moves *moves)
+{
+    for (size_t k = 0; k < edges->n; k++) {
+        const struct imp__edge *e = &edges->edge[k];
+        for (int j = 1; j < e->n_faces; j++)
+            if (move_apart(moves, &edges->face[e->first],
+                           &edges->face[e->first + (size_t)j]))
+                return e;
+    }
+    return NULL;
+}
+
+/* Hits nearer to the ends of an edge than this part of its length are its own faces, or others
+ * that begin there. */
+#define END 1e-5
+
+int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
+                       int *other)
+{
+    for (size_t k = 0; k < edges->n; k++) {
+        const struct imp__edge *e = &edges->edge[k];
+        const imp_v3 d = e->b - e->a;
+        double from = END;
+        struct imp_hit hit;
+        while (imp__intersect(scene, &e->a, &d, from, 1 - END, &hit)) {
+            bool own = false;
+            for (int j = 0; j < e->n_faces; j++)
+                own |= edges->face[e->first + (size_t)j].shape == hit.shape;
+            if (!own) {
+                *other = edges->face[e->first].shape;
+                return hit.shape;
+            }
+            from = hit.t + END;
+        }
+    }
+    return -1;
+}

@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The edges of a scene of triangles, each once: where what is seen past a place may jump. Edges
+ * of different triangles, and of different shapes, that lie on each other are one edge with all
+ * their faces; where they overlap in part they are cut. Inner edges of a flat face of one shape
+ * are left out: nothing jumps there. */
+#ifndef IMP_MOVE_EDGES_H
+#define IMP_MOVE_EDGES_H
+
+#include "moves.h"
+
+struct imp__edge_face {
+    int shape, prim;
+    imp_v3 in,
+        n; /* unit: in the face, across the edge, away from it; normal of the face */
+};
+
+struct imp__edge {
+    imp_v3 a, b; /* ends, world */
+    size_t first;
+    int n_faces; /* face[first .. first + n_faces) */
+};
+
+struct imp__edges {
+    imp_context *ctx;
+    size_t n, n_faces;
+    struct imp__edge *edge;      /* [n] */
+    struct imp__edge_face *face; /* [n_faces] */
+    double *until;               /* [n] length of the edges up to and with this one */
+};
+
+/* All edges of the scene's shapes. IMP_E_UNSUPPORTED, with its name: a shape that is not made of
+ * triangles, or has normals that turn over a facet; instances. */
+enum imp_status imp__edges_build(const struct imp_scene *scene, struct imp__edges *out);
+void imp__edges_free(struct imp__edges *edges);
+
+/* A point by length: density 1/edges->until[n - 1]. u in [0, 1). */
+const struct imp__edge *imp__edges_draw(const struct imp__edges *edges, double u,
+                                        imp_v3 *p);
+/* The point of an edge as one that its first face carries along. */
+struct imp__glued imp__edge_glued(const struct imp__edges *edges,
+                                  const struct imp_scene *scene,
+                                  const struct imp__edge *e, imp_v3 p);
+/* Is the edge a silhouette for a line through it: do all faces lie on one side of the plane of
+ * edge and line, with this normal? 1: on the side that m points away from, -1: on the other;
+ * 0: on both. */
+int imp__edge_side(const struct imp__edges *edges, const struct imp__edge *e, imp_v3 m);
+/* An edge whose faces move apart: they belong to shapes with different velocities. NULL: none. */
+const struct imp__edge *imp__edges_torn(const struct imp__edges *edges,
+                                        const struct imp__moves *moves);
+/* A shape through which an edge of another passes: where they meet is an edge that is in no list.
+ * -1: none; *other: the shape of the edge. */
+int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
+                       int *other);
+
+#endif

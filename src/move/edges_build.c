@@ -1,0 +1,232 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Makes the list of edges (edges.h): the sides of all triangles, sorted by the line on which they
+ * lie; along each line they are cut where one begins or ends, and what lies between two cuts is
+ * one edge with the faces of all sides that cover it. */
+#include "base/context.h"
+#include "edges.h"
+#include <stdlib.h>
+
+#define NEAR 2e-6 /* of the scene's size: sides nearer to each other lie on each other */
+
+/* One side of a triangle. */
+struct side {
+    imp_v3 a, b;
+    double key;        /* the same for sides on one line, and with luck for no other */
+    double from, till; /* along the line that represents them */
+    size_t line;
+    struct imp__edge_face face;
+};
+
+struct building {
+    imp_context *ctx;
+    const struct imp_scene *scene;
+    imp_v3 middle;
+    double near, size;
+    size_t n, cap; /* sides */
+    struct side *side;
+    double *cut; /* [2 n] */
+    size_t cap_edges, cap_faces;
+    struct imp__edges *out;
+};
+
+/* Directions that no scene is aligned with: by the first a line gets its sense, by the second
+ * the point of it that is nearest to the middle becomes a number. */
+static imp_v3 sense(void) { return imp__v3(0.5377, 0.6180, 0.5736); }
+static imp_v3 mark(void) { return imp__v3(-0.4423, 0.7071, -0.5515); }
+
+static imp_v3 vertex(const struct imp_triangles *t, uint32_t i)
+{
+    const float *p = t->positions + 3 * (size_t)i;
+    return imp__v3(p[0], p[1], p[2]);
+}
+
+static void side_add(struct building *x, int shape, int prim, imp_v3 p, imp_v3 q,
+                     imp_v3 apex)
+{
+    struct side *s = &x->side[x->n];
+    const bool turned = imp__dot(q - p, sense()) < 0;
+    s->a = turned ? q : p;
+    s->b = turned ? p : q;
+    const imp_v3 d = imp__normalize(s->b - s->a), r = s->a - x->middle;
+    const imp_v3 in = apex - s->a, across = in - d * imp__dot(in, d);
+    if (!(imp__length(s->b - s->a) > x->near) || !(imp__length(across) > 0)) return;
+    s->key = imp__dot(r - d * imp__dot(r, d), mark());
+    s->face = (struct imp__edge_face){shape, prim, imp__normalize(across),
+                                      imp__normalize(imp__cross(q - p, apex - p))};
+    x->n++;
+}
+
+static enum imp_status sides_make(struct building *x)
+{
+    size_t n = 0;
+    for (int k = 0; k < x->scene->n_shapes; k++) {
+        const struct imp_shape *s = x->scene->shapes[k];
+        if (s->geometry != IMP_TRIANGLES || s->smooth)
+            return imp__error(
+                x->ctx, IMP_E_UNSUPPORTED,
+                "derivatives by what moves are of flat triangles, and shape "
+                "'%s' (%s) %s",
+                s->name, s->ops->name,
+                s->smooth ? "has normals that turn over them (face_normals "
+                            "makes it flat)"
+                          : "has none");
+        n += 3 * s->triangles.n_triangles;
+    }
+    x->side = imp__alloc(x->ctx, n + 1, sizeof *x->side);
+    x->cut = imp__alloc(x->ctx, 2 * n + 1, sizeof *x->cut);
+    if (!x->side || !x->cut)
+        return imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
+    for (int k = 0; k < x->scene->n_shapes; k++) {
+        const struct imp_triangles *t = &x->scene->shapes[k]->triangles;
+        for (size_t j = 0; j < t->n_triangles; j++) {
+            const uint32_t *i = t->indices + 3 * j;
+            const imp_v3 p[3] = {vertex(t, i[0]), vertex(t, i[1]), vertex(t, i[2])};
+            for (int c = 0; c < 3; c++)
+                side_add(x, k, (int)j, p[c], p[(c + 1) % 3], p[(c + 2) % 3]);
+        }
+    }
+    return IMP_OK;
+}
+
+static int by_key(const void *a, const void *b)
+{
+    const struct side *x = a, *y = b;
+    if (x->key != y->key) return x->key < y->key ? -1 : 1;
+    if (x->face.shape != y->face.shape) return x->face.shape < y->face.shape ? -1 : 1;
+    return x->face.prim < y->face.prim ? -1 : x->face.prim > y->face.prim;
+}
+static int by_line(const void *a, const void *b)
+{
+    const struct side *x = a, *y = b;
+    if (x->line != y->line) return x->line < y->line ? -1 : 1;
+    return x->from != y->from ? (x->from < y->from ? -1 : 1) : by_key(a, b);
+}
+static int by_value(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+static double off_line(const struct side *line, imp_v3 p)
+{
+    const imp_v3 d = imp__normalize(line->b - line->a), r = p - line->a;
+    return imp__length(r - d * imp__dot(r, d));
+}
+
+/* Sides on one line get its number: the first of them in the order of keys. */
+static void lines_find(struct building *x)
+{
+    /* A side's own length tells its direction to near/length, and with the way to the middle
+     * that moves the key. */
+    const double window = 1e-5 * x->size;
+    for (size_t k = 0; k < x->n; k++) x->side[k].line = SIZE_MAX;
+    for (size_t k = 0; k < x->n; k++) {
+        struct side *line = &x->side[k];
+        if (line->line != SIZE_MAX) continue;
+        const imp_v3 d = imp__normalize(line->b - line->a);
+        for (size_t j = k; j < x->n && x->side[j].key - line->key <= window; j++) {
+            struct side *s = &x->side[j];
+            if (s->line != SIZE_MAX || off_line(line, s->a) > x->near ||
+                off_line(line, s->b) > x->near)
+                continue;
+            s->line = k;
+            s->from = imp__dot(s->a - line->a, d);
+            s->till = imp__dot(s->b - line->a, d);
+        }
+    }
+}
+
+/* Two faces of one shape in one plane, on both sides: nothing is there. */
+static bool is_inner(const struct imp__edge_face *f, int n)
+{
+    return n == 2 && f[0].shape == f[1].shape && imp__length(f[0].in + f[1].in) < 1e-6;
+}
+
+static enum imp_status edge_add(struct building *x, const struct side *first, size_t n,
+                                double from, double till)
+{
+    struct imp__edges *out = x->out;
+    const size_t before = out->n_faces;
+    const struct side *long_one = NULL;
+    for (size_t k = 0; k < n; k++) {
+        const struct side *s = &first[k];
+        if (s->from > from + x->near || s->till < till - x->near) continue;
+        struct imp__edge_face *more =
+            imp__grow(x->ctx, out->face, &x->cap_faces, out->n_faces + 1, sizeof *more);
+        if (!more) return imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
+        out->face = more;
+        more[out->n_faces++] = s->face;
+        if (!long_one || s->till - s->from > long_one->till - long_one->from)
+            long_one = s;
+    }
+    const int faces = (int)(out->n_faces - before);
+    if (faces == 0 || is_inner(&out->face[before], faces)) {
+        out->n_faces = before;
+        return IMP_OK;
+    }
+    struct imp__edge *more =
+        imp__grow(x->ctx, out->edge, &x->cap_edges, out->n + 1, sizeof *more);
+    if (!more) return imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
+    out->edge = more;
+    const imp_v3 along =
+        (long_one->b - long_one->a) * (1 / (long_one->till - long_one->from));
+    more[out->n++] = (struct imp__edge){
+        long_one->a + along * (imp_max(from, long_one->from) - long_one->from),
+        long_one->a + along * (imp_min(till, long_one->till) - long_one->from), before,
+        faces};
+    return IMP_OK;
+}
+
+/* All edges of one line: between each cut and the next. */
+static enum imp_status line_cut(struct building *x, const struct side *first, size_t n)
+{
+    for (size_t k = 0; k < n; k++) {
+        x->cut[2 * k] = first[k].from;
+        x->cut[2 * k + 1] = first[k].till;
+    }
+    qsort(x->cut, 2 * n, sizeof *x->cut, by_value);
+    double from = x->cut[0];
+    for (size_t k = 1; k < 2 * n; k++) {
+        if (!(x->cut[k] - from > x->near)) continue;
+        /* The sides that may cover it: sorted by their beginning. */
+        size_t lo = 0, hi = 0;
+        while (hi < n && first[hi].from <= from + x->near) hi++;
+        while (lo < hi && first[lo].till < x->cut[k] - x->near) lo++;
+        const enum imp_status st = edge_add(x, first + lo, hi - lo, from, x->cut[k]);
+        if (st != IMP_OK) return st;
+        from = x->cut[k];
+    }
+    return IMP_OK;
+}
+
+enum imp_status imp__edges_build(const struct imp_scene *scene, struct imp__edges *out)
+{
+    enum imp_status st = IMP_OK;
+    struct building x = {.ctx = scene->ctx, .scene = scene, .out = out};
+    *out = (struct imp__edges){.ctx = scene->ctx};
+    if (scene->world)
+        IMP_TRY(imp__error(x.ctx, IMP_E_UNSUPPORTED,
+                           "derivatives by what moves are of scenes without instances"));
+    x.middle = (scene->lo + scene->hi) * 0.5;
+    x.size = imp__length(scene->hi - scene->lo);
+    x.near = NEAR * x.size;
+    IMP_TRY(sides_make(&x));
+    qsort(x.side, x.n, sizeof *x.side, by_key);
+    lines_find(&x);
+    qsort(x.side, x.n, sizeof *x.side, by_line);
+    for (size_t k = 0, n; k < x.n; k += n) {
+        for (n = 1; k + n < x.n && x.side[k + n].line == x.side[k].line;) n++;
+        IMP_TRY(line_cut(&x, &x.side[k], n));
+    }
+    out->until = imp__alloc(x.ctx, out->n + 1, sizeof *out->until);
+    if (!out->until) IMP_TRY(imp__error(x.ctx, IMP_E_NOMEM, "no memory for edges"));
+    double sum = 0;
+    for (size_t k = 0; k < out->n; k++)
+        out->until[k] = sum += imp__length(out->edge[k].b - out->edge[k].a);
+out:
+    imp__release(x.ctx, x.side);
+    imp__release(x.ctx, x.cut);
+    if (st != IMP_OK) imp__edges_free(out);
+    return st;
+}

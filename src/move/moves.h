@@ -1,0 +1,81 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Numbers that move things, and velocities: how a point of a shape, its normal and its area
+ * change by each of them. A mover is a shape or the camera with the numbers of one kind:
+ *
+ *     pose      e, a: every point X has the velocity  V = e + a x (X - c), c the centre (6)
+ *     scale     V = s (X - c) at the scale 1 of the shape as it is (1)
+ *     vertices  V = b_0 e_0 + b_1 e_1 + b_2 e_2, of a triangle with weights b (3 each)
+ *
+ * e: a translation in scene units; a: a rotation vector in radians. Velocities are linear in the
+ * numbers; each function that applies the map has its transpose beside it. Facets alone: the
+ * geometric normal is the same all over a triangle. */
+#ifndef IMP_MOVE_MOVES_H
+#define IMP_MOVE_MOVES_H
+
+#include "scene/located.h"
+
+enum imp__move_kind { IMP_MOVE_POSE, IMP_MOVE_SCALE, IMP_MOVE_VERTICES };
+#define IMP_MOVE_CAMERA (-1) /* in place of a shape */
+
+struct imp__mover {
+    enum imp__move_kind kind;
+    int shape; /* index in the scene, or IMP_MOVE_CAMERA */
+    imp_v3 centre;
+    size_t first, count; /* its numbers */
+};
+
+struct imp__moves {
+    const struct imp_scene *scene;
+    const struct imp_sensor *sensor;
+    int n_movers;
+    size_t cap_movers;
+    struct imp__mover *mover;
+    size_t n; /* numbers in all */
+};
+
+/* A point that is glued to its triangle, world. */
+struct imp__glued {
+    int shape, prim;
+    double b[3]; /* weights of the vertices, as the shape's indices have them */
+    imp_v3 p, n; /* place, and the unit geometric normal of either side */
+};
+
+struct imp__velocity {
+    imp_v3 v, n; /* of the point, and of its normal */
+    double area; /* of the logarithm of an area around it */
+};
+
+/* Without movers. imp__moves_free releases them. */
+struct imp__moves imp__moves_begin(const struct imp_scene *scene,
+                                   const struct imp_sensor *sensor);
+void imp__moves_free(struct imp__moves *moves);
+/* Adds a mover behind the last; its numbers are theta[first .. first + count). IMP_E_UNSUPPORTED:
+ * a shape that is not made of triangles, or a camera whose rays meet in no point. */
+enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kind,
+                               int shape);
+/* Does it move? By a mover that is not `but` (NULL: any). */
+bool imp__moves_shape(const struct imp__moves *moves, int shape,
+                      const struct imp__mover *but);
+
+/* The point of a triangle with these weights of its second and third vertex (located.h), or the
+ * one next to p. n: the side of the normal that is wanted. */
+struct imp__glued imp__glued_at(const struct imp_scene *scene, int shape,
+                                const struct imp_located *x, imp_v3 n);
+struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int prim,
+                                  imp_v3 p, imp_v3 n);
+
+/* Velocity along theta_dot [moves->n]; the transpose adds to theta_bar [moves->n]. */
+struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
+                                      const struct imp__glued *x,
+                                      const double *theta_dot);
+void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *x,
+                       const struct imp__velocity *bar, double *theta_bar);
+/* Velocity of what the camera sees at p through a fixed film position: origin and direction of
+ * the ray move with the camera, the distance is held. */
+imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 p,
+                            const double *theta_dot);
+void imp__camera_velocity_bar(const struct imp__moves *moves, imp_v3 p, imp_v3 bar,
+                              double *theta_bar);
+
+#endif

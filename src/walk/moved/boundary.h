@@ -1,0 +1,78 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The boundary of derivatives by what moves (moved.h): integrals over the edges of the scene, by
+ * which light jumps, of three kinds. V is the velocity of the edge, m normal to the plane of edge
+ * and line of sight, dl a length along the edge, phi the angle between it and the line.
+ *
+ *     film     where the camera sees an edge, the picture jumps: with x' the velocity of the
+ *              edge's picture at a fixed camera and N dl its normal on the film, times length,
+ *                  dI = int [L(-) - L(+)] x'.N dl
+ *     light    a line from a point y of a light, at distance t_y, passes a silhouette on its way to
+ *              a vertex x, at distance t_x behind it; m points away from the edge's faces:
+ *                  dI = -int dA_y dl Le cos_y sin(phi)/t_y^2 f W(x) m.(V - V_line),
+ *                  V_line = (t_y x' + t_x V_y)/(t_x + t_y): both ends of the line move
+ *     scatter  what a vertex x receives from scattered light and the sky jumps at every edge that
+ *              it sees; w is a direction from the edge to it:
+ *                  dI = int dl dw sin(phi) f W(x) [L(-m) - L(+m)] m.(V - x')
+ *
+ * x' is the velocity of a vertex that slides, along the chain from the camera. W(x), what the
+ * sensor makes of a unit of radiance times projected area that leaves x, is a connection to the
+ * camera, or the walk goes on from x by transposed kernels and is connected from there: a walk
+ * from an edge is a walk from a light with a sign. Edges are chosen by length. */
+#ifndef IMP_WALK_BOUNDARY_H
+#define IMP_WALK_BOUNDARY_H
+
+#include "moved.h"
+
+enum imp__boundary_kind { IMP_BOUNDARY_FILM, IMP_BOUNDARY_LIGHT, IMP_BOUNDARY_SCATTER };
+#define IMP_BOUNDARY_KINDS 3
+
+struct imp__boundary {
+    const struct imp_tracer *tracer;
+    const struct imp__moves *moves;
+    const struct imp__edges *edges;
+    imp_v3 camera; /* where its rays meet */
+    double size;   /* of the scene */
+    int n_lights;
+    double
+        *light_cdf; /* [n_emitters] of area lights, by area times radiance; last is 1 */
+};
+
+/* A velocity on which a flux depends: of a glued point, or of what the camera makes of one. */
+struct imp__flux_end {
+    struct imp__glued x;
+    imp_v3 bar;
+    bool camera;
+};
+
+/* What one draw brings to a film position: L times the sum of bar.V over its ends. */
+struct imp__flux {
+    struct imp__flux *next;
+    double px, py;
+    imp_spec L; /* by channels, over the density of the draw */
+    int n_ends;
+    struct imp__flux_end *end; /* [n_ends] */
+};
+
+/* IMP_E_UNSUPPORTED, with the name, as imp__moved_allowed, and where edges tear or shapes pass
+ * through each other. Ended by imp__boundary_free; edges must have been built of the scene. */
+enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
+                                    const struct imp__moves *moves,
+                                    const struct imp__edges *edges,
+                                    struct imp__boundary *out);
+void imp__boundary_free(struct imp__boundary *b);
+
+/* Draw `index` of a kind: what it brings, in the arena; the mean over draws of all kinds, summed,
+ * is the boundary's part of the derivative. NULL: nothing. *no_memory is set where there is none. */
+struct imp__flux *imp__boundary_draw(const struct imp__boundary *b,
+                                     struct imp_arena *arena,
+                                     enum imp__boundary_kind kind, int64_t index,
+                                     bool *no_memory);
+
+/* Along theta_dot: the sum of bar.V; its transpose, times bar, added to theta_bar. */
+double imp__flux_velocity(const struct imp__moves *moves, const struct imp__flux *flux,
+                          const double *theta_dot);
+void imp__flux_bar(const struct imp__moves *moves, const struct imp__flux *flux,
+                   double bar, double *theta_bar);
+
+#endif

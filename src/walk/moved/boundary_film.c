@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Edges as the camera sees them (boundary.h). */
+#include "boundary_parts.h"
+#include "kind/cleared.h"
+#include "walk/core/step.h"
+#include "walk/lights/light_step.h"
+
+/* Film velocity of a point at distance 1 whose velocity is W: (x.W, y.W). Of the direction of a
+ * ray by film position it is the inverse: differences over a pixel are exact to 1e-9 of a smooth
+ * film. */
+static void film_slopes(const struct imp_sensor *s, double px, double py, imp_v3 *x,
+                        imp_v3 *y)
+{
+    const double h = 1e-3, lens[2] = {0.5, 0.5};
+    struct imp_sensor_ray at, lo, hi;
+    s->ops->ray(s, px, py, lens, &at);
+    s->ops->ray(s, px - h, py, lens, &lo);
+    s->ops->ray(s, px + h, py, lens, &hi);
+    const imp_v3 a = (hi.d - lo.d) * (0.5 / h);
+    s->ops->ray(s, px, py - h, lens, &lo);
+    s->ops->ray(s, px, py + h, lens, &hi);
+    const imp_v3 b = (hi.d - lo.d) * (0.5 / h);
+    const imp_v3 across_b = imp__cross(b, at.d), across_a = imp__cross(at.d, a);
+    *x = across_b * (1 / imp__dot(a, across_b));
+    *y = across_a * (1 / imp__dot(b, across_a));
+}
+
+/* What the camera sees at a film position. */
+static imp_spec look(const struct imp__edge_draw *d, double px, double py)
+{
+    const struct imp_tracer *t = d->b->tracer;
+    const double lens[2] = {0.5, 0.5};
+    struct imp_sensor_ray ray;
+    struct imp_walk walk;
+    t->sensor->ops->ray(t->sensor, px, py, lens, &ray);
+    imp__walk_along(t, d->arena, imp__key_branch(d->key, 0, 1), &ray, 0, &walk);
+    return walk.L;
+}
+
+void imp__draw_film(struct imp__edge_draw *d)
+{
+    const struct imp__boundary *b = d->b;
+    const struct imp_sensor *sensor = b->tracer->sensor;
+    const double none[4] = {0};
+    struct imp_sensor_sample to;
+    if (!sensor->ops->connect || !imp__sensor_connect(sensor, &d->p, false, none, &to) ||
+        !imp__light_on_film(sensor, &to))
+        return;
+    const imp_v3 r = d->p - to.p;
+    if (imp__occluded_at(b->tracer->scene, 0, &to.p, &r, 0, 1 - IMP_BESIDE)) return;
+
+    imp_v3 x, y;
+    const double inverse = 1 / imp__length(d->p - b->camera);
+    film_slopes(sensor, to.px, to.py, &x, &y);
+    x *= inverse;
+    y *= inverse;
+    const double tangent[2] = {imp__dot(x, d->along), imp__dot(y, d->along)};
+    const double normal[2] = {-tangent[1], tangent[0]};
+    const double length = sqrt(imp__sqr(normal[0]) + imp__sqr(normal[1]));
+    if (!(length > 0)) return; /* it is seen end on */
+    const imp_v3 bar = x * normal[0] + y * normal[1];
+
+    /* A pixel is so wide at the distance 1. */
+    const double pixel = sqrt(1 / (imp__length(x) * imp__length(y))) * inverse;
+    const double beside = IMP_BESIDE / pixel / length;
+    const double dx = normal[0] * beside, dy = normal[1] * beside;
+    const imp_spec jump =
+        look(d, to.px - dx, to.py - dy) - look(d, to.px + dx, to.py + dy);
+    if (imp__is_zero(jump)) return;
+    struct imp__flux *f = imp__flux_add(d, 2);
+    if (!f) return;
+    f->px = to.px;
+    f->py = to.py;
+    f->L = jump * d->inv_pdf;
+    f->n_ends = 2;
+    const struct imp__glued at =
+        imp__edge_glued(b->edges, b->tracer->scene, d->edge, d->p);
+    f->end[0] = imp__flux_glued(&at, bar);
+    f->end[1] = imp__flux_glued(&at, -bar);
+    f->end[1].camera = true;
+}

@@ -1,0 +1,69 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Inside of boundary.h: what its three kinds of draws share. */
+#ifndef IMP_WALK_BOUNDARY_PARTS_H
+#define IMP_WALK_BOUNDARY_PARTS_H
+
+#include "boundary.h"
+#include "moved_chain.h"
+
+struct imp__edge_draw {
+    const struct imp__boundary *b;
+    struct imp_arena *arena;
+    struct imp_key key;
+    const struct imp__edge *edge;
+    imp_v3 p, along; /* the point, and the unit direction of the edge */
+    double inv_pdf;  /* length of all edges */
+    struct imp__flux *first, **end;
+    bool no_memory;
+};
+
+/* Random numbers of a draw; walks that leave it have others. */
+enum {
+    IMP_EDGE_WHICH,
+    IMP_EDGE_LIGHT,
+    IMP_EDGE_LIGHT_U,
+    IMP_EDGE_LIGHT_V,
+    IMP_EDGE_DIR_U,
+    IMP_EDGE_DIR_V,
+    IMP_EDGE_WALK
+};
+enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
+
+/* So far beside an edge, per distance to it, it is looked past; rays are traced in float, whose
+ * rounding is a tenth of that. */
+#define IMP_BESIDE 1e-5
+/* Surfaces nearer behind an edge, per size of the scene, are what it stands on. */
+#define IMP_CONTACT 2e-5
+
+/* A flux more, with room for n ends. NULL: no memory. */
+struct imp__flux *imp__flux_add(struct imp__edge_draw *d, int n);
+static inline struct imp__flux_end imp__flux_glued(const struct imp__glued *x, imp_v3 bar)
+{
+    return (struct imp__flux_end){*x, bar, false};
+}
+
+/* What light that arrives at `at` (a hit of this shape) along w brings to the sensor: from there,
+ * and over further vertices. Light: radiance times all factors but f W(x). `back`: vertices that
+ * follow behind the edge, for max_depth. fill: the ends that are not of the chain, n of them, and
+ * L_at, light where the chain has `depth` vertices (NULL: the same for all). slide: what the
+ * vertex's velocity counts. */
+struct imp__edge_light {
+    imp_v3 w;
+    imp_spec light;
+    const imp_spec *by_depth; /* [n_depths] in place of light; NULL: light */
+    int n_depths;
+    int behind; /* segments of the path behind x */
+    imp_v3 slide;
+    struct imp__flux_end end[2];
+    int n_ends;
+};
+void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
+                     const struct imp_surface *at, const struct imp__edge_light *light);
+
+/* ---- One draw of each kind ---- */
+void imp__draw_film(struct imp__edge_draw *d);
+void imp__draw_light(struct imp__edge_draw *d);
+void imp__draw_scatter(struct imp__edge_draw *d);
+
+#endif

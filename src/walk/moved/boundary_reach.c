@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * From a vertex behind an edge to the sensor: W(x) of boundary.h, by connections from that vertex
+ * and from those that a walk by transposed kernels meets on. The vertex slides along the chain from
+ * the camera, which is another one for each connection. */
+#include "boundary_parts.h"
+#include "kind/bsdf/transport.h"
+#include "kind/cleared.h"
+#include "math/warp.h"
+#include "walk/core/step.h"
+#include "walk/lights/light_step.h"
+
+/* A vertex of the chain, on the way to the camera. */
+struct link {
+    struct link *before; /* nearer to the edge; NULL: none */
+    struct imp__link_point x;
+    const struct imp_bsdf *bsdf;
+    struct imp_surface at;
+    struct imp_frame frame;
+    imp_v3 wi; /* local: where the light comes from */
+    imp_spec in[IMP_INPUTS_MAX];
+};
+
+static struct link *link_make(struct imp__edge_draw *d, struct link *before,
+                              const struct imp_hit *hit, const struct imp_surface *at,
+                              imp_v3 w)
+{
+    const struct imp_scene *scene = d->b->tracer->scene;
+    const struct imp_shape *shape = scene->shapes[hit->shape];
+    struct link *k = imp__arena_take(d->arena, 1, sizeof *k);
+    if (!k) {
+        d->no_memory = true;
+        return NULL;
+    }
+    const struct imp_texcoord place = {
+        .uv = {at->uv[0], at->uv[1]}, .p = at->p, .shape = shape, .prim = hit->prim};
+    const struct imp_located located = imp__located_hit(scene, shape, hit, at);
+    k->before = before;
+    k->x = imp__surface_point(scene, hit->shape, &located, at->ng);
+    k->bsdf = imp__shape_bsdf(scene, shape);
+    k->at = *at;
+    k->frame = (struct imp_frame){at->s, at->t, at->n};
+    k->wi = imp__to_local(&k->frame, -w);
+    imp__evaluate_inputs(k->bsdf, shape, &place, k->in);
+    return k;
+}
+
+/* The transposed kernel towards wo, local: f cos_o. */
+static imp_spec kernel(const struct link *k, imp_v3 wo)
+{
+    const struct imp_dirs dirs = {wo, k->wi, IMP_SMOOTH, 0};
+    imp_spec f;
+    imp__bsdf_transposed(k->bsdf, k->in, &dirs, &f);
+    return f;
+}
+
+/* All ends of a flux whose chain has `last` next to the camera. */
+static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_light *light,
+                     struct link *last, int depth, struct imp__flux *f)
+{
+    for (int k = 0; k < light->n_ends; k++) f->end[f->n_ends++] = light->end[k];
+    imp_v3 shift = light->slide;
+    /* From the edge to the camera; links lead the other way. */
+    for (int j = 0; j <= depth; j++) {
+        struct link *k = last, *after = NULL;
+        for (int i = j; i < depth; i++) {
+            after = k;
+            k = k->before;
+        }
+        struct imp__link_point x = k->x;
+        const imp_v3 from = after ? after->x.x.p : d->b->camera;
+        x.moved_bar = shift;
+        shift = imp__slide_bar(&x, imp__normalize(x.x.p - from));
+        f->end[f->n_ends++] = imp__flux_glued(&x.x, x.bar.v);
+    }
+    f->end[f->n_ends++] = (struct imp__flux_end){last->x.x, shift, true};
+}
+
+static void connect(struct imp__edge_draw *d, const struct imp__edge_light *light,
+                    struct link *k, int depth, imp_spec brings)
+{
+    const struct imp_tracer *t = d->b->tracer;
+    const double none[4] = {0};
+    struct imp_sensor_sample to;
+    struct imp_shadow shadow;
+    if (!t->sensor->ops->connect ||
+        !imp__sensor_connect(t->sensor, &k->at.p, false, none, &to) ||
+        !imp__light_on_film(t->sensor, &to))
+        return;
+    const imp_spec L = brings * kernel(k, imp__to_local(&k->frame, to.wo)) * to.weight;
+    if (imp__is_zero(L)) return;
+    imp__light_shadow_aim(&k->at, &to, &shadow);
+    if (imp__occluded_at(t->scene, 0, &shadow.o, &shadow.d, 0, shadow.reach)) return;
+    struct imp__flux *f = imp__flux_add(d, light->n_ends + depth + 2);
+    if (!f) return;
+    f->px = to.px;
+    f->py = to.py;
+    f->L = L;
+    ends_set(d, light, k, depth, f);
+}
+
+/* Light for a chain of depth + 1 vertices. False: the path would be too long. */
+static bool light_at(const struct imp_tracer *t, const struct imp__edge_light *light,
+                     int depth, imp_spec *L)
+{
+    const int max = t->integrator->max_depth;
+    if (light->by_depth) {
+        if (depth >= light->n_depths) return false;
+        *L = light->by_depth[depth];
+        return true;
+    }
+    *L = light->light;
+    return max < 0 || depth + 1 + light->behind <= max;
+}
+
+void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
+                     const struct imp_surface *at, const struct imp__edge_light *light)
+{
+    const struct imp_tracer *t = d->b->tracer;
+    struct link *k = link_make(d, NULL, hit, at, light->w);
+    imp_spec T = imp__spec(1), L;
+    for (int depth = 0; k && light_at(t, light, depth, &L); depth++) {
+        connect(d, light, k, depth, L * T);
+        /* The walk goes on: of Lambertian materials on the side it came from. */
+        const unsigned dims = IMP_EDGE_WALK + (unsigned)depth * IMP_EDGE_WALK_DIMS;
+        const double u[2] = {imp__u01(d->key, dims + IMP_EDGE_WALK_U),
+                             imp__u01(d->key, dims + IMP_EDGE_WALK_V)};
+        imp_v3 wo = imp__cosine_hemisphere(u), w;
+        const double pdf = imp__cosine_hemisphere_pdf(wo);
+        if (k->wi[2] < 0) wo[2] = -wo[2];
+        if (!(pdf > 0)) return;
+        T *= kernel(k, wo) * (1 / pdf);
+        const double most = imp__max3(T), survive = depth < 2 ? 1 : imp_min(most, 0.95);
+        if (!(imp__u01(d->key, dims + IMP_EDGE_SURVIVE) < survive) || !(most > 0)) return;
+        T *= 1 / survive;
+        struct imp_hit next;
+        struct imp_surface there;
+        w = imp__to_world(&k->frame, wo);
+        const imp_v3 o = imp__offset(k->at.p, k->at.ng, w);
+        if (!imp__intersect(t->scene, &o, &w, 0, INFINITY, &next)) return;
+        imp__hit_surface(t->scene, &next, &o, &w, &there);
+        k = link_make(d, k, &next, &there, w);
+    }
+}

@@ -1,0 +1,81 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Edges between a vertex and what it receives from the sky and from lit surfaces (boundary.h). */
+#include "boundary_parts.h"
+#include "math/warp.h"
+#include "walk/core/step.h"
+
+/* What arrives along a recorded walk from a vertex x, without the emission of a light that it
+ * meets first, which is glued to that. Vertex i of it has number i + before of the whole path. */
+static imp_spec arrives(const struct imp_tracer *t, const struct imp_walk *walk,
+                        int before)
+{
+    const int max = t->integrator->max_depth;
+    imp_spec L = {0}, T = imp__spec(1);
+    int number = before;
+    if (walk->dropped) return L;
+    for (const struct imp_vertex *v = walk->first; v; v = v->next, number++) {
+        const bool glued = v == walk->first && v->d.scatterer != IMP_AT_SKY;
+        if (!glued && (max < 0 || number < max)) L += T * v->e;
+        if (max < 0 || number + 1 < max) L += T * v->b;
+        T *= v->w;
+    }
+    return L;
+}
+
+static void look(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 to,
+                 struct imp_walk *walk)
+{
+    struct imp_sensor_ray ray = {.t_near = 0, .t_far = INFINITY};
+    ray.o = imp__offset(at->p, at->ng, to - at->p);
+    ray.d = imp__normalize(to - ray.o);
+    imp__walk_along(d->b->tracer, d->arena, imp__key_branch(d->key, 0, 1), &ray, 1, walk);
+}
+
+void imp__draw_scatter(struct imp__edge_draw *d)
+{
+    const struct imp__boundary *b = d->b;
+    const struct imp_tracer *tracer = b->tracer;
+    const struct imp_scene *scene = tracer->scene;
+    const int max = tracer->integrator->max_depth;
+    const double u[2] = {imp__u01(d->key, IMP_EDGE_DIR_U),
+                         imp__u01(d->key, IMP_EDGE_DIR_V)};
+    const imp_v3 w = imp__uniform_sphere(u);
+    struct imp_hit hit;
+    struct imp_surface at;
+    if (max >= 0 && max < 2) return;
+    if (!imp__intersect(scene, &d->p, &w, IMP_CONTACT * b->size, INFINITY, &hit)) return;
+    imp__hit_surface(scene, &hit, &d->p, &w, &at);
+
+    const imp_v3 turned = imp__cross(d->along, w);
+    const double sine = imp__length(turned);
+    if (!(sine > 0)) return;
+    const imp_v3 m = turned * (1 / sine);
+    const imp_v3 beside = m * (IMP_BESIDE * (hit.t + imp__length(d->p)));
+    struct imp_walk lo, hi;
+    look(d, &at, d->p - beside, &lo);
+    look(d, &at, d->p + beside, &hi);
+
+    const int depths = max < 0 ? 1 : max - 1;
+    imp_spec *jump = imp__arena_take(d->arena, (size_t)depths, sizeof *jump);
+    if (!jump) {
+        d->no_memory = true;
+        return;
+    }
+    bool any = false;
+    for (int k = 0; k < depths; k++) {
+        jump[k] = (arrives(tracer, &lo, k + 1) - arrives(tracer, &hi, k + 1)) *
+                  (sine * 4 * IMP_PI * d->inv_pdf);
+        any |= !imp__is_zero(jump[k]);
+    }
+    if (!any) return;
+    struct imp__edge_light light = {.w = w, .n_ends = 1, .slide = -m};
+    light.light = jump[0];
+    if (max >= 0) {
+        light.by_depth = jump;
+        light.n_depths = depths;
+    }
+    const struct imp__glued edge = imp__edge_glued(b->edges, scene, d->edge, d->p);
+    light.end[0] = imp__flux_glued(&edge, m);
+    imp__edge_reach(d, &hit, &at, &light);
+}

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Derivatives of a picture by what moves (move/moves.h). A film position and the directions in
+ * which a walk is scattered stay fixed; the point of a light sample, and emission that is met, are
+ * glued to the light. With these held, the derivative of a pixel is
+ *
+ *     interior   that of each walk's radiance: its vertices slide along fixed rays and over
+ *                light samples that move (moved_sweep.c)
+ *     boundary   integrals over edges, where what is seen past them jumps
+ *
+ * With v_k' the velocity of vertex k, V that of the surface there, n its normal, w the direction
+ * from vertex k on, u what the camera makes of a fixed film position:
+ *
+ *     v_0'     = u + d n.(V - u)/(n.d)
+ *     v_{k+1}' = v_k' + w n.(V - v_k')/(n.w)
+ *     d ln w_k = n'.w/(n.w)
+ *     d ln B_k = (n'.w + n.w')/(n.w) + (n_y'.w + n_y.w')/(n_y.w) - 2 w.(V_y - v_k')/d + d ln dA_y
+ *
+ * of Lambertian materials, w' the part of (V_y - v_k')/d across w. Of emission that is met the
+ * same holds as of a light sample: MIS weights are constants, so both techniques move one point in
+ * one way. (Li et al. 2018; Zhang et al. 2020.) */
+#ifndef IMP_WALK_MOVED_H
+#define IMP_WALK_MOVED_H
+
+#include "move/edges.h"
+#include "walk/core/walk.h"
+
+/* May walks of this tracer be differentiated by what moves? IMP_E_UNSUPPORTED with the name of
+ * what has no such derivative: a material, light, shape, medium, sensor or integrator. */
+enum imp_status imp__moved_allowed(const struct imp_tracer *tracer);
+
+/* Interior, reverse mode: adds adjoint times the derivative of the recorded walk's values to
+ * theta_bar [moves->n]. False: no memory. */
+bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
+                      const struct imp__moves *moves, const struct imp_walk *walk,
+                      imp_spec adjoint, double *theta_bar);
+
+#endif

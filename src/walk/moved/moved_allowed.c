@@ -1,0 +1,107 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What has a derivative by what moves that is whole, and what is refused by name (moved.h). */
+#include "base/context.h"
+#include "moved.h"
+#include "scene/instances.h"
+#include "scene/pose.h"
+
+extern const struct imp_bsdf_ops imp__diffuse, imp__twosided, imp__black;
+extern const struct imp_emitter_ops imp__area, imp__constant;
+
+static enum imp_status refuse(const struct imp_tracer *t, const char *what,
+                              const char *name, const char *kind, const char *why)
+{
+    return imp__error(t->scene->ctx, IMP_E_UNSUPPORTED,
+                      "derivatives by what moves: %s '%s' (%s) %s", what,
+                      name ? name : "", kind, why);
+}
+
+static bool is_textured(const struct imp_input *const *input, int n)
+{
+    for (int k = 0; k < n; k++)
+        if (input[k]->texture) return true;
+    return false;
+}
+
+static bool is_lambertian(const struct imp_bsdf *b)
+{
+    if (b->ops == &imp__twosided) {
+        for (int k = 0; k < b->n_child; k++)
+            if (!is_lambertian(b->child[k])) return false;
+        return true;
+    }
+    return b->ops == &imp__diffuse || b->ops == &imp__black;
+}
+
+static enum imp_status materials_allowed(const struct imp_tracer *t)
+{
+    for (int k = 0; k < t->scene->n_shapes; k++) {
+        const struct imp_shape *s = t->scene->shapes[k];
+        const struct imp_bsdf *b = imp__shape_bsdf(t->scene, s);
+        if (!is_lambertian(b))
+            return refuse(t, "material", b->name, b->ops->name,
+                          "is not Lambertian (diffuse, twosided)");
+        if (b->shaped || is_textured(b->input, b->n_in))
+            return refuse(t, "material", b->name, b->ops->name, "has a texture");
+    }
+    return IMP_OK;
+}
+
+static enum imp_status lights_allowed(const struct imp_tracer *t)
+{
+    for (int k = 0; k < t->scene->n_emitters; k++) {
+        const struct imp_emitter *e = t->scene->emitters[k];
+        if (e->ops != &imp__area && e->ops != &imp__constant)
+            return refuse(t, "light", e->name, e->ops->name,
+                          "is neither an area light nor a constant sky");
+        if (e->shaped || is_textured(e->input, e->n_in))
+            return refuse(t, "light", e->name, e->ops->name, "has a texture");
+        if (e->course)
+            return refuse(t, "light", e->name, e->ops->name, "changes with time");
+    }
+    return t->scene->n_environments < 2
+               ? IMP_OK
+               : imp__error(t->scene->ctx, IMP_E_UNSUPPORTED,
+                            "derivatives by what moves: there are several skies");
+}
+
+static enum imp_status walks_allowed(const struct imp_tracer *t)
+{
+    const struct imp_scene *scene = t->scene;
+    const struct imp_walk_integrator *i = t->integrator;
+    const char *why = scene->n_media + scene->n_bodies > 0 ? "there are media"
+                      : scene->wavelengths                 ? "walks carry wavelengths"
+                      : i->from_lights                     ? "walks begin at the lights"
+                      : i->ends_by != IMP_ENDS_BY_ROULETTE ? "walks end by absorption"
+                      : i->hide_emitters                   ? "emitters are hidden"
+                      : i->mixes || i->split > 1 || t->split > 1 || t->guide
+                          ? "directions have densities beside the material's"
+                      : t->kept ? "walks are kept"
+                                : NULL;
+    if (!why) return IMP_OK;
+    return imp__error(scene->ctx, IMP_E_UNSUPPORTED, "derivatives by what moves: %s",
+                      why);
+}
+
+static enum imp_status sensor_allowed(const struct imp_tracer *t)
+{
+    const struct imp_sensor *s = t->sensor;
+    imp_v3 centre;
+    if (!imp__pinhole(s, &centre))
+        return refuse(t, "sensor", s->name, s->ops->name,
+                      "has no point in which its rays meet");
+    if (s->gain) return refuse(t, "sensor", s->name, s->ops->name, "has an exposure");
+    if (s->open != s->close)
+        return refuse(t, "sensor", s->name, s->ops->name, "has a shutter");
+    return IMP_OK;
+}
+
+enum imp_status imp__moved_allowed(const struct imp_tracer *tracer)
+{
+    enum imp_status st = walks_allowed(tracer);
+    if (st == IMP_OK) st = sensor_allowed(tracer);
+    if (st == IMP_OK) st = materials_allowed(tracer);
+    if (st == IMP_OK) st = lights_allowed(tracer);
+    return st;
+}

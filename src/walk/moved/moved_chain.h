@@ -1,0 +1,83 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Links of a chain from the camera over points that move (moved.h), transposed: adjoints of the
+ * logarithm of a link become adjoints of velocities, and an adjoint of a point that slides along a
+ * ray becomes one of where the ray begins. */
+#ifndef IMP_WALK_MOVED_CHAIN_H
+#define IMP_WALK_MOVED_CHAIN_H
+
+#include "moved.h"
+
+/* A vertex: the glued point of its surface, and adjoints of its velocity. At the sky x.p is the
+ * direction. */
+struct imp__link_point {
+    struct imp__glued x;
+    struct imp__velocity bar; /* of the surface there: V, n', d ln dA */
+    imp_v3 moved_bar;         /* of v', the vertex itself */
+    bool sky;
+};
+
+static inline struct imp__link_point imp__surface_point(const struct imp_scene *scene,
+                                                        int shape,
+                                                        const struct imp_located *at,
+                                                        imp_v3 n)
+{
+    return (struct imp__link_point){.x = imp__glued_at(scene, shape, at, n)};
+}
+static inline struct imp__link_point imp__sky_point(imp_v3 d)
+{
+    return (struct imp__link_point){.x.p = d, .sky = true};
+}
+
+static inline imp_v3 imp__link_direction(const struct imp__link_point *from,
+                                         const struct imp__link_point *to)
+{
+    return to->sky ? to->x.p : imp__normalize(to->x.p - from->x.p);
+}
+
+/* Of d ln = n'.w/(n.w) at the beginning of a step in a fixed direction. */
+static inline void imp__direction_bar(struct imp__link_point *x, imp_v3 w, double bar)
+{
+    if (bar != 0) x->bar.n += w * (bar / imp__dot(x->x.n, w));
+}
+
+/* Of the logarithm of cos cos_y dA_y/d^2 between x, which slides, and y, which is glued. */
+static inline void imp__connection_bar(struct imp__link_point *x,
+                                       struct imp__link_point *y, double bar)
+{
+    if (bar == 0) return;
+    const imp_v3 r = y->x.p - x->x.p;
+    const double inverse = 1 / imp__length(r);
+    const imp_v3 w = r * inverse;
+    const double cosine = imp__dot(x->x.n, w), cosine_y = imp__dot(y->x.n, w);
+    x->bar.n += w * (bar / cosine);
+    y->bar.n += w * (bar / cosine_y);
+    y->bar.area += bar;
+    const imp_v3 turn = x->x.n * (1 / cosine) + y->x.n * (1 / cosine_y);
+    const imp_v3 apart = (turn - w * (imp__dot(w, turn) + 2)) * (bar * inverse);
+    y->bar.v += apart;
+    x->moved_bar -= apart;
+}
+
+/* The vertex that a ray along w meets slides along it: what its adjoint is to the surface it
+ * lies on, which is added there, and to a shift of the ray, which is returned. */
+static inline imp_v3 imp__slide_bar(struct imp__link_point *x, imp_v3 w)
+{
+    const imp_v3 across = x->x.n * (imp__dot(w, x->moved_bar) / imp__dot(x->x.n, w));
+    const imp_v3 shift = x->moved_bar - across;
+    x->bar.v += across;
+    x->moved_bar = (imp_v3){0};
+    return shift;
+}
+
+/* The first vertex of a walk through a fixed film position, whose ray begins at o: the end of
+ * the chain. Adds to theta_bar. */
+static inline void imp__camera_bar(const struct imp__moves *moves, imp_v3 o,
+                                   struct imp__link_point *first, double *theta_bar)
+{
+    const imp_v3 shift = imp__slide_bar(first, imp__normalize(first->x.p - o));
+    imp__camera_velocity_bar(moves, first->x.p, shift, theta_bar);
+    imp__velocity_bar(moves, &first->x, &first->bar, theta_bar);
+}
+
+#endif

@@ -1,0 +1,10 @@
+# A shape and a camera that the command line moves: the picture is another one, moved by nothing it
+# is the same, and what cannot move is named.
+render() { importon render -q -D res=8 --spp 4 "$@" -o x.pfm "$ROOT/scenes/cornell.xml" && cksum <x.pfm; }
+rest=$(render)
+[[ $(render --set tall_block.pose=0,0,0,0,0,0 --set camera.pose=0,0,0,0,0,0) == "$rest" ]] && echo at rest: the same
+[[ $(render --set tall_block.pose=20,0,0,0,0.3,0) != "$rest" ]] && echo a block that moves: another picture
+[[ $(render --set camera.pose=0,0,9,0,0,0) != "$rest" ]] && echo a camera that moves: another picture
+importon info --set tall_block.pose=20,0,0,0,0.3,0 "$ROOT/scenes/cornell.xml" | grep pose
+render --set white.pose=1,0,0,0,0,0
+render --set tall_block.pose=1,2

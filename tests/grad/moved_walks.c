@@ -1,0 +1,259 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The interior of derivatives by what moves: walks of a room whose vertices slide, against
+ * differences of the same walks with their triangles, lamp and camera moved in long double; what
+ * has no such derivative is refused by name. */
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include "math/rng.h"
+#include "moves_kit.h"
+#include "walk/moved/moved.h"
+
+static imp_context *ctx;
+
+struct room {
+    imp_scene *scene;
+    struct imp_tracer tracer;
+    struct imp_arena arena;
+    struct imp__moves moves;
+};
+
+static struct room room_of(const char *rest)
+{
+    char xml[8192];
+    struct room r;
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'>%s" ROOM_CAMERA ROOM_SHAPES "</scene>", rest, "", "",
+             "", "");
+    r.scene = test_scene_text(ctx, xml, IMP_RGB);
+    r.tracer = (struct imp_tracer){.scene = r.scene,
+                                   .integrator = imp__walk_integrator(r.scene),
+                                   .sensor = r.scene->sensors[0],
+                                   .seed = 3};
+    imp__arena_init(&r.arena, ctx);
+    r.moves = imp__moves_begin(r.scene, r.tracer.sensor);
+    return r;
+}
+static void room_free(struct room *r)
+{
+    imp__moves_free(&r->moves);
+    imp__arena_free(&r->arena);
+    imp_scene_destroy(r->scene);
+}
+
+/* ---- The same walk at moved places ------------------------------------------------------ */
+
+struct moved {
+    const struct room *room;
+    const double *theta;
+    real h;
+};
+struct place {
+    real p[3], n[3], area;
+};
+
+static struct place place_of(const struct moved *m, int shape,
+                             const struct imp_located *at)
+{
+    struct place out;
+    const struct triangle t =
+        triangle_moved(&m->room->moves, shape, at->prim, m->theta, m->h);
+    const double b[3] = {1 - (double)at->at[0] - (double)at->at[1], at->at[0], at->at[1]};
+    triangle_point(&t, b, out.p);
+    out.area = triangle_normal(&t, out.n);
+    return out;
+}
+
+/* cos cos_y dA_y/d^2 of the point p on x, and y. */
+static real connection(const real p[3], const struct place *x, const struct place *y)
+{
+    real r[3];
+    for (int i = 0; i < 3; i++) r[i] = y->p[i] - p[i];
+    const real d2 = dot_real(r, r);
+    return dot_real(x->n, r) * dot_real(y->n, r) * y->area / (d2 * d2);
+}
+
+static void ray_meets(const real o[3], const real w[3], const struct place *x, real p[3])
+{
+    real r[3];
+    for (int i = 0; i < 3; i++) r[i] = x->p[i] - o[i];
+    const real t = dot_real(x->n, r) / dot_real(x->n, w);
+    for (int i = 0; i < 3; i++) p[i] = o[i] + t * w[i];
+}
+
+/* Radiance of the recorded walk, sum of channels by `adjoint`: recorded values times what their
+ * geometry is at h over what it is at 0. */
+static real walk_moved(const struct moved *m, const struct imp_walk *walk,
+                       const double adjoint[3])
+{
+    const struct moved rest = {m->room, m->theta, 0};
+    const struct imp_scene *scene = m->room->scene;
+    real from[3], from0[3], w[3], T[3] = {1, 1, 1}, L = 0;
+    const struct imp_vertex *first = walk->first;
+    for (int c = 0; c < 3; c++) L += adjoint[c] * (real)first->e[c];
+    if (first->d.scatterer == IMP_AT_SKY) return L;
+    /* The camera's ray, through its centre and where the first vertex is at rest. */
+    const struct place seen = place_of(&rest, first->d.shape, &first->d.located);
+    real aim[3];
+    for (int i = 0; i < 3; i++) {
+        aim[i] = seen.p[i];
+        from[i] = walk->ray.o[i];
+    }
+    for (int k = 0; k < m->room->moves.n_movers; k++) {
+        const struct imp__mover *x = &m->room->moves.mover[k];
+        if (x->shape != IMP_MOVE_CAMERA) continue;
+        pose_apply(m->theta + x->first, x->centre, m->h, aim);
+        pose_apply(m->theta + x->first, x->centre, m->h, from);
+    }
+    for (int i = 0; i < 3; i++) w[i] = aim[i] - from[i];
+    for (const struct imp_vertex *v = first; v; v = v->next) {
+        const struct place x = place_of(m, v->d.shape, &v->d.located);
+        const struct place x0 = place_of(&rest, v->d.shape, &v->d.located);
+        real p[3], *p0 = from0;
+        ray_meets(from, w, &x, p);
+        for (int i = 0; i < 3; i++) p0[i] = x0.p[i];
+        if (v->d.connection == IMP_CONNECTED) {
+            const struct imp_light *l = &v->d.light;
+            const struct imp_emitter *e = scene->emitters[l->emitter];
+            real ratio;
+            if (e->shape) {
+                const struct place y = place_of(m, e->shape->index, &l->located);
+                const struct place y0 = place_of(&rest, e->shape->index, &l->located);
+                ratio = connection(p, &x, &y) / connection(p0, &x0, &y0);
+            } else {
+                const real d[3] = {l->d[0], l->d[1], l->d[2]};
+                ratio = dot_real(x.n, d) / dot_real(x0.n, d);
+            }
+            for (int c = 0; c < 3; c++) L += adjoint[c] * T[c] * (real)v->b[c] * ratio;
+        }
+        const struct imp_vertex *next = v->next;
+        if (!next || !v->d.goes_on) break;
+        const bool sky = next->d.scatterer == IMP_AT_SKY;
+        struct place y0 = {{0}, {0}, 0};
+        if (!sky) y0 = place_of(&rest, next->d.shape, &next->d.located);
+        for (int i = 0; i < 3; i++) w[i] = sky ? (real)next->d.p[i] : y0.p[i] - p0[i];
+        const real step = dot_real(x.n, w) / dot_real(x0.n, w);
+        real met = step;
+        if (!sky && next->d.met.emitter >= 0) {
+            const struct place y = place_of(m, next->d.shape, &next->d.located);
+            met = connection(p, &x, &y) / connection(p0, &x0, &y0);
+        }
+        for (int c = 0; c < 3; c++) {
+            L += adjoint[c] * T[c] * (real)v->w[c] * (real)next->e[c] * met;
+            T[c] *= (real)v->w[c] * step;
+        }
+        if (sky) break;
+        for (int i = 0; i < 3; i++) from[i] = p[i];
+    }
+    return L;
+}
+
+/* ---- Tests --------------------------------------------------------------------------------- */
+
+static void walks_test(const char *rest, const char *name,
+                       void (*add)(struct imp__moves *moves))
+{
+    struct room r = room_of(rest);
+    test_must(ctx, imp__moved_allowed(&r.tracer));
+    add(&r.moves);
+    double *theta = calloc(r.moves.n, sizeof *theta),
+           *bar = calloc(r.moves.n, sizeof *bar);
+    double error2 = 0, size2 = 0;
+    int n = 0, long_ones = 0;
+    for (int i = 0; i < 24 * 16 * 4; i++) {
+        const struct imp_arena_mark mark = imp__arena_mark(&r.arena);
+        struct imp_walk walk;
+        imp__walk_trace(&r.tracer, &r.arena, i % 24, i / 24 % 16, i / 384, &walk);
+        if (!walk.first || walk.dropped) continue;
+        const struct imp_key key = imp__key(1, 2, (uint64_t)i);
+        double adjoint[3];
+        for (uint32_t c = 0; c < 3; c++) adjoint[c] = imp__u01(key, c) - 0.3;
+        for (size_t k = 0; k < r.moves.n; k++) {
+            theta[k] = imp__u01(key, (uint32_t)(10 + k)) - 0.5;
+            bar[k] = 0;
+        }
+        imp__moved_sweep(&r.tracer, &r.arena, &r.moves, &walk,
+                         (imp_spec){adjoint[0], adjoint[1], adjoint[2], 0}, bar);
+        double derivative = 0;
+        for (size_t k = 0; k < r.moves.n; k++) derivative += bar[k] * theta[k];
+        real f[4];
+        const real h = 2e-5L;
+        for (int k = 0; k < 4; k++)
+            f[k] = walk_moved(&(struct moved){&r, theta, difference_at[k] * h}, &walk,
+                              adjoint);
+        const double ref = (double)difference(f, h);
+        error2 += imp__sqr(derivative - ref);
+        size2 += imp__sqr(ref);
+        n += ref != 0;
+        long_ones += walk.n > 3;
+        imp__arena_rewind(&r.arena, mark);
+    }
+    const double relative = sqrt(error2 / size2);
+    tap_ok(n > 60 && relative < 1e-6, "%s: %d walks, %d of more than 3 vertices # %.1e",
+           name, n, long_ones, relative);
+    free(theta);
+    free(bar);
+    room_free(&r);
+}
+
+static void add_block(struct imp__moves *m)
+{
+    test_must(ctx, imp__moves_add(m, IMP_MOVE_POSE, 2));
+    test_must(ctx, imp__moves_add(m, IMP_MOVE_SCALE, 2));
+}
+static void add_vertices(struct imp__moves *m)
+{
+    test_must(ctx, imp__moves_add(m, IMP_MOVE_VERTICES, 2));
+}
+static void add_lamp(struct imp__moves *m)
+{
+    test_must(ctx, imp__moves_add(m, IMP_MOVE_POSE, 3));
+    test_must(ctx, imp__moves_add(m, IMP_MOVE_SCALE, 3));
+}
+static void add_camera(struct imp__moves *m)
+{
+    test_must(ctx, imp__moves_add(m, IMP_MOVE_POSE, IMP_MOVE_CAMERA));
+}
+static void add_all(struct imp__moves *m)
+{
+    add_camera(m);
+    add_lamp(m);
+    add_block(m);
+    test_must(ctx, imp__moves_add(m, IMP_MOVE_POSE, 0));
+}
+
+static void refused(const char *rest, const char *word)
+{
+    struct room r = room_of(rest);
+    const enum imp_status st = imp__moved_allowed(&r.tracer);
+    const char *why = imp_last_error(ctx);
+    tap_ok(st == IMP_E_UNSUPPORTED && strstr(why, word), "refused # %s", why);
+    room_free(&r);
+}
+
+#define PATH   "<integrator type='path'><integer name='max_depth' value='5'/></integrator>"
+#define DIRECT "<integrator type='direct'/>"
+#define SKY    "<emitter type='constant'><rgb name='radiance' value='.4,.5,.6'/></emitter>"
+
+int main(void)
+{
+    ctx = test_context(1);
+    walks_test(DIRECT, "direct, a block", add_block);
+    walks_test(DIRECT, "direct, the lamp", add_lamp);
+    walks_test(DIRECT, "direct, the camera", add_camera);
+    walks_test(DIRECT SKY, "direct and a sky, all", add_all);
+    walks_test(PATH, "path, a block", add_block);
+    walks_test(PATH, "path, its vertices", add_vertices);
+    walks_test(PATH, "path, the lamp", add_lamp);
+    walks_test(PATH SKY, "path and a sky, all", add_all);
+    refused(PATH "<emitter type='point' id='bulb'/>", "'bulb'");
+    refused(PATH
+            "<bsdf type='plastic' id='wax'/><shape type='cube'><ref id='wax'/></shape>",
+            "'wax'");
+    refused("<integrator type='ptracer'/>", "begin at the lights");
+    refused("<integrator type='path'><boolean name='hide_emitters' value='true'/>"
+            "</integrator>",
+            "hidden");
+    imp_context_destroy(ctx);
+    return tap_done();
+}
