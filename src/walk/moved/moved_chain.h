@@ -35,13 +35,14 @@ static inline imp_v3 imp__link_direction(const struct imp__link_point *from,
     return to->sky ? to->x.p : imp__normalize(to->x.p - from->x.p);
 }
 
-/* Of d ln = n'.w/(n.w) at the beginning of a step in a fixed direction. */
+/* The adjoint of d ln = n'.w/(n.w) at the beginning of a step in a fixed direction. */
 static inline void imp__direction_bar(struct imp__link_point *x, imp_v3 w, double bar)
 {
     if (bar != 0) x->bar.n += w * (bar / imp__dot(x->x.n, w));
 }
 
-/* Of the logarithm of cos cos_y dA_y/d^2 between x, which slides, and y, which is glued. */
+/* The adjoint of the logarithm of cos cos_y dA_y/d^2 between x, which slides, and y, which is
+ * glued. */
 static inline void imp__connection_bar(struct imp__link_point *x,
                                        struct imp__link_point *y, double bar)
 {
