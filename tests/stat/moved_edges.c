@@ -134,8 +134,8 @@ static void derivatives_of(const char *rest, int spp, int draws, struct derivati
     t.seed = 5; /* the walks of the differences are others */
     imp__arena_init(&arena, ctx);
     for (int k = 0; k < 2; k++) {
-        test_must(ctx, imp__moves_add(&m, IMP_MOVE_POSE, 2 + k));
-        test_must(ctx, imp__moves_add(&m, IMP_MOVE_SCALE, 2 + k));
+        test_must(ctx, imp__moves_add(&m, IMP_MOVE_POSE, scene->n_shapes - 2 + k));
+        test_must(ctx, imp__moves_add(&m, IMP_MOVE_SCALE, scene->n_shapes - 2 + k));
     }
     test_must(ctx, imp__moves_add(&m, IMP_MOVE_POSE, IMP_MOVE_CAMERA));
     test_must(ctx, imp__edges_build(scene, &edges));
@@ -367,10 +367,17 @@ static void square_test(void)
 
 int main(void)
 {
+    char many[4096] = PATH;
     ctx = test_context(1);
     room_test("direct", DIRECT, 1024, 500000, 0.03, true);
     room_test("direct with a sky", DIRECT SKY, 1024, 800000, 0.05, false);
-    room_test("path", PATH, 1024, 500000, 0.03, false);
+    /* So many facets, behind the camera, that rays are traced in float. */
+    for (int k = 0; k < 8; k++)
+        snprintf(many + strlen(many), sizeof many - strlen(many),
+                 "<shape type='cube'><transform name='to_world'><scale value='.05'/>"
+                 "<translate x='%d' y='-9'/></transform></shape>",
+                 k - 4);
+    room_test("path, many facets", many, 1024, 600000, 0.03, false);
     together_test();
     square_test();
     imp_context_destroy(ctx);
