@@ -24,6 +24,7 @@ static void all_rows(enum imp_color_mode mode, const char *name, const char *def
     char worst[128] = "none";
     test_must(ctx, imp_problem_create(scene, &p));
     test_must(ctx, imp_problem_activate(p, "*"));
+    o.draws_s = 0.02;
     o.paths = 400;
     o.fresh_spp = 24;
     run.seed = seed;

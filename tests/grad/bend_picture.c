@@ -72,6 +72,7 @@ static void checked(const char *what, const char *body, const char *glob, int sp
     size_t n;
     int failed = 0, seen = 0;
     double frozen = 0, dot = 0, z = 0;
+    o.draws_s = 0.02;
     o.paths = 200;
     o.fresh_spp = spp;
     run.seed = 7;

@@ -57,6 +57,8 @@ static struct found frozen(imp_scene *s, uint64_t seed)
     struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
     struct imp_run run = IMP_RUN_INIT;
     size_t n;
+    o.only = "frozen,dot,euler,fresh,loss,ends";
+    o.draws_s = 0.02;
     o.paths = PATHS;
     o.fresh_spp = 1;
     run.seed = seed;

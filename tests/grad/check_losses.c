@@ -55,6 +55,8 @@ static struct found check(imp_problem *p)
     const struct imp_check_row *rows;
     struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
     size_t n;
+    o.only = "frozen,dot,euler,fresh,loss,ends";
+    o.draws_s = 0.02;
     o.paths = 10;
     o.fresh_spp = 1;
     test_must(ctx, imp_check(p, &o, NULL, &rows, &n));

@@ -432,6 +432,7 @@ static void fresh(const char *colour)
     double worst = 0, noise = 0;
     int seen = 0;
     begin(&s, ball_of("box", colour), "ball.*", 2, IMP_LOSS_L2);
+    o.draws_s = 0.02;
     o.paths = 10;
     o.fresh_spp = 2048;
     test_must(ctx, imp_check(s.problem, &o, &s.run, &rows, &n));

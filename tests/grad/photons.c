@@ -306,6 +306,7 @@ static void checks(void)
         double worst = 0;
         run.spp = 256;
         run.seed = 5;
+        o.draws_s = 0.02;
         o.paths = 300;
         test_must(ctx, imp_check(p, &o, &run, &rows, &n));
         for (size_t i = 0; i < n; i++) {

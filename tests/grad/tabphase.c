@@ -97,6 +97,7 @@ static void checked(int fresh_spp)
     const struct imp_check_row *rows;
     size_t n;
     int frozen = 0, fresh = 0, wrong = 0;
+    o.draws_s = 0.02;
     o.paths = 400;
     o.fresh_spp = fresh_spp;
     test_must(ctx, imp_check(p, &o, NULL, &rows, &n));

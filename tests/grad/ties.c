@@ -275,6 +275,7 @@ static void checks(void)
     const struct imp_run run = run_of(4, 5);
     const struct imp_check_row *rows;
     size_t n_rows, ok = 0;
+    o.draws_s = 0.02;
     o.paths = 100;
     o.fresh_spp = 16;
     test_must(ctx, imp_check(p, &o, &run, &rows, &n_rows));

@@ -314,6 +314,7 @@ static void rows_of(bool bump, const char *nested, enum imp_color_mode mode)
     texels_of(s, texel, &info);
     test_must(ctx, imp_problem_create(s, &p));
     test_must(ctx, imp_problem_activate(p, info.name));
+    o.draws_s = 0.02;
     o.paths = 400;
     o.fresh_spp = 2000;
     run.seed = 3;

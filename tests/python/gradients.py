@@ -159,10 +159,10 @@ def test_adjoint_images():
 def test_check():
     """check passes, and a row says so"""
     s = box()
-    c = im.check(s, RED, spp=16, paths=100)
+    c = im.check(s, RED, spp=16, paths=100, draws_time=0.1)
     assert c and c.ok and not c.failed and len(c) == len(list(c)) and {r.method for r in c} >= {"frozen", "dot", "fresh"}
     assert "<table>" in c._repr_html_() and "ok" in repr(c[0])
-    assert im.check(s, RED, im.render(s, spp=4, seed=9), spp=16, paths=20)
+    assert im.check(s, RED, im.render(s, spp=4, seed=9), spp=16, paths=20, draws_time=0.1)
 
 
 TUTORIAL = '''

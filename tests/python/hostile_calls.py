@@ -92,7 +92,7 @@ class World:
             lambda: im.jacobian(scene, params, spp=spp),
             lambda: im.fit(scene, target, params, max_iterations=self.maybe(2), spp=2, optimizer=self.maybe("adam"),
                            intervals=self.maybe(False), checkpoint=self.maybe(None)),
-            lambda: im.check(scene, params, spp=2, paths=5, fresh_spp=2),
+            lambda: im.check(scene, params, spp=2, paths=5, fresh_spp=2, draws_time=0.01),
             lambda: im.compare(picture, self.maybe(picture)), lambda: im.write(self.maybe("a.exr"), picture),
             lambda: im.read(self.maybe("a.exr")), lambda: picture[values(r)], lambda: picture + values(r),
             lambda: picture._repr_html_(), lambda: picture.__reduce__(),

@@ -39,7 +39,7 @@ def test_modes():
     s = box(mode="single")
     target = im.render(s, spp=64, seed=9)
     e = im.loss(s, target, RED, spp=16, wavelengths="independent")
-    assert np.isfinite(e.grad[RED]).all() and im.check(s, RED, spp=64, paths=40, wavelengths="importance")
+    assert np.isfinite(e.grad[RED]).all() and im.check(s, RED, spp=64, paths=40, draws_time=0.1, wavelengths="importance")
     assert float(im.loss(s, target, RED, spp=16, wavelengths="importance")) != float(e)
     raises(im.ArgumentError, lambda: im.render(s, wavelengths="stratifed"), "stratified")
     raises(im.ArgumentError, lambda: im.render(s, spp=16, wavelength_set=-1))

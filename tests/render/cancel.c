@@ -150,6 +150,8 @@ static void checks(int at)
     const struct imp_check_row *rows = NULL;
     size_t n = 0;
     struct imp_run run = stopped_run(at);
+    o.only = "frozen,dot,euler,fresh,loss,ends";
+    o.draws_s = 0.02;
     o.fresh_spp = MANY;
     double before[N], after[N];
     imp_problem_get_x(problem, before);

@@ -50,6 +50,8 @@ static enum imp_status run_job(enum job job, struct fail_alloc *heap, long fail_
         const struct imp_check_row *rows;
         size_t n;
         struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
+        o.only = "frozen,dot,euler,fresh,loss,ends";
+        o.draws_s = 0.02;
         o.paths = 10;
         st = imp_check(p, &o, &run, &rows, &n);
     } else if (ready && job == FUNCTIONAL) {

@@ -26,6 +26,7 @@ static void rows(imp_context *ctx, imp_scene *s)
     struct imp_run run = IMP_RUN_INIT;
     const struct imp_check_row *all;
     size_t n, same = 0, sized = 0;
+    o.draws_s = 0.02;
     o.paths = 20, o.fresh_spp = 2, run.spp = 2;
     test_must(ctx, imp_check(p, &o, &run, &all, &n));
     for (size_t k = 0; k < n; k++) {

@@ -126,6 +126,7 @@ static void checked(const char *integrator, const char *things)
     const struct imp_check_row *rows;
     size_t n;
     int wrong = 0;
+    o.draws_s = 0.02;
     o.paths = 100;
     o.fresh_spp = 256;
     test_must(ctx, imp_check(p, &o, &run, &rows, &n));

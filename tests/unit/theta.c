@@ -169,6 +169,8 @@ static void listeners(imp_context *ctx)
     struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
     struct imp_run run = IMP_RUN_INIT;
     run.spp = 1;
+    o.only = "frozen,dot,euler,fresh,loss,ends";
+    o.draws_s = 0.02;
     o.paths = 8, o.fresh_spp = 4;
     test_must(ctx, imp_check(p, &o, &run, &rows, &n));
     tap_ok(sum.n_calls > 4 && sum.sum == 0.875 && twice.sum == 1.75,

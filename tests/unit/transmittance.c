@@ -136,6 +136,7 @@ static void derivatives(const char *estimator, double tight)
     struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
     const struct imp_check_row *rows;
     size_t n;
+    o.draws_s = 0.02;
     o.paths = 200;
     o.fresh_spp = 4096;
     test_must(ctx, imp_check(p, &o, &run, &rows, &n));

@@ -9,7 +9,7 @@ importon render "$ROOT/scenes/stam.xml" --guide -q -o c.exr 2>&1 | grep -c 'fini
 offices=$ROOT/scenes/elements/offices.xml
 importon render "$offices" -m mono -D res=4 --spp 64 -q --from lights --guide -o c.exr --json | grep -o '"complete":true'
 importon gradient "$offices" -m mono -D res=4 --spp 8 -q --from lights --guide --guide-share .25 -p 'wall*' | grep -c reflectance
-importon check "$offices" -m mono -D res=4 --spp 8 -q --from lights --guide -p 'wall*' | grep -c '^ends'
+importon check --draws-time 0.1 "$offices" -m mono -D res=4 --spp 8 -q --from lights --guide -p 'wall*' | grep -c '^ends'
 importon render "$offices" -m mono -D res=4 -D integrator=bdpt --guide -q -o c.exr 2>&1 | grep -c 'follow no guide'
 importon render "$offices" -m mono -D res=4 --from lights --guide --guide-roulette 1 -q -o c.exr 2>&1 | grep -c 'leave it out'
 python3 - <<END

@@ -15,7 +15,7 @@ for spp in 1 17; do # replicates have one size, and Gauss-Newton wants four samp
     done
 done
 importon jacobian "$scene" -D res=8 --spp 5 -q -o J5 --json | grep -o '"spp[_a-z]*":[0-9]*' | xargs
-importon check "$scene" -D res=8 --spp 5 --paths 20 -q --json | grep -o '"spp[_a-z]*":[0-9]*' | xargs
+importon check --draws-time 0.1 "$scene" -D res=8 --spp 5 --paths 20 -q --json | grep -o '"spp[_a-z]*":[0-9]*' | xargs
 importon gradient "$scene" -D res=8 --spp 4 -q | head -n 1 | grep -o '(.*'
 importon jacobian "$scene" -D res=8 --spp 16 -q -o J --json >jacobian.json || exit 9
 importon jacobian "$scene" -D res=8 --spp 16 -q -o J | grep -c 'is blue, .* red$'

@@ -28,7 +28,7 @@ full p.png -- importon render "$furnace" --spp 1 -q -o p.png
 full p.npy -- importon render "$furnace" --spp 1 -q -o p.npy
 full walks.txt p.exr -- importon render "$furnace" --spp 1 -q --paths walks.txt --count 3 -o p.exr
 full answer -- importon info "$furnace" -o answer
-full answer -- importon check "$furnace" --paths 10 --fresh-spp 2 -q -o answer
+full answer -- importon check "$furnace" --draws-time 0.1 --paths 10 --fresh-spp 2 -q -o answer
 full answer -- importon compare "$target" "$target" -o answer
 full out/mean.exr -- importon jacobian "$furnace" --spp 2 -q -o out
 full out/target.png out/before.exr out/loss.csv out/recovered.txt -- \

@@ -44,7 +44,7 @@ P
 rm -r r
 importon render "$ROOT/scenes/furnace.xml" -D res=8 --spp 8 --seed 3 -q --se -o target.exr --no-preview
 importon fit "$ROOT/scenes/furnace.xml" -D res=8 -T target.exr -p 'ball.*' --set ball.reflectance.value=0.8 --spp 8 -n 3 --optimizer lm -q -o r >/dev/null
-importon check "$ROOT/scenes/furnace.xml" -D res=8 --spp 4 -p 'ball.*' --json -o r/check.json -q
+importon check --draws-time 0.1 "$ROOT/scenes/furnace.xml" -D res=8 --spp 4 -p 'ball.*' --json -o r/check.json -q
 importon report r -q || exit 9
 python3 - <<'P'
 exec(open("read.py").read())

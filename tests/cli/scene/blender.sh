@@ -133,5 +133,5 @@ XML
 importon info scene.xml | sed -n 's/  .*//p' || exit 9
 importon info --json scene.xml | grep -c '"not_supported":\[\]'
 importon render -q -o picture.exr scene.xml || exit 9
-importon check -q --paths 50 --spp 16 --param 'mat-*' scene.xml > checked || cat checked
+importon check -q --draws-time 0.1 --paths 50 --spp 16 --param 'mat-*' scene.xml > checked || cat checked
 rm -r scene.xml picture.exr checked meshes textures fragments

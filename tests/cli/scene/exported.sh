@@ -51,5 +51,5 @@ XML
 importon info exported.xml | sed -n 's/  .*//p' || exit 9
 importon render -q -o exported.exr exported.xml || exit 9
 importon info --json exported.xml | grep -c '"not_supported":\[\]'
-importon check -q --paths 50 --spp 16 --param 'Spot.*' --param 'World.*' exported.xml > checked || cat checked
+importon check -q --draws-time 0.1 --paths 50 --spp 16 --param 'Spot.*' --param 'World.*' exported.xml > checked || cat checked
 rm exported.xml exported.exr checked
