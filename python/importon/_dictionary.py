@@ -5,6 +5,7 @@ from __future__ import annotations
 import builtins
 import ctypes
 import os
+import tempfile
 from collections.abc import Mapping, Sequence
 from typing import Any, Optional
 
@@ -14,6 +15,7 @@ from ._array import address, numbers
 from ._library import ArgumentError, Handle, context, lib, not_inside, text, warn_said
 from ._objects import grid_of, is_array, is_mesh, matrix_of, mesh_of, pixels_of
 from ._scene import Scene, _load_options
+from ._tables import TABLES
 from ._transform import Transform4f
 
 # Keys under which an object takes what would be in a file, by its type.
@@ -22,9 +24,11 @@ _GRID = ("grid", "data", "filename")
 
 
 class _Builder:
-    def __init__(self, scene: int, ids: Mapping[str, str]) -> None:
+    def __init__(self, scene: int, ids: Mapping[str, str], folder: str) -> None:
         self.scene = scene
         self.ids = ids  # by the keys of objects at the top that have an id of their own
+        self.folder = folder  # for the files of arrays, until the scene is made
+        self.files = 0
 
     def number(self, name: str, value: Any) -> None:
         key = text(name, "name")
@@ -88,6 +92,15 @@ class _Builder:
             if is_array(d.get(key)) or hasattr(d.get(key), "srgb_gamma"):
                 p = pixels_of(d.pop(key), "%s: %s" % (name, key), bool(d.get("raw", False)))
                 lib.imp_scene_image(self.scene, p.shape[1], p.shape[0], p.shape[2], address(p))
+        make, ending = TABLES.get(type, (None, ""))
+        content = make(d, name) if make else None
+        if content is not None:
+            if "filename" in d:
+                raise ArgumentError("%s: arrays and a filename: one of them is wanted" % name)
+            self.files += 1
+            d["filename"] = os.path.join(self.folder, "%d%s" % (self.files, ending))
+            with open(d["filename"], "wb") as file:
+                file.write(content)
         for key in _GRID if type == "gridvolume" else ():
             if is_array(d.get(key)):
                 g = grid_of(d.pop(key), "%s: %s" % (name, key))
@@ -160,7 +173,10 @@ def load_dict(dictionary: Mapping[str, Any], *, mode: Optional[str] = None, sear
         of which uint8 and uint16 are those of a file (sRGB unless "raw"), floats linear,
         and alpha is left out; a "gridvolume" takes "grid" or "data", [nz][ny][nx] or
         [nz][ny][nx][1 or 3]; a "mesh" takes "vertex_positions" [n][3], "faces" [m][3],
-        "vertex_normals" and "vertex_texcoords", or "mesh", an object that has them.
+        "vertex_normals" and "vertex_texcoords", or "mesh", an object that has them; curves take
+        "control_points" [n][4] (x, y, z, radius) or a list of these; "ies" takes "candela"
+        [horizontal][vertical] with "vertical_angles" and "horizontal_angles" in degrees;
+        "merl" takes "data" [half angles][difference angles][azimuths][3] in 1/sr.
     mode, search, upsampling, parallel, optimize
         As `load_file`'s.
 
@@ -200,12 +216,13 @@ def load_dict(dictionary: Mapping[str, Any], *, mode: Optional[str] = None, sear
     ctx.check(lib.imp_scene_create(ctx.pointer, ctypes.byref(options), ctypes.byref(out)))
     handle = Handle(out.value or 0, lib.imp_scene_destroy)
     own = {k: v["id"] for k, v in d.items() if isinstance(v, Mapping) and isinstance(v.get("id"), str)}
-    builder = _Builder(handle.pointer, {k: id for k, id in own.items() if k not in own.values()})
-    for name, value in d.items():
-        if not isinstance(name, str):
-            raise TypeError("the key %r is no string" % (name,))
-        builder.value(name, value, True)
-    ctx.check(lib.imp_scene_commit(handle.pointer))
+    with tempfile.TemporaryDirectory(prefix="importon-") as folder:
+        builder = _Builder(handle.pointer, {k: id for k, id in own.items() if k not in own.values()}, folder)
+        for name, value in d.items():
+            if not isinstance(name, str):
+                raise TypeError("the key %r is no string" % (name,))
+            builder.value(name, value, True)
+        ctx.check(lib.imp_scene_commit(handle.pointer))
     del kept
     warn_said()
     return Scene(handle, ctx, "dictionary")

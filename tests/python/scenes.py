@@ -253,6 +253,53 @@ def test_grids():
     raises(im.Error, lambda: fog(grid=cells * np.nan), "values[0]")
 
 
+def test_tables():
+    """Curves, luminaires and measured materials from arrays are those of their files; errors name the key"""
+    rng = np.random.default_rng(11)
+    strand = np.column_stack([rng.random((6, 3)) - .5, np.full(6, .06)])
+    other = strand + np.array([.2, .1, 0, 0])
+    angles, turns, candela = np.array([0., 30, 60, 90]), np.array([0., 90]), 5 + rng.random((2, 4))
+    unit = np.array([1, 1.15, 1.66]) / 1500
+    measured = .1 + .2 * rng.random((9, 9, 18, 3))
+    measured[3, 2, 4, 1] = -1 # not measured
+
+    def picture(name, **thing):
+        d = dictionary()
+        if name == "merl":
+            d["ball"]["bsdf"] = {"type": "merl", **thing}
+        else:
+            d[name] = {"type": name, **thing}
+        return np.array(im.render(im.load_dict(d), spp=4))
+
+    with warnings.catch_warnings(), tempfile.TemporaryDirectory() as folder:
+        warnings.simplefilter("ignore", im.ImportonWarning)
+        path = os.path.join(folder, "a")
+
+        def written(text, ending):
+            with open(path + ending, "wb") as f:
+                f.write(text)
+            return path + ending
+        lines = ["\n".join("%.17g %.17g %.17g %.17g" % tuple(p) for p in c) + "\n" for c in (strand, other)]
+        ies = "IESNA:LM-63-1995\nTILT=NONE\n1 -1 1 4 2 1 2 0 0 0\n1 1 0\n0 30 60 90\n0 90\n" + " ".join("%.17g" % x for x in candela.ravel())
+        table = struct.pack("<3i", 9, 9, 18) + b"".join((measured[..., c] / unit[c]).astype("<f8").tobytes() for c in range(3))
+        plain = picture("ball2", type="sphere", radius=1e-3)
+        for name, text, ending, arrays in (
+                ("bsplinecurve", lines[0].encode(), ".txt", {"control_points": strand}),
+                ("bsplinecurve", lines[0].encode(), ".txt", {"control_points": strand.tolist()}),
+                ("bsplinecurve", "\n".join(lines).encode(), ".txt", {"control_points": [strand, other]}),
+                ("linearcurve", "\n".join(lines).encode(), ".txt", {"control_points": np.stack([strand, other])}),
+                ("ies", ies.encode(), ".ies", {"candela": candela, "vertical_angles": angles, "horizontal_angles": turns}),
+                ("merl", table, ".binary", {"data": measured})):
+            file = picture(name, filename=written(text, ending))
+            assert np.array_equal(picture(name, **arrays), file) and not np.array_equal(file, plain), name
+            raises(im.ArgumentError, lambda: picture(name, filename=path + ending, **arrays), name if name != "merl" else "bsdf", "filename")
+    raises(im.ArgumentError, lambda: picture("bsplinecurve", control_points=strand[:, :3]), "control_points", "4")
+    raises(im.ArgumentError, lambda: picture("bsplinecurve", control_points=strand * np.nan), "control_points", "finite")
+    raises(im.ArgumentError, lambda: picture("ies", candela=candela), "vertical_angles", "4 angles")
+    raises(im.ArgumentError, lambda: picture("ies", candela=candela, vertical_angles=turns), "vertical_angles")
+    raises(im.ArgumentError, lambda: picture("merl", data=measured[..., 0]), "data")
+
+
 def test_objects_of_others():
     """Objects with .matrix, meshes, numbers as arrays; what cannot be read is named"""
     class Transform:
