@@ -158,6 +158,47 @@ class Scene:
             raise ArgumentError("there is no sensor %d (there are %d)" % (i, len(self.sensors)))
         return i
 
+    def add_pose(self, name: str) -> str:
+        """Make the pose of a shape or a camera a parameter.
+
+        It is six numbers away from where the scene file has the object: a translation in scene
+        units, and a rotation vector in radians about the middle of the shape's box or the
+        camera's own place. Setting them moves the object; `functional` and `render_backward`
+        have their gradient, where the parameter is named. To be called before anything has
+        been computed from the scene, and before `traverse`.
+
+        Parameters
+        ----------
+        name : str
+            Of a mesh, cube, rectangle or perspective camera.
+
+        Returns
+        -------
+        str
+            Of the parameter.
+
+        Raises
+        ------
+        ArgumentError
+            There is no such object, or the scene has been used.
+        UnsupportedError
+            It cannot be moved, with the reason.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> name = scene.add_pose("light")
+        >>> params = importon.traverse(scene)
+        >>> params["light.pose"]
+        array([0., 0., 0., 0., 0., 0.])
+        >>> params["light.pose"] = [0.2, 0, 0, 0, 0, 0.1]
+        """
+        not_inside()
+        with self.lock:
+            self._context.check(lib.imp_scene_add_pose(self.pointer, text(name, "name")))
+            self._table = None
+        return name + ".pose"
+
     @property
     def pointer(self) -> int:
         if self._handle.closed:

@@ -144,6 +144,41 @@ def test_dlpack():
     assert np.shares_memory(np.from_dlpack(np.asarray(out)), out)
 
 
+def test_poses():
+    """A pose moves what the dictionary's transform moves; functional has its gradient; bad names are named"""
+    shift, h, spp = np.array([.2, -.3, .1]), 0.02, 256
+
+    def moved(by=None, translate=(0, 0, 0)):
+        d = im.cornell_box(res=12)
+        d["integrator"]["max_depth"] = 2
+        d["light"]["to_world"] = im.ScalarTransform4f().translate(list(translate)) @ d["light"]["to_world"]
+        del d["small-box"], d["large-box"], d["ceiling"]
+        s = im.load_dict(d)
+        assert s.add_pose("light") == "light.pose"
+        p = im.traverse(s)
+        assert p["light.pose"].shape == (6,) and p.info("light.pose").differentiable
+        if by is not None:
+            p["light.pose"] = by
+        return s
+    at = np.array([*shift, 0, 0, 0])
+    assert np.allclose(im.render(moved(at), spp=4), im.render(moved(None, shift), spp=4), rtol=1e-4, atol=1e-5)
+    got = im.functional(moved(at), "light.pose", spp=1024, seed=3)
+    g, se = got.grad["light.pose"], got.grad.se["light.pose"]
+    for k in (2, 3):  # along the lamp, and about the x axis: differences with the same random numbers
+        step = np.zeros(6)
+        step[k] = h
+        pairs = [[im.functional(moved(at + sign * step), "white.*", spp=spp, seed=seed).value for sign in (1, -1)]
+                 for seed in range(12)]
+        d = np.array([(a - b) / (2 * h) for a, b in pairs])
+        z = (g[k] - d.mean()) / np.hypot(se[k], d.std(ddof=1) / len(d) ** .5)
+        assert abs(z) < 4 and se[k] < .25 * abs(g[k]), (k, g, se, d.mean(), z)
+    raises(im.ArgumentError, lambda: moved().add_pose("nobody"), "nobody")
+    used = moved()
+    im.functional(used, "white.*", spp=2)
+    raises(im.ArgumentError, lambda: used.add_pose("floor"), "problem")
+    return "the mean along z %.4f +- %.4f, about x %.4f +- %.4f" % (g[2], se[2], g[3], se[3])
+
+
 def test_time():
     """Reading or setting a number takes less than 20 us; loading the package 50 ms beyond NumPy"""
     p = im.traverse(box())
