@@ -357,7 +357,9 @@ class Fixture:
             s.pixels = C.addressof(self.array(C.c_float, 48, [0.25] * 48))
         if name == "imp_team": s.gather = C.cast(self.keep.append(C.CFUNCTYPE(C.c_int)(lambda: 0)) or self.keep[-1], C.c_void_p)
         if name == "imp_fit_options": s.max_iterations = 2
-        if name == "imp_check_options": s.paths, s.fresh_spp = 8, 4
+        if name == "imp_check_options":
+            self.keep.append(C.create_string_buffer(b"frozen,dot,euler,fresh,loss,ends,film"))
+            s.paths, s.fresh_spp, s.draws_s, s.only = 8, 4, 1e-3, C.addressof(self.keep[-1])
         if name == "imp_selftest_options": s.samples, s.directions = 1000, 1
         if name == "imp_run": s.spp = 2
         if name == "imp_elements_fit_options": s.targets, s.max_iterations = doubles(1, .1), 2
