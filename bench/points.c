@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Points in sets against independent points, of any scene: variance over seeds, processor
- * time, and errors as they are told over those that are seen (docs/decisions.md).
+ * time, and estimated standard errors over the spread of seeds (docs/decisions.md).
  *
  *     points JOB SCENE [spp [seeds [GLOB [NAME=VALUE]...]]]
  *
@@ -57,7 +57,7 @@ static double processor(void)
 struct sums {
     size_t n;     /* values; one more is the number beside them */
     double *mean; /* [n + 1] */
-    double *m2, *told;
+    double *m2, *reported;
     double seconds;
     int seeds;
 };
@@ -67,7 +67,7 @@ static void add(struct sums *s, size_t i, double x, double se)
     const double d = x - s->mean[i];
     s->mean[i] += d / (s->seeds + 1);
     s->m2[i] += d * (x - s->mean[i]);
-    s->told[i] += se * se;
+    s->reported[i] += se * se;
 }
 
 /* ---- One job ------------------------------------------------------------------------ */
@@ -91,7 +91,7 @@ static void sums_begin(struct sums *s, size_t n)
     s->n = n;
     s->mean = zeros(3 * (n + 1), sizeof *s->mean);
     s->m2 = s->mean + n + 1;
-    s->told = s->m2 + n + 1;
+    s->reported = s->m2 + n + 1;
 }
 static void film_add(struct sums *s, size_t first, imp_film *film)
 {
@@ -166,7 +166,8 @@ static void row(const char *name, const struct sums *one, const struct sums *set
                 size_t from, size_t end)
 {
     double *ratio = zeros(3 * (end - from), sizeof *ratio);
-    double *told = ratio + (end - from), *told_one = told + (end - from), z2 = 0;
+    double *reported = ratio + (end - from), *reported_one = reported + (end - from),
+           z2 = 0;
     size_t n = 0;
     for (size_t i = from; i < end; i++) {
         if (!(one->m2[i] > 0) || !(sets->m2[i] > 0)) continue;
@@ -175,17 +176,17 @@ static void row(const char *name, const struct sums *one, const struct sums *set
                      d = one->mean[i] - sets->mean[i];
         z2 += d * d / (a / one->seeds + b / sets->seeds);
         ratio[n] = b / a;
-        told[n] = sqrt(sets->told[i] / sets->seeds / b);
-        told_one[n++] = sqrt(one->told[i] / one->seeds / a);
+        reported[n] = sqrt(sets->reported[i] / sets->seeds / b);
+        reported_one[n++] = sqrt(one->reported[i] / one->seeds / a);
     }
     if (n > 0) {
         qsort(ratio, n, sizeof *ratio, by_value);
-        qsort(told, n, sizeof *told, by_value);
-        qsort(told_one, n, sizeof *told_one, by_value);
+        qsort(reported, n, sizeof *reported, by_value);
+        qsort(reported_one, n, sizeof *reported_one, by_value);
         printf("%-8s %6zu  variance %.3f (%.3f to %.3f)  told/seen %.3f, independent "
                "%.3f  z^2 %.2f  time %.3f\n",
-               name, n, ratio[n / 2], ratio[n / 4], ratio[3 * n / 4], told[n / 2],
-               told_one[n / 2], z2 / (double)n, sets->seconds / one->seconds);
+               name, n, ratio[n / 2], ratio[n / 4], ratio[3 * n / 4], reported[n / 2],
+               reported_one[n / 2], z2 / (double)n, sets->seconds / one->seconds);
     }
     free(ratio);
 }
