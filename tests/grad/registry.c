@@ -558,7 +558,7 @@ static void frozen(imp_problem *p, const char *what, bool at_bound)
     struct imp_run run = IMP_RUN_INIT;
     const struct imp_check_row *rows;
     size_t n;
-    o.only = "frozen,dot,euler,fresh,loss,ends";
+    o.only = is_long ? "frozen,dot,euler,fresh,loss,ends" : "frozen,dot,euler,loss";
     o.draws_s = 0.02;
     o.paths = is_long ? 1000 : 60;
     o.fresh_spp = with_fresh ? 512 : 1;
