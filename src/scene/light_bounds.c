@@ -129,14 +129,19 @@ static void around(double lo, double hi, float *out_lo, float *out_hi)
     *out_hi = nextafterf((float)hi, INFINITY);
 }
 
+static float gain_of(double cos_normals, double cos_reach)
+{
+    return (float)(1 / (cos_reach < 1 ? mean_cosine(cos_normals)
+                                      : fmax(0.5 * (1 - cos_normals), 1e-9)));
+}
+
 static void cone_set(struct imp_light_node *node, imp_v3 axis, double cos_normals,
                      double cos_reach)
 {
     for (int k = 0; k < 3; k++) node->axis[k] = (float)axis[k];
     node->cos_normals = (float)cos_normals;
     node->cos_reach = (float)cos_reach;
-    node->gain = (float)(1 / (cos_reach < 1 ? mean_cosine(cos_normals)
-                                            : fmax(0.5 * (1 - cos_normals), 1e-9)));
+    node->gain = gain_of(cos_normals, cos_reach);
 }
 
 /* Corners of a triangle: their places, and the narrowest cone about their mean normal. */
@@ -201,42 +206,58 @@ void imp__light_cone(const struct imp_emitter *e, struct imp_light_node *node)
     cone_set(node, axis, cosine, 1);
 }
 
-/* The narrowest cone around two (PBR 4e, section 3.8.4). */
-static void cone_union(const struct imp_light_node *a, const struct imp_light_node *b,
-                       struct imp_light_node *out)
+double imp__light_angle(const struct imp_light_node *node)
+{
+    return acos(imp_clamp((double)node->cos_normals, -1.0, 1.0));
+}
+
+/* The narrowest cone around two of half angles ta, tb (PBR 4e, section 3.8.4); its cosine. */
+static double cone_union(const struct imp_light_node *a, double ta,
+                         const struct imp_light_node *b, double tb, imp_v3 *axis)
 {
     const imp_v3 wa = imp__v3(a->axis[0], a->axis[1], a->axis[2]),
                  wb = imp__v3(b->axis[0], b->axis[1], b->axis[2]);
-    const double reach = fmin((double)a->cos_reach, (double)b->cos_reach);
-    const double ta = acos(imp_clamp((double)a->cos_normals, -1.0, 1.0)),
-                 tb = acos(imp_clamp((double)b->cos_normals, -1.0, 1.0));
+    *axis = wa;
+    if (ta >= IMP_PI) return (double)a->cos_normals;
+    *axis = wb;
+    if (tb >= IMP_PI) return (double)b->cos_normals;
     const imp_v3 turn = imp__cross(wa, wb);
     const double sine = imp__length(turn), td = atan2(sine, imp__dot(wa, wb));
-    if (fmin(td + tb, IMP_PI) <= ta) {
-        cone_set(out, wa, (double)a->cos_normals, reach);
-        return;
-    }
-    if (fmin(td + ta, IMP_PI) <= tb) {
-        cone_set(out, wb, (double)b->cos_normals, reach);
-        return;
-    }
+    *axis = wa;
+    if (imp_min(td + tb, IMP_PI) <= ta) return (double)a->cos_normals;
+    *axis = wb;
+    if (imp_min(td + ta, IMP_PI) <= tb) return (double)b->cos_normals;
     const double to = 0.5 * (ta + td + tb) + 1e-6;
-    if (to >= IMP_PI || !(sine > 1e-12)) {
-        cone_set(out, imp__v3(0, 0, 1), -1, reach);
-        return;
-    }
+    *axis = imp__v3(0, 0, 1);
+    if (to >= IMP_PI || !(sine > 1e-12)) return -1;
     const double by = to - 1e-6 - ta;
     const imp_v3 across = imp__cross(turn * (1 / sine), wa);
-    cone_set(out, imp__normalize(wa * cos(by) + across * sin(by)), cos(to) - 1e-6, reach);
+    *axis = imp__normalize(wa * cos(by) + across * sin(by));
+    return cos(to) - 1e-6;
+}
+
+double imp__light_enclose(const struct imp_light_node *a, double ta,
+                          const struct imp_light_node *b, double tb,
+                          struct imp_light_node *out)
+{
+    imp_v3 axis;
+    const double cos_normals = cone_union(a, ta, b, tb, &axis);
+    for (int k = 0; k < 3; k++) {
+        out->lo[k] = imp_min(a->lo[k], b->lo[k]);
+        out->hi[k] = imp_max(a->hi[k], b->hi[k]);
+        out->axis[k] = (float)axis[k];
+    }
+    out->cos_normals = (float)cos_normals;
+    out->cos_reach = imp_min(a->cos_reach, b->cos_reach);
+    return cos_normals;
 }
 
 void imp__light_union(const struct imp_light_node *a, const struct imp_light_node *b,
                       struct imp_light_node *out)
 {
-    for (int k = 0; k < 3; k++) {
-        out->lo[k] = fminf(a->lo[k], b->lo[k]);
-        out->hi[k] = fmaxf(a->hi[k], b->hi[k]);
-    }
-    cone_union(a, b, out);
-    out->strength = a->strength + b->strength;
+    const float strength = a->strength + b->strength;
+    const double cos_normals =
+        imp__light_enclose(a, imp__light_angle(a), b, imp__light_angle(b), out);
+    out->gain = gain_of(cos_normals, (double)out->cos_reach);
+    out->strength = strength;
 }

@@ -89,6 +89,13 @@ double imp__light_triangle_radiance(const struct imp_scene *scene,
 void imp__light_bound(const struct imp_emitter *e, int prim, struct imp_light_node *node);
 /* The cone alone, of lights whose parameters move it. */
 void imp__light_cone(const struct imp_emitter *e, struct imp_light_node *node);
+/* Half angle of the cone of normals. */
+double imp__light_angle(const struct imp_light_node *node);
+/* Box and cones around two whose half angles are ta, tb; out may be one of them, and keeps its
+ * other fields. The cosine of out's cone before it is rounded. */
+double imp__light_enclose(const struct imp_light_node *a, double ta,
+                          const struct imp_light_node *b, double tb,
+                          struct imp_light_node *out);
 /* The node around both. */
 void imp__light_union(const struct imp_light_node *a, const struct imp_light_node *b,
                       struct imp_light_node *out);

@@ -20,33 +20,49 @@
 
 /* ---- Shape ----------------------------------------------------------------------- */
 
-struct split {
-    struct imp_light_tree *t;
-    struct imp_light_node *bound; /* [n_items] */
-    int32_t *order;               /* [n_items] items, of a node next to each other */
+/* A node, and the half angle of its cone of normals, which sums over bins ask for often. */
+struct bound {
+    struct imp_light_node node;
+    double angle;
 };
 
-static double centre(const struct imp_light_node *n, int k)
+struct split {
+    struct imp_light_tree *t;
+    struct bound *bound; /* [n_items] */
+    int32_t *order;      /* [n_items] items, of a node next to each other */
+};
+
+static inline double centre(const struct bound *b, int k)
 {
-    return 0.5 * ((double)n->lo[k] + n->hi[k]);
+    return 0.5 * ((double)b->node.lo[k] + b->node.hi[k]);
+}
+
+static void enclose(const struct bound *a, const struct bound *b, struct bound *out)
+{
+    const float cos_a = a->node.cos_normals, cos_b = b->node.cos_normals;
+    const double angle_a = a->angle, angle_b = b->angle;
+    imp__light_enclose(&a->node, angle_a, &b->node, angle_b, &out->node);
+    out->angle = out->node.cos_normals == cos_a   ? angle_a
+                 : out->node.cos_normals == cos_b ? angle_b
+                                                  : imp__light_angle(&out->node);
 }
 
 /* Solid angle of the normals, and of what leaves around them with its cosine (PBR 4e, Eq.
  * 12.12). */
-static double directions(const struct imp_light_node *n)
+static double directions(const struct bound *b)
 {
-    const double o = acos(imp_clamp((double)n->cos_normals, -1.0, 1.0)),
-                 e = acos(imp_clamp((double)n->cos_reach, -1.0, 1.0));
-    const double w = fmin(o + e, IMP_PI);
+    const double o = b->angle, e = acos(imp_clamp((double)b->node.cos_reach, -1.0, 1.0));
+    const double w = imp_min(o + e, IMP_PI);
     return IMP_2PI * (1 - cos(o)) +
            IMP_PI / 2 * (2 * w * sin(o) - cos(o - 2 * w) - 2 * o * sin(o) + cos(o));
 }
 
-static double cost(const struct imp_light_node *n, int count)
+static double cost(const struct bound *b, int count)
 {
+    const struct imp_light_node *n = &b->node;
     const double x = (double)n->hi[0] - n->lo[0], y = (double)n->hi[1] - n->lo[1],
                  z = (double)n->hi[2] - n->lo[2];
-    return count * directions(n) * (x * y + y * z + z * x);
+    return count * directions(b) * (x * y + y * z + z * x);
 }
 
 /* Where to cut [first, end) of the order: moves items, returns the first of the second
@@ -60,43 +76,45 @@ static int cut(struct split *s, int first, int end, int depth)
         hi[k] = -INFINITY;
         for (int i = first; i < end; i++) {
             const double c = centre(&s->bound[s->order[i]], k);
-            lo[k] = fmin(lo[k], c);
-            hi[k] = fmax(hi[k], c);
+            lo[k] = imp_min(lo[k], c);
+            hi[k] = imp_max(hi[k], c);
         }
     }
-    const double longest = fmax(hi[0] - lo[0], fmax(hi[1] - lo[1], hi[2] - lo[2]));
+    const double longest = imp_max(hi[0] - lo[0], imp_max(hi[1] - lo[1], hi[2] - lo[2]));
 #define BIN_OF(i, k)                                                                     \
     imp_min((int)((centre(&s->bound[i], k) - lo[k]) / (hi[k] - lo[k]) * BINS), BINS - 1)
     for (int k = 0; k < 3 && depth < DEPTH; k++) {
         if (!(hi[k] > lo[k])) continue;
-        struct imp_light_node in[BINS], below;
+        struct bound in[BINS], below;
         int count[BINS] = {0};
         double before[BINS];
         for (int i = first; i < end; i++) {
             const int b = BIN_OF(s->order[i], k);
-            const struct imp_light_node *n = &s->bound[s->order[i]];
-            if (count[b]++ == 0) in[b] = *n;
-            else imp__light_union(&in[b], n, &in[b]);
+            const struct bound *one = &s->bound[s->order[i]];
+            if (count[b]++ == 0) in[b] = *one;
+            else enclose(&in[b], one, &in[b]);
         }
         int n = 0;
+        double own = INFINITY; /* cost of the bins so far */
         for (int b = 0; b < BINS - 1; b++) {
             if (count[b]) {
                 if (n == 0) below = in[b];
-                else imp__light_union(&below, &in[b], &below);
+                else enclose(&below, &in[b], &below);
                 n += count[b];
+                own = cost(&below, n);
             }
-            before[b] = n ? cost(&below, n) : INFINITY;
+            before[b] = own;
         }
         n = 0;
         for (int b = BINS - 1; b > 0; b--) {
             if (count[b]) {
                 if (n == 0) below = in[b];
-                else imp__light_union(&below, &in[b], &below);
+                else enclose(&below, &in[b], &below);
                 n += count[b];
+                own = cost(&below, n);
             }
             if (n == 0) continue;
-            const double all =
-                (before[b - 1] + cost(&below, n)) * longest / (hi[k] - lo[k]);
+            const double all = (before[b - 1] + own) * longest / (hi[k] - lo[k]);
             if (all < best) {
                 best = all;
                 axis = k;
@@ -122,7 +140,7 @@ static void node_make(struct split *s, int first, int end, int parent, int depth
     const int at = t->n_nodes++;
     if (end - first == 1) {
         const int item = s->order[first];
-        t->node[at] = s->bound[item];
+        t->node[at] = s->bound[item].node;
         t->node[at].second = -1 - item;
         t->item[item].leaf = at;
     } else {
@@ -251,11 +269,12 @@ enum imp_status imp__light_tree_build(struct imp_scene *scene)
     items_fill(t);
     for (int i = 0; i < t->n_items; i++) {
         s.order[i] = i;
-        imp__light_bound(scene->emitters[t->item[i].emitter], t->item[i].prim,
-                         &s.bound[i]);
+        struct imp_light_node *node = &s.bound[i].node;
+        imp__light_bound(scene->emitters[t->item[i].emitter], t->item[i].prim, node);
         if (scene->emitters[t->item[i].emitter]->ops->cone) /* parameters move it */
-            s.bound[i].cos_normals = s.bound[i].cos_reach = -1;
-        s.bound[i].strength = 0;
+            node->cos_normals = node->cos_reach = -1;
+        node->strength = 0;
+        s.bound[i].angle = imp__light_angle(node);
     }
     if (t->n_items > 0) node_make(&s, 0, t->n_items, -1, 0);
     strengths_set(t);
