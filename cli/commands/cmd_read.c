@@ -2,7 +2,9 @@
  *
  * importon read: the numbers of a scene's sensors, means over their films, with standard
  * errors, units and derivatives; from either end, or from both to compare them. */
+#include "read/grid.h"
 #include "shared/command.h"
+#include "shared/overwrite.h"
 #include "shared/picture_files.h"
 #include "shared/problem_options.h"
 #include "text/progress.h"
@@ -14,13 +16,20 @@
 #define APART 5 /* standard errors between the ends that chance does not explain */
 
 static struct {
-    int ends;
+    int ends, grid;
+    const char *csv, *svg;
 } o;
 
 static const struct arg_option options[] = {
     {ARG_FLAG | ARG_REPLAYS, 0, "ends", NULL,
      "read by light tracing, too, and compare: exit status 1 if they differ", &o.ends, 0,
      0, NULL},
+    {ARG_FLAG | ARG_REPLAYS, 0, "grid", NULL,
+     "every pixel of an irradiancemeter: average, minimum, maximum, uniformity", &o.grid, 0,
+     0, NULL},
+    {ARG_TEXT, 0, "csv", "FILE", "the grid's points, values and errors as a table", &o.csv, 0,
+     0, NULL},
+    {ARG_TEXT, 0, "svg", "FILE", "the grid as a plan with isolines", &o.svg, 0, 0, NULL},
     {0}};
 
 struct findings {
@@ -207,6 +216,53 @@ static int sensor_read(imp_problem *problem, struct json *j, struct imp_run run,
     return rc;
 }
 
+/* Has the sensor a grid? */
+static int has_grid(int sensor)
+{
+    struct imp_sensor_info info = {.size = sizeof info};
+    double point[3];
+    if (imp_scene_get_sensor(cli.scene, sensor, &info) != IMP_OK) return 0;
+    if ((size_t)info.width * (size_t)info.height > 1)
+        return strcmp(info.type, "irradiancemeter") == 0;
+    return strcmp(info.type, "irradiancemeter") == 0 &&
+           imp_grid_points(cli.scene, sensor, point, NULL) == IMP_OK;
+}
+
+/* The grids of the sensors from `first` on that have one. */
+static int grids_read(struct json *j, struct imp_run run, int first, int end,
+                      struct findings *found, int *unlit, int *n_unlit)
+{
+    int n = 0, rc = 0;
+    for (int s = first; s < end; s++) n += has_grid(s);
+    if (n == 0)
+        return cli_error(EXIT_USAGE,
+                         "%s: no irradiancemeter on a rectangle is among its sensors, and "
+                         "--grid is of those",
+                         cli.scene_path);
+    if (n > 1 && (o.csv || o.svg))
+        return cli_error(EXIT_USAGE,
+                         "%s: it has %d grids, and --csv and --svg write one: choose it "
+                         "with --sensor",
+                         cli.scene_path, n);
+    for (int s = first; s < end && !rc; s++) {
+        struct grid g;
+        if (!has_grid(s)) continue;
+        run.sensor = s;
+        rc = grid_read(run, o.ends, &g);
+        if (rc) return rc;
+        found->apart |= o.ends && !(fabs(g.z) <= APART);
+        if (g.summary.average.value == 0 && g.summary.average.hi == 0)
+            unlit[(*n_unlit)++] = s;
+        grid_tell(&g);
+        if (cli.json) grid_json(j, &g);
+        else grid_print(&g);
+        if (o.csv) rc = grid_csv(o.csv, &g);
+        if (o.svg && !rc) rc = grid_svg(o.svg, &g);
+        grid_free(&g);
+    }
+    return rc;
+}
+
 /* Sensors to which no walk brought light. */
 static void unlit_tell(struct json *j, const int *sensor, int n)
 {
@@ -248,6 +304,13 @@ static int run_read(int n, char **operand)
         return cli_error(EXIT_USAGE, "%s: there is no sensor in it", cli.scene_path);
     if (cli.time_s > 0)
         return cli_error(EXIT_USAGE, "read takes --spp samples, and has no --time");
+    if (!o.grid && (o.csv || o.svg))
+        return cli_error(EXIT_USAGE, "--csv and --svg write a grid: they go with --grid");
+    if (o.grid && problem_options.params.n)
+        return cli_error(EXIT_USAGE, "--grid has no derivatives: it goes without --param");
+    if (o.csv) rc = overwrite_check(o.csv, OUTPUT_TABLE);
+    if (o.svg && !rc) rc = overwrite_check(o.svg, OUTPUT_CURVE);
+    if (rc) return rc;
     if (o.ends && cli.from)
         return cli_error(EXIT_USAGE, "--ends reads from both: it goes without --from");
     const enum imp_status st = imp_problem_create(cli.scene, &problem);
@@ -262,12 +325,13 @@ static int run_read(int n, char **operand)
     if (cli.json) {
         j = cli_json();
         json_integer(&j, "spp", cli_spp(&run));
-        json_array(&j, "readings");
+        json_array(&j, o.grid ? "grids" : "readings");
     }
     const int one = sensor_named(), first = one ? cli.sensor : 0;
     const int end = one ? first + 1 : scene.n_sensors;
     int *unlit = cli_alloc((size_t)scene.n_sensors, sizeof *unlit), n_unlit = 0;
-    for (int s = first; s < end && !rc; s++) {
+    if (o.grid && !rc) rc = grids_read(&j, run, first, end, &found, unlit, &n_unlit);
+    for (int s = first; s < end && !rc && !o.grid; s++) {
         run.sensor = s;
         found.lit = 0;
         rc = sensor_read(problem, &j, run, blocks, n_blocks, &found);

@@ -869,6 +869,9 @@ struct imp_sensor {
     /* With IMP_SENSOR_GROUP: sensors whose pictures are side by side in its film. */
     int n_child;
     const struct imp_sensor *const *child;
+    /* Of a sensor that is a surface: where on it and by which weight of directions it
+     * measures; NULL: the mean irradiance on its front. */
+    const struct imp_receiver *receiver;
 };
 enum imp_sensor_flags {
     IMP_SENSOR_AREA = 1,     /* its rays start on the shape that it belongs to */

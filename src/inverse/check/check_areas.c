@@ -13,6 +13,7 @@
  * check_directions.c, over all points in which a line leaves the shape. */
 #include "check_lobes.h"
 #include "check_sources.h"
+#include "kind/sensor/receiver.h"
 #include "math/offset.h"
 #include "math/rng.h"
 #include "math/warp.h"
@@ -193,7 +194,7 @@ enum imp_status imp__check_areas(struct imp__draw_list *l,
     const struct imp_tracer *t = &places->tracer;
     const struct imp_scene *scene = t->scene;
     const struct imp_shape *meter = t->sensor->shape;
-    if (meter && meter->ops->sample_area && meter->area > 0)
+    if (meter && !imp__is_unmet(t->sensor) && meter->ops->sample_area && meter->area > 0)
         IMP_TRY(surface_add(l, t, meter, NULL, "areas", t->sensor->name));
     for (int k = 0; k < scene->n_emitters; k++) {
         const struct imp_emitter *e = scene->emitters[k];

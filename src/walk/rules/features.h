@@ -54,6 +54,7 @@ struct imp_active;
     X(PARALLEL_SENSOR, "a sensor of one direction")                                      \
     X(RAY_SENSOR, "a sensor of one ray")                                                 \
     X(SURFACE_SENSOR, "a sensor that is a surface")                                      \
+    X(UNMET_SENSOR, "a meter at points, or whose shape is virtual")                      \
     X(CAMERA, "a sensor that is no surface")                                             \
     X(SENSOR_GROUP, "several sensors in one (batch)")                                    \
     X(EXPOSURE, "a film with an exposure")                                               \

@@ -1,0 +1,95 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * importon: what lighting designers ask of a scene. Grids of illuminances with averages,
+ * minima, maxima and uniformities, whose intervals hold for an extreme of noisy values, too;
+ * the share of each lamp and surface in a reading; the photometry of luminaires.
+ * docs/rooms.md. Same conventions as importon.h.
+ */
+#ifndef IMPORTON_ROOMS_H
+#define IMPORTON_ROOMS_H
+
+#include <importon/importon.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- Grids ------------------------------------------------------------------------ */
+
+/**
+ * The places that the pixels of an irradiancemeter stand for: the middle of each one's cell.
+ * @param sensor number of an irradiancemeter.
+ * @param[out] points  [height][width][3] of the crop window, scene units.
+ * @param[out] normals [height][width][3] the normal of its shape there, unit; may be NULL.
+ * @return IMP_OK; IMP_E_ARG if there is no such sensor, or it is no irradiancemeter on a
+ *         shape whose uv is a square.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status imp_grid_points(const imp_scene *scene, int sensor,
+                                                       double *points, double *normals);
+
+/**
+ * The readings of all pixels of a sensor, and their mean: luminance or illuminance of rgb and
+ * mono scenes. Of a film with several colours the error of a pixel is a bound, the sum of
+ * the colours' errors by their weights; a film of pixel format luminance has none of that.
+ * @param run      its sensor, end, seed and spp; NULL for defaults.
+ * @param[out] value [height][width] of the crop window, in the sensor's unit.
+ * @param[out] se    [height][width], one standard error each.
+ * @param[out] average the mean of all, with its own error: light walks reach many pixels,
+ *                  whose errors are not independent.
+ * @param[out] sets  independent sets of samples of a pixel from which the errors come, for
+ *                   imp_grid_summarise; may be NULL.
+ * @return IMP_OK; IMP_E_ARG; IMP_E_UNSUPPORTED for films of response curves or of XYZ, and
+ *         filters wider than a pixel; what imp_render refuses; IMP_E_NOMEM.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status imp_grid_read(imp_scene *scene,
+                                                     const struct imp_run *run,
+                                                     double *value, double *se,
+                                                     struct imp_estimate *average,
+                                                     int64_t *sets);
+
+/** A number, and an interval around what it estimates. */
+struct imp_interval_estimate {
+    double value, lo, hi;
+};
+
+struct imp_grid_summary {
+    size_t size;
+    size_t n;          /**< points that counted */
+    double confidence; /**< with which each interval by itself contains the truth, at least */
+    struct imp_interval_estimate average, minimum, maximum;
+    struct imp_interval_estimate uniformity; /**< minimum over average, U0 of EN 12464-1 */
+    struct imp_interval_estimate diversity;  /**< minimum over maximum, Ud */
+    size_t at_minimum, at_maximum;           /**< index of the least and the largest value */
+};
+#define IMP_GRID_SUMMARY_INIT IMP_INIT_ZERO(struct imp_grid_summary)
+
+/**
+ * Average, minimum, maximum and uniformities of a grid of noisy values, with intervals that
+ * hold for any dependence between the values.
+ *
+ * The least of noisy values lies below the least true value on average, so an interval of that
+ * value alone would not hold. With x_i and s_i of n points, and z(p) the normal (with `sets`,
+ * Student's) quantile, the minimum m of the true values mu_i has
+ *     P(m < min_i (x_i - z(1 - a) s_i)) <= a, as it is so for the point where m is taken;
+ *     P(m > min_i (x_i + z(1 - a/n) s_i)) <= a, as m <= mu_i for all i (Bonferroni).
+ * The second is conservative where few points are near the minimum: coverage is confidence or
+ * more, never less. Ratios take bounds of both numbers, the risks added.
+ * @param value   [n], finite.
+ * @param se      [n], finite, not negative.
+ * @param average as imp_grid_read gives it; NULL: the mean of value, whose errors are
+ *                then taken as independent.
+ * @param sets    of imp_grid_read; below 2: errors are taken as exact.
+ * @param confidence in (0, 1); 0: .95.
+ * @param[out] out set out->size first.
+ * @return IMP_OK; IMP_E_ARG for n = 0 or numbers out of their range.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_grid_summarise(imp_context *context, size_t n, const double *value, const double *se,
+                   const struct imp_estimate *average, int64_t sets, double confidence,
+                   struct imp_grid_summary *out);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
