@@ -16,7 +16,7 @@
 #define APART 5 /* standard errors between the ends that chance does not explain */
 
 static struct {
-    int ends, grid;
+    int ends, grid, shares;
     const char *csv, *svg;
 } o;
 
@@ -27,6 +27,8 @@ static const struct arg_option options[] = {
     {ARG_FLAG | ARG_REPLAYS, 0, "grid", NULL,
      "every pixel of an irradiancemeter: average, minimum, maximum, uniformity", &o.grid, 0,
      0, NULL},
+    {ARG_FLAG | ARG_REPLAYS, 0, "shares", NULL,
+     "what each lamp and each material has to do with the readings", &o.shares, 0, 0, NULL},
     {ARG_TEXT, 0, "csv", "FILE", "the grid's points, values and errors as a table", &o.csv, 0,
      0, NULL},
     {ARG_TEXT, 0, "svg", "FILE", "the grid as a plan with isolines", &o.svg, 0, 0, NULL},
@@ -228,6 +230,48 @@ static int has_grid(int sensor)
            imp_grid_points(cli.scene, sensor, point, NULL) == IMP_OK;
 }
 
+/* The reading of a sensor, and the rows of lamps and materials. */
+static int shares_read(struct json *j, const struct imp_run *run, struct findings *found)
+{
+    struct imp_sensor_info info = {.size = sizeof info};
+    struct imp_estimate reading;
+    struct imp_share *share = NULL;
+    size_t n;
+    enum imp_status st = imp_scene_get_sensor(cli.scene, run->sensor, &info);
+    if (st == IMP_OK) st = imp_reading_shares(cli.scene, run, NULL, 0, &n, NULL);
+    if (st == IMP_OK) {
+        share = cli_alloc(n + 1, sizeof *share);
+        st = imp_reading_shares(cli.scene, run, share, n + 1, &n, &reading);
+    }
+    if (st != IMP_OK) {
+        free(share);
+        return cli_fail(st, cli.scene_path);
+    }
+    number_print(j, &info, "Y", reading, (struct imp_estimate){0, 0, 0}, found);
+    if (cli.json) json_array(j, "shares");
+    for (size_t k = 0; k < n; k++) {
+        const struct imp_share *s = &share[k];
+        const char *of = s->of == IMP_SHARE_LIGHT ? "light" : "material";
+        const double part = reading.value > 0 ? s->value / reading.value : 0;
+        if (s->of == IMP_SHARE_SURFACE && s->value == 0 && s->se == 0) continue;
+        if (cli.json) {
+            json_object(j, NULL);
+            json_text(j, "of", of);
+            json_text(j, "name", s->name);
+            json_number(j, "value", s->value);
+            json_number(j, "se", s->se);
+            json_number(j, "part", part);
+            json_end_object(j);
+        } else {
+            printf("    %-8s %-23s %-12.6g +- %-8.2g %s %7.1f %%\n", of, s->name, s->value,
+                   s->se, info.unit, 100 * part);
+        }
+    }
+    if (cli.json) json_end_array(j), json_end_object(j);
+    free(share);
+    return 0;
+}
+
 /* The grids of the sensors from `first` on that have one. */
 static int grids_read(struct json *j, struct imp_run run, int first, int end,
                       struct findings *found, int *unlit, int *n_unlit)
@@ -308,6 +352,8 @@ static int run_read(int n, char **operand)
         return cli_error(EXIT_USAGE, "--csv and --svg write a grid: they go with --grid");
     if (o.grid && problem_options.params.n)
         return cli_error(EXIT_USAGE, "--grid has no derivatives: it goes without --param");
+    if (o.shares && (o.grid || o.ends || problem_options.params.n))
+        return cli_error(EXIT_USAGE, "--shares goes without --grid, --ends and --param");
     if (o.csv) rc = overwrite_check(o.csv, OUTPUT_TABLE);
     if (o.svg && !rc) rc = overwrite_check(o.svg, OUTPUT_CURVE);
     if (rc) return rc;
@@ -334,7 +380,8 @@ static int run_read(int n, char **operand)
     for (int s = first; s < end && !rc && !o.grid; s++) {
         run.sensor = s;
         found.lit = 0;
-        rc = sensor_read(problem, &j, run, blocks, n_blocks, &found);
+        rc = o.shares ? shares_read(&j, &run, &found)
+                      : sensor_read(problem, &j, run, blocks, n_blocks, &found);
         if (!rc && !found.lit) unlit[n_unlit++] = s;
     }
     if (cli.json && !rc) json_end_array(&j);

@@ -88,6 +88,40 @@ imp_grid_summarise(imp_context *context, size_t n, const double *value, const do
                    const struct imp_estimate *average, int64_t sets, double confidence,
                    struct imp_grid_summary *out);
 
+/* ---- Shares of a reading ----------------------------------------------------------- */
+
+enum imp_share_of {
+    IMP_SHARE_LIGHT = 0,  /**< a light's emission */
+    IMP_SHARE_SURFACE = 1 /**< a material's reflectances */
+};
+
+/** x dE/dx of a reading E, summed over the numbers x of one object: dE/d ln x by a common factor of
+ * them. Of a light it is what E has of it, and those of all lights add up to E, which is
+ * of first degree in what they emit (Euler). Of a material it is what E gains by a change of its
+ * reflectances, as a part of them: E times the mean number of reflections by it. */
+struct imp_share {
+    enum imp_share_of of;
+    const char *name; /**< of the object; belongs to the scene */
+    double value, se; /**< in the unit of the reading */
+};
+
+/**
+ * The reading of a sensor, the mean over its film, and what each light and each material has to do
+ * with it, from one set of walks.
+ * @param run      its sensor, end, seed and spp; NULL for defaults.
+ * @param[out] share [room] lights in the scene's order, then materials that reflect; may be NULL
+ *                   where room is 0. Objects that share a parameter are one row, by the
+ *                   name of the first.
+ * @param room     rows that there is room for.
+ * @param[out] n   how many rows there are; more than room: nothing else is computed.
+ * @param[out] reading may be NULL where room is 0.
+ * @return IMP_OK; IMP_E_ARG; IMP_E_BIAS if a light's emission has no unbiased gradient, as then
+ *         shares would not add up; what imp_problem_functional refuses; IMP_E_NOMEM.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_reading_shares(imp_scene *scene, const struct imp_run *run, struct imp_share *share,
+                   size_t room, size_t *n, struct imp_estimate *reading);
+
 #ifdef __cplusplus
 }
 #endif

@@ -6,6 +6,7 @@
 #include "color/rgb.h"
 #include "film/film_measure.h"
 #include "kind/sensor/receiver.h"
+#include "room_average.h"
 #include "walk/run/run.h"
 #include <importon/rooms.h>
 #include <math.h>
@@ -65,28 +66,6 @@ static enum imp_status weights_of(const struct imp_scene *scene, const struct im
     return IMP_OK;
 }
 
-/* The mean by light walks, each of which may reach many pixels. */
-static enum imp_status average_by_walks(imp_scene *scene, const struct imp_run *run,
-                                        size_t pixels, struct imp_estimate *out)
-{
-    enum imp_status st = IMP_OK;
-    imp_problem *problem = NULL;
-    const size_t channels = (size_t)scene->channels;
-    float *adjoint = imp__alloc(scene->ctx, pixels * channels, sizeof *adjoint);
-    if (!adjoint) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for an average");
-    for (size_t i = 0; i < pixels * channels; i++)
-        adjoint[i] = (float)((channels == 1 ? 1
-                                            : imp__luminance(i % 3 == 0, i % 3 == 1,
-                                                             i % 3 == 2)) /
-                             (double)pixels);
-    IMP_TRY(imp_problem_create(scene, &problem));
-    IMP_TRY(imp_problem_functional(problem, adjoint, run, out, NULL, NULL));
-out:
-    imp_problem_destroy(problem);
-    imp__release(scene->ctx, adjoint);
-    return st;
-}
-
 enum imp_status imp_grid_read(imp_scene *scene, const struct imp_run *run, double *value,
                               double *se, struct imp_estimate *average, int64_t *sets)
 {
@@ -94,6 +73,7 @@ enum imp_status imp_grid_read(imp_scene *scene, const struct imp_run *run, doubl
     const struct imp_sensor *s;
     struct imp_run own;
     imp_film *film = NULL;
+    imp_problem *problem = NULL;
     struct imp_estimate mean = {0, 0, 0};
     double w[4], square = 0;
     int n = 1;
@@ -115,7 +95,10 @@ enum imp_status imp_grid_read(imp_scene *scene, const struct imp_run *run, doubl
                            "needs two samples, or two sets of them",
                            s->name));
     const size_t pixels = (size_t)film->width * (size_t)film->height;
-    if (shared) IMP_TRY(average_by_walks(scene, &own, pixels, &mean));
+    if (shared) {
+        IMP_TRY(imp_problem_create(scene, &problem));
+        IMP_TRY(imp__room_average(problem, &own, &mean, NULL, NULL));
+    }
     for (size_t i = 0; i < pixels; i++) {
         value[i] = se[i] = 0;
         for (int c = 0; c < n; c++) {
@@ -130,6 +113,7 @@ enum imp_status imp_grid_read(imp_scene *scene, const struct imp_run *run, doubl
     *average = mean;
     if (sets) *sets = film->sets > 0 ? film->sets : film->spp;
 out:
+    imp_problem_destroy(problem);
     imp_film_destroy(film);
     return st;
 }
