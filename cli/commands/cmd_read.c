@@ -25,12 +25,13 @@ static const struct arg_option options[] = {
      "read by light tracing, too, and compare: exit status 1 if they differ", &o.ends, 0,
      0, NULL},
     {ARG_FLAG | ARG_REPLAYS, 0, "grid", NULL,
-     "every pixel of an irradiancemeter: average, minimum, maximum, uniformity", &o.grid, 0,
-     0, NULL},
+     "every pixel of an irradiancemeter: average, minimum, maximum, uniformity", &o.grid,
+     0, 0, NULL},
     {ARG_FLAG | ARG_REPLAYS, 0, "shares", NULL,
-     "what each lamp and each material has to do with the readings", &o.shares, 0, 0, NULL},
-    {ARG_TEXT, 0, "csv", "FILE", "the grid's points, values and errors as a table", &o.csv, 0,
-     0, NULL},
+     "what each lamp and each material has to do with the readings", &o.shares, 0, 0,
+     NULL},
+    {ARG_TEXT, 0, "csv", "FILE", "the grid's points, values and errors as a table",
+     &o.csv, 0, 0, NULL},
     {ARG_TEXT, 0, "svg", "FILE", "the grid as a plan with isolines", &o.svg, 0, 0, NULL},
     {0}};
 
@@ -230,6 +231,29 @@ static int has_grid(int sensor)
            imp_grid_points(cli.scene, sensor, point, NULL) == IMP_OK;
 }
 
+/* Luminaires outside of the box of all shapes light no room. */
+static void outside_tell(void)
+{
+    struct imp_scene_info s = {.size = sizeof s};
+    const int n = imp_scene_n_luminaires(cli.scene);
+    imp_scene_get_info(cli.scene, &s);
+    for (int i = 0; i < n && s.bounds_min[0] <= s.bounds_max[0]; i++) {
+        struct imp_luminaire_info l = {.size = sizeof l};
+        int out = 0;
+        if (imp_scene_get_luminaire(cli.scene, i, &l) != IMP_OK || !l.is_point) continue;
+        for (int k = 0; k < 3; k++)
+            out |= l.position[k] < s.bounds_min[k] || l.position[k] > s.bounds_max[k];
+        if (out)
+            cli_say(
+                "importon: warning: luminaire '%s' at (%g, %g, %g) is outside of all "
+                "shapes, which lie in (%g, %g, %g) to (%g, %g, %g): are they in other "
+                "units, or is it in the wrong place?",
+                l.name, l.position[0], l.position[1], l.position[2], s.bounds_min[0],
+                s.bounds_min[1], s.bounds_min[2], s.bounds_max[0], s.bounds_max[1],
+                s.bounds_max[2]);
+    }
+}
+
 /* The reading of a sensor, and the rows of lamps and materials. */
 static int shares_read(struct json *j, const struct imp_run *run, struct findings *found)
 {
@@ -263,8 +287,8 @@ static int shares_read(struct json *j, const struct imp_run *run, struct finding
             json_number(j, "part", part);
             json_end_object(j);
         } else {
-            printf("    %-8s %-23s %-12.6g +- %-8.2g %s %7.1f %%\n", of, s->name, s->value,
-                   s->se, info.unit, 100 * part);
+            printf("    %-8s %-23s %-12.6g +- %-8.2g %s %7.1f %%\n", of, s->name,
+                   s->value, s->se, info.unit, 100 * part);
         }
     }
     if (cli.json) json_end_array(j), json_end_object(j);
@@ -279,10 +303,11 @@ static int grids_read(struct json *j, struct imp_run run, int first, int end,
     int n = 0, rc = 0;
     for (int s = first; s < end; s++) n += has_grid(s);
     if (n == 0)
-        return cli_error(EXIT_USAGE,
-                         "%s: no irradiancemeter on a rectangle is among its sensors, and "
-                         "--grid is of those",
-                         cli.scene_path);
+        return cli_error(
+            EXIT_USAGE,
+            "%s: no irradiancemeter on a rectangle is among its sensors, and "
+            "--grid is of those",
+            cli.scene_path);
     if (n > 1 && (o.csv || o.svg))
         return cli_error(EXIT_USAGE,
                          "%s: it has %d grids, and --csv and --svg write one: choose it "
@@ -351,7 +376,8 @@ static int run_read(int n, char **operand)
     if (!o.grid && (o.csv || o.svg))
         return cli_error(EXIT_USAGE, "--csv and --svg write a grid: they go with --grid");
     if (o.grid && problem_options.params.n)
-        return cli_error(EXIT_USAGE, "--grid has no derivatives: it goes without --param");
+        return cli_error(EXIT_USAGE,
+                         "--grid has no derivatives: it goes without --param");
     if (o.shares && (o.grid || o.ends || problem_options.params.n))
         return cli_error(EXIT_USAGE, "--shares goes without --grid, --ends and --param");
     if (o.csv) rc = overwrite_check(o.csv, OUTPUT_TABLE);
@@ -367,6 +393,7 @@ static int run_read(int n, char **operand)
         if (rc) return rc;
         blocks = problem_blocks(problem, &n_blocks);
     }
+    outside_tell();
     struct json j;
     if (cli.json) {
         j = cli_json();

@@ -65,8 +65,7 @@ int grid_read(struct imp_run run, int ends, struct grid *out)
     int rc = 0;
     if (ends) run.from = IMP_FROM_SENSOR, g.from = "sensor";
     st = imp_grid_points(cli.scene, run.sensor, g.points, NULL);
-    if (st == IMP_OK)
-        st = imp_grid_read(cli.scene, &run, g.value, g.se, &average, &sets);
+    if (st == IMP_OK) st = imp_grid_read(cli.scene, &run, g.value, g.se, &average, &sets);
     if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
     if (!rc && ends) rc = other_end(run, &g, &average, &sets);
     if (!rc) {

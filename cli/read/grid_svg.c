@@ -13,9 +13,9 @@ enum { PLAN = 720, MARGIN = 20, TOP = 44, SCALE = 96, STEPS_MAX = 12 };
 
 struct plan {
     const struct grid *g;
-    double cell[2];   /* pixels of the drawing */
-    double lo, hi;    /* of the colours */
-    double step;      /* between isolines */
+    double cell[2]; /* pixels of the drawing */
+    double lo, hi;  /* of the colours */
+    double step;    /* between isolines */
 };
 
 /* 1, 2 or 5 times a power of ten, so that at most STEPS_MAX lie in the range. */
@@ -87,13 +87,15 @@ static void cells_put(FILE *f, const struct plan *p)
 {
     const struct grid *g = p->g;
     for (size_t i = 0; i < g->n; i++) {
-        const double column = (double)(i % (size_t)g->width), row = (double)(i / (size_t)g->width);
+        const double column = (double)(i % (size_t)g->width),
+                     row = (double)(i / (size_t)g->width);
         char c[8];
         colour(part_of(p, g->value[i]), c);
-        fprintf(f,
-                "<rect x=\"%.2f\" y=\"%.2f\" width=\"%.2f\" height=\"%.2f\" fill=\"%s\"/>\n",
-                x_at(p, column - 0.5), y_at(p, row + 0.5), p->cell[0] + 0.2,
-                p->cell[1] + 0.2, c);
+        fprintf(
+            f,
+            "<rect x=\"%.2f\" y=\"%.2f\" width=\"%.2f\" height=\"%.2f\" fill=\"%s\"/>\n",
+            x_at(p, column - 0.5), y_at(p, row + 0.5), p->cell[0] + 0.2, p->cell[1] + 0.2,
+            c);
     }
 }
 
@@ -134,7 +136,8 @@ static void square_put(FILE *f, const struct plan *p, int x, int y, double level
 
 static void isolines_put(FILE *f, const struct plan *p)
 {
-    for (double level = ceil(p->lo / p->step) * p->step; level < p->hi; level += p->step) {
+    for (double level = ceil(p->lo / p->step) * p->step; level < p->hi;
+         level += p->step) {
         fprintf(f, "<path fill=\"none\" stroke=\"#fff\" stroke-width=\"1.2\" d=\"");
         for (int y = 0; y + 1 < p->g->height; y++)
             for (int x = 0; x + 1 < p->g->width; x++) square_put(f, p, x, y, level);
@@ -148,11 +151,17 @@ static void numbers_put(FILE *f, const struct plan *p)
     const struct grid *g = p->g;
     if (p->cell[0] < 28 || p->cell[1] < 12) return;
     for (size_t i = 0; i < g->n; i++) {
-        const double column = (double)(i % (size_t)g->width), row = (double)(i / (size_t)g->width);
+        const double column = (double)(i % (size_t)g->width),
+                     row = (double)(i / (size_t)g->width);
         const double v = g->value[i];
-        fprintf(f, "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\" fill=\"%s\">%.*f</text>\n",
+        fprintf(f,
+                "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\" "
+                "fill=\"%s\">%.*f</text>\n",
                 x_at(p, column), y_at(p, row) + 4, part_of(p, v) > 0.6 ? "#000" : "#fff",
-                v < 10 ? 2 : v < 100 ? 1 : 0, v);
+                v < 10    ? 2
+                : v < 100 ? 1
+                          : 0,
+                v);
     }
 }
 
@@ -162,8 +171,9 @@ static void scale_put(FILE *f, const struct plan *p, double x, double high)
     for (int k = 0; k < BANDS; k++) {
         char c[8];
         colour((k + 0.5) / BANDS, c);
-        fprintf(f, "<rect x=\"%.1f\" y=\"%.2f\" width=\"14\" height=\"%.2f\" fill=\"%s\"/>\n",
-                x, TOP + high * (1 - (k + 1.0) / BANDS), high / BANDS + 0.2, c);
+        fprintf(
+            f, "<rect x=\"%.1f\" y=\"%.2f\" width=\"14\" height=\"%.2f\" fill=\"%s\"/>\n",
+            x, TOP + high * (1 - (k + 1.0) / BANDS), high / BANDS + 0.2, c);
     }
     for (double level = ceil(p->lo / p->step) * p->step; level <= p->hi; level += p->step)
         fprintf(f, "<text x=\"%.1f\" y=\"%.1f\">%g</text>\n", x + 19,

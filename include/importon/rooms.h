@@ -41,11 +41,9 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_grid_points(const imp_scene *scene, i
  * @return IMP_OK; IMP_E_ARG; IMP_E_UNSUPPORTED for films of response curves or of XYZ, and
  *         filters wider than a pixel; what imp_render refuses; IMP_E_NOMEM.
  */
-IMP_API IMP_MUST_CHECK enum imp_status imp_grid_read(imp_scene *scene,
-                                                     const struct imp_run *run,
-                                                     double *value, double *se,
-                                                     struct imp_estimate *average,
-                                                     int64_t *sets);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_grid_read(imp_scene *scene, const struct imp_run *run, double *value, double *se,
+              struct imp_estimate *average, int64_t *sets);
 
 /** A number, and an interval around what it estimates. */
 struct imp_interval_estimate {
@@ -54,12 +52,14 @@ struct imp_interval_estimate {
 
 struct imp_grid_summary {
     size_t size;
-    size_t n;          /**< points that counted */
-    double confidence; /**< with which each interval by itself contains the truth, at least */
+    size_t n; /**< points that counted */
+    double
+        confidence; /**< with which each interval by itself contains the truth, at least */
     struct imp_interval_estimate average, minimum, maximum;
-    struct imp_interval_estimate uniformity; /**< minimum over average, U0 of EN 12464-1 */
-    struct imp_interval_estimate diversity;  /**< minimum over maximum, Ud */
-    size_t at_minimum, at_maximum;           /**< index of the least and the largest value */
+    struct imp_interval_estimate
+        uniformity;                         /**< minimum over average, U0 of EN 12464-1 */
+    struct imp_interval_estimate diversity; /**< minimum over maximum, Ud */
+    size_t at_minimum, at_maximum; /**< index of the least and the largest value */
 };
 #define IMP_GRID_SUMMARY_INIT IMP_INIT_ZERO(struct imp_grid_summary)
 
@@ -87,6 +87,31 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_grid_summarise(imp_context *context, size_t n, const double *value, const double *se,
                    const struct imp_estimate *average, int64_t sets, double confidence,
                    struct imp_grid_summary *out);
+
+/* ---- Luminaires -------------------------------------------------------------------- */
+
+/** An emitter `ies` of a scene, with what its photometric file says. */
+struct imp_luminaire_info {
+    size_t size;
+    const char *name; /**< of the emitter; belongs to the scene */
+    double
+        flux; /**< lm in operation: the table's integral times scale, dimming, maintenance */
+    double lamp_flux; /**< lm of its lamps by the file; 0: not given */
+    double watts;     /**< by the file, undimmed; 0: not given */
+    double efficacy;  /**< lm/W of the luminaire as measured; 0: watts are not given */
+    double dimming, maintenance;
+    bool is_point;      /**< it is at the top of the scene, at `position`; else a shape */
+    double position[3]; /**< scene units; of a shape: the middle of its box */
+    double
+        opening[3]; /**< luminous opening by the file, m: along C0, along C90, height */
+};
+
+/** Number of luminaires; 0 for NULL. */
+IMP_API int imp_scene_n_luminaires(const imp_scene *scene);
+/** Set info->size first. @return IMP_OK; IMP_E_ARG if there is no such luminaire. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_scene_get_luminaire(const imp_scene *scene, int luminaire,
+                        struct imp_luminaire_info *info);
 
 /* ---- Shares of a reading ----------------------------------------------------------- */
 

@@ -78,7 +78,8 @@ struct imp_ies_data {
     enum imp_photometry type;
     double lamp_flux; /* lm, of its lamps as the file has it; 0: not given */
     double watts;     /* with its gear; 0: not given */
-    double size[3];   /* of the luminous opening, m: along C0, along C90, height; 0: a point */
+    double
+        size[3]; /* of the luminous opening, m: along C0, along C90, height; 0: a point */
 };
 
 /* A measured isotropic BRDF by half-angle and difference angle (Rusinkiewicz 1998), in

@@ -247,12 +247,14 @@ static enum imp_status parse(struct reader *r, struct imp_arena *keep,
         IMP_TRY(imp__error(r->ctx, IMP_E_NOMEM, "%s: out of memory", r->name));
     const bool c = d->type == IMP_PHOTOMETRY_C;
     IMP_TRY(angles(r, "a vertical angle", c ? 0 : -90, c ? 180 : 90, d->n_vertical, v));
-    IMP_TRY(angles(r, "a horizontal angle", c ? 0 : -90, c ? 360 : 90, d->n_horizontal, h));
+    IMP_TRY(
+        angles(r, "a horizontal angle", c ? 0 : -90, c ? 360 : 90, d->n_horizontal, h));
     if (!c && !span_is_known(d->type, d->n_horizontal, h))
-        IMP_TRY(fail(r, IMP_E_SCENE,
-                     "horizontal angles go from %g to %g: with type %c they may be 0, or go "
-                     "from -90 or 0 to 90",
-                     h[0], h[d->n_horizontal - 1], type == 2 ? 'B' : 'A'));
+        IMP_TRY(
+            fail(r, IMP_E_SCENE,
+                 "horizontal angles go from %g to %g: with type %c they may be 0, or go "
+                 "from -90 or 0 to 90",
+                 h[0], h[d->n_horizontal - 1], type == 2 ? 'B' : 'A'));
     if (!span_is_known(d->type, d->n_horizontal, h))
         IMP_TRY(fail(r, IMP_E_SCENE,
                      "horizontal angles go from %g to %g: they may be 0, or go from 0 to "

@@ -35,7 +35,8 @@ struct lines {
     int line;
 };
 
-static enum imp_status IMP_PRINTF(2, 3) fail(const struct lines *r, const char *format, ...)
+static enum imp_status IMP_PRINTF(2, 3)
+    fail(const struct lines *r, const char *format, ...)
 {
     char text[256];
     va_list args;
@@ -82,7 +83,8 @@ static enum imp_status number(struct lines *r, const char *what, double lo, doub
     double x;
     if (!imp__number(&at, text + n, &x) || at != text + n)
         return fail(r, "%s: not a number", what);
-    if (!(x >= lo && x <= hi)) return fail(r, "%s is %g, not in [%g, %g]", what, x, lo, hi);
+    if (!(x >= lo && x <= hi))
+        return fail(r, "%s is %g, not in [%g, %g]", what, x, lo, hi);
     *out = x;
     return IMP_OK;
 }
@@ -215,9 +217,9 @@ static enum imp_status turns(struct lines *r, const struct head *h, const struct
     for (int k = 0; k < s->made; k++) {
         const int from = about_90 ? s->n - 1 - k : k, plane = s->first + from;
         const double at = plane == h->planes ? c[0] + 360 : c[plane % h->planes];
-        out[k] = !about_90                 ? at
-                 : plane >= h->planes      ? 180 - c[plane - h->planes]
-                                           : 540 - c[plane];
+        out[k] = !about_90            ? at
+                 : plane >= h->planes ? 180 - c[plane - h->planes]
+                                      : 540 - c[plane];
     }
     const double begin = about_90 ? 90 : 0, end = s->made == 1 ? 0 : last[h->symmetry];
     if (fabs(out[0] - begin) > 1e-6 || fabs(out[s->made - 1] - end) > 1e-6)
@@ -225,8 +227,7 @@ static enum imp_status turns(struct lines *r, const struct head *h, const struct
                     "the C-planes of symmetry %d go from %g to %g, in place of %g to %g",
                     h->symmetry, out[0], out[s->made - 1], begin, end);
     for (int k = 1; k < s->made; k++)
-        if (!(out[k] > out[k - 1]))
-            return fail(r, "the C-planes do not ascend");
+        if (!(out[k] > out[k - 1])) return fail(r, "the C-planes do not ascend");
     out[0] = begin;
     out[s->made - 1] = end;
     return IMP_OK;
@@ -256,10 +257,11 @@ static void contradictions_tell(const struct lines *r, const struct head *h,
 {
     const double table = flux_of(d), says = h->flux * h->output_ratio / 100;
     if (h->flux > 0 && h->output_ratio > 0 && fabs(table - says) > OFF_MAX * says)
-        imp__warn(r->ctx,
-                  "%s: its intensities are %.4g lm, and its lamps of %.4g lm with a light "
-                  "output ratio of %.4g %% would give %.4g lm; the intensities count",
-                  r->name, table, h->flux, h->output_ratio, says);
+        imp__warn(
+            r->ctx,
+            "%s: its intensities are %.4g lm, and its lamps of %.4g lm with a light "
+            "output ratio of %.4g %% would give %.4g lm; the intensities count",
+            r->name, table, h->flux, h->output_ratio, says);
 }
 
 static enum imp_status parse(struct lines *r, struct imp_arena *keep,

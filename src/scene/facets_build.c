@@ -162,13 +162,11 @@ bool imp__facets_create(imp_context *ctx, struct imp_shape *const *shapes, int n
     imp_v3 lo = imp__spec(INFINITY), hi = imp__spec(-INFINITY);
     *out = NULL;
     for (int i = 0; i < n; i++) {
-        if (has_facets(shapes[i]))
-            triangles += shapes[i]->triangles.n_triangles;
+        if (has_facets(shapes[i])) triangles += shapes[i]->triangles.n_triangles;
     }
     if (triangles == 0 || triangles > 2 * IMP_FACETS) return true;
     for (int i = 0; i < n; i++)
-        if (has_facets(shapes[i]))
-            box_add(&shapes[i]->triangles, &lo, &hi);
+        if (has_facets(shapes[i])) box_add(&shapes[i]->triangles, &lo, &hi);
     struct imp_facets head = {.centre = (lo + hi) * .5, .half = (hi - lo) * .5};
     head.centre[3] = head.half[3] = 0;
     head.reach = (float)imp__length(head.half);

@@ -6,8 +6,8 @@
  * uniformities, of numbers drawn by hand and of walks. */
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "math/stat.h"
 #include "math/rng.h"
+#include "math/stat.h"
 #include <importon/rooms.h>
 #include <math.h>
 
@@ -25,7 +25,8 @@ enum { NX = 6, NY = 4, N = NX * NY };
     "value='photometric'/><film type='hdrfilm'><integer name='width' value='6'/>"        \
     "<integer name='height' value='4'/></film></sensor></shape>"
 
-static imp_scene *scene_of(int depth, const char *at, const char *receiver, const char *rest)
+static imp_scene *scene_of(int depth, const char *at, const char *receiver,
+                           const char *rest)
 {
     char xml[4096];
     snprintf(xml, sizeof xml, HEAD GRID "%s</scene>", depth, at, receiver, rest);
@@ -77,19 +78,22 @@ static void point_lamp(void)
             test_must(ctx, imp_grid_read(s, &run, value, se, &mean, &sets));
             for (int i = 0; i < N; i++) {
                 double d[3], r2 = 0;
-                for (int k = 0; k < 3; k++) d[k] = lamp_at[k] - p[3 * i + k], r2 += d[k] * d[k];
+                for (int k = 0; k < 3; k++)
+                    d[k] = lamp_at[k] - p[3 * i + k], r2 += d[k] * d[k];
                 for (int k = 0; k < 3; k++) d[k] /= sqrt(r2);
                 const double truth = 100 * weight((enum receiver)r, d) / r2;
                 truth_mean += truth / N;
                 /* Floats of a picture: 6e-8. */
-                worst = fmax(worst, fabs(value[i] - truth) / (se[i] + 2e-7 * truth + 1e-12));
+                worst =
+                    fmax(worst, fabs(value[i] - truth) / (se[i] + 2e-7 * truth + 1e-12));
                 widest = fmax(widest, se[i] / (truth + 1));
             }
             tap_ok(worst < 4.5 && widest < (e ? .02 : 1e-6) && sets > 1,
                    "point lamp, %s, from the %s: worst %.2f, relative error %.1e",
                    receiver_name[r], e ? "lights" : "sensor", worst, widest);
             const double z = (mean.value - truth_mean) / (mean.se + 2e-7 * truth_mean);
-            tap_ok(fabs(z) < 4.5 && mean.se < .01 * truth_mean, "and the average: z %.2f", z);
+            tap_ok(fabs(z) < 4.5 && mean.se < .01 * truth_mean, "and the average: z %.2f",
+                   z);
         }
         tap_ok(normal[2] == 1 && p[0] == -2.5 && p[1] == -1.5 && p[3 * N - 1] == 0,
                "places are the middles of cells");
@@ -131,8 +135,8 @@ static double corner_factor(double a, double b, double c)
 static double lamp_factor(double x, double y, double h)
 {
     const double x0 = -1 - x, x1 = 1 - x, y0 = -.5 - y, y1 = .5 - y;
-    return corner_factor(x1, y1, h) - corner_factor(x0, y1, h) - corner_factor(x1, y0, h) +
-           corner_factor(x0, y0, h);
+    return corner_factor(x1, y1, h) - corner_factor(x0, y1, h) -
+           corner_factor(x1, y0, h) + corner_factor(x0, y0, h);
 }
 #define PANEL                                                                            \
     "<shape type='rectangle'><transform name='to_world'><scale x='1' y='.5'/><rotate "   \
@@ -170,8 +174,10 @@ static void panel(void)
             worst = fmax(worst, fabs(value[i] - truth[i]) / se[i]);
             widest = fmax(widest, se[i] / truth[i]);
         }
-        tap_ok(worst < 4.5 && widest < .02, "a panel, from the %s: worst z %.2f of %d points, "
-               "relative error at most %.1e", e ? "lights" : "sensor", worst, N, widest);
+        tap_ok(worst < 4.5 && widest < .02,
+               "a panel, from the %s: worst z %.2f of %d points, "
+               "relative error at most %.1e",
+               e ? "lights" : "sensor", worst, N, widest);
     }
     imp_scene_destroy(s);
 }
@@ -193,10 +199,9 @@ static void covered_add(const struct imp_grid_summary *s, const double *truth, i
     }
     t[UNIFORMITY] = t[MINIMUM] / t[AVERAGE];
     t[DIVERSITY] = t[MINIMUM] / t[MAXIMUM];
-    const struct imp_interval_estimate *e[NUMBERS] = {&s->average, &s->minimum, &s->maximum,
-                                                      &s->uniformity, &s->diversity};
-    for (int k = 0; k < NUMBERS; k++)
-        covered[k] += e[k]->lo <= t[k] && t[k] <= e[k]->hi;
+    const struct imp_interval_estimate *e[NUMBERS] = {
+        &s->average, &s->minimum, &s->maximum, &s->uniformity, &s->diversity};
+    for (int k = 0; k < NUMBERS; k++) covered[k] += e[k]->lo <= t[k] && t[k] <= e[k]->hi;
 }
 
 /* Of `runs` intervals of 95 %, 93 % or more, less what chance takes of them; the average, which
@@ -208,7 +213,8 @@ static void covered_judge(const char *what, const int covered[NUMBERS], int runs
         const double share = (double)covered[k] / runs;
         tap_ok(share >= fmin(.93, .95 - chance) &&
                    (k != AVERAGE || share <= fmax(.97, .95 + chance)),
-               "%s, %s: %.1f %% of %d intervals hold", what, number_name[k], 100 * share, runs);
+               "%s, %s: %.1f %% of %d intervals hold", what, number_name[k], 100 * share,
+               runs);
     }
 }
 
@@ -229,15 +235,16 @@ static void drawn(void)
             double value[POINTS];
             s.size = sizeof s;
             for (unsigned i = 0; i < POINTS; i++)
-                value[i] = truth[i] + se[i] * imp__normal_quantile(
-                                                  imp__u01(imp__key(5, r, i), (uint32_t)kind));
+                value[i] = truth[i] + se[i] * imp__normal_quantile(imp__u01(
+                                                  imp__key(5, r, i), (uint32_t)kind));
             test_must(ctx, imp_grid_summarise(ctx, POINTS, value, se, NULL, 0, 0, &s));
             covered_add(&s, truth, POINTS, covered);
             low += s.minimum.value / RUNS;
         }
         covered_judge(shape[kind], covered, RUNS);
         if (kind == 0)
-            tap_ok(low < 490, "and the least of noisy values is biased low: %.1f of 500", low);
+            tap_ok(low < 490, "and the least of noisy values is biased low: %.1f of 500",
+                   low);
     }
 }
 
@@ -290,9 +297,10 @@ static void spacing(void)
         char xml[2048];
         struct imp_sensor_info info = {.size = sizeof info};
         snprintf(xml, sizeof xml,
-                 HEAD "<emitter type='constant'/><shape type='rectangle'><transform "
-                      "name='to_world'>%s</transform><sensor type='irradiancemeter'><string "
-                      "name='at' value='points'/>%s</sensor></shape></scene>",
+                 HEAD
+                 "<emitter type='constant'/><shape type='rectangle'><transform "
+                 "name='to_world'>%s</transform><sensor type='irradiancemeter'><string "
+                 "name='at' value='points'/>%s</sensor></shape></scene>",
                  2, rows[k].scale, rows[k].more);
         imp_scene *s = test_scene_text(ctx, xml, IMP_MONO);
         test_must(ctx, imp_scene_get_sensor(s, 0, &info));
@@ -322,7 +330,8 @@ static void refused(void)
         {"<float name='margin' value='.1'/>", "margin is of a grid"},
         {"<string name='at' value='points'/><vector name='facing' x='1' y='0' z='0'/>",
          "faces otherwise"},
-        {"<string name='at' value='points'/><film type='hdrfilm'><rfilter type='tent'/></film>",
+        {"<string name='at' value='points'/><film type='hdrfilm'><rfilter "
+         "type='tent'/></film>",
          "mixes neighbouring points"},
         {"<string name='at' value='points'/><float name='spacing' value='1'/><film "
          "type='hdrfilm'><integer name='width' value='4'/></film>",

@@ -43,24 +43,24 @@ enum imp_status imp_grid_points(const imp_scene *scene, int sensor, double *poin
 }
 
 /* Weights of a film's channels in the luminance. */
-static enum imp_status weights_of(const struct imp_scene *scene, const struct imp_sensor *s,
-                                  double w[4], int *n)
+static enum imp_status weights_of(const struct imp_scene *scene,
+                                  const struct imp_sensor *s, double w[4], int *n)
 {
     const struct imp_film_desc *f = &s->film;
     const enum imp_pixel_format p = f->pixel_format;
     if (f->n_responses > 0 || p == IMP_PIXEL_XYZ || p == IMP_PIXEL_XYZA)
-        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                          "the film of sensor '%s' has other channels than luminance or rgb: "
-                          "a grid has one number of light a point",
-                          s->name);
+        return imp__error(
+            scene->ctx, IMP_E_UNSUPPORTED,
+            "the film of sensor '%s' has other channels than luminance or rgb: "
+            "a grid has one number of light a point",
+            s->name);
     if (f->filter.radius > 0.5)
         return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
                           "the film of sensor '%s' has the filter %s, which mixes "
                           "neighbouring points; a grid has rfilter box",
                           s->name, f->filter.ops->name);
     const bool one = p == IMP_PIXEL_LUMINANCE || p == IMP_PIXEL_LUMINANCE_ALPHA;
-    for (int c = 0; c < 3; c++)
-        w[c] = imp__luminance(c == 0, c == 1, c == 2);
+    for (int c = 0; c < 3; c++) w[c] = imp__luminance(c == 0, c == 1, c == 2);
     if (one) w[0] = 1;
     *n = one ? 1 : 3;
     return IMP_OK;
@@ -86,7 +86,8 @@ enum imp_status imp_grid_read(imp_scene *scene, const struct imp_run *run, doubl
     IMP_CHECKED(weights_of(scene, s, w, &n));
     struct imp_measure measure;
     IMP_CHECKED(imp__measure_create(scene, &own, &measure));
-    const bool shared = measure.integrator && (measure.from_lights || measure.integrator->both);
+    const bool shared =
+        measure.integrator && (measure.from_lights || measure.integrator->both);
     imp__measure_destroy(&measure);
     IMP_TRY(imp_render(scene, &own, &film));
     if (!film->se)

@@ -34,7 +34,8 @@ struct grid {
 static struct imp_interval_estimate least(const struct grid *g, double sign, double risk,
                                           size_t *at)
 {
-    const double one = quantile(risk, g->sets), all = quantile(risk / (double)g->n, g->sets);
+    const double one = quantile(risk, g->sets),
+                 all = quantile(risk / (double)g->n, g->sets);
     struct imp_interval_estimate m = {INFINITY, INFINITY, INFINITY};
     for (size_t i = 0; i < g->n; i++) {
         const double x = sign * g->value[i];
@@ -100,7 +101,8 @@ enum imp_status imp_grid_summarise(imp_context *context, size_t n, const double 
     IMP_FINITE(context, all.se, "average.se");
     if (confidence == 0) confidence = 0.95;
     if (!(confidence > 0 && confidence < 1))
-        return imp__error(context, IMP_E_ARG, "confidence = %g is not in (0, 1)", confidence);
+        return imp__error(context, IMP_E_ARG, "confidence = %g is not in (0, 1)",
+                          confidence);
     const struct grid g = {n, value, se, sets};
     struct imp_grid_summary s = {.size = sizeof s, .n = n, .confidence = confidence};
     const double side = (1 - confidence) / 2;

@@ -77,11 +77,13 @@ static enum imp_status row_tie(struct groups *g, imp_problem *problem, size_t ro
         const struct imp_param_info *info = &s->params[k].info;
         if (g->of[k] != (int)row) continue;
         if (imp__has_wildcards(info->name) || strchr(info->name, ','))
-            IMP_TRY(imp__error(s->ctx, IMP_E_ARG,
-                               "the name %s has signs that choose several: give the object "
-                               "another id for shares",
-                               info->name));
-        if (!(info->flags & IMP_PARAM_DIFFERENTIABLE) && g->row[row].of == IMP_SHARE_SURFACE)
+            IMP_TRY(
+                imp__error(s->ctx, IMP_E_ARG,
+                           "the name %s has signs that choose several: give the object "
+                           "another id for shares",
+                           info->name));
+        if (!(info->flags & IMP_PARAM_DIFFERENTIABLE) &&
+            g->row[row].of == IMP_SHARE_SURFACE)
             continue;
         IMP_TRY(imp_problem_activate(problem, info->name));
         imp__put(&names, "%s%s", n++ ? "," : "", info->name);
@@ -95,12 +97,14 @@ out:
 }
 
 static enum imp_status shares_take(struct groups *g, imp_problem *problem,
-                                   const struct imp_run *run, struct imp_estimate *reading)
+                                   const struct imp_run *run,
+                                   struct imp_estimate *reading)
 {
     enum imp_status st = IMP_OK;
     const struct imp_scene *s = g->scene;
     const size_t n = imp_problem_n_variables(problem);
-    double *gradient = imp__alloc(s->ctx, 2 * n + 1, sizeof *gradient), *se = gradient + n;
+    double *gradient = imp__alloc(s->ctx, 2 * n + 1, sizeof *gradient),
+           *se = gradient + n;
     if (!gradient) IMP_TRY(imp__error(s->ctx, IMP_E_NOMEM, "no memory for shares"));
     IMP_TRY(imp__room_average(problem, run, reading, n ? gradient : NULL, n ? se : NULL));
     for (size_t i = 0; i < n; i++) {

@@ -69,7 +69,8 @@ static double folded(const struct imp_ies_data *d, double h)
 static bool angles_of(const struct imp__ies *x, imp_v3 w, double *v, double *h)
 {
     const struct imp_ies_data *d = x->data;
-    const double a = imp__dot(w, x->c0), b = imp__dot(w, x->c90), c = imp__dot(w, x->nadir);
+    const double a = imp__dot(w, x->c0), b = imp__dot(w, x->c90),
+                 c = imp__dot(w, x->nadir);
     const int n = d->n_horizontal;
     if (d->type == IMP_PHOTOMETRY_C) {
         *v = atan2(sqrt(a * a + b * b), c) / DEGREE;
@@ -162,7 +163,9 @@ double imp__ies_flux(const struct imp__ies *x)
     static const double node[2] = {0.21132486540518712, 0.78867513459481288};
     const int n = d->n_vertical, m = d->n_horizontal;
     const bool turns = d->type == IMP_PHOTOMETRY_C, b = d->type == IMP_PHOTOMETRY_B;
-    double sum = 0, span = m > 1 ? d->horizontal[m - 1] - d->horizontal[0] : turns ? 360 : 180;
+    double sum = 0, span = m > 1   ? d->horizontal[m - 1] - d->horizontal[0]
+                           : turns ? 360
+                                   : 180;
     for (int j = 0; j < imp_max(m - 1, 1); j++)
         for (int i = 0; i + 1 < n; i++)
             for (int q = 0; q < 4; q++) {
@@ -220,12 +223,14 @@ static enum imp_status operation_read(const struct imp_build *b, struct imp__ies
     const struct imp_interval part = {0, 1, IMP_CLOSED}, left = {0, 1, IMP_OPEN_LO};
     double flux;
     IMP_TRY(imp__props_float_in(b->ctx, b->node, "dimming", 1, part, &x->dimming));
-    IMP_TRY(imp__props_float_in(b->ctx, b->node, "maintenance", 1, left, &x->maintenance));
+    IMP_TRY(
+        imp__props_float_in(b->ctx, b->node, "maintenance", 1, left, &x->maintenance));
     IMP_TRY(imp__props_float_in(b->ctx, b->node, "flux", 0, IMP_NOT_NEGATIVE, &flux));
-    const double measured = imp__ies_flux(x) / x->factor;
+    const double measured = imp__ies_flux(x) * x->lumens;
     if (imp_build_has(b, "flux") && !(measured > 0))
-        IMP_TRY(imp_build_error(b, "flux", IMP_E_SCENE,
-                                "its table is dark, and has no flux that could be scaled"));
+        IMP_TRY(
+            imp_build_error(b, "flux", IMP_E_SCENE,
+                            "its table is dark, and has no flux that could be scaled"));
     if (imp_build_has(b, "flux")) x->factor *= flux / measured;
     x->factor *= x->dimming * x->maintenance;
 out:
@@ -241,7 +246,8 @@ static enum imp_status common_build(const struct imp_build *b, struct imp__ies *
     if (!b->node->ies) IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE, "has no table"));
     x->data = b->node->ies;
     IMP_TRY(imp_build_choice(b, "units", units, 2, 0, &unit));
-    x->factor = unit == 0 ? 1 : 1 / PER_WATT;
+    x->lumens = unit == 0 ? 1 : PER_WATT;
+    x->factor = 1 / x->lumens;
     IMP_TRY(operation_read(b, x));
     IMP_TRY(imp_build_transform(b, "to_world", m.m));
     const double det = imp__mat4_det3(&m);

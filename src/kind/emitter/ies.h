@@ -15,8 +15,10 @@ struct imp__ies {
     imp_v3 nadir, c0,
         c90; /* orthonormal, world: w = nadir cos v + sin v (c0 cos h + ...) */
     const struct imp_ies_data *data;
-    double factor;   /* emitted intensity over the table's: 1 or 1/683, times flux, dimming and
+    double
+        factor; /* emitted intensity over the table's: 1 or 1/683, times flux, dimming and
                         maintenance */
+    double lumens; /* lm in a unit of flux: 1 or 683 */
     double dimming, maintenance;
     imp_v3 position; /* of a point */
     /* Projected area of a surface light in direction w, in parts. */

@@ -6,10 +6,10 @@
  *
  * A film of more than one pixel is spread over the shape by its uv: a pixel is the mean
  * over its part, or the value in the middle of it (receiver.h, with other receivers). */
-#include "receiver.h"
 #include "kind/shape/shape.h"
 #include "math/offset.h"
 #include "math/warp.h"
+#include "receiver.h"
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_sensor *s)
 {
@@ -62,8 +62,8 @@ static bool connect(const struct imp_sensor *s, const imp_v3 *ref, bool far,
     const double r2 = imp__dot(d, d), dist = sqrt(r2);
     if (!(dist > 0)) return false;
     const imp_v3 w = d * (1 / dist);
-    const double c =
-        r ? IMP_PI * imp__receiver_density(r, imp__to_local(&r->frame, w)) : imp__dot(w, at.ng);
+    const double c = r ? IMP_PI * imp__receiver_density(r, imp__to_local(&r->frame, w))
+                       : imp__dot(w, at.ng);
     const double pixels = (double)s->film.width * s->film.height;
     if (!(c > 0)) return false;
     *out = (struct imp_sensor_sample){

@@ -29,7 +29,8 @@ double imp__receiver_density(const struct imp_receiver *r, imp_v3 w)
 static double kepler(double u)
 {
     const double m = IMP_2PI * u;
-    double lo = 0, hi = IMP_2PI, y = m < IMP_PI ? cbrt(6 * m) : IMP_2PI - cbrt(6 * (IMP_2PI - m));
+    double lo = 0, hi = IMP_2PI,
+           y = m < IMP_PI ? cbrt(6 * m) : IMP_2PI - cbrt(6 * (IMP_2PI - m));
     for (int k = 0; k < 60; k++) {
         const double f = y - sin(y) - m, slope = 1 - cos(y);
         if (f > 0) hi = y;

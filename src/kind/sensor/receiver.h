@@ -20,9 +20,9 @@ enum imp_receiver_kind { IMP_PLANAR, IMP_CYLINDRICAL, IMP_SEMICYLINDRICAL };
 
 struct imp_receiver {
     enum imp_receiver_kind kind;
-    bool turned;  /* planar, and f is not the shape's normal */
-    bool points;  /* at the middle of each pixel's cell; else the mean over the cell */
-    bool absent;  /* its shape is not there for light */
+    bool turned; /* planar, and f is not the shape's normal */
+    bool points; /* at the middle of each pixel's cell; else the mean over the cell */
+    bool absent; /* its shape is not there for light */
     double first[2], span[2]; /* of uv, which the film covers */
     struct imp_frame frame;   /* the shape's, n its normal and the axis */
     imp_v3 facing;            /* f in that frame */

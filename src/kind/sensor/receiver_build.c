@@ -5,10 +5,10 @@
  * EN 12464-1, 4.4: with d the longer side of the area in metres, or the shorter one if the
  * ratio is 2 or more, points are at most p = 0.2 x 5^(log10 d) apart, p <= 10 m; the number
  * of points along a side is the nearest whole number of side / p. */
-#include "receiver.h"
 #include "kind/filter/filter.h"
 #include "kind/shape/shape.h"
 #include "math/transform.h"
+#include "receiver.h"
 #include <string.h>
 
 #define SPACING_MAX 10.0 /* m */
@@ -51,7 +51,8 @@ static const struct imp_bsdf_ops receiver_ops = {.size = sizeof(struct imp_bsdf_
                                                  .eval = eval,
                                                  .pdf = pdf,
                                                  .eval_d = eval_d,
-                                                 .directional_albedo = directional_albedo};
+                                                 .directional_albedo =
+                                                     directional_albedo};
 
 /* ---- The grid ------------------------------------------------------------------------ */
 
@@ -93,16 +94,18 @@ static enum imp_status film_complete(const struct imp_build *b, struct imp_senso
     const struct imp_node *film = film_of(b->node);
     const double longer = fmax(side[0], side[1]), shorter = fmin(side[0], side[1]);
     double metre, spacing;
-    IMP_TRY(imp__props_float_in(b->ctx, b->node, "metres_per_unit", 1, IMP_POSITIVE, &metre));
+    IMP_TRY(
+        imp__props_float_in(b->ctx, b->node, "metres_per_unit", 1, IMP_POSITIVE, &metre));
     const double d = (longer >= 2 * shorter ? shorter : longer) * metre;
     const double norm = fmin(0.2 * pow(5, log10(d)), SPACING_MAX) / metre;
-    IMP_TRY(imp__props_float_in(b->ctx, b->node, "spacing", norm, IMP_POSITIVE, &spacing));
+    IMP_TRY(
+        imp__props_float_in(b->ctx, b->node, "spacing", norm, IMP_POSITIVE, &spacing));
     const bool sized = written(film, "width") || written(film, "height");
     if (sized && (imp_build_has(b, "spacing") || imp_build_has(b, "metres_per_unit")))
-        IMP_TRY(imp_build_error(b, imp_build_has(b, "spacing") ? "spacing" : "metres_per_unit",
-                                IMP_E_SCENE,
-                                "its film has a width or height, which say how many points "
-                                "there are: one of the two"));
+        IMP_TRY(imp_build_error(
+            b, imp_build_has(b, "spacing") ? "spacing" : "metres_per_unit", IMP_E_SCENE,
+            "its film has a width or height, which say how many points "
+            "there are: one of the two"));
     if (!sized) {
         f->width = f->crop_w = points_along(side[0], spacing);
         f->height = f->crop_h = points_along(side[1], spacing);
@@ -116,7 +119,8 @@ static enum imp_status film_complete(const struct imp_build *b, struct imp_senso
     if (!filtered) {
         struct imp_node *box =
             imp__node_create(b->arena, "rfilter", "box", NULL, NULL, b->node->loc);
-        if (!box) IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "no memory for a filter"));
+        if (!box)
+            IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "no memory for a filter"));
         IMP_TRY(imp__filter_build(b, box, &f->filter));
     }
     if (f->filter.radius > 0.5)
@@ -149,10 +153,10 @@ static enum imp_status facing_read(const struct imp_build *b, struct imp_receive
                                 "'facing' is missing: where a semicylindrical receiver "
                                 "looks, across the normal of its shape"));
     if (r->kind != IMP_CYLINDRICAL && !(length > 1e-6 * whole && isfinite(whole)))
-        IMP_TRY(imp_build_error(b, "facing", IMP_E_SCENE,
-                                r->kind == IMP_PLANAR
-                                    ? "facing is no direction"
-                                    : "facing has no part across the normal of its shape"));
+        IMP_TRY(imp_build_error(
+            b, "facing", IMP_E_SCENE,
+            r->kind == IMP_PLANAR ? "facing is no direction"
+                                  : "facing has no part across the normal of its shape"));
     r->facing = r->kind == IMP_CYLINDRICAL ? imp__v3(0, 0, 0) : facing * (1 / length);
     r->turned = r->kind == IMP_PLANAR && r->facing[2] < 1 - 1e-12;
 out:
@@ -169,8 +173,8 @@ static enum imp_status margin_read(const struct imp_build *b, const double whole
         side[k] = whole[k] - 2 * margin;
         if (!(side[k] > 0))
             IMP_TRY(imp_build_error(b, "margin", IMP_E_SCENE,
-                                    "a margin of %g leaves nothing of a side of %g", margin,
-                                    whole[k]));
+                                    "a margin of %g leaves nothing of a side of %g",
+                                    margin, whole[k]));
         r->first[k] = margin / whole[k];
         r->span[k] = side[k] / whole[k];
     }
@@ -182,7 +186,8 @@ enum imp_status imp__receiver_build(const struct imp_build *b, struct imp_sensor
 {
     static const char *const kinds[] = {"planar", "cylindrical", "semicylindrical"};
     static const char *const places[] = {"cells", "points"};
-    static const char *const of_grids[] = {"facing", "margin", "spacing", "metres_per_unit"};
+    static const char *const of_grids[] = {"facing", "margin", "spacing",
+                                           "metres_per_unit"};
     enum imp_status st = IMP_OK;
     struct imp_receiver r = {.span = {1, 1}};
     double whole[2], side[2];
@@ -195,18 +200,21 @@ enum imp_status imp__receiver_build(const struct imp_build *b, struct imp_sensor
     r.points = place == 1;
     const bool plain = !r.points && !r.absent;
     if (r.kind != IMP_PLANAR && !r.absent)
-        IMP_TRY(imp_build_error(b, "receiver", IMP_E_SCENE,
-                                "a %s receiver stands free in space: its shape is virtual "
-                                "(<boolean name=\"virtual\" value=\"true\"/>)",
-                                kinds[kind]));
+        IMP_TRY(
+            imp_build_error(b, "receiver", IMP_E_SCENE,
+                            "a %s receiver stands free in space: its shape is virtual "
+                            "(<boolean name=\"virtual\" value=\"true\"/>)",
+                            kinds[kind]));
     for (size_t k = 0; k < imp_count(of_grids); k++)
         if (plain && imp_build_has(b, of_grids[k]))
-            IMP_TRY(imp_build_error(b, of_grids[k], IMP_E_SCENE,
-                                    "%s is of a grid: a meter at points, or whose shape is "
-                                    "virtual",
-                                    of_grids[k]));
+            IMP_TRY(
+                imp_build_error(b, of_grids[k], IMP_E_SCENE,
+                                "%s is of a grid: a meter at points, or whose shape is "
+                                "virtual",
+                                of_grids[k]));
     if (plain) goto out;
-    if (!(s->shape->ops->flags & IMP_SHAPE_SQUARE) || !(s->shape->ops->flags & IMP_SHAPE_FLAT))
+    if (!(s->shape->ops->flags & IMP_SHAPE_SQUARE) ||
+        !(s->shape->ops->flags & IMP_SHAPE_FLAT))
         IMP_TRY(imp_build_error(b, r.absent ? "virtual" : "at", IMP_E_SCENE,
                                 "a grid is on a rectangle, and its shape '%s' is a %s",
                                 s->shape->name, s->shape->ops->name));
@@ -216,20 +224,23 @@ enum imp_status imp__receiver_build(const struct imp_build *b, struct imp_sensor
     whole[1] = imp__length(place_of(s->shape, 0, 1, &ng) - corner);
     IMP_TRY(facing_read(b, &r));
     if (r.turned && !r.absent)
-        IMP_TRY(imp_build_error(b, "facing", IMP_E_SCENE,
-                                "a receiver that faces otherwise than its shape stands free "
-                                "in space: its shape is virtual"));
+        IMP_TRY(
+            imp_build_error(b, "facing", IMP_E_SCENE,
+                            "a receiver that faces otherwise than its shape stands free "
+                            "in space: its shape is virtual"));
     IMP_TRY(margin_read(b, whole, &r, side));
     IMP_TRY(film_complete(b, s, side));
     struct imp_receiver *made = imp_build_alloc(b, 1, sizeof *made);
     if (!made) IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "no memory for a receiver"));
     *made = r;
-    made->bsdf = (struct imp_bsdf){.ops = &receiver_ops,
-                                   .self = made,
-                                   .flags = IMP_BSDF_SMOOTH | (r.kind != IMP_PLANAR || r.turned ? IMP_BSDF_TRANSMIT : 0),
-                                   .index_input = -1,
-                                   .index = -1,
-                                   .name = "sensor"};
+    made->bsdf = (struct imp_bsdf){
+        .ops = &receiver_ops,
+        .self = made,
+        .flags =
+            IMP_BSDF_SMOOTH | (r.kind != IMP_PLANAR || r.turned ? IMP_BSDF_TRANSMIT : 0),
+        .index_input = -1,
+        .index = -1,
+        .name = "sensor"};
     s->receiver = made;
 out:
     return st;
