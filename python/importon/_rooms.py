@@ -24,32 +24,24 @@ class Interval(NamedTuple):
     hi: float
 
 
-class Grid:
-    """Readings of the pixels of a meter; intervals hold for extremes of noisy values, too.
+class Grid(NamedTuple):
+    """Readings of the pixels of a meter; intervals hold for extremes of noisy values, too."""
 
-    Attributes
-    ----------
-    value, se : numpy.ndarray
-        [height][width], in the sensor's unit, and one standard error each.
-    points : numpy.ndarray
-        [height][width][3], scene units.
-    average, minimum, maximum, uniformity, diversity : Interval
-        uniformity is minimum over average, diversity minimum over maximum.
-    confidence : float
-        With which each interval by itself contains the truth, at least.
-    """
-
-    def __init__(self, value: Any, se: Any, points: Any, summary: Any) -> None:
-        self.value, self.se, self.points = value, se, points
-        self.confidence: float = summary.confidence
-        for name in ("average", "minimum", "maximum", "uniformity", "diversity"):
-            s = getattr(summary, name)
-            setattr(self, name, Interval(s.value, s.lo, s.hi))
-
-    def __repr__(self) -> str:
-        a, m, u = self.average, self.minimum, self.uniformity  # type: ignore[attr-defined]
-        return "Grid %d x %d: average %.5g, minimum %.5g [%.5g, %.5g], uniformity %.3g [%.3g, %.3g]" % (
-            self.value.shape[1], self.value.shape[0], a.value, m.value, m.lo, m.hi, u.value, u.lo, u.hi)
+    value: Any
+    """[height][width], in the sensor's unit."""
+    se: Any
+    """[height][width], one standard error of each."""
+    points: Any
+    """[height][width][3], scene units."""
+    average: Interval
+    minimum: Interval
+    maximum: Interval
+    uniformity: Interval
+    """Minimum over average."""
+    diversity: Interval
+    """Minimum over maximum."""
+    confidence: float
+    """With which each interval by itself contains the truth, at least."""
 
 
 class Share(NamedTuple):
@@ -112,7 +104,7 @@ def grid(scene: Scene, sensor: Any = 0, *, params: Any = None, confidence: float
     ... <shape type="rectangle"><sensor type="irradiancemeter"><string name="at" value="points"/></sensor></shape></scene>''')
     >>> g = importon.grid(scene, spp=64)
     >>> g.value.shape, g.minimum.lo <= 3.1416 <= g.minimum.hi
-    ((8, 8), True)
+    ((6, 6), True)
     """
     scene = check_scene(scene)
     number = scene.sensor_index(sensor)
@@ -127,7 +119,9 @@ def grid(scene: Scene, sensor: Any = 0, *, params: Any = None, confidence: float
     scene._context.check(lib.imp_grid_summarise(scene._context.pointer, value.size, address(value), address(se),
                                                 ctypes.byref(average), sets.value, float(confidence),
                                                 ctypes.byref(summary)))
-    return Grid(value, se, places, summary)
+    number_of = {k: getattr(summary, k) for k in ("average", "minimum", "maximum", "uniformity", "diversity")}
+    return Grid(value, se, places, confidence=summary.confidence,
+                **{k: Interval(x.value, x.lo, x.hi) for k, x in number_of.items()})
 
 
 def shares(scene: Scene, sensor: Any = 0, *, params: Any = None, seed: int = 0, spp: int = 0, points: str = "scene",
@@ -165,6 +159,15 @@ def shares(scene: Scene, sensor: Any = 0, *, params: Any = None, seed: int = 0, 
 
 def luminaires(scene: Scene) -> list[Luminaire]:
     """The luminaires of a scene: emitters `ies` with what their files say.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    list of Luminaire
+        In the scene's order.
 
     Examples
     --------

@@ -327,7 +327,7 @@ static void refused(void)
          "all sides alike"},
         {"<string name='at' value='points'/><float name='margin' value='1'/>",
          "leaves nothing of a side"},
-        {"<float name='margin' value='.1'/>", "margin is of a grid"},
+        {"<float name='margin' value='.1'/>", "margin"},
         {"<string name='at' value='points'/><vector name='facing' x='1' y='0' z='0'/>",
          "faces otherwise"},
         {"<string name='at' value='points'/><film type='hdrfilm'><rfilter "

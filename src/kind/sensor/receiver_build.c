@@ -186,8 +186,6 @@ enum imp_status imp__receiver_build(const struct imp_build *b, struct imp_sensor
 {
     static const char *const kinds[] = {"planar", "cylindrical", "semicylindrical"};
     static const char *const places[] = {"cells", "points"};
-    static const char *const of_grids[] = {"facing", "margin", "spacing",
-                                           "metres_per_unit"};
     enum imp_status st = IMP_OK;
     struct imp_receiver r = {.span = {1, 1}};
     double whole[2], side[2];
@@ -205,14 +203,7 @@ enum imp_status imp__receiver_build(const struct imp_build *b, struct imp_sensor
                             "a %s receiver stands free in space: its shape is virtual "
                             "(<boolean name=\"virtual\" value=\"true\"/>)",
                             kinds[kind]));
-    for (size_t k = 0; k < imp_count(of_grids); k++)
-        if (plain && imp_build_has(b, of_grids[k]))
-            IMP_TRY(
-                imp_build_error(b, of_grids[k], IMP_E_SCENE,
-                                "%s is of a grid: a meter at points, or whose shape is "
-                                "virtual",
-                                of_grids[k]));
-    if (plain) goto out;
+    if (plain) goto out; /* what is said of grids alone stays unread: an error */
     if (!(s->shape->ops->flags & IMP_SHAPE_SQUARE) ||
         !(s->shape->ops->flags & IMP_SHAPE_FLAT))
         IMP_TRY(imp_build_error(b, r.absent ? "virtual" : "at", IMP_E_SCENE,
