@@ -29,14 +29,14 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_grid_points(const imp_scene *scene, i
 
 /**
  * The readings of all pixels of a sensor, and their mean: luminance or illuminance of rgb and
- * mono scenes. Of a film with several colours the error of a pixel is a bound, the sum of
- * the colours' errors by their weights; a film of pixel format luminance has none of that.
+ * mono scenes. With several colours in the film the error of a pixel is a bound, the sum
+ * of the colours' errors by their weights; pixel format luminance has the error itself.
  * @param run      its sensor, end, seed and spp; NULL for defaults.
  * @param[out] value [height][width] of the crop window, in the sensor's unit.
  * @param[out] se    [height][width], one standard error each.
  * @param[out] average the mean of all, with its own error: light walks reach many pixels,
  *                  whose errors are not independent.
- * @param[out] sets  independent sets of samples of a pixel from which the errors come, for
+ * @param[out] sets  [1] independent sets of samples of a pixel from which the errors come, for
  *                   imp_grid_summarise; may be NULL.
  * @return IMP_OK; IMP_E_ARG; IMP_E_UNSUPPORTED for films of response curves or of XYZ, and
  *         filters wider than a pixel; what imp_render refuses; IMP_E_NOMEM.
