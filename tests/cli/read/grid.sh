@@ -27,7 +27,7 @@ importon read "$ROOT/scenes/cornell.xml" --grid
 cat >half.xml <<'X'
 <scene version="3.0.0"><integrator type="path"/>
 <emitter type="ies" id="lost"><string name="filename" value="opal.ldt"/><transform name="to_world"><rotate x="1" angle="180"/><translate z="30"/></transform></emitter>
-<shape type="cube"><transform name="to_world"><scale x="1" y="3" z="1"/><translate x="1.5"/></transform></shape>
+<shape type="cube"><transform name="to_world"><scale x="1" y="3" z="1"/><translate x="1.7"/></transform></shape>
 <shape type="rectangle"><transform name="to_world"><scale value="2"/></transform><sensor type="irradiancemeter" id="grid">
 <boolean name="virtual" value="true"/><string name="at" value="points"/><string name="units" value="photometric"/>
 <film type="hdrfilm"><integer name="width" value="4"/><integer name="height" value="1"/></film></sensor></shape></scene>
