@@ -2,6 +2,7 @@
  *
  * importon read: the numbers of a scene's sensors, means over their films, with standard
  * errors, units and derivatives; from either end, or from both to compare them. */
+#include "read/glare.h"
 #include "read/grid.h"
 #include "shared/command.h"
 #include "shared/overwrite.h"
@@ -16,7 +17,7 @@
 #define APART 5 /* standard errors between the ends that chance does not explain */
 
 static struct {
-    int ends, grid, shares;
+    int ends, grid, shares, ugr;
     const char *csv, *svg;
 } o;
 
@@ -30,6 +31,9 @@ static const struct arg_option options[] = {
     {ARG_FLAG | ARG_REPLAYS, 0, "shares", NULL,
      "what each lamp and each material has to do with the readings", &o.shares, 0, 0,
      NULL},
+    {ARG_FLAG | ARG_REPLAYS, 0, "ugr", NULL,
+     "glare ratings of the observers of --sensor, a grid with a line of sight", &o.ugr, 0,
+     0, NULL},
     {ARG_TEXT, 0, "csv", "FILE", "the grid's points, values and errors as a table",
      &o.csv, 0, 0, NULL},
     {ARG_TEXT, 0, "svg", "FILE", "the grid as a plan with isolines", &o.svg, 0, 0, NULL},
@@ -380,6 +384,11 @@ static int run_read(int n, char **operand)
                          "--grid has no derivatives: it goes without --param");
     if (o.shares && (o.grid || o.ends || problem_options.params.n))
         return cli_error(EXIT_USAGE, "--shares goes without --grid, --ends and --param");
+    if (o.ugr && (o.shares || o.grid || o.ends || problem_options.params.n))
+        return cli_error(EXIT_USAGE,
+                         "--ugr goes without --shares, --grid, --ends and --param");
+    if (o.ugr && !sensor_named())
+        return cli_error(EXIT_USAGE, "--ugr is of one grid: choose it with --sensor");
     if (o.csv) rc = overwrite_check(o.csv, OUTPUT_TABLE);
     if (o.svg && !rc) rc = overwrite_check(o.svg, OUTPUT_CURVE);
     if (rc) return rc;
@@ -398,13 +407,17 @@ static int run_read(int n, char **operand)
     if (cli.json) {
         j = cli_json();
         json_integer(&j, "spp", cli_spp(&run));
-        json_array(&j, o.grid ? "grids" : "readings");
+        json_array(&j, o.grid ? "grids" : o.ugr ? "glare" : "readings");
     }
     const int one = sensor_named(), first = one ? cli.sensor : 0;
     const int end = one ? first + 1 : scene.n_sensors;
     int *unlit = cli_alloc((size_t)scene.n_sensors, sizeof *unlit), n_unlit = 0;
     if (o.grid && !rc) rc = grids_read(&j, run, first, end, &found, unlit, &n_unlit);
-    for (int s = first; s < end && !rc && !o.grid; s++) {
+    if (o.ugr && !rc) {
+        run.sensor = first;
+        rc = glare_read(&j, &run);
+    }
+    for (int s = first; s < end && !rc && !o.grid && !o.ugr; s++) {
         run.sensor = s;
         found.lit = 0;
         rc = o.shares ? shares_read(&j, &run, &found)

@@ -88,6 +88,50 @@ imp_grid_summarise(imp_context *context, size_t n, const double *value, const do
                    const struct imp_estimate *average, int64_t sets, double confidence,
                    struct imp_grid_summary *out);
 
+/* ---- Glare ------------------------------------------------------------------------ */
+
+/** A luminaire as an observer sees it. */
+struct imp_glare_source {
+    double luminance;   /**< cd/m^2, towards the eye */
+    double solid_angle; /**< sr, of its luminous parts */
+    double position;    /**< Guth's index (imp_guth_position) */
+};
+
+/** Guth's position index p of a source above the line of sight (Levin 1975, J. Illum. Eng. Soc.
+ * 4, 99, to Guth's data, as the tables of CIE 117):
+ *     ln p = (35.2 - .31889 a - 1.22 e^(-2 a/9)) b/1000 + (21 + .26667 a - .002963 a^2) b^2/1e5
+ * @param a degrees from the vertical of the plane through the source and the line of
+ *          sight, in [0, 90]: a source below counts as if it were above.
+ * @param b degrees between the source and the line of sight, in [0, 90].
+ * @return p >= 1; NAN for angles out of their range. */
+IMP_API double imp_guth_position(double a, double b);
+
+/** Unified glare rating, CIE 117-1995: 8 log10(.25/Lb sum L^2 w/p^2).
+ * @param background Lb, cd/m^2, above 0: the indirect vertical illuminance at the eye over pi.
+ * @param source [n] all above 0; may be NULL where n is 0.
+ * @param[out] ugr [1] -INFINITY without sources.
+ * @return IMP_OK; IMP_E_ARG. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_ugr(imp_context *context, double background,
+                                               size_t n,
+                                               const struct imp_glare_source *source,
+                                               double *ugr);
+
+/**
+ * The glare rating at every point of a grid of vertical illuminances: an irradiancemeter whose
+ * shape is virtual and horizontal, with the line of sight as its `facing`. Sources are the
+ * scene's luminaires (emitters `ies`) that are before the observer and not hidden by a shape,
+ * seen as a whole, each with the luminance I/A of its table and its luminous area (of its
+ * shape, or of the file's opening for a point); all other light is background. Lb is
+ * the grid's reading less the luminaires' direct part, over pi. Lengths are metres.
+ * @param run      its sensor, end, seed and spp; NULL for defaults.
+ * @param[out] ugr [height][width] of the crop window; -INFINITY where no source is seen.
+ * @param[out] se  [height][width], one standard error each, that of Lb's; may be NULL.
+ * @return as imp_grid_read; IMP_E_ARG for another sensor, or a luminaire without a
+ *         luminous area; IMP_E_NUMERIC where the background is not above 0.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_grid_glare(imp_scene *scene, const struct imp_run *run, double *ugr, double *se);
+
 /* ---- Luminaires -------------------------------------------------------------------- */
 
 /** An emitter `ies` of a scene, with what its photometric file says. */
@@ -102,8 +146,8 @@ struct imp_luminaire_info {
     double dimming, maintenance;
     bool is_point;      /**< it is at the top of the scene, at `position`; else a shape */
     double position[3]; /**< scene units; of a shape: the middle of its box */
-    double
-        opening[3]; /**< luminous opening by the file, m: along C0, along C90, height */
+    double opening[3];  /**< luminous opening by the file, m: along C0, along C90, height;
+                              a round one as the square of its area */
 };
 
 /** Number of luminaires; 0 for NULL. */

@@ -228,10 +228,12 @@ static enum imp_status parse(struct reader *r, struct imp_arena *keep,
     IMP_TRY(number(r, "input watts", -NUMBER_MAX, NUMBER_MAX, &d->watts));
     d->watts = fmax(d->watts, 0);
     d->lamp_flux = fmax(lamps * lumens, 0) * ballast;
-    /* Negative sizes are diameters of round openings; the length lies along C0. */
+    /* Negative sizes are diameters of round openings, which become squares of their area. The
+     * length lies along C0. */
     const double metre = units == 1 ? FOOT : 1;
-    d->size[0] = fabs(size[1]) * metre;
-    d->size[1] = fabs(size[0]) * metre;
+    const double round = size[0] < 0 && size[1] < 0 ? sqrt(atan(1)) : 1;
+    d->size[0] = fabs(size[1]) * metre * round;
+    d->size[1] = fabs(size[0]) * metre * round;
     d->size[2] = fabs(size[2]) * metre;
     const double factor = multiplier * ballast * (has_factor ? lamp : 1);
 

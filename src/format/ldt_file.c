@@ -119,9 +119,11 @@ static enum imp_status opening(struct lines *r, struct imp_ies_data *d)
     IMP_TRY(number(r, "the length of the opening", 0, NUMBER_MAX, &side[0]));
     IMP_TRY(number(r, "the width of the opening", 0, NUMBER_MAX, &side[1]));
     for (int k = 0; k < 4; k++) IMP_TRY(number(r, heights[k], 0, NUMBER_MAX, &height[k]));
-    /* The length lies along C90, across the plane C0; a width of 0 is a round opening. */
-    d->size[0] = (side[1] > 0 ? side[1] : side[0]) / 1000;
-    d->size[1] = side[0] / 1000;
+    /* The length lies along C90, across the plane C0. Width 0: a round opening, which becomes the
+     * square of its area. */
+    const double round = side[1] > 0 ? 1 : sqrt(atan(1));
+    d->size[0] = (side[1] > 0 ? side[1] : side[0]) / 1000 * round;
+    d->size[1] = side[0] / 1000 * round;
     d->size[2] = fmax(fmax(height[0], height[1]), fmax(height[2], height[3])) / 1000;
 out:
     return st;
