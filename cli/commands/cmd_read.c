@@ -223,41 +223,6 @@ static int sensor_read(imp_problem *problem, struct json *j, struct imp_run run,
     return rc;
 }
 
-/* Has the sensor a grid? */
-static int has_grid(int sensor)
-{
-    struct imp_sensor_info info = {.size = sizeof info};
-    double point[3];
-    if (imp_scene_get_sensor(cli.scene, sensor, &info) != IMP_OK) return 0;
-    if ((size_t)info.width * (size_t)info.height > 1)
-        return strcmp(info.type, "irradiancemeter") == 0;
-    return strcmp(info.type, "irradiancemeter") == 0 &&
-           imp_grid_points(cli.scene, sensor, point, NULL) == IMP_OK;
-}
-
-/* Luminaires outside of the box of all shapes light no room. */
-static void outside_tell(void)
-{
-    struct imp_scene_info s = {.size = sizeof s};
-    const int n = imp_scene_n_luminaires(cli.scene);
-    imp_scene_get_info(cli.scene, &s);
-    for (int i = 0; i < n && s.bounds_min[0] <= s.bounds_max[0]; i++) {
-        struct imp_luminaire_info l = {.size = sizeof l};
-        int out = 0;
-        if (imp_scene_get_luminaire(cli.scene, i, &l) != IMP_OK || !l.is_point) continue;
-        for (int k = 0; k < 3; k++)
-            out |= l.position[k] < s.bounds_min[k] || l.position[k] > s.bounds_max[k];
-        if (out)
-            cli_say(
-                "importon: warning: luminaire '%s' at (%g, %g, %g) is outside of all "
-                "shapes, which lie in (%g, %g, %g) to (%g, %g, %g): are they in other "
-                "units, or is it in the wrong place?",
-                l.name, l.position[0], l.position[1], l.position[2], s.bounds_min[0],
-                s.bounds_min[1], s.bounds_min[2], s.bounds_max[0], s.bounds_max[1],
-                s.bounds_max[2]);
-    }
-}
-
 /* The reading of a sensor, and the rows of lamps and materials. */
 static int shares_read(struct json *j, const struct imp_run *run, struct findings *found)
 {
@@ -298,42 +263,6 @@ static int shares_read(struct json *j, const struct imp_run *run, struct finding
     if (cli.json) json_end_array(j), json_end_object(j);
     free(share);
     return 0;
-}
-
-/* The grids of the sensors from `first` on that have one. */
-static int grids_read(struct json *j, struct imp_run run, int first, int end,
-                      struct findings *found, int *unlit, int *n_unlit)
-{
-    int n = 0, rc = 0;
-    for (int s = first; s < end; s++) n += has_grid(s);
-    if (n == 0)
-        return cli_error(
-            EXIT_USAGE,
-            "%s: no irradiancemeter on a rectangle is among its sensors, and "
-            "--grid is of those",
-            cli.scene_path);
-    if (n > 1 && (o.csv || o.svg))
-        return cli_error(EXIT_USAGE,
-                         "%s: it has %d grids, and --csv and --svg write one: choose it "
-                         "with --sensor",
-                         cli.scene_path, n);
-    for (int s = first; s < end && !rc; s++) {
-        struct grid g;
-        if (!has_grid(s)) continue;
-        run.sensor = s;
-        rc = grid_read(run, o.ends, &g);
-        if (rc) return rc;
-        found->apart |= o.ends && !(fabs(g.z) <= APART);
-        if (g.summary.average.value == 0 && g.summary.average.hi == 0)
-            unlit[(*n_unlit)++] = s;
-        grid_tell(&g);
-        if (cli.json) grid_json(j, &g);
-        else grid_print(&g);
-        if (o.csv) rc = grid_csv(o.csv, &g);
-        if (o.svg && !rc) rc = grid_svg(o.svg, &g);
-        grid_free(&g);
-    }
-    return rc;
 }
 
 /* Sensors to which no walk brought light. */
@@ -402,7 +331,7 @@ static int run_read(int n, char **operand)
         if (rc) return rc;
         blocks = problem_blocks(problem, &n_blocks);
     }
-    outside_tell();
+    luminaires_tell();
     struct json j;
     if (cli.json) {
         j = cli_json();
@@ -412,7 +341,10 @@ static int run_read(int n, char **operand)
     const int one = sensor_named(), first = one ? cli.sensor : 0;
     const int end = one ? first + 1 : scene.n_sensors;
     int *unlit = cli_alloc((size_t)scene.n_sensors, sizeof *unlit), n_unlit = 0;
-    if (o.grid && !rc) rc = grids_read(&j, run, first, end, &found, unlit, &n_unlit);
+    const struct grid_wanted wanted = {o.ends, o.csv, o.svg};
+    if (o.grid && !rc)
+        rc = grids_read(&j, run, first, end, &wanted, APART, &found.apart, unlit,
+                        &n_unlit);
     if (o.ugr && !rc) {
         run.sensor = first;
         rc = glare_read(&j, &run);

@@ -28,6 +28,19 @@ void grid_json(struct json *j, const struct grid *g);
 /* Points at which no light was found, in part of the grid: a warning. */
 void grid_tell(const struct grid *g);
 
+struct grid_wanted {
+    int ends;              /* are they read from both ends? */
+    const char *csv, *svg; /* files; NULL: none */
+};
+/* Read and print the grids of the sensors [first, end) that have one; *apart becomes 1 where
+ * the ends differ by more than most_z standard errors, unlit [*n_unlit] gets those to
+ * which no light comes. 0, or an exit code with the reason printed. */
+int grids_read(struct json *j, struct imp_run run, int first, int end,
+               const struct grid_wanted *wanted, double most_z, int *apart, int *unlit,
+               int *n_unlit);
+/* A warning for luminaires outside of the box of all shapes. */
+void luminaires_tell(void);
+
 /* A line a point: column, row, x, y, z, value, se. 0, or an exit code. */
 int grid_csv(const char *path, const struct grid *g);
 /* The plan of the grid: colours with their scale, isolines, a number at each point where

@@ -165,8 +165,8 @@ enum imp_share_of {
 };
 
 /** x dE/dx of a reading E, summed over the numbers x of one object: dE/d ln x by a common factor of
- * them. Of a light it is what E has of it, and those of all lights add up to E, which is
- * of first degree in what they emit (Euler). Of a material it is what E gains by a change of its
+ * them. For a light it is what E has of it, and those of all lights add up to E, which is
+ * of first degree in what they emit (Euler). For a material it is what E gains by a change of its
  * reflectances, as a part of them: E times the mean number of reflections by it. */
 struct imp_share {
     enum imp_share_of of;

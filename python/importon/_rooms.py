@@ -182,3 +182,39 @@ def luminaires(scene: Scene) -> list[Luminaire]:
         found.append(Luminaire(decode(x.name), x.flux, x.lamp_flux, x.watts, x.efficacy, x.dimming, x.maintenance,
                                bool(x.is_point), tuple(x.position), tuple(x.opening)))
     return found
+
+
+def glare(scene: Scene, sensor: Any = 0, *, params: Any = None, seed: int = 0, spp: int = 0, points: str = "scene",
+          walks_from: str = "scene", progress: Any = None) -> tuple[Any, Any]:
+    """The unified glare rating (CIE 117) of the observers of a grid.
+
+    Parameters
+    ----------
+    scene : Scene
+    sensor : int or str
+        An irradiancemeter with a virtual, horizontal rectangle and a horizontal `facing`, the line of sight.
+    params, seed, spp, points, walks_from, progress
+        As `render`'s.
+
+    Returns
+    -------
+    numpy.ndarray, numpy.ndarray
+        [height][width], and one standard error each; -inf where no luminaire is seen.
+
+    Examples
+    --------
+    >>> scene = importon.load_string('''<scene version="3.0.0"><integrator type="path"/><emitter type="constant"/>
+    ... <shape type="rectangle"><sensor type="irradiancemeter"><boolean name="virtual" value="true"/>
+    ... <vector name="facing" x="1" y="0" z="0"/></sensor></shape></scene>''')
+    >>> ugr, se = importon.glare(scene, spp=16)
+    >>> bool((ugr == -float("inf")).all())
+    True
+    """
+    scene = check_scene(scene)
+    number = scene.sensor_index(sensor)
+    s = scene.sensors[number]
+    ugr, se = np.zeros((s.height, s.width)), np.zeros((s.height, s.width))
+    options = run_options(scene, sensor=number, seed=seed, spp=spp, points=points, walks_from=walks_from)
+    _call(scene, params, options, progress, lib.imp_grid_glare, scene.pointer, ctypes.byref(options), address(ugr),
+          address(se))
+    return ugr, se
