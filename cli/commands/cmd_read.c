@@ -2,8 +2,8 @@
  *
  * importon read: the numbers of a scene's sensors, means over their films, with standard
  * errors, units and derivatives; from either end, or from both to compare them. */
-#include "read/glare.h"
-#include "read/grid.h"
+#include "read/read_glare.h"
+#include "read/read_grid.h"
 #include "shared/command.h"
 #include "shared/overwrite.h"
 #include "shared/picture_files.h"

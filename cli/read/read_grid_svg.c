@@ -2,7 +2,7 @@
  *
  * The plan of a grid as SVG: a coloured cell for each point, isolines between the points
  * (marching squares, linear along the edges), numbers, and a scale of colours. */
-#include "grid.h"
+#include "read_grid.h"
 #include "shared/command.h"
 #include "shared/output.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * read --ugr: the unified glare rating at the points of a grid. */
-#include "glare.h"
+#include "read_glare.h"
 #include "shared/command.h"
 
 #include <math.h>

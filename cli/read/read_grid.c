@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A grid is read, printed, and written as a table. */
-#include "grid.h"
+#include "read_grid.h"
 #include "shared/command.h"
 #include "shared/output.h"
 

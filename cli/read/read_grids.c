@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * read --grid: the grids of a scene's sensors, and luminaires that light none of them. */
-#include "grid.h"
+#include "read_grid.h"
 #include "shared/command.h"
 
 #include <math.h>
