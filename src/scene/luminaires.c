@@ -33,6 +33,7 @@ enum imp_status imp_scene_get_luminaire(const imp_scene *scene, int luminaire,
 {
     IMP_REQUIRE(NULL, scene, "scene");
     IMP_REQUIRE(scene->ctx, info, "info");
+    IMP_CHECKED(imp__size_check(scene->ctx, __func__, "info", info->size, sizeof *info));
     int at = -1, left = luminaire;
     for (int i = 0; i < scene->n_emitters && at < 0 && luminaire >= 0; i++)
         if (is_luminaire(scene->emitters[i]) && left-- == 0) at = i;
