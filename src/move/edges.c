@@ -9,25 +9,7 @@ void imp__edges_free(struct imp__edges *edges)
 {
     imp__release(edges->ctx, edges->edge);
     imp__release(edges->ctx, edges->face);
-    imp__release(edges->ctx, edges->until);
     *edges = (struct imp__edges){0};
-}
-
-const struct imp__edge *imp__edges_draw(const struct imp__edges *edges, double u,
-                                        imp_v3 *p)
-{
-    const double x = u * edges->until[edges->n - 1];
-    size_t lo = 0, hi = edges->n - 1;
-    while (lo < hi) {
-        const size_t half = lo + (hi - lo) / 2;
-        if (edges->until[half] > x) hi = half;
-        else lo = half + 1;
-    }
-    const struct imp__edge *e = &edges->edge[lo];
-    const double before = lo > 0 ? edges->until[lo - 1] : 0;
-    const double t = imp_clamp((x - before) / (edges->until[lo] - before), 0.0, 1.0);
-    *p = e->a + (e->b - e->a) * t;
-    return e;
 }
 
 struct imp__glued imp__edge_glued(const struct imp__edges *edges,
@@ -47,6 +29,12 @@ int imp__edge_side(const struct imp__edges *edges, const struct imp__edge *e, im
         behind |= side <= 0;
     }
     return before && behind ? 0 : before ? -1 : 1;
+}
+
+double imp__edge_turn(const struct imp__edges *edges, const struct imp__edge *e)
+{
+    const struct imp__edge_face *f = &edges->face[e->first];
+    return e->n_faces == 2 ? imp_min(0.5 * imp__length(f[0].in + f[1].in), 1.0) : 1;
 }
 
 static bool vertices_move(const struct imp__moves *moves, int shape)

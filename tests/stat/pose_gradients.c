@@ -75,7 +75,7 @@ static const struct {
 static void room_test(const char *name, const char *rest, const char *filter, int spp,
                       int spp_ref)
 {
-    enum { SEEDS = 12, GROUPS = 12 };
+    enum { SEEDS = 36, GROUPS = 12 };
     imp_scene *scene = room(rest, filter);
     imp_problem *p;
     double sum[N + 3] = {0}, square[N + 3] = {0}, told[N + 3] = {0}, most[3] = {0};

@@ -40,10 +40,33 @@ static enum imp_status movers_add(const struct imp_problem *p,
     return IMP_OK;
 }
 
+/* What the adjoint image makes of light at a film position. */
+static double adjoint_at(const void *payload, const struct imp__flux *f)
+{
+    const struct imp__moved_gradient *m = payload;
+    const struct imp_film_desc *film = &m->tracer->sensor->film;
+    const size_t C = (size_t)m->tracer->scene->channels;
+    struct imp_splat_taps taps;
+    double sum = 0;
+    imp__splat_taps(film, &m->scale, f->px, f->py, &taps);
+    for (int j = 0; j < taps.down.n; j++)
+        for (int i = 0; i < taps.across.n; i++) {
+            const float *from =
+                m->seed + ((size_t)(taps.down.first + j) * (size_t)film->crop_w +
+                           (size_t)(taps.across.first + i)) *
+                              C;
+            double here = 0;
+            for (size_t c = 0; c < C; c++) here += (double)from[c] * f->L[c];
+            sum += taps.down.w[j] * taps.across.w[i] * here;
+        }
+    return sum;
+}
+
 enum imp_status imp__moved_begin(const struct imp_problem *p,
                                  const struct imp_tracer *tracer, const float *seed,
-                                 struct imp__moved_gradient *out)
+                                 int spp, struct imp__moved_gradient *out)
 {
+    const struct imp_film_desc *film = &tracer->sensor->film;
     enum imp_status st = IMP_OK;
     *out = (struct imp__moved_gradient){.tracer = tracer, .seed = seed};
     out->moves = imp__moves_begin(p->scene, tracer->sensor);
@@ -51,7 +74,10 @@ enum imp_status imp__moved_begin(const struct imp_problem *p,
     IMP_TRY(movers_add(p, out));
     IMP_TRY(imp__edges_build(p->scene, &out->edges));
     IMP_TRY(imp__boundary_begin(tracer, &out->moves, &out->edges, &out->boundary));
-    IMP_TRY(imp__splat_scale_create(p->ctx, &tracer->sensor->film, &out->scale));
+    IMP_TRY(imp__splat_scale_create(p->ctx, film, &out->scale));
+    IMP_TRY(imp__boundary_learn(&out->boundary,
+                                (int64_t)film->crop_w * film->crop_h * spp, adjoint_at,
+                                out));
 out:
     return st;
 }
@@ -94,27 +120,6 @@ bool imp__moved_walk(const struct imp__moved_gradient *m, struct imp_arena *aren
     return true;
 }
 
-/* What the adjoint image makes of light at a film position. */
-static double adjoint_at(const struct imp__moved_gradient *m, const struct imp__flux *f)
-{
-    const struct imp_film_desc *film = &m->tracer->sensor->film;
-    const size_t C = (size_t)m->tracer->scene->channels;
-    struct imp_splat_taps taps;
-    double sum = 0;
-    imp__splat_taps(film, &m->scale, f->px, f->py, &taps);
-    for (int j = 0; j < taps.down.n; j++)
-        for (int i = 0; i < taps.across.n; i++) {
-            const float *from =
-                m->seed + ((size_t)(taps.down.first + j) * (size_t)film->crop_w +
-                           (size_t)(taps.across.first + i)) *
-                              C;
-            double here = 0;
-            for (size_t c = 0; c < C; c++) here += (double)from[c] * f->L[c];
-            sum += taps.down.w[j] * taps.across.w[i] * here;
-        }
-    return sum;
-}
-
 bool imp__moved_draws(const struct imp__moved_gradient *m, struct imp_arena *arena,
                       struct imp__replicates plan, int x, int y, int b,
                       struct imp_sink *sink)
@@ -135,7 +140,8 @@ bool imp__moved_draws(const struct imp__moved_gradient *m, struct imp_arena *are
             const int64_t index = ((int64_t)b * n + i) * pixels + pixel;
             for (const struct imp__flux *f =
                      imp__boundary_draw(&m->boundary, arena,
-                                        (enum imp__boundary_kind)kind, index, &no_memory);
+                                        (enum imp__boundary_kind)kind, index, pixels,
+                                &no_memory);
                  f; f = f->next) {
                 imp__flux_bar(&m->moves, f,
                               adjoint_at(m, f) / ((double)n * (double)pixels), bar);

@@ -3,8 +3,8 @@
  * Gradients by poses (scene/pose.h): what a walk of a fixed adjoint gives to them, and the draws
  * from edges that complete it (walk/moved/boundary.h). A replicate of n walks of a pixel has n
  * draws of each kind, of scattered light four times as many, which lie anywhere on the film: pixels
- * only number them. They are independent of each other and of the walks, so standard errors are
- * those of the walks' sums. */
+ * only number them, and are strata along the list of edges. Draws of different replicates are
+ * independent of each other and of the walks, so standard errors are those of the walks' sums. */
 #ifndef IMP_INVERSE_MOVED_GRADIENT_H
 #define IMP_INVERSE_MOVED_GRADIENT_H
 
@@ -24,11 +24,11 @@ struct imp__moved_gradient {
 
 /* Is some pose active? */
 bool imp__moved_wanted(const struct imp_problem *p);
-/* For walks of this tracer, which stays where it is. IMP_E_UNSUPPORTED, by name, as
+/* For walks of this tracer, spp a pixel, which stays where it is. IMP_E_UNSUPPORTED, by name, as
  * imp__boundary_begin. Ended by imp__moved_end, also after a failure. */
 enum imp_status imp__moved_begin(const struct imp_problem *p,
                                  const struct imp_tracer *tracer, const float *seed,
-                                 struct imp__moved_gradient *out);
+                                 int spp, struct imp__moved_gradient *out);
 void imp__moved_end(struct imp__moved_gradient *m);
 
 /* A walk with its adjoint. False: no memory. */

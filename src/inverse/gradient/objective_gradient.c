@@ -222,7 +222,7 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
     IMP_TRY(st);
     IMP_TRY(imp__adjoint_check(p, &j.tracer.sensor->film, seed_image, "seed_image"));
     if (imp__moved_wanted(p)) {
-        IMP_TRY(imp__moved_begin(p, &j.tracer, seed_image, &moved));
+        IMP_TRY(imp__moved_begin(p, &j.tracer, seed_image, own.spp, &moved));
         j.moved = &moved;
     }
     if (j.tracer.integrator->from_lights) {

@@ -1,9 +1,63 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Draws of the boundary, and what they bring as derivatives (boundary.h). */
-#include "base/context.h"
+#include "base/arguments.h"
 #include "boundary_parts.h"
 #include "scene/pose.h"
+
+/* A tenth of each measure is the length in space. */
+#define BY_LENGTH 0.1
+
+/* What an edge may be to the picture: its length as the camera sees it, where it is a silhouette, or
+ * else by how much its faces turn. */
+static double film_measure(const struct imp__boundary *b, const struct imp__edge *e)
+{
+    const imp_v3 along = e->b - e->a, r = (e->a + e->b) * 0.5 - b->camera;
+    const imp_v3 m = imp__cross(along, r);
+    const double d2 = imp_max(imp__dot(r, r), 1e-12 * imp__sqr(b->size));
+    const double jump =
+        imp__edge_side(b->edges, e, m) == 0 ? imp__edge_turn(b->edges, e) : 1;
+    return imp__length(m) / d2 * jump;
+}
+
+/* To lights: of all lines through it, a silhouette to so many; to scattered light, all that jumps is
+ * made by the turn. */
+static double turn_measure(const struct imp__boundary *b, const struct imp__edge *e)
+{
+    return imp__length(e->b - e->a) * imp__edge_turn(b->edges, e);
+}
+
+static enum imp_status choice_make(struct imp__boundary *b, enum imp__boundary_kind kind)
+{
+    const struct imp__edges *edges = b->edges;
+    double *measure = imp__alloc(edges->ctx, edges->n + 1, sizeof *measure);
+    double sum = 0, all = 0;
+    if (!measure) return imp__error(edges->ctx, IMP_E_NOMEM, "no memory for edges");
+    for (size_t k = 0; k < edges->n; k++) {
+        const struct imp__edge *e = &edges->edge[k];
+        sum += measure[k] =
+            kind == IMP_BOUNDARY_FILM ? film_measure(b, e) : turn_measure(b, e);
+        all += imp__length(e->b - e->a);
+    }
+    for (size_t k = 0; k < edges->n; k++) {
+        const struct imp__edge *e = &edges->edge[k];
+        measure[k] = BY_LENGTH * imp__length(e->b - e->a) / all +
+                     (sum > 0 ? (1 - BY_LENGTH) * measure[k] / sum : 0);
+    }
+    const enum imp_status st =
+        imp__edge_choice_begin(edges, &b->tree, measure, 1, &b->choice[kind]);
+    imp__release(edges->ctx, measure);
+    return st;
+}
+
+static enum imp_status choices_make(struct imp__boundary *b)
+{
+    if (b->edges->n == 0) return IMP_OK;
+    IMP_CHECKED(imp__edge_tree_build(b->edges, &b->tree));
+    for (int k = 0; k < IMP_BOUNDARY_KINDS; k++)
+        IMP_CHECKED(choice_make(b, (enum imp__boundary_kind)k));
+    return IMP_OK;
+}
 
 /* Area lights by area times radiance. */
 static enum imp_status lights_make(struct imp__boundary *b)
@@ -63,12 +117,15 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
     if (st == IMP_OK) st = edges_allowed(out);
     imp__pinhole(tracer->sensor, &out->camera);
     if (st == IMP_OK) st = lights_make(out);
+    if (st == IMP_OK) st = choices_make(out);
     return st;
 }
 
 void imp__boundary_free(struct imp__boundary *b)
 {
     if (b->tracer) imp__release(b->tracer->scene->ctx, b->light_cdf);
+    for (int k = 0; k < IMP_BOUNDARY_KINDS; k++) imp__edge_choice_free(&b->choice[k]);
+    imp__edge_tree_free(&b->tree);
     *b = (struct imp__boundary){0};
 }
 
@@ -86,24 +143,52 @@ struct imp__flux *imp__flux_add(struct imp__edge_draw *d, int n)
     return f;
 }
 
+static bool point_set(struct imp__edge_draw *d, const struct imp__edge_point *p)
+{
+    d->edge = p->edge;
+    d->p = p->p;
+    d->along = imp__normalize(p->edge->b - p->edge->a);
+    d->inv_pdf = p->inv_pdf;
+    d->cell = p->cell;
+    return true;
+}
+
+bool imp__edge_any(struct imp__edge_draw *d)
+{
+    struct imp__edge_point p;
+    imp__edge_choice_draw(d->choice, d->u, &p);
+    return point_set(d, &p);
+}
+
+bool imp__edge_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel)
+{
+    struct imp__edge_point p;
+    return imp__edge_choice_silhouette(d->choice, from, parallel, d->u, &p) &&
+           point_set(d, &p);
+}
+
+void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
+{
+    d->end = &d->first;
+    switch (kind) {
+    case IMP_BOUNDARY_FILM: imp__draw_film(d); break;
+    case IMP_BOUNDARY_LIGHT: imp__draw_light(d); break;
+    case IMP_BOUNDARY_SCATTER: imp__draw_scatter(d); break;
+    }
+}
+
 struct imp__flux *imp__boundary_draw(const struct imp__boundary *b,
                                      struct imp_arena *arena,
                                      enum imp__boundary_kind kind, int64_t index,
-                                     bool *no_memory)
+                                     int64_t strata, bool *no_memory)
 {
-    struct imp__edge_draw d = {.b = b, .arena = arena};
+    struct imp__edge_draw d = {.b = b, .arena = arena, .choice = &b->choice[kind]};
     if (b->edges->n == 0) return NULL;
     /* Walks of pictures have smaller numbers in the place of the kind. */
     d.key = imp__key(b->tracer->seed, UINT64_MAX - (uint64_t)kind, (uint64_t)index);
-    d.edge = imp__edges_draw(b->edges, imp__u01(d.key, IMP_EDGE_WHICH), &d.p);
-    d.along = imp__normalize(d.edge->b - d.edge->a);
-    d.inv_pdf = b->edges->until[b->edges->n - 1];
-    d.end = &d.first;
-    switch (kind) {
-    case IMP_BOUNDARY_FILM: imp__draw_film(&d); break;
-    case IMP_BOUNDARY_LIGHT: imp__draw_light(&d); break;
-    case IMP_BOUNDARY_SCATTER: imp__draw_scatter(&d); break;
-    }
+    d.u = ((double)(index % strata) + imp__u01(d.key, IMP_EDGE_WHICH)) / (double)strata;
+    d.u = imp_min(d.u, 1 - 0x1p-53);
+    imp__boundary_work(&d, kind);
     *no_memory |= d.no_memory;
     return d.first;
 }

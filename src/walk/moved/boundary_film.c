@@ -44,7 +44,8 @@ void imp__draw_film(struct imp__edge_draw *d)
     const struct imp_sensor *sensor = b->tracer->sensor;
     const double none[4] = {0};
     struct imp_sensor_sample to;
-    if (!sensor->ops->connect || !imp__sensor_connect(sensor, &d->p, false, none, &to) ||
+    if (!imp__edge_any(d) || !sensor->ops->connect ||
+        !imp__sensor_connect(sensor, &d->p, false, none, &to) ||
         !imp__light_on_film(sensor, &to))
         return;
     const imp_v3 r = d->p - to.p;

@@ -25,6 +25,7 @@ void imp__draw_light(struct imp__edge_draw *d)
     struct imp_surface y, at;
     if (!(pmf > 0)) return;
     e->shape->ops->sample_area(e->shape, u, &y);
+    if (!imp__edge_silhouette(d, y.p, false)) return;
 
     const imp_v3 r = d->p - y.p, turned = imp__cross(d->along, r);
     const double t_y = imp__length(r), sine = imp__length(turned) / t_y;

@@ -11,9 +11,12 @@ struct imp__edge_draw {
     const struct imp__boundary *b;
     struct imp_arena *arena;
     struct imp_key key;
+    const struct imp__edge_choice *choice;
+    double u; /* by which the point is chosen */
     const struct imp__edge *edge;
     imp_v3 p, along; /* the point, and the unit direction of the edge */
-    double inv_pdf;  /* length of all edges */
+    double inv_pdf;  /* of the point, per length */
+    int cell;        /* of the choice */
     struct imp__flux *first, **end;
     bool no_memory;
 };
@@ -36,6 +39,9 @@ enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
 /* Surfaces nearer behind an edge, per size of the scene, are what it stands on. */
 #define IMP_CONTACT 2e-5
 
+/* Sets the edge and its point: of all edges, or of silhouettes of lines from there. False: none. */
+bool imp__edge_any(struct imp__edge_draw *d);
+bool imp__edge_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel);
 /* A flux more, with room for n ends. NULL: no memory. */
 struct imp__flux *imp__flux_add(struct imp__edge_draw *d, int n);
 static inline struct imp__flux_end imp__flux_glued(const struct imp__glued *x, imp_v3 bar)
@@ -62,6 +68,7 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
                      const struct imp_surface *at, const struct imp__edge_light *light);
 
 /* ---- One draw of each kind ---- */
+void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind);
 void imp__draw_film(struct imp__edge_draw *d);
 void imp__draw_light(struct imp__edge_draw *d);
 void imp__draw_scatter(struct imp__edge_draw *d);

@@ -43,7 +43,7 @@ void imp__draw_scatter(struct imp__edge_draw *d)
     const imp_v3 w = imp__uniform_sphere(u);
     struct imp_hit hit;
     struct imp_surface at;
-    if (max >= 0 && max < 2) return;
+    if ((max >= 0 && max < 2) || !imp__edge_any(d)) return;
     if (!imp__intersect(scene, &d->p, &w, IMP_CONTACT * b->size, INFINITY, &hit)) return;
     imp__hit_surface(scene, &hit, &d->p, &w, &at);
 
