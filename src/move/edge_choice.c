@@ -54,13 +54,22 @@ static double chance_at(const struct imp__edge_choice *c, double measure)
     return c->cell[k] + (c->cell[k + 1] - c->cell[k]) * (measure * c->n_cells - k);
 }
 
+/* Root of a cell's moment, with a share of its neighbours: what a few looks have found in one
+ * cell may lie in the next. */
+static double root_near(const struct imp__edge_choice *c, const double *moment, int k)
+{
+    const double before = moment[imp_max(k - 1, 0)];
+    const double after = moment[imp_min(k + 1, c->n_cells - 1)];
+    return sqrt(0.5 * moment[k] + 0.25 * (before + after));
+}
+
 void imp__edge_choice_learn(struct imp__edge_choice *c, const double *moment)
 {
     double sum = 0, before = 0;
-    for (int k = 0; k < c->n_cells; k++) sum += sqrt(moment[k]);
+    for (int k = 0; k < c->n_cells; k++) sum += root_near(c, moment, k);
     if (!(sum > 0) || !(sum < INFINITY)) return;
     for (int k = 0; k < c->n_cells; k++) {
-        before += KEPT / c->n_cells + (1 - KEPT) * sqrt(moment[k]) / sum;
+        before += KEPT / c->n_cells + (1 - KEPT) * root_near(c, moment, k) / sum;
         c->cell[k + 1] = before;
     }
     for (int k = 0; k <= c->n_cells; k++) c->cell[k] /= before;
