@@ -591,6 +591,24 @@ imp_scene_get_param(const imp_scene *scene, size_t index, struct imp_param_info 
  * first. @return IMP_OK; IMP_E_ARG with a message that names the nearest ones. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
+/** Make a number of geometry a parameter, behind all others. Setting it moves the object.
+ *
+ *     NAME.pose              as imp_scene_add_pose
+ *     NAME.scale             of a shape: 1 as the scene file has it, about the middle of its box
+ *     NAME.vertex_positions  of a mesh: [vertices][3], world
+ *     NAME.x_fov             of a perspective camera: horizontal field of view, degrees
+ *     NAME.principal_point_offset_x, NAME.principal_point_offset_y   of a perspective camera:
+ *                            in parts of the film's width and height
+ *     NAME.position          of a point light: [3], world
+ *     NAME.direction         of a directional light: [3], of any length
+ *
+ * Gradients, patterns, and what is there already: as of poses.
+ * @param name  such a name.
+ * @return IMP_OK; IMP_E_ARG if there is no such object or number, the scene is not committed, or
+ *         a problem has been created with it; IMP_E_UNSUPPORTED, with the reason, where it cannot
+ *         be moved; IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_scene_add_geometry(imp_scene *scene,
+                                                              const char *name);
 /** Make the pose of a shape or of a camera a parameter, `OBJECT.pose`, behind all others: six
  * numbers, a translation in scene units and a rotation vector in radians about the middle of the
  * shape's box, or the camera's own place, away from where the scene file has it. Setting it moves

@@ -800,6 +800,10 @@ struct imp_emitter_ops {
     /* For a delta light: light leaves within a cone about `axis` alone, of this cosine, as
      * its inputs are now. NULL: all around. */
     void (*cone)(const struct imp_emitter *e, imp_v3 *axis, double *cosine);
+    /* Where a light at a point is, or the unit direction in which parallel light travels, world:
+     * reads it, or, with `set`, puts the light there (a direction of any length). NULL: another
+     * light, or one whose radiance depends on the direction in which it leaves. */
+    void (*aim)(struct imp_emitter *e, double v[3], bool set);
 };
 
 /* ---- Sensor and filter --------------------------------------------------------- */
@@ -896,6 +900,10 @@ struct imp_sensor_ops {
                     const double u[4], struct imp_sensor_sample *out);
     /* As imp_shape_ops.move. */
     void (*move)(struct imp_sensor *s, const double to_world[12]);
+    /* Horizontal field of view in degrees, and the principal point's offset in parts of the
+     * film's width and height, of a pinhole whose film is flat: reads them, or, with `set`,
+     * changes the camera to these. False: it has none. NULL: so has the kind. */
+    bool (*view)(struct imp_sensor *s, double number[3], bool set);
 };
 
 /* ---- Versions of this header ----------------------------------------------------- */

@@ -31,10 +31,7 @@ static enum imp_status movers_add(const struct imp_problem *p,
     for (const struct imp_pose *q = next_active(p, p->scene->poses); q;
          q = next_active(p, q->next)) {
         if (q->sensor && q->sensor != sensor) continue; /* it is not looked through */
-        IMP_CHECKED(imp__moves_add(&m->moves, IMP_MOVE_POSE,
-                                   q->sensor ? IMP_MOVE_CAMERA : q->shape));
-        struct imp__mover *mover = &m->moves.mover[m->moves.n_movers - 1];
-        for (int i = 0; i < 3; i++) mover->centre[i] = q->centre[i] + q->number[i];
+        IMP_CHECKED(imp__moves_add_pose(&m->moves, q));
         m->pose[m->moves.n_movers - 1] = q;
     }
     return IMP_OK;
@@ -94,18 +91,17 @@ void imp__moved_end(struct imp__moved_gradient *m)
     *m = (struct imp__moved_gradient){0};
 }
 
-/* From velocities to the numbers of poses. */
-static void numbers_add(const struct imp__moved_gradient *m, const double *bar,
+/* From adjoints of velocities, which it overwrites, to the numbers of parameters. */
+static void numbers_add(const struct imp__moved_gradient *m, double *bar,
                         struct imp_sink *sink)
 {
     for (int k = 0; k < m->moves.n_movers; k++) {
         const struct imp_pose *pose = m->pose[k];
-        const double *own = bar + m->moves.mover[k].first;
-        double number[6] = {own[0], own[1], own[2], 0, 0, 0};
-        imp__rotation_bar(pose->number + 3, imp__v3(own[3], own[4], own[5]), number + 3);
-        for (size_t e = 0; e < 6; e++) {
-            const imp_spec lanes = {number[e], 0, 0, 0};
-            if (number[e] != 0) sink->add(sink, pose->param, e, 1, &lanes);
+        double *own = bar + m->moves.mover[k].first;
+        imp__pose_numbers_bar(pose, own);
+        for (size_t e = 0; e < pose->n; e++) {
+            const imp_spec lanes = {own[e], 0, 0, 0};
+            if (own[e] != 0) sink->add(sink, pose->param, e, 1, &lanes);
         }
     }
 }
