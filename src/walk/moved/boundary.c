@@ -59,7 +59,7 @@ static enum imp_status choices_make(struct imp__boundary *b)
     return IMP_OK;
 }
 
-/* Area lights by area times radiance. */
+/* Lights by their power: pi A Le, 4 pi I, or pi R^2 E of a scene within R. */
 static enum imp_status lights_make(struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
@@ -71,9 +71,12 @@ static enum imp_status lights_make(struct imp__boundary *b)
         const struct imp_emitter *e = scene->emitters[k];
         const struct imp_texcoord nowhere = {.shape = e->shape};
         imp_spec in[IMP_INPUTS_MAX];
-        if (e->shape) {
+        if (e->shape || (e->ops->flags & IMP_EMITTER_DELTA)) {
+            const double size = e->shape                            ? e->shape->area
+                                : e->ops->flags & IMP_EMITTER_FAR ? imp__sqr(b->size) / 4
+                                                                    : 4;
             imp__inputs_eval(e->input, e->n_in, &nowhere, in);
-            sum += e->shape->area * imp__max_used(in[0], scene->lanes == 4);
+            sum += size * imp__max_used(in[0], scene->lanes == 4);
             b->n_lights++;
         }
         b->light_cdf[k] = sum;
@@ -199,8 +202,9 @@ double imp__flux_velocity(const struct imp__moves *moves, const struct imp__flux
     double sum = 0;
     for (int k = 0; k < flux->n_ends; k++) {
         const struct imp__flux_end *e = &flux->end[k];
-        const imp_v3 v = e->camera ? imp__camera_velocity(moves, e->x.p, theta_dot)
-                                   : imp__velocity_of(moves, &e->x, theta_dot).v;
+        const imp_v3 v = e->camera  ? imp__camera_velocity(moves, e->x.p, theta_dot)
+                         : e->light ? imp__light_velocity(moves, e->light - 1, theta_dot)
+                                    : imp__velocity_of(moves, &e->x, theta_dot).v;
         sum += imp__dot(e->bar, v);
     }
     return sum;
@@ -213,6 +217,7 @@ void imp__flux_bar(const struct imp__moves *moves, const struct imp__flux *flux,
         const struct imp__flux_end *e = &flux->end[k];
         const struct imp__velocity v = {e->bar * bar, {0}, 0};
         if (e->camera) imp__camera_velocity_bar(moves, e->x.p, v.v, theta_bar);
+        else if (e->light) imp__light_velocity_bar(moves, e->light - 1, v.v, theta_bar);
         else imp__velocity_bar(moves, &e->x, &v, theta_bar);
     }
 }

@@ -10,7 +10,9 @@
  *     light    a line from a point y of a light, at distance t_y, passes a silhouette on its way to
  *              a vertex x, at distance t_x behind it; m points away from the edge's faces:
  *                  dI = -int dA_y dl Le cos_y sin(phi)/t_y^2 f W(x) m.(V - V_line),
- *                  V_line = (t_y x' + t_x V_y)/(t_x + t_y): both ends of the line move
+ *                  V_line = (t_y x' + t_x V_y)/(t_x + t_y): both ends of the line move;
+ *              of a point light Le cos_y dA_y is its intensity, of parallel light along d
+ *              Le cos_y dA_y/t_y^2 its irradiance and V_line = x' - t_x d'
  *     scatter  what a vertex x receives from scattered light and the sky jumps at every edge that
  *              it sees; w is a direction from the edge to it:
  *                  dI = int dl dw sin(phi) f W(x) [L(-m) - L(+m)] m.(V - x')
@@ -40,14 +42,16 @@ struct imp__boundary {
     double size;   /* of the scene */
     int n_lights;
     double
-        *light_cdf; /* [n_emitters] of area lights, by area times radiance; last is 1 */
+        *light_cdf; /* [n_emitters] of all but skies, by power; last is 1 */
 };
 
-/* A velocity on which a flux depends: of a glued point, or of what the camera makes of one. */
+/* A velocity on which a flux depends: of a glued point, of what the camera makes of one, or of a
+ * light without a shape. */
 struct imp__flux_end {
     struct imp__glued x;
     imp_v3 bar;
     bool camera;
+    int light; /* emitter, plus 1, whose place or direction it is; 0: none */
 };
 
 /* What one draw brings to a film position: L times the sum of bar.V over its ends. */

@@ -35,7 +35,10 @@ static void groups_add(struct pilot *x, const struct imp__flux *f)
         const struct imp__mover *m = &moves->mover[k];
         for (int i = 0; i < f->n_ends; i++) {
             const struct imp__flux_end *e = &f->end[i];
-            if ((e->camera ? IMP_MOVE_CAMERA : e->x.shape) != m->shape) continue;
+            const int shape = e->camera  ? IMP_MOVE_CAMERA
+                              : e->light ? IMP_MOVE_EMITTER(e->light - 1)
+                                         : e->x.shape;
+            if (shape != m->shape) continue;
             const imp_v3 turn = imp__cross(e->x.p - m->centre, e->bar);
             for (int j = 0; j < 3; j++) {
                 x->group[6 * k + j] += light * e->bar[j];

@@ -46,7 +46,7 @@ bool imp__edge_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel);
 struct imp__flux *imp__flux_add(struct imp__edge_draw *d, int n);
 static inline struct imp__flux_end imp__flux_glued(const struct imp__glued *x, imp_v3 bar)
 {
-    return (struct imp__flux_end){*x, bar, false};
+    return (struct imp__flux_end){*x, bar, false, 0};
 }
 
 /* What light that arrives at `at` (a hit of this shape) along w brings to the sensor: from there,

@@ -49,12 +49,36 @@ static int read_walk(struct sweep *s, imp_spec adjoint)
     return n;
 }
 
+/* A light sample of a point, or of parallel light. */
+static void delta_bar(struct sweep *s, int k, const struct imp_vertex *v)
+{
+    const int light = v->d.light.emitter;
+    struct imp_emitter *e = s->tracer->scene->emitters[light];
+    const double weight = s->piece[k].light;
+    double aim[3];
+    e->ops->aim(e, aim, false);
+    const imp_v3 at = imp__v3(aim[0], aim[1], aim[2]);
+    if (e->ops->flags & IMP_EMITTER_FAR) {
+        imp__direction_bar(&s->at[k], -at, weight);
+        const imp_v3 n = s->at[k].x.n;
+        imp__light_velocity_bar(s->moves, light, n * (weight / imp__dot(n, at)),
+                                s->theta_bar);
+        return;
+    }
+    const imp_v3 bar = imp__point_bar(&s->at[k], at, weight);
+    imp__light_velocity_bar(s->moves, light, bar, s->theta_bar);
+}
+
 /* The light sample of vertex k. */
 static void light_bar(struct sweep *s, int k, const struct imp_vertex *v)
 {
     const struct imp_scene *scene = s->tracer->scene;
     const struct imp_emitter *e = scene->emitters[v->d.light.emitter];
     const double weight = s->piece[k].light;
+    if (e->ops->flags & IMP_EMITTER_DELTA) {
+        delta_bar(s, k, v);
+        return;
+    }
     if (e->ops->flags & IMP_EMITTER_ENVIRONMENT) {
         const imp_v3 w = -imp__decided_v3(v->d.light.d);
         imp__direction_bar(&s->at[k], w, weight);
