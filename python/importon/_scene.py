@@ -199,6 +199,43 @@ class Scene:
             self._table = None
         return name + ".pose"
 
+    def add_geometry(self, name: str) -> str:
+        """Make a number of geometry a parameter.
+
+        `NAME.pose` as `add_pose`; `NAME.scale` of a shape; `NAME.vertex_positions` of a mesh;
+        `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y` of a perspective camera;
+        `NAME.position` of a point light; `NAME.direction` of a directional light. Otherwise
+        as `add_pose`.
+
+        Parameters
+        ----------
+        name : str
+            Such a name.
+
+        Returns
+        -------
+        str
+            Of the parameter: the same.
+
+        Raises
+        ------
+        ArgumentError
+            There is no such object or number, or the scene has been used.
+        UnsupportedError
+            It cannot be moved, with the reason.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> name = scene.add_geometry("sensor.x_fov")
+        """
+        not_inside()
+        with self.lock:
+            self._context.check(
+                lib.imp_scene_add_geometry(self.pointer, text(name, "name")))
+            self._table = None
+        return name
+
     @property
     def pointer(self) -> int:
         if self._handle.closed:

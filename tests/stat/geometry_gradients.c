@@ -220,7 +220,7 @@ int main(void)
     ctx = test_context(2);
     block_write();
     adjoint_make();
-    room_test("view", DIRECT LAMP, view, turned, 0.04, 64, 64);
+    room_test("view", DIRECT LAMP, view, turned, 0.04, 64, 256);
     room_test("block", PATH LAMP, block, larger, 0.03, 64, 64);
     room_test("corners", DIRECT LAMP, corners, NULL, 0.03, 64, 64);
     room_test("bulb", PATH BULB, bulb, NULL, 0.03, 64, 64);
