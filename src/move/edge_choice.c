@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Points on edges by a measure, and by what a pilot has found in cells of it (edge_choice.h). */
-#include "base/context.h"
 #include "edge_choice.h"
+#include "base/context.h"
 
 #define KEPT 0.15 /* probability that stays with the measure */
 
@@ -104,8 +104,7 @@ static void point_at(const struct imp__edge_choice *c, size_t k, double chance,
     out->edge = e;
     out->p = e->a + (e->b - e->a) * t;
     out->cell = (int)cell;
-    out->inv_pdf =
-        imp__length(e->b - e->a) * own / (pmf * measure * part * c->n_cells);
+    out->inv_pdf = imp__length(e->b - e->a) * own / (pmf * measure * part * c->n_cells);
 }
 
 void imp__edge_choice_draw(const struct imp__edge_choice *c, double u,

@@ -10,10 +10,10 @@
 #define SLACK 1e-6 /* for rounding: where normals are as good as across the line */
 
 struct imp__edge_node {
-    imp_v3 centre, axis; /* of the sphere; of the cone */
+    imp_v3 centre, axis;         /* of the sphere; of the cone */
     double radius, cosine, sine; /* of the cone's half angle; cosine < 0: any normal */
-    size_t lo, hi;        /* edges */
-    size_t second;        /* its second child, the first is the next node; 0: a leaf */
+    size_t lo, hi;               /* edges */
+    size_t second; /* its second child, the first is the next node; 0: a leaf */
 };
 
 /* Normals of the two faces, turned the same way round. False: the edge is a border, or has more

@@ -24,7 +24,7 @@ struct imp__edge {
 struct imp__edges {
     imp_context *ctx;
     size_t n, n_faces;
-    struct imp__edge *edge;      /* [n], along a curve through space: neighbours are near */
+    struct imp__edge *edge; /* [n], along a curve through space: neighbours are near */
     struct imp__edge_face *face; /* [n_faces] */
 };
 

@@ -125,8 +125,8 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
     }
     if (pose->kind == IMP_POSE_SCALE) m->rate = 1 / pose->number[0];
     if (pose->kind == IMP_POSE_DIRECTION)
-        m->rate = 1 / imp__length(imp__v3(pose->number[0], pose->number[1],
-                                          pose->number[2]));
+        m->rate =
+            1 / imp__length(imp__v3(pose->number[0], pose->number[1], pose->number[2]));
     return IMP_OK;
 }
 
@@ -321,7 +321,8 @@ void imp__camera_velocity_bar(const struct imp__moves *moves, imp_v3 p, imp_v3 b
 }
 
 /* Across the direction of parallel light; a place in full. */
-static imp_v3 light_part(const struct imp__moves *moves, const struct imp__mover *m, imp_v3 v)
+static imp_v3 light_part(const struct imp__moves *moves, const struct imp__mover *m,
+                         imp_v3 v)
 {
     const struct imp_emitter *e = moves->scene->emitters[IMP_MOVE_EMITTER(m->shape)];
     if (!(e->ops->flags & IMP_EMITTER_FAR)) return v;

@@ -32,16 +32,17 @@ enum imp__move_kind {
     IMP_MOVE_OFFSET_Y,
     IMP_MOVE_LIGHT
 };
-#define IMP_MOVE_CAMERA (-1)        /* in place of a shape */
+#define IMP_MOVE_CAMERA     (-1)       /* in place of a shape */
 #define IMP_MOVE_EMITTER(k) (-2 - (k)) /* in place of a shape: emitter k of the scene */
 
 struct imp__mover {
     enum imp__move_kind kind;
     int shape; /* index in the scene, IMP_MOVE_CAMERA, or IMP_MOVE_EMITTER(k) */
     imp_v3 centre;
-    imp_v3 axis, across; /* of a camera: unit, and the offset's velocity at the depth 1; of
+    imp_v3 axis,
+        across;  /* of a camera: unit, and the offset's velocity at the depth 1; of
                             parallel light the axis is its direction */
-    double rate;         /* the velocities' factor */
+    double rate; /* the velocities' factor */
     size_t first, count; /* its numbers */
 };
 
@@ -75,7 +76,8 @@ void imp__moves_free(struct imp__moves *moves);
 enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kind,
                                int shape);
 /* The mover of a parameter, at its value now. */
-enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_pose *pose);
+enum imp_status imp__moves_add_pose(struct imp__moves *moves,
+                                    const struct imp_pose *pose);
 /* From the adjoint of a mover's numbers to that of its parameter's, in place: a mover turns the
  * object as it is, the parameter is one vector of rotation. */
 void imp__pose_numbers_bar(const struct imp_pose *pose, double *bar);
@@ -97,7 +99,8 @@ struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
 void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *x,
                        const struct imp__velocity *bar, double *theta_bar);
 /* Velocity of emitter k: of its place, or of the unit direction of parallel light. */
-imp_v3 imp__light_velocity(const struct imp__moves *moves, int k, const double *theta_dot);
+imp_v3 imp__light_velocity(const struct imp__moves *moves, int k,
+                           const double *theta_dot);
 void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 bar,
                              double *theta_bar);
 /* Velocity of what the camera sees at p through a fixed film position: origin and direction of

@@ -54,7 +54,8 @@ struct imp_pose {
 /* The last part of such a name, without its point. */
 const char *imp__pose_tail(enum imp_pose_kind kind);
 /* Another parameter of the same object. NULL: none. */
-const struct imp_pose *imp__pose_beside(const struct imp_pose *p, enum imp_pose_kind kind);
+const struct imp_pose *imp__pose_beside(const struct imp_pose *p,
+                                        enum imp_pose_kind kind);
 
 /* Where the rays of a camera meet. False: in no point, as those of a lens with an aperture or of
  * parallel light. */

@@ -101,12 +101,12 @@ static enum imp_status sensor_find(struct imp_scene *scene, int k, struct imp_po
     if (p->kind != IMP_POSE_RIGID &&
         (p->kind < IMP_POSE_FOV || p->kind > IMP_POSE_OFFSET_Y))
         return refuse(scene, s->name, p->kind, "it is a sensor");
-    if (!s->ops->move) return refuse(scene, s->name, p->kind, "it is no perspective camera");
+    if (!s->ops->move)
+        return refuse(scene, s->name, p->kind, "it is no perspective camera");
     if (s->medium) return refuse(scene, s->name, p->kind, "it is in a medium");
     if (!imp__pinhole(s, &p->centre))
         return refuse(scene, s->name, p->kind, "its rays meet in no point");
-    if (p->kind != IMP_POSE_RIGID &&
-        (!s->ops->view || !s->ops->view(s, number, false)))
+    if (p->kind != IMP_POSE_RIGID && (!s->ops->view || !s->ops->view(s, number, false)))
         return refuse(scene, s->name, p->kind, "its lens distorts the picture");
     return IMP_OK;
 }
@@ -114,8 +114,8 @@ static enum imp_status sensor_find(struct imp_scene *scene, int k, struct imp_po
 static enum imp_status light_find(struct imp_scene *scene, int k, struct imp_pose *p)
 {
     struct imp_emitter *e = scene->emitters[k];
-    const enum imp_pose_kind kind = e->ops->flags & IMP_EMITTER_FAR ? IMP_POSE_DIRECTION
-                                                                    : IMP_POSE_POSITION;
+    const enum imp_pose_kind kind =
+        e->ops->flags & IMP_EMITTER_FAR ? IMP_POSE_DIRECTION : IMP_POSE_POSITION;
     p->emitter = e;
     p->rest_size = e->ops->object_size;
     if (!e->ops->aim || kind != p->kind)
@@ -167,7 +167,8 @@ static enum imp_status rest_keep(struct imp_scene *scene, struct imp_pose *p)
 /* Numbers, and what they are where the file has the object. */
 static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
 {
-    const struct imp_triangles *t = p->shape >= 0 ? &scene->shapes[p->shape]->triangles : NULL;
+    const struct imp_triangles *t =
+        p->shape >= 0 ? &scene->shapes[p->shape]->triangles : NULL;
     double view[3], aim[3];
     p->n = p->kind == IMP_POSE_RIGID      ? 6
            : p->kind == IMP_POSE_VERTICES ? 3 * t->n_vertices
@@ -269,10 +270,10 @@ static enum imp_status geometry_add(struct imp_scene *scene, const char *object,
     p->shape = -1;
     IMP_CHECKED(object_find(scene, object, p));
     if (is_there(scene, p)) return IMP_OK;
-    const bool others = imp__pose_beside(p, IMP_POSE_RIGID) ||
-                        imp__pose_beside(p, IMP_POSE_SCALE);
-    if (p->object != p && ((kind == IMP_POSE_VERTICES && others) ||
-                           imp__pose_beside(p, IMP_POSE_VERTICES)))
+    const bool others =
+        imp__pose_beside(p, IMP_POSE_RIGID) || imp__pose_beside(p, IMP_POSE_SCALE);
+    if (p->object != p &&
+        ((kind == IMP_POSE_VERTICES && others) || imp__pose_beside(p, IMP_POSE_VERTICES)))
         return refuse(scene, object, kind,
                       "single vertices move, and the whole moves with them");
     if (p->object == p) IMP_CHECKED(rest_keep(scene, p));

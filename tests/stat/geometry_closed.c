@@ -39,19 +39,21 @@ static void scene_of(const char *camera, int size, const char *rest, const char 
                      imp_scene **out)
 {
     char xml[4096];
-    snprintf(xml, sizeof xml,
-             "<scene version='3.0.0'><integrator type='direct'/><sensor "
-             "type='perspective' id='camera'>%s<film type='hdrfilm'><integer name='width' "
-             "value='%d'/><integer name='height' value='%d'/><rfilter type='box'/></film>"
-             "</sensor>%s</scene>",
-             camera, size, size, rest);
+    snprintf(
+        xml, sizeof xml,
+        "<scene version='3.0.0'><integrator type='direct'/><sensor "
+        "type='perspective' id='camera'>%s<film type='hdrfilm'><integer name='width' "
+        "value='%d'/><integer name='height' value='%d'/><rfilter type='box'/></film>"
+        "</sensor>%s</scene>",
+        camera, size, size, rest);
     *out = test_scene_text(ctx, xml, IMP_MONO);
     test_must(ctx, imp_scene_add_geometry(*out, name));
 }
 
 #define FLOOR                                                                            \
     "<shape type='rectangle' id='floor'><transform name='to_world'><scale value='9'/>"   \
-    "</transform><bsdf type='diffuse'><rgb name='reflectance' value='.6'/></bsdf></shape>"
+    "</transform><bsdf type='diffuse'><rgb name='reflectance' "                          \
+    "value='.6'/></bsdf></shape>"
 /* Looks at the origin along (-1, 0, -1), of so small a field that the picture is one point. */
 #define NARROW                                                                           \
     "<float name='fov' value='.01'/><transform name='to_world'><lookat "                 \
@@ -64,15 +66,15 @@ static void point_test(void)
     struct tap_stat d[3] = {{0, 0, 0}};
     imp_scene *scene;
     scene_of(NARROW, 4,
-             FLOOR "<emitter type='point' id='bulb'><point name='position' x='.5' y='-.3' "
-                   "z='1.2'/><rgb name='intensity' value='2'/></emitter>",
+             FLOOR
+             "<emitter type='point' id='bulb'><point name='position' x='.5' y='-.3' "
+             "z='1.2'/><rgb name='intensity' value='2'/></emitter>",
              "bulb.position", &scene);
     gradient_of(scene, "bulb.position", 16, 4, d);
     const double r2 = at[0] * at[0] + at[1] * at[1] + at[2] * at[2];
     for (int k = 0; k < 3; k++) {
-        const double ref =
-            rho / IMP_PI * power *
-            ((k == 2) * pow(r2, -1.5) - 3 * at[2] * at[k] * pow(r2, -2.5));
+        const double ref = rho / IMP_PI * power *
+                           ((k == 2) * pow(r2, -1.5) - 3 * at[2] * at[k] * pow(r2, -2.5));
         tap_near(d[k].mean, ref, 1e-3, 0, "irradiance of a point light that moves");
     }
     imp_scene_destroy(scene);
@@ -104,7 +106,8 @@ static void rectangle_test(void)
     gradient_of(scene, "lamp.pose", 4096, 16, d);
     const double h = 1e-5;
     for (int k = 0; k < 3; k++) {
-        const double x = .3, y = .2, z = 1.5, e[3] = {h * (k == 0), h * (k == 1), h * (k == 2)};
+        const double x = .3, y = .2, z = 1.5,
+                     e[3] = {h * (k == 0), h * (k == 1), h * (k == 2)};
         const double ref = .6 * 5 *
                            (form_factor(x + e[0], y + e[1], z + e[2], .4) -
                             form_factor(x - e[0], y - e[1], z - e[2], .4)) /
@@ -123,8 +126,8 @@ static double penumbra(double x, double y, double b)
     if (fabs(x) > b) return 0;
     for (int k = 0; k < 2; k++) {
         const double s = (k ? b : -b) - y;
-        sum += (k ? 1 : -1) * (s / (2 * c * c * (c * c + s * s)) +
-                               atan(s / c) / (2 * c * c * c));
+        sum += (k ? 1 : -1) *
+               (s / (2 * c * c * (c * c + s * s)) + atan(s / c) / (2 * c * c * c));
     }
     return -2 * h * h * sum;
 }
@@ -137,12 +140,13 @@ static void penumbra_test(void)
     scene_of("<float name='fov' value='80'/><transform name='to_world'><lookat "
              "origin='.1,.1,.9' target='.1,.1,0' up='0,1,0'/></transform>",
              16,
-             FLOOR "<shape type='rectangle' id='screen'><transform name='to_world'><scale "
-                   "x='5' y='10'/><translate x='-5' z='1'/></transform><bsdf "
-                   "type='diffuse'><rgb name='reflectance' value='0'/></bsdf></shape>"
-                   "<shape type='rectangle'><transform name='to_world'><scale value='.5'/>"
-                   "<rotate x='1' angle='180'/><translate z='2'/></transform><emitter "
-                   "type='area'><rgb name='radiance' value='5'/></emitter></shape>",
+             FLOOR
+             "<shape type='rectangle' id='screen'><transform name='to_world'><scale "
+             "x='5' y='10'/><translate x='-5' z='1'/></transform><bsdf "
+             "type='diffuse'><rgb name='reflectance' value='0'/></bsdf></shape>"
+             "<shape type='rectangle'><transform name='to_world'><scale value='.5'/>"
+             "<rotate x='1' angle='180'/><translate z='2'/></transform><emitter "
+             "type='area'><rgb name='radiance' value='5'/></emitter></shape>",
              "screen.pose", &scene);
     gradient_of(scene, "screen.pose", 256, 16, d);
     const double half = .9 * tan(40 * IMP_PI / 180);
@@ -242,16 +246,18 @@ static void frame_test(void)
         about += axis[k] * turn[3 + k].mean;
         about2 += imp__sqr(axis[k] * tap_se(&turn[3 + k]));
     }
-    const double z = (view[0].mean - flux[0].mean) / hypot(tap_se(&view[0]), tap_se(&flux[0]));
+    const double z =
+        (view[0].mean - flux[0].mean) / hypot(tap_se(&view[0]), tap_se(&flux[0]));
     tap_ok(fabs(z) < 3.5 && tap_se(&view[0]) < 0.01 * fabs(flux[0].mean) &&
                tap_se(&flux[0]) < 0.05 * fabs(flux[0].mean),
            "field of view and the frame's flux # %.6f se %.6f, %.6f se %.6f z %.2f",
            view[0].mean, tap_se(&view[0]), flux[0].mean, tap_se(&flux[0]), z);
     const double size = 0.5 * fabs(flux[0].mean) / rate;
     const double y = (about - flux[1].mean) / hypot(sqrt(about2), tap_se(&flux[1]));
-    tap_ok(fabs(y) < 3.5 && sqrt(about2) < 0.05 * size && tap_se(&flux[1]) < 0.05 * size,
-           "a turn about the axis and the frame's flux # %.6f se %.6f, %.6f se %.6f z %.2f",
-           about, sqrt(about2), flux[1].mean, tap_se(&flux[1]), y);
+    tap_ok(
+        fabs(y) < 3.5 && sqrt(about2) < 0.05 * size && tap_se(&flux[1]) < 0.05 * size,
+        "a turn about the axis and the frame's flux # %.6f se %.6f, %.6f se %.6f z %.2f",
+        about, sqrt(about2), flux[1].mean, tap_se(&flux[1]), y);
     imp__arena_free(&arena);
     imp_scene_destroy(scene);
 }

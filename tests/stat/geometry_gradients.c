@@ -18,8 +18,8 @@ static void block_write(void)
     FILE *f = fdopen(fd, "w");
     for (int k = 0; k < 8; k++) {
         const double x = k & 1 ? .6 : -.6, y = k & 2 ? .5 : -.5, z = k & 4 ? .4 : -.4;
-        fprintf(f, "v %.9g %.9g %.9g\n", .9 * x - .4 * y - .2, .4 * x + .9 * y + .3 + .1 * z,
-                z + .7);
+        fprintf(f, "v %.9g %.9g %.9g\n", .9 * x - .4 * y - .2,
+                .4 * x + .9 * y + .3 + .1 * z, z + .7);
     }
     fputs("f 1 3 4\nf 1 4 2\nf 5 6 8\nf 5 8 7\nf 1 2 6\nf 1 6 5\nf 3 7 8\nf 3 8 4\n"
           "f 1 5 7\nf 1 7 3\nf 2 4 8\nf 2 8 6\n",

@@ -2,11 +2,11 @@
  *
  * Choice of points on edges: densities against lengths that are summed edge by edge, of all edges
  * and of silhouettes seen from points and along directions, before and after a pilot. */
+#include "move/edge_choice.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "math/rng.h"
 #include "math/warp.h"
-#include "move/edge_choice.h"
 
 static imp_context *ctx;
 
@@ -116,10 +116,10 @@ static void choice_test(int rings)
     measure = calloc(edges.n, sizeof *measure);
     moment = calloc(CELLS, sizeof *moment);
     for (size_t k = 0; k < edges.n; k++)
-        measure[k] = length_of(&edges.edge[k]) *
-                     (0.3 + imp__u01(imp__key(1, 0, (uint64_t)k), 0));
+        measure[k] =
+            length_of(&edges.edge[k]) * (0.3 + imp__u01(imp__key(1, 0, (uint64_t)k), 0));
     for (int k = 0; k < CELLS; k++)
-        moment[k] = k % 3 ? exp(3 * imp__u01(imp__key(2, 0, (uint64_t)k), 0)) : 0;
+        moment[k] = k % 3 && k > 3 ? exp(3 * imp__u01(imp__key(2, 0, (uint64_t)k), 0)) : 0;
     test_must(ctx, imp__edge_choice_begin(&edges, &tree, measure, CELLS, &c));
     imp__edge_choice_learn(&c, moment);
     draws_test(&c, "by what a pilot has found", 0.08);

@@ -72,9 +72,8 @@ enum imp_status imp__moved_begin(const struct imp_problem *p,
     IMP_TRY(imp__edges_build(p->scene, &out->edges));
     IMP_TRY(imp__boundary_begin(tracer, &out->moves, &out->edges, &out->boundary));
     IMP_TRY(imp__splat_scale_create(p->ctx, film, &out->scale));
-    IMP_TRY(imp__boundary_learn(&out->boundary,
-                                (int64_t)film->crop_w * film->crop_h * spp, adjoint_at,
-                                out));
+    IMP_TRY(imp__boundary_learn(
+        &out->boundary, (int64_t)film->crop_w * film->crop_h * spp, adjoint_at, out));
 out:
     return st;
 }
@@ -134,10 +133,9 @@ bool imp__moved_draws(const struct imp__moved_gradient *m, struct imp_arena *are
         for (int i = 0; i < n && !no_memory; i++) {
             const struct imp_arena_mark mark = imp__arena_mark(arena);
             const int64_t index = ((int64_t)b * n + i) * pixels + pixel;
-            for (const struct imp__flux *f =
-                     imp__boundary_draw(&m->boundary, arena,
-                                        (enum imp__boundary_kind)kind, index, pixels,
-                                &no_memory);
+            for (const struct imp__flux *f = imp__boundary_draw(
+                     &m->boundary, arena, (enum imp__boundary_kind)kind, index, pixels,
+                     &no_memory);
                  f; f = f->next) {
                 imp__flux_bar(&m->moves, f,
                               adjoint_at(m, f) / ((double)n * (double)pixels), bar);

@@ -72,9 +72,9 @@ static enum imp_status lights_make(struct imp__boundary *b)
         const struct imp_texcoord nowhere = {.shape = e->shape};
         imp_spec in[IMP_INPUTS_MAX];
         if (e->shape || (e->ops->flags & IMP_EMITTER_DELTA)) {
-            const double size = e->shape                            ? e->shape->area
+            const double size = e->shape                          ? e->shape->area
                                 : e->ops->flags & IMP_EMITTER_FAR ? imp__sqr(b->size) / 4
-                                                                    : 4;
+                                                                  : 4;
             imp__inputs_eval(e->input, e->n_in, &nowhere, in);
             sum += size * imp__max_used(in[0], scene->lanes == 4);
             b->n_lights++;

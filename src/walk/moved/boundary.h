@@ -41,8 +41,7 @@ struct imp__boundary {
     imp_v3 camera; /* where its rays meet */
     double size;   /* of the scene */
     int n_lights;
-    double
-        *light_cdf; /* [n_emitters] of all but skies, by power; last is 1 */
+    double *light_cdf; /* [n_emitters] of all but skies, by power; last is 1 */
 };
 
 /* A velocity on which a flux depends: of a glued point, of what the camera makes of one, or of a

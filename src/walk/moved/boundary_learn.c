@@ -14,7 +14,7 @@ struct pilot {
     imp__flux_weight *weight;
     const void *payload;
     int n_groups;
-    double *group;  /* [n_groups] of one draw: 3 for a shift, 3 for a turn of each mover */
+    double *group; /* [n_groups] of one draw: 3 for a shift, 3 for a turn of each mover */
     double *square; /* [n_groups] sums over the first draws, of each three alike */
     double *moment; /* [cells] */
     bool no_memory;

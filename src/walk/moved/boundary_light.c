@@ -14,11 +14,11 @@ static int light_choose(const struct imp__boundary *b, double u, double *pmf)
 
 /* Where the line to the edge begins, and what it carries. */
 struct source {
-    int light;              /* emitter */
-    struct imp_surface y;   /* of a light with a shape */
-    imp_v3 p;               /* its point; of parallel light the direction in which it travels */
+    int light;            /* emitter */
+    struct imp_surface y; /* of a light with a shape */
+    imp_v3 p; /* its point; of parallel light the direction in which it travels */
     bool parallel;
-    double density;         /* of the light, and of its point per area */
+    double density; /* of the light, and of its point per area */
 };
 
 static struct source source_draw(const struct imp__edge_draw *d)
@@ -50,8 +50,7 @@ static struct imp__flux_end source_end(const struct imp__edge_draw *d,
     const struct imp_shape *shape = scene->emitters[s->light]->shape;
     if (!shape) return (struct imp__flux_end){{.p = s->p}, bar, false, s->light + 1};
     const struct imp_located located = imp__located_drawn(shape, &s->y.located, s->y.uv);
-    const struct imp__glued lit =
-        imp__glued_at(scene, shape->index, &located, s->y.ng);
+    const struct imp__glued lit = imp__glued_at(scene, shape->index, &located, s->y.ng);
     return imp__flux_glued(&lit, bar);
 }
 
