@@ -28,8 +28,8 @@ struct imp__edges {
     struct imp__edge_face *face; /* [n_faces] */
 };
 
-/* All edges of the scene's shapes. IMP_E_UNSUPPORTED, with its name: a shape that is not made of
- * triangles, or has normals that turn over a facet; instances. */
+/* All edges of the scene's shapes; spheres have none. IMP_E_UNSUPPORTED, with its name: another shape
+ * that is not made of triangles, or has normals that turn over a facet; instances. */
 enum imp_status imp__edges_build(const struct imp_scene *scene, struct imp__edges *out);
 void imp__edges_free(struct imp__edges *edges);
 
@@ -47,8 +47,8 @@ double imp__edge_turn(const struct imp__edges *edges, const struct imp__edge *e)
 /* An edge whose faces move apart: they belong to shapes with different velocities. NULL: none. */
 const struct imp__edge *imp__edges_torn(const struct imp__edges *edges,
                                         const struct imp__moves *moves);
-/* A shape through which an edge of another passes: where they meet is an edge that is in no list.
- * -1: none; *other: the shape of the edge. */
+/* A shape through which an edge of another passes, or a sphere whose surface another shape passes:
+ * where they meet is an edge that is in no list. -1: none; *other: the other shape. */
 int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
                        int *other);
 

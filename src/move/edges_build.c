@@ -62,11 +62,13 @@ static enum imp_status sides_make(struct building *x)
     size_t n = 0;
     for (int k = 0; k < x->scene->n_shapes; k++) {
         const struct imp_shape *s = x->scene->shapes[k];
+        struct imp_round round;
+        if (imp__moves_sphere(x->scene, k, &round)) continue;
         if (s->geometry != IMP_TRIANGLES || s->smooth)
             return imp__error(
                 x->ctx, IMP_E_UNSUPPORTED,
-                "derivatives by what moves are of flat triangles, and shape "
-                "'%s' (%s) %s",
+                "derivatives by what moves are of flat triangles and spheres, and "
+                "shape '%s' (%s) %s",
                 s->name, s->ops->name,
                 s->smooth ? "has normals that turn over them (face_normals "
                             "makes it flat)"
@@ -79,6 +81,7 @@ static enum imp_status sides_make(struct building *x)
         return imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
     for (int k = 0; k < x->scene->n_shapes; k++) {
         const struct imp_triangles *t = &x->scene->shapes[k]->triangles;
+        if (x->scene->shapes[k]->geometry != IMP_TRIANGLES) continue;
         for (size_t j = 0; j < t->n_triangles; j++) {
             const uint32_t *i = t->indices + 3 * j;
             const imp_v3 p[3] = {vertex(t, i[0]), vertex(t, i[1]), vertex(t, i[2])};

@@ -4,6 +4,8 @@
 #include "moves.h"
 #include "base/context.h"
 
+extern const struct imp_shape_ops imp__sphere;
+
 struct imp__moves imp__moves_begin(const struct imp_scene *scene,
                                    const struct imp_sensor *sensor)
 {
@@ -69,12 +71,14 @@ static enum imp_status shape_mover(const struct imp__moves *moves, struct imp__m
 {
     imp_context *ctx = moves->scene->ctx;
     const struct imp_shape *s = moves->scene->shapes[m->shape];
-    if (s->geometry != IMP_TRIANGLES)
+    struct imp_round round;
+    if (s->geometry != IMP_TRIANGLES && !imp__moves_sphere(moves->scene, m->shape, &round))
         return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "shape '%s' (%s) is not made of triangles, and has no "
-                          "derivative by its place",
+                          "shape '%s' (%s) is neither made of triangles nor a sphere, and "
+                          "has no derivative by its place",
                           s->name, s->ops->name);
-    if (m->kind == IMP_MOVE_VERTICES && s->ops->surface != imp__mesh_surface)
+    if (m->kind == IMP_MOVE_VERTICES &&
+        (s->geometry != IMP_TRIANGLES || s->ops->surface != imp__mesh_surface))
         return imp__error(ctx, IMP_E_UNSUPPORTED,
                           "shape '%s' (%s) is no mesh, and has no vertices that move",
                           s->name, s->ops->name);
@@ -138,6 +142,14 @@ void imp__pose_numbers_bar(const struct imp_pose *pose, double *bar)
     imp__rotation_bar(pose->number + 3, turn, bar + 3);
 }
 
+bool imp__moves_sphere(const struct imp_scene *scene, int shape, struct imp_round *out)
+{
+    const struct imp_shape *s = scene->shapes[shape];
+    if (s->ops != &imp__sphere) return false;
+    s->ops->round(s, out);
+    return true;
+}
+
 bool imp__moves_shape(const struct imp__moves *moves, int shape,
                       const struct imp__mover *but)
 {
@@ -171,16 +183,36 @@ static struct imp__glued glued(const struct imp_scene *scene, int shape, int pri
                                double b1, double b2, imp_v3 side)
 {
     const struct corners c = corners(scene, shape, prim);
-    struct imp__glued x = {shape, prim, {1 - b1 - b2, b1, b2}, {0}, {0}};
+    struct imp__glued x = {shape, prim, {1 - b1 - b2, b1, b2}, {0}, {0}, 0};
     x.p = c.p0 + c.e1 * b1 + c.e2 * b2;
     x.n = imp__normalize(imp__cross(c.e1, c.e2));
     if (imp__dot(x.n, side) < 0) x.n = -x.n;
     return x;
 }
 
+/* On a sphere, in this direction from its centre. */
+static struct imp__glued glued_round(int shape, const struct imp_round *round, imp_v3 outward,
+                                     imp_v3 side)
+{
+    const double sign = imp__dot(outward, side) < 0 ? -1 : 1;
+    return (struct imp__glued){.shape = shape,
+                               .b = {1, 0, 0},
+                               .p = round->centre + outward * round->radius,
+                               .n = outward * sign,
+                               .curvature = sign / round->radius};
+}
+
 struct imp__glued imp__glued_at(const struct imp_scene *scene, int shape,
                                 const struct imp_located *x, imp_v3 n)
 {
+    struct imp_round round;
+    if (imp__moves_sphere(scene, shape, &round)) {
+        const double uv[2] = {x->at[0], x->at[1]};
+        struct imp_surface at;
+        int prim;
+        scene->shapes[shape]->ops->place(scene->shapes[shape], uv, &at, &prim);
+        return glued_round(shape, &round, imp__normalize(at.p - round.centre), n);
+    }
     return glued(scene, shape, x->prim, x->at[0], x->at[1], n);
 }
 
@@ -188,6 +220,9 @@ struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int 
                                   imp_v3 p, imp_v3 n)
 {
     double b[3];
+    struct imp_round round;
+    if (imp__moves_sphere(scene, shape, &round))
+        return glued_round(shape, &round, imp__normalize(p - round.centre), n);
     imp__triangle_weights(scene->shapes[shape], prim, &p, b);
     return glued(scene, shape, prim, b[1], b[2], n);
 }

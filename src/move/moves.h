@@ -15,8 +15,8 @@
  *               length |d|: the unit direction turns by  e/|d| across d (3)
  *
  * e: a translation in scene units; a: a rotation vector in radians. Velocities are linear in the
- * numbers; each function that applies the map has its transpose beside it. Facets alone: the
- * geometric normal is the same all over a triangle. */
+ * numbers; each function that applies the map has its transpose beside it. The geometric normal is
+ * the same all over a triangle; on a sphere it turns with the place. */
 #ifndef IMP_MOVE_MOVES_H
 #define IMP_MOVE_MOVES_H
 
@@ -55,11 +55,13 @@ struct imp__moves {
     size_t n; /* numbers in all */
 };
 
-/* A point that is glued to its triangle, world. */
+/* A point that is glued to its triangle, or to a sphere, world. */
 struct imp__glued {
     int shape, prim;
     double b[3]; /* weights of the vertices, as the shape's indices have them */
     imp_v3 p, n; /* place, and the unit geometric normal of either side */
+    double curvature; /* of the surface: the normal at a place shifted by x across n turns by
+                         curvature x */
 };
 
 struct imp__velocity {
@@ -81,6 +83,8 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves,
 /* From the adjoint of a mover's numbers to that of its parameter's, in place: a mover turns the
  * object as it is, the parameter is one vector of rotation. */
 void imp__pose_numbers_bar(const struct imp_pose *pose, double *bar);
+/* Centre and radius of a sphere. False: another shape. */
+bool imp__moves_sphere(const struct imp_scene *scene, int shape, struct imp_round *out);
 /* Does it move? By a mover that is not `but` (NULL: any). */
 bool imp__moves_shape(const struct imp__moves *moves, int shape,
                       const struct imp__mover *but);

@@ -111,6 +111,10 @@ static void shape_apply(const struct imp_pose *p)
     const size_t n = 3 * s->triangles.n_vertices;
     float *positions = (float *)(uintptr_t)s->triangles.positions;
     memcpy(s->self, p->rest, p->rest_size);
+    if (s->geometry != IMP_TRIANGLES) {
+        s->ops->move(s, map_of(p).m);
+        return;
+    }
     if (p->positions) memcpy(positions, p->positions, n * sizeof *p->positions);
     for (size_t k = 0; vertices && k < n; k++) positions[k] = (float)vertices->number[k];
     if (p->normals)

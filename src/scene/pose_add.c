@@ -45,8 +45,8 @@ static enum imp_status refuse(const struct imp_scene *scene, const char *name,
 static enum imp_status shape_allowed(const struct imp_scene *scene,
                                      const struct imp_shape *s, enum imp_pose_kind kind)
 {
-    if (!s->ops->move || s->geometry != IMP_TRIANGLES)
-        return refuse(scene, s->name, kind, "it is not made of triangles");
+    if (!s->ops->move)
+        return refuse(scene, s->name, kind, "it is not made of triangles, and no sphere");
     if (scene->world) return refuse(scene, s->name, kind, "the scene has instances");
     if (scene->n_media + scene->n_bodies > 0 || scene->priorities)
         return refuse(scene, s->name, kind, "there are media");
@@ -63,7 +63,8 @@ static enum imp_status shape_allowed(const struct imp_scene *scene,
 static enum imp_status size_allowed(const struct imp_scene *scene,
                                     const struct imp_shape *s, enum imp_pose_kind kind)
 {
-    const bool is_mesh = s->ops->surface == imp__mesh_surface;
+    const bool is_mesh =
+        s->geometry == IMP_TRIANGLES && s->ops->surface == imp__mesh_surface;
     for (int k = 0; k < scene->n_emitters; k++)
         if (scene->emitters[k]->shape == s)
             return refuse(scene, s->name, kind,

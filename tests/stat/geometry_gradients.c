@@ -178,6 +178,10 @@ static void refused(const char *rest, const char *name, const char *word)
 #define BULB                                                                             \
     "<emitter type='point' id='bulb'><point name='position' x='1.2' y='-1' z='2.5'/>"    \
     "<rgb name='intensity' value='6,5,4'/></emitter>"
+#define BALL                                                                             \
+    "<shape type='sphere' id='ball'><float name='radius' value='.5'/><point "            \
+    "name='center' x='1.3' y='.2' z='.9'/><ref id='grey'/></shape>"
+#define SKY "<emitter type='constant'><rgb name='radiance' value='.4,.5,.6'/></emitter>"
 #define SUN                                                                              \
     "<emitter type='directional' id='sun'><vector name='direction' x='-.8' y='.3' "      \
     "z='-1.6'/><rgb name='irradiance' value='3,2.5,2'/></emitter>"
@@ -212,6 +216,19 @@ int main(void)
                                          {"bulb.position", 2, .03},
                                          {"block.pose", 0, .03},
                                          {NULL, 0, 0}},
+                               ball[] = {{"ball.pose", 0, .03},
+                                         {"ball.pose", 1, .03},
+                                         {"ball.pose", 2, .03},
+                                         {"ball.scale", 0, .03},
+                                         {"block.pose", 0, .03},
+                                         {"camera.pose", 0, .03},
+                                         {"camera.pose", 5, .01},
+                                         {NULL, 0, 0}},
+                               round[] = {{"bulb.position", 0, .03},
+                                          {"bulb.position", 2, .03},
+                                          {"ball.pose", 1, .03},
+                                          {"ball.scale", 0, .03},
+                                          {NULL, 0, 0}},
                                sun[] = {{"sun.direction", 0, .02},
                                         {"sun.direction", 1, .02},
                                         {"sun.direction", 2, .02},
@@ -226,6 +243,9 @@ int main(void)
     room_test("bulb", PATH BULB, bulb, NULL, 0.03, 64, 64);
     room_test("bulb and lamp", DIRECT BULB LAMP, bulb, NULL, 0.04, 64, 64);
     room_test("sun", PATH SUN, sun, NULL, 0.03, 64, 64);
+    room_test("ball", DIRECT BALL LAMP, ball, NULL, 0.04, 64, 256);
+    room_test("ball and sky", PATH BALL SKY, ball, NULL, 0.05, 64, 256);
+    room_test("ball and bulb", PATH BALL BULB, round, NULL, 0.04, 64, 128);
     refused(DIRECT LAMP, "lamp.scale", "light");
     refused(DIRECT LAMP, "floor.vertex_positions", "no mesh");
     refused(DIRECT BULB, "bulb.direction", "bulb");

@@ -50,8 +50,38 @@ static enum imp_status choice_make(struct imp__boundary *b, enum imp__boundary_k
     return st;
 }
 
+/* Spheres by the lengths of their great circles, edges by theirs. */
+static enum imp_status balls_make(struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    struct imp_round round;
+    double edges = 0, sum = 0;
+    b->ball = imp__alloc(scene->ctx, (size_t)scene->n_shapes + 1, sizeof *b->ball);
+    if (!b->ball) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
+    for (int k = 0; k < scene->n_shapes; k++)
+        if (imp__moves_sphere(scene, k, &round)) b->ball[b->n_balls++] = k;
+    for (size_t k = 0; k < b->edges->n; k++) edges += turn_measure(b, &b->edges->edge[k]);
+    for (int kind = 0; kind < IMP_BOUNDARY_KINDS; kind++) {
+        double *part =
+            imp__alloc(scene->ctx, (size_t)b->n_balls + 2, sizeof *b->part[kind]);
+        if (!part) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
+        b->part[kind] = part;
+        sum = part[0] = 0;
+        for (int k = 0; k < b->n_balls; k++) {
+            imp__moves_sphere(scene, b->ball[k], &round);
+            part[k + 1] = sum += IMP_2PI * round.radius;
+        }
+        sum += edges;
+        for (int k = 0; k <= b->n_balls && sum > 0; k++) part[k] /= sum;
+        if (!(edges > 0)) part[b->n_balls] = 1;
+        part[b->n_balls + 1] = 1;
+    }
+    return IMP_OK;
+}
+
 static enum imp_status choices_make(struct imp__boundary *b)
 {
+    IMP_CHECKED(balls_make(b));
     if (b->edges->n == 0) return IMP_OK;
     IMP_CHECKED(imp__edge_tree_build(b->edges, &b->tree));
     for (int k = 0; k < IMP_BOUNDARY_KINDS; k++)
@@ -127,7 +157,11 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
 void imp__boundary_free(struct imp__boundary *b)
 {
     if (b->tracer) imp__release(b->tracer->scene->ctx, b->light_cdf);
-    for (int k = 0; k < IMP_BOUNDARY_KINDS; k++) imp__edge_choice_free(&b->choice[k]);
+    for (int k = 0; k < IMP_BOUNDARY_KINDS; k++) {
+        imp__edge_choice_free(&b->choice[k]);
+        if (b->tracer) imp__release(b->tracer->scene->ctx, b->part[k]);
+    }
+    if (b->tracer) imp__release(b->tracer->scene->ctx, b->ball);
     imp__edge_tree_free(&b->tree);
     *b = (struct imp__boundary){0};
 }
@@ -146,32 +180,9 @@ struct imp__flux *imp__flux_add(struct imp__edge_draw *d, int n)
     return f;
 }
 
-static bool point_set(struct imp__edge_draw *d, const struct imp__edge_point *p)
-{
-    d->edge = p->edge;
-    d->p = p->p;
-    d->along = imp__normalize(p->edge->b - p->edge->a);
-    d->inv_pdf = p->inv_pdf;
-    d->cell = p->cell;
-    return true;
-}
-
-bool imp__edge_any(struct imp__edge_draw *d)
-{
-    struct imp__edge_point p;
-    imp__edge_choice_draw(d->choice, d->u, &p);
-    return point_set(d, &p);
-}
-
-bool imp__edge_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel)
-{
-    struct imp__edge_point p;
-    return imp__edge_choice_silhouette(d->choice, from, parallel, d->u, &p) &&
-           point_set(d, &p);
-}
-
 void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
 {
+    d->part = d->b->part[kind];
     d->end = &d->first;
     switch (kind) {
     case IMP_BOUNDARY_FILM: imp__draw_film(d); break;
@@ -186,7 +197,7 @@ struct imp__flux *imp__boundary_draw(const struct imp__boundary *b,
                                      int64_t strata, bool *no_memory)
 {
     struct imp__edge_draw d = {.b = b, .arena = arena, .choice = &b->choice[kind]};
-    if (b->edges->n == 0) return NULL;
+    if (b->edges->n == 0 && b->n_balls == 0) return NULL;
     /* Walks of pictures have smaller numbers in the place of the kind. */
     d.key = imp__key(b->tracer->seed, UINT64_MAX - (uint64_t)kind, (uint64_t)index);
     d.u = ((double)(index % strata) + imp__u01(d.key, IMP_EDGE_WHICH)) / (double)strata;

@@ -17,6 +17,10 @@
  *              it sees; w is a direction from the edge to it:
  *                  dI = int dl dw sin(phi) f W(x) [L(-m) - L(+m)] m.(V - x')
  *
+ * A sphere has a silhouette from everywhere: the circle on which a line touches it is an edge to the
+ * film and to lights, with m its outward normal; of all lines that touch it, by place p, dA, and
+ * turn about the normal, psi, dl dw sin(phi) is  dA dpsi/r.
+ *
  * x' is the velocity of a vertex that slides, along the chain from the camera. W(x), what the
  * sensor makes of a unit of radiance times projected area that leaves x, is a connection to the
  * camera, or the walk goes on from x by transposed kernels and is connected from there: a walk
@@ -38,6 +42,11 @@ struct imp__boundary {
     const struct imp__edges *edges;
     struct imp__edge_tree tree;
     struct imp__edge_choice choice[IMP_BOUNDARY_KINDS];
+    int n_balls;
+    int *ball; /* [n_balls] shapes that are spheres */
+    /* [n_balls + 2] probability of the spheres before this one; then that of all of them, and 1:
+     * the rest is of edges. */
+    double *part[IMP_BOUNDARY_KINDS];
     imp_v3 camera; /* where its rays meet */
     double size;   /* of the scene */
     int n_lights;

@@ -69,12 +69,35 @@ static bool look(struct pilot *x, enum imp__boundary_kind kind, int64_t index, i
 
 static double square3(const double *v) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
 
+#define KEPT 0.3 /* probability that stays as it was */
+
+/* Spheres and edges by roots of the second moments that each would have alone. What is counted of one
+ * that was chosen with the probability c is that moment over c. */
+static void parts_learn(const struct pilot *x, double *part, int n_cells)
+{
+    const int n = x->b->n_balls;
+    const double edges = part[n + 1] - part[n];
+    double root = 0, sum = 0, before = 0;
+    for (int k = 0; k < n_cells; k++) root += sqrt(x->moment[k]);
+    if (n_cells > 0) root *= sqrt(edges / n_cells);
+    for (int k = 0; k < n; k++) sum += sqrt((part[k + 1] - part[k]) * x->moment[n_cells + k]);
+    sum += root;
+    if (!(sum > 0) || !(sum < INFINITY)) return;
+    for (int k = 0; k < n; k++) {
+        const double own = part[k + 1] - before; /* part[k] has been overwritten */
+        const double found = sqrt(own * x->moment[n_cells + k]) / sum;
+        before = part[k + 1];
+        part[k + 1] = part[k] + KEPT * own + (1 - KEPT) * found;
+    }
+    if (edges == 0) part[n] = 1;
+}
+
 static void kind_learn(struct pilot *x, enum imp__boundary_kind kind, int64_t n)
 {
     struct imp__edge_choice *c = &x->b->choice[kind];
     struct imp__edge_draw d;
     for (int k = 0; k < x->n_groups; k++) x->square[k] = 0;
-    for (int k = 0; k < c->n_cells; k++) x->moment[k] = 0;
+    for (int k = 0; k < c->n_cells + x->b->n_balls; k++) x->moment[k] = 0;
     for (int64_t i = 0; i < n / 4; i++) {
         if (!look(x, kind, i, n / 4, &d)) continue;
         for (int k = 0; k < x->n_groups; k += 3) x->square[k] += square3(x->group + k);
@@ -84,9 +107,10 @@ static void kind_learn(struct pilot *x, enum imp__boundary_kind kind, int64_t n)
         double sum = 0;
         for (int k = 0; k < x->n_groups; k += 3)
             if (x->square[k] > 0) sum += square3(x->group + k) / x->square[k];
-        x->moment[d.cell] += sum / d.inv_pdf;
+        x->moment[d.cell] += sum;
     }
-    imp__edge_choice_learn(c, x->moment);
+    if (x->b->edges->n > 0) imp__edge_choice_learn(c, x->moment);
+    if (x->b->n_balls > 0) parts_learn(x, x->b->part[kind], c->n_cells);
 }
 
 /* Cells in place of the one of the beginning. */
@@ -108,7 +132,7 @@ enum imp_status imp__boundary_learn(struct imp__boundary *b, int64_t draws,
     enum imp_status st = IMP_OK;
     imp_context *ctx = b->tracer->scene->ctx;
     struct pilot x = {.b = b, .weight = weight, .payload = payload};
-    if (b->edges->n == 0) return IMP_OK;
+    if (b->edges->n == 0 && b->n_balls == 0) return IMP_OK;
     const int64_t n = draws / PART;
     const int cells = (int)imp_min(n / LOOKS, (int64_t)IMP_EDGE_CELLS_MAX);
     if (cells < LOOKS_LEAST) return IMP_OK; /* too few to learn from */
@@ -116,11 +140,11 @@ enum imp_status imp__boundary_learn(struct imp__boundary *b, int64_t draws,
     imp__arena_init(&x.arena, ctx);
     x.group = imp__alloc(ctx, (size_t)x.n_groups + 1, sizeof *x.group);
     x.square = imp__alloc(ctx, (size_t)x.n_groups + 1, sizeof *x.square);
-    x.moment = imp__alloc(ctx, (size_t)cells, sizeof *x.moment);
+    x.moment = imp__alloc(ctx, (size_t)(cells + b->n_balls), sizeof *x.moment);
     if (!x.group || !x.square || !x.moment)
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for edges"));
     for (int kind = 0; kind < IMP_BOUNDARY_KINDS && !x.no_memory; kind++) {
-        IMP_TRY(cells_make(b, kind, cells));
+        if (b->edges->n > 0) IMP_TRY(cells_make(b, kind, cells));
         kind_learn(&x, (enum imp__boundary_kind)kind, (int64_t)cells * LOOKS);
     }
     if (x.no_memory) st = imp__error(ctx, IMP_E_NOMEM, "no memory for edges");

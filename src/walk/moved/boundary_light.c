@@ -70,7 +70,9 @@ void imp__draw_light(struct imp__edge_draw *d)
     const double cosine = e->shape ? imp__dot(s.y.n, r) / t_y : 1;
     if (!(sine > 0) || !(cosine > IMP_GRAZING)) return;
     imp_v3 m = turned * (1 / (sine * t_y));
-    const int side = imp__edge_side(b->edges, d->edge, m);
+    const int side = d->edge                  ? imp__edge_side(b->edges, d->edge, m)
+                     : imp__dot(m, d->out) > 0 ? 1
+                                               : -1;
     if (side == 0) return;
     m *= (double)side;
 
@@ -92,7 +94,7 @@ void imp__draw_light(struct imp__edge_draw *d)
     struct imp__edge_light light = {.w = imp__normalize(to), .behind = 1, .n_ends = 2};
     light.light = in[0] * (-cosine * sine * d->inv_pdf / (spread * s.density));
     light.slide = m * -far;
-    const struct imp__glued edge = imp__edge_glued(b->edges, scene, d->edge, d->p);
+    const struct imp__glued edge = imp__edge_carried(d);
     light.end[0] = imp__flux_glued(&edge, m);
     light.end[1] = source_end(d, &s, m * (s.parallel ? t_x : far - 1));
     imp__edge_reach(d, &hit, &at, &light);

@@ -12,11 +12,14 @@ struct imp__edge_draw {
     struct imp_arena *arena;
     struct imp_key key;
     const struct imp__edge_choice *choice;
+    const double *part; /* of spheres and edges (boundary.h) */
     double u; /* by which the point is chosen */
-    const struct imp__edge *edge;
+    const struct imp__edge *edge; /* NULL: a sphere touched by a line */
+    int ball;                     /* the sphere's shape */
     imp_v3 p, along; /* the point, and the unit direction of the edge */
-    double inv_pdf;  /* of the point, per length */
-    int cell;        /* of the choice */
+    imp_v3 out;      /* of a sphere: its outward normal */
+    double inv_pdf;  /* of the point, per length; of a line that touches a sphere */
+    int cell;        /* of the choice; behind all cells, of which sphere */
     struct imp__flux *first, **end;
     bool no_memory;
 };
@@ -39,9 +42,15 @@ enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
 /* Surfaces nearer behind an edge, per size of the scene, are what it stands on. */
 #define IMP_CONTACT 2e-5
 
-/* Sets the edge and its point: of all edges, or of silhouettes of lines from there. False: none. */
-bool imp__edge_any(struct imp__edge_draw *d);
+/* Sets the edge and its point: of all edges, and of spheres' silhouettes from there; of silhouettes of
+ * lines from there; of all edges, and lines that touch spheres, along *w. False: none. */
+bool imp__edge_any(struct imp__edge_draw *d, imp_v3 from);
 bool imp__edge_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel);
+bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w);
+/* The edge's point as its surface carries it; and a place beside it that no rounding hides behind
+ * its own sphere. */
+struct imp__glued imp__edge_carried(const struct imp__edge_draw *d);
+imp_v3 imp__edge_clear(const struct imp__edge_draw *d);
 /* A flux more, with room for n ends. NULL: no memory. */
 struct imp__flux *imp__flux_add(struct imp__edge_draw *d, int n);
 static inline struct imp__flux_end imp__flux_glued(const struct imp__glued *x, imp_v3 bar)

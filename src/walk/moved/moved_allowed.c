@@ -59,6 +59,9 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
                           "is none of area, constant, point and directional");
         if (e->shaped || is_textured(e->input, e->n_in))
             return refuse(t, "light", e->name, e->ops->name, "has a texture");
+        if (e->shape && e->shape->geometry != IMP_TRIANGLES)
+            return refuse(t, "light", e->name, e->ops->name,
+                          "is on a shape that is not made of triangles");
         if (e->course)
             return refuse(t, "light", e->name, e->ops->name, "changes with time");
     }

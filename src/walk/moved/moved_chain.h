@@ -79,6 +79,11 @@ static inline imp_v3 imp__point_bar(struct imp__link_point *x, imp_v3 y, double 
  * lies on, which is added there, and to a shift of the ray, which is returned. */
 static inline imp_v3 imp__slide_bar(struct imp__link_point *x, imp_v3 w)
 {
+    /* On a curved surface the normal turns as the vertex slides over it. */
+    const imp_v3 turn =
+        (x->bar.n - x->x.n * imp__dot(x->x.n, x->bar.n)) * x->x.curvature;
+    x->moved_bar += turn;
+    x->bar.v -= turn;
     const imp_v3 across = x->x.n * (imp__dot(w, x->moved_bar) / imp__dot(x->x.n, w));
     const imp_v3 shift = x->moved_bar - across;
     x->bar.v += across;
