@@ -2,7 +2,8 @@
  *
  * Gradients by what moves against closed forms: the irradiance of a point light that moves, and of a
  * rectangle; the penumbra of a half plane that moves before a square lamp; the picture of a lit
- * square by the field of view; and an identity of fields of view and turns of a camera, the flux of
+ * square by the field of view; the
+ * solid angle of a ball before a sky; and an identity of fields of view and turns of a camera, the flux of
  * radiance through the frame of the picture. */
 #include "imp_scene.h"
 #include "imp_tap.h"
@@ -179,6 +180,31 @@ static void view_test(void)
     imp_scene_destroy(scene);
 }
 
+/* A black ball before a sky: seen straight on it is a disc of the area pi f^2 r^2/(D^2 - r^2). */
+static void ball_test(void)
+{
+    struct tap_stat place[6] = {{0, 0, 0}}, scale[1] = {{0, 0, 0}};
+    imp_scene *scene;
+    scene_of("<float name='fov' value='50'/><transform name='to_world'><lookat "
+             "origin='.1,-.2,4' target='.1,-.2,0' up='.3,1,0'/></transform>",
+             24,
+             "<emitter type='constant'><rgb name='radiance' value='5'/></emitter><shape "
+             "type='sphere' id='ball'><float name='radius' value='.8'/><point "
+             "name='center' x='.1' y='-.2' z='0'/><bsdf type='diffuse'><rgb "
+             "name='reflectance' value='0'/></bsdf></shape>",
+             "ball.pose", &scene);
+    test_must(ctx, imp_scene_add_geometry(scene, "ball.scale"));
+    gradient_of(scene, "ball.pose", 64, 16, place);
+    gradient_of(scene, "ball.scale", 64, 16, scale);
+    const double t = tan(25 * IMP_PI / 180), D = 4, r = .8, q = D * D - r * r;
+    const double film = -5 * IMP_PI / (4 * t * t);
+    /* All of the circle brings the same. */
+    tap_near(place[2].mean, film * 2 * r * r * D / (q * q), 1e-6, 0,
+             "solid angle of a ball that nears");
+    tap_near(scale[0].mean, film * 2 * r * r * D * D / (q * q), 1e-6, 0, "and that grows");
+    imp_scene_destroy(scene);
+}
+
 /* Radiance at a film position of the unit square. */
 static double radiance_at(const struct imp_tracer *t, struct imp_arena *arena, double x,
                           double y, uint64_t number)
@@ -269,6 +295,7 @@ int main(void)
     rectangle_test();
     penumbra_test();
     view_test();
+    ball_test();
     frame_test();
     imp_context_destroy(ctx);
     return tap_done();
