@@ -599,7 +599,7 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *     NAME.x_fov             of a perspective camera: horizontal field of view, degrees
  *     NAME.principal_point_offset_x, NAME.principal_point_offset_y   of a perspective camera:
  *                            in parts of the film's width and height
- *     NAME.position          of a point light: [3], world
+ *     NAME.position          of a point or spot light: [3], world
  *     NAME.direction         of a directional light: [3], of any length
  *
  * Gradients, patterns, and what is there already: as of poses.

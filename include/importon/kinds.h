@@ -801,8 +801,8 @@ struct imp_emitter_ops {
      * its inputs are now. NULL: all around. */
     void (*cone)(const struct imp_emitter *e, imp_v3 *axis, double *cosine);
     /* Where a light at a point is, or the unit direction in which parallel light travels, world:
-     * reads it, or, with `set`, puts the light there (a direction of any length). NULL: another
-     * light, or one whose radiance depends on the direction in which it leaves. */
+     * reads it, or, with `set`, puts the light there (a direction of any length), turned as it was.
+     * NULL: another light. */
     void (*aim)(struct imp_emitter *e, double v[3], bool set);
 };
 

@@ -107,13 +107,14 @@ static void triangle_distances(const struct imp_triangles *t, size_t prim, imp_v
 static bool meets_sphere(const struct imp_scene *scene, int shape,
                          const struct imp_round *round)
 {
-    const double inside = round->radius * (1 - TOUCH), outside = round->radius * (1 + TOUCH);
+    const double inside = round->radius * (1 - TOUCH),
+                 outside = round->radius * (1 + TOUCH);
     const struct imp_triangles *t = &scene->shapes[shape]->triangles;
     struct imp_round other;
     if (imp__moves_sphere(scene, shape, &other)) {
         const double d = imp__length(other.centre - round->centre);
-        return d < inside + other.radius && d > fabs(round->radius - other.radius) +
-                                                     TOUCH * round->radius;
+        return d < inside + other.radius &&
+               d > fabs(round->radius - other.radius) + TOUCH * round->radius;
     }
     if (scene->shapes[shape]->geometry != IMP_TRIANGLES) return false;
     for (size_t k = 0; k < t->n_triangles; k++) {

@@ -72,11 +72,13 @@ static enum imp_status shape_mover(const struct imp__moves *moves, struct imp__m
     imp_context *ctx = moves->scene->ctx;
     const struct imp_shape *s = moves->scene->shapes[m->shape];
     struct imp_round round;
-    if (s->geometry != IMP_TRIANGLES && !imp__moves_sphere(moves->scene, m->shape, &round))
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "shape '%s' (%s) is neither made of triangles nor a sphere, and "
-                          "has no derivative by its place",
-                          s->name, s->ops->name);
+    if (s->geometry != IMP_TRIANGLES &&
+        !imp__moves_sphere(moves->scene, m->shape, &round))
+        return imp__error(
+            ctx, IMP_E_UNSUPPORTED,
+            "shape '%s' (%s) is neither made of triangles nor a sphere, and "
+            "has no derivative by its place",
+            s->name, s->ops->name);
     if (m->kind == IMP_MOVE_VERTICES &&
         (s->geometry != IMP_TRIANGLES || s->ops->surface != imp__mesh_surface))
         return imp__error(ctx, IMP_E_UNSUPPORTED,
@@ -191,8 +193,8 @@ static struct imp__glued glued(const struct imp_scene *scene, int shape, int pri
 }
 
 /* On a sphere, in this direction from its centre. */
-static struct imp__glued glued_round(int shape, const struct imp_round *round, imp_v3 outward,
-                                     imp_v3 side)
+static struct imp__glued glued_round(int shape, const struct imp_round *round,
+                                     imp_v3 outward, imp_v3 side)
 {
     const double sign = imp__dot(outward, side) < 0 ? -1 : 1;
     return (struct imp__glued){.shape = shape,

@@ -60,7 +60,8 @@ struct imp__glued {
     int shape, prim;
     double b[3]; /* weights of the vertices, as the shape's indices have them */
     imp_v3 p, n; /* place, and the unit geometric normal of either side */
-    double curvature; /* of the surface: the normal at a place shifted by x across n turns by
+    double
+        curvature; /* of the surface: the normal at a place shifted by x across n turns by
                          curvature x */
 };
 

@@ -120,8 +120,9 @@ static enum imp_status light_find(struct imp_scene *scene, int k, struct imp_pos
     p->emitter = e;
     p->rest_size = e->ops->object_size;
     if (!e->ops->aim || kind != p->kind)
-        return refuse(scene, e->name, p->kind,
-                      "it is none of point (position) and directional (direction)");
+        return refuse(
+            scene, e->name, p->kind,
+            "it is none of point and spot (position), and directional (direction)");
     if (scene->light_tree)
         return refuse(scene, e->name, p->kind,
                       "lights are chosen by a tree (light_choice)");

@@ -201,7 +201,8 @@ static void ball_test(void)
     /* All of the circle brings the same. */
     tap_near(place[2].mean, film * 2 * r * r * D / (q * q), 1e-6, 0,
              "solid angle of a ball that nears");
-    tap_near(scale[0].mean, film * 2 * r * r * D * D / (q * q), 1e-6, 0, "and that grows");
+    tap_near(scale[0].mean, film * 2 * r * r * D * D / (q * q), 1e-6, 0,
+             "and that grows");
     imp_scene_destroy(scene);
 }
 

@@ -178,6 +178,11 @@ static void refused(const char *rest, const char *name, const char *word)
 #define BULB                                                                             \
     "<emitter type='point' id='bulb'><point name='position' x='1.2' y='-1' z='2.5'/>"    \
     "<rgb name='intensity' value='6,5,4'/></emitter>"
+#define SPOT                                                                             \
+    "<emitter type='spot' id='bulb'><float name='cutoff_angle' value='35'/><float "      \
+    "name='beam_width' value='5'/><transform name='to_world'><lookat origin='1.2,-1,3' " \
+    "target='.2,.2,.3' up='0,1,0'/></transform><rgb name='intensity' "                   \
+    "value='16,15,14'/></emitter>"
 #define BALL                                                                             \
     "<shape type='sphere' id='ball'><float name='radius' value='.5'/><point "            \
     "name='center' x='1.3' y='.2' z='.9'/><ref id='grey'/></shape>"
@@ -216,14 +221,10 @@ int main(void)
                                          {"bulb.position", 2, .03},
                                          {"block.pose", 0, .03},
                                          {NULL, 0, 0}},
-                               ball[] = {{"ball.pose", 0, .03},
-                                         {"ball.pose", 1, .03},
-                                         {"ball.pose", 2, .03},
-                                         {"ball.scale", 0, .03},
-                                         {"block.pose", 0, .03},
-                                         {"camera.pose", 0, .03},
-                                         {"camera.pose", 5, .01},
-                                         {NULL, 0, 0}},
+                               ball[] = {{"ball.pose", 0, .03},   {"ball.pose", 1, .03},
+                                         {"ball.pose", 2, .03},   {"ball.scale", 0, .03},
+                                         {"block.pose", 0, .03},  {"camera.pose", 0, .03},
+                                         {"camera.pose", 5, .01}, {NULL, 0, 0}},
                                round[] = {{"bulb.position", 0, .03},
                                           {"bulb.position", 2, .03},
                                           {"ball.pose", 1, .03},
@@ -241,6 +242,7 @@ int main(void)
     room_test("block", PATH LAMP, block, larger, 0.03, 64, 64);
     room_test("corners", DIRECT LAMP, corners, NULL, 0.03, 64, 64);
     room_test("bulb", PATH BULB, bulb, NULL, 0.03, 64, 64);
+    room_test("spot", DIRECT SPOT, bulb, NULL, 0.03, 64, 64);
     room_test("bulb and lamp", DIRECT BULB LAMP, bulb, NULL, 0.04, 64, 64);
     room_test("sun", PATH SUN, sun, NULL, 0.03, 64, 64);
     room_test("ball", DIRECT BALL LAMP, ball, NULL, 0.1, 128, 64);

@@ -119,7 +119,8 @@ static void choice_test(int rings)
         measure[k] =
             length_of(&edges.edge[k]) * (0.3 + imp__u01(imp__key(1, 0, (uint64_t)k), 0));
     for (int k = 0; k < CELLS; k++)
-        moment[k] = k % 3 && k > 3 ? exp(3 * imp__u01(imp__key(2, 0, (uint64_t)k), 0)) : 0;
+        moment[k] =
+            k % 3 && k > 3 ? exp(3 * imp__u01(imp__key(2, 0, (uint64_t)k), 0)) : 0;
     test_must(ctx, imp__edge_choice_begin(&edges, &tree, measure, CELLS, &c));
     imp__edge_choice_learn(&c, moment);
     draws_test(&c, "by what a pilot has found", 0.08);

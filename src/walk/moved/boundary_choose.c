@@ -81,7 +81,8 @@ bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w)
     struct imp_round round;
     double chance;
     const int k = item_choose(d, &chance);
-    const double u[2] = {imp__u01(d->key, IMP_EDGE_DIR_U), imp__u01(d->key, IMP_EDGE_DIR_V)};
+    const double u[2] = {imp__u01(d->key, IMP_EDGE_DIR_U),
+                         imp__u01(d->key, IMP_EDGE_DIR_V)};
     if (!(chance > 0)) return false;
     if (k == d->b->n_balls) {
         *w = imp__uniform_sphere(u);

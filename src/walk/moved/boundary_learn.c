@@ -80,7 +80,8 @@ static void parts_learn(const struct pilot *x, double *part, int n_cells)
     double root = 0, sum = 0, before = 0;
     for (int k = 0; k < n_cells; k++) root += sqrt(x->moment[k]);
     if (n_cells > 0) root *= sqrt(edges / n_cells);
-    for (int k = 0; k < n; k++) sum += sqrt((part[k + 1] - part[k]) * x->moment[n_cells + k]);
+    for (int k = 0; k < n; k++)
+        sum += sqrt((part[k + 1] - part[k]) * x->moment[n_cells + k]);
     sum += root;
     if (!(sum > 0) || !(sum < INFINITY)) return;
     for (int k = 0; k < n; k++) {

@@ -70,7 +70,7 @@ void imp__draw_light(struct imp__edge_draw *d)
     const double cosine = e->shape ? imp__dot(s.y.n, r) / t_y : 1;
     if (!(sine > 0) || !(cosine > IMP_GRAZING)) return;
     imp_v3 m = turned * (1 / (sine * t_y));
-    const int side = d->edge                  ? imp__edge_side(b->edges, d->edge, m)
+    const int side = d->edge                   ? imp__edge_side(b->edges, d->edge, m)
                      : imp__dot(m, d->out) > 0 ? 1
                                                : -1;
     if (side == 0) return;
@@ -86,13 +86,16 @@ void imp__draw_light(struct imp__edge_draw *d)
     imp__hit_surface(scene, &hit, &o, &to, &at);
 
     const struct imp_texcoord there = {.shape = e->shape};
-    imp_spec in[IMP_INPUTS_MAX];
+    const struct imp_emission sent = {
+        .dist = 1, .cos_light = cosine, .d = imp__normalize(to)};
+    imp_spec in[IMP_INPUTS_MAX], le;
     imp__inputs_eval(e->input, e->n_in, &there, in);
+    e->ops->eval(e, in, &sent, &le);
     const double t_x = imp__length(at.p - d->p);
     const double far = s.parallel ? 1 : t_y / (t_x + t_y); /* of V_line that is x' */
     const double spread = s.parallel ? 1 : t_y * t_y;
     struct imp__edge_light light = {.w = imp__normalize(to), .behind = 1, .n_ends = 2};
-    light.light = in[0] * (-cosine * sine * d->inv_pdf / (spread * s.density));
+    light.light = le * (-cosine * sine * d->inv_pdf / (spread * s.density));
     light.slide = m * -far;
     const struct imp__glued edge = imp__edge_carried(d);
     light.end[0] = imp__flux_glued(&edge, m);

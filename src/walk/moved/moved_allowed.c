@@ -8,7 +8,7 @@
 
 extern const struct imp_bsdf_ops imp__diffuse, imp__twosided, imp__black;
 extern const struct imp_emitter_ops imp__area, imp__constant, imp__point_light,
-    imp__directional;
+    imp__spot_light, imp__directional;
 
 static enum imp_status refuse(const struct imp_tracer *t, const char *what,
                               const char *name, const char *kind, const char *why)
@@ -54,9 +54,10 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
     for (int k = 0; k < t->scene->n_emitters; k++) {
         const struct imp_emitter *e = t->scene->emitters[k];
         if (e->ops != &imp__area && e->ops != &imp__constant &&
-            e->ops != &imp__point_light && e->ops != &imp__directional)
+            e->ops != &imp__point_light && e->ops != &imp__spot_light &&
+            e->ops != &imp__directional)
             return refuse(t, "light", e->name, e->ops->name,
-                          "is none of area, constant, point and directional");
+                          "is none of area, constant, point, spot and directional");
         if (e->shaped || is_textured(e->input, e->n_in))
             return refuse(t, "light", e->name, e->ops->name, "has a texture");
         if (e->shape && e->shape->geometry != IMP_TRIANGLES)

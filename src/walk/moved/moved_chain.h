@@ -80,8 +80,7 @@ static inline imp_v3 imp__point_bar(struct imp__link_point *x, imp_v3 y, double 
 static inline imp_v3 imp__slide_bar(struct imp__link_point *x, imp_v3 w)
 {
     /* On a curved surface the normal turns as the vertex slides over it. */
-    const imp_v3 turn =
-        (x->bar.n - x->x.n * imp__dot(x->x.n, x->bar.n)) * x->x.curvature;
+    const imp_v3 turn = (x->bar.n - x->x.n * imp__dot(x->x.n, x->bar.n)) * x->x.curvature;
     x->moved_bar += turn;
     x->bar.v -= turn;
     const imp_v3 across = x->x.n * (imp__dot(w, x->moved_bar) / imp__dot(x->x.n, w));
