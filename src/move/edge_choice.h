@@ -58,8 +58,8 @@ void imp__edge_choice_learn(struct imp__edge_choice *c, const double *moment);
 /* u in [0, 1); neighbours on the list have neighbouring u. */
 void imp__edge_choice_draw(const struct imp__edge_choice *c, double u,
                            struct imp__edge_point *out);
-/* Of silhouettes of lines that come from a point, or, where `parallel`, along this direction. False:
- * this u leads to none. What it leads to need not be one. */
+/* A silhouette of lines that come from a point, or, where `parallel`, along this direction. False: this
+ * u leads to none. */
 bool imp__edge_choice_silhouette(const struct imp__edge_choice *c, imp_v3 from,
                                  bool parallel, double u, struct imp__edge_point *out);
 
