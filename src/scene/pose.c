@@ -104,6 +104,12 @@ static void bounds_update(struct imp_scene *scene)
     scene->ball = imp__ball_around(scene);
 }
 
+static bool is_finite(const struct imp_shape *s)
+{
+    const imp_v3 size = s->hi - s->lo;
+    return isfinite(size[0]) && isfinite(size[1]) && isfinite(size[2]);
+}
+
 static void pose_changed(void *payload)
 {
     struct imp_pose *p = payload;
@@ -118,6 +124,10 @@ enum imp_status imp__poses_settle(struct imp_scene *scene)
         if (!p->due) continue;
         scene->reshaped |= !p->sensor;
         pose_apply(p);
+        if (!p->sensor && !is_finite(scene->shapes[p->shape]))
+            return imp__error(scene->ctx, IMP_E_NUMERIC,
+                              "%s moves the shape beyond what numbers hold",
+                              scene->params[p->param].info.name);
     }
     if (scene->reshaped) {
         bounds_update(scene);

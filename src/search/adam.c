@@ -22,6 +22,7 @@
 #include <math.h>
 #include <string.h>
 
+#define HALVES  6 /* of a step that leads where nothing can be evaluated */
 #define BETA2   IMP_ADAM_BETA2
 #define WINDOW  IMP_ADAM_WINDOW
 #define STALLED IMP_ADAM_STALLED /* net motion over path length: below, no progress */
@@ -168,6 +169,21 @@ static bool settles(const struct imp__goal *goal, const struct imp__opt_options 
     return !turned(s) && options->quiet && goal->settles && goal->settles[j];
 }
 
+/* A step g, in scales, that has led to x: halved while the objective cannot be evaluated there, and
+ * taken back at last. */
+static void step_back(const struct imp__goal *goal, const struct imp__search *s,
+                      double *x, double *g)
+{
+    for (int i = 0; goal->possible && i <= HALVES; i++) {
+        if (goal->possible(x, goal->payload)) return;
+        const double back = i < HALVES ? 0.5 : 1;
+        for (size_t k = 0; k < s->n; k++) {
+            x[k] -= back * goal->scale[k] * g[k];
+            g[k] *= 1 - back;
+        }
+    }
+}
+
 /* One step from HERE. g: the gradient; it and work [n] are destroyed. */
 static enum imp_status step(const struct imp__goal *goal,
                             const struct imp__opt_options *options, struct imp__search *s,
@@ -204,6 +220,9 @@ static enum imp_status step(const struct imp__goal *goal,
         const double old = x[k];
         x[k] = imp__into_bounds(goal, k, old - goal->scale[k] * g[k]);
         g[k] = (x[k] - old) / goal->scale[k];
+    }
+    step_back(goal, s, x, g);
+    for (size_t k = 0; k < s->n; k++) {
         s->scalar[LARGEST] = fmax(s->scalar[LARGEST], fabs(g[k]));
         s->array[SUM][k] += x[k];
     }

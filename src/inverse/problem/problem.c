@@ -171,6 +171,13 @@ out:
     return st;
 }
 
+bool imp__problem_moves(const struct imp_problem *p)
+{
+    for (const struct imp_pose *q = p->scene->poses; q; q = q->next)
+        if (p->active.base[q->param] >= 0) return true;
+    return false;
+}
+
 size_t imp_problem_n_variables(const imp_problem *p) { return p ? p->n : 0; }
 
 enum imp_status imp_problem_get_variable(const imp_problem *p, size_t i,

@@ -3,6 +3,7 @@
  * Draws of the boundary, and what they bring as derivatives (boundary.h). */
 #include "base/context.h"
 #include "boundary_parts.h"
+#include "scene/camera_gain.h"
 #include "scene/pose.h"
 
 /* Area lights by area times radiance. */
@@ -105,6 +106,9 @@ struct imp__flux *imp__boundary_draw(const struct imp__boundary *b,
     case IMP_BOUNDARY_SCATTER: imp__draw_scatter(&d); break;
     }
     *no_memory |= d.no_memory;
+    const struct imp_camera_gain *gain = b->tracer->sensor->gain;
+    for (struct imp__flux *f = gain ? d.first : NULL; f; f = f->next)
+        f->L *= imp__gain_at(gain, b->tracer->photograph, f->px, f->py, NULL);
     return d.first;
 }
 

@@ -35,7 +35,7 @@ static imp_spec look(const struct imp__edge_draw *d, double px, double py)
     struct imp_walk walk;
     t->sensor->ops->ray(t->sensor, px, py, lens, &ray);
     imp__walk_along(t, d->arena, imp__key_branch(d->key, 0, 1), &ray, 0, &walk);
-    return walk.L;
+    return walk.values;
 }
 
 void imp__draw_film(struct imp__edge_draw *d)

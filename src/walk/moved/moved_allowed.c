@@ -91,7 +91,6 @@ static enum imp_status sensor_allowed(const struct imp_tracer *t)
     if (!imp__pinhole(s, &centre))
         return refuse(t, "sensor", s->name, s->ops->name,
                       "has no point in which its rays meet");
-    if (s->gain) return refuse(t, "sensor", s->name, s->ops->name, "has an exposure");
     if (s->open != s->close)
         return refuse(t, "sensor", s->name, s->ops->name, "has a shutter");
     return IMP_OK;

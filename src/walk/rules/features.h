@@ -78,7 +78,7 @@ struct imp_active;
     X(PRINTED_WALKS, "printed walks (render --paths)")                                   \
     X(DERIVATIVE, "derivatives")                                                         \
     X(PICTURE_DERIVATIVE, "derivatives of pictures")                                     \
-    X(EDGE_TERMS, "a gradient of a linear function of the picture")                      \
+    X(EDGE_TERMS, "derivatives with the terms of moving edges")                          \
     X(LOSS, "a loss")                                                                    \
     X(RESPONSE_LOSS, "a loss of other than three response curves")                       \
     X(MANY_PARAMETERS, "a gradient of very many parameters")                             \
