@@ -28,6 +28,15 @@ struct imp_pose {
     float *positions, *normals; /* NULL: in the object, or none */
 };
 
+/* The pose that is this parameter; NULL: it is none. */
+static inline const struct imp_pose *imp__pose_of(const struct imp_scene *scene,
+                                                  size_t param)
+{
+    const struct imp_pose *p = scene->poses;
+    while (p && p->param != (int)param) p = p->next;
+    return p;
+}
+
 /* Where the rays of a camera meet. False: in no point, as those of a lens with an aperture or of
  * parallel light. */
 bool imp__pinhole(const struct imp_sensor *sensor, imp_v3 *centre);

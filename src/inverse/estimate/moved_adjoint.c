@@ -37,14 +37,15 @@ enum imp_status imp__moved_adjoint_fixed(imp_context *ctx,
     return IMP_OK;
 }
 
-enum imp_status imp__moved_adjoint_loss(imp_context *ctx, const struct imp__splat *splat,
+enum imp_status imp__moved_adjoint_loss(imp_context *ctx,
+                                        const struct imp_film_desc *film, int channels,
+                                        const struct imp__splat *splat, int R,
                                         struct imp__moved_adjoint *out)
 {
-    const int R = splat->n / splat->m;
-    const size_t C = (size_t)splat->channels;
-    IMP_CHECKED(create(ctx, splat->film, splat->channels, R / 2, out));
+    const size_t C = (size_t)channels;
+    IMP_CHECKED(create(ctx, film, channels, R / 2, out));
     const size_t n = values_of(out);
-    for (size_t p = 0; p < n / C; p++) {
+    for (size_t p = 0; p < n / C && splat->n > 0; p++) {
         const imp_spec mean = imp__splat_pixel(splat, -1, p);
         for (size_t c = 0; c < C; c++) out->image[p * C + c] = mean[c];
         for (int q = 0; q < out->pairs; q++) {

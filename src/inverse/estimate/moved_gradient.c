@@ -61,7 +61,9 @@ enum imp_status imp__moved_possible(struct imp_problem *p, const struct imp_run 
     struct imp_run own = *run;
     p->edge_terms = true;
     enum imp_status st =
-        imp__target_tracer(p, imp__target_part(&p->targets[0], 0), 0, &own, &tracer);
+        p->n_targets > 0
+            ? imp__target_tracer(p, imp__target_part(&p->targets[0], 0), 0, &own, &tracer)
+            : imp__problem_tracer_of_any_end(p, &own, NULL, &tracer);
     p->edge_terms = false;
     if (st == IMP_OK) st = imp__moved_begin(p, &tracer, &m);
     imp__moved_end(&m);

@@ -13,10 +13,8 @@ static double pose_scale(const struct imp_problem *p, const struct imp__block *b
                          size_t e)
 {
     if (b->log || imp__block_factor(p, b)) return 0;
-    for (const struct imp_pose *q = p->scene->poses; q; q = q->next)
-        if (q->param == (int)b->param)
-            return e < 3 ? 0.1 * imp__length(p->scene->hi - p->scene->lo) : 0.5;
-    return 0;
+    if (!imp__pose_of(p->scene, b->param)) return 0;
+    return e < 3 ? 0.1 * imp__length(p->scene->hi - p->scene->lo) : 0.5;
 }
 
 static bool is_bounded(const struct imp__block *b)

@@ -367,8 +367,9 @@ enum imp_status imp_problem_jacobian_sums(imp_problem *p, const float *adjoint,
         const enum imp_status ended = f.tracer.integrator->from_lights
                                           ? light_errors(ctx, &f, &own, se)
                                           : errors(ctx, &f, &own, weights, false, se);
-        if (ended != IMP_CANCELLED) IMP_TRY(ended);
-        if (ended == IMP_OK && f.moved) IMP_TRY(edge_errors(ctx, &f, &own, se));
+        if (ended != IMP_CANCELLED && ended != IMP_PART) IMP_TRY(ended);
+        if (ended != IMP_CANCELLED && f.moved) IMP_TRY(edge_errors(ctx, &f, &own, se));
+        if (ended == IMP_PART) IMP_TRY(IMP_PART);
     }
     if (value) *value = (struct imp_estimate){inner_product(&f, primal), se[0], 0};
     for (size_t g = 0; g < n; g++) sums[g] = (struct imp_estimate){0, se[g + 1], 0};
