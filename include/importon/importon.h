@@ -595,7 +595,7 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  * numbers, a translation in scene units and a rotation vector in radians about the middle of the
  * shape's box, or the camera's own place, away from where the scene file has it. Setting it moves
  * the object. Theta, and offsets in it, are longer afterwards; a pose that is there already
- * stays as it is. imp_problem_reverse and imp_problem_functional have its gradient; patterns of
+ * stays as it is. Gradients, derivative pictures and fits know it (docs/poses.md); patterns of
  * imp_problem_activate pass it over unless they end in ".pose".
  * @param object  its name, as of imp_param_info.
  * @return IMP_OK; IMP_E_ARG if there is no such object, the scene is not committed, or a problem
@@ -1178,7 +1178,9 @@ struct imp_fit_options {
     /** Adam: textures and volumes are fitted from coarse to fine. Level k of `levels` (at
      * most 16) has one variable for 2^(levels - k) cells along each axis, between which
      * the cells are linear, and an equal share of the iterations; a checkpoint holds the
-     * last level. 0, 1: cells alone. */
+     * last level. 0, 1: cells alone. With active poses, by Adam or Levenberg-Marquardt:
+     * level k compares pictures through a tent of 2^(levels - k) pixels, with the targets
+     * blurred alike, and the last through the film's own filter. */
     int levels;
     imp_fit_step_fn step; /**< NULL: not called */
     void *step_payload;

@@ -163,8 +163,8 @@ class Scene:
 
         It is six numbers away from where the scene file has the object: a translation in scene
         units, and a rotation vector in radians about the middle of the shape's box or the
-        camera's own place. Setting them moves the object; `functional` and `render_backward`
-        have their gradient, where the parameter is named. To be called before anything has
+        camera's own place. Setting them moves the object; gradients, losses, derivative
+        pictures and fits know them, where the parameter is named. To be called before anything has
         been computed from the scene, and before `traverse`.
 
         Parameters

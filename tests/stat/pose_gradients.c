@@ -5,8 +5,8 @@
  * poses; with a filter of one pixel and a wider one, and a material's parameter beside them; errors
  * over seeds; what has no such gradient is refused. */
 #include "imp_scene.h"
-#include "importon/walks.h"
 #include "imp_tap.h"
+#include "importon/walks.h"
 #include "moves_kit.h"
 
 enum { WIDTH = 24, HEIGHT = 16, N = 18 };

@@ -172,7 +172,8 @@ static enum imp_status layout_of(struct imp_problem *p, const uint8_t *chosen, b
 /* Rows of all parameters but poses. */
 static enum imp_status numbers_check(struct imp__check *c, bool lights)
 {
-    enum imp_status ended = imp__check_densities(c); /* first: all that follows rests on them */
+    enum imp_status ended =
+        imp__check_densities(c); /* first: all that follows rests on them */
     if (ended == IMP_OK && !lights && wants_any(c, "frozen,dot,euler"))
         ended = imp__check_frozen(c);
     if (ended == IMP_OK && wants_any(c, "fresh,ends")) ended = imp__check_fresh(c);

@@ -36,7 +36,7 @@ enum imp_status imp__fresh_value(struct imp__fresh *f, struct imp_estimate *out)
 struct imp__motion {
     const struct imp_param *param;
     const double *old, *weight; /* [count] */
-    double scale; /* of the values that move; 0: imp__check_scale */
+    double scale;               /* of the values that move; 0: imp__check_scale */
 };
 struct imp__quotient {
     struct imp_estimate mean;

@@ -13,17 +13,18 @@
 #include <string.h>
 
 #define FROZEN_LIMIT 1e-6
-#define TINY         1e-3 /* of a walk's value per scale of a number: smaller slopes are rounding */
-#define N_STEPS      3
+#define TINY                                                                             \
+    1e-3 /* of a walk's value per scale of a number: smaller slopes are rounding */
+#define N_STEPS 3
 static const double steps[N_STEPS] = {1e-2, 1e-3, 1e-4};
 
 /* One pose, moved by h along one of its numbers. */
 struct moved {
     const struct imp__check *c;
     const struct imp_pose *pose;
-    int shape;        /* or IMP_MOVE_CAMERA */
-    double turn[9];   /* R(a') R(a)^T */
-    imp_v3 from, to;  /* the centre before and after */
+    int shape;       /* or IMP_MOVE_CAMERA */
+    double turn[9];  /* R(a') R(a)^T */
+    imp_v3 from, to; /* the centre before and after */
 };
 
 static void move_by(struct moved *m, int number, double h)
@@ -185,7 +186,8 @@ static enum imp_status pose_check(struct imp__check *c, struct imp__moved_gradie
 {
     const struct imp_film_desc *film = &c->tracer.sensor->film;
     const uint64_t pixels = (uint64_t)film->crop_w * (uint64_t)film->crop_h;
-    struct moved m = {.c = c, .pose = g->pose[mover], .shape = g->moves.mover[mover].shape};
+    struct moved m = {
+        .c = c, .pose = g->pose[mover], .shape = g->moves.mover[mover].shape};
     struct imp_check_row worst = {0};
     for (int t = 0; t < c->options.paths; t++) {
         const uint64_t pixel = imp__mix64((uint64_t)t + 0x51ed270b) % pixels;
@@ -207,8 +209,8 @@ static enum imp_status pose_check(struct imp__check *c, struct imp__moved_gradie
     }
     worst.limit = FROZEN_LIMIT;
     worst.ok = worst.error <= FROZEN_LIMIT;
-    return imp__check_row(c, "frozen", c->problem->scene->params[m.pose->param].info.name, -1,
-                          &worst);
+    return imp__check_row(c, "frozen", c->problem->scene->params[m.pose->param].info.name,
+                          -1, &worst);
 }
 
 enum imp_status imp__check_poses(struct imp__check *c)

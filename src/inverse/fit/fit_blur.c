@@ -72,8 +72,7 @@ static void blur_end(struct blur *b)
     for (size_t t = 0; b->pixels && t < p->n_targets; t++) {
         const struct imp_target *d = &p->targets[t].desc;
         const size_t n = (size_t)d->width * (size_t)d->height * (size_t)d->channels;
-        if (b->pixels[t])
-            memcpy(p->targets[t].pixels, b->pixels[t], n * sizeof(float));
+        if (b->pixels[t]) memcpy(p->targets[t].pixels, b->pixels[t], n * sizeof(float));
         imp__release(p->ctx, b->pixels[t]);
     }
     imp__release(p->ctx, b->filter);
@@ -133,8 +132,8 @@ enum imp_status imp__fit_blurs_allowed(const struct imp_problem *p,
                                                        : NULL;
         if (what)
             return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                              "levels of poses blur the targets, and target %zu has %s", t,
-                              what);
+                              "levels of poses blur the targets, and target %zu has %s",
+                              t, what);
     }
     return IMP_OK;
 }
@@ -158,7 +157,8 @@ out:
     return st;
 }
 
-enum imp_status imp__fit_blurred(struct imp__fit *f, const struct imp__opt_options *options,
+enum imp_status imp__fit_blurred(struct imp__fit *f,
+                                 const struct imp__opt_options *options,
                                  struct imp__search *s)
 {
     enum imp_status st = IMP_OK;

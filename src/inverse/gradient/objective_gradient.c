@@ -65,8 +65,8 @@ static enum imp_status moved_estimate(struct imp__gradient_job *j,
     if (!before) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for errors"));
     memcpy(before, j->totals->gradient_variance, n * sizeof *before);
     IMP_TRY(imp__moved_adjoint_loss(ctx, &j->tracer.sensor->film,
-                                    j->problem->scene->channels, splat,
-                                    j->plan.R, &moved->adjoint));
+                                    j->problem->scene->channels, splat, j->plan.R,
+                                    &moved->adjoint));
     j->contrasts = imp__alloc(ctx, imp__moved_contrasts(moved), sizeof *j->contrasts);
     if (!j->contrasts) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for errors"));
     memset(j->contrasts, 0, imp__moved_contrasts(moved) * sizeof *j->contrasts);
