@@ -139,7 +139,7 @@ static bool is_singly(const struct imp_problem *p, size_t param)
            imp__pose_of(p->scene, param);
 }
 
-/* Of a number of a pose; 0: it is none. */
+/* A large change of a number of a pose; 0: it is none. */
 static double pose_scale(const struct imp_problem *p, const struct comparison *c)
 {
     if (!imp__pose_of(p->scene, c->param)) return 0;

@@ -36,9 +36,9 @@ struct imp__moved_adjoint {
     double *apart; /* [pairs][crop_h][crop_w][channels]: (A_2q - A_2q+1)/R */
 };
 
-/* Of a fixed image, [crop_h][crop_w][channels]; of the pictures of a loss's R replicates, an even
- * number (a merge of parts, which makes no draw, has no pictures: splat->n 0). Either is ended by
- * imp__moved_adjoint_free. IMP_E_NOMEM. */
+/* Adjoints of a fixed image, [crop_h][crop_w][channels], and of the pictures of a loss's R
+ * replicates, an even number (a merge of parts, which makes no draw, has no pictures: splat->n
+ * 0). Either is ended by imp__moved_adjoint_free. IMP_E_NOMEM. */
 enum imp_status imp__moved_adjoint_fixed(imp_context *ctx,
                                          const struct imp_film_desc *film, int channels,
                                          const float *image,
