@@ -15,9 +15,9 @@
 #define DRAWS_S 20 /* default of imp_check_options.draws_s */
 
 static const char *const methods[] = {
-    "frozen",  "dot",    "euler", "fresh",      "loss",    "ends",
-    "uniform", "energy", "aim",   "directions", "choices", "points",
-    "flights", "passes", "areas", "leaves",     "film",    "waves"};
+    "frozen", "dot",    "euler",      "fresh",   "loss",   "ends",    "uniform",
+    "energy", "aim",    "directions", "choices", "points", "flights", "passes",
+    "areas",  "leaves", "guides",     "weights", "film",   "times",   "waves"};
 
 /* Is `word` [n] one of the comma-separated words of `list`? */
 static bool listed(const char *list, const char *word, size_t n)
@@ -138,7 +138,8 @@ enum imp_status imp__check_densities(struct imp__check *c)
     enum imp_status st = IMP_OK;
     struct imp__draw_list l = {.check = c};
     struct imp__places places = {.check = c};
-    if (!wants_any(c, "directions,choices,points,flights,passes,areas,leaves,film,waves"))
+    if (!wants_any(c, "directions,choices,points,flights,passes,areas,leaves,guides,"
+                      "weights,film,times,waves"))
         return IMP_OK;
     imp__arena_init(&l.arena, c->ctx);
     IMP_TRY(imp__places_find(&places));
@@ -146,6 +147,9 @@ enum imp_status imp__check_densities(struct imp__check *c)
     IMP_TRY(imp__check_lights(&l, &places));
     IMP_TRY(imp__check_flights(&l, &places));
     IMP_TRY(imp__check_areas(&l, &places));
+    IMP_TRY(imp__check_far(&l, &places));
+    IMP_TRY(imp__check_guides(&l, &places));
+    IMP_TRY(imp__check_weights(&l, &places));
     IMP_TRY(imp__check_film(&l, &places));
     IMP_TRY(imp__draw_all(&l));
 out:
