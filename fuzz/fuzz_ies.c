@@ -10,11 +10,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 static void check(const struct imp_ies_data *d)
 {
     if (d->n_vertical < 2 || d->n_horizontal < 1) abort();
+    const double lo = d->type == IMP_PHOTOMETRY_C ? 0 : -90;
     for (int k = 0; k < d->n_vertical; k++)
-        if (!(d->vertical[k] >= (k ? d->vertical[k - 1] : 0) && d->vertical[k] <= 180))
+        if (!(d->vertical[k] >= (k ? d->vertical[k - 1] : lo) && d->vertical[k] <= 180))
             abort();
     for (int k = 0; k < d->n_horizontal; k++)
-        if (!(d->horizontal[k] >= (k ? d->horizontal[k - 1] : 0) &&
+        if (!(d->horizontal[k] >= (k ? d->horizontal[k - 1] : lo) &&
               d->horizontal[k] <= 360))
             abort();
     for (int k = 0; k < d->n_vertical * d->n_horizontal; k++)

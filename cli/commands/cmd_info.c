@@ -2,6 +2,7 @@
  *
  * importon info: what is in a scene, and every parameter it has. */
 #include "shared/command.h"
+#include <importon/rooms.h>
 
 #include <math.h>
 #include <stdlib.h>
@@ -103,6 +104,36 @@ static int print_params(struct json *j)
     return 0;
 }
 
+static void print_luminaires(struct json *j)
+{
+    const int n = imp_scene_n_luminaires(cli.scene);
+    for (int i = 0; i < n; i++) {
+        struct imp_luminaire_info l = {.size = sizeof l};
+        if (imp_scene_get_luminaire(cli.scene, i, &l) != IMP_OK) continue;
+        if (j) {
+            json_object(j, NULL);
+            json_text(j, "name", l.name);
+            json_number(j, "flux", l.flux);
+            if (l.lamp_flux > 0) json_number(j, "lamp_flux", l.lamp_flux);
+            if (l.watts > 0) json_number(j, "watts", l.watts);
+            if (l.watts > 0) json_number(j, "efficacy", l.efficacy);
+            json_number(j, "dimming", l.dimming);
+            json_number(j, "maintenance", l.maintenance);
+            json_bool(j, "point", l.is_point);
+            json_numbers(j, "position", 3, l.position);
+            json_numbers(j, "opening", 3, l.opening);
+            json_end_object(j);
+            continue;
+        }
+        printf("luminaire: %s, %.5g lm", l.name, l.flux);
+        if (l.watts > 0) printf(", %.4g W, %.4g lm/W", l.watts, l.efficacy);
+        if (l.dimming != 1) printf(", dimmed to %.3g", l.dimming);
+        if (l.maintenance != 1) printf(", maintenance factor %.3g", l.maintenance);
+        printf(", %s at (%g, %g, %g)\n", l.is_point ? "a point" : "a shape",
+               l.position[0], l.position[1], l.position[2]);
+    }
+}
+
 /* A scene that other commands refuse is not fine. */
 static int verdict(const struct imp_scene_info *s)
 {
@@ -144,6 +175,9 @@ static int run_info(int n, char **operand)
         json_array(&j, "sensors");
         for (int i = 0; i < s.n_sensors; i++) print_sensor_json(&j, i);
         json_end_array(&j);
+        json_array(&j, "luminaires");
+        print_luminaires(&j);
+        json_end_array(&j);
         json_array(&j, "params");
         rc = print_params(&j);
         json_end_array(&j);
@@ -174,6 +208,7 @@ static int run_info(int n, char **operand)
                i, c.name, c.type, c.width, c.height, c.spp, plural(c.spp), c.filter,
                c.filter_radius);
     }
+    print_luminaires(NULL);
     rc = print_params(NULL);
     return rc ? rc : verdict(&s);
 }

@@ -2,7 +2,10 @@
  *
  * importon read: the numbers of a scene's sensors, means over their films, with standard
  * errors, units and derivatives; from either end, or from both to compare them. */
+#include "read/read_glare.h"
+#include "read/read_grid.h"
 #include "shared/command.h"
+#include "shared/overwrite.h"
 #include "shared/picture_files.h"
 #include "shared/problem_options.h"
 #include "text/progress.h"
@@ -14,13 +17,26 @@
 #define APART 5 /* standard errors between the ends that chance does not explain */
 
 static struct {
-    int ends;
+    int ends, grid, shares, ugr;
+    const char *csv, *svg;
 } o;
 
 static const struct arg_option options[] = {
     {ARG_FLAG | ARG_REPLAYS, 0, "ends", NULL,
      "read by light tracing, too, and compare: exit status 1 if they differ", &o.ends, 0,
      0, NULL},
+    {ARG_FLAG | ARG_REPLAYS, 0, "grid", NULL,
+     "every pixel of an irradiancemeter: average, minimum, maximum, uniformity", &o.grid,
+     0, 0, NULL},
+    {ARG_FLAG | ARG_REPLAYS, 0, "shares", NULL,
+     "what each lamp and each material has to do with the readings", &o.shares, 0, 0,
+     NULL},
+    {ARG_FLAG | ARG_REPLAYS, 0, "ugr", NULL,
+     "glare ratings of the observers of --sensor, a grid with a line of sight", &o.ugr, 0,
+     0, NULL},
+    {ARG_TEXT, 0, "csv", "FILE", "the grid's points, values and errors as a table",
+     &o.csv, 0, 0, NULL},
+    {ARG_TEXT, 0, "svg", "FILE", "the grid as a plan with isolines", &o.svg, 0, 0, NULL},
     {0}};
 
 struct findings {
@@ -207,6 +223,48 @@ static int sensor_read(imp_problem *problem, struct json *j, struct imp_run run,
     return rc;
 }
 
+/* The reading of a sensor, and the rows of lamps and materials. */
+static int shares_read(struct json *j, const struct imp_run *run, struct findings *found)
+{
+    struct imp_sensor_info info = {.size = sizeof info};
+    struct imp_estimate reading;
+    struct imp_share *share = NULL;
+    size_t n;
+    enum imp_status st = imp_scene_get_sensor(cli.scene, run->sensor, &info);
+    if (st == IMP_OK) st = imp_reading_shares(cli.scene, run, NULL, 0, &n, NULL);
+    if (st == IMP_OK) {
+        share = cli_alloc(n + 1, sizeof *share);
+        st = imp_reading_shares(cli.scene, run, share, n + 1, &n, &reading);
+    }
+    if (st != IMP_OK) {
+        free(share);
+        return cli_fail(st, cli.scene_path);
+    }
+    number_print(j, &info, "Y", reading, (struct imp_estimate){0, 0, 0}, found);
+    if (cli.json) json_array(j, "shares");
+    for (size_t k = 0; k < n; k++) {
+        const struct imp_share *s = &share[k];
+        const char *of = s->of == IMP_SHARE_LIGHT ? "light" : "material";
+        const double part = reading.value > 0 ? s->value / reading.value : 0;
+        if (s->of == IMP_SHARE_SURFACE && s->value == 0 && s->se == 0) continue;
+        if (cli.json) {
+            json_object(j, NULL);
+            json_text(j, "of", of);
+            json_text(j, "name", s->name);
+            json_number(j, "value", s->value);
+            json_number(j, "se", s->se);
+            json_number(j, "part", part);
+            json_end_object(j);
+        } else {
+            printf("    %-8s %-23s %-12.6g +- %-8.2g %s %7.1f %%\n", of, s->name,
+                   s->value, s->se, info.unit, 100 * part);
+        }
+    }
+    if (cli.json) json_end_array(j), json_end_object(j);
+    free(share);
+    return 0;
+}
+
 /* Sensors to which no walk brought light. */
 static void unlit_tell(struct json *j, const int *sensor, int n)
 {
@@ -248,6 +306,21 @@ static int run_read(int n, char **operand)
         return cli_error(EXIT_USAGE, "%s: there is no sensor in it", cli.scene_path);
     if (cli.time_s > 0)
         return cli_error(EXIT_USAGE, "read takes --spp samples, and has no --time");
+    if (!o.grid && (o.csv || o.svg))
+        return cli_error(EXIT_USAGE, "--csv and --svg write a grid: they go with --grid");
+    if (o.grid && problem_options.params.n)
+        return cli_error(EXIT_USAGE,
+                         "--grid has no derivatives: it goes without --param");
+    if (o.shares && (o.grid || o.ends || problem_options.params.n))
+        return cli_error(EXIT_USAGE, "--shares goes without --grid, --ends and --param");
+    if (o.ugr && (o.shares || o.grid || o.ends || problem_options.params.n))
+        return cli_error(EXIT_USAGE,
+                         "--ugr goes without --shares, --grid, --ends and --param");
+    if (o.ugr && !sensor_named())
+        return cli_error(EXIT_USAGE, "--ugr is of one grid: choose it with --sensor");
+    if (o.csv) rc = overwrite_check(o.csv, OUTPUT_TABLE);
+    if (o.svg && !rc) rc = overwrite_check(o.svg, OUTPUT_CURVE);
+    if (rc) return rc;
     if (o.ends && cli.from)
         return cli_error(EXIT_USAGE, "--ends reads from both: it goes without --from");
     const enum imp_status st = imp_problem_create(cli.scene, &problem);
@@ -258,19 +331,29 @@ static int run_read(int n, char **operand)
         if (rc) return rc;
         blocks = problem_blocks(problem, &n_blocks);
     }
+    luminaires_tell();
     struct json j;
     if (cli.json) {
         j = cli_json();
         json_integer(&j, "spp", cli_spp(&run));
-        json_array(&j, "readings");
+        json_array(&j, o.grid ? "grids" : o.ugr ? "glare" : "readings");
     }
     const int one = sensor_named(), first = one ? cli.sensor : 0;
     const int end = one ? first + 1 : scene.n_sensors;
     int *unlit = cli_alloc((size_t)scene.n_sensors, sizeof *unlit), n_unlit = 0;
-    for (int s = first; s < end && !rc; s++) {
+    const struct grid_wanted wanted = {o.ends, o.csv, o.svg};
+    if (o.grid && !rc)
+        rc = grids_read(&j, run, first, end, &wanted, APART, &found.apart, unlit,
+                        &n_unlit);
+    if (o.ugr && !rc) {
+        run.sensor = first;
+        rc = glare_read(&j, &run);
+    }
+    for (int s = first; s < end && !rc && !o.grid && !o.ugr; s++) {
         run.sensor = s;
         found.lit = 0;
-        rc = sensor_read(problem, &j, run, blocks, n_blocks, &found);
+        rc = o.shares ? shares_read(&j, &run, &found)
+                      : sensor_read(problem, &j, run, blocks, n_blocks, &found);
         if (!rc && !found.lit) unlit[n_unlit++] = s;
     }
     if (cli.json && !rc) json_end_array(&j);

@@ -30,8 +30,8 @@ const struct arg_option options_search[] = {
      "with two bounds in fits of more than 64 values with control variates)",
      &fit_choice.momentum, 1e-6, 0.999999, NULL},
     {ARG_INT | ARG_REPLAYS, 0, "levels", "N",
-     "adam, and bent rays: from coarse to fine, in N levels", &fit_choice.levels, 1, 16,
-     NULL},
+     "adam, poses, and bent rays: from coarse to fine, in N levels", &fit_choice.levels,
+     1, 16, NULL},
     {ARG_CHOICE | ARG_REPLAYS, 0, "allocation", "HOW",
      "adam: samples by tile: variance (of the gradient), even, or auto (default: "
      "even beside control variates of more than 64 values)",

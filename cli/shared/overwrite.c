@@ -21,7 +21,7 @@
 #define MARK(text) text, sizeof text - 1
 static const struct {
     const char *name;
-    const char *begins[5];
+    const char *begins[6];
     const char *mark;
     size_t mark_bytes, within;
 } kinds[] = {
@@ -35,7 +35,7 @@ static const struct {
     [OUTPUT_SETTINGS] = {"a list of settings of importon's", {"# importon "}, NULL, 0, 0},
     [OUTPUT_TABLE] = {"a table of importon's",
                       {"iteration,loss,se\n", "evaluation,objective\n", "ray,bundle,x,y,",
-                       "file,mean,se,"},
+                       "file,mean,se,", "column,row,x,y,z,value,se\n"},
                       NULL,
                       0,
                       0},

@@ -80,7 +80,8 @@ int picture_sensor(const char *spec)
     return at ? atoi(at + 1) : -1;
 }
 
-/* "=V", "=V,V,V" or either with "+-SE": the reading of a sensor of one pixel. */
+/* "=V", "=V,V,V" or either with "+-SE": the reading of a sensor of one pixel, or of every pixel
+ * of a meter's grid. */
 static int number_target(const char *text, int sensor, struct imp_target *target)
 {
     struct imp_sensor_info info = {.size = sizeof info};
@@ -109,20 +110,23 @@ static int number_target(const char *text, int sensor, struct imp_target *target
             "--target %s: expected =NUMBER, or =R,G,B, and +-ERROR behind it "
             "if that is known",
             text);
-    if (info.width != 1 || info.height != 1)
+    const int one = info.width == 1 && info.height == 1;
+    if (!one && strcmp(info.type, "irradiancemeter") != 0)
         return cli_error(
             EXIT_USAGE,
             "--target %s: sensor %d ('%s') makes %d x %d pixels; a number is "
-            "the target of one",
+            "the target of one, or of each of a meter",
             text, sensor, info.name, info.width, info.height);
-    float *pixels = cli_alloc((size_t)n, sizeof *pixels);
-    float *errors = se > 0 ? cli_alloc((size_t)n, sizeof *errors) : NULL;
-    for (int k = 0; k < n; k++) {
-        pixels[k] = (float)value[k];
+    const size_t numbers = (size_t)info.width * (size_t)info.height * (size_t)n;
+    float *pixels = cli_alloc(numbers, sizeof *pixels);
+    float *errors = se > 0 ? cli_alloc(numbers, sizeof *errors) : NULL;
+    for (size_t k = 0; k < numbers; k++) {
+        pixels[k] = (float)value[k % (size_t)n];
         if (errors) errors[k] = (float)se;
     }
     target->sensor = sensor;
-    target->width = target->height = 1;
+    target->width = info.width;
+    target->height = info.height;
     target->channels = n;
     target->pixels = pixels;
     target->noise_se = errors;

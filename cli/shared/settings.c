@@ -47,16 +47,24 @@ static int set_error(const char *where, const char *text, const char *why)
 
 enum imp_status settings_pose(const char *name)
 {
-    const char *end = strrchr(name, '.');
+    static const char *const tails[] = {"pose",
+                                        "scale",
+                                        "vertex_positions",
+                                        "x_fov",
+                                        "principal_point_offset_x",
+                                        "principal_point_offset_y",
+                                        "position",
+                                        "direction"};
+    const char *dot = strrchr(name, '.');
     size_t index;
-    if (!end || strcmp(end, ".pose") != 0 ||
-        imp_scene_find_param(cli.scene, name, &index) == IMP_OK)
-        return IMP_OK;
-    char *object = cli_strdup(name);
-    object[end - name] = 0;
-    const enum imp_status st = imp_scene_add_pose(cli.scene, object);
-    free(object);
-    return st;
+    for (size_t k = 0; dot && k < sizeof tails / sizeof *tails; k++) {
+        if (strcmp(dot + 1, tails[k]) != 0) continue;
+        if (imp_scene_find_param(cli.scene, name, &index) == IMP_OK) return IMP_OK;
+        const enum imp_status st = imp_scene_add_geometry(cli.scene, name);
+        /* What is wrong with a name that parameters of other kinds may have is said later. */
+        return st == IMP_E_ARG && k > 0 ? IMP_OK : st;
+    }
+    return IMP_OK;
 }
 
 /* One --set: "name=v" or "name=v,v,..". Messages begin with `where` it is written; NULL: on

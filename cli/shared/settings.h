@@ -12,7 +12,8 @@
  * printed. */
 int settings_apply(const char *text);
 
-/* Where the name is OBJECT.pose and no parameter yet, that pose becomes one. */
+/* Where the name is OBJECT.pose or another number of geometry, and no parameter yet, it becomes
+ * one. */
 enum imp_status settings_pose(const char *name);
 /* The text of such a file, read now and kept for settings_apply, which reads no file
  * twice (it may be a pipe); NULL: it cannot be read, which settings_apply will report. */

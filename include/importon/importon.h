@@ -591,11 +591,29 @@ imp_scene_get_param(const imp_scene *scene, size_t index, struct imp_param_info 
  * first. @return IMP_OK; IMP_E_ARG with a message that names the nearest ones. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
+/** Make a number of geometry a parameter, behind all others. Setting it moves the object.
+ *
+ *     NAME.pose              as imp_scene_add_pose
+ *     NAME.scale             of a shape: 1 as the scene file has it, about the middle of its box
+ *     NAME.vertex_positions  of a mesh: [vertices][3], world
+ *     NAME.x_fov             of a perspective camera: horizontal field of view, degrees
+ *     NAME.principal_point_offset_x, NAME.principal_point_offset_y   of a perspective camera:
+ *                            in parts of the film's width and height
+ *     NAME.position          of a point or spot light: [3], world
+ *     NAME.direction         of a directional light: [3], of any length
+ *
+ * Gradients, patterns, and what is there already: as of poses.
+ * @param name  such a name.
+ * @return IMP_OK; IMP_E_ARG if there is no such object or number, the scene is not committed, or
+ *         a problem has been created with it; IMP_E_UNSUPPORTED, with the reason, where it cannot
+ *         be moved; IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_scene_add_geometry(imp_scene *scene,
+                                                              const char *name);
 /** Make the pose of a shape or of a camera a parameter, `OBJECT.pose`, behind all others: six
  * numbers, a translation in scene units and a rotation vector in radians about the middle of the
  * shape's box, or the camera's own place, away from where the scene file has it. Setting it moves
  * the object. Theta, and offsets in it, are longer afterwards; a pose that is there already
- * stays as it is. imp_problem_reverse and imp_problem_functional have its gradient; patterns of
+ * stays as it is. Gradients, derivative pictures and fits know it (docs/poses.md); patterns of
  * imp_problem_activate pass it over unless they end in ".pose".
  * @param object  its name, as of imp_param_info.
  * @return IMP_OK; IMP_E_ARG if there is no such object, the scene is not committed, or a problem
@@ -1178,7 +1196,9 @@ struct imp_fit_options {
     /** Adam: textures and volumes are fitted from coarse to fine. Level k of `levels` (at
      * most 16) has one variable for 2^(levels - k) cells along each axis, between which
      * the cells are linear, and an equal share of the iterations; a checkpoint holds the
-     * last level. 0, 1: cells alone. */
+     * last level. 0, 1: cells alone. With active poses, by Adam or Levenberg-Marquardt:
+     * level k compares pictures through a tent of 2^(levels - k) pixels, with the targets
+     * blurred alike, and the last through the film's own filter. */
     int levels;
     imp_fit_step_fn step; /**< NULL: not called */
     void *step_payload;
@@ -1442,11 +1462,19 @@ struct imp_selftest_row {
     double error;   /**< a count of failures, a relative error, or |z| */
     double limit;   /**< of error */
     double chance;  /**< of a value so far off, if all is right; -1: not statistical */
-    enum imp_verdict ok; /**< open: not promised, and not so */
+    enum imp_verdict
+        ok; /**< open: not promised, and not so; or, where `sees` is above 0.02,
+                              as it should be, with too few draws to tell */
+    /** In a row that draws ("draws", "normalised", "albedo", "light"): the relative error of the
+     * density or light that it would have found with a probability of 0.95, in all directions
+     * or places together; of "draws" the root of the mean square over what is drawn. 0: of
+     * other rows. */
+    double sees;
 };
 struct imp_selftest_options {
     size_t size;
-    int samples;    /**< draws of an object; 0: 200,000 */
+    int samples; /**< draws of an object; 0: 200,000, and up to 16 times as many until its
+                         rows would see an error of 2 % (imp_selftest_row.sees) */
     int directions; /**< of sight, or places of reference, of an object; 0: 12 */
     uint64_t seed;
 };

@@ -800,6 +800,10 @@ struct imp_emitter_ops {
     /* For a delta light: light leaves within a cone about `axis` alone, of this cosine, as
      * its inputs are now. NULL: all around. */
     void (*cone)(const struct imp_emitter *e, imp_v3 *axis, double *cosine);
+    /* Where a light at a point is, or the unit direction in which parallel light travels, world:
+     * reads it, or, with `set`, puts the light there (a direction of any length), turned as it was.
+     * NULL: another light. */
+    void (*aim)(struct imp_emitter *e, double v[3], bool set);
 };
 
 /* ---- Sensor and filter --------------------------------------------------------- */
@@ -869,6 +873,9 @@ struct imp_sensor {
     /* With IMP_SENSOR_GROUP: sensors whose pictures are side by side in its film. */
     int n_child;
     const struct imp_sensor *const *child;
+    /* Of a sensor that is a surface: where on it and by which weight of directions it
+     * measures; NULL: the mean irradiance on its front. */
+    const struct imp_receiver *receiver;
 };
 enum imp_sensor_flags {
     IMP_SENSOR_AREA = 1,     /* its rays start on the shape that it belongs to */
@@ -896,6 +903,10 @@ struct imp_sensor_ops {
                     const double u[4], struct imp_sensor_sample *out);
     /* As imp_shape_ops.move. */
     void (*move)(struct imp_sensor *s, const double to_world[12]);
+    /* Horizontal field of view in degrees, and the principal point's offset in parts of the
+     * film's width and height, of a pinhole whose film is flat: reads them, or, with `set`,
+     * changes the camera to these. False: it has none. NULL: so has the kind. */
+    bool (*view)(struct imp_sensor *s, double number[3], bool set);
 };
 
 /* ---- Versions of this header ----------------------------------------------------- */

@@ -38,6 +38,7 @@ from ._picture import DroppedWalk, Picture, project, read, write
 from ._progress import set_progress
 from ._render import denoise, render, walk
 from ._report import report
+from ._rooms import Grid, Interval, Luminaire, Share, glare, grid, luminaires, shares
 from ._scene import Scene, Sensor, load_file, load_string, set_variant, variant
 from ._transform import ScalarTransform4f, Transform4f
 from ._until import Reached, functional_until, render_until
@@ -49,13 +50,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ArgumentError", "BiasError", "Cancelled", "Check", "CheckRow", "Color3f", "Comparison", "DroppedWalk", "Error",
-    "Estimate", "FileError", "Fit", "FitVariable", "Gradient", "ImportonWarning", "Jacobian", "Loss", "Missing",
+    "Estimate", "FileError", "Fit", "FitVariable", "Gradient", "Grid", "ImportonWarning", "Interval", "Jacobian", "Loss",
+    "Luminaire", "Missing",
     "NumericError", "OutOfMemoryError", "ParameterError", "ParameterInfo", "Part", "PartsInfo", "PathsError",
-    "Picture", "Progress", "Reached", "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "SelfTestRow", "Sensor",
+    "Picture", "Progress", "Reached", "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "SelfTestRow", "Sensor", "Share",
     "Transform4f", "UnsupportedError", "Values", "Walks", "__version__", "ad", "bend", "check", "compare", "cornell_box", "denoise",
-    "elements", "fit", "functional", "functional_until", "guide", "jacobian", "join_parts", "keep", "library_path", "load_dict", "load_file",
-    "load_string", "loss", "merge", "missing", "part", "parts_info", "project", "read", "read_walks", "render", "render_backward",
-    "render_forward", "render_until", "report", "selftest", "set_progress", "set_threads", "set_variant", "team", "threads",
+    "elements", "fit", "functional", "functional_until", "glare", "grid", "guide", "jacobian", "join_parts", "keep", "library_path", "load_dict", "load_file",
+    "load_string", "loss", "luminaires", "merge", "missing", "part", "parts_info", "project", "read", "read_walks", "render", "render_backward",
+    "render_forward", "render_until", "report", "selftest", "set_progress", "set_threads", "set_variant", "shares", "team", "threads",
     "traverse", "variant", "walk", "write",
 ]
 

@@ -6,7 +6,7 @@ from typing import Any, Optional
 
 import numpy as np
 
-from ._library import ArgumentError, lib
+from ._library import ArgumentError, OutOfMemoryError, lib
 
 _CPU = (1, 3, 11)  # DLPack device types whose memory a CPU reads: kDLCPU, CUDA's pinned, ROCm's
 
@@ -16,10 +16,13 @@ def _import(value: Any, name: str) -> Any:
     if isinstance(value, np.ndarray):
         return value
     if hasattr(value, "__dlpack_device__"):
-        device = value.__dlpack_device__()
-        if int(device[0]) not in _CPU:
-            raise ArgumentError("%s is on device %s: copy it to the CPU first"
-                                % (name, getattr(value, "device", tuple(device))))
+        try:
+            device = tuple(value.__dlpack_device__())
+            kind = int(device[0])
+        except Exception as error:  # the code of another package, which may raise anything
+            raise ArgumentError("%s does not say which device it is on: %r" % (name, error)) from error
+        if kind not in _CPU:
+            raise ArgumentError("%s is on device %s: copy it to the CPU first" % (name, getattr(value, "device", device)))
         if getattr(value, "requires_grad", False):  # torch exports no part of a graph
             value = value.detach()
         try:
@@ -30,8 +33,10 @@ def _import(value: Any, name: str) -> Any:
                 raise ArgumentError("%s has dtype %s" % (name, dtype)) from error
     try:
         return np.asarray(value)
-    except (ValueError, TypeError, RuntimeError) as error:
-        raise ArgumentError("%s is no array: %s" % (name, error)) from error
+    except MemoryError as error:
+        raise OutOfMemoryError("%s: %s" % (name, error)) from error
+    except Exception as error:  # __array__ of another package may raise anything
+        raise ArgumentError("%s is no array: %s" % (name, error or repr(error))) from error
 
 
 def _numeric_name(dtype: str) -> bool:
@@ -55,8 +60,11 @@ def numbers(value: Any, name: str, dtype: Any = np.float64, shape: Optional[tupl
         wanted = tuple("n" if w == -1 else w for w in shape)
         raise ArgumentError("%s has shape %s, not (%s%s)" % (
             name, array.shape, ", ".join(map(str, wanted)), "," if len(wanted) == 1 else ""))
-    with np.errstate(over="ignore"):
-        out = np.ascontiguousarray(array, dtype=dtype)
+    try:
+        with np.errstate(over="ignore"):
+            out = np.ascontiguousarray(array, dtype=dtype)
+    except MemoryError as error:
+        raise OutOfMemoryError("%s: %s" % (name, error)) from error
     return out if out.ndim == array.ndim else out.reshape(array.shape)
 
 

@@ -12,7 +12,7 @@ from typing import Any, Optional
 import numpy as np
 
 from ._array import address, numbers
-from ._library import ArgumentError, Handle, context, lib, not_inside, text, warn_said
+from ._library import ArgumentError, FileError, Handle, SceneError, context, lib, not_inside, text, warn_said
 from ._objects import grid_of, is_array, is_mesh, matrix_of, mesh_of, pixels_of
 from ._scene import Scene, _load_options
 from ._tables import TABLES
@@ -21,6 +21,33 @@ from ._transform import Transform4f
 # Keys under which an object takes what would be in a file, by its type.
 _PICTURE = {"bitmap": ("bitmap", "data", "filename"), "envmap": ("bitmap", "data", "filename")}
 _GRID = ("grid", "data", "filename")
+
+
+def _entries(value: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """A copy of a mapping, which may be of another package."""
+    try:
+        return dict(value)
+    except Exception as error:
+        raise ArgumentError("%s: its entries cannot be read: %r" % (name, error)) from error
+
+
+def _spectrum_file(value: Any, name: str) -> Any:
+    """Pairs of wavelength in nm and value of a file."""
+    path = os.fsdecode(text(value, name))
+    if not os.path.isfile(path):  # nor is a device read, which may never end
+        raise ArgumentError("%s: '%s' is no number, list of wavelength:value or file" % (name, path))
+    try:
+        return np.loadtxt(path, ndmin=2, comments="#")
+    except OSError as error:
+        raise FileError("%s: %s" % (path, error.strerror)) from error
+    except ValueError as error:
+        raise SceneError("%s: %s" % (path, error)) from None
+
+
+def _flag(value: Any, name: str) -> bool:
+    if not isinstance(value, (bool, int, np.bool_, np.integer)):
+        raise ArgumentError("%s is a %s, not a boolean" % (name, builtins.type(value).__name__))
+    return bool(value)
 
 
 class _Builder:
@@ -36,7 +63,7 @@ class _Builder:
             lib.imp_scene_bool(self.scene, key, bool(value))
         elif isinstance(value, (int, np.integer)):
             if not -2**63 <= value < 2**63:
-                raise ArgumentError("%s = %d is no 64-bit integer" % (name, value))
+                raise ArgumentError("%s is no 64-bit integer" % name)  # and may be too long to print
             lib.imp_scene_integer(self.scene, key, int(value))
         else:
             lib.imp_scene_float(self.scene, key, float(value))
@@ -55,14 +82,11 @@ class _Builder:
         if isinstance(value, str) and ":" in value:
             value = [pair.split(":") for pair in value.replace(",", " ").split()]
         elif isinstance(value, str) or hasattr(value, "__fspath__"):
-            path = os.fspath(value)
-            if not os.path.exists(path):
-                raise ArgumentError("%s: '%s' is no number, list of wavelength:value or file" % (name, path))
-            value = np.loadtxt(path, ndmin=2, comments="#")
+            value = _spectrum_file(value, name)
         if isinstance(value, list) and value and isinstance(value[0], list):
             try:
                 value = [[float(x) for x in pair] for pair in value]
-            except ValueError as error:
+            except (TypeError, ValueError, OverflowError) as error:
                 raise ArgumentError("%s: %s" % (name, error)) from None
         samples = numbers(value, name)
         if samples.ndim == 0:
@@ -73,8 +97,9 @@ class _Builder:
         lib.imp_scene_spectrum(self.scene, key, len(nm), address(nm), address(values))
 
     def begin(self, type: str, id: Optional[str], name: Optional[str]) -> None:
-        lib.imp_scene_begin(self.scene, None, text(type, "type"), text(id, "id") if id else None,
-                            text(name, "name") if name else None)
+        # Checked at once: a dictionary may contain itself, and the library limits the depth.
+        context().check(lib.imp_scene_begin(self.scene, None, text(type, "type"), text(id, "id") if id else None,
+                                            text(name, "name") if name else None))
 
     def end(self) -> None:
         lib.imp_scene_end(self.scene)
@@ -90,7 +115,7 @@ class _Builder:
             self.mesh(name, d)
         for key in _PICTURE.get(type, ()):
             if is_array(d.get(key)) or hasattr(d.get(key), "srgb_gamma"):
-                p = pixels_of(d.pop(key), "%s: %s" % (name, key), bool(d.get("raw", False)))
+                p = pixels_of(d.pop(key), "%s: %s" % (name, key), _flag(d.get("raw", False), "%s: raw" % name))
                 lib.imp_scene_image(self.scene, p.shape[1], p.shape[0], p.shape[2], address(p))
         make, ending = TABLES.get(type, (None, ""))
         content = make(d, name) if make else None
@@ -108,8 +133,10 @@ class _Builder:
 
     def value(self, name: str, value: Any, top: bool, of: str = "scene") -> None:
         matrix = None
+        if not isinstance(name, str):
+            raise TypeError("%s: a key is a %s, which is no string" % (of, builtins.type(name).__name__))
         if isinstance(value, Mapping):
-            self.object(name, dict(value), top)
+            self.object(name, _entries(value, name), top)
         elif is_mesh(value):
             self.object(name, {"type": "mesh", "mesh": value}, top)
         elif isinstance(value, str) or hasattr(value, "__fspath__"):
@@ -139,6 +166,8 @@ class _Builder:
             raise ArgumentError("'%s' is a dictionary without a 'type'" % name)
         if type == "ref":
             id = d.pop("id", "")
+            if not isinstance(id, str):
+                raise ArgumentError("%s: the id of a 'ref' is a string, not a %s" % (name, builtins.type(id).__name__))
             lib.imp_scene_ref(self.scene, text(self.ids.get(id, id), "id"), None if top else text(name, "name"))
         elif type == "rgb":
             self.three(lib.imp_scene_rgb, name, d.pop("value", None))
@@ -146,7 +175,10 @@ class _Builder:
             self.spectrum(name, d.pop("value") if "value" in d else d.pop("filename", None))
         else:
             # At the top a key is the object's id; below, its slot, unless it has an id too.
-            self.begin(type, d.pop("id", name if top else None), None if top else name)
+            id = d.pop("id", name if top else None)
+            if id is not None and not isinstance(id, str):
+                raise ArgumentError("'%s' (%s): an id is a string, not a %s" % (name, type, builtins.type(id).__name__))
+            self.begin(type, id, None if top else name)
             self.bulk(type, name, d)
             for key, v in d.items():
                 self.value(key, v, False, "'%s' (%s)" % (name, type))
@@ -190,6 +222,8 @@ def load_dict(dictionary: Mapping[str, Any], *, mode: Optional[str] = None, sear
         As `load_file`; the message names object and property.
     ArgumentError
         A value that is none of these.
+    TypeError
+        `dictionary` is no mapping, or a key is no string.
 
     Examples
     --------
@@ -206,10 +240,11 @@ def load_dict(dictionary: Mapping[str, Any], *, mode: Optional[str] = None, sear
     not_inside()
     if not isinstance(dictionary, Mapping):
         raise TypeError("a scene is a dictionary, not a %s" % type(dictionary).__name__)
-    d = dict(dictionary)
+    d = _entries(dictionary, "scene")
     kind = d.pop("type", None)
-    if kind != "scene":
-        raise ArgumentError("the dictionary's type is %r: 'scene' is wanted" % (kind,))
+    if not isinstance(kind, str) or kind != "scene":
+        said = repr(kind) if isinstance(kind, str) else "a " + type(kind).__name__
+        raise ArgumentError("the dictionary's type is %s: 'scene' is wanted" % said)
     ctx = context()
     options, kept = _load_options(mode, search, {}, None, upsampling)
     out = ctypes.c_void_p()
@@ -219,8 +254,6 @@ def load_dict(dictionary: Mapping[str, Any], *, mode: Optional[str] = None, sear
     with tempfile.TemporaryDirectory(prefix="importon-") as folder:
         builder = _Builder(handle.pointer, {k: id for k, id in own.items() if k not in own.values()}, folder)
         for name, value in d.items():
-            if not isinstance(name, str):
-                raise TypeError("the key %r is no string" % (name,))
             builder.value(name, value, True)
         ctx.check(lib.imp_scene_commit(handle.pointer))
     del kept

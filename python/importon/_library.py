@@ -273,11 +273,18 @@ def choice(enum: str, value: Any, name: str) -> int:
 
 def text(value: Any, name: str) -> bytes:
     """A string for C."""
-    value = os.fspath(value) if hasattr(value, "__fspath__") else value
+    if hasattr(value, "__fspath__"):
+        try:
+            value = os.fspath(value)
+        except Exception as error:  # the code of another package, which may raise anything
+            raise ArgumentError("%s is no path: %r" % (name, error)) from error
     if isinstance(value, bytes):
         data = value
     elif isinstance(value, str):
-        data = os.fsencode(value)
+        try:
+            data = os.fsencode(value)
+        except UnicodeEncodeError as error:
+            raise ArgumentError("%s: %s" % (name, error)) from None
     else:
         raise TypeError("%s is a %s, not a string" % (name, type(value).__name__))
     if b"\0" in data:

@@ -163,8 +163,8 @@ class Scene:
 
         It is six numbers away from where the scene file has the object: a translation in scene
         units, and a rotation vector in radians about the middle of the shape's box or the
-        camera's own place. Setting them moves the object; `functional` and `render_backward`
-        have their gradient, where the parameter is named. To be called before anything has
+        camera's own place. Setting them moves the object; gradients, losses, derivative
+        pictures and fits know them, where the parameter is named. To be called before anything has
         been computed from the scene, and before `traverse`.
 
         Parameters
@@ -198,6 +198,43 @@ class Scene:
             self._context.check(lib.imp_scene_add_pose(self.pointer, text(name, "name")))
             self._table = None
         return name + ".pose"
+
+    def add_geometry(self, name: str) -> str:
+        """Make a number of geometry a parameter.
+
+        `NAME.pose` as `add_pose`; `NAME.scale` of a shape; `NAME.vertex_positions` of a mesh;
+        `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y` of a perspective camera;
+        `NAME.position` of a point or spot light; `NAME.direction` of a directional light. Otherwise
+        as `add_pose`.
+
+        Parameters
+        ----------
+        name : str
+            Such a name.
+
+        Returns
+        -------
+        str
+            Of the parameter: the same.
+
+        Raises
+        ------
+        ArgumentError
+            There is no such object or number, or the scene has been used.
+        UnsupportedError
+            It cannot be moved, with the reason.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> name = scene.add_geometry("sensor.x_fov")
+        """
+        not_inside()
+        with self.lock:
+            self._context.check(
+                lib.imp_scene_add_geometry(self.pointer, text(name, "name")))
+            self._table = None
+        return name
 
     @property
     def pointer(self) -> int:

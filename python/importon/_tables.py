@@ -29,6 +29,14 @@ def _lines(table: Any) -> str:
     return "".join(" ".join(map(repr, row)) + "\n" for row in np.asarray(table, float).tolist())
 
 
+def _rank(value: Any) -> int:
+    """Dimensions of an array; -1 where its rows have several lengths, or it is no array."""
+    try:
+        return int(np.ndim(value))
+    except Exception:  # __array__ of another package may raise anything
+        return -1
+
+
 def curves(d: dict[str, Any], name: str) -> Optional[bytes]:
     """`control_points`: [n][4], x, y, z and radius; or a sequence of these, a curve each."""
     value = d.get("control_points")
@@ -36,8 +44,9 @@ def curves(d: dict[str, Any], name: str) -> Optional[bytes]:
         return None
     key = "%s: control_points" % name
     del d["control_points"]
-    one = isinstance(value, np.ndarray) or not isinstance(value, (list, tuple)) or np.ndim(value[0] if value else 0) == 1
-    each = [value] if one and np.ndim(value) == 2 else list(value)
+    rank = _rank(value)
+    several = isinstance(value, (list, tuple)) and rank != 2 or rank == 3
+    each = list(value) if several else [value]
     return "\n".join(_lines(_finite(c, key, (-1, 4))) for c in each).encode()
 
 

@@ -63,14 +63,23 @@ struct imp_image_data {
     bool srgb;                   /* an 8- or 16-bit file, values still encoded */
 };
 
-/* The luminous intensity of a luminaire by direction (LM-63, type C). Vertical angles are
- * from nadir, horizontal ones about it; degrees, ascending. Horizontally there is one
+/* The luminous intensity of a luminaire by direction (LM-63, EULUMDAT). Degrees, ascending.
+ *
+ * Type C: vertical angles are from nadir, horizontal ones about it. Horizontally there is one
  * angle (rotational symmetry), or they go from 0 to 90 (symmetric about both planes), 0
- * to 180 or 90 to 270 (about one), or 0 to 360. */
+ * to 180 or 90 to 270 (about one), or 0 to 360.
+ * Types A and B: vertical angles go from -90 or 0 to 90, horizontal ones from -90 to 90, or
+ * from 0 to 90 (symmetric about their plane 0); beyond them there is no light. */
+enum imp_photometry { IMP_PHOTOMETRY_C, IMP_PHOTOMETRY_B, IMP_PHOTOMETRY_A };
 struct imp_ies_data {
     int n_vertical, n_horizontal;
     const double *vertical, *horizontal;
     const double *candela; /* [n_horizontal][n_vertical] */
+    enum imp_photometry type;
+    double lamp_flux; /* lm, of its lamps as the file has it; 0: not given */
+    double watts;     /* with its gear; 0: not given */
+    double
+        size[3]; /* of the luminous opening, m: along C0, along C90, height; 0: a point */
 };
 
 /* A measured isotropic BRDF by half-angle and difference angle (Rusinkiewicz 1998), in

@@ -3,6 +3,7 @@
  * From the scene's shapes to polygons with a material and a light each. What has no place
  * in finite elements is refused here, by the shape's name. */
 #include "elements.h"
+#include "kind/sensor/receiver.h"
 #include <string.h>
 
 static enum imp_status no_memory(imp_elements *e)
@@ -257,6 +258,7 @@ enum imp_status imp__el_roots(imp_elements *e)
     if (!e->prim_root) IMP_TRY(no_memory(e));
     for (int i = 0; i < scene->n_shapes; i++) {
         const struct imp_shape *s = scene->shapes[i];
+        if (imp__shape_is_absent(s)) continue;
         if (s->geometry != IMP_TRIANGLES)
             IMP_TRY(imp__el_refused_at(
                 e,

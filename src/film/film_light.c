@@ -98,7 +98,8 @@ static enum imp_status walk_add(const struct job *j, struct worker *w, int64_t i
     const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
     struct imp_light_walk walk;
     enum imp_status st = IMP_OK;
-    imp__light_walk_trace(p->tracer, &w->arena, index, &walk);
+    if (imp_unlikely(p->trace != NULL)) p->trace(p->payload, &w->arena, index, &walk);
+    else imp__light_walk_trace(p->tracer, &w->arena, index, &walk);
     if (imp_unlikely(walk.walk.dropped == IMP_DROP_MEMORY || w->arena.failed))
         IMP_TRY(imp__error(j->ctx, IMP_E_NOMEM, "no memory to record a walk"));
     if (imp_unlikely(walk.walk.dropped)) walk_drop(j, w, walk.walk.dropped, index);

@@ -59,6 +59,9 @@ struct imp_light_picture {
     imp__reach_values *values;
     /* In place of a picture: n values of a whole walk, whose mean is one pixel. */
     void (*whole)(const void *payload, const struct imp_light_walk *walk, double *value);
+    /* In place of a light walk: sample `index`, with what it reaches, in the arena. */
+    void (*trace)(const void *payload, struct imp_arena *arena, int64_t index,
+                  struct imp_light_walk *out);
     const void *payload;
     int64_t first, walks; /* of the light walks: these numbers */
     double lo, hi;        /* part of the progress; hi 0: all */

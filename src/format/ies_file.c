@@ -10,6 +10,9 @@
  *   input watts
  *   vertical angles, horizontal angles, candela: all of one horizontal angle together
  *
+ * Types A and B have vertical angles from -90 or 0 to 90, horizontal ones from -90 or 0 to
+ * 90. A number of lamps times lumens below 0 is absolute photometry: no lamp is named.
+ *
  * Intensity is candela x multiplier x ballast factor (x ballast-lamp factor). What tilted
  * lamps lose is read and not applied: the luminaire is taken as it was measured. */
 #include "ies_file.h"
@@ -20,6 +23,7 @@
 
 #define NUMBER_MAX 1e12 /* of any number in a file */
 #define TILTS_MAX  10000
+#define FOOT       0.3048 /* m */
 
 struct reader {
     imp_context *ctx;
@@ -157,11 +161,11 @@ out:
     return st;
 }
 
-static enum imp_status angles(struct reader *r, const char *what, double hi, int n,
-                              double *out)
+static enum imp_status angles(struct reader *r, const char *what, double lo, double hi,
+                              int n, double *out)
 {
     for (int k = 0; k < n; k++) {
-        const enum imp_status st = number(r, what, 0, hi, &out[k]);
+        const enum imp_status st = number(r, what, lo, hi, &out[k]);
         if (st != IMP_OK) return st;
         if (k > 0 && !(out[k] > out[k - 1]))
             return fail(r, IMP_E_SCENE, "%s %g does not come after %g", what, out[k],
@@ -173,25 +177,27 @@ static enum imp_status angles(struct reader *r, const char *what, double hi, int
 /* ---- The file ------------------------------------------------------------------ */
 
 /* The spans that LM-63 has, each with its symmetry. */
-static bool span_is_known(int n, const double *h)
+static bool span_is_known(enum imp_photometry type, int n, const double *h)
 {
     const double last = h[n - 1];
     if (n == 1) return h[0] == 0;
+    if (type != IMP_PHOTOMETRY_C) return (h[0] == 0 || h[0] == -90) && last == 90;
     return (h[0] == 0 && (last == 90 || last == 180 || last == 360)) ||
            (h[0] == 90 && last == 270);
 }
 
-static bool ascends(int n, const double *x, double hi)
+static bool ascends(int n, const double *x, double lo, double hi)
 {
     for (int k = 0; k < n; k++)
-        if (!(x[k] >= 0 && x[k] <= hi) || (k > 0 && !(x[k] > x[k - 1]))) return false;
+        if (!(x[k] >= lo && x[k] <= hi) || (k > 0 && !(x[k] > x[k - 1]))) return false;
     return true;
 }
 bool imp__ies_is_valid(const struct imp_ies_data *d)
 {
-    return ascends(d->n_vertical, d->vertical, 180) &&
-           ascends(d->n_horizontal, d->horizontal, 360) &&
-           span_is_known(d->n_horizontal, d->horizontal);
+    const bool c = d->type == IMP_PHOTOMETRY_C;
+    return ascends(d->n_vertical, d->vertical, c ? 0 : -90, c ? 180 : 90) &&
+           ascends(d->n_horizontal, d->horizontal, c ? 0 : -90, c ? 360 : 90) &&
+           span_is_known(d->type, d->n_horizontal, d->horizontal);
 }
 
 static enum imp_status parse(struct reader *r, struct imp_arena *keep,
@@ -199,30 +205,36 @@ static enum imp_status parse(struct reader *r, struct imp_arena *keep,
 {
     enum imp_status st = IMP_OK;
     bool has_factor, tilt;
-    double multiplier = 0, ballast = 0, lamp = 0;
-    int type = 0, units;
+    double multiplier = 0, ballast = 0, lamp = 0, lamps = 0, lumens = 0, size[3];
+    int type = 0, units = 1;
     IMP_TRY(labels(r, &has_factor, &tilt));
     r->line++; /* the one that begins after TILT= */
     if (tilt) IMP_TRY(tilts(r));
-    IMP_TRY(passed_over(r, "the number of lamps"));
-    IMP_TRY(passed_over(r, "lumens per lamp"));
+    IMP_TRY(number(r, "the number of lamps", -NUMBER_MAX, NUMBER_MAX, &lamps));
+    IMP_TRY(number(r, "lumens per lamp", -NUMBER_MAX, NUMBER_MAX, &lumens));
     IMP_TRY(number(r, "the candela multiplier", 0, NUMBER_MAX, &multiplier));
     IMP_TRY(
         whole(r, "the number of vertical angles", 2, IMP_IES_ANGLES_MAX, &d->n_vertical));
     IMP_TRY(whole(r, "the number of horizontal angles", 1, IMP_IES_ANGLES_MAX,
                   &d->n_horizontal));
     IMP_TRY(whole(r, "the photometric type", 1, 3, &type));
-    if (type != 1)
-        IMP_TRY(fail(r, IMP_E_UNSUPPORTED,
-                     "photometry of type %c is not read: convert the file to type C",
-                     type == 2 ? 'B' : 'A'));
+    d->type = (enum imp_photometry)(type - 1);
     IMP_TRY(whole(r, "the units type", 1, 2, &units));
-    IMP_TRY(passed_over(r, "the width"));
-    IMP_TRY(passed_over(r, "the length"));
-    IMP_TRY(passed_over(r, "the height"));
+    static const char *const sides[] = {"the width", "the length", "the height"};
+    for (int k = 0; k < 3; k++)
+        IMP_TRY(number(r, sides[k], -NUMBER_MAX, NUMBER_MAX, &size[k]));
     IMP_TRY(number(r, "the ballast factor", 0, NUMBER_MAX, &ballast));
     IMP_TRY(number(r, "the ballast-lamp photometric factor", 0, NUMBER_MAX, &lamp));
-    IMP_TRY(passed_over(r, "input watts"));
+    IMP_TRY(number(r, "input watts", -NUMBER_MAX, NUMBER_MAX, &d->watts));
+    d->watts = fmax(d->watts, 0);
+    d->lamp_flux = fmax(lamps * lumens, 0) * ballast;
+    /* Negative sizes are diameters of round openings, which become squares of their area. The
+     * length lies along C0. */
+    const double metre = units == 1 ? FOOT : 1;
+    const double round = size[0] < 0 && size[1] < 0 ? sqrt(atan(1)) : 1;
+    d->size[0] = fabs(size[1]) * metre * round;
+    d->size[1] = fabs(size[0]) * metre * round;
+    d->size[2] = fabs(size[2]) * metre;
     const double factor = multiplier * ballast * (has_factor ? lamp : 1);
 
     /* A number takes a digit and a gap: no memory for what cannot be in the file. */
@@ -235,9 +247,17 @@ static enum imp_status parse(struct reader *r, struct imp_arena *keep,
     double *cd = imp__arena_take(keep, n_v * n_h, sizeof *cd);
     if (!v || !h || !cd)
         IMP_TRY(imp__error(r->ctx, IMP_E_NOMEM, "%s: out of memory", r->name));
-    IMP_TRY(angles(r, "a vertical angle", 180, d->n_vertical, v));
-    IMP_TRY(angles(r, "a horizontal angle", 360, d->n_horizontal, h));
-    if (!span_is_known(d->n_horizontal, h))
+    const bool c = d->type == IMP_PHOTOMETRY_C;
+    IMP_TRY(angles(r, "a vertical angle", c ? 0 : -90, c ? 180 : 90, d->n_vertical, v));
+    IMP_TRY(
+        angles(r, "a horizontal angle", c ? 0 : -90, c ? 360 : 90, d->n_horizontal, h));
+    if (!c && !span_is_known(d->type, d->n_horizontal, h))
+        IMP_TRY(
+            fail(r, IMP_E_SCENE,
+                 "horizontal angles go from %g to %g: with type %c they may be 0, or go "
+                 "from -90 or 0 to 90",
+                 h[0], h[d->n_horizontal - 1], type == 2 ? 'B' : 'A'));
+    if (!span_is_known(d->type, d->n_horizontal, h))
         IMP_TRY(fail(r, IMP_E_SCENE,
                      "horizontal angles go from %g to %g: they may be 0, or go from 0 to "
                      "90, 180 or 360, or from 90 to 270",

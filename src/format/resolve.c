@@ -10,6 +10,7 @@
 #include "curve_file.h"
 #include "ies_file.h"
 #include "image.h"
+#include "ldt_file.h"
 #include "load.h"
 #include "measured_file.h"
 #include "merl_file.h"
@@ -143,7 +144,11 @@ static enum imp_status ies_attach(struct imp_scene *scene, struct imp_node *node
     if (!data) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "scene: out of memory"));
     IMP_TRY(path_of(scene, node, &path));
     st = imp__file_read(ctx, path, IMP_IES_BYTES_MAX, &text);
-    if (st == IMP_OK) st = imp__ies_parse(ctx, &scene->arena, path, &text, data);
+    const bool eulumdat =
+        strlen(path) > 4 && strcasecmp(path + strlen(path) - 4, ".ldt") == 0;
+    if (st == IMP_OK)
+        st = eulumdat ? imp__ldt_parse(ctx, &scene->arena, path, &text, data)
+                      : imp__ies_parse(ctx, &scene->arena, path, &text, data);
     if (st != IMP_OK) IMP_TRY(placed(scene, node, st));
     node->ies = data;
 out:

@@ -139,10 +139,12 @@ static enum imp_status grid_put(struct putting *p, const struct imp_node *node)
 
 static void ies_put(struct putting *p, const struct imp_ies_data *d)
 {
-    const int32_t size[2] = {d->n_vertical, d->n_horizontal};
+    const int32_t size[3] = {d->n_vertical, d->n_horizontal, d->type};
+    const double more[5] = {d->lamp_flux, d->watts, d->size[0], d->size[1], d->size[2]};
     const size_t v = (size_t)d->n_vertical, h = (size_t)d->n_horizontal;
     put_mark(p, MARK_IES);
     put(p, size, sizeof size);
+    put(p, more, sizeof more);
     put(p, d->vertical, v * sizeof *d->vertical);
     put(p, d->horizontal, h * sizeof *d->horizontal);
     put(p, d->candela, v * h * sizeof *d->candela);

@@ -22,6 +22,7 @@ struct imp__drawn {
 };
 struct imp__draws {
     double chance; /* p of the chi-square; 1: too few cells for a test */
+    double chi2;   /* with cells - 1 degrees of freedom; 0: too few cells */
     int cells;
     double total;  /* of the density and the lobes */
     double none;   /* fraction of draws that gave none */

@@ -66,6 +66,19 @@ double imp__sphere_cell_integral(const struct imp__sphere_cell *c, imp__sphere_f
                     depth);
 }
 
+double imp__sphere_cell_integral_cut(const struct imp__sphere_cell *c, imp__sphere_fn *f,
+                                     void *payload, double tolerance, int depth, int cuts)
+{
+    double sum = 0;
+    if (cuts == 0) return imp__sphere_cell_integral(c, f, payload, tolerance, depth);
+    for (int k = 0; k < 4; k++) {
+        const struct imp__sphere_cell q = quarter(c, k);
+        sum += imp__sphere_cell_integral_cut(&q, f, payload, 0.5 * tolerance, depth,
+                                             cuts - 1);
+    }
+    return sum;
+}
+
 double imp__sphere_integral(imp__sphere_fn *f, void *payload, double lo, double hi,
                             double tolerance, int depth)
 {

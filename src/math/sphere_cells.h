@@ -23,6 +23,11 @@ enum { IMP_SPHERE_SMOOTH = 12, IMP_SPHERE_STEPS = 5 };
 /* Until halving changes less than `tolerance` (absolute, shared out by area). */
 double imp__sphere_cell_integral(const struct imp__sphere_cell *c, imp__sphere_fn *f,
                                  void *payload, double tolerance, int depth);
+/* The same after the cell has been cut `cuts` times, whatever that changes: for what may hide
+ * between the nodes of a wide cell. */
+double imp__sphere_cell_integral_cut(const struct imp__sphere_cell *c, imp__sphere_fn *f,
+                                     void *payload, double tolerance, int depth,
+                                     int cuts);
 /* Over the whole sphere (lo = -1, hi = 1) or a zone of it; first cut into cells about
  * 1/16 wide. */
 double imp__sphere_integral(imp__sphere_fn *f, void *payload, double lo, double hi,

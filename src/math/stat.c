@@ -64,6 +64,34 @@ double imp__chi2_tail(double x, double k)
     return x <= 0 ? 1 : imp__gamma_q(k / 2, x / 2);
 }
 
+double imp__chi2_tail_off(double x, double k, double lambda)
+{
+    const double mean = lambda / 2, reach = 12 * sqrt(mean) + 40;
+    double sum = 0;
+    for (double j = fmax(0, floor(mean - reach)); j < mean + reach; j++) {
+        const double weight =
+            mean > 0 ? exp(j * log(mean) - mean - lgamma(j + 1)) : j == 0;
+        sum += weight * imp__chi2_tail(x, k + 2 * j);
+    }
+    return sum;
+}
+
+double imp__chi2_seen(double level, double k, double power)
+{
+    double below = 0, above = k + 20 * sqrt(2 * k) + 200; /* the limit of the test */
+    for (int i = 0; i < 60; i++) {
+        const double x = (below + above) / 2;
+        *(imp__chi2_tail(x, k) > level ? &below : &above) = x;
+    }
+    const double limit = above;
+    below = 0, above = limit + 200;
+    for (int i = 0; i < 40; i++) {
+        const double x = (below + above) / 2;
+        *(imp__chi2_tail_off(limit, k, x) < power ? &below : &above) = x;
+    }
+    return above;
+}
+
 double imp__sidak(double alpha, double n) { return -expm1(log1p(-alpha) / n); }
 
 double imp__normal_of_student(double t, double k)

@@ -15,6 +15,11 @@ double imp__normal_of_student(double t, double k);
 double imp__gamma_q(double a, double x);
 /* P(X >= x) for chi-square with k degrees of freedom. */
 double imp__chi2_tail(double x, double k);
+/* The same with the noncentrality lambda: a Poisson mixture of chi-squares with k + 2 j degrees. */
+double imp__chi2_tail_off(double x, double k, double lambda);
+/* The noncentrality that a chi-square test of this level finds with this probability; n draws
+ * whose density is off by the relative error d have n times the mean of d^2. */
+double imp__chi2_seen(double level, double k, double power);
 /* Level for each of n tests, so that all together err with probability alpha (Sidak
  * 1967). */
 double imp__sidak(double alpha, double n);

@@ -5,29 +5,13 @@
 #include "base/context.h"
 #include "math/offset.h"
 
+#define TOUCH 1e-5 /* of a sphere's radius: nearer surfaces touch it */
+
 void imp__edges_free(struct imp__edges *edges)
 {
     imp__release(edges->ctx, edges->edge);
     imp__release(edges->ctx, edges->face);
-    imp__release(edges->ctx, edges->until);
     *edges = (struct imp__edges){0};
-}
-
-const struct imp__edge *imp__edges_draw(const struct imp__edges *edges, double u,
-                                        imp_v3 *p)
-{
-    const double x = u * edges->until[edges->n - 1];
-    size_t lo = 0, hi = edges->n - 1;
-    while (lo < hi) {
-        const size_t half = lo + (hi - lo) / 2;
-        if (edges->until[half] > x) hi = half;
-        else lo = half + 1;
-    }
-    const struct imp__edge *e = &edges->edge[lo];
-    const double before = lo > 0 ? edges->until[lo - 1] : 0;
-    const double t = imp_clamp((x - before) / (edges->until[lo] - before), 0.0, 1.0);
-    *p = e->a + (e->b - e->a) * t;
-    return e;
 }
 
 struct imp__glued imp__edge_glued(const struct imp__edges *edges,
@@ -47,6 +31,12 @@ int imp__edge_side(const struct imp__edges *edges, const struct imp__edge *e, im
         behind |= side <= 0;
     }
     return before && behind ? 0 : before ? -1 : 1;
+}
+
+double imp__edge_turn(const struct imp__edges *edges, const struct imp__edge *e)
+{
+    const struct imp__edge_face *f = &edges->face[e->first];
+    return e->n_faces == 2 ? imp_min(0.5 * imp__length(f[0].in + f[1].in), 1.0) : 1;
 }
 
 static bool vertices_move(const struct imp__moves *moves, int shape)
@@ -90,6 +80,65 @@ const struct imp__edge *imp__edges_torn(const struct imp__edges *edges,
     return NULL;
 }
 
+/* The least and the largest distance of a triangle from a point. */
+static void triangle_distances(const struct imp_triangles *t, size_t prim, imp_v3 c,
+                               double *least, double *most)
+{
+    imp_v3 p[3];
+    *most = 0;
+    *least = INFINITY;
+    for (int k = 0; k < 3; k++) {
+        const float *at = t->positions + 3 * (size_t)t->indices[3 * prim + (size_t)k];
+        p[k] = imp__v3(at[0], at[1], at[2]) - c;
+        *most = imp_max(*most, imp__length(p[k]));
+    }
+    const imp_v3 cross = imp__cross(p[1] - p[0], p[2] - p[0]), n = imp__normalize(cross);
+    bool inside = true;
+    for (int k = 0; k < 3; k++) {
+        const imp_v3 e = p[(k + 1) % 3] - p[k];
+        const double s = imp_clamp(-imp__dot(p[k], e) / imp__dot(e, e), 0.0, 1.0);
+        *least = imp_min(*least, imp__length(p[k] + e * s));
+        inside &= imp__dot(imp__cross(e, -p[k]), n) >= 0;
+    }
+    if (inside) *least = imp_min(*least, fabs(imp__dot(p[0], n)));
+}
+
+/* Does the surface of a sphere meet this shape? Where they touch, it does not. */
+static bool meets_sphere(const struct imp_scene *scene, int shape,
+                         const struct imp_round *round)
+{
+    const double inside = round->radius * (1 - TOUCH),
+                 outside = round->radius * (1 + TOUCH);
+    const struct imp_triangles *t = &scene->shapes[shape]->triangles;
+    struct imp_round other;
+    if (imp__moves_sphere(scene, shape, &other)) {
+        const double d = imp__length(other.centre - round->centre);
+        return d < inside + other.radius &&
+               d > fabs(round->radius - other.radius) + TOUCH * round->radius;
+    }
+    if (scene->shapes[shape]->geometry != IMP_TRIANGLES) return false;
+    for (size_t k = 0; k < t->n_triangles; k++) {
+        double least, most;
+        triangle_distances(t, k, round->centre, &least, &most);
+        if (least < inside && most > outside) return true;
+    }
+    return false;
+}
+
+static int spheres_pierced(const struct imp_scene *scene, int *other)
+{
+    for (int k = 0; k < scene->n_shapes; k++) {
+        struct imp_round round;
+        if (!imp__moves_sphere(scene, k, &round)) continue;
+        for (int j = 0; j < scene->n_shapes; j++)
+            if (j != k && meets_sphere(scene, j, &round)) {
+                *other = j;
+                return k;
+            }
+    }
+    return -1;
+}
+
 /* Hits nearer to the ends of an edge than this part of its length are its own faces, or others
  * that begin there. */
 #define END 1e-5
@@ -113,5 +162,5 @@ int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *s
             from = hit.t + END;
         }
     }
-    return -1;
+    return spheres_pierced(scene, other);
 }

@@ -24,19 +24,15 @@ struct imp__edge {
 struct imp__edges {
     imp_context *ctx;
     size_t n, n_faces;
-    struct imp__edge *edge;      /* [n] */
+    struct imp__edge *edge; /* [n], along a curve through space: neighbours are near */
     struct imp__edge_face *face; /* [n_faces] */
-    double *until;               /* [n] length of the edges up to and with this one */
 };
 
-/* All edges of the scene's shapes. IMP_E_UNSUPPORTED, with its name: a shape that is not made of
- * triangles, or has normals that turn over a facet; instances. */
+/* All edges of the scene's shapes; spheres have none. IMP_E_UNSUPPORTED, with its name: another shape
+ * that is not made of triangles, or has normals that turn over a facet; instances. */
 enum imp_status imp__edges_build(const struct imp_scene *scene, struct imp__edges *out);
 void imp__edges_free(struct imp__edges *edges);
 
-/* A point by length: density 1/edges->until[n - 1]. u in [0, 1). */
-const struct imp__edge *imp__edges_draw(const struct imp__edges *edges, double u,
-                                        imp_v3 *p);
 /* The point of an edge as one that its first face carries along. */
 struct imp__glued imp__edge_glued(const struct imp__edges *edges,
                                   const struct imp_scene *scene,
@@ -45,11 +41,14 @@ struct imp__glued imp__edge_glued(const struct imp__edges *edges,
  * edge and line, with this normal? 1: on the side that m points away from, -1: on the other;
  * 0: on both. */
 int imp__edge_side(const struct imp__edges *edges, const struct imp__edge *e, imp_v3 m);
+/* By how much its two faces turn, 0 to 1: sin of half the angle between their normals. 1: a border,
+ * or more faces. */
+double imp__edge_turn(const struct imp__edges *edges, const struct imp__edge *e);
 /* An edge whose faces move apart: they belong to shapes with different velocities. NULL: none. */
 const struct imp__edge *imp__edges_torn(const struct imp__edges *edges,
                                         const struct imp__moves *moves);
-/* A shape through which an edge of another passes: where they meet is an edge that is in no list.
- * -1: none; *other: the shape of the edge. */
+/* A shape through which an edge of another passes, or a sphere whose surface another shape passes:
+ * where they meet is an edge that is in no list. -1: none; *other: the other shape. */
 int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
                        int *other);
 

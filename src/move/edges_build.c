@@ -62,11 +62,13 @@ static enum imp_status sides_make(struct building *x)
     size_t n = 0;
     for (int k = 0; k < x->scene->n_shapes; k++) {
         const struct imp_shape *s = x->scene->shapes[k];
+        struct imp_round round;
+        if (imp__moves_sphere(x->scene, k, &round)) continue;
         if (s->geometry != IMP_TRIANGLES || s->smooth)
             return imp__error(
                 x->ctx, IMP_E_UNSUPPORTED,
-                "derivatives by what moves are of flat triangles, and shape "
-                "'%s' (%s) %s",
+                "derivatives by what moves are of flat triangles and spheres, and "
+                "shape '%s' (%s) %s",
                 s->name, s->ops->name,
                 s->smooth ? "has normals that turn over them (face_normals "
                             "makes it flat)"
@@ -79,6 +81,7 @@ static enum imp_status sides_make(struct building *x)
         return imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
     for (int k = 0; k < x->scene->n_shapes; k++) {
         const struct imp_triangles *t = &x->scene->shapes[k]->triangles;
+        if (x->scene->shapes[k]->geometry != IMP_TRIANGLES) continue;
         for (size_t j = 0; j < t->n_triangles; j++) {
             const uint32_t *i = t->indices + 3 * j;
             const imp_v3 p[3] = {vertex(t, i[0]), vertex(t, i[1]), vertex(t, i[2])};
@@ -200,6 +203,42 @@ static enum imp_status line_cut(struct building *x, const struct side *first, si
     return IMP_OK;
 }
 
+/* ---- Order of the list --------------------------------------------------------------- */
+
+/* An edge and where the middle of it is on Morton's curve through the scene's box. */
+struct placed {
+    uint64_t code;
+    struct imp__edge edge;
+};
+
+static int by_code(const void *a, const void *b)
+{
+    const struct placed *x = a, *y = b;
+    if (x->code != y->code) return x->code < y->code ? -1 : 1;
+    return x->edge.first < y->edge.first ? -1 : x->edge.first > y->edge.first;
+}
+
+static enum imp_status edges_order(struct building *x)
+{
+    struct imp__edges *out = x->out;
+    struct placed *placed = imp__alloc(x->ctx, out->n + 1, sizeof *placed);
+    if (!placed) return imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
+    for (size_t k = 0; k < out->n; k++) {
+        const imp_v3 r = (out->edge[k].a + out->edge[k].b) * 0.5 - x->middle;
+        placed[k].edge = out->edge[k];
+        for (int bit = 19; bit >= 0; bit--)
+            for (int i = 0; i < 3; i++) {
+                const double at = imp_clamp(r[i] / x->size + 0.5, 0.0, 1.0);
+                const uint32_t cell = (uint32_t)(at * 1048575);
+                placed[k].code = placed[k].code << 1 | (cell >> bit & 1);
+            }
+    }
+    qsort(placed, out->n, sizeof *placed, by_code);
+    for (size_t k = 0; k < out->n; k++) out->edge[k] = placed[k].edge;
+    imp__release(x->ctx, placed);
+    return IMP_OK;
+}
+
 enum imp_status imp__edges_build(const struct imp_scene *scene, struct imp__edges *out)
 {
     enum imp_status st = IMP_OK;
@@ -219,11 +258,7 @@ enum imp_status imp__edges_build(const struct imp_scene *scene, struct imp__edge
         for (n = 1; k + n < x.n && x.side[k + n].line == x.side[k].line;) n++;
         IMP_TRY(line_cut(&x, &x.side[k], n));
     }
-    out->until = imp__alloc(x.ctx, out->n + 1, sizeof *out->until);
-    if (!out->until) IMP_TRY(imp__error(x.ctx, IMP_E_NOMEM, "no memory for edges"));
-    double sum = 0;
-    for (size_t k = 0; k < out->n; k++)
-        out->until[k] = sum += imp__length(out->edge[k].b - out->edge[k].a);
+    IMP_TRY(edges_order(&x));
 out:
     imp__release(x.ctx, x.side);
     imp__release(x.ctx, x.cut);

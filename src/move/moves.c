@@ -3,7 +3,8 @@
  * Movers, the velocities that they give, and the transposes (moves.h). */
 #include "moves.h"
 #include "base/context.h"
-#include "scene/pose.h"
+
+extern const struct imp_shape_ops imp__sphere;
 
 struct imp__moves imp__moves_begin(const struct imp_scene *scene,
                                    const struct imp_sensor *sensor)
@@ -17,34 +18,88 @@ void imp__moves_free(struct imp__moves *moves)
     *moves = (struct imp__moves){0};
 }
 
+/* Axis and slopes of a camera from its rays: it is a pinhole with a flat film. */
+static enum imp_status camera_view(const struct imp__moves *moves, struct imp__mover *m)
+{
+    struct imp_sensor *s = (struct imp_sensor *)(uintptr_t)moves->sensor;
+    const double lens[2] = {0.5, 0.5}, w = s->film.width, h = s->film.height;
+    double number[3];
+    struct imp_sensor_ray at, next;
+    if (!s->ops->view || !s->ops->view(s, number, false))
+        return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
+                          "sensor '%s' has no field of view that moves, or a lens that "
+                          "distorts the picture",
+                          s->name);
+    const double x = (0.5 - number[1]) * w, y = (0.5 - number[2]) * h;
+    const bool down = m->kind == IMP_MOVE_OFFSET_Y;
+    s->ops->ray(s, x, y, lens, &at);
+    s->ops->ray(s, down ? x : x + w, down ? y + h : y, lens, &next);
+    m->axis = at.d;
+    m->across = next.d * (1 / imp__dot(next.d, at.d)) - at.d;
+    const double t = tan(number[0] * (IMP_PI / 360));
+    m->rate = m->kind == IMP_MOVE_FOV ? (1 + t * t) / (2 * t) * (IMP_PI / 180) : 1;
+    return IMP_OK;
+}
+
+static enum imp_status camera_mover(const struct imp__moves *moves, struct imp__mover *m)
+{
+    if ((m->kind != IMP_MOVE_POSE && m->kind < IMP_MOVE_FOV) ||
+        !imp__pinhole(moves->sensor, &m->centre))
+        return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
+                          "sensor '%s': its rays meet in no point, and it has no "
+                          "derivative by its pose",
+                          moves->sensor->name);
+    m->count = m->kind == IMP_MOVE_POSE ? 6 : 1;
+    return m->kind == IMP_MOVE_POSE ? IMP_OK : camera_view(moves, m);
+}
+
+static enum imp_status light_mover(const struct imp__moves *moves, struct imp__mover *m)
+{
+    struct imp_emitter *e = moves->scene->emitters[IMP_MOVE_EMITTER(m->shape)];
+    double v[3];
+    if (!e->ops->aim)
+        return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
+                          "light '%s' (%s) has no derivative by its place", e->name,
+                          e->ops->name);
+    e->ops->aim(e, v, false);
+    m->count = 3;
+    m->centre = m->axis = imp__v3(v[0], v[1], v[2]);
+    return IMP_OK;
+}
+
+static enum imp_status shape_mover(const struct imp__moves *moves, struct imp__mover *m)
+{
+    imp_context *ctx = moves->scene->ctx;
+    const struct imp_shape *s = moves->scene->shapes[m->shape];
+    struct imp_round round;
+    if (s->geometry != IMP_TRIANGLES &&
+        !imp__moves_sphere(moves->scene, m->shape, &round))
+        return imp__error(
+            ctx, IMP_E_UNSUPPORTED,
+            "shape '%s' (%s) is neither made of triangles nor a sphere, and "
+            "has no derivative by its place",
+            s->name, s->ops->name);
+    if (m->kind == IMP_MOVE_VERTICES &&
+        (s->geometry != IMP_TRIANGLES || s->ops->surface != imp__mesh_surface))
+        return imp__error(ctx, IMP_E_UNSUPPORTED,
+                          "shape '%s' (%s) is no mesh, and has no vertices that move",
+                          s->name, s->ops->name);
+    m->centre = (s->lo + s->hi) * 0.5;
+    m->count = m->kind == IMP_MOVE_POSE    ? 6
+               : m->kind == IMP_MOVE_SCALE ? 1
+                                           : 3 * s->triangles.n_vertices;
+    return IMP_OK;
+}
+
 enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kind,
                                int shape)
 {
     imp_context *ctx = moves->scene->ctx;
-    struct imp__mover m = {.kind = kind, .shape = shape, .first = moves->n};
-    if (shape == IMP_MOVE_CAMERA) {
-        if (kind != IMP_MOVE_POSE || !imp__pinhole(moves->sensor, &m.centre))
-            return imp__error(ctx, IMP_E_UNSUPPORTED,
-                              "sensor '%s': its rays meet in no point, and it has no "
-                              "derivative by its pose",
-                              moves->sensor->name);
-        m.count = 6;
-    } else {
-        const struct imp_shape *s = moves->scene->shapes[shape];
-        if (s->geometry != IMP_TRIANGLES)
-            return imp__error(ctx, IMP_E_UNSUPPORTED,
-                              "shape '%s' (%s) is not made of triangles, and has no "
-                              "derivative by its place",
-                              s->name, s->ops->name);
-        if (kind == IMP_MOVE_VERTICES && s->ops->surface != imp__mesh_surface)
-            return imp__error(ctx, IMP_E_UNSUPPORTED,
-                              "shape '%s' (%s) is no mesh, and has no vertices that move",
-                              s->name, s->ops->name);
-        m.centre = (s->lo + s->hi) * 0.5;
-        m.count = kind == IMP_MOVE_POSE    ? 6
-                  : kind == IMP_MOVE_SCALE ? 1
-                                           : 3 * s->triangles.n_vertices;
-    }
+    struct imp__mover m = {.kind = kind, .shape = shape, .first = moves->n, .rate = 1};
+    const enum imp_status st = shape >= 0                 ? shape_mover(moves, &m)
+                               : shape == IMP_MOVE_CAMERA ? camera_mover(moves, &m)
+                                                          : light_mover(moves, &m);
+    if (st != IMP_OK) return st;
     struct imp__mover *more = imp__grow(ctx, moves->mover, &moves->cap_movers,
                                         (size_t)moves->n_movers + 1, sizeof *more);
     if (!more) return imp__error(ctx, IMP_E_NOMEM, "no memory for what moves");
@@ -52,6 +107,52 @@ enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kin
     moves->mover[moves->n_movers++] = m;
     moves->n += m.count;
     return IMP_OK;
+}
+
+/* ---- Parameters -------------------------------------------------------------------- */
+
+enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_pose *pose)
+{
+    static const enum imp__move_kind kind[IMP_POSE_KINDS] = {
+        [IMP_POSE_RIGID] = IMP_MOVE_POSE,        [IMP_POSE_SCALE] = IMP_MOVE_SCALE,
+        [IMP_POSE_VERTICES] = IMP_MOVE_VERTICES, [IMP_POSE_FOV] = IMP_MOVE_FOV,
+        [IMP_POSE_OFFSET_X] = IMP_MOVE_OFFSET_X, [IMP_POSE_OFFSET_Y] = IMP_MOVE_OFFSET_Y,
+        [IMP_POSE_POSITION] = IMP_MOVE_LIGHT,    [IMP_POSE_DIRECTION] = IMP_MOVE_LIGHT};
+    int shape = pose->sensor ? IMP_MOVE_CAMERA : pose->shape;
+    for (int k = 0; pose->emitter && k < moves->scene->n_emitters; k++)
+        if (moves->scene->emitters[k] == pose->emitter) shape = IMP_MOVE_EMITTER(k);
+    const enum imp_status st = imp__moves_add(moves, kind[pose->kind], shape);
+    if (st != IMP_OK) return st;
+    struct imp__mover *m = &moves->mover[moves->n_movers - 1];
+    const struct imp_pose *rigid = imp__pose_beside(pose, IMP_POSE_RIGID);
+    if (pose->shape >= 0 || pose->kind == IMP_POSE_RIGID) {
+        m->centre = pose->object->centre;
+        for (int i = 0; rigid && i < 3; i++) m->centre[i] += rigid->number[i];
+    }
+    if (pose->kind == IMP_POSE_SCALE) m->rate = 1 / pose->number[0];
+    if (pose->kind == IMP_POSE_DIRECTION)
+        m->rate =
+            1 / imp__length(imp__v3(pose->number[0], pose->number[1], pose->number[2]));
+    return IMP_OK;
+}
+
+void imp__pose_numbers_bar(const struct imp_pose *pose, double *bar)
+{
+    if (pose->kind != IMP_POSE_RIGID) return;
+    const imp_v3 turn = imp__v3(bar[3], bar[4], bar[5]);
+    for (int i = 3; i < 6; i++) bar[i] = 0;
+    struct imp_round round;
+    if (pose->shape >= 0 && imp__moves_sphere(pose->scene, pose->shape, &round))
+        return; /* turned about its centre it is where it was */
+    imp__rotation_bar(pose->number + 3, turn, bar + 3);
+}
+
+bool imp__moves_sphere(const struct imp_scene *scene, int shape, struct imp_round *out)
+{
+    const struct imp_shape *s = scene->shapes[shape];
+    if (s->ops != &imp__sphere) return false;
+    s->ops->round(s, out);
+    return true;
 }
 
 bool imp__moves_shape(const struct imp__moves *moves, int shape,
@@ -87,16 +188,36 @@ static struct imp__glued glued(const struct imp_scene *scene, int shape, int pri
                                double b1, double b2, imp_v3 side)
 {
     const struct corners c = corners(scene, shape, prim);
-    struct imp__glued x = {shape, prim, {1 - b1 - b2, b1, b2}, {0}, {0}};
+    struct imp__glued x = {shape, prim, {1 - b1 - b2, b1, b2}, {0}, {0}, 0};
     x.p = c.p0 + c.e1 * b1 + c.e2 * b2;
     x.n = imp__normalize(imp__cross(c.e1, c.e2));
     if (imp__dot(x.n, side) < 0) x.n = -x.n;
     return x;
 }
 
+/* On a sphere, in this direction from its centre. */
+static struct imp__glued glued_round(int shape, const struct imp_round *round,
+                                     imp_v3 outward, imp_v3 side)
+{
+    const double sign = imp__dot(outward, side) < 0 ? -1 : 1;
+    return (struct imp__glued){.shape = shape,
+                               .b = {1, 0, 0},
+                               .p = round->centre + outward * round->radius,
+                               .n = outward * sign,
+                               .curvature = sign / round->radius};
+}
+
 struct imp__glued imp__glued_at(const struct imp_scene *scene, int shape,
                                 const struct imp_located *x, imp_v3 n)
 {
+    struct imp_round round;
+    if (imp__moves_sphere(scene, shape, &round)) {
+        const double uv[2] = {x->at[0], x->at[1]};
+        struct imp_surface at;
+        int prim;
+        scene->shapes[shape]->ops->place(scene->shapes[shape], uv, &at, &prim);
+        return glued_round(shape, &round, imp__normalize(at.p - round.centre), n);
+    }
     return glued(scene, shape, x->prim, x->at[0], x->at[1], n);
 }
 
@@ -104,6 +225,9 @@ struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int 
                                   imp_v3 p, imp_v3 n)
 {
     double b[3];
+    struct imp_round round;
+    if (imp__moves_sphere(scene, shape, &round))
+        return glued_round(shape, &round, imp__normalize(p - round.centre), n);
     imp__triangle_weights(scene->shapes[shape], prim, &p, b);
     return glued(scene, shape, prim, b[1], b[2], n);
 }
@@ -165,10 +289,11 @@ struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
             out.n += imp__cross(number3(theta + 3), x->n);
             break;
         case IMP_MOVE_SCALE:
-            out.v += r * theta[0];
-            out.area += 2 * theta[0];
+            out.v += r * (m->rate * theta[0]);
+            out.area += 2 * m->rate * theta[0];
             break;
         case IMP_MOVE_VERTICES: vertices_velocity(moves, x, theta, &out); break;
+        default: break;
         }
     }
     return out;
@@ -187,10 +312,20 @@ void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *
             add3(theta, bar->v);
             add3(theta + 3, imp__cross(r, bar->v) + imp__cross(x->n, bar->n));
             break;
-        case IMP_MOVE_SCALE: theta[0] += imp__dot(r, bar->v) + 2 * bar->area; break;
+        case IMP_MOVE_SCALE:
+            theta[0] += m->rate * (imp__dot(r, bar->v) + 2 * bar->area);
+            break;
         case IMP_MOVE_VERTICES: vertices_bar(moves, x, bar, theta); break;
+        default: break;
         }
     }
+}
+
+/* A camera's velocity at r from its centre by its one number: r z times the rate, or z across. */
+static imp_v3 view_velocity(const struct imp__mover *m, imp_v3 r)
+{
+    const double z = imp__dot(m->axis, r);
+    return m->kind == IMP_MOVE_FOV ? (r - m->axis * z) * m->rate : m->across * z;
 }
 
 imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 p,
@@ -201,7 +336,10 @@ imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 p,
         const struct imp__mover *m = &moves->mover[k];
         if (m->shape != IMP_MOVE_CAMERA) continue;
         const double *theta = theta_dot + m->first;
-        u += number3(theta) + imp__cross(number3(theta + 3), p - m->centre);
+        const imp_v3 r = p - m->centre;
+        if (m->kind == IMP_MOVE_POSE)
+            u += number3(theta) + imp__cross(number3(theta + 3), r);
+        else u += view_velocity(m, r) * theta[0];
     }
     return u;
 }
@@ -212,7 +350,42 @@ void imp__camera_velocity_bar(const struct imp__moves *moves, imp_v3 p, imp_v3 b
     for (int k = 0; k < moves->n_movers; k++) {
         const struct imp__mover *m = &moves->mover[k];
         if (m->shape != IMP_MOVE_CAMERA) continue;
-        add3(theta_bar + m->first, bar);
-        add3(theta_bar + m->first + 3, imp__cross(p - m->centre, bar));
+        const imp_v3 r = p - m->centre;
+        if (m->kind == IMP_MOVE_POSE) {
+            add3(theta_bar + m->first, bar);
+            add3(theta_bar + m->first + 3, imp__cross(r, bar));
+        } else {
+            theta_bar[m->first] += imp__dot(view_velocity(m, r), bar);
+        }
+    }
+}
+
+/* Across the direction of parallel light; a place in full. */
+static imp_v3 light_part(const struct imp__moves *moves, const struct imp__mover *m,
+                         imp_v3 v)
+{
+    const struct imp_emitter *e = moves->scene->emitters[IMP_MOVE_EMITTER(m->shape)];
+    if (!(e->ops->flags & IMP_EMITTER_FAR)) return v;
+    return (v - m->axis * imp__dot(m->axis, v)) * m->rate;
+}
+
+imp_v3 imp__light_velocity(const struct imp__moves *moves, int k, const double *theta_dot)
+{
+    imp_v3 out = {0};
+    for (int j = 0; j < moves->n_movers; j++) {
+        const struct imp__mover *m = &moves->mover[j];
+        if (m->shape == IMP_MOVE_EMITTER(k))
+            out += light_part(moves, m, number3(theta_dot + m->first));
+    }
+    return out;
+}
+
+void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 bar,
+                             double *theta_bar)
+{
+    for (int j = 0; j < moves->n_movers; j++) {
+        const struct imp__mover *m = &moves->mover[j];
+        if (m->shape == IMP_MOVE_EMITTER(k))
+            add3(theta_bar + m->first, light_part(moves, m, bar));
     }
 }

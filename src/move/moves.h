@@ -4,24 +4,45 @@
  * change by each of them. A mover is a shape or the camera with the numbers of one kind:
  *
  *     pose      e, a: every point X has the velocity  V = e + a x (X - c), c the centre (6)
- *     scale     V = s (X - c) at the scale 1 of the shape as it is (1)
+ *     scale     V = s (X - c) at the scale 1 of the shape as it is, or over that scale (1)
  *     vertices  V = b_0 e_0 + b_1 e_1 + b_2 e_2, of a triangle with weights b (3 each)
+ *     fov       of a camera, by its horizontal field of view f in degrees: at a fixed film position
+ *               it sees r/z away from its axis, z along it, for which
+ *               r'/r = (1 + t^2)/(2 t) pi/180,  t = tan(f/2) (1)
+ *     offset    of the principal point, in parts of the film's width or height W: what is seen is
+ *               what was seen W pixels further (1 each)
+ *     light     a point light's position V = e, or the direction d of parallel light, of any
+ *               length |d|: the unit direction turns by  e/|d| across d (3)
  *
  * e: a translation in scene units; a: a rotation vector in radians. Velocities are linear in the
- * numbers; each function that applies the map has its transpose beside it. Facets alone: the
- * geometric normal is the same all over a triangle. */
+ * numbers; each function that applies the map has its transpose beside it. The geometric normal is
+ * the same all over a triangle; on a sphere it turns with the place. */
 #ifndef IMP_MOVE_MOVES_H
 #define IMP_MOVE_MOVES_H
 
 #include "scene/located.h"
+#include "scene/pose.h"
 
-enum imp__move_kind { IMP_MOVE_POSE, IMP_MOVE_SCALE, IMP_MOVE_VERTICES };
-#define IMP_MOVE_CAMERA (-1) /* in place of a shape */
+enum imp__move_kind {
+    IMP_MOVE_POSE,
+    IMP_MOVE_SCALE,
+    IMP_MOVE_VERTICES,
+    IMP_MOVE_FOV,
+    IMP_MOVE_OFFSET_X,
+    IMP_MOVE_OFFSET_Y,
+    IMP_MOVE_LIGHT
+};
+#define IMP_MOVE_CAMERA     (-1)       /* in place of a shape */
+#define IMP_MOVE_EMITTER(k) (-2 - (k)) /* in place of a shape: emitter k of the scene */
 
 struct imp__mover {
     enum imp__move_kind kind;
-    int shape; /* index in the scene, or IMP_MOVE_CAMERA */
+    int shape; /* index in the scene, IMP_MOVE_CAMERA, or IMP_MOVE_EMITTER(k) */
     imp_v3 centre;
+    imp_v3 axis,
+        across;  /* of a camera: unit, and the offset's velocity at the depth 1; of
+                            parallel light the axis is its direction */
+    double rate; /* the velocities' factor */
     size_t first, count; /* its numbers */
 };
 
@@ -34,11 +55,14 @@ struct imp__moves {
     size_t n; /* numbers in all */
 };
 
-/* A point that is glued to its triangle, world. */
+/* A point that is glued to its triangle, or to a sphere, world. */
 struct imp__glued {
     int shape, prim;
     double b[3]; /* weights of the vertices, as the shape's indices have them */
     imp_v3 p, n; /* place, and the unit geometric normal of either side */
+    double
+        curvature; /* of the surface: the normal at a place shifted by x across n turns by
+                         curvature x */
 };
 
 struct imp__velocity {
@@ -54,6 +78,14 @@ void imp__moves_free(struct imp__moves *moves);
  * a shape that is not made of triangles, or a camera whose rays meet in no point. */
 enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kind,
                                int shape);
+/* The mover of a parameter, at its value now. */
+enum imp_status imp__moves_add_pose(struct imp__moves *moves,
+                                    const struct imp_pose *pose);
+/* From the adjoint of a mover's numbers to that of its parameter's, in place: a mover turns the
+ * object as it is, the parameter is one vector of rotation. */
+void imp__pose_numbers_bar(const struct imp_pose *pose, double *bar);
+/* Centre and radius of a sphere. False: another shape. */
+bool imp__moves_sphere(const struct imp_scene *scene, int shape, struct imp_round *out);
 /* Does it move? By a mover that is not `but` (NULL: any). */
 bool imp__moves_shape(const struct imp__moves *moves, int shape,
                       const struct imp__mover *but);
@@ -71,6 +103,11 @@ struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
                                       const double *theta_dot);
 void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *x,
                        const struct imp__velocity *bar, double *theta_bar);
+/* Velocity of emitter k: of its place, or of the unit direction of parallel light. */
+imp_v3 imp__light_velocity(const struct imp__moves *moves, int k,
+                           const double *theta_dot);
+void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 bar,
+                             double *theta_bar);
 /* Velocity of what the camera sees at p through a fixed film position: origin and direction of
  * the ray move with the camera, the distance is held. */
 imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 p,

@@ -4,6 +4,7 @@
  * in float about the centre of the scene, and the triangles in double. */
 #include "base/context.h"
 #include "facets_lanes.h"
+#include "kind/sensor/receiver.h"
 
 static imp_v3 plane(imp_v3 normal, imp_v3 zero)
 {
@@ -129,11 +130,16 @@ static int mesh_add(struct imp_facets *f, const struct imp_shape *s, int lane)
     return lane;
 }
 
+static bool has_facets(const struct imp_shape *s)
+{
+    return s->geometry == IMP_TRIANGLES && !imp__shape_is_absent(s);
+}
+
 static int meshes_add(struct imp_facets *f, struct imp_shape *const *shapes, int n)
 {
     int lane = 0;
     for (int i = 0; i < n; i++)
-        if (shapes[i]->geometry == IMP_TRIANGLES) lane = mesh_add(f, shapes[i], lane);
+        if (has_facets(shapes[i])) lane = mesh_add(f, shapes[i], lane);
     return lane;
 }
 
@@ -156,13 +162,11 @@ bool imp__facets_create(imp_context *ctx, struct imp_shape *const *shapes, int n
     imp_v3 lo = imp__spec(INFINITY), hi = imp__spec(-INFINITY);
     *out = NULL;
     for (int i = 0; i < n; i++) {
-        if (shapes[i]->geometry == IMP_TRIANGLES)
-            triangles += shapes[i]->triangles.n_triangles;
+        if (has_facets(shapes[i])) triangles += shapes[i]->triangles.n_triangles;
     }
     if (triangles == 0 || triangles > 2 * IMP_FACETS) return true;
     for (int i = 0; i < n; i++)
-        if (shapes[i]->geometry == IMP_TRIANGLES)
-            box_add(&shapes[i]->triangles, &lo, &hi);
+        if (has_facets(shapes[i])) box_add(&shapes[i]->triangles, &lo, &hi);
     struct imp_facets head = {.centre = (lo + hi) * .5, .half = (hi - lo) * .5};
     head.centre[3] = head.half[3] = 0;
     head.reach = (float)imp__length(head.half);

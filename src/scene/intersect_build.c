@@ -16,6 +16,7 @@
 #include "base/pool.h"
 #include "instances.h"
 #include "intersector.h"
+#include "kind/sensor/receiver.h"
 #include "math/offset.h"
 #include <sched.h>
 #include <stdatomic.h>
@@ -318,6 +319,7 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
     size_t primitives = 0;
     for (int i = 0; x->rtc && i < c->n + instances && told.error == RTC_ERROR_NONE; i++) {
         const struct imp_shape *s = i < c->n ? shape_at(scene, c, i) : NULL;
+        if (s && imp__shape_is_absent(s)) continue;
         if (s && s->geometry == IMP_ANALYTIC && few) {
             imp__shape_balls_add(&x->balls, s);
             continue;

@@ -1,32 +1,73 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Where a shape or a camera is, as six numbers: the parameter `NAME.pose`. A point X of it that the
- * scene file has at X0 is at
+ * Where things are, as parameters:
  *
- *     X = c + e + R(a) (X0 - c),    R(a): the rotation about a by |a| radians
+ *     NAME.pose              of a shape or camera: e and a, six numbers; a point that the scene
+ *                            file has at X0 is at  X = c + e + R(a) s (X0 - c)
+ *     NAME.scale             of a shape: s
+ *     NAME.vertex_positions  of a mesh: the vertices, three numbers each, world
+ *     NAME.x_fov             of a perspective camera: its horizontal field of view, degrees
+ *     NAME.principal_point_offset_x, _y    of a camera, in parts of the film's width and height
+ *     NAME.position          of a light at a point, world
+ *     NAME.direction         along which parallel light travels, of any length
  *
- * with e the first three numbers, in scene units, a the last three, and c the centre: of a shape
- * the middle of its box, of a camera its own place. 0 0 0 0 0 0 is the scene file's pose. A pose
- * is a parameter when it is asked for, behind all others: imp_scene_add_pose. */
+ * R(a): the rotation about a by |a| radians; c: the middle of a shape's box, a camera's own place.
+ * They are parameters when they are asked for, behind all others: imp_scene_add_geometry. */
 #ifndef IMP_SCENE_POSE_H
 #define IMP_SCENE_POSE_H
 
 #include "scene.h"
 
+enum imp_pose_kind {
+    IMP_POSE_RIGID,
+    IMP_POSE_SCALE,
+    IMP_POSE_VERTICES,
+    IMP_POSE_FOV,
+    IMP_POSE_OFFSET_X,
+    IMP_POSE_OFFSET_Y,
+    IMP_POSE_POSITION,
+    IMP_POSE_DIRECTION,
+    IMP_POSE_KINDS
+};
+
+/* One such parameter. */
 struct imp_pose {
     struct imp_pose *next; /* added later */
     struct imp_scene *scene;
-    int shape;                 /* index; -1: a sensor */
-    struct imp_sensor *sensor; /* NULL: a shape */
+    enum imp_pose_kind kind;
+    int shape;                   /* index; -1: no shape */
+    struct imp_sensor *sensor;   /* NULL: no sensor */
+    struct imp_emitter *emitter; /* NULL: no light without a shape */
     int param;
-    double number[6];
+    size_t n;
+    double *number; /* [n] */
     imp_v3 centre;
-    bool due; /* its numbers have changed since the object was moved */
+    /* The first one of the same object has what follows. */
+    struct imp_pose *object;
+    bool due; /* its numbers, or another's of the object, changed since it was moved */
     /* As the file has it: the kind's object, and positions and normals of a mesh. */
     void *rest;
     size_t rest_size;
     float *positions, *normals; /* NULL: in the object, or none */
 };
+
+/* The last part of such a name, without its point. */
+const char *imp__pose_tail(enum imp_pose_kind kind);
+/* Another parameter of the same object. NULL: none. */
+const struct imp_pose *imp__pose_beside(const struct imp_pose *p,
+                                        enum imp_pose_kind kind);
+/* The pose that is this parameter; NULL: it is none. */
+static inline const struct imp_pose *imp__pose_of(const struct imp_scene *scene,
+                                                  size_t param)
+{
+    const struct imp_pose *p = scene->poses;
+    while (p && p->param != (int)param) p = p->next;
+    return p;
+}
+
+/* A large change of number e, in its unit: of a place a tenth of the scene, of a rotation half a
+ * radian, of a vertex a tenth of its mesh, of a view ten degrees. */
+double imp__pose_large(const struct imp_pose *p, size_t e);
 
 /* Where the rays of a camera meet. False: in no point, as those of a lens with an aperture or of
  * parallel light. */
@@ -37,6 +78,9 @@ void imp__rotation_of(const double a[3], double R[9]);
 /* Adds to a_bar what an adjoint of the turning at the pose, a rotation about the moved centre, is to
  * the numbers a: the transpose of the left Jacobian of the rotations. */
 void imp__rotation_bar(const double a[3], imp_v3 turn_bar, double a_bar[3]);
+
+/* ---- pose.c for pose_add.c ---- */
+void imp__pose_changed(void *pose);
 
 /* Moves what is due, and makes the tree of shapes again. Whoever has set parameters calls it behind
  * imp__theta_announce. IMP_E_NOMEM, or what Embree says: the scene is not to be used before it

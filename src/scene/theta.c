@@ -150,9 +150,9 @@ enum imp_status imp_scene_find_param(const imp_scene *scene, const char *name,
     if (imp__theta_alias(scene, name, index)) return IMP_OK;
     if (is_geometry(name))
         return imp__error(scene->ctx, IMP_E_ARG,
-                          "there is no parameter '%s': vertices, transformations and "
-                          "cameras are not among them (the pose of a shape or camera is, "
-                          "where it is asked for: NAME.pose)",
+                          "there is no parameter '%s': transformations, normals and "
+                          "positions are not among them (where it is asked for: "
+                          "NAME.pose, scale, vertex_positions, x_fov, position, ...)",
                           name);
     const struct imp_near_names near = imp__theta_near(scene, name);
     return imp__error(scene->ctx, IMP_E_ARG, "there is no parameter '%s'%s", name,

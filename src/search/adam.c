@@ -22,6 +22,7 @@
 #include <math.h>
 #include <string.h>
 
+#define HALVES  6 /* of a step that leads where nothing can be evaluated */
 #define BETA2   IMP_ADAM_BETA2
 #define WINDOW  IMP_ADAM_WINDOW
 #define STALLED IMP_ADAM_STALLED /* net motion over path length: below, no progress */
@@ -168,6 +169,26 @@ static bool settles(const struct imp__goal *goal, const struct imp__opt_options 
     return !turned(s) && options->quiet && goal->settles && goal->settles[j];
 }
 
+static bool is_possible(const struct imp__goal *goal, const double *x)
+{
+    return !goal->possible || goal->possible(x, goal->payload);
+}
+
+/* A step g, in scales, that has led to x: halved while the objective cannot be evaluated there, and
+ * taken back at last. */
+static void step_back(const struct imp__goal *goal, const struct imp__search *s,
+                      double *x, double *g)
+{
+    for (int i = 0; goal->possible && i <= HALVES; i++) {
+        if (goal->possible(x, goal->payload)) return;
+        const double back = i < HALVES ? 0.5 : 1;
+        for (size_t k = 0; k < s->n; k++) {
+            x[k] -= back * goal->scale[k] * g[k];
+            g[k] *= 1 - back;
+        }
+    }
+}
+
 /* One step from HERE. g: the gradient; it and work [n] are destroyed. */
 static enum imp_status step(const struct imp__goal *goal,
                             const struct imp__opt_options *options, struct imp__search *s,
@@ -204,6 +225,9 @@ static enum imp_status step(const struct imp__goal *goal,
         const double old = x[k];
         x[k] = imp__into_bounds(goal, k, old - goal->scale[k] * g[k]);
         g[k] = (x[k] - old) / goal->scale[k];
+    }
+    step_back(goal, s, x, g);
+    for (size_t k = 0; k < s->n; k++) {
         s->scalar[LARGEST] = fmax(s->scalar[LARGEST], fabs(g[k]));
         s->array[SUM][k] += x[k];
     }
@@ -243,9 +267,13 @@ static void cool(const struct imp__goal *goal, struct imp__search *s, bool all, 
         if (turned(s) && net >= STEADY * way) pace[j] = fmax(pace[j] - 1, 0);
     }
     imp__basis_back(s->n, rows(s), mean, move);
-    for (size_t k = 0; k < n; k++)
-        s->array[HERE][k] =
-            imp__into_bounds(goal, k, s->array[HERE][k] + goal->scale[k] * move[k]);
+    for (size_t k = 0; k < n; k++) {
+        const double old = s->array[HERE][k];
+        s->array[HERE][k] = imp__into_bounds(goal, k, old + goal->scale[k] * move[k]);
+        move[k] = old;
+    }
+    if (!is_possible(goal, s->array[HERE]))
+        memcpy(s->array[HERE], move, n * sizeof *move);
 }
 
 static enum imp_status window_end(const struct imp__goal *goal,
@@ -277,7 +305,8 @@ static enum imp_status window_end(const struct imp__goal *goal,
     return align(goal, s, true);
 }
 
-/* x: the iterate, or once the search wanders the average with weights 1, 2, 3, ... */
+/* x: the iterate, or once the search wanders the average with weights 1, 2, 3, ..., where that can be
+ * evaluated. */
 static void answer(const struct imp__goal *goal, struct imp__search *s)
 {
     const double n = s->scalar[AVERAGED];
@@ -288,6 +317,7 @@ static void answer(const struct imp__goal *goal, struct imp__search *s)
             n > 0 ? *mean + (s->array[HERE][k] - *mean) * 2 / (n + 1) : s->array[HERE][k];
         s->x[k] = imp__into_bounds(goal, k, *mean);
     }
+    if (!is_possible(goal, s->x)) memcpy(s->x, s->array[HERE], s->n * sizeof(double));
 }
 
 static enum imp_status run(const struct imp__goal *goal,

@@ -93,6 +93,10 @@ struct imp__goal {
     enum imp_status (*draw)(const double *x, uint64_t seed, void *payload);
     /* Was the last evaluation too far from where its numbers were drawn? NULL: never. */
     bool (*is_stale)(void *payload);
+    /* Can the objective be evaluated at x, which is inside the bounds? Adam's steps are halved until
+     * it can; where it cannot, eval without a gradient is infinite, and with one it is an error. NULL:
+     * everywhere. */
+    bool (*possible)(const double *x, void *payload);
     /* Called after each complete iteration, when `search` may be copied: report progress,
      * write a checkpoint. Returns IMP_CANCELLED to stop. May be NULL. */
     enum imp_status (*iterated)(const struct imp__search *search, void *payload);

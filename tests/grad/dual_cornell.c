@@ -74,6 +74,7 @@ int main(void)
     double light_rgb[3];
     run.spp = SPP;
     run.seed = 11;
+    run.points = IMP_POINTS_INDEPENDENT; /* as the test's own walks have them */
     test_must(ctx, imp_problem_jacobian(p, &run, &primal, films));
     test_must(ctx, imp_scene_find_param(scene, "light.radiance.value", &light));
     test_must(ctx, imp_scene_get_values(scene, light, light_rgb));

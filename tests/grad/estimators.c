@@ -98,7 +98,9 @@ static void begin(struct setting *s, imp_scene *scene, const char *active, int s
                                         .arena = &arena,
                                         .value =
                                             s->walk + (size_t)(p * SPP_MAX + i) * size};
-            imp__lanes_sample(&tracer, &sample);
+            struct imp_walk walk;
+            imp__sample_walk(&sample, &tracer, &walk);
+            imp__lanes_values(&tracer, &walk, sample.value);
             s->at[p][i][0] = sample.px;
             s->at[p][i][1] = sample.py;
             imp__arena_rewind(&arena, mark);

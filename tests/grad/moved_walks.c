@@ -246,7 +246,7 @@ int main(void)
     walks_test(PATH, "path, its vertices", add_vertices);
     walks_test(PATH, "path, the lamp", add_lamp);
     walks_test(PATH SKY, "path and a sky, all", add_all);
-    refused(PATH "<emitter type='point' id='bulb'/>", "'bulb'");
+    refused(PATH "<emitter type='projector' id='bulb'/>", "'bulb'");
     refused(PATH
             "<bsdf type='plastic' id='wax'/><shape type='cube'><ref id='wax'/></shape>",
             "'wax'");

@@ -455,6 +455,7 @@ static void fresh(imp_scene *s, imp_problem *p, size_t param, const double *v,
     }
     if (scale == 0) scale = isfinite(info.hi) ? info.hi : 1;
     run.spp = 4 * BATCHES * spp;
+    run.points = IMP_POINTS_INDEPENDENT; /* the same walks forward and in reverse */
     run.wavelengths = IMP_WAVELENGTHS_INDEPENDENT; /* as the forward picture has them */
     run.seed = 77;
     test_must(ctx, imp_problem_forward(p, x_dot, &run, &film));

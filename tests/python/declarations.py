@@ -13,7 +13,7 @@ from importon import _c
 from importon._library import ERRORS
 from tap import TOP, Skip, run
 
-HEADERS = ["importon.h", "bend.h", "elements.h", "report.h", "walks.h", "until.h", "clip.h"]
+HEADERS = ["importon.h", "bend.h", "elements.h", "report.h", "rooms.h", "walks.h", "until.h", "clip.h"]
 INCLUDES = "".join("#include <importon/%s>\n" % h for h in HEADERS) + "#include <stddef.h>\n"
 STRUCTS = {n: s for n, s in vars(_c).items() if isinstance(s, type) and issubclass(s, ctypes.Structure)
            and n.startswith("imp_")}
@@ -142,6 +142,8 @@ WITHOUT = {
     "imp_report_page": "for servers of a live page: importon view",
     "imp_report_data": "the same",
     "imp_problem_shares": "of one pixel, for pages of walks: importon report --scene; render_backward has its gradient",
+    "imp_ugr": "a formula of one line; glare has it of scenes",
+    "imp_guth_position": "the same",
     "imp_problem_get_fit_variable": "one number of a fit: Fit has arrays; numbers beyond 1,024 have no errors",
 }
 

@@ -197,6 +197,7 @@ static imp_film *render(imp_scene *s, int spp, enum imp_from from, uint64_t seed
     struct imp_run run = IMP_RUN_INIT;
     imp_film *film;
     run.spp = spp;
+    run.points = IMP_POINTS_INDEPENDENT; /* z-scores are normal */
     run.seed = seed;
     run.from = from;
     test_must(ctx, imp_render(s, &run, &film));

@@ -395,7 +395,11 @@ static struct imp_emitter *emitter_build(struct imp_node *n, const struct imp_sh
     const struct imp_emitter_ops *ops = NULL;
     static const double vertical[] = {0, 40, 120}, horizontal[] = {0, 90, 180};
     static const double candela[] = {3, 2, 1, 3, 1, 2, 3, 4, 1};
-    static const struct imp_ies_data table = {3, 3, vertical, horizontal, candela};
+    static const struct imp_ies_data table = {.n_vertical = 3,
+                                              .n_horizontal = 3,
+                                              .vertical = vertical,
+                                              .horizontal = horizontal,
+                                              .candela = candela};
     for (int i = 0; imp__emitter_kinds[i]; i++) /* a name may be a light, and an area */
         if (strcmp(imp__emitter_kinds[i]->name, n->type) == 0 &&
             (!ops || !s == !(imp__emitter_kinds[i]->flags & IMP_EMITTER_AREA)))

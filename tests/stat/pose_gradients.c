@@ -6,6 +6,7 @@
  * over seeds; what has no such gradient is refused. */
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include "importon/walks.h"
 #include "moves_kit.h"
 
 enum { WIDTH = 24, HEIGHT = 16, N = 18 };
@@ -75,7 +76,7 @@ static const struct {
 static void room_test(const char *name, const char *rest, const char *filter, int spp,
                       int spp_ref)
 {
-    enum { SEEDS = 12, GROUPS = 12 };
+    enum { SEEDS = 36, GROUPS = 12 };
     imp_scene *scene = room(rest, filter);
     imp_problem *p;
     double sum[N + 3] = {0}, square[N + 3] = {0}, told[N + 3] = {0}, most[3] = {0};
@@ -131,31 +132,60 @@ static void room_test(const char *name, const char *rest, const char *filter, in
     imp_scene_destroy(scene);
 }
 
+/* Walks that have no such derivative, and objects that stand where it has none. */
+static void refusals_test(void)
+{
+    imp_scene *scene = room("<integrator type='path'/>", "type='box'");
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_walks_options options = IMP_WALKS_OPTIONS_INIT;
+    struct imp_estimate value;
+    const double pierced[6] = {0, 0, -0.5, 0, 0, 0}, far[6] = {1e300, 0, 0, 0, 0, 0},
+                 unknown[6] = {NAN, 0, 0, 0, 0, 0}, rest[6] = {0};
+    imp_walks *walks;
+    imp_problem *p;
+    size_t index;
+    double g[6];
+    run.spp = 4;
+    test_must(ctx, imp_problem_create(scene, &p));
+    test_must(ctx, imp_problem_activate(p, "block.pose"));
+    test_target(ctx, p, 0, WIDTH, HEIGHT, adjoint);
+    options.losses = true;
+    test_must(ctx, imp_walks_keep(scene, &run, &options, &walks));
+    run.walks = walks;
+    enum imp_status st = imp_problem_objective(p, NULL, &run, &value, g, NULL);
+    tap_ok(st == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "walks are"),
+           "recorded walks are refused # %s", imp_last_error(ctx));
+    run.walks = NULL;
+    imp_walks_destroy(walks);
+    test_must(ctx, imp_scene_find_param(scene, "block.pose", &index));
+    test_must(ctx, imp_scene_set_values(scene, index, 6, pierced));
+    st = imp_problem_objective(p, NULL, &run, &value, g, NULL);
+    tap_ok(st == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "'block'") &&
+               strstr(imp_last_error(ctx), "'floor'"),
+           "a block in the floor # %s", imp_last_error(ctx));
+    st = imp_scene_set_values(scene, index, 6, far);
+    tap_ok(st == IMP_E_NUMERIC && strstr(imp_last_error(ctx), "block.pose"),
+           "beyond floats # %s", imp_last_error(ctx));
+    test_must(ctx, imp_scene_set_values(scene, index, 6, rest));
+    st = imp_scene_set_values(scene, index, 6, unknown);
+    tap_ok(st == IMP_E_ARG, "not a number # %s", imp_last_error(ctx));
+    test_must(ctx, imp_problem_objective(p, NULL, &run, &value, g, NULL));
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+}
+
 static void refused_test(void)
 {
     imp_scene *scene = room("<integrator type='path'/>", "type='box'");
     imp_problem *p;
-    struct imp_run run = IMP_RUN_INIT;
-    struct imp_estimate value;
-    imp_film *primal = NULL, *films[8] = {NULL};
-    double g[8];
-    run.spp = 4;
     test_must(ctx, imp_problem_create(scene, &p));
     test_must(ctx, imp_problem_activate(p, "*"));
     const size_t all = imp_problem_n_variables(p);
     test_must(ctx, imp_problem_activate(p, "block.pose"));
     tap_ok(imp_problem_n_variables(p) == all + 6, "'*' leaves poses alone");
     imp_problem_destroy(p);
-    test_must(ctx, imp_problem_create(scene, &p));
-    test_must(ctx, imp_problem_activate(p, "block.pose"));
-    test_target(ctx, p, 0, WIDTH, HEIGHT, adjoint);
-    enum imp_status st = imp_problem_objective(p, NULL, &run, &value, g, NULL);
-    tap_ok(st == IMP_E_BIAS && strstr(imp_last_error(ctx), "block.pose"),
-           "a loss is refused # %s", imp_last_error(ctx));
-    st = imp_problem_jacobian(p, &run, &primal, films);
-    tap_ok(st == IMP_E_BIAS, "so are derivative pictures # %s", imp_last_error(ctx));
-    imp_problem_destroy(p);
     imp_scene_destroy(scene);
+    refusals_test();
 }
 
 #define PATH   "<integrator type='path'><integer name='max_depth' value='4'/></integrator>"

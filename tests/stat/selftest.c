@@ -76,7 +76,7 @@ struct broken {
     const char *name, *rows; /* that must not be ok */
 };
 static const struct broken broken[] = {{"small_pdf", "normalised draws albedo"},
-                                       {"tilted_pdf", "draws"},
+                                       {"tilted_pdf", "draws albedo"},
                                        {"gap", "covers albedo"},
                                        {"horizon", "finite"},
                                        {"bright", "energy"},

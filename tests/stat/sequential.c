@@ -147,6 +147,7 @@ static void gradients(imp_context *ctx, double risk)
     test_must(ctx, imp_problem_create(scene, &p));
     for (int k = 0; k < 2; k++) test_must(ctx, imp_problem_activate(p, active[k]));
     run.spp = size.truth_spp;
+    run.points = IMP_POINTS_INDEPENDENT; /* the bounds' factor is that of normal errors */
     test_must(ctx, imp_problem_functional(p, adjoint, &run, &f, truth, se));
     o.relative = size.gradient;
     o.risk = risk;

@@ -104,6 +104,7 @@ static void furnace(enum imp_color_mode mode, const char *light, const double xy
     struct imp_run run = IMP_RUN_INIT;
     imp_film *f;
     run.spp = 16384;
+    run.points = IMP_POINTS_INDEPENDENT;
     test_must(ctx, imp_render(s, &run, &f));
     double z = 0, worst = 0;
     const float *mean = imp_film_mean(f), *se = imp_film_se(f);

@@ -147,6 +147,7 @@ static const struct row {
     PLAIN("emitter", "envmap", "<string name='filename' value='sky.pfm'/>\n"),
     PLAIN("emitter", "projector", "<texture type='checkerboard' name='irradiance'/>\n"),
     PLAIN("emitter", "sunsky", ""),
+    PLAIN("emitter", "ciesky", ""),
     PLAIN("sensor", "perspective", MUST "\n"),
     PLAIN("sensor", "perspective", MUST "\n<float name='opencv_fx' value='4'/>\n"),
     PLAIN("sensor", "thinlens", MUST "\n<float name='aperture_radius' value='.1'/>\n"),

@@ -94,12 +94,13 @@ static void errors(void)
          "l.ies:2: the number of vertical angles is 1e+09, not in [2, 36001]", 0},
         {"TILT=NONE\n1 1000 1 2.5 1 1 1",
          "l.ies:2: the number of vertical angles is 2.5, not whole", 0},
-        {"TILT=NONE\n" COUNTS("2", "1", "2"),
-         "l.ies:2: photometry of type B is not read: convert the file to type C",
-         IMP_E_UNSUPPORTED},
-        {"TILT=NONE\n" COUNTS("2", "1", "3"),
-         "l.ies:2: photometry of type A is not read: convert the file to type C",
-         IMP_E_UNSUPPORTED},
+        {"TILT=NONE\n" COUNTS("2", "2", "2") "-90 90\n0 180\n1 1 1 1",
+         "l.ies:5: a horizontal angle is 180, not in [-90, 90]", 0},
+        {"TILT=NONE\n" COUNTS("2", "2", "3") "-90 90\n0 45\n1 1 1 1",
+         "l.ies:5: horizontal angles go from 0 to 45: with type A they may be 0, or go "
+         "from "
+         "-90 or 0 to 90",
+         0},
         {"TILT=NONE\n" COUNTS("2", "1", "0"),
          "l.ies:2: the photometric type is 0, not in [1, 3]", 0},
         {"TILT=NONE\n" COUNTS("36001", "36001", "1") "0 90",
@@ -251,8 +252,16 @@ static void symmetries(void)
         for (int i = 0; i < 20; i++) some[i] = 10 + 7 * i % 13 + i;
         for (int i = 0; i < 9; i++)
             memcpy(all + 4 * i, some + 4 * spans[k].index[i], 4 * sizeof *all);
-        const struct imp_ies_data a = {4, spans[k].n, v, spans[k].h, some};
-        const struct imp_ies_data b = {4, 9, v, whole, all};
+        const struct imp_ies_data a = {.n_vertical = 4,
+                                       .n_horizontal = spans[k].n,
+                                       .vertical = v,
+                                       .horizontal = spans[k].h,
+                                       .candela = some};
+        const struct imp_ies_data b = {.n_vertical = 4,
+                                       .n_horizontal = 9,
+                                       .vertical = v,
+                                       .horizontal = whole,
+                                       .candela = all};
         const struct imp__ies x = lamp_of(&a), y = lamp_of(&b);
         for (uint32_t i = 0; i < 2000; i++) {
             const struct imp_key key = imp__key(3, k, i);
@@ -365,7 +374,11 @@ static void fluxes(void)
     double v[91], cd[91];
     static const double h[] = {0};
     for (int k = 0; k < 91; k++) v[k] = k, cd[k] = 700 * cos(k * IMP_PI / 180);
-    const struct imp_ies_data d = {91, 1, v, h, cd};
+    const struct imp_ies_data d = {.n_vertical = 91,
+                                   .n_horizontal = 1,
+                                   .vertical = v,
+                                   .horizontal = h,
+                                   .candela = cd};
     tap_near(flux_of(&d), 700 * IMP_PI, 2.6e-5, 0, "a Lambertian lamp has pi I0");
 }
 
@@ -392,7 +405,11 @@ static void beams(void)
         v[k] = 90.0 * k / (N - 1);
         cd[k] = 3 * area * pow(fmax(0, cos(v[k] * IMP_PI / 180)), 8);
     }
-    const struct imp_ies_data d = {N, 1, v, h, cd};
+    const struct imp_ies_data d = {.n_vertical = N,
+                                   .n_horizontal = 1,
+                                   .vertical = v,
+                                   .horizontal = h,
+                                   .candela = cd};
     struct imp__ies *x = s->emitters[1]->self;
     x->data = &d;
     const imp_v3 n = x->nadir;

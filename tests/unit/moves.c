@@ -7,7 +7,7 @@
 #include "imp_tap.h"
 #include "math/rng.h"
 #include "math/warp.h"
-#include "move/edges.h"
+#include "move/edge_choice.h"
 #include "moves_kit.h"
 #include <stdarg.h>
 
@@ -197,7 +197,12 @@ static void camera_test(void)
 
 /* ---- Edges -------------------------------------------------------------------------------- */
 
-static double total(const struct imp__edges *e) { return e->until[e->n - 1]; }
+static double total(const struct imp__edges *e)
+{
+    double sum = 0;
+    for (size_t k = 0; k < e->n; k++) sum += imp__length(e->edge[k].b - e->edge[k].a);
+    return sum;
+}
 
 static void edges_test(void)
 {
@@ -233,14 +238,17 @@ static void edges_test(void)
            "from outside 4 or 6 of them are silhouettes, and close # 4: %d, 6: %d",
            counts[4], counts[6]);
     struct tap_stat x[3] = {0};
+    struct imp__edge_choice c;
+    test_must(ctx, imp__edge_choice_begin(&e, NULL, NULL, 1, &c));
     for (uint32_t i = 0; i < 20000; i++) {
-        imp_v3 p;
-        imp__edges_draw(&e, imp__u01(imp__key(3, 0, i), 0), &p);
-        for (int k = 0; k < 3; k++) tap_add(&x[k], p[k]);
+        struct imp__edge_point at;
+        imp__edge_choice_draw(&c, imp__u01(imp__key(3, 0, i), 0), &at);
+        for (int k = 0; k < 3; k++) tap_add(&x[k], at.p[k]);
     }
     const double middle[3] = {.3, -.2, 2};
     for (int k = 0; k < 3; k++)
         tap_z(&x[k], middle[k], 6e-3, "points by length have the middle of the box");
+    imp__edge_choice_free(&c);
     imp__edges_free(&e);
     imp_scene_destroy(scene);
 
@@ -295,7 +303,7 @@ static void edges_test(void)
     imp__edges_free(&e);
     imp_scene_destroy(scene);
 
-    scene = scene_of("<shape type='sphere' id='ball'/>");
+    scene = scene_of("<shape type='disk' id='ball'/>");
     const enum imp_status refused = imp__edges_build(scene, &e);
     tap_ok(refused == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "'ball'"),
            "what has no edges is refused by name # %s", imp_last_error(ctx));

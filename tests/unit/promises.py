@@ -164,11 +164,15 @@ NOT_OK = {
     "imp_problem_add_smoothness": "the scene has no texture",
     "imp_problem_get_fit_variable": "there was no fit",
     "imp_scene_write_volume": "the scene has no volume",
+    "imp_grid_points": "its sensor is a camera",
+    "imp_scene_get_luminaire": "the scene has no luminaire",
+    "imp_grid_glare": "its sensor is a camera",
+    "imp_ugr": "its sources are zeros",
 }
 try: C.CDLL("libOpenImageDenoise.so.2")
 except OSError: NOT_OK["imp_denoise"] = NOT_OK["imp_denoiser_check"] = "there is no Open Image Denoise"
 # Pointers that may be NULL, by name, or by function and name.
-NULLABLE = {"imp_report_page.length", "imp_problem_shares.walk_share", "imp_render_until.end", "imp_problem_until.end", "imp_problem_until.adjoint",
+NULLABLE = {"imp_report_page.length", "imp_problem_shares.walk_share", "imp_grid_read.sets", "imp_grid_glare.se", "imp_grid_summarise.average", "imp_reading_shares.share", "imp_reading_shares.reading", "imp_render_until.end", "imp_problem_until.end", "imp_problem_until.adjoint",
             "imp_problem_until.value", "imp_problem_until.gradient", "imp_report_data.length", "options", "run", "stats", "id", "objective", "gradient_se", "primal", "normals", "uvs",
             "axis", "hessian", "taps", "tap_bars", "tap_dots", "power", "bundle", "exit", "targets",
             "error", "order", "memory",
@@ -386,12 +390,12 @@ class Fixture:
         if a.name == "dims": return C.addressof(self.array(C.c_size_t, 1, [1])), None
         if not a.pointer:
             scalars = {"fallback": 1., "fraction": 1., "seed": 1, "flags": 0, "size": 8, "width": 4, "height": 4, "channels": 3, "length": len(self.good(xml, function)[0]) if "load_string" in function else 0, "weight": 1., "order": 1,
-                       "index": 1.5 if a.ctype is C.c_double else 0, "cells": 1., "um": .5, "k": 1.,
+                       "index": 1.5 if a.ctype is C.c_double else 0, "cells": 1., "um": .5, "k": 1., "background": 1., "confidence": .9, "a": 1., "b": 1.,
                        "radius": 2., "bytes": 1 << 20, "hi": 3., "lo": 1., "value": 1.5 if a.ctype is C.c_double else 1,
                        "n_vertices": 3, "n_triangles": 1, "layers": 1, "nx": 1, "ny": 1, "nz": 1, "a": 1., "pilots": 2, "n_groups": 1, "low": .1, "high": .9,
                        "n": {"imp_scene_set_values": 1, "imp_scene_spectrum": 2, "imp_problem_nlopt": 3}.get(function, 1)}
             zeros = {"scalar", "status", "cause", "sensor", "channel", "x", "y", "sample", "json", "i", "from_here",
-                     "kind", "of", "time", "nm", "progress", "rays", "ray", "bundle", "n_walks", "target", "edge", "most", "subject", "from", "to"}
+                     "kind", "of", "time", "nm", "progress", "rays", "ray", "bundle", "n_walks", "target", "edge", "most", "subject", "from", "to", "luminaire", "room", "sets"}
             if key == "imp_problem_tie.kind": return constants["IMP_TIE_LOG"], None
             if key == "imp_bend_image.target": return 4, None  # the fixture adds it
             if function == "imp_parts_create": return {"index": 1, "count": 2}[a.name], None
@@ -431,7 +435,7 @@ class Fixture:
                 bend = open(os.path.join(top, "scenes", "bend", "rod.xml"), "rb").read()
                 return (bend if "bend" in function else SCENE), None
             if a.name == "name":
-                return {"imp_scene_find_param": PARAM.encode()}.get(function, b"name"), None
+                return {"imp_scene_find_param": PARAM.encode(), "imp_scene_add_geometry": b"lamp.pose"}.get(function, b"name"), None
             if a.name == "command": return b"command", None
             words = {"fallback": b"text", "format": b"text", "names": b"R,G,B", "key": b"key", "value": b"value", "tag": b"shape", "type": b"sphere", "id": b"id", "layer": b"layer", "object": b"lamp",
                      "glob": PARAM.encode(), "kind": b"luneburg"}

@@ -4,6 +4,7 @@
 #include "base/team.h"
 #include "check_sources.h"
 #include "inverse/estimate/problem_tracer.h"
+#include "scene/pose.h"
 #include "walk/rules/features.h"
 #include "walk/run/run.h"
 #include <math.h>
@@ -15,9 +16,9 @@
 #define DRAWS_S 20 /* default of imp_check_options.draws_s */
 
 static const char *const methods[] = {
-    "frozen",  "dot",    "euler", "fresh",      "loss",    "ends",
-    "uniform", "energy", "aim",   "directions", "choices", "points",
-    "flights", "passes", "areas", "leaves",     "film",    "waves"};
+    "frozen", "dot",    "euler",      "fresh",   "loss",   "ends",    "uniform",
+    "energy", "aim",    "directions", "choices", "points", "flights", "passes",
+    "areas",  "leaves", "guides",     "weights", "film",   "times",   "waves"};
 
 /* Is `word` [n] one of the comma-separated words of `list`? */
 static bool listed(const char *list, const char *word, size_t n)
@@ -138,7 +139,8 @@ enum imp_status imp__check_densities(struct imp__check *c)
     enum imp_status st = IMP_OK;
     struct imp__draw_list l = {.check = c};
     struct imp__places places = {.check = c};
-    if (!wants_any(c, "directions,choices,points,flights,passes,areas,leaves,film,waves"))
+    if (!wants_any(c, "directions,choices,points,flights,passes,areas,leaves,guides,"
+                      "weights,film,times,waves"))
         return IMP_OK;
     imp__arena_init(&l.arena, c->ctx);
     IMP_TRY(imp__places_find(&places));
@@ -146,6 +148,9 @@ enum imp_status imp__check_densities(struct imp__check *c)
     IMP_TRY(imp__check_lights(&l, &places));
     IMP_TRY(imp__check_flights(&l, &places));
     IMP_TRY(imp__check_areas(&l, &places));
+    IMP_TRY(imp__check_far(&l, &places));
+    IMP_TRY(imp__check_guides(&l, &places));
+    IMP_TRY(imp__check_weights(&l, &places));
     IMP_TRY(imp__check_film(&l, &places));
     IMP_TRY(imp__draw_all(&l));
 out:
@@ -155,11 +160,50 @@ out:
     return st;
 }
 
+/* The active parameters of `chosen` [n_params] that are poses, or are none. */
+static enum imp_status layout_of(struct imp_problem *p, const uint8_t *chosen, bool poses)
+{
+    const size_t n = p->scene->n_params;
+    uint8_t *some = imp__alloc(p->ctx, n + 1, 1);
+    if (!some) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for a check");
+    memcpy(some, chosen, n);
+    for (size_t k = 0; k < n; k++) some[k] &= imp__pose_of(p->scene, k) ? poses : !poses;
+    const enum imp_status st = imp__problem_layout(p, some);
+    imp__release(p->ctx, some);
+    return st;
+}
+
+/* Rows of all parameters but poses. */
+static enum imp_status numbers_check(struct imp__check *c, bool lights)
+{
+    enum imp_status ended =
+        imp__check_densities(c); /* first: all that follows rests on them */
+    if (ended == IMP_OK && !lights && wants_any(c, "frozen,dot,euler"))
+        ended = imp__check_frozen(c);
+    if (ended == IMP_OK && wants_any(c, "fresh,ends")) ended = imp__check_fresh(c);
+    if (ended == IMP_OK && !lights && wants_any(c, "loss")) ended = imp__check_losses(c);
+    if (ended == IMP_OK && wants_any(c, "ends")) ended = imp__check_ends(c);
+    return ended;
+}
+
+/* Rows of poses, which are compared by themselves: walks of other rows stay where they are. */
+static enum imp_status poses_check(struct imp__check *c)
+{
+    struct imp_problem *p = c->problem;
+    p->edge_terms = true;
+    enum imp_status st = imp__problem_tracer_of_any_end(p, &c->outer, NULL, &c->tracer);
+    p->edge_terms = false;
+    if (st == IMP_OK && wants_any(c, "frozen")) st = imp__check_poses(c);
+    if (st == IMP_OK && wants_any(c, "fresh")) st = imp__check_fresh(c);
+    return st;
+}
+
 static enum imp_status check(imp_problem *p, const struct imp_check_options *options,
                              const struct imp_run *run, const struct imp_check_row **rows,
                              size_t *n_rows)
 {
     enum imp_status st = IMP_OK, ended = IMP_OK;
+    uint8_t *chosen = NULL; /* with poses: what is active, before and after */
     IMP_CHECKED(imp__problem_no_parts(p, "check"));
     IMP_FLOAT_MODE;
     IMP_SETS(p->scene, st);
@@ -190,6 +234,13 @@ static enum imp_status check(imp_problem *p, const struct imp_check_options *opt
     c.run.progress = inner_progress;
     c.run.progress_payload = &c;
     if (c.options.fresh_spp > 0) c.run.spp = c.options.fresh_spp;
+    const bool moves = imp__problem_moves(p);
+    if (moves) {
+        chosen = imp__alloc(p->ctx, p->scene->n_params + 1, 1);
+        if (!chosen) IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for a check"));
+        memcpy(chosen, p->chosen, p->scene->n_params);
+        IMP_TRY(layout_of(p, chosen, false));
+    }
     IMP_TRY(imp__problem_tracer_of_any_end(p, &c.outer, NULL, &c.tracer));
     const bool lights = c.tracer.integrator->from_lights;
     if (c.options.sampling) {
@@ -202,13 +253,11 @@ static enum imp_status check(imp_problem *p, const struct imp_check_options *opt
     if (c.options.sampling) {
         ended = imp__check_sampling(&c);
     } else {
-        ended = imp__check_densities(&c); /* first: all that follows rests on them */
-        if (ended == IMP_OK && !lights && wants_any(&c, "frozen,dot,euler"))
-            ended = imp__check_frozen(&c);
-        if (ended == IMP_OK && wants_any(&c, "fresh,ends")) ended = imp__check_fresh(&c);
-        if (ended == IMP_OK && !lights && wants_any(&c, "loss"))
-            ended = imp__check_losses(&c);
-        if (ended == IMP_OK && wants_any(&c, "ends")) ended = imp__check_ends(&c);
+        if (p->n > 0) ended = numbers_check(&c, lights);
+        if (ended == IMP_OK && moves) {
+            IMP_TRY(layout_of(p, chosen, true));
+            ended = poses_check(&c);
+        }
     }
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     struct imp_check_row *kept =
@@ -219,6 +268,11 @@ static enum imp_status check(imp_problem *p, const struct imp_check_options *opt
     *n_rows = c.n_rows;
     st = ended;
 out:
+    if (chosen) {
+        const enum imp_status back = imp__problem_layout(p, chosen);
+        if (st == IMP_OK) st = back;
+    }
+    imp__release(p->ctx, chosen);
     imp__release(p->ctx, c.rows);
     imp__release(p->ctx, c.slopes);
     return st;

@@ -50,6 +50,7 @@ double imp__check_scale(const struct imp_param *p, size_t e);
 void imp__check_direction(const struct imp_param *p, double *w);
 
 enum imp_status imp__check_frozen(struct imp__check *c); /* frozen, dot, euler */
+enum imp_status imp__check_poses(struct imp__check *c);  /* frozen, of poses */
 enum imp_status imp__check_fresh(struct imp__check *c);
 enum imp_status imp__check_losses(struct imp__check *c);
 enum imp_status imp__check_ends(struct imp__check *c);

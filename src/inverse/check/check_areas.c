@@ -7,12 +7,13 @@
  *
  *     q = cos(theta)/(4 pi^2 R^2)    per area and steradian        (Crofton; Santalo 1976)
  *
- * which asks for rays alone. areas: points drawn on the shape, with the density 1/area, and
+ * which asks for rays alone; lines along one direction cos(theta)/(pi R^2) per area. areas: points drawn on the shape, with the density 1/area, and
  * directions by the cosine. leaves: points and directions that light walks begin with; of a
  * light that is a point, directions against lobes about some that were drawn. Sums as in
  * check_directions.c, over all points in which a line leaves the shape. */
 #include "check_lobes.h"
 #include "check_sources.h"
+#include "kind/sensor/receiver.h"
 #include "math/offset.h"
 #include "math/rng.h"
 #include "math/warp.h"
@@ -28,7 +29,9 @@ struct surface {
     const struct imp_emitter *light; /* NULL: a meter, or the area alone */
     double time;
     imp_v3 centre;
-    double radius;           /* of a ball about the shape */
+    double radius; /* of a ball about the shape */
+    bool parallel; /* all light leaves along `axis`, and so do the lines */
+    imp_v3 axis;
     struct imp__lobes lobes; /* of a light that is a point */
 };
 
@@ -44,6 +47,7 @@ static void point_add(struct imp__pair *p, double pdf, double q, const double uv
 }
 static double line_density(const struct surface *x, double cosine)
 {
+    if (x->parallel) return cosine / (IMP_PI * imp__sqr(x->radius));
     return cosine / imp__sqr(IMP_2PI * x->radius);
 }
 
@@ -88,7 +92,7 @@ static void line_pair(const void *payload, uint64_t seed, int64_t i, struct imp_
     double u[8];
     for (int k = 0; k < 8; k++) u[k] = imp__u01(key, (uint32_t)k);
     drawn_add(x, u, p);
-    const imp_v3 d = imp__uniform_sphere(u + 4);
+    const imp_v3 d = x->parallel ? x->axis : imp__uniform_sphere(u + 4);
     const struct imp_frame across = imp__frame_from_normal(d);
     const double r = x->radius * sqrt(u[6]), phi = IMP_2PI * u[7];
     const imp_v3 begin =
@@ -165,6 +169,15 @@ static enum imp_status surface_add(struct imp__draw_list *l, const struct imp_tr
         x->centre = (shape->lo + shape->hi) * 0.5;
         x->radius = 0.501 * imp__length(shape->hi - shape->lo);
     } else lobes_set(x);
+    if (shape && light && light->ops->flags & IMP_EMITTER_DELTA) {
+        struct imp_emission_sample s;
+        s.located.prim = -1;
+        if (!light->ops->sample_emission(light, &t->scene->ball,
+                                         (double[4]){0.5, 0.5, 0.5, 0.5}, &s))
+            return IMP_OK;
+        x->parallel = true;
+        x->axis = s.d;
+    }
     return imp__draw_add(
         l, &(struct imp__draw_row){.method = method,
                                    .name = name,
@@ -182,8 +195,8 @@ static bool alike(const struct imp_emitter *a, const struct imp_emitter *b)
 static bool looked_at(const struct imp_emitter *e)
 {
     const unsigned other = IMP_EMITTER_FAR | IMP_EMITTER_ENVIRONMENT;
-    return !(e->ops->flags & other) && e->ops->sample_emission && e->ops->pdf_emission &&
-           (!e->shape || e->shape->area > 0);
+    if (!e->ops->sample_emission || !e->ops->pdf_emission) return false;
+    return e->shape ? e->shape->area > 0 : !(e->ops->flags & other); /* check_far.c */
 }
 
 enum imp_status imp__check_areas(struct imp__draw_list *l,
@@ -193,7 +206,7 @@ enum imp_status imp__check_areas(struct imp__draw_list *l,
     const struct imp_tracer *t = &places->tracer;
     const struct imp_scene *scene = t->scene;
     const struct imp_shape *meter = t->sensor->shape;
-    if (meter && meter->ops->sample_area && meter->area > 0)
+    if (meter && !imp__is_unmet(t->sensor) && meter->ops->sample_area && meter->area > 0)
         IMP_TRY(surface_add(l, t, meter, NULL, "areas", t->sensor->name));
     for (int k = 0; k < scene->n_emitters; k++) {
         const struct imp_emitter *e = scene->emitters[k];

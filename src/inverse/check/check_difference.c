@@ -9,13 +9,14 @@
  * one-sided differences D of third order, (8 D(h/2) - D(h))/7. */
 #include "check_difference.h"
 #include "film/film_picture.h"
+#include "scene/pose.h"
 #include <math.h>
 
 /* Steps as fractions of the distance to the bounds, or of the value's scale where that is
  * smaller. They are large because noise falls with 1/step. F is exactly linear in
  * emission. Elsewhere the error of Richardson's combination is 0.3^4 = 0.8 % of the term
  * of fifth order. */
-#define STEP           0.3
+#define STEP           IMP_FRESH_STEP
 #define STEP_LINEAR    0.8
 #define FLOAT_ROUNDING 1e-7 /* of a picture's mean: 2^-24, and some for its sums */
 
@@ -166,12 +167,14 @@ static enum imp_status at(struct imp__fresh *f, const struct imp__motion *m, dou
     for (size_t e = 0; e < p.info.count; e++)
         if (m->weight[e] != 0) imp__param_set(&p, e, m->old[e] + step * m->weight[e]);
     imp__theta_announce(f->check->problem->scene);
+    IMP_TRY(imp__poses_settle(f->check->problem->scene));
     for (int b = 0; b < IMP_CHECK_BATCHES; b++)
         IMP_TRY(functional(f, NULL, seed[b], &value[b]));
 out:
     for (size_t e = 0; e < p.info.count; e++) imp__param_set(&p, e, m->old[e]);
     imp__theta_announce(f->check->problem->scene);
-    return st;
+    const enum imp_status back = imp__poses_settle(f->check->problem->scene);
+    return st == IMP_OK ? back : st;
 }
 
 #define PLACES 6
@@ -226,10 +229,11 @@ enum imp_status imp__fresh_difference(struct imp__fresh *f, const struct imp__mo
                                       bool linear, double *step,
                                       struct imp__quotient *out)
 {
-    double below, above, scale = 0;
+    double below, above, scale = m->scale;
     room(m, &below, &above);
     for (size_t e = 0; e < m->param->info.count; e++)
-        if (m->weight[e] != 0) scale = fmax(scale, imp__check_scale(m->param, e));
+        if (m->weight[e] != 0 && m->scale == 0)
+            scale = fmax(scale, imp__check_scale(m->param, e));
     const double least = 1e-3 * scale, part = linear ? STEP_LINEAR : STEP;
     const double both = fmin(fmin(below, above), scale);
     if (both > least) {

@@ -9,6 +9,8 @@
 #define IMP_CHECK_BATCHES                                                                \
     16 /* independent differences behind an SE, known to 18 % then */
 
+#define IMP_FRESH_STEP 0.3 /* of a value's scale (check_difference.c) */
+
 /* The functional F = sum_pc s_pc I_pc that fresh checks differentiate, with a smooth positive
  * pattern s of mean 1/pixels. */
 struct imp__fresh {
@@ -34,6 +36,7 @@ enum imp_status imp__fresh_value(struct imp__fresh *f, struct imp_estimate *out)
 struct imp__motion {
     const struct imp_param *param;
     const double *old, *weight; /* [count] */
+    double scale;               /* of the values that move; 0: imp__check_scale */
 };
 struct imp__quotient {
     struct imp_estimate mean;

@@ -109,13 +109,17 @@ static int worst_part(const struct imp__compared *c, double slack)
     return worst;
 }
 
-/* What the row would see: of everything, and of the parts that are often drawn. */
-static double row_sees(const struct imp__compared *c, double slack)
+/* What the row would see: of everything, of the parts that are often drawn, and of those that
+ * it wants to see well. */
+static double row_sees(const struct imp__compared *c, const struct imp__draw_row *row)
 {
-    double sees = imp__compared_part(c, 0, slack).sees;
+    double sees = imp__compared_part(c, 0, row->slack).sees;
     for (int k = 1; k < IMP_DRAW_PARTS; k++) {
-        const double part = imp__compared_part(c, k, slack).sees;
-        if (c->part[k].hits >= IMP_DRAW_OFTEN * c->n && isfinite(part))
+        const double part = imp__compared_part(c, k, row->slack).sees;
+        if (!isfinite(part)) continue;
+        if (row->fine >> k & 1)
+            sees = fmax(sees, part * (IMP_DRAW_WANTED / IMP_DRAW_FINE));
+        else if (c->part[k].hits >= IMP_DRAW_OFTEN * c->n)
             sees = fmax(sees, part / IMP_DRAW_COARSE);
     }
     return sees;
@@ -184,7 +188,7 @@ static enum imp_status row_draw(const struct imp__draw_list *l, size_t k, double
             IMP_TRY(confirm(l, row, seed + (uint64_t)d->looks, &d->c, &d->wrong, &d->part,
                             &d->again));
         d->looks++;
-        d->sees = row_sees(&d->c, row->slack);
+        d->sees = row_sees(&d->c, row);
         d->more = pairs_next(&d->c, d->sees);
         IMP_TRY(imp__check_progress(check, 0));
     }

@@ -25,6 +25,7 @@
 #define IMP_DRAW_WANTED 0.02
 #define IMP_DRAW_OFTEN  0.2
 #define IMP_DRAW_COARSE 5
+#define IMP_DRAW_FINE   0.05
 
 struct imp__compared {
     double n; /* pairs */
@@ -56,6 +57,8 @@ struct imp__draw_row {
     void (*pair)(const void *payload, uint64_t seed, int64_t i, struct imp__pair *p);
     const void *payload;
     double slack; /* relative error that the claim may have by quadrature or rounding */
+    uint32_t
+        fine; /* parts of which it wants to see IMP_DRAW_FINE, however rarely drawn */
 };
 
 /* The rows of a check, and what their payloads lie in. */

@@ -1,13 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a walk begins with: its place on the film, and its wavelengths.
+ * What a walk begins with: its place on the film, its time, and its wavelengths.
  *
- * film: places are even within a pixel. waves: the sum of the weights that channels give to a
+ * film: places are even within a pixel. times: while the shutter is open they are even, or have
+ * the density of the sensor's response, of which the truth is a quadrature; so have those of
+ * light walks. waves: the sum of the weights that channels give to a
  * walk's wavelengths is an estimate of the integral of the responses, also over each of eight
  * parts of the spectrum; the truth is a quadrature of the responses. */
 #include "check_sources.h"
 #include "check_walks.h"
+#include "math/course.h"
 #include "math/rng.h"
+#include "walk/core/step.h"
 #include <math.h>
 
 #define BINS   8
@@ -19,6 +23,7 @@ struct start {
     const struct imp_tracer *tracer;
     imp_spec weight; /* of the channels */
     double integral[BINS], all;
+    double share[BINS], mean; /* of times, from 0 to 1 while the shutter is open */
 };
 
 static void film_pair(const void *payload, uint64_t seed, int64_t i, struct imp__pair *p)
@@ -37,6 +42,38 @@ static void film_pair(const void *payload, uint64_t seed, int64_t i, struct imp_
         imp__pair_add(p, ACROSS + k, floor(px * BINS) == k, 1.0 / BINS);
         imp__pair_add(p, DOWN + k, floor(py * BINS) == k, 1.0 / BINS);
     }
+}
+
+static void time_pair(const void *payload, uint64_t seed, int64_t i, struct imp__pair *p)
+{
+    const struct start *f = payload;
+    const struct imp_sensor *s = f->tracer->sensor;
+    struct imp_tracer tracer = *f->tracer;
+    struct imp_walk walk;
+    double lens[2];
+    tracer.seed = seed;
+    if (i & 1) imp__light_walk_begin(&tracer, &walk, imp__key(seed, 0x71, (uint64_t)i));
+    else imp__walk_begin(&tracer, 0, 0, i, &walk, lens);
+    const double past = (walk.time - s->open) / (s->close - s->open);
+    imp__pair_add(p, WHOLE, past, f->mean);
+    for (int k = 0; k < BINS; k++)
+        imp__pair_add(p, PARTS + k, floor(past * BINS) == k, f->share[k]);
+}
+
+static void shares_set(struct start *f)
+{
+    const struct imp_sensor *s = f->tracer->sensor;
+    double sum = 0;
+    for (int k = 0; k < BINS * POINTS; k++) {
+        const double past = (k + 0.5) / (BINS * POINTS),
+                     at = s->open + past * (s->close - s->open),
+                     value = s->course ? imp__course_at(s->course, at) : 1;
+        f->share[k / POINTS] += value;
+        f->mean += value * past;
+        sum += value;
+    }
+    f->mean /= sum;
+    for (int k = 0; k < BINS; k++) f->share[k] /= sum;
 }
 
 static void wave_pair(const void *payload, uint64_t seed, int64_t i, struct imp__pair *p)
@@ -89,6 +126,14 @@ enum imp_status imp__check_film(struct imp__draw_list *l,
     IMP_TRY(imp__draw_add(
         l, &(struct imp__draw_row){
                .method = "film", .name = name, .pair = film_pair, .payload = f}));
+    if (t->sensor->close > t->sensor->open) {
+        shares_set(f);
+        IMP_TRY(imp__draw_add(l, &(struct imp__draw_row){.method = "times",
+                                                         .name = name,
+                                                         .pair = time_pair,
+                                                         .payload = f,
+                                                         .slack = 1e-3}));
+    }
     if (!t->wavelengths) return IMP_OK;
     integrals_set(f, l->check);
     IMP_TRY(imp__draw_add(l, &(struct imp__draw_row){.method = "waves",

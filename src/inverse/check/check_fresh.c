@@ -10,6 +10,8 @@
  * Rows whose standard error is too large to decide anything are repeated with more
  * samples, up to 16 times as many in all, which are added to those before. */
 #include "check_difference.h"
+#include "inverse/estimate/moved_gradient.h"
+#include "scene/pose.h"
 #include <math.h>
 #include <string.h>
 
@@ -130,6 +132,44 @@ static bool is_emission(const struct imp_scene *s, size_t param)
     return emission && !other;
 }
 
+/* Has every number a row? */
+static bool is_singly(const struct imp_problem *p, size_t param)
+{
+    return p->scene->params[param].info.count <= IMP_CHECK_SINGLY ||
+           imp__pose_of(p->scene, param);
+}
+
+/* A large change of a number of a pose; 0: it is none. */
+static double pose_scale(const struct imp_problem *p, const struct comparison *c)
+{
+    const struct imp_pose *pose = imp__pose_of(p->scene, c->param);
+    return pose ? 0.2 * imp__pose_large(pose, c->element) : 0;
+}
+
+/* Is there room for a pose on both sides? What touches another object has a derivative on one. */
+static enum imp_status has_room(struct rows *r, const struct imp__motion *m, size_t e,
+                                bool *yes)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_problem *p = r->fresh.check->problem;
+    struct imp_param param = *m->param;
+    *yes = true;
+    for (int side = -1; side <= 1 && *yes && m->scale > 0; side += 2) {
+        imp__param_set(&param, e, m->old[e] + side * IMP_FRESH_STEP * m->scale);
+        imp__theta_announce(p->scene);
+        IMP_TRY(imp__poses_settle(p->scene));
+        st = imp__moved_possible(p, &r->fresh.check->run);
+        *yes = st == IMP_OK;
+        if (st == IMP_E_UNSUPPORTED) st = IMP_OK;
+        IMP_TRY(st);
+    }
+out:
+    imp__param_set(&param, e, m->old[e]);
+    imp__theta_announce(p->scene);
+    const enum imp_status back = imp__poses_settle(p->scene);
+    return st == IMP_OK ? back : st;
+}
+
 /* `before`: samples that the row has had, in multiples of the given number. */
 static enum imp_status comparison_round(struct rows *r, struct comparison *c, int before)
 {
@@ -145,11 +185,26 @@ static enum imp_status comparison_round(struct rows *r, struct comparison *c, in
     double *old = buffer, *weight = buffer + count, *x_dot = buffer + 2 * count;
     struct imp_estimate mine;
     for (size_t e = 0; e < count; e++) old[e] = imp__param_get(q, e);
-    const struct imp__motion m = {q, old, weight};
-    if (count <= IMP_CHECK_SINGLY) {
+    const struct imp__motion m = {q, old, weight, pose_scale(p, c)};
+    if (is_singly(p, c->param)) {
         const size_t e = c->element < 0 ? 0 : (size_t)c->element;
+        bool room = true;
         weight[e] = 1;
         mine = (struct imp_estimate){r->gradient[base + e], r->gradient_se[base + e], 0};
+        if (m.scale > 0) IMP_TRY(has_room(r, &m, e, &room));
+        if (!room) { /* nothing is decided */
+            const struct imp_check_row row = {.step = IMP_FRESH_STEP * m.scale,
+                                              .value = mine.value,
+                                              .reference = NAN,
+                                              .se = mine.se,
+                                              .error = NAN,
+                                              .limit = Z_LIMIT,
+                                              .ok = -1};
+            c->mine = mine;
+            c->noisy = false;
+            st = imp__check_row(r->fresh.check, "fresh", q->info.name, c->element, &row);
+            goto out;
+        }
     } else { /* one direction through all of them */
         imp__check_direction(q, weight);
         memcpy(x_dot + base, weight, count * sizeof *weight);
@@ -167,8 +222,7 @@ static enum imp_status comparisons_list(struct rows *r)
     const struct imp_problem *p = r->fresh.check->problem;
     for (size_t k = 0; k < p->scene->n_params; k++) {
         if (p->active.base[k] < 0) continue;
-        const size_t count = p->scene->params[k].info.count,
-                     n = count <= IMP_CHECK_SINGLY ? count : 1;
+        const size_t n = is_singly(p, k) ? p->scene->params[k].info.count : 1;
         for (size_t e = 0; e < n; e++) {
             struct comparison *grown = imp__grow(r->fresh.check->ctx, r->comparisons,
                                                  &r->cap, r->n + 1, sizeof *grown);
@@ -213,6 +267,7 @@ out:
 static enum imp_status slopes_keep(const struct rows *r)
 {
     struct imp__check *c = r->fresh.check;
+    if (c->slopes) return IMP_OK; /* those of poses are not compared */
     c->slopes = imp__alloc(c->ctx, r->n + 1, sizeof *c->slopes);
     if (!c->slopes) return imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check");
     for (size_t k = 0; k < r->n; k++)

@@ -139,6 +139,14 @@ void imp__place_step(const struct imp__places *p, const struct imp__place *place
     s->at = imp__vertex_at(v);
     s->wo = s->wo_drawn = imp__vertex_wo(v);
     s->in = v->in;
-    if (s->mixed.all && place->located) imp__mixture_prepare(s, v->bsdf, place->at.p);
+    const struct imp_guide *guide = s->guided.guide;
+    if (guide && place->located && v->d.scatterer == IMP_AT_SURFACE) {
+        const struct imp_hit hit = {.shape = v->d.shape, .prim = v->d.located.prim};
+        const imp_v3 d = -imp__to_world(&place->frame, s->wo);
+        s->guided.here =
+            guide->find(guide, IMP_GUIDE_LIGHT, &hit, &place->at, d, &s->guided.at);
+    }
+    if ((s->mixed.all || s->guided.here) && place->located)
+        imp__mixture_prepare(s, v->bsdf, place->at.p);
     s->mixed.only = -1;
 }

@@ -13,7 +13,7 @@
 #include <math.h>
 #include <stdio.h>
 
-enum { QUARTERS = IMP_LIGHT_RATIOS + 6, SAME = QUARTERS + 4 };
+enum { QUARTERS = IMP_LIGHT_RATIOS + 6, SAME = QUARTERS + 4, NARROWLY };
 #define GRAZES      0.05 /* cosine below which the rounding of a ray changes densities */
 #define PASSED_MOST 16   /* surfaces without effect on the way */
 
@@ -130,6 +130,18 @@ static void area_pair(const struct points *g, int k, const struct imp__place *x,
     if (pdf > 0) point_add(p, pdf, cone_pdf(&frame, height, w), at.uv, false);
 }
 
+/* A small bright place is a part of its own: a sun, whose share may be wrong alone. */
+static void sky_add(struct imp__pair *p, const struct imp__lobes *q, imp_v3 w, double pdf,
+                    bool drawn)
+{
+    const double uv[2] = {0.5 + 0.5 * w[0], 0.5 + 0.5 * w[1]},
+                 other = imp__lobes_pdf(q, w);
+    const double part = (drawn ? other : pdf) / (other + pdf);
+    point_add(p, pdf, other, uv, drawn);
+    if (imp__lobes_narrowly(q, w))
+        imp__pair_add(p, NARROWLY, drawn ? part : 0, drawn ? 0 : part);
+}
+
 static void sky_pair(const struct points *g, int k, const struct imp__place *x,
                      struct imp_key key, struct imp__pair *p)
 {
@@ -139,14 +151,12 @@ static void sky_pair(const struct points *g, int k, const struct imp__place *x,
                  v[3] = {imp__u01(key, 2), imp__u01(key, 3), imp__u01(key, 4)};
     struct imp_light_sample ls;
     if (e->ops->sample(e, &x->at.p, u, &ls) && ls.pdf > 0) {
-        const double uv[2] = {0.5 + 0.5 * ls.wi[0], 0.5 + 0.5 * ls.wi[1]};
-        point_add(p, ls.pdf, imp__lobes_pdf(q, ls.wi), uv, true);
+        sky_add(p, q, ls.wi, ls.pdf, true);
         imp__agree_add(p, SAME, ls.pdf, e->ops->pdf(e, &x->at.p, &ls.wi, NULL, NULL));
     }
     const imp_v3 w = imp__lobes_sample(q, v);
     const double pdf = e->ops->pdf(e, &x->at.p, &w, NULL, NULL);
-    const double uv[2] = {0.5 + 0.5 * w[0], 0.5 + 0.5 * w[1]};
-    if (pdf > 0) point_add(p, pdf, imp__lobes_pdf(q, w), uv, false);
+    if (pdf > 0) sky_add(p, q, w, pdf, false);
 }
 
 static void point_pair(const void *payload, uint64_t seed, int64_t i, struct imp__pair *p)
@@ -206,13 +216,7 @@ enum imp_status imp__check_points(struct imp__draw_list *l,
     for (int k = 0; k < g->n && g->triangles; k++)
         area[k] = imp__triangles_area(&light[k]->shape->triangles);
     for (int k = 0; k < g->n && !e->shape; k++)
-        for (uint32_t j = 0; j < IMP_LOBE_AXES; j++) {
-            const struct imp_key key = imp__key(0x9107, (uint64_t)k, 5);
-            const double u[2] = {imp__u01(key, 2 * j), imp__u01(key, 2 * j + 1)};
-            struct imp_light_sample ls;
-            if (light[k]->ops->sample(light[k], &v->at[0]->at.p, u, &ls))
-                imp__lobes_add(&sky[k], ls.wi);
-        }
+        imp__lobes_of_sky(&sky[k], light[k], v->at[0]->at.p);
     const char *own = e->name ? e->name : e->ops->name;
     if (g->n == 1) snprintf(name, 160, "%s", own);
     else snprintf(name, 160, "%s and %d more", own, g->n - 1);
@@ -220,7 +224,8 @@ enum imp_status imp__check_points(struct imp__draw_list *l,
                                                   .name = name,
                                                   .pair = point_pair,
                                                   .payload = g,
-                                                  .slack = 1e-3});
+                                                  .slack = 1e-3,
+                                                  .fine = 1u << NARROWLY});
 out:
     return st;
 }

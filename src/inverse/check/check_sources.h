@@ -22,7 +22,16 @@ enum imp_status imp__check_flights(struct imp__draw_list *l,
 /* Rows for meters and for kinds of lights: areas, leaves. */
 enum imp_status imp__check_areas(struct imp__draw_list *l,
                                  const struct imp__places *places);
-/* Rows for what a walk begins with: film, waves. */
+/* Rows for light walks of skies and parallel lights: leaves. */
+enum imp_status imp__check_far(struct imp__draw_list *l,
+                               const struct imp__places *places);
+/* Rows for what a guide draws: guides. */
+enum imp_status imp__check_guides(struct imp__draw_list *l,
+                                  const struct imp__places *places);
+/* A row for the weights of bidirectional walks: weights. */
+enum imp_status imp__check_weights(struct imp__draw_list *l,
+                                   const struct imp__places *places);
+/* Rows for what a walk begins with: film, times, waves. */
 enum imp_status imp__check_film(struct imp__draw_list *l,
                                 const struct imp__places *places);
 

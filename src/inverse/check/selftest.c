@@ -6,9 +6,6 @@
 #include "math/warp.h"
 #include <string.h>
 
-/* z beyond this is 1 in 150,000 by chance; objects have tens of them. */
-#define Z_LIMIT 4.5
-
 /* ---- Rows ------------------------------------------------------------------------ */
 
 enum imp_status imp__selftest_row(struct imp__selftest *t,
@@ -23,6 +20,8 @@ enum imp_status imp__selftest_row(struct imp__selftest *t,
     r->size = sizeof *r;
     if (r->ok != IMP_VERDICT_OPEN)
         r->ok = r->error <= r->limit ? IMP_VERDICT_RIGHT : IMP_VERDICT_WRONG;
+    if (r->ok == IMP_VERDICT_RIGHT && r->sees > IMP_SELFTEST_WANTED)
+        r->ok = IMP_VERDICT_OPEN;
     return IMP_OK;
 }
 
@@ -40,7 +39,7 @@ enum imp_status imp__selftest_count(struct imp__selftest *t, const char *object,
 }
 
 enum imp_status imp__selftest_draws(struct imp__selftest *t, const char *object,
-                                    const char *kind, double chance)
+                                    const char *kind, double chance, double sees)
 {
     const double least = fmax(chance, 1e-300);
     return imp__selftest_row(
@@ -51,24 +50,26 @@ enum imp_status imp__selftest_draws(struct imp__selftest *t, const char *object,
                                       .reference = t->level,
                                       .error = fmax(0, -imp__normal_quantile(least)),
                                       .limit = -imp__normal_quantile(t->level),
-                                      .chance = chance});
+                                      .chance = chance,
+                                      .sees = sees});
 }
 
 enum imp_status imp__selftest_z(struct imp__selftest *t, const char *object,
-                                const char *kind, const char *contract, double value,
-                                double se, double reference)
+                                const char *kind, const char *contract,
+                                const struct imp__scores *s)
 {
-    const double z = fabs(value - reference) / se;
-    return imp__selftest_row(t, &(struct imp_selftest_row){
-                                    .object = object,
-                                    .kind = kind,
-                                    .contract = contract,
-                                    .value = value,
-                                    .reference = reference,
-                                    .se = se,
-                                    .error = isfinite(z) ? z : INFINITY,
-                                    .limit = Z_LIMIT,
-                                    .chance = isfinite(z) ? 2 * imp__normal_cdf(-z) : 0});
+    const double z = fabs(s->z);
+    return imp__selftest_row(
+        t, &(struct imp_selftest_row){.object = object,
+                                      .kind = kind,
+                                      .contract = contract,
+                                      .value = s->value,
+                                      .reference = s->reference,
+                                      .se = s->se,
+                                      .error = isfinite(z) ? z : INFINITY,
+                                      .limit = IMP_SELFTEST_LIMIT,
+                                      .chance = isfinite(z) ? 2 * imp__normal_cdf(-z) : 0,
+                                      .sees = s->sees});
 }
 
 imp_v3 imp__selftest_direction(int i, uint64_t seed)
@@ -144,6 +145,7 @@ enum imp_status imp_selftest(imp_scene *scene, enum imp_selftest_subject subject
         return imp__error(ctx, IMP_E_ARG, "samples and directions must be >= 0");
     if (!scene->committed)
         return imp__error(ctx, IMP_E_ARG, "imp_selftest: the scene is not committed");
+    t.raises = t.options.samples == 0;
     if (t.options.samples == 0) t.options.samples = 200000;
     if (t.options.directions == 0) t.options.directions = 12;
     if (t.options.samples / t.options.directions < 1000)

@@ -10,10 +10,12 @@
 #include "math/stat.h"
 #include "scene/scene.h"
 
+struct imp__scores;
 struct imp__selftest {
     imp_context *ctx;
     const struct imp_scene *scene;
     struct imp_selftest_options options;
+    bool raises;  /* draws are added until 2 % would be seen */
     double level; /* of one chi-square, so that all together fail 1 % (Sidak 1967) */
     struct imp__sphere_tree *tree;
     struct imp_selftest_row *rows;
@@ -29,11 +31,44 @@ enum imp_status imp__selftest_count(struct imp__selftest *t, const char *object,
                                     double n);
 /* The least chance of some chi-squares. */
 enum imp_status imp__selftest_draws(struct imp__selftest *t, const char *object,
-                                    const char *kind, double chance);
+                                    const char *kind, double chance, double sees);
 /* A z-score. */
 enum imp_status imp__selftest_z(struct imp__selftest *t, const char *object,
-                                const char *kind, const char *contract, double value,
-                                double se, double reference);
+                                const char *kind, const char *contract,
+                                const struct imp__scores *s);
+
+/* ---- selftest_power.c: what a test would have seen ---- */
+/* A relative error that rows want to see, with the probability IMP_SELFTEST_POWER. */
+#define IMP_SELFTEST_WANTED 0.02
+#define IMP_SELFTEST_POWER  0.95
+#define IMP_SELFTEST_LIMIT  4.5 /* of |z|: 1 in 150,000 by chance, and objects have tens */
+
+/* Chi-squares of several directions, one by one and together. */
+struct imp__chances {
+    double least;            /* chance of one, or of their sum */
+    double chi2, degrees, n; /* sums over those with enough cells; n: draws */
+};
+#define IMP_CHANCES_INIT                                                                 \
+    {                                                                                    \
+        .least = 1                                                                       \
+    }
+void imp__chances_add(struct imp__chances *c, const struct imp__draws *test, int n);
+/* All are there. Returns the root mean square relative error that the sum would have seen. */
+double imp__chances_end(struct imp__chances *c, double level);
+
+/* Values against references at several places, one by one and together: the relative error that
+ * all have is estimated by weights 1/variance. */
+struct imp__scores {
+    double z, value, reference, se; /* the worst */
+    double sum, weight;             /* of relative errors */
+    double sees;
+};
+void imp__scores_add(struct imp__scores *s, double value, double reference, double se);
+void imp__scores_end(struct imp__scores *s);
+
+/* Draws of the next try: so many that `sees` becomes what is wanted. 0: it is, or the caller
+ * has said how many, or there are as many as there may be. */
+int imp__selftest_more(const struct imp__selftest *t, int n, double sees);
 
 enum imp_status imp__selftest_materials(struct imp__selftest *t);
 enum imp_status imp__selftest_lights(struct imp__selftest *t);

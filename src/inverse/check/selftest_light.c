@@ -13,6 +13,8 @@ struct light {
     imp_v3 ref;
     const struct imp_carried *carried; /* in spectral modes: four wavelengths */
 };
+#define SKY_PLACES 3
+#define DERIVED    4000 /* directions at a place where derivatives are compared */
 static const struct imp_carried waves = {4, {460, 530, 600, 670}};
 
 static double brightness(const struct light *l, imp_spec le)
@@ -98,9 +100,10 @@ static void spot_set(const struct light *l, uint64_t seed, struct cone *c)
 struct found {
     double n, bad, uncovered, density; /* the last: worst relative difference */
     double error;                      /* of derivatives */
-    double z, own, other, se;          /* light by own draws and by a cone: the worst */
-    double least;                      /* chance of the chi-squares, of a sky */
-    double total;                      /* of its density */
+    struct imp__scores light;          /* by own draws and by a cone */
+    struct imp__chances chances;       /* of a sky */
+    struct imp__scores total;          /* of its density */
+    double seen;                       /* by the chi-squares together */
 };
 
 /* eval_d against central differences: exact, as light is linear in most inputs. */
@@ -177,7 +180,7 @@ static double draw_take(const struct light *l, const double u[2], struct found *
 
 /* One direction drawn without the light. */
 static double cone_take(const struct light *l, const struct cone *c, const double u[2],
-                        struct found *r)
+                        bool derives, struct found *r)
 {
     const bool inside = c->spot && u[0] < 0.5;
     const double first = c->spot ? 2 * u[0] - !inside : u[0];
@@ -202,7 +205,7 @@ static double cone_take(const struct light *l, const struct cone *c, const doubl
     r->bad += !sane;
     if (!sane) return 0;
     r->uncovered += value > 0 && !(pdf > 0);
-    r->error = fmax(r->error, derivative_error(l, &x, p));
+    if (derives) r->error = fmax(r->error, derivative_error(l, &x, p));
     return value * IMP_2PI / share;
 }
 
@@ -223,46 +226,78 @@ static bool sky_draw(void *payload, const double u[3], imp_v3 *w, int *lobe)
     return true;
 }
 
-static enum imp_status light(struct imp__selftest *t, const struct imp_emitter *e)
+/* A place from which the light is looked at. */
+static struct light light_at(const struct imp__selftest *t, const struct imp_emitter *e,
+                             int i)
 {
-    enum imp_status st = IMP_OK;
-    struct found r = {.least = 1};
-    const char *name = e->name, *kind = e->ops->name;
-    const bool delta = e->ops->flags & IMP_EMITTER_DELTA,
-               sky = e->ops->flags & IMP_EMITTER_ENVIRONMENT;
-    const int n = t->options.samples / t->options.directions + 1;
+    const bool spectral = t->scene->mode == IMP_SPECTRAL || t->scene->mode == IMP_SINGLE;
+    return (struct light){
+        .scene = t->scene,
+        .e = e,
+        .channels = t->scene->channels,
+        .carried = spectral ? &waves : NULL,
+        .ref = reference(t->scene, imp__key(t->options.seed, 31, (uint64_t)i))};
+}
+
+/* Light by n draws of its own at each place, and by directions drawn without it. */
+static void light_take(const struct imp__selftest *t, const struct imp_emitter *e, int n,
+                       struct found *r)
+{
+    const bool delta = e->ops->flags & IMP_EMITTER_DELTA;
+    r->n = 0;
+    r->light = (struct imp__scores){0};
     for (int i = 0; i < t->options.directions; i++) {
-        const bool spectral =
-            t->scene->mode == IMP_SPECTRAL || t->scene->mode == IMP_SINGLE;
-        struct light l = {.scene = t->scene,
-                          .e = e,
-                          .channels = t->scene->channels,
-                          .carried = spectral ? &waves : NULL};
+        const struct light l = light_at(t, e, i);
         struct imp__mean own = {0}, other = {0};
-        l.ref = reference(t->scene, imp__key(t->options.seed, 31, (uint64_t)i));
         struct cone cone = cone_of(&l);
-        if (sky) spot_set(&l, t->options.seed, &cone);
+        if (e->ops->flags & IMP_EMITTER_ENVIRONMENT) spot_set(&l, t->options.seed, &cone);
         for (int k = 0; k < n; k++) {
             const struct imp_key key =
                 imp__key(t->options.seed, 400 + (uint64_t)i, (uint64_t)k);
             const double u[4] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2),
                                  imp__u01(key, 3)};
-            imp__mean_add(&own, draw_take(&l, u, &r));
-            if (!delta) imp__mean_add(&other, cone_take(&l, &cone, &u[2], &r));
+            imp__mean_add(&own, draw_take(&l, u, r));
+            if (!delta)
+                imp__mean_add(&other, cone_take(&l, &cone, &u[2], k < DERIVED, r));
         }
         const double se = sqrt(imp__mean_variance(&own) + imp__mean_variance(&other)) +
                           1e-5 * fabs(own.mean) + 1e-300;
-        const double z = delta ? 0 : (own.mean - other.mean) / se;
-        if (fabs(z) >= fabs(r.z))
-            r.z = z, r.own = own.mean, r.other = other.mean, r.se = se;
-        if (!sky || r.bad > 0 || i > 2) continue; /* the same from everywhere */
-        const struct imp__drawn d = {sky_draw, sky_density, NULL, &l, 0};
-        const struct imp__draws test =
-            imp__draws_test(&d, t->options.samples / 3 + 1, t->options.seed + (uint64_t)i,
-                            IMP_SPHERE_STEPS, t->tree);
-        r.least = fmin(r.least, test.chance);
-        r.total = test.total;
+        if (!delta) imp__scores_add(&r->light, own.mean, other.mean, se);
     }
+    imp__scores_end(&r->light);
+}
+
+/* A sky is the same from everywhere. */
+static void sky_take(const struct imp__selftest *t, const struct imp_emitter *e, int n,
+                     struct found *r)
+{
+    r->chances = (struct imp__chances)IMP_CHANCES_INIT;
+    r->total = (struct imp__scores){0};
+    for (int i = 0; i < SKY_PLACES; i++) {
+        struct light l = light_at(t, e, i);
+        const struct imp__drawn d = {sky_draw, sky_density, NULL, &l, 0};
+        const struct imp__draws test = imp__draws_test(
+            &d, n, t->options.seed + (uint64_t)i, IMP_SPHERE_STEPS, t->tree);
+        imp__chances_add(&r->chances, &test, n);
+        imp__scores_add(&r->total, test.total, 1, 1e-3);
+    }
+    r->seen = imp__chances_end(&r->chances, t->level);
+    imp__scores_end(&r->total);
+}
+
+static enum imp_status light(struct imp__selftest *t, const struct imp_emitter *e)
+{
+    enum imp_status st = IMP_OK;
+    struct found r = {0};
+    const char *name = e->name, *kind = e->ops->name;
+    const bool delta = e->ops->flags & IMP_EMITTER_DELTA,
+               sky = e->ops->flags & IMP_EMITTER_ENVIRONMENT;
+    const int n = t->options.samples / t->options.directions + 1;
+    for (int m = n; m > 0 && r.bad == 0; m = imp__selftest_more(t, m, r.light.sees))
+        light_take(t, e, m, &r);
+    for (int m = t->options.samples / SKY_PLACES + 1; m > 0 && sky && r.bad == 0;
+         m = imp__selftest_more(t, m, r.seen))
+        sky_take(t, e, m, &r);
     IMP_TRY(imp__selftest_count(t, name, kind, "finite", r.bad, r.n));
     if (r.bad > 0) return IMP_OK;
     if (delta) return IMP_OK;
@@ -275,10 +310,10 @@ static enum imp_status light(struct imp__selftest *t, const struct imp_emitter *
                                                             .limit = 0.01,
                                                             .chance = -1}));
     if (sky) {
-        IMP_TRY(imp__selftest_z(t, name, kind, "normalised", r.total, 1e-3, 1));
-        IMP_TRY(imp__selftest_draws(t, name, kind, r.least));
+        IMP_TRY(imp__selftest_z(t, name, kind, "normalised", &r.total));
+        IMP_TRY(imp__selftest_draws(t, name, kind, r.chances.least, r.seen));
     }
-    IMP_TRY(imp__selftest_z(t, name, kind, "light", r.own, r.se, r.other));
+    IMP_TRY(imp__selftest_z(t, name, kind, "light", &r.light));
     IMP_TRY(imp__selftest_row(t, &(struct imp_selftest_row){.object = name,
                                                             .kind = kind,
                                                             .contract = "derivative",
@@ -293,7 +328,7 @@ out:
 enum imp_status imp__selftest_lights(struct imp__selftest *t)
 {
     enum imp_status st = IMP_OK;
-    t->level = imp__sidak(0.01, 3);
+    t->level = imp__sidak(0.01, SKY_PLACES + 1);
     for (int k = 0; k < t->scene->n_emitters; k++)
         IMP_TRY(light(t, t->scene->emitters[k]));
 out:

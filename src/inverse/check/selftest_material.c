@@ -182,11 +182,11 @@ static void answers_take(const struct imp__selftest *t, struct point *p, int i,
 /* ---- Draws ----------------------------------------------------------------------- */
 
 struct drawn {
-    double least;          /* chance of the chi-squares */
-    double total, total_z; /* density and missing draws: the worst */
-    double most, most_se;  /* albedo: power that leaves */
-    double z;              /* of albedos by draws against quadrature: the worst */
-    double albedo, sampled, se;
+    struct imp__chances chances;
+    double seen;               /* by the chi-squares together */
+    struct imp__scores total;  /* density and missing draws: 1 */
+    struct imp__scores albedo; /* by draws against quadrature */
+    double most, most_se;      /* albedo: power that leaves */
 };
 
 /* Albedo by draws, smooth lobes and all. */
@@ -220,10 +220,31 @@ static void albedo_take(const struct imp__selftest *t, struct point *p, int i, i
             exact += imp__sphere_cell_integral(&t->tree->cell[k], power_towards, p, 1e-6,
                                                IMP_SPHERE_STEPS);
     const struct imp__mean *s = &smooth[p->lane];
-    const double se = hypot(sqrt(imp__mean_variance(s)), 1e-3 * exact + 1e-9);
-    const double z = (s->mean - exact) / se;
-    if (fabs(z) >= fabs(r->z))
-        r->z = z, r->albedo = exact, r->sampled = s->mean, r->se = se;
+    imp__scores_add(&r->albedo, s->mean, exact,
+                    hypot(sqrt(imp__mean_variance(s)), 1e-3 * exact + 1e-9));
+}
+
+/* Draws for the directions of sight, n for each. The albedo is integrated over the cells that
+ * the draws of the same direction were counted in. */
+static void draws_take(const struct imp__selftest *t, const struct imp_bsdf *b, int n,
+                       struct drawn *r)
+{
+    *r = (struct drawn){.chances = IMP_CHANCES_INIT, .most = -1};
+    for (int i = 0; i < t->options.directions; i++) {
+        struct point p = {.lane = 0};
+        place(t, b, i, &p);
+        const struct imp__drawn d = {draw, b->flags & IMP_BSDF_SMOOTH ? density : NULL,
+                                     chance, &p, 0};
+        const struct imp__draws test = imp__draws_test(
+            &d, n, t->options.seed + 900 + (uint64_t)i, IMP_SPHERE_STEPS, t->tree);
+        imp__chances_add(&r->chances, &test, n);
+        imp__scores_add(&r->total, test.total + test.none, 1,
+                        sqrt(fmax(test.none * (1 - test.none), 0) / n) + 1e-3);
+        albedo_take(t, &p, i, n, r);
+    }
+    r->seen = imp__chances_end(&r->chances, t->level);
+    imp__scores_end(&r->total);
+    imp__scores_end(&r->albedo);
 }
 
 enum imp_status imp__selftest_bsdf(struct imp__selftest *t, const struct imp_bsdf *b,
@@ -231,33 +252,24 @@ enum imp_status imp__selftest_bsdf(struct imp__selftest *t, const struct imp_bsd
 {
     enum imp_status st = IMP_OK;
     struct answers a = {0};
-    struct drawn r = {.least = 1, .most = -1, .total = 1};
+    struct drawn r = {0};
     const int n = t->options.samples / t->options.directions + 1;
     for (int i = 0; i < t->options.directions; i++) {
         struct point p = {.lane = 0};
         place(t, b, i, &p);
         answers_take(t, &p, i, &a);
-        if (a.bad > 0) continue; /* sums with NaN decide nothing */
-        const struct imp__drawn d = {draw, b->flags & IMP_BSDF_SMOOTH ? density : NULL,
-                                     chance, &p, 0};
-        const struct imp__draws test = imp__draws_test(
-            &d, n, t->options.seed + 900 + (uint64_t)i, IMP_SPHERE_STEPS, t->tree);
-        r.least = fmin(r.least, test.chance);
-        const double all = test.total + test.none;
-        const double z =
-            (all - 1) / (sqrt(fmax(test.none * (1 - test.none), 0) / n) + 1e-3);
-        if (fabs(z) >= fabs(r.total_z)) r.total_z = z, r.total = all;
-        albedo_take(t, &p, i, n, &r);
     }
     IMP_TRY(imp__selftest_count(t, name, kind, "finite", a.bad, a.n));
     if (a.bad > 0 || !(b->flags & (IMP_BSDF_SMOOTH | IMP_BSDF_DELTA))) return IMP_OK;
+    for (int m = n; m > 0;
+         m = imp__selftest_more(t, m, fmax(r.seen, fmax(r.total.sees, r.albedo.sees))))
+        draws_take(t, b, m, &r);
     if (b->flags & IMP_BSDF_SMOOTH)
         IMP_TRY(imp__selftest_count(t, name, kind, "covers", a.uncovered, a.n));
-    IMP_TRY(imp__selftest_z(t, name, kind, "normalised", r.total,
-                            r.total_z != 0 ? fabs((r.total - 1) / r.total_z) : 1e-3, 1));
-    IMP_TRY(imp__selftest_draws(t, name, kind, r.least));
+    IMP_TRY(imp__selftest_z(t, name, kind, "normalised", &r.total));
+    IMP_TRY(imp__selftest_draws(t, name, kind, r.chances.least, r.seen));
     if (b->flags & IMP_BSDF_SMOOTH)
-        IMP_TRY(imp__selftest_z(t, name, kind, "albedo", r.sampled, r.se, r.albedo));
+        IMP_TRY(imp__selftest_z(t, name, kind, "albedo", &r.albedo));
     IMP_TRY(imp__selftest_row(
         t, &(struct imp_selftest_row){.object = name,
                                       .kind = kind,
@@ -294,7 +306,7 @@ out:
 enum imp_status imp__selftest_materials(struct imp__selftest *t)
 {
     enum imp_status st = IMP_OK;
-    t->level = imp__sidak(0.01, (double)t->options.directions * t->scene->n_bsdfs);
+    t->level = imp__sidak(0.01, (1.0 + t->options.directions) * t->scene->n_bsdfs);
     for (int k = 0; k < t->scene->n_bsdfs; k++) {
         const struct imp_bsdf *b = t->scene->bsdfs[k];
         if (imp__is_in_medium(b)) continue; /* phase functions have tests of their own */

@@ -90,18 +90,15 @@ static inline void imp__lanes_sweep(const struct imp_tracer *tracer,
     imp__gain_sweep(tracer, walk, imp__spec(1), &lanes.sink);
 }
 
-/* A walk's radiance and its derivatives, value [1 + active][channels], as a sample of a
- * picture. */
-static inline void imp__lanes_sample(const struct imp_tracer *tracer,
-                                     struct imp_sample *s)
+/* A walk's radiance and its derivatives, value [1 + active][channels]. */
+static inline void imp__lanes_values(const struct imp_tracer *tracer,
+                                     const struct imp_walk *walk, double *value)
 {
     const int channels = tracer->scene->channels;
     const size_t n = (tracer->active->n + 1) * (size_t)channels;
-    struct imp_walk walk;
-    imp__sample_walk(s, tracer, &walk);
-    for (size_t k = 0; k < n; k++) s->value[k] = 0;
-    for (int c = 0; c < channels; c++) s->value[c] = walk.L[c];
-    imp__lanes_sweep(tracer, &walk, s->value + channels);
+    for (size_t k = 0; k < n; k++) value[k] = 0;
+    for (int c = 0; c < channels; c++) value[c] = walk->L[c];
+    imp__lanes_sweep(tracer, walk, value + channels);
 }
 
 #endif

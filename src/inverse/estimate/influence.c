@@ -4,8 +4,8 @@
  * (influence.h): tile by tile, with a cross term between neighbouring pixels. */
 #include "influence.h"
 #include "base/team.h"
-#include "channel_sink.h"
 #include "film/film_tiles.h"
+#include "moved_pictures.h"
 #include <math.h>
 #include <string.h>
 
@@ -85,7 +85,7 @@ static bool sample_walk(const struct imp__functional *f, struct stratum *t,
     bool finite = true;
     s->value = t->lane;
     if (f->derivatives) {
-        imp__lanes_sample(&f->tracer, s);
+        imp__moved_sample(f->moved, &f->tracer, s);
     } else {
         struct imp_walk walk;
         imp__sample_walk(s, &f->tracer, &walk);

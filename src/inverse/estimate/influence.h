@@ -30,6 +30,8 @@
 #include "film/film_picture.h"
 #include "inverse/problem/problem.h"
 
+struct imp__moved_gradient;
+
 struct imp__functional {
     struct imp_tracer tracer;
     const struct imp_film_desc *film;
@@ -42,7 +44,8 @@ struct imp__functional {
     double norm;          /* F = sum(adjoint * picture) / norm */
     const double *W;      /* [height][width]; NULL: box filter, spp everywhere */
     bool derivatives;     /* and sums of derivative pictures, in groups */
-    const int *group;     /* [tracer.active->n] */
+    const struct imp__moved_gradient *moved; /* of active poses, or NULL */
+    const int *group;                        /* [tracer.active->n] */
     int n_groups;
     const imp_film *picture; /* when it is there; and the derivatives' */
     imp_film *const *films;  /* [tracer.active->n] */

@@ -57,8 +57,8 @@ struct imp__replicates imp__replicates_plan(int spp, int batch_max)
     return box_plan(spp, batch_max, 0);
 }
 
-/* The plan of replicates that are pictures, for filters wider than a pixel. In sets, two
- * pictures are one replicate: the adjoint of each comes from the other. */
+/* The plan of replicates that are pictures, for filters wider than a pixel and for losses by
+ * poses. In sets, two pictures are one replicate: the adjoint of each comes from the other. */
 static struct imp__replicates wide_plan(int spp, int sets)
 {
     const bool many = spp >= WIDE_MANY;
@@ -114,6 +114,9 @@ struct imp__replicates imp__replicates_loss(const struct imp_problem *p,
     const struct imp_sensor *sensor = sensor_of(p->scene, t, run);
     const int spp = spp_of(sensor, run);
     const int least = p->use == IMP_LOSS_SOUGHT ? LONE_SOUGHT : LONE_TOLD;
+    const int sets =
+        imp__points_of(sensor, run) == IMP_POINTS_SOBOL ? sets_of(t, run) : 0;
+    if (t && imp__problem_moves(p)) return wide_plan(spp, sets);
     struct imp__replicates r = imp__replicates_of(p->scene, t, run);
     if (p->use == IMP_LOSS_COMPARED || run->walks || curved(t) ||
         imp__film_border(&sensor->film) > 0 ||
@@ -126,25 +129,38 @@ struct imp__replicates imp__replicates_loss(const struct imp_problem *p,
     return in_sets(r, SETS);
 }
 
+/* Sets of a replicate of a Gauss-Newton matrix. */
+static int normal_sets(const struct imp_sensor *sensor, const struct imp__target *t,
+                       const struct imp_run *run)
+{
+    return imp__points_of(sensor, run) == IMP_POINTS_SOBOL ? sets_of(t, run) : 0;
+}
+
 struct imp__replicates imp__replicates_normal(const struct imp_scene *scene,
                                               const struct imp__target *t,
                                               const struct imp_run *run, int rounds)
 {
     const struct imp_sensor *sensor = sensor_of(scene, t, run);
-    const int sets =
-        imp__points_of(sensor, run) == IMP_POINTS_SOBOL ? sets_of(t, run) : 0;
+    const int sets = normal_sets(sensor, t, run);
     const int spp = imp_max(spp_of(sensor, run), 4);
-    struct imp__replicates r;
-    if (imp__film_border(&sensor->film) == 0) {
-        r = box_plan(spp, sets ? sets * IMP_SET_POINTS : IMP_BATCH_MAX, sets);
-        r.R *= rounds;
-        r.chunks = imp_max(1, (int)((int64_t)r.R * r.n / NORMAL_CHUNK));
-        return r;
-    }
-    const double all = fmin((double)spp * rounds, 1 << 26);
-    r = (struct imp__replicates){.R = all < 8 ? 4 : IMP_WIDE_REPLICATES, .chunks = 1};
+    if (imp__film_border(&sensor->film) > 0)
+        return imp__replicates_pictures(scene, t, run, rounds);
+    struct imp__replicates r =
+        box_plan(spp, sets ? sets * IMP_SET_POINTS : IMP_BATCH_MAX, sets);
+    r.R *= rounds;
+    r.chunks = imp_max(1, (int)((int64_t)r.R * r.n / NORMAL_CHUNK));
+    return r;
+}
+
+struct imp__replicates imp__replicates_pictures(const struct imp_scene *scene,
+                                                const struct imp__target *t,
+                                                const struct imp_run *run, int rounds)
+{
+    const struct imp_sensor *sensor = sensor_of(scene, t, run);
+    const double all = fmin((double)imp_max(spp_of(sensor, run), 4) * rounds, 1 << 26);
+    struct imp__replicates r = {.R = all < 8 ? 4 : IMP_WIDE_REPLICATES, .chunks = 1};
     r.n = ((int)all - 1) / r.R + 1;
-    return in_sets(r, sets ? SETS_FIXED : 0);
+    return in_sets(r, normal_sets(sensor, t, run) ? SETS_FIXED : 0);
 }
 
 enum imp_status imp__replicates_kept(const struct imp_tracer *tracer,

@@ -43,6 +43,10 @@ struct imp__replicates imp__replicates_of(const struct imp_scene *scene,
 struct imp__replicates imp__replicates_normal(const struct imp_scene *scene,
                                               const struct imp__target *target,
                                               const struct imp_run *run, int rounds);
+/* The same as pictures, where pixels share walks, or draws from edges. */
+struct imp__replicates imp__replicates_pictures(const struct imp_scene *scene,
+                                                const struct imp__target *target,
+                                                const struct imp_run *run, int rounds);
 /* IMP_E_ARG if the tracer has recorded walks, and not all of these. */
 enum imp_status imp__replicates_kept(const struct imp_tracer *tracer,
                                      struct imp__replicates r);

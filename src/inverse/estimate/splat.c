@@ -215,7 +215,23 @@ static void rest_of(const struct imp__splat *s, int b, int k, size_t p, double w
         if (W - w > 1e-9 * W) rest[c] = (rest[c] * W - w * L[c]) / (W - w);
 }
 
-/* l' at that mean, as an adjoint of radiance. */
+/* l' at a mean, as an adjoint of radiance. */
+static imp_spec adjoint_of(const struct imp__splat *s, size_t p, const double mean[3])
+{
+    const struct imp_target *t = &s->target->desc;
+    const bool luminance = imp__sees_luminance(s->target, s->channels);
+    double bar[3] = {0, 0, 0};
+    for (int c = 0; c < t->channels; c++) {
+        struct imp__loss_at at;
+        imp__loss_eval(t->loss, imp__target_weight(s->target, p, c), t->epsilon,
+                       imp__seen(luminance, mean, c),
+                       s->target->pixels[p * (size_t)t->channels + (size_t)c], &at);
+        bar[c] = at.d1;
+    }
+    return imp__seen_bar(luminance, t->channels, bar);
+}
+
+/* The same without the sample. */
 static imp_spec pixel_adjoint(const struct imp__splat *s, int b, int k, size_t p,
                               double w, imp_spec L)
 {
@@ -225,17 +241,19 @@ static imp_spec pixel_adjoint(const struct imp__splat *s, int b, int k, size_t p
         for (int c = 0; c < n; c++) bar[c] = s->seed[p * (size_t)n + (size_t)c];
         return imp__seen_bar(false, n, bar);
     }
-    const struct imp_target *t = &s->target->desc;
-    const bool luminance = imp__sees_luminance(s->target, n);
     rest_of(s, b, k, p, w, L, rest);
-    for (int c = 0; c < t->channels; c++) {
-        struct imp__loss_at at;
-        imp__loss_eval(t->loss, imp__target_weight(s->target, p, c), t->epsilon,
-                       imp__seen(luminance, rest, c),
-                       s->target->pixels[p * (size_t)t->channels + (size_t)c], &at);
-        bar[c] = at.d1;
+    return adjoint_of(s, p, rest);
+}
+
+imp_spec imp__splat_pixel(const struct imp__splat *s, int b, size_t p)
+{
+    const int from = b < 0 ? 0 : b * s->m, end = b < 0 ? s->n : from + s->m;
+    double sum[3] = {0, 0, 0}, mean[3];
+    for (int k = from; k < end; k++) {
+        mean_of(s, k, p, mean);
+        for (int c = 0; c < s->channels; c++) sum[c] += mean[c] / (end - from);
     }
-    return imp__seen_bar(luminance, t->channels, bar);
+    return adjoint_of(s, p, sum);
 }
 
 imp_spec imp__splat_adjoint(const struct imp__splat *s, int b, int k, double px,

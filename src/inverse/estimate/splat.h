@@ -2,7 +2,8 @@
  *
  * Losses seen through filters wider than a pixel. A sample then reaches several pixels,
  * so its adjoint is known only when all of them are: pass 1 makes the picture of each
- * replicate, pass 2 walks the same random numbers again and weights sample i by
+ * replicate, pass 2 walks the same random numbers again and weights sample i by (box filters
+ * too, where draws from edges need the adjoints of all pixels; moved_adjoint.h)
  *
  *     P_i = sum_p  w_ip / W_p  l'_p( (S_p - w_ip L_i) / (W_p - w_ip) )
  *
@@ -40,5 +41,8 @@ void imp__splat_destroy(imp_context *ctx, struct imp__splat *s);
 /* P_i of a sample of replicate b, set k of it, at film position (px, py). */
 imp_spec imp__splat_adjoint(const struct imp__splat *s, int b, int k, double px,
                             double py, imp_spec L);
+/* l' of pixel p at the mean of replicate b, or of all (b -1), as an adjoint of radiance: for what
+ * is independent of the walks. */
+imp_spec imp__splat_pixel(const struct imp__splat *s, int b, size_t p);
 
 #endif

@@ -188,7 +188,8 @@ static enum imp_status search_all(struct imp__fit *f, const struct imp__opt_opti
     imp__fit_scales(f, s);
     f->first_iteration = s->iteration;
     f->searching = true;
-    if (f->options.levels > 1 && !found) st = imp__fit_levels(f, o, s);
+    if (imp__fit_blurs(f) && !found) st = imp__fit_blurred(f, o, s);
+    else if (f->options.levels > 1 && !found) st = imp__fit_levels(f, o, s);
     f->searching = false;
     f->search = s;
     return st == IMP_OK ? search(f, o, s) : st;

@@ -87,6 +87,14 @@ void imp__fit_goal_make(struct imp__fit *fit);
 void imp__fit_span_scale(const struct imp__block *block, const double *x,
                          struct imp__span *span);
 
+/* fit_blur.c: of poses, the searches through wider filters, before the first iteration of `fine`. Films
+ * and targets are afterwards as they were. */
+bool imp__fit_blurs(const struct imp__fit *fit);
+enum imp_status imp__fit_blurs_allowed(const struct imp_problem *problem,
+                                       const struct imp_fit_options *options);
+enum imp_status imp__fit_blurred(struct imp__fit *fit,
+                                 const struct imp__opt_options *options,
+                                 struct imp__search *fine);
 /* fit_levels.c: the searches on coarse cells, before the first iteration of `fine`, which
  * then begins where they end and has their history. IMP_CANCELLED: so far. */
 enum imp_status imp__fit_levels(struct imp__fit *fit,

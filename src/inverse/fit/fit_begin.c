@@ -159,7 +159,8 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
     IMP_TRY(imp__fit_variates(&f));
     f.quiet = f.variate && p->n > IMP_TRAIL_MAX;
     if (f.options.momentum == 0 && !f.quiet) f.options.momentum = IMP_ADAM_MOMENTUM;
-    if (allocates(&f)) IMP_TRY(imp__allocation_create(p, &f.run, &f.allocation));
+    if (allocates(&f) && !imp__problem_moves(p))
+        IMP_TRY(imp__allocation_create(p, &f.run, &f.allocation));
     if (f.options.checkpoint) imp__fit_fingerprint(&f);
     *out = f;
     imp__fit_goal_make(out);

@@ -3,7 +3,7 @@
  * A problem as an optimiser sees it. */
 #include "base/team.h"
 #include "fit.h"
-#include "inverse/estimate/replicates.h"
+#include "inverse/estimate/moved_gradient.h"
 #include "inverse/gauss/gauss_newton.h"
 #include "inverse/gradient/objective_gradient.h"
 #include "inverse/gradient/variate.h"
@@ -111,12 +111,32 @@ int imp__fit_spp(const struct imp__fit *f)
                             : p->scene->sensors[p->targets[0].desc.sensor]->spp;
 }
 
+/* Where poses are active: may objects be as x has them? Not so: what cannot be moved (numbers beyond
+ * floats), or where edges are none (objects that pass through each other). */
+static enum imp_status poses_allow(const struct imp__fit *f, const double *x)
+{
+    const enum imp_status st = imp_problem_set_x(f->problem, x);
+    return st == IMP_OK ? imp__moved_possible(f->problem, &f->run) : st;
+}
+static bool is_impossible(enum imp_status st)
+{
+    return st == IMP_E_UNSUPPORTED || st == IMP_E_NUMERIC;
+}
+static bool possible(const double *x, void *payload)
+{
+    return !is_impossible(poses_allow(payload, x));
+}
+
 static enum imp_status eval(const double *x, uint64_t seed, struct imp_estimate *f,
                             double *g, double *g_se, void *payload)
 {
     struct imp__fit *fit = payload;
     fit->run.seed = seed;
     fit->final_calls++;
+    if (!g && fit->goal.possible && !possible(x, fit)) {
+        *f = (struct imp_estimate){INFINITY, 0, 0};
+        return IMP_OK;
+    }
     enum imp_status st = imp__fit_take_walks(fit, x, seed);
     /* What comes after the search is of samples that are alike. */
     if (fit->allocation.n > 0 && fit->searching)
@@ -228,6 +248,7 @@ void imp__fit_goal_make(struct imp__fit *f)
                                  .iterated = iterated,
                                  .payload = f};
     if (f->allocation.n > 0) f->goal.measure = measure;
+    if (imp__problem_moves(f->problem)) f->goal.possible = possible;
     if (imp__fit_coarse_spp(f) < imp__fit_spp(f)) f->goal.coarsen = coarsen;
     if (imp__fit_keeps(f)) {
         f->goal.draw = imp__fit_draw;

@@ -26,11 +26,13 @@ bool imp__fit_keeps(const struct imp__fit *f)
     return (o == IMP_LBFGS || o == IMP_MMA || o == IMP_SLSQP) && !f->options.no_recording;
 }
 
-/* No walks are kept from here on; the last error is the reason that is reported. */
+/* No walks are kept from here on; the last error is the reason that is reported. Where none ever
+ * were, losses need not compare with theirs. */
 static void give_up(struct imp__fit *f)
 {
     imp__walks_destroy(f->walks);
     f->walks = NULL;
+    if (f->draws == 0) f->problem->use = IMP_LOSS_SOUGHT;
     f->untaken =
         imp__arena_strdup(&f->problem->fit_arena, imp_last_error(f->problem->ctx));
 }

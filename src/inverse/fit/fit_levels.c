@@ -189,6 +189,7 @@ enum imp_status imp__fit_levels_allowed(const struct imp_problem *p,
     if (o->levels < 0 || o->levels > 16)
         return imp__error(p->ctx, IMP_E_ARG, "levels = %d is outside [0, 16]", o->levels);
     if (o->levels < 2) return IMP_OK;
+    if (imp__problem_moves(p)) return imp__fit_blurs_allowed(p, o);
     for (size_t b = 0; b < p->n_blocks; b++) {
         const struct imp_param_info *info = &p->scene->params[p->blocks[b].param].info;
         cells |= are_many(p, b);

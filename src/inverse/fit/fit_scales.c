@@ -1,10 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A large change of a variable: its whole range, or its size at the start. Zeros take the
- * size of their neighbours in the same parameter, or 1 in the parameter's unit. */
+ * size of their neighbours in the same parameter, or 1 in the parameter's unit. A pose, which may
+ * well start at 0, has that of the scene. */
 #include "fit.h"
+#include "scene/pose.h"
 #include <float.h>
 #include <math.h>
+
+/* A large change of a number of geometry; 0: it is none. */
+static double pose_scale(const struct imp_problem *p, const struct imp__block *b,
+                         size_t e)
+{
+    if (b->log || imp__block_factor(p, b)) return 0;
+    const struct imp_pose *pose = imp__pose_of(p->scene, b->param);
+    return pose ? imp__pose_large(pose, e) : 0;
+}
 
 static bool is_bounded(const struct imp__block *b)
 {
@@ -47,9 +58,11 @@ void imp__fit_scales(struct imp__fit *f, const struct imp__search *search)
         const double typical = typical_of(b, square);
         for (size_t e = 0; e < b->count; e++) {
             const double start = fabs(imp__search_start(search, b->first + e));
-            const double scale = is_bounded(b) ? b->hi - b->lo
-                                 : b->log      ? 1
-                                               : fmax(start, typical);
+            const double pose = pose_scale(p, b, e);
+            const double scale = pose > 0        ? pose
+                                 : is_bounded(b) ? b->hi - b->lo
+                                 : b->log        ? 1
+                                                 : fmax(start, typical);
             f->scale[b->first + e] = scale > 0 ? scale : 1;
             f->settles[b->first + e] = is_bounded(b);
         }

@@ -23,6 +23,7 @@
 #include "film/film_filter.h"
 #include "film/parts.h"
 #include "inverse/estimate/adjoint.h"
+#include "inverse/estimate/moved_gradient.h"
 #include "inverse/estimate/problem_tracer.h"
 #include "inverse/problem/loss.h"
 #include "normal_tiles.h"
@@ -59,10 +60,30 @@ static bool shares_walks(const struct imp_tracer *tracer)
     return imp__film_border(&tracer->sensor->film) > 0 || tracer->integrator->from_lights;
 }
 
+/* From pictures of replicates. Draws of one target are not those of another. */
+static enum imp_status pictures_add(struct imp__normal_job *j, const struct imp_run *run,
+                                    size_t number, int rounds, double lo, double hi)
+{
+    const struct imp_problem *p = j->problem;
+    enum imp_status st = IMP_OK;
+    struct imp__normal_sums total = imp__normal_at(j->total, j->K, j->deviate);
+    struct imp__moved_gradient moved = {0};
+    if (imp__problem_moves(p)) {
+        IMP_TRY(imp__moved_begin(p, &j->tracer, &moved));
+        IMP_TRY(imp__moved_learn(&moved, IMP_MOVED_PILOT));
+        moved.first = imp__moved_first(number);
+    }
+    IMP_TRY(imp__gauss_newton_wide(p, &j->tracer, moved.moves.n > 0 ? &moved : NULL,
+                                   j->target, run, rounds, lo, hi, &total));
+out:
+    imp__moved_end(&moved);
+    return st;
+}
+
 static enum imp_status target_add(struct imp__normal_job *j,
-                                  const struct imp__target *target, int part,
-                                  const struct imp_run *run, int rounds, double lo,
-                                  double hi, double start)
+                                  const struct imp__target *target, size_t number,
+                                  int part, const struct imp_run *run, int rounds,
+                                  double lo, double hi, double start)
 {
     const struct imp_problem *p = j->problem;
     struct imp_run own = *run;
@@ -72,14 +93,12 @@ static enum imp_status target_add(struct imp__normal_job *j,
     const struct imp_film_desc *film = &j->tracer.sensor->film;
     struct imp_job job = imp__job(p->scene, j->tracer.sensor, &own, &p->active);
     imp__job_state(&job, IMP_HAS_GAUSS_NEWTON, NULL);
+    imp__job_state(&job, IMP_HAS_EDGE_TERMS, NULL);
     if (!imp__loss_quadratic(target->desc.loss))
         imp__job_state(&job, IMP_HAS_NOT_QUADRATIC, NULL);
     IMP_CHECKED(imp__job_allowed(&job));
-    if (shares_walks(&j->tracer)) {
-        struct imp__normal_sums total = imp__normal_at(j->total, j->K, j->deviate);
-        return imp__gauss_newton_wide(p, &j->tracer, target, &own, rounds, lo, hi,
-                                      &total);
-    }
+    if (shares_walks(&j->tracer) || imp__problem_moves(p))
+        return pictures_add(j, &own, number, rounds, lo, hi);
     j->width = film->crop_w;
     j->plan = imp__replicates_normal(p->scene, target, &own, rounds);
     const double walks = (double)film->crop_w * film->crop_h * j->plan.n * j->plan.R;
@@ -148,6 +167,7 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
                            GAUSS_NEWTON_MAX));
     if (x) IMP_TRY(imp_problem_set_x(p, x));
     imp__team_state(p->scene, &own);
+    p->edge_terms = true;
     j.workers = imp__alloc(ctx, (size_t)ctx->threads, sizeof *j.workers);
     j.total = imp__alloc(ctx, imp__normal_count(j.K, j.deviate), sizeof *j.total);
     if (!j.workers || !j.total)
@@ -159,13 +179,13 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
     for (size_t t = 0; t < p->n_targets; t++) {
         const int parts = imp__target_parts(&p->targets[t]);
         for (int k = 0; k < parts; k++)
-            IMP_TRY(target_add(&j, imp__target_part(&p->targets[t], k), k, &own, rounds,
-                               ((double)t + (double)k / parts) / targets,
+            IMP_TRY(target_add(&j, imp__target_part(&p->targets[t], k), t, k, &own,
+                               rounds, ((double)t + (double)k / parts) / targets,
                                ((double)t + (double)(k + 1) / parts) / targets, start));
         residuals += imp__normal_residual_count(&p->targets[t]);
         const int bias = imp__loss_bias_order(p->targets[t].desc.loss);
         if (bias && (!bias_order || bias < bias_order)) bias_order = bias;
-        wide |= shares_walks(&j.tracer);
+        wide |= shares_walks(&j.tracer) || imp__problem_moves(p);
     }
     /* Where pixels share walks, the same estimate as that of trial steps from the same walks. */
     const struct imp__normal_sums total = imp__normal_at(j.total, j.K, j.deviate);
@@ -192,6 +212,7 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
     out->chi2_se = sqrt(fmax(0, total.scalars[IMP_NORMAL_CHI2_VARIANCE]));
     out->n_residuals = residuals;
 out:
+    p->edge_terms = false;
     for (int k = 0; j.workers && k < ctx->threads; k++) {
         imp__release(ctx, j.workers[k].x);
         imp__release(ctx, j.workers[k].touched);

@@ -49,11 +49,15 @@ enum {
     IMP_NORMAL_SCALARS
 };
 
+struct imp__moved_gradient;
+
 /* Adds H, H_same, H_meas, g, cov_g, cov_excess, deviations and chi2 of a target whose
- * pixels share walks (a filter wider than a pixel, or light walks), from `rounds` times
- * the samples of an evaluation; lo, hi: the part of the caller's progress. */
+ * pixels share walks (a filter wider than a pixel, or light walks) or draws from edges (moved; NULL:
+ * no pose is active), from `rounds` times the samples of an evaluation; lo, hi: the part of the
+ * caller's progress. */
 enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                                        const struct imp_tracer *tracer,
+                                       const struct imp__moved_gradient *moved,
                                        const struct imp__target *target,
                                        const struct imp_run *run, int rounds, double lo,
                                        double hi, struct imp__normal_sums *out);

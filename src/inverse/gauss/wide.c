@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * J^T W J where a walk has a part in several pixels and pixels share walks: with filters
- * wider than a pixel, light walks or bidirectional walks. R independent replicates, each
+ * wider than a pixel, light walks or bidirectional walks; and of poses, whose draws from edges may
+ * lie in any pixel. R independent replicates, each
  * a picture L and a derivative picture X_k for every value, are used in place of walks
  * (docs/estimators.md 15):
  *
@@ -14,7 +15,7 @@
 #include "wide.h"
 #include "film/film_picture.h"
 #include "gauss_newton.h"
-#include "inverse/estimate/channel_sink.h"
+#include "inverse/estimate/moved_pictures.h"
 #include "inverse/gradient/light_gradient.h"
 #include "inverse/problem/loss.h"
 #include <stdio.h>
@@ -24,6 +25,7 @@
 
 struct pass {
     const struct imp_tracer *tracer;
+    const struct imp__moved_gradient *moved; /* NULL: no pose is active */
     const struct imp_run *run;
     double lo, hi;
 };
@@ -31,7 +33,7 @@ struct pass {
 static void sample(const void *payload, struct imp_sample *s)
 {
     const struct pass *p = payload;
-    imp__lanes_sample(p->tracer, s);
+    imp__moved_sample(p->moved, p->tracer, s);
 }
 
 static int progress(const struct imp_progress *p, void *payload)
@@ -42,6 +44,27 @@ static int progress(const struct imp_progress *p, void *payload)
     return pass->run->progress(&own, pass->run->progress_payload);
 }
 
+/* What poses have at edges, of replicate b: from draws of its own, as many as it has walks. */
+static enum imp_status edges_add(struct imp__wide *w, const struct imp_run *run, int b,
+                                 int n)
+{
+    const size_t values =
+        (size_t)w->width * (size_t)w->height * w->K * (size_t)w->channels;
+    if (imp_likely(!w->moved)) return IMP_OK;
+    double *mean = imp__alloc(w->ctx, values, sizeof *mean);
+    if (!mean)
+        return imp__error(w->ctx, IMP_E_NOMEM, "no memory for derivative pictures");
+    struct imp_run own = *run;
+    own.progress = NULL; /* it is that of the walks */
+    const struct imp__moved_run r = {&own, "gauss-newton", (int64_t)b * n, n};
+    const enum imp_status st = imp__moved_pictures(w->moved, &r, NULL, mean, NULL);
+    for (size_t k = 0; st == IMP_OK && k < w->K; k++)
+        imp__moved_film_add(w->films[b], (int)(k + 1) * w->channels, w->channels, k, w->K,
+                            mean, NULL);
+    imp__release(w->ctx, mean);
+    return st;
+}
+
 static enum imp_status replicates(struct imp__wide *w, const struct imp_tracer *tracer,
                                   const struct imp_run *run, int rounds, double lo,
                                   double hi)
@@ -49,7 +72,7 @@ static enum imp_status replicates(struct imp__wide *w, const struct imp_tracer *
     enum imp_status st = IMP_OK;
     const int n = (int)(w->K + 1) * w->channels;
     const struct imp__replicates plan =
-        imp__replicates_normal(tracer->scene, w->of, run, rounds);
+        imp__replicates_pictures(tracer->scene, w->of, run, rounds);
     w->R = plan.R;
     char *names = imp__alloc(w->ctx, (size_t)n, 12);
     if (!names) IMP_TRY(imp__error(w->ctx, IMP_E_NOMEM, "no memory"));
@@ -60,7 +83,7 @@ static enum imp_status replicates(struct imp__wide *w, const struct imp_tracer *
         own.spp = plan.n;
         own.time_limit_s = 0;
         own.walks = NULL; /* the tracer has them */
-        const struct pass pass = {tracer, run, lo + (hi - lo) * b / w->R,
+        const struct pass pass = {tracer, w->moved, run, lo + (hi - lo) * b / w->R,
                                   lo + (hi - lo) * (b + 1) / w->R};
         if (run->progress) {
             own.progress = progress;
@@ -74,6 +97,7 @@ static enum imp_status replicates(struct imp__wide *w, const struct imp_tracer *
                                             .payload = &pass,
                                             .first = imp__replicates_first(plan, b, 0)};
         IMP_TRY(imp__picture_make(w->ctx, &picture, &own, &w->films[b]));
+        IMP_TRY(edges_add(w, run, b, plan.n));
     }
 out:
     imp__release(w->ctx, names);
@@ -269,6 +293,7 @@ static enum imp_status buffers(struct imp__wide *w)
 
 enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                                        const struct imp_tracer *tracer,
+                                       const struct imp__moved_gradient *moved,
                                        const struct imp__target *target,
                                        const struct imp_run *run, int rounds, double lo,
                                        double hi, struct imp__normal_sums *out)
@@ -276,6 +301,7 @@ enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
     enum imp_status st = IMP_OK;
     struct imp__wide w = {.ctx = p->ctx,
                           .of = target,
+                          .moved = moved,
                           .target = &target->desc,
                           .noise_se = target->noise_se,
                           .film = &tracer->sensor->film,

@@ -14,8 +14,9 @@ struct imp__wide {
     const struct imp_target *target; /* its description */
     const float *noise_se;
     const struct imp_film_desc *film;
-    int width, height, channels, seen; /* of the scene, of the target */
-    bool luminance;                    /* that is what the target sees */
+    int width, height, channels, seen;       /* of the scene, of the target */
+    bool luminance;                          /* that is what the target sees */
+    const struct imp__moved_gradient *moved; /* NULL: no pose is active */
     int R;
     size_t K;
     imp_film *films[IMP_WIDE_REPLICATES]; /* channels: the radiance, then [K][channels] */

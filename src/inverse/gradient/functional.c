@@ -3,6 +3,7 @@
  * Functionals of a picture, F = sum_p s_p I_p, with standard errors (influence.h). */
 #include "base/team.h"
 #include "inverse/estimate/influence.h"
+#include "inverse/estimate/moved_pictures.h"
 #include "inverse/estimate/problem_tracer.h"
 #include "inverse/estimate/replicates.h"
 #include "light_gradient.h"
@@ -300,6 +301,21 @@ static enum imp_status light_errors(imp_context *ctx, const struct imp__function
     return st;
 }
 
+/* The part that poses have at edges: se [1 + n_groups] grows by it. */
+static enum imp_status edge_errors(imp_context *ctx, const struct imp__functional *f,
+                                   const struct imp_run *run, double *se)
+{
+    const int n = f->n_groups, spp = imp__error_spp(f->spp);
+    const struct imp__moved_run r = {run, "errors", 0, spp};
+    double *own = imp__alloc(ctx, (size_t)n, sizeof *own);
+    if (!own) return imp__error(ctx, IMP_E_NOMEM, "no memory for sums");
+    const enum imp_status st = imp__moved_sums(f->moved, f, &r, own);
+    for (int g = 0; st == IMP_OK && g < n; g++)
+        se[1 + g] = hypot(se[1 + g], own[g] * sqrt((double)spp / f->spp));
+    imp__release(ctx, own);
+    return st;
+}
+
 enum imp_status imp_problem_jacobian_sums(imp_problem *p, const float *adjoint,
                                           const struct imp_run *run,
                                           const imp_film *primal, imp_film *const *films,
@@ -324,7 +340,13 @@ enum imp_status imp_problem_jacobian_sums(imp_problem *p, const float *adjoint,
     double *weights = NULL, *se = NULL;
     float *ones = NULL;
     int *each = NULL;
+    struct imp__moved_gradient moved = {0};
     IMP_TRY(begin(p, adjoint, &own, &f, &weights, &ones));
+    if (imp__problem_moves(p)) {
+        IMP_TRY(imp__moved_begin(p, &f.tracer, &moved));
+        IMP_TRY(imp__moved_learn(&moved, IMP_MOVED_PILOT));
+        if (moved.moves.n > 0) f.moved = &moved;
+    }
     f.picture = primal;
     f.films = films;
     if (!part) IMP_TRY(pictures_check(p, &f));
@@ -346,12 +368,15 @@ enum imp_status imp_problem_jacobian_sums(imp_problem *p, const float *adjoint,
         const enum imp_status ended = f.tracer.integrator->from_lights
                                           ? light_errors(ctx, &f, &own, se)
                                           : errors(ctx, &f, &own, weights, false, se);
-        if (ended != IMP_CANCELLED) IMP_TRY(ended);
+        if (ended != IMP_CANCELLED && ended != IMP_PART) IMP_TRY(ended);
+        if (ended != IMP_CANCELLED && f.moved) IMP_TRY(edge_errors(ctx, &f, &own, se));
+        if (ended == IMP_PART) IMP_TRY(IMP_PART);
     }
     if (value) *value = (struct imp_estimate){inner_product(&f, primal), se[0], 0};
     for (size_t g = 0; g < n; g++) sums[g] = (struct imp_estimate){0, se[g + 1], 0};
     for (size_t k = 0; k < p->n; k++) sums[each[k]].value += inner_product(&f, films[k]);
 out:
+    imp__moved_end(&moved);
     imp__release(ctx, each);
     imp__release(ctx, se);
     imp__release(ctx, weights);

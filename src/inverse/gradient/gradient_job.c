@@ -6,13 +6,14 @@
 #include "base/arguments.h"
 #include "base/team.h"
 #include "film/film_filter.h"
+#include "inverse/estimate/moved_gradient.h"
 #include <string.h>
 
 /* An item's result, and the sum of several. */
 struct part {
     double objective, variance;
     double dense[]; /* [2 or 3][n] of few values, as of imp__tally_dense; then moments of
-                       the variate, if there is one */
+                       the variate, if there is one; or contrasts of `moved` */
 };
 
 static size_t dense_numbers(const struct imp__gradient_job *j)
@@ -24,6 +25,11 @@ static size_t dense_numbers(const struct imp__gradient_job *j)
 static size_t moment_numbers(const struct imp__gradient_job *j)
 {
     return j->variate ? IMP_VARIATE_MOMENTS : 0;
+}
+
+static size_t result_numbers(const struct imp__gradient_job *j)
+{
+    return dense_numbers(j) + moment_numbers(j) + imp__moved_contrasts(j->moved);
 }
 
 /* ---- Pixels of a tile ------------------------------------------------------------ */
@@ -130,6 +136,9 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
 
     out->objective = out->variance = 0;
     memset(moments, 0, moment_numbers(j) * sizeof *moments);
+    const size_t contrasts = imp__moved_contrasts(j->moved);
+    double *own = contrasts ? j->item_contrasts + (size_t)w->index * contrasts : NULL;
+    if (own) memset(own, 0, contrasts * sizeof *own);
     imp__tally_clear(tally);
     tally->measured = tally->rays = 0;
     if (t->part < (size_t)plan.chunks) { /* other tiles may have more parts */
@@ -141,6 +150,7 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
         const enum imp_status st = pixels_work(t, w, plan, &item, moments);
         if (st != IMP_OK) return st;
     }
+    if (own) memcpy(moments + moment_numbers(j), own, contrasts * sizeof *own);
     imp__tally_measure(tally);
     imp__gradient_see(j, t, tally, out->variance);
     if (tally->dense) {
@@ -155,7 +165,7 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
 
 static void tile_add(void *into, const void *from, void *payload)
 {
-    const size_t n = dense_numbers(payload) + moment_numbers(payload);
+    const size_t n = result_numbers(payload);
     struct part *a = into;
     const struct part *b = from;
     a->objective += b->objective;
@@ -175,6 +185,8 @@ static enum imp_status tile_take(size_t group, const void *sum, void *payload)
     to->variance += in->variance;
     for (size_t k = 0; k < moment_numbers(j); k++)
         j->variate->moments[k] += in->dense[dense_numbers(j) + k];
+    for (size_t k = 0; k < imp__moved_contrasts(j->moved); k++)
+        j->contrasts[k] += in->dense[dense_numbers(j) + moment_numbers(j) + k];
     for (size_t k = 0; k < n; k++) {
         double variance = in->dense[n + k];
         if (j->shared)
@@ -193,6 +205,12 @@ static enum imp_status tallies_create(struct imp__gradient_job *j)
     imp_context *ctx = j->problem->ctx;
     j->tallies = imp__alloc(ctx, (size_t)ctx->threads, sizeof *j->tallies);
     if (!j->tallies) return imp__error(ctx, IMP_E_NOMEM, "no memory");
+    const size_t contrasts = imp__moved_contrasts(j->moved);
+    if (contrasts) {
+        j->item_contrasts =
+            imp__alloc(ctx, (size_t)ctx->threads * contrasts, sizeof(double));
+        if (!j->item_contrasts) return imp__error(ctx, IMP_E_NOMEM, "no memory");
+    }
     for (int k = 0; k < ctx->threads; k++) {
         IMP_CHECKED(imp__tally_create(
             ctx, j->want_gradient ? j->tracer.active : &j->nothing,
@@ -208,7 +226,9 @@ static void job_destroy(struct imp__gradient_job *j)
     for (int k = 0; j->tallies && k < ctx->threads; k++)
         imp__tally_destroy(&j->tallies[k]);
     imp__release(ctx, j->tallies);
+    imp__release(ctx, j->item_contrasts);
     j->tallies = NULL;
+    j->item_contrasts = NULL;
     if (j->tiles.ctx) imp__tiles_destroy(&j->tiles);
 }
 
@@ -223,20 +243,19 @@ enum imp_status imp__gradient_job_run(struct imp__gradient_job *j,
     j->run = run;
     j->width = film->crop_w;
     j->channels = j->problem->scene->channels;
-    j->shared = j->splat != NULL;
+    j->shared = j->splat && imp__film_border(film) > 0;
     if (j->shared) j->overlap = imp__overlap_of(film, margin, j->plan.R);
-    j->tiles = (struct imp_tiles){
-        .ctx = ctx,
-        .run = run,
-        .width = film->crop_w,
-        .height = film->crop_h,
-        .margin = margin,
-        .work = tile_work,
-        .size =
-            sizeof(struct part) + (dense_numbers(j) + moment_numbers(j)) * sizeof(double),
-        .add = tile_add,
-        .take = tile_take,
-        .payload = j};
+    j->tiles = (struct imp_tiles){.ctx = ctx,
+                                  .run = run,
+                                  .width = film->crop_w,
+                                  .height = film->crop_h,
+                                  .margin = margin,
+                                  .work = tile_work,
+                                  .size = sizeof(struct part) +
+                                          result_numbers(j) * sizeof(double),
+                                  .add = tile_add,
+                                  .take = tile_take,
+                                  .payload = j};
     IMP_TRY(imp__tiles_create(&j->tiles));
     imp__gradient_samples(j);
     j->want_errors = j->totals->wants_errors || imp__gradient_metric(j);

@@ -29,8 +29,8 @@ struct imp__gradient_job {
     const struct imp__splat *splat;   /* wide filters: pass 2; NULL: box */
     /* Adjoints in light tracing; NULL: walks begin at the sensor. */
     const struct imp__light_adjoints *light;
-    const struct imp__moved_gradient
-        *moved;                        /* of a fixed adjoint; NULL: no pose is active */
+    const struct imp__moved_gradient *moved; /* NULL: no pose is active */
+    double *contrasts; /* of `moved`, sums over all items (moved_gradient.h) */
     struct imp__variate_view *variate; /* NULL: none */
     struct imp_tracer there;           /* of the variate; scene NULL: nowhere yet */
     bool want_gradient;
@@ -48,6 +48,7 @@ struct imp__gradient_job {
     struct imp_fixed_sum *mean, *spread; /* of many values; spread NULL: not wanted */
     struct imp_tiles tiles;
     struct imp_tally *tallies; /* [threads] */
+    double *item_contrasts; /* [threads][n] of `moved`, of the item at work; NULL: none */
 };
 
 /* Has a pixel a part in the loss? One that has none has no walks. */

@@ -4,8 +4,8 @@
  * these are made of the other walks' mean, all walks are kept until it is known. */
 #include "gradient_job.h"
 #include "inverse/estimate/adjoint.h"
+#include "inverse/estimate/moved_gradient.h"
 #include "light_gradient.h"
-#include "moved_gradient.h"
 
 struct replicate {
     struct imp__gradient_job *job;
@@ -36,9 +36,30 @@ static imp_spec adjoint_of(const struct replicate *r, int set, const struct imp_
     return P;
 }
 
+/* Where poses are active: room for what walks give to velocities. */
+static double *inside_begin(const struct replicate *r)
+{
+    const struct imp__moved_gradient *m = r->job->moved;
+    if (imp_likely(!m)) return NULL;
+    double *inside = imp__arena_array(&r->worker->arena, m->moves.n, sizeof *inside);
+    r->worker->no_memory |= !inside;
+    return inside;
+}
+
+static void inside_end(const struct replicate *r, const double *inside)
+{
+    const struct imp__gradient_job *j = r->job;
+    const size_t n = imp__moved_contrasts(j->moved);
+    double *contrasts = n ? j->item_contrasts + (size_t)r->worker->index * n : NULL;
+    r->worker->no_memory |=
+        !imp__moved_replicate(j->moved, &r->worker->arena, r->plan, r->x, r->y, r->b,
+                              inside, contrasts, &r->tally->sink);
+}
+
 static void sweep_each(const struct replicate *r)
 {
     const struct imp__gradient_job *j = r->job;
+    double *inside = inside_begin(r);
     for (int s = 0; s < r->plan.m; s++) {
         const int n =
             imp__replicates_set(r->plan, s + 1) - imp__replicates_set(r->plan, s);
@@ -48,15 +69,13 @@ static void sweep_each(const struct replicate *r)
             trace(r, s, i, &walk);
             const imp_spec P = adjoint_of(r, s, &walk);
             imp__walk_sweep(&j->tracer, &walk, P, &r->tally->sink);
-            if (imp_unlikely(j->moved != NULL))
-                r->worker->no_memory |= !imp__moved_walk(j->moved, &r->worker->arena,
-                                                         &walk, P, &r->tally->sink);
+            if (imp_unlikely(inside != NULL))
+                r->worker->no_memory |=
+                    !imp__moved_walk(j->moved, &r->worker->arena, &walk, P, inside);
             imp__arena_rewind(&r->worker->arena, mark);
         }
     }
-    if (imp_unlikely(j->moved != NULL))
-        r->worker->no_memory |= !imp__moved_draws(j->moved, &r->worker->arena, r->plan,
-                                                  r->x, r->y, r->b, &r->tally->sink);
+    if (imp_unlikely(inside != NULL)) inside_end(r, inside);
 }
 
 /* ---- Adjoints made of residuals ----------------------------------------------------- */

@@ -7,11 +7,11 @@
 #include "base/team.h"
 #include "film/film_filter.h"
 #include "gradient_job.h"
+#include "inverse/estimate/moved_gradient.h"
 #include "inverse/estimate/problem_tracer.h"
 #include "inverse/estimate/replicates.h"
 #include "inverse/problem/loss.h"
 #include "light_gradient.h"
-#include "moved_gradient.h"
 #include "walk/kept/store.h"
 #include "walk/rules/features.h"
 #include "walk/run/run.h"
@@ -31,7 +31,10 @@ static enum imp_status splat_prepare(struct imp__gradient_job *j,
     if (imp__team_merges(ctx)) IMP_TRY(imp__team_keep(ctx, value, sizeof value, &known));
     if (!known) {
         if (apart) ctx->team->alone++;
-        st = imp__splat_create(j->problem, &j->tracer, j->target, j->seed, j->plan, run,
+        /* Walks that nothing is made of but their radiance. */
+        struct imp_tracer plain = j->tracer;
+        if (j->moved) plain.active = NULL;
+        st = imp__splat_create(j->problem, &plain, j->target, j->seed, j->plan, run,
                                splat);
         if (apart) ctx->team->alone--;
         IMP_TRY(st);
@@ -47,21 +50,69 @@ out:
     return st;
 }
 
+/* The gradient of a target by poses too: adjoints from the pictures of pass 1, and errors from
+ * contrasts (moved_adjoint.h). */
+static enum imp_status moved_estimate(struct imp__gradient_job *j,
+                                      struct imp__moved_gradient *moved,
+                                      const struct imp__splat *splat,
+                                      const struct imp_run *run, double lo, double hi,
+                                      double start_s)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = j->problem->ctx;
+    const size_t n = j->problem->n;
+    double *before = imp__alloc(ctx, n, sizeof *before);
+    if (!before) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for errors"));
+    memcpy(before, j->totals->gradient_variance, n * sizeof *before);
+    IMP_TRY(imp__moved_adjoint_loss(ctx, &j->tracer.sensor->film,
+                                    j->problem->scene->channels, splat, j->plan.R,
+                                    &moved->adjoint));
+    IMP_TRY(imp__moved_learn(moved, run->spp));
+    j->contrasts = imp__alloc(ctx, imp__moved_contrasts(moved), sizeof *j->contrasts);
+    if (!j->contrasts) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for errors"));
+    memset(j->contrasts, 0, imp__moved_contrasts(moved) * sizeof *j->contrasts);
+    IMP_TRY(imp__gradient_job_run(j, run, "gradient", lo, hi, start_s));
+    IMP_TRY(imp__moved_variance(moved, j->tracer.active, j->contrasts, before,
+                                j->totals->gradient_variance));
+out:
+    imp__release(ctx, j->contrasts);
+    imp__release(ctx, before);
+    return st;
+}
+
+static enum imp_status moved_begin(struct imp__gradient_job *j, size_t target,
+                                   struct imp__moved_gradient *moved)
+{
+    const struct imp_problem *p = j->problem;
+    if (j->totals->many)
+        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                          "losses by poses have gradients of at most %d numbers",
+                          IMP_TALLY_DENSE);
+    IMP_CHECKED(imp__moved_begin(p, &j->tracer, moved));
+    moved->first = imp__moved_first(target);
+    if (moved->moves.n > 0) j->moved = moved;
+    return IMP_OK;
+}
+
 static enum imp_status target_estimate(struct imp_problem *p,
-                                       const struct imp__target *target, int part,
-                                       const struct imp_run *run, double lo, double hi,
-                                       double start_s, bool want_gradient,
+                                       const struct imp__target *target, size_t number,
+                                       int part, const struct imp_run *run, double lo,
+                                       double hi, double start_s, bool want_gradient,
                                        struct imp__totals *totals)
 {
     struct imp_run own = *run;
     struct imp__splat splat = {0};
+    struct imp__moved_gradient moved = {0};
     struct imp__gradient_job j = {
         .problem = p, .totals = totals, .target = target, .want_gradient = want_gradient};
+    p->edge_terms = true;
     enum imp_status st = imp__target_tracer(p, target, part, &own, &j.tracer);
+    p->edge_terms = false;
     if (st != IMP_OK) return st;
     struct imp_job job = imp__job(p->scene, j.tracer.sensor, &own, &p->active);
     const struct imp_bearer dense = {.number = IMP_TALLY_DENSE};
     imp__job_state(&job, IMP_HAS_LOSS, NULL);
+    imp__job_state(&job, IMP_HAS_EDGE_TERMS, NULL);
     if (want_gradient && totals->many)
         imp__job_state(&job, IMP_HAS_MANY_PARAMETERS, &dense);
     IMP_CHECKED(imp__job_allowed(&job));
@@ -80,10 +131,15 @@ static enum imp_status target_estimate(struct imp_problem *p,
     if (st != IMP_OK) return st;
     if (p->variate && want_gradient)
         j.variate = imp__variate_use(p->variate, target, &j.tracer, &j.there);
-    if (st == IMP_OK && imp__film_border(&j.tracer.sensor->film) > 0)
+    const bool moves = imp__problem_moves(p);
+    if (moves && want_gradient) st = moved_begin(&j, number, &moved);
+    if (st == IMP_OK && (moves || imp__film_border(&j.tracer.sensor->film) > 0))
         st = splat_prepare(&j, &own, &splat);
-    if (st == IMP_OK && (!j.splat || want_gradient))
+    if (st == IMP_OK && j.moved)
+        st = moved_estimate(&j, &moved, &splat, &own, lo, hi, start_s);
+    else if (st == IMP_OK && (!j.splat || want_gradient))
         st = imp__gradient_job_run(&j, &own, "gradient", lo, hi, start_s);
+    imp__moved_end(&moved);
     imp__splat_destroy(p->ctx, &splat);
     return st;
 }
@@ -98,7 +154,7 @@ static enum imp_status targets_estimate(struct imp_problem *p, const struct imp_
     for (size_t t = 0; t < p->n_targets; t++) {
         const int parts = imp__target_parts(&p->targets[t]);
         for (int k = 0; k < parts && st == IMP_OK; k++)
-            st = target_estimate(p, imp__target_part(&p->targets[t], k), k, run,
+            st = target_estimate(p, imp__target_part(&p->targets[t], k), t, k, run,
                                  ((double)t + (double)k / parts) / n,
                                  ((double)t + (double)(k + 1) / parts) / n, start,
                                  want_gradient, totals);
@@ -112,7 +168,9 @@ static int bias_order(const struct imp_problem *p)
     for (size_t t = 0; t < p->n_targets; t++) {
         const struct imp_target *d = &p->targets[t].desc;
         const bool wide = imp__film_border(&p->scene->sensors[d->sensor]->film) > 0;
-        const int here = wide ? 1 : imp__loss_bias_order(d->loss); /* ratio of sums */
+        const int own = imp__loss_bias_order(d->loss);
+        /* A ratio of sums; adjoints of two passes without the jackknife. */
+        const int here = wide ? 1 : imp__problem_moves(p) ? imp_min(own, 1) : own;
         if (here && (!order || here < order)) order = here;
     }
     return order;
@@ -221,9 +279,12 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
     p->edge_terms = false;
     IMP_TRY(st);
     IMP_TRY(imp__adjoint_check(p, &j.tracer.sensor->film, seed_image, "seed_image"));
-    if (imp__moved_wanted(p)) {
-        IMP_TRY(imp__moved_begin(p, &j.tracer, seed_image, &moved));
-        j.moved = &moved;
+    if (imp__problem_moves(p)) {
+        IMP_TRY(imp__moved_begin(p, &j.tracer, &moved));
+        IMP_TRY(imp__moved_adjoint_fixed(p->ctx, &j.tracer.sensor->film,
+                                         p->scene->channels, seed_image, &moved.adjoint));
+        IMP_TRY(imp__moved_learn(&moved, own.spp));
+        if (moved.moves.n > 0) j.moved = &moved;
     }
     if (j.tracer.integrator->from_lights) {
         IMP_TRY(imp__light_reverse(p, &j.tracer, seed_image, &own, &totals));

@@ -15,6 +15,7 @@ static enum imp_status allowed(const struct imp_problem *p, const struct imp_run
 {
     struct imp_job job = imp__job(p->scene, NULL, run, &p->active);
     imp__job_state(&job, IMP_HAS_CONTROL_VARIATE, NULL);
+    imp__job_state(&job, IMP_HAS_EDGE_TERMS, NULL);
     if (!p->scene->twin) imp__job_state(&job, IMP_HAS_ONE_MAKING, NULL);
     const int n_stated = job.n_stated;
     IMP_CHECKED(imp__job_allowed(&job));

@@ -120,13 +120,13 @@ static enum imp_status activate_named(imp_problem *p, const char *name, uint8_t 
     return IMP_OK;
 }
 
-/* Poses are what a pattern means that names them, "*.pose". */
+/* Numbers of geometry are what a pattern means that names them, "*.pose". */
 static bool is_passed_over(const struct imp_scene *scene, size_t param, const char *glob)
 {
     const char *tail = strrchr(glob, '.');
-    if (tail && strcmp(tail, ".pose") == 0) return false;
     for (const struct imp_pose *q = scene->poses; q; q = q->next)
-        if (q->param == (int)param) return true;
+        if (q->param == (int)param)
+            return !tail || strcmp(tail + 1, imp__pose_tail(q->kind)) != 0;
     return false;
 }
 
@@ -169,6 +169,13 @@ enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
 out:
     imp__release(p->ctx, chosen);
     return st;
+}
+
+bool imp__problem_moves(const struct imp_problem *p)
+{
+    for (const struct imp_pose *q = p->scene->poses; q; q = q->next)
+        if (p->active.base[q->param] >= 0) return true;
+    return false;
 }
 
 size_t imp_problem_n_variables(const imp_problem *p) { return p ? p->n : 0; }

@@ -125,8 +125,8 @@ struct imp_problem {
     struct imp__allocation *allocation; /* of its samples; NULL: all alike */
     struct imp__variate *variate; /* of the evaluation at work (variate.h); NULL: none */
     enum imp__loss_use use;
-    bool
-        edge_terms; /* the evaluation at work has what moving edges give (moved_gradient.h) */
+    /* The evaluation at work has what moving edges give (moved_gradient.h). */
+    bool edge_terms;
     bool
         misses_reported; /* the user has been warned of light that light tracing misses */
     bool same_known;     /* the ranks of a team have the same problem */
@@ -135,6 +135,9 @@ struct imp_problem {
     struct imp_arena check_arena;   /* of the last check's rows */
     struct imp_arena missing_arena; /* of rows of imp_problem_missing */
 };
+
+/* Is some pose active? Then losses have two passes whatever the filter (splat.h). */
+bool imp__problem_moves(const struct imp_problem *p);
 
 /* ---- tied_parameters.c ---- */
 /* Make the parameters `chosen` [n_params] active, and lay out x by the problem's ties.

@@ -55,6 +55,14 @@ static bool sample_emission(const struct imp_emitter *e, const struct imp_ball *
     return true;
 }
 
+static void aim(struct imp_emitter *e, double v[3], bool set)
+{
+    struct directional *l = e->self;
+    const imp_v3 along = imp__v3(v[0], v[1], v[2]);
+    if (set && imp__length(along) > 0) l->along = imp__normalize(along);
+    for (int k = 0; k < 3; k++) v[k] = l->along[k];
+}
+
 const struct imp_emitter_ops imp__directional = {
     .size = sizeof(struct imp_emitter_ops),
     .name = "directional",
@@ -67,4 +75,5 @@ const struct imp_emitter_ops imp__directional = {
     .sample = sample,
     .pdf = imp__point_light_pdf,
     .sample_emission = sample_emission,
-    .pdf_emission = imp__along_emission_pdf};
+    .pdf_emission = imp__along_emission_pdf,
+    .aim = aim};

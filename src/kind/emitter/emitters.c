@@ -17,7 +17,8 @@
     X(imp__spot_light)                                                                   \
     X(imp__sun)                                                                          \
     X(imp__projector)                                                                    \
-    X(imp__sunsky)
+    X(imp__sunsky)                                                                       \
+    X(imp__ciesky)
 
 #define DECLARE(kind) extern const struct imp_emitter_ops kind;
 EMITTERS(DECLARE)

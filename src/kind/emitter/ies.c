@@ -15,7 +15,12 @@
  * light by chance is bounded by the power heuristic, as the density of light samples has
  * the same pole.
  *
- * Between angles the table is interpolated bilinearly; above and below, it is 0. */
+ * Between angles the table is interpolated bilinearly; above and below, it is 0.
+ *
+ * Directions of the types of LM-63-2002, with nadir n, the plane 0 along c and C90 along d:
+ *     C   w = n cos v + (c cos h + d sin h) sin v
+ *     B   w = (n cos v + c sin v) cos h - d sin h         h counts clockwise from above
+ *     A   w = (c cos h - d sin h) cos v - n sin v         v = -90 is nadir */
 #include "ies.h"
 #include "emission.h"
 #include "from_point.h"
@@ -60,18 +65,40 @@ static double folded(const struct imp_ies_data *d, double h)
     return h;
 }
 
+/* Vertical and horizontal angle of a direction, by the table's type. False: beyond it. */
+static bool angles_of(const struct imp__ies *x, imp_v3 w, double *v, double *h)
+{
+    const struct imp_ies_data *d = x->data;
+    const double a = imp__dot(w, x->c0), b = imp__dot(w, x->c90),
+                 c = imp__dot(w, x->nadir);
+    const int n = d->n_horizontal;
+    if (d->type == IMP_PHOTOMETRY_C) {
+        *v = atan2(sqrt(a * a + b * b), c) / DEGREE;
+        *h = n > 1 ? folded(d, atan2(b, a) / DEGREE) : 0;
+        return true;
+    }
+    if (d->type == IMP_PHOTOMETRY_B) {
+        *v = atan2(a, c) / DEGREE;
+        *h = atan2(-b, sqrt(a * a + c * c)) / DEGREE;
+    } else {
+        *v = atan2(-c, sqrt(a * a + b * b)) / DEGREE;
+        *h = atan2(-b, a) / DEGREE;
+    }
+    if (d->horizontal[0] == 0) *h = fabs(*h);
+    return fabs(*h) <= 90 + 1e-9;
+}
+
 double imp__ies_intensity(const struct imp__ies *x, imp_v3 w)
 {
     const struct imp_ies_data *d = x->data;
-    const double a = imp__dot(w, x->c0), b = imp__dot(w, x->c90);
-    const double v = atan2(sqrt(a * a + b * b), imp__dot(w, x->nadir)) / DEGREE;
     const int n = d->n_vertical;
-    double f, g;
+    double f, g, v, h;
     /* Rounding does not take light away at the last angle. */
-    if (v < d->vertical[0] - 1e-9 || v > d->vertical[n - 1] + 1e-9) return 0;
+    if (!angles_of(x, w, &v, &h) || v < d->vertical[0] - 1e-9 ||
+        v > d->vertical[n - 1] + 1e-9)
+        return 0;
     const double *cd = d->candela + place(d->vertical, n, v, &f);
     if (d->n_horizontal > 1) {
-        const double h = folded(d, atan2(b, a) / DEGREE);
         cd += (size_t)place(d->horizontal, d->n_horizontal, h, &g) * (size_t)n;
         const double one = cd[0] + f * (cd[1] - cd[0]);
         return x->factor * (one + g * (cd[n] + f * (cd[n + 1] - cd[n]) - one));
@@ -113,10 +140,11 @@ double imp__ies_bound(const struct imp__ies *x, imp_v3 d, double angle)
     const double v = acos(imp_clamp(imp__dot(d, x->nadir), -1.0, 1.0));
     const double from = (v - angle) / DEGREE, to = (v + angle) / DEGREE;
     double most = 0, shown = x->same + x->across;
-    if (to < t->vertical[0] || from > t->vertical[n - 1]) return 0;
+    const bool any = t->type != IMP_PHOTOMETRY_C; /* its angles are not from nadir */
+    if (!any && (to < t->vertical[0] || from > t->vertical[n - 1])) return 0;
     for (int k = 0; k < n; k++) { /* all angles of the table that touch the range */
-        if (k + 1 < n && t->vertical[k + 1] < from) continue;
-        if (k > 0 && t->vertical[k - 1] > to) break;
+        if (!any && k + 1 < n && t->vertical[k + 1] < from) continue;
+        if (!any && k > 0 && t->vertical[k - 1] > to) break;
         for (int j = 0; j < t->n_horizontal; j++)
             most = fmax(most, t->candela[(size_t)j * (size_t)n + (size_t)k]);
     }
@@ -125,6 +153,37 @@ double imp__ies_bound(const struct imp__ies *x, imp_v3 d, double angle)
         shown += x->facets[k].area * fmax(0, cos(fmax(0, tilt - angle)));
     }
     return shown > 0 ? x->factor * most / shown : 0;
+}
+
+/* I is linear in each angle of a cell; Gauss-Legendre of two points takes its square root's worth of
+ * the sphere's area element to 1e-6 for cells of 5 degrees. */
+double imp__ies_flux(const struct imp__ies *x)
+{
+    const struct imp_ies_data *d = x->data;
+    static const double node[2] = {0.21132486540518712, 0.78867513459481288};
+    const int n = d->n_vertical, m = d->n_horizontal;
+    const bool turns = d->type == IMP_PHOTOMETRY_C, b = d->type == IMP_PHOTOMETRY_B;
+    double sum = 0, span = m > 1   ? d->horizontal[m - 1] - d->horizontal[0]
+                           : turns ? 360
+                                   : 180;
+    for (int j = 0; j < imp_max(m - 1, 1); j++)
+        for (int i = 0; i + 1 < n; i++)
+            for (int q = 0; q < 4; q++) {
+                const double f = node[q & 1], g = node[q >> 1];
+                const double *p = d->candela + (size_t)j * (size_t)n + (size_t)i;
+                const double *o = m > 1 ? p + n : p;
+                const double dv = d->vertical[i + 1] - d->vertical[i];
+                const double dh = m > 1 ? d->horizontal[j + 1] - d->horizontal[j] : span;
+                const double v = (d->vertical[i] + f * dv) * DEGREE;
+                const double h = m > 1 ? (d->horizontal[j] + g * dh) * DEGREE
+                                       : (turns ? 0 : (g - 0.5) * IMP_PI);
+                const double one = p[0] + f * (p[1] - p[0]);
+                const double value = one + g * (o[0] + f * (o[1] - o[0]) - one);
+                const double element = turns ? sin(v) : b ? cos(h) : cos(v);
+                sum += 0.25 * value * element * dv * dh * (DEGREE * DEGREE);
+            }
+    const double whole = turns ? 360 : 180;
+    return x->factor * sum * whole / span;
 }
 
 double imp__ies_mean(const struct imp__ies *x, imp_v3 n)
@@ -156,6 +215,28 @@ static void frame_set(struct imp__ies *x, imp_v3 s, imp_v3 n, bool mirrored)
     x->c90 = imp__cross(x->c0, x->nadir) * (mirrored ? -1.0 : 1.0);
 }
 
+/* What the luminaire gives in operation, as a part of what was measured: a flux in its place, how
+ * far it is dimmed, and what age and dirt leave of it (the maintenance factor). */
+static enum imp_status operation_read(const struct imp_build *b, struct imp__ies *x)
+{
+    enum imp_status st = IMP_OK;
+    const struct imp_interval part = {0, 1, IMP_CLOSED}, left = {0, 1, IMP_OPEN_LO};
+    double flux;
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "dimming", 1, part, &x->dimming));
+    IMP_TRY(
+        imp__props_float_in(b->ctx, b->node, "maintenance", 1, left, &x->maintenance));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "flux", 0, IMP_NOT_NEGATIVE, &flux));
+    const double measured = imp__ies_flux(x) * x->lumens;
+    if (imp_build_has(b, "flux") && !(measured > 0))
+        IMP_TRY(
+            imp_build_error(b, "flux", IMP_E_SCENE,
+                            "its table is dark, and has no flux that could be scaled"));
+    if (imp_build_has(b, "flux")) x->factor *= flux / measured;
+    x->factor *= x->dimming * x->maintenance;
+out:
+    return st;
+}
+
 static enum imp_status common_build(const struct imp_build *b, struct imp__ies *x)
 {
     static const char *const units[] = {"photometric", "radiometric"};
@@ -165,7 +246,9 @@ static enum imp_status common_build(const struct imp_build *b, struct imp__ies *
     if (!b->node->ies) IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE, "has no table"));
     x->data = b->node->ies;
     IMP_TRY(imp_build_choice(b, "units", units, 2, 0, &unit));
-    x->factor = unit == 0 ? 1 : 1 / PER_WATT;
+    x->lumens = unit == 0 ? 1 : PER_WATT;
+    x->factor = 1 / x->lumens;
+    IMP_TRY(operation_read(b, x));
     IMP_TRY(imp_build_transform(b, "to_world", m.m));
     const double det = imp__mat4_det3(&m);
     if (!imp__mat4_is_finite(&m) || !imp__mat4_is_affine(&m) || !(fabs(det) > 0) ||

@@ -15,7 +15,11 @@ struct imp__ies {
     imp_v3 nadir, c0,
         c90; /* orthonormal, world: w = nadir cos v + sin v (c0 cos h + ...) */
     const struct imp_ies_data *data;
-    double factor;   /* emitted intensity over the table's: 1 or 1/683 */
+    double
+        factor; /* emitted intensity over the table's: 1 or 1/683, times flux, dimming and
+                        maintenance */
+    double lumens; /* lm in a unit of flux: 1 or 683 */
+    double dimming, maintenance;
     imp_v3 position; /* of a point */
     /* Projected area of a surface light in direction w, in parts. */
     double same;   /* sphere: the same for all w; else 0 */
@@ -27,6 +31,8 @@ struct imp__ies {
 
 /* Intensity along w (world, unit, away from the light), at scale 1. */
 double imp__ies_intensity(const struct imp__ies *x, imp_v3 w);
+/* Int I dw, at scale 1, in lm (or W). */
+double imp__ies_flux(const struct imp__ies *x);
 /* Area that faces w, projected along w. */
 double imp__ies_projected(const struct imp__ies *x, imp_v3 w);
 /* Radiance of the surface along w: intensity over projected area. */

@@ -66,6 +66,13 @@ static bool emission_sample(const struct imp_emitter *e, const struct imp_ball *
     return true;
 }
 
+static void aim(struct imp_emitter *e, double v[3], bool set)
+{
+    struct point *p = e->self;
+    if (set) p->position = imp__v3(v[0], v[1], v[2]);
+    for (int k = 0; k < 3; k++) v[k] = p->position[k];
+}
+
 const struct imp_emitter_ops imp__point_light = {.size = sizeof(struct imp_emitter_ops),
                                                  .name = "point",
                                                  .object_size = sizeof(struct point),
@@ -77,4 +84,5 @@ const struct imp_emitter_ops imp__point_light = {.size = sizeof(struct imp_emitt
                                                  .sample = sample,
                                                  .pdf = imp__point_light_pdf,
                                                  .sample_emission = emission_sample,
-                                                 .pdf_emission = imp__point_emission_pdf};
+                                                 .pdf_emission = imp__point_emission_pdf,
+                                                 .aim = aim};

@@ -168,6 +168,13 @@ static bool sample_emission(const struct imp_emitter *e, const struct imp_ball *
     return true;
 }
 
+static void aim(struct imp_emitter *e, double v[3], bool set)
+{
+    struct imp__light_frame *f = e->self;
+    if (set) f->origin = imp__v3(v[0], v[1], v[2]);
+    for (int k = 0; k < 3; k++) v[k] = f->origin[k];
+}
+
 const struct imp_emitter_ops imp__spot_light = {.size = sizeof(struct imp_emitter_ops),
                                                 .name = "spot",
                                                 .object_size =
@@ -184,4 +191,5 @@ const struct imp_emitter_ops imp__spot_light = {.size = sizeof(struct imp_emitte
                                                 .place_d = place_d,
                                                 .sample_emission = sample_emission,
                                                 .pdf_emission = pdf_emission,
-                                                .cone = cone};
+                                                .cone = cone,
+                                                .aim = aim};

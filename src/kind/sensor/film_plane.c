@@ -150,3 +150,22 @@ enum imp_status imp__film_plane_build(const struct imp_build *b, bool offset,
 out:
     return st;
 }
+
+bool imp__film_plane_view(struct imp_film_plane *f, double number[3], bool set)
+{
+    const double t = -f->dx * f->width / 2, ty = -f->dy * f->height / 2;
+    if (f->lens) return false;
+    if (!set) {
+        number[0] = atan(t) * (360 / IMP_PI);
+        number[1] = (1 - f->x0 / t) / 2;
+        number[2] = (1 - f->y0 / ty) / 2;
+        return true;
+    }
+    const double wide = tan(number[0] * (IMP_PI / 360)), high = ty * (wide / t);
+    f->dx = -2 * wide / f->width;
+    f->dy = -2 * high / f->height;
+    f->x0 = wide * (1 - 2 * number[1]);
+    f->y0 = high * (1 - 2 * number[2]);
+    film_bound(f, ceil(f->beside) + 1);
+    return true;
+}

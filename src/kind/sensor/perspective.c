@@ -47,10 +47,17 @@ static void move(struct imp_sensor *s, const double to_world[12])
     imp__projection_move(&p->projection, to_world);
 }
 
+static bool view(struct imp_sensor *s, double number[3], bool set)
+{
+    struct perspective *p = s->self;
+    return imp__film_plane_view(&p->film, number, set);
+}
+
 const struct imp_sensor_ops imp__perspective = {.size = sizeof(struct imp_sensor_ops),
                                                 .name = "perspective",
                                                 .object_size = sizeof(struct perspective),
                                                 .build = build,
                                                 .ray = ray,
                                                 .connect = connect,
-                                                .move = move};
+                                                .move = move,
+                                                .view = view};

@@ -64,6 +64,8 @@ struct imp_film_plane {
 enum imp_status imp__film_plane_build(const struct imp_build *b, bool offset,
                                       const struct imp_film_desc *film,
                                       struct imp_film_plane *out);
+/* imp_sensor_ops.view of a film without a lens that distorts. */
+bool imp__film_plane_view(struct imp_film_plane *film, double number[3], bool set);
 /* (x, y, 1) at a film position. */
 static inline imp_v3 imp__film_plane_at(const struct imp_film_plane *film, double px,
                                         double py)

@@ -182,6 +182,22 @@ static void round_of(const struct imp_shape *s, struct imp_round *out)
     *out = (struct imp_round){.centre = p->center, .radius = p->radius};
 }
 
+static void move(struct imp_shape *s, const double to_world[12])
+{
+    struct sphere *p = s->self;
+    const imp_v3 x = imp__rows_vector(to_world, p->axes.s);
+    const double scale = imp__length(x);
+    p->center = imp__rows_point(to_world, p->center);
+    p->axes.s = x * (1 / scale);
+    p->axes.t = imp__rows_vector(to_world, p->axes.t) * (1 / scale);
+    p->axes.n = imp__rows_vector(to_world, p->axes.n) * (1 / scale);
+    p->radius *= scale;
+    s->area = 4 * IMP_PI * p->radius * p->radius;
+    const imp_v3 r = imp__v3(p->radius, p->radius, p->radius);
+    s->lo = p->center - r;
+    s->hi = p->center + r;
+}
+
 const struct imp_shape_ops imp__sphere = {.size = sizeof(struct imp_shape_ops),
                                           .name = "sphere",
                                           .flags = IMP_SHAPE_CONVEX | IMP_SHAPE_NEAREST,
@@ -193,4 +209,5 @@ const struct imp_shape_ops imp__sphere = {.size = sizeof(struct imp_shape_ops),
                                           .pdf_toward = pdf_toward,
                                           .round = round_of,
                                           .sample_area = sample_area,
-                                          .place = place};
+                                          .place = place,
+                                          .move = move};

@@ -4,6 +4,7 @@
  * the sensor, or meet its surface. Of both ways, weights of MIS (Veach 1997, 9.2). */
 #include "kind/bsdf/transport.h"
 #include "kind/cleared.h"
+#include "kind/sensor/receiver.h"
 #include "walk/both/both.h"
 
 static void reach_add(struct imp_light_step *w, struct imp_vertex *v, bool met, double px,
@@ -52,7 +53,8 @@ void imp__light_meet_sensor(struct imp_light_step *w, struct imp_vertex *v,
     struct imp_step *s = &w->s;
     const struct imp_sensor *sensor = s->tracer->sensor;
     const double cosine = -imp__dot(at->ng, s->d);
-    if (!(cosine > 0) || !imp__light_depth_allows(s, s->depth)) return;
+    if (!(cosine > 0) || imp__is_unmet(sensor) || !imp__light_depth_allows(s, s->depth))
+        return;
     if (s->tracer->integrator->hide_emitters && s->depth - s->straight == 1) return;
     const double mis = w->both ? imp__both_sensor_weight(w, cosine)
                                : met_weight(w, cosine, w->passed + v->t);
@@ -119,7 +121,8 @@ double imp__light_connect_weight(const struct imp_step *s,
                                  double across)
 {
     const struct imp_sensor *sensor = s->tracer->sensor;
-    if (!sensor->shape || !s->tracer->integrator->directions) return 1;
+    if (!sensor->shape || imp__is_unmet(sensor) || !s->tracer->integrator->directions)
+        return 1;
     const double c = to->cos_sensor;
     const double meets = across > 0 ? across * c : pdf * c / (to->dist * to->dist);
     return power_heuristic(1 / sensor->shape->area, meets);

@@ -1,11 +1,96 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Draws of the boundary, and what they bring as derivatives (boundary.h). */
-#include "base/context.h"
+#include "base/arguments.h"
 #include "boundary_parts.h"
+#include "scene/camera_gain.h"
 #include "scene/pose.h"
 
-/* Area lights by area times radiance. */
+/* A tenth of each measure is the length in space. */
+#define BY_LENGTH 0.1
+
+/* What an edge may be to the picture: its length as the camera sees it, where it is a silhouette, or
+ * else by how much its faces turn. */
+static double film_measure(const struct imp__boundary *b, const struct imp__edge *e)
+{
+    const imp_v3 along = e->b - e->a, r = (e->a + e->b) * 0.5 - b->camera;
+    const imp_v3 m = imp__cross(along, r);
+    const double d2 = imp_max(imp__dot(r, r), 1e-12 * imp__sqr(b->size));
+    const double jump =
+        imp__edge_side(b->edges, e, m) == 0 ? imp__edge_turn(b->edges, e) : 1;
+    return imp__length(m) / d2 * jump;
+}
+
+/* To lights: of all lines through it, a silhouette to so many; to scattered light, all that jumps is
+ * made by the turn. */
+static double turn_measure(const struct imp__boundary *b, const struct imp__edge *e)
+{
+    return imp__length(e->b - e->a) * imp__edge_turn(b->edges, e);
+}
+
+static enum imp_status choice_make(struct imp__boundary *b, enum imp__boundary_kind kind)
+{
+    const struct imp__edges *edges = b->edges;
+    double *measure = imp__alloc(edges->ctx, edges->n + 1, sizeof *measure);
+    double sum = 0, all = 0;
+    if (!measure) return imp__error(edges->ctx, IMP_E_NOMEM, "no memory for edges");
+    for (size_t k = 0; k < edges->n; k++) {
+        const struct imp__edge *e = &edges->edge[k];
+        sum += measure[k] =
+            kind == IMP_BOUNDARY_FILM ? film_measure(b, e) : turn_measure(b, e);
+        all += imp__length(e->b - e->a);
+    }
+    for (size_t k = 0; k < edges->n; k++) {
+        const struct imp__edge *e = &edges->edge[k];
+        measure[k] = BY_LENGTH * imp__length(e->b - e->a) / all +
+                     (sum > 0 ? (1 - BY_LENGTH) * measure[k] / sum : 0);
+    }
+    const enum imp_status st =
+        imp__edge_choice_begin(edges, &b->tree, measure, 1, &b->choice[kind]);
+    imp__release(edges->ctx, measure);
+    return st;
+}
+
+/* Spheres by the lengths of their great circles, edges by theirs. */
+static enum imp_status balls_make(struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    struct imp_round round;
+    double edges = 0, sum = 0;
+    b->ball = imp__alloc(scene->ctx, (size_t)scene->n_shapes + 1, sizeof *b->ball);
+    if (!b->ball) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
+    for (int k = 0; k < scene->n_shapes; k++)
+        if (imp__moves_sphere(scene, k, &round)) b->ball[b->n_balls++] = k;
+    for (size_t k = 0; k < b->edges->n; k++) edges += turn_measure(b, &b->edges->edge[k]);
+    for (int kind = 0; kind < IMP_BOUNDARY_KINDS; kind++) {
+        double *part =
+            imp__alloc(scene->ctx, (size_t)b->n_balls + 2, sizeof *b->part[kind]);
+        if (!part) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
+        b->part[kind] = part;
+        sum = part[0] = 0;
+        for (int k = 0; k < b->n_balls; k++) {
+            imp__moves_sphere(scene, b->ball[k], &round);
+            part[k + 1] = sum += IMP_2PI * round.radius;
+        }
+        sum += edges;
+        for (int k = 0; k <= b->n_balls && sum > 0; k++) part[k] /= sum;
+        if (!(edges > 0)) part[b->n_balls] = 1;
+        part[b->n_balls + 1] = 1;
+    }
+    return IMP_OK;
+}
+
+static enum imp_status choices_make(struct imp__boundary *b)
+{
+    IMP_CHECKED(balls_make(b));
+    if (b->edges->n == 0) return IMP_OK;
+    IMP_CHECKED(imp__edge_tree_build(b->edges, &b->tree));
+    for (int k = 0; k < IMP_BOUNDARY_KINDS; k++)
+        IMP_CHECKED(choice_make(b, (enum imp__boundary_kind)k));
+    return IMP_OK;
+}
+
+/* Lights by their power: pi A Le, 4 pi I, or pi R^2 E of a scene within R. */
 static enum imp_status lights_make(struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
@@ -17,9 +102,12 @@ static enum imp_status lights_make(struct imp__boundary *b)
         const struct imp_emitter *e = scene->emitters[k];
         const struct imp_texcoord nowhere = {.shape = e->shape};
         imp_spec in[IMP_INPUTS_MAX];
-        if (e->shape) {
+        if (e->shape || (e->ops->flags & IMP_EMITTER_DELTA)) {
+            const double size = e->shape                          ? e->shape->area
+                                : e->ops->flags & IMP_EMITTER_FAR ? imp__sqr(b->size) / 4
+                                                                  : 4;
             imp__inputs_eval(e->input, e->n_in, &nowhere, in);
-            sum += e->shape->area * imp__max_used(in[0], scene->lanes == 4);
+            sum += size * imp__max_used(in[0], scene->lanes == 4);
             b->n_lights++;
         }
         b->light_cdf[k] = sum;
@@ -63,12 +151,19 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
     if (st == IMP_OK) st = edges_allowed(out);
     imp__pinhole(tracer->sensor, &out->camera);
     if (st == IMP_OK) st = lights_make(out);
+    if (st == IMP_OK) st = choices_make(out);
     return st;
 }
 
 void imp__boundary_free(struct imp__boundary *b)
 {
     if (b->tracer) imp__release(b->tracer->scene->ctx, b->light_cdf);
+    for (int k = 0; k < IMP_BOUNDARY_KINDS; k++) {
+        imp__edge_choice_free(&b->choice[k]);
+        if (b->tracer) imp__release(b->tracer->scene->ctx, b->part[k]);
+    }
+    if (b->tracer) imp__release(b->tracer->scene->ctx, b->ball);
+    imp__edge_tree_free(&b->tree);
     *b = (struct imp__boundary){0};
 }
 
@@ -86,25 +181,33 @@ struct imp__flux *imp__flux_add(struct imp__edge_draw *d, int n)
     return f;
 }
 
+void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
+{
+    d->part = d->b->part[kind];
+    d->end = &d->first;
+    switch (kind) {
+    case IMP_BOUNDARY_FILM: imp__draw_film(d); break;
+    case IMP_BOUNDARY_LIGHT: imp__draw_light(d); break;
+    case IMP_BOUNDARY_SCATTER: imp__draw_scatter(d); break;
+    }
+}
+
 struct imp__flux *imp__boundary_draw(const struct imp__boundary *b,
                                      struct imp_arena *arena,
                                      enum imp__boundary_kind kind, int64_t index,
-                                     bool *no_memory)
+                                     int64_t strata, bool *no_memory)
 {
-    struct imp__edge_draw d = {.b = b, .arena = arena};
-    if (b->edges->n == 0) return NULL;
+    struct imp__edge_draw d = {.b = b, .arena = arena, .choice = &b->choice[kind]};
+    if (b->edges->n == 0 && b->n_balls == 0) return NULL;
     /* Walks of pictures have smaller numbers in the place of the kind. */
     d.key = imp__key(b->tracer->seed, UINT64_MAX - (uint64_t)kind, (uint64_t)index);
-    d.edge = imp__edges_draw(b->edges, imp__u01(d.key, IMP_EDGE_WHICH), &d.p);
-    d.along = imp__normalize(d.edge->b - d.edge->a);
-    d.inv_pdf = b->edges->until[b->edges->n - 1];
-    d.end = &d.first;
-    switch (kind) {
-    case IMP_BOUNDARY_FILM: imp__draw_film(&d); break;
-    case IMP_BOUNDARY_LIGHT: imp__draw_light(&d); break;
-    case IMP_BOUNDARY_SCATTER: imp__draw_scatter(&d); break;
-    }
+    d.u = ((double)(index % strata) + imp__u01(d.key, IMP_EDGE_WHICH)) / (double)strata;
+    d.u = imp_min(d.u, 1 - 0x1p-53);
+    imp__boundary_work(&d, kind);
     *no_memory |= d.no_memory;
+    const struct imp_camera_gain *gain = b->tracer->sensor->gain;
+    for (struct imp__flux *f = gain ? d.first : NULL; f; f = f->next)
+        f->L *= imp__gain_at(gain, b->tracer->photograph, f->px, f->py, NULL);
     return d.first;
 }
 
@@ -114,8 +217,9 @@ double imp__flux_velocity(const struct imp__moves *moves, const struct imp__flux
     double sum = 0;
     for (int k = 0; k < flux->n_ends; k++) {
         const struct imp__flux_end *e = &flux->end[k];
-        const imp_v3 v = e->camera ? imp__camera_velocity(moves, e->x.p, theta_dot)
-                                   : imp__velocity_of(moves, &e->x, theta_dot).v;
+        const imp_v3 v = e->camera  ? imp__camera_velocity(moves, e->x.p, theta_dot)
+                         : e->light ? imp__light_velocity(moves, e->light - 1, theta_dot)
+                                    : imp__velocity_of(moves, &e->x, theta_dot).v;
         sum += imp__dot(e->bar, v);
     }
     return sum;
@@ -128,6 +232,7 @@ void imp__flux_bar(const struct imp__moves *moves, const struct imp__flux *flux,
         const struct imp__flux_end *e = &flux->end[k];
         const struct imp__velocity v = {e->bar * bar, {0}, 0};
         if (e->camera) imp__camera_velocity_bar(moves, e->x.p, v.v, theta_bar);
+        else if (e->light) imp__light_velocity_bar(moves, e->light - 1, v.v, theta_bar);
         else imp__velocity_bar(moves, &e->x, &v, theta_bar);
     }
 }

@@ -10,18 +10,27 @@
  *     light    a line from a point y of a light, at distance t_y, passes a silhouette on its way to
  *              a vertex x, at distance t_x behind it; m points away from the edge's faces:
  *                  dI = -int dA_y dl Le cos_y sin(phi)/t_y^2 f W(x) m.(V - V_line),
- *                  V_line = (t_y x' + t_x V_y)/(t_x + t_y): both ends of the line move
+ *                  V_line = (t_y x' + t_x V_y)/(t_x + t_y): both ends of the line move;
+ *              of a point light Le cos_y dA_y is its intensity, of parallel light along d
+ *              Le cos_y dA_y/t_y^2 its irradiance and V_line = x' - t_x d'
  *     scatter  what a vertex x receives from scattered light and the sky jumps at every edge that
  *              it sees; w is a direction from the edge to it:
  *                  dI = int dl dw sin(phi) f W(x) [L(-m) - L(+m)] m.(V - x')
  *
+ * A sphere has a silhouette from everywhere: the circle on which a line touches it is an edge to the
+ * film and to lights, with m its outward normal; of all lines that touch it, by place p, dA, and
+ * turn about the normal, psi, dl dw sin(phi) is  dA dpsi/r.
+ *
  * x' is the velocity of a vertex that slides, along the chain from the camera. W(x), what the
  * sensor makes of a unit of radiance times projected area that leaves x, is a connection to the
  * camera, or the walk goes on from x by transposed kernels and is connected from there: a walk
- * from an edge is a walk from a light with a sign. Edges are chosen by length. */
+ * from an edge is a walk from a light with a sign. Points on edges are chosen by what a pilot has
+ * found (move/edge_choice.h); those between a light and what it lights among the silhouettes seen
+ * from the light's point. */
 #ifndef IMP_WALK_BOUNDARY_H
 #define IMP_WALK_BOUNDARY_H
 
+#include "move/edge_choice.h"
 #include "moved.h"
 
 enum imp__boundary_kind { IMP_BOUNDARY_FILM, IMP_BOUNDARY_LIGHT, IMP_BOUNDARY_SCATTER };
@@ -31,18 +40,26 @@ struct imp__boundary {
     const struct imp_tracer *tracer;
     const struct imp__moves *moves;
     const struct imp__edges *edges;
+    struct imp__edge_tree tree;
+    struct imp__edge_choice choice[IMP_BOUNDARY_KINDS];
+    int n_balls;
+    int *ball; /* [n_balls] shapes that are spheres */
+    /* [n_balls + 2] probability of the spheres before this one; then that of all of them, and 1:
+     * the rest is of edges. */
+    double *part[IMP_BOUNDARY_KINDS];
     imp_v3 camera; /* where its rays meet */
     double size;   /* of the scene */
     int n_lights;
-    double
-        *light_cdf; /* [n_emitters] of area lights, by area times radiance; last is 1 */
+    double *light_cdf; /* [n_emitters] of all but skies, by power; last is 1 */
 };
 
-/* A velocity on which a flux depends: of a glued point, or of what the camera makes of one. */
+/* A velocity on which a flux depends: of a glued point, of what the camera makes of one, or of a
+ * light without a shape. */
 struct imp__flux_end {
     struct imp__glued x;
     imp_v3 bar;
     bool camera;
+    int light; /* emitter, plus 1, whose place or direction it is; 0: none */
 };
 
 /* What one draw brings to a film position: L times the sum of bar.V over its ends. */
@@ -62,12 +79,24 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
                                     struct imp__boundary *out);
 void imp__boundary_free(struct imp__boundary *b);
 
+/* How much light at a film position counts; the sign is of no interest. */
+typedef double imp__flux_weight(const void *payload, const struct imp__flux *flux);
+
+/* A pilot chooses where on the edges later draws look: by the second moments of what its own draws
+ * bring to all movers, shifts and turns weighed alike. Later draws are independent of it, and have
+ * the mean that they had. draws: about how many will follow, of each kind; the pilot has an eighth.
+ * weight NULL: all light counts alike. */
+enum imp_status imp__boundary_learn(struct imp__boundary *b, int64_t draws,
+                                    imp__flux_weight *weight, const void *payload);
+
 /* Draw `index` of a kind: what it brings, in the arena; the mean over draws of all kinds, summed,
- * is the boundary's part of the derivative. NULL: nothing. *no_memory is set where there is none. */
+ * is the boundary's part of the derivative. Where draws are to be spread, index modulo `strata`
+ * is the stratum, along the list of edges; 1: all are alike. NULL: nothing. *no_memory is set
+ * where there is none. */
 struct imp__flux *imp__boundary_draw(const struct imp__boundary *b,
                                      struct imp_arena *arena,
                                      enum imp__boundary_kind kind, int64_t index,
-                                     bool *no_memory);
+                                     int64_t strata, bool *no_memory);
 
 /* Along theta_dot: the sum of bar.V; its transpose, times bar, added to theta_bar. */
 double imp__flux_velocity(const struct imp__moves *moves, const struct imp__flux *flux,

@@ -35,7 +35,7 @@ static imp_spec look(const struct imp__edge_draw *d, double px, double py)
     struct imp_walk walk;
     t->sensor->ops->ray(t->sensor, px, py, lens, &ray);
     imp__walk_along(t, d->arena, imp__key_branch(d->key, 0, 1), &ray, 0, &walk);
-    return walk.L;
+    return walk.values;
 }
 
 void imp__draw_film(struct imp__edge_draw *d)
@@ -44,10 +44,11 @@ void imp__draw_film(struct imp__edge_draw *d)
     const struct imp_sensor *sensor = b->tracer->sensor;
     const double none[4] = {0};
     struct imp_sensor_sample to;
-    if (!sensor->ops->connect || !imp__sensor_connect(sensor, &d->p, false, none, &to) ||
+    if (!imp__edge_any(d, b->camera) || !sensor->ops->connect ||
+        !imp__sensor_connect(sensor, &d->p, false, none, &to) ||
         !imp__light_on_film(sensor, &to))
         return;
-    const imp_v3 r = d->p - to.p;
+    const imp_v3 r = imp__edge_clear(d) - to.p;
     if (imp__occluded_at(b->tracer->scene, 0, &to.p, &r, 0, 1 - IMP_BESIDE)) return;
 
     imp_v3 x, y;
@@ -74,8 +75,7 @@ void imp__draw_film(struct imp__edge_draw *d)
     f->py = to.py;
     f->L = jump * d->inv_pdf;
     f->n_ends = 2;
-    const struct imp__glued at =
-        imp__edge_glued(b->edges, b->tracer->scene, d->edge, d->p);
+    const struct imp__glued at = imp__edge_carried(d);
     f->end[0] = imp__flux_glued(&at, bar);
     f->end[1] = imp__flux_glued(&at, -bar);
     f->end[1].camera = true;

@@ -3,14 +3,55 @@
  * Silhouettes between a light and what it lights (boundary.h). */
 #include "boundary_parts.h"
 
-static const struct imp_emitter *light_choose(const struct imp__boundary *b, double u,
-                                              double *pmf)
+static int light_choose(const struct imp__boundary *b, double u, double *pmf)
 {
     const struct imp_scene *scene = b->tracer->scene;
     int k = 0;
     while (k < scene->n_emitters - 1 && !(u < b->light_cdf[k])) k++;
     *pmf = b->light_cdf[k] - (k > 0 ? b->light_cdf[k - 1] : 0);
-    return scene->emitters[k];
+    return k;
+}
+
+/* Where the line to the edge begins, and what it carries. */
+struct source {
+    int light;            /* emitter */
+    struct imp_surface y; /* of a light with a shape */
+    imp_v3 p; /* its point; of parallel light the direction in which it travels */
+    bool parallel;
+    double density; /* of the light, and of its point per area */
+};
+
+static struct source source_draw(const struct imp__edge_draw *d)
+{
+    struct source s = {.density = 0};
+    double aim[3];
+    const double u[2] = {imp__u01(d->key, IMP_EDGE_LIGHT_U),
+                         imp__u01(d->key, IMP_EDGE_LIGHT_V)};
+    s.light = light_choose(d->b, imp__u01(d->key, IMP_EDGE_LIGHT), &s.density);
+    struct imp_emitter *e = d->b->tracer->scene->emitters[s.light];
+    if (!(s.density > 0)) return s;
+    if (e->shape) {
+        e->shape->ops->sample_area(e->shape, u, &s.y);
+        s.density /= e->shape->area;
+        s.p = s.y.p;
+        return s;
+    }
+    e->ops->aim(e, aim, false);
+    s.p = imp__v3(aim[0], aim[1], aim[2]);
+    s.parallel = e->ops->flags & IMP_EMITTER_FAR;
+    return s;
+}
+
+/* The velocity of the light's end of the line counts so. */
+static struct imp__flux_end source_end(const struct imp__edge_draw *d,
+                                       const struct source *s, imp_v3 bar)
+{
+    const struct imp_scene *scene = d->b->tracer->scene;
+    const struct imp_shape *shape = scene->emitters[s->light]->shape;
+    if (!shape) return (struct imp__flux_end){{.p = s->p}, bar, false, s->light + 1};
+    const struct imp_located located = imp__located_drawn(shape, &s->y.located, s->y.uv);
+    const struct imp__glued lit = imp__glued_at(scene, shape->index, &located, s->y.ng);
+    return imp__flux_glued(&lit, bar);
 }
 
 void imp__draw_light(struct imp__edge_draw *d)
@@ -18,43 +59,46 @@ void imp__draw_light(struct imp__edge_draw *d)
     const struct imp__boundary *b = d->b;
     const struct imp_scene *scene = b->tracer->scene;
     if (b->n_lights == 0) return;
-    double pmf;
-    const struct imp_emitter *e = light_choose(b, imp__u01(d->key, IMP_EDGE_LIGHT), &pmf);
-    const double u[2] = {imp__u01(d->key, IMP_EDGE_LIGHT_U),
-                         imp__u01(d->key, IMP_EDGE_LIGHT_V)};
-    struct imp_surface y, at;
-    if (!(pmf > 0)) return;
-    e->shape->ops->sample_area(e->shape, u, &y);
+    const struct source s = source_draw(d);
+    const struct imp_emitter *e = scene->emitters[s.light];
+    if (!(s.density > 0) || !imp__edge_silhouette(d, s.p, s.parallel)) return;
 
-    const imp_v3 r = d->p - y.p, turned = imp__cross(d->along, r);
+    /* Parallel light: from outside the scene. */
+    const imp_v3 from = s.parallel ? d->p - s.p * (2 * b->size) : s.p;
+    const imp_v3 r = d->p - from, turned = imp__cross(d->along, r);
     const double t_y = imp__length(r), sine = imp__length(turned) / t_y;
-    const double cosine = imp__dot(y.n, r) / t_y;
+    const double cosine = e->shape ? imp__dot(s.y.n, r) / t_y : 1;
     if (!(sine > 0) || !(cosine > IMP_GRAZING)) return;
     imp_v3 m = turned * (1 / (sine * t_y));
-    const int side = imp__edge_side(b->edges, d->edge, m);
+    const int side = d->edge                   ? imp__edge_side(b->edges, d->edge, m)
+                     : imp__dot(m, d->out) > 0 ? 1
+                                               : -1;
     if (side == 0) return;
     m *= (double)side;
 
     /* One ray past the edge; parts of its length to there. */
-    const imp_v3 o = imp__offset(y.p, y.ng, r);
+    const imp_v3 o = e->shape ? imp__offset(from, s.y.ng, r) : from;
     const imp_v3 to = d->p + m * (IMP_BESIDE * (t_y + imp__length(d->p))) - o;
     struct imp_hit hit;
+    struct imp_surface at;
     if (!imp__intersect(scene, &o, &to, 0, INFINITY, &hit)) return;
     if (hit.t < 1 + IMP_CONTACT * b->size / t_y) return;
     imp__hit_surface(scene, &hit, &o, &to, &at);
 
     const struct imp_texcoord there = {.shape = e->shape};
-    imp_spec in[IMP_INPUTS_MAX];
+    const struct imp_emission sent = {
+        .dist = 1, .cos_light = cosine, .d = imp__normalize(to)};
+    imp_spec in[IMP_INPUTS_MAX], le;
     imp__inputs_eval(e->input, e->n_in, &there, in);
-    const double t_x = imp__length(at.p - d->p), inverse = 1 / (t_x + t_y);
-    const double density = pmf / (e->shape->area * d->inv_pdf);
+    e->ops->eval(e, in, &sent, &le);
+    const double t_x = imp__length(at.p - d->p);
+    const double far = s.parallel ? 1 : t_y / (t_x + t_y); /* of V_line that is x' */
+    const double spread = s.parallel ? 1 : t_y * t_y;
     struct imp__edge_light light = {.w = imp__normalize(to), .behind = 1, .n_ends = 2};
-    light.light = in[0] * (-cosine * sine / (t_y * t_y * density));
-    light.slide = m * (-t_y * inverse);
-    const struct imp__glued edge = imp__edge_glued(b->edges, scene, d->edge, d->p);
-    const struct imp_located located = imp__located_drawn(e->shape, &y.located, y.uv);
-    const struct imp__glued lit = imp__glued_at(scene, e->shape->index, &located, y.ng);
+    light.light = le * (-cosine * sine * d->inv_pdf / (spread * s.density));
+    light.slide = m * -far;
+    const struct imp__glued edge = imp__edge_carried(d);
     light.end[0] = imp__flux_glued(&edge, m);
-    light.end[1] = imp__flux_glued(&lit, m * (-t_x * inverse));
+    light.end[1] = source_end(d, &s, m * (s.parallel ? t_x : far - 1));
     imp__edge_reach(d, &hit, &at, &light);
 }

@@ -11,9 +11,15 @@ struct imp__edge_draw {
     const struct imp__boundary *b;
     struct imp_arena *arena;
     struct imp_key key;
-    const struct imp__edge *edge;
-    imp_v3 p, along; /* the point, and the unit direction of the edge */
-    double inv_pdf;  /* length of all edges */
+    const struct imp__edge_choice *choice;
+    const double *part;           /* of spheres and edges (boundary.h) */
+    double u;                     /* by which the point is chosen */
+    const struct imp__edge *edge; /* NULL: a sphere touched by a line */
+    int ball;                     /* the sphere's shape */
+    imp_v3 p, along;              /* the point, and the unit direction of the edge */
+    imp_v3 out;                   /* of a sphere: its outward normal */
+    double inv_pdf; /* of the point, per length; of a line that touches a sphere */
+    int cell;       /* of the choice; behind all cells, of which sphere */
     struct imp__flux *first, **end;
     bool no_memory;
 };
@@ -36,11 +42,20 @@ enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
 /* Surfaces nearer behind an edge, per size of the scene, are what it stands on. */
 #define IMP_CONTACT 2e-5
 
+/* Sets the edge and its point: of all edges, and of spheres' silhouettes from there; of silhouettes of
+ * lines from there; of all edges, and lines that touch spheres, along *w. False: none. */
+bool imp__edge_any(struct imp__edge_draw *d, imp_v3 from);
+bool imp__edge_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel);
+bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w);
+/* The edge's point as its surface carries it; and a place beside it that no rounding hides behind
+ * its own sphere. */
+struct imp__glued imp__edge_carried(const struct imp__edge_draw *d);
+imp_v3 imp__edge_clear(const struct imp__edge_draw *d);
 /* A flux more, with room for n ends. NULL: no memory. */
 struct imp__flux *imp__flux_add(struct imp__edge_draw *d, int n);
 static inline struct imp__flux_end imp__flux_glued(const struct imp__glued *x, imp_v3 bar)
 {
-    return (struct imp__flux_end){*x, bar, false};
+    return (struct imp__flux_end){*x, bar, false, 0};
 }
 
 /* What light that arrives at `at` (a hit of this shape) along w brings to the sensor: from there,
@@ -62,6 +77,7 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
                      const struct imp_surface *at, const struct imp__edge_light *light);
 
 /* ---- One draw of each kind ---- */
+void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind);
 void imp__draw_film(struct imp__edge_draw *d);
 void imp__draw_light(struct imp__edge_draw *d);
 void imp__draw_scatter(struct imp__edge_draw *d);

@@ -73,7 +73,7 @@ static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_ligh
         shift = imp__slide_bar(&x, imp__normalize(x.x.p - from));
         f->end[f->n_ends++] = imp__flux_glued(&x.x, x.bar.v);
     }
-    f->end[f->n_ends++] = (struct imp__flux_end){last->x.x, shift, true};
+    f->end[f->n_ends++] = (struct imp__flux_end){last->x.x, shift, true, 0};
 }
 
 static void connect(struct imp__edge_draw *d, const struct imp__edge_light *light,

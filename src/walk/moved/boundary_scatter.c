@@ -2,7 +2,6 @@
  *
  * Edges between a vertex and what it receives from the sky and from lit surfaces (boundary.h). */
 #include "boundary_parts.h"
-#include "math/warp.h"
 #include "walk/core/step.h"
 
 /* What arrives along a recorded walk from a vertex x, without the emission of a light that it
@@ -38,14 +37,13 @@ void imp__draw_scatter(struct imp__edge_draw *d)
     const struct imp_tracer *tracer = b->tracer;
     const struct imp_scene *scene = tracer->scene;
     const int max = tracer->integrator->max_depth;
-    const double u[2] = {imp__u01(d->key, IMP_EDGE_DIR_U),
-                         imp__u01(d->key, IMP_EDGE_DIR_V)};
-    const imp_v3 w = imp__uniform_sphere(u);
+    imp_v3 w;
     struct imp_hit hit;
     struct imp_surface at;
-    if (max >= 0 && max < 2) return;
-    if (!imp__intersect(scene, &d->p, &w, IMP_CONTACT * b->size, INFINITY, &hit)) return;
-    imp__hit_surface(scene, &hit, &d->p, &w, &at);
+    if ((max >= 0 && max < 2) || !imp__edge_touched(d, &w)) return;
+    const imp_v3 from = imp__edge_clear(d);
+    if (!imp__intersect(scene, &from, &w, IMP_CONTACT * b->size, INFINITY, &hit)) return;
+    imp__hit_surface(scene, &hit, &from, &w, &at);
 
     const imp_v3 turned = imp__cross(d->along, w);
     const double sine = imp__length(turned);
@@ -65,7 +63,7 @@ void imp__draw_scatter(struct imp__edge_draw *d)
     bool any = false;
     for (int k = 0; k < depths; k++) {
         jump[k] = (arrives(tracer, &lo, k + 1) - arrives(tracer, &hi, k + 1)) *
-                  (sine * 4 * IMP_PI * d->inv_pdf);
+                  ((d->edge ? sine * 4 * IMP_PI : 1) * d->inv_pdf);
         any |= !imp__is_zero(jump[k]);
     }
     if (!any) return;
@@ -75,7 +73,7 @@ void imp__draw_scatter(struct imp__edge_draw *d)
         light.by_depth = jump;
         light.n_depths = depths;
     }
-    const struct imp__glued edge = imp__edge_glued(b->edges, scene, d->edge, d->p);
+    const struct imp__glued edge = imp__edge_carried(d);
     light.end[0] = imp__flux_glued(&edge, m);
     imp__edge_reach(d, &hit, &at, &light);
 }

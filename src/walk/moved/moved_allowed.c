@@ -7,7 +7,8 @@
 #include "scene/pose.h"
 
 extern const struct imp_bsdf_ops imp__diffuse, imp__twosided, imp__black;
-extern const struct imp_emitter_ops imp__area, imp__constant;
+extern const struct imp_emitter_ops imp__area, imp__constant, imp__point_light,
+    imp__spot_light, imp__directional;
 
 static enum imp_status refuse(const struct imp_tracer *t, const char *what,
                               const char *name, const char *kind, const char *why)
@@ -52,11 +53,16 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
 {
     for (int k = 0; k < t->scene->n_emitters; k++) {
         const struct imp_emitter *e = t->scene->emitters[k];
-        if (e->ops != &imp__area && e->ops != &imp__constant)
+        if (e->ops != &imp__area && e->ops != &imp__constant &&
+            e->ops != &imp__point_light && e->ops != &imp__spot_light &&
+            e->ops != &imp__directional)
             return refuse(t, "light", e->name, e->ops->name,
-                          "is neither an area light nor a constant sky");
+                          "is none of area, constant, point, spot and directional");
         if (e->shaped || is_textured(e->input, e->n_in))
             return refuse(t, "light", e->name, e->ops->name, "has a texture");
+        if (e->shape && e->shape->geometry != IMP_TRIANGLES)
+            return refuse(t, "light", e->name, e->ops->name,
+                          "is on a shape that is not made of triangles");
         if (e->course)
             return refuse(t, "light", e->name, e->ops->name, "changes with time");
     }
@@ -91,7 +97,6 @@ static enum imp_status sensor_allowed(const struct imp_tracer *t)
     if (!imp__pinhole(s, &centre))
         return refuse(t, "sensor", s->name, s->ops->name,
                       "has no point in which its rays meet");
-    if (s->gain) return refuse(t, "sensor", s->name, s->ops->name, "has an exposure");
     if (s->open != s->close)
         return refuse(t, "sensor", s->name, s->ops->name, "has a shutter");
     return IMP_OK;

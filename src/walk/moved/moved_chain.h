@@ -60,10 +60,29 @@ static inline void imp__connection_bar(struct imp__link_point *x,
     x->moved_bar -= apart;
 }
 
+/* The adjoint of the logarithm of cos/d^2 between x, which slides, and a light at the point y;
+ * returns that of the light's velocity. */
+static inline imp_v3 imp__point_bar(struct imp__link_point *x, imp_v3 y, double bar)
+{
+    const imp_v3 r = y - x->x.p;
+    const double inverse = 1 / imp__length(r);
+    const imp_v3 w = r * inverse;
+    const double cosine = imp__dot(x->x.n, w);
+    const imp_v3 turn = x->x.n * (1 / cosine);
+    const imp_v3 apart = (turn - w * (imp__dot(w, turn) + 2)) * (bar * inverse);
+    x->bar.n += w * (bar / cosine);
+    x->moved_bar -= apart;
+    return apart;
+}
+
 /* The vertex that a ray along w meets slides along it: what its adjoint is to the surface it
  * lies on, which is added there, and to a shift of the ray, which is returned. */
 static inline imp_v3 imp__slide_bar(struct imp__link_point *x, imp_v3 w)
 {
+    /* On a curved surface the normal turns as the vertex slides over it. */
+    const imp_v3 turn = (x->bar.n - x->x.n * imp__dot(x->x.n, x->bar.n)) * x->x.curvature;
+    x->moved_bar += turn;
+    x->bar.v -= turn;
     const imp_v3 across = x->x.n * (imp__dot(w, x->moved_bar) / imp__dot(x->x.n, w));
     const imp_v3 shift = x->moved_bar - across;
     x->bar.v += across;

@@ -49,12 +49,70 @@ static int read_walk(struct sweep *s, imp_spec adjoint)
     return n;
 }
 
+/* Derivative of the logarithm of what a light at a point sends along d, by d across itself: by
+ * differences, whose kinks at the borders of a spot's beam are so wide. */
+#define TURN 1e-6
+static imp_v3 sent_slope(const struct imp_emitter *e, imp_v3 d, int lanes)
+{
+    const struct imp_frame f = imp__frame_from_normal(d);
+    const struct imp_texcoord nowhere = {.shape = NULL};
+    const imp_v3 across[2] = {f.s, f.t};
+    imp_spec in[IMP_INPUTS_MAX];
+    imp_v3 slope = {0};
+    imp__inputs_eval(e->input, e->n_in, &nowhere, in);
+    for (int k = 0; k < 2; k++) {
+        double value[2];
+        for (int j = 0; j < 2; j++) {
+            const struct imp_emission x = {
+                .dist = 1,
+                .cos_light = 1,
+                .d = imp__normalize(d + across[k] * (j ? TURN : -TURN))};
+            imp_spec le;
+            e->ops->eval(e, in, &x, &le);
+            value[j] = imp__sum_used(le, lanes);
+        }
+        const double middle = 0.5 * (value[0] + value[1]);
+        if (middle > 0)
+            slope += across[k] * ((value[1] - value[0]) / (2 * TURN * middle));
+    }
+    return slope;
+}
+
+/* A light sample of a point, or of parallel light. */
+static void delta_bar(struct sweep *s, int k, const struct imp_vertex *v)
+{
+    const int light = v->d.light.emitter;
+    struct imp_emitter *e = s->tracer->scene->emitters[light];
+    const double weight = s->piece[k].light;
+    double aim[3];
+    e->ops->aim(e, aim, false);
+    const imp_v3 at = imp__v3(aim[0], aim[1], aim[2]);
+    if (e->ops->flags & IMP_EMITTER_FAR) {
+        imp__direction_bar(&s->at[k], -at, weight);
+        const imp_v3 n = s->at[k].x.n;
+        imp__light_velocity_bar(s->moves, light, n * (weight / imp__dot(n, at)),
+                                s->theta_bar);
+        return;
+    }
+    const imp_v3 r = s->at[k].x.p - at;
+    const double distance = imp__length(r);
+    const imp_v3 turn =
+        sent_slope(e, r * (1 / distance), s->tracer->scene->lanes) * (weight / distance);
+    const imp_v3 bar = imp__point_bar(&s->at[k], at, weight) - turn;
+    s->at[k].moved_bar += turn;
+    imp__light_velocity_bar(s->moves, light, bar, s->theta_bar);
+}
+
 /* The light sample of vertex k. */
 static void light_bar(struct sweep *s, int k, const struct imp_vertex *v)
 {
     const struct imp_scene *scene = s->tracer->scene;
     const struct imp_emitter *e = scene->emitters[v->d.light.emitter];
     const double weight = s->piece[k].light;
+    if (e->ops->flags & IMP_EMITTER_DELTA) {
+        delta_bar(s, k, v);
+        return;
+    }
     if (e->ops->flags & IMP_EMITTER_ENVIRONMENT) {
         const imp_v3 w = -imp__decided_v3(v->d.light.d);
         imp__direction_bar(&s->at[k], w, weight);

@@ -3,6 +3,7 @@
  * The first vertex of a walk from a sensor that is a surface: a white diffuse one, whose
  * direction is drawn by the cosine. */
 #include "surface_sensor.h"
+#include "kind/sensor/receiver.h"
 #include "math/warp.h"
 #include "scene/located.h"
 
@@ -58,9 +59,8 @@ struct imp_vertex *imp__meter_begin(struct imp_step *s, struct imp_surface *at,
 {
     struct imp_walk *walk = s->walk;
     const struct imp_sensor *sensor = s->tracer->sensor;
-    const struct imp_film_desc *film = &sensor->film;
-    const double u[2] = {imp_clamp(walk->px / film->width, 0.0, 0x1.fffffffffffffp-1),
-                         imp_clamp(walk->py / film->height, 0.0, 0x1.fffffffffffffp-1)};
+    double u[2];
+    imp__receiver_uv(sensor, walk->px, walk->py, u);
     s->flight.medium = s->flight.here = sensor->medium;
     if (!imp__sensor_vertex(s)) return NULL;
     struct imp_vertex *v = walk->last;
@@ -87,7 +87,7 @@ struct imp_vertex *imp__meter_begin(struct imp_step *s, struct imp_surface *at,
     v = imp__vertex_add(s, 0);
     if (!v) return NULL;
     v->shape = sensor->shape;
-    v->bsdf = &white;
+    v->bsdf = sensor->receiver ? &sensor->receiver->bsdf : &white;
     if (s->recorded) {
         v->d.shape = sensor->shape->index;
         v->d.scatterer = IMP_AT_SURFACE;

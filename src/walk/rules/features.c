@@ -4,6 +4,7 @@
 #include "features.h"
 
 #include "base/team.h"
+#include "kind/sensor/receiver.h"
 #include "scene/guide.h"
 #include "scene/media_around.h"
 #include "scene/pose.h"
@@ -270,6 +271,7 @@ FOUND(LIGHT_BEYOND_MEDIUM)
 OF_SENSOR(PARALLEL_SENSOR, s->ops->flags &IMP_SENSOR_PARALLEL)
 OF_SENSOR(RAY_SENSOR, !s->ops->connect)
 OF_SENSOR(SURFACE_SENSOR, s->shape)
+OF_SENSOR(UNMET_SENSOR, imp__is_unmet(s))
 OF_SENSOR(CAMERA, !s->shape)
 OF_SENSOR(SENSOR_GROUP, s->ops->flags &IMP_SENSOR_GROUP)
 OF_SENSOR(EXPOSURE, s->gain)

@@ -54,6 +54,7 @@ struct imp_active;
     X(PARALLEL_SENSOR, "a sensor of one direction")                                      \
     X(RAY_SENSOR, "a sensor of one ray")                                                 \
     X(SURFACE_SENSOR, "a sensor that is a surface")                                      \
+    X(UNMET_SENSOR, "a meter at points, or whose shape is virtual")                      \
     X(CAMERA, "a sensor that is no surface")                                             \
     X(SENSOR_GROUP, "several sensors in one (batch)")                                    \
     X(EXPOSURE, "a film with an exposure")                                               \
@@ -78,7 +79,7 @@ struct imp_active;
     X(PRINTED_WALKS, "printed walks (render --paths)")                                   \
     X(DERIVATIVE, "derivatives")                                                         \
     X(PICTURE_DERIVATIVE, "derivatives of pictures")                                     \
-    X(EDGE_TERMS, "a gradient of a linear function of the picture")                      \
+    X(EDGE_TERMS, "derivatives with the terms of moving edges")                          \
     X(LOSS, "a loss")                                                                    \
     X(RESPONSE_LOSS, "a loss of other than three response curves")                       \
     X(MANY_PARAMETERS, "a gradient of very many parameters")                             \

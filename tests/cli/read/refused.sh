@@ -32,5 +32,5 @@ cat >turned.xml <<'X'
 X
 importon render turned.xml -o a.exr
 importon fit "$ROOT/scenes/desk.xml" -T =@0 -o F
-importon fit "$ROOT/scenes/desk.xml" -D nx=2 -T =3@0 -o F
+importon fit "$ROOT/scenes/cornell.xml" -D res=8 -T =3@0 -o F
 true

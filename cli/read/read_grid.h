@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Grids of readings: the pixels of an irradiancemeter, as text, JSON, a table, and a plan
+ * with isolines. */
+#ifndef IMP_CLI_GRID_H
+#define IMP_CLI_GRID_H
+
+#include "text/json.h"
+#include <importon/rooms.h>
+
+struct grid {
+    const char *name, *unit; /* of the sensor */
+    int width, height;
+    size_t n;
+    double *points;     /* [n][3] */
+    double *value, *se; /* [n] */
+    const char *from;   /* which walks they are of: "sensor", "lights", or NULL */
+    double z;           /* of the averages of both ends; NAN: one was read */
+    struct imp_grid_summary summary;
+};
+
+/* Read the grid of run->sensor; `ends`: from both, and what has the smaller error counts.
+ * 0, or an exit code with the reason printed. */
+int grid_read(struct imp_run run, int ends, struct grid *out);
+void grid_free(struct grid *g);
+void grid_print(const struct grid *g);
+void grid_json(struct json *j, const struct grid *g);
+/* Points at which no light was found, in part of the grid: a warning. */
+void grid_tell(const struct grid *g);
+
+struct grid_wanted {
+    int ends;              /* are they read from both ends? */
+    const char *csv, *svg; /* files; NULL: none */
+};
+/* Read and print the grids of the sensors [first, end) that have one; *apart becomes 1 where
+ * the ends differ by more than most_z standard errors, unlit [*n_unlit] gets those to
+ * which no light comes. 0, or an exit code with the reason printed. */
+int grids_read(struct json *j, struct imp_run run, int first, int end,
+               const struct grid_wanted *wanted, double most_z, int *apart, int *unlit,
+               int *n_unlit);
+/* A warning for luminaires outside of the box of all shapes. */
+void luminaires_tell(void);
+
+/* A line a point: column, row, x, y, z, value, se. 0, or an exit code. */
+int grid_csv(const char *path, const struct grid *g);
+/* The plan of the grid: colours with their scale, isolines, a number at each point where
+ * there is room. 0, or an exit code. */
+int grid_svg(const char *path, const struct grid *g);
+
+#endif

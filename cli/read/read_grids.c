@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * read --grid: the grids of a scene's sensors, and luminaires that light none of them. */
+#include "read_grid.h"
+#include "shared/command.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Has the sensor a grid? */
+static int has_grid(int sensor)
+{
+    struct imp_sensor_info info = {.size = sizeof info};
+    double point[3];
+    if (imp_scene_get_sensor(cli.scene, sensor, &info) != IMP_OK) return 0;
+    if ((size_t)info.width * (size_t)info.height > 1)
+        return strcmp(info.type, "irradiancemeter") == 0;
+    return strcmp(info.type, "irradiancemeter") == 0 &&
+           imp_grid_points(cli.scene, sensor, point, NULL) == IMP_OK;
+}
+
+/* The grids of the sensors from `first` on that have one. */
+int grids_read(struct json *j, struct imp_run run, int first, int end,
+               const struct grid_wanted *wanted, double most_z, int *apart, int *unlit,
+               int *n_unlit)
+{
+    int n = 0, rc = 0;
+    for (int s = first; s < end; s++) n += has_grid(s);
+    if (n == 0)
+        return cli_error(
+            EXIT_USAGE,
+            "%s: no irradiancemeter on a rectangle is among its sensors, and "
+            "--grid is of those",
+            cli.scene_path);
+    if (n > 1 && (wanted->csv || wanted->svg))
+        return cli_error(EXIT_USAGE,
+                         "%s: it has %d grids, and --csv and --svg write one: choose it "
+                         "with --sensor",
+                         cli.scene_path, n);
+    for (int s = first; s < end && !rc; s++) {
+        struct grid g;
+        if (!has_grid(s)) continue;
+        run.sensor = s;
+        rc = grid_read(run, wanted->ends, &g);
+        if (rc) return rc;
+        *apart |= wanted->ends && !(fabs(g.z) <= most_z);
+        if (g.summary.average.value == 0 && g.summary.average.hi == 0)
+            unlit[(*n_unlit)++] = s;
+        grid_tell(&g);
+        if (cli.json) grid_json(j, &g);
+        else grid_print(&g);
+        if (wanted->csv) rc = grid_csv(wanted->csv, &g);
+        if (wanted->svg && !rc) rc = grid_svg(wanted->svg, &g);
+        grid_free(&g);
+    }
+    return rc;
+}
+
+/* Luminaires outside of the box of all shapes light no room. */
+void luminaires_tell(void)
+{
+    struct imp_scene_info s = {.size = sizeof s};
+    const int n = imp_scene_n_luminaires(cli.scene);
+    imp_scene_get_info(cli.scene, &s);
+    for (int i = 0; i < n && s.bounds_min[0] <= s.bounds_max[0]; i++) {
+        struct imp_luminaire_info l = {.size = sizeof l};
+        int out = 0;
+        if (imp_scene_get_luminaire(cli.scene, i, &l) != IMP_OK || !l.is_point) continue;
+        for (int k = 0; k < 3; k++)
+            out |= l.position[k] < s.bounds_min[k] || l.position[k] > s.bounds_max[k];
+        if (out)
+            cli_say(
+                "importon: warning: luminaire '%s' at (%g, %g, %g) is outside of all "
+                "shapes, which lie in (%g, %g, %g) to (%g, %g, %g): are they in other "
+                "units, or is it in the wrong place?",
+                l.name, l.position[0], l.position[1], l.position[2], s.bounds_min[0],
+                s.bounds_min[1], s.bounds_min[2], s.bounds_max[0], s.bounds_max[1],
+                s.bounds_max[2]);
+    }
+}

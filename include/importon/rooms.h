@@ -1,0 +1,198 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * importon: what lighting designers ask of a scene. Grids of illuminances with averages,
+ * minima, maxima and uniformities, whose intervals hold for an extreme of noisy values, too;
+ * the share of each lamp and surface in a reading; the photometry of luminaires.
+ * docs/rooms.md. Same conventions as importon.h.
+ */
+#ifndef IMPORTON_ROOMS_H
+#define IMPORTON_ROOMS_H
+
+#include <importon/importon.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- Grids ------------------------------------------------------------------------ */
+
+/**
+ * The places that the pixels of an irradiancemeter stand for: the middle of each one's cell.
+ * @param sensor number of an irradiancemeter.
+ * @param[out] points  [height][width][3] of the crop window, scene units.
+ * @param[out] normals [height][width][3] the normal of its shape there, unit; may be NULL.
+ * @return IMP_OK; IMP_E_ARG if there is no such sensor, or it is no irradiancemeter on a
+ *         shape whose uv is a square.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status imp_grid_points(const imp_scene *scene, int sensor,
+                                                       double *points, double *normals);
+
+/**
+ * The readings of all pixels of a sensor, and their mean: luminance or illuminance of rgb and
+ * mono scenes. With several colours in the film the error of a pixel is a bound, the sum
+ * of the colours' errors by their weights; pixel format luminance has the error itself.
+ * @param run      its sensor, end, seed and spp; NULL for defaults.
+ * @param[out] value [height][width] of the crop window, in the sensor's unit.
+ * @param[out] se    [height][width], one standard error each.
+ * @param[out] average the mean of all, with its own error: light walks reach many pixels,
+ *                  whose errors are not independent.
+ * @param[out] sets  [1] independent sets of samples of a pixel from which the errors come, for
+ *                   imp_grid_summarise; may be NULL.
+ * @return IMP_OK; IMP_E_ARG; IMP_E_UNSUPPORTED for films of response curves or of XYZ, and
+ *         filters wider than a pixel; what imp_render refuses; IMP_E_NOMEM.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_grid_read(imp_scene *scene, const struct imp_run *run, double *value, double *se,
+              struct imp_estimate *average, int64_t *sets);
+
+/** A number, and an interval around what it estimates. */
+struct imp_interval_estimate {
+    double value, lo, hi;
+};
+
+struct imp_grid_summary {
+    size_t size;
+    size_t n; /**< points that counted */
+    double
+        confidence; /**< with which each interval by itself contains the truth, at least */
+    struct imp_interval_estimate average, minimum, maximum;
+    struct imp_interval_estimate
+        uniformity;                         /**< minimum over average, U0 of EN 12464-1 */
+    struct imp_interval_estimate diversity; /**< minimum over maximum, Ud */
+    size_t at_minimum, at_maximum; /**< index of the least and the largest value */
+};
+#define IMP_GRID_SUMMARY_INIT IMP_INIT_ZERO(struct imp_grid_summary)
+
+/**
+ * Average, minimum, maximum and uniformities of a grid of noisy values, with intervals that
+ * hold for any dependence between the values.
+ *
+ * The least of noisy values lies below the least true value on average, so an interval of that
+ * value alone would not hold. With x_i and s_i of n points, and z(p) the normal (with `sets`,
+ * Student's) quantile, the minimum m of the true values mu_i has
+ *     P(m < min_i (x_i - z(1 - a) s_i)) <= a, as it is so for the point where m is taken;
+ *     P(m > min_i (x_i + z(1 - a/n) s_i)) <= a, as m <= mu_i for all i (Bonferroni).
+ * The second is conservative where few points are near the minimum: coverage is confidence or
+ * more, never less. Ratios take bounds of both numbers, the risks added.
+ * @param value   [n], finite.
+ * @param se      [n], finite, not negative.
+ * @param average as imp_grid_read gives it; NULL: the mean of value, whose errors are
+ *                then taken as independent.
+ * @param sets    of imp_grid_read; below 2: errors are taken as exact.
+ * @param confidence in (0, 1); 0: .95.
+ * @param[out] out set out->size first.
+ * @return IMP_OK; IMP_E_ARG for n = 0 or numbers out of their range.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_grid_summarise(imp_context *context, size_t n, const double *value, const double *se,
+                   const struct imp_estimate *average, int64_t sets, double confidence,
+                   struct imp_grid_summary *out);
+
+/* ---- Glare ------------------------------------------------------------------------ */
+
+/** A luminaire as an observer sees it. */
+struct imp_glare_source {
+    double luminance;   /**< cd/m^2, towards the eye */
+    double solid_angle; /**< sr, of its luminous parts */
+    double position;    /**< Guth's index (imp_guth_position) */
+};
+
+/** Guth's position index p of a source above the line of sight (Levin 1975, J. Illum. Eng. Soc.
+ * 4, 99, to Guth's data, as the tables of CIE 117):
+ *     ln p = (35.2 - .31889 a - 1.22 e^(-2 a/9)) b/1000 + (21 + .26667 a - .002963 a^2) b^2/1e5
+ * @param a degrees from the vertical of the plane through the source and the line of
+ *          sight, in [0, 90]: a source below counts as if it were above.
+ * @param b degrees between the source and the line of sight, in [0, 90].
+ * @return p >= 1; NAN for angles out of their range. */
+IMP_API double imp_guth_position(double a, double b);
+
+/** Unified glare rating, CIE 117-1995: 8 log10(.25/Lb sum L^2 w/p^2).
+ * @param background Lb, cd/m^2, above 0: the indirect vertical illuminance at the eye over pi.
+ * @param source [n] all above 0; may be NULL where n is 0.
+ * @param[out] ugr [1] -INFINITY without sources.
+ * @return IMP_OK; IMP_E_ARG. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_ugr(imp_context *context, double background,
+                                               size_t n,
+                                               const struct imp_glare_source *source,
+                                               double *ugr);
+
+/**
+ * The glare rating at every point of a grid of vertical illuminances: an irradiancemeter whose
+ * shape is virtual and horizontal, with the line of sight as its `facing`. Sources are the
+ * scene's luminaires (emitters `ies`) that are before the observer and not hidden by a shape,
+ * seen as a whole, each with the luminance I/A of its table and its luminous area (of its
+ * shape, or of the file's opening for a point); all other light is background. Lb is
+ * the grid's reading less the luminaires' direct part, over pi. Lengths are metres.
+ * @param run      its sensor, end, seed and spp; NULL for defaults.
+ * @param[out] ugr [height][width] of the crop window; -INFINITY where no source is seen.
+ * @param[out] se  [height][width], one standard error each, that of Lb's; may be NULL.
+ * @return as imp_grid_read; IMP_E_ARG for another sensor, or a luminaire without a
+ *         luminous area; IMP_E_NUMERIC where the background is not above 0.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_grid_glare(imp_scene *scene, const struct imp_run *run, double *ugr, double *se);
+
+/* ---- Luminaires -------------------------------------------------------------------- */
+
+/** An emitter `ies` of a scene, with what its photometric file says. */
+struct imp_luminaire_info {
+    size_t size;
+    const char *name; /**< of the emitter; belongs to the scene */
+    double
+        flux; /**< lm in operation: the table's integral times scale, dimming, maintenance */
+    double lamp_flux; /**< lm of its lamps by the file; 0: not given */
+    double watts;     /**< by the file, undimmed; 0: not given */
+    double efficacy;  /**< lm/W of the luminaire as measured; 0: watts are not given */
+    double dimming, maintenance;
+    bool is_point;      /**< it is at the top of the scene, at `position`; else a shape */
+    double position[3]; /**< scene units; of a shape: the middle of its box */
+    double opening[3];  /**< luminous opening by the file, m: along C0, along C90, height;
+                              a round one as the square of its area */
+};
+
+/** Number of luminaires; 0 for NULL. */
+IMP_API int imp_scene_n_luminaires(const imp_scene *scene);
+/** Set info->size first. @return IMP_OK; IMP_E_ARG if there is no such luminaire. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_scene_get_luminaire(const imp_scene *scene, int luminaire,
+                        struct imp_luminaire_info *info);
+
+/* ---- Shares of a reading ----------------------------------------------------------- */
+
+enum imp_share_of {
+    IMP_SHARE_LIGHT = 0,  /**< a light's emission */
+    IMP_SHARE_SURFACE = 1 /**< a material's reflectances */
+};
+
+/** x dE/dx of a reading E, summed over the numbers x of one object: dE/d ln x by a common factor of
+ * them. For a light it is what E has of it, and those of all lights add up to E, which is
+ * of first degree in what they emit (Euler). For a material it is what E gains by a change of its
+ * reflectances, as a part of them: E times the mean number of reflections by it. */
+struct imp_share {
+    enum imp_share_of of;
+    const char *name; /**< of the object; belongs to the scene */
+    double value, se; /**< in the unit of the reading */
+};
+
+/**
+ * The reading of a sensor, the mean over its film, and what each light and each material has to do
+ * with it, from one set of walks.
+ * @param run      its sensor, end, seed and spp; NULL for defaults.
+ * @param[out] share [room] lights in the scene's order, then materials that reflect; may be NULL
+ *                   where room is 0. Objects that share a parameter are one row, by the
+ *                   name of the first.
+ * @param room     rows that there is room for.
+ * @param[out] n   how many rows there are; more than room: nothing else is computed.
+ * @param[out] reading may be NULL where room is 0.
+ * @return IMP_OK; IMP_E_ARG; IMP_E_BIAS if a light's emission has no unbiased gradient, as then
+ *         shares would not add up; what imp_problem_functional refuses; IMP_E_NOMEM.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_reading_shares(imp_scene *scene, const struct imp_run *run, struct imp_share *share,
+                   size_t room, size_t *n, struct imp_estimate *reading);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

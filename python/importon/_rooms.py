@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Grids of illuminances, shares of lamps and materials, luminaires."""
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from . import _c
+from ._array import address
+from ._library import decode, failure, lib, make, run
+from ._params import SceneParameters
+from ._problem import check_scene, push, run_options
+from ._scene import Scene
+
+
+class Interval(NamedTuple):
+    """A number, and an interval around what it estimates."""
+
+    value: float
+    lo: float
+    hi: float
+
+
+class Grid(NamedTuple):
+    """Readings of the pixels of a meter; intervals hold for extremes of noisy values, too."""
+
+    value: Any
+    """[height][width], in the sensor's unit."""
+    se: Any
+    """[height][width], one standard error of each."""
+    points: Any
+    """[height][width][3], scene units."""
+    average: Interval
+    minimum: Interval
+    maximum: Interval
+    uniformity: Interval
+    """Minimum over average."""
+    diversity: Interval
+    """Minimum over maximum."""
+    confidence: float
+    """With which each interval by itself contains the truth, at least."""
+
+
+class Share(NamedTuple):
+    """What a lamp or a material has to do with a reading: dE/d ln x by a common factor."""
+
+    of: str
+    """ "light" or "surface"."""
+    name: str
+    value: float
+    se: float
+
+
+class Luminaire(NamedTuple):
+    """An emitter `ies`: `struct imp_luminaire_info`."""
+
+    name: str
+    flux: float
+    lamp_flux: float
+    watts: float
+    efficacy: float
+    dimming: float
+    maintenance: float
+    is_point: bool
+    position: tuple[float, float, float]
+    opening: tuple[float, float, float]
+
+
+def _call(scene: Scene, params: Any, options: Any, progress: Any, *call: Any) -> None:
+    with scene.lock:
+        if isinstance(params, Mapping) and not isinstance(params, SceneParameters):
+            SceneParameters(scene).update(params)
+        elif params is not None:
+            push(scene, params)
+        status, message = run(scene._context, options, progress, *call)
+    if status:
+        raise failure(status, message)
+
+
+def grid(scene: Scene, sensor: Any = 0, *, params: Any = None, confidence: float = 0.95, seed: int = 0, spp: int = 0,
+         points: str = "scene", walks_from: str = "scene", progress: Any = None) -> Grid:
+    """The readings of an irradiancemeter's pixels, with average, extremes and uniformities.
+
+    Parameters
+    ----------
+    scene : Scene
+    sensor : int or str
+        An irradiancemeter on a rectangle.
+    confidence : float
+        Of each interval.
+    params, seed, spp, points, walks_from, progress
+        As `render`'s.
+
+    Returns
+    -------
+    Grid
+
+    Examples
+    --------
+    >>> scene = importon.load_string('''<scene version="3.0.0"><integrator type="path"/><emitter type="constant"/>
+    ... <shape type="rectangle"><sensor type="irradiancemeter"><string name="at" value="points"/></sensor></shape></scene>''')
+    >>> g = importon.grid(scene, spp=64)
+    >>> g.value.shape, g.minimum.lo <= 3.1416 <= g.minimum.hi
+    ((6, 6), True)
+    """
+    scene = check_scene(scene)
+    number = scene.sensor_index(sensor)
+    s = scene.sensors[number]
+    value, se = np.zeros((s.height, s.width)), np.zeros((s.height, s.width))
+    places = np.zeros((s.height, s.width, 3))
+    options = run_options(scene, sensor=number, seed=seed, spp=spp, points=points, walks_from=walks_from)
+    average, sets, summary = _c.imp_estimate(), ctypes.c_int64(), make(_c.imp_grid_summary)
+    scene._context.check(lib.imp_grid_points(scene.pointer, number, address(places), None))
+    _call(scene, params, options, progress, lib.imp_grid_read, scene.pointer, ctypes.byref(options), address(value),
+          address(se), ctypes.byref(average), ctypes.byref(sets))
+    scene._context.check(lib.imp_grid_summarise(scene._context.pointer, value.size, address(value), address(se),
+                                                ctypes.byref(average), sets.value, float(confidence),
+                                                ctypes.byref(summary)))
+    number_of = {k: getattr(summary, k) for k in ("average", "minimum", "maximum", "uniformity", "diversity")}
+    return Grid(value, se, places, confidence=summary.confidence,
+                **{k: Interval(x.value, x.lo, x.hi) for k, x in number_of.items()})
+
+
+def shares(scene: Scene, sensor: Any = 0, *, params: Any = None, seed: int = 0, spp: int = 0, points: str = "scene",
+           walks_from: str = "scene", progress: Any = None) -> tuple[Interval, list[Share]]:
+    """What each lamp and each material has to do with a reading; shares of lamps add up to it.
+
+    Parameters
+    ----------
+    scene : Scene
+    sensor, params, seed, spp, points, walks_from, progress
+        As `render`'s.
+
+    Returns
+    -------
+    Interval, list of Share
+        The reading with its 95 % interval; lamps, then materials.
+
+    Examples
+    --------
+    >>> scene = importon.load_dict(importon.cornell_box(res=8))
+    >>> reading, rows = importon.shares(scene, spp=8)
+    >>> bool(abs(sum(r.value for r in rows if r.of == "light") / reading.value - 1) < 1e-5)
+    True
+    """
+    scene = check_scene(scene)
+    options = run_options(scene, sensor=sensor, seed=seed, spp=spp, points=points, walks_from=walks_from)
+    n, e = ctypes.c_size_t(), _c.imp_estimate()
+    scene._context.check(lib.imp_reading_shares(scene.pointer, ctypes.byref(options), None, 0, ctypes.byref(n), None))
+    rows = (_c.imp_share * max(n.value, 1))()
+    _call(scene, params, options, progress, lib.imp_reading_shares, scene.pointer, ctypes.byref(options), rows,
+          len(rows), ctypes.byref(n), ctypes.byref(e))
+    found = [Share("light" if r.of == 0 else "surface", decode(r.name), r.value, r.se) for r in rows[:n.value]]
+    return Interval(e.value, e.value - 1.96 * e.se, e.value + 1.96 * e.se), found
+
+
+def luminaires(scene: Scene) -> list[Luminaire]:
+    """The luminaires of a scene: emitters `ies` with what their files say.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    list of Luminaire
+        In the scene's order.
+
+    Examples
+    --------
+    >>> importon.luminaires(importon.load_dict(importon.cornell_box(res=8)))
+    []
+    """
+    scene = check_scene(scene)
+    found = []
+    for i in range(lib.imp_scene_n_luminaires(scene.pointer)):
+        x = make(_c.imp_luminaire_info)
+        scene._context.check(lib.imp_scene_get_luminaire(scene.pointer, i, ctypes.byref(x)))
+        found.append(Luminaire(decode(x.name), x.flux, x.lamp_flux, x.watts, x.efficacy, x.dimming, x.maintenance,
+                               bool(x.is_point), tuple(x.position), tuple(x.opening)))
+    return found
+
+
+def glare(scene: Scene, sensor: Any = 0, *, params: Any = None, seed: int = 0, spp: int = 0, points: str = "scene",
+          walks_from: str = "scene", progress: Any = None) -> tuple[Any, Any]:
+    """The unified glare rating (CIE 117) of the observers of a grid.
+
+    Parameters
+    ----------
+    scene : Scene
+    sensor : int or str
+        An irradiancemeter with a virtual, horizontal rectangle and a horizontal `facing`, the line of sight.
+    params, seed, spp, points, walks_from, progress
+        As `render`'s.
+
+    Returns
+    -------
+    numpy.ndarray, numpy.ndarray
+        [height][width], and one standard error each; -inf where no luminaire is seen.
+
+    Examples
+    --------
+    >>> scene = importon.load_string('''<scene version="3.0.0"><integrator type="path"/><emitter type="constant"/>
+    ... <shape type="rectangle"><sensor type="irradiancemeter"><boolean name="virtual" value="true"/>
+    ... <vector name="facing" x="1" y="0" z="0"/></sensor></shape></scene>''')
+    >>> ugr, se = importon.glare(scene, spp=16)
+    >>> bool((ugr == -float("inf")).all())
+    True
+    """
+    scene = check_scene(scene)
+    number = scene.sensor_index(sensor)
+    s = scene.sensors[number]
+    ugr, se = np.zeros((s.height, s.width)), np.zeros((s.height, s.width))
+    options = run_options(scene, sensor=number, seed=seed, spp=spp, points=points, walks_from=walks_from)
+    _call(scene, params, options, progress, lib.imp_grid_glare, scene.pointer, ctypes.byref(options), address(ugr),
+          address(se))
+    return ugr, se

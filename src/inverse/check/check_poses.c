@@ -1,0 +1,295 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Poses: recorded walks whose vertices move with the objects they lie on, film positions and
+ * scattered directions held, against the derivative inside of walks; one row for each pose, scale, and
+ * place or direction of a light, its worst walk and number. Places are moved by these numbers
+ * themselves, in double, and not by velocities. Other numbers of geometry have fresh rows alone.
+ * What jumps at edges is not in it: fresh rows have that. */
+#include "check.h"
+#include "inverse/estimate/moved_gradient.h"
+#include "scene/pose.h"
+#include "walk/core/vertex.h"
+#include "walk/moved/moved_chain.h"
+#include <math.h>
+#include <string.h>
+
+#define FROZEN_LIMIT 1e-6
+#define TINY                                                                             \
+    1e-3 /* of a walk's value per scale of a number: smaller slopes are rounding */
+#define N_STEPS 3
+static const double steps[N_STEPS] = {1e-2, 1e-3, 1e-4};
+
+/* One pose, scale, place or direction of a light, moved by h along one of its numbers. */
+struct moved {
+    const struct imp__check *c;
+    const struct imp_pose *pose;
+    int shape;       /* or IMP_MOVE_CAMERA, or that of a light */
+    double turn[9];  /* R(a') R(a)^T */
+    double by;       /* scale after over before */
+    imp_v3 from, to; /* the centre, or a light's place or direction, before and after */
+};
+
+static bool is_of_kind(const struct imp_pose *p)
+{
+    return p->kind == IMP_POSE_RIGID || p->kind == IMP_POSE_SCALE ||
+           p->kind == IMP_POSE_POSITION || p->kind == IMP_POSE_DIRECTION;
+}
+
+static void move_by(struct moved *m, size_t number, double h)
+{
+    const struct imp_pose *p = m->pose;
+    double there[6] = {0}, old[9], new[9];
+    memcpy(there, p->number, p->n * sizeof *there);
+    there[number] += h;
+    m->by = 1;
+    if (p->kind == IMP_POSE_SCALE) {
+        m->by = there[0] / p->number[0];
+        m->to = m->from;
+        return;
+    }
+    if (p->kind != IMP_POSE_RIGID) {
+        m->from = imp__v3(p->number[0], p->number[1], p->number[2]);
+        m->to = imp__v3(there[0], there[1], there[2]);
+        return;
+    }
+    imp__rotation_of(p->number + 3, old);
+    imp__rotation_of(there + 3, new);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            double sum = 0;
+            for (int k = 0; k < 3; k++) sum += new[3 * i + k] * old[3 * j + k];
+            m->turn[3 * i + j] = sum;
+        }
+    m->from = p->centre + imp__v3(p->number[0], p->number[1], p->number[2]);
+    m->to = p->centre + imp__v3(there[0], there[1], there[2]);
+}
+
+static imp_v3 turned(const struct moved *m, imp_v3 d)
+{
+    const double *R = m->turn;
+    return imp__v3(R[0] * d[0] + R[1] * d[1] + R[2] * d[2],
+                   R[3] * d[0] + R[4] * d[1] + R[5] * d[2],
+                   R[6] * d[0] + R[7] * d[1] + R[8] * d[2]);
+}
+
+/* A point of a shape, its normal, and the curvature there, where the pose has moved. */
+struct at {
+    imp_v3 p, n;
+    double curvature;
+};
+static struct at placed(const struct moved *m, const struct imp__glued *x)
+{
+    struct at at = {x->p, x->n, x->curvature};
+    if (x->shape != m->shape) return at;
+    if (m->pose->kind == IMP_POSE_SCALE) {
+        at.p = m->from + (x->p - m->from) * m->by;
+        at.curvature /= m->by;
+    } else {
+        at.p = m->to + turned(m, x->p - m->from);
+        at.n = turned(m, x->n);
+    }
+    return at;
+}
+
+/* Where a ray from o along w meets the plane of a place, or the sphere that it lies on; the normal
+ * there. */
+static imp_v3 met_at(imp_v3 o, imp_v3 w, struct at *x)
+{
+    const double plane = imp__dot(x->n, x->p - o) / imp__dot(x->n, w);
+    if (x->curvature == 0) return o + w * plane;
+    const imp_v3 centre = x->p - x->n * (1 / x->curvature);
+    const double middle = imp__dot(centre - o, w);
+    const imp_v3 across = centre - o - w * middle;
+    const double half =
+        sqrt(fmax(imp__sqr(1 / x->curvature) - imp__dot(across, across), 0));
+    const double far = middle + half, near = middle - half;
+    const imp_v3 p = o + w * (fabs(far - plane) < fabs(near - plane) ? far : near);
+    x->n = imp__normalize((p - centre) * x->curvature);
+    return p;
+}
+
+/* cos cos_y/d^2 between two points. */
+static double geometry(imp_v3 x, imp_v3 n, imp_v3 y, imp_v3 n_y)
+{
+    const imp_v3 r = y - x;
+    const double d = imp__length(r);
+    return imp__dot(n, r) * imp__dot(n_y, r) / (d * d * d * d);
+}
+
+/* The light sample of a vertex at x with normal n, over that at its recorded place. */
+static double light_ratio(const struct moved *m, const struct imp_vertex *v,
+                          const struct imp__glued *old, imp_v3 x, imp_v3 n)
+{
+    const struct imp_scene *scene = m->c->problem->scene;
+    const struct imp_emitter *e = scene->emitters[v->d.light.emitter];
+    const imp_v3 d = imp__decided_v3(v->d.light.d);
+    const bool moves = m->pose->emitter == e;
+    if (e->ops->flags & IMP_EMITTER_ENVIRONMENT)
+        return imp__dot(n, d) / imp__dot(old->n, d);
+    if (!e->shape && e->ops->flags & IMP_EMITTER_FAR) {
+        const double side = imp__dot(d, m->from) < 0 ? -1 : 1;
+        const imp_v3 there = moves ? imp__normalize(m->to) * side : d;
+        return imp__dot(n, there) / imp__dot(old->n, d);
+    }
+    if (!e->shape) {
+        double at[3];
+        e->ops->aim((struct imp_emitter *)(uintptr_t)e, at, false);
+        const imp_v3 y = imp__v3(at[0], at[1], at[2]), r = (moves ? m->to : y) - x,
+                     r_old = y - old->p;
+        return imp__dot(n, r) / imp__dot(old->n, r_old) *
+               pow(imp__dot(r_old, r_old) / imp__dot(r, r), 1.5);
+    }
+    const struct imp__glued y =
+        imp__glued_at(scene, e->shape->index, &v->d.light.located, d);
+    const struct at there = placed(m, &y);
+    return geometry(x, n, there.p, there.n) / geometry(old->p, old->n, y.p, y.n);
+}
+
+/* Has it light of a spot, whose beam changes across its cone? */
+static bool has_spots(const struct imp_scene *scene, const struct imp_walk *walk)
+{
+    for (const struct imp_vertex *v = walk->first; v; v = v->next)
+        if (v->d.connection == IMP_CONNECTED &&
+            scene->emitters[v->d.light.emitter]->ops->cone)
+            return true;
+    return false;
+}
+
+/* The walk's value, weighted by channels, where the pose has moved. */
+static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spec P)
+{
+    const struct imp_scene *scene = m->c->problem->scene;
+    const struct imp_vertex *v = walk->first;
+    double value = 0, share = 1;
+    if (!v || v->d.scatterer == IMP_AT_SKY) return 0;
+    struct imp__glued old = imp__glued_at(scene, v->d.shape, &v->d.located, v->ng);
+    imp_v3 o = walk->ray.o, w = imp__normalize(old.p - o);
+    if (m->shape == IMP_MOVE_CAMERA) {
+        o = m->to + turned(m, o - m->from);
+        w = turned(m, w);
+    }
+    struct at here = placed(m, &old);
+    imp_v3 x = met_at(o, w, &here);
+    for (; v; v = v->next) {
+        if (v->d.connection == IMP_CONNECTED)
+            value += share * light_ratio(m, v, &old, x, here.n) *
+                     imp__sum_used(P * v->b, scene->lanes);
+        P *= v->w;
+        const struct imp_vertex *next = v->next;
+        if (!v->d.goes_on || !next) break;
+        const bool sky = next->d.scatterer == IMP_AT_SKY;
+        const struct imp__glued ahead =
+            sky ? old : imp__glued_at(scene, next->d.shape, &next->d.located, next->ng);
+        w = sky ? imp__decided_v3(next->d.p) : imp__normalize(ahead.p - old.p);
+        const double step = imp__dot(here.n, w) / imp__dot(old.n, w);
+        if (sky) {
+            value += share * step * imp__sum_used(P * v->beyond, scene->lanes);
+            break;
+        }
+        struct at there = placed(m, &ahead);
+        if (next->d.met.emitter >= 0)
+            value += share * imp__sum_used(P * next->e, scene->lanes) *
+                     geometry(x, here.n, there.p, there.n) /
+                     geometry(old.p, old.n, ahead.p, ahead.n);
+        x = met_at(x, w, &there);
+        share *= step;
+        old = ahead;
+        here = there;
+    }
+    return value;
+}
+
+/* A walk's slopes along the numbers against differences, each at its best step; *worst: the row of
+ * the largest error so far. */
+static void compare(struct moved *m, const struct imp_walk *walk, imp_spec P,
+                    const double slope[6], struct imp_check_row *worst)
+{
+    static const double places[4] = {1, -1, 2, -2};
+    move_by(m, 0, 0);
+    const double still = fabs(frozen(m, walk, P));
+    for (size_t e = 0; e < m->pose->n; e++) {
+        const double scale = 0.1 * imp__pose_large(m->pose, e);
+        struct imp_check_row best = {.error = INFINITY};
+        for (int s = 0; s < N_STEPS; s++) {
+            const double h = steps[s] * scale;
+            double f[4];
+            for (int i = 0; i < 4; i++) {
+                move_by(m, e, places[i] * h);
+                f[i] = frozen(m, walk, P);
+            }
+            const double d = (8 * (f[0] - f[1]) - (f[2] - f[3])) / (12 * h);
+            const double least = fmax(fabs(slope[e]), TINY * still / scale);
+            const double error = d == slope[e] ? 0 : fabs(d - slope[e]) / least;
+            if (error < best.error)
+                best = (struct imp_check_row){
+                    .step = h, .value = slope[e], .reference = d, .error = error};
+        }
+        if (!(best.error <= worst->error) || worst->step == 0) *worst = best;
+    }
+}
+
+/* The numbers' slopes of a walk, six at most: the part of bar that belongs to the pose. */
+struct six {
+    struct imp_sink sink; /* first */
+    int param;
+    double number[6];
+};
+static void six_add(struct imp_sink *sink, int param, size_t element, int channels,
+                    const imp_spec *bar)
+{
+    struct six *s = (struct six *)sink;
+    (void)channels;
+    if (param == s->param) s->number[element] += (*bar)[0];
+}
+
+static enum imp_status pose_check(struct imp__check *c, struct imp__moved_gradient *g,
+                                  struct imp_arena *arena, int mover)
+{
+    const struct imp_film_desc *film = &c->tracer.sensor->film;
+    const uint64_t pixels = (uint64_t)film->crop_w * (uint64_t)film->crop_h;
+    struct moved m = {.c = c,
+                      .pose = g->pose[mover],
+                      .shape = g->moves.mover[mover].shape,
+                      .from = g->moves.mover[mover].centre};
+    struct imp_check_row worst = {0};
+    for (int t = 0; t < c->options.paths; t++) {
+        const uint64_t pixel = imp__mix64((uint64_t)t + 0x51ed270b) % pixels;
+        const struct imp_arena_mark mark = imp__arena_mark(arena);
+        struct imp_walk walk;
+        imp__walk_trace(&c->tracer, arena, (int)(pixel % (uint64_t)film->crop_w),
+                        (int)(pixel / (uint64_t)film->crop_w), t, &walk);
+        double *bar = imp__arena_array(arena, g->moves.n, sizeof *bar);
+        const imp_spec channels = {1, 0.7, 0.4, 0};
+        if (!bar || walk.dropped == IMP_DROP_MEMORY ||
+            !imp__moved_walk(g, arena, &walk, channels, bar))
+            return imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check");
+        struct six six = {{six_add, false}, m.pose->param, {0}};
+        imp__moved_numbers(g, bar, (imp_spec){1, 0, 0, 0}, &six.sink);
+        if (walk.dropped == IMP_DROP_NONE && walk.valid &&
+            !has_spots(c->problem->scene, &walk))
+            compare(&m, &walk, imp__walk_values(&c->tracer, &walk, channels), six.number,
+                    &worst);
+        imp__arena_rewind(arena, mark);
+    }
+    worst.limit = FROZEN_LIMIT;
+    worst.ok = worst.error <= FROZEN_LIMIT;
+    return imp__check_row(c, "frozen", c->problem->scene->params[m.pose->param].info.name,
+                          -1, &worst);
+}
+
+enum imp_status imp__check_poses(struct imp__check *c)
+{
+    enum imp_status st = IMP_OK;
+    struct imp__moved_gradient g = {0};
+    struct imp_arena arena;
+    imp__arena_init(&arena, c->ctx);
+    IMP_TRY(imp__moved_begin(c->problem, &c->tracer, &g));
+    for (int k = 0; k < g.moves.n_movers; k++) {
+        if (is_of_kind(g.pose[k])) IMP_TRY(pose_check(c, &g, &arena, k));
+        IMP_TRY(imp__check_progress(c, 0));
+    }
+out:
+    imp__moved_end(&g);
+    imp__arena_free(&arena);
+    return st;
+}

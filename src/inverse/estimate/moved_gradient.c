@@ -1,0 +1,248 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Gradients by poses, inside walks and at edges (moved_gradient.h). */
+#include "moved_gradient.h"
+#include "base/arguments.h"
+#include "problem_tracer.h"
+#include "scene/pose.h"
+#include <string.h>
+
+const int imp__moved_times[IMP_BOUNDARY_KINDS] = {
+    [IMP_BOUNDARY_FILM] = 1, [IMP_BOUNDARY_LIGHT] = 1, [IMP_BOUNDARY_SCATTER] = 4};
+
+static const struct imp_pose *next_active(const struct imp_problem *p,
+                                          const struct imp_pose *from)
+{
+    while (from && p->active.base[from->param] < 0) from = from->next;
+    return from;
+}
+
+/* A mover for each active pose, about where the object's centre is now. */
+static enum imp_status movers_add(const struct imp_problem *p,
+                                  struct imp__moved_gradient *m)
+{
+    const struct imp_sensor *sensor = m->tracer->sensor;
+    int n = 0;
+    for (const struct imp_pose *q = p->scene->poses; q; q = q->next) n++;
+    m->pose = imp__alloc(p->ctx, (size_t)n, sizeof *m->pose);
+    if (!m->pose) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for poses");
+    for (const struct imp_pose *q = next_active(p, p->scene->poses); q;
+         q = next_active(p, q->next)) {
+        if (q->sensor && q->sensor != sensor) continue; /* it is not looked through */
+        IMP_CHECKED(imp__moves_add_pose(&m->moves, q));
+        m->pose[m->moves.n_movers - 1] = q;
+    }
+    return IMP_OK;
+}
+
+enum imp_status imp__moved_begin(const struct imp_problem *p,
+                                 const struct imp_tracer *tracer,
+                                 struct imp__moved_gradient *out)
+{
+    enum imp_status st = IMP_OK;
+    *out = (struct imp__moved_gradient){.tracer = tracer};
+    out->moves = imp__moves_begin(p->scene, tracer->sensor);
+    IMP_TRY(imp__moved_allowed(tracer));
+    IMP_TRY(movers_add(p, out));
+    IMP_TRY(imp__edges_build(p->scene, &out->edges));
+    IMP_TRY(imp__boundary_begin(tracer, &out->moves, &out->edges, &out->boundary));
+    IMP_TRY(imp__splat_scale_create(p->ctx, &tracer->sensor->film, &out->scale));
+out:
+    return st;
+}
+
+enum imp_status imp__moved_possible(struct imp_problem *p, const struct imp_run *run)
+{
+    struct imp__moved_gradient m = {0};
+    struct imp_tracer tracer;
+    struct imp_run own = *run;
+    p->edge_terms = true;
+    enum imp_status st =
+        p->n_targets > 0
+            ? imp__target_tracer(p, imp__target_part(&p->targets[0], 0), 0, &own, &tracer)
+            : imp__problem_tracer_of_any_end(p, &own, NULL, &tracer);
+    p->edge_terms = false;
+    if (st == IMP_OK) st = imp__moved_begin(p, &tracer, &m);
+    imp__moved_end(&m);
+    return st;
+}
+
+void imp__moved_end(struct imp__moved_gradient *m)
+{
+    if (!m->tracer) return;
+    imp_context *ctx = m->tracer->scene->ctx;
+    imp__moved_adjoint_free(&m->adjoint);
+    imp__splat_scale_destroy(ctx, &m->scale);
+    imp__boundary_free(&m->boundary);
+    if (m->edges.ctx) imp__edges_free(&m->edges);
+    imp__moves_free(&m->moves);
+    imp__release(ctx, m->pose);
+    *m = (struct imp__moved_gradient){0};
+}
+
+void imp__moved_numbers(const struct imp__moved_gradient *m, double *bar, imp_spec lane,
+                        struct imp_sink *sink)
+{
+    for (int k = 0; k < m->moves.n_movers; k++) {
+        const struct imp_pose *pose = m->pose[k];
+        double *own = bar + m->moves.mover[k].first;
+        imp__pose_numbers_bar(pose, own);
+        for (size_t e = 0; e < pose->n; e++) {
+            const imp_spec lanes = lane * own[e];
+            if (own[e] != 0) sink->add(sink, pose->param, e, 1, &lanes);
+        }
+    }
+}
+
+static double counts_at(const void *payload, const struct imp__flux *f)
+{
+    const struct imp__moved_gradient *m = payload;
+    return imp__moved_adjoint_at(&m->adjoint, &m->scale, f->px, f->py, &f->L, NULL);
+}
+
+enum imp_status imp__moved_learn(struct imp__moved_gradient *m, int spp)
+{
+    const struct imp_film_desc *film = &m->tracer->sensor->film;
+    return imp__boundary_learn(&m->boundary, (int64_t)film->crop_w * film->crop_h * spp,
+                               m->adjoint.image ? counts_at : NULL, m);
+}
+
+bool imp__moved_walk(const struct imp__moved_gradient *m, struct imp_arena *arena,
+                     const struct imp_walk *walk, imp_spec adjoint, double *bar)
+{
+    return imp__moved_sweep(m->tracer, arena, &m->moves, walk,
+                            imp__walk_values(m->tracer, walk, adjoint), bar);
+}
+
+/* ---- Draws of a replicate ----------------------------------------------------------- */
+
+struct draws {
+    const struct imp__moved_gradient *m;
+    double *velocity; /* [moves.n] of a flux */
+    double *bar;      /* [moves.n] sum over draws */
+    double *half[2];  /* [IMP_CONTRASTS][moves.n]; NULL: not wanted */
+};
+
+/* times [n] v. */
+static void add_times(double *to, double times, const double *v, size_t n)
+{
+    for (size_t k = 0; k < n; k++) to[k] += times * v[k];
+}
+
+static void flux_add(const struct draws *d, const struct imp__flux *f, double weight,
+                     int half)
+{
+    const size_t n = d->m->moves.n;
+    double contrast[IMP_CONTRASTS];
+    const double counts =
+        imp__moved_adjoint_at(&d->m->adjoint, &d->m->scale, f->px, f->py, &f->L,
+                              d->half[half] ? contrast : NULL);
+    memset(d->velocity, 0, n * sizeof *d->velocity);
+    imp__flux_bar(&d->m->moves, f, 1, d->velocity);
+    add_times(d->bar, counts * weight, d->velocity, n);
+    if (!d->half[half]) return;
+    weight /= d->m->adjoint.pairs; /* half of the draws of all replicates */
+    for (size_t k = 0; k < IMP_CONTRASTS; k++)
+        add_times(d->half[half] + k * n, contrast[k] * weight, d->velocity, n);
+}
+
+static bool draws_add(const struct draws *d, struct imp_arena *arena,
+                      struct imp__replicates plan, int x, int y, int b)
+{
+    const struct imp__moved_gradient *m = d->m;
+    const struct imp_film_desc *film = &m->tracer->sensor->film;
+    const int margin = m->scale.margin, width = film->crop_w + 2 * margin;
+    const int64_t pixels = (int64_t)width * (film->crop_h + 2 * margin);
+    const int64_t pixel = (int64_t)(y + margin) * width + x + margin;
+    bool no_memory = false;
+    for (int kind = 0; kind < IMP_BOUNDARY_KINDS; kind++) {
+        const int n = plan.n * imp__moved_times[kind];
+        for (int i = 0; i < n && !no_memory; i++) {
+            const struct imp_arena_mark mark = imp__arena_mark(arena);
+            const int64_t index = m->first + ((int64_t)b * n + i) * pixels + pixel;
+            for (const struct imp__flux *f = imp__boundary_draw(
+                     &m->boundary, arena, (enum imp__boundary_kind)kind, index, pixels,
+                     &no_memory);
+                 f; f = f->next)
+                flux_add(d, f, 1 / ((double)n * (double)pixels), (i + x + y) & 1);
+            imp__arena_rewind(arena, mark);
+        }
+    }
+    return !no_memory;
+}
+
+bool imp__moved_replicate(const struct imp__moved_gradient *m, struct imp_arena *arena,
+                          struct imp__replicates plan, int x, int y, int b,
+                          const double *inside, double *contrasts, struct imp_sink *sink)
+{
+    const size_t n = m->moves.n, part = IMP_CONTRASTS * n;
+    struct draws d = {.m = m};
+    d.velocity = imp__arena_take(arena, n, sizeof *d.velocity);
+    d.bar = imp__arena_array(arena, n, sizeof *d.bar);
+    if (!d.velocity || !d.bar) return false;
+    if (contrasts) {
+        const uint64_t signs = imp__contrast_signs(&m->adjoint, x, y, b / 2);
+        const double share = (b % 2 ? -0.5 : 0.5) / m->adjoint.pairs;
+        for (int k = 0; k < IMP_CONTRASTS; k++)
+            add_times(contrasts + (size_t)k * n, imp__contrast_sign(signs, k) * share,
+                      inside, n);
+        d.half[0] = contrasts + part;
+        d.half[1] = contrasts + 2 * part;
+    }
+    if (!draws_add(&d, arena, plan, x, y, b)) return false;
+    add_times(d.bar, 1, inside, n);
+    imp__moved_numbers(m, d.bar, (imp_spec){1, 0, 0, 0}, sink);
+    return true;
+}
+
+/* ---- Variance ------------------------------------------------------------------------ */
+
+/* Numbers of poses among the active numbers. */
+struct numbers {
+    struct imp_sink sink; /* first */
+    const struct imp_active *active;
+    double *value; /* [active->n] */
+};
+
+static void number_add(struct imp_sink *sink, int param, size_t element, int channels,
+                       const imp_spec *bar)
+{
+    const struct numbers *s = (const struct numbers *)sink;
+    (void)channels;
+    if (s->active->base[param] < 0) return;
+    s->value[imp__active_at(s->active, param, element)] +=
+        (*bar)[0] * imp__active_slope(s->active, param, element);
+}
+
+/* Not below this part of the variance at fixed adjoints, where contrasts, which are few, say that
+ * the noise of A takes the rest away. */
+#define LEAST 0.1
+
+enum imp_status imp__moved_variance(const struct imp__moved_gradient *m,
+                                    const struct imp_active *active, double *contrasts,
+                                    const double *before, double *variance)
+{
+    imp_context *ctx = m->tracer->scene->ctx;
+    const size_t n = active->n, N = m->moves.n;
+    double *value = imp__alloc(ctx, 4 * n, sizeof *value), *more = value + 3 * n;
+    if (!value) return imp__error(ctx, IMP_E_NOMEM, "no memory for errors");
+    memset(more, 0, n * sizeof *more);
+    for (size_t c = 0; c < IMP_CONTRASTS; c++) {
+        memset(value, 0, 3 * n * sizeof *value);
+        for (size_t part = 0; part < 3; part++) {
+            struct numbers s = {{number_add, false}, active, value + part * n};
+            imp__moved_numbers(m, contrasts + (part * IMP_CONTRASTS + c) * N,
+                               (imp_spec){1, 0, 0, 0}, &s.sink);
+        }
+        for (size_t k = 0; k < n; k++) {
+            const double inside = value[k], one = value[n + k], other = value[2 * n + k];
+            more[k] += (inside * (one + other) + one * other) / IMP_CONTRASTS;
+        }
+    }
+    for (size_t k = 0; k < n; k++) {
+        const double own = variance[k] - before[k];
+        if (more[k] != 0) variance[k] = before[k] + fmax(own + more[k], LEAST * own);
+    }
+    imp__release(ctx, value);
+    return IMP_OK;
+}

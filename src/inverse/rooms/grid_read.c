@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The pixels of a meter as a grid: where they are, and what they read. */
+#include "base/arguments.h"
+#include "base/film.h"
+#include "color/rgb.h"
+#include "film/film_measure.h"
+#include "kind/sensor/receiver.h"
+#include "room_average.h"
+#include "walk/run/run.h"
+#include <importon/rooms.h>
+#include <math.h>
+
+enum imp_status imp_grid_points(const imp_scene *scene, int sensor, double *points,
+                                double *normals)
+{
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, points, "points");
+    if (sensor < 0 || sensor >= scene->n_sensors)
+        return imp__error(scene->ctx, IMP_E_ARG,
+                          "there is no sensor %d; the scene has %d", sensor,
+                          scene->n_sensors);
+    const struct imp_sensor *s = scene->sensors[sensor];
+    if (!s->shape || !(s->shape->ops->flags & IMP_SHAPE_SQUARE))
+        return imp__error(scene->ctx, IMP_E_ARG,
+                          "sensor '%s' (%s) has no grid of points: that is an "
+                          "irradiancemeter on a rectangle",
+                          s->name, s->ops->name);
+    const struct imp_film_desc *f = &s->film;
+    for (int y = 0; y < f->crop_h; y++)
+        for (int x = 0; x < f->crop_w; x++) {
+            const size_t at = 3 * ((size_t)y * (size_t)f->crop_w + (size_t)x);
+            struct imp_surface p;
+            double uv[2];
+            imp__receiver_uv(s, f->crop_x + x + 0.5, f->crop_y + y + 0.5, uv);
+            s->shape->ops->sample_area(s->shape, uv, &p);
+            for (int k = 0; k < 3; k++) {
+                points[at + (size_t)k] = p.p[k];
+                if (normals) normals[at + (size_t)k] = p.ng[k];
+            }
+        }
+    return IMP_OK;
+}
+
+/* Weights of a film's channels in the luminance. */
+static enum imp_status weights_of(const struct imp_scene *scene,
+                                  const struct imp_sensor *s, double w[4], int *n)
+{
+    const struct imp_film_desc *f = &s->film;
+    const enum imp_pixel_format p = f->pixel_format;
+    if (f->n_responses > 0 || p == IMP_PIXEL_XYZ || p == IMP_PIXEL_XYZA)
+        return imp__error(
+            scene->ctx, IMP_E_UNSUPPORTED,
+            "the film of sensor '%s' has other channels than luminance or rgb: "
+            "a grid has one number of light a point",
+            s->name);
+    if (f->filter.radius > 0.5)
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "the film of sensor '%s' has the filter %s, which mixes "
+                          "neighbouring points; a grid has rfilter box",
+                          s->name, f->filter.ops->name);
+    const bool one = p == IMP_PIXEL_LUMINANCE || p == IMP_PIXEL_LUMINANCE_ALPHA;
+    for (int c = 0; c < 3; c++) w[c] = imp__luminance(c == 0, c == 1, c == 2);
+    if (one) w[0] = 1;
+    *n = one ? 1 : 3;
+    return IMP_OK;
+}
+
+enum imp_status imp_grid_read(imp_scene *scene, const struct imp_run *run, double *value,
+                              double *se, struct imp_estimate *average, int64_t *sets)
+{
+    enum imp_status st = IMP_OK;
+    const struct imp_sensor *s;
+    struct imp_run own;
+    imp_film *film = NULL;
+    imp_problem *problem = NULL;
+    struct imp_estimate mean = {0, 0, 0};
+    double w[4], square = 0;
+    int n = 1;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, value, "value");
+    IMP_REQUIRE(scene->ctx, se, "se");
+    IMP_REQUIRE(scene->ctx, average, "average");
+    IMP_RUN(scene->ctx, own, run);
+    IMP_CHECKED(imp__run_sensor(scene, &own, &s));
+    IMP_CHECKED(weights_of(scene, s, w, &n));
+    struct imp_measure measure;
+    IMP_CHECKED(imp__measure_create(scene, &own, &measure));
+    const bool shared =
+        measure.integrator && (measure.from_lights || measure.integrator->both);
+    imp__measure_destroy(&measure);
+    IMP_TRY(imp_render(scene, &own, &film));
+    if (!film->se)
+        IMP_TRY(imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                           "the readings of sensor '%s' have no standard errors: a pixel "
+                           "needs two samples, or two sets of them",
+                           s->name));
+    const size_t pixels = (size_t)film->width * (size_t)film->height;
+    if (shared) {
+        IMP_TRY(imp_problem_create(scene, &problem));
+        IMP_TRY(imp__room_average(problem, &own, &mean, NULL, NULL));
+    }
+    for (size_t i = 0; i < pixels; i++) {
+        value[i] = se[i] = 0;
+        for (int c = 0; c < n; c++) {
+            const size_t at = i * (size_t)film->channels + (size_t)c;
+            value[i] += w[c] * (double)film->mean[at];
+            se[i] += w[c] * (double)film->se[at];
+        }
+        if (!shared) mean.value += value[i] / (double)pixels;
+        square += se[i] * se[i];
+    }
+    if (!shared) mean.se = sqrt(square) / (double)pixels;
+    *average = mean;
+    if (sets) *sets = film->sets > 0 ? film->sets : film->spp;
+out:
+    imp_problem_destroy(problem);
+    imp_film_destroy(film);
+    return st;
+}

@@ -1,0 +1,174 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The tree over edges, by which silhouettes are chosen (edge_choice.h). Its leaves are runs of the
+ * list, whose order follows a curve through space. */
+#include "base/context.h"
+#include "edge_choice.h"
+
+#define LEAF  4    /* edges at most; each of them is tested */
+#define AHEAD 3    /* levels below a child by which it is judged */
+#define SLACK 1e-6 /* for rounding: where normals are as good as across the line */
+
+struct imp__edge_node {
+    imp_v3 centre, axis;         /* of the sphere; of the cone */
+    double radius, cosine, sine; /* of the cone's half angle; cosine < 0: any normal */
+    size_t lo, hi;               /* edges */
+    size_t second; /* its second child, the first is the next node; 0: a leaf */
+};
+
+/* Normals of the two faces, turned the same way round. False: the edge is a border, or has more
+ * faces. It is a silhouette of a line r where r.a and r.b have different signs. */
+static bool normals(const struct imp__edges *edges, const struct imp__edge *e, imp_v3 *a,
+                    imp_v3 *b)
+{
+    const struct imp__edge_face *f = &edges->face[e->first];
+    if (e->n_faces != 2) return false;
+    const imp_v3 along = imp__normalize(e->b - e->a);
+    *a = imp__cross(along, f[0].in);
+    *b = imp__cross(f[1].in, along);
+    if (imp__dot(*a, f[0].n) < 0) {
+        *a = -*a;
+        *b = -*b;
+    }
+    return true;
+}
+
+static void node_bound(const struct imp__edges *edges, struct imp__edge_node *node)
+{
+    imp_v3 lo = edges->edge[node->lo].a, hi = lo, sum = {0}, a, b;
+    bool any = true;
+    for (size_t k = node->lo; k < node->hi; k++) {
+        const struct imp__edge *e = &edges->edge[k];
+        for (int i = 0; i < 3; i++) {
+            lo[i] = imp_min(lo[i], imp_min(e->a[i], e->b[i]));
+            hi[i] = imp_max(hi[i], imp_max(e->a[i], e->b[i]));
+        }
+        if (normals(edges, e, &a, &b)) sum += a + b;
+        else any = false;
+    }
+    node->centre = (lo + hi) * 0.5;
+    node->radius = 0.5 * imp__length(hi - lo);
+    node->cosine = -1;
+    if (!any || !(imp__length(sum) > 0)) return;
+    node->axis = imp__normalize(sum);
+    double least = 1;
+    for (size_t k = node->lo; k < node->hi; k++) {
+        normals(edges, &edges->edge[k], &a, &b);
+        least = imp_min(least, imp__dot(node->axis, a));
+        least = imp_min(least, imp__dot(node->axis, b));
+    }
+    node->cosine = least;
+    node->sine = sqrt(imp_max(1 - least * least, 0.0));
+}
+
+/* Returns the node behind the last. */
+static size_t node_make(struct imp__edge_tree *t, size_t k, size_t lo, size_t hi)
+{
+    struct imp__edge_node *node = &t->node[k];
+    *node = (struct imp__edge_node){.lo = lo, .hi = hi};
+    node_bound(t->edges, node);
+    if (hi - lo <= LEAF) return k + 1;
+    const size_t half = lo + (hi - lo) / 2;
+    node->second = node_make(t, k + 1, lo, half);
+    return node_make(t, node->second, half, hi);
+}
+
+enum imp_status imp__edge_tree_build(const struct imp__edges *edges,
+                                     struct imp__edge_tree *out)
+{
+    *out = (struct imp__edge_tree){.ctx = edges->ctx, .edges = edges};
+    if (edges->n == 0) return IMP_OK;
+    out->node = imp__alloc(edges->ctx, 2 * edges->n, sizeof *out->node);
+    if (!out->node) return imp__error(edges->ctx, IMP_E_NOMEM, "no memory for edges");
+    node_make(out, 0, 0, edges->n);
+    return IMP_OK;
+}
+
+void imp__edge_tree_free(struct imp__edge_tree *tree)
+{
+    if (tree->ctx) imp__release(tree->ctx, tree->node);
+    *tree = (struct imp__edge_tree){0};
+}
+
+/* May a line from there pass a silhouette of this node? With angles c of the cone and s of the
+ * sphere as it is seen, and g between the axis and a right angle to the line: |g| <= c + s. */
+static bool may_pass(const struct imp__edge_node *node, imp_v3 from, bool parallel)
+{
+    if (node->cosine <= 0) return true;
+    const imp_v3 r = parallel ? from : node->centre - from;
+    const double d = imp__length(r), sine = parallel ? 0 : node->radius / d;
+    if (!(sine < node->cosine)) return true; /* c + s is above a right angle */
+    const double cosine = sqrt(1 - sine * sine);
+    return fabs(imp__dot(node->axis, r)) <=
+           d * (node->sine * cosine + node->cosine * sine + SLACK);
+}
+
+static bool is_silhouette(const struct imp__edge_tree *tree, size_t k, imp_v3 from,
+                          bool parallel)
+{
+    const struct imp__edge *e = &tree->edges->edge[k];
+    const imp_v3 m = imp__cross(e->b - e->a, parallel ? from : e->a - from);
+    return imp__edge_side(tree->edges, e, m) != 0;
+}
+
+/* Probability of what may be silhouettes in a node, as nodes that lie so many levels below say. */
+static double importance(const struct imp__edge_tree *tree,
+                         const struct imp__edge_node *node, const double *chance,
+                         imp_v3 from, bool parallel, int levels)
+{
+    double sum = 0;
+    if (!may_pass(node, from, parallel)) return 0;
+    if (node->second == 0) {
+        for (size_t k = node->lo; k < node->hi; k++)
+            if (is_silhouette(tree, k, from, parallel)) sum += chance[k + 1] - chance[k];
+        return sum;
+    }
+    if (levels == 0) return chance[node->hi] - chance[node->lo];
+    return importance(tree, node + 1, chance, from, parallel, levels - 1) +
+           importance(tree, tree->node + node->second, chance, from, parallel,
+                      levels - 1);
+}
+
+static ptrdiff_t leaf_choose(const struct imp__edge_tree *tree,
+                             const struct imp__edge_node *leaf, const double *chance,
+                             imp_v3 from, bool parallel, double *u, double *pmf)
+{
+    double part[LEAF], sum = 0;
+    for (size_t k = leaf->lo; k < leaf->hi; k++)
+        sum += part[k - leaf->lo] =
+            is_silhouette(tree, k, from, parallel) ? chance[k + 1] - chance[k] : 0;
+    if (!(sum > 0)) return -1;
+    double x = *u * sum;
+    size_t last = 0;
+    for (size_t k = 0; k < leaf->hi - leaf->lo; k++) {
+        if (!(part[k] > 0)) continue;
+        last = k;
+        if (x < part[k]) break;
+        x -= part[k];
+    }
+    *u = imp_clamp(x / part[last], 0.0, 1 - 0x1p-53);
+    *pmf *= part[last] / sum;
+    return (ptrdiff_t)(leaf->lo + last);
+}
+
+ptrdiff_t imp__edge_tree_choose(const struct imp__edge_tree *tree, const double *chance,
+                                imp_v3 from, bool parallel, double *u, double *pmf)
+{
+    const struct imp__edge_node *node = tree->node;
+    *pmf = 1;
+    while (node->second > 0) {
+        const struct imp__edge_node *child[2] = {node + 1, tree->node + node->second};
+        double part[2];
+        for (int k = 0; k < 2; k++)
+            part[k] = importance(tree, child[k], chance, from, parallel, AHEAD);
+        const double sum = part[0] + part[1];
+        if (!(sum > 0)) return -1;
+        const double first = part[0] / sum;
+        const int k = *u < first ? 0 : 1;
+        const double own = k == 0 ? first : 1 - first;
+        *u = imp_clamp((*u - (k == 0 ? 0 : first)) / own, 0.0, 1 - 0x1p-53);
+        *pmf *= own;
+        node = child[k];
+    }
+    return leaf_choose(tree, node, chance, from, parallel, u, pmf);
+}

@@ -1,0 +1,322 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Numbers of geometry become parameters (pose.h), or are refused by name. */
+#include "access.h"
+#include "base/arguments.h"
+#include "kind/shape/shape.h"
+#include "pose.h"
+#include <stdio.h>
+#include <string.h>
+
+/* ---- Cameras ------------------------------------------------------------------------ */
+
+/* By the rays through two corners of the film, and one through another point of the lens. */
+bool imp__pinhole(const struct imp_sensor *s, imp_v3 *centre)
+{
+    const double w = s->film.width, h = s->film.height, lens[2] = {0.3, 0.8};
+    struct imp_sensor_ray a, b;
+    if (!s->ops->ray || s->shape) return false;
+    s->ops->ray(s, 0, 0, lens, &a);
+    s->ops->ray(s, w, h, lens, &b);
+    const imp_v3 d = b.o - a.o, n = imp__cross(a.d, b.d);
+    const double n2 = imp__dot(n, n), size = imp__length(d) + imp__length(a.o);
+    if (!(n2 > 1e-20)) return false;
+    const double ta = imp__dot(imp__cross(d, b.d), n) / n2,
+                 tb = imp__dot(imp__cross(d, a.d), n) / n2;
+    *centre = a.o + a.d * ta;
+    const imp_v3 other = b.o + b.d * tb;
+    struct imp_sensor_ray elsewhere; /* through another point of the lens */
+    s->ops->ray(s, 0, 0, (const double[2]){0.9, 0.1}, &elsewhere);
+    const imp_v3 apart = imp__cross(elsewhere.o - *centre, elsewhere.d);
+    return imp__length(other - *centre) <= 1e-7 * size &&
+           imp__length(apart) <= 1e-7 * size;
+}
+
+/* ---- Adding ------------------------------------------------------------------------- */
+
+static enum imp_status refuse(const struct imp_scene *scene, const char *name,
+                              enum imp_pose_kind kind, const char *why)
+{
+    return imp__error(scene->ctx, IMP_E_UNSUPPORTED, "'%s' has no %s: %s",
+                      name ? name : "", imp__pose_tail(kind), why);
+}
+
+/* What else is made from where shapes are, and is not made again. */
+static enum imp_status shape_allowed(const struct imp_scene *scene,
+                                     const struct imp_shape *s, enum imp_pose_kind kind)
+{
+    if (!s->ops->move)
+        return refuse(scene, s->name, kind, "it is not made of triangles, and no sphere");
+    if (scene->world) return refuse(scene, s->name, kind, "the scene has instances");
+    if (scene->n_media + scene->n_bodies > 0 || scene->priorities)
+        return refuse(scene, s->name, kind, "there are media");
+    if (scene->light_tree)
+        return refuse(scene, s->name, kind, "lights are chosen by a tree (light_choice)");
+    if (scene->aims.aimed)
+        return refuse(scene, s->name, kind, "directions are aimed at shapes");
+    if (s->placed || s->by_triangle)
+        return refuse(scene, s->name, kind, "its textures need more than uv");
+    return IMP_OK;
+}
+
+/* What a scale or single vertices change beside places. */
+static enum imp_status size_allowed(const struct imp_scene *scene,
+                                    const struct imp_shape *s, enum imp_pose_kind kind)
+{
+    const bool is_mesh =
+        s->geometry == IMP_TRIANGLES && s->ops->surface == imp__mesh_surface;
+    for (int k = 0; k < scene->n_emitters; k++)
+        if (scene->emitters[k]->shape == s)
+            return refuse(scene, s->name, kind,
+                          "it is a light, whose points are drawn by areas that stay");
+    for (int k = 0; k < scene->n_sensors; k++)
+        if (scene->sensors[k]->shape == s)
+            return refuse(scene, s->name, kind, "it is a sensor");
+    if (is_mesh && ((const struct imp__mesh *)s->self)->normals)
+        return refuse(scene, s->name, kind,
+                      "it has normals at its vertices (face_normals drops them)");
+    if (kind == IMP_POSE_VERTICES && !is_mesh)
+        return refuse(scene, s->name, kind, "it is no mesh");
+    return IMP_OK;
+}
+
+static enum imp_status shape_find(struct imp_scene *scene, int k, struct imp_pose *p)
+{
+    const struct imp_shape *s = scene->shapes[k];
+    p->shape = k;
+    p->centre = (s->lo + s->hi) * 0.5;
+    p->rest_size = s->ops->object_size;
+    if (p->kind > IMP_POSE_VERTICES)
+        return refuse(scene, s->name, p->kind, "it is a shape");
+    const enum imp_status st = shape_allowed(scene, s, p->kind);
+    return st == IMP_OK && p->kind != IMP_POSE_RIGID ? size_allowed(scene, s, p->kind)
+                                                     : st;
+}
+
+static enum imp_status sensor_find(struct imp_scene *scene, int k, struct imp_pose *p)
+{
+    struct imp_sensor *s = scene->sensors[k];
+    double number[3];
+    p->sensor = s;
+    p->rest_size = s->ops->object_size;
+    if (p->kind != IMP_POSE_RIGID &&
+        (p->kind < IMP_POSE_FOV || p->kind > IMP_POSE_OFFSET_Y))
+        return refuse(scene, s->name, p->kind, "it is a sensor");
+    if (!s->ops->move)
+        return refuse(scene, s->name, p->kind, "it is no perspective camera");
+    if (s->medium) return refuse(scene, s->name, p->kind, "it is in a medium");
+    if (!imp__pinhole(s, &p->centre))
+        return refuse(scene, s->name, p->kind, "its rays meet in no point");
+    if (p->kind != IMP_POSE_RIGID && (!s->ops->view || !s->ops->view(s, number, false)))
+        return refuse(scene, s->name, p->kind, "its lens distorts the picture");
+    return IMP_OK;
+}
+
+static enum imp_status light_find(struct imp_scene *scene, int k, struct imp_pose *p)
+{
+    struct imp_emitter *e = scene->emitters[k];
+    const enum imp_pose_kind kind =
+        e->ops->flags & IMP_EMITTER_FAR ? IMP_POSE_DIRECTION : IMP_POSE_POSITION;
+    p->emitter = e;
+    p->rest_size = e->ops->object_size;
+    if (!e->ops->aim || kind != p->kind)
+        return refuse(
+            scene, e->name, p->kind,
+            "it is none of point and spot (position), and directional (direction)");
+    if (scene->light_tree)
+        return refuse(scene, e->name, p->kind,
+                      "lights are chosen by a tree (light_choice)");
+    return IMP_OK;
+}
+
+static enum imp_status object_find(struct imp_scene *scene, const char *name,
+                                   struct imp_pose *p)
+{
+    for (int k = 0; k < scene->n_shapes; k++)
+        if (strcmp(scene->shapes[k]->name, name) == 0) return shape_find(scene, k, p);
+    for (int k = 0; k < scene->n_sensors; k++)
+        if (strcmp(scene->sensors[k]->name, name) == 0) return sensor_find(scene, k, p);
+    for (int k = 0; k < scene->n_emitters; k++)
+        if (!scene->emitters[k]->shape && strcmp(scene->emitters[k]->name, name) == 0)
+            return light_find(scene, k, p);
+    return imp__error(scene->ctx, IMP_E_ARG, "there is no %s '%s'",
+                      p->kind >= IMP_POSE_POSITION ? "light" : "shape or camera", name);
+}
+
+static enum imp_status rest_keep(struct imp_scene *scene, struct imp_pose *p)
+{
+    p->rest = imp__arena_take(&scene->arena, 1, p->rest_size);
+    if (!p->rest) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
+    if (p->sensor || p->emitter) {
+        memcpy(p->rest, p->sensor ? p->sensor->self : p->emitter->self, p->rest_size);
+        return IMP_OK;
+    }
+    const struct imp_shape *s = scene->shapes[p->shape];
+    memcpy(p->rest, s->self, p->rest_size);
+    const struct imp_triangles *t = &s->triangles;
+    const struct imp__mesh *m = s->ops->move == imp__mesh_move ? s->self : NULL;
+    if (!m) return IMP_OK; /* its positions are in the object */
+    const size_t n = 3 * t->n_vertices;
+    p->positions = imp__arena_take(&scene->arena, n, sizeof *p->positions);
+    if (m->normals) p->normals = imp__arena_take(&scene->arena, n, sizeof *p->normals);
+    if (!p->positions || (m->normals && !p->normals))
+        return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
+    memcpy(p->positions, t->positions, n * sizeof *p->positions);
+    if (m->normals) memcpy(p->normals, m->normals, n * sizeof *p->normals);
+    return IMP_OK;
+}
+
+/* Numbers, and what they are where the file has the object. */
+static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
+{
+    const struct imp_triangles *t =
+        p->shape >= 0 ? &scene->shapes[p->shape]->triangles : NULL;
+    double view[3], aim[3];
+    p->n = p->kind == IMP_POSE_RIGID      ? 6
+           : p->kind == IMP_POSE_VERTICES ? 3 * t->n_vertices
+           : p->kind >= IMP_POSE_POSITION ? 3
+                                          : 1;
+    p->number = imp__arena_array(&scene->arena, p->n, sizeof *p->number);
+    if (!p->number) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
+    switch (p->kind) {
+    case IMP_POSE_SCALE: p->number[0] = 1; break;
+    case IMP_POSE_VERTICES:
+        for (size_t k = 0; k < p->n; k++) p->number[k] = t->positions[k];
+        break;
+    case IMP_POSE_FOV:
+    case IMP_POSE_OFFSET_X:
+    case IMP_POSE_OFFSET_Y:
+        p->sensor->ops->view(p->sensor, view, false);
+        p->number[0] = view[p->kind - IMP_POSE_FOV];
+        break;
+    case IMP_POSE_POSITION:
+    case IMP_POSE_DIRECTION:
+        p->emitter->ops->aim(p->emitter, aim, false);
+        memcpy(p->number, aim, sizeof aim);
+        break;
+    default: break;
+    }
+    return IMP_OK;
+}
+
+static const struct tail {
+    const char *name, *unit;
+    double lo, hi;
+} tails[IMP_POSE_KINDS] = {
+    [IMP_POSE_RIGID] = {"pose", "scene units, radians", -INFINITY, INFINITY},
+    [IMP_POSE_SCALE] = {"scale", "1", 1e-3, INFINITY},
+    [IMP_POSE_VERTICES] = {"vertex_positions", "scene units", -INFINITY, INFINITY},
+    [IMP_POSE_FOV] = {"x_fov", "degree", 0.1, 179},
+    [IMP_POSE_OFFSET_X] = {"principal_point_offset_x", "film width", -INFINITY, INFINITY},
+    [IMP_POSE_OFFSET_Y] = {"principal_point_offset_y", "film height", -INFINITY,
+                           INFINITY},
+    [IMP_POSE_POSITION] = {"position", "scene units", -INFINITY, INFINITY},
+    [IMP_POSE_DIRECTION] = {"direction", "1", -INFINITY, INFINITY}};
+
+const char *imp__pose_tail(enum imp_pose_kind kind) { return tails[kind].name; }
+
+static enum imp_status param_add(struct imp_scene *scene, const char *object,
+                                 struct imp_pose *p)
+{
+    const struct tail *tail = &tails[p->kind];
+    const size_t length = strlen(object) + strlen(tail->name) + 2;
+    char *name = imp__arena_take(&scene->arena, length, 1);
+    if (!name) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
+    snprintf(name, length, "%s.%s", object, tail->name);
+    const bool rows = p->kind == IMP_POSE_VERTICES;
+    const struct imp_param param = {
+        .info = {.size = sizeof param.info,
+                 .name = name,
+                 .unit = tail->unit,
+                 .dims = {rows ? p->n / 3 : p->n, rows ? 3 : 0},
+                 .n_dims = rows ? 2 : 1,
+                 .lo = tail->lo,
+                 .hi = tail->hi,
+                 .flags = IMP_PARAM_DIFFERENTIABLE},
+        .store = IMP_STORE_DOUBLES,
+        .degree = IMP_DEGREE_OTHER,
+        .doubles = p->number};
+    IMP_CHECKED(imp__theta_add(scene, &param, &p->param));
+    imp__theta_finish(scene);
+    return imp__theta_watch(scene, p->param, imp__pose_changed, p);
+}
+
+/* Is it there already? Else *object is the first parameter of the same object, or p. */
+static bool is_there(const struct imp_scene *scene, struct imp_pose *p)
+{
+    p->object = p;
+    for (struct imp_pose *q = scene->poses; q; q = q->next) {
+        if (q->shape != p->shape || q->sensor != p->sensor || q->emitter != p->emitter)
+            continue;
+        if (q->kind == p->kind) return true;
+        p->object = q->object;
+        p->centre = q->object->centre;
+    }
+    return false;
+}
+
+static enum imp_status geometry_add(struct imp_scene *scene, const char *object,
+                                    enum imp_pose_kind kind)
+{
+    if (!scene->committed || scene->rayless)
+        return imp__error(scene->ctx, IMP_E_ARG,
+                          "%s needs a committed scene that has geometry",
+                          imp__pose_tail(kind));
+    if (scene->in_problem)
+        return imp__error(scene->ctx, IMP_E_ARG,
+                          "what moves is added before the scene's first problem is "
+                          "created");
+    struct imp_pose *p = imp__arena_array(&scene->arena, 1, sizeof *p);
+    if (!p) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
+    p->scene = scene;
+    p->kind = kind;
+    p->shape = -1;
+    IMP_CHECKED(object_find(scene, object, p));
+    if (is_there(scene, p)) return IMP_OK;
+    const bool others =
+        imp__pose_beside(p, IMP_POSE_RIGID) || imp__pose_beside(p, IMP_POSE_SCALE);
+    if (p->object != p &&
+        ((kind == IMP_POSE_VERTICES && others) || imp__pose_beside(p, IMP_POSE_VERTICES)))
+        return refuse(scene, object, kind,
+                      "single vertices move, and the whole moves with them");
+    if (p->object == p) IMP_CHECKED(rest_keep(scene, p));
+    IMP_CHECKED(numbers_make(scene, p));
+    IMP_CHECKED(param_add(scene, object, p));
+    struct imp_pose **end = &scene->poses;
+    while (*end) end = &(*end)->next;
+    *end = p;
+    return IMP_OK;
+}
+
+enum imp_status imp_scene_add_pose(imp_scene *scene, const char *object)
+{
+    enum imp_status st = IMP_OK;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, object, "object");
+    IMP_SETS(scene, st);
+    return st == IMP_OK ? geometry_add(scene, object, IMP_POSE_RIGID) : st;
+}
+
+enum imp_status imp_scene_add_geometry(imp_scene *scene, const char *name)
+{
+    enum imp_status st = IMP_OK;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, name, "name");
+    IMP_SETS(scene, st);
+    if (st != IMP_OK) return st;
+    const char *dot = strrchr(name, '.');
+    for (int k = 0; dot && k < IMP_POSE_KINDS; k++) {
+        if (strcmp(dot + 1, tails[k].name) != 0) continue;
+        char object[256];
+        const size_t length = (size_t)(dot - name);
+        if (length >= sizeof object) break;
+        memcpy(object, name, length);
+        object[length] = 0;
+        return geometry_add(scene, object, (enum imp_pose_kind)k);
+    }
+    return imp__error(scene->ctx, IMP_E_ARG,
+                      "'%s' names no number of geometry: NAME.pose, scale, "
+                      "vertex_positions, x_fov, principal_point_offset_x, _y, position "
+                      "or direction",
+                      name);
+}

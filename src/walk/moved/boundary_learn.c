@@ -1,0 +1,158 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The pilot of the boundary (boundary.h): draws whose second moments, by cells of the list of edges,
+ * become chances of later draws. Shifts and turns of a mover have different units: a first quarter
+ * of the draws finds the sums of their squares, by which the others divide. */
+#include "base/context.h"
+#include "boundary_parts.h"
+
+enum { LOOKS_LEAST = 2, LOOKS = 8, PART = 8 };
+
+struct pilot {
+    struct imp__boundary *b;
+    struct imp_arena arena;
+    imp__flux_weight *weight;
+    const void *payload;
+    int n_groups;
+    double *group; /* [n_groups] of one draw: 3 for a shift, 3 for a turn of each mover */
+    double *square; /* [n_groups] sums over the first draws, of each three alike */
+    double *moment; /* [cells] */
+    bool no_memory;
+};
+
+static double light_of(const struct pilot *x, const struct imp__flux *f)
+{
+    if (x->weight) return x->weight(x->payload, f);
+    return imp__sum_used(f->L, x->b->tracer->scene->lanes);
+}
+
+/* What a flux makes of a shift of each mover, and of a turn about its centre. */
+static void groups_add(struct pilot *x, const struct imp__flux *f)
+{
+    const struct imp__moves *moves = x->b->moves;
+    const double light = light_of(x, f);
+    for (int k = 0; k < moves->n_movers; k++) {
+        const struct imp__mover *m = &moves->mover[k];
+        for (int i = 0; i < f->n_ends; i++) {
+            const struct imp__flux_end *e = &f->end[i];
+            const int shape = e->camera  ? IMP_MOVE_CAMERA
+                              : e->light ? IMP_MOVE_EMITTER(e->light - 1)
+                                         : e->x.shape;
+            if (shape != m->shape) continue;
+            const imp_v3 turn = imp__cross(e->x.p - m->centre, e->bar);
+            for (int j = 0; j < 3; j++) {
+                x->group[6 * k + j] += light * e->bar[j];
+                x->group[6 * k + 3 + j] += light * turn[j];
+            }
+        }
+    }
+}
+
+/* One draw; false: it brings nothing. */
+static bool look(struct pilot *x, enum imp__boundary_kind kind, int64_t index, int64_t n,
+                 struct imp__edge_draw *d)
+{
+    const struct imp_arena_mark mark = imp__arena_mark(&x->arena);
+    *d = (struct imp__edge_draw){
+        .b = x->b, .arena = &x->arena, .choice = &x->b->choice[kind]};
+    d->key = imp__key(x->b->tracer->seed,
+                      UINT64_MAX - IMP_BOUNDARY_KINDS - (uint64_t)kind, (uint64_t)index);
+    d->u = ((double)(index % n) + imp__u01(d->key, IMP_EDGE_WHICH)) / (double)n;
+    d->u = imp_min(d->u, 1 - 0x1p-53);
+    for (int k = 0; k < x->n_groups; k++) x->group[k] = 0;
+    imp__boundary_work(d, kind);
+    for (const struct imp__flux *f = d->first; f; f = f->next) groups_add(x, f);
+    imp__arena_rewind(&x->arena, mark);
+    x->no_memory |= d->no_memory;
+    return d->first != NULL;
+}
+
+static double square3(const double *v) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
+
+#define KEPT 0.3 /* probability that stays as it was */
+
+/* Spheres and edges by roots of the second moments that each would have alone. What is counted of one
+ * that was chosen with the probability c is that moment over c. */
+static void parts_learn(const struct pilot *x, double *part, int n_cells)
+{
+    const int n = x->b->n_balls;
+    const double edges = part[n + 1] - part[n];
+    double root = 0, sum = 0, before = 0;
+    for (int k = 0; k < n_cells; k++) root += sqrt(x->moment[k]);
+    if (n_cells > 0) root *= sqrt(edges / n_cells);
+    for (int k = 0; k < n; k++)
+        sum += sqrt((part[k + 1] - part[k]) * x->moment[n_cells + k]);
+    sum += root;
+    if (!(sum > 0) || !(sum < INFINITY)) return;
+    for (int k = 0; k < n; k++) {
+        const double own = part[k + 1] - before; /* part[k] has been overwritten */
+        const double found = sqrt(own * x->moment[n_cells + k]) / sum;
+        before = part[k + 1];
+        part[k + 1] = part[k] + KEPT * own + (1 - KEPT) * found;
+    }
+    if (edges == 0) part[n] = 1;
+}
+
+static void kind_learn(struct pilot *x, enum imp__boundary_kind kind, int64_t n)
+{
+    struct imp__edge_choice *c = &x->b->choice[kind];
+    struct imp__edge_draw d;
+    for (int k = 0; k < x->n_groups; k++) x->square[k] = 0;
+    for (int k = 0; k < c->n_cells + x->b->n_balls; k++) x->moment[k] = 0;
+    for (int64_t i = 0; i < n / 4; i++) {
+        if (!look(x, kind, i, n / 4, &d)) continue;
+        for (int k = 0; k < x->n_groups; k += 3) x->square[k] += square3(x->group + k);
+    }
+    for (int64_t i = 0; i < n; i++) {
+        if (!look(x, kind, n + i, n, &d)) continue;
+        double sum = 0;
+        for (int k = 0; k < x->n_groups; k += 3)
+            if (x->square[k] > 0) sum += square3(x->group + k) / x->square[k];
+        x->moment[d.cell] += sum;
+    }
+    if (x->b->edges->n > 0) imp__edge_choice_learn(c, x->moment);
+    if (x->b->n_balls > 0) parts_learn(x, x->b->part[kind], c->n_cells);
+}
+
+/* Cells in place of the one of the beginning. */
+static enum imp_status cells_make(struct imp__boundary *b, int kind, int n)
+{
+    struct imp__edge_choice *c = &b->choice[kind];
+    double *cell = imp__alloc(b->edges->ctx, (size_t)n + 1, sizeof *cell);
+    if (!cell) return imp__error(b->edges->ctx, IMP_E_NOMEM, "no memory for edges");
+    imp__release(b->edges->ctx, c->cell);
+    c->cell = cell;
+    c->n_cells = n;
+    for (int k = 0; k <= n; k++) cell[k] = (double)k / n;
+    return IMP_OK;
+}
+
+enum imp_status imp__boundary_learn(struct imp__boundary *b, int64_t draws,
+                                    imp__flux_weight *weight, const void *payload)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = b->tracer->scene->ctx;
+    struct pilot x = {.b = b, .weight = weight, .payload = payload};
+    if (b->edges->n == 0 && b->n_balls == 0) return IMP_OK;
+    const int64_t n = draws / PART;
+    const int cells = (int)imp_min(n / LOOKS, (int64_t)IMP_EDGE_CELLS_MAX);
+    if (cells < LOOKS_LEAST) return IMP_OK; /* too few to learn from */
+    x.n_groups = 6 * b->moves->n_movers;
+    imp__arena_init(&x.arena, ctx);
+    x.group = imp__alloc(ctx, (size_t)x.n_groups + 1, sizeof *x.group);
+    x.square = imp__alloc(ctx, (size_t)x.n_groups + 1, sizeof *x.square);
+    x.moment = imp__alloc(ctx, (size_t)(cells + b->n_balls), sizeof *x.moment);
+    if (!x.group || !x.square || !x.moment)
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for edges"));
+    for (int kind = 0; kind < IMP_BOUNDARY_KINDS && !x.no_memory; kind++) {
+        if (b->edges->n > 0) IMP_TRY(cells_make(b, kind, cells));
+        kind_learn(&x, (enum imp__boundary_kind)kind, (int64_t)cells * LOOKS);
+    }
+    if (x.no_memory) st = imp__error(ctx, IMP_E_NOMEM, "no memory for edges");
+out:
+    imp__arena_free(&x.arena);
+    imp__release(ctx, x.group);
+    imp__release(ctx, x.square);
+    imp__release(ctx, x.moment);
+    return st;
+}

@@ -1,0 +1,303 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Gradients by what moves against closed forms: the irradiance of a point light that moves, and of a
+ * rectangle; the penumbra of a half plane that moves before a square lamp; the picture of a lit
+ * square by the field of view; the
+ * solid angle of a ball before a sky; and an identity of fields of view and turns of a camera, the flux of
+ * radiance through the frame of the picture. */
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include "math/rng.h"
+#include "walk/core/walk.h"
+
+static imp_context *ctx;
+enum { NUMBERS_MAX = 16, PIXELS_MAX = 1024 };
+
+/* d (mean of the picture)/d numbers, over seeds. */
+static void gradient_of(imp_scene *scene, const char *name, int spp, int seeds,
+                        struct tap_stat *out)
+{
+    static float adjoint[PIXELS_MAX * 3];
+    const struct imp_film_desc *film = &scene->sensors[0]->film;
+    const size_t n = (size_t)film->width * (size_t)film->height * (size_t)scene->channels;
+    imp_problem *p;
+    for (size_t k = 0; k < n; k++) adjoint[k] = (float)(1. / (double)n);
+    test_must(ctx, imp_problem_create(scene, &p));
+    test_must(ctx, imp_problem_activate(p, name));
+    const size_t numbers = imp_problem_n_variables(p);
+    for (int s = 0; s < seeds; s++) {
+        struct imp_run run = IMP_RUN_INIT;
+        double g[NUMBERS_MAX];
+        run.spp = spp;
+        run.seed = 7 + (uint64_t)s;
+        test_must(ctx, imp_problem_reverse(p, adjoint, &run, g, NULL));
+        for (size_t k = 0; k < numbers; k++) tap_add(&out[k], g[k]);
+    }
+    imp_problem_destroy(p);
+}
+
+static void scene_of(const char *camera, int size, const char *rest, const char *name,
+                     imp_scene **out)
+{
+    char xml[4096];
+    snprintf(
+        xml, sizeof xml,
+        "<scene version='3.0.0'><integrator type='direct'/><sensor "
+        "type='perspective' id='camera'>%s<film type='hdrfilm'><integer name='width' "
+        "value='%d'/><integer name='height' value='%d'/><rfilter type='box'/></film>"
+        "</sensor>%s</scene>",
+        camera, size, size, rest);
+    *out = test_scene_text(ctx, xml, IMP_MONO);
+    test_must(ctx, imp_scene_add_geometry(*out, name));
+}
+
+#define FLOOR                                                                            \
+    "<shape type='rectangle' id='floor'><transform name='to_world'><scale value='9'/>"   \
+    "</transform><bsdf type='diffuse'><rgb name='reflectance' "                          \
+    "value='.6'/></bsdf></shape>"
+/* Looks at the origin along (-1, 0, -1), of so small a field that the picture is one point. */
+#define NARROW                                                                           \
+    "<float name='fov' value='.01'/><transform name='to_world'><lookat "                 \
+    "origin='.6,0,.6' target='0,0,0' up='0,0,1'/></transform>"
+
+/* I h/(h^2 + r^2)^1.5 of a light at (x, y, h). */
+static void point_test(void)
+{
+    const double at[3] = {.5, -.3, 1.2}, rho = .6, power = 2;
+    struct tap_stat d[3] = {{0, 0, 0}};
+    imp_scene *scene;
+    scene_of(NARROW, 4,
+             FLOOR
+             "<emitter type='point' id='bulb'><point name='position' x='.5' y='-.3' "
+             "z='1.2'/><rgb name='intensity' value='2'/></emitter>",
+             "bulb.position", &scene);
+    gradient_of(scene, "bulb.position", 16, 4, d);
+    const double r2 = at[0] * at[0] + at[1] * at[1] + at[2] * at[2];
+    for (int k = 0; k < 3; k++) {
+        const double ref = rho / IMP_PI * power *
+                           ((k == 2) * pow(r2, -1.5) - 3 * at[2] * at[k] * pow(r2, -2.5));
+        tap_near(d[k].mean, ref, 1e-3, 0, "irradiance of a point light that moves");
+    }
+    imp_scene_destroy(scene);
+}
+
+/* Form factor of a square of sides 2 b, parallel to the floor at the height h, centred at (x, y). */
+static double form_factor(double x, double y, double h, double b)
+{
+    double sum = 0;
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2; j++) {
+            const double X = (x + (i ? b : -b)) / h, Y = (y + (j ? b : -b)) / h;
+            const double u = sqrt(1 + X * X), v = sqrt(1 + Y * Y);
+            sum += (i == j ? 1 : -1) * (X / u * atan(Y / u) + Y / v * atan(X / v));
+        }
+    return sum / (2 * IMP_PI);
+}
+
+static void rectangle_test(void)
+{
+    struct tap_stat d[6] = {{0, 0, 0}};
+    imp_scene *scene;
+    scene_of(NARROW, 4,
+             FLOOR "<shape type='rectangle' id='lamp'><transform name='to_world'><scale "
+                   "value='.4'/><rotate x='1' angle='180'/><translate x='.3' y='.2' "
+                   "z='1.5'/></transform><emitter type='area'><rgb name='radiance' "
+                   "value='5'/></emitter></shape>",
+             "lamp.pose", &scene);
+    gradient_of(scene, "lamp.pose", 4096, 16, d);
+    const double h = 1e-5;
+    for (int k = 0; k < 3; k++) {
+        const double x = .3, y = .2, z = 1.5,
+                     e[3] = {h * (k == 0), h * (k == 1), h * (k == 2)};
+        const double ref = .6 * 5 *
+                           (form_factor(x + e[0], y + e[1], z + e[2], .4) -
+                            form_factor(x - e[0], y - e[1], z - e[2], .4)) /
+                           (2 * h);
+        tap_z(&d[k], ref, 3e-3 * fabs(ref), "form factor of a rectangle that moves");
+    }
+    imp_scene_destroy(scene);
+}
+
+/* A lamp |X|, |Y| < b at the height 2 over a floor; a half plane x < 0 at the height 1. From (x, y)
+ * its edge is seen at X = -x, and shifted by e at 2 e - x. */
+static double penumbra(double x, double y, double b)
+{
+    const double h = 2, c = sqrt(h * h + 4 * x * x);
+    double sum = 0;
+    if (fabs(x) > b) return 0;
+    for (int k = 0; k < 2; k++) {
+        const double s = (k ? b : -b) - y;
+        sum += (k ? 1 : -1) *
+               (s / (2 * c * c * (c * c + s * s)) + atan(s / c) / (2 * c * c * c));
+    }
+    return -2 * h * h * sum;
+}
+
+static void penumbra_test(void)
+{
+    enum { N = 400 };
+    struct tap_stat d[6] = {{0, 0, 0}};
+    imp_scene *scene;
+    scene_of("<float name='fov' value='80'/><transform name='to_world'><lookat "
+             "origin='.1,.1,.9' target='.1,.1,0' up='0,1,0'/></transform>",
+             16,
+             FLOOR
+             "<shape type='rectangle' id='screen'><transform name='to_world'><scale "
+             "x='5' y='10'/><translate x='-5' z='1'/></transform><bsdf "
+             "type='diffuse'><rgb name='reflectance' value='0'/></bsdf></shape>"
+             "<shape type='rectangle'><transform name='to_world'><scale value='.5'/>"
+             "<rotate x='1' angle='180'/><translate z='2'/></transform><emitter "
+             "type='area'><rgb name='radiance' value='5'/></emitter></shape>",
+             "screen.pose", &scene);
+    gradient_of(scene, "screen.pose", 256, 16, d);
+    const double half = .9 * tan(40 * IMP_PI / 180);
+    double ref = 0;
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++)
+            ref += penumbra(.1 + half * (2 * (i + .5) / N - 1),
+                            .1 + half * (2 * (j + .5) / N - 1), .5) /
+                   ((double)N * N);
+    ref *= 5 * .6 / IMP_PI;
+    tap_z(&d[0], ref, 3e-3 * fabs(ref), "the penumbra of a half plane that moves");
+    imp_scene_destroy(scene);
+}
+
+/* A bright square of sides 2 at the distance 4 has the area (W/(4 t))^2 pixels. */
+static void view_test(void)
+{
+    struct tap_stat d[1] = {{0, 0, 0}};
+    imp_scene *scene;
+    scene_of("<float name='fov' value='50'/><transform name='to_world'><lookat "
+             "origin='.1,-.2,4' target='.1,-.2,0' up='.3,1,0'/></transform>",
+             24,
+             "<shape type='rectangle'><emitter type='area'><rgb name='radiance' "
+             "value='5'/></emitter></shape>",
+             "camera.x_fov", &scene);
+    gradient_of(scene, "camera.x_fov", 256, 16, d);
+    const double t = tan(25 * IMP_PI / 180);
+    const double ref = -5 / (16 * t * t) * (1 + t * t) / t * (IMP_PI / 180);
+    tap_z(&d[0], ref, 3e-3 * fabs(ref), "a square's picture by the field of view");
+    imp_scene_destroy(scene);
+}
+
+/* A black ball before a sky: seen straight on it is a disc of the area pi f^2 r^2/(D^2 - r^2). */
+static void ball_test(void)
+{
+    struct tap_stat place[6] = {{0, 0, 0}}, scale[1] = {{0, 0, 0}};
+    imp_scene *scene;
+    scene_of("<float name='fov' value='50'/><transform name='to_world'><lookat "
+             "origin='.1,-.2,4' target='.1,-.2,0' up='.3,1,0'/></transform>",
+             24,
+             "<emitter type='constant'><rgb name='radiance' value='5'/></emitter><shape "
+             "type='sphere' id='ball'><float name='radius' value='.8'/><point "
+             "name='center' x='.1' y='-.2' z='0'/><bsdf type='diffuse'><rgb "
+             "name='reflectance' value='0'/></bsdf></shape>",
+             "ball.pose", &scene);
+    test_must(ctx, imp_scene_add_geometry(scene, "ball.scale"));
+    gradient_of(scene, "ball.pose", 64, 16, place);
+    gradient_of(scene, "ball.scale", 64, 16, scale);
+    const double t = tan(25 * IMP_PI / 180), D = 4, r = .8, q = D * D - r * r;
+    const double film = -5 * IMP_PI / (4 * t * t);
+    /* All of the circle brings the same. */
+    tap_near(place[2].mean, film * 2 * r * r * D / (q * q), 1e-6, 0,
+             "solid angle of a ball that nears");
+    tap_near(scale[0].mean, film * 2 * r * r * D * D / (q * q), 1e-6, 0,
+             "and that grows");
+    imp_scene_destroy(scene);
+}
+
+/* Radiance at a film position of the unit square. */
+static double radiance_at(const struct imp_tracer *t, struct imp_arena *arena, double x,
+                          double y, uint64_t number)
+{
+    const double lens[2] = {.5, .5}, w = t->sensor->film.width;
+    const struct imp_arena_mark mark = imp__arena_mark(arena);
+    struct imp_sensor_ray ray;
+    struct imp_walk walk;
+    t->sensor->ops->ray(t->sensor, x * w, y * w, lens, &ray);
+    imp__walk_along(t, arena, imp__key(99, 1, number), &ray, 0, &walk);
+    imp__arena_rewind(arena, mark);
+    return walk.L[0];
+}
+
+/* What a film position x sees moves by T'(x): d mean = flux of L T' through the frame - mean of
+ * L div T'. Field of view: T' = r (x - 1/2), about the axis: T' = (1/2 - y, x - 1/2) up to a sign of
+ * axes that point left and up. */
+static void frame_test(void)
+{
+    enum { GROUPS = 32, DRAWS = 16000 };
+    struct tap_stat view[1] = {{0, 0, 0}}, turn[6] = {{0, 0, 0}}, flux[2] = {{0, 0, 0}};
+    imp_scene *scene;
+    struct imp_arena arena;
+    scene_of("<float name='fov' value='50'/><transform name='to_world'><lookat "
+             "origin='.5,-3.5,2' target='.3,0,.4' up='0,0,1'/></transform>",
+             24,
+             FLOOR "<shape type='cube'><transform name='to_world'><scale value='.5'/>"
+                   "<rotate x='1' y='1' angle='25'/><translate z='1.1'/></transform>"
+                   "</shape><shape type='rectangle'><transform name='to_world'><scale "
+                   "value='.5'/><rotate x='1' angle='170'/><translate x='.6' z='3.5'/>"
+                   "</transform><emitter type='area'><rgb name='radiance' value='9'/>"
+                   "</emitter></shape>",
+             "camera.x_fov", &scene);
+    test_must(ctx, imp_scene_add_geometry(scene, "camera.pose"));
+    gradient_of(scene, "camera.x_fov", 64, 16, view);
+    gradient_of(scene, "camera.pose", 256, 24, turn);
+    struct imp_tracer t = {.scene = scene,
+                           .integrator = imp__walk_integrator(scene),
+                           .sensor = scene->sensors[0],
+                           .seed = 5};
+    const double tangent = tan(25 * IMP_PI / 180);
+    const double rate = (1 + tangent * tangent) / (2 * tangent) * (IMP_PI / 180);
+    imp__arena_init(&arena, ctx);
+    for (int g = 0; g < GROUPS; g++) {
+        double sum[2] = {0};
+        for (int i = 0; i < DRAWS; i++) {
+            const uint64_t number = (uint64_t)g * DRAWS + (uint64_t)i;
+            const struct imp_key key = imp__key(98, 2, number);
+            const double a = imp__u01(key, 0), b = imp__u01(key, 1);
+            const int side = i % 4;
+            const double x = side < 2 ? side : a, y = side < 2 ? a : side - 2;
+            const double border = radiance_at(&t, &arena, x, y, 2 * number),
+                         inside = radiance_at(&t, &arena, a, b, 2 * number + 1);
+            const double nx = side < 2 ? 2 * x - 1 : 0, ny = side < 2 ? 0 : 2 * y - 1;
+            /* Four sides of length 1, each by a quarter of the draws. */
+            sum[0] += rate * (4 * border * .5 - 2 * inside) / DRAWS;
+            sum[1] += 4 * border * ((.5 - y) * nx + (x - .5) * ny) / DRAWS;
+        }
+        tap_add(&flux[0], sum[0]);
+        tap_add(&flux[1], sum[1]);
+    }
+    const imp_v3 axis = imp__normalize(imp__v3(-.2, 3.5, -1.6));
+    double about = 0, about2 = 0;
+    for (int k = 0; k < 3; k++) {
+        about += axis[k] * turn[3 + k].mean;
+        about2 += imp__sqr(axis[k] * tap_se(&turn[3 + k]));
+    }
+    const double z =
+        (view[0].mean - flux[0].mean) / hypot(tap_se(&view[0]), tap_se(&flux[0]));
+    tap_ok(fabs(z) < 3.5 && tap_se(&view[0]) < 0.01 * fabs(flux[0].mean) &&
+               tap_se(&flux[0]) < 0.05 * fabs(flux[0].mean),
+           "field of view and the frame's flux # %.6f se %.6f, %.6f se %.6f z %.2f",
+           view[0].mean, tap_se(&view[0]), flux[0].mean, tap_se(&flux[0]), z);
+    const double size = 0.5 * fabs(flux[0].mean) / rate;
+    const double y = (about - flux[1].mean) / hypot(sqrt(about2), tap_se(&flux[1]));
+    tap_ok(
+        fabs(y) < 3.5 && sqrt(about2) < 0.05 * size && tap_se(&flux[1]) < 0.05 * size,
+        "a turn about the axis and the frame's flux # %.6f se %.6f, %.6f se %.6f z %.2f",
+        about, sqrt(about2), flux[1].mean, tap_se(&flux[1]), y);
+    imp__arena_free(&arena);
+    imp_scene_destroy(scene);
+}
+
+int main(void)
+{
+    ctx = test_context(2);
+    point_test();
+    rectangle_test();
+    penumbra_test();
+    view_test();
+    ball_test();
+    frame_test();
+    imp_context_destroy(ctx);
+    return tap_done();
+}

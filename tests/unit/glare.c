@@ -1,0 +1,138 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Guth's position index against the first row of the table of CIE 117-1995 (T/R = 0), and glare
+ * ratings against the formula worked by hand, from numbers and from a scene. */
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include <importon/rooms.h>
+#include <math.h>
+
+static imp_context *ctx;
+
+static void positions(void)
+{
+    static const double row[] = {1.00, 1.26, 1.53, 1.90, 2.35, 2.86,
+                                 3.50, 4.20, 5.00, 6.00, 7.00};
+    double worst = 0;
+    for (int k = 0; k <= 10; k++)
+        worst = fmax(worst,
+                     fabs(imp_guth_position(0, atan(k / 10.) * 180 / M_PI) / row[k] - 1));
+    /* UGR takes 16 log10 p: 4 % are .27 at the worst point of the row, and .1 of it mostly. */
+    tap_ok(worst < .04, "position indices of CIE 117, T/R = 0: within %.1f %%",
+           100 * worst);
+    tap_ok(imp_guth_position(90, 0) == 1 && isnan(imp_guth_position(-1, 0)) &&
+               isnan(imp_guth_position(0, 91)),
+           "angles out of their range");
+}
+
+static void formula(void)
+{
+    /* .25/25 (10000^2 x .002/4 + 5000^2 x .004/1) = .01 x 150000 = 1500: 8 log10 = 25.409 */
+    const struct imp_glare_source s[] = {{10000, .002, 2}, {5000, .004, 1}};
+    double ugr;
+    test_must(ctx, imp_ugr(ctx, 25, 2, s, &ugr));
+    tap_near(ugr, 25.40873, 1e-6, 0, "two sources");
+    test_must(ctx, imp_ugr(ctx, 25, 0, NULL, &ugr));
+    tap_ok(isinf(ugr) && ugr < 0, "none");
+    const struct imp_glare_source bad = {-1, 1, 1};
+    tap_ok(imp_ugr(ctx, 0, 1, s, &ugr) == IMP_E_ARG &&
+               imp_ugr(ctx, 1, 1, &bad, &ugr) == IMP_E_ARG,
+           "no background, a negative luminance");
+}
+
+#define LAMP(name, y, more)                                                              \
+    "<emitter type='ies' id='" name "'><string name='filename' value='" IMP_SCENES       \
+    "/lamps/opal.ldt'/>" more "<transform name='to_world'><rotate x='1' angle='180'/>"   \
+    "<translate y='" y "' z='2.7'/></transform></emitter>"
+/* Two observers at (-1, 0, 1.2) and (1, 0, 1.2), who look along y under a sky of 20 cd/m^2. */
+#define EYES(facing)                                                                     \
+    "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' "          \
+    "value='2'/></integrator><emitter type='constant'><rgb name='radiance' value='20'/>" \
+    "</emitter><shape type='rectangle'><transform name='to_world'><scale x='2'/>"        \
+    "<translate z='1.2'/></transform><sensor type='irradiancemeter' id='eyes'><boolean " \
+    "name='virtual' value='true'/><string name='at' value='points'/>" facing             \
+    "<string name='units' value='photometric'/><film type='hdrfilm'><integer "           \
+    "name='width' value='2'/><integer name='height' value='1'/></film></sensor></shape>"
+#define SIGHT "<vector name='facing' x='0' y='1' z='0'/>"
+
+/* By hand: opening 1.15 m x .28 m, 4000 lm of a cosine. d = (1, 3, 1.5) from the eye. */
+static double by_hand(double background, double dimming)
+{
+    const double r2 = 1 + 9 + 2.25, r = sqrt(r2), cosine = 1.5 / r;
+    const double area = 1.15 * .28 * cosine, intensity = dimming * 4000 / M_PI * cosine;
+    const double a = atan2(1, 1.5) * 180 / M_PI, b = acos(3 / r) * 180 / M_PI;
+    const double p = imp_guth_position(a, b), l = intensity / area;
+    return 8 * log10(.25 / background * l * l * area / r2 / (p * p));
+}
+
+static void scenes(void)
+{
+    static const struct {
+        const char *what, *rest;
+        double dimming; /* 0: nothing is seen */
+    } rows[] = {
+        {"a luminaire", LAMP("a", "3", ""), 1},
+        {"dimmed", LAMP("a", "3", "<float name='dimming' value='.25'/>"), .25},
+        {"behind the observer", LAMP("a", "-3", ""), 0},
+        {"hidden",
+         LAMP("a", "3", "") "<shape type='sphere'><transform name='to_world'><scale "
+                            "value='.2'/><translate y='2.9' z='2.6'/></transform>"
+                            "<bsdf type='diffuse'><rgb name='reflectance' value='0'/>"
+                            "</bsdf></shape>",
+         0}};
+    for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
+        char xml[4096];
+        struct imp_run run = IMP_RUN_INIT;
+        double ugr[2], se[2];
+        snprintf(xml, sizeof xml, EYES(SIGHT) "%s</scene>", rows[k].rest);
+        imp_scene *s = test_scene_text(ctx, xml, IMP_MONO);
+        run.spp = 65536;
+        test_must(ctx, imp_grid_glare(s, &run, ugr, se));
+        const double truth =
+            rows[k].dimming > 0 ? by_hand(20, rows[k].dimming) : -INFINITY;
+        for (int e = 0; e < 2; e++)
+            tap_ok(truth == ugr[e] ||
+                       (fabs(ugr[e] - truth) < .2 && se[e] > 0 && se[e] < .05),
+                   "%s, observer %d: %.3f +- %.3f, by hand %.3f", rows[k].what, e, ugr[e],
+                   se[e], truth);
+        imp_scene_destroy(s);
+    }
+}
+
+static void refused(void)
+{
+    static const char *const facing[] = {"", "<vector name='facing' x='0' y='1' z='1'/>"};
+    for (int k = 0; k < 2; k++) {
+        char xml[4096];
+        double ugr[2];
+        snprintf(xml, sizeof xml, EYES("%s") LAMP("a", "3", "") "</scene>", facing[k]);
+        imp_scene *s = test_scene_text(ctx, xml, IMP_MONO);
+        tap_ok(imp_grid_glare(s, NULL, ugr, NULL) == IMP_E_ARG &&
+                   strstr(imp_last_error(ctx), "no line of sight"),
+               "%s", imp_last_error(ctx));
+        imp_scene_destroy(s);
+    }
+    char xml[4096];
+    double ugr[2];
+    snprintf(xml, sizeof xml,
+             EYES(SIGHT) "<emitter type='ies' id='spot'><string name='filename' "
+                         "value='" IMP_SCENES "/lamps/downlight.ies'/><transform "
+                         "name='to_world'><rotate x='1' angle='180'/><translate y='3' "
+                         "z='2.7'/></transform></emitter></scene>");
+    imp_scene *s = test_scene_text(ctx, xml, IMP_MONO);
+    tap_ok(imp_grid_glare(s, NULL, ugr, NULL) == IMP_E_ARG &&
+               strstr(imp_last_error(ctx), "'spot' has no luminous area"),
+           "%s", imp_last_error(ctx));
+    imp_scene_destroy(s);
+}
+
+int main(void)
+{
+    ctx = test_context(0);
+    positions();
+    formula();
+    scenes();
+    refused();
+    imp_context_destroy(ctx);
+    return tap_done();
+}
