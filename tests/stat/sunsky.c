@@ -277,12 +277,11 @@ static void contracts(imp_context *ctx)
         size_t n, failed = 0;
         char found[200] = "";
         imp_scene *s = test_scene_text(ctx, row[k].scene, row[k].mode);
-        struct imp_selftest_options o = IMP_SELFTEST_OPTIONS_INIT;
-        o.size = sizeof o;
-        o.samples = 200000;
-        test_must(ctx, imp_selftest(s, IMP_SELFTEST_LIGHT, &o, &rows, &n));
+        test_must(ctx, imp_selftest(s, IMP_SELFTEST_LIGHT, NULL, &rows, &n));
         for (size_t i = 0; i < n; i++) {
-            if (rows[i].ok != 0) continue; /* too few draws decide nothing */
+            /* A sun at the horizon is half behind it: its draws end before 2 % are seen. */
+            const bool open = rows[i].ok == IMP_VERDICT_OPEN;
+            if (rows[i].ok == 1 || (k == 2 && open && rows[i].sees < 0.07)) continue;
             failed++;
             snprintf(found, sizeof found, "%s %g for %g", rows[i].contract, rows[i].value,
                      rows[i].reference);
