@@ -27,7 +27,8 @@ static unsigned byte(struct bytes *b)
 }
 
 /* Mostly ordinary numbers in [0, 1.6]. Bounds of 1e12 end walks by their number of tentative
- * collisions. */
+ * collisions, a million each: so that such a scene ends within seconds, few walks are asked
+ * for. */
 static double number(struct bytes *b)
 {
     static const double odd[] = {0, -1, 1e-12, 1e2, NAN, INFINITY, 1e12, 1};
@@ -155,8 +156,8 @@ static void scene(struct bytes *b, struct text *t, int fd[3][3])
         "target='0,0,0' up='0,1,0'/></transform>",
         how & 1 ? "orthographic" : "perspective", how & 2 ? 3. : number(b) - .5);
     if (how & 4) put(t, "<ref id='m%d'/>", byte(b) % media);
-    put(t, "<film type='hdrfilm'><integer name='width' value='3'/><integer "
-           "name='height' value='3'/><rfilter type='box'/></film></sensor>");
+    put(t, "<film type='hdrfilm'><integer name='width' value='2'/><integer "
+           "name='height' value='1'/><rfilter type='box'/></film></sensor>");
     if (how & 8) put(t, "<emitter type='constant'/>");
     if (how & 16)
         put(t,
@@ -173,7 +174,7 @@ static void use(imp_scene *s)
     struct imp_estimate v;
     imp_film *film = NULL;
     imp_problem *p = NULL;
-    run.spp = 4;
+    run.spp = 2;
     run.drop_budget = 1; /* absurd scenes drop walks; that is not what is looked for */
     if (imp_render(s, &run, &film) != IMP_OK) return;
     struct imp_film_info info = {.size = sizeof info};
