@@ -4,7 +4,6 @@
  * derivation). */
 #include "base/arguments.h"
 #include "math/stat.h"
-#include "math/vec.h"
 #include <importon/rooms.h>
 #include <math.h>
 
