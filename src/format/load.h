@@ -34,6 +34,8 @@ enum imp_status imp__graded_finish(struct imp_scene *scene);
 /* survey.c: IMP_E_UNSUPPORTED if two or more plugins do not exist, with all of them; a
  * lenient scene goes on without. References are resolved. */
 enum imp_status imp__survey(struct imp_scene *scene);
+/* survey.c: one line of what a lenient scene goes on without (imp_scene_info); copied. */
+enum imp_status imp__lost_add(struct imp_scene *scene, const char *text);
 /* survey.c: when objects are made, a warning for what is declared and used nowhere, and for
  * what was not read of a lenient scene. */
 enum imp_status imp__survey_finish(struct imp_scene *scene);

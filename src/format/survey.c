@@ -112,8 +112,7 @@ struct missing {
     int others; /* of the same type */
 };
 
-/* One line of what a lenient scene goes on without (imp_scene_info). */
-static enum imp_status lost_add(struct imp_scene *scene, const char *text)
+enum imp_status imp__lost_add(struct imp_scene *scene, const char *text)
 {
     char *copy = imp__arena_strdup(&scene->arena, text);
     if (!copy) return imp__error(scene->ctx, IMP_E_NOMEM, "scene: out of memory");
@@ -146,7 +145,7 @@ static enum imp_status note(struct survey *s, const struct imp_node *node,
                  node->tag, node->type, node->id ? " '" : "", node->id ? node->id : "",
                  node->id ? "'" : "", lost, near ? " (did you mean '" : "",
                  near ? near : "", near ? "'?)" : "");
-        return lost_add(s->scene, text);
+        return imp__lost_add(s->scene, text);
     }
     for (int k = 0; k < s->n; k++) {
         struct missing *m = s->type[k];
@@ -329,7 +328,7 @@ static enum imp_status unused_list(struct imp_scene *scene, struct imp_node *nod
         snprintf(text, sizeof text, "%s: %s %s: no property '%s'; it is left out%s%s%s",
                  where, node->tag, node->type, p->name, near ? " (did you mean '" : "",
                  near ? near : "", near ? "'?)" : "");
-        IMP_TRY(lost_add(scene, text));
+        IMP_TRY(imp__lost_add(scene, text));
     }
     for (size_t i = 0; i < node->n_children; i++) {
         const struct imp_child *c = &node->children[i];
@@ -341,7 +340,7 @@ static enum imp_status unused_list(struct imp_scene *scene, struct imp_node *nod
                      where, node->tag, node->type, c->node->tag, c->name ? " '" : "",
                      c->name ? c->name : "", c->name ? "'" : "",
                      near ? " (did you mean '" : "", near ? near : "", near ? "'?)" : "");
-            IMP_TRY(lost_add(scene, text));
+            IMP_TRY(imp__lost_add(scene, text));
         }
         IMP_TRY(unused_list(scene, c->node));
     }

@@ -4,6 +4,7 @@
  * and column. */
 #include "xml.h"
 #include "hooks.h"
+#include "import.h"
 #include "search.h"
 #include <expat.h>
 #include <stdio.h>
@@ -161,6 +162,22 @@ out:
     return st;
 }
 
+/* A file of another program: in the root of a scene, or with parent NULL the scene. */
+static enum imp_status foreign_read(struct xml_reader *r, imp__import_read *read,
+                                    const struct imp_bytes *text, const char *name,
+                                    struct imp_node *parent)
+{
+    const struct imp__import in = {.scene = r->scene,
+                                   .tree = &r->tree,
+                                   .params = &r->params,
+                                   .scratch = &r->scratch,
+                                   .parent = parent,
+                                   .name = imp__arena_strdup(&r->scene->arena, name),
+                                   .text = text};
+    if (!in.name) return imp__error(r->ctx, IMP_E_NOMEM, "%s: out of memory", name);
+    return read(&in);
+}
+
 static bool same_file(const char *a, const char *b)
 {
     struct stat x, y;
@@ -181,6 +198,7 @@ void imp__xml_include(struct xml_file *f, const char *name, const char *slot,
         imp__xml_fail_here(f, st);
         return;
     }
+    imp__import_read *read = imp__import_of(path);
     int depth = 1;
     for (const struct xml_file *up = f; up; up = up->includer, depth++)
         if (same_file(up->name, path)) {
@@ -205,8 +223,12 @@ void imp__xml_include(struct xml_file *f, const char *name, const char *slot,
     if (r->n_bytes > XML_FILE_BYTES_MAX)
         imp__xml_fail(f, IMP_E_SCENE, "included files are larger than %zu bytes together",
                       XML_FILE_BYTES_MAX);
+    else if (read && strcmp(parent->tag, "scene") != 0)
+        imp__xml_fail(f, IMP_E_SCENE, "'%s' belongs in the scene, not in a %s", path,
+                      parent->tag);
     else /* the message names the place inside */
-        imp__xml_fail_placed(f, file_read(r, f, &text, path, parent, slot));
+        imp__xml_fail_placed(f, read ? foreign_read(r, read, &text, path, parent)
+                                     : file_read(r, f, &text, path, parent, slot));
     imp__bytes_free(r->ctx, &text);
 }
 
@@ -219,7 +241,9 @@ enum imp_status imp__xml_read(struct imp_scene *scene, const struct imp_bytes *t
     imp__arena_init(&r.scratch, scene->ctx);
     IMP_TRY(imp__params_init(&r.params, scene->ctx, options ? options->defines : NULL,
                              options ? options->n_defines : 0));
-    IMP_TRY(file_read(&r, NULL, text, name, NULL, NULL));
+    if (imp__import_of(name))
+        IMP_TRY(foreign_read(&r, imp__import_scene, text, name, NULL));
+    else IMP_TRY(file_read(&r, NULL, text, name, NULL, NULL));
     const char *meant, *unused = imp__params_unused(&r.params, &meant);
     if (unused)
         IMP_TRY(imp__loc_error(r.ctx, r.tree.root->loc, IMP_E_SCENE,
