@@ -179,14 +179,14 @@ enum imp_status imp__unread_add(const struct imp__import *in, struct imp__unread
     char text[1024];
     u->n++;
     if (in->scene->lenient) {
-        snprintf(text, sizeof text, "%s:%d: %s: not supported; %s", in->name, line, what,
-                 lost);
+        snprintf(text, sizeof text, "%s:%d:1: %s: not supported; %s", in->name, line,
+                 what, lost);
         return imp__lost_add(in->scene, text);
     }
     if (u->listed < u->n - 1) return IMP_OK; /* one before had no room */
     const size_t used = strlen(u->text);
     const int n = u->n == 1
-                      ? snprintf(text, sizeof text, "%s:%d: %s", in->name, line, what)
+                      ? snprintf(text, sizeof text, "%s:%d:1: %s", in->name, line, what)
                       : snprintf(text, sizeof text, ", %s (line %d)", what, line);
     if (n < 0 || used + (size_t)n + 1 > sizeof u->text) return IMP_OK;
     memcpy(u->text + used, text, (size_t)n + 1);

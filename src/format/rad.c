@@ -214,7 +214,7 @@ enum imp_status imp__rad_read(const struct imp__import *in)
         IMP_TRY(primitive_read(&r));
     }
     if (r.n_empty)
-        imp__warn(r.ctx, "%s:%d: %zu polygon%s without area: left out", in->name,
+        imp__warn(r.ctx, "%s:%d:1: %zu polygon%s without area: left out", in->name,
                   r.first_empty, r.n_empty, r.n_empty > 1 ? "s, this the first," : "");
     IMP_TRY(imp__unread_finish(in, &r.unread));
     IMP_TRY(imp__rad_meshes_finish(&r));

@@ -77,7 +77,7 @@ static enum imp_status replaced(struct rad_reader *r, const struct rule *rule,
     enum imp_status st = IMP_OK;
     struct rad_modifier *m;
     const struct rad_modifier copy = *by; /* declare() may give the name of `by` */
-    imp__warn(r->ctx, "%s:%d: %s '%s': its alternative, '%s', takes its place",
+    imp__warn(r->ctx, "%s:%d:1: %s '%s': its alternative, '%s', takes its place",
               r->in->name, r->p.line, rule->type, r->p.id, copy.id);
     IMP_TRY(declare(r, &m));
     const char *id = m->id;
@@ -265,12 +265,12 @@ static void light_said(struct rad_reader *r, struct rad_modifier *m)
     m->reported = true;
     if (strcmp(m->type, "glow") == 0)
         imp__warn(r->ctx,
-                  "%s:%d: glow '%s': an area light for all that it is seen from; its "
+                  "%s:%d:1: glow '%s': an area light for all that it is seen from; its "
                   "radius, %g, is not used",
                   r->in->name, m->line, m->id, m->value[3]);
     if (strcmp(m->type, "illum") == 0)
-        imp__warn(r->ctx, "%s:%d: illum '%s': an area light, which is seen", r->in->name,
-                  m->line, m->id);
+        imp__warn(r->ctx, "%s:%d:1: illum '%s': an area light, which is seen",
+                  r->in->name, m->line, m->id);
 }
 
 enum imp_status imp__rad_look(struct rad_reader *r, struct rad_modifier **out,
