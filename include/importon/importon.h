@@ -396,16 +396,16 @@ struct imp_load_options {
 };
 #define IMP_LOAD_OPTIONS_INIT IMP_INIT_ZERO(struct imp_load_options)
 
-/** Load a scene file (Mitsuba 3 XML). The scene is committed and ready. `options` may be
- * NULL.
+/** Load a scene file (Mitsuba 3 XML; Radiance's, if its name ends in .rad, docs/import.md).
+ * The scene is committed and ready. `options` may be NULL.
  * @return IMP_OK; IMP_E_IO; IMP_E_SCENE (message begins file:line:column); IMP_E_NOMEM;
  *         IMP_E_UNSUPPORTED for a plugin this version does not have. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_load(imp_context *context, const char *path,
                const struct imp_load_options *options, imp_scene **out);
 
-/** The same from memory: xml [length]; `name` is the file in messages, files are
- * searched for in the working folder.
+/** The same from memory: xml [length]; `name` is the file in messages, and
+ * its ending says what is read; files are searched for in the working folder.
  * @return as imp_scene_load. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_load_string(imp_context *context, const char *xml, size_t length,

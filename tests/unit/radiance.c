@@ -362,6 +362,34 @@ static void refused(const char *rad, enum imp_status status, const char *message
     imp_scene_destroy(s);
 }
 
+/* -vs moves the view to the right, -vl up: what was in the middle is left, below. */
+static void shifts(void)
+{
+    static const struct {
+        const char *option;
+        int x, y; /* of the pixel that sees the lamp */
+    } cases[] = {{"", 4, 4}, {"-vs .25", 2, 4}, {"-vl .25", 4, 6}};
+    for (int k = 0; k < 3; k++) {
+        char view[100];
+        snprintf(view, sizeof view, "-vp .1 -5 -.1 -vd 0 1 0 -vh 40 -vv 40 %s",
+                 cases[k].option);
+        imp_scene *s =
+            seen("void light l 0 0 3 1 1 1\nl sphere a 0 0 4 .3 0 -.3 .1", view);
+        struct imp_run run = IMP_RUN_INIT;
+        imp_film *f;
+        int best = 0;
+        run.spp = 64;
+        test_must(ctx, imp_render(s, &run, &f));
+        for (int i = 0; i < 64; i++)
+            if (f->mean[i * f->channels] > f->mean[best * f->channels]) best = i;
+        tap_ok(best % 8 == cases[k].x && best / 8 == cases[k].y,
+               "view '%s': the lamp at pixel %d, %d", cases[k].option, best % 8,
+               best / 8);
+        imp_film_destroy(f);
+        imp_scene_destroy(s);
+    }
+}
+
 static void refusals(void)
 {
     imp_scene *s;
@@ -441,6 +469,7 @@ int main(void)
     same_bits();
     polygons();
     names();
+    shifts();
     refusals();
     memory();
     imp_context_destroy(ctx);
