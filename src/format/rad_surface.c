@@ -3,7 +3,7 @@
  * Radiance's surfaces as shapes (docs/import.md). Polygons of one material are one mesh,
  * those that are lights each a shape with the light's name, so that each is a lamp. */
 #include "mesh_file.h"
-#include "polygon.h"
+#include "polygon_cut.h"
 #include "rad.h"
 #include <math.h>
 #include <stdio.h>

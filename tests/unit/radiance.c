@@ -3,7 +3,7 @@
  * Radiance's scenes: illuminances and radiances in closed form, materials against Radiance's
  * formulas, the bits of the same room in XML, polygons cut into triangles, and what is refused. */
 #include "base/film.h"
-#include "format/polygon.h"
+#include "format/polygon_cut.h"
 #include "imp_fail_alloc.h"
 #include "imp_scene.h"
 #include "imp_tap.h"

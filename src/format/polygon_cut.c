@@ -4,7 +4,7 @@
  * (Meisters 1975). Every triangle has the orientation of the polygon; then the sum of their
  * indicator functions is the winding number, which is 1 in a simple polygon: they cover it
  * once. */
-#include "polygon.h"
+#include "polygon_cut.h"
 #include <math.h>
 
 struct flat { /* projected along the largest component of the normal, anticlockwise */

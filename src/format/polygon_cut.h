@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Plane polygons cut into triangles. */
-#ifndef IMP_FORMAT_POLYGON_H
-#define IMP_FORMAT_POLYGON_H
+#ifndef IMP_FORMAT_POLYGON_CUT_H
+#define IMP_FORMAT_POLYGON_CUT_H
 
 #include "base/context.h"
 #include <stdint.h>
