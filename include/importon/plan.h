@@ -125,6 +125,10 @@ imp_plan(imp_problem *problem, const struct imp_plan_candidate *candidates, size
          const struct imp_plan_options *options, const struct imp_run *run,
          const struct imp_plan_result **result);
 
+/** Name of a lamp, as imp_plan_candidate.lamps has it, 0 <= lamp < imp_scene_info.n_emitters. It
+ * belongs to the scene. NULL if there is none. */
+IMP_API const char *imp_plan_lamp(const imp_scene *scene, int lamp);
+
 /** Which pixels of a candidate tell of which number: per pixel and channel the information
  * w J_i^2 on each number, and sum over i, j of pull_ij w J_i J_j, its share in a criterion. Products
  * are of two independent derivative pictures, so that sums over pixels are the

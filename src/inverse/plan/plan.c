@@ -4,7 +4,6 @@
  * apart, the chosen set, and what no candidate determines. */
 #include "base/arguments.h"
 #include "inverse/fit/fit.h"
-#include "math/linalg.h"
 #include "math/rng.h"
 #include "plan_arguments.h"
 #include "walk/run/run.h"
@@ -12,9 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define SEED       0x91a2
-#define LOOSE_LEAST 3   /* information on a direction, in those of the prior (plan.h: half) */
-#define APART      2   /* errors of a difference by which candidates can be told apart */
+#define SEED  0x91a2
+#define APART 2 /* errors of a difference by which candidates can be told apart */
 
 struct plan {
     struct imp_problem *p, *blank;
@@ -98,7 +96,8 @@ static enum imp_status errors_give(const struct plan *plan, const double *C,
     if (!se) return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
     for (size_t k = 0; k < n; k++) {
         const double part = sqrt(C[k * n + k]);
-        se[k] = !plan->given[k] && part > 0.5 ? INFINITY
+        se[k] = !plan->given[k] && part * part > 1. / (1 + IMP_PLAN_LOOSE)
+                    ? INFINITY
                                               : part * plan->width[k] * plan->unit[k];
     }
     *out = se;
@@ -268,11 +267,8 @@ static enum imp_status loose_find(struct plan *plan, struct imp_plan_result *r)
     if (!all || !loose)
         IMP_TRY(imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan"));
     for (size_t i = 0; i < plan->n_all; i++) all[i] = &plan->data[i];
-    IMP_TRY(imp__plan_evaluate(&plan->model, all, plan->n_all, &plan->then));
-    for (size_t j = 0; j < n; j++)
-        if (plan->then.loose[j] || plan->then.values[j] < LOOSE_LEAST)
-            memcpy(loose + r->n_loose++ * n, plan->then.vectors + j * n,
-                   n * sizeof *loose);
+    IMP_TRY(imp__plan_loose(&plan->model, all, plan->n_all, &plan->then, loose,
+                            &r->n_loose));
     r->loose = loose;
 out:
     imp__release(plan->p->ctx, all);

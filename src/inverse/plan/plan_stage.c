@@ -4,6 +4,7 @@
  * as it was afterwards. A lamp that is off has a factor of 0 over time (math/course.h), so that
  * its light and the derivatives with respect to its numbers are 0, whatever these are, and no
  * light samples. */
+#include "base/arguments.h"
 #include "inverse/problem/match.h"
 #include "math/course.h"
 #include "math/motion.h"
@@ -123,6 +124,13 @@ static enum imp_status lamps_switch(struct imp_scene *scene,
     for (size_t k = 0; k < n; k++)
         scene->light_cdf[k] = sum > 0 ? scene->light_cdf[k] / sum : 0;
     return IMP_OK;
+}
+
+const char *imp_plan_lamp(const imp_scene *scene, int lamp)
+{
+    IMP_REQUIRE_OR(NULL, scene, "scene", NULL);
+    if (!scene->committed || lamp < 0 || lamp >= scene->n_emitters) return NULL;
+    return scene->emitters[lamp]->name;
 }
 
 enum imp_status imp__stage_begin(struct imp_scene *scene,

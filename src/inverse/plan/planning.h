@@ -76,6 +76,13 @@ void imp__plan_known_destroy(imp_context *ctx, struct imp__plan_known *k);
 enum imp_status imp__plan_evaluate(const struct imp__plan_model *m,
                                    const struct imp__plan_data *const *items,
                                    size_t n_items, struct imp__plan_known *out);
+/* Information on a direction, in those of its prior, below which it is not determined: the
+ * posterior is half as wide as the prior. */
+#define IMP_PLAN_LOOSE 3
+/* out [n][n]: *r unit vectors that span what `items` leave undetermined. Uses up `scratch`. */
+enum imp_status imp__plan_loose(const struct imp__plan_model *m,
+                                const struct imp__plan_data *const *items, size_t n_items,
+                                struct imp__plan_known *scratch, double *out, size_t *r);
 /* out [IMP_DEVIATIONS]: trace of pull times the deviations of an item. */
 void imp__plan_deviations(size_t n, const double *pull, const struct imp__plan_data *item,
                           double *out);
