@@ -122,7 +122,7 @@ static enum imp_status matrix_give(const struct plan *plan, const double *A, int
 
 /* What the deviations of a candidate, and of what we have, do to its worth. */
 struct moves {
-    double own[IMP_DEVIATIONS];
+    double own[IMP_DEVIATIONS], hidden;
     double *have; /* [n_have][IMP_DEVIATIONS] */
 };
 
@@ -135,6 +135,7 @@ static enum imp_status moves_find(const struct plan *plan,
     if (!m->have) return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
     imp__plan_deviations(n, plan->then.pull, item, m->own);
     for (int g = 0; g < IMP_DEVIATIONS; g++) m->own[g] /= cost;
+    m->hidden = plan->then.hidden / cost;
     for (size_t i = 0; i < plan->n_have; i++) {
         double before[IMP_DEVIATIONS], *after = m->have + i * IMP_DEVIATIONS;
         imp__plan_deviations(n, plan->today.pull, plan->have[i], before);
@@ -148,7 +149,7 @@ static enum imp_status moves_find(const struct plan *plan,
 static double moves_variance(const struct plan *plan, const struct moves *a,
                              const struct moves *b)
 {
-    double sum = 0;
+    double sum = imp__sqr(a->hidden) + (b ? imp__sqr(b->hidden) : 0);
     for (int g = 0; g < IMP_DEVIATIONS; g++)
         sum += imp__sqr(a->own[g]) + (b ? imp__sqr(b->own[g]) : 0);
     for (size_t i = 0; i < plan->n_have * IMP_DEVIATIONS; i++)
@@ -167,7 +168,8 @@ static enum imp_status row_make(struct plan *plan, size_t k, struct imp_plan_row
     IMP_TRY(imp__plan_evaluate(&plan->model, plan->have, plan->n_have + 1, &plan->then));
     IMP_TRY(moves_find(plan, d, plan->cost[k], moves));
     const double gain = plan->then.phi - plan->today.phi;
-    const double se = sqrt(moves_variance(plan, moves, NULL));
+    const double se = hypot(sqrt(moves_variance(plan, moves, NULL)),
+                            plan->today.hidden / plan->cost[k]);
     *row = (struct imp_plan_row){.size = sizeof *row,
                                  .candidate = plan->open_at[k],
                                  .gain = {gain, se * plan->cost[k], 1},

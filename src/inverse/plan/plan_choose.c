@@ -88,11 +88,12 @@ static enum imp_status exchange(struct search *s, double *now, bool *improved)
 
 /* The gain's error: changes of what we have move today's, too. */
 static void error_of(const struct search *s, const double *pull_today,
+                     double hidden_today,
                      struct imp_estimate *gain)
 {
     const struct imp__plan_choice *c = s->c;
     const size_t n = c->model->n;
-    double square = 0;
+    double square = s->known->hidden * s->known->hidden + hidden_today * hidden_today;
     for (size_t i = 0; i < c->n_have + s->n_chosen; i++) {
         double after[IMP_DEVIATIONS], before[IMP_DEVIATIONS] = {0};
         imp__plan_deviations(n, s->known->pull, s->set[i], after);
@@ -110,7 +111,7 @@ enum imp_status imp__plan_choose(const struct imp__plan_choice *c, size_t *chose
     imp_context *ctx = c->model->ctx;
     const size_t n = c->model->n;
     struct search s = {.c = c, .chosen = chosen, .known = known};
-    double *today = imp__alloc(ctx, n * n, sizeof *today), now;
+    double *today = imp__alloc(ctx, n * n, sizeof *today), now, hidden;
     bool more = true;
     s.set = imp__alloc(ctx, c->n_have + c->n + 1, sizeof *s.set);
     s.in = imp__alloc(ctx, c->n + 1, sizeof *s.in);
@@ -119,6 +120,7 @@ enum imp_status imp__plan_choose(const struct imp__plan_choice *c, size_t *chose
     for (size_t i = 0; i < c->n_have; i++) s.set[i] = c->have[i];
     IMP_TRY(imp__plan_evaluate(c->model, s.set, c->n_have, known));
     s.today = known->phi;
+    hidden = known->hidden;
     memcpy(today, known->pull, n * n * sizeof *today);
     now = 0;
     while (more && s.n_chosen < c->take) {
@@ -133,7 +135,7 @@ enum imp_status imp__plan_choose(const struct imp__plan_choice *c, size_t *chose
     if (s.n_chosen > 0) IMP_TRY(score(&s, &now));
     else IMP_TRY(imp__plan_evaluate(c->model, s.set, c->n_have, known));
     *gain = (struct imp_estimate){known->phi - s.today, 0, 1};
-    error_of(&s, today, gain);
+    error_of(&s, today, hidden, gain);
     *n_chosen = s.n_chosen;
 out:
     imp__release(ctx, s.set);

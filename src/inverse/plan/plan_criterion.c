@@ -10,7 +10,9 @@
  *     D:  phi = -log det(C_SS)/m      d phi = tr( C_SS^-1 (Q dA Q)_SS )/m
  *     A:  phi = -log tr(C_SS)         d phi = tr( (Q dA Q)_SS ) / tr(C_SS)
  *
- * Q the part of C in the directions that count. */
+ * Q the part of C in the directions that count. In the others phi could be larger, with eigenvalues
+ * of lambda + 2 se: with |v_S|^2 the part of such a direction in the wanted numbers, by
+ * |v_S|^2 log(1 + lambda + 2 se)/m, or, of traces, |v_S|^2 (1 - 1/(1 + lambda + 2 se))/tr(C_SS). */
 #include "math/linalg.h"
 #include "planning.h"
 #include <math.h>
@@ -64,14 +66,19 @@ static enum imp_status spectrum(const struct imp__plan_model *m,
         for (size_t k = 0; k < n * n; k++) A[k] += items[i]->H[k];
     if (!imp__eigen_symmetric(n, A, out->values, out->vectors))
         return imp__error(m->ctx, IMP_E_NUMERIC, "the information is not finite");
+    out->hidden = 0;
     for (size_t j = 0; j < n; j++) {
         const double *v = out->vectors + j * n;
-        double square = 0;
+        double square = 0, part = 0;
         for (size_t i = 0; i < n_items; i++)
             for (size_t g = 0; g < IMP_DEVIATIONS; g++)
                 square += pow(along(n, items[i]->deviations + g * n * n, v), 2);
         out->loose[j] = !(out->values[j] > 2 * sqrt(square)) ||
                         out->values[j] <= RELATIVE_LEAST * out->values[n - 1];
+        if (!out->loose[j]) continue;
+        const double most = fmax(out->values[j], 0) + 2 * sqrt(square);
+        for (size_t a = 0; a < m->n_of; a++) part += v[m->of[a]] * v[m->of[a]];
+        out->hidden += part * (m->kind == IMP_PLAN_A ? most / (1 + most) : log1p(most));
     }
     return IMP_OK;
 }
@@ -122,6 +129,7 @@ enum imp_status imp__plan_evaluate(const struct imp__plan_model *m,
     }
     if (m->kind == IMP_PLAN_A) {
         out->phi = -log(trace);
+        out->hidden /= trace;
         pull_add(m, Q, NULL, 1 / trace, work, out->pull);
         return IMP_OK;
     }
@@ -131,6 +139,7 @@ enum imp_status imp__plan_evaluate(const struct imp__plan_model *m,
     for (size_t a = 0; a < s; a++) log_det += 2 * log(L[a * s + a]);
     imp__cholesky_inverse(s, L, B);
     out->phi = -log_det / (double)s;
+    out->hidden /= (double)s;
     pull_add(m, Q, B, 1 / (double)s, work, out->pull);
     return IMP_OK;
 }

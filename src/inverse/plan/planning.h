@@ -67,6 +67,8 @@ struct imp__plan_known {
                                  row k belongs to values[k] */
     bool *loose;              /* [n] values[k] is not above twice its error: it counts as 0 */
     double phi; /* of the criterion: the gain is what it grows by */
+    double hidden; /* what phi would grow by if loose directions had as much as their errors allow:
+                      not known, and so a part of the error of phi */
     double *work;
 };
 enum imp_status imp__plan_known_create(const struct imp__plan_model *m,
