@@ -74,7 +74,7 @@ struct imp_plan_row {
     size_t candidate; /**< index */
     struct imp_estimate gain;
     struct imp_estimate worth; /**< gain over cost, by which rows are ordered */
-    /** Number of its group, from 0: the worths of a group are within twice the errors of their
+    /** Number of its group, from 0: the worths of a group are within 2.5 times the errors of their
      * differences from its first one. */
     size_t group;
     double lit; /**< fraction of its values that count: neither saturated nor 0 */

@@ -12,7 +12,7 @@
 #include <string.h>
 
 #define SEED  0x91a2
-#define APART 2 /* errors of a difference by which candidates can be told apart */
+#define APART 2.5 /* errors of a difference by which candidates can be told apart */
 
 struct plan {
     struct imp_problem *p, *blank;
