@@ -120,7 +120,7 @@ static int run_plan(int n, char **operand)
 const struct command command_plan = {
     {"plan",
      "SCENE",
-     "which picture to take next: candidates by the intervals they would leave",
+     "which picture to take next, by the intervals that it would leave",
      {options, options_candidates, options_numbers, options_params, options_run,
       options_scene, options_file, options_general},
      1,

@@ -70,7 +70,7 @@ static void print_group(const struct plan_answer *a)
             printf("%s%s", k == 0 ? "" : k + 1 == n ? " or " : ", ",
                    name(a, row(a, k)->candidate));
     }
-    printf(". More --spp may tell.\n");
+    printf(row(a, 0)->gain.se > 0 ? ". More --spp may tell.\n" : ".\n");
 }
 
 /* ---- Numbers ----------------------------------------------------------------------------- */
@@ -143,8 +143,8 @@ static void print_loose(const struct plan_answer *a)
     const struct imp_plan_result *r = a->result;
     char text[600];
     if (r->n_loose == 0) return;
-    printf("\nnot determined by all candidates together (combinations, in units of the "
-           "priors):\n");
+    printf("\nnot determined by all candidates together (combinations, in parts "
+           "of ranges or sizes):\n");
     for (size_t j = 0; j < r->n_loose; j++) {
         bool any = false;
         for (size_t i = 0; i < r->n; i++) {

@@ -352,6 +352,8 @@ int candidates_make(struct candidates *out)
     if (!rc && places > 0 && (cli.sensor < 0 || cli.sensor >= n_sensors()))
         rc = cli_error(EXIT_USAGE, "--sensor %d: the scene has %d", cli.sensor,
                        n_sensors());
+    if (!rc && places == 0 && o.up)
+        rc = cli_error(EXIT_USAGE, "--up is of --sphere and --path");
     if (!rc && (places == 0 || o.sensors)) rc = sensors_add(out, have, n_have);
     if (!rc && o.sphere) rc = sphere_add(out);
     if (!rc && o.path) rc = path_add(out);

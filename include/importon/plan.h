@@ -91,6 +91,7 @@ struct imp_plan_result {
     size_t n;            /**< of x */
     const double *today; /**< [n] as imp_plan_row.se, without new pictures */
     const double *prior; /**< [n] in units of x, as used */
+    const double *span;  /**< [n] the numbers' large changes, in units of x */
     size_t n_rows;
     const struct imp_plan_row *rows; /**< [n_rows] the best first (IMP_ROW) */
     size_t n_chosen;
@@ -98,7 +99,7 @@ struct imp_plan_result {
     struct imp_estimate chosen_gain;
     const double *chosen_se; /**< [n] after all chosen ones */
     /** Combinations that stay undetermined with all candidates together: [n_loose][n] unit
-     * vectors, numbers in units of `prior`. */
+     * vectors, numbers in units of `span`. */
     size_t n_loose;
     const double *loose;
 };

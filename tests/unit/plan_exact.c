@@ -182,7 +182,7 @@ static void product(void)
     const struct imp_plan_result *r = planned(p, &c, 1, &o);
     tap_ok(r->n == 2 && r->n_loose == 1, "a product leaves one direction");
     const size_t lamp = test_variable(p, scene, ctx, "one.radiance.value"), e = 1 - lamp;
-    const double dL = r->loose[lamp] * r->prior[lamp], de = r->loose[e] * r->prior[e];
+    const double dL = r->loose[lamp] * r->span[lamp], de = r->loose[e] * r->span[e];
     tap_near(0.5 * dL + 3 * de, 0, 0, 1e-6 * fabs(dL), "that leaves the product");
     tap_near(r->rows[0].information[lamp * 2 + e], 25 / 1e-4 * 0.5 * 3, 1e-5, 0,
              "information of both");

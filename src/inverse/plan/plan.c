@@ -22,6 +22,7 @@ struct plan {
     size_t n_all, n;              /* candidates; variables */
     struct imp_run run;
     double *width;       /* [n] standard deviations of the priors */
+    double *span;        /* [n] large changes */
     const bool *given;   /* [n] they are the caller's */
     double *unit;        /* [n] own unit over that of x */
     struct imp__plan_model model;
@@ -259,6 +260,21 @@ static enum imp_status set_choose(struct plan *plan, struct imp_plan_result *r)
     return errors_give(plan, plan->then.C, &r->chosen_se);
 }
 
+/* From the units of the priors to those of large changes. */
+static void data_rescale(const struct plan *plan, struct imp__plan_data *d)
+{
+    const size_t n = plan->n;
+    for (size_t g = 0; g <= IMP_DEVIATIONS; g++) {
+        double *A = g ? d->deviations + (g - 1) * n * n : d->H;
+        for (size_t k = 0; k < n; k++)
+            for (size_t l = 0; l < n; l++)
+                A[k * n + l] *= plan->span[k] / plan->width[k] *
+                                (plan->span[l] / plan->width[l]);
+    }
+}
+
+/* The last one to use the informations, whose units it changes: what pictures determine is
+ * not a matter of priors. */
 static enum imp_status loose_find(struct plan *plan, struct imp_plan_result *r)
 {
     enum imp_status st = IMP_OK;
@@ -268,7 +284,10 @@ static enum imp_status loose_find(struct plan *plan, struct imp_plan_result *r)
     double *loose = imp__arena_array(plan->arena, n * n, sizeof *loose);
     if (!all || !loose)
         IMP_TRY(imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan"));
-    for (size_t i = 0; i < plan->n_all; i++) all[i] = &plan->data[i];
+    for (size_t i = 0; i < plan->n_all; i++) {
+        data_rescale(plan, &plan->data[i]);
+        all[i] = &plan->data[i];
+    }
     IMP_TRY(imp__plan_loose(&plan->model, all, plan->n_all, &plan->then, loose,
                             &r->n_loose));
     r->loose = loose;
@@ -286,9 +305,10 @@ static enum imp_status widths_set(struct plan *plan)
     double *x = imp__alloc(p->ctx, n, sizeof *x);
     bool *given = imp__arena_array(plan->arena, n, sizeof *given);
     plan->width = imp__arena_array(plan->arena, n, sizeof *plan->width);
+    plan->span = imp__arena_array(plan->arena, n, sizeof *plan->span);
     plan->unit = imp__arena_array(plan->arena, n, sizeof *plan->unit);
     enum imp_status st = IMP_OK;
-    if (!x || !given || !plan->width || !plan->unit)
+    if (!x || !given || !plan->width || !plan->span || !plan->unit)
         IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for a plan"));
     imp_problem_get_x(p, x);
     for (size_t b = 0; b < p->n_blocks; b++) {
@@ -300,8 +320,8 @@ static enum imp_status widths_set(struct plan *plan)
             const size_t k = block->first + e;
             const double own = plan->o.prior ? plan->o.prior[k] : 0;
             given[k] = own > 0;
-            plan->width[k] =
-                own > 0 ? own : imp__large_change(p, block, e, x[k], square);
+            plan->span[k] = imp__large_change(p, block, e, x[k], square);
+            plan->width[k] = given[k] ? own : plan->span[k];
             plan->unit[k] = block->log ? exp(x[k]) : 1;
         }
     }
@@ -396,6 +416,7 @@ enum imp_status imp_plan(imp_problem *problem,
     r->size = sizeof *r;
     r->n = plan.n;
     r->prior = plan.width;
+    r->span = plan.span;
     IMP_TRY(imp__plan_evaluate(&plan.model, plan.have, plan.n_have, &plan.today));
     IMP_TRY(errors_give(&plan, plan.today.C, &r->today));
     IMP_TRY(rows_make(&plan, r));

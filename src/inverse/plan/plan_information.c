@@ -136,9 +136,8 @@ enum imp_status imp__plan_target(struct imp_problem *p, struct imp_problem *blan
     t.desc.scale = 1;
     t.desc.epsilon = 1;
     if (film->channels < t.desc.channels)
-        IMP_TRY(imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                           "%s: its film has %d of %d channels",
-                           imp__plan_name(p->scene, c), film->channels, t.desc.channels));
+        IMP_TRY(imp__error(p->ctx, IMP_E_UNSUPPORTED, "its film has %d of %d channels",
+                           film->channels, t.desc.channels));
     const size_t pixels = (size_t)film->width * (size_t)film->height;
     t.pixels = imp__alloc(p->ctx, pixels * (size_t)t.desc.channels, sizeof *t.pixels);
     t.precision =

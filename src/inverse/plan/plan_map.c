@@ -88,8 +88,7 @@ enum imp_status imp_plan_map(imp_problem *problem,
     const struct imp_sensor *s = problem->scene->sensors[c->sensor];
     if (s->film.n_responses > 0 || (s->gain && s->gain->fitted_gamma))
         IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
-                           "%s: maps are of films without response curves and gamma",
-                           imp__plan_name(problem->scene, c)));
+                           "maps are of films without response curves and gamma"));
     made = imp__alloc(ctx, 3 * n + 1, sizeof *made);
     x = imp__alloc(ctx, 2 * n, sizeof *x);
     if (!made || !x) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for maps"));

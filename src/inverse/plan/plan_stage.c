@@ -40,8 +40,8 @@ static struct imp_mat4 placement_of(const struct imp_scene *scene,
 static enum imp_status cannot_move(const struct imp_scene *scene,
                                    const struct imp_plan_candidate *c, const char *why)
 {
-    return imp__error(scene->ctx, IMP_E_UNSUPPORTED, "%s: '%s' cannot be placed: %s",
-                      imp__plan_name(scene, c), scene->sensors[c->sensor]->name, why);
+    return imp__error(scene->ctx, IMP_E_UNSUPPORTED, "sensor '%s' cannot be placed: %s",
+                      scene->sensors[c->sensor]->name, why);
 }
 
 /* The rigid map from where the camera stands and looks to where it shall. */
@@ -66,8 +66,7 @@ static enum imp_status sensor_move(struct imp_scene *scene,
                      imp__v3(c->target[0], c->target[1], c->target[2]),
                      imp__v3(c->up[0], c->up[1], c->up[2]), &to))
         return imp__error(scene->ctx, IMP_E_ARG,
-                          "%s: origin and target are equal, or up is parallel to the view",
-                          imp__plan_name(scene, c));
+                          "origin and target are equal, or up is parallel to the view");
     stage->rest = imp__alloc_raw(scene->ctx, 1, s->ops->object_size);
     if (!stage->rest) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a plan");
     memcpy(stage->rest, s->self, s->ops->object_size);
@@ -119,8 +118,7 @@ static enum imp_status lamps_switch(struct imp_scene *scene,
         scene->light_cdf[k] = sum;
     }
     if (on == 0)
-        return imp__error(scene->ctx, IMP_E_ARG, "%s: there is no lamp '%s'",
-                          imp__plan_name(scene, c), c->lamps);
+        return imp__error(scene->ctx, IMP_E_ARG, "there is no lamp '%s'", c->lamps);
     for (size_t k = 0; k < n; k++)
         scene->light_cdf[k] = sum > 0 ? scene->light_cdf[k] / sum : 0;
     return IMP_OK;
