@@ -24,14 +24,16 @@ static const struct arg_option options[] = {
     {ARG_INT, 'k', "take", "K", "choose K candidates together (default 1)", &o.take, 1,
      4096, NULL},
     {ARG_NUMBER, 0, "budget", "COST",
-     "choose as many as these costs allow (with --take: at most K)", &o.budget, 1e-12, 1e12,
-     NULL},
+     "choose as many as these costs allow (with --take: at most K)", &o.budget, 1e-12,
+     1e12, NULL},
     {ARG_CHOICE, 0, "criterion", "WORD",
-     "D (default): determinant of the covariance; A: sum of the variances",
-     &o.criterion, 0, 0, criterion_words},
+     "D (default): determinant of the covariance; A: sum of the variances", &o.criterion,
+     0, 0, criterion_words},
     {ARG_TEXT, 0, "noise", "KEY=V[,..]",
-     "of a value v at time of exposure 1: variance read^2 + shot v + (relative v)^2; with "
-     "white=V values from V on are saturated (default: read is 1 % of the picture's mean)",
+     "of a value v at time of exposure 1: variance read^2 + shot v + (relative v)^2; "
+     "with "
+     "white=V values from V on are saturated (default: read is 1 % of the picture's "
+     "mean)",
      &o.noise, 0, 0, NULL},
     {ARG_TEXT, 0, "map", "PREFIX",
      "pictures of which pixels of the best candidate tell of which number, and of the "
@@ -62,16 +64,17 @@ static int noise_read(struct imp_plan_options *p)
             if (met) at = end + (*end == ',');
         }
         if (!met)
-            return cli_error(EXIT_USAGE,
-                             "--noise %s: expected read=V, shot=V, relative=V or white=V, "
-                             "with commas between them, none negative",
-                             o.noise);
+            return cli_error(
+                EXIT_USAGE,
+                "--noise %s: expected read=V, shot=V, relative=V or white=V, "
+                "with commas between them, none negative",
+                o.noise);
     }
-    return !o.noise || noisy
-               ? 0
-               : cli_error(EXIT_USAGE, "--noise %s: pictures without noise have "
-                                       "intervals of 0; give read, shot or relative",
-                           o.noise);
+    return !o.noise || noisy ? 0
+                             : cli_error(EXIT_USAGE,
+                                         "--noise %s: pictures without noise have "
+                                         "intervals of 0; give read, shot or relative",
+                                         o.noise);
 }
 
 static int plan(imp_problem *problem, const struct candidates *c,

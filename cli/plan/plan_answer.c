@@ -49,9 +49,8 @@ static void print_ranking(const struct plan_answer *a)
         const bool first = k == 0 || row(a, k - 1)->group != r->group;
         char rank[24] = "=";
         if (first) snprintf(rank, sizeof rank, "%zu", k + 1);
-        printf("%-4s  %-*s  %-11.4g %-9.2g x %-*.3g", rank, width,
-               name(a, r->candidate), r->gain.value, r->gain.se, costs ? 7 : 0,
-               exp(-0.5 * r->gain.value));
+        printf("%-4s  %-*s  %-11.4g %-9.2g x %-*.3g", rank, width, name(a, r->candidate),
+               r->gain.value, r->gain.se, costs ? 7 : 0, exp(-0.5 * r->gain.value));
         if (costs) printf("  %-9.4g %.4g", cost(a, r->candidate), r->worth.value);
         printf("%s\n", r->lit == 0 ? "  all black or saturated" : "");
     }
@@ -67,7 +66,10 @@ static void print_group(const struct plan_answer *a)
     if (n <= 8) {
         printf(": ");
         for (size_t k = 0; k < n; k++)
-            printf("%s%s", k == 0 ? "" : k + 1 == n ? " or " : ", ",
+            printf("%s%s",
+                   k == 0       ? ""
+                   : k + 1 == n ? " or "
+                                : ", ",
                    name(a, row(a, k)->candidate));
     }
     printf(row(a, 0)->gain.se > 0 ? ". More --spp may tell.\n" : ".\n");
@@ -116,8 +118,7 @@ static void print_numbers(const struct plan_answer *a)
 static double total_cost(const struct plan_answer *a)
 {
     double sum = 0;
-    for (size_t k = 0; k < a->result->n_chosen; k++)
-        sum += cost(a, a->result->chosen[k]);
+    for (size_t k = 0; k < a->result->n_chosen; k++) sum += cost(a, a->result->chosen[k]);
     return sum;
 }
 
@@ -219,8 +220,7 @@ static void chosen_json(struct json *j, const struct plan_answer *a)
     const struct imp_plan_result *r = a->result;
     json_object(j, "chosen");
     json_array(j, "candidates");
-    for (size_t k = 0; k < r->n_chosen; k++)
-        json_integer(j, NULL, (int64_t)r->chosen[k]);
+    for (size_t k = 0; k < r->n_chosen; k++) json_integer(j, NULL, (int64_t)r->chosen[k]);
     json_end_array(j);
     json_array(j, "names");
     for (size_t k = 0; k < r->n_chosen; k++) json_text(j, NULL, name(a, r->chosen[k]));

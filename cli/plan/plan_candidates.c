@@ -16,10 +16,10 @@ static struct {
 
 const struct arg_option options_candidates[] = {
     {ARG_TEXT, 0, "sensors", "N[,N..]",
-     "candidates: these sensors (default: all that --have does not name)", &o.sensors, 0, 0,
-     NULL},
-    {ARG_TEXT, 0, "have", "N[,N..]",
-     "pictures of these sensors have been taken already", &o.have, 0, 0, NULL},
+     "candidates: these sensors (default: all that --have does not name)", &o.sensors, 0,
+     0, NULL},
+    {ARG_TEXT, 0, "have", "N[,N..]", "pictures of these sensors have been taken already",
+     &o.have, 0, 0, NULL},
     {ARG_TEXT, 0, "sphere", "X,Y,Z,R,N[,A,B]",
      "candidates: the camera of --sensor at N places, R from X,Y,Z, which it looks at, "
      "between the elevations A and B (default 0,90 degrees)",
@@ -37,7 +37,8 @@ const struct arg_option options_candidates[] = {
     {ARG_TEXT, 0, "exposures", "T[,T..]",
      "each candidate with these times of exposure (default 1)", &o.exposures, 0, 0, NULL},
     {ARG_LIST, 0, "cost", "C|C+C1*t|GLOB=C",
-     "cost of a picture, with its time of exposure t, or of the candidates of these names "
+     "cost of a picture, with its time of exposure t, or of the candidates of these "
+     "names "
      "(default 1)",
      &o.costs, 0, 0, NULL},
     {0}};
@@ -204,8 +205,8 @@ static int sphere_add(struct candidates *out)
         const double s = s0 + (s1 - s0) * (i + 0.5) / v[4], c = sqrt(1 - s * s);
         double at[3];
         for (int k = 0; k < 3; k++)
-            at[k] = v[k] + v[3] * (s * up[k] + c * (cos(golden * i) * x[k] +
-                                                    sin(golden * i) * y[k]));
+            at[k] = v[k] + v[3] * (s * up[k] +
+                                   c * (cos(golden * i) * x[k] + sin(golden * i) * y[k]));
         place_add(out, at, v, up, NULL);
     }
     return 0;
@@ -223,15 +224,16 @@ static int path_add(struct candidates *out)
         number++;
         if (!*at || *at == '#') continue;
         *name = 0;
-        const int n = sscanf(at, "%lf %lf %lf %lf %lf %lf %255[^\r\n]", &v[0], &v[1], &v[2],
-                             &v[3], &v[4], &v[5], name);
+        const int n = sscanf(at, "%lf %lf %lf %lf %lf %lf %255[^\r\n]", &v[0], &v[1],
+                             &v[2], &v[3], &v[4], &v[5], name);
         bool fine = n >= 6;
         for (int k = 0; k < 6 && fine; k++) fine = isfinite(v[k]);
         if (!fine)
-            rc = cli_error(EXIT_USAGE,
-                           "%s:%d: expected a place X Y Z, a point to look at X Y Z, and a "
-                           "name or none",
-                           o.path, number);
+            rc = cli_error(
+                EXIT_USAGE,
+                "%s:%d: expected a place X Y Z, a point to look at X Y Z, and a "
+                "name or none",
+                o.path, number);
         else if (out->n - out->n_have >= LIST_MAX)
             rc = cli_error(EXIT_USAGE, "%s: more than %d places", o.path, LIST_MAX);
         else place_add(out, v, v + 3, up, name);
@@ -287,7 +289,8 @@ static int lamps_multiply(struct candidates *out)
     for (size_t i = 0; i < o.lamps.n; i++)
         if (strcmp(o.lamps.item[i], "each") != 0) lamps[n++] = o.lamps.item[i];
         else
-            for (int k = 0; k < info.n_emitters; k++) lamps[n++] = imp_plan_lamp(cli.scene, k);
+            for (int k = 0; k < info.n_emitters; k++)
+                lamps[n++] = imp_plan_lamp(cli.scene, k);
     const int rc = n ? 0 : cli_error(EXIT_USAGE, "--lamps each: the scene has no lamp");
     if (!rc) multiply(out, n, lamps_set, lamps);
     free(lamps);
@@ -339,8 +342,7 @@ static int cost_set(struct candidates *out, const char *text)
         out->c[k].cost = fixed + per * (out->c[k].time > 0 ? out->c[k].time : 1);
         met++;
     }
-    return met ? 0
-               : cli_error(EXIT_USAGE, "--cost %s: no candidate has this name", text);
+    return met ? 0 : cli_error(EXIT_USAGE, "--cost %s: no candidate has this name", text);
 }
 
 int candidates_make(struct candidates *out)
@@ -361,8 +363,7 @@ int candidates_make(struct candidates *out)
         rc = cli_error(EXIT_USAGE,
                        "plan: there are no candidates: the scene has %d sensor%s%s; see "
                        "--sphere and --path",
-                       n_sensors(), plural(n_sensors()),
-                       o.have ? ", all of --have" : "");
+                       n_sensors(), plural(n_sensors()), o.have ? ", all of --have" : "");
     if (!rc) rc = lamps_multiply(out);
     if (!rc) rc = exposures_multiply(out);
     for (size_t i = 0; i < o.costs.n && !rc; i++) rc = cost_set(out, o.costs.item[i]);

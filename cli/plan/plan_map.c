@@ -45,9 +45,8 @@ int plan_map_write(const char *prefix, imp_problem *problem, const struct plan_a
     imp_film **films = cli_alloc(p->n + 1, sizeof *films);
     struct imp_run run = *a->run;
     int rc = 0;
-    const enum imp_status st =
-        imp_plan_map(problem, &a->candidates->c[best->candidate], a->options, &run,
-                     best->pull, films);
+    const enum imp_status st = imp_plan_map(problem, &a->candidates->c[best->candidate],
+                                            a->options, &run, best->pull, films);
     if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
     for (size_t i = 0; i <= p->n && !rc; i++) {
         char *path = map_path(prefix, p, i);

@@ -13,7 +13,8 @@ static struct arg_list of, prior;
 
 const struct arg_option options_numbers[] = {
     {ARG_LIST, 0, "of", "NAME",
-     "the wanted numbers: a parameter, one of its numbers NAME[K], or a pattern (default: "
+     "the wanted numbers: a parameter, one of its numbers NAME[K], or a pattern "
+     "(default: "
      "all active ones)",
      &of, 0, 0, NULL},
     {ARG_LIST, 0, "prior", "NAME=SIGMA",
@@ -28,7 +29,8 @@ const struct block *plan_number_block(const struct plan_numbers *p, size_t i)
     return &p->blocks[b];
 }
 
-const char *plan_number_name(const struct plan_numbers *p, size_t i, char *text, size_t size)
+const char *plan_number_name(const struct plan_numbers *p, size_t i, char *text,
+                             size_t size)
 {
     const struct block *b = plan_number_block(p, i);
     return cli_number_row(&b->info, i - b->first, text, size);
@@ -54,13 +56,13 @@ static int not_active(const char *option, const char *name, const struct plan_nu
 {
     size_t index;
     char first[600];
-    if (!strpbrk(name, "*?[") &&
-        imp_scene_find_param(cli.scene, name, &index) != IMP_OK)
+    if (!strpbrk(name, "*?[") && imp_scene_find_param(cli.scene, name, &index) != IMP_OK)
         return cli_fail(IMP_E_ARG, cli.scene_path);
-    return cli_error(EXIT_USAGE,
-                     "--%s %s: none of the %zu active numbers has this name (the first is "
-                     "%s)",
-                     option, name, p->n, plan_number_name(p, 0, first, sizeof first));
+    return cli_error(
+        EXIT_USAGE,
+        "--%s %s: none of the %zu active numbers has this name (the first is "
+        "%s)",
+        option, name, p->n, plan_number_name(p, 0, first, sizeof first));
 }
 
 static int of_read(struct plan_numbers *p)
@@ -87,10 +89,11 @@ static int prior_read(struct plan_numbers *p)
         const double sigma = equal ? strtod(equal + 1, &end) : NAN;
         size_t met = 0;
         if (!equal || end == equal + 1 || *end || !(sigma > 0) || !isfinite(sigma))
-            return cli_error(EXIT_USAGE,
-                             "--prior %s: expected NAME=SIGMA, a standard deviation above "
-                             "0",
-                             text);
+            return cli_error(
+                EXIT_USAGE,
+                "--prior %s: expected NAME=SIGMA, a standard deviation above "
+                "0",
+                text);
         snprintf(name, sizeof name, "%.*s", (int)(equal - text), text);
         for (size_t i = 0; i < p->n; i++) {
             const struct block *b = plan_number_block(p, i);

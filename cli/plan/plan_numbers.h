@@ -22,7 +22,8 @@ struct plan_numbers {
 int plan_numbers_make(const imp_problem *problem, struct plan_numbers *out);
 void plan_numbers_free(struct plan_numbers *p);
 /* "name[element]" of number i, as a fit prints it. */
-const char *plan_number_name(const struct plan_numbers *p, size_t i, char *text, size_t size);
+const char *plan_number_name(const struct plan_numbers *p, size_t i, char *text,
+                             size_t size);
 const struct block *plan_number_block(const struct plan_numbers *p, size_t i);
 
 #endif

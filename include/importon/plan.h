@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon: which measurement next. Of pictures that could be taken, each with its noise and
- * cost, those are found that shrink the intervals of the active numbers most (optimal design
- * of experiments: Fedorov 1972; Chaloner and Verdinelli, Statist. Sci. 10, 1995).
+ * importon: which measurement next. Candidates, pictures that could be taken, each with its noise
+ * and cost, are ranked by how much they would shrink the intervals of the active numbers (optimal
+ * design of experiments: Fedorov 1972; Chaloner and Verdinelli, Statist. Sci. 10, 1995).
  *
  * A picture with Jacobian J and noise of variance 1/W adds the information I = J^T W J to what is
  * known, which is estimated without bias from one pass of walks at the scene's present
  * parameters (docs/estimators.md 15). With S_0 the covariance before (of priors and of what has
- * been measured) the covariance after the pictures of a set is (S_0^-1 + sum I)^-1, and
+ * been measured), the covariance after the pictures of a set is S = (S_0^-1 + sum I)^-1, and
  *
- *     gain   D:  mean of  log (variance before / variance after)  over the axes of the ellipsoid,
- *                (log det S_0 - log det S)/m, of the m wanted numbers
+ *     gain   D:  (log det S_0 - log det S)/m, of the m wanted numbers: the mean of
+ *                log (variance before / variance after) over the axes of the ellipsoid
  *            A:  log (trace S_0 / trace S), numbers in units of their priors
  *
- * so that intervals shrink to exp(-gain/2) of their lengths. Its Monte Carlo error is carried
- * from the entries of I to the gain and to the differences of gains, so that the ranking tells
- * which candidates it cannot tell apart. docs/do/plan.md, docs/estimators.md 23.
+ * so that intervals shrink to exp(-gain/2) of their lengths. The Monte Carlo error of the entries
+ * of I is carried to the gain and to the differences of gains: candidates whose gains it cannot
+ * tell apart form a group. docs/do/plan.md, docs/estimators.md 23.
  */
 #ifndef IMPORTON_PLAN_H
 #define IMPORTON_PLAN_H
@@ -56,15 +56,17 @@ enum imp_plan_criterion { IMP_PLAN_D = 0, IMP_PLAN_A };
 struct imp_plan_options {
     size_t size;
     enum imp_plan_criterion criterion;
-    const size_t *of;    /**< [n_of] indices in x of the wanted numbers; NULL: all */
+    const size_t *of; /**< [n_of] indices in x of the wanted numbers; NULL: all */
     size_t n_of;
     /** [imp_problem_n_variables] one standard deviation of what is known of a number without
      * pictures, in units of x; 0: its large change (its range where it has two bounds, else its
      * size), which keeps numbers that no picture determines from being infinite. NULL: all 0. */
     const double *prior;
     double read, shot, relative, white; /**< all 0: read is 1 % of each picture's mean */
-    size_t take;   /**< pictures to choose together; 0: 1, or with `budget` as many as fit in */
-    double budget; /**< of the chosen ones' costs; 0: none, and the gain over the cost counts */
+    size_t
+        take; /**< pictures to choose together; 0: 1, or with `budget` as many as fit in */
+    double
+        budget; /**< of the chosen ones' costs; 0: none, and the gain over the cost counts */
 };
 #define IMP_PLAN_OPTIONS_INIT IMP_INIT_ZERO(struct imp_plan_options)
 
@@ -95,7 +97,8 @@ struct imp_plan_result {
     size_t n_rows;
     const struct imp_plan_row *rows; /**< [n_rows] the best first (IMP_ROW) */
     size_t n_chosen;
-    const size_t *chosen; /**< [n_chosen] indices of candidates, in the order of their worth */
+    const size_t
+        *chosen; /**< [n_chosen] indices of candidates, in the order of their worth */
     struct imp_estimate chosen_gain;
     const double *chosen_se; /**< [n] after all chosen ones */
     /** Combinations that stay undetermined with all candidates together: [n_loose][n] unit

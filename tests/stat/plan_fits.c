@@ -16,7 +16,14 @@
 #include <importon/plan.h>
 #include <math.h>
 
-enum { SENSORS = 6, WIDTH = 16, HEIGHT = 12, PIXELS = WIDTH * HEIGHT, SPP = 64, LOOK = 64 };
+enum {
+    SENSORS = 6,
+    WIDTH = 16,
+    HEIGHT = 12,
+    PIXELS = WIDTH * HEIGHT,
+    SPP = 64,
+    LOOK = 64
+};
 enum { MATERIALS, LAMPS, CLOUD, MOVES, KINDS };
 #define NOISE 0.2 /* of a picture's mean */
 
@@ -60,21 +67,22 @@ static imp_scene *scene_make(int kind, struct imp_key key)
         "<bsdf type='diffuse' id='floor'><spectrum name='reflectance' value='%g'/></bsdf>"
         "<bsdf type='twosided'><bsdf type='%s' id='wall'>%s</bsdf></bsdf>"
         "<bsdf type='diffuse' id='ball'><spectrum name='reflectance' value='%g'/></bsdf>"
-        "<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' "
+        "<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate "
+        "x='1' "
         "angle='-90'/></transform><ref id='floor'/></shape>"
         "<shape type='rectangle'><transform name='to_world'><translate y='1' z='-1'/>"
         "</transform><ref id='wall'/></shape>"
         "<shape type='sphere'><point name='center' x='-.5' y='.4' z='.2'/><float "
         "name='radius' value='.4'/><ref id='ball'/></shape>",
         0.3 + 0.5 * imp__u01(key, 1), kind == MOVES ? "diffuse" : "roughconductor",
-        kind == MOVES ? "" : alpha,
-        0.2 + 0.6 * imp__u01(key, 3));
+        kind == MOVES ? "" : alpha, 0.2 + 0.6 * imp__u01(key, 3));
     n += snprintf(
         xml + n, sizeof xml - (size_t)n,
         "<shape type='rectangle'><transform name='to_world'><scale value='.4'/><rotate "
         "x='1' angle='90'/><translate x='%g' y='2.5'/></transform><emitter type='area' "
         "id='lamp'><spectrum name='radiance' value='%g'/></emitter></shape>"
-        "<emitter type='constant' id='sky'><spectrum name='radiance' value='%g'/></emitter>",
+        "<emitter type='constant' id='sky'><spectrum name='radiance' "
+        "value='%g'/></emitter>",
         imp__u01(key, 4) - 0.5, 5 + 10 * imp__u01(key, 5), 0.1 + 0.3 * imp__u01(key, 6));
     if (kind == CLOUD)
         n += snprintf(xml + n, sizeof xml - (size_t)n,
@@ -217,8 +225,8 @@ static void ranking_compare(const double *gain, const double *gain_se,
         if (se > 0) tap_add(&out->z2, pow((gain[k] - right[at[k]]) / se, 2));
         if (k == 0 || group[k] == group[0]) continue;
         out->claims++;
-        out->wrong += right[at[k]] - right[at[0]] >
-                      2 * hypot(right_se[at[0]], right_se[at[k]]);
+        out->wrong +=
+            right[at[k]] - right[at[0]] > 2 * hypot(right_se[at[0]], right_se[at[k]]);
     }
 }
 

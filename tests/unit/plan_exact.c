@@ -17,8 +17,8 @@
     "</film></sensor>"
 #define LAMP(id, x, radiance)                                                            \
     "<shape type='rectangle'><transform name='to_world'><translate x='" x                \
-    "'/></transform><emitter type='area' id='" id "'><spectrum name='radiance' value='"  \
-    radiance "'/></emitter></shape>"
+    "'/></transform><emitter type='area' id='" id                                        \
+    "'><spectrum name='radiance' value='" radiance "'/></emitter></shape>"
 
 static const char xml[] =
     "<scene version='3.0.0'><integrator type='path'/>" CAMERA("first", "0", "4", "")

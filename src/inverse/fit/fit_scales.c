@@ -42,8 +42,8 @@ void imp__fit_span_scale(const struct imp__block *b, const double *x,
     span_scale(b, square, span);
 }
 
-double imp__large_change(const struct imp_problem *p, const struct imp__block *b, size_t e,
-                         double start, double square)
+double imp__large_change(const struct imp_problem *p, const struct imp__block *b,
+                         size_t e, double start, double square)
 {
     const double pose = pose_scale(p, b, e);
     const double scale = pose > 0        ? pose

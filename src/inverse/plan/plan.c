@@ -21,15 +21,16 @@ struct plan {
     struct imp_plan_candidate *c; /* [n_all] */
     size_t n_all, n;              /* candidates; variables */
     struct imp_run run;
-    double *width;       /* [n] standard deviations of the priors */
-    double *span;        /* [n] large changes */
-    const bool *given;   /* [n] they are the caller's */
-    double *unit;        /* [n] own unit over that of x */
+    double *width;     /* [n] standard deviations of the priors */
+    double *span;      /* [n] large changes */
+    const bool *given; /* [n] they are the caller's */
+    double *unit;      /* [n] own unit over that of x */
     struct imp__plan_model model;
-    struct imp__plan_data *data;         /* [n_all] */
-    const struct imp__plan_data **have, **open; /* those that we have, and that are ranked */
-    size_t *open_at;                     /* [n_open] index of the candidate */
-    double *cost;                        /* [n_open] */
+    struct imp__plan_data *data; /* [n_all] */
+    const struct imp__plan_data **have,
+        **open;      /* those that we have, and that are ranked */
+    size_t *open_at; /* [n_open] index of the candidate */
+    double *cost;    /* [n_open] */
     size_t n_have, n_open;
     struct imp__plan_known today, then;
     size_t done; /* for progress */
@@ -61,29 +62,27 @@ static enum imp_status informations(struct plan *plan)
             run.progress_payload = plan;
         }
         d->H = imp__alloc(plan->p->ctx, (1 + IMP_DEVIATIONS) * n * n, sizeof *d->H);
-        if (!d->H)
-            return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
+        if (!d->H) return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
         d->deviations = d->H + n * n;
         plan->done = 2 * i;
-        const enum imp_status st =
-            imp__plan_information(plan->p, plan->blank, &plan->c[i], &plan->o, &run,
-                                  plan->width, d);
+        const enum imp_status st = imp__plan_information(
+            plan->p, plan->blank, &plan->c[i], &plan->o, &run, plan->width, d);
         if (st != IMP_OK)
             return st == IMP_CANCELLED
                        ? st
                        : imp__error_prefix(plan->p->ctx, st, "%s",
                                            imp__plan_name(plan->p->scene, &plan->c[i]));
         if (d->lit == 0)
-            imp__warn(plan->p->ctx,
-                      "%s: all values are 0 or saturated: it tells nothing",
+            imp__warn(plan->p->ctx, "%s: all values are 0 or saturated: it tells nothing",
                       imp__plan_name(plan->p->scene, &plan->c[i]));
         else lit += !plan->c[i].have;
     }
     return lit > 0 ? IMP_OK
-                   : imp__error(plan->p->ctx, IMP_E_ARG,
-                                "candidates: all values of all of them, %s the first, are 0 or "
-                                "saturated",
-                                imp__plan_name(plan->p->scene, &plan->c[0]));
+                   : imp__error(
+                         plan->p->ctx, IMP_E_ARG,
+                         "candidates: all values of all of them, %s the first, are 0 or "
+                         "saturated",
+                         imp__plan_name(plan->p->scene, &plan->c[0]));
 }
 
 /* ---- Rows -------------------------------------------------------------------------------- */
@@ -99,7 +98,7 @@ static enum imp_status errors_give(const struct plan *plan, const double *C,
         const double part = sqrt(C[k * n + k]);
         se[k] = !plan->given[k] && part * part > 1. / (1 + IMP_PLAN_LOOSE)
                     ? INFINITY
-                                              : part * plan->width[k] * plan->unit[k];
+                    : part * plan->width[k] * plan->unit[k];
     }
     *out = se;
     return IMP_OK;
@@ -253,8 +252,8 @@ static enum imp_status set_choose(struct plan *plan, struct imp_plan_result *r)
                                             .budget = plan->o.budget};
     size_t *chosen = imp__arena_array(plan->arena, plan->n_open, sizeof *chosen);
     if (!chosen) return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
-    IMP_CHECKED(imp__plan_choose(&choice, chosen, &r->n_chosen, &plan->then,
-                                 &r->chosen_gain));
+    IMP_CHECKED(
+        imp__plan_choose(&choice, chosen, &r->n_chosen, &plan->then, &r->chosen_gain));
     for (size_t k = 0; k < r->n_chosen; k++) chosen[k] = plan->open_at[chosen[k]];
     r->chosen = chosen;
     return errors_give(plan, plan->then.C, &r->chosen_se);
@@ -268,8 +267,8 @@ static void data_rescale(const struct plan *plan, struct imp__plan_data *d)
         double *A = g ? d->deviations + (g - 1) * n * n : d->H;
         for (size_t k = 0; k < n; k++)
             for (size_t l = 0; l < n; l++)
-                A[k * n + l] *= plan->span[k] / plan->width[k] *
-                                (plan->span[l] / plan->width[l]);
+                A[k * n + l] *=
+                    plan->span[k] / plan->width[k] * (plan->span[l] / plan->width[l]);
     }
 }
 
@@ -288,8 +287,8 @@ static enum imp_status loose_find(struct plan *plan, struct imp_plan_result *r)
         data_rescale(plan, &plan->data[i]);
         all[i] = &plan->data[i];
     }
-    IMP_TRY(imp__plan_loose(&plan->model, all, plan->n_all, &plan->then, loose,
-                            &r->n_loose));
+    IMP_TRY(
+        imp__plan_loose(&plan->model, all, plan->n_all, &plan->then, loose, &r->n_loose));
     r->loose = loose;
 out:
     imp__release(plan->p->ctx, all);
@@ -314,8 +313,7 @@ static enum imp_status widths_set(struct plan *plan)
     for (size_t b = 0; b < p->n_blocks; b++) {
         const struct imp__block *block = &p->blocks[b];
         double square = 0;
-        for (size_t e = 0; e < block->count; e++)
-            square += imp__sqr(x[block->first + e]);
+        for (size_t e = 0; e < block->count; e++) square += imp__sqr(x[block->first + e]);
         for (size_t e = 0; e < block->count; e++) {
             const size_t k = block->first + e;
             const double own = plan->o.prior ? plan->o.prior[k] : 0;
@@ -399,12 +397,13 @@ enum imp_status imp_plan(imp_problem *problem,
     IMP_RUN(ctx, plan.run, run);
     IMP_CHECKED(imp__run_traces(ctx, "imp_plan", &plan.run));
     IMP_CHECKED(imp__problem_no_parts(problem, "a plan"));
-    IMP_CHECKED(imp__plan_options_take(problem, options, &plan.o));
+    IMP_CHECKED(imp__plan_options_take(problem, __func__, options, &plan.o));
     IMP_FLOAT_MODE;
     IMP_SETS(problem->scene, st);
     if (st != IMP_OK) return st;
     imp__arena_free(&problem->plan_arena);
-    IMP_TRY(imp__plan_candidates_take(problem, candidates, n, &plan.c));
+    IMP_TRY(imp__plan_candidates_take(problem, __func__, "candidates", candidates, n,
+                                      &plan.c));
     plan.n_all = n;
     IMP_TRY(widths_set(&plan));
     IMP_TRY(lists_make(&plan));

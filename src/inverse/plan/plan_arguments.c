@@ -12,20 +12,20 @@ static enum imp_status not_negative(imp_context *ctx, const char *of, const char
                                     double value)
 {
     if (value >= 0 && isfinite(value)) return IMP_OK;
-    return imp__error(ctx, IMP_E_ARG, "%s: %s = %g is not a number >= 0", of, name, value);
+    return imp__error(ctx, IMP_E_ARG, "%s: %s = %g is not a number >= 0", of, name,
+                      value);
 }
 
-enum imp_status imp__plan_options_take(const struct imp_problem *p,
+enum imp_status imp__plan_options_take(const struct imp_problem *p, const char *function,
                                        const struct imp_plan_options *options,
                                        struct imp_plan_options *own)
 {
     imp_context *ctx = p->ctx;
     *own = (struct imp_plan_options)IMP_PLAN_OPTIONS_INIT;
-    IMP_OPTIONS(ctx, *own, options, "options");
+    IMP_CHECKED(imp__options_take(ctx, function, "options", options, own, sizeof *own));
     if (p->n == 0 || p->n > IMP_DENSE_MAX)
-        return imp__error(ctx, IMP_E_ARG,
-                          "%zu numbers are active; a plan takes 1 to %d", p->n,
-                          IMP_DENSE_MAX);
+        return imp__error(ctx, IMP_E_ARG, "%zu numbers are active; a plan takes 1 to %d",
+                          p->n, IMP_DENSE_MAX);
     if ((unsigned)own->criterion > IMP_PLAN_A)
         return imp__error(ctx, IMP_E_ARG, "criterion %d does not exist",
                           (int)own->criterion);
@@ -38,8 +38,9 @@ enum imp_status imp__plan_options_take(const struct imp_problem *p,
         return imp__error(ctx, IMP_E_ARG, "options: of is NULL, and n_of is %zu",
                           own->n_of);
     if (own->n_of > p->n)
-        return imp__error(ctx, IMP_E_ARG, "options: n_of is %zu, and %zu numbers are active",
-                          own->n_of, p->n);
+        return imp__error(ctx, IMP_E_ARG,
+                          "options: n_of is %zu, and %zu numbers are active", own->n_of,
+                          p->n);
     for (size_t i = 0; i < own->n_of; i++) {
         if (own->of[i] >= p->n)
             return imp__error(ctx, IMP_E_ARG,
@@ -47,8 +48,8 @@ enum imp_status imp__plan_options_take(const struct imp_problem *p,
                               own->of[i], p->n);
         for (size_t j = 0; j < i; j++)
             if (own->of[j] == own->of[i])
-                return imp__error(ctx, IMP_E_ARG,
-                                  "options: of has number %zu twice", own->of[i]);
+                return imp__error(ctx, IMP_E_ARG, "options: of has number %zu twice",
+                                  own->of[i]);
     }
     for (size_t k = 0; own->prior && k < p->n; k++) {
         char name[32];
@@ -87,12 +88,13 @@ static enum imp_status candidate_check(const struct imp_problem *p, size_t i,
     if (c->cost == 0) c->cost = 1;
     for (int k = 0; k < 3; k++)
         if (!isfinite(c->origin[k]) || !isfinite(c->target[k]) || !isfinite(c->up[k]))
-            return imp__error(ctx, IMP_E_ARG,
-                              "%s: origin, target or up is not finite", of);
+            return imp__error(ctx, IMP_E_ARG, "%s: origin, target or up is not finite",
+                              of);
     return IMP_OK;
 }
 
 enum imp_status imp__plan_candidates_take(const struct imp_problem *p,
+                                          const char *function, const char *name,
                                           const struct imp_plan_candidate *candidates,
                                           size_t n, struct imp_plan_candidate **out)
 {
@@ -105,7 +107,7 @@ enum imp_status imp__plan_candidates_take(const struct imp_problem *p,
     enum imp_status st = IMP_OK;
     for (size_t i = 0; i < n; i++) {
         own[i] = (struct imp_plan_candidate)IMP_PLAN_CANDIDATE_INIT;
-        IMP_TRY(imp__element_take(ctx, "imp_plan", "candidates", candidates, i, &own[i],
+        IMP_TRY(imp__element_take(ctx, function, name, candidates, i, &own[i],
                                   sizeof own[i]));
         IMP_TRY(candidate_check(p, i, &own[i]));
     }

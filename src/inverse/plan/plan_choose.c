@@ -88,8 +88,7 @@ static enum imp_status exchange(struct search *s, double *now, bool *improved)
 
 /* The gain's error: changes of what we have move today's, too. */
 static void error_of(const struct search *s, const double *pull_today,
-                     double hidden_today,
-                     struct imp_estimate *gain)
+                     double hidden_today, struct imp_estimate *gain)
 {
     const struct imp__plan_choice *c = s->c;
     const size_t n = c->model->n;

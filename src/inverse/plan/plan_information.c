@@ -56,7 +56,8 @@ static enum imp_status pilot_make(struct imp_problem *blank, const struct imp_se
 /* ---- Weights ------------------------------------------------------------------------- */
 
 struct noise {
-    double read2, shot, relative2, white; /* in the units of the picture; white INFINITY: none */
+    double read2, shot, relative2,
+        white; /* in the units of the picture; white INFINITY: none */
 };
 
 static struct noise noise_of(const struct imp_plan_options *o,

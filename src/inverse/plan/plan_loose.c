@@ -54,8 +54,7 @@ static enum imp_status narrow(const struct imp__plan_model *m,
     memset(A, 0, old * sizeof *A);
     for (size_t g = 0; g < IMP_DEVIATIONS; g++) {
         project(n, old, V, item->deviations + g * n * n, row, D);
-        for (size_t j = 0; j < old; j++)
-            A[j] += pow(along(old, D, vectors + j * old), 2);
+        for (size_t j = 0; j < old; j++) A[j] += pow(along(old, D, vectors + j * old), 2);
     }
     *r = 0;
     for (size_t j = 0; j < old; j++) {
@@ -63,8 +62,7 @@ static enum imp_status narrow(const struct imp__plan_model *m,
         double *to = next + (*r)++ * n;
         memset(to, 0, n * sizeof *to);
         for (size_t a = 0; a < old; a++)
-            for (size_t k = 0; k < n; k++)
-                to[k] += vectors[j * old + a] * V[a * n + k];
+            for (size_t k = 0; k < n; k++) to[k] += vectors[j * old + a] * V[a * n + k];
     }
     memcpy(V, next, *r * n * sizeof *V);
     return IMP_OK;
@@ -83,7 +81,7 @@ enum imp_status imp__plan_loose(const struct imp__plan_model *m,
     for (size_t j = 0; j < n; j++)
         if (scratch->loose[j] || scratch->values[j] < IMP_PLAN_LOOSE)
             memcpy(out + (*r)++ * n, scratch->vectors + j * n, n * sizeof *out);
-    for (size_t i = 0; i < n_items && *r > 0 && st == IMP_OK; i++)
+    for (size_t i = 0; i<n_items && * r> 0 && st == IMP_OK; i++)
         st = narrow(m, items[i], work, out, r);
     imp__release(m->ctx, work);
     return st;

@@ -3,12 +3,12 @@
  * Which pixels tell of which number: weights times products of two derivative pictures with
  * independent random numbers, whose sums over pixels are the information without bias. */
 #include "base/arguments.h"
+#include "color/rgb.h"
 #include "inverse/estimate/problem_tracer.h"
 #include "math/rng.h"
 #include "plan_arguments.h"
-#include "walk/run/run.h"
-#include "color/rgb.h"
 #include "scene/camera_gain.h"
+#include "walk/run/run.h"
 #include <string.h>
 
 #define MAP_SEED 0x3a9f
@@ -79,12 +79,12 @@ enum imp_status imp_plan_map(imp_problem *problem,
     IMP_RUN(ctx, all, run);
     IMP_CHECKED(imp__run_traces(ctx, "imp_plan_map", &all));
     IMP_CHECKED(imp__problem_no_parts(problem, "a plan"));
-    IMP_CHECKED(imp__plan_options_take(problem, options, &own));
+    IMP_CHECKED(imp__plan_options_take(problem, __func__, options, &own));
     IMP_FINITE_ALL(ctx, pull, n * n, "pull");
     IMP_FLOAT_MODE;
     IMP_SETS(problem->scene, st);
     if (st != IMP_OK) return st;
-    IMP_TRY(imp__plan_candidates_take(problem, candidate, 1, &c));
+    IMP_TRY(imp__plan_candidates_take(problem, __func__, "candidate", candidate, 1, &c));
     const struct imp_sensor *s = problem->scene->sensors[c->sensor];
     if (s->film.n_responses > 0 || (s->gain && s->gain->fitted_gamma))
         IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,

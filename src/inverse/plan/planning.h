@@ -15,8 +15,9 @@ struct imp__stage {
     struct imp_scene *scene;
     struct imp_sensor *sensor; /* moved; NULL: it stands where it was */
     void *rest;                /* what it was */
-    const struct imp_course **course; /* [n_emitters] what they were; NULL: all are as they were */
-    double *light_cdf;                /* [n_emitters] likewise */
+    const struct imp_course *
+        *course;       /* [n_emitters] what they were; NULL: all are as they were */
+    double *light_cdf; /* [n_emitters] likewise */
 };
 /* What messages call it. */
 const char *imp__plan_name(const struct imp_scene *scene,
@@ -61,13 +62,15 @@ struct imp__plan_model {
 };
 /* What is known with some pictures. */
 struct imp__plan_known {
-    double *C;                /* [n][n] covariance */
-    double *pull;             /* [n][n] d phi / d (sum of information) */
-    double *values, *vectors; /* [n] eigenvalues of the sum of information, ascending; [n][n]
+    double *C;    /* [n][n] covariance */
+    double *pull; /* [n][n] d phi / d (sum of information) */
+    double *values,
+        *vectors; /* [n] eigenvalues of the sum of information, ascending; [n][n]
                                  row k belongs to values[k] */
-    bool *loose;              /* [n] values[k] is not above twice its error: it counts as 0 */
-    double phi; /* of the criterion: the gain is what it grows by */
-    double hidden; /* what phi would grow by if loose directions had as much as their errors allow:
+    bool *loose;  /* [n] values[k] is not above twice its error: it counts as 0 */
+    double phi;   /* of the criterion: the gain is what it grows by */
+    double
+        hidden; /* what phi would grow by if loose directions had as much as their errors allow:
                       not known, and so a part of the error of phi */
     double *work;
 };
