@@ -3,7 +3,7 @@
  * importon plan: which picture to take next. Ranks candidates by how much they would shrink the
  * intervals of the active numbers, and chooses a set of them. */
 #include "plan_answer.h"
-#include "plan_map.h"
+#include "plan_maps.h"
 #include "shared/command.h"
 #include "shared/problem_options.h"
 

@@ -18,7 +18,7 @@ struct search {
     struct imp__plan_known *known;
 };
 
-/* Of the set with these chosen ones: what is to be improved; -INFINITY: it costs too much. */
+/* What is to be improved, with these chosen ones; -INFINITY: they cost too much. */
 static enum imp_status score(struct search *s, double *out)
 {
     const struct imp__plan_choice *c = s->c;

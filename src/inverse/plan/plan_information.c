@@ -172,14 +172,14 @@ enum imp_status imp__plan_information(struct imp_problem *p, struct imp_problem 
 {
     enum imp_status st = IMP_OK;
     const size_t n = p->n;
-    struct imp__stage stage;
+    struct imp__plan_stage stage;
     struct imp__target target = {0};
     struct imp__target *const targets = p->targets;
     const size_t n_targets = p->n_targets;
     struct imp_run own = *run;
     struct imp__gauss_newton gn = {.H = out->H, .deviations = out->deviations};
 
-    IMP_TRY(imp__stage_begin(p->scene, c, &stage));
+    IMP_TRY(imp__plan_stage_begin(p->scene, c, &stage));
     IMP_TRY(imp__plan_target(p, blank, c, options, run, &target, &out->lit));
     p->targets = &target;
     p->n_targets = 1;
@@ -195,6 +195,6 @@ enum imp_status imp__plan_information(struct imp_problem *p, struct imp_problem 
     }
 out:
     imp__target_free(p->ctx, &target);
-    imp__stage_end(&stage);
+    imp__plan_stage_end(&stage);
     return st;
 }

@@ -66,7 +66,7 @@ enum imp_status imp_plan_map(imp_problem *problem,
     imp_context *ctx = problem->ctx;
     const size_t n = problem->n;
     struct map m = {.p = problem};
-    struct imp__stage stage = {0};
+    struct imp__plan_stage stage = {0};
     struct imp_plan_candidate *c = NULL;
     struct imp_plan_options own;
     struct imp_run all;
@@ -95,7 +95,7 @@ enum imp_status imp_plan_map(imp_problem *problem,
     m.J[0] = made + n + 1;
     m.J[1] = m.J[0] + n;
     IMP_TRY(imp_problem_create(problem->scene, &blank));
-    IMP_TRY(imp__stage_begin(problem->scene, c, &stage));
+    IMP_TRY(imp__plan_stage_begin(problem->scene, c, &stage));
     IMP_TRY(imp__plan_target(problem, blank, c, &own, &all, &m.target, &lit));
     for (int side = 0; side < 2; side++) {
         struct imp_run one = all;
@@ -110,7 +110,7 @@ enum imp_status imp_plan_map(imp_problem *problem,
     memcpy(films, made, (n + 1) * sizeof *made);
     memset(made, 0, (n + 1) * sizeof *made);
 out:
-    imp__stage_end(&stage);
+    imp__plan_stage_end(&stage);
     imp__target_free(ctx, &m.target);
     if (made) destroy_all(made, 3 * n + 1);
     imp__release(ctx, made);

@@ -47,7 +47,7 @@ static enum imp_status cannot_move(const struct imp_scene *scene,
 /* The rigid map from where the camera stands and looks to where it shall. */
 static enum imp_status sensor_move(struct imp_scene *scene,
                                    const struct imp_plan_candidate *c,
-                                   struct imp__stage *stage)
+                                   struct imp__plan_stage *stage)
 {
     struct imp_sensor *s = scene->sensors[c->sensor];
     const struct imp_mat4 at = placement_of(scene, s);
@@ -96,7 +96,7 @@ static bool is_named(const char *globs, const char *name)
 
 static enum imp_status lamps_switch(struct imp_scene *scene,
                                     const struct imp_plan_candidate *c,
-                                    struct imp__stage *stage)
+                                    struct imp__plan_stage *stage)
 {
     const size_t n = (size_t)scene->n_emitters;
     double sum = 0;
@@ -131,18 +131,18 @@ const char *imp_plan_lamp(const imp_scene *scene, int lamp)
     return scene->emitters[lamp]->name;
 }
 
-enum imp_status imp__stage_begin(struct imp_scene *scene,
-                                 const struct imp_plan_candidate *c,
-                                 struct imp__stage *stage)
+enum imp_status imp__plan_stage_begin(struct imp_scene *scene,
+                                      const struct imp_plan_candidate *c,
+                                      struct imp__plan_stage *stage)
 {
     enum imp_status st = IMP_OK;
-    *stage = (struct imp__stage){.scene = scene};
+    *stage = (struct imp__plan_stage){.scene = scene};
     if (c->placed) st = sensor_move(scene, c, stage);
     if (st == IMP_OK && c->lamps) st = lamps_switch(scene, c, stage);
     return st;
 }
 
-void imp__stage_end(struct imp__stage *stage)
+void imp__plan_stage_end(struct imp__plan_stage *stage)
 {
     struct imp_scene *scene = stage->scene;
     if (stage->sensor)
@@ -156,5 +156,5 @@ void imp__stage_end(struct imp__stage *stage)
         imp__release(scene->ctx, stage->course);
         imp__release(scene->ctx, stage->light_cdf);
     }
-    *stage = (struct imp__stage){0};
+    *stage = (struct imp__plan_stage){0};
 }

@@ -11,7 +11,7 @@
 
 /* ---- plan_stage.c: a candidate put into the scene ------------------------------------ */
 
-struct imp__stage {
+struct imp__plan_stage {
     struct imp_scene *scene;
     struct imp_sensor *sensor; /* moved; NULL: it stands where it was */
     void *rest;                /* what it was */
@@ -22,11 +22,11 @@ struct imp__stage {
 /* What messages call it. */
 const char *imp__plan_name(const struct imp_scene *scene,
                            const struct imp_plan_candidate *c);
-/* To be ended by imp__stage_end, also after a failure. */
-enum imp_status imp__stage_begin(struct imp_scene *scene,
-                                 const struct imp_plan_candidate *c,
-                                 struct imp__stage *stage);
-void imp__stage_end(struct imp__stage *stage);
+/* To be ended by imp__plan_stage_end, also after a failure. */
+enum imp_status imp__plan_stage_begin(struct imp_scene *scene,
+                                      const struct imp_plan_candidate *c,
+                                      struct imp__plan_stage *stage);
+void imp__plan_stage_end(struct imp__plan_stage *stage);
 
 /* ---- plan_information.c ---------------------------------------------------------------- */
 

@@ -2,7 +2,7 @@
  *
  * Maps of the best candidate: information of each pixel on each number, and its share in the
  * criterion. */
-#include "plan_map.h"
+#include "plan_maps.h"
 
 #include "shared/picture_files.h"
 
@@ -11,7 +11,7 @@
 
 enum { MAPS_MAX = 64 };
 
-/* Of number i; of the criterion from n on. */
+/* The file of number i; from n on that of the criterion. */
 static char *map_path(const char *prefix, const struct plan_numbers *p, size_t i)
 {
     char number[600] = "criterion", *path = cli_alloc(strlen(prefix) + 700, 1);

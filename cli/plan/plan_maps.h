@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * --map: which pixels of the best candidate tell of which number. */
-#ifndef IMP_CLI_PLAN_MAP_H
-#define IMP_CLI_PLAN_MAP_H
+#ifndef IMP_CLI_PLAN_MAPS_H
+#define IMP_CLI_PLAN_MAPS_H
 
 #include "plan_answer.h"
 
