@@ -93,7 +93,18 @@ class Plan:
         self.not_determined = _copy(result.loose, result.n_loose * n).reshape(result.n_loose, n)
 
     def best(self) -> list[PlanRow]:
-        """Those that cannot be told apart from the first."""
+        """Those that cannot be told apart from the first.
+
+        Returns
+        -------
+        list of PlanRow
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> [row.name for row in importon.plan(scene, "red.*", [{"time": 1, "name": "short"}, {"time": 9, "name": "long"}]).best()]
+        ['long']
+        """
         return [r for r in self.rows if r.group == 0]
 
     def __repr__(self) -> str:
@@ -245,7 +256,7 @@ def plan(scene: Scene, params: Any = None, candidates: Any = None, *, have: Any 
     >>> scene = importon.load_dict(importon.cornell_box(res=8))
     >>> p = importon.plan(scene, ["red.*", "green.*"], [0, {"origin": (0.5, 0, 2), "target": (0, 0, 0)}], spp=64)
     >>> len(p.rows), p.names[0]
-    (2, 'red.reflectance.value[0]')
+    (2, 'green.reflectance.value[0]')
     """
     with Problem(scene, params, same, factor, log) as p:
         keep: list[Any] = []
