@@ -9,7 +9,7 @@
  *     find the contrary by two of its errors, in at least 95 of 100;
  *   - errors of gains, against the spread of plans with other seeds.
  *
- * Argument long: 100 cases in place of 3, and the box. */
+ * Argument long, or a number: 100 cases in place of 3, and the box. */
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "math/rng.h"
@@ -269,7 +269,8 @@ static int by_size(const void *a, const void *b)
 
 int main(int argc, char **argv)
 {
-    const int cases = argc > 1 && !strcmp(argv[1], "long") ? 100 : 3;
+    const int given = argc > 1 ? atoi(argv[1]) : 0;
+    const int cases = argc > 1 && !strcmp(argv[1], "long") ? 100 : given > 0 ? given : 3;
     struct record r = {.ratio = calloc((size_t)cases * 16, sizeof(double))};
     ctx = test_context(2);
     if (!r.ratio) return 99;

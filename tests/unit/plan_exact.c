@@ -23,10 +23,12 @@
 static const char xml[] =
     "<scene version='3.0.0'><integrator type='path'/>" CAMERA("first", "0", "4", "")
         CAMERA("second", "10", "3", "") CAMERA("beside", "30", "4", "")
-            CAMERA("exposed", "0", "5", "<float name='exposure' value='.5'/>")
+            CAMERA("exposed", "0", "5", "<float name='exposure' value='.5'/>") CAMERA(
+                "photo", "0", "4",
+                "<float name='exposure' value='.25'/><float name='gamma' value='2.2'/>")
                 LAMP("one", "0", "3") LAMP("two", "10", "5") "</scene>";
 
-enum { FIRST, SECOND, BESIDE, EXPOSED };
+enum { FIRST, SECOND, BESIDE, EXPOSED, PHOTO };
 
 static imp_context *ctx;
 static imp_scene *scene;
@@ -189,6 +191,55 @@ static void product(void)
     imp_problem_destroy(p);
 }
 
+/* A photograph M = g L = V^gamma tells of L and of gamma what its linear values do:
+ * dM/dgamma = M log V. */
+static void photograph(void)
+{
+    imp_problem *p;
+    test_must(ctx, imp_problem_create(scene, &p));
+    test_must(ctx, imp_problem_activate(p, "one.radiance.value"));
+    test_must(ctx, imp_problem_activate(p, "photo.gamma.value"));
+    const struct imp_plan_candidate c = view(PHOTO);
+    struct imp_plan_options o = IMP_PLAN_OPTIONS_INIT;
+    o.read = 0.01;
+    o.shot = 0.001;
+    const struct imp_plan_result *r = planned(p, &c, 1, &o);
+    const size_t lamp = test_variable(p, scene, ctx, "one.radiance.value"), g = 1 - lamp;
+    const double M = 0.75, D = 1e-4 + 0.001 * M, slope = M * log(M) / 2.2;
+    const double *I = r->rows[0].information;
+    tap_near(I[lamp * 2 + lamp], 16 * 0.0625 / D, 1e-5, 0, "a photograph and a lamp");
+    tap_near(I[g * 2 + g], 16 * slope * slope / D, 1e-5, 0, "and its gamma");
+    tap_near(fabs(I[1]), fabs(16 * 0.25 * slope / D), 1e-5, 0, "and both");
+    imp_problem_destroy(p);
+}
+
+/* A film of luminances in a scene of colours. */
+static void luminance(void)
+{
+    static const char colours[] =
+        "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'><float "
+        "name='fov' value='20'/><transform name='to_world'><lookat origin='0,0,2' "
+        "target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' "
+        "value='4'/><integer name='height' value='2'/><string name='pixel_format' "
+        "value='luminance'/><rfilter type='box'/></film></sensor><shape type='rectangle'>"
+        "<emitter type='area' id='one'><rgb name='radiance' value='1,2,3'/></emitter>"
+        "</shape></scene>";
+    imp_scene *s = test_scene_text(ctx, colours, IMP_RGB);
+    imp_problem *p = test_problem(ctx, s, "one.radiance.value");
+    const struct imp_plan_candidate c = view(0);
+    struct imp_plan_options o = IMP_PLAN_OPTIONS_INIT;
+    const double w[3] = {0.212671, 0.715160, 0.072169};
+    double worst = 0;
+    o.read = 0.1;
+    const struct imp_plan_result *r = planned(p, &c, 1, &o);
+    for (size_t k = 0; k < 9; k++)
+        worst = fmax(worst, fabs(r->rows[0].information[k] / (800 * w[k / 3] * w[k % 3]) - 1));
+    tap_near(worst, 0, 0, 1e-5, "luminances of three colours");
+    tap_ok(r->n_loose == 2, "leave two combinations open");
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
 /* A camera that is placed sees what one that stands there sees. */
 static void places(void)
 {
@@ -288,6 +339,8 @@ int main(void)
     noise();
     lamps();
     product();
+    photograph();
+    luminance();
     places();
     errors();
     imp_scene_destroy(scene);
