@@ -20,13 +20,12 @@
     "'/></transform><emitter type='area' id='" id                                        \
     "'><spectrum name='radiance' value='" radiance "'/></emitter></shape>"
 
-static const char xml[] =
-    "<scene version='3.0.0'><integrator type='path'/>" CAMERA("first", "0", "4", "")
-        CAMERA("second", "10", "3", "") CAMERA("beside", "30", "4", "")
-            CAMERA("exposed", "0", "5", "<float name='exposure' value='.5'/>") CAMERA(
-                "photo", "0", "4",
-                "<float name='exposure' value='.25'/><float name='gamma' value='2.2'/>")
-                LAMP("one", "0", "3") LAMP("two", "10", "5") "</scene>";
+static const char xml[] = "<scene version='3.0.0'><integrator type='path'/>" CAMERA(
+    "first", "0", "4", "") CAMERA("second", "10", "3", "") CAMERA("beside", "30", "4", "")
+    CAMERA("exposed", "0", "5", "<float name='exposure' value='.5'/>")
+        CAMERA("photo", "0", "4",
+               "<float name='exposure' value='.25'/><float name='gamma' value='2.2'/>")
+            LAMP("one", "0", "3") LAMP("two", "10", "5") "</scene>";
 
 enum { FIRST, SECOND, BESIDE, EXPOSED, PHOTO };
 
@@ -217,9 +216,11 @@ static void photograph(void)
 static void luminance(void)
 {
     static const char colours[] =
-        "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'><float "
+        "<scene version='3.0.0'><integrator type='path'/><sensor "
+        "type='perspective'><float "
         "name='fov' value='20'/><transform name='to_world'><lookat origin='0,0,2' "
-        "target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' "
+        "target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><integer "
+        "name='width' "
         "value='4'/><integer name='height' value='2'/><string name='pixel_format' "
         "value='luminance'/><rfilter type='box'/></film></sensor><shape type='rectangle'>"
         "<emitter type='area' id='one'><rgb name='radiance' value='1,2,3'/></emitter>"
@@ -233,7 +234,8 @@ static void luminance(void)
     o.read = 0.1;
     const struct imp_plan_result *r = planned(p, &c, 1, &o);
     for (size_t k = 0; k < 9; k++)
-        worst = fmax(worst, fabs(r->rows[0].information[k] / (800 * w[k / 3] * w[k % 3]) - 1));
+        worst = fmax(worst,
+                     fabs(r->rows[0].information[k] / (800 * w[k / 3] * w[k % 3]) - 1));
     tap_near(worst, 0, 0, 1e-5, "luminances of three colours");
     tap_ok(r->n_loose == 2, "leave two combinations open");
     imp_problem_destroy(p);
