@@ -13,7 +13,7 @@
 #include <string.h>
 
 static struct {
-    int take, criterion;
+    int take, criterion, improve;
     double budget;
     const char *noise, *map;
 } o;
@@ -35,6 +35,11 @@ static const struct arg_option options[] = {
      "white=V values from V on are saturated (default: read is 1 % of the picture's "
      "mean)",
      &o.noise, 0, 0, NULL},
+    {ARG_INT, 0, "improve", "ROUNDS",
+     "move the best camera of --sphere or --path along the derivative of its gain, at "
+     "its "
+     "distance",
+     &o.improve, 1, 200, NULL},
     {ARG_TEXT, 0, "map", "PREFIX",
      "pictures of which pixels of the best candidate tell of which number, and of the "
      "criterion",
@@ -77,6 +82,32 @@ static int noise_read(struct imp_plan_options *p)
                                          o.noise);
 }
 
+/* What we have, and the best candidate, which moves. The result belongs to the problem, and the
+ * search makes others: the ranking is made again, to the bit. */
+static int improve(imp_problem *problem, struct plan_answer *a)
+{
+    const struct candidates *c = a->candidates;
+    const size_t best = a->result->rows->candidate;
+    struct imp_plan_candidate *some = cli_alloc(c->n_have + 1, sizeof *some);
+    memcpy(some, c->c, c->n_have * sizeof *some);
+    some[c->n_have] = c->c[best];
+    enum imp_status st = IMP_OK;
+    int rc = 0;
+    if (!c->c[best].placed)
+        rc = cli_error(EXIT_USAGE,
+                       "--improve: %s is a sensor of the scene; it moves "
+                       "cameras of --sphere and --path",
+                       c->c[best].name);
+    else
+        st = imp_plan_improve(problem, some, c->n_have + 1, a->options, a->run, o.improve,
+                              a->origin, &a->gain);
+    if (!rc && st == IMP_OK)
+        st = imp_plan(problem, c->c, c->n, a->options, a->run, &a->result);
+    free(some);
+    a->improved = !rc && st == IMP_OK;
+    return rc ? rc : st == IMP_OK ? 0 : cli_fail(st, cli.scene_path);
+}
+
 static int plan(imp_problem *problem, const struct candidates *c,
                 const struct plan_numbers *numbers)
 {
@@ -96,7 +127,9 @@ static int plan(imp_problem *problem, const struct candidates *c,
     if (st == IMP_CANCELLED)
         return cli_error(cli_done(), "interrupted: there is no ranking yet");
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
-    const struct plan_answer a = {c, numbers, &p, result, &run};
+    struct plan_answer a = {c, numbers, &p, result, &run, .improved = 0};
+    if (o.improve) rc = improve(problem, &a);
+    if (rc) return rc;
     if (cli.json) plan_answer_json(&a);
     else plan_answer_print(&a);
     return o.map ? plan_map_write(o.map, problem, &a) : 0;

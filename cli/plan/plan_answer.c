@@ -163,6 +163,10 @@ void plan_answer_print(const struct plan_answer *a)
 {
     print_ranking(a);
     print_group(a);
+    if (a->improved)
+        printf("\n%s is better at %.4g,%.4g,%.4g: gain %.4g +- %.2g, intervals x %.3g\n",
+               name(a, row(a, 0)->candidate), a->origin[0], a->origin[1], a->origin[2],
+               a->gain.value, a->gain.se, exp(-0.5 * a->gain.value));
     print_numbers(a);
     print_chosen(a);
     print_loose(a);
@@ -256,6 +260,13 @@ void plan_answer_json(const struct plan_answer *a)
     json_end_array(&j);
     rows_json(&j, a);
     chosen_json(&j, a);
+    if (a->improved) {
+        json_object(&j, "improved");
+        json_numbers(&j, "origin", 3, a->origin);
+        json_number(&j, "gain", a->gain.value);
+        json_number(&j, "gain_se", a->gain.se);
+        json_end_object(&j);
+    }
     json_array(&j, "not_determined");
     for (size_t k = 0; k < r->n_loose; k++) {
         json_array(&j, NULL);

@@ -13,6 +13,9 @@ struct plan_answer {
     const struct imp_plan_options *options;
     const struct imp_plan_result *result;
     const struct imp_run *run;
+    int improved; /* the best camera, at another place */
+    double origin[3];
+    struct imp_estimate gain;
 };
 void plan_answer_print(const struct plan_answer *a);
 void plan_answer_json(const struct plan_answer *a);

@@ -129,6 +129,21 @@ imp_plan(imp_problem *problem, const struct imp_plan_candidate *candidates, size
          const struct imp_plan_options *options, const struct imp_run *run,
          const struct imp_plan_result **result);
 
+/** Improve the place of a camera along the derivative of its gain, on the sphere around its target: each
+ * round ranks it and four places around it, by differences, until the derivative is within twice its
+ * error.
+ * @param candidates [n] those that we have, and one that is placed: the first that has not been taken.
+ * @param rounds  at most, 1 to 200.
+ * @param[out] origin [3] the place found.
+ * @param[out] gain   there, of random numbers of its own.
+ * @return as imp_plan; IMP_E_ARG where no candidate is placed.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_plan_improve(imp_problem *problem, const struct imp_plan_candidate *candidates,
+                 size_t n, const struct imp_plan_options *options,
+                 const struct imp_run *run, int rounds, double origin[3],
+                 struct imp_estimate *gain);
+
 /** Name of a lamp, as imp_plan_candidate.lamps has it, 0 <= lamp < imp_scene_info.n_emitters. It
  * belongs to the scene. NULL if there is none. */
 IMP_API const char *imp_plan_lamp(const imp_scene *scene, int lamp);

@@ -278,6 +278,48 @@ def plan(scene: Scene, params: Any = None, candidates: Any = None, *, have: Any 
         return Plan(rows_of(_c.imp_plan_result, out.value, 1)[0], names, called)
 
 
+def plan_improve(scene: Scene, params: Any, candidate: Mapping[str, Any], rounds: int = 20, *, have: Any = (),
+                 of: Any = None, prior: Optional[Mapping[str, float]] = None,
+                 noise: Optional[Mapping[str, float]] = None, criterion: str = "d", spp: int = 0, seed: int = 0,
+                 same: Any = None, factor: Any = None, log: Any = None, drop_budget: float = 0, points: str = "scene",
+                 progress: Any = None) -> tuple[Any, float, float]:
+    """The place of a camera, moved along the derivative of its gain at its distance from its target.
+
+    Parameters
+    ----------
+    scene, params, have, of, prior, noise, criterion, spp, seed, same, factor, log, drop_budget, points, progress
+        As `plan`'s.
+    candidate : mapping
+        As one of `plan`'s, with `origin` and `target`.
+    rounds : int
+        At most so many, of five places each.
+
+    Returns
+    -------
+    numpy.ndarray, float, float
+        The origin, the gain there, and its standard error.
+
+    Examples
+    --------
+    >>> scene = importon.load_dict(importon.cornell_box(res=8))
+    >>> place, gain, se = importon.plan_improve(scene, "red.*", {"origin": (0, 0, 3), "target": (0, 0, 0)}, 2, spp=16)
+    >>> bool(abs(np.linalg.norm(place) - 3) < 1e-9), gain > 0
+    (True, True)
+    """
+    with Problem(scene, params, same, factor, log) as p:
+        keep: list[Any] = []
+        taken = [_one(p.scene, c, keep) for c in have]
+        for c in taken:
+            c.have = True
+        rows = (_c.imp_plan_candidate * (len(taken) + 1))(*taken, _one(p.scene, candidate, keep))
+        o = _options(p, _number_names(p), keep, of, prior, noise, criterion, 0, 0)
+        options = run_options(p.scene, seed=seed, spp=spp, drop_budget=drop_budget, points=points)
+        place, gain = np.zeros(3), _c.imp_estimate()
+        p.run(options, progress, lib.imp_plan_improve, p.pointer, rows, len(rows), ctypes.byref(o),
+              ctypes.byref(options), integer(rounds, "rounds"), address(place), ctypes.byref(gain))
+        return place, gain.value, gain.se
+
+
 def plan_map(scene: Scene, params: Any, candidate: Any, pull: Any, *, noise: Optional[Mapping[str, float]] = None,
              spp: int = 0, seed: int = 0, same: Any = None, factor: Any = None, log: Any = None,
              drop_budget: float = 0, points: str = "scene", progress: Any = None) -> list[Picture]:

@@ -279,6 +279,51 @@ static void places(void)
     imp_problem_destroy(p);
 }
 
+/* A lamp in the dark covers most pixels as seen from its front: a camera at 60 degrees, moved along
+ * the derivative, comes near to it. */
+static void improved(void)
+{
+    static const char lamp[] =
+        "<scene version='3.0.0'><integrator type='path'/><sensor "
+        "type='perspective'><float "
+        "name='fov' value='60'/><film type='hdrfilm'><integer name='width' value='12'/>"
+        "<integer name='height' value='12'/><rfilter type='box'/></film></sensor>"
+        "<shape type='rectangle'><transform name='to_world'><scale "
+        "value='.5'/></transform>"
+        "<emitter type='area' id='one'><spectrum name='radiance' value='1'/></emitter>"
+        "</shape></scene>";
+    imp_scene *s = test_scene_text(ctx, lamp, IMP_MONO);
+    imp_problem *p = test_problem(ctx, s, "one.radiance.value");
+    struct imp_plan_candidate c = IMP_PLAN_CANDIDATE_INIT;
+    struct imp_plan_options o = IMP_PLAN_OPTIONS_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_estimate gain;
+    double origin[3];
+    o.read = 0.1;
+    run.spp = 256;
+    c.placed = true;
+    c.origin[0] = 2 * sin(1.05);
+    c.origin[2] = 2 * cos(1.05);
+    c.up[1] = 1;
+    const struct imp_plan_result *r;
+    test_must(ctx, imp_plan(p, &c, 1, &o, &run, &r));
+    const struct imp_estimate before = r->rows[0].gain;
+    test_must(ctx, imp_plan_improve(p, &c, 1, &o, &run, 20, origin, &gain));
+    const double length =
+        sqrt(origin[0] * origin[0] + origin[1] * origin[1] + origin[2] * origin[2]);
+    tap_near(length, 2, 1e-9, 0, "an improved camera keeps its distance");
+    tap_ok(acos(origin[2] / length) < 0.5 &&
+               gain.value - before.value > 5 * hypot(gain.se, before.se),
+           "and comes to where it sees more # %.2f rad, gain %.3f +- %.3f, before %.3f",
+           acos(origin[2] / length), gain.value, gain.se, before.value);
+    c.placed = false;
+    tap_ok(imp_plan_improve(p, &c, 1, &o, &run, 20, origin, &gain) == IMP_E_ARG &&
+               strstr(imp_last_error(ctx), "placed"),
+           "what is not placed cannot be moved # %s", imp_last_error(ctx));
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
 static void refused(imp_problem *p, const struct imp_plan_candidate *c, size_t n,
                     const struct imp_plan_options *o, enum imp_status expected,
                     const char *part)
@@ -344,6 +389,7 @@ int main(void)
     photograph();
     luminance();
     places();
+    improved();
     errors();
     imp_scene_destroy(scene);
     imp_context_destroy(ctx);

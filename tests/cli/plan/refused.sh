@@ -26,3 +26,4 @@ plan --exposures 0
 plan --sensors 2
 plan --sensors 0,2
 plan --budget 0.5
+plan --sensors 0 --improve 2
