@@ -3,6 +3,7 @@
  * Plans whose answer is known by hand: cameras that see nothing but a lamp, so that every pixel is
  * its radiance and J is 1. Information adds, criteria are logarithms, and what no camera sees is
  * named. Bad input is refused by name, and the scene is as before. */
+#include "imp_fail_alloc.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include <importon/plan.h>
@@ -377,6 +378,50 @@ static void errors(void)
     imp_problem_destroy(p);
 }
 
+/* Every allocation fails in turn: nothing leaks, and the scene stands as before. */
+static imp_problem *fragile;
+static enum imp_status plan_and_map(imp_context *unused)
+{
+    const struct imp_plan_result *r;
+    struct imp_plan_options o = IMP_PLAN_OPTIONS_INIT;
+    struct imp_plan_candidate c[2] = {view(FIRST), view(SECOND)};
+    struct imp_run run = IMP_RUN_INIT;
+    const double pull[4] = {1, 0, 0, 1};
+    imp_film *maps[3];
+    (void)unused;
+    run.spp = 4;
+    c[0].placed = true;
+    c[0].origin[2] = 1.9;
+    c[0].lamps = "one";
+    c[1].have = true;
+    enum imp_status st = imp_plan(fragile, c, 2, &o, &run, &r);
+    if (st == IMP_OK) st = imp_plan_map(fragile, c, &o, &run, pull, maps);
+    for (int k = 0; st == IMP_OK && k < 3; k++) imp_film_destroy(maps[k]);
+    return st;
+}
+static void memory(void)
+{
+    struct fail_alloc heap = {0};
+    imp_context *own = fail_alloc_context(&heap);
+    imp_scene *s = test_scene_text(own, xml, IMP_MONO);
+    struct imp_run run = IMP_RUN_INIT;
+    imp_film *before, *after;
+    run.spp = 4;
+    test_must(own, imp_render(s, &run, &before));
+    fragile = test_problem(own, s, "*.radiance.value");
+    const int n = fail_alloc_in_turn(&heap, plan_and_map, own);
+    tap_ok(n > 50, "every allocation failed once # %d", n);
+    test_must(own, imp_render(s, &run, &after));
+    tap_ok(!memcmp(imp_film_mean(before), imp_film_mean(after), 16 * sizeof(float)),
+           "and the scene is as before");
+    imp_film_destroy(before);
+    imp_film_destroy(after);
+    imp_problem_destroy(fragile);
+    imp_scene_destroy(s);
+    imp_context_destroy(own);
+    tap_ok(heap.live == 0, "nothing leaks # %ld blocks", heap.live);
+}
+
 int main(void)
 {
     ctx = test_context(2);
@@ -391,6 +436,7 @@ int main(void)
     places();
     improved();
     errors();
+    memory();
     imp_scene_destroy(scene);
     imp_context_destroy(ctx);
     return tap_done();
