@@ -361,6 +361,8 @@ class Fixture:
             s.pixels = C.addressof(self.array(C.c_float, 48, [0.25] * 48))
         if name == "imp_team": s.gather = C.cast(self.keep.append(C.CFUNCTYPE(C.c_int)(lambda: 0)) or self.keep[-1], C.c_void_p)
         if name == "imp_fit_options": s.max_iterations = 2
+        if name == "imp_plan_candidate" and function == "imp_plan_improve":
+            s.placed, s.origin[1], s.origin[2] = True, -4, 1
         if name == "imp_check_options":
             self.keep.append(C.create_string_buffer(b"frozen,dot,euler,fresh,loss,ends,film"))
             s.paths, s.fresh_spp, s.draws_s, s.only = 8, 4, 1e-3, C.addressof(self.keep[-1])
