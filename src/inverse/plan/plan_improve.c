@@ -111,6 +111,7 @@ enum imp_status imp_plan_improve(imp_problem *problem,
     IMP_RUN(ctx, m.run, run);
     m.options = (struct imp_plan_options)IMP_PLAN_OPTIONS_INIT;
     IMP_OPTIONS(ctx, m.options, options, "options");
+    IMP_FINITE(ctx, m.options.budget, "options: budget");
     m.options.take = 1;
     m.options.budget = 0;
     if (n == 0 || rounds < 1 || rounds > MAX_MOVE)
