@@ -136,13 +136,23 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
     return IMP_OK;
 }
 
+/* Has the shape's material textures? */
+static bool looks_up(const struct imp_scene *scene, int shape)
+{
+    const struct imp_bsdf *b = imp__shape_bsdf(scene, scene->shapes[shape]);
+    for (int k = 0; k < b->n_in; k++)
+        if (b->input[k]->texture) return true;
+    return false;
+}
+
 void imp__pose_numbers_bar(const struct imp_pose *pose, double *bar)
 {
     if (pose->kind != IMP_POSE_RIGID) return;
     const imp_v3 turn = imp__v3(bar[3], bar[4], bar[5]);
     for (int i = 3; i < 6; i++) bar[i] = 0;
     struct imp_round round;
-    if (pose->shape >= 0 && imp__moves_sphere(pose->scene, pose->shape, &round))
+    if (pose->shape >= 0 && imp__moves_sphere(pose->scene, pose->shape, &round) &&
+        !looks_up(pose->scene, pose->shape))
         return; /* turned about its centre it is where it was */
     imp__rotation_bar(pose->number + 3, turn, bar + 3);
 }

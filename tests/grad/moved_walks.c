@@ -7,7 +7,9 @@
 #include "imp_tap.h"
 #include "math/rng.h"
 #include "moves_kit.h"
+#include "walk/core/vertex.h"
 #include "walk/moved/moved.h"
+#include "walk/moved/moved_kernel.h"
 
 static imp_context *ctx;
 
@@ -92,9 +94,43 @@ static void frame_of(const struct imp_surface *at, const struct place *rest,
     }
 }
 
+/* Coordinates of p - origin in two edges of a triangle. */
+static void in_edges(const struct triangle *t, const real p[3], real b[2])
+{
+    real e[2][3], gram[3] = {0}, by[2] = {0};
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 2; k++) e[k][i] = t->p[k + 1][i] - t->p[0][i];
+        gram[0] += e[0][i] * e[0][i];
+        gram[1] += e[0][i] * e[1][i];
+        gram[2] += e[1][i] * e[1][i];
+        for (int k = 0; k < 2; k++) by[k] += e[k][i] * (p[i] - t->p[0][i]);
+    }
+    const real det = gram[0] * gram[2] - gram[1] * gram[1];
+    b[0] = (by[0] * gram[2] - by[1] * gram[1]) / det;
+    b[1] = (by[1] * gram[0] - by[0] * gram[1]) / det;
+}
+
+/* Inputs at p: uv are those of the same weights at rest. */
+static void look_up(const struct imp_vertex *v, const struct imp_surface *at,
+                    const struct place *rest, const struct place *x, const real p[3],
+                    imp_spec *in)
+{
+    struct imp_texcoord there = imp__vertex_at(v);
+    real b[2], b0[2];
+    in_edges(&x->t, p, b);
+    in_edges(&rest->t, rest->p, b0);
+    imp_v3 d = {0}, grad[2];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 2; k++)
+            d[i] += (double)((b[k] - b0[k]) * (rest->t.p[k + 1][i] - rest->t.p[0][i]));
+    imp__surface_grad(at, grad);
+    for (int k = 0; k < 2; k++) there.uv[k] += imp__dot(grad[k], d);
+    imp__inputs_eval(v->bsdf->input, v->bsdf->n_in, &there, in);
+}
+
 /* The kernel of a vertex, from the world's directions, of any length. */
-static imp_spec kernel_of(const struct imp_vertex *v, real f[3][3], const real wo[3],
-                          const real wi[3], int lobe)
+static imp_spec kernel_of(const struct imp_vertex *v, const imp_spec *in, real f[3][3],
+                          const real wo[3], const real wi[3], int lobe)
 {
     struct imp_dirs d = {{0}, {0}, lobe, 0};
     imp_spec K;
@@ -102,7 +138,7 @@ static imp_spec kernel_of(const struct imp_vertex *v, real f[3][3], const real w
         d.wo[i] = (double)(dot_real(f[i], wo) / sqrtl(dot_real(wo, wo)));
         d.wi[i] = (double)(dot_real(f[i], wi) / sqrtl(dot_real(wi, wi)));
     }
-    v->bsdf->ops->eval(v->bsdf, v->in, &d, &K);
+    v->bsdf->ops->eval(v->bsdf, in, &d, &K);
     return K;
 }
 
@@ -157,6 +193,8 @@ static real walk_moved(const struct moved *m, const struct imp_walk *walk,
         imp__decided_surface(scene, &v->d, 0, &at);
         frame_of(&at, &x0, &x, f);
         frame_of(&at, &x0, &x0, f0);
+        imp_spec in[IMP_INPUTS_MAX];
+        look_up(v, &at, &x0, &x, p, in);
         for (int i = 0; i < 3; i++) {
             p0[i] = x0.p[i];
             wo[i] = -w[i];
@@ -172,8 +210,8 @@ static real walk_moved(const struct moved *m, const struct imp_walk *walk,
                 const struct place y0 = place_of(&rest, e->shape->index, &l->located);
                 ratio = receives(p, &y, d) / receives(p0, &y0, d0);
             }
-            const imp_spec K = kernel_of(v, f, wo, d, IMP_SMOOTH),
-                           K0 = kernel_of(v, f0, wo0, d0, IMP_SMOOTH);
+            const imp_spec K = kernel_of(v, in, f, wo, d, IMP_SMOOTH),
+                           K0 = kernel_of(v, v->in, f0, wo0, d0, IMP_SMOOTH);
             for (int c = 0; c < 3; c++)
                 L += K0[c] != 0 ? adjoint[c] * T[c] * (real)v->b[c] * ratio *
                                       ((real)K[c] / (real)K0[c])
@@ -186,15 +224,15 @@ static real walk_moved(const struct moved *m, const struct imp_walk *walk,
         if (!sky) y0 = place_of(&rest, next->d.shape, &next->d.located);
         for (int i = 0; i < 3; i++)
             w[i] = w0[i] = sky ? (real)next->d.p[i] : y0.p[i] - p0[i];
-        const imp_spec K0 = kernel_of(v, f0, wo0, w0, v->d.lobe),
-                       step = kernel_of(v, f, wo, w, v->d.lobe);
+        const imp_spec K0 = kernel_of(v, v->in, f0, wo0, w0, v->d.lobe),
+                       step = kernel_of(v, in, f, wo, w, v->d.lobe);
         imp_spec met = step;
         real ratio = 1;
         if (!sky && next->d.met.emitter >= 0) {
             const struct place y = place_of(m, next->d.shape, &next->d.located);
             real to[3], to0[3];
             ratio = receives(p, &y, to) / receives(p0, &y0, to0);
-            met = kernel_of(v, f, wo, to, v->d.lobe);
+            met = kernel_of(v, in, f, wo, to, v->d.lobe);
         }
         for (int c = 0; c < 3; c++) {
             if (!(K0[c] > 0)) {
@@ -217,6 +255,7 @@ static void walks_test(const char *rest, const char *grey, const char *name,
                        void (*add)(struct imp__moves *moves))
 {
     /* The albedo of rough plastic is a table, which has kinks. */
+    const bool textured = grey && strstr(grey, "bitmap");
     const double limit = grey && strstr(grey, "roughplastic") ? 1e-4 : 1e-6;
     struct room r = room_of(rest, grey);
     test_must(ctx, imp__moved_allowed(&r.tracer));
@@ -242,7 +281,8 @@ static void walks_test(const char *rest, const char *grey, const char *name,
         double derivative = 0;
         for (size_t k = 0; k < r.moves.n; k++) derivative += bar[k] * theta[k];
         real f[4];
-        const real h = 2e-5L;
+        /* So small that no vertex slides over the border of a texel. */
+        const real h = textured ? 1e-7L : 2e-5L;
         for (int k = 0; k < 4; k++)
             f[k] = walk_moved(&(struct moved){&r, theta, difference_at[k] * h}, &walk,
                               adjoint);
@@ -319,6 +359,16 @@ static void refused(const char *rest, const char *word)
     "</bsdf></bsdf>"
 #define SHINE "<bsdf type='phong' id='grey'><float name='exponent' value='12'/></bsdf>"
 
+#define WAVES "<string name='filename' value='" IMP_SCENES "/textured/waves.png'/>"
+#define PAINT                                                                            \
+    "<bsdf type='diffuse' id='grey'><texture type='bitmap' name='reflectance'>" WAVES    \
+    "</texture></bsdf>"
+#define WORN                                                                             \
+    "<bsdf type='twosided' id='grey'><bsdf type='roughconductor'><texture "              \
+    "type='bitmap' name='alpha'>" WAVES "<boolean name='raw' value='true'/></texture>"   \
+    "<texture type='bitmap' name='specular_reflectance'>" WAVES                          \
+    "</texture></bsdf></bsdf>"
+
 int main(void)
 {
     ctx = test_context(1);
@@ -338,10 +388,16 @@ int main(void)
     walks_test(PATH, CAR, "path, principled, all", add_all);
     walks_test(PATH, MIX, "path, a blend, all", add_all);
     walks_test(PATH, SHINE, "path, phong, all", add_all);
+    walks_test(DIRECT, PAINT, "a texture, all", add_all);
+    walks_test(PATH, PAINT, "path, a texture, vertices", add_vertices);
+    walks_test(PATH SKY, WORN, "path, textured metal, all", add_all);
     refused(PATH "<emitter type='projector' id='bulb'/>", "'bulb'");
     refused(PATH
             "<bsdf type='plastic' id='wax'/><shape type='cube'><ref id='wax'/></shape>",
             "'wax'");
+    refused(PATH "<shape type='cube'><bsdf type='diffuse' id='tiles'><texture "
+                 "type='checkerboard' name='reflectance'/></bsdf></shape>",
+            "values jump");
     refused("<integrator type='ptracer'/>", "begin at the lights");
     refused("<integrator type='path'><boolean name='hide_emitters' value='true'/>"
             "</integrator>",

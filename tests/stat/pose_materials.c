@@ -90,6 +90,11 @@ static void material_test(const char *name, const struct room_parts *parts,
     "<bsdf type='principled' id='grey'><rgb name='base_color' value='.6,.3,.2'/><float " \
     "name='roughness' value='.5'/><float name='metallic' value='.4'/></bsdf>"
 
+#define WAVES "<string name='filename' value='" IMP_SCENES "/textured/waves.png'/>"
+#define PAINT                                                                            \
+    "<bsdf type='diffuse' id='grey'><texture type='bitmap' name='reflectance'>" WAVES    \
+    "</texture></bsdf>"
+
 int main(int argc, char **argv)
 {
     const bool more = argc > 1 && strcmp(argv[1], "long") == 0;
@@ -100,6 +105,7 @@ int main(int argc, char **argv)
                                    sky = {.rest = DIRECT SKY, .grey = METAL},
                                    grain = {.rest = DIRECT, .grey = GRAIN},
                                    wax = {.rest = PATH, .grey = WAX},
+                                   paint = {.rest = PATH, .grey = PAINT},
                                    car = {.rest = DIRECT, .grey = CAR};
     ctx = test_context(2);
     for (int p = 0; p < WIDTH * HEIGHT; p++)
@@ -119,6 +125,7 @@ int main(int argc, char **argv)
         material_test("rough metal", &metal, few, 4, 0.06);
     }
     material_test("metal with a grain", &grain, few, 4, 0.05);
+    material_test("a texture", &paint, few, 4, 0.05);
     imp_context_destroy(ctx);
     return tap_done();
 }

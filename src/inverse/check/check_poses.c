@@ -16,8 +16,9 @@
 #define FROZEN_LIMIT 1e-6
 #define TINY                                                                             \
     1e-3 /* of a walk's value per scale of a number: smaller slopes are rounding */
-#define N_STEPS 3
-static const double steps[N_STEPS] = {1e-2, 1e-3, 1e-4};
+#define N_STEPS                                                                          \
+    5 /* the last ones for vertices that slide fast, seen at a grazing angle */
+static const double steps[N_STEPS] = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
 
 /* One pose, scale, place or direction of a light, moved by h along one of its numbers. */
 struct moved {
@@ -99,7 +100,7 @@ static struct imp__glued vertex_glued(const struct imp_scene *scene,
 {
     struct imp__glued x = imp__glued_at(scene, v->d.shape, &v->d.located, v->ng);
     struct imp_surface at;
-    if (v->bsdf && !imp__is_lambertian(v->bsdf) &&
+    if (v->bsdf && !imp__is_plain(v->bsdf) &&
         imp__decided_surface(scene, &v->d, time, &at))
         x.s = at.s;
     return x;
@@ -130,22 +131,56 @@ static double receives(imp_v3 x, imp_v3 y, imp_v3 n_y)
     return imp__dot(n_y, r) / (d * d * d);
 }
 
-/* The kernel of a vertex over that at its recorded place, by lanes: between o and w, unit, now and
- * then. */
-static imp_spec kernel_ratio(const struct imp_vertex *v, const struct at *now,
-                             const imp_v3 o[2], const imp_v3 w[2],
-                             const struct imp__glued *then, int lobe)
+/* What the material looks up at x: of a shape that has moved since, where this point of it was when
+ * the walk was recorded. */
+static void looked_up(const struct moved *m, const struct imp_vertex *v, imp_v3 x,
+                      bool moved, const struct imp__glued *then, imp_spec *in)
 {
-    if (imp__is_lambertian(v->bsdf))
+    const struct imp_scene *scene = m->c->problem->scene;
+    struct imp_texcoord at = imp__vertex_at(v);
+    struct imp_surface old;
+    imp_v3 grad[2];
+    if (moved && then->shape == m->shape) {
+        const double *R = m->turn;
+        const imp_v3 r = x - m->to;
+        x = m->pose->kind == IMP_POSE_SCALE
+                ? m->from + r * (1 / m->by)
+                : m->from + imp__v3(R[0] * r[0] + R[3] * r[1] + R[6] * r[2],
+                                    R[1] * r[0] + R[4] * r[1] + R[7] * r[2],
+                                    R[2] * r[0] + R[5] * r[1] + R[8] * r[2]);
+    }
+    if (then->curvature !=
+        0) { /* the point itself, as one that a ray of no length hits */
+        const struct imp_hit hit = {.t = 0};
+        v->shape->ops->surface(v->shape, &hit, &x, &(imp_v3){0}, &old);
+        at.uv[0] = old.uv[0];
+        at.uv[1] = old.uv[1];
+    } else if (imp__decided_surface(scene, &v->d, 0, &old)) {
+        imp__surface_grad(&old, grad);
+        for (int k = 0; k < 2; k++) at.uv[k] += imp__dot(grad[k], x - then->p);
+    }
+    imp__inputs_eval(v->bsdf->input, v->bsdf->n_in, &at, in);
+}
+
+/* The kernel of a vertex, now at x, over that at its recorded place, by lanes: between o and w, unit,
+ * now and then. */
+static imp_spec kernel_ratio(const struct moved *m, const struct imp_vertex *v,
+                             const struct at *now, imp_v3 x, const imp_v3 o[2],
+                             const imp_v3 w[2], const struct imp__glued *then, int lobe)
+{
+    imp_spec in[IMP_INPUTS_MAX];
+    if (imp__is_plain(v->bsdf))
         return imp__spec(imp__dot(now->n, w[0]) / imp__dot(then->n, w[1]));
     imp_spec K[2];
+    const bool textured = imp__is_textured(v->bsdf);
     for (int k = 0; k < 2; k++) {
+        if (textured) looked_up(m, v, k ? then->p : x, k == 0, then, in);
         const imp_v3 n = k ? then->n : now->n, across = k ? then->s : now->s;
         const imp_v3 s = imp__normalize(across - n * imp__dot(n, across));
         const struct imp_frame f = {s, imp__cross(n, s), n};
         const struct imp_dirs d = {imp__to_local(&f, -o[k]), imp__to_local(&f, w[k]),
                                    lobe, 0};
-        v->bsdf->ops->eval(v->bsdf, v->in, &d, &K[k]);
+        v->bsdf->ops->eval(v->bsdf, textured ? in : v->in, &d, &K[k]);
     }
     for (int c = 0; c < 4; c++) K[0][c] = K[1][c] != 0 ? K[0][c] / K[1][c] : 0;
     return K[0];
@@ -215,10 +250,10 @@ static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spe
         if (v->d.connection == IMP_CONNECTED) {
             imp_v3 to[2];
             const double ratio = light_ratio(m, v, &old, x, to);
-            value +=
-                ratio * imp__sum_used(
-                            P * v->b * kernel_ratio(v, &here, from, to, &old, IMP_SMOOTH),
-                            scene->lanes);
+            value += ratio * imp__sum_used(P * v->b *
+                                               kernel_ratio(m, v, &here, x, from, to,
+                                                            &old, IMP_SMOOTH),
+                                           scene->lanes);
         }
         P *= v->w;
         const struct imp_vertex *next = v->next;
@@ -226,7 +261,7 @@ static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spe
         const bool sky = next->d.scatterer == IMP_AT_SKY;
         const struct imp__glued ahead = sky ? old : vertex_glued(scene, next, walk->time);
         w[0] = w[1] = sky ? imp__decided_v3(next->d.p) : imp__normalize(ahead.p - old.p);
-        const imp_spec step = kernel_ratio(v, &here, from, w, &old, v->d.lobe);
+        const imp_spec step = kernel_ratio(m, v, &here, x, from, w, &old, v->d.lobe);
         if (sky) {
             value += imp__sum_used(P * step * v->beyond, scene->lanes);
             break;
@@ -234,10 +269,11 @@ static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spe
         struct at there = placed(m, &ahead);
         if (next->d.met.emitter >= 0) {
             const imp_v3 to[2] = {imp__normalize(there.p - x), w[1]};
-            value += imp__sum_used(P * next->e *
-                                       kernel_ratio(v, &here, from, to, &old, v->d.lobe),
-                                   scene->lanes) *
-                     receives(x, there.p, there.n) / receives(old.p, ahead.p, ahead.n);
+            value +=
+                imp__sum_used(P * next->e *
+                                  kernel_ratio(m, v, &here, x, from, to, &old, v->d.lobe),
+                              scene->lanes) *
+                receives(x, there.p, there.n) / receives(old.p, ahead.p, ahead.n);
         }
         x = met_at(x, w[0], &there);
         P *= step;

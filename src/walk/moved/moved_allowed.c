@@ -31,9 +31,9 @@ static enum imp_status materials_allowed(const struct imp_tracer *t)
         const struct imp_shape *s = t->scene->shapes[k];
         const struct imp_bsdf *b = imp__shape_bsdf(t->scene, s);
         const char *why = imp__kernel_without_d(b, s->geometry != IMP_TRIANGLES);
+        if (!why) why = imp__textures_without_d(b, s);
+        if (!why && b->shaped) why = "has a spectrum for a number";
         if (why) return refuse(t, "material", b->name, b->ops->name, why);
-        if (b->shaped || is_textured(b->input, b->n_in))
-            return refuse(t, "material", b->name, b->ops->name, "has a texture");
     }
     return IMP_OK;
 }

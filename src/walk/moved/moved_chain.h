@@ -42,6 +42,8 @@ static inline void imp__scatter_bar(struct imp__link_point *x,
 {
     x->bar.n += kernel->n;
     x->bar.turn += kernel->turn;
+    x->moved_bar += kernel->slide;
+    x->bar.v -= kernel->slide;
 }
 
 /* Adds the adjoint of the logarithm of 1/d^2 (`bar`), and of what else depends on the unit

@@ -78,13 +78,13 @@ static imp_v3 sent_slope(const struct imp_emitter *e, imp_v3 d, int lanes)
 }
 
 /* The derivatives of vertex k's kernel towards w, from the places of the chain, which are exact to
- * each other; recorded directions are rounded. False: it is Lambertian, and w and its normal are
- * enough. */
+ * each other; recorded directions are rounded. False: it is Lambertian without textures, and w and
+ * its normal are enough. */
 static bool kernel_derive(const struct sweep *s, int k, const struct imp_vertex *v,
                           imp_v3 w, int lobe, struct imp__kernel_d *out)
 {
     struct imp_surface at;
-    if (imp_likely(imp__is_lambertian(v->bsdf)) ||
+    if (imp_likely(imp__is_plain(v->bsdf)) ||
         !imp__decided_surface(s->tracer->scene, &v->d, s->walk->time, &at))
         return false;
     const imp_v3 from = k > 0 ? s->at[k - 1].x.p : s->walk->ray.o;
@@ -92,7 +92,7 @@ static bool kernel_derive(const struct sweep *s, int k, const struct imp_vertex 
     const struct imp_dirs dirs = {
         imp__to_local(&frame, imp__normalize(from - s->at[k].x.p)),
         imp__to_local(&frame, w), lobe, 0};
-    imp__kernel_derive(v, &frame, &dirs, out);
+    imp__kernel_derive(v, &at, &dirs, out);
     return true;
 }
 
