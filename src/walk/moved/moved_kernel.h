@@ -55,7 +55,7 @@ void imp__kernel_derive(const struct imp_vertex *v, const struct imp_surface *at
 struct imp__kernel_bar imp__kernel_times(const struct imp__kernel_d *d, imp_spec bar,
                                          int lanes);
 
-/* Of a Lambertian kernel, towards the unit direction w: bar times the derivative of the logarithm of n.w. */
+/* A Lambertian kernel towards the unit direction w: bar times the derivative of the logarithm of n.w. */
 static inline struct imp__kernel_bar imp__lambert_times(imp_v3 n, imp_v3 w, double bar)
 {
     struct imp__kernel_bar out = {{0}, {0}, {0}, 0, {0}};
