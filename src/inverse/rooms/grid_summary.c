@@ -4,6 +4,7 @@
  * derivation). */
 #include "base/arguments.h"
 #include "math/stat.h"
+#include "math/vec.h"
 #include <importon/rooms.h>
 #include <math.h>
 
