@@ -201,14 +201,15 @@ static bool lifted_alike(const struct imp__lifted_texels *t, enum imp__lift_rule
     struct imp__lifter by;
     imp__lifter_make(&by);
     for (size_t i = 0; i < t->n; i++) {
+        struct imp__lifted own;
+        const struct imp__lifted *is = imp__lifted_texel(t, i, &own);
+        if (t->n > 4096 && i % 8) continue; /* to find is 1000 times as fast as to lift */
         const double rgb[3] = {t->data[3 * i], t->data[3 * i + 1], t->data[3 * i + 2]};
         const bool beyond = rgb[0] > 1 || rgb[1] > 1 || rgb[2] > 1;
         struct imp__lifted l;
         if (rule == IMP__LIFT_ANY_SIZE || (rule == IMP__LIFT_BY_SIZE && beyond))
             imp__lift_unbounded_by(&by, rgb, &l);
         else imp__lift_reflectance_by(&by, rgb, &l);
-        struct imp__lifted own;
-        const struct imp__lifted *is = imp__lifted_texel(t, i, &own);
         if (l.scale != is->scale || memcmp(l.c, is->c, sizeof l.c) != 0 ||
             memcmp(l.d_c, is->d_c, sizeof l.d_c) != 0)
             return false;
