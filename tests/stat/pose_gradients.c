@@ -169,11 +169,12 @@ static void refused_test(void)
 #define PATH   "<integrator type='path'><integer name='max_depth' value='4'/></integrator>"
 #define DIRECT "<integrator type='direct'/>"
 
-int main(void)
+int main(int argc, char **argv)
 {
+    const bool is_long = tap_is_long(argc, argv);
     ctx = test_context(2);
     adjoint_make();
-    room_test("direct", DIRECT, "type='box'", 64, 128);
+    if (is_long) room_test("direct", DIRECT, "type='box'", 64, 128);
     room_test("path, a Gaussian filter", PATH, "type='gaussian'", 64, 64);
     refused_test();
     imp_context_destroy(ctx);
