@@ -16,7 +16,8 @@
  *     jacobian    imp_problem_jacobian: the derivative pictures
  *
  * GLOB chooses the parameters. One row for values (pixels, or entries of a gradient: the medians,
- * and the quartiles of the ratio of variances) and one for the number beside them, if there is one.
+ * the quartiles of the ratio of variances, and what the means of all variances give) and one for
+ * the number beside them, if there is one.
  */
 #include <importon/importon.h>
 #include <math.h>
@@ -167,7 +168,7 @@ static void row(const char *name, const struct sums *one, const struct sums *set
 {
     double *ratio = zeros(3 * (end - from), sizeof *ratio);
     double *reported = ratio + (end - from), *reported_one = reported + (end - from),
-           z2 = 0;
+           z2 = 0, all[3] = {0, 0, 0};
     size_t n = 0;
     for (size_t i = from; i < end; i++) {
         if (!(one->m2[i] > 0) || !(sets->m2[i] > 0)) continue;
@@ -175,6 +176,9 @@ static void row(const char *name, const struct sums *one, const struct sums *set
                      b = sets->m2[i] / (sets->seeds - 1),
                      d = one->mean[i] - sets->mean[i];
         z2 += d * d / (a / one->seeds + b / sets->seeds);
+        all[0] += a;
+        all[1] += b;
+        all[2] += sets->reported[i] / sets->seeds;
         ratio[n] = b / a;
         reported[n] = sqrt(sets->reported[i] / sets->seeds / b);
         reported_one[n++] = sqrt(one->reported[i] / one->seeds / a);
@@ -184,9 +188,10 @@ static void row(const char *name, const struct sums *one, const struct sums *set
         qsort(reported, n, sizeof *reported, by_value);
         qsort(reported_one, n, sizeof *reported_one, by_value);
         printf("%-8s %6zu  variance %.3f (%.3f to %.3f)  told/seen %.3f, independent "
-               "%.3f  z^2 %.2f  time %.3f\n",
+               "%.3f  of means %.3f, %.3f  z^2 %.2f  time %.3f\n",
                name, n, ratio[n / 2], ratio[n / 4], ratio[3 * n / 4], reported[n / 2],
-               reported_one[n / 2], z2 / (double)n, sets->seconds / one->seconds);
+               reported_one[n / 2], all[1] / all[0], sqrt(all[2] / all[1]),
+               z2 / (double)n, sets->seconds / one->seconds);
     }
     free(ratio);
 }

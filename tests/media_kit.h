@@ -36,6 +36,7 @@ static inline void media_mean(imp_context *ctx, imp_scene *s, int spp, double me
     struct imp_run run = IMP_RUN_INIT;
     run.spp = spp;
     run.seed = 5;
+    run.points = IMP_POINTS_INDEPENDENT; /* variances of single samples are known */
     media_mean_run(ctx, s, &run, mean, se, IMP_DROP_NONE);
 }
 

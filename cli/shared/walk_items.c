@@ -139,8 +139,10 @@ char *walks_json(const struct imp_run *run, size_t n, const int (*pixel)[2], int
                  int *rc)
 {
     struct imp_scene_info scene = {.size = sizeof scene};
+    struct imp_run own = *run;
     char *text = NULL;
     size_t length = 0;
+    own.points = IMP_POINTS_INDEPENDENT; /* the walks of a pixel are 0, 1, 2, ... */
     enum imp_status st = imp_scene_get_info(cli.scene, &scene);
     FILE *f = st == IMP_OK ? open_memstream(&text, &length) : NULL;
     if (f) {
@@ -150,12 +152,12 @@ char *walks_json(const struct imp_run *run, size_t n, const int (*pixel)[2], int
         json_numbers(&j, NULL, 3, scene.bounds_min);
         json_numbers(&j, NULL, 3, scene.bounds_max);
         json_end_array(&j);
-        st = put_all_shares(&j, run, n, pixel, count);
+        st = put_all_shares(&j, &own, n, pixel, count);
         fputs(",\"walks\":[", f);
         for (size_t i = 0; i < n * (size_t)count && st == IMP_OK; i++) {
             const int *at = pixel[i / (size_t)count];
             char *walk = NULL;
-            st = imp_walk_describe(cli.scene, run, at[0], at[1],
+            st = imp_walk_describe(cli.scene, &own, at[0], at[1],
                                    (int64_t)(i % (size_t)count), 1, &walk);
             if (st == IMP_OK) fprintf(f, "%s%s", i ? "," : "", walk);
             imp_free(cli.context, walk);

@@ -792,14 +792,15 @@ enum imp_wavelength_sampling {
 typedef void (*imp_preview_fn)(const imp_film *picture, void *payload);
 /** The random numbers of a pixel's walks. */
 enum imp_points {
-    /** Those of the sensor's sampler; where there is none, independent for pictures, of
-     * Sobol's sequence for losses, and fits but IMP_LM, of scenes without media. */
+    /** Those of the sensor's sampler. Where there is none, or one that is called
+     * independent: independent for fits by IMP_LM, and for losses of scenes with
+     * media; of Sobol's sequence for all else. */
     IMP_POINTS_SCENE = 0,
-    IMP_POINTS_INDEPENDENT, /**< independent */
+    IMP_POINTS_INDEPENDENT, /**< independent, whatever the scene says */
     /** Sets of up to 64 points of Sobol's sequence, scrambled by Owen's method. Pixels
      * and sets are independent of each other. Means stay what they are, errors shrink;
-     * standard errors of gradients come from independent sets, those of pictures from
-     * parts of sets, and are a little too large. */
+     * standard errors come from the spread of independent sets, four of each pixel at
+     * least in pictures of 8 samples or more. */
     IMP_POINTS_SOBOL
 };
 
@@ -832,9 +833,9 @@ struct imp_run {
     const imp_guide *guide; /**< NULL: none; for path, and for light walks */
     /** For spectral modes. */
     enum imp_wavelength_sampling wavelengths;
-    /** Walks of a pixel among which wavelengths are stratified; 0: a quarter of the
-     * samples per pixel, at most 16. Standard errors come from the spread of such
-     * sets. */
+    /** Independent walks of a pixel among which wavelengths are stratified; 0: a quarter of
+     * the samples per pixel, at most 16. Standard errors come from the spread of such
+     * sets. With IMP_POINTS_SOBOL wavelengths are stratified in the sets of points. */
     int wavelength_set;
     /** For pictures: called with the picture after 1, 2, 4, ... passes of 64 samples
      * (with a time limit, of 4);
@@ -883,7 +884,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_denoiser_check(imp_context *context);
 
 /** One walk, vertex by vertex, as text (json 0) or JSON: sample number `sample` of pixel
  * (x, y) of the picture, the same walk that renders and gradients of run->seed use
- * (losses of scenes without a sampler: with run->points IMP_POINTS_SOBOL). Pixels
+ * (losses of scenes with media: with run->points IMP_POINTS_INDEPENDENT). Walk j of set s
+ * of points has the number 64 s + j. Pixels
  * of the border that a film with sample_border samples for its filter have numbers below
  * 0 and from the width, or height, on. The caller frees *text with imp_free.
  * @return IMP_OK; IMP_E_ARG for a pixel outside these; IMP_E_SCENE if the

@@ -866,7 +866,7 @@ struct imp_sensor {
     bool photometric;             /* readings are luminances, in lux or cd/m^2 */
     const struct imp_camera_gain
         *gain; /* exposure and its like, between radiance and picture; NULL: 1 */
-    enum imp_points points; /* its sampler's; IMP_POINTS_SCENE: it has none */
+    enum imp_points points; /* its sampler's; IMP_POINTS_SCENE: it names none */
     /* The scene's: its rays have times from `open` to `close`, evenly or as `course`. */
     double open, close;
     const struct imp_course *course;

@@ -83,7 +83,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_report_data(imp_context *context,
  * @param[out] share_se   [imp_scene_n_params], one standard error.
  * @param[out] radiance   R.
  * @param[out] walk_share [n_walks][imp_scene_n_params] x dL/dx of the pixel's first walks
- *                        (those of imp_walk_describe), in units of radiance; may be NULL
+ *                        (those of imp_walk_describe in their order, with IMP_POINTS_SOBOL those of
+ *                        the first sets), in units of radiance; may be NULL
  *                        for no walks.
  * @return IMP_OK; IMP_E_ARG without an active parameter, for a pixel that is not there,
  *         or more walks than run->spp; what imp_problem_reverse refuses; IMP_E_NOMEM.

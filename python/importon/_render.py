@@ -46,11 +46,11 @@ def render(scene: Scene, params: Any = None, sensor: Any = 0, integrator: None =
         Of scenes in a spectral mode: "stratified" (within a pixel), "independent" or
         "importance" (by response times light).
     wavelength_set : int
-        Walks of a pixel among which wavelengths are stratified; 0: a quarter of the samples
+        Independent walks of a pixel among which wavelengths are stratified; 0: a quarter of the samples
         per pixel, at most 16.
     points : str
-        Random numbers of a pixel's walks: "scene" (what its sampler asks for), "independent",
-        or "sobol" (sets of scrambled points: less noise, the same mean).
+        Random numbers of a pixel's walks: "scene" (its sampler's; where that is "independent", or
+        there is none, those of least noise), "independent", or "sobol" (sets of scrambled points).
     walks_from : str
         The end at which walks begin: "scene" (what its integrator says), "sensor" or
         "lights".

@@ -134,7 +134,7 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
                                 .integrator = from,
                                 .from_lights = from && from->from_lights,
                                 .names = (char *)names.text.bytes.data};
-    struct imp_tracer tracer = {.scene = scene};
+    struct imp_tracer tracer = {.scene = scene, .sensor = sensor};
     const int64_t samples = imp__walks_of(run, sensor);
     imp__tracer_numbers(&tracer, run, samples);
     if (run->walks) {

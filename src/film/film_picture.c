@@ -4,13 +4,13 @@
  * the first 2^k passes are a node of the tree over passes, so what is there and the next
  * sweep are its two children, and one set of sums is enough for a picture that can be had
  * at any time. */
-#include "film_nets.h"
 #include "film_patch.h"
 #include <float.h>
 #include <stdio.h>
 #include <string.h>
 
 #define PASS_SPP       64
+#define PASS_SETS      4 /* at least, through wide filters: errors are taken within a pass */
 #define PASS_SPP_TIMED 4
 
 /* Wide filters: tiles of a large picture are larger, so that their borders take less. */
@@ -37,7 +37,6 @@ struct render {
     int sets, pass_sets; /* in all of them, in a pass */
     double *set_values;  /* [threads][n] box: sums of a set */
     double *set_patches; /* [threads] as patches, of a set: sums of w and w v alone */
-    double *parts;       /* [threads][IMP_NET_PARTS][n] nets: sums of the quarters */
     int sweep_spp;       /* samples of a pixel in the sweep at work */
 };
 
@@ -111,24 +110,11 @@ static void set_take(const struct render *r, const struct imp_tile *t, int worke
     }
 }
 
-/* Sample k of a pixel, in the quarter of its net; the net's last adds to the tile's sums. */
-static void net_take(const struct render *r, int worker, const struct imp_sample *s,
-                     int k, double *sums)
-{
-    const int n = r->patch.n, of = r->set * IMP_NET_PARTS, at = k % of;
-    const size_t size = IMP_NET_PARTS * (size_t)n;
-    double *parts = r->parts + (size_t)worker * apart(size);
-    if (at == 0) memset(parts, 0, size * sizeof *parts);
-    for (int c = 0; c < n; c++) parts[at / r->set * n + c] += s->value[c];
-    if (at + 1 == of) imp__nets_add(sums, parts, n);
-}
-
 /* First sample of a pass; passes end with sets. */
 static int pass_begin(const struct render *r, int pass)
 {
     if (r->set > 1 && r->sets > 0)
-        return (int)(imp_min((int64_t)pass * r->pass_sets, (int64_t)r->sets) * r->period /
-                     r->sets);
+        return (int)((int64_t)r->sets * pass / r->passes * r->period / r->sets);
     return (int)imp_min((int64_t)pass * r->pass_spp, (int64_t)r->spp);
 }
 
@@ -144,17 +130,16 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
     double *patch = r->patches + (size_t)w->index * apart(imp__patch_size(&r->patch));
     struct imp_sample s = {.arena = &w->arena,
                            .value = r->values + (size_t)w->index * apart((size_t)n)};
-    memset(tile, 0, imp__film_sums_tile(&r->sums) * sizeof *tile);
+    memset(tile, 0, imp__film_sums_pixels(&r->sums) * sizeof *tile);
     for (s.y = t->y0; s.y < t->y1; s.y++)
         for (s.x = t->x0; s.x < t->x1; s.x++) {
             double *own =
                 tile + (size_t)((s.y - t->y0) * r->patch.tile_side + s.x - t->x0) * 2 *
                            (size_t)n;
             for (int k = s0; k < s1; k++) {
-                s.index = r->picture->first + (int64_t)k * step;
+                s.index = r->picture->points ? imp__set_number(r->set, r->period, k)
+                                             : r->picture->first + (int64_t)k * step;
                 sample_take(r, w, &s);
-                if (r->sums.nets)
-                    net_take(r, w->index, &s, k, tile + imp__film_sums_pixels(&r->sums));
                 if (imp_unlikely(r->set > 1)) {
                     if (k == s0 || k >= first + n_set)
                         imp__set_at(r->set, r->period, k, &first, &n_set);
@@ -182,7 +167,7 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
 static void tile_add(void *into, const void *from, void *payload)
 {
     const struct render *r = payload;
-    const size_t n = imp__film_sums_tile(&r->sums);
+    const size_t n = imp__film_sums_pixels(&r->sums);
     double *a = into;
     const double *b = from;
     for (size_t k = 0; k < n; k++) a[k] += b[k];
@@ -216,9 +201,10 @@ static enum imp_status render_plan(struct render *r, imp_context *ctx)
     r->set = imp_max(p->set, 1);
     r->pass_spp = run->time_limit_s > 0 ? PASS_SPP_TIMED : PASS_SPP;
     r->sets = r->period > 0 ? (int)imp_max(r->period / r->set, (int64_t)1) : 0;
-    r->pass_sets = imp_max(r->pass_spp / r->set, 1);
+    r->pass_sets =
+        imp_max(r->pass_spp / r->set, r->sets > 0 && r->patch.border > 0 ? PASS_SETS : 1);
     if (r->set > 1 && r->sets == 0) r->pass_spp = r->pass_sets * r->set;
-    r->passes = r->set > 1 && r->sets > 0 ? (r->sets - 1) / r->pass_sets + 1
+    r->passes = r->set > 1 && r->sets > 0 ? imp_max(r->sets / r->pass_sets, 1)
                                           : (r->spp - 1) / r->pass_spp + 1;
     r->tiles =
         (struct imp_tiles){.ctx = ctx,
@@ -242,10 +228,9 @@ static enum imp_status render_plan(struct render *r, imp_context *ctx)
                                .margin = r->tiles.margin,
                                .side = r->patch.tile_side,
                                .set = r->sets > 0 ? (double)r->period / r->sets : r->set,
-                               .nets = p->nets && imp__nets_whole(r->period, r->set),
                                .across = r->tiles.across,
                                .down = r->tiles.down};
-    r->tiles.size = imp__film_sums_tile(&r->sums) * sizeof(double);
+    r->tiles.size = imp__film_sums_pixels(&r->sums) * sizeof(double);
     return st;
 }
 
@@ -265,12 +250,6 @@ static enum imp_status buffers_create(struct render *r, imp_context *ctx)
                                    apart((size_t)r->patch.n) * sizeof(double));
         r->set_patches = imp__alloc(ctx, (size_t)ctx->threads,
                                     apart(imp__patch_size(&r->patch)) * sizeof(double));
-    }
-    if (r->sums.nets) {
-        r->parts = imp__alloc(ctx, (size_t)ctx->threads,
-                              apart(IMP_NET_PARTS * (size_t)r->patch.n) * sizeof(double));
-        if (!r->parts)
-            return imp__error(ctx, IMP_E_NOMEM, "no memory for sets of samples");
     }
     if (!r->values || !r->patches || (r->set > 1 && (!r->set_values || !r->set_patches)))
         return imp__error(ctx, IMP_E_NOMEM, "no memory for samples of %d channels",
@@ -292,8 +271,9 @@ static int sweep_passes(const struct render *r, int done)
 /* Were errors of a wide filter taken within strata? */
 static bool in_strata(const struct render *r)
 {
-    return r->patch.border > 0 && imp_min(r->spp, r->pass_spp) > r->set &&
-           (r->sets == 0 || r->sets > 1);
+    return r->patch.border > 0 &&
+           (r->set > 1 && r->sets > 0 ? r->sets > 1
+                                      : imp_min(r->spp, r->pass_spp) > r->set);
 }
 
 /* Between sweeps, show what is there. */
@@ -401,6 +381,5 @@ out:
     imp__release(ctx, r.patches);
     imp__release(ctx, r.set_values);
     imp__release(ctx, r.set_patches);
-    imp__release(ctx, r.parts);
     return st;
 }

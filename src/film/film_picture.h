@@ -34,7 +34,9 @@ struct imp_picture {
     /* Consecutive samples of a pixel that depend on each other, from the first on: errors
      * come from the spread of such sets. 0: none do. */
     int set;
-    bool nets; /* a pixel's samples are nets of points */
+    bool
+        points; /* these sets are sets of points: samples are numbered by imp__set_number,
+                    and `first` and `step` are not used */
 };
 
 /* out [n_films]. A value that is not finite or beyond float is a dropped walk

@@ -46,7 +46,7 @@ enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
                                             .sample = imp__measure_sample,
                                             .payload = &measure,
                                             .set = measure.set,
-                                            .nets = measure.tracer.points != NULL};
+                                            .points = imp__tracer_sets(&measure.tracer)};
         st = imp__picture_make(scene->ctx, &picture, &own, out);
     }
     imp__measure_destroy(&measure);

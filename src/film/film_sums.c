@@ -2,11 +2,7 @@
  *
  * Sums of pictures, added tile by tile, and the means and errors that follow. */
 #include "film_sums.h"
-#include "film_nets.h"
 #include <string.h>
-
-/* Tiles on each side whose pixels a factor of errors comes from. */
-#define AROUND 2
 
 static size_t pixels_of(const struct imp_film_sums *s)
 {
@@ -24,13 +20,12 @@ static size_t tiles_of(const struct imp_film_sums *s)
 double imp__film_sums_bytes(const struct imp_film_sums *s)
 {
     const double pixels = (double)pixels_of(s), n = s->n;
-    const double tile = sizeof *s->count + (s->nets ? 3 * n * sizeof(double) : 0);
-    const double tiles = (double)s->across * s->down;
+    const double counts = (double)s->across * s->down * sizeof *s->count;
     const double film = (double)s->n / s->n_films * sizeof(float);
     /* box: one film's means or errors are there beside all sums; wide: all films are */
-    if (s->border == 0) return pixels * (n * 2 * sizeof(double) + film) + tiles * tile;
+    if (s->border == 0) return pixels * (n * 2 * sizeof(double) + film) + counts;
     return (double)s->down * (double)row_doubles(s) * sizeof(double) +
-           pixels * n * 2 * sizeof(float) + tiles * tile;
+           pixels * n * 2 * sizeof(float) + counts;
 }
 
 enum imp_status imp__film_sums_create(struct imp_film_sums *s)
@@ -39,11 +34,6 @@ enum imp_status imp__film_sums_create(struct imp_film_sums *s)
     const size_t C = (size_t)(s->n / s->n_films);
     s->count = imp__alloc(s->ctx, tiles_of(s), sizeof *s->count);
     bool fine = s->count;
-    if (s->nets) {
-        s->nested = imp__alloc(s->ctx, tiles_of(s), 2 * (size_t)s->n * sizeof(double));
-        s->factor = imp__alloc(s->ctx, tiles_of(s), (size_t)s->n * sizeof(double));
-        fine = fine && s->nested && s->factor;
-    }
     if (s->border == 0) {
         s->sum = imp__alloc(s->ctx, films, sizeof *s->sum);
         s->square = imp__alloc(s->ctx, films, sizeof *s->square);
@@ -81,10 +71,7 @@ void imp__film_sums_destroy(struct imp_film_sums *s)
     array_free(s->ctx, &s->square, s->n_films);
     array_free(s->ctx, &s->rows, s->down);
     imp__release(s->ctx, s->count);
-    imp__release(s->ctx, s->nested);
-    imp__release(s->ctx, s->factor);
     s->count = NULL;
-    s->nested = s->factor = NULL;
 }
 
 /* ---- Sums of a tile ------------------------------------------------------------- */
@@ -113,9 +100,8 @@ static void box_add(struct imp_film_sums *s, size_t tile, const double *in, bool
 void imp__film_sums_add(struct imp_film_sums *s, size_t tile, const double *in, int count)
 {
     const bool first = s->count[tile] == 0;
-    const size_t n = imp__film_sums_pixels(s), nets = s->nets ? 2 * (size_t)s->n : 0;
+    const size_t n = imp__film_sums_pixels(s);
     s->count[tile] += count;
-    for (size_t k = 0; k < nets; k++) s->nested[tile * nets + k] += in[n + k];
     if (s->border == 0) {
         box_add(s, tile, in, first);
         return;
@@ -146,38 +132,6 @@ static double freedom_of(bool strata, double W, double W2)
     const double n_eff = W2 > 0 ? W * W / W2 : 0;
     return strata ? 1 : n_eff > 1 ? n_eff / (n_eff - 1) : INFINITY;
 }
-/* Factors of the errors of a tile, from the sums of the tiles around it. */
-static void factors_of(struct imp_film_sums *s, int i, int j)
-{
-    const int i0 = imp_max(i - AROUND, 0), i1 = imp_min(i + AROUND, s->across - 1);
-    const int j0 = imp_max(j - AROUND, 0), j1 = imp_min(j + AROUND, s->down - 1);
-    const size_t n = (size_t)s->n, across = (size_t)s->across;
-    double *factor = s->factor + ((size_t)j * across + (size_t)i) * n;
-    for (size_t c = 0; c < n; c++) {
-        double sums[2] = {0, 0};
-        for (int y = j0; y <= j1; y++)
-            for (int x = i0; x <= i1; x++) {
-                const double *at =
-                    s->nested + 2 * (((size_t)y * across + (size_t)x) * n + c);
-                sums[0] += at[0];
-                sums[1] += at[1];
-            }
-        factor[c] = imp__nets_factor(sums);
-    }
-}
-static void factors_make(struct imp_film_sums *s)
-{
-    for (int j = 0; s->nets && j < s->down; j++)
-        for (int i = 0; i < s->across; i++) factors_of(s, i, j);
-}
-/* Those of a pixel's channels [n]; NULL: 1. */
-static const double *factors_at(const struct imp_film_sums *s, int x, int y)
-{
-    const int i = (x + s->margin) / s->side, j = (y + s->margin) / s->side;
-    return s->nets
-               ? s->factor + ((size_t)j * (size_t)s->across + (size_t)i) * (size_t)s->n
-               : NULL;
-}
 static float error_of(double freedom, double W, double spread)
 {
     return isfinite(freedom) && W != 0
@@ -205,8 +159,6 @@ static enum imp_status box_row(size_t item, int worker, int slot, void *payload)
         const size_t pixel = y * (size_t)s->width + x;
         const double W = count[x / (size_t)s->side], q = s->set;
         const double freedom = freedom_of(false, W, W * q);
-        const double *factor = factors_at(s, (int)x, (int)y);
-        if (factor) factor += (size_t)f->film * C;
         if (f->weights) f->weights[pixel] = W;
         for (size_t k = pixel * C; k < (pixel + 1) * C; k++) {
             const double sum = W != 0 ? s->sum[f->film][k] : 0;
@@ -215,7 +167,6 @@ static enum imp_status box_row(size_t item, int worker, int slot, void *payload)
                 const double square = W != 0 ? s->square[f->film][k] : 0;
                 const double spread = square - 2 * (q * mean) * sum + q * mean * mean * W;
                 film->se[k] = error_of(freedom, W, spread);
-                if (factor) film->se[k] *= (float)factor[k - pixel * C];
             } else {
                 film->mean[k] = (float)mean;
                 if (!isfinite(film->mean[k]))
@@ -284,7 +235,6 @@ static enum imp_status wide_row(size_t item, int worker, int slot, void *payload
         const size_t pixel = (size_t)y * (size_t)s->width + (size_t)x;
         wide_gather(s, x, y, t);
         const double W = t[0], freedom = freedom_of(f->strata, W, t[1]);
-        const double *factor = factors_at(s, x, y);
         if (f->weights) f->weights[pixel] = W;
         for (int c = 0; c < s->n; c++) {
             const double *v = t + 2 + 3 * c;
@@ -294,7 +244,6 @@ static enum imp_status wide_row(size_t item, int worker, int slot, void *payload
             const size_t k = pixel * (size_t)C + (size_t)(c % C);
             film->mean[k] = (float)mean;
             film->se[k] = error_of(freedom, W, spread);
-            if (factor) film->se[k] *= (float)factor[c];
             if (!isfinite(film->mean[k])) return not_finite(film, pixel, c % C);
         }
     }
@@ -336,7 +285,6 @@ enum imp_status imp__film_sums_finish(struct imp_film_sums *s, bool strata,
                                       double *weights, imp_film **films)
 {
     struct finish f = {.s = s, .strata = strata, .weights = weights, .films = films};
-    factors_make(s);
     return s->border == 0 ? box_finish(&f) : wide_finish(&f);
 }
 
@@ -344,6 +292,5 @@ enum imp_status imp__film_sums_look(struct imp_film_sums *s, bool strata,
                                     imp_film **films)
 {
     struct finish f = {.s = s, .strata = strata, .films = films, .keep = true};
-    factors_make(s);
     return s->border == 0 ? box_finish(&f) : wide_finish(&f);
 }

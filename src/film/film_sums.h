@@ -17,8 +17,6 @@
  * Samples that depend on each other come in sets; then a set takes the place of a
  * sample, with the sums of its w and w v. With a box filter and sets of q samples the
  * squares are those of sets:  se^2 = R/(R - 1) [sum S^2 - q m^2 N] / N^2,  R = N/q.
- * Where sets are quarters of nets of points, that is an upper bound, and a factor for each tile
- * and channel brings it nearer (film_nets.h).
  *
  * Order of the sums: over the passes of a tile in a fixed binary tree; then, of the tiles
  * that reach a pixel through a wide filter, in the tiles' order. Tiles keep their sums
@@ -38,10 +36,7 @@ struct imp_film_sums {
     int border;                     /* reach of the filter in pixels; 0: box */
     int margin, side, across, down; /* of the tiles */
     double set;                     /* samples of a set, in the mean */
-    bool nets;                      /* sets are quarters of nets (film_nets.h) */
     int32_t *count; /* [tiles] samples of a pixel that are in, 0: nothing is known */
-    double *nested; /* nets: [tiles][n][2] of imp__nets_add */
-    double *factor; /* nets, in the end: [tiles][n] of the errors */
     /* box: of film f, [height][width][n / n_films] */
     double **sum, **square;
     /* wide: rows of tiles, [across][side + 2 border]^2[IMP_WIDE_SUMS] */
@@ -58,11 +53,6 @@ static inline size_t imp__film_sums_pixels(const struct imp_film_sums *s)
 {
     const size_t side = (size_t)(s->side + 2 * s->border), n = (size_t)s->n;
     return side * side * (s->border ? IMP_WIDE_SUMS(n) : 2 * n);
-}
-/* Doubles of a tile's result: behind its pixels [n][2] of imp__nets_add, with nets. */
-static inline size_t imp__film_sums_tile(const struct imp_film_sums *s)
-{
-    return imp__film_sums_pixels(s) + (s->nets ? 2 * (size_t)s->n : 0);
 }
 /* Bytes of it all, the films made in the end included. */
 double imp__film_sums_bytes(const struct imp_film_sums *s);

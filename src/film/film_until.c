@@ -17,6 +17,7 @@
 #include "base/film.h"
 #include "film_filter.h"
 #include "film_measure.h"
+#include "math/stat.h"
 #include "walk/core/walk_integrator.h"
 #include "walk/run/interim_looks.h"
 #include <math.h>
@@ -32,8 +33,38 @@ static double sharing(const imp_scene *scene, const struct imp_run *run,
     return channels * side * side;
 }
 
-/* Bound of the error, over the picture's length, which is longer by its own noise. */
-static double bound(const struct imp__looks *l, const imp_film *film, double share)
+/* Sum of the squared standard errors, and its degrees of freedom: each of a film has sets - 1, and
+ * their sum S^2/(c Q) times as many at least (Satterthwaite, Biometrics Bulletin 2, 1946). */
+struct spread {
+    double S, freedom;
+};
+
+static struct spread spread_of(const imp_film *film, double share)
+{
+    struct spread s = {0, film->sets > 1 ? (double)film->sets - 1 : INFINITY};
+    double Q = 0;
+    for (size_t i = 0; i < imp__film_values(film); i++) {
+        const double v = imp__sqr((double)film->se[i]);
+        s.S += v;
+        Q += v * v;
+    }
+    if (share > 0 && Q > 0) s.freedom *= fmax(1, s.S * s.S / (share * Q));
+    return s;
+}
+
+/* s: of the mean with another film of weight w. */
+static void spread_mix(struct spread *s, struct spread other, double w)
+{
+    const double a = (1 - w) * (1 - w) * s->S, b = w * w * other.S;
+    s->S = a + b;
+    s->freedom =
+        s->S > 0 ? s->S * s->S / (a * a / s->freedom + b * b / other.freedom) : INFINITY;
+}
+
+/* Bound of the error, over the picture's length, which is longer by its own noise. What bounds a
+ * normal number bounds one of Student's distribution if its error is longer by `widen`. */
+static double bound(const struct imp__looks *l, const imp_film *film, double share,
+                    double freedom)
 {
     double S = 0, Q = 0, M = 0, most = 0;
     for (size_t i = 0; i < imp__film_values(film); i++) {
@@ -43,11 +74,13 @@ static double bound(const struct imp__looks *l, const imp_film *film, double sha
         most = fmax(most, v);
         M += imp__sqr((double)film->mean[i]);
     }
-    double E = imp__sqr(imp__looks_z(l)) * S;
+    const double z = imp__looks_z(l), widen = imp__student_of_normal(z, freedom) / z;
+    double E = z * z * S;
     if (share > 0) {
         const double x = -log(imp__looks_risk(l));
         E = fmin(E, S + 2 * sqrt(share * Q * x) + 2 * x * fmin(S, share * most));
     }
+    E *= widen * widen;
     return M > S ? sqrt(E / (M - S)) : INFINITY; /* darkness may be light not yet found */
 }
 
@@ -74,6 +107,7 @@ enum imp_status imp_render_until(const imp_scene *scene, const struct imp_run *r
     struct imp_run own;
     struct imp__looks l;
     const struct imp_sensor *sensor;
+    struct spread spread = {0, INFINITY};
     imp_film *all = NULL, *film = NULL;
     IMP_REQUIRE(NULL, scene, "scene");
     IMP_REQUIRE(scene->ctx, out, "out");
@@ -97,16 +131,20 @@ enum imp_status imp_render_until(const imp_scene *scene, const struct imp_run *r
                                 __func__);
             goto out;
         }
+        const double share = sharing(scene, &own, sensor, film->channels);
+        const struct spread own_spread = spread_of(film, share);
         if (!all) {
             all = film;
+            spread = own_spread;
             l.end.spp = film->spp; /* the time may have been up */
         } else {
+            spread_mix(&spread, own_spread, imp__looks_weight(&l));
             film_mix(all, film, imp__looks_weight(&l));
             imp_film_destroy(film);
         }
         film = NULL;
         if (st == IMP_CANCELLED) break;
-        imp__looks_bound(&l, bound(&l, all, sharing(scene, &own, sensor, all->channels)));
+        imp__looks_bound(&l, bound(&l, all, share, spread.freedom));
         if (own.preview) own.preview(all, own.preview_payload);
     }
 out:

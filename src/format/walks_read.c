@@ -77,11 +77,12 @@ static enum imp_status head_take(struct reading *r)
             imp__error(ctx, IMP_E_SCENE,
                        "%s: recorded walks of version %u; this program reads version %d",
                        path, h->version, IMP_WALKS_VERSION));
-    if (h->spp < 0 || h->points < 0 || h->points > IMP_POINTS_SOBOL ||
-        h->wavelengths < 0 || h->wavelengths > IMP_WAVELENGTHS_IMPORTANCE ||
-        h->wavelength_set < 0 || h->losses < 0 || h->losses > 1 || h->n_stores < 1 ||
-        h->guided < 0 || h->guided > 1 || h->reserved != 0 ||
-        !(h->survival >= 0 && h->survival <= 1) || !(h->ess >= 0 && h->ess <= 1) ||
+    if (h->spp < 0 || h->points < IMP_POINTS_INDEPENDENT ||
+        h->points > IMP_POINTS_SOBOL || h->wavelengths < 0 ||
+        h->wavelengths > IMP_WAVELENGTHS_IMPORTANCE || h->wavelength_set < 0 ||
+        h->losses < 0 || h->losses > 1 || h->n_stores < 1 || h->guided < 0 ||
+        h->guided > 1 || h->reserved != 0 || !(h->survival >= 0 && h->survival <= 1) ||
+        !(h->ess >= 0 && h->ess <= 1) ||
         !(h->headroom >= 0 && h->headroom <= IMP_HEADROOM_MOST) ||
         h->n_theta > SIZE_MAX / 16)
         IMP_TRY(damaged(r, "its head"));

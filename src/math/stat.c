@@ -100,3 +100,10 @@ double imp__normal_of_student(double t, double k)
     const double z = (8 * k + 1) / (8 * k + 3) * sqrt(k * log1p(t * t / k));
     return copysign(z, t);
 }
+
+double imp__student_of_normal(double z, double k)
+{
+    if (isinf(k) || z == 0 || isinf(z)) return z;
+    const double s = z * (8 * k + 3) / (8 * k + 1);
+    return copysign(sqrt(k * expm1(s * s / k)), z);
+}

@@ -11,6 +11,8 @@ double imp__normal_quantile(double p);
  * freedom (Wallace 1959, Ann. Math. Statist. 30, 1124): to 2 %
  * for k >= 3. */
 double imp__normal_of_student(double t, double k);
+/* Its inverse. */
+double imp__student_of_normal(double z, double k);
 /* Regularised upper incomplete gamma function Q(a, x), a > 0, x >= 0. */
 double imp__gamma_q(double a, double x);
 /* P(X >= x) for chi-square with k degrees of freedom. */

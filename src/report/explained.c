@@ -19,9 +19,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define CORRELATED 4.
-#define LIMIT      4.
-#define CERTAIN    1e-3 /* relative: half floats stay below */
+#define CORRELATED    4.
+#define LIMIT         4.
+#define LEAST_FREEDOM 3.   /* of 2 and fewer a ratio has no mean */
+#define CERTAIN       1e-3 /* relative: half floats stay below */
 enum { SIDE_MAX = 32, BLOCK_MIN = 4, REGIONS = 5, CHANNELS = 4, SAMPLES_MIN = 8 };
 
 struct pair { /* colour channels of both: index, and of the error; -1: none */
@@ -78,7 +79,7 @@ static double error_at(const struct pair *p, int side, size_t pixel, int c)
 
 struct block {
     double difference, target; /* sums over pixels and channels */
-    double dd, ss;             /* of d^2 and of s^2 */
+    double dd, ss, s4;         /* of d^2, s^2 and s^4 */
     double variance;           /* of the sum over pixels of the channels' mean */
     double pixels;
     double certain; /* numbers without noise that differ */
@@ -111,6 +112,7 @@ static void pixel_take(const struct pair *p, struct sums *s, size_t pixel,
             s->n += 1;
             b->dd += (v - t) * (v - t);
             b->ss += size * size;
+            b->s4 += pow(size, 4);
         } else {
             s->left_out += 1;
             b->certain += fabs(v - t) > CERTAIN * fmax(fabs(v), fabs(t));
@@ -257,15 +259,30 @@ static int ascending(const void *p, const void *q)
     return (a > b) - (a < b);
 }
 
-/* Mean of the blocks, and its standard error if all is noise; ratios [blocks] is room. */
-static double chi_square(const struct sums *s, double *ratios, double *error)
+/* Degrees of freedom of an error, at least. */
+static double freedom_of(const struct pair *p)
+{
+    double least = INFINITY;
+    for (int side = 0; side < 2; side++)
+        if (p->noise[side] && p->film[side]->sets > 1)
+            least = fmin(least, (double)p->film[side]->sets - 1);
+    return least;
+}
+
+/* Mean of the blocks, and its standard error if all is noise; ratios [blocks] is room. Where s^2
+ * has few degrees of freedom, a ratio has the mean k/(k - 2), with k = freedom S_2^2/(c S_4) of
+ * the sum over a block (Satterthwaite 1946), c channels being one. */
+static double chi_square(const struct sums *s, int channels, double freedom,
+                         double *ratios, double *error)
 {
     size_t n = 0;
     double sum = 0, pixels = 0;
     for (int k = 0; k < s->columns * s->rows; k++) {
         const struct block *b = &s->blocks[k];
         if (!(b->ss > 0)) continue;
-        sum += ratios[n++] = b->dd / b->ss;
+        const double k2 = fmax(freedom * b->ss * b->ss / (channels * b->s4), freedom);
+        const double mean = 1 / (1 - 2 / fmax(k2, LEAST_FREEDOM));
+        sum += ratios[n++] = b->dd / b->ss / mean;
         pixels += b->pixels;
     }
     *error = NAN;
@@ -301,7 +318,7 @@ static void put_answer(struct imp_text *t, const struct pair *p, struct sums *s,
     const int64_t samples = least_samples(p);
     const bool known = s->n > 0 && (samples == 0 || samples >= SAMPLES_MIN);
     double error;
-    const double chi2 = chi_square(s, ratios, &error);
+    const double chi2 = chi_square(s, p->n, freedom_of(p), ratios, &error);
     imp__put(t, "{\"numbers\":%.0f,\"left_out\":%.0f,\"noise\":\"%s\"", s->n, s->left_out,
              noise[p->noise[0]][p->noise[1]]);
     put_number(t, "chi2", chi2);

@@ -270,7 +270,7 @@ static void closing(void)
         }
         imp_problem_destroy(p);
     }
-    tap_ok(st == IMP_OK && z2 < 3 && told < 0.5 * once,
+    tap_ok(st == IMP_OK && z2 < 3 && told < 0.6 * once,
            "closing loss # mean z^2 %.2f, error %.3g, of one evaluation %.3g", z2, told,
            once);
     imp_film_destroy(film);

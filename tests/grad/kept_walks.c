@@ -683,7 +683,7 @@ static void refusals(void)
     imp_scene_destroy(other);
 
     scene = test_scene(ctx, "cornell.xml", IMP_RGB, "res=8");
-    walks = keep(scene, 64, 3, IMP_POINTS_SOBOL, false, 0);
+    walks = keep(scene, 300, 3, IMP_POINTS_SOBOL, false, 0); /* 64: the sets of a loss */
     imp_problem *p = problem_of(scene, "red.*");
     struct imp_estimate f;
     run = (struct imp_run)IMP_RUN_INIT;

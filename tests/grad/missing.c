@@ -47,6 +47,7 @@ static void target_make(imp_scene *s, uint64_t seed, float *pixels, float *se,
     double mean = 0;
     run.spp = TRUTH_SPP;
     run.seed = seed;
+    run.points = IMP_POINTS_INDEPENDENT; /* whose errors have 511 degrees of freedom */
     test_must(ctx, imp_render(s, &run, &film));
     for (int i = 0; i < 3 * PIXELS; i++) mean += imp_film_mean(film)[i] / (3 * PIXELS);
     for (int i = 0; i < 3 * PIXELS; i++) {

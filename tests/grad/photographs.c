@@ -114,6 +114,7 @@ static void dark_corners(void)
     struct imp_run run = run_of(16, 1, 0);
     double x[2], g[2], worst = 0;
     const double h = 1e-4;
+    run.points = IMP_POINTS_INDEPENDENT; /* values and gradients of the same walks */
     test_must(ctx, imp_problem_functional(p, NULL, &run, NULL, g, NULL));
     imp_problem_get_x(p, x);
     for (int k = 0; k < 2; k++) {

@@ -179,6 +179,36 @@ static void fixed(const char *filter, const char *name)
     imp_scene_destroy(scene);
 }
 
+/* The mean of a picture, whose error comes from independent sets. */
+static void number(int spp)
+{
+    enum { REPEATS = 120 };
+    imp_scene *scene = scene_of("<rfilter type='box'/>", "");
+    struct tap_stat value[2] = {0};
+    double stated = 0;
+    imp_problem *p;
+    test_must(ctx, imp_problem_create(scene, &p));
+    for (int kind = 0; kind < 2; kind++)
+        for (int seed = 0; seed < REPEATS; seed++) {
+            struct imp_run run = IMP_RUN_INIT;
+            struct imp_estimate e;
+            run.spp = spp;
+            run.seed = (uint64_t)seed + (uint64_t)kind * 5000;
+            run.points = kind ? IMP_POINTS_SOBOL : IMP_POINTS_INDEPENDENT;
+            test_must(ctx, imp_problem_functional(p, NULL, &run, &e, NULL, NULL));
+            tap_add(&value[kind], e.value);
+            if (kind) stated += e.se * e.se / REPEATS;
+        }
+    const double seen = variance(&value[1]), before = variance(&value[0]);
+    const double z = (value[1].mean - value[0].mean) / sqrt((seen + before) / REPEATS);
+    /* An error from 120 seeds is known to 6.5 %. */
+    tap_ok(fabs(sqrt(stated / seen) - 1) < .2 && fabs(z) < 4 && seen < before,
+           "mean of a picture, %d spp # stated/seen %.2f, variance %.2f, z %.2f", spp,
+           sqrt(stated / seen), seen / before, z);
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+}
+
 /* A meter on a disk of radius 1 before a lamp like it, both of reflectance 1/2, at a distance of 1.
  * With F = (3 - sqrt 5)/2 between them, and light that returns once, E = pi F (1 + F^2/4). */
 static void meter(void)
@@ -213,15 +243,11 @@ static void meter(void)
     imp_scene_destroy(scene);
 }
 
-/* Where nothing is said, a loss has points in sets and a picture independent ones. */
+/* Where nothing is said, or `independent` by a sampler, losses and pictures have points in sets. */
 static void unsaid(void)
 {
     static const char *const sampler[] = {"", "<sampler type='independent'/>",
                                           "<sampler type='multijitter'/>"};
-    static const enum imp_points loss[] = {IMP_POINTS_SOBOL, IMP_POINTS_INDEPENDENT,
-                                           IMP_POINTS_SOBOL},
-                                 picture[] = {IMP_POINTS_INDEPENDENT,
-                                              IMP_POINTS_INDEPENDENT, IMP_POINTS_SOBOL};
     for (int k = 0; k < 3; k++) {
         imp_scene *scene = scene_of("<rfilter type='box'/>", sampler[k]);
         imp_film *target, *film[3];
@@ -237,10 +263,10 @@ static void unsaid(void)
             value[j] = e.value;
         }
         const size_t bytes = RES * RES * sizeof(float);
-        tap_ok(value[0] == value[loss[k]] && value[1] != value[2],
+        tap_ok(value[0] == value[IMP_POINTS_SOBOL] && value[1] != value[2],
                "sampler \"%s\": the points of a loss", sampler[k]);
-        tap_ok(memcmp(imp_film_mean(film[0]), imp_film_mean(film[picture[k]]), bytes) ==
-                   0,
+        tap_ok(memcmp(imp_film_mean(film[0]), imp_film_mean(film[IMP_POINTS_SOBOL]),
+                      bytes) == 0,
                "sampler \"%s\": the points of a picture", sampler[k]);
         for (int j = 0; j < 3; j++) imp_film_destroy(film[j]);
         imp_film_destroy(target);
@@ -263,6 +289,9 @@ int main(void)
     losses(wide, "wide, log", IMP_LOSS_LOG, 32);
     fixed(box, "box");
     fixed(wide, "wide");
+    number(16);
+    number(64);
+    number(100);
     meter();
     unsaid();
     imp_context_destroy(ctx);

@@ -17,7 +17,7 @@ def box(res=16, **kw):
 
 def setting(noise_spp=256, res=16):
     s = box(res)
-    target = im.render(s, spp=noise_spp, seed=1)
+    target = im.render(s, spp=noise_spp, seed=1, points="independent")
     p = im.traverse(s)
     truth = p[RED]
     p.keep("red.*")

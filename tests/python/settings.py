@@ -57,9 +57,10 @@ def test_kept_walks():
     params = im.traverse(s)
     walks = im.keep(s, spp=64, seed=3, losses=True, survival=-1)
     assert walks.spp == 64 and walks.seed == 3 and 40 * walks.n_vertices < walks.bytes < 194 * walks.n_vertices + 88 * 12 * 12 * 64 and "MB" in repr(walks)
-    assert im.render(s, walks=walks).tobytes() == im.render(s, spp=64, seed=3).tobytes()
+    # Walks that are recorded for losses are independent.
+    assert im.render(s, walks=walks).tobytes() == im.render(s, spp=64, seed=3, points="independent").tobytes()
     target = im.render(s, spp=16, seed=9)
-    a, b = (im.loss(s, target, RED, **key) for key in ({"walks": walks}, {"spp": 64, "seed": 3}))
+    a, b = (im.loss(s, target, RED, **key) for key in ({"walks": walks}, {"spp": 64, "seed": 3, "points": "independent"}))
     # Recorded walks are sums of products here, which round in another order.
     for x, y in ((a.value, b.value), (a.se, b.se), (a.grad[RED], b.grad[RED])):
         assert np.allclose(x, y, rtol=1e-9, atol=0)
@@ -83,7 +84,7 @@ def test_kept_walks():
 def test_walks():
     """Points in sets, and light walks: other noise, the same picture and loss"""
     s = im.load_file(CORNELL, res=12)
-    plain = im.render(s, spp=256, seed=1)
+    plain = im.render(s, spp=256, seed=1, points="independent")
     said = []
     for key, value in (("points", "sobol"), ("walks_from", "lights")):
         p = im.render(s, spp=256, seed=2, **{key: value})
@@ -150,14 +151,15 @@ def test_walk():
     """The walks of a pixel add up to the pixel; those that were dropped are found again"""
     s = box(res=6)
     p = im.render(s, spp=8, seed=4)
-    values = [im.walk(s, 2, 3, k, seed=4, spp=8, json=True)["radiance"] for k in range(8)]
+    # Four sets of two points, which have the numbers 0, 1, 64, 65, ...
+    values = [im.walk(s, 2, 3, 64 * (k // 2) + k % 2, seed=4, spp=8, json=True)["radiance"] for k in range(8)]
     assert np.allclose(np.mean(values, axis=0), p[3, 2], rtol=1e-5), (values, p[3, 2])
     assert im.walk(s, 2, 3, 1, seed=4, spp=8).startswith("walk: pixel 2,3 sample 1")
     im.traverse(s)[LIGHT] = 1e39  # more than a float holds
-    q = im.render(s, spp=8, drop_budget=1)
+    q = im.render(s, spp=64, drop_budget=1)
     assert q.dropped["infinite"] == sum(q.dropped.values()) and 0 < len(q.dropped_walks) <= 8
     for w in q.dropped_walks:
-        assert w.cause == "infinite" and "1e+39" in im.walk(s, w.x, w.y, w.sample, seed=w.seed, spp=8)
+        assert w.cause == "infinite" and "1e+39" in im.walk(s, w.x, w.y, w.sample, seed=w.seed, spp=64)
     raises(im.ArgumentError, lambda: im.walk(s, 6, 0), "6,0")
     raises(TypeError, lambda: im.walk(s, 1.5, 0), "x")
 
@@ -169,16 +171,17 @@ def test_functional():
     for filter in ("box", "gaussian"):
         s = box(filter=filter)
         w = rng.random((12, 12, 3)).astype(np.float32)
-        f = im.functional(s, RED, w, spp=16, seed=3)
-        p, j = im.render(s, spp=16, seed=3), im.jacobian(s, RED, spp=16, seed=3)
+        run = {"spp": 16, "seed": 3, "points": "independent"}  # values and gradients are of the same walks
+        f = im.functional(s, RED, w, **run)
+        p, j = im.render(s, **run), im.jacobian(s, RED, **run)
         assert np.isclose(f.value, np.sum(p.astype(float) * w), rtol=1e-6)
-        assert np.allclose(f.grad[RED], im.render_backward(s, RED, w, spp=16, seed=3)[RED], rtol=1e-9)
+        assert np.allclose(f.grad[RED], im.render_backward(s, RED, w, **run)[RED], rtol=1e-9)
         # Through a wide filter a picture divides by the weights that fell on a pixel, a gradient by their mean.
         se, product = f.grad_se[RED], np.einsum("khwc,hwc->k", j[RED].astype(float), w)
         assert np.all(np.abs(f.grad[RED] - product) < (1e-5 if filter == "box" else .5) * se)
         sums = j.sums(w)
         assert np.isclose(sums.value, f.value, rtol=1e-6) and np.allclose(sums.grad[RED], product, rtol=1e-5)
-        mean = im.functional(s, [], spp=16, seed=3)
+        mean = im.functional(s, [], **run)
         assert np.isclose(mean.value, np.mean(p, dtype=float), rtol=1e-6) and not len(mean.grad)
         many = [im.functional(s, [], w, spp=4, seed=50 + k) for k in range(400)]
         said.append(spread([m.se for m in many], [m.value for m in many]))

@@ -116,10 +116,11 @@ static void threads(const char *filter)
            "%s: the same bits from one thread and from three", filter);
 }
 
-/* A pixel is the mean of the walks that imp_walk_describe shows, over two sets. */
+/* A pixel is the mean of the walks that imp_walk_describe shows, over four sets of points, whose
+ * numbers begin at multiples of 64. */
 static void shown(imp_context *ctx)
 {
-    enum { SPP = 128, X = 8, Y = 6 }; /* two whole sets */
+    enum { SPP = 128, SET = 32, X = 8, Y = 6 };
     const struct imp_run run = run_of(SPP);
     imp_scene *s = scene_of(ctx, "box", "");
     imp_film *film = picture(ctx, s, &run);
@@ -127,7 +128,8 @@ static void shown(imp_context *ctx)
     for (int i = 0; i < SPP; i++) {
         double L[3] = {NAN, NAN, NAN};
         char *text;
-        test_must(ctx, imp_walk_describe(s, &run, X, Y, i, 1, &text));
+        const int number = i / SET * 64 + i % SET;
+        test_must(ctx, imp_walk_describe(s, &run, X, Y, number, 1, &text));
         const char *at = strstr(text, "\"radiance\":");
         if (at) sscanf(at, "\"radiance\":[%lf,%lf,%lf]", &L[0], &L[1], &L[2]);
         for (int c = 0; c < 3; c++) sum[c] += L[c] / SPP;

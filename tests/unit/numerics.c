@@ -37,6 +37,9 @@ static void distributions(void)
     tap_near(imp__normal_of_student(5.207626, 6), 3.090232, .01, 0,
              "Student's t, 6, far");
     tap_ok(imp__normal_of_student(3, INFINITY) == 3, "Student's t, normal in the limit");
+    tap_near(imp__student_of_normal(2.575829, 3), 5.840909, .25, 0, "and back, 3");
+    tap_near(imp__student_of_normal(-2.575829, 6), -3.707428, .05, 0, "and back, 6");
+    tap_ok(imp__student_of_normal(3, INFINITY) == 3, "and back, normal in the limit");
     /* Q(n, x) is a Poisson sum, also where both expansions meet. */
     double sum = 0;
     for (int k = 0; k < 2000; k++) {

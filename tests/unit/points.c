@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Points of sets: every pair is a net, also after its shifts; numbers are uniform, and
- * those of different pairs, blocks and sets are not correlated. */
+ * those of different pairs, blocks and sets are not correlated. The samples of a pixel are cut
+ * into sets that no other shares. */
 #include "math/points.h"
 #include "imp_tap.h"
+#include "walk/core/walk.h"
 #include <stdbool.h>
 #include <stdlib.h>
 
@@ -87,11 +89,43 @@ static void products(void)
     tap_z(&s, .25, 1e-3, "a mean of products over two blocks");
 }
 
+/* Samples of pixels of n samples: sets of up to 64, at least four from four samples on, of sizes
+ * that differ by one at most, with the numbers 64 s, 64 s + 1, ... */
+static void numbers(void)
+{
+    const struct imp_film_desc film = {.crop_w = 9, .crop_h = 7};
+    const struct imp_sensor sensor = {.film = film};
+    const struct imp_tracer tracer = {.sensor = &sensor, .points = &table};
+    bool fine = true;
+    int64_t fewest = INT64_MAX;
+    for (int64_t n = 1; n < 1100; n++) {
+        const int set = imp__tracer_set(&tracer, n);
+        int64_t sets = 0, least = n, most = 0;
+        for (int64_t k = 0; k < n;) {
+            int64_t first, size;
+            imp__set_at(set, n, k, &first, &size);
+            fine &= first == k && size >= 1 && size <= IMP_SET_POINTS;
+            for (int64_t i = 0; i < size; i++)
+                fine &= imp__set_number(set, n, k + i) == IMP_SET_POINTS * sets + i;
+            least = imp_min(least, size);
+            most = imp_max(most, size);
+            k += imp_max(size, (int64_t)1);
+            sets++;
+        }
+        fine &= most - least <= 1;
+        if (n >= 4) fewest = imp_min(fewest, sets);
+    }
+    for (int64_t k = 0; k < 100; k++)
+        fine &= imp__set_number(4, 0, k) == IMP_SET_POINTS * (k / 4) + k % 4;
+    tap_ok(fine && fewest == 4, "samples of a pixel in sets # %d or more", (int)fewest);
+}
+
 int main(void)
 {
     imp__points_make(&table);
     nets();
     independence();
     products();
+    numbers();
     return tap_done();
 }

@@ -534,10 +534,11 @@ static void samplers(void)
         node_int(b.node, "seed", 3);
         if (imp__sampler_build(&b, &spp, &points) != IMP_OK || spp != rows[k].expected)
             bad++;
-        misread += points != (k == 0 ? IMP_POINTS_INDEPENDENT : IMP_POINTS_SOBOL);
+        misread += points != (k == 0 ? IMP_POINTS_SCENE : IMP_POINTS_SOBOL);
     }
     tap_ok(bad == 0, "sample counts are rounded as section 10 says");
-    tap_ok(misread == 0, "all but independent ask for points in sets");
+    tap_ok(misread == 0,
+           "all but independent, which chooses nothing, ask for points in sets");
     b.node = NULL;
     tap_ok(imp__sampler_build(&b, &spp, &points) == IMP_OK && spp == 4 &&
                points == IMP_POINTS_SCENE,

@@ -310,6 +310,7 @@ static void pixels(const char *filter, double radius)
                                    .sensor = t.scene->sensors[0]};
     imp__arena_init(&t.arena, ctx);
     run.spp = SPP;
+    run.points = IMP_POINTS_INDEPENDENT;
     t.tracer.seed = run.seed;
     test_must(ctx, imp_render(t.scene, &run, &film));
 

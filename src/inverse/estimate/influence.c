@@ -26,7 +26,8 @@ struct pass {
     size_t n;       /* numbers F */
     int border, spp;
     int set;             /* samples that depend on each other, about */
-    int64_t sets, parts; /* such sets of a pixel; items of a tile */
+    int64_t period;      /* samples that are cut into such sets, of which spp are taken */
+    int64_t sets, parts; /* sets of a pixel that are taken; items of a tile */
     struct imp_tiles tiles;
     double *store; /* [tiles][doubles of a result] */
 };
@@ -203,7 +204,8 @@ static void stratum_end(const struct pass *p, const struct imp_tile *tile, int x
 /* First sample of a part: parts end with sets. */
 static int64_t part_begin(const struct pass *p, size_t part)
 {
-    return p->sets * (int64_t)part / p->parts * p->spp / p->sets;
+    const int64_t all = p->period / p->set;
+    return p->sets * (int64_t)part / p->parts * p->period / all;
 }
 
 static enum imp_status tile_work(const struct imp_tile *tile, struct imp_tile_worker *w,
@@ -227,9 +229,12 @@ static enum imp_status tile_work(const struct imp_tile *tile, struct imp_tile_wo
             memset(t.sum_u, 0, area * sizeof *t.sum_u);
             if (cross) memset(t.cross, 0, area * p->n * sizeof *t.cross);
             for (int64_t k = s0; k < s1; k++) {
-                struct imp_sample s = {.x = x, .y = y, .index = k, .arena = &w->arena};
+                struct imp_sample s = {.x = x, .y = y, .arena = &w->arena};
                 const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
-                if (k >= first + n_set) imp__set_at(p->set, p->spp, k, &first, &n_set);
+                if (k >= first + n_set) imp__set_at(p->set, p->period, k, &first, &n_set);
+                s.index = imp__tracer_sets(&p->f->tracer)
+                              ? imp__set_number(p->set, p->period, k)
+                              : k;
                 const bool good = sample_add(p, &t, &s);
                 imp__arena_rewind(&w->arena, mark);
                 if (!good)
@@ -283,6 +288,18 @@ static void tiles_gather(const struct pass *p, struct imp__influence *out)
     }
 }
 
+/* Whole sets of the picture's, two at least: those of fewer points have another variance. */
+static void sets_plan(const struct imp__functional *f, struct pass *p)
+{
+    const int least = imp__error_spp(f->spp);
+    p->period = imp_max(f->spp, 2);
+    p->set = imp_max(imp__tracer_set(&f->tracer, p->period), 1);
+    const int64_t all = imp_max(p->period / p->set, (int64_t)1);
+    p->sets = imp_min(imp_max((least - 1) / p->set + 1, (int64_t)2), all);
+    p->spp = (int)(p->sets * p->period / all);
+    p->parts = imp_max(p->sets / imp_max(PART_SPP / p->set, 2), (int64_t)1);
+}
+
 static enum imp_status pass_run(imp_context *ctx, const struct imp__functional *f,
                                 const struct imp_run *run, bool positions,
                                 struct imp__influence *out)
@@ -292,8 +309,8 @@ static enum imp_status pass_run(imp_context *ctx, const struct imp__functional *
     struct pass p = {.f = f,
                      .positions = positions,
                      .n = (size_t)f->n_groups + 1,
-                     .border = f->W ? imp__film_border(f->film) : 0,
-                     .spp = imp__error_spp(f->spp)};
+                     .border = f->W ? imp__film_border(f->film) : 0};
+    sets_plan(f, &p);
     const int width = f->film->crop_w, height = f->film->crop_h;
     if (f->tracer.kept && (f->tracer.kept->source.set > 0 || f->tracer.kept->n < 2))
         IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
@@ -304,9 +321,6 @@ static enum imp_status pass_run(imp_context *ctx, const struct imp__functional *
                                  "pictures (importon record --pictures)"));
     const double walks =
         (double)p.spp * (width + 2. * f->margin) * (height + 2. * f->margin);
-    p.set = imp_max(imp__tracer_set(&f->tracer, p.spp), 1);
-    p.sets = p.spp / p.set; /* at least 4 of dependent walks: see imp__tracer_set */
-    p.parts = imp_max(p.sets / imp_max(PART_SPP / p.set, 2), (int64_t)1);
     own.spp = p.spp;
     own.time_limit_s = 0;
     p.tiles = (struct imp_tiles){.ctx = ctx,
@@ -360,8 +374,9 @@ enum imp_status imp__influence_errors(imp_context *ctx, const struct imp__functi
     enum imp_status st = IMP_OK;
     struct imp__influence known = {0};
     struct stratum t = {0};
-    const struct pass p = {.f = f, .n = (size_t)f->n_groups + 1};
-    const double samples = (double)f->spp / imp__error_spp(f->spp);
+    struct pass p = {.f = f, .n = (size_t)f->n_groups + 1};
+    sets_plan(f, &p);
+    const double samples = (double)f->spp / p.spp;
     t.value = imp__alloc(ctx, p.n, sizeof *t.value);
     if (!t.value) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for standard errors"));
     if (f->W) IMP_TRY(pass_run(ctx, f, run, true, &known));

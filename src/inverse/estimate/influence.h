@@ -37,9 +37,6 @@ struct imp__functional {
     const struct imp_film_desc *film;
     int channels, margin; /* extra pixels sampled on every side */
     int spp;              /* of the picture */
-    int set; /* samples of a set of points of its own, of `period` in a pixel;
-                             0: sets are whole */
-    int64_t period;
     const float *adjoint; /* s [height][width][channels] */
     double norm;          /* F = sum(adjoint * picture) / norm */
     const double *W;      /* [height][width]; NULL: box filter, spp everywhere */
@@ -57,7 +54,7 @@ struct imp__influence {
     double *cross;    /* [height][width][n] as well, with u_p; NULL: box filter */
 };
 
-/* Samples per pixel that errors of a picture of `spp` are taken from. */
+/* Samples per pixel that errors of a picture of `spp` independent ones are taken from. */
 int imp__error_spp(int spp);
 
 /* The first pass. Release `out` with imp__influence_free, also after a failure.

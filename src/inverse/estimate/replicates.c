@@ -82,14 +82,33 @@ static const struct imp_sensor *sensor_of(const struct imp_scene *scene,
     return scene->sensors[t ? t->desc.sensor : run->sensor];
 }
 
-void imp__points_of_losses(const struct imp_problem *p, struct imp_run *run)
+/* ---- Points ------------------------------------------------------------------------ */
+
+void imp__points_of_normal(const struct imp_problem *p, struct imp_run *run)
 {
-    if (run->points != IMP_POINTS_SCENE || run->walks || p->scene->n_media > 0) return;
+    if (run->points != IMP_POINTS_SCENE || run->walks) return;
     for (size_t i = 0; i < p->n_targets; i++)
         if (p->scene->sensors[p->targets[i].desc.sensor]->points != IMP_POINTS_SCENE)
             return;
-    if (p->n_targets > 0) run->points = IMP_POINTS_SOBOL;
+    if (p->n_targets > 0) run->points = IMP_POINTS_INDEPENDENT;
 }
+void imp__points_of_losses(const struct imp_problem *p, struct imp_run *run)
+{
+    if (p->scene->n_media > 0) imp__points_of_normal(p, run);
+}
+
+enum imp_points imp__points_recorded(const struct imp_scene *scene,
+                                     const struct imp_run *run, const uint8_t *sensors,
+                                     bool losses)
+{
+    if (run->points != IMP_POINTS_SCENE) return run->points;
+    bool chosen = !losses;
+    for (int k = 0; k < scene->n_sensors; k++)
+        chosen |= sensors[k] && scene->sensors[k]->points != IMP_POINTS_SCENE;
+    return chosen ? IMP_POINTS_SOBOL : IMP_POINTS_INDEPENDENT;
+}
+
+/* ---- Plans ------------------------------------------------------------------------- */
 
 struct imp__replicates imp__replicates_of(const struct imp_scene *scene,
                                           const struct imp__target *t,

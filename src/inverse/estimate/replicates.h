@@ -25,10 +25,18 @@ struct imp__replicates {
 };
 /* The plan for independent samples. */
 struct imp__replicates imp__replicates_plan(int spp, int batch_max);
-/* Losses have Sobol's points where neither the run nor the sampler of a sensor names others:
- * errors come from sets, which are independent. In media most numbers of a walk are no
- * points, and fewer pairs of sets than of samples cost more than the points bring. */
+/* Losses of scenes with media have independent points where neither the run nor the sampler
+ * of a target's sensor names a kind: most random numbers of such walks are no points, and
+ * fewer pairs of sets than of samples cost more than the points gain. */
 void imp__points_of_losses(const struct imp_problem *p, struct imp_run *run);
+/* So have the losses and normal equations of Levenberg-Marquardt in all scenes: it ends where
+ * its gradient is within its noise, of which few sets give too poor an estimate. */
+void imp__points_of_normal(const struct imp_problem *p, struct imp_run *run);
+/* Those of walks that are recorded, from the sensors k with sensors[k]. If for losses, they are
+ * independent where nobody chose: sets for losses are too few for errors of means and regions. */
+enum imp_points imp__points_recorded(const struct imp_scene *scene,
+                                     const struct imp_run *run, const uint8_t *sensors,
+                                     bool losses);
 /* The plan of imp_problem_objective. */
 struct imp__replicates imp__replicates_loss(const struct imp_problem *p,
                                             const struct imp__target *target,

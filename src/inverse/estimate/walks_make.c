@@ -35,8 +35,8 @@ static enum imp_status number_add(struct numbers *s, int64_t k)
     return IMP_OK;
 }
 
-/* Sample numbers to keep. A picture needs 0, 1, 2, ...; losses need those of the
- * replicates: the sets of Sobol points, or with independent points enough for all kinds
+/* Sample numbers to keep. A picture needs 0, 1, 2, ..., or the same of its sets; losses need
+ * those of the replicates: the sets of Sobol points, or with independent points enough for all kinds
  * of loss. */
 static enum imp_status numbers_of(const struct imp_scene *scene, int sensor,
                                   const struct imp_walks *w, struct numbers *out)
@@ -56,6 +56,14 @@ static enum imp_status numbers_of(const struct imp_scene *scene, int sensor,
                 for (int i = 0; i < n; i++)
                     IMP_CHECKED(number_add(out, imp__replicates_first(r, b, s) + i));
             }
+        return IMP_OK;
+    }
+    if (sobol) {
+        const struct imp_tracer tracer = {.points = imp__points(),
+                                          .sensor = scene->sensors[sensor]};
+        const int set = imp__tracer_set(&tracer, spp);
+        for (int k = 0; k < spp; k++)
+            IMP_CHECKED(number_add(out, imp__set_number(set, spp, k)));
         return IMP_OK;
     }
     int64_t n = spp;
@@ -345,13 +353,9 @@ enum imp_status imp_walks_keep(imp_scene *scene, const struct imp_run *run,
     IMP_TRY(imp__run_sensor(scene, &own, &sensor));
     sensors = imp__alloc(ctx, (size_t)scene->n_sensors, 1);
     if (!sensors) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for recorded walks"));
-    bool told = own.points != IMP_POINTS_SCENE;
-    for (int k = 0; k < scene->n_sensors; k++) {
+    for (int k = 0; k < scene->n_sensors; k++)
         sensors[k] = o.all_sensors || k == own.sensor;
-        if (sensors[k]) told |= scene->sensors[k]->points != IMP_POINTS_SCENE;
-    }
-    if (o.losses && !told && scene->n_media == 0)
-        own.points = IMP_POINTS_SOBOL; /* imp__points_of_losses */
+    own.points = imp__points_recorded(scene, &own, sensors, o.losses);
     IMP_TRY(imp__walks_make(scene, &own, &o, sensors, NULL, out));
 out:
     imp__release(ctx, sensors);

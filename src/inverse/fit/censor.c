@@ -260,7 +260,8 @@ static void target_decide(struct decision *d)
     }
 }
 
-/* The scene's own picture, whatever the film's pixel format. */
+/* The scene's own picture, whatever the film's pixel format. Decisions depend on the error of
+ * each pixel alone, of which few sets of points give too poor an estimate. */
 static enum imp_status picture_make(struct imp_problem *p, const struct imp__target *t,
                                     int number, const struct imp_run *run, imp_film **out)
 {
@@ -272,6 +273,7 @@ static enum imp_status picture_make(struct imp_problem *p, const struct imp__tar
     own.seed = imp__mix64(run->seed ^ (UINT64_C(0xc11bbed) + (uint64_t)number));
     own.time_limit_s = 0;
     own.walks = NULL;
+    own.points = IMP_POINTS_INDEPENDENT;
     enum imp_status st = imp_problem_create(p->scene, &plain);
     if (st == IMP_OK) st = imp_problem_jacobian(plain, &own, out, NULL);
     imp_problem_destroy(plain);

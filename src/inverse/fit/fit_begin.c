@@ -142,9 +142,8 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
                                   sizeof f.options));
     IMP_CHECKED(imp__run_take(ctx, "imp_fit", run, &f.outer));
     IMP_CHECKED(imp__run_traces(ctx, "imp_fit", &f.outer));
-    /* Levenberg-Marquardt ends where its gradient is within its noise, of which few sets
-     * give too poor an estimate. */
-    if (f.options.optimizer != IMP_LM) imp__points_of_losses(p, &f.outer);
+    if (f.options.optimizer == IMP_LM) imp__points_of_normal(p, &f.outer);
+    else imp__points_of_losses(p, &f.outer);
     IMP_CHECKED(options_check(p, &f.options));
     options_default(&f.options);
 

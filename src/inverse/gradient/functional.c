@@ -27,13 +27,6 @@ static void sample_value(const void *payload, struct imp_sample *s)
 {
     const struct imp__functional *f = payload;
     const size_t C = (size_t)f->channels;
-    if (f->set > 0) {
-        int64_t first, n;
-        imp__set_at(f->set, f->period, s->index, &first, &n);
-        s->index =
-            ((s->index + 1) * (f->period / f->set) - 1) / f->period * IMP_SET_POINTS +
-            s->index - first;
-    }
     radiance(f, s);
     if (f->W) return;
     const size_t p = (size_t)s->y * (size_t)f->film->crop_w + (size_t)s->x;
@@ -111,7 +104,7 @@ static enum imp_status weights_make(imp_context *ctx, const struct imp__function
         .weights = weights,
         /* in the order in which the picture adds them */
         .set = imp__tracer_set(&f->tracer, imp__walks_of(run, f->tracer.sensor)),
-        .nets = f->tracer.points != NULL};
+        .points = imp__tracer_sets(&f->tracer)};
     const enum imp_status st = imp__picture_make(ctx, &picture, &own, &film);
     imp_film_destroy(film);
     return st;
@@ -141,22 +134,6 @@ out:
     return st;
 }
 
-/* Sets of points that the samples of a pixel are cut into for a number alone, 0: none. Sets are
- * independent, so that their spread is the error, of which a sum over pixels makes few do. Parts
- * of one set would give a bound, twice the error where one edge of a lamp decides. */
-#define FREEDOM 16 /* at least, in all pixels */
-static void sets_choose(struct imp__functional *f, const struct imp_run *run)
-{
-    const int64_t n = imp__walks_of(run, f->tracer.sensor);
-    const double pixels = (double)f->film->crop_w * f->film->crop_h;
-    const bool alone = f->tracer.set > 1; /* sets of wavelengths */
-    if (f->W || !f->tracer.points || f->tracer.kept || alone || n < 8) return;
-    const int64_t sets = imp_max((n - 1) / IMP_SET_POINTS + 1,
-                                 imp_min((int64_t)ceil(FREEDOM / pixels) + 1, n / 4));
-    f->period = n;
-    f->set = (int)(n / sets);
-}
-
 static enum imp_status picture_value(imp_context *ctx, struct imp__functional *f,
                                      double *weights, const struct imp_run *run,
                                      struct imp_estimate *out)
@@ -168,7 +145,6 @@ static enum imp_status picture_value(imp_context *ctx, struct imp__functional *f
     struct imp_estimate value = {0, 0, 0};
     imp_film *film = NULL;
     f->tracer.active = NULL; /* nothing is differentiated here */
-    sets_choose(f, run);
     const struct imp_picture picture = {
         .sensor = f->tracer.sensor,
         .stage = "picture",
@@ -177,10 +153,8 @@ static enum imp_status picture_value(imp_context *ctx, struct imp__functional *f
         .sample = sample_value,
         .payload = f,
         .weights = weights,
-        .set = f->set > 0
-                   ? f->set
-                   : imp__tracer_set(&f->tracer, imp__walks_of(run, f->tracer.sensor)),
-        .nets = f->tracer.points && f->set == 0};
+        .set = imp__tracer_set(&f->tracer, imp__walks_of(run, f->tracer.sensor)),
+        .points = imp__tracer_sets(&f->tracer)};
     /* Through a box filter errors are the pixels', if these have any. */
     const int spp = (int)imp_max(imp__walks_of(run, f->tracer.sensor), (int64_t)1);
     const bool one_pass = box && spp > 1;

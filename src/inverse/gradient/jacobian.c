@@ -126,7 +126,7 @@ enum imp_status imp_problem_forward(imp_problem *p, const double *x_dot,
         .sample = sample_tangent,
         .payload = &f,
         .set = imp__tracer_set(&f.tracer, imp__walks_of(&own, f.tracer.sensor)),
-        .nets = f.tracer.points != NULL};
+        .points = imp__tracer_sets(&f.tracer)};
     st = picture_and_poses(&f, &picture, &own, 1, &made);
     if (made) *out = made;
 out:
@@ -180,7 +180,7 @@ enum imp_status imp_problem_jacobian(imp_problem *p, const struct imp_run *run,
         .payload = &f,
         .n_films = n,
         .set = imp__tracer_set(tracer, imp__walks_of(&own, tracer->sensor)),
-        .nets = tracer->points != NULL};
+        .points = imp__tracer_sets(tracer)};
     st = tracer->integrator->from_lights
              ? imp__light_jacobian(tracer, &own, made)
              : picture_and_poses(&f, &picture, &own, p->n, made);

@@ -98,7 +98,8 @@ static enum imp_status walks_take(const struct imp_tracer *tracer, struct shares
         struct imp_walk walk;
         int64_t first, count;
         imp__set_at(set, n, i, &first, &count);
-        imp__walk_trace(tracer, &arena, x, y, i, &walk);
+        imp__walk_trace(tracer, &arena, x, y,
+                        imp__tracer_sets(tracer) ? imp__set_number(set, n, i) : i, &walk);
         if (walk.dropped == IMP_DROP_MEMORY)
             st =
                 imp__error(scene->ctx, IMP_E_NOMEM, "no memory for the walks of a pixel");

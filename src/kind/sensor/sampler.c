@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Samplers: independent points, or points in sets, which all other names mean here. There
- * are as many samples as the kind rounds up to, so that a file costs the same everywhere
- * (docs/scene-format.md 10). */
+ * Samplers. `independent` leaves the choice of points to the run, as no sampler does: exporters
+ * write it into every file. All other names mean points in sets here. There are as many samples
+ * as the kind rounds up to, so that a file costs the same everywhere (docs/scene-format.md 10). */
 #include "base/compiler.h"
 #include "kind/registry.h"
 #include "sensor_film.h"
@@ -93,7 +93,7 @@ enum imp_status imp__sampler_build(const struct imp_build *b, int *spp,
                   b->node->type);
     IMP_TRY(imp__props_finish(b->ctx, b->node));
     *spp = (int)imp_min(kinds[kind].round(count), SPP_MAX);
-    *points = kind == 0 ? IMP_POINTS_INDEPENDENT : IMP_POINTS_SOBOL;
+    *points = kind == 0 ? IMP_POINTS_SCENE : IMP_POINTS_SOBOL;
 out:
     return st;
 }

@@ -202,14 +202,14 @@ static inline const struct imp_guide *imp__guide_of(const struct imp_scene *scen
                ? guide
                : NULL;
 }
-/* The points of a run through a sensor: independent, or Sobol's. Where neither says, a
- * picture has independent ones, since its errors are exact then. */
+/* The points of a run through a sensor: independent, or Sobol's, which have the smaller errors
+ * where neither the run nor the sampler names a kind (docs/decisions.md). */
 static inline enum imp_points imp__points_of(const struct imp_sensor *sensor,
                                              const struct imp_run *run)
 {
     const enum imp_points asked =
         run->points != IMP_POINTS_SCENE ? run->points : sensor->points;
-    return asked != IMP_POINTS_SCENE ? asked : IMP_POINTS_INDEPENDENT;
+    return asked != IMP_POINTS_SCENE ? asked : IMP_POINTS_SOBOL;
 }
 
 /* ---- Wavelengths (waves.c) ------------------------------------------------------- */
@@ -218,9 +218,9 @@ static inline enum imp_points imp__points_of(const struct imp_sensor *sensor,
  * whole. */
 void imp__tracer_numbers(struct imp_tracer *tracer, const struct imp_run *run, int64_t n);
 
-/* Walks of a pixel that a picture's errors take together, since they depend on each other;
- * n in all, 0: not known. Of points, a quarter of a set is a net by itself: its parts vary as
- * independent ones of their size at least, so that their spread is an upper bound. */
+/* Walks of a pixel that a picture's errors take together, since they depend on each other,
+ * about; n in all, 0: not known. Sets are independent of each other: their spread is the
+ * error. Those of points are four, at least: more would be smaller, and gain less. */
 int imp__tracer_set(const struct imp_tracer *tracer, int64_t n);
 
 /* The set that a walk belongs to: its first walk, and how many it has. A whole is cut into
@@ -237,6 +237,21 @@ static inline void imp__set_at(int set, int64_t period, int64_t sample, int64_t 
     const int64_t k = ((at + 1) * sets - 1) / period;
     *first = sample - at + k * period / sets;
     *n = (k + 1) * period / sets - k * period / sets;
+}
+
+/* Are the walks of a picture traced in sets of points? Then they have the numbers of
+ * imp__set_number. Recorded ones are asked for in the order in which they were traced. */
+static inline bool imp__tracer_sets(const struct imp_tracer *tracer)
+{
+    return tracer->points && !tracer->kept;
+}
+/* Number of walk k of a pixel, whose sets are sets of points. */
+static inline int64_t imp__set_number(int set, int64_t period, int64_t k)
+{
+    if (period <= 0) return k / set * IMP_SET_POINTS + k % set;
+    const int64_t sets = imp_max(period / set, (int64_t)1), at = k % period;
+    const int64_t s = ((at + 1) * sets - 1) / period;
+    return (k / period * sets + s) * IMP_SET_POINTS + at - s * period / sets;
 }
 
 /* When its light reaches the sensor. */

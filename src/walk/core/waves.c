@@ -8,10 +8,24 @@
  * standard error. */
 #define SET_MAX   16
 #define SET_TIMED 4 /* where it is not known how many there will be */
+/* Sets of points of a pixel, at least; and the degrees of freedom that the errors of all pixels
+ * together have, at least, in sets of four points or more. */
+#define SETS    4
+#define FREEDOM 16
 
 static int set_default(int64_t n)
 {
     return n > 0 ? (int)imp_clamp(n / 4, (int64_t)1, (int64_t)SET_MAX) : SET_TIMED;
+}
+/* The same of points, which gain with the size of a set. */
+static int set_of_points(const struct imp_film_desc *film, int64_t n)
+{
+    if (n <= 0) return SET_TIMED;
+    const double pixels = (double)film->crop_w * film->crop_h;
+    const int64_t free = imp_min((int64_t)ceil(FREEDOM / pixels) + 1, n / 4);
+    const int64_t most = (n - 1) / IMP_SET_POINTS + 1;
+    const int64_t sets = imp_max(imp_max(most, free), (int64_t)SETS);
+    return (int)imp_max(n / sets, (int64_t)1);
 }
 static int set_of(const struct imp_run *run, int64_t n)
 {
@@ -34,7 +48,7 @@ void imp__tracer_numbers(struct imp_tracer *tracer, const struct imp_run *run, i
                           ? IMP_WAVES_IMPORTANCE
                           : IMP_WAVES_UNIFORM;
     tracer->wavelengths = all + (size_t)run->sensor * IMP_WAVES_DRAWN + drawn;
-    tracer->set = n == 1 ? 1 : set_of(run, n);
+    tracer->set = n == 1 || tracer->points ? 1 : set_of(run, n);
     tracer->stratified = run->wavelengths != IMP_WAVELENGTHS_INDEPENDENT;
     tracer->period = n;
 }
@@ -44,7 +58,7 @@ int imp__tracer_set(const struct imp_tracer *tracer, int64_t n)
     if (tracer->kept && imp__walk_source(tracer)->set > 0)
         return imp__walk_source(tracer)->set;
     if (tracer->set > 1) return tracer->set;
-    return tracer->points ? set_default(n) : 1;
+    return tracer->points ? set_of_points(&tracer->sensor->film, n) : 1;
 }
 
 /* Walk k of a set of n covers the k-th of n parts of [0, 1); of a hero with C wavelengths

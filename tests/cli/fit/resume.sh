@@ -12,7 +12,7 @@ for optimizer in lm lbfgs; do
     grep -o '"reason":"[^"]*"' $optimizer.2/parameters.json
 done
 # Points are part of a fit.
-"${fit[@]}" -o sobol.0 --resume --points sobol >/dev/null
+"${fit[@]}" -o sobol.0 --resume --points independent >/dev/null
 echo "exit $?"
 rm $optimizer.state
 "${fit[@]}" -o sobol.1 --points sobol >/dev/null || exit 9

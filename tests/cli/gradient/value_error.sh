@@ -4,8 +4,8 @@
 # too small. A spread over 48 runs is known to 10 %.
 sed "s:type=\"box\":type=\"gaussian\":; s:filename\" value=\":&$ROOT/scenes/:" "$ROOT/scenes/cornell.xml" >cornell.xml
 for seed in $(seq 48); do
-    importon gradient cornell.xml -m mono -D res=12 --spp 4 --seed "$seed" -p 'white*' --json -q || exit 9
-    importon jacobian cornell.xml -m mono -D res=12 --spp 4 --seed "$seed" -p 'white*' --json -q -o J >>table || exit 9
+    importon gradient cornell.xml -m mono -D res=12 --spp 4 --points independent --seed "$seed" -p 'white*' --json -q || exit 9
+    importon jacobian cornell.xml -m mono -D res=12 --spp 4 --points independent --seed "$seed" -p 'white*' --json -q -o J >>table || exit 9
 done >answers
 # ratio: of "value se" lines, the spread over the error told.
 ratio() {

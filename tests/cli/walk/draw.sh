@@ -2,7 +2,7 @@
 # Walks are drawn: as many segments as the walks have vertices, after the twelve of the box.
 scene=(-m mono "$ROOT/scenes/stam.xml")
 importon render "${scene[@]}" --paths walks.jsonl --count 12 -q || exit 9
-importon render "${scene[@]}" --pixel 16,16 --sample 39 --json >walk.jsonl || exit 9
+importon render "${scene[@]}" --points independent --pixel 16,16 --sample 39 --json >walk.jsonl || exit 9
 for walks in walks walk; do
     python3 "$ROOT/docs/draw_paths.py" $walks.jsonl $walks.svg --sphere 0,0,0,.5 || exit 9
     python3 - $walks <<'PY' || exit 9
