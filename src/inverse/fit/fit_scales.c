@@ -8,7 +8,7 @@
 #include <float.h>
 #include <math.h>
 
-/* Of a number of geometry; 0: it is none. */
+/* The large change of a number of geometry; 0: it is none. */
 static double pose_scale(const struct imp_problem *p, const struct imp__block *b,
                          size_t e)
 {
