@@ -10,10 +10,17 @@
 
 #include <math.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
 static int tap_count, tap_failed;
+
+/* A program whose suite "long" runs it as `PROGRAM long`: all cases, not only the short form. */
+static inline bool tap_is_long(int argc, char **argv)
+{
+    return argc > 1 && strcmp(argv[1], "long") == 0;
+}
 
 /* Running mean and variance (Welford). */
 struct tap_stat {

@@ -5,6 +5,8 @@
 #ifndef IMP_TEST_MOVES_KIT_H
 #define IMP_TEST_MOVES_KIT_H
 
+#include "imp_scene.h"
+#include "imp_tap.h"
 #include "move/moves.h"
 
 typedef long double real;
@@ -90,28 +92,89 @@ static inline real difference(const real f[4], real h)
 }
 static const int difference_at[4] = {1, -1, 2, -2};
 
-/* A floor, a wall, a block above the floor and a lamp; SHAPES: in place of the block's
- * transform; REST: sky, integrator. Camera: 24 x 16 pixels. */
+/* A unit direction in a triangle that is glued to it. */
+static inline void triangle_grain(const struct triangle *t, real s[3])
+{
+    real length = 0;
+    for (int i = 0; i < 3; i++) {
+        s[i] = 0.3L * (t->p[1][i] - t->p[0][i]) + 0.8L * (t->p[2][i] - t->p[0][i]);
+        length += s[i] * s[i];
+    }
+    for (int i = 0; i < 3; i++) s[i] /= sqrtl(length);
+}
+
+/* ---- A room ------------------------------------------------------------------------ */
+
+/* A floor, a wall, a block above the floor and a lamp; a camera of 24 x 16 pixels. NULL: what is
+ * there most often. */
+struct room_parts {
+    const char *rest; /* integrator, sky, more shapes */
+    const char
+        *grey; /* the inside of <bsdf id='grey'> and its type: of floor and block */
+    const char *filter;                /* "type='box'" */
+    const char *camera, *block, *lamp; /* what follows in their transforms */
+};
+
+#define ROOM_GREY                                                                        \
+    "<bsdf type='diffuse' id='grey'><rgb name='reflectance' value='.6,.5,.4'/></bsdf>"
+
+/* Of its transform's end, and of its filter. */
 #define ROOM_CAMERA                                                                      \
     "<sensor type='perspective' id='camera'><float name='fov' value='50'/>"              \
-    "<transform name='to_world'>%s<lookat origin='.4,-5.5,2.3' target='0,0,.6' "         \
+    "<transform name='to_world'><lookat origin='.4,-5.5,2.3' target='0,0,.6' "           \
     "up='0,0,1'/>%s</transform><film type='hdrfilm'><integer name='width' value='24'/>"  \
-    "<integer name='height' value='16'/><rfilter type='box'/></film></sensor>"
-#define ROOM_SHAPES                                                                      \
-    "<bsdf type='diffuse' id='grey'><rgb name='reflectance' value='.6,.5,.4'/></bsdf>"   \
-    "<shape type='rectangle' id='floor'><transform name='to_world'><scale value='3'/>"   \
-    "</transform><ref id='grey'/></shape>"                                               \
-    "<shape type='rectangle' id='wall'><transform name='to_world'><scale x='3' "         \
-    "y='1.5'/>"                                                                          \
-    "<rotate x='1' angle='90'/><translate y='3' z='1.5'/></transform>"                   \
-    "<bsdf type='twosided'><bsdf type='diffuse'><rgb name='reflectance' "                \
-    "value='.3,.5,.7'/></bsdf></bsdf></shape>"                                           \
-    "<shape type='cube' id='block'><transform name='to_world'><scale x='.6' y='.5' "     \
-    "z='.4'/><rotate z='1' angle='25'/><translate x='-.2' y='.3' z='.7'/>%s"             \
-    "</transform><ref id='grey'/></shape>"                                               \
-    "<shape type='rectangle' id='lamp'><transform name='to_world'><scale x='.5' "        \
-    "y='.7'/>"                                                                           \
-    "<rotate x='1' angle='170'/><translate x='.9' y='-.2' z='3.2'/>%s</transform>"       \
-    "<emitter type='area'><rgb name='radiance' value='9,8,7'/></emitter></shape>"
+    "<integer name='height' value='16'/><rfilter %s/></film></sensor>"
+
+static inline void room_write(const struct room_parts *r, char *xml, size_t n)
+{
+    static const char format[] =
+        "<scene version='3.0.0'>%s" ROOM_CAMERA "%s"
+        "<shape type='rectangle' id='floor'><transform name='to_world'><scale "
+        "value='3'/></transform><ref id='grey'/></shape>"
+        "<shape type='rectangle' id='wall'><transform name='to_world'><scale x='3' "
+        "y='1.5'/><rotate x='1' angle='90'/><translate y='3' z='1.5'/></transform>"
+        "<bsdf type='twosided'><bsdf type='diffuse'><rgb name='reflectance' "
+        "value='.3,.5,.7'/></bsdf></bsdf></shape>"
+        "<shape type='cube' id='block'><transform name='to_world'><scale x='.6' y='.5' "
+        "z='.4'/><rotate z='1' angle='25'/><translate x='-.2' y='.3' z='.7'/>%s"
+        "</transform><ref id='grey'/></shape>"
+        "<shape type='rectangle' id='lamp'><transform name='to_world'><scale x='.5' "
+        "y='.7'/><rotate x='1' angle='170'/><translate x='.9' y='-.2' z='3.2'/>%s"
+        "</transform><emitter type='area'><rgb name='radiance' value='9,8,7'/></emitter>"
+        "</shape></scene>";
+    snprintf(xml, n, format, r->rest ? r->rest : "", r->camera ? r->camera : "",
+             r->filter ? r->filter : "type='box'", r->grey ? r->grey : ROOM_GREY,
+             r->block ? r->block : "", r->lamp ? r->lamp : "");
+}
+
+static inline imp_scene *room_build(imp_context *ctx, const struct room_parts *r)
+{
+    char xml[16384];
+    room_write(r, xml, sizeof xml);
+    return test_scene_text(ctx, xml, IMP_RGB);
+}
+
+/* Three things that move, six numbers each. */
+enum { ROOM_NUMBERS = 18 };
+static const char *const room_objects[] = {"block", "lamp", "camera"};
+
+static inline imp_scene *room_posed(imp_context *ctx, const struct room_parts *r)
+{
+    imp_scene *scene = room_build(ctx, r);
+    for (int k = 0; k < 3; k++)
+        test_must(ctx, imp_scene_add_pose(scene, room_objects[k]));
+    return scene;
+}
+static inline void room_poses_set(imp_context *ctx, imp_scene *scene,
+                                  const double numbers[ROOM_NUMBERS])
+{
+    for (int k = 0; k < 3; k++) {
+        char name[32];
+        size_t index;
+        snprintf(name, sizeof name, "%s.pose", room_objects[k]);
+        test_must(ctx, imp_scene_find_param(scene, name, &index));
+        test_must(ctx, imp_scene_set_values(scene, index, 6, numbers + 6 * k));
+    }
+}
 
 #endif

@@ -5,7 +5,8 @@
 
 Processor seconds, the least of N repeats (5), in which both programs take turns, on one thread. Ours are those of the
 whole process (`importon render -m spectral --spp 1`); Mitsuba's (scalar_spectral, which compiles nothing) those from load_file
-to the picture, in a process of its own: the interpreter and the import are left out. FOLDER, in which the files and all
+to the picture, in a process of its own: the interpreter and the import are left out; one that hangs (on one thread some
+scenes do) is ended after a minute. FOLDER, in which the files and all
 that they name are, is copied (without folders called refs), and width and height of its films are made N pixels (16). Lines whose ratio is above 2 are marked, and their number is the last line.
 """
 import argparse
@@ -60,7 +61,8 @@ def ours(importon, path, out):
 
 
 def theirs(path):
-    return float(subprocess.run([sys.executable, "-c", PEER, path], check=True, capture_output=True, text=True).stdout.split()[-1])
+    return float(subprocess.run([sys.executable, "-c", PEER, path], check=True, capture_output=True, text=True,
+                                timeout=60).stdout.split()[-1])
 
 
 def main():
@@ -83,6 +85,9 @@ def main():
             try:
                 for _ in range(args.repeats):
                     times.append((ours(args.importon, path, os.path.join(scratch, "o.exr")), theirs(path)))
+            except subprocess.TimeoutExpired:
+                print("%-38s Mitsuba hangs" % name, flush=True)
+                continue
             except subprocess.CalledProcessError as e:
                 said = e.stderr if isinstance(e.stderr, str) else e.stderr.decode(errors="replace")
                 print("%-38s %s" % (name, said.strip().splitlines()[-1:]))

@@ -323,13 +323,13 @@ static int run_read(int n, char **operand)
     if (rc) return rc;
     if (o.ends && cli.from)
         return cli_error(EXIT_USAGE, "--ends reads from both: it goes without --from");
-    const enum imp_status st = imp_problem_create(cli.scene, &problem);
-    if (st != IMP_OK) return cli_fail(st, NULL);
     if (problem_options.params.n) {
-        imp_problem_destroy(problem);
         rc = problem_open(&problem);
         if (rc) return rc;
         blocks = problem_blocks(problem, &n_blocks);
+    } else {
+        const enum imp_status st = imp_problem_create(cli.scene, &problem);
+        if (st != IMP_OK) return cli_fail(st, NULL);
     }
     luminaires_tell();
     struct json j;

@@ -11,6 +11,7 @@
 static const char *verdict(const struct imp_check_row *r)
 {
     if (r->limit == 0) return "";
+    if (r->why) return "open";
     return r->ok > 0 ? r->kinks > 0 ? "kink" : "ok" : r->ok < 0 ? "noisy" : "FAILED";
 }
 
@@ -34,6 +35,7 @@ void check_rows_print(const struct imp_check_row *rows, size_t n)
         if (r->kinks > 0) printf(" (%d walk%s)", r->kinks, plural(r->kinks));
         if (r->sees > 0 && r->ok != 0) printf(" (sees %.2g %%)", 100 * r->sees);
         printf("\n");
+        if (r->why) printf("           %s\n", r->why);
     }
 }
 
@@ -55,6 +57,7 @@ void check_rows_json(struct json *j, const struct imp_check_row *rows, size_t n)
         json_bool(j, "resolved", r->ok >= 0);
         json_integer(j, "kinks", r->kinks);
         json_number(j, "sees", r->sees);
+        if (r->why) json_text(j, "why", r->why);
         json_end_object(j);
     }
     json_end_array(j);

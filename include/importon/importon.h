@@ -1403,6 +1403,8 @@ struct imp_check_row {
                       error of the density that it would have found, with a probability of
                       0.9. Above 0.02 such a row does not decide, unless it fails. 0: of
                       other rows */
+    const char *why; /**< why a row that has no reference decides nothing: a difference
+                          that would press a shape into another; NULL: of other rows */
 };
 struct imp_check_options {
     size_t size;

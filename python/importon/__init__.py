@@ -35,6 +35,7 @@ from ._missing import Missing, missing
 from ._params import Gradient, ParameterInfo, SceneParameters, Values, traverse
 from ._parts import PartsInfo, join_parts, merge, part, parts_info, team
 from ._picture import DroppedWalk, Picture, project, read, write
+from ._plan import Plan, PlanRow, lamps, plan, plan_improve, plan_map
 from ._progress import set_progress
 from ._render import denoise, render, walk
 from ._report import report
@@ -53,10 +54,10 @@ __all__ = [
     "Estimate", "FileError", "Fit", "FitVariable", "Gradient", "Grid", "ImportonWarning", "Interval", "Jacobian", "Loss",
     "Luminaire", "Missing",
     "NumericError", "OutOfMemoryError", "ParameterError", "ParameterInfo", "Part", "PartsInfo", "PathsError",
-    "Picture", "Progress", "Reached", "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "SelfTestRow", "Sensor", "Share",
+    "Picture", "Plan", "PlanRow", "Progress", "Reached", "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "SelfTestRow", "Sensor", "Share",
     "Transform4f", "UnsupportedError", "Values", "Walks", "__version__", "ad", "bend", "check", "compare", "cornell_box", "denoise",
-    "elements", "fit", "functional", "functional_until", "glare", "grid", "guide", "jacobian", "join_parts", "keep", "library_path", "load_dict", "load_file",
-    "load_string", "loss", "luminaires", "merge", "missing", "part", "parts_info", "project", "read", "read_walks", "render", "render_backward",
+    "elements", "fit", "functional", "functional_until", "glare", "grid", "guide", "jacobian", "join_parts", "keep", "lamps", "library_path", "load_dict", "load_file",
+    "load_string", "loss", "luminaires", "merge", "missing", "part", "parts_info", "plan", "plan_improve", "plan_map", "project", "read", "read_walks", "render", "render_backward",
     "render_forward", "render_until", "report", "selftest", "set_progress", "set_threads", "set_variant", "shares", "team", "threads",
     "traverse", "variant", "walk", "write",
 ]

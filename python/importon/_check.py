@@ -50,21 +50,24 @@ class CheckRow(Row):
     sees : float
         Of a row that compares draws with a density: the smallest relative error of the density
         that it would have found; 0: of other rows.
+    why : str or None
+        Why a row without a reference decides nothing, as where a shape has no room to move.
     verdict : str
-        "ok", "FAIL" or "noisy".
+        "ok", "FAIL", "noisy" or "open".
     """
 
-    FIELDS = ("method", "param", "step", "value", "reference", "se", "error", "limit", "ok", "kinks", "sees")
+    FIELDS = ("method", "param", "step", "value", "reference", "se", "error", "limit", "ok", "kinks", "sees", "why")
     method: str
     param: str
     step: float
     kinks: int
     sees: float
+    why: Optional[str]
 
     @property
     def verdict(self) -> str:
-        """"ok", "FAIL" or "noisy"."""
-        return {1: "ok", 0: "FAIL"}.get(self.ok, "noisy")
+        """"ok", "FAIL", "noisy" or "open"."""
+        return {1: "ok", 0: "FAIL"}.get(self.ok, "open" if self.why else "noisy")
 
     def __repr__(self) -> str:
         return "%-9s %-32s %12.6g %12.6g +- %-9.2g error %-9.2g %s" % (

@@ -29,9 +29,9 @@ struct job {
     imp_context *ctx;
     struct imp_splat_scale scale;
     size_t pixels, n, items;
-    /* Bidirectional samples: groups of `group` items each, whose spread is the error. */
+    /* Bidirectional samples, and sweeps: groups of `group` items each, whose spread is the error. */
     size_t groups, group;
-    int64_t each;     /* walks of a pixel, in groups as even as can be */
+    int64_t each;     /* walks of a pixel, or sweeps, in groups as even as can be */
     double *spread;   /* [pixels][n][2]: sums of S^2 and N S over groups of N walks */
     double **waiting; /* [groups] sums of groups behind one that is not there yet */
     size_t next;      /* group to be added, guarded by lock */
@@ -148,7 +148,7 @@ static size_t result_size(const struct job *j)
     return j->pixels * j->n * (j->groups ? 1 : 2) * sizeof(double);
 }
 
-/* The first walk of a group: of each pixel it has the same number. */
+/* The first walk of a group: of each pixel, or stratum, it has the same number. */
 static int64_t group_begin(const struct job *j, size_t group)
 {
     const int64_t pixels = j->picture->walks / j->each;
@@ -333,9 +333,9 @@ enum imp_status imp__light_picture_make(const struct imp_light_picture *p, doubl
     j.items = (size_t)imp_clamp(p->walks / ITEM_WALKS, (int64_t)1, (int64_t)ITEMS_MAX);
     if (j.pixels > INT32_MAX)
         IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED, "light walks: more than 2^31 pixels"));
-    if (p->tracer->integrator->both) {
+    if (p->tracer->integrator->both || p->sweep > 0) {
         const int64_t pixels = (int64_t)film->crop_w * film->crop_h;
-        j.each = p->walks / pixels;
+        j.each = p->walks / (p->sweep > 0 ? p->sweep : pixels);
         j.groups = (size_t)imp_clamp(j.each, (int64_t)1, (int64_t)GROUPS_MAX);
         j.group = (size_t)imp_clamp(p->walks / (int64_t)j.groups / ITEM_WALKS, (int64_t)1,
                                     (int64_t)GROUP_ITEMS);

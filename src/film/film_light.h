@@ -12,6 +12,8 @@
  * The samples are cut into groups with equal numbers for each pixel, and the spread of
  * the groups' pictures is the standard error.
  *
+ * Walks that are strata of sweeps (imp_light_picture.sweep) are cut into groups, too.
+ *
  * Order of the sums: the walks are cut into a fixed number of items, each adds its walks up
  * one by one in a film of its own, and items are added in a fixed binary tree. */
 #ifndef IMP_FILM_LIGHT_H
@@ -64,7 +66,10 @@ struct imp_light_picture {
                   struct imp_light_walk *out);
     const void *payload;
     int64_t first, walks; /* of the light walks: these numbers */
-    double lo, hi;        /* part of the progress; hi 0: all */
+    /* So many walks, one behind the other, are strata of one sweep, and sweeps are independent: the
+     * error is the spread of groups of sweeps. Divides walks; 0: walks are independent. */
+    int64_t sweep;
+    double lo, hi; /* part of the progress; hi 0: all */
 };
 
 /* mean, se [height][width][n]; se may be NULL. The budget of dropped walks is checked.

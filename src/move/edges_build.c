@@ -140,10 +140,26 @@ static void lines_find(struct building *x)
     }
 }
 
-/* Two faces of one shape in one plane, on both sides: nothing is there. */
-static bool is_inner(const struct imp__edge_face *f, int n)
+/* Have two triangles a side in common, vertices and with them uv? */
+static bool is_welded(const struct imp_triangles *t, int prim, int other)
 {
-    return n == 2 && f[0].shape == f[1].shape && imp__length(f[0].in + f[1].in) < 1e-6;
+    const uint32_t *i = t->indices;
+    int common = 0;
+    for (int k = 0; k < 9; k++) common += i[3 * prim + k / 3] == i[3 * other + k % 3];
+    return common >= 2;
+}
+
+/* Two faces of one shape in one plane, on both sides: nothing is there, unless a texture has a
+ * seam. */
+static bool is_inner(const struct building *x, const struct imp__edge_face *f, int n)
+{
+    if (n != 2 || f[0].shape != f[1].shape || !(imp__length(f[0].in + f[1].in) < 1e-6))
+        return false;
+    const struct imp_shape *s = x->scene->shapes[f[0].shape];
+    const struct imp_bsdf *b = imp__shape_bsdf(x->scene, s);
+    bool textured = false;
+    for (int k = 0; k < b->n_in; k++) textured |= b->input[k]->texture != NULL;
+    return !textured || is_welded(&s->triangles, f[0].prim, f[1].prim);
 }
 
 static enum imp_status edge_add(struct building *x, const struct side *first, size_t n,
@@ -164,7 +180,7 @@ static enum imp_status edge_add(struct building *x, const struct side *first, si
             long_one = s;
     }
     const int faces = (int)(out->n_faces - before);
-    if (faces == 0 || is_inner(&out->face[before], faces)) {
+    if (faces == 0 || is_inner(x, &out->face[before], faces)) {
         out->n_faces = before;
         return IMP_OK;
     }

@@ -136,13 +136,23 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
     return IMP_OK;
 }
 
+/* Has the shape's material textures? */
+static bool looks_up(const struct imp_scene *scene, int shape)
+{
+    const struct imp_bsdf *b = imp__shape_bsdf(scene, scene->shapes[shape]);
+    for (int k = 0; k < b->n_in; k++)
+        if (b->input[k]->texture) return true;
+    return false;
+}
+
 void imp__pose_numbers_bar(const struct imp_pose *pose, double *bar)
 {
     if (pose->kind != IMP_POSE_RIGID) return;
     const imp_v3 turn = imp__v3(bar[3], bar[4], bar[5]);
     for (int i = 3; i < 6; i++) bar[i] = 0;
     struct imp_round round;
-    if (pose->shape >= 0 && imp__moves_sphere(pose->scene, pose->shape, &round))
+    if (pose->shape >= 0 && imp__moves_sphere(pose->scene, pose->shape, &round) &&
+        !looks_up(pose->scene, pose->shape))
         return; /* turned about its centre it is where it was */
     imp__rotation_bar(pose->number + 3, turn, bar + 3);
 }
@@ -188,7 +198,7 @@ static struct imp__glued glued(const struct imp_scene *scene, int shape, int pri
                                double b1, double b2, imp_v3 side)
 {
     const struct corners c = corners(scene, shape, prim);
-    struct imp__glued x = {shape, prim, {1 - b1 - b2, b1, b2}, {0}, {0}, 0};
+    struct imp__glued x = {.shape = shape, .prim = prim, .b = {1 - b1 - b2, b1, b2}};
     x.p = c.p0 + c.e1 * b1 + c.e2 * b2;
     x.n = imp__normalize(imp__cross(c.e1, c.e2));
     if (imp__dot(x.n, side) < 0) x.n = -x.n;
@@ -243,6 +253,18 @@ static void add3(double *bar, imp_v3 v)
     for (int i = 0; i < 3; i++) bar[i] += v[i];
 }
 
+/* s = in_edges[0] e1 + in_edges[1] e2. False: there is no s, or no triangle. */
+static bool edges_of(const struct corners *k, imp_v3 s, double in_edges[2])
+{
+    const double a = imp__dot(k->e1, k->e1), c = imp__dot(k->e2, k->e2),
+                 m = imp__dot(k->e1, k->e2), det = a * c - m * m;
+    const double x = imp__dot(k->e1, s), y = imp__dot(k->e2, s);
+    if (imp__is_zero(s) || !(det > 0)) return false;
+    in_edges[0] = (c * x - m * y) / det;
+    in_edges[1] = (a * y - m * x) / det;
+    return true;
+}
+
 /* n = c/|c|, c = e1 x e2: n' and the logarithm of |c|. */
 static void vertices_velocity(const struct imp__moves *moves, const struct imp__glued *x,
                               const double *theta, struct imp__velocity *out)
@@ -258,6 +280,10 @@ static void vertices_velocity(const struct imp__moves *moves, const struct imp__
     out->v += v0 * x->b[0] + v1 * x->b[1] + v2 * x->b[2];
     out->n += (c_dot * inverse - n * along) * side;
     out->area += along;
+    double in_edges[2];
+    if (!edges_of(&k, x->s, in_edges)) return;
+    const imp_v3 s_dot = (v1 - v0) * in_edges[0] + (v2 - v0) * in_edges[1];
+    out->turn += imp__dot(imp__cross(x->n, x->s), s_dot);
 }
 
 static void vertices_bar(const struct imp__moves *moves, const struct imp__glued *x,
@@ -268,7 +294,13 @@ static void vertices_bar(const struct imp__moves *moves, const struct imp__glued
     const double inverse = 1 / imp__length(c), side = imp__dot(n, x->n) < 0 ? -1 : 1;
     const imp_v3 turn = bar->n * side;
     const imp_v3 c_bar = (turn - n * imp__dot(n, turn) + n * bar->area) * inverse;
-    const imp_v3 e1_bar = imp__cross(k.e2, c_bar), e2_bar = imp__cross(c_bar, k.e1);
+    imp_v3 e1_bar = imp__cross(k.e2, c_bar), e2_bar = imp__cross(c_bar, k.e1);
+    double in_edges[2];
+    if (bar->turn != 0 && edges_of(&k, x->s, in_edges)) {
+        const imp_v3 s_bar = imp__cross(x->n, x->s) * bar->turn;
+        e1_bar += s_bar * in_edges[0];
+        e2_bar += s_bar * in_edges[1];
+    }
     add3(theta_bar + 3 * (size_t)k.index[0], bar->v * x->b[0] - e1_bar - e2_bar);
     add3(theta_bar + 3 * (size_t)k.index[1], bar->v * x->b[1] + e1_bar);
     add3(theta_bar + 3 * (size_t)k.index[2], bar->v * x->b[2] + e2_bar);
@@ -277,7 +309,7 @@ static void vertices_bar(const struct imp__moves *moves, const struct imp__glued
 struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
                                       const struct imp__glued *x, const double *theta_dot)
 {
-    struct imp__velocity out = {{0}, {0}, 0};
+    struct imp__velocity out = {{0}, {0}, 0, 0};
     for (int k = 0; k < moves->n_movers; k++) {
         const struct imp__mover *m = &moves->mover[k];
         if (m->shape != x->shape) continue;
@@ -287,6 +319,7 @@ struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
         case IMP_MOVE_POSE:
             out.v += number3(theta) + imp__cross(number3(theta + 3), r);
             out.n += imp__cross(number3(theta + 3), x->n);
+            out.turn += imp__dot(number3(theta + 3), x->n);
             break;
         case IMP_MOVE_SCALE:
             out.v += r * (m->rate * theta[0]);
@@ -310,7 +343,8 @@ void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *
         switch (m->kind) {
         case IMP_MOVE_POSE:
             add3(theta, bar->v);
-            add3(theta + 3, imp__cross(r, bar->v) + imp__cross(x->n, bar->n));
+            add3(theta + 3,
+                 imp__cross(r, bar->v) + imp__cross(x->n, bar->n) + x->n * bar->turn);
             break;
         case IMP_MOVE_SCALE:
             theta[0] += m->rate * (imp__dot(r, bar->v) + 2 * bar->area);

@@ -60,6 +60,7 @@ struct imp__glued {
     int shape, prim;
     double b[3]; /* weights of the vertices, as the shape's indices have them */
     imp_v3 p, n; /* place, and the unit geometric normal of either side */
+    imp_v3 s; /* a unit direction in the surface that is glued to it; 0: none is wanted */
     double
         curvature; /* of the surface: the normal at a place shifted by x across n turns by
                          curvature x */
@@ -68,6 +69,7 @@ struct imp__glued {
 struct imp__velocity {
     imp_v3 v, n; /* of the point, and of its normal */
     double area; /* of the logarithm of an area around it */
+    double turn; /* of its direction s about n */
 };
 
 /* Without movers. imp__moves_free releases them. */

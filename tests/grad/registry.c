@@ -737,7 +737,7 @@ int main(int argc, char **argv)
         if (ops->max_children) {
             for (int i = 0; imp__bsdf_kinds[i]; i++)
                 if (!imp__bsdf_kinds[i]->max_children &&
-                    imp__bsdf_kinds[i]->inputs[0].name && (is_long || (i + k) % 2))
+                    imp__bsdf_kinds[i]->inputs[0].name && (is_long || (i + k) % 4 == 1))
                     check(&(struct subject){.bsdf = ops, .back = imp__bsdf_kinds[i]});
             for (int i = 0; imp__texture_kinds[i] && ops->inputs[0].name; i++)
                 if (!of_meshes(imp__texture_kinds[i]))
@@ -759,7 +759,7 @@ int main(int argc, char **argv)
                                             imp__texture_kinds[i]->inputs &&
                                             imp__texture_kinds[i]->inputs[0].name);
                  nested++)
-                if (is_long || (i + k + nested) % 2)
+                if (is_long || (i + k + 2 * nested) % 4 == 1)
                     check(&(struct subject){
                         .bsdf = ops, .texture = imp__texture_kinds[i], .nested = nested});
         }

@@ -99,6 +99,39 @@ def test_missing():
     raises(im.ArgumentError, lambda: first(weights=np.zeros((8, 8))), "weights")
 
 
+def test_plan():
+    """Gains are the determinants and traces of NumPy, of the informations handed out; maps add up to these"""
+    s = box(8)
+    views = [0, {"origin": (.6, .3, 2.5), "target": (0, 0, 0), "name": "aside"}, {"time": 4, "name": "long"}]
+    names, call = ["red.*", "green.*"], dict(noise={"read": .05}, spp=256, seed=4)
+    p = im.plan(s, names, views, have=[0], take=2, **call)
+    red = [p.names.index(RED + "[%d]" % k) for k in range(3)]
+    assert len(p.rows) == 3 and len(p.chosen) == 2 and np.isfinite(p.half95_today).all()
+    taken = im.plan(s, names, [0], seed=1, **{k: call[k] for k in ("noise", "spp")})
+    alone = im.plan(s, names, views, criterion="A", of=RED, **call)
+    for criterion, q in (("d", im.plan(s, names, views, **call)), ("a", alone)):
+        for r in q.rows:
+            prior = np.diag(q.prior ** -2)
+            C = np.linalg.inv(prior + r.information)
+            gain = (np.linalg.slogdet(prior + r.information)[1] - np.linalg.slogdet(prior)[1]) / 6 if criterion == "d" \
+                else np.log(3 / np.trace(C[np.ix_(red, red)] / q.prior[0] ** 2))
+            assert abs(r.gain / gain - 1) < 1e-9, (criterion, r.gain, gain)
+            assert np.allclose(r.half95, 1.959963984540054 * np.sqrt(np.diag(C)))
+            assert np.allclose(r.information, r.information.T) and (r.information_se >= 0).all()
+    row = taken.rows[0]
+    maps = im.plan_map(s, names, 0, row.pull, noise=call["noise"], spp=256, seed=9)
+    for k, m in enumerate(maps[:-1]):
+        assert abs(np.asarray(m).sum() / row.information[k, k] - 1) < .2, (k, np.asarray(m).sum(), row.information[k, k])
+    assert im.lamps(s) == ["light.emitter"] and im.plan(s, LIGHT, [{"lamps": im.lamps(s)}], spp=16).rows[0].lit == 1
+    half = im.plan(s, names, views, prior={RED: 1e-6}, **call)
+    assert np.allclose(half.half95_today[red], 1.959963984540054e-6)
+    raises(im.ArgumentError, lambda: im.plan(s, names, [], **call), "candidates")
+    raises(im.ArgumentError, lambda: im.plan(s, names, [{"place": 1}]), "place")
+    raises(im.ArgumentError, lambda: im.plan(s, names, of="nothing"), "nothing")
+    raises(im.ArgumentError, lambda: im.plan(s, names, noise={"dark": 1}), "dark")
+    raises(im.ArgumentError, lambda: im.plan(s, names, [{"lamps": "none"}]), "none")
+
+
 def test_answer():
     """The truth comes back within its errors; covariance and intervals belong together"""
     s, target, p, truth = setting()

@@ -309,13 +309,14 @@ static void refused(imp_context *ctx)
     imp_scene_destroy(s);
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
+    const bool is_long = tap_is_long(argc, argv);
     imp_context *ctx = test_context(2);
     densities(ctx);
-    pictures(ctx, "elements/glossy.xml", 0.25);
+    if (is_long) pictures(ctx, "elements/glossy.xml", 0.25);
     pictures(ctx, "elements/b.xml", 0.6);
-    expectations(ctx, "elements/b.xml", 0.08);
+    if (is_long) expectations(ctx, "elements/b.xml", 0.08);
     expectations(ctx, "elements/glossy.xml", 0.25); /* by bins of 15 degrees */
     gradients(ctx);
     refused(ctx);

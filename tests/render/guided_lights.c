@@ -211,15 +211,16 @@ static void refused(imp_context *ctx)
     imp_scene_destroy(s);
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
+    const bool is_long = tap_is_long(argc, argv);
     imp_context *ctx = test_context(2);
     beginnings(ctx);
-    means(ctx, offices, "res=16", 0, 8, 0, 0.7);
+    if (is_long) means(ctx, offices, "res=16", 0, 8, 0, 0.7);
     means(ctx, offices, "res=16", 0, 8, 0.25, 0.7);
     means(ctx, offices, "res=16", 1, 1024, 0.25, 0.5);
     means(ctx, offices, "res=4 integrator=photons", 1, 6144, 0.25, 0.6);
-    means(ctx, "elements/glossy.xml", "res=8", 0, 64, 0.25, 1.2);
+    if (is_long) means(ctx, "elements/glossy.xml", "res=8", 0, 64, 0.25, 1.2);
     means(ctx, "cornell.xml", "res=8", 0, 32, 0.25, 1.2);
     bits(ctx);
     gradients(ctx);

@@ -12,7 +12,7 @@
 
 enum { MOST_DIRECTIONS = 24, SAMPLES_OF_A_KIND = 2200000 };
 /* Of wo, for every configuration: in the long run all of them. */
-static int directions = MOST_DIRECTIONS / 2;
+static int directions = MOST_DIRECTIONS / 3;
 static double level; /* of one chi-square, so that all together fail 1 % (Sidak) */
 
 struct point {

@@ -35,13 +35,13 @@ static void motion_text(enum body body, const double pose[7], char *out, size_t 
 
 static imp_scene *room(const char *rest, double pose[BODIES][7])
 {
-    char xml[16384], text[BODIES][1024];
+    char text[BODIES][1024];
     for (enum body k = 0; k < BODIES; k++)
         motion_text(k, pose[k], text[k], sizeof text[k]);
-    snprintf(xml, sizeof xml,
-             "<scene version='3.0.0'>%s" ROOM_CAMERA ROOM_SHAPES "</scene>", rest, "",
-             text[CAMERA], text[BLOCK], text[LAMP]);
-    return test_scene_text(ctx, xml, IMP_RGB);
+    return room_build(ctx, &(struct room_parts){.rest = rest,
+                                                .camera = text[CAMERA],
+                                                .block = text[BLOCK],
+                                                .lamp = text[LAMP]});
 }
 
 /* A smooth weight of film positions and channels: one that jumps between pixels would have kinks
@@ -242,7 +242,7 @@ static void together_test(void)
              "<shape type='rectangle'><transform name='to_world'><scale value='.5'/>"
              "<rotate x='1' angle='170'/><translate x='.6' z='2.6'/></transform><emitter "
              "type='area'><rgb name='radiance' value='9,8,7'/></emitter></shape></scene>",
-             "", "");
+             "", "type='box'");
     imp_scene *scene = test_scene_text(ctx, xml, IMP_RGB);
     struct imp_tracer t = tracer_of(scene);
     struct imp__moves m = imp__moves_begin(scene, t.sensor);

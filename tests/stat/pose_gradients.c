@@ -11,34 +11,12 @@
 
 enum { WIDTH = 24, HEIGHT = 16, N = 18 };
 static imp_context *ctx;
-static const char *const objects[] = {"block", "lamp", "camera"};
 static const double at[N] = {.1, -.1, .05, .2, -.1, .3,  -.1, .2,  .1,
                              .1, .05, 0,   .1, .2,  -.1, .02, .03, -.02};
 
 static imp_scene *room(const char *rest, const char *filter)
 {
-    char xml[16384], *box;
-    snprintf(xml, sizeof xml,
-             "<scene version='3.0.0'>%s" ROOM_CAMERA ROOM_SHAPES "</scene>", rest, "", "",
-             "", "");
-    box = strstr(xml, "type='box'");
-    memmove(box + strlen(filter), box + strlen("type='box'"),
-            strlen(box + strlen("type='box'")) + 1);
-    memcpy(box, filter, strlen(filter));
-    imp_scene *scene = test_scene_text(ctx, xml, IMP_RGB);
-    for (int k = 0; k < 3; k++) test_must(ctx, imp_scene_add_pose(scene, objects[k]));
-    return scene;
-}
-
-static void poses_set(imp_scene *scene, const double numbers[N])
-{
-    for (int k = 0; k < 3; k++) {
-        char name[32];
-        size_t index;
-        snprintf(name, sizeof name, "%s.pose", objects[k]);
-        test_must(ctx, imp_scene_find_param(scene, name, &index));
-        test_must(ctx, imp_scene_set_values(scene, index, 6, numbers + 6 * k));
-    }
+    return room_posed(ctx, &(struct room_parts){.rest = rest, .filter = filter});
 }
 
 /* Smooth over the picture, in steps of pixels that no difference notices. */
@@ -80,7 +58,7 @@ static void room_test(const char *name, const char *rest, const char *filter, in
     imp_scene *scene = room(rest, filter);
     imp_problem *p;
     double sum[N + 3] = {0}, square[N + 3] = {0}, told[N + 3] = {0}, most[3] = {0};
-    poses_set(scene, at);
+    room_poses_set(ctx, scene, at);
     test_must(ctx, imp_problem_create(scene, &p));
     test_must(ctx, imp_problem_activate(p, "grey.reflectance.value"));
     test_must(ctx, imp_problem_activate(p, "*.pose"));
@@ -118,7 +96,7 @@ static void room_test(const char *name, const char *rest, const char *filter, in
                 double there[N];
                 memcpy(there, at, sizeof there);
                 there[k] += (s ? 1 : -1) * checked[i].step;
-                poses_set(scene, there);
+                room_poses_set(ctx, scene, there);
                 value[s] = functional(scene, 500 + g, spp_ref);
             }
             tap_add(&ref, (value[1] - value[0]) / (2 * checked[i].step));
@@ -127,7 +105,7 @@ static void room_test(const char *name, const char *rest, const char *filter, in
         const double z = (sum[3 + k] - ref.mean) / hypot(se, tap_se(&ref));
         tap_ok(fabs(z) < 3.5 && se < 0.05 * most[k / 6],
                "%s, %s.pose[%d] # %.5f se %.5f ref %.5f se %.5f z %.2f", name,
-               objects[k / 6], k % 6, sum[3 + k], se, ref.mean, tap_se(&ref), z);
+               room_objects[k / 6], k % 6, sum[3 + k], se, ref.mean, tap_se(&ref), z);
     }
     imp_scene_destroy(scene);
 }
@@ -191,11 +169,12 @@ static void refused_test(void)
 #define PATH   "<integrator type='path'><integer name='max_depth' value='4'/></integrator>"
 #define DIRECT "<integrator type='direct'/>"
 
-int main(void)
+int main(int argc, char **argv)
 {
+    const bool is_long = tap_is_long(argc, argv);
     ctx = test_context(2);
     adjoint_make();
-    room_test("direct", DIRECT, "type='box'", 64, 128);
+    if (is_long) room_test("direct", DIRECT, "type='box'", 64, 128);
     room_test("path, a Gaussian filter", PATH, "type='gaussian'", 64, 64);
     refused_test();
     imp_context_destroy(ctx);

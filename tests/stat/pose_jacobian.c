@@ -11,36 +11,16 @@
 
 enum { WIDTH = 24, HEIGHT = 16, VALUES = WIDTH * HEIGHT * 3, N = 18 };
 static imp_context *ctx;
-static const char *const objects[] = {"block", "lamp", "camera"};
 static const double at[N] = {.1, -.1, .05, .2, -.1, .3,  -.1, .2,  .1,
                              .1, .05, 0,   .1, .2,  -.1, .02, .03, -.02};
 static float adjoint[VALUES];
 
 static imp_scene *room(const char *filter)
 {
-    char xml[16384], *box;
-    snprintf(xml, sizeof xml,
-             "<scene version='3.0.0'>%s" ROOM_CAMERA ROOM_SHAPES "</scene>",
-             "<integrator type='path'><integer name='max_depth' value='3'/></integrator>",
-             "", "", "", "");
-    box = strstr(xml, "type='box'");
-    memmove(box + strlen(filter), box + strlen("type='box'"),
-            strlen(box + strlen("type='box'")) + 1);
-    memcpy(box, filter, strlen(filter));
-    imp_scene *scene = test_scene_text(ctx, xml, IMP_RGB);
-    for (int k = 0; k < 3; k++) test_must(ctx, imp_scene_add_pose(scene, objects[k]));
-    return scene;
-}
-
-static void poses_set(imp_scene *scene, const double numbers[N])
-{
-    for (int k = 0; k < 3; k++) {
-        char name[32];
-        size_t index;
-        snprintf(name, sizeof name, "%s.pose", objects[k]);
-        test_must(ctx, imp_scene_find_param(scene, name, &index));
-        test_must(ctx, imp_scene_set_values(scene, index, 6, numbers + 6 * k));
-    }
+    return room_posed(
+        ctx, &(struct room_parts){.rest = "<integrator type='path'><integer "
+                                          "name='max_depth' value='3'/></integrator>",
+                                  .filter = filter});
 }
 
 static double sum_of(imp_film *film)
@@ -77,7 +57,7 @@ static void pictures_test(const char *name, const char *filter)
     memset(mean, 0, sizeof mean);
     memset(square, 0, sizeof square);
     memset(told, 0, sizeof told);
-    poses_set(scene, at);
+    room_poses_set(ctx, scene, at);
     for (int s = 0; s < SEEDS; s++) {
         struct imp_run run = IMP_RUN_INIT;
         struct imp_estimate sums[N];
@@ -139,7 +119,7 @@ static void pictures_test(const char *name, const char *filter)
                 double there[N];
                 memcpy(there, at, sizeof there);
                 there[k] += (s ? 1 : -1) * checked[i].step;
-                poses_set(scene, there);
+                room_poses_set(ctx, scene, there);
                 value[s] = functional(scene, 700 + (uint64_t)g);
             }
             tap_add(&ref, (value[1] - value[0]) / (2 * checked[i].step));
@@ -148,7 +128,7 @@ static void pictures_test(const char *name, const char *filter)
         const double z = (sum[k] - ref.mean) / hypot(se, tap_se(&ref));
         tap_ok(fabs(z) < 3.5 && se < 0.06 * most[k / 6],
                "%s, %s.pose[%d] # %.5f se %.5f ref %.5f se %.5f z %.2f", name,
-               objects[k / 6], k % 6, sum[k], se, ref.mean, tap_se(&ref), z);
+               room_objects[k / 6], k % 6, sum[k], se, ref.mean, tap_se(&ref), z);
     }
     imp_scene_destroy(scene);
 }
@@ -182,7 +162,7 @@ static void normal_test(void)
     test_must(ctx, imp_render(scene, &run, &target));
     test_target(ctx, p, 0, WIDTH, HEIGHT, imp_film_mean(target));
     imp_film_destroy(target);
-    poses_set(scene, at);
+    room_poses_set(ctx, scene, at);
     for (int s = 0; s < SEEDS; s++) {
         double cov[K * K], excess[K * K], own[K], own_se[K];
         struct imp_estimate value;
@@ -247,8 +227,9 @@ static void normal_test(void)
     imp_scene_destroy(scene);
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
+    const bool is_long = tap_is_long(argc, argv);
     ctx = test_context(2);
     for (int p = 0; p < WIDTH * HEIGHT; p++)
         for (int c = 0; c < 3; c++) {
@@ -256,7 +237,7 @@ int main(void)
             adjoint[3 * p + c] =
                 (float)((1 + 0.3 * sin(3 * x + 2 * y + c)) / (WIDTH * HEIGHT));
         }
-    pictures_test("box", "type='box'");
+    if (is_long) pictures_test("box", "type='box'");
     pictures_test("a Gaussian filter", "type='gaussian'");
     normal_test();
     imp_context_destroy(ctx);

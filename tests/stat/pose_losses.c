@@ -9,36 +9,16 @@
 
 enum { WIDTH = 24, HEIGHT = 16, N = 18, ALL = N + 3 };
 static imp_context *ctx;
-static const char *const objects[] = {"block", "lamp", "camera"};
 static const double truth[N] = {0};
 static const double away[N] = {.1, -.1, .05, .2, -.1, .3,  -.1, .2,  .1,
                                .1, .05, 0,   .1, .2,  -.1, .02, .03, -.02};
 
 static imp_scene *room(const char *filter)
 {
-    char xml[16384], *box;
-    snprintf(xml, sizeof xml,
-             "<scene version='3.0.0'>%s" ROOM_CAMERA ROOM_SHAPES "</scene>",
-             "<integrator type='path'><integer name='max_depth' value='3'/></integrator>",
-             "", "", "", "");
-    box = strstr(xml, "type='box'");
-    memmove(box + strlen(filter), box + strlen("type='box'"),
-            strlen(box + strlen("type='box'")) + 1);
-    memcpy(box, filter, strlen(filter));
-    imp_scene *scene = test_scene_text(ctx, xml, IMP_RGB);
-    for (int k = 0; k < 3; k++) test_must(ctx, imp_scene_add_pose(scene, objects[k]));
-    return scene;
-}
-
-static void poses_set(imp_scene *scene, const double numbers[N])
-{
-    for (int k = 0; k < 3; k++) {
-        char name[32];
-        size_t index;
-        snprintf(name, sizeof name, "%s.pose", objects[k]);
-        test_must(ctx, imp_scene_find_param(scene, name, &index));
-        test_must(ctx, imp_scene_set_values(scene, index, 6, numbers + 6 * k));
-    }
+    return room_posed(
+        ctx, &(struct room_parts){.rest = "<integrator type='path'><integer "
+                                          "name='max_depth' value='3'/></integrator>",
+                                  .filter = filter});
 }
 
 /* A problem with a reflectance and, if asked for, all poses, and the picture at the scene file's
@@ -50,7 +30,7 @@ static imp_problem *problem(imp_scene *scene, enum imp_loss loss, bool moves)
     struct imp_target t = IMP_TARGET_INIT;
     imp_problem *p = test_problem(ctx, scene, "grey.reflectance.value");
     if (moves) test_must(ctx, imp_problem_activate(p, "*.pose"));
-    poses_set(scene, truth);
+    room_poses_set(ctx, scene, truth);
     run.spp = 1024;
     run.seed = 77;
     test_must(ctx, imp_render(scene, &run, &film));
@@ -74,7 +54,7 @@ static double loss_at(imp_problem *p, imp_scene *scene, const double numbers[N],
     double there[N];
     memcpy(there, numbers, sizeof there);
     there[k] += h;
-    poses_set(scene, there);
+    room_poses_set(ctx, scene, there);
     run.spp = spp;
     run.seed = seed;
     test_must(ctx, imp_problem_objective(p, NULL, &run, &value, NULL, NULL));
@@ -105,7 +85,7 @@ static void loss_test(const struct setting *o)
     const int SEEDS = o->seeds;
     const double *at = o->at_optimum ? truth : away;
     double sum[ALL] = {0}, square[ALL] = {0}, told[ALL] = {0}, most[3] = {0};
-    poses_set(scene, at);
+    room_poses_set(ctx, scene, at);
     for (int s = 0; s < SEEDS; s++) {
         struct imp_run run = IMP_RUN_INIT;
         struct imp_estimate value;
@@ -145,7 +125,7 @@ static void loss_test(const struct setting *o)
         const double z = (sum[3 + k] - ref.mean) / hypot(se, tap_se(&ref));
         tap_ok(fabs(z) < 3.5 && se < 0.05 * most[k / 6],
                "%s, %s.pose[%d] # %.5f se %.5f ref %.5f se %.5f z %.2f", o->name,
-               objects[k / 6], k % 6, sum[3 + k], se, ref.mean, tap_se(&ref), z);
+               room_objects[k / 6], k % 6, sum[3 + k], se, ref.mean, tap_se(&ref), z);
     }
     imp_problem_destroy(still);
     imp_problem_destroy(p);

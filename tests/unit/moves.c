@@ -68,14 +68,23 @@ static void kind_test(enum imp__move_kind kind, const char *name)
             bar[k] = 0;
         }
         const imp_v3 side = imp__v3(imp__u01(key, 2) - 0.5, imp__u01(key, 3) - 0.5, 0.1);
-        const struct imp__glued x = imp__glued_at(scene, 0, &at, side);
+        struct imp__glued x = imp__glued_at(scene, 0, &at, side);
+        const struct triangle rest = triangle_moved(&m, 0, at.prim, theta, 0);
+        real along[3];
+        triangle_grain(&rest, along);
+        x.s = imp__v3((double)along[0], (double)along[1], (double)along[2]);
+        const imp_v3 across = imp__cross(x.n, x.s);
         const struct imp__velocity v = imp__velocity_of(&m, &x, theta);
         real out[4][7];
+        real grain[4];
         const real h = 1e-4L;
         for (int k = 0; k < 4; k++) {
             const struct triangle moved =
                 triangle_moved(&m, 0, at.prim, theta, difference_at[k] * h);
             triangle_read(&moved, x.b, out[k]);
+            real s[3];
+            triangle_grain(&moved, s);
+            grain[k] = across[0] * s[0] + across[1] * s[1] + across[2] * s[2];
         }
         double d[7];
         for (int k = 0; k < 7; k++) {
@@ -93,8 +102,10 @@ static void kind_test(enum imp__move_kind kind, const char *name)
             worst = fmax(worst, fabs(v.n[k] - turn * d[3 + k]));
         }
         worst = fmax(worst, fabs(v.area - d[6]));
-        struct imp__velocity w = {imp__v3(0, 0, 0), imp__v3(0, 0, 0), imp__u01(key, 4)};
-        double forward = w.area * v.area, reverse = 0;
+        worst = fmax(worst, fabs(v.turn - (double)difference(grain, h)));
+        struct imp__velocity w = {imp__v3(0, 0, 0), imp__v3(0, 0, 0), imp__u01(key, 4),
+                                  imp__u01(key, 5)};
+        double forward = w.area * v.area + w.turn * v.turn, reverse = 0;
         for (int k = 0; k < 3; k++) {
             w.v[k] = imp__u01(key, (uint32_t)(500 + k)) - 0.5;
             w.n[k] = imp__u01(key, (uint32_t)(600 + k)) - 0.5;

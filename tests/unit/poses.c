@@ -14,12 +14,14 @@ static imp_context *ctx;
 static imp_scene *room(const char *rest, const char *camera, const char *block,
                        const char *lamp)
 {
-    char xml[16384];
-    snprintf(xml, sizeof xml,
-             "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' "
-             "value='3'/></integrator>%s" ROOM_CAMERA ROOM_SHAPES "</scene>",
-             rest, "", camera, block, lamp);
-    return test_scene_text(ctx, xml, IMP_RGB);
+    char first[1024];
+    snprintf(
+        first, sizeof first,
+        "<integrator type='path'><integer name='max_depth' value='3'/></integrator>%s",
+        rest);
+    return room_build(ctx,
+                      &(struct room_parts){
+                          .rest = first, .camera = camera, .block = block, .lamp = lamp});
 }
 
 static imp_film *picture(imp_scene *scene)

@@ -361,6 +361,8 @@ class Fixture:
             s.pixels = C.addressof(self.array(C.c_float, 48, [0.25] * 48))
         if name == "imp_team": s.gather = C.cast(self.keep.append(C.CFUNCTYPE(C.c_int)(lambda: 0)) or self.keep[-1], C.c_void_p)
         if name == "imp_fit_options": s.max_iterations = 2
+        if name == "imp_plan_candidate" and function == "imp_plan_improve":
+            s.placed, s.origin[1], s.origin[2] = True, -4, 1
         if name == "imp_check_options":
             self.keep.append(C.create_string_buffer(b"frozen,dot,euler,fresh,loss,ends,film"))
             s.paths, s.fresh_spp, s.draws_s, s.only = 8, 4, 1e-3, C.addressof(self.keep[-1])
@@ -391,11 +393,11 @@ class Fixture:
         if not a.pointer:
             scalars = {"fallback": 1., "fraction": 1., "seed": 1, "flags": 0, "size": 8, "width": 4, "height": 4, "channels": 3, "length": len(self.good(xml, function)[0]) if "load_string" in function else 0, "weight": 1., "order": 1,
                        "index": 1.5 if a.ctype is C.c_double else 0, "cells": 1., "um": .5, "k": 1., "background": 1., "confidence": .9, "a": 1., "b": 1.,
-                       "radius": 2., "bytes": 1 << 20, "hi": 3., "lo": 1., "value": 1.5 if a.ctype is C.c_double else 1,
+                       "radius": 2., "rounds": 1, "bytes": 1 << 20, "hi": 3., "lo": 1., "value": 1.5 if a.ctype is C.c_double else 1,
                        "n_vertices": 3, "n_triangles": 1, "layers": 1, "nx": 1, "ny": 1, "nz": 1, "a": 1., "pilots": 2, "n_groups": 1, "low": .1, "high": .9,
                        "n": {"imp_scene_set_values": 1, "imp_scene_spectrum": 2, "imp_problem_nlopt": 3}.get(function, 1)}
             zeros = {"scalar", "status", "cause", "sensor", "channel", "x", "y", "sample", "json", "i", "from_here",
-                     "kind", "of", "time", "nm", "progress", "rays", "ray", "bundle", "n_walks", "target", "edge", "most", "subject", "from", "to", "luminaire", "room", "sets"}
+                     "kind", "of", "time", "nm", "progress", "rays", "ray", "bundle", "n_walks", "target", "edge", "most", "subject", "from", "to", "luminaire", "lamp", "room", "sets"}
             if key == "imp_problem_tie.kind": return constants["IMP_TIE_LOG"], None
             if key == "imp_bend_image.target": return 4, None  # the fixture adds it
             if function == "imp_parts_create": return {"index": 1, "count": 2}[a.name], None

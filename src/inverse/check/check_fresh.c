@@ -13,6 +13,7 @@
 #include "inverse/estimate/moved_gradient.h"
 #include "scene/pose.h"
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 /* 6e-5 by chance for normal numbers, 1e-3 with the 15 degrees of freedom of a difference.
@@ -146,22 +147,34 @@ static double pose_scale(const struct imp_problem *p, const struct comparison *c
     return pose ? 0.2 * imp__pose_large(pose, c->element) : 0;
 }
 
-/* Is there room for a pose on both sides? What touches another object has a derivative on one. */
+/* The last error as a reason, without what all of them begin with. */
+static enum imp_status reason_keep(struct imp_problem *p, int side, const char **why)
+{
+    static const char prefix[] = "derivatives by what moves: ";
+    const char *text = imp_last_error(p->ctx);
+    char line[600];
+    if (strncmp(text, prefix, sizeof prefix - 1) == 0) text += sizeof prefix - 1;
+    snprintf(line, sizeof line, "a step %s it: %s", side < 0 ? "below" : "above", text);
+    *why = imp__arena_strdup(&p->check_arena, line);
+    return *why ? IMP_OK : imp__error(p->ctx, IMP_E_NOMEM, "no memory for a check");
+}
+
+/* Is there room for a pose on both sides? What touches another object has a derivative on one. *why:
+ * what stands in the way, in the check's arena; NULL: nothing. */
 static enum imp_status has_room(struct rows *r, const struct imp__motion *m, size_t e,
-                                bool *yes)
+                                const char **why)
 {
     enum imp_status st = IMP_OK;
     struct imp_problem *p = r->fresh.check->problem;
     struct imp_param param = *m->param;
-    *yes = true;
-    for (int side = -1; side <= 1 && *yes && m->scale > 0; side += 2) {
+    *why = NULL;
+    for (int side = -1; side <= 1 && !*why && m->scale > 0; side += 2) {
         imp__param_set(&param, e, m->old[e] + side * IMP_FRESH_STEP * m->scale);
         imp__theta_announce(p->scene);
         IMP_TRY(imp__poses_settle(p->scene));
         st = imp__moved_possible(p, &r->fresh.check->run);
-        *yes = st == IMP_OK;
-        if (st == IMP_E_UNSUPPORTED) st = IMP_OK;
-        IMP_TRY(st);
+        if (st != IMP_E_UNSUPPORTED) IMP_TRY(st);
+        else IMP_TRY(reason_keep(p, side, why));
     }
 out:
     imp__param_set(&param, e, m->old[e]);
@@ -188,18 +201,19 @@ static enum imp_status comparison_round(struct rows *r, struct comparison *c, in
     const struct imp__motion m = {q, old, weight, pose_scale(p, c)};
     if (is_singly(p, c->param)) {
         const size_t e = c->element < 0 ? 0 : (size_t)c->element;
-        bool room = true;
+        const char *why = NULL;
         weight[e] = 1;
         mine = (struct imp_estimate){r->gradient[base + e], r->gradient_se[base + e], 0};
-        if (m.scale > 0) IMP_TRY(has_room(r, &m, e, &room));
-        if (!room) { /* nothing is decided */
+        if (m.scale > 0) IMP_TRY(has_room(r, &m, e, &why));
+        if (why) { /* nothing is decided */
             const struct imp_check_row row = {.step = IMP_FRESH_STEP * m.scale,
                                               .value = mine.value,
                                               .reference = NAN,
                                               .se = mine.se,
                                               .error = NAN,
                                               .limit = Z_LIMIT,
-                                              .ok = -1};
+                                              .ok = -1,
+                                              .why = why};
             c->mine = mine;
             c->noisy = false;
             st = imp__check_row(r->fresh.check, "fresh", q->info.name, c->element, &row);

@@ -16,8 +16,9 @@
 #define FROZEN_LIMIT 1e-6
 #define TINY                                                                             \
     1e-3 /* of a walk's value per scale of a number: smaller slopes are rounding */
-#define N_STEPS 3
-static const double steps[N_STEPS] = {1e-2, 1e-3, 1e-4};
+#define N_STEPS                                                                          \
+    5 /* the last ones for vertices that slide fast, seen at a grazing angle */
+static const double steps[N_STEPS] = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
 
 /* One pose, scale, place or direction of a light, moved by h along one of its numbers. */
 struct moved {
@@ -72,14 +73,15 @@ static imp_v3 turned(const struct moved *m, imp_v3 d)
                    R[6] * d[0] + R[7] * d[1] + R[8] * d[2]);
 }
 
-/* A point of a shape, its normal, and the curvature there, where the pose has moved. */
+/* A point of a shape, its normal and a direction in it, and the curvature there, where the pose has
+ * moved. */
 struct at {
-    imp_v3 p, n;
+    imp_v3 p, n, s;
     double curvature;
 };
 static struct at placed(const struct moved *m, const struct imp__glued *x)
 {
-    struct at at = {x->p, x->n, x->curvature};
+    struct at at = {x->p, x->n, x->s, x->curvature};
     if (x->shape != m->shape) return at;
     if (m->pose->kind == IMP_POSE_SCALE) {
         at.p = m->from + (x->p - m->from) * m->by;
@@ -87,8 +89,21 @@ static struct at placed(const struct moved *m, const struct imp__glued *x)
     } else {
         at.p = m->to + turned(m, x->p - m->from);
         at.n = turned(m, x->n);
+        at.s = turned(m, x->s);
     }
     return at;
+}
+
+/* The point of a vertex, with its frame's s where its material is not Lambertian. */
+static struct imp__glued vertex_glued(const struct imp_scene *scene,
+                                      const struct imp_vertex *v, double time)
+{
+    struct imp__glued x = imp__glued_at(scene, v->d.shape, &v->d.located, v->ng);
+    struct imp_surface at;
+    if (v->bsdf && !imp__is_plain(v->bsdf) &&
+        imp__decided_surface(scene, &v->d, time, &at))
+        x.s = at.s;
+    return x;
 }
 
 /* Where a ray from o along w meets the plane of a place, or the sphere that it lies on; the normal
@@ -108,41 +123,100 @@ static imp_v3 met_at(imp_v3 o, imp_v3 w, struct at *x)
     return p;
 }
 
-/* cos cos_y/d^2 between two points. */
-static double geometry(imp_v3 x, imp_v3 n, imp_v3 y, imp_v3 n_y)
+/* cos_y/d^2 from a point to another one. */
+static double receives(imp_v3 x, imp_v3 y, imp_v3 n_y)
 {
     const imp_v3 r = y - x;
     const double d = imp__length(r);
-    return imp__dot(n, r) * imp__dot(n_y, r) / (d * d * d * d);
+    return imp__dot(n_y, r) / (d * d * d);
 }
 
-/* The light sample of a vertex at x with normal n, over that at its recorded place. */
+/* What the material looks up at x: of a shape that has moved since, where this point of it was when
+ * the walk was recorded. */
+static void looked_up(const struct moved *m, const struct imp_vertex *v, imp_v3 x,
+                      bool moved, const struct imp__glued *then, imp_spec *in)
+{
+    const struct imp_scene *scene = m->c->problem->scene;
+    struct imp_texcoord at = imp__vertex_at(v);
+    struct imp_surface old;
+    imp_v3 grad[2];
+    if (moved && then->shape == m->shape) {
+        const double *R = m->turn;
+        const imp_v3 r = x - m->to;
+        x = m->pose->kind == IMP_POSE_SCALE
+                ? m->from + r * (1 / m->by)
+                : m->from + imp__v3(R[0] * r[0] + R[3] * r[1] + R[6] * r[2],
+                                    R[1] * r[0] + R[4] * r[1] + R[7] * r[2],
+                                    R[2] * r[0] + R[5] * r[1] + R[8] * r[2]);
+    }
+    if (then->curvature !=
+        0) { /* the point itself, as one that a ray of no length hits */
+        const struct imp_hit hit = {.t = 0};
+        v->shape->ops->surface(v->shape, &hit, &x, &(imp_v3){0}, &old);
+        at.uv[0] = old.uv[0];
+        at.uv[1] = old.uv[1];
+    } else if (imp__decided_surface(scene, &v->d, 0, &old)) {
+        imp__surface_grad(&old, grad);
+        for (int k = 0; k < 2; k++) at.uv[k] += imp__dot(grad[k], x - then->p);
+    }
+    imp__inputs_eval(v->bsdf->input, v->bsdf->n_in, &at, in);
+}
+
+/* The kernel of a vertex, now at x, over that at its recorded place, by lanes: between o and w, unit,
+ * now and then. */
+static imp_spec kernel_ratio(const struct moved *m, const struct imp_vertex *v,
+                             const struct at *now, imp_v3 x, const imp_v3 o[2],
+                             const imp_v3 w[2], const struct imp__glued *then, int lobe)
+{
+    imp_spec in[IMP_INPUTS_MAX];
+    if (imp__is_plain(v->bsdf))
+        return imp__spec(imp__dot(now->n, w[0]) / imp__dot(then->n, w[1]));
+    imp_spec K[2];
+    const bool textured = imp__is_textured(v->bsdf);
+    for (int k = 0; k < 2; k++) {
+        if (textured) looked_up(m, v, k ? then->p : x, k == 0, then, in);
+        const imp_v3 n = k ? then->n : now->n, across = k ? then->s : now->s;
+        const imp_v3 s = imp__normalize(across - n * imp__dot(n, across));
+        const struct imp_frame f = {s, imp__cross(n, s), n};
+        const struct imp_dirs d = {imp__to_local(&f, -o[k]), imp__to_local(&f, w[k]),
+                                   lobe, 0};
+        v->bsdf->ops->eval(v->bsdf, textured ? in : v->in, &d, &K[k]);
+    }
+    for (int c = 0; c < 4; c++) K[0][c] = K[1][c] != 0 ? K[0][c] / K[1][c] : 0;
+    return K[0];
+}
+
+/* Directions to the light sample of a vertex at x, now and at its recorded place; returns how what
+ * it receives, without its kernel, has changed. */
 static double light_ratio(const struct moved *m, const struct imp_vertex *v,
-                          const struct imp__glued *old, imp_v3 x, imp_v3 n)
+                          const struct imp__glued *old, imp_v3 x, imp_v3 w[2])
 {
     const struct imp_scene *scene = m->c->problem->scene;
     const struct imp_emitter *e = scene->emitters[v->d.light.emitter];
     const imp_v3 d = imp__decided_v3(v->d.light.d);
     const bool moves = m->pose->emitter == e;
-    if (e->ops->flags & IMP_EMITTER_ENVIRONMENT)
-        return imp__dot(n, d) / imp__dot(old->n, d);
+    w[0] = w[1] = -d;
+    if (e->ops->flags & IMP_EMITTER_ENVIRONMENT) return 1;
     if (!e->shape && e->ops->flags & IMP_EMITTER_FAR) {
-        const double side = imp__dot(d, m->from) < 0 ? -1 : 1;
-        const imp_v3 there = moves ? imp__normalize(m->to) * side : d;
-        return imp__dot(n, there) / imp__dot(old->n, d);
+        const double side = imp__dot(d, m->from) < 0 ? 1 : -1;
+        if (moves) w[0] = imp__normalize(m->to) * side;
+        return 1;
     }
     if (!e->shape) {
         double at[3];
         e->ops->aim((struct imp_emitter *)(uintptr_t)e, at, false);
         const imp_v3 y = imp__v3(at[0], at[1], at[2]), r = (moves ? m->to : y) - x,
                      r_old = y - old->p;
-        return imp__dot(n, r) / imp__dot(old->n, r_old) *
-               pow(imp__dot(r_old, r_old) / imp__dot(r, r), 1.5);
+        w[0] = imp__normalize(r);
+        w[1] = imp__normalize(r_old);
+        return imp__dot(r_old, r_old) / imp__dot(r, r);
     }
     const struct imp__glued y =
         imp__glued_at(scene, e->shape->index, &v->d.light.located, d);
     const struct at there = placed(m, &y);
-    return geometry(x, n, there.p, there.n) / geometry(old->p, old->n, y.p, y.n);
+    w[0] = imp__normalize(there.p - x);
+    w[1] = imp__normalize(y.p - old->p);
+    return receives(x, there.p, there.n) / receives(old->p, y.p, y.n);
 }
 
 /* Has it light of a spot, whose beam changes across its cone? */
@@ -160,39 +234,49 @@ static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spe
 {
     const struct imp_scene *scene = m->c->problem->scene;
     const struct imp_vertex *v = walk->first;
-    double value = 0, share = 1;
+    double value = 0;
     if (!v || v->d.scatterer == IMP_AT_SKY) return 0;
-    struct imp__glued old = imp__glued_at(scene, v->d.shape, &v->d.located, v->ng);
-    imp_v3 o = walk->ray.o, w = imp__normalize(old.p - o);
+    struct imp__glued old = vertex_glued(scene, v, walk->time);
+    imp_v3 o = walk->ray.o, w[2];
+    w[0] = w[1] = imp__normalize(old.p - o);
     if (m->shape == IMP_MOVE_CAMERA) {
         o = m->to + turned(m, o - m->from);
-        w = turned(m, w);
+        w[0] = turned(m, w[0]);
     }
     struct at here = placed(m, &old);
-    imp_v3 x = met_at(o, w, &here);
+    imp_v3 x = met_at(o, w[0], &here);
     for (; v; v = v->next) {
-        if (v->d.connection == IMP_CONNECTED)
-            value += share * light_ratio(m, v, &old, x, here.n) *
-                     imp__sum_used(P * v->b, scene->lanes);
+        const imp_v3 from[2] = {w[0], w[1]};
+        if (v->d.connection == IMP_CONNECTED) {
+            imp_v3 to[2];
+            const double ratio = light_ratio(m, v, &old, x, to);
+            value += ratio * imp__sum_used(P * v->b *
+                                               kernel_ratio(m, v, &here, x, from, to,
+                                                            &old, IMP_SMOOTH),
+                                           scene->lanes);
+        }
         P *= v->w;
         const struct imp_vertex *next = v->next;
         if (!v->d.goes_on || !next) break;
         const bool sky = next->d.scatterer == IMP_AT_SKY;
-        const struct imp__glued ahead =
-            sky ? old : imp__glued_at(scene, next->d.shape, &next->d.located, next->ng);
-        w = sky ? imp__decided_v3(next->d.p) : imp__normalize(ahead.p - old.p);
-        const double step = imp__dot(here.n, w) / imp__dot(old.n, w);
+        const struct imp__glued ahead = sky ? old : vertex_glued(scene, next, walk->time);
+        w[0] = w[1] = sky ? imp__decided_v3(next->d.p) : imp__normalize(ahead.p - old.p);
+        const imp_spec step = kernel_ratio(m, v, &here, x, from, w, &old, v->d.lobe);
         if (sky) {
-            value += share * step * imp__sum_used(P * v->beyond, scene->lanes);
+            value += imp__sum_used(P * step * v->beyond, scene->lanes);
             break;
         }
         struct at there = placed(m, &ahead);
-        if (next->d.met.emitter >= 0)
-            value += share * imp__sum_used(P * next->e, scene->lanes) *
-                     geometry(x, here.n, there.p, there.n) /
-                     geometry(old.p, old.n, ahead.p, ahead.n);
-        x = met_at(x, w, &there);
-        share *= step;
+        if (next->d.met.emitter >= 0) {
+            const imp_v3 to[2] = {imp__normalize(there.p - x), w[1]};
+            value +=
+                imp__sum_used(P * next->e *
+                                  kernel_ratio(m, v, &here, x, from, to, &old, v->d.lobe),
+                              scene->lanes) *
+                receives(x, there.p, there.n) / receives(old.p, ahead.p, ahead.n);
+        }
+        x = met_at(x, w[0], &there);
+        P *= step;
         old = ahead;
         here = there;
     }

@@ -51,6 +51,7 @@ struct pictures {
     const struct imp__moved_gradient *m;
     const struct imp__functional *f; /* of sums; else NULL */
     const double *x_dot;             /* of one direction; else NULL */
+    int64_t strata;                  /* samples of a sweep along the list of edges */
 };
 
 /* A sample of all kinds: draws times s, times s + 1, ... of each. */
@@ -65,9 +66,9 @@ static void sample_draw(const void *payload, struct imp_arena *arena, int64_t in
     for (int kind = 0; kind < IMP_BOUNDARY_KINDS; kind++) {
         const int times = imp__moved_times[kind];
         for (int i = 0; i < times; i++) {
-            struct imp__flux *f =
-                imp__boundary_draw(&m->boundary, arena, (enum imp__boundary_kind)kind,
-                                   m->first + index * times + i, 1, &no_memory);
+            struct imp__flux *f = imp__boundary_draw(
+                &m->boundary, arena, (enum imp__boundary_kind)kind,
+                m->first + index * times + i, own->strata * times, &no_memory);
             for (; f; f = f->next) {
                 struct edge_reach *r = imp__arena_array(arena, 1, sizeof *r);
                 no_memory |= !r;
@@ -119,7 +120,11 @@ static void reach_tangent(const void *payload, const struct imp_light_walk *walk
         for (size_t c = 0; c < C; c++) value[c] += own->x_dot[k] * row[k * C + c];
 }
 
-static struct imp_light_picture picture_of(const struct pictures *own,
+/* Sweeps of a picture, whose spread is its error: one of each pixel's samples, or so many where
+ * these are few. */
+#define SWEEPS_LEAST 8
+
+static struct imp_light_picture picture_of(struct pictures *own,
                                            const struct imp__moved_run *r)
 {
     const struct imp__moved_gradient *m = own->m;
@@ -127,20 +132,23 @@ static struct imp_light_picture picture_of(const struct pictures *own,
     const int margin = m->scale.margin;
     const int64_t pixels =
         (int64_t)(film->crop_w + 2 * margin) * (film->crop_h + 2 * margin);
+    const int64_t sweeps = imp_max(r->spp, (int64_t)SWEEPS_LEAST);
+    own->strata = imp_max(r->spp * pixels / sweeps, (int64_t)1);
     return (struct imp_light_picture){.tracer = m->tracer,
                                       .run = r->run,
                                       .stage = r->stage,
                                       .trace = sample_draw,
                                       .payload = own,
                                       .first = r->first * pixels,
-                                      .walks = r->spp * pixels};
+                                      .walks = own->strata * sweeps,
+                                      .sweep = own->strata};
 }
 
 enum imp_status imp__moved_pictures(const struct imp__moved_gradient *m,
                                     const struct imp__moved_run *r, const double *x_dot,
                                     double *mean, double *se)
 {
-    const struct pictures own = {m, NULL, x_dot};
+    struct pictures own = {m, NULL, x_dot, 1};
     struct imp_light_picture picture = picture_of(&own, r);
     const size_t numbers = x_dot ? 1 : m->tracer->active->n;
     picture.n = (int)numbers * m->tracer->scene->channels;
@@ -195,7 +203,7 @@ enum imp_status imp__moved_sums(const struct imp__moved_gradient *m,
                                 const struct imp__moved_run *r, double *se)
 {
     enum imp_status st = IMP_OK;
-    const struct pictures own = {m, f, NULL};
+    struct pictures own = {m, f, NULL, 1};
     struct imp_light_picture picture = picture_of(&own, r);
     double *mean = imp__alloc(m->tracer->scene->ctx, (size_t)f->n_groups, sizeof *mean);
     if (!mean)

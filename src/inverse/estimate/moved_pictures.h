@@ -2,8 +2,9 @@
  *
  * Derivative pictures by poses: what a walk of a pixel has inside, and pictures of what draws from
  * edges bring (moved_gradient.h), which lie anywhere on the film. For every walk of a pixel there is
- * a sample of all kinds of draws; these are independent of each other and of the walks, so the
- * pictures are added, and the squares of their errors. */
+ * a sample of all kinds of draws, which are independent of the walks, so the pictures are added, and
+ * the squares of their errors. Samples are strata along the list of edges, in sweeps that are
+ * independent of each other: the spread of these is the error (film_light.h). */
 #ifndef IMP_INVERSE_MOVED_PICTURES_H
 #define IMP_INVERSE_MOVED_PICTURES_H
 

@@ -45,12 +45,14 @@ static inline uint32_t tag_of(uint32_t key, bool single)
 }
 
 /* Where key is, or would be (Fibonacci hashing; Knuth, vol. 3, 6.4). Eight neighbours
- * share a line of the cache: cells and texels are touched side by side. */
+ * share a line of the cache: cells and texels are touched side by side. Triples are counted by
+ * threes: the keys between them have no entry. */
 static inline struct imp__tally_slot *slot_of(const struct imp_tally *t, uint32_t key,
                                               bool single)
 {
-    const uint32_t tag = tag_of(key, single), hash = (key >> 3) * UINT32_C(0x9e3779b9);
-    size_t k = (size_t)(hash >> t->shift) << 3 | (key & 7);
+    const uint32_t tag = tag_of(key, single), number = single ? key : key / 3;
+    const uint32_t hash = (number >> 3) * UINT32_C(0x9e3779b9);
+    size_t k = (size_t)(hash >> t->shift) << 3 | (number & 7);
     while (imp_unlikely(t->table[k].tag != tag) && t->table[k].tag != 0)
         k = (k + 1) & (t->table_size - 1);
     return &t->table[k];

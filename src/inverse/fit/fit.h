@@ -80,6 +80,9 @@ int imp__fit_coarse_spp(const struct imp__fit *fit);
 void imp__fit_fingerprint(struct imp__fit *fit);
 /* Scales of the variables, from where the search starts. */
 void imp__fit_scales(struct imp__fit *fit, const struct imp__search *search);
+/* A large change of value e of a block that is `start`; square: sum of squares of all its values. */
+double imp__large_change(const struct imp_problem *p, const struct imp__block *b,
+                         size_t e, double start, double square);
 void imp__fit_end(struct imp__fit *fit);
 /* fit_goal.c: the goal of a search, which points to `fit`: it does not move any more. */
 void imp__fit_goal_make(struct imp__fit *fit);

@@ -8,7 +8,7 @@
 #include <float.h>
 #include <math.h>
 
-/* Of a number of geometry; 0: it is none. */
+/* The large change of a number of geometry; 0: it is none. */
 static double pose_scale(const struct imp_problem *p, const struct imp__block *b,
                          size_t e)
 {
@@ -42,6 +42,17 @@ void imp__fit_span_scale(const struct imp__block *b, const double *x,
     span_scale(b, square, span);
 }
 
+double imp__large_change(const struct imp_problem *p, const struct imp__block *b,
+                         size_t e, double start, double square)
+{
+    const double pose = pose_scale(p, b, e);
+    const double scale = pose > 0        ? pose
+                         : is_bounded(b) ? b->hi - b->lo
+                         : b->log        ? 1
+                                         : fmax(fabs(start), typical_of(b, square));
+    return scale > 0 ? scale : 1;
+}
+
 void imp__fit_scales(struct imp__fit *f, const struct imp__search *search)
 {
     const struct imp_problem *p = f->problem;
@@ -55,15 +66,9 @@ void imp__fit_scales(struct imp__fit *f, const struct imp__search *search)
             span_scale(b, square, &f->spans[span++]);
             continue;
         }
-        const double typical = typical_of(b, square);
         for (size_t e = 0; e < b->count; e++) {
-            const double start = fabs(imp__search_start(search, b->first + e));
-            const double pose = pose_scale(p, b, e);
-            const double scale = pose > 0        ? pose
-                                 : is_bounded(b) ? b->hi - b->lo
-                                 : b->log        ? 1
-                                                 : fmax(start, typical);
-            f->scale[b->first + e] = scale > 0 ? scale : 1;
+            const double start = imp__search_start(search, b->first + e);
+            f->scale[b->first + e] = imp__large_change(p, b, e, start, square);
             f->settles[b->first + e] = is_bounded(b);
         }
     }

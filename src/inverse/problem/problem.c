@@ -31,6 +31,7 @@ enum imp_status imp_problem_create(imp_scene *scene, imp_problem **out)
     imp__arena_init(&p->fit_arena, ctx);
     imp__arena_init(&p->check_arena, ctx);
     imp__arena_init(&p->missing_arena, ctx);
+    imp__arena_init(&p->plan_arena, ctx);
     p->chosen = imp__alloc(ctx, imp_max(scene->n_params, (size_t)1), 1);
     if (!p->chosen) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a problem"));
     IMP_TRY(imp__active_create(scene, p->chosen, &p->active));
@@ -65,6 +66,7 @@ void imp_problem_destroy(imp_problem *p)
     imp__fit_answer_free(p);
     imp__arena_free(&p->check_arena);
     imp__arena_free(&p->missing_arena);
+    imp__arena_free(&p->plan_arena);
     imp__release(ctx, p->chosen);
     imp__release(ctx, p);
     imp__context_drop(ctx);
@@ -282,7 +284,7 @@ static enum imp_status target_check(imp_problem *p, struct imp__target *t)
 
 /* Values of a photograph are compared by their own size, whatever the exponent: their
  * noise is estimated from what is left over. */
-static void photograph_take(imp_problem *p, struct imp__target *t)
+void imp__target_photograph(const struct imp_problem *p, struct imp__target *t)
 {
     const struct imp_sensor *s = p->scene->sensors[t->desc.sensor];
     if (!s->gain || !s->gain->fitted_gamma) return;
@@ -344,7 +346,7 @@ enum imp_status imp_problem_add_target(imp_problem *p, const struct imp_target *
     t.desc.pixels = t.pixels;
     t.desc.weights = t.weights;
     t.desc.noise_se = t.noise_se;
-    photograph_take(p, &t);
+    imp__target_photograph(p, &t);
     IMP_TRY(imp__target_split(p, &t));
 
     struct imp__target *grown =

@@ -22,6 +22,8 @@ struct imp__target {
     struct imp_photograph photograph; /* the pixels, if they have a gamma; else NULL */
     struct imp__clip *clip;           /* levels, and who has no weight; NULL: none */
     const uint8_t *silent; /* of clip, [height][width][channels]; NULL: all count */
+    float *precision; /* a factor of the weight of each value, [height][width][channels];
+                         NULL: 1 */
     /* A film with response curves, unless they are three: targets of up to three of
      * its curves, each with walks of its own; they share the weights. n_parts 0: none. */
     int n_parts;
@@ -37,8 +39,10 @@ static inline bool imp__target_counts(const struct imp__target *t, size_t pixel)
 /* Factor of the loss of channel c of a pixel. */
 static inline double imp__target_weight(const struct imp__target *t, size_t pixel, int c)
 {
+    const size_t at = pixel * (size_t)t->desc.channels + (size_t)c;
     const double w = t->desc.scale * (t->weights ? t->weights[pixel] : 1);
-    return t->silent && t->silent[pixel * (size_t)t->desc.channels + (size_t)c] ? 0 : w;
+    if (t->silent && t->silent[at]) return 0;
+    return t->precision ? w * t->precision[at] : w;
 }
 static inline int imp__target_parts(const struct imp__target *t)
 {
@@ -53,6 +57,8 @@ static inline const struct imp__target *imp__target_part(const struct imp__targe
 /* Makes the parts; t has been checked. */
 enum imp_status imp__target_split(struct imp_problem *p, struct imp__target *t);
 void imp__target_free(imp_context *ctx, struct imp__target *t);
+/* problem.c: where the film of its sensor has a gamma, the pixels are a photograph. */
+void imp__target_photograph(const struct imp_problem *p, struct imp__target *t);
 
 struct imp__regulariser {
     enum { IMP_TIKHONOV, IMP_SMOOTHNESS } kind;
@@ -134,6 +140,7 @@ struct imp_problem {
     struct imp__fit_answer fit_answer;
     struct imp_arena check_arena;   /* of the last check's rows */
     struct imp_arena missing_arena; /* of rows of imp_problem_missing */
+    struct imp_arena plan_arena;    /* of the last plan's result */
 };
 
 /* Is some pose active? Then losses have two passes whatever the filter (splat.h). */

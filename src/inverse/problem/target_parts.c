@@ -22,12 +22,14 @@ void imp__target_free(imp_context *ctx, struct imp__target *t)
     for (int k = 0; k < t->n_parts; k++) {
         imp__release(ctx, t->part[k].pixels);
         imp__release(ctx, t->part[k].noise_se);
+        imp__release(ctx, t->part[k].precision);
     }
     imp__release(ctx, t->part);
     imp__clip_free(ctx, t->clip);
     imp__release(ctx, t->pixels);
     imp__release(ctx, t->weights);
     imp__release(ctx, t->noise_se);
+    imp__release(ctx, t->precision);
 }
 
 /* Channels first .. first + count - 1 of a picture, as a picture. */
@@ -62,6 +64,9 @@ enum imp_status imp__target_split(struct imp_problem *p, struct imp__target *t)
         if (t->noise_se)
             IMP_TRY(channels_copy(p->ctx, t->noise_se, pixels, n, first, count,
                                   &part->noise_se));
+        if (t->precision)
+            IMP_TRY(channels_copy(p->ctx, t->precision, pixels, n, first, count,
+                                  &part->precision));
         part->desc.pixels = part->pixels;
         part->desc.noise_se = part->noise_se;
         for (int k = 0; k < IMP_WAVES_DRAWN; k++) {

@@ -109,22 +109,36 @@ void imp__mesh_place(const struct imp_shape *s, const double uv[2],
     surface(s, &hit, out);
 }
 
+/* The first of n triangles after which c exceeds x, or the last. Without branches: each would be a
+ * coin toss. */
+static inline size_t cumulative_find(const double *c, size_t n, double x)
+{
+    size_t lo = 0;
+    while (n > 1) {
+        const size_t half = n / 2;
+        lo += (size_t) !(c[lo + half] > x) * half;
+        n -= half;
+    }
+    return lo;
+}
+
 /* A triangle by its area, and barycentric weights in it. */
 static inline struct imp_hit draw(const struct imp_shape *s, const struct imp__mesh *m,
                                   const double u[2])
 {
-    /* The first triangle whose cumulative area exceeds x: those without area never are.
-     * Without branches: each would be a coin toss. */
-    const double x = u[0] * s->area;
-    size_t lo = 0;
-    for (size_t n = m->last + 1; n > 1;) {
-        const size_t half = n / 2;
-        lo += (size_t) !(m->cumulative[lo + half] > x) * half;
-        n -= half;
+    /* The first triangle whose cumulative area exceeds x: those without area never are. */
+    const double x = u[0] * s->area, *c = m->cumulative;
+    size_t lo;
+    double within;
+    if (m->last == 1) { /* the quotient of each triangle does not wait for the choice */
+        lo = !(c[1] > x);
+        const double of_first = x / c[1], of_second = (x - c[1]) / (c[2] - c[1]);
+        within = lo ? of_second : of_first;
+    } else {
+        lo = cumulative_find(c, m->last + 1, x);
+        within = (x - c[lo]) / (c[lo + 1] - c[lo]);
     }
-    const double below = m->cumulative[lo], width = m->cumulative[lo + 1] - below;
-    const double within =
-        imp_min(imp_max((x - below) / width, 0.0), 0x1.fffffffffffffp-1);
+    within = imp_min(imp_max(within, 0.0), 0x1.fffffffffffffp-1);
     double b[2];
     imp__uniform_triangle((double[2]){within, u[1]}, b);
     return (struct imp_hit){.prim = (int)lo, .u = b[0], .v = b[1]};

@@ -46,8 +46,13 @@ static enum imp_status data_convert(const struct imp_build *b,
     if (!t->data) return imp__error(b->ctx, IMP_E_NOMEM, "bitmap does not fit");
     t->data[n * (size_t)t->channels] = 0;
     t->negative = -1;
-    double decoded[256]; /* 8-bit files have no other values, and pow takes its time */
-    for (int k = 0; k < 256 && im->srgb; k++) decoded[k] = imp__srgb_decode(k / 255.0);
+    /* 8-bit files have no other values, and pow takes its time. */
+    float byte[256];
+    double decoded[256];
+    for (int k = 0; k < 256 && im->srgb; k++) {
+        byte[k] = (float)(k / 255.0);
+        decoded[k] = imp__srgb_decode(k / 255.0);
+    }
     for (size_t i = 0; i < n; i++) {
         double p[3] = {0, 0, 0};
         for (int c = 0; c < im->channels; c++) {
@@ -62,8 +67,8 @@ static enum imp_status data_convert(const struct imp_build *b,
             }
             if (im->srgb && !raw) {
                 const double k = rint(p[c] * 255);
-                const bool byte = k >= 0 && k <= 255 && (float)(k / 255) == (float)p[c];
-                p[c] = byte ? decoded[(int)k] : imp__srgb_decode(p[c]);
+                const bool of_byte = k >= 0 && k <= 255 && byte[(int)k] == (float)p[c];
+                p[c] = of_byte ? decoded[(int)k] : imp__srgb_decode(p[c]);
             }
         }
         if (grey) p[0] = imp__luminance(p[0], p[1], p[2]);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Spectra of RGB texels: lifted when texels change, on all threads, each colour once where
- * it is met again, or by the first walk that looks one up; value, reverse and forward
- * derivatives of their interpolation at a wavelength.
+ * Spectra of RGB texels: value, reverse and forward derivatives of their interpolation at a
+ * wavelength. The first walk that looks a texel up lifts it, unless another texel of its colour was
+ * lifted before: texels refer to a common list of spectra, which a table finds by colour.
  *
  * What a texel is lifted to depends on its colour alone, so it does not count when that is
  * done, nor by whom. */
@@ -14,38 +14,35 @@
 #include <stdatomic.h>
 #include <string.h>
 
-/* A texel that was made from the same colour, by a hash of it: pictures have far fewer
- * colours than texels. Where two colours share a place, the later one stays. */
-struct known {
-    uint32_t
-        *texel; /* [1 << bits], 0: none, k + 1: texel k; NULL: no memory, none is known */
-    int bits;
-};
-#define KNOWN_BITS 17
-#define LEAST      1024 /* texels of a thread */
+#define LEAST 1024 /* texels of a thread */
+/* The table of colours: so many places for 2^KNOWN_BITS_MAX colours at most, and a colour is in one of
+ * PROBES places. One that finds them taken is lifted again where it is met again. */
+#define KNOWN_BITS_MAX 21
+#define PROBES         4
 
-/* Colours that a thread lifts of its texels before walks look them up: so many, and a part of them.
- * Where colours are met again these are all; where they are not, a picture of millions of
- * colours would take its time before the first walk. */
-#define LIFTED_FIRST 8192
-#define LIFTED_PART  32
-
-/* State of a texel's spectrum; IS_WRITTEN while one thread writes it. */
-enum { IS_NOT, IS_WRITTEN, IS_THERE };
-
-static _Atomic uint8_t *state_of(const struct imp__lifted_texels *t, size_t k)
+static _Atomic uint32_t *atomic_of(uint32_t *x) { return (_Atomic uint32_t *)x; }
+static uint32_t get(uint32_t *x)
 {
-    return (_Atomic uint8_t *)&t->state[k];
+    return atomic_load_explicit(atomic_of(x), memory_order_acquire);
+}
+static void put(uint32_t *x, uint32_t value)
+{
+    atomic_store_explicit(atomic_of(x), value, memory_order_release);
 }
 
-static uint32_t *known_at(const struct known *k, const float colour[3])
+static bool same_colour(const float a[3], const float b[3])
+{
+    return memcmp(a, b, 3 * sizeof *a) == 0;
+}
+
+static size_t hash_of(const float colour[3], int bits_of_hash)
 {
     uint32_t bits[3];
     memcpy(bits, colour, sizeof bits);
     const uint64_t h = (bits[0] * UINT64_C(0x9e3779b97f4a7c15)) ^
                        (bits[1] * UINT64_C(0xc2b2ae3d27d4eb4f)) ^
                        (bits[2] * UINT64_C(0x165667b19e3779f9));
-    return &k->texel[(h ^ h >> 29) * UINT64_C(0xbf58476d1ce4e5b9) >> (64 - k->bits)];
+    return (h ^ h >> 29) * UINT64_C(0xbf58476d1ce4e5b9) >> (64 - bits_of_hash);
 }
 
 static void lift(const struct imp__lifted_texels *t, const struct imp__lifter *by,
@@ -58,95 +55,120 @@ static void lift(const struct imp__lifted_texels *t, const struct imp__lifter *b
     else imp__lift_reflectance_by(by, rgb, out);
 }
 
-struct lifting {
-    struct imp__lifted_texels *texels;
-    bool all; /* not only texels that have other colours now */
-};
-
-static enum imp_status texels_lift(size_t first, size_t end, void *payload)
-{
-    const struct lifting *l = payload;
-    struct imp__lifted_texels *t = l->texels;
-    struct known known = {.bits = 4};
-    size_t left = LIFTED_FIRST + (end - first) / LIFTED_PART;
-    while (known.bits < KNOWN_BITS && (size_t)1 << known.bits < 2 * (end - first))
-        known.bits++;
-    if (t->n < UINT32_MAX)
-        known.texel = imp__alloc(t->ctx, (size_t)1 << known.bits, sizeof *known.texel);
-    for (size_t i = first; i < end; i++) {
-        struct imp__lifted_texel *to = &t->texel[i];
-        const float *p = t->data + 3 * i;
-        if (!l->all && t->state[i] == IS_THERE && memcmp(p, to->of, sizeof to->of) == 0)
-            continue;
-        t->state[i] = IS_NOT;
-        uint32_t *at = known.texel ? known_at(&known, p) : NULL;
-        const struct imp__lifted_texel *same = at && *at ? &t->texel[*at - 1] : NULL;
-        if (same && memcmp(p, same->of, sizeof same->of) == 0) {
-            *to = *same;
-            t->state[i] = IS_THERE;
-            continue;
-        }
-        if (left == 0 && !t->whole) continue;
-        left -= left > 0;
-        lift(t, t->by, p, &to->lifted);
-        memcpy(to->of, p, sizeof to->of);
-        t->state[i] = IS_THERE;
-        if (at) *at = (uint32_t)i + 1;
-    }
-    imp__release(t->ctx, known.texel);
-    return IMP_OK;
-}
-
 enum imp_status imp__lifted_texels_make(const struct imp_build *b, const float *data,
                                         size_t n, struct imp__lifted_texels *out)
 {
-    *out = (struct imp__lifted_texels){.ctx = b->ctx, .data = data, .n = n};
+    struct imp__lifted_texels t = {.ctx = b->ctx, .data = data, .n = n, .known_bits = 4};
+    *out = t;
     if (b->linear_colors) return IMP_OK;
-    out->texel = imp__arena_take(b->arena, n, sizeof *out->texel);
-    out->state = imp__arena_array(b->arena, n, sizeof *out->state);
+    /* An eighth more than texels, so that a few that change need no new list. Pages that nothing
+     * is written to take no memory. */
+    t.room = imp_min(n + n / 8 + 64, (size_t)UINT32_MAX / 2);
+    while (t.known_bits < KNOWN_BITS_MAX && (size_t)1 << t.known_bits < n) t.known_bits++;
     struct imp__lifter *by = imp__arena_take(b->arena, 1, sizeof *by);
-    if (!out->texel || !out->state || !by)
+    t.spectrum_of = imp__arena_take(b->arena, n, sizeof *t.spectrum_of);
+    t.spectrum = imp__arena_take(b->arena, t.room, sizeof *t.spectrum);
+    t.colour = imp__arena_take(b->arena, t.room, sizeof *t.colour);
+    t.known = imp__arena_take(b->arena, (size_t)1 << t.known_bits, sizeof *t.known);
+    t.used = imp__arena_array(b->arena, 1, sizeof *t.used);
+    if (!t.spectrum_of || !t.spectrum || !t.colour || !t.known || !t.used || !by)
         return imp__error(b->ctx, IMP_E_NOMEM, "texels do not fit as spectra");
     imp__lifter_make(by);
-    out->by = by;
+    t.by = by;
+    *out = t;
     return IMP_OK;
 }
 
-void imp__lifted_texels_update(struct imp__lifted_texels *t, enum imp__lift_rule rule)
-{
-    const bool all = !t->made || t->rule != rule;
-    t->rule = rule;
-    t->made = true;
-    struct lifting l = {t, all};
-    if (!t->texel) return;
-    /* Without memory for a loop of all threads, this one does it. */
-    if (imp__parallel_ranges(t->ctx, t->n, LEAST, texels_lift, &l) != IMP_OK)
-        (void)texels_lift(0, t->n, &l);
-}
-
+/* Lifts texel k, or finds the spectrum of its colour. *own is the result if the list is full. */
 static const struct imp__lifted *lift_now(const struct imp__lifted_texels *t, size_t k,
                                           struct imp__lifted *own)
 {
-    uint8_t was = IS_NOT;
     const float *p = t->data + 3 * k;
-    lift(t, t->by, p, own);
-    if (atomic_compare_exchange_strong_explicit(state_of(t, k), &was, IS_WRITTEN,
-                                                memory_order_relaxed,
-                                                memory_order_relaxed)) {
-        t->texel[k].lifted = *own;
-        memcpy(t->texel[k].of, p, sizeof t->texel[k].of);
-        atomic_store_explicit(state_of(t, k), IS_THERE, memory_order_release);
+    const size_t mask = ((size_t)1 << t->known_bits) - 1, h = hash_of(p, t->known_bits);
+    uint32_t *place = &t->known[h];
+    for (size_t i = 0; i < PROBES; i++) {
+        uint32_t *at = &t->known[(h + i) & mask];
+        const uint32_t s = get(at);
+        if (s && same_colour(t->colour[s - 1], p)) {
+            put(&t->spectrum_of[k], s);
+            return &t->spectrum[s - 1];
+        }
+        if (s) continue;
+        place = at;
+        break;
     }
-    return own;
+    lift(t, t->by, p, own);
+    if (get(t->used) >= t->room) return own;
+    const uint32_t s =
+        atomic_fetch_add_explicit(atomic_of(t->used), 1, memory_order_relaxed);
+    if (s >= t->room) return own;
+    t->spectrum[s] = *own;
+    memcpy(t->colour[s], p, sizeof t->colour[s]);
+    put(place, s + 1);
+    put(&t->spectrum_of[k], s + 1);
+    return &t->spectrum[s];
 }
 
 const struct imp__lifted *imp__lifted_texel(const struct imp__lifted_texels *t, size_t k,
                                             struct imp__lifted *own)
 {
-    if (imp_likely(atomic_load_explicit(state_of(t, k), memory_order_acquire) ==
-                   IS_THERE))
-        return &t->texel[k].lifted;
-    return lift_now(t, k, own);
+    const uint32_t s = get(&t->spectrum_of[k]);
+    return imp_likely(s != 0) ? &t->spectrum[s - 1] : lift_now(t, k, own);
+}
+
+static enum imp_status lift_all(size_t first, size_t end, void *payload)
+{
+    const struct imp__lifted_texels *t = payload;
+    struct imp__lifted own;
+    for (size_t k = first; k < end; k++) imp__lifted_texel(t, k, &own);
+    return IMP_OK;
+}
+
+struct forgetting {
+    const struct imp__lifted_texels *texels;
+    _Atomic size_t without; /* texels that have no spectrum now */
+};
+
+/* Texels whose colours have changed have no spectrum any more. */
+static enum imp_status forget_changed(size_t first, size_t end, void *payload)
+{
+    struct forgetting *f = payload;
+    const struct imp__lifted_texels *t = f->texels;
+    size_t without = 0;
+    for (size_t k = first; k < end; k++) {
+        uint32_t *s = &t->spectrum_of[k];
+        if (*s && !same_colour(t->colour[*s - 1], t->data + 3 * k)) *s = 0;
+        without += *s == 0;
+    }
+    atomic_fetch_add(&f->without, without);
+    return IMP_OK;
+}
+
+/* Work on all texels, by all threads or, without memory for a loop of them, by this one. */
+static void all_texels(const struct imp__lifted_texels *t,
+                       enum imp_status (*work)(size_t, size_t, void *), void *payload)
+{
+    if (imp__parallel_ranges(t->ctx, t->n, LEAST, work, payload) != IMP_OK)
+        (void)work(0, t->n, payload);
+}
+
+void imp__lifted_texels_update(struct imp__lifted_texels *t, enum imp__lift_rule rule)
+{
+    bool anew = !t->made || t->rule != rule;
+    t->rule = rule;
+    t->made = true;
+    if (!t->spectrum_of) return;
+    if (!anew) {
+        struct forgetting f = {.texels = t};
+        all_texels(t, forget_changed, &f);
+        anew = *t->used + f.without > t->room;
+    }
+    if (anew) {
+        memset(t->spectrum_of, 0, t->n * sizeof *t->spectrum_of);
+        memset(t->known, 0, sizeof *t->known << t->known_bits);
+        *t->used = 0;
+    }
+    if (t->whole) all_texels(t, lift_all, t);
 }
 
 /* Value of a texel at one wavelength and its derivatives by its three numbers. */
@@ -154,7 +176,7 @@ static double texel_at(const struct imp__lifted_texels *t, size_t k, double nm,
                        double d[3])
 {
     struct imp__lifted own;
-    if (t->texel) return imp__lifted_value_d(imp__lifted_texel(t, k, &own), nm, d);
+    if (t->spectrum_of) return imp__lifted_value_d(imp__lifted_texel(t, k, &own), nm, d);
     imp__rgb_basis(nm, d);
     const float *p = t->data + 3 * k;
     return p[0] * d[0] + p[1] * d[1] + p[2] * d[2];
@@ -178,7 +200,7 @@ void imp__lifted_texels_eval(const struct imp__lifted_texels *t,
                              const struct imp__texel_sum *sum,
                              const struct imp_carried *carried, imp_spec *value)
 {
-    if (!t->texel) {
+    if (!t->spectrum_of) {
         linear_eval(t, sum, carried, value);
     } else {
         double at[4] = {0, 0, 0, 0};
@@ -231,6 +253,6 @@ double imp__lifted_texels_most(const struct imp__lifted_texels *t, size_t k)
 {
     const float *p = t->data + 3 * k;
     struct imp__lifted own;
-    if (t->texel) return imp__lifted_most(imp__lifted_texel(t, k, &own));
+    if (t->spectrum_of) return imp__lifted_most(imp__lifted_texel(t, k, &own));
     return fmax(fmax(p[0], p[1]), p[2]);
 }

@@ -4,8 +4,8 @@
  * and the spectra are interpolated. With the linear basis a texel's spectrum is linear in
  * its numbers, and nothing is kept.
  *
- * A texel is lifted when texels change, while colours are met again; in a picture of more
- * colours, when a walk first looks the texel up. */
+ * A texel is lifted when a walk first looks it up. Texels of one colour share a spectrum, so
+ * that time and memory follow the number of colours that are seen. */
 #ifndef IMP_KIND_TEXTURE_LIFTED_TEXELS_H
 #define IMP_KIND_TEXTURE_LIFTED_TEXELS_H
 
@@ -18,20 +18,24 @@ enum imp__lift_rule {
     IMP__LIFT_ANY_SIZE
 };
 
-struct imp__lifted_texel {
-    struct imp__lifted lifted;
-    float of[3]; /* what it was made from */
-};
-
+/* Members marked atomic are written by walks. */
 struct imp__lifted_texels {
     imp_context *ctx;
     const float *data; /* [n][3] */
     size_t n;
     enum imp__lift_rule rule;
     bool made;  /* by this rule */
-    bool whole; /* all texels are looked up at once, as bounds need them; 0 after make */
-    struct imp__lifted_texel *texel; /* [n]; NULL: linear */
-    uint8_t *state;                  /* [n] of texel, atomic: 0 not lifted, ... */
+    bool whole; /* update lifts all texels, as bounds need them; 0 after make */
+    uint32_t
+        *spectrum_of; /* [n], atomic: 0 not lifted yet, s + 1: spectrum s; NULL: linear */
+    struct imp__lifted *spectrum; /* [room] */
+    float (*colour)[3];           /* [room], from which each spectrum was made */
+    size_t room;
+    uint32_t
+        *used; /* atomic: the spectra taken, also if there was no room for the last */
+    uint32_t
+        *known; /* [1 << known_bits], atomic: by a hash of the colour, as spectrum_of */
+    int known_bits;
     const struct imp__lifter *by;
 };
 
@@ -45,7 +49,7 @@ struct imp__texel_sum {
 /* data [n][3] stays the caller's. Update makes the spectra. IMP_E_NOMEM. */
 enum imp_status imp__lifted_texels_make(const struct imp_build *b, const float *data,
                                         size_t n, struct imp__lifted_texels *out);
-/* Numbers have changed, or the rule has. */
+/* Numbers have changed, or the rule has; no walk looks texels up meanwhile. */
 void imp__lifted_texels_update(struct imp__lifted_texels *t, enum imp__lift_rule rule);
 
 void imp__lifted_texels_eval(const struct imp__lifted_texels *t,
@@ -60,7 +64,7 @@ void imp__lifted_texels_tangent(const struct imp__lifted_texels *t,
                                 const struct imp__texel_sum *sum,
                                 const struct imp_carried *carried, int param,
                                 imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot);
-/* The spectrum of texel k, unless linear; *own has it if the texel does not keep it yet. */
+/* The spectrum of texel k, unless linear; *own has it if it cannot be kept. */
 const struct imp__lifted *imp__lifted_texel(const struct imp__lifted_texels *t, size_t k,
                                             struct imp__lifted *own);
 /* No less than texel k at any wavelength. */

@@ -268,8 +268,10 @@ static void bound(const struct imp_texture *t, const imp_v3 *lo, const imp_v3 *h
                 const size_t cell =
                     ((size_t)z * (size_t)v->n[1] + (size_t)y) * (size_t)v->n[0] +
                     (size_t)x;
-                for (int c = 0; c < 4 && v->spectral && !scalar; c++)
-                    max[c] = fmax(max[c], imp__lifted_texels_most(&v->lifted, cell));
+                if (v->spectral && !scalar) {
+                    const double top = imp__lifted_texels_most(&v->lifted, cell);
+                    for (int c = 0; c < 4; c++) max[c] = fmax(max[c], top);
+                }
                 for (int c = 0; c < 4 && !(v->spectral && !scalar); c++)
                     max[c] = fmax(
                         max[c],

@@ -230,7 +230,7 @@ void imp__flux_bar(const struct imp__moves *moves, const struct imp__flux *flux,
 {
     for (int k = 0; k < flux->n_ends; k++) {
         const struct imp__flux_end *e = &flux->end[k];
-        const struct imp__velocity v = {e->bar * bar, {0}, 0};
+        const struct imp__velocity v = {.v = e->bar * bar};
         if (e->camera) imp__camera_velocity_bar(moves, e->x.p, v.v, theta_bar);
         else if (e->light) imp__light_velocity_bar(moves, e->light - 1, v.v, theta_bar);
         else imp__velocity_bar(moves, &e->x, &v, theta_bar);

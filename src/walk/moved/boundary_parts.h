@@ -35,6 +35,7 @@ enum {
     IMP_EDGE_WALK
 };
 enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
+#define IMP_EDGE_LOBE (1u << 20) /* behind all of those: by which a lobe is chosen */
 
 /* So far beside an edge, per distance to it, it is looked past; rays are traced in float, whose
  * rounding is a tenth of that. */

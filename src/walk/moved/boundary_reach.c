@@ -113,6 +113,27 @@ static bool light_at(const struct imp_tracer *t, const struct imp__edge_light *l
     return max < 0 || depth + 1 + light->behind <= max;
 }
 
+/* Where the walk goes on, local, and its density: of Lambertian materials by the cosine on the side
+ * it came from, of others as light that arrives is scattered. 0: nowhere. */
+static double direction_draw(const struct imp__edge_draw *d, const struct link *k,
+                             unsigned dims, imp_v3 *wo)
+{
+    const double u[3] = {imp__u01(d->key, dims + IMP_EDGE_WALK_U),
+                         imp__u01(d->key, dims + IMP_EDGE_WALK_V),
+                         imp__u01(d->key, dims + IMP_EDGE_LOBE)};
+    if (imp__is_lambertian(k->bsdf)) {
+        *wo = imp__cosine_hemisphere(u);
+        const double pdf = imp__cosine_hemisphere_pdf(*wo);
+        if (k->wi[2] < 0) (*wo)[2] = -(*wo)[2];
+        return pdf;
+    }
+    struct imp_dirs dirs = {{0}, k->wi, IMP_SMOOTH, 0};
+    const double by_lobe[3] = {u[2], u[0], u[1]};
+    if (!imp__bsdf_transposed_sample(k->bsdf, k->in, by_lobe, &dirs)) return 0;
+    *wo = dirs.wo;
+    return imp__bsdf_transposed_pdf(k->bsdf, k->in, &dirs);
+}
+
 void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
                      const struct imp_surface *at, const struct imp__edge_light *light)
 {
@@ -121,13 +142,9 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
     imp_spec T = imp__spec(1), L;
     for (int depth = 0; k && light_at(t, light, depth, &L); depth++) {
         connect(d, light, k, depth, L * T);
-        /* The walk goes on: of Lambertian materials on the side it came from. */
         const unsigned dims = IMP_EDGE_WALK + (unsigned)depth * IMP_EDGE_WALK_DIMS;
-        const double u[2] = {imp__u01(d->key, dims + IMP_EDGE_WALK_U),
-                             imp__u01(d->key, dims + IMP_EDGE_WALK_V)};
-        imp_v3 wo = imp__cosine_hemisphere(u), w;
-        const double pdf = imp__cosine_hemisphere_pdf(wo);
-        if (k->wi[2] < 0) wo[2] = -wo[2];
+        imp_v3 wo, w;
+        const double pdf = direction_draw(d, k, dims, &wo);
         if (!(pdf > 0)) return;
         T *= kernel(k, wo) * (1 / pdf);
         const double most = imp__max3(T), survive = depth < 2 ? 1 : imp_min(most, 0.95);

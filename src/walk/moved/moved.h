@@ -16,7 +16,7 @@
  *     d ln w_k = n'.w/(n.w)
  *     d ln B_k = (n'.w + n.w')/(n.w) + (n_y'.w + n_y.w')/(n_y.w) - 2 w.(V_y - v_k')/d + d ln dA_y
  *
- * of Lambertian materials, w' the part of (V_y - v_k')/d across w; of a light at a point without
+ * of Lambertian materials (of others moved_kernel.h), w' the part of (V_y - v_k')/d across w; of a light at a point without
  * cos_y and dA_y, of parallel light (n'.w + n.w')/(n.w) alone. Of emission that is met the
  * same holds as of a light sample: MIS weights are constants, so both techniques move one point in
  * one way. (Li et al. 2018; Zhang et al. 2020.) */

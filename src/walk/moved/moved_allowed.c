@@ -3,10 +3,10 @@
  * What has a derivative by what moves that is whole, and what is refused by name (moved.h). */
 #include "base/context.h"
 #include "moved.h"
+#include "moved_kernel.h"
 #include "scene/instances.h"
 #include "scene/pose.h"
 
-extern const struct imp_bsdf_ops imp__diffuse, imp__twosided, imp__black;
 extern const struct imp_emitter_ops imp__area, imp__constant, imp__point_light,
     imp__spot_light, imp__directional;
 
@@ -25,26 +25,15 @@ static bool is_textured(const struct imp_input *const *input, int n)
     return false;
 }
 
-static bool is_lambertian(const struct imp_bsdf *b)
-{
-    if (b->ops == &imp__twosided) {
-        for (int k = 0; k < b->n_child; k++)
-            if (!is_lambertian(b->child[k])) return false;
-        return true;
-    }
-    return b->ops == &imp__diffuse || b->ops == &imp__black;
-}
-
 static enum imp_status materials_allowed(const struct imp_tracer *t)
 {
     for (int k = 0; k < t->scene->n_shapes; k++) {
         const struct imp_shape *s = t->scene->shapes[k];
         const struct imp_bsdf *b = imp__shape_bsdf(t->scene, s);
-        if (!is_lambertian(b))
-            return refuse(t, "material", b->name, b->ops->name,
-                          "is not Lambertian (diffuse, twosided)");
-        if (b->shaped || is_textured(b->input, b->n_in))
-            return refuse(t, "material", b->name, b->ops->name, "has a texture");
+        const char *why = imp__kernel_without_d(b, s->geometry != IMP_TRIANGLES);
+        if (!why) why = imp__textures_without_d(b, s);
+        if (!why && b->shaped) why = "has a spectrum for a number";
+        if (why) return refuse(t, "material", b->name, b->ops->name, why);
     }
     return IMP_OK;
 }

@@ -7,6 +7,7 @@
 #define IMP_WALK_MOVED_CHAIN_H
 
 #include "moved.h"
+#include "moved_kernel.h"
 
 /* A vertex: the glued point of its surface, and adjoints of its velocity. At the sky x.p is the
  * direction. */
@@ -35,44 +36,51 @@ static inline imp_v3 imp__link_direction(const struct imp__link_point *from,
     return to->sky ? to->x.p : imp__normalize(to->x.p - from->x.p);
 }
 
-/* The adjoint of d ln = n'.w/(n.w) at the beginning of a step in a fixed direction. */
-static inline void imp__direction_bar(struct imp__link_point *x, imp_v3 w, double bar)
+/* The adjoint of a kernel at x, of a step in a fixed direction. */
+static inline void imp__scatter_bar(struct imp__link_point *x,
+                                    const struct imp__kernel_bar *kernel)
 {
-    if (bar != 0) x->bar.n += w * (bar / imp__dot(x->x.n, w));
+    x->bar.n += kernel->n;
+    x->bar.turn += kernel->turn;
+    x->moved_bar += kernel->slide;
+    x->bar.v -= kernel->slide;
 }
 
-/* The adjoint of the logarithm of cos cos_y dA_y/d^2 between x, which slides, and y, which is
- * glued. */
-static inline void imp__connection_bar(struct imp__link_point *x,
-                                       struct imp__link_point *y, double bar)
+/* Adds the adjoint of the logarithm of 1/d^2 (`bar`), and of what else depends on the unit
+ * direction w from x towards y (`turn`), d away: to x, which slides; returns that of y. */
+static inline imp_v3 imp__apart_bar(struct imp__link_point *x, imp_v3 w, double d,
+                                    imp_v3 turn, double bar)
 {
-    if (bar == 0) return;
-    const imp_v3 r = y->x.p - x->x.p;
-    const double inverse = 1 / imp__length(r);
-    const imp_v3 w = r * inverse;
-    const double cosine = imp__dot(x->x.n, w), cosine_y = imp__dot(y->x.n, w);
-    x->bar.n += w * (bar / cosine);
-    y->bar.n += w * (bar / cosine_y);
-    y->bar.area += bar;
-    const imp_v3 turn = x->x.n * (1 / cosine) + y->x.n * (1 / cosine_y);
-    const imp_v3 apart = (turn - w * (imp__dot(w, turn) + 2)) * (bar * inverse);
-    y->bar.v += apart;
-    x->moved_bar -= apart;
-}
-
-/* The adjoint of the logarithm of cos/d^2 between x, which slides, and a light at the point y;
- * returns that of the light's velocity. */
-static inline imp_v3 imp__point_bar(struct imp__link_point *x, imp_v3 y, double bar)
-{
-    const imp_v3 r = y - x->x.p;
-    const double inverse = 1 / imp__length(r);
-    const imp_v3 w = r * inverse;
-    const double cosine = imp__dot(x->x.n, w);
-    const imp_v3 turn = x->x.n * (1 / cosine);
-    const imp_v3 apart = (turn - w * (imp__dot(w, turn) + 2)) * (bar * inverse);
-    x->bar.n += w * (bar / cosine);
+    const imp_v3 apart = (turn - w * (imp__dot(w, turn) + 2 * bar)) * (1 / d);
     x->moved_bar -= apart;
     return apart;
+}
+
+/* The adjoint of the kernel at x, which slides, and (`bar`) of the logarithm of cos_y dA_y/d^2 of
+ * y, which is glued. */
+static inline void imp__connection_bar(struct imp__link_point *x,
+                                       struct imp__link_point *y,
+                                       const struct imp__kernel_bar *kernel, double bar)
+{
+    const imp_v3 r = y->x.p - x->x.p;
+    const double d = imp__length(r);
+    const imp_v3 w = r * (1 / d);
+    const double by = bar / imp__dot(y->x.n, w);
+    imp__scatter_bar(x, kernel);
+    y->bar.n += w * by;
+    y->bar.area += bar;
+    y->bar.v += imp__apart_bar(x, w, d, kernel->wi + y->x.n * by, bar);
+}
+
+/* The adjoint of the kernel at x, and of the logarithm of 1/d^2 between x, which slides, and a
+ * light at the point y; returns that of the light's velocity. */
+static inline imp_v3 imp__point_bar(struct imp__link_point *x, imp_v3 y,
+                                    const struct imp__kernel_bar *kernel, double bar)
+{
+    const imp_v3 r = y - x->x.p;
+    const double d = imp__length(r);
+    imp__scatter_bar(x, kernel);
+    return imp__apart_bar(x, r * (1 / d), d, kernel->wi, bar);
 }
 
 /* The vertex that a ray along w meets slides along it: what its adjoint is to the surface it
@@ -91,12 +99,19 @@ static inline imp_v3 imp__slide_bar(struct imp__link_point *x, imp_v3 w)
 }
 
 /* The first vertex of a walk through a fixed film position, whose ray begins at o: the end of
- * the chain. Adds to theta_bar. */
+ * the chain. wo_bar: of the direction towards the camera, across it. Adds to theta_bar. */
 static inline void imp__camera_bar(const struct imp__moves *moves, imp_v3 o,
-                                   struct imp__link_point *first, double *theta_bar)
+                                   struct imp__link_point *first, imp_v3 wo_bar,
+                                   double *theta_bar)
 {
-    const imp_v3 shift = imp__slide_bar(first, imp__normalize(first->x.p - o));
+    const double t = imp__length(first->x.p - o);
+    const imp_v3 shift = imp__slide_bar(first, (first->x.p - o) * (1 / t));
     imp__camera_velocity_bar(moves, first->x.p, shift, theta_bar);
+    if (!imp__is_zero(wo_bar)) {
+        /* The ray turns by (u(p) - u(o))/t, and wo against it. */
+        imp__camera_velocity_bar(moves, first->x.p, wo_bar * (-1 / t), theta_bar);
+        imp__camera_velocity_bar(moves, o, wo_bar * (1 / t), theta_bar);
+    }
     imp__velocity_bar(moves, &first->x, &first->bar, theta_bar);
 }
 

@@ -5,11 +5,11 @@
 #include "moved_chain.h"
 #include "walk/core/vertex.h"
 
-/* What the values of vertex k depend on, as adjoints of their logarithms. */
+/* What the values of vertex k depend on, as adjoints of their logarithms, by lanes. */
 struct pieces {
-    double light; /* its light sample */
-    double step;  /* the step, of all light but what is emitted at its end */
-    double met;   /* emission at its end */
+    imp_spec light; /* its light sample */
+    imp_spec step;  /* the step, of all light but what is emitted at its end */
+    imp_spec met;   /* emission at its end */
 };
 
 struct sweep {
@@ -19,6 +19,7 @@ struct sweep {
     struct imp__link_point *at; /* [n] */
     struct pieces *piece;       /* [n] */
     double *theta_bar;
+    imp_v3 wo_bar; /* of the direction from the first vertex to the camera */
 };
 
 static bool is_emitted(const struct imp_vertex *v)
@@ -37,14 +38,12 @@ static int read_walk(struct sweep *s, imp_spec adjoint)
         s->at[n] = sky ? imp__sky_point(imp__decided_v3(v->d.p))
                        : imp__surface_point(scene, v->d.shape, &v->d.located, v->ng);
         struct pieces *piece = &s->piece[n];
-        *piece = (struct pieces){0, 0, 0};
-        if (v->d.connection == IMP_CONNECTED)
-            piece->light = imp__sum_used(P * v->b, scene->lanes);
+        *piece = (struct pieces){{0}, {0}, {0}};
+        if (v->d.connection == IMP_CONNECTED) piece->light = P * v->b;
         P *= v->w;
         if (!v->d.goes_on || !v->next) continue;
-        const imp_spec met = is_emitted(v->next) ? v->next->e : (imp_spec){0};
-        piece->met = imp__sum_used(P * met, scene->lanes);
-        piece->step = imp__sum_used(P * (v->beyond - met), scene->lanes);
+        if (is_emitted(v->next)) piece->met = P * v->next->e;
+        piece->step = P * v->beyond - piece->met;
     }
     return n;
 }
@@ -78,27 +77,69 @@ static imp_v3 sent_slope(const struct imp_emitter *e, imp_v3 d, int lanes)
     return slope;
 }
 
+/* The derivatives of vertex k's kernel towards w, from the places of the chain, which are exact to
+ * each other; recorded directions are rounded. False: it is Lambertian without textures, and w and
+ * its normal are enough. */
+static bool kernel_derive(const struct sweep *s, int k, const struct imp_vertex *v,
+                          imp_v3 w, int lobe, struct imp__kernel_d *out)
+{
+    struct imp_surface at;
+    if (imp_likely(imp__is_plain(v->bsdf)) ||
+        !imp__decided_surface(s->tracer->scene, &v->d, s->walk->time, &at))
+        return false;
+    const imp_v3 from = k > 0 ? s->at[k - 1].x.p : s->walk->ray.o;
+    const struct imp_frame frame = {at.s, at.t, at.n};
+    const struct imp_dirs dirs = {
+        imp__to_local(&frame, imp__normalize(from - s->at[k].x.p)),
+        imp__to_local(&frame, w), lobe, 0};
+    imp__kernel_derive(v, &at, &dirs, out);
+    return true;
+}
+
+/* The adjoint of vertex k's kernel towards w from that of its logarithm, by lanes. derived: by
+ * kernel_derive; NULL: Lambertian. */
+static struct imp__kernel_bar kernel_bar(struct sweep *s, int k,
+                                         const struct imp__kernel_d *derived, imp_v3 w,
+                                         imp_spec bar)
+{
+    const int lanes = s->tracer->scene->lanes;
+    if (!derived) return imp__lambert_times(s->at[k].x.n, w, imp__sum_used(bar, lanes));
+    const struct imp__kernel_bar out = imp__kernel_times(derived, bar, lanes);
+    s->at[k].x.s = derived->frame.s;
+    if (k == 0) s->wo_bar += out.wo;
+    return out;
+}
+
+/* The same of its light sample, towards w. */
+static struct imp__kernel_bar light_kernel(struct sweep *s, int k,
+                                           const struct imp_vertex *v, imp_v3 w)
+{
+    struct imp__kernel_d d;
+    const bool derived = kernel_derive(s, k, v, w, IMP_SMOOTH, &d);
+    return kernel_bar(s, k, derived ? &d : NULL, w, s->piece[k].light);
+}
+
 /* A light sample of a point, or of parallel light. */
 static void delta_bar(struct sweep *s, int k, const struct imp_vertex *v)
 {
     const int light = v->d.light.emitter;
     struct imp_emitter *e = s->tracer->scene->emitters[light];
-    const double weight = s->piece[k].light;
+    const double weight = imp__sum_used(s->piece[k].light, s->tracer->scene->lanes);
     double aim[3];
     e->ops->aim(e, aim, false);
     const imp_v3 at = imp__v3(aim[0], aim[1], aim[2]);
     if (e->ops->flags & IMP_EMITTER_FAR) {
-        imp__direction_bar(&s->at[k], -at, weight);
-        const imp_v3 n = s->at[k].x.n;
-        imp__light_velocity_bar(s->moves, light, n * (weight / imp__dot(n, at)),
-                                s->theta_bar);
+        const struct imp__kernel_bar far = light_kernel(s, k, v, -at);
+        imp__scatter_bar(&s->at[k], &far);
+        imp__light_velocity_bar(s->moves, light, -far.wi, s->theta_bar);
         return;
     }
     const imp_v3 r = s->at[k].x.p - at;
     const double distance = imp__length(r);
     const imp_v3 turn =
         sent_slope(e, r * (1 / distance), s->tracer->scene->lanes) * (weight / distance);
-    const imp_v3 bar = imp__point_bar(&s->at[k], at, weight) - turn;
+    const struct imp__kernel_bar kernel = light_kernel(s, k, v, r * (-1 / distance));
+    const imp_v3 bar = imp__point_bar(&s->at[k], at, &kernel, weight) - turn;
     s->at[k].moved_bar += turn;
     imp__light_velocity_bar(s->moves, light, bar, s->theta_bar);
 }
@@ -108,48 +149,63 @@ static void light_bar(struct sweep *s, int k, const struct imp_vertex *v)
 {
     const struct imp_scene *scene = s->tracer->scene;
     const struct imp_emitter *e = scene->emitters[v->d.light.emitter];
-    const double weight = s->piece[k].light;
     if (e->ops->flags & IMP_EMITTER_DELTA) {
         delta_bar(s, k, v);
         return;
     }
     if (e->ops->flags & IMP_EMITTER_ENVIRONMENT) {
         const imp_v3 w = -imp__decided_v3(v->d.light.d);
-        imp__direction_bar(&s->at[k], w, weight);
+        const struct imp__kernel_bar kernel = light_kernel(s, k, v, w);
+        imp__scatter_bar(&s->at[k], &kernel);
         return;
     }
     struct imp__link_point y = imp__surface_point(
         scene, e->shape->index, &v->d.light.located, imp__decided_v3(v->d.light.d));
-    imp__connection_bar(&s->at[k], &y, weight);
+    const imp_v3 w = imp__link_direction(&s->at[k], &y);
+    const struct imp__kernel_bar kernel = light_kernel(s, k, v, w);
+    imp__connection_bar(&s->at[k], &y, &kernel,
+                        imp__sum_used(s->piece[k].light, scene->lanes));
     imp__velocity_bar(s->moves, &y.x, &y.bar, s->theta_bar);
+}
+
+/* The step from vertex k to the next one, which slides along it; emission that it meets there is
+ * glued. */
+static void step_bar(struct sweep *s, int k, const struct imp_vertex *v)
+{
+    struct imp__link_point *x = &s->at[k], *next = x + 1;
+    const struct pieces *piece = &s->piece[k];
+    const imp_v3 w = imp__link_direction(x, next);
+    struct imp__kernel_d derived;
+    const struct imp__kernel_d *d =
+        kernel_derive(s, k, v, w, v->d.lobe, &derived) ? &derived : NULL;
+    const struct imp__kernel_bar on = kernel_bar(s, k, d, w, piece->step);
+    imp__scatter_bar(x, &on);
+    if (next->sky) return;
+    x->moved_bar += imp__slide_bar(next, w);
+    if (!imp__is_zero(piece->met)) {
+        const struct imp__kernel_bar met = kernel_bar(s, k, d, w, piece->met);
+        imp__connection_bar(x, next, &met,
+                            imp__sum_used(piece->met, s->tracer->scene->lanes));
+    }
+    imp__velocity_bar(s->moves, &next->x, &next->bar, s->theta_bar);
 }
 
 bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
                       const struct imp__moves *moves, const struct imp_walk *walk,
                       imp_spec adjoint, double *theta_bar)
 {
-    struct sweep s = {tracer, moves, walk, NULL, NULL, theta_bar};
+    struct sweep s = {tracer, moves, walk, NULL, NULL, theta_bar, {0}};
     if (walk->dropped || !walk->valid || !walk->first) return true;
     s.at = imp__arena_take(arena, (size_t)walk->n, sizeof *s.at);
     s.piece = imp__arena_take(arena, (size_t)walk->n, sizeof *s.piece);
     if (!s.at || !s.piece) return false;
     int k = read_walk(&s, adjoint) - 1;
     for (const struct imp_vertex *v = walk->last; v; v = v->prev, k--) {
-        struct imp__link_point *x = &s.at[k];
-        if (x->sky) continue;
+        if (s.at[k].sky) continue;
         if (v->d.connection == IMP_CONNECTED) light_bar(&s, k, v);
-        if (v->d.goes_on && v->next) {
-            struct imp__link_point *next = x + 1;
-            const imp_v3 w = imp__link_direction(x, next);
-            imp__direction_bar(x, w, s.piece[k].step);
-            if (!next->sky) {
-                x->moved_bar += imp__slide_bar(next, w);
-                imp__connection_bar(x, next, s.piece[k].met);
-                imp__velocity_bar(moves, &next->x, &next->bar, theta_bar);
-            }
-        }
+        if (v->d.goes_on && v->next) step_bar(&s, k, v);
     }
     if (s.at[0].sky) return true;
-    imp__camera_bar(moves, walk->ray.o, &s.at[0], theta_bar);
+    imp__camera_bar(moves, walk->ray.o, &s.at[0], s.wo_bar, theta_bar);
     return true;
 }

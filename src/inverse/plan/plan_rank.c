@@ -1,0 +1,428 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A plan: informations of all candidates, gains with their errors, groups that cannot be told
+ * apart, the chosen set, and what no candidate determines. */
+#include "base/arguments.h"
+#include "inverse/fit/fit.h"
+#include "math/rng.h"
+#include "plan_arguments.h"
+#include "walk/run/run.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define SEED  0x91a2
+#define APART 2.5 /* errors of a difference by which candidates can be told apart */
+
+struct plan {
+    struct imp_problem *p, *blank;
+    struct imp_arena *arena;
+    struct imp_plan_options o;
+    struct imp_plan_candidate *c; /* [n_all] */
+    size_t n_all, n;              /* candidates; variables */
+    struct imp_run run;
+    double *width;     /* [n] standard deviations of the priors */
+    double *span;      /* [n] large changes */
+    const bool *given; /* [n] they are the caller's */
+    double *unit;      /* [n] own unit over that of x */
+    struct imp__plan_model model;
+    struct imp__plan_data *data; /* [n_all] */
+    const struct imp__plan_data **have,
+        **open;      /* those that we have, and that are ranked */
+    size_t *open_at; /* [n_open] index of the candidate */
+    double *cost;    /* [n_open] */
+    size_t n_have, n_open;
+    struct imp__plan_known today, then;
+    size_t done; /* for progress */
+};
+
+/* ---- Informations ---------------------------------------------------------------------- */
+
+static int progress(const struct imp_progress *p, void *payload)
+{
+    const struct plan *plan = payload;
+    struct imp_progress own = *p;
+    own.stage = "plan";
+    own.fraction = ((double)plan->done + p->fraction) / (2 * (double)plan->n_all);
+    own.eta_s = own.fraction > 0 ? own.elapsed_s * (1 / own.fraction - 1) : -1;
+    return ((const struct imp_run *)&plan->run)
+        ->progress(&own, plan->run.progress_payload);
+}
+
+static enum imp_status informations(struct plan *plan)
+{
+    const size_t n = plan->n;
+    size_t lit = 0;
+    for (size_t i = 0; i < plan->n_all; i++) {
+        struct imp__plan_data *d = &plan->data[i];
+        struct imp_run run = plan->run;
+        run.seed = imp__mix64(plan->run.seed ^ imp__mix64(SEED + i));
+        if (run.progress) {
+            run.progress = progress;
+            run.progress_payload = plan;
+        }
+        d->H = imp__alloc(plan->p->ctx, (1 + IMP_DEVIATIONS) * n * n, sizeof *d->H);
+        if (!d->H) return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
+        d->deviations = d->H + n * n;
+        plan->done = 2 * i;
+        const enum imp_status st = imp__plan_information(
+            plan->p, plan->blank, &plan->c[i], &plan->o, &run, plan->width, d);
+        if (st != IMP_OK)
+            return st == IMP_CANCELLED
+                       ? st
+                       : imp__error_prefix(plan->p->ctx, st, "%s",
+                                           imp__plan_name(plan->p->scene, &plan->c[i]));
+        if (d->lit == 0)
+            imp__warn(plan->p->ctx, "%s: all values are 0 or saturated: it tells nothing",
+                      imp__plan_name(plan->p->scene, &plan->c[i]));
+        else lit += !plan->c[i].have;
+    }
+    return lit > 0 ? IMP_OK
+                   : imp__error(
+                         plan->p->ctx, IMP_E_ARG,
+                         "candidates: all values of all of them, %s the first, are 0 or "
+                         "saturated",
+                         imp__plan_name(plan->p->scene, &plan->c[0]));
+}
+
+/* ---- Rows -------------------------------------------------------------------------------- */
+
+/* The standard deviations that a covariance has, in the numbers' own units. */
+static enum imp_status errors_give(const struct plan *plan, const double *C,
+                                   const double **out)
+{
+    const size_t n = plan->n;
+    double *se = imp__arena_array(plan->arena, n, sizeof *se);
+    if (!se) return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
+    for (size_t k = 0; k < n; k++) {
+        const double part = sqrt(C[k * n + k]);
+        se[k] = !plan->given[k] && part * part > 1. / (1 + IMP_PLAN_LOOSE)
+                    ? INFINITY
+                    : part * plan->width[k] * plan->unit[k];
+    }
+    *out = se;
+    return IMP_OK;
+}
+
+/* Matrices from the units of the priors to those of x; power -1: informations; 1: pulls. */
+static enum imp_status matrix_give(const struct plan *plan, const double *A, int power,
+                                   const double **out)
+{
+    const size_t n = plan->n;
+    double *B = imp__arena_array(plan->arena, n * n, sizeof *B);
+    if (!B) return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
+    for (size_t k = 0; k < n; k++)
+        for (size_t l = 0; l < n; l++) {
+            const double units = plan->width[k] * plan->width[l];
+            B[k * n + l] = power > 0 ? A[k * n + l] * units : A[k * n + l] / units;
+        }
+    *out = B;
+    return IMP_OK;
+}
+
+/* What the deviations of a candidate, and of what we have, do to its worth. */
+struct moves {
+    double own[IMP_DEVIATIONS], hidden;
+    double *have; /* [n_have][IMP_DEVIATIONS] */
+};
+
+static enum imp_status moves_find(const struct plan *plan,
+                                  const struct imp__plan_data *item, double cost,
+                                  struct moves *m)
+{
+    const size_t n = plan->n;
+    m->have = imp__alloc(plan->p->ctx, plan->n_have * IMP_DEVIATIONS + 1, sizeof(double));
+    if (!m->have) return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
+    imp__plan_deviations(n, plan->then.pull, item, m->own);
+    for (int g = 0; g < IMP_DEVIATIONS; g++) m->own[g] /= cost;
+    m->hidden = plan->then.hidden / cost;
+    for (size_t i = 0; i < plan->n_have; i++) {
+        double before[IMP_DEVIATIONS], *after = m->have + i * IMP_DEVIATIONS;
+        imp__plan_deviations(n, plan->today.pull, plan->have[i], before);
+        imp__plan_deviations(n, plan->then.pull, plan->have[i], after);
+        for (int g = 0; g < IMP_DEVIATIONS; g++) after[g] = (after[g] - before[g]) / cost;
+    }
+    return IMP_OK;
+}
+
+/* Variance of the worth, or of the difference of two. */
+static double moves_variance(const struct plan *plan, const struct moves *a,
+                             const struct moves *b)
+{
+    double sum = imp__sqr(a->hidden) + (b ? imp__sqr(b->hidden) : 0);
+    for (int g = 0; g < IMP_DEVIATIONS; g++)
+        sum += imp__sqr(a->own[g]) + (b ? imp__sqr(b->own[g]) : 0);
+    for (size_t i = 0; i < plan->n_have * IMP_DEVIATIONS; i++)
+        sum += imp__sqr(a->have[i] - (b ? b->have[i] : 0));
+    return sum;
+}
+
+static enum imp_status row_make(struct plan *plan, size_t k, struct imp_plan_row *row,
+                                struct moves *moves)
+{
+    enum imp_status st = IMP_OK;
+    const size_t n = plan->n;
+    const struct imp__plan_data *d = plan->open[k];
+    double *error = plan->then.work;
+    plan->have[plan->n_have] = d; /* there is room for one more */
+    IMP_TRY(imp__plan_evaluate(&plan->model, plan->have, plan->n_have + 1, &plan->then));
+    IMP_TRY(moves_find(plan, d, plan->cost[k], moves));
+    const double gain = plan->then.phi - plan->today.phi;
+    const double se = hypot(sqrt(moves_variance(plan, moves, NULL)),
+                            plan->today.hidden / plan->cost[k]);
+    *row = (struct imp_plan_row){.size = sizeof *row,
+                                 .candidate = plan->open_at[k],
+                                 .gain = {gain, se * plan->cost[k], 1},
+                                 .worth = {gain / plan->cost[k], se, 1},
+                                 .lit = d->lit};
+    IMP_TRY(errors_give(plan, plan->then.C, &row->se));
+    IMP_TRY(matrix_give(plan, d->H, -1, &row->information));
+    IMP_TRY(matrix_give(plan, plan->then.pull, 1, &row->pull));
+    for (size_t i = 0; i < n * n; i++) {
+        error[i] = 0;
+        for (size_t g = 0; g < IMP_DEVIATIONS; g++)
+            error[i] += imp__sqr(d->deviations[g * n * n + i]);
+        error[i] = sqrt(error[i]);
+    }
+    IMP_TRY(matrix_give(plan, error, -1, &row->information_se));
+out:
+    return st;
+}
+
+struct ranked {
+    double worth;
+    size_t at;
+};
+static int by_worth(const void *a, const void *b)
+{
+    const struct ranked *x = a, *y = b;
+    if (x->worth != y->worth) return x->worth > y->worth ? -1 : 1;
+    return x->at < y->at ? -1 : x->at > y->at;
+}
+
+static enum imp_status rows_make(struct plan *plan, struct imp_plan_result *r)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = plan->p->ctx;
+    const size_t n = plan->n_open;
+    struct imp_plan_row *made = imp__alloc(ctx, n, sizeof *made);
+    struct ranked *order = imp__alloc(ctx, n, sizeof *order);
+    struct moves *moves = imp__alloc(ctx, n, sizeof *moves);
+    struct imp_plan_row *rows = imp__arena_array(plan->arena, n, sizeof *rows);
+    if (!made || !order || !moves || !rows)
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a plan"));
+    for (size_t k = 0; k < n; k++) {
+        IMP_TRY(row_make(plan, k, &made[k], &moves[k]));
+        order[k] = (struct ranked){made[k].worth.value, k};
+    }
+    qsort(order, n, sizeof *order, by_worth);
+    size_t first = 0, group = 0;
+    for (size_t i = 0; i < n; i++) {
+        const size_t k = order[i].at, f = order[first].at;
+        const double apart = order[first].worth - order[i].worth;
+        const double se = sqrt(moves_variance(plan, &moves[f], &moves[k]));
+        if (i > 0 && apart > APART * se) {
+            group++;
+            first = i;
+        }
+        rows[i] = made[k];
+        rows[i].group = group;
+    }
+    r->rows = rows;
+    r->n_rows = n;
+out:
+    for (size_t k = 0; moves && k < n; k++) imp__release(ctx, moves[k].have);
+    imp__release(ctx, moves);
+    imp__release(ctx, made);
+    imp__release(ctx, order);
+    return st;
+}
+
+/* ---- The set, and what stays open ---------------------------------------------------------- */
+
+static enum imp_status set_choose(struct plan *plan, struct imp_plan_result *r)
+{
+    const struct imp__plan_choice choice = {.model = &plan->model,
+                                            .have = plan->have,
+                                            .n_have = plan->n_have,
+                                            .items = plan->open,
+                                            .cost = plan->cost,
+                                            .n = plan->n_open,
+                                            .take = plan->o.take,
+                                            .budget = plan->o.budget};
+    size_t *chosen = imp__arena_array(plan->arena, plan->n_open, sizeof *chosen);
+    if (!chosen) return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
+    IMP_CHECKED(
+        imp__plan_choose(&choice, chosen, &r->n_chosen, &plan->then, &r->chosen_gain));
+    for (size_t k = 0; k < r->n_chosen; k++) chosen[k] = plan->open_at[chosen[k]];
+    r->chosen = chosen;
+    return errors_give(plan, plan->then.C, &r->chosen_se);
+}
+
+/* From the units of the priors to those of large changes. */
+static void data_rescale(const struct plan *plan, struct imp__plan_data *d)
+{
+    const size_t n = plan->n;
+    for (size_t g = 0; g <= IMP_DEVIATIONS; g++) {
+        double *A = g ? d->deviations + (g - 1) * n * n : d->H;
+        for (size_t k = 0; k < n; k++)
+            for (size_t l = 0; l < n; l++)
+                A[k * n + l] *=
+                    plan->span[k] / plan->width[k] * (plan->span[l] / plan->width[l]);
+    }
+}
+
+/* The last one to use the informations, whose units it changes: what pictures determine is
+ * not a matter of priors. */
+static enum imp_status loose_find(struct plan *plan, struct imp_plan_result *r)
+{
+    enum imp_status st = IMP_OK;
+    const size_t n = plan->n;
+    const struct imp__plan_data **all =
+        imp__alloc(plan->p->ctx, plan->n_all, sizeof *all);
+    double *loose = imp__arena_array(plan->arena, n * n, sizeof *loose);
+    if (!all || !loose)
+        IMP_TRY(imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan"));
+    for (size_t i = 0; i < plan->n_all; i++) {
+        data_rescale(plan, &plan->data[i]);
+        all[i] = &plan->data[i];
+    }
+    IMP_TRY(
+        imp__plan_loose(&plan->model, all, plan->n_all, &plan->then, loose, &r->n_loose));
+    r->loose = loose;
+out:
+    imp__release(plan->p->ctx, all);
+    return st;
+}
+
+/* ---- All of it ----------------------------------------------------------------------------- */
+
+static enum imp_status widths_set(struct plan *plan)
+{
+    const struct imp_problem *p = plan->p;
+    const size_t n = p->n;
+    double *x = imp__alloc(p->ctx, n, sizeof *x);
+    bool *given = imp__arena_array(plan->arena, n, sizeof *given);
+    plan->width = imp__arena_array(plan->arena, n, sizeof *plan->width);
+    plan->span = imp__arena_array(plan->arena, n, sizeof *plan->span);
+    plan->unit = imp__arena_array(plan->arena, n, sizeof *plan->unit);
+    enum imp_status st = IMP_OK;
+    if (!x || !given || !plan->width || !plan->span || !plan->unit)
+        IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for a plan"));
+    imp_problem_get_x(p, x);
+    for (size_t b = 0; b < p->n_blocks; b++) {
+        const struct imp__block *block = &p->blocks[b];
+        double square = 0;
+        for (size_t e = 0; e < block->count; e++) square += imp__sqr(x[block->first + e]);
+        for (size_t e = 0; e < block->count; e++) {
+            const size_t k = block->first + e;
+            const double own = plan->o.prior ? plan->o.prior[k] : 0;
+            given[k] = own > 0;
+            plan->span[k] = imp__large_change(p, block, e, x[k], square);
+            plan->width[k] = given[k] ? own : plan->span[k];
+            plan->unit[k] = block->log ? exp(x[k]) : 1;
+        }
+    }
+    plan->given = given;
+out:
+    imp__release(p->ctx, x);
+    return st;
+}
+
+static enum imp_status lists_make(struct plan *plan)
+{
+    imp_context *ctx = plan->p->ctx;
+    const size_t n = plan->n_all;
+    plan->data = imp__alloc(ctx, n, sizeof *plan->data);
+    plan->have = imp__alloc(ctx, n + 1, sizeof *plan->have);
+    plan->open = imp__alloc(ctx, n, sizeof *plan->open);
+    plan->open_at = imp__alloc(ctx, n, sizeof *plan->open_at);
+    plan->cost = imp__alloc(ctx, n, sizeof *plan->cost);
+    if (!plan->data || !plan->have || !plan->open || !plan->open_at || !plan->cost)
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for a plan");
+    for (size_t i = 0; i < n; i++) {
+        if (plan->c[i].have) {
+            plan->have[plan->n_have++] = &plan->data[i];
+            continue;
+        }
+        plan->open_at[plan->n_open] = i;
+        plan->cost[plan->n_open] = plan->c[i].cost;
+        plan->open[plan->n_open++] = &plan->data[i];
+    }
+    return imp__plan_take_check(plan->p, &plan->o, plan->n_open);
+}
+
+static enum imp_status model_make(struct plan *plan)
+{
+    size_t *of = imp__arena_array(plan->arena, plan->n, sizeof *of);
+    if (!of) return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
+    const size_t n = plan->o.n_of > 0 ? plan->o.n_of : plan->n;
+    for (size_t k = 0; k < n; k++) of[k] = plan->o.n_of > 0 ? plan->o.of[k] : k;
+    plan->model = (struct imp__plan_model){.ctx = plan->p->ctx,
+                                           .n = plan->n,
+                                           .kind = plan->o.criterion,
+                                           .of = of,
+                                           .n_of = n};
+    IMP_CHECKED(imp__plan_known_create(&plan->model, &plan->today));
+    return imp__plan_known_create(&plan->model, &plan->then);
+}
+
+static void plan_end(struct plan *plan)
+{
+    imp_context *ctx = plan->p->ctx;
+    for (size_t i = 0; plan->data && i < plan->n_all; i++)
+        imp__release(ctx, plan->data[i].H);
+    imp__plan_known_destroy(ctx, &plan->today);
+    imp__plan_known_destroy(ctx, &plan->then);
+    imp__release(ctx, plan->data);
+    imp__release(ctx, plan->have);
+    imp__release(ctx, plan->open);
+    imp__release(ctx, plan->open_at);
+    imp__release(ctx, plan->cost);
+    imp__release(ctx, plan->c);
+    imp_problem_destroy(plan->blank);
+}
+
+enum imp_status imp_plan(imp_problem *problem,
+                         const struct imp_plan_candidate *candidates, size_t n,
+                         const struct imp_plan_options *options,
+                         const struct imp_run *run, const struct imp_plan_result **result)
+{
+    enum imp_status st = IMP_OK;
+    IMP_REQUIRE(NULL, problem, "problem");
+    imp_context *ctx = problem->ctx;
+    struct plan plan = {.p = problem, .arena = &problem->plan_arena, .n = problem->n};
+    IMP_REQUIRE(ctx, candidates, "candidates");
+    IMP_REQUIRE(ctx, result, "result");
+    IMP_RUN(ctx, plan.run, run);
+    IMP_CHECKED(imp__run_traces(ctx, "imp_plan", &plan.run));
+    IMP_CHECKED(imp__problem_no_parts(problem, "a plan"));
+    IMP_CHECKED(imp__plan_options_take(problem, __func__, options, &plan.o));
+    IMP_FLOAT_MODE;
+    IMP_SETS(problem->scene, st);
+    if (st != IMP_OK) return st;
+    imp__arena_free(&problem->plan_arena);
+    IMP_TRY(imp__plan_candidates_take(problem, __func__, "candidates", candidates, n,
+                                      &plan.c));
+    plan.n_all = n;
+    IMP_TRY(widths_set(&plan));
+    IMP_TRY(lists_make(&plan));
+    IMP_TRY(model_make(&plan));
+    IMP_TRY(imp_problem_create(problem->scene, &plan.blank));
+    IMP_TRY(informations(&plan));
+    struct imp_plan_result *r = imp__arena_array(plan.arena, 1, sizeof *r);
+    if (!r) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a plan"));
+    r->size = sizeof *r;
+    r->n = plan.n;
+    r->prior = plan.width;
+    r->span = plan.span;
+    IMP_TRY(imp__plan_evaluate(&plan.model, plan.have, plan.n_have, &plan.today));
+    IMP_TRY(errors_give(&plan, plan.today.C, &r->today));
+    IMP_TRY(rows_make(&plan, r));
+    IMP_TRY(set_choose(&plan, r));
+    IMP_TRY(loose_find(&plan, r));
+    *result = r;
+out:
+    plan_end(&plan);
+    return st;
+}
