@@ -84,6 +84,19 @@ static const char *half(double se, char text[16])
     return text;
 }
 
+/* Has a number no interval yet, or with one of the next candidates? */
+static bool some_open(const struct plan_answer *a, size_t next)
+{
+    const struct imp_plan_result *r = a->result;
+    bool open = false;
+    for (size_t i = 0; i < a->numbers->n; i++) {
+        open |= !isfinite(r->today[i]);
+        for (size_t k = 0; k < next; k++) open |= !isfinite(row(a, k)->se[i]);
+        if (r->n_chosen > 1) open |= !isfinite(r->chosen_se[i]);
+    }
+    return open;
+}
+
 static void print_numbers(const struct plan_answer *a)
 {
     const struct plan_numbers *p = a->numbers;
@@ -95,7 +108,8 @@ static void print_numbers(const struct plan_answer *a)
         const int n = (int)strlen(plan_number_name(p, i, text, sizeof text));
         width = n > width ? n : width;
     }
-    printf("\nhalf-widths of 95 %% intervals ('-': not determined)\n");
+    printf("\nhalf-widths of 95 %% intervals%s\n",
+           some_open(a, next) ? " ('-': not determined)" : "");
     printf("%-*s  %-10s", width, "parameter", "today");
     for (size_t k = 0; k < next; k++) {
         snprintf(text, sizeof text, "with #%zu", k + 1);
