@@ -152,7 +152,7 @@ cat >bad.xml <<'X'
 X
 importon render bad.xml --spp 16 --seed 2 -o bad.pfm --no-preview >/dev/null 2>alone.txt
 ranks 3 importon render bad.xml --spp 16 --seed 2 -o bad.pfm --no-preview >/dev/null
-grep -q '3 of .* walks were left out' alone.txt && cmp -s alone.txt stderr
+grep -Eq '[2-9] of .* walks were left out' alone.txt && cmp -s alone.txt stderr
 ok $? "walks of all ranks that were left out are said once, as by one process"
 ranks 2 importon info "$scenes/furnace.xml" >/dev/null
 says "importon: info runs in one process, and mpirun started 2" "commands for one process"
