@@ -12,7 +12,10 @@
 static const struct {
     const char *ending;
     imp__import_read *read;
-} readers[] = {{".rad", imp__rad_read}, {".vf", imp__view_read}};
+} readers[] = {{".rad", imp__rad_read},
+               {".vf", imp__view_read},
+               {".gltf", imp__gltf_read},
+               {".glb", imp__gltf_read}};
 
 imp__import_read *imp__import_of(const char *name)
 {
@@ -79,13 +82,14 @@ enum imp_status imp__import_scene(const struct imp__import *in)
     const struct imp_loc loc = {in->name, 1, 1};
     struct imp__import inside = *in;
     struct imp_node *integrator;
+    inside.alone = true;
     imp__import_read *read = imp__import_of(in->name);
     IMP_TRY(
         imp__tree_open(in->tree, NULL, "scene", NULL, NULL, NULL, loc, &inside.parent));
     IMP_TRY(imp__tree_open(in->tree, inside.parent, "integrator", "path", NULL, NULL, loc,
                            &integrator));
     IMP_TRY(read(&inside));
-    if (read != imp__view_read) IMP_TRY(view_add(&inside));
+    if (read == imp__rad_read) IMP_TRY(view_add(&inside));
 out:
     return st;
 }

@@ -18,6 +18,7 @@ struct imp__import {
     struct imp_node *parent;   /* the root of the scene */
     const char *name;          /* path, in the scene's arena */
     const struct imp_bytes *text;
+    bool alone; /* a scene of its own: what it lacks to be seen is added */
 };
 
 /* @return IMP_E_SCENE at a line of the file; IMP_E_UNSUPPORTED with all that is not read,
@@ -25,11 +26,12 @@ struct imp__import {
 typedef enum imp_status imp__import_read(const struct imp__import *in);
 imp__import_read imp__rad_read;  /* Radiance: materials and surfaces */
 imp__import_read imp__view_read; /* Radiance: a view, which becomes a sensor */
+imp__import_read imp__gltf_read; /* glTF 2.0, as text and binary */
 
 /* The reader by the ending of a name; NULL: a file in XML. */
 imp__import_read *imp__import_of(const char *name);
 /* A scene of the file alone. in->parent is NULL; the camera is the view file that the
- * parameter `view` names, or Radiance's view without options. */
+ * parameter `view` names, or Radiance's view without options; glTF brings its own. */
 enum imp_status imp__import_scene(const struct imp__import *in);
 
 /* ---- Nodes and properties, written at `loc` -------------------------------------- */
