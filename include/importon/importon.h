@@ -396,8 +396,8 @@ struct imp_load_options {
 };
 #define IMP_LOAD_OPTIONS_INIT IMP_INIT_ZERO(struct imp_load_options)
 
-/** Load a scene file (Mitsuba 3 XML; Radiance's or glTF's, by the ending .rad, .gltf or .glb,
- * docs/import.md).
+/** Load a scene file (Mitsuba 3 XML; by the ending .rad, .gltf, .glb or .obj
+ * those of docs/import.md).
  * The scene is committed and ready. `options` may be NULL.
  * @return IMP_OK; IMP_E_IO; IMP_E_SCENE (message begins file:line:column); IMP_E_NOMEM;
  *         IMP_E_UNSUPPORTED for a plugin this version does not have. */

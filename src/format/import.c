@@ -14,6 +14,7 @@ static const struct {
     imp__import_read *read;
 } readers[] = {{".rad", imp__rad_read},
                {".vf", imp__view_read},
+               {".obj", imp__obj_read},
                {".gltf", imp__gltf_read},
                {".glb", imp__gltf_read}};
 
@@ -173,6 +174,15 @@ const char *imp__import_id(const struct imp__import *in, const char *wanted)
     for (int k = 2; imp__names_find(&in->tree->ids, NULL, text) && k < 1 << 20; k++)
         snprintf(text, sizeof text, "%.280s_%d", wanted, k);
     return imp__arena_strdup(&in->scene->arena, text);
+}
+
+const char *imp__import_name(const struct imp__import *in, const char *name)
+{
+    char text[128];
+    snprintf(text, sizeof text, "%.100s", name);
+    for (char *c = text; *c; c++)
+        if (strchr(".*?[] \t\r\n=,:/\\\"'<>&", *c) || (unsigned char)*c < ' ') *c = '_';
+    return imp__import_id(in, text);
 }
 
 /* ---- What is not read ------------------------------------------------------------ */

@@ -26,6 +26,7 @@ struct imp__import {
 typedef enum imp_status imp__import_read(const struct imp__import *in);
 imp__import_read imp__rad_read;  /* Radiance: materials and surfaces */
 imp__import_read imp__view_read; /* Radiance: a view, which becomes a sensor */
+imp__import_read imp__obj_read;  /* Wavefront: OBJ with the materials of its MTL files */
 imp__import_read imp__gltf_read; /* glTF 2.0, as text and binary */
 
 /* The reader by the ending of a name; NULL: a file in XML. */
@@ -57,11 +58,25 @@ enum imp_status imp__import_matrix(const struct imp__import *in, struct imp_node
 /* An id that no object of the scene has: `wanted`, or with a number behind it. In the
  * scene's arena; NULL: out of memory. */
 const char *imp__import_id(const struct imp__import *in, const char *wanted);
+/* The same of a name that somebody gave: what patterns and parameters' names are made of
+ * becomes '_'. */
+const char *imp__import_name(const struct imp__import *in, const char *name);
 /* The number that the parameter $name has, or `missing` if nobody gave it.
  * @return IMP_E_SCENE if it is not one in [lo, hi]. */
 enum imp_status imp__import_number(const struct imp__import *in, const char *name,
                                    const char *missing, double lo, double hi,
                                    double *out);
+
+/* ---- What a file alone may lack (import_view.c) ----------------------------------- */
+
+/* The film of a sensor: the parameters `width` and `spp`, the height by width/height. */
+enum imp_status imp__import_film(const struct imp__import *in, struct imp_node *sensor,
+                                 double aspect, struct imp_loc loc);
+/* A camera on all of a box from the front, above and the right; +y is up. */
+enum imp_status imp__import_camera(const struct imp__import *in, const double lo[3],
+                                   const double hi[3], struct imp_loc loc);
+/* A sky of radiance 1, and a warning. */
+enum imp_status imp__import_sky(const struct imp__import *in, struct imp_loc loc);
 
 /* ---- What is not read ------------------------------------------------------------ */
 

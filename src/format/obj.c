@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Wavefront OBJ: v, vt, vn and f with positive indices; polygons are fanned from their
- * first corner; all other lines are ignored. A vertex is a distinct (v, vt, vn). */
+ * Wavefront OBJ: v, vt, vn and f, whose negative indices count from the last row so far;
+ * polygons are fanned from their first corner. A vertex is a distinct (v, vt, vn). What
+ * objects, materials and their files are called goes to who asks for it (obj_parts.c);
+ * all other lines are ignored. */
 #include "base/number.h"
-#include "mesh_file.h"
+#include "obj_parts.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -32,6 +34,7 @@ struct obj {
     uint32_t *table; /* vertex + 1 by hash of its corner; 0: free */
     size_t cap_table;
     bool missing_normal;
+    struct imp__obj_names *names; /* NULL: nobody asks */
 };
 
 static enum imp_status no_memory(const struct obj *o)
@@ -90,9 +93,9 @@ static enum imp_status index_read(struct obj *o, const struct column *c, const c
     const size_t n = c->n / (size_t)c->width;
     int64_t i;
     if (!imp__integer(s, end, &i)) return line_error(o, "malformed index of a %s", what);
-    if (i < 1)
-        return line_error(o, "index %lld of a %s is not positive", (long long)i, what);
-    if ((uint64_t)i > n)
+    if (i == 0) return line_error(o, "index 0 of a %s", what);
+    if (i < 0 && i >= -(int64_t)n) i += (int64_t)n + 1;
+    if (i < 1 || (uint64_t)i > n)
         return line_error(o, "index %lld of a %s: there are %zu so far", (long long)i,
                           what, n);
     *out = (uint32_t)i;
@@ -214,6 +217,9 @@ static enum imp_status line_read(struct obj *o, const char *s, const char *end)
         return row_read(o, &o->t, "texture coordinate", 1, s, end);
     if (length == 2 && word[0] == 'v' && word[1] == 'n')
         return row_read(o, &o->n, "normal", 3, s, end);
+    if (!o->names) return IMP_OK;
+    if (!imp__obj_name(o->names, word, length, s, end, o->n_indices / 3))
+        return no_memory(o);
     return IMP_OK;
 }
 
@@ -245,12 +251,17 @@ out:
     return st;
 }
 
-enum imp_status imp__obj_parse(const struct imp_mesh_source *source,
-                               struct imp_mesh_data *out)
+enum imp_status imp__obj_parse_names(const struct imp_mesh_source *source,
+                                     struct imp__obj_names *names,
+                                     struct imp_mesh_data *out)
 {
     enum imp_status st = IMP_OK;
-    struct obj o = {
-        .source = source, .ctx = source->ctx, .v.width = 3, .t.width = 2, .n.width = 3};
+    struct obj o = {.source = source,
+                    .ctx = source->ctx,
+                    .v.width = 3,
+                    .t.width = 2,
+                    .n.width = 3,
+                    .names = names};
     const char *s = (const char *)source->text.data, *end = s + source->text.size;
     while (s < end) {
         const char *stop = memchr(s, '\n', (size_t)(end - s));
@@ -268,4 +279,10 @@ out:
     imp__release(o.ctx, o.indices);
     imp__release(o.ctx, o.table);
     return st;
+}
+
+enum imp_status imp__obj_parse(const struct imp_mesh_source *source,
+                               struct imp_mesh_data *out)
+{
+    return imp__obj_parse_names(source, NULL, out);
 }

@@ -134,14 +134,10 @@ const json_t *imp__gltf_extension(const json_t *object, const char *name)
 const char *imp__gltf_id(const struct gltf *g, const json_t *object, const char *kind,
                          size_t index)
 {
-    char text[128];
+    char text[64];
     const char *name = imp__gltf_text(object, "name");
-    if (!name || !*name) snprintf(text, sizeof text, "%s_%zu", kind, index);
-    else snprintf(text, sizeof text, "%.100s", name);
-    /* Ids become names of parameters: a point separates their parts, and a pattern has *. */
-    for (char *c = text; *c; c++)
-        if (strchr(".*?[] \t\r\n=,:/\\\"'<>&", *c) || (unsigned char)*c < ' ') *c = '_';
-    return imp__import_id(g->in, text);
+    snprintf(text, sizeof text, "%s_%zu", kind, index);
+    return imp__import_name(g->in, name && *name ? name : text);
 }
 
 /* ---- The file --------------------------------------------------------------------------- */

@@ -9,7 +9,6 @@
 #include <string.h>
 
 #define DEPTH_MAX 1000 /* nodes inside nodes */
-#define FOV       40   /* degrees, of the view of a file without cameras */
 
 /* ---- Transforms --------------------------------------------------------------------------- */
 
@@ -131,26 +130,6 @@ static enum imp_status mesh_place(struct gltf *g, const json_t *node, size_t ind
 
 /* ---- Cameras ---------------------------------------------------------------------------------- */
 
-/* The film of a sensor: `width` pixels, and what its aspect ratio makes of them. */
-static enum imp_status film(struct gltf *g, struct imp_node *sensor, double aspect)
-{
-    double width, spp;
-    struct imp_node *node;
-    IMP_CHECKED(imp__import_number(g->in, "width", "512", 1, 65536, &width));
-    IMP_CHECKED(imp__import_number(g->in, "spp", "64", 1, 1e9, &spp));
-    const double height = floor(width / aspect + .5);
-    if (!(height < 65536))
-        return imp__gltf_error(g, "the picture would be %g pixels high", height);
-    IMP_CHECKED(imp__tree_open(g->in->tree, sensor, "film", "hdrfilm", NULL, NULL, g->loc,
-                               &node));
-    IMP_CHECKED(imp__import_integer(g->in, node, "width", (int64_t)width, g->loc));
-    IMP_CHECKED(imp__import_integer(g->in, node, "height",
-                                    imp_max((int64_t)height, (int64_t)1), g->loc));
-    IMP_CHECKED(imp__tree_open(g->in->tree, sensor, "sampler", "independent", NULL, NULL,
-                               g->loc, &node));
-    return imp__import_integer(g->in, node, "sample_count", (int64_t)spp, g->loc);
-}
-
 static enum imp_status perspective(struct gltf *g, const json_t *lens, const char *id,
                                    const struct imp_mat4 *look)
 {
@@ -163,7 +142,7 @@ static enum imp_status perspective(struct gltf *g, const json_t *lens, const cha
     IMP_CHECKED(imp__import_matrix(g->in, sensor, "to_world", look->m, g->loc));
     IMP_CHECKED(imp__import_string(g->in, sensor, "fov_axis", "y", g->loc));
     IMP_CHECKED(imp__import_float(g->in, sensor, "fov", fov * 180 / IMP_PI, g->loc));
-    return film(g, sensor, aspect);
+    return imp__import_film(g->in, sensor, aspect, g->loc);
 }
 
 static enum imp_status orthographic(struct gltf *g, const json_t *lens, const char *id,
@@ -178,7 +157,7 @@ static enum imp_status orthographic(struct gltf *g, const json_t *lens, const ch
     IMP_CHECKED(imp__tree_open(g->in->tree, g->in->parent, "sensor", "orthographic", id,
                                NULL, g->loc, &sensor));
     IMP_CHECKED(imp__import_matrix(g->in, sensor, "to_world", m.m, g->loc));
-    return film(g, sensor, x / y);
+    return imp__import_film(g->in, sensor, x / y, g->loc);
 }
 
 static enum imp_status camera_place(struct gltf *g, size_t index,
@@ -194,30 +173,6 @@ static enum imp_status camera_place(struct gltf *g, size_t index,
     const json_t *flat = json_object_get(camera, "orthographic");
     return flat ? orthographic(g, flat, id, &look)
                 : perspective(g, json_object_get(camera, "perspective"), id, &look);
-}
-
-/* A file alone without a camera: all of it, from the front, above and the right. */
-static enum imp_status camera_add(struct gltf *g)
-{
-    struct imp_mat4 look;
-    const imp_v3 lo = imp__v3(g->lo[0], g->lo[1], g->lo[2]),
-                 hi = imp__v3(g->hi[0], g->hi[1], g->hi[2]), middle = (lo + hi) * .5,
-                 from = imp__v3(.45, .35, 1);
-    const double radius = .5 * imp__length(hi - lo);
-    if (!(radius > 0) || !isfinite(radius)) {
-        g->where[0] = 0;
-        return imp__gltf_error(g, "it has no mesh to look at");
-    }
-    const imp_v3 away = imp__normalize(from) * (radius / sin(FOV * IMP_PI / 360));
-    if (!imp__lookat(middle + away, middle, imp__v3(0, 1, 0), &look))
-        return imp__gltf_error(g, "its meshes are too far away to look at");
-    struct imp_node *sensor;
-    IMP_CHECKED(imp__tree_open(g->in->tree, g->in->parent, "sensor", "perspective",
-                               imp__import_id(g->in, "camera"), NULL, g->loc, &sensor));
-    IMP_CHECKED(imp__import_matrix(g->in, sensor, "to_world", look.m, g->loc));
-    IMP_CHECKED(imp__import_string(g->in, sensor, "fov_axis", "smaller", g->loc));
-    IMP_CHECKED(imp__import_float(g->in, sensor, "fov", FOV, g->loc));
-    return film(g, sensor, 4. / 3);
 }
 
 /* ---- Lights ------------------------------------------------------------------------------------ */
@@ -351,7 +306,6 @@ static enum imp_status roots(struct gltf *g, bool *inner)
 
 enum imp_status imp__gltf_nodes(struct gltf *g)
 {
-    struct imp_node *sky;
     bool *inner = imp__arena_array(&g->in->scene->files, g->n_nodes + 1, sizeof *inner);
     if (!inner) return imp__gltf_memory(g);
     IMP_CHECKED(roots(g, inner));
@@ -359,11 +313,6 @@ enum imp_status imp__gltf_nodes(struct gltf *g)
         imp__warn(g->ctx, "%s: animations are not read: nodes are where they stand",
                   g->in->name);
     if (!g->in->alone) return IMP_OK;
-    if (!g->n_cameras) IMP_CHECKED(camera_add(g));
-    if (g->n_lamps) return IMP_OK;
-    imp__warn(g->ctx, "%s: it has no light: a sky of radiance 1 from everywhere is added",
-              g->in->name);
-    IMP_CHECKED(imp__tree_open(g->in->tree, g->in->parent, "emitter", "constant",
-                               imp__import_id(g->in, "sky"), NULL, g->loc, &sky));
-    return imp__import_rgb(g->in, sky, "radiance", (double[3]){1, 1, 1}, g->loc);
+    if (!g->n_cameras) IMP_CHECKED(imp__import_camera(g->in, g->lo, g->hi, g->loc));
+    return g->n_lamps ? IMP_OK : imp__import_sky(g->in, g->loc);
 }
