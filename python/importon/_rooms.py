@@ -142,7 +142,7 @@ def shares(scene: Scene, sensor: Any = 0, *, params: Any = None, seed: int = 0, 
     Examples
     --------
     >>> scene = importon.load_dict(importon.cornell_box(res=8))
-    >>> reading, rows = importon.shares(scene, spp=8, points="independent")
+    >>> reading, rows = importon.shares(scene, spp=8)
     >>> bool(abs(sum(r.value for r in rows if r.of == "light") / reading.value - 1) < 1e-5)
     True
     """

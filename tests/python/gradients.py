@@ -18,17 +18,17 @@ def test_forward_is_reverse():
     s = box()
     rng = np.random.default_rng(1)
     w = rng.normal(size=(16, 16, 3)).astype(np.float32)
-    g = im.render_backward(s, None, w, spp=16, seed=5, points="independent")
+    g = im.render_backward(s, None, w, spp=16, seed=5)
     for name in g:
         dot = rng.normal(size=np.shape(g[name]))
-        f = im.render_forward(s, None, {name: dot}, spp=16, seed=5, points="independent")
+        f = im.render_forward(s, None, {name: dot}, spp=16, seed=5)
         a, b = np.sum(np.asarray(f, float) * w), np.sum(g[name] * dot)
         assert abs(a - b) <= 2e-6 * np.sum(np.abs(np.asarray(f, float) * w)), (name, a, b)
         assert f.signed and f.se.shape == f.shape
-    j = im.jacobian(s, RED, spp=16, seed=5, points="independent")
+    j = im.jacobian(s, RED, spp=16, seed=5)
     assert np.allclose(np.einsum("khwc,hwc->k", j[RED].astype(float), w), g[RED], rtol=1e-4, atol=1e-5)
     assert j.se[RED].shape == (3, 16, 16, 3) and len(j.pictures[RED]) == 3
-    assert np.allclose(j.picture, im.render(s, spp=16, seed=5, points="independent"), rtol=1e-5, atol=1e-6)
+    assert np.allclose(j.picture, im.render(s, spp=16, seed=5), rtol=1e-5, atol=1e-6)
 
 
 def test_differences():

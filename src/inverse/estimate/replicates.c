@@ -110,6 +110,21 @@ enum imp_points imp__points_recorded(const struct imp_scene *scene,
 
 /* ---- Plans ------------------------------------------------------------------------- */
 
+/* The sets of a picture as replicates: a picture and its derivatives by a fixed adjoint are of the
+ * same walks. False where these sets differ in size. */
+static bool picture_plan(const struct imp_sensor *sensor, int spp,
+                         struct imp__replicates *out)
+{
+    const struct imp_tracer tracer = {.points = imp__points(), .sensor = sensor};
+    const int sets = spp / imp__tracer_set(&tracer, spp);
+    if (sets < 2 || spp % sets != 0) return false;
+    out->R = sets;
+    out->n = spp / sets;
+    out->chunks = imp_max(1, sets / IMP_BATCHES_PER_ITEM);
+    *out = in_sets(*out, SETS_FIXED);
+    return true;
+}
+
 struct imp__replicates imp__replicates_of(const struct imp_scene *scene,
                                           const struct imp__target *t,
                                           const struct imp_run *run)
@@ -118,6 +133,9 @@ struct imp__replicates imp__replicates_of(const struct imp_scene *scene,
     const int sets =
         imp__points_of(sensor, run) == IMP_POINTS_SOBOL ? sets_of(t, run) : 0;
     if (imp__film_border(&sensor->film) > 0) return wide_plan(spp_of(sensor, run), sets);
+    struct imp__replicates fixed = {0};
+    if (sets == SETS_FIXED && picture_plan(sensor, spp_of(sensor, run), &fixed))
+        return fixed;
     /* Longer batches reduce the bias of a loss that is not quadratic. */
     const bool kept_sets = run->walks && sets;
     const int most = curved(t) && !kept_sets ? IMP_REPLICATE_MAX
