@@ -211,7 +211,8 @@ enum imp_status imp__obj_read(const struct imp__import *in)
                                            .text = *in->text,
                                            .flip_v = true};
     /* Faces before the first o or usemtl. */
-    if (!imp__obj_name(&p.names, "o", 1, NULL, NULL, 0))
+    static const char none[] = "";
+    if (!imp__obj_name(&p.names, "o", 1, none, none, 0))
         IMP_TRY(imp__error(p.ctx, IMP_E_NOMEM, "%s: out of memory", in->name));
     p.names.run[0].object = NULL;
     IMP_TRY(imp__obj_parse_names(&source, &p.names, &p.all));
