@@ -5,9 +5,6 @@
 #include "light_tree.h"
 #include <string.h>
 
-/* Directions that a strength is the mean of. */
-#define DIRECTIONS 32
-
 static double luminance(const struct imp_scene *scene, imp_spec le)
 {
     const double l = scene->channels == 1 ? le[0] : imp__luminance(le[0], le[1], le[2]);
@@ -27,13 +24,22 @@ static double radiance(const struct imp_scene *scene, const struct imp_emitter *
     return luminance(scene, le);
 }
 
-/* The k-th of n directions that cover the cone of cosine `least` evenly, by the golden
- * angle. */
-static imp_v3 direction(const struct imp_frame *f, double least, int k, int n)
+void imp__light_turns(struct imp_light_turns *out)
 {
-    const double z = 1 - (k + 0.5) / n * (1 - least), r = sqrt(fmax(0, 1 - z * z));
-    const double phi = k * (IMP_PI * (3 - 2.2360679774997897));
-    return f->s * (r * cos(phi)) + f->t * (r * sin(phi)) + f->n * z;
+    for (int k = 0; k < IMP_LIGHT_DIRECTIONS; k++) {
+        const double phi = k * (IMP_PI * (3 - 2.2360679774997897));
+        out->cosine[k] = cos(phi);
+        out->sine[k] = sin(phi);
+    }
+}
+
+/* The k-th of the directions that cover the cone of cosine `least` evenly. */
+static imp_v3 direction(const struct imp_light_turns *turns, const struct imp_frame *f,
+                        double least, int k)
+{
+    const double z = 1 - (k + 0.5) / IMP_LIGHT_DIRECTIONS * (1 - least),
+                 r = sqrt(imp_max(0.0, 1 - z * z));
+    return f->s * (r * turns->cosine[k]) + f->t * (r * turns->sine[k]) + f->n * z;
 }
 
 /* Mean over all directions w of cos(max(0, angle between w and a cone of normals)), where
@@ -47,6 +53,7 @@ static double mean_cosine(double cos_o)
 }
 
 static double strength_of_point(const struct imp_scene *scene,
+                                const struct imp_light_turns *turns,
                                 const struct imp_emitter *e,
                                 const struct imp_light_node *bound)
 {
@@ -54,26 +61,25 @@ static double strength_of_point(const struct imp_scene *scene,
     const imp_v3 axis = imp__v3(bound->axis[0], bound->axis[1], bound->axis[2]);
     const struct imp_frame f = imp__frame_from_normal(axis);
     double sum = 0;
-    for (int k = 0; k < DIRECTIONS; k++) {
+    for (int k = 0; k < IMP_LIGHT_DIRECTIONS; k++) {
         const struct imp_emission x = {
-            .dist = 1,
-            .cos_light = 1,
-            .d = direction(&f, bound->cos_normals, k, DIRECTIONS)};
+            .dist = 1, .cos_light = 1, .d = direction(turns, &f, bound->cos_normals, k)};
         sum += radiance(scene, e, &x, p);
     }
-    return sum / DIRECTIONS / (double)bound->gain;
+    return sum / IMP_LIGHT_DIRECTIONS / (double)bound->gain;
 }
 
 /* Mean intensity of a surface over all directions, by what arrives on a sphere around it. */
 static double strength_of_surface(const struct imp_scene *scene,
+                                  const struct imp_light_turns *turns,
                                   const struct imp_emitter *e)
 {
     const struct imp_frame f = imp__frame_from_normal(imp__v3(0, 0, 1));
     const imp_v3 centre = (e->shape->lo + e->shape->hi) * 0.5;
     const double r = imp__length(e->shape->hi - e->shape->lo);
     double sum = 0;
-    for (int k = 0; k < DIRECTIONS; k++) {
-        const imp_v3 from = centre + direction(&f, -1, k, DIRECTIONS) * r;
+    for (int k = 0; k < IMP_LIGHT_DIRECTIONS; k++) {
+        const imp_v3 from = centre + direction(turns, &f, -1, k) * r;
         /* Points in Halton's order. */
         double u[2] = {0, 0}, base = 0.5;
         for (int j = k + 1; j > 0; j /= 2, base /= 2) u[0] += (j % 2) * base;
@@ -85,21 +91,23 @@ static double strength_of_surface(const struct imp_scene *scene,
             {ls.uv[0], ls.uv[1]}, ls.dist, ls.cos_light, -ls.wi};
         sum += radiance(scene, e, &x, ls.p) / ls.pdf;
     }
-    return sum / DIRECTIONS * r * r;
+    return sum / IMP_LIGHT_DIRECTIONS * r * r;
 }
 
-double imp__light_strength(const struct imp_scene *scene, const struct imp_emitter *e)
+double imp__light_strength(const struct imp_scene *scene,
+                           const struct imp_light_turns *turns,
+                           const struct imp_emitter *e)
 {
     struct imp_light_node bound;
     imp__light_bound(e, -1, &bound);
-    if (!e->shape) return strength_of_point(scene, e, &bound);
+    if (!e->shape) return strength_of_point(scene, turns, e, &bound);
     bool plain = true;
     for (int j = 0; j < e->n_in; j++) plain &= !e->input[j]->texture;
     if ((e->ops->flags & IMP_EMITTER_UNIFORM) && plain && bound.cos_normals >= 1) {
         const struct imp_emission x = {.dist = 1, .cos_light = 1, .d = {0, 0, 1}};
         return 0.25 * radiance(scene, e, &x, (imp_v3){0}) * e->shape->area;
     }
-    return strength_of_surface(scene, e);
+    return strength_of_surface(scene, turns, e);
 }
 
 double imp__light_triangle_radiance(const struct imp_scene *scene,

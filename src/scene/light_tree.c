@@ -19,7 +19,10 @@ static inline double sin_less(double sin_a, double cos_a, double sin_b, double c
 {
     return cos_a > cos_b ? 0 : sin_a * cos_b - cos_a * sin_b;
 }
-static inline double sin_of(double cosine) { return sqrt(fmax(0, 1 - cosine * cosine)); }
+static inline double sin_of(double cosine)
+{
+    return sqrt(imp_max(0.0, 1 - cosine * cosine));
+}
 
 /* Mean of max(0, x) where x lies evenly in [m - e, m + e]. */
 static inline double mean_positive(double m, double e)
@@ -45,7 +48,7 @@ static double importance(const struct imp_light_node *n, const struct imp_light_
         along += half * fabs((double)n->axis[k]);
     }
     *near = d2 < NEAR2 * r2;
-    double out = n->strength * n->gain / fmax(fmax(d2, r2), 1e-60);
+    double out = n->strength * n->gain / imp_max(imp_max(d2, r2), 1e-60);
     const double inverse = d2 > 0 ? 1 / sqrt(d2) : 0;
     if (at->faces) {
         if (!(front > -(1 + SLACK) * depth)) return 0;

@@ -78,10 +78,18 @@ double imp__light_tree_factor(const struct imp_light_tree *t,
 size_t imp__light_tree_bytes(const struct imp_light_tree *t);
 
 /* ---- light_bounds.c: bounds and strengths of single lights ---- */
-/* Luminous intensity of item k as the importance takes it, without its sampling weight: by
- * the lights' parameters as they are. `all`: what this function gives for the whole light.
- */
-double imp__light_strength(const struct imp_scene *scene, const struct imp_emitter *e);
+/* Directions that a strength is the mean of lie about an axis by multiples of the golden angle,
+ * whose cosines and sines serve all lights. */
+enum { IMP_LIGHT_DIRECTIONS = 32 };
+struct imp_light_turns {
+    double cosine[IMP_LIGHT_DIRECTIONS], sine[IMP_LIGHT_DIRECTIONS];
+};
+void imp__light_turns(struct imp_light_turns *out);
+/* Luminous intensity of a whole light as the importance takes it, without its sampling weight:
+ * by its parameters as they are. */
+double imp__light_strength(const struct imp_scene *scene,
+                           const struct imp_light_turns *turns,
+                           const struct imp_emitter *e);
 /* Mean radiance of a triangle of a light whose radiance depends on the place alone. */
 double imp__light_triangle_radiance(const struct imp_scene *scene,
                                     const struct imp_emitter *e, int prim);

@@ -30,6 +30,9 @@ struct split {
     struct imp_light_tree *t;
     struct bound *bound; /* [n_items] */
     int32_t *order;      /* [n_items] items, of a node next to each other */
+    /* The cone that solid angles were last found for: mostly the next one is the same. */
+    float cos_normals, cos_reach;
+    double directions;
 };
 
 static inline double centre(const struct bound *b, int k)
@@ -57,12 +60,17 @@ static double directions(const struct bound *b)
            IMP_PI / 2 * (2 * w * sin(o) - cos(o - 2 * w) - 2 * o * sin(o) + cos(o));
 }
 
-static double cost(const struct bound *b, int count)
+static double cost(struct split *s, const struct bound *b, int count)
 {
     const struct imp_light_node *n = &b->node;
+    if (n->cos_normals != s->cos_normals || n->cos_reach != s->cos_reach) {
+        s->cos_normals = n->cos_normals;
+        s->cos_reach = n->cos_reach;
+        s->directions = directions(b);
+    }
     const double x = (double)n->hi[0] - n->lo[0], y = (double)n->hi[1] - n->lo[1],
                  z = (double)n->hi[2] - n->lo[2];
-    return count * directions(b) * (x * y + y * z + z * x);
+    return count * s->directions * (x * y + y * z + z * x);
 }
 
 /* Where to cut [first, end) of the order: moves items, returns the first of the second
@@ -101,7 +109,7 @@ static int cut(struct split *s, int first, int end, int depth)
                 if (n == 0) below = in[b];
                 else enclose(&below, &in[b], &below);
                 n += count[b];
-                own = cost(&below, n);
+                own = cost(s, &below, n);
             }
             before[b] = own;
         }
@@ -111,7 +119,7 @@ static int cut(struct split *s, int first, int end, int depth)
                 if (n == 0) below = in[b];
                 else enclose(&below, &in[b], &below);
                 n += count[b];
-                own = cost(&below, n);
+                own = cost(s, &below, n);
             }
             if (n == 0) continue;
             const double all = (before[b - 1] + own) * longest / (hi[k] - lo[k]);
@@ -159,11 +167,13 @@ static void strengths_set(void *payload)
 {
     struct imp_light_tree *t = payload;
     const struct imp_scene *scene = t->scene;
+    struct imp_light_turns turns;
     double sum = 0;
     int n = 0;
+    imp__light_turns(&turns);
     for (int i = 0; i < t->n_items; n++) {
         const int e = t->item[i].emitter;
-        const double all = imp__light_strength(scene, scene->emitters[e]);
+        const double all = imp__light_strength(scene, &turns, scene->emitters[e]);
         sum += all;
         for (; i < t->n_items && t->item[i].emitter == e; i++)
             t->node[t->item[i].leaf].strength = (float)all;
@@ -173,7 +183,7 @@ static void strengths_set(void *payload)
         const struct imp_light_item *item = &t->item[i];
         const struct imp_emitter *e = scene->emitters[item->emitter];
         struct imp_light_node *leaf = &t->node[item->leaf];
-        double own = fmax((double)leaf->strength, least) * item->part;
+        double own = imp_max((double)leaf->strength, least) * item->part;
         if (item->prim >= 0 && e->ops->flags & IMP_EMITTER_UNIFORM)
             own = EVENLY * own + (1 - EVENLY) * 0.25 *
                                      imp__light_triangle_radiance(scene, e, item->prim) *
@@ -261,8 +271,12 @@ enum imp_status imp__light_tree_build(struct imp_scene *scene)
                                       sizeof *t->far_light),
         .far_share = imp__arena_array(&scene->arena, (size_t)scene->n_emitters + 1,
                                       sizeof *t->far_share)};
-    s = (struct split){t, imp__alloc(scene->ctx, n + 1, sizeof *s.bound),
-                       imp__alloc(scene->ctx, n + 1, sizeof *s.order)};
+    s = (struct split){t,
+                       imp__alloc(scene->ctx, n + 1, sizeof *s.bound),
+                       imp__alloc(scene->ctx, n + 1, sizeof *s.order),
+                       NAN,
+                       NAN,
+                       0};
     if (!t->item || !t->node || !t->first || !t->far_light || !t->far_share || !s.bound ||
         !s.order)
         IMP_TRY(imp__build_no_memory(scene));

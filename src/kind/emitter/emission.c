@@ -53,7 +53,7 @@ double imp__surface_emission_pdf(const struct imp_emitter *e,
                                  const struct imp_emission *x)
 {
     (void)e;
-    return fmax(x->cos_light, 0) * IMP_INV_PI;
+    return imp_max(x->cos_light, 0.0) * IMP_INV_PI;
 }
 
 void imp__point_emission_sample(imp_v3 position, const double u[4],

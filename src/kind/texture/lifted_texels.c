@@ -98,6 +98,9 @@ static const struct imp__lifted *lift_now(const struct imp__lifted_texels *t, si
         break;
     }
     lift(t, t->by, p, own);
+    /* Another thread may have lifted it meanwhile: a second spectrum would take room. */
+    const uint32_t there = get(&t->spectrum_of[k]);
+    if (there) return &t->spectrum[there - 1];
     if (get(t->used) >= t->room) return own;
     const uint32_t s =
         atomic_fetch_add_explicit(atomic_of(t->used), 1, memory_order_relaxed);

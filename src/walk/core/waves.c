@@ -88,7 +88,7 @@ double imp__wave_draw(const struct imp_tracer *tracer, const struct imp_walk *wa
     imp__set_at(tracer->set, tracer->period, sample, &first, &n);
     const int64_t k = sample - first;
     const double range = floor(C * u), part = C * u - range;
-    return fmin((range + ((double)k + part) / (double)n) / C, 0x1.fffffffffffffp-1);
+    return imp_min((range + ((double)k + part) / (double)n) / C, 0x1.fffffffffffffp-1);
 }
 
 bool imp__walk_wave(const struct imp_tracer *tracer, struct imp_arena *arena, double u,

@@ -91,7 +91,7 @@ static inline bool survives(struct imp_step *s, const struct imp_bsdf *b,
 {
     (void)b, (void)dirs, (void)factor;
     if (s->depth < s->tracer->integrator->rr_depth) return true;
-    *survive = imp__decide1(fmin(imp__max_used(s->beta, s->at.carried), 0.95));
+    *survive = imp__decide1(imp_min(imp__max_used(s->beta, s->at.carried), 0.95));
     return imp__u01(s->walk->key, imp__dim(s->depth, IMP_DIM_SURVIVE)) < *survive;
 }
 

@@ -36,10 +36,7 @@ static bool side_take(struct imp_step *s, const struct imp_shape *shape, imp_v3 
 
 /* Rays from a point of a medium begin a little behind it: a boundary as near as Embree's
  * rounding is met then, and met from its wrong side it is not there. */
-static double behind(imp_v3 p)
-{
-    return (1 + fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2])))) * IMP_RAY_EPSILON;
-}
+static double behind(imp_v3 p) { return (1 + imp__max3(imp__abs(p))) * IMP_RAY_EPSILON; }
 
 /* A surface that a ray passes as if it were not there, though media may change. */
 static bool is_passed(const struct imp_scene *scene, const struct imp_shape *shape)
@@ -152,7 +149,7 @@ static void look_closely(const struct imp_step *s, imp_v3 d, bool hide,
                          const struct imp_medium *m, int passed, struct surface_ahead *a)
 {
     const imp_v3 p = s->o + d * hit->t;
-    const double back = fmin(behind(p) + hit->t * IMP_RAY_EPSILON, hit->t);
+    const double back = imp_min(behind(p) + hit->t * IMP_RAY_EPSILON, hit->t);
     const imp_v3 from = s->o + d * (hit->t - back);
     struct imp_hit first;
     if (!imp__intersect_at(s->scene, s->walk->time, &from, &d, 0, 2 * back, &first)) {
@@ -176,7 +173,7 @@ static enum imp_meeting meet(struct imp_step *s, struct imp_hit *hit)
     for (int passed = 0;; passed++) {
         const bool found =
             imp__intersect_at(scene, s->walk->time, &s->o, &d, s->t_min, t_max, hit);
-        const double near = passed ? base : fmax(s->t_min, s->flight.behind),
+        const double near = passed ? base : imp_max(s->t_min, s->flight.behind),
                      far = base + (found ? hit->t : t_max);
         const struct imp_medium *m = s->flight.medium;
         s->flight.base = base;
