@@ -27,7 +27,8 @@ static const struct {
     {"bsdf", "plastic roughplastic roughdielectric thindielectric principled "
              "principledthin bumpmap normalmap blendbsdf mask measured hair polarizer "
              "retarder circular pplastic"},
-    {"emitter", "envmap directional directionalarea spot projector sunsky ciesky"},
+    {"emitter", "envmap directional directionalarea spot projector sunsky ciesky "
+                "perezsky"},
     {"shape",
      "obj ply serialized cube sphere cylinder disk rectangle shapegroup instance "
      "sdfgrid bsplinecurve linearcurve ellipsoids heightfield merge"},

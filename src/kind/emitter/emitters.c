@@ -18,7 +18,8 @@
     X(imp__sun)                                                                          \
     X(imp__projector)                                                                    \
     X(imp__sunsky)                                                                       \
-    X(imp__ciesky)
+    X(imp__ciesky)                                                                       \
+    X(imp__perezsky)
 
 #define DECLARE(kind) extern const struct imp_emitter_ops kind;
 EMITTERS(DECLARE)

@@ -1,0 +1,99 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * perezsky: the all-weather sky of Perez, Seals and Michalsky ("All-weather model for sky luminance
+ * distribution", Solar Energy 50, 1993, with the erratum in 51), from two measured numbers, the
+ * diffuse irradiance Ed of level ground and the direct irradiance Es across the sun's rays. With
+ * Z the sun's angle to the zenith in radians, m the air mass (Kasten 1965) and E0 the irradiance
+ * outside of the atmosphere,
+ *
+ *     epsilon = ((Ed + Es)/Ed + 1.041 Z^3)/(1 + 1.041 Z^3)      clearness, one of eight bins
+ *     Delta   = m Ed/E0                                          brightness
+ *     a = a1 + a2 Z + Delta (a3 + a4 Z), and so b to e
+ *
+ * but in the first bin c = exp((Delta (c1 + c2 Z))^c3) - c4 and d = -exp(Delta (d1 + d2 Z)) + d3 +
+ * Delta d4. Between epsilon = 1.065 and 2.8 a Delta below .2 is taken as .2, as Radiance's programs
+ * do: there the fit has no data. */
+#include "base/required.h"
+#include "emission.h"
+#include "sky_shape.h"
+#include <math.h>
+
+#define BINS           8
+#define SOLAR_CONSTANT 1367 /* W m^-2, with which the model was fitted */
+
+static const double bounds[BINS - 1] = {1.065, 1.23, 1.5, 1.95, 2.8, 4.5, 6.2};
+
+/* Table 1 by columns: [a to e][1 to 4][bin]. */
+static const double fit[5][4][BINS] = {
+    {{1.3525, -1.2219, -1.1, -.5484, -.6, -1.0156, -1, -1.05},
+     {-.2576, -.773, -.2515, -.6654, -.3566, -.367, .0211, .0289},
+     {-.269, 1.4148, .8952, -.2672, -2.5, 1.0078, .5025, .426},
+     {-1.4366, 1.1016, .0156, .7117, 2.325, 1.4051, -.5119, .359}},
+    {{-.767, -.2054, .2782, .7234, .2937, .2875, -.3, -.325},
+     {.0007, .0367, -.1812, -.6219, .0496, -.5328, .1922, .1156},
+     {1.2734, -3.9128, -4.5, -5.6812, -5.6812, -3.85, .7023, .7781},
+     {-.1233, .9156, 1.1766, 2.6297, 1.8415, 3.375, -1.6317, .0025}},
+    {{2.8, 6.975, 24.7219, 33.3389, 21, 14, 19, 31.0625},
+     {.6004, .1774, -13.0812, -18.3, -4.7656, -.9999, -5, -14.5},
+     {1.2375, 6.4477, -37.7, -62.25, -21.5906, -7.1406, 1.2438, -46.1148},
+     {1, -.1239, 34.8438, 52.0781, 7.2492, 7.5469, -1.9094, 55.375}},
+    {{1.8734, -1.5798, -5, -3.5, -3.5, -3.4, -4, -7.2312},
+     {.6297, -.5081, 1.5218, .0016, -.1554, -.1078, .025, .405},
+     {.9738, -1.7812, 3.9229, 1.1477, 1.4062, -1.075, .3844, 13.35},
+     {.2809, .108, -2.6204, .1062, .3988, 1.5702, .2656, .6234}},
+    {{.0356, .2624, -.0156, .4659, .0032, -.0672, 1.0468, 1.5},
+     {-.1246, .0672, .1597, -.3296, .0766, .4016, -.3788, -.6426},
+     {-.5718, -.219, .4199, -.0876, -.0656, .3017, -2.4517, 1.8564},
+     {.9938, -.4285, -.5562, -.0329, -.1294, -.4844, 1.4656, .5636}}};
+
+static void shape_set(struct imp__sky_shape *s, double Z, double epsilon, double Delta)
+{
+    int bin = 0;
+    while (bin < BINS - 1 && epsilon >= bounds[bin]) bin++;
+    if (epsilon > bounds[0] && epsilon < bounds[4]) Delta = fmax(Delta, 0.2);
+    for (int k = 0; k < 5; k++) {
+        const double x1 = fit[k][0][bin], x2 = fit[k][1][bin], x3 = fit[k][2][bin],
+                     x4 = fit[k][3][bin];
+        s->n[k] = x1 + x2 * Z + Delta * (x3 + x4 * Z);
+        if (bin == 0 && k == 2) s->n[k] = exp(pow(Delta * (x1 + x2 * Z), x3)) - x4;
+        if (bin == 0 && k == 3) s->n[k] = -exp(Delta * (x1 + x2 * Z)) + x3 + Delta * x4;
+    }
+    s->h = 0;
+}
+
+static enum imp_status build(const struct imp_build *b, void *self, struct imp_emitter *e)
+{
+    enum imp_status st = IMP_OK;
+    struct imp__sky_shape *s = self;
+    double diffuse, direct, level, outside;
+    bool of_world;
+    (void)e;
+    for (int k = 0; k < 2; k++) {
+        const char *name = k ? "direct" : "diffuse";
+        if (!imp_build_has(b, name)) IMP_TRY(imp__node_missing(b->ctx, b->node, name));
+    }
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "diffuse", 0, IMP_POSITIVE, &diffuse));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "direct", 0, IMP_NOT_NEGATIVE, &direct));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "extraterrestrial", SOLAR_CONSTANT,
+                                IMP_POSITIVE, &outside));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "illuminance", diffuse, IMP_POSITIVE,
+                                &level));
+    IMP_TRY(imp__sky_shape_place(b, s, &of_world));
+    IMP_TRY(imp__sky_shape_by_day(b, s, of_world, "Perez'"));
+    const double up = imp_clamp(imp__dot(s->sun, s->axis[2]), 0.0, 1.0), Z = acos(up),
+                 cube = 1.041 * Z * Z * Z,
+                 air = 1 / (up + 0.15 * pow(93.885 - Z * 180 / IMP_PI, -1.253));
+    shape_set(s, Z, ((diffuse + direct) / diffuse + cube) / (1 + cube),
+              air * diffuse / outside);
+    const double all = imp__sky_shape_horizontal(s);
+    if (!(all > 0) || !isfinite(all))
+        IMP_TRY(imp_build_error(b, "diffuse", IMP_E_SCENE,
+                                "%g W/m^2 and direct = %g: the model has no sky for them",
+                                diffuse, direct));
+    s->factor = level / all;
+out:
+    return st;
+}
+
+const struct imp_emitter_ops imp__perezsky = {IMP__SKY_SHAPE_OPS, .name = "perezsky",
+                                              .build = build};
