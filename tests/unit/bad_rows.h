@@ -149,7 +149,7 @@ static const struct row {
     PLAIN("emitter", "sunsky", ""),
     PLAIN("emitter", "ciesky", ""),
     PLAIN("emitter", "perezsky",
-          "<float name='diffuse' value='100'/><float name='direct' value='300'/>"),
+          "<float name='diffuse' value='100'/>\n<float name='direct' value='300'/>\n"),
     PLAIN("sensor", "perspective", MUST "\n"),
     PLAIN("sensor", "perspective", MUST "\n<float name='opencv_fx' value='4'/>\n"),
     PLAIN("sensor", "thinlens", MUST "\n<float name='aperture_radius' value='.1'/>\n"),

@@ -72,10 +72,12 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
         const char *name = k ? "direct" : "diffuse";
         if (!imp_build_has(b, name)) IMP_TRY(imp__node_missing(b->ctx, b->node, name));
     }
-    IMP_TRY(imp__props_float_in(b->ctx, b->node, "diffuse", 0, IMP_POSITIVE, &diffuse));
-    IMP_TRY(imp__props_float_in(b->ctx, b->node, "direct", 0, IMP_NOT_NEGATIVE, &direct));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "diffuse", 0,
+                                (struct imp_interval){0, 1000, IMP_OPEN_LO}, &diffuse));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "direct", 0,
+                                (struct imp_interval){0, 1500, IMP_CLOSED}, &direct));
     IMP_TRY(imp__props_float_in(b->ctx, b->node, "extraterrestrial", SOLAR_CONSTANT,
-                                IMP_POSITIVE, &outside));
+                                (struct imp_interval){1300, 1450, IMP_CLOSED}, &outside));
     IMP_TRY(imp__props_float_in(b->ctx, b->node, "illuminance", diffuse, IMP_POSITIVE,
                                 &level));
     IMP_TRY(imp__sky_shape_place(b, s, &of_world));
