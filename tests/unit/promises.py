@@ -439,6 +439,7 @@ class Fixture:
             if a.name == "name":
                 return {"imp_scene_find_param": PARAM.encode(), "imp_scene_add_geometry": b"lamp.pose"}.get(function, b"name"), None
             if a.name == "command": return b"command", None
+            if key == "imp_problem_hold.glob": return (PARAM + "[0]").encode(), None
             words = {"fallback": b"text", "format": b"text", "names": b"R,G,B", "key": b"key", "value": b"value", "tag": b"shape", "type": b"sphere", "id": b"id", "layer": b"layer", "object": b"lamp",
                      "glob": PARAM.encode(), "kind": b"luneburg"}
             return words[a.name], None
