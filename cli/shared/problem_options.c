@@ -23,8 +23,10 @@ static const enum imp_loss losses[] = {IMP_LOSS_L2, IMP_LOSS_RELATIVE_L2, IMP_LO
 
 const struct arg_option options_params[] = {
     {ARG_LIST | ARG_REPLAYS, 'p', "param", "GLOB",
-     "active parameters: a name or a pattern (default '*')", &problem_options.params, 0,
-     0, NULL},
+     "active parameters: a name or a pattern (default '*'); of geometry NAME.pose, "
+     "scale, "
+     "vertex_positions, x_fov, position, direction",
+     &problem_options.params, 0, 0, NULL},
     {ARG_LIST | ARG_REPLAYS, 0, "same", "GLOB,..",
      "values of all these are equal: one paint", &problem_options.same, 0, 0, NULL},
     {ARG_LIST | ARG_REPLAYS, 0, "factor", "GLOB,..",

@@ -609,6 +609,13 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *         be moved; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_add_geometry(imp_scene *scene,
                                                               const char *name);
+/** Names of what imp_scene_add_geometry accepts: of shapes, then of sensors, then of lights without
+ * a shape. Those that are parameters already are among them.
+ * @param index  from 0.
+ * @param name   [size] overwritten; 256 are enough for every name.
+ * @return IMP_OK; IMP_E_ARG if there are no more, or size does not suffice. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_scene_geometry_name(const imp_scene *scene, size_t index, size_t size, char *name);
 /** Make the pose of a shape or of a camera a parameter, `OBJECT.pose`, behind all others: six
  * numbers, a translation in scene units and a rotation vector in radians about the middle of the
  * shape's box, or the camera's own place, away from where the scene file has it. Setting it moves

@@ -237,6 +237,16 @@ class Scene:
         return name
 
     @property
+    def geometry_names(self) -> list[str]:
+        """What `add_geometry` accepts: numbers of geometry of this scene's shapes, sensors and lights."""
+        names: list[str] = []
+        buffer = ctypes.create_string_buffer(256)
+        with self.lock:
+            while lib.imp_scene_geometry_name(self.pointer, len(names), len(buffer), buffer) == 0:
+                names.append(buffer.value.decode())
+        return names
+
+    @property
     def pointer(self) -> int:
         if self._handle.closed:
             raise ArgumentError("the scene is closed")

@@ -65,6 +65,14 @@ static inline const struct imp_pose *imp__pose_of(const struct imp_scene *scene,
     return p;
 }
 
+/* Names of all numbers of geometry that may become parameters, one after the other: shapes',
+ * sensors', lights', each with its kinds. From {0}; false: there is no further one. */
+struct imp_geometry_walk {
+    int next;
+    char name[256];
+};
+bool imp__geometry_next(const struct imp_scene *scene, struct imp_geometry_walk *at);
+
 /* A large change of number e, in its unit: of a place a tenth of the scene, of a rotation half a
  * radian, of a vertex a tenth of its mesh, of a view ten degrees. */
 double imp__pose_large(const struct imp_pose *p, size_t e);
