@@ -600,7 +600,7 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *     NAME.principal_point_offset_x, NAME.principal_point_offset_y   of a perspective camera:
  *                            in parts of the film's width and height
  *     NAME.position          of a point or spot light: [3], world
- *     NAME.direction         of a directional light: [3], of any length
+ *     NAME.direction         of a directional light, or of a spot's axis: [3], of any length
  *
  * Gradients, patterns, and what is there already: as of poses.
  * @param name  such a name.

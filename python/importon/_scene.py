@@ -204,7 +204,7 @@ class Scene:
 
         `NAME.pose` as `add_pose`; `NAME.scale` of a shape; `NAME.vertex_positions` of a mesh;
         `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y` of a perspective camera;
-        `NAME.position` of a point or spot light; `NAME.direction` of a directional light. Otherwise
+        `NAME.position` of a point or spot light; `NAME.direction` of a directional light or spot. Otherwise
         as `add_pose`.
 
         Parameters

@@ -57,13 +57,15 @@ static enum imp_status light_mover(const struct imp__moves *moves, struct imp__m
 {
     struct imp_emitter *e = moves->scene->emitters[IMP_MOVE_EMITTER(m->shape)];
     double v[3];
-    if (!e->ops->aim)
+    if (!e->ops->aim || (m->kind == IMP_MOVE_AXIS && !e->ops->cone))
         return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
                           "light '%s' (%s) has no derivative by its place", e->name,
                           e->ops->name);
     e->ops->aim(e, v, false);
     m->count = 3;
     m->centre = m->axis = imp__v3(v[0], v[1], v[2]);
+    double cosine;
+    if (m->kind == IMP_MOVE_AXIS) e->ops->cone(e, &m->axis, &cosine);
     return IMP_OK;
 }
 
@@ -122,7 +124,10 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
     int shape = pose->sensor ? IMP_MOVE_CAMERA : pose->shape;
     for (int k = 0; pose->emitter && k < moves->scene->n_emitters; k++)
         if (moves->scene->emitters[k] == pose->emitter) shape = IMP_MOVE_EMITTER(k);
-    const enum imp_status st = imp__moves_add(moves, kind[pose->kind], shape);
+    const bool turns = pose->kind == IMP_POSE_DIRECTION &&
+                       !(pose->emitter->ops->flags & IMP_EMITTER_FAR);
+    const enum imp_status st =
+        imp__moves_add(moves, turns ? IMP_MOVE_AXIS : kind[pose->kind], shape);
     if (st != IMP_OK) return st;
     struct imp__mover *m = &moves->mover[moves->n_movers - 1];
     const struct imp_pose *rigid = imp__pose_beside(pose, IMP_POSE_RIGID);
@@ -423,12 +428,12 @@ void imp__camera_velocity_bar(const struct imp__moves *moves, imp_v3 p, imp_v3 b
     }
 }
 
-/* Across the direction of parallel light; a place in full. */
+/* Across the direction of parallel light, or a spot's axis; a place in full. */
 static imp_v3 light_part(const struct imp__moves *moves, const struct imp__mover *m,
                          imp_v3 v)
 {
     const struct imp_emitter *e = moves->scene->emitters[IMP_MOVE_EMITTER(m->shape)];
-    if (!(e->ops->flags & IMP_EMITTER_FAR)) return v;
+    if (m->kind != IMP_MOVE_AXIS && !(e->ops->flags & IMP_EMITTER_FAR)) return v;
     return (v - m->axis * imp__dot(m->axis, v)) * m->rate;
 }
 
@@ -437,7 +442,7 @@ imp_v3 imp__light_velocity(const struct imp__moves *moves, int k, const double *
     imp_v3 out = {0};
     for (int j = 0; j < moves->n_movers; j++) {
         const struct imp__mover *m = &moves->mover[j];
-        if (m->shape == IMP_MOVE_EMITTER(k))
+        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_LIGHT)
             out += light_part(moves, m, number3(theta_dot + m->first));
     }
     return out;
@@ -448,7 +453,18 @@ void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 bar,
 {
     for (int j = 0; j < moves->n_movers; j++) {
         const struct imp__mover *m = &moves->mover[j];
-        if (m->shape == IMP_MOVE_EMITTER(k))
+        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_LIGHT)
             add3(theta_bar + m->first, light_part(moves, m, bar));
+    }
+}
+
+void imp__light_axis_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
+                         double *theta_bar)
+{
+    for (int j = 0; j < moves->n_movers; j++) {
+        const struct imp__mover *m = &moves->mover[j];
+        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_AXIS)
+            add3(theta_bar + m->first,
+                 light_part(moves, m, imp__cross(turn_bar, m->axis)));
     }
 }

@@ -13,6 +13,7 @@
  *               what was seen W pixels further (1 each)
  *     light     a point light's position V = e, or the direction d of parallel light, of any
  *               length |d|: the unit direction turns by  e/|d| across d (3)
+ *     axis      of a spot, by a direction of any length, likewise (3)
  *
  * e: a translation in scene units; a: a rotation vector in radians. Velocities are linear in the
  * numbers; each function that applies the map has its transpose beside it. The geometric normal is
@@ -30,7 +31,8 @@ enum imp__move_kind {
     IMP_MOVE_FOV,
     IMP_MOVE_OFFSET_X,
     IMP_MOVE_OFFSET_Y,
-    IMP_MOVE_LIGHT
+    IMP_MOVE_LIGHT,
+    IMP_MOVE_AXIS
 };
 #define IMP_MOVE_CAMERA     (-1)       /* in place of a shape */
 #define IMP_MOVE_EMITTER(k) (-2 - (k)) /* in place of a shape: emitter k of the scene */
@@ -118,6 +120,9 @@ imp_v3 imp__light_velocity(const struct imp__moves *moves, int k,
                            const double *theta_dot);
 void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 bar,
                              double *theta_bar);
+/* The transpose of the turn of a spot's axis, a rotation vector across it. */
+void imp__light_axis_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
+                         double *theta_bar);
 /* Velocity of what the camera sees at p through a fixed film position: origin and direction of
  * the ray move with the camera, the distance is held. */
 imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 p,

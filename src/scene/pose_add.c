@@ -33,6 +33,8 @@ bool imp__pinhole(const struct imp_sensor *s, imp_v3 *centre)
            imp__length(apart) <= 1e-7 * size;
 }
 
+extern const struct imp_emitter_ops imp__spot_light;
+
 /* ---- Adding ------------------------------------------------------------------------- */
 
 static enum imp_status refuse(const struct imp_scene *scene, const char *name,
@@ -98,10 +100,13 @@ static const char *sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
 static const char *light_why(const struct imp_scene *scene, const struct imp_emitter *e,
                              enum imp_pose_kind kind)
 {
-    const enum imp_pose_kind own =
-        e->ops->flags & IMP_EMITTER_FAR ? IMP_POSE_DIRECTION : IMP_POSE_POSITION;
-    if (!e->ops->aim || kind != own)
-        return "it is none of point and spot (position), and directional (direction)";
+    const bool far = e->ops->flags & IMP_EMITTER_FAR;
+    const bool has = kind == IMP_POSE_POSITION    ? !far
+                     : kind == IMP_POSE_DIRECTION ? far || e->ops == &imp__spot_light
+                                                  : false;
+    if (!e->ops->aim || !has)
+        return "it is none of point and spot (position), and directional and spot "
+               "(direction)";
     if (scene->light_tree) return "lights are chosen by a tree (light_choice)";
     return NULL;
 }
@@ -202,7 +207,7 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
         break;
     case IMP_POSE_POSITION:
     case IMP_POSE_DIRECTION:
-        p->emitter->ops->aim(p->emitter, aim, false);
+        imp__pose_aim(p->emitter, p->kind, aim);
         memcpy(p->number, aim, sizeof aim);
         break;
     default: break;
