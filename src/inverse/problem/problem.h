@@ -177,7 +177,7 @@ void imp__ties_free(struct imp_problem *p);
 /* Is some number of parameter k held, or number e of block b? */
 bool imp__param_held(const struct imp_problem *p, size_t k);
 bool imp__block_held(const struct imp_problem *p, const struct imp__block *b, size_t e);
-/* Of all numbers of x. */
+/* How many numbers of x are. */
 size_t imp__held_count(const struct imp_problem *p);
 /* Bounds of number e of a block, which are its value where it is held. */
 struct imp__bounds {
