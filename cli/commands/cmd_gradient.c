@@ -267,9 +267,10 @@ static void print_text(const struct result *r, const struct block *blocks,
         }
         for (size_t i = 0; i < b->n; i++) {
             const size_t at = b->first + i;
-            printf("%-*s  %-14.8g %-14.7g %.2g\n", width,
-                   cli_number_row(&b->info, i, name, sizeof name), r->x[at], r->grad[at],
-                   r->se[at]);
+            printf("%-*s  %-14.8g ", width,
+                   cli_number_row(&b->info, i, name, sizeof name), r->x[at]);
+            if (block_held(b, i)) printf("held\n");
+            else printf("%-14.7g %.2g\n", r->grad[at], r->se[at]);
         }
     }
 }

@@ -104,6 +104,31 @@ static int print_params(struct json *j)
     return 0;
 }
 
+/* Numbers of geometry, which are parameters where they are named; a line for each object. */
+static void print_geometry(struct json *j)
+{
+    char name[256], object[256] = "";
+    if (j) json_array(j, "geometry");
+    for (size_t i = 0; imp_scene_geometry_name(cli.scene, i, sizeof name, name) == IMP_OK;
+         i++) {
+        const char *dot = strrchr(name, '.');
+        const size_t length = dot ? (size_t)(dot - name) : 0;
+        if (j) {
+            json_text(j, NULL, name);
+            continue;
+        }
+        if (i == 0) printf("\ngeometry (parameters where -p or --set name them)\n");
+        if (strncmp(name, object, length) == 0 && !object[length]) {
+            printf(", %s", dot + 1);
+            continue;
+        }
+        printf("%s%s", *object ? "\n" : "", name);
+        snprintf(object, sizeof object, "%.*s", (int)length, name);
+    }
+    if (j) json_end_array(j);
+    else if (*object) printf("\n");
+}
+
 static void print_luminaires(struct json *j)
 {
     const int n = imp_scene_n_luminaires(cli.scene);
@@ -181,6 +206,7 @@ static int run_info(int n, char **operand)
         json_array(&j, "params");
         rc = print_params(&j);
         json_end_array(&j);
+        print_geometry(&j);
         cli_json_end(&j);
         return rc ? rc : verdict(&s);
     }
@@ -210,6 +236,7 @@ static int run_info(int n, char **operand)
     }
     print_luminaires(NULL);
     rc = print_params(NULL);
+    print_geometry(NULL);
     return rc ? rc : verdict(&s);
 }
 

@@ -126,7 +126,8 @@ static void print_table(const struct fit_answer *a, char **paths)
             else if (!a->no_intervals && !v->determined)
                 snprintf(interval, sizeof interval, "not determined");
             printf("%-22s %s", interval, b->info.unit);
-            printf("%s\n", v->at_bound < 0   ? "  at its lower bound"
+            printf("%s\n", block_held(b, i)  ? "  held"
+                           : v->at_bound < 0 ? "  at its lower bound"
                            : v->at_bound > 0 ? "  at its upper bound"
                                              : "");
         }

@@ -30,6 +30,7 @@ static void put_variable(struct json *j, const imp_problem *problem, size_t i,
     json_number(j, "hi95", v->hi95);
     json_integer(j, "at_bound", v->at_bound);
     json_bool(j, "determined", v->determined);
+    if (block_held(b, i - b->first)) json_bool(j, "held", 1);
     block_ties_json(j, b);
     json_end_object(j);
 }

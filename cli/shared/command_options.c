@@ -44,8 +44,10 @@ const struct arg_option options_scene[] = {
     {ARG_LIST | ARG_REPLAYS, 'D', "define", "NAME=VALUE",
      "set a $parameter of the scene file", &cli.defines, 0, 0, NULL},
     {ARG_LIST | ARG_REPLAYS, 0, "set", "ID=V[,V..]",
-     "set a scene parameter ('importon info' lists them); @FILE: many", &cli.sets, 0, 0,
-     NULL},
+     "set a scene parameter ('importon info' lists them, and NAME.pose and other numbers "
+     "of "
+     "geometry); @FILE: many",
+     &cli.sets, 0, 0, NULL},
     {ARG_TEXT | ARG_REPLAYS, 'a', "search", "DIR[;DIR..]",
      "more folders to search for files", &cli.search, 0, 0, NULL},
     {ARG_CHOICE | ARG_REPLAYS, 'm', "mode", "MODE",

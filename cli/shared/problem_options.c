@@ -23,14 +23,19 @@ static const enum imp_loss losses[] = {IMP_LOSS_L2, IMP_LOSS_RELATIVE_L2, IMP_LO
 
 const struct arg_option options_params[] = {
     {ARG_LIST | ARG_REPLAYS, 'p', "param", "GLOB",
-     "active parameters: a name or a pattern (default '*')", &problem_options.params, 0,
-     0, NULL},
+     "active parameters: a name or a pattern (default '*'); of geometry NAME.pose, "
+     "scale, "
+     "vertex_positions, x_fov, position, direction",
+     &problem_options.params, 0, 0, NULL},
     {ARG_LIST | ARG_REPLAYS, 0, "same", "GLOB,..",
      "values of all these are equal: one paint", &problem_options.same, 0, 0, NULL},
     {ARG_LIST | ARG_REPLAYS, 0, "factor", "GLOB,..",
      "all these keep their ratios: one factor", &problem_options.factor, 0, 0, NULL},
     {ARG_LIST | ARG_REPLAYS, 0, "log", "GLOB,..",
      "these are fitted as logarithms, and stay positive", &problem_options.log, 0, 0,
+     NULL},
+    {ARG_LIST | ARG_REPLAYS, 0, "hold", "NAME[i],..",
+     "these numbers stay as they are: block.pose[2-4]", &problem_options.hold, 0, 0,
      NULL},
     {0}};
 
@@ -205,6 +210,8 @@ static enum imp_status add_ties(imp_problem *problem)
     for (size_t k = 0; k < 3 && st == IMP_OK; k++)
         for (size_t i = 0; i < ties[k].globs->n && st == IMP_OK; i++)
             st = imp_problem_tie(problem, ties[k].globs->item[i], ties[k].kind);
+    for (size_t i = 0; i < o->hold.n && st == IMP_OK; i++)
+        st = imp_problem_hold(problem, o->hold.item[i]);
     return st;
 }
 
@@ -251,6 +258,7 @@ void problem_close(imp_problem *problem)
     args_list_free(&o->same);
     args_list_free(&o->factor);
     args_list_free(&o->log);
+    args_list_free(&o->hold);
     args_list_free(&o->targets);
     args_list_free(&o->masks);
     args_list_free(&o->tikhonov);
@@ -279,6 +287,7 @@ struct block *problem_blocks(const imp_problem *problem, size_t *n_blocks)
             b->info.n_dims = 0;
             b->info.wavelengths_nm = NULL;
         }
+        b->problem = problem;
         b->first = i;
         b->n = b->tie.count; /* parameters are active as a whole */
         i += b->n;
@@ -287,10 +296,27 @@ struct block *problem_blocks(const imp_problem *problem, size_t *n_blocks)
     return blocks;
 }
 
+int block_held(const struct block *b, size_t i)
+{
+    struct imp_variable_info v = IMP_VARIABLE_INFO_INIT;
+    return imp_problem_get_variable(b->problem, b->first + i, &v) == IMP_OK && v.held;
+}
+
 /* Spectra are tables of their wavelengths. */
 int block_is_large(const struct block *b)
 {
     return b->n > (b->info.wavelengths_nm ? 1000 : 12);
+}
+
+static void block_held_json(struct json *j, const struct block *b)
+{
+    int any = 0;
+    for (size_t i = 0; i < b->n; i++) {
+        if (!block_held(b, i)) continue;
+        if (!any++) json_array(j, "held");
+        json_integer(j, NULL, (int64_t)i);
+    }
+    if (any) json_end_array(j);
 }
 
 void block_json(struct json *j, const struct block *b)
@@ -301,6 +327,7 @@ void block_json(struct json *j, const struct block *b)
     if (b->info.wavelengths_nm)
         json_numbers(j, "wavelengths_nm", b->info.count, b->info.wavelengths_nm);
     block_ties_json(j, b);
+    block_held_json(j, b);
 }
 
 void block_ties_json(struct json *j, const struct block *b)

@@ -8,7 +8,8 @@
 #include "command.h"
 
 struct problem_options {
-    struct arg_list params, same, factor, log, targets, masks, tikhonov, stay, smooth;
+    struct arg_list params, same, factor, log, hold, targets, masks, tikhonov, stay,
+        smooth;
     const char *clip; /* NULL: not given */
     int loss;
     double epsilon;
@@ -29,11 +30,14 @@ struct block {
     struct imp_param_info info; /* of the first; of a factor, what it is called */
     size_t first, n;            /* x[first .. first + n) */
     struct imp_tie_info tie;
+    const imp_problem *problem;
 };
 struct block *problem_blocks(const imp_problem *problem, size_t *n_blocks);
 /* Too long for a line of numbers: goes to a picture, or is summed up. */
 int block_is_large(const struct block *b);
-/* {"name":..,"unit":..} and what the caller adds before json_end_object. */
+/* Is its number i held (imp_problem_hold)? */
+int block_held(const struct block *b, size_t i);
+/* {"name":..,"unit":..,"held":[indices]} and what the caller adds before json_end_object. */
 void block_json(struct json *j, const struct block *b);
 /* "log", "same", "multiplies", where they apply. */
 void block_ties_json(struct json *j, const struct block *b);

@@ -601,7 +601,7 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *     NAME.principal_point_offset_x, NAME.principal_point_offset_y   of a perspective camera:
  *                            in parts of the film's width and height
  *     NAME.position          of a point or spot light: [3], world
- *     NAME.direction         of a directional light: [3], of any length
+ *     NAME.direction         of a directional light, or of a spot's axis: [3], of any length
  *
  * Gradients, patterns, and what is there already: as of poses.
  * @param name  such a name.
@@ -610,6 +610,13 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *         be moved; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_add_geometry(imp_scene *scene,
                                                               const char *name);
+/** Names of what imp_scene_add_geometry accepts: of shapes, then of sensors, then of lights without
+ * a shape. Those that are parameters already are among them.
+ * @param index  from 0.
+ * @param name   [size] overwritten; 256 are enough for every name.
+ * @return IMP_OK; IMP_E_ARG if there are no more, or size does not suffice. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_scene_geometry_name(const imp_scene *scene, size_t index, size_t size, char *name);
 /** Make the pose of a shape or of a camera a parameter, `OBJECT.pose`, behind all others: six
  * numbers, a translation in scene units and a rotation vector in radians about the middle of the
  * shape's box, or the camera's own place, away from where the scene file has it. Setting it moves
@@ -962,6 +969,18 @@ struct imp_tie_info {
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_problem_get_tie(const imp_problem *problem, size_t i, struct imp_tie_info *info);
 
+/** Hold single numbers of active parameters at the values that the scene has: x, a block on a
+ * floor, `block.pose[2-4]`. Held numbers stay in x, between bounds that are both their value;
+ * their derivatives are 0, with an error of 0; fits and their intervals are those of the other
+ * numbers. Checks test every number.
+ * @param glob  as for imp_problem_activate, which comes first, with the numbers' indices behind
+ *              it: "block.pose[2]", "*.pose[3-5]"; or several, with commas between them.
+ * @return IMP_OK; IMP_E_ARG if indices are missing or not below the count of numbers, or an
+ *         active parameter matches nowhere or has a tie; IMP_E_UNSUPPORTED in fields of
+ *         indices; IMP_E_NOMEM. After an error nothing more is held. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_problem_hold(imp_problem *problem,
+                                                        const char *glob);
+
 /** Length of x: the count of active variables. */
 IMP_API size_t imp_problem_n_variables(const imp_problem *problem);
 /** An active variable. */
@@ -970,6 +989,7 @@ struct imp_variable_info {
     size_t param; /**< index of its parameter: the first that follows it, if several do */
     size_t element; /**< index inside the parameter */
     double lo, hi;  /**< bounds; may be infinite */
+    bool held;      /**< imp_problem_hold: both bounds are its value */
 };
 #define IMP_VARIABLE_INFO_INIT IMP_INIT_ZERO(struct imp_variable_info)
 /** Variable i < imp_problem_n_variables.

@@ -213,7 +213,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         resume: bool = False, spp: int = 0, seed: int = 0, sensor: Any = 0, loss: str = "l2", epsilon: float = 0,
         weights: Any = None, clip: Any = None, noise_se: Any = None, tikhonov: Optional[Mapping[str, float]] = None,
         stay: Optional[Mapping[str, float]] = None, smooth: Optional[Mapping[str, float]] = None,
-        same: Any = None, factor: Any = None, log: Any = None, time_limit: float = 0, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
+        same: Any = None, factor: Any = None, log: Any = None, hold: Any = None, time_limit: float = 0, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
         wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", levels: int = 0, memory: float = 0,
          headroom: float = 0, control_variate: str = "auto", allocation: str = "default", momentum: float = 0,
          progress: Any = None) -> Fit:
@@ -272,6 +272,8 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         Parameters that keep their ratios: one factor multiplies them, `fit["factor(lamp.*)"]`.
     log : pattern, or list of them, optional
         Parameters that move as logarithms, and stay positive. Values are in their own unit.
+    hold : pattern with indices, or list of them, optional
+        Single numbers that stay as they are: "block.pose[2-4]", of a block that stands on a floor.
     time_limit : float
         In seconds; 0: none.
     progress : bool or callable, optional
@@ -300,7 +302,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
     >>> bool(np.all(abs(fit["red.reflectance"].value - truth) < 5 * fit["red.reflectance"].se))
     True
     """
-    with Problem(scene, params, same, factor, log) as p:
+    with Problem(scene, params, same, factor, log, hold) as p:
         options = run_options(p.scene, seed=seed, spp=spp, time_limit=time_limit, drop_budget=drop_budget, guide=guide,
                               wavelengths=wavelengths, wavelength_set=wavelength_set, points=points, walks_from=walks_from)
         p.add_targets(target, clip, sensor=sensor, weights=weights, loss=loss, epsilon=epsilon, noise_se=noise_se)

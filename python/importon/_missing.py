@@ -53,7 +53,7 @@ class Missing(Row):
 def missing(scene: Scene, params: Any = None, target: Any = None, *, spp: int = 0, seed: int = 0, sensor: Any = 0,
             loss: str = "l2", epsilon: float = 0, weights: Any = None, clip: Any = None, noise_se: Any = None,
             tikhonov: Optional[Mapping[str, float]] = None, stay: Optional[Mapping[str, float]] = None,
-            smooth: Optional[Mapping[str, float]] = None, same: Any = None, factor: Any = None, log: Any = None,
+            smooth: Optional[Mapping[str, float]] = None, same: Any = None, factor: Any = None, log: Any = None, hold: Any = None,
             drop_budget: float = 0, points: str = "scene", progress: Any = None) -> list[Missing]:
     """Which number that is not fitted may be wrong? To be asked after a fit, with its
     parameters, targets, priors and ties: the scores of all other numbers, with the active ones following.
@@ -68,7 +68,7 @@ def missing(scene: Scene, params: Any = None, target: Any = None, *, spp: int = 
         As `loss`'s.
     stay : mapping, optional
         As `loss`'s; of numbers that a fit has moved, that is from where they are now.
-    noise_se, same, factor, log
+    noise_se, same, factor, log, hold
         As `fit`'s.
 
     Returns
@@ -85,7 +85,7 @@ def missing(scene: Scene, params: Any = None, target: Any = None, *, spp: int = 
     >>> 0 <= rows[0].chance <= 1
     True
     """
-    with Problem(scene, params, same, factor, log) as p:
+    with Problem(scene, params, same, factor, log, hold) as p:
         options = run_options(p.scene, sensor=sensor, seed=seed, spp=spp, drop_budget=drop_budget, points=points)
         p.add_targets(target, clip, sensor=sensor, weights=weights, loss=loss, epsilon=epsilon, noise_se=noise_se)
         p.add_regularisers(tikhonov, stay, smooth)

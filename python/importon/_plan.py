@@ -212,7 +212,7 @@ def lamps(scene: Scene) -> list[str]:
 def plan(scene: Scene, params: Any = None, candidates: Any = None, *, have: Any = (), of: Any = None,
          prior: Optional[Mapping[str, float]] = None, noise: Optional[Mapping[str, float]] = None,
          criterion: str = "d", take: int = 0, budget: float = 0, spp: int = 0, seed: int = 0, same: Any = None,
-         factor: Any = None, log: Any = None, drop_budget: float = 0, points: str = "scene",
+         factor: Any = None, log: Any = None, hold: Any = None, drop_budget: float = 0, points: str = "scene",
          progress: Any = None) -> Plan:
     """Which pictures to take next? Candidates by how much they would shrink the intervals of the active numbers.
 
@@ -244,7 +244,7 @@ def plan(scene: Scene, params: Any = None, candidates: Any = None, *, have: Any 
         Of the costs of the chosen ones; 0: none, and the gain over the cost counts.
     spp, seed, drop_budget, points, progress
         As `loss`'s.
-    same, factor, log
+    same, factor, log, hold
         As `fit`'s.
 
     Returns
@@ -258,7 +258,7 @@ def plan(scene: Scene, params: Any = None, candidates: Any = None, *, have: Any 
     >>> len(p.rows), p.names[0]
     (2, 'green.reflectance.value[0]')
     """
-    with Problem(scene, params, same, factor, log) as p:
+    with Problem(scene, params, same, factor, log, hold) as p:
         keep: list[Any] = []
         names = _number_names(p)
         taken = [_one(p.scene, c, keep) for c in have]
@@ -281,13 +281,13 @@ def plan(scene: Scene, params: Any = None, candidates: Any = None, *, have: Any 
 def plan_improve(scene: Scene, params: Any, candidate: Mapping[str, Any], rounds: int = 20, *, have: Any = (),
                  of: Any = None, prior: Optional[Mapping[str, float]] = None,
                  noise: Optional[Mapping[str, float]] = None, criterion: str = "d", spp: int = 0, seed: int = 0,
-                 same: Any = None, factor: Any = None, log: Any = None, drop_budget: float = 0, points: str = "scene",
+                 same: Any = None, factor: Any = None, log: Any = None, hold: Any = None, drop_budget: float = 0, points: str = "scene",
                  progress: Any = None) -> tuple[Any, float, float]:
     """The place of a camera, moved along the derivative of its gain at its distance from its target.
 
     Parameters
     ----------
-    scene, params, have, of, prior, noise, criterion, spp, seed, same, factor, log, drop_budget, points, progress
+    scene, params, have, of, prior, noise, criterion, spp, seed, same, factor, log, hold, drop_budget, points, progress
         As `plan`'s.
     candidate : mapping
         As one of `plan`'s, with `origin` and `target`.
@@ -306,7 +306,7 @@ def plan_improve(scene: Scene, params: Any, candidate: Mapping[str, Any], rounds
     >>> bool(abs(np.linalg.norm(place) - 3) < 1e-9), gain > 0
     (True, True)
     """
-    with Problem(scene, params, same, factor, log) as p:
+    with Problem(scene, params, same, factor, log, hold) as p:
         keep: list[Any] = []
         taken = [_one(p.scene, c, keep) for c in have]
         for c in taken:
@@ -321,13 +321,13 @@ def plan_improve(scene: Scene, params: Any, candidate: Mapping[str, Any], rounds
 
 
 def plan_map(scene: Scene, params: Any, candidate: Any, pull: Any, *, noise: Optional[Mapping[str, float]] = None,
-             spp: int = 0, seed: int = 0, same: Any = None, factor: Any = None, log: Any = None,
+             spp: int = 0, seed: int = 0, same: Any = None, factor: Any = None, log: Any = None, hold: Any = None,
              drop_budget: float = 0, points: str = "scene", progress: Any = None) -> list[Picture]:
     """Which pixels of a candidate tell of which number.
 
     Parameters
     ----------
-    scene, params, noise, spp, seed, same, factor, log, drop_budget, points, progress
+    scene, params, noise, spp, seed, same, factor, log, hold, drop_budget, points, progress
         As `plan`'s.
     candidate : int, str or mapping
         As one of `plan`'s.
@@ -348,7 +348,7 @@ def plan_map(scene: Scene, params: Any, candidate: Any, pull: Any, *, noise: Opt
     >>> len(maps), maps[0].shape
     (4, (8, 8, 3))
     """
-    with Problem(scene, params, same, factor, log) as p:
+    with Problem(scene, params, same, factor, log, hold) as p:
         keep: list[Any] = []
         c = _one(p.scene, candidate, keep)
         o = _options(p, _number_names(p), keep, None, None, noise, "d", 0, 0)

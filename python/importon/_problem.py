@@ -65,11 +65,13 @@ def push(scene: Scene, params: Any) -> None:
 class Problem:
     """A scene with active parameters, for the time of a `with` block: holds the scene's lock."""
 
-    def __init__(self, scene: Any, params: Any, same: Any = None, factor: Any = None, log: Any = None) -> None:
+    def __init__(self, scene: Any, params: Any, same: Any = None, factor: Any = None, log: Any = None,
+                 hold: Any = None) -> None:
         self.scene, self.params = check_scene(scene), params
         self.ties = [(glob, kind, name) for name, kind, globs in (
             ("same", _c.IMP_TIE_SAME, same), ("factor", _c.IMP_TIE_FACTOR, factor), ("log", _c.IMP_TIE_LOG, log))
             for glob in ([] if globs is None else [globs] if isinstance(globs, str) else globs)]
+        self.holds = [] if hold is None else [hold] if isinstance(hold, str) else list(hold)
         self.blocks: list[tuple[ParameterInfo, slice]] = []
         self.logs: list[bool] = []
         self.handle: Optional[Handle] = None
@@ -89,6 +91,8 @@ class Problem:
                 self.check(lib.imp_problem_activate(self.pointer, text(name, "params")))
             for glob, kind, name in self.ties:
                 self.check(lib.imp_problem_tie(self.pointer, text(glob, name), kind))
+            for glob in self.holds:
+                self.check(lib.imp_problem_hold(self.pointer, text(glob, "hold")))
             self.n = lib.imp_problem_n_variables(self.pointer)
             infos = list(table(scene).values())
             i, variable = 0, make(_c.imp_variable_info)

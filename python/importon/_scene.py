@@ -204,7 +204,7 @@ class Scene:
 
         `NAME.pose` as `add_pose`; `NAME.scale` of a shape; `NAME.vertex_positions` of a mesh;
         `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y` of a perspective camera;
-        `NAME.position` of a point or spot light; `NAME.direction` of a directional light. Otherwise
+        `NAME.position` of a point or spot light; `NAME.direction` of a directional light or spot. Otherwise
         as `add_pose`.
 
         Parameters
@@ -235,6 +235,16 @@ class Scene:
                 lib.imp_scene_add_geometry(self.pointer, text(name, "name")))
             self._table = None
         return name
+
+    @property
+    def geometry_names(self) -> list[str]:
+        """What `add_geometry` accepts: numbers of geometry of this scene's shapes, sensors and lights."""
+        names: list[str] = []
+        buffer = ctypes.create_string_buffer(256)
+        with self.lock:
+            while lib.imp_scene_geometry_name(self.pointer, len(names), len(buffer), buffer) == 0:
+                names.append(buffer.value.decode())
+        return names
 
     @property
     def pointer(self) -> int:

@@ -103,6 +103,48 @@ static void triangle_distances(const struct imp_triangles *t, size_t prim, imp_v
     if (inside) *least = imp_min(*least, fabs(imp__dot(p[0], n)));
 }
 
+/* Chords of a rim, by which it is tested: what is pierced by less than 3e-4 of the radius counts
+ * as touched. */
+#define CHORDS 128
+
+/* A disk and the surface of a sphere. */
+static bool disk_meets(const struct imp_scene *scene, int shape,
+                       const struct imp_round *round)
+{
+    double least = INFINITY, most = 0;
+    bool over = true; /* is the centre above the disk? */
+    for (int k = 0; k < CHORDS; k++) {
+        const struct imp__rim_point rim = imp__disk_rim(scene, shape, (double)k / CHORDS);
+        const imp_v3 r = rim.p - round->centre;
+        least = imp_min(least, imp__length(r));
+        most = imp_max(most, imp__length(r));
+        over &= imp__dot(r, rim.out) > 0;
+    }
+    const struct imp__rim_point rim = imp__disk_rim(scene, shape, 0);
+    if (over) least = imp_min(least, fabs(imp__dot(rim.n, rim.p - round->centre)));
+    return least < round->radius * (1 - TOUCH) && most > round->radius * (1 + TOUCH);
+}
+
+/* A shape that the rim of a disk passes through. */
+static int disks_pierced(const struct imp_scene *scene, int *other)
+{
+    for (int k = 0; k < scene->n_shapes; k++) {
+        if (!imp__moves_disk(scene, k)) continue;
+        for (int j = 0; j < CHORDS; j++) {
+            const imp_v3 a = imp__disk_rim(scene, k, (double)j / CHORDS).p,
+                         d = imp__disk_rim(scene, k, (j + 1.0) / CHORDS).p - a;
+            struct imp_hit hit;
+            for (double from = 0; imp__intersect(scene, &a, &d, from, 1, &hit);
+                 from = hit.t + 1e-5) {
+                if (hit.shape == k) continue;
+                *other = k;
+                return hit.shape;
+            }
+        }
+    }
+    return -1;
+}
+
 /* Does the surface of a sphere meet this shape? Where they touch, it does not. */
 static bool meets_sphere(const struct imp_scene *scene, int shape,
                          const struct imp_round *round)
@@ -116,6 +158,7 @@ static bool meets_sphere(const struct imp_scene *scene, int shape,
         return d < inside + other.radius &&
                d > fabs(round->radius - other.radius) + TOUCH * round->radius;
     }
+    if (imp__moves_disk(scene, shape)) return disk_meets(scene, shape, round);
     if (scene->shapes[shape]->geometry != IMP_TRIANGLES) return false;
     for (size_t k = 0; k < t->n_triangles; k++) {
         double least, most;
@@ -162,5 +205,6 @@ int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *s
             from = hit.t + END;
         }
     }
-    return spheres_pierced(scene, other);
+    const int pierced = spheres_pierced(scene, other);
+    return pierced >= 0 ? pierced : disks_pierced(scene, other);
 }

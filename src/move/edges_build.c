@@ -63,7 +63,8 @@ static enum imp_status sides_make(struct building *x)
     for (int k = 0; k < x->scene->n_shapes; k++) {
         const struct imp_shape *s = x->scene->shapes[k];
         struct imp_round round;
-        if (imp__moves_sphere(x->scene, k, &round)) continue;
+        if (imp__moves_sphere(x->scene, k, &round) || imp__moves_disk(x->scene, k))
+            continue;
         if (s->geometry != IMP_TRIANGLES || s->smooth)
             return imp__error(
                 x->ctx, IMP_E_UNSUPPORTED,

@@ -4,7 +4,7 @@
 #include "moves.h"
 #include "base/context.h"
 
-extern const struct imp_shape_ops imp__sphere;
+extern const struct imp_shape_ops imp__sphere, imp__disk;
 
 struct imp__moves imp__moves_begin(const struct imp_scene *scene,
                                    const struct imp_sensor *sensor)
@@ -57,13 +57,15 @@ static enum imp_status light_mover(const struct imp__moves *moves, struct imp__m
 {
     struct imp_emitter *e = moves->scene->emitters[IMP_MOVE_EMITTER(m->shape)];
     double v[3];
-    if (!e->ops->aim)
+    if (!e->ops->aim || (m->kind == IMP_MOVE_AXIS && !e->ops->cone))
         return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
                           "light '%s' (%s) has no derivative by its place", e->name,
                           e->ops->name);
     e->ops->aim(e, v, false);
     m->count = 3;
     m->centre = m->axis = imp__v3(v[0], v[1], v[2]);
+    double cosine;
+    if (m->kind == IMP_MOVE_AXIS) e->ops->cone(e, &m->axis, &cosine);
     return IMP_OK;
 }
 
@@ -73,10 +75,11 @@ static enum imp_status shape_mover(const struct imp__moves *moves, struct imp__m
     const struct imp_shape *s = moves->scene->shapes[m->shape];
     struct imp_round round;
     if (s->geometry != IMP_TRIANGLES &&
-        !imp__moves_sphere(moves->scene, m->shape, &round))
+        !imp__moves_sphere(moves->scene, m->shape, &round) &&
+        !imp__moves_disk(moves->scene, m->shape))
         return imp__error(
             ctx, IMP_E_UNSUPPORTED,
-            "shape '%s' (%s) is neither made of triangles nor a sphere, and "
+            "shape '%s' (%s) is neither made of triangles nor a sphere or disk, and "
             "has no derivative by its place",
             s->name, s->ops->name);
     if (m->kind == IMP_MOVE_VERTICES &&
@@ -121,7 +124,10 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
     int shape = pose->sensor ? IMP_MOVE_CAMERA : pose->shape;
     for (int k = 0; pose->emitter && k < moves->scene->n_emitters; k++)
         if (moves->scene->emitters[k] == pose->emitter) shape = IMP_MOVE_EMITTER(k);
-    const enum imp_status st = imp__moves_add(moves, kind[pose->kind], shape);
+    const bool turns = pose->kind == IMP_POSE_DIRECTION &&
+                       !(pose->emitter->ops->flags & IMP_EMITTER_FAR);
+    const enum imp_status st =
+        imp__moves_add(moves, turns ? IMP_MOVE_AXIS : kind[pose->kind], shape);
     if (st != IMP_OK) return st;
     struct imp__mover *m = &moves->mover[moves->n_movers - 1];
     const struct imp_pose *rigid = imp__pose_beside(pose, IMP_POSE_RIGID);
@@ -163,6 +169,24 @@ bool imp__moves_sphere(const struct imp_scene *scene, int shape, struct imp_roun
     if (s->ops != &imp__sphere) return false;
     s->ops->round(s, out);
     return true;
+}
+
+bool imp__moves_disk(const struct imp_scene *scene, int shape)
+{
+    return scene->shapes[shape]->ops == &imp__disk;
+}
+
+struct imp__rim_point imp__disk_rim(const struct imp_scene *scene, int shape, double v)
+{
+    const struct imp_shape *s = scene->shapes[shape];
+    const double uv[2] = {1, v};
+    struct imp_surface at;
+    int prim;
+    s->ops->place(s, uv, &at, &prim);
+    const double rate = imp__length(at.dp_dv);
+    const imp_v3 along = at.dp_dv * (1 / rate), out = imp__cross(along, at.ng);
+    return (struct imp__rim_point){at.p, along, imp__dot(out, at.dp_du) < 0 ? -out : out,
+                                   at.ng, rate};
 }
 
 bool imp__moves_shape(const struct imp__moves *moves, int shape,
@@ -217,16 +241,24 @@ static struct imp__glued glued_round(int shape, const struct imp_round *round,
                                .curvature = sign / round->radius};
 }
 
+static struct imp__glued glued_flat(int shape, imp_v3 p, imp_v3 n, imp_v3 side)
+{
+    return (struct imp__glued){
+        .shape = shape, .b = {1, 0, 0}, .p = p, .n = imp__dot(n, side) < 0 ? -n : n};
+}
+
 struct imp__glued imp__glued_at(const struct imp_scene *scene, int shape,
                                 const struct imp_located *x, imp_v3 n)
 {
     struct imp_round round;
-    if (imp__moves_sphere(scene, shape, &round)) {
+    if (scene->shapes[shape]->geometry != IMP_TRIANGLES) {
         const double uv[2] = {x->at[0], x->at[1]};
         struct imp_surface at;
         int prim;
         scene->shapes[shape]->ops->place(scene->shapes[shape], uv, &at, &prim);
-        return glued_round(shape, &round, imp__normalize(at.p - round.centre), n);
+        if (imp__moves_sphere(scene, shape, &round))
+            return glued_round(shape, &round, imp__normalize(at.p - round.centre), n);
+        return glued_flat(shape, at.p, at.ng, n);
     }
     return glued(scene, shape, x->prim, x->at[0], x->at[1], n);
 }
@@ -238,6 +270,8 @@ struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int 
     struct imp_round round;
     if (imp__moves_sphere(scene, shape, &round))
         return glued_round(shape, &round, imp__normalize(p - round.centre), n);
+    if (imp__moves_disk(scene, shape))
+        return glued_flat(shape, p, imp__disk_rim(scene, shape, 0).n, n);
     imp__triangle_weights(scene->shapes[shape], prim, &p, b);
     return glued(scene, shape, prim, b[1], b[2], n);
 }
@@ -394,12 +428,12 @@ void imp__camera_velocity_bar(const struct imp__moves *moves, imp_v3 p, imp_v3 b
     }
 }
 
-/* Across the direction of parallel light; a place in full. */
+/* Across the direction of parallel light, or a spot's axis; a place in full. */
 static imp_v3 light_part(const struct imp__moves *moves, const struct imp__mover *m,
                          imp_v3 v)
 {
     const struct imp_emitter *e = moves->scene->emitters[IMP_MOVE_EMITTER(m->shape)];
-    if (!(e->ops->flags & IMP_EMITTER_FAR)) return v;
+    if (m->kind != IMP_MOVE_AXIS && !(e->ops->flags & IMP_EMITTER_FAR)) return v;
     return (v - m->axis * imp__dot(m->axis, v)) * m->rate;
 }
 
@@ -408,7 +442,7 @@ imp_v3 imp__light_velocity(const struct imp__moves *moves, int k, const double *
     imp_v3 out = {0};
     for (int j = 0; j < moves->n_movers; j++) {
         const struct imp__mover *m = &moves->mover[j];
-        if (m->shape == IMP_MOVE_EMITTER(k))
+        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_LIGHT)
             out += light_part(moves, m, number3(theta_dot + m->first));
     }
     return out;
@@ -419,7 +453,18 @@ void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 bar,
 {
     for (int j = 0; j < moves->n_movers; j++) {
         const struct imp__mover *m = &moves->mover[j];
-        if (m->shape == IMP_MOVE_EMITTER(k))
+        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_LIGHT)
             add3(theta_bar + m->first, light_part(moves, m, bar));
+    }
+}
+
+void imp__light_axis_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
+                         double *theta_bar)
+{
+    for (int j = 0; j < moves->n_movers; j++) {
+        const struct imp__mover *m = &moves->mover[j];
+        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_AXIS)
+            add3(theta_bar + m->first,
+                 light_part(moves, m, imp__cross(turn_bar, m->axis)));
     }
 }

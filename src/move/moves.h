@@ -13,10 +13,11 @@
  *               what was seen W pixels further (1 each)
  *     light     a point light's position V = e, or the direction d of parallel light, of any
  *               length |d|: the unit direction turns by  e/|d| across d (3)
+ *     axis      of a spot, by a direction of any length, likewise (3)
  *
  * e: a translation in scene units; a: a rotation vector in radians. Velocities are linear in the
  * numbers; each function that applies the map has its transpose beside it. The geometric normal is
- * the same all over a triangle; on a sphere it turns with the place. */
+ * the same all over a triangle or disk; on a sphere it turns with the place. */
 #ifndef IMP_MOVE_MOVES_H
 #define IMP_MOVE_MOVES_H
 
@@ -30,7 +31,8 @@ enum imp__move_kind {
     IMP_MOVE_FOV,
     IMP_MOVE_OFFSET_X,
     IMP_MOVE_OFFSET_Y,
-    IMP_MOVE_LIGHT
+    IMP_MOVE_LIGHT,
+    IMP_MOVE_AXIS
 };
 #define IMP_MOVE_CAMERA     (-1)       /* in place of a shape */
 #define IMP_MOVE_EMITTER(k) (-2 - (k)) /* in place of a shape: emitter k of the scene */
@@ -55,7 +57,7 @@ struct imp__moves {
     size_t n; /* numbers in all */
 };
 
-/* A point that is glued to its triangle, or to a sphere, world. */
+/* A point that is glued to its triangle, or to a sphere or disk, world. */
 struct imp__glued {
     int shape, prim;
     double b[3]; /* weights of the vertices, as the shape's indices have them */
@@ -77,7 +79,7 @@ struct imp__moves imp__moves_begin(const struct imp_scene *scene,
                                    const struct imp_sensor *sensor);
 void imp__moves_free(struct imp__moves *moves);
 /* Adds a mover behind the last; its numbers are theta[first .. first + count). IMP_E_UNSUPPORTED:
- * a shape that is not made of triangles, or a camera whose rays meet in no point. */
+ * a shape that is neither made of triangles nor a sphere or disk, or a camera whose rays meet in no point. */
 enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kind,
                                int shape);
 /* The mover of a parameter, at its value now. */
@@ -88,6 +90,14 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves,
 void imp__pose_numbers_bar(const struct imp_pose *pose, double *bar);
 /* Centre and radius of a sphere. False: another shape. */
 bool imp__moves_sphere(const struct imp_scene *scene, int shape, struct imp_round *out);
+/* Is it a disk? And a point of its rim, by v of a turn, with its unit direction, the unit direction
+ * in the disk's plane away from it, the normal, and the length of dp/dv. */
+bool imp__moves_disk(const struct imp_scene *scene, int shape);
+struct imp__rim_point {
+    imp_v3 p, along, out, n;
+    double rate;
+};
+struct imp__rim_point imp__disk_rim(const struct imp_scene *scene, int shape, double v);
 /* Does it move? By a mover that is not `but` (NULL: any). */
 bool imp__moves_shape(const struct imp__moves *moves, int shape,
                       const struct imp__mover *but);
@@ -110,6 +120,9 @@ imp_v3 imp__light_velocity(const struct imp__moves *moves, int k,
                            const double *theta_dot);
 void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 bar,
                              double *theta_bar);
+/* The transpose of the turn of a spot's axis, a rotation vector across it. */
+void imp__light_axis_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
+                         double *theta_bar);
 /* Velocity of what the camera sees at p through a fixed film position: origin and direction of
  * the ray move with the camera, the distance is held. */
 imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 p,

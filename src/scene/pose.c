@@ -5,6 +5,7 @@
 #include "pose.h"
 #include "access.h"
 #include "base/arguments.h"
+#include "kind/emitter/from_point.h"
 #include "kind/shape/shape.h"
 #include "math/motion.h"
 #include <string.h>
@@ -123,11 +124,31 @@ static void shape_apply(const struct imp_pose *p)
     s->ops->move(s, map_of(p).m); /* also at rest: frames of facets and the box follow */
 }
 
+void imp__pose_aim(struct imp_emitter *e, enum imp_pose_kind kind, double v[3])
+{
+    imp_v3 axis;
+    double cosine;
+    if (kind != IMP_POSE_DIRECTION || e->ops->flags & IMP_EMITTER_FAR) {
+        e->ops->aim(e, v, false);
+        return;
+    }
+    e->ops->cone(e, &axis, &cosine);
+    for (int k = 0; k < 3; k++) v[k] = axis[k];
+}
+
 static void light_apply(const struct imp_pose *p)
 {
+    const struct imp_pose *at = imp__pose_beside(p, IMP_POSE_POSITION),
+                          *to = imp__pose_beside(p, IMP_POSE_DIRECTION);
+    const bool far = p->emitter->ops->flags & IMP_EMITTER_FAR;
     double v[3];
-    memcpy(v, p->number, sizeof v);
-    p->emitter->ops->aim(p->emitter, v, true);
+    if (at || far) {
+        memcpy(v, far ? to->number : at->number, sizeof v);
+        p->emitter->ops->aim(p->emitter, v, true);
+    }
+    if (to && !far)
+        imp__light_frame_turn(p->emitter->self, p->rest,
+                              imp__v3(to->number[0], to->number[1], to->number[2]));
 }
 
 static void pose_apply(struct imp_pose *p)
@@ -193,13 +214,14 @@ enum imp_status imp__poses_settle(struct imp_scene *scene)
         pose_apply(p);
         if (p->shape >= 0 && !is_finite(scene->shapes[p->shape]))
             wrong = "moves the shape beyond what numbers hold";
-        if (p->kind == IMP_POSE_DIRECTION &&
-            !(imp__length(imp__v3(p->number[0], p->number[1], p->number[2])) > 0))
+        const struct imp_pose *to = imp__pose_beside(p, IMP_POSE_DIRECTION);
+        if (to &&
+            !(imp__length(imp__v3(to->number[0], to->number[1], to->number[2])) > 0))
             wrong = "is no direction";
         if (!wrong) continue;
         p->due = true;
         return imp__error(scene->ctx, IMP_E_NUMERIC, "%s %s",
-                          scene->params[p->param].info.name, wrong);
+                          scene->params[to ? to->param : p->param].info.name, wrong);
     }
     if (scene->reshaped) {
         bounds_update(scene);

@@ -9,7 +9,7 @@
  *     NAME.x_fov             of a perspective camera: its horizontal field of view, degrees
  *     NAME.principal_point_offset_x, _y    of a camera, in parts of the film's width and height
  *     NAME.position          of a light at a point, world
- *     NAME.direction         along which parallel light travels, of any length
+ *     NAME.direction         along which parallel light travels, or of a spot's axis, of any length
  *
  * R(a): the rotation about a by |a| radians; c: the middle of a shape's box, a camera's own place.
  * They are parameters when they are asked for, behind all others: imp_scene_add_geometry. */
@@ -65,9 +65,20 @@ static inline const struct imp_pose *imp__pose_of(const struct imp_scene *scene,
     return p;
 }
 
+/* Names of all numbers of geometry that may become parameters, one after the other: shapes',
+ * sensors', lights', each with its kinds. From {0}; false: there is no further one. */
+struct imp_geometry_walk {
+    int next;
+    char name[256];
+};
+bool imp__geometry_next(const struct imp_scene *scene, struct imp_geometry_walk *at);
+
 /* A large change of number e, in its unit: of a place a tenth of the scene, of a rotation half a
  * radian, of a vertex a tenth of its mesh, of a view ten degrees. */
 double imp__pose_large(const struct imp_pose *p, size_t e);
+
+/* Where a light is, or where it shines: the unit direction of parallel light, or a spot's axis. */
+void imp__pose_aim(struct imp_emitter *e, enum imp_pose_kind kind, double v[3]);
 
 /* Where the rays of a camera meet. False: in no point, as those of a lens with an aperture or of
  * parallel light. */

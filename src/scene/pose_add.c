@@ -5,6 +5,7 @@
 #include "base/arguments.h"
 #include "kind/shape/shape.h"
 #include "pose.h"
+#include "theta_near.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -32,6 +33,8 @@ bool imp__pinhole(const struct imp_sensor *s, imp_v3 *centre)
            imp__length(apart) <= 1e-7 * size;
 }
 
+extern const struct imp_emitter_ops imp__spot_light;
+
 /* ---- Adding ------------------------------------------------------------------------- */
 
 static enum imp_status refuse(const struct imp_scene *scene, const char *name,
@@ -41,43 +44,77 @@ static enum imp_status refuse(const struct imp_scene *scene, const char *name,
                       name ? name : "", imp__pose_tail(kind), why);
 }
 
-/* What else is made from where shapes are, and is not made again. */
-static enum imp_status shape_allowed(const struct imp_scene *scene,
-                                     const struct imp_shape *s, enum imp_pose_kind kind)
+/* What else is made from where shapes are, and is not made again. NULL: nothing is in the way, as
+ * below. */
+static const char *shape_why(const struct imp_scene *scene, const struct imp_shape *s)
 {
-    if (!s->ops->move)
-        return refuse(scene, s->name, kind, "it is not made of triangles, and no sphere");
-    if (scene->world) return refuse(scene, s->name, kind, "the scene has instances");
+    if (!s->ops->move) return "it is not made of triangles, and no sphere or disk";
+    if (scene->world) return "the scene has instances";
     if (scene->n_media + scene->n_bodies > 0 || scene->priorities)
-        return refuse(scene, s->name, kind, "there are media");
-    if (scene->light_tree)
-        return refuse(scene, s->name, kind, "lights are chosen by a tree (light_choice)");
-    if (scene->aims.aimed)
-        return refuse(scene, s->name, kind, "directions are aimed at shapes");
-    if (s->placed || s->by_triangle)
-        return refuse(scene, s->name, kind, "its textures need more than uv");
-    return IMP_OK;
+        return "there are media";
+    if (scene->light_tree) return "lights are chosen by a tree (light_choice)";
+    if (scene->aims.aimed) return "directions are aimed at shapes";
+    if (s->placed || s->by_triangle) return "its textures need more than uv";
+    return NULL;
 }
 
 /* What a scale or single vertices change beside places. */
-static enum imp_status size_allowed(const struct imp_scene *scene,
-                                    const struct imp_shape *s, enum imp_pose_kind kind)
+static const char *size_why(const struct imp_scene *scene, const struct imp_shape *s,
+                            enum imp_pose_kind kind)
 {
     const bool is_mesh =
         s->geometry == IMP_TRIANGLES && s->ops->surface == imp__mesh_surface;
     for (int k = 0; k < scene->n_emitters; k++)
         if (scene->emitters[k]->shape == s)
-            return refuse(scene, s->name, kind,
-                          "it is a light, whose points are drawn by areas that stay");
+            return "it is a light, whose points are drawn by areas that stay";
     for (int k = 0; k < scene->n_sensors; k++)
-        if (scene->sensors[k]->shape == s)
-            return refuse(scene, s->name, kind, "it is a sensor");
+        if (scene->sensors[k]->shape == s) return "it is a sensor";
     if (is_mesh && ((const struct imp__mesh *)s->self)->normals)
-        return refuse(scene, s->name, kind,
-                      "it has normals at its vertices (face_normals drops them)");
-    if (kind == IMP_POSE_VERTICES && !is_mesh)
-        return refuse(scene, s->name, kind, "it is no mesh");
-    return IMP_OK;
+        return "it has normals at its vertices (face_normals drops them)";
+    if (kind == IMP_POSE_VERTICES && !is_mesh) return "it is no mesh";
+    return NULL;
+}
+
+static const char *shape_kind_why(const struct imp_scene *scene,
+                                  const struct imp_shape *s, enum imp_pose_kind kind)
+{
+    if (kind > IMP_POSE_VERTICES) return "it is a shape";
+    const char *why = shape_why(scene, s);
+    return why || kind == IMP_POSE_RIGID ? why : size_why(scene, s, kind);
+}
+
+static const char *sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
+                              imp_v3 *centre)
+{
+    double number[3];
+    if (kind != IMP_POSE_RIGID && (kind < IMP_POSE_FOV || kind > IMP_POSE_OFFSET_Y))
+        return "it is a sensor";
+    if (!s->ops->move) return "it is no perspective camera";
+    if (s->medium) return "it is in a medium";
+    if (!imp__pinhole(s, centre)) return "its rays meet in no point";
+    if (kind != IMP_POSE_RIGID && (!s->ops->view || !s->ops->view(s, number, false)))
+        return "its lens distorts the picture";
+    return NULL;
+}
+
+static const char *light_why(const struct imp_scene *scene, const struct imp_emitter *e,
+                             enum imp_pose_kind kind)
+{
+    const bool far = e->ops->flags & IMP_EMITTER_FAR;
+    const bool has = kind == IMP_POSE_POSITION    ? !far
+                     : kind == IMP_POSE_DIRECTION ? far || e->ops == &imp__spot_light
+                                                  : false;
+    if (!e->ops->aim || !has)
+        return "it is none of point and spot (position), and directional and spot "
+               "(direction)";
+    if (scene->light_tree) return "lights are chosen by a tree (light_choice)";
+    return NULL;
+}
+
+static enum imp_status found(const struct imp_scene *scene, const char *name,
+                             const struct imp_pose *p, const char *why)
+{
+    return why ? refuse(scene, name, p->kind, why) : IMP_OK;
 }
 
 static enum imp_status shape_find(struct imp_scene *scene, int k, struct imp_pose *p)
@@ -86,47 +123,23 @@ static enum imp_status shape_find(struct imp_scene *scene, int k, struct imp_pos
     p->shape = k;
     p->centre = (s->lo + s->hi) * 0.5;
     p->rest_size = s->ops->object_size;
-    if (p->kind > IMP_POSE_VERTICES)
-        return refuse(scene, s->name, p->kind, "it is a shape");
-    const enum imp_status st = shape_allowed(scene, s, p->kind);
-    return st == IMP_OK && p->kind != IMP_POSE_RIGID ? size_allowed(scene, s, p->kind)
-                                                     : st;
+    return found(scene, s->name, p, shape_kind_why(scene, s, p->kind));
 }
 
 static enum imp_status sensor_find(struct imp_scene *scene, int k, struct imp_pose *p)
 {
     struct imp_sensor *s = scene->sensors[k];
-    double number[3];
     p->sensor = s;
     p->rest_size = s->ops->object_size;
-    if (p->kind != IMP_POSE_RIGID &&
-        (p->kind < IMP_POSE_FOV || p->kind > IMP_POSE_OFFSET_Y))
-        return refuse(scene, s->name, p->kind, "it is a sensor");
-    if (!s->ops->move)
-        return refuse(scene, s->name, p->kind, "it is no perspective camera");
-    if (s->medium) return refuse(scene, s->name, p->kind, "it is in a medium");
-    if (!imp__pinhole(s, &p->centre))
-        return refuse(scene, s->name, p->kind, "its rays meet in no point");
-    if (p->kind != IMP_POSE_RIGID && (!s->ops->view || !s->ops->view(s, number, false)))
-        return refuse(scene, s->name, p->kind, "its lens distorts the picture");
-    return IMP_OK;
+    return found(scene, s->name, p, sensor_why(s, p->kind, &p->centre));
 }
 
 static enum imp_status light_find(struct imp_scene *scene, int k, struct imp_pose *p)
 {
     struct imp_emitter *e = scene->emitters[k];
-    const enum imp_pose_kind kind =
-        e->ops->flags & IMP_EMITTER_FAR ? IMP_POSE_DIRECTION : IMP_POSE_POSITION;
     p->emitter = e;
     p->rest_size = e->ops->object_size;
-    if (!e->ops->aim || kind != p->kind)
-        return refuse(
-            scene, e->name, p->kind,
-            "it is none of point and spot (position), and directional (direction)");
-    if (scene->light_tree)
-        return refuse(scene, e->name, p->kind,
-                      "lights are chosen by a tree (light_choice)");
-    return IMP_OK;
+    return found(scene, e->name, p, light_why(scene, e, p->kind));
 }
 
 static enum imp_status object_find(struct imp_scene *scene, const char *name,
@@ -139,8 +152,11 @@ static enum imp_status object_find(struct imp_scene *scene, const char *name,
     for (int k = 0; k < scene->n_emitters; k++)
         if (!scene->emitters[k]->shape && strcmp(scene->emitters[k]->name, name) == 0)
             return light_find(scene, k, p);
-    return imp__error(scene->ctx, IMP_E_ARG, "there is no %s '%s'",
-                      p->kind >= IMP_POSE_POSITION ? "light" : "shape or camera", name);
+    char whole[256];
+    snprintf(whole, sizeof whole, "%s.%s", name, imp__pose_tail(p->kind));
+    return imp__error(scene->ctx, IMP_E_ARG, "there is no %s '%s'%s",
+                      p->kind >= IMP_POSE_POSITION ? "light" : "shape or camera", name,
+                      imp__theta_near(scene, whole).text);
 }
 
 static enum imp_status rest_keep(struct imp_scene *scene, struct imp_pose *p)
@@ -191,7 +207,7 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
         break;
     case IMP_POSE_POSITION:
     case IMP_POSE_DIRECTION:
-        p->emitter->ops->aim(p->emitter, aim, false);
+        imp__pose_aim(p->emitter, p->kind, aim);
         memcpy(p->number, aim, sizeof aim);
         break;
     default: break;
@@ -286,6 +302,61 @@ static enum imp_status geometry_add(struct imp_scene *scene, const char *object,
     while (*end) end = &(*end)->next;
     *end = p;
     return IMP_OK;
+}
+
+/* ---- Names ---------------------------------------------------------------------------- */
+
+/* Object k: shapes, then sensors, then lights without a shape; may it have such a number? */
+static const char *object_name(const struct imp_scene *scene, int k,
+                               enum imp_pose_kind kind)
+{
+    imp_v3 centre;
+    if (k < scene->n_shapes) {
+        const struct imp_shape *s = scene->shapes[k];
+        return shape_kind_why(scene, s, kind) ? NULL : s->name;
+    }
+    k -= scene->n_shapes;
+    if (k < scene->n_sensors) {
+        struct imp_sensor *s = scene->sensors[k];
+        return sensor_why(s, kind, &centre) ? NULL : s->name;
+    }
+    const struct imp_emitter *e = scene->emitters[k - scene->n_sensors];
+    return e->shape || light_why(scene, e, kind) ? NULL : e->name;
+}
+
+bool imp__geometry_next(const struct imp_scene *scene, struct imp_geometry_walk *at)
+{
+    const int n = scene->n_shapes + scene->n_sensors + scene->n_emitters;
+    if (!scene->committed || scene->rayless) return false;
+    for (; at->next < n * IMP_POSE_KINDS; at->next++) {
+        const enum imp_pose_kind kind = (enum imp_pose_kind)(at->next % IMP_POSE_KINDS);
+        const char *name = object_name(scene, at->next / IMP_POSE_KINDS, kind);
+        if (!name) continue;
+        snprintf(at->name, sizeof at->name, "%s.%s", name, imp__pose_tail(kind));
+        at->next++;
+        return true;
+    }
+    return false;
+}
+
+enum imp_status imp_scene_geometry_name(const imp_scene *scene, size_t index, size_t size,
+                                        char *name)
+{
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, name, "name");
+    IMP_READS(scene);
+    struct imp_geometry_walk at = {0};
+    size_t k = 0;
+    while (imp__geometry_next(scene, &at))
+        if (k++ == index) {
+            if (size <= strlen(at.name))
+                return imp__error(scene->ctx, IMP_E_ARG,
+                                  "%zu characters are too few for '%s'", size, at.name);
+            memcpy(name, at.name, strlen(at.name) + 1);
+            return IMP_OK;
+        }
+    return imp__error(scene->ctx, IMP_E_ARG,
+                      "there is no number of geometry %zu (there are %zu)", index, k);
 }
 
 enum imp_status imp_scene_add_pose(imp_scene *scene, const char *object)

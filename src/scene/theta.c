@@ -148,13 +148,13 @@ enum imp_status imp_scene_find_param(const imp_scene *scene, const char *name,
          tail = strchr(tail, '.') ? strchr(tail, '.') + 1 : NULL)
         if (imp__theta_exact(scene, tail, index)) return IMP_OK;
     if (imp__theta_alias(scene, name, index)) return IMP_OK;
+    const struct imp_near_names near = imp__theta_near(scene, name);
     if (is_geometry(name))
         return imp__error(scene->ctx, IMP_E_ARG,
                           "there is no parameter '%s': transformations, normals and "
                           "positions are not among them (where it is asked for: "
-                          "NAME.pose, scale, vertex_positions, x_fov, position, ...)",
-                          name);
-    const struct imp_near_names near = imp__theta_near(scene, name);
+                          "NAME.pose, scale, vertex_positions, x_fov, position, ...)%s",
+                          name, near.text);
     return imp__error(scene->ctx, IMP_E_ARG, "there is no parameter '%s'%s", name,
                       scene->n_params ? near.text : "; the scene has none");
 }

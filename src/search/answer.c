@@ -195,9 +195,11 @@ static enum imp_status answer_find(const struct imp__goal *goal,
     enum imp_status st = IMP_OK;
     imp_context *ctx = goal->ctx;
     const size_t n = s->n;
-    /* All variables: for the condition, and for those that press against a bound. */
+    /* All variables but those that are held: for the condition, and for those that press against
+     * a bound. */
     imp__directions_destroy(ctx, &a->every);
-    IMP_TRY(imp__directions_find(s, NULL, &a->every));
+    for (size_t k = 0; k < n; k++) a->fixed[k] = imp__goal_held(goal, k);
+    IMP_TRY(imp__directions_find(s, a->fixed, &a->every));
     IMP_TRY(newton_point(s, x, &a->every, a->wish));
     IMP_TRY(newton_free(goal, s, x, a->fixed, &a->free, u->x));
     const bool known = s->mean.noise_known;

@@ -106,9 +106,11 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
     for (size_t k = 0; k < n; k++) {
         struct imp_fit_variable *v = &variables[k];
         v->value = u.x[k];
-        v->at_bound = imp__at_bound(goal, u.x, k);
+        const bool held = imp__goal_held(goal, k);
+        v->at_bound = held ? 0 : imp__at_bound(goal, u.x, k);
         v->determined = !imp__is_loose(a.fixed[k] ? &a.every : &a.free, k);
-        if (a.fixed[k])
+        if (held) imp__interval_free(goal, k, 0, v);
+        else if (a.fixed[k])
             imp__interval_bound(
                 goal, k, a.wish[k],
                 imp__interval_se(&a.every, n, k, a.measurement, a.monte_carlo), v);

@@ -253,6 +253,12 @@ static inline struct imp__span imp__goal_span(const struct imp__goal *goal, size
     return goal->spans[lo];
 }
 
+/* Does it stay where it is? Its derivatives are 0. */
+static inline bool imp__goal_held(const struct imp__goal *goal, size_t k)
+{
+    const struct imp__span a = imp__goal_span(goal, k);
+    return a.lo == a.hi;
+}
 /* -1 or 1 if x[k] is at its lower or upper bound, else 0. */
 static inline int imp__at_bound(const struct imp__goal *goal, const double *x, size_t k)
 {

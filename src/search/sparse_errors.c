@@ -112,7 +112,7 @@ static void finish(struct work *w)
     for (size_t k = 0; k < w->eq.n; k++) {
         const bool bound = imp__at_bound(w->goal, out->x, k) != 0;
         out->n_loose += w->loose[k] && !bound;
-        out->n_bound += bound;
+        out->n_bound += bound && !imp__goal_held(w->goal, k);
         out->se[k] = w->fixed[k] || w->loose[k] || bound ? NAN : sqrt(out->se[k]);
     }
 }

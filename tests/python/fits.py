@@ -268,6 +268,10 @@ def test_ties():
     lo, hi = one.interval
     assert np.isclose(lo * hi, one.value ** 2)
     raises(im.ArgumentError, lambda: im.fit(s, target, ["red.*"], same="red.*"), "alone")
+    p[RED] = .5, .25, .3
+    f = im.fit(s, target, ["red.*"], optimizer="lm", spp=4, hold=[RED + "[1]"])
+    assert f[RED].value[1] == .25 and f[RED].se[1] == 0 and f[RED].se[0] > 0
+    raises(im.ArgumentError, lambda: im.fit(s, target, ["red.*"], hold=RED), "NAME[i]")
     return "z %.2f" % worst
 
 

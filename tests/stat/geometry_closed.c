@@ -81,6 +81,49 @@ static void point_test(void)
     imp_scene_destroy(scene);
 }
 
+/* A spot whose axis has the angle t to the direction of the origin: I z/r^3 (c - t)/(c - b). */
+static double spot(const double at[3], const double v[3])
+{
+    const double r = sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]),
+                 l = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    const double t = acos(-(at[0] * v[0] + at[1] * v[1] + at[2] * v[2]) / (r * l));
+    const double k = (40 - t * 180 / IMP_PI) / 35;
+    return .6 / IMP_PI * 2 * at[2] / (r * r * r) * fmin(fmax(k, 0), 1);
+}
+
+static void spot_test(void)
+{
+    const double at[3] = {.5, -.3, 1.2}, v[3] = {-.3, .6, -1.9}, h = 1e-5;
+    struct tap_stat d[2][3] = {{{0, 0, 0}}};
+    imp_scene *scene;
+    size_t index;
+    scene_of(
+        NARROW, 4,
+        FLOOR
+        "<emitter type='spot' id='bulb'><float name='cutoff_angle' value='40'/><float "
+        "name='beam_width' value='5'/><transform name='to_world'><lookat "
+        "origin='.5,-.3,1.2' target='0,0,0' up='1,0,0'/></transform><rgb "
+        "name='intensity' value='2'/></emitter>",
+        "bulb.position", &scene);
+    test_must(ctx, imp_scene_add_geometry(scene, "bulb.direction"));
+    test_must(ctx, imp_scene_find_param(scene, "bulb.direction", &index));
+    test_must(ctx, imp_scene_set_values(scene, index, 3, v));
+    gradient_of(scene, "bulb.position", 16, 4, d[0]);
+    gradient_of(scene, "bulb.direction", 16, 4, d[1]);
+    for (int k = 0; k < 3; k++) {
+        double lo[2][3], hi[2][3];
+        for (int i = 0; i < 3; i++) {
+            lo[0][i] = at[i] - h * (i == k), hi[0][i] = at[i] + h * (i == k);
+            lo[1][i] = v[i] - h * (i == k), hi[1][i] = v[i] + h * (i == k);
+        }
+        tap_near(d[0][k].mean, (spot(hi[0], v) - spot(lo[0], v)) / (2 * h), 1e-3, 0,
+                 "irradiance of a spot that moves");
+        tap_near(d[1][k].mean, (spot(at, hi[1]) - spot(at, lo[1])) / (2 * h), 1e-3, 0,
+                 "irradiance of a spot that turns");
+    }
+    imp_scene_destroy(scene);
+}
+
 /* Form factor of a square of sides 2 b, parallel to the floor at the height h, centred at (x, y). */
 static double form_factor(double x, double y, double h, double b)
 {
@@ -293,6 +336,7 @@ int main(void)
 {
     ctx = test_context(2);
     point_test();
+    spot_test();
     rectangle_test();
     penumbra_test();
     view_test();

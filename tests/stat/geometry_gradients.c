@@ -186,6 +186,10 @@ static void refused(const char *rest, const char *name, const char *word)
 #define BALL                                                                             \
     "<shape type='sphere' id='ball'><float name='radius' value='.5'/><point "            \
     "name='center' x='1.3' y='.2' z='.9'/><ref id='grey'/></shape>"
+#define PLATE                                                                            \
+    "<shape type='disk' id='plate'><transform name='to_world'><scale x='.6' y='.45'/>"   \
+    "<rotate x='1' y='.4' angle='35'/><translate x='1.2' y='.1' z='1.1'/></transform>"   \
+    "<bsdf type='twosided'><ref id='grey'/></bsdf></shape>"
 #define SKY "<emitter type='constant'><rgb name='radiance' value='.4,.5,.6'/></emitter>"
 #define SUN                                                                              \
     "<emitter type='directional' id='sun'><vector name='direction' x='-.8' y='.3' "      \
@@ -226,6 +230,13 @@ int main(int argc, char **argv)
                                          {"ball.pose", 2, .03},   {"ball.scale", 0, .03},
                                          {"block.pose", 0, .03},  {"camera.pose", 0, .03},
                                          {"camera.pose", 5, .01}, {NULL, 0, 0}},
+                               plate[] = {{"plate.pose", 0, .03},
+                                          {"plate.pose", 2, .03},
+                                          {"plate.pose", 3, .03},
+                                          {"plate.pose", 4, .03},
+                                          {"plate.scale", 0, .03},
+                                          {"block.pose", 0, .03},
+                                          {NULL, 0, 0}},
                                round[] = {{"bulb.position", 0, .03},
                                           {"bulb.position", 2, .03},
                                           {"ball.pose", 1, .03},
@@ -248,6 +259,9 @@ int main(int argc, char **argv)
     room_test("sun", PATH SUN, sun, NULL, 0.03, 64, 24);
     if (is_long) room_test("ball", DIRECT BALL LAMP, ball, NULL, 0.1, 128, 32);
     room_test("ball and sky", PATH BALL SKY, ball, NULL, 0.25, 128, 32);
+    room_test("plate and lamp", PATH PLATE LAMP, plate, NULL, 0.05, 64,
+              is_long ? 200 : 24);
+    if (is_long) room_test("plate and sky", PATH PLATE SKY, plate, NULL, 0.1, 128, 24);
     room_test("ball and bulb", PATH BALL BULB, round, NULL, 0.1, 128, 24);
     refused(DIRECT LAMP, "lamp.scale", "light");
     refused(DIRECT LAMP, "floor.vertex_positions", "no mesh");

@@ -314,7 +314,7 @@ static void edges_test(void)
     imp__edges_free(&e);
     imp_scene_destroy(scene);
 
-    scene = scene_of("<shape type='disk' id='ball'/>");
+    scene = scene_of("<shape type='cylinder' id='ball'/>");
     const enum imp_status refused = imp__edges_build(scene, &e);
     tap_ok(refused == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "'ball'"),
            "what has no edges is refused by name # %s", imp_last_error(ctx));

@@ -161,7 +161,7 @@ int main(void)
     object_test("", "lamp", imp__v3(.9, -.2, 3.2), 2);
     object_test("", "camera", imp__v3(.4, -5.5, 2.3), 0);
 
-    imp_scene *scene = room("<shape type='disk' id='ball'/>", "", "", "");
+    imp_scene *scene = room("<shape type='cylinder' id='ball'/>", "", "", "");
     refused(scene, "ball", IMP_E_UNSUPPORTED, "triangles");
     refused(scene, "nobody", IMP_E_ARG, "nobody");
     const size_t n = imp_scene_n_theta(scene);

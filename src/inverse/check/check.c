@@ -278,7 +278,7 @@ out:
     return st;
 }
 
-/* Values are checked one by one, whatever ties they have. */
+/* Values are checked one by one, whatever ties they have, and those that are held. */
 enum imp_status imp_check(imp_problem *p, const struct imp_check_options *options,
                           const struct imp_run *run, const struct imp_check_row **rows,
                           size_t *n_rows)
@@ -287,11 +287,14 @@ enum imp_status imp_check(imp_problem *p, const struct imp_check_options *option
     IMP_REQUIRE(p->ctx, rows, "rows");
     IMP_REQUIRE(p->ctx, n_rows, "n_rows");
     const size_t ties = p->n_ties;
-    if (ties == 0) return check(p, options, run, rows, n_rows);
+    uint8_t *held = p->held;
+    if (ties == 0 && !held) return check(p, options, run, rows, n_rows);
     p->n_ties = 0;
+    p->held = NULL;
     enum imp_status st = imp__problem_layout(p, p->chosen);
     if (st == IMP_OK) st = check(p, options, run, rows, n_rows);
     p->n_ties = ties;
+    p->held = held;
     const enum imp_status back = imp__problem_layout(p, p->chosen);
     return st != IMP_OK ? st : back;
 }

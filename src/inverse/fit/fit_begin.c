@@ -44,8 +44,9 @@ static enum imp_status bounds_make(struct imp__fit *f)
             f->spans[f->n_spans++] = (struct imp__span){
                 .end = b->first + b->count, .lo = b->lo, .hi = b->hi, .scale = 1};
         for (size_t e = 0; !many && e < b->count; e++) {
-            f->lo[b->first + e] = b->lo;
-            f->hi[b->first + e] = b->hi;
+            const struct imp__bounds bounds = imp__block_bounds(p, b, e);
+            f->lo[b->first + e] = bounds.lo;
+            f->hi[b->first + e] = bounds.hi;
         }
     }
     return IMP_OK;

@@ -195,7 +195,7 @@ static enum imp_status normal(const double *x, uint64_t seed, int rounds,
     out->noise_known = true;
     /* A fit of n variables reduces the squared residuals of M pixels by (M - n)/M on
      * average; corrected where they are used as estimates of the noise. */
-    const double freedom = gn.n_residuals - (double)n;
+    const double freedom = gn.n_residuals - (double)(n - imp__held_count(fit->problem));
     const double widen = fit->noise_known || freedom < 1 ? 1 : gn.n_residuals / freedom;
     for (size_t i = 0; i < n * n; i++) out->H_meas[i] *= widen;
     for (size_t i = 0; i < n * n; i++) {

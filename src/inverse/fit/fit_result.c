@@ -104,8 +104,9 @@ static void error_of(const struct imp__fit_block *b, double x, double se,
 }
 
 /* The row of a value, without standard error and interval where those are of matrices. */
-static struct imp_fit_variable variable_of(const struct imp__fit_answer *a, size_t i)
+static struct imp_fit_variable variable_of(const struct imp_problem *p, size_t i)
 {
+    const struct imp__fit_answer *a = &p->fit_answer;
     size_t at = 0, end = a->n_blocks;
     while (end - at > 1) { /* the last block that begins at i or before */
         const size_t middle = at + (end - at) / 2;
@@ -128,6 +129,11 @@ static struct imp_fit_variable variable_of(const struct imp__fit_answer *a, size
                                  .determined = 1}; /* until a covariance shows the
                                                       contrary */
     if (a->se) error_of(b, x, a->se[i], &v);
+    const struct imp__block *own = imp__problem_block(p, i);
+    if (!imp__block_held(p, own, i - own->first)) return v;
+    v.se = v.at_bound = 0;
+    v.lo95 = v.hi95 = v.value;
+    v.determined = 1;
     return v;
 }
 
@@ -143,7 +149,7 @@ enum imp_status imp_problem_get_fit_variable(const imp_problem *p, size_t i,
                           a->n ? "there is no number i = %zu in the last fit (it has %zu)"
                                : "number i = %zu: there is no fit yet",
                           i, a->n);
-    const struct imp_fit_variable all = a->rows ? a->rows[i] : variable_of(a, i);
+    const struct imp_fit_variable all = a->rows ? a->rows[i] : variable_of(p, i);
     IMP_GIVE(p->ctx, variable, all, "variable");
     return IMP_OK;
 }
@@ -239,7 +245,8 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
     struct imp_arena *arena = &f->problem->fit_arena;
     struct imp__fit_answer *answer = &f->problem->fit_answer;
     const size_t n = f->problem->n;
-    size_t determined = n;
+    size_t determined = n - imp__held_count(f->problem);
+    bool missing = f->errors.x && f->errors.n_loose > 0;
     struct imp_fit_result *r = imp__arena_array(arena, 1, sizeof *r);
     const size_t n_trail = imp__search_trail(s);
     double *history =
@@ -257,7 +264,7 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
         if (se) memcpy(se, f->errors.se, n * sizeof *se);
         else st = imp__error(f->problem->ctx, IMP_E_NOMEM, "no memory for %zu errors", n);
         answer->se = se;
-        determined = n - f->errors.n_loose;
+        determined -= f->errors.n_loose;
     }
     if (st != IMP_OK) {
         answer->search = NULL; /* the caller's */
@@ -265,7 +272,7 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
     }
     for (size_t k = 0; rows && k < n; k++) {
         const struct imp_fit_variable known = rows[k];
-        rows[k] = variable_of(answer, k);
+        rows[k] = variable_of(f->problem, k);
         if (!u->n) continue;
         const bool log = imp__problem_block(f->problem, k)->log;
         rows[k].se = known.se * (log ? rows[k].value : 1);
@@ -273,9 +280,10 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
         rows[k].hi95 = log ? exp(known.hi95) : known.hi95;
         rows[k].determined = known.determined;
         determined -= !known.determined;
+        missing |= !known.determined;
     }
     const double *loosest = NULL;
-    IMP_CHECKED(loosest_give(f, u, determined < n, &loosest));
+    IMP_CHECKED(loosest_give(f, u, missing, &loosest));
     if (s->n_history > 0) {
         memcpy(history, s->history, s->n_history * sizeof *history);
         memcpy(history + s->n_history, s->history_se, s->n_history * sizeof *history);

@@ -127,7 +127,7 @@ enum imp_status imp__fit_sparse(const double *x, uint64_t seed, int rounds,
     eq.n_residuals = e->rows.n_residuals;
     /* A fit of n variables reduces the squared residuals of M pixels by (M - n)/M on
      * average; corrected where they are used as estimates of the noise. */
-    const double freedom = eq.n_residuals - (double)n;
+    const double freedom = eq.n_residuals - (double)(n - imp__held_count(f->problem));
     e->widen = f->noise_known || freedom < 1 ? 1 : sqrt(eq.n_residuals / freedom);
     *out = eq;
     return IMP_OK;

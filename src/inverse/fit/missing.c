@@ -297,7 +297,9 @@ static enum imp_status answer(struct missing *m, const struct imp_missing **rows
     for (size_t i = 0; i < n; i++) {
         const struct imp__block *b = imp__problem_block(p, i);
         const double x = imp__block_get(p, b, i - b->first);
-        if (is_own(m, i) && x > b->lo && x < b->hi) a[n_a++] = i;
+        if (is_own(m, i) && x > b->lo && x < b->hi &&
+            !imp__block_held(p, b, i - b->first))
+            a[n_a++] = i;
     }
     IMP_TRY(inverse_of(m, a, n_a, inverse));
     double *v = inverse + n * n;

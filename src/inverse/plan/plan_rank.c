@@ -297,6 +297,8 @@ out:
 
 /* ---- All of it ----------------------------------------------------------------------------- */
 
+#define KNOWN 1e-6 /* the width of a number that is held, in large changes */
+
 static enum imp_status widths_set(struct plan *plan)
 {
     const struct imp_problem *p = plan->p;
@@ -316,9 +318,12 @@ static enum imp_status widths_set(struct plan *plan)
         for (size_t e = 0; e < block->count; e++) square += imp__sqr(x[block->first + e]);
         for (size_t e = 0; e < block->count; e++) {
             const size_t k = block->first + e;
-            const double own = plan->o.prior ? plan->o.prior[k] : 0;
-            given[k] = own > 0;
             plan->span[k] = imp__large_change(p, block, e, x[k], square);
+            /* What is held is known. */
+            const double own = imp__block_held(p, block, e) ? KNOWN * plan->span[k]
+                               : plan->o.prior              ? plan->o.prior[k]
+                                                            : 0;
+            given[k] = own > 0;
             plan->width[k] = given[k] ? own : plan->span[k];
             plan->unit[k] = block->log ? exp(x[k]) : 1;
         }

@@ -63,6 +63,7 @@ void imp_problem_destroy(imp_problem *p)
     imp__active_destroy(p->ctx, &p->active);
     imp__release(p->ctx, p->blocks);
     imp__ties_free(p);
+    imp__release(p->ctx, p->held);
     imp__fit_answer_free(p);
     imp__arena_free(&p->check_arena);
     imp__arena_free(&p->missing_arena);
@@ -191,11 +192,13 @@ enum imp_status imp_problem_get_variable(const imp_problem *p, size_t i,
         return imp__error(p->ctx, IMP_E_ARG,
                           "there is no active number %zu (there are %zu)", i, p->n);
     const struct imp__block *b = imp__problem_block(p, i);
+    const struct imp__bounds bounds = imp__block_bounds(p, b, i - b->first);
     const struct imp_variable_info all = {.size = sizeof all,
                                           .param = b->param,
                                           .element = i - b->first,
-                                          .lo = b->lo,
-                                          .hi = b->hi};
+                                          .lo = bounds.lo,
+                                          .hi = bounds.hi,
+                                          .held = imp__block_held(p, b, i - b->first)};
     IMP_GIVE(p->ctx, info, all, "info");
     return IMP_OK;
 }
@@ -224,9 +227,10 @@ enum imp_status imp_problem_set_x(imp_problem *p, const double *x)
         const struct imp__block *b = &p->blocks[k];
         for (size_t e = 0; e < b->count; e++) {
             const double v = x[b->first + e];
-            if (!isfinite(v) || v < b->lo || v > b->hi)
+            const struct imp__bounds bounds = imp__block_bounds(p, b, e);
+            if (!isfinite(v) || v < bounds.lo || v > bounds.hi)
                 return imp__error(p->ctx, IMP_E_ARG, "%s[%zu] = %g is outside [%g, %g]",
-                                  imp__block_name(p, b), e, v, b->lo, b->hi);
+                                  imp__block_name(p, b), e, v, bounds.lo, bounds.hi);
         }
     }
     for (size_t k = 0; k < p->scene->n_params; k++)

@@ -123,6 +123,7 @@ struct imp_problem {
     struct imp__block *blocks; /* in the order of their numbers */
     size_t n_ties, cap_ties;
     struct imp__param_tie *ties;
+    uint8_t *held; /* [n_theta] numbers that stay as they are; NULL: none */
     size_t n_targets, cap_targets;
     struct imp__target *targets;
     size_t n_regularisers, cap_regularisers;
@@ -172,6 +173,18 @@ double imp__block_get(const struct imp_problem *p, const struct imp__block *b, s
 void imp__tied_set(const struct imp_active *active, struct imp_param *param, size_t k,
                    const double *x);
 void imp__ties_free(struct imp_problem *p);
+/* ---- held_numbers.c ---- */
+/* Is some number of parameter k held, or number e of block b? */
+bool imp__param_held(const struct imp_problem *p, size_t k);
+bool imp__block_held(const struct imp_problem *p, const struct imp__block *b, size_t e);
+/* How many numbers of x are. */
+size_t imp__held_count(const struct imp_problem *p);
+/* Bounds of number e of a block, which are its value where it is held. */
+struct imp__bounds {
+    double lo, hi;
+} imp__block_bounds(const struct imp_problem *p, const struct imp__block *b, size_t e);
+/* IMP_E_UNSUPPORTED if numbers are held where `what` moves all of them. */
+enum imp_status imp__holds_none(const struct imp_problem *p, const char *what);
 /* Forgets the tie that was made last; the layout is the caller's. */
 void imp__tie_last_free(struct imp_problem *p);
 uint64_t imp__ties_hash(const struct imp_problem *p, uint64_t hash);

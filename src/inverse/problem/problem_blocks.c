@@ -54,8 +54,9 @@ void imp__tied_set(const struct imp_active *active, struct imp_param *param, siz
 {
     const struct imp_tied *tied = active->tied ? &active->tied[k] : NULL;
     const double *from = x + active->base[k];
-    const bool plain = !tied || !tied->param;
+    const bool plain = !tied || !(tied->factor || tied->log);
     for (size_t e = 0; e < param->info.count; e++) {
+        if (tied && tied->held && tied->held[e]) continue;
         if (plain) {
             imp__param_set(param, e, from[e]);
             continue;
@@ -135,7 +136,7 @@ enum imp_status imp__problem_layout(struct imp_problem *p, const uint8_t *chosen
     if (!blocks)
         IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for active parameters"));
     IMP_TRY(imp__active_create(s, chosen, &active));
-    if (p->n_ties > 0) {
+    if (p->n_ties > 0 || p->held) {
         active.tied = imp__alloc(p->ctx, room, sizeof *active.tied);
         if (!active.tied)
             IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for active parameters"));
@@ -170,6 +171,19 @@ enum imp_status imp__problem_layout(struct imp_problem *p, const uint8_t *chosen
                                "no number is within the bounds of all that %s is tied to",
                                s->params[k].info.name));
         active.base[k] = (int64_t)b->first;
+        if (imp__param_held(p, k)) {
+            active.tied[k] = (struct imp_tied){
+                .param = &s->params[k], .held = p->held + s->params[k].info.offset};
+            if (tie || log)
+                IMP_TRY(imp__error(p->ctx, IMP_E_ARG,
+                                   "%s has numbers that are held: it cannot be tied",
+                                   s->params[k].info.name));
+            if (in_body(s, k))
+                IMP_TRY(imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                                   "%s: numbers of a field of indices cannot be held",
+                                   s->params[k].info.name));
+            continue;
+        }
         if (!active.tied || (!log && !(tie && tie->kind == IMP_TIE_FACTOR))) continue;
         if (in_body(s, k))
             IMP_TRY(imp__error(p->ctx, IMP_E_UNSUPPORTED,

@@ -140,6 +140,14 @@ static double smoothness(double weight, const struct imp__cells *n,
     return 0.5 * weight * sum;
 }
 
+/* Numbers that are held have no derivatives. */
+static void held_clear(const struct imp_problem *p, double *d)
+{
+    for (size_t k = 0; p->held && k < p->n_blocks; k++)
+        for (size_t e = 0; e < p->blocks[k].count; e++)
+            if (imp__block_held(p, &p->blocks[k], e)) d[p->blocks[k].first + e] = 0;
+}
+
 double imp__regularise(const struct imp_problem *p, const double *x, double *gradient)
 {
     double value = 0;
@@ -159,6 +167,7 @@ double imp__regularise(const struct imp_problem *p, const double *x, double *gra
             }
         }
     }
+    if (gradient && p->n_regularisers > 0) held_clear(p, gradient);
     return value;
 }
 
@@ -191,6 +200,7 @@ void imp__regularise_diagonal(const struct imp_problem *p, double *d)
             }
         }
     }
+    if (p->n_regularisers > 0) held_clear(p, d);
 }
 
 /* They are quadratic: column k is a difference of gradients, without error. */

@@ -199,11 +199,13 @@ uint64_t imp__ties_hash(const struct imp_problem *p, uint64_t hash)
         hash = imp__hash(hash, t->origin,
                          t->origin ? p->scene->n_theta * sizeof *t->origin : 0);
     }
+    if (p->held) hash = imp__hash(hash, p->held, p->scene->n_theta);
     return hash;
 }
 
 enum imp_status imp__ties_equal_only(const struct imp_problem *p, const char *what)
 {
+    IMP_CHECKED(imp__holds_none(p, what));
     for (size_t i = 0; i < p->n_ties; i++)
         if (p->ties[i].kind != IMP_TIE_SAME)
             return imp__error(

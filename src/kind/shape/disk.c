@@ -3,12 +3,30 @@
  * The unit disk at z = 0 under an affine map, hence any ellipse. */
 #include "math/warp.h"
 #include "shape.h"
+#include <string.h>
 
 struct disk {
     struct imp_mat4 to_world, to_local;
     imp_v3 n;
     double inv_area;
 };
+
+/* Area and box, of where it is. */
+static void placed(struct disk *k, struct imp_shape *s)
+{
+    const imp_v3 a = imp__mat4_column(&k->to_world, 0),
+                 c = imp__mat4_column(&k->to_world, 1);
+    s->area = IMP_PI * imp__length(imp__cross(a, c));
+    k->inv_area = 1 / s->area;
+    /* |x a_i + y c_i| is largest on the unit circle where (x, y) is along (a_i, c_i). */
+    const imp_v3 center = imp__point(&k->to_world, imp__v3(0, 0, 0));
+    for (int i = 0; i < 3; i++) {
+        const double reach = hypot(a[i], c[i]);
+        s->lo[i] = center[i] - reach;
+        s->hi[i] = center[i] + reach;
+    }
+    s->lo[3] = s->hi[3] = 0;
+}
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_shape *s)
 {
@@ -20,20 +38,11 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     k->to_local = at.to_local;
     const imp_v3 a = imp__mat4_column(&at.to_world, 0),
                  c = imp__mat4_column(&at.to_world, 1);
-    s->area = IMP_PI * imp__length(imp__cross(a, c));
+    placed(k, s);
     if (!(s->area > 0) || !isfinite(s->area))
         return imp_build_error(b, NULL, IMP_E_SCENE, "its area is %g", s->area);
-    k->inv_area = 1 / s->area;
     k->n = imp__normalize(imp__cross(a, c)) *
            ((at.mirrored != s->flip_normals) ? -1.0 : 1.0);
-    /* |x a_i + y c_i| is largest on the unit circle where (x, y) is along (a_i, c_i). */
-    const imp_v3 center = imp__point(&at.to_world, imp__v3(0, 0, 0));
-    for (int i = 0; i < 3; i++) {
-        const double reach = hypot(a[i], c[i]);
-        s->lo[i] = center[i] - reach;
-        s->hi[i] = center[i] + reach;
-    }
-    s->lo[3] = s->hi[3] = 0;
     s->geometry = IMP_ANALYTIC;
     return IMP_OK;
 }
@@ -110,6 +119,19 @@ static double pdf_toward(const struct imp_shape *s, const imp_v3 *ref,
     return imp__area_to_angle(*ref, at->p, at->ng, k->inv_area);
 }
 
+static void move(struct imp_shape *s, const double to_world[12])
+{
+    struct disk *k = s->self;
+    struct imp_mat4 by = {{0}}, back;
+    memcpy(by.m, to_world, 12 * sizeof *to_world);
+    by.m[15] = 1;
+    if (!imp__mat4_inverse(&by, &back)) return; /* no motion is singular */
+    k->to_world = imp__mat4_multiply(&by, &k->to_world);
+    k->to_local = imp__mat4_multiply(&k->to_local, &back);
+    k->n = imp__normalize(imp__rows_vector(to_world, k->n));
+    placed(k, s);
+}
+
 const struct imp_shape_ops imp__disk = {.size = sizeof(struct imp_shape_ops),
                                         .name = "disk",
                                         .flags = IMP_SHAPE_CONVEX | IMP_SHAPE_FLAT,
@@ -120,4 +142,5 @@ const struct imp_shape_ops imp__disk = {.size = sizeof(struct imp_shape_ops),
                                         .sample_toward = sample_toward,
                                         .pdf_toward = pdf_toward,
                                         .sample_area = sample_area,
-                                        .place = place};
+                                        .place = place,
+                                        .move = move};

@@ -130,6 +130,7 @@ void imp__active_destroy(imp_context *ctx, struct imp_active *a)
 double imp__tied_slope(const struct imp_tied *tied, size_t e)
 {
     if (!tied->param) return 1;
+    if (tied->held && tied->held[e]) return 0;
     if (tied->log) return imp__param_get(tied->param, e);
     return tied->factor ? tied->factor[e] : 1;
 }

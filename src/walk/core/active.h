@@ -16,6 +16,7 @@ struct imp_tied {
     const double *factor;          /* [count]: v[e] = factor[e] x[base], or with log
                                       factor[e] exp(x[base]); NULL: a number each */
     bool log;                      /* v[e] = exp(x[base + e]) */
+    const uint8_t *held; /* [count]: v[e] stays, whatever x[base + e]; NULL: none does */
 };
 
 struct imp_active {

@@ -51,7 +51,7 @@ static enum imp_status choice_make(struct imp__boundary *b, enum imp__boundary_k
     return st;
 }
 
-/* Spheres by the lengths of their great circles, edges by theirs. */
+/* Spheres by the lengths of their great circles, disks by those of their rims, edges by theirs. */
 static enum imp_status balls_make(struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
@@ -60,7 +60,8 @@ static enum imp_status balls_make(struct imp__boundary *b)
     b->ball = imp__alloc(scene->ctx, (size_t)scene->n_shapes + 1, sizeof *b->ball);
     if (!b->ball) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
     for (int k = 0; k < scene->n_shapes; k++)
-        if (imp__moves_sphere(scene, k, &round)) b->ball[b->n_balls++] = k;
+        if (imp__moves_sphere(scene, k, &round) || imp__moves_disk(scene, k))
+            b->ball[b->n_balls++] = k;
     for (size_t k = 0; k < b->edges->n; k++) edges += turn_measure(b, &b->edges->edge[k]);
     for (int kind = 0; kind < IMP_BOUNDARY_KINDS; kind++) {
         double *part =
@@ -69,7 +70,9 @@ static enum imp_status balls_make(struct imp__boundary *b)
         b->part[kind] = part;
         sum = part[0] = 0;
         for (int k = 0; k < b->n_balls; k++) {
-            imp__moves_sphere(scene, b->ball[k], &round);
+            /* A circle that is as large, about. */
+            if (!imp__moves_sphere(scene, b->ball[k], &round))
+                round.radius = sqrt(scene->shapes[b->ball[k]]->area * IMP_INV_PI);
             part[k + 1] = sum += IMP_2PI * round.radius;
         }
         sum += edges;

@@ -19,7 +19,8 @@
  *
  * A sphere has a silhouette from everywhere: the circle on which a line touches it is an edge to the
  * film and to lights, with m its outward normal; of all lines that touch it, by place p, dA, and
- * turn about the normal, psi, dl dw sin(phi) is  dA dpsi/r.
+ * turn about the normal, psi, dl dw sin(phi) is  dA dpsi/r. The rim of a disk is an edge with one
+ * face, by its length.
  *
  * x' is the velocity of a vertex that slides, along the chain from the camera. W(x), what the
  * sensor makes of a unit of radiance times projected area that leaves x, is a connection to the
@@ -43,7 +44,7 @@ struct imp__boundary {
     struct imp__edge_tree tree;
     struct imp__edge_choice choice[IMP_BOUNDARY_KINDS];
     int n_balls;
-    int *ball; /* [n_balls] shapes that are spheres */
+    int *ball; /* [n_balls] shapes that are spheres or disks */
     /* [n_balls + 2] probability of the spheres before this one; then that of all of them, and 1:
      * the rest is of edges. */
     double *part[IMP_BOUNDARY_KINDS];

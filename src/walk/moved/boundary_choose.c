@@ -26,20 +26,32 @@ static int item_choose(struct imp__edge_draw *d, double *chance)
     return k;
 }
 
-static void ball_set(struct imp__edge_draw *d, int k, struct imp_round *round)
+/* False: it is a disk. */
+static bool ball_set(struct imp__edge_draw *d, int k, struct imp_round *round)
 {
     d->edge = NULL;
     d->ball = d->b->ball[k];
     d->cell = d->choice->n_cells + k;
-    imp__moves_sphere(d->b->tracer->scene, d->ball, round);
+    return imp__moves_sphere(d->b->tracer->scene, d->ball, round);
 }
 
-/* The circle on which lines from there touch the sphere. */
+/* A point of the rim of a disk. */
+static bool rim_set(struct imp__edge_draw *d, double chance)
+{
+    const struct imp__rim_point rim = imp__disk_rim(d->b->tracer->scene, d->ball, d->u);
+    d->p = rim.p;
+    d->along = rim.along;
+    d->out = rim.out;
+    d->inv_pdf = rim.rate / chance;
+    return true;
+}
+
+/* The circle on which lines from there touch the sphere, or the rim of a disk. */
 static bool ball_silhouette(struct imp__edge_draw *d, int k, imp_v3 from, bool parallel,
                             double chance)
 {
     struct imp_round round;
-    ball_set(d, k, &round);
+    if (!ball_set(d, k, &round)) return rim_set(d, chance);
     const imp_v3 way = parallel ? from : round.centre - from;
     const double D = imp__length(way), sine = parallel ? 0 : round.radius / D;
     if (!(sine < 1)) return false;
@@ -84,13 +96,14 @@ bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w)
     const double u[2] = {imp__u01(d->key, IMP_EDGE_DIR_U),
                          imp__u01(d->key, IMP_EDGE_DIR_V)};
     if (!(chance > 0)) return false;
+    *w = imp__uniform_sphere(u);
     if (k == d->b->n_balls) {
-        *w = imp__uniform_sphere(u);
         imp__edge_choice_draw(d->choice, d->u, &p);
         return point_set(d, &p, chance);
     }
     const double at[2] = {d->u, u[0]};
-    ball_set(d, k, &round);
+    if (!ball_set(d, k, &round)) return rim_set(d, chance);
+    d->touches = true;
     d->out = imp__uniform_sphere(at);
     const struct imp_frame f = imp__frame_from_normal(d->out);
     *w = f.s * cos(IMP_2PI * u[1]) + f.t * sin(IMP_2PI * u[1]);
@@ -109,6 +122,6 @@ struct imp__glued imp__edge_carried(const struct imp__edge_draw *d)
 
 imp_v3 imp__edge_clear(const struct imp__edge_draw *d)
 {
-    if (d->edge) return d->p;
+    if (d->edge || imp__moves_disk(d->b->tracer->scene, d->ball)) return d->p;
     return d->p + d->out * (IMP_BESIDE * (d->b->size + imp__length(d->p)));
 }

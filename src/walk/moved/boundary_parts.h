@@ -12,12 +12,15 @@ struct imp__edge_draw {
     struct imp_arena *arena;
     struct imp_key key;
     const struct imp__edge_choice *choice;
-    const double *part;           /* of spheres and edges (boundary.h) */
-    double u;                     /* by which the point is chosen */
-    const struct imp__edge *edge; /* NULL: a sphere touched by a line */
-    int ball;                     /* the sphere's shape */
-    imp_v3 p, along;              /* the point, and the unit direction of the edge */
-    imp_v3 out;                   /* of a sphere: its outward normal */
+    const double *part; /* of spheres and edges (boundary.h) */
+    double u;           /* by which the point is chosen */
+    const struct imp__edge
+        *edge;       /* NULL: a sphere touched by a line, or the rim of a disk */
+    int ball;        /* the sphere's or disk's shape */
+    bool touches;    /* a line that touches a sphere */
+    imp_v3 p, along; /* the point, and the unit direction of the edge */
+    imp_v3
+        out; /* of a sphere: its outward normal; of a disk: in its plane, away from it */
     double inv_pdf; /* of the point, per length; of a line that touches a sphere */
     int cell;       /* of the choice; behind all cells, of which sphere */
     struct imp__flux *first, **end;

@@ -63,7 +63,7 @@ void imp__draw_scatter(struct imp__edge_draw *d)
     bool any = false;
     for (int k = 0; k < depths; k++) {
         jump[k] = (arrives(tracer, &lo, k + 1) - arrives(tracer, &hi, k + 1)) *
-                  ((d->edge ? sine * 4 * IMP_PI : 1) * d->inv_pdf);
+                  ((d->touches ? 1 : sine * 4 * IMP_PI) * d->inv_pdf);
         any |= !imp__is_zero(jump[k]);
     }
     if (!any) return;

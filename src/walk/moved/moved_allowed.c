@@ -25,6 +25,13 @@ static bool is_textured(const struct imp_input *const *input, int n)
     return false;
 }
 
+static bool is_simple(const struct imp_tracer *t, const struct imp_shape *s)
+{
+    struct imp_round round;
+    return imp__moves_sphere(t->scene, s->index, &round) ||
+           imp__moves_disk(t->scene, s->index);
+}
+
 static enum imp_status materials_allowed(const struct imp_tracer *t)
 {
     for (int k = 0; k < t->scene->n_shapes; k++) {
@@ -49,9 +56,10 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
                           "is none of area, constant, point, spot and directional");
         if (e->shaped || is_textured(e->input, e->n_in))
             return refuse(t, "light", e->name, e->ops->name, "has a texture");
-        if (e->shape && e->shape->geometry != IMP_TRIANGLES)
+        if (e->shape && e->shape->geometry != IMP_TRIANGLES && !is_simple(t, e->shape))
             return refuse(t, "light", e->name, e->ops->name,
-                          "is on a shape that is not made of triangles");
+                          "is on a shape that is not made of triangles, and no sphere or "
+                          "disk");
         if (e->course)
             return refuse(t, "light", e->name, e->ops->name, "changes with time");
     }

@@ -171,6 +171,8 @@ const char *imp__textures_without_d(const struct imp_bsdf *b, const struct imp_s
     const struct imp_texcoord middle = {.uv = {0.5, 0.5}};
     if (!imp__is_textured(b)) return NULL;
     if (s->placed || s->by_triangle) return "has a texture that needs more than uv";
+    if (s->geometry != IMP_TRIANGLES && s->ops->flags & IMP_SHAPE_FLAT)
+        return "has a texture, on a disk, whose uv turn about its middle";
     for (int k = 0; k < b->n_in; k++) {
         const struct imp_texture *t = b->input[k]->texture;
         imp_spec d_uv[2];

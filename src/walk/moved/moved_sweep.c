@@ -136,8 +136,11 @@ static void delta_bar(struct sweep *s, int k, const struct imp_vertex *v)
     }
     const imp_v3 r = s->at[k].x.p - at;
     const double distance = imp__length(r);
-    const imp_v3 turn =
-        sent_slope(e, r * (1 / distance), s->tracer->scene->lanes) * (weight / distance);
+    const imp_v3 d = r * (1 / distance);
+    const imp_v3 slope = sent_slope(e, d, s->tracer->scene->lanes) * weight;
+    const imp_v3 turn = slope * (1 / distance);
+    /* The light turned by a vector sends along d what it sent along d turned back. */
+    imp__light_axis_bar(s->moves, light, imp__cross(slope, d), s->theta_bar);
     const struct imp__kernel_bar kernel = light_kernel(s, k, v, r * (-1 / distance));
     const imp_v3 bar = imp__point_bar(&s->at[k], at, &kernel, weight) - turn;
     s->at[k].moved_bar += turn;

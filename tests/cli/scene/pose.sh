@@ -5,7 +5,10 @@ rest=$(render)
 [[ $(render --set tall_block.pose=0,0,0,0,0,0 --set camera.pose=0,0,0,0,0,0) == "$rest" ]] && echo at rest: the same
 [[ $(render --set tall_block.pose=20,0,0,0,0.3,0) != "$rest" ]] && echo a block that moves: another picture
 [[ $(render --set camera.pose=0,0,9,0,0,0) != "$rest" ]] && echo a camera that moves: another picture
-importon info --set tall_block.pose=20,0,0,0,0.3,0 "$ROOT/scenes/cornell.xml" | grep pose
+importon info --set tall_block.pose=20,0,0,0,0.3,0 "$ROOT/scenes/cornell.xml" | grep 'pose .*numbers'
+importon info "$ROOT/scenes/cornell.xml" | sed -n '/^geometry/,$p'
+render --set tall_blok.pose=1,0,0,0,0,0
+importon gradient -q -D res=8 --spp 1 -p tall_block.poze "$ROOT/scenes/cornell.xml"
 render --set white.pose=1,0,0,0,0,0
 render --set tall_block.pose=1,2
 importon gradient -q -D res=8 --spp 4 -p tall_block.pose "$ROOT/scenes/cornell.xml" | grep -c 'tall_block.pose\['
