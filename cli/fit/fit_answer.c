@@ -267,6 +267,13 @@ int fit_answer_write(const struct fit_answer *a)
     return rc;
 }
 
+void fit_answer_print(const struct fit_answer *a)
+{
+    char **paths = cli_alloc(a->n_blocks, sizeof *paths);
+    print_table(a, paths);
+    paths_free(a, paths);
+}
+
 int fit_answer_give(const struct fit_answer *a)
 {
     char **paths = cli_alloc(a->n_blocks, sizeof *paths);

@@ -22,6 +22,8 @@ struct fit_answer {
 int fit_answer_give(const struct fit_answer *a);
 /* Write it: all but what sensors see. */
 int fit_answer_write(const struct fit_answer *a);
+/* Its table alone. */
+void fit_answer_print(const struct fit_answer *a);
 /* May that, and the pictures of a fit, be written? */
 int fit_answer_writable(const struct block *blocks, size_t n_blocks);
 /* The members of its JSON. paths [n_blocks]: files of large blocks; NULL: none. */

@@ -77,6 +77,12 @@ static void file_levels(const struct encoding *e, double *low, double *high)
     *high = 1 - part / e->most;
 }
 
+double photograph_step(const char *spec)
+{
+    const struct encoding e = encoding_of(spec);
+    return e.srgb ? 1 / e.most : 0;
+}
+
 void photograph_warn_clipped(const char *spec, const struct imp_target *t)
 {
     double low, high;

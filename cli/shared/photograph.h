@@ -6,6 +6,9 @@
 
 #include "command.h"
 
+/* Between neighbouring values of a file of integers, as it has them; 0: it holds floating-point
+ * numbers. */
+double photograph_step(const char *spec);
 /* Warns of pixels that are as bright as the file can hold. */
 void photograph_warn_clipped(const char *spec, const struct imp_target *target);
 /* Where the film of target->sensor has a gamma, it is the numbers of the file that count:

@@ -31,6 +31,7 @@ from ._gradient import Estimate, Jacobian, Loss, functional, jacobian, loss, ren
 from ._library import (ArgumentError, BiasError, Cancelled, Error, FileError, ImportonWarning, NumericError, Part,
                        OutOfMemoryError, ParameterError, PathsError, Progress, SceneError, UnsupportedError,
                        explained, library_path, set_threads, threads)
+from ._measure import MeasuredPhoto, Measurement, MeasureStage, measure
 from ._missing import Missing, missing
 from ._params import Gradient, ParameterInfo, SceneParameters, Values, traverse
 from ._parts import PartsInfo, join_parts, merge, part, parts_info, team
@@ -52,12 +53,12 @@ if TYPE_CHECKING:
 __all__ = [
     "ArgumentError", "BiasError", "Cancelled", "Check", "CheckRow", "Color3f", "Comparison", "DroppedWalk", "Error",
     "Estimate", "FileError", "Fit", "FitVariable", "Gradient", "Grid", "ImportonWarning", "Interval", "Jacobian", "Loss",
-    "Luminaire", "Missing",
+    "Luminaire", "MeasureStage", "MeasuredPhoto", "Measurement", "Missing",
     "NumericError", "OutOfMemoryError", "ParameterError", "ParameterInfo", "Part", "PartsInfo", "PathsError",
     "Picture", "Plan", "PlanRow", "Progress", "Reached", "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "SelfTestRow", "Sensor", "Share",
     "Transform4f", "UnsupportedError", "Values", "Walks", "__version__", "ad", "bend", "check", "compare", "cornell_box", "denoise",
     "elements", "fit", "functional", "functional_until", "glare", "grid", "guide", "jacobian", "join_parts", "keep", "lamps", "library_path", "load_dict", "load_file",
-    "load_string", "loss", "luminaires", "merge", "missing", "part", "parts_info", "plan", "plan_improve", "plan_map", "project", "read", "read_walks", "render", "render_backward",
+    "load_string", "loss", "luminaires", "measure", "merge", "missing", "part", "parts_info", "plan", "plan_improve", "plan_map", "project", "read", "read_walks", "render", "render_backward",
     "render_forward", "render_until", "report", "selftest", "set_progress", "set_threads", "set_variant", "shares", "team", "threads",
     "traverse", "variant", "walk", "write",
 ]

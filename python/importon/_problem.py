@@ -93,25 +93,29 @@ class Problem:
                 self.check(lib.imp_problem_tie(self.pointer, text(glob, name), kind))
             for glob in self.holds:
                 self.check(lib.imp_problem_hold(self.pointer, text(glob, "hold")))
-            self.n = lib.imp_problem_n_variables(self.pointer)
-            infos = list(table(scene).values())
-            i, variable = 0, make(_c.imp_variable_info)
-            while i < self.n:
-                self.check(lib.imp_problem_get_variable(self.pointer, i, ctypes.byref(variable)))
-                info, log = infos[variable.param], False
-                if self.ties:
-                    tie = make(_c.imp_tie_info)
-                    self.check(lib.imp_problem_get_tie(self.pointer, i, ctypes.byref(tie)))
-                    log = bool(tie.log)
-                    if tie.factor:
-                        info = info._replace(name=tie.name.decode(), unit="1", shape=(), size=1)
-                self.blocks.append((info, slice(i, i + info.size)))
-                self.logs.append(log)
-                i += info.size
+            self.layout()
             return self
         except BaseException:
             self.__exit__()
             raise
+
+    def layout(self) -> None:
+        """Read which numbers are active."""
+        self.n = lib.imp_problem_n_variables(self.pointer)
+        infos = list(table(self.scene).values())
+        i, variable = 0, make(_c.imp_variable_info)
+        while i < self.n:
+            self.check(lib.imp_problem_get_variable(self.pointer, i, ctypes.byref(variable)))
+            info, log = infos[variable.param], False
+            if self.ties:
+                tie = make(_c.imp_tie_info)
+                self.check(lib.imp_problem_get_tie(self.pointer, i, ctypes.byref(tie)))
+                log = bool(tie.log)
+                if tie.factor:
+                    info = info._replace(name=tie.name.decode(), unit="1", shape=(), size=1)
+            self.blocks.append((info, slice(i, i + info.size)))
+            self.logs.append(log)
+            i += info.size
 
     def __exit__(self, *error: Any) -> None:
         if self.handle:

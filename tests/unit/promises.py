@@ -47,7 +47,7 @@ for m in re.finditer(r"enum \w+ \{([^}]*)\}", code):
 SCALARS = {"size_t": C.c_size_t, "int": C.c_int, "unsigned": C.c_uint, "double": C.c_double,
            "float": C.c_float, "int64_t": C.c_int64, "uint64_t": C.c_uint64, "int32_t": C.c_int32,
            "uint32_t": C.c_uint32, "uint16_t": C.c_uint16, "uint8_t": C.c_uint8,
-           "imp_progress_fn": C.c_void_p, "imp_preview_fn": C.c_void_p, "imp_fit_step_fn": C.c_void_p, "imp_bend_fit_step_fn": C.c_void_p, "imp_dot_fn": C.c_void_p,
+           "imp_progress_fn": C.c_void_p, "imp_preview_fn": C.c_void_p, "imp_fit_step_fn": C.c_void_p, "imp_measure_say_fn": C.c_void_p, "imp_bend_fit_step_fn": C.c_void_p, "imp_dot_fn": C.c_void_p,
            "bool": C.c_bool, "imp_v3": C.c_double * 4, "imp_spec": C.c_double * 4}
 structs = {}
 
@@ -361,6 +361,14 @@ class Fixture:
             s.pixels = C.addressof(self.array(C.c_float, 48, [0.25] * 48))
         if name == "imp_team": s.gather = C.cast(self.keep.append(C.CFUNCTYPE(C.c_int)(lambda: 0)) or self.keep[-1], C.c_void_p)
         if name == "imp_fit_options": s.max_iterations = 2
+        if name == "imp_photo":
+            s.width = s.height = 4
+            s.channels = 3
+            s.pixels = C.addressof(self.array(C.c_float, 48, [.2 + .01 * (k % 7) for k in range(48)]))
+        if name == "imp_measure_options":
+            word = C.create_string_buffer(b"materials")
+            self.keep.append(word)
+            s.rounds, s.max_iterations, s.stages = 1, 2, C.addressof(word)
         if name == "imp_plan_candidate" and function == "imp_plan_improve":
             s.placed, s.origin[1], s.origin[2] = True, -4, 1
         if name == "imp_check_options":
@@ -397,7 +405,7 @@ class Fixture:
                        "n_vertices": 3, "n_triangles": 1, "layers": 1, "nx": 1, "ny": 1, "nz": 1, "a": 1., "pilots": 2, "n_groups": 1, "low": .1, "high": .9,
                        "n": {"imp_scene_set_values": 1, "imp_scene_spectrum": 2, "imp_problem_nlopt": 3}.get(function, 1)}
             zeros = {"scalar", "status", "cause", "sensor", "channel", "x", "y", "sample", "json", "i", "from_here",
-                     "kind", "of", "time", "nm", "progress", "rays", "ray", "bundle", "n_walks", "target", "edge", "most", "subject", "from", "to", "luminaire", "lamp", "room", "sets"}
+                     "kind", "of", "time", "nm", "progress", "rays", "ray", "bundle", "n_walks", "target", "edge", "most", "subject", "from", "to", "luminaire", "lamp", "room", "sets", "stage"}
             if key == "imp_problem_tie.kind": return constants["IMP_TIE_LOG"], None
             if key == "imp_bend_image.target": return 4, None  # the fixture adds it
             if function == "imp_parts_create": return {"index": 1, "count": 2}[a.name], None

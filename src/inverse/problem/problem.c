@@ -32,6 +32,7 @@ enum imp_status imp_problem_create(imp_scene *scene, imp_problem **out)
     imp__arena_init(&p->check_arena, ctx);
     imp__arena_init(&p->missing_arena, ctx);
     imp__arena_init(&p->plan_arena, ctx);
+    imp__arena_init(&p->measure_arena, ctx);
     p->chosen = imp__alloc(ctx, imp_max(scene->n_params, (size_t)1), 1);
     if (!p->chosen) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a problem"));
     IMP_TRY(imp__active_create(scene, p->chosen, &p->active));
@@ -68,6 +69,7 @@ void imp_problem_destroy(imp_problem *p)
     imp__arena_free(&p->check_arena);
     imp__arena_free(&p->missing_arena);
     imp__arena_free(&p->plan_arena);
+    imp__arena_free(&p->measure_arena);
     imp__release(ctx, p->chosen);
     imp__release(ctx, p);
     imp__context_drop(ctx);

@@ -142,6 +142,7 @@ struct imp_problem {
     struct imp_arena check_arena;   /* of the last check's rows */
     struct imp_arena missing_arena; /* of rows of imp_problem_missing */
     struct imp_arena plan_arena;    /* of the last plan's result */
+    struct imp_arena measure_arena; /* of the measurement whose last fit this is */
 };
 
 /* Is some pose active? Then losses have two passes whatever the filter (splat.h). */

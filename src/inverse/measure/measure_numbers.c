@@ -1,0 +1,234 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Which numbers are measured, and in which stage. */
+#include "base/arguments.h"
+#include "inverse/problem/match.h"
+#include "measuring.h"
+#include "scene/pose.h"
+#include <stdio.h>
+#include <string.h>
+
+#define FIELD 12 /* a parameter of more numbers, but no spectrum, is a texture */
+
+/* ---- Poses ----------------------------------------------------------------------------- */
+
+static bool is_geometry(const char *name)
+{
+    const char *tail = strrchr(name, '.');
+    for (int kind = 0; tail && kind < IMP_POSE_KINDS; kind++)
+        if (!strcmp(tail + 1, imp__pose_tail((enum imp_pose_kind)kind))) return true;
+    return false;
+}
+
+/* Do the patterns mean this number of geometry? As imp_problem_activate: those do that end in
+ * its last part. */
+static bool is_meant(const char *const *list, size_t n, const char *name)
+{
+    const char *tail = strrchr(name, '.');
+    for (size_t i = 0; i < n; i++) {
+        const char *own = strrchr(list[i], '.');
+        if (!strcmp(list[i], name) ||
+            (own && tail && !strcmp(own, tail) && imp__glob(list[i], name)))
+            return true;
+    }
+    return false;
+}
+
+/* A number of a photograph's camera becomes a parameter, or there is a line that says why not. */
+static enum imp_status camera_add(struct imp__measure *m, const struct imp__photo *p,
+                                  const char *number, bool wanted_anyway)
+{
+    char name[320];
+    snprintf(name, sizeof name, "%.300s.%s", p->sensor->name, number);
+    const bool named = is_meant(m->o.params, m->o.n_params, name);
+    if (m->o.params ? !named : !wanted_anyway) return IMP_OK;
+    if (is_meant(m->o.hold, m->o.n_hold, name)) return IMP_OK;
+    const enum imp_status st = imp_scene_add_geometry(m->scene, name);
+    if (st != IMP_E_UNSUPPORTED || named) return st;
+    return imp__measure_say(m, "%s stays: %s", name, imp_last_error(m->ctx));
+}
+
+static enum imp_status poses_add(struct imp__measure *m)
+{
+    bool focal = true;
+    for (size_t i = 0; i < m->n_photos; i++) focal &= m->photos[i].desc.focal_35mm > 0;
+    if (!m->wanted[IMP_MEASURE_CAMERAS]) return IMP_OK;
+    for (size_t i = 0; i < m->n_photos; i++) {
+        IMP_CHECKED(camera_add(m, &m->photos[i], "pose", true));
+        IMP_CHECKED(camera_add(m, &m->photos[i], "x_fov", focal));
+        IMP_CHECKED(camera_add(m, &m->photos[i], "principal_point_offset_x", false));
+        IMP_CHECKED(camera_add(m, &m->photos[i], "principal_point_offset_y", false));
+    }
+    for (size_t k = 0; k < m->o.n_params; k++) {
+        size_t index;
+        if (imp__has_wildcards(m->o.params[k]) || !is_geometry(m->o.params[k]) ||
+            imp_scene_find_param(m->scene, m->o.params[k], &index) == IMP_OK)
+            continue;
+        IMP_CHECKED(imp_scene_add_geometry(m->scene, m->o.params[k]));
+    }
+    return IMP_OK;
+}
+
+/* ---- Stages ---------------------------------------------------------------------------- */
+
+static bool is_below(const char *name, const char *object)
+{
+    const size_t n = object ? strlen(object) : 0;
+    return n > 0 && !strncmp(name, object, n) && name[n] == '.';
+}
+
+/* The stage of a parameter by what it belongs to; IMP_MEASURE_STAGES: no photograph is of the
+ * sensor that has it. */
+static enum imp_measure_stage stage_of(const struct imp__measure *m, size_t k)
+{
+    const struct imp_scene *s = m->scene;
+    const struct imp_param_info *info = &s->params[k].info;
+    const struct imp_pose *pose = imp__pose_of(s, k);
+    if (pose && !pose->sensor)
+        return pose->emitter ? IMP_MEASURE_LIGHTS : IMP_MEASURE_CAMERAS;
+    for (int c = 0; c < s->n_sensors; c++) {
+        if (!is_below(info->name, s->sensors[c]->name)) continue;
+        for (size_t i = 0; i < m->n_photos; i++)
+            if (m->photos[i].sensor == s->sensors[c])
+                return pose ? IMP_MEASURE_CAMERAS : IMP_MEASURE_EXPOSURE;
+        return IMP_MEASURE_STAGES;
+    }
+    if (info->count > FIELD && !info->wavelengths_nm) return IMP_MEASURE_TEXTURES;
+    for (int e = 0; e < s->n_emitters; e++)
+        if (is_below(info->name, s->emitters[e]->name)) return IMP_MEASURE_LIGHTS;
+    return IMP_MEASURE_MATERIALS;
+}
+
+/* Does a name or pattern mean parameter k? */
+static bool names(const struct imp__measure *m, const char *glob, size_t k)
+{
+    const char *name = m->scene->params[k].info.name;
+    size_t index;
+    if (imp__pose_of(m->scene, k)) return is_meant(&glob, 1, name);
+    if (imp__has_wildcards(glob)) return imp__glob(glob, name);
+    return imp_scene_find_param(m->scene, glob, &index) == IMP_OK && index == k;
+}
+
+static enum imp_status all_mean_something(const struct imp__measure *m, const char *what,
+                                          const char *const *list, size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        bool met = false;
+        for (size_t k = 0; k < m->scene->n_params && !met; k++)
+            met = names(m, list[i], k);
+        if (!met && !is_geometry(list[i]))
+            return imp__error(m->ctx, IMP_E_ARG, "%s '%s': there is no such parameter",
+                              what, list[i]);
+    }
+    return IMP_OK;
+}
+
+static bool is_listed(const struct imp__measure *m, const char *const *list, size_t n,
+                      size_t k)
+{
+    for (size_t i = 0; i < n; i++)
+        if (names(m, list[i], k)) return true;
+    return false;
+}
+
+/* ---- What only a product determines ---------------------------------------------------- */
+
+struct imp_param *imp__measure_film_number(const struct imp__measure *m,
+                                           const struct imp__photo *photo,
+                                           const char *number, size_t *index)
+{
+    char name[320];
+    snprintf(name, sizeof name, "%.280s.%s.value", photo->sensor->name, number);
+    for (size_t k = 0; k < m->scene->n_params; k++)
+        if (!strcmp(m->scene->params[k].info.name, name)) {
+            *index = k;
+            return &m->scene->params[k];
+        }
+    return NULL;
+}
+
+/* Has each light a measured number, of `lanes` values at least? */
+static bool lights_free(const struct imp__measure *m, size_t lanes)
+{
+    const struct imp_scene *s = m->scene;
+    for (int e = 0; e < s->n_emitters; e++) {
+        bool met = false;
+        for (size_t k = 0; k < s->n_params && !met; k++)
+            met = (m->stage[k] == IMP_MEASURE_LIGHTS ||
+                   m->stage[k] == IMP_MEASURE_TEXTURES) &&
+                  !imp__pose_of(s, k) && s->params[k].info.count >= lanes &&
+                  is_below(s->params[k].info.name, s->emitters[e]->name);
+        if (!met) return false;
+    }
+    return s->n_emitters > 0;
+}
+
+/* Where all photographs have a free factor of this kind, and all lights are free, too: the
+ * first one's stays, and is the unit. */
+static enum imp_status unit_hold(struct imp__measure *m, const char *number,
+                                 const char *why)
+{
+    size_t first = 0, index;
+    for (size_t i = m->n_photos; i-- > 0; first = index) {
+        if (!imp__measure_film_number(m, &m->photos[i], number, &index)) return IMP_OK;
+        if (m->stage[index] != IMP_MEASURE_EXPOSURE) return IMP_OK;
+    }
+    m->stage[first] = IMP_MEASURE_STAGES;
+    return imp__measure_say(m, "%s stays at %g: %s", m->scene->params[first].info.name,
+                            imp__param_get(&m->scene->params[first], 0), why);
+}
+
+/* ---- All of it ------------------------------------------------------------------------- */
+
+size_t imp__measure_count(const struct imp__measure *m, enum imp_measure_stage stage)
+{
+    size_t n = 0;
+    for (size_t k = 0; k < m->scene->n_params; k++) {
+        const bool own = stage == IMP_MEASURE_TOGETHER
+                             ? m->stage[k] < IMP_MEASURE_TEXTURES
+                             : m->stage[k] == stage;
+        n += own ? m->scene->params[k].info.count : 0;
+    }
+    return n;
+}
+
+enum imp_status imp__measure_numbers(struct imp__measure *m)
+{
+    IMP_CHECKED(poses_add(m));
+    const struct imp_scene *s = m->scene;
+    m->stage = imp__alloc(m->ctx, s->n_params + 1, 1);
+    m->at = imp__alloc(m->ctx, s->n_theta + 1, sizeof *m->at);
+    m->at_se = imp__alloc(m->ctx, s->n_theta + 1, sizeof *m->at_se);
+    if (!m->stage || !m->at || !m->at_se)
+        return imp__error(m->ctx, IMP_E_NOMEM, "no memory for %zu parameters",
+                          s->n_params);
+    IMP_CHECKED(all_mean_something(m, "params", m->o.params, m->o.n_params));
+    IMP_CHECKED(all_mean_something(m, "hold", m->o.hold, m->o.n_hold));
+    for (size_t k = 0; k < s->n_params; k++) {
+        const enum imp_measure_stage stage = stage_of(m, k);
+        const bool meant = m->o.params
+                               ? is_listed(m, m->o.params, m->o.n_params, k)
+                               : !imp__pose_of(s, k) || stage == IMP_MEASURE_CAMERAS;
+        m->stage[k] = IMP_MEASURE_STAGES;
+        if (stage == IMP_MEASURE_STAGES || !m->wanted[stage] || !meant) continue;
+        if (is_listed(m, m->o.hold, m->o.n_hold, k)) continue;
+        if (!(s->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE)) continue;
+        m->stage[k] = (uint8_t)stage;
+    }
+    if (lights_free(m, 1))
+        IMP_CHECKED(unit_hold(m, "exposure",
+                              "photographs determine its product with the lights alone"));
+    if (lights_free(m, 3)) {
+        const char *why =
+            "photographs determine its product with the lights' colour alone";
+        IMP_CHECKED(unit_hold(m, "white_balance_red", why));
+        IMP_CHECKED(unit_hold(m, "white_balance_blue", why));
+    }
+    if (imp__measure_count(m, IMP_MEASURE_TOGETHER) +
+            imp__measure_count(m, IMP_MEASURE_TEXTURES) ==
+        0)
+        return imp__error(m->ctx, IMP_E_ARG,
+                          "no number of the scene is to be measured: stages, params and "
+                          "hold leave none that has a gradient");
+    return IMP_OK;
+}

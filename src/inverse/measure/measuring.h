@@ -1,0 +1,110 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What the parts of imp_measure share (importon/measure.h has the stages). */
+#ifndef IMP_INVERSE_MEASURING_H
+#define IMP_INVERSE_MEASURING_H
+
+#include "inverse/problem/problem.h"
+#include <importon/measure.h>
+
+/* A photograph at work. */
+struct imp__photo {
+    struct imp_photo desc; /* borrowed arrays */
+    const char *name;
+    const struct imp_sensor *sensor;
+    size_t n_pixels, n_values;
+    double noise;    /* one standard deviation */
+    double noise_of; /* relative error of its square; 0: it was given */
+    float *noise_se; /* [n_values] all `noise`, for targets */
+    float *weights;  /* [n_pixels] desc.weights, 0 where masked */
+    float *square;   /* [n_pixels] sum of squared residuals of its compared values ... */
+    float
+        *expected; /* [n_pixels] ... and what noise makes of it; 0: nothing is compared */
+    float *robust; /* [n_pixels] factors of weights in all fits but the last */
+    int block, columns, rows;
+    uint8_t *masked; /* [rows][columns] */
+    size_t n_masked;
+    double chi2,
+        chi2_se; /* mean square of residuals, our own noise taken off, over the noise */
+    size_t n_compared; /* values in it */
+};
+
+struct imp__measure {
+    imp_context *ctx;
+    struct imp_scene *scene;
+    struct imp_measure_options o;
+    struct imp_run run;
+    struct imp_arena arena; /* of the result: goes to the problem */
+    size_t n_photos;
+    struct imp__photo *photos;
+    bool wanted[IMP_MEASURE_STAGES];
+    uint8_t *stage;  /* [n_params] of which stage it is; IMP_MEASURE_STAGES: held */
+    double *at;      /* [n_theta] where its own stage has left each number */
+    double *at_se;   /* [n_theta] and its standard error there; 0: none */
+    uint64_t task;   /* hash of scene, photographs and options */
+    int round, next; /* the round, from 1, and the stage that comes next */
+    bool due[IMP_MEASURE_STAGES]; /* in this round */
+    size_t n_rows, cap_rows;
+    struct imp_measure_row *rows;
+    size_t n_lines, cap_lines;
+    char **lines;
+    bool looked;  /* residuals are those of the present numbers */
+    bool repeats; /* lines are not given to the host: the checkpoint's */
+};
+
+/* ---- measure.c ---- */
+/* A decision: kept, and given to the host. */
+IMP_PRINTF(2, 3)
+enum imp_status imp__measure_say(struct imp__measure *m, const char *format, ...);
+
+/* ---- measure_arguments.c ---- */
+enum imp_status imp__measure_options_take(struct imp__measure *m,
+                                          const struct imp_measure_options *options);
+/* To be freed by imp__measure_photos_free. */
+enum imp_status imp__measure_photos_take(struct imp__measure *m,
+                                         const struct imp_photo *photos, size_t n);
+void imp__measure_photos_free(struct imp__measure *m);
+uint64_t imp__measure_hash(const struct imp__measure *m);
+
+/* ---- measure_numbers.c ---- */
+/* Poses become parameters, and each parameter gets its stage. */
+enum imp_status imp__measure_numbers(struct imp__measure *m);
+/* The parameter "SENSOR.NUMBER.value" of a photograph's film or camera; NULL: there is none. */
+struct imp_param *imp__measure_film_number(const struct imp__measure *m,
+                                           const struct imp__photo *photo,
+                                           const char *number, size_t *index);
+/* How many numbers a stage has. */
+size_t imp__measure_count(const struct imp__measure *m, enum imp_measure_stage stage);
+
+/* ---- measure_begin.c ---- */
+/* Fields of view and exposures at the start. */
+enum imp_status imp__measure_begin(struct imp__measure *m);
+
+/* ---- measure_photo.c ---- */
+/* noise and noise_of, where it was not given. */
+enum imp_status imp__measure_noise(struct imp__measure *m, struct imp__photo *photo);
+/* Residuals, chi2 and robust weights at the scene's present numbers, by pictures of `seed`. */
+enum imp_status imp__measure_residual(struct imp__measure *m, struct imp__photo *photo,
+                                      uint64_t seed);
+/* ---- measure_mask.c ---- */
+/* Which blocks are masked, by the residuals. *changed: others than before. */
+enum imp_status imp__measure_mask(struct imp__measure *m, struct imp__photo *photo,
+                                  bool *changed);
+
+/* photo->weights, by what is masked. */
+void imp__measure_weights(struct imp__photo *photo);
+
+/* ---- measure_stage.c ---- */
+/* Residuals of all photographs at the present numbers, unless they are there. */
+enum imp_status imp__measure_look(struct imp__measure *m);
+/* A fit of one stage, whose problem is destroyed unless `problem` is there. Adds its row. */
+enum imp_status imp__measure_fit(struct imp__measure *m, enum imp_measure_stage stage,
+                                 int round, imp_problem **problem,
+                                 const struct imp_fit_result **result);
+
+/* ---- measure_state.c ---- */
+/* The checkpoint, if there is one: rows, lines, masks and numbers after so many fits. */
+enum imp_status imp__measure_state_write(const struct imp__measure *m);
+enum imp_status imp__measure_state_read(struct imp__measure *m, bool *found);
+
+#endif

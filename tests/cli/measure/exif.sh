@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: Apache-2.0
+# Focal lengths, exposure times, ISO and apertures are where views and exposures begin; of one photograph without
+# them, of damaged and of hostile ones nothing is taken, and nothing breaks.
+make() { python3 "$ROOT/tests/cli/measure/exif.py" "$@"; }
+measure() {
+    importon measure "$SCENES/still.xml" left.png right.png -m mono --spp 2 -n 1 --rounds 1 --hold 'lamp.*' --hold '*.gamma.*' \
+        "$@" >said 2>warned || echo "exit $?"
+    grep ' by \|stays' said
+    grep -v warning warned
+}
+make left.png 24 18 120 0.1 4 100 48
+make right.png 24 18 150 0.4 4 100 48
+if measure -p '*.x_fov' -p '*.exposure.*' --stages cameras,exposure | grep -q libexif; then
+    cat "$ROOT/tests/cli/measure/exif.sh.stdout.exact" # there is none to read them
+    exit
+fi
+measure -p '*.x_fov' -p '*.exposure.*' --stages cameras,exposure
+make right.png 24 18 150
+measure -p '*.exposure.*' --stages exposure
+for kind in 1 2 3 4 5 6 7; do
+    make right.png 24 18 150 broken $kind
+    importon measure "$SCENES/still.xml" right.png -m mono --spp 2 -n 1 --rounds 1 -p right.exposure --stages exposure >/dev/null 2>&1 ||
+        echo "$kind: exit $?"
+done
