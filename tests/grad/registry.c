@@ -271,6 +271,10 @@ static void emitter_make(imp_scene *s, const struct subject *q, bool lifted)
         imp_scene_string(s, "filename", IMP_SCENES "/lamps/wallwash.ies");
         imp_scene_string(s, "units", "radiometric");
     }
+    if (strcmp(q->emitter->name, "perezsky") == 0) {
+        imp_scene_float(s, "diffuse", 3);
+        imp_scene_float(s, "direct", 4);
+    }
     if (q->emitter->place && sky) { /* a picture of the sky, some of it dark */
         float pixels[5 * 4 * 3];
         for (uint32_t k = 0; k < 60; k++)
