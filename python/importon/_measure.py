@@ -200,7 +200,10 @@ def measure(scene: Scene, photos: Any, params: Any = None, *, stages: Any = None
     >>> scene = importon.load_dict(importon.cornell_box(res=16))
     >>> photo = np.asarray(importon.render(scene, spp=256, seed=1)) + np.random.default_rng(1).normal(0, .05, (16, 16, 3))
     >>> importon.traverse(scene)["red.reflectance.value"] = 0.5
-    >>> m = importon.measure(scene, photo, "red.*", spp=64)
+    >>> lines = []
+    >>> m = importon.measure(scene, photo, "red.*", spp=64, say=lines.append)
+    >>> len(lines) > 0 and isinstance(lines[0], str)
+    True
     >>> m.stages[-1].stage, m.explained, m.photos[0].masked
     ('together', True, 0)
     """
@@ -209,10 +212,10 @@ def measure(scene: Scene, photos: Any, params: Any = None, *, stages: Any = None
     keep: list[Any] = []
     spoken: list[BaseException] = []
 
-    def on_say(line: bytes, payload: Any) -> None:
+    def on_say(line: int, payload: Any) -> None:
         try:
             if say and not spoken:
-                say(decode(line))
+                say(decode(ctypes.string_at(line)))
         except BaseException as error:  # raised when the call has ended
             spoken.append(error)
 

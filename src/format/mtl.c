@@ -61,7 +61,8 @@ static enum imp_status numbers(struct line *l, const char *what, int n, double *
         }
         if (!length || !imp__number(&at, w + length, &out[i]) || at != w + length ||
             !isfinite(out[i]) || out[i] < 0)
-            return line_error(l, "%s needs %d numbers, positive or 0", what, n);
+            return line_error(l, "%s needs %d number%s, positive or 0", what, n,
+                              n > 1 ? "s" : "");
     }
     return IMP_OK;
 }
@@ -73,7 +74,10 @@ static enum imp_status map(struct line *l, const char **out)
     const char *w = word(l, &n), *rest = w;
     if (!n) return line_error(l, "a map without a file");
     if (*w == '-') { /* "-bm 1.0 file.png": names without spaces */
+        imp__warn(l->in->scene->ctx, "%s:%d:1: options of a map (%.*s ...) are not read",
+                  l->file, l->number, (int)imp_min(n, (size_t)20), w);
         for (size_t m; w = word(l, &m), m;) rest = w, n = m;
+        if (*rest == '-') return line_error(l, "a map without a file");
         *out = copy(l, rest, n);
     } else {
         const char *end = l->end;
@@ -275,6 +279,12 @@ enum imp_status imp__mtl_make(const struct imp__import *in, struct imp__mtl *m)
     if (m->map_bump) /* heights or normals: the file does not say */
         imp__warn(in->scene->ctx, "%s:%d:1: material '%.80s': its bumps are not read",
                   m->library, m->line, m->name);
+    if (any(m->ks) && !(m->ns > 0) && m->illum == 2 && isnan(m->pr) && isnan(m->pm))
+        imp__warn(in->scene->ctx, "%s:%d:1: material '%.80s': Ks without Ns is not read",
+                  m->library, m->line, m->name);
+    if (m->illum > 10)
+        imp__warn(in->scene->ctx, "%s:%d:1: material '%.80s': illum %d is not known",
+                  m->library, m->line, m->name, m->illum);
     const bool glass = m->illum == 4 || m->illum == 6 || m->illum == 7 || m->illum == 9,
                mirror = m->illum == 3 || m->illum == 5;
     if (glass && m->ni > 1.0001) {

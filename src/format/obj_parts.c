@@ -4,6 +4,7 @@
 #include "obj_parts.h"
 #include "base/arguments.h"
 #include "base/nearest.h"
+#include "load.h"
 #include "search.h"
 #include <math.h>
 #include <stdio.h>
@@ -140,7 +141,15 @@ static enum imp_status material_of(struct parts *p, const char *name,
         if (strcmp(p->list.material[i].name, name) == 0) *out = &p->list.material[i];
         imp__nearest_try(&near, p->list.material[i].name);
     }
-    if (*out || p->in->scene->lenient) return IMP_OK;
+    if (*out) return IMP_OK;
+    if (p->in->scene->lenient) {
+        char lost[300];
+        snprintf(lost, sizeof lost,
+                 "%.150s: material '%.80s' is in none of its libraries: "
+                 "diffuse grey",
+                 p->in->name, name);
+        return imp__lost_add(p->in->scene, lost);
+    }
     return imp__loc_error(p->ctx, p->loc, IMP_E_SCENE,
                           "material '%.80s' is in none of its libraries%s%s%s", name,
                           near.best ? "; did you mean '" : "", near.best ? near.best : "",
@@ -186,7 +195,16 @@ static enum imp_status libraries_read(struct parts *p)
         struct imp_bytes text = {0};
         enum imp_status st =
             imp__search(p->in->scene, folder, p->names.library[i], &path);
-        if (st == IMP_E_IO && p->in->scene->lenient) continue;
+        if (st == IMP_E_IO && p->in->scene->lenient) {
+            char lost[400];
+            snprintf(lost, sizeof lost,
+                     "%.150s: mtllib '%.150s' is not there: its "
+                     "materials are diffuse grey",
+                     p->in->name, p->names.library[i]);
+            IMP_CHECKED(imp__lost_add(p->in->scene, lost));
+            continue;
+        }
+        if (st != IMP_OK) return imp__error_prefix(p->ctx, st, "%s: mtllib", p->in->name);
         if (st == IMP_OK) st = imp__file_read(p->ctx, path, MTL_BYTES_MAX, &text);
         if (st == IMP_OK) st = imp__mtl_parse(p->in, path, &text, &p->list);
         imp__bytes_free(p->ctx, &text);

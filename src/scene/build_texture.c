@@ -83,7 +83,8 @@ enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *nod
         if (!t->asked) {
             t->asked = asked;
             if (t->ops->changed) t->ops->changed(t);
-        } else if (imp__is_spectral(scene->mode) && !same_spectra(t->asked, asked)) {
+        } else if (asked && imp__is_spectral(scene->mode) &&
+                   !same_spectra(t->asked, asked)) {
             return imp__node_error(
                 scene->ctx, node, IMP_E_UNSUPPORTED,
                 "is the value of '%s' and of '%s', which are different "

@@ -405,6 +405,11 @@ static struct imp_emitter *emitter_build(struct imp_node *n, const struct imp_sh
             (!ops || !s == !(imp__emitter_kinds[i]->flags & IMP_EMITTER_AREA)))
             ops = imp__emitter_kinds[i];
     n->ies = &table;
+    if (strcmp(n->type, "perezsky") == 0) /* what it cannot be without */
+        for (int k = 0; k < 2; k++)
+            imp__node_add(&world.arena, n, k ? "direct" : "diffuse", IMP_PROP_FLOAT,
+                          n->loc)
+                ->number[0] = 3;
     struct imp_emitter *e = imp__arena_array(&world.arena, 1, sizeof *e);
     int n_in = 0;
     while (ops->inputs[n_in].name) n_in++;

@@ -27,6 +27,8 @@ static void put(const char *name, const char *text)
     put_bytes(name, text, strlen(text));
 }
 
+static enum imp_color_mode mode = IMP_RGB;
+
 static enum imp_status load_in(imp_context *c, const char *name, bool lenient,
                                imp_scene **out)
 {
@@ -37,7 +39,7 @@ static enum imp_status load_in(imp_context *c, const char *name, bool lenient,
     o.defines = defines;
     o.n_defines = strstr(name, ".gl") ? 2 : 0;
     o.lenient = lenient ? IMP_LENIENT_QUIET : IMP_LENIENT_OFF;
-    o.mode = IMP_RGB;
+    o.mode = mode;
     return imp_scene_load(c, path, &o, out);
 }
 static imp_scene *load(const char *name)
@@ -321,6 +323,24 @@ static void textures(void)
     imp_scene_destroy(s);
 }
 
+/* A texture may stand behind the material that uses it. */
+static void spectra(void)
+{
+    mode = IMP_SPECTRAL;
+    square(PLAIN,
+           "{\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0},"
+           "\"metallicFactor\":0}"
+           "}",
+           PLATE VIEWER, CAMERA TEXTURES);
+    imp_scene *s = load("a.gltf");
+    imp_film *f = picture(s, 4);
+    tap_ok(value_of(s, "texture_0_color.data", 0) == 1 && f->mean[0] > 0,
+           "textures in spectra");
+    imp_film_destroy(f);
+    imp_scene_destroy(s);
+    mode = IMP_RGB;
+}
+
 /* A square seen from +z, lit by what it emits: the colour at its upper left corner. */
 static double upper_left(const char *material, const char *more)
 {
@@ -520,6 +540,7 @@ int main(void)
     same_bits();
     binary();
     textures();
+    spectra();
     pictures();
     lights();
     refusals();

@@ -50,8 +50,9 @@ struct gltf_mesh {
 };
 
 struct gltf_material {
-    const char *id;              /* of the bsdf; NULL: not made yet */
-    int texcoord;                /* the set of uvs that its textures use */
+    const char *id; /* of the bsdf; NULL: not made yet */
+    int texcoord;   /* the set of uvs that its textures use */
+    bool textured;
     double emitted[3];           /* radiance, texture aside */
     const char *emitted_texture; /* an id, or NULL */
 };

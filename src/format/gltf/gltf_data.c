@@ -176,6 +176,9 @@ enum imp_status imp__gltf_accessor(struct gltf *g, size_t index,
                                   "not supported");
     IMP_CHECKED(imp__gltf_view(g, view, &a.data, &size, &a.stride));
     if (!a.stride) a.stride = each;
+    if (a.stride < each)
+        return imp__gltf_error(g, "byteStride is %zu, an element has %zu bytes", a.stride,
+                               each);
     if (offset > size || each > size - offset ||
         (a.count - 1) > (size - offset - each) / a.stride)
         return imp__gltf_error(g, "accessors[%zu] does not lie inside of its view",

@@ -64,6 +64,10 @@ static enum imp_status extensions(struct gltf *g, const json_t *object, struct l
     for (int k = 0; k < 3; k++) l->emitted[k] *= strength * g->efficacy;
     e = imp__gltf_extension(object, "KHR_materials_ior");
     IMP_CHECKED(imp__gltf_number(g, e, "ior", 0, 10, &l->ior));
+    if (l->ior > 0 && l->ior < 1) return imp__gltf_error(g, "ior is %g, below 1", l->ior);
+    if (l->ior == 0)
+        imp__warn(g->ctx, "%s: %s: ior 0 (all is reflected) is taken as 10", g->in->name,
+                  g->where);
     e = imp__gltf_extension(object, "KHR_materials_transmission");
     IMP_CHECKED(imp__gltf_number(g, e, "transmissionFactor", 0, 1, &l->transmission));
     e = imp__gltf_extension(object, "KHR_materials_volume");
@@ -73,6 +77,15 @@ static enum imp_status extensions(struct gltf *g, const json_t *object, struct l
     IMP_CHECKED(imp__gltf_number(g, e, "clearcoatFactor", 0, 1, &l->coat));
     IMP_CHECKED(
         imp__gltf_number(g, e, "clearcoatRoughnessFactor", 0, 1, &l->coat_roughness));
+    const json_t *pbr = json_object_get(object, "pbrMetallicRoughness");
+    const bool sheet = l->transmission > 0 && l->thin;
+    if (sheet && l->coat > 0)
+        imp__warn(g->ctx, "%s: %s: the clear coat of a sheet that transmits is not read",
+                  g->in->name, g->where);
+    if (sheet && json_object_get(pbr, "metallicFactor") && l->metallic > 0)
+        imp__warn(g->ctx,
+                  "%s: %s: the metallic part of a sheet that transmits is not read",
+                  g->in->name, g->where);
     return IMP_OK;
 }
 
@@ -97,6 +110,9 @@ static enum imp_status look_read(struct gltf *g, const json_t *object, struct lo
     IMP_CHECKED(imp__gltf_number(g, object, "alphaCutoff", 0, 1e6, &l->cutoff));
     IMP_CHECKED(
         imp__gltf_number(g, l->normal_info, "scale", -1e3, 1e3, &l->normal_scale));
+    if (l->alpha && strcmp(l->alpha, "OPAQUE") != 0 && strcmp(l->alpha, "MASK") != 0 &&
+        strcmp(l->alpha, "BLEND") != 0)
+        return imp__gltf_error(g, "alphaMode is '%.20s'", l->alpha);
     for (int k = 0; k < 4; k++)
         if (!(l->base[k] >= 0 && l->base[k] <= 1))
             return imp__gltf_error(g, "baseColorFactor is %g, not in [0, 1]", l->base[k]);
@@ -107,7 +123,8 @@ static enum imp_status look_read(struct gltf *g, const json_t *object, struct lo
 }
 
 /* One set of uvs a mesh: that of the textures, if they agree. */
-static enum imp_status texcoord(struct gltf *g, const struct look *l, int *out)
+static enum imp_status texcoord(struct gltf *g, const struct look *l, int *out,
+                                bool *textured)
 {
     const json_t *const infos[] = {l->base_info, l->rough_info, l->normal_info,
                                    l->emitted_info};
@@ -122,6 +139,7 @@ static enum imp_status texcoord(struct gltf *g, const struct look *l, int *out)
         if (set < 0) set = of;
     }
     *out = imp_max(set, 0);
+    *textured = set >= 0;
     return IMP_OK;
 }
 
@@ -227,7 +245,7 @@ enum imp_status imp__gltf_material(struct gltf *g, int material,
     m->id = imp__gltf_id(g, object, "material", index);
     if (!m->id) return imp__gltf_memory(g);
     IMP_CHECKED(look_read(g, object, &l));
-    IMP_CHECKED(texcoord(g, &l, &m->texcoord));
+    IMP_CHECKED(texcoord(g, &l, &m->texcoord, &m->textured));
     IMP_CHECKED(bsdf(g, &l, m->id));
     memcpy(m->emitted, l.emitted, sizeof m->emitted);
     if (l.emitted[0] > 0 || l.emitted[1] > 0 || l.emitted[2] > 0)

@@ -15,7 +15,7 @@ struct reading {
     const json_t *object, *attributes;
     size_t n_vertices, n_indices;
     struct gltf_accessor index;
-    bool indexed;
+    bool indexed, textured;
 };
 
 static void there(const struct reading *r)
@@ -138,6 +138,9 @@ static enum imp_status arrays(struct reading *r, int mode, int texcoord,
     snprintf(name, sizeof name, "TEXCOORD_%d", texcoord);
     IMP_CHECKED(attribute(r, "NORMAL", 3, &has_normals, &normal));
     IMP_CHECKED(attribute(r, name, 2, &has_uvs, &uv));
+    if (r->textured && !has_uvs)
+        imp__warn(g->ctx, "%s: %s: its material has textures, and it no %s", g->in->name,
+                  g->where, name);
     IMP_CHECKED(colors(r));
     IMP_CHECKED(indices(r));
     if (r->n_indices < 3) return IMP_OK;
@@ -184,6 +187,7 @@ static enum imp_status primitive(struct reading *r, struct gltf_primitive *out)
         return imp__gltf_unread(g, "it is left out", "%s: KHR_draco_mesh_compression",
                                 g->where);
     IMP_CHECKED(imp__gltf_material(g, out->material, &material));
+    r->textured = material->textured;
     return arrays(r, (int)mode, material->texcoord, out);
 }
 

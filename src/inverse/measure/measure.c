@@ -121,17 +121,38 @@ static enum imp_status photos_mask(struct imp__measure *m, bool *changed)
     return IMP_OK;
 }
 
+/* A fit whose cameras have no derivatives in this scene (what they see is refused by name) is
+ * made without them, which is said. */
+static enum imp_status stage_fit(struct imp__measure *m, enum imp_measure_stage stage,
+                                 imp_problem **problem,
+                                 const struct imp_fit_result **result)
+{
+    const enum imp_status st = imp__measure_fit(m, stage, m->round, problem, result);
+    const size_t cameras = imp__measure_count(m, IMP_MEASURE_CAMERAS);
+    if ((st != IMP_E_UNSUPPORTED && st != IMP_E_BIAS) || !cameras ||
+        (stage != IMP_MEASURE_CAMERAS && stage != IMP_MEASURE_TOGETHER))
+        return st;
+    IMP_CHECKED(imp__measure_say(m, "round %d: cameras stay: %s", m->round,
+                                 imp_last_error(m->ctx)));
+    for (size_t k = 0; k < m->scene->n_params; k++)
+        if (m->stage[k] == IMP_MEASURE_CAMERAS) m->stage[k] = IMP_MEASURE_STAGES;
+    if (stage == IMP_MEASURE_CAMERAS && !problem) return IMP_OK;
+    const enum imp_measure_stage left = last_stage(m);
+    if (imp__measure_count(m, left) == 0) return st; /* there was nothing else */
+    return imp__measure_fit(m, left, m->round, problem, result);
+}
+
 /* One round. *again: others follow. */
 static enum imp_status round_run(struct imp__measure *m, imp_problem **problem,
                                  const struct imp_fit_result **result, bool *again)
 {
-    const enum imp_measure_stage last = last_stage(m);
+    enum imp_measure_stage last = last_stage(m);
     double moved[IMP_MEASURE_STAGES] = {0};
     bool changed = false;
     for (int s = m->next; s < IMP_MEASURE_TOGETHER; s++) {
         const enum imp_measure_stage stage = (enum imp_measure_stage)s;
         if (stage == last || !m->due[s] || imp__measure_count(m, stage) == 0) continue;
-        IMP_CHECKED(imp__measure_fit(m, stage, m->round, NULL, NULL));
+        IMP_CHECKED(stage_fit(m, stage, NULL, NULL));
         m->next = s + 1;
         IMP_CHECKED(imp__measure_state_write(m));
     }
@@ -141,7 +162,9 @@ static enum imp_status round_run(struct imp__measure *m, imp_problem **problem,
         IMP_CHECKED(imp__measure_look(m)); /* where it goes on from a checkpoint */
         IMP_CHECKED(photos_mask(m, &changed));
     }
-    IMP_CHECKED(imp__measure_fit(m, last, m->round, problem, result));
+    last = last_stage(m);
+    IMP_CHECKED(stage_fit(m, last, problem, result));
+    last = last_stage(m);
     for (int s = 0; s < IMP_MEASURE_TEXTURES; s++)
         moved[s] =
             last == IMP_MEASURE_TOGETHER ? moved_since(m, (enum imp_measure_stage)s) : 0;
