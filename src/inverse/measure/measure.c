@@ -142,6 +142,39 @@ static enum imp_status stage_fit(struct imp__measure *m, enum imp_measure_stage 
     return imp__measure_fit(m, left, m->round, problem, result);
 }
 
+/* The fit that gives the answer. Pixels that no mask has taken and the scene cannot explain lead a fit
+ * without robust weights away from where the stages came to: then it has these weights, too. */
+static enum imp_status last_fit(struct imp__measure *m, enum imp_measure_stage stage,
+                                imp_problem **problem,
+                                const struct imp_fit_result **result)
+{
+    enum imp_status st = IMP_OK;
+    double *theta = imp__alloc(m->ctx, m->scene->n_theta + 1, sizeof *theta);
+    if (!theta) return imp__error(m->ctx, IMP_E_NOMEM, "no memory for a stage");
+    m->doubtful = false;
+    IMP_TRY(imp_scene_get_theta(m->scene, theta));
+    IMP_TRY(stage_fit(m, stage, problem, result));
+    if (m->n_rows < 2 || stage != IMP_MEASURE_TOGETHER) goto out;
+    const struct imp_measure_row *now = &m->rows[m->n_rows - 1], *before = now - 1;
+    if (before->round != now->round || now->explained ||
+        !(now->chi2 - before->chi2 > AGAIN * hypot(now->chi2_se, before->chi2_se)))
+        goto out;
+    IMP_TRY(imp__measure_say(m,
+                             "round %d: the last fit ended worse than it began, led by "
+                             "values that the scene does not explain: again with the "
+                             "weights of the stages; its intervals are too narrow",
+                             m->round));
+    imp_problem_destroy(*problem);
+    *problem = NULL;
+    m->looked = false;
+    m->doubtful = true;
+    IMP_TRY(imp_scene_set_theta(m->scene, theta));
+    IMP_TRY(stage_fit(m, last_stage(m), problem, result));
+out:
+    imp__release(m->ctx, theta);
+    return st;
+}
+
 /* One round. *again: others follow. */
 static enum imp_status round_run(struct imp__measure *m, imp_problem **problem,
                                  const struct imp_fit_result **result, bool *again)
@@ -163,7 +196,7 @@ static enum imp_status round_run(struct imp__measure *m, imp_problem **problem,
         IMP_CHECKED(photos_mask(m, &changed));
     }
     last = last_stage(m);
-    IMP_CHECKED(stage_fit(m, last, problem, result));
+    IMP_CHECKED(last_fit(m, last, problem, result));
     last = last_stage(m);
     for (int s = 0; s < IMP_MEASURE_TEXTURES; s++)
         moved[s] =

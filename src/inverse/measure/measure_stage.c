@@ -262,7 +262,7 @@ enum imp_status imp__measure_fit(struct imp__measure *m, enum imp_measure_stage 
     if (stage == IMP_MEASURE_TEXTURES) o.max_iterations = m->o.max_iterations;
     o.levels = levels_of(m, stage, round);
     IMP_TRY(imp__measure_look(m));
-    IMP_TRY(problem_make(m, stage, stage == IMP_MEASURE_TOGETHER, &p));
+    IMP_TRY(problem_make(m, stage, stage == IMP_MEASURE_TOGETHER && !m->doubtful, &p));
     st = imp_fit(p, &o, &run, &r);
     if (st != IMP_OK && st != IMP_CANCELLED)
         IMP_TRY(imp__error_prefix(m->ctx, st, "stage %s", name));

@@ -48,6 +48,8 @@ struct imp__measure {
     struct imp_measure_row *rows;
     size_t n_lines, cap_lines;
     char **lines;
+    bool
+        doubtful; /* the last fit has the stages' weights, which its intervals do not know */
     bool looked;  /* residuals are those of the present numbers */
     bool repeats; /* lines are not given to the host: the checkpoint's */
 };
