@@ -207,11 +207,14 @@ static int photo_read(struct photos *p, const char *path, int sensor)
     if (grown) p->photo = grown;
     char **paths = realloc(p->path, (p->n + 1) * sizeof *paths);
     if (paths) p->path = paths;
-    if (!grown || !paths) exit(cli_error(EXIT_RUN, "out of memory"));
+    char **specs = realloc(p->spec, (p->n + 1) * sizeof *specs);
+    if (specs) p->spec = specs;
+    if (!grown || !paths || !specs) exit(cli_error(EXIT_RUN, "out of memory"));
     p->path[p->n] = cli_strdup(path);
+    p->spec[p->n] = cli_strdup(spec);
     photo.name = p->path[p->n];
     p->photo[p->n++] = photo;
-    args_list_add(&problem_options.targets, cli_strdup(spec));
+    args_list_add(&problem_options.targets, p->spec[p->n - 1]);
     return 0;
 }
 
@@ -279,8 +282,10 @@ void photos_free(struct photos *p)
     for (size_t i = 0; i < p->n; i++) {
         free((void *)p->photo[i].pixels);
         free(p->path[i]);
+        free(p->spec[i]);
     }
     free(p->photo);
     free(p->path);
+    free(p->spec);
     args_list_free(&o.named);
 }

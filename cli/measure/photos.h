@@ -13,6 +13,7 @@ struct photos {
     size_t n;
     struct imp_photo *photo; /* [n] with pixels, owned */
     char **path;             /* [n] as messages have them */
+    char **spec;             /* [n] as targets: FILE@N */
 };
 
 /* The scene file among the operands: the first, or the one .xml file of a folder that stands
