@@ -19,6 +19,7 @@
  * PROBES places. One that finds them taken is lifted again where it is met again. */
 #define KNOWN_BITS_MAX 21
 #define PROBES         4
+#define BUSY           UINT32_MAX /* of a texel that a thread is lifting */
 
 static _Atomic uint32_t *atomic_of(uint32_t *x) { return (_Atomic uint32_t *)x; }
 static uint32_t get(uint32_t *x)
@@ -97,14 +98,23 @@ static const struct imp__lifted *lift_now(const struct imp__lifted_texels *t, si
         place = at;
         break;
     }
+    /* One thread gives the texel its spectrum: a second one would take room. Others that look it up
+     * meanwhile lift it for themselves. */
+    uint32_t none = 0;
+    const bool mine = atomic_compare_exchange_strong_explicit(
+        atomic_of(&t->spectrum_of[k]), &none, BUSY, memory_order_acquire,
+        memory_order_acquire);
+    if (!mine && none != BUSY) return &t->spectrum[none - 1];
     lift(t, t->by, p, own);
-    /* Another thread may have lifted it meanwhile: a second spectrum would take room. */
-    const uint32_t there = get(&t->spectrum_of[k]);
-    if (there) return &t->spectrum[there - 1];
-    if (get(t->used) >= t->room) return own;
+    if (!mine) return own;
     const uint32_t s =
-        atomic_fetch_add_explicit(atomic_of(t->used), 1, memory_order_relaxed);
-    if (s >= t->room) return own;
+        get(t->used) < t->room
+            ? atomic_fetch_add_explicit(atomic_of(t->used), 1, memory_order_relaxed)
+            : BUSY;
+    if (s >= t->room) {
+        put(&t->spectrum_of[k], 0);
+        return own;
+    }
     t->spectrum[s] = *own;
     memcpy(t->colour[s], p, sizeof t->colour[s]);
     put(place, s + 1);
@@ -116,7 +126,7 @@ const struct imp__lifted *imp__lifted_texel(const struct imp__lifted_texels *t, 
                                             struct imp__lifted *own)
 {
     const uint32_t s = get(&t->spectrum_of[k]);
-    return imp_likely(s != 0) ? &t->spectrum[s - 1] : lift_now(t, k, own);
+    return imp_likely(s - 1 < BUSY - 1) ? &t->spectrum[s - 1] : lift_now(t, k, own);
 }
 
 static enum imp_status lift_all(size_t first, size_t end, void *payload)
