@@ -181,7 +181,8 @@ static void next_print(const struct next_photo *next)
         const size_t n = strlen(next->name[row->candidate]);
         width = n > width ? n : width;
     }
-    printf("\nnext photograph ('=': cannot be told apart from the one above)\n");
+    printf(
+        "\nnext photograph ('=': the difference to the row above is within its error)\n");
     printf("%-4s  %-*s  %-8s  %-8s  intervals\n", "rank", (int)width, "photograph",
            "gain", "se");
     for (size_t k = 0; k < next->result->n_rows; k++) {
