@@ -8,33 +8,11 @@
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "math/rng.h"
+#include "mean_gradient.h"
 #include "walk/core/walk.h"
 
 static imp_context *ctx;
-enum { NUMBERS_MAX = 16, PIXELS_MAX = 1024 };
-
-/* d (mean of the picture)/d numbers, over seeds. */
-static void gradient_of(imp_scene *scene, const char *name, int spp, int seeds,
-                        struct tap_stat *out)
-{
-    static float adjoint[PIXELS_MAX * 3];
-    const struct imp_film_desc *film = &scene->sensors[0]->film;
-    const size_t n = (size_t)film->width * (size_t)film->height * (size_t)scene->channels;
-    imp_problem *p;
-    for (size_t k = 0; k < n; k++) adjoint[k] = (float)(1. / (double)n);
-    test_must(ctx, imp_problem_create(scene, &p));
-    test_must(ctx, imp_problem_activate(p, name));
-    const size_t numbers = imp_problem_n_variables(p);
-    for (int s = 0; s < seeds; s++) {
-        struct imp_run run = IMP_RUN_INIT;
-        double g[NUMBERS_MAX];
-        run.spp = spp;
-        run.seed = 7 + (uint64_t)s;
-        test_must(ctx, imp_problem_reverse(p, adjoint, &run, g, NULL));
-        for (size_t k = 0; k < numbers; k++) tap_add(&out[k], g[k]);
-    }
-    imp_problem_destroy(p);
-}
+enum { NUMBERS_MAX = 16 };
 
 static void scene_of(const char *camera, int size, const char *rest, const char *name,
                      imp_scene **out)
@@ -71,7 +49,7 @@ static void point_test(void)
              "<emitter type='point' id='bulb'><point name='position' x='.5' y='-.3' "
              "z='1.2'/><rgb name='intensity' value='2'/></emitter>",
              "bulb.position", &scene);
-    gradient_of(scene, "bulb.position", 16, 4, d);
+    mean_gradient(ctx, scene, "bulb.position", 16, 4, d);
     const double r2 = at[0] * at[0] + at[1] * at[1] + at[2] * at[2];
     for (int k = 0; k < 3; k++) {
         const double ref = rho / IMP_PI * power *
@@ -108,8 +86,8 @@ static void spot_test(void)
     test_must(ctx, imp_scene_add_geometry(scene, "bulb.direction"));
     test_must(ctx, imp_scene_find_param(scene, "bulb.direction", &index));
     test_must(ctx, imp_scene_set_values(scene, index, 3, v));
-    gradient_of(scene, "bulb.position", 16, 4, d[0]);
-    gradient_of(scene, "bulb.direction", 16, 4, d[1]);
+    mean_gradient(ctx, scene, "bulb.position", 16, 4, d[0]);
+    mean_gradient(ctx, scene, "bulb.direction", 16, 4, d[1]);
     for (int k = 0; k < 3; k++) {
         double lo[2][3], hi[2][3];
         for (int i = 0; i < 3; i++) {
@@ -147,7 +125,7 @@ static void rectangle_test(void)
                    "z='1.5'/></transform><emitter type='area'><rgb name='radiance' "
                    "value='5'/></emitter></shape>",
              "lamp.pose", &scene);
-    gradient_of(scene, "lamp.pose", 4096, 16, d);
+    mean_gradient(ctx, scene, "lamp.pose", 4096, 16, d);
     const double h = 1e-5;
     for (int k = 0; k < 3; k++) {
         const double x = .3, y = .2, z = 1.5,
@@ -192,7 +170,7 @@ static void penumbra_test(void)
              "<rotate x='1' angle='180'/><translate z='2'/></transform><emitter "
              "type='area'><rgb name='radiance' value='5'/></emitter></shape>",
              "screen.pose", &scene);
-    gradient_of(scene, "screen.pose", 256, 16, d);
+    mean_gradient(ctx, scene, "screen.pose", 256, 16, d);
     const double half = .9 * tan(40 * IMP_PI / 180);
     double ref = 0;
     for (int i = 0; i < N; i++)
@@ -216,7 +194,7 @@ static void view_test(void)
              "<shape type='rectangle'><emitter type='area'><rgb name='radiance' "
              "value='5'/></emitter></shape>",
              "camera.x_fov", &scene);
-    gradient_of(scene, "camera.x_fov", 256, 16, d);
+    mean_gradient(ctx, scene, "camera.x_fov", 256, 16, d);
     const double t = tan(25 * IMP_PI / 180);
     const double ref = -5 / (16 * t * t) * (1 + t * t) / t * (IMP_PI / 180);
     tap_z(&d[0], ref, 3e-3 * fabs(ref), "a square's picture by the field of view");
@@ -237,8 +215,8 @@ static void ball_test(void)
              "name='reflectance' value='0'/></bsdf></shape>",
              "ball.pose", &scene);
     test_must(ctx, imp_scene_add_geometry(scene, "ball.scale"));
-    gradient_of(scene, "ball.pose", 64, 16, place);
-    gradient_of(scene, "ball.scale", 64, 16, scale);
+    mean_gradient(ctx, scene, "ball.pose", 64, 16, place);
+    mean_gradient(ctx, scene, "ball.scale", 64, 16, scale);
     const double t = tan(25 * IMP_PI / 180), D = 4, r = .8, q = D * D - r * r;
     const double film = -5 * IMP_PI / (4 * t * t);
     /* All of the circle brings the same. */
@@ -283,8 +261,8 @@ static void frame_test(void)
                    "</emitter></shape>",
              "camera.x_fov", &scene);
     test_must(ctx, imp_scene_add_geometry(scene, "camera.pose"));
-    gradient_of(scene, "camera.x_fov", 64, 16, view);
-    gradient_of(scene, "camera.pose", 256, 24, turn);
+    mean_gradient(ctx, scene, "camera.x_fov", 64, 16, view);
+    mean_gradient(ctx, scene, "camera.pose", 256, 24, turn);
     struct imp_tracer t = {.scene = scene,
                            .integrator = imp__walk_integrator(scene),
                            .sensor = scene->sensors[0],

@@ -7,33 +7,10 @@
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "math/vec.h"
+#include "mean_gradient.h"
 
 static imp_context *ctx;
-enum { NUMBERS_MAX = 6, PIXELS_MAX = 1024, N = 400 };
-
-/* d (mean of the picture)/d numbers, over seeds. */
-static void gradient_of(imp_scene *scene, const char *name, int spp, int seeds,
-                        struct tap_stat *out)
-{
-    static float adjoint[PIXELS_MAX];
-    struct imp_sensor_info film = {.size = sizeof film};
-    imp_problem *p;
-    test_must(ctx, imp_scene_get_sensor(scene, 0, &film));
-    const size_t n = (size_t)film.width * (size_t)film.height;
-    for (size_t k = 0; k < n; k++) adjoint[k] = (float)(1. / (double)n);
-    test_must(ctx, imp_problem_create(scene, &p));
-    test_must(ctx, imp_problem_activate(p, name));
-    const size_t numbers = imp_problem_n_variables(p);
-    for (int s = 0; s < seeds; s++) {
-        struct imp_run run = IMP_RUN_INIT;
-        double g[NUMBERS_MAX];
-        run.spp = spp;
-        run.seed = 7 + (uint64_t)s;
-        test_must(ctx, imp_problem_reverse(p, adjoint, &run, g, NULL));
-        for (size_t k = 0; k < numbers; k++) tap_add(&out[k], g[k]);
-    }
-    imp_problem_destroy(p);
-}
+enum { NUMBERS_MAX = 6, N = 400 };
 
 static imp_scene *scene_of(const char *camera, int size, const char *rest)
 {
@@ -97,8 +74,8 @@ static void sky_test(void)
         test_must(ctx, imp_scene_add_geometry(scene, "plate.scale"));
         test_must(ctx, imp_scene_find_param(scene, "plate.pose", &index));
         test_must(ctx, imp_scene_set_values(scene, index, 6, at));
-        gradient_of(scene, "plate.pose", 64, 16, pose);
-        gradient_of(scene, "plate.scale", 64, 16, scale);
+        mean_gradient(ctx, scene, "plate.pose", 64, 16, pose);
+        mean_gradient(ctx, scene, "plate.scale", 64, 16, scale);
         const double largest = 5 * 2 * film_part((double[3]){0}, at[3], 0, r, t) / 4;
         for (int k = 0; k < 5;
              k++) { /* at a = 0 the axes of both rotations are at right angles */
@@ -153,7 +130,7 @@ static void lamp_test(void)
                        "z='1.5'/></transform><emitter type='area'><rgb name='radiance' "
                        "value='5'/></emitter></shape>");
     test_must(ctx, imp_scene_add_geometry(scene, "lamp.pose"));
-    gradient_of(scene, "lamp.pose", 512, 16, d);
+    mean_gradient(ctx, scene, "lamp.pose", 512, 16, d);
     for (int k = 0; k < 4; k++) {
         const imp_v3 e = {h * (k == 0), h * (k == 1), h * (k == 2)}, p = {.3, .2, 1.5};
         const double a = h * (k == 3);
@@ -176,7 +153,7 @@ static void ball_test(void)
               "name='center' x='.3' y='.2' z='1.5'/><emitter type='area'><rgb "
               "name='radiance' value='5'/></emitter></shape>");
     test_must(ctx, imp_scene_add_geometry(scene, "lamp.pose"));
-    gradient_of(scene, "lamp.pose", 512, 16, d);
+    mean_gradient(ctx, scene, "lamp.pose", 512, 16, d);
     const double d2 = c[0] * c[0] + c[1] * c[1] + c[2] * c[2];
     for (int k = 0; k < 3; k++) {
         const double ref =
@@ -212,8 +189,8 @@ static void shadow_test(void)
     const double side = 2 * .9 * tan(40 * IMP_PI / 180), h = 1e-4;
     test_must(ctx, imp_scene_add_geometry(scene, "plate.pose"));
     test_must(ctx, imp_scene_add_geometry(scene, "plate.scale"));
-    gradient_of(scene, "plate.pose", 64, 16, pose);
-    gradient_of(scene, "plate.scale", 64, 16, scale);
+    mean_gradient(ctx, scene, "plate.pose", 64, 16, pose);
+    mean_gradient(ctx, scene, "plate.scale", 64, 16, scale);
     const double by = -.6 / IMP_PI / (side * side);
     const double z = by * (shadow(.25, 1 + h) - shadow(.25, 1 - h)) / (2 * h),
                  r = by * (shadow(.25 + h, 1) - shadow(.25 - h, 1)) / (2 * h) * .25;

@@ -3,19 +3,10 @@
  * Perez' sky: one in each of the eight bins of clearness, horizontal and vertical illuminances
  * by walks against an integral over the formula written again here, with the table by rows
  * (Perez, Seals and Michalsky 1993, table 1); what is refused. */
-#include "imp_scene.h"
-#include "imp_tap.h"
-#include <importon/rooms.h>
+#include "sky_kit.h"
 #include <math.h>
 
 static imp_context *ctx;
-
-#define METER(facing)                                                                    \
-    "<shape type='rectangle'><transform name='to_world'><scale value='.1'/></transform>" \
-    "<sensor type='irradiancemeter'><boolean name='virtual' value='true'/>" facing       \
-    "<string name='units' value='photometric'/><film type='hdrfilm'><integer "           \
-    "name='width' value='1'/><integer name='height' value='1'/></film></sensor></shape>"
-#define HEAD "<scene version='3.0.0'><integrator type='path'/>"
 
 static const double table[8][20] = {
     {1.3525,  -0.2576, -0.2690, -1.4366, -0.7670, 0.0007, 1.2734,
@@ -102,12 +93,7 @@ static void skies(void)
         const double level = k % 2 ? 20000 : w[0], all = integral(w[0], w[1], up, &bin);
         tap_ok(bin == k, "%g and %g W/m^2: bin %d", w[0], w[1], bin + 1);
         for (int m = 0; m < 2; m++) {
-            struct imp_run run = IMP_RUN_INIT;
-            struct imp_estimate e;
-            double value, se;
-            run.spp = 40000;
-            run.sensor = m;
-            test_must(ctx, imp_grid_read(s, &run, &value, &se, &e, NULL));
+            const struct imp_estimate e = read_meter(ctx, s, m, IMP_FROM_SENSOR);
             const double truth = level * (m ? integral(w[0], w[1], side, &bin) / all : 1);
             tap_ok(fabs(e.value - truth) < 4.5 * e.se + 2e-4 * truth &&
                        e.se < .01 * truth,
@@ -128,17 +114,7 @@ static void refused(void)
         {"<float name='diffuse' value='9'/><float name='direct' value='9'/><vector "
          "name='sun_direction' x='1' y='0' z='-1'/>",
          "below the horizon"}};
-    for (int k = 0; k < 4; k++) {
-        char xml[1024];
-        imp_scene *s = NULL;
-        snprintf(xml, sizeof xml, HEAD "<emitter type='perezsky'>%s</emitter></scene>",
-                 rows[k][0]);
-        const enum imp_status st =
-            imp_scene_load_string(ctx, xml, strlen(xml), "test", NULL, &s);
-        tap_ok(st == IMP_E_SCENE && strstr(imp_last_error(ctx), rows[k][1]), "%s",
-               imp_last_error(ctx));
-        imp_scene_destroy(s);
-    }
+    for (int k = 0; k < 4; k++) sky_refused(ctx, "perezsky", rows[k][0], rows[k][1]);
 }
 
 int main(void)

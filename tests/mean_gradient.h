@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * For tests of derivatives in closed form: gradients of the mean of a picture. */
+#ifndef IMP_TEST_MEAN_GRADIENT_H
+#define IMP_TEST_MEAN_GRADIENT_H
+
+#include "imp_scene.h"
+#include "imp_tap.h"
+
+enum { MEAN_NUMBERS_MAX = 16, MEAN_VALUES_MAX = 1024 * 3 };
+
+/* d (mean of sensor 0's picture)/d numbers of a parameter, added to out [numbers] for each seed. */
+static inline void mean_gradient(imp_context *ctx, imp_scene *scene, const char *name,
+                                 int spp, int seeds, struct tap_stat *out)
+{
+    static float adjoint[MEAN_VALUES_MAX];
+    struct imp_scene_info info = {.size = sizeof info};
+    struct imp_sensor_info film = {.size = sizeof film};
+    double g[MEAN_NUMBERS_MAX];
+    imp_problem *p;
+    test_must(ctx, imp_scene_get_info(scene, &info));
+    test_must(ctx, imp_scene_get_sensor(scene, 0, &film));
+    const size_t n = (size_t)film.width * (size_t)film.height * (size_t)info.channels;
+    for (size_t k = 0; k < n && k < MEAN_VALUES_MAX; k++)
+        adjoint[k] = (float)(1. / (double)n);
+    test_must(ctx, imp_problem_create(scene, &p));
+    test_must(ctx, imp_problem_activate(p, name));
+    const size_t numbers = imp_problem_n_variables(p);
+    if (n > MEAN_VALUES_MAX || numbers > MEAN_NUMBERS_MAX) exit(99);
+    for (int s = 0; s < seeds; s++) {
+        struct imp_run run = IMP_RUN_INIT;
+        run.spp = spp;
+        run.seed = 7 + (uint64_t)s;
+        test_must(ctx, imp_problem_reverse(p, adjoint, &run, g, NULL));
+        for (size_t k = 0; k < numbers; k++) tap_add(&out[k], g[k]);
+    }
+    imp_problem_destroy(p);
+}
+
+#endif
