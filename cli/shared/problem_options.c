@@ -34,7 +34,7 @@ const struct arg_option options_params[] = {
     {ARG_LIST | ARG_REPLAYS, 0, "log", "GLOB,..",
      "these are fitted as logarithms, and stay positive", &problem_options.log, 0, 0,
      NULL},
-    {ARG_LIST | ARG_REPLAYS, 0, "hold", "NAME[i],..",
+    {ARG_LIST | ARG_REPLAYS, 0, "hold", "NAME[i-j]",
      "these numbers stay as they are: block.pose[2-4]", &problem_options.hold, 0, 0,
      NULL},
     {0}};

@@ -969,14 +969,15 @@ struct imp_tie_info {
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_problem_get_tie(const imp_problem *problem, size_t i, struct imp_tie_info *info);
 
-/** Hold single numbers of active parameters at the values that the scene has: x, a block on a
- * floor, `block.pose[2-4]`. Held numbers stay in x, between bounds that are both their value;
+/** Hold numbers of active parameters at the values that the scene has: of a block on a floor
+ * `block.pose[2-4]`. Held numbers stay in x, between bounds that are both their value;
  * their derivatives are 0, with an error of 0; fits and their intervals are those of the other
  * numbers. Checks test every number.
  * @param glob  as for imp_problem_activate, which comes first, with the numbers' indices behind
- *              it: "block.pose[2]", "*.pose[3-5]"; or several, with commas between them.
- * @return IMP_OK; IMP_E_ARG if indices are missing or not below the count of numbers, or an
- *         active parameter matches nowhere or has a tie; IMP_E_UNSUPPORTED in fields of
+ *              it: "block.pose[2]", "*.pose[3-5]", or without indices for all numbers of a
+ *              parameter; or several, with commas between them.
+ * @return IMP_OK; IMP_E_ARG if an index is not below the count of numbers, or an active
+ *         parameter matches nowhere or has a tie; IMP_E_UNSUPPORTED in fields of
  *         indices; IMP_E_NOMEM. After an error nothing more is held. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_hold(imp_problem *problem,
                                                         const char *glob);

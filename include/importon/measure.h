@@ -73,7 +73,9 @@ struct imp_measure_options {
      * may tell of, and the poses of their cameras. */
     const char *const *params;
     size_t n_params;
-    const char *const *hold; /**< [n_hold] of these, what stays as it is */
+    const char *const
+        *hold; /**< [n_hold] of these, what stays as it is; single numbers as
+                                  imp_problem_hold has them: "left.pose[3-5]" */
     size_t n_hold;
     int rounds; /**< of all stages, at most; 0: 3 */
     double

@@ -272,8 +272,8 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         Parameters that keep their ratios: one factor multiplies them, `fit["factor(lamp.*)"]`.
     log : pattern, or list of them, optional
         Parameters that move as logarithms, and stay positive. Values are in their own unit.
-    hold : pattern with indices, or list of them, optional
-        Single numbers that stay as they are: "block.pose[2-4]", of a block that stands on a floor.
+    hold : pattern, with indices or without, or list of them, optional
+        Numbers that stay as they are: "block.pose[2-4]", of a block that stands on a floor.
     time_limit : float
         In seconds; 0: none.
     progress : bool or callable, optional

@@ -167,7 +167,7 @@ def measure(scene: Scene, photos: Any, params: Any = None, *, stages: Any = None
     stages : str or list of str, optional
         Of "cameras", "exposure", "lights", "materials", "textures"; by default all.
     hold : str or list of str
-        Names or patterns of what stays as it is.
+        Names or patterns of what stays as it is, with indices for single numbers: "left.pose[3-5]".
     rounds : int
         Of all stages, at most; 0: 3.
     mask : float

@@ -111,11 +111,25 @@ static void fit_test(const char *hold, enum imp_optimizer optimizer, double se[6
     end(p, scene);
 }
 
+static void whole_test(void)
+{
+    imp_scene *scene;
+    imp_problem *p = problem_of(&scene, "block.pose");
+    size_t held = 0;
+    for (size_t i = 0; i < 6; i++) {
+        struct imp_variable_info v = IMP_VARIABLE_INFO_INIT;
+        test_must(ctx, imp_problem_get_variable(p, i, &v));
+        held += v.held;
+    }
+    tap_ok(held == 6, "a name without indices holds all of its numbers");
+    end(p, scene);
+}
+
 static void refused_test(void)
 {
     static const char *const bad[] = {
-        "block.pose", "block.pose[6]",   "block.pose[3-2]", "block.pose[]",
-        "none[0]",    "block.pose[1],x", "block.pose[-1]",  ""};
+        "block.pose[6]", "block.pose[3-2]", "block.pose[]",   "none[0]",
+        "none",          "block.pose[1],x", "block.pose[-1]", ""};
     imp_scene *scene;
     imp_problem *p = problem_of(&scene, "*.pose[4],block.pose[2-3]");
     size_t wrong = 0;
@@ -172,6 +186,7 @@ int main(void)
            shorter);
     fit_test("block.pose[2-4]", IMP_ADAM, other);
     fit_test("block.pose[2-4]", IMP_LBFGS, other);
+    whole_test();
     refused_test();
     check_test();
     imp_context_destroy(ctx);

@@ -240,5 +240,6 @@ uint64_t imp__measure_hash(const struct imp__measure *m)
     h = imp__hash(h, o, sizeof o);
     h = imp__hash(h, &m->run.seed, sizeof m->run.seed);
     h = imp__hash(h, m->wanted, sizeof m->wanted);
+    if (m->held) h = imp__hash(h, m->held, s->n_theta);
     return imp__hash(h, m->stage, s->n_params);
 }

@@ -34,6 +34,13 @@ static bool is_meant(const char *const *list, size_t n, const char *name)
     return false;
 }
 
+/* Item i of `hold`: a name or a pattern, and perhaps indices. */
+static enum imp_status held_item(const struct imp__measure *m, size_t i,
+                                 struct imp__held *item)
+{
+    return imp__held_read(m->ctx, m->o.hold[i], strlen(m->o.hold[i]), item);
+}
+
 /* A number of a photograph's camera becomes a parameter, or there is a line that says why not. */
 static enum imp_status camera_add(struct imp__measure *m, const struct imp__photo *p,
                                   const char *number, bool wanted_anyway)
@@ -42,7 +49,12 @@ static enum imp_status camera_add(struct imp__measure *m, const struct imp__phot
     snprintf(name, sizeof name, "%.300s.%s", p->sensor->name, number);
     const bool named = is_meant(m->o.params, m->o.n_params, name);
     if (m->o.params ? !named : !wanted_anyway) return IMP_OK;
-    if (is_meant(m->o.hold, m->o.n_hold, name)) return IMP_OK;
+    for (size_t i = 0; i < m->o.n_hold; i++) {
+        struct imp__held item;
+        const char *glob = item.glob;
+        IMP_CHECKED(held_item(m, i, &item));
+        if (item.last == SIZE_MAX && is_meant(&glob, 1, name)) return IMP_OK;
+    }
     const enum imp_status st = imp_scene_add_geometry(m->scene, name);
     if (st != IMP_E_UNSUPPORTED || named) return st;
     return imp__measure_say(m, "%s stays: %s", name, imp_last_error(m->ctx));
@@ -109,25 +121,58 @@ static bool names(const struct imp__measure *m, const char *glob, size_t k)
     return imp_scene_find_param(m->scene, glob, &index) == IMP_OK && index == k;
 }
 
-static enum imp_status all_mean_something(const struct imp__measure *m, const char *what,
-                                          const char *const *list, size_t n)
+static enum imp_status params_mean_something(const struct imp__measure *m)
 {
-    for (size_t i = 0; i < n; i++) {
+    for (size_t i = 0; i < m->o.n_params; i++) {
         bool met = false;
         for (size_t k = 0; k < m->scene->n_params && !met; k++)
-            met = names(m, list[i], k);
-        if (!met && !is_geometry(list[i]))
-            return imp__error(m->ctx, IMP_E_ARG, "%s '%s': there is no such parameter",
-                              what, list[i]);
+            met = names(m, m->o.params[i], k);
+        if (!met && !is_geometry(m->o.params[i]))
+            return imp__error(m->ctx, IMP_E_ARG,
+                              "params '%s': there is no such parameter", m->o.params[i]);
     }
     return IMP_OK;
 }
 
-static bool is_listed(const struct imp__measure *m, const char *const *list, size_t n,
-                      size_t k)
+/* What `hold` means: parameters that are in no stage, and single numbers. Each item must mean
+ * something. */
+static enum imp_status holds_apply(struct imp__measure *m)
 {
-    for (size_t i = 0; i < n; i++)
-        if (names(m, list[i], k)) return true;
+    const struct imp_scene *s = m->scene;
+    for (size_t i = 0; i < m->o.n_hold; i++) {
+        struct imp__held item;
+        bool met = false;
+        IMP_CHECKED(held_item(m, i, &item));
+        for (size_t k = 0; k < s->n_params; k++) {
+            if (!names(m, item.glob, k)) continue;
+            met = true;
+            if (item.last == SIZE_MAX) {
+                m->stage[k] = IMP_MEASURE_STAGES;
+                continue;
+            }
+            if (!m->held) m->held = imp__alloc(m->ctx, s->n_theta + 1, 1);
+            if (!m->held)
+                return imp__error(m->ctx, IMP_E_NOMEM, "no memory for held numbers");
+            IMP_CHECKED(imp__held_mark(m->ctx, &item, &s->params[k].info, m->held));
+        }
+        if (!met && !is_geometry(item.glob))
+            return imp__error(m->ctx, IMP_E_ARG, "hold '%s': there is no such parameter",
+                              item.glob);
+    }
+    return IMP_OK;
+}
+
+/* Is a number of parameter k held by itself? */
+bool imp__measure_holds(const struct imp__measure *m, size_t k)
+{
+    const struct imp_param_info *info = &m->scene->params[k].info;
+    return m->held && memchr(m->held + info->offset, 1, info->count) != NULL;
+}
+
+static bool is_named(const struct imp__measure *m, size_t k)
+{
+    for (size_t i = 0; i < m->o.n_params; i++)
+        if (names(m, m->o.params[i], k)) return true;
     return false;
 }
 
@@ -202,19 +247,18 @@ enum imp_status imp__measure_numbers(struct imp__measure *m)
     if (!m->stage || !m->at || !m->at_se)
         return imp__error(m->ctx, IMP_E_NOMEM, "no memory for %zu parameters",
                           s->n_params);
-    IMP_CHECKED(all_mean_something(m, "params", m->o.params, m->o.n_params));
-    IMP_CHECKED(all_mean_something(m, "hold", m->o.hold, m->o.n_hold));
+    IMP_CHECKED(params_mean_something(m));
     for (size_t k = 0; k < s->n_params; k++) {
         const enum imp_measure_stage stage = stage_of(m, k);
         const bool meant = m->o.params
-                               ? is_listed(m, m->o.params, m->o.n_params, k)
+                               ? is_named(m, k)
                                : !imp__pose_of(s, k) || stage == IMP_MEASURE_CAMERAS;
         m->stage[k] = IMP_MEASURE_STAGES;
         if (stage == IMP_MEASURE_STAGES || !m->wanted[stage] || !meant) continue;
-        if (is_listed(m, m->o.hold, m->o.n_hold, k)) continue;
         if (!(s->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE)) continue;
         m->stage[k] = (uint8_t)stage;
     }
+    IMP_CHECKED(holds_apply(m));
     if (lights_free(m, 1))
         IMP_CHECKED(unit_hold(m, "exposure",
                               "photographs determine its product with the lights alone"));

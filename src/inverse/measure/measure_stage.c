@@ -43,7 +43,7 @@ static bool is_tied(const struct imp__measure *m, enum imp_measure_stage stage, 
     const struct imp_param *q = &m->scene->params[k];
     bool shines = false;
     if (stage != IMP_MEASURE_EXPOSURE || m->stage[k] != IMP_MEASURE_LIGHTS ||
-        imp__pose_of(m->scene, k))
+        imp__pose_of(m->scene, k) || imp__measure_holds(m, k))
         return false;
     for (size_t e = 0; e < q->info.count; e++) shines |= imp__param_get(q, e) > 0;
     return shines && !strpbrk(q->info.name, "*?[],");
@@ -75,7 +75,7 @@ static enum imp_status exposures_tie(struct imp__measure *m, imp_problem *p)
         const struct imp_param *q =
             imp__measure_film_number(m, &m->photos[i], "exposure", &k);
         if (!q || !p->chosen[k] || !(imp__param_get(q, 0) > 0) ||
-            strpbrk(q->info.name, "*?[],"))
+            imp__measure_holds(m, k) || strpbrk(q->info.name, "*?[],"))
             continue;
         IMP_CHECKED(imp_problem_tie(p, q->info.name, IMP_TIE_LOG));
     }
@@ -135,6 +135,7 @@ static enum imp_status problem_make(struct imp__measure *m, enum imp_measure_sta
         chosen[k] = is_own(m, stage, k) || is_along(m, stage, k) || is_tied(m, stage, k);
     IMP_TRY(imp_problem_create(m->scene, &p));
     IMP_TRY(imp__problem_layout(p, chosen));
+    if (m->held) IMP_TRY(imp__problem_hold_marked(p, m->held));
     IMP_TRY(lights_tie(m, stage, p));
     IMP_TRY(exposures_tie(m, p));
     for (size_t i = 0; i < m->n_photos; i++) IMP_TRY(target_add(m, p, i, last));

@@ -39,6 +39,7 @@ struct imp__measure {
     struct imp__photo *photos;
     bool wanted[IMP_MEASURE_STAGES];
     uint8_t *stage;  /* [n_params] of which stage it is; IMP_MEASURE_STAGES: held */
+    uint8_t *held;   /* [n_theta] single numbers that stay; NULL: none */
     double *at;      /* [n_theta] where its own stage has left each number */
     double *at_se;   /* [n_theta] and its standard error there; 0: none */
     uint64_t task;   /* hash of scene, photographs and options */
@@ -75,6 +76,8 @@ enum imp_status imp__measure_numbers(struct imp__measure *m);
 struct imp_param *imp__measure_film_number(const struct imp__measure *m,
                                            const struct imp__photo *photo,
                                            const char *number, size_t *index);
+/* Is a single number of parameter k held? */
+bool imp__measure_holds(const struct imp__measure *m, size_t k);
 /* How many numbers a stage has. */
 size_t imp__measure_count(const struct imp__measure *m, enum imp_measure_stage stage);
 

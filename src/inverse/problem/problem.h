@@ -184,6 +184,20 @@ size_t imp__held_count(const struct imp_problem *p);
 struct imp__bounds {
     double lo, hi;
 } imp__block_bounds(const struct imp_problem *p, const struct imp__block *b, size_t e);
+/* An item of imp_problem_hold: numbers first to last of the parameters that the glob matches; all
+ * of them where last is SIZE_MAX. */
+struct imp__held {
+    char glob[256];
+    size_t first, last;
+};
+/* The first n bytes of a text as an item. IMP_E_ARG: they are none. */
+enum imp_status imp__held_read(imp_context *ctx, const char *text, size_t n,
+                               struct imp__held *item);
+/* Marks the item's numbers of a parameter in held [n_theta]. IMP_E_ARG: it has fewer. */
+enum imp_status imp__held_mark(imp_context *ctx, const struct imp__held *item,
+                               const struct imp_param_info *info, uint8_t *held);
+/* The marked numbers, held [n_theta], and no others are held. */
+enum imp_status imp__problem_hold_marked(struct imp_problem *p, const uint8_t *held);
 /* IMP_E_UNSUPPORTED if numbers are held where `what` moves all of them. */
 enum imp_status imp__holds_none(const struct imp_problem *p, const char *what);
 /* Forgets the tie that was made last; the layout is the caller's. */
