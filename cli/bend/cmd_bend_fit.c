@@ -2,6 +2,7 @@
  *
  * importon bend fit: a field that meets the targets, and what is written of it. */
 #include "cmd_bend.h"
+#include "shared/answer_file.h"
 #include "shared/output.h"
 #include "shared/picture_files.h"
 #include "shared/plot.h"
@@ -158,24 +159,14 @@ static void put_answer(struct json *j, imp_bend *bend,
 static int write_answer(imp_bend *bend, const struct imp_bend_fit_result *r,
                         double seconds)
 {
-    char *path = join_path(cli.out, "bend.json");
-    struct output to;
-    int rc = output_open(&to, path, OUTPUT_JSON);
-    if (!rc) {
-        struct json j = {to.file, 0};
-        json_object(&j, NULL);
-        json_text(&j, "importon", imp_version());
-        json_text(&j, "command", "bend");
-        put_answer(&j, bend, r, seconds);
-        json_object(&j, "history");
-        json_numbers(&j, "loss", r->n_history, r->history);
-        json_end_object(&j);
-        json_end_object(&j);
-        fputc('\n', to.file);
-        rc = output_close(&to, 0);
-    }
-    free(path);
-    return rc;
+    struct answer_file to;
+    const int rc = answer_open(&to, cli.out, "bend.json", "bend");
+    if (rc) return rc;
+    put_answer(&to.json, bend, r, seconds);
+    json_object(&to.json, "history");
+    json_numbers(&to.json, "loss", r->n_history, r->history);
+    json_end_object(&to.json);
+    return answer_close(&to, 0);
 }
 
 int bend_fit(imp_bend *bend)

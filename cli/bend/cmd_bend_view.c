@@ -5,7 +5,7 @@
 #include "bend_chart.h"
 #include "bend_items.h"
 #include "cmd_bend.h"
-#include "shared/output.h"
+#include "shared/answer_file.h"
 #include "shared/picture_files.h"
 
 #include <math.h>
@@ -341,24 +341,14 @@ static int targets(imp_bend *b, const struct palette *palette, const char *folde
 static int rays_write(imp_bend *b, const char *folder, const char *prefix)
 {
     struct bend_truth truth;
-    struct output to;
+    struct answer_file to;
     char name[64];
     snprintf(name, sizeof name, "%srays.json", prefix);
-    char *path = join_path(folder, name);
     int rc = bend_truth_open(bend_truth_path, &truth);
-    if (!rc) rc = output_open(&to, path, OUTPUT_JSON);
-    if (!rc) {
-        struct json j = {to.file, 0};
-        json_object(&j, NULL);
-        json_text(&j, "importon", imp_version());
-        json_text(&j, "command", "rays");
-        rc = bend_rays_json(&j, b, bend_truth_field(&truth));
-        json_end_object(&j);
-        fputc('\n', to.file);
-        rc = output_close(&to, rc);
-    }
+    if (!rc) rc = answer_open(&to, folder, name, "rays");
+    if (!rc)
+        rc = answer_close(&to, bend_rays_json(&to.json, b, bend_truth_field(&truth)));
     bend_truth_close(&truth);
-    free(path);
     return rc;
 }
 

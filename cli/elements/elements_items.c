@@ -5,7 +5,7 @@
 #include "elements_items.h"
 
 #include "elements_mesh.h"
-#include "shared/output.h"
+#include "shared/answer_file.h"
 #include "shared/picture_files.h"
 
 #include <math.h>
@@ -278,26 +278,17 @@ static int put_mesh(struct json *j, const imp_elements *e,
 static int write_file(const imp_elements *e, const struct elements_answer *a,
                       const char *folder, int which)
 {
-    char *path = join_path(folder, files[which]);
-    struct output to;
-    int rc = output_open(&to, path, OUTPUT_JSON);
-    if (!rc) {
-        struct json j = {to.file, 0};
-        json_object(&j, NULL);
-        json_text(&j, "importon", imp_version());
-        json_text(&j, "command", which ? "mesh" : "elements");
-        if (which) {
-            rc = put_mesh(&j, e, a);
-        } else {
-            elements_answer_info(a, &j);
-            if (elements_fit_wanted()) elements_fit_json(&j, a->typed);
-            elements_answer_sensitivity(a, &j);
-        }
-        cli_json_end(&j);
-        rc = output_close(&to, rc);
+    struct answer_file to;
+    int rc = answer_open(&to, folder, files[which], which ? "mesh" : "elements");
+    if (rc) return rc;
+    if (which) {
+        rc = put_mesh(&to.json, e, a);
+    } else {
+        elements_answer_info(a, &to.json);
+        if (elements_fit_wanted()) elements_fit_json(&to.json, a->typed);
+        elements_answer_sensitivity(a, &to.json);
     }
-    free(path);
-    return rc;
+    return answer_close(&to, rc);
 }
 
 int elements_report_write(const imp_elements *e, const struct elements_answer *a,

@@ -4,6 +4,7 @@
 #include "fit_answer.h"
 
 #include "fit_pictures.h"
+#include "shared/answer_file.h"
 #include "shared/command.h"
 #include "shared/output.h"
 #include "shared/picture_files.h"
@@ -36,20 +37,11 @@ static int write_history(const struct imp_fit_result *r)
 
 static int write_json(const struct fit_answer *a, char **paths)
 {
-    char *path = join_path(cli.out, "parameters.json");
-    struct output to;
-    int rc = output_open(&to, path, OUTPUT_JSON);
-    if (!rc) {
-        struct json j = {to.file, 0};
-        json_object(&j, NULL);
-        json_text(&j, "importon", imp_version());
-        json_text(&j, "command", "fit");
-        fit_answer_json(&j, a, paths);
-        cli_json_end(&j);
-        rc = output_close(&to, 0);
-    }
-    free(path);
-    return rc;
+    struct answer_file to;
+    const int rc = answer_open(&to, cli.out, "parameters.json", "fit");
+    if (rc) return rc;
+    fit_answer_json(&to.json, a, paths);
+    return answer_close(&to, 0);
 }
 
 /* What is left, or that it is below the noise of so many samples. */

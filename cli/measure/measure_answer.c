@@ -5,7 +5,7 @@
 
 #include "fit/fit_answer.h"
 #include "fit/fit_pictures.h"
-#include "shared/output.h"
+#include "shared/answer_file.h"
 #include "shared/picture_files.h"
 
 #include <math.h>
@@ -154,20 +154,11 @@ static void put_all(struct json *j, const struct measure_answer *a,
 
 static int json_write(const struct measure_answer *a, const struct fit_answer *fit)
 {
-    char *path = join_path(cli.out, "measure.json");
-    struct output to;
-    int rc = output_open(&to, path, OUTPUT_JSON);
-    if (!rc) {
-        struct json j = {to.file, 0};
-        json_object(&j, NULL);
-        json_text(&j, "importon", imp_version());
-        json_text(&j, "command", "measure");
-        put_all(&j, a, fit);
-        cli_json_end(&j);
-        rc = output_close(&to, 0);
-    }
-    free(path);
-    return rc;
+    struct answer_file to;
+    const int rc = answer_open(&to, cli.out, "measure.json", "measure");
+    if (rc) return rc;
+    put_all(&to.json, a, fit);
+    return answer_close(&to, 0);
 }
 
 /* ---- Text ------------------------------------------------------------------------------ */
