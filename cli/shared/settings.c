@@ -39,66 +39,14 @@ char *read_all(FILE *file, size_t limit, size_t *length)
     return NULL;
 }
 
-static int set_error(const char *where, const char *text, const char *why)
-{
-    if (where) return cli_error(EXIT_USAGE, "%s: '%.60s': %s", where, text, why);
-    return cli_error(EXIT_USAGE, "--set %s: %s", text, why);
-}
-
 enum imp_status settings_pose(const char *name)
 {
-    static const char *const tails[] = {"pose",
-                                        "scale",
-                                        "vertex_positions",
-                                        "x_fov",
-                                        "principal_point_offset_x",
-                                        "principal_point_offset_y",
-                                        "position",
-                                        "direction"};
     const char *dot = strrchr(name, '.');
     size_t index;
-    for (size_t k = 0; dot && k < sizeof tails / sizeof *tails; k++) {
-        if (strcmp(dot + 1, tails[k]) != 0) continue;
-        if (imp_scene_find_param(cli.scene, name, &index) == IMP_OK) return IMP_OK;
-        const enum imp_status st = imp_scene_add_geometry(cli.scene, name);
-        /* What is wrong with a name that parameters of other kinds may have is said later. */
-        return st == IMP_E_ARG && k > 0 ? IMP_OK : st;
-    }
-    return IMP_OK;
-}
-
-/* One --set: "name=v" or "name=v,v,..". Messages begin with `where` it is written; NULL: on
- * the command line. */
-static int apply_set(const char *where, const char *text)
-{
-    const char *equal = strchr(text, '=');
-    char *name, *end, why[96];
-    double *values = NULL;
-    size_t index, n = 0;
-    int rc = 0;
-    enum imp_status st;
-
-    if (!equal || equal == text) return set_error(where, text, "expected ID=VALUE");
-    name = cli_alloc((size_t)(equal - text) + 1, 1);
-    memcpy(name, text, (size_t)(equal - text));
-    values = cli_alloc(strlen(equal), sizeof *values); /* more than there can be */
-    for (const char *p = equal + 1;; p = end + 1) {
-        values[n++] = strtod(p, &end);
-        if (end == p || (*end && *end != ',')) {
-            snprintf(why, sizeof why, "'%.60s' is not a number", p);
-            rc = set_error(where, text, why);
-            goto out;
-        }
-        if (!*end) break;
-    }
-    st = settings_pose(name);
-    if (st == IMP_OK) st = imp_scene_find_param(cli.scene, name, &index);
-    if (st == IMP_OK) st = imp_scene_set_values(cli.scene, index, n, values);
-    if (st != IMP_OK) rc = cli_fail(st, where ? where : cli.scene_path);
-out:
-    free(name);
-    free(values);
-    return rc;
+    if (imp_scene_find_param(cli.scene, name, &index) == IMP_OK) return IMP_OK;
+    const enum imp_status st = imp_scene_add_geometry(cli.scene, name);
+    /* What is wrong with a name that parameters of other kinds may have is said later. */
+    return st == IMP_E_ARG && !(dot && !strcmp(dot, ".pose")) ? IMP_OK : st;
 }
 
 #define SET_FILE_MAX ((size_t)256 << 20) /* ten million numbers of 17 digits */
@@ -150,8 +98,8 @@ static char *held_take(const char *path, size_t *length)
 static int apply_set_file(const char *path)
 {
     const bool reads = ranks_reads();
-    size_t length = 0, number = 0;
-    int rc = 0;
+    size_t length = 0;
+    int rc;
     char *text = reads ? held_take(path, &length) : NULL;
     const int code = errno;
     if (reads && !text && code == EFBIG)
@@ -161,25 +109,23 @@ static int apply_set_file(const char *path)
         return cli_error(code == ENOMEM ? EXIT_RUN : EXIT_USAGE, "--set @%s: %s", path,
                          strerror(code));
     if (cli.mpi_files == 0 && (rc = ranks_broadcast(&text, &length))) return rc;
-    for (char *line = text, *next; !rc && line < text + length; line = next) {
-        char *end = memchr(line, '\n', (size_t)(text + length - line)), *where;
-        if (!end) end = text + length;
-        next = end + 1;
-        if (end > line && end[-1] == '\r') end--;
-        *end = 0;
-        if (asprintf(&where, "%s:%zu", path, ++number) < 0)
-            exit(cli_error(EXIT_RUN, "out of memory"));
-        if (strlen(line) != (size_t)(end - line))
-            rc = cli_error(EXIT_USAGE, "%s: a zero byte: this is no list of settings",
-                           where);
-        else if (*line && *line != '#') rc = apply_set(where, line);
-        free(where);
-    }
+    const enum imp_status st = imp_scene_set_text(cli.scene, text, length, path);
     free(text);
+    return st == IMP_OK ? 0 : cli_fail(st, path);
+}
+
+static int apply_set(const char *text)
+{
+    char *what;
+    const enum imp_status st = imp_scene_set_text(cli.scene, text, strlen(text), NULL);
+    if (st == IMP_OK) return 0;
+    if (asprintf(&what, "--set %s", text) < 0) exit(cli_error(EXIT_RUN, "out of memory"));
+    const int rc = cli_fail(st, what);
+    free(what);
     return rc;
 }
 
 int settings_apply(const char *text)
 {
-    return *text == '@' ? apply_set_file(text + 1) : apply_set(NULL, text);
+    return *text == '@' ? apply_set_file(text + 1) : apply_set(text);
 }

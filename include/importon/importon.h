@@ -630,6 +630,16 @@ imp_scene_geometry_name(const imp_scene *scene, size_t index, size_t size, char 
  *         instances, media, or what else is made from places; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_add_pose(imp_scene *scene,
                                                           const char *object);
+/** Parameters by text: lines NAME=VALUE or NAME=VALUE,VALUE,.., as of --set @FILE and
+ * recovered.txt; empty lines and lines that begin with # are skipped. Names of geometry, NAME.pose and
+ * the like, become parameters first, as by imp_scene_add_geometry.
+ * @param text    [length] bytes; need not end with a zero byte.
+ * @param name    of the text, for messages ("NAME:LINE: .."); NULL: there are no places in them.
+ * @return IMP_OK; IMP_E_ARG if a line is malformed, its parameter does not exist or has other bounds
+ *         or another count: lines before it are set; and what imp_scene_add_geometry returns;
+ *         IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_scene_set_text(imp_scene *scene, const char *text, size_t length, const char *name);
 /** theta [imp_scene_n_theta], in the units of imp_param_info; written, and read.
  * @return IMP_OK; IMP_E_ARG. */
 IMP_API enum imp_status imp_scene_get_theta(const imp_scene *scene, double *theta);

@@ -7,6 +7,7 @@
 #include "film/film_integrator.h"
 #include "load.h"
 #include "search.h"
+#include "settings.h"
 #include "tree.h"
 #include "twin_scene.h"
 #include "xml.h"
@@ -77,6 +78,8 @@ enum imp_status imp__scene_finish(struct imp_scene *scene)
     if (st == IMP_OK) st = imp__scene_build(scene, imp__integrator_kinds);
     if (st == IMP_OK) st = imp__graded_finish(scene);
     if (st == IMP_OK) st = imp__survey_finish(scene);
+    if (st == IMP_OK) st = imp__settings_apply(scene, scene->settings);
+    scene->settings = scene->last_setting = NULL;
     scene->twin = imp__scene_twin;
     imp__scene_release_files(scene);
     return st;
