@@ -2,6 +2,7 @@
  *
  * What a fit has found: its table, and its files: history, JSON, pictures, settings. */
 #include "fit_answer.h"
+#include "fit_scene.h"
 
 #include "fit_pictures.h"
 #include "shared/answer_file.h"
@@ -215,6 +216,22 @@ static int write_set(const struct fit_answer *a)
     return rc;
 }
 
+/* The scene of what was recovered, and of `more`, names [n_more]. */
+static int write_scene(const struct fit_answer *a)
+{
+    size_t most = a->n_more, n = 0;
+    for (size_t k = 0; k < a->n_blocks; k++) most += a->blocks[k].tie.n_members;
+    const char **large = cli_alloc(most, sizeof *large);
+    for (size_t k = 0; k < a->n_blocks; k++)
+        for (size_t m = 0;
+             block_is_large(&a->blocks[k]) && m < a->blocks[k].tie.n_members; m++)
+            large[n++] = a->blocks[k].tie.members[m];
+    for (size_t k = 0; k < a->n_more; k++) large[n++] = a->more[k];
+    const int rc = fit_scene_write(large, n);
+    free(large);
+    return rc;
+}
+
 /* Besides pictures. */
 static const struct {
     const char *name;
@@ -229,6 +246,7 @@ int fit_answer_writable(const struct block *blocks, size_t n_blocks)
     int rc = make_folder(cli.out);
     for (size_t k = 0; k < sizeof outputs / sizeof *outputs && !rc; k++)
         rc = overwrite_check_in(cli.out, outputs[k].name, outputs[k].kind);
+    if (!rc) rc = fit_scene_writable();
     if (!rc) rc = fit_pictures_writable();
     for (size_t k = 0; k < n_blocks && !rc; k++)
         if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], cli.out, 0);
@@ -241,6 +259,7 @@ static int write_all(const struct fit_answer *a, char **paths)
     if (!rc) rc = write_history(a->result);
     if (!rc) rc = write_json(a, paths);
     if (!rc) rc = write_set(a);
+    if (!rc) rc = write_scene(a);
     if (!rc && a->result->loosest) rc = fit_loosest_write(a->problem, a->result->loosest);
     return rc;
 }

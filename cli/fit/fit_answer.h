@@ -15,7 +15,9 @@ struct fit_answer {
     int no_intervals;                  /* they were not computed */
     const struct imp_missing *missing; /* [n_missing] values that may be wrong */
     size_t n_missing;
-    int looked; /* they were searched for */
+    int looked;              /* they were searched for */
+    const char *const *more; /* [n_more] parameters that were found, and are not in it */
+    size_t n_more;
 };
 /* Print it, and write it into -o DIR. 0, or an exit code with the reason printed, as the
  * next two. */

@@ -200,15 +200,22 @@ int measure_answer_give(const struct measure_answer *a)
 {
     size_t n_blocks;
     struct block *blocks = problem_blocks(a->problem, &n_blocks);
-    const struct fit_answer fit = {.problem = a->problem,
-                                   .result = a->result->fit,
-                                   .blocks = blocks,
-                                   .n_blocks = n_blocks,
-                                   .optimizer = "lm",
-                                   .missing = a->result->missing,
-                                   .n_missing = a->result->n_missing,
-                                   .looked = !a->result->explained};
+    const char **more = cli_alloc(a->result->n_textures, sizeof *more);
+    struct fit_answer fit = {.problem = a->problem,
+                             .result = a->result->fit,
+                             .blocks = blocks,
+                             .n_blocks = n_blocks,
+                             .optimizer = "lm",
+                             .missing = a->result->missing,
+                             .n_missing = a->result->n_missing,
+                             .looked = !a->result->explained,
+                             .more = more};
     int rc = 0;
+    for (size_t k = 0; k < a->result->n_textures; k++) {
+        struct imp_param_info info = {.size = sizeof info};
+        if (imp_scene_get_param(cli.scene, a->result->textures[k], &info) == IMP_OK)
+            more[fit.n_more++] = info.name;
+    }
     if (cli.json) {
         struct json j = cli_json();
         put_all(&j, a, &fit);
@@ -226,5 +233,6 @@ int measure_answer_give(const struct measure_answer *a)
     if (!rc && cli.out) rc = json_write(a, &fit);
     if (!rc && cli.out) rc = fit_pictures_write("recovered", 0);
     free(blocks);
+    free(more);
     return rc;
 }

@@ -14,7 +14,8 @@ enum output_kind {
     OUTPUT_PART,
     OUTPUT_MANIFEST,
     OUTPUT_RECORD,
-    OUTPUT_SETTINGS, /* "# importon ..", and name=value,.. for --set @FILE */
+    OUTPUT_SETTINGS,
+    OUTPUT_SCENE, /* "# importon ..", and name=value,.. for --set @FILE */
     OUTPUT_TABLE,
     OUTPUT_CURVE,
     OUTPUT_JSON,

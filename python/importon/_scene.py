@@ -236,6 +236,35 @@ class Scene:
             self._table = None
         return name
 
+    def set_text(self, settings: str) -> None:
+        """Set parameters by lines `NAME=V` or `NAME=V,V,..`, such as those of a fit's recovered.txt.
+
+        Names of geometry (`NAME.pose`) become parameters first, as by `add_geometry`. Empty lines and
+        lines that begin with # are skipped. Lines before a wrong one are set.
+
+        Parameters
+        ----------
+        settings : str
+            The lines.
+
+        Raises
+        ------
+        ArgumentError
+            A line is malformed, or there is no such parameter or value.
+        UnsupportedError
+            Something cannot be moved, with the reason.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> scene.set_text("red.reflectance.value=0.5,0.1,0.1")
+        """
+        not_inside()
+        lines = text(settings, "settings")
+        with self.lock:
+            self._context.check(lib.imp_scene_set_text(self.pointer, lines, len(lines), b"settings"))
+            self._table = None
+
     @property
     def geometry_names(self) -> list[str]:
         """What `add_geometry` accepts: numbers of geometry of this scene's shapes, sensors and lights."""

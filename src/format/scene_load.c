@@ -80,6 +80,7 @@ enum imp_status imp__scene_finish(struct imp_scene *scene)
     if (st == IMP_OK) st = imp__survey_finish(scene);
     if (st == IMP_OK) st = imp__settings_apply(scene, scene->settings);
     scene->settings = scene->last_setting = NULL;
+    imp__arena_free(&scene->settings_arena);
     scene->twin = imp__scene_twin;
     imp__scene_release_files(scene);
     return st;

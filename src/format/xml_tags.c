@@ -134,7 +134,7 @@ static void setting_read(struct xml_file *f, const char *filename, struct imp_se
         imp__xml_fail_here(f, st);
         return;
     }
-    char *copy = imp__arena_array(&r->scene->files, text.size + 1, 1);
+    char *copy = imp__arena_array(&r->scene->settings_arena, text.size + 1, 1);
     if (!copy) imp__xml_fail(f, IMP_E_NOMEM, "out of memory");
     else memcpy(copy, text.data, text.size);
     *s = (struct imp_setting){.text = copy, .length = text.size, .place = path};
@@ -144,7 +144,7 @@ static void setting_read(struct xml_file *f, const char *filename, struct imp_se
 static void setting_make(struct xml_file *f, const char *name, const char *value,
                          struct imp_setting *s)
 {
-    struct imp_arena *arena = &f->reader->scene->files;
+    struct imp_arena *arena = &f->reader->scene->settings_arena;
     const struct imp_loc at = imp__xml_loc(f);
     const size_t n = strlen(name) + strlen(value) + 2, m = strlen(at.file) + 32;
     char *text = imp__arena_array(arena, n, 1), *place = imp__arena_array(arena, m, 1);
@@ -164,7 +164,7 @@ static void setting_make(struct xml_file *f, const char *name, const char *value
 static void act_set(struct xml_file *f, const struct xml_attributes *a)
 {
     struct imp_scene *scene = f->reader->scene;
-    struct imp_setting *s = imp__arena_array(&scene->files, 1, sizeof *s);
+    struct imp_setting *s = imp__arena_array(&scene->settings_arena, 1, sizeof *s);
     if (f->depth != 1 || !f->levels[0].node || strcmp(f->levels[0].tag, "scene") != 0) {
         imp__xml_fail(f, IMP_E_SCENE, "<set> belongs in the root of a scene");
         return;

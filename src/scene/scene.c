@@ -21,6 +21,7 @@ enum imp_status imp__scene_new(imp_context *ctx, enum imp_color_mode mode,
     scene->environment = -1;
     imp__arena_init(&scene->arena, ctx);
     imp__arena_init(&scene->files, ctx);
+    imp__arena_init(&scene->settings_arena, ctx);
     *out = scene;
     return IMP_OK;
 }
@@ -66,6 +67,7 @@ void imp_scene_destroy(imp_scene *scene)
     imp__release(ctx, scene->stack);
     imp__release(ctx, scene->build_error);
     imp__release(ctx, scene->params);
+    imp__arena_free(&scene->settings_arena);
     imp__arena_free(&scene->files);
     imp__arena_free(&scene->arena);
     imp__release(ctx, scene);

@@ -107,7 +107,8 @@ struct imp_scene {
     size_t n_stack, cap_stack;
     enum imp_status build_status; /* first failure of the building calls */
     char *build_error;
-    struct imp_setting *settings, *last_setting; /* of the file, until it is made */
+    struct imp_setting *settings, *last_setting; /* of the file, until it is made ... */
+    struct imp_arena settings_arena;             /* ... and their text */
     char **search;                               /* [n_search] folders for files */
     size_t n_search;
     struct imp_tree *tree;  /* of the building calls, until commit (format/tree.h) */

@@ -399,7 +399,7 @@ class Fixture:
         if a.name == "words": return C.addressof(self.array(C.c_char_p, 1, [b"word"])), None
         if a.name == "dims": return C.addressof(self.array(C.c_size_t, 1, [1])), None
         if not a.pointer:
-            scalars = {"fallback": 1., "fraction": 1., "seed": 1, "flags": 0, "size": 64 if function == "imp_scene_geometry_name" else 8, "width": 4, "height": 4, "channels": 3, "length": len(self.good(xml, function)[0]) if "load_string" in function else 0, "weight": 1., "order": 1,
+            scalars = {"fallback": 1., "fraction": 1., "seed": 1, "flags": 0, "size": 64 if function == "imp_scene_geometry_name" else 8, "width": 4, "height": 4, "channels": 3, "length": len(self.good(xml, function)[0]) if "load_string" in function else len(PARAM) + 4 if "set_text" in function else 0, "weight": 1., "order": 1,
                        "index": 1.5 if a.ctype is C.c_double else 0, "cells": 1., "um": .5, "k": 1., "background": 1., "confidence": .9, "a": 1., "b": 1.,
                        "radius": 2., "rounds": 1, "bytes": 1 << 20, "hi": 3., "lo": 1., "value": 1.5 if a.ctype is C.c_double else 1,
                        "n_vertices": 3, "n_triangles": 1, "layers": 1, "nx": 1, "ny": 1, "nz": 1, "a": 1., "pilots": 2, "n_groups": 1, "low": .1, "high": .9,
@@ -448,6 +448,7 @@ class Fixture:
                 return {"imp_scene_find_param": PARAM.encode(), "imp_scene_add_geometry": b"lamp.pose"}.get(function, b"name"), None
             if a.name == "command": return b"command", None
             if key == "imp_problem_hold.glob": return (PARAM + "[0]").encode(), None
+            if key == "imp_scene_set_text.text": return (PARAM + "=0.5").encode(), None
             words = {"fallback": b"text", "format": b"text", "names": b"R,G,B", "key": b"key", "value": b"value", "tag": b"shape", "type": b"sphere", "id": b"id", "layer": b"layer", "object": b"lamp",
                      "glob": PARAM.encode(), "kind": b"luneburg"}
             return words[a.name], None
