@@ -596,7 +596,8 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *
  *     NAME.pose              as imp_scene_add_pose
  *     NAME.scale             of a shape: 1 as the scene file has it, about the middle of its box
- *     NAME.vertex_positions  of a mesh: [vertices][3], world
+ *     NAME.vertex_positions  of a mesh: [vertices][3], world; vertex normals, if it has any, are
+ *                            computed from them
  *     NAME.x_fov             of a perspective camera: horizontal field of view, degrees
  *     NAME.principal_point_offset_x, NAME.principal_point_offset_y   of a perspective camera:
  *                            in parts of the film's width and height
