@@ -634,14 +634,15 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_scene_add_pose(imp_scene *scene,
 /** theta [imp_scene_n_theta], in the units of imp_param_info; written, and read.
  * @return IMP_OK; IMP_E_ARG. */
 IMP_API enum imp_status imp_scene_get_theta(const imp_scene *scene, double *theta);
-/** @return IMP_OK; IMP_E_ARG if a value is not finite or outside its bounds: nothing is
- * set.
+/** @return IMP_OK; IMP_E_ARG if a value is not finite or outside its bounds, IMP_E_NUMERIC if
+ * geometry cannot be so (docs/poses.md): nothing is set.
  * theta [imp_scene_n_theta] is copied. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_set_theta(imp_scene *scene,
                                                            const double *theta);
 /** One parameter: values [info.count], or n == 1 to set all of them to one value.
  * @return IMP_OK; IMP_E_ARG if there is no such parameter, for another n, or a value
- *         outside its bounds: nothing is set. */
+ *         outside its bounds; IMP_E_NUMERIC if geometry cannot be so (docs/poses.md): nothing is
+ *         set. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_set_values(imp_scene *scene, size_t index, size_t n, const double *values);
 /** values [info.count] of one parameter, in its unit.

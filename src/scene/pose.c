@@ -197,6 +197,21 @@ static void bounds_update(struct imp_scene *scene)
     scene->ball = imp__ball_around(scene);
 }
 
+/* Triangles of a mesh whose vertices are set singly. */
+static enum imp_status folds_refuse(const struct imp_pose *p)
+{
+    const struct imp_pose *vertices = imp__pose_beside(p, IMP_POSE_VERTICES);
+    const char *why = NULL;
+    size_t triangle = 0;
+    if (!vertices || !p->positions) return IMP_OK;
+    IMP_CHECKED(imp__mesh_folds(p->scene, &p->scene->shapes[p->shape]->triangles,
+                                p->positions, &triangle, &why));
+    return why ? imp__error(p->scene->ctx, IMP_E_NUMERIC,
+                            "%s makes triangle %zu of the shape %s",
+                            p->scene->params[vertices->param].info.name, triangle, why)
+               : IMP_OK;
+}
+
 static bool is_finite(const struct imp_shape *s)
 {
     const imp_v3 size = s->hi - s->lo;
@@ -228,6 +243,12 @@ enum imp_status imp__poses_settle(struct imp_scene *scene)
         if (to &&
             !(imp__length(imp__v3(to->number[0], to->number[1], to->number[2])) > 0))
             wrong = "is no direction";
+        if (!wrong && p->shape >= 0) {
+            const enum imp_status folds = folds_refuse(p);
+            if (folds == IMP_OK) continue;
+            p->due = true;
+            return folds;
+        }
         if (!wrong) continue;
         p->due = true;
         return imp__error(scene->ctx, IMP_E_NUMERIC, "%s %s",

@@ -148,52 +148,6 @@ static enum imp_status lights_make(struct imp__boundary *b)
     return IMP_OK;
 }
 
-/* A light at a point, or parallel light, and a mesh with vertex normals that move against each
- * other: a facet that turns away from it becomes dark all at once. */
-static enum imp_status facets_allowed(const struct imp__boundary *b)
-{
-    const struct imp_scene *scene = b->tracer->scene;
-    for (int k = 0; k < scene->n_emitters; k++) {
-        const struct imp_emitter *e = scene->emitters[k];
-        if (!(e->ops->flags & IMP_EMITTER_DELTA)) continue;
-        for (int j = 0; j < scene->n_shapes; j++)
-            if (imp__moves_smooth(scene, j) &&
-                (imp__moves_shape(b->moves, j, NULL) ||
-                 imp__moves_shape(b->moves, IMP_MOVE_EMITTER(k), NULL)))
-                return imp__error(
-                    scene->ctx, IMP_E_UNSUPPORTED,
-                    "derivatives by what moves: light '%s' (%s) and shape '%s', which "
-                    "has "
-                    "vertex normals, move against each other: facets that turn away from "
-                    "a light without size become dark all at once (face_normals makes "
-                    "the shape flat)",
-                    e->name ? e->name : "", e->ops->name, scene->shapes[j]->name);
-    }
-    return IMP_OK;
-}
-
-static enum imp_status edges_allowed(const struct imp__boundary *b)
-{
-    const struct imp_scene *scene = b->tracer->scene;
-    const struct imp__edge *torn = imp__edges_torn(b->edges, b->moves);
-    if (torn)
-        return imp__error(
-            scene->ctx, IMP_E_UNSUPPORTED,
-            "derivatives by what moves: an edge of shape '%s' at (%g, %g, %g) "
-            "lies on another one, which moves differently",
-            scene->shapes[b->edges->face[torn->first].shape]->name, torn->a[0],
-            torn->a[1], torn->a[2]);
-    int other = -1;
-    const int pierced = imp__edges_pierced(b->edges, scene, &other);
-    if (pierced >= 0)
-        return imp__error(
-            scene->ctx, IMP_E_UNSUPPORTED,
-            "derivatives by what moves: shape '%s' passes through shape '%s', "
-            "and where they meet is no edge",
-            scene->shapes[other]->name, scene->shapes[pierced]->name);
-    return IMP_OK;
-}
-
 enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
                                     const struct imp__moves *moves,
                                     const struct imp__edges *edges,
@@ -203,9 +157,8 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
     *out = (struct imp__boundary){.tracer = tracer, .moves = moves, .edges = edges};
     out->size = imp__length(scene->hi - scene->lo);
     enum imp_status st = imp__moved_allowed(tracer);
-    if (st == IMP_OK) st = edges_allowed(out);
-    if (st == IMP_OK) st = facets_allowed(out);
     imp__pinhole(tracer->sensor, &out->camera);
+    if (st == IMP_OK) st = imp__boundary_allowed(out);
     if (st == IMP_OK) st = lights_make(out);
     if (st == IMP_OK) st = choices_make(out);
     return st;

@@ -102,6 +102,10 @@ struct imp__edge_light {
 void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
                      const struct imp_surface *at, const struct imp__edge_light *light);
 
+/* IMP_E_UNSUPPORTED, with names: edges that tear, shapes that pass through each other, facets that
+ * become lit at once, a camera inside of a shape. */
+enum imp_status imp__boundary_allowed(const struct imp__boundary *b);
+
 /* ---- One draw of each kind ---- */
 void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind);
 void imp__draw_film(struct imp__edge_draw *d);
