@@ -596,7 +596,8 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *
  *     NAME.pose              as imp_scene_add_pose
  *     NAME.scale             of a shape: 1 as the scene file has it, about the middle of its box
- *     NAME.vertex_positions  of a mesh: [vertices][3], world
+ *     NAME.vertex_positions  of a mesh: [vertices][3], world; vertex normals, if it has any, are
+ *                            computed from them
  *     NAME.x_fov             of a perspective camera: horizontal field of view, degrees
  *     NAME.principal_point_offset_x, NAME.principal_point_offset_y   of a perspective camera:
  *                            in parts of the film's width and height
@@ -643,14 +644,15 @@ imp_scene_set_text(imp_scene *scene, const char *text, size_t length, const char
 /** theta [imp_scene_n_theta], in the units of imp_param_info; written, and read.
  * @return IMP_OK; IMP_E_ARG. */
 IMP_API enum imp_status imp_scene_get_theta(const imp_scene *scene, double *theta);
-/** @return IMP_OK; IMP_E_ARG if a value is not finite or outside its bounds: nothing is
- * set.
+/** @return IMP_OK; IMP_E_ARG if a value is not finite or outside its bounds, IMP_E_NUMERIC if
+ * geometry cannot be so (docs/poses.md): nothing is set.
  * theta [imp_scene_n_theta] is copied. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_set_theta(imp_scene *scene,
                                                            const double *theta);
 /** One parameter: values [info.count], or n == 1 to set all of them to one value.
  * @return IMP_OK; IMP_E_ARG if there is no such parameter, for another n, or a value
- *         outside its bounds: nothing is set. */
+ *         outside its bounds; IMP_E_NUMERIC if geometry cannot be so (docs/poses.md): nothing is
+ *         set. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_set_values(imp_scene *scene, size_t index, size_t n, const double *values);
 /** values [info.count] of one parameter, in its unit.

@@ -28,8 +28,8 @@ struct imp__edges {
     struct imp__edge_face *face; /* [n_faces] */
 };
 
-/* All edges of the scene's shapes of triangles. IMP_E_UNSUPPORTED, with its name: another shape, no sphere and no disk,
- * that is not made of triangles, or has normals that turn over a facet; instances. */
+/* All edges of the scene's shapes of triangles, flat or with vertex normals. IMP_E_UNSUPPORTED,
+ * with its name: another shape that is no sphere and no disk; instances. */
 enum imp_status imp__edges_build(const struct imp_scene *scene, struct imp__edges *out);
 void imp__edges_free(struct imp__edges *edges);
 

@@ -65,15 +65,14 @@ static enum imp_status sides_make(struct building *x)
         struct imp_round round;
         if (imp__moves_sphere(x->scene, k, &round) || imp__moves_disk(x->scene, k))
             continue;
-        if (s->geometry != IMP_TRIANGLES || s->smooth)
-            return imp__error(
-                x->ctx, IMP_E_UNSUPPORTED,
-                "derivatives by what moves are of flat triangles and spheres, and "
-                "shape '%s' (%s) %s",
-                s->name, s->ops->name,
-                s->smooth ? "has normals that turn over them (face_normals "
-                            "makes it flat)"
-                          : "has none");
+        if (s->geometry != IMP_TRIANGLES ||
+            (s->smooth && !imp__moves_smooth(x->scene, k)))
+            return imp__error(x->ctx, IMP_E_UNSUPPORTED,
+                              "derivatives by what moves are of triangles, spheres and "
+                              "disks, and shape '%s' (%s) %s",
+                              s->name, s->ops->name,
+                              s->smooth ? "has normals of its own over its triangles"
+                                        : "has none");
         n += 3 * s->triangles.n_triangles;
     }
     x->side = imp__alloc(x->ctx, n + 1, sizeof *x->side);
@@ -151,16 +150,16 @@ static bool is_welded(const struct imp_triangles *t, int prim, int other)
 }
 
 /* Two faces of one shape in one plane, on both sides: nothing is there, unless a texture has a
- * seam. */
+ * seam, or shading normals have one. */
 static bool is_inner(const struct building *x, const struct imp__edge_face *f, int n)
 {
     if (n != 2 || f[0].shape != f[1].shape || !(imp__length(f[0].in + f[1].in) < 1e-6))
         return false;
     const struct imp_shape *s = x->scene->shapes[f[0].shape];
     const struct imp_bsdf *b = imp__shape_bsdf(x->scene, s);
-    bool textured = false;
-    for (int k = 0; k < b->n_in; k++) textured |= b->input[k]->texture != NULL;
-    return !textured || is_welded(&s->triangles, f[0].prim, f[1].prim);
+    bool varies = s->smooth;
+    for (int k = 0; k < b->n_in; k++) varies |= b->input[k]->texture != NULL;
+    return !varies || is_welded(&s->triangles, f[0].prim, f[1].prim);
 }
 
 static enum imp_status edge_add(struct building *x, const struct side *first, size_t n,

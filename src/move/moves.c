@@ -14,6 +14,8 @@ struct imp__moves imp__moves_begin(const struct imp_scene *scene,
 
 void imp__moves_free(struct imp__moves *moves)
 {
+    for (int k = 0; k < moves->n_movers; k++)
+        imp__fans_free(moves->scene->ctx, moves->mover[k].fans);
     if (moves->scene) imp__release(moves->scene->ctx, moves->mover);
     *moves = (struct imp__moves){0};
 }
@@ -91,7 +93,10 @@ static enum imp_status shape_mover(const struct imp__moves *moves, struct imp__m
     m->count = m->kind == IMP_MOVE_POSE    ? 6
                : m->kind == IMP_MOVE_SCALE ? 1
                                            : 3 * s->triangles.n_vertices;
-    return IMP_OK;
+    if (m->kind != IMP_MOVE_VERTICES || !imp__moves_smooth(moves->scene, m->shape))
+        return IMP_OK;
+    m->count *= 2;
+    return imp__fans_make(ctx, &s->triangles, &m->fans);
 }
 
 enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kind,
@@ -105,7 +110,10 @@ enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kin
     if (st != IMP_OK) return st;
     struct imp__mover *more = imp__grow(ctx, moves->mover, &moves->cap_movers,
                                         (size_t)moves->n_movers + 1, sizeof *more);
-    if (!more) return imp__error(ctx, IMP_E_NOMEM, "no memory for what moves");
+    if (!more) {
+        imp__fans_free(ctx, m.fans);
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for what moves");
+    }
     moves->mover = more;
     moves->mover[moves->n_movers++] = m;
     moves->n += m.count;
@@ -151,8 +159,12 @@ static bool looks_up(const struct imp_scene *scene, int shape)
     return false;
 }
 
-void imp__pose_numbers_bar(const struct imp_pose *pose, double *bar)
+void imp__pose_numbers_bar(const struct imp__moves *moves, const struct imp__mover *mover,
+                           const struct imp_pose *pose, double *bar)
 {
+    if (mover->fans)
+        imp__fans_normals_bar(mover->fans, &moves->scene->shapes[mover->shape]->triangles,
+                              bar + mover->count / 2, bar);
     if (pose->kind != IMP_POSE_RIGID) return;
     const imp_v3 turn = imp__v3(bar[3], bar[4], bar[5]);
     for (int i = 3; i < 6; i++) bar[i] = 0;
@@ -226,6 +238,7 @@ static struct imp__glued glued(const struct imp_scene *scene, int shape, int pri
     x.p = c.p0 + c.e1 * b1 + c.e2 * b2;
     x.n = imp__normalize(imp__cross(c.e1, c.e2));
     if (imp__dot(x.n, side) < 0) x.n = -x.n;
+    imp__glued_shade(scene, &x, (const imp_v3[2]){c.e1, c.e2});
     return x;
 }
 
@@ -314,6 +327,14 @@ static void vertices_velocity(const struct imp__moves *moves, const struct imp__
     out->v += v0 * x->b[0] + v1 * x->b[1] + v2 * x->b[2];
     out->n += (c_dot * inverse - n * along) * side;
     out->area += along;
+    if (x->smooth) {
+        const double *normals =
+            theta + 3 * moves->scene->shapes[x->shape]->triangles.n_vertices;
+        imp_v3 dot = {0};
+        for (int i = 0; i < 3; i++)
+            dot += number3(normals + 3 * (size_t)k.index[i]) * (x->b[i] / x->length);
+        out->shade += dot - x->shade * imp__dot(x->shade, dot);
+    }
     double in_edges[2];
     if (!edges_of(&k, x->s, in_edges)) return;
     const imp_v3 s_dot = (v1 - v0) * in_edges[0] + (v2 - v0) * in_edges[1];
@@ -338,12 +359,18 @@ static void vertices_bar(const struct imp__moves *moves, const struct imp__glued
     add3(theta_bar + 3 * (size_t)k.index[0], bar->v * x->b[0] - e1_bar - e2_bar);
     add3(theta_bar + 3 * (size_t)k.index[1], bar->v * x->b[1] + e1_bar);
     add3(theta_bar + 3 * (size_t)k.index[2], bar->v * x->b[2] + e2_bar);
+    if (!x->smooth) return;
+    double *normals =
+        theta_bar + 3 * moves->scene->shapes[x->shape]->triangles.n_vertices;
+    const imp_v3 across = bar->shade - x->shade * imp__dot(x->shade, bar->shade);
+    for (int i = 0; i < 3; i++)
+        add3(normals + 3 * (size_t)k.index[i], across * (x->b[i] / x->length));
 }
 
 struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
                                       const struct imp__glued *x, const double *theta_dot)
 {
-    struct imp__velocity out = {{0}, {0}, 0, 0};
+    struct imp__velocity out = {.area = 0};
     for (int k = 0; k < moves->n_movers; k++) {
         const struct imp__mover *m = &moves->mover[k];
         if (m->shape != x->shape) continue;
@@ -353,6 +380,7 @@ struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
         case IMP_MOVE_POSE:
             out.v += number3(theta) + imp__cross(number3(theta + 3), r);
             out.n += imp__cross(number3(theta + 3), x->n);
+            out.shade += imp__cross(number3(theta + 3), x->shade);
             out.turn += imp__dot(number3(theta + 3), x->n);
             break;
         case IMP_MOVE_SCALE:
@@ -379,6 +407,7 @@ void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *
             add3(theta, bar->v);
             add3(theta + 3,
                  imp__cross(r, bar->v) + imp__cross(x->n, bar->n) + x->n * bar->turn);
+            if (x->smooth) add3(theta + 3, imp__cross(x->shade, bar->shade));
             break;
         case IMP_MOVE_SCALE:
             theta[0] += m->rate * (imp__dot(r, bar->v) + 2 * bar->area);

@@ -17,7 +17,12 @@
  *
  * e: a translation in scene units; a: a rotation vector in radians. Velocities are linear in the
  * numbers; each function that applies the map has its transpose beside it. The geometric normal is
- * the same all over a triangle or disk; on a sphere it turns with the place. */
+ * the same all over a triangle or disk; on a sphere it turns with the place.
+ *
+ * A mesh with vertex normals n_i has the shading normal  N/|N|, N = sum_i b_i n_i.  It turns with a
+ * pose, stays under a scale, and follows vertices, whose normals are then the sums of those of
+ * their faces, weighted by angles (kind/shape/mesh_normals.c). A mover of such vertices has 3 more
+ * numbers for each: velocities of n_i, which shade.c takes back to positions. */
 #ifndef IMP_MOVE_MOVES_H
 #define IMP_MOVE_MOVES_H
 
@@ -34,6 +39,7 @@ enum imp__move_kind {
     IMP_MOVE_LIGHT,
     IMP_MOVE_AXIS
 };
+struct imp__fans;                      /* triangles around each vertex: shade.c */
 #define IMP_MOVE_CAMERA     (-1)       /* in place of a shape */
 #define IMP_MOVE_EMITTER(k) (-2 - (k)) /* in place of a shape: emitter k of the scene */
 
@@ -45,7 +51,8 @@ struct imp__mover {
         across;  /* of a camera: unit, and the offset's velocity at the depth 1; of
                             parallel light the axis is its direction */
     double rate; /* the velocities' factor */
-    size_t first, count; /* its numbers */
+    size_t first, count;    /* its numbers */
+    struct imp__fans *fans; /* of vertices with normals; else NULL */
 };
 
 struct imp__moves {
@@ -66,12 +73,24 @@ struct imp__glued {
     double
         curvature; /* of the surface: the normal at a place shifted by x across n turns by
                          curvature x */
+    /* Meshes with vertex normals: N/|N| and |N|; shifted by x in the surface it turns by
+     * sum_k turn[k] (slope[k].x). */
+    bool smooth;
+    double length;
+    imp_v3 shade, turn[2], slope[2];
 };
 
+/* The normal of the shading frame. */
+static inline imp_v3 imp__shading_normal(const struct imp__glued *x)
+{
+    return x->smooth ? x->shade : x->n;
+}
+
 struct imp__velocity {
-    imp_v3 v, n; /* of the point, and of its normal */
-    double area; /* of the logarithm of an area around it */
-    double turn; /* of its direction s about n */
+    imp_v3 v, n;  /* of the point, and of its normal */
+    double area;  /* of the logarithm of an area around it */
+    double turn;  /* of its direction s about n */
+    imp_v3 shade; /* of the shading normal, where the surface is smooth; else that is n */
 };
 
 /* Without movers. imp__moves_free releases them. */
@@ -86,8 +105,9 @@ enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kin
 enum imp_status imp__moves_add_pose(struct imp__moves *moves,
                                     const struct imp_pose *pose);
 /* From the adjoint of a mover's numbers to that of its parameter's, in place: a mover turns the
- * object as it is, the parameter is one vector of rotation. */
-void imp__pose_numbers_bar(const struct imp_pose *pose, double *bar);
+ * object as it is, the parameter is one vector of rotation; normals follow vertices. */
+void imp__pose_numbers_bar(const struct imp__moves *moves, const struct imp__mover *mover,
+                           const struct imp_pose *pose, double *bar);
 /* Centre and radius of a sphere. False: another shape. */
 bool imp__moves_sphere(const struct imp_scene *scene, int shape, struct imp_round *out);
 /* Is it a disk? And a point of its rim, by v of a turn, with its unit direction, the unit direction
@@ -129,5 +149,20 @@ imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 p,
                             const double *theta_dot);
 void imp__camera_velocity_bar(const struct imp__moves *moves, imp_v3 p, imp_v3 bar,
                               double *theta_bar);
+
+/* ---- shade.c ---- */
+/* Has this shape vertex normals, by which it is shaded? */
+bool imp__moves_smooth(const struct imp_scene *scene, int shape);
+/* Sets what a glued point of a triangle has of a mesh with vertex normals; e: edges from the first
+ * vertex. Another shape: nothing. */
+void imp__glued_shade(const struct imp_scene *scene, struct imp__glued *x,
+                      const imp_v3 e[2]);
+/* The triangles around each vertex, or around all that lie where it lies. */
+enum imp_status imp__fans_make(imp_context *ctx, const struct imp_triangles *t,
+                               struct imp__fans **out);
+void imp__fans_free(imp_context *ctx, struct imp__fans *fans);
+/* Adds what adjoints of vertex normals [3 n_vertices], which become zero, are to positions. */
+void imp__fans_normals_bar(const struct imp__fans *fans, const struct imp_triangles *t,
+                           double *normals_bar, double *positions_bar);
 
 #endif

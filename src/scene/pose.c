@@ -105,7 +105,7 @@ static void sensor_apply(const struct imp_pose *p)
     if (!at_rest(imp__pose_beside(p, IMP_POSE_RIGID))) s->ops->move(s, map_of(p).m);
 }
 
-static void shape_apply(const struct imp_pose *p)
+static enum imp_status shape_apply(const struct imp_pose *p)
 {
     struct imp_shape *s = p->scene->shapes[p->shape];
     const struct imp_pose *vertices = imp__pose_beside(p, IMP_POSE_VERTICES);
@@ -114,14 +114,19 @@ static void shape_apply(const struct imp_pose *p)
     memcpy(s->self, p->rest, p->rest_size);
     if (s->geometry != IMP_TRIANGLES) {
         s->ops->move(s, map_of(p).m);
-        return;
+        return IMP_OK;
     }
     if (p->positions) memcpy(positions, p->positions, n * sizeof *p->positions);
     for (size_t k = 0; vertices && k < n; k++) positions[k] = (float)vertices->number[k];
-    if (p->normals)
-        memcpy((float *)(uintptr_t)((struct imp__mesh *)s->self)->normals, p->normals,
-               n * sizeof *p->normals);
+    float *normals =
+        p->normals ? (float *)(uintptr_t)((struct imp__mesh *)s->self)->normals : NULL;
+    if (normals && !vertices) memcpy(normals, p->normals, n * sizeof *normals);
+    if (normals && vertices)
+        IMP_CHECKED(imp__mesh_normals(p->scene->ctx, s->triangles.n_vertices,
+                                      s->triangles.n_triangles, positions,
+                                      s->triangles.indices, normals));
     s->ops->move(s, map_of(p).m); /* also at rest: frames of facets and the box follow */
+    return IMP_OK;
 }
 
 void imp__pose_aim(struct imp_emitter *e, enum imp_pose_kind kind, double v[3])
@@ -151,12 +156,13 @@ static void light_apply(const struct imp_pose *p)
                               imp__v3(to->number[0], to->number[1], to->number[2]));
 }
 
-static void pose_apply(struct imp_pose *p)
+static enum imp_status pose_apply(struct imp_pose *p)
 {
     p->due = false;
+    if (p->shape >= 0) return shape_apply(p);
     if (p->sensor) sensor_apply(p);
-    else if (p->emitter) light_apply(p);
-    else shape_apply(p);
+    else light_apply(p);
+    return IMP_OK;
 }
 
 double imp__pose_large(const struct imp_pose *p, size_t e)
@@ -191,6 +197,21 @@ static void bounds_update(struct imp_scene *scene)
     scene->ball = imp__ball_around(scene);
 }
 
+/* Triangles of a mesh whose vertices are set singly. */
+static enum imp_status folds_refuse(const struct imp_pose *p)
+{
+    const struct imp_pose *vertices = imp__pose_beside(p, IMP_POSE_VERTICES);
+    const char *why = NULL;
+    size_t triangle = 0;
+    if (!vertices || !p->positions) return IMP_OK;
+    IMP_CHECKED(imp__mesh_folds(p->scene, &p->scene->shapes[p->shape]->triangles,
+                                p->positions, &triangle, &why));
+    return why ? imp__error(p->scene->ctx, IMP_E_NUMERIC,
+                            "%s makes triangle %zu of the shape %s",
+                            p->scene->params[vertices->param].info.name, triangle, why)
+               : IMP_OK;
+}
+
 static bool is_finite(const struct imp_shape *s)
 {
     const imp_v3 size = s->hi - s->lo;
@@ -211,13 +232,23 @@ enum imp_status imp__poses_settle(struct imp_scene *scene)
         if (!p->due) continue;
         scene->reshaped |= p->shape >= 0;
         const char *wrong = NULL;
-        pose_apply(p);
+        const enum imp_status st = pose_apply(p);
+        if (st != IMP_OK) {
+            p->due = true;
+            return st;
+        }
         if (p->shape >= 0 && !is_finite(scene->shapes[p->shape]))
             wrong = "moves the shape beyond what numbers hold";
         const struct imp_pose *to = imp__pose_beside(p, IMP_POSE_DIRECTION);
         if (to &&
             !(imp__length(imp__v3(to->number[0], to->number[1], to->number[2])) > 0))
             wrong = "is no direction";
+        if (!wrong && p->shape >= 0) {
+            const enum imp_status folds = folds_refuse(p);
+            if (folds == IMP_OK) continue;
+            p->due = true;
+            return folds;
+        }
         if (!wrong) continue;
         p->due = true;
         return imp__error(scene->ctx, IMP_E_NUMERIC, "%s %s",

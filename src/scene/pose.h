@@ -93,8 +93,16 @@ void imp__rotation_bar(const double a[3], imp_v3 turn_bar, double a_bar[3]);
 /* ---- pose.c for pose_add.c ---- */
 void imp__pose_changed(void *pose);
 
+/* ---- pose_folds.c for pose.c ---- */
+/* A triangle of a mesh that its vertices' motion away from `rest` [3 n_vertices] makes vanish, or
+ * turn over: *why says which in a verb. NULL: there is none. IMP_E_NOMEM. */
+enum imp_status imp__mesh_folds(const struct imp_scene *scene,
+                                const struct imp_triangles *t, const float *rest,
+                                size_t *triangle, const char **why);
+
 /* Moves what is due, and makes the tree of shapes again. Whoever has set parameters calls it behind
- * imp__theta_announce. IMP_E_NOMEM, or what Embree says: the scene is not to be used before it
+ * imp__theta_announce. IMP_E_NUMERIC where numbers are beyond what floats hold, no direction, or make a
+ * triangle vanish or turn over; IMP_E_NOMEM, or what Embree says: the scene is not to be used before it
  * has succeeded. */
 enum imp_status imp__poses_settle(struct imp_scene *scene);
 

@@ -69,8 +69,6 @@ static const char *size_why(const struct imp_scene *scene, const struct imp_shap
             return "it is a light, whose points are drawn by areas that stay";
     for (int k = 0; k < scene->n_sensors; k++)
         if (scene->sensors[k]->shape == s) return "it is a sensor";
-    if (is_mesh && ((const struct imp__mesh *)s->self)->normals)
-        return "it has normals at its vertices (face_normals drops them)";
     if (kind == IMP_POSE_VERTICES && !is_mesh) return "it is no mesh";
     return NULL;
 }
@@ -301,7 +299,9 @@ static enum imp_status geometry_add(struct imp_scene *scene, const char *object,
     struct imp_pose **end = &scene->poses;
     while (*end) end = &(*end)->next;
     *end = p;
-    return IMP_OK;
+    if (kind != IMP_POSE_VERTICES || !p->normals) return IMP_OK;
+    imp__pose_changed(p); /* normals follow vertices from now on */
+    return imp__poses_settle(scene);
 }
 
 /* ---- Names ---------------------------------------------------------------------------- */

@@ -182,6 +182,43 @@ enum imp_status imp__param_check(const struct imp_scene *scene, const struct imp
                       p->info.name, element, value, p->info.lo, p->info.hi);
 }
 
+static void theta_put(struct imp_scene *scene, const double *theta)
+{
+    for (size_t i = 0; i < scene->n_params; i++) {
+        struct imp_param *p = &scene->params[i];
+        for (size_t k = 0; k < p->info.count; k++)
+            imp__param_set(p, k, theta[p->info.offset + k]);
+    }
+}
+
+/* Values as they are, [n_theta], to be released. */
+static enum imp_status theta_keep(const struct imp_scene *scene, double **out)
+{
+    const size_t n = imp_scene_n_theta(scene);
+    *out = imp__alloc(scene->ctx, n + 1, sizeof **out);
+    if (!*out) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for parameters");
+    for (size_t i = 0; i < scene->n_params; i++) {
+        const struct imp_param *p = &scene->params[i];
+        for (size_t k = 0; k < p->info.count; k++)
+            (*out)[p->info.offset + k] = imp__param_get(p, k);
+    }
+    return IMP_OK;
+}
+
+/* Moves what the values move. Where they cannot be had, all are as before, in old [n_theta]. */
+static enum imp_status moved_or_restored(struct imp_scene *scene, const double *old)
+{
+    char why[512];
+    imp__theta_announce(scene);
+    const enum imp_status st = imp__poses_settle(scene);
+    if (st == IMP_OK) return st;
+    snprintf(why, sizeof why, "%s", imp_last_error(scene->ctx));
+    theta_put(scene, old);
+    imp__theta_announce(scene);
+    const enum imp_status back = imp__poses_settle(scene);
+    return back == IMP_OK ? imp__error(scene->ctx, st, "%s", why) : back;
+}
+
 enum imp_status imp_scene_set_theta(imp_scene *scene, const double *theta)
 {
     enum imp_status st = IMP_OK;
@@ -194,13 +231,17 @@ enum imp_status imp_scene_set_theta(imp_scene *scene, const double *theta)
         for (size_t k = 0; k < p->info.count; k++)
             IMP_CHECKED(imp__param_check(scene, p, k, theta[p->info.offset + k]));
     }
-    for (size_t i = 0; i < scene->n_params; i++) {
-        struct imp_param *p = &scene->params[i];
-        for (size_t k = 0; k < p->info.count; k++)
-            imp__param_set(p, k, theta[p->info.offset + k]);
+    double *old = NULL;
+    if (scene->poses) IMP_CHECKED(theta_keep(scene, &old));
+    theta_put(scene, theta);
+    if (old) {
+        st = moved_or_restored(scene, old);
+    } else {
+        imp__theta_announce(scene);
+        st = imp__poses_settle(scene);
     }
-    imp__theta_announce(scene);
-    return imp__poses_settle(scene);
+    imp__release(scene->ctx, old);
+    return st;
 }
 
 enum imp_status imp_scene_set_values(imp_scene *scene, size_t index, size_t n,
@@ -218,10 +259,18 @@ enum imp_status imp_scene_set_values(imp_scene *scene, size_t index, size_t n,
     IMP_SETS(scene, st);
     if (st != IMP_OK) return st;
     for (size_t k = 0; k < n; k++) IMP_CHECKED(imp__param_check(scene, p, k, values[k]));
+    double *old = NULL;
+    if (imp__pose_of(scene, index)) IMP_CHECKED(theta_keep(scene, &old));
     for (size_t k = 0; k < p->info.count; k++)
         imp__param_set(p, k, values[n == 1 ? 0 : k]);
-    imp__theta_announce(scene);
-    return imp__poses_settle(scene);
+    if (old) {
+        st = moved_or_restored(scene, old);
+    } else {
+        imp__theta_announce(scene);
+        st = imp__poses_settle(scene);
+    }
+    imp__release(scene->ctx, old);
+    return st;
 }
 
 enum imp_status imp_scene_get_values(const imp_scene *scene, size_t index, double *values)

@@ -3,7 +3,7 @@
  * Checks of frozen walks where the picture has kinks: behind a ball of graded index hang
  * texels as different as can be, and the slope of what a walk sees jumps from texel to
  * texel. A walk that stands on a border is no wrong derivative, and a wrong derivative
- * is one on borders too. */
+ * is one on borders too. Fresh steps of a spot's angles stay between beam and cutoff. */
 #include "bend/inside.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
@@ -84,9 +84,46 @@ static void wrong_splat(const imp_field *f, const imp_v3 *x, double a, const imp
     right->splat(f, x, a * off, &c, bar);
 }
 
+/* A spot whose light falls off within one degree: steps of a third of an angle would cross it. */
+static void spot_test(void)
+{
+    imp_scene *s = test_scene_text(
+        ctx,
+        "<scene version='3.0.0'><integrator type='direct'/><sensor type='perspective'>"
+        "<float name='fov' value='50'/><transform name='to_world'><lookat "
+        "origin='.4,-5.5,2.3' target='0,0,.6' up='0,0,1'/></transform><film "
+        "type='hdrfilm'><integer name='width' value='24'/><integer name='height' "
+        "value='16'/><rfilter type='box'/></film></sensor><shape type='rectangle'>"
+        "<transform name='to_world'><scale value='3'/></transform><bsdf type='diffuse'/>"
+        "</shape><emitter type='spot' id='lamp'><float name='intensity' "
+        "value='9'/><float "
+        "name='cutoff_angle' value='24'/><float name='beam_width' value='23'/><transform "
+        "name='to_world'><lookat origin='0,0,3' target='.2,0,0' up='0,1,0'/></transform>"
+        "</emitter></scene>",
+        IMP_MONO);
+    imp_problem *p = test_problem(ctx, s, "lamp.cutoff_angle*");
+    test_must(ctx, imp_problem_activate(p, "lamp.beam_width*"));
+    const struct imp_check_row *rows;
+    struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    size_t n;
+    o.only = "fresh";
+    o.fresh_spp = 256;
+    test_must(ctx, imp_check(p, &o, &run, &rows, &n));
+    tap_ok(n == 2, "a spot's angles have a row each");
+    for (size_t i = 0; i < n; i++)
+        tap_ok(rows[i].ok == 1 && rows[i].step < 1 &&
+                   rows[i].se < 0.1 * fabs(rows[i].reference),
+               "%s # %.5f, differences %.5f se %.5f, step %g", rows[i].param,
+               rows[i].value, rows[i].reference, rows[i].se, rows[i].step);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
 int main(void)
 {
     ctx = test_context(0);
+    spot_test();
     imp_scene *s = dots();
     struct found sum = {0};
     uint64_t kinked = 0;

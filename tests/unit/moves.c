@@ -103,8 +103,7 @@ static void kind_test(enum imp__move_kind kind, const char *name)
         }
         worst = fmax(worst, fabs(v.area - d[6]));
         worst = fmax(worst, fabs(v.turn - (double)difference(grain, h)));
-        struct imp__velocity w = {imp__v3(0, 0, 0), imp__v3(0, 0, 0), imp__u01(key, 4),
-                                  imp__u01(key, 5)};
+        struct imp__velocity w = {.area = imp__u01(key, 4), .turn = imp__u01(key, 5)};
         double forward = w.area * v.area + w.turn * v.turn, reverse = 0;
         for (int k = 0; k < 3; k++) {
             w.v[k] = imp__u01(key, (uint32_t)(500 + k)) - 0.5;

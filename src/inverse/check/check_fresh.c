@@ -140,11 +140,39 @@ static bool is_singly(const struct imp_problem *p, size_t param)
            imp__pose_of(p->scene, param);
 }
 
-/* A large change of a number of a pose; 0: it is none. */
-static double pose_scale(const struct imp_problem *p, const struct comparison *c)
+extern const struct imp_emitter_ops imp__spot_light;
+
+/* Between the beam of a spot and its cutoff, where light falls off, differences are smooth; a step
+ * across it has a kink. 0: the parameter is no angle of a spot. */
+static double spot_scale(const struct imp_problem *p, size_t param)
+{
+    for (int k = 0; k < p->scene->n_emitters; k++) {
+        const struct imp_emitter *e = p->scene->emitters[k];
+        const struct imp_texcoord nowhere = {.shape = NULL};
+        double cutoff = 0, beam = 0;
+        bool own = false;
+        for (int j = 0; e->ops == &imp__spot_light && j < e->n_in; j++) {
+            const char *name = e->ops->inputs[j].name;
+            imp_spec value;
+            if (strcmp(name, "cutoff_angle") != 0 && strcmp(name, "beam_width") != 0)
+                continue;
+            imp__inputs_eval(&e->input[j], 1, &nowhere, &value);
+            if (name[0] == 'c') cutoff = value[0];
+            else beam = value[0];
+            own |= e->input[j]->param == (int)param;
+        }
+        if (own)
+            return fmin(imp__check_scale(&p->scene->params[param], 0),
+                        fmax(cutoff - beam, 0.01));
+    }
+    return 0;
+}
+
+/* A large change of a number of a pose, or a spot's angle; 0: it is none. */
+static double own_scale(const struct imp_problem *p, const struct comparison *c)
 {
     const struct imp_pose *pose = imp__pose_of(p->scene, c->param);
-    return pose ? 0.2 * imp__pose_large(pose, c->element) : 0;
+    return pose ? 0.2 * imp__pose_large(pose, c->element) : spot_scale(p, c->param);
 }
 
 /* The last error as a reason, without what all of them begin with. */
@@ -198,13 +226,13 @@ static enum imp_status comparison_round(struct rows *r, struct comparison *c, in
     double *old = buffer, *weight = buffer + count, *x_dot = buffer + 2 * count;
     struct imp_estimate mine;
     for (size_t e = 0; e < count; e++) old[e] = imp__param_get(q, e);
-    const struct imp__motion m = {q, old, weight, pose_scale(p, c)};
+    const struct imp__motion m = {q, old, weight, own_scale(p, c)};
     if (is_singly(p, c->param)) {
         const size_t e = c->element < 0 ? 0 : (size_t)c->element;
         const char *why = NULL;
         weight[e] = 1;
         mine = (struct imp_estimate){r->gradient[base + e], r->gradient_se[base + e], 0};
-        if (m.scale > 0) IMP_TRY(has_room(r, &m, e, &why));
+        if (imp__pose_of(p->scene, c->param)) IMP_TRY(has_room(r, &m, e, &why));
         if (why) { /* nothing is decided */
             const struct imp_check_row row = {.step = IMP_FRESH_STEP * m.scale,
                                               .value = mine.value,

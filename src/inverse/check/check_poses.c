@@ -74,14 +74,15 @@ static imp_v3 turned(const struct moved *m, imp_v3 d)
 }
 
 /* A point of a shape, its normal and a direction in it, and the curvature there, where the pose has
- * moved. */
+ * moved; the normal of its shading frame. */
 struct at {
     imp_v3 p, n, s;
     double curvature;
+    imp_v3 shade;
 };
 static struct at placed(const struct moved *m, const struct imp__glued *x)
 {
-    struct at at = {x->p, x->n, x->s, x->curvature};
+    struct at at = {x->p, x->n, x->s, x->curvature, imp__shading_normal(x)};
     if (x->shape != m->shape) return at;
     if (m->pose->kind == IMP_POSE_SCALE) {
         at.p = m->from + (x->p - m->from) * m->by;
@@ -90,8 +91,41 @@ static struct at placed(const struct moved *m, const struct imp__glued *x)
         at.p = m->to + turned(m, x->p - m->from);
         at.n = turned(m, x->n);
         at.s = turned(m, x->s);
+        at.shade = turned(m, imp__shading_normal(x));
     }
     return at;
+}
+
+/* Where a point of a shape, now at x, was when the walk was recorded. */
+static imp_v3 was_at(const struct moved *m, int shape, imp_v3 x)
+{
+    const double *R = m->turn;
+    const imp_v3 r = x - m->to;
+    if (shape != m->shape) return x;
+    if (m->pose->kind == IMP_POSE_SCALE) return m->from + r * (1 / m->by);
+    return m->from + imp__v3(R[0] * r[0] + R[3] * r[1] + R[6] * r[2],
+                             R[1] * r[0] + R[4] * r[1] + R[7] * r[2],
+                             R[2] * r[0] + R[5] * r[1] + R[8] * r[2]);
+}
+
+/* The shading normal at x, in the plane of a triangle with vertex normals. */
+static imp_v3 shaded_at(const struct moved *m, const struct imp__glued *then, imp_v3 x)
+{
+    const struct imp_shape *s = m->c->problem->scene->shapes[then->shape];
+    const uint32_t *i = s->triangles.indices + 3 * (size_t)then->prim;
+    const imp_v3 r = was_at(m, then->shape, x) - then->p;
+    double b[3] = {then->b[0], then->b[1], then->b[2]};
+    imp_v3 N = {0};
+    for (int k = 0; k < 2; k++) {
+        b[k + 1] += imp__dot(then->slope[k], r);
+        b[0] -= imp__dot(then->slope[k], r);
+    }
+    for (int k = 0; k < 3; k++) {
+        const float *n = ((const struct imp__mesh *)s->self)->normals + 3 * (size_t)i[k];
+        N += imp__v3(n[0], n[1], n[2]) * b[k];
+    }
+    N = imp__normalize(N);
+    return then->shape == m->shape && m->pose->kind == IMP_POSE_RIGID ? turned(m, N) : N;
 }
 
 /* The point of a vertex, with its frame's s where its material is not Lambertian. */
@@ -140,15 +174,7 @@ static void looked_up(const struct moved *m, const struct imp_vertex *v, imp_v3 
     struct imp_texcoord at = imp__vertex_at(v);
     struct imp_surface old;
     imp_v3 grad[2];
-    if (moved && then->shape == m->shape) {
-        const double *R = m->turn;
-        const imp_v3 r = x - m->to;
-        x = m->pose->kind == IMP_POSE_SCALE
-                ? m->from + r * (1 / m->by)
-                : m->from + imp__v3(R[0] * r[0] + R[3] * r[1] + R[6] * r[2],
-                                    R[1] * r[0] + R[4] * r[1] + R[7] * r[2],
-                                    R[2] * r[0] + R[5] * r[1] + R[8] * r[2]);
-    }
+    if (moved) x = was_at(m, then->shape, x);
     if (then->curvature !=
         0) { /* the point itself, as one that a ray of no length hits */
         const struct imp_hit hit = {.t = 0};
@@ -170,12 +196,14 @@ static imp_spec kernel_ratio(const struct moved *m, const struct imp_vertex *v,
 {
     imp_spec in[IMP_INPUTS_MAX];
     if (imp__is_plain(v->bsdf))
-        return imp__spec(imp__dot(now->n, w[0]) / imp__dot(then->n, w[1]));
+        return imp__spec(imp__dot(now->shade, w[0]) /
+                         imp__dot(imp__shading_normal(then), w[1]));
     imp_spec K[2];
     const bool textured = imp__is_textured(v->bsdf);
     for (int k = 0; k < 2; k++) {
         if (textured) looked_up(m, v, k ? then->p : x, k == 0, then, in);
-        const imp_v3 n = k ? then->n : now->n, across = k ? then->s : now->s;
+        const imp_v3 n = k ? imp__shading_normal(then) : now->shade,
+                     across = k ? then->s : now->s;
         const imp_v3 s = imp__normalize(across - n * imp__dot(n, across));
         const struct imp_frame f = {s, imp__cross(n, s), n};
         const struct imp_dirs d = {imp__to_local(&f, -o[k]), imp__to_local(&f, w[k]),
@@ -245,6 +273,7 @@ static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spe
     }
     struct at here = placed(m, &old);
     imp_v3 x = met_at(o, w[0], &here);
+    here.shade = old.smooth ? shaded_at(m, &old, x) : here.n;
     for (; v; v = v->next) {
         const imp_v3 from[2] = {w[0], w[1]};
         if (v->d.connection == IMP_CONNECTED) {
@@ -276,6 +305,7 @@ static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spe
                 receives(x, there.p, there.n) / receives(old.p, ahead.p, ahead.n);
         }
         x = met_at(x, w[0], &there);
+        there.shade = ahead.smooth ? shaded_at(m, &ahead, x) : there.n;
         P *= step;
         old = ahead;
         here = there;

@@ -86,7 +86,7 @@ void imp__moved_numbers(const struct imp__moved_gradient *m, double *bar, imp_sp
     for (int k = 0; k < m->moves.n_movers; k++) {
         const struct imp_pose *pose = m->pose[k];
         double *own = bar + m->moves.mover[k].first;
-        imp__pose_numbers_bar(pose, own);
+        imp__pose_numbers_bar(&m->moves, &m->moves.mover[k], pose, own);
         for (size_t e = 0; e < pose->n; e++) {
             const imp_spec lanes = lane * own[e];
             if (own[e] != 0) sink->add(sink, pose->param, e, 1, &lanes);

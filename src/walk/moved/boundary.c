@@ -51,41 +51,69 @@ static enum imp_status choice_make(struct imp__boundary *b, enum imp__boundary_k
     return st;
 }
 
-/* Spheres by the lengths of their great circles, disks by those of their rims, edges by theirs. */
-static enum imp_status balls_make(struct imp__boundary *b)
+/* What has edges that are in no list; all = shapes, or 2 more for meshes with vertex normals. */
+static enum imp_status items_find(struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
     struct imp_round round;
-    double edges = 0, sum = 0;
-    b->ball = imp__alloc(scene->ctx, (size_t)scene->n_shapes + 1, sizeof *b->ball);
-    if (!b->ball) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
-    for (int k = 0; k < scene->n_shapes; k++)
+    b->item = imp__alloc(scene->ctx, 2 * (size_t)scene->n_shapes + 1, sizeof *b->item);
+    if (!b->item) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
+    for (int k = 0; k < scene->n_shapes; k++) {
         if (imp__moves_sphere(scene, k, &round) || imp__moves_disk(scene, k))
-            b->ball[b->n_balls++] = k;
+            b->item[b->n_items++] =
+                (struct imp__edge_item){.kind = IMP_ITEM_ROUND, .shape = k};
+        if (!imp__moves_smooth(scene, k)) continue;
+        for (int i = 0; i < 2; i++) {
+            struct imp__edge_item *item = &b->item[b->n_items++];
+            *item = (struct imp__edge_item){
+                .kind = i ? IMP_ITEM_HORIZON : IMP_ITEM_SHADING, .shape = k};
+            IMP_CHECKED(imp__edge_item_measure(b, item));
+        }
+    }
+    return IMP_OK;
+}
+
+/* The circumference of a circle that is as large, about: of spheres and disks; half of it of what
+ * meshes with vertex normals have, which between lights and vertices is nothing. */
+static double item_length(const struct imp__boundary *b,
+                          const struct imp__edge_item *item, int kind)
+{
+    const struct imp_shape *s = b->tracer->scene->shapes[item->shape];
+    struct imp_round round;
+    if (imp__moves_sphere(b->tracer->scene, item->shape, &round))
+        return IMP_2PI * round.radius;
+    if (item->kind == IMP_ITEM_ROUND) return IMP_2PI * sqrt(s->area * IMP_INV_PI);
+    if (kind == IMP_BOUNDARY_LIGHT) return 0;
+    if (kind == IMP_BOUNDARY_FILM && item->n_seen == 0) return 0;
+    return IMP_PI * sqrt(item->until[s->triangles.n_triangles] * IMP_INV_PI / 4);
+}
+
+/* Items by such lengths, edges by theirs. */
+static enum imp_status items_make(struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    double edges = 0, sum = 0;
+    IMP_CHECKED(items_find(b));
     for (size_t k = 0; k < b->edges->n; k++) edges += turn_measure(b, &b->edges->edge[k]);
     for (int kind = 0; kind < IMP_BOUNDARY_KINDS; kind++) {
         double *part =
-            imp__alloc(scene->ctx, (size_t)b->n_balls + 2, sizeof *b->part[kind]);
+            imp__alloc(scene->ctx, (size_t)b->n_items + 2, sizeof *b->part[kind]);
         if (!part) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
         b->part[kind] = part;
         sum = part[0] = 0;
-        for (int k = 0; k < b->n_balls; k++) {
-            /* A circle that is as large, about. */
-            if (!imp__moves_sphere(scene, b->ball[k], &round))
-                round.radius = sqrt(scene->shapes[b->ball[k]]->area * IMP_INV_PI);
-            part[k + 1] = sum += IMP_2PI * round.radius;
-        }
+        for (int k = 0; k < b->n_items; k++)
+            part[k + 1] = sum += item_length(b, &b->item[k], kind);
         sum += edges;
-        for (int k = 0; k <= b->n_balls && sum > 0; k++) part[k] /= sum;
-        if (!(edges > 0)) part[b->n_balls] = 1;
-        part[b->n_balls + 1] = 1;
+        for (int k = 0; k <= b->n_items && sum > 0; k++) part[k] /= sum;
+        if (!(edges > 0)) part[b->n_items] = 1;
+        part[b->n_items + 1] = 1;
     }
     return IMP_OK;
 }
 
 static enum imp_status choices_make(struct imp__boundary *b)
 {
-    IMP_CHECKED(balls_make(b));
+    IMP_CHECKED(items_make(b));
     if (b->edges->n == 0) return IMP_OK;
     IMP_CHECKED(imp__edge_tree_build(b->edges, &b->tree));
     for (int k = 0; k < IMP_BOUNDARY_KINDS; k++)
@@ -120,28 +148,6 @@ static enum imp_status lights_make(struct imp__boundary *b)
     return IMP_OK;
 }
 
-static enum imp_status edges_allowed(const struct imp__boundary *b)
-{
-    const struct imp_scene *scene = b->tracer->scene;
-    const struct imp__edge *torn = imp__edges_torn(b->edges, b->moves);
-    if (torn)
-        return imp__error(
-            scene->ctx, IMP_E_UNSUPPORTED,
-            "derivatives by what moves: an edge of shape '%s' at (%g, %g, %g) "
-            "lies on another one, which moves differently",
-            scene->shapes[b->edges->face[torn->first].shape]->name, torn->a[0],
-            torn->a[1], torn->a[2]);
-    int other = -1;
-    const int pierced = imp__edges_pierced(b->edges, scene, &other);
-    if (pierced >= 0)
-        return imp__error(
-            scene->ctx, IMP_E_UNSUPPORTED,
-            "derivatives by what moves: shape '%s' passes through shape '%s', "
-            "and where they meet is no edge",
-            scene->shapes[other]->name, scene->shapes[pierced]->name);
-    return IMP_OK;
-}
-
 enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
                                     const struct imp__moves *moves,
                                     const struct imp__edges *edges,
@@ -151,8 +157,8 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
     *out = (struct imp__boundary){.tracer = tracer, .moves = moves, .edges = edges};
     out->size = imp__length(scene->hi - scene->lo);
     enum imp_status st = imp__moved_allowed(tracer);
-    if (st == IMP_OK) st = edges_allowed(out);
     imp__pinhole(tracer->sensor, &out->camera);
+    if (st == IMP_OK) st = imp__boundary_allowed(out);
     if (st == IMP_OK) st = lights_make(out);
     if (st == IMP_OK) st = choices_make(out);
     return st;
@@ -165,7 +171,9 @@ void imp__boundary_free(struct imp__boundary *b)
         imp__edge_choice_free(&b->choice[k]);
         if (b->tracer) imp__release(b->tracer->scene->ctx, b->part[k]);
     }
-    if (b->tracer) imp__release(b->tracer->scene->ctx, b->ball);
+    for (int k = 0; k < b->n_items; k++)
+        imp__edge_item_free(b->tracer->scene->ctx, &b->item[k]);
+    if (b->tracer) imp__release(b->tracer->scene->ctx, b->item);
     imp__edge_tree_free(&b->tree);
     *b = (struct imp__boundary){0};
 }
@@ -188,10 +196,19 @@ void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
 {
     d->part = d->b->part[kind];
     d->end = &d->first;
+    if (!imp__edge_item_choose(d)) return;
+    const enum imp__edge_item_kind item = d->item ? d->item->kind : IMP_ITEM_ROUND;
     switch (kind) {
-    case IMP_BOUNDARY_FILM: imp__draw_film(d); break;
+    case IMP_BOUNDARY_FILM:
+        if (item == IMP_ITEM_ROUND) imp__draw_film(d);
+        if (item == IMP_ITEM_SHADING) imp__draw_shading_film(d);
+        break;
     case IMP_BOUNDARY_LIGHT: imp__draw_light(d); break;
-    case IMP_BOUNDARY_SCATTER: imp__draw_scatter(d); break;
+    case IMP_BOUNDARY_SCATTER:
+        if (item == IMP_ITEM_ROUND) imp__draw_scatter(d);
+        if (item == IMP_ITEM_SHADING) imp__draw_shading_scatter(d);
+        if (item == IMP_ITEM_HORIZON) imp__draw_horizon(d);
+        break;
     }
 }
 
@@ -201,7 +218,7 @@ struct imp__flux *imp__boundary_draw(const struct imp__boundary *b,
                                      int64_t strata, bool *no_memory)
 {
     struct imp__edge_draw d = {.b = b, .arena = arena, .choice = &b->choice[kind]};
-    if (b->edges->n == 0 && b->n_balls == 0) return NULL;
+    if (b->edges->n == 0 && b->n_items == 0) return NULL;
     /* Walks of pictures have smaller numbers in the place of the kind. */
     d.key = imp__key(b->tracer->seed, UINT64_MAX - (uint64_t)kind, (uint64_t)index);
     d.u = ((double)(index % strata) + imp__u01(d.key, IMP_EDGE_WHICH)) / (double)strata;
@@ -214,16 +231,25 @@ struct imp__flux *imp__boundary_draw(const struct imp__boundary *b,
     return d.first;
 }
 
+/* What a velocity counts. */
+static double velocity_times(const struct imp__glued *x, const struct imp__velocity *bar,
+                             const struct imp__velocity *v)
+{
+    const double sum = imp__dot(bar->v, v->v) + imp__dot(bar->n, v->n);
+    return x->smooth ? sum + imp__dot(bar->shade, v->shade) : sum;
+}
+
 double imp__flux_velocity(const struct imp__moves *moves, const struct imp__flux *flux,
                           const double *theta_dot)
 {
     double sum = 0;
     for (int k = 0; k < flux->n_ends; k++) {
         const struct imp__flux_end *e = &flux->end[k];
-        const imp_v3 v = e->camera  ? imp__camera_velocity(moves, e->x.p, theta_dot)
-                         : e->light ? imp__light_velocity(moves, e->light - 1, theta_dot)
-                                    : imp__velocity_of(moves, &e->x, theta_dot).v;
-        sum += imp__dot(e->bar, v);
+        struct imp__velocity v = {.area = 0};
+        if (e->camera) v.v = imp__camera_velocity(moves, e->x.p, theta_dot);
+        else if (e->light) v.v = imp__light_velocity(moves, e->light - 1, theta_dot);
+        else v = imp__velocity_of(moves, &e->x, theta_dot);
+        sum += velocity_times(&e->x, &e->bar, &v);
     }
     return sum;
 }
@@ -233,7 +259,8 @@ void imp__flux_bar(const struct imp__moves *moves, const struct imp__flux *flux,
 {
     for (int k = 0; k < flux->n_ends; k++) {
         const struct imp__flux_end *e = &flux->end[k];
-        const struct imp__velocity v = {.v = e->bar * bar};
+        const struct imp__velocity v = {
+            .v = e->bar.v * bar, .n = e->bar.n * bar, .shade = e->bar.shade * bar};
         if (e->camera) imp__camera_velocity_bar(moves, e->x.p, v.v, theta_bar);
         else if (e->light) imp__light_velocity_bar(moves, e->light - 1, v.v, theta_bar);
         else imp__velocity_bar(moves, &e->x, &v, theta_bar);

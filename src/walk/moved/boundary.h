@@ -22,6 +22,19 @@
  * turn about the normal, psi, dl dw sin(phi) is  dA dpsi/r. The rim of a disk is an edge with one
  * face, by its length.
  *
+ * A mesh with vertex normals n_s, beside its geometric normal n, has two more places where light
+ * jumps. Kernels are those of n_s, and vanish where it turns away from where the light goes:
+ *
+ *     shading  towards the direction w that is scattered at a point p of the mesh, with the circle
+ *              psi of directions across n_s and the jump of what p scatters, lit side first:
+ *                  dI = int dA_p dpsi |n.w| W(x) [L(n_s.w > 0) - L(n_s.w < 0)] n_s'.w
+ *              of p that slides along w; to the camera the curve n_s.w = 0 on the mesh:
+ *                  dI_p = int dl_p [L - L] |n.w|/t^2 (n_s'.w + n_s.w')/|grad n_s.w|
+ *     horizon  a ray that leaves p below the plane of its facet begins behind it, and the kernel
+ *              does not vanish there; with psi in the facet's plane
+ *                  dI = int dA_p dpsi f |n_s.w| W(p) [L(above) - L(below)] n'.w
+ *              where what is emitted by a light at y, glued to it, has n'.w + n.(V_y - V)/d.
+ *
  * x' is the velocity of a vertex that slides, along the chain from the camera. W(x), what the
  * sensor makes of a unit of radiance times projected area that leaves x, is a connection to the
  * camera, or the walk goes on from x by transposed kernels and is connected from there: a walk
@@ -37,15 +50,33 @@
 enum imp__boundary_kind { IMP_BOUNDARY_FILM, IMP_BOUNDARY_LIGHT, IMP_BOUNDARY_SCATTER };
 #define IMP_BOUNDARY_KINDS 3
 
+/* What has edges that are in no list. */
+enum imp__edge_item_kind {
+    IMP_ITEM_ROUND,   /* a sphere's silhouettes, a disk's rim */
+    IMP_ITEM_SHADING, /* of a mesh with vertex normals */
+    IMP_ITEM_HORIZON
+};
+struct imp__edge_item {
+    enum imp__edge_item_kind kind;
+    int shape;
+    double
+        *until; /* of meshes: [n_triangles + 1] area of the triangles before this one */
+    /* IMP_ITEM_SHADING: triangles in which the shading normal may turn away from the camera, and
+     * [n_seen + 1] the perimeters of those before, over distances. */
+    size_t n_seen;
+    int *seen;
+    double *seen_until;
+};
+
 struct imp__boundary {
     const struct imp_tracer *tracer;
     const struct imp__moves *moves;
     const struct imp__edges *edges;
     struct imp__edge_tree tree;
     struct imp__edge_choice choice[IMP_BOUNDARY_KINDS];
-    int n_balls;
-    int *ball; /* [n_balls] shapes that are spheres or disks */
-    /* [n_balls + 2] probability of the spheres before this one; then that of all of them, and 1:
+    int n_items;
+    struct imp__edge_item *item; /* [n_items] */
+    /* [n_items + 2] probability of the items before this one; then that of all of them, and 1:
      * the rest is of edges. */
     double *part[IMP_BOUNDARY_KINDS];
     imp_v3 camera; /* where its rays meet */
@@ -58,12 +89,12 @@ struct imp__boundary {
  * light without a shape. */
 struct imp__flux_end {
     struct imp__glued x;
-    imp_v3 bar;
+    struct imp__velocity bar; /* of a camera or light: bar.v alone */
     bool camera;
     int light; /* emitter, plus 1, whose place or direction it is; 0: none */
 };
 
-/* What one draw brings to a film position: L times the sum of bar.V over its ends. */
+/* What one draw brings to a film position: L times the sum of bar times velocity over its ends. */
 struct imp__flux {
     struct imp__flux *next;
     double px, py;

@@ -26,8 +26,7 @@ static void film_slopes(const struct imp_sensor *s, double px, double py, imp_v3
     *y = across_a * (1 / imp__dot(b, across_a));
 }
 
-/* What the camera sees at a film position. */
-static imp_spec look(const struct imp__edge_draw *d, double px, double py)
+imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py)
 {
     const struct imp_tracer *t = d->b->tracer;
     const double lens[2] = {0.5, 0.5};
@@ -66,8 +65,8 @@ void imp__draw_film(struct imp__edge_draw *d)
     const double pixel = sqrt(1 / (imp__length(x) * imp__length(y))) * inverse;
     const double beside = IMP_BESIDE / pixel / length;
     const double dx = normal[0] * beside, dy = normal[1] * beside;
-    const imp_spec jump =
-        look(d, to.px - dx, to.py - dy) - look(d, to.px + dx, to.py + dy);
+    const imp_spec jump = imp__look_through(d, to.px - dx, to.py - dy) -
+                          imp__look_through(d, to.px + dx, to.py + dy);
     if (imp__is_zero(jump)) return;
     struct imp__flux *f = imp__flux_add(d, 2);
     if (!f) return;
@@ -77,6 +76,5 @@ void imp__draw_film(struct imp__edge_draw *d)
     f->n_ends = 2;
     const struct imp__glued at = imp__edge_carried(d);
     f->end[0] = imp__flux_glued(&at, bar);
-    f->end[1] = imp__flux_glued(&at, -bar);
-    f->end[1].camera = true;
+    f->end[1] = imp__flux_camera(&at, -bar);
 }

@@ -39,9 +39,12 @@ static void groups_add(struct pilot *x, const struct imp__flux *f)
                               : e->light ? IMP_MOVE_EMITTER(e->light - 1)
                                          : e->x.shape;
             if (shape != m->shape) continue;
-            const imp_v3 turn = imp__cross(e->x.p - m->centre, e->bar);
+            imp_v3 turn = imp__cross(e->x.p - m->centre, e->bar.v);
+            if (e->x.smooth)
+                turn +=
+                    imp__cross(e->x.n, e->bar.n) + imp__cross(e->x.shade, e->bar.shade);
             for (int j = 0; j < 3; j++) {
-                x->group[6 * k + j] += light * e->bar[j];
+                x->group[6 * k + j] += light * e->bar.v[j];
                 x->group[6 * k + 3 + j] += light * turn[j];
             }
         }
@@ -75,7 +78,7 @@ static double square3(const double *v) { return v[0] * v[0] + v[1] * v[1] + v[2]
  * that was chosen with the probability c is that moment over c. */
 static void parts_learn(const struct pilot *x, double *part, int n_cells)
 {
-    const int n = x->b->n_balls;
+    const int n = x->b->n_items;
     const double edges = part[n + 1] - part[n];
     double root = 0, sum = 0, before = 0;
     for (int k = 0; k < n_cells; k++) root += sqrt(x->moment[k]);
@@ -98,7 +101,7 @@ static void kind_learn(struct pilot *x, enum imp__boundary_kind kind, int64_t n)
     struct imp__edge_choice *c = &x->b->choice[kind];
     struct imp__edge_draw d;
     for (int k = 0; k < x->n_groups; k++) x->square[k] = 0;
-    for (int k = 0; k < c->n_cells + x->b->n_balls; k++) x->moment[k] = 0;
+    for (int k = 0; k < c->n_cells + x->b->n_items; k++) x->moment[k] = 0;
     for (int64_t i = 0; i < n / 4; i++) {
         if (!look(x, kind, i, n / 4, &d)) continue;
         for (int k = 0; k < x->n_groups; k += 3) x->square[k] += square3(x->group + k);
@@ -111,7 +114,7 @@ static void kind_learn(struct pilot *x, enum imp__boundary_kind kind, int64_t n)
         x->moment[d.cell] += sum;
     }
     if (x->b->edges->n > 0) imp__edge_choice_learn(c, x->moment);
-    if (x->b->n_balls > 0) parts_learn(x, x->b->part[kind], c->n_cells);
+    if (x->b->n_items > 0) parts_learn(x, x->b->part[kind], c->n_cells);
 }
 
 /* Cells in place of the one of the beginning. */
@@ -133,7 +136,7 @@ enum imp_status imp__boundary_learn(struct imp__boundary *b, int64_t draws,
     enum imp_status st = IMP_OK;
     imp_context *ctx = b->tracer->scene->ctx;
     struct pilot x = {.b = b, .weight = weight, .payload = payload};
-    if (b->edges->n == 0 && b->n_balls == 0) return IMP_OK;
+    if (b->edges->n == 0 && b->n_items == 0) return IMP_OK;
     const int64_t n = draws / PART;
     const int cells = (int)imp_min(n / LOOKS, (int64_t)IMP_EDGE_CELLS_MAX);
     if (cells < LOOKS_LEAST) return IMP_OK; /* too few to learn from */
@@ -141,7 +144,7 @@ enum imp_status imp__boundary_learn(struct imp__boundary *b, int64_t draws,
     imp__arena_init(&x.arena, ctx);
     x.group = imp__alloc(ctx, (size_t)x.n_groups + 1, sizeof *x.group);
     x.square = imp__alloc(ctx, (size_t)x.n_groups + 1, sizeof *x.square);
-    x.moment = imp__alloc(ctx, (size_t)(cells + b->n_balls), sizeof *x.moment);
+    x.moment = imp__alloc(ctx, (size_t)(cells + b->n_items), sizeof *x.moment);
     if (!x.group || !x.square || !x.moment)
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for edges"));
     for (int kind = 0; kind < IMP_BOUNDARY_KINDS && !x.no_memory; kind++) {

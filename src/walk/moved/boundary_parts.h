@@ -12,11 +12,12 @@ struct imp__edge_draw {
     struct imp_arena *arena;
     struct imp_key key;
     const struct imp__edge_choice *choice;
-    const double *part; /* of spheres and edges (boundary.h) */
-    double u;           /* by which the point is chosen */
+    const double *part;                /* of spheres and edges (boundary.h) */
+    double u;                          /* by which the point is chosen */
+    const struct imp__edge_item *item; /* NULL: an edge */
+    double chance;                     /* of the item, or of all edges */
     const struct imp__edge
         *edge;       /* NULL: a sphere touched by a line, or the rim of a disk */
-    int ball;        /* the sphere's or disk's shape */
     bool touches;    /* a line that touches a sphere */
     imp_v3 p, along; /* the point, and the unit direction of the edge */
     imp_v3
@@ -46,6 +47,8 @@ enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
 /* Surfaces nearer behind an edge, per size of the scene, are what it stands on. */
 #define IMP_CONTACT 2e-5
 
+/* Chooses an item, or the edges. False: there is none. */
+bool imp__edge_item_choose(struct imp__edge_draw *d);
 /* Sets the edge and its point: of all edges, and of spheres' silhouettes from there; of silhouettes of
  * lines from there; of all edges, and lines that touch spheres, along *w. False: none. */
 bool imp__edge_any(struct imp__edge_draw *d, imp_v3 from);
@@ -59,8 +62,26 @@ imp_v3 imp__edge_clear(const struct imp__edge_draw *d);
 struct imp__flux *imp__flux_add(struct imp__edge_draw *d, int n);
 static inline struct imp__flux_end imp__flux_glued(const struct imp__glued *x, imp_v3 bar)
 {
-    return (struct imp__flux_end){*x, bar, false, 0};
+    return (struct imp__flux_end){*x, {.v = bar}, false, 0};
 }
+static inline struct imp__flux_end imp__flux_camera(const struct imp__glued *x,
+                                                    imp_v3 bar)
+{
+    return (struct imp__flux_end){*x, {.v = bar}, true, 0};
+}
+/* What the camera sees at a film position. */
+imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py);
+/* What a vertex at a hit sees towards a place. */
+void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 to,
+                    struct imp_walk *walk);
+/* What arrives along a recorded walk from a vertex x, without the emission of a light that it
+ * meets first, which is glued to that. Vertex i of it has number i + before of the whole path. */
+imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk,
+                      int before);
+/* Vertices behind the edge for which light is known: what jumps by depth [*n], in the arena. NULL:
+ * no memory, or nothing jumps. */
+imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
+                     const struct imp_walk *hi, double times, int *n);
 
 /* What light that arrives at `at` (a hit of this shape) along w brings to the sensor: from there,
  * and over further vertices. Light: radiance times all factors but f W(x). `back`: vertices that
@@ -72,7 +93,8 @@ struct imp__edge_light {
     imp_spec light;
     const imp_spec *by_depth; /* [n_depths] in place of light; NULL: light */
     int n_depths;
-    int behind; /* segments of the path behind x */
+    int behind;   /* segments of the path behind x */
+    bool horizon; /* light is per area of x, and not times the cosine there */
     imp_v3 slide;
     struct imp__flux_end end[2];
     int n_ends;
@@ -80,10 +102,25 @@ struct imp__edge_light {
 void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
                      const struct imp_surface *at, const struct imp__edge_light *light);
 
+/* IMP_E_UNSUPPORTED, with names: edges that tear, shapes that pass through each other, facets that
+ * become lit at once, a camera inside of a shape. */
+enum imp_status imp__boundary_allowed(const struct imp__boundary *b);
+
 /* ---- One draw of each kind ---- */
 void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind);
 void imp__draw_film(struct imp__edge_draw *d);
 void imp__draw_light(struct imp__edge_draw *d);
 void imp__draw_scatter(struct imp__edge_draw *d);
+/* ---- Of meshes with vertex normals: boundary_shading.c, boundary_horizon.c ---- */
+void imp__draw_shading_film(struct imp__edge_draw *d);
+void imp__draw_shading_scatter(struct imp__edge_draw *d);
+void imp__draw_horizon(struct imp__edge_draw *d);
+/* A point of the item's mesh by area, d->inv_pdf per area; false: it has none. */
+bool imp__edge_item_point(struct imp__edge_draw *d, struct imp_hit *hit,
+                          struct imp_surface *at);
+/* Sets the lists of an item; freed by imp__edge_item_free. */
+enum imp_status imp__edge_item_measure(const struct imp__boundary *b,
+                                       struct imp__edge_item *item);
+void imp__edge_item_free(imp_context *ctx, struct imp__edge_item *item);
 
 #endif

@@ -18,12 +18,14 @@ struct link {
     struct imp_surface at;
     struct imp_frame frame;
     imp_v3 wi; /* local: where the light comes from */
+    double
+        cos_i; /* of shading normals: |n.wi| of the geometric one, by which the light counts */
     imp_spec in[IMP_INPUTS_MAX];
 };
 
 static struct link *link_make(struct imp__edge_draw *d, struct link *before,
                               const struct imp_hit *hit, const struct imp_surface *at,
-                              imp_v3 w)
+                              imp_v3 w, bool horizon)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
     const struct imp_shape *shape = scene->shapes[hit->shape];
@@ -41,15 +43,22 @@ static struct link *link_make(struct imp__edge_draw *d, struct link *before,
     k->at = *at;
     k->frame = (struct imp_frame){at->s, at->t, at->n};
     k->wi = imp__to_local(&k->frame, -w);
+    k->cos_i = horizon ? 1 : fabs(imp__dot(at->ng, w));
     imp__evaluate_inputs(k->bsdf, shape, &place, k->in);
     return k;
 }
 
-/* The transposed kernel towards wo, local: f cos_o. */
+/* The transposed kernel towards wo, local: f cos_o; with vertex normals f cos_i^s |cos_o/cos_i|,
+ * where ^s is of the shading normal (kind/bsdf/transport.h). */
 static imp_spec kernel(const struct link *k, imp_v3 wo)
 {
     const struct imp_dirs dirs = {wo, k->wi, IMP_SMOOTH, 0};
     imp_spec f;
+    if (k->x.x.smooth) {
+        const double cos_o = fabs(imp__dot(k->at.ng, imp__to_world(&k->frame, wo)));
+        k->bsdf->ops->eval(k->bsdf, k->in, &dirs, &f);
+        return k->cos_i > 0 ? f * (cos_o / k->cos_i) : imp__spec(0);
+    }
     imp__bsdf_transposed(k->bsdf, k->in, &dirs, &f);
     return f;
 }
@@ -73,7 +82,7 @@ static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_ligh
         shift = imp__slide_bar(&x, imp__normalize(x.x.p - from));
         f->end[f->n_ends++] = imp__flux_glued(&x.x, x.bar.v);
     }
-    f->end[f->n_ends++] = (struct imp__flux_end){last->x.x, shift, true, 0};
+    f->end[f->n_ends++] = imp__flux_camera(&last->x.x, shift);
 }
 
 static void connect(struct imp__edge_draw *d, const struct imp__edge_light *light,
@@ -138,7 +147,7 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
                      const struct imp_surface *at, const struct imp__edge_light *light)
 {
     const struct imp_tracer *t = d->b->tracer;
-    struct link *k = link_make(d, NULL, hit, at, light->w);
+    struct link *k = link_make(d, NULL, hit, at, light->w, light->horizon);
     imp_spec T = imp__spec(1), L;
     for (int depth = 0; k && light_at(t, light, depth, &L); depth++) {
         connect(d, light, k, depth, L * T);
@@ -156,6 +165,6 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
         const imp_v3 o = imp__offset(k->at.p, k->at.ng, w);
         if (!imp__intersect(t->scene, &o, &w, 0, INFINITY, &next)) return;
         imp__hit_surface(t->scene, &next, &o, &w, &there);
-        k = link_make(d, k, &next, &there, w);
+        k = link_make(d, k, &next, &there, w, false);
     }
 }

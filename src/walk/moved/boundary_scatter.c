@@ -4,10 +4,7 @@
 #include "boundary_parts.h"
 #include "walk/core/step.h"
 
-/* What arrives along a recorded walk from a vertex x, without the emission of a light that it
- * meets first, which is glued to that. Vertex i of it has number i + before of the whole path. */
-static imp_spec arrives(const struct imp_tracer *t, const struct imp_walk *walk,
-                        int before)
+imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk, int before)
 {
     const int max = t->integrator->max_depth;
     imp_spec L = {0}, T = imp__spec(1);
@@ -22,13 +19,33 @@ static imp_spec arrives(const struct imp_tracer *t, const struct imp_walk *walk,
     return L;
 }
 
-static void look(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 to,
-                 struct imp_walk *walk)
+void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 to,
+                    struct imp_walk *walk)
 {
     struct imp_sensor_ray ray = {.t_near = 0, .t_far = INFINITY};
     ray.o = imp__offset(at->p, at->ng, to - at->p);
     ray.d = imp__normalize(to - ray.o);
     imp__walk_along(d->b->tracer, d->arena, imp__key_branch(d->key, 0, 1), &ray, 1, walk);
+}
+
+imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
+                     const struct imp_walk *hi, double times, int *n)
+{
+    const struct imp_tracer *tracer = d->b->tracer;
+    const int max = tracer->integrator->max_depth;
+    *n = max < 0 ? 1 : max - 1;
+    imp_spec *jump = imp__arena_take(d->arena, (size_t)*n, sizeof *jump);
+    if (!jump) {
+        d->no_memory = true;
+        return NULL;
+    }
+    bool any = false;
+    for (int k = 0; k < *n; k++) {
+        jump[k] =
+            (imp__arrives(tracer, lo, k + 1) - imp__arrives(tracer, hi, k + 1)) * times;
+        any |= !imp__is_zero(jump[k]);
+    }
+    return any ? jump : NULL;
 }
 
 void imp__draw_scatter(struct imp__edge_draw *d)
@@ -51,22 +68,13 @@ void imp__draw_scatter(struct imp__edge_draw *d)
     const imp_v3 m = turned * (1 / sine);
     const imp_v3 beside = m * (IMP_BESIDE * (hit.t + imp__length(d->p)));
     struct imp_walk lo, hi;
-    look(d, &at, d->p - beside, &lo);
-    look(d, &at, d->p + beside, &hi);
+    imp__look_from(d, &at, d->p - beside, &lo);
+    imp__look_from(d, &at, d->p + beside, &hi);
 
-    const int depths = max < 0 ? 1 : max - 1;
-    imp_spec *jump = imp__arena_take(d->arena, (size_t)depths, sizeof *jump);
-    if (!jump) {
-        d->no_memory = true;
-        return;
-    }
-    bool any = false;
-    for (int k = 0; k < depths; k++) {
-        jump[k] = (arrives(tracer, &lo, k + 1) - arrives(tracer, &hi, k + 1)) *
-                  ((d->touches ? 1 : sine * 4 * IMP_PI) * d->inv_pdf);
-        any |= !imp__is_zero(jump[k]);
-    }
-    if (!any) return;
+    int depths;
+    const double times = (d->touches ? 1 : sine * 4 * IMP_PI) * d->inv_pdf;
+    imp_spec *jump = imp__jumps(d, &lo, &hi, times, &depths);
+    if (!jump) return;
     struct imp__edge_light light = {.w = w, .n_ends = 1, .slide = -m};
     light.light = jump[0];
     if (max >= 0) {

@@ -37,7 +37,8 @@ static enum imp_status materials_allowed(const struct imp_tracer *t)
     for (int k = 0; k < t->scene->n_shapes; k++) {
         const struct imp_shape *s = t->scene->shapes[k];
         const struct imp_bsdf *b = imp__shape_bsdf(t->scene, s);
-        const char *why = imp__kernel_without_d(b, s->geometry != IMP_TRIANGLES);
+        const char *why =
+            imp__kernel_without_d(b, s->geometry != IMP_TRIANGLES || s->smooth);
         if (!why) why = imp__textures_without_d(b, s);
         if (!why && b->shaped) why = "has a spectrum for a number";
         if (why) return refuse(t, "material", b->name, b->ops->name, why);
@@ -60,6 +61,10 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
             return refuse(t, "light", e->name, e->ops->name,
                           "is on a shape that is not made of triangles, and no sphere or "
                           "disk");
+        if (e->shape && e->shape->smooth)
+            return refuse(t, "light", e->name, e->ops->name,
+                          "is on a mesh with vertex normals, whose light ends where "
+                          "these turn away (face_normals makes it flat)");
         if (e->course)
             return refuse(t, "light", e->name, e->ops->name, "changes with time");
     }

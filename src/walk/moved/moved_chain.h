@@ -40,7 +40,8 @@ static inline imp_v3 imp__link_direction(const struct imp__link_point *from,
 static inline void imp__scatter_bar(struct imp__link_point *x,
                                     const struct imp__kernel_bar *kernel)
 {
-    x->bar.n += kernel->n;
+    if (x->x.smooth) x->bar.shade += kernel->n;
+    else x->bar.n += kernel->n;
     x->bar.turn += kernel->turn;
     x->moved_bar += kernel->slide;
     x->bar.v -= kernel->slide;
@@ -87,8 +88,12 @@ static inline imp_v3 imp__point_bar(struct imp__link_point *x, imp_v3 y,
  * lies on, which is added there, and to a shift of the ray, which is returned. */
 static inline imp_v3 imp__slide_bar(struct imp__link_point *x, imp_v3 w)
 {
-    /* On a curved surface the normal turns as the vertex slides over it. */
-    const imp_v3 turn = (x->bar.n - x->x.n * imp__dot(x->x.n, x->bar.n)) * x->x.curvature;
+    /* On a curved surface the normal turns as the vertex slides over it; on a mesh with vertex
+     * normals the shading normal does. */
+    imp_v3 turn = (x->bar.n - x->x.n * imp__dot(x->x.n, x->bar.n)) * x->x.curvature;
+    if (x->x.smooth)
+        turn = x->x.slope[0] * imp__dot(x->x.turn[0], x->bar.shade) +
+               x->x.slope[1] * imp__dot(x->x.turn[1], x->bar.shade);
     x->moved_bar += turn;
     x->bar.v -= turn;
     const imp_v3 across = x->x.n * (imp__dot(w, x->moved_bar) / imp__dot(x->x.n, w));

@@ -103,7 +103,9 @@ static struct imp__kernel_bar kernel_bar(struct sweep *s, int k,
                                          imp_spec bar)
 {
     const int lanes = s->tracer->scene->lanes;
-    if (!derived) return imp__lambert_times(s->at[k].x.n, w, imp__sum_used(bar, lanes));
+    if (!derived)
+        return imp__lambert_times(imp__shading_normal(&s->at[k].x), w,
+                                  imp__sum_used(bar, lanes));
     const struct imp__kernel_bar out = imp__kernel_times(derived, bar, lanes);
     s->at[k].x.s = derived->frame.s;
     if (k == 0) s->wo_bar += out.wo;

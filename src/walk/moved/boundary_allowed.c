@@ -1,0 +1,100 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Places and motions that the boundary cannot differentiate (boundary.h), refused by name. */
+#include "base/arguments.h"
+#include "boundary_parts.h"
+#include "math/warp.h"
+
+extern const struct imp_bsdf_ops imp__twosided;
+
+/* A light at a point, or parallel light, and a mesh with vertex normals that move against each
+ * other: a facet that turns away from it becomes dark all at once. */
+static enum imp_status facets_allowed(const struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    for (int k = 0; k < scene->n_emitters; k++) {
+        const struct imp_emitter *e = scene->emitters[k];
+        if (!(e->ops->flags & IMP_EMITTER_DELTA)) continue;
+        for (int j = 0; j < scene->n_shapes; j++)
+            if (imp__moves_smooth(scene, j) &&
+                (imp__moves_shape(b->moves, j, NULL) ||
+                 imp__moves_shape(b->moves, IMP_MOVE_EMITTER(k), NULL)))
+                return imp__error(
+                    scene->ctx, IMP_E_UNSUPPORTED,
+                    "derivatives by what moves: light '%s' (%s) and shape '%s', which "
+                    "has "
+                    "vertex normals, move against each other: facets that turn away from "
+                    "a light without size become dark all at once (face_normals makes "
+                    "the shape flat)",
+                    e->name ? e->name : "", e->ops->name, scene->shapes[j]->name);
+    }
+    return IMP_OK;
+}
+
+static enum imp_status edges_allowed(const struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    const struct imp__edge *torn = imp__edges_torn(b->edges, b->moves);
+    if (torn)
+        return imp__error(
+            scene->ctx, IMP_E_UNSUPPORTED,
+            "derivatives by what moves: an edge of shape '%s' at (%g, %g, %g) "
+            "lies on another one, which moves differently",
+            scene->shapes[b->edges->face[torn->first].shape]->name, torn->a[0],
+            torn->a[1], torn->a[2]);
+    int other = -1;
+    const int pierced = imp__edges_pierced(b->edges, scene, &other);
+    if (pierced >= 0)
+        return imp__error(
+            scene->ctx, IMP_E_UNSUPPORTED,
+            "derivatives by what moves: shape '%s' passes through shape '%s', "
+            "and where they meet is no edge",
+            scene->shapes[other]->name, scene->shapes[pierced]->name);
+    return IMP_OK;
+}
+
+/* Does a ray from the camera meet the back of a shape that shows nothing there? Its index; -1: it
+ * meets something else. */
+static int back_met(const struct imp__boundary *b, imp_v3 w)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    struct imp_hit hit;
+    struct imp_surface at;
+    if (!imp__intersect(scene, &b->camera, &w, 0, INFINITY, &hit)) return -1;
+    imp__hit_surface(scene, &hit, &b->camera, &w, &at);
+    const struct imp_bsdf *bsdf = imp__shape_bsdf(scene, scene->shapes[hit.shape]);
+    return imp__dot(at.ng, w) > 0 && bsdf->ops != &imp__twosided ? hit.shape : -1;
+}
+
+#define PROBES 64
+
+/* A camera inside of a shape, of which it sees the back in every direction: the picture is black, and
+ * its derivative is none that anybody asks for. */
+static enum imp_status camera_allowed(const struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    int shape = -1;
+    for (uint32_t k = 0; k < PROBES; k++) {
+        const struct imp_key key = imp__key(5, 3, k);
+        const double u[2] = {imp__u01(key, 0), imp__u01(key, 1)};
+        const int met = back_met(b, imp__uniform_sphere(u));
+        if (met < 0 || (shape >= 0 && met != shape)) return IMP_OK;
+        shape = met;
+    }
+    if (!imp__moves_shape(b->moves, shape, NULL) &&
+        !imp__moves_shape(b->moves, IMP_MOVE_CAMERA, NULL))
+        return IMP_OK;
+    return imp__error(
+        scene->ctx, IMP_E_UNSUPPORTED,
+        "derivatives by what moves: sensor '%s' is inside of shape '%s', of "
+        "which it sees nothing but the back",
+        b->tracer->sensor->name, scene->shapes[shape]->name);
+}
+
+enum imp_status imp__boundary_allowed(const struct imp__boundary *b)
+{
+    enum imp_status st = edges_allowed(b);
+    if (st == IMP_OK) st = facets_allowed(b);
+    if (st == IMP_OK) st = camera_allowed(b);
+    return st;
+}

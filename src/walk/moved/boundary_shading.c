@@ -1,0 +1,320 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Where the shading normal of a mesh turns away from the direction in which light is scattered
+ * (boundary.h): kernels vanish there, in the middle of a triangle. On it
+ *
+ *     g = n_s.wo,  grad g = sum_k slope[k] (turn[k].wo) - n_s/t  in the surface, t the distance.
+ *
+ * The curve g = 0 as the camera sees it is met by random lines through its triangles. Lines
+ * through a triangle have the measure of its perimeter, and of a curve within (Crofton)
+ *
+ *     int F dl = 1/2 int dline sum over crossings of F */
+#include "base/context.h"
+#include "boundary_parts.h"
+#include "kind/cleared.h"
+#include "math/warp.h"
+#include "walk/core/step.h"
+#include "walk/lights/light_step.h"
+
+/* ---- Lists ------------------------------------------------------------------------------ */
+
+static imp_v3 triple(const float *array, uint32_t i)
+{
+    const float *p = array + 3 * (size_t)i;
+    return imp__v3(p[0], p[1], p[2]);
+}
+
+struct corners {
+    imp_v3 p[3], n[3];
+};
+static struct corners corners(const struct imp_shape *s, size_t prim)
+{
+    const uint32_t *i = s->triangles.indices + 3 * prim;
+    const struct imp__mesh *m = s->self;
+    struct corners c;
+    for (int k = 0; k < 3; k++) {
+        c.p[k] = triple(s->triangles.positions, i[k]);
+        c.n[k] = triple(m->normals, i[k]);
+    }
+    return c;
+}
+
+/* May N.(camera - p) vanish in the triangle? It is a quadratic form of the weights, between the
+ * least and the largest of its Bezier coefficients. */
+static bool may_turn(const struct corners *c, imp_v3 camera)
+{
+    double lo = INFINITY, hi = -INFINITY;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j <= i; j++) {
+            const double b = 0.5 * (imp__dot(c->n[i], camera - c->p[j]) +
+                                    imp__dot(c->n[j], camera - c->p[i]));
+            lo = imp_min(lo, b);
+            hi = imp_max(hi, b);
+        }
+    return lo <= 0 && hi >= 0;
+}
+
+static double perimeter(const struct corners *c)
+{
+    return imp__length(c->p[1] - c->p[0]) + imp__length(c->p[2] - c->p[1]) +
+           imp__length(c->p[0] - c->p[2]);
+}
+
+static enum imp_status seen_find(const struct imp__boundary *b,
+                                 struct imp__edge_item *item)
+{
+    imp_context *ctx = b->tracer->scene->ctx;
+    const struct imp_shape *s = b->tracer->scene->shapes[item->shape];
+    const size_t n = s->triangles.n_triangles;
+    item->seen = imp__alloc(ctx, n, sizeof *item->seen);
+    item->seen_until = imp__alloc(ctx, n + 1, sizeof *item->seen_until);
+    if (!item->seen || !item->seen_until)
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for vertex normals");
+    item->seen_until[0] = 0;
+    for (size_t k = 0; k < n; k++) {
+        const struct corners c = corners(s, k);
+        const double distance = imp__length(c.p[0] - b->camera) + 1e-6 * b->size;
+        if (!may_turn(&c, b->camera) || !(item->until[k + 1] > item->until[k])) continue;
+        item->seen[item->n_seen] = (int)k;
+        item->seen_until[item->n_seen + 1] =
+            item->seen_until[item->n_seen] + perimeter(&c) / distance;
+        item->n_seen++;
+    }
+    return IMP_OK;
+}
+
+enum imp_status imp__edge_item_measure(const struct imp__boundary *b,
+                                       struct imp__edge_item *item)
+{
+    imp_context *ctx = b->tracer->scene->ctx;
+    const struct imp_shape *s = b->tracer->scene->shapes[item->shape];
+    const size_t n = s->triangles.n_triangles;
+    item->until = imp__alloc(ctx, n + 1, sizeof *item->until);
+    if (!item->until) return imp__error(ctx, IMP_E_NOMEM, "no memory for vertex normals");
+    item->until[0] = 0;
+    for (size_t k = 0; k < n; k++) {
+        const struct corners c = corners(s, k);
+        item->until[k + 1] =
+            item->until[k] +
+            0.5 * imp__length(imp__cross(c.p[1] - c.p[0], c.p[2] - c.p[0]));
+    }
+    return item->kind == IMP_ITEM_SHADING ? seen_find(b, item) : IMP_OK;
+}
+
+void imp__edge_item_free(imp_context *ctx, struct imp__edge_item *item)
+{
+    imp__release(ctx, item->until);
+    imp__release(ctx, item->seen);
+    imp__release(ctx, item->seen_until);
+}
+
+/* The entry of rising sums [n + 1] that u chooses; u is uniform again, *chance its probability. */
+static size_t entry_choose(const double *until, size_t n, double *u, double *chance)
+{
+    const double x = *u * until[n];
+    size_t lo = 0, hi = n - 1;
+    while (lo < hi) {
+        const size_t half = lo + (hi - lo + 1) / 2;
+        if (until[half] <= x) lo = half;
+        else hi = half - 1;
+    }
+    const double own = until[lo + 1] - until[lo];
+    *chance = own / until[n];
+    *u = imp_clamp((x - until[lo]) / own, 0.0, 1 - 0x1p-53);
+    return lo;
+}
+
+static void surface_at(const struct imp__edge_draw *d, struct imp_hit *hit,
+                       struct imp_surface *at)
+{
+    const struct imp_shape *s = d->b->tracer->scene->shapes[d->item->shape];
+    hit->shape = d->item->shape;
+    s->ops->surface(s, hit, NULL, NULL, at);
+}
+
+bool imp__edge_item_point(struct imp__edge_draw *d, struct imp_hit *hit,
+                          struct imp_surface *at)
+{
+    const struct imp_shape *s = d->b->tracer->scene->shapes[d->item->shape];
+    const size_t n = s->triangles.n_triangles;
+    double chance, b[2], u = d->u;
+    if (!(d->item->until[n] > 0)) return false;
+    const size_t prim = entry_choose(d->item->until, n, &u, &chance);
+    const double v[2] = {u, imp__u01(d->key, IMP_EDGE_LIGHT_U)};
+    imp__uniform_triangle(v, b);
+    *hit = (struct imp_hit){.prim = (int)prim, .u = b[0], .v = b[1]};
+    surface_at(d, hit, at);
+    d->p = at->p;
+    d->inv_pdf = d->item->until[n] / d->chance;
+    return true;
+}
+
+/* ---- To the camera ---------------------------------------------------------------------- */
+
+/* A point of the curve on a random line; false: the line does not cross it. Sets d->inv_pdf, per
+ * length of the curve. */
+static bool seen_point(struct imp__edge_draw *d, struct imp_hit *hit)
+{
+    const struct imp__edge_item *item = d->item;
+    const struct imp_shape *s = d->b->tracer->scene->shapes[item->shape];
+    double chance, u = d->u;
+    const int prim =
+        item->seen[entry_choose(item->seen_until, item->n_seen, &u, &chance)];
+    const struct corners c = corners(s, (size_t)prim);
+    const double round = perimeter(&c);
+
+    /* A point of the perimeter, on side k, and a direction by the cosine to the side's normal. */
+    double x = imp__u01(d->key, IMP_EDGE_DIR_U) * round, length = 0;
+    int k = 0;
+    for (; k < 3; k++) {
+        length = imp__length(c.p[(k + 1) % 3] - c.p[k]);
+        if (x < length || k == 2) break;
+        x -= length;
+    }
+    const double t = imp_min(x / length, 1.0);
+    const imp_v3 along = (c.p[(k + 1) % 3] - c.p[k]) * (1 / length);
+    const imp_v3 apex = c.p[(k + 2) % 3] - c.p[k];
+    const imp_v3 in = imp__normalize(apex - along * imp__dot(apex, along));
+    const double sine = 2 * imp__u01(d->key, IMP_EDGE_DIR_V) - 1;
+    const imp_v3 q = in * sqrt(imp_max(1 - sine * sine, 0.0)) + along * sine;
+
+    /* Weights along the line, and where it leaves the triangle. */
+    const imp_v3 e1 = c.p[1] - c.p[0], e2 = c.p[2] - c.p[0];
+    const double aa = imp__dot(e1, e1), ab = imp__dot(e1, e2), bb = imp__dot(e2, e2);
+    const double det = aa * bb - ab * ab, qa = imp__dot(q, e1), qb = imp__dot(q, e2);
+    double b[3] = {0}, rate[3], until = INFINITY;
+    b[k] = 1 - t;
+    b[(k + 1) % 3] = t;
+    rate[1] = (bb * qa - ab * qb) / det;
+    rate[2] = (aa * qb - ab * qa) / det;
+    rate[0] = -rate[1] - rate[2];
+    for (int i = 0; i < 3; i++)
+        if (i != (k + 2) % 3 && rate[i] < 0) until = imp_min(until, -b[i] / rate[i]);
+
+    /* N.(camera - p) along it: a quadratic. */
+    imp_v3 N = {0}, turn = {0}, p = {0};
+    for (int i = 0; i < 3; i++) {
+        N += c.n[i] * b[i];
+        turn += c.n[i] * rate[i];
+        p += c.p[i] * b[i];
+    }
+    const imp_v3 r = d->b->camera - p;
+    const double g0 = imp__dot(N, r), g1 = imp__dot(turn, r) - imp__dot(N, q),
+                 g2 = -imp__dot(turn, q), square = g1 * g1 - 4 * g0 * g2;
+    if (!(square >= 0) || !(until < INFINITY)) return false;
+    const double half = -0.5 * (g1 + copysign(sqrt(square), g1));
+    const double all[2] = {half / g2, g0 / half};
+    double root[2];
+    int n = 0;
+    for (int i = 0; i < 2; i++)
+        if (all[i] > 0 && all[i] < until) root[n++] = all[i];
+    if (n == 0) return false;
+    const double at = root[n == 2 && imp__u01(d->key, IMP_EDGE_LIGHT) >= 0.5];
+    *hit = (struct imp_hit){
+        .prim = prim, .u = b[1] + rate[1] * at, .v = b[2] + rate[2] * at};
+    d->inv_pdf = 0.5 * round * n / (chance * d->chance);
+    return true;
+}
+
+/* A point where the shading normal turns away from w, at which something is t away. */
+struct turning {
+    struct imp__glued x;
+    imp_v3 beside; /* to the lit side of it, so far that a look is not lost in rounding */
+    double slope;  /* |grad g| */
+};
+static bool turning_at(const struct imp__edge_draw *d, const struct imp_hit *hit,
+                       const struct imp_surface *at, imp_v3 w, double t,
+                       struct turning *out)
+{
+    const struct imp_located located = {hit->prim, {(float)hit->u, (float)hit->v}};
+    out->x = imp__glued_at(d->b->tracer->scene, hit->shape, &located, at->ng);
+    if (!out->x.smooth) return false;
+    const imp_v3 n = out->x.shade - out->x.n * imp__dot(out->x.n, out->x.shade);
+    const imp_v3 grad = out->x.slope[0] * imp__dot(out->x.turn[0], w) +
+                        out->x.slope[1] * imp__dot(out->x.turn[1], w) - n * (1 / t);
+    out->slope = imp__length(grad);
+    if (!(out->slope > 0)) return false;
+    const imp_v3 D = grad * (1 / out->slope), across = D - w * imp__dot(w, D);
+    const double seen = imp__length(across);
+    if (!(seen > IMP_GRAZING)) return false;
+    out->beside = D * (IMP_BESIDE * (t + imp__length(at->p)) / seen);
+    return true;
+}
+
+/* The curve's picture passes between two film positions. */
+static bool film_beside(const struct imp__edge_draw *d, imp_v3 p,
+                        struct imp_sensor_sample *to)
+{
+    const double none[4] = {0};
+    return imp__sensor_connect(d->b->tracer->sensor, &p, false, none, to);
+}
+
+void imp__draw_shading_film(struct imp__edge_draw *d)
+{
+    const struct imp_sensor *sensor = d->b->tracer->sensor;
+    struct imp_sensor_sample to, lit, dark;
+    struct imp_surface at;
+    struct imp_hit hit;
+    struct turning x;
+    if (!sensor->ops->connect || !seen_point(d, &hit)) return;
+    surface_at(d, &hit, &at);
+    d->p = at.p;
+    if (!film_beside(d, at.p, &to) || !imp__light_on_film(sensor, &to)) return;
+    const imp_v3 r = at.p - to.p;
+    const double t = imp__length(r);
+    if (imp__occluded_at(d->b->tracer->scene, 0, &to.p, &r, 0, 1 - IMP_BESIDE)) return;
+    if (!turning_at(d, &hit, &at, to.wo, t, &x)) return;
+    if (!film_beside(d, at.p + x.beside, &lit) || !film_beside(d, at.p - x.beside, &dark))
+        return;
+    const imp_spec jump =
+        imp__look_through(d, lit.px, lit.py) - imp__look_through(d, dark.px, dark.py);
+    if (imp__is_zero(jump)) return;
+    struct imp__flux *f = imp__flux_add(d, 3);
+    if (!f) return;
+    f->px = to.px;
+    f->py = to.py;
+    f->L = jump * (fabs(imp__dot(at.ng, to.wo)) * to.weight * d->inv_pdf / x.slope);
+    /* g' = n_s'.wo + n_s.wo', and the ray turns by (u(p) - u(o))/t, against wo. */
+    struct imp__link_point p = {.x = x.x, .bar = {.shade = to.wo}};
+    const imp_v3 shift = imp__slide_bar(&p, to.wo), turn = x.x.shade * (1 / t);
+    const struct imp__glued o = {.p = to.p};
+    f->n_ends = 3;
+    f->end[0] = (struct imp__flux_end){p.x, p.bar, false, 0};
+    f->end[1] = imp__flux_camera(&p.x, shift - turn);
+    f->end[2] = imp__flux_camera(&o, turn);
+}
+
+/* ---- To a vertex ------------------------------------------------------------------------ */
+
+void imp__draw_shading_scatter(struct imp__edge_draw *d)
+{
+    const struct imp_scene *scene = d->b->tracer->scene;
+    const int max = d->b->tracer->integrator->max_depth;
+    struct imp_hit from, hit;
+    struct imp_surface p, at;
+    struct turning x;
+    struct imp_walk lit, dark;
+    if ((max >= 0 && max < 2) || !imp__edge_item_point(d, &from, &p)) return;
+    const double psi = IMP_2PI * imp__u01(d->key, IMP_EDGE_DIR_U);
+    const struct imp_frame f = imp__frame_from_normal(p.n);
+    const imp_v3 w = f.s * cos(psi) + f.t * sin(psi);
+    const imp_v3 o = imp__offset(p.p, p.ng, w);
+    if (!imp__intersect(scene, &o, &w, 0, INFINITY, &hit)) return;
+    imp__hit_surface(scene, &hit, &o, &w, &at);
+    if (!turning_at(d, &from, &p, w, imp__length(at.p - p.p), &x)) return;
+    imp__look_from(d, &at, p.p + x.beside, &lit);
+    imp__look_from(d, &at, p.p - x.beside, &dark);
+    int depths;
+    const double times = fabs(imp__dot(p.ng, w)) * IMP_2PI * d->inv_pdf;
+    imp_spec *jump = imp__jumps(d, &lit, &dark, times, &depths);
+    if (!jump) return;
+    struct imp__edge_light light = {.w = w, .light = jump[0], .n_ends = 1};
+    if (max >= 0) {
+        light.by_depth = jump;
+        light.n_depths = depths;
+    }
+    struct imp__link_point slides = {.x = x.x, .bar = {.shade = w}};
+    light.slide = imp__slide_bar(&slides, w);
+    light.end[0] = (struct imp__flux_end){slides.x, slides.bar, false, 0};
+    imp__edge_reach(d, &hit, &at, &light);
+}
