@@ -18,7 +18,7 @@ import sys
 SCALARS = {"size_t": "c_size_t", "int": "c_int", "unsigned": "c_uint", "double": "c_double",
            "float": "c_float", "int64_t": "c_int64", "uint64_t": "c_uint64",
            "int32_t": "c_int32", "uint32_t": "c_uint32", "uint16_t": "c_uint16",
-           "uint8_t": "c_uint8", "bool": "c_bool"}
+           "uint8_t": "c_uint8", "bool": "c_bool", "char": "c_char"}
 
 
 def split(text):
@@ -163,7 +163,7 @@ def write(headers, out):
         '"""Declarations of the C library, made from its headers by python/generate.py."""',
         "from __future__ import annotations", "",
         "import ctypes",
-        "from ctypes import (CFUNCTYPE, POINTER, Structure, c_bool, c_char_p, c_double, c_float, c_int, c_int32,",
+        "from ctypes import (CFUNCTYPE, POINTER, Structure, c_bool, c_char, c_char_p, c_double, c_float, c_int, c_int32,",
         "                    c_int64, c_size_t, c_uint, c_uint8, c_uint16, c_uint32, c_uint64, c_void_p)",
         "from typing import Any", "",
         'VERSION = "%s"' % headers.strings["IMP_VERSION_STRING"], "")

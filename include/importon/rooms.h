@@ -132,6 +132,117 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_ugr(imp_context *context, double back
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_grid_glare(imp_scene *scene, const struct imp_run *run, double *ugr, double *se);
 
+/* ---- Daylight of a year --------------------------------------------------------------- */
+
+/** The weather of an hour. */
+struct imp_weather_hour {
+    int year, month, day;
+    double hour;   /**< its middle, 0.5 to 23.5 of the place's standard time */
+    double sun[3]; /**< unit, towards it at that time: z up, x south, y west */
+    double diffuse,
+        direct; /**< irradiances of level ground by the sky, and across the sun's
+                                 rays by the sun, W/m^2 */
+    double diffuse_illuminance, direct_illuminance; /**< the same in lx */
+};
+
+struct imp_weather_info {
+    size_t size;
+    char place[64];             /**< as the file names it */
+    double latitude, longitude; /**< degrees, north and east positive */
+    double timezone;            /**< hours east of Greenwich */
+    double elevation;           /**< m */
+    size_t n;                   /**< hours: 8760, or 8784 */
+    bool
+        modelled; /**< illuminances are not the file's, which has none or none that can be:
+                        they are made of irradiances and dew points (Perez et al. 1990) */
+};
+#define IMP_WEATHER_INFO_INIT IMP_INIT_ZERO(struct imp_weather_info)
+
+/**
+ * The hours of a year from an EnergyPlus weather file (EPW).
+ * @param[out] info set info->size first.
+ * @param[out] hour [room] the first of them; may be NULL where room is 0.
+ * @return IMP_OK; IMP_E_IO; IMP_E_SCENE with file, line and column for what is damaged, has hours
+ *         missing or no radiation in any, or lacks a radiation; IMP_E_NOMEM.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_weather_read(imp_context *context, const char *path, struct imp_weather_info *info,
+                 struct imp_weather_hour *hour, size_t room);
+
+struct imp_annual_options {
+    size_t size;
+    double opens,
+        closes;    /**< hours of use of every day, standard time; an hour counts whose
+                               middle lies between. 0 and 0: 8 to 18 */
+    double wanted; /**< lx, of the autonomy; 0: 300 */
+    double useful
+        [3]; /**< lx, ascending, between the four parts of useful daylight; all 0: 100,
+                           300, 3000 */
+    double sunlit;       /**< lx of the sun alone, which is too much; 0: 1000 */
+    double sunlit_hours; /**< a year, so many of which are too much; 0: 250 */
+    double part;         /**< of the hours, at which a point has daylight enough; 0: .5 */
+};
+#define IMP_ANNUAL_OPTIONS_INIT IMP_INIT_ZERO(struct imp_annual_options)
+
+/** A year at a point. Errors are standard errors with 15 degrees of freedom. */
+struct imp_annual_point {
+    struct imp_estimate
+        autonomy; /**< DA: part of the hours of use with `wanted` or more */
+    struct imp_estimate continuous; /**< cDA: mean over them of min(E/wanted, 1) */
+    struct imp_estimate
+        useful[4];                /**< UDI: part of them below useful[0], below [1], up to
+                                        [2], and above */
+    struct imp_estimate mean;     /**< over the hours of use, lx */
+    struct imp_estimate exposure; /**< over all hours, lx h */
+    struct imp_estimate
+        sunlit_hours; /**< hours of use with `sunlit` or more by the sun alone,
+                                           not reflected */
+};
+
+struct imp_annual_summary {
+    size_t size;
+    size_t hours;                    /**< of use */
+    struct imp_annual_point average; /**< over the points */
+    struct imp_estimate
+        spatial_autonomy; /**< sDA: part of the points with an autonomy of `part` or more */
+    struct imp_estimate
+        sun_exposure; /**< ASE: part of the points with more than `sunlit_hours` */
+};
+#define IMP_ANNUAL_SUMMARY_INIT IMP_INIT_ZERO(struct imp_annual_summary)
+
+/**
+ * Daylight at the points of an irradiancemeter over the hours of a year, from one set of walks.
+ *
+ * The scene has an emitter `perezsky` or `ciesky`, which says where up and south are, and how
+ * directions into the sky are drawn; its own light does not count, nor does that of any other
+ * emitter. The sky of an hour is Perez' (1993) with its diffuse illuminance, the sun a disc
+ * of .004675 rad with its direct illuminance.
+ *
+ * Walks give the coefficient of each of 577 patches of the sky (Reinhart), and of the sun in
+ * each patch that it passes, where it is reflected; what the sun gives a point at once is
+ * computed for each hour by rays. Light of the sun passes panes (delta lobes that go straight
+ * on). Errors: 16 groups of walks, and balanced halves of them (Walsh and Hadamard), which
+ * hold for numbers that count hours, too.
+ * @param run     its sensor, seed and spp, which is rounded up to a multiple of 16; NULL for
+ *                defaults. Walks are those from the sensor.
+ * @param hour    [n] irradiances at least 0; an hour with the sun below the horizon has no sun,
+ *                and the sky of a sun that sets.
+ * @param options NULL for defaults.
+ * @param[out] point    [height][width] of the crop window; may be NULL.
+ * @param[out] summary  set summary->size first; may be NULL.
+ * @param[out] reading  [height][width][n] the hours' illuminances, lx; may be NULL.
+ * @param[out] se       [height][width][n] one standard error each; may be NULL.
+ * @return IMP_OK; IMP_E_ARG for another sensor, a scene without such a sky, hours without any
+ *         light or numbers out of their range; IMP_E_UNSUPPORTED for spectral modes, media,
+ *         graded indices and integrators whose walks do not begin at the sensor;
+ *         IMP_CANCELLED; IMP_E_PATHS; IMP_E_NOMEM.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_annual_read(imp_scene *scene, const struct imp_run *run, size_t n,
+                const struct imp_weather_hour *hour,
+                const struct imp_annual_options *options, struct imp_annual_point *point,
+                struct imp_annual_summary *summary, double *reading, double *se);
+
 /* ---- Luminaires -------------------------------------------------------------------- */
 
 /** An emitter `ies` of a scene, with what its photometric file says. */

@@ -38,6 +38,7 @@ from ._parts import PartsInfo, join_parts, merge, part, parts_info, team
 from ._picture import DroppedWalk, Picture, project, read, write
 from ._plan import Plan, PlanRow, lamps, plan, plan_improve, plan_map
 from ._progress import set_progress
+from ._daylight import Weather, Year, annual, weather
 from ._render import denoise, render, walk
 from ._report import report
 from ._rooms import Grid, Interval, Luminaire, Share, glare, grid, luminaires, shares
@@ -56,11 +57,11 @@ __all__ = [
     "Luminaire", "MeasureStage", "MeasuredPhoto", "Measurement", "Missing",
     "NumericError", "OutOfMemoryError", "ParameterError", "ParameterInfo", "Part", "PartsInfo", "PathsError",
     "Picture", "Plan", "PlanRow", "Progress", "Reached", "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "SelfTestRow", "Sensor", "Share",
-    "Transform4f", "UnsupportedError", "Values", "Walks", "__version__", "ad", "bend", "check", "compare", "cornell_box", "denoise",
+    "Transform4f", "UnsupportedError", "Values", "Walks", "Weather", "Year", "__version__", "ad", "annual", "bend", "check", "compare", "cornell_box", "denoise",
     "elements", "fit", "functional", "functional_until", "glare", "grid", "guide", "jacobian", "join_parts", "keep", "lamps", "library_path", "load_dict", "load_file",
     "load_string", "loss", "luminaires", "measure", "merge", "missing", "part", "parts_info", "plan", "plan_improve", "plan_map", "project", "read", "read_walks", "render", "render_backward",
     "render_forward", "render_until", "report", "selftest", "set_progress", "set_threads", "set_variant", "shares", "team", "threads",
-    "traverse", "variant", "walk", "write",
+    "traverse", "variant", "walk", "weather", "write",
 ]
 
 for _name in __all__:  # errors and objects are known by the name that users import

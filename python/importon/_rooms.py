@@ -69,7 +69,7 @@ class Luminaire(NamedTuple):
     opening: tuple[float, float, float]
 
 
-def _call(scene: Scene, params: Any, options: Any, progress: Any, *call: Any) -> None:
+def call(scene: Scene, params: Any, options: Any, progress: Any, *call: Any) -> None:
     with scene.lock:
         if isinstance(params, Mapping) and not isinstance(params, SceneParameters):
             SceneParameters(scene).update(params)
@@ -114,7 +114,7 @@ def grid(scene: Scene, sensor: Any = 0, *, params: Any = None, confidence: float
     options = run_options(scene, sensor=number, seed=seed, spp=spp, points=points, walks_from=walks_from)
     average, sets, summary = _c.imp_estimate(), ctypes.c_int64(), make(_c.imp_grid_summary)
     scene._context.check(lib.imp_grid_points(scene.pointer, number, address(places), None))
-    _call(scene, params, options, progress, lib.imp_grid_read, scene.pointer, ctypes.byref(options), address(value),
+    call(scene, params, options, progress, lib.imp_grid_read, scene.pointer, ctypes.byref(options), address(value),
           address(se), ctypes.byref(average), ctypes.byref(sets))
     scene._context.check(lib.imp_grid_summarise(scene._context.pointer, value.size, address(value), address(se),
                                                 ctypes.byref(average), sets.value, float(confidence),
@@ -151,7 +151,7 @@ def shares(scene: Scene, sensor: Any = 0, *, params: Any = None, seed: int = 0, 
     n, e = ctypes.c_size_t(), _c.imp_estimate()
     scene._context.check(lib.imp_reading_shares(scene.pointer, ctypes.byref(options), None, 0, ctypes.byref(n), None))
     rows = (_c.imp_share * max(n.value, 1))()
-    _call(scene, params, options, progress, lib.imp_reading_shares, scene.pointer, ctypes.byref(options), rows,
+    call(scene, params, options, progress, lib.imp_reading_shares, scene.pointer, ctypes.byref(options), rows,
           len(rows), ctypes.byref(n), ctypes.byref(e))
     found = [Share("light" if r.of == 0 else "surface", decode(r.name), r.value, r.se) for r in rows[:n.value]]
     return Interval(e.value, e.value - 1.96 * e.se, e.value + 1.96 * e.se), found
@@ -215,6 +215,6 @@ def glare(scene: Scene, sensor: Any = 0, *, params: Any = None, seed: int = 0, s
     s = scene.sensors[number]
     ugr, se = np.zeros((s.height, s.width)), np.zeros((s.height, s.width))
     options = run_options(scene, sensor=number, seed=seed, spp=spp, points=points, walks_from=walks_from)
-    _call(scene, params, options, progress, lib.imp_grid_glare, scene.pointer, ctypes.byref(options), address(ugr),
+    call(scene, params, options, progress, lib.imp_grid_glare, scene.pointer, ctypes.byref(options), address(ugr),
           address(se))
     return ugr, se

@@ -48,7 +48,7 @@ SCALARS = {"size_t": C.c_size_t, "int": C.c_int, "unsigned": C.c_uint, "double":
            "float": C.c_float, "int64_t": C.c_int64, "uint64_t": C.c_uint64, "int32_t": C.c_int32,
            "uint32_t": C.c_uint32, "uint16_t": C.c_uint16, "uint8_t": C.c_uint8,
            "imp_progress_fn": C.c_void_p, "imp_preview_fn": C.c_void_p, "imp_fit_step_fn": C.c_void_p, "imp_measure_say_fn": C.c_void_p, "imp_bend_fit_step_fn": C.c_void_p, "imp_dot_fn": C.c_void_p,
-           "bool": C.c_bool, "imp_v3": C.c_double * 4, "imp_spec": C.c_double * 4}
+           "bool": C.c_bool, "char": C.c_char, "imp_v3": C.c_double * 4, "imp_spec": C.c_double * 4}
 structs = {}
 
 def split(s):
@@ -167,12 +167,14 @@ NOT_OK = {
     "imp_grid_points": "its sensor is a camera",
     "imp_scene_get_luminaire": "the scene has no luminaire",
     "imp_grid_glare": "its sensor is a camera",
+    "imp_annual_read": "its sensor is a camera",
+    "imp_weather_read": "there is no such file",
     "imp_ugr": "its sources are zeros",
 }
 try: C.CDLL("libOpenImageDenoise.so.2")
 except OSError: NOT_OK["imp_denoise"] = NOT_OK["imp_denoiser_check"] = "there is no Open Image Denoise"
 # Pointers that may be NULL, by name, or by function and name.
-NULLABLE = {"imp_report_page.length", "imp_problem_shares.walk_share", "imp_grid_read.sets", "imp_grid_glare.se", "imp_grid_summarise.average", "imp_reading_shares.share", "imp_reading_shares.reading", "imp_render_until.end", "imp_problem_until.end", "imp_problem_until.adjoint",
+NULLABLE = {"imp_report_page.length", "imp_problem_shares.walk_share", "imp_grid_read.sets", "imp_grid_glare.se", "imp_weather_read.hour", "imp_annual_read.point", "imp_annual_read.summary", "imp_annual_read.reading", "imp_annual_read.se", "imp_grid_summarise.average", "imp_reading_shares.share", "imp_reading_shares.reading", "imp_render_until.end", "imp_problem_until.end", "imp_problem_until.adjoint",
             "imp_problem_until.value", "imp_problem_until.gradient", "imp_report_data.length", "options", "run", "stats", "id", "objective", "gradient_se", "primal", "normals", "uvs",
             "axis", "hessian", "taps", "tap_bars", "tap_dots", "power", "bundle", "exit", "targets",
             "error", "order", "memory",
@@ -415,7 +417,7 @@ class Fixture:
         if a.type == "const char *" or (a.text.startswith("const char *") and a.type.count("*") == 1):
             paths = {"imp_scene_load": os.path.join(top, "scenes", "furnace.xml"),
                      "imp_bend_load": os.path.join(top, "scenes", "bend", "maxwell.xml"),
-                     "imp_film_write": self.folder + "/x.exr", "imp_elements_save": self.folder + "/x.el",
+                     "imp_film_write": self.folder + "/x.exr", "imp_elements_save": self.folder + "/x.el", "imp_weather_read": self.folder + "/x.epw",
                      "imp_elements_export": self.folder + "/x.ply", "imp_field_write": self.folder + "/x.npy",
                      "imp_parts_write": self.folder + "/x.part", "imp_checkpoint_free": self.folder + "/x.checkpoint", "imp_scene_write_volume": self.folder + "/x.vol", "imp_report_write": self.folder + "/x.html",
                      "imp_manifest_write": self.folder + "/x.proof", "imp_walks_write": self.folder + "/x.walks"}

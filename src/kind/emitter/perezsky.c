@@ -13,13 +13,12 @@
  * but in the first bin c = exp((Delta (c1 + c2 Z))^c3) - c4 and d = -exp(Delta (d1 + d2 Z)) + d3 +
  * Delta d4. Between epsilon = 1.065 and 2.8 a Delta below .2 is taken as .2, as Radiance's programs
  * do: there the fit has no data. */
+#include "perezsky.h"
 #include "base/required.h"
 #include "emission.h"
-#include "sky_shape.h"
 #include <math.h>
 
-#define BINS           8
-#define SOLAR_CONSTANT 1367 /* W m^-2, with which the model was fitted */
+#define BINS 8
 
 static const double bounds[BINS - 1] = {1.065, 1.23, 1.5, 1.95, 2.8, 4.5, 6.2};
 
@@ -46,11 +45,36 @@ static const double fit[5][4][BINS] = {
      {-.5718, -.219, .4199, -.0876, -.0656, .3017, -2.4517, 1.8564},
      {.9938, -.4285, -.5562, -.0329, -.1294, -.4844, 1.4656, .5636}}};
 
-static void shape_set(struct imp__sky_shape *s, double Z, double epsilon, double Delta)
+/* Diffuse light by columns 1, W, cos Z, ln Delta; of direct 1, W, exp(5.73 Z - 5), Delta. */
+static const double efficacy[2][4][BINS] = {
+    {{97.24, 107.22, 104.97, 102.39, 100.71, 106.42, 141.88, 152.23},
+     {-.46, 1.15, 2.96, 5.59, 5.94, 3.83, 1.9, .35},
+     {12, .59, -5.53, -13.95, -22.75, -36.15, -53.24, -45.27},
+     {-8.91, -3.95, -8.77, -13.9, -23.74, -28.83, -14.03, -7.98}},
+    {{57.2, 98.99, 109.83, 110.34, 106.36, 107.19, 105.75, 101.18},
+     {-4.55, -3.46, -4.9, -5.84, -3.97, -1.25, .77, 1.58},
+     {-2.98, -1.21, -1.71, -1.99, -1.75, -1.51, -1.26, -1.1},
+     {117.12, 12.38, -8.81, -4.56, -6.16, -26.73, -34.44, -8.29}}};
+
+/* up: cos Z. The sky's bin, Z and Delta. */
+static int sky_of(const struct imp__perez_weather *w, double up, double *Z, double *Delta)
 {
+    *Z = acos(imp_clamp(up, 0.0, 1.0));
+    const double cube = 1.041 * *Z * *Z * *Z;
+    const double epsilon = ((w->diffuse + w->direct) / w->diffuse + cube) / (1 + cube);
+    const double air =
+        1 / (imp_clamp(up, 0.0, 1.0) + 0.15 * pow(93.885 - *Z * 180 / IMP_PI, -1.253));
+    *Delta = air * w->diffuse / w->extraterrestrial;
     int bin = 0;
     while (bin < BINS - 1 && epsilon >= bounds[bin]) bin++;
-    if (epsilon > bounds[0] && epsilon < bounds[4]) Delta = fmax(Delta, 0.2);
+    return bin;
+}
+
+void imp__perez_shape(struct imp__sky_shape *s, const struct imp__perez_weather *w)
+{
+    double Z, Delta;
+    const int bin = sky_of(w, imp__dot(s->sun, s->axis[2]), &Z, &Delta);
+    if (bin >= 1 && bin <= 4) Delta = fmax(Delta, 0.2);
     for (int k = 0; k < 5; k++) {
         const double x1 = fit[k][0][bin], x2 = fit[k][1][bin], x3 = fit[k][2][bin],
                      x4 = fit[k][3][bin];
@@ -59,6 +83,21 @@ static void shape_set(struct imp__sky_shape *s, double Z, double epsilon, double
         if (bin == 0 && k == 3) s->n[k] = -exp(Delta * (x1 + x2 * Z)) + x3 + Delta * x4;
     }
     s->h = 0;
+    s->overcast = false;
+}
+
+void imp__perez_efficacy(const struct imp__perez_weather *w, double up, double dew,
+                         double *diffuse, double *direct)
+{
+    double Z, Delta;
+    const int bin = sky_of(w, up, &Z, &Delta);
+    const double water = exp(0.07 * dew - 0.075); /* cm */
+    const double last[2][2] = {{cos(Z), log(Delta)}, {exp(5.73 * Z - 5), Delta}};
+    for (int k = 0; k < 2; k++) {
+        double sum = efficacy[k][0][bin] + efficacy[k][1][bin] * water;
+        for (int j = 0; j < 2; j++) sum += efficacy[k][2 + j][bin] * last[k][j];
+        *(k ? direct : diffuse) = fmax(sum, 0);
+    }
 }
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_emitter *e)
@@ -76,17 +115,13 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
                                 (struct imp_interval){0, 1000, IMP_OPEN_LO}, &diffuse));
     IMP_TRY(imp__props_float_in(b->ctx, b->node, "direct", 0,
                                 (struct imp_interval){0, 1500, IMP_CLOSED}, &direct));
-    IMP_TRY(imp__props_float_in(b->ctx, b->node, "extraterrestrial", SOLAR_CONSTANT,
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "extraterrestrial", IMP__SOLAR_CONSTANT,
                                 (struct imp_interval){1300, 1450, IMP_CLOSED}, &outside));
     IMP_TRY(imp__props_float_in(b->ctx, b->node, "illuminance", diffuse, IMP_POSITIVE,
                                 &level));
     IMP_TRY(imp__sky_shape_place(b, s, &of_world));
     IMP_TRY(imp__sky_shape_by_day(b, s, of_world, "Perez'"));
-    const double up = imp_clamp(imp__dot(s->sun, s->axis[2]), 0.0, 1.0), Z = acos(up),
-                 cube = 1.041 * Z * Z * Z,
-                 air = 1 / (up + 0.15 * pow(93.885 - Z * 180 / IMP_PI, -1.253));
-    shape_set(s, Z, ((diffuse + direct) / diffuse + cube) / (1 + cube),
-              air * diffuse / outside);
+    imp__perez_shape(s, &(struct imp__perez_weather){diffuse, direct, outside});
     const double all = imp__sky_shape_horizontal(s);
     if (!(all > 0) || !isfinite(all))
         IMP_TRY(imp_build_error(b, "diffuse", IMP_E_SCENE,

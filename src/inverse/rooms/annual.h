@@ -1,0 +1,115 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Daylight of a year (importon/rooms.h): what the files that compute it share.
+ *
+ * With C_p the coefficient of patch p, L_p(h) the mean radiance of hour h's sky in it, E_s(h)
+ * the illuminance across the sun's rays, D(h) what reaches the point straight from the sun and
+ * I_q what comes reflected while the sun is in patch q, both for an illuminance of 1,
+ *
+ *     E(h) = sum_p C_p L_p(h) + E_s(h) (D(h) + I_q(h))
+ *
+ * C, D and I are estimated by each of IMP__GROUPS groups of walks. */
+#ifndef IMP_INVERSE_ANNUAL_H
+#define IMP_INVERSE_ANNUAL_H
+
+#include "base/arena.h"
+#include "base/drops.h"
+#include "color/rgb.h"
+#include "sky_patches.h"
+#include "walk/core/walk.h"
+#include <importon/rooms.h>
+
+enum { IMP__GROUPS = 16, IMP__VARIANTS = 2 * IMP__GROUPS - 1 };
+
+/* Hours with light. */
+struct imp__annual_hours {
+    size_t n;
+    size_t *hour;   /* [n] of the caller's */
+    double *sky;    /* [n][IMP__PATCHES] */
+    double *sun;    /* [n] E_s, lx; 0: none */
+    imp_v3 *to_sun; /* [n] unit, world */
+    int *cell;      /* [n] of the sun; -1: none */
+    /* Patches in which the sun is at some hour. */
+    int n_cells;
+    int cell_of[IMP__PATCHES];      /* -1: the sun is never there */
+    int patch_of[IMP__PATCHES];     /* of a cell */
+    size_t *suns;                   /* lit hours by cells */
+    double *below;                  /* their E_s added up, from the cell's first on */
+    size_t first[IMP__PATCHES + 1]; /* of a cell, in both */
+};
+
+struct imp__annual {
+    const struct imp_scene *scene;
+    const struct imp_sensor *sensor;
+    struct imp_tracer tracer;
+    struct imp__sky_patches patches;
+    struct imp__annual_hours hours;
+    int sky;       /* the emitter */
+    bool panes;    /* has some material a lobe that goes straight on? */
+    bool through;  /* such lobes are no bounces */
+    int64_t walks; /* of a group */
+};
+
+/* Light as one number. */
+static inline double imp__annual_light(bool mono, imp_spec x)
+{
+    return mono ? x[0] : imp__luminance(x[0], x[1], x[2]);
+}
+
+/* Coefficients of one point. */
+struct imp__annual_coefficients {
+    double (*C)[IMP__GROUPS]; /* [IMP__PATCHES] */
+    double (*I)[IMP__GROUPS]; /* [n_cells] */
+};
+
+struct imp__annual_worker {
+    struct imp_arena arena;
+    struct imp_drops drops;
+    struct imp__annual_coefficients at;
+    double (*E)[IMP__GROUPS], (*S)[IMP__GROUPS]; /* [hours.n] all light; the sun alone */
+};
+
+/* annual_hours.c: IMP_E_ARG for numbers out of range; skies and suns of hours that are checked. */
+enum imp_status imp__annual_hours_check(imp_context *ctx, size_t n,
+                                        const struct imp_weather_hour *hour);
+enum imp_status imp__annual_hours_make(const struct imp__annual *a, size_t n,
+                                       const struct imp_weather_hour *hour,
+                                       struct imp__annual_hours *out);
+void imp__annual_hours_free(imp_context *ctx, struct imp__annual_hours *h);
+
+/* annual_sun.c: what of the light from direction w reaches o: 0 or 1 but for panes. */
+imp_spec imp__annual_passes(const struct imp__annual *a, double time, imp_v3 o, imp_v3 w);
+/* Adds the sun of hour h, straight to the point of pixel (x, y), to S, by groups. */
+void imp__annual_direct(const struct imp__annual *a, int x, int y,
+                        struct imp__annual_worker *w);
+
+/* annual_walks.c: coefficients of pixel (x, y). */
+enum imp_status imp__annual_walks(const struct imp__annual *a, int x, int y,
+                                  struct imp__annual_worker *w);
+
+/* annual_sums.c: numbers of a year of one point, each with the halves of groups added and left
+ * out: [0] the groups' mean, then E + d and E - d of 15 balanced halves. */
+enum imp__annual_number {
+    IMP__AUTONOMY,
+    IMP__CONTINUOUS,
+    IMP__USEFUL,
+    IMP__MEAN = IMP__USEFUL + 4,
+    IMP__EXPOSURE,
+    IMP__SUNLIT,
+    IMP__ANNUAL_NUMBERS
+};
+struct imp__annual_numbers {
+    double of[IMP__ANNUAL_NUMBERS][IMP__VARIANTS];
+};
+/* used [hours.n]: is it an hour of use? all: how many of the year are, lit or not. */
+void imp__annual_add(const struct imp__annual *a, const struct imp_annual_options *o,
+                     const bool *used, size_t all, const struct imp__annual_worker *w,
+                     struct imp__annual_numbers *out);
+/* Value and error of a number's variants. */
+struct imp_estimate imp__annual_estimate(const double variant[IMP__VARIANTS]);
+void imp__annual_point_set(const struct imp__annual_numbers *x,
+                           struct imp_annual_point *out);
+/* Mean of the groups, and its error. */
+struct imp_estimate imp__annual_mean(const double group[IMP__GROUPS]);
+
+#endif

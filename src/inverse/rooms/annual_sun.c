@@ -1,0 +1,140 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The sun over a year, straight to a point: a ray for each hour and group of walks, to a point of
+ * its disc. */
+#include "annual.h"
+#include "kind/sensor/receiver.h"
+#include "math/offset.h"
+#include "math/rng.h"
+#include "scene/instances.h"
+#include "walk/core/step.h"
+#include <math.h>
+
+#define RADIUS       0.004675 /* rad, of the kind `sun` */
+#define SURFACES_MAX 64       /* panes behind each other */
+
+static double versed(void)
+{
+    const double half = sin(RADIUS / 2);
+    return 2 * half * half;
+}
+
+/* The lobes of a surface that go straight on. */
+static imp_spec pane(const struct imp_scene *scene, const struct imp_hit *hit,
+                     const struct imp_surface *at, imp_v3 w)
+{
+    const struct imp_shape *shape = scene->shapes[hit->shape];
+    const struct imp_bsdf *b = imp__shape_bsdf(scene, shape);
+    const struct imp_frame frame = {at->s, at->t, at->n};
+    const struct imp_texcoord where = {
+        .uv = {at->uv[0], at->uv[1]}, .p = at->p, .shape = shape, .prim = hit->prim};
+    const imp_v3 wi = imp__to_local(&frame, w);
+    imp_spec in[IMP_INPUTS_MAX], T = {0};
+    if (!b->straight) return T;
+    imp__evaluate_inputs(b, shape, &where, in);
+    for (int lobe = 0; lobe < 64; lobe++) {
+        imp_spec f;
+        if (!(b->straight >> lobe & 1)) continue;
+        const struct imp_dirs dirs = {-wi, wi, lobe, 0};
+        imp__bsdf_eval(b, NULL, in, &dirs, &f);
+        T += f;
+    }
+    return T;
+}
+
+imp_spec imp__annual_passes(const struct imp__annual *a, double time, imp_v3 o, imp_v3 w)
+{
+    const struct imp_scene *scene = a->scene;
+    imp_spec T = imp__spec(1);
+    if (!a->panes) return imp__spec(!imp__occluded_at(scene, time, &o, &w, 0, INFINITY));
+    for (int k = 0; k < SURFACES_MAX; k++) {
+        struct imp_hit hit;
+        struct imp_surface at;
+        if (!imp__intersect_at(scene, time, &o, &w, 0, INFINITY, &hit)) return T;
+        imp__hit_surface(scene, &hit, &o, &w, &at);
+        T *= pane(scene, &hit, &at, w);
+        if (imp__is_zero_used(T, false)) return T;
+        o = imp__offset(at.p, at.ng, w);
+    }
+    return imp__spec(0);
+}
+
+/* The place of a group's ray on the shape, and its frame. */
+static void place_draw(const struct imp__annual *a, int x, int y, struct imp_key key,
+                       struct imp_surface *at, struct imp_frame *frame)
+{
+    const struct imp_sensor *s = a->sensor;
+    double uv[2];
+    imp__receiver_uv(s, s->film.crop_x + x + imp__u01(key, 0),
+                     s->film.crop_y + y + imp__u01(key, 1), uv);
+    at->located.prim = -1;
+    s->shape->ops->sample_area(s->shape, uv, at);
+    *frame = imp__frame_from_normal(at->ng);
+}
+
+static double weight(const struct imp_sensor *s, const struct imp_frame *frame, imp_v3 w)
+{
+    const imp_v3 local = imp__to_local(frame, w);
+    return s->scale * (s->receiver ? imp__receiver_density(s->receiver, local)
+                                   : imp_max(local[2], 0.0) * IMP_INV_PI);
+}
+
+/* Points of the disc, one for each group, that cover it evenly: rings of one area, a golden
+ * angle apart. Each is uniform on the disc when all are turned and shifted by u. */
+struct disc {
+    double across[IMP__GROUPS][2], along[IMP__GROUPS];
+};
+static void disc_draw(const double u[2], struct disc *out)
+{
+    const double most = versed();
+    for (int g = 0; g < IMP__GROUPS; g++) {
+        double ring = (g + 0.5) / IMP__GROUPS + u[0];
+        ring -= floor(ring);
+        const double down = ring * most, r = sqrt(down * (2 - down));
+        const double phi = IMP_2PI * u[1] + g * 2.39996322972865332;
+        out->across[g][0] = r * cos(phi);
+        out->across[g][1] = r * sin(phi);
+        out->along[g] = 1 - down;
+    }
+}
+
+void imp__annual_direct(const struct imp__annual *a, int x, int y,
+                        struct imp__annual_worker *w)
+{
+    enum { DISCS = 64 };
+    const struct imp__annual_hours *h = &a->hours;
+    const struct imp_film_desc *film = &a->sensor->film;
+    const uint64_t pixel = (uint64_t)(y + film->crop_y) << 32 |
+                           (uint64_t)(uint32_t)(x + film->crop_x) | 1ull << 63;
+    const double time = a->sensor->open;
+    const bool mono = a->scene->mode == IMP_MONO;
+    const bool fixed = a->sensor->receiver && a->sensor->receiver->points;
+    struct disc disc[DISCS];
+    for (int k = 0; k < DISCS; k++) {
+        const struct imp_key key =
+            imp__key(a->tracer.seed, pixel, 1ull << 63 | (uint64_t)k);
+        disc_draw((double[2]){imp__u01(key, 0), imp__u01(key, 1)}, &disc[k]);
+    }
+    struct imp_surface at;
+    struct imp_frame frame;
+    place_draw(a, x, y, imp__key(a->tracer.seed, pixel, UINT64_MAX), &at, &frame);
+    for (size_t k = 0; k < h->n; k++) {
+        for (int g = 0; g < IMP__GROUPS; g++) w->S[k][g] = 0;
+        if (!(h->sun[k] > 0)) continue;
+        const struct imp_frame sun = imp__frame_from_normal(h->to_sun[k]);
+        const struct disc *points = &disc[k % DISCS];
+        double f = 0;
+        for (int g = 0; g < IMP__GROUPS; g++) {
+            const uint64_t number = (uint64_t)k * IMP__GROUPS + (uint64_t)g;
+            if (!fixed)
+                place_draw(a, x, y, imp__key(a->tracer.seed, pixel, number), &at, &frame);
+            const imp_v3 d = sun.s * points->across[g][0] + sun.t * points->across[g][1] +
+                             sun.n * points->along[g];
+            if (!fixed || g == 0) f = weight(a->sensor, &frame, h->to_sun[k]);
+            if (!(f > 0)) continue;
+            const imp_spec T =
+                imp__annual_passes(a, time, imp__offset(at.p, at.ng, d), d);
+            w->S[k][g] = h->sun[k] * f * imp__annual_light(mono, T);
+        }
+    }
+}
