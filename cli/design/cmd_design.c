@@ -158,7 +158,7 @@ static int run_design(int n, char **operand)
 const struct command command_design = {
     {"design",
      "SCENE",
-     "which luminaires of a room, how far dimmed, for wanted illuminances",
+     "which luminaires of a room, how far dimmed, for wanted lux",
      {options, options_lamps, options_run, options_scene, options_file, options_general},
      1,
      1},

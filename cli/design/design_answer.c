@@ -143,7 +143,7 @@ static void print_lamps(const struct design_answer *a)
     for (size_t j = 0; j < d->n_lamps; j++) {
         const double x = d->level[j];
         if (x == 0) continue;
-        printf("%-*s  %-6.4g  %-8.4g  %-8.5g\n", width, a->lamps->lamp[j].lamp, x,
+        printf("%-*s  %-6.4g  %-8.4g  %.5g\n", width, a->lamps->lamp[j].lamp, x,
                x * d->lamp_watts[j], x * d->lamp_flux[j]);
     }
 }
@@ -156,7 +156,7 @@ static void print_wants(const struct design_answer *a)
         const struct imp_design_finding *f = design_finding(a, k);
         char what[300], price[64] = "-";
         snprintf(what, sizeof what, "%s %s", design_sensor(w), design_words[w->of]);
-        if (f->binding)
+        if (f->price != 0)
             snprintf(price, sizeof price, "%.3g %s per %s", f->price,
                      objectives[a->options->least],
                      *design_unit(w) ? design_unit(w) : "1");
@@ -211,8 +211,7 @@ void design_print(const struct design_answer *a)
     printf("%zu of %zu lamps: %.4g W, %.5g lm", used(a, d->level), d->n_lamps, d->watts,
            d->flux);
     if (d->cost > 0) printf(", cost %.6g", d->cost);
-    if (d->bound >= d->objective * (1 - 1e-6))
-        printf("; no combination has fewer %s\n\n", objective_words[what]);
+    if (d->bound >= d->objective * (1 - 1e-6)) printf("; no combination needs less\n\n");
     else
         printf("; the search ended with a bound of %.4g %s (--nodes)\n\n", d->bound,
                objectives[what]);

@@ -75,8 +75,7 @@ struct imp_design_finding {
     double sure;
     bool holds;   /**< `sure` is on the right side of what is wanted */
     bool binding; /**< a little less wanted were cheaper */
-    double
-        price; /**< d objective / d wanted, with the same lamps; of a binding one not 0 */
+    double price; /**< d objective / d wanted, with the same lamps; 0 of costs */
     /** Without an answer: the best value that it can have while all other wants hold; NAN: with
      * the others none has an answer. */
     double attainable;

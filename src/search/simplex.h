@@ -29,7 +29,7 @@ struct imp__lp {
     size_t *nonbasic;
     bool *upper;   /* [n] is nonbasic variable j at its upper bound? */
     size_t pivots; /* since the dictionary was last made from the rows */
-    /* Of the last solution. */
+    /* The last solution. */
     double *x;    /* [n] */
     double *dual; /* [room] d objective / d (-b): what a row costs, not negative */
     double objective;

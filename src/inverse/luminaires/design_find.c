@@ -50,6 +50,7 @@ static enum imp_status answer_set(struct imp__design_model *m,
     for (size_t k = 0; k < m->n_wants; k++) {
         f[k].price = imp__design_price(m, k, wanted[k], x, a->dual);
         f[k].binding = f[k].price != 0;
+        if (m->o.least == IMP_LEAST_COST) f[k].price = 0;
     }
     return IMP_OK;
 }
