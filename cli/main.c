@@ -25,7 +25,7 @@ static const struct command *const commands[] = {
     &command_bend,     &command_bench,    &command_elements, &command_envmap,
     &command_merge,    &command_report,   &command_read,     &command_verify,
     &command_view,     &command_record,   &command_whatif,   &command_plan,
-    &command_measure};
+    &command_measure,  &command_design};
 #define N_COMMANDS (sizeof commands / sizeof *commands)
 
 static void print_usage(FILE *to)

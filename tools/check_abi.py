@@ -26,7 +26,7 @@ import sys
 import tempfile
 
 TOP = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-HEADERS = ["importon", "clip", "until", "walks", "report", "rooms", "plan", "measure", "elements", "bend", "kinds", "mpi"]
+HEADERS = ["importon", "clip", "until", "walks", "report", "rooms", "design", "plan", "measure", "elements", "bend", "kinds", "mpi"]
 ELSEWHERE = ["mpi"]  # functions of other libraries
 MAP = os.path.join(TOP, "lib", "importon.map")
 

@@ -21,7 +21,7 @@ import re
 import sys
 
 TOP = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-HEADERS = ["importon", "clip", "until", "walks", "report", "rooms", "plan", "measure", "elements", "bend", "mpi"]
+HEADERS = ["importon", "clip", "until", "walks", "report", "rooms", "design", "plan", "measure", "elements", "bend", "mpi"]
 GROUPS = {"imp_elements_fit": "its comment is inside clang-format off, for the formula"}
 # One value that is set, of a type that the prototype has.
 ONE = {"n", "n_rows", "index", "length", "spp", "code", "n_points", "objective", "value", "param"}

@@ -249,6 +249,8 @@ int cli_load(const char *path)
     options.upsampling = (enum imp_upsampling)cli.upsampling;
     options.defines = cli.defines.item;
     options.n_defines = cli.defines.n;
+    options.luminaires = cli.luminaires.item;
+    options.n_luminaires = cli.luminaires.n;
     options.weights = cli.weights;
     options.bins = cli.bins;
     options.lenient = (enum imp_lenience)cli.lenient;
@@ -291,6 +293,7 @@ void cli_close(void)
     imp_context_destroy(cli.context);
     args_list_free(&cli.defines);
     args_list_free(&cli.sets);
+    args_list_free(&cli.luminaires);
 }
 
 struct imp_run cli_run(void)

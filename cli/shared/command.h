@@ -35,7 +35,7 @@ extern const struct command command_render, command_gradient, command_jacobian,
     command_check, command_selftest, command_fit, command_compare, command_info,
     command_bench, command_bend, command_elements, command_envmap, command_merge,
     command_report, command_read, command_verify, command_view, command_record,
-    command_whatif, command_plan, command_measure;
+    command_whatif, command_plan, command_measure, command_design;
 
 /* Option tables, to be named in args_spec.group. -o is a file, or a folder for commands
  * that write several files. */
@@ -54,7 +54,7 @@ struct cli {
     const char *out;
     int threads, json, progress, help, quiet, overwrite;
     /* options_scene */
-    struct arg_list defines, sets;
+    struct arg_list defines, sets, luminaires;
     const char *search, *weights, *bins;
     int mode, dump;
     int lenient; /* enum imp_lenience; an option sets 1, IMP_LENIENT_WARN */

@@ -48,6 +48,9 @@ const struct arg_option options_scene[] = {
      "of "
      "geometry); @FILE: many",
      &cli.sets, 0, 0, NULL},
+    {ARG_LIST | ARG_REPLAYS, 0, "luminaire", "NAME=FILE",
+     "another photometric file for luminaires (emitters ies) of this name, or pattern",
+     &cli.luminaires, 0, 0, NULL},
     {ARG_TEXT | ARG_REPLAYS, 'a', "search", "DIR[;DIR..]",
      "more folders to search for files", &cli.search, 0, 0, NULL},
     {ARG_CHOICE | ARG_REPLAYS, 'm', "mode", "MODE",

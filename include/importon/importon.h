@@ -393,6 +393,12 @@ struct imp_load_options {
      * wavelengths for channels (docs/spectra.md 5), in place of what they have; NULL:
      * that. */
     const char *bins;
+    /** [n_luminaires] "GLOB=FILE" or "GLOB=FILE,FILE": photometric files in place of those of
+     * emitters `ies` at the top of the scene; of several files each is a luminaire of its own at the
+     * same place, "ID:NAME" with NAME the file's without folder and ending (design.h
+     * chooses among them). */
+    const char *const *luminaires;
+    size_t n_luminaires;
 };
 #define IMP_LOAD_OPTIONS_INIT IMP_INIT_ZERO(struct imp_load_options)
 

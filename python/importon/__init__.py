@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._c import VERSION as __version__
 from ._check import Check, CheckRow, Comparison, SelfTestRow, check, compare, selftest
+from ._design import Design, Want, design
 from ._dictionary import cornell_box, load_dict
 from ._fit import Fit, FitVariable, fit
 from ._gradient import Estimate, Jacobian, Loss, functional, jacobian, loss, render_backward, render_forward
@@ -52,12 +53,12 @@ if TYPE_CHECKING:
     from .elements import guide
 
 __all__ = [
-    "ArgumentError", "BiasError", "Cancelled", "Check", "CheckRow", "Color3f", "Comparison", "DroppedWalk", "Error",
+    "ArgumentError", "BiasError", "Cancelled", "Check", "CheckRow", "Color3f", "Comparison", "Design", "DroppedWalk", "Error",
     "Estimate", "FileError", "Fit", "FitVariable", "Gradient", "Grid", "ImportonWarning", "Interval", "Jacobian", "Loss",
     "Luminaire", "MeasureStage", "MeasuredPhoto", "Measurement", "Missing",
     "NumericError", "OutOfMemoryError", "ParameterError", "ParameterInfo", "Part", "PartsInfo", "PathsError",
     "Picture", "Plan", "PlanRow", "Progress", "Reached", "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "SelfTestRow", "Sensor", "Share",
-    "Transform4f", "UnsupportedError", "Values", "Walks", "Weather", "Year", "__version__", "ad", "annual", "bend", "check", "compare", "cornell_box", "denoise",
+    "Transform4f", "UnsupportedError", "Values", "Walks", "Want", "Weather", "Year", "__version__", "ad", "annual", "bend", "check", "compare", "cornell_box", "denoise", "design",
     "elements", "fit", "functional", "functional_until", "glare", "grid", "guide", "jacobian", "join_parts", "keep", "lamps", "library_path", "load_dict", "load_file",
     "load_string", "loss", "luminaires", "measure", "merge", "missing", "part", "parts_info", "plan", "plan_improve", "plan_map", "project", "read", "read_walks", "render", "render_backward",
     "render_forward", "render_until", "report", "selftest", "set_progress", "set_threads", "set_variant", "shares", "team", "threads",

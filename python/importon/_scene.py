@@ -319,21 +319,26 @@ class Scene:
 
 def _load_options(mode: Optional[str], search: Sequence[Any], defines: dict[str, Any],
                   weights: Optional[str] = None, upsampling: str = "sigmoid",
-                  lenient: bool = False, bins: Optional[str] = None) -> tuple[Any, Any]:
+                  lenient: bool = False, bins: Optional[str] = None,
+                  luminaires: Any = None) -> tuple[Any, Any]:
     """imp_load_options, and what it points to."""
     if isinstance(search, (str, bytes)) or hasattr(search, "__fspath__"):
         search = [search]
     pairs = [text("%s=%s" % (k, _define(k, v)), k) for k, v in defines.items()]
     folders = [text(f, "search") for f in search]
+    files = [text("%s=%s" % (name, f if isinstance(f, str) else ",".join(map(str, f))), "luminaires")
+             for name, f in dict(luminaires or {}).items()]
+    lamps = (ctypes.c_char_p * (len(files) + 1))(*files)
     names = (ctypes.c_char_p * (len(pairs) + 1))(*pairs)
     paths = (ctypes.c_char_p * (len(folders) + 1))(*folders)
     options = make(_c.imp_load_options, mode=choice("imp_color_mode", mode or _mode, "mode"),
                    defines=ctypes.addressof(names), n_defines=len(pairs),
                    search=ctypes.addressof(paths), n_search=len(folders),
+                   luminaires=ctypes.addressof(lamps), n_luminaires=len(files),
                    weights=None if weights is None else text(weights, "weights"),
                    bins=None if bins is None else text(bins, "bins"),
                    upsampling=choice("imp_upsampling", upsampling, "upsampling"), lenient=int(bool(lenient)))
-    return options, (names, paths)
+    return options, (names, paths, lamps)
 
 
 def _define(name: str, value: Any) -> str:
@@ -348,10 +353,10 @@ def _define(name: str, value: Any) -> str:
 
 
 def _load(function: Any, arguments: tuple[Any, ...], name: str, mode: Optional[str], search: Sequence[Any],
-          weights: Any, upsampling: str, lenient: bool, bins: Any, defines: dict[str, Any]) -> Scene:
+          weights: Any, upsampling: str, lenient: bool, bins: Any, luminaires: Any, defines: dict[str, Any]) -> Scene:
     not_inside()
     ctx = context()
-    options, kept = _load_options(mode, search, defines, _weights(weights), upsampling, lenient, _bins(bins))
+    options, kept = _load_options(mode, search, defines, _weights(weights), upsampling, lenient, _bins(bins), luminaires)
     out = ctypes.c_void_p()
     status = function(ctx.pointer, *arguments, ctypes.byref(options), ctypes.byref(out))
     del kept
@@ -380,7 +385,7 @@ def _bins(bins: Any) -> Optional[str]:
 
 
 def load_file(path: Any, *, mode: Optional[str] = None, search: Sequence[Any] = (), weights: Any = None,
-              upsampling: str = "sigmoid", lenient: bool = False, bins: Any = None, parallel: bool = True,
+              upsampling: str = "sigmoid", lenient: bool = False, bins: Any = None, luminaires: Any = None, parallel: bool = True,
               optimize: bool = True, **defaults: Any) -> Scene:
     """Load a scene file (Mitsuba 3 XML).
 
@@ -403,6 +408,9 @@ def load_file(path: Any, *, mode: Optional[str] = None, search: Sequence[Any] = 
     bins : sequence of three numbers, optional
         Of spectral modes: (from, to, n) in nm; pictures have n bins of wavelengths for
         channels, in place of the film's.
+    luminaires : mapping, optional
+        Photometric files in place of those of emitters `ies`, by name or pattern: {"lamp_*": "opal.ldt"}; of
+        several, ["opal.ldt", "spot.ies"], each is a luminaire "NAME:opal" of its own at the same place (`design`).
     parallel, optimize : bool
         Taken as Mitsuba's are; without effect.
     **defaults
@@ -430,11 +438,11 @@ def load_file(path: Any, *, mode: Optional[str] = None, search: Sequence[Any] = 
     16
     """
     return _load(lib.imp_scene_load, (text(path, "path"),), str(path), mode, search, weights,
-                 upsampling, lenient, bins, defaults)
+                 upsampling, lenient, bins, luminaires, defaults)
 
 
 def load_string(xml: str, *, name: str = "string", mode: Optional[str] = None, search: Sequence[Any] = (),
-                weights: Any = None, upsampling: str = "sigmoid", lenient: bool = False, bins: Any = None,
+                weights: Any = None, upsampling: str = "sigmoid", lenient: bool = False, bins: Any = None, luminaires: Any = None,
                 parallel: bool = True, optimize: bool = True, **defaults: Any) -> Scene:
     """Load a scene from text, as `load_file` does from a file.
 
@@ -443,7 +451,7 @@ def load_string(xml: str, *, name: str = "string", mode: Optional[str] = None, s
     xml : str
     name : str
         Stands for the file in messages.
-    mode, search, weights, upsampling, lenient, bins, parallel, optimize, **defaults
+    mode, search, weights, upsampling, lenient, bins, luminaires, parallel, optimize, **defaults
         As `load_file`'s. Files are searched for in the working folder.
 
     Returns
@@ -464,4 +472,4 @@ def load_string(xml: str, *, name: str = "string", mode: Optional[str] = None, s
     """
     data = xml.encode() if isinstance(xml, str) else bytes(xml)
     return _load(lib.imp_scene_load_string, (data, len(data), text(name, "name")), name, mode, search,
-                 weights, upsampling, lenient, bins, defaults)
+                 weights, upsampling, lenient, bins, luminaires, defaults)

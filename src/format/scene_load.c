@@ -6,6 +6,7 @@
 #include "color/convert.h"
 #include "film/film_integrator.h"
 #include "load.h"
+#include "luminaire_files.h"
 #include "search.h"
 #include "settings.h"
 #include "tree.h"
@@ -24,8 +25,10 @@ enum imp_status imp__load_options(imp_context *ctx, const struct imp_load_option
         (int)to->upsampling > IMP_UPSAMPLING_LINEAR)
         return imp__error(ctx, IMP_E_ARG, "upsampling %d is not known",
                           (int)to->upsampling);
-    if ((to->n_defines && !to->defines) || (to->n_search && !to->search))
-        return imp__error(ctx, IMP_E_ARG, "definitions or search folders are NULL");
+    if ((to->n_defines && !to->defines) || (to->n_search && !to->search) ||
+        (to->n_luminaires && !to->luminaires))
+        return imp__error(ctx, IMP_E_ARG,
+                          "definitions, search folders or luminaires are NULL");
     return IMP_OK;
 }
 
@@ -173,6 +176,7 @@ static enum imp_status load(imp_context *ctx, const struct imp__load_file *f,
     IMP_TRY(imp__search_init(scene, o->search, o->n_search, f->folder));
     IMP_TRY(imp__xml_read(scene, &f->text, f->name, o));
     if (o->weights) IMP_TRY(weights_set(scene, o->weights));
+    IMP_TRY(imp__luminaire_files_set(scene, o->luminaires, o->n_luminaires));
     if (o->bins) IMP_TRY(bins_set(scene, scene->root, o->bins));
     IMP_TRY(imp__scene_finish(scene));
     *out = scene;

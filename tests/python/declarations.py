@@ -13,7 +13,7 @@ from importon import _c
 from importon._library import ERRORS
 from tap import TOP, Skip, run
 
-HEADERS = ["importon.h", "bend.h", "elements.h", "plan.h", "measure.h", "report.h", "rooms.h", "walks.h", "until.h", "clip.h"]
+HEADERS = ["importon.h", "bend.h", "elements.h", "plan.h", "measure.h", "report.h", "rooms.h", "design.h", "walks.h", "until.h", "clip.h"]
 INCLUDES = "".join("#include <importon/%s>\n" % h for h in HEADERS) + "#include <stddef.h>\n"
 STRUCTS = {n: s for n, s in vars(_c).items() if isinstance(s, type) and issubclass(s, ctypes.Structure)
            and n.startswith("imp_")}

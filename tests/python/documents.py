@@ -93,7 +93,7 @@ def is_record(thing):
 
 
 RETURNED = {"Check", "Field", "Picture", "Progress", "CheckRow", "Comparison", "ElementsFit", "Estimate", "Fit", "Gradient", "Guide", "Jacobian", "Loss",
-            "Measurement", "Missing", "Optimizer", "Plan", "PlanRow", "Scene", "SceneParameters", "SelfTestRow", "Values"}
+            "Design", "Measurement", "Missing", "Optimizer", "Plan", "PlanRow", "Scene", "SceneParameters", "SelfTestRow", "Values"}
 UNDERSTOOD = {"self", "cls"}
 
 

@@ -132,6 +132,35 @@ def test_plan():
     raises(im.ArgumentError, lambda: im.plan(s, names, [{"lamps": "none"}]), "none")
 
 
+def test_design():
+    """Levels of a design are those of arithmetic; the room with its luminaires and levels has what was said"""
+    path = os.path.join(SCENES, "office.xml")
+    lamps = {"lamp_*": ["lamps/opal.ldt", "lamps/batwing.ies"]}
+    s = im.load_file(path, mode="mono", luminaires=lamps, spp=32)
+    rows = [{"lamp": x.name, "place": x.name.split(":")[0], "watts": 25 if "batwing" in x.name else 32}
+            for x in im.luminaires(s)]
+    assert len(rows) == 12
+    d = im.design(s, {"work": {"average": 450}, "eyes": {"ugr": 22}}, rows, others=1, within=.5)
+    assert d.found and d.holds and d.bound == d.objective == d.watts and "lx" not in repr(d)
+    assert [(w.sensor, w.of, w.wanted) for w in d.wants] == [("work", "average", 450), ("eyes", "ugr", 22)]
+    assert abs(sum(d.levels[r["lamp"]] * r["watts"] for r in rows) - d.watts) < 1e-9
+    used = {name.split(":")[0]: (name.split(":")[1], x) for name, x in d.levels.items() if x > 0}
+    assert len(used) == sum(x > 0 for x in d.levels.values()) and len(d.others) == 1 and d.others[0][0] >= d.watts
+    files = {"opal": "lamps/opal.ldt", "batwing": "lamps/batwing.ies"}
+    room = im.load_file(path, mode="mono", luminaires={k: files[f] for k, (f, _) in used.items()}, spp=256)
+    p = im.traverse(room)
+    for x in im.luminaires(room):
+        p[x.name + ".scale.value"] = used.get(x.name, (None, 0))[1]
+    g = im.grid(room, "work", params=p)
+    assert g.average.hi > 450 and abs(g.average.value - d.wants[0].value) < 15, (g.average, d)
+    none = im.design(s, {"work": {"average": 2000}}, rows)
+    assert not none.found and none.wants[0].alone < 1000 and "no combination" in repr(none)
+    raises(im.ArgumentError, lambda: im.design(s, {"work": {"brightness": 1}}), "brightness")
+    raises(im.ArgumentError, lambda: im.design(s, {"work": {"average": 1}}, [{"lamp": "x"}]), "'x'")
+    raises(im.ArgumentError, lambda: im.design(s, {"work": {"average": 1}}, [{"lamb": "x"}]), "lamb")
+    raises(im.ArgumentError, lambda: im.design(s, [1]), "wants")
+
+
 def test_answer():
     """The truth comes back within its errors; covariance and intervals belong together"""
     s, target, p, truth = setting()

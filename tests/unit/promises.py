@@ -170,6 +170,7 @@ NOT_OK = {
     "imp_annual_read": "its sensor is a camera",
     "imp_weather_read": "there is no such file",
     "imp_ugr": "its sources are zeros",
+    "imp_design_find": "its sensor is a camera",
 }
 try: C.CDLL("libOpenImageDenoise.so.2")
 except OSError: NOT_OK["imp_denoise"] = NOT_OK["imp_denoiser_check"] = "there is no Open Image Denoise"
@@ -306,7 +307,7 @@ class Fixture:
                 t.pixels = C.addressof(self.array(C.c_float, 16, [1.] * 16))
                 if lib.imp_bend_add_target(b, C.byref(t)) != OK: raise RuntimeError(self.said())
             return b
-        if kind == "imp_guide": return None
+        if kind in ("imp_guide", "imp_design"): return None
         if kind == "imp_walks": return self.make("imp_walks_keep", scene, None, None)
         if kind == "imp_manifest": return self.make("imp_manifest_create", context, b"command")
         if kind == "imp_parts": return self.make("imp_parts_create", context, 1, 2, b"command")
@@ -367,6 +368,11 @@ class Fixture:
             s.width = s.height = 4
             s.channels = 3
             s.pixels = C.addressof(self.array(C.c_float, 48, [.2 + .01 * (k % 7) for k in range(48)]))
+        if name == "imp_design_lamp":
+            word = C.create_string_buffer(b"lamp.emitter")
+            self.keep.append(word)
+            s.lamp, s.watts = C.addressof(word), 5
+        if name == "imp_design_want": s.value = 1
         if name == "imp_measure_options":
             word = C.create_string_buffer(b"materials")
             self.keep.append(word)
@@ -404,7 +410,7 @@ class Fixture:
             scalars = {"fallback": 1., "fraction": 1., "seed": 1, "flags": 0, "size": 64 if function == "imp_scene_geometry_name" else 8, "width": 4, "height": 4, "channels": 3, "length": len(self.good(xml, function)[0]) if "load_string" in function else len(PARAM) + 4 if "set_text" in function else 0, "weight": 1., "order": 1,
                        "index": 1.5 if a.ctype is C.c_double else 0, "cells": 1., "um": .5, "k": 1., "background": 1., "confidence": .9, "a": 1., "b": 1.,
                        "radius": 2., "rounds": 1, "bytes": 1 << 20, "hi": 3., "lo": 1., "value": 1.5 if a.ctype is C.c_double else 1,
-                       "n_vertices": 3, "n_triangles": 1, "layers": 1, "nx": 1, "ny": 1, "nz": 1, "a": 1., "pilots": 2, "n_groups": 1, "low": .1, "high": .9,
+                       "n_vertices": 3, "n_lamps": 1, "n_wants": 1, "n_triangles": 1, "layers": 1, "nx": 1, "ny": 1, "nz": 1, "a": 1., "pilots": 2, "n_groups": 1, "low": .1, "high": .9,
                        "n": {"imp_scene_set_values": 1, "imp_scene_spectrum": 2, "imp_problem_nlopt": 3}.get(function, 1)}
             zeros = {"scalar", "status", "cause", "sensor", "channel", "x", "y", "sample", "json", "i", "from_here",
                      "kind", "of", "time", "nm", "progress", "rays", "ray", "bundle", "n_walks", "target", "edge", "most", "subject", "from", "to", "luminaire", "lamp", "room", "sets", "stage"}

@@ -1,20 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A candidate put into the scene: its camera moved, its lamps on and the others off, and the scene
- * as it was afterwards. A lamp that is off has a factor of 0 over time (math/course.h), so that
- * its light and the derivatives with respect to its numbers are 0, whatever these are, and no
- * light samples. */
+ * as it was afterwards. */
 #include "base/arguments.h"
 #include "inverse/problem/match.h"
-#include "math/course.h"
 #include "math/motion.h"
 #include "planning.h"
 #include "scene/pose.h"
 #include "scene/unlit.h"
+#include <math.h>
 #include <string.h>
-
-static const double off_time = 0, off_value = 0;
-static const struct imp_course off = {1, &off_time, &off_value};
 
 const char *imp__plan_name(const struct imp_scene *scene,
                            const struct imp_plan_candidate *c)
@@ -99,29 +94,20 @@ static enum imp_status lamps_switch(struct imp_scene *scene,
                                     struct imp__plan_stage *stage)
 {
     const size_t n = (size_t)scene->n_emitters;
-    double sum = 0;
     size_t on = 0;
-    stage->light_cdf = imp__alloc(scene->ctx, n + 1, sizeof *stage->light_cdf);
-    stage->course = imp__alloc(scene->ctx, n + 1, sizeof *stage->course);
-    if (!stage->course || !stage->light_cdf)
-        return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a plan");
+    double *level = imp__alloc(scene->ctx, n + 1, sizeof *level);
+    if (!level) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a plan");
     for (size_t k = 0; k < n; k++) {
-        stage->course[k] = scene->emitters[k]->course;
-        stage->light_cdf[k] = scene->light_cdf[k];
-    }
-    for (size_t k = 0; k < n; k++) {
-        struct imp_emitter *e = scene->emitters[k];
-        const bool shines = is_named(c->lamps, e->name ? e->name : "");
-        if (!shines) e->course = &off;
+        const bool shines =
+            is_named(c->lamps, scene->emitters[k]->name ? scene->emitters[k]->name : "");
+        level[k] = shines ? NAN : 0;
         on += shines;
-        sum += shines ? e->weight : 0;
-        scene->light_cdf[k] = sum;
     }
-    if (on == 0)
-        return imp__error(scene->ctx, IMP_E_ARG, "there is no lamp '%s'", c->lamps);
-    for (size_t k = 0; k < n; k++)
-        scene->light_cdf[k] = sum > 0 ? scene->light_cdf[k] / sum : 0;
-    return IMP_OK;
+    const enum imp_status st =
+        on ? imp__lamp_levels_begin(scene, level, &stage->lamps)
+           : imp__error(scene->ctx, IMP_E_ARG, "there is no lamp '%s'", c->lamps);
+    imp__release(scene->ctx, level);
+    return st;
 }
 
 const char *imp_plan_lamp(const imp_scene *scene, int lamp)
@@ -147,14 +133,7 @@ void imp__plan_stage_end(struct imp__plan_stage *stage)
     struct imp_scene *scene = stage->scene;
     if (stage->sensor)
         memcpy(stage->sensor->self, stage->rest, stage->sensor->ops->object_size);
-    for (int k = 0; stage->course && stage->light_cdf && k < scene->n_emitters; k++) {
-        scene->emitters[k]->course = stage->course[k];
-        scene->light_cdf[k] = stage->light_cdf[k];
-    }
-    if (scene) {
-        imp__release(scene->ctx, stage->rest);
-        imp__release(scene->ctx, stage->course);
-        imp__release(scene->ctx, stage->light_cdf);
-    }
+    imp__lamp_levels_end(&stage->lamps);
+    if (scene) imp__release(scene->ctx, stage->rest);
     *stage = (struct imp__plan_stage){0};
 }

@@ -5,6 +5,7 @@
 #ifndef IMP_INVERSE_PLANNING_H
 #define IMP_INVERSE_PLANNING_H
 
+#include "inverse/estimate/lamp_levels.h"
 #include "inverse/problem/problem.h"
 #include "search/optimize.h"
 #include <importon/plan.h>
@@ -15,9 +16,7 @@ struct imp__plan_stage {
     struct imp_scene *scene;
     struct imp_sensor *sensor; /* moved; NULL: it stands where it was */
     void *rest;                /* what it was */
-    const struct imp_course *
-        *course;       /* [n_emitters] what they were; NULL: all are as they were */
-    double *light_cdf; /* [n_emitters] likewise */
+    struct imp__lamp_levels lamps;
 };
 /* What messages call it. */
 const char *imp__plan_name(const struct imp_scene *scene,

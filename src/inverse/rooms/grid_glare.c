@@ -4,19 +4,13 @@
 #include "base/arguments.h"
 #include "color/rgb.h"
 #include "film/film_measure.h"
+#include "glare_sources.h"
 #include "kind/emitter/ies.h"
 #include "kind/sensor/receiver.h"
 #include "walk/run/run.h"
-#include <importon/rooms.h>
 #include <math.h>
 
 #define DEGREE (IMP_PI / 180)
-
-/* A luminaire from a point at distance r along -w: what it sends there. */
-struct seen {
-    struct imp_glare_source source;
-    double direct; /* illuminance on the observer's plane, lx */
-};
 
 /* Luminous area that is seen along w, of a point by the file's opening: a box with the sides a along
  * C0, b along C90 and the height h, its lower face alone. */
@@ -36,11 +30,11 @@ static double scale_of(const struct imp_scene *scene, const struct imp_emitter *
     return scene->channels == 1 ? c[0] : imp__luminance(c[0], c[1], c[2]);
 }
 
-/* False: it is behind the observer, hidden, or dark in this direction. */
-static bool look(const struct imp_scene *scene, const struct imp_emitter *e, imp_v3 eye,
-                 imp_v3 sight, imp_v3 up, struct seen *out)
+bool imp__glare_look(const struct imp_scene *scene, const struct imp_emitter *e,
+                     imp_v3 eye, imp_v3 sight, imp_v3 up, struct imp__glare_seen *out)
 {
     const struct imp__ies *x = e->self;
+    if (e->ops != &imp__ies_light && e->ops != &imp__ies_area) return false;
     const imp_v3 at = e->shape ? (e->shape->lo + e->shape->hi) * 0.5 : x->position;
     const imp_v3 d = at - eye;
     const double r = imp__length(d);
@@ -64,6 +58,17 @@ static bool look(const struct imp_scene *scene, const struct imp_emitter *e, imp
     return true;
 }
 
+enum imp_status imp__glare_area_check(const struct imp_scene *scene,
+                                      const struct imp_emitter *e,
+                                      const struct imp__glare_seen *s)
+{
+    if (s->source.solid_angle > 0) return IMP_OK;
+    return imp__error(scene->ctx, IMP_E_ARG,
+                      "luminaire '%s' has no luminous area: its file names no opening, "
+                      "so give it a shape",
+                      e->name);
+}
+
 static enum imp_status point_rate(const struct imp_scene *scene, imp_v3 eye, imp_v3 sight,
                                   imp_v3 up, double reading,
                                   struct imp_glare_source *source, double *background,
@@ -73,15 +78,9 @@ static enum imp_status point_rate(const struct imp_scene *scene, imp_v3 eye, imp
     double direct = 0;
     for (int i = 0; i < scene->n_emitters; i++) {
         const struct imp_emitter *e = scene->emitters[i];
-        struct seen s;
-        if (e->ops != &imp__ies_light && e->ops != &imp__ies_area) continue;
-        if (!look(scene, e, eye, sight, up, &s)) continue;
-        if (!(s.source.solid_angle > 0))
-            return imp__error(
-                scene->ctx, IMP_E_ARG,
-                "luminaire '%s' has no luminous area: its file names no opening, "
-                "so give it a shape",
-                e->name);
+        struct imp__glare_seen s;
+        if (!imp__glare_look(scene, e, eye, sight, up, &s)) continue;
+        IMP_CHECKED(imp__glare_area_check(scene, e, &s));
         source[n++] = s.source;
         direct += s.direct;
     }
@@ -92,6 +91,19 @@ static enum imp_status point_rate(const struct imp_scene *scene, imp_v3 eye, imp
                           "background is left to rate glare by",
                           eye[0], eye[1], eye[2], direct, reading);
     return imp_ugr(scene->ctx, *background, n, source, ugr);
+}
+
+enum imp_status imp__glare_sight_check(const struct imp_scene *scene,
+                                       const struct imp_sensor *s)
+{
+    const struct imp_receiver *r = s->receiver;
+    if (r && r->absent && r->kind == IMP_PLANAR && fabs(r->facing[2]) < 1e-6)
+        return IMP_OK;
+    return imp__error(scene->ctx, IMP_E_ARG,
+                      "sensor '%s' (%s) has no line of sight: glare is rated at an "
+                      "irradiancemeter with a virtual, horizontal rectangle and a "
+                      "horizontal 'facing'",
+                      s->name, s->ops->name);
 }
 
 enum imp_status imp_grid_glare(imp_scene *scene, const struct imp_run *run, double *ugr,
@@ -106,12 +118,7 @@ enum imp_status imp_grid_glare(imp_scene *scene, const struct imp_run *run, doub
     IMP_RUN(scene->ctx, own, run);
     IMP_CHECKED(imp__run_sensor(scene, &own, &s));
     const struct imp_receiver *r = s->receiver;
-    if (!r || !r->absent || r->kind != IMP_PLANAR || !(fabs(r->facing[2]) < 1e-6))
-        return imp__error(scene->ctx, IMP_E_ARG,
-                          "sensor '%s' (%s) has no line of sight: glare is rated at an "
-                          "irradiancemeter with a virtual, horizontal rectangle and a "
-                          "horizontal 'facing'",
-                          s->name, s->ops->name);
+    IMP_CHECKED(imp__glare_sight_check(scene, s));
     const size_t n = (size_t)s->film.crop_w * (size_t)s->film.crop_h;
     double *value = imp__alloc(scene->ctx, 5 * n, sizeof *value);
     double *error = value + n, *place = error + n;

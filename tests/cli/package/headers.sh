@@ -2,7 +2,7 @@
 # Each public header compiles alone, as C11 and as C++11 and C++20, under strict warnings, and with it every
 # initialiser: IMP_RUN_INIT is one of struct imp_run.
 n=0
-for header in importon kinds lobes elements bend clip until walks report rooms mpi; do
+for header in importon kinds lobes elements bend clip until walks report rooms design mpi; do
     echo "#include <importon/$header.h>" >alone.c
     for init in $(sed -nE 's/^#define (IMP_\w+_INIT)( .*|)$/\1/p' "$ROOT/include/importon/$header.h"); do
         name=${init%_INIT}

@@ -1,0 +1,219 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A design: responses, the best combination, fresh walks through it, larger margins where these
+ * do not show what is wanted, and other answers. */
+#include "base/arguments.h"
+#include "designing.h"
+#include "inverse/problem/problem.h"
+#include "math/rng.h"
+#include "scene/access.h"
+#include "walk/run/run.h"
+#include <math.h>
+#include <string.h>
+
+#define FRESH 0x71c3
+
+struct imp_design {
+    imp_context *ctx;
+    struct imp_arena arena;
+    struct imp_design_answer answer;
+};
+
+/* Readings with each lamp that judge, twice those of the responses, then twice as many a round. */
+static int repeats_of(int round) { return 2 << (round < 10 ? round : 10); }
+
+static void findings_begin(const struct imp__design_model *m,
+                           struct imp_design_finding *f)
+{
+    for (size_t k = 0; k < m->n_wants; k++)
+        f[k] = (struct imp_design_finding){.size = sizeof *f,
+                                           .wanted = m->want[k].value,
+                                           .attainable = m->want[k].value,
+                                           .alone = m->want[k].value};
+}
+
+/* The answer of a search becomes that of the design. */
+static enum imp_status answer_set(struct imp__design_model *m,
+                                  const struct imp__choice_answer *a,
+                                  const double *wanted, struct imp_design_finding *f,
+                                  struct imp_design_answer *out)
+{
+    const double *x = a->x;
+    out->found = true;
+    out->level = x;
+    out->watts = imp__design_objective(m, IMP_LEAST_WATTS, x);
+    out->flux = imp__design_objective(m, IMP_LEAST_FLUX, x);
+    out->cost = imp__design_objective(m, IMP_LEAST_COST, x);
+    out->objective = imp__design_objective(m, m->o.least, x);
+    out->bound = a->proven ? out->objective : fmin(a->bound, out->objective);
+    out->objective_se = imp__design_objective_se(m, x, a->dual);
+    for (size_t k = 0; k < m->n_wants; k++) {
+        f[k].price = imp__design_price(m, k, wanted[k], x, a->dual);
+        f[k].binding = f[k].price != 0;
+        if (m->o.least == IMP_LEAST_COST) f[k].price = 0;
+    }
+    return IMP_OK;
+}
+
+/* Search and judge until each want holds; the margin of those that do not grows by what is
+ * missing. */
+static enum imp_status rounds_run(struct imp__design_model *m, double *wanted,
+                                  struct imp_design_finding *f,
+                                  struct imp_design_answer *out)
+{
+    double risk = 1 - m->o.confidence;
+    for (int round = 0; round < m->o.rounds; round++) {
+        struct imp__choice_answer a;
+        struct imp__design_reading fresh;
+        for (size_t k = 0; k < m->n_wants; k++)
+            imp__design_rows_set(m, k, wanted[k], IMP_DESIGN_MARGIN);
+        IMP_CHECKED(imp__design_search(m, NULL, 0, false, &a));
+        if (!a.found) return IMP_OK; /* the answer of the last round stays */
+        IMP_CHECKED(answer_set(m, &a, wanted, f, out));
+        IMP_CHECKED(imp__design_read(m, out->level, FRESH + (uint64_t)round,
+                                     repeats_of(round), &fresh));
+        out->rounds = round + 1;
+        out->holds = true;
+        if (m->o.rounds > 1)
+            risk *= 0.5; /* all rounds together have the risk asked for */
+        for (size_t k = 0; k < m->n_wants; k++) {
+            imp__design_judge(m, k, out->level, &fresh, risk, &f[k]);
+            out->holds &= f[k].holds;
+            if (!f[k].holds) {
+                wanted[k] += m->want[k].value - f[k].sure;
+                if (m->want[k].of == IMP_WANT_UNIFORMITY)
+                    wanted[k] = fmin(wanted[k], 0.999);
+            }
+        }
+        if (out->holds) return IMP_OK;
+        for (size_t k = 0; k < m->n_wants; k++)
+            if (!isfinite(wanted[k])) return IMP_OK; /* no reading bounds it */
+    }
+    return IMP_OK;
+}
+
+/* What the objective were if the responses had no errors. */
+static enum imp_status margin_find(struct imp__design_model *m,
+                                   struct imp_design_answer *out)
+{
+    struct imp__choice_answer a;
+    for (size_t k = 0; k < m->n_wants; k++)
+        imp__design_rows_set(m, k, m->want[k].value, 0);
+    IMP_CHECKED(imp__design_search(m, NULL, 0, false, &a));
+    if (a.found)
+        out->margin = fmax(out->objective - imp__design_objective(m, m->o.least, a.x), 0);
+    return IMP_OK;
+}
+
+/* Other sets of lamps, one by one, with the margins of the answer. */
+static enum imp_status others_find(struct imp__design_model *m, const double *wanted,
+                                   struct imp_design_answer *out)
+{
+    const size_t most = (size_t)m->o.others;
+    const bool **not_these = imp__arena_array(m->arena, most + 1, sizeof *not_these);
+    bool *first = imp__arena_array(m->arena, m->n, sizeof *first);
+    double *objective = imp__arena_array(m->arena, most + 1, sizeof *objective);
+    double *level = imp__arena_array(m->arena, most * m->n + 1, sizeof *level);
+    if (!not_these || !first || !objective || !level)
+        return imp__error(m->ctx, IMP_E_NOMEM, "no memory for other answers");
+    for (size_t j = 0; j < m->n; j++) first[j] = out->level[j] > 0;
+    not_these[0] = first;
+    for (size_t k = 0; k < m->n_wants; k++)
+        imp__design_rows_set(m, k, wanted[k], IMP_DESIGN_MARGIN);
+    while (out->n_others < most) {
+        struct imp__choice_answer a;
+        IMP_CHECKED(imp__design_search(m, not_these, out->n_others + 1, false, &a));
+        if (!a.found) break;
+        const double o = imp__design_objective(m, m->o.least, a.x);
+        if (o > out->objective * (1 + m->o.within)) break;
+        objective[out->n_others] = o;
+        memcpy(level + out->n_others * m->n, a.x, m->n * sizeof *level);
+        not_these[++out->n_others] = a.used;
+    }
+    out->other_objective = objective;
+    out->other_level = level;
+    return IMP_OK;
+}
+
+static enum imp_status design_make(struct imp__design_model *m,
+                                   struct imp_design_answer *out)
+{
+    struct imp_design_finding *f = imp__arena_array(m->arena, m->n_wants, sizeof *f);
+    double *wanted = imp__arena_array(m->arena, m->n_wants, sizeof *wanted);
+    if (!f || !wanted) return imp__error(m->ctx, IMP_E_NOMEM, "no memory for wants");
+    findings_begin(m, f);
+    for (size_t k = 0; k < m->n_wants; k++) wanted[k] = m->want[k].value;
+    m->whole = (double)m->n_grids * ((double)m->n + 1) * (1 + repeats_of(0));
+    out->n_lamps = m->n;
+    out->lamp_watts = m->watts;
+    out->lamp_flux = m->flux;
+    out->n_wants = m->n_wants;
+    out->wants = f;
+    out->level = imp__arena_array(m->arena, m->n, sizeof *out->level);
+    if (!out->level) return imp__error(m->ctx, IMP_E_NOMEM, "no memory for levels");
+    IMP_CHECKED(imp__design_responses(m));
+    IMP_CHECKED(imp__design_rows_make(m));
+    IMP_CHECKED(rounds_run(m, wanted, f, out));
+    if (!out->found) IMP_CHECKED(imp__design_attainable(m, f));
+    else {
+        if (m->o.others > 0) IMP_CHECKED(others_find(m, wanted, out));
+        IMP_CHECKED(margin_find(m, out));
+    }
+    out->nodes = m->nodes;
+    return IMP_OK;
+}
+
+enum imp_status imp_design_find(imp_scene *scene, const struct imp_design_lamp *lamps,
+                                size_t n_lamps, const struct imp_design_want *wants,
+                                size_t n_wants, const struct imp_design_options *options,
+                                const struct imp_run *run, imp_design **out)
+{
+    enum imp_status st = IMP_OK;
+    IMP_REQUIRE(NULL, scene, "scene");
+    imp_context *ctx = scene->ctx;
+    imp_problem *blank = NULL;
+    IMP_REQUIRE(ctx, lamps, "lamps");
+    IMP_REQUIRE(ctx, wants, "wants");
+    IMP_REQUIRE(ctx, out, "out");
+    struct imp__design_model m = {
+        .ctx = ctx, .scene = scene, .n = n_lamps, .n_wants = n_wants};
+    IMP_RUN(ctx, m.run, run);
+    IMP_CHECKED(imp__run_traces(ctx, "imp_design_find", &m.run));
+    IMP_CHECKED(imp_problem_create(scene, &blank)); /* a committed scene, and no parts */
+    st = imp__problem_no_parts(blank, "a design");
+    imp_problem_destroy(blank);
+    if (st != IMP_OK) return st;
+    IMP_FLOAT_MODE;
+    IMP_SETS(scene, st);
+    if (st != IMP_OK) return st;
+    imp_design *d = imp__alloc(ctx, 1, sizeof *d);
+    if (!d) return imp__error(ctx, IMP_E_NOMEM, "no memory for a design");
+    d->ctx = ctx;
+    imp__context_hold(ctx);
+    imp__arena_init(&d->arena, ctx);
+    m.arena = &d->arena;
+    d->answer.size = sizeof d->answer;
+    IMP_TRY(imp__design_options_take(&m, options));
+    IMP_TRY(imp__design_lamps_take(&m, lamps));
+    IMP_TRY(imp__design_wants_take(&m, wants));
+    IMP_TRY(design_make(&m, &d->answer));
+    *out = d;
+    d = NULL;
+out:
+    imp_design_destroy(d);
+    return st;
+}
+
+const struct imp_design_answer *imp_design_result(const imp_design *design)
+{
+    return design ? &design->answer : NULL;
+}
+
+void imp_design_destroy(imp_design *design)
+{
+    if (!design) return;
+    imp_context *ctx = design->ctx;
+    imp__arena_free(&design->arena);
+    imp__release(ctx, design);
+    imp__context_drop(ctx);
+}
