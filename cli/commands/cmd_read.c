@@ -4,6 +4,7 @@
  * errors, units and derivatives; from either end, or from both to compare them. */
 #include "read/read_glare.h"
 #include "read/read_grid.h"
+#include "read/room_page.h"
 #include "shared/command.h"
 #include "shared/overwrite.h"
 #include "shared/picture_files.h"
@@ -18,7 +19,7 @@
 
 static struct {
     int ends, grid, shares, ugr;
-    const char *csv, *svg;
+    const char *csv, *svg, *report;
 } o;
 
 static const struct arg_option options[] = {
@@ -37,6 +38,9 @@ static const struct arg_option options[] = {
     {ARG_TEXT, 0, "csv", "FILE", "the grid's points, values and errors as a table",
      &o.csv, 0, 0, NULL},
     {ARG_TEXT, 0, "svg", "FILE", "the grid as a plan with isolines", &o.svg, 0, 0, NULL},
+    {ARG_TEXT, 0, "report", "FILE",
+     "the grids as a page for a client: plans, --want, luminaires, the view of a camera",
+     &o.report, 0, 0, NULL},
     {0}};
 
 struct findings {
@@ -318,7 +322,13 @@ static int run_read(int n, char **operand)
                          "--ugr goes without --shares, --grid, --ends and --param");
     if (o.ugr && !sensor_named())
         return cli_error(EXIT_USAGE, "--ugr is of one grid: choose it with --sensor");
-    if (o.csv) rc = overwrite_check(o.csv, OUTPUT_TABLE);
+    if (o.report && !o.grid)
+        return cli_error(EXIT_USAGE, "--report is of grids: it goes with --grid");
+    if (wants_given() && !o.report)
+        return cli_error(EXIT_USAGE,
+                         "--want is compared on a page: it goes with --report");
+    if (o.report) rc = overwrite_check(o.report, OUTPUT_PAGE);
+    if (o.csv && !rc) rc = overwrite_check(o.csv, OUTPUT_TABLE);
     if (o.svg && !rc) rc = overwrite_check(o.svg, OUTPUT_CURVE);
     if (rc) return rc;
     if (o.ends && cli.from)
@@ -341,10 +351,16 @@ static int run_read(int n, char **operand)
     const int one = sensor_named(), first = one ? cli.sensor : 0;
     const int end = one ? first + 1 : scene.n_sensors;
     int *unlit = cli_alloc((size_t)scene.n_sensors, sizeof *unlit), n_unlit = 0;
-    const struct grid_wanted wanted = {o.ends, o.csv, o.svg};
+    struct room_page *page = o.report ? cli_alloc(1, sizeof *page) : NULL;
+    bool met = true;
+    const struct grid_wanted wanted = {o.ends, o.csv, o.svg, page};
+    if (page && !rc) rc = wants_read(page->want, &page->n_wants);
     if (o.grid && !rc)
         rc = grids_read(&j, run, first, end, &wanted, APART, &found.apart, unlit,
                         &n_unlit);
+    if (page && !rc) rc = room_page_write(page, o.report, run, &met);
+    if (page) room_page_free(page);
+    free(page);
     if (o.ugr && !rc) {
         run.sensor = first;
         rc = glare_read(&j, &run);
@@ -363,15 +379,15 @@ static int run_read(int n, char **operand)
     free(blocks);
     problem_close(problem);
     if (rc) return rc;
-    return found.apart ? EXIT_NO : cli_done();
+    return found.apart || !met ? EXIT_NO : cli_done();
 }
 
 const struct command command_read = {
     {"read",
      "SCENE",
      "the readings of all sensors, with units, errors and derivatives",
-     {options, options_params, options_run, options_limits, options_scene, options_file,
-      options_general},
+     {options, options_wants, options_params, options_run, options_limits, options_scene,
+      options_file, options_general},
      1,
      1},
     run_read,

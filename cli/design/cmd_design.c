@@ -2,30 +2,26 @@
  *
  * importon design: which luminaires of a room, how far dimmed, for what is wanted of its grids. */
 #include "design_answer.h"
+#include "read/room_page.h"
 #include "shared/command.h"
 #include "shared/overwrite.h"
 #include "text/progress.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define WANTS_MAX 200
+#define PAGE_TIMES                                                                       \
+    8 /* samples of a grid of the page, all lamps at once, over those of one lamp */
 
 static struct {
-    struct arg_list wants;
     int least, others, rounds, nodes;
     double confidence, within;
-    const char *settings;
+    const char *settings, *report;
 } o;
 
 static const char *const least_words[] = {"watts", "flux", "cost", NULL};
 
 static const struct arg_option options[] = {
-    {ARG_LIST, 'w', "want", "GRID.WHAT=V",
-     "of a grid (an irradiancemeter, by name or number): average, minimum or uniformity "
-     "at least V, maximum or ugr at most V",
-     &o.wants, 0, 0, NULL},
     {ARG_CHOICE, 0, "least", "WHAT", "watts (default), flux or cost", &o.least, 0, 0,
      least_words},
     {ARG_NUMBER, 0, "confidence", "P", "with which all of it holds (default 0.95)",
@@ -41,69 +37,75 @@ static const struct arg_option options[] = {
      1, 1e9, NULL},
     {ARG_TEXT, 0, "settings", "FILE", "write the levels, for --set @FILE", &o.settings, 0,
      0, NULL},
+    {ARG_TEXT, 0, "report", "FILE",
+     "the answer as a page for a client: plans, what is wanted, luminaires, a view",
+     &o.report, 0, 0, NULL},
     {0}};
 
-static int sensor_find(const char *name, const char *text, int *out)
+/* ---- The page ------------------------------------------------------------------------ */
+
+static size_t lamp_index(const struct design_answer *a, const char *name)
 {
-    struct imp_scene_info scene = {.size = sizeof scene};
-    char *end;
-    imp_scene_get_info(cli.scene, &scene);
-    for (int s = 0; s < scene.n_sensors; s++) {
-        struct imp_sensor_info info = {.size = sizeof info};
-        if (imp_scene_get_sensor(cli.scene, s, &info) != IMP_OK || !info.name) continue;
-        if (strcmp(info.name, name) != 0) continue;
-        *out = s;
-        return 0;
-    }
-    const long number = strtol(name, &end, 10);
-    if (*name && !*end && number >= 0 && number < scene.n_sensors) {
-        *out = (int)number;
-        return 0;
-    }
-    return cli_error(EXIT_USAGE, "--want %s: the scene has no sensor '%s'", text, name);
+    size_t j = 0;
+    while (j < a->lamps->n && strcmp(a->lamps->lamp[j].lamp, name) != 0) j++;
+    return j;
+}
+static const char *file_of(const char *lamp, void *payload)
+{
+    const struct design_answer *a = payload;
+    const size_t j = lamp_index(a, lamp);
+    return j < a->lamps->n && a->lamps->file[j] ? a->lamps->file[j] : "";
+}
+static double level_of(const char *lamp, void *payload)
+{
+    const struct design_answer *a = payload;
+    const size_t j = lamp_index(a, lamp);
+    return j < a->lamps->n ? a->answer->level[j] : 1;
+}
+static double watts_of(const char *lamp, void *payload)
+{
+    const struct design_answer *a = payload;
+    const size_t j = lamp_index(a, lamp);
+    return j < a->lamps->n ? a->answer->lamp_watts[j] : 0;
 }
 
-/* "GRID.WHAT=V" */
-static int want_read(const char *text, struct imp_design_want *out)
+/* The grids that something is wanted of, with the answer's levels and walks of their own. */
+static int report_write(struct design_answer *a, size_t n)
 {
-    char *copy = cli_strdup(text), *equal = strrchr(copy, '='), *dot, *end = NULL;
-    int rc = 0, of = -1;
-    if (equal) *equal = 0;
-    dot = strrchr(copy, '.');
-    const double value = equal ? strtod(equal + 1, &end) : NAN;
-    if (dot) {
-        *dot = 0;
-        for (int k = 0; design_words[k]; k++)
-            if (!strcmp(dot + 1, design_words[k])) of = k;
+    struct room_page *page = cli_alloc(1, sizeof *page);
+    struct imp_run run = cli_run();
+    char heading[200];
+    bool met;
+    int rc = design_levels_apply(a);
+    run.seed += 1;
+    snprintf(heading, sizeof heading,
+             "Chosen with the fewest %s: %.4g W, %.5g lm. Fresh walks show all that is "
+             "wanted with %g %% confidence: %s.",
+             least_words[o.least], a->answer->watts, a->answer->flux,
+             100 * (o.confidence > 0 ? o.confidence : 0.95),
+             a->answer->holds ? "yes" : "no");
+    page->heading = heading;
+    page->file_of = file_of;
+    page->level_of = level_of;
+    page->watts_of = watts_of;
+    page->payload = a;
+    page->n_wants = n;
+    memcpy(page->want, a->wants, n * sizeof *page->want);
+    for (size_t k = 0; k < n && !rc; k++) {
+        struct grid g;
+        bool there = false;
+        for (size_t i = 0; i < page->n_grids; i++)
+            there |= page->grid[i].sensor == a->wants[k].sensor;
+        if (there) continue;
+        run.sensor = a->wants[k].sensor;
+        run.spp = cli.spp;
+        run.spp = PAGE_TIMES * cli_spp(&run);
+        rc = grid_read(run, 0, &g);
+        if (!rc) room_page_add(page, &g);
     }
-    *out = (struct imp_design_want)IMP_DESIGN_WANT_INIT;
-    if (of < 0 || !equal || end == equal + 1 || *end || !isfinite(value))
-        rc = cli_error(EXIT_USAGE,
-                       "--want %s: expected GRID.WHAT=V, WHAT one of average, minimum, "
-                       "maximum, uniformity, ugr",
-                       text);
-    else rc = sensor_find(copy, text, &out->sensor);
-    out->of = (enum imp_design_want_of)(of < 0 ? 0 : of);
-    out->value = value;
-    free(copy);
-    return rc;
-}
-
-static int wants_read(struct imp_design_want *want, size_t *n)
-{
-    int rc = 0;
-    for (size_t k = 0; k < o.wants.n && !rc; k++) {
-        char *copy = cli_strdup(o.wants.item[k]), *save = NULL;
-        for (char *w = strtok_r(copy, ",", &save); w && !rc;
-             w = strtok_r(NULL, ",", &save))
-            rc = *n < WANTS_MAX ? want_read(w, &want[(*n)++])
-                                : cli_error(EXIT_USAGE, "more than %d wants", WANTS_MAX);
-        free(copy);
-    }
-    if (!rc && *n == 0)
-        rc = cli_error(EXIT_USAGE,
-                       "design: nothing is wanted; say it by --want, such as --want "
-                       "work.average=500,work.uniformity=0.6");
+    if (!rc) rc = room_page_write(page, o.report, run, &met);
+    room_page_free(page);
+    free(page);
     return rc;
 }
 
@@ -121,7 +123,12 @@ static int design(const struct design_lamps *lamps)
     options.within = o.within;
     options.nodes = o.nodes;
     int rc = wants_read(want, &n);
+    if (!rc && n == 0)
+        rc = cli_error(EXIT_USAGE,
+                       "design: nothing is wanted; say it by --want, such as --want "
+                       "work.average=500,work.uniformity=0.6");
     if (!rc && o.settings) rc = overwrite_check(o.settings, OUTPUT_SETTINGS);
+    if (!rc && o.report) rc = overwrite_check(o.report, OUTPUT_PAGE);
     if (!rc) {
         const enum imp_status st = imp_design_find(cli.scene, lamps->lamp, lamps->n, want,
                                                    n, &options, &run, &found);
@@ -129,10 +136,11 @@ static int design(const struct design_lamps *lamps)
         else if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
     }
     if (!rc) {
-        const struct design_answer a = {lamps, want, &options, imp_design_result(found)};
+        struct design_answer a = {lamps, want, &options, imp_design_result(found)};
         if (cli.json) design_json(&a);
         else design_print(&a);
         if (o.settings && a.answer->found) rc = design_settings_write(o.settings, &a);
+        if (!rc && o.report && a.answer->found) rc = report_write(&a, n);
         if (!rc && !(a.answer->found && a.answer->holds)) rc = EXIT_NO;
     }
     imp_design_destroy(found);
@@ -151,7 +159,6 @@ static int run_design(int n, char **operand)
     if (!rc) rc = design_lamps_make(&lamps);
     if (!rc) rc = design(&lamps);
     design_lamps_free(&lamps);
-    args_list_free(&o.wants);
     return rc ? rc : cli_done();
 }
 
@@ -159,7 +166,8 @@ const struct command command_design = {
     {"design",
      "SCENE",
      "which luminaires of a room, how far dimmed, for wanted lux",
-     {options, options_lamps, options_run, options_scene, options_file, options_general},
+     {options_wants, options, options_lamps, options_run, options_scene, options_file,
+      options_general},
      1,
      1},
     run_design,

@@ -2,6 +2,7 @@
  *
  * What a design prints. */
 #include "design_answer.h"
+#include "read/room_wants.h"
 #include "shared/command.h"
 #include "shared/output.h"
 
@@ -10,31 +11,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const design_words[] = {"average",    "minimum", "maximum",
-                                    "uniformity", "ugr",     NULL};
 static const char *const objectives[] = {"W", "lm", ""};
 static const char *const objective_words[] = {"watts", "flux", "cost"};
 
-static struct imp_sensor_info sensor_of(const struct imp_design_want *w)
-{
-    struct imp_sensor_info info = {.size = sizeof info};
-    if (imp_scene_get_sensor(cli.scene, w->sensor, &info) != IMP_OK)
-        info.name = info.unit = "";
-    return info;
-}
-const char *design_sensor(const struct imp_design_want *w) { return sensor_of(w).name; }
-const char *design_unit(const struct imp_design_want *w)
-{
-    const bool bare = w->of == IMP_WANT_UNIFORMITY || w->of == IMP_WANT_UGR;
-    return bare ? "" : sensor_of(w).unit;
-}
 const struct imp_design_finding *design_finding(const struct design_answer *a, size_t k)
 {
     return IMP_ROW(imp_design_finding, a->answer->wants, k);
-}
-static bool is_upper(const struct imp_design_want *w)
-{
-    return w->of == IMP_WANT_MAXIMUM || w->of == IMP_WANT_UGR;
 }
 static size_t used(const struct design_answer *a, const double *level)
 {
@@ -45,32 +27,60 @@ static size_t used(const struct design_answer *a, const double *level)
 
 /* ---- Settings ------------------------------------------------------------------------- */
 
-/* The scale of an emitter is one of these; level times its values makes the answer. */
-static int setting_print(FILE *f, const char *lamp, double level)
+/* The parameter that an emitter's output goes with, and its values, to be freed; NULL: it has
+ * none. */
+static double *scale_find(const char *lamp, size_t *param, struct imp_param_info *info)
 {
     static const char *const inputs[] = {"scale", "radiance", "irradiance", "intensity"};
     for (size_t k = 0; k < sizeof inputs / sizeof *inputs; k++) {
         char name[600];
-        size_t param;
-        struct imp_param_info info = {.size = sizeof info};
+        *info = (struct imp_param_info){.size = sizeof *info};
         snprintf(name, sizeof name, "%s.%s.value", lamp, inputs[k]);
-        if (imp_scene_find_param(cli.scene, name, &param) != IMP_OK ||
-            imp_scene_get_param(cli.scene, param, &info) != IMP_OK)
+        if (imp_scene_find_param(cli.scene, name, param) != IMP_OK ||
+            imp_scene_get_param(cli.scene, *param, info) != IMP_OK)
             continue;
-        double *value = cli_alloc(info.count, sizeof *value);
-        if (imp_scene_get_values(cli.scene, param, value) != IMP_OK) {
-            free(value);
-            continue;
-        }
-        fprintf(f, "%s=", name);
-        for (size_t i = 0; i < info.count; i++)
-            fprintf(f, "%s%.9g", i ? "," : "", value[i] * level);
-        fprintf(f, "\n");
+        double *value = cli_alloc(info->count, sizeof *value);
+        if (imp_scene_get_values(cli.scene, *param, value) == IMP_OK) return value;
         free(value);
-        return 0;
     }
-    return cli_error(EXIT_USAGE, "--settings: lamp '%s' has no scale that could be set",
+    return NULL;
+}
+
+static int no_scale(const char *option, const char *lamp)
+{
+    return cli_error(EXIT_USAGE, "--%s: lamp '%s' has no scale that could be set", option,
                      lamp);
+}
+
+/* Level times its values makes the answer. */
+static int setting_print(FILE *f, const char *lamp, double level)
+{
+    struct imp_param_info info;
+    size_t param;
+    double *value = scale_find(lamp, &param, &info);
+    if (!value) return no_scale("settings", lamp);
+    fprintf(f, "%s=", info.name);
+    for (size_t i = 0; i < info.count; i++)
+        fprintf(f, "%s%.9g", i ? "," : "", value[i] * level);
+    fprintf(f, "\n");
+    free(value);
+    return 0;
+}
+
+int design_levels_apply(const struct design_answer *a)
+{
+    for (size_t j = 0; j < a->answer->n_lamps; j++) {
+        struct imp_param_info info;
+        size_t param;
+        double *value = scale_find(a->lamps->lamp[j].lamp, &param, &info);
+        if (!value) return no_scale("report", a->lamps->lamp[j].lamp);
+        for (size_t i = 0; i < info.count; i++) value[i] *= a->answer->level[j];
+        const enum imp_status st =
+            imp_scene_set_values(cli.scene, param, info.count, value);
+        free(value);
+        if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    }
+    return 0;
 }
 
 /* A luminaire of a catalogue takes the place's name, as --luminaire PLACE=FILE makes it. */
@@ -155,13 +165,12 @@ static void print_wants(const struct design_answer *a)
         const struct imp_design_want *w = &a->wants[k];
         const struct imp_design_finding *f = design_finding(a, k);
         char what[300], price[64] = "-";
-        snprintf(what, sizeof what, "%s %s", design_sensor(w), design_words[w->of]);
+        snprintf(what, sizeof what, "%s %s", want_sensor(w), want_words[w->of]);
         if (f->price != 0)
             snprintf(price, sizeof price, "%.3g %s per %s", f->price,
-                     objectives[a->options->least],
-                     *design_unit(w) ? design_unit(w) : "1");
+                     objectives[a->options->least], *want_unit(w) ? want_unit(w) : "1");
         printf("%-24s %s %-9.4g %-11.5g %-11.5g %s%s\n", what,
-               is_upper(w) ? "<=" : ">=", f->wanted, f->sure, f->value, price,
+               want_is_upper(w) ? "<=" : ">=", f->wanted, f->sure, f->value, price,
                f->holds ? "" : "  NOT SHOWN");
     }
 }
@@ -191,12 +200,13 @@ static void print_none(const struct design_answer *a)
         const struct imp_design_want *w = &a->wants[k];
         const struct imp_design_finding *f = design_finding(a, k);
         char what[300], with[64] = "none";
-        snprintf(what, sizeof what, "%s %s", design_sensor(w), design_words[w->of]);
+        snprintf(what, sizeof what, "%s %s", want_sensor(w), want_words[w->of]);
         if (!isnan(f->attainable)) snprintf(with, sizeof with, "%.5g", f->attainable);
         char alone[64] = "none";
         if (!isnan(f->alone)) snprintf(alone, sizeof alone, "%.5g", f->alone);
-        printf("%-24s %s %-9.4g %-11s %s%s\n", what, is_upper(w) ? "<=" : ">=", f->wanted,
-               alone, with, f->holds ? "" : "  not even alone");
+        printf("%-24s %s %-9.4g %-11s %s%s\n", what,
+               want_is_upper(w) ? "<=" : ">=", f->wanted, alone, with,
+               f->holds ? "" : "  not even alone");
     }
 }
 
@@ -276,9 +286,9 @@ void design_json(const struct design_answer *a)
     for (size_t k = 0; k < d->n_wants; k++) {
         const struct imp_design_finding *f = design_finding(a, k);
         json_object(&j, NULL);
-        json_text(&j, "sensor", design_sensor(&a->wants[k]));
-        json_text(&j, "of", design_words[a->wants[k].of]);
-        json_text(&j, "unit", design_unit(&a->wants[k]));
+        json_text(&j, "sensor", want_sensor(&a->wants[k]));
+        json_text(&j, "of", want_words[a->wants[k].of]);
+        json_text(&j, "unit", want_unit(&a->wants[k]));
         json_number(&j, "wanted", f->wanted);
         json_number(&j, d->found ? "value" : "alone", d->found ? f->value : f->alone);
         json_number(&j, d->found ? "sure" : "attainable",

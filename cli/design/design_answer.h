@@ -14,15 +14,12 @@ struct design_answer {
     const struct imp_design_answer *answer;
 };
 
-/* "average", "minimum", .. by enum imp_design_want_of; its unit for a sensor. */
-extern const char *const design_words[];
-const char *design_unit(const struct imp_design_want *w);
-/* Name of the sensor. */
-const char *design_sensor(const struct imp_design_want *w);
 const struct imp_design_finding *design_finding(const struct design_answer *a, size_t k);
 
 void design_print(const struct design_answer *a);
 void design_json(const struct design_answer *a);
+/* The scene becomes that of the answer. 0, or an exit code. */
+int design_levels_apply(const struct design_answer *a);
 /* Lines for --set @FILE: the levels of the answer. 0, or an exit code. */
 int design_settings_write(const char *path, const struct design_answer *a);
 

@@ -52,7 +52,8 @@ int grid_read(struct imp_run run, int ends, struct grid *out)
     int64_t sets;
     enum imp_status st = imp_scene_get_sensor(cli.scene, run.sensor, &info);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
-    struct grid g = {.name = info.name,
+    struct grid g = {.sensor = run.sensor,
+                     .name = info.name,
                      .unit = info.unit,
                      .width = info.width,
                      .height = info.height,

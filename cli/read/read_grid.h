@@ -8,7 +8,10 @@
 #include "text/json.h"
 #include <importon/rooms.h>
 
+struct room_page;
+
 struct grid {
+    int sensor;
     const char *name, *unit; /* of the sensor */
     int width, height;
     size_t n;
@@ -29,8 +32,9 @@ void grid_json(struct json *j, const struct grid *g);
 void grid_tell(const struct grid *g);
 
 struct grid_wanted {
-    int ends;              /* are they read from both ends? */
-    const char *csv, *svg; /* files; NULL: none */
+    int ends;               /* are they read from both ends? */
+    const char *csv, *svg;  /* files; NULL: none */
+    struct room_page *page; /* which takes the grids; NULL: none */
 };
 /* Read and print the grids of the sensors [first, end) that have one; *apart becomes 1 where
  * the ends differ by more than most_z standard errors, unlit [*n_unlit] gets those to
@@ -46,5 +50,6 @@ int grid_csv(const char *path, const struct grid *g);
 /* The plan of the grid: colours with their scale, isolines, a number at each point where
  * there is room. 0, or an exit code. */
 int grid_svg(const char *path, const struct grid *g);
+void grid_svg_put(FILE *f, const struct grid *g);
 
 #endif

@@ -188,27 +188,32 @@ static void name_put(FILE *f, const char *name)
         else fputc(*c, f);
 }
 
-int grid_svg(const char *path, const struct grid *g)
+void grid_svg_put(FILE *f, const struct grid *g)
 {
-    struct output o;
-    int rc = output_open(&o, path, OUTPUT_CURVE);
-    if (rc) return rc;
     const struct plan p = plan_of(g);
     const double wide = p.cell[0] * g->width, high = p.cell[1] * g->height;
     const double full = MARGIN + wide + SCALE, whole = TOP + fmax(high, 120) + MARGIN;
-    fprintf(o.file,
+    fprintf(f,
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.0f\" height=\"%.0f\" "
             "viewBox=\"0 0 %.0f %.0f\" font-family=\"sans-serif\" font-size=\"11\">\n"
             "<metadata>importon</metadata>\n<rect width=\"100%%\" height=\"100%%\" "
             "fill=\"#fff\"/>\n<text x=\"%d\" y=\"%d\" font-size=\"14\">",
             full, whole, full, whole, MARGIN, TOP - 18);
-    name_put(o.file, g->name);
-    fprintf(o.file, ": average %.4g %s, minimum/average %.2f</text>\n",
+    name_put(f, g->name);
+    fprintf(f, ": average %.4g %s, minimum/average %.2f</text>\n",
             g->summary.average.value, g->unit, g->summary.uniformity.value);
-    cells_put(o.file, &p);
-    isolines_put(o.file, &p);
-    numbers_put(o.file, &p);
-    scale_put(o.file, &p, MARGIN + wide + 12, fmax(high, 120));
-    fprintf(o.file, "</svg>\n");
+    cells_put(f, &p);
+    isolines_put(f, &p);
+    numbers_put(f, &p);
+    scale_put(f, &p, MARGIN + wide + 12, fmax(high, 120));
+    fprintf(f, "</svg>\n");
+}
+
+int grid_svg(const char *path, const struct grid *g)
+{
+    struct output o;
+    const int rc = output_open(&o, path, OUTPUT_CURVE);
+    if (rc) return rc;
+    grid_svg_put(o.file, g);
     return output_close(&o, rc);
 }

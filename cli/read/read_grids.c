@@ -2,6 +2,7 @@
  *
  * read --grid: the grids of a scene's sensors, and luminaires that light none of them. */
 #include "read_grid.h"
+#include "room_page.h"
 #include "shared/command.h"
 
 #include <math.h>
@@ -51,7 +52,8 @@ int grids_read(struct json *j, struct imp_run run, int first, int end,
         else grid_print(&g);
         if (wanted->csv) rc = grid_csv(wanted->csv, &g);
         if (wanted->svg && !rc) rc = grid_svg(wanted->svg, &g);
-        grid_free(&g);
+        if (wanted->page) room_page_add(wanted->page, &g);
+        else grid_free(&g);
     }
     return rc;
 }

@@ -165,7 +165,7 @@ def design(scene: Scene, wants: Mapping[Any, Mapping[str, float]],
     ... </scene>''')
     >>> d = importon.design(scene, {"desk": {"minimum": 40}}, [{"lamp": "lamp", "watts": 10}])
     >>> d.holds, round(d.levels["lamp"], 3)
-    (True, 0.602)
+    (True, 0.625)
     """
     scene = check_scene(scene)
     keep: list[Any] = []

@@ -3,7 +3,7 @@
 design() { importon design "$ROOT/scenes/office.xml" -m mono -D spp=32 "$@"; echo "exit $?"; }
 design -w work.average=450,work.uniformity=0.6,eyes.ugr=20
 design -w work.average=450 --choose 'lamp_*=lamps/opal.ldt,lamps/batwing.ies,none' --watts '*:batwing=25' --others 1 --settings levels
-cat levels
+sed 1d levels
 cat >catalogue <<'X'
 # places  file               settings
 lamp_1?   lamps/opal.ldt     cost=120

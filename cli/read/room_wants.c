@@ -1,0 +1,96 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * --want: what a grid shall have. */
+#include "room_wants.h"
+#include "shared/command.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static struct arg_list wants;
+
+const struct arg_option options_wants[] = {
+    {ARG_LIST, 'w', "want", "GRID.WHAT=V",
+     "of a grid (an irradiancemeter, by name or number): average, minimum or uniformity "
+     "at least V, maximum or ugr at most V",
+     &wants, 0, 0, NULL},
+    {0}};
+
+const char *const want_words[] = {"average",    "minimum", "maximum",
+                                  "uniformity", "ugr",     NULL};
+
+static struct imp_sensor_info sensor_of(const struct imp_design_want *w)
+{
+    struct imp_sensor_info info = {.size = sizeof info};
+    if (imp_scene_get_sensor(cli.scene, w->sensor, &info) != IMP_OK)
+        info.name = info.unit = "";
+    return info;
+}
+const char *want_sensor(const struct imp_design_want *w) { return sensor_of(w).name; }
+const char *want_unit(const struct imp_design_want *w)
+{
+    const bool bare = w->of == IMP_WANT_UNIFORMITY || w->of == IMP_WANT_UGR;
+    return bare ? "" : sensor_of(w).unit;
+}
+bool wants_given(void) { return wants.n > 0; }
+
+static int sensor_find(const char *name, const char *text, int *out)
+{
+    struct imp_scene_info scene = {.size = sizeof scene};
+    char *end;
+    imp_scene_get_info(cli.scene, &scene);
+    for (int s = 0; s < scene.n_sensors; s++) {
+        struct imp_sensor_info info = {.size = sizeof info};
+        if (imp_scene_get_sensor(cli.scene, s, &info) != IMP_OK || !info.name) continue;
+        if (strcmp(info.name, name) != 0) continue;
+        *out = s;
+        return 0;
+    }
+    const long number = strtol(name, &end, 10);
+    if (*name && !*end && number >= 0 && number < scene.n_sensors) {
+        *out = (int)number;
+        return 0;
+    }
+    return cli_error(EXIT_USAGE, "--want %s: the scene has no sensor '%s'", text, name);
+}
+
+/* "GRID.WHAT=V" */
+static int want_read(const char *text, struct imp_design_want *out)
+{
+    char *copy = cli_strdup(text), *equal = strrchr(copy, '='), *dot, *end = NULL;
+    int rc = 0, of = -1;
+    if (equal) *equal = 0;
+    dot = strrchr(copy, '.');
+    const double value = equal ? strtod(equal + 1, &end) : NAN;
+    if (dot) {
+        *dot = 0;
+        for (int k = 0; want_words[k]; k++)
+            if (!strcmp(dot + 1, want_words[k])) of = k;
+    }
+    *out = (struct imp_design_want)IMP_DESIGN_WANT_INIT;
+    if (of < 0 || !equal || end == equal + 1 || *end || !isfinite(value))
+        rc = cli_error(EXIT_USAGE,
+                       "--want %s: expected GRID.WHAT=V, WHAT one of average, minimum, "
+                       "maximum, uniformity, ugr",
+                       text);
+    else rc = sensor_find(copy, text, &out->sensor);
+    out->of = (enum imp_design_want_of)(of < 0 ? 0 : of);
+    out->value = value;
+    free(copy);
+    return rc;
+}
+
+int wants_read(struct imp_design_want *want, size_t *n)
+{
+    int rc = 0;
+    for (size_t k = 0; k < wants.n && !rc; k++) {
+        char *copy = cli_strdup(wants.item[k]), *save = NULL;
+        for (char *w = strtok_r(copy, ",", &save); w && !rc;
+             w = strtok_r(NULL, ",", &save))
+            rc = *n < WANTS_MAX ? want_read(w, &want[(*n)++])
+                                : cli_error(EXIT_USAGE, "more than %d wants", WANTS_MAX);
+        free(copy);
+    }
+    return rc;
+}
