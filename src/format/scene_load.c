@@ -8,7 +8,7 @@
 #include "load.h"
 #include "luminaire_files.h"
 #include "search.h"
-#include "settings.h"
+#include "setting_lines.h"
 #include "tree.h"
 #include "twin_scene.h"
 #include "xml.h"

@@ -4,7 +4,7 @@
  * (docs/scene-format.md 1.1). */
 #include "base/nearest.h"
 #include "search.h"
-#include "settings.h"
+#include "setting_lines.h"
 #include "value.h"
 #include "xml.h"
 #include <stdio.h>

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Values of parameters as text: of --set, of lists of settings, and of <set> in scene files. */
-#ifndef IMP_FORMAT_SETTINGS_H
-#define IMP_FORMAT_SETTINGS_H
+#ifndef IMP_FORMAT_SETTING_LINES_H
+#define IMP_FORMAT_SETTING_LINES_H
 
 #include "scene/scene.h"
 

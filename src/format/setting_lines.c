@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Values of parameters as text (settings.h): lines NAME=V[,V..], empty lines, and lines that
+ * Values of parameters as text (setting_lines.h): lines NAME=V[,V..], empty lines, and lines that
  * begin with #. */
-#include "settings.h"
+#include "setting_lines.h"
 #include "base/arguments.h"
 #include "value.h"
 #include <stdio.h>
 #include <string.h>
 
-/* Of whom a message speaks. */
+/* Whom a message speaks of. */
 struct source {
     const char *name; /* NULL: a text of the caller's alone */
     size_t line;      /* 0: it has one */
