@@ -79,7 +79,8 @@ struct imp_design_finding {
     /** Without an answer: the best value that it can have while all other wants hold; NAN: with
      * the others none has an answer. */
     double attainable;
-    double alone; /**< without an answer: the best value that it can have alone */
+    double alone; /**< without an answer: the best value that it can have alone; NAN: the
+                       search did not end */
     size_t
         at; /**< index of the point or observer where `sure` is taken; 0 of an average */
 };
@@ -88,6 +89,9 @@ struct imp_design_answer {
     size_t size;
     bool found; /**< some combination has what is wanted, with the margins */
     bool holds; /**< and by fresh walks each want does, with the confidence */
+    /** The search ended by itself: nothing has a smaller objective, or nothing has what is wanted. Else
+     * it ended after options.nodes. */
+    bool proven;
     double objective;
     double
         bound; /**< none has less than this: equal to the objective where the search ended */
