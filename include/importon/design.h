@@ -77,12 +77,10 @@ struct imp_design_finding {
     bool binding; /**< a little less wanted were cheaper */
     double price; /**< d objective / d wanted, with the same lamps; 0 of costs */
     /** Without an answer: the best value that it can have while all other wants hold; NAN: with
-     * the others none has an answer. */
+     * the others there is none, or a search ended after options.nodes. */
     double attainable;
-    double alone; /**< without an answer: the best value that it can have alone; NAN: the
-                       search did not end */
-    size_t
-        at; /**< index of the point or observer where `sure` is taken; 0 of an average */
+    double alone; /**< the same without the other wants */
+    size_t at;    /**< point or observer where `sure` is taken; 0 of an average */
 };
 
 struct imp_design_answer {
