@@ -25,6 +25,11 @@ say "gradient: the Cornell box, and its derivatives by three reflectances"
 "$importon" jacobian scenes/cornell.xml -D res=128 --spp 256 -p 'red.*' -p 'green.*' -p 'white.*' -q \
     -o "$out/J" --sheet "$images/cornell_jacobian.png" >"$out/jacobian.txt"
 
+say "derivatives of a table by the place of a lamp"
+"$importon" jacobian scenes/placing.xml -m mono --sensor 3 -p lamp.position --set spot.intensity.value=9 \
+    --set lamp.intensity.value=4 -q -o "$out/lamp" \
+    --sheet "$images/lamp_jacobian.png" >"$out/lamp.txt"
+
 say "fit: wrong walls and a wrong lamp, the target, what was recovered (as ./quickstart)"
 size=(-D res=96)
 "$importon" render scenes/cornell.xml "${size[@]}" --spp 512 --seed 1 --se -q -o "$out/target.exr"
@@ -50,7 +55,7 @@ chromium --headless --no-sandbox --use-gl=angle --use-angle=swiftshader --enable
     --window-size=620,820 --virtual-time-budget=5000 --screenshot="$PWD/$images/report_elements.png" \
     "file://$(realpath "$page")" 2>/dev/null
 
-for picture in report report_elements textured lenses cornell_jacobian cornell_fit; do
+for picture in report report_elements textured lenses cornell_jacobian lamp_jacobian cornell_fit; do
     bytes=$(stat -c %s "$images/$picture.png")
     say "$images/$picture.png: $bytes bytes"
     ((bytes < most)) || { echo "$images/$picture.png is larger than $most bytes" >&2; exit 1; }

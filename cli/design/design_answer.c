@@ -214,14 +214,17 @@ void design_print(const struct design_answer *a)
 {
     const struct imp_design_answer *d = a->answer;
     const int what = (int)a->options->least;
-    if (!d->found) {
-        print_none(a);
-        return;
-    }
+    if (!d->found && !d->proven)
+        printf("no combination was found in %lld branches, and it is not shown that "
+               "there is "
+               "none (--nodes)\n",
+               (long long)d->nodes);
+    else if (!d->found) print_none(a);
+    if (!d->found) return;
     printf("%zu of %zu lamps: %.4g W, %.5g lm", used(a, d->level), d->n_lamps, d->watts,
            d->flux);
     if (d->cost > 0) printf(", cost %.6g", d->cost);
-    if (d->bound >= d->objective * (1 - 1e-6)) printf("; no combination needs less\n\n");
+    if (d->proven) printf("; no combination needs less\n\n");
     else
         printf("; the search ended with a bound of %.4g %s (--nodes)\n\n", d->bound,
                objectives[what]);
@@ -269,6 +272,7 @@ void design_json(const struct design_answer *a)
     struct json j = cli_json();
     json_bool(&j, "found", d->found);
     json_bool(&j, "holds", d->holds);
+    json_bool(&j, "proven", d->proven);
     json_text(&j, "least", objective_words[a->options->least]);
     if (d->found) {
         json_number(&j, "objective", d->objective);

@@ -17,7 +17,7 @@ extern const char *const want_words[];
 /* The wants that were given; want [WANTS_MAX]. 0, or an exit code with the reason printed. */
 int wants_read(struct imp_design_want *want, size_t *n);
 bool wants_given(void);
-/* Of its sensor; the unit is "" of ratios and ratings. */
+/* Name and unit of its sensor; the unit is "" of ratios and ratings. */
 const char *want_sensor(const struct imp_design_want *w);
 const char *want_unit(const struct imp_design_want *w);
 /* Is the wanted value the largest? */

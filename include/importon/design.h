@@ -77,17 +77,19 @@ struct imp_design_finding {
     bool binding; /**< a little less wanted were cheaper */
     double price; /**< d objective / d wanted, with the same lamps; 0 of costs */
     /** Without an answer: the best value that it can have while all other wants hold; NAN: with
-     * the others none has an answer. */
+     * the others there is none, or a search ended after options.nodes. */
     double attainable;
-    double alone; /**< without an answer: the best value that it can have alone */
-    size_t
-        at; /**< index of the point or observer where `sure` is taken; 0 of an average */
+    double alone; /**< the same without the other wants */
+    size_t at;    /**< point or observer where `sure` is taken; 0 of an average */
 };
 
 struct imp_design_answer {
     size_t size;
     bool found; /**< some combination has what is wanted, with the margins */
     bool holds; /**< and by fresh walks each want does, with the confidence */
+    /** The search ended by itself: nothing has a smaller objective, or nothing has what is wanted. Else
+     * it ended after options.nodes. */
+    bool proven;
     double objective;
     double
         bound; /**< none has less than this: equal to the objective where the search ended */

@@ -47,6 +47,8 @@ class Design:
         Some combination has what is wanted, with margins for the errors of walks.
     holds : bool
         Fresh walks show it, with the confidence.
+    proven : bool
+        The search ended by itself: nothing is better, or nothing has what is wanted.
     levels : dict of str to float
         Of each lamp; 0: not used.
     objective, bound : float
@@ -62,7 +64,7 @@ class Design:
 
     def __init__(self, answer: Any, names: list[str], sensors: list[str]) -> None:
         n = len(names)
-        self.found, self.holds = bool(answer.found), bool(answer.holds)
+        self.found, self.holds, self.proven = bool(answer.found), bool(answer.holds), bool(answer.proven)
         for key in ("objective", "bound", "objective_se", "margin", "watts", "flux", "cost"):
             setattr(self, key, float(getattr(answer, key)))
         self.rounds, self.nodes = int(answer.rounds), int(answer.nodes)

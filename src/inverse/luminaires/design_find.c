@@ -40,6 +40,7 @@ static enum imp_status answer_set(struct imp__design_model *m,
 {
     const double *x = a->x;
     out->found = true;
+    out->proven = a->proven;
     out->level = x;
     out->watts = imp__design_objective(m, IMP_LEAST_WATTS, x);
     out->flux = imp__design_objective(m, IMP_LEAST_FLUX, x);
@@ -68,6 +69,7 @@ static enum imp_status rounds_run(struct imp__design_model *m, double *wanted,
         for (size_t k = 0; k < m->n_wants; k++)
             imp__design_rows_set(m, k, wanted[k], IMP_DESIGN_MARGIN);
         IMP_CHECKED(imp__design_search(m, NULL, 0, false, &a));
+        if (!out->found) out->proven = a.proven;
         if (!a.found) return IMP_OK; /* the answer of the last round stays */
         IMP_CHECKED(answer_set(m, &a, wanted, f, out));
         IMP_CHECKED(imp__design_read(m, out->level, FRESH + (uint64_t)round,
@@ -154,8 +156,10 @@ static enum imp_status design_make(struct imp__design_model *m,
     IMP_CHECKED(imp__design_responses(m));
     IMP_CHECKED(imp__design_rows_make(m));
     IMP_CHECKED(rounds_run(m, wanted, f, out));
-    if (!out->found) IMP_CHECKED(imp__design_attainable(m, f));
-    else {
+    for (size_t k = 0; !out->found && k < m->n_wants; k++)
+        f[k].value = f[k].sure = f[k].attainable = f[k].alone = NAN;
+    if (!out->found && out->proven) IMP_CHECKED(imp__design_attainable(m, f));
+    if (out->found) {
         if (m->o.others > 0) IMP_CHECKED(others_find(m, wanted, out));
         IMP_CHECKED(margin_find(m, out));
     }

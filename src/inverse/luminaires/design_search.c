@@ -85,44 +85,45 @@ static void drop(struct imp__design_model *m, size_t k)
     }
 }
 
-static enum imp_status is_possible(struct imp__design_model *m, bool *yes)
+enum possible { NO, YES, NOT_KNOWN };
+
+static enum imp_status is_possible(struct imp__design_model *m, enum possible *out)
 {
     struct imp__choice_answer a;
     const enum imp_status st = imp__design_search(m, NULL, 0, true, &a);
-    *yes = st == IMP_OK && a.found;
+    *out = st == IMP_OK && a.found ? YES : a.proven ? NO : NOT_KNOWN;
     return st;
 }
 
-/* The best value of want k with the rows of the others as they are; NAN: none. */
+/* The best value of want k with the rows of the others as they are; NAN: none, or a search ended
+ * before it was known. */
 static enum imp_status best_of(struct imp__design_model *m, size_t k, double *out)
 {
     const enum imp_design_want_of of = m->want[k].of;
     const double wanted = m->want[k].value;
-    bool yes;
+    enum possible is;
     *out = NAN;
     drop(m, k);
-    IMP_CHECKED(is_possible(m, &yes));
-    if (!yes) return IMP_OK;
+    IMP_CHECKED(is_possible(m, &is));
+    if (is != YES) return IMP_OK;
     double bad = wanted, good = 0; /* light is not negative */
     imp__design_rows_set(m, k, wanted, IMP_DESIGN_MARGIN);
-    IMP_CHECKED(is_possible(m, &yes));
-    if (yes) {
-        *out = wanted;
-        return IMP_OK;
-    }
-    for (int i = 0; imp__design_upper(of); i++) { /* a value that is enough, at all */
+    IMP_CHECKED(is_possible(m, &is));
+    if (is == YES) *out = wanted;
+    for (int i = 0; is == NO && imp__design_upper(of) && i < 30; i++) {
+        /* A value that is enough, at all. */
         good = of == IMP_WANT_UGR ? wanted + 2 * i + 2 : 2 * fmax(good, wanted);
         imp__design_rows_set(m, k, good, IMP_DESIGN_MARGIN);
-        IMP_CHECKED(is_possible(m, &yes));
-        if (yes) break;
-        bad = good;
-        if (i == 30) return IMP_OK;
+        IMP_CHECKED(is_possible(m, &is));
+        if (is == NO) bad = good;
     }
+    if (*out == wanted || (imp__design_upper(of) ? is != YES : is != NO)) return IMP_OK;
     for (int i = 0; i < HALVINGS; i++) {
         const double middle = 0.5 * (good + bad);
         imp__design_rows_set(m, k, middle, IMP_DESIGN_MARGIN);
-        IMP_CHECKED(is_possible(m, &yes));
-        if (yes) good = middle;
+        IMP_CHECKED(is_possible(m, &is));
+        if (is == NOT_KNOWN) return IMP_OK;
+        if (is == YES) good = middle;
         else bad = middle;
     }
     *out = good;

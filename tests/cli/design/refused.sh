@@ -32,3 +32,5 @@ catalogue 'lamp_* lamps/opal.ldt levels=2'
 catalogue 'lamp_* a,b'
 importon design "$SCENES/two_lamps.xml" -m mono -w 0.average=1 --lamps one --watts 3; echo "exit $?" >&2
 importon design "$SCENES/two_lamps.xml" -m mono -w 0.average=1; echo "exit $?" >&2
+# A search that was ended says so.
+importon design "$ROOT/scenes/office.xml" -m mono -D spp=256 -w work.average=430,work.maximum=480 --levels 1 --nodes 1; echo "exit $?" >&2
