@@ -5,6 +5,7 @@
 #include "read/read_glare.h"
 #include "read/read_grid.h"
 #include "read/room_page.h"
+#include "read/read_year.h"
 #include "shared/command.h"
 #include "shared/overwrite.h"
 #include "shared/picture_files.h"
@@ -310,8 +311,21 @@ static int run_read(int n, char **operand)
         return cli_error(EXIT_USAGE, "%s: there is no sensor in it", cli.scene_path);
     if (cli.time_s > 0)
         return cli_error(EXIT_USAGE, "read takes --spp samples, and has no --time");
-    if (!o.grid && (o.csv || o.svg))
-        return cli_error(EXIT_USAGE, "--csv and --svg write a grid: they go with --grid");
+    const int year = year_wanted.weather != NULL;
+    if (!o.grid && !year && (o.csv || o.svg))
+        return cli_error(EXIT_USAGE,
+                         "--csv and --svg write a grid: they go with --grid or --year");
+    if (year &&
+        (o.ugr || o.shares || o.grid || o.ends || cli.from || problem_options.params.n))
+        return cli_error(EXIT_USAGE,
+                         "--year goes without --ugr, --shares, --grid, --ends, "
+                         "--from and --param");
+    if (year && !sensor_named() && scene.n_sensors > 1)
+        return cli_error(
+            EXIT_USAGE,
+            "%s: it has %d sensors, and --year is of one grid: choose it with "
+            "--sensor",
+            cli.scene_path, scene.n_sensors);
     if (o.grid && problem_options.params.n)
         return cli_error(EXIT_USAGE,
                          "--grid has no derivatives: it goes without --param");
@@ -346,7 +360,7 @@ static int run_read(int n, char **operand)
     if (cli.json) {
         j = cli_json();
         json_integer(&j, "spp", cli_spp(&run));
-        json_array(&j, o.grid ? "grids" : o.ugr ? "glare" : "readings");
+        json_array(&j, o.grid ? "grids" : o.ugr ? "glare" : year ? "years" : "readings");
     }
     const int one = sensor_named(), first = one ? cli.sensor : 0;
     const int end = one ? first + 1 : scene.n_sensors;
@@ -365,7 +379,11 @@ static int run_read(int n, char **operand)
         run.sensor = first;
         rc = glare_read(&j, &run);
     }
-    for (int s = first; s < end && !rc && !o.grid && !o.ugr; s++) {
+    if (year && !rc) {
+        run.sensor = first;
+        rc = year_read(&j, &run, o.csv, o.svg);
+    }
+    for (int s = first; s < end && !rc && !o.grid && !o.ugr && !year; s++) {
         run.sensor = s;
         found.lit = 0;
         rc = o.shares ? shares_read(&j, &run, &found)
@@ -387,6 +405,7 @@ const struct command command_read = {
      "SCENE",
      "the readings of all sensors, with units, errors and derivatives",
      {options, options_wants, options_params, options_run, options_limits, options_scene,
+     {options, options_year, options_params, options_run, options_limits, options_scene,
       options_file, options_general},
      1,
      1},

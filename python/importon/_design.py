@@ -10,7 +10,7 @@ from . import _c
 from ._library import ArgumentError, choice, decode, integer, lib, make, rows_of, text
 from ._plan import lamps as lamp_names
 from ._problem import check_scene, run_options
-from ._rooms import _call, luminaires
+from ._rooms import call, luminaires
 from ._scene import Scene
 
 _WANTS = ("average", "minimum", "maximum", "uniformity", "ugr")
@@ -183,7 +183,7 @@ def design(scene: Scene, wants: Mapping[Any, Mapping[str, float]],
              nodes=integer(nodes, "nodes"))
     options = run_options(scene, sensor=0, seed=seed, spp=spp, points=points, walks_from=walks_from)
     out = ctypes.c_void_p()
-    _call(scene, params, options, progress, lib.imp_design_find, scene.pointer, rows, len(listed), of, len(wanted),
+    call(scene, params, options, progress, lib.imp_design_find, scene.pointer, rows, len(listed), of, len(wanted),
           ctypes.byref(o), ctypes.byref(options), ctypes.byref(out))
     try:
         answer = rows_of(_c.imp_design_answer, _pointer(lib.imp_design_result(out)), 1)[0]

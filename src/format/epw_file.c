@@ -56,7 +56,7 @@ static enum imp_status IMP_PRINTF(3, 4)
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
-    return imp__error(r->ctx, IMP_E_SCENE, "%s:%d:%d: %s", r->name, r->line,
+    return imp__error(r->ctx, IMP_E_SCENE, "%s:%d:%d: %s", r->name, imp_max(r->line, 1),
                       field < r->n ? r->field[field].column : 1, text);
 }
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write a weather file (EPW) of a place that does not exist.
 
-    tools/make_weather.py [--latitude 50] [--longitude 10] [--timezone 1] [--seed 1] [--clear] > town.epw
+    scenes/make_weather.py [--latitude 50] [--longitude 10] [--timezone 1] [--seed 1] [--clear] > town.epw
 
 For examples and tests, as files of real places have owners. Direct light is that of Meinel's clear
 sky (1976), 1353 W/m^2 x .7^(m^.678) with the air mass m; clouds follow each other by a chain with
@@ -50,7 +50,7 @@ def main():
     chance = random.Random(a.seed)
     print(f"LOCATION,Nowhere,-,-,importon,000000,{a.latitude:g},{a.longitude:g},{a.timezone:g},100")
     print("DESIGN CONDITIONS,0\nTYPICAL/EXTREME PERIODS,0\nGROUND TEMPERATURES,0")
-    print("HOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0\nCOMMENTS 1,made by tools/make_weather.py\nCOMMENTS 2,")
+    print("HOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0\nCOMMENTS 1,made by scenes/make_weather.py\nCOMMENTS 2,")
     print("DATA PERIODS,1,1,Data,Sunday,1/1,12/31")
     cover, day = .5, 0
     for month, n in enumerate(DAYS, 1):
