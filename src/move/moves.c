@@ -418,6 +418,24 @@ void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *
     }
 }
 
+size_t imp__mover_touched(const struct imp__moves *moves, const struct imp__mover *mover,
+                          const struct imp__glued *x, size_t index[IMP_TOUCHED_MOST])
+{
+    size_t n = 0;
+    if (mover->kind != IMP_MOVE_VERTICES) {
+        for (; n < mover->count; n++) index[n] = mover->first + n;
+        return n;
+    }
+    const struct imp_triangles *t = &moves->scene->shapes[x->shape]->triangles;
+    for (size_t row = 0; row < mover->count / (3 * t->n_vertices); row++)
+        for (int k = 0; k < 9; k++) {
+            const uint32_t vertex = t->indices[3 * (size_t)x->prim + (size_t)(k / 3)];
+            index[n++] =
+                mover->first + 3 * (row * t->n_vertices + vertex) + (size_t)(k % 3);
+        }
+    return n;
+}
+
 /* A camera's velocity at r from its centre by its one number: r z times the rate, or z across. */
 static imp_v3 view_velocity(const struct imp__mover *m, imp_v3 r)
 {

@@ -135,6 +135,11 @@ struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
                                       const double *theta_dot);
 void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *x,
                        const struct imp__velocity *bar, double *theta_bar);
+/* Numbers that the velocity of a point of its shape depends on, by their index among all; of vertices
+ * those of one triangle. Returns how many. */
+#define IMP_TOUCHED_MOST 18
+size_t imp__mover_touched(const struct imp__moves *moves, const struct imp__mover *mover,
+                          const struct imp__glued *x, size_t index[IMP_TOUCHED_MOST]);
 /* Velocity of emitter k: of its place, or of the unit direction of parallel light. */
 imp_v3 imp__light_velocity(const struct imp__moves *moves, int k,
                            const double *theta_dot);

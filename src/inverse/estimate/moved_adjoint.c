@@ -40,10 +40,11 @@ enum imp_status imp__moved_adjoint_fixed(imp_context *ctx,
 enum imp_status imp__moved_adjoint_loss(imp_context *ctx,
                                         const struct imp_film_desc *film, int channels,
                                         const struct imp__splat *splat, int R,
-                                        struct imp__moved_adjoint *out)
+                                        int contrasts, struct imp__moved_adjoint *out)
 {
     const size_t C = (size_t)channels;
     IMP_CHECKED(create(ctx, film, channels, R / 2, out));
+    out->contrasts = contrasts;
     const size_t n = values_of(out);
     for (size_t p = 0; p < n / C && splat->n > 0; p++) {
         const imp_spec mean = imp__splat_pixel(splat, -1, p);
@@ -81,7 +82,7 @@ double imp__moved_adjoint_at(const struct imp__moved_adjoint *a,
     struct imp_splat_taps taps;
     double sum = 0;
     imp__splat_taps(a->film, scale, px, py, &taps);
-    for (int m = 0; contrast && m < IMP_CONTRASTS; m++) contrast[m] = 0;
+    for (int m = 0; contrast && m < a->contrasts; m++) contrast[m] = 0;
     for (int j = 0; j < taps.down.n; j++)
         for (int i = 0; i < taps.across.n; i++) {
             const int x = taps.across.first + i, y = taps.down.first + j;
@@ -96,7 +97,7 @@ double imp__moved_adjoint_at(const struct imp__moved_adjoint *a,
                 for (size_t c = 0; c < C; c++)
                     apart += a->apart[(size_t)q * n + at + c] * (*L)[c];
                 apart *= w;
-                for (int m = 0; m < IMP_CONTRASTS; m++)
+                for (int m = 0; m < a->contrasts; m++)
                     contrast[m] += signs >> m & 1 ? apart : -apart;
             }
         }

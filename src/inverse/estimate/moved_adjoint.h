@@ -25,6 +25,8 @@
 #include "inverse/estimate/splat.h"
 
 #define IMP_CONTRASTS 64 /* signs are the bits of a word */
+#define IMP_CONTRASTS_MANY                                                               \
+    16 /* of gradients of many numbers: each has one of every number */
 
 struct imp__moved_adjoint {
     imp_context *ctx;
@@ -32,6 +34,7 @@ struct imp__moved_adjoint {
     int channels, margin;
     bool wide;     /* pixels share walks */
     int pairs;     /* of replicates; 0: a fixed adjoint, without noise */
+    int contrasts; /* IMP_CONTRASTS at most */
     double *image; /* [crop_h][crop_w][channels] */
     double *apart; /* [pairs][crop_h][crop_w][channels]: (A_2q - A_2q+1)/R */
 };
@@ -46,7 +49,7 @@ enum imp_status imp__moved_adjoint_fixed(imp_context *ctx,
 enum imp_status imp__moved_adjoint_loss(imp_context *ctx,
                                         const struct imp_film_desc *film, int channels,
                                         const struct imp__splat *splat, int R,
-                                        struct imp__moved_adjoint *out);
+                                        int contrasts, struct imp__moved_adjoint *out);
 void imp__moved_adjoint_free(struct imp__moved_adjoint *a);
 
 /* Signs of pixel (x, y), also of one in the margin, and of a pair: bit m of contrast m. */
@@ -56,7 +59,7 @@ static inline double imp__contrast_sign(uint64_t signs, int m)
     return signs >> m & 1 ? 1 : -1;
 }
 
-/* What light L at a film position counts; contrast [IMP_CONTRASTS]: by each contrast of A (NULL:
+/* What light L at a film position counts; contrast [a->contrasts]: by each contrast of A (NULL:
  * not wanted). */
 double imp__moved_adjoint_at(const struct imp__moved_adjoint *a,
                              const struct imp_splat_scale *scale, double px, double py,

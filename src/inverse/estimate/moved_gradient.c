@@ -118,9 +118,9 @@ bool imp__moved_walk(const struct imp__moved_gradient *m, struct imp_arena *aren
 
 struct draws {
     const struct imp__moved_gradient *m;
-    double *velocity; /* [moves.n] of a flux */
+    double *velocity; /* [moves.n] of a flux; 0 between fluxes */
     double *bar;      /* [moves.n] sum over draws */
-    double *half[2];  /* [IMP_CONTRASTS][moves.n]; NULL: not wanted */
+    double *half[2];  /* [contrasts][moves.n]; NULL: not wanted */
 };
 
 /* times [n] v. */
@@ -129,21 +129,41 @@ static void add_times(double *to, double times, const double *v, size_t n)
     for (size_t k = 0; k < n; k++) to[k] += times * v[k];
 }
 
+/* A number that a flux depends on. */
+static void number_count(const struct draws *d, size_t number, double counts,
+                         const double *contrast, double *half)
+{
+    const size_t n = d->m->moves.n;
+    const double v = d->velocity[number];
+    if (v == 0) return; /* of no use, or counted already */
+    d->velocity[number] = 0;
+    d->bar[number] += counts * v;
+    for (int k = 0; half && k < d->m->adjoint.contrasts; k++)
+        half[(size_t)k * n + number] += contrast[k] * v;
+}
+
 static void flux_add(const struct draws *d, const struct imp__flux *f, double weight,
                      int half)
 {
-    const size_t n = d->m->moves.n;
+    const struct imp__moves *moves = &d->m->moves;
     double contrast[IMP_CONTRASTS];
     const double counts =
         imp__moved_adjoint_at(&d->m->adjoint, &d->m->scale, f->px, f->py, &f->L,
-                              d->half[half] ? contrast : NULL);
-    memset(d->velocity, 0, n * sizeof *d->velocity);
-    imp__flux_bar(&d->m->moves, f, 1, d->velocity);
-    add_times(d->bar, counts * weight, d->velocity, n);
-    if (!d->half[half]) return;
-    weight /= d->m->adjoint.pairs; /* half of the draws of all replicates */
-    for (size_t k = 0; k < IMP_CONTRASTS; k++)
-        add_times(d->half[half] + k * n, contrast[k] * weight, d->velocity, n);
+                              d->half[half] ? contrast : NULL) *
+        weight;
+    /* Half of the draws of all replicates. */
+    for (int k = 0; d->half[half] && k < d->m->adjoint.contrasts; k++)
+        contrast[k] *= weight / d->m->adjoint.pairs;
+    imp__flux_bar(moves, f, 1, d->velocity);
+    for (int i = 0; i < f->n_ends; i++)
+        for (int k = 0; k < moves->n_movers; k++) {
+            const struct imp__mover *m = &moves->mover[k];
+            if (imp__flux_end_shape(&f->end[i]) != m->shape) continue;
+            size_t index[IMP_TOUCHED_MOST];
+            const size_t n = imp__mover_touched(moves, m, &f->end[i].x, index);
+            for (size_t j = 0; j < n; j++)
+                number_count(d, index[j], counts, contrast, d->half[half]);
+        }
 }
 
 static bool draws_add(const struct draws *d, struct imp_arena *arena,
@@ -175,17 +195,18 @@ bool imp__moved_replicate(const struct imp__moved_gradient *m, struct imp_arena 
                           struct imp__replicates plan, int x, int y, int b,
                           const double *inside, double *contrasts, struct imp_sink *sink)
 {
-    const size_t n = m->moves.n, part = IMP_CONTRASTS * n;
+    const size_t n = m->moves.n, part = (size_t)m->adjoint.contrasts * n;
     struct draws d = {.m = m};
-    d.velocity = imp__arena_take(arena, n, sizeof *d.velocity);
+    d.velocity = imp__arena_array(arena, n, sizeof *d.velocity);
     d.bar = imp__arena_array(arena, n, sizeof *d.bar);
     if (!d.velocity || !d.bar) return false;
     if (contrasts) {
         const uint64_t signs = imp__contrast_signs(&m->adjoint, x, y, b / 2);
         const double share = (b % 2 ? -0.5 : 0.5) / m->adjoint.pairs;
-        for (int k = 0; k < IMP_CONTRASTS; k++)
-            add_times(contrasts + (size_t)k * n, imp__contrast_sign(signs, k) * share,
-                      inside, n);
+        for (size_t e = 0; e < n; e++)
+            for (int k = 0; inside[e] != 0 && k < m->adjoint.contrasts; k++)
+                contrasts[(size_t)k * n + e] +=
+                    imp__contrast_sign(signs, k) * share * inside[e];
         d.half[0] = contrasts + part;
         d.half[1] = contrasts + 2 * part;
     }
@@ -220,29 +241,27 @@ static void number_add(struct imp_sink *sink, int param, size_t element, int cha
 
 enum imp_status imp__moved_variance(const struct imp__moved_gradient *m,
                                     const struct imp_active *active, double *contrasts,
-                                    const double *before, double *variance)
+                                    const double *own, double *more)
 {
     imp_context *ctx = m->tracer->scene->ctx;
-    const size_t n = active->n, N = m->moves.n;
-    double *value = imp__alloc(ctx, 4 * n, sizeof *value), *more = value + 3 * n;
+    const size_t n = active->n, N = m->moves.n, all = (size_t)m->adjoint.contrasts;
+    double *value = imp__alloc(ctx, 3 * n, sizeof *value);
     if (!value) return imp__error(ctx, IMP_E_NOMEM, "no memory for errors");
     memset(more, 0, n * sizeof *more);
-    for (size_t c = 0; c < IMP_CONTRASTS; c++) {
+    for (size_t c = 0; c < all; c++) {
         memset(value, 0, 3 * n * sizeof *value);
         for (size_t part = 0; part < 3; part++) {
             struct numbers s = {{number_add, false}, active, value + part * n};
-            imp__moved_numbers(m, contrasts + (part * IMP_CONTRASTS + c) * N,
+            imp__moved_numbers(m, contrasts + (part * all + c) * N,
                                (imp_spec){1, 0, 0, 0}, &s.sink);
         }
         for (size_t k = 0; k < n; k++) {
             const double inside = value[k], one = value[n + k], other = value[2 * n + k];
-            more[k] += (inside * (one + other) + one * other) / IMP_CONTRASTS;
+            more[k] += (inside * (one + other) + one * other) / (double)all;
         }
     }
-    for (size_t k = 0; k < n; k++) {
-        const double own = variance[k] - before[k];
-        if (more[k] != 0) variance[k] = before[k] + fmax(own + more[k], LEAST * own);
-    }
+    for (size_t k = 0; k < n; k++)
+        if (more[k] != 0) more[k] = fmax(more[k], (LEAST - 1) * own[k]);
     imp__release(ctx, value);
     return IMP_OK;
 }

@@ -53,20 +53,20 @@ bool imp__moved_walk(const struct imp__moved_gradient *m, struct imp_arena *aren
                      const struct imp_walk *walk, imp_spec adjoint, double *bar);
 
 /* Numbers of an item's contrasts: inside of walks, and at edges by two halves of the draws,
- * [3][IMP_CONTRASTS][moves.n]; 0 with a fixed adjoint. */
+ * [3][adjoint.contrasts][moves.n]; 0 with a fixed adjoint. */
 static inline size_t imp__moved_contrasts(const struct imp__moved_gradient *m)
 {
-    return m && m->adjoint.pairs > 0 ? 3 * IMP_CONTRASTS * m->moves.n : 0;
+    return m && m->adjoint.pairs > 0 ? 3 * (size_t)m->adjoint.contrasts * m->moves.n : 0;
 }
 /* Replicate b of pixel (x, y), of plan.n walks, which gave `inside` [moves.n]: adds that and its
  * draws to the sink, and to the contrasts (NULL: a fixed adjoint). False: no memory. */
 bool imp__moved_replicate(const struct imp__moved_gradient *m, struct imp_arena *arena,
                           struct imp__replicates plan, int x, int y, int b,
                           const double *inside, double *contrasts, struct imp_sink *sink);
-/* The contrasts of all items, which it overwrites: adds to variance [active->n], which is that of the gradient at fixed
- * adjoints and what other jobs have brought, `before` [n]. IMP_E_NOMEM. */
+/* The contrasts of all items, which it overwrites: what they add to the variance at fixed adjoints,
+ * own [active->n], to more [active->n]. IMP_E_NOMEM. */
 enum imp_status imp__moved_variance(const struct imp__moved_gradient *m,
                                     const struct imp_active *active, double *contrasts,
-                                    const double *before, double *variance);
+                                    const double *own, double *more);
 
 #endif

@@ -50,6 +50,23 @@ out:
     return st;
 }
 
+/* Variance [n] of what all jobs so far have brought. */
+static void variance_read(const struct imp__totals *t, size_t n, double *out)
+{
+    for (size_t k = 0; k < n; k++)
+        out[k] = !t->many        ? t->gradient_variance[k]
+                 : t->spread.sum ? imp__fixed_value(&t->spread, k)
+                                 : 0;
+}
+
+/* Adds what the noise of adjoints brings to it; own [n] is the variance that this job brought. */
+static void variance_add(struct imp__totals *t, size_t n, const double *more)
+{
+    for (size_t k = 0; k < n; k++)
+        if (!t->many) t->gradient_variance[k] += more[k];
+        else if (t->spread.sum && more[k] != 0) imp__fixed_add(&t->spread, k, more[k]);
+}
+
 /* The gradient of a target by poses too: adjoints from the pictures of pass 1, and errors from
  * contrasts (moved_adjoint.h). */
 static enum imp_status moved_estimate(struct imp__gradient_job *j,
@@ -61,19 +78,22 @@ static enum imp_status moved_estimate(struct imp__gradient_job *j,
     enum imp_status st = IMP_OK;
     imp_context *ctx = j->problem->ctx;
     const size_t n = j->problem->n;
-    double *before = imp__alloc(ctx, n, sizeof *before);
+    double *before = imp__alloc(ctx, 3 * n, sizeof *before), *own = before + n,
+           *more = own + n;
     if (!before) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for errors"));
-    memcpy(before, j->totals->gradient_variance, n * sizeof *before);
-    IMP_TRY(imp__moved_adjoint_loss(ctx, &j->tracer.sensor->film,
-                                    j->problem->scene->channels, splat, j->plan.R,
-                                    &moved->adjoint));
+    variance_read(j->totals, n, before);
+    IMP_TRY(imp__moved_adjoint_loss(
+        ctx, &j->tracer.sensor->film, j->problem->scene->channels, splat, j->plan.R,
+        j->totals->many ? IMP_CONTRASTS_MANY : IMP_CONTRASTS, &moved->adjoint));
     IMP_TRY(imp__moved_learn(moved, run->spp));
     j->contrasts = imp__alloc(ctx, imp__moved_contrasts(moved), sizeof *j->contrasts);
     if (!j->contrasts) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for errors"));
     memset(j->contrasts, 0, imp__moved_contrasts(moved) * sizeof *j->contrasts);
     IMP_TRY(imp__gradient_job_run(j, run, "gradient", lo, hi, start_s));
-    IMP_TRY(imp__moved_variance(moved, j->tracer.active, j->contrasts, before,
-                                j->totals->gradient_variance));
+    variance_read(j->totals, n, own);
+    for (size_t k = 0; k < n; k++) own[k] -= before[k];
+    IMP_TRY(imp__moved_variance(moved, j->tracer.active, j->contrasts, own, more));
+    variance_add(j->totals, n, more);
 out:
     imp__release(ctx, j->contrasts);
     imp__release(ctx, before);
@@ -84,10 +104,12 @@ static enum imp_status moved_begin(struct imp__gradient_job *j, size_t target,
                                    struct imp__moved_gradient *moved)
 {
     const struct imp_problem *p = j->problem;
-    if (j->totals->many)
-        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                          "losses by poses have gradients of at most %d numbers",
-                          IMP_TALLY_DENSE);
+    if (j->totals->many && p->ctx->team)
+        return imp__error(
+            p->ctx, IMP_E_UNSUPPORTED,
+            "a gradient of a loss by more than %d numbers, some of geometry, "
+            "is computed in one process",
+            IMP_TALLY_DENSE);
     IMP_CHECKED(imp__moved_begin(p, &j->tracer, moved));
     moved->first = imp__moved_first(target);
     if (moved->moves.n > 0) j->moved = moved;

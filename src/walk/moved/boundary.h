@@ -94,6 +94,14 @@ struct imp__flux_end {
     int light; /* emitter, plus 1, whose place or direction it is; 0: none */
 };
 
+/* As imp__mover.shape. */
+static inline int imp__flux_end_shape(const struct imp__flux_end *e)
+{
+    return e->camera  ? IMP_MOVE_CAMERA
+           : e->light ? IMP_MOVE_EMITTER(e->light - 1)
+                      : e->x.shape;
+}
+
 /* What one draw brings to a film position: L times the sum of bar times velocity over its ends. */
 struct imp__flux {
     struct imp__flux *next;

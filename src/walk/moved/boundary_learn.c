@@ -35,10 +35,7 @@ static void groups_add(struct pilot *x, const struct imp__flux *f)
         const struct imp__mover *m = &moves->mover[k];
         for (int i = 0; i < f->n_ends; i++) {
             const struct imp__flux_end *e = &f->end[i];
-            const int shape = e->camera  ? IMP_MOVE_CAMERA
-                              : e->light ? IMP_MOVE_EMITTER(e->light - 1)
-                                         : e->x.shape;
-            if (shape != m->shape) continue;
+            if (imp__flux_end_shape(e) != m->shape) continue;
             imp_v3 turn = imp__cross(e->x.p - m->centre, e->bar.v);
             if (e->x.smooth)
                 turn +=
