@@ -4,8 +4,8 @@
  * errors, units and derivatives; from either end, or from both to compare them. */
 #include "read/read_glare.h"
 #include "read/read_grid.h"
-#include "read/room_page.h"
 #include "read/read_year.h"
+#include "read/room_page.h"
 #include "shared/command.h"
 #include "shared/overwrite.h"
 #include "shared/picture_files.h"
@@ -404,9 +404,8 @@ const struct command command_read = {
     {"read",
      "SCENE",
      "the readings of all sensors, with units, errors and derivatives",
-     {options, options_wants, options_params, options_run, options_limits, options_scene,
-     {options, options_year, options_params, options_run, options_limits, options_scene,
-      options_file, options_general},
+     {options, options_wants, options_year, options_params, options_run, options_limits,
+      options_scene, options_file, options_general},
      1,
      1},
     run_read,

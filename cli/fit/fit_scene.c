@@ -166,7 +166,7 @@ int fit_scene_write(const char *const *large, size_t n)
     if (!rc && cli.luminaires.n)
         cli_say("importon: no %s is written: a scene file has no --luminaire", SCENE);
     else if (!rc && access(cli.scene_path, F_OK) == 0 &&
-        !(rc = output_open(&to, path, OUTPUT_SCENE))) {
+             !(rc = output_open(&to, path, OUTPUT_SCENE))) {
         put_scene(to.file, n > 0);
         rc = output_close(&to, 0);
     }
