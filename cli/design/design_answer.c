@@ -215,10 +215,10 @@ void design_print(const struct design_answer *a)
     const struct imp_design_answer *d = a->answer;
     const int what = (int)a->options->least;
     if (!d->found && !d->proven)
-        printf("no combination was found in %lld branches, and it is not shown that "
+        printf("no combination was found in %lld branch%s, and it is not shown that "
                "there is "
                "none (--nodes)\n",
-               (long long)d->nodes);
+               (long long)d->nodes, d->nodes == 1 ? "" : "es");
     else if (!d->found) print_none(a);
     if (!d->found) return;
     printf("%zu of %zu lamps: %.4g W, %.5g lm", used(a, d->level), d->n_lamps, d->watts,
