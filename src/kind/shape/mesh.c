@@ -130,10 +130,12 @@ static inline struct imp_hit draw(const struct imp_shape *s, const struct imp__m
     const double x = u[0] * s->area, *c = m->cumulative;
     size_t lo;
     double within;
-    if (m->last == 1) { /* the quotient of each triangle does not wait for the choice */
-        lo = !(c[1] > x);
-        const double of_first = x / c[1], of_second = (x - c[1]) / (c[2] - c[1]);
-        within = lo ? of_second : of_first;
+    if (m->last == 1) { /* by masks, since a branch would be a coin toss here, too */
+        const imp_pair_mask first = imp__pair_exceeds(c[1], x);
+        const imp_pair part = imp__pair_choose(first, (imp_pair){x, c[1]},
+                                               (imp_pair){x - c[1], c[2] - c[1]});
+        lo = 1 + (size_t)first[0];
+        within = part[0] / part[1];
     } else {
         lo = cumulative_find(c, m->last + 1, x);
         within = (x - c[lo]) / (c[lo + 1] - c[lo]);

@@ -60,7 +60,7 @@ IMP_STEP_INLINE bool imp__vertex_work(const struct imp_end_ops *end, struct imp_
                                       const struct imp_frame *frame)
 {
     const bool goes_on = imp__vertex_goes_on(end, s, v);
-    imp__step_numbers(s);
+    if (!hit) imp__step_numbers(s); /* else drawn before its ray was traced */
     if (end->densities) end->densities(s, v, at);
     if (!end->meet(s, v, hit, at) || (!end->connects_last && !goes_on)) return false;
     if (end->goes_on) end->goes_on(s, v);
@@ -74,7 +74,9 @@ IMP_STEP_INLINE bool imp__one_step(const struct imp_end_ops *end, struct imp_ste
     struct imp_frame frame;
     struct imp_vertex *v;
 
-    /* Follow the ray to what it meets. */
+    /* Follow the ray to what it meets. Which numbers the vertex there has does not depend on
+     * it: they come from memory meanwhile. */
+    imp__step_numbers(s);
     switch (s->segment->meet(s, &hit)) {
     case IMP_MEETS_SURFACE: v = imp__surface_meet(s, &hit, &at, &frame); break;
     case IMP_MEETS_MEDIUM:

@@ -115,8 +115,9 @@ static inline double imp__step_number(const struct imp_step *s, int use)
 
 static inline void imp__step_numbers(struct imp_step *s)
 {
-    if (s->walk->point.points)
-        s->block = imp__point_block(s->walk->point, imp__block(s->depth));
+    if (!s->walk->point.points) return;
+    s->block = imp__point_block(s->walk->point, imp__block(s->depth));
+    __builtin_prefetch(s->block.lead);
 }
 
 /* What a record stores of v, in double again. */
