@@ -52,6 +52,8 @@ struct item {
 static struct {
     struct item *item;
     size_t n;
+    char **text; /* [n_texts] for the loader */
+    size_t n_texts;
 } catalogue;
 
 static int levels_read(const char *text, double *lo, double *hi)
@@ -175,6 +177,9 @@ static void luminaires_set(void)
         for (size_t i = 0; i < catalogue.n; i++)
             if (catalogue.item[i].file) size += strlen(catalogue.item[i].file) + 1;
         char *text = cli_alloc(size, 1);
+        if (!catalogue.text)
+            catalogue.text = cli_alloc(ITEMS_MAX, sizeof *catalogue.text);
+        catalogue.text[catalogue.n_texts++] = text;
         strcat(strcat(text, name), "=");
         for (size_t i = 0, n = 0; i < catalogue.n; i++)
             if (catalogue.item[i].file && !strcmp(catalogue.item[i].name, name))
@@ -334,6 +339,8 @@ void design_lamps_free(struct design_lamps *l)
         free(catalogue.item[k].name);
         free(catalogue.item[k].file);
     }
+    for (size_t k = 0; k < catalogue.n_texts; k++) free(catalogue.text[k]);
+    free(catalogue.text);
     free(catalogue.item);
     args_list_free(&o.choose);
     args_list_free(&o.watts);
