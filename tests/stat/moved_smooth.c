@@ -266,13 +266,14 @@ int main(int argc, char **argv)
     numbers_test("direct", DIRECT, WHITE, 64, 128, .06, whole);
     numbers_test("path and a sky", PATH SKY, WHITE, 48, 32, .06, sky);
     if (is_long) {
-        numbers_test("path and a sky, all", PATH SKY, WHITE, 512, 1024, .1, whole);
-        numbers_test("path, rough metal", PATH SKY, METAL, 512, 1024, .1, whole);
+        numbers_test("path, all", PATH, WHITE, 512, 1024, .1, whole);
+        numbers_test("path, rough metal", PATH, METAL, 512, 1024, .1, whole);
         numbers_test("path, a scale", PATH, WHITE, 512, 1024, .1, sizes);
     }
     egg_write(false);
     numbers_test("vertices", DIRECT, WHITE, 64, 128, .1, vertices);
     refused("a bulb and an egg that moves", BULB, WHITE, "egg.pose", "'bulb'");
+    refused("an egg that moves under a sky", DIRECT SKY, WHITE, "egg.pose", "sky");
     refused("a bulb that moves", BULB, WHITE, "bulb.position", "'egg'");
     refused("a bulb, an egg, and a camera that moves", BULB, WHITE, "camera.pose", NULL);
     remove(EGG);
