@@ -251,6 +251,8 @@ int main(int argc, char **argv)
                                           {NULL, 0, 0}};
     static const struct number sky[] = {
         {"camera.pose", 0, .02}, {"lamp.pose", 0, .04}, {NULL, 0, 0}};
+    static const struct number metal[] = {
+        {"camera.pose", 5, .01}, {"lamp.pose", 0, .04}, {NULL, 0, 0}};
     static const struct number sizes[] = {
         {"egg.scale", 0, .03}, {"camera.pose", 3, .01}, {NULL, 0, 0}};
     static const struct number vertices[] = {{"egg.vertex_positions", 1, .02},
@@ -265,6 +267,7 @@ int main(int argc, char **argv)
     egg_write(true);
     numbers_test("direct", DIRECT, WHITE, 64, 128, .06, whole);
     numbers_test("path and a sky", PATH SKY, WHITE, 48, 32, .06, sky);
+    numbers_test("path, rough metal at grazing angles", PATH, METAL, 16, 16, .5, metal);
     if (is_long) {
         numbers_test("path, all", PATH, WHITE, 512, 1024, .1, whole);
         numbers_test("path, rough metal", PATH, METAL, 512, 1024, .1, whole);

@@ -7,6 +7,7 @@
 #include "math/rng.h"
 #include "math/warp.h"
 #include "walk/core/vertex.h"
+#include <float.h>
 
 extern const struct imp_bsdf_ops imp__diffuse, imp__twosided, imp__black;
 
@@ -74,7 +75,8 @@ void imp__kernel_derive(const struct imp_vertex *v, const struct imp_surface *at
         imp__surface_grad(at, out->grad);
         textures_derive(v, dirs, out->d_uv);
     }
-    for (int c = 0; c < 4; c++) K[c] = K[c] > 0 ? 1 / K[c] : 0;
+    /* Far away from a narrow lobe values are subnormal, and have no finite inverse. */
+    for (int c = 0; c < 4; c++) K[c] = K[c] >= DBL_MIN ? 1 / K[c] : 0;
     for (int k = 0; k < 3; k++) {
         out->d_wo[k] *= K;
         out->d_wi[k] *= K;
