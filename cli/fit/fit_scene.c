@@ -162,6 +162,7 @@ int fit_scene_write(const char *const *large, size_t n)
     char *path = join_path(cli.out, SCENE);
     struct output to;
     int rc = textures_write(large, n);
+    if (!rc) (void)unlink(path); /* a former one would read what this fit has found */
     /* A scene from standard input is in no file that could be included. */
     if (!rc && cli.luminaires.n)
         cli_say("importon: no %s is written: a scene file has no --luminaire", SCENE);

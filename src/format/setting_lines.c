@@ -46,7 +46,7 @@ static enum imp_status values_read(imp_context *ctx, char *text,
         if (next) *next++ = 0;
         if (imp__value_float(item, &values[(*n)++])) continue;
         if (!from->quotes)
-            return imp__error(ctx, IMP_E_ARG, "expected NAME=VALUE[,VALUE..]");
+            return imp__error(ctx, IMP_E_ARG, "expected ID=VALUE[,VALUE..]");
         return imp__error(ctx, IMP_E_ARG, "'%.60s' is not a number", item);
     }
     return IMP_OK;

@@ -141,6 +141,21 @@ static void setting_read(struct xml_file *f, const char *filename, struct imp_se
     imp__bytes_free(r->ctx, &text);
 }
 
+/* Lists of attributes are split at blanks and commas, those of settings at commas. In place. */
+static void list_join(char *text)
+{
+    char *to = text;
+    for (const char *from = text; *from; from++) {
+        const bool blank = strchr(" \t\r\n", *from) != NULL;
+        const bool more = strspn(from, " \t\r\n,") < strlen(from);
+        if (!blank) *to++ = *from;
+        else if (to > text && to[-1] != ',' && more &&
+                 from[strspn(from, " \t\r\n")] != ',')
+            *to++ = ',';
+    }
+    *to = 0;
+}
+
 static void setting_make(struct xml_file *f, const char *name, const char *value,
                          struct imp_setting *s)
 {
@@ -155,9 +170,10 @@ static void setting_make(struct xml_file *f, const char *name, const char *value
     if (strpbrk(name, "=\n#"))
         imp__xml_fail(f, IMP_E_SCENE, "'%.80s' is no name of a parameter", name);
     snprintf(text, n, "%s=%s", name, value);
+    list_join(text + strlen(name) + 1);
     snprintf(place, m, "%s:%d:%d", at.file, at.line, at.column);
     *s = (struct imp_setting){
-        .text = text, .length = n - 1, .place = place, .in_scene = true};
+        .text = text, .length = strlen(text), .place = place, .in_scene = true};
 }
 
 /* NAME="VALUE", or all lines of a file: kept until the scene is made. */

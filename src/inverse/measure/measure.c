@@ -335,6 +335,7 @@ static void measure_end(struct imp__measure *m)
     imp__release(m->ctx, m->rows);
     imp__release(m->ctx, m->stage);
     imp__release(m->ctx, m->held);
+    imp__release(m->ctx, m->holds);
     imp__release(m->ctx, m->at);
     imp__release(m->ctx, m->at_se);
 }

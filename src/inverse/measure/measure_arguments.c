@@ -53,6 +53,25 @@ static enum imp_status patterns_check(struct imp__measure *m, const char *name,
     return IMP_OK;
 }
 
+/* Each of `hold` is an item, or several with commas between them. */
+static enum imp_status holds_take(struct imp__measure *m)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < m->o.n_hold; i++) {
+        n++;
+        for (const char *c = m->o.hold[i]; *c; c++) n += *c == ',';
+    }
+    if (n > 0 && !(m->holds = imp__alloc(m->ctx, n, sizeof *m->holds)))
+        return imp__error(m->ctx, IMP_E_NOMEM, "no memory for %zu names", n);
+    for (size_t i = 0; i < m->o.n_hold; i++)
+        for (const char *from = m->o.hold[i];; from += strcspn(from, ",") + 1) {
+            const size_t length = strcspn(from, ",");
+            IMP_CHECKED(imp__held_read(m->ctx, from, length, &m->holds[m->n_holds++]));
+            if (!from[length]) break;
+        }
+    return IMP_OK;
+}
+
 enum imp_status imp__measure_options_take(struct imp__measure *m,
                                           const struct imp_measure_options *options)
 {
@@ -69,6 +88,7 @@ enum imp_status imp__measure_options_take(struct imp__measure *m,
     if (m->o.mask == 0) m->o.mask = MASK;
     IMP_CHECKED(patterns_check(m, "params", m->o.params, m->o.n_params));
     IMP_CHECKED(patterns_check(m, "hold", m->o.hold, m->o.n_hold));
+    IMP_CHECKED(holds_take(m));
     for (int s = 0; s < IMP_MEASURE_STAGES; s++) m->wanted[s] = !m->o.stages;
     return m->o.stages ? stages_take(m) : IMP_OK;
 }

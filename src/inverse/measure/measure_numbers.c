@@ -34,11 +34,13 @@ static bool is_meant(const char *const *list, size_t n, const char *name)
     return false;
 }
 
-/* Item i of `hold`: a name or a pattern, and perhaps indices. */
-static enum imp_status held_item(const struct imp__measure *m, size_t i,
-                                 struct imp__held *item)
+/* Is there geometry in the scene that a name or pattern means, parameter or not? */
+static bool is_there(const struct imp__measure *m, const char *glob)
 {
-    return imp__held_read(m->ctx, m->o.hold[i], strlen(m->o.hold[i]), item);
+    struct imp_geometry_walk at = {0};
+    while (imp__geometry_next(m->scene, &at))
+        if (is_meant(&glob, 1, at.name)) return true;
+    return false;
 }
 
 /* A number of a photograph's camera becomes a parameter, or there is a line that says why not. */
@@ -49,11 +51,9 @@ static enum imp_status camera_add(struct imp__measure *m, const struct imp__phot
     snprintf(name, sizeof name, "%.300s.%s", p->sensor->name, number);
     const bool named = is_meant(m->o.params, m->o.n_params, name);
     if (m->o.params ? !named : !wanted_anyway) return IMP_OK;
-    for (size_t i = 0; i < m->o.n_hold; i++) {
-        struct imp__held item;
-        const char *glob = item.glob;
-        IMP_CHECKED(held_item(m, i, &item));
-        if (item.last == SIZE_MAX && is_meant(&glob, 1, name)) return IMP_OK;
+    for (size_t i = 0; i < m->n_holds; i++) {
+        const char *glob = m->holds[i].glob;
+        if (m->holds[i].last == SIZE_MAX && is_meant(&glob, 1, name)) return IMP_OK;
     }
     const enum imp_status st = imp_scene_add_geometry(m->scene, name);
     if (st != IMP_E_UNSUPPORTED || named) return st;
@@ -139,25 +139,24 @@ static enum imp_status params_mean_something(const struct imp__measure *m)
 static enum imp_status holds_apply(struct imp__measure *m)
 {
     const struct imp_scene *s = m->scene;
-    for (size_t i = 0; i < m->o.n_hold; i++) {
-        struct imp__held item;
+    for (size_t i = 0; i < m->n_holds; i++) {
+        const struct imp__held *item = &m->holds[i];
         bool met = false;
-        IMP_CHECKED(held_item(m, i, &item));
         for (size_t k = 0; k < s->n_params; k++) {
-            if (!names(m, item.glob, k)) continue;
+            if (!names(m, item->glob, k)) continue;
             met = true;
-            if (item.last == SIZE_MAX) {
+            if (item->last == SIZE_MAX) {
                 m->stage[k] = IMP_MEASURE_STAGES;
                 continue;
             }
             if (!m->held) m->held = imp__alloc(m->ctx, s->n_theta + 1, 1);
             if (!m->held)
                 return imp__error(m->ctx, IMP_E_NOMEM, "no memory for held numbers");
-            IMP_CHECKED(imp__held_mark(m->ctx, &item, &s->params[k].info, m->held));
+            IMP_CHECKED(imp__held_mark(m->ctx, item, &s->params[k].info, m->held));
         }
-        if (!met && !is_geometry(item.glob))
+        if (!met && !is_there(m, item->glob))
             return imp__error(m->ctx, IMP_E_ARG, "hold '%s': there is no such parameter",
-                              item.glob);
+                              item->glob);
     }
     return IMP_OK;
 }

@@ -38,12 +38,14 @@ struct imp__measure {
     size_t n_photos;
     struct imp__photo *photos;
     bool wanted[IMP_MEASURE_STAGES];
-    uint8_t *stage;  /* [n_params] of which stage it is; IMP_MEASURE_STAGES: held */
-    uint8_t *held;   /* [n_theta] single numbers that stay; NULL: none */
-    double *at;      /* [n_theta] where its own stage has left each number */
-    double *at_se;   /* [n_theta] and its standard error there; 0: none */
-    uint64_t task;   /* hash of scene, photographs and options */
-    int round, next; /* the round, from 1, and the stage that comes next */
+    uint8_t *stage; /* [n_params] of which stage it is; IMP_MEASURE_STAGES: held */
+    size_t n_holds;
+    struct imp__held *holds;      /* [n_holds] the items of o.hold */
+    uint8_t *held;                /* [n_theta] single numbers that stay; NULL: none */
+    double *at;                   /* [n_theta] where its own stage has left each number */
+    double *at_se;                /* [n_theta] and its standard error there; 0: none */
+    uint64_t task;                /* hash of scene, photographs and options */
+    int round, next;              /* the round, from 1, and the stage that comes next */
     bool due[IMP_MEASURE_STAGES]; /* in this round */
     size_t n_rows, cap_rows;
     struct imp_measure_row *rows;

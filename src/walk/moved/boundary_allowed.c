@@ -31,20 +31,6 @@ static enum imp_status facets_allowed(const struct imp__boundary *b)
     return IMP_OK;
 }
 
-/* A mesh with vertex normals that moves under a sky: differences find derivatives by a rotation that
- * are 14 % larger than ours, for a reason that is not known. */
-static enum imp_status skies_allowed(const struct imp__boundary *b)
-{
-    const struct imp_scene *scene = b->tracer->scene;
-    for (int k = 0; k < scene->n_shapes && scene->n_environments > 0; k++)
-        if (imp__moves_smooth(scene, k) && imp__moves_shape(b->moves, k, NULL))
-            return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                              "derivatives by what moves: shape '%s', which has vertex "
-                              "normals, moves under a sky (face_normals makes it flat)",
-                              scene->shapes[k]->name);
-    return IMP_OK;
-}
-
 static enum imp_status edges_allowed(const struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
@@ -109,7 +95,6 @@ enum imp_status imp__boundary_allowed(const struct imp__boundary *b)
 {
     enum imp_status st = edges_allowed(b);
     if (st == IMP_OK) st = facets_allowed(b);
-    if (st == IMP_OK) st = skies_allowed(b);
     if (st == IMP_OK) st = camera_allowed(b);
     return st;
 }

@@ -4,7 +4,8 @@ importon render "$SCENES/still.xml" -m mono -q -s 0 --seed 9 --spp 64 -o left.pf
 python3 "$ROOT/tests/cli/measure/camera.py" left.pfm left.ppm 2.2 0.01 1
 measure() {
     importon measure "$SCENES/still.xml" left.ppm -m mono --stages cameras --hold '*.exposure.*' --hold 'sky.*' --spp 4 -n 2 --rounds 1 \
-        --no-masks --noise .0104 "$@" 2>&1 | sed -n 's/^\(left.pose.[3-5].\) .*  held$/\1 held/p; /no number/p'
+        --no-masks --noise .0104 "$@" 2>&1 | sed -n 's/^\(left.pose.[3-5].\) .*  held$/\1 held/p; /no number/p; /no such/p'
 }
 measure --hold 'left.pose[3-5]'
 measure --hold '*.pose[3-6]'
+measure --hold 'sky.*,lfet.pose' 2>&1
