@@ -2,6 +2,7 @@
  *
  * importon read: the numbers of a scene's sensors, means over their films, with standard
  * errors, units and derivatives; from either end, or from both to compare them. */
+#include "read/read_dgp.h"
 #include "read/read_glare.h"
 #include "read/read_grid.h"
 #include "read/read_year.h"
@@ -336,6 +337,13 @@ static int run_read(int n, char **operand)
                          "--ugr goes without --shares, --grid, --ends and --param");
     if (o.ugr && !sensor_named())
         return cli_error(EXIT_USAGE, "--ugr is of one grid: choose it with --sensor");
+    if (dgp_wanted.on && (o.ugr || year || o.shares || o.grid || o.ends || cli.from ||
+                          problem_options.params.n))
+        return cli_error(EXIT_USAGE,
+                         "--dgp goes without --ugr, --year, --shares, --grid, --ends, "
+                         "--from and --param");
+    if (dgp_wanted.on && !sensor_named())
+        return cli_error(EXIT_USAGE, "--dgp is of one grid: choose it with --sensor");
     if (o.report && !o.grid)
         return cli_error(EXIT_USAGE, "--report is of grids: it goes with --grid");
     if (wants_given() && !o.report)
@@ -360,7 +368,10 @@ static int run_read(int n, char **operand)
     if (cli.json) {
         j = cli_json();
         json_integer(&j, "spp", cli_spp(&run));
-        json_array(&j, o.grid ? "grids" : o.ugr ? "glare" : year ? "years" : "readings");
+        json_array(&j, o.grid                   ? "grids"
+                       : o.ugr || dgp_wanted.on ? "glare"
+                       : year                   ? "years"
+                                                : "readings");
     }
     const int one = sensor_named(), first = one ? cli.sensor : 0;
     const int end = one ? first + 1 : scene.n_sensors;
@@ -379,11 +390,16 @@ static int run_read(int n, char **operand)
         run.sensor = first;
         rc = glare_read(&j, &run);
     }
+    if (dgp_wanted.on && !rc) {
+        run.sensor = first;
+        rc = dgp_read(&j, &run);
+    }
     if (year && !rc) {
         run.sensor = first;
         rc = year_read(&j, &run, o.csv, o.svg);
     }
-    for (int s = first; s < end && !rc && !o.grid && !o.ugr && !year; s++) {
+    const bool others = o.grid || o.ugr || dgp_wanted.on || year;
+    for (int s = first; s < end && !rc && !others; s++) {
         run.sensor = s;
         found.lit = 0;
         rc = o.shares ? shares_read(&j, &run, &found)
@@ -404,8 +420,8 @@ const struct command command_read = {
     {"read",
      "SCENE",
      "the readings of all sensors, with units, errors and derivatives",
-     {options, options_wants, options_year, options_params, options_run, options_limits,
-      options_scene, options_file, options_general},
+     {options, options_dgp, options_wants, options_year, options_params, options_run,
+      options_limits, options_scene, options_file, options_general},
      1,
      1},
     run_read,

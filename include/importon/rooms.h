@@ -132,6 +132,62 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_ugr(imp_context *context, double back
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_grid_glare(imp_scene *scene, const struct imp_run *run, double *ugr, double *se);
 
+/** Position index below the line of sight (Iwata and Tokura 1997): 1 + .8 r for r = tan b up to .6,
+ * 1 + 1.2 r beyond, with r at most 3.
+ * @param b degrees between the source and the line of sight, in [0, 90].
+ * @return at least 1; NAN for angles out of their range. */
+IMP_API double imp_iwata_position(double b);
+
+/** Daylight glare probability (Wienold and Christoffersen 2006):
+ *     5.87e-5 E + .0918 log10(1 + sum L^2 w/(E^1.87 p^2)) + .16
+ * which was found for E of 380 lx or more and for .2 to .8. Other values are given as the formula
+ * has them, above 1, too.
+ * @param illuminance E, lx, vertical at the eye; above 0 if there is a source, else at least 0.
+ * @param source [n] none negative; may be NULL where n is 0.
+ * @param[out] dgp [1]
+ * @return IMP_OK; IMP_E_ARG. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_dgp(imp_context *context, double illuminance,
+                                               size_t n,
+                                               const struct imp_glare_source *source,
+                                               double *dgp);
+
+struct imp_dgp_options {
+    size_t size;
+    double threshold; /**< luminance from which a part of the view is a source: up to 100
+                           a multiple of the mean luminance of the view, above that
+                           cd/m^2; 0: 5 */
+    int cells; /**< the view, half of all directions, has cells x cells parts of equal
+                    solid angle; a multiple of 4, 8 to 512; 0: 64 */
+};
+#define IMP_DGP_OPTIONS_INIT IMP_INIT_ZERO(struct imp_dgp_options)
+
+/**
+ * The daylight glare probability at every point of a grid of vertical illuminances: an
+ * irradiancemeter as for imp_grid_glare, `at` points. Sources are the cells of the view whose
+ * luminance is above the threshold, each with its own position index (Guth's above the line of
+ * sight and at most 16, Iwata's below); E is the grid's reading. All comes from the walks of
+ * the meter, by the directions in which they leave the eye; in 16 groups, so that squares of
+ * luminances are products of independent ones. Cells across the edge of a source are made up for
+ * by those of twice their side (Richardson); the light of a source smaller than a cell stays
+ * spread over the cell.
+ * @param run     its sensor, seed and spp, which is at least 16 walks for each cell; NULL for
+ *                defaults. Walks are those from the sensor.
+ * @param options NULL for defaults.
+ * @param[out] dgp         [height][width] of the crop window.
+ * @param[out] se          [height][width], one standard error each, with 15 degrees of freedom
+ *                         (jackknife over the groups); may be NULL.
+ * @param[out] illuminance [height][width], E, lx; may be NULL.
+ * @return IMP_OK; IMP_E_ARG for another sensor or options out of their range;
+ *         IMP_E_UNSUPPORTED for spectral modes, media, graded indices, hidden emitters and
+ *         integrators whose walks do not begin at the sensor; IMP_CANCELLED; IMP_E_PATHS;
+ *         IMP_E_NOMEM.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status imp_grid_dgp(imp_scene *scene,
+                                                    const struct imp_run *run,
+                                                    const struct imp_dgp_options *options,
+                                                    double *dgp, double *se,
+                                                    double *illuminance);
+
 /* ---- Daylight of a year --------------------------------------------------------------- */
 
 /** The weather of an hour. */

@@ -218,3 +218,48 @@ def glare(scene: Scene, sensor: Any = 0, *, params: Any = None, seed: int = 0, s
     call(scene, params, options, progress, lib.imp_grid_glare, scene.pointer, ctypes.byref(options), address(ugr),
           address(se))
     return ugr, se
+
+
+def daylight_glare(scene: Scene, sensor: Any = 0, *, threshold: float = 5, cells: int = 64, params: Any = None,
+                   seed: int = 0, spp: int = 0, points: str = "scene", progress: Any = None) -> tuple[Any, Any, Any]:
+    """The daylight glare probability (Wienold and Christoffersen 2006) of the observers of a grid.
+
+    Parameters
+    ----------
+    scene : Scene
+    sensor : int or str
+        An irradiancemeter with a virtual, horizontal rectangle, `at` points, and a horizontal `facing`, the line of sight.
+    threshold : float
+        Luminance from which a part of the view is a source of glare: up to 100 a multiple of the mean luminance of the
+        view, above that cd/m^2.
+    cells : int
+        The view has cells x cells parts of equal solid angle, with at least 16 walks for each.
+    params, seed, spp, points, progress
+        As `render`'s.
+
+    Returns
+    -------
+    numpy.ndarray, numpy.ndarray, numpy.ndarray
+        [height][width]; one standard error each; the vertical illuminance at the eye, lx.
+
+    Examples
+    --------
+    >>> scene = importon.load_string('''<scene version="3.0.0"><integrator type="path"/><emitter type="constant"/>
+    ... <shape type="rectangle"><sensor type="irradiancemeter"><boolean name="virtual" value="true"/>
+    ... <string name="at" value="points"/><vector name="facing" x="1" y="0" z="0"/>
+    ... <film type="hdrfilm"><integer name="width" value="1"/><integer name="height" value="1"/></film></sensor></shape>
+    ... </scene>''', mode="mono")
+    >>> dgp, se, lx = importon.daylight_glare(scene, cells=8)
+    >>> bool(abs(dgp[0, 0] - .16018) < 1e-4 and abs(lx[0, 0] - 3.1416) < .1)
+    True
+    """
+    scene = check_scene(scene)
+    number = scene.sensor_index(sensor)
+    s = scene.sensors[number]
+    found = np.zeros((3, s.height, s.width))
+    o = make(_c.imp_dgp_options)
+    o.threshold, o.cells = threshold, cells
+    options = run_options(scene, sensor=number, seed=seed, spp=spp, points=points, walks_from="scene")
+    call(scene, params, options, progress, lib.imp_grid_dgp, scene.pointer, ctypes.byref(options), ctypes.byref(o),
+          address(found[0]), address(found[1]), address(found[2]))
+    return found[0], found[1], found[2]

@@ -143,7 +143,9 @@ WITHOUT = {
     "imp_report_data": "the same",
     "imp_problem_shares": "of one pixel, for pages of walks: importon report --scene; render_backward has its gradient",
     "imp_ugr": "a formula of one line; glare has it of scenes",
+    "imp_dgp": "the same, daylight_glare",
     "imp_guth_position": "the same",
+    "imp_iwata_position": "the same",
     "imp_problem_get_fit_variable": "one number of a fit: Fit has arrays; numbers beyond 1,024 have no errors",
 }
 

@@ -40,6 +40,34 @@ static void formula(void)
            "no background, a negative luminance");
 }
 
+/* Luminous disks across the ray from the eye, worked by hand with the position indices of CIE 117's
+ * table: above the line of sight by H, at distance R along it. */
+static void disks(void)
+{
+    static const struct {
+        double H, R, area, luminance; /* m, m^2, cd/m^2 */
+        size_t n;                     /* so many, one like the other */
+        double background, ugr;
+    } rows[] = {
+        /* H/R = .2, p = 1.53; w = .04/16.64: .25/40 x 15000^2 x .0024038/2.3409 = 1444.1 */
+        {.8, 4, .04, 15000, 1, 40, 25.28},
+        /* .5, 2.86; .1/20: .25/25 x 4 x 6000^2 x .005/8.1796 = 880.2 */
+        {2, 4, .1, 6000, 4, 25, 23.56},
+        /* .3, 1.90; .3/27.25: .25/60 x 6 x 3000^2 x .011009/3.61 = 686.2 */
+        {1.5, 5, .3, 3000, 6, 60, 22.69}};
+    for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
+        struct imp_glare_source s[6];
+        double ugr;
+        for (size_t i = 0; i < rows[k].n; i++)
+            s[i] = (struct imp_glare_source){
+                rows[k].luminance,
+                rows[k].area / (rows[k].R * rows[k].R + rows[k].H * rows[k].H),
+                imp_guth_position(0, atan(rows[k].H / rows[k].R) * 180 / M_PI)};
+        test_must(ctx, imp_ugr(ctx, rows[k].background, rows[k].n, s, &ugr));
+        tap_near(ugr, rows[k].ugr, .2, 0, "disks by hand");
+    }
+}
+
 #define LAMP(name, y, more)                                                              \
     "<emitter type='ies' id='" name "'><string name='filename' value='" IMP_SCENES       \
     "/lamps/opal.ldt'/>" more "<transform name='to_world'><rotate x='1' angle='180'/>"   \
@@ -131,6 +159,7 @@ int main(void)
     ctx = test_context(0);
     positions();
     formula();
+    disks();
     scenes();
     refused();
     imp_context_destroy(ctx);

@@ -167,6 +167,8 @@ NOT_OK = {
     "imp_grid_points": "its sensor is a camera",
     "imp_scene_get_luminaire": "the scene has no luminaire",
     "imp_grid_glare": "its sensor is a camera",
+    "imp_grid_dgp": "the same",
+    "imp_dgp": "its sources are zeros",
     "imp_annual_read": "its sensor is a camera",
     "imp_weather_read": "there is no such file",
     "imp_ugr": "its sources are zeros",
@@ -175,7 +177,7 @@ NOT_OK = {
 try: C.CDLL("libOpenImageDenoise.so.2")
 except OSError: NOT_OK["imp_denoise"] = NOT_OK["imp_denoiser_check"] = "there is no Open Image Denoise"
 # Pointers that may be NULL, by name, or by function and name.
-NULLABLE = {"imp_report_page.length", "imp_scene_set_text.name", "imp_problem_shares.walk_share", "imp_grid_read.sets", "imp_grid_glare.se", "imp_weather_read.hour", "imp_annual_read.point", "imp_annual_read.summary", "imp_annual_read.reading", "imp_annual_read.se", "imp_grid_summarise.average", "imp_reading_shares.share", "imp_reading_shares.reading", "imp_render_until.end", "imp_problem_until.end", "imp_problem_until.adjoint",
+NULLABLE = {"imp_report_page.length", "imp_scene_set_text.name", "imp_problem_shares.walk_share", "imp_grid_read.sets", "imp_grid_glare.se", "imp_grid_dgp.se", "imp_grid_dgp.illuminance", "imp_weather_read.hour", "imp_annual_read.point", "imp_annual_read.summary", "imp_annual_read.reading", "imp_annual_read.se", "imp_grid_summarise.average", "imp_reading_shares.share", "imp_reading_shares.reading", "imp_render_until.end", "imp_problem_until.end", "imp_problem_until.adjoint",
             "imp_problem_until.value", "imp_problem_until.gradient", "imp_report_data.length", "options", "run", "stats", "id", "objective", "gradient_se", "primal", "normals", "uvs",
             "axis", "hessian", "taps", "tap_bars", "tap_dots", "power", "bundle", "exit", "targets",
             "error", "order", "memory",
@@ -408,7 +410,7 @@ class Fixture:
         if a.name == "dims": return C.addressof(self.array(C.c_size_t, 1, [1])), None
         if not a.pointer:
             scalars = {"fallback": 1., "fraction": 1., "seed": 1, "flags": 0, "size": 64 if function == "imp_scene_geometry_name" else 8, "width": 4, "height": 4, "channels": 3, "length": len(self.good(xml, function)[0]) if "load_string" in function else len(PARAM) + 4 if "set_text" in function else 0, "weight": 1., "order": 1,
-                       "index": 1.5 if a.ctype is C.c_double else 0, "cells": 1., "um": .5, "k": 1., "background": 1., "confidence": .9, "a": 1., "b": 1.,
+                       "index": 1.5 if a.ctype is C.c_double else 0, "cells": 1., "um": .5, "k": 1., "illuminance": 1.0, "background": 1., "confidence": .9, "a": 1., "b": 1.,
                        "radius": 2., "rounds": 1, "bytes": 1 << 20, "hi": 3., "lo": 1., "value": 1.5 if a.ctype is C.c_double else 1,
                        "n_vertices": 3, "n_lamps": 1, "n_wants": 1, "n_triangles": 1, "layers": 1, "nx": 1, "ny": 1, "nz": 1, "a": 1., "pilots": 2, "n_groups": 1, "low": .1, "high": .9,
                        "n": {"imp_scene_set_values": 1, "imp_scene_spectrum": 2, "imp_problem_nlopt": 3}.get(function, 1)}

@@ -1,0 +1,96 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Daylight glare probability of a view whose luminances are noisy.
+ *
+ * The square of a noisy luminance is too large by its variance. Of groups a and b of walks, which
+ * are independent, the product L_a L_b is without that bias; and whether the cell is a source is
+ * told by the mean of the other groups, since a cell chosen for a large L_a would have a product
+ * that is too large. The sum takes all pairs. Its error is the jackknife's: all of it again
+ * without each group.
+ *
+ * A cell that the edge of a source crosses has less L^2 than there is in it. What is missing is
+ * in proportion to the sides of the cells, so that twice the sum over small cells less that
+ * over those of twice their side is without it (Richardson). */
+#include "dgp.h"
+#include <math.h>
+#include <string.h>
+
+enum { ALL = -1, GROUPS = IMP__VIEW_GROUPS };
+
+/* Mean over the pairs of groups but `without` of L_a L_b, counted where the others are above the
+ * threshold. */
+static double square_of(const double L[GROUPS], int without, double threshold)
+{
+    double sum = 0, squares = 0, first = 0, second = 0;
+    for (int g = 0; g < GROUPS; g++) {
+        const double x = g == without ? 0 : L[g];
+        sum += x;
+        squares += x * x;
+        second = x > first ? first : fmax(second, x);
+        first = fmax(first, x);
+    }
+    const int n = without == ALL ? GROUPS : GROUPS - 1;
+    const double pairs = (double)(n * (n - 1)), bound = threshold * (n - 2);
+    if (!(sum > bound)) return 0;
+    if (sum - first - second > bound) return (sum * sum - squares) / pairs;
+    double found = 0;
+    for (int a = 0; a < GROUPS; a++)
+        for (int b = 0; b < a; b++)
+            if (a != without && b != without && sum - L[a] - L[b] > bound)
+                found += 2 * L[a] * L[b];
+    return found / pairs;
+}
+
+/* Sum of L^2 w/p^2 over the sources. */
+static double sum_of(const struct imp__view *v, double (*L)[GROUPS], int without,
+                     double threshold)
+{
+    double sum = 0;
+    for (size_t c = 0; c < v->n; c++)
+        sum += v->weight[c] * square_of(L[c], without, threshold);
+    return sum;
+}
+
+/* The number without a group, from luminances. E, total [GROUPS]: illuminance; sum of the cells'
+ * luminances. */
+static double number_of(const struct imp__view view[2], double (*L)[GROUPS],
+                        const double *total, const double *E, int without,
+                        double threshold, double *illuminance)
+{
+    const int n = without == ALL ? GROUPS : GROUPS - 1;
+    double light = 0, mean = 0;
+    for (int g = 0; g < GROUPS; g++)
+        if (g != without) light += E[g] / n, mean += total[g] / n;
+    if (threshold <= 100) threshold *= mean / (double)view->n;
+    const double fine = sum_of(&view[0], L, without, threshold);
+    const double coarse = sum_of(&view[1], L + view->n, without, threshold);
+    *illuminance = light;
+    return imp__dgp_of(light, fmax(2 * fine - coarse, 0));
+}
+
+void imp__dgp_rate(const struct imp__view view[2], double (*light)[GROUPS],
+                   double threshold, double *dgp, double *se, double *illuminance)
+{
+    const int side = view->side, half = view[1].side;
+    double(*merged)[GROUPS] = light + view->n;
+    double E[GROUPS] = {0}, total[GROUPS] = {0}, left[GROUPS], mean = 0, square = 0, lx;
+    memset(merged, 0, view[1].n * sizeof *merged);
+    for (int c = 0; c < (int)view->n; c++) {
+        const int at = c / side / 2 * half + c % side / 2;
+        const double k = 1 / (view[0].size * view[0].cosine[c]);
+        const double m = 1 / (view[1].size * view[1].cosine[at]);
+        for (int g = 0; g < GROUPS; g++) {
+            E[g] += light[c][g];
+            merged[at][g] += light[c][g] * m;
+            light[c][g] *= k;
+            total[g] += light[c][g];
+        }
+    }
+    *dgp = number_of(view, light, total, E, ALL, threshold, illuminance);
+    for (int g = 0; g < GROUPS; g++) {
+        left[g] = number_of(view, light, total, E, g, threshold, &lx);
+        mean += left[g] / GROUPS;
+    }
+    for (int g = 0; g < GROUPS; g++) square += (left[g] - mean) * (left[g] - mean);
+    *se = sqrt(square * (GROUPS - 1) / GROUPS);
+}
