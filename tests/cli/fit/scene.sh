@@ -21,7 +21,7 @@ echo '<scene version="3.0.0"><set filename="secret"/></scene>' >wrong.xml
 echo password >secret
 importon info wrong.xml
 echo "<scene version='3.0.0'><include filename='$ROOT/scenes/cornell.xml'/><set name='red.reflectance.value' value=' .4 .1, .2 '/></scene>" >lists.xml
-importon info lists.xml --dump | grep -A4 '^red.reflectance\|"red.reflectance'
+importon info lists.xml --dump | grep '^red.reflectance\|"red.reflectance'
 for set in 'name="a"' 'value="1"' 'name="a" value="1" filename="secret"' 'name="a=b" value="1"' 'filename="nowhere"'; do
     echo "<scene version='3.0.0'><set $set/></scene>" >wrong.xml
     importon info wrong.xml
