@@ -173,12 +173,13 @@ int cli_open(void)
 
 int cli_writes(void) { return ranks_first() && !cli.verifies; }
 
-/* Cut "a;b;c" into a list; the text lives as long as the process. */
-static void split_search(const char *paths, struct arg_list *list)
+/* Cut "a;b;c" into a list, of a text that is returned: to be freed after the list. */
+static char *split_search(const char *paths, struct arg_list *list)
 {
     char *copy = cli_strdup(paths), *save = NULL;
     for (char *p = strtok_r(copy, ";", &save); p; p = strtok_r(NULL, ";", &save))
         args_list_add(list, p);
+    return copy;
 }
 
 /* The parameters as --set takes them. Long ones are cut short; not in JSON. */
@@ -254,7 +255,7 @@ int cli_load(const char *path)
     options.weights = cli.weights;
     options.bins = cli.bins;
     options.lenient = (enum imp_lenience)cli.lenient;
-    if (cli.search) split_search(cli.search, &search);
+    char *folders = cli.search ? split_search(cli.search, &search) : NULL;
     options.search = search.item;
     options.n_search = search.n;
     if (!strcmp(path, "-")) {
@@ -271,6 +272,7 @@ int cli_load(const char *path)
         st = imp_scene_load(cli.context, path, &options, &cli.scene);
     }
     args_list_free(&search);
+    free(folders);
     if (st != IMP_OK) {
         rc = cli_fail(st, NULL);
         return st == IMP_E_IO ? EXIT_USAGE : rc;
