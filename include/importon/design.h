@@ -23,7 +23,7 @@ struct imp_design_lamp {
     /** At most one lamp of a place is used; NULL: it has a place of its own. */
     const char *place;
     bool needed;  /**< one lamp of its place is used */
-    double watts; /**< at level 1; 0: by its photometric file, times its dimming */
+    double watts; /**< at level 1; 0: by its photometric file, times its present level */
     double cost;  /**< of using it, at any level */
     /** Levels when it is used, 0 < least <= most <= 1; 0: .1 and 1. Equal ones: on or off. */
     double least, most;

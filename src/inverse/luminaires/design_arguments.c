@@ -58,7 +58,7 @@ static void photometry_take(struct imp__design_model *m, size_t i)
         if (imp_scene_get_luminaire(m->scene, k, &info) != IMP_OK ||
             strcmp(info.name, m->lamp[i].lamp) != 0)
             continue;
-        if (m->watts[i] == 0) m->watts[i] = info.watts * info.dimming;
+        if (m->watts[i] == 0) m->watts[i] = info.power;
         m->flux[i] = info.flux;
     }
 }
