@@ -96,8 +96,8 @@ static int wants_put(FILE *f, const struct room_page *p, struct imp_run run, boo
         struct imp_interval_estimate e = {0, 0, 0};
         const int rc = value_find(p, w, run, &e);
         if (rc) return rc;
-        const bool sure = upper ? e.hi <= w->value : e.lo >= w->value,
-                   never = upper ? e.lo > w->value : e.hi < w->value;
+        const bool sure = imp_design_enough(w->of, upper ? e.hi : e.lo, w->value),
+                   never = !imp_design_enough(w->of, upper ? e.lo : e.hi, w->value);
         *met &= sure;
         fprintf(f, "<tr><td>");
         text_put(f, want_sensor(w));

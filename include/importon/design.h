@@ -112,6 +112,16 @@ struct imp_design_answer {
     const double *other_level;     /**< [n_others][n_lamps] */
 };
 
+/** Is `value` on the right side of what is wanted? A bound that is met exactly holds; rounding is
+ * up to a part of 1e-6. */
+static inline bool imp_design_enough(enum imp_design_want_of of, double value,
+                                     double wanted)
+{
+    const double rounding = 1e-6 * (wanted < 0 ? -wanted : wanted);
+    return of == IMP_WANT_MAXIMUM || of == IMP_WANT_UGR ? value <= wanted + rounding
+                                                        : value >= wanted - rounding;
+}
+
 typedef struct imp_design imp_design;
 
 /**

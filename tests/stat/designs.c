@@ -225,6 +225,12 @@ static void test_none(void)
            "what cannot be had # average %.5g of at most %.5g; below the maximum %.5g",
            alone, full, with);
     imp_design_destroy(d);
+    tap_ok(imp_design_enough(IMP_WANT_UNIFORMITY, 0.81 * (1 - 1e-8), 0.81) &&
+               !imp_design_enough(IMP_WANT_UNIFORMITY, 0.8099, 0.81) &&
+               imp_design_enough(IMP_WANT_UGR, 19 * (1 + 1e-8), 19) &&
+               !imp_design_enough(IMP_WANT_UGR, 19.001, 19) &&
+               !imp_design_enough(IMP_WANT_AVERAGE, NAN, 1),
+           "a bound that is met exactly holds");
     /* The best that can be had does not depend on what was asked for. */
     double worst = 0;
     for (int k = 0; k < 4; k++) {

@@ -166,7 +166,7 @@ enum imp_status imp__design_attainable(struct imp__design_model *m,
         IMP_CHECKED(best_of(m, k, &finding[k].alone));
         finding[k].value = finding[k].sure = finding[k].alone;
         finding[k].holds =
-            imp__design_enough(m->want[k].of, finding[k].alone, m->want[k].value);
+            imp_design_enough(m->want[k].of, finding[k].alone, m->want[k].value);
     }
     rows_reset(m);
     return IMP_OK;
