@@ -141,7 +141,9 @@ static void print_luminaires(struct json *j)
             json_number(j, "flux", l.flux);
             if (l.lamp_flux > 0) json_number(j, "lamp_flux", l.lamp_flux);
             if (l.watts > 0) json_number(j, "watts", l.watts);
+            if (l.watts > 0) json_number(j, "power", l.power);
             if (l.watts > 0) json_number(j, "efficacy", l.efficacy);
+            json_number(j, "level", l.level);
             json_number(j, "dimming", l.dimming);
             json_number(j, "maintenance", l.maintenance);
             json_bool(j, "point", l.is_point);
@@ -151,8 +153,9 @@ static void print_luminaires(struct json *j)
             continue;
         }
         printf("luminaire: %s, %.5g lm", l.name, l.flux);
-        if (l.watts > 0) printf(", %.4g W, %.4g lm/W", l.watts, l.efficacy);
-        if (l.dimming != 1) printf(", dimmed to %.3g", l.dimming);
+        if (l.watts > 0) printf(", %.4g W", l.power);
+        if (l.efficacy > 0) printf(", %.4g lm/W", l.efficacy);
+        if (l.level != 1) printf(", dimmed to %.3g", l.level);
         if (l.maintenance != 1) printf(", maintenance factor %.3g", l.maintenance);
         printf(", %s at (%g, %g, %g)\n", l.is_point ? "a point" : "a shape",
                l.position[0], l.position[1], l.position[2]);

@@ -288,14 +288,6 @@ static void unlit_tell(struct json *j, const int *sensor, int n)
     if (cli.json) json_end_array(j);
 }
 
-/* Is one sensor chosen, and not all? */
-static int sensor_named(void)
-{
-    for (size_t k = 0; k < cli.typed.n; k++)
-        if (strncmp(cli.typed.item[k], "--sensor=", 9) == 0) return 1;
-    return 0;
-}
-
 static int run_read(int n, char **operand)
 {
     struct imp_scene_info scene = {.size = sizeof scene};
@@ -321,12 +313,15 @@ static int run_read(int n, char **operand)
         return cli_error(EXIT_USAGE,
                          "--year goes without --ugr, --shares, --grid, --ends, "
                          "--from and --param");
-    if (year && !sensor_named() && scene.n_sensors > 1)
+    if (year && !cli_typed("sensor") && scene.n_sensors > 1)
         return cli_error(
             EXIT_USAGE,
             "%s: it has %d sensors, and --year is of one grid: choose it with "
             "--sensor",
             cli.scene_path, scene.n_sensors);
+    if (!year && (cli_typed("hours") || cli_typed("wanted")))
+        return cli_error(EXIT_USAGE,
+                         "--hours and --wanted are of daylight: they go with --year");
     if (o.grid && problem_options.params.n)
         return cli_error(EXIT_USAGE,
                          "--grid has no derivatives: it goes without --param");
@@ -335,7 +330,7 @@ static int run_read(int n, char **operand)
     if (o.ugr && (o.shares || o.grid || o.ends || problem_options.params.n))
         return cli_error(EXIT_USAGE,
                          "--ugr goes without --shares, --grid, --ends and --param");
-    if (o.ugr && !sensor_named())
+    if (o.ugr && !cli_typed("sensor"))
         return cli_error(EXIT_USAGE, "--ugr is of one grid: choose it with --sensor");
     if (dgp_wanted.on && (o.ugr || year || o.shares || o.grid || o.ends || cli.from ||
                           problem_options.params.n))
@@ -373,7 +368,7 @@ static int run_read(int n, char **operand)
                        : year                   ? "years"
                                                 : "readings");
     }
-    const int one = sensor_named(), first = one ? cli.sensor : 0;
+    const int one = cli_typed("sensor"), first = one ? cli.sensor : 0;
     const int end = one ? first + 1 : scene.n_sensors;
     int *unlit = cli_alloc((size_t)scene.n_sensors, sizeof *unlit), n_unlit = 0;
     struct room_page *page = o.report ? cli_alloc(1, sizeof *page) : NULL;

@@ -9,6 +9,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #define PAGE_TIMES                                                                       \
     8 /* samples of a grid of the page, all lamps at once, over those of one lamp */
@@ -109,6 +110,26 @@ static int report_write(struct design_answer *a, size_t n)
     return rc;
 }
 
+/* An older file of an option stays where there is no answer, and is none of this scene. */
+static void older_tell(const char *path)
+{
+    if (path && access(path, F_OK) == 0)
+        cli_say(
+            "importon: warning: %s is not written, since there is no answer: what is in "
+            "it is older",
+            path);
+}
+
+static int samples_check(struct imp_run run, const struct imp_design_want *want, size_t n)
+{
+    int rc = 0;
+    for (size_t k = 0; k < n && !rc; k++) {
+        run.sensor = want[k].sensor;
+        rc = grid_samples_check(run);
+    }
+    return rc;
+}
+
 static int design(const struct design_lamps *lamps)
 {
     const struct imp_run run = cli_run();
@@ -127,6 +148,7 @@ static int design(const struct design_lamps *lamps)
         rc = cli_error(EXIT_USAGE,
                        "design: nothing is wanted; say it by --want, such as --want "
                        "work.average=500,work.uniformity=0.6");
+    if (!rc) rc = samples_check(run, want, n);
     if (!rc && o.settings) rc = overwrite_check(o.settings, OUTPUT_SETTINGS);
     if (!rc && o.report) rc = overwrite_check(o.report, OUTPUT_PAGE);
     if (!rc) {
@@ -139,6 +161,7 @@ static int design(const struct design_lamps *lamps)
         struct design_answer a = {lamps, want, &options, imp_design_result(found)};
         if (cli.json) design_json(&a);
         else design_print(&a);
+        if (!a.answer->found) older_tell(o.settings), older_tell(o.report);
         if (o.settings && a.answer->found) rc = design_settings_write(o.settings, &a);
         if (!rc && o.report && a.answer->found) rc = report_write(&a, n);
         if (!rc && !(a.answer->found && a.answer->holds)) rc = EXIT_NO;
@@ -156,6 +179,9 @@ static int run_design(int n, char **operand)
     if (!rc) rc = cli_load(operand[0]);
     if (!rc && cli.time_s > 0)
         rc = cli_error(EXIT_USAGE, "design takes --spp samples, and has no --time");
+    if (!rc && cli_typed("sensor"))
+        rc = cli_error(EXIT_USAGE,
+                       "design is of the grids that --want names, and has no --sensor");
     if (!rc) rc = design_lamps_make(&lamps);
     if (!rc) rc = design(&lamps);
     design_lamps_free(&lamps);

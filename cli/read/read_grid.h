@@ -22,6 +22,9 @@ struct grid {
     struct imp_grid_summary summary;
 };
 
+/* Errors come from two samples on: 0, or an exit code with the reason printed, where run.sensor has
+ * fewer. */
+int grid_samples_check(struct imp_run run);
 /* Read the grid of run->sensor; `ends`: from both, and what has the smaller error counts.
  * 0, or an exit code with the reason printed. */
 int grid_read(struct imp_run run, int ends, struct grid *out);

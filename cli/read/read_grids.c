@@ -20,6 +20,34 @@ static int has_grid(int sensor)
            imp_grid_points(cli.scene, sensor, point, NULL) == IMP_OK;
 }
 
+int grid_samples_check(struct imp_run run)
+{
+    if (cli_spp(&run) >= 2) return 0;
+    return cli_error(
+        EXIT_USAGE,
+        "--spp %d: one sample a point has no standard error; grids take 2 or "
+        "more",
+        cli_spp(&run));
+}
+
+/* Why the sensor that --sensor names has no grid. */
+static int no_grid(int sensor)
+{
+    struct imp_scene_info scene = {.size = sizeof scene};
+    struct imp_sensor_info info = {.size = sizeof info};
+    imp_scene_get_info(cli.scene, &scene);
+    if (sensor >= scene.n_sensors)
+        return cli_error(
+            EXIT_USAGE, "--sensor %d: %s has %d sensor%s, and their numbers begin at 0",
+            sensor, cli.scene_path, scene.n_sensors, plural(scene.n_sensors));
+    const enum imp_status st = imp_scene_get_sensor(cli.scene, sensor, &info);
+    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    return cli_error(EXIT_USAGE,
+                     "--sensor %d: sensor '%s' (%s) has no grid; --grid is of "
+                     "irradiancemeters on rectangles",
+                     sensor, info.name, info.type);
+}
+
 /* The grids of the sensors from `first` on that have one. */
 int grids_read(struct json *j, struct imp_run run, int first, int end,
                const struct grid_wanted *wanted, double most_z, int *apart, int *unlit,
@@ -27,6 +55,7 @@ int grids_read(struct json *j, struct imp_run run, int first, int end,
 {
     int n = 0, rc = 0;
     for (int s = first; s < end; s++) n += has_grid(s);
+    if (n == 0 && cli_typed("sensor")) return no_grid(first);
     if (n == 0)
         return cli_error(
             EXIT_USAGE,
@@ -42,6 +71,8 @@ int grids_read(struct json *j, struct imp_run run, int first, int end,
         struct grid g;
         if (!has_grid(s)) continue;
         run.sensor = s;
+        rc = grid_samples_check(run);
+        if (rc) return rc;
         rc = grid_read(run, wanted->ends, &g);
         if (rc) return rc;
         *apart |= wanted->ends && !(fabs(g.z) <= most_z);

@@ -9,6 +9,9 @@
 
 #include <stdlib.h>
 
+#define HOURS_MAX 8784 /* of a leap year, the longest that is read */
+#define SPP_LEAST 256  /* samples from which the bias of hours over a bound is small */
+
 struct year_wanted year_wanted = {NULL, {8, 18}, 300};
 
 const struct arg_option options_year[] = {
@@ -44,12 +47,9 @@ static int compute(struct year *y, const struct imp_run *run)
 {
     const char *file = year_wanted.weather;
     y->weather.size = sizeof y->weather;
-    enum imp_status st = imp_weather_read(cli.context, file, &y->weather, NULL, 0);
-    if (st != IMP_OK) return cli_fail(st, NULL);
-    y->hour = cli_alloc(y->weather.n, sizeof *y->hour);
-    const size_t room = y->weather.n;
-    y->weather.size = sizeof y->weather;
-    st = imp_weather_read(cli.context, file, &y->weather, y->hour, room);
+    y->hour = cli_alloc(HOURS_MAX, sizeof *y->hour);
+    enum imp_status st =
+        imp_weather_read(cli.context, file, &y->weather, y->hour, HOURS_MAX);
     if (st != IMP_OK) return cli_fail(st, NULL);
     y->sensor.size = sizeof y->sensor;
     st = imp_scene_get_sensor(cli.scene, run->sensor, &y->sensor);
@@ -210,6 +210,11 @@ int year_read(struct json *j, const struct imp_run *run, const char *csv, const 
     if (!rc && !cli.json) text_print(&y);
     if (!rc && csv) rc = table_write(csv, &y);
     if (!rc && svg) rc = plan_write(svg, &y);
+    if (!rc && cli_spp(run) < SPP_LEAST)
+        cli_say(
+            "importon: warning: %d samples: below %d the autonomy is low by about its "
+            "error, and its interval holds less often than 95 %%",
+            cli_spp(run), SPP_LEAST);
     year_free(&y);
     return rc;
 }

@@ -96,8 +96,8 @@ static int wants_put(FILE *f, const struct room_page *p, struct imp_run run, boo
         struct imp_interval_estimate e = {0, 0, 0};
         const int rc = value_find(p, w, run, &e);
         if (rc) return rc;
-        const bool sure = upper ? e.hi <= w->value : e.lo >= w->value,
-                   never = upper ? e.lo > w->value : e.hi < w->value;
+        const bool sure = imp_design_enough(w->of, upper ? e.hi : e.lo, w->value),
+                   never = !imp_design_enough(w->of, upper ? e.lo : e.hi, w->value);
         *met &= sure;
         fprintf(f, "<tr><td>");
         text_put(f, want_sensor(w));
@@ -168,8 +168,8 @@ static void luminaires_put(FILE *f, const struct room_page *p)
         struct imp_luminaire_info l = {.size = sizeof l};
         if (imp_scene_get_luminaire(cli.scene, i, &l) != IMP_OK) continue;
         const double level = p->level_of ? p->level_of(l.name, p->payload) : 1;
-        double w = p->watts_of ? p->watts_of(l.name, p->payload) : 0;
-        if (w == 0) w = l.watts * l.dimming;
+        const double full = p->watts_of ? p->watts_of(l.name, p->payload) : 0;
+        const double w = full > 0 ? full * level : l.power;
         if (level == 0) continue;
         rows++;
         fprintf(f, "<tr><td>");
@@ -179,12 +179,11 @@ static void luminaires_put(FILE *f, const struct room_page *p)
             text_put(f, p->file_of(l.name, p->payload));
         }
         fprintf(f, "</td><td>%.4g, %.4g, %.4g</td><td>%.3g %%</td><td>%.5g lm</td><td>",
-                l.position[0], l.position[1], l.position[2], 100 * level * l.dimming,
-                l.flux);
-        if (w > 0) fprintf(f, "%.4g W", w * level);
+                l.position[0], l.position[1], l.position[2], 100 * l.level, l.flux);
+        if (full > 0 || l.watts > 0) fprintf(f, "%.4g W", w);
         else all_watts = 0;
         fprintf(f, "</td></tr>\n");
-        watts += w * level;
+        watts += w;
         flux += l.flux;
     }
     fprintf(f, "<tr><td>%d in all</td>%s<td></td><td></td><td>%.5g lm</td><td>", rows,

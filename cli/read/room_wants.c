@@ -81,15 +81,26 @@ static int want_read(const char *text, struct imp_design_want *out)
     return rc;
 }
 
+/* Without blanks around it. */
+static char *trimmed(char *text)
+{
+    text += strspn(text, " \t\n");
+    size_t n = strlen(text);
+    while (n > 0 && strchr(" \t\n", text[n - 1])) text[--n] = 0;
+    return text;
+}
+
 int wants_read(struct imp_design_want *want, size_t *n)
 {
     int rc = 0;
     for (size_t k = 0; k < wants.n && !rc; k++) {
         char *copy = cli_strdup(wants.item[k]), *save = NULL;
         for (char *w = strtok_r(copy, ",", &save); w && !rc;
-             w = strtok_r(NULL, ",", &save))
+             w = strtok_r(NULL, ",", &save)) {
+            w = trimmed(w);
             rc = *n < WANTS_MAX ? want_read(w, &want[(*n)++])
                                 : cli_error(EXIT_USAGE, "more than %d wants", WANTS_MAX);
+        }
         free(copy);
     }
     return rc;

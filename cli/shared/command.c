@@ -313,6 +313,17 @@ struct imp_run cli_run(void)
     run.points = (enum imp_points)cli.points;
     return run;
 }
+bool cli_typed(const char *name)
+{
+    const size_t n = strlen(name);
+    for (size_t k = 0; k < cli.typed.n; k++) {
+        const char *word = cli.typed.item[k];
+        if (!strncmp(word, "--", 2) && !strncmp(word + 2, name, n) && word[2 + n] == '=')
+            return true;
+    }
+    return false;
+}
+
 int cli_spp(const struct imp_run *run)
 {
     struct imp_sensor_info info = {.size = sizeof info};

@@ -124,6 +124,9 @@ int cli_done(void);
 /* Behind the word for what is counted: "1 sample", "2 samples". */
 static inline const char *plural(long long n) { return n == 1 ? "" : "s"; }
 
+/* Was the option --name given with a value? */
+bool cli_typed(const char *name);
+
 /* Talk on stderr, unless --quiet. */
 void cli_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
 

@@ -23,7 +23,7 @@ struct imp_design_lamp {
     /** At most one lamp of a place is used; NULL: it has a place of its own. */
     const char *place;
     bool needed;  /**< one lamp of its place is used */
-    double watts; /**< at level 1; 0: by its photometric file, times its dimming */
+    double watts; /**< at level 1; 0: by its photometric file, times its present level */
     double cost;  /**< of using it, at any level */
     /** Levels when it is used, 0 < least <= most <= 1; 0: .1 and 1. Equal ones: on or off. */
     double least, most;
@@ -111,6 +111,16 @@ struct imp_design_answer {
     const double *other_objective; /**< [n_others] the least first */
     const double *other_level;     /**< [n_others][n_lamps] */
 };
+
+/** Is `value` on the right side of what is wanted? A bound that is met exactly holds; rounding is
+ * up to a part of 1e-6. */
+static inline bool imp_design_enough(enum imp_design_want_of of, double value,
+                                     double wanted)
+{
+    const double rounding = 1e-6 * (wanted < 0 ? -wanted : wanted);
+    return of == IMP_WANT_MAXIMUM || of == IMP_WANT_UGR ? value <= wanted + rounding
+                                                        : value >= wanted - rounding;
+}
 
 typedef struct imp_design imp_design;
 

@@ -315,6 +315,8 @@ struct imp_luminaire_info {
     double position[3]; /**< scene units; of a shape: the middle of its box */
     double opening[3];  /**< luminous opening by the file, m: along C0, along C90, height;
                               a round one as the square of its area */
+    double level; /**< dimming times the present scale (1 for a texture): 0 is off */
+    double power; /**< W in operation: watts times level; 0: watts are not given */
 };
 
 /** Number of luminaires; 0 for NULL. */

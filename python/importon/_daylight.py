@@ -95,11 +95,9 @@ def weather(path: Any) -> Weather:
     own = context()
     info = make(_c.imp_weather_info)
     name = os.fsencode(path)
-    own.check(lib.imp_weather_read(own.pointer, name, ctypes.byref(info), None, 0))
-    rows = (_c.imp_weather_hour * info.n)()
-    info = make(_c.imp_weather_info)
+    rows = (_c.imp_weather_hour * 8784)()  # a leap year; read once, so that warnings come once
     own.check(lib.imp_weather_read(own.pointer, name, ctypes.byref(info), rows, len(rows)))
-    table = np.frombuffer(rows, dtype=_WEATHER).copy()
+    table = np.frombuffer(rows, dtype=_WEATHER)[:info.n].copy()
     return Weather(hour=table["hour"], sun=table["sun"],
                    date=np.stack([table["year"], table["month"], table["day"]], 1),
                    **{k: table[k] for k in ("diffuse", "direct", "diffuse_illuminance", "direct_illuminance")},

@@ -67,6 +67,8 @@ class Luminaire(NamedTuple):
     is_point: bool
     position: tuple[float, float, float]
     opening: tuple[float, float, float]
+    level: float
+    power: float
 
 
 def call(scene: Scene, params: Any, options: Any, progress: Any, *call: Any) -> None:
@@ -180,7 +182,7 @@ def luminaires(scene: Scene) -> list[Luminaire]:
         x = make(_c.imp_luminaire_info)
         scene._context.check(lib.imp_scene_get_luminaire(scene.pointer, i, ctypes.byref(x)))
         found.append(Luminaire(decode(x.name), x.flux, x.lamp_flux, x.watts, x.efficacy, x.dimming, x.maintenance,
-                               bool(x.is_point), tuple(x.position), tuple(x.opening)))
+                               bool(x.is_point), tuple(x.position), tuple(x.opening), x.level, x.power))
     return found
 
 

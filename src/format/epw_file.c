@@ -33,6 +33,10 @@
 #define FIELDS_MAX   64
 #define HOURS_MAX    8784
 #define NO_DEW       10 /* degrees Celsius, where the file has none */
+/* Direct radiation, Wh/m^2, of an hour in which the sun is below the horizon from its beginning to its
+ * end: in half an hour it rises by 7.5 degrees at most. */
+#define DARK_DIRECT 20
+#define DARK_HEIGHT (-0.1305)
 /* lm/W over a year: outside of these a file's illuminances are in other units. */
 #define EFFICACY_LEAST 60
 #define EFFICACY_MOST  180
@@ -177,6 +181,7 @@ struct rows {
     int fields;        /* of the first */
     bool missing;      /* an illuminance */
     double lux, watts; /* sums over the rows */
+    int dark;          /* hours with direct radiation and no sun */
 };
 
 static enum imp_status light(const struct reader *r, int field, const char *what,
@@ -221,6 +226,7 @@ static enum imp_status row_read(const struct reader *r, const struct imp_weather
         w->latitude, w->longitude, w->timezone, h->year, h->month, h->day, h->hour, 0, 0};
     const imp_v3 sun = imp__normalize(imp__sun_direction(&date));
     for (int k = 0; k < 3; k++) h->sun[k] = sun[k];
+    all->dark += h->direct > DARK_DIRECT && sun[2] < DARK_HEIGHT;
     return IMP_OK;
 }
 
@@ -270,7 +276,7 @@ enum imp_status imp__epw_parse(imp_context *ctx, struct imp_arena *keep, const c
     const char *at = (const char *)text->data;
     struct reader r = {.ctx = ctx, .name = name, .at = at, .end = at + text->size};
     struct imp_weather w = {.info = {.size = sizeof w.info}};
-    struct rows all = {0, false, 0, 0};
+    struct rows all = {0, false, 0, 0, 0};
     double *dew = NULL;
     if (text->size >= 3 && memcmp(at, "\xef\xbb\xbf", 3) == 0) r.at += 3;
     IMP_TRY(head_read(&r, &w.info));
@@ -280,6 +286,11 @@ enum imp_status imp__epw_parse(imp_context *ctx, struct imp_arena *keep, const c
     IMP_TRY(rows_read(&r, dew, &w, &all));
     if (!(all.watts > 0))
         IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: no hour has any radiation", name));
+    if (all.dark > 0)
+        imp__warn(ctx,
+                  "%s: in %d hours it has direct radiation while the sun is below the "
+                  "horizon: do latitude %g, longitude %g and time zone %g belong to it?",
+                  name, all.dark, w.info.latitude, w.info.longitude, w.info.timezone);
     const double efficacy = all.lux / all.watts;
     w.info.modelled = all.missing || !(all.lux > 0);
     if (!w.info.modelled && !(efficacy >= EFFICACY_LEAST && efficacy <= EFFICACY_MOST)) {

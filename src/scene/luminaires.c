@@ -43,17 +43,21 @@ enum imp_status imp_scene_get_luminaire(const imp_scene *scene, int luminaire,
                           imp_scene_n_luminaires(scene));
     const struct imp_emitter *e = scene->emitters[at];
     const struct imp__ies *x = e->self;
-    const double full = imp__ies_flux(x) * x->lumens * scale_of(scene, e);
+    const double rated = imp__ies_flux(x) * x->lumens, scale = scale_of(scene, e);
     const double reduced = x->dimming * x->maintenance;
     struct imp_luminaire_info all = {.size = sizeof all,
                                      .name = e->name,
-                                     .flux = full,
+                                     .flux = rated * scale,
                                      .lamp_flux = x->data->lamp_flux,
                                      .watts = x->data->watts,
                                      .dimming = x->dimming,
                                      .maintenance = x->maintenance,
-                                     .is_point = !e->shape};
-    if (all.watts > 0 && reduced > 0) all.efficacy = full / reduced / all.watts;
+                                     .is_point = !e->shape,
+                                     .level = x->dimming * scale};
+    /* A scale stands for a dimmer that is set later, so power follows it as it follows dimming;
+     * age and dirt (maintenance) save nothing. */
+    all.power = all.watts * all.level;
+    if (all.watts > 0 && reduced > 0) all.efficacy = rated / reduced / all.watts;
     const imp_v3 p = e->shape ? (e->shape->lo + e->shape->hi) * 0.5 : x->position;
     for (int k = 0; k < 3; k++) {
         all.position[k] = p[k];

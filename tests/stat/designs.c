@@ -225,6 +225,66 @@ static void test_none(void)
            "what cannot be had # average %.5g of at most %.5g; below the maximum %.5g",
            alone, full, with);
     imp_design_destroy(d);
+    tap_ok(imp_design_enough(IMP_WANT_UNIFORMITY, 0.81 * (1 - 1e-8), 0.81) &&
+               !imp_design_enough(IMP_WANT_UNIFORMITY, 0.8099, 0.81) &&
+               imp_design_enough(IMP_WANT_UGR, 19 * (1 + 1e-8), 19) &&
+               !imp_design_enough(IMP_WANT_UGR, 19.001, 19) &&
+               !imp_design_enough(IMP_WANT_AVERAGE, NAN, 1),
+           "a bound that is met exactly holds");
+    /* The best that can be had does not depend on what was asked for. */
+    double worst = 0;
+    for (int k = 0; k < 4; k++) {
+        const double most[LAMPS] = {1, 1, 1}, least = least_of(e, most);
+        const double factor = (double[]){1.001, 3, 100, 1e5}[k];
+        const struct imp_design_want v[2] = {
+            want_of(IMP_WANT_AVERAGE, k < 2 ? 0.9 * full : factor * full),
+            want_of(IMP_WANT_MINIMUM, factor * least)};
+        test_must(ctx, imp_design_find(s, lamps, LAMPS, v, 2, NULL, NULL, &d));
+        worst = fmax(worst, fabs(finding(d, 0)->alone / full - 1));
+        worst = fmax(worst, fabs(finding(d, 1)->alone / least - 1));
+        imp_design_destroy(d);
+    }
+    tap_ok(worst < 3e-6, "the best that can be had, whatever is wanted # error %.2g",
+           worst);
+    imp_scene_destroy(s);
+}
+
+/* Uniformity alone: some lamps are lit, since without light it is not defined. */
+static void test_lit(void)
+{
+    enum { STEPS = 60 };
+    double e[LAMPS][N], best = 0;
+    imp_scene *s = points_scene(ctx);
+    points_truth(e);
+    const struct imp_design_lamp lamps[LAMPS] = {
+        lamp_of("lamp_0", 10), lamp_of("lamp_1", 25), lamp_of("lamp_2", 11)};
+    for (int k = 1; k < (STEPS + 1) * (STEPS + 1) * (STEPS + 1); k++) {
+        const double x[LAMPS] = {k % (STEPS + 1), k / (STEPS + 1) % (STEPS + 1),
+                                 k / (STEPS + 1) / (STEPS + 1)};
+        double average = 0;
+        bool is_level = true; /* 0, or a tenth or more */
+        for (int j = 0; j < LAMPS; j++) is_level &= x[j] == 0 || x[j] >= 0.1 * STEPS;
+        for (int j = 0; j < LAMPS; j++)
+            for (int i = 0; i < N; i++) average += e[j][i] * x[j] / N;
+        if (!is_level) continue;
+        best = fmax(best, least_of(e, x) / average);
+    }
+    for (int t = 0; t < 2; t++) {
+        const double wanted = t ? 0.95 * best : fmin(1.1 * best, 0.99);
+        const struct imp_design_want w = want_of(IMP_WANT_UNIFORMITY, wanted);
+        imp_design *d = NULL;
+        test_must(ctx, imp_design_find(s, lamps, LAMPS, &w, 1, NULL, NULL, &d));
+        const struct imp_design_answer *a = imp_design_result(d);
+        const double value = finding(d, 0)->value;
+        if (t)
+            tap_ok(a->found && a->holds && a->watts > 1 && value >= wanted * (1 - 1e-6),
+                   "a uniformity needs light # %.4g W, %.4f of at least %.4f", a->watts,
+                   value, wanted);
+        else
+            tap_ok(!a->found && a->proven && value > best - 1e-6 && value < 1.01 * best,
+                   "the best uniformity # %.5f, by trial %.5f", value, best);
+        imp_design_destroy(d);
+    }
     imp_scene_destroy(s);
 }
 
@@ -415,6 +475,7 @@ int main(int argc, char **argv)
     test_points();
     test_places();
     test_none();
+    test_lit();
     test_coverage(tap_is_long(argc, argv));
     test_rounds();
     test_glare();

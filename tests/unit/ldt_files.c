@@ -224,14 +224,17 @@ static void operation(void)
 {
     static const struct {
         const char *more;
-        double flux, efficacy;
+        double flux, efficacy, level;
     } rows[] = {
-        {"", 4000, 125},
-        {"<float name='dimming' value='.5'/>", 2000, 125},
+        {"", 4000, 125, 1},
+        {"<float name='dimming' value='.5'/>", 2000, 125, .5},
         {"<float name='maintenance' value='.8'/><float name='flux' value='3000'/>", 2400,
-         93.75},
-        {"<rgb name='scale' value='2'/>", 8000, 250},
-        {"<string name='units' value='radiometric'/>", 4000, 125}};
+         93.75, 1},
+        {"<rgb name='scale' value='2'/>", 8000, 125, 2},
+        {"<rgb name='scale' value='.5'/><float name='dimming' value='.5'/>", 1000, 125,
+         .25},
+        {"<rgb name='scale' value='0'/>", 0, 125, 0},
+        {"<string name='units' value='radiometric'/>", 4000, 125, 1}};
     for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
         char xml[1024];
         struct imp_luminaire_info l = {.size = sizeof l};
@@ -245,11 +248,14 @@ static void operation(void)
         imp_scene *s = test_scene_text(ctx, xml, IMP_MONO);
         test_must(ctx, imp_scene_get_luminaire(s, 0, &l));
         /* A table of cos in steps of 5 degrees, linear between: 6e-4. */
-        tap_ok(fabs(l.flux / rows[k].flux - 1) < 1.3e-3 &&
+        tap_ok(fabs(l.flux - rows[k].flux) <= 1.3e-3 * rows[k].flux &&
                    fabs(l.efficacy / rows[k].efficacy - 1) < 1.3e-3 && l.is_point &&
-                   l.position[2] == 3 && l.watts == 32 && strcmp(l.name, "opal") == 0 &&
-                   imp_scene_n_luminaires(s) == 1,
-               "%s: %.2f lm, %.2f lm/W", rows[k].more, l.flux, l.efficacy);
+                   l.position[2] == 3 && l.watts == 32 &&
+                   fabs(l.level - rows[k].level) < 1e-6 &&
+                   fabs(l.power - 32 * rows[k].level) < 1e-4 &&
+                   strcmp(l.name, "opal") == 0 && imp_scene_n_luminaires(s) == 1,
+               "%s: %.2f lm, %.2f lm/W, %.2f W", rows[k].more, l.flux, l.efficacy,
+               l.power);
         tap_ok(imp_scene_get_luminaire(s, 1, &l) == IMP_E_ARG &&
                    imp_scene_get_luminaire(s, -1, &l) == IMP_E_ARG,
                "no such luminaire");

@@ -58,7 +58,7 @@ static void photometry_take(struct imp__design_model *m, size_t i)
         if (imp_scene_get_luminaire(m->scene, k, &info) != IMP_OK ||
             strcmp(info.name, m->lamp[i].lamp) != 0)
             continue;
-        if (m->watts[i] == 0) m->watts[i] = info.watts * info.dimming;
+        if (m->watts[i] == 0) m->watts[i] = info.power;
         m->flux[i] = info.flux;
     }
 }
@@ -135,8 +135,14 @@ static enum imp_status want_check(struct imp__design_model *m, size_t i)
                                                        : "above 0");
     if (!s->receiver)
         return imp__error(m->ctx, IMP_E_ARG,
-                          "sensor '%s' (%s) is no irradiancemeter: a design is of grids",
+                          "sensor '%s' (%s) has no grid: a design is of irradiancemeters "
+                          "on shapes",
                           s->name, s->ops->name);
+    if (m->run.spp == 1 || (m->run.spp == 0 && s->spp == 1))
+        return imp__error(m->ctx, IMP_E_ARG,
+                          "spp = 1: one sample has no standard error, and a design needs "
+                          "those of sensor '%s'",
+                          s->name);
     if (w->of == IMP_WANT_UGR) IMP_CHECKED(imp__glare_sight_check(scene, s));
     for (size_t k = 0; k < i; k++)
         if (m->want[k].of == w->of && m->want[k].sensor == w->sensor)

@@ -5,7 +5,10 @@
 #include "designing.h"
 #include <math.h>
 
-#define HALVINGS 12 /* of the range in which what can be had is found */
+#define PRECISION 1e-6 /* relative, of the values that can be had */
+#define HALVINGS  60   /* of the range in which they are found, at most */
+#define UGR_LEAST (-40.0)
+#define UGR_MOST  100.0 /* ratings beyond these are no lamps */
 
 double imp__design_objective(const struct imp__design_model *m,
                              enum imp_design_least what, const double *x)
@@ -95,30 +98,47 @@ static enum imp_status is_possible(struct imp__design_model *m, enum possible *o
     return st;
 }
 
-/* The best value of want k with the rows of the others as they are; NAN: none, or a search ended
- * before it was known. */
-static enum imp_status best_of(struct imp__design_model *m, size_t k, double *out)
+/* Values between which the best one of want k lies, from none that lamps can have to one that they all
+ * have; they do not depend on what is wanted. */
+static void range_of(const struct imp__design_model *m, size_t k, double *bad,
+                     double *good)
 {
     const enum imp_design_want_of of = m->want[k].of;
-    const double wanted = m->want[k].value;
+    const struct imp__design_grid *g = &m->grid[m->grid_of[k]];
+    double most = 0; /* of a point with all lamps at level 1 */
+    for (size_t p = g->first; p < g->first + g->n; p++) {
+        double sum = m->base.value[p] + IMP_DESIGN_MARGIN * m->base.se[p];
+        for (size_t j = 0; j < m->n; j++)
+            sum += m->with[j].value[p] + IMP_DESIGN_MARGIN * m->with[j].se[p];
+        most = fmax(most, sum);
+    }
+    *bad = of == IMP_WANT_MAXIMUM ? 0 : of == IMP_WANT_UGR ? UGR_LEAST : most;
+    *good = of == IMP_WANT_MAXIMUM ? most : of == IMP_WANT_UGR ? UGR_MOST : 0;
+    if (of == IMP_WANT_UNIFORMITY) *bad = 1;
+}
+
+/* The best value of want k with the rows of the others as they are, by bisection; NAN: none, or a
+ * search ended before it was known. */
+static enum imp_status best_of(struct imp__design_model *m, size_t k, double *out)
+{
     enum possible is;
+    double bad, good;
     *out = NAN;
     drop(m, k);
     IMP_CHECKED(is_possible(m, &is));
     if (is != YES) return IMP_OK;
-    double bad = wanted, good = 0; /* light is not negative */
-    imp__design_rows_set(m, k, wanted, IMP_DESIGN_MARGIN);
+    range_of(m, k, &bad, &good);
+    imp__design_rows_set(m, k, good, IMP_DESIGN_MARGIN);
     IMP_CHECKED(is_possible(m, &is));
-    if (is == YES) *out = wanted;
-    for (int i = 0; is == NO && imp__design_upper(of) && i < 30; i++) {
-        /* A value that is enough, at all. */
-        good = of == IMP_WANT_UGR ? wanted + 2 * i + 2 : 2 * fmax(good, wanted);
-        imp__design_rows_set(m, k, good, IMP_DESIGN_MARGIN);
-        IMP_CHECKED(is_possible(m, &is));
-        if (is == NO) bad = good;
+    if (is != YES) return IMP_OK; /* nothing is lit, or no point has a value above 0 */
+    imp__design_rows_set(m, k, bad, IMP_DESIGN_MARGIN);
+    IMP_CHECKED(is_possible(m, &is));
+    if (is == YES) {
+        /* All of the range can be had; of ratings, without a lamp in sight. */
+        *out = m->want[k].of == IMP_WANT_UGR ? -INFINITY : bad;
+        return IMP_OK;
     }
-    if (*out == wanted || (imp__design_upper(of) ? is != YES : is != NO)) return IMP_OK;
-    for (int i = 0; i < HALVINGS; i++) {
+    for (int i = 0; i < HALVINGS && fabs(good - bad) > PRECISION * fabs(good); i++) {
         const double middle = 0.5 * (good + bad);
         imp__design_rows_set(m, k, middle, IMP_DESIGN_MARGIN);
         IMP_CHECKED(is_possible(m, &is));
@@ -146,7 +166,7 @@ enum imp_status imp__design_attainable(struct imp__design_model *m,
         IMP_CHECKED(best_of(m, k, &finding[k].alone));
         finding[k].value = finding[k].sure = finding[k].alone;
         finding[k].holds =
-            imp__design_enough(m->want[k].of, finding[k].alone, m->want[k].value);
+            imp_design_enough(m->want[k].of, finding[k].alone, m->want[k].value);
     }
     rows_reset(m);
     return IMP_OK;

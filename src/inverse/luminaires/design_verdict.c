@@ -8,11 +8,6 @@
 #include "math/vec.h"
 #include <math.h>
 
-bool imp__design_enough(enum imp_design_want_of of, double value, double wanted)
-{
-    return imp__design_upper(of) ? value <= wanted : value >= wanted;
-}
-
 static double rating(double sources, double light)
 {
     if (!(sources > 0)) return -INFINITY;
@@ -55,5 +50,5 @@ void imp__design_judge(const struct imp__design_model *m, size_t k, const double
             out->at = of == IMP_WANT_AVERAGE ? 0 : i;
         }
     }
-    out->holds = imp__design_enough(of, out->sure, m->want[k].value);
+    out->holds = imp_design_enough(of, out->sure, m->want[k].value);
 }

@@ -97,8 +97,6 @@ double imp__design_objective_se(const struct imp__design_model *m, const double 
 void imp__design_judge(const struct imp__design_model *m, size_t k, const double *x,
                        const struct imp__design_reading *r, double risk,
                        struct imp_design_finding *out);
-/* Is `value` on the right side of `wanted`? */
-bool imp__design_enough(enum imp_design_want_of of, double value, double wanted);
 static inline bool imp__design_upper(enum imp_design_want_of of)
 {
     return of == IMP_WANT_MAXIMUM || of == IMP_WANT_UGR;

@@ -32,5 +32,12 @@ catalogue 'lamp_* lamps/opal.ldt levels=2'
 catalogue 'lamp_* a,b'
 importon design "$SCENES/two_lamps.xml" -m mono -w 0.average=1 --lamps one --watts 3; echo "exit $?" >&2
 importon design "$SCENES/two_lamps.xml" -m mono -w 0.average=1; echo "exit $?" >&2
+# One sample has no error, a meter without a grid, no --sensor, blanks, what an older file is.
+design -w work.average=500 --spp 1
+design -w work.average=500 --sensor 1
+design -w 'work.average=50, work.brightness=3'
+design -w 'work.average=50, work.average=60 '
+design -w work.average=50 --settings older.txt >/dev/null
+design -w work.average=50000 --settings older.txt >/dev/null; test -s older.txt || echo gone
 # A search that was ended says so.
 importon design "$ROOT/scenes/office.xml" -m mono -D spp=256 -w work.average=430,work.maximum=480 --levels 1 --nodes 1; echo "exit $?" >&2

@@ -23,6 +23,11 @@ importon read "$ROOT/scenes/office.xml" --csv g.csv
 importon read "$ROOT/scenes/office.xml" --grid --csv g.csv
 importon read "$ROOT/scenes/office.xml" --grid -p 'lamp_11.*'
 importon read "$ROOT/scenes/office.xml" --shares --ends
+importon read "$ROOT/scenes/office.xml" --grid --sensor 9
+importon read "$ROOT/scenes/office.xml" --grid --sensor 4
+importon read "$ROOT/scenes/office.xml" --grid --spp 1
+importon read "$ROOT/scenes/office.xml" --hours 9,17
+importon read "$ROOT/scenes/office.xml" --grid --wanted 500
 importon read "$ROOT/scenes/cornell.xml" --grid
 cat >half.xml <<'X'
 <scene version="3.0.0"><integrator type="path"/>

@@ -17,6 +17,8 @@ names = [e.tag.split("}")[1] for e in tree.parse("y.svg").getroot().iter()]
 assert names.count("rect") == 1 + len(rows) + 64
 X
 importon read "$ROOT/scenes/daylit.xml" -m mono -D spp=64 --year town.epw --hours 9,17 --wanted 500 | sed -n 1,2p
+sed '1s/,50,10,1,/,50,10,13,/' town.epw >noon.epw
+importon read "$ROOT/scenes/daylit.xml" -m mono -D spp=4 --year noon.epw >/dev/null
 importon read "$ROOT/scenes/daylit.xml" --year town.epw --grid
 importon read "$ROOT/scenes/office.xml" --year town.epw
 importon read "$ROOT/scenes/office.xml" --year town.epw --sensor 0
