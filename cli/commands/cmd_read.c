@@ -337,7 +337,7 @@ static int run_read(int n, char **operand)
         return cli_error(EXIT_USAGE,
                          "--dgp goes without --ugr, --year, --shares, --grid, --ends, "
                          "--from and --param");
-    if (dgp_wanted.on && !sensor_named())
+    if (dgp_wanted.on && !cli_typed("sensor"))
         return cli_error(EXIT_USAGE, "--dgp is of one grid: choose it with --sensor");
     if (o.report && !o.grid)
         return cli_error(EXIT_USAGE, "--report is of grids: it goes with --grid");
