@@ -135,8 +135,9 @@ static enum imp_status want_check(struct imp__design_model *m, size_t i)
                                                        : "above 0");
     if (!s->receiver)
         return imp__error(m->ctx, IMP_E_ARG,
-                          "sensor '%s' (%s) has no grid: a design is of irradiancemeters "
-                          "on shapes",
+                          "sensor '%s' (%s) has no grid that a design reads: that is an "
+                          "irradiancemeter on a rectangle, with 'virtual' true or 'at' "
+                          "points",
                           s->name, s->ops->name);
     if (m->run.spp == 1 || (m->run.spp == 0 && s->spp == 1))
         return imp__error(m->ctx, IMP_E_ARG,
