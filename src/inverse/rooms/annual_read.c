@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Daylight of a year at the points of a grid: what is asked, which scenes have it, and a loop over
- * the points. A point is one item of work with sums of its own: the number of threads changes no
+ * Daylight of a year at the points of a grid: options, scenes without it, and the loop over the
+ * points. A point is one item of work with sums of its own: the number of threads changes no
  * bit. */
 #include "annual.h"
 #include "base/arguments.h"
-#include "base/pool.h"
 #include "film/film_measure.h"
 #include "kind/emitter/sky_shape.h"
+#include "point_loop.h"
 #include "walk/path/first_segment.h"
 #include "walk/rules/features.h"
 #include "walk/run/run.h"
@@ -29,7 +29,7 @@ struct job {
     struct imp_drops drops;
 };
 
-/* ---- What is asked ----------------------------------------------------------------- */
+/* ---- Options ----------------------------------------------------------------------- */
 
 static void or_default(double *x, double fallback)
 {
@@ -313,16 +313,7 @@ enum imp_status imp_annual_read(imp_scene *scene, const struct imp_run *run, siz
     locked = pthread_mutex_init(&j.lock, NULL) == 0;
     if (!locked) IMP_TRY(IMP_E_NOMEM);
     const double walks = (double)a.walks * IMP__GROUPS * (double)points;
-    const struct imp_loop loop = {.n_items = points,
-                                  .work = point_work,
-                                  .payload = &j,
-                                  .progress = own.progress,
-                                  .progress_payload = own.progress_payload,
-                                  .stage = "year",
-                                  .rate_unit = "walks",
-                                  .units = walks};
-    IMP_TRY(imp__parallel(ctx, &loop, NULL));
-    IMP_TRY(imp__drops_budget(ctx, &j.drops, own.drop_budget, walks, ""));
+    IMP_TRY(imp__point_loop(ctx, &own, points, walks, "year", point_work, &j, &j.drops));
     for (size_t i = 0; point && i < points; i++)
         imp__annual_point_set(&j.numbers[i], &point[i]);
     if (summary) {

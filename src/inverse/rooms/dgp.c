@@ -3,9 +3,9 @@
  * Daylight glare probability of a view whose luminances are noisy.
  *
  * The square of a noisy luminance is too large by its variance. Of groups a and b of walks, which
- * are independent, the product L_a L_b is without that bias; and whether the cell is a source is
- * told by the mean of the other groups, since a cell chosen for a large L_a would have a product
- * that is too large. The sum takes all pairs. Its error is the jackknife's: all of it again
+ * are independent, the product L_a L_b is without that bias. The mean of the other groups decides
+ * whether the cell is a source, since a cell chosen for a large L_a would have a product that is
+ * too large. The sum takes all pairs. Its error is the jackknife's: all of it again
  * without each group.
  *
  * A cell that the edge of a source crosses has less L^2 than there is in it. What is missing is

@@ -8,12 +8,12 @@
 #include "base/arena.h"
 #include "base/arguments.h"
 #include "base/drops.h"
-#include "base/pool.h"
 #include "color/rgb.h"
 #include "dgp.h"
 #include "film/film_measure.h"
 #include "glare_sources.h"
 #include "kind/sensor/receiver.h"
+#include "point_loop.h"
 #include "walk/core/walk.h"
 #include "walk/rules/features.h"
 #include "walk/run/run.h"
@@ -232,16 +232,7 @@ enum imp_status imp_grid_dgp(imp_scene *scene, const struct imp_run *run,
     if (!locked) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for views"));
     const size_t points = (size_t)sensor->film.crop_w * (size_t)sensor->film.crop_h;
     const double walks = (double)j.walks * IMP__VIEW_GROUPS * (double)points;
-    const struct imp_loop loop = {.n_items = points,
-                                  .work = point_work,
-                                  .payload = &j,
-                                  .progress = own.progress,
-                                  .progress_payload = own.progress_payload,
-                                  .stage = "views",
-                                  .rate_unit = "walks",
-                                  .units = walks};
-    IMP_TRY(imp__parallel(ctx, &loop, NULL));
-    IMP_TRY(imp__drops_budget(ctx, &j.drops, own.drop_budget, walks, ""));
+    IMP_TRY(imp__point_loop(ctx, &own, points, walks, "views", point_work, &j, &j.drops));
 out:
     if (locked) pthread_mutex_destroy(&j.lock);
     workers_free(&j, ctx);
