@@ -134,14 +134,20 @@ static void put_values(FILE *f, const char *name)
     free(values);
 }
 
+/* A former fit's file would read what this one has found; fit_scene_writable has looked whose it
+ * is. Only the rank that writes: another would remove what that one has just written. */
+static void former_remove(const char *path)
+{
+    if (cli_writes()) (void)unlink(path);
+}
+
 static int textures_write(const char *const *large, size_t n)
 {
     char *path = join_path(cli.out, TEXTURES);
     struct output to;
     int rc = 0;
     if (n == 0) {
-        (void)unlink(
-            path); /* of a former fit: fit_scene_writable has looked whose it is */
+        former_remove(path);
     } else if (!(rc = output_open(&to, path, OUTPUT_SETTINGS))) {
         fprintf(to.file, "# importon %s textures\n", imp_version());
         for (size_t k = 0; k < n; k++) put_values(to.file, large[k]);
@@ -162,7 +168,7 @@ int fit_scene_write(const char *const *large, size_t n)
     char *path = join_path(cli.out, SCENE);
     struct output to;
     int rc = textures_write(large, n);
-    if (!rc) (void)unlink(path); /* a former one would read what this fit has found */
+    if (!rc) former_remove(path);
     /* A scene from standard input is in no file that could be included. */
     if (!rc && cli.luminaires.n)
         cli_say("importon: no %s is written: a scene file has no --luminaire", SCENE);

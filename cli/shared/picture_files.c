@@ -103,6 +103,7 @@ int picture_writable(const char *path, int preview)
 
 void picture_remove(const char *path)
 {
+    if (!cli_writes()) return; /* another rank may have written it by now */
     char *beside = preview_path(path);
     unlink(path);
     if (beside) unlink(beside);
