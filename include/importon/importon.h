@@ -607,6 +607,8 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *     NAME.x_fov             of a perspective camera: horizontal field of view, degrees
  *     NAME.principal_point_offset_x, NAME.principal_point_offset_y   of a perspective camera:
  *                            in parts of the film's width and height
+ *     NAME.opencv_k1, _k2, _p1, _p2, _k3   of a perspective camera: the distortion of its lens;
+ *                            IMP_E_NUMERIC where it would fold the picture
  *     NAME.position          of a point or spot light: [3], world
  *     NAME.direction         of a directional light, or of a spot's axis: [3], of any length
  *

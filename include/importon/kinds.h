@@ -883,6 +883,7 @@ enum imp_sensor_flags {
                                 end */
     IMP_SENSOR_GROUP = 4     /* its children are sensors */
 };
+#define IMP_VIEW_NUMBERS 8
 struct imp_sensor_ops {
     size_t size;
     const char *name;
@@ -903,10 +904,15 @@ struct imp_sensor_ops {
                     const double u[4], struct imp_sensor_sample *out);
     /* As imp_shape_ops.move. */
     void (*move)(struct imp_sensor *s, const double to_world[12]);
-    /* Horizontal field of view in degrees, and the principal point's offset in parts of the
-     * film's width and height, of a pinhole whose film is flat: reads them, or, with `set`,
-     * changes the camera to these. False: it has none. NULL: so has the kind. */
-    bool (*view)(struct imp_sensor *s, double number[3], bool set);
+    /* Horizontal field of view in degrees, the principal point's offset in parts of the film's
+     * width and height, and k1, k2, p1, p2, k3 of a lens as OpenCV has them, of a pinhole: reads
+     * them, or, with `set`, changes the camera to these. False: it has none; with `set`: a lens
+     * with these numbers folds the picture. NULL: the kind has none. */
+    bool (*view)(struct imp_sensor *s, double number[IMP_VIEW_NUMBERS], bool set);
+    /* How fast what is seen at a fixed film position moves when number k of `view` grows, at the
+     * point r from where its rays meet, world, along the plane of its depth; per unit of the
+     * number. NULL where `view` is. */
+    imp_v3 (*view_velocity)(const struct imp_sensor *s, int k, imp_v3 r);
 };
 
 /* ---- Versions of this header ----------------------------------------------------- */

@@ -203,7 +203,8 @@ class Scene:
         """Make a number of geometry a parameter.
 
         `NAME.pose` as `add_pose`; `NAME.scale` of a shape; `NAME.vertex_positions` of a mesh;
-        `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y` of a perspective camera;
+        `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y`, `NAME.opencv_k1`,
+        `_k2`, `_p1`, `_p2` and `_k3` of a perspective camera;
         `NAME.position` of a point or spot light; `NAME.direction` of a directional light or spot. Otherwise
         as `add_pose`.
 

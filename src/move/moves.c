@@ -20,39 +20,18 @@ void imp__moves_free(struct imp__moves *moves)
     *moves = (struct imp__moves){0};
 }
 
-/* Axis and slopes of a camera from its rays: it is a pinhole with a flat film. */
-static enum imp_status camera_view(const struct imp__moves *moves, struct imp__mover *m)
-{
-    struct imp_sensor *s = (struct imp_sensor *)(uintptr_t)moves->sensor;
-    const double lens[2] = {0.5, 0.5}, w = s->film.width, h = s->film.height;
-    double number[3];
-    struct imp_sensor_ray at, next;
-    if (!s->ops->view || !s->ops->view(s, number, false))
-        return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
-                          "sensor '%s' has no field of view that moves, or a lens that "
-                          "distorts the picture",
-                          s->name);
-    const double x = (0.5 - number[1]) * w, y = (0.5 - number[2]) * h;
-    const bool down = m->kind == IMP_MOVE_OFFSET_Y;
-    s->ops->ray(s, x, y, lens, &at);
-    s->ops->ray(s, down ? x : x + w, down ? y + h : y, lens, &next);
-    m->axis = at.d;
-    m->across = next.d * (1 / imp__dot(next.d, at.d)) - at.d;
-    const double t = tan(number[0] * (IMP_PI / 360));
-    m->rate = m->kind == IMP_MOVE_FOV ? (1 + t * t) / (2 * t) * (IMP_PI / 180) : 1;
-    return IMP_OK;
-}
-
 static enum imp_status camera_mover(const struct imp__moves *moves, struct imp__mover *m)
 {
-    if ((m->kind != IMP_MOVE_POSE && m->kind < IMP_MOVE_FOV) ||
+    if ((m->kind != IMP_MOVE_POSE && m->kind < IMP_MOVE_VIEW) ||
         !imp__pinhole(moves->sensor, &m->centre))
         return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
                           "sensor '%s': its rays meet in no point, and it has no "
                           "derivative by its pose",
                           moves->sensor->name);
     m->count = m->kind == IMP_MOVE_POSE ? 6 : 1;
-    return m->kind == IMP_MOVE_POSE ? IMP_OK : camera_view(moves, m);
+    if (m->kind == IMP_MOVE_POSE || moves->sensor->ops->view_velocity) return IMP_OK;
+    return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
+                      "sensor '%s' has no field of view that moves", moves->sensor->name);
 }
 
 static enum imp_status light_mover(const struct imp__moves *moves, struct imp__mover *m)
@@ -125,17 +104,23 @@ enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kin
 enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_pose *pose)
 {
     static const enum imp__move_kind kind[IMP_POSE_KINDS] = {
-        [IMP_POSE_RIGID] = IMP_MOVE_POSE,        [IMP_POSE_SCALE] = IMP_MOVE_SCALE,
-        [IMP_POSE_VERTICES] = IMP_MOVE_VERTICES, [IMP_POSE_FOV] = IMP_MOVE_FOV,
-        [IMP_POSE_OFFSET_X] = IMP_MOVE_OFFSET_X, [IMP_POSE_OFFSET_Y] = IMP_MOVE_OFFSET_Y,
-        [IMP_POSE_POSITION] = IMP_MOVE_LIGHT,    [IMP_POSE_DIRECTION] = IMP_MOVE_LIGHT};
+        [IMP_POSE_RIGID] = IMP_MOVE_POSE,
+        [IMP_POSE_SCALE] = IMP_MOVE_SCALE,
+        [IMP_POSE_VERTICES] = IMP_MOVE_VERTICES,
+        [IMP_POSE_POSITION] = IMP_MOVE_LIGHT,
+        [IMP_POSE_DIRECTION] = IMP_MOVE_LIGHT};
     int shape = pose->sensor ? IMP_MOVE_CAMERA : pose->shape;
     for (int k = 0; pose->emitter && k < moves->scene->n_emitters; k++)
         if (moves->scene->emitters[k] == pose->emitter) shape = IMP_MOVE_EMITTER(k);
     const bool turns = pose->kind == IMP_POSE_DIRECTION &&
                        !(pose->emitter->ops->flags & IMP_EMITTER_FAR);
-    const enum imp_status st =
-        imp__moves_add(moves, turns ? IMP_MOVE_AXIS : kind[pose->kind], shape);
+    const enum imp_status st = imp__moves_add(
+        moves,
+        turns ? IMP_MOVE_AXIS
+        : imp__pose_is_view(pose->kind)
+            ? (enum imp__move_kind)(IMP_MOVE_VIEW + pose->kind - IMP_POSE_FOV)
+            : kind[pose->kind],
+        shape);
     if (st != IMP_OK) return st;
     struct imp__mover *m = &moves->mover[moves->n_movers - 1];
     const struct imp_pose *rigid = imp__pose_beside(pose, IMP_POSE_RIGID);
@@ -434,84 +419,4 @@ size_t imp__mover_touched(const struct imp__moves *moves, const struct imp__move
                 mover->first + 3 * (row * t->n_vertices + vertex) + (size_t)(k % 3);
         }
     return n;
-}
-
-/* A camera's velocity at r from its centre by its one number: r z times the rate, or z across. */
-static imp_v3 view_velocity(const struct imp__mover *m, imp_v3 r)
-{
-    const double z = imp__dot(m->axis, r);
-    return m->kind == IMP_MOVE_FOV ? (r - m->axis * z) * m->rate : m->across * z;
-}
-
-imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 p,
-                            const double *theta_dot)
-{
-    imp_v3 u = {0};
-    for (int k = 0; k < moves->n_movers; k++) {
-        const struct imp__mover *m = &moves->mover[k];
-        if (m->shape != IMP_MOVE_CAMERA) continue;
-        const double *theta = theta_dot + m->first;
-        const imp_v3 r = p - m->centre;
-        if (m->kind == IMP_MOVE_POSE)
-            u += number3(theta) + imp__cross(number3(theta + 3), r);
-        else u += view_velocity(m, r) * theta[0];
-    }
-    return u;
-}
-
-void imp__camera_velocity_bar(const struct imp__moves *moves, imp_v3 p, imp_v3 bar,
-                              double *theta_bar)
-{
-    for (int k = 0; k < moves->n_movers; k++) {
-        const struct imp__mover *m = &moves->mover[k];
-        if (m->shape != IMP_MOVE_CAMERA) continue;
-        const imp_v3 r = p - m->centre;
-        if (m->kind == IMP_MOVE_POSE) {
-            add3(theta_bar + m->first, bar);
-            add3(theta_bar + m->first + 3, imp__cross(r, bar));
-        } else {
-            theta_bar[m->first] += imp__dot(view_velocity(m, r), bar);
-        }
-    }
-}
-
-/* Across the direction of parallel light, or a spot's axis; a place in full. */
-static imp_v3 light_part(const struct imp__moves *moves, const struct imp__mover *m,
-                         imp_v3 v)
-{
-    const struct imp_emitter *e = moves->scene->emitters[IMP_MOVE_EMITTER(m->shape)];
-    if (m->kind != IMP_MOVE_AXIS && !(e->ops->flags & IMP_EMITTER_FAR)) return v;
-    return (v - m->axis * imp__dot(m->axis, v)) * m->rate;
-}
-
-imp_v3 imp__light_velocity(const struct imp__moves *moves, int k, const double *theta_dot)
-{
-    imp_v3 out = {0};
-    for (int j = 0; j < moves->n_movers; j++) {
-        const struct imp__mover *m = &moves->mover[j];
-        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_LIGHT)
-            out += light_part(moves, m, number3(theta_dot + m->first));
-    }
-    return out;
-}
-
-void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 bar,
-                             double *theta_bar)
-{
-    for (int j = 0; j < moves->n_movers; j++) {
-        const struct imp__mover *m = &moves->mover[j];
-        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_LIGHT)
-            add3(theta_bar + m->first, light_part(moves, m, bar));
-    }
-}
-
-void imp__light_axis_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
-                         double *theta_bar)
-{
-    for (int j = 0; j < moves->n_movers; j++) {
-        const struct imp__mover *m = &moves->mover[j];
-        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_AXIS)
-            add3(theta_bar + m->first,
-                 light_part(moves, m, imp__cross(turn_bar, m->axis)));
-    }
 }

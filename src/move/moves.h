@@ -6,11 +6,9 @@
  *     pose      e, a: every point X has the velocity  V = e + a x (X - c), c the centre (6)
  *     scale     V = s (X - c) at the scale 1 of the shape as it is, or over that scale (1)
  *     vertices  V = b_0 e_0 + b_1 e_1 + b_2 e_2, of a triangle with weights b (3 each)
- *     fov       of a camera, by its horizontal field of view f in degrees: at a fixed film position
- *               it sees r/z away from its axis, z along it, for which
- *               r'/r = (1 + t^2)/(2 t) pi/180,  t = tan(f/2) (1)
- *     offset    of the principal point, in parts of the film's width or height W: what is seen is
- *               what was seen W pixels further (1 each)
+ *     view      of a camera: the velocity of what a fixed film position sees by its field of view,
+ *               its principal point or a coefficient of its lens (imp_sensor_ops.view_velocity)
+ *               (1 each)
  *     light     a point light's position V = e, or the direction d of parallel light, of any
  *               length |d|: the unit direction turns by  e/|d| across d (3)
  *     axis      of a spot, by a direction of any length, likewise (3)
@@ -33,11 +31,9 @@ enum imp__move_kind {
     IMP_MOVE_POSE,
     IMP_MOVE_SCALE,
     IMP_MOVE_VERTICES,
-    IMP_MOVE_FOV,
-    IMP_MOVE_OFFSET_X,
-    IMP_MOVE_OFFSET_Y,
     IMP_MOVE_LIGHT,
-    IMP_MOVE_AXIS
+    IMP_MOVE_AXIS,
+    IMP_MOVE_VIEW /* + k: number k of a camera's view */
 };
 struct imp__fans;                      /* triangles around each vertex: shade.c */
 #define IMP_MOVE_CAMERA     (-1)       /* in place of a shape */
@@ -47,10 +43,8 @@ struct imp__mover {
     enum imp__move_kind kind;
     int shape; /* index in the scene, IMP_MOVE_CAMERA, or IMP_MOVE_EMITTER(k) */
     imp_v3 centre;
-    imp_v3 axis,
-        across;  /* of a camera: unit, and the offset's velocity at the depth 1; of
-                            parallel light the axis is its direction */
-    double rate; /* the velocities' factor */
+    imp_v3 axis;            /* of a spot; of parallel light its direction; unit */
+    double rate;            /* the velocities' factor */
     size_t first, count;    /* its numbers */
     struct imp__fans *fans; /* of vertices with normals; else NULL */
 };
@@ -140,6 +134,7 @@ void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *
 #define IMP_TOUCHED_MOST 18
 size_t imp__mover_touched(const struct imp__moves *moves, const struct imp__mover *mover,
                           const struct imp__glued *x, size_t index[IMP_TOUCHED_MOST]);
+/* ---- cameras_lights.c ---- */
 /* Velocity of emitter k: of its place, or of the unit direction of parallel light. */
 imp_v3 imp__light_velocity(const struct imp__moves *moves, int k,
                            const double *theta_dot);

@@ -87,22 +87,27 @@ static bool at_rest(const struct imp_pose *rigid)
     return rests;
 }
 
-static void sensor_apply(const struct imp_pose *p)
+static enum imp_status sensor_apply(const struct imp_pose *p)
 {
-    static const enum imp_pose_kind view[3] = {IMP_POSE_FOV, IMP_POSE_OFFSET_X,
-                                               IMP_POSE_OFFSET_Y};
     struct imp_sensor *s = p->sensor;
-    double number[3];
+    double number[IMP_VIEW_NUMBERS];
     bool any = false;
     memcpy(s->self, p->rest, p->rest_size);
     if (s->ops->view) s->ops->view(s, number, false);
-    for (int k = 0; k < 3; k++) {
-        const struct imp_pose *q = imp__pose_beside(p, view[k]);
+    for (int k = 0; k < IMP_VIEW_NUMBERS; k++) {
+        const struct imp_pose *q =
+            imp__pose_beside(p, (enum imp_pose_kind)(IMP_POSE_FOV + k));
         if (q) number[k] = q->number[0];
         any |= q != NULL;
     }
-    if (any) s->ops->view(s, number, true);
+    if (any && !s->ops->view(s, number, true))
+        return imp__error(
+            p->scene->ctx, IMP_E_NUMERIC,
+            "the lens of camera '%s' folds its picture with k1, k2, p1, p2, "
+            "k3 = %g, %g, %g, %g, %g",
+            s->name, number[3], number[4], number[5], number[6], number[7]);
     if (!at_rest(imp__pose_beside(p, IMP_POSE_RIGID))) s->ops->move(s, map_of(p).m);
+    return IMP_OK;
 }
 
 static enum imp_status shape_apply(const struct imp_pose *p)
@@ -160,8 +165,8 @@ static enum imp_status pose_apply(struct imp_pose *p)
 {
     p->due = false;
     if (p->shape >= 0) return shape_apply(p);
-    if (p->sensor) sensor_apply(p);
-    else light_apply(p);
+    if (p->sensor) return sensor_apply(p);
+    light_apply(p);
     return IMP_OK;
 }
 
@@ -177,7 +182,12 @@ double imp__pose_large(const struct imp_pose *p, size_t e)
     }
     case IMP_POSE_FOV: return 10;
     case IMP_POSE_OFFSET_X:
-    case IMP_POSE_OFFSET_Y: return 0.1;
+    case IMP_POSE_OFFSET_Y:
+    case IMP_POSE_K1:
+    case IMP_POSE_K2:
+    case IMP_POSE_K3: return 0.1;
+    case IMP_POSE_P1:
+    case IMP_POSE_P2: return 0.02;
     case IMP_POSE_DIRECTION:
         return 0.3 * imp__length(imp__v3(p->number[0], p->number[1], p->number[2]));
     default: return 0.1 * scene;

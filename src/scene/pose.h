@@ -8,6 +8,7 @@
  *     NAME.vertex_positions  of a mesh: the vertices, three numbers each, world
  *     NAME.x_fov             of a perspective camera: its horizontal field of view, degrees
  *     NAME.principal_point_offset_x, _y    of a camera, in parts of the film's width and height
+ *     NAME.opencv_k1, _k2, _p1, _p2, _k3   of a camera, by which its lens distorts the picture
  *     NAME.position          of a light at a point, world
  *     NAME.direction         along which parallel light travels, or of a spot's axis, of any length
  *
@@ -25,10 +26,21 @@ enum imp_pose_kind {
     IMP_POSE_FOV,
     IMP_POSE_OFFSET_X,
     IMP_POSE_OFFSET_Y,
+    IMP_POSE_K1,
+    IMP_POSE_K2,
+    IMP_POSE_P1,
+    IMP_POSE_P2,
+    IMP_POSE_K3,
     IMP_POSE_POSITION,
     IMP_POSE_DIRECTION,
     IMP_POSE_KINDS
 };
+
+/* A number of a camera's view (imp_sensor_ops.view): number kind - IMP_POSE_FOV. */
+static inline bool imp__pose_is_view(enum imp_pose_kind kind)
+{
+    return kind >= IMP_POSE_FOV && kind < IMP_POSE_FOV + IMP_VIEW_NUMBERS;
+}
 
 /* One such parameter. */
 struct imp_pose {

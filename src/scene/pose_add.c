@@ -84,14 +84,11 @@ static const char *shape_kind_why(const struct imp_scene *scene,
 static const char *sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
                               imp_v3 *centre)
 {
-    double number[3];
-    if (kind != IMP_POSE_RIGID && (kind < IMP_POSE_FOV || kind > IMP_POSE_OFFSET_Y))
-        return "it is a sensor";
+    if (kind != IMP_POSE_RIGID && !imp__pose_is_view(kind)) return "it is a sensor";
     if (!s->ops->move) return "it is no perspective camera";
     if (s->medium) return "it is in a medium";
     if (!imp__pinhole(s, centre)) return "its rays meet in no point";
-    if (kind != IMP_POSE_RIGID && (!s->ops->view || !s->ops->view(s, number, false)))
-        return "its lens distorts the picture";
+    if (kind != IMP_POSE_RIGID && !s->ops->view) return "it has no field of view";
     return NULL;
 }
 
@@ -185,7 +182,8 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
 {
     const struct imp_triangles *t =
         p->shape >= 0 ? &scene->shapes[p->shape]->triangles : NULL;
-    double view[3], aim[3];
+    double view[IMP_VIEW_NUMBERS], aim[3];
+    if (imp__pose_is_view(p->kind)) p->sensor->ops->view(p->sensor, view, false);
     p->n = p->kind == IMP_POSE_RIGID      ? 6
            : p->kind == IMP_POSE_VERTICES ? 3 * t->n_vertices
            : p->kind >= IMP_POSE_POSITION ? 3
@@ -197,18 +195,13 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
     case IMP_POSE_VERTICES:
         for (size_t k = 0; k < p->n; k++) p->number[k] = t->positions[k];
         break;
-    case IMP_POSE_FOV:
-    case IMP_POSE_OFFSET_X:
-    case IMP_POSE_OFFSET_Y:
-        p->sensor->ops->view(p->sensor, view, false);
-        p->number[0] = view[p->kind - IMP_POSE_FOV];
-        break;
     case IMP_POSE_POSITION:
     case IMP_POSE_DIRECTION:
         imp__pose_aim(p->emitter, p->kind, aim);
         memcpy(p->number, aim, sizeof aim);
         break;
-    default: break;
+    default:
+        if (imp__pose_is_view(p->kind)) p->number[0] = view[p->kind - IMP_POSE_FOV];
     }
     return IMP_OK;
 }
@@ -224,6 +217,11 @@ static const struct tail {
     [IMP_POSE_OFFSET_X] = {"principal_point_offset_x", "film width", -INFINITY, INFINITY},
     [IMP_POSE_OFFSET_Y] = {"principal_point_offset_y", "film height", -INFINITY,
                            INFINITY},
+    [IMP_POSE_K1] = {"opencv_k1", "1", -INFINITY, INFINITY},
+    [IMP_POSE_K2] = {"opencv_k2", "1", -INFINITY, INFINITY},
+    [IMP_POSE_P1] = {"opencv_p1", "1", -INFINITY, INFINITY},
+    [IMP_POSE_P2] = {"opencv_p2", "1", -INFINITY, INFINITY},
+    [IMP_POSE_K3] = {"opencv_k3", "1", -INFINITY, INFINITY},
     [IMP_POSE_POSITION] = {"position", "scene units", -INFINITY, INFINITY},
     [IMP_POSE_DIRECTION] = {"direction", "1", -INFINITY, INFINITY}};
 
@@ -387,7 +385,7 @@ enum imp_status imp_scene_add_geometry(imp_scene *scene, const char *name)
     }
     return imp__error(scene->ctx, IMP_E_ARG,
                       "'%s' names no number of geometry: NAME.pose, scale, "
-                      "vertex_positions, x_fov, principal_point_offset_x, _y, position "
-                      "or direction",
+                      "vertex_positions, x_fov, principal_point_offset_x, _y, "
+                      "opencv_k1, k2, p1, p2, k3, position or direction",
                       name);
 }

@@ -227,6 +227,37 @@ static void ball_test(void)
     imp_scene_destroy(scene);
 }
 
+/* The same disc through a lens has the radius  R = u (1 + k1 u^2 + k2 u^4 + k3 u^6),  u that of the
+ * pinhole. */
+static void lens_test(void)
+{
+    static const char *const name[4] = {"camera.opencv_k1", "camera.opencv_k2",
+                                        "camera.opencv_k3", "camera.x_fov"};
+    imp_scene *scene;
+    scene_of("<float name='fov' value='50'/><float name='opencv_k1' value='-.2'/><float "
+             "name='opencv_k2' value='.08'/><float name='opencv_k3' value='-.02'/>"
+             "<transform name='to_world'><lookat origin='.1,-.2,4' target='.1,-.2,0' "
+             "up='.3,1,0'/></transform>",
+             24,
+             "<emitter type='constant'><rgb name='radiance' value='5'/></emitter><shape "
+             "type='sphere' id='ball'><float name='radius' value='1.1'/><point "
+             "name='center' x='.1' y='-.2' z='0'/><bsdf type='diffuse'><rgb "
+             "name='reflectance' value='0'/></bsdf></shape>",
+             name[0], &scene);
+    const double t = tan(25 * IMP_PI / 180), u = 1.1 / sqrt(16 - 1.1 * 1.1), u2 = u * u;
+    const double R = u * (1 + u2 * (-.2 + u2 * (.08 - u2 * .02)));
+    const double by_R = -5 * 2 * IMP_PI * R / (4 * t * t);
+    const double truth[4] = {by_R * u * u2, by_R * u * u2 * u2, by_R * u * u2 * u2 * u2,
+                             -by_R * R / t * (1 + t * t) / 2 * (IMP_PI / 180)};
+    for (int k = 1; k < 4; k++) test_must(ctx, imp_scene_add_geometry(scene, name[k]));
+    for (int k = 0; k < 4; k++) {
+        struct tap_stat d[1] = {{0, 0, 0}};
+        mean_gradient(ctx, scene, name[k], 64, 16, d);
+        tap_near(d[0].mean, truth[k], 1e-6, 0, name[k]);
+    }
+    imp_scene_destroy(scene);
+}
+
 /* Radiance at a film position of the unit square. */
 static double radiance_at(const struct imp_tracer *t, struct imp_arena *arena, double x,
                           double y, uint64_t number)
@@ -319,6 +350,7 @@ int main(void)
     penumbra_test();
     view_test();
     ball_test();
+    lens_test();
     frame_test();
     imp_context_destroy(ctx);
     return tap_done();

@@ -94,6 +94,7 @@ static void numbers_test(imp_scene *scene)
     refused(scene, "block.scale", 0, 1e300, IMP_E_NUMERIC, "block.scale", "beyond");
     refused(scene, "block.pose", 1, NAN, IMP_E_ARG, "block.pose", "nan");
     refused(scene, "camera.x_fov", 0, 180, IMP_E_ARG, "camera.x_fov", "outside");
+    refused(scene, "camera.opencv_k1", 0, -40, IMP_E_NUMERIC, "camera", "folds");
 }
 
 static void direction_test(imp_scene *scene)
@@ -183,8 +184,8 @@ int main(void)
     singular_test();
     imp_scene *scene = test_scene_text(ctx, text, IMP_RGB);
     static const char *const names[] = {
-        "sheet.vertex_positions", "block.scale",  "block.pose", "camera.pose",
-        "camera.x_fov",           "sun.direction"};
+        "sheet.vertex_positions", "block.scale",   "block.pose",      "camera.pose",
+        "camera.x_fov",           "sun.direction", "camera.opencv_k1"};
     for (size_t k = 0; k < sizeof names / sizeof *names; k++)
         test_must(ctx, imp_scene_add_geometry(scene, names[k]));
     numbers_test(scene);

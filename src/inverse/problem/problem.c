@@ -77,25 +77,34 @@ void imp_problem_destroy(imp_problem *p)
 
 /* ---- Active parameters --------------------------------------------------------- */
 
-/* A camera's place and lens are no parameters: is it one of them that is meant? */
+/* Properties of a camera that are no parameters: is it one of them that is meant? */
 static enum imp_status camera_geometry(const imp_problem *p, const char *glob)
 {
-    static const char *const names[] = {
-        "to_world",        "fov",       "focal_length", "principal_point_offset_x",
-        "aperture_radius", "opencv_fx", "opencv_fy",    "principal_point_offset_y",
-        "focus_distance",  "opencv_cx", "opencv_cy",    "opencv_k1",
-        "opencv_k2",       "opencv_k3", "opencv_p1",    "opencv_p2"};
+    static const char *const names[][2] = {{"to_world", "pose"},
+                                           {"fov", "x_fov"},
+                                           {"focal_length", "x_fov"},
+                                           {"opencv_fx", "x_fov"},
+                                           {"opencv_fy", "x_fov"},
+                                           {"opencv_cx", "principal_point_offset_x"},
+                                           {"opencv_cy", "principal_point_offset_y"},
+                                           {"aperture_radius", NULL},
+                                           {"focus_distance", NULL}};
     char name[256];
     if (strpbrk(glob, "*?[")) return IMP_OK; /* of parameters, then */
     for (int s = 0; s < p->scene->n_sensors; s++)
         for (size_t k = 0; k < imp_count(names); k++) {
-            snprintf(name, sizeof name, "%s.%s", p->scene->sensors[s]->name, names[k]);
-            if (imp__glob(glob, name))
+            const char *camera = p->scene->sensors[s]->name;
+            snprintf(name, sizeof name, "%s.%s", camera, names[k][0]);
+            if (!imp__glob(glob, name)) continue;
+            if (names[k][1])
                 return imp__error(p->ctx, IMP_E_BIAS,
-                                  "%s has no unbiased derivative: it moves the edges of "
-                                  "the picture, and the terms of that motion are not "
-                                  "computed. Tell it, by a calibration",
-                                  name);
+                                  "%s is no parameter: %s.%s is, where the camera is a "
+                                  "perspective one",
+                                  name, camera, names[k][1]);
+            return imp__error(p->ctx, IMP_E_BIAS,
+                              "%s has no unbiased derivative: it moves the edges of the "
+                              "picture, and the terms of that motion are not computed",
+                              name);
         }
     return IMP_OK;
 }

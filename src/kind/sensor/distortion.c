@@ -22,6 +22,16 @@ void imp__distort(const struct imp_distortion *d, const double at[2], double out
     slope[2] = R + 2 * y * y * by_r2 + 6 * d->p1 * y + 2 * d->p2 * x;
 }
 
+void imp__distort_by(const double at[2], int k, double out[2])
+{
+    const double x = at[0], y = at[1], r2 = x * x + y * y;
+    const double radial[5] = {r2, r2 * r2, 0, 0, r2 * r2 * r2};
+    out[0] = x * radial[k];
+    out[1] = y * radial[k];
+    if (k == 2) out[0] = 2 * x * y, out[1] = r2 + 2 * y * y;
+    if (k == 3) out[0] = r2 + 2 * x * x, out[1] = 2 * x * y;
+}
+
 /* Newton's method from x, which it replaces. Returns the smaller eigenvalue of the slope
  * where it ends; NAN where it does not converge. */
 static double newton(const struct imp_distortion *d, const double seen[2], double x[2])

@@ -25,6 +25,8 @@ struct imp_distortion {
 /* (x'', y''), and d(x'', y'')/d(x, y), which is symmetric: xx, xy, yy. */
 void imp__distort(const struct imp_distortion *d, const double at[2], double out[2],
                   double slope[3]);
+/* d(x'', y'')/dk at (x, y); k: 0 to 4 for k1, k2, p1, p2, k3, OpenCV's order. */
+void imp__distort_by(const double at[2], int k, double out[2]);
 /* Its inverse; the table must be filled. */
 void imp__undistort(const struct imp_distortion *d, const double seen[2], double out[2]);
 

@@ -105,33 +105,48 @@ static void lens_bound(const struct imp_distortion *d, struct imp_film_plane *ou
     out->y_most = -lo[1] + cell[1];
 }
 
+/* Bounds of the film, and the table of a lens that distorts. False: it has no inverse where *seen
+ * is. */
+static bool film_settle(struct imp_film_plane *f, double seen[2])
+{
+    bool distorts = false;
+    for (int i = 0; i < 5; i++) distorts |= f->k[i] != 0;
+    f->lens = NULL;
+    film_bound(f, distorts ? f->beside : ceil(f->beside) + 1);
+    if (!distorts) return true;
+    /* No walk is connected farther out. */
+    const double lo[2] = {-f->x_most, -f->y_most}, hi[2] = {-f->x_least, -f->y_least};
+    struct imp_distortion *d = f->table;
+    d->k1 = f->k[0];
+    d->k2 = f->k[1];
+    d->p1 = f->k[2];
+    d->p2 = f->k[3];
+    d->k3 = f->k[4];
+    if (!imp__distortion_invert(d, lo, hi, seen)) return false;
+    lens_bound(d, f);
+    f->lens = d;
+    return true;
+}
+
 static enum imp_status lens_build(const struct imp_build *b, struct imp_film_plane *out)
 {
     enum imp_status st = IMP_OK;
-    static const char *const names[] = {"opencv_k1", "opencv_k2", "opencv_k3",
-                                        "opencv_p1", "opencv_p2"};
-    double k[5], seen[2];
-    int first = -1;
-    for (int i = 4; i >= 0; i--) {
-        IMP_TRY(imp_build_float(b, names[i], 0, &k[i]));
-        if (k[i] != 0) first = i;
-    }
-    if (first < 0) goto out;
-    struct imp_distortion *d = imp_build_alloc(b, 1, sizeof *d);
-    if (!d) IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "no memory for a distortion"));
-    *d = (struct imp_distortion){
-        .k1 = k[0], .k2 = k[1], .k3 = k[2], .p1 = k[3], .p2 = k[4]};
-    film_bound(out, out->beside); /* no walk is connected farther out */
-    if (!imp__distortion_invert(d, (double[2]){-out->x_most, -out->y_most},
-                                (double[2]){-out->x_least, -out->y_least}, seen))
+    static const char *const names[5] = {"opencv_k1", "opencv_k2", "opencv_p1",
+                                         "opencv_p2", "opencv_k3"};
+    double seen[2];
+    int first = 0;
+    for (int i = 0; i < 5; i++) IMP_TRY(imp_build_float(b, names[i], 0, &out->k[i]));
+    while (first < 4 && out->k[first] == 0) first++;
+    out->table = imp_build_alloc(b, 1, sizeof *out->table);
+    if (!out->table)
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "no memory for a distortion"));
+    if (!film_settle(out, seen))
         IMP_TRY(imp_build_error(
             b, names[first], IMP_E_SCENE,
             "the distortion %s = %g has no inverse in the picture: it folds before film "
             "position (%.1f, %.1f)",
-            names[first], k[first], (-seen[0] - out->x0) / out->dx,
+            names[first], out->k[first], (-seen[0] - out->x0) / out->dx,
             (-seen[1] - out->y0) / out->dy));
-    lens_bound(d, out);
-    out->lens = d;
 out:
     return st;
 }
@@ -145,20 +160,21 @@ enum imp_status imp__film_plane_build(const struct imp_build *b, bool offset,
         .beside = film->filter.radius, .width = film->width, .height = film->height};
     if (imp_build_has(b, "opencv_fx")) IMP_TRY(calibration_read(b, film, out));
     else IMP_TRY(field_read(b, offset, film, out));
-    film_bound(out, ceil(out->beside) + 1);
     IMP_TRY(lens_build(b, out));
 out:
     return st;
 }
 
-bool imp__film_plane_view(struct imp_film_plane *f, double number[3], bool set)
+bool imp__film_plane_view(struct imp_film_plane *f, double number[IMP_VIEW_NUMBERS],
+                          bool set)
 {
     const double t = -f->dx * f->width / 2, ty = -f->dy * f->height / 2;
-    if (f->lens) return false;
+    double seen[2];
     if (!set) {
         number[0] = atan(t) * (360 / IMP_PI);
         number[1] = (1 - f->x0 / t) / 2;
         number[2] = (1 - f->y0 / ty) / 2;
+        for (int i = 0; i < 5; i++) number[3 + i] = f->k[i];
         return true;
     }
     const double wide = tan(number[0] * (IMP_PI / 360)), high = ty * (wide / t);
@@ -166,6 +182,33 @@ bool imp__film_plane_view(struct imp_film_plane *f, double number[3], bool set)
     f->dy = -2 * high / f->height;
     f->x0 = wide * (1 - 2 * number[1]);
     f->y0 = high * (1 - 2 * number[2]);
-    film_bound(f, ceil(f->beside) + 1);
-    return true;
+    for (int i = 0; i < 5; i++) f->k[i] = number[3 + i];
+    return film_settle(f, seen);
+}
+
+/* x'' = x''(x; k) stays where it is on a film that moves by w: with the lens's slope J,
+ *
+ *     J x' + dx''/dk = w
+ */
+void imp__film_plane_velocity(const struct imp_film_plane *f, int number,
+                              const double at[2], double out[2])
+{
+    const double t = -f->dx * f->width / 2, ty = -f->dy * f->height / 2;
+    const double x[2] = {-at[0], -at[1]}; /* axes to the right and down */
+    double seen[2] = {x[0], x[1]}, slope[3] = {1, 0, 1}, w[2] = {0, 0};
+    if (f->lens) imp__distort(f->lens, x, seen, slope);
+    if (number == 0) { /* all lengths on the film are as t */
+        const double rate = (1 + t * t) / (2 * t) * (IMP_PI / 180);
+        w[0] = seen[0] * rate;
+        w[1] = seen[1] * rate;
+    } else if (number <= 2) {
+        w[number - 1] = number == 1 ? 2 * t : 2 * ty;
+    } else {
+        imp__distort_by(x, number - 3, w);
+        w[0] = -w[0];
+        w[1] = -w[1];
+    }
+    const double det = slope[0] * slope[2] - slope[1] * slope[1];
+    out[0] = -(slope[2] * w[0] - slope[1] * w[1]) / det;
+    out[1] = -(slope[0] * w[1] - slope[1] * w[0]) / det;
 }

@@ -47,10 +47,20 @@ static void move(struct imp_sensor *s, const double to_world[12])
     imp__projection_move(&p->projection, to_world);
 }
 
-static bool view(struct imp_sensor *s, double number[3], bool set)
+static bool view(struct imp_sensor *s, double number[IMP_VIEW_NUMBERS], bool set)
 {
     struct perspective *p = s->self;
     return imp__film_plane_view(&p->film, number, set);
+}
+
+static imp_v3 view_velocity(const struct imp_sensor *s, int k, imp_v3 r)
+{
+    const struct perspective *p = s->self;
+    const imp_v3 q = imp__vector(&p->projection.to_local, r);
+    const double at[2] = {q[0] / q[2], q[1] / q[2]};
+    double v[2];
+    imp__film_plane_velocity(&p->film, k, at, v);
+    return imp__vector(&p->projection.to_world, imp__v3(v[0] * q[2], v[1] * q[2], 0));
 }
 
 const struct imp_sensor_ops imp__perspective = {.size = sizeof(struct imp_sensor_ops),
@@ -60,4 +70,5 @@ const struct imp_sensor_ops imp__perspective = {.size = sizeof(struct imp_sensor
                                                 .ray = ray,
                                                 .connect = connect,
                                                 .move = move,
-                                                .view = view};
+                                                .view = view,
+                                                .view_velocity = view_velocity};

@@ -57,15 +57,21 @@ struct imp_film_plane {
     /* Bounds of x and y on the film, with a filter's radius and a pixel beside it. */
     double x_least, x_most, y_least, y_most;
     double beside, width, height;      /* the filter's radius, and the film, in pixels */
-    const struct imp_distortion *lens; /* NULL: none */
+    double k[5];                       /* of the lens: k1, k2, p1, p2, k3 */
+    struct imp_distortion *table;      /* place for the lens */
+    const struct imp_distortion *lens; /* the table, filled; NULL: k is 0 */
 };
 /* Field of view, principal point and distortion. `offset`: principal_point_offset_x, _y
  * are properties too. */
 enum imp_status imp__film_plane_build(const struct imp_build *b, bool offset,
                                       const struct imp_film_desc *film,
                                       struct imp_film_plane *out);
-/* imp_sensor_ops.view of a film without a lens that distorts. */
-bool imp__film_plane_view(struct imp_film_plane *film, double number[3], bool set);
+/* imp_sensor_ops.view. */
+bool imp__film_plane_view(struct imp_film_plane *film, double number[IMP_VIEW_NUMBERS],
+                          bool set);
+/* d(x, y)/d(number) of what a fixed film position sees, where it sees (x, y, 1). */
+void imp__film_plane_velocity(const struct imp_film_plane *film, int number,
+                              const double at[2], double out[2]);
 /* (x, y, 1) at a film position. */
 static inline imp_v3 imp__film_plane_at(const struct imp_film_plane *film, double px,
                                         double py)

@@ -28,4 +28,4 @@ for i in range(100):
 n = (x * x + y * y + 1) ** .5
 print("%.4f %.4f %.4f" % (-x / n, -y / n, 1 / n))'
 importon render lens.xml -D k1=-0.9 --pixel 7,5
-importon gradient lens.xml -p cam.opencv_k1
+importon gradient lens.xml -p cam.opencv_fx

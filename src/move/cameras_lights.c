@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Velocities of cameras and lights, and the transposes (moves.h). */
+#include "moves.h"
+
+static imp_v3 number3(const double *theta)
+{
+    return imp__v3(theta[0], theta[1], theta[2]);
+}
+static void add3(double *bar, imp_v3 v)
+{
+    for (int i = 0; i < 3; i++) bar[i] += v[i];
+}
+
+/* At r from the camera's centre, by the one number of a mover that is no pose. */
+static imp_v3 view_velocity(const struct imp__moves *moves, const struct imp__mover *m,
+                            imp_v3 r)
+{
+    const struct imp_sensor *s = moves->sensor;
+    return s->ops->view_velocity(s, (int)m->kind - IMP_MOVE_VIEW, r);
+}
+
+imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 p,
+                            const double *theta_dot)
+{
+    imp_v3 u = {0};
+    for (int k = 0; k < moves->n_movers; k++) {
+        const struct imp__mover *m = &moves->mover[k];
+        if (m->shape != IMP_MOVE_CAMERA) continue;
+        const double *theta = theta_dot + m->first;
+        const imp_v3 r = p - m->centre;
+        if (m->kind == IMP_MOVE_POSE)
+            u += number3(theta) + imp__cross(number3(theta + 3), r);
+        else u += view_velocity(moves, m, r) * theta[0];
+    }
+    return u;
+}
+
+void imp__camera_velocity_bar(const struct imp__moves *moves, imp_v3 p, imp_v3 bar,
+                              double *theta_bar)
+{
+    for (int k = 0; k < moves->n_movers; k++) {
+        const struct imp__mover *m = &moves->mover[k];
+        if (m->shape != IMP_MOVE_CAMERA) continue;
+        const imp_v3 r = p - m->centre;
+        if (m->kind == IMP_MOVE_POSE) {
+            add3(theta_bar + m->first, bar);
+            add3(theta_bar + m->first + 3, imp__cross(r, bar));
+        } else {
+            theta_bar[m->first] += imp__dot(view_velocity(moves, m, r), bar);
+        }
+    }
+}
+
+/* Across the direction of parallel light, or a spot's axis; a place in full. */
+static imp_v3 light_part(const struct imp__moves *moves, const struct imp__mover *m,
+                         imp_v3 v)
+{
+    const struct imp_emitter *e = moves->scene->emitters[IMP_MOVE_EMITTER(m->shape)];
+    if (m->kind != IMP_MOVE_AXIS && !(e->ops->flags & IMP_EMITTER_FAR)) return v;
+    return (v - m->axis * imp__dot(m->axis, v)) * m->rate;
+}
+
+imp_v3 imp__light_velocity(const struct imp__moves *moves, int k, const double *theta_dot)
+{
+    imp_v3 out = {0};
+    for (int j = 0; j < moves->n_movers; j++) {
+        const struct imp__mover *m = &moves->mover[j];
+        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_LIGHT)
+            out += light_part(moves, m, number3(theta_dot + m->first));
+    }
+    return out;
+}
+
+void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 bar,
+                             double *theta_bar)
+{
+    for (int j = 0; j < moves->n_movers; j++) {
+        const struct imp__mover *m = &moves->mover[j];
+        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_LIGHT)
+            add3(theta_bar + m->first, light_part(moves, m, bar));
+    }
+}
+
+void imp__light_axis_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
+                         double *theta_bar)
+{
+    for (int j = 0; j < moves->n_movers; j++) {
+        const struct imp__mover *m = &moves->mover[j];
+        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_AXIS)
+            add3(theta_bar + m->first,
+                 light_part(moves, m, imp__cross(turn_bar, m->axis)));
+    }
+}

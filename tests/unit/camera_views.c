@@ -1,0 +1,113 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The numbers of a camera's view (imp_sensor_ops.view): what is set is read, rays follow it, and
+ * view_velocity is the difference of rays. */
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include "scene/scene.h"
+#include <math.h>
+
+static imp_context *ctx;
+static const char *const names[IMP_VIEW_NUMBERS] = {
+    "x_fov", "offset x", "offset y", "k1", "k2", "p1", "p2", "k3"};
+
+static imp_scene *camera(const char *lens)
+{
+    char xml[2048];
+    snprintf(
+        xml, sizeof xml,
+        "<scene version='3.0.0'><sensor type='perspective' id='camera'><float "
+        "name='fov' value='60'/><float name='principal_point_offset_x' value='.04'/>%s"
+        "<transform name='to_world'><lookat origin='1,2,3' target='-1,.5,7' "
+        "up='.1,1,0'/></transform><film type='hdrfilm'><integer name='width' "
+        "value='64'/><integer name='height' value='36'/></film></sensor><emitter "
+        "type='constant'/></scene>",
+        lens);
+    return test_scene_text(ctx, xml, IMP_MONO);
+}
+
+static imp_v3 seen(const struct imp_sensor *s, double px, double py)
+{
+    const double lens[2] = {.5, .5};
+    struct imp_sensor_ray r;
+    s->ops->ray(s, px, py, lens, &r);
+    return r.d;
+}
+
+static void slopes(const char *lens, const char *what)
+{
+    imp_scene *scene = camera(lens);
+    struct imp_sensor *s = scene->sensors[0];
+    double number[IMP_VIEW_NUMBERS], again[IMP_VIEW_NUMBERS];
+    tap_ok(s->ops->view(s, number, false), "%s: its numbers are read", what);
+    const double cx = (.5 - number[1]) * 64, cy = (.5 - number[2]) * 36;
+    const imp_v3 axis = seen(s, cx, cy);
+    for (int k = 0; k < IMP_VIEW_NUMBERS; k++) {
+        const double h = k == 0 ? 1e-3 : 1e-5;
+        double worst = 0;
+        for (int i = 0; i < 35; i++) {
+            const double px = 64 * (i % 7) / 6., py = 36 * (i / 7) / 4., depth = 2.5;
+            imp_v3 at[2];
+            for (int side = 0; side < 2; side++) {
+                memcpy(again, number, sizeof again);
+                again[k] += side ? h : -h;
+                s->ops->view(s, again, true);
+                const imp_v3 d = seen(s, px, py);
+                at[side] = d * (depth / imp__dot(d, axis));
+            }
+            s->ops->view(s, number, true);
+            const imp_v3 d = seen(s, px, py), r = d * (depth / imp__dot(d, axis));
+            const imp_v3 slope = (at[1] - at[0]) * (.5 / h),
+                         told = s->ops->view_velocity(s, k, r);
+            worst = fmax(worst, imp__length(slope - told) / (1e-3 + imp__length(slope)));
+        }
+        tap_ok(worst < 1e-6, "%s: what a pixel sees by %s # off by %.1e", what, names[k],
+               worst);
+    }
+    s->ops->view(s, again, false);
+    double worst = 0;
+    for (int k = 0; k < IMP_VIEW_NUMBERS; k++)
+        worst = fmax(worst, fabs(again[k] - number[k]));
+    tap_ok(worst < 1e-12, "%s: what is set is read # off by %.1e", what, worst);
+    imp_scene_destroy(scene);
+}
+
+/* A lens whose numbers become 0 is none, to the last bit; one that folds is refused. */
+static void limits(void)
+{
+    imp_scene *plain = camera(""),
+              *lens = camera("<float name='opencv_k1' value='-.1'/>");
+    struct imp_sensor *s = lens->sensors[0], *pinhole = plain->sensors[0];
+    double number[IMP_VIEW_NUMBERS];
+    s->ops->view(s, number, false);
+    tap_ok(number[3] == -.1, "k1 of the file # %g", number[3]);
+    number[3] = -20;
+    tap_ok(!s->ops->view(s, number, true), "a lens that folds the picture");
+    number[3] = NAN;
+    tap_ok(!s->ops->view(s, number, true), "a lens without a number");
+    pinhole->ops->view(pinhole, number, false);
+    pinhole->ops->view(pinhole, number, true);
+    tap_ok(s->ops->view(s, number, true), "and none");
+    int differ = 0;
+    for (int i = 0; i < 100; i++) {
+        const imp_v3 a = seen(s, .64 * i, .36 * (99 - i)),
+                     b = seen(pinhole, .64 * i, .36 * (99 - i));
+        for (int c = 0; c < 3; c++) differ += a[c] != b[c];
+    }
+    tap_ok(differ == 0, "without distortion it is a pinhole # %d numbers differ", differ);
+    imp_scene_destroy(plain);
+    imp_scene_destroy(lens);
+}
+
+int main(void)
+{
+    ctx = test_context(1);
+    slopes("", "a pinhole");
+    slopes("<float name='opencv_k1' value='-.12'/><float name='opencv_k2' value='.05'/>"
+           "<float name='opencv_k3' value='-.01'/><float name='opencv_p1' value='.004'/>"
+           "<float name='opencv_p2' value='-.007'/>",
+           "a lens");
+    limits();
+    imp_context_destroy(ctx);
+    return tap_done();
+}
