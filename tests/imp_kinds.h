@@ -236,6 +236,13 @@ static inline bool kind_steps(const struct kind_case *c)
     return strstr(c->label, "merl") || strstr(c->label, "measured");
 }
 
+/* Fibres and tables inside another material: dear to evaluate, and the outer kind is met with all
+ * other materials inside. They wait for the long run. */
+static inline bool kind_waits(const struct kind_case *c)
+{
+    return strchr(c->label, '(') && (kind_steps(c) || strstr(c->label, "hair"));
+}
+
 static inline int kinds_visit(struct kind_factory *f,
                               void (*visit)(const struct kind_case *c, void *payload),
                               void *payload)

@@ -128,13 +128,14 @@ static double wrong_pdf(const struct imp_bsdf *b, const imp_spec *in,
 }
 
 /* Pictures and gradients are wrong alike then, and no difference is far off. */
-static void wrong_densities(void)
+static void wrong_densities(bool both_signs)
 {
     static const char *const kinds[] = {"roughconductor", "diffuse"};
     imp_scene *s = test_scene(ctx, "textured.xml", IMP_RGB, "width=24 height=16");
     imp_problem *p = test_problem(ctx, s, "metal*");
     for (size_t k = 0; k < imp_count(kinds); k++)
         for (int sign = -1; sign <= 1; sign += 2) {
+            if (!both_signs && sign == (k ? -1 : 1)) continue;
             struct imp_bsdf_ops wrong;
             for (int i = 0; i < s->n_bsdfs; i++)
                 if (!strcmp(s->bsdfs[i]->ops->name, kinds[k]))
@@ -295,7 +296,7 @@ int main(int argc, char **argv)
     ctx = test_context(0);
     imp_scene *s = test_scene(ctx, "stam.xml", IMP_MONO, "res=16");
     /* seven controls; emission, sphere, walls */
-    passes(s, "Stam's box", 1000, 256, 7 * 4, 3, 7, 0);
+    passes(s, "Stam's box", 300, 256, 7 * 4, 3, 7, 0);
     imp_scene_destroy(s);
     if (is_long) {
         s = test_scene(ctx, "stam.xml", IMP_MONO,
@@ -337,7 +338,7 @@ int main(int argc, char **argv)
     wrong_end("cornell.xml", "res=16", "*", IMP_FROM_LIGHTS, 1.15, 6);
     if (is_long) wrong_end("cornell.xml", "res=16", "*", IMP_FROM_SENSOR, 1.15, 5);
     wrong_end("textured.xml", "width=24 height=18", "floor.*", IMP_FROM_SENSOR, 0.5, 2);
-    wrong_densities();
+    wrong_densities(is_long);
     black_and_white();
     imp_context_destroy(ctx);
     return tap_done();

@@ -103,7 +103,8 @@ static void loss(imp_context *ctx, int spp, int repeats)
     for (int k = 0; k < 8; k++) {
         char what[160];
         snprintf(what, sizeof what, "loss at %d spp: %s", spp, k ? names[k - 1] : "J");
-        agrees(stat[k].mean, tap_se(&stat[k]), ref[k], spp < 16 ? .12 : .06, what);
+        agrees(stat[k].mean, tap_se(&stat[k]), ref[k], 10 / sqrt(spp * (double)repeats),
+               what);
         /* The reported variance against the spread of the repeats, whose logarithm has a
          * standard error of sqrt(2/(repeats - 1)) for normal numbers, which sums over a
          * thousand pixels nearly are: 4 of them. Paired pixels give a bound, here a tight
@@ -135,13 +136,13 @@ int main(int argc, char **argv)
         imp_context_destroy(ctx);
         return tap_done();
     }
-    means(ctx, "microfacet", "mixture", 4096, m2, .006);
-    means(ctx, "microfacet", "cosine", 2048, m2, .06);
-    means(ctx, "paper", "mixture", 2048, m2p, .01);
-    means(ctx, "microfacet", "mixture integrator=path", 2048, m2,
-          .011); /* lights sampled */
-    loss(ctx, 2, 4000);
-    loss(ctx, 256, 60);
+    means(ctx, "microfacet", "mixture", 1024, m2, .012);
+    means(ctx, "microfacet", "cosine", 512, m2, .12);
+    means(ctx, "paper", "mixture", 512, m2p, .02);
+    means(ctx, "microfacet", "mixture integrator=path", 512, m2,
+          .022); /* lights sampled */
+    loss(ctx, 2, 1000);
+    loss(ctx, 64, 60);
     imp_context_destroy(ctx);
     return tap_done();
 }

@@ -119,6 +119,7 @@ static void visit(const struct kind_case *c, void *payload)
 {
     const struct census *all = payload;
     int configurations = 1, cells = 0;
+    if (directions < MOST_DIRECTIONS && kind_waits(c)) return;
     for (int i = 0; all[i].kind; i++)
         if (strcmp(all[i].kind, c->kind) == 0) configurations = all[i].n;
     const int samples = SAMPLES_OF_A_KIND / MOST_DIRECTIONS / configurations + 1;

@@ -199,7 +199,7 @@ int main(int argc, char **argv)
     if (all) {
         coverage_test(argc > 2 ? atoi(argv[2]) : 200, 64, 64, 4);
     } else {
-        coverage_test(6, 32, 16, 3);
+        coverage_test(3, 32, 8, 3);
         together_test();
         adam_test();
     }
