@@ -191,6 +191,19 @@ struct imp_param *imp__measure_film_number(const struct imp__measure *m,
     return NULL;
 }
 
+/* Textures of lights have no unit: their inputs' names tell. */
+bool imp__measure_shines(const struct imp__measure *m, size_t k)
+{
+    static const char *const part[] = {"scale.", ".data", "radiance.", "emission.",
+                                       "intensity."};
+    const struct imp_param_info *info = &m->scene->params[k].info;
+    if (imp__pose_of(m->scene, k)) return false;
+    if (info->unit && info->unit[0] == 'W') return true;
+    for (size_t i = 0; i < sizeof part / sizeof *part; i++)
+        if (strstr(info->name, part[i])) return true;
+    return false;
+}
+
 /* Has each light a measured number, of `lanes` values at least? */
 static bool lights_free(const struct imp__measure *m, size_t lanes)
 {
@@ -200,7 +213,7 @@ static bool lights_free(const struct imp__measure *m, size_t lanes)
         for (size_t k = 0; k < s->n_params && !met; k++)
             met = (m->stage[k] == IMP_MEASURE_LIGHTS ||
                    m->stage[k] == IMP_MEASURE_TEXTURES) &&
-                  !imp__pose_of(s, k) && s->params[k].info.count >= lanes &&
+                  imp__measure_shines(m, k) && s->params[k].info.count >= lanes &&
                   is_below(s->params[k].info.name, s->emitters[e]->name);
         if (!met) return false;
     }

@@ -43,7 +43,7 @@ static bool is_tied(const struct imp__measure *m, enum imp_measure_stage stage, 
     const struct imp_param *q = &m->scene->params[k];
     bool shines = false;
     if (stage != IMP_MEASURE_EXPOSURE || m->stage[k] != IMP_MEASURE_LIGHTS ||
-        imp__pose_of(m->scene, k) || imp__measure_holds(m, k))
+        !imp__measure_shines(m, k) || imp__measure_holds(m, k))
         return false;
     for (size_t e = 0; e < q->info.count; e++) shines |= imp__param_get(q, e) > 0;
     return shines && !strpbrk(q->info.name, "*?[],");
@@ -242,6 +242,18 @@ static enum imp_status row_add(struct imp__measure *m, enum imp_measure_stage st
         round, imp_measure_stage_name(stage), r->n, r->n == 1 ? "" : "s", r->iterations,
         r->iterations == 1 ? "" : "s", 100 * r->residual, row->chi2, row->chi2_se,
         row->explained ? "explained" : "not explained");
+}
+
+enum imp_status imp__measure_judge_again(struct imp__measure *m)
+{
+    struct imp_measure_row *row = &m->rows[m->n_rows - 1];
+    m->looked = false;
+    IMP_CHECKED(imp__measure_look(m));
+    row_judge(m, row);
+    return imp__measure_say(m,
+                            "round %d, %s: by this noise chi-square is %.3g +- %.2g, %s",
+                            row->round, imp_measure_stage_name(row->stage), row->chi2,
+                            row->chi2_se, row->explained ? "explained" : "not explained");
 }
 
 enum imp_status imp__measure_fit(struct imp__measure *m, enum imp_measure_stage stage,
