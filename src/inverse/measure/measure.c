@@ -86,8 +86,18 @@ static struct imp_measure_row *row_of(struct imp__measure *m, int stage)
 static enum imp_status stages_judge(struct imp__measure *m, const double *moved,
                                     bool masks_changed, bool quieter, bool *again)
 {
-    const bool explained = m->rows[m->n_rows - 1].explained;
-    const bool last = m->round >= m->o.rounds;
+    const struct imp_measure_row *answer = &m->rows[m->n_rows - 1];
+    const bool explained = answer->explained, last = m->round >= m->o.rounds;
+    const bool blind = answer->chi2_se >= IMP_MEASURE_BLIND &&
+                       answer->chi2 - 1 < AGAIN * answer->chi2_se;
+    if (blind) {
+        *again = false;
+        memset(m->due, 0, sizeof m->due);
+        return imp__measure_say(m,
+                                "round %d: with so few samples chi-square tells nothing, "
+                                "and other rounds would not: more are needed (--spp)",
+                                m->round);
+    }
     *again = masks_changed || quieter;
     for (int s = 0; s < IMP_MEASURE_TOGETHER; s++) {
         struct imp_measure_row *row = row_of(m, s);

@@ -18,7 +18,6 @@
 #define LEVELS     4 /* of cameras, in the first round, ... */
 #define ACROSS     8 /* ... through tents of at most this part of a photograph */
 #define TEXTURE    4 /* levels of textures */
-#define BLIND      1 /* an error of chi-square with which nothing is explained */
 #define DOUBT      3 /* errors of chi-square above 1 from which on a stage is not explained */
 
 /* ---- Which numbers --------------------------------------------------------------------- */
@@ -214,7 +213,7 @@ static void row_judge(const struct imp__measure *m, struct imp_measure_row *row)
     row->chi2 = sum / freedom;
     row->chi2_se = hypot(sqrt(variance) / freedom, noise_of / freedom);
     row->explained =
-        values > 0 && row->chi2 - 1 < DOUBT * row->chi2_se && row->chi2_se < BLIND;
+        values > 0 && row->chi2 - 1 < DOUBT * row->chi2_se && row->chi2_se < IMP_MEASURE_BLIND;
 }
 
 static enum imp_status row_add(struct imp__measure *m, enum imp_measure_stage stage,

@@ -31,6 +31,9 @@ struct imp__photo {
     size_t n_compared; /* values in it */
 };
 
+/* An error of chi-square with which nothing is explained. */
+#define IMP_MEASURE_BLIND 1
+
 struct imp__measure {
     imp_context *ctx;
     struct imp_scene *scene;
