@@ -313,7 +313,8 @@ static enum imp_status result_make(struct imp__measure *m, imp_problem *p,
     size_t *textures = imp__arena_array(a, m->scene->n_params + 1, sizeof *textures);
     if (!textures) return imp__error(m->ctx, no_memory, "no memory for an answer");
     for (size_t k = 0; k < m->scene->n_params; k++)
-        if (m->stage[k] == IMP_MEASURE_TEXTURES) textures[r->n_textures++] = k;
+        if (m->stage[k] == IMP_MEASURE_TEXTURES && !m->joined)
+            textures[r->n_textures++] = k;
     r->textures = textures;
     struct imp_measure_row *rows = imp__arena_array(a, m->n_rows, sizeof *rows);
     const char **lines = imp__arena_array(a, m->n_lines, sizeof *lines);

@@ -8,7 +8,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#define FIELD 12 /* a parameter of more numbers, but no spectrum, is a texture */
+#define FIELD 12  /* a parameter of more numbers, but no spectrum, is a texture */
+#define FEW   236 /* numbers, textures included, that imp_plan and imp_problem_missing take */
 
 /* ---- Poses ----------------------------------------------------------------------------- */
 
@@ -237,15 +238,18 @@ static enum imp_status unit_hold(struct imp__measure *m, const char *number,
 
 /* ---- All of it ------------------------------------------------------------------------- */
 
+bool imp__measure_has(const struct imp__measure *m, enum imp_measure_stage stage, size_t k)
+{
+    return stage == IMP_MEASURE_TOGETHER
+               ? m->stage[k] < IMP_MEASURE_TEXTURES + (m->joined ? 1 : 0)
+               : m->stage[k] == stage;
+}
+
 size_t imp__measure_count(const struct imp__measure *m, enum imp_measure_stage stage)
 {
     size_t n = 0;
-    for (size_t k = 0; k < m->scene->n_params; k++) {
-        const bool own = stage == IMP_MEASURE_TOGETHER
-                             ? m->stage[k] < IMP_MEASURE_TEXTURES
-                             : m->stage[k] == stage;
-        n += own ? m->scene->params[k].info.count : 0;
-    }
+    for (size_t k = 0; k < m->scene->n_params; k++)
+        n += imp__measure_has(m, stage, k) ? m->scene->params[k].info.count : 0;
     return n;
 }
 
@@ -280,9 +284,10 @@ enum imp_status imp__measure_numbers(struct imp__measure *m)
         IMP_CHECKED(unit_hold(m, "white_balance_red", why));
         IMP_CHECKED(unit_hold(m, "white_balance_blue", why));
     }
-    if (imp__measure_count(m, IMP_MEASURE_TOGETHER) +
-            imp__measure_count(m, IMP_MEASURE_TEXTURES) ==
-        0)
+    const size_t all = imp__measure_count(m, IMP_MEASURE_TOGETHER) +
+                       imp__measure_count(m, IMP_MEASURE_TEXTURES);
+    m->joined = all <= FEW;
+    if (all == 0)
         return imp__error(m->ctx, IMP_E_ARG,
                           "no number of the scene is to be measured: stages, params and "
                           "hold leave none that has a gradient");

@@ -22,12 +22,6 @@
 
 /* ---- Which numbers --------------------------------------------------------------------- */
 
-static bool is_own(const struct imp__measure *m, enum imp_measure_stage stage, size_t k)
-{
-    return stage == IMP_MEASURE_TOGETHER ? m->stage[k] < IMP_MEASURE_TEXTURES
-                                         : m->stage[k] == stage;
-}
-
 /* While cameras are found, all numbers but textures go along: contrasts between wrong paints would
  * turn the cameras. Films' numbers go along with lights. */
 static bool is_along(const struct imp__measure *m, enum imp_measure_stage stage, size_t k)
@@ -123,6 +117,23 @@ out:
     return st;
 }
 
+/* Numbers of materials that have no bound above (roughnesses, extinctions) move as logarithms, too: a step
+ * that takes a roughness to nearly nothing ends where few pixels tell of it, and no derivative
+ * leads back. */
+static enum imp_status sizes_tie(struct imp__measure *m, imp_problem *p)
+{
+    for (size_t k = 0; k < m->scene->n_params; k++) {
+        const struct imp_param *q = &m->scene->params[k];
+        bool positive = m->stage[k] == IMP_MEASURE_MATERIALS && p->chosen[k] &&
+                        !isfinite(q->info.hi) && q->info.lo >= 0;
+        for (size_t e = 0; e < q->info.count; e++) positive &= imp__param_get(q, e) > 0;
+        if (!positive || imp__measure_holds(m, k) || strpbrk(q->info.name, "*?[],"))
+            continue;
+        IMP_CHECKED(imp_problem_tie(p, q->info.name, IMP_TIE_LOG));
+    }
+    return IMP_OK;
+}
+
 static enum imp_status problem_make(struct imp__measure *m, enum imp_measure_stage stage,
                                     bool last, imp_problem **out)
 {
@@ -131,12 +142,13 @@ static enum imp_status problem_make(struct imp__measure *m, enum imp_measure_sta
     uint8_t *chosen = imp__alloc(m->ctx, m->scene->n_params + 1, 1);
     if (!chosen) IMP_TRY(imp__error(m->ctx, IMP_E_NOMEM, "no memory for a stage"));
     for (size_t k = 0; k < m->scene->n_params; k++)
-        chosen[k] = is_own(m, stage, k) || is_along(m, stage, k) || is_tied(m, stage, k);
+        chosen[k] = imp__measure_has(m, stage, k) || is_along(m, stage, k) || is_tied(m, stage, k);
     IMP_TRY(imp_problem_create(m->scene, &p));
     IMP_TRY(imp__problem_layout(p, chosen));
     if (m->held) IMP_TRY(imp__problem_hold_marked(p, m->held));
     IMP_TRY(lights_tie(m, stage, p));
     IMP_TRY(exposures_tie(m, p));
+    IMP_TRY(sizes_tie(m, p));
     for (size_t i = 0; i < m->n_photos; i++) IMP_TRY(target_add(m, p, i, last));
     *out = p;
     p = NULL;
@@ -172,7 +184,7 @@ static void places_note(struct imp__measure *m, enum imp_measure_stage stage,
     for (size_t i = 0; i < p->n; i++) {
         const struct imp__block *b = imp__problem_block(p, i);
         struct imp_fit_variable v = IMP_FIT_VARIABLE_INIT;
-        if (imp__block_factor(p, b) || !is_own(m, stage, b->param) ||
+        if (imp__block_factor(p, b) || !imp__measure_has(m, stage, b->param) ||
             imp_problem_get_fit_variable(p, i, &v) != IMP_OK)
             continue;
         const size_t at = m->scene->params[b->param].info.offset + (i - b->first);

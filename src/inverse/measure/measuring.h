@@ -46,6 +46,7 @@ struct imp__measure {
     uint8_t *stage; /* [n_params] of which stage it is; IMP_MEASURE_STAGES: held */
     size_t n_holds;
     struct imp__held *holds;      /* [n_holds] the items of o.hold */
+    bool joined;                  /* textures are few: the last fit has them */
     uint8_t *held;                /* [n_theta] single numbers that stay; NULL: none */
     double *at;                   /* [n_theta] where its own stage has left each number */
     double *at_se;                /* [n_theta] and its standard error there; 0: none */
@@ -88,6 +89,9 @@ bool imp__measure_holds(const struct imp__measure *m, size_t k);
 /* Is parameter k a factor of what a light sends: a radiance or the like, or a scale, and no place,
  * angle or turbidity? */
 bool imp__measure_shines(const struct imp__measure *m, size_t k);
+/* Is parameter k of a stage? The last fit has those of all stages before textures, and of textures where
+ * they are few. */
+bool imp__measure_has(const struct imp__measure *m, enum imp_measure_stage stage, size_t k);
 /* How many numbers a stage has. */
 size_t imp__measure_count(const struct imp__measure *m, enum imp_measure_stage stage);
 
