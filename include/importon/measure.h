@@ -132,7 +132,8 @@ struct imp_measure_result {
     /** The last fit with intervals: of `problem`. */
     const struct imp_fit_result *fit;
     size_t n_textures;
-    const size_t *textures; /**< [n_textures] those of the stage of this name that the last fit
+    const size_t
+        *textures; /**< [n_textures] those of the stage of this name that the last fit
                                  does not have: they have no intervals */
     /** Where it is not explained: numbers that are not measured and may be wrong. */
     size_t n_missing;

@@ -8,8 +8,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#define FIELD 12  /* a parameter of more numbers, but no spectrum, is a texture */
-#define FEW   236 /* numbers, textures included, that imp_plan and imp_problem_missing take */
+#define FIELD 12 /* a parameter of more numbers, but no spectrum, is a texture */
+#define FEW                                                                              \
+    236 /* numbers, textures included, that imp_plan and imp_problem_missing take */
 
 /* ---- Poses ----------------------------------------------------------------------------- */
 
@@ -238,7 +239,8 @@ static enum imp_status unit_hold(struct imp__measure *m, const char *number,
 
 /* ---- All of it ------------------------------------------------------------------------- */
 
-bool imp__measure_has(const struct imp__measure *m, enum imp_measure_stage stage, size_t k)
+bool imp__measure_has(const struct imp__measure *m, enum imp_measure_stage stage,
+                      size_t k)
 {
     return stage == IMP_MEASURE_TOGETHER
                ? m->stage[k] < IMP_MEASURE_TEXTURES + (m->joined ? 1 : 0)

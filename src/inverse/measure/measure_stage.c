@@ -142,7 +142,8 @@ static enum imp_status problem_make(struct imp__measure *m, enum imp_measure_sta
     uint8_t *chosen = imp__alloc(m->ctx, m->scene->n_params + 1, 1);
     if (!chosen) IMP_TRY(imp__error(m->ctx, IMP_E_NOMEM, "no memory for a stage"));
     for (size_t k = 0; k < m->scene->n_params; k++)
-        chosen[k] = imp__measure_has(m, stage, k) || is_along(m, stage, k) || is_tied(m, stage, k);
+        chosen[k] = imp__measure_has(m, stage, k) || is_along(m, stage, k) ||
+                    is_tied(m, stage, k);
     IMP_TRY(imp_problem_create(m->scene, &p));
     IMP_TRY(imp__problem_layout(p, chosen));
     if (m->held) IMP_TRY(imp__problem_hold_marked(p, m->held));
@@ -165,7 +166,7 @@ static int levels_of(const struct imp__measure *m, enum imp_measure_stage stage,
                      int round)
 {
     int levels = 1;
-    if (stage == IMP_MEASURE_TEXTURES) return TEXTURE;
+    if (stage == IMP_MEASURE_TEXTURES) return m->joined ? 0 : TEXTURE;
     if (stage != IMP_MEASURE_CAMERAS || round > 1) return 0;
     for (size_t i = 0; i < m->n_photos; i++) {
         const struct imp_photo *d = &m->photos[i].desc;
@@ -224,8 +225,8 @@ static void row_judge(const struct imp__measure *m, struct imp_measure_row *row)
     const double freedom = fmax(values - (double)row->n, 1);
     row->chi2 = sum / freedom;
     row->chi2_se = hypot(sqrt(variance) / freedom, noise_of / freedom);
-    row->explained =
-        values > 0 && row->chi2 - 1 < DOUBT * row->chi2_se && row->chi2_se < IMP_MEASURE_BLIND;
+    row->explained = values > 0 && row->chi2 - 1 < DOUBT * row->chi2_se &&
+                     row->chi2_se < IMP_MEASURE_BLIND;
 }
 
 static enum imp_status row_add(struct imp__measure *m, enum imp_measure_stage stage,
@@ -278,12 +279,13 @@ enum imp_status imp__measure_fit(struct imp__measure *m, enum imp_measure_stage 
     const struct imp_fit_result *r = NULL;
     const char *name = imp_measure_stage_name(stage);
     run.seed = imp__mix64(m->run.seed ^ (SEED + 16 * (uint64_t)round + (uint64_t)stage));
-    o.optimizer = stage == IMP_MEASURE_TEXTURES ? IMP_ADAM : IMP_LM;
-    o.intervals = stage != IMP_MEASURE_TEXTURES;
+    const bool many = stage == IMP_MEASURE_TEXTURES && !m->joined;
+    o.optimizer = many ? IMP_ADAM : IMP_LM;
+    o.intervals = !many;
     o.max_iterations = m->o.max_iterations ? m->o.max_iterations
                        : problem           ? 0
                                            : ITERATIONS;
-    if (stage == IMP_MEASURE_TEXTURES) o.max_iterations = m->o.max_iterations;
+    if (many) o.max_iterations = m->o.max_iterations;
     o.levels = levels_of(m, stage, round);
     IMP_TRY(imp__measure_look(m));
     IMP_TRY(problem_make(m, stage, stage == IMP_MEASURE_TOGETHER && !m->doubtful, &p));

@@ -91,7 +91,8 @@ bool imp__measure_holds(const struct imp__measure *m, size_t k);
 bool imp__measure_shines(const struct imp__measure *m, size_t k);
 /* Is parameter k of a stage? The last fit has those of all stages before textures, and of textures where
  * they are few. */
-bool imp__measure_has(const struct imp__measure *m, enum imp_measure_stage stage, size_t k);
+bool imp__measure_has(const struct imp__measure *m, enum imp_measure_stage stage,
+                      size_t k);
 /* How many numbers a stage has. */
 size_t imp__measure_count(const struct imp__measure *m, enum imp_measure_stage stage);
 
