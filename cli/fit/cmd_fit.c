@@ -88,6 +88,7 @@ static int run_fit(int n, char **operand)
         rc = manifest_begin(cli.out);
         if (!rc && o.resume) rc = manifest_whole();
         const enum imp_status st = rc ? IMP_OK : imp_fit(problem, &fit, &run, &result);
+        if (!rc) fit_pictures_refused(st);
         /* a checkpoint that cannot be written names itself */
         if (cli_failed(st)) rc = cli_fail(st, st == IMP_E_IO ? NULL : cli.scene_path);
         if (!rc) rc = manifest_pause();

@@ -261,6 +261,8 @@ static int write_all(const struct fit_answer *a, char **paths)
     if (!rc) rc = write_set(a);
     if (!rc) rc = write_scene(a);
     if (!rc && a->result->loosest) rc = fit_loosest_write(a->problem, a->result->loosest);
+    if (!rc && !a->result->loosest)
+        fit_pictures_remove("undetermined"); /* a former fit's */
     return rc;
 }
 

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 /* "name.exr", or "name-1.exr" for the second of several targets. */
 static char *picture_path(const char *name, size_t i)
@@ -131,6 +132,24 @@ int fit_targets_write(void)
         free(path);
     }
     return rc;
+}
+
+void fit_pictures_remove(const char *name)
+{
+    for (size_t i = 0; i < problem_options.targets.n; i++) {
+        char *path = picture_path(name, i);
+        if (!is_there(i, path)) picture_remove(path);
+        free(path);
+    }
+}
+
+void fit_pictures_refused(enum imp_status st)
+{
+    if (!cli.out || (st != IMP_E_ARG && st != IMP_E_UNSUPPORTED && st != IMP_E_BIAS))
+        return;
+    fit_pictures_remove("before");
+    fit_pictures_remove("target");
+    if (cli_writes()) (void)!rmdir(cli.out);
 }
 
 int fit_sheet_write(const char *to)

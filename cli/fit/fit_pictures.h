@@ -11,6 +11,10 @@
 int fit_pictures_writable(void);
 /* The scene as it is now, through the sensor of every target. spp 0: the run's. */
 int fit_pictures_write(const char *name, int spp);
+/* Those of this name go: a fit that was refused leaves none. */
+void fit_pictures_remove(const char *name);
+/* `before` and `target` go where a fit was refused, and the folder, if nothing else is in it. */
+void fit_pictures_refused(enum imp_status st);
 /* Target i as the fit compares it, with its standard errors where it has them; the
  * caller destroys it. */
 int fit_target_film(size_t i, imp_film **out);

@@ -33,8 +33,9 @@ static const struct arg_option options[] = {
      "of these, what stays as it is: *.gamma.value, left.pose[3-5]", &o.hold, 0, 0, NULL},
     {ARG_INT, 0, "rounds", "N", "of all stages, at most (default 3)", &o.rounds, 1, 100,
      NULL},
-    {ARG_INT, 'n', "iterations", "N", "of each fit, at most (default 30)", &o.iterations,
-     1, 1e9, NULL},
+    {ARG_INT, 'n', "iterations", "N",
+     "of each search, at most (default 30); a fit with clipped values takes two to six",
+     &o.iterations, 1, 1e9, NULL},
     {ARG_NUMBER, 0, "mask-above", "S",
      "mask blocks of pixels whose residuals are S robust standard deviations above the "
      "others' (default 6)",
@@ -85,7 +86,10 @@ static int measure(const struct photos *photos, const char *checkpoint)
         else cli_say("importon: interrupted; with -o DIR it can go on");
         return cli_done();
     }
-    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    if (st != IMP_OK) {
+        fit_pictures_refused(st);
+        return cli_fail(st, cli.scene_path);
+    }
     int rc = next_photo_find(a.problem, photos, a.result, &next);
     if (!rc) rc = measure_answer_give(&a);
     if (!rc && checkpoint) (void)unlink(checkpoint);

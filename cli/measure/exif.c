@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * EXIF by libexif. The block is found here, as libexif reads JPEG files alone: segment APP1 of a
- * JPEG file (EXIF 2.3, 4.5.4), chunk eXIf of a PNG file (PNG, third edition, 11.3.4.6). */
+ * JPEG file (EXIF 2.3, 4.5.4), chunk eXIf of a PNG file (PNG, third edition, 11.3.4.6), the whole of a
+ * TIFF file, which is such a block itself where its numbers stand in the first part. */
 #include "exif.h"
 
 #include <libexif/exif-data.h>
@@ -62,6 +63,15 @@ static size_t png_block(FILE *f, unsigned char *block)
     return 0;
 }
 
+/* The EXIF directory may stand anywhere in the file, which is as large as its picture: a writer that puts
+ * it behind the picture is not read. */
+static size_t tiff_block(FILE *f, unsigned char *block)
+{
+    if (fseek(f, 0, SEEK_SET) != 0) return 0;
+    memcpy(block, mark, sizeof mark);
+    return sizeof mark + fread(block + sizeof mark, 1, BLOCK_MAX, f);
+}
+
 /* The first number of an entry; 0: there is none, or it is not positive and finite. */
 static double number_of(ExifData *data, ExifTag tag)
 {
@@ -91,6 +101,8 @@ struct exif_numbers exif_read(const char *path)
     if (f && block && fread(head, 1, 8, f) == 8) {
         if (head[0] == 0xff && head[1] == 0xd8) size = jpeg_block(f, block);
         else if (!memcmp(head, "\x89PNG\r\n\x1a\n", 8)) size = png_block(f, block);
+        else if (!memcmp(head, "II*\0", 4) || !memcmp(head, "MM\0*", 4))
+            size = tiff_block(f, block);
     }
     if (f) fclose(f);
     ExifData *data = size > 0 ? exif_data_new() : NULL;

@@ -50,8 +50,9 @@ static bool has_ending(const char *name, const char *const *endings)
 }
 
 static const char *const scene_endings[] = {"xml", NULL};
-static const char *const photo_endings[] = {"png", "jpg", "jpeg", "exr", "pfm", "hdr",
-                                            "npy", "ppm", "pgm",  "bmp", "tga", NULL};
+static const char *const photo_endings[] = {"png", "jpg", "jpeg", "exr", "pfm",
+                                            "hdr", "npy", "ppm",  "pgm", "bmp",
+                                            "tga", "tif", "tiff", NULL};
 
 static int by_name(const void *a, const void *b)
 {

@@ -16,11 +16,51 @@
 /* JPEG's own noise makes white a little darker, and black a little brighter. */
 #define JPEG_LEVELS 5
 
-/* The format by the file's first bytes, as in imp_film_read. */
+/* The format by the file's first bytes, as in imp_film_read; of TIFF by its first directory. */
 struct encoding {
     bool srgb, jpeg; /* read as sRGB: not a file of floating-point numbers */
     double most;     /* largest number of a channel */
 };
+
+/* n bytes of a TIFF file in the order that its first two letters say. */
+static unsigned long tiff_number(const unsigned char *b, int n, bool little)
+{
+    unsigned long v = 0;
+    for (int k = 0; k < n; k++) v = v << 8 | b[little ? n - 1 - k : k];
+    return v;
+}
+
+/* Bits of a value, negative of floats (TIFF 6.0, section 2: a directory has entries of 12 bytes, tag,
+ * type, count and value; tag 258 are bits, 339 the format, 3 for floats). */
+static int tiff_bits(FILE *f, const char *header)
+{
+    const bool little = header[0] == 'I';
+    unsigned char entry[12];
+    unsigned long tag;
+    int bits = 8;
+    bool real = false;
+    if (fseek(f, (long)tiff_number((const unsigned char *)header + 4, 4, little),
+              SEEK_SET) ||
+        fread(entry, 1, 2, f) != 2)
+        return bits;
+    for (unsigned long left = tiff_number(entry, 2, little); left > 0; left--) {
+        if (fread(entry, 1, 12, f) != 12) break;
+        tag = tiff_number(entry, 2, little);
+        const unsigned long count = tiff_number(entry + 4, 4, little);
+        if (tag != 258 && tag != 339) continue;
+        unsigned long v = tiff_number(entry + 8, 2, little);
+        if (count > 2) { /* they stand elsewhere, all the same */
+            const long back = ftell(f);
+            if (back < 0 || fseek(f, (long)tiff_number(entry + 8, 4, little), SEEK_SET) ||
+                fread(entry, 1, 2, f) != 2 || fseek(f, back, SEEK_SET))
+                break;
+            v = tiff_number(entry, 2, little);
+        }
+        if (tag == 258) bits = (int)v;
+        else real = v == 3;
+    }
+    return real ? -bits : bits;
+}
 
 static struct encoding encoding_of(const char *spec)
 {
@@ -33,6 +73,11 @@ static struct encoding encoding_of(const char *spec)
     struct encoding e = {.srgb = f && fread(header, 1, sizeof header - 1, f) > 2,
                          .most = 255};
     int maxval;
+    if (f && (!memcmp(header, "II*\0", 4) || !memcmp(header, "MM\0*", 4))) {
+        const int bits = tiff_bits(f, header);
+        e.srgb = bits > 0;
+        e.most = bits == 16 ? 65535 : 255;
+    }
     if (f) fclose(f);
     free(path);
     for (size_t k = 0; k < sizeof linear / sizeof *linear; k++)

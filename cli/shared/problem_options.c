@@ -302,10 +302,10 @@ int block_held(const struct block *b, size_t i)
     return imp_problem_get_variable(b->problem, b->first + i, &v) == IMP_OK && v.held;
 }
 
-/* Spectra are tables of their wavelengths. */
+/* Spectra are tables of their wavelengths, and lists (vertices) have no picture. */
 int block_is_large(const struct block *b)
 {
-    return b->n > (b->info.wavelengths_nm ? 1000 : 12);
+    return b->n > (b->info.wavelengths_nm || b->info.flags & IMP_PARAM_LIST ? 1000 : 12);
 }
 
 static void block_held_json(struct json *j, const struct block *b)

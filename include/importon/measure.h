@@ -9,7 +9,8 @@
  *     lights     radiances of lamps and sky
  *     materials  reflectances, roughnesses, media
  *     textures   parameters of more than 12 numbers that are no spectra (Adam, coarse to fine)
- *     together   all of the stages before but textures, which is where the intervals come from
+ *     together   all of the stages before, textures where there are no more than 236 numbers: this
+ *                is where the intervals come from
  *
  * Before and after "together" blocks of pixels that do not fit where most others do (something that has
  * moved, the photographer's reflection) lose their weight; stages whose numbers have moved on are
@@ -66,7 +67,7 @@ typedef void (*imp_measure_say_fn)(const char *line, void *payload);
 struct imp_measure_options {
     size_t size;
     /** Names of stages with commas between them, in any order; NULL: all. "together" follows always,
-     * but textures alone. */
+     * but more than 236 numbers of textures alone. */
     const char *stages;
     /** [n_params] names or patterns of what is measured, poses and other numbers of geometry
      * included ("camera.pose", "*.x_fov"). NULL: all parameters with a gradient that the photographs
@@ -131,7 +132,9 @@ struct imp_measure_result {
     /** The last fit with intervals: of `problem`. */
     const struct imp_fit_result *fit;
     size_t n_textures;
-    const size_t *textures; /**< [n_textures] parameters of the stage of this name */
+    const size_t
+        *textures; /**< [n_textures] those of the stage of this name that the last fit
+                                 does not have: they have no intervals */
     /** Where it is not explained: numbers that are not measured and may be wrong. */
     size_t n_missing;
     const struct imp_missing *missing; /**< [n_missing] as of imp_problem_missing */
@@ -145,7 +148,7 @@ struct imp_measure_result {
  * @param photos  [n] one at most of each sensor; arrays are borrowed until it returns.
  * @param options NULL for defaults.
  * @param run     samples of an evaluation; its sensor is ignored. NULL for defaults.
- * @param[out] problem the last fit's, of all measured numbers but textures, with the photographs
+ * @param[out] problem the last fit's, of all measured numbers but large textures, with the photographs
  *                as targets: for imp_problem_get_fit_variable, imp_plan and the like. The caller
  *                destroys it.
  * @param[out] result belongs to the problem. On failure neither is written.

@@ -62,7 +62,7 @@ class Measurement:
     Attributes
     ----------
     fit : Fit
-        The last fit, of all measured numbers but textures, with intervals.
+        The last fit, of all measured numbers but large textures, with intervals.
     explained : bool
         The scene explains the photographs within their noise.
     stages : list of MeasureStage
@@ -74,7 +74,7 @@ class Measurement:
         Where it is not explained: numbers that are not measured and may be wrong.
     rounds : int
     textures : list of int
-        Positions of the parameters that the stage of this name has fitted.
+        Positions of the parameters that the stage of this name has fitted and the last fit does not have.
     """
 
     def __init__(self, fit: Fit, result: Any, photos: list[MeasuredPhoto], missing: list[Missing]) -> None:

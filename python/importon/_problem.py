@@ -230,6 +230,22 @@ def _is_path(target: Any) -> bool:
     return isinstance(target, (str, bytes)) or hasattr(target, "__fspath__")
 
 
+def _tiff_bits(path: Any, order: Any) -> int:
+    """Bits of a value, negative of floats, by the first directory: entries of 12 bytes, tag 258 bits, 339 the format."""
+    with open(path, "rb") as file:
+        data = file.read()
+
+    def number(at: int, n: int) -> int:
+        return int.from_bytes(data[at:at + n], order)
+
+    bits, real, start = 8, False, number(4, 4)
+    for at in range(start + 2, min(start + 2 + 12 * number(start, 2), len(data) - 11), 12):
+        if number(at, 2) in (258, 339):
+            v = number(at + 8 if number(at + 4, 4) <= 2 else number(at + 8, 4), 2)
+            bits, real = (v, real) if number(at, 2) == 258 else (bits, v == 3)
+    return -bits if real else bits
+
+
 def _integers(path: Any) -> Optional[tuple[bool, int]]:
     """Of a file of integers, which `read` takes for sRGB: is it JPEG, and its largest number."""
     with open(path, "rb") as file:
@@ -238,6 +254,9 @@ def _integers(path: Any) -> Optional[tuple[bool, int]]:
         return None
     if head[:4] == b"\x89PNG":
         return False, 65535 if head[24] == 16 else 255
+    if head[:4] in (b"II*\0", b"MM\0*"):
+        bits = _tiff_bits(path, "little" if head[:1] == b"I" else "big")
+        return None if bits < 0 else (False, 65535 if bits == 16 else 255)
     if head[:2] in (b"P5", b"P6"):
         words = b"\n".join(line.split(b"#")[0] for line in head.split(b"\n")).split()  # without comments
         return False, int(words[3]) if len(words) > 3 and words[3].isdigit() else 255

@@ -53,10 +53,12 @@ enum imp_status imp__image_parse(imp_context *ctx, const char *name,
     if (n >= 2 && d[0] == 'B' && d[1] == 'M') return imp__bmp_parse(ctx, name, file, out);
     if (n >= 2 && d[0] == 'P' && (d[1] == '5' || d[1] == '6'))
         return imp__ppm_parse(ctx, name, file, out);
+    if (n >= 4 && (memcmp(d, "II*\0", 4) == 0 || memcmp(d, "MM\0*", 4) == 0))
+        return imp__tiff_parse(ctx, name, file, out, srgb);
     if (imp__tga_is(file)) return imp__tga_parse(ctx, name, file, out);
-    return imp__error(ctx, IMP_E_SCENE,
-                      "%s: not an EXR, PNG, JPEG, BMP, TGA, PPM, HDR, PFM or NPY picture",
-                      name);
+    return imp__error(
+        ctx, IMP_E_SCENE,
+        "%s: not an EXR, PNG, JPEG, TIFF, BMP, TGA, PPM, HDR, PFM or NPY picture", name);
 }
 
 enum imp_status imp__image_read(imp_context *ctx, const char *path, imp_film **out,

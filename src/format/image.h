@@ -43,6 +43,9 @@ enum imp_status imp__hdr_parse(imp_context *ctx, const char *name,
                                const struct imp_bytes *file, imp_film **out);
 enum imp_status imp__bmp_parse(imp_context *ctx, const char *name,
                                const struct imp_bytes *file, imp_film **out);
+/* *srgb is set here: false for files of floats. */
+enum imp_status imp__tiff_parse(imp_context *ctx, const char *name,
+                                const struct imp_bytes *file, imp_film **out, bool *srgb);
 /* PPM and PGM, of at least two bytes. */
 enum imp_status imp__ppm_parse(imp_context *ctx, const char *name,
                                const struct imp_bytes *file, imp_film **out);

@@ -244,7 +244,7 @@ static enum imp_status param_add(struct imp_scene *scene, const char *object,
                  .n_dims = rows ? 2 : 1,
                  .lo = tail->lo,
                  .hi = tail->hi,
-                 .flags = IMP_PARAM_DIFFERENTIABLE},
+                 .flags = IMP_PARAM_DIFFERENTIABLE | (rows ? IMP_PARAM_LIST : 0u)},
         .store = IMP_STORE_DOUBLES,
         .degree = IMP_DEGREE_OTHER,
         .doubles = p->number};

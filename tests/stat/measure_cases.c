@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Scenes from photographs. In scenes drawn at random (paints, a lamp, a sky, two cameras with unknown
- * exposures) two photographs are made with noise, a gamma, 8 bits and clipping, and measured from guesses
+ * exposures and vignetting) two photographs are made with noise, a gamma, 8 bits and clipping, and measured from guesses
  * that are off, cameras included:
  *
  *   - 95 % intervals hold the truth, counted over all numbers;
@@ -33,7 +33,7 @@ static double normal(struct imp_key key, uint32_t k)
 
 /* The numbers of a case. */
 struct truth {
-    double floor, block, lamp, sky, exposure, x[2], turn;
+    double floor, block, lamp, sky, exposure, x[2], turn, dark[2];
 };
 
 static struct truth truth_of(struct imp_key key)
@@ -45,10 +45,12 @@ static struct truth truth_of(struct imp_key key)
         .sky = 0.2 + 0.3 * imp__u01(key, 4),
         .exposure = 0.8 + 0.6 * imp__u01(key, 5),
         .x = {-1.4 + 0.4 * imp__u01(key, 6), 1.2 + 0.4 * imp__u01(key, 7)},
-        .turn = 90 * imp__u01(key, 8)};
+        .turn = 90 * imp__u01(key, 8),
+        .dark = {-0.3 * imp__u01(key, 9), -0.3 * imp__u01(key, 10)}};
 }
 
-static int sensor_put(char *to, size_t room, const char *id, double x, double exposure)
+static int sensor_put(char *to, size_t room, const char *id, double x, double exposure,
+                      double dark)
 {
     return snprintf(
         to, room,
@@ -56,8 +58,9 @@ static int sensor_put(char *to, size_t room, const char *id, double x, double ex
         "name='to_world'><lookat origin='%g,1.2,2.3' target='0,.2,0' up='0,1,0'/>"
         "</transform><film type='hdrfilm'><integer name='width' value='%d'/><integer "
         "name='height' value='%d'/><rfilter type='box'/><float name='exposure' "
-        "value='%g'/><float name='gamma' value='2.2'/></film></sensor>",
-        id, x, WIDTH, HEIGHT, exposure);
+        "value='%g'/><float name='vignetting_2' value='%g'/><float name='gamma' "
+        "value='2.2'/></film></sensor>",
+        id, x, WIDTH, HEIGHT, exposure, dark);
 }
 
 static imp_scene *scene_make(const struct truth *t)
@@ -66,8 +69,9 @@ static imp_scene *scene_make(const struct truth *t)
     int n = snprintf(xml, sizeof xml,
                      "<scene version='3.0.0'><integrator type='path'><integer "
                      "name='max_depth' value='3'/></integrator>");
-    n += sensor_put(xml + n, sizeof xml - (size_t)n, "left", t->x[0], 1);
-    n += sensor_put(xml + n, sizeof xml - (size_t)n, "right", t->x[1], t->exposure);
+    n += sensor_put(xml + n, sizeof xml - (size_t)n, "left", t->x[0], 1, t->dark[0]);
+    n += sensor_put(xml + n, sizeof xml - (size_t)n, "right", t->x[1], t->exposure,
+                    t->dark[1]);
     snprintf(xml + n, sizeof xml - (size_t)n,
              "<shape type='rectangle'><transform name='to_world'><scale value='2'/>"
              "<rotate x='1' angle='-90'/></transform><bsdf type='diffuse' id='floor'>"
@@ -150,10 +154,10 @@ static double truth_by_name(const char *name, const struct truth *t)
     const struct {
         const char *name;
         double value;
-    } all[] = {{"floor.reflectance.value", t->floor},
-               {"block.reflectance.value", t->block},
-               {"lamp.radiance.value", t->lamp},
-               {"right.exposure.value", t->exposure}};
+    } all[] = {
+        {"floor.reflectance.value", t->floor},    {"block.reflectance.value", t->block},
+        {"lamp.radiance.value", t->lamp},         {"left.vignetting_2.value", t->dark[0]},
+        {"right.vignetting_2.value", t->dark[1]}, {"right.exposure.value", t->exposure}};
     for (size_t k = 0; k < sizeof all / sizeof *all; k++)
         if (!strcmp(all[k].name, name)) return all[k].value;
     return 0; /* poses: the file has the cameras where they were */
@@ -186,6 +190,10 @@ static void guesses_set(imp_scene *s, struct imp_key key, bool cameras)
         if (strstr(info.name, "gamma") || strstr(info.name, "sky") || info.count != 1)
             continue;
         test_must(ctx, imp_scene_get_values(s, k, v));
+        if (strstr(info.name, "vignetting")) {
+            test_must(ctx, imp_scene_set_values(s, k, 1, &(double){0}));
+            continue;
+        }
         v[0] *= exp(0.3 * (2 * imp__u01(key, 100 + (uint32_t)k) - 1));
         if (!strstr(info.name, "left")) test_must(ctx, imp_scene_set_values(s, k, 1, v));
     }
@@ -241,7 +249,8 @@ static void one_case(uint64_t seed, bool cameras, struct record *r)
 static int wrong_lamp(uint64_t seed)
 {
     static float pixels[2][PIXELS];
-    static const char *const hold[] = {"*.gamma.*", "sky.*", "*.exposure.*", "lamp.*"};
+    static const char *const hold[] = {"*.gamma.*", "sky.*", "*.exposure.*", "lamp.*",
+                                       "*.vignetting*"};
     const struct truth t = truth_of(imp__key(seed, 3, 0));
     imp_scene *s = scene_make(&t);
     size_t lamp;
@@ -250,7 +259,7 @@ static int wrong_lamp(uint64_t seed)
     photo_make(s, 1, 4000 + seed, false, pixels[1]);
     test_must(ctx, imp_scene_find_param(s, "lamp.radiance.value", &lamp));
     test_must(ctx, imp_scene_set_values(s, lamp, 1, &(double){0.5 * t.lamp}));
-    const struct measured m = measure(s, pixels, 2, hold, 4, "materials", seed);
+    const struct measured m = measure(s, pixels, 2, hold, 5, "materials", seed);
     for (size_t k = 0; k < m.result->n_missing; k++) {
         const struct imp_missing *row = IMP_ROW(imp_missing, m.result->missing, k);
         named |= row->param == lamp && row->chance < 0.05;

@@ -19,6 +19,7 @@
 #include "inverse/problem/problem.h"
 #include "math/linalg.h"
 #include "math/rng.h"
+#include "scene/pose.h"
 #include "search/optimize.h"
 #include "walk/run/run.h"
 #include <math.h>
@@ -78,6 +79,18 @@ static bool may_ask(const struct imp_scene *s, size_t k)
     for (size_t e = 0; e < q->info.count; e++)
         if (imp__param_get(q, e) != 0) return !strpbrk(q->info.name, "*?[],");
     return false;
+}
+
+/* Places and other numbers of geometry are asked no more; false: none was. */
+static bool places_leave(struct missing *m)
+{
+    bool met = false;
+    for (size_t k = 0; k < m->p->scene->n_params; k++) {
+        if (!m->able[k] || !imp__pose_of(m->p->scene, k)) continue;
+        m->able[k] = 0;
+        met = true;
+    }
+    return met;
 }
 
 static bool is_own(const struct missing *m, size_t i)
@@ -361,6 +374,11 @@ enum imp_status imp_problem_missing(struct imp_problem *p, const struct imp_run 
     if (!some) goto out;
     st = rows_choose(&m, chosen);
     ties_back(p, m.own_ties);
+    /* Scenes whose geometry has no derivatives have other numbers that may be wrong. */
+    if ((st == IMP_E_UNSUPPORTED || st == IMP_E_BIAS) && places_leave(&m)) {
+        st = rows_choose(&m, chosen);
+        ties_back(p, m.own_ties);
+    }
     if (st == IMP_OK) st = layout(&m, chosen);
     if (st == IMP_OK && m.n > 0) st = rows_make(&m);
     if (st == IMP_OK && m.n > 0) st = answer(&m, rows, n);

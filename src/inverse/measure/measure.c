@@ -82,13 +82,23 @@ static struct imp_measure_row *row_of(struct imp__measure *m, int stage)
 /* Which stages are due again, where the last fit does not explain the photographs: those whose numbers
  * it has moved, or all where other pixels count. A fit of all numbers that explains them needs no
  * other, however far single ones have moved along what the stages could not tell apart; where other
- * pixels count, it is repeated alone. */
+ * pixels count, or the noise is found to be less, it is repeated alone. */
 static enum imp_status stages_judge(struct imp__measure *m, const double *moved,
-                                    bool masks_changed, bool *again)
+                                    bool masks_changed, bool quieter, bool *again)
 {
-    const bool explained = m->rows[m->n_rows - 1].explained;
-    const bool last = m->round >= m->o.rounds;
-    *again = masks_changed;
+    const struct imp_measure_row *answer = &m->rows[m->n_rows - 1];
+    const bool explained = answer->explained, last = m->round >= m->o.rounds;
+    const bool blind = answer->chi2_se >= IMP_MEASURE_BLIND &&
+                       answer->chi2 - 1 < AGAIN * answer->chi2_se;
+    if (blind) {
+        *again = false;
+        memset(m->due, 0, sizeof m->due);
+        return imp__measure_say(m,
+                                "round %d: with so few samples chi-square tells nothing, "
+                                "and other rounds would not: more are needed (--spp)",
+                                m->round);
+    }
+    *again = masks_changed || quieter;
     for (int s = 0; s < IMP_MEASURE_TOGETHER; s++) {
         struct imp_measure_row *row = row_of(m, s);
         const enum imp_measure_stage stage = (enum imp_measure_stage)s;
@@ -106,6 +116,9 @@ static enum imp_status stages_judge(struct imp__measure *m, const double *moved,
         IMP_CHECKED(imp__measure_say(m, "round %d: %s again, as other pixels are masked",
                                      m->round,
                                      explained ? "the last fit" : "all stages"));
+    else if (quieter && explained && !last)
+        IMP_CHECKED(
+            imp__measure_say(m, "round %d: the last fit again, by this noise", m->round));
     if (*again && last)
         IMP_CHECKED(imp__measure_say(
             m, "round %d is the last, though stages are due again", m->round));
@@ -119,6 +132,17 @@ static enum imp_status photos_mask(struct imp__measure *m, bool *changed)
     for (size_t i = 0; i < m->n_photos; i++)
         IMP_CHECKED(imp__measure_mask(m, &m->photos[i], changed));
     return IMP_OK;
+}
+
+/* Noise by the residuals of a last fit that explains the photographs by the noise that they seemed to
+ * have, and so has their edges; *quieter: it is less, and the fit was judged again. */
+static enum imp_status photos_quiet(struct imp__measure *m, bool *quieter)
+{
+    *quieter = false;
+    if (!m->rows[m->n_rows - 1].explained) return IMP_OK;
+    for (size_t i = 0; i < m->n_photos; i++)
+        IMP_CHECKED(imp__measure_noise_again(m, &m->photos[i], quieter));
+    return *quieter ? imp__measure_judge_again(m) : IMP_OK;
 }
 
 /* A fit whose cameras have no derivatives in this scene (what they see is refused by name) is
@@ -181,7 +205,7 @@ static enum imp_status round_run(struct imp__measure *m, imp_problem **problem,
 {
     enum imp_measure_stage last = last_stage(m);
     double moved[IMP_MEASURE_STAGES] = {0};
-    bool changed = false;
+    bool changed = false, quieter = false;
     for (int s = m->next; s < IMP_MEASURE_TOGETHER; s++) {
         const enum imp_measure_stage stage = (enum imp_measure_stage)s;
         if (stage == last || !m->due[s] || imp__measure_count(m, stage) == 0) continue;
@@ -202,7 +226,8 @@ static enum imp_status round_run(struct imp__measure *m, imp_problem **problem,
         moved[s] =
             last == IMP_MEASURE_TOGETHER ? moved_since(m, (enum imp_measure_stage)s) : 0;
     IMP_CHECKED(photos_mask(m, &changed));
-    IMP_CHECKED(stages_judge(m, moved, changed, again));
+    IMP_CHECKED(photos_quiet(m, &quieter));
+    IMP_CHECKED(stages_judge(m, moved, changed, quieter, again));
     places_follow(m);
     m->round++;
     m->next = 0;
@@ -288,7 +313,8 @@ static enum imp_status result_make(struct imp__measure *m, imp_problem *p,
     size_t *textures = imp__arena_array(a, m->scene->n_params + 1, sizeof *textures);
     if (!textures) return imp__error(m->ctx, no_memory, "no memory for an answer");
     for (size_t k = 0; k < m->scene->n_params; k++)
-        if (m->stage[k] == IMP_MEASURE_TEXTURES) textures[r->n_textures++] = k;
+        if (m->stage[k] == IMP_MEASURE_TEXTURES && !m->joined)
+            textures[r->n_textures++] = k;
     r->textures = textures;
     struct imp_measure_row *rows = imp__arena_array(a, m->n_rows, sizeof *rows);
     const char **lines = imp__arena_array(a, m->n_lines, sizeof *lines);

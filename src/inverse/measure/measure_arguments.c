@@ -189,12 +189,14 @@ static enum imp_status photo_take(struct imp__measure *m, size_t i)
     p->rows = (d->height + p->block - 1) / p->block;
     p->noise_se = imp__alloc(m->ctx, p->n_values, sizeof(float));
     p->weights = imp__alloc(m->ctx, p->n_pixels, sizeof(float));
+    p->left = imp__alloc(m->ctx, p->n_values, sizeof(float));
+    p->own = imp__alloc(m->ctx, p->n_values, sizeof(float));
     p->square = imp__alloc(m->ctx, p->n_pixels, sizeof(float));
     p->expected = imp__alloc(m->ctx, p->n_pixels, sizeof(float));
     p->robust = imp__alloc(m->ctx, p->n_pixels, sizeof(float));
     p->masked = imp__alloc(m->ctx, (size_t)p->columns * (size_t)p->rows, 1);
-    if (!p->noise_se || !p->weights || !p->square || !p->expected || !p->robust ||
-        !p->masked)
+    if (!p->noise_se || !p->weights || !p->left || !p->own || !p->square ||
+        !p->expected || !p->robust || !p->masked)
         return imp__error(m->ctx, IMP_E_NOMEM, "no memory for %s", p->name);
     for (size_t k = 0; k < p->n_pixels; k++)
         p->weights[k] = d->weights ? d->weights[k] : 1;
@@ -224,6 +226,8 @@ void imp__measure_photos_free(struct imp__measure *m)
         imp__release(m->ctx, m->photos[i].noise_se);
         imp__release(m->ctx, m->photos[i].weights);
         imp__release(m->ctx, m->photos[i].square);
+        imp__release(m->ctx, m->photos[i].left);
+        imp__release(m->ctx, m->photos[i].own);
         imp__release(m->ctx, m->photos[i].expected);
         imp__release(m->ctx, m->photos[i].robust);
         imp__release(m->ctx, m->photos[i].masked);

@@ -100,11 +100,11 @@ static enum imp_status param_scale(struct imp__measure *m, size_t k, double fact
                             imp__param_get(q, 0), "the means of photograph and picture");
 }
 
-/* All measured numbers of lights that are no places. */
+/* All measured numbers of lights that are factors of what they send. */
 static enum imp_status lights_scale(struct imp__measure *m, double factor)
 {
     for (size_t k = 0; k < m->scene->n_params; k++)
-        if (m->stage[k] == IMP_MEASURE_LIGHTS && !imp__pose_of(m->scene, k))
+        if (m->stage[k] == IMP_MEASURE_LIGHTS && imp__measure_shines(m, k))
             IMP_CHECKED(param_scale(m, k, factor));
     return IMP_OK;
 }

@@ -9,6 +9,8 @@
 #include <string.h>
 
 #define FIELD 12 /* a parameter of more numbers, but no spectrum, is a texture */
+#define FEW                                                                              \
+    236 /* numbers, textures included, that imp_plan and imp_problem_missing take */
 
 /* ---- Poses ----------------------------------------------------------------------------- */
 
@@ -191,6 +193,19 @@ struct imp_param *imp__measure_film_number(const struct imp__measure *m,
     return NULL;
 }
 
+/* Textures of lights have no unit: their inputs' names tell. */
+bool imp__measure_shines(const struct imp__measure *m, size_t k)
+{
+    static const char *const part[] = {"scale.", ".data", "radiance.", "emission.",
+                                       "intensity."};
+    const struct imp_param_info *info = &m->scene->params[k].info;
+    if (imp__pose_of(m->scene, k)) return false;
+    if (info->unit && info->unit[0] == 'W') return true;
+    for (size_t i = 0; i < sizeof part / sizeof *part; i++)
+        if (strstr(info->name, part[i])) return true;
+    return false;
+}
+
 /* Has each light a measured number, of `lanes` values at least? */
 static bool lights_free(const struct imp__measure *m, size_t lanes)
 {
@@ -200,7 +215,7 @@ static bool lights_free(const struct imp__measure *m, size_t lanes)
         for (size_t k = 0; k < s->n_params && !met; k++)
             met = (m->stage[k] == IMP_MEASURE_LIGHTS ||
                    m->stage[k] == IMP_MEASURE_TEXTURES) &&
-                  !imp__pose_of(s, k) && s->params[k].info.count >= lanes &&
+                  imp__measure_shines(m, k) && s->params[k].info.count >= lanes &&
                   is_below(s->params[k].info.name, s->emitters[e]->name);
         if (!met) return false;
     }
@@ -224,15 +239,19 @@ static enum imp_status unit_hold(struct imp__measure *m, const char *number,
 
 /* ---- All of it ------------------------------------------------------------------------- */
 
+bool imp__measure_has(const struct imp__measure *m, enum imp_measure_stage stage,
+                      size_t k)
+{
+    return stage == IMP_MEASURE_TOGETHER
+               ? m->stage[k] < IMP_MEASURE_TEXTURES + (m->joined ? 1 : 0)
+               : m->stage[k] == stage;
+}
+
 size_t imp__measure_count(const struct imp__measure *m, enum imp_measure_stage stage)
 {
     size_t n = 0;
-    for (size_t k = 0; k < m->scene->n_params; k++) {
-        const bool own = stage == IMP_MEASURE_TOGETHER
-                             ? m->stage[k] < IMP_MEASURE_TEXTURES
-                             : m->stage[k] == stage;
-        n += own ? m->scene->params[k].info.count : 0;
-    }
+    for (size_t k = 0; k < m->scene->n_params; k++)
+        n += imp__measure_has(m, stage, k) ? m->scene->params[k].info.count : 0;
     return n;
 }
 
@@ -267,9 +286,10 @@ enum imp_status imp__measure_numbers(struct imp__measure *m)
         IMP_CHECKED(unit_hold(m, "white_balance_red", why));
         IMP_CHECKED(unit_hold(m, "white_balance_blue", why));
     }
-    if (imp__measure_count(m, IMP_MEASURE_TOGETHER) +
-            imp__measure_count(m, IMP_MEASURE_TEXTURES) ==
-        0)
+    const size_t all = imp__measure_count(m, IMP_MEASURE_TOGETHER) +
+                       imp__measure_count(m, IMP_MEASURE_TEXTURES);
+    m->joined = all <= FEW;
+    if (all == 0)
         return imp__error(m->ctx, IMP_E_ARG,
                           "no number of the scene is to be measured: stages, params and "
                           "hold leave none that has a gradient");

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Noise of a photograph, and what a scene leaves over of it. */
+ * What a scene leaves over of a photograph. */
 #include "base/arguments.h"
 #include "math/rng.h"
 #include "measuring.h"
@@ -14,56 +14,6 @@ static int ascending(const void *a, const void *b)
 {
     const float x = *(const float *)a, y = *(const float *)b;
     return (x > y) - (x < y);
-}
-
-/* The median of the magnitudes of
- *
- *      1 -2  1
- *     -2  4 -2     which is 0 for what is linear along either axis, and has 36 times the variance
- *      1 -2  1     of independent noise (Immerkaer, Computer Vision and Image Understanding 64, 1996)
- *
- * over .6745 is a robust standard deviation of it: edges and textures count where they cover less
- * than about a third of the pixels. A median has an efficiency of .37, and neighbouring differences
- * have correlations whose squares add up to 1.94^2, so that the relative error of the variance from n of
- * them is 2 sqrt(1.94^2/(2 .37 n)). */
-enum imp_status imp__measure_noise(struct imp__measure *m, struct imp__photo *p)
-{
-    const int w = p->desc.width, h = p->desc.height, C = p->desc.channels;
-    const float *v = p->desc.pixels;
-    size_t n = 0;
-    p->noise = p->desc.noise;
-    if (!(p->noise > 0)) {
-        float *list = imp__alloc(m->ctx, p->n_values, sizeof *list);
-        if (!list) return imp__error(m->ctx, IMP_E_NOMEM, "no memory for %s", p->name);
-        for (int y = 1; y + 1 < h; y++)
-            for (int x = 1; x + 1 < w; x++)
-                for (int c = 0; c < C; c++) {
-                    static const double mask[3] = {1, -2, 1};
-                    double sum = 0;
-                    bool counts = true;
-                    for (int j = -1; j <= 1; j++)
-                        for (int i = -1; i <= 1; i++) {
-                            const size_t at =
-                                (size_t)(y + j) * (size_t)w + (size_t)(x + i);
-                            const double u = (double)v[at * (size_t)C + (size_t)c];
-                            counts &=
-                                !p->desc.clipped || (u > p->desc.low && u < p->desc.high);
-                            counts &= p->weights[at] > 0;
-                            sum += mask[j + 1] * mask[i + 1] * u;
-                        }
-                    if (counts) list[n++] = (float)fabs(sum);
-                }
-        qsort(list, n, sizeof *list, ascending);
-        p->noise = n > 0 ? (double)list[n / 2] / (0.6745 * 6) : 0;
-        imp__release(m->ctx, list);
-        p->noise_of = n > 0 ? 2 * sqrt(1.94 * 1.94 / (2 * 0.37 * (double)n)) : 1;
-        p->noise = fmax(p->noise, p->desc.step / sqrt(12));
-        if (!(p->noise > 0))
-            return imp__error(m->ctx, IMP_E_ARG,
-                              "%s has no noise that can be estimated: give it", p->name);
-    }
-    for (size_t i = 0; i < p->n_values; i++) p->noise_se[i] = (float)p->noise;
-    return IMP_OK;
 }
 
 /* The power of the film's curve: its values are M^(1/gamma). */
@@ -177,6 +127,8 @@ enum imp_status imp__measure_residual(struct imp__measure *m, struct imp__photo 
             const size_t at = i * (size_t)C + (size_t)c;
             v[c] = value_compare(p, (double)p->desc.pixels[at], (double)mean[at],
                                  se ? (double)se[at] : 0, gamma);
+            p->left[at] = (float)v[c].residual;
+            p->own[at] = (float)v[c].own;
         }
         pixel_add(p, i, v, gamma, &sums);
     }

@@ -18,16 +18,9 @@
 #define LEVELS     4 /* of cameras, in the first round, ... */
 #define ACROSS     8 /* ... through tents of at most this part of a photograph */
 #define TEXTURE    4 /* levels of textures */
-#define BLIND      1 /* an error of chi-square with which nothing is explained */
 #define DOUBT      3 /* errors of chi-square above 1 from which on a stage is not explained */
 
 /* ---- Which numbers --------------------------------------------------------------------- */
-
-static bool is_own(const struct imp__measure *m, enum imp_measure_stage stage, size_t k)
-{
-    return stage == IMP_MEASURE_TOGETHER ? m->stage[k] < IMP_MEASURE_TEXTURES
-                                         : m->stage[k] == stage;
-}
 
 /* While cameras are found, all numbers but textures go along: contrasts between wrong paints would
  * turn the cameras. Films' numbers go along with lights. */
@@ -43,7 +36,7 @@ static bool is_tied(const struct imp__measure *m, enum imp_measure_stage stage, 
     const struct imp_param *q = &m->scene->params[k];
     bool shines = false;
     if (stage != IMP_MEASURE_EXPOSURE || m->stage[k] != IMP_MEASURE_LIGHTS ||
-        imp__pose_of(m->scene, k) || imp__measure_holds(m, k))
+        !imp__measure_shines(m, k) || imp__measure_holds(m, k))
         return false;
     for (size_t e = 0; e < q->info.count; e++) shines |= imp__param_get(q, e) > 0;
     return shines && !strpbrk(q->info.name, "*?[],");
@@ -124,6 +117,23 @@ out:
     return st;
 }
 
+/* Numbers of materials that have no bound above (roughnesses, extinctions) move as logarithms, too: a step
+ * that takes a roughness to nearly nothing ends where few pixels tell of it, and no derivative
+ * leads back. */
+static enum imp_status sizes_tie(struct imp__measure *m, imp_problem *p)
+{
+    for (size_t k = 0; k < m->scene->n_params; k++) {
+        const struct imp_param *q = &m->scene->params[k];
+        bool positive = m->stage[k] == IMP_MEASURE_MATERIALS && p->chosen[k] &&
+                        !isfinite(q->info.hi) && q->info.lo >= 0;
+        for (size_t e = 0; e < q->info.count; e++) positive &= imp__param_get(q, e) > 0;
+        if (!positive || imp__measure_holds(m, k) || strpbrk(q->info.name, "*?[],"))
+            continue;
+        IMP_CHECKED(imp_problem_tie(p, q->info.name, IMP_TIE_LOG));
+    }
+    return IMP_OK;
+}
+
 static enum imp_status problem_make(struct imp__measure *m, enum imp_measure_stage stage,
                                     bool last, imp_problem **out)
 {
@@ -132,12 +142,14 @@ static enum imp_status problem_make(struct imp__measure *m, enum imp_measure_sta
     uint8_t *chosen = imp__alloc(m->ctx, m->scene->n_params + 1, 1);
     if (!chosen) IMP_TRY(imp__error(m->ctx, IMP_E_NOMEM, "no memory for a stage"));
     for (size_t k = 0; k < m->scene->n_params; k++)
-        chosen[k] = is_own(m, stage, k) || is_along(m, stage, k) || is_tied(m, stage, k);
+        chosen[k] = imp__measure_has(m, stage, k) || is_along(m, stage, k) ||
+                    is_tied(m, stage, k);
     IMP_TRY(imp_problem_create(m->scene, &p));
     IMP_TRY(imp__problem_layout(p, chosen));
     if (m->held) IMP_TRY(imp__problem_hold_marked(p, m->held));
     IMP_TRY(lights_tie(m, stage, p));
     IMP_TRY(exposures_tie(m, p));
+    IMP_TRY(sizes_tie(m, p));
     for (size_t i = 0; i < m->n_photos; i++) IMP_TRY(target_add(m, p, i, last));
     *out = p;
     p = NULL;
@@ -154,7 +166,7 @@ static int levels_of(const struct imp__measure *m, enum imp_measure_stage stage,
                      int round)
 {
     int levels = 1;
-    if (stage == IMP_MEASURE_TEXTURES) return TEXTURE;
+    if (stage == IMP_MEASURE_TEXTURES) return m->joined ? 0 : TEXTURE;
     if (stage != IMP_MEASURE_CAMERAS || round > 1) return 0;
     for (size_t i = 0; i < m->n_photos; i++) {
         const struct imp_photo *d = &m->photos[i].desc;
@@ -173,7 +185,7 @@ static void places_note(struct imp__measure *m, enum imp_measure_stage stage,
     for (size_t i = 0; i < p->n; i++) {
         const struct imp__block *b = imp__problem_block(p, i);
         struct imp_fit_variable v = IMP_FIT_VARIABLE_INIT;
-        if (imp__block_factor(p, b) || !is_own(m, stage, b->param) ||
+        if (imp__block_factor(p, b) || !imp__measure_has(m, stage, b->param) ||
             imp_problem_get_fit_variable(p, i, &v) != IMP_OK)
             continue;
         const size_t at = m->scene->params[b->param].info.offset + (i - b->first);
@@ -213,8 +225,8 @@ static void row_judge(const struct imp__measure *m, struct imp_measure_row *row)
     const double freedom = fmax(values - (double)row->n, 1);
     row->chi2 = sum / freedom;
     row->chi2_se = hypot(sqrt(variance) / freedom, noise_of / freedom);
-    row->explained =
-        values > 0 && row->chi2 - 1 < DOUBT * row->chi2_se && row->chi2_se < BLIND;
+    row->explained = values > 0 && row->chi2 - 1 < DOUBT * row->chi2_se &&
+                     row->chi2_se < IMP_MEASURE_BLIND;
 }
 
 static enum imp_status row_add(struct imp__measure *m, enum imp_measure_stage stage,
@@ -244,6 +256,18 @@ static enum imp_status row_add(struct imp__measure *m, enum imp_measure_stage st
         row->explained ? "explained" : "not explained");
 }
 
+enum imp_status imp__measure_judge_again(struct imp__measure *m)
+{
+    struct imp_measure_row *row = &m->rows[m->n_rows - 1];
+    m->looked = false;
+    IMP_CHECKED(imp__measure_look(m));
+    row_judge(m, row);
+    return imp__measure_say(m,
+                            "round %d, %s: by this noise chi-square is %.3g +- %.2g, %s",
+                            row->round, imp_measure_stage_name(row->stage), row->chi2,
+                            row->chi2_se, row->explained ? "explained" : "not explained");
+}
+
 enum imp_status imp__measure_fit(struct imp__measure *m, enum imp_measure_stage stage,
                                  int round, imp_problem **problem,
                                  const struct imp_fit_result **result)
@@ -255,12 +279,13 @@ enum imp_status imp__measure_fit(struct imp__measure *m, enum imp_measure_stage 
     const struct imp_fit_result *r = NULL;
     const char *name = imp_measure_stage_name(stage);
     run.seed = imp__mix64(m->run.seed ^ (SEED + 16 * (uint64_t)round + (uint64_t)stage));
-    o.optimizer = stage == IMP_MEASURE_TEXTURES ? IMP_ADAM : IMP_LM;
-    o.intervals = stage != IMP_MEASURE_TEXTURES;
+    const bool many = stage == IMP_MEASURE_TEXTURES && !m->joined;
+    o.optimizer = many ? IMP_ADAM : IMP_LM;
+    o.intervals = !many;
     o.max_iterations = m->o.max_iterations ? m->o.max_iterations
                        : problem           ? 0
                                            : ITERATIONS;
-    if (stage == IMP_MEASURE_TEXTURES) o.max_iterations = m->o.max_iterations;
+    if (many) o.max_iterations = m->o.max_iterations;
     o.levels = levels_of(m, stage, round);
     IMP_TRY(imp__measure_look(m));
     IMP_TRY(problem_make(m, stage, stage == IMP_MEASURE_TOGETHER && !m->doubtful, &p));

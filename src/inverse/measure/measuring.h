@@ -17,7 +17,9 @@ struct imp__photo {
     double noise_of; /* relative error of its square; 0: it was given */
     float *noise_se; /* [n_values] all `noise`, for targets */
     float *weights;  /* [n_pixels] desc.weights, 0 where masked */
-    float *square;   /* [n_pixels] sum of squared residuals of its compared values ... */
+    float *left,
+        *own;      /* [n_values] residuals, NAN: not compared; the picture's variances */
+    float *square; /* [n_pixels] sum of squared residuals of its compared values ... */
     float
         *expected; /* [n_pixels] ... and what noise makes of it; 0: nothing is compared */
     float *robust; /* [n_pixels] factors of weights in all fits but the last */
@@ -28,6 +30,9 @@ struct imp__photo {
         chi2_se; /* mean square of residuals, our own noise taken off, over the noise */
     size_t n_compared; /* values in it */
 };
+
+/* An error of chi-square with which nothing is explained. */
+#define IMP_MEASURE_BLIND 1
 
 struct imp__measure {
     imp_context *ctx;
@@ -41,6 +46,7 @@ struct imp__measure {
     uint8_t *stage; /* [n_params] of which stage it is; IMP_MEASURE_STAGES: held */
     size_t n_holds;
     struct imp__held *holds;      /* [n_holds] the items of o.hold */
+    bool joined;                  /* textures are few: the last fit has them */
     uint8_t *held;                /* [n_theta] single numbers that stay; NULL: none */
     double *at;                   /* [n_theta] where its own stage has left each number */
     double *at_se;                /* [n_theta] and its standard error there; 0: none */
@@ -80,6 +86,13 @@ struct imp_param *imp__measure_film_number(const struct imp__measure *m,
                                            const char *number, size_t *index);
 /* Is a single number of parameter k held? */
 bool imp__measure_holds(const struct imp__measure *m, size_t k);
+/* Is parameter k a factor of what a light sends: a radiance or the like, or a scale, and no place,
+ * angle or turbidity? */
+bool imp__measure_shines(const struct imp__measure *m, size_t k);
+/* Is parameter k of a stage? The last fit has those of all stages before textures, and of textures where
+ * they are few. */
+bool imp__measure_has(const struct imp__measure *m, enum imp_measure_stage stage,
+                      size_t k);
 /* How many numbers a stage has. */
 size_t imp__measure_count(const struct imp__measure *m, enum imp_measure_stage stage);
 
@@ -87,9 +100,14 @@ size_t imp__measure_count(const struct imp__measure *m, enum imp_measure_stage s
 /* Fields of view and exposures at the start. */
 enum imp_status imp__measure_begin(struct imp__measure *m);
 
-/* ---- measure_photo.c ---- */
-/* noise and noise_of, where it was not given. */
+/* ---- measure_noise.c ---- */
+/* noise, and noise_of where it was not given. */
 enum imp_status imp__measure_noise(struct imp__measure *m, struct imp__photo *photo);
+/* The same from its residuals, where that is less: *changed, and a line. */
+enum imp_status imp__measure_noise_again(struct imp__measure *m, struct imp__photo *photo,
+                                         bool *changed);
+
+/* ---- measure_photo.c ---- */
 /* Residuals, chi2 and robust weights at the scene's present numbers, by pictures of `seed`. */
 enum imp_status imp__measure_residual(struct imp__measure *m, struct imp__photo *photo,
                                       uint64_t seed);
@@ -104,6 +122,8 @@ void imp__measure_weights(struct imp__photo *photo);
 /* ---- measure_stage.c ---- */
 /* Residuals of all photographs at the present numbers, unless they are there. */
 enum imp_status imp__measure_look(struct imp__measure *m);
+/* Chi-square of the last row again, by other noise; says so. */
+enum imp_status imp__measure_judge_again(struct imp__measure *m);
 /* A fit of one stage, whose problem is destroyed unless `problem` is there. Adds its row. */
 enum imp_status imp__measure_fit(struct imp__measure *m, enum imp_measure_stage stage,
                                  int round, imp_problem **problem,

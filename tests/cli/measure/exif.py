@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Grey PNG photographs with EXIF: exif.py NAME.png WIDTH HEIGHT LEVEL [TIME F_NUMBER ISO FOCAL_35MM | broken KIND]."""
+"""Grey photographs with EXIF, PNG of 8 bits or TIFF of 16: exif.py NAME.png|NAME.tif WIDTH HEIGHT LEVEL
+[TIME F_NUMBER ISO FOCAL_35MM | broken KIND]; LEVEL of 255."""
 import random
 import struct
 import sys
@@ -43,8 +44,29 @@ def broken(kind):
     return bytes(good)
 
 
+def tiff(data):
+    """The same directory for the picture, whose pixels stand behind all numbers."""
+    pixels = b"".join(struct.pack("<H", 257 * level + rng.randrange(-800, 800)) for _ in range(width * height))
+    fields = [(256, 4, width), (257, 4, height), (258, 3, 16), (259, 3, 1), (262, 3, 1), (273, 4, None), (277, 3, 1), (278, 4, height),
+              (279, 4, len(pixels)), (0x8769, 4, None)]
+    start = 8 + 2 + 12 * len(fields) + 4
+    more = data[26:]  # the EXIF directory, whose places move along
+    count = struct.unpack("<H", more[:2])[0]
+    entries = [list(struct.unpack("<HHII", more[2 + 12 * k:14 + 12 * k])) for k in range(count)]
+    for e in entries:
+        e[3] += start - 26 if e[1] == 5 else 0
+    more = more[:2] + b"".join(struct.pack("<HHII", *e) for e in entries) + more[2 + 12 * count:]
+    places = {273: start + len(more), 0x8769: start}
+    table = b"".join(struct.pack("<HHII", tag, kind, 1, places.get(tag, value)) for tag, kind, value in fields)
+    return b"II*\0" + struct.pack("<IH", 8, len(fields)) + table + struct.pack("<I", 0) + more + pixels
+
+
 width, height, level = map(int, sys.argv[2:5])
 rng = random.Random(level)
+if sys.argv[1].endswith(".tif"):
+    with open(sys.argv[1], "wb") as f:
+        f.write(tiff(block(*map(float, sys.argv[5:9]))))
+    sys.exit()
 rows = b"".join(b"\0" + bytes(level + rng.randrange(-3, 4) for _ in range(width)) for _ in range(height))
 exif = b""
 if len(sys.argv) > 5:

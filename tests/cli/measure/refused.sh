@@ -23,5 +23,7 @@ measure "$S" left.pgm --stages lamps
 measure "$S" left.pgm -p 'ball.*'
 measure "$S" left.pgm --hold '*' --hold '*.pose'
 measure "$S" left.pgm@7
+measure "$S" black.pgm@0 -o refused
+test -e refused && echo 'a refused measurement has left a folder' >&2
 echo mine >measure.json
 measure "$S" left.pgm -o .

@@ -26,5 +26,6 @@ off = [(n, t, rows[n]["lo95"], rows[n]["hi95"]) for n, t in truth.items() if not
 wide = [n for n, t in truth.items() if rows[n]["se"] > .3 * t]
 far = [n for n, t in truth.items() if abs(rows[n]["value"] - t) > 3.5 * rows[n]["se"]]
 print(len(off) <= 1 or off, wide, far)
+print([abs(p["noise"] / .01006 - 1) < .36 for p in a["photographs"]])  # three errors of an estimate by 350 pixels
 print([s["stage"] for s in a["stages"]][:4], [n["photograph"] for n in a["next"]] != [])
 P
