@@ -152,6 +152,7 @@ def test_design():
     for x in im.luminaires(room):
         p[x.name + ".scale.value"] = used.get(x.name, (None, 0))[1]
     g = im.grid(room, "work", params=p)
+    assert g.raster == (8, 5) and g.cells.shape == (5, 8, 2) and g.cells[4, 7].tolist() == [7, 4]
     assert g.average.hi > 450 and abs(g.average.value - d.wants[0].value) < 15, (g.average, d)
     none = im.design(s, {"work": {"average": 2000}}, rows)
     assert not none.found and none.wants[0].alone < 1000 and "no combination" in repr(none)
