@@ -607,8 +607,11 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *     NAME.x_fov             of a perspective camera: horizontal field of view, degrees
  *     NAME.principal_point_offset_x, NAME.principal_point_offset_y   of a perspective camera:
  *                            in parts of the film's width and height
- *     NAME.position          of a point or spot light: [3], world
- *     NAME.direction         of a directional light, or of a spot's axis: [3], of any length
+ *     NAME.position          of a point, spot or ies light: [3], world
+ *     NAME.direction         of a directional light, of a spot's axis or an ies light's nadir: [3],
+ *                            of any length
+ *
+ * An ies light is one without a shape; it moves without derivatives.
  *
  * Gradients, patterns, and what is there already: as of poses.
  * @param name  such a name.

@@ -174,6 +174,7 @@ NOT_OK = {
     "imp_weather_read": "there is no such file",
     "imp_ugr": "its sources are zeros",
     "imp_design_find": "its sensor is a camera",
+    "imp_design_move": "a problem was made with its scene",
 }
 try: C.CDLL("libOpenImageDenoise.so.2")
 except OSError: NOT_OK["imp_denoise"] = NOT_OK["imp_denoiser_check"] = "there is no Open Image Denoise"
