@@ -36,8 +36,8 @@ static const struct arg_option options[] = {
      10, NULL},
     {ARG_INT, 0, "nodes", "N", "branches of a search, at most (default 20000)", &o.nodes,
      1, 1e9, NULL},
-    {ARG_TEXT, 0, "settings", "FILE", "write the levels, for --set @FILE", &o.settings, 0,
-     0, NULL},
+    {ARG_TEXT, 0, "settings", "FILE", "write the levels and places, for --set @FILE",
+     &o.settings, 0, 0, NULL},
     {ARG_TEXT, 0, "report", "FILE",
      "the answer as a page for a client: plans, what is wanted, luminaires, a view",
      &o.report, 0, 0, NULL},
@@ -130,11 +130,24 @@ static int samples_check(struct imp_run run, const struct imp_design_want *want,
     return rc;
 }
 
+static enum imp_status find(const struct design_lamps *lamps,
+                            const struct design_moves *moves,
+                            const struct imp_design_want *want, size_t n,
+                            const struct imp_design_options *options,
+                            const struct imp_run *run, imp_design **out)
+{
+    return moves->n > 0 ? imp_design_move(cli.scene, lamps->lamp, lamps->n, want, n,
+                                          moves->move, moves->n, options, run, out)
+                        : imp_design_find(cli.scene, lamps->lamp, lamps->n, want, n,
+                                          options, run, out);
+}
+
 static int design(const struct design_lamps *lamps)
 {
     const struct imp_run run = cli_run();
     struct imp_design_options options = IMP_DESIGN_OPTIONS_INIT;
     struct imp_design_want *want = cli_alloc(WANTS_MAX, sizeof *want);
+    struct design_moves moves = {0};
     imp_design *found = NULL;
     size_t n = 0;
     options.least = (enum imp_design_least)o.least;
@@ -149,16 +162,17 @@ static int design(const struct design_lamps *lamps)
                        "design: nothing is wanted; say it by --want, such as --want "
                        "work.average=500,work.uniformity=0.6");
     if (!rc) rc = samples_check(run, want, n);
+    if (!rc) rc = design_moves_make(design_is_catalogued(), &moves, &options);
     if (!rc && o.settings) rc = overwrite_check(o.settings, OUTPUT_SETTINGS);
     if (!rc && o.report) rc = overwrite_check(o.report, OUTPUT_PAGE);
     if (!rc) {
-        const enum imp_status st = imp_design_find(cli.scene, lamps->lamp, lamps->n, want,
-                                                   n, &options, &run, &found);
+        const enum imp_status st = find(lamps, &moves, want, n, &options, &run, &found);
         if (st == IMP_CANCELLED) rc = cli_error(cli_done(), "interrupted: no answer yet");
         else if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
     }
     if (!rc) {
-        struct design_answer a = {lamps, want, &options, imp_design_result(found)};
+        struct design_answer a = {lamps, &moves, want, &options,
+                                  imp_design_result(found)};
         if (cli.json) design_json(&a);
         else design_print(&a);
         if (!a.answer->found) older_tell(o.settings), older_tell(o.report);
@@ -167,6 +181,7 @@ static int design(const struct design_lamps *lamps)
         if (!rc && !(a.answer->found && a.answer->holds)) rc = EXIT_NO;
     }
     imp_design_destroy(found);
+    design_moves_free(&moves);
     free(want);
     return rc;
 }
@@ -192,8 +207,8 @@ const struct command command_design = {
     {"design",
      "SCENE",
      "which luminaires of a room, how far dimmed, for wanted lux",
-     {options_wants, options, options_lamps, options_run, options_scene, options_file,
-      options_general},
+     {options_wants, options, options_lamps, options_moves, options_run, options_scene,
+      options_file, options_general},
      1,
      1},
     run_design,

@@ -121,6 +121,7 @@ int design_settings_write(const char *path, const struct design_answer *a)
                     text + strlen(a->lamps->lamp[j].lamp));
         free(text);
     }
+    if (!rc) rc = design_moves_settings(out.file, a->moves);
     return output_close(&out, rc);
 }
 
@@ -214,6 +215,8 @@ void design_print(const struct design_answer *a)
 {
     const struct imp_design_answer *d = a->answer;
     const int what = (int)a->options->least;
+    if (!d->found && d->n_moves > 0)
+        printf("places were searched near the first ones, and none was found: ");
     if (!d->found && !d->proven)
         printf("no combination was found in %lld branch%s, and it is not shown that "
                "there is "
@@ -224,11 +227,13 @@ void design_print(const struct design_answer *a)
     printf("%zu of %zu lamps: %.4g W, %.5g lm", used(a, d->level), d->n_lamps, d->watts,
            d->flux);
     if (d->cost > 0) printf(", cost %.6g", d->cost);
-    if (d->proven) printf("; no combination needs less\n\n");
+    if (d->proven)
+        printf("; no combination needs less%s\n\n", d->n_moves ? " at these places" : "");
     else
         printf("; the search ended with a bound of %.4g %s (--nodes)\n\n", d->bound,
                objectives[what]);
     print_lamps(a);
+    design_moves_print(a->moves, d);
     print_wants(a);
     printf("%s %g %% confidence, by fresh walks (round %d)\n",
            d->holds ? "all of it holds with" : "NOT all of it is shown to hold with",
@@ -286,6 +291,7 @@ void design_json(const struct design_answer *a)
     json_integer(&j, "rounds", d->rounds);
     json_integer(&j, "nodes", d->nodes);
     json_lamps(&j, a);
+    design_moves_json(&j, a->moves, d);
     json_array(&j, "wants");
     for (size_t k = 0; k < d->n_wants; k++) {
         const struct imp_design_finding *f = design_finding(a, k);

@@ -79,6 +79,8 @@ static int item_add(const char *name, const char *file, struct item **out)
     return 0;
 }
 
+bool design_is_catalogued(void) { return catalogue.n > 0; }
+
 static int choose_read(const char *text)
 {
     char *copy = cli_strdup(text), *save = NULL, *equal = strchr(copy, '=');

@@ -55,8 +55,6 @@ int grid_read(struct imp_run run, int ends, struct grid *out)
     struct grid g = {.sensor = run.sensor,
                      .name = info.name,
                      .unit = info.unit,
-                     .width = info.width,
-                     .height = info.height,
                      .n = (size_t)info.width * (size_t)info.height,
                      .z = NAN,
                      .summary = IMP_GRID_SUMMARY_INIT};
@@ -68,6 +66,7 @@ int grid_read(struct imp_run run, int ends, struct grid *out)
     st = imp_grid_points(cli.scene, run.sensor, g.points, NULL);
     if (st == IMP_OK) st = imp_grid_read(cli.scene, &run, g.value, g.se, &average, &sets);
     if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
+    if (!rc) rc = grid_raster(run.sensor, &g);
     if (!rc && ends) rc = other_end(run, &g, &average, &sets);
     if (!rc) {
         g.summary.size = sizeof g.summary;
@@ -83,7 +82,24 @@ int grid_read(struct imp_run run, int ends, struct grid *out)
 void grid_free(struct grid *g)
 {
     free(g->points);
+    free(g->cell);
     g->points = g->value = g->se = NULL;
+    g->cell = NULL;
+}
+
+int grid_raster(int sensor, struct grid *out)
+{
+    out->cell = cli_alloc(2 * out->n, sizeof *out->cell);
+    const enum imp_status st =
+        imp_grid_cells(cli.scene, sensor, &out->columns, &out->rows, out->cell);
+    return st == IMP_OK ? 0 : cli_fail(st, cli.scene_path);
+}
+
+void grid_size_text(const struct grid *g, char *text, size_t size)
+{
+    if (g->n == (size_t)g->columns * (size_t)g->rows)
+        snprintf(text, size, "%d x %d points", g->columns, g->rows);
+    else snprintf(text, size, "%zu of %d x %d points", g->n, g->columns, g->rows);
 }
 
 static void row_print(const char *what, const struct imp_interval_estimate *e,
@@ -103,7 +119,9 @@ static void place_print(const struct grid *g, size_t at)
 void grid_print(const struct grid *g)
 {
     const struct imp_grid_summary *s = &g->summary;
-    printf("%s: %d x %d points", g->name, g->width, g->height);
+    char size[64];
+    grid_size_text(g, size, sizeof size);
+    printf("%s: %s", g->name, size);
     if (g->from) printf(", from the %s (z %.1f)", g->from, g->z);
     printf("; %g %% intervals\n", 100 * s->confidence);
     row_print("average", &s->average, g->unit);
@@ -135,8 +153,8 @@ void grid_json(struct json *j, const struct grid *g)
     json_object(j, NULL);
     json_text(j, "sensor", g->name);
     json_text(j, "unit", g->unit);
-    json_integer(j, "width", g->width);
-    json_integer(j, "height", g->height);
+    json_integer(j, "width", g->columns);
+    json_integer(j, "height", g->rows);
     if (g->from) {
         json_text(j, "from", g->from);
         json_number(j, "z", g->z);
@@ -147,6 +165,10 @@ void grid_json(struct json *j, const struct grid *g)
     interval_json(j, "maximum", &s->maximum);
     interval_json(j, "uniformity", &s->uniformity);
     interval_json(j, "diversity", &s->diversity);
+    json_array(j, "cells");
+    for (size_t i = 0; i < g->n; i++)
+        json_numbers(j, NULL, 2, (double[2]){g->cell[2 * i], g->cell[2 * i + 1]});
+    json_end_array(j);
     json_array(j, "points");
     for (size_t i = 0; i < g->n; i++) json_numbers(j, NULL, 3, g->points + 3 * i);
     json_end_array(j);
@@ -175,8 +197,8 @@ int grid_csv(const char *path, const struct grid *g)
     fprintf(o.file, "column,row,x,y,z,value,se\n");
     for (size_t i = 0; i < g->n; i++) {
         const double *p = g->points + 3 * i;
-        fprintf(o.file, "%zu,%zu,%.9g,%.9g,%.9g,%.9g,%.3g\n", i % (size_t)g->width,
-                i / (size_t)g->width, p[0], p[1], p[2], g->value[i], g->se[i]);
+        fprintf(o.file, "%d,%d,%.9g,%.9g,%.9g,%.9g,%.3g\n", (int)g->cell[2 * i],
+                (int)g->cell[2 * i + 1], p[0], p[1], p[2], g->value[i], g->se[i]);
     }
     return output_close(&o, rc);
 }

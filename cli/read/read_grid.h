@@ -13,7 +13,8 @@ struct room_page;
 struct grid {
     int sensor;
     const char *name, *unit; /* of the sensor */
-    int width, height;
+    int columns, rows;       /* of the raster: all of it has points on a rectangle */
+    int32_t *cell;           /* [n][2] column and row of each point */
     size_t n;
     double *points;     /* [n][3] */
     double *value, *se; /* [n] */
@@ -29,6 +30,11 @@ int grid_samples_check(struct imp_run run);
  * 0, or an exit code with the reason printed. */
 int grid_read(struct imp_run run, int ends, struct grid *out);
 void grid_free(struct grid *g);
+/* The raster of a sensor's n points, into columns, rows and a new array cell. 0, or an exit code
+ * with the reason printed. */
+int grid_raster(int sensor, struct grid *out);
+/* "8 x 5 points", or how many of them there are. */
+void grid_size_text(const struct grid *g, char *text, size_t size);
 void grid_print(const struct grid *g);
 void grid_json(struct json *j, const struct grid *g);
 /* Points at which no light was found, in part of the grid: a warning. */

@@ -7,12 +7,14 @@
 #include "shared/output.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { PLAN = 720, MARGIN = 20, TOP = 44, SCALE = 96, STEPS_MAX = 12 };
 
 struct plan {
     const struct grid *g;
+    int *point;     /* [rows][columns] of the raster; -1: no point */
     double cell[2]; /* pixels of the drawing */
     double lo, hi;  /* of the colours */
     double step;    /* between isolines */
@@ -53,7 +55,7 @@ static double x_at(const struct plan *p, double column)
 }
 static double y_at(const struct plan *p, double row)
 {
-    return TOP + (p->g->height - row - 0.5) * p->cell[1];
+    return TOP + (p->g->rows - row - 0.5) * p->cell[1];
 }
 
 static double length_between(const struct grid *g, size_t a, size_t b)
@@ -66,14 +68,31 @@ static double length_between(const struct grid *g, size_t a, size_t b)
     return sqrt(sum);
 }
 
+/* Between neighbours along columns (0) or rows (1); 0: no two points are neighbours. */
+static double spacing_of(const struct plan *p, int along)
+{
+    const struct grid *g = p->g;
+    for (size_t i = 0; i < g->n; i++) {
+        const int x = g->cell[2 * i] + (along == 0), y = g->cell[2 * i + 1] + along;
+        const int next =
+            x < g->columns && y < g->rows ? p->point[y * g->columns + x] : -1;
+        if (next >= 0) return length_between(g, i, (size_t)next);
+    }
+    return 0;
+}
+
 static struct plan plan_of(const struct grid *g)
 {
     struct plan p = {.g = g, .lo = INFINITY, .hi = -INFINITY};
-    double side[2] = {g->width > 1 ? length_between(g, 0, 1) : 1,
-                      g->height > 1 ? length_between(g, 0, (size_t)g->width) : 1};
-    if (g->width == 1) side[0] = side[1];
-    if (g->height == 1) side[1] = side[0];
-    const double wide = side[0] * g->width, high = side[1] * g->height;
+    const size_t places = (size_t)g->columns * (size_t)g->rows;
+    p.point = cli_alloc(places, sizeof *p.point);
+    for (size_t i = 0; i < places; i++) p.point[i] = -1;
+    for (size_t i = 0; i < g->n; i++)
+        p.point[g->cell[2 * i + 1] * g->columns + g->cell[2 * i]] = (int)i;
+    double side[2] = {spacing_of(&p, 0), spacing_of(&p, 1)};
+    for (int k = 0; k < 2; k++)
+        if (side[k] == 0) side[k] = side[1 - k] > 0 ? side[1 - k] : 1;
+    const double wide = side[0] * g->columns, high = side[1] * g->rows;
     for (int k = 0; k < 2; k++) p.cell[k] = side[k] * PLAN / fmax(wide, high);
     for (size_t i = 0; i < g->n; i++) {
         p.lo = fmin(p.lo, g->value[i]);
@@ -87,8 +106,7 @@ static void cells_put(FILE *f, const struct plan *p)
 {
     const struct grid *g = p->g;
     for (size_t i = 0; i < g->n; i++) {
-        const double column = (double)(i % (size_t)g->width),
-                     row = (double)(i / (size_t)g->width);
+        const double column = g->cell[2 * i], row = g->cell[2 * i + 1];
         char c[8];
         colour(part_of(p, g->value[i]), c);
         fprintf(
@@ -108,8 +126,8 @@ static void crossing(const struct plan *p, double level, const double a[3],
     out[1] = y_at(p, a[1] + t * (b[1] - a[1]));
 }
 
-/* The lines of a level in the square with the points (x, y) and (x + 1, y + 1) as corners. Where
- * two opposite corners are above it, the mean decides which way the lines run. */
+/* The lines of a level in the square with the points (x, y) and (x + 1, y + 1) as corners, if there
+ * are all four. Where two opposite corners are above it, the mean decides which way the lines run. */
 static void square_put(FILE *f, const struct plan *p, int x, int y, double level)
 {
     static const int dx[4] = {0, 1, 1, 0}, dy[4] = {0, 0, 1, 1};
@@ -118,7 +136,9 @@ static void square_put(FILE *f, const struct plan *p, int x, int y, double level
     for (int k = 0; k < 4; k++) {
         corner[k][0] = x + dx[k];
         corner[k][1] = y + dy[k];
-        corner[k][2] = p->g->value[(y + dy[k]) * p->g->width + x + dx[k]];
+        const int i = p->point[(y + dy[k]) * p->g->columns + x + dx[k]];
+        if (i < 0) return;
+        corner[k][2] = p->g->value[i];
         mean += corner[k][2] / 4;
     }
     for (int k = 0; k < 4; k++) {
@@ -139,8 +159,8 @@ static void isolines_put(FILE *f, const struct plan *p)
     for (double level = ceil(p->lo / p->step) * p->step; level < p->hi;
          level += p->step) {
         fprintf(f, "<path fill=\"none\" stroke=\"#fff\" stroke-width=\"1.2\" d=\"");
-        for (int y = 0; y + 1 < p->g->height; y++)
-            for (int x = 0; x + 1 < p->g->width; x++) square_put(f, p, x, y, level);
+        for (int y = 0; y + 1 < p->g->rows; y++)
+            for (int x = 0; x + 1 < p->g->columns; x++) square_put(f, p, x, y, level);
         fprintf(f, "\"><title>%g %s</title></path>\n", level, p->g->unit);
     }
 }
@@ -151,8 +171,7 @@ static void numbers_put(FILE *f, const struct plan *p)
     const struct grid *g = p->g;
     if (p->cell[0] < 28 || p->cell[1] < 12) return;
     for (size_t i = 0; i < g->n; i++) {
-        const double column = (double)(i % (size_t)g->width),
-                     row = (double)(i / (size_t)g->width);
+        const double column = g->cell[2 * i], row = g->cell[2 * i + 1];
         const double v = g->value[i];
         fprintf(f,
                 "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\" "
@@ -191,7 +210,7 @@ static void name_put(FILE *f, const char *name)
 void grid_svg_put(FILE *f, const struct grid *g)
 {
     const struct plan p = plan_of(g);
-    const double wide = p.cell[0] * g->width, high = p.cell[1] * g->height;
+    const double wide = p.cell[0] * g->columns, high = p.cell[1] * g->rows;
     const double full = MARGIN + wide + SCALE, whole = TOP + fmax(high, 120) + MARGIN;
     fprintf(f,
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.0f\" height=\"%.0f\" "
@@ -207,6 +226,7 @@ void grid_svg_put(FILE *f, const struct grid *g)
     numbers_put(f, &p);
     scale_put(f, &p, MARGIN + wide + 12, fmax(high, 120));
     fprintf(f, "</svg>\n");
+    free(p.point);
 }
 
 int grid_svg(const char *path, const struct grid *g)

@@ -44,7 +44,8 @@ static int no_grid(int sensor)
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
     return cli_error(EXIT_USAGE,
                      "--sensor %d: sensor '%s' (%s) has no grid; --grid is of "
-                     "irradiancemeters on rectangles",
+                     "irradiancemeters on rectangles and, at points, on disks and flat "
+                     "meshes",
                      sensor, info.name, info.type);
 }
 
@@ -57,11 +58,11 @@ int grids_read(struct json *j, struct imp_run run, int first, int end,
     for (int s = first; s < end; s++) n += has_grid(s);
     if (n == 0 && cli_typed("sensor")) return no_grid(first);
     if (n == 0)
-        return cli_error(
-            EXIT_USAGE,
-            "%s: no irradiancemeter on a rectangle is among its sensors, and "
-            "--grid is of those",
-            cli.scene_path);
+        return cli_error(EXIT_USAGE,
+                         "%s: no irradiancemeter on a rectangle is among its sensors, "
+                         "nor one at points "
+                         "on a disk or a flat mesh, and --grid is of those",
+                         cli.scene_path);
     if (n > 1 && (wanted->csv || wanted->svg))
         return cli_error(EXIT_USAGE,
                          "%s: it has %d grids, and --csv and --svg write one: choose it "

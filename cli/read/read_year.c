@@ -8,6 +8,7 @@
 #include "shared/output.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 #define HOURS_MAX 8784 /* of a leap year, the longest that is read */
 #define SPP_LEAST 256  /* samples from which the bias of hours over a bound is small */
@@ -31,42 +32,60 @@ struct year {
     struct imp_weather_hour *hour; /* [weather.n] */
     struct imp_annual_options options;
     struct imp_annual_summary all;
-    struct imp_annual_point *point; /* [n] */
-    double *place;                  /* [n][3] */
-    size_t n;
+    struct imp_annual_point *point; /* [grid.n] */
+    struct grid grid; /* its points; and the autonomy in percent for the plan */
 };
 
 static void year_free(struct year *y)
 {
     free(y->hour);
     free(y->point);
-    free(y->place);
+    grid_free(&y->grid);
+}
+
+/* From a file or, by "-", from the standard input. */
+static int weather_take(struct year *y)
+{
+    const bool piped = strcmp(year_wanted.weather, "-") == 0;
+    if (piped && cli.scene_path[0] == '<')
+        return cli_error(EXIT_USAGE,
+                         "the scene is read from stdin, so --year names a file");
+    y->weather.size = sizeof y->weather;
+    y->hour = cli_alloc(HOURS_MAX, sizeof *y->hour);
+    const enum imp_status st =
+        imp_weather_read(cli.context, piped ? "/dev/stdin" : year_wanted.weather,
+                         &y->weather, y->hour, HOURS_MAX);
+    if (st == IMP_OK) return 0;
+    const int rc = cli_fail(st, NULL);
+    return st == IMP_E_IO ? EXIT_USAGE : rc; /* an input that is not there */
 }
 
 static int compute(struct year *y, const struct imp_run *run)
 {
-    const char *file = year_wanted.weather;
-    y->weather.size = sizeof y->weather;
-    y->hour = cli_alloc(HOURS_MAX, sizeof *y->hour);
-    enum imp_status st =
-        imp_weather_read(cli.context, file, &y->weather, y->hour, HOURS_MAX);
-    if (st != IMP_OK) return cli_fail(st, NULL);
+    struct grid *g = &y->grid;
+    int rc = weather_take(y);
+    if (rc) return rc;
     y->sensor.size = sizeof y->sensor;
-    st = imp_scene_get_sensor(cli.scene, run->sensor, &y->sensor);
+    enum imp_status st = imp_scene_get_sensor(cli.scene, run->sensor, &y->sensor);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
-    y->n = (size_t)y->sensor.width * (size_t)y->sensor.height;
-    y->point = cli_alloc(y->n, sizeof *y->point);
-    y->place = cli_alloc(3 * y->n, sizeof *y->place);
+    g->name = y->sensor.name;
+    g->unit = "% autonomy";
+    g->n = (size_t)y->sensor.width * (size_t)y->sensor.height;
+    g->points = cli_alloc(5 * g->n, sizeof *g->points);
+    g->value = g->points + 3 * g->n;
+    g->se = g->value + g->n;
+    y->point = cli_alloc(g->n, sizeof *y->point);
     y->options.size = sizeof y->options;
     y->options.opens = year_wanted.hours[0];
     y->options.closes = year_wanted.hours[1];
     y->options.wanted = year_wanted.lux;
     y->all.size = sizeof y->all;
-    st = imp_grid_points(cli.scene, run->sensor, y->place, NULL);
+    st = imp_grid_points(cli.scene, run->sensor, g->points, NULL);
     if (st == IMP_OK)
         st = imp_annual_read(cli.scene, run, y->weather.n, y->hour, &y->options, y->point,
                              &y->all, NULL, NULL);
-    return st == IMP_OK ? 0 : cli_fail(st, cli.scene_path);
+    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    return grid_raster(run->sensor, g);
 }
 
 /* ---- Text --------------------------------------------------------------------------- */
@@ -83,9 +102,10 @@ static void text_print(const struct year *y)
     const struct imp_annual_point *a = &y->all.average;
     char wanted[32];
     snprintf(wanted, sizeof wanted, "%g lx", y->options.wanted);
-    printf("%s: %d x %d points, %zu hours of use (%d to %d)\n", y->sensor.name,
-           y->sensor.width, y->sensor.height, y->all.hours, year_wanted.hours[0],
-           year_wanted.hours[1]);
+    char size[64];
+    grid_size_text(&y->grid, size, sizeof size);
+    printf("%s: %s, %zu hours of use (%d to %d)\n", y->sensor.name, size, y->all.hours,
+           year_wanted.hours[0], year_wanted.hours[1]);
     printf("weather: %s, %g N, %g E%s\n", y->weather.place, y->weather.latitude,
            y->weather.longitude,
            y->weather.modelled ? "; illuminances by Perez' model from radiation" : "");
@@ -130,8 +150,8 @@ static void json_print(struct json *j, const struct year *y)
 {
     json_object(j, NULL);
     json_text(j, "sensor", y->sensor.name);
-    json_integer(j, "width", y->sensor.width);
-    json_integer(j, "height", y->sensor.height);
+    json_integer(j, "width", y->grid.columns);
+    json_integer(j, "height", y->grid.rows);
     json_object(j, "weather");
     json_text(j, "place", y->weather.place);
     json_number(j, "latitude", y->weather.latitude);
@@ -146,7 +166,8 @@ static void json_print(struct json *j, const struct year *y)
     number_json(j, "spatial_autonomy", y->all.spatial_autonomy);
     number_json(j, "sun_exposure", y->all.sun_exposure);
     json_array(j, "points");
-    for (size_t i = 0; i < y->n; i++) point_json(j, NULL, &y->point[i], y->place + 3 * i);
+    for (size_t i = 0; i < y->grid.n; i++)
+        point_json(j, NULL, &y->point[i], y->grid.points + 3 * i);
     json_end_array(j);
     json_end_object(j);
 }
@@ -159,19 +180,23 @@ static int table_write(const char *path, const struct year *y)
     int rc = output_open(&o, path, OUTPUT_TABLE);
     if (rc) return rc;
     fprintf(o.file, "column,row,x,y,z");
-    static const char *const name[] = {"autonomy",  "continuous", "below_100",
-                                       "below_300", "below_3000", "above_3000",
-                                       "mean",      "exposure",   "sunlit_hours"};
-    for (int k = 0; k < 9; k++) fprintf(o.file, ",%s,%s_se", name[k], name[k]);
+    /* Units in brackets; parts of the hours of use, from 0 to 1, have none. */
+    static const char *const name[][2] = {
+        {"autonomy", ""},  {"continuous", ""},      {"below_100", ""},
+        {"below_300", ""}, {"below_3000", ""},      {"above_3000", ""},
+        {"mean", " [lx]"}, {"exposure", " [lx h]"}, {"sunlit_hours", " [h]"}};
+    for (int k = 0; k < 9; k++)
+        fprintf(o.file, ",%s%s,%s_se%s", name[k][0], name[k][1], name[k][0], name[k][1]);
     fprintf(o.file, "\n");
-    for (size_t i = 0; i < y->n; i++) {
-        const double *p = y->place + 3 * i;
+    for (size_t i = 0; i < y->grid.n; i++) {
+        const double *p = y->grid.points + 3 * i;
         const struct imp_annual_point *x = &y->point[i];
         const struct imp_estimate e[9] = {x->autonomy,  x->continuous, x->useful[0],
                                           x->useful[1], x->useful[2],  x->useful[3],
                                           x->mean,      x->exposure,   x->sunlit_hours};
-        fprintf(o.file, "%zu,%zu,%.9g,%.9g,%.9g", i % (size_t)y->sensor.width,
-                i / (size_t)y->sensor.width, p[0], p[1], p[2]);
+        const int32_t *cell = y->grid.cell + 2 * i;
+        fprintf(o.file, "%d,%d,%.9g,%.9g,%.9g", (int)cell[0], (int)cell[1], p[0], p[1],
+                p[2]);
         for (int k = 0; k < 9; k++) fprintf(o.file, ",%.6g,%.2g", e[k].value, e[k].se);
         fprintf(o.file, "\n");
     }
@@ -179,27 +204,17 @@ static int table_write(const char *path, const struct year *y)
 }
 
 /* The autonomy in percent as a grid. */
-static int plan_write(const char *path, const struct year *y)
+static int plan_write(const char *path, struct year *y)
 {
-    struct grid g = {.name = y->sensor.name,
-                     .unit = "% autonomy",
-                     .width = y->sensor.width,
-                     .height = y->sensor.height,
-                     .n = y->n,
-                     .points = y->place,
-                     .summary = IMP_GRID_SUMMARY_INIT};
-    g.value = cli_alloc(2 * y->n, sizeof *g.value);
-    g.se = g.value + y->n;
-    for (size_t i = 0; i < y->n; i++) {
-        g.value[i] = 100 * y->point[i].autonomy.value;
-        g.se[i] = 100 * y->point[i].autonomy.se;
+    struct grid *g = &y->grid;
+    for (size_t i = 0; i < g->n; i++) {
+        g->value[i] = 100 * y->point[i].autonomy.value;
+        g->se[i] = 100 * y->point[i].autonomy.se;
     }
-    g.summary.size = sizeof g.summary;
+    g->summary.size = sizeof g->summary;
     const enum imp_status st =
-        imp_grid_summarise(cli.context, y->n, g.value, g.se, NULL, 16, 0, &g.summary);
-    const int rc = st == IMP_OK ? grid_svg(path, &g) : cli_fail(st, NULL);
-    free(g.value);
-    return rc;
+        imp_grid_summarise(cli.context, g->n, g->value, g->se, NULL, 16, 0, &g->summary);
+    return st == IMP_OK ? grid_svg(path, g) : cli_fail(st, NULL);
 }
 
 int year_read(struct json *j, const struct imp_run *run, const char *csv, const char *svg)

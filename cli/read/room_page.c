@@ -134,9 +134,11 @@ static void row_put(FILE *f, const char *what, const struct imp_interval_estimat
 static void grid_put(FILE *f, const struct grid *g)
 {
     const struct imp_grid_summary *s = &g->summary;
+    char size[64];
     fprintf(f, "<section>\n<h2>");
     text_put(f, g->name);
-    fprintf(f, ": %d x %d points</h2>\n", g->width, g->height);
+    grid_size_text(g, size, sizeof size);
+    fprintf(f, ": %s</h2>\n", size);
     grid_svg_put(f, g);
     fprintf(
         f,

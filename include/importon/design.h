@@ -47,6 +47,19 @@ struct imp_design_want {
 };
 #define IMP_DESIGN_WANT_INIT IMP_INIT_ZERO(struct imp_design_want)
 
+/** A number of the scene's geometry that may change: where a lamp is, or where it looks. */
+struct imp_design_move {
+    size_t size;
+    /** "LAMP.position", "LAMP.direction" or "SHAPE.pose" (imp_scene_add_geometry). */
+    const char *name;
+    int component; /**< which of its numbers, from 0 */
+    /** Bounds, in its unit, with its present value between them. Both 0: of a place, or of the box of
+     * a shape with a pose, the box of all shapes less options.clearance; of a component of a
+     * direction -1 and 1, or its present value's size; of a turn .5 rad to both sides. */
+    double lo, hi;
+};
+#define IMP_DESIGN_MOVE_INIT IMP_INIT_ZERO(struct imp_design_move)
+
 enum imp_design_least {
     IMP_LEAST_WATTS = 0, /**< sum of watts times level */
     IMP_LEAST_FLUX = 1,  /**< sum of flux times level; all lamps are luminaires */
@@ -62,6 +75,8 @@ struct imp_design_options {
     int others;        /**< other sets of lamps to be listed, at most; 0: none */
     double within; /**< of their objective above the answer's, as a part of it; 0: .05 */
     int64_t nodes; /**< branches of a search, at most; 0: 20000 */
+    double clearance; /**< of what moves, from the box of all shapes: scene units, >= 0 */
+    int steps;        /**< of a search for places, at most; 0: 60 */
 };
 #define IMP_DESIGN_OPTIONS_INIT IMP_INIT_ZERO(struct imp_design_options)
 
@@ -110,6 +125,10 @@ struct imp_design_answer {
     size_t n_others;
     const double *other_objective; /**< [n_others] the least first */
     const double *other_level;     /**< [n_others][n_lamps] */
+    size_t n_moves;
+    const double *moved_from,
+        *moved_to; /**< [n_moves] in the order in which they were given */
+    int steps;     /**< that were taken from there to here */
 };
 
 /** Is `value` on the right side of what is wanted? A bound that is met exactly holds; rounding is
@@ -147,6 +166,26 @@ typedef struct imp_design imp_design;
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_design_find(imp_scene *scene, const struct imp_design_lamp *lamps, size_t n_lamps,
                 const struct imp_design_want *wants, size_t n_wants,
+                const struct imp_design_options *options, const struct imp_run *run,
+                imp_design **out);
+/**
+ * Move lamps first: find places and aims near the present ones for which what is wanted holds with the
+ * fewest watts, flux or cost; then do as imp_design_find there. The search is local (sequential
+ * linear programs in levels and places, with one set of random numbers), so that where it ends
+ * depends on where it begins; it proves nothing of other places, while `proven` and `bound`
+ * are of the combinations at the places found. Lamps that are not used at the first places stay
+ * where they are, unless nothing there has what is wanted: then all are used to begin with.
+ * The scene has the places found afterwards, also without an answer; after an error, the first ones.
+ * @param moves   [n_moves] at least 1.
+ * @param lamps, wants, options, run, out   as imp_design_find.
+ * @return as imp_design_find; IMP_E_ARG for a number that is none of these, is there twice, or has a
+ *         value outside of its bounds; and what imp_scene_add_geometry refuses, with a problem made
+ *         with the scene before that was to be.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_design_move(imp_scene *scene, const struct imp_design_lamp *lamps, size_t n_lamps,
+                const struct imp_design_want *wants, size_t n_wants,
+                const struct imp_design_move *moves, size_t n_moves,
                 const struct imp_design_options *options, const struct imp_run *run,
                 imp_design **out);
 /** It belongs to the design. NULL for NULL. */

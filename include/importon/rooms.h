@@ -22,10 +22,26 @@ extern "C" {
  * @param[out] points  [height][width][3] of the crop window, scene units.
  * @param[out] normals [height][width][3] the normal of its shape there, unit; may be NULL.
  * @return IMP_OK; IMP_E_ARG if there is no such sensor, or it is no irradiancemeter on a
- *         shape whose uv is a square.
+ *         rectangle or, at points, on a disk or a flat mesh.
  */
 IMP_API IMP_MUST_CHECK enum imp_status imp_grid_points(const imp_scene *scene, int sensor,
                                                        double *points, double *normals);
+
+/**
+ * Where the points of imp_grid_points are in a raster of columns and rows: a rectangle's is its film, row
+ * by row, in the directions of u and v. On a disk or a flat mesh the raster is that of the
+ * rectangle around the shape, and the film has one row of those points that lie on the
+ * shape.
+ * @param sensor as imp_grid_points.
+ * @param[out] columns [1] of the raster; may be NULL.
+ * @param[out] rows    [1] may be NULL.
+ * @param[out] cell    [height][width][2] of the crop window: column and row of each point, from 0;
+ *                     may be NULL.
+ * @return as imp_grid_points.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status imp_grid_cells(const imp_scene *scene, int sensor,
+                                                      int *columns, int *rows,
+                                                      int32_t *cell);
 
 /**
  * The readings of all pixels of a sensor, and their mean: luminance or illuminance of rgb and

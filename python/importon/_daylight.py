@@ -126,7 +126,7 @@ def annual(scene: Scene, weather: Any, sensor: Any = 0, *, opens: float = 8, clo
     weather : Weather, str or path-like
         The hours, or an EPW file.
     sensor : int or str
-        An irradiancemeter on a rectangle.
+        An irradiancemeter on a rectangle or, at points, on a disk or a flat mesh.
     opens, closes : float
         Hours of use of every day, standard time.
     wanted : float

@@ -60,6 +60,10 @@ class Design:
     others : list of (float, dict)
         Objectives and levels of other sets of lamps.
     rounds, nodes : int
+    moves : dict of str to list of (float, float)
+        What has moved, by name: from and to, for each of its numbers that may move.
+    steps : int
+        Of the search for places.
     """
 
     def __init__(self, answer: Any, names: list[str], sensors: list[str]) -> None:
@@ -67,7 +71,8 @@ class Design:
         self.found, self.holds, self.proven = bool(answer.found), bool(answer.holds), bool(answer.proven)
         for key in ("objective", "bound", "objective_se", "margin", "watts", "flux", "cost"):
             setattr(self, key, float(getattr(answer, key)))
-        self.rounds, self.nodes = int(answer.rounds), int(answer.nodes)
+        self.rounds, self.nodes, self.steps = int(answer.rounds), int(answer.nodes), int(answer.steps)
+        self.moves: dict[str, list[tuple[float, float]]] = {}
         self.levels = dict(zip(names, _doubles(answer.level, n)))
         self.wants = [Want(s, "", f.wanted, f.value, f.sure, bool(f.holds), bool(f.binding), f.price, f.attainable,
                            f.alone) for s, f in zip(sensors, rows_of(_c.imp_design_finding, _pointer(answer.wants),
@@ -114,6 +119,26 @@ def _lamp(value: Any, keep: list[Any]) -> Any:
     return row
 
 
+def _moves(moves: Any, keep: list[Any]) -> list[Any]:
+    """imp_design_move of names, or of a mapping of names to bounds (None, or a pair for each number; None: it stays)."""
+    listed = []
+    for name in moves or ():
+        bounds = moves[name] if isinstance(moves, Mapping) else None
+        if bounds is None:
+            bounds = [(0, 0)] * (6 if str(name).endswith(".pose") else 3)
+        keep.append(text(name, "moves"))
+        for component, pair in enumerate(bounds):
+            if pair is None:
+                continue
+            try:
+                lo, hi = (float(x) for x in pair)
+            except (TypeError, ValueError) as e:
+                raise ArgumentError("moves: bounds of %r are pairs (lo, hi), or None for a number that stays" % name) from e
+            listed.append(make(_c.imp_design_move, component=component, lo=lo, hi=hi))
+            listed[-1].name = keep[-1]
+    return listed
+
+
 def _wants(scene: Scene, wants: Mapping[Any, Mapping[str, float]]) -> list[Any]:
     if not isinstance(wants, Mapping):
         raise ArgumentError("wants maps grids to what is wanted of them, as {'work': {'average': 500}}")
@@ -130,7 +155,7 @@ def _wants(scene: Scene, wants: Mapping[Any, Mapping[str, float]]) -> list[Any]:
 def design(scene: Scene, wants: Mapping[Any, Mapping[str, float]],
            lamps: Optional[Sequence[Union[str, Mapping[str, Any]]]] = None, *, least: str = "watts",
            confidence: float = 0.95, rounds: int = 0, others: int = 0, within: float = 0, nodes: int = 0,
-           params: Any = None, seed: int = 0, spp: int = 0, points: str = "scene", walks_from: str = "scene",
+           moves: Any = None, clearance: float = 0.1, steps: int = 0, params: Any = None, seed: int = 0, spp: int = 0, points: str = "scene", walks_from: str = "scene",
            progress: Any = None) -> Design:
     """Which lamps are used, and how far dimmed, so that what is wanted of grids holds with the fewest watts.
 
@@ -149,6 +174,14 @@ def design(scene: Scene, wants: Mapping[Any, Mapping[str, float]],
         With which all of it holds, by fresh walks.
     rounds, nodes : int
         Of fresh walks, and branches of a search, at most.
+    moves : list of str or mapping, optional
+        Places and aims that may change: names as of `Scene.add_geometry` ("lamp.position", "lamp.direction",
+        "shape.pose"), or a mapping of them to bounds, ``{"lamp.position": [(0, 4), (0, 6), None]}``; None: a number that
+        stays. The scene has the places found afterwards.
+    clearance : float
+        Of what moves without bounds, from the box of all shapes.
+    steps : int
+        Of a search for places, at most (60).
     others, within
         Other sets of lamps to be listed, at most, and by what part of the objective they may be above it.
     params, seed, spp, points, walks_from, progress
@@ -180,14 +213,23 @@ def design(scene: Scene, wants: Mapping[Any, Mapping[str, float]],
     of = (_c.imp_design_want * max(len(wanted), 1))(*wanted)
     o = make(_c.imp_design_options, least=choice("imp_design_least", least, "least"), confidence=float(confidence),
              rounds=integer(rounds, "rounds"), others=integer(others, "others"), within=float(within),
-             nodes=integer(nodes, "nodes"))
+             nodes=integer(nodes, "nodes"), clearance=float(clearance), steps=integer(steps, "steps"))
     options = run_options(scene, sensor=0, seed=seed, spp=spp, points=points, walks_from=walks_from)
     out = ctypes.c_void_p()
-    call(scene, params, options, progress, lib.imp_design_find, scene.pointer, rows, len(listed), of, len(wanted),
-          ctypes.byref(o), ctypes.byref(options), ctypes.byref(out))
+    moved = _moves(moves, keep)
+    if moved:
+        rows_moved = (_c.imp_design_move * len(moved))(*moved)
+        call(scene, params, options, progress, lib.imp_design_move, scene.pointer, rows, len(listed), of, len(wanted),
+              rows_moved, len(moved), ctypes.byref(o), ctypes.byref(options), ctypes.byref(out))
+    else:
+        call(scene, params, options, progress, lib.imp_design_find, scene.pointer, rows, len(listed), of, len(wanted),
+              ctypes.byref(o), ctypes.byref(options), ctypes.byref(out))
     try:
         answer = rows_of(_c.imp_design_answer, _pointer(lib.imp_design_result(out)), 1)[0]
         d = Design(answer, [decode(x.lamp) for x in listed], [scene.sensors[w.sensor].name for w in wanted])
+        places = zip(_doubles(answer.moved_from, len(moved)), _doubles(answer.moved_to, len(moved)))
+        for row, pair in zip(moved, places):
+            d.moves.setdefault(decode(row.name), []).append(pair)
         d.wants = [w._replace(of=_WANTS[x.of]) for w, x in zip(d.wants, wanted)]
         return d
     finally:

@@ -42,6 +42,11 @@ class Grid(NamedTuple):
     """Minimum over maximum."""
     confidence: float
     """With which each interval by itself contains the truth, at least."""
+    cells: Any
+    """[height][width][2], column and row of each point in the raster: on a disk or a flat mesh the film has one row of
+    those points that lie on the shape."""
+    raster: tuple[int, int]
+    """Columns and rows."""
 
 
 class Share(NamedTuple):
@@ -90,7 +95,7 @@ def grid(scene: Scene, sensor: Any = 0, *, params: Any = None, confidence: float
     ----------
     scene : Scene
     sensor : int or str
-        An irradiancemeter on a rectangle.
+        An irradiancemeter on a rectangle or, at points, on a disk or a flat mesh.
     confidence : float
         Of each interval.
     params, seed, spp, points, walks_from, progress
@@ -112,17 +117,20 @@ def grid(scene: Scene, sensor: Any = 0, *, params: Any = None, confidence: float
     number = scene.sensor_index(sensor)
     s = scene.sensors[number]
     value, se = np.zeros((s.height, s.width)), np.zeros((s.height, s.width))
-    places = np.zeros((s.height, s.width, 3))
+    places, cells = np.zeros((s.height, s.width, 3)), np.zeros((s.height, s.width, 2), np.int32)
+    columns, rows = ctypes.c_int(), ctypes.c_int()
     options = run_options(scene, sensor=number, seed=seed, spp=spp, points=points, walks_from=walks_from)
     average, sets, summary = _c.imp_estimate(), ctypes.c_int64(), make(_c.imp_grid_summary)
     scene._context.check(lib.imp_grid_points(scene.pointer, number, address(places), None))
+    scene._context.check(lib.imp_grid_cells(scene.pointer, number, ctypes.byref(columns), ctypes.byref(rows),
+                                            address(cells)))
     call(scene, params, options, progress, lib.imp_grid_read, scene.pointer, ctypes.byref(options), address(value),
           address(se), ctypes.byref(average), ctypes.byref(sets))
     scene._context.check(lib.imp_grid_summarise(scene._context.pointer, value.size, address(value), address(se),
                                                 ctypes.byref(average), sets.value, float(confidence),
                                                 ctypes.byref(summary)))
     number_of = {k: getattr(summary, k) for k in ("average", "minimum", "maximum", "uniformity", "diversity")}
-    return Grid(value, se, places, confidence=summary.confidence,
+    return Grid(value, se, places, confidence=summary.confidence, cells=cells, raster=(columns.value, rows.value),
                 **{k: Interval(x.value, x.lo, x.hi) for k, x in number_of.items()})
 
 

@@ -85,5 +85,11 @@ static inline void imp__uniform_triangle(const double u[2], double b[2])
     b[0] = u[0] - half;
     b[1] = u[1] - half;
 }
+static inline void imp__uniform_triangle_inverse(const double b[2], double u[2])
+{
+    const double least = imp_min(b[0], b[1]);
+    u[0] = b[0] + least;
+    u[1] = b[1] + least;
+}
 
 #endif

@@ -40,8 +40,8 @@ static enum imp_status light_mover(const struct imp__moves *moves, struct imp__m
     double v[3];
     if (!e->ops->aim || (m->kind == IMP_MOVE_AXIS && !e->ops->cone))
         return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
-                          "light '%s' (%s) has no derivative by its place", e->name,
-                          e->ops->name);
+                          "light '%s' (%s) has no derivative by its %s", e->name,
+                          e->ops->name, m->kind == IMP_MOVE_AXIS ? "direction" : "place");
     e->ops->aim(e, v, false);
     m->count = 3;
     m->centre = m->axis = imp__v3(v[0], v[1], v[2]);

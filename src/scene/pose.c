@@ -6,6 +6,7 @@
 #include "access.h"
 #include "base/arguments.h"
 #include "kind/emitter/from_point.h"
+#include "kind/emitter/ies.h"
 #include "kind/shape/shape.h"
 #include "math/motion.h"
 #include <string.h>
@@ -142,6 +143,11 @@ void imp__pose_aim(struct imp_emitter *e, enum imp_pose_kind kind, double v[3])
         e->ops->aim(e, v, false);
         return;
     }
+    if (e->ops == &imp__ies_light) {
+        const struct imp__ies *x = e->self;
+        for (int k = 0; k < 3; k++) v[k] = x->nadir[k];
+        return;
+    }
     e->ops->cone(e, &axis, &cosine);
     for (int k = 0; k < 3; k++) v[k] = axis[k];
 }
@@ -156,9 +162,11 @@ static void light_apply(const struct imp_pose *p)
         memcpy(v, far ? to->number : at->number, sizeof v);
         p->emitter->ops->aim(p->emitter, v, true);
     }
-    if (to && !far)
-        imp__light_frame_turn(p->emitter->self, p->rest,
-                              imp__v3(to->number[0], to->number[1], to->number[2]));
+    if (!to || far) return;
+    const imp_v3 axis = imp__v3(to->number[0], to->number[1], to->number[2]);
+    if (p->emitter->ops == &imp__ies_light)
+        imp__ies_turn(p->emitter->self, p->rest, axis);
+    else imp__light_frame_turn(p->emitter->self, p->rest, axis);
 }
 
 static enum imp_status pose_apply(struct imp_pose *p)

@@ -33,7 +33,7 @@ bool imp__pinhole(const struct imp_sensor *s, imp_v3 *centre)
            imp__length(apart) <= 1e-7 * size;
 }
 
-extern const struct imp_emitter_ops imp__spot_light;
+extern const struct imp_emitter_ops imp__spot_light, imp__ies_light;
 
 /* ---- Adding ------------------------------------------------------------------------- */
 
@@ -96,12 +96,14 @@ static const char *light_why(const struct imp_scene *scene, const struct imp_emi
                              enum imp_pose_kind kind)
 {
     const bool far = e->ops->flags & IMP_EMITTER_FAR;
-    const bool has = kind == IMP_POSE_POSITION    ? !far
-                     : kind == IMP_POSE_DIRECTION ? far || e->ops == &imp__spot_light
-                                                  : false;
+    const bool has = kind == IMP_POSE_POSITION ? !far
+                     : kind == IMP_POSE_DIRECTION
+                         ? far || e->ops == &imp__spot_light || e->ops == &imp__ies_light
+                         : false;
     if (!e->ops->aim || !has)
-        return "it is none of point and spot (position), and directional and spot "
-               "(direction)";
+        return "it is none of point, spot and ies without a shape (position), and "
+               "directional, "
+               "spot and ies (direction)";
     if (scene->light_tree) return "lights are chosen by a tree (light_choice)";
     return NULL;
 }

@@ -152,7 +152,18 @@ def test_design():
     for x in im.luminaires(room):
         p[x.name + ".scale.value"] = used.get(x.name, (None, 0))[1]
     g = im.grid(room, "work", params=p)
+    assert g.raster == (8, 5) and g.cells.shape == (5, 8, 2) and g.cells[4, 7].tolist() == [7, 4]
     assert g.average.hi > 450 and abs(g.average.value - d.wants[0].value) < 15, (g.average, d)
+    xml = '''<scene version="3.0.0"><integrator type="path"/><emitter type="point" id="lamp">
+<point name="position" x="1" y=".5" z="2"/><rgb name="intensity" value="400"/></emitter>
+<shape type="rectangle"><sensor type="irradiancemeter" id="desk"><string name="at" value="points"/></sensor></shape></scene>'''
+    row = [{"lamp": "lamp", "watts": 10, "least": .01}]
+    still = im.design(im.load_string(xml), {"desk": {"minimum": 20}}, row)
+    hall = im.load_string(xml)
+    put = im.design(hall, {"desk": {"minimum": 20}}, row, moves={"lamp.position": [(-2, 2), (-2, 2), None]})
+    to = [b for _, b in put.moves["lamp.position"]]
+    assert put.watts < .8 * still.watts and max(map(abs, to)) < .02 and not still.moves and put.steps > 0, (put, to)
+    raises(im.ArgumentError, lambda: im.design(hall, {"desk": {"minimum": 20}}, row, moves={"lamp.position": [1]}), "pairs")
     none = im.design(s, {"work": {"average": 2000}}, rows)
     assert not none.found and none.wants[0].alone < 1000 and "no combination" in repr(none)
     raises(im.ArgumentError, lambda: im.design(s, {"work": {"brightness": 1}}), "brightness")

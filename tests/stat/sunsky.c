@@ -319,6 +319,8 @@ int main(void)
     refused(ctx, SCENE(NUMBER("turbidity", 11)), "turbidity");
     refused(ctx, SCENE(SUN(0, 0, 0)), "length 0");
     refused(ctx, SCENE(SUN(0, 0, 1) NUMBER("hour", 9)), "not both");
+    refused(ctx, SCENE(NUMBER("hour", 25)), "hour = 25");
+    refused(ctx, SCENE(NUMBER("minute", -1)), "minute = -1");
     refused(ctx, SCENE(NUMBER("sun_aperture", 0)), "sun_aperture");
     refused(ctx, SCENE(NUMBER("latitude", 91)), "latitude");
     refused(ctx, SCENE("<integer name='month' value='13'/>"), "month");

@@ -222,6 +222,14 @@ enum imp_status imp__design_options_take(struct imp__design_model *m,
     if (o->rounds == 0) o->rounds = 4;
     if (o->within == 0) o->within = 0.05;
     if (o->nodes == 0) o->nodes = 20000;
+    if (o->steps == 0) o->steps = 60;
+    IMP_FINITE(m->ctx, o->clearance, "options: clearance");
+    if (o->clearance < 0 || o->steps < 1 || o->steps > 10000)
+        return imp__error(
+            m->ctx, IMP_E_ARG,
+            "options: clearance %g is negative, or steps %d are not in 1 to "
+            "10000",
+            o->clearance, o->steps);
     if (!(o->confidence > 0 && o->confidence < 1))
         return imp__error(m->ctx, IMP_E_ARG, "options: confidence = %g is not in (0, 1)",
                           o->confidence);

@@ -3,7 +3,7 @@
  * A design: responses, the best combination, fresh walks through it, larger margins where these
  * do not show what is wanted, and other answers. */
 #include "base/arguments.h"
-#include "designing.h"
+#include "design_moving.h"
 #include "inverse/problem/problem.h"
 #include "math/rng.h"
 #include "scene/access.h"
@@ -167,45 +167,130 @@ static enum imp_status design_make(struct imp__design_model *m,
     return IMP_OK;
 }
 
-enum imp_status imp_design_find(imp_scene *scene, const struct imp_design_lamp *lamps,
-                                size_t n_lamps, const struct imp_design_want *wants,
-                                size_t n_wants, const struct imp_design_options *options,
-                                const struct imp_run *run, imp_design **out)
+/* Places first, then a design there. Where that ends with an error, what has moved goes back. */
+static enum imp_status moved_make(struct imp__moving *v,
+                                  const struct imp_design_move *moves,
+                                  struct imp_design_answer *out)
+{
+    struct imp__design_model *m = v->m;
+    enum imp_status st = IMP_OK;
+    v->iterations = m->o.steps;
+    m->whole = (double)m->n_grids * ((double)m->n + 2 * (double)v->n) * 10;
+    IMP_TRY(imp__moving_bounds(v, moves, m->o.clearance));
+    /* The largest error of a point is above their rms, by how much is found out. */
+    for (v->more = 1.3; v->more < 5 && !out->found; v->more *= 1.5) {
+        *out = (struct imp_design_answer){.size = out->size};
+        IMP_TRY(imp__design_move(v));
+        IMP_TRY(design_make(m, out));
+        if (v->n == 0) break;
+    }
+    if (v->steps > 0 && v->started < (out->found ? out->objective : INFINITY)) {
+        /* The search took errors of single points as equal: with those that they have the first
+         * places are better. */
+        *out = (struct imp_design_answer){.size = out->size};
+        v->steps = 0;
+        memcpy(v->p, v->first, v->n * sizeof *v->p);
+        IMP_TRY(imp__moving_place(v, v->p));
+        IMP_TRY(design_make(m, out));
+    }
+    out->n_moves = v->n;
+    out->moved_from = v->first;
+    out->moved_to = v->p;
+    out->steps = v->steps;
+out:
+    if (st != IMP_OK && v->n > 0) {
+        const enum imp_status back = imp__moving_place(v, v->first);
+        (void)back; /* the first error is told */
+    }
+    return st;
+}
+
+/* What a design is made of, in a scene whose parameters are held. */
+struct asked {
+    const struct imp_design_lamp *lamps;
+    const struct imp_design_want *wants;
+    const struct imp_design_move *moves;
+    const struct imp_design_options *options;
+};
+
+static enum imp_status design_hold(struct imp__moving *v, const struct asked *a,
+                                   struct imp_design_answer *out)
+{
+    struct imp__design_model *m = v->m;
+    enum imp_status st = IMP_OK;
+    IMP_FLOAT_MODE;
+    IMP_SETS(m->scene, st);
+    if (st != IMP_OK) return st;
+    IMP_CHECKED(imp__design_options_take(m, a->options));
+    IMP_CHECKED(imp__design_lamps_take(m, a->lamps));
+    IMP_CHECKED(imp__design_wants_take(m, a->wants));
+    return moved_make(v, a->moves, out);
+}
+
+static enum imp_status design_run(struct imp__moving *v, const struct asked *a,
+                                  const char *function, const struct imp_run *run,
+                                  imp_design **out)
 {
     enum imp_status st = IMP_OK;
-    IMP_REQUIRE(NULL, scene, "scene");
-    imp_context *ctx = scene->ctx;
+    struct imp__design_model *m = v->m;
+    imp_context *ctx = m->ctx;
     imp_problem *blank = NULL;
-    IMP_REQUIRE(ctx, lamps, "lamps");
-    IMP_REQUIRE(ctx, wants, "wants");
-    IMP_REQUIRE(ctx, out, "out");
-    struct imp__design_model m = {
-        .ctx = ctx, .scene = scene, .n = n_lamps, .n_wants = n_wants};
-    IMP_RUN(ctx, m.run, run);
-    IMP_CHECKED(imp__run_traces(ctx, "imp_design_find", &m.run));
-    IMP_CHECKED(imp_problem_create(scene, &blank)); /* a committed scene, and no parts */
-    st = imp__problem_no_parts(blank, "a design");
-    imp_problem_destroy(blank);
-    if (st != IMP_OK) return st;
-    IMP_FLOAT_MODE;
-    IMP_SETS(scene, st);
-    if (st != IMP_OK) return st;
+    IMP_RUN(ctx, m->run, run);
+    IMP_CHECKED(imp__run_traces(ctx, function, &m->run));
     imp_design *d = imp__alloc(ctx, 1, sizeof *d);
     if (!d) return imp__error(ctx, IMP_E_NOMEM, "no memory for a design");
     d->ctx = ctx;
     imp__context_hold(ctx);
     imp__arena_init(&d->arena, ctx);
-    m.arena = &d->arena;
+    m->arena = &d->arena;
     d->answer.size = sizeof d->answer;
-    IMP_TRY(imp__design_options_take(&m, options));
-    IMP_TRY(imp__design_lamps_take(&m, lamps));
-    IMP_TRY(imp__design_wants_take(&m, wants));
-    IMP_TRY(design_make(&m, &d->answer));
+    if (v->n > 0) IMP_TRY(imp__moving_names(v, a->moves));
+    IMP_TRY(imp_problem_create(m->scene, &blank)); /* a committed scene, and no parts */
+    IMP_TRY(imp__problem_no_parts(blank, "a design"));
+    IMP_TRY(design_hold(v, a, &d->answer));
     *out = d;
     d = NULL;
 out:
+    imp_problem_destroy(blank);
     imp_design_destroy(d);
     return st;
+}
+
+enum imp_status imp_design_find(imp_scene *scene, const struct imp_design_lamp *lamps,
+                                size_t n_lamps, const struct imp_design_want *wants,
+                                size_t n_wants, const struct imp_design_options *options,
+                                const struct imp_run *run, imp_design **out)
+{
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, lamps, "lamps");
+    IMP_REQUIRE(scene->ctx, wants, "wants");
+    IMP_REQUIRE(scene->ctx, out, "out");
+    struct imp__design_model m = {
+        .ctx = scene->ctx, .scene = scene, .n = n_lamps, .n_wants = n_wants};
+    struct imp__moving v = {.m = &m};
+    return design_run(&v, &(struct asked){lamps, wants, NULL, options}, __func__, run,
+                      out);
+}
+
+enum imp_status imp_design_move(imp_scene *scene, const struct imp_design_lamp *lamps,
+                                size_t n_lamps, const struct imp_design_want *wants,
+                                size_t n_wants, const struct imp_design_move *moves,
+                                size_t n_moves, const struct imp_design_options *options,
+                                const struct imp_run *run, imp_design **out)
+{
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, lamps, "lamps");
+    IMP_REQUIRE(scene->ctx, wants, "wants");
+    IMP_REQUIRE(scene->ctx, moves, "moves");
+    IMP_REQUIRE(scene->ctx, out, "out");
+    if (n_moves == 0 || n_moves > 1000)
+        return imp__error(scene->ctx, IMP_E_ARG,
+                          "moves: %zu numbers; there are 1 to 1000", n_moves);
+    struct imp__design_model m = {
+        .ctx = scene->ctx, .scene = scene, .n = n_lamps, .n_wants = n_wants};
+    struct imp__moving v = {.m = &m, .n = n_moves};
+    return design_run(&v, &(struct asked){lamps, wants, moves, options}, __func__, run,
+                      out);
 }
 
 const struct imp_design_answer *imp_design_result(const imp_design *design)

@@ -177,7 +177,7 @@ static enum imp_status observers_look(struct imp__design_model *m,
     return IMP_OK;
 }
 
-static enum imp_status glare_take(struct imp__design_model *m)
+enum imp_status imp__design_observe(struct imp__design_model *m)
 {
     enum imp_status st = IMP_OK;
     m->source = imp__arena_array(m->arena, m->n_points * m->n, sizeof *m->source);
@@ -194,23 +194,24 @@ out:
     return st;
 }
 
-enum imp_status imp__design_responses(struct imp__design_model *m)
+enum imp_status imp__design_response(struct imp__design_model *m, size_t j)
 {
-    enum imp_status st = IMP_OK;
+    struct imp__design_reading *r = j < m->n ? &m->with[j] : &m->base;
+    const uint64_t seed = imp__mix64(m->run.seed ^ imp__mix64(SEED + j));
+    IMP_CHECKED(imp__design_reading_make(m, r));
+    if (j == m->n && !has_others(m)) return IMP_OK;
     double *level = imp__alloc(m->ctx, (size_t)m->scene->n_emitters + 1, sizeof *level);
-    m->with = imp__arena_array(m->arena, m->n, sizeof *m->with);
-    if (!level || !m->with)
-        IMP_TRY(imp__error(m->ctx, IMP_E_NOMEM, "no memory for responses"));
-    for (size_t j = 0; j <= m->n; j++) {
-        struct imp__design_reading *r = j < m->n ? &m->with[j] : &m->base;
-        const uint64_t seed = imp__mix64(m->run.seed ^ imp__mix64(SEED + j));
-        IMP_TRY(imp__design_reading_make(m, r));
-        if (j == m->n && !has_others(m)) break;
-        levels_set(m, j, level);
-        IMP_TRY(levels_read(m, level, seed, 1, r));
-    }
-    IMP_TRY(glare_take(m));
-out:
+    if (!level) return imp__error(m->ctx, IMP_E_NOMEM, "no memory for responses");
+    levels_set(m, j, level);
+    const enum imp_status st = levels_read(m, level, seed, 1, r);
     imp__release(m->ctx, level);
     return st;
+}
+
+enum imp_status imp__design_responses(struct imp__design_model *m)
+{
+    m->with = imp__arena_array(m->arena, m->n, sizeof *m->with);
+    if (!m->with) return imp__error(m->ctx, IMP_E_NOMEM, "no memory for responses");
+    for (size_t j = 0; j <= m->n; j++) IMP_CHECKED(imp__design_response(m, j));
+    return imp__design_observe(m);
 }

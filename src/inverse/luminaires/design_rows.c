@@ -48,6 +48,7 @@ enum imp_status imp__design_rows_make(struct imp__design_model *m)
 {
     m->first_row = imp__arena_array(m->arena, m->n_wants + 1, sizeof *m->first_row);
     if (!m->first_row) return imp__error(m->ctx, IMP_E_NOMEM, "no memory for wants");
+    m->n_rows = 0;
     for (size_t k = 0; k < m->n_wants; k++) {
         m->first_row[k] = m->n_rows;
         m->n_rows += rows_of(m, k);

@@ -73,6 +73,10 @@ enum imp_status imp__design_reading_make(struct imp__design_model *m,
                                          struct imp__design_reading *r);
 /* All responses, and what observers see. */
 enum imp_status imp__design_responses(struct imp__design_model *m);
+/* That of lamp j, or of the other emitters (m->n), once more: the same walks where nothing has moved. */
+enum imp_status imp__design_response(struct imp__design_model *m, size_t j);
+/* What observers see, once more. */
+enum imp_status imp__design_observe(struct imp__design_model *m);
 /* The readings with the lamps at x [n] and the other emitters as they are, from `repeats` readings
  * with each one that is used. */
 enum imp_status imp__design_read(struct imp__design_model *m, const double *x,

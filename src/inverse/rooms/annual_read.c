@@ -7,6 +7,7 @@
 #include "base/arguments.h"
 #include "film/film_measure.h"
 #include "kind/emitter/sky_shape.h"
+#include "kind/sensor/receiver.h"
 #include "point_loop.h"
 #include "walk/path/first_segment.h"
 #include "walk/rules/features.h"
@@ -87,9 +88,9 @@ static enum imp_status allowed(const struct imp_scene *scene, const struct imp_s
                                const struct imp_walk_integrator *walks)
 {
     const char *why = NULL;
-    if (!s->shape || s->gain || !(s->shape->ops->flags & IMP_SHAPE_SQUARE))
+    if (s->gain || !imp__has_grid(s))
         return imp__error(scene->ctx, IMP_E_ARG,
-                          "sensor '%s' (%s) is no irradiancemeter on a rectangle: "
+                          "sensor '%s' (%s) is no irradiancemeter with a grid: "
                           "daylight of a year is of the points of one",
                           s->name, s->ops->name);
     if (scene->mode != IMP_MONO && scene->mode != IMP_RGB) why = "spectral modes";

@@ -11,21 +11,50 @@
 #include <importon/rooms.h>
 #include <math.h>
 
-enum imp_status imp_grid_points(const imp_scene *scene, int sensor, double *points,
-                                double *normals)
+static enum imp_status no_grid(const struct imp_scene *scene, const struct imp_sensor *s)
 {
-    IMP_REQUIRE(NULL, scene, "scene");
-    IMP_REQUIRE(scene->ctx, points, "points");
+    return imp__error(scene->ctx, IMP_E_ARG,
+                      "sensor '%s' (%s) has no grid of points: that is an "
+                      "irradiancemeter on a rectangle or, at points, on a disk or a flat "
+                      "mesh",
+                      s->name, s->ops->name);
+}
+
+static enum imp_status grid_of(const struct imp_scene *scene, int sensor,
+                               const struct imp_sensor **out)
+{
     if (sensor < 0 || sensor >= scene->n_sensors)
         return imp__error(scene->ctx, IMP_E_ARG,
                           "there is no sensor %d; the scene has %d", sensor,
                           scene->n_sensors);
-    const struct imp_sensor *s = scene->sensors[sensor];
-    if (!s->shape || !(s->shape->ops->flags & IMP_SHAPE_SQUARE))
-        return imp__error(scene->ctx, IMP_E_ARG,
-                          "sensor '%s' (%s) has no grid of points: that is an "
-                          "irradiancemeter on a rectangle",
-                          s->name, s->ops->name);
+    *out = scene->sensors[sensor];
+    return imp__has_grid(*out) ? IMP_OK : no_grid(scene, *out);
+}
+
+enum imp_status imp_grid_cells(const imp_scene *scene, int sensor, int *columns,
+                               int *rows, int32_t *cell)
+{
+    const struct imp_sensor *s;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_CHECKED(grid_of(scene, sensor, &s));
+    const struct imp_film_desc *f = &s->film;
+    const struct imp_receiver *r = s->receiver && s->receiver->place ? s->receiver : NULL;
+    if (columns) *columns = r ? r->columns : f->crop_w;
+    if (rows) *rows = r ? r->rows : f->crop_h;
+    for (int i = 0; cell && i < f->crop_w * f->crop_h; i++) {
+        cell[2 * i] = r ? r->cell[i][0] : i % f->crop_w;
+        cell[2 * i + 1] = r ? r->cell[i][1] : i / f->crop_w;
+    }
+    return IMP_OK;
+}
+
+enum imp_status imp_grid_points(const imp_scene *scene, int sensor, double *points,
+                                double *normals)
+{
+    const struct imp_sensor *s;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, points, "points");
+    IMP_CHECKED(grid_of(scene, sensor, &s));
     const struct imp_film_desc *f = &s->film;
     for (int y = 0; y < f->crop_h; y++)
         for (int x = 0; x < f->crop_w; x++) {

@@ -397,6 +397,23 @@ static bool point_sample(const struct imp_emitter *e, const imp_v3 *ref,
     return imp__point_light_sample(p->position, *ref, out);
 }
 
+static void aim(struct imp_emitter *e, double v[3], bool set)
+{
+    struct imp__ies *x = e->self;
+    if (set) x->position = imp__v3(v[0], v[1], v[2]);
+    for (int k = 0; k < 3; k++) v[k] = x->position[k];
+}
+
+void imp__ies_turn(struct imp__ies *x, const struct imp__ies *from, imp_v3 to)
+{
+    struct imp__light_frame f,
+        rest = {{from->c0, from->c90, from->nadir}, from->position};
+    imp__light_frame_turn(&f, &rest, to);
+    x->c0 = f.axis[0];
+    x->c90 = f.axis[1];
+    x->nadir = f.axis[2];
+}
+
 static bool emission_sample(const struct imp_emitter *e, const struct imp_ball *scene,
                             const double u[4], struct imp_emission_sample *out)
 {
@@ -458,7 +475,8 @@ const struct imp_emitter_ops imp__ies_light = {.size = sizeof(struct imp_emitter
                                                .sample = point_sample,
                                                .pdf = imp__point_light_pdf,
                                                .sample_emission = emission_sample,
-                                               .pdf_emission = imp__point_emission_pdf};
+                                               .pdf_emission = imp__point_emission_pdf,
+                                               .aim = aim};
 const struct imp_emitter_ops imp__ies_area = {
     .size = sizeof(struct imp_emitter_ops),
     .name = "ies",

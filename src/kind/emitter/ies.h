@@ -31,6 +31,8 @@ struct imp__ies {
 
 /* Intensity along w (world, unit, away from the light), at scale 1. */
 double imp__ies_intensity(const struct imp__ies *x, imp_v3 w);
+/* The frame of `from`, turned as little as possible until its nadir is along `to`. */
+void imp__ies_turn(struct imp__ies *x, const struct imp__ies *from, imp_v3 to);
 /* Int I dw, at scale 1, in lm (or W). */
 double imp__ies_flux(const struct imp__ies *x);
 /* Area that faces w, projected along w. */

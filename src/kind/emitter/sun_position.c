@@ -50,6 +50,7 @@ imp_v3 imp__sun_direction(const struct imp__sun_date *d)
 static enum imp_status date_read(const struct imp_build *b, imp_v3 *sun)
 {
     enum imp_status st = IMP_OK;
+    static const struct imp_interval sixty = {0, 60, IMP_CLOSED};
     struct imp__sun_date d;
     int64_t year, month, day;
     IMP_TRY(imp__props_float_in(b->ctx, b->node, "latitude", 35.6894,
@@ -59,9 +60,10 @@ static enum imp_status date_read(const struct imp_build *b, imp_v3 *sun)
     IMP_TRY(imp_build_int(b, "year", 2010, 1900, 2100, &year));
     IMP_TRY(imp_build_int(b, "month", 7, 1, 12, &month));
     IMP_TRY(imp_build_int(b, "day", 10, 1, 31, &day));
-    IMP_TRY(imp_build_float(b, "hour", 15, &d.hour));
-    IMP_TRY(imp_build_float(b, "minute", 0, &d.minute));
-    IMP_TRY(imp_build_float(b, "second", 0, &d.second));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "hour", 15,
+                                (struct imp_interval){0, 24, IMP_CLOSED}, &d.hour));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "minute", 0, sixty, &d.minute));
+    IMP_TRY(imp__props_float_in(b->ctx, b->node, "second", 0, sixty, &d.second));
     d.year = (int)year;
     d.month = (int)month;
     d.day = (int)day;

@@ -4,8 +4,9 @@
  *
  *     E = 1/A int int L cos(theta) dw dA
  *
- * A film of more than one pixel is spread over the shape by its uv: a pixel is the mean
- * over its part, or the value in the middle of it (receiver.h, with other receivers). */
+ * A film of more than one pixel is spread over a rectangle by its uv: a pixel is the mean
+ * over its part, or the value in the middle of it (receiver.h, with other receivers). Other
+ * flat shapes have points within their outline (receiver_outline.h). */
 #include "kind/shape/shape.h"
 #include "math/offset.h"
 #include "math/warp.h"
@@ -23,10 +24,10 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
                                s->shape->name, s->shape->ops->name);
     enum imp_status st = imp__receiver_build(b, s);
     if (st != IMP_OK) return st;
-    if ((f->width != 1 || f->height != 1) && !(s->shape->ops->flags & IMP_SHAPE_SQUARE))
+    if ((f->width != 1 || f->height != 1) && !imp__has_grid(s))
         return imp_build_error(b, NULL, IMP_E_SCENE,
-                               "its film has %d x %d pixels; on a %s it has 1 x 1, and "
-                               "more on a rectangle alone",
+                               "its film has %d x %d pixels; on a %s it has 1 x 1, or "
+                               "more for points ('at') on a disk or a flat mesh",
                                f->width, f->height, s->shape->ops->name);
     s->scale = IMP_PI;
     return IMP_OK;

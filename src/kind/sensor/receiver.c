@@ -8,6 +8,12 @@ void imp__receiver_uv(const struct imp_sensor *s, double px, double py, double u
 {
     const struct imp_receiver *r = s->receiver;
     const double at[2] = {px, py}, size[2] = {s->film.width, s->film.height};
+    if (r && r->place) {
+        const int x = (int)imp_clamp(px, 0.0, size[0] - 1);
+        uv[0] = r->place[x][0];
+        uv[1] = r->place[x][1];
+        return;
+    }
     for (int k = 0; k < 2; k++) {
         double x = at[k];
         if (r && r->points) x = imp_clamp(floor(x), 0.0, size[k] - 1) + 0.5;

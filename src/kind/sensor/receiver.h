@@ -24,9 +24,14 @@ struct imp_receiver {
     bool points; /* at the middle of each pixel's cell; else the mean over the cell */
     bool absent; /* its shape is not there for light */
     double first[2], span[2]; /* of uv, which the film covers */
-    struct imp_frame frame;   /* the shape's, n its normal and the axis */
-    imp_v3 facing;            /* f in that frame */
-    struct imp_bsdf bsdf;     /* p as the value and density of a material in that frame */
+    /* On a disk or a mesh, which have points alone: the numbers by which sample_area makes the
+     * point of each pixel, where that is in the raster around the shape, and its size. */
+    const double (*place)[2];
+    const int32_t (*cell)[2];
+    int columns, rows;
+    struct imp_frame frame; /* the shape's, n its normal and the axis */
+    imp_v3 facing;          /* f in that frame */
+    struct imp_bsdf bsdf;   /* p as the value and density of a material in that frame */
 };
 
 /* Light walks cannot meet what is a point, or not there: they are connected to it alone. */
@@ -40,7 +45,14 @@ static inline bool imp__shape_is_absent(const struct imp_shape *s)
     return s->sensor && s->sensor->receiver && s->sensor->receiver->absent;
 }
 
-/* uv on the shape of a film position in pixels. */
+/* Has the meter a grid: pixels with a place each? */
+static inline bool imp__has_grid(const struct imp_sensor *s)
+{
+    return s->shape && ((s->shape->ops->flags & IMP_SHAPE_SQUARE) ||
+                        (s->receiver && s->receiver->place));
+}
+
+/* What sample_area makes the place of a film position in pixels of; uv on a rectangle. */
 void imp__receiver_uv(const struct imp_sensor *s, double px, double py, double uv[2]);
 /* p of direction w, in the shape's frame. */
 double imp__receiver_density(const struct imp_receiver *r, imp_v3 w);

@@ -5,10 +5,11 @@
  * EN 12464-1, 4.4: with d the longer side of the area in metres, or the shorter one if the
  * ratio is 2 or more, points are at most p = 0.2 x 5^(log10 d) apart, p <= 10 m; the number
  * of points along a side is the nearest whole number of side / p. */
+#include "base/arguments.h"
 #include "kind/filter/filter.h"
 #include "kind/shape/shape.h"
 #include "math/transform.h"
-#include "receiver.h"
+#include "receiver_outline.h"
 #include <string.h>
 
 #define SPACING_MAX 10.0 /* m */
@@ -182,15 +183,70 @@ out:
     return st;
 }
 
+/* A rectangle's sides and frame by its corners; the sides of the rectangle around others. */
+static enum imp_status plane_read(const struct imp_build *b, struct imp_sensor *s,
+                                  struct imp_receiver *r, struct imp__outline *outline,
+                                  double whole[2])
+{
+    const bool square = s->shape->ops->flags & IMP_SHAPE_SQUARE;
+    imp_v3 ng;
+    const imp_v3 corner = place_of(s->shape, 0, 0, &ng);
+    r->frame = imp__frame_from_normal(ng);
+    if (!square) {
+        IMP_CHECKED(imp__outline_create(b, s->shape, ng, outline));
+        for (int k = 0; k < 2; k++) whole[k] = outline->side[k];
+        return IMP_OK;
+    }
+    whole[0] = imp__length(place_of(s->shape, 1, 0, &ng) - corner);
+    whole[1] = imp__length(place_of(s->shape, 0, 1, &ng) - corner);
+    return IMP_OK;
+}
+
+/* The raster's points within the outline become the pixels of a film of one row. */
+static enum imp_status points_list(const struct imp_build *b, struct imp_sensor *s,
+                                   const struct imp__outline *outline,
+                                   struct imp_receiver *r)
+{
+    struct imp_film_desc *f = &s->film;
+    const char *kind = s->shape->ops->name;
+    const double margin = r->first[0] * outline->side[0];
+    int n;
+    if (f->crop_w != f->width || f->crop_h != f->height)
+        return imp_build_error(
+            b, NULL, IMP_E_SCENE,
+            "its film has a crop window; a grid on this shape (%s) has "
+            "all points within its outline",
+            kind);
+    if (r->points) {
+        IMP_CHECKED(imp__outline_points(b, s->shape, outline, margin, f->width, f->height,
+                                        r, &n));
+        f->width = f->crop_w = n;
+        f->height = f->crop_h = 1;
+        return IMP_OK;
+    }
+    if (f->width != 1 || f->height != 1)
+        return imp_build_error(b, imp_build_has(b, "at") ? "at" : NULL, IMP_E_SCENE,
+                               "the outline of its shape (%s) cuts cells, which have no "
+                               "equal areas: 'at' is points, or the film has 1 x 1 "
+                               "pixels, the mean",
+                               kind);
+    if (margin > 0)
+        return imp_build_error(b, "margin", IMP_E_SCENE,
+                               "the mean over its shape (%s) is over all of it: a margin "
+                               "goes with points ('at')",
+                               kind);
+    return IMP_OK;
+}
+
 enum imp_status imp__receiver_build(const struct imp_build *b, struct imp_sensor *s)
 {
     static const char *const kinds[] = {"planar", "cylindrical", "semicylindrical"};
     static const char *const places[] = {"cells", "points"};
     enum imp_status st = IMP_OK;
     struct imp_receiver r = {.span = {1, 1}};
+    struct imp__outline outline = {.edge = NULL};
     double whole[2], side[2];
     int kind, place;
-    imp_v3 ng;
     IMP_TRY(imp_build_choice(b, "receiver", kinds, 3, IMP_PLANAR, &kind));
     IMP_TRY(imp_build_choice(b, "at", places, 2, 0, &place));
     IMP_TRY(imp_build_bool(b, "virtual", false, &r.absent));
@@ -204,15 +260,7 @@ enum imp_status imp__receiver_build(const struct imp_build *b, struct imp_sensor
                             "(<boolean name=\"virtual\" value=\"true\"/>)",
                             kinds[kind]));
     if (plain) goto out; /* what is said of grids alone stays unread: an error */
-    if (!(s->shape->ops->flags & IMP_SHAPE_SQUARE) ||
-        !(s->shape->ops->flags & IMP_SHAPE_FLAT))
-        IMP_TRY(imp_build_error(b, r.absent ? "virtual" : "at", IMP_E_SCENE,
-                                "a grid is on a rectangle, and its shape '%s' is a %s",
-                                s->shape->name, s->shape->ops->name));
-    const imp_v3 corner = place_of(s->shape, 0, 0, &ng);
-    r.frame = imp__frame_from_normal(ng);
-    whole[0] = imp__length(place_of(s->shape, 1, 0, &ng) - corner);
-    whole[1] = imp__length(place_of(s->shape, 0, 1, &ng) - corner);
+    IMP_TRY(plane_read(b, s, &r, &outline, whole));
     IMP_TRY(facing_read(b, &r));
     if (r.turned && !r.absent)
         IMP_TRY(
@@ -221,6 +269,7 @@ enum imp_status imp__receiver_build(const struct imp_build *b, struct imp_sensor
                             "in space: its shape is virtual"));
     IMP_TRY(margin_read(b, whole, &r, side));
     IMP_TRY(film_complete(b, s, side));
+    if (outline.edge) IMP_TRY(points_list(b, s, &outline, &r));
     struct imp_receiver *made = imp_build_alloc(b, 1, sizeof *made);
     if (!made) IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "no memory for a receiver"));
     *made = r;
@@ -234,5 +283,6 @@ enum imp_status imp__receiver_build(const struct imp_build *b, struct imp_sensor
         .name = "sensor"};
     s->receiver = made;
 out:
+    imp__outline_destroy(b, &outline);
     return st;
 }

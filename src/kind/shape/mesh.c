@@ -146,6 +146,18 @@ static inline struct imp_hit draw(const struct imp_shape *s, const struct imp__m
     return (struct imp_hit){.prim = (int)lo, .u = b[0], .v = b[1]};
 }
 
+void imp__mesh_area_numbers(const struct imp_shape *s, int prim, const double b[2],
+                            double u[2])
+{
+    const struct imp__mesh *m = s->self;
+    const double *c = m->cumulative + prim;
+    double within[2];
+    imp__uniform_triangle_inverse(b, within);
+    for (int k = 0; k < 2; k++) within[k] = imp_clamp(within[k], 1e-9, 1 - 1e-9);
+    u[0] = (c[0] + within[0] * (c[1] - c[0])) / s->area;
+    u[1] = within[1];
+}
+
 static inline struct imp_located located(const struct imp_hit *hit)
 {
     return (struct imp_located){hit->prim, {(float)hit->u, (float)hit->v}};

@@ -158,6 +158,11 @@ void imp__triangle_weights(const struct imp_shape *s, int prim, const imp_v3 *p,
                            double b[3]);
 void imp__mesh_sample_area(const struct imp_shape *s, const double u[2],
                            struct imp_surface *out);
+/* The numbers u by which imp__mesh_sample_area makes a point of a triangle, given by the weights of
+ * its second and third vertex. The point moves by a part of 1e-9 at most, since one on an edge
+ * might be that of another triangle after rounding. */
+void imp__mesh_area_numbers(const struct imp_shape *s, int prim, const double b[2],
+                            double u[2]);
 bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
                       struct imp_light_sample *out);
 /* As imp_shape_ops.sample_triangle. */

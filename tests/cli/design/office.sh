@@ -16,6 +16,9 @@ design -w 0.average=300 --catalogue catalogue --least cost
 design -w work.average=700 -w eyes.ugr=19
 # The room of an answer reads what was said.
 importon read "$ROOT/scenes/office.xml" -m mono -D spp=64 --luminaire 'lamp_*=lamps/batwing.ies' --set @levels --grid --sensor 0 | head -2
+# Two of the luminaires are enough where they may move; what was found is a scene.
+design -w work.average=200,work.uniformity=0.5 --lamps 'lamp_1[13]' --move 'lamp_1[13].position[0-1]' --settings places | sed 's/ *after .*//'
+importon read "$ROOT/scenes/office.xml" -m mono -D spp=64 --set @places --grid --sensor 0 | head -2
 # The same bits on any number of threads.
 for t in 1 3; do importon design "$ROOT/scenes/office.xml" -m mono -D spp=16 -w work.average=450,eyes.ugr=22 --json -t $t >answer$t; done
 cmp answer1 answer3 && echo same

@@ -41,3 +41,11 @@ design -w work.average=50 --settings older.txt >/dev/null
 design -w work.average=50000 --settings older.txt >/dev/null; test -s older.txt || echo gone
 # A search that was ended says so.
 importon design "$ROOT/scenes/office.xml" -m mono -D spp=256 -w work.average=430,work.maximum=480 --levels 1 --nodes 1; echo "exit $?" >&2
+# Places: names, components, bounds, a catalogue.
+design -w work.average=500 --move 'spot.position'
+design -w work.average=500 --move 'lamp_11.position[3]'
+design -w work.average=500 --move 'lamp_11.position[1-0]'
+design -w work.average=500 --move 'lamp_11.position[2]=3,2'
+design -w work.average=500 --move 'lamp_11.position[2]=0,1'
+design -w work.average=500 --steps 3
+design -w work.average=500 --choose 'lamp_*=lamps/opal.ldt,none' --move 'lamp_11.position'

@@ -7,6 +7,7 @@ import csv, json, xml.etree.ElementTree as tree
 y = json.load(open("y.json"))["years"][0]
 rows = list(csv.DictReader(open("y.csv")))
 assert len(rows) == y["width"] * y["height"] == len(y["points"]) and y["hours"] == 3650 and y["weather"]["hours"] == 8760
+assert "mean [lx]" in rows[0] and "exposure_se [lx h]" in rows[0] and "sunlit_hours [h]" in rows[0], rows[0]
 for r, p in zip(rows, y["points"]):
     assert abs(float(r["autonomy"]) - p["autonomy"]["value"]) < 1e-4 and 0 <= p["autonomy"]["value"] <= 1, r
     assert all(abs(float(r[k]) - x) < 1e-6 for k, x in zip("xyz", p["point"])), r
@@ -24,6 +25,9 @@ importon read "$ROOT/scenes/office.xml" --year town.epw
 importon read "$ROOT/scenes/office.xml" --year town.epw --sensor 0
 importon read "$ROOT/scenes/daylit.xml" -m spectral --year town.epw
 importon read "$ROOT/scenes/daylit.xml" --year none.epw
+importon read - --year - <"$ROOT/scenes/daylit.xml"
+importon read "$ROOT/scenes/daylit.xml" --year - </dev/null
+importon read "$ROOT/scenes/daylit.xml" -m mono -D spp=16 --year - --json -q <town.epw >/dev/null || exit 9
 importon read "$ROOT/scenes/daylit.xml" --year town.epw --hours 18,8
 sed 100d town.epw >hole.epw
 importon read "$ROOT/scenes/daylit.xml" --year hole.epw
