@@ -41,11 +41,12 @@ mi, np, stats = mitsuba_import()
 def importon_render(program, case, spp, seed, out):
     """Mean and standard error of every channel of importon's picture."""
     command = [program, "render", case.scene, "--spp", str(spp), "--seed", str(seed), "--se",
+               "--points", "independent",  # a normal error for every pixel, which sets have not
                "--no-preview", "-q", "-m", case.mode, "-s", str(case.sensor), "-o", out]
     for d in case.defines:
         command += ["-D", d]
     start = time.time()
-    subprocess.run(command, check=True)
+    subprocess.run(command, check=True, stderr=subprocess.PIPE, text=True)
     seconds = time.time() - start
     bitmap = mi.Bitmap(out)
     names = [f.name for f in bitmap.struct_()]
@@ -181,7 +182,7 @@ def main():
                                                   os.path.join(folder, "x.exr"))
             batches, n, peer_s = mitsuba_render(case, spp)
         except (subprocess.CalledProcessError, RuntimeError) as e:
-            print("%-28s FAILED TO RENDER: %s" % (case.name, e))
+            print("%-28s FAILED TO RENDER: %s" % (case.name, getattr(e, "stderr", None) or e))
             report[case.name] = {"error": str(e)}
             bad += 1
             continue
