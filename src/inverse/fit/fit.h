@@ -52,7 +52,7 @@ struct imp__fit {
     struct imp__variate *variate; /* NULL: there is none */
     bool searching;               /* evaluations are those of the search */
     bool quiet;                   /* imp__opt_options */
-    const char *without_variate;  /* why not; NULL: there is one, or none was wanted */
+    char without_variate[512]; /* why not; empty: there is one, or none was wanted */
     struct imp__sparse_errors errors; /* of many values; x NULL: there are none */
     char note[96];
 };
