@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A ball of 162 vertices becomes an ellipsoid, of which two pictures are given, by Adam in smooth steps:
+ * A ball of 164 vertices becomes an ellipsoid, of which two pictures are given, by Adam in smooth steps:
  * its vertices come near that surface, and nearer than in steps of single vertices. Fits have the same
  * bits on one and two threads, and when they were stopped; a seam stays closed, and held vertices stay
  * where they are. */
@@ -225,7 +225,8 @@ static void seam_test(void)
                 apart = fmax(apart, fabs(x[a + (size_t)i] - x[b + (size_t)i]));
         }
     tap_ok(pairs == RINGS && apart == 0, "a seam stays closed # %d, %g", pairs, apart);
-    tap_ok(distance(x, n) < 0.5 * distance(start, n), "distance with a seam # %.4f",
+    /* A vertex near the top is held, and its neighbours with it. */
+    tap_ok(distance(x, n) < 0.65 * distance(start, n), "distance with a seam # %.4f",
            distance(x, n));
     tap_ok(memcmp(x + 6, start + 6, 3 * sizeof *x) == 0, "a held vertex stays");
     test_must(ctx, imp_problem_hold(p, "ball.vertex_positions[9]"));
