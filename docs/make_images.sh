@@ -38,6 +38,16 @@ size=(-D res=96)
     -p 'red.*' -p 'green.*' -p 'white.*' -p 'light.*' --target "$out/target.exr" --optimizer lm --spp 64 \
     --seed 2 -q -o "$out/fit" --picture-spp 512 --sheet "$images/cornell_fit.png" >"$out/fit.txt"
 
+say "shape: a ball that becomes a knotty body (docs/do/shape.md)"
+scenes/make_shape.py "$out/shape" --views 6 --frequency 8 --res 32 >"$out/shape.txt"
+shape=()
+for k in 0 1 2 3 4 5; do
+    "$importon" render "$out/shape/truth.xml" -s $k --spp 256 --seed 1 -q -o "$out/shape/target$k.exr"
+    shape+=(-T "$out/shape/target$k.exr")
+done
+"$importon" fit "$out/shape/shape.xml" -p body.vertex_positions "${shape[@]}" --spp 6 --lr .1 -n 30 -q -o "$out/shape/found" \
+    --picture-spp 256 --sheet "$images/shape_fit.png" >>"$out/shape.txt"
+
 say "report: the page of that fit, as Chromium shows it"
 "$importon" jacobian scenes/cornell.xml "${size[@]}" --spp 64 -p 'red.*' -p 'green.*' -q -o "$out/fit" >"$out/fit-J.txt"
 "$importon" report "$out/fit" --title "Cornell box: paints and a lamp" -q

@@ -2,6 +2,7 @@
  *
  * Options of a search, as both fit and view take them, and the imp_fit_options that they make. */
 #include "fit_options.h"
+#include <math.h>
 
 static const char *const optimizer_words[] = {"adam", "lm",    "lbfgs",
                                               "mma",  "slsqp", NULL};
@@ -12,7 +13,7 @@ static const char *const missing_words[] = {"auto", "always", "never", NULL};
 
 static const char *const variate_words[] = {"auto", "on", "off", NULL};
 
-struct fit_choice fit_choice = {.memory = -1};
+struct fit_choice fit_choice = {.memory = -1, .mesh_lambda = -1};
 
 const struct arg_option options_search[] = {
     {ARG_CHOICE | ARG_REPLAYS, 0, "optimizer", "NAME",
@@ -32,6 +33,10 @@ const struct arg_option options_search[] = {
     {ARG_INT | ARG_REPLAYS, 0, "levels", "N",
      "adam, poses, and bent rays: from coarse to fine, in N levels", &fit_choice.levels,
      1, 16, NULL},
+    {ARG_NUMBER | ARG_REPLAYS, 0, "mesh-lambda", "L",
+     "adam: vertices of meshes move in smooth steps, of (I + L Laplacian) x (default: "
+     "their number / 64; 0: each for itself)",
+     &fit_choice.mesh_lambda, 0, 1e12, NULL},
     {ARG_CHOICE | ARG_REPLAYS, 0, "allocation", "HOW",
      "adam: samples by tile: variance (of the gradient), even, or auto (default: "
      "even beside control variates of more than 64 values)",
@@ -76,6 +81,7 @@ struct imp_fit_options fit_choice_options(void)
     fit.memory = fit_choice.memory > 0 ? (size_t)(1e6 * fit_choice.memory) : 0;
     fit.no_recording = fit_choice.memory == 0;
     fit.headroom = fit_choice.headroom;
+    fit.mesh_lambda = fit_choice.mesh_lambda == 0 ? -1 : fmax(fit_choice.mesh_lambda, 0);
     static const enum imp_variates variates[] = {IMP_VARIATES_AUTO, IMP_VARIATES_ON,
                                                  IMP_VARIATES_OFF};
     fit.control_variate = variates[fit_choice.variate];

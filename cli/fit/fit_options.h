@@ -11,6 +11,7 @@ struct fit_choice {
     double learning_rate, tolerance, momentum;
     double memory; /* MB; < 0: not given */
     double headroom;
+    double mesh_lambda; /* < 0: not given */
 };
 extern struct fit_choice fit_choice;
 extern const struct arg_option options_search[],

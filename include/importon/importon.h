@@ -1268,6 +1268,14 @@ struct imp_fit_options {
      * 0 or 1: none, and such walks are traced each time. */
     double headroom;
     bool no_recording; /**< walks are traced in each evaluation, none are kept */
+    /** IMP_ADAM: vertex_positions of meshes are fitted in smooth steps: those of
+     * u = (I + mesh_lambda L) x, L the uniform Laplacian of the mesh, with one step size for
+     * all (Nicolet, Jacobson, Jakob 2021, "Large steps"). On a mesh with sides h steps are
+     * smooth over about h sqrt(1.5 mesh_lambda). Vertices at the same place (seams) move
+     * together, and whole places are held or none. 0: a 64th of the number of places; below
+     * 0: steps of single vertices. A build without CXSparse refuses the
+     * former by name. */
+    double mesh_lambda;
 };
 #define IMP_FIT_OPTIONS_INIT IMP_INIT_ZERO(struct imp_fit_options)
 

@@ -216,7 +216,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         same: Any = None, factor: Any = None, log: Any = None, hold: Any = None, time_limit: float = 0, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
         wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", levels: int = 0, memory: float = 0,
          headroom: float = 0, control_variate: str = "auto", allocation: str = "default", momentum: float = 0,
-         progress: Any = None) -> Fit:
+         mesh_lambda: Optional[float] = None, progress: Any = None) -> Fit:
     """Fit parameters to target pictures; the scene ends at the best estimate.
 
     Parameters
@@ -255,6 +255,10 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
     control_variate : str
         Of adam, "auto", "on" or "off": walks are evaluated at the last iteration's numbers, too, which
         makes gradients less noisy; "auto" for more than 64 numbers, where that is possible. `Fit.control_variate` says what it brought.
+    mesh_lambda : float, optional
+        Of adam: `vertex_positions` of meshes move in smooth steps, those of (1 + mesh_lambda L) x with L the
+        uniform Laplacian of the mesh ("large steps"), and vertices at one place together; 0: each vertex
+        for itself; default: a 64th of the number of vertices.
     intervals : bool
         Estimate covariance and 95 % intervals at the end.
     checkpoint : path, optional
@@ -313,7 +317,8 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
                       tolerance=float(tolerance), intervals=bool(intervals), checkpoint=path, resume=bool(resume),
                       levels=integer(levels, "levels"), memory=memory_bytes(max(memory, 0)), no_recording=memory < 0,
                       headroom=float(headroom), control_variate=choice("imp_variates", control_variate, "control_variate"),
-                      allocation=choice("imp_allocation", allocation, "allocation"), momentum=float(momentum))
+                      allocation=choice("imp_allocation", allocation, "allocation"), momentum=float(momentum),
+                      mesh_lambda=0 if mesh_lambda is None else float(mesh_lambda) or -1)
         out, start = ctypes.c_void_p(), p.x()
         status, message = run(p.context, options, progress, lib.imp_fit, p.pointer, ctypes.byref(wanted),
                               ctypes.byref(options), ctypes.byref(out))

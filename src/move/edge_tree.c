@@ -6,7 +6,8 @@
 #include "edge_choice.h"
 
 #define LEAF  4    /* edges at most; each of them is tested */
-#define AHEAD 3    /* levels below a child by which it is judged */
+#define DOWN  2    /* levels that one choice goes down, */
+#define DEEP  5    /* by what is so many levels below */
 #define SLACK 1e-6 /* for rounding: where normals are as good as across the line */
 
 struct imp__edge_node {
@@ -91,16 +92,19 @@ void imp__edge_tree_free(struct imp__edge_tree *tree)
 }
 
 /* May a line from there pass a silhouette of this node? With angles c of the cone and s of the
- * sphere as it is seen, and g between the axis and a right angle to the line: |g| <= c + s. */
+ * sphere as it is seen, sin s = R/d, and g between the axis and a right angle to the line:
+ * |g| <= c + s, or  |axis.r| <= sin(c) sqrt(d^2 - R^2) + cos(c) R. */
 static bool may_pass(const struct imp__edge_node *node, imp_v3 from, bool parallel)
 {
     if (node->cosine <= 0) return true;
     const imp_v3 r = parallel ? from : node->centre - from;
-    const double d = imp__length(r), sine = parallel ? 0 : node->radius / d;
-    if (!(sine < node->cosine)) return true; /* c + s is above a right angle */
-    const double cosine = sqrt(1 - sine * sine);
+    const double d2 = imp__dot(r, r), R = parallel ? 0 : node->radius;
+    if (!(R * R < d2 * (node->cosine * node->cosine)))
+        return true; /* c + s: above a right
+                                                                      angle */
+    const double across = sqrt(d2 - R * R);
     return fabs(imp__dot(node->axis, r)) <=
-           d * (node->sine * cosine + node->cosine * sine + SLACK);
+           node->sine * across + node->cosine * R + SLACK * (across + R);
 }
 
 static bool is_silhouette(const struct imp__edge_tree *tree, size_t k, imp_v3 from,
@@ -111,22 +115,37 @@ static bool is_silhouette(const struct imp__edge_tree *tree, size_t k, imp_v3 fr
     return imp__edge_side(tree->edges, e, m) != 0;
 }
 
-/* Probability of what may be silhouettes in a node, as nodes that lie so many levels below say. */
-static double importance(const struct imp__edge_tree *tree,
-                         const struct imp__edge_node *node, const double *chance,
-                         imp_v3 from, bool parallel, int levels)
+/* Nodes DOWN levels below one, and the probabilities of what may be silhouettes in them, as nodes DEEP
+ * levels below it say. */
+struct below {
+    int n;
+    const struct imp__edge_node *node[1 << DOWN];
+    double part[1 << DOWN], sum;
+};
+
+static void below_find(const struct imp__edge_tree *tree,
+                       const struct imp__edge_node *node, const double *chance,
+                       imp_v3 from, bool parallel, int level, struct below *out)
 {
-    double sum = 0;
-    if (!may_pass(node, from, parallel)) return 0;
-    if (node->second == 0) {
-        for (size_t k = node->lo; k < node->hi; k++)
-            if (is_silhouette(tree, k, from, parallel)) sum += chance[k + 1] - chance[k];
-        return sum;
+    const int before = out->n;
+    double part = 0;
+    if (!may_pass(node, from, parallel)) return;
+    if (level == DOWN || (node->second == 0 && level < DOWN)) {
+        out->node[out->n] = node;
+        out->part[out->n++] = 0;
     }
-    if (levels == 0) return chance[node->hi] - chance[node->lo];
-    return importance(tree, node + 1, chance, from, parallel, levels - 1) +
-           importance(tree, tree->node + node->second, chance, from, parallel,
-                      levels - 1);
+    if (node->second > 0 && level < DEEP) {
+        below_find(tree, node + 1, chance, from, parallel, level + 1, out);
+        below_find(tree, tree->node + node->second, chance, from, parallel, level + 1,
+                   out);
+    } else {
+        if (node->second > 0) part = chance[node->hi] - chance[node->lo];
+        for (size_t k = node->lo; node->second == 0 && k < node->hi; k++)
+            if (is_silhouette(tree, k, from, parallel)) part += chance[k + 1] - chance[k];
+        out->part[out->n - 1] += part;
+        out->sum += part;
+    }
+    if (out->n > before && !(out->part[out->n - 1] > 0) && level <= DOWN) out->n--;
 }
 
 static ptrdiff_t leaf_choose(const struct imp__edge_tree *tree,
@@ -157,18 +176,17 @@ ptrdiff_t imp__edge_tree_choose(const struct imp__edge_tree *tree, const double 
     const struct imp__edge_node *node = tree->node;
     *pmf = 1;
     while (node->second > 0) {
-        const struct imp__edge_node *child[2] = {node + 1, tree->node + node->second};
-        double part[2];
-        for (int k = 0; k < 2; k++)
-            part[k] = importance(tree, child[k], chance, from, parallel, AHEAD);
-        const double sum = part[0] + part[1];
-        if (!(sum > 0)) return -1;
-        const double first = part[0] / sum;
-        const int k = *u < first ? 0 : 1;
-        const double own = k == 0 ? first : 1 - first;
-        *u = imp_clamp((*u - (k == 0 ? 0 : first)) / own, 0.0, 1 - 0x1p-53);
-        *pmf *= own;
-        node = child[k];
+        struct below below;
+        below.n = 0;
+        below.sum = 0;
+        below_find(tree, node, chance, from, parallel, 0, &below);
+        if (below.n == 0) return -1;
+        double x = *u * below.sum;
+        int k = 0;
+        for (; k < below.n - 1 && x >= below.part[k]; k++) x -= below.part[k];
+        *u = imp_clamp(x / below.part[k], 0.0, 1 - 0x1p-53);
+        *pmf *= below.part[k] / below.sum;
+        node = below.node[k];
     }
     return leaf_choose(tree, node, chance, from, parallel, u, pmf);
 }

@@ -47,12 +47,18 @@ static bool vertices_move(const struct imp__moves *moves, int shape)
     return false;
 }
 
-/* Have two triangles of a shape a side in common, and not only places? */
-static bool is_welded(const struct imp_scene *scene, int shape, int prim, int other)
+/* Have two triangles of a shape a side in common, two vertices; with `places`, two of their places? */
+static bool is_welded(const struct imp_scene *scene, int shape, int prim, int other,
+                      bool places)
 {
-    const uint32_t *i = scene->shapes[shape]->triangles.indices;
+    const struct imp_triangles *t = &scene->shapes[shape]->triangles;
     int common = 0;
-    for (int k = 0; k < 9; k++) common += i[3 * prim + k / 3] == i[3 * other + k % 3];
+    for (int k = 0; k < 9; k++) {
+        const uint32_t a = t->indices[3 * prim + k / 3],
+                       b = t->indices[3 * other + k % 3];
+        const float *p = t->positions + 3 * (size_t)a, *q = t->positions + 3 * (size_t)b;
+        common += a == b || (places && p[0] == q[0] && p[1] == q[1] && p[2] == q[2]);
+    }
     return common == 2;
 }
 
@@ -62,7 +68,7 @@ static bool move_apart(const struct imp__moves *moves, const struct imp__edge_fa
 {
     if (f->shape == g->shape)
         return vertices_move(moves, f->shape) &&
-               !is_welded(moves->scene, f->shape, f->prim, g->prim);
+               !is_welded(moves->scene, f->shape, f->prim, g->prim, moves->seams_join);
     return imp__moves_shape(moves, f->shape, NULL) ||
            imp__moves_shape(moves, g->shape, NULL);
 }

@@ -56,6 +56,9 @@ struct imp__moves {
     size_t cap_movers;
     struct imp__mover *mover;
     size_t n; /* numbers in all */
+    /* Vertices of a mesh at one place move together, as the caller sees to: what is wanted of their
+     * numbers is the sum. */
+    bool seams_join;
 };
 
 /* A point that is glued to its triangle, or to a sphere or disk, world. */
@@ -157,6 +160,9 @@ bool imp__moves_smooth(const struct imp_scene *scene, int shape);
  * vertex. Another shape: nothing. */
 void imp__glued_shade(const struct imp_scene *scene, struct imp__glued *x,
                       const imp_v3 e[2]);
+/* For each of n positions [n][3] the least vertex at the same one, to place [n]. IMP_E_NOMEM. */
+enum imp_status imp__vertex_places(imp_context *ctx, const float *positions, size_t n,
+                                   uint32_t *place);
 /* The triangles around each vertex, or around all that lie where it lies. */
 enum imp_status imp__fans_make(imp_context *ctx, const struct imp_triangles *t,
                                struct imp__fans **out);

@@ -74,12 +74,14 @@ static int by_place(const void *a, const void *b)
     return x->vertex < y->vertex ? -1 : x->vertex > y->vertex;
 }
 
-static void places_find(const struct imp_triangles *t, struct placed *placed,
-                        uint32_t *place)
+enum imp_status imp__vertex_places(imp_context *ctx, const float *positions, size_t n,
+                                   uint32_t *place)
 {
-    const size_t n = t->n_vertices;
+    struct placed *placed = imp__alloc(ctx, n, sizeof *placed);
+    if (!placed)
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for the places of vertices");
     for (size_t k = 0; k < n; k++) {
-        memcpy(placed[k].p, t->positions + 3 * k, sizeof placed[k].p);
+        memcpy(placed[k].p, positions + 3 * k, sizeof placed[k].p);
         placed[k].vertex = (uint32_t)k;
     }
     qsort(placed, n, sizeof *placed, by_place);
@@ -88,6 +90,8 @@ static void places_find(const struct imp_triangles *t, struct placed *placed,
         if (p[0] != q[0] || p[1] != q[1] || p[2] != q[2]) first = k;
         place[placed[k].vertex] = placed[first].vertex;
     }
+    imp__release(ctx, placed);
+    return IMP_OK;
 }
 
 static void corners_find(const struct imp_triangles *t, struct imp__fans *f)
@@ -106,21 +110,23 @@ enum imp_status imp__fans_make(imp_context *ctx, const struct imp_triangles *t,
                                struct imp__fans **out)
 {
     struct imp__fans *f = imp__alloc(ctx, 1, sizeof *f);
-    struct placed *placed = imp__alloc(ctx, t->n_vertices, sizeof *placed);
     if (f) {
         *f = (struct imp__fans){.n = t->n_vertices};
         f->place = imp__alloc(ctx, f->n, sizeof *f->place);
         f->start = imp__alloc(ctx, f->n + 1, sizeof *f->start);
         f->corner = imp__alloc(ctx, 3 * t->n_triangles, sizeof *f->corner);
     }
-    if (!f || !placed || !f->place || !f->start || !f->corner) {
-        imp__release(ctx, placed);
+    if (!f || !f->place || !f->start || !f->corner) {
         imp__fans_free(ctx, f);
         return imp__error(ctx, IMP_E_NOMEM, "no memory for vertex normals");
     }
-    places_find(t, placed, f->place);
+    const enum imp_status st =
+        imp__vertex_places(ctx, t->positions, t->n_vertices, f->place);
+    if (st != IMP_OK) {
+        imp__fans_free(ctx, f);
+        return st;
+    }
     corners_find(t, f);
-    imp__release(ctx, placed);
     *out = f;
     return IMP_OK;
 }

@@ -22,7 +22,7 @@
 #include <math.h>
 #include <string.h>
 
-#define HALVES  6 /* of a step that leads where nothing can be evaluated */
+#define HALVES  IMP_ADAM_HALVES
 #define BETA2   IMP_ADAM_BETA2
 #define WINDOW  IMP_ADAM_WINDOW
 #define STALLED IMP_ADAM_STALLED /* net motion over path length: below, no progress */

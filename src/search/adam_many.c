@@ -111,16 +111,23 @@ static double moments(const struct imp__goal *goal,
     return mean_v;
 }
 
-static void step(const struct imp__goal *goal, const struct imp__opt_options *options,
-                 struct imp__search *s, const double *g)
+/* ---- Steps ------------------------------------------------------------------------- */
+
+/* The largest r of a smooth span, which all its numbers have; 0: of another one. */
+static double joint_root(const struct imp__span *a, const packed *r, size_t first)
 {
-    packed *m = floats(s, MEAN_G), *r = floats(s, ROOT_V);
-    packed *net = floats(s, NET), *sum = floats(s, SUM_NET);
-    if (s->scalar[UNIT] == 0) s->scalar[UNIT] = unit_of(goal, s, g);
-    s->scalar[COUNT]++;
-    if (s->scalar[UNIT] == 0) return; /* nothing has a derivative yet */
-    const double age = ++s->scalar[AGE], mean_v = moments(goal, options, s, g);
-    const double c2 = 1 - pow(IMP_ADAM_BETA2, age);
+    double most = 0;
+    for (size_t k = first; a->smooth && k < a->end; k++) most = fmax(most, r[k]);
+    return most;
+}
+
+/* The step wanted, in scales of each variable, to d. */
+static void steps_want(const struct imp__goal *goal,
+                       const struct imp__opt_options *options, struct imp__search *s,
+                       double mean_v, double *d)
+{
+    const packed *m = floats(s, MEAN_G), *r = floats(s, ROOT_V);
+    const double age = s->scalar[AGE], c2 = 1 - pow(IMP_ADAM_BETA2, age);
     const double all =
         options->learning_rate * pow(1 + s->scalar[PACE], -IMP_ADAM_COOLING);
     /* Relative to the mean of v, whatever the objective's unit: variables that never had
@@ -131,14 +138,62 @@ static void step(const struct imp__goal *goal, const struct imp__opt_options *op
         const bool settles = options->quiet && a->settles;
         const double rate = all * imp__adam_fall(s->iteration, settles);
         const double c1 = 1 - pow(imp__adam_momentum(options, settles), age);
+        const double joint = joint_root(a, r, k);
+        for (; k < a->end; k++)
+            d[k] = rate * (m[k] / c1) / ((a->smooth ? joint : r[k]) / sqrt(c2) + tiny);
+    }
+    if (goal->smooth) goal->smooth(d, true, goal->payload);
+}
+
+/* The steps d against the gradient, which become those taken. */
+static void steps_take(const struct imp__goal *goal, struct imp__search *s, double *d)
+{
+    for (size_t i = 0, k = 0; i < goal->n_spans; i++) {
+        const struct imp__span *a = &goal->spans[i];
         for (; k < a->end; k++) {
-            const double wanted = rate * (m[k] / c1) / (r[k] / sqrt(c2) + tiny);
             const double old = s->x[k], scale = scale_of(s, a, k);
-            s->x[k] = imp_clamp(old - scale * wanted, a->lo, a->hi);
-            const double moved = (s->x[k] - old) / scale;
-            s->scalar[LARGEST] = fmax(s->scalar[LARGEST], fabs(moved));
-            s->scalar[WAY] += fabs(moved);
-            net[k] = (float)(net[k] + moved);
+            s->x[k] = imp_clamp(old - scale * d[k], a->lo, a->hi);
+            d[k] = (s->x[k] - old) / scale;
+        }
+    }
+}
+
+/* Steps d that were taken are halved while the objective cannot be evaluated there, and taken back at
+ * last. */
+static void steps_back(const struct imp__goal *goal, struct imp__search *s, double *d)
+{
+    for (int h = 0; goal->possible && h <= IMP_ADAM_HALVES; h++) {
+        if (goal->possible(s->x, goal->payload)) return;
+        const double back = h < IMP_ADAM_HALVES ? 0.5 : 1;
+        for (size_t i = 0, k = 0; i < goal->n_spans; i++) {
+            const struct imp__span *a = &goal->spans[i];
+            for (; k < a->end; k++) {
+                s->x[k] -= back * scale_of(s, a, k) * d[k];
+                d[k] *= 1 - back;
+            }
+        }
+    }
+}
+
+/* g is destroyed. */
+static void step(const struct imp__goal *goal, const struct imp__opt_options *options,
+                 struct imp__search *s, double *g)
+{
+    packed *m = floats(s, MEAN_G), *net = floats(s, NET), *sum = floats(s, SUM_NET);
+    if (goal->smooth) goal->smooth(g, false, goal->payload);
+    if (s->scalar[UNIT] == 0) s->scalar[UNIT] = unit_of(goal, s, g);
+    s->scalar[COUNT]++;
+    if (s->scalar[UNIT] == 0) return; /* nothing has a derivative yet */
+    s->scalar[AGE]++;
+    steps_want(goal, options, s, moments(goal, options, s, g), g);
+    steps_take(goal, s, g);
+    steps_back(goal, s, g);
+    for (size_t i = 0, k = 0; i < goal->n_spans; i++) {
+        const struct imp__span *a = &goal->spans[i];
+        for (; k < a->end; k++) {
+            s->scalar[LARGEST] = fmax(s->scalar[LARGEST], fabs(g[k]));
+            s->scalar[WAY] += fabs(g[k]);
+            net[k] = (float)(net[k] + g[k]);
             sum[k] += net[k];
             /* Momentum into a bound would delay leaving it. */
             if ((s->x[k] <= a->lo && m[k] > 0) || (s->x[k] >= a->hi && m[k] < 0))
@@ -147,11 +202,9 @@ static void step(const struct imp__goal *goal, const struct imp__opt_options *op
     }
 }
 
-/* Slower, from the window's mean: many variables have no average in many dimensions to go
- * by, so the rate is halved. */
-static void cool(const struct imp__goal *goal, struct imp__search *s)
+/* To the window's mean. */
+static void to_mean(const struct imp__goal *goal, struct imp__search *s)
 {
-    s->scalar[PACE] = pow(2, 1 / IMP_ADAM_COOLING) * (1 + s->scalar[PACE]) - 1;
     for (size_t i = 0, k = 0; i < goal->n_spans; i++) {
         const struct imp__span *a = &goal->spans[i];
         for (; k < a->end; k++) {
@@ -162,8 +215,20 @@ static void cool(const struct imp__goal *goal, struct imp__search *s)
     }
 }
 
+/* Slower, from the window's mean: many variables have no average in many dimensions to go
+ * by, so the rate is halved. work [n]. */
+static void cool(const struct imp__goal *goal, struct imp__search *s, double *work)
+{
+    s->scalar[PACE] = pow(2, 1 / IMP_ADAM_COOLING) * (1 + s->scalar[PACE]) - 1;
+    memcpy(work, s->x, s->n * sizeof *work);
+    to_mean(goal, s);
+    if (goal->possible && !goal->possible(s->x, goal->payload))
+        memcpy(s->x, work, s->n * sizeof *work);
+}
+
 static void window_end(const struct imp__goal *goal,
-                       const struct imp__opt_options *options, struct imp__search *s)
+                       const struct imp__opt_options *options, struct imp__search *s,
+                       double *work)
 {
     double net = 0;
     for (size_t k = 0; k < s->n; k++) net += fabsf(floats(s, NET)[k]);
@@ -174,7 +239,7 @@ static void window_end(const struct imp__goal *goal,
     const bool wandered = net <= IMP_ADAM_STALLED * s->scalar[WAY];
 
     if (s->scalar[LARGEST] < options->tolerance) imp__search_finish(s, IMP_FINISH_STEPS);
-    if (wandered && !fell) cool(goal, s);
+    if (wandered && !fell) cool(goal, s, work);
     if (fall > IMP_ADAM_FAR * se) s->scalar[AVERAGED] = 0;
     if (wandered && !fell && s->scalar[AVERAGED] == 0) {
         for (size_t k = 0; k < s->n; k++) floats(s, AVERAGE)[k] = (float)s->x[k];
@@ -185,8 +250,9 @@ static void window_end(const struct imp__goal *goal,
     window_begin(s);
 }
 
-/* Once the search wanders, the average of the iterates with weights 1, 2, 3, ... */
-static void average(struct imp__search *s)
+/* Once the search wanders, the average of the iterates with weights 1, 2, 3, ...; it begins anew where
+ * it cannot be evaluated. work [n]. */
+static void average(const struct imp__goal *goal, struct imp__search *s, double *work)
 {
     packed *mean = floats(s, AVERAGE);
     const double n = s->scalar[AVERAGED];
@@ -194,6 +260,9 @@ static void average(struct imp__search *s)
     s->scalar[AVERAGED]++;
     for (size_t k = 0; k < s->n; k++)
         mean[k] = (float)(mean[k] + (s->x[k] - mean[k]) * 2 / (n + 1));
+    if (!goal->possible) return;
+    for (size_t k = 0; k < s->n; k++) work[k] = mean[k];
+    if (!goal->possible(work, goal->payload)) s->scalar[AVERAGED] = 0;
 }
 
 /* ---- The noise of a step ---------------------------------------------------------- */
@@ -254,8 +323,8 @@ enum imp_status imp__adam_many_run(const struct imp__goal *goal,
         s->scalar[LOSS] += f.value;
         s->scalar[LOSS_VAR] += f.se * f.se;
         step(goal, options, s, g);
-        if (s->scalar[COUNT] == IMP_ADAM_WINDOW) window_end(goal, options, s);
-        average(s);
+        if (s->scalar[COUNT] == IMP_ADAM_WINDOW) window_end(goal, options, s, g);
+        average(goal, s, g);
         IMP_TRY(imp__search_iterated(goal, s));
     }
 out:

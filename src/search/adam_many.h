@@ -17,6 +17,7 @@
 #define IMP_ADAM_COOLING 1.5
 #define IMP_ADAM_FELL    2
 #define IMP_ADAM_FAR     4
+#define IMP_ADAM_HALVES  6 /* of a step that leads where nothing can be evaluated */
 /* Steps after which second moments are known well enough to measure noise in their units, */
 #define IMP_ADAM_KNOWN 4
 /* and what they count as at least, over their mean: some have hardly been seen yet. */

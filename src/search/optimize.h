@@ -53,6 +53,7 @@ struct imp__span {
     double lo, hi, scale;
     bool by_start; /* a start that is larger than `scale` is the variable's scale */
     bool settles;  /* `scale` is the whole range: the variable has no farther to go */
+    bool smooth;   /* of a mesh: imp__goal.smooth */
 };
 
 struct imp__goal {
@@ -66,6 +67,11 @@ struct imp__goal {
      * answer. NULL: lo, hi and scale are there. */
     const struct imp__span *spans;
     size_t n_spans;
+    /* Where spans are smooth: takes derivatives by x to those by other variables u, or a step of u
+     * to one of x, in place, both linear; v [n]. Numbers of spans that are not smooth stay. In a
+     * smooth span all numbers have the largest second moment of one of them (Nicolet, Jacobson, Jakob
+     * 2021), so that a step of u has the direction of the mean derivative. NULL: none is smooth. */
+    void (*smooth)(double *v, bool step, void *payload);
     uint64_t seed;
     /* Value and gradient at x (inside the bounds) from the random numbers of `seed`;
      * equal seeds are common random numbers. g and g_se may be NULL. */

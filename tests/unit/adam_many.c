@@ -53,8 +53,8 @@ static enum imp_status iterated(const struct imp__search *s, void *payload)
 static void bowl_make(struct bowl *b, imp_context *ctx, size_t n, bool many, double gain)
 {
     *b = (struct bowl){.n = n, .gain = gain};
-    b->spans[0] = (struct imp__span){n / 2, 0, 1, 1, false, true};
-    b->spans[1] = (struct imp__span){n, 0, INFINITY, 0.3, true, false};
+    b->spans[0] = (struct imp__span){n / 2, 0, 1, 1, false, true, false};
+    b->spans[1] = (struct imp__span){n, 0, INFINITY, 0.3, true, false, false};
     b->goal = (struct imp__goal){
         .ctx = ctx, .n = n, .seed = 7, .eval = eval, .iterated = iterated, .payload = b};
     for (size_t k = 0; !many && k < n; k++) {
@@ -208,7 +208,7 @@ static void momenta(bool many)
         const bool settles[2] = {row[i].settles, row[i].settles};
         const struct imp__opt_options o = {row[i].before + 2, 0.05, 1e-6, row[i].asked,
                                            row[i].quiet};
-        const struct imp__span span = {2, -1, row[i].hi, 1, false, row[i].settles};
+        const struct imp__span span = {2, -1, row[i].hi, 1, false, row[i].settles, false};
         int calls = 0;
         struct imp__goal goal = {
             .ctx = ctx, .n = 2, .eval = eval_turned, .payload = &calls};

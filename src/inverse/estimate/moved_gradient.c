@@ -5,6 +5,7 @@
 #include "base/arguments.h"
 #include "problem_tracer.h"
 #include "scene/pose.h"
+#include <math.h>
 #include <string.h>
 
 const int imp__moved_times[IMP_BOUNDARY_KINDS] = {
@@ -41,7 +42,9 @@ enum imp_status imp__moved_begin(const struct imp_problem *p,
 {
     enum imp_status st = IMP_OK;
     *out = (struct imp__moved_gradient){.tracer = tracer};
+    for (int k = 0; k < IMP_BOUNDARY_KINDS; k++) out->draws[k] = imp__moved_times[k];
     out->moves = imp__moves_begin(p->scene, tracer->sensor);
+    out->moves.seams_join = p->seams_join;
     IMP_TRY(imp__moved_allowed(tracer));
     IMP_TRY(movers_add(p, out));
     IMP_TRY(imp__edges_build(p->scene, &out->edges));
@@ -105,6 +108,22 @@ enum imp_status imp__moved_learn(struct imp__moved_gradient *m, int spp)
     const struct imp_film_desc *film = &m->tracer->sensor->film;
     return imp__boundary_learn(&m->boundary, (int64_t)film->crop_w * film->crop_h * spp,
                                m->adjoint.image ? counts_at : NULL, m);
+}
+
+/* With second moments M of one draw, n draws of a kind add M/n to the variance, and cost n c: of the
+ * cost SHARED, n is in proportion to sqrt(M/c). Costs are relative to that of an edge that the camera
+ * sees, and the sum of all is then about that of the walks. */
+#define SHARED 2
+static const double cost[IMP_BOUNDARY_KINDS] = {
+    [IMP_BOUNDARY_FILM] = 1, [IMP_BOUNDARY_LIGHT] = 2, [IMP_BOUNDARY_SCATTER] = 0.5};
+
+void imp__moved_share(struct imp__moved_gradient *m)
+{
+    const double *moment = m->boundary.moment;
+    double sum = 0;
+    for (int k = 0; k < IMP_BOUNDARY_KINDS; k++) sum += sqrt(moment[k] * cost[k]);
+    for (int k = 0; k < IMP_BOUNDARY_KINDS && sum > 0 && sum < INFINITY; k++)
+        m->draws[k] = SHARED * sqrt(moment[k] / cost[k]) / sum;
 }
 
 bool imp__moved_walk(const struct imp__moved_gradient *m, struct imp_arena *arena,
@@ -176,7 +195,7 @@ static bool draws_add(const struct draws *d, struct imp_arena *arena,
     const int64_t pixel = (int64_t)(y + margin) * width + x + margin;
     bool no_memory = false;
     for (int kind = 0; kind < IMP_BOUNDARY_KINDS; kind++) {
-        const int n = plan.n * imp__moved_times[kind];
+        const int n = imp_max((int)lround(plan.n * m->draws[kind]), 1);
         for (int i = 0; i < n && !no_memory; i++) {
             const struct imp_arena_mark mark = imp__arena_mark(arena);
             const int64_t index = m->first + ((int64_t)b * n + i) * pixels + pixel;
@@ -214,6 +233,14 @@ bool imp__moved_replicate(const struct imp__moved_gradient *m, struct imp_arena 
     add_times(d.bar, 1, inside, n);
     imp__moved_numbers(m, d.bar, (imp_spec){1, 0, 0, 0}, sink);
     return true;
+}
+
+bool imp__moved_draws(const struct imp__moved_gradient *m, struct imp_arena *arena,
+                      struct imp__replicates plan, int x, int y, int b, double *bar,
+                      double *velocity)
+{
+    const struct draws d = {.m = m, .velocity = velocity, .bar = bar};
+    return draws_add(&d, arena, plan, x, y, b);
 }
 
 /* ---- Variance ------------------------------------------------------------------------ */

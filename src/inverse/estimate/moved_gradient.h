@@ -22,6 +22,7 @@ struct imp__moved_gradient {
     const struct imp_pose **pose;      /* [moves.n_movers] that a mover is */
     struct imp__moved_adjoint adjoint; /* of gradients in reverse mode; else none */
     int64_t first;                     /* number of the first draw of each kind */
+    double draws[IMP_BOUNDARY_KINDS];  /* for each walk */
 };
 
 /* For walks of this tracer, which stays where it is. IMP_E_UNSUPPORTED, by name, as
@@ -38,10 +39,13 @@ enum imp_status imp__moved_learn(struct imp__moved_gradient *m, int spp);
 /* IMP_OK, or what imp__moved_begin and imp__problem_tracer say of the scene as it is: an object that
  * passes through another, edges that tear. */
 enum imp_status imp__moved_possible(struct imp_problem *p, const struct imp_run *run);
+/* Behind the pilot, for searches, which need no errors of a gradient: as many draws of each kind as
+ * make its variance least for the time of the walks. Else draws are imp__moved_times. */
+void imp__moved_share(struct imp__moved_gradient *m);
 /* `first` of a target's draws, which are not those of another. */
 static inline int64_t imp__moved_first(size_t target) { return (int64_t)target << 40; }
 
-/* Draws of a kind for each walk, and the number of those of one sample of all kinds. */
+/* Draws of a kind for each walk unless they are shared out, and the number of those of one sample of all kinds. */
 extern const int imp__moved_times[IMP_BOUNDARY_KINDS];
 /* From adjoints of velocities, bar [moves.n], which it overwrites, to the numbers of parameters, times
  * `lane` of the sink's channels. */
@@ -63,6 +67,11 @@ static inline size_t imp__moved_contrasts(const struct imp__moved_gradient *m)
 bool imp__moved_replicate(const struct imp__moved_gradient *m, struct imp_arena *arena,
                           struct imp__replicates plan, int x, int y, int b,
                           const double *inside, double *contrasts, struct imp_sink *sink);
+/* Adds the draws of replicate b of pixel (x, y) to bar [moves.n], of several replicates; velocity
+ * [moves.n] is 0 before and after. False: no memory. */
+bool imp__moved_draws(const struct imp__moved_gradient *m, struct imp_arena *arena,
+                      struct imp__replicates plan, int x, int y, int b, double *bar,
+                      double *velocity);
 /* The contrasts of all items, which it overwrites: what they add to the variance at fixed adjoints,
  * own [active->n], to more [active->n]. IMP_E_NOMEM. */
 enum imp_status imp__moved_variance(const struct imp__moved_gradient *m,

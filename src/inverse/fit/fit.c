@@ -75,6 +75,10 @@ static enum imp_status intervals(struct imp__fit *f, const struct imp__search *s
                                  struct imp__uncertainty *u, const char **why)
 {
     imp_context *ctx = f->problem->ctx;
+    if (f->seams) {
+        *why = "vertices of a mesh at one place move together";
+        return IMP_OK;
+    }
     if (imp__fit_is_sparse(f)) {
         imp__sparse_errors_destroy(ctx, &f->errors);
         IMP_CHECKED(imp__sparse_errors_find(&f->goal, x, f->clipped_rounds, &f->errors));

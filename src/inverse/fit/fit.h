@@ -21,8 +21,11 @@ struct imp__fit {
     double *lo, *hi, *scale; /* [n]; NULL with spans */
     double *g_se;            /* [n], for Gauss-Newton; likewise */
     bool *settles;           /* [n], likewise */
-    struct imp__span *spans; /* Adam of many variables: by parameter; or NULL */
+    struct imp__span *spans; /* Adam of many variables, and of meshes; or NULL */
     size_t n_spans;
+    struct imp__fit_mesh *meshes; /* [n_meshes] in smooth steps */
+    size_t n_meshes;
+    bool seams;       /* some of their vertices are at one place */
     double *H_prior;  /* [n][n] second derivative of the regularisers */
     bool noise_known; /* every target has noise_se */
 
@@ -52,7 +55,7 @@ struct imp__fit {
     struct imp__variate *variate; /* NULL: there is none */
     bool searching;               /* evaluations are those of the search */
     bool quiet;                   /* imp__opt_options */
-    const char *without_variate;  /* why not; NULL: there is one, or none was wanted */
+    char without_variate[512];    /* why not; empty: there is one, or none was wanted */
     struct imp__sparse_errors errors; /* of many values; x NULL: there are none */
     char note[96];
 };
@@ -78,12 +81,20 @@ int imp__fit_spp(const struct imp__fit *fit);
 int imp__fit_coarse_spp(const struct imp__fit *fit);
 /* fit_fingerprint.c: sets that of the fit. */
 void imp__fit_fingerprint(struct imp__fit *fit);
+/* Is the block a rigid pose, whose numbers have two units? */
+bool imp__block_is_rigid(const struct imp_problem *p, const struct imp__block *b);
 /* Scales of the variables, from where the search starts. */
 void imp__fit_scales(struct imp__fit *fit, const struct imp__search *search);
 /* A large change of value e of a block that is `start`; square: sum of squares of all its values. */
 double imp__large_change(const struct imp_problem *p, const struct imp__block *b,
                          size_t e, double start, double square);
 void imp__fit_end(struct imp__fit *fit);
+/* fit_mesh.c: the meshes whose vertices are fitted in smooth steps; is the block one of them? And
+ * imp__goal.smooth. */
+enum imp_status imp__fit_meshes(struct imp__fit *fit);
+void imp__fit_meshes_free(struct imp__fit *fit);
+bool imp__fit_smooths(const struct imp__fit *fit, const struct imp__block *block);
+void imp__fit_smooth(double *v, bool step, void *fit);
 /* fit_goal.c: the goal of a search, which points to `fit`: it does not move any more. */
 void imp__fit_goal_make(struct imp__fit *fit);
 /* Scale of the block's values in x [n], for `spans`. */

@@ -20,18 +20,36 @@ static bool allocates(const struct imp__fit *f)
            (!many || f->options.allocation == IMP_ALLOCATION_VARIANCE);
 }
 
-/* Bounds, by variable or by parameter. */
+/* The span of a block; of a pose two, of translation and rotation, which have different scales. */
+static void spans_add(struct imp__fit *f, const struct imp__block *b)
+{
+    struct imp__span span = {.end = b->first + b->count,
+                             .lo = b->lo,
+                             .hi = b->hi,
+                             .scale = 1,
+                             .smooth = imp__fit_smooths(f, b)};
+    if (imp__block_is_rigid(f->problem, b)) {
+        struct imp__span first = span;
+        first.end = b->first + 3;
+        f->spans[f->n_spans++] = first;
+    }
+    f->spans[f->n_spans++] = span;
+}
+
+/* Bounds, by variable or by parameter. Of meshes in smooth steps, which Adam searches as it does many
+ * variables, both: intervals of few need the former. */
 static enum imp_status bounds_make(struct imp__fit *f)
 {
     const struct imp_problem *p = f->problem;
     const size_t n = p->n;
-    const bool many = f->options.optimizer == IMP_ADAM && n > IMP_SEARCH_FEW;
-    if (many) f->spans = imp__alloc(p->ctx, p->scene->n_params, sizeof *f->spans);
-    else {
+    const bool many = f->options.optimizer == IMP_ADAM && n > IMP_SEARCH_FEW,
+               spans = many || f->n_meshes > 0;
+    if (spans) f->spans = imp__alloc(p->ctx, 2 * p->n_blocks, sizeof *f->spans);
+    if (!many) {
         f->lo = imp__alloc(p->ctx, 4 * n, sizeof *f->lo);
         f->settles = imp__alloc(p->ctx, n, sizeof *f->settles);
     }
-    if (!f->spans && !(f->lo && f->settles))
+    if ((spans && !f->spans) || (!many && !(f->lo && f->settles)))
         return imp__error(p->ctx, IMP_E_NOMEM, "no memory for %zu variables", n);
     if (!many) {
         f->hi = f->lo + n;
@@ -40,9 +58,7 @@ static enum imp_status bounds_make(struct imp__fit *f)
     }
     for (size_t k = 0; k < p->n_blocks; k++) {
         const struct imp__block *b = &p->blocks[k];
-        if (many)
-            f->spans[f->n_spans++] = (struct imp__span){
-                .end = b->first + b->count, .lo = b->lo, .hi = b->hi, .scale = 1};
+        if (spans) spans_add(f, b);
         for (size_t e = 0; !many && e < b->count; e++) {
             const struct imp__bounds bounds = imp__block_bounds(p, b, e);
             f->lo[b->first + e] = bounds.lo;
@@ -149,6 +165,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
     options_default(&f.options);
 
     p->use = use_of(&f);
+    IMP_TRY(imp__fit_meshes(&f));
     IMP_TRY(bounds_make(&f));
     IMP_TRY(prior_make(&f));
     f.noise_known = true;
@@ -174,6 +191,7 @@ void imp__fit_end(struct imp__fit *f)
 {
     if (!f->problem) return;
     f->problem->use = IMP_LOSS_TOLD;
+    imp__fit_meshes_free(f);
     imp__walks_destroy(f->walks);
     imp__variate_destroy(f->variate);
     imp__allocation_destroy(&f->allocation);

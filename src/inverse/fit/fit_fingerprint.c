@@ -53,6 +53,8 @@ static uint64_t options_hash(const struct imp__fit *f)
         f->allocation.n > 0 ? imp__allocation_numbers(&f->allocation) : 0;
     uint64_t h = imp__hash(f->outer.seed, number, sizeof number);
     h = imp__hash(h, how, sizeof how);
+    if (f->n_meshes > 0)
+        h = imp__hash(h, &f->options.mesh_lambda, sizeof f->options.mesh_lambda);
     return imp__hash(h, &numbers, sizeof numbers);
 }
 

@@ -248,6 +248,7 @@ void imp__fit_goal_make(struct imp__fit *f)
                                  .iterated = iterated,
                                  .payload = f};
     if (f->allocation.n > 0) f->goal.measure = measure;
+    if (f->n_meshes > 0) f->goal.smooth = imp__fit_smooth;
     if (imp__problem_moves(f->problem)) f->goal.possible = possible;
     if (imp__fit_coarse_spp(f) < imp__fit_spp(f)) f->goal.coarsen = coarsen;
     if (imp__fit_keeps(f)) {

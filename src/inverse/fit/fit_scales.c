@@ -8,6 +8,10 @@
 #include <float.h>
 #include <math.h>
 
+/* A large change of a mesh in smooth steps over that of single vertices: the smoother makes what is not
+ * as smooth much smaller, and the one size of all steps is that of the largest derivative. */
+#define SMOOTH 5
+
 /* The large change of a number of geometry; 0: it is none. */
 static double pose_scale(const struct imp_problem *p, const struct imp__block *b,
                          size_t e)
@@ -15,6 +19,12 @@ static double pose_scale(const struct imp_problem *p, const struct imp__block *b
     if (b->log || imp__block_factor(p, b)) return 0;
     const struct imp_pose *pose = imp__pose_of(p->scene, b->param);
     return pose ? imp__pose_large(pose, e) : 0;
+}
+
+bool imp__block_is_rigid(const struct imp_problem *p, const struct imp__block *b)
+{
+    const struct imp_pose *pose = imp__pose_of(p->scene, b->param);
+    return pose && pose->kind == IMP_POSE_RIGID && b->tie < 0;
 }
 
 static bool is_bounded(const struct imp__block *b)
@@ -62,11 +72,16 @@ void imp__fit_scales(struct imp__fit *f, const struct imp__search *search)
         double square = 0;
         for (size_t e = 0; e < b->count; e++)
             square += imp__sqr(imp__search_start(search, b->first + e));
-        if (f->spans) {
-            span_scale(b, square, &f->spans[span++]);
-            continue;
+        for (size_t e = b->first; f->spans && e < b->first + b->count; span++) {
+            const double pose = pose_scale(p, b, e - b->first);
+            span_scale(b, square, &f->spans[span]);
+            if (pose > 0) {
+                f->spans[span].scale = f->spans[span].smooth ? SMOOTH * pose : pose;
+                f->spans[span].by_start = false;
+            }
+            e = f->spans[span].end;
         }
-        for (size_t e = 0; e < b->count; e++) {
+        for (size_t e = 0; f->scale && e < b->count; e++) {
             const double start = imp__search_start(search, b->first + e);
             f->scale[b->first + e] = imp__large_change(p, b, e, start, square);
             f->settles[b->first + e] = is_bounded(b);

@@ -29,8 +29,9 @@ enum imp_status imp__fit_variates(struct imp__fit *f)
     }
     st = imp__variate_create(p, &f->run, &f->variate);
     if (!asked && (st == IMP_E_UNSUPPORTED || st == IMP_E_NOMEM)) {
-        f->without_variate =
-            imp__arena_strdup(&f->problem->fit_arena, imp_last_error(p->ctx));
+        /* The arena of the last fit's answer is released before this one begins. */
+        snprintf(f->without_variate, sizeof f->without_variate, "%s",
+                 imp_last_error(p->ctx));
         st = IMP_OK;
     }
     /* Memory may be short on one rank alone, but all ranks must go on alike, or fail. */
@@ -42,7 +43,8 @@ enum imp_status imp__fit_variates(struct imp__fit *f)
                           "control variate: another rank has no memory for it");
     imp__variate_destroy(f->variate);
     f->variate = NULL;
-    f->without_variate = "control variate: another rank has none";
+    snprintf(f->without_variate, sizeof f->without_variate,
+             "control variate: another rank has none");
     return IMP_OK;
 }
 
@@ -118,7 +120,8 @@ const char *imp__fit_variate_text(const struct imp__fit *f)
 {
     char text[160];
     if (f->options.control_variate == IMP_VARIATES_OFF) return NULL;
-    if (f->without_variate) return f->without_variate;
+    if (f->without_variate[0])
+        return imp__arena_strdup(&f->problem->fit_arena, f->without_variate);
     if (!f->variate || f->variate->evaluations < 2) return NULL;
     snprintf(
         text, sizeof text,

@@ -124,6 +124,21 @@ static enum imp_status pixels_work(const struct imp_tile *t, struct imp_tile_wor
 
 /* ---- Tiles --------------------------------------------------------------------- */
 
+/* Of the worker; NULL: replicates have their own. */
+static double *item_bar(const struct imp__gradient_job *j, int worker)
+{
+    return j->item_bars ? j->item_bars + (size_t)worker * 2 * j->moved->moves.n : NULL;
+}
+
+/* What all replicates of the item gave to velocities goes to its tally at once. */
+static void item_bar_end(const struct item *i, double *bar)
+{
+    if (!bar) return;
+    imp__moved_numbers(i->job->moved, bar, (imp_spec){1, 0, 0, 0}, &i->tally->sink);
+    imp__tally_batch(i->tally, 0);
+    imp__tally_pixel(i->tally, 1, 1 / i->all, 0);
+}
+
 static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worker *w,
                                  void *result, void *payload)
 {
@@ -138,7 +153,9 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
     memset(moments, 0, moment_numbers(j) * sizeof *moments);
     const size_t contrasts = imp__moved_contrasts(j->moved);
     double *own = contrasts ? j->item_contrasts + (size_t)w->index * contrasts : NULL;
+    double *bar = item_bar(j, w->index);
     if (own) memset(own, 0, contrasts * sizeof *own);
+    if (bar) memset(bar, 0, 2 * j->moved->moves.n * sizeof *bar);
     imp__tally_clear(tally);
     tally->measured = tally->rays = 0;
     if (t->part < (size_t)plan.chunks) { /* other tiles may have more parts */
@@ -149,6 +166,9 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
         if (plan.R > 1) item.by_variance = item.R / ((item.R - 1) * item.all * item.all);
         const enum imp_status st = pixels_work(t, w, plan, &item, moments);
         if (st != IMP_OK) return st;
+        item_bar_end(&item, bar);
+        w->no_memory |= tally->failed;
+        IMP_CHECKED(imp__tile_check(w));
     }
     if (own) memcpy(moments + moment_numbers(j), own, contrasts * sizeof *own);
     imp__tally_measure(tally);
@@ -211,6 +231,11 @@ static enum imp_status tallies_create(struct imp__gradient_job *j)
             imp__alloc(ctx, (size_t)ctx->threads * contrasts, sizeof(double));
         if (!j->item_contrasts) return imp__error(ctx, IMP_E_NOMEM, "no memory");
     }
+    if (j->moved && j->totals->many && !j->want_errors) {
+        j->item_bars = imp__alloc_raw(ctx, (size_t)ctx->threads * 2 * j->moved->moves.n,
+                                      sizeof *j->item_bars);
+        if (!j->item_bars) return imp__error(ctx, IMP_E_NOMEM, "no memory");
+    }
     for (int k = 0; k < ctx->threads; k++) {
         IMP_CHECKED(imp__tally_create(
             ctx, j->want_gradient ? j->tracer.active : &j->nothing,
@@ -227,8 +252,10 @@ static void job_destroy(struct imp__gradient_job *j)
         imp__tally_destroy(&j->tallies[k]);
     imp__release(ctx, j->tallies);
     imp__release(ctx, j->item_contrasts);
+    imp__release(ctx, j->item_bars);
     j->tallies = NULL;
     j->item_contrasts = NULL;
+    j->item_bars = NULL;
     if (j->tiles.ctx) imp__tiles_destroy(&j->tiles);
 }
 

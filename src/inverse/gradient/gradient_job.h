@@ -49,6 +49,9 @@ struct imp__gradient_job {
     struct imp_tiles tiles;
     struct imp_tally *tallies; /* [threads] */
     double *item_contrasts; /* [threads][n] of `moved`, of the item at work; NULL: none */
+    /* [threads][2][n] of `moved`: what the item at work gives to velocities, and room for one draw.
+     * NULL: each replicate gives its own to the tally, where its errors are wanted. */
+    double *item_bars;
 };
 
 /* Has a pixel a part in the loss? One that has none has no walks. */

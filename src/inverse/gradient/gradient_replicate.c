@@ -41,14 +41,22 @@ static double *inside_begin(const struct replicate *r)
 {
     const struct imp__moved_gradient *m = r->job->moved;
     if (imp_likely(!m)) return NULL;
+    if (r->job->item_bars)
+        return r->job->item_bars + (size_t)r->worker->index * 2 * m->moves.n;
     double *inside = imp__arena_array(&r->worker->arena, m->moves.n, sizeof *inside);
     r->worker->no_memory |= !inside;
     return inside;
 }
 
-static void inside_end(const struct replicate *r, const double *inside)
+static void inside_end(const struct replicate *r, double *inside)
 {
     const struct imp__gradient_job *j = r->job;
+    if (j->item_bars) {
+        r->worker->no_memory |=
+            !imp__moved_draws(j->moved, &r->worker->arena, r->plan, r->x, r->y, r->b,
+                              inside, inside + j->moved->moves.n);
+        return;
+    }
     const size_t n = imp__moved_contrasts(j->moved);
     double *contrasts = n ? j->item_contrasts + (size_t)r->worker->index * n : NULL;
     r->worker->no_memory |=

@@ -78,14 +78,23 @@ static enum imp_status moved_estimate(struct imp__gradient_job *j,
     enum imp_status st = IMP_OK;
     imp_context *ctx = j->problem->ctx;
     const size_t n = j->problem->n;
+    const bool errors = j->totals->many && j->totals->wants_errors;
     double *before = imp__alloc(ctx, 3 * n, sizeof *before), *own = before + n,
            *more = own + n;
     if (!before) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for errors"));
     variance_read(j->totals, n, before);
-    IMP_TRY(imp__moved_adjoint_loss(
-        ctx, &j->tracer.sensor->film, j->problem->scene->channels, splat, j->plan.R,
-        j->totals->many ? IMP_CONTRASTS_MANY : IMP_CONTRASTS, &moved->adjoint));
+    IMP_TRY(imp__moved_adjoint_loss(ctx, &j->tracer.sensor->film,
+                                    j->problem->scene->channels, splat, j->plan.R,
+                                    errors            ? IMP_CONTRASTS_MANY
+                                    : j->totals->many ? 0
+                                                      : IMP_CONTRASTS,
+                                    &moved->adjoint));
     IMP_TRY(imp__moved_learn(moved, run->spp));
+    if (j->totals->many && !errors) {
+        imp__moved_share(moved);
+        st = imp__gradient_job_run(j, run, "gradient", lo, hi, start_s);
+        goto out;
+    }
     j->contrasts = imp__alloc(ctx, imp__moved_contrasts(moved), sizeof *j->contrasts);
     if (!j->contrasts) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for errors"));
     memset(j->contrasts, 0, imp__moved_contrasts(moved) * sizeof *j->contrasts);
@@ -104,11 +113,12 @@ static enum imp_status moved_begin(struct imp__gradient_job *j, size_t target,
                                    struct imp__moved_gradient *moved)
 {
     const struct imp_problem *p = j->problem;
-    if (j->totals->many && p->ctx->team)
+    if (j->totals->many && j->totals->wants_errors &&
+        (imp__team_ranks(p->ctx) || imp__team_apart(p->ctx)))
         return imp__error(
             p->ctx, IMP_E_UNSUPPORTED,
-            "a gradient of a loss by more than %d numbers, some of geometry, "
-            "is computed in one process",
+            "the errors of a gradient of a loss by more than %d numbers, some of "
+            "geometry, are computed in one process",
             IMP_TALLY_DENSE);
     IMP_CHECKED(imp__moved_begin(p, &j->tracer, moved));
     moved->first = imp__moved_first(target);

@@ -73,6 +73,8 @@ struct imp__boundary {
     const struct imp__moves *moves;
     const struct imp__edges *edges;
     struct imp__edge_tree tree;
+    /* By the pilot: the second moment of what a draw of each kind brings to shifts; all 0: none was made. */
+    double moment[IMP_BOUNDARY_KINDS];
     struct imp__edge_choice choice[IMP_BOUNDARY_KINDS];
     int n_items;
     struct imp__edge_item *item; /* [n_items] */

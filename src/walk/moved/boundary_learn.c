@@ -17,6 +17,7 @@ struct pilot {
     double *group; /* [n_groups] of one draw: 3 for a shift, 3 for a turn of each mover */
     double *square; /* [n_groups] sums over the first draws, of each three alike */
     double *moment; /* [cells] */
+    double *shift;  /* [cells] sums of squares of what shifts alone bring */
     bool no_memory;
 };
 
@@ -93,12 +94,26 @@ static void parts_learn(const struct pilot *x, double *part, int n_cells)
     if (edges == 0) part[n] = 1;
 }
 
+/* The second moment of what a draw brings to shifts, when cells and items have their best chances: with
+ * w_c the part of it that cell c of probability q_c has, (sum_c sqrt(w_c q_c))^2. part: before they learn. */
+static double moment_after(const struct pilot *x, const double *part, int n_cells,
+                           int64_t n)
+{
+    const int items = x->b->n_items;
+    double sum = 0;
+    for (int k = 0; k < n_cells; k++)
+        sum += sqrt(x->shift[k] * (part[items + 1] - part[items]) / n_cells);
+    for (int k = 0; k < items; k++)
+        sum += sqrt(x->shift[n_cells + k] * (part[k + 1] - part[k]));
+    return sum * sum / (double)n;
+}
+
 static void kind_learn(struct pilot *x, enum imp__boundary_kind kind, int64_t n)
 {
     struct imp__edge_choice *c = &x->b->choice[kind];
     struct imp__edge_draw d;
     for (int k = 0; k < x->n_groups; k++) x->square[k] = 0;
-    for (int k = 0; k < c->n_cells + x->b->n_items; k++) x->moment[k] = 0;
+    for (int k = 0; k < c->n_cells + x->b->n_items; k++) x->moment[k] = x->shift[k] = 0;
     for (int64_t i = 0; i < n / 4; i++) {
         if (!look(x, kind, i, n / 4, &d)) continue;
         for (int k = 0; k < x->n_groups; k += 3) x->square[k] += square3(x->group + k);
@@ -106,10 +121,13 @@ static void kind_learn(struct pilot *x, enum imp__boundary_kind kind, int64_t n)
     for (int64_t i = 0; i < n; i++) {
         if (!look(x, kind, n + i, n, &d)) continue;
         double sum = 0;
+        for (int k = 0; k < x->n_groups; k += 6)
+            x->shift[d.cell] += square3(x->group + k);
         for (int k = 0; k < x->n_groups; k += 3)
             if (x->square[k] > 0) sum += square3(x->group + k) / x->square[k];
         x->moment[d.cell] += sum;
     }
+    x->b->moment[kind] = moment_after(x, x->b->part[kind], c->n_cells, n);
     if (x->b->edges->n > 0) imp__edge_choice_learn(c, x->moment);
     if (x->b->n_items > 0) parts_learn(x, x->b->part[kind], c->n_cells);
 }
@@ -142,7 +160,8 @@ enum imp_status imp__boundary_learn(struct imp__boundary *b, int64_t draws,
     x.group = imp__alloc(ctx, (size_t)x.n_groups + 1, sizeof *x.group);
     x.square = imp__alloc(ctx, (size_t)x.n_groups + 1, sizeof *x.square);
     x.moment = imp__alloc(ctx, (size_t)(cells + b->n_items), sizeof *x.moment);
-    if (!x.group || !x.square || !x.moment)
+    x.shift = imp__alloc(ctx, (size_t)(cells + b->n_items), sizeof *x.shift);
+    if (!x.group || !x.square || !x.moment || !x.shift)
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for edges"));
     for (int kind = 0; kind < IMP_BOUNDARY_KINDS && !x.no_memory; kind++) {
         if (b->edges->n > 0) IMP_TRY(cells_make(b, kind, cells));
@@ -154,5 +173,6 @@ out:
     imp__release(ctx, x.group);
     imp__release(ctx, x.square);
     imp__release(ctx, x.moment);
+    imp__release(ctx, x.shift);
     return st;
 }
