@@ -11,7 +11,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#define SPP 64 /* samples per pixel of an evaluation, where nobody chose */
+#define SPP    64   /* samples per pixel of an evaluation, where nobody chose */
+#define CHANCE 1e-4 /* chance and drop of chi-square by which a number that is held ... */
+#define DROP   20   /* ... is wrong though all pixels together are explained */
 #define AGAIN                                                                            \
     3 /* standard errors that a number has moved since its stage, which repeats it */
 
@@ -244,8 +246,20 @@ static enum imp_status missing_find(struct imp__measure *m, imp_problem *p,
         imp_problem_missing(p, &m->run, &r->missing, &r->n_missing);
     if (st != IMP_E_UNSUPPORTED && st != IMP_E_BIAS) return st;
     r->n_missing = 0;
+    if (r->explained) return IMP_OK;
     return imp__measure_say(m, "numbers that may be wrong are not looked for: %s",
                             imp_last_error(m->ctx));
+}
+
+/* Chi-square of all pixels does not see what is wrong in few of them; the test of a single number does. Is
+ * one of those that are not measured wrong beyond doubt? */
+static bool missing_surely(const struct imp_measure_result *r)
+{
+    for (size_t k = 0; k < r->n_missing; k++)
+        if (r->missing[k].chance < CHANCE &&
+            r->missing[k].chi2 - 2 * r->missing[k].chi2_se > DROP)
+            return true;
+    return false;
 }
 
 static enum imp_status missing_say(struct imp__measure *m,
@@ -287,10 +301,15 @@ static enum imp_status result_make(struct imp__measure *m, imp_problem *p,
     r->fit = fit;
     r->rounds = m->round - 1;
     r->explained = m->rows[m->n_rows - 1].explained;
-    if (!r->explained) {
-        IMP_CHECKED(missing_find(m, p, r));
-        IMP_CHECKED(missing_say(m, r));
+    IMP_CHECKED(missing_find(m, p, r));
+    if (r->explained && missing_surely(r)) {
+        r->explained = false;
+        IMP_CHECKED(imp__measure_say(m,
+                                     "not explained after all: chi-square of all pixels "
+                                     "hides what is wrong in few of them"));
     }
+    if (!r->explained) IMP_CHECKED(missing_say(m, r));
+    else r->n_missing = 0;
     for (size_t i = 0; i < m->n_photos; i++) {
         const struct imp__photo *photo = &m->photos[i];
         float *copy = imp__arena_array(a, 2 * photo->n_pixels, sizeof *copy);
