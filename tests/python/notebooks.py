@@ -65,4 +65,9 @@ def test_lamps_for_lux():
     return execute("lamps_for_lux")
 
 
+def test_office_table():
+    """A room, from its file to the norm's table"""
+    return execute("office_table")
+
+
 run(globals())

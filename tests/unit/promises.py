@@ -174,7 +174,7 @@ NOT_OK = {
     "imp_weather_read": "there is no such file",
     "imp_ugr": "its sources are zeros",
     "imp_design_find": "its sensor is a camera",
-    "imp_design_move": "a problem was made with its scene",
+    "imp_design_move": "its sensor is a camera",
 }
 try: C.CDLL("libOpenImageDenoise.so.2")
 except OSError: NOT_OK["imp_denoise"] = NOT_OK["imp_denoiser_check"] = "there is no Open Image Denoise"
@@ -377,6 +377,10 @@ class Fixture:
             self.keep.append(word)
             s.lamp, s.watts = C.addressof(word), 5
         if name == "imp_design_want": s.value = 1
+        if name == "imp_design_move":
+            word = C.create_string_buffer(b"lamp.pose")
+            self.keep.append(word)
+            s.name = C.addressof(word)
         if name == "imp_measure_options":
             word = C.create_string_buffer(b"materials")
             self.keep.append(word)
@@ -414,7 +418,7 @@ class Fixture:
             scalars = {"fallback": 1., "fraction": 1., "seed": 1, "flags": 0, "size": 64 if function == "imp_scene_geometry_name" else 8, "width": 4, "height": 4, "channels": 3, "length": len(self.good(xml, function)[0]) if "load_string" in function else len(PARAM) + 4 if "set_text" in function else 0, "weight": 1., "order": 1,
                        "index": 1.5 if a.ctype is C.c_double else 0, "cells": 1., "um": .5, "k": 1., "illuminance": 1.0, "background": 1., "confidence": .9, "a": 1., "b": 1.,
                        "radius": 2., "rounds": 1, "bytes": 1 << 20, "hi": 3., "lo": 1., "value": 1.5 if a.ctype is C.c_double else 1,
-                       "n_vertices": 3, "n_lamps": 1, "n_wants": 1, "n_triangles": 1, "layers": 1, "nx": 1, "ny": 1, "nz": 1, "a": 1., "pilots": 2, "n_groups": 1, "low": .1, "high": .9,
+                       "n_vertices": 3, "n_lamps": 1, "n_wants": 1, "n_moves": 1, "n_triangles": 1, "layers": 1, "nx": 1, "ny": 1, "nz": 1, "a": 1., "pilots": 2, "n_groups": 1, "low": .1, "high": .9,
                        "n": {"imp_scene_set_values": 1, "imp_scene_spectrum": 2, "imp_problem_nlopt": 3}.get(function, 1)}
             zeros = {"scalar", "status", "cause", "sensor", "channel", "x", "y", "sample", "json", "i", "from_here",
                      "kind", "of", "time", "nm", "progress", "rays", "ray", "bundle", "n_walks", "target", "edge", "most", "subject", "from", "to", "luminaire", "lamp", "room", "sets", "stage"}

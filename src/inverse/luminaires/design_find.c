@@ -221,9 +221,6 @@ static enum imp_status design_hold(struct imp__moving *v, const struct asked *a,
     IMP_FLOAT_MODE;
     IMP_SETS(m->scene, st);
     if (st != IMP_OK) return st;
-    IMP_CHECKED(imp__design_options_take(m, a->options));
-    IMP_CHECKED(imp__design_lamps_take(m, a->lamps));
-    IMP_CHECKED(imp__design_wants_take(m, a->wants));
     return moved_make(v, a->moves, out);
 }
 
@@ -244,6 +241,12 @@ static enum imp_status design_run(struct imp__moving *v, const struct asked *a,
     imp__arena_init(&d->arena, ctx);
     m->arena = &d->arena;
     d->answer.size = sizeof d->answer;
+    if (!m->scene->committed)
+        IMP_TRY(imp__error(ctx, IMP_E_ARG, "a design needs a committed scene"));
+    IMP_TRY(imp__moving_check(v, a->moves));
+    IMP_TRY(imp__design_options_take(m, a->options));
+    IMP_TRY(imp__design_lamps_take(m, a->lamps));
+    IMP_TRY(imp__design_wants_take(m, a->wants));
     if (v->n > 0) IMP_TRY(imp__moving_names(v, a->moves));
     IMP_TRY(imp_problem_create(m->scene, &blank)); /* a committed scene, and no parts */
     IMP_TRY(imp__problem_no_parts(blank, "a design"));

@@ -43,7 +43,7 @@ static enum imp_status places_set(struct imp__moving *v, const double *p)
     return imp__design_observe(m);
 }
 
-/* Of the points of want k: the rms of the errors of its rows, in their own units, and d/dx of it. The
+/* The margin of want k: from the rms of the errors of its rows, in their own units; and d/dx. The
  * error of a single point has few degrees of freedom, and the least of many rows, each less its own
  * error, were no smooth function of places. */
 static double margin_of(const struct imp__moving *v, size_t k, const double *x,

@@ -14,7 +14,7 @@ struct imp__moving {
     size_t *param, *component, *lamp;
     double *first, *lo, *hi;
     double *at; /* [n] where the scene has them */
-    /* Of the search (imp__moving_rows): */
+    /* For the search (imp__moving_rows): */
     double *p, *trial;                  /* [n] */
     double *x, *before;                 /* [m->n] levels */
     double *turn;                       /* [m->n] */
@@ -37,6 +37,9 @@ struct imp__moving_readings {
     double *source, *direct, *base_source, *base_direct;
 };
 
+/* Sizes, names and bounds that are numbers. */
+enum imp_status imp__moving_check(const struct imp__moving *v,
+                                  const struct imp_design_move *moves);
 /* Makes the numbers parameters of the scene, and checks their bounds: before a problem is made with
  * the scene. m has context, scene and arena, no more. */
 enum imp_status imp__moving_names(struct imp__moving *v,

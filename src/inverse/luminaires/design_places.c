@@ -31,6 +31,28 @@ static enum imp_status value_of(const struct imp__moving *v, size_t i, double *o
     return st;
 }
 
+static enum imp_status move_of(const struct imp__moving *v,
+                               const struct imp_design_move *moves, size_t i,
+                               struct imp_design_move *out)
+{
+    imp_context *ctx = v->m->ctx;
+    *out = (struct imp_design_move)IMP_DESIGN_MOVE_INIT;
+    IMP_CHECKED(
+        imp__element_take(ctx, "imp_design_move", "moves", moves, i, out, sizeof *out));
+    IMP_REQUIRE(ctx, out->name, "moves: name");
+    IMP_FINITE(ctx, out->lo, "moves: lo");
+    IMP_FINITE(ctx, out->hi, "moves: hi");
+    return IMP_OK;
+}
+
+enum imp_status imp__moving_check(const struct imp__moving *v,
+                                  const struct imp_design_move *moves)
+{
+    struct imp_design_move own;
+    for (size_t i = 0; i < v->n; i++) IMP_CHECKED(move_of(v, moves, i, &own));
+    return IMP_OK;
+}
+
 enum imp_status imp__moving_names(struct imp__moving *v,
                                   const struct imp_design_move *moves)
 {
@@ -38,11 +60,9 @@ enum imp_status imp__moving_names(struct imp__moving *v,
     struct imp_scene *scene = v->m->scene;
     IMP_CHECKED(arrays_take(v));
     for (size_t i = 0; i < v->n; i++) {
-        struct imp_design_move own = IMP_DESIGN_MOVE_INIT;
+        struct imp_design_move own;
         struct imp_param_info info = {.size = sizeof info};
-        IMP_CHECKED(imp__element_take(ctx, "imp_design_move", "moves", moves, i, &own,
-                                      sizeof own));
-        IMP_REQUIRE(ctx, own.name, "moves: name");
+        IMP_CHECKED(move_of(v, moves, i, &own));
         IMP_CHECKED(imp_scene_add_geometry(scene, own.name));
         IMP_CHECKED(imp_scene_find_param(scene, own.name, &v->param[i]));
         IMP_CHECKED(imp_scene_get_param(scene, v->param[i], &info));
@@ -61,8 +81,6 @@ enum imp_status imp__moving_names(struct imp__moving *v,
             if (v->param[k] == v->param[i] && v->component[k] == v->component[i])
                 return imp__error(ctx, IMP_E_ARG, "moves[%zu]: '%s', component %d, twice",
                                   i, own.name, own.component);
-        IMP_FINITE(ctx, own.lo, "moves: lo");
-        IMP_FINITE(ctx, own.hi, "moves: hi");
         IMP_CHECKED(value_of(v, i, &v->first[i]));
         v->at[i] = v->p[i] = v->first[i];
     }
@@ -99,9 +117,8 @@ enum imp_status imp__moving_bounds(struct imp__moving *v,
     const struct imp__design_model *m = v->m;
     for (size_t i = 0; i < v->n; i++) {
         const struct imp_pose *pose = imp__pose_of(m->scene, v->param[i]);
-        struct imp_design_move own = IMP_DESIGN_MOVE_INIT;
-        IMP_CHECKED(imp__element_take(m->ctx, "imp_design_move", "moves", moves, i, &own,
-                                      sizeof own));
+        struct imp_design_move own;
+        IMP_CHECKED(move_of(v, moves, i, &own));
         v->lamp[i] = m->n;
         for (size_t j = 0; j < m->n; j++)
             if (pose->emitter && m->scene->emitters[m->emitter[j]] == pose->emitter)
