@@ -58,7 +58,8 @@ enum imp_status imp__color_spectrum_make(const struct imp__color_ask *ask,
     struct imp_spectrum *s = imp__spectrum_make(ask->arena, form, n, nm, value);
     if (!s) return imp__error(ask->ctx, IMP_E_NOMEM, "out of memory");
     s->times = times;
-    s->emission = ask->role == IMP_EMISSION || ask->any_size;
+    s->emission = ask->role == IMP_EMISSION;
+    s->extinction = ask->any_size;
     s->linear = ask->linear;
     imp__spectrum_update(s);
     out->spectrum = s;

@@ -187,7 +187,8 @@ double imp__spectrum_most(const struct imp_spectrum *s)
 void imp__spectrum_update(struct imp_spectrum *s)
 {
     if (s->form != IMP_SPECTRUM_COLOR) return;
-    if (s->linear) imp__lift_linear(s->value, !s->emission, &s->lifted);
+    if (s->linear) imp__lift_linear(s->value, !s->emission && !s->extinction, &s->lifted);
+    else if (s->extinction) imp__lift_extinction(s->value, &s->lifted);
     else if (s->emission) imp__lift_unbounded(s->value, &s->lifted);
     else imp__lift_reflectance(s->value, &s->lifted);
 }

@@ -34,9 +34,10 @@ struct imp_spectrum {
     double lo, hi; /* nm, outside of which it is 0 */
     const struct imp_spectrum *times, *over; /* fixed; NULL: 1 */
     struct imp__lifted lifted;               /* COLOR: what follows from value */
-    bool emission;                           /* COLOR: of any size, else <= 1 */
-    bool linear;                             /* COLOR: linear in its numbers */
-    double *color_d; /* [n][3] d colour/d number, if prepared; or NULL */
+    bool emission, extinction; /* COLOR: of any size by one rule or the other of
+                                  upsample.h; neither: <= 1 */
+    bool linear;               /* COLOR: linear in its numbers */
+    double *color_d;           /* [n][3] d colour/d number, if prepared; or NULL */
 };
 
 /* Value at one wavelength, and its derivatives by numbers first .. first + n - 1. */

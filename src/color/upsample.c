@@ -181,27 +181,39 @@ void imp__lift_reflectance_by(const struct imp__lifter *by, const double rgb[3],
     *out = l;
 }
 
-/* value = s S(c(rgb/s)), s = 2 m: the part of drgb along rgb changes the size alone. */
-void imp__lift_unbounded_by(const struct imp__lifter *by, const double rgb[3],
-                            struct imp__lifted *out)
+static int largest(const double rgb[3])
 {
     int top = 0;
     for (int k = 1; k < 3; k++)
         if (rgb[k] > rgb[top]) top = k;
-    const double s = 2 * rgb[top];
+    return top;
+}
+
+/* value = s S(c(rgb/s)), with ds/drgb[top] = d_s: a change of s alone changes rgb/s along
+ * itself. */
+static void lift_scaled(const struct imp__lifter *by, const double rgb[3], int top,
+                        double s, double d_s, struct imp__lifted *out)
+{
     double part[3] = {0.5, 0.5, 0.5};
     struct imp__lifted l = {.scale = s};
     if (s > 0)
         for (int k = 0; k < 3; k++) part[k] = imp_max(rgb[k] / s, 0.0);
     fit(by, part, &l);
-    l.d_scale[top] = 2;
+    l.d_scale[top] = d_s;
     for (int i = 0; i < 3; i++) {
         double along = 0;
         for (int k = 0; k < 3; k++) along += l.d_c[i][k] * part[k];
         for (int k = 0; k < 3; k++)
-            l.d_c[i][k] = s > 0 ? ((l.d_c[i][k] - (k == top ? 2 * along : 0)) / s) : 0;
+            l.d_c[i][k] = s > 0 ? ((l.d_c[i][k] - (k == top ? d_s * along : 0)) / s) : 0;
     }
     *out = l;
+}
+
+void imp__lift_unbounded_by(const struct imp__lifter *by, const double rgb[3],
+                            struct imp__lifted *out)
+{
+    const int top = largest(rgb);
+    lift_scaled(by, rgb, top, 2 * rgb[top], 2, out);
 }
 
 void imp__lift_reflectance(const double rgb[3], struct imp__lifted *out)
@@ -216,6 +228,15 @@ void imp__lift_unbounded(const double rgb[3], struct imp__lifted *out)
     struct imp__lifter by;
     imp__lifter_make(&by);
     imp__lift_unbounded_by(&by, rgb, out);
+}
+
+void imp__lift_extinction(const double rgb[3], struct imp__lifted *out)
+{
+    struct imp__lifter by;
+    imp__lifter_make(&by);
+    const int top = largest(rgb);
+    const bool beyond = rgb[top] > 1;
+    lift_scaled(&by, rgb, top, beyond ? 2 * rgb[top] - 1 : 1, beyond ? 2 : 0, out);
 }
 
 void imp__lift_linear(const double rgb[3], bool bounded, struct imp__lifted *out)

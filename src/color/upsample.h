@@ -39,7 +39,10 @@ void imp__lifter_make(struct imp__lifter *out);
 void imp__lift_reflectance(const double rgb[3], struct imp__lifted *out);
 /* rgb >= 0: 2 m S of rgb/(2 m), m its largest. */
 void imp__lift_unbounded(const double rgb[3], struct imp__lifted *out);
-/* The same to the bit, for many colours. */
+/* rgb >= 0, m its largest: s S of rgb/s, s = max(1, 2 m - 1). Up to 1 it is the spectrum of
+ * a reflectance, which Mitsuba takes for an extinction and which it does not have beyond. */
+void imp__lift_extinction(const double rgb[3], struct imp__lifted *out);
+/* The first two to the bit, for many colours. */
 void imp__lift_reflectance_by(const struct imp__lifter *by, const double rgb[3],
                               struct imp__lifted *out);
 void imp__lift_unbounded_by(const struct imp__lifter *by, const double rgb[3],

@@ -2,6 +2,7 @@
  *
  * Media: transmittances in closed form, as hit fractions and with derivatives; colours of
  * very different extinction; cameras inside; bounds that follow; what is refused. */
+#include "color/upsample.h"
 #include "media_kit.h"
 #include "scene/majorants.h"
 #include "vol_write.h"
@@ -97,6 +98,34 @@ static void colours(void)
     media_near(mean[0], se[0] + 1e-12, 1, .01, "a colour without extinction");
     media_near(mean[2], se[2], exp(-3), .01, "beside one with");
     imp_scene_destroy(s);
+}
+
+/* By wavelengths: the colour of exp(-S), S the spectrum of a reflectance of that colour, as
+ * Mitsuba has it. */
+static void wavelengths(void)
+{
+    static const double sigma[2][3] = {{1, .2, .95}, {.1, .99, .1}};
+    struct imp__lifter by;
+    imp__lifter_make(&by);
+    for (int k = 0; k < 2; k++) {
+        char text[256];
+        double mean[3], se[3], T[3] = {0, 0, 0};
+        struct imp__lifted S;
+        imp__lift_reflectance_by(&by, sigma[k], &S);
+        for (int q = 0; q < IMP__LIFT_POINTS; q++)
+            for (int c = 0; c < 3; c++)
+                T[c] +=
+                    by.weight[q][c] * exp(-imp__lifted_value(&S, 360 + 470 * by.x[q]));
+        snprintf(text, sizeof text,
+                 "<medium type='homogeneous' id='fog'><rgb name='sigma_t' "
+                 "value='%g,%g,%g'/><float name='albedo' value='0'/></medium>",
+                 sigma[k][0], sigma[k][1], sigma[k][2]);
+        imp_scene *s = column(text, "", IMP_SPECTRAL);
+        media_mean(ctx, s, 4096, mean, se);
+        for (int c = 0; c < 3; c++)
+            media_near(mean[c], se[c], T[c], .004, "T by wavelengths of a colour");
+        imp_scene_destroy(s);
+    }
 }
 
 /* In an absorbing fog without an end: exp(-3 sigma), and its derivative. */
@@ -504,6 +533,7 @@ int main(void)
     ctx = test_context(0);
     transmittances();
     colours();
+    wavelengths();
     inside();
     panes();
     empty_shadow();

@@ -82,6 +82,49 @@ static void upsampling(void)
     tap_ok(derivative < 1e-4, "derivatives by r, g, b # %.1e", derivative);
 }
 
+/* Extinctions: a reflectance's spectra up to 1, without a step there, and derivatives beyond
+ * by differences. */
+static void extinctions(void)
+{
+    static const double hue[][3] = {{1, .2, .9}, {.1, .97, .3}, {.9, .95, 1}};
+    double same = 0, step = 0, derivative = 0;
+    for (int q = 0; q < 3; q++)
+        for (int size = 0; size < 6; size++) {
+            const double m = (double[]){.4, .95, 1 - 1e-9, 1 + 1e-9, 1.6, 7}[size];
+            double rgb[3], d[3];
+            struct imp__lifted l, other;
+            for (int c = 0; c < 3; c++) rgb[c] = m * hue[q][c] / (q == 1 ? .97 : 1);
+            imp__lift_extinction(rgb, &l);
+            imp__lift_reflectance(rgb, &other);
+            for (double nm = 380; nm < 800; nm += 30) {
+                const double apart =
+                    fabs(imp__lifted_value(&l, nm) - imp__lifted_value(&other, nm));
+                if (m < 1) same = fmax(same, apart);
+                else if (m < 1.1) step = fmax(step, apart);
+            }
+            if (m > .96 && m < 1.1) continue; /* spectra are too steep for differences */
+            for (int c = 0; c < 3; c++) {
+                const double h = 1e-5 * m;
+                struct imp__lifted a, b;
+                double up[3], down[3];
+                memcpy(up, rgb, sizeof up);
+                memcpy(down, rgb, sizeof down);
+                up[c] += h, down[c] -= h;
+                imp__lift_extinction(up, &a);
+                imp__lift_extinction(down, &b);
+                for (double nm = 380; nm < 800; nm += 60) {
+                    imp__lifted_value_d(&l, nm, d);
+                    const double by =
+                        (imp__lifted_value(&a, nm) - imp__lifted_value(&b, nm)) / (2 * h);
+                    derivative = fmax(derivative, fabs(d[c] - by) / (1 + fabs(by)));
+                }
+            }
+        }
+    tap_ok(same < 1e-12, "extinctions up to 1 are lifted as reflectances # %.1e", same);
+    tap_ok(step < 1e-4, "and there is no step beyond # %.1e", step);
+    tap_ok(derivative < 1e-4, "derivatives of extinctions # %.1e", derivative);
+}
+
 /* The linear basis: nowhere negative, of sum 1, with the colours of the axes; derivatives;
  * and bounds of both kinds of spectra. */
 static void linear(void)
@@ -99,11 +142,12 @@ static void linear(void)
             rgb[c] = imp__u01(imp__key(1, 2, 3), (uint32_t)(3 * k + c));
             if (k < 8) rgb[c] = k >> c & 1;
         }
-        for (int form = 0; form < 3; form++) {
+        for (int form = 0; form < 4; form++) {
             struct imp__lifted l;
             double most = 0;
             if (form == 0) imp__lift_linear(rgb, true, &l);
             else if (form == 1) imp__lift_reflectance(rgb, &l);
+            else if (form == 2) imp__lift_extinction(rgb, &l);
             else imp__lift_unbounded(rgb, &l);
             for (double nm = 360; nm <= 830; nm += 0.5)
                 most = fmax(most, imp__lifted_value(&l, nm));
@@ -380,6 +424,7 @@ int main(void)
     if (imp_context_create(&options, &ctx) != IMP_OK) return 1;
     imp__arena_init(&arena, ctx);
     upsampling();
+    extinctions();
     linear();
     bounds();
     lanes();
