@@ -92,7 +92,7 @@ enum imp_status imp__fit_meshes(struct imp__fit *f)
     const double lambda = f->options.mesh_lambda;
     size_t n = 0;
     for (size_t k = 0; k < p->n_blocks; k++) n += vertices_of(p, &p->blocks[k]) != NULL;
-    if (isnan(lambda) || lambda == INFINITY)
+    if (!isfinite(lambda))
         return imp__error(p->ctx, IMP_E_ARG, "mesh_lambda = %g is not finite", lambda);
     if (lambda > 0 && f->options.optimizer != IMP_ADAM)
         return imp__error(p->ctx, IMP_E_ARG,

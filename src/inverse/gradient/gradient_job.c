@@ -124,7 +124,7 @@ static enum imp_status pixels_work(const struct imp_tile *t, struct imp_tile_wor
 
 /* ---- Tiles --------------------------------------------------------------------- */
 
-/* Of the worker; NULL: replicates have their own. */
+/* The bars of a worker; NULL: replicates have their own. */
 static double *item_bar(const struct imp__gradient_job *j, int worker)
 {
     return j->item_bars ? j->item_bars + (size_t)worker * 2 * j->moved->moves.n : NULL;
