@@ -48,7 +48,8 @@ bool imp__color_is_object(const struct imp_node *node)
 
 bool imp__color_is_raw(const struct imp_node *node)
 {
-    return object_kind(node) == RAWCONSTANT;
+    const enum object kind = object_kind(node);
+    return kind == RAWCONSTANT || kind == SRGB;
 }
 
 enum imp_status imp__color_list(imp_context *ctx, struct imp_node *node, const char *name,

@@ -51,7 +51,7 @@ enum imp_status imp__color_default(const struct imp__color_ask *ask, double fall
 
 /* Is this node a colour that is written as an object (uniform, srgb, d65, ...)? */
 bool imp__color_is_object(const struct imp_node *node);
-/* Is it a rawconstant: numbers that need not be a colour? */
+/* Does it have three numbers that may be a direction, rawconstant or srgb? */
 bool imp__color_is_raw(const struct imp_node *node);
 /* The property that has the numbers of such an object; NULL: none is written. */
 const struct imp_prop *imp__color_written(const struct imp_node *node);

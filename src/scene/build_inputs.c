@@ -296,9 +296,9 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
                  imp__color_is_raw(w.child->node);
     if (d->flags & (IMP_INPUT_BUMP | IMP_INPUT_VECTOR) && (w.prop || w.object) &&
         !in->vector)
-        return imp__prop_error(scene->ctx, node, w.prop, IMP_E_SCENE,
-                               "'%s' must be a texture%s", d->name,
-                               d->flags & IMP_INPUT_VECTOR ? ", or a rawconstant" : "");
+        return imp__prop_error(
+            scene->ctx, node, w.prop, IMP_E_SCENE, "'%s' must be a texture%s", d->name,
+            d->flags & IMP_INPUT_VECTOR ? ", a rawconstant or srgb" : "");
     if (!w.prop && w.child && !w.object) {
         w.child->used = true;
         return texture_input(scene, node, w.child->node, name, d, in);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Normals that a material gives instead of its surface: a `rawconstant` is a map of one
+ * Normals that a material gives instead of its surface: a `rawconstant` or `srgb` is a map of one
  * normal, in every colour mode. On a diffuse floor under a directional light of irradiance
  * E along the ray to the light w, radiance is
  *
@@ -74,6 +74,9 @@ int main(void)
         {"<spectrum type='rawconstant' name='normalmap'>"
          "<float name='value' value='.8'/></spectrum>",
          {.8, .8, .8}},
+        {"<spectrum type='srgb' name='normalmap'>"
+         "<rgb name='color' value='.3, .55, .9'/></spectrum>",
+         {.3, .55, .9}},
     };
     static const char *const flat = "<spectrum type='rawconstant' name='normalmap'>"
                                     "<vector name='value' value='.5, .5, 1'/></spectrum>";
@@ -98,7 +101,7 @@ int main(void)
     snprintf(xml, sizeof xml, EYE, "<rgb name='normalmap' value='.5, .5, 1'/>");
     const enum imp_status st =
         imp_scene_load_string(ctx, xml, strlen(xml), "test", &o, &scene);
-    tap_ok(st == IMP_E_SCENE && strstr(imp_last_error(ctx), "or a rawconstant"),
+    tap_ok(st == IMP_E_SCENE && strstr(imp_last_error(ctx), "a rawconstant or srgb"),
            "a colour is no normal # %s", imp_last_error(ctx));
     imp_context_destroy(ctx);
     return tap_done();
