@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A camera from one photograph of three boards: importon's fit beside OpenCV's calibrateCamera.
 
-    calibration.py [--cases N] [--width W] [--spp S] [--noise SIGMA]
+    calibration.py [--cases N] [--width W] [--spp S] [--noise SIGMA] [--fit-spp S] [--opencv-only]
 
 Both get the same photograph of scenes/board.xml, W x 3W/4 pixels with S walks a pixel and Gaussian
 noise of SIGMA of its largest value, and the same rough guess, the scene as the file has it. OpenCV
@@ -106,10 +106,11 @@ def main():
     for name, value in (("cases", 3), ("width", 128), ("spp", 64), ("fit_spp", 16)):
         parser.add_argument("--" + name.replace("_", "-"), type=int, default=value)
     parser.add_argument("--noise", type=float, default=0.01)
+    parser.add_argument("--opencv-only", action="store_true")
     o = parser.parse_args()
     w, h = o.width, o.width * 3 // 4
     rng = random.Random(1)
-    errors = {"opencv": [], "importon": []}
+    errors = {"opencv": []} if o.opencv_only else {"opencv": [], "importon": []}
     times = {"opencv": 0.0, "importon": 0.0}
     for case in range(o.cases):
         pose = [rng.uniform(-0.15, 0.15) for _ in range(3)] + [rng.uniform(-0.03, 0.03) for _ in range(3)]
