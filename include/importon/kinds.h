@@ -912,7 +912,8 @@ struct imp_sensor_ops {
     /* How fast what is seen at a fixed film position moves when number k of `view` grows, at the
      * point r from where its rays meet, world, along the plane of its depth; per unit of the
      * number. NULL where `view` is. */
-    imp_v3 (*view_velocity)(const struct imp_sensor *s, int k, imp_v3 r);
+    void (*view_velocity)(const struct imp_sensor *s, int k, const imp_v3 *r,
+                          imp_v3 *out);
 };
 
 /* ---- Versions of this header ----------------------------------------------------- */

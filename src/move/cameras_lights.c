@@ -17,7 +17,9 @@ static imp_v3 view_velocity(const struct imp__moves *moves, const struct imp__mo
                             imp_v3 r)
 {
     const struct imp_sensor *s = moves->sensor;
-    return s->ops->view_velocity(s, (int)m->kind - IMP_MOVE_VIEW, r);
+    imp_v3 v;
+    s->ops->view_velocity(s, (int)m->kind - IMP_MOVE_VIEW, &r, &v);
+    return v;
 }
 
 imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 p,

@@ -429,7 +429,7 @@ static void fresh(imp_scene *s, imp_problem *p, size_t param, const double *v,
 {
     struct imp_param_info info = {.size = sizeof info};
     struct imp_run run = IMP_RUN_INIT;
-    const int spp = is_long ? 64 : 2;
+    const int spp = is_long ? 64 : 4;
     /* Of a case's own name: a new kind does not change the numbers of the others. */
     uint64_t seed = imp__hash_text(imp__hash_text(1000, what), "fresh") >> 16;
     imp_film *film;

@@ -53,14 +53,14 @@ static bool view(struct imp_sensor *s, double number[IMP_VIEW_NUMBERS], bool set
     return imp__film_plane_view(&p->film, number, set);
 }
 
-static imp_v3 view_velocity(const struct imp_sensor *s, int k, imp_v3 r)
+static void view_velocity(const struct imp_sensor *s, int k, const imp_v3 *r, imp_v3 *out)
 {
     const struct perspective *p = s->self;
-    const imp_v3 q = imp__vector(&p->projection.to_local, r);
+    const imp_v3 q = imp__vector(&p->projection.to_local, *r);
     const double at[2] = {q[0] / q[2], q[1] / q[2]};
     double v[2];
     imp__film_plane_velocity(&p->film, k, at, v);
-    return imp__vector(&p->projection.to_world, imp__v3(v[0] * q[2], v[1] * q[2], 0));
+    *out = imp__vector(&p->projection.to_world, imp__v3(v[0] * q[2], v[1] * q[2], 0));
 }
 
 const struct imp_sensor_ops imp__perspective = {.size = sizeof(struct imp_sensor_ops),
