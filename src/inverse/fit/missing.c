@@ -81,7 +81,7 @@ static bool may_ask(const struct imp_scene *s, size_t k)
     return false;
 }
 
-/* Places and other numbers of geometry are asked no more; false: none was. */
+/* Leaves parameters of geometry out of the search; false: there were none. */
 static bool places_leave(struct missing *m)
 {
     bool met = false;

@@ -200,7 +200,7 @@ static enum imp_status moved_make(struct imp__moving *v,
 out:
     if (st != IMP_OK && v->n > 0) {
         const enum imp_status back = imp__moving_place(v, v->first);
-        (void)back; /* the first error is told */
+        (void)back; /* the caller gets the first error */
     }
     return st;
 }
