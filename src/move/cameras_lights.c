@@ -3,15 +3,6 @@
  * Velocities of cameras and lights, and the transposes (moves.h). */
 #include "moves.h"
 
-static imp_v3 number3(const double *theta)
-{
-    return imp__v3(theta[0], theta[1], theta[2]);
-}
-static void add3(double *bar, imp_v3 v)
-{
-    for (int i = 0; i < 3; i++) bar[i] += v[i];
-}
-
 /* At r from the camera's centre, by the one number of a mover that is no pose. */
 static imp_v3 view_velocity(const struct imp__moves *moves, const struct imp__mover *m,
                             imp_v3 r)
@@ -32,7 +23,7 @@ imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 p,
         const double *theta = theta_dot + m->first;
         const imp_v3 r = p - m->centre;
         if (m->kind == IMP_MOVE_POSE)
-            u += number3(theta) + imp__cross(number3(theta + 3), r);
+            u += imp__move_vector(theta) + imp__cross(imp__move_vector(theta + 3), r);
         else u += view_velocity(moves, m, r) * theta[0];
     }
     return u;
@@ -46,8 +37,8 @@ void imp__camera_velocity_bar(const struct imp__moves *moves, imp_v3 p, imp_v3 b
         if (m->shape != IMP_MOVE_CAMERA) continue;
         const imp_v3 r = p - m->centre;
         if (m->kind == IMP_MOVE_POSE) {
-            add3(theta_bar + m->first, bar);
-            add3(theta_bar + m->first + 3, imp__cross(r, bar));
+            imp__move_vector_bar(theta_bar + m->first, bar);
+            imp__move_vector_bar(theta_bar + m->first + 3, imp__cross(r, bar));
         } else {
             theta_bar[m->first] += imp__dot(view_velocity(moves, m, r), bar);
         }
@@ -69,7 +60,7 @@ imp_v3 imp__light_velocity(const struct imp__moves *moves, int k, const double *
     for (int j = 0; j < moves->n_movers; j++) {
         const struct imp__mover *m = &moves->mover[j];
         if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_LIGHT)
-            out += light_part(moves, m, number3(theta_dot + m->first));
+            out += light_part(moves, m, imp__move_vector(theta_dot + m->first));
     }
     return out;
 }
@@ -80,7 +71,7 @@ void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 bar,
     for (int j = 0; j < moves->n_movers; j++) {
         const struct imp__mover *m = &moves->mover[j];
         if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_LIGHT)
-            add3(theta_bar + m->first, light_part(moves, m, bar));
+            imp__move_vector_bar(theta_bar + m->first, light_part(moves, m, bar));
     }
 }
 
@@ -90,7 +81,7 @@ void imp__light_axis_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
     for (int j = 0; j < moves->n_movers; j++) {
         const struct imp__mover *m = &moves->mover[j];
         if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_AXIS)
-            add3(theta_bar + m->first,
-                 light_part(moves, m, imp__cross(turn_bar, m->axis)));
+            imp__move_vector_bar(theta_bar + m->first,
+                                 light_part(moves, m, imp__cross(turn_bar, m->axis)));
     }
 }

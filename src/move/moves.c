@@ -276,15 +276,6 @@ struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int 
 
 /* ---- Velocities -------------------------------------------------------------------- */
 
-static imp_v3 number3(const double *theta)
-{
-    return imp__v3(theta[0], theta[1], theta[2]);
-}
-static void add3(double *bar, imp_v3 v)
-{
-    for (int i = 0; i < 3; i++) bar[i] += v[i];
-}
-
 /* s = in_edges[0] e1 + in_edges[1] e2. False: there is no s, or no triangle. */
 static bool edges_of(const struct corners *k, imp_v3 s, double in_edges[2])
 {
@@ -302,9 +293,9 @@ static void vertices_velocity(const struct imp__moves *moves, const struct imp__
                               const double *theta, struct imp__velocity *out)
 {
     const struct corners k = corners(moves->scene, x->shape, x->prim);
-    const imp_v3 v0 = number3(theta + 3 * (size_t)k.index[0]),
-                 v1 = number3(theta + 3 * (size_t)k.index[1]),
-                 v2 = number3(theta + 3 * (size_t)k.index[2]);
+    const imp_v3 v0 = imp__move_vector(theta + 3 * (size_t)k.index[0]),
+                 v1 = imp__move_vector(theta + 3 * (size_t)k.index[1]),
+                 v2 = imp__move_vector(theta + 3 * (size_t)k.index[2]);
     const imp_v3 c = imp__cross(k.e1, k.e2), n = imp__normalize(c);
     const imp_v3 c_dot = imp__cross(v1 - v0, k.e2) + imp__cross(k.e1, v2 - v0);
     const double inverse = 1 / imp__length(c), along = imp__dot(n, c_dot) * inverse;
@@ -317,7 +308,8 @@ static void vertices_velocity(const struct imp__moves *moves, const struct imp__
             theta + 3 * moves->scene->shapes[x->shape]->triangles.n_vertices;
         imp_v3 dot = {0};
         for (int i = 0; i < 3; i++)
-            dot += number3(normals + 3 * (size_t)k.index[i]) * (x->b[i] / x->length);
+            dot += imp__move_vector(normals + 3 * (size_t)k.index[i]) *
+                   (x->b[i] / x->length);
         out->shade += dot - x->shade * imp__dot(x->shade, dot);
     }
     double in_edges[2];
@@ -341,15 +333,17 @@ static void vertices_bar(const struct imp__moves *moves, const struct imp__glued
         e1_bar += s_bar * in_edges[0];
         e2_bar += s_bar * in_edges[1];
     }
-    add3(theta_bar + 3 * (size_t)k.index[0], bar->v * x->b[0] - e1_bar - e2_bar);
-    add3(theta_bar + 3 * (size_t)k.index[1], bar->v * x->b[1] + e1_bar);
-    add3(theta_bar + 3 * (size_t)k.index[2], bar->v * x->b[2] + e2_bar);
+    imp__move_vector_bar(theta_bar + 3 * (size_t)k.index[0],
+                         bar->v * x->b[0] - e1_bar - e2_bar);
+    imp__move_vector_bar(theta_bar + 3 * (size_t)k.index[1], bar->v * x->b[1] + e1_bar);
+    imp__move_vector_bar(theta_bar + 3 * (size_t)k.index[2], bar->v * x->b[2] + e2_bar);
     if (!x->smooth) return;
     double *normals =
         theta_bar + 3 * moves->scene->shapes[x->shape]->triangles.n_vertices;
     const imp_v3 across = bar->shade - x->shade * imp__dot(x->shade, bar->shade);
     for (int i = 0; i < 3; i++)
-        add3(normals + 3 * (size_t)k.index[i], across * (x->b[i] / x->length));
+        imp__move_vector_bar(normals + 3 * (size_t)k.index[i],
+                             across * (x->b[i] / x->length));
 }
 
 struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
@@ -363,10 +357,10 @@ struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
         const imp_v3 r = x->p - m->centre;
         switch (m->kind) {
         case IMP_MOVE_POSE:
-            out.v += number3(theta) + imp__cross(number3(theta + 3), r);
-            out.n += imp__cross(number3(theta + 3), x->n);
-            out.shade += imp__cross(number3(theta + 3), x->shade);
-            out.turn += imp__dot(number3(theta + 3), x->n);
+            out.v += imp__move_vector(theta) + imp__cross(imp__move_vector(theta + 3), r);
+            out.n += imp__cross(imp__move_vector(theta + 3), x->n);
+            out.shade += imp__cross(imp__move_vector(theta + 3), x->shade);
+            out.turn += imp__dot(imp__move_vector(theta + 3), x->n);
             break;
         case IMP_MOVE_SCALE:
             out.v += r * (m->rate * theta[0]);
@@ -389,10 +383,12 @@ void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *
         const imp_v3 r = x->p - m->centre;
         switch (m->kind) {
         case IMP_MOVE_POSE:
-            add3(theta, bar->v);
-            add3(theta + 3,
-                 imp__cross(r, bar->v) + imp__cross(x->n, bar->n) + x->n * bar->turn);
-            if (x->smooth) add3(theta + 3, imp__cross(x->shade, bar->shade));
+            imp__move_vector_bar(theta, bar->v);
+            imp__move_vector_bar(theta + 3, imp__cross(r, bar->v) +
+                                                imp__cross(x->n, bar->n) +
+                                                x->n * bar->turn);
+            if (x->smooth)
+                imp__move_vector_bar(theta + 3, imp__cross(x->shade, bar->shade));
             break;
         case IMP_MOVE_SCALE:
             theta[0] += m->rate * (imp__dot(r, bar->v) + 2 * bar->area);

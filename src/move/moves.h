@@ -90,6 +90,16 @@ struct imp__velocity {
     imp_v3 shade; /* of the shading normal, where the surface is smooth; else that is n */
 };
 
+/* Three numbers as a vector, and the transpose. */
+static inline imp_v3 imp__move_vector(const double *theta)
+{
+    return imp__v3(theta[0], theta[1], theta[2]);
+}
+static inline void imp__move_vector_bar(double *bar, imp_v3 v)
+{
+    for (int i = 0; i < 3; i++) bar[i] += v[i];
+}
+
 /* Without movers. imp__moves_free releases them. */
 struct imp__moves imp__moves_begin(const struct imp_scene *scene,
                                    const struct imp_sensor *sensor);

@@ -24,11 +24,6 @@ static imp_v3 triple(const float *array, uint32_t i)
     return imp__v3(p[0], p[1], p[2]);
 }
 
-static void add3(double *bar, imp_v3 v)
-{
-    for (int i = 0; i < 3; i++) bar[i] += v[i];
-}
-
 void imp__glued_shade(const struct imp_scene *scene, struct imp__glued *x,
                       const imp_v3 e[2])
 {
@@ -175,9 +170,9 @@ static void face_bar(const struct fan_face *f, imp_v3 S_bar, double *positions_b
     const imp_v3 c_bar = (n_bar - f->n * imp__dot(f->n, n_bar)) * (1 / f->area2);
     const imp_v3 a_bar = imp__cross(f->b, c_bar) + angle_slope(f->a, f->b) * angle_bar;
     const imp_v3 b_bar = imp__cross(c_bar, f->a) + angle_slope(f->b, f->a) * angle_bar;
-    add3(positions_bar + 3 * (size_t)f->i[0], -a_bar - b_bar);
-    add3(positions_bar + 3 * (size_t)f->i[1], a_bar);
-    add3(positions_bar + 3 * (size_t)f->i[2], b_bar);
+    imp__move_vector_bar(positions_bar + 3 * (size_t)f->i[0], -a_bar - b_bar);
+    imp__move_vector_bar(positions_bar + 3 * (size_t)f->i[1], a_bar);
+    imp__move_vector_bar(positions_bar + 3 * (size_t)f->i[2], b_bar);
 }
 
 void imp__fans_normals_bar(const struct imp__fans *fans, const struct imp_triangles *t,
@@ -189,7 +184,7 @@ void imp__fans_normals_bar(const struct imp__fans *fans, const struct imp_triang
         const size_t place = fans->place[v];
         if (imp__is_zero(bar) || place == v) continue;
         own[0] = own[1] = own[2] = 0;
-        add3(normals_bar + 3 * place, bar);
+        imp__move_vector_bar(normals_bar + 3 * place, bar);
     }
     for (size_t v = 0; v < fans->n; v++) {
         double *own = normals_bar + 3 * v;
