@@ -10,7 +10,7 @@ set -u
 export ASAN_OPTIONS=${ASAN_OPTIONS:+$ASAN_OPTIONS:}detect_leaks=0
 ROOT=$(cd "$(dirname "$0")/../.." && pwd)
 export PATH=$1:$PATH LC_ALL=C OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
-export OMPI_MCA_hwloc_base_binding_policy=none
+export OMPI_MCA_hwloc_base_binding_policy=none OMPI_MCA_rtc=^hwloc
 unset TMPDIR
 work=$(mktemp -d)
 cd "$work" || exit 99
@@ -48,13 +48,14 @@ exec ip netns exec "$host" sh -c "$*"
 X
 chmod +x agent*.sh
 # daemons FILE COMMAND...: its output. Daemons of Open MPI on one machine may fail over a folder that
-# both of them make at once, which those of two machines never do: then again.
+# both of them make at once, which those of two machines never do: then again. For the same reason
+# none of them puts its list of cores into memory that the other reads (rtc_hwloc).
 daemons() {
     local file=$1
     shift
     for try in 1 2 3 4 5 6; do
         timeout 100 "$@" >"$file" 2>stderr
-        grep -q 'unable to create the desired directory' stderr || break
+        grep -q 'unable to create the desired directory\|orted(.*)\[' stderr || break
     done
 }
 if [[ -e $1/../mpi/libimporton-openmpi.so.0 ]] && command -v mpirun.openmpi >/dev/null; then
