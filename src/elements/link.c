@@ -128,7 +128,7 @@ double imp__el_link_bound(const imp_elements *e, const struct imp__el_link *link
         } else {
             x = i->v[k - 4] + (i->centre - i->v[k - 4]) * 1e-3;
         }
-        most = fmax(most, imp__polygon_factor(x, n, j->corners, j->v, facing));
+        most = imp_max(imp__polygon_factor(x, n, j->corners, j->v, facing), most);
     }
     return most * i->area / 4;
 }

@@ -19,8 +19,8 @@ double imp__polygon_factor(imp_v3 x, imp_v3 normal, int n, const imp_v3 *v, imp_
     for (int k = 0; k < n; k++) {
         at[k] = v[k] - x;
         height[k] = imp__dot(at[k], normal);
-        far = fmax(far, imp__dot(at[k], at[k]));
-        top = fmax(top, height[k]);
+        far = imp_max(imp__dot(at[k], at[k]), far);
+        top = imp_max(height[k], top);
     }
     /* Planes that touch: without a tolerance the inside of a coplanar polygon would be a
      * whole hemisphere. */

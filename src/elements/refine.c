@@ -36,7 +36,7 @@ static double corner_bound(const imp_elements *e, const struct imp__element *x,
         for (int k = 0; k < 4; k++) total[k] += fabs(sum[k]);
     }
     for (int k = 0; k < 4; k++)
-        if (w[2][k] > 0) most = fmax(most, total[k]);
+        if (w[2][k] > 0) most = imp_max(total[k], most);
     return most;
 }
 
@@ -90,11 +90,11 @@ static double error_of(const imp_elements *e, const struct imp__el_link *k,
         double q = 0;
         for (int c = 0; c < e->ch; c++) q += fabs(l[c][s]) * fabs(g[c][s]);
         q *= 4 * k->k[s];
-        q_min = fmin(q_min, q);
-        q_max = fmax(q_max, q);
-        k_max = fmax(k_max, k->k[s]);
-        l_max = fmax(l_max, sum_of(e->ch, l, s));
-        g_max = fmax(g_max, sum_of(e->ch, g, s));
+        q_min = imp_min(q, q_min);
+        q_max = imp_max(q, q_max);
+        k_max = imp_max(k->k[s], k_max);
+        l_max = imp_max(sum_of(e->ch, l, s), l_max);
+        g_max = imp_max(sum_of(e->ch, g, s), g_max);
     }
     if (k_max == 0) k_max = imp__el_link_bound(e, k);
     const int ni = imp__el_n(e, ri), nj = imp__el_n(e, rj);
@@ -105,16 +105,16 @@ static double error_of(const imp_elements *e, const struct imp__el_link *k,
     if (wide && nj > 1) bound += corner_bound(e, j, imp__el_at(e, e->l, j), i);
     else if (nj > 0) {
         double sh = 0;
-        for (int s = 0; s < 4; s++) sh = fmax(sh, sum_of(e->ch, l, s));
-        bound = fmax(bound, sh);
+        for (int s = 0; s < 4; s++) sh = imp_max(sum_of(e->ch, l, s), sh);
+        bound = imp_max(sh, bound);
     }
-    l_max = fmax(l_max, bound);
+    l_max = imp_max(bound, l_max);
     if (importance && wide && ni > 1)
-        g_max = fmax(g_max, corner_bound(e, i, imp__el_at(e, e->g, i), j));
+        g_max = imp_max(corner_bound(e, i, imp__el_at(e, e->g, i), j), g_max);
     int hidden = 0;
     for (int s = 0; s < 4; s++) hidden += k->k[s] == 0;
     return (hidden % 4 ? HALF_HIDDEN : 1) *
-           fmax(q_max - q_min, 4 * k_max * l_max * g_max / e->ch);
+           imp_max(q_max - q_min, 4 * k_max * l_max * g_max / e->ch);
 }
 
 /* The part of the source's radiance that finer sources would resolve. The kernel is

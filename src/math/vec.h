@@ -56,6 +56,14 @@ static inline imp_v3 imp__abs(imp_v3 v)
     typedef int64_t bits __attribute__((vector_size(32)));
     return (imp_v3)((bits)v & INT64_MAX);
 }
+/* Of each lane the lesser, or the greater; that of b where one is NAN. */
+static inline imp_v3 imp__lesser(imp_v3 a, imp_v3 b)
+{
+    typedef int64_t bits __attribute__((vector_size(32)));
+    const bits m = a < b;
+    return (imp_v3)((m & (bits)a) | (~m & (bits)b));
+}
+static inline imp_v3 imp__greater(imp_v3 a, imp_v3 b) { return -imp__lesser(-a, -b); }
 static inline double imp__dot(imp_v3 a, imp_v3 b)
 {
     const imp_v3 p = a * b;

@@ -20,7 +20,8 @@ static double cell_bound(const struct imp_majorants *g, const int cell[3])
         imp_v3 p = {0};
         for (int a = 0; a < 3; a++) p[a] = (double)(cell[a] + (k >> a & 1)) / g->n[a];
         p = imp__point(&g->to_world, p);
-        for (int a = 0; a < 3; a++) lo[a] = fmin(lo[a], p[a]), hi[a] = fmax(hi[a], p[a]);
+        lo = imp__lesser(lo, p);
+        hi = imp__greater(hi, p);
     }
     const struct imp_texcoord at = {.p = (lo + hi) * 0.5};
     imp__inputs_eval(m->input, m->n_own, &at, in);
@@ -30,7 +31,7 @@ static double cell_bound(const struct imp_majorants *g, const int cell[3])
             imp__input_most(m->input[j], &lo, &hi, &in[j]);
     m->ops->eval(m, in, &c);
     double most = 0;
-    for (int k = 0; k < g->channels; k++) most = fmax(most, c.extinction[k]);
+    for (int k = 0; k < g->channels; k++) most = imp_max(c.extinction[k], most);
     return most;
 }
 
@@ -62,11 +63,11 @@ static struct imp_control cell_control(const struct imp_majorants *g, const int 
         m->ops->eval(m, in, &c);
         for (int l = 0; l < g->channels; l++) {
             sum += c.extinction[l];
-            least = fmin(least, c.extinction[l]);
+            least = imp_min(c.extinction[l], least);
         }
     }
-    const double mean = fmin(sum / (8 * g->channels), bound);
-    const double reach = fmax(fmax(mean - least, bound - mean), 0.1 * bound);
+    const double mean = imp_min(sum / (8 * g->channels), bound);
+    const double reach = imp_max(imp_max(mean - least, bound - mean), 0.1 * bound);
     return (struct imp_control){(float)mean, (float)reach};
 }
 
