@@ -4,6 +4,7 @@
  * edges of the angle they subtend times the cosine between the receiver's normal and the
  * normal of the triangle (x, v_k, v_k+1) (docs/elements-theory.md 3.1). */
 #include "elements.h"
+#include "math/trig.h"
 
 double imp__polygon_area(int n, const imp_v3 *v)
 {
@@ -36,11 +37,19 @@ double imp__polygon_factor(imp_v3 x, imp_v3 normal, int n, const imp_v3 *v, imp_
                 at[k] + (at[next] - at[k]) * (height[k] / (height[k] - height[next]));
     }
     double sum = 0;
-    for (int k = 0; k < m; k++) {
-        const imp_v3 p = cut[k], q = cut[k + 1 < m ? k + 1 : 0];
-        const imp_v3 c = imp__cross(p, q);
-        const double sine = imp__length(c);
-        if (sine > 0) sum += atan2(sine, imp__dot(p, q)) * imp__dot(c, normal) / sine;
+    for (int first = 0; first < m; first += 4) { /* angles of four edges at a time */
+        imp_v3 sine = {0}, cosine = {1, 1, 1, 1}, across = {0};
+        for (int k = first; k < m && k < first + 4; k++) {
+            const imp_v3 p = cut[k], q = cut[k + 1 < m ? k + 1 : 0];
+            const imp_v3 c = imp__cross(p, q);
+            const double length = imp__length(c);
+            if (!(length > 0)) continue;
+            sine[k - first] = length;
+            cosine[k - first] = imp__dot(p, q);
+            across[k - first] = imp__dot(c, normal) / length;
+        }
+        const imp_v3 part = imp__angles(cosine, sine) * across;
+        sum += (part[0] + part[1]) + (part[2] + part[3]);
     }
     return fabs(sum) / 2;
 }

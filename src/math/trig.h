@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Sine and cosine of a fraction of a turn, and angles of vectors. Every direction drawn needs
- * the former, every hit of a sphere and every triangle of a mesh without normals the latter;
- * written out they cost a third of the C library's, and give the same bits with every C
- * library. */
+ * the former; every hit of a sphere, direction to a photometric file, pixel of a sky and edge of a
+ * form factor the latter. Written out they cost a third of the C library's, and give the same bits
+ * with every C library. */
 #ifndef IMP_MATH_TRIG_H
 #define IMP_MATH_TRIG_H
 
@@ -73,6 +73,15 @@ static inline imp_v3 imp__angles(imp_v3 x, imp_v3 y)
     const imp_v3 t = atan_c + (s + s * (z * (p + z4 * (q + z4 * r))));
     const imp_v3 a = imp__lanes_choose(y > ax, IMP_PI / 2 - t, t);
     return imp__lanes_choose(x < 0, IMP_PI - a, a);
+}
+
+/* Angles of the vectors (x, y), one a lane, in (-pi, pi], to 2^-51; 0 of the vector 0. */
+static inline imp_v3 imp__angles_signed(imp_v3 x, imp_v3 y)
+{
+    const imp_v3 high = imp__abs(y);
+    const imp_v3 a =
+        imp__angles(imp__lanes_choose((x == 0) & (high == 0), imp__spec(1), x), high);
+    return imp__lanes_choose(y < 0, -a, a);
 }
 
 #endif

@@ -27,6 +27,7 @@
 #include "kind/build.h"
 #include "kind/shape/shape.h"
 #include "math/transform.h"
+#include "math/trig.h"
 
 #define FACETS_MAX   64
 #define PER_WATT     683.0 /* lm/W at 555 nm, by which the candela is defined */
@@ -71,18 +72,23 @@ static bool angles_of(const struct imp__ies *x, imp_v3 w, double *v, double *h)
     const struct imp_ies_data *d = x->data;
     const double a = imp__dot(w, x->c0), b = imp__dot(w, x->c90),
                  c = imp__dot(w, x->nadir);
-    const int n = d->n_horizontal;
+    imp_v3 cosine = {1, 1, 1, 1}, sine = {0}; /* of v and of h */
     if (d->type == IMP_PHOTOMETRY_C) {
-        *v = atan2(sqrt(a * a + b * b), c) / DEGREE;
-        *h = n > 1 ? folded(d, atan2(b, a) / DEGREE) : 0;
-        return true;
-    }
-    if (d->type == IMP_PHOTOMETRY_B) {
-        *v = atan2(a, c) / DEGREE;
-        *h = atan2(-b, sqrt(a * a + c * c)) / DEGREE;
+        cosine[0] = c, sine[0] = sqrt(a * a + b * b);
+        cosine[1] = a, sine[1] = b;
+    } else if (d->type == IMP_PHOTOMETRY_B) {
+        cosine[0] = c, sine[0] = a;
+        cosine[1] = sqrt(a * a + c * c), sine[1] = -b;
     } else {
-        *v = atan2(-c, sqrt(a * a + b * b)) / DEGREE;
-        *h = atan2(-b, a) / DEGREE;
+        cosine[0] = sqrt(a * a + b * b), sine[0] = -c;
+        cosine[1] = a, sine[1] = -b;
+    }
+    const imp_v3 angle = imp__angles_signed(cosine, sine) * (1 / DEGREE);
+    *v = angle[0];
+    *h = angle[1];
+    if (d->type == IMP_PHOTOMETRY_C) {
+        *h = d->n_horizontal > 1 ? folded(d, *h) : 0;
+        return true;
     }
     if (d->horizontal[0] == 0) *h = fabs(*h);
     return fabs(*h) <= 90 + 1e-9;

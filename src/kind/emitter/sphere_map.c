@@ -3,15 +3,17 @@
  * Directions of texels, solid angles of rows, and draws inside a texel, for both projections of a
  * picture of all directions. */
 #include "sphere_map.h"
+#include "math/trig.h"
 
 void imp__sphere_map_place(const struct imp__sphere_map *m, imp_v3 d, double *u,
                            double *row)
 {
-    const double turns = atan2(d[0], -d[2]) * (IMP_INV_PI / 2);
-    const double last = m->height - 1;
+    const double out = sqrt(d[0] * d[0] + d[2] * d[2]), last = m->height - 1;
+    const imp_v3 angle =
+        imp__angles_signed((imp_v3){-d[2], d[1], 1, 1}, (imp_v3){d[0], out, 0, 0});
+    const double turns = angle[0] * (IMP_INV_PI / 2);
     *u = turns < 0 ? turns + 1 : turns;
-    if (m->projection == IMP_LATLONG)
-        *row = atan2(sqrt(d[0] * d[0] + d[2] * d[2]), d[1]) * IMP_INV_PI * last;
+    if (m->projection == IMP_LATLONG) *row = angle[1] * IMP_INV_PI * last;
     else *row = (1 - d[1]) * 0.5 * m->height - 0.5;
     *row = imp_clamp(*row, 0.0, last);
 }
