@@ -3,6 +3,8 @@
  * Distributions, quadrature and small linear algebra against published or exact numbers.
  */
 #include "imp_tap.h"
+#include "math/exp.h"
+#include "math/exp.h"
 #include "math/linalg.h"
 #include "math/quadrature.h"
 #include "math/rng.h"
@@ -150,17 +152,50 @@ static void angles(void)
             const long double right = atan2l(y[k], x[k]);
             worst = fmax(worst, (double)fabsl((a[k] - right) / right));
         }
+        const imp_v3 sign = {-1, 1, -1, 1}, b = imp__angles_signed(x * sign, -y * sign);
+        for (int k = 0; k < 4; k++) {
+            const long double right = atan2l(-y[k] * sign[k], x[k] * sign[k]);
+            worst = fmax(worst, (double)fabsl((b[k] - right) / right));
+        }
     }
     const imp_v3 flat = imp__angles((imp_v3){2, -2, 0, 1}, (imp_v3){0, 0, 3, 1});
     tap_ok(flat[0] == 0 && flat[1] == IMP_PI && flat[2] == IMP_PI / 2 &&
                flat[3] == IMP_PI / 4,
            "along the axes and between them");
+    const imp_v3 round =
+        imp__angles_signed((imp_v3){0, -1, 0, -1}, (imp_v3){0, 0, -1, -1});
+    tap_ok(round[0] == 0 && round[1] == IMP_PI && round[2] == -IMP_PI / 2 &&
+               round[3] == -0.75 * IMP_PI,
+           "the vector 0 has the angle 0, and those below the axis a negative one");
     tap_ok(worst < 0x1p-51, "angles of vectors # worst relative error %.3g", worst);
+}
+
+/* Of numbers of all sizes, and beyond what it has. */
+static void exponentials(void)
+{
+    double worst = 0;
+    for (uint32_t i = 0; i < 100000; i++) {
+        const struct imp_key key = imp__key(4, 0, i);
+        const double u = imp__u01(key, 0), small = exp2(-(double)(i % 70));
+        const imp_v3 x = {1417 * u - 708, -u * small, u * small, 40 * u - 40};
+        const imp_v3 e = imp__exp(x);
+        for (int k = 0; k < 4; k++) {
+            const long double right = expl(x[k]);
+            worst = fmax(worst, (double)fabsl((e[k] - right) / right));
+        }
+    }
+    tap_ok(worst < 0x1p-52, "exponentials # worst relative error %.3g", worst);
+    const imp_v3 end = imp__exp((imp_v3){0, -INFINITY, INFINITY, NAN});
+    const imp_v3 off = imp__exp((imp_v3){-709, 710, 1e300, -1e300});
+    tap_ok(end[0] == 1 && end[1] == 0 && isinf(end[2]) && isnan(end[3]) && off[0] == 0 &&
+               isinf(off[1]) && isinf(off[2]) && off[3] == 0,
+           "of 0, of what is too large, and of no number");
 }
 
 int main(void)
 {
     angles();
+    exponentials();
     distributions();
     quadrature();
     linear_algebra();

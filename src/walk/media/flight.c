@@ -7,7 +7,8 @@
 #include "scene/majorants.h"
 
 static double uniform(struct imp_free_flight *w) { return imp__u01(w->key, w->n++); }
-static double free_path(struct imp_free_flight *w) { return -log1p(-uniform(w)); }
+/* 1 - u is exact. */
+static double free_path(struct imp_free_flight *w) { return -log(1 - uniform(w)); }
 
 struct imp_free_flight imp__flight_from(struct imp_step *s, imp_v3 o, imp_v3 d,
                                         int stream)

@@ -1,16 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What is kept of a flight, evaluated and differentiated: a product over its events. */
+#include "math/exp.h"
 #include "tracking.h"
 
 imp_spec imp__attenuation(imp_spec sigma, double t)
 {
-    imp_spec T;
-    for (int c = 0; c < 4; c++)
-        T[c] = c > 0 && sigma[c] == sigma[0] ? T[0]
-               : sigma[c] > 0                ? exp(-sigma[c] * t)
-                                             : 1;
-    return T;
+    return imp__lanes_choose(sigma > 0, imp__exp(-sigma * t), imp__spec(1));
 }
 
 imp_spec imp__extinction_at(const struct imp_medium *m, imp_v3 p,
