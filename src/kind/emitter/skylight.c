@@ -47,30 +47,27 @@ void imp__skylight_set(struct imp__skylight *s, double elevation, double radius,
     }
 }
 
-/* Whole turbidities around t. The derivative of a line is the difference of its ends; where
- * two lines meet it is the mean of theirs, as central differences find it. */
-struct between {
-    int low, high; /* indices of the ends */
-    double share;  /* of the upper one */
-    int from, to;  /* the derivative is (value[to] - value[from]) per */
-    double per;
-};
-static struct between between(double t)
+struct imp__sky_between imp__sky_between(double t)
 {
-    const int k = (int)fmin(fmax(floor(t), 1), IMP_SKY_TURBIDITIES - 1) - 1;
+    const int k = (int)imp_clamp(floor(t), 1.0, IMP_SKY_TURBIDITIES - 1.0) - 1;
     const double share = t - (k + 1);
     const bool corner = share == 0 && k > 0;
-    return (struct between){k, k + 1, share, corner ? k - 1 : k, k + 1, corner ? 0.5 : 1};
+    return (struct imp__sky_between){k,     k + 1,           share, corner ? k - 1 : k,
+                                     k + 1, corner ? 0.5 : 1};
+}
+struct imp__sky_place imp__sky_place(double cos_theta, double cos_gamma)
+{
+    return (struct imp__sky_place){cos_gamma, acos(imp_clamp(cos_gamma, -1.0, 1.0)),
+                                   1 / (cos_theta + 0.01), sqrt(cos_theta)};
 }
 
 /* Value and derivatives by A..I, R. */
-static double radiance(const double c[IMP_SKY_NUMBERS], double cos_theta,
-                       double cos_gamma, double d[IMP_SKY_NUMBERS])
+static double radiance(const double c[IMP_SKY_NUMBERS], const struct imp__sky_place *x,
+                       double d[IMP_SKY_NUMBERS])
 {
-    const double gamma = acos(fmin(fmax(cos_gamma, -1), 1));
-    const double up = 1 / (cos_theta + 0.01), haze = exp(c[B] * up),
-                 root = sqrt(cos_theta);
-    const double glow = exp(c[E] * gamma), square = cos_gamma * cos_gamma;
+    const double up = x->up, root = x->root, gamma = x->gamma, cos_gamma = x->cos_gamma;
+    const double haze = exp(c[B] * up), glow = exp(c[E] * gamma),
+                 square = cos_gamma * cos_gamma;
     const double base = 1 + c[I] * c[I] - 2 * c[I] * cos_gamma;
     const double chi = (1 + square) / (base * sqrt(base));
     const double first = 1 + c[A] * haze;
@@ -90,12 +87,12 @@ static double radiance(const double c[IMP_SKY_NUMBERS], double cos_theta,
 }
 
 struct imp__sky_value imp__sky_radiance(const struct imp__skylight *s, int k,
-                                        double turbidity, double albedo, double cos_theta,
-                                        double cos_gamma)
+                                        const struct imp__sky_between *of, double albedo,
+                                        const struct imp__sky_place *x)
 {
     double c[IMP_SKY_NUMBERS], d[IMP_SKY_NUMBERS];
     struct imp__sky_value out = {0};
-    const struct between t = between(turbidity);
+    const struct imp__sky_between t = *of;
     double thick[IMP_SKY_NUMBERS], light[IMP_SKY_NUMBERS]; /* d by turbidity, by albedo */
     for (int m = 0; m < IMP_SKY_NUMBERS; m++) {
 #define GROUND(i) (s->sky[i][1][k][m] - s->sky[i][0][k][m])
@@ -106,7 +103,7 @@ struct imp__sky_value imp__sky_radiance(const struct imp__skylight *s, int k,
 #undef AT
 #undef GROUND
     }
-    const double value = radiance(c, cos_theta, cos_gamma, d);
+    const double value = radiance(c, x, d);
     if (!(value > 0)) return out; /* the fit falls below 0 in places */
     out.value = value;
     for (int m = 0; m < IMP_SKY_NUMBERS; m++) {
@@ -143,7 +140,7 @@ static void sun_blend(double turbidity, double elevation,
                       const double limb[IMP_SKY_WAVES],
                       struct imp__sky_value out[IMP_SKY_WAVES])
 {
-    const struct between t = between(turbidity);
+    const struct imp__sky_between t = imp__sky_between(turbidity);
     for (int k = 0; k < IMP_SKY_WAVES; k++) {
         const double low = sun_at(t.low, k, elevation),
                      high = sun_at(t.high, k, elevation);

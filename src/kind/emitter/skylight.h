@@ -43,11 +43,26 @@ void imp__skylight_set(struct imp__skylight *s, double elevation, double radius,
 struct imp__sky_value {
     double value, by_turbidity, by_albedo;
 };
-/* Radiance of the sky in channel k. cos_theta >= 0 of the direction to the zenith, cos_gamma
- * to the sun. */
+/* A direction, as all channels need it: theta <= pi/2 from the zenith, gamma from the sun. */
+struct imp__sky_place {
+    double cos_gamma, gamma;
+    double up;   /* 1/(cos theta + .01) */
+    double root; /* of cos theta */
+};
+struct imp__sky_place imp__sky_place(double cos_theta, double cos_gamma);
+/* Whole turbidities around one. The derivative of a line is the difference of its ends; where
+ * two lines meet it is the mean of theirs, as central differences find it. */
+struct imp__sky_between {
+    int low, high; /* indices of the ends */
+    double share;  /* of the upper one */
+    int from, to;  /* the derivative is (value[to] - value[from]) per */
+    double per;
+};
+struct imp__sky_between imp__sky_between(double turbidity);
+/* Radiance of the sky in channel k. */
 struct imp__sky_value imp__sky_radiance(const struct imp__skylight *s, int k,
-                                        double turbidity, double albedo, double cos_theta,
-                                        double cos_gamma);
+                                        const struct imp__sky_between *t, double albedo,
+                                        const struct imp__sky_place *x);
 
 /* Radiance of the sun at eleven wavelengths, where it is hit in a direction of this
  * elevation, with cos_limb between the ray and the sun's surface; its albedo has none. */

@@ -68,14 +68,21 @@ struct both {
     struct imp__sky_value sky, sun;
 };
 
-struct at { /* a direction, in the frame of the sky */
+struct at { /* a direction, in the frame of the sky, and a turbidity */
     double cos_theta, cos_gamma;
     bool in_disc;
+    struct imp__sky_place place;
+    struct imp__sky_between between;
 };
-static struct at at_direction(const struct sunsky *s, imp_v3 w)
+static bool in_disc(const struct sunsky *s, double cos_gamma)
+{
+    return cos_gamma >= s->cos_radius;
+}
+static struct at at_direction(const struct sunsky *s, imp_v3 w, double turbidity)
 {
     const double c = imp__dot(w, s->sun);
-    return (struct at){w[2], c, c >= s->cos_radius};
+    return (struct at){w[2], c, in_disc(s, c), imp__sky_place(w[2], c),
+                       imp__sky_between(turbidity)};
 }
 
 /* The sun's eleven wavelengths. */
@@ -98,30 +105,28 @@ static void add(struct imp__sky_value *sum, double factor, const struct imp__sky
 }
 
 /* At one wavelength: lines between the model's. */
-static void at_wave(const struct sunsky *s, const struct at *x, double turbidity,
-                    double albedo, double nm, const struct imp__sky_value *sun,
-                    struct both *out)
+static void at_wave(const struct sunsky *s, const struct at *x, double albedo, double nm,
+                    const struct imp__sky_value *sun, struct both *out)
 {
     const double at = (nm - IMP_SKY_FIRST_NM) / IMP_SKY_STEP_NM;
     *out = (struct both){0};
     if (!(at >= 0 && at <= IMP_SKY_WAVES - 1)) return;
-    const int k = (int)fmin(at, IMP_SKY_WAVES - 2);
+    const int k = (int)imp_min(at, IMP_SKY_WAVES - 2.0);
     for (int j = 0; j < 2; j++) {
         const double share = j ? at - k : 1 - (at - k);
-        const struct imp__sky_value sky = imp__sky_radiance(
-            &s->light, k + j, turbidity, albedo, x->cos_theta, x->cos_gamma);
+        const struct imp__sky_value sky =
+            imp__sky_radiance(&s->light, k + j, &x->between, albedo, &x->place);
         add(&out->sky, share, &sky);
         if (x->in_disc) add(&out->sun, share, &sun[k + j]);
     }
 }
 
 /* Sky and sun in colour c: the sky's tables are for colours, in units of luminance. */
-static void at_color(const struct sunsky *s, const struct at *x, double turbidity,
-                     double albedo, int c, const struct imp__sky_value *sun,
-                     struct both *out)
+static void at_color(const struct sunsky *s, const struct at *x, double albedo, int c,
+                     const struct imp__sky_value *sun, struct both *out)
 {
     const struct imp__sky_value sky =
-        imp__sky_radiance(&s->light, c, turbidity, albedo, x->cos_theta, x->cos_gamma);
+        imp__sky_radiance(&s->light, c, &x->between, albedo, &x->place);
     *out = (struct both){0};
     add(&out->sky, 1 / IMP_CIE_Y_INTEGRAL, &sky);
     for (int k = 0; k < IMP_SKY_WAVES && x->in_disc; k++)
@@ -132,17 +137,16 @@ static void at_color(const struct sunsky *s, const struct at *x, double turbidit
 static void lanes(const struct sunsky *s, const imp_spec *in, imp_v3 w,
                   struct both out[4])
 {
-    const struct at x = at_direction(s, w);
     const double turbidity = in[TURBIDITY][0];
     struct imp__sky_value sun[IMP_SKY_WAVES];
     for (int c = 0; c < 4; c++) out[c] = (struct both){0};
-    if (s->dark || !(x.cos_theta >= 0)) return;
+    if (s->dark || !(w[2] >= 0)) return;
+    const struct at x = at_direction(s, w, turbidity);
     if (x.in_disc) sun_waves(s, &x, turbidity, sun);
     for (int c = 0; c < (s->by_wave ? 4 : 3); c++) {
         const double albedo = in[ALBEDO][s->mono ? 0 : c];
-        if (s->by_wave)
-            at_wave(s, &x, turbidity, albedo, in[WAVELENGTH][c], sun, &out[c]);
-        else at_color(s, &x, turbidity, albedo, c, sun, &out[c]);
+        if (s->by_wave) at_wave(s, &x, albedo, in[WAVELENGTH][c], sun, &out[c]);
+        else at_color(s, &x, albedo, c, sun, &out[c]);
         const struct imp__sky_value full = out[c].sun;
         out[c].sun = (struct imp__sky_value){0};
         add(&out[c].sun, s->dim, &full);
@@ -224,7 +228,7 @@ static void luminances(const struct imp_emitter *e, imp_v3 w, double *sky, doubl
 
 static imp_v3 cell_direction(int i, int j, double up, double round)
 {
-    const double z = (i + up) / HEIGHTS, r = sqrt(fmax(0, (1 - z) * (1 + z)));
+    const double z = (i + up) / HEIGHTS, r = sqrt(imp_max((1 - z) * (1 + z), 0.0));
     double sine, cosine;
     imp__sincos_turn((j + round) / TURNS, &sine, &cosine);
     return imp__v3(r * cosine, r * sine, z);
@@ -241,7 +245,7 @@ static void changed(const struct imp_emitter *e)
             for (int k = 0; k < 4; k++) {
                 luminances(e, cell_direction(i, j, k / 2 ? .75 : .25, k % 2 ? .75 : .25),
                            &y, &unused);
-                sum += fmax(0, y) / 4;
+                sum += imp_max(y, 0.0) / 4;
             }
             t.column[i * TURNS + j] = sum;
             total += sum;
@@ -261,8 +265,7 @@ static double density(const struct imp_emitter *e, imp_v3 w)
 {
     const struct sunsky *s = e->self;
     const struct imp__weight_table *t = &s->table;
-    const struct at x = at_direction(s, w);
-    double p = x.in_disc ? *s->sun_share / s->sun_solid : 0;
+    double p = in_disc(s, imp__dot(w, s->sun)) ? *s->sun_share / s->sun_solid : 0;
     if (w[2] >= 0) {
         const double turn = atan2(w[1], w[0]) * (IMP_INV_PI / 2);
         const int i = imp_min((int)(w[2] * HEIGHTS), HEIGHTS - 1);
