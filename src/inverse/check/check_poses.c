@@ -10,6 +10,7 @@
 #include "scene/pose.h"
 #include "walk/core/vertex.h"
 #include "walk/moved/moved_chain.h"
+#include "walk/moved/moved_sky.h"
 #include <math.h>
 #include <string.h>
 
@@ -263,7 +264,14 @@ static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spe
     const struct imp_scene *scene = m->c->problem->scene;
     const struct imp_vertex *v = walk->first;
     double value = 0;
-    if (!v || v->d.scatterer == IMP_AT_SKY) return 0;
+    if (!v) return 0;
+    if (v->d.scatterer == IMP_AT_SKY) {
+        const imp_v3 d = walk->ray.d;
+        return imp__sum_used(
+            P * imp__skies_from(scene, m->shape == IMP_MOVE_CAMERA ? turned(m, d) : d,
+                                v->carried),
+            scene->lanes);
+    }
     struct imp__glued old = vertex_glued(scene, v, walk->time);
     imp_v3 o = walk->ray.o, w[2];
     w[0] = w[1] = imp__normalize(old.p - o);

@@ -37,22 +37,12 @@ imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py)
     return walk.values;
 }
 
-void imp__draw_film(struct imp__edge_draw *d)
+void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to)
 {
-    const struct imp__boundary *b = d->b;
-    const struct imp_sensor *sensor = b->tracer->sensor;
-    const double none[4] = {0};
-    struct imp_sensor_sample to;
-    if (!imp__edge_any(d, b->camera) || !sensor->ops->connect ||
-        !imp__sensor_connect(sensor, &d->p, false, none, &to) ||
-        !imp__light_on_film(sensor, &to))
-        return;
-    const imp_v3 r = imp__edge_clear(d) - to.p;
-    if (imp__occluded_at(b->tracer->scene, 0, &to.p, &r, 0, 1 - IMP_BESIDE)) return;
-
+    const imp_v3 camera = d->b->camera;
+    const double inverse = 1 / imp__length(d->p - camera);
     imp_v3 x, y;
-    const double inverse = 1 / imp__length(d->p - b->camera);
-    film_slopes(sensor, to.px, to.py, &x, &y);
+    film_slopes(d->b->tracer->sensor, to->px, to->py, &x, &y);
     x *= inverse;
     y *= inverse;
     const double tangent[2] = {imp__dot(x, d->along), imp__dot(y, d->along)};
@@ -65,16 +55,34 @@ void imp__draw_film(struct imp__edge_draw *d)
     const double pixel = sqrt(1 / (imp__length(x) * imp__length(y))) * inverse;
     const double beside = IMP_BESIDE / pixel / length;
     const double dx = normal[0] * beside, dy = normal[1] * beside;
-    const imp_spec jump = imp__look_through(d, to.px - dx, to.py - dy) -
-                          imp__look_through(d, to.px + dx, to.py + dy);
+    const imp_spec jump = imp__look_through(d, to->px - dx, to->py - dy) -
+                          imp__look_through(d, to->px + dx, to->py + dy);
     if (imp__is_zero(jump)) return;
     struct imp__flux *f = imp__flux_add(d, 2);
     if (!f) return;
-    f->px = to.px;
-    f->py = to.py;
+    f->px = to->px;
+    f->py = to->py;
     f->L = jump * d->inv_pdf;
     f->n_ends = 2;
-    const struct imp__glued at = imp__edge_carried(d);
-    f->end[0] = imp__flux_glued(&at, bar);
+    const bool sky = d->item && d->item->kind == IMP_ITEM_SKY;
+    const struct imp__glued at = sky ? (struct imp__glued){.p = d->p}
+                                     : imp__edge_carried(d),
+                            eye = {.p = camera};
+    f->end[0] = sky ? imp__flux_camera(&eye, bar) : imp__flux_glued(&at, bar);
     f->end[1] = imp__flux_camera(&at, -bar);
+}
+
+void imp__draw_film(struct imp__edge_draw *d)
+{
+    const struct imp__boundary *b = d->b;
+    const struct imp_sensor *sensor = b->tracer->sensor;
+    const double none[4] = {0};
+    struct imp_sensor_sample to;
+    if (!imp__edge_any(d, b->camera) || !sensor->ops->connect ||
+        !imp__sensor_connect(sensor, &d->p, false, none, &to) ||
+        !imp__light_on_film(sensor, &to))
+        return;
+    const imp_v3 r = imp__edge_clear(d) - to.p;
+    if (imp__occluded_at(b->tracer->scene, 0, &to.p, &r, 0, 1 - IMP_BESIDE)) return;
+    imp__film_jump(d, &to);
 }

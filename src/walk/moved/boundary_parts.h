@@ -71,17 +71,21 @@ static inline struct imp__flux_end imp__flux_camera(const struct imp__glued *x,
 }
 /* What the camera sees at a film position. */
 imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py);
+/* The flux of a jump of the picture where the draw's point is seen; of a circle of a sky, with the
+ * point d->p at the distance 1 from the camera. */
+void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to);
 /* What a vertex at a hit sees towards a place. */
 void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 to,
                     struct imp_walk *walk);
 /* What arrives along a recorded walk from a vertex x, without the emission of a light that it
- * meets first, which is glued to that. Vertex i of it has number i + before of the whole path. */
-imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk,
-                      int before);
+ * meets first, which is glued to that; of skies that have draws of their own only with `skies`.
+ * Vertex i of it has number i + before of the whole path. */
+imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk, int before,
+                      bool skies);
 /* Vertices behind the edge for which light is known: what jumps by depth [*n], in the arena. NULL:
  * no memory, or nothing jumps. */
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
-                     const struct imp_walk *hi, double times, int *n);
+                     const struct imp_walk *hi, double times, bool skies, int *n);
 
 /* What light that arrives at `at` (a hit of this shape) along w brings to the sensor: from there,
  * and over further vertices. Light: radiance times all factors but f W(x). `back`: vertices that
@@ -111,6 +115,7 @@ void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind);
 void imp__draw_film(struct imp__edge_draw *d);
 void imp__draw_light(struct imp__edge_draw *d);
 void imp__draw_scatter(struct imp__edge_draw *d);
+void imp__draw_sky_film(struct imp__edge_draw *d);
 /* ---- Of meshes with vertex normals: boundary_shading.c, boundary_horizon.c ---- */
 void imp__draw_shading_film(struct imp__edge_draw *d);
 void imp__draw_shading_scatter(struct imp__edge_draw *d);

@@ -1,20 +1,27 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Edges between a vertex and what it receives from the sky and from lit surfaces (boundary.h). */
+ * Edges between a vertex and what it receives from lit surfaces (boundary.h). */
 #include "boundary_parts.h"
+#include "moved_sky.h"
 #include "walk/core/step.h"
 
-imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk, int before)
+imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk, int before,
+                      bool skies)
 {
     const int max = t->integrator->max_depth;
     imp_spec L = {0}, T = imp__spec(1);
     int number = before;
-    if (walk->dropped) return L;
-    for (const struct imp_vertex *v = walk->first; v; v = v->next, number++) {
-        const bool glued = v == walk->first && v->d.scatterer != IMP_AT_SKY;
-        if (!glued && (max < 0 || number < max)) L += T * v->e;
+    if (walk->dropped || !walk->first) return L;
+    const bool sky_first = walk->first->d.scatterer == IMP_AT_SKY;
+    for (const struct imp_vertex *v = walk->first; v; v = v->next) {
+        /* To each sky a vertex. */
+        const bool left = sky_first
+                              ? !skies && imp__sky_has_draws(t->scene, v->d.met.emitter)
+                              : v == walk->first;
+        if (!left && (max < 0 || number < max)) L += T * v->e;
         if (max < 0 || number + 1 < max) L += T * v->b;
         T *= v->w;
+        number += v->d.scatterer != IMP_AT_SKY;
     }
     return L;
 }
@@ -29,7 +36,7 @@ void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_
 }
 
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
-                     const struct imp_walk *hi, double times, int *n)
+                     const struct imp_walk *hi, double times, bool skies, int *n)
 {
     const struct imp_tracer *tracer = d->b->tracer;
     const int max = tracer->integrator->max_depth;
@@ -41,8 +48,9 @@ imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
     }
     bool any = false;
     for (int k = 0; k < *n; k++) {
-        jump[k] =
-            (imp__arrives(tracer, lo, k + 1) - imp__arrives(tracer, hi, k + 1)) * times;
+        jump[k] = (imp__arrives(tracer, lo, k + 1, skies) -
+                   imp__arrives(tracer, hi, k + 1, skies)) *
+                  times;
         any |= !imp__is_zero(jump[k]);
     }
     return any ? jump : NULL;
@@ -73,7 +81,7 @@ void imp__draw_scatter(struct imp__edge_draw *d)
 
     int depths;
     const double times = (d->touches ? 1 : sine * 4 * IMP_PI) * d->inv_pdf;
-    imp_spec *jump = imp__jumps(d, &lo, &hi, times, &depths);
+    imp_spec *jump = imp__jumps(d, &lo, &hi, times, false, &depths);
     if (!jump) return;
     struct imp__edge_light light = {.w = w, .n_ends = 1, .slide = -m};
     light.light = jump[0];

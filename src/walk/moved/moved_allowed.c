@@ -7,8 +7,8 @@
 #include "scene/instances.h"
 #include "scene/pose.h"
 
-extern const struct imp_emitter_ops imp__area, imp__constant, imp__point_light,
-    imp__spot_light, imp__directional;
+extern const struct imp_emitter_ops imp__area, imp__point_light, imp__spot_light,
+    imp__directional;
 
 static enum imp_status refuse(const struct imp_tracer *t, const char *what,
                               const char *name, const char *kind, const char *why)
@@ -50,12 +50,14 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
 {
     for (int k = 0; k < t->scene->n_emitters; k++) {
         const struct imp_emitter *e = t->scene->emitters[k];
-        if (e->ops != &imp__area && e->ops != &imp__constant &&
-            e->ops != &imp__point_light && e->ops != &imp__spot_light &&
-            e->ops != &imp__directional)
+        const bool sky = e->ops->flags & IMP_EMITTER_ENVIRONMENT;
+        if (sky ? !e->ops->jumps
+                : e->ops != &imp__area && e->ops != &imp__point_light &&
+                      e->ops != &imp__spot_light && e->ops != &imp__directional)
             return refuse(t, "light", e->name, e->ops->name,
-                          "is none of area, constant, point, spot and directional");
-        if (e->shaped || is_textured(e->input, e->n_in))
+                          sky ? "does not say where its radiance jumps"
+                              : "is none of area, point, spot, directional and skies");
+        if (!sky && (e->shaped || is_textured(e->input, e->n_in)))
             return refuse(t, "light", e->name, e->ops->name, "has a texture");
         if (e->shape && e->shape->geometry != IMP_TRIANGLES && !is_simple(t, e->shape))
             return refuse(t, "light", e->name, e->ops->name,
@@ -68,10 +70,7 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
         if (e->course)
             return refuse(t, "light", e->name, e->ops->name, "changes with time");
     }
-    return t->scene->n_environments < 2
-               ? IMP_OK
-               : imp__error(t->scene->ctx, IMP_E_UNSUPPORTED,
-                            "derivatives by what moves: there are several skies");
+    return IMP_OK;
 }
 
 static enum imp_status walks_allowed(const struct imp_tracer *t)

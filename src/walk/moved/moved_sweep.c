@@ -3,6 +3,7 @@
  * The interior derivative of a walk by what moves (moved.h): adjoints of its values from the first
  * vertex to the last, then adjoints of its places from the last to the first. */
 #include "moved_chain.h"
+#include "moved_sky.h"
 #include "walk/core/vertex.h"
 
 /* What the values of vertex k depend on, as adjoints of their logarithms, by lanes. */
@@ -195,6 +196,17 @@ static void step_bar(struct sweep *s, int k, const struct imp_vertex *v)
     imp__velocity_bar(s->moves, &next->x, &next->bar, s->theta_bar);
 }
 
+/* The sky through a fixed film position: the direction d of the ray turns by u(o + d) - u(o). */
+static void sky_seen_bar(const struct sweep *s, imp_spec adjoint)
+{
+    const struct imp_sensor_ray *ray = &s->walk->ray;
+    const imp_v3 slope =
+        imp__skies_slope(s->tracer->scene, ray->d, adjoint, s->walk->first->carried);
+    if (imp__is_zero(slope)) return;
+    imp__camera_velocity_bar(s->moves, ray->o + ray->d, slope, s->theta_bar);
+    imp__camera_velocity_bar(s->moves, ray->o, -slope, s->theta_bar);
+}
+
 bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
                       const struct imp__moves *moves, const struct imp_walk *walk,
                       imp_spec adjoint, double *theta_bar)
@@ -210,7 +222,10 @@ bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
         if (v->d.connection == IMP_CONNECTED) light_bar(&s, k, v);
         if (v->d.goes_on && v->next) step_bar(&s, k, v);
     }
-    if (s.at[0].sky) return true;
+    if (s.at[0].sky) {
+        sky_seen_bar(&s, adjoint);
+        return true;
+    }
     imp__camera_bar(moves, walk->ray.o, &s.at[0], s.wo_bar, theta_bar);
     return true;
 }
