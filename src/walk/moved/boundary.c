@@ -6,6 +6,7 @@
 #include "moved_sky.h"
 #include "scene/camera_gain.h"
 #include "scene/pose.h"
+#include "walk/core/lane_mis.h"
 
 /* A tenth of each measure is the length in space. */
 #define BY_LENGTH 0.1
@@ -154,8 +155,10 @@ static double light_power(const struct imp__boundary *b, int k)
     const double across = imp__sqr(b->size) / 4;
     imp_spec in[IMP_INPUTS_MAX];
     if (e->ops->flags & IMP_EMITTER_ENVIRONMENT)
-        return across * imp__sky_whole(scene, k, NULL);
-    imp__inputs_eval(e->input, e->n_in, &nowhere, in);
+        return across * imp__sky_whole(b->tracer, k);
+    if (b->tracer->wavelengths)
+        imp__input_most(e->input[0], &nowhere.p, &nowhere.p, &in[0]);
+    else imp__inputs_eval(e->input, e->n_in, &nowhere, in);
     const double size = e->shape                          ? e->shape->area
                         : e->ops->flags & IMP_EMITTER_FAR ? across
                                                           : 4;
@@ -226,11 +229,24 @@ struct imp__flux *imp__flux_add(struct imp__edge_draw *d, int n)
     return f;
 }
 
-void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
+/* Wavelengths of a draw, each on its own. False: no memory. */
+static bool waves_draw(struct imp__edge_draw *d)
 {
-    d->part = d->b->part[kind];
-    d->end = &d->first;
-    if (!imp__edge_item_choose(d)) return;
+    const struct imp_wavelengths *all = d->b->tracer->wavelengths;
+    if (imp_likely(!all)) return true;
+    struct imp_waves *waves = imp__arena_take(d->arena, 1, sizeof *waves);
+    if (!waves) {
+        d->no_memory = true;
+        return false;
+    }
+    imp__waves_make(all, imp__u01(d->key, IMP_EDGE_WAVE), waves);
+    waves->drew = imp__lane_drawn(d->key, all->lanes);
+    d->waves = waves;
+    return true;
+}
+
+static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
+{
     const enum imp__edge_item_kind item = d->item ? d->item->kind : IMP_ITEM_ROUND;
     switch (kind) {
     case IMP_BOUNDARY_FILM:
@@ -245,6 +261,16 @@ void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
         if (item == IMP_ITEM_HORIZON) imp__draw_horizon(d);
         break;
     }
+}
+
+void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
+{
+    d->part = d->b->part[kind];
+    d->end = &d->first;
+    if (!waves_draw(d) || !imp__edge_item_choose(d)) return;
+    kind_work(d, kind);
+    for (struct imp__flux *f = d->waves ? d->first : NULL; f; f = f->next)
+        f->L = imp__waves_channels(d->waves, f->L);
 }
 
 struct imp__flux *imp__boundary_draw(const struct imp__boundary *b,

@@ -33,7 +33,7 @@ imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py)
     struct imp_sensor_ray ray;
     struct imp_walk walk;
     t->sensor->ops->ray(t->sensor, px, py, lens, &ray);
-    imp__walk_along(t, d->arena, imp__key_branch(d->key, 0, 1), &ray, 0, &walk);
+    imp__walk_along(t, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves, 0, &walk);
     return walk.values;
 }
 
@@ -57,7 +57,7 @@ void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to
     const double dx = normal[0] * beside, dy = normal[1] * beside;
     const imp_spec jump = imp__look_through(d, to->px - dx, to->py - dy) -
                           imp__look_through(d, to->px + dx, to->py + dy);
-    if (imp__is_zero(jump)) return;
+    if (imp__is_zero_used(jump, d->waves)) return;
     struct imp__flux *f = imp__flux_add(d, 2);
     if (!f) return;
     f->px = to->px;

@@ -71,10 +71,10 @@ static imp_spec sent(const struct imp__edge_draw *d, const struct source *s,
 {
     const struct imp_scene *scene = d->b->tracer->scene;
     const struct imp_emitter *e = scene->emitters[s->light];
-    const struct imp_texcoord there = {.shape = e->shape};
+    const struct imp_texcoord there = {.shape = e->shape, .carried = imp__edge_waves(d)};
     const struct imp_emission x = {.dist = 1, .cos_light = cosine, .d = along};
     imp_spec in[IMP_INPUTS_MAX], le;
-    if (s->sky) return imp__sky_radiance_from(scene, s->light, -s->p, NULL);
+    if (s->sky) return imp__sky_radiance_from(scene, s->light, -s->p, imp__edge_waves(d));
     imp__inputs_eval(e->input, e->n_in, &there, in);
     e->ops->eval(e, in, &x, &le);
     return le;

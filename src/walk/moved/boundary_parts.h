@@ -11,6 +11,7 @@ struct imp__edge_draw {
     const struct imp__boundary *b;
     struct imp_arena *arena;
     struct imp_key key;
+    const struct imp_waves *waves; /* of all its walks; NULL: colours */
     const struct imp__edge_choice *choice;
     const double *part;                /* of spheres and edges (boundary.h) */
     double u;                          /* by which the point is chosen */
@@ -40,12 +41,18 @@ enum {
 };
 enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
 #define IMP_EDGE_LOBE (1u << 20) /* behind all of those: by which a lobe is chosen */
+#define IMP_EDGE_WAVE (1u << 21) /* and from which wavelengths are drawn */
 
 /* So far beside an edge, per distance to it, it is looked past; rays are traced in float, whose
  * rounding is a tenth of that. */
 #define IMP_BESIDE 1e-5
 /* Surfaces nearer behind an edge, per size of the scene, are what it stands on. */
 #define IMP_CONTACT 2e-5
+
+static inline const struct imp_carried *imp__edge_waves(const struct imp__edge_draw *d)
+{
+    return d->waves ? &d->waves->carried : NULL;
+}
 
 /* Chooses an item, or the edges. False: there is none. */
 bool imp__edge_item_choose(struct imp__edge_draw *d);

@@ -32,7 +32,8 @@ void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_
     struct imp_sensor_ray ray = {.t_near = 0, .t_far = INFINITY};
     ray.o = imp__offset(at->p, at->ng, to - at->p);
     ray.d = imp__normalize(to - ray.o);
-    imp__walk_along(d->b->tracer, d->arena, imp__key_branch(d->key, 0, 1), &ray, 1, walk);
+    imp__walk_along(d->b->tracer, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves,
+                    1, walk);
 }
 
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
@@ -51,7 +52,7 @@ imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
         jump[k] = (imp__arrives(tracer, lo, k + 1, skies) -
                    imp__arrives(tracer, hi, k + 1, skies)) *
                   times;
-        any |= !imp__is_zero(jump[k]);
+        any |= !imp__is_zero_used(jump[k], d->waves);
     }
     return any ? jump : NULL;
 }

@@ -268,7 +268,7 @@ void imp__draw_shading_film(struct imp__edge_draw *d)
         return;
     const imp_spec jump =
         imp__look_through(d, lit.px, lit.py) - imp__look_through(d, dark.px, dark.py);
-    if (imp__is_zero(jump)) return;
+    if (imp__is_zero_used(jump, d->waves)) return;
     struct imp__flux *f = imp__flux_add(d, 3);
     if (!f) return;
     f->px = to.px;

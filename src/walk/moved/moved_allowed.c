@@ -78,7 +78,6 @@ static enum imp_status walks_allowed(const struct imp_tracer *t)
     const struct imp_scene *scene = t->scene;
     const struct imp_walk_integrator *i = t->integrator;
     const char *why = scene->n_media + scene->n_bodies > 0 ? "there are media"
-                      : scene->wavelengths                 ? "walks carry wavelengths"
                       : i->from_lights                     ? "walks begin at the lights"
                       : i->ends_by != IMP_ENDS_BY_ROULETTE ? "walks end by absorption"
                       : i->hide_emitters                   ? "emitters are hidden"

@@ -3,7 +3,6 @@
  * Radiance of skies by direction (moved_sky.h). */
 #include "moved_sky.h"
 #include "math/rng.h"
-#include "walk/core/emitted.h"
 
 imp_spec imp__sky_radiance_from(const struct imp_scene *scene, int emitter, imp_v3 w,
                                 const struct imp_carried *carried)
@@ -67,10 +66,10 @@ bool imp__sky_has_draws(const struct imp_scene *scene, int emitter)
     return !(scene->emitters[emitter]->ops->flags & IMP_EMITTER_UNIFORM);
 }
 
-double imp__sky_whole(const struct imp_scene *scene, int emitter,
-                      const struct imp_carried *carried)
+double imp__sky_whole(const struct imp_tracer *tracer, int emitter)
 {
     enum { DRAWS = 256 };
+    const struct imp_scene *scene = tracer->scene;
     const struct imp_emitter *e = scene->emitters[emitter];
     const imp_v3 from = (scene->lo + scene->hi) * 0.5;
     imp_spec sum = {0};
@@ -78,8 +77,13 @@ double imp__sky_whole(const struct imp_scene *scene, int emitter,
         const struct imp_key key = imp__key(11, 4, k);
         const double u[2] = {(k + imp__u01(key, 0)) / DRAWS, imp__u01(key, 1)};
         struct imp_light_sample to;
+        struct imp_waves waves;
         if (!e->ops->sample(e, &from, u, &to) || !(to.pdf > 0)) continue;
-        sum += imp__sky_radiance_from(scene, emitter, to.wi, carried) * (1 / to.pdf);
+        if (tracer->wavelengths)
+            imp__waves_make(tracer->wavelengths, imp__u01(key, 2), &waves);
+        sum += imp__sky_radiance_from(scene, emitter, to.wi,
+                                      tracer->wavelengths ? &waves.carried : NULL) *
+               (1 / to.pdf);
     }
     return imp__max_used(sum, scene->lanes == 4) / DRAWS;
 }

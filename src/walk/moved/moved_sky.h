@@ -10,9 +10,7 @@
 #ifndef IMP_WALK_MOVED_SKY_H
 #define IMP_WALK_MOVED_SKY_H
 
-#include "scene/scene.h"
-
-struct imp_carried;
+#include "walk/core/walk.h"
 
 /* Radiance of a sky, environment `emitter`, that arrives from the unit direction w, by lanes. */
 imp_spec imp__sky_radiance_from(const struct imp_scene *scene, int emitter, imp_v3 w,
@@ -27,7 +25,6 @@ imp_v3 imp__skies_slope(const struct imp_scene *scene, imp_v3 w, imp_spec bar,
 bool imp__sky_has_draws(const struct imp_scene *scene, int emitter);
 /* Integral of a sky's radiance over all directions, by its own draws, roughly: of the lane that has
  * most. */
-double imp__sky_whole(const struct imp_scene *scene, int emitter,
-                      const struct imp_carried *carried);
+double imp__sky_whole(const struct imp_tracer *tracer, int emitter);
 
 #endif

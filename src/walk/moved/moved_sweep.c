@@ -52,10 +52,11 @@ static int read_walk(struct sweep *s, imp_spec adjoint)
 /* Derivative of the logarithm of what a light at a point sends along d, by d across itself: by
  * differences, whose kinks at the borders of a spot's beam are so wide. */
 #define TURN 1e-6
-static imp_v3 sent_slope(const struct imp_emitter *e, imp_v3 d, int lanes)
+static imp_v3 sent_slope(const struct imp_emitter *e, imp_v3 d, int lanes,
+                         const struct imp_carried *carried)
 {
     const struct imp_frame f = imp__frame_from_normal(d);
-    const struct imp_texcoord nowhere = {.shape = NULL};
+    const struct imp_texcoord nowhere = {.carried = carried};
     const imp_v3 across[2] = {f.s, f.t};
     imp_spec in[IMP_INPUTS_MAX];
     imp_v3 slope = {0};
@@ -140,7 +141,7 @@ static void delta_bar(struct sweep *s, int k, const struct imp_vertex *v)
     const imp_v3 r = s->at[k].x.p - at;
     const double distance = imp__length(r);
     const imp_v3 d = r * (1 / distance);
-    const imp_v3 slope = sent_slope(e, d, s->tracer->scene->lanes) * weight;
+    const imp_v3 slope = sent_slope(e, d, s->tracer->scene->lanes, v->carried) * weight;
     const imp_v3 turn = slope * (1 / distance);
     /* The light turned by a vector sends along d what it sent along d turned back. */
     imp__light_axis_bar(s->moves, light, imp__cross(slope, d), s->theta_bar);
