@@ -62,17 +62,15 @@ static enum imp_status sides_make(struct building *x)
     size_t n = 0;
     for (int k = 0; k < x->scene->n_shapes; k++) {
         const struct imp_shape *s = x->scene->shapes[k];
-        struct imp_round round;
-        if (imp__moves_sphere(x->scene, k, &round) || imp__moves_disk(x->scene, k))
-            continue;
+        if (imp__moves_curved(x->scene, k)) continue;
         if (s->geometry != IMP_TRIANGLES ||
             (s->smooth && !imp__moves_smooth(x->scene, k)))
             return imp__error(x->ctx, IMP_E_UNSUPPORTED,
-                              "derivatives by what moves are of triangles, spheres and "
-                              "disks, and shape '%s' (%s) %s",
+                              "derivatives by what moves are of triangles, spheres, "
+                              "disks and circular cylinders, and shape '%s' (%s) %s",
                               s->name, s->ops->name,
                               s->smooth ? "has normals of its own over its triangles"
-                                        : "has none");
+                                        : "is none");
         n += 3 * s->triangles.n_triangles;
     }
     x->side = imp__alloc(x->ctx, n + 1, sizeof *x->side);

@@ -68,20 +68,31 @@ static void circles_find(struct imp__boundary *b)
     }
 }
 
+static struct imp__edge_item round_item(const struct imp_scene *scene, int shape)
+{
+    struct imp__edge_item item = {.kind = IMP_ITEM_ROUND, .shape = shape};
+    const bool disk = imp__moves_disk(scene, shape);
+    for (int k = 0; k < imp__rims(scene, shape); k++) {
+        int rim;
+        const int other = imp__rim_beside(scene, shape, k, &rim);
+        if (other < 0) continue;
+        if (disk) item.wall = imp__rim(scene, other, rim, 0).out;
+        else item.closed[k] = true;
+    }
+    return item;
+}
+
 /* What has edges that are in no list: two of a shape at most. */
 static enum imp_status items_find(struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
-    struct imp_round round;
     const size_t most =
         2 * (size_t)scene->n_shapes + IMP_SKY_CIRCLES * (size_t)scene->n_environments;
     b->item = imp__alloc(scene->ctx, most + 1, sizeof *b->item);
     if (!b->item) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
     circles_find(b);
     for (int k = 0; k < scene->n_shapes; k++) {
-        if (imp__moves_sphere(scene, k, &round) || imp__moves_disk(scene, k))
-            b->item[b->n_items++] =
-                (struct imp__edge_item){.kind = IMP_ITEM_ROUND, .shape = k};
+        if (imp__moves_curved(scene, k)) b->item[b->n_items++] = round_item(scene, k);
         if (!imp__moves_smooth(scene, k)) continue;
         for (int i = 0; i < 2; i++) {
             struct imp__edge_item *item = &b->item[b->n_items++];
@@ -93,8 +104,9 @@ static enum imp_status items_find(struct imp__boundary *b)
     return IMP_OK;
 }
 
-/* The circumference of a circle that is as large, about: of spheres and disks; half of it of what
- * meshes with vertex normals have, which between lights and vertices is nothing. */
+/* The circumference of a circle that is as large, about: of spheres and disks; of cylinders the length
+ * of all edges; half of it of what meshes with vertex normals have, which between lights and vertices is
+ * nothing. */
 static double item_length(const struct imp__boundary *b,
                           const struct imp__edge_item *item, int kind)
 {
@@ -104,8 +116,11 @@ static double item_length(const struct imp__boundary *b,
                    : 0;
     const struct imp_shape *s = b->tracer->scene->shapes[item->shape];
     struct imp_round round;
+    struct imp__tube tube;
     if (imp__moves_sphere(b->tracer->scene, item->shape, &round))
         return IMP_2PI * round.radius;
+    if (imp__moves_cylinder(b->tracer->scene, item->shape, &tube))
+        return 2 * IMP_2PI * tube.radius + 2 * tube.length;
     if (item->kind == IMP_ITEM_ROUND) return IMP_2PI * sqrt(s->area * IMP_INV_PI);
     if (kind == IMP_BOUNDARY_LIGHT) return 0;
     if (kind == IMP_BOUNDARY_FILM && item->n_seen == 0) return 0;

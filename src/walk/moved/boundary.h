@@ -20,8 +20,10 @@
  *
  * A sphere has a silhouette from everywhere: the circle on which a line touches it is an edge to the
  * film and to lights, with m its outward normal; of all lines that touch it, by place p, dA, and
- * turn about the normal, psi, dl dw sin(phi) is  dA dpsi/r. The rim of a disk is an edge with one
- * face, by its length.
+ * turn about the normal, psi, dl dw sin(phi) is  dA dpsi/r. Silhouettes of a cylinder are two straight
+ * lines; of lines that touch it at the angle psi to its axis it is  sin^2(psi) dA dpsi/r. The rims of
+ * disks and cylinders are edges with one face, by their length; the rim on which a disk closes a
+ * cylinder is one edge with two.
  *
  * A mesh with vertex normals n_s, beside its geometric normal n, has two more places where light
  * jumps. Kernels are those of n_s, and vanish where it turns away from where the light goes:
@@ -53,7 +55,7 @@ enum imp__boundary_kind { IMP_BOUNDARY_FILM, IMP_BOUNDARY_LIGHT, IMP_BOUNDARY_SC
 
 /* What has edges that are in no list. */
 enum imp__edge_item_kind {
-    IMP_ITEM_ROUND,   /* a sphere's silhouettes, a disk's rim */
+    IMP_ITEM_ROUND, /* silhouettes of spheres and cylinders, rims of disks and cylinders */
     IMP_ITEM_SHADING, /* of a mesh with vertex normals */
     IMP_ITEM_HORIZON,
     IMP_ITEM_SKY /* where the camera sees a sky jump; it has no shape */
@@ -62,6 +64,10 @@ struct imp__edge_item {
     enum imp__edge_item_kind kind;
     int shape;
     struct imp_sky_circle circle; /* IMP_ITEM_SKY */
+    /* IMP_ITEM_ROUND: rims of a cylinder that a disk closes, whose edge they are; of such a disk the
+     * direction out of the cylinder, at its end; 0: it closes none. */
+    bool closed[2];
+    imp_v3 wall;
     double
         *until; /* of meshes: [n_triangles + 1] area of the triangles before this one */
     /* IMP_ITEM_SHADING: triangles in which the shading normal may turn away from the camera, and

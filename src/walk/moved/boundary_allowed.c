@@ -43,6 +43,14 @@ static enum imp_status edges_allowed(const struct imp__boundary *b)
             scene->shapes[b->edges->face[torn->first].shape]->name, torn->a[0],
             torn->a[1], torn->a[2]);
     int other = -1;
+    const int rim = imp__rims_torn(scene, b->moves, &other);
+    if (rim >= 0)
+        return imp__error(
+            scene->ctx, IMP_E_UNSUPPORTED,
+            "derivatives by what moves: a rim of shape '%s' lies on one of "
+            "shape '%s', and they are not the wall and the lid of a can that "
+            "stands still",
+            scene->shapes[rim]->name, scene->shapes[other]->name);
     const int pierced = imp__edges_pierced(b->edges, scene, &other);
     if (pierced >= 0)
         return imp__error(

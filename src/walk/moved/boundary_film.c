@@ -83,6 +83,7 @@ void imp__draw_film(struct imp__edge_draw *d)
         !imp__light_on_film(sensor, &to))
         return;
     const imp_v3 r = imp__edge_clear(d) - to.p;
+    if (imp__edge_merges(d, r, IMP_BESIDE * imp__length(r))) return;
     if (imp__occluded_at(b->tracer->scene, 0, &to.p, &r, 0, 1 - IMP_BESIDE)) return;
     imp__film_jump(d, &to);
 }

@@ -80,6 +80,15 @@ static imp_spec sent(const struct imp__edge_draw *d, const struct source *s,
     return le;
 }
 
+/* As imp__edge_side, of a curved shape. */
+static int round_side(const struct imp__edge_draw *d, imp_v3 m)
+{
+    const int side = imp__dot(m, d->out) > 0 ? 1 : -1;
+    const imp_v3 wall = d->item->wall; /* of a can with a lid */
+    if (!d->rim || imp__is_zero(wall)) return side;
+    return (imp__dot(m, wall) > 0 ? 1 : -1) == side ? side : 0;
+}
+
 void imp__draw_light(struct imp__edge_draw *d)
 {
     const struct imp__boundary *b = d->b;
@@ -96,15 +105,15 @@ void imp__draw_light(struct imp__edge_draw *d)
     const double cosine = e->shape ? imp__dot(s.y.n, r) / t_y : 1;
     if (!(sine > 0) || !(cosine > IMP_GRAZING)) return;
     imp_v3 m = turned * (1 / (sine * t_y));
-    const int side = d->edge                   ? imp__edge_side(b->edges, d->edge, m)
-                     : imp__dot(m, d->out) > 0 ? 1
-                                               : -1;
+    const int side = d->edge ? imp__edge_side(b->edges, d->edge, m) : round_side(d, m);
     if (side == 0) return;
     m *= (double)side;
 
     /* One ray past the edge; parts of its length to there. */
     const imp_v3 o = e->shape ? imp__offset(from, s.y.ng, r) : from;
-    const imp_v3 to = d->p + m * (IMP_BESIDE * (t_y + imp__length(d->p))) - o;
+    const double beside = IMP_BESIDE * (t_y + imp__length(d->p));
+    const imp_v3 to = d->p + m * beside - o;
+    if (imp__edge_merges(d, to, beside)) return;
     struct imp_hit hit;
     struct imp_surface at;
     if (!imp__intersect(scene, &o, &to, 0, INFINITY, &hit)) return;

@@ -18,11 +18,12 @@ struct imp__edge_draw {
     const struct imp__edge_item *item; /* NULL: an edge */
     double chance;                     /* of the item, or of all edges */
     const struct imp__edge
-        *edge;       /* NULL: a sphere touched by a line, or the rim of a disk */
-    bool touches;    /* a line that touches a sphere */
+        *edge;    /* NULL: a sphere or cylinder touched by a line, or a rim */
+    bool touches; /* a line that touches a sphere or cylinder */
+    bool rim;
     imp_v3 p, along; /* the point, and the unit direction of the edge */
     imp_v3
-        out; /* of a sphere: its outward normal; of a disk: in its plane, away from it */
+        out; /* of a line that touches: the outward normal; of a rim: in its surface, away from it */
     double inv_pdf; /* of the point, per length; of a line that touches a sphere */
     int cell;       /* of the choice; behind all cells, of which sphere */
     struct imp__flux *first, **end;
@@ -65,6 +66,10 @@ bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w);
  * its own sphere. */
 struct imp__glued imp__edge_carried(const struct imp__edge_draw *d);
 imp_v3 imp__edge_clear(const struct imp__edge_draw *d);
+/* Where the picture of a cylinder's opening, into which a look along w goes, nears the outline, the wall
+ * is thinner than the look is apart from the rim, `beside` it: it sees what is beside the outline, which
+ * has draws of its own. */
+bool imp__edge_merges(const struct imp__edge_draw *d, imp_v3 w, double beside);
 /* A flux more, with room for n ends. NULL: no memory. */
 struct imp__flux *imp__flux_add(struct imp__edge_draw *d, int n);
 static inline struct imp__flux_end imp__flux_glued(const struct imp__glued *x, imp_v3 bar)

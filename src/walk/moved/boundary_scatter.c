@@ -75,7 +75,9 @@ void imp__draw_scatter(struct imp__edge_draw *d)
     const double sine = imp__length(turned);
     if (!(sine > 0)) return;
     const imp_v3 m = turned * (1 / sine);
-    const imp_v3 beside = m * (IMP_BESIDE * (hit.t + imp__length(d->p)));
+    const double apart = IMP_BESIDE * (hit.t + imp__length(d->p));
+    const imp_v3 beside = m * apart;
+    if (imp__edge_merges(d, -w, apart)) return;
     struct imp_walk lo, hi;
     imp__look_from(d, &at, d->p - beside, &lo);
     imp__look_from(d, &at, d->p + beside, &hi);

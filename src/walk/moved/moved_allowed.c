@@ -25,13 +25,6 @@ static bool is_textured(const struct imp_input *const *input, int n)
     return false;
 }
 
-static bool is_simple(const struct imp_tracer *t, const struct imp_shape *s)
-{
-    struct imp_round round;
-    return imp__moves_sphere(t->scene, s->index, &round) ||
-           imp__moves_disk(t->scene, s->index);
-}
-
 static enum imp_status materials_allowed(const struct imp_tracer *t)
 {
     for (int k = 0; k < t->scene->n_shapes; k++) {
@@ -59,10 +52,11 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
                               : "is none of area, point, spot, directional and skies");
         if (!sky && (e->shaped || is_textured(e->input, e->n_in)))
             return refuse(t, "light", e->name, e->ops->name, "has a texture");
-        if (e->shape && e->shape->geometry != IMP_TRIANGLES && !is_simple(t, e->shape))
+        if (e->shape && e->shape->geometry != IMP_TRIANGLES &&
+            !imp__moves_curved(t->scene, e->shape->index))
             return refuse(t, "light", e->name, e->ops->name,
-                          "is on a shape that is not made of triangles, and no sphere or "
-                          "disk");
+                          "is on a shape that is not made of triangles, and no sphere, "
+                          "disk or circular cylinder");
         if (e->shape && e->shape->smooth)
             return refuse(t, "light", e->name, e->ops->name,
                           "is on a mesh with vertex normals, whose light ends where "
