@@ -61,7 +61,7 @@ struct imp__moves {
     bool seams_join;
 };
 
-/* A point that is glued to its triangle, or to a sphere or disk, world. */
+/* A point that is glued to its triangle, or to a sphere, disk or cylinder, world. */
 struct imp__glued {
     int shape, prim;
     double b[3]; /* weights of the vertices, as the shape's indices have them */
