@@ -53,14 +53,16 @@ static bool disk_meets(const struct imp_scene *scene, int shape,
     return least < round->radius * (1 - TOUCH) && most > round->radius * (1 + TOUCH);
 }
 
-/* A shape that a segment from a to b of shape k passes through; -1: none. */
-static int segment_pierces(const struct imp_scene *scene, int k, imp_v3 a, imp_v3 b)
+/* A shape that a segment from a to b of shape k passes through, from its ends inwards by `end` parts of
+ * it; not `but`. -1: none. */
+static int segment_pierces(const struct imp_scene *scene, int k, int but, imp_v3 a,
+                           imp_v3 b, double end)
 {
     const imp_v3 d = b - a;
     struct imp_hit hit;
-    for (double from = END; imp__intersect(scene, &a, &d, from, 1 - END, &hit);
+    for (double from = end; imp__intersect(scene, &a, &d, from, 1 - end, &hit);
          from = hit.t + END)
-        if (hit.shape != k) return hit.shape;
+        if (hit.shape != k && hit.shape != but) return hit.shape;
     return -1;
 }
 
@@ -69,15 +71,17 @@ static int rims_pierced(const struct imp_scene *scene, int *other)
 {
     for (int k = 0; k < scene->n_shapes; k++) {
         const int rims = imp__rims(scene, k);
+        int beside = -1, unused;
         *other = k;
         for (int j = 0; j < rims * CHORDS; j++) {
             const int rim = j / CHORDS;
             const double v = (double)(j % CHORDS) / CHORDS;
-            const imp_v3 a = imp__rim(scene, k, rim, v).p;
-            int met =
-                segment_pierces(scene, k, a, imp__rim(scene, k, rim, v + 1. / CHORDS).p);
+            const imp_v3 a = imp__rim(scene, k, rim, v).p,
+                         b = imp__rim(scene, k, rim, v + 1. / CHORDS).p;
+            if (j % CHORDS == 0) beside = imp__rim_beside(scene, k, rim, &unused);
+            int met = segment_pierces(scene, k, beside, a, b, 0);
             if (met < 0 && rims == 2 && rim == 0)
-                met = segment_pierces(scene, k, a, imp__rim(scene, k, 1, v).p);
+                met = segment_pierces(scene, k, -1, a, imp__rim(scene, k, 1, v).p, END);
             if (met >= 0) return met;
         }
     }

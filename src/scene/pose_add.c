@@ -48,7 +48,8 @@ static enum imp_status refuse(const struct imp_scene *scene, const char *name,
  * below. */
 static const char *shape_why(const struct imp_scene *scene, const struct imp_shape *s)
 {
-    if (!s->ops->move) return "it is not made of triangles, and no sphere, disk or cylinder";
+    if (!s->ops->move)
+        return "it is not made of triangles, and no sphere, disk or cylinder";
     if (scene->world) return "the scene has instances";
     if (scene->n_media + scene->n_bodies > 0 || scene->priorities)
         return "there are media";
