@@ -78,8 +78,9 @@ static struct tap_stat difference_of(imp_scene *scene, const struct number *x, i
 
 /* Parameters are added, and some of their numbers compared; the standard error is at most
  * `largest` of the largest number of the same parameter. Ends the scene. */
-static void numbers_compare(const char *what, imp_scene *scene, int spp, int spp_ref,
-                            double largest, const struct number *numbers)
+static inline void numbers_compare(const char *what, imp_scene *scene, int spp,
+                                   int spp_ref, double largest,
+                                   const struct number *numbers)
 {
     enum { SEEDS = 12 };
     imp_problem *p;

@@ -16,6 +16,7 @@ struct imp__glued imp__edge_glued(const struct imp__edges *edges,
                                   const struct imp__edge *e, imp_v3 p)
 {
     const struct imp__edge_face *f = &edges->face[e->first];
+    if (f->place > 0) return imp__glued_still(f->shape, p, f->n);
     return imp__glued_near(scene, f->shape, f->prim, p, f->n);
 }
 
@@ -63,7 +64,7 @@ static bool is_welded(const struct imp_scene *scene, int shape, int prim, int ot
 static bool move_apart(const struct imp__moves *moves, const struct imp__edge_face *f,
                        const struct imp__edge_face *g)
 {
-    if (f->shape == g->shape)
+    if (f->shape == g->shape && f->place == g->place)
         return vertices_move(moves, f->shape) &&
                !is_welded(moves->scene, f->shape, f->prim, g->prim, moves->seams_join);
     return imp__moves_shape(moves, f->shape, NULL) ||
@@ -98,7 +99,8 @@ int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *s
         while (imp__intersect(scene, &e->a, &d, from, 1 - END, &hit)) {
             bool own = false;
             for (int j = 0; j < e->n_faces; j++)
-                own |= edges->face[e->first + (size_t)j].shape == hit.shape;
+                own |= edges->face[e->first + (size_t)j].shape == hit.shape &&
+                       edges->face[e->first + (size_t)j].place == hit.place;
             if (!own) {
                 *other = edges->face[e->first].shape;
                 return hit.shape;

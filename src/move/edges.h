@@ -11,6 +11,7 @@
 
 struct imp__edge_face {
     int shape, prim;
+    int64_t place; /* the instance that the shape is in (imp_hit.place); 0: none */
     imp_v3 in,
         n; /* unit: in the face, across the edge, away from it; normal of the face */
 };
@@ -28,8 +29,9 @@ struct imp__edges {
     struct imp__edge_face *face; /* [n_faces] */
 };
 
-/* All edges of the scene's shapes of triangles, flat or with vertex normals. IMP_E_UNSUPPORTED,
- * with its name: another shape that is no sphere, disk or circular cylinder; instances. */
+/* All edges of the scene's shapes of triangles, flat or with vertex normals, and of flat ones in
+ * instances that stand still. IMP_E_UNSUPPORTED, with its name: another shape that is no sphere, disk or
+ * circular cylinder, or that is in an instance; an instance that moves. */
 enum imp_status imp__edges_build(const struct imp_scene *scene, struct imp__edges *out);
 void imp__edges_free(struct imp__edges *edges);
 

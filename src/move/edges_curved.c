@@ -69,7 +69,7 @@ static int segment_pierces(const struct imp_scene *scene, int k, int but, imp_v3
 /* A shape that a rim passes through, or a straight line in a cylinder. */
 static int rims_pierced(const struct imp_scene *scene, int *other)
 {
-    for (int k = 0; k < scene->n_shapes; k++) {
+    for (int k = 0; k < imp__shapes_outside(scene); k++) {
         const int rims = imp__rims(scene, k);
         int beside = -1, unused;
         *other = k;
@@ -126,10 +126,10 @@ static bool meets_sphere(const struct imp_scene *scene, int shape,
 
 static int spheres_pierced(const struct imp_scene *scene, int *other)
 {
-    for (int k = 0; k < scene->n_shapes; k++) {
+    for (int k = 0; k < imp__shapes_outside(scene); k++) {
         struct imp_round round;
         if (!imp__moves_sphere(scene, k, &round)) continue;
-        for (int j = 0; j < scene->n_shapes; j++)
+        for (int j = 0; j < imp__shapes_outside(scene); j++)
             if (j != k && meets_sphere(scene, j, &round)) {
                 *other = j;
                 return k;
@@ -148,7 +148,7 @@ int imp__curved_pierced(const struct imp_scene *scene, int *other)
 
 int imp__rim_beside(const struct imp_scene *scene, int shape, int k, int *rim)
 {
-    for (int other = 0; other < scene->n_shapes; other++)
+    for (int other = 0; other < imp__shapes_outside(scene); other++)
         for (*rim = 0; *rim < imp__rims(scene, other); ++*rim)
             if ((other != shape || *rim != k) &&
                 imp__rims_meet(scene, shape, k, other, *rim))
@@ -159,7 +159,7 @@ int imp__rim_beside(const struct imp_scene *scene, int shape, int k, int *rim)
 int imp__rims_torn(const struct imp_scene *scene, const struct imp__moves *moves,
                    int *other)
 {
-    for (int shape = 0; shape < scene->n_shapes; shape++)
+    for (int shape = 0; shape < imp__shapes_outside(scene); shape++)
         for (int k = 0; k < imp__rims(scene, shape); k++) {
             int rim;
             *other = imp__rim_beside(scene, shape, k, &rim);

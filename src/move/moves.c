@@ -217,6 +217,21 @@ struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int 
     return glued(scene, shape, prim, b[1], b[2], n);
 }
 
+/* No mover has a shape of a group. */
+struct imp__glued imp__glued_still(int shape, imp_v3 p, imp_v3 n)
+{
+    return (struct imp__glued){.shape = shape, .b = {1, 0, 0}, .p = p, .n = n};
+}
+
+struct imp__glued imp__glued_placed(const struct imp_scene *scene, int shape,
+                                    const struct imp_located *x, int64_t place, imp_v3 n)
+{
+    struct imp_surface at;
+    if (place == 0) return imp__glued_at(scene, shape, x, n);
+    imp__located_surface(scene, shape, x, place, 0, &at);
+    return imp__glued_still(shape, at.p, imp__dot(at.ng, n) < 0 ? -at.ng : at.ng);
+}
+
 /* ---- Velocities -------------------------------------------------------------------- */
 
 /* s = in_edges[0] e1 + in_edges[1] e2. False: there is no s, or no triangle. */

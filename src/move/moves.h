@@ -24,6 +24,7 @@
 #ifndef IMP_MOVE_MOVES_H
 #define IMP_MOVE_MOVES_H
 
+#include "scene/instances.h"
 #include "scene/located.h"
 #include "scene/pose.h"
 
@@ -127,6 +128,11 @@ struct imp__glued imp__glued_at(const struct imp_scene *scene, int shape,
                                 const struct imp_located *x, imp_v3 n);
 struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int prim,
                                   imp_v3 p, imp_v3 n);
+
+/* A point of a shape in an instance (place > 0), which stands still. */
+struct imp__glued imp__glued_still(int shape, imp_v3 p, imp_v3 n);
+struct imp__glued imp__glued_placed(const struct imp_scene *scene, int shape,
+                                    const struct imp_located *x, int64_t place, imp_v3 n);
 
 /* Velocity along theta_dot [moves->n]; the transpose adds to theta_bar [moves->n]. */
 struct imp__velocity imp__velocity_of(const struct imp__moves *moves,

@@ -3,6 +3,7 @@
  * Numbers of geometry become parameters (pose.h), or are refused by name. */
 #include "access.h"
 #include "base/arguments.h"
+#include "instances.h"
 #include "kind/shape/shape.h"
 #include "pose.h"
 #include "theta_near.h"
@@ -50,7 +51,7 @@ static const char *shape_why(const struct imp_scene *scene, const struct imp_sha
 {
     if (!s->ops->move)
         return "it is not made of triangles, and no sphere, disk or cylinder";
-    if (scene->world) return "the scene has instances";
+    if (s->index >= imp__shapes_outside(scene)) return "it is in a shape group";
     if (scene->n_media + scene->n_bodies > 0 || scene->priorities)
         return "there are media";
     if (scene->light_tree) return "lights are chosen by a tree (light_choice)";

@@ -134,7 +134,8 @@ static imp_v3 shaded_at(const struct moved *m, const struct imp__glued *then, im
 static struct imp__glued vertex_glued(const struct imp_scene *scene,
                                       const struct imp_vertex *v, double time)
 {
-    struct imp__glued x = imp__glued_at(scene, v->d.shape, &v->d.located, v->ng);
+    struct imp__glued x =
+        imp__glued_placed(scene, v->d.shape, &v->d.located, v->d.place, v->ng);
     struct imp_surface at;
     if (v->bsdf && !imp__is_plain(v->bsdf) &&
         imp__decided_surface(scene, &v->d, time, &at))

@@ -91,7 +91,7 @@ static enum imp_status items_find(struct imp__boundary *b)
     b->item = imp__alloc(scene->ctx, most + 1, sizeof *b->item);
     if (!b->item) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
     circles_find(b);
-    for (int k = 0; k < scene->n_shapes; k++) {
+    for (int k = 0; k < imp__shapes_outside(scene); k++) {
         if (imp__moves_curved(scene, k)) b->item[b->n_items++] = round_item(scene, k);
         if (!imp__moves_smooth(scene, k)) continue;
         for (int i = 0; i < 2; i++) {

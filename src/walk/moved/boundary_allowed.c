@@ -15,7 +15,7 @@ static enum imp_status facets_allowed(const struct imp__boundary *b)
     for (int k = 0; k < scene->n_emitters; k++) {
         const struct imp_emitter *e = scene->emitters[k];
         if (!(e->ops->flags & IMP_EMITTER_DELTA)) continue;
-        for (int j = 0; j < scene->n_shapes; j++)
+        for (int j = 0; j < imp__shapes_outside(scene); j++)
             if (imp__moves_smooth(scene, j) &&
                 (imp__moves_shape(b->moves, j, NULL) ||
                  imp__moves_shape(b->moves, IMP_MOVE_EMITTER(k), NULL)))
@@ -70,7 +70,8 @@ static int back_met(const struct imp__boundary *b, imp_v3 w)
     struct imp_surface at;
     if (!imp__intersect(scene, &b->camera, &w, 0, INFINITY, &hit)) return -1;
     imp__hit_surface(scene, &hit, &b->camera, &w, &at);
-    const struct imp_bsdf *bsdf = imp__shape_bsdf(scene, scene->shapes[hit.shape]);
+    const int met = imp__placed_shape(scene, hit.shape, hit.place);
+    const struct imp_bsdf *bsdf = imp__shape_bsdf(scene, scene->shapes[met]);
     return imp__dot(at.ng, w) > 0 && bsdf->ops != &imp__twosided ? hit.shape : -1;
 }
 

@@ -28,7 +28,8 @@ static struct link *link_make(struct imp__edge_draw *d, struct link *before,
                               imp_v3 w, bool horizon)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
-    const struct imp_shape *shape = scene->shapes[hit->shape];
+    const struct imp_shape *shape =
+        scene->shapes[imp__placed_shape(scene, hit->shape, hit->place)];
     struct link *k = imp__arena_take(d->arena, 1, sizeof *k);
     if (!k) {
         d->no_memory = true;
@@ -41,7 +42,7 @@ static struct link *link_make(struct imp__edge_draw *d, struct link *before,
                                        .carried = imp__edge_waves(d)};
     const struct imp_located located = imp__located_hit(scene, shape, hit, at);
     k->before = before;
-    k->x = imp__surface_point(scene, hit->shape, &located, at->ng);
+    k->x = imp__surface_point(scene, hit->shape, &located, hit->place, at->ng);
     k->bsdf = imp__shape_bsdf(scene, shape);
     k->at = *at;
     k->frame = (struct imp_frame){at->s, at->t, at->n};

@@ -71,10 +71,12 @@ static enum imp_status walks_allowed(const struct imp_tracer *t)
 {
     const struct imp_scene *scene = t->scene;
     const struct imp_walk_integrator *i = t->integrator;
-    const char *why = scene->n_media + scene->n_bodies > 0 ? "there are media"
-                      : i->from_lights                     ? "walks begin at the lights"
-                      : i->ends_by != IMP_ENDS_BY_ROULETTE ? "walks end by absorption"
-                      : i->hide_emitters                   ? "emitters are hidden"
+    const bool many = scene->world && scene->world->n_places >= IMP_PLACE_MOST;
+    const char *why = many ? "there are too many instances"
+                      : scene->n_media + scene->n_bodies > 0 ? "there are media"
+                      : i->from_lights                       ? "walks begin at the lights"
+                      : i->ends_by != IMP_ENDS_BY_ROULETTE   ? "walks end by absorption"
+                      : i->hide_emitters                     ? "emitters are hidden"
                       : i->mixes || i->split > 1 || t->split > 1 || t->guide
                           ? "directions have densities beside the material's"
                       : t->kept ? "walks are kept"

@@ -36,8 +36,9 @@ static int read_walk(struct sweep *s, imp_spec adjoint)
     int n = 0;
     for (const struct imp_vertex *v = s->walk->first; v; v = v->next, n++) {
         const bool sky = v->d.scatterer == IMP_AT_SKY;
-        s->at[n] = sky ? imp__sky_point(imp__decided_v3(v->d.p))
-                       : imp__surface_point(scene, v->d.shape, &v->d.located, v->ng);
+        s->at[n] =
+            sky ? imp__sky_point(imp__decided_v3(v->d.p))
+                : imp__surface_point(scene, v->d.shape, &v->d.located, v->d.place, v->ng);
         struct pieces *piece = &s->piece[n];
         *piece = (struct pieces){{0}, {0}, {0}};
         if (v->d.connection == IMP_CONNECTED) piece->light = P * v->b;
@@ -167,7 +168,7 @@ static void light_bar(struct sweep *s, int k, const struct imp_vertex *v)
         return;
     }
     struct imp__link_point y = imp__surface_point(
-        scene, e->shape->index, &v->d.light.located, imp__decided_v3(v->d.light.d));
+        scene, e->shape->index, &v->d.light.located, 0, imp__decided_v3(v->d.light.d));
     const imp_v3 w = imp__link_direction(&s->at[k], &y);
     const struct imp__kernel_bar kernel = light_kernel(s, k, v, w);
     imp__connection_bar(&s->at[k], &y, &kernel,
