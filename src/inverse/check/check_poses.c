@@ -150,7 +150,7 @@ static imp_v3 met_at(imp_v3 o, imp_v3 w, struct at *x)
     const double plane = imp__dot(x->n, x->p - o) / imp__dot(x->n, w);
     if (x->curvature == 0) return o + w * plane;
     const imp_v3 centre = x->p - x->n * (1 / x->curvature);
-    /* Of a cylinder in the plane across its axis. */
+    /* A cylinder is met in the plane across its axis. */
     const imp_v3 a = x->straight, flat = w - a * imp__dot(a, w);
     imp_v3 r = centre - o;
     r -= a * imp__dot(a, r);

@@ -160,7 +160,7 @@ static enum imp_status choices_make(struct imp__boundary *b)
     return IMP_OK;
 }
 
-/* Of a light, over pi: A Le, 4 I, or R^2 E of a scene within R; of a sky E is the integral of its
+/* Power of a light, over pi: A Le, 4 I, or R^2 E of a scene within R; of a sky E is the integral of its
  * radiance over all directions. */
 static double light_power(const struct imp__boundary *b, int k)
 {

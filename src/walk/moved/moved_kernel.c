@@ -39,7 +39,7 @@ void imp__surface_grad(const struct imp_surface *at, imp_v3 grad[2])
     grad[1] = (b * aa - a * ab) * (1 / det);
 }
 
-/* Of the luminance of a colour, also where walks carry wavelengths. */
+/* Slope of the luminance of a colour, also where walks carry wavelengths. */
 static void luminance_slope(const struct imp_input *colour, imp_spec weight,
                             const struct imp_texcoord *at, imp_spec d_uv[2])
 {
