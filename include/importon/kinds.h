@@ -753,6 +753,13 @@ struct imp_emitter_profile {
     double (*mean)(const struct imp_emitter *e, const imp_v3 *n);
 };
 
+/* A circle of directions, world: unit w with w.axis = cosine. */
+struct imp_sky_circle {
+    imp_v3 axis; /* unit */
+    double cosine;
+};
+#define IMP_SKY_CIRCLES 4 /* at most */
+
 struct imp_emitter_ops {
     size_t size;
     const char *name;
@@ -804,6 +811,10 @@ struct imp_emitter_ops {
      * reads it, or, with `set`, puts the light there (a direction of any length), turned as it was.
      * NULL: another light. */
     void (*aim)(struct imp_emitter *e, double v[3], bool set);
+    /* Of an environment: the circles of directions towards the sky across which its radiance
+     * jumps; returns how many. Elsewhere it is continuous, with a derivative by the direction almost
+     * everywhere. NULL: it may jump anywhere, and derivatives by what moves are refused. */
+    int (*jumps)(const struct imp_emitter *e, struct imp_sky_circle out[IMP_SKY_CIRCLES]);
 };
 
 /* ---- Sensor and filter --------------------------------------------------------- */
@@ -950,8 +961,8 @@ struct imp_sensor_ops {
                             second(imp_film_desc) second(imp_filter) second(imp_hit)     \
                                 second(imp_input_desc) second(imp_light_sample)          \
                                     second(imp_located) second(imp_sink)                 \
-                                        second(imp_surface) second(imp_texcoord)         \
-                                            second(imp_triangles)
+                                        second(imp_sky_circle) second(imp_surface)       \
+                                            second(imp_texcoord) second(imp_triangles)
 
 /* The version and the sizes that somebody was compiled with. These two structs never
  * change. */

@@ -8,7 +8,8 @@ static imp_v3 view_velocity(const struct imp__moves *moves, const struct imp__mo
                             imp_v3 r)
 {
     const struct imp_sensor *s = moves->sensor;
-    imp_v3 v;
+    imp_v3 v = {0};
+    if (imp__is_zero(r)) return v; /* what is there moves along no film */
     s->ops->view_velocity(s, (int)m->kind - IMP_MOVE_VIEW, &r, &v);
     return v;
 }

@@ -11,6 +11,7 @@
 
 struct imp__edge_face {
     int shape, prim;
+    int64_t place; /* the instance that the shape is in (imp_hit.place); 0: none */
     imp_v3 in,
         n; /* unit: in the face, across the edge, away from it; normal of the face */
 };
@@ -28,8 +29,9 @@ struct imp__edges {
     struct imp__edge_face *face; /* [n_faces] */
 };
 
-/* All edges of the scene's shapes of triangles, flat or with vertex normals. IMP_E_UNSUPPORTED,
- * with its name: another shape that is no sphere and no disk; instances. */
+/* All edges of the scene's shapes of triangles, flat or with vertex normals, and of flat ones in
+ * instances that stand still. IMP_E_UNSUPPORTED, with its name: another shape that is no sphere, disk or
+ * circular cylinder, or that is in an instance; an instance that moves. */
 enum imp_status imp__edges_build(const struct imp_scene *scene, struct imp__edges *out);
 void imp__edges_free(struct imp__edges *edges);
 
@@ -47,9 +49,19 @@ double imp__edge_turn(const struct imp__edges *edges, const struct imp__edge *e)
 /* An edge whose faces move apart: they belong to shapes with different velocities. NULL: none. */
 const struct imp__edge *imp__edges_torn(const struct imp__edges *edges,
                                         const struct imp__moves *moves);
-/* A shape through which an edge of another passes, or a sphere whose surface another shape passes:
- * where they meet is an edge that is in no list. -1: none; *other: the other shape. */
+/* A shape through which an edge of another passes, or a sphere or cylinder whose surface another shape
+ * passes: where they meet is an edge that is in no list. -1: none; *other: the other shape. */
 int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
                        int *other);
+
+/* ---- edges_curved.c ---- */
+/* The same of curved shapes alone. */
+int imp__curved_pierced(const struct imp_scene *scene, int *other);
+/* A shape, and its rim, that lies on rim k of another one. -1: none. */
+int imp__rim_beside(const struct imp_scene *scene, int shape, int k, int *rim);
+/* A shape whose rim lies on another's, of which one moves, or which are not the lid and the wall of a
+ * can. -1: none; *other: the other shape. */
+int imp__rims_torn(const struct imp_scene *scene, const struct imp__moves *moves,
+                   int *other);
 
 #endif

@@ -41,8 +41,8 @@ static imp_v3 vertex(const struct imp_triangles *t, uint32_t i)
     return imp__v3(p[0], p[1], p[2]);
 }
 
-static void side_add(struct building *x, int shape, int prim, imp_v3 p, imp_v3 q,
-                     imp_v3 apex)
+static void side_add(struct building *x, const struct imp__edge_face *face, imp_v3 p,
+                     imp_v3 q, imp_v3 apex)
 {
     struct side *s = &x->side[x->n];
     const bool turned = imp__dot(q - p, sense()) < 0;
@@ -52,42 +52,96 @@ static void side_add(struct building *x, int shape, int prim, imp_v3 p, imp_v3 q
     const imp_v3 in = apex - s->a, across = in - d * imp__dot(in, d);
     if (!(imp__length(s->b - s->a) > x->near) || !(imp__length(across) > 0)) return;
     s->key = imp__dot(r - d * imp__dot(r, d), mark());
-    s->face = (struct imp__edge_face){shape, prim, imp__normalize(across),
-                                      imp__normalize(imp__cross(q - p, apex - p))};
+    s->face = *face;
+    s->face.in = imp__normalize(across);
+    s->face.n = imp__normalize(imp__cross(q - p, apex - p));
     x->n++;
+}
+
+/* Its triangles, moved by the instance's map where it is in one. */
+static void shape_add(struct building *x, int shape, int64_t place,
+                      const struct imp_map *to_world)
+{
+    const struct imp_triangles *t = &x->scene->shapes[shape]->triangles;
+    if (x->scene->shapes[shape]->geometry != IMP_TRIANGLES) return;
+    for (size_t j = 0; j < t->n_triangles; j++) {
+        const struct imp__edge_face face = {
+            .shape = shape, .prim = (int)j, .place = place};
+        imp_v3 p[3];
+        for (int c = 0; c < 3; c++) {
+            p[c] = vertex(t, t->indices[3 * j + (size_t)c]);
+            if (to_world) p[c] = imp__map_point(to_world, p[c]);
+        }
+        for (int c = 0; c < 3; c++)
+            side_add(x, &face, p[c], p[(c + 1) % 3], p[(c + 2) % 3]);
+    }
+}
+
+static int64_t places(const struct imp_scene *scene)
+{
+    return scene->world ? scene->world->n_places : 0;
+}
+
+static enum imp_status refuse(const struct building *x, const struct imp_shape *s,
+                              const char *why)
+{
+    return imp__error(x->ctx, IMP_E_UNSUPPORTED,
+                      "derivatives by what moves are of triangles, spheres, disks and "
+                      "circular cylinders, and shape '%s' (%s) %s",
+                      s->name, s->ops->name, why);
+}
+
+/* How many sides there are. */
+static enum imp_status sides_count(const struct building *x, size_t *n)
+{
+    const struct imp_scene *scene = x->scene;
+    *n = 0;
+    for (int k = 0; k < imp__shapes_outside(scene); k++) {
+        const struct imp_shape *s = scene->shapes[k];
+        if (imp__moves_curved(scene, k)) continue;
+        if (s->smooth && !imp__moves_smooth(scene, k))
+            return refuse(x, s, "has normals of its own over its triangles");
+        if (s->geometry != IMP_TRIANGLES) return refuse(x, s, "is none");
+        *n += 3 * s->triangles.n_triangles;
+    }
+    for (int64_t place = 1; place <= places(scene); place++) {
+        const struct imp_group *g = imp__place_group(scene, place);
+        if (!g)
+            return imp__error(
+                x->ctx, IMP_E_UNSUPPORTED,
+                "derivatives by what moves: an instance has a motion of its "
+                "own");
+        for (int k = g->first; k < g->first + g->n_shapes; k++) {
+            const struct imp_shape *s = scene->shapes[k];
+            if (s->geometry != IMP_TRIANGLES)
+                return refuse(x, s, "is in an instance, and not made of triangles");
+            if (s->smooth)
+                return refuse(x, s,
+                              "is in an instance, and has vertex normals (face_normals "
+                              "makes it flat)");
+            *n += 3 * s->triangles.n_triangles;
+        }
+    }
+    return IMP_OK;
 }
 
 static enum imp_status sides_make(struct building *x)
 {
-    size_t n = 0;
-    for (int k = 0; k < x->scene->n_shapes; k++) {
-        const struct imp_shape *s = x->scene->shapes[k];
-        struct imp_round round;
-        if (imp__moves_sphere(x->scene, k, &round) || imp__moves_disk(x->scene, k))
-            continue;
-        if (s->geometry != IMP_TRIANGLES ||
-            (s->smooth && !imp__moves_smooth(x->scene, k)))
-            return imp__error(x->ctx, IMP_E_UNSUPPORTED,
-                              "derivatives by what moves are of triangles, spheres and "
-                              "disks, and shape '%s' (%s) %s",
-                              s->name, s->ops->name,
-                              s->smooth ? "has normals of its own over its triangles"
-                                        : "has none");
-        n += 3 * s->triangles.n_triangles;
-    }
+    const struct imp_scene *scene = x->scene;
+    size_t n;
+    const enum imp_status st = sides_count(x, &n);
+    if (st != IMP_OK) return st;
     x->side = imp__alloc(x->ctx, n + 1, sizeof *x->side);
     x->cut = imp__alloc(x->ctx, 2 * n + 1, sizeof *x->cut);
     if (!x->side || !x->cut)
         return imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
-    for (int k = 0; k < x->scene->n_shapes; k++) {
-        const struct imp_triangles *t = &x->scene->shapes[k]->triangles;
-        if (x->scene->shapes[k]->geometry != IMP_TRIANGLES) continue;
-        for (size_t j = 0; j < t->n_triangles; j++) {
-            const uint32_t *i = t->indices + 3 * j;
-            const imp_v3 p[3] = {vertex(t, i[0]), vertex(t, i[1]), vertex(t, i[2])};
-            for (int c = 0; c < 3; c++)
-                side_add(x, k, (int)j, p[c], p[(c + 1) % 3], p[(c + 2) % 3]);
-        }
+    for (int k = 0; k < imp__shapes_outside(scene); k++) shape_add(x, k, 0, NULL);
+    for (int64_t place = 1; place <= places(scene); place++) {
+        const struct imp_group *g = imp__place_group(scene, place);
+        struct imp_map to_world, to_local;
+        imp__place_map(scene, place, 0, &to_world, &to_local);
+        for (int k = g->first; k < g->first + g->n_shapes; k++)
+            shape_add(x, k, place, &to_world);
     }
     return IMP_OK;
 }
@@ -97,6 +151,7 @@ static int by_key(const void *a, const void *b)
     const struct side *x = a, *y = b;
     if (x->key != y->key) return x->key < y->key ? -1 : 1;
     if (x->face.shape != y->face.shape) return x->face.shape < y->face.shape ? -1 : 1;
+    if (x->face.place != y->face.place) return x->face.place < y->face.place ? -1 : 1;
     return x->face.prim < y->face.prim ? -1 : x->face.prim > y->face.prim;
 }
 static int by_line(const void *a, const void *b)
@@ -153,10 +208,12 @@ static bool is_welded(const struct imp_triangles *t, int prim, int other)
  * seam, or shading normals have one. */
 static bool is_inner(const struct building *x, const struct imp__edge_face *f, int n)
 {
-    if (n != 2 || f[0].shape != f[1].shape || !(imp__length(f[0].in + f[1].in) < 1e-6))
+    if (n != 2 || f[0].shape != f[1].shape || f[0].place != f[1].place ||
+        !(imp__length(f[0].in + f[1].in) < 1e-6))
         return false;
     const struct imp_shape *s = x->scene->shapes[f[0].shape];
-    const struct imp_bsdf *b = imp__shape_bsdf(x->scene, s);
+    const struct imp_bsdf *b = imp__shape_bsdf(
+        x->scene, x->scene->shapes[imp__placed_shape(x->scene, f[0].shape, f[0].place)]);
     bool varies = s->smooth;
     for (int k = 0; k < b->n_in; k++) varies |= b->input[k]->texture != NULL;
     return !varies || is_welded(&s->triangles, f[0].prim, f[1].prim);
@@ -260,9 +317,6 @@ enum imp_status imp__edges_build(const struct imp_scene *scene, struct imp__edge
     enum imp_status st = IMP_OK;
     struct building x = {.ctx = scene->ctx, .scene = scene, .out = out};
     *out = (struct imp__edges){.ctx = scene->ctx};
-    if (scene->world)
-        IMP_TRY(imp__error(x.ctx, IMP_E_UNSUPPORTED,
-                           "derivatives by what moves are of scenes without instances"));
     x.middle = (scene->lo + scene->hi) * 0.5;
     x.size = imp__length(scene->hi - scene->lo);
     x.near = NEAR * x.size;

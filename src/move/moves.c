@@ -4,8 +4,6 @@
 #include "moves.h"
 #include "base/context.h"
 
-extern const struct imp_shape_ops imp__sphere, imp__disk;
-
 struct imp__moves imp__moves_begin(const struct imp_scene *scene,
                                    const struct imp_sensor *sensor)
 {
@@ -54,15 +52,11 @@ static enum imp_status shape_mover(const struct imp__moves *moves, struct imp__m
 {
     imp_context *ctx = moves->scene->ctx;
     const struct imp_shape *s = moves->scene->shapes[m->shape];
-    struct imp_round round;
-    if (s->geometry != IMP_TRIANGLES &&
-        !imp__moves_sphere(moves->scene, m->shape, &round) &&
-        !imp__moves_disk(moves->scene, m->shape))
-        return imp__error(
-            ctx, IMP_E_UNSUPPORTED,
-            "shape '%s' (%s) is neither made of triangles nor a sphere or disk, and "
-            "has no derivative by its place",
-            s->name, s->ops->name);
+    if (s->geometry != IMP_TRIANGLES && !imp__moves_curved(moves->scene, m->shape))
+        return imp__error(ctx, IMP_E_UNSUPPORTED,
+                          "shape '%s' (%s) is neither made of triangles nor a sphere, "
+                          "disk or circular cylinder, and has no derivative by its place",
+                          s->name, s->ops->name);
     if (m->kind == IMP_MOVE_VERTICES &&
         (s->geometry != IMP_TRIANGLES || s->ops->surface != imp__mesh_surface))
         return imp__error(ctx, IMP_E_UNSUPPORTED,
@@ -160,32 +154,6 @@ void imp__pose_numbers_bar(const struct imp__moves *moves, const struct imp__mov
     imp__rotation_bar(pose->number + 3, turn, bar + 3);
 }
 
-bool imp__moves_sphere(const struct imp_scene *scene, int shape, struct imp_round *out)
-{
-    const struct imp_shape *s = scene->shapes[shape];
-    if (s->ops != &imp__sphere) return false;
-    s->ops->round(s, out);
-    return true;
-}
-
-bool imp__moves_disk(const struct imp_scene *scene, int shape)
-{
-    return scene->shapes[shape]->ops == &imp__disk;
-}
-
-struct imp__rim_point imp__disk_rim(const struct imp_scene *scene, int shape, double v)
-{
-    const struct imp_shape *s = scene->shapes[shape];
-    const double uv[2] = {1, v};
-    struct imp_surface at;
-    int prim;
-    s->ops->place(s, uv, &at, &prim);
-    const double rate = imp__length(at.dp_dv);
-    const imp_v3 along = at.dp_dv * (1 / rate), out = imp__cross(along, at.ng);
-    return (struct imp__rim_point){at.p, along, imp__dot(out, at.dp_du) < 0 ? -out : out,
-                                   at.ng, rate};
-}
-
 bool imp__moves_shape(const struct imp__moves *moves, int shape,
                       const struct imp__mover *but)
 {
@@ -227,51 +195,41 @@ static struct imp__glued glued(const struct imp_scene *scene, int shape, int pri
     return x;
 }
 
-/* On a sphere, in this direction from its centre. */
-static struct imp__glued glued_round(int shape, const struct imp_round *round,
-                                     imp_v3 outward, imp_v3 side)
-{
-    const double sign = imp__dot(outward, side) < 0 ? -1 : 1;
-    return (struct imp__glued){.shape = shape,
-                               .b = {1, 0, 0},
-                               .p = round->centre + outward * round->radius,
-                               .n = outward * sign,
-                               .curvature = sign / round->radius};
-}
-
-static struct imp__glued glued_flat(int shape, imp_v3 p, imp_v3 n, imp_v3 side)
-{
-    return (struct imp__glued){
-        .shape = shape, .b = {1, 0, 0}, .p = p, .n = imp__dot(n, side) < 0 ? -n : n};
-}
-
 struct imp__glued imp__glued_at(const struct imp_scene *scene, int shape,
                                 const struct imp_located *x, imp_v3 n)
 {
-    struct imp_round round;
-    if (scene->shapes[shape]->geometry != IMP_TRIANGLES) {
-        const double uv[2] = {x->at[0], x->at[1]};
-        struct imp_surface at;
-        int prim;
-        scene->shapes[shape]->ops->place(scene->shapes[shape], uv, &at, &prim);
-        if (imp__moves_sphere(scene, shape, &round))
-            return glued_round(shape, &round, imp__normalize(at.p - round.centre), n);
-        return glued_flat(shape, at.p, at.ng, n);
-    }
-    return glued(scene, shape, x->prim, x->at[0], x->at[1], n);
+    const struct imp_shape *s = scene->shapes[shape];
+    if (s->geometry == IMP_TRIANGLES)
+        return glued(scene, shape, x->prim, x->at[0], x->at[1], n);
+    const double uv[2] = {x->at[0], x->at[1]};
+    struct imp_surface at;
+    int prim;
+    s->ops->place(s, uv, &at, &prim);
+    return imp__glued_curved(scene, shape, at.p, n);
 }
 
 struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int prim,
                                   imp_v3 p, imp_v3 n)
 {
     double b[3];
-    struct imp_round round;
-    if (imp__moves_sphere(scene, shape, &round))
-        return glued_round(shape, &round, imp__normalize(p - round.centre), n);
-    if (imp__moves_disk(scene, shape))
-        return glued_flat(shape, p, imp__disk_rim(scene, shape, 0).n, n);
+    if (imp__moves_curved(scene, shape)) return imp__glued_curved(scene, shape, p, n);
     imp__triangle_weights(scene->shapes[shape], prim, &p, b);
     return glued(scene, shape, prim, b[1], b[2], n);
+}
+
+/* No mover has a shape of a group. */
+struct imp__glued imp__glued_still(int shape, imp_v3 p, imp_v3 n)
+{
+    return (struct imp__glued){.shape = shape, .b = {1, 0, 0}, .p = p, .n = n};
+}
+
+struct imp__glued imp__glued_placed(const struct imp_scene *scene, int shape,
+                                    const struct imp_located *x, int64_t place, imp_v3 n)
+{
+    struct imp_surface at;
+    if (place == 0) return imp__glued_at(scene, shape, x, n);
+    imp__located_surface(scene, shape, x, place, 0, &at);
+    return imp__glued_still(shape, at.p, imp__dot(at.ng, n) < 0 ? -at.ng : at.ng);
 }
 
 /* ---- Velocities -------------------------------------------------------------------- */

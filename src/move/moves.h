@@ -24,6 +24,7 @@
 #ifndef IMP_MOVE_MOVES_H
 #define IMP_MOVE_MOVES_H
 
+#include "scene/instances.h"
 #include "scene/located.h"
 #include "scene/pose.h"
 
@@ -61,7 +62,7 @@ struct imp__moves {
     bool seams_join;
 };
 
-/* A point that is glued to its triangle, or to a sphere or disk, world. */
+/* A point that is glued to its triangle, or to a sphere, disk or cylinder, world. */
 struct imp__glued {
     int shape, prim;
     double b[3]; /* weights of the vertices, as the shape's indices have them */
@@ -70,6 +71,7 @@ struct imp__glued {
     double
         curvature; /* of the surface: the normal at a place shifted by x across n turns by
                          curvature x */
+    imp_v3 straight; /* unit: along which it does not, of a cylinder; else 0 */
     /* Meshes with vertex normals: N/|N| and |N|; shifted by x in the surface it turns by
      * sum_k turn[k] (slope[k].x). */
     bool smooth;
@@ -105,7 +107,8 @@ struct imp__moves imp__moves_begin(const struct imp_scene *scene,
                                    const struct imp_sensor *sensor);
 void imp__moves_free(struct imp__moves *moves);
 /* Adds a mover behind the last; its numbers are theta[first .. first + count). IMP_E_UNSUPPORTED:
- * a shape that is neither made of triangles nor a sphere or disk, or a camera whose rays meet in no point. */
+ * a shape that is neither made of triangles nor a sphere, disk or cylinder, or a camera whose rays
+ * meet in no point. */
 enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kind,
                                int shape);
 /* The mover of a parameter, at its value now. */
@@ -115,16 +118,6 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves,
  * object as it is, the parameter is one vector of rotation; normals follow vertices. */
 void imp__pose_numbers_bar(const struct imp__moves *moves, const struct imp__mover *mover,
                            const struct imp_pose *pose, double *bar);
-/* Centre and radius of a sphere. False: another shape. */
-bool imp__moves_sphere(const struct imp_scene *scene, int shape, struct imp_round *out);
-/* Is it a disk? And a point of its rim, by v of a turn, with its unit direction, the unit direction
- * in the disk's plane away from it, the normal, and the length of dp/dv. */
-bool imp__moves_disk(const struct imp_scene *scene, int shape);
-struct imp__rim_point {
-    imp_v3 p, along, out, n;
-    double rate;
-};
-struct imp__rim_point imp__disk_rim(const struct imp_scene *scene, int shape, double v);
 /* Does it move? By a mover that is not `but` (NULL: any). */
 bool imp__moves_shape(const struct imp__moves *moves, int shape,
                       const struct imp__mover *but);
@@ -135,6 +128,11 @@ struct imp__glued imp__glued_at(const struct imp_scene *scene, int shape,
                                 const struct imp_located *x, imp_v3 n);
 struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int prim,
                                   imp_v3 p, imp_v3 n);
+
+/* A point of a shape in an instance (place > 0), which stands still. */
+struct imp__glued imp__glued_still(int shape, imp_v3 p, imp_v3 n);
+struct imp__glued imp__glued_placed(const struct imp_scene *scene, int shape,
+                                    const struct imp_located *x, int64_t place, imp_v3 n);
 
 /* Velocity along theta_dot [moves->n]; the transpose adds to theta_bar [moves->n]. */
 struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
@@ -147,6 +145,32 @@ void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *
 #define IMP_TOUCHED_MOST 18
 size_t imp__mover_touched(const struct imp__moves *moves, const struct imp__mover *mover,
                           const struct imp__glued *x, size_t index[IMP_TOUCHED_MOST]);
+/* ---- curved.c ---- */
+/* Centre and radius of a sphere. False: another shape. */
+bool imp__moves_sphere(const struct imp_scene *scene, int shape, struct imp_round *out);
+bool imp__moves_disk(const struct imp_scene *scene, int shape);
+/* A circular cylinder, open at both ends. False: another shape. */
+struct imp__tube {
+    imp_v3 base, axis; /* the middle of its first end; unit */
+    double radius, length;
+};
+bool imp__moves_cylinder(const struct imp_scene *scene, int shape, struct imp__tube *out);
+/* One of these? */
+bool imp__moves_curved(const struct imp_scene *scene, int shape);
+/* Rims: one of a disk, two of a cylinder, 0 of others. A point of rim k, by v of a turn, with its unit
+ * direction, the unit direction in the surface away from it, the normal, and the length of dp/dv. */
+int imp__rims(const struct imp_scene *scene, int shape);
+struct imp__rim_point {
+    imp_v3 p, along, out, n;
+    double rate;
+};
+struct imp__rim_point imp__rim(const struct imp_scene *scene, int shape, int k, double v);
+/* Do two rims lie on each other? */
+bool imp__rims_meet(const struct imp_scene *scene, int shape, int k, int other, int j);
+/* The point next to p, whose normal n is on this side; in a direction from the middle of a sphere. */
+struct imp__glued imp__glued_curved(const struct imp_scene *scene, int shape, imp_v3 p,
+                                    imp_v3 n);
+
 /* ---- cameras_lights.c ---- */
 /* Velocity of emitter k: of its place, or of the unit direction of parallel light. */
 imp_v3 imp__light_velocity(const struct imp__moves *moves, int k,

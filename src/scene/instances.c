@@ -48,6 +48,18 @@ void imp__placed_surface(const struct imp_scene *scene, const struct imp_hit *hi
     imp__surface_move(out, &to_world, &to_local);
 }
 
+const struct imp_group *imp__place_group(const struct imp_scene *scene, int64_t place)
+{
+    const struct imp_group *g = scene->world;
+    bool moves = false;
+    while (place > 0) {
+        const struct imp_instance *p = descend(g, &place);
+        moves |= p->motion != NULL;
+        g = p->group;
+    }
+    return moves ? NULL : g;
+}
+
 void imp__place_map(const struct imp_scene *scene, int64_t place, double time,
                     struct imp_map *to_world, struct imp_map *to_local)
 {

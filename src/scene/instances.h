@@ -77,6 +77,13 @@ imp__instance_local(const struct imp_instance *p, double time, struct imp_map ro
 }
 /* The box of an instance at all times, in the world around it. */
 void imp__instance_box(const struct imp_instance *p, imp_v3 *lo, imp_v3 *hi);
+/* The group that a place (> 0) is in; NULL: it moves, or one of the instances around it does. */
+const struct imp_group *imp__place_group(const struct imp_scene *scene, int64_t place);
+/* Shapes of the scene that are in no group: the first so many. */
+static inline int imp__shapes_outside(const struct imp_scene *scene)
+{
+    return scene->world ? scene->world->n_shapes : scene->n_shapes;
+}
 /* From the group that a place (> 0) is in to the world at a time, and back. */
 void imp__place_map(const struct imp_scene *scene, int64_t place, double time,
                     struct imp_map *to_world, struct imp_map *to_local);

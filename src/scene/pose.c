@@ -5,6 +5,7 @@
 #include "pose.h"
 #include "access.h"
 #include "base/arguments.h"
+#include "instances.h"
 #include "kind/emitter/from_point.h"
 #include "kind/emitter/ies.h"
 #include "kind/shape/shape.h"
@@ -202,16 +203,31 @@ double imp__pose_large(const struct imp_pose *p, size_t e)
     }
 }
 
+static void box_add(struct imp_scene *scene, imp_v3 lo, imp_v3 hi)
+{
+    for (int i = 0; i < 3; i++) {
+        scene->lo[i] = fmin(scene->lo[i], lo[i]);
+        scene->hi[i] = fmax(scene->hi[i], hi[i]);
+    }
+}
+
 static void bounds_update(struct imp_scene *scene)
 {
+    struct imp_group *world = scene->world;
     scene->lo = imp__v3(INFINITY, INFINITY, INFINITY);
     scene->hi = -scene->lo;
-    for (int k = 0; k < scene->n_shapes; k++)
-        for (int i = 0; i < 3; i++) {
-            scene->lo[i] = fmin(scene->lo[i], scene->shapes[k]->lo[i]);
-            scene->hi[i] = fmax(scene->hi[i], scene->shapes[k]->hi[i]);
-        }
+    for (int k = 0; k < imp__shapes_outside(scene); k++)
+        box_add(scene, scene->shapes[k]->lo, scene->shapes[k]->hi);
+    for (int k = 0; world && k < world->n_instances; k++) {
+        imp_v3 lo, hi;
+        imp__instance_box(&world->instance[k], &lo, &hi);
+        box_add(scene, lo, hi);
+    }
     scene->lo[3] = scene->hi[3] = 0;
+    if (world) {
+        world->lo = scene->lo;
+        world->hi = scene->hi;
+    }
     scene->ball = imp__ball_around(scene);
 }
 

@@ -3,6 +3,7 @@
  * Numbers of geometry become parameters (pose.h), or are refused by name. */
 #include "access.h"
 #include "base/arguments.h"
+#include "instances.h"
 #include "kind/shape/shape.h"
 #include "pose.h"
 #include "theta_near.h"
@@ -48,8 +49,9 @@ static enum imp_status refuse(const struct imp_scene *scene, const char *name,
  * below. */
 static const char *shape_why(const struct imp_scene *scene, const struct imp_shape *s)
 {
-    if (!s->ops->move) return "it is not made of triangles, and no sphere or disk";
-    if (scene->world) return "the scene has instances";
+    if (!s->ops->move)
+        return "it is not made of triangles, and no sphere, disk or cylinder";
+    if (s->index >= imp__shapes_outside(scene)) return "it is in a shape group";
     if (scene->n_media + scene->n_bodies > 0 || scene->priorities)
         return "there are media";
     if (scene->light_tree) return "lights are chosen by a tree (light_choice)";

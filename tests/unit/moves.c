@@ -313,7 +313,8 @@ static void edges_test(void)
     imp__edges_free(&e);
     imp_scene_destroy(scene);
 
-    scene = scene_of("<shape type='cylinder' id='ball'/>");
+    scene = scene_of("<shape type='cylinder' id='ball'><transform name='to_world'><scale "
+                     "x='2'/></transform></shape>");
     const enum imp_status refused = imp__edges_build(scene, &e);
     tap_ok(refused == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "'ball'"),
            "what has no edges is refused by name # %s", imp_last_error(ctx));

@@ -161,8 +161,15 @@ int main(void)
     object_test("", "lamp", imp__v3(.9, -.2, 3.2), 2);
     object_test("", "camera", imp__v3(.4, -5.5, 2.3), 0);
 
-    imp_scene *scene = room("<shape type='cylinder' id='ball'/>", "", "", "");
-    refused(scene, "ball", IMP_E_UNSUPPORTED, "triangles");
+    FILE *f = fopen("poses_thread.txt", "w");
+    if (!f) return 99;
+    fprintf(f, "0 0 2 .1\n1 0 2 .1\n");
+    fclose(f);
+    imp_scene *scene = room("<shape type='linearcurve' id='thread'><string "
+                            "name='filename' value='poses_thread.txt'/></shape>",
+                            "", "", "");
+    remove("poses_thread.txt");
+    refused(scene, "thread", IMP_E_UNSUPPORTED, "triangles");
     refused(scene, "nobody", IMP_E_ARG, "nobody");
     const size_t n = imp_scene_n_theta(scene);
     test_must(ctx, imp_scene_add_pose(scene, "block"));

@@ -10,6 +10,7 @@
 #include "scene/pose.h"
 #include "walk/core/vertex.h"
 #include "walk/moved/moved_chain.h"
+#include "walk/moved/moved_sky.h"
 #include <math.h>
 #include <string.h>
 
@@ -78,11 +79,11 @@ static imp_v3 turned(const struct moved *m, imp_v3 d)
 struct at {
     imp_v3 p, n, s;
     double curvature;
-    imp_v3 shade;
+    imp_v3 straight, shade;
 };
 static struct at placed(const struct moved *m, const struct imp__glued *x)
 {
-    struct at at = {x->p, x->n, x->s, x->curvature, imp__shading_normal(x)};
+    struct at at = {x->p, x->n, x->s, x->curvature, x->straight, imp__shading_normal(x)};
     if (x->shape != m->shape) return at;
     if (m->pose->kind == IMP_POSE_SCALE) {
         at.p = m->from + (x->p - m->from) * m->by;
@@ -91,6 +92,7 @@ static struct at placed(const struct moved *m, const struct imp__glued *x)
         at.p = m->to + turned(m, x->p - m->from);
         at.n = turned(m, x->n);
         at.s = turned(m, x->s);
+        at.straight = turned(m, x->straight);
         at.shade = turned(m, imp__shading_normal(x));
     }
     return at;
@@ -132,7 +134,8 @@ static imp_v3 shaded_at(const struct moved *m, const struct imp__glued *then, im
 static struct imp__glued vertex_glued(const struct imp_scene *scene,
                                       const struct imp_vertex *v, double time)
 {
-    struct imp__glued x = imp__glued_at(scene, v->d.shape, &v->d.located, v->ng);
+    struct imp__glued x =
+        imp__glued_placed(scene, v->d.shape, &v->d.located, v->d.place, v->ng);
     struct imp_surface at;
     if (v->bsdf && !imp__is_plain(v->bsdf) &&
         imp__decided_surface(scene, &v->d, time, &at))
@@ -147,13 +150,18 @@ static imp_v3 met_at(imp_v3 o, imp_v3 w, struct at *x)
     const double plane = imp__dot(x->n, x->p - o) / imp__dot(x->n, w);
     if (x->curvature == 0) return o + w * plane;
     const imp_v3 centre = x->p - x->n * (1 / x->curvature);
-    const double middle = imp__dot(centre - o, w);
-    const imp_v3 across = centre - o - w * middle;
+    /* A cylinder is met in the plane across its axis. */
+    const imp_v3 a = x->straight, flat = w - a * imp__dot(a, w);
+    imp_v3 r = centre - o;
+    r -= a * imp__dot(a, r);
+    const double slope = imp__length(flat), middle = imp__dot(r, flat) / slope;
+    const imp_v3 across = r - flat * (middle / slope);
     const double half =
         sqrt(fmax(imp__sqr(1 / x->curvature) - imp__dot(across, across), 0));
-    const double far = middle + half, near = middle - half;
+    const double far = (middle + half) / slope, near = (middle - half) / slope;
     const imp_v3 p = o + w * (fabs(far - plane) < fabs(near - plane) ? far : near);
-    x->n = imp__normalize((p - centre) * x->curvature);
+    const imp_v3 out = p - centre;
+    x->n = imp__normalize((out - a * imp__dot(a, out)) * x->curvature);
     return p;
 }
 
@@ -180,7 +188,9 @@ static void looked_up(const struct moved *m, const struct imp_vertex *v, imp_v3 
         const struct imp_hit hit = {.t = 0};
         v->shape->ops->surface(v->shape, &hit, &x, &(imp_v3){0}, &old);
         at.uv[0] = old.uv[0];
-        at.uv[1] = old.uv[1];
+        if (imp__is_zero(then->straight)) at.uv[1] = old.uv[1];
+        else /* the height of a cylinder is not of the point, but of the hit */
+            at.uv[1] += imp__dot(old.dp_dv, x - then->p) / imp__dot(old.dp_dv, old.dp_dv);
     } else if (imp__decided_surface(scene, &v->d, 0, &old)) {
         imp__surface_grad(&old, grad);
         for (int k = 0; k < 2; k++) at.uv[k] += imp__dot(grad[k], x - then->p);
@@ -263,7 +273,14 @@ static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spe
     const struct imp_scene *scene = m->c->problem->scene;
     const struct imp_vertex *v = walk->first;
     double value = 0;
-    if (!v || v->d.scatterer == IMP_AT_SKY) return 0;
+    if (!v) return 0;
+    if (v->d.scatterer == IMP_AT_SKY) {
+        const imp_v3 d = walk->ray.d;
+        return imp__sum_used(
+            P * imp__skies_from(scene, m->shape == IMP_MOVE_CAMERA ? turned(m, d) : d,
+                                v->carried),
+            scene->lanes);
+    }
     struct imp__glued old = vertex_glued(scene, v, walk->time);
     imp_v3 o = walk->ray.o, w[2];
     w[0] = w[1] = imp__normalize(old.p - o);

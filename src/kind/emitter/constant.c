@@ -48,4 +48,5 @@ const struct imp_emitter_ops imp__constant = {.size = sizeof(struct imp_emitter_
                                               .sample = sample,
                                               .pdf = pdf,
                                               .sample_emission = imp__sky_emission_sample,
-                                              .pdf_emission = imp__sky_emission_pdf};
+                                              .pdf_emission = imp__sky_emission_pdf,
+                                              .jumps = imp__sky_without_jumps};

@@ -41,5 +41,8 @@ enum imp_status imp__travel_read(const struct imp_build *b, imp_v3 *along);
 bool imp__sky_emission_sample(const struct imp_emitter *e, const struct imp_ball *scene,
                               const double u[4], struct imp_emission_sample *out);
 double imp__sky_emission_pdf(const struct imp_emitter *e, const struct imp_emission *x);
+/* imp_emitter_ops.jumps of an environment that is continuous: none. */
+int imp__sky_without_jumps(const struct imp_emitter *e,
+                           struct imp_sky_circle out[IMP_SKY_CIRCLES]);
 
 #endif

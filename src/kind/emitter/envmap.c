@@ -236,4 +236,5 @@ const struct imp_emitter_ops imp__envmap = {.size = sizeof(struct imp_emitter_op
                                             .place = place,
                                             .place_d = place_d,
                                             .sample_emission = imp__sky_emission_sample,
-                                            .pdf_emission = imp__sky_emission_pdf};
+                                            .pdf_emission = imp__sky_emission_pdf,
+                                            .jumps = imp__sky_without_jumps};

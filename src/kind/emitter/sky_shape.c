@@ -108,3 +108,11 @@ double imp__sky_shape_pdf(const struct imp_emitter *e, const imp_v3 *ref,
     (void)ref, (void)hit, (void)at;
     return density(e->self, *wi);
 }
+
+int imp__sky_shape_jumps(const struct imp_emitter *e,
+                         struct imp_sky_circle out[IMP_SKY_CIRCLES])
+{
+    const struct imp__sky_shape *s = e->self;
+    out[0] = (struct imp_sky_circle){s->axis[2], 0}; /* the horizon */
+    return 1;
+}

@@ -52,11 +52,13 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
     return st;
 }
 
+#define WIDER (1 + 1e-6) /* for directions that are rounded */
+
 /* 1 - cos of the angle to the axis is half the square of the chord. */
 static bool inside(const struct sun *s, imp_v3 w)
 {
     const imp_v3 chord = w - s->axis;
-    return imp__dot(chord, chord) <= 2 * s->versed * (1 + 1e-6);
+    return imp__dot(chord, chord) <= 2 * s->versed * WIDER;
 }
 
 static void eval(const struct imp_emitter *e, const imp_spec *in,
@@ -96,6 +98,13 @@ static double pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *
     return inside(s, *wi) ? IMP_INV_PI / 2 / s->versed : 0;
 }
 
+static int jumps(const struct imp_emitter *e, struct imp_sky_circle out[IMP_SKY_CIRCLES])
+{
+    const struct sun *s = e->self;
+    out[0] = (struct imp_sky_circle){s->axis, 1 - s->versed * WIDER};
+    return 1;
+}
+
 const struct imp_emitter_ops imp__sun = {.size = sizeof(struct imp_emitter_ops),
                                          .name = "sun",
                                          .object_size = sizeof(struct sun),
@@ -108,4 +117,5 @@ const struct imp_emitter_ops imp__sun = {.size = sizeof(struct imp_emitter_ops),
                                          .pdf = pdf,
                                          .changed = changed,
                                          .sample_emission = imp__sky_emission_sample,
-                                         .pdf_emission = imp__sky_emission_pdf};
+                                         .pdf_emission = imp__sky_emission_pdf,
+                                         .jumps = jumps};

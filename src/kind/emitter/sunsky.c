@@ -348,6 +348,18 @@ out:
     return st;
 }
 
+/* The horizon, and the border of the disc. */
+static int jumps(const struct imp_emitter *e, struct imp_sky_circle out[IMP_SKY_CIRCLES])
+{
+    const struct sunsky *s = e->self;
+    const imp_v3 sun =
+        s->axis[0] * s->sun[0] + s->axis[1] * s->sun[1] + s->axis[2] * s->sun[2];
+    if (s->dark) return 0;
+    out[0] = (struct imp_sky_circle){s->axis[2], 0};
+    out[1] = (struct imp_sky_circle){sun, s->cos_radius};
+    return 2;
+}
+
 const struct imp_emitter_ops imp__sunsky = {.size = sizeof(struct imp_emitter_ops),
                                             .name = "sunsky",
                                             .object_size = sizeof(struct sunsky),
@@ -360,4 +372,5 @@ const struct imp_emitter_ops imp__sunsky = {.size = sizeof(struct imp_emitter_op
                                             .pdf = pdf,
                                             .changed = changed,
                                             .sample_emission = imp__sky_emission_sample,
-                                            .pdf_emission = imp__sky_emission_pdf};
+                                            .pdf_emission = imp__sky_emission_pdf,
+                                            .jumps = jumps};

@@ -41,6 +41,18 @@ static bool oval_set(const imp_v3 axis[3], struct cylinder *c)
     return imp__is_finite(rows[0]) && imp__is_finite(rows[1]) && imp__is_finite(rows[2]);
 }
 
+/* s cos(phi) + t sin(phi) is largest along axis i at |(s_i, t_i)|. */
+static void box_set(const struct cylinder *c, struct imp_shape *s)
+{
+    const imp_v3 top = c->base + c->axes.n * c->length;
+    for (int i = 0; i < 3; i++) {
+        const double most = c->radius * hypot(c->axes.s[i], c->axes.t[i]);
+        s->lo[i] = fmin(c->base[i], top[i]) - most;
+        s->hi[i] = fmax(c->base[i], top[i]) + most;
+    }
+    s->lo[3] = s->hi[3] = 0;
+}
+
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_shape *s)
 {
     enum imp_status st = IMP_OK;
@@ -84,14 +96,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
                                 "radius: in the world its length, %g, is outside (0, %g)",
                                 reach, IMP_REACH_MAX));
     c->side = (at.mirrored != s->flip_normals) ? -1 : 1;
-    /* s cos(phi) + t sin(phi) is largest along axis i at |(s_i, t_i)|. */
-    const imp_v3 top = c->base + c->axes.n * c->length;
-    for (int i = 0; i < 3; i++) {
-        const double most = c->radius * hypot(c->axes.s[i], c->axes.t[i]);
-        s->lo[i] = fmin(c->base[i], top[i]) - most;
-        s->hi[i] = fmax(c->base[i], top[i]) + most;
-    }
-    s->lo[3] = s->hi[3] = 0;
+    box_set(c, s);
     s->geometry = IMP_ANALYTIC;
 out:
     return st;
@@ -189,6 +194,27 @@ static void round_of(const struct imp_shape *s, struct imp_round *out)
                    : (struct imp_round){k->base, k->axes.n, k->radius};
 }
 
+static void move(struct imp_shape *s, const double to_world[12])
+{
+    struct cylinder *k = s->self;
+    const imp_v3 axis[3] = {imp__rows_vector(to_world, k->axes.s),
+                            imp__rows_vector(to_world, k->axes.t),
+                            imp__rows_vector(to_world, k->axes.n)};
+    const double scale = imp__length(axis[2]) / imp__length(k->axes.n);
+    k->base = imp__rows_point(to_world, k->base);
+    s->area *= scale * scale;
+    if (k->oval) {
+        oval_set(axis, k); /* no motion flattens it */
+    } else {
+        k->axes = (struct imp_frame){axis[0] * (1 / scale), axis[1] * (1 / scale),
+                                     axis[2] * (1 / scale)};
+        k->inner = k->axes;
+        k->radius *= scale;
+        k->length *= scale;
+    }
+    box_set(k, s);
+}
+
 const struct imp_shape_ops imp__cylinder = {.size = sizeof(struct imp_shape_ops),
                                             .name = "cylinder",
                                             .object_size = sizeof(struct cylinder),
@@ -199,4 +225,5 @@ const struct imp_shape_ops imp__cylinder = {.size = sizeof(struct imp_shape_ops)
                                             .pdf_toward = pdf_toward,
                                             .round = round_of,
                                             .sample_area = sample_area,
-                                            .place = place};
+                                            .place = place,
+                                            .move = move};

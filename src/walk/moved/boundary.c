@@ -3,8 +3,10 @@
  * Draws of the boundary, and what they bring as derivatives (boundary.h). */
 #include "base/arguments.h"
 #include "boundary_parts.h"
+#include "moved_sky.h"
 #include "scene/camera_gain.h"
 #include "scene/pose.h"
+#include "walk/core/lane_mis.h"
 
 /* A tenth of each measure is the length in space. */
 #define BY_LENGTH 0.1
@@ -51,17 +53,46 @@ static enum imp_status choice_make(struct imp__boundary *b, enum imp__boundary_k
     return st;
 }
 
-/* What has edges that are in no list; all = shapes, or 2 more for meshes with vertex normals. */
+/* Circles of a camera's pictures of skies, if it moves. */
+static void circles_find(struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    if (!imp__moves_shape(b->moves, IMP_MOVE_CAMERA, NULL)) return;
+    for (int k = 0; k < scene->n_environments; k++) {
+        const struct imp_emitter *e = scene->emitters[scene->environments[k]];
+        struct imp_sky_circle circle[IMP_SKY_CIRCLES];
+        const int n = e->ops->jumps(e, circle);
+        for (int i = 0; i < n; i++)
+            b->item[b->n_items++] = (struct imp__edge_item){
+                .kind = IMP_ITEM_SKY, .shape = -1, .circle = circle[i]};
+    }
+}
+
+static struct imp__edge_item round_item(const struct imp_scene *scene, int shape)
+{
+    struct imp__edge_item item = {.kind = IMP_ITEM_ROUND, .shape = shape};
+    const bool disk = imp__moves_disk(scene, shape);
+    for (int k = 0; k < imp__rims(scene, shape); k++) {
+        int rim;
+        const int other = imp__rim_beside(scene, shape, k, &rim);
+        if (other < 0) continue;
+        if (disk) item.wall = imp__rim(scene, other, rim, 0).out;
+        else item.closed[k] = true;
+    }
+    return item;
+}
+
+/* What has edges that are in no list: two of a shape at most. */
 static enum imp_status items_find(struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
-    struct imp_round round;
-    b->item = imp__alloc(scene->ctx, 2 * (size_t)scene->n_shapes + 1, sizeof *b->item);
+    const size_t most =
+        2 * (size_t)scene->n_shapes + IMP_SKY_CIRCLES * (size_t)scene->n_environments;
+    b->item = imp__alloc(scene->ctx, most + 1, sizeof *b->item);
     if (!b->item) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
-    for (int k = 0; k < scene->n_shapes; k++) {
-        if (imp__moves_sphere(scene, k, &round) || imp__moves_disk(scene, k))
-            b->item[b->n_items++] =
-                (struct imp__edge_item){.kind = IMP_ITEM_ROUND, .shape = k};
+    circles_find(b);
+    for (int k = 0; k < imp__shapes_outside(scene); k++) {
+        if (imp__moves_curved(scene, k)) b->item[b->n_items++] = round_item(scene, k);
         if (!imp__moves_smooth(scene, k)) continue;
         for (int i = 0; i < 2; i++) {
             struct imp__edge_item *item = &b->item[b->n_items++];
@@ -73,15 +104,23 @@ static enum imp_status items_find(struct imp__boundary *b)
     return IMP_OK;
 }
 
-/* The circumference of a circle that is as large, about: of spheres and disks; half of it of what
- * meshes with vertex normals have, which between lights and vertices is nothing. */
+/* The circumference of a circle that is as large, about: of spheres and disks; of cylinders the length
+ * of all edges; half of it of what meshes with vertex normals have, which between lights and vertices is
+ * nothing. */
 static double item_length(const struct imp__boundary *b,
                           const struct imp__edge_item *item, int kind)
 {
+    if (item->kind == IMP_ITEM_SKY) /* as large as the scene */
+        return kind == IMP_BOUNDARY_FILM
+                   ? IMP_PI * b->size * sqrt(1 - imp__sqr(item->circle.cosine))
+                   : 0;
     const struct imp_shape *s = b->tracer->scene->shapes[item->shape];
     struct imp_round round;
+    struct imp__tube tube;
     if (imp__moves_sphere(b->tracer->scene, item->shape, &round))
         return IMP_2PI * round.radius;
+    if (imp__moves_cylinder(b->tracer->scene, item->shape, &tube))
+        return 2 * IMP_2PI * tube.radius + 2 * tube.length;
     if (item->kind == IMP_ITEM_ROUND) return IMP_2PI * sqrt(s->area * IMP_INV_PI);
     if (kind == IMP_BOUNDARY_LIGHT) return 0;
     if (kind == IMP_BOUNDARY_FILM && item->n_seen == 0) return 0;
@@ -121,7 +160,26 @@ static enum imp_status choices_make(struct imp__boundary *b)
     return IMP_OK;
 }
 
-/* Lights by their power: pi A Le, 4 pi I, or pi R^2 E of a scene within R. */
+/* Power of a light, over pi: A Le, 4 I, or R^2 E of a scene within R; of a sky E is the integral of its
+ * radiance over all directions. */
+static double light_power(const struct imp__boundary *b, int k)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    const struct imp_emitter *e = scene->emitters[k];
+    const struct imp_texcoord nowhere = {.shape = e->shape};
+    const double across = imp__sqr(b->size) / 4;
+    imp_spec in[IMP_INPUTS_MAX];
+    if (e->ops->flags & IMP_EMITTER_ENVIRONMENT)
+        return across * imp__sky_whole(b->tracer, k);
+    if (b->tracer->wavelengths)
+        imp__input_most(e->input[0], &nowhere.p, &nowhere.p, &in[0]);
+    else imp__inputs_eval(e->input, e->n_in, &nowhere, in);
+    const double size = e->shape                          ? e->shape->area
+                        : e->ops->flags & IMP_EMITTER_FAR ? across
+                                                          : 4;
+    return size * imp__max_used(in[0], scene->lanes == 4);
+}
+
 static enum imp_status lights_make(struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
@@ -130,15 +188,9 @@ static enum imp_status lights_make(struct imp__boundary *b)
         imp__alloc(scene->ctx, (size_t)scene->n_emitters + 1, sizeof *b->light_cdf);
     if (!b->light_cdf) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for lights");
     for (int k = 0; k < scene->n_emitters; k++) {
-        const struct imp_emitter *e = scene->emitters[k];
-        const struct imp_texcoord nowhere = {.shape = e->shape};
-        imp_spec in[IMP_INPUTS_MAX];
-        if (e->shape || (e->ops->flags & IMP_EMITTER_DELTA)) {
-            const double size = e->shape                          ? e->shape->area
-                                : e->ops->flags & IMP_EMITTER_FAR ? imp__sqr(b->size) / 4
-                                                                  : 4;
-            imp__inputs_eval(e->input, e->n_in, &nowhere, in);
-            sum += size * imp__max_used(in[0], scene->lanes == 4);
+        const bool sky = scene->emitters[k]->ops->flags & IMP_EMITTER_ENVIRONMENT;
+        if (!sky || imp__sky_has_draws(scene, k)) {
+            sum += light_power(b, k);
             b->n_lights++;
         }
         b->light_cdf[k] = sum;
@@ -192,16 +244,30 @@ struct imp__flux *imp__flux_add(struct imp__edge_draw *d, int n)
     return f;
 }
 
-void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
+/* Wavelengths of a draw, each on its own. False: no memory. */
+static bool waves_draw(struct imp__edge_draw *d)
 {
-    d->part = d->b->part[kind];
-    d->end = &d->first;
-    if (!imp__edge_item_choose(d)) return;
+    const struct imp_wavelengths *all = d->b->tracer->wavelengths;
+    if (imp_likely(!all)) return true;
+    struct imp_waves *waves = imp__arena_take(d->arena, 1, sizeof *waves);
+    if (!waves) {
+        d->no_memory = true;
+        return false;
+    }
+    imp__waves_make(all, imp__u01(d->key, IMP_EDGE_WAVE), waves);
+    waves->drew = imp__lane_drawn(d->key, all->lanes);
+    d->waves = waves;
+    return true;
+}
+
+static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
+{
     const enum imp__edge_item_kind item = d->item ? d->item->kind : IMP_ITEM_ROUND;
     switch (kind) {
     case IMP_BOUNDARY_FILM:
         if (item == IMP_ITEM_ROUND) imp__draw_film(d);
         if (item == IMP_ITEM_SHADING) imp__draw_shading_film(d);
+        if (item == IMP_ITEM_SKY) imp__draw_sky_film(d);
         break;
     case IMP_BOUNDARY_LIGHT: imp__draw_light(d); break;
     case IMP_BOUNDARY_SCATTER:
@@ -210,6 +276,16 @@ void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
         if (item == IMP_ITEM_HORIZON) imp__draw_horizon(d);
         break;
     }
+}
+
+void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
+{
+    d->part = d->b->part[kind];
+    d->end = &d->first;
+    if (!waves_draw(d) || !imp__edge_item_choose(d)) return;
+    kind_work(d, kind);
+    for (struct imp__flux *f = d->waves ? d->first : NULL; f; f = f->next)
+        f->L = imp__waves_channels(d->waves, f->L);
 }
 
 struct imp__flux *imp__boundary_draw(const struct imp__boundary *b,

@@ -12,15 +12,18 @@
  *                  dI = -int dA_y dl Le cos_y sin(phi)/t_y^2 f W(x) m.(V - V_line),
  *                  V_line = (t_y x' + t_x V_y)/(t_x + t_y): both ends of the line move;
  *              of a point light Le cos_y dA_y is its intensity, of parallel light along d
- *              Le cos_y dA_y/t_y^2 its irradiance and V_line = x' - t_x d'
- *     scatter  what a vertex x receives from scattered light and the sky jumps at every edge that
- *              it sees; w is a direction from the edge to it:
+ *              Le cos_y dA_y/t_y^2 its irradiance and V_line = x' - t_x d'; of a sky that
+ *              is not the same from everywhere L dw, and d' = 0
+ *     scatter  what a vertex x receives from scattered light, and from a sky of one radiance, jumps
+ *              at every edge that it sees; w is a direction from the edge to it:
  *                  dI = int dl dw sin(phi) f W(x) [L(-m) - L(+m)] m.(V - x')
  *
  * A sphere has a silhouette from everywhere: the circle on which a line touches it is an edge to the
  * film and to lights, with m its outward normal; of all lines that touch it, by place p, dA, and
- * turn about the normal, psi, dl dw sin(phi) is  dA dpsi/r. The rim of a disk is an edge with one
- * face, by its length.
+ * turn about the normal, psi, dl dw sin(phi) is  dA dpsi/r. Silhouettes of a cylinder are two straight
+ * lines; of lines that touch it at the angle psi to its axis it is  sin^2(psi) dA dpsi/r. The rims of
+ * disks and cylinders are edges with one face, by their length; the rim on which a disk closes a
+ * cylinder is one edge with two.
  *
  * A mesh with vertex normals n_s, beside its geometric normal n, has two more places where light
  * jumps. Kernels are those of n_s, and vanish where it turns away from where the light goes:
@@ -52,13 +55,19 @@ enum imp__boundary_kind { IMP_BOUNDARY_FILM, IMP_BOUNDARY_LIGHT, IMP_BOUNDARY_SC
 
 /* What has edges that are in no list. */
 enum imp__edge_item_kind {
-    IMP_ITEM_ROUND,   /* a sphere's silhouettes, a disk's rim */
+    IMP_ITEM_ROUND, /* silhouettes of spheres and cylinders, rims of disks and cylinders */
     IMP_ITEM_SHADING, /* of a mesh with vertex normals */
-    IMP_ITEM_HORIZON
+    IMP_ITEM_HORIZON,
+    IMP_ITEM_SKY /* where the camera sees a sky jump; it has no shape */
 };
 struct imp__edge_item {
     enum imp__edge_item_kind kind;
     int shape;
+    struct imp_sky_circle circle; /* IMP_ITEM_SKY */
+    /* IMP_ITEM_ROUND: rims of a cylinder that a disk closes, whose edge they are; of such a disk the
+     * direction out of the cylinder, at its end; 0: it closes none. */
+    bool closed[2];
+    imp_v3 wall;
     double
         *until; /* of meshes: [n_triangles + 1] area of the triangles before this one */
     /* IMP_ITEM_SHADING: triangles in which the shading normal may turn away from the camera, and
@@ -84,7 +93,7 @@ struct imp__boundary {
     imp_v3 camera; /* where its rays meet */
     double size;   /* of the scene */
     int n_lights;
-    double *light_cdf; /* [n_emitters] of all but skies, by power; last is 1 */
+    double *light_cdf; /* [n_emitters] of those that have draws, by power; last is 1 */
 };
 
 /* A velocity on which a flux depends: of a glued point, of what the camera makes of one, or of a

@@ -15,7 +15,7 @@ static enum imp_status facets_allowed(const struct imp__boundary *b)
     for (int k = 0; k < scene->n_emitters; k++) {
         const struct imp_emitter *e = scene->emitters[k];
         if (!(e->ops->flags & IMP_EMITTER_DELTA)) continue;
-        for (int j = 0; j < scene->n_shapes; j++)
+        for (int j = 0; j < imp__shapes_outside(scene); j++)
             if (imp__moves_smooth(scene, j) &&
                 (imp__moves_shape(b->moves, j, NULL) ||
                  imp__moves_shape(b->moves, IMP_MOVE_EMITTER(k), NULL)))
@@ -43,6 +43,14 @@ static enum imp_status edges_allowed(const struct imp__boundary *b)
             scene->shapes[b->edges->face[torn->first].shape]->name, torn->a[0],
             torn->a[1], torn->a[2]);
     int other = -1;
+    const int rim = imp__rims_torn(scene, b->moves, &other);
+    if (rim >= 0)
+        return imp__error(
+            scene->ctx, IMP_E_UNSUPPORTED,
+            "derivatives by what moves: a rim of shape '%s' lies on one of "
+            "shape '%s', and they are not the wall and the lid of a can that "
+            "stands still",
+            scene->shapes[rim]->name, scene->shapes[other]->name);
     const int pierced = imp__edges_pierced(b->edges, scene, &other);
     if (pierced >= 0)
         return imp__error(
@@ -62,7 +70,8 @@ static int back_met(const struct imp__boundary *b, imp_v3 w)
     struct imp_surface at;
     if (!imp__intersect(scene, &b->camera, &w, 0, INFINITY, &hit)) return -1;
     imp__hit_surface(scene, &hit, &b->camera, &w, &at);
-    const struct imp_bsdf *bsdf = imp__shape_bsdf(scene, scene->shapes[hit.shape]);
+    const int met = imp__placed_shape(scene, hit.shape, hit.place);
+    const struct imp_bsdf *bsdf = imp__shape_bsdf(scene, scene->shapes[met]);
     return imp__dot(at.ng, w) > 0 && bsdf->ops != &imp__twosided ? hit.shape : -1;
 }
 

@@ -27,17 +27,21 @@ bool imp__edge_item_choose(struct imp__edge_draw *d)
     return true;
 }
 
-/* False: it is a disk. */
 static bool is_ball(const struct imp__edge_draw *d, struct imp_round *round)
 {
     return imp__moves_sphere(d->b->tracer->scene, d->item->shape, round);
 }
+static bool is_tube(const struct imp__edge_draw *d, struct imp__tube *tube)
+{
+    return imp__moves_cylinder(d->b->tracer->scene, d->item->shape, tube);
+}
 
-/* A point of the rim of a disk. */
-static bool rim_set(struct imp__edge_draw *d)
+/* A point of rim k. */
+static bool rim_set(struct imp__edge_draw *d, int k)
 {
     const struct imp__rim_point rim =
-        imp__disk_rim(d->b->tracer->scene, d->item->shape, d->u);
+        imp__rim(d->b->tracer->scene, d->item->shape, k, d->u);
+    d->rim = true;
     d->p = rim.p;
     d->along = rim.along;
     d->out = rim.out;
@@ -45,11 +49,45 @@ static bool rim_set(struct imp__edge_draw *d)
     return true;
 }
 
-/* The circle on which lines from there touch the sphere, or the rim of a disk. */
+/* The parts of a cylinder's edges: its rims, and its two silhouettes, or lines that touch it. Divides
+ * d->chance by the probability, and makes d->u uniform again. */
+static int tube_part(struct imp__edge_draw *d, const struct imp__tube *c)
+{
+    const double all = 2 * IMP_2PI * c->radius + 2 * c->length;
+    const double rim = IMP_2PI * c->radius / all, part[3] = {rim, rim, 1 - 2 * rim};
+    int k = 0;
+    for (; k < 2 && d->u >= part[k]; k++) d->u -= part[k];
+    d->u = imp_clamp(d->u / part[k], 0.0, 1 - 0x1p-53);
+    d->chance *= part[k];
+    return k;
+}
+
+/* The lines on which lines from there touch the cylinder, or a rim. */
+static bool tube_silhouette(struct imp__edge_draw *d, const struct imp__tube *c,
+                            imp_v3 from, bool parallel)
+{
+    const int k = tube_part(d, c);
+    if (k < 2) return !d->item->closed[k] && rim_set(d, k);
+    imp_v3 way = parallel ? from : c->base - from;
+    way -= c->axis * imp__dot(c->axis, way);
+    const double D = imp__length(way), sine = parallel ? 0 : c->radius / D;
+    if (!(D > 0) || !(sine < 1)) return false;
+    const double side = d->u < 0.5 ? -1 : 1, z = 2 * d->u - (d->u < 0.5 ? 0 : 1);
+    way *= 1 / D;
+    d->out = imp__cross(c->axis, way) * (side * sqrt(1 - sine * sine)) - way * sine;
+    d->p = c->base + d->out * c->radius + c->axis * (z * c->length);
+    d->along = c->axis;
+    d->inv_pdf = 2 * c->length / d->chance;
+    return true;
+}
+
+/* The circle on which lines from there touch the sphere; of what is no sphere its own edges. */
 static bool ball_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel)
 {
     struct imp_round round;
-    if (!is_ball(d, &round)) return rim_set(d);
+    struct imp__tube tube;
+    if (is_tube(d, &tube)) return tube_silhouette(d, &tube, from, parallel);
+    if (!is_ball(d, &round)) return rim_set(d, 0);
     const imp_v3 way = parallel ? from : round.centre - from;
     const double D = imp__length(way), sine = parallel ? 0 : round.radius / D;
     if (!(sine < 1)) return false;
@@ -79,10 +117,28 @@ bool imp__edge_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel)
            point_set(d, &p);
 }
 
+/* A line that touches the cylinder at a place, or the rims, along w. */
+static bool tube_touched(struct imp__edge_draw *d, const struct imp__tube *c,
+                         const double u[2], imp_v3 *w)
+{
+    const int k = tube_part(d, c);
+    if (k < 2) return !d->item->closed[k] && rim_set(d, k);
+    const struct imp_frame f = imp__frame_from_normal(c->axis);
+    const double phi = IMP_2PI * d->u, psi = IMP_2PI * u[1];
+    d->touches = true;
+    d->out = f.s * cos(phi) + f.t * sin(phi);
+    *w = c->axis * cos(psi) + imp__cross(d->out, c->axis) * sin(psi);
+    d->p = c->base + d->out * c->radius + c->axis * (u[0] * c->length);
+    d->along = imp__cross(d->out, *w);
+    d->inv_pdf = IMP_2PI * IMP_2PI * c->length * imp__sqr(sin(psi)) / d->chance;
+    return true;
+}
+
 bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w)
 {
     struct imp__edge_point p;
     struct imp_round round;
+    struct imp__tube tube;
     const double u[2] = {imp__u01(d->key, IMP_EDGE_DIR_U),
                          imp__u01(d->key, IMP_EDGE_DIR_V)};
     *w = imp__uniform_sphere(u);
@@ -91,7 +147,8 @@ bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w)
         return point_set(d, &p);
     }
     const double at[2] = {d->u, u[0]};
-    if (!is_ball(d, &round)) return rim_set(d);
+    if (is_tube(d, &tube)) return tube_touched(d, &tube, u, w);
+    if (!is_ball(d, &round)) return rim_set(d, 0);
     d->touches = true;
     d->out = imp__uniform_sphere(at);
     const struct imp_frame f = imp__frame_from_normal(d->out);
@@ -111,6 +168,15 @@ struct imp__glued imp__edge_carried(const struct imp__edge_draw *d)
 
 imp_v3 imp__edge_clear(const struct imp__edge_draw *d)
 {
-    if (d->edge || imp__moves_disk(d->b->tracer->scene, d->item->shape)) return d->p;
+    if (d->edge || d->rim) return d->p;
     return d->p + d->out * (IMP_BESIDE * (d->b->size + imp__length(d->p)));
+}
+
+bool imp__edge_merges(const struct imp__edge_draw *d, imp_v3 w, double beside)
+{
+    struct imp__tube c;
+    if (!d->rim || !is_tube(d, &c) || imp__dot(w, d->out) >= 0) return false;
+    const imp_v3 r = d->p - c.base, n = imp__normalize(r - c.axis * imp__dot(c.axis, r));
+    const double cosine = imp__dot(n, imp__normalize(w - c.axis * imp__dot(c.axis, w)));
+    return cosine < 0 && 0.5 * c.radius * cosine * cosine < beside;
 }

@@ -33,8 +33,43 @@ imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py)
     struct imp_sensor_ray ray;
     struct imp_walk walk;
     t->sensor->ops->ray(t->sensor, px, py, lens, &ray);
-    imp__walk_along(t, d->arena, imp__key_branch(d->key, 0, 1), &ray, 0, &walk);
+    imp__walk_along(t, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves, 0, &walk);
     return walk.values;
+}
+
+void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to)
+{
+    const imp_v3 camera = d->b->camera;
+    const double inverse = 1 / imp__length(d->p - camera);
+    imp_v3 x, y;
+    film_slopes(d->b->tracer->sensor, to->px, to->py, &x, &y);
+    x *= inverse;
+    y *= inverse;
+    const double tangent[2] = {imp__dot(x, d->along), imp__dot(y, d->along)};
+    const double normal[2] = {-tangent[1], tangent[0]};
+    const double length = sqrt(imp__sqr(normal[0]) + imp__sqr(normal[1]));
+    if (!(length > 0)) return; /* it is seen end on */
+    const imp_v3 bar = x * normal[0] + y * normal[1];
+
+    /* A pixel is so wide at the distance 1. */
+    const double pixel = sqrt(1 / (imp__length(x) * imp__length(y))) * inverse;
+    const double beside = IMP_BESIDE / pixel / length;
+    const double dx = normal[0] * beside, dy = normal[1] * beside;
+    const imp_spec jump = imp__look_through(d, to->px - dx, to->py - dy) -
+                          imp__look_through(d, to->px + dx, to->py + dy);
+    if (imp__is_zero_used(jump, d->waves)) return;
+    struct imp__flux *f = imp__flux_add(d, 2);
+    if (!f) return;
+    f->px = to->px;
+    f->py = to->py;
+    f->L = jump * d->inv_pdf;
+    f->n_ends = 2;
+    const bool sky = d->item && d->item->kind == IMP_ITEM_SKY;
+    const struct imp__glued at = sky ? (struct imp__glued){.p = d->p}
+                                     : imp__edge_carried(d),
+                            eye = {.p = camera};
+    f->end[0] = sky ? imp__flux_camera(&eye, bar) : imp__flux_glued(&at, bar);
+    f->end[1] = imp__flux_camera(&at, -bar);
 }
 
 void imp__draw_film(struct imp__edge_draw *d)
@@ -48,33 +83,7 @@ void imp__draw_film(struct imp__edge_draw *d)
         !imp__light_on_film(sensor, &to))
         return;
     const imp_v3 r = imp__edge_clear(d) - to.p;
+    if (imp__edge_merges(d, r, IMP_BESIDE * imp__length(r))) return;
     if (imp__occluded_at(b->tracer->scene, 0, &to.p, &r, 0, 1 - IMP_BESIDE)) return;
-
-    imp_v3 x, y;
-    const double inverse = 1 / imp__length(d->p - b->camera);
-    film_slopes(sensor, to.px, to.py, &x, &y);
-    x *= inverse;
-    y *= inverse;
-    const double tangent[2] = {imp__dot(x, d->along), imp__dot(y, d->along)};
-    const double normal[2] = {-tangent[1], tangent[0]};
-    const double length = sqrt(imp__sqr(normal[0]) + imp__sqr(normal[1]));
-    if (!(length > 0)) return; /* it is seen end on */
-    const imp_v3 bar = x * normal[0] + y * normal[1];
-
-    /* A pixel is so wide at the distance 1. */
-    const double pixel = sqrt(1 / (imp__length(x) * imp__length(y))) * inverse;
-    const double beside = IMP_BESIDE / pixel / length;
-    const double dx = normal[0] * beside, dy = normal[1] * beside;
-    const imp_spec jump = imp__look_through(d, to.px - dx, to.py - dy) -
-                          imp__look_through(d, to.px + dx, to.py + dy);
-    if (imp__is_zero(jump)) return;
-    struct imp__flux *f = imp__flux_add(d, 2);
-    if (!f) return;
-    f->px = to.px;
-    f->py = to.py;
-    f->L = jump * d->inv_pdf;
-    f->n_ends = 2;
-    const struct imp__glued at = imp__edge_carried(d);
-    f->end[0] = imp__flux_glued(&at, bar);
-    f->end[1] = imp__flux_camera(&at, -bar);
+    imp__film_jump(d, &to);
 }

@@ -12,7 +12,8 @@ static void look(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 
 {
     struct imp_sensor_ray ray = {.d = w, .t_near = 0, .t_far = INFINITY};
     ray.o = imp__offset(at->p, at->ng, up);
-    imp__walk_along(d->b->tracer, d->arena, imp__key_branch(d->key, 0, 1), &ray, 1, walk);
+    imp__walk_along(d->b->tracer, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves,
+                    1, walk);
 }
 
 /* Emission of a light that is met first, which moves with the light. */
@@ -21,7 +22,9 @@ static void emission_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
                            const struct imp_walk *walk, imp_v3 w, double times)
 {
     const struct imp_vertex *v = walk->first;
-    if (walk->dropped || !v || v->d.scatterer == IMP_AT_SKY || imp__is_zero(v->e)) return;
+    if (walk->dropped || !v || v->d.scatterer == IMP_AT_SKY ||
+        imp__is_zero_used(v->e, d->waves))
+        return;
     const struct imp__glued y =
         imp__glued_at(d->b->tracer->scene, v->d.shape, &v->d.located, v->ng);
     const imp_v3 turn = x->n * (1 / imp__length(y.p - x->p));
@@ -51,7 +54,7 @@ void imp__draw_horizon(struct imp__edge_draw *d)
     emission_reach(d, &hit, &at, &x, &above, w, times);
     emission_reach(d, &hit, &at, &x, &below, w, -times);
     int depths;
-    imp_spec *jump = imp__jumps(d, &above, &below, times, &depths);
+    imp_spec *jump = imp__jumps(d, &above, &below, times, true, &depths);
     if (!jump) return;
     struct imp__edge_light light = {
         .w = -w, .light = jump[0], .horizon = true, .n_ends = 1};

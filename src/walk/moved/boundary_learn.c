@@ -24,7 +24,7 @@ struct pilot {
 static double light_of(const struct pilot *x, const struct imp__flux *f)
 {
     if (x->weight) return x->weight(x->payload, f);
-    return imp__sum_used(f->L, x->b->tracer->scene->lanes);
+    return imp__sum_used(f->L, x->b->tracer->scene->channels);
 }
 
 /* What a flux makes of a shift of each mover, and of a turn about its centre. */

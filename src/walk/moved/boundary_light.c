@@ -2,6 +2,7 @@
  *
  * Silhouettes between a light and what it lights (boundary.h). */
 #include "boundary_parts.h"
+#include "moved_sky.h"
 
 static int light_choose(const struct imp__boundary *b, double u, double *pmf)
 {
@@ -17,8 +18,8 @@ struct source {
     int light;            /* emitter */
     struct imp_surface y; /* of a light with a shape */
     imp_v3 p; /* its point; of parallel light the direction in which it travels */
-    bool parallel;
-    double density; /* of the light, and of its point per area */
+    bool parallel, sky;
+    double density; /* of the light, and of its point per area, or direction of a sky */
 };
 
 static struct source source_draw(const struct imp__edge_draw *d)
@@ -34,6 +35,15 @@ static struct source source_draw(const struct imp__edge_draw *d)
         e->shape->ops->sample_area(e->shape, u, &s.y);
         s.density /= e->shape->area;
         s.p = s.y.p;
+        return s;
+    }
+    if (e->ops->flags & IMP_EMITTER_ENVIRONMENT) {
+        const struct imp_scene *scene = d->b->tracer->scene;
+        const imp_v3 from = (scene->lo + scene->hi) * 0.5;
+        struct imp_light_sample to = {.pdf = 0};
+        s.density *= e->ops->sample(e, &from, u, &to) ? to.pdf : 0;
+        s.p = -to.wi;
+        s.parallel = s.sky = true;
         return s;
     }
     e->ops->aim(e, aim, false);
@@ -55,6 +65,30 @@ static struct imp__flux_end source_end(const struct imp__edge_draw *d,
     return imp__flux_glued(&lit, bar);
 }
 
+/* Radiance along the line, intensity or irradiance. */
+static imp_spec sent(const struct imp__edge_draw *d, const struct source *s,
+                     double cosine, imp_v3 along)
+{
+    const struct imp_scene *scene = d->b->tracer->scene;
+    const struct imp_emitter *e = scene->emitters[s->light];
+    const struct imp_texcoord there = {.shape = e->shape, .carried = imp__edge_waves(d)};
+    const struct imp_emission x = {.dist = 1, .cos_light = cosine, .d = along};
+    imp_spec in[IMP_INPUTS_MAX], le;
+    if (s->sky) return imp__sky_radiance_from(scene, s->light, -s->p, imp__edge_waves(d));
+    imp__inputs_eval(e->input, e->n_in, &there, in);
+    e->ops->eval(e, in, &x, &le);
+    return le;
+}
+
+/* As imp__edge_side, of a curved shape. */
+static int round_side(const struct imp__edge_draw *d, imp_v3 m)
+{
+    const int side = imp__dot(m, d->out) > 0 ? 1 : -1;
+    const imp_v3 wall = d->item->wall; /* of a can with a lid */
+    if (!d->rim || imp__is_zero(wall)) return side;
+    return (imp__dot(m, wall) > 0 ? 1 : -1) == side ? side : 0;
+}
+
 void imp__draw_light(struct imp__edge_draw *d)
 {
     const struct imp__boundary *b = d->b;
@@ -71,27 +105,22 @@ void imp__draw_light(struct imp__edge_draw *d)
     const double cosine = e->shape ? imp__dot(s.y.n, r) / t_y : 1;
     if (!(sine > 0) || !(cosine > IMP_GRAZING)) return;
     imp_v3 m = turned * (1 / (sine * t_y));
-    const int side = d->edge                   ? imp__edge_side(b->edges, d->edge, m)
-                     : imp__dot(m, d->out) > 0 ? 1
-                                               : -1;
+    const int side = d->edge ? imp__edge_side(b->edges, d->edge, m) : round_side(d, m);
     if (side == 0) return;
     m *= (double)side;
 
     /* One ray past the edge; parts of its length to there. */
     const imp_v3 o = e->shape ? imp__offset(from, s.y.ng, r) : from;
-    const imp_v3 to = d->p + m * (IMP_BESIDE * (t_y + imp__length(d->p))) - o;
+    const double beside = IMP_BESIDE * (t_y + imp__length(d->p));
+    const imp_v3 to = d->p + m * beside - o;
+    if (imp__edge_merges(d, to, beside)) return;
     struct imp_hit hit;
     struct imp_surface at;
     if (!imp__intersect(scene, &o, &to, 0, INFINITY, &hit)) return;
     if (hit.t < 1 + IMP_CONTACT * b->size / t_y) return;
     imp__hit_surface(scene, &hit, &o, &to, &at);
 
-    const struct imp_texcoord there = {.shape = e->shape};
-    const struct imp_emission sent = {
-        .dist = 1, .cos_light = cosine, .d = imp__normalize(to)};
-    imp_spec in[IMP_INPUTS_MAX], le;
-    imp__inputs_eval(e->input, e->n_in, &there, in);
-    e->ops->eval(e, in, &sent, &le);
+    const imp_spec le = sent(d, &s, cosine, imp__normalize(to));
     const double t_x = imp__length(at.p - d->p);
     const double far = s.parallel ? 1 : t_y / (t_x + t_y); /* of V_line that is x' */
     const double spread = s.parallel ? 1 : t_y * t_y;
@@ -100,6 +129,7 @@ void imp__draw_light(struct imp__edge_draw *d)
     light.slide = m * -far;
     const struct imp__glued edge = imp__edge_carried(d);
     light.end[0] = imp__flux_glued(&edge, m);
-    light.end[1] = source_end(d, &s, m * (s.parallel ? t_x : far - 1));
+    if (s.sky) light.n_ends = 1; /* it stays */
+    else light.end[1] = source_end(d, &s, m * (s.parallel ? t_x : far - 1));
     imp__edge_reach(d, &hit, &at, &light);
 }

@@ -11,17 +11,19 @@ struct imp__edge_draw {
     const struct imp__boundary *b;
     struct imp_arena *arena;
     struct imp_key key;
+    const struct imp_waves *waves; /* of all its walks; NULL: colours */
     const struct imp__edge_choice *choice;
     const double *part;                /* of spheres and edges (boundary.h) */
     double u;                          /* by which the point is chosen */
     const struct imp__edge_item *item; /* NULL: an edge */
     double chance;                     /* of the item, or of all edges */
     const struct imp__edge
-        *edge;       /* NULL: a sphere touched by a line, or the rim of a disk */
-    bool touches;    /* a line that touches a sphere */
+        *edge;    /* NULL: a sphere or cylinder touched by a line, or a rim */
+    bool touches; /* a line that touches a sphere or cylinder */
+    bool rim;
     imp_v3 p, along; /* the point, and the unit direction of the edge */
     imp_v3
-        out; /* of a sphere: its outward normal; of a disk: in its plane, away from it */
+        out; /* of a line that touches: the outward normal; of a rim: in its surface, away from it */
     double inv_pdf; /* of the point, per length; of a line that touches a sphere */
     int cell;       /* of the choice; behind all cells, of which sphere */
     struct imp__flux *first, **end;
@@ -40,12 +42,18 @@ enum {
 };
 enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
 #define IMP_EDGE_LOBE (1u << 20) /* behind all of those: by which a lobe is chosen */
+#define IMP_EDGE_WAVE (1u << 21) /* and from which wavelengths are drawn */
 
 /* So far beside an edge, per distance to it, it is looked past; rays are traced in float, whose
  * rounding is a tenth of that. */
 #define IMP_BESIDE 1e-5
 /* Surfaces nearer behind an edge, per size of the scene, are what it stands on. */
 #define IMP_CONTACT 2e-5
+
+static inline const struct imp_carried *imp__edge_waves(const struct imp__edge_draw *d)
+{
+    return d->waves ? &d->waves->carried : NULL;
+}
 
 /* Chooses an item, or the edges. False: there is none. */
 bool imp__edge_item_choose(struct imp__edge_draw *d);
@@ -58,6 +66,10 @@ bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w);
  * its own sphere. */
 struct imp__glued imp__edge_carried(const struct imp__edge_draw *d);
 imp_v3 imp__edge_clear(const struct imp__edge_draw *d);
+/* Where the picture of a cylinder's opening, into which a look along w goes, nears the outline, the wall
+ * is thinner than the look is apart from the rim, `beside` it: it sees what is beside the outline, which
+ * has draws of its own. */
+bool imp__edge_merges(const struct imp__edge_draw *d, imp_v3 w, double beside);
 /* A flux more, with room for n ends. NULL: no memory. */
 struct imp__flux *imp__flux_add(struct imp__edge_draw *d, int n);
 static inline struct imp__flux_end imp__flux_glued(const struct imp__glued *x, imp_v3 bar)
@@ -71,17 +83,21 @@ static inline struct imp__flux_end imp__flux_camera(const struct imp__glued *x,
 }
 /* What the camera sees at a film position. */
 imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py);
+/* The flux of a jump of the picture where the draw's point is seen; of a circle of a sky, with the
+ * point d->p at the distance 1 from the camera. */
+void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to);
 /* What a vertex at a hit sees towards a place. */
 void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 to,
                     struct imp_walk *walk);
 /* What arrives along a recorded walk from a vertex x, without the emission of a light that it
- * meets first, which is glued to that. Vertex i of it has number i + before of the whole path. */
-imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk,
-                      int before);
+ * meets first, which is glued to that; of skies that have draws of their own only with `skies`.
+ * Vertex i of it has number i + before of the whole path. */
+imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk, int before,
+                      bool skies);
 /* Vertices behind the edge for which light is known: what jumps by depth [*n], in the arena. NULL:
  * no memory, or nothing jumps. */
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
-                     const struct imp_walk *hi, double times, int *n);
+                     const struct imp_walk *hi, double times, bool skies, int *n);
 
 /* What light that arrives at `at` (a hit of this shape) along w brings to the sensor: from there,
  * and over further vertices. Light: radiance times all factors but f W(x). `back`: vertices that
@@ -111,6 +127,7 @@ void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind);
 void imp__draw_film(struct imp__edge_draw *d);
 void imp__draw_light(struct imp__edge_draw *d);
 void imp__draw_scatter(struct imp__edge_draw *d);
+void imp__draw_sky_film(struct imp__edge_draw *d);
 /* ---- Of meshes with vertex normals: boundary_shading.c, boundary_horizon.c ---- */
 void imp__draw_shading_film(struct imp__edge_draw *d);
 void imp__draw_shading_scatter(struct imp__edge_draw *d);

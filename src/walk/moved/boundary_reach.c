@@ -28,17 +28,21 @@ static struct link *link_make(struct imp__edge_draw *d, struct link *before,
                               imp_v3 w, bool horizon)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
-    const struct imp_shape *shape = scene->shapes[hit->shape];
+    const struct imp_shape *shape =
+        scene->shapes[imp__placed_shape(scene, hit->shape, hit->place)];
     struct link *k = imp__arena_take(d->arena, 1, sizeof *k);
     if (!k) {
         d->no_memory = true;
         return NULL;
     }
-    const struct imp_texcoord place = {
-        .uv = {at->uv[0], at->uv[1]}, .p = at->p, .shape = shape, .prim = hit->prim};
+    const struct imp_texcoord place = {.uv = {at->uv[0], at->uv[1]},
+                                       .p = at->p,
+                                       .shape = shape,
+                                       .prim = hit->prim,
+                                       .carried = imp__edge_waves(d)};
     const struct imp_located located = imp__located_hit(scene, shape, hit, at);
     k->before = before;
-    k->x = imp__surface_point(scene, hit->shape, &located, at->ng);
+    k->x = imp__surface_point(scene, hit->shape, &located, hit->place, at->ng);
     k->bsdf = imp__shape_bsdf(scene, shape);
     k->at = *at;
     k->frame = (struct imp_frame){at->s, at->t, at->n};
@@ -97,7 +101,7 @@ static void connect(struct imp__edge_draw *d, const struct imp__edge_light *ligh
         !imp__light_on_film(t->sensor, &to))
         return;
     const imp_spec L = brings * kernel(k, imp__to_local(&k->frame, to.wo)) * to.weight;
-    if (imp__is_zero(L)) return;
+    if (imp__is_zero_used(L, d->waves)) return;
     imp__light_shadow_aim(&k->at, &to, &shadow);
     if (imp__occluded_at(t->scene, 0, &shadow.o, &shadow.d, 0, shadow.reach)) return;
     struct imp__flux *f = imp__flux_add(d, light->n_ends + depth + 2);
@@ -156,7 +160,8 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
         const double pdf = direction_draw(d, k, dims, &wo);
         if (!(pdf > 0)) return;
         T *= kernel(k, wo) * (1 / pdf);
-        const double most = imp__max3(T), survive = depth < 2 ? 1 : imp_min(most, 0.95);
+        const double most = imp__max_used(T, d->waves),
+                     survive = depth < 2 ? 1 : imp_min(most, 0.95);
         if (!(imp__u01(d->key, dims + IMP_EDGE_SURVIVE) < survive) || !(most > 0)) return;
         T *= 1 / survive;
         struct imp_hit next;

@@ -1,20 +1,27 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Edges between a vertex and what it receives from the sky and from lit surfaces (boundary.h). */
+ * Edges between a vertex and what it receives from lit surfaces (boundary.h). */
 #include "boundary_parts.h"
+#include "moved_sky.h"
 #include "walk/core/step.h"
 
-imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk, int before)
+imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk, int before,
+                      bool skies)
 {
     const int max = t->integrator->max_depth;
     imp_spec L = {0}, T = imp__spec(1);
     int number = before;
-    if (walk->dropped) return L;
-    for (const struct imp_vertex *v = walk->first; v; v = v->next, number++) {
-        const bool glued = v == walk->first && v->d.scatterer != IMP_AT_SKY;
-        if (!glued && (max < 0 || number < max)) L += T * v->e;
+    if (walk->dropped || !walk->first) return L;
+    const bool sky_first = walk->first->d.scatterer == IMP_AT_SKY;
+    for (const struct imp_vertex *v = walk->first; v; v = v->next) {
+        /* To each sky a vertex. */
+        const bool left = sky_first
+                              ? !skies && imp__sky_has_draws(t->scene, v->d.met.emitter)
+                              : v == walk->first;
+        if (!left && (max < 0 || number < max)) L += T * v->e;
         if (max < 0 || number + 1 < max) L += T * v->b;
         T *= v->w;
+        number += v->d.scatterer != IMP_AT_SKY;
     }
     return L;
 }
@@ -25,11 +32,12 @@ void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_
     struct imp_sensor_ray ray = {.t_near = 0, .t_far = INFINITY};
     ray.o = imp__offset(at->p, at->ng, to - at->p);
     ray.d = imp__normalize(to - ray.o);
-    imp__walk_along(d->b->tracer, d->arena, imp__key_branch(d->key, 0, 1), &ray, 1, walk);
+    imp__walk_along(d->b->tracer, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves,
+                    1, walk);
 }
 
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
-                     const struct imp_walk *hi, double times, int *n)
+                     const struct imp_walk *hi, double times, bool skies, int *n)
 {
     const struct imp_tracer *tracer = d->b->tracer;
     const int max = tracer->integrator->max_depth;
@@ -41,9 +49,10 @@ imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
     }
     bool any = false;
     for (int k = 0; k < *n; k++) {
-        jump[k] =
-            (imp__arrives(tracer, lo, k + 1) - imp__arrives(tracer, hi, k + 1)) * times;
-        any |= !imp__is_zero(jump[k]);
+        jump[k] = (imp__arrives(tracer, lo, k + 1, skies) -
+                   imp__arrives(tracer, hi, k + 1, skies)) *
+                  times;
+        any |= !imp__is_zero_used(jump[k], d->waves);
     }
     return any ? jump : NULL;
 }
@@ -66,14 +75,16 @@ void imp__draw_scatter(struct imp__edge_draw *d)
     const double sine = imp__length(turned);
     if (!(sine > 0)) return;
     const imp_v3 m = turned * (1 / sine);
-    const imp_v3 beside = m * (IMP_BESIDE * (hit.t + imp__length(d->p)));
+    const double apart = IMP_BESIDE * (hit.t + imp__length(d->p));
+    const imp_v3 beside = m * apart;
+    if (imp__edge_merges(d, -w, apart)) return;
     struct imp_walk lo, hi;
     imp__look_from(d, &at, d->p - beside, &lo);
     imp__look_from(d, &at, d->p + beside, &hi);
 
     int depths;
     const double times = (d->touches ? 1 : sine * 4 * IMP_PI) * d->inv_pdf;
-    imp_spec *jump = imp__jumps(d, &lo, &hi, times, &depths);
+    imp_spec *jump = imp__jumps(d, &lo, &hi, times, false, &depths);
     if (!jump) return;
     struct imp__edge_light light = {.w = w, .n_ends = 1, .slide = -m};
     light.light = jump[0];

@@ -268,7 +268,7 @@ void imp__draw_shading_film(struct imp__edge_draw *d)
         return;
     const imp_spec jump =
         imp__look_through(d, lit.px, lit.py) - imp__look_through(d, dark.px, dark.py);
-    if (imp__is_zero(jump)) return;
+    if (imp__is_zero_used(jump, d->waves)) return;
     struct imp__flux *f = imp__flux_add(d, 3);
     if (!f) return;
     f->px = to.px;
@@ -306,7 +306,7 @@ void imp__draw_shading_scatter(struct imp__edge_draw *d)
     imp__look_from(d, &at, p.p - x.beside, &dark);
     int depths;
     const double times = fabs(imp__dot(p.ng, w)) * IMP_2PI * d->inv_pdf;
-    imp_spec *jump = imp__jumps(d, &lit, &dark, times, &depths);
+    imp_spec *jump = imp__jumps(d, &lit, &dark, times, true, &depths);
     if (!jump) return;
     struct imp__edge_light light = {.w = w, .light = jump[0], .n_ends = 1};
     if (max >= 0) {

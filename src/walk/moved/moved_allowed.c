@@ -7,8 +7,8 @@
 #include "scene/instances.h"
 #include "scene/pose.h"
 
-extern const struct imp_emitter_ops imp__area, imp__constant, imp__point_light,
-    imp__spot_light, imp__directional;
+extern const struct imp_emitter_ops imp__area, imp__point_light, imp__spot_light,
+    imp__directional;
 
 static enum imp_status refuse(const struct imp_tracer *t, const char *what,
                               const char *name, const char *kind, const char *why)
@@ -23,13 +23,6 @@ static bool is_textured(const struct imp_input *const *input, int n)
     for (int k = 0; k < n; k++)
         if (input[k]->texture) return true;
     return false;
-}
-
-static bool is_simple(const struct imp_tracer *t, const struct imp_shape *s)
-{
-    struct imp_round round;
-    return imp__moves_sphere(t->scene, s->index, &round) ||
-           imp__moves_disk(t->scene, s->index);
 }
 
 static enum imp_status materials_allowed(const struct imp_tracer *t)
@@ -50,17 +43,20 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
 {
     for (int k = 0; k < t->scene->n_emitters; k++) {
         const struct imp_emitter *e = t->scene->emitters[k];
-        if (e->ops != &imp__area && e->ops != &imp__constant &&
-            e->ops != &imp__point_light && e->ops != &imp__spot_light &&
-            e->ops != &imp__directional)
+        const bool sky = e->ops->flags & IMP_EMITTER_ENVIRONMENT;
+        if (sky ? !e->ops->jumps
+                : e->ops != &imp__area && e->ops != &imp__point_light &&
+                      e->ops != &imp__spot_light && e->ops != &imp__directional)
             return refuse(t, "light", e->name, e->ops->name,
-                          "is none of area, constant, point, spot and directional");
-        if (e->shaped || is_textured(e->input, e->n_in))
+                          sky ? "does not say where its radiance jumps"
+                              : "is none of area, point, spot, directional and skies");
+        if (!sky && (e->shaped || is_textured(e->input, e->n_in)))
             return refuse(t, "light", e->name, e->ops->name, "has a texture");
-        if (e->shape && e->shape->geometry != IMP_TRIANGLES && !is_simple(t, e->shape))
+        if (e->shape && e->shape->geometry != IMP_TRIANGLES &&
+            !imp__moves_curved(t->scene, e->shape->index))
             return refuse(t, "light", e->name, e->ops->name,
-                          "is on a shape that is not made of triangles, and no sphere or "
-                          "disk");
+                          "is on a shape that is not made of triangles, and no sphere, "
+                          "disk or circular cylinder");
         if (e->shape && e->shape->smooth)
             return refuse(t, "light", e->name, e->ops->name,
                           "is on a mesh with vertex normals, whose light ends where "
@@ -68,21 +64,19 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
         if (e->course)
             return refuse(t, "light", e->name, e->ops->name, "changes with time");
     }
-    return t->scene->n_environments < 2
-               ? IMP_OK
-               : imp__error(t->scene->ctx, IMP_E_UNSUPPORTED,
-                            "derivatives by what moves: there are several skies");
+    return IMP_OK;
 }
 
 static enum imp_status walks_allowed(const struct imp_tracer *t)
 {
     const struct imp_scene *scene = t->scene;
     const struct imp_walk_integrator *i = t->integrator;
-    const char *why = scene->n_media + scene->n_bodies > 0 ? "there are media"
-                      : scene->wavelengths                 ? "walks carry wavelengths"
-                      : i->from_lights                     ? "walks begin at the lights"
-                      : i->ends_by != IMP_ENDS_BY_ROULETTE ? "walks end by absorption"
-                      : i->hide_emitters                   ? "emitters are hidden"
+    const bool many = scene->world && scene->world->n_places >= IMP_PLACE_MOST;
+    const char *why = many ? "there are too many instances"
+                      : scene->n_media + scene->n_bodies > 0 ? "there are media"
+                      : i->from_lights                       ? "walks begin at the lights"
+                      : i->ends_by != IMP_ENDS_BY_ROULETTE   ? "walks end by absorption"
+                      : i->hide_emitters                     ? "emitters are hidden"
                       : i->mixes || i->split > 1 || t->split > 1 || t->guide
                           ? "directions have densities beside the material's"
                       : t->kept ? "walks are kept"

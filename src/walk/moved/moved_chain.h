@@ -21,9 +21,9 @@ struct imp__link_point {
 static inline struct imp__link_point imp__surface_point(const struct imp_scene *scene,
                                                         int shape,
                                                         const struct imp_located *at,
-                                                        imp_v3 n)
+                                                        int64_t place, imp_v3 n)
 {
-    return (struct imp__link_point){.x = imp__glued_at(scene, shape, at, n)};
+    return (struct imp__link_point){.x = imp__glued_placed(scene, shape, at, place, n)};
 }
 static inline struct imp__link_point imp__sky_point(imp_v3 d)
 {
@@ -91,6 +91,7 @@ static inline imp_v3 imp__slide_bar(struct imp__link_point *x, imp_v3 w)
     /* On a curved surface the normal turns as the vertex slides over it; on a mesh with vertex
      * normals the shading normal does. */
     imp_v3 turn = (x->bar.n - x->x.n * imp__dot(x->x.n, x->bar.n)) * x->x.curvature;
+    turn -= x->x.straight * imp__dot(x->x.straight, turn);
     if (x->x.smooth)
         turn = x->x.slope[0] * imp__dot(x->x.turn[0], x->bar.shade) +
                x->x.slope[1] * imp__dot(x->x.turn[1], x->bar.shade);

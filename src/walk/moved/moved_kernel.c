@@ -39,6 +39,18 @@ void imp__surface_grad(const struct imp_surface *at, imp_v3 grad[2])
     grad[1] = (b * aa - a * ab) * (1 / det);
 }
 
+/* Slope of the luminance of a colour, also where walks carry wavelengths. */
+static void luminance_slope(const struct imp_input *colour, imp_spec weight,
+                            const struct imp_texcoord *at, imp_spec d_uv[2])
+{
+    const struct imp_texture *t = colour->texture;
+    struct imp_texcoord plain = *at;
+    plain.carried = NULL;
+    if (!t) return;
+    t->ops->slope(t, &plain, colour->scalar, d_uv);
+    for (int k = 0; k < 2; k++) d_uv[k] = imp__spec(imp__sum_used(weight * d_uv[k], 3));
+}
+
 /* d K/du and d K/dv. */
 static void textures_derive(const struct imp_vertex *v, const struct imp_dirs *dirs,
                             imp_spec d_uv[2])
@@ -51,13 +63,10 @@ static void textures_derive(const struct imp_vertex *v, const struct imp_dirs *d
         const struct imp_input *i = b->input[j];
         const struct imp_texture *t = i->texture;
         d_in[j][0] = d_in[j][1] = imp__spec(0);
-        if (t) t->ops->slope(t, &at, i->scalar, d_in[j]);
-        for (int k = 0; k < 2; k++) {
-            if (i->luminance)
-                d_in[j][k] =
-                    imp__spec(imp__sum_used(i->weight * d_in[j - i->luminance][k], 3));
-            d_uv[k] += df[j] * d_in[j][k];
-        }
+        if (i->luminance)
+            luminance_slope(b->input[j - i->luminance], i->weight, &at, d_in[j]);
+        else if (t) t->ops->slope(t, &at, i->scalar, d_in[j]);
+        for (int k = 0; k < 2; k++) d_uv[k] += df[j] * d_in[j][k];
     }
 }
 

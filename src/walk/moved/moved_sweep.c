@@ -3,6 +3,7 @@
  * The interior derivative of a walk by what moves (moved.h): adjoints of its values from the first
  * vertex to the last, then adjoints of its places from the last to the first. */
 #include "moved_chain.h"
+#include "moved_sky.h"
 #include "walk/core/vertex.h"
 
 /* What the values of vertex k depend on, as adjoints of their logarithms, by lanes. */
@@ -35,8 +36,9 @@ static int read_walk(struct sweep *s, imp_spec adjoint)
     int n = 0;
     for (const struct imp_vertex *v = s->walk->first; v; v = v->next, n++) {
         const bool sky = v->d.scatterer == IMP_AT_SKY;
-        s->at[n] = sky ? imp__sky_point(imp__decided_v3(v->d.p))
-                       : imp__surface_point(scene, v->d.shape, &v->d.located, v->ng);
+        s->at[n] =
+            sky ? imp__sky_point(imp__decided_v3(v->d.p))
+                : imp__surface_point(scene, v->d.shape, &v->d.located, v->d.place, v->ng);
         struct pieces *piece = &s->piece[n];
         *piece = (struct pieces){{0}, {0}, {0}};
         if (v->d.connection == IMP_CONNECTED) piece->light = P * v->b;
@@ -51,10 +53,11 @@ static int read_walk(struct sweep *s, imp_spec adjoint)
 /* Derivative of the logarithm of what a light at a point sends along d, by d across itself: by
  * differences, whose kinks at the borders of a spot's beam are so wide. */
 #define TURN 1e-6
-static imp_v3 sent_slope(const struct imp_emitter *e, imp_v3 d, int lanes)
+static imp_v3 sent_slope(const struct imp_emitter *e, imp_v3 d, int lanes,
+                         const struct imp_carried *carried)
 {
     const struct imp_frame f = imp__frame_from_normal(d);
-    const struct imp_texcoord nowhere = {.shape = NULL};
+    const struct imp_texcoord nowhere = {.carried = carried};
     const imp_v3 across[2] = {f.s, f.t};
     imp_spec in[IMP_INPUTS_MAX];
     imp_v3 slope = {0};
@@ -139,7 +142,7 @@ static void delta_bar(struct sweep *s, int k, const struct imp_vertex *v)
     const imp_v3 r = s->at[k].x.p - at;
     const double distance = imp__length(r);
     const imp_v3 d = r * (1 / distance);
-    const imp_v3 slope = sent_slope(e, d, s->tracer->scene->lanes) * weight;
+    const imp_v3 slope = sent_slope(e, d, s->tracer->scene->lanes, v->carried) * weight;
     const imp_v3 turn = slope * (1 / distance);
     /* The light turned by a vector sends along d what it sent along d turned back. */
     imp__light_axis_bar(s->moves, light, imp__cross(slope, d), s->theta_bar);
@@ -165,7 +168,7 @@ static void light_bar(struct sweep *s, int k, const struct imp_vertex *v)
         return;
     }
     struct imp__link_point y = imp__surface_point(
-        scene, e->shape->index, &v->d.light.located, imp__decided_v3(v->d.light.d));
+        scene, e->shape->index, &v->d.light.located, 0, imp__decided_v3(v->d.light.d));
     const imp_v3 w = imp__link_direction(&s->at[k], &y);
     const struct imp__kernel_bar kernel = light_kernel(s, k, v, w);
     imp__connection_bar(&s->at[k], &y, &kernel,
@@ -195,6 +198,17 @@ static void step_bar(struct sweep *s, int k, const struct imp_vertex *v)
     imp__velocity_bar(s->moves, &next->x, &next->bar, s->theta_bar);
 }
 
+/* The sky through a fixed film position: the direction d of the ray turns by u(o + d) - u(o). */
+static void sky_seen_bar(const struct sweep *s, imp_spec adjoint)
+{
+    const struct imp_sensor_ray *ray = &s->walk->ray;
+    const imp_v3 slope =
+        imp__skies_slope(s->tracer->scene, ray->d, adjoint, s->walk->first->carried);
+    if (imp__is_zero(slope)) return;
+    imp__camera_velocity_bar(s->moves, ray->o + ray->d, slope, s->theta_bar);
+    imp__camera_velocity_bar(s->moves, ray->o, -slope, s->theta_bar);
+}
+
 bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
                       const struct imp__moves *moves, const struct imp_walk *walk,
                       imp_spec adjoint, double *theta_bar)
@@ -210,7 +224,10 @@ bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
         if (v->d.connection == IMP_CONNECTED) light_bar(&s, k, v);
         if (v->d.goes_on && v->next) step_bar(&s, k, v);
     }
-    if (s.at[0].sky) return true;
+    if (s.at[0].sky) {
+        sky_seen_bar(&s, adjoint);
+        return true;
+    }
     imp__camera_bar(moves, walk->ray.o, &s.at[0], s.wo_bar, theta_bar);
     return true;
 }

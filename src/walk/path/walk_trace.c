@@ -159,8 +159,8 @@ void imp__step_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
 }
 
 void imp__walk_along(const struct imp_tracer *tracer, struct imp_arena *arena,
-                     struct imp_key key, const struct imp_sensor_ray *ray, int depth,
-                     struct imp_walk *walk)
+                     struct imp_key key, const struct imp_sensor_ray *ray,
+                     const struct imp_waves *waves, int depth, struct imp_walk *walk)
 {
     imp_spec scratch[IMP_INPUTS_MAX];
     struct imp_step s;
@@ -171,6 +171,7 @@ void imp__walk_along(const struct imp_tracer *tracer, struct imp_arena *arena,
     walk->px = walk->py = 0;
     walk->ray = *ray;
     walk->depth = depth;
+    walk->waves = waves;
     walk->time = imp__walk_time(tracer, walk);
     step_begin(tracer, arena, walk, scratch, &s);
     s.depth = depth;

@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Skies and what moves (moved.h). Directions in which walks are scattered, and light samples of a
+ * sky, stay fixed in the world, and with them what the sky sends along: a sky enters only where the
+ * camera sees it, along a direction d that turns,
+ *
+ *     dL = dL/dd.d'
+ *
+ * and jumps across the circles of imp_emitter_ops.jumps, whose pictures are edges. */
+#ifndef IMP_WALK_MOVED_SKY_H
+#define IMP_WALK_MOVED_SKY_H
+
+#include "walk/core/walk.h"
+
+/* Radiance of a sky, environment `emitter`, that arrives from the unit direction w, by lanes. */
+imp_spec imp__sky_radiance_from(const struct imp_scene *scene, int emitter, imp_v3 w,
+                                const struct imp_carried *carried);
+/* The same of all skies; bar, by lanes, times its derivative by w, across w. */
+imp_spec imp__skies_from(const struct imp_scene *scene, imp_v3 w,
+                         const struct imp_carried *carried);
+imp_v3 imp__skies_slope(const struct imp_scene *scene, imp_v3 w, imp_spec bar,
+                        const struct imp_carried *carried);
+/* Are silhouettes looked for along directions that the sky draws? One that is the same from
+ * everywhere comes with scattered light. */
+bool imp__sky_has_draws(const struct imp_scene *scene, int emitter);
+/* Integral of a sky's radiance over all directions, by its own draws, roughly: of the lane that has
+ * most. */
+double imp__sky_whole(const struct imp_tracer *tracer, int emitter);
+
+#endif

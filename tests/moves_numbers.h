@@ -1,0 +1,146 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * For tests of gradients by what moves: imp_problem_reverse against central differences of pictures
+ * of 24 x 16 pixels with the same random numbers. The test has a context, ctx. */
+#ifndef IMP_TEST_MOVES_NUMBERS_H
+#define IMP_TEST_MOVES_NUMBERS_H
+
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include "math/vec.h"
+
+enum { WIDTH = 24, HEIGHT = 16 };
+static imp_context *ctx;
+
+/* Smooth over the picture, in steps of pixels that no difference notices. */
+static float adjoint[WIDTH * HEIGHT * 3];
+static void adjoint_make(void)
+{
+    for (int p = 0; p < WIDTH * HEIGHT; p++)
+        for (int c = 0; c < 3; c++) {
+            const double x = (p % WIDTH + .5) / WIDTH, y = (p / WIDTH + .5) / HEIGHT;
+            adjoint[3 * p + c] =
+                (float)((1 + 0.3 * sin(3 * x + 2 * y + c)) / (WIDTH * HEIGHT));
+        }
+}
+
+static double functional(imp_scene *scene, int64_t seed, int spp)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    imp_problem *p;
+    struct imp_estimate value;
+    run.spp = spp;
+    run.seed = (uint64_t)seed;
+    test_must(ctx, imp_problem_create(scene, &p));
+    test_must(ctx, imp_problem_functional(p, adjoint, &run, &value, NULL, NULL));
+    imp_problem_destroy(p);
+    return value.value;
+}
+
+struct number {
+    const char *name;
+    int k;
+    double step;
+};
+
+enum { NUMBERS_MAX = 80 };
+static void values_get(imp_scene *scene, const char *name, double *out, size_t *n,
+                       size_t *index)
+{
+    struct imp_param_info info = {.size = sizeof info};
+    test_must(ctx, imp_scene_find_param(scene, name, index));
+    test_must(ctx, imp_scene_get_param(scene, *index, &info));
+    *n = info.count;
+    if (*n > NUMBERS_MAX) exit(99);
+    test_must(ctx, imp_scene_get_values(scene, *index, out));
+}
+
+static struct tap_stat difference_of(imp_scene *scene, const struct number *x, int spp)
+{
+    enum { GROUPS = 12 };
+    struct tap_stat out = {0, 0, 0};
+    double rest[NUMBERS_MAX], there[NUMBERS_MAX];
+    size_t n, index;
+    values_get(scene, x->name, rest, &n, &index);
+    for (int g = 0; g < GROUPS; g++) {
+        double value[2];
+        for (int s = 0; s < 2; s++) {
+            memcpy(there, rest, sizeof there);
+            there[x->k] += (s ? 1 : -1) * x->step;
+            test_must(ctx, imp_scene_set_values(scene, index, n, there));
+            value[s] = functional(scene, 500 + g, spp);
+        }
+        tap_add(&out, (value[1] - value[0]) / (2 * x->step));
+    }
+    test_must(ctx, imp_scene_set_values(scene, index, n, rest));
+    return out;
+}
+
+/* Parameters are added, and some of their numbers compared; the standard error is at most
+ * `largest` of the largest number of the same parameter. Ends the scene. */
+static inline void numbers_compare(const char *what, imp_scene *scene, int spp,
+                                   int spp_ref, double largest,
+                                   const struct number *numbers)
+{
+    enum { SEEDS = 12 };
+    imp_problem *p;
+    static struct tap_stat g[3 * NUMBERS_MAX];
+    double told = 0, seen = 0;
+    memset(g, 0, sizeof g);
+    for (const struct number *x = numbers; x->name; x++)
+        test_must(ctx, imp_scene_add_geometry(scene, x->name));
+    test_must(ctx, imp_problem_create(scene, &p));
+    const char *active[3 * NUMBERS_MAX];
+    int first[3 * NUMBERS_MAX], n_active = 0;
+    for (const struct number *x = numbers; x->name; x++) {
+        if (n_active > 0 && strcmp(active[n_active - 1], x->name) == 0) continue;
+        first[n_active] = (int)imp_problem_n_variables(p);
+        active[n_active++] = x->name;
+        test_must(ctx, imp_problem_activate(p, x->name));
+    }
+    const size_t n = imp_problem_n_variables(p);
+    if (n > 3 * NUMBERS_MAX) exit(99);
+    first[n_active] = (int)n;
+    static double square[3 * NUMBERS_MAX];
+    memset(square, 0, sizeof square);
+    for (int s = 0; s < SEEDS; s++) {
+        struct imp_run run = IMP_RUN_INIT;
+        double v[3 * NUMBERS_MAX], se[3 * NUMBERS_MAX];
+        run.spp = spp;
+        run.seed = 100 + (uint64_t)s;
+        test_must(ctx, imp_problem_reverse(p, adjoint, &run, v, se));
+        for (size_t k = 0; k < n; k++) {
+            tap_add(&g[k], v[k]);
+            square[k] += se[k] * se[k] / SEEDS;
+        }
+    }
+    imp_problem_destroy(p);
+    int counted = 0;
+    for (size_t k = 0; k < n; k++) {
+        if (!(square[k] > 0)) continue;
+        const double own = imp__sqr(tap_se(&g[k])) * SEEDS;
+        told += log(sqrt(square[k] / own));
+        counted++;
+        seen += own;
+    }
+    const double ratio = exp(told / counted);
+    tap_ok(ratio > 0.75 && ratio < 1.3,
+           "%s: errors told over errors seen, mean of %d numbers # %.3f", what, counted,
+           ratio);
+    for (const struct number *x = numbers; x->name; x++) {
+        int a = 0;
+        double most = 0;
+        while (strcmp(active[a], x->name) != 0) a++;
+        for (int k = first[a]; k < first[a + 1]; k++) most = fmax(most, fabs(g[k].mean));
+        const struct tap_stat ref = difference_of(scene, x, spp_ref),
+                              *own = &g[first[a] + x->k];
+        const double se = sqrt(square[first[a] + x->k] / SEEDS);
+        const double z = (own->mean - ref.mean) / hypot(se, tap_se(&ref));
+        tap_ok(fabs(z) < 3.5 && se < largest * most,
+               "%s, %s[%d] # %.5f se %.5f ref %.5f se %.5f z %.2f", what, x->name, x->k,
+               own->mean, se, ref.mean, tap_se(&ref), z);
+    }
+    imp_scene_destroy(scene);
+}
+
+#endif
