@@ -4,7 +4,6 @@
  */
 #include "imp_tap.h"
 #include "math/exp.h"
-#include "math/exp.h"
 #include "math/linalg.h"
 #include "math/quadrature.h"
 #include "math/rng.h"
