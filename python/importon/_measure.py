@@ -151,7 +151,7 @@ def measure(scene: Scene, photos: Any, params: Any = None, *, stages: Any = None
             noise: Any = None, exif: Any = None, weights: Any = None, say: Optional[Callable[[str], None]] = None,
             spp: int = 0, seed: int = 0, drop_budget: float = 0, points: str = "scene",
             progress: Any = None) -> Measurement:
-    """A scene from photographs, in stages: cameras, exposure, lights, materials, textures, then all together. The scene
+    """A scene from photographs, in stages: cameras, lens, exposure, lights, materials, textures, then all together. The scene
     ends at the best estimate. To be called before anything has been computed from the scene, unless its cameras' poses
     are parameters already (`Scene.add_pose`) or stay.
 
@@ -165,7 +165,8 @@ def measure(scene: Scene, photos: Any, params: Any = None, *, stages: Any = None
         What is measured, poses and other numbers of geometry included; by default all that photographs may tell of, and
         their cameras' poses.
     stages : str or list of str, optional
-        Of "cameras", "exposure", "lights", "materials", "textures"; by default all.
+        Of "cameras", "lens", "exposure", "lights", "materials", "textures"; by default all. A "lens" that is named
+        here measures fields of view and opencv_k1 of the photographs' cameras; `params` names others.
     hold : str or list of str
         Names or patterns of what stays as it is, with indices for single numbers: "left.pose[3-5]".
     rounds : int

@@ -154,15 +154,17 @@ static enum imp_status stage_fit(struct imp__measure *m, enum imp_measure_stage 
                                  const struct imp_fit_result **result)
 {
     const enum imp_status st = imp__measure_fit(m, stage, m->round, problem, result);
-    const size_t cameras = imp__measure_count(m, IMP_MEASURE_CAMERAS);
+    const size_t cameras = imp__measure_count(m, IMP_MEASURE_CAMERAS) +
+                           imp__measure_count(m, IMP_MEASURE_LENS);
+    const bool of_cameras = stage <= IMP_MEASURE_LENS;
     if ((st != IMP_E_UNSUPPORTED && st != IMP_E_BIAS) || !cameras ||
-        (stage != IMP_MEASURE_CAMERAS && stage != IMP_MEASURE_TOGETHER))
+        (!of_cameras && stage != IMP_MEASURE_TOGETHER))
         return st;
     IMP_CHECKED(imp__measure_say(m, "round %d: cameras stay: %s", m->round,
                                  imp_last_error(m->ctx)));
     for (size_t k = 0; k < m->scene->n_params; k++)
-        if (m->stage[k] == IMP_MEASURE_CAMERAS) m->stage[k] = IMP_MEASURE_STAGES;
-    if (stage == IMP_MEASURE_CAMERAS && !problem) return IMP_OK;
+        if (m->stage[k] <= IMP_MEASURE_LENS) m->stage[k] = IMP_MEASURE_STAGES;
+    if (of_cameras && !problem) return IMP_OK;
     const enum imp_measure_stage left = last_stage(m);
     if (imp__measure_count(m, left) == 0) return st; /* there was nothing else */
     return imp__measure_fit(m, left, m->round, problem, result);

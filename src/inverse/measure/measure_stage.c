@@ -23,10 +23,13 @@
 /* ---- Which numbers --------------------------------------------------------------------- */
 
 /* While cameras are found, all numbers but textures go along: contrasts between wrong paints would
- * turn the cameras. Films' numbers go along with lights. */
+ * turn the cameras. So they do with lenses, and cameras with them, as a place looks like a principal
+ * point. A lens that is far off keeps its place while cameras are, which blurred pictures show without
+ * it. Films' numbers go along with lights. */
 static bool is_along(const struct imp__measure *m, enum imp_measure_stage stage, size_t k)
 {
-    if (stage == IMP_MEASURE_CAMERAS) return m->stage[k] < IMP_MEASURE_TEXTURES;
+    if (stage == IMP_MEASURE_CAMERAS && m->stage[k] == IMP_MEASURE_LENS) return false;
+    if (stage <= IMP_MEASURE_LENS) return m->stage[k] < IMP_MEASURE_TEXTURES;
     return stage == IMP_MEASURE_LIGHTS && m->stage[k] == IMP_MEASURE_EXPOSURE;
 }
 
