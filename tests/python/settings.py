@@ -195,6 +195,24 @@ def test_functional():
     return "; ".join(said)
 
 
+def test_reduce():
+    """Smaller pictures: means, errors and what is clipped; sizes that do not go into each other are refused"""
+    big = np.random.default_rng(3).random((6, 8, 3)).astype(np.float32)
+    small = im.reduce(big, 4, 2)
+    assert np.allclose(small, big.reshape(2, 3, 4, 2, 3).mean((1, 3)), rtol=1e-6)
+    big[:3, :2], big[3, 2] = 2, 2
+    small = im.reduce(big, 4, 2, white=2)
+    assert (small[0, 0] == 2).all() and np.isnan(small[1, 1]).all() and np.isnan(small).sum() == 3
+    im.write("big.exr", big)
+    assert np.array_equal(im.reduce("big.exr", 4, 2, 2), small, equal_nan=True)
+    drawn = im.render(im.load_dict(im.cornell_box(res=8)), spp=16)
+    reduced = im.reduce(drawn, 4, 4)
+    assert np.allclose(reduced.standard_error, np.sqrt((drawn.standard_error.reshape(4, 2, 4, 2, 3) ** 2).sum((1, 3))) / 4, rtol=1e-5)
+    raises(im.ArgumentError, lambda: im.reduce(big, 3, 2), "whole")
+    raises(im.ArgumentError, lambda: im.reduce(big, 0, 2))
+    raises(im.ArgumentError, lambda: im.reduce(big, 4, 2, float("nan")), "nan")
+
+
 def test_sky():
     """Skies: projections and sizes keep the light; files and arrays"""
     sky = np.random.default_rng(2).random((16, 32, 3)).astype(np.float32)
