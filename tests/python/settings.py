@@ -207,7 +207,7 @@ def test_reduce():
     assert np.array_equal(im.reduce("big.exr", 4, 2, 2), small, equal_nan=True)
     drawn = im.render(im.load_dict(im.cornell_box(res=8)), spp=16)
     reduced = im.reduce(drawn, 4, 4)
-    assert np.allclose(reduced.standard_error, np.sqrt((drawn.standard_error.reshape(4, 2, 4, 2, 3) ** 2).sum((1, 3))) / 4, rtol=1e-5)
+    assert np.allclose(reduced.se, np.sqrt((drawn.se.reshape(4, 2, 4, 2, 3) ** 2).sum((1, 3))) / 4, rtol=1e-5)
     raises(im.ArgumentError, lambda: im.reduce(big, 3, 2), "whole")
     raises(im.ArgumentError, lambda: im.reduce(big, 0, 2))
     raises(im.ArgumentError, lambda: im.reduce(big, 4, 2, float("nan")), "nan")

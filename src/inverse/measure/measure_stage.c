@@ -213,7 +213,7 @@ enum imp_status imp__measure_look(struct imp__measure *m)
     return m->looked ? IMP_OK : photos_look(m, m->n_rows);
 }
 
-static void row_judge(const struct imp__measure *m, struct imp_measure_row *row)
+void imp__measure_judge(const struct imp__measure *m, struct imp_measure_row *row)
 {
     double sum = 0, variance = 0, values = 0, noise_of = 0;
     for (size_t i = 0; i < m->n_photos; i++) {
@@ -248,7 +248,7 @@ static enum imp_status row_add(struct imp__measure *m, enum imp_measure_stage st
                                     .residual = r->residual,
                                     .residual_hi = r->residual_hi};
     IMP_CHECKED(photos_look(m, m->n_rows + 1));
-    row_judge(m, row);
+    imp__measure_judge(m, row);
     m->n_rows++;
     return imp__measure_say(
         m,
@@ -264,7 +264,7 @@ enum imp_status imp__measure_judge_again(struct imp__measure *m)
     struct imp_measure_row *row = &m->rows[m->n_rows - 1];
     m->looked = false;
     IMP_CHECKED(imp__measure_look(m));
-    row_judge(m, row);
+    imp__measure_judge(m, row);
     return imp__measure_say(m,
                             "round %d, %s: by this noise chi-square is %.3g +- %.2g, %s",
                             row->round, imp_measure_stage_name(row->stage), row->chi2,
