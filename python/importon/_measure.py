@@ -14,7 +14,7 @@ from ._fit import Fit, variables
 from ._library import ArgumentError, Handle, decode, failure, integer, lib, make, not_inside, rows_of, run, text
 from ._missing import Missing
 from ._params import names_of
-from ._problem import Problem, _integers, _is_path, _one_target, is_photograph, levels, push, run_options, target_list
+from ._problem import Problem, _integers, _is_path, _one_target, is_photograph, is_raw, levels, push, run_options, target_list
 from ._scene import Scene
 
 _EXIF = ("focal_35mm", "exposure_s", "iso", "f_number")
@@ -111,7 +111,7 @@ def _photo(scene: Scene, sensor: int, value: Any, weights: Any, clip: Any, noise
     file = _integers(value) if _is_path(value) else None
     p = make(_c.imp_photo, sensor=sensor, width=t.width, height=t.height, channels=t.channels, pixels=t.pixels,
              weights=t.weights, noise=float(noise), step=1 / file[1] if file else 0.)
-    if clip is not None and (clip != "auto" or file):
+    if clip is not None and (clip != "auto" or file or (_is_path(value) and is_raw(value))):
         p.clipped = True
         p.low, p.high = levels(value, clip, is_photograph(scene, sensor))
     for key, number in exif.items():
