@@ -12,6 +12,7 @@
 #include <string.h>
 
 #define SPP    64   /* samples per pixel of an evaluation, where nobody chose */
+#define LOOK   64   /* samples by which those that are held are tested, at least: once */
 #define CHANCE 1e-4 /* chance and drop of chi-square by which a number that is held ... */
 #define DROP   20   /* ... is wrong though all pixels together are explained */
 
@@ -179,8 +180,9 @@ static enum imp_status round_run(struct imp__measure *m, imp_problem **problem,
 static enum imp_status missing_find(struct imp__measure *m, imp_problem *p,
                                     struct imp_measure_result *r)
 {
-    const enum imp_status st =
-        imp_problem_missing(p, &m->run, &r->missing, &r->n_missing);
+    struct imp_run run = m->run;
+    run.spp = imp_max(LOOK, run.spp);
+    const enum imp_status st = imp_problem_missing(p, &run, &r->missing, &r->n_missing);
     if (st != IMP_E_UNSUPPORTED && st != IMP_E_BIAS) return st;
     r->n_missing = 0;
     if (r->explained) return IMP_OK;
