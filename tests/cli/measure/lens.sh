@@ -9,7 +9,7 @@ measure() {
     importon measure scene.xml left.ppm -m mono -D floor=.4 -D block=.45 --hold '*.gamma.*' --hold 'sky.*' --hold 'lamp.*' \
         --noise .0104 --spp 8 --no-masks --rounds 1 "$@"
 }
-stages() { sed -n 's/^\(round 1, [a-z]*: [0-9]* numbers\).*/\1/p; s/^\(left\.[px][a-z]*_[^ ]*\) .*/\1/p; s/^\(left\.o[^ ]*\) .*/\1/p'; }
+stages() { sed -n 's/^\(round 1, [a-z]*: [0-9]* numbers\).*/\1/p; s/^\(left\.[px][a-z]*_[^ ]*\) .*/\1/p; s/^\(left\.o[^ ]*\) .*/\1/p' | uniq; }
 measure --stages lens,exposure,materials -n 8 -o out | stages
 python3 - <<'P'
 import json
