@@ -5,7 +5,7 @@
  * a plan of its own random numbers: in the median of the scenes four know the numbers as well, and they
  * know them better than four that are drawn at random.
  *
- * Argument long, or a number: 100 cases in place of 4. */
+ * Argument long, or a number: 100 cases in place of one. */
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "math/rng.h"
@@ -158,7 +158,7 @@ static int by_size(const void *a, const void *b)
 int main(int argc, char **argv)
 {
     const int given = argc > 1 ? atoi(argv[1]) : 0;
-    const int cases = argc > 1 && !strcmp(argv[1], "long") ? 100 : given > 0 ? given : 4;
+    const int cases = argc > 1 && !strcmp(argv[1], "long") ? 100 : given > 0 ? given : 1;
     double *ten = calloc(2 * (size_t)cases, sizeof *ten), *drawn = ten + cases;
     ctx = test_context(2);
     if (!ten) return 99;
