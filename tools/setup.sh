@@ -5,7 +5,7 @@
 
 packages=(meson ninja-build gcc libc6-dev pkg-config libembree-dev libopenexr-dev libnlopt-dev
     libpng-dev libjpeg-dev libexpat1-dev libjansson-dev zlib1g-dev libsuitesparse-dev libmicrohttpd-dev
-    libexif-dev libtiff-dev)
+    libexif-dev libtiff-dev libraw-dev)
 
 say() {
     if [[ -t 2 ]]; then printf '\033[1m== %s\033[0m\n' "$*" >&2; else echo "== $*" >&2; fi

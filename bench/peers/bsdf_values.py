@@ -13,14 +13,10 @@ mitsuba; skips (77) without.
 """
 import argparse
 import os
-import sys
 
-try:
-    import mitsuba as mi
-    import numpy as np
-except ImportError as e:
-    print("SKIP: this python3 has no mitsuba or numpy (%s)" % e, file=sys.stderr)
-    sys.exit(77)
+import needed
+
+mi, np = needed.modules("mitsuba", "numpy")
 
 here = os.path.dirname(os.path.abspath(__file__))
 SCENE = os.path.join(here, "../../tests/render/peer/bsdfs.xml")

@@ -17,15 +17,11 @@ import os
 import random
 import resource
 import subprocess
-import sys
 import tempfile
 
-try:
-    import cv2
-    import numpy as np
-except ImportError as e:
-    print("SKIP: this python3 has no OpenCV or numpy (%s)" % e)
-    sys.exit(77)
+import needed
+
+cv2, np = needed.modules("cv2", "numpy")
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 SCENE = os.path.join(ROOT, "scenes", "board.xml")

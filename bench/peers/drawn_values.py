@@ -15,14 +15,10 @@ can import mitsuba; skips (77) without.
 import argparse
 import glob
 import os
-import sys
 
-try:
-    import mitsuba as mi
-    import numpy as np
-except ImportError as e:
-    print("SKIP: this python3 has no mitsuba or numpy (%s)" % e, file=sys.stderr)
-    sys.exit(77)
+import needed
+
+mi, np = needed.modules("mitsuba", "numpy")
 
 
 def direction(rng, both, grazing):

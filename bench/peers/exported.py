@@ -18,12 +18,9 @@ import tempfile
 
 import random_parts
 
-try:
-    import mitsuba as mi
-    import numpy as np
-except ImportError as e:
-    print("SKIP: this python3 has no mitsuba or numpy (%s)" % e)
-    sys.exit(77)
+import needed
+
+mi, np = needed.modules("mitsuba", "numpy")
 
 here = os.path.dirname(os.path.abspath(__file__))
 root = os.path.dirname(os.path.dirname(here))

@@ -52,12 +52,9 @@ DIFFERENCES = ["brass.alpha.value", "brushed.alpha_u.value", "mirror.eta.value",
                "glass.specular_reflectance.value", "glass.specular_transmittance.value"]
 STEP = 0.02  # of differences, as a fraction of the value
 
-try:
-    import mitsuba as mi
-    import numpy as np
-except ImportError as e:
-    print("SKIP: this python3 has no mitsuba or numpy (%s)" % e)
-    sys.exit(77)
+import needed
+
+mi, np = needed.modules("mitsuba", "numpy")
 
 
 def texture_read(path):

@@ -17,13 +17,9 @@ import time
 here = os.path.dirname(os.path.abspath(__file__))
 root = os.path.dirname(os.path.dirname(here))
 
-try:
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-except ImportError as e:
-    print("SKIP: this python3 has no mitsuba or numpy (%s)" % e, file=sys.stderr)
-    sys.exit(77)
+import needed
+
+dr, mi, np = needed.modules("drjit", "mitsuba", "numpy")
 
 
 def measured(path, spp, pictures=8):

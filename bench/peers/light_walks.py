@@ -12,20 +12,15 @@ import argparse
 import os
 import resource
 import subprocess
-import sys
 import tempfile
 import time
 
 here = os.path.dirname(os.path.abspath(__file__))
 root = os.path.dirname(os.path.dirname(here))
 
-try:
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-except ImportError as e:
-    print("SKIP: this python3 has no mitsuba or numpy (%s)" % e, file=sys.stderr)
-    sys.exit(77)
+import needed
+
+dr, mi, np = needed.modules("drjit", "mitsuba", "numpy")
 
 SCENE = """<scene version="3.0.0"><integrator type="ptracer"><integer name="max_depth" value="8"/>
 <integer name="rr_depth" value="100"/></integrator>

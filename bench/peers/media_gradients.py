@@ -13,16 +13,11 @@ import argparse
 import math
 import os
 import subprocess
-import sys
 import tempfile
 
-try:
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-except ImportError as e:
-    print("SKIP: this python3 has no mitsuba or numpy (%s)" % e)
-    sys.exit(77)
+import needed
+
+dr, mi, np = needed.modules("drjit", "mitsuba", "numpy")
 
 here = os.path.dirname(os.path.abspath(__file__))
 SCENE = """<scene version="3.0.0"><default name="integrator" value="volpath"/>

@@ -16,12 +16,9 @@ import subprocess
 import sys
 import tempfile
 
-try:
-    import mitsuba  # noqa: F401
-    import numpy as np  # noqa: F401
-except ImportError as e:
-    print("SKIP: this python3 has no mitsuba or numpy (%s)" % e, file=sys.stderr)
-    sys.exit(77)
+import needed
+
+needed.modules("mitsuba", "numpy")
 
 import meshes
 

@@ -30,12 +30,9 @@ here = os.path.dirname(os.path.abspath(__file__))
 root = os.path.dirname(os.path.dirname(here))
 SCENE = os.path.join(root, "scenes/cornell.xml")
 
-try:
-    import mitsuba as mi
-    import numpy as np
-except ImportError as e:
-    print("SKIP: this python3 has no mitsuba or numpy (%s)" % e, file=sys.stderr)
-    sys.exit(77)
+import needed
+
+mi, np = needed.modules("mitsuba", "numpy")
 
 PICTURE = """
 import sys

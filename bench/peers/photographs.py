@@ -17,16 +17,12 @@ import math
 import os
 import random
 import subprocess
-import sys
 import tempfile
 import time
 
-try:
-    import mitsuba as mi
-    import numpy as np
-except ImportError as e:
-    print("SKIP: this python3 has no mitsuba or numpy (%s)" % e)
-    sys.exit(77)
+import needed
+
+mi, np = needed.modules("mitsuba", "numpy")
 
 import photograph_cases
 

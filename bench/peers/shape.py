@@ -16,13 +16,9 @@ import sys
 import tempfile
 import time
 
-try:
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-except ImportError as e:
-    print("SKIP: this python3 has no mitsuba or numpy (%s)" % e)
-    sys.exit(77)
+import needed
+
+dr, mi, np = needed.modules("drjit", "mitsuba", "numpy")
 
 here = os.path.dirname(os.path.abspath(__file__))
 root = os.path.dirname(os.path.dirname(here))

@@ -14,18 +14,13 @@ import argparse
 import os
 import resource
 import subprocess
-import sys
 import tempfile
 import time
 
-try:
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-    from scipy.ndimage import zoom
-except ImportError as e:
-    print("SKIP: this python3 has no mitsuba, numpy or scipy (%s)" % e)
-    sys.exit(77)
+import needed
+
+dr, mi, np, ndimage = needed.modules("drjit", "mitsuba", "numpy", "scipy.ndimage")
+zoom = ndimage.zoom
 
 here = os.path.dirname(os.path.abspath(__file__))
 root = os.path.dirname(os.path.dirname(here))

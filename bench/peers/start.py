@@ -18,11 +18,9 @@ import subprocess
 import sys
 import tempfile
 
-try:
-    import mitsuba  # noqa: F401
-except ImportError as e:
-    print("SKIP: this python3 has no mitsuba (%s)" % e, file=sys.stderr)
-    sys.exit(77)
+import needed
+
+needed.modules("mitsuba")
 
 root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 TOO_MUCH = 2

@@ -28,19 +28,12 @@ import os
 import re
 import statistics
 import subprocess
-import sys
 import tempfile
 import time
 
-try:
-    import drjit as dr
-    import importon as im
-    import mitsuba as mi
-    import numpy as np
-    import scipy.stats
-except ImportError as e:
-    print("SKIP: this python3 lacks a module (%s)" % e, file=sys.stderr)
-    sys.exit(77)
+import needed
+
+dr, im, mi, np, stats = needed.modules("drjit", "importon", "mitsuba", "numpy", "scipy.stats")
 
 import meshes
 
@@ -255,7 +248,7 @@ def gradients(case, own, peer, a):
         if where == "wrong":
             ours, theirs = (got[p.name, p.best][1] for p in (own, peer))
             length = float((ours.mean(axis=0) ** 2).sum())
-            level = scipy.stats.ttest_ind(ours, theirs, equal_var=False).pvalue.min() * ours.shape[1]
+            level = stats.ttest_ind(ours, theirs, equal_var=False).pvalue.min() * ours.shape[1]
             print("%s: %d numbers, the programs' mean gradients agree at level %.3g" % (case.name, ours.shape[1], level))
             print("%s: a gradient takes %s" % (case.name, ", ".join(
                 "%.3g s (%s, %s, %d samples)" % (s, p.name, points, samples(p, a)) for p in (own, peer)

@@ -19,20 +19,15 @@ import sys
 import tempfile
 import time
 
+import needed
+
 here = os.path.dirname(os.path.abspath(__file__))
 root = os.path.dirname(os.path.dirname(here))
 BATCHES = 32
 
 
 def mitsuba_import():
-    try:
-        import mitsuba
-        import numpy
-        import scipy.stats
-    except ImportError as e:
-        print("SKIP: this python3 has no mitsuba, numpy or scipy (%s)" % e)
-        sys.exit(77)
-    return mitsuba, numpy, scipy.stats
+    return needed.modules("mitsuba", "numpy", "scipy.stats")
 
 
 mi, np, stats = mitsuba_import()

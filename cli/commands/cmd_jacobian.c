@@ -143,9 +143,14 @@ static int write_block(struct json *j, FILE *table, const struct block *b,
     int rc = 0;
     for (size_t i = 1; i < b->n && n == 1; i++)
         add_film(films[b->first], films[b->first + i]);
-    for (size_t i = 0; i < n && !rc; i++)
+    for (size_t i = 0; i < n && !rc; i++) {
+        if (n > 1 && block_held(b, i)) { /* its picture is 0 */
+            if (!cli.json) printf("%-40s held\n", control_name(b, i, name, sizeof name));
+            continue;
+        }
         rc = write_control(j, table, films[b->first + i], means[i],
                            control_name(b, i, name, sizeof name), run);
+    }
     return rc;
 }
 

@@ -87,6 +87,10 @@ static void print_derivatives(const struct block *blocks, size_t n_blocks,
             char name[256];
             const size_t at = blocks[b].first + k;
             cli_number_row(&blocks[b].info, k, name, sizeof name);
+            if (block_held(&blocks[b], k)) {
+                printf("    d/d %-28s held\n", name);
+                continue;
+            }
             printf("    d/d %-28s %-12.6g +- %-8.2g %s / (%s)\n", name, r->grad[at],
                    r->se[at], unit, blocks[b].info.unit);
         }
@@ -339,6 +343,8 @@ static int run_read(int n, char **operand)
                          "--from and --param");
     if (dgp_wanted.on && !cli_typed("sensor"))
         return cli_error(EXIT_USAGE, "--dgp is of one grid: choose it with --sensor");
+    if (problem_options.hold.n && !problem_options.params.n)
+        return cli_error(EXIT_USAGE, "--hold is of derivatives: it goes with --param");
     if (o.report && !o.grid)
         return cli_error(EXIT_USAGE, "--report is of grids: it goes with --grid");
     if (wants_given() && !o.report)

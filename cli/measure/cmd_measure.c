@@ -24,8 +24,8 @@ static struct {
 
 static const struct arg_option options[] = {
     {ARG_TEXT, 0, "stages", "NAME[,..]",
-     "of cameras, exposure, lights, materials, textures (default: all)", &o.stages, 0, 0,
-     NULL},
+     "of cameras, lens, exposure, lights, materials, textures (default: all)", &o.stages,
+     0, 0, NULL},
     {ARG_LIST, 'p', "param", "GLOB",
      "what is measured: a name or a pattern (default: all, and the cameras' poses)",
      &problem_options.params, 0, 0, NULL},

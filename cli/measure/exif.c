@@ -73,9 +73,11 @@ static size_t tiff_block(FILE *f, unsigned char *block)
 }
 
 /* The first number of an entry; 0: there is none, or it is not positive and finite. */
+/* Raw files have some of it in their first directory (TIFF/EP, ISO 12234-2). */
 static double number_of(ExifData *data, ExifTag tag)
 {
     ExifEntry *e = exif_content_get_entry(data->ifd[EXIF_IFD_EXIF], tag);
+    if (!e) e = exif_content_get_entry(data->ifd[EXIF_IFD_0], tag);
     const ExifByteOrder order = exif_data_get_byte_order(data);
     double v = 0;
     if (!e || !e->data || e->components < 1 ||

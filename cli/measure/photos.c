@@ -10,6 +10,7 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
@@ -52,7 +53,7 @@ static bool has_ending(const char *name, const char *const *endings)
 static const char *const scene_endings[] = {"xml", NULL};
 static const char *const photo_endings[] = {"png", "jpg", "jpeg", "exr", "pfm",
                                             "hdr", "npy", "ppm",  "pgm", "bmp",
-                                            "tga", "tif", "tiff", NULL};
+                                            "tga", "tif", "tiff", "dng", NULL};
 
 static int by_name(const void *a, const void *b)
 {
@@ -181,7 +182,8 @@ static int photo_read(struct photos *p, const char *path, int sensor)
     if (rc) return rc;
     photo.step = photograph_step(spec);
     const bool never = o.clip && !strcmp(o.clip, "never");
-    photo.clipped = !never && (photo.step > 0 || (o.clip && strcmp(o.clip, "auto") != 0));
+    photo.clipped = !never && (isfinite(photograph_white(spec)) ||
+                               (o.clip && strcmp(o.clip, "auto") != 0));
     photograph_undo_srgb(spec, &t);
     if (photo.clipped)
         rc = photograph_levels(spec, o.clip ? o.clip : "auto", &t, &photo.low,
@@ -196,12 +198,13 @@ static int photo_read(struct photos *p, const char *path, int sensor)
     photo.height = t.height;
     photo.channels = t.channels;
     photo.pixels = t.pixels;
+    photo.weights = t.weights;
     photo.noise = o.noise;
     photo.focal_35mm = exif.focal_35mm;
     photo.exposure_s = exif.exposure_s;
     photo.iso = exif.iso;
     photo.f_number = exif.f_number;
-    t.pixels = NULL;
+    t.pixels = t.weights = NULL;
     picture_target_free(&t);
 
     struct imp_photo *grown = realloc(p->photo, (p->n + 1) * sizeof *grown);
@@ -282,6 +285,7 @@ void photos_free(struct photos *p)
 {
     for (size_t i = 0; i < p->n; i++) {
         free((void *)p->photo[i].pixels);
+        free((void *)p->photo[i].weights);
         free(p->path[i]);
         free(p->spec[i]);
     }

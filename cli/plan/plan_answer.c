@@ -117,6 +117,11 @@ static void print_numbers(const struct plan_answer *a)
     }
     printf("%s\n", r->n_chosen > 1 ? " with the chosen" : "");
     for (size_t i = 0; i < p->n; i++) {
+        const struct block *b = plan_number_block(p, i);
+        if (block_held(b, i - b->first)) {
+            printf("%-*s  held\n", width, plan_number_name(p, i, text, sizeof text));
+            continue;
+        }
         printf("%-*s  %-10s", width, plan_number_name(p, i, text, sizeof text),
                half(r->today[i], number));
         for (size_t k = 0; k < next; k++)

@@ -19,6 +19,7 @@
 /* The format by the file's first bytes, as in imp_film_read; of TIFF by its first directory. */
 struct encoding {
     bool srgb, jpeg; /* read as sRGB: not a file of floating-point numbers */
+    bool raw;        /* linear, clipped at 1: a DNG */
     double most;     /* largest number of a channel */
 };
 
@@ -30,8 +31,9 @@ static unsigned long tiff_number(const unsigned char *b, int n, bool little)
     return v;
 }
 
-/* Bits of a value, negative of floats (TIFF 6.0, section 2: a directory has entries of 12 bytes, tag,
- * type, count and value; tag 258 are bits, 339 the format, 3 for floats). */
+/* Bits of a value, negative of floats, 0 of a DNG (TIFF 6.0, section 2: a directory has entries of 12
+ * bytes, tag, type, count and value; tag 258 are bits, 339 the format, 3 for floats, 50706 DNG's
+ * version). */
 static int tiff_bits(FILE *f, const char *header)
 {
     const bool little = header[0] == 'I';
@@ -46,6 +48,7 @@ static int tiff_bits(FILE *f, const char *header)
     for (unsigned long left = tiff_number(entry, 2, little); left > 0; left--) {
         if (fread(entry, 1, 12, f) != 12) break;
         tag = tiff_number(entry, 2, little);
+        if (tag == 50706) return 0;
         const unsigned long count = tiff_number(entry + 4, 4, little);
         if (tag != 258 && tag != 339) continue;
         unsigned long v = tiff_number(entry + 8, 2, little);
@@ -76,6 +79,7 @@ static struct encoding encoding_of(const char *spec)
     if (f && (!memcmp(header, "II*\0", 4) || !memcmp(header, "MM\0*", 4))) {
         const int bits = tiff_bits(f, header);
         e.srgb = bits > 0;
+        e.raw = bits == 0;
         e.most = bits == 16 ? 65535 : 255;
     }
     if (f) fclose(f);
@@ -128,6 +132,15 @@ double photograph_step(const char *spec)
     return e.srgb ? 1 / e.most : 0;
 }
 
+double photograph_white(const char *spec)
+{
+    const struct encoding e = encoding_of(spec);
+    double low, high;
+    if (e.raw) return 1;
+    file_levels(&e, &low, &high);
+    return e.srgb ? decode(high) : (double)INFINITY;
+}
+
 void photograph_warn_clipped(const char *spec, const struct imp_target *t)
 {
     double low, high;
@@ -155,7 +168,9 @@ int photograph_levels(const char *spec, const char *text, const struct imp_targe
     const struct encoding e = encoding_of(spec);
     *low = (double)-FLT_MAX; /* below all numbers */
     *high = (double)FLT_MAX;
-    if (!strcmp(text, "auto")) {
+    if (!strcmp(text, "auto") && e.raw) {
+        *high = 1;
+    } else if (!strcmp(text, "auto")) {
         if (!e.srgb)
             return cli_error(EXIT_USAGE,
                              "--clip auto: %s holds floating-point numbers, and not "

@@ -9,6 +9,9 @@
 /* Between neighbouring values of a file of integers, as it has them; 0: it holds floating-point
  * numbers. */
 double photograph_step(const char *spec);
+/* Where its values are clipped once they are linear light, as picture_read has them; infinite: it does not
+ * say. */
+double photograph_white(const char *spec);
 /* Warns of pixels that are as bright as the file can hold. */
 void photograph_warn_clipped(const char *spec, const struct imp_target *target);
 /* Where the film of target->sensor has a gamma, it is the numbers of the file that count:

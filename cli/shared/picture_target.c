@@ -4,6 +4,7 @@
 #include "picture_files.h"
 
 #include "command.h"
+#include "photograph.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -133,6 +134,54 @@ static int number_target(const char *text, int sensor, struct imp_target *target
     return 0;
 }
 
+/* Once for each file, which is read for its copy in the folder of answers, too. */
+static void reduced_say(const char *path, int part)
+{
+    static struct arg_list said;
+    for (size_t i = 0; i < said.n; i++)
+        if (!strcmp(said.item[i], path)) return;
+    args_list_add(&said, cli_strdup(path));
+    cli_say("importon: %s: means of %d x %d pixels each", path, part, part);
+}
+
+/* A file with a whole number of pixels for each of the sensor's: their means, and weight 0 where some are
+ * clipped. *made is to be freed; NULL: nothing was. */
+static int reduce(const char *spec, const char *path,
+                  const struct imp_sensor_info *sensor, imp_film **film, float **made)
+{
+    struct imp_film_info info = {.size = sizeof info};
+    imp_film *small = NULL;
+    imp_film_get_info(*film, &info);
+    if (sensor->width < 1 || sensor->height < 1 || info.width <= sensor->width ||
+        info.width % sensor->width || info.height % sensor->height ||
+        info.width / sensor->width != info.height / sensor->height)
+        return 0;
+    const enum imp_status st = imp_film_reduce(*film, sensor->width, sensor->height,
+                                               photograph_white(spec), &small);
+    if (st != IMP_OK) return cli_fail(st, path);
+    reduced_say(path, info.width / sensor->width);
+    imp_film_destroy(*film);
+    *film = small;
+    const size_t n = (size_t)sensor->width * (size_t)sensor->height,
+                 C = (size_t)info.channels;
+    float *v = imp_film_mean(small), *se = imp_film_se(small);
+    float *weights = cli_alloc(n, sizeof *weights);
+    size_t some = 0;
+    for (size_t i = 0; i < n; i++) {
+        weights[i] = 1;
+        for (size_t c = 0; c < C; c++) {
+            if (!isnan(v[i * C + c])) continue;
+            weights[i] = 0;
+            v[i * C + c] = 0;
+            if (se) se[i * C + c] = 0;
+        }
+        some += weights[i] == 0;
+    }
+    if (some) *made = weights;
+    else free(weights);
+    return 0;
+}
+
 int picture_target(const char *spec, const char *mask, struct imp_target *target)
 {
     struct imp_film_info info = {.size = sizeof info},
@@ -141,6 +190,7 @@ int picture_target(const char *spec, const char *mask, struct imp_target *target
     imp_film *film = NULL, *weights = NULL;
     struct imp_sensor_info sensor = {.size = sizeof sensor};
     int *index = NULL;
+    float *whole = NULL; /* weights */
     const char *at = sensor_part(spec);
     char *path = at ? strndup(spec, (size_t)(at - spec)) : strdup(spec);
     if (!path) return cli_error(EXIT_RUN, "out of memory");
@@ -156,7 +206,10 @@ int picture_target(const char *spec, const char *mask, struct imp_target *target
     imp_film_get_info(film, &info);
     target->sensor = at ? picture_sensor(spec) : cli.sensor;
     if (imp_scene_get_sensor(cli.scene, target->sensor, &sensor) != IMP_OK)
-        sensor.n_responses = 0; /* which the problem will report */
+        sensor.n_responses = sensor.width = 0; /* which the problem will report */
+    rc = reduce(spec, path, &sensor, &film, &whole);
+    if (rc) goto out;
+    imp_film_get_info(film, &info);
     index = cli_alloc((size_t)sensor.n_responses + 3, sizeof *index);
     int channels = sensor.n_responses;
     if (channels) rc = curve_channels(film, path, &info, &sensor, index);
@@ -185,8 +238,13 @@ int picture_target(const char *spec, const char *mask, struct imp_target *target
         colour_channels(weights, mask_info.channels, index);
         target->weights =
             extract(imp_film_mean(weights), n, mask_info.channels, index, 1, 1, 0);
+        for (size_t i = 0; whole && i < n; i++) ((float *)target->weights)[i] *= whole[i];
+    } else if (whole) {
+        target->weights = whole;
+        whole = NULL;
     }
 out:
+    free(whole);
     imp_film_destroy(film);
     imp_film_destroy(weights);
     free(index);

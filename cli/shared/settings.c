@@ -122,7 +122,8 @@ static int apply_set(const char *text)
     if (asprintf(&what, "--set %s", text) < 0) exit(cli_error(EXIT_RUN, "out of memory"));
     const int rc = cli_fail(st, what);
     free(what);
-    return rc;
+    /* Numbers that no scene can have are the caller's mistake, though they are found when things move. */
+    return st == IMP_E_NUMERIC ? EXIT_USAGE : rc;
 }
 
 int settings_apply(const char *text)

@@ -786,12 +786,22 @@ struct imp_write_options {
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_film_write(const imp_film *film, const char *path,
                const struct imp_write_options *options);
-/** Read .exr, .pfm, .hdr, .npy, .png or .jpg (8- and 16-bit files are taken to be sRGB
- * and made linear). The caller destroys the film.
+/** Read .exr, .pfm, .hdr, .npy, .png, .jpg, .tif, .dng and others, by their first bytes (8- and
+ * 16-bit files are taken to be sRGB and made linear; a DNG is what its sensor counted, white at 1,
+ * 2 x 2 pixels of a mosaic as one). The caller destroys the film.
  * @return IMP_OK; IMP_E_IO; IMP_E_SCENE if it is not such a file, or damaged;
  *         IMP_E_UNSUPPORTED; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_film_read(imp_context *context,
                                                      const char *path, imp_film **out);
+
+/** A picture of fewer pixels: means of blocks of nx x ny, where it has nx width x ny height.
+ * @param white values at or above it are clipped: a block of these alone has `white`, and one with
+ *              some of them NaN, as its mean is not known. INFINITY: none.
+ * @param[out] out with the same channels, and errors where it has some; the caller destroys it.
+ * @return IMP_OK; IMP_E_ARG where that is not a whole number of pixels; IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_film_reduce(const imp_film *film, int width,
+                                                       int height, double white,
+                                                       imp_film **out);
 
 /** How a picture holds all directions: rows at equal angles from up to down, the first
  * and the last at the poles, or rows at equal cosines, all texels of one solid angle. */

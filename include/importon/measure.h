@@ -4,7 +4,9 @@
  * sensors, imp_measure finds the numbers of the scene in stages, each of which begins where the one
  * before has ended:
  *
- *     cameras    poses and fields of view, with all numbers of the next three beside them
+ *     cameras    poses and fields of view, with exposure, lights and materials beside them
+ *     lens       principal points and distortion, with all of these beside them; where it or its numbers
+ *                are named
  *     exposure   exposure, white balance, vignetting and gamma of the films, with that factor
  *     lights     radiances of lamps and sky
  *     materials  reflectances, roughnesses, media
@@ -51,6 +53,7 @@ struct imp_photo {
 
 enum imp_measure_stage {
     IMP_MEASURE_CAMERAS = 0,
+    IMP_MEASURE_LENS,
     IMP_MEASURE_EXPOSURE,
     IMP_MEASURE_LIGHTS,
     IMP_MEASURE_MATERIALS,
@@ -67,7 +70,8 @@ typedef void (*imp_measure_say_fn)(const char *line, void *payload);
 struct imp_measure_options {
     size_t size;
     /** Names of stages with commas between them, in any order; NULL: all. "together" follows always,
-     * but more than 236 numbers of textures alone. */
+     * but more than 236 numbers of textures alone. Where "lens" is among them, and `params` is NULL,
+     * x_fov and opencv_k1 of the photographs' cameras are measured. */
     const char *stages;
     /** [n_params] names or patterns of what is measured, poses and other numbers of geometry
      * included ("camera.pose", "*.x_fov"). NULL: all parameters with a gradient that the photographs

@@ -56,7 +56,9 @@ enum imp_plan_criterion { IMP_PLAN_D = 0, IMP_PLAN_A };
 struct imp_plan_options {
     size_t size;
     enum imp_plan_criterion criterion;
-    const size_t *of; /**< [n_of] indices in x of the wanted numbers; NULL: all */
+    /** [n_of] indices in x of the wanted numbers; NULL: all. Those that are held (imp_problem_hold) do
+     * not count, and have no interval. */
+    const size_t *of;
     size_t n_of;
     /** [imp_problem_n_variables] one standard deviation of what is known of a number without
      * pictures, in units of x; 0: its large change (its range where it has two bounds, else its

@@ -36,7 +36,7 @@ from ._measure import MeasuredPhoto, Measurement, MeasureStage, measure
 from ._missing import Missing, missing
 from ._params import Gradient, ParameterInfo, SceneParameters, Values, traverse
 from ._parts import PartsInfo, join_parts, merge, part, parts_info, team
-from ._picture import DroppedWalk, Picture, project, read, write
+from ._picture import DroppedWalk, Picture, project, read, reduce, write
 from ._plan import Plan, PlanRow, lamps, plan, plan_improve, plan_map
 from ._progress import set_progress
 from ._daylight import Weather, Year, annual, weather
@@ -60,7 +60,7 @@ __all__ = [
     "Picture", "Plan", "PlanRow", "Progress", "Reached", "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "SelfTestRow", "Sensor", "Share",
     "Transform4f", "UnsupportedError", "Values", "Walks", "Want", "Weather", "Year", "__version__", "ad", "annual", "bend", "check", "compare", "cornell_box", "daylight_glare", "denoise", "design",
     "elements", "fit", "functional", "functional_until", "glare", "grid", "guide", "jacobian", "join_parts", "keep", "lamps", "library_path", "load_dict", "load_file",
-    "load_string", "loss", "luminaires", "measure", "merge", "missing", "part", "parts_info", "plan", "plan_improve", "plan_map", "project", "read", "read_walks", "render", "render_backward",
+    "load_string", "loss", "luminaires", "measure", "merge", "missing", "part", "parts_info", "plan", "plan_improve", "plan_map", "project", "read", "read_walks", "reduce", "render", "render_backward",
     "render_forward", "render_until", "report", "selftest", "set_progress", "set_threads", "set_variant", "shares", "team", "threads",
     "traverse", "variant", "walk", "weather", "write",
 ]

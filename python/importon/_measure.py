@@ -14,7 +14,7 @@ from ._fit import Fit, variables
 from ._library import ArgumentError, Handle, decode, failure, integer, lib, make, not_inside, rows_of, run, text
 from ._missing import Missing
 from ._params import names_of
-from ._problem import Problem, _integers, _is_path, _one_target, is_photograph, levels, push, run_options, target_list
+from ._problem import Problem, _integers, _is_path, _one_target, is_photograph, is_raw, levels, push, run_options, target_list
 from ._scene import Scene
 
 _EXIF = ("focal_35mm", "exposure_s", "iso", "f_number")
@@ -111,7 +111,7 @@ def _photo(scene: Scene, sensor: int, value: Any, weights: Any, clip: Any, noise
     file = _integers(value) if _is_path(value) else None
     p = make(_c.imp_photo, sensor=sensor, width=t.width, height=t.height, channels=t.channels, pixels=t.pixels,
              weights=t.weights, noise=float(noise), step=1 / file[1] if file else 0.)
-    if clip is not None and (clip != "auto" or file):
+    if clip is not None and (clip != "auto" or file or (_is_path(value) and is_raw(value))):
         p.clipped = True
         p.low, p.high = levels(value, clip, is_photograph(scene, sensor))
     for key, number in exif.items():
@@ -151,7 +151,7 @@ def measure(scene: Scene, photos: Any, params: Any = None, *, stages: Any = None
             noise: Any = None, exif: Any = None, weights: Any = None, say: Optional[Callable[[str], None]] = None,
             spp: int = 0, seed: int = 0, drop_budget: float = 0, points: str = "scene",
             progress: Any = None) -> Measurement:
-    """A scene from photographs, in stages: cameras, exposure, lights, materials, textures, then all together. The scene
+    """A scene from photographs, in stages: cameras, lens, exposure, lights, materials, textures, then all together. The scene
     ends at the best estimate. To be called before anything has been computed from the scene, unless its cameras' poses
     are parameters already (`Scene.add_pose`) or stay.
 
@@ -165,7 +165,8 @@ def measure(scene: Scene, photos: Any, params: Any = None, *, stages: Any = None
         What is measured, poses and other numbers of geometry included; by default all that photographs may tell of, and
         their cameras' poses.
     stages : str or list of str, optional
-        Of "cameras", "exposure", "lights", "materials", "textures"; by default all.
+        Of "cameras", "lens", "exposure", "lights", "materials", "textures"; by default all. A "lens" that is named
+        here measures fields of view and opencv_k1 of the photographs' cameras; `params` names others.
     hold : str or list of str
         Names or patterns of what stays as it is, with indices for single numbers: "left.pose[3-5]".
     rounds : int

@@ -328,6 +328,41 @@ def project(map: Any, source: str = "latlong", target: str = "equal_area", *, wi
     return from_film(out.value)
 
 
+def reduce(picture: Any, width: int, height: int, white: float = float("inf")) -> Picture:
+    """A picture of fewer pixels: means of blocks, as a photograph for a film of this size.
+
+    Parameters
+    ----------
+    picture : Picture, array or path
+        Its width and height are whole multiples of the new ones.
+    width, height : int
+    white : float
+        Values at or above it are clipped: a block of these alone has `white`, and one with some of them is nan, as its
+        mean is not known. A DNG is clipped at 1.
+
+    Returns
+    -------
+    Picture
+
+    Raises
+    ------
+    ArgumentError
+        That is not a whole number of pixels.
+
+    Examples
+    --------
+    >>> small = importon.reduce(np.array([[0.0, 0.5, 1.0, 1.0], [0.5, 1.0, 1.0, 1.0]]), 2, 1, white=1)
+    >>> small.tolist()
+    [[nan, 1.0]]
+    """
+    if isinstance(picture, (str, bytes)) or hasattr(picture, "__fspath__"):
+        picture = read(picture)
+    film, out = to_film(picture), ctypes.c_void_p()
+    context().check(lib.imp_film_reduce(film.pointer, integer(width, "width"), integer(height, "height"), float(white),
+                                        ctypes.byref(out)))
+    return from_film(out.value)
+
+
 def png(picture: Any) -> bytes:
     """The picture as a PNG file in memory."""
     import tempfile  # late: it takes as long to load as the rest of the package

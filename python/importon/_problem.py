@@ -12,7 +12,7 @@ from . import _c
 from ._array import address, numbers
 from ._library import ArgumentError, Handle, choice, integer, lib, make, run, text
 from ._params import ParameterInfo, SceneParameters, Values, names_of, table
-from ._picture import Picture, read
+from ._picture import Picture, read, reduce
 from ._scene import Scene
 
 
@@ -231,7 +231,8 @@ def _is_path(target: Any) -> bool:
 
 
 def _tiff_bits(path: Any, order: Any) -> int:
-    """Bits of a value, negative of floats, by the first directory: entries of 12 bytes, tag 258 bits, 339 the format."""
+    """Bits of a value, negative of floats, 0 of a DNG, by the first directory: entries of 12 bytes, tag 258 bits, 339 the
+    format, 50706 DNG's version."""
     with open(path, "rb") as file:
         data = file.read()
 
@@ -240,6 +241,8 @@ def _tiff_bits(path: Any, order: Any) -> int:
 
     bits, real, start = 8, False, number(4, 4)
     for at in range(start + 2, min(start + 2 + 12 * number(start, 2), len(data) - 11), 12):
+        if number(at, 2) == 50706:
+            return 0
         if number(at, 2) in (258, 339):
             v = number(at + 8 if number(at + 4, 4) <= 2 else number(at + 8, 4), 2)
             bits, real = (v, real) if number(at, 2) == 258 else (bits, v == 3)
@@ -256,7 +259,7 @@ def _integers(path: Any) -> Optional[tuple[bool, int]]:
         return False, 65535 if head[24] == 16 else 255
     if head[:4] in (b"II*\0", b"MM\0*"):
         bits = _tiff_bits(path, "little" if head[:1] == b"I" else "big")
-        return None if bits < 0 else (False, 65535 if bits == 16 else 255)
+        return None if bits <= 0 else (False, 65535 if bits == 16 else 255)
     if head[:2] in (b"P5", b"P6"):
         words = b"\n".join(line.split(b"#")[0] for line in head.split(b"\n")).split()  # without comments
         return False, int(words[3]) if len(words) > 3 and words[3].isdigit() else 255
@@ -277,9 +280,34 @@ def _decode(v: float) -> float:
 _ENDS = (-float(np.finfo(np.float32).max), float(np.finfo(np.float32).max))
 
 
+def is_raw(path: Any) -> bool:
+    """A DNG, which is clipped at 1."""
+    with open(path, "rb") as file:
+        head = file.read(4)
+    return head in (b"II*\0", b"MM\0*") and _tiff_bits(path, "little" if head[:1] == b"I" else "big") == 0
+
+
+def _fewer(scene: Scene, path: Any, picture: Any, sensor: int) -> tuple[Any, Any]:
+    """A file with a whole number of pixels for each of the sensor's: their means, and weights that are 0 where only some
+    are clipped; None: all are 1."""
+    film, file = scene.sensors[sensor], _integers(path)
+    part = picture.shape[1] // max(film.width, 1)
+    if part < 2 or picture.shape[:2] != (part * film.height, part * film.width):
+        return picture, None
+    white = 1. if is_raw(path) else float("inf") if file is None else _decode(1 - (5 if file[0] else 0.5) / file[1])
+    small = reduce(picture, film.width, film.height, white)
+    some = np.isnan(np.asarray(small)).reshape(small.shape[0], small.shape[1], -1).any(-1)
+    if not some.any():
+        return small, None
+    small[np.isnan(np.asarray(small))] = 0
+    return small, (~some).astype(np.float32)
+
+
 def levels(target: Any, clip: Any, photograph: bool) -> tuple[float, float]:
     """Levels of clipping in the target's numbers."""
     file = _integers(target) if _is_path(target) else None
+    if clip == "auto" and _is_path(target) and is_raw(target):
+        return _ENDS[0], 1.
     if isinstance(clip, str):
         if clip != "auto" or file is None:
             raise ArgumentError("clip=%r: 'auto' is of files of integers; else (low, high) in the file's numbers" % (clip,))
@@ -298,8 +326,9 @@ def _one_target(scene: Scene, target: Any, sensor: int, weights: Any, loss: str,
                 noise_se: Any) -> tuple[Any, Any]:
     """imp_target, and what it points to."""
     path = target if _is_path(target) else None
+    whole = None
     if path is not None:
-        target = read(path)
+        target, whole = _fewer(scene, path, read(path), sensor)
     se = noise_se
     if isinstance(target, Picture) and target.ndim == 3 and target.channels:
         pixels, own = _colours(target, scene.channels)
@@ -320,6 +349,8 @@ def _one_target(scene: Scene, target: Any, sensor: int, weights: Any, loss: str,
         if isinstance(weights, (str, bytes)) or hasattr(weights, "__fspath__"):
             weights = np.asarray(read(weights))[..., 0]
         weights = numbers(weights, "weights", np.float32, shape=pixels.shape[:2])
+    if whole is not None:
+        weights = whole if weights is None else numbers(weights * whole, "weights", np.float32)
     t = make(_c.imp_target, sensor=sensor, width=pixels.shape[1], height=pixels.shape[0],
              channels=pixels.shape[2], pixels=address(pixels), weights=address(weights),
              loss=choice("imp_loss", loss, "loss"), epsilon=float(epsilon), noise_se=address(se))

@@ -45,6 +45,9 @@ enum imp_status imp__image_parse(imp_context *ctx, const char *name,
         return imp__pfm_parse(ctx, name, file, out);
     if (n >= 3 && memcmp(d, "VOL", 3) == 0) return imp__vol_picture(ctx, name, file, out);
     if (n >= 2 && d[0] == '#' && d[1] == '?') return imp__hdr_parse(ctx, name, file, out);
+    const bool tiff =
+        n >= 4 && (memcmp(d, "II*\0", 4) == 0 || memcmp(d, "MM\0*", 4) == 0);
+    if (tiff && imp__dng_is(file)) return imp__dng_parse(ctx, name, file, out);
     *srgb = true;
     if (n >= 4 && memcmp(d, "\x89PNG", 4) == 0)
         return imp__png_parse(ctx, name, file, out);
@@ -53,12 +56,12 @@ enum imp_status imp__image_parse(imp_context *ctx, const char *name,
     if (n >= 2 && d[0] == 'B' && d[1] == 'M') return imp__bmp_parse(ctx, name, file, out);
     if (n >= 2 && d[0] == 'P' && (d[1] == '5' || d[1] == '6'))
         return imp__ppm_parse(ctx, name, file, out);
-    if (n >= 4 && (memcmp(d, "II*\0", 4) == 0 || memcmp(d, "MM\0*", 4) == 0))
-        return imp__tiff_parse(ctx, name, file, out, srgb);
+    if (tiff) return imp__tiff_parse(ctx, name, file, out, srgb);
     if (imp__tga_is(file)) return imp__tga_parse(ctx, name, file, out);
     return imp__error(
         ctx, IMP_E_SCENE,
-        "%s: not an EXR, PNG, JPEG, TIFF, BMP, TGA, PPM, HDR, PFM or NPY picture", name);
+        "%s: not an EXR, PNG, JPEG, TIFF, DNG, BMP, TGA, PPM, HDR, PFM or NPY picture",
+        name);
 }
 
 enum imp_status imp__image_read(imp_context *ctx, const char *path, imp_film **out,

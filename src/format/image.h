@@ -46,6 +46,10 @@ enum imp_status imp__bmp_parse(imp_context *ctx, const char *name,
 /* *srgb is set here: false for files of floats. */
 enum imp_status imp__tiff_parse(imp_context *ctx, const char *name,
                                 const struct imp_bytes *file, imp_film **out, bool *srgb);
+/* Is a TIFF file, of which it has the first four bytes, a DNG? Linear, white at 1. */
+bool imp__dng_is(const struct imp_bytes *file);
+enum imp_status imp__dng_parse(imp_context *ctx, const char *name,
+                               const struct imp_bytes *file, imp_film **out);
 /* PPM and PGM, of at least two bytes. */
 enum imp_status imp__ppm_parse(imp_context *ctx, const char *name,
                                const struct imp_bytes *file, imp_film **out);

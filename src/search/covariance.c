@@ -5,6 +5,7 @@
  *     measurement   G (J^T W Sigma W J) G      noise of the pictures
  *     Monte Carlo   G Cov(g) G                 noise of our own estimate of g
  *     prior         kappa G H_prior G          of directions that it alone determines
+ *     undetermined  v v^T                      of each other direction v, of the variables' size
  *
  * where kappa is the variance of the pictures in units of 1/weight: J/kappa is then the
  * negative logarithm of the posterior density. What the pictures determine takes no part
@@ -49,6 +50,21 @@ static void square_add(size_t n, double factor, const double *v, double *sum)
         for (size_t l = 0; l < n; l++) sum[k * n + l] += factor * v[k] * v[l];
 }
 
+/* Directions that are not determined stay where the search began, which is an error of all variables that
+ * take part in them. They are known as well as the sizes of their variables, as in a plan. */
+static void loose_add(const struct imp__sampled *s, const struct imp__directions *d,
+                      double *v, double *measurement)
+{
+    const size_t n = s->n;
+    for (size_t j = 0; j < d->m && !d->held; j++) {
+        if (!d->loose[j]) continue;
+        memset(v, 0, n * sizeof *v);
+        for (size_t p = 0; p < d->m; p++)
+            v[d->index[p]] = s->scale[d->index[p]] * d->vectors[j * d->m + p];
+        square_add(n, 1, v, measurement);
+    }
+}
+
 /* What else is not known of the variables that move. A step that was not taken is an error of
  * all that it would have moved. A variable that is held at a bound may be inside, and would take
  * the others along by -G H: with w the way from the bound inwards to where it wants to be and
@@ -59,6 +75,7 @@ static void unknown_add(const struct imp__goal *goal, const struct imp__sampled 
     const size_t n = s->n;
     double *v = a->step;
     square_add(n, 1, v, u->measurement);
+    loose_add(s, &a->free, v, u->measurement);
     for (size_t b = 0; b < n; b++) {
         const int wall = imp__at_bound(goal, u->x, b);
         const double se =

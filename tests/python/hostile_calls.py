@@ -112,6 +112,7 @@ class World:
             lambda: im.selftest(scene, self.maybe("camera"), samples=self.maybe(1000), directions=1),
             lambda: im.check(scene, params, sampling=True, spp=2), lambda: im.render(scene, spp=2, wavelengths=self.maybe("independent")),
             lambda: im.project(picture, self.maybe("latlong"), self.maybe("equal_area"), width=self.maybe(4)),
+            lambda: im.reduce(picture, self.maybe(4), self.maybe(2), white=self.maybe(.5)),
             lambda: im.jacobian(scene, RED, spp=1).sums(self.maybe(None)), lambda: picture.attribute(values(r)),
             lambda: im.write("a.exr", picture, attributes=self.maybe({"a": "b"})),
             lambda: im.report(self.maybe("r.html"), [self.maybe(picture), {"json": values(r)}]),

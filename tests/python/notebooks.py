@@ -42,7 +42,7 @@ def execute(name, *modules):
     assert "text/html" in shown, shown
     said = "".join(o.get("text", "") for c in read.cells if c.cell_type == "code" for o in c.outputs if o.output_type == "stream")
     return "%.0f s, by Jupyter" % (time.time() - start) + "".join("; " + re.sub(r"  +", " ", x) for x in said.splitlines()
-                                                                       if "importon" in x or "Mitsuba" in x or "desk" in x or "rms" in x)
+                                                                       if "importon" in x or "Mitsuba" in x or "desk" in x or "rms" in x or "hold the truth" in x)
 
 
 def test_red_wall():
@@ -68,6 +68,11 @@ def test_lamps_for_lux():
 def test_office_table():
     """A room, from its file to the norm's table"""
     return execute("office_table")
+
+
+def test_measured_room():
+    """A box from twelve photographs"""
+    return execute("measured_room")
 
 
 run(globals())

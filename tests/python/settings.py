@@ -195,6 +195,36 @@ def test_functional():
     return "; ".join(said)
 
 
+def test_reduce():
+    """Smaller pictures: means, errors and what is clipped; sizes that do not go into each other are refused"""
+    big = np.random.default_rng(3).random((6, 8, 3)).astype(np.float32)
+    small = im.reduce(big, 4, 2)
+    assert np.allclose(small, big.reshape(2, 3, 4, 2, 3).mean((1, 3)), rtol=1e-6)
+    big[:3, :2], big[3, 2] = 2, 2
+    small = im.reduce(big, 4, 2, white=2)
+    assert (small[0, 0] == 2).all() and np.isnan(small[1, 1]).all() and np.isnan(small).sum() == 3
+    im.write("big.exr", big)
+    assert np.array_equal(im.reduce("big.exr", 4, 2, 2), small, equal_nan=True)
+    drawn = im.render(im.load_dict(im.cornell_box(res=8)), spp=16)
+    reduced = im.reduce(drawn, 4, 4)
+    assert np.allclose(reduced.se, np.sqrt((drawn.se.reshape(4, 2, 4, 2, 3) ** 2).sum((1, 3))) / 4, rtol=1e-5)
+    box = im.load_dict(im.cornell_box(res=4))  # files with four pixels for each of its film's are targets, too
+    big = .9 * np.random.default_rng(4).random((8, 8, 3)).astype(np.float32)
+    im.write("target.exr", big)
+    of_file, of_array = (im.loss(box, t, "red.*", spp=2) for t in ("target.exr", im.reduce(big, 4, 4)))
+    assert of_file.value == of_array.value
+    big[0, 0] = 3
+    im.write("white.png", big)  # one of the first pixel's four is clipped: it has no weight
+    weights = np.ones((4, 4))
+    weights[0, 0] = 0
+    small = im.reduce("white.png", 4, 4)
+    of_file, of_array = im.loss(box, "white.png", "red.*", spp=2), im.loss(box, small, "red.*", spp=2, weights=weights)
+    assert np.isclose(of_file.value, of_array.value, rtol=1e-6) and of_file.value != im.loss(box, small, "red.*", spp=2).value
+    raises(im.ArgumentError, lambda: im.reduce(big, 3, 2), "whole")
+    raises(im.ArgumentError, lambda: im.reduce(big, 0, 2))
+    raises(im.ArgumentError, lambda: im.reduce(big, 4, 2, float("nan")), "nan")
+
+
 def test_sky():
     """Skies: projections and sizes keep the light; files and arrays"""
     sky = np.random.default_rng(2).random((16, 32, 3)).astype(np.float32)

@@ -227,6 +227,52 @@ static void beside_a_bound(void)
     }
 }
 
+/* Two columns differ by a part of a third only, so that one direction is not determined: where the search
+ * began along it is an error of the third variable, too. */
+static void beside_undetermined(void)
+{
+    enum { SEEDS = 400 };
+    const struct imp__rounds rounds = {.most = 6};
+    int held = 0, alone = 0, met = 0;
+    struct tap_stat width = {0};
+    for (uint64_t seed = 0; seed < SEEDS; seed++) {
+        struct imp_fit_variable v[TOY_N];
+        struct imp__uncertainty u;
+        double x[TOY_N], column = 0;
+        struct toy t;
+        toy_make(&t, ctx, 40000 + 7 * seed, 0.2, 0.3);
+        for (int k = 0; k < TOY_N; k++) t.scale[k] = 2 * fabs(t.truth[k]);
+        for (int p = 0; p < TOY_M; p++) {
+            const double old = t.A[p][3];
+            t.A[p][3] =
+                (t.A[p][0] * t.scale[0] + 0.1 * t.A[p][1] * t.scale[1]) / t.scale[3];
+            t.T[p] += (t.A[p][3] - old) * t.truth[3];
+            column += pow(t.A[p][1], 2);
+        }
+        const double off = toy_gauss(seed, 99) / sqrt(2.01);
+        memcpy(x, t.truth, sizeof x);
+        x[0] += off * t.scale[0];
+        x[1] += 0.1 * off * t.scale[1];
+        x[3] -= off * t.scale[3];
+        if (imp__covariance(&t.goal, x, &rounds, v, &u) != IMP_OK) exit(99);
+        if (u.found && !v[0].determined && !v[3].determined && v[1].determined) {
+            met++;
+            tap_add(&width, v[1].se / (0.1 / sqrt(2.01) * t.scale[1]));
+            held += v[1].lo95 <= t.truth[1] && t.truth[1] <= v[1].hi95;
+            alone +=
+                fabs(v[1].value - t.truth[1]) < 1.96 * sqrt((0.04 + 0.09 / 6) / column);
+        }
+        imp__uncertainty_destroy(ctx, &u);
+    }
+    tap_ok(
+        met > SEEDS / 2 && held > 0.94 * met && alone < met / 2,
+        "beside what is not determined # %d of %d, cover %.1f %%; as if that were known, "
+        "%.1f %%",
+        met, SEEDS, 100. * held / met, 100. * alone / met);
+    tap_ok(width.mean > 0.9 && width.mean < 1.3, "its part of a size of these # %.3f",
+           width.mean);
+}
+
 int main(void)
 {
     if (imp_context_create(NULL, &ctx) != IMP_OK) return 1;
@@ -308,6 +354,7 @@ int main(void)
     at_newton(0.6, 0.35, 1);
     overshot();
     beside_a_bound();
+    beside_undetermined();
     refined();
     imp_context_destroy(ctx);
     return tap_done();

@@ -305,8 +305,9 @@ static void check_hostile(void)
         {"PF\nnan 1\n-1\n", 12, "x: PFM of nan x 1, scale -1"},
         {"PF\n-5 1\n-1\n", 11, "x: PFM of -5 x 1, scale -1"},
         {"GIF89a", 6,
-         "x: not an EXR, PNG, JPEG, TIFF, BMP, TGA, PPM, HDR, PFM or NPY picture"},
-        {"", 0, "x: not an EXR, PNG, JPEG, TIFF, BMP, TGA, PPM, HDR, PFM or NPY picture"},
+         "x: not an EXR, PNG, JPEG, TIFF, DNG, BMP, TGA, PPM, HDR, PFM or NPY picture"},
+        {"", 0,
+         "x: not an EXR, PNG, JPEG, TIFF, DNG, BMP, TGA, PPM, HDR, PFM or NPY picture"},
         /* A PNG that claims 2^19 x 2^19 pixels. */
         {"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\x08\0\0\0\x08\0\0\x08\x02\0\0\0\x8c"
          "\x17\x3b\x9b",

@@ -12,10 +12,9 @@
 #include <string.h>
 
 #define SPP    64   /* samples per pixel of an evaluation, where nobody chose */
+#define LOOK   64   /* samples by which those that are held are tested, at least: once */
 #define CHANCE 1e-4 /* chance and drop of chi-square by which a number that is held ... */
 #define DROP   20   /* ... is wrong though all pixels together are explained */
-#define AGAIN                                                                            \
-    3 /* standard errors that a number has moved since its stage, which repeats it */
 
 /* ---- Decisions ------------------------------------------------------------------------- */
 
@@ -42,13 +41,6 @@ enum imp_status imp__measure_say(struct imp__measure *m, const char *format, ...
 }
 
 /* ---- Rounds ---------------------------------------------------------------------------- */
-
-/* The last fit of a round, whose problem is the answer. */
-static enum imp_measure_stage last_stage(const struct imp__measure *m)
-{
-    return imp__measure_count(m, IMP_MEASURE_TOGETHER) > 0 ? IMP_MEASURE_TOGETHER
-                                                           : IMP_MEASURE_TEXTURES;
-}
 
 /* By how many standard errors numbers of a stage have moved since it ended, at most. */
 static double moved_since(const struct imp__measure *m, enum imp_measure_stage stage)
@@ -91,7 +83,7 @@ static enum imp_status stages_judge(struct imp__measure *m, const double *moved,
     const struct imp_measure_row *answer = &m->rows[m->n_rows - 1];
     const bool explained = answer->explained, last = m->round >= m->o.rounds;
     const bool blind = answer->chi2_se >= IMP_MEASURE_BLIND &&
-                       answer->chi2 - 1 < AGAIN * answer->chi2_se;
+                       answer->chi2 - 1 < IMP_MEASURE_SURE * answer->chi2_se;
     if (blind) {
         *again = false;
         memset(m->due, 0, sizeof m->due);
@@ -106,7 +98,7 @@ static enum imp_status stages_judge(struct imp__measure *m, const double *moved,
         const enum imp_measure_stage stage = (enum imp_measure_stage)s;
         if (row) row->moved = moved[s];
         m->due[s] = imp__measure_count(m, stage) > 0 && !explained &&
-                    (masks_changed || moved[s] > AGAIN);
+                    (masks_changed || moved[s] > IMP_MEASURE_SURE);
         *again |= m->due[s];
         if (!m->due[s] || last || masks_changed) continue;
         IMP_CHECKED(imp__measure_say(m,
@@ -147,71 +139,17 @@ static enum imp_status photos_quiet(struct imp__measure *m, bool *quieter)
     return *quieter ? imp__measure_judge_again(m) : IMP_OK;
 }
 
-/* A fit whose cameras have no derivatives in this scene (what they see is refused by name) is
- * made without them, which is said. */
-static enum imp_status stage_fit(struct imp__measure *m, enum imp_measure_stage stage,
-                                 imp_problem **problem,
-                                 const struct imp_fit_result **result)
-{
-    const enum imp_status st = imp__measure_fit(m, stage, m->round, problem, result);
-    const size_t cameras = imp__measure_count(m, IMP_MEASURE_CAMERAS);
-    if ((st != IMP_E_UNSUPPORTED && st != IMP_E_BIAS) || !cameras ||
-        (stage != IMP_MEASURE_CAMERAS && stage != IMP_MEASURE_TOGETHER))
-        return st;
-    IMP_CHECKED(imp__measure_say(m, "round %d: cameras stay: %s", m->round,
-                                 imp_last_error(m->ctx)));
-    for (size_t k = 0; k < m->scene->n_params; k++)
-        if (m->stage[k] == IMP_MEASURE_CAMERAS) m->stage[k] = IMP_MEASURE_STAGES;
-    if (stage == IMP_MEASURE_CAMERAS && !problem) return IMP_OK;
-    const enum imp_measure_stage left = last_stage(m);
-    if (imp__measure_count(m, left) == 0) return st; /* there was nothing else */
-    return imp__measure_fit(m, left, m->round, problem, result);
-}
-
-/* The fit that gives the answer. Pixels that no mask has taken and the scene cannot explain lead a fit
- * without robust weights away from where the stages came to: then it has these weights, too. */
-static enum imp_status last_fit(struct imp__measure *m, enum imp_measure_stage stage,
-                                imp_problem **problem,
-                                const struct imp_fit_result **result)
-{
-    enum imp_status st = IMP_OK;
-    double *theta = imp__alloc(m->ctx, m->scene->n_theta + 1, sizeof *theta);
-    if (!theta) return imp__error(m->ctx, IMP_E_NOMEM, "no memory for a stage");
-    m->doubtful = false;
-    IMP_TRY(imp_scene_get_theta(m->scene, theta));
-    IMP_TRY(stage_fit(m, stage, problem, result));
-    if (m->n_rows < 2 || stage != IMP_MEASURE_TOGETHER) goto out;
-    const struct imp_measure_row *now = &m->rows[m->n_rows - 1], *before = now - 1;
-    if (before->round != now->round || now->explained ||
-        !(now->chi2 - before->chi2 > AGAIN * hypot(now->chi2_se, before->chi2_se)))
-        goto out;
-    IMP_TRY(imp__measure_say(m,
-                             "round %d: the last fit ended worse than it began, led by "
-                             "values that the scene does not explain: again with the "
-                             "weights of the stages; its intervals are too narrow",
-                             m->round));
-    imp_problem_destroy(*problem);
-    *problem = NULL;
-    m->looked = false;
-    m->doubtful = true;
-    IMP_TRY(imp_scene_set_theta(m->scene, theta));
-    IMP_TRY(stage_fit(m, last_stage(m), problem, result));
-out:
-    imp__release(m->ctx, theta);
-    return st;
-}
-
 /* One round. *again: others follow. */
 static enum imp_status round_run(struct imp__measure *m, imp_problem **problem,
                                  const struct imp_fit_result **result, bool *again)
 {
-    enum imp_measure_stage last = last_stage(m);
+    enum imp_measure_stage last = imp__measure_last_stage(m);
     double moved[IMP_MEASURE_STAGES] = {0};
     bool changed = false, quieter = false;
     for (int s = m->next; s < IMP_MEASURE_TOGETHER; s++) {
         const enum imp_measure_stage stage = (enum imp_measure_stage)s;
         if (stage == last || !m->due[s] || imp__measure_count(m, stage) == 0) continue;
-        IMP_CHECKED(stage_fit(m, stage, NULL, NULL));
+        IMP_CHECKED(imp__measure_stage(m, stage, NULL, NULL));
         m->next = s + 1;
         IMP_CHECKED(imp__measure_state_write(m));
     }
@@ -220,14 +158,14 @@ static enum imp_status round_run(struct imp__measure *m, imp_problem **problem,
     if (m->n_rows > 0 && m->rows[m->n_rows - 1].round == m->round) {
         IMP_CHECKED(imp__measure_look(m)); /* where it goes on from a checkpoint */
         IMP_CHECKED(photos_mask(m, &changed));
+        if (changed) m->looked = false;
     }
-    last = last_stage(m);
-    IMP_CHECKED(last_fit(m, last, problem, result));
-    last = last_stage(m);
+    IMP_CHECKED(imp__measure_last(m, problem, result));
+    last = imp__measure_last_stage(m);
     for (int s = 0; s < IMP_MEASURE_TEXTURES; s++)
         moved[s] =
             last == IMP_MEASURE_TOGETHER ? moved_since(m, (enum imp_measure_stage)s) : 0;
-    IMP_CHECKED(photos_mask(m, &changed));
+    if (!m->astray) IMP_CHECKED(photos_mask(m, &changed));
     IMP_CHECKED(photos_quiet(m, &quieter));
     IMP_CHECKED(stages_judge(m, moved, changed, quieter, again));
     places_follow(m);
@@ -242,8 +180,9 @@ static enum imp_status round_run(struct imp__measure *m, imp_problem **problem,
 static enum imp_status missing_find(struct imp__measure *m, imp_problem *p,
                                     struct imp_measure_result *r)
 {
-    const enum imp_status st =
-        imp_problem_missing(p, &m->run, &r->missing, &r->n_missing);
+    struct imp_run run = m->run;
+    run.spp = imp_max(LOOK, run.spp);
+    const enum imp_status st = imp_problem_missing(p, &run, &r->missing, &r->n_missing);
     if (st != IMP_E_UNSUPPORTED && st != IMP_E_BIAS) return st;
     r->n_missing = 0;
     if (r->explained) return IMP_OK;
@@ -369,6 +308,7 @@ static enum imp_status measure_run(struct imp__measure *m, imp_problem **problem
         IMP_CHECKED(imp__measure_state_write(m));
     }
     while (again) IMP_CHECKED(round_run(m, problem, &fit, &again));
+    IMP_CHECKED(imp__measure_last_again(m, problem, &fit));
     return result_make(m, *problem, fit, result);
 }
 

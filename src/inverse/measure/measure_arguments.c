@@ -14,7 +14,7 @@
 #define LEAST  3 /* pixels of a photograph in each direction */
 
 static const char *const stage_names[IMP_MEASURE_STAGES] = {
-    "cameras", "exposure", "lights", "materials", "textures", "together"};
+    "cameras", "lens", "exposure", "lights", "materials", "textures", "together"};
 
 const char *imp_measure_stage_name(enum imp_measure_stage stage)
 {
@@ -33,7 +33,8 @@ static enum imp_status stages_take(struct imp__measure *m)
         if (found < 0)
             return imp__error(m->ctx, IMP_E_ARG,
                               "options: there is no stage '%.*s'; there are cameras, "
-                              "exposure, lights, materials, textures and together",
+                              "lens, exposure, lights, materials, textures and "
+                              "together",
                               (int)imp_min(n, (size_t)100), at);
         m->wanted[found] = true;
         at += n + (at[n] == ',');

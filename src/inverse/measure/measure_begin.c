@@ -21,8 +21,7 @@
 static enum imp_status views_set(struct imp__measure *m)
 {
     for (const struct imp_pose *q = m->scene->poses; q; q = q->next) {
-        if (q->kind != IMP_POSE_FOV || m->stage[q->param] != IMP_MEASURE_CAMERAS)
-            continue;
+        if (q->kind != IMP_POSE_FOV || m->stage[q->param] > IMP_MEASURE_LENS) continue;
         for (size_t i = 0; i < m->n_photos; i++) {
             const struct imp__photo *p = &m->photos[i];
             if (p->sensor != q->sensor || !(p->desc.focal_35mm > 0)) continue;

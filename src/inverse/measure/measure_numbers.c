@@ -62,17 +62,36 @@ static enum imp_status camera_add(struct imp__measure *m, const struct imp__phot
     return imp__measure_say(m, "%s stays: %s", name, imp_last_error(m->ctx));
 }
 
+/* What the stage of lenses measures where no numbers are named. One photograph of a camera hardly
+ * determines more: a principal point looks like a rotation, k2 like k1. */
+static bool is_usual(enum imp_pose_kind kind)
+{
+    return kind == IMP_POSE_FOV || kind == IMP_POSE_K1;
+}
+
+static enum imp_status cameras_add(struct imp__measure *m, const struct imp__photo *p,
+                                   bool focal)
+{
+    const bool asked = m->o.stages && m->wanted[IMP_MEASURE_LENS];
+    if (m->wanted[IMP_MEASURE_CAMERAS]) {
+        IMP_CHECKED(camera_add(m, p, "pose", true));
+        IMP_CHECKED(camera_add(m, p, "x_fov", focal || asked));
+    }
+    for (int k = IMP_POSE_FOV; k < IMP_POSE_FOV + IMP_VIEW_NUMBERS; k++) {
+        const enum imp_pose_kind kind = (enum imp_pose_kind)k;
+        if (!m->wanted[IMP_MEASURE_LENS]) break;
+        IMP_CHECKED(camera_add(m, p, imp__pose_tail(kind), asked && is_usual(kind)));
+    }
+    return IMP_OK;
+}
+
 static enum imp_status poses_add(struct imp__measure *m)
 {
     bool focal = true;
     for (size_t i = 0; i < m->n_photos; i++) focal &= m->photos[i].desc.focal_35mm > 0;
-    if (!m->wanted[IMP_MEASURE_CAMERAS]) return IMP_OK;
-    for (size_t i = 0; i < m->n_photos; i++) {
-        IMP_CHECKED(camera_add(m, &m->photos[i], "pose", true));
-        IMP_CHECKED(camera_add(m, &m->photos[i], "x_fov", focal));
-        IMP_CHECKED(camera_add(m, &m->photos[i], "principal_point_offset_x", false));
-        IMP_CHECKED(camera_add(m, &m->photos[i], "principal_point_offset_y", false));
-    }
+    if (!m->wanted[IMP_MEASURE_CAMERAS] && !m->wanted[IMP_MEASURE_LENS]) return IMP_OK;
+    for (size_t i = 0; i < m->n_photos; i++)
+        IMP_CHECKED(cameras_add(m, &m->photos[i], focal));
     for (size_t k = 0; k < m->o.n_params; k++) {
         size_t index;
         if (imp__has_wildcards(m->o.params[k]) || !is_geometry(m->o.params[k]) ||
@@ -98,13 +117,17 @@ static enum imp_measure_stage stage_of(const struct imp__measure *m, size_t k)
     const struct imp_scene *s = m->scene;
     const struct imp_param_info *info = &s->params[k].info;
     const struct imp_pose *pose = imp__pose_of(s, k);
+    const bool lens = pose && imp__pose_is_view(pose->kind) &&
+                      (pose->kind != IMP_POSE_FOV || !m->wanted[IMP_MEASURE_CAMERAS]);
     if (pose && !pose->sensor)
         return pose->emitter ? IMP_MEASURE_LIGHTS : IMP_MEASURE_CAMERAS;
     for (int c = 0; c < s->n_sensors; c++) {
         if (!is_below(info->name, s->sensors[c]->name)) continue;
         for (size_t i = 0; i < m->n_photos; i++)
             if (m->photos[i].sensor == s->sensors[c])
-                return pose ? IMP_MEASURE_CAMERAS : IMP_MEASURE_EXPOSURE;
+                return lens   ? IMP_MEASURE_LENS
+                       : pose ? IMP_MEASURE_CAMERAS
+                              : IMP_MEASURE_EXPOSURE;
         return IMP_MEASURE_STAGES;
     }
     if (info->count > FIELD && !info->wavelengths_nm) return IMP_MEASURE_TEXTURES;
@@ -268,9 +291,8 @@ enum imp_status imp__measure_numbers(struct imp__measure *m)
     IMP_CHECKED(params_mean_something(m));
     for (size_t k = 0; k < s->n_params; k++) {
         const enum imp_measure_stage stage = stage_of(m, k);
-        const bool meant = m->o.params
-                               ? is_named(m, k)
-                               : !imp__pose_of(s, k) || stage == IMP_MEASURE_CAMERAS;
+        const bool meant = m->o.params ? is_named(m, k)
+                                       : !imp__pose_of(s, k) || stage <= IMP_MEASURE_LENS;
         m->stage[k] = IMP_MEASURE_STAGES;
         if (stage == IMP_MEASURE_STAGES || !m->wanted[stage] || !meant) continue;
         if (!(s->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE)) continue;

@@ -23,10 +23,13 @@
 /* ---- Which numbers --------------------------------------------------------------------- */
 
 /* While cameras are found, all numbers but textures go along: contrasts between wrong paints would
- * turn the cameras. Films' numbers go along with lights. */
+ * turn the cameras. So they do with lenses, and cameras with them, as a place looks like a principal
+ * point. A lens that is far off keeps its place while cameras are, which blurred pictures show without
+ * it. Films' numbers go along with lights. */
 static bool is_along(const struct imp__measure *m, enum imp_measure_stage stage, size_t k)
 {
-    if (stage == IMP_MEASURE_CAMERAS) return m->stage[k] < IMP_MEASURE_TEXTURES;
+    if (stage == IMP_MEASURE_CAMERAS && m->stage[k] == IMP_MEASURE_LENS) return false;
+    if (stage <= IMP_MEASURE_LENS) return m->stage[k] < IMP_MEASURE_TEXTURES;
     return stage == IMP_MEASURE_LIGHTS && m->stage[k] == IMP_MEASURE_EXPOSURE;
 }
 
@@ -210,7 +213,7 @@ enum imp_status imp__measure_look(struct imp__measure *m)
     return m->looked ? IMP_OK : photos_look(m, m->n_rows);
 }
 
-static void row_judge(const struct imp__measure *m, struct imp_measure_row *row)
+void imp__measure_judge(const struct imp__measure *m, struct imp_measure_row *row)
 {
     double sum = 0, variance = 0, values = 0, noise_of = 0;
     for (size_t i = 0; i < m->n_photos; i++) {
@@ -245,7 +248,7 @@ static enum imp_status row_add(struct imp__measure *m, enum imp_measure_stage st
                                     .residual = r->residual,
                                     .residual_hi = r->residual_hi};
     IMP_CHECKED(photos_look(m, m->n_rows + 1));
-    row_judge(m, row);
+    imp__measure_judge(m, row);
     m->n_rows++;
     return imp__measure_say(
         m,
@@ -261,7 +264,7 @@ enum imp_status imp__measure_judge_again(struct imp__measure *m)
     struct imp_measure_row *row = &m->rows[m->n_rows - 1];
     m->looked = false;
     IMP_CHECKED(imp__measure_look(m));
-    row_judge(m, row);
+    imp__measure_judge(m, row);
     return imp__measure_say(m,
                             "round %d, %s: by this noise chi-square is %.3g +- %.2g, %s",
                             row->round, imp_measure_stage_name(row->stage), row->chi2,

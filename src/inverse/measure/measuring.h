@@ -33,6 +33,8 @@ struct imp__photo {
 
 /* An error of chi-square with which nothing is explained. */
 #define IMP_MEASURE_BLIND 1
+/* Standard errors by which something is more. */
+#define IMP_MEASURE_SURE 3
 
 struct imp__measure {
     imp_context *ctx;
@@ -59,6 +61,7 @@ struct imp__measure {
     char **lines;
     bool
         doubtful; /* the last fit has the stages' weights, which its intervals do not know */
+    bool astray;  /* the last fit ended worse than it began, whatever was done */
     bool looked;  /* residuals are those of the present numbers */
     bool repeats; /* lines are not given to the host: the checkpoint's */
 };
@@ -122,12 +125,27 @@ void imp__measure_weights(struct imp__photo *photo);
 /* ---- measure_stage.c ---- */
 /* Residuals of all photographs at the present numbers, unless they are there. */
 enum imp_status imp__measure_look(struct imp__measure *m);
+/* Chi-square of the residuals that are there, of row->n numbers. */
+void imp__measure_judge(const struct imp__measure *m, struct imp_measure_row *row);
 /* Chi-square of the last row again, by other noise; says so. */
 enum imp_status imp__measure_judge_again(struct imp__measure *m);
 /* A fit of one stage, whose problem is destroyed unless `problem` is there. Adds its row. */
 enum imp_status imp__measure_fit(struct imp__measure *m, enum imp_measure_stage stage,
                                  int round, imp_problem **problem,
                                  const struct imp_fit_result **result);
+
+/* ---- measure_last.c ---- */
+/* The last fit of a round: of all numbers, or of textures where there is nothing else. */
+enum imp_measure_stage imp__measure_last_stage(const struct imp__measure *m);
+/* imp__measure_fit in this round, without cameras that have no derivatives. */
+enum imp_status imp__measure_stage(struct imp__measure *m, enum imp_measure_stage stage,
+                                   imp_problem **problem,
+                                   const struct imp_fit_result **result);
+enum imp_status imp__measure_last(struct imp__measure *m, imp_problem **problem,
+                                  const struct imp_fit_result **result);
+/* Behind the last round: with more samples, where the photographs are not explained. */
+enum imp_status imp__measure_last_again(struct imp__measure *m, imp_problem **problem,
+                                        const struct imp_fit_result **result);
 
 /* ---- measure_state.c ---- */
 /* The checkpoint, if there is one: rows, lines, masks and numbers after so many fits. */

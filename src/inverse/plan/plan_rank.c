@@ -12,7 +12,8 @@
 #include <string.h>
 
 #define SEED  0x91a2
-#define APART 2.5 /* errors of a difference by which candidates can be told apart */
+#define KNOWN 1e-6 /* the width of a number that is held, in large changes */
+#define APART 2.5  /* errors of a difference by which candidates can be told apart */
 
 struct plan {
     struct imp_problem *p, *blank;
@@ -24,6 +25,7 @@ struct plan {
     double *width;     /* [n] standard deviations of the priors */
     double *span;      /* [n] large changes */
     const bool *given; /* [n] they are the caller's */
+    const bool *held;  /* [n] numbers that stay */
     double *unit;      /* [n] own unit over that of x */
     struct imp__plan_model model;
     struct imp__plan_data *data; /* [n_all] */
@@ -99,6 +101,7 @@ static enum imp_status errors_give(const struct plan *plan, const double *C,
         se[k] = !plan->given[k] && part * part > 1. / (1 + IMP_PLAN_LOOSE)
                     ? INFINITY
                     : part * plan->width[k] * plan->unit[k];
+        if (plan->held[k]) se[k] = 0;
     }
     *out = se;
     return IMP_OK;
@@ -287,6 +290,8 @@ static enum imp_status loose_find(struct plan *plan, struct imp_plan_result *r)
         data_rescale(plan, &plan->data[i]);
         all[i] = &plan->data[i];
     }
+    for (size_t k = 0; k < n; k++) /* which derivatives do not tell of */
+        if (plan->held[k]) plan->data[0].H[k * n + k] = 1 / (KNOWN * KNOWN);
     IMP_TRY(
         imp__plan_loose(&plan->model, all, plan->n_all, &plan->then, loose, &r->n_loose));
     r->loose = loose;
@@ -297,19 +302,18 @@ out:
 
 /* ---- All of it ----------------------------------------------------------------------------- */
 
-#define KNOWN 1e-6 /* the width of a number that is held, in large changes */
-
 static enum imp_status widths_set(struct plan *plan)
 {
     const struct imp_problem *p = plan->p;
     const size_t n = p->n;
     double *x = imp__alloc(p->ctx, n, sizeof *x);
-    bool *given = imp__arena_array(plan->arena, n, sizeof *given);
+    bool *given = imp__arena_array(plan->arena, n, sizeof *given),
+         *held = imp__arena_array(plan->arena, n, sizeof *held);
     plan->width = imp__arena_array(plan->arena, n, sizeof *plan->width);
     plan->span = imp__arena_array(plan->arena, n, sizeof *plan->span);
     plan->unit = imp__arena_array(plan->arena, n, sizeof *plan->unit);
     enum imp_status st = IMP_OK;
-    if (!x || !given || !plan->width || !plan->span || !plan->unit)
+    if (!x || !given || !held || !plan->width || !plan->span || !plan->unit)
         IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for a plan"));
     imp_problem_get_x(p, x);
     for (size_t b = 0; b < p->n_blocks; b++) {
@@ -320,15 +324,17 @@ static enum imp_status widths_set(struct plan *plan)
             const size_t k = block->first + e;
             plan->span[k] = imp__large_change(p, block, e, x[k], square);
             /* What is held is known. */
-            const double own = imp__block_held(p, block, e) ? KNOWN * plan->span[k]
-                               : plan->o.prior              ? plan->o.prior[k]
-                                                            : 0;
+            held[k] = imp__block_held(p, block, e);
+            const double own = held[k]         ? KNOWN * plan->span[k]
+                               : plan->o.prior ? plan->o.prior[k]
+                                               : 0;
             given[k] = own > 0;
             plan->width[k] = given[k] ? own : plan->span[k];
             plan->unit[k] = block->log ? exp(x[k]) : 1;
         }
     }
     plan->given = given;
+    plan->held = held;
 out:
     imp__release(p->ctx, x);
     return st;
@@ -361,8 +367,14 @@ static enum imp_status model_make(struct plan *plan)
 {
     size_t *of = imp__arena_array(plan->arena, plan->n, sizeof *of);
     if (!of) return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
-    const size_t n = plan->o.n_of > 0 ? plan->o.n_of : plan->n;
-    for (size_t k = 0; k < n; k++) of[k] = plan->o.n_of > 0 ? plan->o.of[k] : k;
+    size_t n = 0;
+    for (size_t i = 0; i < (plan->o.n_of > 0 ? plan->o.n_of : plan->n); i++) {
+        const size_t k = plan->o.n_of > 0 ? plan->o.of[i] : i;
+        if (!plan->held[k]) of[n++] = k;
+    }
+    if (n == 0)
+        return imp__error(plan->p->ctx, IMP_E_ARG,
+                          "imp_plan: all numbers that are wanted are held");
     plan->model = (struct imp__plan_model){.ctx = plan->p->ctx,
                                            .n = plan->n,
                                            .kind = plan->o.criterion,
