@@ -342,6 +342,51 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_get_luminaire(const imp_scene *scene, int luminaire,
                         struct imp_luminaire_info *info);
 
+enum imp_glare_table_size {
+    IMP_GLARE_ROOMS = 19, /**< of a table of glare ratings */
+    IMP_GLARE_SETS = 5    /**< of reflectances */
+};
+
+struct imp_glare_table_options {
+    size_t size;
+    double
+        spacing; /**< of the luminaires in parts of their height above the eyes; 0: .25, as in
+                         most catalogues; CIE 190 has 1 */
+    double flux; /**< lm of a luminaire in place of that which it has in the scene: tables
+                         of catalogues are often for 1000 lm; 0: that of the scene */
+};
+#define IMP_GLARE_TABLE_OPTIONS_INIT IMP_INIT_ZERO(struct imp_glare_table_options)
+
+/** Unified glare ratings of a luminaire in standard rooms. */
+struct imp_glare_table {
+    size_t size;
+    double flux, spacing;
+    double room[IMP_GLARE_ROOMS]
+               [2]; /**< width across the line of sight and depth along it,
+                         in heights of the luminaires above the eyes */
+    double reflectance[IMP_GLARE_SETS][3];          /**< of ceiling, walls and floor */
+    double ugr[IMP_GLARE_ROOMS][2][IMP_GLARE_SETS]; /**< seen across the length of
+                                                       the lamps, and along it */
+};
+#define IMP_GLARE_TABLE_INIT IMP_INIT_ZERO(struct imp_glare_table)
+
+/**
+ * The table of glare ratings of a luminaire (CIE 117-1995, CIE 190:2010), from its photometric file:
+ * an observer in the middle of a wall looks level along a room full of such luminaires.
+ * Background is the walls' mean indirect illuminance over pi, by the exchange between
+ * floor, walls and ceiling; luminaires count whose T/R is at most 3 and whose rays are
+ * within 85 degrees of nadir, with their luminous openings by the file.
+ * @param luminaire from 0 (imp_scene_get_luminaire).
+ * @param options NULL for defaults.
+ * @param[out] out set out->size first.
+ * @return IMP_OK; IMP_E_ARG if there is no such luminaire, it is dark or its file names no
+ *         opening, or options are out of their range.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_luminaire_glare_table(const imp_scene *scene, int luminaire,
+                          const struct imp_glare_table_options *options,
+                          struct imp_glare_table *out);
+
 /* ---- Shares of a reading ----------------------------------------------------------- */
 
 enum imp_share_of {
