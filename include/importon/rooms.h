@@ -17,12 +17,13 @@ extern "C" {
 /* ---- Grids ------------------------------------------------------------------------ */
 
 /**
- * The places that the pixels of an irradiancemeter stand for: the middle of each one's cell.
- * @param sensor number of an irradiancemeter.
+ * The places that the pixels of an irradiancemeter stand for, or those that a radiancemeter with a
+ * grid looks at: the middle of each one's cell.
+ * @param sensor number of such a sensor.
  * @param[out] points  [height][width][3] of the crop window, scene units.
  * @param[out] normals [height][width][3] the normal of its shape there, unit; may be NULL.
  * @return IMP_OK; IMP_E_ARG if there is no such sensor, or it is no irradiancemeter on a
- *         rectangle or, at points, on a disk or a flat mesh.
+ *         rectangle or, at points, on a disk or a flat mesh, nor a radiancemeter with a grid.
  */
 IMP_API IMP_MUST_CHECK enum imp_status imp_grid_points(const imp_scene *scene, int sensor,
                                                        double *points, double *normals);

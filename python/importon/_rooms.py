@@ -95,7 +95,7 @@ def grid(scene: Scene, sensor: Any = 0, *, params: Any = None, confidence: float
     ----------
     scene : Scene
     sensor : int or str
-        An irradiancemeter on a rectangle or, at points, on a disk or a flat mesh.
+        An irradiancemeter on a rectangle or, at points, on a disk or a flat mesh, or a radiancemeter with a grid.
     confidence : float
         Of each interval.
     params, seed, spp, points, walks_from, progress
