@@ -2,7 +2,7 @@
  *
  * importon info: what is in a scene, and every parameter it has. */
 #include "shared/command.h"
-#include "shared/glare_table.h"
+#include "shared/ugr_tables.h"
 #include <importon/rooms.h>
 
 #include <math.h>

@@ -177,10 +177,11 @@ static enum imp_status moved_make(struct imp__moving *v,
     v->iterations = m->o.steps;
     m->whole = (double)m->n_grids * ((double)m->n + 2 * (double)v->n) * 10;
     IMP_TRY(imp__moving_bounds(v, moves, m->o.clearance));
+    m->whole *= v->n > 0 ? m->o.starts : 1;
     /* The largest error of a point is above their rms, by how much is found out. */
     for (v->more = 1.3; v->more < 5 && !out->found; v->more *= 1.5) {
         *out = (struct imp_design_answer){.size = out->size};
-        IMP_TRY(imp__design_move(v));
+        if (v->n > 0) IMP_TRY(v->end ? imp__design_move(v) : imp__design_starts(v));
         IMP_TRY(design_make(m, out));
         if (v->n == 0) break;
     }
@@ -189,6 +190,7 @@ static enum imp_status moved_make(struct imp__moving *v,
          * places are better. */
         *out = (struct imp_design_answer){.size = out->size};
         v->steps = 0;
+        v->start = (size_t)m->o.starts;
         memcpy(v->p, v->first, v->n * sizeof *v->p);
         IMP_TRY(imp__moving_place(v, v->p));
         IMP_TRY(design_make(m, out));
@@ -197,6 +199,10 @@ static enum imp_status moved_make(struct imp__moving *v,
     out->moved_from = v->first;
     out->moved_to = v->p;
     out->steps = v->steps;
+    out->n_starts = v->n > 0 ? (size_t)m->o.starts : 0;
+    out->start_objective = v->end;
+    out->start_place = v->ended;
+    out->start = v->start;
 out:
     if (st != IMP_OK && v->n > 0) {
         const enum imp_status back = imp__moving_place(v, v->first);

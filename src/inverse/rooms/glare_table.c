@@ -103,7 +103,7 @@ static double walls_indirect(const double room[2], const double reflectance[3],
     const double to[3][3] = {{0, aside, up}, {back, 1 - 2 * back, back}, {up, aside, 0}};
     double E[3], first[3];
     for (int k = 0; k < 3; k++) E[k] = first[k] = flux[k] / area[k];
-    /* Of the light a part of at most .7 is left after each reflection. */
+    /* Each reflection leaves .7 of the light or less. */
     for (int n = 0; n < 200; n++) {
         double next[3];
         for (int i = 0; i < 3; i++) {

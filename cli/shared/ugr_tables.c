@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Tables of glare ratings as text and JSON. */
-#include "glare_table.h"
+#include "ugr_tables.h"
 #include "command.h"
 #include <importon/rooms.h>
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * info --ugr-table: the glare ratings of luminaires in standard rooms. */
-#ifndef IMP_CLI_GLARE_TABLE_H
-#define IMP_CLI_GLARE_TABLE_H
+#ifndef IMP_CLI_UGR_TABLES_H
+#define IMP_CLI_UGR_TABLES_H
 
 #include "text/args.h"
 #include "text/json.h"
