@@ -230,13 +230,26 @@ static enum imp_status design_hold(struct imp__moving *v, const struct asked *a,
     return moved_make(v, a->moves, out);
 }
 
-static enum imp_status design_run(struct imp__moving *v, const struct asked *a,
+/* A design of n_lamps lamps with n_wants wants, of which n_moves numbers move. */
+static enum imp_status design_run(imp_scene *scene, size_t n_lamps, size_t n_wants,
+                                  size_t n_moves, const struct asked *a,
                                   const char *function, const struct imp_run *run,
                                   imp_design **out)
 {
     enum imp_status st = IMP_OK;
-    struct imp__design_model *m = v->m;
-    imp_context *ctx = m->ctx;
+    if (!scene) return imp__argument_missing(NULL, function, "scene");
+    imp_context *ctx = scene->ctx;
+    const struct {
+        const void *pointer;
+        const char *name;
+    } needed[] = {{a->lamps, "lamps"}, {a->wants, "wants"}, {out, "out"}};
+    for (size_t k = 0; k < imp_count(needed); k++)
+        if (!needed[k].pointer)
+            return imp__argument_missing(ctx, function, needed[k].name);
+    struct imp__design_model model = {
+        .ctx = ctx, .scene = scene, .n = n_lamps, .n_wants = n_wants};
+    struct imp__design_model *m = &model;
+    struct imp__moving moving = {.m = m, .n = n_moves}, *v = &moving;
     imp_problem *blank = NULL;
     IMP_RUN(ctx, m->run, run);
     IMP_CHECKED(imp__run_traces(ctx, function, &m->run));
@@ -270,15 +283,8 @@ enum imp_status imp_design_find(imp_scene *scene, const struct imp_design_lamp *
                                 size_t n_wants, const struct imp_design_options *options,
                                 const struct imp_run *run, imp_design **out)
 {
-    IMP_REQUIRE(NULL, scene, "scene");
-    IMP_REQUIRE(scene->ctx, lamps, "lamps");
-    IMP_REQUIRE(scene->ctx, wants, "wants");
-    IMP_REQUIRE(scene->ctx, out, "out");
-    struct imp__design_model m = {
-        .ctx = scene->ctx, .scene = scene, .n = n_lamps, .n_wants = n_wants};
-    struct imp__moving v = {.m = &m};
-    return design_run(&v, &(struct asked){lamps, wants, NULL, options}, __func__, run,
-                      out);
+    return design_run(scene, n_lamps, n_wants, 0,
+                      &(struct asked){lamps, wants, NULL, options}, __func__, run, out);
 }
 
 enum imp_status imp_design_move(imp_scene *scene, const struct imp_design_lamp *lamps,
@@ -288,18 +294,12 @@ enum imp_status imp_design_move(imp_scene *scene, const struct imp_design_lamp *
                                 const struct imp_run *run, imp_design **out)
 {
     IMP_REQUIRE(NULL, scene, "scene");
-    IMP_REQUIRE(scene->ctx, lamps, "lamps");
-    IMP_REQUIRE(scene->ctx, wants, "wants");
     IMP_REQUIRE(scene->ctx, moves, "moves");
-    IMP_REQUIRE(scene->ctx, out, "out");
     if (n_moves == 0 || n_moves > 1000)
         return imp__error(scene->ctx, IMP_E_ARG,
                           "moves: %zu numbers; there are 1 to 1000", n_moves);
-    struct imp__design_model m = {
-        .ctx = scene->ctx, .scene = scene, .n = n_lamps, .n_wants = n_wants};
-    struct imp__moving v = {.m = &m, .n = n_moves};
-    return design_run(&v, &(struct asked){lamps, wants, moves, options}, __func__, run,
-                      out);
+    return design_run(scene, n_lamps, n_wants, n_moves,
+                      &(struct asked){lamps, wants, moves, options}, __func__, run, out);
 }
 
 const struct imp_design_answer *imp_design_result(const imp_design *design)
