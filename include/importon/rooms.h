@@ -185,8 +185,9 @@ struct imp_dgp_options {
  * sight and at most 16, Iwata's below); E is the grid's reading. All comes from the walks of
  * the meter, by the directions in which they leave the eye; in 16 groups, so that squares of
  * luminances are products of independent ones. Cells across the edge of a source are made up for
- * by those of twice their side (Richardson); the light of a source smaller than a cell stays
- * spread over the cell.
+ * by those of twice their side (Richardson). A `sun` that light samples find is a source with the
+ * size of its disc; the light of other sources smaller than a cell stays spread over the
+ * cell.
  * @param run     its sensor, seed and spp, which is at least 16 walks for each cell; NULL for
  *                defaults. Walks are those from the sensor.
  * @param options NULL for defaults.
