@@ -2,6 +2,7 @@
  *
  * importon info: what is in a scene, and every parameter it has. */
 #include "shared/command.h"
+#include "shared/ugr_tables.h"
 #include <importon/rooms.h>
 
 #include <math.h>
@@ -179,6 +180,8 @@ static int run_info(int n, char **operand)
     int rc = cli_load(operand[0]);
     if (rc) return rc;
     imp_scene_get_info(cli.scene, &s);
+    rc = glare_table_check();
+    if (rc) return rc;
     if (cli.json) {
         struct json j = cli_json();
         json_text(&j, "scene", cli.scene_path);
@@ -206,6 +209,8 @@ static int run_info(int n, char **operand)
         json_array(&j, "luminaires");
         print_luminaires(&j);
         json_end_array(&j);
+        if (glare_table_wanted.on) rc = glare_tables_print(&j);
+        if (rc) return rc;
         json_array(&j, "params");
         rc = print_params(&j);
         json_end_array(&j);
@@ -238,18 +243,23 @@ static int run_info(int n, char **operand)
                c.filter_radius);
     }
     print_luminaires(NULL);
-    rc = print_params(NULL);
-    print_geometry(NULL);
+    if (glare_table_wanted.on) {
+        rc = glare_tables_print(NULL);
+    } else {
+        rc = print_params(NULL);
+        print_geometry(NULL);
+    }
     return rc ? rc : verdict(&s);
 }
 
-const struct command command_info = {{"info",
-                                      "SCENE",
-                                      "list a scene's objects and parameters",
-                                      {options_scene, options_file, options_general},
-                                      1,
-                                      1},
-                                     run_info,
-                                     1,
-                                     0,
-                                     REPLAYS_NEVER};
+const struct command command_info = {
+    {"info",
+     "SCENE",
+     "list a scene's objects and parameters",
+     {options_glare_table, options_scene, options_file, options_general},
+     1,
+     1},
+    run_info,
+    1,
+    0,
+    REPLAYS_NEVER};

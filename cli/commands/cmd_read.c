@@ -2,9 +2,8 @@
  *
  * importon read: the numbers of a scene's sensors, means over their films, with standard
  * errors, units and derivatives; from either end, or from both to compare them. */
-#include "read/read_dgp.h"
-#include "read/read_glare.h"
 #include "read/read_grid.h"
+#include "read/read_ratings.h"
 #include "read/read_year.h"
 #include "read/room_page.h"
 #include "shared/command.h"
@@ -20,7 +19,7 @@
 #define APART 5 /* standard errors between the ends that chance does not explain */
 
 static struct {
-    int ends, grid, shares, ugr;
+    int ends, grid, shares;
     const char *csv, *svg, *report;
 } o;
 
@@ -34,12 +33,10 @@ static const struct arg_option options[] = {
     {ARG_FLAG | ARG_REPLAYS, 0, "shares", NULL,
      "what each lamp and each material has to do with the readings", &o.shares, 0, 0,
      NULL},
-    {ARG_FLAG | ARG_REPLAYS, 0, "ugr", NULL,
-     "glare ratings of the observers of --sensor, a grid with a line of sight", &o.ugr, 0,
+    {ARG_TEXT, 0, "csv", "FILE",
+     "the points, values and errors of a grid or of glare ratings as a table", &o.csv, 0,
      0, NULL},
-    {ARG_TEXT, 0, "csv", "FILE", "the grid's points, values and errors as a table",
-     &o.csv, 0, 0, NULL},
-    {ARG_TEXT, 0, "svg", "FILE", "the grid as a plan with isolines", &o.svg, 0, 0, NULL},
+    {ARG_TEXT, 0, "svg", "FILE", "the same as a plan with isolines", &o.svg, 0, 0, NULL},
     {ARG_TEXT, 0, "report", "FILE",
      "the grids as a page for a client: plans, --want, luminaires, the view of a camera",
      &o.report, 0, 0, NULL},
@@ -309,11 +306,13 @@ static int run_read(int n, char **operand)
     if (cli.time_s > 0)
         return cli_error(EXIT_USAGE, "read takes --spp samples, and has no --time");
     const int year = year_wanted.weather != NULL;
-    if (!o.grid && !year && (o.csv || o.svg))
+    const int ugr = ratings_wanted.ugr, dgp = ratings_wanted.dgp;
+    if (!o.grid && !year && !ugr && !dgp && (o.csv || o.svg))
         return cli_error(EXIT_USAGE,
-                         "--csv and --svg write a grid: they go with --grid or --year");
+                         "--csv and --svg write a grid: they go with --grid, --ugr, "
+                         "--dgp or --year");
     if (year &&
-        (o.ugr || o.shares || o.grid || o.ends || cli.from || problem_options.params.n))
+        (ugr || o.shares || o.grid || o.ends || cli.from || problem_options.params.n))
         return cli_error(EXIT_USAGE,
                          "--year goes without --ugr, --shares, --grid, --ends, "
                          "--from and --param");
@@ -331,17 +330,17 @@ static int run_read(int n, char **operand)
                          "--grid has no derivatives: it goes without --param");
     if (o.shares && (o.grid || o.ends || problem_options.params.n))
         return cli_error(EXIT_USAGE, "--shares goes without --grid, --ends and --param");
-    if (o.ugr && (o.shares || o.grid || o.ends || problem_options.params.n))
+    if (ugr && (o.shares || o.grid || o.ends || problem_options.params.n))
         return cli_error(EXIT_USAGE,
                          "--ugr goes without --shares, --grid, --ends and --param");
-    if (o.ugr && !cli_typed("sensor"))
+    if (ugr && !cli_typed("sensor"))
         return cli_error(EXIT_USAGE, "--ugr is of one grid: choose it with --sensor");
-    if (dgp_wanted.on && (o.ugr || year || o.shares || o.grid || o.ends || cli.from ||
-                          problem_options.params.n))
+    if (dgp && (ugr || year || o.shares || o.grid || o.ends || cli.from ||
+                problem_options.params.n))
         return cli_error(EXIT_USAGE,
                          "--dgp goes without --ugr, --year, --shares, --grid, --ends, "
                          "--from and --param");
-    if (dgp_wanted.on && !cli_typed("sensor"))
+    if (dgp && !cli_typed("sensor"))
         return cli_error(EXIT_USAGE, "--dgp is of one grid: choose it with --sensor");
     if (problem_options.hold.n && !problem_options.params.n)
         return cli_error(EXIT_USAGE, "--hold is of derivatives: it goes with --param");
@@ -369,10 +368,10 @@ static int run_read(int n, char **operand)
     if (cli.json) {
         j = cli_json();
         json_integer(&j, "spp", cli_spp(&run));
-        json_array(&j, o.grid                   ? "grids"
-                       : o.ugr || dgp_wanted.on ? "glare"
-                       : year                   ? "years"
-                                                : "readings");
+        json_array(&j, o.grid       ? "grids"
+                       : ugr || dgp ? "glare"
+                       : year       ? "years"
+                                    : "readings");
     }
     const int one = cli_typed("sensor"), first = one ? cli.sensor : 0;
     const int end = one ? first + 1 : scene.n_sensors;
@@ -387,19 +386,15 @@ static int run_read(int n, char **operand)
     if (page && !rc) rc = room_page_write(page, o.report, run, &met);
     if (page) room_page_free(page);
     free(page);
-    if (o.ugr && !rc) {
+    if ((ugr || dgp) && !rc) {
         run.sensor = first;
-        rc = glare_read(&j, &run);
-    }
-    if (dgp_wanted.on && !rc) {
-        run.sensor = first;
-        rc = dgp_read(&j, &run);
+        rc = ratings_read(&j, &run, o.csv, o.svg);
     }
     if (year && !rc) {
         run.sensor = first;
         rc = year_read(&j, &run, o.csv, o.svg);
     }
-    const bool others = o.grid || o.ugr || dgp_wanted.on || year;
+    const bool others = o.grid || ugr || dgp || year;
     for (int s = first; s < end && !rc && !others; s++) {
         run.sensor = s;
         found.lit = 0;
@@ -421,7 +416,7 @@ const struct command command_read = {
     {"read",
      "SCENE",
      "the readings of all sensors, with units, errors and derivatives",
-     {options, options_dgp, options_wants, options_year, options_params, options_run,
+     {options, options_ratings, options_wants, options_year, options_params, options_run,
       options_limits, options_scene, options_file, options_general},
      1,
      1},

@@ -5,6 +5,7 @@
 #include "shared/command.h"
 
 #include <fnmatch.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -13,7 +14,7 @@
 static struct {
     struct arg_list move;
     double clearance;
-    int steps;
+    int steps, starts;
 } o = {.clearance = 0.1};
 
 const struct arg_option options_moves[] = {
@@ -26,6 +27,9 @@ const struct arg_option options_moves[] = {
      0, 1e9, NULL},
     {ARG_INT, 0, "steps", "N", "of a search for places, at most (default 60)", &o.steps,
      1, 10000, NULL},
+    {ARG_INT, 0, "starts", "N",
+     "searches for places: from the present ones, and from places that are drawn (1)",
+     &o.starts, 1, 1000, NULL},
     {0}};
 
 /* NAME[I-J]=LO,HI in its parts; name is a copy, to be freed. */
@@ -100,8 +104,10 @@ int design_moves_make(bool catalogued, struct design_moves *out,
     int rc = 0;
     options->clearance = o.clearance;
     options->steps = o.steps;
-    if (o.move.n == 0 && (cli_typed("clearance") || cli_typed("steps")))
-        return cli_error(EXIT_USAGE, "--clearance and --steps go with --move");
+    options->starts = o.starts;
+    if (o.move.n == 0 &&
+        (cli_typed("clearance") || cli_typed("steps") || cli_typed("starts")))
+        return cli_error(EXIT_USAGE, "--clearance, --steps and --starts go with --move");
     if (o.move.n == 0) return 0;
     if (catalogued)
         return cli_error(
@@ -129,6 +135,28 @@ void design_moves_free(struct design_moves *m)
     *m = (struct design_moves){0};
 }
 
+/* Ends of the other starts, and how many are as good within the errors of both. */
+static void starts_print(const struct imp_design_answer *a)
+{
+    size_t best = 0, as_good = 0, none = 0;
+    for (size_t s = 1; s < a->n_starts; s++)
+        if (a->start_objective[s] < a->start_objective[best]) best = s;
+    if (a->n_starts < 2) return;
+    printf("starts: ");
+    for (size_t s = 0; s < a->n_starts; s++) {
+        const double value = a->start_objective[s];
+        none += isinf(value);
+        as_good += s != best && isfinite(value) &&
+                   value - a->start_objective[best] <= 2 * a->objective_se;
+        if (isinf(value)) printf("%snone", s ? ", " : "");
+        else printf("%s%.1f", s ? ", " : "", value);
+    }
+    printf("; %zu of the others %s as good within two errors", as_good,
+           as_good == 1 ? "is" : "are");
+    if (none > 0) printf(", %zu end%s without an answer", none, none == 1 ? "s" : "");
+    printf("\n");
+}
+
 void design_moves_print(const struct design_moves *m, const struct imp_design_answer *a)
 {
     int width = 5;
@@ -144,6 +172,7 @@ void design_moves_print(const struct design_moves *m, const struct imp_design_an
         snprintf(name, sizeof name, "%s[%d]", m->move[i].name, m->move[i].component);
         printf("%-*s  %-8.4g  %.4g\n", width, name, a->moved_from[i], a->moved_to[i]);
     }
+    starts_print(a);
 }
 
 void design_moves_json(struct json *j, const struct design_moves *m,
@@ -156,6 +185,14 @@ void design_moves_json(struct json *j, const struct design_moves *m,
         json_integer(j, "component", m->move[i].component);
         json_number(j, "from", a->moved_from[i]);
         json_number(j, "to", a->moved_to[i]);
+        json_end_object(j);
+    }
+    json_end_array(j);
+    json_array(j, "starts");
+    for (size_t s = 0; s < a->n_starts; s++) {
+        json_object(j, NULL);
+        json_number(j, "objective", a->start_objective[s]);
+        json_numbers(j, "places", a->n_moves, a->start_place + s * a->n_moves);
         json_end_object(j);
     }
     json_end_array(j);

@@ -45,33 +45,43 @@ static int other_end(struct imp_run run, struct grid *g, struct imp_estimate *av
     return 0;
 }
 
-int grid_read(struct imp_run run, int ends, struct grid *out)
+int grid_open(int sensor, struct grid *out)
 {
     struct imp_sensor_info info = {.size = sizeof info};
+    struct grid *g = out;
+    *g = (struct grid){.sensor = sensor, .z = NAN, .summary = IMP_GRID_SUMMARY_INIT};
+    g->summary.size = sizeof g->summary;
+    enum imp_status st = imp_scene_get_sensor(cli.scene, sensor, &info);
+    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    g->name = info.name;
+    g->unit = info.unit;
+    g->n = (size_t)info.width * (size_t)info.height;
+    g->points = cli_alloc(5 * g->n, sizeof *g->points);
+    g->value = g->points + 3 * g->n;
+    g->se = g->value + g->n;
+    g->cell = cli_alloc(2 * g->n, sizeof *g->cell);
+    st = imp_grid_points(cli.scene, sensor, g->points, NULL);
+    if (st == IMP_OK)
+        st = imp_grid_cells(cli.scene, sensor, &g->columns, &g->rows, g->cell);
+    return st == IMP_OK ? 0 : cli_fail(st, cli.scene_path);
+}
+
+int grid_read(struct imp_run run, int ends, struct grid *out)
+{
     struct imp_estimate average;
     int64_t sets;
-    enum imp_status st = imp_scene_get_sensor(cli.scene, run.sensor, &info);
-    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
-    struct grid g = {.sensor = run.sensor,
-                     .name = info.name,
-                     .unit = info.unit,
-                     .n = (size_t)info.width * (size_t)info.height,
-                     .z = NAN,
-                     .summary = IMP_GRID_SUMMARY_INIT};
-    g.points = cli_alloc(5 * g.n, sizeof *g.points);
-    g.value = g.points + 3 * g.n;
-    g.se = g.value + g.n;
-    int rc = 0;
+    struct grid g;
+    int rc = grid_open(run.sensor, &g);
     if (ends) run.from = IMP_FROM_SENSOR, g.from = "sensor";
-    st = imp_grid_points(cli.scene, run.sensor, g.points, NULL);
-    if (st == IMP_OK) st = imp_grid_read(cli.scene, &run, g.value, g.se, &average, &sets);
-    if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
-    if (!rc) rc = grid_raster(run.sensor, &g);
+    if (!rc) {
+        const enum imp_status st =
+            imp_grid_read(cli.scene, &run, g.value, g.se, &average, &sets);
+        if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
+    }
     if (!rc && ends) rc = other_end(run, &g, &average, &sets);
     if (!rc) {
-        g.summary.size = sizeof g.summary;
-        st = imp_grid_summarise(cli.context, g.n, g.value, g.se, &average, sets, 0,
-                                &g.summary);
+        const enum imp_status st = imp_grid_summarise(cli.context, g.n, g.value, g.se,
+                                                      &average, sets, 0, &g.summary);
         if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
     }
     if (rc) grid_free(&g);
@@ -85,14 +95,6 @@ void grid_free(struct grid *g)
     free(g->cell);
     g->points = g->value = g->se = NULL;
     g->cell = NULL;
-}
-
-int grid_raster(int sensor, struct grid *out)
-{
-    out->cell = cli_alloc(2 * out->n, sizeof *out->cell);
-    const enum imp_status st =
-        imp_grid_cells(cli.scene, sensor, &out->columns, &out->rows, out->cell);
-    return st == IMP_OK ? 0 : cli_fail(st, cli.scene_path);
 }
 
 void grid_size_text(const struct grid *g, char *text, size_t size)
@@ -147,14 +149,26 @@ static void interval_json(struct json *j, const char *key,
     json_end_object(j);
 }
 
+void grid_places_json(struct json *j, const struct grid *g)
+{
+    json_integer(j, "width", g->columns);
+    json_integer(j, "height", g->rows);
+    json_array(j, "cells");
+    for (size_t i = 0; i < g->n; i++)
+        json_numbers(j, NULL, 2, (double[2]){g->cell[2 * i], g->cell[2 * i + 1]});
+    json_end_array(j);
+    json_array(j, "points");
+    for (size_t i = 0; i < g->n; i++) json_numbers(j, NULL, 3, g->points + 3 * i);
+    json_end_array(j);
+}
+
 void grid_json(struct json *j, const struct grid *g)
 {
     const struct imp_grid_summary *s = &g->summary;
     json_object(j, NULL);
     json_text(j, "sensor", g->name);
     json_text(j, "unit", g->unit);
-    json_integer(j, "width", g->columns);
-    json_integer(j, "height", g->rows);
+    grid_places_json(j, g);
     if (g->from) {
         json_text(j, "from", g->from);
         json_number(j, "z", g->z);
@@ -165,13 +179,6 @@ void grid_json(struct json *j, const struct grid *g)
     interval_json(j, "maximum", &s->maximum);
     interval_json(j, "uniformity", &s->uniformity);
     interval_json(j, "diversity", &s->diversity);
-    json_array(j, "cells");
-    for (size_t i = 0; i < g->n; i++)
-        json_numbers(j, NULL, 2, (double[2]){g->cell[2 * i], g->cell[2 * i + 1]});
-    json_end_array(j);
-    json_array(j, "points");
-    for (size_t i = 0; i < g->n; i++) json_numbers(j, NULL, 3, g->points + 3 * i);
-    json_end_array(j);
     json_numbers(j, "value", g->n, g->value);
     json_numbers(j, "se", g->n, g->se);
     json_end_object(j);

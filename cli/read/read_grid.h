@@ -13,6 +13,7 @@ struct room_page;
 struct grid {
     int sensor;
     const char *name, *unit; /* of the sensor */
+    const char *heading;     /* of a plan; NULL: average and uniformity */
     int columns, rows;       /* of the raster: all of it has points on a rectangle */
     int32_t *cell;           /* [n][2] column and row of each point */
     size_t n;
@@ -29,14 +30,16 @@ int grid_samples_check(struct imp_run run);
 /* Read the grid of run->sensor; `ends`: from both, and what has the smaller error counts.
  * 0, or an exit code with the reason printed. */
 int grid_read(struct imp_run run, int ends, struct grid *out);
+/* The places of a sensor's pixels, with room for values and errors. 0, or an exit code with the
+ * reason printed; grid_free in either case. */
+int grid_open(int sensor, struct grid *out);
 void grid_free(struct grid *g);
-/* The raster of a sensor's n points, into columns, rows and a new array cell. 0, or an exit code
- * with the reason printed. */
-int grid_raster(int sensor, struct grid *out);
 /* "8 x 5 points", or how many of them there are. */
 void grid_size_text(const struct grid *g, char *text, size_t size);
 void grid_print(const struct grid *g);
 void grid_json(struct json *j, const struct grid *g);
+/* width, height, cells and points: the raster, and where the points are. */
+void grid_places_json(struct json *j, const struct grid *g);
 /* Points at which no light was found, in part of the grid: a warning. */
 void grid_tell(const struct grid *g);
 
@@ -57,7 +60,7 @@ void luminaires_tell(void);
 /* A line a point: column, row, x, y, z, value, se. 0, or an exit code. */
 int grid_csv(const char *path, const struct grid *g);
 /* The plan of the grid: colours with their scale, isolines, a number at each point where
- * there is room. 0, or an exit code. */
+ * there is room. Values that are not finite are grey. 0, or an exit code. */
 int grid_svg(const char *path, const struct grid *g);
 void grid_svg_put(FILE *f, const struct grid *g);
 

@@ -95,9 +95,11 @@ static struct plan plan_of(const struct grid *g)
     const double wide = side[0] * g->columns, high = side[1] * g->rows;
     for (int k = 0; k < 2; k++) p.cell[k] = side[k] * PLAN / fmax(wide, high);
     for (size_t i = 0; i < g->n; i++) {
+        if (!isfinite(g->value[i])) continue;
         p.lo = fmin(p.lo, g->value[i]);
         p.hi = fmax(p.hi, g->value[i]);
     }
+    if (!(p.lo <= p.hi)) p.lo = p.hi = 0;
     p.step = step_of(p.hi - p.lo);
     return p;
 }
@@ -107,8 +109,8 @@ static void cells_put(FILE *f, const struct plan *p)
     const struct grid *g = p->g;
     for (size_t i = 0; i < g->n; i++) {
         const double column = g->cell[2 * i], row = g->cell[2 * i + 1];
-        char c[8];
-        colour(part_of(p, g->value[i]), c);
+        char c[8] = "#c8ccd2";
+        if (isfinite(g->value[i])) colour(part_of(p, g->value[i]), c);
         fprintf(
             f,
             "<rect x=\"%.2f\" y=\"%.2f\" width=\"%.2f\" height=\"%.2f\" fill=\"%s\"/>\n",
@@ -139,6 +141,7 @@ static void square_put(FILE *f, const struct plan *p, int x, int y, double level
         const int i = p->point[(y + dy[k]) * p->g->columns + x + dx[k]];
         if (i < 0) return;
         corner[k][2] = p->g->value[i];
+        if (!isfinite(corner[k][2])) return;
         mean += corner[k][2] / 4;
     }
     for (int k = 0; k < 4; k++) {
@@ -173,6 +176,7 @@ static void numbers_put(FILE *f, const struct plan *p)
     for (size_t i = 0; i < g->n; i++) {
         const double column = g->cell[2 * i], row = g->cell[2 * i + 1];
         const double v = g->value[i];
+        if (!isfinite(v)) continue;
         fprintf(f,
                 "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\" "
                 "fill=\"%s\">%.*f</text>\n",
@@ -219,8 +223,10 @@ void grid_svg_put(FILE *f, const struct grid *g)
             "fill=\"#fff\"/>\n<text x=\"%d\" y=\"%d\" font-size=\"14\">",
             full, whole, full, whole, MARGIN, TOP - 18);
     name_put(f, g->name);
-    fprintf(f, ": average %.4g %s, minimum/average %.2f</text>\n",
-            g->summary.average.value, g->unit, g->summary.uniformity.value);
+    if (g->heading) fprintf(f, ": %s</text>\n", g->heading);
+    else
+        fprintf(f, ": average %.4g %s, minimum/average %.2f</text>\n",
+                g->summary.average.value, g->unit, g->summary.uniformity.value);
     cells_put(f, &p);
     isolines_put(f, &p);
     numbers_put(f, &p);

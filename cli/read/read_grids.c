@@ -14,10 +14,11 @@ static int has_grid(int sensor)
     struct imp_sensor_info info = {.size = sizeof info};
     double point[3];
     if (imp_scene_get_sensor(cli.scene, sensor, &info) != IMP_OK) return 0;
-    if ((size_t)info.width * (size_t)info.height > 1)
-        return strcmp(info.type, "irradiancemeter") == 0;
-    return strcmp(info.type, "irradiancemeter") == 0 &&
-           imp_grid_points(cli.scene, sensor, point, NULL) == IMP_OK;
+    if (strcmp(info.type, "irradiancemeter") != 0 &&
+        strcmp(info.type, "radiancemeter") != 0)
+        return 0;
+    if ((size_t)info.width * (size_t)info.height > 1) return 1;
+    return imp_grid_points(cli.scene, sensor, point, NULL) == IMP_OK;
 }
 
 int grid_samples_check(struct imp_run run)
@@ -45,7 +46,7 @@ static int no_grid(int sensor)
     return cli_error(EXIT_USAGE,
                      "--sensor %d: sensor '%s' (%s) has no grid; --grid is of "
                      "irradiancemeters on rectangles and, at points, on disks and flat "
-                     "meshes",
+                     "meshes, and of radiancemeters with 'grid'",
                      sensor, info.name, info.type);
 }
 
@@ -61,7 +62,8 @@ int grids_read(struct json *j, struct imp_run run, int first, int end,
         return cli_error(EXIT_USAGE,
                          "%s: no irradiancemeter on a rectangle is among its sensors, "
                          "nor one at points "
-                         "on a disk or a flat mesh, and --grid is of those",
+                         "on a disk or a flat mesh, nor a radiancemeter with 'grid', and "
+                         "--grid is of those",
                          cli.scene_path);
     if (n > 1 && (wanted->csv || wanted->svg))
         return cli_error(EXIT_USAGE,

@@ -27,7 +27,6 @@ const struct arg_option options_year[] = {
     {0}};
 
 struct year {
-    struct imp_sensor_info sensor;
     struct imp_weather_info weather;
     struct imp_weather_hour *hour; /* [weather.n] */
     struct imp_annual_options options;
@@ -65,27 +64,19 @@ static int compute(struct year *y, const struct imp_run *run)
     struct grid *g = &y->grid;
     int rc = weather_take(y);
     if (rc) return rc;
-    y->sensor.size = sizeof y->sensor;
-    enum imp_status st = imp_scene_get_sensor(cli.scene, run->sensor, &y->sensor);
-    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
-    g->name = y->sensor.name;
+    rc = grid_open(run->sensor, g);
+    if (rc) return rc;
     g->unit = "% autonomy";
-    g->n = (size_t)y->sensor.width * (size_t)y->sensor.height;
-    g->points = cli_alloc(5 * g->n, sizeof *g->points);
-    g->value = g->points + 3 * g->n;
-    g->se = g->value + g->n;
     y->point = cli_alloc(g->n, sizeof *y->point);
     y->options.size = sizeof y->options;
     y->options.opens = year_wanted.hours[0];
     y->options.closes = year_wanted.hours[1];
     y->options.wanted = year_wanted.lux;
     y->all.size = sizeof y->all;
-    st = imp_grid_points(cli.scene, run->sensor, g->points, NULL);
-    if (st == IMP_OK)
-        st = imp_annual_read(cli.scene, run, y->weather.n, y->hour, &y->options, y->point,
-                             &y->all, NULL, NULL);
-    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
-    return grid_raster(run->sensor, g);
+    const enum imp_status st =
+        imp_annual_read(cli.scene, run, y->weather.n, y->hour, &y->options, y->point,
+                        &y->all, NULL, NULL);
+    return st == IMP_OK ? 0 : cli_fail(st, cli.scene_path);
 }
 
 /* ---- Text --------------------------------------------------------------------------- */
@@ -104,7 +95,7 @@ static void text_print(const struct year *y)
     snprintf(wanted, sizeof wanted, "%g lx", y->options.wanted);
     char size[64];
     grid_size_text(&y->grid, size, sizeof size);
-    printf("%s: %s, %zu hours of use (%d to %d)\n", y->sensor.name, size, y->all.hours,
+    printf("%s: %s, %zu hours of use (%d to %d)\n", y->grid.name, size, y->all.hours,
            year_wanted.hours[0], year_wanted.hours[1]);
     printf("weather: %s, %g N, %g E%s\n", y->weather.place, y->weather.latitude,
            y->weather.longitude,
@@ -131,10 +122,14 @@ static void number_json(struct json *j, const char *key, struct imp_estimate e)
 }
 
 static void point_json(struct json *j, const char *key, const struct imp_annual_point *p,
-                       const double *place)
+                       const struct grid *g, size_t at)
 {
     json_object(j, key);
-    if (place) json_numbers(j, "point", 3, place);
+    if (g) {
+        const int32_t *cell = g->cell + 2 * at;
+        json_numbers(j, "cell", 2, (double[2]){cell[0], cell[1]});
+        json_numbers(j, "point", 3, g->points + 3 * at);
+    }
     number_json(j, "autonomy", p->autonomy);
     number_json(j, "continuous", p->continuous);
     json_array(j, "useful");
@@ -149,7 +144,7 @@ static void point_json(struct json *j, const char *key, const struct imp_annual_
 static void json_print(struct json *j, const struct year *y)
 {
     json_object(j, NULL);
-    json_text(j, "sensor", y->sensor.name);
+    json_text(j, "sensor", y->grid.name);
     json_integer(j, "width", y->grid.columns);
     json_integer(j, "height", y->grid.rows);
     json_object(j, "weather");
@@ -162,12 +157,11 @@ static void json_print(struct json *j, const struct year *y)
     json_end_object(j);
     json_integer(j, "hours", (int64_t)y->all.hours);
     json_number(j, "wanted", y->options.wanted);
-    point_json(j, "average", &y->all.average, NULL);
+    point_json(j, "average", &y->all.average, NULL, 0);
     number_json(j, "spatial_autonomy", y->all.spatial_autonomy);
     number_json(j, "sun_exposure", y->all.sun_exposure);
     json_array(j, "points");
-    for (size_t i = 0; i < y->grid.n; i++)
-        point_json(j, NULL, &y->point[i], y->grid.points + 3 * i);
+    for (size_t i = 0; i < y->grid.n; i++) point_json(j, NULL, &y->point[i], &y->grid, i);
     json_end_array(j);
     json_end_object(j);
 }

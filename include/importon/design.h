@@ -77,6 +77,8 @@ struct imp_design_options {
     int64_t nodes; /**< branches of a search, at most; 0: 20000 */
     double clearance; /**< of what moves, from the box of all shapes: scene units, >= 0 */
     int steps;        /**< of a search for places, at most; 0: 60 */
+    int starts; /**< searches for places: the first from the present ones, others from
+                     places drawn within the bounds by the run's seed; at most 1000; 0: 1 */
 };
 #define IMP_DESIGN_OPTIONS_INIT IMP_INIT_ZERO(struct imp_design_options)
 
@@ -129,6 +131,13 @@ struct imp_design_answer {
     const double *moved_from,
         *moved_to; /**< [n_moves] in the order in which they were given */
     int steps;     /**< that were taken from there to here */
+    size_t n_starts;
+    /** [n_starts] the objective at the end of the search from each start, before fresh walks;
+     * INFINITY: nothing there has what is wanted, or the start was no scene. */
+    const double *start_objective;
+    const double *start_place; /**< [n_starts][n_moves] where it ended */
+    size_t start; /**< the one whose places the answer has; n_starts: the first places
+                       are better than all */
 };
 
 /** Is `value` on the right side of what is wanted? A bound that is met exactly holds; rounding is
@@ -170,9 +179,10 @@ imp_design_find(imp_scene *scene, const struct imp_design_lamp *lamps, size_t n_
                 imp_design **out);
 /**
  * Move lamps first: find places and aims near the present ones for which what is wanted holds with the
- * fewest watts, flux or cost; then do as imp_design_find there. The search is local (sequential
+ * fewest watts, flux or cost; then do as imp_design_find there. A search is local (sequential
  * linear programs in levels and places, with one set of random numbers), so that where it ends
- * depends on where it begins; it proves nothing of other places, while `proven` and `bound`
+ * depends on where it begins: options.starts of them begin in different places, and the best end
+ * is taken. They prove nothing of other places, while `proven` and `bound`
  * are of the combinations at the places found. Lamps that are not used at the first places stay
  * where they are, unless nothing there has what is wanted: then all are used to begin with.
  * The scene has the places found afterwards, also without an answer; after an error, the first ones.

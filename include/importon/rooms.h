@@ -17,12 +17,13 @@ extern "C" {
 /* ---- Grids ------------------------------------------------------------------------ */
 
 /**
- * The places that the pixels of an irradiancemeter stand for: the middle of each one's cell.
- * @param sensor number of an irradiancemeter.
+ * The places that the pixels of an irradiancemeter stand for, or those that a radiancemeter with a
+ * grid looks at: the middle of each one's cell.
+ * @param sensor number of such a sensor.
  * @param[out] points  [height][width][3] of the crop window, scene units.
  * @param[out] normals [height][width][3] the normal of its shape there, unit; may be NULL.
  * @return IMP_OK; IMP_E_ARG if there is no such sensor, or it is no irradiancemeter on a
- *         rectangle or, at points, on a disk or a flat mesh.
+ *         rectangle or, at points, on a disk or a flat mesh, nor a radiancemeter with a grid.
  */
 IMP_API IMP_MUST_CHECK enum imp_status imp_grid_points(const imp_scene *scene, int sensor,
                                                        double *points, double *normals);
@@ -184,8 +185,9 @@ struct imp_dgp_options {
  * sight and at most 16, Iwata's below); E is the grid's reading. All comes from the walks of
  * the meter, by the directions in which they leave the eye; in 16 groups, so that squares of
  * luminances are products of independent ones. Cells across the edge of a source are made up for
- * by those of twice their side (Richardson); the light of a source smaller than a cell stays
- * spread over the cell.
+ * by those of twice their side (Richardson). A `sun` that light samples find is a source with the
+ * size of its disc; the light of other sources smaller than a cell stays spread over the
+ * cell.
  * @param run     its sensor, seed and spp, which is at least 16 walks for each cell; NULL for
  *                defaults. Walks are those from the sensor.
  * @param options NULL for defaults.
@@ -341,6 +343,51 @@ IMP_API int imp_scene_n_luminaires(const imp_scene *scene);
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_get_luminaire(const imp_scene *scene, int luminaire,
                         struct imp_luminaire_info *info);
+
+enum imp_glare_table_size {
+    IMP_GLARE_ROOMS = 19, /**< of a table of glare ratings */
+    IMP_GLARE_SETS = 5    /**< of reflectances */
+};
+
+struct imp_glare_table_options {
+    size_t size;
+    double
+        spacing; /**< of the luminaires in parts of their height above the eyes; 0: .25, as in
+                         most catalogues; CIE 190 has 1 */
+    double flux; /**< lm of a luminaire in place of that which it has in the scene: tables
+                         of catalogues are often for 1000 lm; 0: that of the scene */
+};
+#define IMP_GLARE_TABLE_OPTIONS_INIT IMP_INIT_ZERO(struct imp_glare_table_options)
+
+/** Unified glare ratings of a luminaire in standard rooms. */
+struct imp_glare_table {
+    size_t size;
+    double flux, spacing;
+    double room[IMP_GLARE_ROOMS]
+               [2]; /**< width across the line of sight and depth along it,
+                         in heights of the luminaires above the eyes */
+    double reflectance[IMP_GLARE_SETS][3];          /**< of ceiling, walls and floor */
+    double ugr[IMP_GLARE_ROOMS][2][IMP_GLARE_SETS]; /**< seen across the length of
+                                                       the lamps, and along it */
+};
+#define IMP_GLARE_TABLE_INIT IMP_INIT_ZERO(struct imp_glare_table)
+
+/**
+ * The table of glare ratings of a luminaire (CIE 117-1995, CIE 190:2010), from its photometric file:
+ * an observer in the middle of a wall looks level along a room full of such luminaires.
+ * Background is the walls' mean indirect illuminance over pi, by the exchange between
+ * floor, walls and ceiling; luminaires count whose T/R is at most 3 and whose rays are
+ * within 85 degrees of nadir, with their luminous openings by the file.
+ * @param luminaire from 0 (imp_scene_get_luminaire).
+ * @param options NULL for defaults.
+ * @param[out] out set out->size first.
+ * @return IMP_OK; IMP_E_ARG if there is no such luminaire, it is dark or its file names no
+ *         opening, or options are out of their range.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_luminaire_glare_table(const imp_scene *scene, int luminaire,
+                          const struct imp_glare_table_options *options,
+                          struct imp_glare_table *out);
 
 /* ---- Shares of a reading ----------------------------------------------------------- */
 

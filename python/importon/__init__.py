@@ -42,7 +42,7 @@ from ._progress import set_progress
 from ._daylight import Weather, Year, annual, weather
 from ._render import denoise, render, walk
 from ._report import report
-from ._rooms import Grid, Interval, Luminaire, Share, daylight_glare, glare, grid, luminaires, shares
+from ._rooms import GlareTable, Grid, Interval, Luminaire, Share, daylight_glare, glare, glare_table, grid, luminaires, shares
 from ._scene import Scene, Sensor, load_file, load_string, set_variant, variant
 from ._transform import ScalarTransform4f, Transform4f
 from ._until import Reached, functional_until, render_until
@@ -54,12 +54,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ArgumentError", "BiasError", "Cancelled", "Check", "CheckRow", "Color3f", "Comparison", "Design", "DroppedWalk", "Error",
-    "Estimate", "FileError", "Fit", "FitVariable", "Gradient", "Grid", "ImportonWarning", "Interval", "Jacobian", "Loss",
+    "Estimate", "FileError", "Fit", "FitVariable", "GlareTable", "Gradient", "Grid", "ImportonWarning", "Interval", "Jacobian", "Loss",
     "Luminaire", "MeasureStage", "MeasuredPhoto", "Measurement", "Missing",
     "NumericError", "OutOfMemoryError", "ParameterError", "ParameterInfo", "Part", "PartsInfo", "PathsError",
     "Picture", "Plan", "PlanRow", "Progress", "Reached", "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "SelfTestRow", "Sensor", "Share",
     "Transform4f", "UnsupportedError", "Values", "Walks", "Want", "Weather", "Year", "__version__", "ad", "annual", "bend", "check", "compare", "cornell_box", "daylight_glare", "denoise", "design",
-    "elements", "fit", "functional", "functional_until", "glare", "grid", "guide", "jacobian", "join_parts", "keep", "lamps", "library_path", "load_dict", "load_file",
+    "elements", "fit", "functional", "functional_until", "glare", "glare_table", "grid", "guide", "jacobian", "join_parts", "keep", "lamps", "library_path", "load_dict", "load_file",
     "load_string", "loss", "luminaires", "measure", "merge", "missing", "part", "parts_info", "plan", "plan_improve", "plan_map", "project", "read", "read_walks", "reduce", "render", "render_backward",
     "render_forward", "render_until", "report", "selftest", "set_progress", "set_threads", "set_variant", "shares", "team", "threads",
     "traverse", "variant", "walk", "weather", "write",

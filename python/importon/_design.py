@@ -64,6 +64,8 @@ class Design:
         What has moved, by name: from and to, for each of its numbers that may move.
     steps : int
         Of the search for places.
+    starts : list of float
+        The objective at the end of the search from each start, before fresh walks; inf: nothing there has what is wanted.
     """
 
     def __init__(self, answer: Any, names: list[str], sensors: list[str]) -> None:
@@ -72,6 +74,7 @@ class Design:
         for key in ("objective", "bound", "objective_se", "margin", "watts", "flux", "cost"):
             setattr(self, key, float(getattr(answer, key)))
         self.rounds, self.nodes, self.steps = int(answer.rounds), int(answer.nodes), int(answer.steps)
+        self.starts = _doubles(answer.start_objective, int(answer.n_starts))
         self.moves: dict[str, list[tuple[float, float]]] = {}
         self.levels = dict(zip(names, _doubles(answer.level, n)))
         self.wants = [Want(s, "", f.wanted, f.value, f.sure, bool(f.holds), bool(f.binding), f.price, f.attainable,
@@ -155,7 +158,7 @@ def _wants(scene: Scene, wants: Mapping[Any, Mapping[str, float]]) -> list[Any]:
 def design(scene: Scene, wants: Mapping[Any, Mapping[str, float]],
            lamps: Optional[Sequence[Union[str, Mapping[str, Any]]]] = None, *, least: str = "watts",
            confidence: float = 0.95, rounds: int = 0, others: int = 0, within: float = 0, nodes: int = 0,
-           moves: Any = None, clearance: float = 0.1, steps: int = 0, params: Any = None, seed: int = 0, spp: int = 0, points: str = "scene", walks_from: str = "scene",
+           moves: Any = None, clearance: float = 0.1, steps: int = 0, starts: int = 0, params: Any = None, seed: int = 0, spp: int = 0, points: str = "scene", walks_from: str = "scene",
            progress: Any = None) -> Design:
     """Which lamps are used, and how far dimmed, so that what is wanted of grids holds with the fewest watts.
 
@@ -182,6 +185,8 @@ def design(scene: Scene, wants: Mapping[Any, Mapping[str, float]],
         Of what moves without bounds, from the box of all shapes.
     steps : int
         Of a search for places, at most (60).
+    starts : int
+        Searches for places (1): the first from the present ones, others from places that are drawn within the bounds.
     others, within
         Other sets of lamps to be listed, at most, and by what part of the objective they may be above it.
     params, seed, spp, points, walks_from, progress
@@ -213,7 +218,8 @@ def design(scene: Scene, wants: Mapping[Any, Mapping[str, float]],
     of = (_c.imp_design_want * max(len(wanted), 1))(*wanted)
     o = make(_c.imp_design_options, least=choice("imp_design_least", least, "least"), confidence=float(confidence),
              rounds=integer(rounds, "rounds"), others=integer(others, "others"), within=float(within),
-             nodes=integer(nodes, "nodes"), clearance=float(clearance), steps=integer(steps, "steps"))
+             nodes=integer(nodes, "nodes"), clearance=float(clearance), steps=integer(steps, "steps"),
+             starts=integer(starts, "starts"))
     options = run_options(scene, sensor=0, seed=seed, spp=spp, points=points, walks_from=walks_from)
     out = ctypes.c_void_p()
     moved = _moves(moves, keep)

@@ -95,7 +95,7 @@ def grid(scene: Scene, sensor: Any = 0, *, params: Any = None, confidence: float
     ----------
     scene : Scene
     sensor : int or str
-        An irradiancemeter on a rectangle or, at points, on a disk or a flat mesh.
+        An irradiancemeter on a rectangle or, at points, on a disk or a flat mesh, or a radiancemeter with a grid.
     confidence : float
         Of each interval.
     params, seed, spp, points, walks_from, progress
@@ -228,6 +228,58 @@ def glare(scene: Scene, sensor: Any = 0, *, params: Any = None, seed: int = 0, s
     call(scene, params, options, progress, lib.imp_grid_glare, scene.pointer, ctypes.byref(options), address(ugr),
           address(se))
     return ugr, se
+
+
+class GlareTable(NamedTuple):
+    """Unified glare ratings of a luminaire in standard rooms: `struct imp_glare_table`."""
+
+    flux: float
+    """Of a luminaire, lm."""
+    spacing: float
+    """Of the luminaires, in parts of their height above the eyes."""
+    rooms: Any
+    """[19][2], width across the line of sight and depth along it, in those heights."""
+    reflectances: Any
+    """[5][3], of ceiling, walls and floor."""
+    across: Any
+    """[19][5], seen across the length of the lamps."""
+    along: Any
+    """[19][5], seen along it."""
+
+
+def glare_table(scene: Scene, luminaire: int = 0, *, spacing: float = .25, flux: float = 0) -> GlareTable:
+    """The table of glare ratings of a luminaire (CIE 117, CIE 190), from its photometric file.
+
+    Parameters
+    ----------
+    scene : Scene
+        A photometric file alone is a scene: `importon.load_file("lamp.ldt")`.
+    luminaire : int
+        Its number, as in `luminaires`.
+    spacing : float
+        Of the luminaires, in parts of their height above the eyes.
+    flux : float
+        Of a luminaire, lm, in place of that which it has in the scene (0).
+
+    Returns
+    -------
+    GlareTable
+
+    Examples
+    --------
+    >>> scene = importon.load_string('''<scene version="3.0.0"><integrator type="path"/><emitter type="ies">
+    ... <string name="filename" value="scenes/lamps/opal.ldt"/></emitter></scene>''')
+    >>> table = importon.glare_table(scene, flux=4000)
+    >>> table.across.shape, round(float(table.across[10, 0]), 1)
+    ((19, 5), 22.3)
+    """
+    scene = check_scene(scene)
+    o, t = make(_c.imp_glare_table_options), make(_c.imp_glare_table)
+    o.spacing, o.flux = spacing, flux
+    scene._context.check(lib.imp_luminaire_glare_table(scene.pointer, luminaire, ctypes.byref(o), ctypes.byref(t)))
+    ugr = np.array([[list(row) for row in room] for room in t.ugr])
+    return GlareTable(t.flux, t.spacing, np.array([list(x) for x in t.room]), np.array([list(x) for x in t.reflectance]),
+                      ugr[:, 0], ugr[:, 1])
 
 
 def daylight_glare(scene: Scene, sensor: Any = 0, *, threshold: float = 5, cells: int = 64, params: Any = None,

@@ -80,6 +80,8 @@ struct imp_ies_data {
     double watts;     /* with its gear; 0: not given */
     double
         size[3]; /* of the luminous opening, m: along C0, along C90, height; 0: a point */
+    bool
+        length_c0; /* the length of lamps lies along C0 (LM-63); else along C90 (EULUMDAT) */
 };
 
 /* A measured isotropic BRDF by half-angle and difference angle (Rusinkiewicz 1998), in

@@ -235,6 +235,7 @@ static enum imp_status parse(struct reader *r, struct imp_arena *keep,
     d->size[0] = fabs(size[1]) * metre * round;
     d->size[1] = fabs(size[0]) * metre * round;
     d->size[2] = fabs(size[2]) * metre;
+    d->length_c0 = true;
     const double factor = multiplier * ballast * (has_factor ? lamp : 1);
 
     /* A number takes a digit and a gap: no memory for what cannot be in the file. */

@@ -12,11 +12,10 @@
 static const struct {
     const char *ending;
     imp__import_read *read;
-} readers[] = {{".rad", imp__rad_read},
-               {".vf", imp__view_read},
-               {".obj", imp__obj_read},
-               {".gltf", imp__gltf_read},
-               {".glb", imp__gltf_read}};
+} readers[] = {{".rad", imp__rad_read},      {".vf", imp__view_read},
+               {".obj", imp__obj_read},      {".gltf", imp__gltf_read},
+               {".glb", imp__gltf_read},     {".ldt", imp__luminaire_read},
+               {".ies", imp__luminaire_read}};
 
 imp__import_read *imp__import_of(const char *name)
 {

@@ -28,6 +28,7 @@ imp__import_read imp__rad_read;  /* Radiance: materials and surfaces */
 imp__import_read imp__view_read; /* Radiance: a view, which becomes a sensor */
 imp__import_read imp__obj_read;  /* Wavefront: OBJ with the materials of its MTL files */
 imp__import_read imp__gltf_read; /* glTF 2.0, as text and binary */
+imp__import_read imp__luminaire_read; /* EULUMDAT and LM-63: a luminaire */
 
 /* The reader by the ending of a name; NULL: a file in XML. */
 imp__import_read *imp__import_of(const char *name);

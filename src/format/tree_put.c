@@ -139,7 +139,8 @@ static enum imp_status grid_put(struct putting *p, const struct imp_node *node)
 
 static void ies_put(struct putting *p, const struct imp_ies_data *d)
 {
-    const int32_t size[3] = {d->n_vertical, d->n_horizontal, d->type};
+    const int32_t size[3] = {d->n_vertical, d->n_horizontal,
+                             d->type | (d->length_c0 ? 4 : 0)};
     const double more[5] = {d->lamp_flux, d->watts, d->size[0], d->size[1], d->size[2]};
     const size_t v = (size_t)d->n_vertical, h = (size_t)d->n_horizontal;
     put_mark(p, MARK_IES);

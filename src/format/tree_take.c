@@ -67,14 +67,15 @@ static bool take_ies(struct taking *t)
     struct imp_ies_data *d = imp__arena_array(&t->scene->arena, 1, sizeof *d);
     if (!d || node->ies || strcmp(node->tag, "emitter") != 0 ||
         !take(t, size, sizeof size) || !take(t, more, sizeof more) ||
-        !all_in(more, 5, 0, 1e300) || size[2] < IMP_PHOTOMETRY_C ||
-        size[2] > IMP_PHOTOMETRY_A || size[0] < 2 || size[1] < 1 ||
+        !all_in(more, 5, 0, 1e300) || size[2] < 0 || size[2] >> 3 ||
+        (size[2] & 3) > IMP_PHOTOMETRY_A || size[0] < 2 || size[1] < 1 ||
         size[0] > IMP_IES_ANGLES_MAX || size[1] > IMP_IES_ANGLES_MAX)
         return false;
     const size_t v = (size_t)size[0], h = (size_t)size[1];
     d->n_vertical = size[0];
     d->n_horizontal = size[1];
-    d->type = (enum imp_photometry)size[2];
+    d->type = (enum imp_photometry)(size[2] & 3);
+    d->length_c0 = size[2] & 4;
     d->lamp_flux = more[0];
     d->watts = more[1];
     for (int k = 0; k < 3; k++) d->size[k] = more[2 + k];

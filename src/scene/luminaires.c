@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Luminaires of a scene: its emitters that have a photometric table. */
+#include "luminaires.h"
 #include "base/arguments.h"
 #include "color/rgb.h"
 #include "kind/emitter/ies.h"
-#include "scene.h"
 #include <importon/rooms.h>
 
 static bool is_luminaire(const struct imp_emitter *e)
@@ -18,6 +18,14 @@ int imp_scene_n_luminaires(const imp_scene *scene)
     for (int i = 0; scene && i < scene->n_emitters; i++)
         n += is_luminaire(scene->emitters[i]);
     return n;
+}
+
+const struct imp_emitter *imp__luminaire_at(const struct imp_scene *scene, int luminaire)
+{
+    int left = luminaire;
+    for (int i = 0; i < scene->n_emitters && luminaire >= 0; i++)
+        if (is_luminaire(scene->emitters[i]) && left-- == 0) return scene->emitters[i];
+    return NULL;
 }
 
 /* Luminance of the scale; of a texture, 1: its mean is not known here. */
@@ -34,14 +42,11 @@ enum imp_status imp_scene_get_luminaire(const imp_scene *scene, int luminaire,
     IMP_REQUIRE(NULL, scene, "scene");
     IMP_REQUIRE(scene->ctx, info, "info");
     IMP_CHECKED(imp__size_check(scene->ctx, __func__, "info", info->size, sizeof *info));
-    int at = -1, left = luminaire;
-    for (int i = 0; i < scene->n_emitters && at < 0 && luminaire >= 0; i++)
-        if (is_luminaire(scene->emitters[i]) && left-- == 0) at = i;
-    if (at < 0)
+    const struct imp_emitter *e = imp__luminaire_at(scene, luminaire);
+    if (!e)
         return imp__error(scene->ctx, IMP_E_ARG,
                           "there is no luminaire %d; the scene has %d", luminaire,
                           imp_scene_n_luminaires(scene));
-    const struct imp_emitter *e = scene->emitters[at];
     const struct imp__ies *x = e->self;
     const double rated = imp__ies_flux(x) * x->lumens, scale = scale_of(scene, e);
     const double reduced = x->dimming * x->maintenance;

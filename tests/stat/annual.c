@@ -304,10 +304,11 @@ static void coverage(bool is_long)
                                               "exposure"};
     const double t = 2.131;
     const int runs = is_long ? RUNS : RUNS / 4;
-    int held[NUMBERS] = {0};
+    int held[NUMBERS] = {0}, at_points = 0;
+    struct imp_annual_point point[POINTS];
     imp_scene *s = scene_of("path", SKY ROOM DESK);
     struct imp_annual_options o = IMP_ANNUAL_OPTIONS_INIT;
-    double truth[NUMBERS];
+    double truth[NUMBERS], point_truth[POINTS];
     o.size = sizeof o;
     o.closes = 24;
     o.wanted = 4000;
@@ -317,13 +318,21 @@ static void coverage(bool is_long)
         y.size = sizeof y;
         run.spp = r < 0 ? 1 << 16 : 256;
         run.seed = 1000 + (uint64_t)(r + 1);
-        test_must(ctx, imp_annual_read(s, &run, HOURS, hours, &o, NULL, &y, NULL, NULL));
+        test_must(ctx, imp_annual_read(s, &run, HOURS, hours, &o, point, &y, NULL, NULL));
+        for (int i = 0; i < POINTS; i++) {
+            const struct imp_estimate a = point[i].autonomy;
+            if (r < 0) point_truth[i] = a.value;
+            else at_points += fabs(a.value - point_truth[i]) <= t * a.se + 1e-12;
+        }
         const struct imp_estimate e[NUMBERS] = {y.average.autonomy, y.average.continuous,
                                                 y.average.mean, y.average.exposure};
         for (int k = 0; k < NUMBERS; k++)
             if (r < 0) truth[k] = e[k].value;
             else held[k] += fabs(e[k].value - truth[k]) <= t * e[k].se + 1e-12;
     }
+    const double at_point = (double)at_points / (runs * POINTS);
+    tap_ok(at_point > .93, "autonomy of single points: %.1f %% of %d intervals hold",
+           100 * at_point, runs * POINTS);
     for (int k = 0; k < NUMBERS; k++) {
         const double part = (double)held[k] / runs;
         /* What counts hours is conservative: the error has the bias of noise in it. */

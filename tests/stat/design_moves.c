@@ -118,6 +118,52 @@ static void height(void)
     imp_scene_destroy(s);
 }
 
+/* ---- Several starts -------------------------------------------------------------------------- */
+
+/* The mean of 100 h/r^3 over points at -4, 0 and 4, from a lamp at x, 2 above them. */
+static double three_of(double x)
+{
+    double sum = 0;
+    for (int i = -1; i <= 1; i++)
+        sum += 200 / pow((x - 4 * i) * (x - 4 * i) + 4, 1.5) / 3;
+    return sum;
+}
+
+/* Near each point there is a place that is the best around; above the middle one it is the best of
+ * all, and a search from near the last one does not find it. */
+static void starts(void)
+{
+    const struct imp_design_lamp lamp = lamp_of("lamp");
+    const struct imp_design_want want = want_of(IMP_WANT_AVERAGE, 5);
+    const struct imp_design_move move = move_of("lamp.position", 0, -7, 7);
+    double near = 0;
+    for (double x = 3; x < 5; x += 1e-4) near = fmax(near, three_of(x));
+    for (int k = 0; k < 2; k++) {
+        imp_scene *s =
+            room(2, 6, 6, 1, 16, 3, 1,
+                 "<emitter type='point' id='lamp'><point name='position' x='4.4' y='0' "
+                 "z='2'/><rgb name='intensity' value='100'/></emitter>");
+        struct imp_design_options o = IMP_DESIGN_OPTIONS_INIT;
+        imp_design *d = NULL;
+        o.starts = k ? 8 : 1;
+        test_must(ctx, imp_design_move(s, &lamp, 1, &want, 1, &move, 1, &o, NULL, &d));
+        const struct imp_design_answer *a = imp_design_result(d);
+        const double truth = 50 * 5 / (k ? three_of(0) : near);
+        tap_ok(a->holds && fabs(a->watts / truth - 1) < 1e-4, "%d starts: %.4f W of %.4f",
+               o.starts, a->watts, truth);
+        double least = INFINITY;
+        for (size_t i = 0; i < a->n_starts; i++)
+            least = fmin(least, a->start_objective[i]);
+        tap_ok(a->n_starts == (size_t)o.starts && a->start < a->n_starts &&
+                   a->start_objective[a->start] == least &&
+                   a->start_place[a->start] == a->moved_to[0] &&
+                   fabs(a->start_objective[0] * near / (50 * 5) - 1) < 1e-4,
+               "the best of them is start %zu", a->start);
+        imp_design_destroy(d);
+        imp_scene_destroy(s);
+    }
+}
+
 /* ---- Two lamps in a corridor ------------------------------------------------------------------ */
 
 /* The least illuminance of 12 x 2 points of [-6, 6] x [-1, 1] with lamps at (+-a, 0, 2.5). */
@@ -312,6 +358,7 @@ int main(void)
 {
     ctx = test_context(0);
     height();
+    starts();
     corridor();
     aimed();
     reflected();

@@ -168,6 +168,36 @@ static void disks(void)
     }
 }
 
+/* A sun's disc of .0047 rad 25 degrees up and 20 to the right, much smaller than a cell; by a pane
+ * across the line of sight a part T of its light is left. */
+static void sun(void)
+{
+    const double el = 25 * DEGREE, az = 20 * DEGREE, size = 2 * M_PI * (1 - cos(.004675));
+    const double w[3] = {cos(el) * sin(az), cos(el) * cos(az), sin(el)};
+    const double b = acos(w[1]) / DEGREE, a = acos(w[2] / hypot(w[0], w[2])) / DEGREE;
+    const double p = imp_guth_position(a, b), L = 2e7;
+    const double lx = 300 * M_PI + L * size * w[1];
+    const double truth =
+        5.87e-5 * lx + .0918 * log10(1 + L * L * size / (p * p) / pow(lx, 1.87)) + .16;
+    char xml[2048];
+    snprintf(xml, sizeof xml,
+             EYE(POINTS SIGHT) SKY
+             "<emitter type='sun'><rgb name='radiance' value='%.17g'/>"
+             "<vector name='direction' x='%.17g' y='%.17g' "
+             "z='%.17g'/></emitter></scene>",
+             300., L, -w[0], -w[1], -w[2]);
+    imp_scene *s = test_scene_text(ctx, xml, IMP_MONO);
+    for (int cells = 16; cells <= 64; cells *= 4) {
+        double dgp, se, E;
+        dgp_of(s, cells, 0, 1, 0, &dgp, &se, &E);
+        tap_ok(fabs(dgp - truth) < 6.5 * se && se > 0 && se < 5e-3 &&
+                   fabs(E / lx - 1) < .02,
+               "the sun's disc, %d x %d cells: %.5f +- %.5f of %.5f, %.0f lx of %.0f",
+               cells, cells, dgp, se, truth, E, lx);
+    }
+    imp_scene_destroy(s);
+}
+
 static void without_disk(void)
 {
     char xml[2048];
@@ -282,6 +312,7 @@ int main(void)
     formulas();
     view();
     disks();
+    sun();
     without_disk();
     furnace();
     coverage();

@@ -167,6 +167,7 @@ NOT_OK = {
     "imp_grid_points": "its sensor is a camera",
     "imp_grid_cells": "the same",
     "imp_scene_get_luminaire": "the scene has no luminaire",
+    "imp_luminaire_glare_table": "the scene has no luminaire",
     "imp_grid_glare": "its sensor is a camera",
     "imp_grid_dgp": "the same",
     "imp_dgp": "its sources are zeros",

@@ -223,6 +223,10 @@ enum imp_status imp__design_options_take(struct imp__design_model *m,
     if (o->within == 0) o->within = 0.05;
     if (o->nodes == 0) o->nodes = 20000;
     if (o->steps == 0) o->steps = 60;
+    if (o->starts == 0) o->starts = 1;
+    if (o->starts < 1 || o->starts > 1000)
+        return imp__error(m->ctx, IMP_E_ARG, "options: starts = %d are not in 1 to 1000",
+                          o->starts);
     IMP_FINITE(m->ctx, o->clearance, "options: clearance");
     if (o->clearance < 0 || o->steps < 1 || o->steps > 10000)
         return imp__error(

@@ -177,10 +177,11 @@ static enum imp_status moved_make(struct imp__moving *v,
     v->iterations = m->o.steps;
     m->whole = (double)m->n_grids * ((double)m->n + 2 * (double)v->n) * 10;
     IMP_TRY(imp__moving_bounds(v, moves, m->o.clearance));
+    m->whole *= v->n > 0 ? m->o.starts : 1;
     /* The largest error of a point is above their rms, by how much is found out. */
     for (v->more = 1.3; v->more < 5 && !out->found; v->more *= 1.5) {
         *out = (struct imp_design_answer){.size = out->size};
-        IMP_TRY(imp__design_move(v));
+        if (v->n > 0) IMP_TRY(v->end ? imp__design_move(v) : imp__design_starts(v));
         IMP_TRY(design_make(m, out));
         if (v->n == 0) break;
     }
@@ -189,6 +190,7 @@ static enum imp_status moved_make(struct imp__moving *v,
          * places are better. */
         *out = (struct imp_design_answer){.size = out->size};
         v->steps = 0;
+        v->start = (size_t)m->o.starts;
         memcpy(v->p, v->first, v->n * sizeof *v->p);
         IMP_TRY(imp__moving_place(v, v->p));
         IMP_TRY(design_make(m, out));
@@ -197,6 +199,10 @@ static enum imp_status moved_make(struct imp__moving *v,
     out->moved_from = v->first;
     out->moved_to = v->p;
     out->steps = v->steps;
+    out->n_starts = v->n > 0 ? (size_t)m->o.starts : 0;
+    out->start_objective = v->end;
+    out->start_place = v->ended;
+    out->start = v->start;
 out:
     if (st != IMP_OK && v->n > 0) {
         const enum imp_status back = imp__moving_place(v, v->first);
@@ -224,13 +230,26 @@ static enum imp_status design_hold(struct imp__moving *v, const struct asked *a,
     return moved_make(v, a->moves, out);
 }
 
-static enum imp_status design_run(struct imp__moving *v, const struct asked *a,
+/* A design of n_lamps lamps with n_wants wants, of which n_moves numbers move. */
+static enum imp_status design_run(imp_scene *scene, size_t n_lamps, size_t n_wants,
+                                  size_t n_moves, const struct asked *a,
                                   const char *function, const struct imp_run *run,
                                   imp_design **out)
 {
     enum imp_status st = IMP_OK;
-    struct imp__design_model *m = v->m;
-    imp_context *ctx = m->ctx;
+    if (!scene) return imp__argument_missing(NULL, function, "scene");
+    imp_context *ctx = scene->ctx;
+    const struct {
+        const void *pointer;
+        const char *name;
+    } needed[] = {{a->lamps, "lamps"}, {a->wants, "wants"}, {out, "out"}};
+    for (size_t k = 0; k < imp_count(needed); k++)
+        if (!needed[k].pointer)
+            return imp__argument_missing(ctx, function, needed[k].name);
+    struct imp__design_model model = {
+        .ctx = ctx, .scene = scene, .n = n_lamps, .n_wants = n_wants};
+    struct imp__design_model *m = &model;
+    struct imp__moving moving = {.m = m, .n = n_moves}, *v = &moving;
     imp_problem *blank = NULL;
     IMP_RUN(ctx, m->run, run);
     IMP_CHECKED(imp__run_traces(ctx, function, &m->run));
@@ -264,15 +283,8 @@ enum imp_status imp_design_find(imp_scene *scene, const struct imp_design_lamp *
                                 size_t n_wants, const struct imp_design_options *options,
                                 const struct imp_run *run, imp_design **out)
 {
-    IMP_REQUIRE(NULL, scene, "scene");
-    IMP_REQUIRE(scene->ctx, lamps, "lamps");
-    IMP_REQUIRE(scene->ctx, wants, "wants");
-    IMP_REQUIRE(scene->ctx, out, "out");
-    struct imp__design_model m = {
-        .ctx = scene->ctx, .scene = scene, .n = n_lamps, .n_wants = n_wants};
-    struct imp__moving v = {.m = &m};
-    return design_run(&v, &(struct asked){lamps, wants, NULL, options}, __func__, run,
-                      out);
+    return design_run(scene, n_lamps, n_wants, 0,
+                      &(struct asked){lamps, wants, NULL, options}, __func__, run, out);
 }
 
 enum imp_status imp_design_move(imp_scene *scene, const struct imp_design_lamp *lamps,
@@ -282,18 +294,12 @@ enum imp_status imp_design_move(imp_scene *scene, const struct imp_design_lamp *
                                 const struct imp_run *run, imp_design **out)
 {
     IMP_REQUIRE(NULL, scene, "scene");
-    IMP_REQUIRE(scene->ctx, lamps, "lamps");
-    IMP_REQUIRE(scene->ctx, wants, "wants");
     IMP_REQUIRE(scene->ctx, moves, "moves");
-    IMP_REQUIRE(scene->ctx, out, "out");
     if (n_moves == 0 || n_moves > 1000)
         return imp__error(scene->ctx, IMP_E_ARG,
                           "moves: %zu numbers; there are 1 to 1000", n_moves);
-    struct imp__design_model m = {
-        .ctx = scene->ctx, .scene = scene, .n = n_lamps, .n_wants = n_wants};
-    struct imp__moving v = {.m = &m, .n = n_moves};
-    return design_run(&v, &(struct asked){lamps, wants, moves, options}, __func__, run,
-                      out);
+    return design_run(scene, n_lamps, n_wants, n_moves,
+                      &(struct asked){lamps, wants, moves, options}, __func__, run, out);
 }
 
 const struct imp_design_answer *imp_design_result(const imp_design *design)

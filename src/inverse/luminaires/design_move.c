@@ -216,8 +216,9 @@ static enum imp_status levels_begin(struct imp__moving *v)
         v->x[j] = a.found ? a.x[j] : m->most[j];
         whole += m->price[j] * m->most[j];
     }
-    if (v->steps == 0)
+    if (!v->begun)
         v->started = a.found ? imp__design_objective(m, m->o.least, a.x) : INFINITY;
+    v->begun = true;
     v->penalty = whole > 0 ? PENALTY * whole : 1;
     return IMP_OK;
 }

@@ -28,6 +28,10 @@ struct imp__moving {
     double more; /* margins are so many times those of a design */
     double
         started; /* objective of the best combination at the first places; infinite: none */
+    bool begun; /* is that known? */
+    double *end,
+        *ended;   /* [m->o.starts] objectives, and places [m->o.starts][n], of searches */
+    size_t start; /* the best of them */
     struct imp__design_reading *kept; /* [m->n] */
 };
 
@@ -56,5 +60,7 @@ void imp__moving_restore(struct imp__moving *v, const struct imp__moving_reading
 
 /* The search, from v->p on; v->p and the scene have its places afterwards. */
 enum imp_status imp__design_move(struct imp__moving *v);
+/* m->o.starts searches: v->p and the scene have the places of the best afterwards. */
+enum imp_status imp__design_starts(struct imp__moving *v);
 
 #endif

@@ -33,7 +33,7 @@ struct imp__annual_hours {
     int n_cells;
     int cell_of[IMP__PATCHES];      /* -1: the sun is never there */
     int patch_of[IMP__PATCHES];     /* of a cell */
-    size_t *suns;                   /* lit hours by cells */
+    imp_v3 *suns;                   /* to_sun of the lit hours, by cells */
     double *below;                  /* their E_s added up, from the cell's first on */
     size_t first[IMP__PATCHES + 1]; /* of a cell, in both */
 };

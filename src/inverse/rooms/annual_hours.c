@@ -110,7 +110,7 @@ static void cells_make(const struct imp__sky_patches *p, struct imp__annual_hour
         if (h->cell[k] < 0) continue;
         const int c = h->cell[k] = h->cell_of[h->cell[k]];
         const size_t at = h->first[c] + filled[c]++;
-        h->suns[at] = k;
+        h->suns[at] = h->to_sun[k];
         h->below[at] = h->sun[k] + (at > h->first[c] ? h->below[at - 1] : 0);
     }
 }

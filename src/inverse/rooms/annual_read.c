@@ -143,18 +143,27 @@ static void hours_light(const struct imp__annual *a, struct imp__annual_worker *
         for (int g = 0; g < IMP__GROUPS; g++) any |= w->at.C[p][g] != 0;
         if (any) seen[n++] = p;
     }
-    for (size_t k = 0; k < h->n; k++) {
-        const double *L = h->sky + k * IMP__PATCHES;
-        const double *I = h->cell[k] >= 0 ? w->at.I[h->cell[k]] : NULL;
-        imp_v3 E[FOURS]; /* four groups each, so that no compiler loses them */
-        for (int g = 0; g < IMP__GROUPS; g++)
-            E[g / 4][g % 4] = w->S[k][g] + (I ? h->sun[k] * I[g] : 0);
+    for (size_t k = 0; k < h->n;
+         k += 2) { /* two at once: coefficients are read once for both */
+        const size_t both[2] = {k, imp_min(k + 1, h->n - 1)};
+        const double *L0 = h->sky + both[0] * IMP__PATCHES,
+                     *L1 = h->sky + both[1] * IMP__PATCHES;
+        imp_v3 E[2][FOURS]; /* four groups each, so that no compiler loses them */
+        for (int t = 0; t < 2; t++) {
+            const int cell = h->cell[both[t]];
+            for (int g = 0; g < IMP__GROUPS; g++)
+                E[t][g / 4][g % 4] = w->S[both[t]][g] +
+                                     (cell >= 0 ? h->sun[both[t]] * w->at.I[cell][g] : 0);
+        }
         for (int i = 0; i < n; i++) {
             const imp_v3 *C = (const imp_v3 *)w->at.C[seen[i]];
-            const double here = L[seen[i]];
-            for (int f = 0; f < FOURS; f++) E[f] += C[f] * here;
+            const double a0 = L0[seen[i]], a1 = L1[seen[i]];
+            for (int f = 0; f < FOURS; f++) {
+                E[0][f] += C[f] * a0;
+                E[1][f] += C[f] * a1;
+            }
         }
-        memcpy(w->E[k], E, sizeof E);
+        for (int t = 0; t < 2; t++) memcpy(w->E[both[t]], E[t], sizeof E[t]);
     }
 }
 

@@ -8,14 +8,19 @@
  *
  *     x +- d_c,   x = sum_g x_g / 16,   d_c = sum_g s_cg x_g / 16,   c = 1 ... 15
  *
- * and a number T of the year has the variance sum_c ((T(x + d_c) - T(x - d_c))/2)^2 / 15: of a
- * mean that is s^2/16 exactly, of counts it is consistent, since d_c is as large as the error
- * of x (balanced half-samples: McCarthy 1969; Shao and Wu 1992).
+ * Let u_c = (T(x + d_c) - T(x - d_c))/2 and v_c = (T(x + d_c) + T(x - d_c))/2 - T(x) for a number T of
+ * the year. Noise makes min(E, wanted) smaller, and carries hours over a bound to the side that
+ * has fewer: the mean of v_c is as far from 0 as T(x) is from the truth on average, and is
+ * taken off. What is left has the variance
  *
- * For the same reason the mean over c of T(x + d_c) and T(x - d_c) is as far from T(x) as that is
- * from the truth, on average: noise makes min(E, wanted) smaller, and carries hours over a
- * bound to the side that has fewer. That bias b is taken off, and as its estimate is of
- * second order and noisy, the error is (variance + b^2)^(1/2). */
+ *     sum_c (u_c^2 + 11 (v_c - v)^2) / 15 + v^2,   v = sum_c v_c / 15
+ *
+ * Of a mean v_c is 0, and that is s^2/16 exactly. Of a count that many hours near a bound change
+ * together, u_c is consistent, since d_c is as large as the error of x (balanced half-samples:
+ * McCarthy 1969; Shao and Wu 1992). A single hour at its bound is counted as 2 [e > 0] - P(e),
+ * with e the normal error of x and P its distribution: the variance is 7/12, u_c^2 is 1/8 and
+ * (v_c - v)^2 is 1/24 on average, hence the factor 11. The correction v, an estimate of second
+ * order, is itself a part of the error. */
 #include "annual.h"
 #include <math.h>
 
@@ -46,15 +51,18 @@ static inline void variants_of(const double group[IMP__GROUPS], double out[IMP__
 
 struct imp_estimate imp__annual_estimate(const double v[IMP__VARIANTS])
 {
-    double square = 0, bias = 0;
+    double across = 0, along = 0, bias = 0;
     for (int c = 1; c < IMP__GROUPS; c++) {
         const double up = v[c] - v[0], down = v[IMP__GROUPS - 1 + c] - v[0];
-        square += (up - down) * (up - down) / 4;
+        across += imp__sqr((up - down) / 2);
+        along += imp__sqr((up + down) / 2);
         bias += (up + down) / 2;
     }
     const double n = IMP__GROUPS - 1;
     bias /= n;
-    return (struct imp_estimate){v[0] - bias, sqrt(square / n + bias * bias), 2};
+    return (struct imp_estimate){
+        v[0] - bias,
+        sqrt(across / n + 11 * imp_max(along / n - bias * bias, 0.0) + bias * bias), 2};
 }
 
 /* A part of the hours. */

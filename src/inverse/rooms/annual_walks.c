@@ -4,7 +4,8 @@
  * its direction and what it would bring of radiance 1 there; and, at every vertex but the
  * first, rays to the sun as it is at some hours of the year.
  *
- * The hours of a vertex are drawn by patches, each the same number of times, and in a patch by the
+ * Rays are as many as the throughput up to a vertex is large, since what each brings is, too: half
+ * of the light, half of the rays. The hours of a vertex are drawn by patches, each the same number of times, and in a patch by the
  * sun's illuminance: the sum over the hours of what the sun brings reflected is without bias, that
  * of an hour alone is a mean over the patch. Light that a mirror or a lens brings from the
  * sun meets no ray of these: it is that of walks which leave through the sun's patch, spread
@@ -15,7 +16,7 @@
 #include "walk/core/vertex.h"
 #include <string.h>
 
-enum { SUNS = 4 }; /* rays to the sun at a vertex */
+enum { SUNS = 4 }; /* rays to the sun at a vertex that all light of a walk passes */
 
 struct walk_job {
     const struct imp__annual *a;
@@ -38,17 +39,16 @@ static void sky_add(struct walk_job *j, imp_v3 w, imp_spec light, bool bent)
         j->w->at.I[cell][j->group] += x / imp__sky_patch_size(&a->patches, patch);
 }
 
-/* An hour at which the sun is in the cell, by its illuminance. */
-static size_t hour_draw(const struct imp__annual_hours *h, int cell, double u)
+/* The sun at an hour when it is in the cell, by its illuminance. The hours of a cell are alike, so
+ * that the hour sought is near where it were if they had the same. */
+static imp_v3 sun_draw(const struct imp__annual_hours *h, int cell, double u)
 {
-    size_t lo = h->first[cell], hi = h->first[cell + 1] - 1;
-    const double want = u * h->below[hi];
-    while (lo < hi) {
-        const size_t middle = (lo + hi) / 2;
-        if (want < h->below[middle]) hi = middle;
-        else lo = middle + 1;
-    }
-    return h->suns[lo];
+    const size_t lo = h->first[cell], n = h->first[cell + 1] - lo;
+    const double want = u * h->below[lo + n - 1];
+    size_t k = imp_min((size_t)(u * (double)n), n - 1);
+    while (k > 0 && want < h->below[lo + k - 1]) k--;
+    while (k + 1 < n && !(want < h->below[lo + k])) k++;
+    return h->suns[lo + k];
 }
 
 /* P: throughput up to v; k: its number in the walk, which numbers its random numbers. */
@@ -57,7 +57,10 @@ static void suns_add(struct walk_job *j, const struct imp_vertex *v, imp_spec P,
     const struct imp__annual *a = j->a;
     const struct imp__annual_hours *h = &a->hours;
     const struct imp_key key = imp__key_branch(j->walk->key, k, 0x5u);
+    const double rays = SUNS * imp_min(imp__annual_light(j->mono, P), 1.0);
+    const int n = (int)(rays + imp__u01(key, 2 * SUNS));
     struct imp_surface at;
+    if (n == 0) return;
     if (!imp__decided_surface(a->scene, &v->d, j->walk->time, &at)) {
         j->st = imp__error(a->scene->ctx, IMP_E_UNSUPPORTED,
                            "shape %d (%s) does not say where its points are: the sun "
@@ -67,19 +70,19 @@ static void suns_add(struct walk_job *j, const struct imp_vertex *v, imp_spec P,
     }
     const struct imp_frame frame = {at.s, at.t, at.n};
     const imp_v3 wo = imp__vertex_wo(v);
-    for (int i = 0; i < SUNS; i++) {
+    for (int i = 0; i < n; i++) {
         const uint32_t dim = 2 * (uint32_t)i;
-        const double which = (i + imp__u01(key, dim)) / SUNS * h->n_cells;
+        const double which = (i + imp__u01(key, dim)) / n * h->n_cells;
         const int cell = imp_min((int)which, h->n_cells - 1);
-        const size_t hour = hour_draw(h, cell, imp__u01(key, dim + 1));
-        const imp_v3 w = h->to_sun[hour]; /* its disc is small beside the patch */
+        /* Its disc is small beside the patch. */
+        const imp_v3 w = sun_draw(h, cell, imp__u01(key, dim + 1));
         const struct imp_dirs dirs = {wo, imp__to_local(&frame, w), IMP_SMOOTH, 0};
         imp_spec f;
         imp__bsdf_eval(v->bsdf, NULL, v->in, &dirs, &f);
         f *= P;
         if (imp__is_zero_used(f, false)) continue;
         f *= imp__annual_passes(a, j->walk->time, imp__offset(at.p, at.ng, w), w);
-        j->w->at.I[cell][j->group] += imp__annual_light(j->mono, f) * h->n_cells / SUNS;
+        j->w->at.I[cell][j->group] += imp__annual_light(j->mono, f) * h->n_cells / rays;
     }
 }
 

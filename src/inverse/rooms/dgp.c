@@ -51,44 +51,66 @@ static double sum_of(const struct imp__view *v, double (*L)[GROUPS], int without
     return sum;
 }
 
-/* The number without a group, from luminances. E, total [GROUPS]: illuminance; sum of the cells'
- * luminances. */
-static double number_of(const struct imp__view view[2], double (*L)[GROUPS],
-                        const double *total, const double *E, int without,
-                        double threshold, double *illuminance)
+/* Luminances of cells and discs by groups; E, total [GROUPS]: illuminance; sum of the cells'
+ * luminances, discs among them. */
+struct seen {
+    const struct imp__view *view; /* [2] */
+    double (*cell)[GROUPS];
+    size_t n_discs;
+    const struct imp__view_disc *disc;
+    double (*disc_L)[GROUPS];
+    double E[GROUPS], total[GROUPS];
+};
+
+/* The number without a group. */
+static double number_of(const struct seen *s, int without, double threshold,
+                        double *illuminance)
 {
+    const struct imp__view *view = s->view;
     const int n = without == ALL ? GROUPS : GROUPS - 1;
     double light = 0, mean = 0;
     for (int g = 0; g < GROUPS; g++)
-        if (g != without) light += E[g] / n, mean += total[g] / n;
+        if (g != without) light += s->E[g] / n, mean += s->total[g] / n;
     if (threshold <= 100) threshold *= mean / (double)view->n;
-    const double fine = sum_of(&view[0], L, without, threshold);
-    const double coarse = sum_of(&view[1], L + view->n, without, threshold);
+    const double fine = sum_of(&view[0], s->cell, without, threshold);
+    const double coarse = sum_of(&view[1], s->cell + view->n, without, threshold);
+    double discs = 0;
+    for (size_t k = 0; k < s->n_discs; k++)
+        discs += s->disc[k].weight * square_of(s->disc_L[k], without, threshold);
     *illuminance = light;
-    return imp__dgp_of(light, fmax(2 * fine - coarse, 0));
+    return imp__dgp_of(light, fmax(2 * fine - coarse, 0) + fmax(discs, 0));
 }
 
 void imp__dgp_rate(const struct imp__view view[2], double (*light)[GROUPS],
-                   double threshold, double *dgp, double *se, double *illuminance)
+                   size_t n_discs, const struct imp__view_disc *disc,
+                   double (*disc_light)[GROUPS], double threshold, double *dgp,
+                   double *se, double *illuminance)
 {
+    struct seen s = {view, light, n_discs, disc, disc_light, {0}, {0}};
     const int side = view->side, half = view[1].side;
     double(*merged)[GROUPS] = light + view->n;
-    double E[GROUPS] = {0}, total[GROUPS] = {0}, left[GROUPS], mean = 0, square = 0, lx;
+    double left[GROUPS], mean = 0, square = 0, lx;
     memset(merged, 0, view[1].n * sizeof *merged);
     for (int c = 0; c < (int)view->n; c++) {
         const int at = c / side / 2 * half + c % side / 2;
         const double k = 1 / (view[0].size * view[0].cosine[c]);
         const double m = 1 / (view[1].size * view[1].cosine[at]);
         for (int g = 0; g < GROUPS; g++) {
-            E[g] += light[c][g];
+            s.E[g] += light[c][g];
             merged[at][g] += light[c][g] * m;
             light[c][g] *= k;
-            total[g] += light[c][g];
+            s.total[g] += light[c][g];
         }
     }
-    *dgp = number_of(view, light, total, E, ALL, threshold, illuminance);
+    for (size_t d = 0; d < n_discs; d++)
+        for (int g = 0; g < GROUPS; g++) {
+            s.E[g] += disc_light[d][g];
+            disc_light[d][g] /= disc[d].size * disc[d].cosine;
+            s.total[g] += disc_light[d][g] * disc[d].size / view[0].size;
+        }
+    *dgp = number_of(&s, ALL, threshold, illuminance);
     for (int g = 0; g < GROUPS; g++) {
-        left[g] = number_of(view, light, total, E, g, threshold, &lx);
+        left[g] = number_of(&s, g, threshold, &lx);
         mean += left[g] / GROUPS;
     }
     for (int g = 0; g < GROUPS; g++) square += (left[g] - mean) * (left[g] - mean);

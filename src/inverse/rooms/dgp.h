@@ -30,13 +30,22 @@ imp_v3 imp__view_middle(const struct imp__view *v, int cell);
 /* Guth's or Iwata's, at most 16. */
 double imp__view_position(imp_v3 w);
 
+/* A part of the view that has a place and a size of its own: a sun's disc. */
+struct imp__view_disc {
+    double size, cosine; /* sr; to the line of sight */
+    double weight;       /* size over the square of the position index */
+};
+
 /* glare.c: the formula, with sum = sum L^2 w/p^2. */
 double imp__dgp_of(double illuminance, double sum);
 
 /* dgp.c: light [n] of the cells of view[0] by groups, as illuminances, which become luminances;
  * view[1] has half as many cells on a side, which share the array behind the first n.
- * threshold as of imp_dgp_options. */
+ * threshold as of imp_dgp_options. The light of the discs, which is not in the cells, is
+ * disc_light [n_discs], as the cells'. */
 void imp__dgp_rate(const struct imp__view view[2], double (*light)[IMP__VIEW_GROUPS],
-                   double threshold, double *dgp, double *se, double *illuminance);
+                   size_t n_discs, const struct imp__view_disc *disc,
+                   double (*disc_light)[IMP__VIEW_GROUPS], double threshold, double *dgp,
+                   double *se, double *illuminance);
 
 #endif

@@ -3,7 +3,8 @@
  * Daylight glare probability at the points of a grid. The walks of a meter that faces along the line
  * of sight are those of the eye: what each brings is added to the cell of the view in whose
  * direction it left, or in which the light lies that was sampled there. So the cells add up to
- * the meter's reading. A point is one item of work with sums of its own: the number of
+ * the meter's reading. Samples of a sun's disc are a source of its own, much smaller than a
+ * cell; a sun that is met by chance, which a mirror shows, is in the cell. A point is one item of work with sums of its own: the number of
  * threads changes no bit. */
 #include "base/arena.h"
 #include "base/arguments.h"
@@ -12,6 +13,7 @@
 #include "dgp.h"
 #include "film/film_measure.h"
 #include "glare_sources.h"
+#include "kind/emitter/sun.h"
 #include "kind/sensor/receiver.h"
 #include "point_loop.h"
 #include "walk/core/walk.h"
@@ -22,7 +24,7 @@
 struct worker {
     struct imp_arena arena;
     struct imp_drops drops;
-    double (*light)[IMP__VIEW_GROUPS]; /* [view[0].n + view[1].n] */
+    double (*light)[IMP__VIEW_GROUPS]; /* [view[0].n + view[1].n], then [n_discs] */
 };
 
 struct job {
@@ -31,8 +33,11 @@ struct job {
     struct imp_tracer tracer;
     struct imp__view view[2]; /* of o.cells a side, and of half as many */
     double threshold;
-    int64_t walks;                  /* of a group */
-    imp_v3 right, up, sight;        /* in the meter's frame */
+    int64_t walks;           /* of a group */
+    imp_v3 right, up, sight; /* in the meter's frame */
+    size_t n_discs;          /* suns before the observer */
+    struct imp__view_disc *disc;
+    int *sun;                       /* [n_discs] their emitters */
     struct worker *worker;          /* [threads] */
     double *dgp, *se, *illuminance; /* [points] */
     pthread_mutex_t lock;
@@ -103,17 +108,58 @@ static enum imp_status job_begin(struct job *j, const struct imp_scene *scene,
     return IMP_OK;
 }
 
+/* Direction w of the meter's frame in that of the view. */
+static imp_v3 seen_from(const struct job *j, imp_v3 w)
+{
+    return imp__v3(imp__dot(w, j->right), imp__dot(w, j->up), imp__dot(w, j->sight));
+}
+
+/* The suns before the observer. */
+static enum imp_status discs_find(struct job *j)
+{
+    const struct imp_scene *scene = j->scene;
+    const size_t most = (size_t)scene->n_emitters + 1;
+    j->disc = imp__alloc(scene->ctx, most, sizeof *j->disc);
+    j->sun = imp__alloc(scene->ctx, most, sizeof *j->sun);
+    if (!j->disc || !j->sun)
+        return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for views");
+    for (int i = 0; i < scene->n_emitters; i++) {
+        imp_v3 axis;
+        double size;
+        if (!imp__sun_disc(scene->emitters[i], &axis, &size)) continue;
+        const imp_v3 w = seen_from(j, imp__to_local(&j->sensor->receiver->frame, axis));
+        if (!(w[2] > 0)) continue;
+        const double p = imp__view_position(w);
+        j->disc[j->n_discs] = (struct imp__view_disc){size, w[2], size / (p * p)};
+        j->sun[j->n_discs++] = i;
+    }
+    return IMP_OK;
+}
+
+static double number_of(const struct job *j, imp_spec light)
+{
+    return j->scene->mode == IMP_MONO ? light[0]
+                                      : imp__luminance(light[0], light[1], light[2]);
+}
+
 /* Light from direction w, in the meter's frame. */
 static void light_add(const struct job *j, struct worker *k, int group, imp_v3 w,
                       imp_spec light)
 {
-    const imp_v3 seen =
-        imp__v3(imp__dot(w, j->right), imp__dot(w, j->up), imp__dot(w, j->sight));
-    const int cell = imp__view_cell(&j->view[0], seen);
-    if (cell < 0) return;
-    k->light[cell][group] += j->scene->mode == IMP_MONO
-                                 ? light[0]
-                                 : imp__luminance(light[0], light[1], light[2]);
+    const int cell = imp__view_cell(&j->view[0], seen_from(j, w));
+    if (cell >= 0) k->light[cell][group] += number_of(j, light);
+}
+
+/* A light sample of an emitter: of a sun's disc, or of the cell in its direction. */
+static void sample_add(const struct job *j, struct worker *k, int group, int emitter,
+                       imp_v3 w, imp_spec light)
+{
+    for (size_t d = 0; d < j->n_discs; d++) {
+        if (j->sun[d] != emitter) continue;
+        k->light[j->view[0].n + j->view[1].n + d][group] += number_of(j, light);
+        return;
+    }
+    light_add(j, k, group, w, light);
 }
 
 /* The first vertex of a meter's walk is where it begins, the second the meter itself. */
@@ -124,7 +170,8 @@ static void walk_add(const struct job *j, struct worker *k, int group,
     if (!meter) return;
     const struct imp_decision *d = &meter->d;
     if (d->connection == IMP_CONNECTED)
-        light_add(j, k, group, imp__decided_v3(d->light.wi), start->w * meter->b);
+        sample_add(j, k, group, d->light.emitter, imp__decided_v3(d->light.wi),
+                   start->w * meter->b);
     if (d->goes_on)
         light_add(j, k, group, imp__decided_v3(d->wi),
                   start->w * meter->w * meter->beyond);
@@ -135,7 +182,9 @@ static enum imp_status view_trace(const struct job *j, int x, int y, struct work
     struct imp_walk walk;
     /* A group takes sets of points of its own: groups are independent. */
     const int64_t sets = (j->walks + IMP_SET_POINTS - 1) / IMP_SET_POINTS;
+    double(*discs)[IMP__VIEW_GROUPS] = k->light + j->view[0].n + j->view[1].n;
     memset(k->light, 0, j->view[0].n * sizeof *k->light);
+    memset(discs, 0, j->n_discs * sizeof *discs);
     for (int g = 0; g < IMP__VIEW_GROUPS; g++)
         for (int64_t i = 0; i < j->walks; i++) {
             const struct imp_arena_mark mark = imp__arena_mark(&k->arena);
@@ -157,6 +206,8 @@ static enum imp_status view_trace(const struct job *j, int x, int y, struct work
         }
     for (size_t c = 0; c < j->view[0].n; c++)
         for (int g = 0; g < IMP__VIEW_GROUPS; g++) k->light[c][g] *= 1 / (double)j->walks;
+    for (size_t d = 0; d < j->n_discs; d++)
+        for (int g = 0; g < IMP__VIEW_GROUPS; g++) discs[d][g] *= 1 / (double)j->walks;
     return IMP_OK;
 }
 
@@ -175,7 +226,9 @@ static enum imp_status point_work(size_t i, int worker, int slot, void *payload)
         memset(&k->drops, 0, sizeof k->drops);
     }
     if (st != IMP_OK) return st;
-    imp__dgp_rate(j->view, k->light, j->threshold, &j->dgp[i], &se, &illuminance);
+    imp__dgp_rate(j->view, k->light, j->n_discs, j->disc,
+                  k->light + j->view[0].n + j->view[1].n, j->threshold, &j->dgp[i], &se,
+                  &illuminance);
     if (j->se) j->se[i] = se;
     if (j->illuminance) j->illuminance[i] = illuminance;
     return IMP_OK;
@@ -183,7 +236,7 @@ static enum imp_status point_work(size_t i, int worker, int slot, void *payload)
 
 static enum imp_status workers_make(struct job *j, imp_context *ctx)
 {
-    const size_t n = j->view[0].n + j->view[1].n;
+    const size_t n = j->view[0].n + j->view[1].n + j->n_discs;
     j->worker = imp__alloc(ctx, (size_t)ctx->threads, sizeof *j->worker);
     for (int t = 0; j->worker && t < ctx->threads; t++) {
         imp__arena_init(&j->worker[t].arena, ctx);
@@ -227,6 +280,7 @@ enum imp_status imp_grid_dgp(imp_scene *scene, const struct imp_run *run,
     for (int k = 0; k < 2; k++)
         IMP_TRY(imp__view_make(ctx, o.cells / (k + 1), &j.view[k]));
     IMP_TRY(job_begin(&j, scene, &own, sensor));
+    IMP_TRY(discs_find(&j));
     IMP_TRY(workers_make(&j, ctx));
     locked = pthread_mutex_init(&j.lock, NULL) == 0;
     if (!locked) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for views"));
@@ -236,6 +290,8 @@ enum imp_status imp_grid_dgp(imp_scene *scene, const struct imp_run *run,
 out:
     if (locked) pthread_mutex_destroy(&j.lock);
     workers_free(&j, ctx);
+    imp__release(ctx, j.disc);
+    imp__release(ctx, j.sun);
     for (int k = 0; k < 2; k++) imp__view_free(ctx, &j.view[k]);
     return st;
 }

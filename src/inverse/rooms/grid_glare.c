@@ -12,17 +12,6 @@
 
 #define DEGREE (IMP_PI / 180)
 
-/* Luminous area that is seen along w, of a point by the file's opening: a box with the sides a along
- * C0, b along C90 and the height h, its lower face alone. */
-static double luminous_area(const struct imp_emitter *e, imp_v3 w)
-{
-    const struct imp__ies *x = e->self;
-    if (e->shape) return imp__ies_projected(x, w);
-    const double *s = x->data->size;
-    return s[0] * s[1] * fabs(imp__dot(w, x->nadir)) +
-           s[2] * (s[0] * fabs(imp__dot(w, x->c90)) + s[1] * fabs(imp__dot(w, x->c0)));
-}
-
 static double scale_of(const struct imp_scene *scene, const struct imp_emitter *e)
 {
     if (e->input[0]->texture) return 1;
@@ -44,7 +33,8 @@ bool imp__glare_look(const struct imp_scene *scene, const struct imp_emitter *e,
     /* Just before the luminaire, which may be a shape itself. */
     if (!(ahead > 0) || imp__occluded_at(scene, 0, &eye, &d, 0, 1 - 1e-3)) return false;
     const double intensity = imp__ies_intensity(x, back) * scale_of(scene, e);
-    const double area = luminous_area(e, back);
+    const double area =
+        e->shape ? imp__ies_projected(x, back) : imp__ies_opening(x, back);
     if (!(intensity > 0)) return false;
     const imp_v3 across = w - sight * ahead;
     const double side = imp__length(across);

@@ -5,6 +5,7 @@
 #include "base/film.h"
 #include "color/rgb.h"
 #include "film/film_measure.h"
+#include "kind/sensor/radiancemeter.h"
 #include "kind/sensor/receiver.h"
 #include "room_average.h"
 #include "walk/run/run.h"
@@ -16,7 +17,7 @@ static enum imp_status no_grid(const struct imp_scene *scene, const struct imp_s
     return imp__error(scene->ctx, IMP_E_ARG,
                       "sensor '%s' (%s) has no grid of points: that is an "
                       "irradiancemeter on a rectangle or, at points, on a disk or a flat "
-                      "mesh",
+                      "mesh, or a radiancemeter with 'grid'",
                       s->name, s->ops->name);
 }
 
@@ -28,7 +29,8 @@ static enum imp_status grid_of(const struct imp_scene *scene, int sensor,
                           "there is no sensor %d; the scene has %d", sensor,
                           scene->n_sensors);
     *out = scene->sensors[sensor];
-    return imp__has_grid(*out) ? IMP_OK : no_grid(scene, *out);
+    return imp__has_grid(*out) || imp__looks_at_grid(*out) ? IMP_OK
+                                                           : no_grid(scene, *out);
 }
 
 enum imp_status imp_grid_cells(const imp_scene *scene, int sensor, int *columns,
@@ -48,6 +50,17 @@ enum imp_status imp_grid_cells(const imp_scene *scene, int sensor, int *columns,
     return IMP_OK;
 }
 
+static imp_v3 place_of(const struct imp_sensor *s, double px, double py, imp_v3 *normal)
+{
+    struct imp_surface at;
+    double uv[2];
+    if (imp__looks_at_grid(s)) return imp__grid_looked_at(s, px, py, normal);
+    imp__receiver_uv(s, px, py, uv);
+    s->shape->ops->sample_area(s->shape, uv, &at);
+    *normal = at.ng;
+    return at.p;
+}
+
 enum imp_status imp_grid_points(const imp_scene *scene, int sensor, double *points,
                                 double *normals)
 {
@@ -59,13 +72,11 @@ enum imp_status imp_grid_points(const imp_scene *scene, int sensor, double *poin
     for (int y = 0; y < f->crop_h; y++)
         for (int x = 0; x < f->crop_w; x++) {
             const size_t at = 3 * ((size_t)y * (size_t)f->crop_w + (size_t)x);
-            struct imp_surface p;
-            double uv[2];
-            imp__receiver_uv(s, f->crop_x + x + 0.5, f->crop_y + y + 0.5, uv);
-            s->shape->ops->sample_area(s->shape, uv, &p);
+            imp_v3 n;
+            const imp_v3 p = place_of(s, f->crop_x + x + 0.5, f->crop_y + y + 0.5, &n);
             for (int k = 0; k < 3; k++) {
-                points[at + (size_t)k] = p.p[k];
-                if (normals) normals[at + (size_t)k] = p.ng[k];
+                points[at + (size_t)k] = p[k];
+                if (normals) normals[at + (size_t)k] = n[k];
             }
         }
     return IMP_OK;

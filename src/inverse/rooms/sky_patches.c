@@ -2,6 +2,7 @@
  *
  * Patches of the sky: where they are, and the radiance of a sky in them. */
 #include "sky_patches.h"
+#include "math/lanes.h"
 #include <math.h>
 
 enum { HALVES = 2 }; /* points of a patch in each direction */
@@ -50,75 +51,87 @@ double imp__sky_patch_size(const struct imp__sky_patches *p, int patch)
     return IMP_2PI * (p->sine[row + 1] - p->sine[row]) / count_of(row);
 }
 
-/* Abramowitz and Stegun 4.4.46, to 2e-8: a year has ten million of these. */
-static inline double angle_of(double cosine)
+/* Relative radiances of four directions at one height, of which g is the factor, by the cosines
+ * of their angles to the sun. A year has ten million of them. */
+static inline imp_v3 relative(const struct imp__sky_shape *s, double g, imp_v3 cosine)
 {
-    const double c = fabs(cosine);
-    const double x =
-        sqrt(1 - c) *
-        (1.5707963050 +
-         c * (-0.2145988016 +
-              c * (0.0889789874 +
-                   c * (-0.0501743046 +
-                        c * (0.0308918810 +
-                             c * (-0.0170881256 +
-                                  c * (0.0066700901 + c * -0.0012624911)))))));
-    return cosine < 0 ? IMP_PI - x : x;
+    const double *n = s->n;
+    const imp_v3 c = imp__lanes_clamp(cosine, -1, 1);
+    const imp_v3 near = imp__lanes_exp(n[3] * imp__lanes_acos(c)) - s->h;
+    const imp_v3 L = g * (1 + n[2] * near + n[4] * c * c);
+    return imp__lanes_pick(L > imp__spec(0), L, imp__spec(0));
 }
 
-/* g depends on the height alone: who asks for a row of directions has it. */
-static inline double relative(const struct imp__sky_shape *s, double g, imp_v3 w)
+static double zenith_factor(const struct imp__sky_shape *s, double z)
 {
-    const double *n = s->n, c = imp_clamp(imp__dot(w, s->sun), -1.0, 1.0);
-    const double f = 1 + n[2] * (exp(n[3] * angle_of(c)) - s->h) + n[4] * c * c;
-    return imp_max(g * f, 0.0);
+    return 1 + s->n[0] * exp(s->n[1] / z);
 }
 
-/* Relative radiances of a row's patches, at heights even in sin(altitude), added to L. */
+/* The sun in the axes of the patches. */
+static imp_v3 sun_in(const struct imp__sky_patches *p, const struct imp__sky_shape *s)
+{
+    return imp__v3(imp__dot(s->sun, p->axis[0]), imp__dot(s->sun, p->axis[1]),
+                   imp__dot(s->sun, p->axis[2]));
+}
+
+/* Relative radiances of a row's patches, at heights even in sin(altitude), into L. Four
+ * directions at once are two patches, at HALVES of 2. */
 static void row_fill(const struct imp__sky_patches *p, const struct imp__sky_shape *s,
-                     int row, double *L)
+                     imp_v3 sun, int row, double *L)
 {
     const int n = count_of(row);
     const double lo = p->sine[row], hi = p->sine[row + 1];
+    const double step = IMP_2PI / (HALVES * n), turn_c = cos(4 * step),
+                 turn_s = sin(4 * step);
+    double z[HALVES], r[HALVES], g[HALVES];
+    imp_v3 c, q;
     for (int i = 0; i < HALVES; i++) {
-        const double z = lo + (hi - lo) * (i + 0.5) / HALVES, r = sqrt(1 - z * z);
-        const double g = 1 + s->n[0] * exp(s->n[1] / z);
-        const double step = IMP_2PI / (HALVES * n);
-        double c = cos(step / 2), q = sin(step / 2);
-        const double turn_c = cos(step), turn_s = sin(step);
-        for (int j = 0; j < HALVES * n; j++) {
-            const imp_v3 w = p->axis[0] * (r * c) + p->axis[1] * (r * q) + p->axis[2] * z;
-            L[j / HALVES] += relative(s, g, w) / (HALVES * HALVES);
-            const double next = c * turn_c - q * turn_s;
-            q = q * turn_c + c * turn_s;
-            c = next;
-        }
+        z[i] = lo + (hi - lo) * (i + 0.5) / HALVES;
+        r[i] = sqrt(1 - z[i] * z[i]);
+        g[i] = zenith_factor(s, z[i]);
+    }
+    for (int k = 0; k < 4; k++) {
+        c[k] = cos((k + 0.5) * step);
+        q[k] = sin((k + 0.5) * step);
+    }
+    for (int j = 0; j < n; j += 2) {
+        const imp_v3 level = c * sun[0] + q * sun[1];
+        imp_v3 sum = imp__spec(0);
+        for (int i = 0; i < HALVES; i++)
+            sum += relative(s, g[i], level * r[i] + z[i] * sun[2]);
+        L[j] = (sum[0] + sum[1]) / (HALVES * HALVES);
+        L[j + 1] = (sum[2] + sum[3]) / (HALVES * HALVES);
+        const imp_v3 next = c * turn_c - q * turn_s;
+        q = q * turn_c + c * turn_s;
+        c = next;
     }
 }
 
-static double cap(const struct imp__sky_patches *p, const struct imp__sky_shape *s)
+static double cap(const struct imp__sky_patches *p, const struct imp__sky_shape *s,
+                  imp_v3 sun)
 {
-    enum { AROUND = 6 };
+    enum { FOURS = 2, AROUND = 4 * FOURS };
     const double z = (1 + p->sine[IMP__PATCH_ROWS]) / 2, r = sqrt(1 - z * z);
-    const double g = 1 + s->n[0] * exp(s->n[1] / z);
-    double sum = 0;
-    for (int k = 0; k < AROUND; k++) {
-        const double phi = IMP_2PI * (k + 0.5) / AROUND;
-        sum += relative(s, g,
-                        p->axis[0] * (r * cos(phi)) + p->axis[1] * (r * sin(phi)) +
-                            p->axis[2] * z);
+    imp_v3 sum = imp__spec(0);
+    for (int k = 0; k < FOURS; k++) {
+        imp_v3 cosine;
+        for (int i = 0; i < 4; i++) {
+            const double phi = IMP_2PI * (4 * k + i + 0.5) / AROUND;
+            cosine[i] = r * (cos(phi) * sun[0] + sin(phi) * sun[1]) + z * sun[2];
+        }
+        sum += relative(s, zenith_factor(s, z), cosine);
     }
-    return sum / AROUND;
+    return imp__sum_used(sum, 4) / AROUND;
 }
 
 void imp__sky_patches_fill(const struct imp__sky_patches *p,
                            const struct imp__sky_shape *sky, double level, double *L)
 {
     double ground = 0; /* Int L cos dw: cos dw = d(z^2)/2 dphi */
-    for (int k = 0; k < IMP__PATCHES; k++) L[k] = 0;
+    const imp_v3 sun = sun_in(p, sky);
     for (int row = 0; row < IMP__PATCH_ROWS; row++) {
         double *here = L + p->first[row];
-        row_fill(p, sky, row, here);
+        row_fill(p, sky, sun, row, here);
         const int n = count_of(row);
         const double each =
             IMP_PI / n *
@@ -126,7 +139,7 @@ void imp__sky_patches_fill(const struct imp__sky_patches *p,
         for (int k = 0; k < n; k++) ground += each * here[k];
     }
     const double edge = p->sine[IMP__PATCH_ROWS];
-    L[IMP__PATCHES - 1] = cap(p, sky);
+    L[IMP__PATCHES - 1] = cap(p, sky, sun);
     ground += IMP_PI * (1 - edge * edge) * L[IMP__PATCHES - 1];
     const bool dark = !(ground > 0) || !isfinite(ground);
     for (int k = 0; k < IMP__PATCHES; k++)

@@ -22,7 +22,7 @@ int imp__sky_patch_of(const struct imp__sky_patches *p, imp_v3 w);
 /* Its solid angle. */
 double imp__sky_patch_size(const struct imp__sky_patches *p, int patch);
 /* The mean radiance [IMP__PATCHES] over each patch of a sky whose axes are those of p, at four
- * points (of the cap: six), so scaled that level ground has the illuminance `level`: Int L cos dw
+ * points (of the cap: eight), so scaled that level ground has the illuminance `level`: Int L cos dw
  * with L constant in each patch. A sky that is dark everywhere is taken as uniform. */
 void imp__sky_patches_fill(const struct imp__sky_patches *p,
                            const struct imp__sky_shape *sky, double level, double *L);

@@ -126,6 +126,13 @@ double imp__ies_projected(const struct imp__ies *x, imp_v3 w)
     return sum;
 }
 
+double imp__ies_opening(const struct imp__ies *x, imp_v3 w)
+{
+    const double *s = x->data->size;
+    return s[0] * s[1] * fabs(imp__dot(w, x->nadir)) +
+           s[2] * (s[0] * fabs(imp__dot(w, x->c90)) + s[1] * fabs(imp__dot(w, x->c0)));
+}
+
 static double surface_area(const struct imp__ies *x)
 {
     double sum = x->same + x->across;

@@ -37,6 +37,9 @@ void imp__ies_turn(struct imp__ies *x, const struct imp__ies *from, imp_v3 to);
 double imp__ies_flux(const struct imp__ies *x);
 /* Area that faces w, projected along w. */
 double imp__ies_projected(const struct imp__ies *x, imp_v3 w);
+/* Luminous area that is seen along w by the file's opening, a box whose lower face shines with its
+ * sides; 0: the file has none. */
+double imp__ies_opening(const struct imp__ies *x, imp_v3 w);
 /* Radiance of the surface along w: intensity over projected area. */
 double imp__ies_radiance(const struct imp__ies *x, imp_v3 w);
 /* For the error of links: the largest intensity within `angle` of d over the largest

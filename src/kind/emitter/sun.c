@@ -7,6 +7,7 @@
  *
  * Its edge moves with the radius, so that this has no derivative. The fallback is the mean
  * radius of the sun, 6.866e-5 sr. */
+#include "sun.h"
 #include "emission.h"
 #include "kind/build.h"
 #include "math/transform.h"
@@ -119,3 +120,12 @@ const struct imp_emitter_ops imp__sun = {.size = sizeof(struct imp_emitter_ops),
                                          .sample_emission = imp__sky_emission_sample,
                                          .pdf_emission = imp__sky_emission_pdf,
                                          .jumps = jumps};
+
+bool imp__sun_disc(const struct imp_emitter *e, imp_v3 *axis, double *size)
+{
+    const struct sun *s = e->self;
+    if (e->ops != &imp__sun) return false;
+    *axis = s->axis;
+    *size = IMP_2PI * s->versed;
+    return true;
+}

@@ -1,17 +1,62 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The radiance that arrives along one ray. */
-#include "kind/build.h"
+ * The radiance that arrives along one ray; or, with `grid`, along the rays to an observer from
+ * the points in the middles of the cells of a rectangle. */
+#include "radiancemeter.h"
+#include "math/transform.h"
 #include "projection.h"
+#include "receiver.h"
 
 struct radiancemeter {
     imp_v3 o, d;
+    bool grid;
+    imp_v3 middle, u, v, n; /* of the rectangle: half of its sides, its normal */
 };
 
-static enum imp_status build(const struct imp_build *b, void *self, struct imp_sensor *s)
+static imp_v3 vector_read(const double x[3]) { return imp__v3(x[0], x[1], x[2]); }
+
+static enum imp_status grid_read(const struct imp_build *b, struct imp_sensor *s,
+                                 struct radiancemeter *r)
 {
     enum imp_status st = IMP_OK;
-    struct radiancemeter *r = self;
+    struct imp_mat4 m;
+    double o[3];
+    if (!imp_build_has(b, "origin"))
+        IMP_TRY(imp_build_error(b, "grid", IMP_E_SCENE,
+                                "'origin' is missing: the observer who looks at the "
+                                "grid"));
+    IMP_TRY(imp_build_vector(b, "origin", (double[3]){0, 0, 0}, o));
+    IMP_TRY(imp_build_transform(b, "grid", m.m));
+    r->grid = true;
+    r->o = vector_read(o);
+    r->middle = imp__point(&m, imp__v3(0, 0, 0));
+    r->u = imp__vector(&m, imp__v3(1, 0, 0));
+    r->v = imp__vector(&m, imp__v3(0, 1, 0));
+    const imp_v3 n = imp__cross(r->u, r->v);
+    const double area = imp__length(n);
+    if (!imp__mat4_is_finite(&m) || !imp__mat4_is_affine(&m) || !(area > 0) ||
+        !isfinite(area))
+        IMP_TRY(imp_build_error(b, "grid", IMP_E_SCENE,
+                                "grid is not affine, or its rectangle has no area"));
+    r->n = n * (1 / area);
+    IMP_TRY(imp__grid_film(b, s));
+    for (int y = 0; y < s->film.height; y++)
+        for (int x = 0; x < s->film.width; x++) {
+            imp_v3 normal;
+            s->self = r;
+            if (!(imp__length(imp__grid_looked_at(s, x + 0.5, y + 0.5, &normal) - r->o) >
+                  0))
+                IMP_TRY(imp_build_error(b, "origin", IMP_E_SCENE,
+                                        "the observer is at a point of the grid"));
+        }
+out:
+    return st;
+}
+
+static enum imp_status ray_read(const struct imp_build *b, const struct imp_sensor *s,
+                                struct radiancemeter *r)
+{
+    enum imp_status st = IMP_OK;
     struct imp_mat4 m, inverse;
     double o[3], d[3];
     const bool by_ray = imp_build_has(b, "origin") || imp_build_has(b, "direction");
@@ -30,8 +75,8 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     IMP_TRY(imp_build_vector(b, "origin", (double[3]){0, 0, 0}, o));
     IMP_TRY(imp_build_vector(b, "direction", (double[3]){0, 0, 1}, d));
     IMP_TRY(imp__sensor_place(b, &m, &inverse));
-    r->o = imp__point(&m, imp__v3(o[0], o[1], o[2]));
-    r->d = imp__vector(&m, imp__v3(d[0], d[1], d[2]));
+    r->o = imp__point(&m, vector_read(o));
+    r->d = imp__vector(&m, vector_read(d));
     const double length = imp__length(r->d);
     if (!(length > 0) || !isfinite(length) || !imp__is_finite(r->o))
         IMP_TRY(imp_build_error(b, by_ray ? "direction" : "to_world", IMP_E_SCENE,
@@ -41,12 +86,31 @@ out:
     return st;
 }
 
+static enum imp_status build(const struct imp_build *b, void *self, struct imp_sensor *s)
+{
+    return imp_build_has(b, "grid") ? grid_read(b, s, self) : ray_read(b, s, self);
+}
+
+imp_v3 imp__grid_looked_at(const struct imp_sensor *s, double px, double py,
+                           imp_v3 *normal)
+{
+    const struct radiancemeter *r = s->self;
+    const double size[2] = {s->film.width, s->film.height}, at[2] = {px, py};
+    double x[2];
+    for (int k = 0; k < 2; k++)
+        x[k] = 2 * (imp_clamp(floor(at[k]), 0.0, size[k] - 1) + 0.5) / size[k] - 1;
+    *normal = r->n;
+    return r->middle + r->u * x[0] + r->v * x[1];
+}
+
 static void ray(const struct imp_sensor *s, double px, double py, const double lens[2],
                 struct imp_sensor_ray *out)
 {
-    (void)px, (void)py, (void)lens;
+    (void)lens;
     const struct radiancemeter *r = s->self;
-    *out = (struct imp_sensor_ray){r->o, r->d, 0, INFINITY};
+    imp_v3 d = r->d, n;
+    if (r->grid) d = imp__normalize(imp__grid_looked_at(s, px, py, &n) - r->o);
+    *out = (struct imp_sensor_ray){r->o, d, 0, INFINITY};
 }
 
 const struct imp_sensor_ops imp__radiancemeter = {.size = sizeof(struct imp_sensor_ops),
@@ -55,3 +119,8 @@ const struct imp_sensor_ops imp__radiancemeter = {.size = sizeof(struct imp_sens
                                                       sizeof(struct radiancemeter),
                                                   .build = build,
                                                   .ray = ray};
+
+bool imp__looks_at_grid(const struct imp_sensor *s)
+{
+    return s->ops == &imp__radiancemeter && ((const struct radiancemeter *)s->self)->grid;
+}

@@ -59,6 +59,9 @@ double imp__receiver_density(const struct imp_receiver *r, imp_v3 w);
 /* Draws w by p. */
 imp_v3 imp__receiver_direction(const struct imp_receiver *r, const double u[2]);
 
+/* What is not written of a grid's film: one number of light a pixel, and a box filter, through
+ * which each pixel has its own point. IMP_E_SCENE for a wider filter. */
+enum imp_status imp__grid_film(const struct imp_build *b, struct imp_sensor *s);
 /* Reads what the sensor b->node, a meter on s->shape, says of these; sets s->receiver, and
  * the film's size by the norm's spacing where the film has none. Nothing is read of what
  * the rest of the scene holds. IMP_E_SCENE with its place. */

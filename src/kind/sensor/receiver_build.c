@@ -85,8 +85,33 @@ static int points_along(double side, double spacing)
     return (int)imp_clamp(floor(side / spacing + 0.5), 1.0, 4096.0);
 }
 
-/* What is not written of the film: its size by the spacing, one number of light a pixel,
- * and a box filter, through which each pixel has its own point. */
+enum imp_status imp__grid_film(const struct imp_build *b, struct imp_sensor *s)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_film_desc *f = &s->film;
+    const struct imp_node *film = film_of(b->node);
+    if (!written(film, "pixel_format") && f->n_responses == 0)
+        f->pixel_format = IMP_PIXEL_LUMINANCE;
+    bool filtered = false;
+    for (size_t i = 0; film && i < film->n_children; i++)
+        filtered |= strcmp(film->children[i].node->tag, "rfilter") == 0;
+    if (!filtered) {
+        struct imp_node *box =
+            imp__node_create(b->arena, "rfilter", "box", NULL, NULL, b->node->loc);
+        if (!box)
+            IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "no memory for a filter"));
+        IMP_TRY(imp__filter_build(b, box, &f->filter));
+    }
+    if (f->filter.radius > 0.5)
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
+                                "its film has the filter %s, which mixes neighbouring "
+                                "points; a grid has rfilter box",
+                                f->filter.ops->name));
+out:
+    return st;
+}
+
+/* What is not written of the film: its size by the spacing, and what every grid has. */
 static enum imp_status film_complete(const struct imp_build *b, struct imp_sensor *s,
                                      const double side[2])
 {
@@ -112,23 +137,7 @@ static enum imp_status film_complete(const struct imp_build *b, struct imp_senso
         f->height = f->crop_h = points_along(side[1], spacing);
         f->crop_x = f->crop_y = 0;
     }
-    if (!written(film, "pixel_format") && f->n_responses == 0)
-        f->pixel_format = IMP_PIXEL_LUMINANCE;
-    bool filtered = false;
-    for (size_t i = 0; film && i < film->n_children; i++)
-        filtered |= strcmp(film->children[i].node->tag, "rfilter") == 0;
-    if (!filtered) {
-        struct imp_node *box =
-            imp__node_create(b->arena, "rfilter", "box", NULL, NULL, b->node->loc);
-        if (!box)
-            IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "no memory for a filter"));
-        IMP_TRY(imp__filter_build(b, box, &f->filter));
-    }
-    if (f->filter.radius > 0.5)
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
-                                "its film has the filter %s, which mixes neighbouring "
-                                "points; a grid has rfilter box",
-                                f->filter.ops->name));
+    IMP_TRY(imp__grid_film(b, s));
 out:
     return st;
 }

@@ -25,7 +25,7 @@ python3 - <<'X'
 import csv, json
 d, none = (json.load(open(f))["glare"][0] for f in ("dgp.json", "none.json"))
 grid = list(csv.DictReader(open("grid.csv")))
-assert d["width"] == 2 and d["cells"] == 32 and d["threshold"] == 5 and len(grid) == len(d["dgp"]) == len(d["points"]) == 2
+assert d["width"] == 2 and d["view_cells"] == 32 and d["cells"] == [[0, 0], [1, 0]] and d["threshold"] == 5 and len(grid) == len(d["dgp"]) == len(d["points"]) == 2
 for r, E, p, x, se in zip(grid, d["illuminance"], d["points"], d["dgp"], d["se"]):
     value, error = (float(r[k]) for k in ("value", "se"))
     assert abs(value - E) < 8 * error and error < .02 * value, (value, error, E)

@@ -19,6 +19,16 @@ names = [e.tag.split("}")[1] for e in svg.iter()]
 assert names.count("rect") == 1 + 45 + 64 and names.count("path") >= 3
 X
 importon read "$ROOT/scenes/office.xml" -m mono -D spp=64 --grid --sensor 1 --csv g.csv --svg g.svg -q >/dev/null || exit 9
+importon read "$ROOT/scenes/office.xml" -m mono -D spp=64 --ugr --sensor 3 --json --csv u.csv --svg u.svg >u.json || exit 9
+python3 - <<'X'
+import csv, json, math, xml.etree.ElementTree as tree
+u = json.load(open("u.json"))["glare"][0]
+rows = list(csv.DictReader(open("u.csv")))
+assert u["cells"] == [[int(r["column"]), int(r["row"])] for r in rows] and (u["width"], u["height"], len(rows)) == (8, 5, 40)
+assert all(float(r["value"]) == -math.inf if v is None else abs(float(r["value"]) - v) < 1e-5 for r, v in zip(rows, u["ugr"]))
+svg = tree.parse("u.svg").getroot()
+assert "UGR at most %.1f" % max(v for v in u["ugr"] if v is not None) in "".join(svg.itertext())
+X
 importon read "$ROOT/scenes/office.xml" --csv g.csv
 importon read "$ROOT/scenes/office.xml" --grid --csv g.csv
 importon read "$ROOT/scenes/office.xml" --grid -p 'lamp_11.*'
