@@ -56,7 +56,7 @@ static inline imp_v3 imp__abs(imp_v3 v)
     typedef int64_t bits __attribute__((vector_size(32)));
     return (imp_v3)((bits)v & INT64_MAX);
 }
-/* Of each lane the lesser, or the greater; that of b where one is NAN. */
+/* The lesser, or the greater, in each lane; that of b where one is NAN. */
 static inline imp_v3 imp__lesser(imp_v3 a, imp_v3 b)
 {
     typedef int64_t bits __attribute__((vector_size(32)));

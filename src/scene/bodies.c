@@ -141,8 +141,8 @@ enum imp_status imp__bodies_check(struct imp_scene *scene)
         if (st != IMP_OK) return st;
         struct imp_body *m = scene->bodies[s->body->index];
         for (int k = 0; k < 3; k++) {
-            m->lo[k] = fmin(m->lo[k], s->lo[k]);
-            m->hi[k] = fmax(m->hi[k], s->hi[k]);
+            m->lo[k] = imp_min(s->lo[k], m->lo[k]);
+            m->hi[k] = imp_max(s->hi[k], m->hi[k]);
         }
     }
     for (int i = 0; i < scene->n_shapes; i++) {

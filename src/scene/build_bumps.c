@@ -47,8 +47,8 @@ static bool is_same(const struct stretch *a, const struct stretch *b, double wit
 {
     double off = 0, size = 0;
     for (int k = 0; k < 9; k++) {
-        off = fmax(off, fabs(a->gram[k] - b->gram[k]));
-        size = fmax(size, fabs(a->gram[k]));
+        off = imp_max(fabs(a->gram[k] - b->gram[k]), off);
+        size = imp_max(fabs(a->gram[k]), size);
     }
     return off <= within * size && a->mirrors == b->mirrors;
 }

@@ -294,8 +294,8 @@ static enum imp_status instances_build(struct imp_scene *scene, struct imp_node 
         imp_v3 lo, hi;
         imp__instance_box(p, &lo, &hi);
         for (int k = 0; k < 3; k++) {
-            g->lo[k] = fmin(g->lo[k], lo[k]);
-            g->hi[k] = fmax(g->hi[k], hi[k]);
+            g->lo[k] = imp_min(lo[k], g->lo[k]);
+            g->hi[k] = imp_max(hi[k], g->hi[k]);
         }
         g->n_instances++;
     }

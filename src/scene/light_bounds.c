@@ -140,7 +140,7 @@ static void around(double lo, double hi, float *out_lo, float *out_hi)
 static float gain_of(double cos_normals, double cos_reach)
 {
     return (float)(1 / (cos_reach < 1 ? mean_cosine(cos_normals)
-                                      : fmax(0.5 * (1 - cos_normals), 1e-9)));
+                                      : imp_max(0.5 * (1 - cos_normals), 1e-9)));
 }
 
 static void cone_set(struct imp_light_node *node, imp_v3 axis, double cos_normals,
@@ -163,8 +163,8 @@ static void triangle_bound(const struct imp_shape *s, int prim,
         struct imp_surface at;
         s->ops->surface(s, &hit, &none, &none, &at);
         for (int j = 0; j < 3; j++) {
-            lo[j] = fmin(lo[j], at.p[j]);
-            hi[j] = fmax(hi[j], at.p[j]);
+            lo[j] = imp_min(at.p[j], lo[j]);
+            hi[j] = imp_max(at.p[j], hi[j]);
         }
         mean += n[k] = at.n;
         n[3] = at.ng;
@@ -173,7 +173,7 @@ static void triangle_bound(const struct imp_shape *s, int prim,
     const double length = imp__length(mean + n[3]);
     double least = length > 0 ? 1 : -1;
     const imp_v3 axis = length > 0 ? (mean + n[3]) * (1 / length) : imp__v3(0, 0, 1);
-    for (int k = 0; k < 4; k++) least = fmin(least, imp__dot(axis, n[k]));
+    for (int k = 0; k < 4; k++) least = imp_min(imp__dot(axis, n[k]), least);
     /* Interpolated normals lie within a cap that is no more than a hemisphere. */
     if (least < 1e-3) least = -1;
     cone_set(node, axis, least < 1 - 1e-7 ? least - 1e-6 : 1, 0);

@@ -238,7 +238,7 @@ static void items_fill(struct imp_light_tree *t)
             t->far_share[t->n_far++] = e->weight;
             far += e->weight;
         } else {
-            near = fmax(near, e->weight);
+            near = imp_max(e->weight, near);
         }
         for (size_t j = 0; j < n; j++) {
             const bool all = !imp__light_in_triangles(e);

@@ -113,7 +113,7 @@ enum imp_status imp__mixing_settle(struct imp_scene *scene, struct imp_mixing *m
                       m->weight[k]);
             m->weight[k] = 0;
         }
-        sum += fmax(m->weight[k], 0);
+        sum += imp_max(m->weight[k], 0.0);
     }
     if (m->node && !(m->weight[IMP_DENSITY_KERNEL] + m->weight[IMP_DENSITY_UNIFORM] > 0))
         return imp__prop_error(scene->ctx, m->node, p, IMP_E_SCENE,

@@ -206,8 +206,8 @@ double imp__pose_large(const struct imp_pose *p, size_t e)
 static void box_add(struct imp_scene *scene, imp_v3 lo, imp_v3 hi)
 {
     for (int i = 0; i < 3; i++) {
-        scene->lo[i] = fmin(scene->lo[i], lo[i]);
-        scene->hi[i] = fmax(scene->hi[i], hi[i]);
+        scene->lo[i] = imp_min(lo[i], scene->lo[i]);
+        scene->hi[i] = imp_max(hi[i], scene->hi[i]);
     }
 }
 

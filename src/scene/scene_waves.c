@@ -85,8 +85,8 @@ static struct range curve_range(const struct imp_spectrum *s)
     while (first + 1 < s->n && s->value[first + 1] == 0 && s->value[first] == 0) first++;
     while (last > 0 && s->value[last - 1] == 0 && s->value[last] == 0) last--;
     const double step = s->per_nm > 0 ? 1 / s->per_nm : 0;
-    r.lo = fmax(r.lo, step > 0 ? s->nm[0] + step * (double)first : s->nm[first]);
-    r.hi = fmin(r.hi, step > 0 ? s->nm[0] + step * (double)last : s->nm[last]);
+    r.lo = imp_max(step > 0 ? s->nm[0] + step * (double)first : s->nm[first], r.lo);
+    r.hi = imp_min(step > 0 ? s->nm[0] + step * (double)last : s->nm[last], r.hi);
     return r;
 }
 
@@ -157,8 +157,8 @@ enum imp_status imp__waves_build(struct imp_scene *scene)
             w.lo = INFINITY;
             w.hi = 0;
             for (int c = 0; c < w.n_channels; c++) {
-                w.lo = fmin(w.lo, w.response[c].lo);
-                w.hi = fmax(w.hi, w.response[c].hi);
+                w.lo = imp_min(w.response[c].lo, w.lo);
+                w.hi = imp_max(w.response[c].hi, w.hi);
             }
         }
         if (film->srf) {
@@ -169,8 +169,8 @@ enum imp_status imp__waves_build(struct imp_scene *scene)
                 own[c].times = film->srf;
             }
             w.response = own;
-            w.lo = fmax(w.lo, film->srf->lo);
-            w.hi = fmin(w.hi, film->srf->hi);
+            w.lo = imp_max(film->srf->lo, w.lo);
+            w.hi = imp_min(film->srf->hi, w.hi);
         }
         IMP_TRY(lit_check(scene, scene->sensors[s]));
         all[s * IMP_WAVES_DRAWN + IMP_WAVES_UNIFORM] = w;

@@ -2,6 +2,7 @@
  *
  * Patches of the sky: where they are, and the radiance of a sky in them. */
 #include "sky_patches.h"
+#include "math/exp.h"
 #include "math/lanes.h"
 #include <math.h>
 
@@ -57,9 +58,9 @@ static inline imp_v3 relative(const struct imp__sky_shape *s, double g, imp_v3 c
 {
     const double *n = s->n;
     const imp_v3 c = imp__lanes_clamp(cosine, -1, 1);
-    const imp_v3 near = imp__lanes_exp(n[3] * imp__lanes_acos(c)) - s->h;
+    const imp_v3 near = imp__exp(n[3] * imp__lanes_acos(c)) - s->h;
     const imp_v3 L = g * (1 + n[2] * near + n[4] * c * c);
-    return imp__lanes_pick(L > imp__spec(0), L, imp__spec(0));
+    return imp__lanes_choose(L > imp__spec(0), L, imp__spec(0));
 }
 
 static double zenith_factor(const struct imp__sky_shape *s, double z)

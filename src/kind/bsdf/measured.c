@@ -101,7 +101,7 @@ static float *colours_make(const struct imp_build *b, const struct imp_measured_
                 double sum = 0;
                 for (size_t k = 0; k < n; k++)
                     sum += weight[3 * k + c] * (double)from[k * square + i];
-                to[c * square + i] = (float)fmax(0, sum);
+                to[c * square + i] = (float)imp_max(sum, 0.0);
             }
     }
     return rgb;
@@ -156,12 +156,12 @@ static int interval(const float *x, int n, double at, double *t)
         else high = middle - 1;
     }
     const double lo = (double)x[low], hi = (double)x[low + 1];
-    *t = fmin(fmax((at - lo) / (hi - lo), 0), 1);
+    *t = imp_min(imp_max((at - lo) / (hi - lo), 0.0), 1.0);
     return low;
 }
 
 static double theta_of(imp_v3 w) { return atan2(hypot(w[0], w[1]), w[2]); }
-static double root_of(double theta) { return fmin(1, sqrt(theta * (2 / IMP_PI))); }
+static double root_of(double theta) { return imp_min(sqrt(theta * (2 / IMP_PI)), 1.0); }
 
 /* A direction wo in the tables' terms. */
 struct sight {

@@ -61,7 +61,7 @@ static struct imp__weight_table lobe(const struct imp_merl_data *t,
 
 static imp_v3 half_vector(double cos_h, double turn)
 {
-    const double s = sqrt(fmax(0, (1 - cos_h) * (1 + cos_h)));
+    const double s = sqrt(imp_max((1 - cos_h) * (1 + cos_h), 0.0));
     return imp__v3(s * cos(turn), s * sin(turn), cos_h);
 }
 
@@ -105,14 +105,14 @@ static double cosine_take(struct imp__weight_table *w, imp_v3 wo,
         const double share = 0.5 * (lo + hi);
         double above = 0;
         for (int k = 0; k < n; k++)
-            above += fmax(0, share / cosines * cell_weight(t, wo, k, false) -
-                                 w->column[k] / all);
+            above += imp_max(
+                share / cosines * cell_weight(t, wo, k, false) - w->column[k] / all, 0.0);
         if (above > 0.02 * share) hi = share;
         else lo = share;
     }
     for (int k = 0; k < n; k++) {
         const double taken = lo / cosines * cell_weight(t, wo, k, false);
-        w->column[k] = fmax(0, w->column[k] / all - taken);
+        w->column[k] = imp_max(w->column[k] / all - taken, 0.0);
         rest += w->column[k];
     }
     return rest > 0 ? lo : 1;

@@ -74,7 +74,7 @@ struct at {
 static struct at at_inputs(const struct imp_bsdf *b, const imp_spec *in)
 {
     const struct roughplastic *p = b->self;
-    const double alpha = fmax(in[ALPHA][0], IMP_ALPHA_MIN);
+    const double alpha = imp_max(in[ALPHA][0], IMP_ALPHA_MIN);
     return (struct at){p, {p->type, p->visible, alpha, alpha, 0}, alpha, in[ETA][0]};
 }
 

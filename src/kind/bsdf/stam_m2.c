@@ -75,7 +75,7 @@ static struct half half(const struct m2 *m2, double alpha, const struct imp_dirs
     h.c_m = h.m[2];
     h.mo = imp__dot(h.m, d->wo);
     h.p = (alpha + 2) / IMP_2PI * pow(h.c_m, alpha + 1) / (4 * h.mo);
-    h.V = m2->variant == RECIPROCAL ? fmin(1, d->wi[2] / d->wo[2])
+    h.V = m2->variant == RECIPROCAL ? imp_min(d->wi[2] / d->wo[2], 1.0)
           : m2->variant == PAPER    ? sin_m(&h)
                                     : 1;
     return h;
@@ -113,7 +113,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
         if (!imp__lambert_sample(&u[1], d)) return false;
     } else {
         const double c = pow(1 - u[1], 1 / (in[EXPONENT][0] + 2)), phi = IMP_2PI * u[2];
-        const double r = sqrt(fmax(0, 1 - c * c));
+        const double r = sqrt(imp_max(1 - c * c, 0.0));
         const imp_v3 m = imp__v3(r * cos(phi), r * sin(phi), c);
         const double mo = imp__dot(m, d->wo);
         if (!(mo > 0)) return false;

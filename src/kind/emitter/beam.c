@@ -48,7 +48,8 @@ static double cosine(const struct imp_emitter *e, const struct imp_emission *x)
 {
     const struct beam *beam = e->self;
     if (!(x->cos_light > 0)) return 0;
-    return beam->aimed ? fmax(0, imp__dot(x->d, beam->axis)) : fmin(x->cos_light, 1);
+    return beam->aimed ? imp_max(imp__dot(x->d, beam->axis), 0.0)
+                       : imp_min(x->cos_light, 1.0);
 }
 
 static void eval(const struct imp_emitter *e, const imp_spec *in,

@@ -119,10 +119,10 @@ double imp__ies_projected(const struct imp__ies *x, imp_v3 w)
     double sum = x->same;
     if (x->across > 0) {
         const double c = imp__dot(w, x->axis);
-        sum += x->across * sqrt(fmax(0, 1 - c * c));
+        sum += x->across * sqrt(imp_max(1 - c * c, 0.0));
     }
     for (int k = 0; k < x->n_facets; k++)
-        sum += x->facets[k].area * fmax(0, imp__dot(w, x->facets[k].n));
+        sum += x->facets[k].area * imp_max(imp__dot(w, x->facets[k].n), 0.0);
     return sum;
 }
 
@@ -159,11 +159,11 @@ double imp__ies_bound(const struct imp__ies *x, imp_v3 d, double angle)
         if (!any && k + 1 < n && t->vertical[k + 1] < from) continue;
         if (!any && k > 0 && t->vertical[k - 1] > to) break;
         for (int j = 0; j < t->n_horizontal; j++)
-            most = fmax(most, t->candela[(size_t)j * (size_t)n + (size_t)k]);
+            most = imp_max(t->candela[(size_t)j * (size_t)n + (size_t)k], most);
     }
     for (int k = 0; k < x->n_facets; k++) {
         const double tilt = acos(imp_clamp(imp__dot(d, x->facets[k].n), -1.0, 1.0));
-        shown += x->facets[k].area * fmax(0, cos(fmax(0, tilt - angle)));
+        shown += x->facets[k].area * imp_max(cos(imp_max(tilt - angle, 0.0)), 0.0);
     }
     return shown > 0 ? x->factor * most / shown : 0;
 }

@@ -74,7 +74,7 @@ void imp__perez_shape(struct imp__sky_shape *s, const struct imp__perez_weather 
 {
     double Z, Delta;
     const int bin = sky_of(w, imp__dot(s->sun, s->axis[2]), &Z, &Delta);
-    if (bin >= 1 && bin <= 4) Delta = fmax(Delta, 0.2);
+    if (bin >= 1 && bin <= 4) Delta = imp_max(Delta, 0.2);
     for (int k = 0; k < 5; k++) {
         const double x1 = fit[k][0][bin], x2 = fit[k][1][bin], x3 = fit[k][2][bin],
                      x4 = fit[k][3][bin];
@@ -96,7 +96,7 @@ void imp__perez_efficacy(const struct imp__perez_weather *w, double up, double d
     for (int k = 0; k < 2; k++) {
         double sum = efficacy[k][0][bin] + efficacy[k][1][bin] * water;
         for (int j = 0; j < 2; j++) sum += efficacy[k][2 + j][bin] * last[k][j];
-        *(k ? direct : diffuse) = fmax(sum, 0);
+        *(k ? direct : diffuse) = imp_max(sum, 0.0);
     }
 }
 

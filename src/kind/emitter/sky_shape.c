@@ -48,7 +48,7 @@ double imp__sky_shape_at(const struct imp__sky_shape *s, imp_v3 w)
     const double *n = s->n, c = imp_clamp(imp__dot(w, s->sun), -1.0, 1.0), x = acos(c);
     const double g = 1 + n[0] * exp(n[1] / z);
     const double f = 1 + n[2] * (exp(n[3] * x) - s->h) + n[4] * c * c;
-    return fmax(f * g, 0);
+    return imp_max(f * g, 0.0);
 }
 
 double imp__sky_shape_horizontal(const struct imp__sky_shape *s)
@@ -92,7 +92,7 @@ bool imp__sky_shape_sample(const struct imp_emitter *e, const imp_v3 *ref,
     const struct imp__sky_shape *s = e->self;
     const bool cosine = u[0] < 0.5;
     const double r = cosine ? 2 * u[0] : 2 * u[0] - 1, phi = IMP_2PI * u[1];
-    const double z = cosine ? sqrt(1 - r) : 1 - r, across = sqrt(fmax(0, 1 - z * z));
+    const double z = cosine ? sqrt(1 - r) : 1 - r, across = sqrt(imp_max(1 - z * z, 0.0));
     (void)ref;
     if (!(z > 0)) return false;
     const imp_v3 w = imp__normalize(s->axis[0] * (across * cos(phi)) +

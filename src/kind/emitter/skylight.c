@@ -158,7 +158,7 @@ void imp__sun_radiance(double turbidity, double elevation, double cos_limb,
 {
     double limb[IMP_SKY_WAVES];
     for (int k = 0; k < IMP_SKY_WAVES; k++) limb[k] = limb_at(k, cos_limb);
-    sun_blend(turbidity, fmax(elevation, 0), limb, out);
+    sun_blend(turbidity, imp_max(elevation, 0.0), limb, out);
 }
 
 /* The mean of cos^j over a disc seen from far is 2/(j + 2). The elevation is that of the

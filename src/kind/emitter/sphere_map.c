@@ -90,8 +90,8 @@ static void latlong_draw(const struct imp__sphere_map *m, int i, double r,
     const double at = r * (above + below);
     double t;
     if (at < above || below == 0)
-        t = theta - half_hat_draw(IMP_PI - theta, delta, fmax(0, 1 - at / above));
-    else t = theta + half_hat_draw(theta, delta, fmin(1, (at - above) / below));
+        t = theta - half_hat_draw(IMP_PI - theta, delta, imp_max(1 - at / above, 0.0));
+    else t = theta + half_hat_draw(theta, delta, imp_min((at - above) / below, 1.0));
     *cos_theta = cos(t);
     *sin_theta = sin(t);
 }

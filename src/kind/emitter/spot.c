@@ -137,7 +137,7 @@ static void cone(const struct imp_emitter *e, imp_v3 *axis, double *cosine)
 {
     const struct imp__light_frame *f = e->self;
     *axis = f->axis[2];
-    *cosine = cos(fmin(e->input[CUTOFF]->value[0], 180) * DEGREE);
+    *cosine = cos(imp_min(e->input[CUTOFF]->value[0], 180.0) * DEGREE);
 }
 
 /* Uniformly in the cone of the cutoff, at whose border the light is 0. */

@@ -37,10 +37,11 @@ imp_v3 imp__sun_direction(const struct imp__sun_date *d)
     const double greenwich = 6.6974243242 + 0.0657098283 * n + hours;
     const double turn = (greenwich * 15 + d->longitude) * DEGREE - ascension;
     const double latitude = d->latitude * DEGREE;
-    const double zenith = acos(fmin(fmax(cos(latitude) * cos(turn) * cos(declination) +
-                                             sin(declination) * sin(latitude),
-                                         -1),
-                                    1));
+    const double zenith =
+        acos(imp_min(imp_max(cos(latitude) * cos(turn) * cos(declination) +
+                                 sin(declination) * sin(latitude),
+                             -1.0),
+                     1.0));
     const double azimuth =
         atan2(-sin(turn), tan(declination) * cos(latitude) - sin(latitude) * cos(turn));
     const double seen = zenith + 6371.01 / 149597890 * sin(zenith); /* parallax */

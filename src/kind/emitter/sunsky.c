@@ -94,7 +94,7 @@ static void sun_waves(const struct sunsky *s, const struct at *x, double turbidi
         return;
     }
     const double away = (1 - x->cos_gamma) / (1 - s->cos_radius);
-    imp__sun_radiance(turbidity, asin(x->cos_theta), sqrt(fmax(0, 1 - away)), out);
+    imp__sun_radiance(turbidity, asin(x->cos_theta), sqrt(imp_max(1 - away, 0.0)), out);
 }
 
 static void add(struct imp__sky_value *sum, double factor, const struct imp__sky_value *v)
@@ -255,7 +255,7 @@ static void changed(const struct imp_emitter *e)
         t.column[k] += mean > 0 ? CELL_LEAST * mean : 1;
     imp__weight_table_sum(&t, NULL);
     luminances(e, s->sun, &unused, &sun);
-    sun = fmax(0, sun) * s->sun_solid * e->input[SUN_SCALE]->value[0];
+    sun = imp_max(sun, 0.0) * s->sun_solid * e->input[SUN_SCALE]->value[0];
     const double sky = mean * IMP_2PI * e->input[SKY_SCALE]->value[0];
     *s->sun_share =
         sun + sky > 0 ? imp_clamp(sun / (sun + sky), SHARE_LEAST, 1 - SHARE_LEAST) : 0.5;

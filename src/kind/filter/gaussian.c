@@ -24,7 +24,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_f
 static double eval(const struct imp_filter *f, double x)
 {
     const struct gaussian *g = f->self;
-    return fmax(0, exp(-x * x * g->inv_2_sigma2) - g->at_radius);
+    return imp_max(exp(-x * x * g->inv_2_sigma2) - g->at_radius, 0.0);
 }
 
 const struct imp_filter_ops imp__gaussian = {.size = sizeof(struct imp_filter_ops),

@@ -11,7 +11,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_f
 }
 static double eval(const struct imp_filter *f, double x)
 {
-    return fmax(0, 1 - fabs(x) / f->radius);
+    return imp_max(1 - fabs(x) / f->radius, 0.0);
 }
 
 const struct imp_filter_ops imp__tent = {

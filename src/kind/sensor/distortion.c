@@ -3,6 +3,7 @@
  * Brown and Conrady's map, and its inverse by Newton's method, followed from the middle of the film
  * so that the continuous branch is found. */
 #include "distortion.h"
+#include "base/compiler.h"
 #include <math.h>
 
 #define LEAST_SLOPE 0.01 /* of the map, in any direction: below, it is about to fold */
@@ -60,7 +61,7 @@ void imp__undistort(const struct imp_distortion *d, const double seen[2], double
     int k[2];
     for (int i = 0; i < 2; i++) {
         const double u = (seen[i] - d->lo[i]) / d->step[i];
-        k[i] = (int)fmax(0, fmin(floor(u), IMP_DISTORTION_NODES - 2));
+        k[i] = (int)imp_max(fmin(floor(u), IMP_DISTORTION_NODES - 2), 0.0);
         f[i] = u - k[i];
     }
     const double *const a = d->node[k[1]][k[0]], *const b = d->node[k[1]][k[0] + 1],

@@ -95,8 +95,8 @@ static void lens_bound(const struct imp_distortion *d, struct imp_film_plane *ou
     for (int j = 0; j < N; j++)
         for (int i = 0; i < N; i++)
             for (int k = 0; k < 2; k++) {
-                lo[k] = fmin(lo[k], d->node[j][i][k]);
-                hi[k] = fmax(hi[k], d->node[j][i][k]);
+                lo[k] = imp_min(d->node[j][i][k], lo[k]);
+                hi[k] = imp_max(d->node[j][i][k], hi[k]);
             }
     for (int k = 0; k < 2; k++) cell[k] = (hi[k] - lo[k]) / (N - 1);
     out->x_least = -hi[0] - cell[0];

@@ -24,10 +24,10 @@ void imp__receiver_uv(const struct imp_sensor *s, double px, double py, double u
 
 double imp__receiver_density(const struct imp_receiver *r, imp_v3 w)
 {
-    if (r->kind == IMP_PLANAR) return fmax(imp__dot(w, r->facing), 0) * IMP_INV_PI;
+    if (r->kind == IMP_PLANAR) return imp_max(imp__dot(w, r->facing), 0.0) * IMP_INV_PI;
     const double across = sqrt(w[0] * w[0] + w[1] * w[1]);
     const double towards = r->kind == IMP_CYLINDRICAL ? 0 : imp__dot(w, r->facing);
-    return fmax(across + towards, 0) * (IMP_INV_PI * IMP_INV_PI);
+    return imp_max(across + towards, 0.0) * (IMP_INV_PI * IMP_INV_PI);
 }
 
 /* y in [0, 2 pi] with y - sin y = 2 pi u: Newton's method inside a bracket. Below 1e-5 the

@@ -111,8 +111,8 @@ static void rectangle_choose(struct imp__outline *o)
             const double at[2] = {(dx * f[0] + dy * f[1]) / length,
                                   (dx * f[1] - dy * f[0]) / length};
             for (int k = 0; k < 2; k++) {
-                lo[k] = fmin(lo[k], at[k]);
-                hi[k] = fmax(hi[k], at[k]);
+                lo[k] = imp_min(at[k], lo[k]);
+                hi[k] = imp_max(at[k], hi[k]);
             }
         }
         const double area = (hi[0] - lo[0]) * (hi[1] - lo[1]);
@@ -270,7 +270,7 @@ static double outline_distance(const struct imp__outline *o, const double at[2])
         const double *e = o->edge[i], dx = e[2] - e[0], dy = e[3] - e[1];
         const double px = at[0] - e[0], py = at[1] - e[1], l2 = dx * dx + dy * dy;
         const double t = l2 > 0 ? imp_clamp((px * dx + py * dy) / l2, 0.0, 1.0) : 0;
-        least = fmin(least, hypot(px - t * dx, py - t * dy));
+        least = imp_min(hypot(px - t * dx, py - t * dy), least);
     }
     return least;
 }

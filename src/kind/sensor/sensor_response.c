@@ -18,7 +18,7 @@ static enum imp_status curve_check(const struct imp_build *b, const char *name,
                 b, name, IMP_E_SCENE,
                 "response '%s' is %g at %g nm: it cannot be negative", name, s->value[k],
                 s->per_nm > 0 ? s->nm[0] + (double)k / s->per_nm : s->nm[k]);
-    for (double nm = fmax(s->lo, 1); nm <= fmin(s->hi, 1e5); nm += 1) {
+    for (double nm = imp_max(s->lo, 1.0); nm <= imp_min(s->hi, 1e5); nm += 1) {
         const double v = imp__spectrum_value(s, nm);
         if (v < 0)
             return imp_build_error(b, name, IMP_E_SCENE,

@@ -34,8 +34,8 @@ static enum imp_status points_place(const struct imp_build *b, struct imp_shape 
                 return imp_build_error(b, NULL, IMP_E_SCENE,
                                        "control point %zu lies further out than 1e18", k);
             out[4 * k + (size_t)i] = (float)p[i];
-            s->lo[i] = fmin(s->lo[i], p[i] - q[3]);
-            s->hi[i] = fmax(s->hi[i], p[i] + q[3]);
+            s->lo[i] = imp_min(p[i] - q[3], s->lo[i]);
+            s->hi[i] = imp_max(p[i] + q[3], s->hi[i]);
         }
         out[4 * k + 3] = q[3];
     }

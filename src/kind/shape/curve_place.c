@@ -47,14 +47,14 @@ static imp_v3 ball_meet(const struct imp__curve_at *at, imp_v3 o, imp_v3 d)
     const double a = imp__dot(d, d), b = imp__dot(from, d) / a;
     const imp_v3 nearest = from - d * b; /* of the line to the centre */
     const double e = at->r * at->r - imp__dot(nearest, nearest);
-    return nearest - d * sqrt(fmax(e, 0) / a);
+    return nearest - d * sqrt(imp_max(e, 0.0) / a);
 }
 
 imp_v3 imp__curve_meet(const struct imp_curves *k, int segment, double t, double *v,
                        imp_v3 o, imp_v3 d, struct imp__curve_at *out)
 {
     const bool cone = k->degree == 1;
-    const double v0 = *v > 0 ? fmin(*v, 1) : 0; /* Embree may give no number */
+    const double v0 = *v > 0 ? imp_min(*v, 1.0) : 0; /* Embree may give no number */
     double x = v0, y = t;
     bool fine = true;
     imp_v3 q;

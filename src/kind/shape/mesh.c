@@ -55,7 +55,7 @@ static struct imp_hit point_read(const struct imp_shape *s, const double uv[2])
                  v = (double)(word & most) / (double)most;
     return (struct imp_hit){.prim = prim < s->triangles.n_triangles ? (int)prim : 0,
                             .u = u,
-                            .v = fmin(v, 1 - u)};
+                            .v = imp_min(v, 1 - u)};
 }
 
 static void surface(const struct imp_shape *s, const struct imp_hit *hit,

@@ -41,8 +41,8 @@ static enum imp_status range_place(size_t first, size_t end, void *payload)
     }
     pthread_mutex_lock(&place->lock);
     for (int i = 0; i < 3; i++) {
-        place->s->lo[i] = fmin(place->s->lo[i], lo[i]);
-        place->s->hi[i] = fmax(place->s->hi[i], hi[i]);
+        place->s->lo[i] = imp_min(lo[i], place->s->lo[i]);
+        place->s->hi[i] = imp_max(hi[i], place->s->hi[i]);
     }
     pthread_mutex_unlock(&place->lock);
     return IMP_OK;
@@ -322,8 +322,8 @@ void imp__mesh_move(struct imp_shape *s, const double to_world[12])
         for (int i = 0; i < 3; i++) {
             positions[3 * k + (size_t)i] = (float)p[i];
             if (normals) normals[3 * k + (size_t)i] = (float)t[i];
-            s->lo[i] = fmin(s->lo[i], positions[3 * k + (size_t)i]);
-            s->hi[i] = fmax(s->hi[i], positions[3 * k + (size_t)i]);
+            s->lo[i] = imp_min(positions[3 * k + (size_t)i], s->lo[i]);
+            s->hi[i] = imp_max(positions[3 * k + (size_t)i], s->hi[i]);
         }
     }
     s->lo[3] = s->hi[3] = 0;

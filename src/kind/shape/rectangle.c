@@ -28,8 +28,8 @@ static void settle(struct rectangle *r, struct imp_shape *s)
             r->corner + r->eu * (double)(k == 1 || k == 2) + r->ev * (double)(k >= 2);
         for (int i = 0; i < 3; i++) {
             r->positions[3 * k + i] = (float)p[i];
-            s->lo[i] = fmin(s->lo[i], p[i]);
-            s->hi[i] = fmax(s->hi[i], p[i]);
+            s->lo[i] = imp_min(p[i], s->lo[i]);
+            s->hi[i] = imp_max(p[i], s->hi[i]);
         }
     }
     s->lo[3] = s->hi[3] = 0;

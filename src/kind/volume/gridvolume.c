@@ -250,7 +250,8 @@ static void bound(const struct imp_texture *t, const imp_v3 *lo, const imp_v3 *h
         const imp_v3 corner = {(k & 1 ? *hi : *lo)[0], (k & 2 ? *hi : *lo)[1],
                                (k & 4 ? *hi : *lo)[2], 0};
         const imp_v3 u = imp__point(&v->to_unit, corner);
-        for (int d = 0; d < 3; d++) a[d] = fmin(a[d], u[d]), b[d] = fmax(b[d], u[d]);
+        for (int d = 0; d < 3; d++)
+            a[d] = imp_min(u[d], a[d]), b[d] = imp_max(u[d], b[d]);
     }
     for (int d = 0; d < 3; d++) {
         const double rim = 0.5001; /* of a trilinear lookup; more than rounding */
@@ -270,12 +271,12 @@ static void bound(const struct imp_texture *t, const imp_v3 *lo, const imp_v3 *h
                     (size_t)x;
                 if (v->spectral && !scalar) {
                     const double top = imp__lifted_texels_most(&v->lifted, cell);
-                    for (int c = 0; c < 4; c++) max[c] = fmax(max[c], top);
+                    for (int c = 0; c < 4; c++) max[c] = imp_max(top, max[c]);
                 }
                 for (int c = 0; c < 4 && !(v->spectral && !scalar); c++)
-                    max[c] = fmax(
-                        max[c],
-                        v->data[cell * (size_t)v->channels + (size_t)(c % v->channels)]);
+                    max[c] = imp_max(
+                        v->data[cell * (size_t)v->channels + (size_t)(c % v->channels)],
+                        max[c]);
             }
     *most = scalar ? imp__spec(imp__max3(max)) : max;
 }

@@ -34,7 +34,7 @@ static void shares_set(struct imp_step *s, const struct imp_bsdf *b)
     const struct imp_aims *t = &s->scene->aims;
     const bool guided = s->guided.here && lobes == IMP_BSDF_SMOOTH;
     double sum = 0;
-    for (int k = 0; k < IMP_DENSITIES; k++) m->share[k] = fmax(use->weight[k], 0);
+    for (int k = 0; k < IMP_DENSITIES; k++) m->share[k] = imp_max(use->weight[k], 0.0);
     m->sphere = (lobes & IMP_BSDF_TRANSMIT) != 0;
     if (m->share[IMP_DENSITY_EMITTERS] > 0) {
         m->strength[0] = imp__aims_sum(t, 0, t->n_lights, m->p);
@@ -201,7 +201,7 @@ bool imp__mixture_draw(const struct imp_step *s, const struct imp_bsdf *b,
     while (k > 0 && !(u[0] < before + m->share[k])) before += m->share[k--];
     *drawn = k;
     const double width = k > 0 ? m->share[k] : 1 - before;
-    const double rest[3] = {fmin((u[0] - before) / width, 0x1.fffffffffffffp-1), u[1],
+    const double rest[3] = {imp_min((u[0] - before) / width, 0x1.fffffffffffffp-1), u[1],
                             u[2]};
     return member_draw(s, k, b, frame, rest, dirs);
 }

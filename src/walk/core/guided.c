@@ -67,7 +67,7 @@ bool imp__guided_light_draw(const struct imp_step *s, const struct imp_frame *fr
     const struct imp_guided *g = &s->guided;
     const double share = g->at.share;
     if (!(u[0] < share)) {
-        u[0] = fmin((u[0] - share) / (1 - share), 0x1.fffffffffffffp-1);
+        u[0] = imp_min((u[0] - share) / (1 - share), 0x1.fffffffffffffp-1);
         return false;
     }
     dirs->wo = imp__to_local(frame, g->guide->draw(g->guide, &g->at, u + 1));

@@ -32,7 +32,7 @@ static double photon_survival(const struct imp_step *s, const struct imp_bsdf *b
     double brightest = imp__max_used(H, four);
     if (active && b->index >= 0 && active->bsdf[b->index])
         for (int c = 0; c < 3 + four; c++)
-            if (H[c] == 0) brightest = fmax(brightest, 0.5);
+            if (H[c] == 0) brightest = imp_max(brightest, 0.5);
     return imp_min(brightest * s->tracer->integrator->h, 1);
 }
 
@@ -74,7 +74,7 @@ static void mixed_parts(const struct imp_step *s, double all, double k, int by, 
     const bool alone = m->only >= 0;
     if (!alone || lobe != IMP_SMOOTH) p->share = alone ? 1 : m->share[IMP_DENSITY_KERNEL];
     else p->share = by == IMP_DENSITY_KERNEL ? all / k : 0;
-    if (lobe == IMP_SMOOTH) p->rest = fmax(all - p->share * k, 0);
+    if (lobe == IMP_SMOOTH) p->rest = imp_max(all - p->share * k, 0.0);
 }
 
 /* f: the value. Where a vertex splits, the members' MIS weights are those of the lane that

@@ -266,7 +266,7 @@ enum imp_status imp__walks_weigh(const struct imp_walks *w, const struct imp_sto
     else if (x.sum.n > 0) out->ess = 0;
     /* A mean of ratios that is below 1 by chance is not looked at. */
     if (x.sum.seen < SEEN_LEAST * x.sum.moved)
-        out->ess = fmin(out->ess, x.sum.seen / x.sum.moved);
+        out->ess = imp_min(x.sum.seen / x.sum.moved, out->ess);
     out->growth = imp__moments_radius(&x.sum);
     IMP_TRY(collisions_check(w, &x.sum));
 out:

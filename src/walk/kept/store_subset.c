@@ -79,7 +79,7 @@ static double stratum_weight(const struct imp_store *s, uint64_t rare)
     size_t least = SIZE_MAX;
     for (; rare; rare &= rare - 1)
         least = imp_min(least, (size_t)s->met[__builtin_ctzll(rare)]);
-    return fmax((double)least / LEAST, 1);
+    return imp_max((double)least / LEAST, 1.0);
 }
 
 size_t imp__store_next(const struct imp_store *s, const struct imp_asking *a, size_t tile,

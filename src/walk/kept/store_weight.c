@@ -77,18 +77,18 @@ static double survival_now(const struct imp_densities *m, const struct looked *v
         if (!v->bsdf->ops->directional_albedo ||
             !v->bsdf->ops->directional_albedo(v->bsdf, v->in, &v->dirs.wo, &H))
             H = factor;
-        q = fmin(1, imp__max_used(H, four) * m->integrator->h);
+        q = imp_min(imp__max_used(H, four) * m->integrator->h, 1.0);
     } else {
-        q = fmin(imp__max_used(beta, four) * eta * eta, 0.95);
+        q = imp_min(imp__max_used(beta, four) * eta * eta, 0.95);
     }
-    return fmax(q, m->survival);
+    return imp_max(q, m->survival);
 }
 
 /* Throughput as roulette sees it (scatter.c): in a lane, the first factor that is zero but
  * may have a derivative is another number. */
 static imp_spec seen_by_roulette(imp_spec factor, bool four, int zeros[4])
 {
-    const double stand_in = fmax(imp__max_used(factor, four), 0.5);
+    const double stand_in = imp_max(imp__max_used(factor, four), 0.5);
     for (int c = 0; c < 4; c++)
         if (factor[c] == 0 && zeros[c]++ == 0) factor[c] = stand_in;
     return factor;
@@ -178,7 +178,7 @@ static void cross(struct course *c, const struct imp_decision *d,
     if (c->m->flights) collisions_look(c->m->scene, v, c->sum);
     if (c->m->flights || c->carried) ratio = lanes_ratio(c, p, 1 / (double)d->passes);
     c->w *= ratio;
-    c->beta *= p * ((double)d->passes / fmax(ratio, TINY)); /* as in tracking.c */
+    c->beta *= p * ((double)d->passes / imp_max(ratio, TINY)); /* as in tracking.c */
 }
 
 /* Roulette at a step that it plays with; f: the value there. */
@@ -187,9 +187,10 @@ static void roll(struct course *c, const struct looked *v, const struct imp_deci
 {
     struct imp_moments *sum = c->sum;
     const bool four = c->carried != NULL;
-    const double q = c->m->guided ? (double)d->survive
-                                  : survival_now(c->m, v, step * (1 / fmax(ratio, TINY)),
-                                                 c->beta, c->eta, four);
+    const double q = c->m->guided
+                         ? (double)d->survive
+                         : survival_now(c->m, v, step * (1 / imp_max(ratio, TINY)),
+                                        c->beta, c->eta, four);
     const bool first = !c->settled;
     c->w *= q / (double)d->survive;
     c->beta *= 1 / q;
@@ -222,7 +223,7 @@ static void step_on(struct course *c, const struct imp_decision *d,
             imp_spec f;
             imp__bsdf_eval(v.bsdf, c->carried, v.in, &v.dirs, &f);
             const imp_spec step = f * (1 / (double)d->pdf);
-            c->beta *= seen_by_roulette(step * (1 / fmax(ratio, TINY)),
+            c->beta *= seen_by_roulette(step * (1 / imp_max(ratio, TINY)),
                                         c->carried != NULL, c->zeros);
             if (v.bsdf->ops->index_ratio && !v.bsdf->shaped)
                 c->eta *= v.bsdf->ops->index_ratio(v.bsdf, v.in, &v.dirs);
@@ -359,7 +360,7 @@ double imp__moments_radius(const struct imp_moments *sum)
             for (int a = 0; a < n; a++) {
                 y[a] = 0;
                 for (int b = 0; b < n; b++) y[a] += T[a][b] * x[b];
-                largest = fmax(largest, y[a]);
+                largest = imp_max(y[a], largest);
             }
             radius = largest;
             if (!(largest > 0)) break;
@@ -367,11 +368,11 @@ double imp__moments_radius(const struct imp_moments *sum)
             double norm = 0;
             for (int a = 0; a < n; a++) {
                 x[a] = y[a] + 0.1 * largest * x[a];
-                norm = fmax(norm, x[a]);
+                norm = imp_max(x[a], norm);
             }
             for (int a = 0; a < n; a++) x[a] /= norm;
         }
-        most = fmax(most, radius);
+        most = imp_max(radius, most);
     }
     return most;
 }

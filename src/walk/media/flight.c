@@ -108,10 +108,10 @@ static double raised(const struct imp_free_flight *w, const struct imp_majorants
     for (int a = 0; a < 3; a++) {
         imp_v3 edge = {0};
         edge[a] = 1;
-        size = fmax(size, imp__length(imp__vector(&g->to_world, edge)));
+        size = imp_max(imp__length(imp__vector(&g->to_world, edge)), size);
     }
-    const double empty = fmax(EMPTY * (double)g->most, 1 / size);
-    return imp__decide1(fmax(h * bound, (h - 1) * empty));
+    const double empty = imp_max(1 / size, EMPTY * (double)g->most);
+    return imp__decide1(imp_max(h * bound, (h - 1) * empty));
 }
 
 /* Extinction over its bound at a tentative collision. False: the walk is dropped. */
@@ -141,7 +141,7 @@ static bool collide(struct imp_free_flight *w, const struct imp_medium *m, doubl
     imp_spec sigma;
     if (!tentative(w, m, t, bound, &sigma)) return true;
     imp_spec p = sigma;
-    for (int c = 0; has_room(w) && c < 4; c++) p[c] = fmax(p[c], IMP_REAL_LEAST);
+    for (int c = 0; has_room(w) && c < 4; c++) p[c] = imp_max(IMP_REAL_LEAST, p[c]);
     const bool real = collides && uniform(w) < p[imp__lane_mis_drew(s)];
     w->f *= real ? sigma : 1 - sigma;
     w->p *= real ? p : 1 - p;

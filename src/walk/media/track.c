@@ -167,8 +167,8 @@ imp_spec imp__track_density(const struct imp_scene *scene, const struct imp_trac
         const struct imp_event *e = &track->event[i];
         imp_spec f = event_factor(scene, track, e, carried);
         for (int c = 0; least > 0 && c < 4; c++) {
-            if (e->kind == IMP_REAL_AT) f[c] = fmax(f[c], least);
-            else if (e->kind == IMP_NULL_AT) f[c] = fmin(f[c], 1 - least);
+            if (e->kind == IMP_REAL_AT) f[c] = imp_max(least, f[c]);
+            else if (e->kind == IMP_NULL_AT) f[c] = imp_min(1 - least, f[c]);
         }
         p *= f;
     }

@@ -76,7 +76,8 @@ static double baseline_of(const struct sums *s)
     const double b = s->a_light / s->a,
                  variance =
                      (s->aa_light2 - 2 * b * s->aa_light + b * b * s->aa) / (s->a * s->a);
-    return b == 0 || !isfinite(variance) ? 0 : b * b * b / (b * b + fmax(variance, 0));
+    return b == 0 || !isfinite(variance) ? 0
+                                         : b * b * b / (b * b + imp_max(variance, 0.0));
 }
 
 enum imp_status imp__baseline_set(struct imp_tracer *tracer, int64_t walks)

@@ -18,12 +18,12 @@ static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_
                  imp_spec *f)
 {
     (void)b, (void)in;
-    *f = imp__spec(fmax(d->wi[2], 0) * IMP_INV_PI);
+    *f = imp__spec(imp_max(d->wi[2], 0.0) * IMP_INV_PI);
 }
 static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
 {
     (void)b, (void)in;
-    return fmax(d->wi[2], 0) * IMP_INV_PI;
+    return imp_max(d->wi[2], 0.0) * IMP_INV_PI;
 }
 static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
                    imp_spec *df)

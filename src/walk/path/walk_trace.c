@@ -47,7 +47,7 @@ enum imp_drop imp__drop_cause(imp_spec L)
     double sum = 0, largest = 0;
     for (int c = 0; c < 4; c++) {
         sum += L[c];
-        largest = fmax(largest, fabs(L[c]));
+        largest = imp_max(fabs(L[c]), largest);
     }
     if (isnan(sum)) return IMP_DROP_NAN;
     return largest <= FLT_MAX ? IMP_DROP_NEGATIVE : IMP_DROP_INFINITE;
