@@ -233,7 +233,7 @@ static double light_ratio(const struct moved *m, const struct imp_vertex *v,
     const struct imp_emitter *e = scene->emitters[v->d.light.emitter];
     const imp_v3 d = imp__decided_v3(v->d.light.d);
     const bool moves = m->pose->emitter == e;
-    w[0] = w[1] = -d;
+    w[0] = w[1] = imp__normalize(-d);
     if (e->ops->flags & IMP_EMITTER_ENVIRONMENT) return 1;
     if (!e->shape && e->ops->flags & IMP_EMITTER_FAR) {
         const double side = imp__dot(d, m->from) < 0 ? 1 : -1;
@@ -306,7 +306,7 @@ static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spe
         if (!v->d.goes_on || !next) break;
         const bool sky = next->d.scatterer == IMP_AT_SKY;
         const struct imp__glued ahead = sky ? old : vertex_glued(scene, next, walk->time);
-        w[0] = w[1] = sky ? imp__decided_v3(next->d.p) : imp__normalize(ahead.p - old.p);
+        w[0] = w[1] = imp__normalize(sky ? imp__decided_v3(next->d.p) : ahead.p - old.p);
         const imp_spec step = kernel_ratio(m, v, &here, x, from, w, &old, v->d.lobe);
         if (sky) {
             value += imp__sum_used(P * step * v->beyond, scene->lanes);

@@ -37,7 +37,7 @@ static int read_walk(struct sweep *s, imp_spec adjoint)
     for (const struct imp_vertex *v = s->walk->first; v; v = v->next, n++) {
         const bool sky = v->d.scatterer == IMP_AT_SKY;
         s->at[n] =
-            sky ? imp__sky_point(imp__decided_v3(v->d.p))
+            sky ? imp__sky_point(imp__normalize(imp__decided_v3(v->d.p)))
                 : imp__surface_point(scene, v->d.shape, &v->d.located, v->d.place, v->ng);
         struct pieces *piece = &s->piece[n];
         *piece = (struct pieces){{0}, {0}, {0}};
@@ -162,7 +162,7 @@ static void light_bar(struct sweep *s, int k, const struct imp_vertex *v)
         return;
     }
     if (e->ops->flags & IMP_EMITTER_ENVIRONMENT) {
-        const imp_v3 w = -imp__decided_v3(v->d.light.d);
+        const imp_v3 w = imp__normalize(-imp__decided_v3(v->d.light.d));
         const struct imp__kernel_bar kernel = light_kernel(s, k, v, w);
         imp__scatter_bar(&s->at[k], &kernel);
         return;
