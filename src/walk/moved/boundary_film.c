@@ -37,6 +37,23 @@ imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py)
     return walk.values;
 }
 
+/* What is seen past the draw's point on the side of the film that `shift` points to, or (sign -1) away
+ * from; bar: the same direction in space, of any length. */
+static imp_spec look_beside(const struct imp__edge_draw *d,
+                            const struct imp_sensor_sample *to, imp_v3 bar, double sign,
+                            const double shift[2])
+{
+    const struct imp_sensor *sensor = d->b->tracer->sensor;
+    const double none[4] = {0};
+    const imp_v3 r = d->p - to->p, m = imp__normalize(bar) * sign;
+    const double apart = IMP_BESIDE * imp__length(r);
+    const imp_v3 past = d->p + m * apart, q = imp__edge_beside(d, r, m, apart);
+    struct imp_sensor_sample at;
+    if (!imp__is_zero(q - past) && imp__sensor_connect(sensor, &q, false, none, &at))
+        return imp__look_through(d, at.px, at.py);
+    return imp__look_through(d, to->px + sign * shift[0], to->py + sign * shift[1]);
+}
+
 void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to)
 {
     const imp_v3 camera = d->b->camera;
@@ -54,9 +71,9 @@ void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to
     /* A pixel is so wide at the distance 1. */
     const double pixel = sqrt(1 / (imp__length(x) * imp__length(y))) * inverse;
     const double beside = IMP_BESIDE / pixel / length;
-    const double dx = normal[0] * beside, dy = normal[1] * beside;
-    const imp_spec jump = imp__look_through(d, to->px - dx, to->py - dy) -
-                          imp__look_through(d, to->px + dx, to->py + dy);
+    const double shift[2] = {normal[0] * beside, normal[1] * beside};
+    const imp_spec jump =
+        look_beside(d, to, bar, -1, shift) - look_beside(d, to, bar, 1, shift);
     if (imp__is_zero_used(jump, d->waves)) return;
     struct imp__flux *f = imp__flux_add(d, 2);
     if (!f) return;

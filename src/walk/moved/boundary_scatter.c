@@ -76,11 +76,10 @@ void imp__draw_scatter(struct imp__edge_draw *d)
     if (!(sine > 0)) return;
     const imp_v3 m = turned * (1 / sine);
     const double apart = IMP_BESIDE * (hit.t + imp__length(d->p));
-    const imp_v3 beside = m * apart;
     if (imp__edge_merges(d, -w, apart)) return;
     struct imp_walk lo, hi;
-    imp__look_from(d, &at, d->p - beside, &lo);
-    imp__look_from(d, &at, d->p + beside, &hi);
+    imp__look_from(d, &at, imp__edge_beside(d, -w, -m, apart), &lo);
+    imp__look_from(d, &at, imp__edge_beside(d, -w, m, apart), &hi);
 
     int depths;
     const double times = (d->touches ? 1 : sine * 4 * IMP_PI) * d->inv_pdf;

@@ -216,6 +216,17 @@ static bool seen_point(struct imp__edge_draw *d, struct imp_hit *hit)
     return true;
 }
 
+/* How far the triangle goes on from a point of it along D, and against D. */
+static double room_along(const struct imp__glued *x, imp_v3 D)
+{
+    const double b1 = imp__dot(x->slope[0], D), b2 = imp__dot(x->slope[1], D);
+    const double rate[3] = {-b1 - b2, b1, b2};
+    double room = INFINITY;
+    for (int k = 0; k < 3; k++)
+        if (rate[k] != 0) room = imp_min(room, imp_max(x->b[k], 0.0) / fabs(rate[k]));
+    return room;
+}
+
 /* A point where the shading normal turns away from w, at which something is t away. */
 struct turning {
     struct imp__glued x;
@@ -237,7 +248,8 @@ static bool turning_at(const struct imp__edge_draw *d, const struct imp_hit *hit
     const imp_v3 D = grad * (1 / out->slope), across = D - w * imp__dot(w, D);
     const double seen = imp__length(across);
     if (!(seen > IMP_GRAZING)) return false;
-    out->beside = D * (IMP_BESIDE * (t + imp__length(at->p)) / seen);
+    const double apart = IMP_BESIDE * (t + imp__length(at->p)) / seen;
+    out->beside = D * imp_min(apart, 0.5 * room_along(&out->x, D));
     return true;
 }
 
