@@ -4,9 +4,14 @@
  * that it is narrower than the look is apart from the edge: near silhouettes of fine meshes that is so
  * along a part of each edge that does not shrink with the triangles. Such a look would pass the face,
  * and see the jump of the silhouette behind it, which has draws of its own, a second time. It goes
- * to a point of the face instead. */
+ * to a point of the face instead.
+ *
+ * What is seen of a face is seen next to the edge, by weights of its corners in double, and not where a
+ * ray beside the edge meets it: on a face at a flat angle that is far away, and what differs in
+ * between would count as a jump. */
 #include "boundary_parts.h"
 #include "scene/instances.h"
+#include "walk/core/step.h"
 
 /* The face that a look along w sees first on the side that m points to. NULL: none is there. */
 static const struct imp__edge_face *face_seen(const struct imp__edge_draw *d, imp_v3 w,
@@ -23,6 +28,8 @@ static const struct imp__edge_face *face_seen(const struct imp__edge_draw *d, im
     }
     return seen;
 }
+
+#define NEXT 0.3 /* per `apart`: so far from the edge, in a face */
 
 static void corners(const struct imp_scene *scene, const struct imp__edge_face *f,
                     imp_v3 p[3])
@@ -61,4 +68,52 @@ imp_v3 imp__edge_beside(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m, doub
     const imp_v3 middle = (p[0] + p[1] + p[2]) * (1.0 / 3) - d->p;
     const double across = imp__dot(middle, m);
     return d->p + middle * (across > 2 * apart ? apart / across : 0.5);
+}
+
+/* Weights of the second and third corner at a point of the triangle's plane. */
+static void weights(const imp_v3 p[3], imp_v3 q, double b[2])
+{
+    const imp_v3 e1 = p[1] - p[0], e2 = p[2] - p[0], r = q - p[0];
+    const double aa = imp__dot(e1, e1), ab = imp__dot(e1, e2), bb = imp__dot(e2, e2);
+    const double ra = imp__dot(r, e1), rb = imp__dot(r, e2), det = aa * bb - ab * ab;
+    b[0] = (bb * ra - ab * rb) / det;
+    b[1] = (aa * rb - ab * ra) / det;
+}
+
+void imp__look_at(struct imp__edge_draw *d, imp_v3 o, struct imp_hit *hit, int before,
+                  struct imp_walk *walk)
+{
+    const struct imp__edge_face f = {
+        .shape = hit->shape, .prim = hit->prim, .place = hit->place};
+    imp_v3 p[3];
+    corners(d->b->tracer->scene, &f, p);
+    const imp_v3 r = p[0] + (p[1] - p[0]) * hit->u + (p[2] - p[0]) * hit->v - o;
+    struct imp_sensor_ray ray = {.o = o, .t_near = 0, .t_far = INFINITY};
+    hit->t = imp__length(r);
+    ray.d = r * (1 / hit->t);
+    imp__walk_along(d->b->tracer, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves,
+                    before, hit, walk);
+}
+
+bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, imp_v3 m, double apart,
+                         int before, struct imp_walk *walk)
+{
+    const imp_v3 w = imp__normalize(d->p - o);
+    const struct imp__edge_face *f = d->edge ? face_seen(d, w, m) : NULL;
+    if (!f) return false;
+    const imp_v3 to = imp__normalize(imp__edge_beside(d, w, m, apart) - o);
+    struct imp_hit hit;
+    if (!imp__intersect(d->b->tracer->scene, &o, &to, 0, INFINITY, &hit) ||
+        hit.shape != f->shape || hit.prim != f->prim || hit.place != f->place)
+        return false;
+    imp_v3 p[3];
+    corners(d->b->tracer->scene, f, p);
+    const imp_v3 middle = (p[0] + p[1] + p[2]) * (1.0 / 3) - d->p;
+    const double across = imp__dot(middle, f->in), next = NEXT * apart;
+    double b[2];
+    weights(p, d->p + middle * (across > 2 * next ? next / across : 0.5), b);
+    hit.u = b[0];
+    hit.v = b[1];
+    imp__look_at(d, o, &hit, before, walk);
+    return true;
 }

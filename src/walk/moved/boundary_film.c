@@ -33,15 +33,15 @@ imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py)
     struct imp_sensor_ray ray;
     struct imp_walk walk;
     t->sensor->ops->ray(t->sensor, px, py, lens, &ray);
-    imp__walk_along(t, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves, 0, &walk);
+    imp__walk_along(t, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves, 0, NULL,
+                    &walk);
     return walk.values;
 }
 
 /* What is seen past the draw's point on the side of the film that `shift` points to, or (sign -1) away
  * from; bar: the same direction in space, of any length. */
-static imp_spec look_beside(const struct imp__edge_draw *d,
-                            const struct imp_sensor_sample *to, imp_v3 bar, double sign,
-                            const double shift[2])
+static imp_spec look_beside(struct imp__edge_draw *d, const struct imp_sensor_sample *to,
+                            imp_v3 bar, double sign, const double shift[2])
 {
     const struct imp_sensor *sensor = d->b->tracer->sensor;
     const double none[4] = {0};
@@ -49,6 +49,8 @@ static imp_spec look_beside(const struct imp__edge_draw *d,
     const double apart = IMP_BESIDE * imp__length(r);
     const imp_v3 past = d->p + m * apart, q = imp__edge_beside(d, r, m, apart);
     struct imp_sensor_sample at;
+    struct imp_walk walk;
+    if (imp__edge_face_look(d, to->p, m, apart, 0, &walk)) return walk.values;
     if (!imp__is_zero(q - past) && imp__sensor_connect(sensor, &q, false, none, &at))
         return imp__look_through(d, at.px, at.py);
     return imp__look_through(d, to->px + sign * shift[0], to->py + sign * shift[1]);
