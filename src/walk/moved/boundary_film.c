@@ -33,8 +33,27 @@ imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py)
     struct imp_sensor_ray ray;
     struct imp_walk walk;
     t->sensor->ops->ray(t->sensor, px, py, lens, &ray);
-    imp__walk_along(t, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves, 0, &walk);
+    imp__walk_along(t, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves, 0, NULL,
+                    &walk);
     return walk.values;
+}
+
+/* What is seen past the draw's point on the side of the film that `shift` points to, or (sign -1) away
+ * from; bar: the same direction in space, of any length. */
+static imp_spec look_beside(struct imp__edge_draw *d, const struct imp_sensor_sample *to,
+                            imp_v3 bar, double sign, const double shift[2])
+{
+    const struct imp_sensor *sensor = d->b->tracer->sensor;
+    const double none[4] = {0};
+    const imp_v3 r = d->p - to->p, m = imp__normalize(bar) * sign;
+    const double apart = IMP_BESIDE * imp__length(r);
+    const imp_v3 past = d->p + m * apart, q = imp__edge_beside(d, r, m, apart);
+    struct imp_sensor_sample at;
+    struct imp_walk walk;
+    if (imp__edge_face_look(d, to->p, m, apart, 0, &walk)) return walk.values;
+    if (!imp__is_zero(q - past) && imp__sensor_connect(sensor, &q, false, none, &at))
+        return imp__look_through(d, at.px, at.py);
+    return imp__look_through(d, to->px + sign * shift[0], to->py + sign * shift[1]);
 }
 
 void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to)
@@ -54,9 +73,9 @@ void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to
     /* A pixel is so wide at the distance 1. */
     const double pixel = sqrt(1 / (imp__length(x) * imp__length(y))) * inverse;
     const double beside = IMP_BESIDE / pixel / length;
-    const double dx = normal[0] * beside, dy = normal[1] * beside;
-    const imp_spec jump = imp__look_through(d, to->px - dx, to->py - dy) -
-                          imp__look_through(d, to->px + dx, to->py + dy);
+    const double shift[2] = {normal[0] * beside, normal[1] * beside};
+    const imp_spec jump =
+        look_beside(d, to, bar, -1, shift) - look_beside(d, to, bar, 1, shift);
     if (imp__is_zero_used(jump, d->waves)) return;
     struct imp__flux *f = imp__flux_add(d, 2);
     if (!f) return;
@@ -72,6 +91,27 @@ void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to
     f->end[1] = imp__flux_camera(&at, -bar);
 }
 
+/* Is the edge's point hidden from o, r away? Its own faces do not hide it, but a ray along one may meet
+ * it anywhere. */
+static bool is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r)
+{
+    const struct imp_scene *scene = d->b->tracer->scene;
+    if (!d->edge) return imp__occluded_at(scene, 0, &o, &r, 0, 1 - IMP_BESIDE);
+    struct imp_hit hit;
+    double from = 0;
+    while (imp__intersect(scene, &o, &r, from, 1 - IMP_BESIDE, &hit)) {
+        bool own = false;
+        for (int k = 0; k < d->edge->n_faces; k++) {
+            const struct imp__edge_face *f =
+                &d->b->edges->face[d->edge->first + (size_t)k];
+            own |= f->shape == hit.shape && f->prim == hit.prim && f->place == hit.place;
+        }
+        if (!own) return true;
+        from = hit.t + 0.1 * IMP_BESIDE;
+    }
+    return false;
+}
+
 void imp__draw_film(struct imp__edge_draw *d)
 {
     const struct imp__boundary *b = d->b;
@@ -84,6 +124,6 @@ void imp__draw_film(struct imp__edge_draw *d)
         return;
     const imp_v3 r = imp__edge_clear(d) - to.p;
     if (imp__edge_merges(d, r, IMP_BESIDE * imp__length(r))) return;
-    if (imp__occluded_at(b->tracer->scene, 0, &to.p, &r, 0, 1 - IMP_BESIDE)) return;
+    if (is_hidden(d, to.p, r)) return;
     imp__film_jump(d, &to);
 }

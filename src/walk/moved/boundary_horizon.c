@@ -13,7 +13,7 @@ static void look(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 
     struct imp_sensor_ray ray = {.d = w, .t_near = 0, .t_far = INFINITY};
     ray.o = imp__offset(at->p, at->ng, up);
     imp__walk_along(d->b->tracer, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves,
-                    1, walk);
+                    1, NULL, walk);
 }
 
 /* Emission of a light that is met first, which moves with the light. */

@@ -70,6 +70,16 @@ imp_v3 imp__edge_clear(const struct imp__edge_draw *d);
  * is thinner than the look is apart from the rim, `beside` it: it sees what is beside the outline, which
  * has draws of its own. */
 bool imp__edge_merges(const struct imp__edge_draw *d, imp_v3 w, double beside);
+/* A walk from o to a hit of a triangle, behind `before` vertices: the point is as exact as its weights. */
+void imp__look_at(struct imp__edge_draw *d, imp_v3 o, struct imp_hit *hit, int before,
+                  struct imp_walk *walk);
+/* Past the edge's point as imp__edge_beside, from o: where its face is what a ray there meets, the walk
+ * begins at the face, next to the edge. False: no such face is met, or none is there. */
+bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, imp_v3 m, double apart,
+                         int before, struct imp_walk *walk);
+/* The point at which a look along w past the edge's point aims, on the side that the unit vector m, across
+ * both, points to, so far apart: of a face that is narrower there, a point of it. */
+imp_v3 imp__edge_beside(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m, double apart);
 /* A flux more, with room for n ends. NULL: no memory. */
 struct imp__flux *imp__flux_add(struct imp__edge_draw *d, int n);
 static inline struct imp__flux_end imp__flux_glued(const struct imp__glued *x, imp_v3 bar)

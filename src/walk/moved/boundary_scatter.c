@@ -33,7 +33,7 @@ void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_
     ray.o = imp__offset(at->p, at->ng, to - at->p);
     ray.d = imp__normalize(to - ray.o);
     imp__walk_along(d->b->tracer, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves,
-                    1, walk);
+                    1, NULL, walk);
 }
 
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
@@ -57,6 +57,14 @@ imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
     return any ? jump : NULL;
 }
 
+static void look_beside(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 m,
+                        double apart, struct imp_walk *walk)
+{
+    const imp_v3 r = d->p - at->p, o = imp__offset(at->p, at->ng, r);
+    if (imp__edge_face_look(d, o, m, apart, 1, walk)) return;
+    imp__look_from(d, at, imp__edge_beside(d, r, m, apart), walk);
+}
+
 void imp__draw_scatter(struct imp__edge_draw *d)
 {
     const struct imp__boundary *b = d->b;
@@ -76,11 +84,10 @@ void imp__draw_scatter(struct imp__edge_draw *d)
     if (!(sine > 0)) return;
     const imp_v3 m = turned * (1 / sine);
     const double apart = IMP_BESIDE * (hit.t + imp__length(d->p));
-    const imp_v3 beside = m * apart;
     if (imp__edge_merges(d, -w, apart)) return;
     struct imp_walk lo, hi;
-    imp__look_from(d, &at, d->p - beside, &lo);
-    imp__look_from(d, &at, d->p + beside, &hi);
+    look_beside(d, &at, -m, apart, &lo);
+    look_beside(d, &at, m, apart, &hi);
 
     int depths;
     const double times = (d->touches ? 1 : sine * 4 * IMP_PI) * d->inv_pdf;

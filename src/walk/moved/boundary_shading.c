@@ -216,11 +216,25 @@ static bool seen_point(struct imp__edge_draw *d, struct imp_hit *hit)
     return true;
 }
 
+#define NEXT 0.3 /* as of edges (boundary_beside.c) */
+
+/* How far the triangle goes on from a point of it along D, and against D. */
+static double room_along(const struct imp__glued *x, imp_v3 D)
+{
+    const double b1 = imp__dot(x->slope[0], D), b2 = imp__dot(x->slope[1], D);
+    const double rate[3] = {-b1 - b2, b1, b2};
+    double room = INFINITY;
+    for (int k = 0; k < 3; k++)
+        if (rate[k] != 0) room = imp_min(room, imp_max(x->b[k], 0.0) / fabs(rate[k]));
+    return room;
+}
+
 /* A point where the shading normal turns away from w, at which something is t away. */
 struct turning {
     struct imp__glued x;
     imp_v3 beside; /* to the lit side of it, so far that a look is not lost in rounding */
     double slope;  /* |grad g| */
+    imp_v3 next;   /* to that side, much nearer */
 };
 static bool turning_at(const struct imp__edge_draw *d, const struct imp_hit *hit,
                        const struct imp_surface *at, imp_v3 w, double t,
@@ -237,7 +251,26 @@ static bool turning_at(const struct imp__edge_draw *d, const struct imp_hit *hit
     const imp_v3 D = grad * (1 / out->slope), across = D - w * imp__dot(w, D);
     const double seen = imp__length(across);
     if (!(seen > IMP_GRAZING)) return false;
-    out->beside = D * (IMP_BESIDE * (t + imp__length(at->p)) / seen);
+    const double apart = IMP_BESIDE * (t + imp__length(at->p)) / seen;
+    const double room = 0.5 * room_along(&out->x, D);
+    out->beside = D * imp_min(apart, room);
+    out->next = D * imp_min(NEXT * apart * seen, room);
+    return true;
+}
+
+/* From o, beside the curve on the lit side (sign 1) or the dark one: where a ray there meets its
+ * triangle, the walk begins at it, next to the curve. */
+static bool look_next(struct imp__edge_draw *d, const struct turning *x, double sign,
+                      imp_v3 o, int before, struct imp_walk *walk)
+{
+    struct imp_hit hit;
+    const imp_v3 r = imp__normalize(x->x.p + x->beside * sign - o), by = x->next * sign;
+    if (!imp__intersect(d->b->tracer->scene, &o, &r, 0, INFINITY, &hit) ||
+        hit.shape != x->x.shape || hit.prim != x->x.prim || hit.place != 0)
+        return false;
+    hit.u = x->x.b[1] + imp__dot(x->x.slope[0], by);
+    hit.v = x->x.b[2] + imp__dot(x->x.slope[1], by);
+    imp__look_at(d, o, &hit, before, walk);
     return true;
 }
 
@@ -266,8 +299,12 @@ void imp__draw_shading_film(struct imp__edge_draw *d)
     if (!turning_at(d, &hit, &at, to.wo, t, &x)) return;
     if (!film_beside(d, at.p + x.beside, &lit) || !film_beside(d, at.p - x.beside, &dark))
         return;
-    const imp_spec jump =
-        imp__look_through(d, lit.px, lit.py) - imp__look_through(d, dark.px, dark.py);
+    struct imp_walk near;
+    imp_spec jump = look_next(d, &x, 1, to.p, 0, &near)
+                        ? near.values
+                        : imp__look_through(d, lit.px, lit.py);
+    jump -= look_next(d, &x, -1, to.p, 0, &near) ? near.values
+                                                 : imp__look_through(d, dark.px, dark.py);
     if (imp__is_zero_used(jump, d->waves)) return;
     struct imp__flux *f = imp__flux_add(d, 3);
     if (!f) return;
@@ -302,8 +339,10 @@ void imp__draw_shading_scatter(struct imp__edge_draw *d)
     if (!imp__intersect(scene, &o, &w, 0, INFINITY, &hit)) return;
     imp__hit_surface(scene, &hit, &o, &w, &at);
     if (!turning_at(d, &from, &p, w, imp__length(at.p - p.p), &x)) return;
-    imp__look_from(d, &at, p.p + x.beside, &lit);
-    imp__look_from(d, &at, p.p - x.beside, &dark);
+    const imp_v3 back = imp__offset(at.p, at.ng, -w);
+    if (!look_next(d, &x, 1, back, 1, &lit)) imp__look_from(d, &at, p.p + x.beside, &lit);
+    if (!look_next(d, &x, -1, back, 1, &dark))
+        imp__look_from(d, &at, p.p - x.beside, &dark);
     int depths;
     const double times = fabs(imp__dot(p.ng, w)) * IMP_2PI * d->inv_pdf;
     imp_spec *jump = imp__jumps(d, &lit, &dark, times, true, &depths);

@@ -186,3 +186,16 @@ void imp__walk_on_meter(struct imp_step *s)
     s->depth++;
     imp__walk_on(s);
 }
+
+void imp__walk_on_hit(struct imp_step *s, struct imp_hit *hit)
+{
+    struct imp_surface at;
+    struct imp_frame frame;
+    imp__step_numbers(s);
+    struct imp_vertex *v = imp__surface_meet(s, hit, &at, &frame);
+    if (!v || !arrive(s, v, hit, &at, &frame) ||
+        !imp__vertex_work(&sensor_end, s, v, hit, &at, &frame))
+        return;
+    s->depth++;
+    imp__walk_on(s);
+}
