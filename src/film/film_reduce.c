@@ -53,7 +53,8 @@ enum imp_status imp_film_reduce(const imp_film *film, int width, int height, dou
     IMP_FLOAT_MODE;
     imp_context *ctx = film->ctx;
     *out = NULL;
-    if (isnan(white)) return imp__error(ctx, IMP_E_ARG, "imp_film_reduce: white is nan");
+    if (!(white > -INFINITY))
+        return imp__error(ctx, IMP_E_ARG, "imp_film_reduce: white is %g", white);
     if (width < 1 || height < 1 || film->width % width || film->height % height)
         return imp__error(
             ctx, IMP_E_ARG,

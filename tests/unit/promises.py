@@ -202,7 +202,8 @@ NOT_NULLABLE = {"imp_bend_set_options.o", "imp_elements_fit.options",
 INPUT = {"imp_bend_adjoint.out"}  # structs of pointers to write to, not written themselves
 # Numbers that may be anything: a NaN is a documented value, infinity is a bound, or the
 # number is not used with the good arguments. What comes out must be finite all the same.
-ANY_NUMBER = {"imp_optimizer_step.lo": "infinite: none", "imp_optimizer_step.hi": "infinite: none",
+ANY_NUMBER = {"imp_film_reduce.white": "infinite: nothing is clipped",
+              "imp_optimizer_step.lo": "infinite: none", "imp_optimizer_step.hi": "infinite: none",
               "imp_bend_set_bounds.lo": "infinite: none", "imp_bend_set_bounds.hi": "infinite: none",
               "imp_bend_adjoint.taps": "there are none", "imp_bend_adjoint.tap_bars": "there are none",
               "imp_course_value.time": "a function of it", "imp_spectrum_value.nm": "a function of it",
@@ -417,7 +418,7 @@ class Fixture:
         if a.name == "dims": return C.addressof(self.array(C.c_size_t, 1, [1])), None
         if not a.pointer:
             scalars = {"fallback": 1., "fraction": 1., "seed": 1, "flags": 0, "size": 64 if function == "imp_scene_geometry_name" else 8, "width": 4, "height": 4, "channels": 3, "length": len(self.good(xml, function)[0]) if "load_string" in function else len(PARAM) + 4 if "set_text" in function else 0, "weight": 1., "order": 1,
-                       "index": 1.5 if a.ctype is C.c_double else 0, "cells": 1., "um": .5, "k": 1., "illuminance": 1.0, "background": 1., "confidence": .9, "a": 1., "b": 1.,
+                       "index": 1.5 if a.ctype is C.c_double else 0, "cells": 1., "um": .5, "k": 1., "illuminance": 1.0, "background": 1., "confidence": .9, "white": 1., "a": 1., "b": 1.,
                        "radius": 2., "rounds": 1, "bytes": 1 << 20, "hi": 3., "lo": 1., "value": 1.5 if a.ctype is C.c_double else 1,
                        "n_vertices": 3, "n_lamps": 1, "n_wants": 1, "n_moves": 1, "n_triangles": 1, "layers": 1, "nx": 1, "ny": 1, "nz": 1, "a": 1., "pilots": 2, "n_groups": 1, "low": .1, "high": .9,
                        "n": {"imp_scene_set_values": 1, "imp_scene_spectrum": 2, "imp_problem_nlopt": 3}.get(function, 1)}
