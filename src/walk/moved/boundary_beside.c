@@ -80,6 +80,15 @@ static void weights(const imp_v3 p[3], imp_v3 q, double b[2])
     b[1] = (aa * rb - ab * ra) / det;
 }
 
+bool imp__edge_face_hit(const struct imp__edge_draw *d, const struct imp__edge_face *f,
+                        const struct imp_hit *hit)
+{
+    /* An instance may have a material of its own, and with it a shape. */
+    return hit->prim == f->prim && hit->place == f->place &&
+           (hit->shape == f->shape ||
+            hit->shape == imp__placed_shape(d->b->tracer->scene, f->shape, f->place));
+}
+
 void imp__look_at(struct imp__edge_draw *d, imp_v3 o, struct imp_hit *hit, int before,
                   struct imp_walk *walk)
 {
@@ -104,7 +113,7 @@ bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, imp_v3 m, double ap
     const imp_v3 to = imp__normalize(imp__edge_beside(d, w, m, apart) - o);
     struct imp_hit hit;
     if (!imp__intersect(d->b->tracer->scene, &o, &to, 0, INFINITY, &hit) ||
-        hit.shape != f->shape || hit.prim != f->prim || hit.place != f->place)
+        !imp__edge_face_hit(d, f, &hit))
         return false;
     imp_v3 p[3];
     corners(d->b->tracer->scene, f, p);

@@ -101,11 +101,9 @@ static bool is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r)
     double from = 0;
     while (imp__intersect(scene, &o, &r, from, 1 - IMP_BESIDE, &hit)) {
         bool own = false;
-        for (int k = 0; k < d->edge->n_faces; k++) {
-            const struct imp__edge_face *f =
-                &d->b->edges->face[d->edge->first + (size_t)k];
-            own |= f->shape == hit.shape && f->prim == hit.prim && f->place == hit.place;
-        }
+        for (int k = 0; k < d->edge->n_faces; k++)
+            own |= imp__edge_face_hit(d, &d->b->edges->face[d->edge->first + (size_t)k],
+                                      &hit);
         if (!own) return true;
         from = hit.t + 0.1 * IMP_BESIDE;
     }

@@ -70,6 +70,9 @@ imp_v3 imp__edge_clear(const struct imp__edge_draw *d);
  * is thinner than the look is apart from the rim, `beside` it: it sees what is beside the outline, which
  * has draws of its own. */
 bool imp__edge_merges(const struct imp__edge_draw *d, imp_v3 w, double beside);
+/* Is a hit one of this face? */
+bool imp__edge_face_hit(const struct imp__edge_draw *d, const struct imp__edge_face *f,
+                        const struct imp_hit *hit);
 /* A walk from o to a hit of a triangle, behind `before` vertices: the point is as exact as its weights. */
 void imp__look_at(struct imp__edge_draw *d, imp_v3 o, struct imp_hit *hit, int before,
                   struct imp_walk *walk);
