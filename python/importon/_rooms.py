@@ -267,8 +267,7 @@ def glare_table(scene: Scene, luminaire: int = 0, *, spacing: float = .25, flux:
 
     Examples
     --------
-    >>> scene = importon.load_string('''<scene version="3.0.0"><integrator type="path"/><emitter type="ies">
-    ... <string name="filename" value="scenes/lamps/opal.ldt"/></emitter></scene>''')
+    >>> scene = importon.load_file("opal.ldt")
     >>> table = importon.glare_table(scene, flux=4000)
     >>> table.across.shape, round(float(table.across[10, 0]), 1)
     ((19, 5), 22.3)

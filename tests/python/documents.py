@@ -32,7 +32,7 @@ def examples(module, **more):
 
 
 def beside_scenes():
-    for name in ("cornell.xml", "cornell", "bend/rod.xml"):
+    for name in ("cornell.xml", "cornell", "bend/rod.xml", "lamps/opal.ldt"):
         source = os.path.join(SCENES, name)
         target = os.path.basename(name)
         if not os.path.exists(target):
