@@ -21,12 +21,12 @@ static enum imp_status grid_read(const struct imp_build *b, struct imp_sensor *s
     enum imp_status st = IMP_OK;
     struct imp_mat4 m;
     double o[3];
+    IMP_TRY(imp_build_transform(b, "grid", m.m));
     if (!imp_build_has(b, "origin"))
         IMP_TRY(imp_build_error(b, "grid", IMP_E_SCENE,
                                 "'origin' is missing: the observer who looks at the "
                                 "grid"));
     IMP_TRY(imp_build_vector(b, "origin", (double[3]){0, 0, 0}, o));
-    IMP_TRY(imp_build_transform(b, "grid", m.m));
     r->grid = true;
     r->o = vector_read(o);
     r->middle = imp__point(&m, imp__v3(0, 0, 0));
