@@ -6,9 +6,10 @@ direct_projective.
                                  [--integrators NAME,...] [--variant NAME] [--block welded|split|egg] [--json FILE]
 
 The scene is scenes/poses.xml with its block as a flat-shaded mesh of 8 vertices and 12 triangles (split: of 24
-vertices; egg: a ball of 1,280 triangles with vertex normals in its place), so that both have the same edges. The functional is the mean of the picture, its derivative one gradient of six numbers: translation
-and rotation vector about the middle of the block. One thread each; scenes are loaded and kernels compiled before,
-and the two take turns, seed by seed. Points are independent.
+vertices; egg: a ball of 1,280 triangles with vertex normals in its place), so that both have the same edges. The
+functional is the mean of the picture, its derivative one gradient of six numbers: translation and rotation vector
+about the middle of the block. One thread each; scenes are loaded and kernels compiled before, and the two take
+turns, seed by seed. Points are independent.
 
   truth      central differences of importon's pictures with common numbers, several seeds
   agrees     the mean of the seeds is within 3.5 standard errors (its own and the truth's) of the truth
@@ -23,16 +24,11 @@ import os
 import re
 import resource
 import subprocess
-import sys
 import tempfile
 
-try:
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-except ImportError as e:
-    print("SKIP: this python3 has no mitsuba or numpy (%s)" % e)
-    sys.exit(77)
+import needed
+
+dr, mi, np = needed.modules("drjit", "mitsuba", "numpy")
 
 here = os.path.dirname(os.path.abspath(__file__))
 root = os.path.dirname(os.path.dirname(here))
