@@ -353,7 +353,7 @@ def reduce(picture: Any, width: int, height: int, white: float = float("inf")) -
     --------
     >>> small = importon.reduce(np.array([[0.0, 0.5, 1.0, 1.0], [0.5, 1.0, 1.0, 1.0]]), 2, 1, white=1)
     >>> small.tolist()
-    [[nan, 1.0]]
+    [[[nan], [1.0]]]
     """
     if isinstance(picture, (str, bytes)) or hasattr(picture, "__fspath__"):
         picture = read(picture)
