@@ -811,7 +811,7 @@ struct imp_emitter_ops {
      * reads it, or, with `set`, puts the light there (a direction of any length), turned as it was.
      * NULL: another light. */
     void (*aim)(struct imp_emitter *e, double v[3], bool set);
-    /* Of an environment: the circles of directions towards the sky across which its radiance
+    /* The circles of directions towards an environment across which its radiance
      * jumps; returns how many. Elsewhere it is continuous, with a derivative by the direction almost
      * everywhere. NULL: it may jump anywhere, and derivatives by what moves are refused. */
     int (*jumps)(const struct imp_emitter *e, struct imp_sky_circle out[IMP_SKY_CIRCLES]);

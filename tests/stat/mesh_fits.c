@@ -9,7 +9,7 @@
 #include "math/vec.h"
 #include <string.h>
 
-enum { RINGS = 9, SIDES = 18, SPP = 16, STEPS = 16 };
+enum { RINGS = 9, SIDES = 18, SPP = 16, STEPS = 32 };
 #define VERTICES (RINGS * SIDES + 2)
 #define BALL     "mesh_fits.obj"
 #define STATE    "mesh_fits.checkpoint"
@@ -155,11 +155,11 @@ static void near_test(double *smooth)
     const size_t n = fit(p, &o, smooth, IMP_OK);
     tap_ok(n == 3 * VERTICES, "numbers # %zu", n);
     const double before = distance(start, n), after = distance(smooth, n);
-    tap_ok(after < 0.65 * before, "distance %.4f, from %.4f", after, before);
+    tap_ok(after < 0.5 * before, "distance %.4f, from %.4f", after, before);
     test_must(ctx, imp_problem_set_x(p, start));
     o.mesh_lambda = -1;
     fit(p, &o, single, IMP_OK);
-    tap_ok(after < 0.75 * distance(single, n), "steps of single vertices # %.4f",
+    tap_ok(after < 0.7 * distance(single, n), "steps of single vertices # %.4f",
            distance(single, n));
     o.mesh_lambda = 10;
     o.optimizer = IMP_LM;
@@ -210,6 +210,7 @@ static void seam_test(void)
     static double start[MOST], x[MOST];
     imp_scene *scene;
     struct imp_fit_options o = options(0);
+    o.max_iterations = 48; /* the held vertex is in the way of its neighbours */
     imp_problem *p = problem_of(ctx, true, &scene);
     imp_problem_get_x(p, start);
     test_must(ctx, imp_problem_hold(p, "ball.vertex_positions[6-8]"));
@@ -226,7 +227,7 @@ static void seam_test(void)
         }
     tap_ok(pairs == RINGS && apart == 0, "a seam stays closed # %d, %g", pairs, apart);
     /* A vertex near the top is held, and its neighbours with it. */
-    tap_ok(distance(x, n) < 0.85 * distance(start, n), "distance with a seam # %.4f",
+    tap_ok(distance(x, n) < 0.65 * distance(start, n), "distance with a seam # %.4f",
            distance(x, n));
     tap_ok(memcmp(x + 6, start + 6, 3 * sizeof *x) == 0, "a held vertex stays");
     test_must(ctx, imp_problem_hold(p, "ball.vertex_positions[9]"));

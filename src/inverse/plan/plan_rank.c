@@ -13,7 +13,7 @@
 
 #define SEED  0x91a2
 #define KNOWN 1e-6 /* the width of a number that is held, in large changes */
-#define APART 2.5  /* errors of a difference by which candidates can be told apart */
+#define APART 2.5  /* standard errors of a difference that is significant */
 
 struct plan {
     struct imp_problem *p, *blank;

@@ -15,7 +15,7 @@
  *
  *     sum_c (u_c^2 + 11 (v_c - v)^2) / 15 + v^2,   v = sum_c v_c / 15
  *
- * Of a mean v_c is 0, and that is s^2/16 exactly. Of a count that many hours near a bound change
+ * For a mean v_c is 0, and that is s^2/16 exactly. For a count that many hours near a bound change
  * together, u_c is consistent, since d_c is as large as the error of x (balanced half-samples:
  * McCarthy 1969; Shao and Wu 1992). A single hour at its bound is counted as 2 [e > 0] - P(e),
  * with e the normal error of x and P its distribution: the variance is 7/12, u_c^2 is 1/8 and
