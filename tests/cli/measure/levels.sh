@@ -9,7 +9,7 @@ open("mask.pgm", "wb").write(b"P5 24 18 255\n" + b"".join(rows))
 P
 fit() {
     importon fit "$SCENES/still.xml" -m mono -T right.ppm@1 --mask mask.pgm --clip auto -D right_exposure=3.4 -p right.pose \
-        --set right.pose=0.5,-0.2,0.2,0.14,0.13,0.1 --optimizer lm --spp 8 -o "$@" >/dev/null 2>&1
+        --set right.pose=0.5,-0.2,0.2,0.14,0.13,0.1 --optimizer lm --spp 16 -o "$@" >/dev/null 2>&1
     python3 - "$1/parameters.json" <<'P'
 import json
 import sys
