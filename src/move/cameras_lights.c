@@ -83,6 +83,8 @@ void imp__light_axis_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
         const struct imp__mover *m = &moves->mover[j];
         if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_AXIS)
             imp__move_vector_bar(theta_bar + m->first,
-                                 light_part(moves, m, imp__cross(turn_bar, m->axis)));
+                                 light_part(moves, m,
+                                            imp__cross(turn_bar, m->axis) +
+                                                m->twist * imp__dot(turn_bar, m->axis)));
     }
 }

@@ -3,6 +3,8 @@
  * Movers, the velocities that they give, and the transposes (moves.h). */
 #include "moves.h"
 #include "base/context.h"
+#include "kind/emitter/from_point.h"
+#include "kind/emitter/ies.h"
 
 struct imp__moves imp__moves_begin(const struct imp_scene *scene,
                                    const struct imp_sensor *sensor)
@@ -36,15 +38,18 @@ static enum imp_status light_mover(const struct imp__moves *moves, struct imp__m
 {
     struct imp_emitter *e = moves->scene->emitters[IMP_MOVE_EMITTER(m->shape)];
     double v[3];
-    if (!e->ops->aim || (m->kind == IMP_MOVE_AXIS && !e->ops->cone))
+    if (!e->ops->aim ||
+        (m->kind == IMP_MOVE_AXIS && !e->ops->cone && e->ops != &imp__ies_light))
         return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
                           "light '%s' (%s) has no derivative by its %s", e->name,
                           e->ops->name, m->kind == IMP_MOVE_AXIS ? "direction" : "place");
     e->ops->aim(e, v, false);
     m->count = 3;
     m->centre = m->axis = imp__v3(v[0], v[1], v[2]);
-    double cosine;
-    if (m->kind == IMP_MOVE_AXIS) e->ops->cone(e, &m->axis, &cosine);
+    if (m->kind == IMP_MOVE_AXIS) {
+        imp__pose_aim(e, IMP_POSE_DIRECTION, v);
+        m->axis = imp__v3(v[0], v[1], v[2]);
+    }
     return IMP_OK;
 }
 
@@ -95,6 +100,17 @@ enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kin
 
 /* ---- Parameters -------------------------------------------------------------------- */
 
+/* imp__mover.twist of a light's axis a. Opposite to z the frame may turn in any way: 0. */
+static imp_v3 twist_of(const struct imp_pose *pose, imp_v3 a)
+{
+    const void *rest = pose->object->rest;
+    const imp_v3 z = pose->emitter->ops == &imp__ies_light
+                         ? ((const struct imp__ies *)rest)->nadir
+                         : ((const struct imp__light_frame *)rest)->axis[2];
+    const double sum = 1 + imp__dot(z, a);
+    return sum > 1e-9 ? imp__cross(z, a) * (-1 / sum) : (imp_v3){0};
+}
+
 enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_pose *pose)
 {
     static const enum imp__move_kind kind[IMP_POSE_KINDS] = {
@@ -126,6 +142,7 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
     if (pose->kind == IMP_POSE_DIRECTION)
         m->rate =
             1 / imp__length(imp__v3(pose->number[0], pose->number[1], pose->number[2]));
+    if (turns) m->twist = twist_of(pose, m->axis);
     return IMP_OK;
 }
 

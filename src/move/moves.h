@@ -11,7 +11,9 @@
  *               (1 each)
  *     light     a point light's position V = e, or the direction d of parallel light, of any
  *               length |d|: the unit direction turns by  e/|d| across d (3)
- *     axis      of a spot, by a direction of any length, likewise (3)
+ *     axis      of a spot or ies light, by a direction of any length, likewise (3); the frame turns
+ *               as little as possible from where the file has its axis, z:
+ *                   a x a' - a (z x a).a'/(1 + z.a)
  *
  * e: a translation in scene units; a: a rotation vector in radians. Velocities are linear in the
  * numbers; each function that applies the map has its transpose beside it. The geometric normal is
@@ -44,8 +46,9 @@ struct imp__mover {
     enum imp__move_kind kind;
     int shape; /* index in the scene, IMP_MOVE_CAMERA, or IMP_MOVE_EMITTER(k) */
     imp_v3 centre;
-    imp_v3 axis;            /* of a spot; of parallel light its direction; unit */
-    double rate;            /* the velocities' factor */
+    imp_v3 axis;  /* of a spot or ies light; of parallel light its direction; unit */
+    imp_v3 twist; /* of such an axis: a' turns its frame about it by twist.a' */
+    double rate;  /* the velocities' factor */
     size_t first, count;    /* its numbers */
     struct imp__fans *fans; /* of vertices with normals; else NULL */
 };

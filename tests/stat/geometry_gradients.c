@@ -27,6 +27,38 @@ static void block_write(void)
     fclose(f);
 }
 
+#define DIRECT "<integrator type='direct'/>"
+#define PATH   "<integrator type='path'><integer name='max_depth' value='3'/></integrator>"
+
+static char table_file[] = "/tmp/geometry_XXXXXX.ies",
+            dark_file[] = "/tmp/geometry_XXXXXX.ies";
+
+/* Another plane at each right angle; `last`: what is left at 90 degrees. */
+static void table_write(char *name, int last)
+{
+    const int fd = mkstemps(name, 4);
+    FILE *f = fdopen(fd, "w");
+    fputs("IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 5 5 1 2 0 0 0\n1 1 0\n"
+          "0 20 45 65 90\n0 90 180 270 360\n",
+          f);
+    for (int k = 0; k < 5; k++)
+        fprintf(f, "9000 %d %d %d %d\n", 9000 - 900 * (k % 4), 8000 - 1700 * (k % 4),
+                4000 + 900 * (k % 4), last);
+    fclose(f);
+}
+
+/* The light `bulb` by that table. */
+static const char *luminaire(const char *name)
+{
+    static char text[512];
+    snprintf(text, sizeof text,
+             PATH "<emitter type='ies' id='bulb'><string name='filename' value='%s'/>"
+                  "<transform name='to_world'><rotate z='1' angle='25'/><rotate x='1' "
+                  "angle='14'/><translate x='1.2' y='-1' z='2.5'/></transform></emitter>",
+             name);
+    return text;
+}
+
 /* A floor, a wall and the block, and REST: lights, integrator. */
 static imp_scene *room(const char *rest)
 {
@@ -171,8 +203,6 @@ static void refused(const char *rest, const char *name, const char *word)
     imp_scene_destroy(scene);
 }
 
-#define DIRECT "<integrator type='direct'/>"
-#define PATH   "<integrator type='path'><integer name='max_depth' value='3'/></integrator>"
 #define LAMP                                                                             \
     "<shape type='rectangle' id='lamp'><transform name='to_world'><scale x='.5' "        \
     "y='.7'/><rotate x='1' angle='170'/><translate x='.9' y='-.2' z='3.2'/></transform>" \
@@ -196,6 +226,24 @@ static void refused(const char *rest, const char *name, const char *word)
 #define SUN                                                                              \
     "<emitter type='directional' id='sun'><vector name='direction' x='-.8' y='.3' "      \
     "z='-1.6'/><rgb name='irradiance' value='3,2.5,2'/></emitter>"
+
+/* It becomes a parameter, and has no derivative. */
+static void moved_refused(const char *rest, const char *name, const char *word)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    imp_scene *scene = room(rest);
+    imp_problem *p;
+    double g[NUMBERS_MAX], se[NUMBERS_MAX];
+    test_must(ctx, imp_scene_add_geometry(scene, name));
+    test_must(ctx, imp_problem_create(scene, &p));
+    test_must(ctx, imp_problem_activate(p, name));
+    run.spp = 4;
+    const enum imp_status st = imp_problem_reverse(p, adjoint, &run, g, se);
+    tap_ok(st == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), word), "refused # %s",
+           imp_last_error(ctx));
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+}
 
 int main(int argc, char **argv)
 {
@@ -243,6 +291,14 @@ int main(int argc, char **argv)
                                          {"bulb.position", 2, .03},
                                          {"block.pose", 0, .03},
                                          {NULL, 0, 0}},
+                               aimed[] = {{"bulb.position", 0, .03},
+                                          {"bulb.position", 2, .03},
+                                          {"bulb.direction", 0, .01},
+                                          {"bulb.direction", 1, .01},
+                                          {NULL, 0, 0}},
+                               leaning[] = {{"bulb.direction", 0, -.4},
+                                            {"bulb.direction", 1, .5},
+                                            {NULL, 0, 0}},
                                ball[] = {{"ball.pose", 0, .03},   {"ball.pose", 1, .03},
                                          {"ball.pose", 2, .03},   {"ball.scale", 0, .03},
                                          {"block.pose", 0, .03},  {"camera.pose", 0, .03},
@@ -267,6 +323,8 @@ int main(int argc, char **argv)
     if (!is_long) seeds = 6, groups = 12;
     ctx = test_context(2);
     block_write();
+    table_write(table_file, 0);
+    table_write(dark_file, 300);
     adjoint_make();
     room_test("view", DIRECT LAMP, view, turned, 0.04, 64, 64);
     room_test("lens", DIRECT LAMP, lens, bent, 0.04, 64, 64);
@@ -274,6 +332,7 @@ int main(int argc, char **argv)
     room_test("corners", DIRECT LAMP, corners, NULL, 0.03, 64, 24);
     room_test("bulb", PATH BULB, bulb, NULL, 0.03, 64, 24);
     if (is_long) room_test("spot", DIRECT SPOT, bulb, NULL, 0.03, 64, 24);
+    room_test("luminaire", luminaire(table_file), aimed, leaning, 0.03, 64, 24);
     if (is_long) room_test("bulb and lamp", DIRECT BULB LAMP, bulb, NULL, 0.04, 64, 24);
     room_test("sun", PATH SUN, sun, NULL, 0.03, 64, 24);
     if (is_long) room_test("ball", DIRECT BALL LAMP, ball, NULL, 0.1, 128, 32);
@@ -286,7 +345,10 @@ int main(int argc, char **argv)
     refused(DIRECT LAMP, "floor.vertex_positions", "no mesh");
     refused(DIRECT BULB, "bulb.direction", "bulb");
     refused(DIRECT BULB, "block.colour", "pose");
+    moved_refused(luminaire(dark_file), "bulb.position", "still has light");
     remove(block_file);
+    remove(table_file);
+    remove(dark_file);
     imp_context_destroy(ctx);
     return tap_done();
 }

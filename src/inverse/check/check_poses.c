@@ -7,6 +7,7 @@
  * What jumps at edges is not in it: fresh rows have that. */
 #include "check.h"
 #include "inverse/estimate/moved_gradient.h"
+#include "kind/emitter/ies.h"
 #include "scene/pose.h"
 #include "walk/core/vertex.h"
 #include "walk/moved/moved_chain.h"
@@ -257,13 +258,14 @@ static double light_ratio(const struct moved *m, const struct imp_vertex *v,
     return receives(x, there.p, there.n) / receives(old->p, y.p, y.n);
 }
 
-/* Has it light of a spot, whose beam changes across its cone? */
+/* Has it light of a spot or ies light, whose intensity changes with the direction? */
 static bool has_spots(const struct imp_scene *scene, const struct imp_walk *walk)
 {
-    for (const struct imp_vertex *v = walk->first; v; v = v->next)
-        if (v->d.connection == IMP_CONNECTED &&
-            scene->emitters[v->d.light.emitter]->ops->cone)
-            return true;
+    for (const struct imp_vertex *v = walk->first; v; v = v->next) {
+        if (v->d.connection != IMP_CONNECTED) continue;
+        const struct imp_emitter_ops *ops = scene->emitters[v->d.light.emitter]->ops;
+        if (ops->cone || ops == &imp__ies_light) return true;
+    }
     return false;
 }
 

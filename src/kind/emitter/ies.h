@@ -31,6 +31,8 @@ struct imp__ies {
 
 /* Intensity along w (world, unit, away from the light), at scale 1. */
 double imp__ies_intensity(const struct imp__ies *x, imp_v3 w);
+/* Where its table jumps as a function of direction, for a message; NULL: nowhere. */
+const char *imp__ies_jump(const struct imp_ies_data *d);
 /* The frame of `from`, turned as little as possible until its nadir is along `to`. */
 void imp__ies_turn(struct imp__ies *x, const struct imp__ies *from, imp_v3 to);
 /* Int I dw, at scale 1, in lm (or W). */

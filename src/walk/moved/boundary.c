@@ -3,6 +3,7 @@
  * Draws of the boundary, and what they bring as derivatives (boundary.h). */
 #include "base/arguments.h"
 #include "boundary_parts.h"
+#include "kind/emitter/ies.h"
 #include "moved_sky.h"
 #include "scene/camera_gain.h"
 #include "scene/pose.h"
@@ -174,7 +175,8 @@ static double light_power(const struct imp__boundary *b, int k)
     if (b->tracer->wavelengths)
         imp__input_most(e->input[0], &nowhere.p, &nowhere.p, &in[0]);
     else imp__inputs_eval(e->input, e->n_in, &nowhere, in);
-    const double size = e->shape                          ? e->shape->area
+    const double size = e->shape                    ? e->shape->area
+                        : e->ops == &imp__ies_light ? imp__ies_flux(e->self) * IMP_INV_PI
                         : e->ops->flags & IMP_EMITTER_FAR ? across
                                                           : 4;
     return size * imp__max_used(in[0], scene->lanes == 4);

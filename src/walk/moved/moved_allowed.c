@@ -2,6 +2,7 @@
  *
  * What has a derivative by what moves that is whole, and what is refused by name (moved.h). */
 #include "base/context.h"
+#include "kind/emitter/ies.h"
 #include "moved.h"
 #include "moved_kernel.h"
 #include "scene/instances.h"
@@ -46,10 +47,17 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
         const bool sky = e->ops->flags & IMP_EMITTER_ENVIRONMENT;
         if (sky ? !e->ops->jumps
                 : e->ops != &imp__area && e->ops != &imp__point_light &&
-                      e->ops != &imp__spot_light && e->ops != &imp__directional)
+                      e->ops != &imp__spot_light && e->ops != &imp__directional &&
+                      e->ops != &imp__ies_light)
             return refuse(t, "light", e->name, e->ops->name,
                           sky ? "does not say where its radiance jumps"
-                              : "is none of area, point, spot, directional and skies");
+                              : "is none of area, point, spot, directional, ies without "
+                                "a shape, and skies");
+        if (e->ops == &imp__ies_light) {
+            const struct imp__ies *x = e->self;
+            const char *jump = imp__ies_jump(x->data);
+            if (jump) return refuse(t, "the table of light", e->name, e->ops->name, jump);
+        }
         if (!sky && (e->shaped || is_textured(e->input, e->n_in)))
             return refuse(t, "light", e->name, e->ops->name, "has a texture");
         if (e->shape && e->shape->geometry != IMP_TRIANGLES &&
