@@ -5,6 +5,7 @@
  * one edge with the faces of all sides that cover it. */
 #include "base/context.h"
 #include "edges.h"
+#include "kind/sensor/receiver.h"
 #include <stdlib.h>
 
 #define NEAR 2e-6 /* of the scene's size: sides nearer to each other lie on each other */
@@ -63,7 +64,9 @@ static void shape_add(struct building *x, int shape, int64_t place,
                       const struct imp_map *to_world)
 {
     const struct imp_triangles *t = &x->scene->shapes[shape]->triangles;
-    if (x->scene->shapes[shape]->geometry != IMP_TRIANGLES) return;
+    if (x->scene->shapes[shape]->geometry != IMP_TRIANGLES ||
+        imp__shape_is_absent(x->scene->shapes[shape]))
+        return;
     for (size_t j = 0; j < t->n_triangles; j++) {
         const struct imp__edge_face face = {
             .shape = shape, .prim = (int)j, .place = place};
@@ -98,7 +101,7 @@ static enum imp_status sides_count(const struct building *x, size_t *n)
     *n = 0;
     for (int k = 0; k < imp__shapes_outside(scene); k++) {
         const struct imp_shape *s = scene->shapes[k];
-        if (imp__moves_curved(scene, k)) continue;
+        if (imp__moves_curved(scene, k) || imp__shape_is_absent(s)) continue;
         if (s->smooth && !imp__moves_smooth(scene, k))
             return refuse(x, s, "has normals of its own over its triangles");
         if (s->geometry != IMP_TRIANGLES) return refuse(x, s, "is none");

@@ -3,6 +3,7 @@
  * Curved shapes and the edges of a scene (edges.h): where surfaces pass through each other, and rims
  * that lie on each other. */
 #include "edges.h"
+#include "kind/sensor/receiver.h"
 #include "math/offset.h"
 
 #define TOUCH 1e-5 /* of a sphere's radius: nearer surfaces touch it */
@@ -70,7 +71,7 @@ static int segment_pierces(const struct imp_scene *scene, int k, int but, imp_v3
 static int rims_pierced(const struct imp_scene *scene, int *other)
 {
     for (int k = 0; k < imp__shapes_outside(scene); k++) {
-        const int rims = imp__rims(scene, k);
+        const int rims = imp__shape_is_absent(scene->shapes[k]) ? 0 : imp__rims(scene, k);
         int beside = -1, unused;
         *other = k;
         for (int j = 0; j < rims * CHORDS; j++) {
@@ -130,7 +131,8 @@ static int spheres_pierced(const struct imp_scene *scene, int *other)
         struct imp_round round;
         if (!imp__moves_sphere(scene, k, &round)) continue;
         for (int j = 0; j < imp__shapes_outside(scene); j++)
-            if (j != k && meets_sphere(scene, j, &round)) {
+            if (j != k && !imp__shape_is_absent(scene->shapes[j]) &&
+                meets_sphere(scene, j, &round)) {
                 *other = j;
                 return k;
             }

@@ -4,6 +4,7 @@
 #include "access.h"
 #include "base/arguments.h"
 #include "instances.h"
+#include "kind/sensor/receiver.h"
 #include "kind/shape/shape.h"
 #include "pose.h"
 #include "theta_near.h"
@@ -56,6 +57,8 @@ static const char *shape_why(const struct imp_scene *scene, const struct imp_sha
         return "there are media";
     if (scene->light_tree) return "lights are chosen by a tree (light_choice)";
     if (scene->aims.aimed) return "directions are aimed at shapes";
+    if (s->sensor && s->sensor->receiver)
+        return "its meter is a grid, or not there, and stays where it is";
     if (s->placed || s->by_triangle) return "its textures need more than uv";
     return NULL;
 }

@@ -8,6 +8,7 @@
 #include "check.h"
 #include "inverse/estimate/moved_gradient.h"
 #include "kind/emitter/ies.h"
+#include "kind/sensor/receiver.h"
 #include "scene/pose.h"
 #include "walk/core/vertex.h"
 #include "walk/moved/moved_chain.h"
@@ -199,6 +200,13 @@ static void looked_up(const struct moved *m, const struct imp_vertex *v, imp_v3 
     imp__inputs_eval(v->bsdf->input, v->bsdf->n_in, &at, in);
 }
 
+/* The density of directions of a meter that stays. */
+static double received(const struct moved *m, imp_v3 w)
+{
+    const struct imp_receiver *r = m->c->tracer.sensor->receiver;
+    return imp__receiver_density(r, imp__to_local(&r->frame, w));
+}
+
 /* The kernel of a vertex, now at x, over that at its recorded place, by lanes: between o and w, unit,
  * now and then. */
 static imp_spec kernel_ratio(const struct moved *m, const struct imp_vertex *v,
@@ -206,7 +214,10 @@ static imp_spec kernel_ratio(const struct moved *m, const struct imp_vertex *v,
                              const imp_v3 w[2], const struct imp__glued *then, int lobe)
 {
     imp_spec in[IMP_INPUTS_MAX];
-    if (imp__is_plain(v->bsdf))
+    const bool meter = v->prev && v->prev->d.scatterer == IMP_AT_SENSOR;
+    if (meter && m->c->tracer.sensor->receiver)
+        return imp__spec(received(m, w[0]) / received(m, w[1]));
+    if (meter || imp__is_plain(v->bsdf))
         return imp__spec(imp__dot(now->shade, w[0]) /
                          imp__dot(imp__shading_normal(then), w[1]));
     imp_spec K[2];
@@ -283,6 +294,12 @@ static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spe
                                 v->carried),
             scene->lanes);
     }
+    const bool meter = v->d.scatterer == IMP_AT_SENSOR;
+    if (meter) {
+        P *= v->w;
+        v = v->next;
+        if (!v) return 0;
+    }
     struct imp__glued old = vertex_glued(scene, v, walk->time);
     imp_v3 o = walk->ray.o, w[2];
     w[0] = w[1] = imp__normalize(old.p - o);
@@ -291,7 +308,7 @@ static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spe
         w[0] = turned(m, w[0]);
     }
     struct at here = placed(m, &old);
-    imp_v3 x = met_at(o, w[0], &here);
+    imp_v3 x = meter ? here.p : met_at(o, w[0], &here);
     here.shade = old.smooth ? shaded_at(m, &old, x) : here.n;
     for (; v; v = v->next) {
         const imp_v3 from[2] = {w[0], w[1]};

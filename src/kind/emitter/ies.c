@@ -28,7 +28,6 @@
 #include "kind/shape/shape.h"
 #include "math/transform.h"
 #include "math/trig.h"
-#include <string.h>
 
 #define FACETS_MAX   64
 #define PER_WATT     683.0 /* lm/W at 555 nm, by which the candela is defined */
@@ -113,26 +112,30 @@ double imp__ies_intensity(const struct imp__ies *x, imp_v3 w)
     return x->factor * (cd[0] + f * (cd[1] - cd[0]));
 }
 
-/* Has one plane of angles h light at vertical angle k? */
-static bool is_lit(const struct imp_ies_data *d, int k)
+/* Does a value differ from 0 by more than what files round? */
+static bool is_light(double value, double largest)
 {
-    for (int j = 0; j < d->n_horizontal; j++)
-        if (d->candela[(size_t)j * (size_t)d->n_vertical + (size_t)k] > 0) return true;
-    return false;
+    return fabs(value) > 1e-6 * largest;
 }
 
 const char *imp__ies_jump(const struct imp_ies_data *d)
 {
     const int n = d->n_vertical, m = d->n_horizontal;
-    const double *seam = d->candela + (size_t)(m - 1) * (size_t)n;
+    double most = 0, ends = 0, seam = 0;
     if (d->type != IMP_PHOTOMETRY_C) return "is of type A or B";
-    if ((d->vertical[0] > 0 && is_lit(d, 0)) ||
-        (d->vertical[n - 1] < 180 && is_lit(d, n - 1)))
+    for (int k = 0; k < n * m; k++) most = imp_max(most, d->candela[k]);
+    for (int j = 0; j < m; j++) {
+        const double *plane = d->candela + (size_t)j * (size_t)n;
+        if (d->vertical[0] > 0) ends = imp_max(ends, plane[0]);
+        if (d->vertical[n - 1] < 180) ends = imp_max(ends, plane[n - 1]);
+    }
+    if (is_light(ends, most))
         return "ends at a vertical angle at which it still has light";
-    if (m > 1 && d->horizontal[m - 1] == 360 &&
-        memcmp(seam, d->candela, (size_t)n * sizeof *seam) != 0)
-        return "has two planes at the horizontal angles 0 and 360";
-    return NULL;
+    for (int k = 0; k < n && m > 1 && d->horizontal[m - 1] == 360; k++)
+        seam = imp_max(seam, fabs(d->candela[k] -
+                                  d->candela[(size_t)(m - 1) * (size_t)n + (size_t)k]));
+    return is_light(seam, most) ? "has two planes at the horizontal angles 0 and 360"
+                                : NULL;
 }
 
 /* ---- The surface --------------------------------------------------------------- */

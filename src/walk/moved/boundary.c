@@ -4,6 +4,7 @@
 #include "base/arguments.h"
 #include "boundary_parts.h"
 #include "kind/emitter/ies.h"
+#include "kind/sensor/receiver.h"
 #include "moved_sky.h"
 #include "scene/camera_gain.h"
 #include "scene/pose.h"
@@ -93,6 +94,7 @@ static enum imp_status items_find(struct imp__boundary *b)
     if (!b->item) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
     circles_find(b);
     for (int k = 0; k < imp__shapes_outside(scene); k++) {
+        if (imp__shape_is_absent(scene->shapes[k])) continue;
         if (imp__moves_curved(scene, k)) b->item[b->n_items++] = round_item(scene, k);
         if (!imp__moves_smooth(scene, k)) continue;
         for (int i = 0; i < 2; i++) {
@@ -188,10 +190,16 @@ static enum imp_status lights_make(struct imp__boundary *b)
     double sum = 0;
     b->light_cdf =
         imp__alloc(scene->ctx, (size_t)scene->n_emitters + 1, sizeof *b->light_cdf);
-    if (!b->light_cdf) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for lights");
+    b->drawn =
+        imp__alloc(scene->ctx, 2 * (size_t)scene->n_emitters + 1, sizeof *b->drawn);
+    if (!b->light_cdf || !b->drawn)
+        return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for lights");
+    b->drawn_to_meter = b->drawn + scene->n_emitters;
     for (int k = 0; k < scene->n_emitters; k++) {
         const bool sky = scene->emitters[k]->ops->flags & IMP_EMITTER_ENVIRONMENT;
-        if (!sky || imp__sky_has_draws(scene, k)) {
+        b->drawn[k] = sky && imp__sky_has_draws(scene, k);
+        b->drawn_to_meter[k] = b->drawn[k] && imp__sky_is_narrow(b->tracer, k);
+        if (!sky || b->drawn[k]) {
             sum += light_power(b, k);
             b->n_lights++;
         }
@@ -211,7 +219,9 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
     *out = (struct imp__boundary){.tracer = tracer, .moves = moves, .edges = edges};
     out->size = imp__length(scene->hi - scene->lo);
     enum imp_status st = imp__moved_allowed(tracer);
-    imp__pinhole(tracer->sensor, &out->camera);
+    if (tracer->sensor->shape) /* by which edges are chosen: the middle of a meter */
+        out->camera = (tracer->sensor->shape->lo + tracer->sensor->shape->hi) * 0.5;
+    else imp__pinhole(tracer->sensor, &out->camera);
     if (st == IMP_OK) st = imp__boundary_allowed(out);
     if (st == IMP_OK) st = lights_make(out);
     if (st == IMP_OK) st = choices_make(out);
@@ -221,6 +231,7 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
 void imp__boundary_free(struct imp__boundary *b)
 {
     if (b->tracer) imp__release(b->tracer->scene->ctx, b->light_cdf);
+    if (b->tracer) imp__release(b->tracer->scene->ctx, b->drawn);
     for (int k = 0; k < IMP_BOUNDARY_KINDS; k++) {
         imp__edge_choice_free(&b->choice[k]);
         if (b->tracer) imp__release(b->tracer->scene->ctx, b->part[k]);
@@ -267,6 +278,10 @@ static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
     const enum imp__edge_item_kind item = d->item ? d->item->kind : IMP_ITEM_ROUND;
     switch (kind) {
     case IMP_BOUNDARY_FILM:
+        if (d->b->tracer->sensor->shape) {
+            imp__draw_meter(d);
+            break;
+        }
         if (item == IMP_ITEM_ROUND) imp__draw_film(d);
         if (item == IMP_ITEM_SHADING) imp__draw_shading_film(d);
         if (item == IMP_ITEM_SKY) imp__draw_sky_film(d);

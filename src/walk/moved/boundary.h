@@ -43,7 +43,8 @@
  * camera, or the walk goes on from x by transposed kernels and is connected from there: a walk
  * from an edge is a walk from a light with a sign. Points on edges are chosen by what a pilot has
  * found (move/edge_choice.h); those between a light and what it lights among the silhouettes seen
- * from the light's point. */
+ * from the light's point. A meter sees edges from a point of its own in each draw, and that point
+ * moves with its shape (boundary_meter.c). */
 #ifndef IMP_WALK_BOUNDARY_H
 #define IMP_WALK_BOUNDARY_H
 
@@ -94,6 +95,8 @@ struct imp__boundary {
     double size;   /* of the scene */
     int n_lights;
     double *light_cdf; /* [n_emitters] of those that have draws, by power; last is 1 */
+    /* [n_emitters] skies that have draws, and of these what a meter does not see by chance. */
+    bool *drawn, *drawn_to_meter;
 };
 
 /* A velocity on which a flux depends: of a glued point, of what the camera makes of one, or of a

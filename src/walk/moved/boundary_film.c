@@ -91,9 +91,7 @@ void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to
     f->end[1] = imp__flux_camera(&at, -bar);
 }
 
-/* Is the edge's point hidden from o, r away? Its own faces do not hide it, but a ray along one may meet
- * it anywhere. */
-static bool is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r)
+bool imp__edge_is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
     if (!d->edge) return imp__occluded_at(scene, 0, &o, &r, 0, 1 - IMP_BESIDE);
@@ -122,6 +120,6 @@ void imp__draw_film(struct imp__edge_draw *d)
         return;
     const imp_v3 r = imp__edge_clear(d) - to.p;
     if (imp__edge_merges(d, r, IMP_BESIDE * imp__length(r))) return;
-    if (is_hidden(d, to.p, r)) return;
+    if (imp__edge_is_hidden(d, to.p, r)) return;
     imp__film_jump(d, &to);
 }

@@ -54,7 +54,7 @@ void imp__draw_horizon(struct imp__edge_draw *d)
     emission_reach(d, &hit, &at, &x, &above, w, times);
     emission_reach(d, &hit, &at, &x, &below, w, -times);
     int depths;
-    imp_spec *jump = imp__jumps(d, &above, &below, times, true, &depths);
+    imp_spec *jump = imp__jumps(d, &above, &below, times, NULL, &depths);
     if (!jump) return;
     struct imp__edge_light light = {
         .w = -w, .light = jump[0], .horizon = true, .n_ends = 1};

@@ -89,6 +89,28 @@ static int round_side(const struct imp__edge_draw *d, imp_v3 m)
     return (imp__dot(m, wall) > 0 ? 1 : -1) == side ? side : 0;
 }
 
+/* A line past the edge. */
+struct line {
+    const struct source *from;
+    imp_v3 m;
+    double t_y;
+};
+
+/* The ends of a flux to a point so far behind the edge. */
+static void ends_set(const struct imp__edge_draw *d, const struct line *l, double t_x,
+                     struct imp__edge_light *light)
+{
+    const bool parallel = l->from->parallel;
+    const double far = parallel ? 1 : l->t_y / (t_x + l->t_y); /* of V_line that is x' */
+    const struct imp__glued edge = imp__edge_carried(d);
+    light->slide = l->m * -far;
+    light->end[0] = imp__flux_glued(&edge, l->m);
+    light->n_ends = 1;
+    if (!l->from->sky) /* which stays */
+        light->end[light->n_ends++] =
+            source_end(d, l->from, l->m * (parallel ? t_x : far - 1));
+}
+
 void imp__draw_light(struct imp__edge_draw *d)
 {
     const struct imp__boundary *b = d->b;
@@ -116,20 +138,22 @@ void imp__draw_light(struct imp__edge_draw *d)
     if (imp__edge_merges(d, to, beside)) return;
     struct imp_hit hit;
     struct imp_surface at;
-    if (!imp__intersect(scene, &o, &to, 0, INFINITY, &hit)) return;
-    if (hit.t < 1 + IMP_CONTACT * b->size / t_y) return;
-    imp__hit_surface(scene, &hit, &o, &to, &at);
+    const bool meets = imp__intersect(scene, &o, &to, 0, INFINITY, &hit);
+    if (meets && hit.t < 1 + IMP_CONTACT * b->size / t_y) return;
 
     const imp_spec le = sent(d, &s, cosine, imp__normalize(to));
-    const double t_x = imp__length(at.p - d->p);
-    const double far = s.parallel ? 1 : t_y / (t_x + t_y); /* of V_line that is x' */
     const double spread = s.parallel ? 1 : t_y * t_y;
-    struct imp__edge_light light = {.w = imp__normalize(to), .behind = 1, .n_ends = 2};
+    struct line line = {&s, m, t_y};
+    struct imp__edge_light light = {.w = imp__normalize(to), .behind = 1};
     light.light = le * (-cosine * sine * d->inv_pdf / (spread * s.density));
-    light.slide = m * -far;
-    const struct imp__glued edge = imp__edge_carried(d);
-    light.end[0] = imp__flux_glued(&edge, m);
-    if (s.sky) light.n_ends = 1; /* it stays */
-    else light.end[1] = source_end(d, &s, m * (s.parallel ? t_x : far - 1));
+    struct imp__meter_point x;
+    if (b->tracer->sensor->shape && (!s.sky || b->drawn_to_meter[s.light]) &&
+        imp__meter_meet(d, o, to, meets ? &hit : NULL, &x)) {
+        ends_set(d, &line, imp__length(x.at.p - d->p), &light);
+        imp__meter_reach(d, &x, &light);
+    }
+    if (!meets) return;
+    imp__hit_surface(scene, &hit, &o, &to, &at);
+    ends_set(d, &line, imp__length(at.p - d->p), &light);
     imp__edge_reach(d, &hit, &at, &light);
 }

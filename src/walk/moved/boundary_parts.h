@@ -41,8 +41,9 @@ enum {
     IMP_EDGE_WALK
 };
 enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
-#define IMP_EDGE_LOBE (1u << 20) /* behind all of those: by which a lobe is chosen */
-#define IMP_EDGE_WAVE (1u << 21) /* and from which wavelengths are drawn */
+#define IMP_EDGE_LOBE   (1u << 20) /* behind all of those: by which a lobe is chosen */
+#define IMP_EDGE_WAVE   (1u << 21) /* and from which wavelengths are drawn */
+#define IMP_EDGE_SENSOR (1u << 22) /* four, of a meter's point */
 
 /* So far beside an edge, per distance to it, it is looked past; rays are traced in float, whose
  * rounding is a tenth of that. */
@@ -70,6 +71,9 @@ imp_v3 imp__edge_clear(const struct imp__edge_draw *d);
  * is thinner than the look is apart from the rim, `beside` it: it sees what is beside the outline, which
  * has draws of its own. */
 bool imp__edge_merges(const struct imp__edge_draw *d, imp_v3 w, double beside);
+/* Is the edge's point hidden from o, r away? Its own faces do not hide it, but a ray along one may meet
+ * it anywhere. */
+bool imp__edge_is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r);
 /* Is a hit one of this face? */
 bool imp__edge_face_hit(const struct imp__edge_draw *d, const struct imp__edge_face *f,
                         const struct imp_hit *hit);
@@ -99,18 +103,18 @@ imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py)
 /* The flux of a jump of the picture where the draw's point is seen; of a circle of a sky, with the
  * point d->p at the distance 1 from the camera. */
 void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to);
-/* What a vertex at a hit sees towards a place. */
+/* What a vertex at a hit sees towards a place, behind `before` vertices. */
 void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 to,
-                    struct imp_walk *walk);
+                    int before, struct imp_walk *walk);
 /* What arrives along a recorded walk from a vertex x, without the emission of a light that it
- * meets first, which is glued to that; of skies that have draws of their own only with `skies`.
+ * meets first, which is glued to that, and of skies that are drawn [n_emitters] (NULL: none is).
  * Vertex i of it has number i + before of the whole path. */
 imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk, int before,
-                      bool skies);
+                      const bool *drawn);
 /* Vertices behind the edge for which light is known: what jumps by depth [*n], in the arena. NULL:
  * no memory, or nothing jumps. */
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
-                     const struct imp_walk *hi, double times, bool skies, int *n);
+                     const struct imp_walk *hi, double times, const bool *drawn, int *n);
 
 /* What light that arrives at `at` (a hit of this shape) along w brings to the sensor: from there,
  * and over further vertices. Light: radiance times all factors but f W(x). `back`: vertices that
@@ -131,6 +135,25 @@ struct imp__edge_light {
 void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
                      const struct imp_surface *at, const struct imp__edge_light *light);
 
+/* ---- Of meters: boundary_meter.c ---- */
+/* Has it a place for each pixel, and no area? */
+bool imp__meter_is_points(const struct imp_sensor *s);
+/* The numbers of connections to the sensor: of a meter its point. */
+void imp__connect_numbers(const struct imp__edge_draw *d, double u[4]);
+/* What the velocity of a meter's point counts. */
+struct imp__flux_end imp__meter_end(const struct imp__edge_draw *d,
+                                    const struct imp_sensor_sample *to, imp_v3 bar);
+/* Where a line along `to` meets the front of a meter with an area, behind the edge and not behind
+ * `hit`, what else it meets first (NULL: nothing); and what light that arrives there brings. */
+struct imp__meter_point {
+    struct imp_surface at;
+    double film[2]; /* in [0, 1) */
+};
+bool imp__meter_meet(const struct imp__edge_draw *d, imp_v3 o, imp_v3 to,
+                     const struct imp_hit *hit, struct imp__meter_point *x);
+void imp__meter_reach(struct imp__edge_draw *d, const struct imp__meter_point *x,
+                      const struct imp__edge_light *light);
+
 /* IMP_E_UNSUPPORTED, with names: edges that tear, shapes that pass through each other, facets that
  * become lit at once, a camera inside of a shape. */
 enum imp_status imp__boundary_allowed(const struct imp__boundary *b);
@@ -138,6 +161,7 @@ enum imp_status imp__boundary_allowed(const struct imp__boundary *b);
 /* ---- One draw of each kind ---- */
 void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind);
 void imp__draw_film(struct imp__edge_draw *d);
+void imp__draw_meter(struct imp__edge_draw *d);
 void imp__draw_light(struct imp__edge_draw *d);
 void imp__draw_scatter(struct imp__edge_draw *d);
 void imp__draw_sky_film(struct imp__edge_draw *d);

@@ -69,7 +69,8 @@ static imp_spec kernel(const struct link *k, imp_v3 wo)
 
 /* All ends of a flux whose chain has `last` next to the camera. */
 static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_light *light,
-                     struct link *last, int depth, struct imp__flux *f)
+                     const struct imp_sensor_sample *to, struct link *last, int depth,
+                     struct imp__flux *f)
 {
     for (int k = 0; k < light->n_ends; k++) f->end[f->n_ends++] = light->end[k];
     imp_v3 shift = light->slide;
@@ -81,23 +82,26 @@ static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_ligh
             k = k->before;
         }
         struct imp__link_point x = k->x;
-        const imp_v3 from = after ? after->x.x.p : d->b->camera;
+        const imp_v3 from = after ? after->x.x.p : to->p;
         x.moved_bar = shift;
         shift = imp__slide_bar(&x, imp__normalize(x.x.p - from));
         f->end[f->n_ends++] = imp__flux_glued(&x.x, x.bar.v);
     }
-    f->end[f->n_ends++] = imp__flux_camera(&last->x.x, shift);
+    f->end[f->n_ends++] = d->b->tracer->sensor->shape
+                              ? imp__meter_end(d, to, shift)
+                              : imp__flux_camera(&last->x.x, shift);
 }
 
 static void connect(struct imp__edge_draw *d, const struct imp__edge_light *light,
                     struct link *k, int depth, imp_spec brings)
 {
     const struct imp_tracer *t = d->b->tracer;
-    const double none[4] = {0};
+    double u[4];
     struct imp_sensor_sample to;
     struct imp_shadow shadow;
+    imp__connect_numbers(d, u);
     if (!t->sensor->ops->connect ||
-        !imp__sensor_connect(t->sensor, &k->at.p, false, none, &to) ||
+        !imp__sensor_connect(t->sensor, &k->at.p, false, u, &to) ||
         !imp__light_on_film(t->sensor, &to))
         return;
     const imp_spec L = brings * kernel(k, imp__to_local(&k->frame, to.wo)) * to.weight;
@@ -109,7 +113,7 @@ static void connect(struct imp__edge_draw *d, const struct imp__edge_light *ligh
     f->px = to.px;
     f->py = to.py;
     f->L = L;
-    ends_set(d, light, k, depth, f);
+    ends_set(d, light, &to, k, depth, f);
 }
 
 /* Light for a chain of depth + 1 vertices. False: the path would be too long. */

@@ -6,7 +6,7 @@
 #include "walk/core/step.h"
 
 imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk, int before,
-                      bool skies)
+                      const bool *drawn)
 {
     const int max = t->integrator->max_depth;
     imp_spec L = {0}, T = imp__spec(1);
@@ -15,9 +15,7 @@ imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk, i
     const bool sky_first = walk->first->d.scatterer == IMP_AT_SKY;
     for (const struct imp_vertex *v = walk->first; v; v = v->next) {
         /* To each sky a vertex. */
-        const bool left = sky_first
-                              ? !skies && imp__sky_has_draws(t->scene, v->d.met.emitter)
-                              : v == walk->first;
+        const bool left = sky_first ? drawn && drawn[v->d.met.emitter] : v == walk->first;
         if (!left && (max < 0 || number < max)) L += T * v->e;
         if (max < 0 || number + 1 < max) L += T * v->b;
         T *= v->w;
@@ -27,17 +25,17 @@ imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk, i
 }
 
 void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 to,
-                    struct imp_walk *walk)
+                    int before, struct imp_walk *walk)
 {
     struct imp_sensor_ray ray = {.t_near = 0, .t_far = INFINITY};
     ray.o = imp__offset(at->p, at->ng, to - at->p);
     ray.d = imp__normalize(to - ray.o);
     imp__walk_along(d->b->tracer, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves,
-                    1, NULL, walk);
+                    before, NULL, walk);
 }
 
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
-                     const struct imp_walk *hi, double times, bool skies, int *n)
+                     const struct imp_walk *hi, double times, const bool *drawn, int *n)
 {
     const struct imp_tracer *tracer = d->b->tracer;
     const int max = tracer->integrator->max_depth;
@@ -49,8 +47,8 @@ imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
     }
     bool any = false;
     for (int k = 0; k < *n; k++) {
-        jump[k] = (imp__arrives(tracer, lo, k + 1, skies) -
-                   imp__arrives(tracer, hi, k + 1, skies)) *
+        jump[k] = (imp__arrives(tracer, lo, k + 1, drawn) -
+                   imp__arrives(tracer, hi, k + 1, drawn)) *
                   times;
         any |= !imp__is_zero_used(jump[k], d->waves);
     }
@@ -62,7 +60,7 @@ static void look_beside(struct imp__edge_draw *d, const struct imp_surface *at, 
 {
     const imp_v3 r = d->p - at->p, o = imp__offset(at->p, at->ng, r);
     if (imp__edge_face_look(d, o, m, apart, 1, walk)) return;
-    imp__look_from(d, at, imp__edge_beside(d, r, m, apart), walk);
+    imp__look_from(d, at, imp__edge_beside(d, r, m, apart), 1, walk);
 }
 
 void imp__draw_scatter(struct imp__edge_draw *d)
@@ -91,7 +89,7 @@ void imp__draw_scatter(struct imp__edge_draw *d)
 
     int depths;
     const double times = (d->touches ? 1 : sine * 4 * IMP_PI) * d->inv_pdf;
-    imp_spec *jump = imp__jumps(d, &lo, &hi, times, false, &depths);
+    imp_spec *jump = imp__jumps(d, &lo, &hi, times, b->drawn, &depths);
     if (!jump) return;
     struct imp__edge_light light = {.w = w, .n_ends = 1, .slide = -m};
     light.light = jump[0];

@@ -340,12 +340,13 @@ void imp__draw_shading_scatter(struct imp__edge_draw *d)
     imp__hit_surface(scene, &hit, &o, &w, &at);
     if (!turning_at(d, &from, &p, w, imp__length(at.p - p.p), &x)) return;
     const imp_v3 back = imp__offset(at.p, at.ng, -w);
-    if (!look_next(d, &x, 1, back, 1, &lit)) imp__look_from(d, &at, p.p + x.beside, &lit);
+    if (!look_next(d, &x, 1, back, 1, &lit))
+        imp__look_from(d, &at, p.p + x.beside, 1, &lit);
     if (!look_next(d, &x, -1, back, 1, &dark))
-        imp__look_from(d, &at, p.p - x.beside, &dark);
+        imp__look_from(d, &at, p.p - x.beside, 1, &dark);
     int depths;
     const double times = fabs(imp__dot(p.ng, w)) * IMP_2PI * d->inv_pdf;
-    imp_spec *jump = imp__jumps(d, &lit, &dark, times, true, &depths);
+    imp_spec *jump = imp__jumps(d, &lit, &dark, times, NULL, &depths);
     if (!jump) return;
     struct imp__edge_light light = {.w = w, .light = jump[0], .n_ends = 1};
     if (max >= 0) {

@@ -94,10 +94,29 @@ static enum imp_status walks_allowed(const struct imp_tracer *t)
                       why);
 }
 
+static enum imp_status meter_allowed(const struct imp_tracer *t)
+{
+    const struct imp_sensor *s = t->sensor;
+    const struct imp_shape *on = s->shape;
+    const bool flat = on->ops->flags & IMP_SHAPE_FLAT || s->receiver;
+    if (!s->ops->connect || !flat ||
+        (on->geometry != IMP_TRIANGLES && !imp__moves_curved(t->scene, on->index)))
+        return refuse(t, "sensor", s->name, s->ops->name, "is on no flat shape");
+    if (on->smooth)
+        return refuse(t, "sensor", s->name, s->ops->name,
+                      "is on a mesh with vertex normals (face_normals makes it flat)");
+    for (int k = 0; k < t->scene->n_shapes; k++)
+        if (imp__moves_smooth(t->scene, k))
+            return refuse(t, "sensor", s->name, s->ops->name,
+                          "sees a mesh with vertex normals (face_normals makes it flat)");
+    return IMP_OK;
+}
+
 static enum imp_status sensor_allowed(const struct imp_tracer *t)
 {
     const struct imp_sensor *s = t->sensor;
     imp_v3 centre;
+    if (s->shape) return meter_allowed(t);
     if (!imp__pinhole(s, &centre))
         return refuse(t, "sensor", s->name, s->ops->name,
                       "has no point in which its rays meet");

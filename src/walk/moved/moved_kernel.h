@@ -66,4 +66,8 @@ static inline struct imp__kernel_bar imp__lambert_times(imp_v3 n, imp_v3 w, doub
     return out;
 }
 
+/* The same for a meter, whose shape has the normal n. */
+struct imp__kernel_bar imp__meter_times(const struct imp_sensor *s, imp_v3 n, imp_v3 w,
+                                        double bar);
+
 #endif

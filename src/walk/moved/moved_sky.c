@@ -66,13 +66,15 @@ bool imp__sky_has_draws(const struct imp_scene *scene, int emitter)
     return !(scene->emitters[emitter]->ops->flags & IMP_EMITTER_UNIFORM);
 }
 
-double imp__sky_whole(const struct imp_tracer *tracer, int emitter)
+/* Integrals of a sky's radiance and of its square over all directions, by its own draws. */
+static void sky_moments(const struct imp_tracer *tracer, int emitter, imp_spec *whole,
+                        imp_spec *square)
 {
     enum { DRAWS = 256 };
     const struct imp_scene *scene = tracer->scene;
     const struct imp_emitter *e = scene->emitters[emitter];
     const imp_v3 from = (scene->lo + scene->hi) * 0.5;
-    imp_spec sum = {0};
+    *whole = *square = (imp_spec){0};
     for (uint32_t k = 0; k < DRAWS; k++) {
         const struct imp_key key = imp__key(11, 4, k);
         const double u[2] = {(k + imp__u01(key, 0)) / DRAWS, imp__u01(key, 1)};
@@ -81,9 +83,24 @@ double imp__sky_whole(const struct imp_tracer *tracer, int emitter)
         if (!e->ops->sample(e, &from, u, &to) || !(to.pdf > 0)) continue;
         if (tracer->wavelengths)
             imp__waves_make(tracer->wavelengths, imp__u01(key, 2), &waves);
-        sum += imp__sky_radiance_from(scene, emitter, to.wi,
-                                      tracer->wavelengths ? &waves.carried : NULL) *
-               (1 / to.pdf);
+        const imp_spec L = imp__sky_radiance_from(
+            scene, emitter, to.wi, tracer->wavelengths ? &waves.carried : NULL);
+        *whole += L * (1 / to.pdf) * (1. / DRAWS);
+        *square += L * L * (1 / to.pdf) * (1. / DRAWS);
     }
-    return imp__max_used(sum, scene->lanes == 4) / DRAWS;
+}
+
+double imp__sky_whole(const struct imp_tracer *tracer, int emitter)
+{
+    imp_spec whole, square;
+    sky_moments(tracer, emitter, &whole, &square);
+    return imp__max_used(whole, tracer->scene->lanes == 4);
+}
+
+bool imp__sky_is_narrow(const struct imp_tracer *tracer, int emitter)
+{
+    imp_spec whole, square;
+    sky_moments(tracer, emitter, &whole, &square);
+    return imp__sqr(imp__sum_used(whole, tracer->scene->lanes)) <
+           imp__sum_used(square, tracer->scene->lanes) * tracer->scene->lanes;
 }

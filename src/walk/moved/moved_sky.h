@@ -26,5 +26,7 @@ bool imp__sky_has_draws(const struct imp_scene *scene, int emitter);
 /* Integral of a sky's radiance over all directions, by its own draws, roughly: of the lane that has
  * most. */
 double imp__sky_whole(const struct imp_tracer *tracer, int emitter);
+/* Does it come from less than a steradian, (int L dw)^2 / int L^2 dw, roughly? */
+bool imp__sky_is_narrow(const struct imp_tracer *tracer, int emitter);
 
 #endif

@@ -21,6 +21,7 @@ struct sweep {
     struct pieces *piece;       /* [n] */
     double *theta_bar;
     imp_v3 wo_bar; /* of the direction from the first vertex to the camera */
+    int first;     /* vertex: 1 on a meter, behind that of the sensor */
 };
 
 static bool is_emitted(const struct imp_vertex *v)
@@ -36,11 +37,15 @@ static int read_walk(struct sweep *s, imp_spec adjoint)
     int n = 0;
     for (const struct imp_vertex *v = s->walk->first; v; v = v->next, n++) {
         const bool sky = v->d.scatterer == IMP_AT_SKY;
+        s->piece[n] = (struct pieces){{0}, {0}, {0}};
+        if (n < s->first) {
+            P *= v->w;
+            continue;
+        }
         s->at[n] =
             sky ? imp__sky_point(imp__normalize(imp__decided_v3(v->d.p)))
                 : imp__surface_point(scene, v->d.shape, &v->d.located, v->d.place, v->ng);
         struct pieces *piece = &s->piece[n];
-        *piece = (struct pieces){{0}, {0}, {0}};
         if (v->d.connection == IMP_CONNECTED) piece->light = P * v->b;
         P *= v->w;
         if (!v->d.goes_on || !v->next) continue;
@@ -80,6 +85,9 @@ static imp_v3 sent_slope(const struct imp_emitter *e, imp_v3 d, int lanes,
     return slope;
 }
 
+/* Is it the point of a meter, in whose place a white surface is? */
+static bool is_meter(const struct sweep *s, int k) { return s->first == 1 && k == 1; }
+
 /* The derivatives of vertex k's kernel towards w, from the places of the chain, which are exact to
  * each other; recorded directions are rounded. False: it is Lambertian without textures, and w and
  * its normal are enough. */
@@ -87,7 +95,7 @@ static bool kernel_derive(const struct sweep *s, int k, const struct imp_vertex 
                           imp_v3 w, int lobe, struct imp__kernel_d *out)
 {
     struct imp_surface at;
-    if (imp_likely(imp__is_plain(v->bsdf)) ||
+    if (imp_likely(imp__is_plain(v->bsdf)) || is_meter(s, k) ||
         !imp__decided_surface(s->tracer->scene, &v->d, s->walk->time, &at))
         return false;
     const imp_v3 from = k > 0 ? s->at[k - 1].x.p : s->walk->ray.o;
@@ -106,6 +114,9 @@ static struct imp__kernel_bar kernel_bar(struct sweep *s, int k,
                                          imp_spec bar)
 {
     const int lanes = s->tracer->scene->lanes;
+    if (is_meter(s, k))
+        return imp__meter_times(s->tracer->sensor, s->at[k].x.n, w,
+                                imp__sum_used(bar, lanes));
     if (!derived)
         return imp__lambert_times(imp__shading_normal(&s->at[k].x), w,
                                   imp__sum_used(bar, lanes));
@@ -213,16 +224,23 @@ bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
                       const struct imp__moves *moves, const struct imp_walk *walk,
                       imp_spec adjoint, double *theta_bar)
 {
-    struct sweep s = {tracer, moves, walk, NULL, NULL, theta_bar, {0}};
+    struct sweep s = {tracer, moves,     walk, NULL,
+                      NULL,   theta_bar, {0},  tracer->sensor->shape ? 1 : 0};
     if (walk->dropped || !walk->valid || !walk->first) return true;
     s.at = imp__arena_take(arena, (size_t)walk->n, sizeof *s.at);
     s.piece = imp__arena_take(arena, (size_t)walk->n, sizeof *s.piece);
     if (!s.at || !s.piece) return false;
     int k = read_walk(&s, adjoint) - 1;
     for (const struct imp_vertex *v = walk->last; v; v = v->prev, k--) {
-        if (s.at[k].sky) continue;
+        if (s.at[k].sky || k < s.first) continue;
         if (v->d.connection == IMP_CONNECTED) light_bar(&s, k, v);
         if (v->d.goes_on && v->next) step_bar(&s, k, v);
+    }
+    if (s.first == 1) {
+        if (walk->n < 2) return true;
+        s.at[1].bar.v += s.at[1].moved_bar;
+        imp__velocity_bar(moves, &s.at[1].x, &s.at[1].bar, theta_bar);
+        return true;
     }
     if (s.at[0].sky) {
         sky_seen_bar(&s, adjoint);
