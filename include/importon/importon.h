@@ -609,6 +609,7 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *                            in parts of the film's width and height
  *     NAME.opencv_k1, _k2, _p1, _p2, _k3   of a perspective camera: the distortion of its lens;
  *                            IMP_E_NUMERIC where it would fold the picture
+ *     NAME.aperture_radius, NAME.focus_distance   of a thin lens
  *     NAME.position          of a point, spot or ies light: [3], world
  *     NAME.direction         of a directional light, of a spot's axis or an ies light's nadir: [3],
  *                            of any length

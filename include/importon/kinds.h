@@ -894,7 +894,7 @@ enum imp_sensor_flags {
                                 end */
     IMP_SENSOR_GROUP = 4     /* its children are sensors */
 };
-#define IMP_VIEW_NUMBERS 8
+#define IMP_VIEW_NUMBERS 10
 struct imp_sensor_ops {
     size_t size;
     const char *name;
@@ -916,15 +916,20 @@ struct imp_sensor_ops {
     /* As imp_shape_ops.move. */
     void (*move)(struct imp_sensor *s, const double to_world[12]);
     /* Horizontal field of view in degrees, the principal point's offset in parts of the film's
-     * width and height, and k1, k2, p1, p2, k3 of a lens as OpenCV has them, of a pinhole: reads
-     * them, or, with `set`, changes the camera to these. False: it has none; with `set`: a lens
-     * with these numbers folds the picture. NULL: the kind has none. */
+     * width and height, k1, k2, p1, p2, k3 of a lens as OpenCV has them, and, of a thin lens, the
+     * radius of its aperture and its focus distance: reads them (what it has not stays as it was),
+     * or, with `set`, changes the camera to these. False: it has none; with `set`: a lens with these
+     * numbers folds the picture. NULL: the kind has none. */
     bool (*view)(struct imp_sensor *s, double number[IMP_VIEW_NUMBERS], bool set);
     /* How fast what is seen at a fixed film position moves when number k of `view` grows, at the
      * point r from where its rays meet, world, along the plane of its depth; per unit of the
-     * number. NULL where `view` is. */
+     * number. NULL where `view` is, or `lens_velocity` is not. */
     void (*view_velocity)(const struct imp_sensor *s, int k, const imp_v3 *r,
                           imp_v3 *out);
+    /* The same of a lens with an aperture, for a ray whose numbers `lens` stay: r and `other` are
+     * two points of it, from the middle of the lens. */
+    void (*lens_velocity)(const struct imp_sensor *s, int k, const imp_v3 *r,
+                          const imp_v3 *other, imp_v3 *out);
 };
 
 /* ---- Versions of this header ----------------------------------------------------- */

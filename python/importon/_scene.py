@@ -204,9 +204,9 @@ class Scene:
 
         `NAME.pose` as `add_pose`; `NAME.scale` of a shape; `NAME.vertex_positions` of a mesh;
         `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y`, `NAME.opencv_k1`,
-        `_k2`, `_p1`, `_p2` and `_k3` of a perspective camera;
-        `NAME.position` of a point or spot light; `NAME.direction` of a directional light or spot. Otherwise
-        as `add_pose`.
+        `_k2`, `_p1`, `_p2` and `_k3` of a perspective camera or thin lens;
+        `NAME.aperture_radius` and `NAME.focus_distance` of a thin lens; `NAME.position` of a point, spot or
+        ies light; `NAME.direction` of a directional, spot or ies light. Otherwise as `add_pose`.
 
         Parameters
         ----------

@@ -3,18 +3,21 @@
  * Velocities of cameras and lights, and the transposes (moves.h). */
 #include "moves.h"
 
-/* At r from the camera's centre, by the one number of a mover that is no pose. */
+/* At p, by the one number of a mover that is no pose. */
 static imp_v3 view_velocity(const struct imp__moves *moves, const struct imp__mover *m,
-                            imp_v3 r)
+                            imp_v3 eye, imp_v3 p)
 {
     const struct imp_sensor *s = moves->sensor;
+    const int k = (int)m->kind - IMP_MOVE_VIEW;
+    const imp_v3 r = p - m->centre, from = eye - m->centre;
     imp_v3 v = {0};
     if (imp__is_zero(r)) return v; /* what is there moves along no film */
-    s->ops->view_velocity(s, (int)m->kind - IMP_MOVE_VIEW, &r, &v);
+    if (s->ops->lens_velocity) s->ops->lens_velocity(s, k, &r, &from, &v);
+    else s->ops->view_velocity(s, k, &r, &v);
     return v;
 }
 
-imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 p,
+imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 eye, imp_v3 p,
                             const double *theta_dot)
 {
     imp_v3 u = {0};
@@ -22,26 +25,26 @@ imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 p,
         const struct imp__mover *m = &moves->mover[k];
         if (m->shape != IMP_MOVE_CAMERA) continue;
         const double *theta = theta_dot + m->first;
-        const imp_v3 r = p - m->centre;
         if (m->kind == IMP_MOVE_POSE)
-            u += imp__move_vector(theta) + imp__cross(imp__move_vector(theta + 3), r);
-        else u += view_velocity(moves, m, r) * theta[0];
+            u += imp__move_vector(theta) +
+                 imp__cross(imp__move_vector(theta + 3), p - m->centre);
+        else u += view_velocity(moves, m, eye, p) * theta[0];
     }
     return u;
 }
 
-void imp__camera_velocity_bar(const struct imp__moves *moves, imp_v3 p, imp_v3 bar,
-                              double *theta_bar)
+void imp__camera_velocity_bar(const struct imp__moves *moves, imp_v3 eye, imp_v3 p,
+                              imp_v3 bar, double *theta_bar)
 {
     for (int k = 0; k < moves->n_movers; k++) {
         const struct imp__mover *m = &moves->mover[k];
         if (m->shape != IMP_MOVE_CAMERA) continue;
-        const imp_v3 r = p - m->centre;
         if (m->kind == IMP_MOVE_POSE) {
             imp__move_vector_bar(theta_bar + m->first, bar);
-            imp__move_vector_bar(theta_bar + m->first + 3, imp__cross(r, bar));
+            imp__move_vector_bar(theta_bar + m->first + 3,
+                                 imp__cross(p - m->centre, bar));
         } else {
-            theta_bar[m->first] += imp__dot(view_velocity(moves, m, r), bar);
+            theta_bar[m->first] += imp__dot(view_velocity(moves, m, eye, p), bar);
         }
     }
 }

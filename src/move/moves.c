@@ -23,13 +23,15 @@ void imp__moves_free(struct imp__moves *moves)
 static enum imp_status camera_mover(const struct imp__moves *moves, struct imp__mover *m)
 {
     if ((m->kind != IMP_MOVE_POSE && m->kind < IMP_MOVE_VIEW) ||
-        !imp__pinhole(moves->sensor, &m->centre))
+        !imp__lens_middle(moves->sensor, &m->centre))
         return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
                           "sensor '%s': its rays meet in no point, and it has no "
                           "derivative by its pose",
                           moves->sensor->name);
     m->count = m->kind == IMP_MOVE_POSE ? 6 : 1;
-    if (m->kind == IMP_MOVE_POSE || moves->sensor->ops->view_velocity) return IMP_OK;
+    if (m->kind == IMP_MOVE_POSE || moves->sensor->ops->view_velocity ||
+        moves->sensor->ops->lens_velocity)
+        return IMP_OK;
     return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
                       "sensor '%s' has no field of view that moves", moves->sensor->name);
 }

@@ -7,8 +7,8 @@
  *     scale     V = s (X - c) at the scale 1 of the shape as it is, or over that scale (1)
  *     vertices  V = b_0 e_0 + b_1 e_1 + b_2 e_2, of a triangle with weights b (3 each)
  *     view      of a camera: the velocity of what a fixed film position sees by its field of view,
- *               its principal point or a coefficient of its lens (imp_sensor_ops.view_velocity)
- *               (1 each)
+ *               its principal point, a coefficient or the aperture of its lens
+ *               (imp_sensor_ops.view_velocity, lens_velocity) (1 each)
  *     light     a point light's position V = e, or the direction d of parallel light, of any
  *               length |d|: the unit direction turns by  e/|d| across d (3)
  *     axis      of a spot or ies light, by a direction of any length, likewise (3); the frame turns
@@ -183,12 +183,13 @@ void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 bar,
 /* The transpose of the turn of a spot's axis, a rotation vector across it. */
 void imp__light_axis_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
                          double *theta_bar);
-/* Velocity of what the camera sees at p through a fixed film position: origin and direction of
- * the ray move with the camera, the distance is held. */
-imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 p,
+/* Velocity of what the camera sees at p through a fixed film position and, of a lens, fixed numbers of
+ * its point: origin and direction of the ray move with the camera, the distance is held. eye: another
+ * point of the ray. */
+imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 eye, imp_v3 p,
                             const double *theta_dot);
-void imp__camera_velocity_bar(const struct imp__moves *moves, imp_v3 p, imp_v3 bar,
-                              double *theta_bar);
+void imp__camera_velocity_bar(const struct imp__moves *moves, imp_v3 eye, imp_v3 p,
+                              imp_v3 bar, double *theta_bar);
 
 /* ---- shade.c ---- */
 /* Has this shape vertex normals, by which it is shaded? */

@@ -197,6 +197,8 @@ double imp__pose_large(const struct imp_pose *p, size_t e)
     case IMP_POSE_K3: return 0.1;
     case IMP_POSE_P1:
     case IMP_POSE_P2: return 0.02;
+    case IMP_POSE_APERTURE: return 0.3 * p->number[0] + 1e-3 * scene;
+    case IMP_POSE_FOCUS: return 0.2 * p->number[0];
     case IMP_POSE_DIRECTION:
         return 0.3 * imp__length(imp__v3(p->number[0], p->number[1], p->number[2]));
     default: return 0.1 * scene;

@@ -9,6 +9,7 @@
  *     NAME.x_fov             of a perspective camera: its horizontal field of view, degrees
  *     NAME.principal_point_offset_x, _y    of a camera, in parts of the film's width and height
  *     NAME.opencv_k1, _k2, _p1, _p2, _k3   of a camera, by which its lens distorts the picture
+ *     NAME.aperture_radius, NAME.focus_distance   of a thin lens
  *     NAME.position          of a light at a point, world
  *     NAME.direction         along which parallel light travels, or of a spot's axis, of any length
  *
@@ -31,6 +32,8 @@ enum imp_pose_kind {
     IMP_POSE_P1,
     IMP_POSE_P2,
     IMP_POSE_K3,
+    IMP_POSE_APERTURE,
+    IMP_POSE_FOCUS,
     IMP_POSE_POSITION,
     IMP_POSE_DIRECTION,
     IMP_POSE_KINDS
@@ -95,6 +98,11 @@ void imp__pose_aim(struct imp_emitter *e, enum imp_pose_kind kind, double v[3]);
 /* Where the rays of a camera meet. False: in no point, as those of a lens with an aperture or of
  * parallel light. */
 bool imp__pinhole(const struct imp_sensor *sensor, imp_v3 *centre);
+/* The point of its lens that rays with these numbers go through; a pinhole has one. False: none. */
+bool imp__lens_point(const struct imp_sensor *sensor, const double lens[2],
+                     imp_v3 *point);
+/* That point, or the middle of a lens whose rays to a film position meet in a point. False: neither. */
+bool imp__lens_middle(const struct imp_sensor *sensor, imp_v3 *centre);
 
 /* The rotation of a vector of rotation, row by row. */
 void imp__rotation_of(const double a[3], double R[9]);

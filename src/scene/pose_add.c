@@ -13,26 +13,36 @@
 
 /* ---- Cameras ------------------------------------------------------------------------ */
 
-/* By the rays through two corners of the film, and one through another point of the lens. */
-bool imp__pinhole(const struct imp_sensor *s, imp_v3 *centre)
+/* By the rays through two corners of the film. */
+bool imp__lens_point(const struct imp_sensor *s, const double lens[2], imp_v3 *point)
 {
-    const double w = s->film.width, h = s->film.height, lens[2] = {0.3, 0.8};
     struct imp_sensor_ray a, b;
     if (!s->ops->ray || s->shape) return false;
     s->ops->ray(s, 0, 0, lens, &a);
-    s->ops->ray(s, w, h, lens, &b);
+    s->ops->ray(s, s->film.width, s->film.height, lens, &b);
     const imp_v3 d = b.o - a.o, n = imp__cross(a.d, b.d);
     const double n2 = imp__dot(n, n), size = imp__length(d) + imp__length(a.o);
     if (!(n2 > 1e-20)) return false;
     const double ta = imp__dot(imp__cross(d, b.d), n) / n2,
                  tb = imp__dot(imp__cross(d, a.d), n) / n2;
-    *centre = a.o + a.d * ta;
-    const imp_v3 other = b.o + b.d * tb;
+    *point = a.o + a.d * ta;
+    return imp__length(b.o + b.d * tb - *point) <= 1e-7 * size;
+}
+
+bool imp__pinhole(const struct imp_sensor *s, imp_v3 *centre)
+{
     struct imp_sensor_ray elsewhere; /* through another point of the lens */
+    if (!imp__lens_point(s, (const double[2]){0.3, 0.8}, centre)) return false;
     s->ops->ray(s, 0, 0, (const double[2]){0.9, 0.1}, &elsewhere);
-    const imp_v3 apart = imp__cross(elsewhere.o - *centre, elsewhere.d);
-    return imp__length(other - *centre) <= 1e-7 * size &&
-           imp__length(apart) <= 1e-7 * size;
+    const imp_v3 r = elsewhere.o - *centre, apart = imp__cross(r, elsewhere.d);
+    return imp__length(apart) <= 1e-7 * (imp__length(r) + imp__length(elsewhere.o));
+}
+
+bool imp__lens_middle(const struct imp_sensor *s, imp_v3 *centre)
+{
+    if (imp__pinhole(s, centre)) return true;
+    return s->ops->connect && s->ops->lens_velocity &&
+           imp__lens_point(s, (const double[2]){0.5, 0.5}, centre);
 }
 
 extern const struct imp_emitter_ops imp__spot_light, imp__ies_light;
@@ -90,11 +100,15 @@ static const char *sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
                               imp_v3 *centre)
 {
     if (kind != IMP_POSE_RIGID && !imp__pose_is_view(kind)) return "it is a sensor";
-    if (!s->ops->move) return "it is no perspective camera";
+    double number[IMP_VIEW_NUMBERS];
+    if (!s->ops->move) return "it is no perspective camera or thin lens";
     if (s->medium) return "it is in a medium";
-    if (!imp__pinhole(s, centre)) return "its rays meet in no point";
-    if (kind != IMP_POSE_RIGID && !s->ops->view) return "it has no field of view";
-    return NULL;
+    if (!imp__lens_middle(s, centre)) return "its rays meet in no point";
+    if (kind == IMP_POSE_RIGID) return NULL;
+    number[kind - IMP_POSE_FOV] = NAN;
+    if (!s->ops->view || !s->ops->view(s, number, false))
+        return "it has no field of view";
+    return isnan(number[kind - IMP_POSE_FOV]) ? "it is no thin lens" : NULL;
 }
 
 static const char *light_why(const struct imp_scene *scene, const struct imp_emitter *e,
@@ -229,6 +243,8 @@ static const struct tail {
     [IMP_POSE_P1] = {"opencv_p1", "1", -INFINITY, INFINITY},
     [IMP_POSE_P2] = {"opencv_p2", "1", -INFINITY, INFINITY},
     [IMP_POSE_K3] = {"opencv_k3", "1", -INFINITY, INFINITY},
+    [IMP_POSE_APERTURE] = {"aperture_radius", "scene units", 0, INFINITY},
+    [IMP_POSE_FOCUS] = {"focus_distance", "scene units", 1e-6, INFINITY},
     [IMP_POSE_POSITION] = {"position", "scene units", -INFINITY, INFINITY},
     [IMP_POSE_DIRECTION] = {"direction", "1", -INFINITY, INFINITY}};
 
@@ -393,6 +409,7 @@ enum imp_status imp_scene_add_geometry(imp_scene *scene, const char *name)
     return imp__error(scene->ctx, IMP_E_ARG,
                       "'%s' names no number of geometry: NAME.pose, scale, "
                       "vertex_positions, x_fov, principal_point_offset_x, _y, "
-                      "opencv_k1, k2, p1, p2, k3, position or direction",
+                      "opencv_k1, k2, p1, p2, k3, aperture_radius, "
+                      "focus_distance, position or direction",
                       name);
 }

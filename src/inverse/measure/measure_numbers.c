@@ -80,6 +80,7 @@ static enum imp_status cameras_add(struct imp__measure *m, const struct imp__pho
     for (int k = IMP_POSE_FOV; k < IMP_POSE_FOV + IMP_VIEW_NUMBERS; k++) {
         const enum imp_pose_kind kind = (enum imp_pose_kind)k;
         if (!m->wanted[IMP_MEASURE_LENS]) break;
+        if (kind >= IMP_POSE_APERTURE && !p->sensor->ops->lens_velocity) continue;
         IMP_CHECKED(camera_add(m, p, imp__pose_tail(kind), asked && is_usual(kind)));
     }
     return IMP_OK;

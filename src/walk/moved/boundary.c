@@ -221,7 +221,9 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
     enum imp_status st = imp__moved_allowed(tracer);
     if (tracer->sensor->shape) /* by which edges are chosen: the middle of a meter */
         out->camera = (tracer->sensor->shape->lo + tracer->sensor->shape->hi) * 0.5;
-    else imp__pinhole(tracer->sensor, &out->camera);
+    else imp__lens_middle(tracer->sensor, &out->camera);
+    imp_v3 point;
+    out->wide = !imp__pinhole(tracer->sensor, &point);
     if (st == IMP_OK) st = imp__boundary_allowed(out);
     if (st == IMP_OK) st = lights_make(out);
     if (st == IMP_OK) st = choices_make(out);
@@ -273,6 +275,16 @@ static bool waves_draw(struct imp__edge_draw *d)
     return true;
 }
 
+/* The point through which the draw is seen. */
+static void eye_draw(struct imp__edge_draw *d)
+{
+    const struct imp_sensor *s = d->b->tracer->sensor;
+    for (unsigned k = 0; k < 4; k++)
+        d->lens[k] = d->b->wide ? imp__u01(d->key, IMP_EDGE_SENSOR + k) : 0;
+    d->eye = d->b->camera;
+    if (d->b->wide && !s->shape) imp__lens_point(s, d->lens, &d->eye);
+}
+
 static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
 {
     const enum imp__edge_item_kind item = d->item ? d->item->kind : IMP_ITEM_ROUND;
@@ -299,6 +311,7 @@ void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
 {
     d->part = d->b->part[kind];
     d->end = &d->first;
+    eye_draw(d);
     if (!waves_draw(d) || !imp__edge_item_choose(d)) return;
     kind_work(d, kind);
     for (struct imp__flux *f = d->waves ? d->first : NULL; f; f = f->next)
@@ -339,7 +352,7 @@ double imp__flux_velocity(const struct imp__moves *moves, const struct imp__flux
     for (int k = 0; k < flux->n_ends; k++) {
         const struct imp__flux_end *e = &flux->end[k];
         struct imp__velocity v = {.area = 0};
-        if (e->camera) v.v = imp__camera_velocity(moves, e->x.p, theta_dot);
+        if (e->camera) v.v = imp__camera_velocity(moves, e->eye, e->x.p, theta_dot);
         else if (e->light) v.v = imp__light_velocity(moves, e->light - 1, theta_dot);
         else v = imp__velocity_of(moves, &e->x, theta_dot);
         sum += velocity_times(&e->x, &e->bar, &v);
@@ -354,7 +367,7 @@ void imp__flux_bar(const struct imp__moves *moves, const struct imp__flux *flux,
         const struct imp__flux_end *e = &flux->end[k];
         const struct imp__velocity v = {
             .v = e->bar.v * bar, .n = e->bar.n * bar, .shade = e->bar.shade * bar};
-        if (e->camera) imp__camera_velocity_bar(moves, e->x.p, v.v, theta_bar);
+        if (e->camera) imp__camera_velocity_bar(moves, e->eye, e->x.p, v.v, theta_bar);
         else if (e->light) imp__light_velocity_bar(moves, e->light - 1, v.v, theta_bar);
         else imp__velocity_bar(moves, &e->x, &v, theta_bar);
     }

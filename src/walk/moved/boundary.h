@@ -91,7 +91,8 @@ struct imp__boundary {
     /* [n_items + 2] probability of the items before this one; then that of all of them, and 1:
      * the rest is of edges. */
     double *part[IMP_BOUNDARY_KINDS];
-    imp_v3 camera; /* where its rays meet */
+    imp_v3 camera; /* where its rays meet, or the middle of its lens, or of a meter */
+    bool wide;     /* they do not: a lens with an aperture, or a meter */
     double size;   /* of the scene */
     int n_lights;
     double *light_cdf; /* [n_emitters] of those that have draws, by power; last is 1 */
@@ -105,7 +106,8 @@ struct imp__flux_end {
     struct imp__glued x;
     struct imp__velocity bar; /* of a camera or light: bar.v alone */
     bool camera;
-    int light; /* emitter, plus 1, whose place or direction it is; 0: none */
+    int light;  /* emitter, plus 1, whose place or direction it is; 0: none */
+    imp_v3 eye; /* of a camera: the point of its lens */
 };
 
 /* As imp__mover.shape. */

@@ -9,10 +9,10 @@
 /* Film velocity of a point at distance 1 whose velocity is W: (x.W, y.W). Of the direction of a
  * ray by film position it is the inverse: differences over a pixel are exact to 1e-9 of a smooth
  * film. */
-static void film_slopes(const struct imp_sensor *s, double px, double py, imp_v3 *x,
-                        imp_v3 *y)
+static void film_slopes(const struct imp_sensor *s, double px, double py,
+                        const double *lens, imp_v3 *x, imp_v3 *y)
 {
-    const double h = 1e-3, lens[2] = {0.5, 0.5};
+    const double h = 1e-3;
     struct imp_sensor_ray at, lo, hi;
     s->ops->ray(s, px, py, lens, &at);
     s->ops->ray(s, px - h, py, lens, &lo);
@@ -29,10 +29,9 @@ static void film_slopes(const struct imp_sensor *s, double px, double py, imp_v3
 imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py)
 {
     const struct imp_tracer *t = d->b->tracer;
-    const double lens[2] = {0.5, 0.5};
     struct imp_sensor_ray ray;
     struct imp_walk walk;
-    t->sensor->ops->ray(t->sensor, px, py, lens, &ray);
+    t->sensor->ops->ray(t->sensor, px, py, d->lens, &ray);
     imp__walk_along(t, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves, 0, NULL,
                     &walk);
     return walk.values;
@@ -44,24 +43,23 @@ static imp_spec look_beside(struct imp__edge_draw *d, const struct imp_sensor_sa
                             imp_v3 bar, double sign, const double shift[2])
 {
     const struct imp_sensor *sensor = d->b->tracer->sensor;
-    const double none[4] = {0};
     const imp_v3 r = d->p - to->p, m = imp__normalize(bar) * sign;
     const double apart = IMP_BESIDE * imp__length(r);
     const imp_v3 past = d->p + m * apart, q = imp__edge_beside(d, r, m, apart);
     struct imp_sensor_sample at;
     struct imp_walk walk;
     if (imp__edge_face_look(d, to->p, m, apart, 0, &walk)) return walk.values;
-    if (!imp__is_zero(q - past) && imp__sensor_connect(sensor, &q, false, none, &at))
+    if (!imp__is_zero(q - past) && imp__sensor_connect(sensor, &q, false, d->lens, &at))
         return imp__look_through(d, at.px, at.py);
     return imp__look_through(d, to->px + sign * shift[0], to->py + sign * shift[1]);
 }
 
 void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to)
 {
-    const imp_v3 camera = d->b->camera;
+    const imp_v3 camera = d->eye;
     const double inverse = 1 / imp__length(d->p - camera);
     imp_v3 x, y;
-    film_slopes(d->b->tracer->sensor, to->px, to->py, &x, &y);
+    film_slopes(d->b->tracer->sensor, to->px, to->py, d->lens, &x, &y);
     x *= inverse;
     y *= inverse;
     const double tangent[2] = {imp__dot(x, d->along), imp__dot(y, d->along)};
@@ -87,8 +85,9 @@ void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to
     const struct imp__glued at = sky ? (struct imp__glued){.p = d->p}
                                      : imp__edge_carried(d),
                             eye = {.p = camera};
-    f->end[0] = sky ? imp__flux_camera(&eye, bar) : imp__flux_glued(&at, bar);
-    f->end[1] = imp__flux_camera(&at, -bar);
+    f->end[0] = sky ? imp__flux_camera(d, &eye, bar) : imp__flux_glued(&at, bar);
+    f->end[1] = imp__flux_camera(d, &at, -bar);
+    if (sky) f->end[0].eye = d->p; /* another point of the ray through the eye */
 }
 
 bool imp__edge_is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r)
@@ -112,10 +111,9 @@ void imp__draw_film(struct imp__edge_draw *d)
 {
     const struct imp__boundary *b = d->b;
     const struct imp_sensor *sensor = b->tracer->sensor;
-    const double none[4] = {0};
     struct imp_sensor_sample to;
-    if (!imp__edge_any(d, b->camera) || !sensor->ops->connect ||
-        !imp__sensor_connect(sensor, &d->p, false, none, &to) ||
+    if (!imp__edge_any(d, d->eye) || !sensor->ops->connect ||
+        !imp__sensor_connect(sensor, &d->p, false, d->lens, &to) ||
         !imp__light_on_film(sensor, &to))
         return;
     const imp_v3 r = imp__edge_clear(d) - to.p;

@@ -30,7 +30,7 @@ static void emission_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
     const imp_v3 turn = x->n * (1 / imp__length(y.p - x->p));
     struct imp__edge_light light = {
         .w = -w, .light = v->e * times, .behind = 1, .horizon = true, .n_ends = 2};
-    light.end[0] = (struct imp__flux_end){*x, {.n = w, .v = -turn}, false, 0};
+    light.end[0] = (struct imp__flux_end){*x, {.n = w, .v = -turn}, false, 0, {0}};
     light.end[1] = imp__flux_glued(&y, turn);
     imp__edge_reach(d, hit, at, &light);
 }
@@ -62,6 +62,6 @@ void imp__draw_horizon(struct imp__edge_draw *d)
         light.by_depth = jump;
         light.n_depths = depths;
     }
-    light.end[0] = (struct imp__flux_end){x, {.n = w}, false, 0};
+    light.end[0] = (struct imp__flux_end){x, {.n = w}, false, 0, {0}};
     imp__edge_reach(d, &hit, &at, &light);
 }

@@ -31,12 +31,6 @@ static void point_draw(const struct imp_sensor *s, const double u[4],
     s->shape->ops->sample_area(s->shape, on, at);
 }
 
-void imp__connect_numbers(const struct imp__edge_draw *d, double u[4])
-{
-    for (unsigned k = 0; k < 4; k++)
-        u[k] = d->b->tracer->sensor->shape ? imp__u01(d->key, IMP_EDGE_SENSOR + k) : 0;
-}
-
 struct imp__flux_end imp__meter_end(const struct imp__edge_draw *d,
                                     const struct imp_sensor_sample *to, imp_v3 bar)
 {
@@ -91,13 +85,11 @@ void imp__draw_meter(struct imp__edge_draw *d)
 {
     const struct imp_tracer *t = d->b->tracer;
     const bool points = imp__meter_is_points(t->sensor);
-    double u[4];
     struct imp_sensor_sample to;
     struct imp_surface at = {.uv = {0}};
-    imp__connect_numbers(d, u);
-    point_draw(t->sensor, u, &at);
+    point_draw(t->sensor, d->lens, &at);
     if (!imp__edge_any(d, at.p) ||
-        !imp__sensor_connect(t->sensor, &d->p, false, u, &to) ||
+        !imp__sensor_connect(t->sensor, &d->p, false, d->lens, &to) ||
         !imp__light_on_film(t->sensor, &to))
         return;
     const imp_v3 o = imp__offset(at.p, at.ng, d->p - at.p);

@@ -28,6 +28,9 @@ struct imp__edge_draw {
     int cell;       /* of the choice; behind all cells, of which sphere */
     struct imp__flux *first, **end;
     bool no_memory;
+    double lens
+        [4]; /* numbers of the point through which the sensor sees, and of connections */
+    imp_v3 eye; /* that point, of a camera */
 };
 
 /* Random numbers of a draw; walks that leave it have others. */
@@ -43,7 +46,7 @@ enum {
 enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
 #define IMP_EDGE_LOBE   (1u << 20) /* behind all of those: by which a lobe is chosen */
 #define IMP_EDGE_WAVE   (1u << 21) /* and from which wavelengths are drawn */
-#define IMP_EDGE_SENSOR (1u << 22) /* four, of a meter's point */
+#define IMP_EDGE_SENSOR (1u << 22) /* four, of a point of a meter or lens */
 
 /* So far beside an edge, per distance to it, it is looked past; rays are traced in float, whose
  * rounding is a tenth of that. */
@@ -91,12 +94,12 @@ imp_v3 imp__edge_beside(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m, doub
 struct imp__flux *imp__flux_add(struct imp__edge_draw *d, int n);
 static inline struct imp__flux_end imp__flux_glued(const struct imp__glued *x, imp_v3 bar)
 {
-    return (struct imp__flux_end){*x, {.v = bar}, false, 0};
+    return (struct imp__flux_end){*x, {.v = bar}, false, 0, {0}};
 }
-static inline struct imp__flux_end imp__flux_camera(const struct imp__glued *x,
-                                                    imp_v3 bar)
+static inline struct imp__flux_end
+imp__flux_camera(const struct imp__edge_draw *d, const struct imp__glued *x, imp_v3 bar)
 {
-    return (struct imp__flux_end){*x, {.v = bar}, true, 0};
+    return (struct imp__flux_end){*x, {.v = bar}, true, 0, d->eye};
 }
 /* What the camera sees at a film position. */
 imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py);
@@ -138,8 +141,6 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
 /* ---- Of meters: boundary_meter.c ---- */
 /* Has it a place for each pixel, and no area? */
 bool imp__meter_is_points(const struct imp_sensor *s);
-/* The numbers of connections to the sensor: of a meter its point. */
-void imp__connect_numbers(const struct imp__edge_draw *d, double u[4]);
 /* What the velocity of a meter's point counts. */
 struct imp__flux_end imp__meter_end(const struct imp__edge_draw *d,
                                     const struct imp_sensor_sample *to, imp_v3 bar);

@@ -89,19 +89,17 @@ static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_ligh
     }
     f->end[f->n_ends++] = d->b->tracer->sensor->shape
                               ? imp__meter_end(d, to, shift)
-                              : imp__flux_camera(&last->x.x, shift);
+                              : imp__flux_camera(d, &last->x.x, shift);
 }
 
 static void connect(struct imp__edge_draw *d, const struct imp__edge_light *light,
                     struct link *k, int depth, imp_spec brings)
 {
     const struct imp_tracer *t = d->b->tracer;
-    double u[4];
     struct imp_sensor_sample to;
     struct imp_shadow shadow;
-    imp__connect_numbers(d, u);
     if (!t->sensor->ops->connect ||
-        !imp__sensor_connect(t->sensor, &k->at.p, false, u, &to) ||
+        !imp__sensor_connect(t->sensor, &k->at.p, false, d->lens, &to) ||
         !imp__light_on_film(t->sensor, &to))
         return;
     const imp_spec L = brings * kernel(k, imp__to_local(&k->frame, to.wo)) * to.weight;

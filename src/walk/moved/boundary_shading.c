@@ -13,6 +13,7 @@
 #include "boundary_parts.h"
 #include "kind/cleared.h"
 #include "math/warp.h"
+#include "scene/pose.h"
 #include "walk/core/step.h"
 #include "walk/lights/light_step.h"
 
@@ -39,11 +40,12 @@ static struct corners corners(const struct imp_shape *s, size_t prim)
     return c;
 }
 
-/* May N.(camera - p) vanish in the triangle? It is a quadratic form of the weights, between the
- * least and the largest of its Bezier coefficients. */
-static bool may_turn(const struct corners *c, imp_v3 camera)
+/* May N.(eye - p) vanish in the triangle, for an eye within `radius` of the camera? It is a quadratic
+ * form of the weights, between the least and the largest of its Bezier coefficients. */
+static bool may_turn(const struct corners *c, imp_v3 camera, double radius)
 {
-    double lo = INFINITY, hi = -INFINITY;
+    double lo = INFINITY, hi = -INFINITY, most = 0;
+    for (int i = 0; i < 3; i++) most = imp_max(most, imp__length(c->n[i]));
     for (int i = 0; i < 3; i++)
         for (int j = 0; j <= i; j++) {
             const double b = 0.5 * (imp__dot(c->n[i], camera - c->p[j]) +
@@ -51,13 +53,22 @@ static bool may_turn(const struct corners *c, imp_v3 camera)
             lo = imp_min(lo, b);
             hi = imp_max(hi, b);
         }
-    return lo <= 0 && hi >= 0;
+    return lo <= most * radius && hi >= -most * radius;
 }
 
 static double perimeter(const struct corners *c)
 {
     return imp__length(c->p[1] - c->p[0]) + imp__length(c->p[2] - c->p[1]) +
            imp__length(c->p[0] - c->p[2]);
+}
+
+static double lens_radius(const struct imp__boundary *b)
+{
+    const struct imp_sensor *s = b->tracer->sensor;
+    const double rim[2] = {1, 0.5};
+    imp_v3 point = b->camera;
+    imp__lens_point(s, rim, &point);
+    return imp__length(point - b->camera);
 }
 
 static enum imp_status seen_find(const struct imp__boundary *b,
@@ -71,10 +82,12 @@ static enum imp_status seen_find(const struct imp__boundary *b,
     if (!item->seen || !item->seen_until)
         return imp__error(ctx, IMP_E_NOMEM, "no memory for vertex normals");
     item->seen_until[0] = 0;
+    const double radius = b->wide ? lens_radius(b) : 0;
     for (size_t k = 0; k < n; k++) {
         const struct corners c = corners(s, k);
         const double distance = imp__length(c.p[0] - b->camera) + 1e-6 * b->size;
-        if (!may_turn(&c, b->camera) || !(item->until[k + 1] > item->until[k])) continue;
+        if (!may_turn(&c, b->camera, radius) || !(item->until[k + 1] > item->until[k]))
+            continue;
         item->seen[item->n_seen] = (int)k;
         item->seen_until[item->n_seen + 1] =
             item->seen_until[item->n_seen] + perimeter(&c) / distance;
@@ -198,7 +211,7 @@ static bool seen_point(struct imp__edge_draw *d, struct imp_hit *hit)
         turn += c.n[i] * rate[i];
         p += c.p[i] * b[i];
     }
-    const imp_v3 r = d->b->camera - p;
+    const imp_v3 r = d->eye - p;
     const double g0 = imp__dot(N, r), g1 = imp__dot(turn, r) - imp__dot(N, q),
                  g2 = -imp__dot(turn, q), square = g1 * g1 - 4 * g0 * g2;
     if (!(square >= 0) || !(until < INFINITY)) return false;
@@ -278,8 +291,7 @@ static bool look_next(struct imp__edge_draw *d, const struct turning *x, double 
 static bool film_beside(const struct imp__edge_draw *d, imp_v3 p,
                         struct imp_sensor_sample *to)
 {
-    const double none[4] = {0};
-    return imp__sensor_connect(d->b->tracer->sensor, &p, false, none, to);
+    return imp__sensor_connect(d->b->tracer->sensor, &p, false, d->lens, to);
 }
 
 void imp__draw_shading_film(struct imp__edge_draw *d)
@@ -316,9 +328,9 @@ void imp__draw_shading_film(struct imp__edge_draw *d)
     const imp_v3 shift = imp__slide_bar(&p, to.wo), turn = x.x.shade * (1 / t);
     const struct imp__glued o = {.p = to.p};
     f->n_ends = 3;
-    f->end[0] = (struct imp__flux_end){p.x, p.bar, false, 0};
-    f->end[1] = imp__flux_camera(&p.x, shift - turn);
-    f->end[2] = imp__flux_camera(&o, turn);
+    f->end[0] = (struct imp__flux_end){p.x, p.bar, false, 0, {0}};
+    f->end[1] = imp__flux_camera(d, &p.x, shift - turn);
+    f->end[2] = imp__flux_camera(d, &o, turn);
 }
 
 /* ---- To a vertex ------------------------------------------------------------------------ */
@@ -355,6 +367,6 @@ void imp__draw_shading_scatter(struct imp__edge_draw *d)
     }
     struct imp__link_point slides = {.x = x.x, .bar = {.shade = w}};
     light.slide = imp__slide_bar(&slides, w);
-    light.end[0] = (struct imp__flux_end){slides.x, slides.bar, false, 0};
+    light.end[0] = (struct imp__flux_end){slides.x, slides.bar, false, 0, {0}};
     imp__edge_reach(d, &hit, &at, &light);
 }

@@ -14,17 +14,17 @@ void imp__draw_sky_film(struct imp__edge_draw *d)
     const struct imp_tracer *tracer = d->b->tracer;
     const struct imp_sensor *sensor = tracer->sensor;
     const struct imp_sky_circle *c = &d->item->circle;
-    const double none[4] = {0}, psi = IMP_2PI * d->u;
+    const double psi = IMP_2PI * d->u;
     const double sine = sqrt(imp_max(1 - imp__sqr(c->cosine), 0.0));
     const struct imp_frame f = imp__frame_from_normal(c->axis);
     const imp_v3 w = c->axis * c->cosine + (f.s * cos(psi) + f.t * sin(psi)) * sine;
     struct imp_sensor_sample to;
-    if (!sensor->ops->connect || !imp__sensor_connect(sensor, &w, true, none, &to) ||
+    if (!sensor->ops->connect || !imp__sensor_connect(sensor, &w, true, d->lens, &to) ||
         !imp__light_on_film(sensor, &to) ||
         imp__occluded_at(tracer->scene, 0, &to.p, &w, 0, INFINITY))
         return;
     d->along = f.t * cos(psi) - f.s * sin(psi);
     d->inv_pdf = IMP_2PI * sine / d->chance;
-    d->p = d->b->camera + w;
+    d->p = d->eye + w;
     imp__film_jump(d, &to);
 }

@@ -117,9 +117,9 @@ static enum imp_status sensor_allowed(const struct imp_tracer *t)
     const struct imp_sensor *s = t->sensor;
     imp_v3 centre;
     if (s->shape) return meter_allowed(t);
-    if (!imp__pinhole(s, &centre))
+    if (!imp__lens_middle(s, &centre))
         return refuse(t, "sensor", s->name, s->ops->name,
-                      "has no point in which its rays meet");
+                      "has no point in which its rays meet, and is no thin lens");
     if (s->open != s->close)
         return refuse(t, "sensor", s->name, s->ops->name, "has a shutter");
     return IMP_OK;

@@ -112,11 +112,11 @@ static inline void imp__camera_bar(const struct imp__moves *moves, imp_v3 o,
 {
     const double t = imp__length(first->x.p - o);
     const imp_v3 shift = imp__slide_bar(first, (first->x.p - o) * (1 / t));
-    imp__camera_velocity_bar(moves, first->x.p, shift, theta_bar);
+    imp__camera_velocity_bar(moves, o, first->x.p, shift, theta_bar);
     if (!imp__is_zero(wo_bar)) {
         /* The ray turns by (u(p) - u(o))/t, and wo against it. */
-        imp__camera_velocity_bar(moves, first->x.p, wo_bar * (-1 / t), theta_bar);
-        imp__camera_velocity_bar(moves, o, wo_bar * (1 / t), theta_bar);
+        imp__camera_velocity_bar(moves, o, first->x.p, wo_bar * (-1 / t), theta_bar);
+        imp__camera_velocity_bar(moves, first->x.p, o, wo_bar * (1 / t), theta_bar);
     }
     imp__velocity_bar(moves, &first->x, &first->bar, theta_bar);
 }

@@ -216,8 +216,8 @@ static void sky_seen_bar(const struct sweep *s, imp_spec adjoint)
     const imp_v3 slope =
         imp__skies_slope(s->tracer->scene, ray->d, adjoint, s->walk->first->carried);
     if (imp__is_zero(slope)) return;
-    imp__camera_velocity_bar(s->moves, ray->o + ray->d, slope, s->theta_bar);
-    imp__camera_velocity_bar(s->moves, ray->o, -slope, s->theta_bar);
+    imp__camera_velocity_bar(s->moves, ray->o, ray->o + ray->d, slope, s->theta_bar);
+    imp__camera_velocity_bar(s->moves, ray->o + ray->d, ray->o, -slope, s->theta_bar);
 }
 
 bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
