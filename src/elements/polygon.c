@@ -48,7 +48,7 @@ double imp__polygon_factor(imp_v3 x, imp_v3 normal, int n, const imp_v3 *v, imp_
             cosine[k - first] = imp__dot(p, q);
             across[k - first] = imp__dot(c, normal) / length;
         }
-        const imp_v3 part = imp__angles(cosine, sine) * across;
+        const imp_v3 part = imp__angles_4(cosine, sine) * across;
         sum += (part[0] + part[1]) + (part[2] + part[3]);
     }
     return fabs(sum) / 2;

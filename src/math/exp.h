@@ -28,8 +28,8 @@ static inline imp_v3 imp__exp(imp_v3 x)
                      z * (1. / 479001600 + r * (1. / 6227020800));
     const imp_v3 e = 1 + (r + z * ((a + z2 * b) + z4 * c));
     const imp_v3 power = (imp_v3)(((bits)t - (bits)shift + 1023) << 52);
-    const imp_v3 least = imp__lanes_choose(x < -708, (imp_v3){0}, e * power);
-    return imp__lanes_choose(x > 709, imp__spec(INFINITY), least);
+    const imp_v3 least = imp__choose_4(x < -708, (imp_v3){0}, e * power);
+    return imp__choose_4(x > 709, imp__spec(INFINITY), least);
 }
 
 #endif

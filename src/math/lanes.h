@@ -10,15 +10,7 @@
 static inline imp_v3 imp__lanes_clamp(imp_v3 x, double lo, double hi)
 {
     const imp_v3 l = imp__spec(lo), h = imp__spec(hi);
-    return imp__lanes_choose(x < l, l, imp__lanes_choose(x > h, h, x));
-}
-static inline imp_v3 imp__lanes_sqrt(imp_v3 x)
-{
-#ifdef __AVX__
-    return (imp_v3)__builtin_ia32_sqrtpd256(x);
-#else
-    return (imp_v3){sqrt(x[0]), sqrt(x[1]), sqrt(x[2]), sqrt(x[3])};
-#endif
+    return imp__choose_4(x < l, l, imp__choose_4(x > h, h, x));
 }
 
 /* Abramowitz and Stegun 4.4.46, to 2e-8; c in [-1, 1]. */
@@ -32,8 +24,8 @@ static inline imp_v3 imp__lanes_acos(imp_v3 c)
     p = p * a + 0.0889789874;
     p = p * a - 0.2145988016;
     p = p * a + 1.5707963050;
-    p *= imp__lanes_sqrt(1 - a);
-    return imp__lanes_choose(c < imp__spec(0), IMP_PI - p, p);
+    p *= imp__root_4(1 - a);
+    return imp__choose_4(c < imp__spec(0), IMP_PI - p, p);
 }
 
 #endif

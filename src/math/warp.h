@@ -22,7 +22,7 @@ static inline void imp__concentric_disk(const double u[2], double xy[2])
     const imp_pair_mask wide = imp__pair_exceeds(fabs(a), fabs(b));
     const imp_pair larger = imp__pair_choose(wide, (imp_pair){a, b}, (imp_pair){b, a});
     const double r = larger[0], x = IMP_PI / 4 * (larger[1] / r);
-    const double s = imp__sin_eighth(x), c = imp__cos_eighth(x);
+    const double s = imp__sin_eighth_1(x), c = imp__cos_eighth_1(x);
     const imp_pair p = imp__pair_choose(wide, (imp_pair){c, s}, (imp_pair){s, c});
     xy[0] = r * p[0];
     xy[1] = r * p[1];

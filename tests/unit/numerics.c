@@ -146,23 +146,23 @@ static void angles(void)
         const double turn = IMP_PI * imp__u01(key, 0), size = exp2(i % 200 - 100.);
         const imp_v3 x = {size * cos(turn), -size, 0, size * imp__u01(key, 1)},
                      y = {size * sin(turn), size * exp2(-(double)(i % 60)), size, size};
-        const imp_v3 a = imp__angles(x, y);
+        const imp_v3 a = imp__angles_4(x, y);
         for (int k = 0; k < 4; k++) {
             const long double right = atan2l(y[k], x[k]);
             worst = fmax(worst, (double)fabsl((a[k] - right) / right));
         }
-        const imp_v3 sign = {-1, 1, -1, 1}, b = imp__angles_signed(x * sign, -y * sign);
+        const imp_v3 sign = {-1, 1, -1, 1}, b = imp__angles_signed_4(x * sign, -y * sign);
         for (int k = 0; k < 4; k++) {
             const long double right = atan2l(-y[k] * sign[k], x[k] * sign[k]);
             worst = fmax(worst, (double)fabsl((b[k] - right) / right));
         }
     }
-    const imp_v3 flat = imp__angles((imp_v3){2, -2, 0, 1}, (imp_v3){0, 0, 3, 1});
+    const imp_v3 flat = imp__angles_4((imp_v3){2, -2, 0, 1}, (imp_v3){0, 0, 3, 1});
     tap_ok(flat[0] == 0 && flat[1] == IMP_PI && flat[2] == IMP_PI / 2 &&
                flat[3] == IMP_PI / 4,
            "along the axes and between them");
     const imp_v3 round =
-        imp__angles_signed((imp_v3){0, -1, 0, -1}, (imp_v3){0, 0, -1, -1});
+        imp__angles_signed_4((imp_v3){0, -1, 0, -1}, (imp_v3){0, 0, -1, -1});
     tap_ok(round[0] == 0 && round[1] == IMP_PI && round[2] == -IMP_PI / 2 &&
                round[3] == -0.75 * IMP_PI,
            "the vector 0 has the angle 0, and those below the axis a negative one");

@@ -60,7 +60,7 @@ static inline imp_v3 relative(const struct imp__sky_shape *s, double g, imp_v3 c
     const imp_v3 c = imp__lanes_clamp(cosine, -1, 1);
     const imp_v3 near = imp__exp(n[3] * imp__lanes_acos(c)) - s->h;
     const imp_v3 L = g * (1 + n[2] * near + n[4] * c * c);
-    return imp__lanes_choose(L > imp__spec(0), L, imp__spec(0));
+    return imp__choose_4(L > imp__spec(0), L, imp__spec(0));
 }
 
 static double zenith_factor(const struct imp__sky_shape *s, double z)

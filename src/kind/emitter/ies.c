@@ -83,7 +83,7 @@ static bool angles_of(const struct imp__ies *x, imp_v3 w, double *v, double *h)
         cosine[0] = sqrt(a * a + b * b), sine[0] = -c;
         cosine[1] = a, sine[1] = -b;
     }
-    const imp_v3 angle = imp__angles_signed(cosine, sine) * (1 / DEGREE);
+    const imp_v3 angle = imp__angles_signed_4(cosine, sine) * (1 / DEGREE);
     *v = angle[0];
     *h = angle[1];
     if (d->type == IMP_PHOTOMETRY_C) {

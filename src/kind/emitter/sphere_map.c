@@ -10,7 +10,7 @@ void imp__sphere_map_place(const struct imp__sphere_map *m, imp_v3 d, double *u,
 {
     const double out = sqrt(d[0] * d[0] + d[2] * d[2]), last = m->height - 1;
     const imp_v3 angle =
-        imp__angles_signed((imp_v3){-d[2], d[1], 1, 1}, (imp_v3){d[0], out, 0, 0});
+        imp__angles_signed_4((imp_v3){-d[2], d[1], 1, 1}, (imp_v3){d[0], out, 0, 0});
     const double turns = angle[0] * (IMP_INV_PI / 2);
     *u = turns < 0 ? turns + 1 : turns;
     if (m->projection == IMP_LATLONG) *row = angle[1] * IMP_INV_PI * last;

@@ -146,7 +146,7 @@ static inline imp_v3 four_weigh(const float *positions, const uint32_t index[12]
     for (int i = 0; i < 3; i++) {
         /* From sine and cosine, which keep the angle exact for slivers, where acos loses
          * it. */
-        const imp_v3 weight = imp__angles(cosine[i], twice_area) * one;
+        const imp_v3 weight = imp__angles_4(cosine[i], twice_area) * one;
         add[i] = (struct four){normal.x * weight, normal.y * weight, normal.z * weight};
     }
     return twice_area;

@@ -80,8 +80,8 @@ static void surface_at(const struct sphere *p, imp_v3 outward, struct imp_surfac
     out->p = p->center + outward * p->radius;
     out->ng = out->n = outward * p->side;
     /* Longitude, over a turn, and latitude; 0 of the former at a pole. */
-    const imp_v3 angle = imp__angles((imp_v3){rho > 0 ? q[0] : 1, q[2], 1, 1},
-                                     (imp_v3){fabs(q[1]), rho, 0, 0});
+    const imp_v3 angle = imp__angles_4((imp_v3){rho > 0 ? q[0] : 1, q[2], 1, 1},
+                                       (imp_v3){fabs(q[1]), rho, 0, 0});
     const double turn = angle[0] * (1 / IMP_2PI), u = q[1] < 0 ? 1 - turn : turn;
     out->uv[0] = u < 1 ? u : 0;
     out->uv[1] = angle[1] * IMP_INV_PI;

@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * One, four or eight numbers, and functions of them that are not operators. The same bits on
+ * every processor, and in every lane as alone. */
+#ifndef IMP_MATH_REALS_H
+#define IMP_MATH_REALS_H
+
+#include "vec.h"
+
+/* What comparisons give: of vectors all bits of a lane that is true. */
+typedef double imp_real_1;
+typedef int imp_truth_1;
+typedef imp_spec imp_real_4;
+typedef int64_t imp_truth_4 __attribute__((vector_size(32)));
+typedef double imp_real_8 __attribute__((vector_size(64)));
+typedef int64_t imp_truth_8 __attribute__((vector_size(64)));
+
+/* a where m is true, else b. */
+static inline double imp__choose_1(int m, double a, double b) { return m ? a : b; }
+static inline imp_real_4 imp__choose_4(imp_truth_4 m, imp_real_4 a, imp_real_4 b)
+{
+    return (imp_real_4)((m & (imp_truth_4)a) | (~m & (imp_truth_4)b));
+}
+static inline imp_real_8 imp__choose_8(imp_truth_8 m, imp_real_8 a, imp_real_8 b)
+{
+    return (imp_real_8)((m & (imp_truth_8)a) | (~m & (imp_truth_8)b));
+}
+
+static inline double imp__root_1(double x) { return sqrt(x); }
+static inline imp_real_4 imp__root_4(imp_real_4 x)
+{
+#ifdef __AVX__
+    return (imp_real_4)__builtin_ia32_sqrtpd256(x);
+#else
+    return (imp_real_4){sqrt(x[0]), sqrt(x[1]), sqrt(x[2]), sqrt(x[3])};
+#endif
+}
+static inline imp_real_8 imp__root_8(imp_real_8 x)
+{
+    return (imp_real_8){sqrt(x[0]), sqrt(x[1]), sqrt(x[2]), sqrt(x[3]),
+                        sqrt(x[4]), sqrt(x[5]), sqrt(x[6]), sqrt(x[7])};
+}
+
+/* The same number in all lanes. */
+static inline double imp__real_1(double x) { return x; }
+static inline imp_real_4 imp__real_4(double x) { return imp__spec(x); }
+static inline imp_real_8 imp__real_8(double x)
+{
+    return (imp_real_8){x, x, x, x, x, x, x, x};
+}
+
+static inline double imp__magnitude_1(double x) { return fabs(x); }
+static inline imp_real_4 imp__magnitude_4(imp_real_4 x) { return imp__abs(x); }
+static inline imp_real_8 imp__magnitude_8(imp_real_8 x)
+{
+    return (imp_real_8)((imp_truth_8)x & INT64_MAX);
+}
+
+/* The greater; b where one is NAN. */
+static inline double imp__larger_1(double a, double b) { return imp_max(a, b); }
+static inline imp_real_4 imp__larger_4(imp_real_4 a, imp_real_4 b)
+{
+    return imp__choose_4(a > b, a, b);
+}
+static inline imp_real_8 imp__larger_8(imp_real_8 a, imp_real_8 b)
+{
+    return imp__choose_8(a > b, a, b);
+}
+
+#endif
