@@ -192,10 +192,10 @@ static void camera_test(void)
         const double t = 0.5 + 0.3 * i;
         const imp_v3 p = ray[1].o + ray[1].d * t;
         const imp_v3 d = (ray[2].o + ray[2].d * t - ray[0].o - ray[0].d * t) * (0.5 / h);
-        const imp_v3 u = imp__camera_velocity(&m, p, theta);
+        const imp_v3 u = imp__camera_velocity(&m, ray[1].o, p, theta);
         worst = fmax(worst, imp__length(u - d));
         double bar[6] = {0}, sum = 0;
-        imp__camera_velocity_bar(&m, p, imp__v3(.3, -.4, .7), bar);
+        imp__camera_velocity_bar(&m, ray[1].o, p, imp__v3(.3, -.4, .7), bar);
         for (int k = 0; k < 6; k++) sum += bar[k] * theta[k];
         transposed = fmax(transposed, fabs(sum - imp__dot(u, imp__v3(.3, -.4, .7))));
     }
