@@ -195,9 +195,10 @@ static enum imp_status photo_take(struct imp__measure *m, size_t i)
     p->square = imp__alloc(m->ctx, p->n_pixels, sizeof(float));
     p->expected = imp__alloc(m->ctx, p->n_pixels, sizeof(float));
     p->robust = imp__alloc(m->ctx, p->n_pixels, sizeof(float));
+    p->edges = imp__alloc(m->ctx, p->n_pixels, sizeof(float));
     p->masked = imp__alloc(m->ctx, (size_t)p->columns * (size_t)p->rows, 1);
     if (!p->noise_se || !p->weights || !p->left || !p->own || !p->square ||
-        !p->expected || !p->robust || !p->masked)
+        !p->expected || !p->robust || !p->edges || !p->masked)
         return imp__error(m->ctx, IMP_E_NOMEM, "no memory for %s", p->name);
     for (size_t k = 0; k < p->n_pixels; k++)
         p->weights[k] = d->weights ? d->weights[k] : 1;
@@ -231,6 +232,7 @@ void imp__measure_photos_free(struct imp__measure *m)
         imp__release(m->ctx, m->photos[i].own);
         imp__release(m->ctx, m->photos[i].expected);
         imp__release(m->ctx, m->photos[i].robust);
+        imp__release(m->ctx, m->photos[i].edges);
         imp__release(m->ctx, m->photos[i].masked);
     }
     imp__release(m->ctx, m->photos);

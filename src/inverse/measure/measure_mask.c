@@ -37,7 +37,7 @@ static double block_level(const struct imp__photo *p, int column, int row, int *
             if (!(p->expected[at] > 0) || (p->desc.weights && !(p->desc.weights[at] > 0)))
                 continue;
             square += (double)p->square[at];
-            expected += (double)p->expected[at];
+            expected += (double)p->expected[at] + (double)p->edges[at];
             n++;
         }
     *values = n * p->desc.channels;

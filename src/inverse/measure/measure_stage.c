@@ -15,10 +15,14 @@
 #define SEED       0x57a6e
 #define ITERATIONS 12 /* of a stage that is not the last fit */
 #define COMPARE    0xc03a
-#define LEVELS     4 /* of cameras, in the first round, ... */
-#define ACROSS     8 /* ... through tents of at most this part of a photograph */
-#define TEXTURE    4 /* levels of textures */
-#define DOUBT      3 /* errors of chi-square above 1 from which on a stage is not explained */
+#define LEVELS     4    /* of cameras, in the first round, ... */
+#define ACROSS     8    /* ... through tents of at most this part of a photograph */
+#define TEXTURE    4    /* levels of textures */
+#define NEVER      1e30 /* a level that no value reaches */
+#define SEARCHES                                                                         \
+    5 /* of the last fit, at most, with decisions on clipped values before each, */
+#define CAMERAS 2 /* of cameras; one of the other stages */
+#define DOUBT   3 /* errors of chi-square above 1 from which on a stage is not explained */
 
 /* ---- Which numbers --------------------------------------------------------------------- */
 
@@ -78,18 +82,14 @@ static enum imp_status exposures_tie(struct imp__measure *m, imp_problem *p)
     return IMP_OK;
 }
 
-/* Until the last fit, pixels with a clipped value have no weight, as fits that decide which of
- * them count take several searches, and others have robust ones. weights [n_pixels]. */
+/* Until the last fit, pixels have robust weights. weights [n_pixels]. */
 static void weights_make(const struct imp__photo *p, float *weights)
 {
-    const size_t C = (size_t)p->desc.channels;
-    for (size_t i = 0; i < p->n_pixels; i++) {
-        weights[i] = p->weights[i] * p->robust[i];
-        for (size_t c = 0; c < C && p->desc.clipped; c++)
-            if (p->desc.pixels[i * C + c] >= (float)p->desc.high) weights[i] = 0;
-    }
+    for (size_t i = 0; i < p->n_pixels; i++) weights[i] = p->weights[i] * p->robust[i];
 }
 
+/* Levels also where nothing was clipped: pictures of the start then say how well walks know each value,
+ * and a power is expanded about what the scene has. */
 static enum imp_status target_add(struct imp__measure *m, imp_problem *p, size_t i,
                                   bool last)
 {
@@ -114,7 +114,8 @@ static enum imp_status target_add(struct imp__measure *m, imp_problem *p, size_t
     }
     st = imp_problem_add_target(p, &t);
     if (st != IMP_OK) IMP_TRY(imp__error_prefix(m->ctx, st, "%s", photo->name));
-    if (d->clipped && last) IMP_TRY(imp_problem_clip(p, (int)i, d->low, d->high));
+    IMP_TRY(imp_problem_clip(p, (int)i, d->clipped ? d->low : -NEVER,
+                             d->clipped ? d->high : NEVER));
 out:
     imp__release(m->ctx, weights);
     return st;
@@ -154,6 +155,9 @@ static enum imp_status problem_make(struct imp__measure *m, enum imp_measure_sta
     IMP_TRY(exposures_tie(m, p));
     IMP_TRY(sizes_tie(m, p));
     for (size_t i = 0; i < m->n_photos; i++) IMP_TRY(target_add(m, p, i, last));
+    p->near_searches = stage == IMP_MEASURE_TOGETHER ? SEARCHES
+                       : stage <= IMP_MEASURE_LENS   ? CAMERAS
+                                                     : 1;
     *out = p;
     p = NULL;
 out:

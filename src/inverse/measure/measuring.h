@@ -23,6 +23,8 @@ struct imp__photo {
     float
         *expected; /* [n_pixels] ... and what noise makes of it; 0: nothing is compared */
     float *robust; /* [n_pixels] factors of weights in all fits but the last */
+    float *
+        edges; /* [n_pixels] squared residuals by edges that are a little off; 0: places are known */
     int block, columns, rows;
     uint8_t *masked; /* [rows][columns] */
     size_t n_masked;
