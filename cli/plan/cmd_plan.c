@@ -163,5 +163,5 @@ const struct command command_plan = {
      1},
     run_plan,
     1,
-    0,
+    1,
     REPLAYS_NEVER};

@@ -44,13 +44,15 @@ static double block_level(const struct imp__photo *p, int column, int row, int *
     return square > 0 ? log(square / expected) : NAN;
 }
 
-/* level [n] of blocks; marks those above `high`, and neighbours of these above `low`. */
+/* level [n] of blocks; marks those above `high`, those that are masked and above `low`, so that a block near
+ * the limit does not come and go, and neighbours of these above `low`. */
 static size_t blocks_mark(const struct imp__photo *p, const double *level, double high,
                           double low, uint8_t *mark)
 {
     size_t n = 0;
     bool grown = true;
-    for (int k = 0; k < p->columns * p->rows; k++) mark[k] = level[k] > high;
+    for (int k = 0; k < p->columns * p->rows; k++)
+        mark[k] = level[k] > high || (p->masked[k] && level[k] > low);
     while (grown) {
         grown = false;
         for (int k = 0; k < p->columns * p->rows; k++) {
