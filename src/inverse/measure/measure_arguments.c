@@ -106,7 +106,10 @@ static enum imp_status numbers_check(struct imp__measure *m, const struct imp__p
                  {"focal_35mm", p->desc.focal_35mm},
                  {"exposure_s", p->desc.exposure_s},
                  {"iso", p->desc.iso},
-                 {"f_number", p->desc.f_number}};
+                 {"f_number", p->desc.f_number},
+                 {"read", p->desc.read},
+                 {"shot", p->desc.shot},
+                 {"relative", p->desc.relative}};
     for (size_t k = 0; k < imp_count(given); k++)
         if (!(given[k].value >= 0) || !isfinite(given[k].value))
             return imp__error(m->ctx, IMP_E_ARG, "%s: %s = %g is not a number >= 0",
@@ -254,7 +257,8 @@ uint64_t imp__measure_hash(const struct imp__measure *m)
         const double d[] = {p->desc.sensor,     p->desc.clipped,    p->desc.low,
                             p->desc.high,       p->desc.noise,      p->desc.step,
                             p->desc.focal_35mm, p->desc.exposure_s, p->desc.iso,
-                            p->desc.f_number};
+                            p->desc.f_number,   p->desc.read,       p->desc.shot,
+                            p->desc.relative};
         const uint64_t camera = imp__fingerprint_sensor(p->sensor);
         h = imp__hash(h, d, sizeof d);
         h = imp__hash(h, &camera, sizeof camera);

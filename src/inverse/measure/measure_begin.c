@@ -161,9 +161,12 @@ enum imp_status imp__measure_begin(struct imp__measure *m)
     if (!ratio) IMP_TRY(imp__error(m->ctx, IMP_E_NOMEM, "no memory for photographs"));
     for (size_t i = 0; i < m->n_photos; i++) {
         IMP_TRY(imp__measure_noise(m, &m->photos[i]));
-        IMP_TRY(imp__measure_say(
-            m, "%s: noise %.3g%s", m->photos[i].name, m->photos[i].noise,
-            m->photos[i].noise_of > 0 ? " of its values, estimated" : " of its values"));
+        IMP_TRY(imp__measure_say(m, "%s: noise %.3g%s", m->photos[i].name,
+                                 m->photos[i].noise,
+                                 m->photos[i].noise_of > 0 ? " of its values, estimated"
+                                 : imp__measure_noise_varies(&m->photos[i])
+                                     ? " of its values, root of the mean square"
+                                     : " of its values"));
     }
     IMP_TRY(views_set(m));
     for (size_t i = 0; i < m->n_photos; i++)

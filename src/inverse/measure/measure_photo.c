@@ -32,8 +32,8 @@ struct compared {
     double own;      /* variance of the picture's */
 };
 
-static struct compared value_compare(const struct imp__photo *p, double T, double M,
-                                     double M_se, double gamma)
+static struct compared value_compare(const struct imp__photo *p, double noise, double T,
+                                     double M, double M_se, double gamma)
 {
     const bool curve = gamma != 1;
     struct compared v = {NAN, 0};
@@ -41,7 +41,7 @@ static struct compared value_compare(const struct imp__photo *p, double T, doubl
     const double V = curve ? pow(fmax(M, 0), 1 / gamma) : M;
     const double slope = curve ? V / (gamma * fmax(M, 1e-12)) : 1;
     v.own = isfinite(M_se) ? imp__sqr(slope * M_se) : 0;
-    const double doubt = 3 * sqrt(imp__sqr(p->noise) + v.own);
+    const double doubt = 3 * sqrt(noise * noise + v.own);
     if (p->desc.clipped && T >= p->desc.high)
         v.residual = V > p->desc.high - doubt ? NAN : p->desc.high - V;
     else if (p->desc.clipped && T <= p->desc.low)
@@ -51,8 +51,8 @@ static struct compared value_compare(const struct imp__photo *p, double T, doubl
 }
 
 /* Sums over the pixels that have a weight. The expectation of squared residuals contains the variance
- * of the picture, which is taken off: chi2 = sum w (r^2 - own)/(sum w noise^2), with a variance of
- * 2 sum w^2 (noise^2 + own)^2 for Gaussian residuals, which w = (noise^2/(noise^2 + own))^2 makes least.
+ * of the picture, which is taken off: chi2 = sum w (r^2 - own)/noise^2 / sum w, with a variance of
+ * 2 sum w^2 (1 + own/noise^2)^2 for Gaussian residuals, which w = (noise^2/(noise^2 + own))^2 makes least.
  * Without w, a few pixels that a lamp covers in part would be most of it. */
 struct sums {
     double square, own, variance, weights;
@@ -86,15 +86,14 @@ static void pixel_add(struct imp__photo *p, size_t i, struct sums *s)
         const size_t at = i * (size_t)C + (size_t)c;
         const double residual = (double)p->left[at], own = (double)p->own[at];
         if (isnan(residual)) continue;
-        const double both = imp__sqr(p->noise) + own;
+        const double noise2 = imp__sqr((double)p->noise_se[at]), both = noise2 + own;
         square += imp__sqr(residual);
         expected += both;
         if (!(p->weights[i] > 0)) continue;
-        const double w =
-            imp__sqr(imp__sqr(p->noise) / (imp__sqr(p->noise) + own_around(p, i, c)));
-        s->square += w * imp__sqr(residual);
-        s->own += w * own;
-        s->variance += 2 * imp__sqr(w * both);
+        const double w = imp__sqr(noise2 / (noise2 + own_around(p, i, c)));
+        s->square += w * imp__sqr(residual) / noise2;
+        s->own += w * own / noise2;
+        s->variance += 2 * imp__sqr(w * both / noise2);
         s->weights += w;
         s->n++;
     }
@@ -181,12 +180,13 @@ enum imp_status imp__measure_residual(struct imp__measure *m, struct imp__photo 
     IMP_TRY(imp_problem_create(m->scene, &blank));
     IMP_TRY(imp_problem_jacobian(blank, &run, &film, NULL));
     const float *mean = imp_film_mean(film), *se = imp_film_se(film);
+    if (imp__measure_noise_varies(p)) imp__measure_noise_by_light(p, mean, gamma);
     for (size_t i = 0; i < p->n_pixels; i++) {
         for (int c = 0; c < C; c++) {
             const size_t at = i * (size_t)C + (size_t)c;
             const struct compared v =
-                value_compare(p, (double)p->desc.pixels[at], (double)mean[at],
-                              se ? (double)se[at] : 0, gamma);
+                value_compare(p, (double)p->noise_se[at], (double)p->desc.pixels[at],
+                              (double)mean[at], se ? (double)se[at] : 0, gamma);
             p->left[at] = (float)v.residual;
             p->own[at] = (float)v.own;
         }
@@ -194,10 +194,9 @@ enum imp_status imp__measure_residual(struct imp__measure *m, struct imp__photo 
     for (size_t i = 0; i < p->n_pixels; i++) pixel_add(p, i, &sums);
     edges_set(m, p, mean, gamma);
     IMP_TRY(robust_set(m, p));
-    const double unit = sums.weights * imp__sqr(p->noise);
     p->n_compared = sums.n;
-    p->chi2 = sums.n > 0 ? (sums.square - sums.own) / unit : NAN;
-    p->chi2_se = sums.n > 0 ? sqrt(sums.variance) / unit : NAN;
+    p->chi2 = sums.n > 0 ? (sums.square - sums.own) / sums.weights : NAN;
+    p->chi2_se = sums.n > 0 ? sqrt(sums.variance) / sums.weights : NAN;
 out:
     imp_film_destroy(film);
     imp_problem_destroy(blank);

@@ -82,10 +82,19 @@ static enum imp_status exposures_tie(struct imp__measure *m, imp_problem *p)
     return IMP_OK;
 }
 
-/* Until the last fit, pixels have robust weights. weights [n_pixels]. */
-static void weights_make(const struct imp__photo *p, float *weights)
+/* Until the last fit, pixels have robust weights; where noise varies, those of their noise. weights
+ * [n_pixels]. */
+static void weights_make(const struct imp__photo *p, bool last, float *weights)
 {
-    for (size_t i = 0; i < p->n_pixels; i++) weights[i] = p->weights[i] * p->robust[i];
+    const size_t C = (size_t)p->desc.channels;
+    for (size_t i = 0; i < p->n_pixels; i++) {
+        double variance = 0;
+        weights[i] = last ? p->weights[i] : p->weights[i] * p->robust[i];
+        for (size_t c = 0; c < C; c++)
+            variance += imp__sqr((double)p->noise_se[i * C + c]) / (double)C;
+        if (imp__measure_noise_varies(p))
+            weights[i] *= (float)(p->noise * p->noise / variance);
+    }
 }
 
 /* Levels also where nothing was clipped: pictures of the start then say how well walks know each value,
@@ -106,10 +115,10 @@ static enum imp_status target_add(struct imp__measure *m, imp_problem *p, size_t
     t.weights = d->weights || photo->n_masked > 0 ? photo->weights : NULL;
     t.noise_se = photo->noise_se;
     t.scale = 1 / (photo->noise * photo->noise);
-    if (!last) {
+    if (!last || imp__measure_noise_varies(photo)) {
         weights = imp__alloc(m->ctx, photo->n_pixels, sizeof *weights);
         if (!weights) IMP_TRY(imp__error(m->ctx, IMP_E_NOMEM, "no memory for a stage"));
-        weights_make(photo, weights);
+        weights_make(photo, last, weights);
         t.weights = weights;
     }
     st = imp_problem_add_target(p, &t);

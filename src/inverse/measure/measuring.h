@@ -13,9 +13,9 @@ struct imp__photo {
     const char *name;
     const struct imp_sensor *sensor;
     size_t n_pixels, n_values;
-    double noise;    /* one standard deviation */
+    double noise;    /* one standard deviation; root of the mean square where it varies */
     double noise_of; /* relative error of its square; 0: it was given */
-    float *noise_se; /* [n_values] all `noise`, for targets */
+    float *noise_se; /* [n_values] all `noise`, unless it varies */
     float *weights;  /* [n_pixels] desc.weights, 0 where masked */
     float *left,
         *own;      /* [n_values] residuals, NAN: not compared; the picture's variances */
@@ -106,6 +106,12 @@ size_t imp__measure_count(const struct imp__measure *m, enum imp_measure_stage s
 enum imp_status imp__measure_begin(struct imp__measure *m);
 
 /* ---- measure_noise.c ---- */
+/* Is it given by value? */
+bool imp__measure_noise_varies(const struct imp__photo *photo);
+/* Then: of all values, where the scene's light is light [n_values] and its film has this gamma; by the
+ * picture and not by the photograph, whose noise would be in the weights. */
+void imp__measure_noise_by_light(struct imp__photo *photo, const float *light,
+                                 double gamma);
 /* noise, and noise_of where it was not given. */
 enum imp_status imp__measure_noise(struct imp__measure *m, struct imp__photo *photo);
 /* The same from its residuals, where that is less: *changed, and a line. */
