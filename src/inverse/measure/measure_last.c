@@ -78,7 +78,7 @@ enum imp_status imp__measure_last(struct imp__measure *m, imp_problem **problem,
     m->doubtful = m->astray = false;
     IMP_TRY(imp_scene_get_theta(m->scene, theta));
     IMP_TRY(imp__measure_look(m));
-    imp__measure_judge(m, &start);
+    imp__measure_judge(m, 0, &start);
     IMP_TRY(imp__measure_stage(m, stage, problem, result));
     if (stage != IMP_MEASURE_TOGETHER || last_row(m)->explained ||
         !is_above(last_row(m), &start))

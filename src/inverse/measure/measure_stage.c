@@ -226,7 +226,8 @@ enum imp_status imp__measure_look(struct imp__measure *m)
     return m->looked ? IMP_OK : photos_look(m, m->n_rows);
 }
 
-void imp__measure_judge(const struct imp__measure *m, struct imp_measure_row *row)
+void imp__measure_judge(const struct imp__measure *m, double own_part,
+                        struct imp_measure_row *row)
 {
     double sum = 0, variance = 0, values = 0, noise_of = 0;
     for (size_t i = 0; i < m->n_photos; i++) {
@@ -239,8 +240,11 @@ void imp__measure_judge(const struct imp__measure *m, struct imp_measure_row *ro
         values += n;
     }
     const double freedom = fmax(values - (double)row->n, 1);
-    row->chi2 = sum / freedom;
-    row->chi2_se = hypot(sqrt(variance) / freedom, noise_of / freedom);
+    const double n = (double)row->n,
+                 own = isfinite(own_part) ? own_part * n / freedom : 0;
+    row->chi2 = sum / freedom - own;
+    row->chi2_se =
+        hypot(hypot(sqrt(variance), noise_of) / freedom, n > 0 ? own * sqrt(2 / n) : 0);
     row->explained = values > 0 && row->chi2 - 1 < DOUBT * row->chi2_se &&
                      row->chi2_se < IMP_MEASURE_BLIND;
 }
@@ -261,7 +265,8 @@ static enum imp_status row_add(struct imp__measure *m, enum imp_measure_stage st
                                     .residual = r->residual,
                                     .residual_hi = r->residual_hi};
     IMP_CHECKED(photos_look(m, m->n_rows + 1));
-    imp__measure_judge(m, row);
+    m->own_part = r->own_part;
+    imp__measure_judge(m, m->own_part, row);
     m->n_rows++;
     return imp__measure_say(
         m,
@@ -277,7 +282,7 @@ enum imp_status imp__measure_judge_again(struct imp__measure *m)
     struct imp_measure_row *row = &m->rows[m->n_rows - 1];
     m->looked = false;
     IMP_CHECKED(imp__measure_look(m));
-    imp__measure_judge(m, row);
+    imp__measure_judge(m, m->own_part, row);
     return imp__measure_say(m,
                             "round %d, %s: by this noise chi-square is %.3g +- %.2g, %s",
                             row->round, imp_measure_stage_name(row->stage), row->chi2,

@@ -63,9 +63,10 @@ struct imp__measure {
     char **lines;
     bool
         doubtful; /* the last fit has the stages' weights, which its intervals do not know */
-    bool astray;  /* the last fit ended worse than it began, whatever was done */
-    bool looked;  /* residuals are those of the present numbers */
-    bool repeats; /* lines are not given to the host: the checkpoint's */
+    bool astray;     /* the last fit ended worse than it began, whatever was done */
+    double own_part; /* of the last fit's answer (struct imp_fit_result) */
+    bool looked;     /* residuals are those of the present numbers */
+    bool repeats;    /* lines are not given to the host: the checkpoint's */
 };
 
 /* ---- measure.c ---- */
@@ -133,8 +134,10 @@ void imp__measure_weights(struct imp__photo *photo);
 /* ---- measure_stage.c ---- */
 /* Residuals of all photographs at the present numbers, unless they are there. */
 enum imp_status imp__measure_look(struct imp__measure *m);
-/* Chi-square of the residuals that are there, of row->n numbers. */
-void imp__measure_judge(const struct imp__measure *m, struct imp_measure_row *row);
+/* Chi-square of the residuals that are there, of row->n numbers; own_part: what our own noise in them
+ * adds, in parts of row->n; it is taken off. */
+void imp__measure_judge(const struct imp__measure *m, double own_part,
+                        struct imp_measure_row *row);
 /* Chi-square of the last row again, by other noise; says so. */
 enum imp_status imp__measure_judge_again(struct imp__measure *m);
 /* A fit of one stage, whose problem is destroyed unless `problem` is there. Adds its row. */
