@@ -119,7 +119,7 @@ enum imp_status imp__fit_levels_allowed(const struct imp_problem *problem,
 
 /* fit_clip.c: before the first search, of clipped targets. */
 enum imp_status imp__fit_clipped_begin(struct imp__fit *fit);
-/* Of clipped targets, decides anew after search *s, the round-th. *again: with
+/* Clipped targets: decides anew after search *s, the round-th. *again: with
  * other weights, and *s is the next search, which has not begun, of these options. */
 enum imp_status imp__fit_clipped(struct imp__fit *fit, int round,
                                  struct imp__opt_options *options, struct imp__search **s,

@@ -132,7 +132,7 @@ struct imp_problem {
     struct imp__allocation *allocation; /* of its samples; NULL: all alike */
     struct imp__variate *variate; /* of the evaluation at work (variate.h); NULL: none */
     enum imp__loss_use use;
-    /* Of a fit to clipped targets that begins near its end: pictures of the start decide who counts, and so
+    /* A fit to clipped targets may begin near its end: pictures of the start decide who counts, and so
      * many searches follow at most; 0: it may begin anywhere (fit_clip.c). */
     int near_searches;
     bool seams_join; /* vertices of a mesh at one place move together (fit_mesh.c) */
