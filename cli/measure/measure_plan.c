@@ -71,7 +71,12 @@ int next_photo_find(imp_problem *problem, const struct photos *photos,
         if (!has_photo(photos, s)) add(out, s, false, "%s");
     for (size_t i = 0; i < photos->n; i++)
         add(out, photos->photo[i].sensor, false, "%s again");
-    options.read = linear_noise(photos, r);
+    const struct imp_photo *first = &photos->photo[0];
+    if (first->read > 0 || first->shot > 0 || first->relative > 0) {
+        options.read = first->read;
+        options.shot = first->shot;
+        options.relative = first->relative;
+    } else options.read = linear_noise(photos, r);
     run.time_limit_s = 0;
     if (run.spp == 0) run.spp = 64;
     const enum imp_status st =

@@ -4,6 +4,7 @@
 #include "photos.h"
 
 #include "exif.h"
+#include "shared/noise.h"
 #include "shared/photograph.h"
 #include "shared/picture_files.h"
 #include "shared/problem_options.h"
@@ -18,16 +19,16 @@
 
 static struct {
     struct arg_list named;
-    double noise;
-    const char *clip;
+    const char *noise, *clip;
 } o;
 
 const struct arg_option options_photos[] = {
     {ARG_LIST, 0, "photo", "SENSOR=FILE", "this photograph is of this sensor", &o.named,
      0, 0, NULL},
-    {ARG_NUMBER, 0, "noise", "SIGMA",
-     "one standard deviation of the photographs' values (default: estimated from each)",
-     &o.noise, 1e-9, 1e9, NULL},
+    {ARG_TEXT, 0, "noise", "SIGMA|KEY=V[,..]",
+     "one standard deviation of the photographs' values, or as of plan: light v has the "
+     "variance read^2 + shot v + (relative v)^2 (default: one, estimated from each)",
+     &o.noise, 0, 0, NULL},
     {ARG_TEXT, 0, "clip", "auto|LOW,HIGH|never",
      "values at these levels were clipped (default auto: by the files, where they hold "
      "integers)",
@@ -170,6 +171,26 @@ static int no_sensor(const char *what)
 
 /* ---- Pixels ---------------------------------------------------------------------------- */
 
+struct given_noise {
+    double one; /* 0: it is not given */
+    struct noise of_light;
+};
+
+static int given_noise_read(struct given_noise *out)
+{
+    char *end;
+    *out = (struct given_noise){0};
+    if (!o.noise) return 0;
+    out->one = strtod(o.noise, &end);
+    if (end == o.noise || *end) {
+        out->one = 0;
+        return noise_read(o.noise, false, &out->of_light);
+    }
+    return out->one > 0 && isfinite(out->one)
+               ? 0
+               : cli_error(EXIT_USAGE, "--noise %s: expected a number above 0", o.noise);
+}
+
 static int photo_read(struct photos *p, const char *path, int sensor)
 {
     struct imp_target t = IMP_TARGET_INIT;
@@ -178,7 +199,9 @@ static int photo_read(struct photos *p, const char *path, int sensor)
     if (strlen(path) > 4096)
         return cli_error(EXIT_USAGE, "%.60s...: too long a name", path);
     snprintf(spec, sizeof spec, "%s@%d", path, sensor);
-    int rc = picture_target(spec, NULL, &t);
+    struct given_noise noise;
+    int rc = given_noise_read(&noise);
+    if (!rc) rc = picture_target(spec, NULL, &t);
     if (rc) return rc;
     photo.step = photograph_step(spec);
     const bool never = o.clip && !strcmp(o.clip, "never");
@@ -199,7 +222,10 @@ static int photo_read(struct photos *p, const char *path, int sensor)
     photo.channels = t.channels;
     photo.pixels = t.pixels;
     photo.weights = t.weights;
-    photo.noise = o.noise;
+    photo.noise = noise.one;
+    photo.read = noise.of_light.read;
+    photo.shot = noise.of_light.shot;
+    photo.relative = noise.of_light.relative;
     photo.focal_35mm = exif.focal_35mm;
     photo.exposure_s = exif.exposure_s;
     photo.iso = exif.iso;

@@ -5,6 +5,7 @@
 #include "plan_answer.h"
 #include "plan_maps.h"
 #include "shared/command.h"
+#include "shared/noise.h"
 #include "shared/problem_options.h"
 
 #include <math.h>
@@ -46,42 +47,6 @@ static const struct arg_option options[] = {
      &o.map, 0, 0, NULL},
     {0}};
 
-static int noise_read(struct imp_plan_options *p)
-{
-    const struct {
-        const char *key;
-        double *to;
-    } keys[] = {{"read", &p->read},
-                {"shot", &p->shot},
-                {"relative", &p->relative},
-                {"white", &p->white}};
-    bool noisy = false;
-    for (const char *at = o.noise; at && *at;) {
-        bool met = false;
-        for (size_t k = 0; k < sizeof keys / sizeof *keys && !met; k++) {
-            const size_t n = strlen(keys[k].key);
-            char *end;
-            if (strncmp(at, keys[k].key, n) != 0 || at[n] != '=') continue;
-            *keys[k].to = strtod(at + n + 1, &end);
-            met = end != at + n + 1 && (!*end || *end == ',') && *keys[k].to >= 0 &&
-                  isfinite(*keys[k].to);
-            noisy |= k < 3 && *keys[k].to > 0;
-            if (met) at = end + (*end == ',');
-        }
-        if (!met)
-            return cli_error(
-                EXIT_USAGE,
-                "--noise %s: expected read=V, shot=V, relative=V or white=V, "
-                "with commas between them, none negative",
-                o.noise);
-    }
-    return !o.noise || noisy ? 0
-                             : cli_error(EXIT_USAGE,
-                                         "--noise %s: pictures without noise have "
-                                         "intervals of 0; give read, shot or relative",
-                                         o.noise);
-}
-
 /* What we have, and the best candidate, which moves. The result belongs to the problem, and the
  * search makes others: the ranking is made again, to the bit. */
 static int improve(imp_problem *problem, struct plan_answer *a)
@@ -120,7 +85,12 @@ static int plan(imp_problem *problem, const struct candidates *c,
     p.prior = numbers->prior;
     p.take = (size_t)o.take;
     p.budget = o.budget;
-    int rc = noise_read(&p);
+    struct noise noise = {0};
+    int rc = o.noise ? noise_read(o.noise, true, &noise) : 0;
+    p.read = noise.read;
+    p.shot = noise.shot;
+    p.relative = noise.relative;
+    p.white = noise.white;
     if (!rc && o.map) rc = plan_map_writable(o.map, numbers);
     if (rc) return rc;
     const enum imp_status st = imp_plan(problem, c->c, c->n, &p, &run, &result);
@@ -163,5 +133,5 @@ const struct command command_plan = {
      1},
     run_plan,
     1,
-    0,
+    1,
     REPLAYS_NEVER};

@@ -2,7 +2,8 @@
  *
  * importon: values of a target that were clipped. A photograph's white means "at least",
  * its black "at most": such values are censored data. They have no weight where the
- * scene agrees with them, and count as the level itself where it does not. Which they
+ * scene agrees with them, and count as the level itself where it does not. All values of
+ * such a target count the less, the less the walks of a loss know them beside the target's noise. Which they
  * are is decided by pictures of other random numbers than those of losses, so that
  * losses, gradients and Gauss-Newton matrices stay unbiased for the weights that were
  * decided (docs/estimators.md, 20; docs/photographs.md).

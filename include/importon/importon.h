@@ -1341,6 +1341,9 @@ struct imp_fit_result {
     const char *walks;
     const char *control_variate; /**< Adam: what it brought, or why there was none; NULL:
                                       not wanted */
+    /** Chi-square that our own noise in the variables adds, over the `n` that the targets' noise takes from it:
+     * tr(H C)/tr(H D) of their covariances C and D. NaN without intervals. */
+    double own_part;
 };
 
 /** Fit the active parameters to the targets; the scene ends at the best estimate.

@@ -48,6 +48,10 @@ struct imp_photo {
      * mm with the same diagonal field of view, where NAME.x_fov begins if all photographs have one;
      * exposure_s iso/(100 f_number^2), known of all, gives the ratios of exposures at the start. */
     double focal_35mm, exposure_s, iso, f_number;
+    /** Noise of a sensor: light of a value v (the value itself, but of a film with a gamma v^gamma) has the
+     * variance read^2 + shot v + (relative v)^2, as in imp_plan_options, and rounding to `step` adds its
+     * own. Where one of them is above 0, `noise` is not used. */
+    double read, shot, relative;
 };
 #define IMP_PHOTO_INIT IMP_INIT_ZERO(struct imp_photo)
 

@@ -56,6 +56,9 @@ class Fit(Values):
     shift : float
         How far four times the samples would move an answer, in standard errors, where the
         loss leaves a bias; else NaN.
+    own_part : float
+        Chi-square that our own noise in the answer adds, over what the targets' noise takes from it, in their
+        number of values; NaN without intervals.
     reason, warning : str
     clipped : dict or None
         With `clip`: how many "numbers" there are, how many are "clipped", how many have no
@@ -86,6 +89,7 @@ class Fit(Values):
         self.residual: float = result.residual
         self.residual_hi: float = result.residual_hi
         self.shift: float = result.shift
+        self.own_part: float = result.own_part
         self.reason: str = decode(result.reason)
         self.warning: str = decode(result.warning)
         self.walks: str = decode(result.walks)

@@ -17,6 +17,7 @@ from ._params import names_of
 from ._problem import Problem, _integers, _is_path, _one_target, is_photograph, is_raw, levels, push, run_options, target_list
 from ._scene import Scene
 
+_NOISE = ("read", "shot", "relative")
 _EXIF = ("focal_35mm", "exposure_s", "iso", "f_number")
 
 
@@ -104,16 +105,21 @@ def _words(values: Any, name: str, keep: list[Any]) -> tuple[Any, int]:
     return ctypes.addressof(array), len(listed)
 
 
-def _photo(scene: Scene, sensor: int, value: Any, weights: Any, clip: Any, noise: float, exif: Mapping[str, float],
+def _photo(scene: Scene, sensor: int, value: Any, weights: Any, clip: Any, noise: Any, exif: Mapping[str, float],
            keep: list[Any]) -> Any:
     """imp_photo."""
+    by_light = noise if isinstance(noise, Mapping) else {}
     t, kept = _one_target(scene, value, sensor, weights, "l2", 0, None)
     file = _integers(value) if _is_path(value) else None
     p = make(_c.imp_photo, sensor=sensor, width=t.width, height=t.height, channels=t.channels, pixels=t.pixels,
-             weights=t.weights, noise=float(noise), step=1 / file[1] if file else 0.)
+             weights=t.weights, noise=0. if by_light else float(noise), step=1 / file[1] if file else 0.)
     if clip is not None and (clip != "auto" or file or (_is_path(value) and is_raw(value))):
         p.clipped = True
         p.low, p.high = levels(value, clip, is_photograph(scene, sensor))
+    for key, number in by_light.items():
+        if key not in _NOISE:
+            raise ArgumentError("noise has no %r; it has %s" % (key, ", ".join(_NOISE)))
+        setattr(p, key, float(number))
     for key, number in exif.items():
         if key not in _EXIF:
             raise ArgumentError("exif has no %r; it has %s" % (key, ", ".join(_EXIF)))
@@ -130,7 +136,7 @@ def _photos(scene: Scene, photos: Any, weights: Any, clip: Any, noise: Any, exif
     pairs = target_list(scene, photos, 0)
 
     def part(value: Any, i: int, none: Any) -> Any:
-        if isinstance(value, Mapping) and not set(value) <= set(_EXIF):
+        if isinstance(value, Mapping) and not set(value) <= set(_EXIF + _NOISE):
             return {scene.sensor_index(k): v for k, v in value.items()}.get(pairs[i][0], none)
         return none if value is None else value
 
@@ -181,8 +187,9 @@ def measure(scene: Scene, photos: Any, params: Any = None, *, stages: Any = None
         Go on from the checkpoint, if it is there.
     clip : "auto", None or (low, high)
         As `loss`'s; "auto" is of files of integers, others are not clipped.
-    noise : float or dictionary by sensor, optional
-        One standard deviation of the photographs' values; by default estimated from each.
+    noise : float, mapping, or dictionary of these by sensor, optional
+        One standard deviation of the photographs' values; by default estimated from each. A mapping with "read",
+        "shot", "relative", as `plan`'s: light v has the variance read^2 + shot v + (relative v)^2.
     exif : dictionary, or dictionary of these by sensor, optional
         "focal_35mm", "exposure_s", "iso", "f_number": where fields of view and exposures begin.
     weights : array, or dictionary by sensor, optional

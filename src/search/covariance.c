@@ -30,6 +30,19 @@ void imp__uncertainty_destroy(imp_context *ctx, struct imp__uncertainty *u)
     *u = (struct imp__uncertainty){0};
 }
 
+/* By how much the loss at x is above its minimum: for our own noise over that for the data's. Before what is not
+ * determined is added. */
+static double own_part(size_t n, const double *H, const struct imp__uncertainty *u)
+{
+    double own = 0, data = 0;
+    for (size_t k = 0; k < n; k++)
+        for (size_t l = 0; l < n; l++) {
+            own += H[k * n + l] * u->monte_carlo[l * n + k];
+            data += H[k * n + l] * u->measurement[l * n + k];
+        }
+    return data > 0 && own >= 0 ? own / data : NAN;
+}
+
 static enum imp_status uncertainty_create(imp_context *ctx, size_t n,
                                           struct imp__uncertainty *u)
 {
@@ -112,6 +125,7 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
     if (!u.found) goto out;
     u.rounds = s.rounds;
     u.loss = imp__sampled_loss(&s, a.from, u.x, a.free.G, a.part);
+    u.own_part = own_part(n, s.mean.H, &u);
     unknown_add(goal, &s, &a, &u);
 
     memcpy(u.G, a.free.G, n * n * sizeof *u.G);

@@ -21,6 +21,7 @@ struct imp__uncertainty {
     double noise_scale;
     struct imp_estimate loss; /* at x, by the same samples; value NAN: not known */
     int rounds;               /* samples taken, in those of an evaluation */
+    double own_part;          /* tr(H monte_carlo)/tr(H measurement); NAN: not known */
     bool found;               /* at_newton: false where the search has to go on */
 };
 

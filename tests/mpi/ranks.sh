@@ -86,6 +86,7 @@ job gradient gradient "${cornell[@]}" -T "$work/target.exr" --spp 8 --json
 job points gradient "${cornell[@]}" -T "$work/target.exr" --spp 16 --points sobol --json
 job texture gradient "${textured[@]}" -T "$work/textured.exr" --spp 4 --json
 job jacobian jacobian "${cornell[@]}" -p '*radiance*' --spp 6 -o x --json
+job plan plan "${cornell[@]}" -p 'white.*' --exposures 1,2 --spp 4 --map x --json
 job record record "${cornell[@]}" --spp 6 --json -o x.walks
 job fog record "$scenes/fog.xml" -D res=10 --spp 2 --all-sensors -q -o x.walks
 job check check "$scenes/furnace.xml" --paths 20 --spp 4 --json

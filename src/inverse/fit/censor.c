@@ -78,6 +78,7 @@ static void target_reset(const struct imp_problem *p, struct imp__target *t)
     for (size_t i = 0; i < numbers_of(t); i++) {
         c->silent[i] = is_clipped(c, i);
         t->pixels[i] = c->measured[i];
+        t->precision[i] = 1;
         if (c->base) c->base[i] = c->measured[i];
     }
     t->photograph.at = gamma_of(p, t);
@@ -120,7 +121,8 @@ enum imp_status imp_problem_clip(imp_problem *p, int target, double low, double 
     c->measured = imp__alloc(ctx, n, sizeof *c->measured);
     c->silent = imp__alloc(ctx, n, sizeof *c->silent);
     if (t->photograph.pixels) c->base = imp__alloc(ctx, n, sizeof *c->base);
-    if (!c->measured || !c->silent || (t->photograph.pixels && !c->base))
+    t->precision = imp__alloc(ctx, n, sizeof *t->precision);
+    if (!c->measured || !c->silent || !t->precision || (t->photograph.pixels && !c->base))
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for clipped numbers"));
     memcpy(c->measured, t->pixels, n * sizeof *c->measured);
     t->clip = c;
@@ -141,6 +143,7 @@ struct decision {
     float *V, *up, *down; /* [numbers]: by J, J + 3 se, J - 3 se */
     float *off;           /* [numbers] |T - V| of some */
     double noise[2];      /* of the target, about black and about white */
+    double fewer;         /* samples of J over those of a loss */
 };
 
 static double value_of(const struct decision *d, double linear)
@@ -223,7 +226,9 @@ static double noise_of(struct decision *d, int half)
 }
 
 /* A photograph's value, expanded about V. Far from T, where the scene is not yet right,
- * the expansion may fall below 0, and the power is that of T. */
+ * the expansion may fall below 0, and the power is that of T: its residual
+ * T^(1 - gamma) V^gamma - T of a dark value where the scene is bright is many times gamma (V - T),
+ * and the value gets the weight that makes up for it. */
 static void photograph_set(struct decision *d, size_t i)
 {
     struct imp__target *t = d->t;
@@ -232,12 +237,27 @@ static void photograph_set(struct decision *d, size_t i)
     const double se = ((double)d->up[i] - (double)d->down[i]) / (2 * SIGMAS);
     if (V < IMP_PHOTOGRAPH_LEAST || se > KNOWN_SE * V ||
         T < fmax(0.5, 1 - 0.5 / gamma) * V) {
+        const double far = T >= IMP_PHOTOGRAPH_LEAST ? T * (pow(V / T, gamma) - 1) : 0;
+        const double plain = gamma * (V - T);
         c->base[i] = (float)T;
         t->pixels[i] = (float)T;
+        if (plain > 0 && far > plain)
+            t->precision[i] *= (float)((plain / far) * (plain / far));
         return;
     }
     c->base[i] = d->V[i];
     t->pixels[i] = (float)(V + gamma * (T - V) + 0.5 * gamma * (gamma - 1) * se * se / V);
+}
+
+/* A value that the walks of a loss know less well than the target counts less: where a lamp covers a part of a
+ * pixel, few walks meet it, and a handful of such pixels would be most of the noise of a loss. */
+static void precision_set(struct decision *d, size_t i)
+{
+    const double V = (double)d->V[i];
+    const double se = ((double)d->up[i] - (double)d->down[i]) / (2 * SIGMAS);
+    const double s = d->noise[V > 0.5 * (double)(d->t->clip->low + d->t->clip->high)];
+    const double own = d->fewer * se * se;
+    d->t->precision[i] = (float)(s > 0 ? s * s / (s * s + own) : 1);
 }
 
 static void target_decide(struct decision *d)
@@ -255,6 +275,7 @@ static void target_decide(struct decision *d)
         const bool silent = bright || dark;
         c->changed += silent != c->silent[i] && has_weight(t, i);
         c->silent[i] = silent;
+        precision_set(d, i);
         if (c->base) photograph_set(d, i);
         else t->pixels[i] = (float)at_level(c, i);
     }
@@ -263,7 +284,8 @@ static void target_decide(struct decision *d)
 /* The scene's own picture, whatever the film's pixel format. Decisions depend on the error of
  * each pixel alone, of which few sets of points give too poor an estimate. */
 static enum imp_status picture_make(struct imp_problem *p, const struct imp__target *t,
-                                    int number, const struct imp_run *run, imp_film **out)
+                                    int number, const struct imp_run *run, double *fewer,
+                                    imp_film **out)
 {
     struct imp_run own = *run;
     struct imp_problem *plain = NULL;
@@ -271,6 +293,7 @@ static enum imp_status picture_make(struct imp_problem *p, const struct imp__tar
     own.sensor = t->desc.sensor;
     own.spp = (int)fmin(fmax((double)MORE * spp, LEAST_SPP), 1 << 26);
     own.seed = imp__mix64(run->seed ^ (UINT64_C(0xc11bbed) + (uint64_t)number));
+    *fewer = (double)own.spp / spp;
     own.time_limit_s = 0;
     own.walks = NULL;
     own.points = IMP_POINTS_INDEPENDENT;
@@ -295,7 +318,7 @@ static enum imp_status target_censor(struct imp_problem *p, size_t number,
     d.up = d.V + n;
     d.down = d.up + n;
     d.off = d.down + n;
-    IMP_TRY(picture_make(p, t, (int)number, run, &film));
+    IMP_TRY(picture_make(p, t, (int)number, run, &d.fewer, &film));
     values_take(&d, film, p->scene->channels);
     for (int half = 0; half < 2; half++) d.noise[half] = noise_of(&d, half);
     target_decide(&d);

@@ -267,7 +267,7 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
             imp__error(ctx, IMP_E_ARG, "headroom %g: out of range", f.options.headroom));
     IMP_TRY(imp__fit_start_keep(p, f.spans != NULL, &start));
     imp__fit_answer_free(p);
-    imp__clip_reset(p);
+    IMP_TRY(imp__fit_clipped_begin(&f));
     const struct imp__opt_options o = {f.options.max_iterations, f.options.learning_rate,
                                        f.options.tolerance, f.options.momentum, f.quiet};
     IMP_TRY(search_make(&f, &o, &s, &found));

@@ -117,7 +117,9 @@ enum imp_status imp__fit_levels(struct imp__fit *fit,
 enum imp_status imp__fit_levels_allowed(const struct imp_problem *problem,
                                         const struct imp_fit_options *options);
 
-/* fit_clip.c: of clipped targets, decides anew after search *s, the round-th. *again: with
+/* fit_clip.c: before the first search, of clipped targets. */
+enum imp_status imp__fit_clipped_begin(struct imp__fit *fit);
+/* Clipped targets: decides anew after search *s, the round-th. *again: with
  * other weights, and *s is the next search, which has not begun, of these options. */
 enum imp_status imp__fit_clipped(struct imp__fit *fit, int round,
                                  struct imp__opt_options *options, struct imp__search **s,

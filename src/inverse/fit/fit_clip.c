@@ -64,6 +64,17 @@ out:
     return st;
 }
 
+enum imp_status imp__fit_clipped_begin(struct imp__fit *f)
+{
+    struct imp_run run = f->run;
+    size_t changed, numbers;
+    imp__clip_reset(f->problem);
+    if (f->problem->near_searches == 0) return IMP_OK;
+    run.spp = imp__fit_spp(f);
+    run.seed = imp__search_seed(&f->goal, DECIDING_SEED, ROUNDS);
+    return imp__censor(f->problem, &run, &changed, &numbers);
+}
+
 enum imp_status imp__fit_clipped(struct imp__fit *f, int round,
                                  struct imp__opt_options *o, struct imp__search **s,
                                  bool *again)
@@ -76,10 +87,12 @@ enum imp_status imp__fit_clipped(struct imp__fit *f, int round,
         photographs |= c && c->base;
     }
     *again = false;
-    if (!imp__problem_clips(f->problem) || round >= ROUNDS) return IMP_OK;
+    const int near = f->problem->near_searches;
+    if (!imp__problem_clips(f->problem) || round >= (near ? near - 1 : ROUNDS))
+        return IMP_OK;
     IMP_CHECKED(decide(f, *s, round, &changed, &numbers));
     *again = (double)changed > STAYS * (double)numbers ||
-             (photographs && round < ROUNDS_PHOTO);
+             (photographs && round < (near ? 1 : ROUNDS_PHOTO));
     if (!*again) return IMP_OK;
     /* Adam takes all iterations that it may; the others end where they arrive. */
     if (f->options.optimizer == IMP_ADAM)

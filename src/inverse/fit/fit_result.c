@@ -303,6 +303,7 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
         .n = n,
         .variables = rows,
         .condition = u->condition,
+        .own_part = u->n ? u->own_part : NAN,
         .reason = !f->stopped                                       ? s->reason
                   : f->deadline_s > 0 && imp__now() > f->deadline_s ? "time limit reached"
                                                                     : "cancelled",

@@ -27,6 +27,7 @@
 #include "inverse/estimate/problem_tracer.h"
 #include "inverse/problem/loss.h"
 #include "normal_tiles.h"
+#include "search/excess.h"
 #include "walk/rules/features.h"
 
 #define GAUSS_NEWTON_MAX 256
@@ -209,7 +210,10 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
     }
     out->objective = objective;
     out->chi2 = total.scalars[IMP_NORMAL_CHI2];
-    out->chi2_se = sqrt(fmax(0, total.scalars[IMP_NORMAL_CHI2_VARIANCE]));
+    double variance = total.scalars[IMP_NORMAL_CHI2_VARIANCE];
+    IMP_TRY(
+        imp__excess_take(p->ctx, 1, &variance, &total.scalars[IMP_NORMAL_CHI2_EXCESS]));
+    out->chi2_se = sqrt(fmax(0, variance));
     out->n_residuals = residuals;
 out:
     p->edge_terms = false;

@@ -45,7 +45,8 @@ enum {
     IMP_NORMAL_OBJECTIVE,
     IMP_NORMAL_VARIANCE,
     IMP_NORMAL_CHI2,
-    IMP_NORMAL_CHI2_VARIANCE,
+    IMP_NORMAL_CHI2_VARIANCE, /* its jackknife, */
+    IMP_NORMAL_CHI2_EXCESS,   /* and what that has too much (excess.h) */
     IMP_NORMAL_SCALARS
 };
 

@@ -275,8 +275,9 @@ static void gradient_add(const struct imp__normal_job *j, const struct pixel *p,
 }
 
 /* Variance of chi^2, of the mean over pairs of sum over channels of w r_a r_b: its
- * jackknife less what that has too much. */
-static double chi2_variance(const struct imp__normal_job *j, const struct pixel *p)
+ * jackknife, and what that has too much. */
+static void chi2_variance_add(const struct imp__normal_job *j, const struct pixel *p,
+                              double *variance, double *excess)
 {
     const struct imp__normal_worker *w = p->w;
     const size_t S = (size_t)seen_channels(j);
@@ -300,8 +301,9 @@ static double chi2_variance(const struct imp__normal_job *j, const struct pixel 
     for (int a = 0; a < p->M; a++)
         for (int b = a + 1; b < p->M; b++)
             second += imp__sqr(h[a][b] - total / (M * (M - 1) / 2) - e[a] - e[b]);
-    return p->share * p->share * 4 / (M * (M - 1)) *
-           (first - second / ((M - 2) * (M - 3)));
+    const double scale = p->share * p->share * 4 / (M * (M - 1));
+    *variance += scale * first;
+    *excess += scale * second / ((M - 2) * (M - 3));
 }
 
 /* ---- Tiles ------------------------------------------------------------------------ */
@@ -329,7 +331,8 @@ enum imp_status imp__normal_work(const struct imp_tile *t, struct imp_tile_worke
             for (size_t c = 0; c < (size_t)seen_channels(j); c++)
                 channel_add(j, &p, c, &out);
             gradient_add(j, &p, &out);
-            out.scalars[IMP_NORMAL_CHI2_VARIANCE] += chi2_variance(j, &p);
+            chi2_variance_add(j, &p, &out.scalars[IMP_NORMAL_CHI2_VARIANCE],
+                              &out.scalars[IMP_NORMAL_CHI2_EXCESS]);
             out.scalars[IMP_NORMAL_OBJECTIVE] += p.value / all;
             out.scalars[IMP_NORMAL_VARIANCE] +=
                 (p.square - p.value * p.value / R) * R / ((R - 1) * all * all);

@@ -326,7 +326,8 @@ enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
     double variance = 0, excess = 0;
     IMP_TRY(imp__pair_noise_covariance(&w.loss_noise, 2 * imp__film_border(w.film),
                                        &variance, &excess));
-    out->scalars[IMP_NORMAL_CHI2_VARIANCE] += variance - excess;
+    out->scalars[IMP_NORMAL_CHI2_VARIANCE] += variance;
+    out->scalars[IMP_NORMAL_CHI2_EXCESS] += excess;
     imp__wide_measurement(&w, out);
 out:
     for (int b = 0; b < IMP_WIDE_REPLICATES; b++) {

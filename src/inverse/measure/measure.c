@@ -11,10 +11,11 @@
 #include <stdio.h>
 #include <string.h>
 
-#define SPP    64   /* samples per pixel of an evaluation, where nobody chose */
-#define LOOK   64   /* samples by which those that are held are tested, at least: once */
-#define CHANCE 1e-4 /* chance and drop of chi-square by which a number that is held ... */
-#define DROP   20   /* ... is wrong though all pixels together are explained */
+#define SPP     64   /* samples per pixel of an evaluation, where nobody chose */
+#define LOOK    64   /* samples by which those that are held are tested, at least: once */
+#define STRANGE 3    /* times the chi-square of the others */
+#define CHANCE  1e-4 /* chance and drop of chi-square by which a number that is held ... */
+#define DROP    20   /* ... is wrong though all pixels together are explained */
 
 /* ---- Decisions ------------------------------------------------------------------------- */
 
@@ -227,6 +228,27 @@ static enum imp_status missing_say(struct imp__measure *m,
                                      "scene lacks something");
 }
 
+/* A photograph that fits far less than the others is named: it may be of something else. */
+static enum imp_status stranger_say(struct imp__measure *m)
+{
+    size_t worst = 0;
+    double others = 1;
+    for (size_t i = 1; i < m->n_photos; i++)
+        if (m->photos[i].chi2 > m->photos[worst].chi2) worst = i;
+    for (size_t i = 0; i < m->n_photos; i++)
+        if (i != worst && m->photos[i].n_compared > 0)
+            others = fmax(others, m->photos[i].chi2);
+    const struct imp__photo *p = &m->photos[worst];
+    if (!(p->n_compared > 0) ||
+        !(p->chi2 - IMP_MEASURE_SURE * p->chi2_se > STRANGE * others))
+        return IMP_OK;
+    return imp__measure_say(
+        m,
+        "%s: its chi-square is %.3g, that of the others %.3g at most: "
+        "is it of this scene, and of sensor '%s'?",
+        p->name, p->chi2, others, p->sensor->name);
+}
+
 static enum imp_status result_make(struct imp__measure *m, imp_problem *p,
                                    const struct imp_fit_result *fit,
                                    const struct imp_measure_result **out)
@@ -247,8 +269,10 @@ static enum imp_status result_make(struct imp__measure *m, imp_problem *p,
                                      "not explained after all: chi-square of all pixels "
                                      "hides what is wrong in few of them"));
     }
-    if (!r->explained) IMP_CHECKED(missing_say(m, r));
-    else r->n_missing = 0;
+    if (!r->explained) {
+        IMP_CHECKED(stranger_say(m));
+        IMP_CHECKED(missing_say(m, r));
+    } else r->n_missing = 0;
     for (size_t i = 0; i < m->n_photos; i++) {
         const struct imp__photo *photo = &m->photos[i];
         float *copy = imp__arena_array(a, 2 * photo->n_pixels, sizeof *copy);

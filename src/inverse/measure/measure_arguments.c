@@ -106,7 +106,10 @@ static enum imp_status numbers_check(struct imp__measure *m, const struct imp__p
                  {"focal_35mm", p->desc.focal_35mm},
                  {"exposure_s", p->desc.exposure_s},
                  {"iso", p->desc.iso},
-                 {"f_number", p->desc.f_number}};
+                 {"f_number", p->desc.f_number},
+                 {"read", p->desc.read},
+                 {"shot", p->desc.shot},
+                 {"relative", p->desc.relative}};
     for (size_t k = 0; k < imp_count(given); k++)
         if (!(given[k].value >= 0) || !isfinite(given[k].value))
             return imp__error(m->ctx, IMP_E_ARG, "%s: %s = %g is not a number >= 0",
@@ -195,9 +198,10 @@ static enum imp_status photo_take(struct imp__measure *m, size_t i)
     p->square = imp__alloc(m->ctx, p->n_pixels, sizeof(float));
     p->expected = imp__alloc(m->ctx, p->n_pixels, sizeof(float));
     p->robust = imp__alloc(m->ctx, p->n_pixels, sizeof(float));
+    p->edges = imp__alloc(m->ctx, p->n_pixels, sizeof(float));
     p->masked = imp__alloc(m->ctx, (size_t)p->columns * (size_t)p->rows, 1);
     if (!p->noise_se || !p->weights || !p->left || !p->own || !p->square ||
-        !p->expected || !p->robust || !p->masked)
+        !p->expected || !p->robust || !p->edges || !p->masked)
         return imp__error(m->ctx, IMP_E_NOMEM, "no memory for %s", p->name);
     for (size_t k = 0; k < p->n_pixels; k++)
         p->weights[k] = d->weights ? d->weights[k] : 1;
@@ -231,6 +235,7 @@ void imp__measure_photos_free(struct imp__measure *m)
         imp__release(m->ctx, m->photos[i].own);
         imp__release(m->ctx, m->photos[i].expected);
         imp__release(m->ctx, m->photos[i].robust);
+        imp__release(m->ctx, m->photos[i].edges);
         imp__release(m->ctx, m->photos[i].masked);
     }
     imp__release(m->ctx, m->photos);
@@ -252,7 +257,8 @@ uint64_t imp__measure_hash(const struct imp__measure *m)
         const double d[] = {p->desc.sensor,     p->desc.clipped,    p->desc.low,
                             p->desc.high,       p->desc.noise,      p->desc.step,
                             p->desc.focal_35mm, p->desc.exposure_s, p->desc.iso,
-                            p->desc.f_number};
+                            p->desc.f_number,   p->desc.read,       p->desc.shot,
+                            p->desc.relative};
         const uint64_t camera = imp__fingerprint_sensor(p->sensor);
         h = imp__hash(h, d, sizeof d);
         h = imp__hash(h, &camera, sizeof camera);

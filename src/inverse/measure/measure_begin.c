@@ -74,17 +74,33 @@ out:
     return st;
 }
 
+/* What some files tell and others do not is not used, which is said of the first that does not.
+ * known [n_photos]. */
+static enum imp_status part_say(struct imp__measure *m, const double *known,
+                                const char *what)
+{
+    size_t some = 0, first = SIZE_MAX;
+    for (size_t i = 0; i < m->n_photos; i++) {
+        some += known[i] > 0;
+        if (!(known[i] > 0) && first == SIZE_MAX) first = i;
+    }
+    if (some == 0 || some == m->n_photos) return IMP_OK;
+    return imp__measure_say(m, "%s has no %s: that of the other files is not used",
+                            m->photos[first].name, what);
+}
+
 /* exposure_s iso/(100 f_number^2) of all; false: it is not known of all. */
 static bool exif_exposures(const struct imp__measure *m, double *out)
 {
+    bool all = true;
     for (size_t i = 0; i < m->n_photos; i++) {
         const struct imp_photo *d = &m->photos[i].desc;
         out[i] = d->f_number > 0
                      ? d->exposure_s * d->iso / (100 * d->f_number * d->f_number)
                      : 0;
-        if (!(out[i] > 0)) return false;
+        all &= out[i] > 0;
     }
-    return true;
+    return all;
 }
 
 static enum imp_status param_scale(struct imp__measure *m, size_t k, double factor)
@@ -130,6 +146,7 @@ static enum imp_status brightness_set(struct imp__measure *m, double *ratio, dou
     if (light != 1) IMP_CHECKED(lights_scale(m, light));
     for (size_t i = 0; i < m->n_photos; i++) ratio[i] /= light;
     const bool known = exif_exposures(m, exif);
+    IMP_CHECKED(part_say(m, exif, "exposure time, ISO and aperture"));
     for (size_t i = 0; known && i < m->n_photos; i++) {
         const struct imp_param *q = free_exposure(m, i, &k);
         if (!q || !(imp__param_get(q, 0) > 0)) continue;
@@ -161,10 +178,16 @@ enum imp_status imp__measure_begin(struct imp__measure *m)
     if (!ratio) IMP_TRY(imp__error(m->ctx, IMP_E_NOMEM, "no memory for photographs"));
     for (size_t i = 0; i < m->n_photos; i++) {
         IMP_TRY(imp__measure_noise(m, &m->photos[i]));
-        IMP_TRY(imp__measure_say(
-            m, "%s: noise %.3g%s", m->photos[i].name, m->photos[i].noise,
-            m->photos[i].noise_of > 0 ? " of its values, estimated" : " of its values"));
+        IMP_TRY(imp__measure_say(m, "%s: noise %.3g%s", m->photos[i].name,
+                                 m->photos[i].noise,
+                                 m->photos[i].noise_of > 0 ? " of its values, estimated"
+                                 : imp__measure_noise_varies(&m->photos[i])
+                                     ? " of its values, root of the mean square"
+                                     : " of its values"));
     }
+    for (size_t i = 0; i < m->n_photos; i++) ratio[i] = m->photos[i].desc.focal_35mm;
+    if (m->wanted[IMP_MEASURE_CAMERAS] && !m->o.params)
+        IMP_TRY(part_say(m, ratio, "focal length"));
     IMP_TRY(views_set(m));
     for (size_t i = 0; i < m->n_photos; i++)
         IMP_TRY(ratio_of(m, &m->photos[i], &ratio[i]));

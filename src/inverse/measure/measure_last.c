@@ -4,6 +4,7 @@
 #include "base/arguments.h"
 #include "measuring.h"
 #include <math.h>
+#include <stdio.h>
 
 #define MORE 4  /* times as many samples where a fit is led by its noise ... */
 #define MOST 16 /* ... up to these */
@@ -77,7 +78,7 @@ enum imp_status imp__measure_last(struct imp__measure *m, imp_problem **problem,
     m->doubtful = m->astray = false;
     IMP_TRY(imp_scene_get_theta(m->scene, theta));
     IMP_TRY(imp__measure_look(m));
-    imp__measure_judge(m, &start);
+    imp__measure_judge(m, 0, &start);
     IMP_TRY(imp__measure_stage(m, stage, problem, result));
     if (stage != IMP_MEASURE_TOGETHER || last_row(m)->explained ||
         !is_above(last_row(m), &start))
@@ -105,24 +106,42 @@ out:
     return st;
 }
 
+/* Numbers that the fit could not determine: by the photographs, or by so few samples. */
+static size_t loose_count(const struct imp_problem *p, const struct imp_fit_result *r)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < r->n; i++) {
+        struct imp_fit_variable v = IMP_FIT_VARIABLE_INIT;
+        n += imp_problem_get_fit_variable(p, i, &v) == IMP_OK && !v.determined;
+    }
+    return n;
+}
+
 /* A fit ends where its gradient is within its noise. What the photographs know better is left over, and is
- * found with more samples, before anything is said to be wrong; while they help. */
+ * found with more samples, before anything is said to be wrong, or not to be determined; while they help. */
 enum imp_status imp__measure_last_again(struct imp__measure *m, imp_problem **problem,
                                         const struct imp_fit_result **result)
 {
     const int spp = m->run.spp;
     if (imp__measure_last_stage(m) != IMP_MEASURE_TOGETHER) return IMP_OK;
+    size_t loose = loose_count(*problem, *result);
     m->round--; /* it is the last round's */
-    while (!last_row(m)->explained && last_row(m)->chi2_se < IMP_MEASURE_BLIND &&
-           m->run.spp < MOST * spp) {
+    while ((!last_row(m)->explained || loose > 0) &&
+           last_row(m)->chi2_se < IMP_MEASURE_BLIND && m->run.spp < MOST * spp) {
         const struct imp_measure_row before = *last_row(m);
+        const size_t loose_before = loose;
+        char what[96] = "wrong";
         m->run.spp *= MORE;
+        if (before.explained)
+            snprintf(what, sizeof what, "not determined (%zu number%s)", loose,
+                     loose == 1 ? "" : "s");
         IMP_CHECKED(imp__measure_say(m,
-                                     "round %d: before anything is said to be wrong, the "
+                                     "round %d: before anything is said to be %s, the "
                                      "last fit again with %d samples per pixel",
-                                     m->round, m->run.spp));
+                                     m->round, what, m->run.spp));
         IMP_CHECKED(fit_again(m, NULL, problem, result));
-        if (!is_above(&before, last_row(m))) break;
+        loose = loose_count(*problem, *result);
+        if (!is_above(&before, last_row(m)) && loose >= loose_before) break;
     }
     m->round++;
     return IMP_OK;

@@ -37,20 +37,22 @@ static double block_level(const struct imp__photo *p, int column, int row, int *
             if (!(p->expected[at] > 0) || (p->desc.weights && !(p->desc.weights[at] > 0)))
                 continue;
             square += (double)p->square[at];
-            expected += (double)p->expected[at];
+            expected += (double)p->expected[at] + (double)p->edges[at];
             n++;
         }
     *values = n * p->desc.channels;
     return square > 0 ? log(square / expected) : NAN;
 }
 
-/* level [n] of blocks; marks those above `high`, and neighbours of these above `low`. */
+/* level [n] of blocks; marks those above `high`, those that are masked and above `low`, so that a block near
+ * the limit does not come and go, and neighbours of these above `low`. */
 static size_t blocks_mark(const struct imp__photo *p, const double *level, double high,
                           double low, uint8_t *mark)
 {
     size_t n = 0;
     bool grown = true;
-    for (int k = 0; k < p->columns * p->rows; k++) mark[k] = level[k] > high;
+    for (int k = 0; k < p->columns * p->rows; k++)
+        mark[k] = level[k] > high || (p->masked[k] && level[k] > low);
     while (grown) {
         grown = false;
         for (int k = 0; k < p->columns * p->rows; k++) {

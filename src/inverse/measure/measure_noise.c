@@ -89,9 +89,50 @@ static void noise_set(struct imp__photo *p, double noise, double of)
     for (size_t i = 0; i < p->n_values; i++) p->noise_se[i] = (float)noise;
 }
 
+bool imp__measure_noise_varies(const struct imp__photo *p)
+{
+    return p->desc.read > 0 || p->desc.shot > 0 || p->desc.relative > 0;
+}
+
+/* A value V = v^(1/gamma) has the noise of v times V/(gamma v), which at black is taken where v is as large
+ * as its noise. */
+void imp__measure_noise_by_light(struct imp__photo *p, const float *light, double gamma)
+{
+    const struct imp_photo *d = &p->desc;
+    double sum = 0;
+    for (size_t i = 0; i < p->n_values; i++) {
+        const double v = fmax((double)light[i], 0);
+        const double of_light =
+            sqrt(d->read * d->read + d->shot * v + imp__sqr(d->relative * v));
+        const double at = fmax(fmax(v, of_light), 1e-9);
+        const double slope = gamma == 1 ? 1 : pow(at, 1 / gamma - 1) / gamma;
+        const double variance = imp__sqr(slope * of_light) + d->step * d->step / 12;
+        p->noise_se[i] = (float)fmax(sqrt(variance), 1e-9);
+        sum += variance;
+    }
+    p->noise = fmax(sqrt(sum / (double)p->n_values), 1e-9);
+    p->noise_of = 0;
+}
+
+/* Where a measurement begins, by the photograph. */
+static enum imp_status noise_by_photo(struct imp__measure *m, struct imp__photo *p)
+{
+    size_t index;
+    const struct imp_param *curve = imp__measure_film_number(m, p, "gamma", &index);
+    const double gamma = curve ? imp__param_get(curve, 0) : 1;
+    float *light = imp__alloc(m->ctx, p->n_values, sizeof *light);
+    if (!light) return imp__error(m->ctx, IMP_E_NOMEM, "no memory for %s", p->name);
+    for (size_t i = 0; i < p->n_values; i++)
+        light[i] = (float)pow(fmax((double)p->desc.pixels[i], 0), gamma);
+    imp__measure_noise_by_light(p, light, gamma);
+    imp__release(m->ctx, light);
+    return IMP_OK;
+}
+
 enum imp_status imp__measure_noise(struct imp__measure *m, struct imp__photo *p)
 {
     double variance, of;
+    if (imp__measure_noise_varies(p)) return noise_by_photo(m, p);
     if (p->desc.noise > 0) {
         noise_set(p, p->desc.noise, 0);
         return IMP_OK;

@@ -15,10 +15,14 @@
 #define SEED       0x57a6e
 #define ITERATIONS 12 /* of a stage that is not the last fit */
 #define COMPARE    0xc03a
-#define LEVELS     4 /* of cameras, in the first round, ... */
-#define ACROSS     8 /* ... through tents of at most this part of a photograph */
-#define TEXTURE    4 /* levels of textures */
-#define DOUBT      3 /* errors of chi-square above 1 from which on a stage is not explained */
+#define LEVELS     4    /* of cameras, in the first round, ... */
+#define ACROSS     8    /* ... through tents of at most this part of a photograph */
+#define TEXTURE    4    /* levels of textures */
+#define NEVER      1e30 /* a level that no value reaches */
+#define SEARCHES                                                                         \
+    5 /* of the last fit, at most, with decisions on clipped values before each, */
+#define CAMERAS 2 /* of cameras; one of the other stages */
+#define DOUBT   3 /* errors of chi-square above 1 from which on a stage is not explained */
 
 /* ---- Which numbers --------------------------------------------------------------------- */
 
@@ -78,18 +82,23 @@ static enum imp_status exposures_tie(struct imp__measure *m, imp_problem *p)
     return IMP_OK;
 }
 
-/* Until the last fit, pixels with a clipped value have no weight, as fits that decide which of
- * them count take several searches, and others have robust ones. weights [n_pixels]. */
-static void weights_make(const struct imp__photo *p, float *weights)
+/* Until the last fit, pixels have robust weights; where noise varies, those of their noise. weights
+ * [n_pixels]. */
+static void weights_make(const struct imp__photo *p, bool last, float *weights)
 {
     const size_t C = (size_t)p->desc.channels;
     for (size_t i = 0; i < p->n_pixels; i++) {
-        weights[i] = p->weights[i] * p->robust[i];
-        for (size_t c = 0; c < C && p->desc.clipped; c++)
-            if (p->desc.pixels[i * C + c] >= (float)p->desc.high) weights[i] = 0;
+        double variance = 0;
+        weights[i] = last ? p->weights[i] : p->weights[i] * p->robust[i];
+        for (size_t c = 0; c < C; c++)
+            variance += imp__sqr((double)p->noise_se[i * C + c]) / (double)C;
+        if (imp__measure_noise_varies(p))
+            weights[i] *= (float)(p->noise * p->noise / variance);
     }
 }
 
+/* Levels also where nothing was clipped: pictures of the start then say how well walks know each value,
+ * and a power is expanded about what the scene has. */
 static enum imp_status target_add(struct imp__measure *m, imp_problem *p, size_t i,
                                   bool last)
 {
@@ -106,15 +115,16 @@ static enum imp_status target_add(struct imp__measure *m, imp_problem *p, size_t
     t.weights = d->weights || photo->n_masked > 0 ? photo->weights : NULL;
     t.noise_se = photo->noise_se;
     t.scale = 1 / (photo->noise * photo->noise);
-    if (!last) {
+    if (!last || imp__measure_noise_varies(photo)) {
         weights = imp__alloc(m->ctx, photo->n_pixels, sizeof *weights);
         if (!weights) IMP_TRY(imp__error(m->ctx, IMP_E_NOMEM, "no memory for a stage"));
-        weights_make(photo, weights);
+        weights_make(photo, last, weights);
         t.weights = weights;
     }
     st = imp_problem_add_target(p, &t);
     if (st != IMP_OK) IMP_TRY(imp__error_prefix(m->ctx, st, "%s", photo->name));
-    if (d->clipped && last) IMP_TRY(imp_problem_clip(p, (int)i, d->low, d->high));
+    IMP_TRY(imp_problem_clip(p, (int)i, d->clipped ? d->low : -NEVER,
+                             d->clipped ? d->high : NEVER));
 out:
     imp__release(m->ctx, weights);
     return st;
@@ -154,6 +164,9 @@ static enum imp_status problem_make(struct imp__measure *m, enum imp_measure_sta
     IMP_TRY(exposures_tie(m, p));
     IMP_TRY(sizes_tie(m, p));
     for (size_t i = 0; i < m->n_photos; i++) IMP_TRY(target_add(m, p, i, last));
+    p->near_searches = stage == IMP_MEASURE_TOGETHER ? SEARCHES
+                       : stage <= IMP_MEASURE_LENS   ? CAMERAS
+                                                     : 1;
     *out = p;
     p = NULL;
 out:
@@ -213,7 +226,8 @@ enum imp_status imp__measure_look(struct imp__measure *m)
     return m->looked ? IMP_OK : photos_look(m, m->n_rows);
 }
 
-void imp__measure_judge(const struct imp__measure *m, struct imp_measure_row *row)
+void imp__measure_judge(const struct imp__measure *m, double own_part,
+                        struct imp_measure_row *row)
 {
     double sum = 0, variance = 0, values = 0, noise_of = 0;
     for (size_t i = 0; i < m->n_photos; i++) {
@@ -226,8 +240,11 @@ void imp__measure_judge(const struct imp__measure *m, struct imp_measure_row *ro
         values += n;
     }
     const double freedom = fmax(values - (double)row->n, 1);
-    row->chi2 = sum / freedom;
-    row->chi2_se = hypot(sqrt(variance) / freedom, noise_of / freedom);
+    const double n = (double)row->n,
+                 own = isfinite(own_part) ? own_part * n / freedom : 0;
+    row->chi2 = sum / freedom - own;
+    row->chi2_se =
+        hypot(hypot(sqrt(variance), noise_of) / freedom, n > 0 ? own * sqrt(2 / n) : 0);
     row->explained = values > 0 && row->chi2 - 1 < DOUBT * row->chi2_se &&
                      row->chi2_se < IMP_MEASURE_BLIND;
 }
@@ -248,7 +265,8 @@ static enum imp_status row_add(struct imp__measure *m, enum imp_measure_stage st
                                     .residual = r->residual,
                                     .residual_hi = r->residual_hi};
     IMP_CHECKED(photos_look(m, m->n_rows + 1));
-    imp__measure_judge(m, row);
+    m->own_part = r->own_part;
+    imp__measure_judge(m, m->own_part, row);
     m->n_rows++;
     return imp__measure_say(
         m,
@@ -264,7 +282,7 @@ enum imp_status imp__measure_judge_again(struct imp__measure *m)
     struct imp_measure_row *row = &m->rows[m->n_rows - 1];
     m->looked = false;
     IMP_CHECKED(imp__measure_look(m));
-    imp__measure_judge(m, row);
+    imp__measure_judge(m, m->own_part, row);
     return imp__measure_say(m,
                             "round %d, %s: by this noise chi-square is %.3g +- %.2g, %s",
                             row->round, imp_measure_stage_name(row->stage), row->chi2,

@@ -13,9 +13,9 @@ struct imp__photo {
     const char *name;
     const struct imp_sensor *sensor;
     size_t n_pixels, n_values;
-    double noise;    /* one standard deviation */
+    double noise;    /* one standard deviation; root of the mean square where it varies */
     double noise_of; /* relative error of its square; 0: it was given */
-    float *noise_se; /* [n_values] all `noise`, for targets */
+    float *noise_se; /* [n_values] all `noise`, unless it varies */
     float *weights;  /* [n_pixels] desc.weights, 0 where masked */
     float *left,
         *own;      /* [n_values] residuals, NAN: not compared; the picture's variances */
@@ -23,6 +23,8 @@ struct imp__photo {
     float
         *expected; /* [n_pixels] ... and what noise makes of it; 0: nothing is compared */
     float *robust; /* [n_pixels] factors of weights in all fits but the last */
+    float *
+        edges; /* [n_pixels] squared residuals by edges that are a little off; 0: places are known */
     int block, columns, rows;
     uint8_t *masked; /* [rows][columns] */
     size_t n_masked;
@@ -61,9 +63,10 @@ struct imp__measure {
     char **lines;
     bool
         doubtful; /* the last fit has the stages' weights, which its intervals do not know */
-    bool astray;  /* the last fit ended worse than it began, whatever was done */
-    bool looked;  /* residuals are those of the present numbers */
-    bool repeats; /* lines are not given to the host: the checkpoint's */
+    bool astray;     /* the last fit ended worse than it began, whatever was done */
+    double own_part; /* of the last fit's answer (struct imp_fit_result) */
+    bool looked;     /* residuals are those of the present numbers */
+    bool repeats;    /* lines are not given to the host: the checkpoint's */
 };
 
 /* ---- measure.c ---- */
@@ -104,6 +107,12 @@ size_t imp__measure_count(const struct imp__measure *m, enum imp_measure_stage s
 enum imp_status imp__measure_begin(struct imp__measure *m);
 
 /* ---- measure_noise.c ---- */
+/* Is it given by value? */
+bool imp__measure_noise_varies(const struct imp__photo *photo);
+/* Then: of all values, where the scene's light is light [n_values] and its film has this gamma; by the
+ * picture and not by the photograph, whose noise would be in the weights. */
+void imp__measure_noise_by_light(struct imp__photo *photo, const float *light,
+                                 double gamma);
 /* noise, and noise_of where it was not given. */
 enum imp_status imp__measure_noise(struct imp__measure *m, struct imp__photo *photo);
 /* The same from its residuals, where that is less: *changed, and a line. */
@@ -125,8 +134,10 @@ void imp__measure_weights(struct imp__photo *photo);
 /* ---- measure_stage.c ---- */
 /* Residuals of all photographs at the present numbers, unless they are there. */
 enum imp_status imp__measure_look(struct imp__measure *m);
-/* Chi-square of the residuals that are there, of row->n numbers. */
-void imp__measure_judge(const struct imp__measure *m, struct imp_measure_row *row);
+/* Chi-square of the residuals that are there, of row->n numbers; own_part: what our own noise in them
+ * adds, in parts of row->n; it is taken off. */
+void imp__measure_judge(const struct imp__measure *m, double own_part,
+                        struct imp_measure_row *row);
 /* Chi-square of the last row again, by other noise; says so. */
 enum imp_status imp__measure_judge_again(struct imp__measure *m);
 /* A fit of one stage, whose problem is destroyed unless `problem` is there. Adds its row. */

@@ -132,6 +132,9 @@ struct imp_problem {
     struct imp__allocation *allocation; /* of its samples; NULL: all alike */
     struct imp__variate *variate; /* of the evaluation at work (variate.h); NULL: none */
     enum imp__loss_use use;
+    /* A fit to clipped targets may begin near its end: pictures of the start decide who counts, and so
+     * many searches follow at most; 0: it may begin anywhere (fit_clip.c). */
+    int near_searches;
     bool seams_join; /* vertices of a mesh at one place move together (fit_mesh.c) */
     /* The evaluation at work has what moving edges give (moved_gradient.h). */
     bool edge_terms;

@@ -12,7 +12,7 @@ measure() {
         --hold 'sky.*' -D gamma=2.2 --stages exposure,lights,materials --spp 8 "$@"
 }
 measure -o out >said || exit 9
-grep -c 'are masked' said
+grep -q 'left.ppm: .* are masked' said && echo masked
 importon render "$SCENES/still.xml" -m mono -q --spp 1 --set @out/recovered.txt -o again.pfm && echo taken again
 python3 - <<'P'
 import json
