@@ -613,7 +613,8 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *     NAME.direction         of a directional light, of a spot's axis or an ies light's nadir: [3],
  *                            of any length
  *
- * An ies light is one without a shape; it moves without derivatives.
+ * An ies light is one without a shape. It has derivatives where its table has no light at an angle at
+ * which it ends (up to 1e-3 of its largest intensity); else gradients are IMP_E_UNSUPPORTED.
  *
  * Gradients, patterns, and what is there already: as of poses.
  * @param name  such a name.

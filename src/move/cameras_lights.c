@@ -76,13 +76,23 @@ void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 bar,
     }
 }
 
+/* An axis a that is turned on the shortest way from r to b turns the light about a line across both;
+ * where b then goes by db, the light turns by
+ *
+ *     b x db - b (r x b) . db/(1 + r . b),
+ *
+ * as triangles on the sphere turn what is carried around them by their area. */
 void imp__light_axis_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
                          double *theta_bar)
 {
     for (int j = 0; j < moves->n_movers; j++) {
         const struct imp__mover *m = &moves->mover[j];
-        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_AXIS)
-            imp__move_vector_bar(theta_bar + m->first,
-                                 light_part(moves, m, imp__cross(turn_bar, m->axis)));
+        if (m->shape != IMP_MOVE_EMITTER(k) || m->kind != IMP_MOVE_AXIS) continue;
+        const double cosine = imp__dot(m->rest, m->axis);
+        imp_v3 bar = imp__cross(turn_bar, m->axis);
+        if (1 + cosine > 1e-12)
+            bar -= imp__cross(m->rest, m->axis) *
+                   (imp__dot(turn_bar, m->axis) / (1 + cosine));
+        imp__move_vector_bar(theta_bar + m->first, light_part(moves, m, bar));
     }
 }

@@ -36,15 +36,18 @@ static enum imp_status light_mover(const struct imp__moves *moves, struct imp__m
 {
     struct imp_emitter *e = moves->scene->emitters[IMP_MOVE_EMITTER(m->shape)];
     double v[3];
-    if (!e->ops->aim || (m->kind == IMP_MOVE_AXIS && !e->ops->cone))
+    if (!e->ops->aim || (m->kind == IMP_MOVE_AXIS && !imp__pose_has_axis(e)))
         return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
                           "light '%s' (%s) has no derivative by its %s", e->name,
                           e->ops->name, m->kind == IMP_MOVE_AXIS ? "direction" : "place");
     e->ops->aim(e, v, false);
     m->count = 3;
     m->centre = m->axis = imp__v3(v[0], v[1], v[2]);
-    double cosine;
-    if (m->kind == IMP_MOVE_AXIS) e->ops->cone(e, &m->axis, &cosine);
+    if (m->kind == IMP_MOVE_AXIS) {
+        imp__pose_aim(e, IMP_POSE_DIRECTION, v);
+        m->axis = imp__v3(v[0], v[1], v[2]);
+    }
+    m->rest = m->axis;
     return IMP_OK;
 }
 
@@ -123,6 +126,7 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
         for (int i = 0; rigid && i < 3; i++) m->centre[i] += rigid->number[i];
     }
     if (pose->kind == IMP_POSE_SCALE) m->rate = 1 / pose->number[0];
+    if (turns) m->rest = imp__pose_rest_axis(pose);
     if (pose->kind == IMP_POSE_DIRECTION)
         m->rate =
             1 / imp__length(imp__v3(pose->number[0], pose->number[1], pose->number[2]));

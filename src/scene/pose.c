@@ -12,6 +12,8 @@
 #include "math/motion.h"
 #include <string.h>
 
+extern const struct imp_emitter_ops imp__spot_light;
+
 /* ---- Rotations --------------------------------------------------------------------- */
 
 /* sin(t)/t, (1 - cos t)/t^2, (t - sin t)/t^3 with t = |a|. */
@@ -151,6 +153,17 @@ void imp__pose_aim(struct imp_emitter *e, enum imp_pose_kind kind, double v[3])
     }
     e->ops->cone(e, &axis, &cosine);
     for (int k = 0; k < 3; k++) v[k] = axis[k];
+}
+
+bool imp__pose_has_axis(const struct imp_emitter *e)
+{
+    return e->ops == &imp__spot_light || e->ops == &imp__ies_light;
+}
+imp_v3 imp__pose_rest_axis(const struct imp_pose *p)
+{
+    return p->emitter->ops == &imp__ies_light
+               ? ((const struct imp__ies *)p->object->rest)->nadir
+               : ((const struct imp__light_frame *)p->object->rest)->axis[2];
 }
 
 static void light_apply(const struct imp_pose *p)

@@ -91,6 +91,10 @@ double imp__pose_large(const struct imp_pose *p, size_t e);
 
 /* Where a light is, or where it shines: the unit direction of parallel light, or a spot's axis. */
 void imp__pose_aim(struct imp_emitter *e, enum imp_pose_kind kind, double v[3]);
+/* Has a light at a point an axis that turns? */
+bool imp__pose_has_axis(const struct imp_emitter *e);
+/* That axis where the file has it. */
+imp_v3 imp__pose_rest_axis(const struct imp_pose *direction);
 
 /* Where the rays of a camera meet. False: in no point, as those of a lens with an aperture or of
  * parallel light. */

@@ -34,7 +34,6 @@ bool imp__pinhole(const struct imp_sensor *s, imp_v3 *centre)
            imp__length(apart) <= 1e-7 * size;
 }
 
-extern const struct imp_emitter_ops imp__spot_light, imp__ies_light;
 
 /* ---- Adding ------------------------------------------------------------------------- */
 
@@ -100,7 +99,7 @@ static const char *light_why(const struct imp_scene *scene, const struct imp_emi
     const bool far = e->ops->flags & IMP_EMITTER_FAR;
     const bool has = kind == IMP_POSE_POSITION ? !far
                      : kind == IMP_POSE_DIRECTION
-                         ? far || e->ops == &imp__spot_light || e->ops == &imp__ies_light
+                         ? far || imp__pose_has_axis(e)
                          : false;
     if (!e->ops->aim || !has)
         return "it is none of point, spot and ies without a shape (position), and "

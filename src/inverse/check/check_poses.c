@@ -257,12 +257,12 @@ static double light_ratio(const struct moved *m, const struct imp_vertex *v,
     return receives(x, there.p, there.n) / receives(old->p, y.p, y.n);
 }
 
-/* Has it light of a spot, whose beam changes across its cone? */
+/* Has it light of a spot or a luminaire, which changes with the direction? */
 static bool has_spots(const struct imp_scene *scene, const struct imp_walk *walk)
 {
     for (const struct imp_vertex *v = walk->first; v; v = v->next)
         if (v->d.connection == IMP_CONNECTED &&
-            scene->emitters[v->d.light.emitter]->ops->cone)
+            imp__pose_has_axis(scene->emitters[v->d.light.emitter]))
             return true;
     return false;
 }

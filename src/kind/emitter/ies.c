@@ -112,6 +112,37 @@ double imp__ies_intensity(const struct imp__ies *x, imp_v3 w)
     return x->factor * (cd[0] + f * (cd[1] - cd[0]));
 }
 
+static double most_of(const double *x, size_t n, size_t stride)
+{
+    double most = 0;
+    for (size_t k = 0; k < n; k++) most = imp_max(most, x[k * stride]);
+    return most;
+}
+
+const char *imp__ies_jumps(const struct imp__ies *x)
+{
+    const struct imp_ies_data *d = x->data;
+    const size_t n = (size_t)d->n_vertical, m = (size_t)d->n_horizontal;
+    const double *first = d->candela, *last = d->candela + (m - 1) * n;
+    const double small = 1e-3 * most_of(d->candela, n * m, 1);
+    const double whole = d->type == IMP_PHOTOMETRY_C ? 180 : 90;
+    const bool from = d->type == IMP_PHOTOMETRY_C ? d->vertical[0] > 0
+                                                  : d->vertical[0] > -90;
+    if ((from && most_of(first, m, n) > small) ||
+        (d->vertical[n - 1] < whole && most_of(first + n - 1, m, n) > small))
+        return "has a table whose first or last vertical angle has light, which ends there";
+    if (d->type != IMP_PHOTOMETRY_C && m > 1 &&
+        (most_of(last, n, 1) > small ||
+         (d->horizontal[0] < 0 && most_of(first, n, 1) > small)))
+        return "has a table whose first or last horizontal angle has light, which ends "
+               "there";
+    if (d->type == IMP_PHOTOMETRY_C && m > 1 && d->horizontal[m - 1] == 360)
+        for (size_t k = 0; k < n; k++)
+            if (fabs(first[k] - last[k]) > small)
+                return "has a table with different light at 0 and at 360 degrees";
+    return NULL;
+}
+
 /* ---- The surface --------------------------------------------------------------- */
 
 double imp__ies_projected(const struct imp__ies *x, imp_v3 w)

@@ -33,6 +33,10 @@ struct imp__ies {
 double imp__ies_intensity(const struct imp__ies *x, imp_v3 w);
 /* The frame of `from`, turned as little as possible until its nadir is along `to`. */
 void imp__ies_turn(struct imp__ies *x, const struct imp__ies *from, imp_v3 to);
+/* Where the table ends inside the sphere with more than 1e-3 of its largest intensity, or its first
+ * and last plane are one and differ by that: there its light jumps from one direction to the next,
+ * so that what turns the direction has another derivative than that of the table. NULL: nowhere. */
+const char *imp__ies_jumps(const struct imp__ies *x);
 /* Int I dw, at scale 1, in lm (or W). */
 double imp__ies_flux(const struct imp__ies *x);
 /* Area that faces w, projected along w. */

@@ -4,6 +4,7 @@
 #include "base/context.h"
 #include "moved.h"
 #include "moved_kernel.h"
+#include "kind/emitter/ies.h"
 #include "scene/instances.h"
 #include "scene/pose.h"
 
@@ -46,10 +47,14 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
         const bool sky = e->ops->flags & IMP_EMITTER_ENVIRONMENT;
         if (sky ? !e->ops->jumps
                 : e->ops != &imp__area && e->ops != &imp__point_light &&
-                      e->ops != &imp__spot_light && e->ops != &imp__directional)
+                      e->ops != &imp__spot_light && e->ops != &imp__directional &&
+                      e->ops != &imp__ies_light)
             return refuse(t, "light", e->name, e->ops->name,
                           sky ? "does not say where its radiance jumps"
-                              : "is none of area, point, spot, directional and skies");
+                              : "is none of area, point, spot, directional, ies without a "
+                                "shape, and skies");
+        if (e->ops == &imp__ies_light && imp__ies_jumps(e->self))
+            return refuse(t, "light", e->name, e->ops->name, imp__ies_jumps(e->self));
         if (!sky && (e->shaped || is_textured(e->input, e->n_in)))
             return refuse(t, "light", e->name, e->ops->name, "has a texture");
         if (e->shape && e->shape->geometry != IMP_TRIANGLES &&
