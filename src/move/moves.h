@@ -44,9 +44,9 @@ struct imp__mover {
     enum imp__move_kind kind;
     int shape; /* index in the scene, IMP_MOVE_CAMERA, or IMP_MOVE_EMITTER(k) */
     imp_v3 centre;
-    imp_v3 axis;            /* of a spot; of parallel light its direction; unit */
-    imp_v3 rest;            /* axis of the file, from which it is turned on the shortest way */
-    double rate;            /* the velocities' factor */
+    imp_v3 axis; /* of a spot; of parallel light its direction; unit */
+    imp_v3 rest; /* axis of the file, from which it is turned on the shortest way */
+    double rate; /* the velocities' factor */
     size_t first, count;    /* its numbers */
     struct imp__fans *fans; /* of vertices with normals; else NULL */
 };

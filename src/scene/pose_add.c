@@ -34,7 +34,6 @@ bool imp__pinhole(const struct imp_sensor *s, imp_v3 *centre)
            imp__length(apart) <= 1e-7 * size;
 }
 
-
 /* ---- Adding ------------------------------------------------------------------------- */
 
 static enum imp_status refuse(const struct imp_scene *scene, const char *name,
@@ -97,10 +96,9 @@ static const char *light_why(const struct imp_scene *scene, const struct imp_emi
                              enum imp_pose_kind kind)
 {
     const bool far = e->ops->flags & IMP_EMITTER_FAR;
-    const bool has = kind == IMP_POSE_POSITION ? !far
-                     : kind == IMP_POSE_DIRECTION
-                         ? far || imp__pose_has_axis(e)
-                         : false;
+    const bool has = kind == IMP_POSE_POSITION    ? !far
+                     : kind == IMP_POSE_DIRECTION ? far || imp__pose_has_axis(e)
+                                                  : false;
     if (!e->ops->aim || !has)
         return "it is none of point, spot and ies without a shape (position), and "
                "directional, "

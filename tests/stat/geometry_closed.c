@@ -135,7 +135,8 @@ static double luminaire(const double at[3], const double n[3])
     turned(rest, n, f);
     for (int i = 0; i < 3; i++) r += at[i] * at[i];
     r = sqrt(r);
-    for (int i = 0; i < 3; i++) down -= at[i] * f[0][i] / r, across -= at[i] * f[1][i] / r;
+    for (int i = 0; i < 3; i++)
+        down -= at[i] * f[0][i] / r, across -= at[i] * f[1][i] / r;
     const double v = acos(down) * 180 / IMP_PI;
     const double h = acos(fabs(across) / sin(acos(down))) * 180 / IMP_PI;
     return .6 / IMP_PI * (1 + 3 * h / 90) * (1 - v / 90) * at[2] / (r * r * r);
@@ -157,9 +158,10 @@ static void luminaire_test(void)
     imp_scene *scene;
     size_t index;
     scene_of(NARROW, 4,
-             FLOOR "<emitter type='ies' id='bulb'><string name='filename' "
-                   "value='luminaire.ies'/><transform name='to_world'><lookat "
-                   "origin='.5,-.3,1.2' target='.5,.3,.4' up='0,0,1'/></transform></emitter>",
+             FLOOR
+             "<emitter type='ies' id='bulb'><string name='filename' "
+             "value='luminaire.ies'/><transform name='to_world'><lookat "
+             "origin='.5,-.3,1.2' target='.5,.3,.4' up='0,0,1'/></transform></emitter>",
              "bulb.position", &scene);
     test_must(ctx, imp_scene_add_geometry(scene, "bulb.direction"));
     test_must(ctx, imp_scene_find_param(scene, "bulb.direction", &index));
@@ -172,8 +174,8 @@ static void luminaire_test(void)
             lo[0][i] = at[i] - h * (i == k), hi[0][i] = at[i] + h * (i == k);
             lo[1][i] = v[i] - h * (i == k), hi[1][i] = v[i] + h * (i == k);
         }
-        tap_near(d[0][k].mean, (luminaire(hi[0], v) - luminaire(lo[0], v)) / (2 * h), 1e-4,
-                 0, "irradiance of a luminaire that moves");
+        tap_near(d[0][k].mean, (luminaire(hi[0], v) - luminaire(lo[0], v)) / (2 * h),
+                 1e-4, 0, "irradiance of a luminaire that moves");
         tap_near(d[1][k].mean, (luminaire(at, hi[1]) - luminaire(at, lo[1])) / (2 * h),
                  1e-4, 0, "irradiance of a luminaire that turns");
     }

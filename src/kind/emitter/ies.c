@@ -126,11 +126,12 @@ const char *imp__ies_jumps(const struct imp__ies *x)
     const double *first = d->candela, *last = d->candela + (m - 1) * n;
     const double small = 1e-3 * most_of(d->candela, n * m, 1);
     const double whole = d->type == IMP_PHOTOMETRY_C ? 180 : 90;
-    const bool from = d->type == IMP_PHOTOMETRY_C ? d->vertical[0] > 0
-                                                  : d->vertical[0] > -90;
+    const bool from =
+        d->type == IMP_PHOTOMETRY_C ? d->vertical[0] > 0 : d->vertical[0] > -90;
     if ((from && most_of(first, m, n) > small) ||
         (d->vertical[n - 1] < whole && most_of(first + n - 1, m, n) > small))
-        return "has a table whose first or last vertical angle has light, which ends there";
+        return "has a table whose first or last vertical angle has light, which ends "
+               "there";
     if (d->type != IMP_PHOTOMETRY_C && m > 1 &&
         (most_of(last, n, 1) > small ||
          (d->horizontal[0] < 0 && most_of(first, n, 1) > small)))

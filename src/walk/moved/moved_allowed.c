@@ -2,9 +2,9 @@
  *
  * What has a derivative by what moves that is whole, and what is refused by name (moved.h). */
 #include "base/context.h"
+#include "kind/emitter/ies.h"
 #include "moved.h"
 #include "moved_kernel.h"
-#include "kind/emitter/ies.h"
 #include "scene/instances.h"
 #include "scene/pose.h"
 
@@ -49,10 +49,11 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
                 : e->ops != &imp__area && e->ops != &imp__point_light &&
                       e->ops != &imp__spot_light && e->ops != &imp__directional &&
                       e->ops != &imp__ies_light)
-            return refuse(t, "light", e->name, e->ops->name,
-                          sky ? "does not say where its radiance jumps"
-                              : "is none of area, point, spot, directional, ies without a "
-                                "shape, and skies");
+            return refuse(
+                t, "light", e->name, e->ops->name,
+                sky ? "does not say where its radiance jumps"
+                    : "is none of area, point, spot, directional, ies without a "
+                      "shape, and skies");
         if (e->ops == &imp__ies_light && imp__ies_jumps(e->self))
             return refuse(t, "light", e->name, e->ops->name, imp__ies_jumps(e->self));
         if (!sky && (e->shaped || is_textured(e->input, e->n_in)))
