@@ -92,10 +92,11 @@ static void disc_draw(const double u[2], struct disc *out)
 {
     const double most = versed();
     for (int g = 0; g < RAYS; g++) {
-        double ring = (5 * g % RAYS + 0.5) / RAYS + u[0]; /* half of them are even, too */
+        const int k = 5 * g % RAYS; /* so that half of them are even, too */
+        double ring = (k + 0.5) / RAYS + u[0];
         ring -= floor(ring);
         const double down = ring * most, r = sqrt(down * (2 - down));
-        const double phi = IMP_2PI * u[1] + g * 2.39996322972865332;
+        const double phi = IMP_2PI * u[1] + k * 2.39996322972865332;
         out->across[g][0] = r * cos(phi);
         out->across[g][1] = r * sin(phi);
         out->along[g] = 1 - down;

@@ -260,6 +260,35 @@ static void frame_set(struct imp__ies *x, imp_v3 s, imp_v3 n, bool mirrored)
     x->c90 = imp__cross(x->c0, x->nadir) * (mirrored ? -1.0 : 1.0);
 }
 
+/* What its lamps keep of their flux when the luminaire is tilted. */
+static enum imp_status tilt_read(const struct imp_build *b, struct imp__ies *x)
+{
+    const struct imp_ies_data *d = x->data;
+    double tilt, f;
+    enum imp_status st = IMP_OK;
+    x->kept = 1;
+    if (!imp_build_has(b, "tilt")) goto out;
+    IMP_TRY(imp__props_float(b->ctx, b->node, "tilt", 0, &tilt));
+    if (d->n_tilts == 0)
+        IMP_TRY(
+            imp_build_error(b, "tilt", IMP_E_SCENE,
+                            "its file does not say what tilted lamps keep (TILT=NONE)"));
+    tilt = fabs(tilt);
+    if (!(tilt >= d->tilt[0] && tilt <= d->tilt[d->n_tilts - 1]))
+        IMP_TRY(imp_build_error(b, "tilt", IMP_E_SCENE,
+                                "tilt = %g: its file says what lamps keep from %g to %g "
+                                "degrees",
+                                tilt, d->tilt[0], d->tilt[d->n_tilts - 1]));
+    if (d->n_tilts == 1) {
+        x->kept = d->tilt_factor[0];
+    } else {
+        const double *k = d->tilt_factor + place(d->tilt, d->n_tilts, tilt, &f);
+        x->kept = k[0] + f * (k[1] - k[0]);
+    }
+out:
+    return st;
+}
+
 /* What the luminaire gives in operation, as a part of what was measured: a flux in its place, how
  * far it is dimmed, and what age and dirt leave of it (the maintenance factor). */
 static enum imp_status operation_read(const struct imp_build *b, struct imp__ies *x)
@@ -277,7 +306,8 @@ static enum imp_status operation_read(const struct imp_build *b, struct imp__ies
             imp_build_error(b, "flux", IMP_E_SCENE,
                             "its table is dark, and has no flux that could be scaled"));
     if (imp_build_has(b, "flux")) x->factor *= flux / measured;
-    x->factor *= x->dimming * x->maintenance;
+    IMP_TRY(tilt_read(b, x));
+    x->factor *= x->dimming * x->maintenance * x->kept;
 out:
     return st;
 }
