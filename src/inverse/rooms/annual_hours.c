@@ -134,9 +134,9 @@ static size_t step_of(size_t n)
     }
 }
 
-/* The chance of a cell goes with the root of its light in the year: between one for each cell, which
- * numbers that count hours want, and one by light, which sums want. In it that of an hour goes
- * with the hour's sun. Each entry of the table has room for the chance 1/n: hours with less are
+/* The chance of a cell goes with the fourth root of its light in the year: counts of hours have least
+ * noise where all cells are drawn alike, sums where they are drawn by their light. In it that of
+ * an hour goes with the hour's sun. Each entry of the table has room for the chance 1/n: hours with less are
  * filled up by those with more. Entries side by side are of hours far apart. */
 static void suns_make(struct imp__annual_hours *h, const double *light, double *chance,
                       size_t *list)
@@ -145,8 +145,8 @@ static void suns_make(struct imp__annual_hours *h, const double *light, double *
     double roots = 0;
     size_t low = 0, high = n; /* list: hours with less from 0 on, with more to n */
     size_t next = 0, step = n > 0 ? step_of(n) : 0;
-    for (int c = 0; c < h->n_cells; c++) roots += sqrt(light[c]);
-    for (int c = 0; c < h->n_cells; c++) h->times[c] = roots / sqrt(light[c]);
+    for (int c = 0; c < h->n_cells; c++) roots += sqrt(sqrt(light[c]));
+    for (int c = 0; c < h->n_cells; c++) h->times[c] = roots / sqrt(sqrt(light[c]));
     for (size_t k = 0; k < h->n; k++) {
         const int c = h->cell[k];
         if (c < 0) continue;
