@@ -90,7 +90,7 @@ struct imp_grid_summary {
  *     P(m < min_i (x_i - z(1 - a) s_i)) <= a, as it is so for the point where m is taken;
  *     P(m > min_i (x_i + z(1 - a/n) s_i)) <= a, as m <= mu_i for all i (Bonferroni).
  * The second is conservative where few points are near the minimum. In place of z(1 - a/n) it has the
- * u for which  sum_i P(z > u + d_i) = a,  d_i = max(0, (x_i - min_j (x_j + 1.5 s_j))/s_i - 1.5):  points
+ * u for which  sum_i P(z > u + d_i) = a,  d_i = max(0, (x_i - min_j (x_j + 1.75 s_j))/s_i - 1.75):  points
  * that surely lie above the least one count less. Where all points are near it this is missed
  * with up to 2 a, but then the first bound hardly ever is: coverage is confidence or more, in
  * simulations of all kinds of grids. Ratios take bounds of both numbers, the risks added.

@@ -57,7 +57,7 @@ static double upper(const struct grid *g, double sign, double risk, double one,
                     double all)
 {
     enum { HALVINGS = 40 };
-    const double CERTAIN = 1.5, far = 12;
+    const double CERTAIN = 1.75, far = 12;
     double m = INFINITY, lo = one, hi = all;
     for (size_t i = 0; i < g->n; i++)
         m = fmin(m, sign * g->value[i] + CERTAIN * g->se[i]);
