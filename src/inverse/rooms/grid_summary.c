@@ -41,7 +41,7 @@ static double freedom_of_sum(size_t n, const double *se, double k)
     return square > 0 ? fmax(k, (k + 2) * sum * sum / square) : k;
 }
 
-/* Of errors with k degrees of freedom, beyond t. */
+/* Chance of an error beyond t, with k degrees of freedom. */
 static double tail(double t, double k)
 {
     return imp__normal_cdf(-(k < 1 || k > 1e5 ? t : imp__normal_of_student(t, k)));
