@@ -269,10 +269,12 @@ static enum imp_status tilt_read(const struct imp_build *b, struct imp__ies *x)
     x->kept = 1;
     if (!imp_build_has(b, "tilt")) goto out;
     IMP_TRY(imp__props_float(b->ctx, b->node, "tilt", 0, &tilt));
+    if (d->n_tilts == 0 && tilt == 0) goto out; /* as it was measured */
     if (d->n_tilts == 0)
-        IMP_TRY(
-            imp_build_error(b, "tilt", IMP_E_SCENE,
-                            "its file does not say what tilted lamps keep (TILT=NONE)"));
+        IMP_TRY(imp_build_error(b, "tilt", IMP_E_SCENE,
+                                "tilt = %g: its file does not say what tilted lamps keep "
+                                "(TILT=NONE)",
+                                tilt));
     tilt = fabs(tilt);
     if (!(tilt >= d->tilt[0] && tilt <= d->tilt[d->n_tilts - 1]))
         IMP_TRY(imp_build_error(b, "tilt", IMP_E_SCENE,
