@@ -562,7 +562,7 @@ static void tilted(void)
                            "value='1000'/>"),
                  600 / (2 * M_PI * 2.5), 1e-3, 0, what);
         tap_ok(isnan(part_kept("<float name='tilt' value='91'/>")) &&
-                   strstr(imp_last_error(ctx), "keep from 0 to 90 degrees"),
+                   strstr(imp_last_error(ctx), "outside [0, 90]"),
                "%s", imp_last_error(ctx));
     }
     static const struct {

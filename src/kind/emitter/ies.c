@@ -272,14 +272,14 @@ static enum imp_status tilt_read(const struct imp_build *b, struct imp__ies *x)
     if (d->n_tilts == 0 && tilt == 0) goto out; /* as it was measured */
     if (d->n_tilts == 0)
         IMP_TRY(imp_build_error(b, "tilt", IMP_E_SCENE,
-                                "tilt = %g: its file does not say what tilted lamps keep "
-                                "(TILT=NONE)",
+                                "tilt = %g needs a file that says what tilted lamps "
+                                "keep; its file has TILT=NONE",
                                 tilt));
     tilt = fabs(tilt);
     if (!(tilt >= d->tilt[0] && tilt <= d->tilt[d->n_tilts - 1]))
         IMP_TRY(imp_build_error(b, "tilt", IMP_E_SCENE,
-                                "tilt = %g: its file says what lamps keep from %g to %g "
-                                "degrees",
+                                "tilt = %g is outside [%g, %g], for which its file says "
+                                "what lamps keep",
                                 tilt, d->tilt[0], d->tilt[d->n_tilts - 1]));
     if (d->n_tilts == 1) {
         x->kept = d->tilt_factor[0];
