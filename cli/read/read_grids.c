@@ -50,6 +50,22 @@ static int no_grid(int sensor)
                      sensor, info.name, info.type);
 }
 
+/* Is the grid a plane across z as high above the lowest shape as work planes are in feet? */
+static void feet_tell(const struct grid *g)
+{
+    struct imp_scene_info s = {.size = sizeof s};
+    imp_scene_get_info(cli.scene, &s);
+    const double height = s.bounds_max[2] - s.bounds_min[2];
+    const double up = g->n > 0 ? g->points[2] - s.bounds_min[2] : 0;
+    for (size_t i = 1; i < g->n; i++)
+        if (fabs(g->points[3 * i + 2] - g->points[2]) > 1e-6) return;
+    if (imp_scene_n_luminaires(cli.scene) > 0 && height >= 7 && height <= 14 &&
+        up >= 2.3 && up <= 2.9)
+        cli_say("importon: warning: grid '%s' is %g above the lowest shape, in a room %g "
+                "high: is the scene in feet? Luminaires take its units for metres",
+                g->name, up, height);
+}
+
 /* The grids of the sensors from `first` on that have one. */
 int grids_read(struct json *j, struct imp_run run, int first, int end,
                const struct grid_wanted *wanted, double most_z, int *apart, int *unlit,
@@ -82,6 +98,7 @@ int grids_read(struct json *j, struct imp_run run, int first, int end,
         if (g.summary.average.value == 0 && g.summary.average.hi == 0)
             unlit[(*n_unlit)++] = s;
         grid_tell(&g);
+        feet_tell(&g);
         if (cli.json) grid_json(j, &g);
         else grid_print(&g);
         if (wanted->csv) rc = grid_csv(wanted->csv, &g);
@@ -92,12 +109,27 @@ int grids_read(struct json *j, struct imp_run run, int first, int end,
     return rc;
 }
 
+/* Scenes with luminaires are in metres. Where all three sides are longer than halls are high, or a work
+ * plane lies as high in a room as .7 to .9 m are in feet, they hardly are. */
+static void units_tell(const struct imp_scene_info *s)
+{
+    enum { HALL = 50 };
+    double size[3];
+    for (int k = 0; k < 3; k++) size[k] = s->bounds_max[k] - s->bounds_min[k];
+    if (fmin(size[0], fmin(size[1], size[2])) > HALL)
+        cli_say(
+            "importon: warning: all shapes together are %g x %g x %g, and a luminaire "
+            "takes that for metres: are they in centimetres, inches or millimetres?",
+            size[0], size[1], size[2]);
+}
+
 /* Luminaires outside of the box of all shapes light no room. */
 void luminaires_tell(void)
 {
     struct imp_scene_info s = {.size = sizeof s};
     const int n = imp_scene_n_luminaires(cli.scene);
     imp_scene_get_info(cli.scene, &s);
+    if (n > 0) units_tell(&s);
     for (int i = 0; i < n && s.bounds_min[0] <= s.bounds_max[0]; i++) {
         struct imp_luminaire_info l = {.size = sizeof l};
         int out = 0;

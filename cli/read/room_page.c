@@ -99,6 +99,11 @@ static int wants_put(FILE *f, const struct room_page *p, struct imp_run run, boo
         const bool sure = imp_design_enough(w->of, upper ? e.hi : e.lo, w->value),
                    never = !imp_design_enough(w->of, upper ? e.lo : e.hi, w->value);
         *met &= sure;
+        if (!sure)
+            cli_say("importon: %s %s: %.4g%s%s [%.4g, %.4g], wanted %s %.4g: %s",
+                    want_sensor(w), want_words[w->of], e.value, *want_unit(w) ? " " : "",
+                    want_unit(w), e.lo, e.hi, upper ? "<=" : ">=", w->value,
+                    never ? "not met" : "within the error");
         fprintf(f, "<tr><td>");
         text_put(f, want_sensor(w));
         fprintf(f,

@@ -82,6 +82,11 @@ struct imp_ies_data {
         size[3]; /* of the luminous opening, m: along C0, along C90, height; 0: a point */
     bool
         length_c0; /* the length of lamps lies along C0 (LM-63); else along C90 (EULUMDAT) */
+    /* What tilted lamps keep of their flux, by degrees from the position of measurement. n_tilts 0:
+     * all of it; then tilt_file is the file that LM-63's TILT= names, which is not read yet, or NULL. */
+    int n_tilts;
+    const double *tilt, *tilt_factor;
+    const char *tilt_file;
 };
 
 /* A measured isotropic BRDF by half-angle and difference angle (Rusinkiewicz 1998), in

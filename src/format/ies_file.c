@@ -13,8 +13,10 @@
  * Types A and B have vertical angles from -90 or 0 to 90, horizontal ones from -90 or 0 to
  * 90. A number of lamps times lumens below 0 is absolute photometry: no lamp is named.
  *
- * Intensity is candela x multiplier x ballast factor (x ballast-lamp factor). What tilted
- * lamps lose is read and not applied: the luminaire is taken as it was measured. */
+ * TILT=FILE has the numbers of TILT=INCLUDE in a file of their own.
+ *
+ * Intensity is candela x multiplier x ballast factor (x ballast-lamp factor), as it was measured;
+ * what tilted lamps keep of it is for the emitter, whose tilt it is. */
 #include "ies_file.h"
 #include "base/number.h"
 #include <math.h>
@@ -22,6 +24,7 @@
 #include <string.h>
 
 #define NUMBER_MAX 1e12 /* of any number in a file */
+#define TILT_MOST  100  /* of a lamp's flux, tilted over measured */
 #define TILTS_MAX  10000
 #define FOOT       0.3048 /* m */
 
@@ -65,8 +68,23 @@ static bool begins(const char *line, size_t n, const char *with)
     return n >= strlen(with) && memcmp(line, with, strlen(with)) == 0;
 }
 
-/* Up to TILT=. *factor: does the ballast-lamp photometric factor count? */
-static enum imp_status labels(struct reader *r, bool *factor, bool *tilt)
+/* A copy of what stands behind TILT=. */
+static enum imp_status tilt_named(struct reader *r, struct imp_arena *keep,
+                                  const char *name, size_t n, struct imp_ies_data *d)
+{
+    if (n == 0)
+        return fail(r, IMP_E_SCENE, "TILT= names nothing: NONE, INCLUDE or a file");
+    char *text = imp__arena_take(keep, n + 1, 1);
+    if (!text) return imp__error(r->ctx, IMP_E_NOMEM, "%s: out of memory", r->name);
+    memcpy(text, name, n);
+    text[n] = 0;
+    d->tilt_file = text;
+    return IMP_OK;
+}
+
+/* Up to TILT=. *factor: does the ballast-lamp photometric factor count? *tilt: do its numbers follow? */
+static enum imp_status labels(struct reader *r, struct imp_arena *keep, bool *factor,
+                              bool *tilt, struct imp_ies_data *d)
 {
     static const struct {
         const char *name;
@@ -95,9 +113,7 @@ static enum imp_status labels(struct reader *r, bool *factor, bool *tilt)
         while (n > 0 && (*line == ' ' || *line == '\t')) line++, n--;
         *tilt = n == 7 && memcmp(line, "INCLUDE", 7) == 0;
         if (*tilt || (n == 4 && memcmp(line, "NONE", 4) == 0)) return IMP_OK;
-        return fail(r, IMP_E_UNSUPPORTED,
-                    "TILT=%.*s: NONE and INCLUDE are read, tilt in another file is not",
-                    (int)imp_min(n, (size_t)40), line);
+        return tilt_named(r, keep, line, n, d);
     }
     return fail(r, IMP_E_SCENE, "the file ends without a line that begins with TILT=");
 }
@@ -143,24 +159,6 @@ static enum imp_status whole(struct reader *r, const char *what, int lo, int hi,
     *out = (int)x;
     return IMP_OK;
 }
-static enum imp_status passed_over(struct reader *r, const char *what)
-{
-    double x;
-    return number(r, what, -NUMBER_MAX, NUMBER_MAX, &x);
-}
-
-static enum imp_status tilts(struct reader *r)
-{
-    enum imp_status st = IMP_OK;
-    int geometry, n = 0;
-    IMP_TRY(whole(r, "the lamp-to-luminaire geometry", 1, 3, &geometry));
-    IMP_TRY(whole(r, "the number of tilt angles", 1, TILTS_MAX, &n));
-    for (int k = 0; k < n; k++) IMP_TRY(passed_over(r, "a tilt angle"));
-    for (int k = 0; k < n; k++) IMP_TRY(passed_over(r, "a tilt multiplier"));
-out:
-    return st;
-}
-
 static enum imp_status angles(struct reader *r, const char *what, double lo, double hi,
                               int n, double *out)
 {
@@ -172,6 +170,38 @@ static enum imp_status angles(struct reader *r, const char *what, double lo, dou
                         out[k - 1]);
     }
     return IMP_OK;
+}
+
+/* The lamp-to-luminaire geometry says how lamps lie in the luminaire; the multipliers are those of the
+ * luminaire's tilt with any of them. */
+static enum imp_status tilts(struct reader *r, struct imp_arena *keep,
+                             struct imp_ies_data *d)
+{
+    enum imp_status st = IMP_OK;
+    int geometry, n = 0;
+    IMP_TRY(whole(r, "the lamp-to-luminaire geometry", 1, 3, &geometry));
+    IMP_TRY(whole(r, "the number of tilt angles", 1, TILTS_MAX, &n));
+    double *tilt = imp__arena_take(keep, (size_t)n, sizeof *tilt);
+    double *factor = imp__arena_take(keep, (size_t)n, sizeof *factor);
+    if (!tilt || !factor)
+        IMP_TRY(imp__error(r->ctx, IMP_E_NOMEM, "%s: out of memory", r->name));
+    IMP_TRY(angles(r, "a tilt angle", 0, 180, n, tilt));
+    for (int k = 0; k < n; k++)
+        IMP_TRY(number(r, "a tilt multiplier", 0, TILT_MOST, &factor[k]));
+    d->n_tilts = n;
+    d->tilt = tilt;
+    d->tilt_factor = factor;
+    d->tilt_file = NULL;
+out:
+    return st;
+}
+
+/* Nothing but gaps and an end of file of another age is left. */
+static bool at_end(struct reader *r, int *line)
+{
+    *line = r->line;
+    while (gap(r, line), r->at < r->end && *r->at == '\x1a') r->at++;
+    return r->at == r->end;
 }
 
 /* ---- The file ------------------------------------------------------------------ */
@@ -207,9 +237,9 @@ static enum imp_status parse(struct reader *r, struct imp_arena *keep,
     bool has_factor, tilt;
     double multiplier = 0, ballast = 0, lamp = 0, lamps = 0, lumens = 0, size[3];
     int type = 0, units = 1;
-    IMP_TRY(labels(r, &has_factor, &tilt));
+    IMP_TRY(labels(r, keep, &has_factor, &tilt, d));
     r->line++; /* the one that begins after TILT= */
-    if (tilt) IMP_TRY(tilts(r));
+    if (tilt) IMP_TRY(tilts(r, keep, d));
     IMP_TRY(number(r, "the number of lamps", -NUMBER_MAX, NUMBER_MAX, &lamps));
     IMP_TRY(number(r, "lumens per lamp", -NUMBER_MAX, NUMBER_MAX, &lumens));
     IMP_TRY(number(r, "the candela multiplier", 0, NUMBER_MAX, &multiplier));
@@ -273,9 +303,8 @@ static enum imp_status parse(struct reader *r, struct imp_arena *keep,
         IMP_TRY(number(r, "a candela value", 0, NUMBER_MAX, &cd[k]));
         cd[k] *= factor;
     }
-    int line = r->line;
-    while (gap(r, &line), r->at < r->end && *r->at == '\x1a') r->at++;
-    if (r->at < r->end) {
+    int line;
+    if (!at_end(r, &line)) {
         r->line = line;
         IMP_TRY(fail(r, IMP_E_SCENE, "there is more than %d x %d candela values",
                      d->n_vertical, d->n_horizontal));
@@ -295,5 +324,23 @@ enum imp_status imp__ies_parse(imp_context *ctx, struct imp_arena *keep, const c
     struct imp_ies_data d = {0};
     const enum imp_status st = parse(&r, keep, &d);
     if (st == IMP_OK) *out = d;
+    return st;
+}
+
+enum imp_status imp__ies_tilt_parse(imp_context *ctx, struct imp_arena *keep,
+                                    const char *name, const struct imp_bytes *text,
+                                    struct imp_ies_data *data)
+{
+    const char *at = (const char *)text->data;
+    struct reader r = {
+        .ctx = ctx, .name = name, .at = at, .end = at + text->size, .line = 1};
+    struct imp_ies_data d = *data;
+    enum imp_status st = tilts(&r, keep, &d);
+    int line;
+    if (st == IMP_OK && !at_end(&r, &line)) {
+        r.line = line;
+        st = fail(&r, IMP_E_SCENE, "there is more than %d tilt multipliers", d.n_tilts);
+    }
+    if (st == IMP_OK) *data = d;
     return st;
 }

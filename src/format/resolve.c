@@ -134,6 +134,25 @@ out:
     return st;
 }
 
+/* The file that TILT= of the LM-63 file at `path` names, from the folder of that. */
+static enum imp_status tilt_attach(struct imp_scene *scene, struct imp_node *node,
+                                   const char *path, struct imp_ies_data *data)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_bytes text = {0};
+    const char *tilt, *first = imp__folder_of(scene, path);
+    if (!first) IMP_TRY(imp__error(scene->ctx, IMP_E_NOMEM, "scene: out of memory"));
+    st = imp__search(scene, first, data->tilt_file, &tilt);
+    if (st != IMP_OK) imp__error_prefix(scene->ctx, st, "%s: TILT", path);
+    if (st == IMP_OK) st = imp__file_read(scene->ctx, tilt, IMP_IES_BYTES_MAX, &text);
+    if (st == IMP_OK)
+        st = imp__ies_tilt_parse(scene->ctx, &scene->arena, tilt, &text, data);
+    if (st != IMP_OK) st = placed(scene, node, st);
+out:
+    imp__bytes_free(scene->ctx, &text);
+    return st;
+}
+
 static enum imp_status ies_attach(struct imp_scene *scene, struct imp_node *node)
 {
     enum imp_status st = IMP_OK;
@@ -150,6 +169,7 @@ static enum imp_status ies_attach(struct imp_scene *scene, struct imp_node *node
         st = eulumdat ? imp__ldt_parse(ctx, &scene->arena, path, &text, data)
                       : imp__ies_parse(ctx, &scene->arena, path, &text, data);
     if (st != IMP_OK) IMP_TRY(placed(scene, node, st));
+    if (data->tilt_file) IMP_TRY(tilt_attach(scene, node, path, data));
     node->ies = data;
 out:
     imp__bytes_free(ctx, &text);

@@ -139,8 +139,9 @@ static enum imp_status grid_put(struct putting *p, const struct imp_node *node)
 
 static void ies_put(struct putting *p, const struct imp_ies_data *d)
 {
-    const int32_t size[3] = {d->n_vertical, d->n_horizontal,
-                             d->type | (d->length_c0 ? 4 : 0)};
+    const int32_t size[4] = {d->n_vertical, d->n_horizontal,
+                             d->type | (d->length_c0 ? 4 : 0), d->n_tilts};
+    const size_t n = (size_t)d->n_tilts;
     const double more[5] = {d->lamp_flux, d->watts, d->size[0], d->size[1], d->size[2]};
     const size_t v = (size_t)d->n_vertical, h = (size_t)d->n_horizontal;
     put_mark(p, MARK_IES);
@@ -149,6 +150,8 @@ static void ies_put(struct putting *p, const struct imp_ies_data *d)
     put(p, d->vertical, v * sizeof *d->vertical);
     put(p, d->horizontal, h * sizeof *d->horizontal);
     put(p, d->candela, v * h * sizeof *d->candela);
+    put(p, d->tilt, n * sizeof *d->tilt);
+    put(p, d->tilt_factor, n * sizeof *d->tilt_factor);
 }
 
 static void merl_put(struct putting *p, const struct imp_merl_data *d)

@@ -61,7 +61,7 @@ static bool all_in(const double *x, size_t n, double lo, double hi)
 
 static bool take_ies(struct taking *t)
 {
-    int32_t size[3];
+    int32_t size[4];
     double more[5];
     struct imp_node *node = top_of(t);
     struct imp_ies_data *d = imp__arena_array(&t->scene->arena, 1, sizeof *d);
@@ -69,9 +69,9 @@ static bool take_ies(struct taking *t)
         !take(t, size, sizeof size) || !take(t, more, sizeof more) ||
         !all_in(more, 5, 0, 1e300) || size[2] < 0 || size[2] >> 3 ||
         (size[2] & 3) > IMP_PHOTOMETRY_A || size[0] < 2 || size[1] < 1 ||
-        size[0] > IMP_IES_ANGLES_MAX || size[1] > IMP_IES_ANGLES_MAX)
+        size[0] > IMP_IES_ANGLES_MAX || size[1] > IMP_IES_ANGLES_MAX || size[3] < 0)
         return false;
-    const size_t v = (size_t)size[0], h = (size_t)size[1];
+    const size_t n = (size_t)size[3], v = (size_t)size[0], h = (size_t)size[1];
     d->n_vertical = size[0];
     d->n_horizontal = size[1];
     d->type = (enum imp_photometry)(size[2] & 3);
@@ -82,6 +82,14 @@ static bool take_ies(struct taking *t)
     d->vertical = take_array(t, v, sizeof(double), true);
     d->horizontal = take_array(t, h, sizeof(double), true);
     d->candela = take_array(t, v * h, sizeof(double), true);
+    if (n > 0) {
+        d->n_tilts = size[3];
+        d->tilt = take_array(t, n, sizeof(double), true);
+        d->tilt_factor = take_array(t, n, sizeof(double), true);
+        if (!d->tilt || !d->tilt_factor || !all_in(d->tilt, n, 0, 180) ||
+            !all_in(d->tilt_factor, n, 0, 1e300))
+            return false;
+    }
     node->ies = d;
     return d->vertical && d->horizontal && d->candela && imp__ies_is_valid(d) &&
            all_in(d->candela, v * h, 0, 1e300);

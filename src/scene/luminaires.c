@@ -49,7 +49,7 @@ enum imp_status imp_scene_get_luminaire(const imp_scene *scene, int luminaire,
                           imp_scene_n_luminaires(scene));
     const struct imp__ies *x = e->self;
     const double rated = imp__ies_flux(x) * x->lumens, scale = scale_of(scene, e);
-    const double reduced = x->dimming * x->maintenance;
+    const double reduced = x->dimming * x->maintenance * x->kept;
     struct imp_luminaire_info all = {.size = sizeof all,
                                      .name = e->name,
                                      .flux = rated * scale,

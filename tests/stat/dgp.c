@@ -56,8 +56,8 @@ static void view(void)
     /* By hand: 30 degrees up: a = 0; to the side: a = 90; below: Iwata. */
     const imp_v3 up = {0, .5, sqrt(.75)}, side = {-.5, 0, sqrt(.75)},
                  down = {.3, -.4, sqrt(.75)};
-    tap_ok(fabs(imp__view_position(up) - imp_guth_position(0, 30)) < 1e-9 &&
-               fabs(imp__view_position(side) - imp_guth_position(90, 30)) < 1e-9 &&
+    tap_ok(fabs(imp__view_position(up) - imp__levin_position(0, 30)) < 1e-9 &&
+               fabs(imp__view_position(side) - imp__levin_position(90, 30)) < 1e-9 &&
                fabs(imp__view_position(down) - (1 + .8 * tan(30 * DEGREE))) < 1e-9,
            "positions above, beside and below");
     imp__view_free(ctx, &v);
@@ -175,7 +175,7 @@ static void sun(void)
     const double el = 25 * DEGREE, az = 20 * DEGREE, size = 2 * M_PI * (1 - cos(.004675));
     const double w[3] = {cos(el) * sin(az), cos(el) * cos(az), sin(el)};
     const double b = acos(w[1]) / DEGREE, a = acos(w[2] / hypot(w[0], w[2])) / DEGREE;
-    const double p = imp_guth_position(a, b), L = 2e7;
+    const double p = imp__levin_position(a, b), L = 2e7;
     const double lx = 300 * M_PI + L * size * w[1];
     const double truth =
         5.87e-5 * lx + .0918 * log10(1 + L * L * size / (p * p) / pow(lx, 1.87)) + .16;

@@ -102,6 +102,87 @@ static void spot_test(void)
     imp_scene_destroy(scene);
 }
 
+/* ---- A luminaire ---------------------------------------------------------------- */
+
+/* Its nadir and C0 where the file has it, and nadir n: turned on the shortest way. */
+static void turned(const double rest[2][3], const double n[3], double out[2][3])
+{
+    const double *a = rest[0];
+    double b[3], t[3], c = 0, l = 0;
+    for (int i = 0; i < 3; i++) l += n[i] * n[i];
+    for (int i = 0; i < 3; i++) b[i] = n[i] / sqrt(l), c += a[i] * b[i];
+    for (int i = 0; i < 3; i++)
+        t[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+    for (int k = 0; k < 2; k++) {
+        double v[3], once[3];
+        for (int i = 0; i < 3; i++) v[i] = rest[k][i];
+        for (int i = 0; i < 3; i++)
+            once[i] = t[(i + 1) % 3] * v[(i + 2) % 3] - t[(i + 2) % 3] * v[(i + 1) % 3];
+        for (int i = 0; i < 3; i++)
+            out[k][i] = v[i] + once[i] +
+                        (t[(i + 1) % 3] * once[(i + 2) % 3] -
+                         t[(i + 2) % 3] * once[(i + 1) % 3]) /
+                            (1 + c);
+    }
+}
+
+/* 1 + 3 h/90 at nadir, and 0 at 90 degrees, linear between, h from C0. */
+static double luminaire(const double at[3], const double n[3])
+{
+    /* lookat's x is up x forward, and C0 is x. */
+    static const double rest[2][3] = {{0, 0.6, -0.8}, {1, 0, 0}};
+    double f[2][3], r = 0, down = 0, across = 0;
+    turned(rest, n, f);
+    for (int i = 0; i < 3; i++) r += at[i] * at[i];
+    r = sqrt(r);
+    for (int i = 0; i < 3; i++)
+        down -= at[i] * f[0][i] / r, across -= at[i] * f[1][i] / r;
+    const double v = acos(down) * 180 / IMP_PI;
+    const double h = acos(fabs(across) / sin(acos(down))) * 180 / IMP_PI;
+    return .6 / IMP_PI * (1 + 3 * h / 90) * (1 - v / 90) * at[2] / (r * r * r);
+}
+
+static void luminaire_test(void)
+{
+    const char *file = "luminaire.ies";
+    FILE *f = fopen(file, "w");
+    if (!f) {
+        tap_ok(false, "%s can be written", file);
+        return;
+    }
+    fprintf(f, "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 2 1 2 0 0 0 1 1 0\n0 90\n0 90\n"
+               "1 0 4 0\n");
+    fclose(f);
+    const double at[3] = {.5, -.3, 1.2}, v[3] = {-.7, .5, -1.5}, h = 1e-5;
+    struct tap_stat d[2][3] = {{{0, 0, 0}}};
+    imp_scene *scene;
+    size_t index;
+    scene_of(NARROW, 4,
+             FLOOR
+             "<emitter type='ies' id='bulb'><string name='filename' "
+             "value='luminaire.ies'/><transform name='to_world'><lookat "
+             "origin='.5,-.3,1.2' target='.5,.3,.4' up='0,0,1'/></transform></emitter>",
+             "bulb.position", &scene);
+    test_must(ctx, imp_scene_add_geometry(scene, "bulb.direction"));
+    test_must(ctx, imp_scene_find_param(scene, "bulb.direction", &index));
+    test_must(ctx, imp_scene_set_values(scene, index, 3, v));
+    mean_gradient(ctx, scene, "bulb.position", 16, 4, d[0]);
+    mean_gradient(ctx, scene, "bulb.direction", 16, 4, d[1]);
+    for (int k = 0; k < 3; k++) {
+        double lo[2][3], hi[2][3];
+        for (int i = 0; i < 3; i++) {
+            lo[0][i] = at[i] - h * (i == k), hi[0][i] = at[i] + h * (i == k);
+            lo[1][i] = v[i] - h * (i == k), hi[1][i] = v[i] + h * (i == k);
+        }
+        tap_near(d[0][k].mean, (luminaire(hi[0], v) - luminaire(lo[0], v)) / (2 * h),
+                 1e-4, 0, "irradiance of a luminaire that moves");
+        tap_near(d[1][k].mean, (luminaire(at, hi[1]) - luminaire(at, lo[1])) / (2 * h),
+                 1e-4, 0, "irradiance of a luminaire that turns");
+    }
+    imp_scene_destroy(scene);
+    remove(file);
+}
+
 /* Form factor of a square of sides 2 b, parallel to the floor at the height h, centred at (x, y). */
 static double form_factor(double x, double y, double h, double b)
 {
@@ -346,6 +427,7 @@ int main(void)
     ctx = test_context(2);
     point_test();
     spot_test();
+    luminaire_test();
     rectangle_test();
     penumbra_test();
     view_test();

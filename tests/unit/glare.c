@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Guth's position index against the first row of the table of CIE 117-1995 (T/R = 0), and glare
+ * Guth's position index against four rows of the table of CIE 117-1995, and glare
  * ratings against the formula worked by hand, from numbers and from a scene. */
 #include "imp_scene.h"
 #include "imp_tap.h"
@@ -9,19 +9,52 @@
 
 static imp_context *ctx;
 
+/* Index of a source at T/R aside and H/R above. */
+static double position(double t, double h)
+{
+    return imp_guth_position(atan2(t, h) * 180 / M_PI, atan(hypot(t, h)) * 180 / M_PI);
+}
+
 static void positions(void)
 {
-    static const double row[] = {1.00, 1.26, 1.53, 1.90, 2.35, 2.86,
-                                 3.50, 4.20, 5.00, 6.00, 7.00};
-    double worst = 0;
-    for (int k = 0; k <= 10; k++)
-        worst = fmax(worst,
-                     fabs(imp_guth_position(0, atan(k / 10.) * 180 / M_PI) / row[k] - 1));
-    /* UGR takes 16 log10 p: 4 % are .27 at the worst point of the row, and .1 of it mostly. */
-    tap_ok(worst < .04, "position indices of CIE 117, T/R = 0: within %.1f %%",
-           100 * worst);
+    static const struct {
+        double t; /* T/R; H/R goes up by tenths from 0 */
+        int n;
+        double p[20];
+    } row[] = {
+        {0,
+         18,
+         {1.00, 1.26, 1.53, 1.90, 2.35, 2.86, 3.50, 4.20, 5.00, 6.00, 7.00, 8.10, 9.25,
+          10.35, 11.70, 13.15, 14.70, 16.20}},
+        {.5,
+         19,
+         {1.43, 1.60, 1.82, 2.10, 2.48, 2.91, 3.40, 3.98, 4.70, 5.50, 6.40, 7.30, 8.30,
+          9.40, 10.50, 11.75, 13.00, 14.40, 15.70}},
+        {1, 20, {2.11, 2.40, 2.75, 3.10, 3.50,  3.91,  4.40,  5.00,  5.60,  6.20,
+                 7.00, 7.90, 8.80, 9.75, 10.80, 11.90, 12.95, 14.00, 15.00, 16.00}},
+        {2, 20, {3.50, 4.00, 4.50,  4.90,  5.35,  5.80,  6.40,  7.10,  7.70,  8.30,
+                 8.90, 9.60, 10.40, 11.10, 12.00, 12.85, 13.60, 14.30, 15.10, 16.00}}};
+    double worst = 0, between = 0, step = 0;
+    for (size_t r = 0; r < sizeof row / sizeof *row; r++)
+        for (int k = 0; k < row[r].n; k++) {
+            worst = fmax(worst, fabs(position(row[r].t, k / 10.) / row[r].p[k] - 1));
+            if (k + 1 < row[r].n)
+                between = fmax(between, fabs(position(row[r].t, (k + .5) / 10) /
+                                                 (row[r].p[k] + row[r].p[k + 1]) * 2 -
+                                             1));
+        }
+    tap_ok(worst < 1e-9, "position indices of CIE 117: within %.1e", worst);
+    tap_ok(between < .02, "and between them: within %.1f %% of their means",
+           100 * between);
+    for (int i = 0; i < 400; i++)
+        for (int k = 0; k < 300; k++) {
+            const double here = position(i * .01, k * .01);
+            step = fmax(step, fabs(log(position((i + 1) * .01, k * .01) / here)));
+            step = fmax(step, fabs(log(position(i * .01, (k + 1) * .01) / here)));
+        }
+    tap_ok(step < .03, "without jumps: %.3f at most within .01", step);
     tap_ok(imp_guth_position(90, 0) == 1 && isnan(imp_guth_position(-1, 0)) &&
-               isnan(imp_guth_position(0, 91)),
+               isnan(imp_guth_position(0, 91)) && isfinite(imp_guth_position(0, 90)),
            "angles out of their range");
 }
 
@@ -41,30 +74,34 @@ static void formula(void)
 }
 
 /* Luminous disks across the ray from the eye, worked by hand with the position indices of CIE 117's
- * table: above the line of sight by H, at distance R along it. */
+ * table: above the line of sight by H, aside by T, at distance R along it. */
 static void disks(void)
 {
     static const struct {
-        double H, R, area, luminance; /* m, m^2, cd/m^2 */
-        size_t n;                     /* so many, one like the other */
+        double T, H, R, area, luminance; /* m, m^2, cd/m^2 */
+        size_t n;                        /* so many, one like the other */
         double background, ugr;
     } rows[] = {
         /* H/R = .2, p = 1.53; w = .04/16.64: .25/40 x 15000^2 x .0024038/2.3409 = 1444.1 */
-        {.8, 4, .04, 15000, 1, 40, 25.28},
+        {0, .8, 4, .04, 15000, 1, 40, 25.28},
         /* .5, 2.86; .1/20: .25/25 x 4 x 6000^2 x .005/8.1796 = 880.2 */
-        {2, 4, .1, 6000, 4, 25, 23.56},
+        {0, 2, 4, .1, 6000, 4, 25, 23.56},
         /* .3, 1.90; .3/27.25: .25/60 x 6 x 3000^2 x .011009/3.61 = 686.2 */
-        {1.5, 5, .3, 3000, 6, 60, 22.69}};
+        {0, 1.5, 5, .3, 3000, 6, 60, 22.69},
+        /* T/R = 1, H/R = .5, 3.91; .1/36: .25/30 x 2 x 8000^2 x .0027778/15.288 = 193.81 */
+        {4, 2, 4, .1, 8000, 2, 30, 18.30},
+        /* 1.5, .3, 4.10; .3/83.5: .25/50 x 12000^2 x .0035928/16.81 = 153.89 */
+        {7.5, 1.5, 5, .3, 12000, 1, 50, 17.50}};
     for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
         struct imp_glare_source s[6];
+        const double T = rows[k].T, H = rows[k].H, R = rows[k].R;
         double ugr;
         for (size_t i = 0; i < rows[k].n; i++)
-            s[i] = (struct imp_glare_source){
-                rows[k].luminance,
-                rows[k].area / (rows[k].R * rows[k].R + rows[k].H * rows[k].H),
-                imp_guth_position(0, atan(rows[k].H / rows[k].R) * 180 / M_PI)};
+            s[i] = (struct imp_glare_source){rows[k].luminance,
+                                             rows[k].area / (T * T + R * R + H * H),
+                                             position(T / R, H / R)};
         test_must(ctx, imp_ugr(ctx, rows[k].background, rows[k].n, s, &ugr));
-        tap_near(ugr, rows[k].ugr, .2, 0, "disks by hand");
+        tap_near(ugr, rows[k].ugr, .01, 0, "disks by hand");
     }
 }
 

@@ -10,6 +10,7 @@
 #include "kind/emitter/ies.h"
 #include "math/rng.h"
 #include "scene/scene.h"
+#include <importon/rooms.h>
 
 static imp_context *ctx;
 
@@ -68,9 +69,13 @@ static void errors(void)
          "l.ies:1: the format 'IESNA:LM-63-1887' is not "
          "known",
          0},
-        {"TILT=lamp.tlt\n",
-         "l.ies:1: TILT=lamp.tlt: NONE and INCLUDE are read, tilt in another file is not",
-         IMP_E_UNSUPPORTED},
+        {"TILT= \n", "l.ies:1: TILT= names nothing: NONE, INCLUDE or a file", 0},
+        {"TILT=INCLUDE\n1 2\n0 190 1 1\n",
+         "l.ies:3: a tilt angle is 190, not in [0, 180]", 0},
+        {"TILT=INCLUDE\n1 2\n10 0 1 1\n",
+         "l.ies:3: a tilt angle 0 does not come after 10", 0},
+        {"TILT=INCLUDE\n1 2\n0 90\n1 -1\n",
+         "l.ies:4: a tilt multiplier is -1, not in [0, 100]", 0},
         {"TILT=INCLUDE\n4\n",
          "l.ies:2: the lamp-to-luminaire geometry is 4, not in [1, 3]", 0},
         {"TILT=INCLUDE\n1 0\n",
@@ -513,6 +518,72 @@ static void scenes(void)
     imp_scene_destroy(s);
 }
 
+/* ---- Tilted lamps -------------------------------------------------------------- */
+
+static bool file_put(const char *name, const char *text)
+{
+    FILE *f = fopen(name, "w");
+    return f && fputs(text, f) >= 0 && fclose(f) == 0;
+}
+
+/* The luminaire's flux over that of its table; NAN: an error. */
+static double part_kept(const char *more)
+{
+    char xml[512];
+    struct imp_luminaire_info info = {.size = sizeof info};
+    imp_scene *s = NULL;
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'><emitter type='ies' id='a'><string name='filename' "
+             "value='tilted_lamp.ies'/>%s</emitter></scene>",
+             more);
+    if (imp_scene_load_string(ctx, xml, strlen(xml), "tilted", NULL, &s) != IMP_OK)
+        return NAN;
+    test_must(ctx, imp_scene_get_luminaire(s, 0, &info));
+    imp_scene_destroy(s);
+    return info.flux / (2 * M_PI * 2.5);
+}
+
+/* 1, .9 and .6 of its flux at 0, 30 and 90 degrees: in the file, or in one beside it. */
+static void tilted(void)
+{
+#define TILTS "1\n3\n0 30 90\n1 .9 .6\n"
+#define EVEN  "1 -1 2.5 2 1 1 2 0 0 0\n1 1 40\n0 90\n0\n1 1\n"
+    for (int k = 0; k < 2; k++) {
+        const char *what = k ? "in a file of its own" : "in the file";
+        tap_ok(file_put("tilted_lamp.ies", k ? "IESNA91\nTILT=tilted_lamp.tlt\n" EVEN
+                                             : "IESNA91\nTILT=INCLUDE\n" TILTS EVEN) &&
+                   (!k || file_put("tilted_lamp.tlt", TILTS)),
+               "tilts %s", what);
+        const double all = part_kept("");
+        tap_near(all, 1, 2e-3, 0, what);
+        tap_near(part_kept("<float name='tilt' value='60'/>") / all, .75, 1e-9, 0, what);
+        tap_near(part_kept("<float name='tilt' value='-15'/>") / all, .95, 1e-9, 0, what);
+        tap_near(part_kept("<float name='tilt' value='90'/><float name='flux' "
+                           "value='1000'/>"),
+                 600 / (2 * M_PI * 2.5), 1e-3, 0, what);
+        tap_ok(isnan(part_kept("<float name='tilt' value='91'/>")) &&
+                   strstr(imp_last_error(ctx), "outside [0, 90]"),
+               "%s", imp_last_error(ctx));
+    }
+    static const struct {
+        const char *tilts, *message;
+    } wrong[] = {{"1\n2\n0 90\n1\n", "tilted_lamp.tlt:4: the file ends before a tilt "},
+                 {TILTS "5", "tilted_lamp.tlt:5: there is more than 3 tilt multipliers"}};
+    for (size_t k = 0; k < imp_count(wrong); k++)
+        tap_ok(file_put("tilted_lamp.tlt", wrong[k].tilts) && isnan(part_kept("")) &&
+                   strstr(imp_last_error(ctx), wrong[k].message),
+               "%s", imp_last_error(ctx));
+    remove("tilted_lamp.tlt");
+    tap_ok(isnan(part_kept("")) && strstr(imp_last_error(ctx), "TILT: ") &&
+               strstr(imp_last_error(ctx), "tilted_lamp.tlt"),
+           "%s", imp_last_error(ctx));
+    tap_ok(file_put("tilted_lamp.ies", "IESNA91\nTILT=NONE\n" EVEN) &&
+               isnan(part_kept("<float name='tilt' value='5'/>")) &&
+               strstr(imp_last_error(ctx), "TILT=NONE"),
+           "%s", imp_last_error(ctx));
+    remove("tilted_lamp.ies");
+}
+
 int main(void)
 {
     ctx = test_context(1);
@@ -524,6 +595,7 @@ int main(void)
     beams();
     bounds();
     scenes();
+    tilted();
     imp_context_destroy(ctx);
     return tap_done();
 }

@@ -19,23 +19,35 @@
 #include "walk/core/walk.h"
 #include <importon/rooms.h>
 
-enum { IMP__GROUPS = 16, IMP__VARIANTS = 2 * IMP__GROUPS - 1 };
+enum { IMP__GROUPS = 16, IMP__VARIANTS = 2 * IMP__GROUPS - 1, IMP__AT_ONCE = 8 };
+
+/* Numbers of as many hours: hour k is lane k % 8 of block k/8. Their readings have errors of a part
+ * in a thousand or more, so floats are enough. */
+typedef float imp__annual_lanes __attribute__((vector_size(4 * IMP__AT_ONCE)));
+typedef int32_t imp__annual_mask __attribute__((vector_size(4 * IMP__AT_ONCE)));
+
+/* Two suns of a table from which one is drawn (Walker 1977): the first below `part`. */
+struct imp__annual_sun {
+    float to[2][3]; /* unit, world */
+    float part;
+    uint16_t cell[2];
+};
 
 /* Hours with light. */
 struct imp__annual_hours {
-    size_t n;
-    size_t *hour;   /* [n] of the caller's */
-    double *sky;    /* [n][IMP__PATCHES] */
-    double *sun;    /* [n] E_s, lx; 0: none */
-    imp_v3 *to_sun; /* [n] unit, world */
-    int *cell;      /* [n] of the sun; -1: none */
+    size_t n, blocks;
+    size_t *hour;                           /* [n] of the caller's */
+    imp__annual_lanes (*sky)[IMP__PATCHES]; /* [blocks] */
+    double *sun;                            /* [n] E_s, lx; 0: none */
+    imp_v3 *to_sun;                         /* [n] unit, world */
+    int *cell;                              /* [n] of the sun; -1: none */
     /* Patches in which the sun is at some hour. */
     int n_cells;
-    int cell_of[IMP__PATCHES];      /* -1: the sun is never there */
-    int patch_of[IMP__PATCHES];     /* of a cell */
-    imp_v3 *suns;                   /* to_sun of the lit hours, by cells */
-    double *below;                  /* their E_s added up, from the cell's first on */
-    size_t first[IMP__PATCHES + 1]; /* of a cell, in both */
+    int cell_of[IMP__PATCHES];  /* -1: the sun is never there */
+    int patch_of[IMP__PATCHES]; /* of a cell */
+    double times[IMP__PATCHES]; /* 1 over the chance of a cell */
+    size_t n_suns;              /* hours with a sun */
+    struct imp__annual_sun *suns;
 };
 
 struct imp__annual {
@@ -58,15 +70,17 @@ static inline double imp__annual_light(bool mono, imp_spec x)
 
 /* Coefficients of one point. */
 struct imp__annual_coefficients {
-    double (*C)[IMP__GROUPS]; /* [IMP__PATCHES] */
-    double (*I)[IMP__GROUPS]; /* [n_cells] */
+    float (*C)[IMP__GROUPS]; /* [IMP__PATCHES] */
+    float (*I)[IMP__GROUPS]; /* [n_cells] */
+    double *C_sum, *I_sum;   /* of a group, while it is summed */
 };
 
 struct imp__annual_worker {
     struct imp_arena arena;
     struct imp_drops drops;
     struct imp__annual_coefficients at;
-    double (*E)[IMP__GROUPS], (*S)[IMP__GROUPS]; /* [hours.n] all light; the sun alone */
+    /* [hours.blocks] all light; the sun alone */
+    imp__annual_lanes (*E)[IMP__GROUPS], (*S)[IMP__GROUPS];
 };
 
 /* annual_hours.c: IMP_E_ARG for numbers out of range; skies and suns of hours that are checked. */
@@ -101,10 +115,10 @@ enum imp__annual_number {
 struct imp__annual_numbers {
     double of[IMP__ANNUAL_NUMBERS][IMP__VARIANTS];
 };
-/* used [hours.n]: is it an hour of use? all: how many of the year are, lit or not. */
+/* used [hours.blocks]: -1 of an hour of use, else 0. all: how many of the year are, lit or not. */
 void imp__annual_add(const struct imp__annual *a, const struct imp_annual_options *o,
-                     const bool *used, size_t all, const struct imp__annual_worker *w,
-                     struct imp__annual_numbers *out);
+                     const imp__annual_mask *used, size_t all,
+                     const struct imp__annual_worker *w, struct imp__annual_numbers *out);
 /* Value and error of a number's variants. */
 struct imp_estimate imp__annual_estimate(const double variant[IMP__VARIANTS]);
 void imp__annual_point_set(const struct imp__annual_numbers *x,

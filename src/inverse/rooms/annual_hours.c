@@ -61,11 +61,9 @@ static void sky_make(const struct job *j, size_t k)
 {
     const struct imp_weather_hour *h = &j->hour[j->out->hour[k]];
     const struct imp__sky_patches *p = j->patches;
-    double *L = j->out->sky + k * IMP__PATCHES;
-    if (!(h->diffuse_illuminance > 0)) {
-        for (int i = 0; i < IMP__PATCHES; i++) L[i] = 0;
-        return;
-    }
+    imp__annual_lanes *out = j->out->sky[k / IMP__AT_ONCE];
+    double L[IMP__PATCHES];
+    if (!(h->diffuse_illuminance > 0)) return;
     struct imp__sky_shape s = {.axis = {p->axis[0], p->axis[1], p->axis[2]}};
     const double up = h->sun[2];
     s.sun = sun_of(p, h);
@@ -77,42 +75,113 @@ static void sky_make(const struct job *j, size_t k)
     imp__perez_shape(&s, &(struct imp__perez_weather){fmax(h->diffuse, 1), h->direct,
                                                       IMP__SOLAR_CONSTANT});
     imp__sky_patches_fill(p, &s, h->diffuse_illuminance, L);
+    for (int i = 0; i < IMP__PATCHES; i++) out[i][k % IMP__AT_ONCE] = (float)L[i];
 }
 
 static enum imp_status skies_make(size_t first, size_t end, void *payload)
 {
-    for (size_t k = first; k < end; k++) sky_make(payload, k);
+    const struct job *j = payload;
+    for (size_t k = first * IMP__AT_ONCE; k < end * IMP__AT_ONCE && k < j->out->n; k++)
+        sky_make(j, k);
     return IMP_OK;
 }
 
 /* ---- The sun's patches ---------------------------------------------------------------- */
 
-static void cells_make(const struct imp__sky_patches *p, struct imp__annual_hours *h)
+static void cells_make(const struct imp__sky_patches *p, struct imp__annual_hours *h,
+                       double *light)
 {
-    size_t count[IMP__PATCHES] = {0};
+    bool any[IMP__PATCHES] = {false};
     h->n_cells = 0;
     for (size_t k = 0; k < h->n; k++) {
         h->cell[k] = h->sun[k] > 0 ? imp__sky_patch_of(p, h->to_sun[k]) : -1;
-        if (h->cell[k] >= 0) count[h->cell[k]]++;
+        if (h->cell[k] >= 0) any[h->cell[k]] = true;
         else h->sun[k] = 0;
     }
-    h->first[0] = 0;
     for (int i = 0; i < IMP__PATCHES; i++) {
         h->cell_of[i] = -1;
-        if (!count[i]) continue;
+        if (!any[i]) continue;
         h->cell_of[i] = h->n_cells;
-        h->patch_of[h->n_cells] = i;
-        h->first[h->n_cells + 1] = h->first[h->n_cells] + count[i];
-        h->n_cells++;
+        h->patch_of[h->n_cells++] = i;
     }
-    size_t filled[IMP__PATCHES] = {0};
     for (size_t k = 0; k < h->n; k++) {
         if (h->cell[k] < 0) continue;
-        const int c = h->cell[k] = h->cell_of[h->cell[k]];
-        const size_t at = h->first[c] + filled[c]++;
-        h->suns[at] = h->to_sun[k];
-        h->below[at] = h->sun[k] + (at > h->first[c] ? h->below[at - 1] : 0);
+        h->cell[k] = h->cell_of[h->cell[k]];
+        light[h->cell[k]] += h->sun[k];
+        h->n_suns++;
     }
+}
+
+static void sun_put(struct imp__annual_sun *t, int at, const struct imp__annual_hours *h,
+                    size_t hour)
+{
+    for (int i = 0; i < 3; i++) t->to[at][i] = (float)h->to_sun[hour][i];
+    t->cell[at] = (uint16_t)h->cell[hour];
+}
+
+/* A step through n places that comes to each of them, near the golden section of n. */
+static size_t step_of(size_t n)
+{
+    size_t step = imp_max((size_t)(0.6180339887 * (double)n), (size_t)1);
+    for (;; step++) {
+        size_t a = n, b = step;
+        while (b > 0) {
+            const size_t left = a % b;
+            a = b;
+            b = left;
+        }
+        if (a == 1) return step;
+    }
+}
+
+/* The chance of a cell goes with the fourth root of its light in the year: counts of hours have least
+ * noise where all cells are drawn alike, sums where they are drawn by their light. In it that of
+ * an hour goes with the hour's sun. Each entry of the table has room for the chance 1/n: hours with less are
+ * filled up by those with more. Entries side by side are of hours far apart. */
+static void suns_make(struct imp__annual_hours *h, const double *light, double *chance,
+                      size_t *list)
+{
+    const size_t n = h->n_suns;
+    double roots = 0;
+    size_t low = 0, high = n; /* list: hours with less from 0 on, with more to n */
+    size_t next = 0, step = n > 0 ? step_of(n) : 0;
+    for (int c = 0; c < h->n_cells; c++) roots += sqrt(sqrt(light[c]));
+    for (int c = 0; c < h->n_cells; c++) h->times[c] = roots / sqrt(sqrt(light[c]));
+    for (size_t k = 0; k < h->n; k++) {
+        const int c = h->cell[k];
+        if (c < 0) continue;
+        chance[k] = (double)n * h->sun[k] / (light[c] * h->times[c]);
+        if (chance[k] < 1) list[low++] = k;
+        else list[--high] = k;
+    }
+    for (size_t left = n; left > 0; left--, next = (next + step) % n) {
+        /* Rounding leaves the last ones a little less or more than 1. */
+        const bool fills = low > 0 && high < n;
+        const size_t one = low > 0 ? list[--low] : list[high++];
+        const size_t other = fills ? list[high] : one;
+        struct imp__annual_sun *t = &h->suns[next];
+        t->part = fills ? (float)chance[one] : 1;
+        sun_put(t, 0, h, one);
+        sun_put(t, 1, h, other);
+        if (!fills) continue;
+        chance[other] -= 1 - chance[one];
+        if (chance[other] < 1) list[low++] = other, high++;
+    }
+}
+
+static enum imp_status suns_draw_by(imp_context *ctx, const struct imp__sky_patches *p,
+                                    struct imp__annual_hours *h)
+{
+    double light[IMP__PATCHES] = {0};
+    cells_make(p, h, light);
+    h->suns = imp__alloc(ctx, h->n_suns + 1, sizeof *h->suns);
+    double *chance = imp__alloc(ctx, h->n, sizeof *chance);
+    size_t *list = imp__alloc(ctx, h->n_suns + 1, sizeof *list);
+    const bool got = h->suns && chance && list;
+    if (got) suns_make(h, light, chance, list);
+    imp__release(ctx, chance);
+    imp__release(ctx, list);
+    return got ? IMP_OK : imp__error(ctx, IMP_E_NOMEM, "no memory for suns of a year");
 }
 
 enum imp_status imp__annual_hours_make(const struct imp__annual *a, size_t n,
@@ -125,14 +194,13 @@ enum imp_status imp__annual_hours_make(const struct imp__annual *a, size_t n,
     for (size_t i = 0; i < n; i++) h.n += has_light(&hour[i]);
     if (h.n == 0)
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "none of the %zu hours has any daylight", n));
+    h.blocks = (h.n + IMP__AT_ONCE - 1) / IMP__AT_ONCE;
     h.hour = imp__alloc(ctx, h.n, sizeof *h.hour);
-    h.sky = imp__alloc(ctx, h.n * IMP__PATCHES, sizeof *h.sky);
+    h.sky = imp__alloc(ctx, h.blocks, sizeof *h.sky);
     h.sun = imp__alloc(ctx, h.n, sizeof *h.sun);
     h.to_sun = imp__alloc(ctx, h.n, sizeof *h.to_sun);
     h.cell = imp__alloc(ctx, h.n, sizeof *h.cell);
-    h.suns = imp__alloc(ctx, h.n, sizeof *h.suns);
-    h.below = imp__alloc(ctx, h.n, sizeof *h.below);
-    if (!h.hour || !h.sky || !h.sun || !h.to_sun || !h.cell || !h.suns || !h.below)
+    if (!h.hour || !h.sky || !h.sun || !h.to_sun || !h.cell)
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu skies", h.n));
     for (size_t i = 0, k = 0; i < n; i++) {
         if (!has_light(&hour[i])) continue;
@@ -140,9 +208,9 @@ enum imp_status imp__annual_hours_make(const struct imp__annual *a, size_t n,
         h.to_sun[k] = sun_of(&a->patches, &hour[i]);
         h.sun[k++] = has_sun(&hour[i]) ? hour[i].direct_illuminance : 0;
     }
-    cells_make(&a->patches, &h);
+    IMP_TRY(suns_draw_by(ctx, &a->patches, &h));
     struct job j = {&a->patches, hour, &h};
-    IMP_TRY(imp__parallel_ranges(ctx, h.n, 64, skies_make, &j));
+    IMP_TRY(imp__parallel_ranges(ctx, h.blocks, 8, skies_make, &j));
     *out = h;
     h = (struct imp__annual_hours){.n = 0};
 out:
@@ -158,5 +226,4 @@ void imp__annual_hours_free(imp_context *ctx, struct imp__annual_hours *h)
     imp__release(ctx, h->to_sun);
     imp__release(ctx, h->cell);
     imp__release(ctx, h->suns);
-    imp__release(ctx, h->below);
 }

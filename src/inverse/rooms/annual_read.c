@@ -21,7 +21,7 @@ struct job {
     struct imp_annual_options options;
     const struct imp_run *run;
     size_t n;                            /* hours as given */
-    bool *used;                          /* [hours.n] */
+    imp__annual_mask *used;              /* [hours.blocks] -1: an hour of use */
     size_t n_used;                       /* of the year */
     struct imp__annual_worker *worker;   /* [threads] */
     struct imp__annual_numbers *numbers; /* [points] */
@@ -132,39 +132,40 @@ static enum imp_status annual_begin(const struct imp_scene *scene,
 
 /* ---- A point ------------------------------------------------------------------------- */
 
-/* E = sum_p C_p L_p + S + E_s I. */
-static void hours_light(const struct imp__annual *a, struct imp__annual_worker *w)
+/* E = sum_p C_p L_p + S + E_s I of the hours of a block, for half of the groups: as many sums as
+ * processors have registers for, beside what they are made of. */
+static void block_light(const struct imp__annual *a, const struct imp__annual_worker *w,
+                        const int *seen, int n, size_t block, int half)
 {
-    enum { FOURS = IMP__GROUPS / 4 };
+    enum { HALF = IMP__GROUPS / 2 };
     const struct imp__annual_hours *h = &a->hours;
+    const imp__annual_lanes *L = h->sky[block];
+    imp__annual_lanes E[HALF];
+    for (int g = 0; g < HALF; g++) E[g] = w->S[block][half * HALF + g];
+    for (size_t t = 0; t < IMP__AT_ONCE && block * IMP__AT_ONCE + t < h->n; t++) {
+        const size_t k = block * IMP__AT_ONCE + t;
+        const float *I = h->cell[k] >= 0 ? w->at.I[h->cell[k]] + half * HALF : NULL;
+        for (int g = 0; I && g < HALF; g++) E[g][t] += (float)h->sun[k] * I[g];
+    }
+    const size_t ahead = block + 1 < h->blocks ? IMP__PATCHES : 0; /* of the next block */
+    for (int i = 0; i < n; i++) {
+        const float *C = w->at.C[seen[i]] + half * HALF;
+        if (half == 0) __builtin_prefetch(L + ahead + seen[i]);
+        for (int g = 0; g < HALF; g++) E[g] += L[seen[i]] * C[g];
+    }
+    for (int g = 0; g < HALF; g++) w->E[block][half * HALF + g] = E[g];
+}
+
+static void hours_light(const struct imp__annual *a, const struct imp__annual_worker *w)
+{
     int seen[IMP__PATCHES], n = 0; /* patches from which any light comes */
     for (int p = 0; p < IMP__PATCHES; p++) {
         bool any = false;
         for (int g = 0; g < IMP__GROUPS; g++) any |= w->at.C[p][g] != 0;
         if (any) seen[n++] = p;
     }
-    for (size_t k = 0; k < h->n;
-         k += 2) { /* two at once: coefficients are read once for both */
-        const size_t both[2] = {k, imp_min(k + 1, h->n - 1)};
-        const double *L0 = h->sky + both[0] * IMP__PATCHES,
-                     *L1 = h->sky + both[1] * IMP__PATCHES;
-        imp_v3 E[2][FOURS]; /* four groups each, so that no compiler loses them */
-        for (int t = 0; t < 2; t++) {
-            const int cell = h->cell[both[t]];
-            for (int g = 0; g < IMP__GROUPS; g++)
-                E[t][g / 4][g % 4] = w->S[both[t]][g] +
-                                     (cell >= 0 ? h->sun[both[t]] * w->at.I[cell][g] : 0);
-        }
-        for (int i = 0; i < n; i++) {
-            const imp_v3 *C = (const imp_v3 *)w->at.C[seen[i]];
-            const double a0 = L0[seen[i]], a1 = L1[seen[i]];
-            for (int f = 0; f < FOURS; f++) {
-                E[0][f] += C[f] * a0;
-                E[1][f] += C[f] * a1;
-            }
-        }
-        for (int t = 0; t < 2; t++) memcpy(w->E[both[t]], E[t], sizeof E[t]);
-    }
+    for (size_t b = 0; b < a->hours.blocks; b++)
+        for (int half = 0; half < 2; half++) block_light(a, w, seen, n, b, half);
 }
 
 static void hours_give(const struct job *j, size_t point,
@@ -172,7 +173,10 @@ static void hours_give(const struct job *j, size_t point,
 {
     const struct imp__annual_hours *h = &j->a->hours;
     for (size_t k = 0; k < h->n; k++) {
-        const struct imp_estimate e = imp__annual_mean(w->E[k]);
+        double group[IMP__GROUPS];
+        for (int g = 0; g < IMP__GROUPS; g++)
+            group[g] = (double)w->E[k / IMP__AT_ONCE][g][k % IMP__AT_ONCE];
+        const struct imp_estimate e = imp__annual_mean(group);
         if (j->reading) j->reading[point * j->n + h->hour[k]] = e.value;
         if (j->se) j->se[point * j->n + h->hour[k]] = e.se;
     }
@@ -215,9 +219,12 @@ static enum imp_status workers_make(struct job *j, int threads)
         imp__arena_init(&w->arena, ctx);
         w->at.C = imp__alloc(ctx, IMP__PATCHES, sizeof *w->at.C);
         w->at.I = imp__alloc(ctx, (size_t)h->n_cells + 1, sizeof *w->at.I);
-        w->E = imp__alloc(ctx, h->n, sizeof *w->E);
-        w->S = imp__alloc(ctx, h->n, sizeof *w->S);
-        if (!w->at.C || !w->at.I || !w->E || !w->S) return IMP_E_NOMEM;
+        w->at.C_sum = imp__alloc(ctx, IMP__PATCHES, sizeof *w->at.C_sum);
+        w->at.I_sum = imp__alloc(ctx, IMP__PATCHES, sizeof *w->at.I_sum);
+        w->E = imp__alloc(ctx, h->blocks, sizeof *w->E);
+        w->S = imp__alloc(ctx, h->blocks, sizeof *w->S);
+        if (!w->at.C || !w->at.I || !w->at.C_sum || !w->at.I_sum || !w->E || !w->S)
+            return IMP_E_NOMEM;
     }
     return IMP_OK;
 }
@@ -229,6 +236,8 @@ static void workers_free(struct job *j, int threads)
         if (w->arena.ctx) imp__arena_free(&w->arena);
         imp__release(ctx, w->at.C);
         imp__release(ctx, w->at.I);
+        imp__release(ctx, w->at.C_sum);
+        imp__release(ctx, w->at.I_sum);
         imp__release(ctx, w->E);
         imp__release(ctx, w->S);
     }
@@ -271,12 +280,14 @@ static enum imp_status use_set(struct job *j, const struct imp_weather_hour *hou
 {
     const struct imp__annual_hours *h = &j->a->hours;
     const struct imp_annual_options *o = &j->options;
-    j->used = imp__alloc(j->a->scene->ctx, h->n, sizeof *j->used);
+    j->used = imp__alloc(j->a->scene->ctx, h->blocks, sizeof *j->used);
     if (!j->used) return IMP_E_NOMEM;
     for (size_t i = 0, k = 0; i < j->n; i++) {
         const bool used = hour[i].hour > o->opens && hour[i].hour < o->closes;
         j->n_used += used;
-        if (k < h->n && h->hour[k] == i) j->used[k++] = used;
+        if (k >= h->n || h->hour[k] != i) continue;
+        j->used[k / IMP__AT_ONCE][k % IMP__AT_ONCE] = -used;
+        k++;
     }
     if (j->n_used == 0)
         return imp__error(j->a->scene->ctx, IMP_E_ARG,

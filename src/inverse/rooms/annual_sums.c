@@ -23,6 +23,7 @@
  * order, is itself a part of the error. */
 #include "annual.h"
 #include <math.h>
+#include <string.h>
 
 /* x [16] becomes sum_g s_cg x_g. */
 static inline void walsh(double x[IMP__GROUPS])
@@ -80,54 +81,112 @@ struct imp_estimate imp__annual_mean(const double group[IMP__GROUPS])
     return imp__annual_estimate(v);
 }
 
-/* An hour of use with the illuminances E. */
-static void hour_add(const struct imp_annual_options *o, const double E[IMP__VARIANTS],
-                     struct imp__annual_numbers *x)
+/* ---- Hours ------------------------------------------------------------------------- */
+
+enum { BLOCKS = 8 }; /* whose sums are floats */
+
+typedef imp__annual_lanes lanes;
+typedef imp__annual_mask mask;
+
+static inline lanes splat(double x)
 {
-    const double wanted = o->wanted, each = 1 / wanted;
-    for (int v = 0; v < IMP__VARIANTS; v++) {
-        x->of[IMP__AUTONOMY][v] += E[v] >= wanted;
-        x->of[IMP__CONTINUOUS][v] += imp_min(E[v] * each, 1.0);
-        x->of[IMP__USEFUL][v] += E[v] < o->useful[0];
-        x->of[IMP__USEFUL + 1][v] += E[v] >= o->useful[0] && E[v] < o->useful[1];
-        x->of[IMP__USEFUL + 2][v] += E[v] >= o->useful[1] && E[v] <= o->useful[2];
-        x->of[IMP__USEFUL + 3][v] += E[v] > o->useful[2];
+    const float f = (float)x;
+    return (lanes){f, f, f, f, f, f, f, f};
+}
+
+/* x as it is in lanes where m is -1, else 0. */
+static inline lanes only(mask m, lanes x) { return (lanes)((mask)x & m); }
+
+/* As variants_of, of the hours of a block. */
+static inline void variants_at_once(const lanes group[IMP__GROUPS],
+                                    lanes out[IMP__VARIANTS])
+{
+    lanes x[IMP__GROUPS];
+    for (int g = 0; g < IMP__GROUPS; g++) x[g] = group[g] * (1.f / IMP__GROUPS);
+    for (int step = 1; step < IMP__GROUPS; step *= 2)
+        for (int i = 0; i < IMP__GROUPS; i += 2 * step)
+            for (int k = i; k < i + step; k++) {
+                const lanes a = x[k], b = x[k + step];
+                x[k] = a + b;
+                x[k + step] = a - b;
+            }
+    out[0] = x[0];
+    for (int c = 1; c < IMP__GROUPS; c++) {
+        out[c] = x[0] + x[c];
+        out[IMP__GROUPS - 1 + c] = x[0] - x[c];
     }
 }
 
-static void dark_add(const struct imp_annual_options *o, size_t hours,
-                     struct imp__annual_numbers *x)
+/* Sums over some blocks, by lanes: counts, and numbers of hours that are not whole. */
+struct sums {
+    mask count[IMP__ANNUAL_NUMBERS][IMP__VARIANTS];
+    lanes part[IMP__VARIANTS], mean[IMP__GROUPS], exposure[IMP__GROUPS];
+};
+
+static void block_add(const struct imp_annual_options *o, const lanes all[IMP__GROUPS],
+                      const lanes straight[IMP__GROUPS], mask used, struct sums *s)
 {
-    static const double dark[IMP__VARIANTS] = {0};
-    struct imp__annual_numbers one = {{{0}}};
-    hour_add(o, dark, &one);
-    for (int m = 0; m < IMP__ANNUAL_NUMBERS; m++)
-        for (int v = 0; v < IMP__VARIANTS; v++)
-            x->of[m][v] += (double)hours * one.of[m][v];
+    const lanes wanted = splat(o->wanted), each = splat(1 / o->wanted), one = splat(1);
+    const lanes lo = splat(o->useful[0]), middle = splat(o->useful[1]),
+                hi = splat(o->useful[2]), sunlit = splat(o->sunlit);
+    lanes E[IMP__VARIANTS], S[IMP__VARIANTS];
+    variants_at_once(all, E);
+    variants_at_once(straight, S);
+    for (int g = 0; g < IMP__GROUPS; g++) {
+        s->mean[g] += only(used, all[g]);
+        s->exposure[g] += all[g];
+    }
+    for (int v = 0; v < IMP__VARIANTS; v++) {
+        const lanes part = E[v] * each;
+        s->count[IMP__AUTONOMY][v] -= (E[v] >= wanted) & used;
+        s->part[v] += only((part < one) & used, part) + only((part >= one) & used, one);
+        s->count[IMP__USEFUL][v] -= (E[v] < lo) & used;
+        s->count[IMP__USEFUL + 1][v] -= (E[v] >= lo) & (E[v] < middle) & used;
+        s->count[IMP__USEFUL + 2][v] -= (E[v] >= middle) & (E[v] <= hi) & used;
+        s->count[IMP__USEFUL + 3][v] -= (E[v] > hi) & used;
+        s->count[IMP__SUNLIT][v] -= (S[v] >= sunlit) & used;
+    }
+}
+
+static void groups_flush(lanes x[IMP__GROUPS], double sum[IMP__GROUPS])
+{
+    for (int g = 0; g < IMP__GROUPS; g++) {
+        for (int t = 0; t < IMP__AT_ONCE; t++) sum[g] += (double)x[g][t];
+        x[g] = splat(0);
+    }
 }
 
 void imp__annual_add(const struct imp__annual *a, const struct imp_annual_options *o,
-                     const bool *used, size_t all, const struct imp__annual_worker *w,
-                     struct imp__annual_numbers *out)
+                     const imp__annual_mask *used, size_t all,
+                     const struct imp__annual_worker *w, struct imp__annual_numbers *out)
 {
     const struct imp__annual_hours *h = &a->hours;
     double mean[IMP__GROUPS] = {0}, exposure[IMP__GROUPS] = {0};
+    struct sums s;
     size_t lit = 0;
+    memset(&s, 0, sizeof s);
     *out = (struct imp__annual_numbers){{{0}}};
-    for (size_t k = 0; k < h->n; k++) {
-        for (int g = 0; g < IMP__GROUPS; g++) exposure[g] += w->E[k][g];
-        if (!used[k]) continue;
-        lit++;
-        double E[IMP__VARIANTS], S[IMP__VARIANTS];
-        for (int g = 0; g < IMP__GROUPS; g++) mean[g] += w->E[k][g];
-        variants_of(w->E[k], E);
-        hour_add(o, E, out);
-        if (!(h->sun[k] > 0)) continue;
-        variants_of(w->S[k], S);
-        for (int v = 0; v < IMP__VARIANTS; v++)
-            out->of[IMP__SUNLIT][v] += S[v] >= o->sunlit;
+    for (size_t b = 0; b < h->blocks; b++) {
+        block_add(o, w->E[b], w->S[b], used[b], &s);
+        for (int t = 0; t < IMP__AT_ONCE; t++) lit += used[b][t] != 0;
+        if ((b + 1) % BLOCKS != 0 && b + 1 < h->blocks) continue;
+        groups_flush(s.mean, mean);
+        groups_flush(s.exposure, exposure);
+        for (int v = 0; v < IMP__VARIANTS; v++) {
+            for (int t = 0; t < IMP__AT_ONCE; t++)
+                out->of[IMP__CONTINUOUS][v] += (double)s.part[v][t];
+            s.part[v] = splat(0);
+        }
     }
-    dark_add(o, all - lit, out);
+    for (int m = 0; m < IMP__ANNUAL_NUMBERS; m++)
+        for (int v = 0; v < IMP__VARIANTS; v++)
+            for (int t = 0; t < IMP__AT_ONCE; t++) out->of[m][v] += s.count[m][v][t];
+    if (o->useful[0] > 0) /* hours without light */
+        for (int v = 0; v < IMP__VARIANTS; v++)
+            out->of[IMP__USEFUL][v] += (double)(all - lit);
+    else
+        for (int v = 0; v < IMP__VARIANTS; v++)
+            out->of[IMP__USEFUL + 1][v] += (double)(all - lit);
     variants_of(mean, out->of[IMP__MEAN]);
     variants_of(exposure, out->of[IMP__EXPOSURE]);
     const double part = all > 0 ? 1 / (double)all : 0;

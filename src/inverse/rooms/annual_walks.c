@@ -5,7 +5,7 @@
  * first, rays to the sun as it is at some hours of the year.
  *
  * Rays are as many as the throughput up to a vertex is large, since what each brings is, too: half
- * of the light, half of the rays. The hours of a vertex are drawn by patches, each the same number of times, and in a patch by the
+ * of the light, half of the rays. The hours of a vertex are drawn by patches, and in a patch by the
  * sun's illuminance: the sum over the hours of what the sun brings reflected is without bias, that
  * of an hour alone is a mean over the patch. Light that a mirror or a lens brings from the
  * sun meets no ray of these: it is that of walks which leave through the sun's patch, spread
@@ -16,13 +16,12 @@
 #include "walk/core/vertex.h"
 #include <string.h>
 
-enum { SUNS = 4 }; /* rays to the sun at a vertex that all light of a walk passes */
+enum { SUNS = 3 }; /* rays to the sun at a vertex that all light of a walk passes */
 
 struct walk_job {
     const struct imp__annual *a;
     struct imp__annual_worker *w;
     const struct imp_walk *walk;
-    int group;
     bool mono;
     enum imp_status st;
 };
@@ -34,21 +33,9 @@ static void sky_add(struct walk_job *j, imp_v3 w, imp_spec light, bool bent)
     if (patch < 0) return;
     const double x = imp__annual_light(j->mono, light);
     const int cell = a->hours.cell_of[patch];
-    j->w->at.C[patch][j->group] += x;
+    j->w->at.C_sum[patch] += x;
     if (bent && cell >= 0)
-        j->w->at.I[cell][j->group] += x / imp__sky_patch_size(&a->patches, patch);
-}
-
-/* The sun at an hour when it is in the cell, by its illuminance. The hours of a cell are alike, so
- * that the hour sought is near where it were if they had the same. */
-static imp_v3 sun_draw(const struct imp__annual_hours *h, int cell, double u)
-{
-    const size_t lo = h->first[cell], n = h->first[cell + 1] - lo;
-    const double want = u * h->below[lo + n - 1];
-    size_t k = imp_min((size_t)(u * (double)n), n - 1);
-    while (k > 0 && want < h->below[lo + k - 1]) k--;
-    while (k + 1 < n && !(want < h->below[lo + k])) k++;
-    return h->suns[lo + k];
+        j->w->at.I_sum[cell] += x / imp__sky_patch_size(&a->patches, patch);
 }
 
 /* P: throughput up to v; k: its number in the walk, which numbers its random numbers. */
@@ -70,19 +57,24 @@ static void suns_add(struct walk_job *j, const struct imp_vertex *v, imp_spec P,
     }
     const struct imp_frame frame = {at.s, at.t, at.n};
     const imp_v3 wo = imp__vertex_wo(v);
-    for (int i = 0; i < n; i++) {
-        const uint32_t dim = 2 * (uint32_t)i;
-        const double which = (i + imp__u01(key, dim)) / n * h->n_cells;
-        const int cell = imp_min((int)which, h->n_cells - 1);
-        /* Its disc is small beside the patch. */
-        const imp_v3 w = sun_draw(h, cell, imp__u01(key, dim + 1));
+    const bool opaque = !(v->bsdf->flags & IMP_BSDF_TRANSMIT);
+    /* The sun's disc is small beside the patch. Entries side by side are read at once. */
+    size_t entry = (size_t)(imp__u01(key, 2 * SUNS + 1) * (double)h->n_suns);
+    for (int i = 0; i < n; i++, entry++) {
+        if (entry >= h->n_suns) entry = 0;
+        const struct imp__annual_sun *sun = &h->suns[entry];
+        const int other = !((float)imp__u01(key, (uint32_t)i) < sun->part);
+        const float *to = sun->to[other];
+        const imp_v3 w = imp__v3((double)to[0], (double)to[1], (double)to[2]);
         const struct imp_dirs dirs = {wo, imp__to_local(&frame, w), IMP_SMOOTH, 0};
+        if (opaque && !(dirs.wo[2] * dirs.wi[2] > 0)) continue;
+        const int cell = sun->cell[other];
         imp_spec f;
         imp__bsdf_eval(v->bsdf, NULL, v->in, &dirs, &f);
         f *= P;
         if (imp__is_zero_used(f, false)) continue;
         f *= imp__annual_passes(a, j->walk->time, imp__offset(at.p, at.ng, w), w);
-        j->w->at.I[cell][j->group] += imp__annual_light(j->mono, f) * h->n_cells / rays;
+        j->w->at.I_sum[cell] += imp__annual_light(j->mono, f) * h->times[cell] / rays;
     }
 }
 
@@ -136,10 +128,9 @@ enum imp_status imp__annual_walks(const struct imp__annual *a, int x, int y,
     struct walk_job j = {.a = a, .w = w, .mono = a->scene->mode == IMP_MONO};
     struct imp_walk walk;
     const double each = 1 / (double)a->walks;
-    memset(w->at.C, 0, IMP__PATCHES * sizeof *w->at.C);
-    memset(w->at.I, 0, (size_t)a->hours.n_cells * sizeof *w->at.I);
     for (int g = 0; g < IMP__GROUPS; g++) {
-        j.group = g;
+        memset(w->at.C_sum, 0, IMP__PATCHES * sizeof *w->at.C_sum);
+        memset(w->at.I_sum, 0, IMP__PATCHES * sizeof *w->at.I_sum);
         for (int64_t i = 0; i < a->walks; i++) {
             const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
             const int64_t sample = sample_of(a, g, i);
@@ -159,10 +150,10 @@ enum imp_status imp__annual_walks(const struct imp__annual *a, int x, int y,
             imp__arena_rewind(&w->arena, mark);
             if (j.st != IMP_OK) return j.st;
         }
+        for (int p = 0; p < IMP__PATCHES; p++)
+            w->at.C[p][g] = (float)(w->at.C_sum[p] * each);
+        for (int c = 0; c < a->hours.n_cells; c++)
+            w->at.I[c][g] = (float)(w->at.I_sum[c] * each);
     }
-    for (int p = 0; p < IMP__PATCHES; p++)
-        for (int g = 0; g < IMP__GROUPS; g++) w->at.C[p][g] *= each;
-    for (int c = 0; c < a->hours.n_cells; c++)
-        for (int g = 0; g < IMP__GROUPS; g++) w->at.I[c][g] *= each;
     return IMP_OK;
 }

@@ -36,6 +36,9 @@ struct imp__view_disc {
     double weight;       /* size over the square of the position index */
 };
 
+/* position_index.c: Guth's by Levin's formula, a and b in degrees as of imp_guth_position; NAN. */
+double imp__levin_position(double a, double b);
+
 /* glare.c: the formula, with sum = sum L^2 w/p^2. */
 double imp__dgp_of(double illuminance, double sum);
 

@@ -27,7 +27,7 @@ double imp__view_position(imp_v3 w)
     if (w[1] < 0) return imp_iwata_position(fmin(b, 90));
     const double side = hypot(w[0], w[1]);
     const double a = side > 0 ? acos(imp_clamp(w[1] / side, 0.0, 1.0)) / DEGREE : 0;
-    return fmin(imp_guth_position(fmin(a, 90), fmin(b, 90)), 16);
+    return fmin(imp__levin_position(fmin(a, 90), fmin(b, 90)), 16);
 }
 
 int imp__view_cell(const struct imp__view *v, imp_v3 w)

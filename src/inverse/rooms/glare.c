@@ -7,14 +7,6 @@
 #include <importon/rooms.h>
 #include <math.h>
 
-double imp_guth_position(double a, double b)
-{
-    if (!(a >= 0 && a <= 90 && b >= 0 && b <= 90)) return NAN;
-    const double first = 35.2 - 0.31889 * a - 1.22 * exp(-2 * a / 9);
-    const double second = 21 + 0.26667 * a - 0.002963 * a * a;
-    return exp(first * 1e-3 * b + second * 1e-5 * b * b);
-}
-
 double imp_iwata_position(double b)
 {
     if (!(b >= 0 && b <= 90)) return NAN;

@@ -2,8 +2,6 @@
  *
  * Patches of the sky: where they are, and the radiance of a sky in them. */
 #include "sky_patches.h"
-#include "math/exp.h"
-#include "math/lanes.h"
 #include <math.h>
 
 enum { HALVES = 2 }; /* points of a patch in each direction */
@@ -52,15 +50,58 @@ double imp__sky_patch_size(const struct imp__sky_patches *p, int patch)
     return IMP_2PI * (p->sine[row + 1] - p->sine[row]) / count_of(row);
 }
 
-/* Relative radiances of four directions at one height, of which g is the factor, by the cosines
- * of their angles to the sun. A year has ten million of them. */
-static inline imp_v3 relative(const struct imp__sky_shape *s, double g, imp_v3 cosine)
+/* ---- Skies ------------------------------------------------------------------------- */
+
+/* Floats, since a year has ten million directions, and patches are means of four of them. */
+enum { LANES = 8 };
+typedef float lanes __attribute__((vector_size(4 * LANES)));
+typedef int32_t mask __attribute__((vector_size(4 * LANES)));
+
+static inline lanes choose(mask m, lanes a, lanes b)
 {
-    const double *n = s->n;
-    const imp_v3 c = imp__lanes_clamp(cosine, -1, 1);
-    const imp_v3 near = imp__exp(n[3] * imp__lanes_acos(c)) - s->h;
-    const imp_v3 L = g * (1 + n[2] * near + n[4] * c * c);
-    return imp__choose_4(L > imp__spec(0), L, imp__spec(0));
+    return (lanes)(((mask)a & m) | ((mask)b & ~m));
+}
+static inline lanes root(lanes x)
+{
+#ifdef __AVX__
+    return (lanes)__builtin_ia32_sqrtps256(x);
+#else
+    for (int k = 0; k < LANES; k++) x[k] = sqrtf(x[k]);
+    return x;
+#endif
+}
+
+/* As imp__lanes_acos: Abramowitz and Stegun 4.4.45, to 7e-5; c in [-1, 1]. */
+static inline lanes angle_of(lanes c)
+{
+    const lanes a = choose(c < 0.f * c, -c, c);
+    const lanes p = ((a * -0.0187293f + 0.0742610f) * a - 0.2121144f) * a + 1.5707288f;
+    const lanes x = p * root(1.f - a);
+    return choose(c < 0.f * c, 3.14159265f - x, x);
+}
+
+/* As imp__exp, to 3e-7: 2^k exp(r), |r| < .35; x in [-80, 80]. */
+static inline lanes power_of(lanes x)
+{
+    const lanes low = 0.f * x - 80.f;
+    x = choose(x < low, low, choose(x > -low, -low, x));
+    const lanes t = x * 1.44269504f + 0x1.8p23f, k = t - 0x1.8p23f;
+    const lanes r = (x - k * 0x1.62ep-1f) - k * 0x1.0bfbe8p-15f;
+    const lanes e =
+        1.f + r * (1.f + r * (1.f / 2 +
+                              r * (1.f / 6 +
+                                   r * (1.f / 24 + r * (1.f / 120 + r * (1.f / 720))))));
+    return (lanes)((mask)e + (((mask)t - (mask)(0.f * t + 0x1.8p23f)) << 23));
+}
+
+/* Relative radiances of directions by the cosines of their angles to the sun; g of their heights. */
+static inline lanes relative(const struct imp__sky_shape *s, lanes g, lanes c)
+{
+    const lanes one = 0.f * c + 1.f;
+    c = choose(c < -one, -one, choose(c > one, one, c));
+    const lanes near = power_of((float)s->n[3] * angle_of(c)) - (float)s->h;
+    const lanes L = g * (1.f + (float)s->n[2] * near + (float)s->n[4] * c * c);
+    return choose(L > 0.f * L, L, 0.f * L);
 }
 
 static double zenith_factor(const struct imp__sky_shape *s, double z)
@@ -75,34 +116,31 @@ static imp_v3 sun_in(const struct imp__sky_patches *p, const struct imp__sky_sha
                    imp__dot(s->sun, p->axis[2]));
 }
 
-/* Relative radiances of a row's patches, at heights even in sin(altitude), into L. Four
- * directions at once are two patches, at HALVES of 2. */
+/* Relative radiances of a row's patches, at heights even in sin(altitude), into L. Eight directions
+ * at once are two patches, at HALVES of 2: the lower four first. */
 static void row_fill(const struct imp__sky_patches *p, const struct imp__sky_shape *s,
                      imp_v3 sun, int row, double *L)
 {
     const int n = count_of(row);
     const double lo = p->sine[row], hi = p->sine[row + 1];
-    const double step = IMP_2PI / (HALVES * n), turn_c = cos(4 * step),
-                 turn_s = sin(4 * step);
-    double z[HALVES], r[HALVES], g[HALVES];
-    imp_v3 c, q;
-    for (int i = 0; i < HALVES; i++) {
-        z[i] = lo + (hi - lo) * (i + 0.5) / HALVES;
-        r[i] = sqrt(1 - z[i] * z[i]);
-        g[i] = zenith_factor(s, z[i]);
-    }
-    for (int k = 0; k < 4; k++) {
-        c[k] = cos((k + 0.5) * step);
-        q[k] = sin((k + 0.5) * step);
+    const double step = IMP_2PI / (HALVES * n);
+    const float turn_c = (float)cos(4 * step), turn_s = (float)sin(4 * step);
+    lanes z, r, g, c, q;
+    for (int i = 0; i < LANES; i++) {
+        const double up = lo + (hi - lo) * (i / 4 + 0.5) / HALVES;
+        const double phi = (i % 4 + 0.5) * step;
+        z[i] = (float)(up * sun[2]);
+        r[i] = (float)sqrt(1 - up * up);
+        g[i] = (float)zenith_factor(s, up);
+        c[i] = (float)cos(phi);
+        q[i] = (float)sin(phi);
     }
     for (int j = 0; j < n; j += 2) {
-        const imp_v3 level = c * sun[0] + q * sun[1];
-        imp_v3 sum = imp__spec(0);
-        for (int i = 0; i < HALVES; i++)
-            sum += relative(s, g[i], level * r[i] + z[i] * sun[2]);
-        L[j] = (sum[0] + sum[1]) / (HALVES * HALVES);
-        L[j + 1] = (sum[2] + sum[3]) / (HALVES * HALVES);
-        const imp_v3 next = c * turn_c - q * turn_s;
+        const lanes level = c * (float)sun[0] + q * (float)sun[1];
+        const lanes x = relative(s, g, level * r + z);
+        L[j] = (double)((x[0] + x[1]) + (x[4] + x[5])) / (HALVES * HALVES);
+        L[j + 1] = (double)((x[2] + x[3]) + (x[6] + x[7])) / (HALVES * HALVES);
+        const lanes next = c * turn_c - q * turn_s;
         q = q * turn_c + c * turn_s;
         c = next;
     }
@@ -111,18 +149,17 @@ static void row_fill(const struct imp__sky_patches *p, const struct imp__sky_sha
 static double cap(const struct imp__sky_patches *p, const struct imp__sky_shape *s,
                   imp_v3 sun)
 {
-    enum { FOURS = 2, AROUND = 4 * FOURS };
     const double z = (1 + p->sine[IMP__PATCH_ROWS]) / 2, r = sqrt(1 - z * z);
-    imp_v3 sum = imp__spec(0);
-    for (int k = 0; k < FOURS; k++) {
-        imp_v3 cosine;
-        for (int i = 0; i < 4; i++) {
-            const double phi = IMP_2PI * (4 * k + i + 0.5) / AROUND;
-            cosine[i] = r * (cos(phi) * sun[0] + sin(phi) * sun[1]) + z * sun[2];
-        }
-        sum += relative(s, zenith_factor(s, z), cosine);
+    lanes cosine, g;
+    for (int i = 0; i < LANES; i++) {
+        const double phi = IMP_2PI * (i + 0.5) / LANES;
+        cosine[i] = (float)(r * (cos(phi) * sun[0] + sin(phi) * sun[1]) + z * sun[2]);
+        g[i] = (float)zenith_factor(s, z);
     }
-    return imp__sum_used(sum, 4) / AROUND;
+    const lanes x = relative(s, g, cosine);
+    double sum = 0;
+    for (int i = 0; i < LANES; i++) sum += (double)x[i] / LANES;
+    return sum;
 }
 
 void imp__sky_patches_fill(const struct imp__sky_patches *p,

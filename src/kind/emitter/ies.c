@@ -112,30 +112,33 @@ double imp__ies_intensity(const struct imp__ies *x, imp_v3 w)
     return x->factor * (cd[0] + f * (cd[1] - cd[0]));
 }
 
-/* Does a value differ from 0 by more than what files round? */
-static bool is_light(double value, double largest)
+static double most_of(const double *x, size_t n, size_t stride)
 {
-    return fabs(value) > 1e-6 * largest;
+    double most = 0;
+    for (size_t k = 0; k < n; k++) most = imp_max(most, x[k * stride]);
+    return most;
 }
 
 const char *imp__ies_jump(const struct imp_ies_data *d)
 {
-    const int n = d->n_vertical, m = d->n_horizontal;
-    double most = 0, ends = 0, seam = 0;
-    if (d->type != IMP_PHOTOMETRY_C) return "is of type A or B";
-    for (int k = 0; k < n * m; k++) most = imp_max(most, d->candela[k]);
-    for (int j = 0; j < m; j++) {
-        const double *plane = d->candela + (size_t)j * (size_t)n;
-        if (d->vertical[0] > 0) ends = imp_max(ends, plane[0]);
-        if (d->vertical[n - 1] < 180) ends = imp_max(ends, plane[n - 1]);
-    }
-    if (is_light(ends, most))
+    const size_t n = (size_t)d->n_vertical, m = (size_t)d->n_horizontal;
+    const double *first = d->candela, *last = d->candela + (m - 1) * n;
+    const bool turns = d->type == IMP_PHOTOMETRY_C;
+    const bool around = d->type == IMP_PHOTOMETRY_B; /* v goes on behind 90 degrees */
+    const double small = 1e-6 * most_of(d->candela, n * m, 1); /* what files round */
+    const double from = turns ? 0 : -90, till = turns ? 180 : 90;
+    if (((around || d->vertical[0] > from) && most_of(first, m, n) > small) ||
+        ((around || d->vertical[n - 1] < till) && most_of(first + n - 1, m, n) > small))
         return "ends at a vertical angle at which it still has light";
-    for (int k = 0; k < n && m > 1 && d->horizontal[m - 1] == 360; k++)
-        seam = imp_max(seam, fabs(d->candela[k] -
-                                  d->candela[(size_t)(m - 1) * (size_t)n + (size_t)k]));
-    return is_light(seam, most) ? "has two planes at the horizontal angles 0 and 360"
-                                : NULL;
+    if (d->type == IMP_PHOTOMETRY_A && m > 1 &&
+        (most_of(last, n, 1) > small ||
+         (d->horizontal[0] < 0 && most_of(first, n, 1) > small)))
+        return "ends at a horizontal angle at which it still has light";
+    if (turns && m > 1 && d->horizontal[m - 1] == 360)
+        for (size_t k = 0; k < n; k++)
+            if (fabs(first[k] - last[k]) > small)
+                return "has two planes at the horizontal angles 0 and 360";
+    return NULL;
 }
 
 /* ---- The surface --------------------------------------------------------------- */
@@ -254,6 +257,37 @@ static void frame_set(struct imp__ies *x, imp_v3 s, imp_v3 n, bool mirrored)
     x->c90 = imp__cross(x->c0, x->nadir) * (mirrored ? -1.0 : 1.0);
 }
 
+/* What its lamps keep of their flux when the luminaire is tilted. */
+static enum imp_status tilt_read(const struct imp_build *b, struct imp__ies *x)
+{
+    const struct imp_ies_data *d = x->data;
+    double tilt, f;
+    enum imp_status st = IMP_OK;
+    x->kept = 1;
+    if (!imp_build_has(b, "tilt")) goto out;
+    IMP_TRY(imp__props_float(b->ctx, b->node, "tilt", 0, &tilt));
+    if (d->n_tilts == 0 && tilt == 0) goto out; /* as it was measured */
+    if (d->n_tilts == 0)
+        IMP_TRY(imp_build_error(b, "tilt", IMP_E_SCENE,
+                                "tilt = %g needs a file that says what tilted lamps "
+                                "keep; its file has TILT=NONE",
+                                tilt));
+    tilt = fabs(tilt);
+    if (!(tilt >= d->tilt[0] && tilt <= d->tilt[d->n_tilts - 1]))
+        IMP_TRY(imp_build_error(b, "tilt", IMP_E_SCENE,
+                                "tilt = %g is outside [%g, %g], for which its file says "
+                                "what lamps keep",
+                                tilt, d->tilt[0], d->tilt[d->n_tilts - 1]));
+    if (d->n_tilts == 1) {
+        x->kept = d->tilt_factor[0];
+    } else {
+        const double *k = d->tilt_factor + place(d->tilt, d->n_tilts, tilt, &f);
+        x->kept = k[0] + f * (k[1] - k[0]);
+    }
+out:
+    return st;
+}
+
 /* What the luminaire gives in operation, as a part of what was measured: a flux in its place, how
  * far it is dimmed, and what age and dirt leave of it (the maintenance factor). */
 static enum imp_status operation_read(const struct imp_build *b, struct imp__ies *x)
@@ -271,7 +305,8 @@ static enum imp_status operation_read(const struct imp_build *b, struct imp__ies
             imp_build_error(b, "flux", IMP_E_SCENE,
                             "its table is dark, and has no flux that could be scaled"));
     if (imp_build_has(b, "flux")) x->factor *= flux / measured;
-    x->factor *= x->dimming * x->maintenance;
+    IMP_TRY(tilt_read(b, x));
+    x->factor *= x->dimming * x->maintenance * x->kept;
 out:
     return st;
 }

@@ -18,9 +18,9 @@ struct imp__ies {
     double
         factor; /* emitted intensity over the table's: 1 or 1/683, times flux, dimming and
                         maintenance */
-    double lumens; /* lm in a unit of flux: 1 or 683 */
-    double dimming, maintenance;
-    imp_v3 position; /* of a point */
+    double lumens;                     /* lm in a unit of flux: 1 or 683 */
+    double dimming, maintenance, kept; /* kept: by tilted lamps */
+    imp_v3 position;                   /* of a point */
     /* Projected area of a surface light in direction w, in parts. */
     double same;   /* sphere: the same for all w; else 0 */
     double across; /* cylinder: seen from its side; else 0 */

@@ -335,6 +335,15 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
     s->sun_solid = 4 * IMP_PI * half * half;
     s->dim = own * own / (half * half);
     s->dark = s->sun[2] < 0;
+    if (s->dark) {
+        char where[512];
+        imp__warn(b->ctx,
+                  "%s: emitter '%s' (%s): the sun is %.3g degrees below the horizon: "
+                  "there is no light from it",
+                  imp__loc_text(b->node->loc, where, sizeof where),
+                  b->node->id ? b->node->id : "", b->node->type,
+                  asin(imp_min(-s->sun[2], 1.0)) * 180 / IMP_PI);
+    }
     imp__skylight_set(&s->light, asin(imp_clamp(s->sun[2], 0.0, 1.0)), radius,
                       s->by_wave);
     s->table = (struct imp__weight_table){

@@ -38,3 +38,10 @@ importon read glass.xml --spp 1 >/dev/null
 importon fit glass.xml -m mono -T a.exr -p shape1.emitter.radiance.value --spp 4 --optimizer lm --iterations 1 -o fit >told 2>&1
 grep 'is missing' told >&2 # once, though the fit writes two pictures
 true
+cat >night.xml <<'X'
+<scene version="3.0.0"><integrator type="path"/>
+<emitter type="sunsky" id="sky"><float name="latitude" value="50"/><float name="longitude" value="10"/><float name="timezone" value="1"/>
+<integer name="year" value="2024"/><integer name="month" value="12"/><integer name="day" value="21"/><float name="hour" value="22"/></emitter>
+<shape type="rectangle"><sensor type="irradiancemeter" id="grid"/></shape></scene>
+X
+importon read night.xml -m mono >/dev/null
