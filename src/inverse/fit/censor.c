@@ -131,6 +131,8 @@ enum imp_status imp_problem_clip(imp_problem *p, int target, double low, double 
     target_reset(p, t);
     return IMP_OK;
 out:
+    imp__release(ctx, t->precision);
+    t->precision = NULL;
     imp__clip_free(ctx, c);
     return st;
 }
