@@ -232,7 +232,7 @@ bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
     if (!s.at || !s.piece) return false;
     int k = read_walk(&s, adjoint) - 1;
     for (const struct imp_vertex *v = walk->last; v; v = v->prev, k--) {
-        if (s.at[k].sky || k < s.first) continue;
+        if (k < s.first || s.at[k].sky) continue;
         if (v->d.connection == IMP_CONNECTED) light_bar(&s, k, v);
         if (v->d.goes_on && v->next) step_bar(&s, k, v);
     }
