@@ -76,10 +76,11 @@ static void slopes(const char *lens, bool thin, const char *what)
             const imp_v3 slope = (at[1][i] - at[0][i]) * (.5 / h);
             const imp_v3 other =
                 met(s, 64 * (i % 7) / 6., 36 * (i / 7) / 4., middle, axis, .1);
-            imp_v3 told;
-            if (thin) s->ops->lens_velocity(s, k, &at[2][i], &other, &told);
-            else s->ops->view_velocity(s, k, &at[2][i], &told);
-            worst = fmax(worst, imp__length(slope - told) / (1e-3 + imp__length(slope)));
+            imp_v3 velocity;
+            if (thin) s->ops->lens_velocity(s, k, &at[2][i], &other, &velocity);
+            else s->ops->view_velocity(s, k, &at[2][i], &velocity);
+            worst =
+                fmax(worst, imp__length(slope - velocity) / (1e-3 + imp__length(slope)));
         }
         tap_ok(worst < 1e-6, "%s: what a pixel sees by %s # off by %.1e", what, names[k],
                worst);

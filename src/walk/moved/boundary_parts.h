@@ -138,7 +138,7 @@ struct imp__edge_light {
 void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
                      const struct imp_surface *at, const struct imp__edge_light *light);
 
-/* ---- Of meters: boundary_meter.c ---- */
+/* ---- Meters: boundary_meter.c ---- */
 /* Has it a place for each pixel, and no area? */
 bool imp__meter_is_points(const struct imp_sensor *s);
 /* What the velocity of a meter's point counts. */
