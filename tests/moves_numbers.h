@@ -113,4 +113,25 @@ static inline void numbers_compare(const char *what, imp_scene *scene, int spp,
     imp_scene_destroy(scene);
 }
 
+/* What it has no gradient by, or what does not become a parameter: the error holds the word. Ends the
+ * scene. */
+static inline void number_refused(const char *what, imp_scene *scene, const char *name,
+                                  const char *word)
+{
+    imp_problem *p;
+    struct imp_run run = IMP_RUN_INIT;
+    double g[NUMBERS_MAX];
+    run.spp = 2;
+    enum imp_status st = imp_scene_add_geometry(scene, name);
+    if (st == IMP_OK) {
+        test_must(ctx, imp_problem_create(scene, &p));
+        test_must(ctx, imp_problem_activate(p, name));
+        st = imp_problem_reverse(p, adjoint, &run, g, NULL);
+        imp_problem_destroy(p);
+    }
+    tap_ok(st == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), word), "%s # %s", what,
+           st == IMP_OK ? "" : imp_last_error(ctx));
+    imp_scene_destroy(scene);
+}
+
 #endif

@@ -69,20 +69,16 @@ static double spot(const double at[3], const double v[3])
     return .6 / IMP_PI * 2 * at[2] / (r * r * r) * fmin(fmax(k, 0), 1);
 }
 
-static void spot_test(void)
+/* A light `bulb` at (.5, -.3, 1.2) over the floor, aimed along v: its irradiance by place and aim. */
+static void aimed_test(const char *what, const char *light, const double v[3],
+                       double (*irradiance)(const double at[3], const double v[3]),
+                       double within)
 {
-    const double at[3] = {.5, -.3, 1.2}, v[3] = {-.3, .6, -1.9}, h = 1e-5;
+    const double at[3] = {.5, -.3, 1.2}, h = 1e-5;
     struct tap_stat d[2][3] = {{{0, 0, 0}}};
     imp_scene *scene;
     size_t index;
-    scene_of(
-        NARROW, 4,
-        FLOOR
-        "<emitter type='spot' id='bulb'><float name='cutoff_angle' value='40'/><float "
-        "name='beam_width' value='5'/><transform name='to_world'><lookat "
-        "origin='.5,-.3,1.2' target='0,0,0' up='1,0,0'/></transform><rgb "
-        "name='intensity' value='2'/></emitter>",
-        "bulb.position", &scene);
+    scene_of(NARROW, 4, light, "bulb.position", &scene);
     test_must(ctx, imp_scene_add_geometry(scene, "bulb.direction"));
     test_must(ctx, imp_scene_find_param(scene, "bulb.direction", &index));
     test_must(ctx, imp_scene_set_values(scene, index, 3, v));
@@ -90,16 +86,30 @@ static void spot_test(void)
     mean_gradient(ctx, scene, "bulb.direction", 16, 4, d[1]);
     for (int k = 0; k < 3; k++) {
         double lo[2][3], hi[2][3];
+        char moves[64], turns[64];
         for (int i = 0; i < 3; i++) {
             lo[0][i] = at[i] - h * (i == k), hi[0][i] = at[i] + h * (i == k);
             lo[1][i] = v[i] - h * (i == k), hi[1][i] = v[i] + h * (i == k);
         }
-        tap_near(d[0][k].mean, (spot(hi[0], v) - spot(lo[0], v)) / (2 * h), 1e-3, 0,
-                 "irradiance of a spot that moves");
-        tap_near(d[1][k].mean, (spot(at, hi[1]) - spot(at, lo[1])) / (2 * h), 1e-3, 0,
-                 "irradiance of a spot that turns");
+        snprintf(moves, sizeof moves, "irradiance of a %s that moves", what);
+        snprintf(turns, sizeof turns, "irradiance of a %s that turns", what);
+        tap_near(d[0][k].mean, (irradiance(hi[0], v) - irradiance(lo[0], v)) / (2 * h),
+                 within, 0, moves);
+        tap_near(d[1][k].mean, (irradiance(at, hi[1]) - irradiance(at, lo[1])) / (2 * h),
+                 within, 0, turns);
     }
     imp_scene_destroy(scene);
+}
+
+static void spot_test(void)
+{
+    aimed_test("spot",
+               FLOOR
+               "<emitter type='spot' id='bulb'><float name='cutoff_angle' value='40'/>"
+               "<float name='beam_width' value='5'/><transform name='to_world'><lookat "
+               "origin='.5,-.3,1.2' target='0,0,0' up='1,0,0'/></transform><rgb "
+               "name='intensity' value='2'/></emitter>",
+               (const double[3]){-.3, .6, -1.9}, spot, 1e-3);
 }
 
 /* ---- A luminaire ---------------------------------------------------------------- */
@@ -153,33 +163,12 @@ static void luminaire_test(void)
     fprintf(f, "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 2 1 2 0 0 0 1 1 0\n0 90\n0 90\n"
                "1 0 4 0\n");
     fclose(f);
-    const double at[3] = {.5, -.3, 1.2}, v[3] = {-.7, .5, -1.5}, h = 1e-5;
-    struct tap_stat d[2][3] = {{{0, 0, 0}}};
-    imp_scene *scene;
-    size_t index;
-    scene_of(NARROW, 4,
-             FLOOR
-             "<emitter type='ies' id='bulb'><string name='filename' "
-             "value='luminaire.ies'/><transform name='to_world'><lookat "
-             "origin='.5,-.3,1.2' target='.5,.3,.4' up='0,0,1'/></transform></emitter>",
-             "bulb.position", &scene);
-    test_must(ctx, imp_scene_add_geometry(scene, "bulb.direction"));
-    test_must(ctx, imp_scene_find_param(scene, "bulb.direction", &index));
-    test_must(ctx, imp_scene_set_values(scene, index, 3, v));
-    mean_gradient(ctx, scene, "bulb.position", 16, 4, d[0]);
-    mean_gradient(ctx, scene, "bulb.direction", 16, 4, d[1]);
-    for (int k = 0; k < 3; k++) {
-        double lo[2][3], hi[2][3];
-        for (int i = 0; i < 3; i++) {
-            lo[0][i] = at[i] - h * (i == k), hi[0][i] = at[i] + h * (i == k);
-            lo[1][i] = v[i] - h * (i == k), hi[1][i] = v[i] + h * (i == k);
-        }
-        tap_near(d[0][k].mean, (luminaire(hi[0], v) - luminaire(lo[0], v)) / (2 * h),
-                 1e-4, 0, "irradiance of a luminaire that moves");
-        tap_near(d[1][k].mean, (luminaire(at, hi[1]) - luminaire(at, lo[1])) / (2 * h),
-                 1e-4, 0, "irradiance of a luminaire that turns");
-    }
-    imp_scene_destroy(scene);
+    aimed_test("luminaire",
+               FLOOR
+               "<emitter type='ies' id='bulb'><string name='filename' "
+               "value='luminaire.ies'/><transform name='to_world'><lookat "
+               "origin='.5,-.3,1.2' target='.5,.3,.4' up='0,0,1'/></transform></emitter>",
+               (const double[3]){-.7, .5, -1.5}, luminaire, 1e-4);
     remove(file);
 }
 
