@@ -29,6 +29,8 @@ struct imp__ies {
     const struct imp__ies_facet *facets;
 };
 
+/* x[k] <= v, k at most n - 2, and the fraction of the way to x[k + 1]. */
+int imp__ies_place(const double *x, int n, double v, double *fraction);
 /* Intensity along w (world, unit, away from the light), at scale 1. */
 double imp__ies_intensity(const struct imp__ies *x, imp_v3 w);
 /* Where its table jumps as a function of direction, for a message; NULL: nowhere. */
