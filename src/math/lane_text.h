@@ -25,7 +25,15 @@
 #define choose     WIDE(imp__choose)
 #define root_of    WIDE(imp__root)
 #define larger     WIDE(imp__larger)
+#define lesser     WIDE(imp__lesser)
 #define magnitude  WIDE(imp__magnitude)
+#define signed_as  WIDE(imp__signed_as)
+#define real3      struct WIDE(imp_real3) /* of vec_text.h, which comes first */
+#define inner      WIDE(imp__inner)
+#define plus3      WIDE(imp__plus)
+#define minus3     WIDE(imp__minus)
+#define times3     WIDE(imp__times)
+#define choose3    WIDE(imp__choose3)
 
 #include IMP_TEXT
 
@@ -36,6 +44,14 @@
 #undef choose
 #undef root_of
 #undef larger
+#undef lesser
 #undef magnitude
+#undef signed_as
+#undef real3
+#undef inner
+#undef plus3
+#undef minus3
+#undef times3
+#undef choose3
 #undef IMP_WIDE
 #undef IMP_TEXT

@@ -6,6 +6,9 @@
 #define IMP_MATH_REALS_H
 
 #include "vec.h"
+#ifdef __AVX512F__
+#include <immintrin.h>
+#endif
 
 /* What comparisons give: of vectors all bits of a lane that is true. */
 typedef double imp_real_1;
@@ -37,6 +40,9 @@ static inline imp_real_4 imp__root_4(imp_real_4 x)
 }
 static inline imp_real_8 imp__root_8(imp_real_8 x)
 {
+#ifdef __AVX512F__
+    return (imp_real_8)_mm512_sqrt_pd((__m512d)x);
+#endif
     return (imp_real_8){sqrt(x[0]), sqrt(x[1]), sqrt(x[2]), sqrt(x[3]),
                         sqrt(x[4]), sqrt(x[5]), sqrt(x[6]), sqrt(x[7])};
 }
@@ -65,6 +71,28 @@ static inline imp_real_4 imp__larger_4(imp_real_4 a, imp_real_4 b)
 static inline imp_real_8 imp__larger_8(imp_real_8 a, imp_real_8 b)
 {
     return imp__choose_8(a > b, a, b);
+}
+
+/* The lesser; b where one is NAN. */
+static inline double imp__lesser_1(double a, double b) { return imp_min(a, b); }
+static inline imp_real_4 imp__lesser_4(imp_real_4 a, imp_real_4 b)
+{
+    return imp__choose_4(a < b, a, b);
+}
+static inline imp_real_8 imp__lesser_8(imp_real_8 a, imp_real_8 b)
+{
+    return imp__choose_8(a < b, a, b);
+}
+
+/* The magnitude of a with the sign of b. */
+static inline double imp__signed_as_1(double a, double b) { return copysign(a, b); }
+static inline imp_real_4 imp__signed_as_4(imp_real_4 a, imp_real_4 b)
+{
+    return (imp_real_4)(((imp_truth_4)a & INT64_MAX) | ((imp_truth_4)b & INT64_MIN));
+}
+static inline imp_real_8 imp__signed_as_8(imp_real_8 a, imp_real_8 b)
+{
+    return (imp_real_8)(((imp_truth_8)a & INT64_MAX) | ((imp_truth_8)b & INT64_MIN));
 }
 
 #endif

@@ -14,6 +14,10 @@
 #define IMP_TEXT "math/trig_text.h"
 #include "lane_text.h"
 
+#define IMP_WIDE 8
+#define IMP_TEXT "math/trig_text.h"
+#include "lane_text.h"
+
 /* sin and cos of 2 pi u, |u| < 2^20. */
 static inline void imp__sincos_turn(double u, double *s, double *c)
 {

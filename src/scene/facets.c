@@ -4,57 +4,13 @@
  * double (facets.h). */
 #include "facets_lanes.h"
 
-/* ---- one triangle, in double
- * ------------------------------------------------------------------ */
-
-/* Triangles that share an edge overlap by this part of their sides: more than what is rounded
- * off, and far less than what a picture shows. */
-#define OVERLAP 1e-10
-static inline bool triangle_met(const struct triangle *s, imp_v3 from, imp_v3 d,
-                                double tmin, double tmax, struct imp_hit *hit)
-{
-    const imp_v3 off = (s->x * from[0] + s->y * from[1]) + (s->z * from[2] + s->one);
-    const imp_v3 step = (s->x * d[0] + s->y * d[1]) + s->z * d[2];
-    const double t = -off[0] / step[0];
-    const imp_v3 p = off + t * step;
-    const double u = p[1], v = p[2];
-    if (!(t > tmin && t < tmax && u >= -OVERLAP && v >= -OVERLAP && u + v <= 1 + OVERLAP))
-        return false;
-    hit->t = t;
-    hit->u = imp_clamp(u, 0, 1);
-    hit->v = imp_clamp(v, 0, 1 - hit->u);
-    hit->shape = s->shape;
-    hit->prim = s->prim;
-    hit->place = 0;
-    return true;
-}
-
-/* ---- eight facets, in float
- * ------------------------------------------------------------------- */
-
-static inline lanes choose(mask m, lanes a, lanes b)
-{
-    return (lanes)((m & (mask)a) | (~m & (mask)b));
-}
-static inline lanes lesser(lanes a, lanes b) { return choose(a < b, a, b); }
-static inline lanes magnitude(lanes a) { return (lanes)((mask)a & INT32_MAX); }
+static inline lanes lesser(lanes a, lanes b) { return imp__lanes_choose(a < b, a, b); }
 static inline float least(lanes a)
 {
     a = lesser(a, __builtin_shufflevector(a, a, 4, 5, 6, 7, 0, 1, 2, 3));
     a = lesser(a, __builtin_shufflevector(a, a, 2, 3, 0, 1, 6, 7, 4, 5));
     return imp_min(a[0], a[1]);
 }
-static inline unsigned bits_of(mask m)
-{
-#ifdef __AVX__
-    return (unsigned)__builtin_ia32_movmskps256((lanes)m);
-#else
-    unsigned bits = 0;
-    for (int k = 0; k < LANES; k++) bits |= (m[k] & 1u) << k;
-    return bits;
-#endif
-}
-
 /* A ray for floats, from a point that is not far away; distances count from there. */
 struct ray {
     lanes o[3], d[3];
@@ -110,8 +66,9 @@ static inline mask group_met(const struct group *g, const struct ray *r, float s
                              lanes *t, lanes *sum)
 {
     const lanes nd = g->n[0] * r->d[0] + g->n[1] * r->d[1] + g->n[2] * r->d[2];
-    const lanes inv = -1 / choose(magnitude(nd) < r->least, r->least, nd);
-    const lanes size = magnitude(inv), aside = r->stretch * size * g->slack;
+    const lanes inv =
+        -1 / imp__lanes_choose(imp__lanes_magnitude(nd) < r->least, r->least, nd);
+    const lanes size = imp__lanes_magnitude(inv), aside = r->stretch * size * g->slack;
     const lanes far = size * slack, side = 1 + aside;
     *t = (g->n[0] * r->o[0] + g->n[1] * r->o[1] + g->n[2] * r->o[2] + g->n[3]) * inv;
     const lanes x = r->o[0] + *t * r->d[0], y = r->o[1] + *t * r->d[1],
@@ -119,16 +76,8 @@ static inline mask group_met(const struct group *g, const struct ray *r, float s
     const lanes u = g->u[0] * x + g->u[1] * y + g->u[2] * z + g->u[3];
     const lanes v = g->v[0] * x + g->v[1] * y + g->v[2] * z + g->v[3];
     *sum = u + v;
-    return (magnitude(u) <= side) & (magnitude(v) <= side) & (*sum <= g->sum + aside) &
-           (*t > r->lo - far) & (*t < r->hi + 4 * far);
-}
-
-/* first: the half that is tested first. */
-static inline bool facet_met(const struct triangle half[2], int first, imp_v3 from,
-                             imp_v3 d, double tmin, double tmax, struct imp_hit *hit)
-{
-    return triangle_met(&half[first], from, d, tmin, tmax, hit) ||
-           triangle_met(&half[1 - first], from, d, tmin, tmax, hit);
+    return (imp__lanes_magnitude(u) <= side) & (imp__lanes_magnitude(v) <= side) &
+           (*sum <= g->sum + aside) & (*t > r->lo - far) & (*t < r->hi + 4 * far);
 }
 
 /* Where the facet that floats chose is not met. */
@@ -139,10 +88,10 @@ static IMP_COLD bool nearest_of_all(const struct imp_facets *f, const struct ray
     bool met = false;
     for (int g = 0; g < f->n_groups; g++) {
         lanes t, sum;
-        unsigned ask = bits_of(group_met(&f->group[g], r, f->slack, &t, &sum));
+        unsigned ask = imp__lanes_bits(group_met(&f->group[g], r, f->slack, &t, &sum));
         for (; ask; ask &= ask - 1)
-            if (facet_met(f->facet[LANES * g + __builtin_ctz(ask)], 0, from, d, tmin,
-                          tmax, hit)) {
+            if (imp__facet_met(f->facet[LANES * g + __builtin_ctz(ask)], 0, from, d, tmin,
+                               tmax, hit)) {
                 tmax = hit->t;
                 met = true;
             }
@@ -160,20 +109,20 @@ bool imp__facets_nearest(const struct imp_facets *f, const imp_v3 *o, const imp_
     for (int g = 0; g < f->n_groups; g++) {
         lanes t, sum;
         const mask m = group_met(&f->group[g], &r, f->slack, &t, &sum) & (t < best);
-        best = choose(m, t, best);
-        in = choose(m, imp__splat((float)g), in);
-        half = choose(m, sum, half);
+        best = imp__lanes_choose(m, t, best);
+        in = imp__lanes_choose(m, imp__splat((float)g), in);
+        half = imp__lanes_choose(m, sum, half);
     }
     const float first = least(best);
     if (!(first < INFINITY)) return false;
-    unsigned equal = bits_of(best == imp__splat(first));
+    unsigned equal = imp__lanes_bits(best == imp__splat(first));
     int k = __builtin_ctz(equal);
     while (imp_unlikely(equal &= equal - 1)) { /* at one place */
         const int other = __builtin_ctz(equal);
         if (in[other] < in[k]) k = other;
     }
-    if (imp_likely(facet_met(f->facet[LANES * (int)in[k] + k], half[k] > 0, from, *d,
-                             tmin, tmax, hit)))
+    if (imp_likely(imp__facet_met(f->facet[LANES * (int)in[k] + k], half[k] > 0, from, *d,
+                                  tmin, tmax, hit)))
         return true;
     return nearest_of_all(f, &r, from, *d, tmin, tmax, hit);
 }
@@ -187,10 +136,10 @@ bool imp__facets_occluded(const struct imp_facets *f, const imp_v3 *o, const imp
     for (int g = 0; g < f->n_groups; g++) {
         lanes t, sum;
         struct imp_hit hit;
-        unsigned ask = bits_of(group_met(&f->group[g], &r, f->slack, &t, &sum));
+        unsigned ask = imp__lanes_bits(group_met(&f->group[g], &r, f->slack, &t, &sum));
         for (; ask; ask &= ask - 1)
-            if (facet_met(f->facet[LANES * g + __builtin_ctz(ask)], 0, from, *d, tmin,
-                          tmax, &hit))
+            if (imp__facet_met(f->facet[LANES * g + __builtin_ctz(ask)], 0, from, *d,
+                               tmin, tmax, &hit))
                 return true;
     }
     return false;

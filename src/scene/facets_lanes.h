@@ -51,4 +51,50 @@ struct imp_facets {
 
 static inline lanes imp__splat(float x) { return (lanes){x, x, x, x, x, x, x, x}; }
 
+static inline lanes imp__lanes_choose(mask m, lanes a, lanes b)
+{
+    return (lanes)((m & (mask)a) | (~m & (mask)b));
+}
+static inline lanes imp__lanes_magnitude(lanes a) { return (lanes)((mask)a & INT32_MAX); }
+static inline unsigned imp__lanes_bits(mask m)
+{
+#ifdef __AVX__
+    return (unsigned)__builtin_ia32_movmskps256((lanes)m);
+#else
+    unsigned bits = 0;
+    for (int k = 0; k < LANES; k++) bits |= (m[k] & 1u) << k;
+    return bits;
+#endif
+}
+
+/* Triangles that share an edge overlap by this part of their sides: more than what is rounded
+ * off, and far less than what a picture shows. */
+#define OVERLAP 1e-10
+static inline bool imp__triangle_met(const struct triangle *s, imp_v3 from, imp_v3 d,
+                                     double tmin, double tmax, struct imp_hit *hit)
+{
+    const imp_v3 off = (s->x * from[0] + s->y * from[1]) + (s->z * from[2] + s->one);
+    const imp_v3 step = (s->x * d[0] + s->y * d[1]) + s->z * d[2];
+    const double t = -off[0] / step[0];
+    const imp_v3 p = off + t * step;
+    const double u = p[1], v = p[2];
+    if (!(t > tmin && t < tmax && u >= -OVERLAP && v >= -OVERLAP && u + v <= 1 + OVERLAP))
+        return false;
+    hit->t = t;
+    hit->u = imp_clamp(u, 0, 1);
+    hit->v = imp_clamp(v, 0, 1 - hit->u);
+    hit->shape = s->shape;
+    hit->prim = s->prim;
+    hit->place = 0;
+    return true;
+}
+
+/* first: the half that is tested first. */
+static inline bool imp__facet_met(const struct triangle half[2], int first, imp_v3 from,
+                                  imp_v3 d, double tmin, double tmax, struct imp_hit *hit)
+{
+    return imp__triangle_met(&half[first], from, d, tmin, tmax, hit) ||
+           imp__triangle_met(&half[1 - first], from, d, tmin, tmax, hit);
+}
+
 #endif

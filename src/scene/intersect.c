@@ -13,18 +13,6 @@
 
 /* ---- analytic shapes ----------------------------------------------------------- */
 
-/* A triangle's distance is rounded, by a few units of 2^-24 of what it is computed from; an
- * analytic hit's is not. Nearer to each other than this the two are at one place, and the
- * analytic shape is met: mostly it is a lamp that lies on a mesh. (Rays leave surfaces from
- * IMP_RAY_EPSILON in front of them, which is far more.) */
-#define TIE (4 * 0x1p-24)
-/* Up to where a triangle is met before the analytic hit at t. */
-static inline float triangle_far(const imp_v3 *o, const imp_v3 *d, double t)
-{
-    const imp_v3 a = imp__abs(*o), b = imp__abs(*d);
-    return (float)(t - TIE * (t + (a[0] + a[1] + a[2]) / (b[0] + b[1] + b[2])));
-}
-
 /* Passed through Embree to the callbacks: ray and nearest analytic hit, in double. */
 struct query {
     struct RTCIntersectContext context; /* first: callbacks get its address */
@@ -56,7 +44,7 @@ void imp__analytic_intersect(const struct RTCIntersectFunctionNArguments *args)
     struct imp_hit hit;
     if (!args->valid[0]) return;
     if (!s->ops->intersect(s, q->o, q->d, q->tmin, q->tmax, &hit)) return;
-    const float far = triangle_far(q->o, q->d, hit.t);
+    const float far = imp__triangle_far(q->o, q->d, hit.t);
     /* Where the nearest is a triangle's. */
     if (r->hit.geomID != q->geometry && r->ray.tfar <= far) return;
     hit.shape = s->index;
@@ -144,13 +132,6 @@ static void gather_triangle(const struct RTCFilterFunctionNArguments *args)
 
 /* ---- queries ------------------------------------------------------------------- */
 
-/* Rays that are not within Embree's numbers hit nothing. */
-static inline bool ray_valid(const imp_v3 *o, const imp_v3 *d, double tmin, double tmax)
-{
-    const imp_v3 size = imp__abs(*o) + imp__abs(*d);
-    return (size[0] + size[1]) + size[2] < IMP_REACH_MAX && tmin >= 0 && tmin < tmax;
-}
-
 /* Embree reads (org, tnear) and (dir, time) as 16 bytes each. Written as single floats
  * they could not be forwarded from the store buffer, which costs 10 ns a ray. */
 static inline void ray_fill(struct RTCRay *r, const imp_v3 *o, const imp_v3 *d,
@@ -187,9 +168,9 @@ nearest(const struct imp_intersector *x, double time, const imp_v3 *o, const imp
 {
     struct query q;
     struct RTCRayHit r;
-    if (imp_unlikely(!ray_valid(o, d, tmin, tmax))) return false;
+    if (imp_unlikely(!imp__ray_valid(o, d, tmin, tmax))) return false;
     bool met = imp__shape_balls_nearest(&x->balls, o, d, tmin, &tmax, hit);
-    float far = met ? triangle_far(o, d, tmax) : (float)tmax;
+    float far = met ? imp__triangle_far(o, d, tmax) : (float)tmax;
     if (x->facets &&
         imp__facets_nearest(x->facets, o, d, tmin, met ? (double)far : tmax, hit)) {
         met = true;
@@ -222,7 +203,7 @@ anything(const struct imp_intersector *x, double time, const imp_v3 *o, const im
 {
     struct query q;
     struct RTCRay r;
-    if (imp_unlikely(!ray_valid(o, d, tmin, tmax))) return false;
+    if (imp_unlikely(!imp__ray_valid(o, d, tmin, tmax))) return false;
     if (imp__shape_balls_occluded(&x->balls, o, d, tmin, tmax)) return true;
     if (x->facets && imp__facets_occluded(x->facets, o, d, tmin, tmax)) return true;
     if (!x->holds) return false;
@@ -306,7 +287,7 @@ int imp__aims_hit(const struct imp_aims *t, const imp_v3 *o, const imp_v3 *d, do
                        .hit = hit,
                        .max = max};
     struct RTCRayHit r;
-    if (imp_unlikely(!x || !ray_valid(o, d, tmin, INFINITY))) return 0;
+    if (imp_unlikely(!x || !imp__ray_valid(o, d, tmin, INFINITY))) return 0;
     rtcInitIntersectContext(&g.context);
     g.context.filter = gather_triangle;
     ray_fill(&r.ray, o, d, tmin, INFINITY);

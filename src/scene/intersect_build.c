@@ -317,6 +317,7 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
                         (c->aims ? RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION : 0));
     const bool instances = c->group && c->group->n_instances > 0;
     size_t primitives = 0;
+    bool curves = false;
     for (int i = 0; x->rtc && i < c->n + instances && told.error == RTC_ERROR_NONE; i++) {
         const struct imp_shape *s = i < c->n ? shape_at(scene, c, i) : NULL;
         if (s && imp__shape_is_absent(s)) continue;
@@ -333,7 +334,10 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
         x->holds = true;
         primitives += s ? primitives_of(s) : (size_t)c->group->n_instances;
         x->calls_back |= !s || s->geometry == IMP_ANALYTIC;
+        curves |= s && s->geometry == IMP_CURVES;
     }
+    x->packets = x->holds && !x->calls_back && !curves &&
+                 rtcGetDeviceProperty(rtc, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED);
     if (x->rtc && told.error == RTC_ERROR_NONE)
         tree_build(scene->ctx, x->rtc, primitives);
     const enum RTCError error = !x->rtc && told.error == RTC_ERROR_NONE

@@ -15,9 +15,30 @@ struct imp_intersector {
     struct imp_facets *facets;
     bool holds;      /* Embree's scene is not empty */
     bool calls_back; /* for analytic shapes or instances */
+    bool packets;    /* it takes eight rays at a time, and each has its numbers then */
     int first;       /* index of its first shape */
     int64_t bytes;
 };
+
+/* A triangle's distance is rounded, by a few units of 2^-24 of what it is computed from; an
+ * analytic hit's is not. Nearer to each other than this the two are at one place, and the
+ * analytic shape is met: mostly it is a lamp that lies on a mesh. (Rays leave surfaces from
+ * IMP_RAY_EPSILON in front of them, which is far more.) */
+#define IMP_HIT_TIE (4 * 0x1p-24)
+/* Up to where a triangle is met before the analytic hit at t. */
+static inline float imp__triangle_far(const imp_v3 *o, const imp_v3 *d, double t)
+{
+    const imp_v3 a = imp__abs(*o), b = imp__abs(*d);
+    return (float)(t - IMP_HIT_TIE * (t + (a[0] + a[1] + a[2]) / (b[0] + b[1] + b[2])));
+}
+
+/* Rays that are not within Embree's numbers hit nothing. */
+static inline bool imp__ray_valid(const imp_v3 *o, const imp_v3 *d, double tmin,
+                                  double tmax)
+{
+    const imp_v3 size = imp__abs(*o) + imp__abs(*d);
+    return (size[0] + size[1]) + size[2] < IMP_REACH_MAX && tmin >= 0 && tmin < tmax;
+}
 
 /* What Embree calls for analytic shapes. */
 void imp__analytic_intersect(const struct RTCIntersectFunctionNArguments *args);

@@ -14,9 +14,6 @@
 #define IMP_TEXT "kind/bsdf/conductor_text.h"
 #include "math/lane_text.h"
 #define IMP_WIDE 8
-#define IMP_TEXT "math/trig_text.h"
-#include "math/lane_text.h"
-#define IMP_WIDE 8
 #define IMP_TEXT "kind/bsdf/conductor_text.h"
 #include "math/lane_text.h"
 

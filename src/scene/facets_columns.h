@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Facets (facets.h) against eight rays. */
+#ifndef IMP_SCENE_FACETS_COLUMNS_H
+#define IMP_SCENE_FACETS_COLUMNS_H
+
+#include "facets.h"
+#include "math/wide.h"
+
+/* Rays are taken so many at a time, in one or more registers. */
+enum { IMP_RAY_BLOCK = 8, IMP_RAY_PARTS = IMP_RAY_BLOCK / IMP_LANES };
+struct imp_ray_block {
+    imp_wide3 o[IMP_RAY_PARTS], d[IMP_RAY_PARTS];
+    imp_wide near[IMP_RAY_PARTS], far[IMP_RAY_PARTS];
+};
+/* Numbers of ray k. */
+static inline imp_v3 imp__block_origin(const struct imp_ray_block *b, int k)
+{
+    return imp__wide3_lane(&b->o[k / IMP_LANES], k % IMP_LANES);
+}
+static inline imp_v3 imp__block_direction(const struct imp_ray_block *b, int k)
+{
+    return imp__wide3_lane(&b->d[k / IMP_LANES], k % IMP_LANES);
+}
+static inline double imp__block_near(const struct imp_ray_block *b, int k)
+{
+    return b->near[k / IMP_LANES][k % IMP_LANES];
+}
+static inline double imp__block_far(const struct imp_ray_block *b, int k)
+{
+    return b->far[k / IMP_LANES][k % IMP_LANES];
+}
+
+/* on: a bit for each ray that is asked for. A bit for each that meets something, with its hit, or
+ * that is hidden: as imp__facets_nearest and imp__facets_occluded say of it. */
+unsigned imp__facets_nearest_block(const struct imp_facets *f,
+                                   const struct imp_ray_block *rays, unsigned on,
+                                   struct imp_hit hit[IMP_RAY_BLOCK]);
+unsigned imp__facets_occluded_block(const struct imp_facets *f,
+                                    const struct imp_ray_block *rays, unsigned on);
+
+#endif
