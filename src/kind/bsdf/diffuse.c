@@ -2,6 +2,7 @@
  *
  * diffuse: Lambert. f cos = rho cos(theta_i)/pi on the front, so that the integral over
  * the hemisphere is rho, the albedo. */
+#include "bsdf_lanes.h"
 #include "kind/build.h"
 #include "lambert.h"
 
@@ -68,3 +69,25 @@ const struct imp_bsdf_ops imp__diffuse = {.size = sizeof(struct imp_bsdf_ops),
                                           .directional_albedo = directional_albedo,
                                           .pdf_eval = pdf_eval,
                                           .eval_directions_d = eval_directions_d};
+
+/* ---- In lanes ---------------------------------------------------------------------------- */
+
+static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
+                                   const struct imp_wide_color *in, const imp_wide3 *wo,
+                                   const imp_wide u[3], imp_wide3 *wi)
+{
+    (void)b, (void)in;
+    return imp__lambert_samples(u, wo, wi);
+}
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                               const imp_wide3 *wo, const imp_wide3 *wi,
+                               struct imp_wide_color *f)
+{
+    (void)b;
+    const imp_wide p = imp__lamberts(wo, wi);
+    for (int c = 0; c < 3; c++) f->c[c] = in[RHO].c[c] * p;
+    return p;
+}
+
+const struct imp_bsdf_lanes imp__diffuse_lanes = {.sample = sample_lanes,
+                                                  .pdf_eval = pdf_eval_lanes};

@@ -3,6 +3,7 @@
  * twosided: seen from behind, the second child (or the only one) is turned over: the
  * mirror z -> -z is applied to both directions. */
 #include "blending.h"
+#include "bsdf_lanes.h"
 #include "kind/build.h"
 
 static enum imp_status build(const struct imp_build *build, void *self,
@@ -178,3 +179,68 @@ const struct imp_bsdf_ops imp__twosided = {.size = sizeof(struct imp_bsdf_ops),
                                            .directional_albedo = directional_albedo,
                                            .pdf_eval = pdf_eval,
                                            .eval_directions_d = eval_directions_d};
+
+/* ---- In lanes ---------------------------------------------------------------------------- */
+
+static bool covers(const struct imp_bsdf *b)
+{
+    for (int k = 0; k < b->n_child; k++)
+        if (!imp__bsdf_lanes(b->child[k])) return false;
+    return true;
+}
+
+static imp_wide3 flips(const imp_wide3 *w, imp_wide_truth back)
+{
+    return (imp_wide3){w->x, w->y, imp__wide_choose(back, -w->z, w->z)};
+}
+
+/* Are there lanes of which child k is asked? With one child all are. */
+static bool is_asked(const struct imp_bsdf *b, int k, imp_wide_truth back)
+{
+    const unsigned bits = imp__wide_bits(back);
+    return b->n_child == 1 || (k > 0 ? bits != 0 : bits != imp__bits_first(IMP_LANES));
+}
+
+static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
+                                   const struct imp_wide_color *in, const imp_wide3 *wo,
+                                   const imp_wide u[3], imp_wide3 *wi)
+{
+    const imp_wide_truth back = wo->z < imp__wide(0);
+    const imp_wide3 seen = flips(wo, back);
+    imp_wide_truth drawn = {0};
+    for (int k = 0; k < b->n_child; k++) {
+        const struct imp_bsdf *c = b->child[k];
+        imp_wide3 own;
+        if (!is_asked(b, k, back)) continue;
+        const imp_wide_truth some = imp__bsdf_lanes(c)->sample(c, in + b->child_in[k],
+                                                               &seen, u, &own),
+                             here = k > 0 ? back : ~(imp_wide_truth){0};
+        own = flips(&own, back);
+        *wi = imp__wide3_choose(here, own, *wi);
+        drawn = (drawn & ~here) | (some & here);
+    }
+    return drawn;
+}
+
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                               const imp_wide3 *wo, const imp_wide3 *wi,
+                               struct imp_wide_color *f)
+{
+    const imp_wide_truth back = wo->z < imp__wide(0);
+    const imp_wide3 o = flips(wo, back), i = flips(wi, back);
+    imp_wide pdf = imp__wide(0);
+    for (int k = 0; k < b->n_child; k++) {
+        const struct imp_bsdf *c = b->child[k];
+        struct imp_wide_color own;
+        if (!is_asked(b, k, back)) continue;
+        const imp_wide p =
+            imp__bsdf_lanes(c)->pdf_eval(c, in + b->child_in[k], &o, &i, &own);
+        const imp_wide_truth here = k > 0 ? back : ~(imp_wide_truth){0};
+        pdf = imp__wide_choose(here, p, pdf);
+        for (int j = 0; j < 3; j++) f->c[j] = imp__wide_choose(here, own.c[j], f->c[j]);
+    }
+    return pdf;
+}
+
+const struct imp_bsdf_lanes imp__twosided_lanes = {
+    .covers = covers, .sample = sample_lanes, .pdf_eval = pdf_eval_lanes};

@@ -5,6 +5,7 @@
  *   (t (1 - 2X), (t/a)(1 - 2Y), 1),   X = px/W + offset_x,  Y = py/H + offset_y
  *
  * unless a lens distorts the picture. */
+#include "kind/lanes.h"
 #include "projection.h"
 
 struct perspective {
@@ -72,3 +73,45 @@ const struct imp_sensor_ops imp__perspective = {.size = sizeof(struct imp_sensor
                                                 .move = move,
                                                 .view = view,
                                                 .view_velocity = view_velocity};
+
+/* ---- In lanes: without a lens ------------------------------------------------------------- */
+
+static bool covers(const struct imp_sensor *s)
+{
+    return !((const struct perspective *)s->self)->film.lens;
+}
+
+static imp_wide3 vectors(const double m[16], imp_wide3 v)
+{
+    return (imp_wide3){m[0] * v.x + m[1] * v.y + m[2] * v.z,
+                       m[4] * v.x + m[5] * v.y + m[6] * v.z,
+                       m[8] * v.x + m[9] * v.y + m[10] * v.z};
+}
+static imp_wide3 points(const double m[16], imp_wide3 v)
+{
+    return (imp_wide3){m[0] * v.x + m[1] * v.y + m[2] * v.z + m[3],
+                       m[4] * v.x + m[5] * v.y + m[6] * v.z + m[7],
+                       m[8] * v.x + m[9] * v.y + m[10] * v.z + m[11]};
+}
+
+static void rays(const struct imp_sensor *s, imp_wide px, imp_wide py,
+                 struct imp_wide_ray *out)
+{
+    const struct perspective *p = s->self;
+    const double *m = p->projection.to_world.m, near = p->projection.near_clip;
+    const imp_wide3 v = {p->film.x0 + px * p->film.dx, p->film.y0 + py * p->film.dy,
+                         imp__wide(1)};
+    const imp_wide3 d = vectors(m, v), begin = imp__wide3_times(v, imp__wide(near));
+    const imp_wide length = imp__wide3_norm(d), zero = imp__wide(0);
+    out->o = points(m, (imp_wide3){zero + begin.x, zero + begin.y, zero + begin.z});
+    out->d = imp__wide3_times(d, 1 / length);
+    out->near = zero;
+    out->far = (p->projection.far_clip - near) * length;
+}
+
+static const struct imp_sensor_lanes lanes = {.covers = covers, .ray = rays};
+
+const struct imp_sensor_lanes *imp__sensor_lanes(const struct imp_sensor *s)
+{
+    return s->ops == &imp__perspective && covers(s) ? &lanes : NULL;
+}

@@ -109,38 +109,12 @@ void imp__mesh_place(const struct imp_shape *s, const double uv[2],
     surface(s, &hit, out);
 }
 
-/* The first of n triangles after which c exceeds x, or the last. Without branches: each would be a
- * coin toss. */
-static inline size_t cumulative_find(const double *c, size_t n, double x)
-{
-    size_t lo = 0;
-    while (n > 1) {
-        const size_t half = n / 2;
-        lo += (size_t) !(c[lo + half] > x) * half;
-        n -= half;
-    }
-    return lo;
-}
-
 /* A triangle by its area, and barycentric weights in it. */
 static inline struct imp_hit draw(const struct imp_shape *s, const struct imp__mesh *m,
                                   const double u[2])
 {
-    /* The first triangle whose cumulative area exceeds x: those without area never are. */
-    const double x = u[0] * s->area, *c = m->cumulative;
-    size_t lo;
     double within;
-    if (m->last == 1) { /* by masks, since a branch would be a coin toss here, too */
-        const imp_pair_mask first = imp__pair_exceeds(c[1], x);
-        const imp_pair part = imp__pair_choose(first, (imp_pair){x, c[1]},
-                                               (imp_pair){x - c[1], c[2] - c[1]});
-        lo = 1 + (size_t)first[0];
-        within = part[0] / part[1];
-    } else {
-        lo = cumulative_find(c, m->last + 1, x);
-        within = (x - c[lo]) / (c[lo + 1] - c[lo]);
-    }
-    within = imp_min(imp_max(within, 0.0), 0x1.fffffffffffffp-1);
+    const size_t lo = imp__mesh_triangle_draw(s, m, u[0], &within);
     double b[2];
     imp__uniform_triangle((double[2]){within, u[1]}, b);
     return (struct imp_hit){.prim = (int)lo, .u = b[0], .v = b[1]};

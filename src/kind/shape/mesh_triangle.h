@@ -5,6 +5,7 @@
 #ifndef IMP_MESH_TRIANGLE_H
 #define IMP_MESH_TRIANGLE_H
 
+#include "math/pair.h"
 #include "shape.h"
 #include <string.h>
 
@@ -32,6 +33,23 @@ static inline struct imp__mesh_corner imp__mesh_corner(const struct imp__mesh *m
                                      imp__mesh_load(m->positions, i[2]) - p0};
 }
 
+/* uv of a point of a triangle. */
+static inline void imp__mesh_uv(const struct imp__mesh *m, const struct imp_hit *hit,
+                                double uv[2])
+{
+    const double b1 = hit->u, b2 = hit->v;
+    /* Without uv they are the weights of the file's second and third vertex. */
+    uv[0] = m->reversed ? b2 : b1;
+    uv[1] = m->reversed ? b1 : b2;
+    if (m->uvs) {
+        const uint32_t *i = m->indices + 3 * (size_t)hit->prim;
+        const float *t0 = m->uvs + 2 * (size_t)i[0], *t1 = m->uvs + 2 * (size_t)i[1],
+                    *t2 = m->uvs + 2 * (size_t)i[2];
+        for (int k = 0; k < 2; k++)
+            uv[k] = t0[k] + b1 * ((double)t1[k] - t0[k]) + b2 * ((double)t2[k] - t0[k]);
+    }
+}
+
 /* Position, normals and uv: all that a light sample needs. */
 static inline void imp__mesh_point(const struct imp__mesh *m, const struct imp_hit *hit,
                                    const struct imp__mesh_corner *c, imp_v3 ng,
@@ -49,17 +67,42 @@ static inline void imp__mesh_point(const struct imp__mesh *m, const struct imp_h
         const double l = imp__length(n);
         if (l > 1e-6) out->n = n * (1 / l);
     }
-    /* Without uv they are the weights of the file's second and third vertex. */
-    out->uv[0] = m->reversed ? b2 : b1;
-    out->uv[1] = m->reversed ? b1 : b2;
-    if (m->uvs) {
-        const uint32_t *i = m->indices + 3 * (size_t)hit->prim;
-        const float *t0 = m->uvs + 2 * (size_t)i[0], *t1 = m->uvs + 2 * (size_t)i[1],
-                    *t2 = m->uvs + 2 * (size_t)i[2];
-        for (int k = 0; k < 2; k++)
-            out->uv[k] =
-                t0[k] + b1 * ((double)t1[k] - t0[k]) + b2 * ((double)t2[k] - t0[k]);
+    imp__mesh_uv(m, hit, out->uv);
+}
+
+/* The first of n triangles after which c exceeds x, or the last. Without branches: each would be a
+ * coin toss. */
+static inline size_t imp__cumulative_find(const double *c, size_t n, double x)
+{
+    size_t lo = 0;
+    while (n > 1) {
+        const size_t half = n / 2;
+        lo += (size_t) !(c[lo + half] > x) * half;
+        n -= half;
     }
+    return lo;
+}
+
+/* A triangle by its area; *within: where u lies in its part of all, on [0, 1). */
+static inline size_t imp__mesh_triangle_draw(const struct imp_shape *s,
+                                             const struct imp__mesh *m, double u,
+                                             double *within)
+{
+    /* The first triangle whose cumulative area exceeds x: those without area never are. */
+    const double x = u * s->area, *c = m->cumulative;
+    size_t lo;
+    if (m->last == 1) { /* by masks, since a branch would be a coin toss here, too */
+        const imp_pair_mask first = imp__pair_exceeds(c[1], x);
+        const imp_pair part = imp__pair_choose(first, (imp_pair){x, c[1]},
+                                               (imp_pair){x - c[1], c[2] - c[1]});
+        lo = 1 + (size_t)first[0];
+        *within = part[0] / part[1];
+    } else {
+        lo = imp__cumulative_find(c, m->last + 1, x);
+        *within = (x - c[lo]) / (c[lo + 1] - c[lo]);
+    }
+    *within = imp_min(imp_max(*within, 0.0), 0x1.fffffffffffffp-1);
+    return lo;
 }
 
 /* dp_du and dp_dv, from uv where they say something. */

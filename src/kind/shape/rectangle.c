@@ -3,7 +3,7 @@
  * The square [-1,1]^2 at z = 0 under an affine map: a parallelogram. Embree sees two
  * triangles; the surface is computed from the parallelogram itself, in double. */
 #include "math/pair.h"
-#include "shape.h"
+#include "shape_lanes.h"
 #include <string.h>
 
 struct rectangle {
@@ -152,3 +152,42 @@ const struct imp_shape_ops imp__rectangle = {.size = sizeof(struct imp_shape_ops
                                              .sample_area = sample_area,
                                              .place = place,
                                              .move = move};
+
+/* ---- In lanes ---------------------------------------------------------------------------- */
+
+static imp_wide3 points_at(const struct rectangle *r, imp_wide u, imp_wide v)
+{
+    return imp__wide3_plus(imp__wide3_plus(imp__wide3_of(r->corner),
+                                           imp__wide3_times(imp__wide3_of(r->eu), u)),
+                           imp__wide3_times(imp__wide3_of(r->ev), v));
+}
+
+static void surfaces(const struct imp_shape *s, const struct imp_wide_hits *h, bool uv,
+                     struct imp_wide_surface *out)
+{
+    const struct rectangle *r = s->self;
+    const imp_wide u = imp__wide_gather(h->u, h->at), v = imp__wide_gather(h->v, h->at);
+    const imp_wide sum = u + v;
+    imp_wide_truth before;
+    for (int k = 0; k < IMP_LANES; k++) before[k] = -(int64_t)(h->prim[h->at[k]] == 0);
+    const imp_wide at_u = imp__wide_choose(before, sum, u),
+                   at_v = imp__wide_choose(before, v, sum);
+    out->p = points_at(r, at_u, at_v);
+    out->ng = imp__wide3_of(r->n);
+    out->frame = (imp_wide_frame){imp__wide3_of(r->s), imp__wide3_of(r->t), out->ng};
+    if (!uv) return;
+    out->uv[0] = at_u;
+    out->uv[1] = at_v;
+}
+
+static void sample_toward_lanes(const struct imp_shape *s, const imp_wide3 *ref,
+                                const imp_wide u[2], struct imp_wide_light *out)
+{
+    const struct rectangle *r = s->self;
+    const imp_wide3 n = imp__wide3_of(r->n);
+    imp__lights_from_area(*ref, points_at(r, u[0], u[1]), n, n, imp__wide(r->inv_area),
+                          out);
+}
+
+const struct imp_shape_lanes imp__rectangle_lanes = {
+    .surface = surfaces, .sample_toward = sample_toward_lanes};

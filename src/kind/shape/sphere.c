@@ -5,7 +5,7 @@
 #include "math/quadratic.h"
 #include "math/trig.h"
 #include "math/warp.h"
-#include "shape.h"
+#include "shape_lanes.h"
 
 struct sphere {
     imp_v3 center;
@@ -211,3 +211,36 @@ const struct imp_shape_ops imp__sphere = {.size = sizeof(struct imp_shape_ops),
                                           .sample_area = sample_area,
                                           .place = place,
                                           .move = move};
+
+/* ---- In lanes ---------------------------------------------------------------------------- */
+
+static void surfaces(const struct imp_shape *s, const struct imp_wide_hits *h, bool uv,
+                     struct imp_wide_surface *out)
+{
+    const struct sphere *p = s->self;
+    const imp_wide3 o = imp__wide3_gather(h->o, h->at),
+                    d = imp__wide3_gather(h->d, h->at), center = imp__wide3_of(p->center);
+    const imp_wide3 outward = imp__wide3_unit(imp__wide3_minus(
+        imp__wide3_plus(o, imp__wide3_times(d, imp__wide_gather(h->t, h->at))), center));
+    const imp_wide_frame axes = {imp__wide3_of(p->axes.s), imp__wide3_of(p->axes.t),
+                                 imp__wide3_of(p->axes.n)};
+    const imp_wide3 q = imp__into_wide_frame(&axes, outward);
+    out->p = imp__wide3_plus(center, imp__wide3_times(outward, imp__wide(p->radius)));
+    out->ng = imp__wide3_times(outward, imp__wide(p->side));
+    out->frame.n = out->ng;
+    const imp_wide3 turned =
+        imp__out_of_wide_frame(&axes, (imp_wide3){-q.y, q.x, imp__wide(0)});
+    imp__wide_surface_frame(&out->frame,
+                            imp__wide3_times(turned, imp__wide(IMP_2PI * p->radius)));
+    if (!uv) return;
+    const imp_wide zero = imp__wide(0), one = imp__wide(1);
+    const imp_wide rho = imp__wide_root(q.x * q.x + q.y * q.y);
+    const imp_wide turn = IMP_WIDE_OF(imp__angles)(imp__wide_choose(rho > zero, q.x, one),
+                                                   imp__wide_magnitude(q.y)) *
+                          (1 / IMP_2PI);
+    const imp_wide u = imp__wide_choose(q.y < zero, 1 - turn, turn);
+    out->uv[0] = imp__wide_choose(u < one, u, zero);
+    out->uv[1] = IMP_WIDE_OF(imp__angles)(q.z, rho) * IMP_INV_PI;
+}
+
+const struct imp_shape_lanes imp__sphere_lanes = {.surface = surfaces};

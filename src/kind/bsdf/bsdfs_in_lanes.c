@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Which materials have forms in lanes. */
+#include "bsdf_lanes.h"
+
+extern const struct imp_bsdf_ops imp__diffuse, imp__roughconductor, imp__twosided;
+
+static const struct {
+    const struct imp_bsdf_ops *ops;
+    const struct imp_bsdf_lanes *lanes;
+} list[] = {{&imp__diffuse, &imp__diffuse_lanes},
+            {&imp__roughconductor, &imp__roughconductor_lanes},
+            {&imp__twosided, &imp__twosided_lanes}};
+
+const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b)
+{
+    for (size_t k = 0; k < imp_count(list); k++)
+        if (b->ops == list[k].ops)
+            return !list[k].lanes->covers || list[k].lanes->covers(b) ? list[k].lanes
+                                                                      : NULL;
+    return NULL;
+}

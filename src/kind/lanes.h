@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Kinds in lanes: forms of a kind's functions that work on IMP_LANES points or directions at a
+ * time (math/wide.h). Lane k of a result has the bits that the kind's own function (kinds.h) gives
+ * for lane k of the arguments. Where a lane's result does not count it may be anything.
+ *
+ * A kind without a form in lanes is called point by point. One that has some lists it in the table
+ * of its concept (kind/bsdf/bsdfs_in_lanes.c, ...); tests/unit/bundles.c compares both forms. */
+#ifndef IMP_KIND_LANES_H
+#define IMP_KIND_LANES_H
+
+#include "math/wide.h"
+#include <importon/kinds.h>
+
+/* Colours: r, g, b. */
+struct imp_wide_color {
+    imp_wide c[3];
+};
+static inline struct imp_wide_color imp__wide_color(imp_spec s)
+{
+    return (struct imp_wide_color){{imp__wide(s[0]), imp__wide(s[1]), imp__wide(s[2])}};
+}
+
+/* ---- Shapes ------------------------------------------------------------------------------ */
+
+/* Hits of one shape: rows at[k] of columns. */
+struct imp_wide_hits {
+    double *const *o, *const *d; /* [3] columns: the rays */
+    const double *t, *u, *v;     /* as of struct imp_hit */
+    const int32_t *prim;
+    const int32_t *at; /* [IMP_LANES] */
+};
+struct imp_wide_surface {
+    imp_wide3 p, ng;
+    imp_wide_frame frame; /* shading frame */
+    imp_wide uv[2];
+};
+/* Points of a light as seen from others. */
+struct imp_wide_light {
+    imp_wide3 wi, p;
+    imp_wide pdf, cos_light; /* as of struct imp_light_sample */
+    imp_wide_truth drawn;    /* there is one */
+};
+
+struct imp_shape_lanes {
+    /* imp_shape_ops.surface; uv only if `uv`. */
+    void (*surface)(const struct imp_shape *s, const struct imp_wide_hits *hits, bool uv,
+                    struct imp_wide_surface *out);
+    /* imp_shape_ops.sample_toward, of shapes with an area for which `lights` is true or NULL.
+     * NULL: point by point. */
+    void (*sample_toward)(const struct imp_shape *s, const imp_wide3 *ref,
+                          const imp_wide u[2], struct imp_wide_light *out);
+    bool (*lights)(const struct imp_shape *s);
+};
+/* NULL: this shape has none. */
+const struct imp_shape_lanes *imp__shape_lanes(const struct imp_shape *s);
+
+/* ---- Materials --------------------------------------------------------------------------- */
+
+struct imp_bsdf_lanes {
+    /* This one is covered: its parameters may say it is not. NULL: all are. */
+    bool (*covers)(const struct imp_bsdf *b);
+    /* imp_bsdf_ops.sample, with a smooth lobe; u as there. Where it is true. */
+    imp_wide_truth (*sample)(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                             const imp_wide3 *wo, const imp_wide u[3], imp_wide3 *wi);
+    /* imp_bsdf_ops.pdf_eval of smooth lobes. */
+    imp_wide (*pdf_eval)(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                         const imp_wide3 *wo, const imp_wide3 *wi,
+                         struct imp_wide_color *f);
+};
+/* NULL: this material has none. Those that have one have neither an index ratio nor emission, and
+ * no lobe that is not smooth. */
+const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b);
+
+/* ---- Emitters ---------------------------------------------------------------------------- */
+
+struct imp_emitter_lanes {
+    bool (*covers)(const struct imp_emitter *e); /* NULL: all are */
+    /* imp_emitter_ops.sample. */
+    void (*sample)(const struct imp_emitter *e, const imp_wide3 *ref, const imp_wide u[2],
+                   struct imp_wide_light *out);
+    bool far; /* its points are infinitely far */
+    /* imp_emitter_ops.pdf, where they are; else NULL. */
+    imp_wide (*pdf)(const struct imp_emitter *e, const imp_wide3 *ref,
+                    const imp_wide3 *wi);
+};
+/* NULL: this emitter has none. */
+const struct imp_emitter_lanes *imp__emitter_lanes(const struct imp_emitter *e);
+
+/* ---- Sensors ----------------------------------------------------------------------------- */
+
+struct imp_wide_ray {
+    imp_wide3 o, d;
+    imp_wide near, far; /* as of struct imp_sensor_ray */
+};
+struct imp_sensor_lanes {
+    bool (*covers)(const struct imp_sensor *s); /* NULL: all are */
+    /* imp_sensor_ops.ray, without the numbers of a lens. */
+    void (*ray)(const struct imp_sensor *s, imp_wide px, imp_wide py,
+                struct imp_wide_ray *out);
+};
+/* NULL: this sensor has none. */
+const struct imp_sensor_lanes *imp__sensor_lanes(const struct imp_sensor *s);
+
+#endif
