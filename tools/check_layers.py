@@ -17,7 +17,7 @@ import sys
 # From the ground up.
 ROOMS = "base math color kind scene move search bend elements walk film inverse format render report"
 INSIDE = {
-    "src/walk": "core media graded path lights both moved kept rules run",
+    "src/walk": "core media graded path bundle lights both moved kept rules run",
     "src/inverse": "problem estimate gradient gauss fit plan measure check design rooms luminaires",
     "cli": "text shared bend elements fit plan measure view read design commands",
 }

@@ -150,6 +150,12 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
     return st;
 }
 
+const struct imp_tracer *imp__measure_bundles(const struct imp_measure *m)
+{
+    const bool one = m->integrator && !imp__channels_of(m->scene->integrator);
+    return one ? imp__bundle_use(&m->tracer) : NULL;
+}
+
 void imp__measure_destroy(struct imp_measure *m)
 {
     imp__release(m->scene->ctx, m->names);

@@ -29,6 +29,8 @@ struct imp_measure {
 enum imp_status imp__measure_create(const struct imp_scene *scene,
                                     const struct imp_run *run, struct imp_measure *out);
 void imp__measure_destroy(struct imp_measure *m);
+/* The tracer whose walks can be bundled where a sample is one walk; else NULL. */
+const struct imp_tracer *imp__measure_bundles(const struct imp_measure *m);
 /* Takes the sample (payload: the measure). */
 void imp__measure_sample(const void *measure, struct imp_sample *sample);
 

@@ -6,6 +6,7 @@
 
 #include "base/film.h"
 #include "film_filter.h"
+#include "walk/bundle/bundle.h"
 #include "walk/kept/store.h"
 
 /* A sample of a pixel: which one, and what comes of it. */
@@ -13,6 +14,9 @@ struct imp_sample {
     int x, y;                /* pixel, from the crop's corner */
     int64_t index;           /* number of the sample in its pixel */
     struct imp_arena *arena; /* rewound afterwards */
+    const struct imp_bundle
+        *bundle; /* its walk is number `in_bundle` of it; NULL: of none */
+    int in_bundle;
     /* Set by whoever takes the sample: */
     double *value; /* [n]; 0 if dropped */
     double px, py; /* film position */
@@ -34,6 +38,9 @@ struct imp_picture {
     /* Consecutive samples of a pixel that depend on each other, from the first on: errors
      * come from the spread of such sets. 0: none do. */
     int set;
+    const struct imp_tracer
+        *walks; /* a sample is one walk of it, and walks can be bundled
+                                       (walk/bundle/); NULL: not so */
     bool
         points; /* these sets are sets of points: samples are numbered by imp__set_number,
                     and `first` and `step` are not used */
@@ -61,7 +68,8 @@ static inline int64_t imp__walks_of(const struct imp_run *run,
 static inline void imp__sample_walk(struct imp_sample *s, const struct imp_tracer *tracer,
                                     struct imp_walk *walk)
 {
-    if (imp_likely(!tracer->kept))
+    if (s->bundle) imp__bundle_walk(s->bundle, s->in_bundle, walk);
+    else if (imp_likely(!tracer->kept))
         imp__walk_trace(tracer, s->arena, s->x, s->y, s->index, walk);
     else imp__store_walk_at(tracer, s->arena, s->x, s->y, s->index, walk);
     s->px = walk->px;

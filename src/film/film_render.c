@@ -46,6 +46,7 @@ enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
                                             .sample = imp__measure_sample,
                                             .payload = &measure,
                                             .set = measure.set,
+                                            .walks = imp__measure_bundles(&measure),
                                             .points = imp__tracer_sets(&measure.tracer)};
         st = imp__picture_make(scene->ctx, &picture, &own, out);
     }

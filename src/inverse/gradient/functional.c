@@ -144,10 +144,12 @@ static enum imp_status picture_value(imp_context *ctx, struct imp__functional *f
     const int n = f->channels + box;
     struct imp_estimate value = {0, 0, 0};
     imp_film *film = NULL;
-    f->tracer.active = NULL; /* nothing is differentiated here */
+    f->tracer.active = NULL; /* nothing is differentiated here, and no walk is swept */
+    f->tracer.value_only = true;
     const struct imp_picture picture = {
         .sensor = f->tracer.sensor,
         .stage = "picture",
+        .walks = imp__bundle_use(&f->tracer),
         .names = names[n - 1],
         .n = n,
         .sample = sample_value,

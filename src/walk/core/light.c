@@ -3,6 +3,7 @@
  * Emission: met by chance, and asked for by light samples, each with the weight of the
  * power heuristic (Veach 1997) against the other. */
 #include "drawn.h"
+#include "light_point.h"
 #include "scene/located.h"
 #include "walk/both/both.h"
 
@@ -74,13 +75,6 @@ static int light_choose(const struct imp_step *s, double u, double *pmf)
     return light;
 }
 
-/* Where u, which chose the light, lies in its interval, on [0, 1). */
-static double light_part(const struct imp_scene *scene, int light, double u, double pmf)
-{
-    const double below = light > 0 ? scene->light_cdf[light - 1] : 0;
-    return imp_clamp((u - below) / pmf, 0, 0x1.fffffffffffffp-1);
-}
-
 /* A light and a point on it, for the vertex at `at`; *pmf: probability of the light, or of
  * the triangle that the density in `ls` is that of. -1: none. Of points in sets, the first
  * number chooses the light too: those that a light gets then cover it evenly. */
@@ -111,28 +105,16 @@ static inline int weights_sample(const struct imp_step *s, const struct imp_surf
     const int light =
         light_choose(s, one ? u[0] : imp__step_number(s, IMP_DIM_LIGHT), pmf);
     if (!(*pmf > 0)) return -1;
-    if (one) u[0] = light_part(s->scene, light, u[0], *pmf);
+    if (one) u[0] = imp__light_part(s->scene, light, u[0], *pmf);
     const struct imp_emitter *e = s->scene->emitters[light];
     return e->ops->sample(e, &at->p, u, ls) ? light : -1;
 }
 
-/* The point; none of a light that is infinitely far. */
-static inline imp_v3 point_of(const struct imp_light_sample *ls)
-{
-    return isfinite(ls->dist) ? ls->p : (imp_v3){0};
-}
-
-/* The radiance of a light, from what is decided. That of an even one asks for its side
- * alone. */
+/* noinline: of uneven lights, it would keep registers from the even ones. */
 static __attribute__((noinline)) imp_spec
 uneven_radiance(const struct imp_step *s, int light, const struct imp_light_sample *ls)
 {
-    const imp_v3 there =
-        imp__decide((imp_v3){ls->uv[0], ls->uv[1], ls->dist, ls->cos_light});
-    const struct imp_emission x = {
-        {there[0], there[1]}, there[2], there[3], imp__decide(-ls->wi)};
-    return imp__emitter_radiance(s->scene, light, &x, imp__decide(point_of(ls)),
-                                 s->at.carried);
+    return imp__light_point_radiance(s->scene, s->at.carried, light, ls);
 }
 static inline imp_spec sample_radiance(const struct imp_step *s, int light,
                                        const struct imp_light_sample *ls)
@@ -158,7 +140,7 @@ static inline void record(struct imp_vertex *v, int emitter,
     l->dist = there[2];
     l->cos_light = there[3];
     imp__store_v3(l->d, -ls->wi);
-    imp__store_v3(l->p, point_of(ls));
+    imp__store_v3(l->p, imp__light_place_of(ls));
     imp__store_v3(l->wi, wi);
     l->located = imp__located_drawn(shape, &ls->located, ls->uv);
     v->d.connection = IMP_OCCLUDED; /* until it is seen */

@@ -301,7 +301,9 @@ static inline __attribute__((always_inline)) void imp__walk_clear(struct imp_wal
 void imp__walk_begin(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                      struct imp_walk *walk, double lens[2]);
 
-/* Film position alone of the same walk. */
+/* Its point alone, and its film position alone. */
+void imp__walk_point(const struct imp_tracer *tracer, int x, int y, int64_t sample,
+                     struct imp_point *point);
 void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                         double *px, double *py);
 

@@ -11,19 +11,32 @@
 
 /* Keys use full-film pixels: a crop renders the same samples as the whole picture. The
  * border of wide filters may lie outside the film, hence the offset. */
-static inline void number(const struct imp_tracer *tracer, int x, int y, int64_t sample,
-                          struct imp_walk *walk)
+static inline uint64_t pixel_number(const struct imp_tracer *tracer, int x, int y)
 {
     const struct imp_film_desc *film = &tracer->sensor->film;
     const uint64_t row = (uint64_t)(y + film->crop_y + 0x8000);
-    const uint64_t column = (uint64_t)(x + film->crop_x + 0x8000),
-                   pixel = row << 32 | column;
-    walk->key = imp__key(tracer->seed, pixel, (uint64_t)sample);
-    walk->point.points = tracer->points;
+    return row << 32 | (uint64_t)(x + film->crop_x + 0x8000);
+}
+static inline void point_of(const struct imp_tracer *tracer, uint64_t pixel,
+                            int64_t sample, struct imp_point *point)
+{
+    point->points = tracer->points;
     if (imp_likely(!tracer->points)) return;
     const uint64_t set = (uint64_t)sample / IMP_SET_POINTS | 1ull << 63;
-    walk->point.set = imp__key(tracer->seed, pixel, set).state;
-    walk->point.index = (uint32_t)sample % IMP_SET_POINTS;
+    point->set = imp__key(tracer->seed, pixel, set).state;
+    point->index = (uint32_t)sample % IMP_SET_POINTS;
+}
+static inline void number(const struct imp_tracer *tracer, int x, int y, int64_t sample,
+                          struct imp_walk *walk)
+{
+    const uint64_t pixel = pixel_number(tracer, x, y);
+    walk->key = imp__key(tracer->seed, pixel, (uint64_t)sample);
+    point_of(tracer, pixel, sample, &walk->point);
+}
+void imp__walk_point(const struct imp_tracer *tracer, int x, int y, int64_t sample,
+                     struct imp_point *point)
+{
+    point_of(tracer, pixel_number(tracer, x, y), sample, point);
 }
 
 static inline void position(const struct imp_tracer *tracer, const struct imp_walk *w,

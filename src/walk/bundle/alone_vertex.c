@@ -1,0 +1,179 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A vertex of a bundle by the step of walks that go alone (core/one_step.h): out of the columns,
+ * through the kinds' functions, and back. */
+#include "depth.h"
+#include "walk/path/sensor_end.h"
+#include "walk/path/surface_sensor.h"
+
+/* The connection is seen later, with all shadow rays of the depth. */
+static inline void link_see(struct imp_step *s, struct imp_vertex *v,
+                            const struct imp_surface *at, const struct imp_link *link)
+{
+    (void)at;
+    v->b = link->shadow.brings;
+    ((struct imp_lone *)s)->shadow = link->shadow;
+}
+
+static const struct imp_end_ops bundle_end = {.nothing = imp__sky_meet,
+                                              .arrive = imp__end_arrive,
+                                              .bounces = imp__end_bounces,
+                                              .passes = imp__end_counts,
+                                              .densities = imp__end_densities,
+                                              .meet = imp__end_meet,
+                                              .goes_on = imp__end_goes_on,
+                                              .link_draw = imp__end_link_draw,
+                                              .link_weigh = imp__end_link_weigh,
+                                              .link_see = link_see,
+                                              .direction_draw = imp__direction_begin,
+                                              .scatter = imp__scatter_along};
+
+/* The ray in flight, as it has been for a walk that goes alone. */
+static void take(struct imp_depth *d, int i)
+{
+    const struct imp_flights *f = d->rays;
+    const struct imp_bundle *b = d->bundle;
+    struct imp_step *s = &d->lone->step;
+    struct imp_walk *w = &d->lone->walk;
+    const int walk = f->walk[i];
+    w->first = w->last = NULL;
+    w->n = d->depth + b->before;
+    w->valid = false;
+    w->dropped = IMP_DROP_NONE;
+    w->key.state = w->point.set = b->set[walk]; /* one of the two is used */
+    w->point.index = b->index[walk];
+    w->time = b->time[walk];
+    s->depth = d->depth;
+    s->o = imp__column_v3(f->ray.o, i);
+    s->d = imp__column_v3(f->ray.d, i);
+    s->from = imp__column_v3(f->from, i);
+    s->pdf = f->pdf[i];
+    s->beta = imp__column_v3(f->beta, i);
+    s->eta = f->eta[i];
+    if (imp_unlikely(f->left != NULL)) s->left = f->left[i];
+}
+
+static void give_back(struct imp_depth *d, int walk)
+{
+    const struct imp_walk *w = &d->lone->walk;
+    d->bundle->valid[walk] |= w->valid;
+    if (imp_unlikely(w->dropped != IMP_DROP_NONE))
+        d->bundle->dropped[walk] = (uint8_t)w->dropped;
+}
+
+static void shadow_add(struct imp_shadows *to, const struct imp_shadow *shadow,
+                       double time, int at)
+{
+    const int n = to->ray.n++;
+    imp__column_put(to->ray.o, n, shadow->o);
+    imp__column_put(to->ray.d, n, shadow->d);
+    to->ray.far[n] = shadow->reach;
+    if (to->ray.time) to->ray.time[n] = time;
+    to->at[n] = at;
+}
+
+static void ray_add(struct imp_flights *to, const struct imp_step *s, int walk, int up)
+{
+    const int n = to->ray.n++;
+    imp__column_put(to->ray.o, n, s->o);
+    imp__column_put(to->ray.d, n, s->d);
+    to->ray.far[n] = INFINITY;
+    if (to->ray.time) to->ray.time[n] = s->walk->time;
+    imp__column_put(to->from, n, s->from);
+    to->pdf[n] = s->pdf;
+    imp__column_put(to->beta, n, s->beta);
+    to->eta[n] = s->eta;
+    if (imp_unlikely(to->left != NULL)) to->left[n] = s->left;
+    to->walk[n] = walk;
+    to->up[n] = up;
+}
+
+/* Values, the shadow ray and the next ray of vertex v, at place `at`; NULL: it is dropped. */
+static void vertex_give_back(struct imp_depth *d, const struct imp_vertex *v,
+                             bool goes_on, int walk, int up, int at)
+{
+    const struct imp_step *s = &d->lone->step;
+    const imp_spec none = {0};
+    d->values->up[at] = up;
+    imp__column_put(d->values->e, at, v ? v->e : none);
+    imp__column_put(d->values->b, at, v ? v->b : none);
+    imp__column_put(d->values->w, at, v ? v->w : none);
+    imp__column_put(d->values->beyond, at, none);
+    if (d->lone->shadow.wanted)
+        shadow_add(d->shadows, &d->lone->shadow, s->walk->time, at);
+    if (goes_on) ray_add(d->next, s, walk, at);
+    give_back(d, walk);
+}
+
+void imp__vertex_alone(struct imp_depth *d, int i, int at)
+{
+    struct imp_step *s = &d->lone->step;
+    const int walk = d->rays->walk[i];
+    const struct imp_arena_mark mark = imp__arena_mark(s->arena);
+    struct imp_hit hit = {.shape = d->hits->shape[i],
+                          .prim = d->hits->prim[i],
+                          .t = d->hits->t[i],
+                          .u = d->hits->u[i],
+                          .v = d->hits->v[i],
+                          .place = d->hits->place[i],
+                          .time = d->bundle->time[walk]};
+    struct imp_surface surface;
+    struct imp_frame frame;
+    take(d, i);
+    imp__step_numbers(s);
+    struct imp_vertex *v = imp__surface_meet(s, &hit, &surface, &frame);
+    d->lone->shadow.wanted = false;
+    const bool goes_on = v && imp__vertex_work(&bundle_end, s, v, &hit, &surface, &frame);
+    vertex_give_back(d, v, goes_on, walk, d->rays->up[i], at);
+    imp__arena_rewind(s->arena, mark);
+}
+
+void imp__meet_alone(struct imp_depth *d, const struct imp_hit_columns *hits)
+{
+    struct imp_step *s = &d->lone->step;
+    const struct imp_ray_columns *rays = &d->rays->ray;
+    for (int i = 0; i < rays->n; i++) {
+        struct imp_hit hit;
+        take(d, i);
+        s->t_min = rays->near ? rays->near[i] : 0;
+        s->t_max = rays->far[i];
+        hits->shape[i] = -1;
+        if (imp__straight_meet(s, &hit) == IMP_MEETS_SURFACE) imp__hit_put(hits, i, &hit);
+    }
+    s->t_min = 0;
+    s->t_max = INFINITY;
+}
+
+void imp__meter_vertex(struct imp_depth *d, const struct imp_walk *begun, int walk,
+                       double *weight)
+{
+    struct imp_step *s = &d->lone->step;
+    struct imp_walk *w = &d->lone->walk;
+    const struct imp_arena_mark mark = imp__arena_mark(s->arena);
+    struct imp_surface surface;
+    struct imp_frame frame;
+    *w = *begun;
+    s->o = s->from = w->ray.o;
+    s->d = w->ray.d;
+    s->pdf = 0;
+    s->beta = imp__spec(1);
+    s->eta = 1;
+    s->depth = 0;
+    struct imp_vertex *v = imp__meter_begin(s, &surface, &frame);
+    d->lone->shadow.wanted = false;
+    const bool goes_on = v && imp__vertex_work(&bundle_end, s, v, NULL, &surface, &frame);
+    *weight = w->first ? w->first->w[0] : 0;
+    d->bundle->set[walk] = w->point.points ? w->point.set : w->key.state;
+    vertex_give_back(d, v, goes_on, walk, walk, walk);
+    imp__arena_rewind(s->arena, mark);
+}
+
+void imp__sky_alone(struct imp_depth *d, int i, double *const beyond[3])
+{
+    const struct imp_arena_mark mark = imp__arena_mark(d->lone->step.arena);
+    take(d, i);
+    imp__sky_meet(&d->lone->step);
+    imp__column_put(beyond, d->rays->up[i], imp__walk_fold(&d->lone->walk));
+    give_back(d, d->rays->walk[i]);
+    imp__arena_rewind(d->lone->step.arena, mark);
+}

@@ -1,0 +1,370 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A bundle of walks from its pixels to its radiance: rays of the sensor; segment after segment
+ * hits, vertices and shadow rays; the fold. */
+#include "lanes_light.h"
+#include "scene/ray_columns.h"
+#include "walk/path/first_segment.h"
+#include <string.h>
+
+bool imp__bundle_fits(const struct imp_tracer *t)
+{
+    const struct imp_walk_integrator *w = t->integrator;
+    return t->value_only && !t->active && !t->kept && !t->guide && !t->wavelengths &&
+           !t->mixing && t->split <= 1 && !w->mixes && !w->both &&
+           !(w->hide_emitters && t->sensor->shape) && !w->from_lights && !w->first_hit &&
+           !t->scene->priorities && imp__segment_first(t) == &imp__straight_ops;
+}
+
+/* ---- The beginning ----------------------------------------------------------------------- */
+
+#define TAKE(p) ((p) = imp__arena_take(arena, n + IMP_COLUMN_SLACK, sizeof *(p)))
+
+static bool bundle_create(struct imp_arena *arena, size_t n, struct imp_bundle *b)
+{
+    return TAKE(b->px) && TAKE(b->py) && TAKE(b->time) && TAKE(b->set) &&
+           TAKE(b->index) && TAKE(b->L[0]) && TAKE(b->L[1]) && TAKE(b->L[2]) &&
+           TAKE(b->valid) && TAKE(b->dropped);
+}
+
+/* What walk k has from its ray alone. */
+static inline void ray_put(struct imp_bundle *b, int k, struct imp_flights *rays)
+{
+    rays->pdf[k] = 0;
+    imp__column_put(rays->beta, k, imp__spec(1));
+    rays->eta[k] = 1;
+    rays->walk[k] = rays->up[k] = k;
+    if (rays->left) rays->left[k] = (struct imp_light_place){.faces = false};
+    b->time[k] = b->tracer->sensor->open;
+}
+
+/* One by one. False: rays have a near end. */
+static bool rays_alone(struct imp_bundle *b, const int (*xy)[2], int n_samples,
+                       const int64_t *samples, struct imp_flights *rays)
+{
+    bool begin = true;
+    for (int k = 0; k < b->n; k++) {
+        const int *at = xy[k / n_samples];
+        struct imp_walk walk;
+        double lens[2];
+        imp__walk_begin(b->tracer, at[0], at[1], samples[k % n_samples], &walk, lens);
+        ray_put(b, k, rays);
+        b->px[k] = walk.px;
+        b->py[k] = walk.py;
+        b->time[k] = walk.time;
+        b->set[k] = b->tracer->points ? walk.point.set : walk.key.state;
+        b->index[k] = walk.point.index;
+        imp__column_put(rays->ray.o, k, walk.ray.o);
+        imp__column_put(rays->ray.d, k, walk.ray.d);
+        rays->ray.near[k] = walk.ray.t_near;
+        rays->ray.far[k] = walk.ray.t_far;
+        imp__column_put(rays->from, k, walk.ray.o);
+        begin &= walk.ray.t_near == 0;
+    }
+    return begin;
+}
+
+/* In lanes, of a sensor whose shutter is open for an instant. */
+static bool rays_in_lanes(struct imp_bundle *b, const struct imp_sensor_lanes *lanes,
+                          const int (*xy)[2], int n_samples, const int64_t *samples,
+                          struct imp_flights *rays)
+{
+    const struct imp_tracer *t = b->tracer;
+    const struct imp_film_desc *film = &t->sensor->film;
+    bool begin = true;
+    for (int k = 0; k < b->n; k++) {
+        const int s = k % n_samples, *at = xy[k / n_samples];
+        if (s == 0 || samples[s] / IMP_SET_POINTS != samples[s - 1] / IMP_SET_POINTS) {
+            struct imp_point point;
+            imp__walk_point(t, at[0], at[1], samples[s], &point);
+            b->set[k] = point.set;
+        } else b->set[k] = b->set[k - 1];
+        b->index[k] = (uint32_t)samples[s] % IMP_SET_POINTS;
+        b->px[k] = film->crop_x + at[0];
+        b->py[k] = film->crop_y + at[1];
+        ray_put(b, k, rays);
+    }
+    for (int i = 0; i < b->n; i += IMP_LANES) {
+        int32_t at[IMP_LANES];
+        struct imp_wide_ray r;
+        for (int k = 0; k < IMP_LANES; k++) at[k] = imp_min(i + k, b->n - 1);
+        const struct imp_wide_block block =
+            imp__wide_block(t->points, b->set, b->index, at, 0);
+        const imp_wide px = imp__wide_load(&b->px[i]) +
+                            imp__wide_number(&block, IMP_DIM_PIXEL_X),
+                       py = imp__wide_load(&b->py[i]) +
+                            imp__wide_number(&block, IMP_DIM_PIXEL_Y);
+        lanes->ray(t->sensor, px, py, &r);
+        imp__wide_store(&b->px[i], px);
+        imp__wide_store(&b->py[i], py);
+        imp__wide3_store(rays->ray.o, i, r.o);
+        imp__wide3_store(rays->ray.d, i, r.d);
+        imp__wide3_store(rays->from, i, r.o);
+        imp__wide_store(&rays->ray.near[i], r.near);
+        imp__wide_store(&rays->ray.far[i], r.far);
+        begin &= !(imp__wide_bits(r.near != imp__wide(0)) & imp__bits_first(b->n - i));
+    }
+    return begin;
+}
+
+/* ---- A depth ----------------------------------------------------------------------------- */
+
+/* What hidden lights would have brought. */
+static void unlit(struct imp_bundle_values *values, const struct imp_shadows *shadows,
+                  const bool *hidden)
+{
+    for (int k = 0; k < shadows->ray.n; k++)
+        if (hidden[k]) imp__column_put(values->b, shadows->at[k], (imp_v3){0});
+}
+
+/* Rays by the shape that they meet. */
+struct by_shape {
+    bool lanes, sky; /* vertices may be made, and the sky met, in lanes */
+    int32_t *count;  /* [shapes] 0 between depths */
+    int32_t *shape;  /* [rays] those that are met, in this order */
+    int32_t *order;  /* [rays] rays of the first shape, then of the second, ... */
+    int n;
+};
+
+static bool by_shape_create(const struct imp_tracer *tracer, struct imp_arena *arena,
+                            size_t n, struct by_shape *s)
+{
+    const size_t shapes = (size_t)tracer->scene->n_shapes;
+    s->lanes = imp__lanes_fit(tracer);
+    s->sky = s->lanes && imp__lanes_sky_fits(tracer);
+    s->count = imp__arena_array(arena, shapes, sizeof *s->count);
+    return s->count && TAKE(s->shape) && TAKE(s->order);
+}
+
+/* Sorts the rays that meet something; the sky goes to the others. */
+static void sort(struct imp_depth *d, double *const beyond[3], struct by_shape *s)
+{
+    int missed = 0;
+    s->n = 0;
+    for (int i = 0; i < d->rays->ray.n; i++) {
+        const int shape = d->hits->shape[i];
+        if (shape < 0) s->order[missed++] = i;
+        else if (s->count[shape]++ == 0) s->shape[s->n++] = shape;
+    }
+    if (s->sky) imp__lanes_sky_meet(d, s->order, missed, beyond);
+    else if (d->bundle->tracer->scene->n_environments > 0)
+        for (int k = 0; k < missed; k++) imp__sky_alone(d, s->order[k], beyond);
+    int from = 0;
+    for (int k = 0; k < s->n; k++) {
+        const int n = s->count[s->shape[k]];
+        s->count[s->shape[k]] = from;
+        from += n;
+    }
+    for (int i = 0; i < d->rays->ray.n; i++)
+        if (d->hits->shape[i] >= 0) s->order[s->count[d->hits->shape[i]]++] = i;
+}
+
+/* Fewer vertices on a shape are not worth lanes. */
+enum { FEW = IMP_LANES / 2 };
+
+/* One by one, as they come: shapes of groups have numbers of their own. */
+static void vertices_alone(struct imp_depth *d, double *const beyond[3])
+{
+    const bool sky = d->bundle->tracer->scene->n_environments > 0;
+    d->values->n = 0;
+    for (int i = 0; i < d->rays->ray.n; i++)
+        if (d->hits->shape[i] >= 0) imp__vertex_alone(d, i, d->values->n++);
+        else if (sky) imp__sky_alone(d, i, beyond);
+}
+
+static void vertices(struct imp_depth *d, double *const beyond[3], struct by_shape *s)
+{
+    if (!s->lanes) {
+        vertices_alone(d, beyond);
+        return;
+    }
+    const int max_depth = d->bundle->tracer->integrator->max_depth;
+    const bool last = max_depth >= 0 && d->depth + 1 >= max_depth;
+    struct imp_bin bin;
+    sort(d, beyond, s);
+    d->values->n = 0;
+    for (int k = 0, from = 0; k < s->n; k++) {
+        const int shape = s->shape[k], n = s->count[shape] - from;
+        const int32_t *order = s->order + from;
+        from += n;
+        const bool lanes = d->depth < IMP_WALK_MAX && (last || n >= FEW) &&
+                           imp__shape_bin(d->bundle->tracer, shape, &bin);
+        if (lanes && last) continue; /* nothing is met there, and nothing leaves */
+        if (lanes) imp__vertices_in_lanes(d, &bin, order, n, d->values->n);
+        else
+            for (int i = 0; i < n; i++) imp__vertex_alone(d, order[i], d->values->n + i);
+        d->values->n += n;
+    }
+    for (int k = 0; k < s->n; k++) s->count[s->shape[k]] = 0;
+}
+
+static void fold(const struct imp_bundle_values *v, double *const beyond[3])
+{
+    for (int c = 0; c < 3; c++)
+        for (int i = 0; i < v->n; i++)
+            beyond[c][v->up[i]] = v->e[c][i] + v->w[c][i] * v->beyond[c][i] + v->b[c][i];
+}
+
+/* ---- All --------------------------------------------------------------------------------- */
+
+/* Values of a depth, and those of the one before. */
+struct link {
+    struct imp_bundle_values values;
+    struct link *before;
+};
+static struct link *link_add(struct imp_arena *arena, size_t n, struct link *before)
+{
+    struct link *link = imp__arena_take(arena, 1, sizeof *link);
+    if (!link || !imp__bundle_values_create(arena, n, &link->values)) return NULL;
+    link->before = before;
+    return link;
+}
+
+/* What walks of a bundle work with. */
+struct room {
+    struct imp_flights flights[2];
+    struct imp_hit_columns hits;
+    struct imp_shadows shadows;
+    struct by_shape by_shape;
+    bool *hidden;
+    struct imp_lone lone;
+};
+
+static bool room_create(const struct imp_tracer *tracer, struct imp_arena *arena,
+                        size_t n, struct room *r)
+{
+    const bool left = tracer->integrator->light_tree && tracer->scene->light_tree;
+    const bool instant = !(tracer->sensor->close > tracer->sensor->open);
+    if (!imp__flights_create(arena, n, left, &r->flights[0]) ||
+        !imp__flights_create(arena, n, left, &r->flights[1]) ||
+        !imp__hits_create(arena, n, &r->hits) ||
+        !imp__shadows_create(arena, n, &r->shadows) ||
+        !by_shape_create(tracer, arena, n, &r->by_shape) || !TAKE(r->hidden))
+        return false;
+    if (!instant && (!TAKE(r->flights[0].ray.time) || !TAKE(r->flights[1].ray.time) ||
+                     !TAKE(r->shadows.ray.time)))
+        return false;
+    r->flights[0].ray.instant = r->flights[1].ray.instant = r->shadows.ray.instant =
+        tracer->sensor->open;
+    imp__walk_clear(&r->lone.walk);
+    r->lone.walk.point.points = tracer->points;
+    imp__step_begin(tracer, arena, &r->lone.walk, r->lone.scratch, &r->lone.step);
+    r->lone.step.t_min = 0;
+    r->lone.step.t_max = INFINITY;
+    return true;
+}
+
+/* The lights of the depth's vertices that are hidden. */
+static void see(struct imp_depth *d, struct room *r)
+{
+    imp__occluded_columns(d->bundle->tracer->scene, &r->shadows.ray, r->hidden);
+    unlit(d->values, &r->shadows, r->hidden);
+    r->shadows.ray.n = 0;
+}
+
+/* Walks from a camera: their first rays. False: no memory. */
+static bool camera_begin(struct imp_arena *arena, struct imp_bundle *b,
+                         const int (*xy)[2], int n_samples, const int64_t *samples,
+                         struct imp_flights *rays)
+{
+    const size_t n = (size_t)b->n;
+    const bool instant = !rays->ray.time;
+    const struct imp_sensor_lanes *lanes =
+        instant && b->tracer->points ? imp__sensor_lanes(b->tracer->sensor) : NULL;
+    if (!TAKE(rays->ray.near)) return false;
+    const bool begin = lanes ? rays_in_lanes(b, lanes, xy, n_samples, samples, rays)
+                             : rays_alone(b, xy, n_samples, samples, rays);
+    rays->ray.n = b->n;
+    if (!instant) memcpy(rays->ray.time, b->time, n * sizeof *b->time);
+    if (begin) rays->ray.near = NULL;
+    return true;
+}
+
+/* Walks from a sensor that is a surface: their first vertices, in links of their own. NULL: no
+ * memory. */
+static struct link *meter_begin(struct imp_arena *arena, struct imp_depth *d,
+                                const int (*xy)[2], int n_samples, const int64_t *samples,
+                                struct room *r)
+{
+    struct imp_bundle *b = d->bundle;
+    const size_t n = (size_t)b->n;
+    struct link *sensor = link_add(arena, n, NULL),
+                *first = sensor ? link_add(arena, n, sensor) : NULL;
+    if (!first) return NULL;
+    sensor->values.n = first->values.n = b->n;
+    d->values = &first->values;
+    d->next = &r->flights[0];
+    d->next->ray.n = r->shadows.ray.n = 0;
+    for (int k = 0; k < b->n; k++) {
+        const int *at = xy[k / n_samples];
+        struct imp_walk walk;
+        double lens[2], weight;
+        imp__walk_begin(b->tracer, at[0], at[1], samples[k % n_samples], &walk, lens);
+        b->px[k] = walk.px;
+        b->py[k] = walk.py;
+        b->time[k] = walk.time;
+        b->index[k] = walk.point.index;
+        imp__meter_vertex(d, &walk, k, &weight);
+        imp__column_put(sensor->values.e, k, imp__spec(0));
+        imp__column_put(sensor->values.b, k, imp__spec(0));
+        imp__column_put(sensor->values.w, k, imp__spec(weight));
+        imp__column_put(sensor->values.beyond, k, imp__spec(0));
+        sensor->values.up[k] = k;
+    }
+    see(d, r);
+    return first;
+}
+
+bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
+                       int n_pixels, const int (*xy)[2], int n_samples,
+                       const int64_t *samples, struct imp_bundle *b)
+{
+    const size_t n = (size_t)n_pixels * (size_t)n_samples;
+    struct room r;
+    struct imp_depth d = {
+        .bundle = b, .hits = &r.hits, .shadows = &r.shadows, .lone = &r.lone};
+    struct link *last = NULL;
+    *b = (struct imp_bundle){
+        .tracer = tracer, .n = (int)n, .before = tracer->sensor->shape ? 2 : 0};
+    if (!bundle_create(arena, n, b) || !room_create(tracer, arena, n, &r)) return false;
+    memset(b->valid, 0, n * sizeof *b->valid);
+    memset(b->dropped, 0, n * sizeof *b->dropped);
+    for (int c = 0; c < 3; c++) memset(b->L[c], 0, n * sizeof *b->L[c]);
+    if (!tracer->sensor->shape) {
+        if (!camera_begin(arena, b, xy, n_samples, samples, &r.flights[0])) return false;
+    } else {
+        last = meter_begin(arena, &d, xy, n_samples, samples, &r);
+        if (!last) return false;
+    }
+
+    r.shadows.ray.n = 0;
+    for (d.depth = 0; r.flights[d.depth & 1].ray.n > 0; d.depth++) {
+        d.rays = &r.flights[d.depth & 1];
+        d.next = &r.flights[~d.depth & 1];
+        struct link *here = link_add(arena, (size_t)d.rays->ray.n, last);
+        if (!here) return false;
+        d.values = &here->values;
+        d.next->ray.n = 0;
+        if (d.depth == 0 && tracer->integrator->hide_emitters)
+            imp__meet_alone(&d, &r.hits);
+        else imp__intersect_columns(tracer->scene, &d.rays->ray, &r.hits);
+        vertices(&d, last ? last->values.beyond : b->L, &r.by_shape);
+        see(&d, &r);
+        r.flights[0].ray.near = NULL;
+        last = here;
+    }
+    for (; last; last = last->before)
+        fold(&last->values, last->before ? last->before->values.beyond : b->L);
+    return true;
+}
+
+void imp__bundle_walk(const struct imp_bundle *b, int k, struct imp_walk *walk)
+{
+    imp__walk_clear(walk);
+    walk->px = b->px[k];
+    walk->py = b->py[k];
+    walk->time = b->time[k];
+    walk->valid = b->valid[k];
+    walk->dropped = (enum imp_drop)b->dropped[k];
+    imp__walk_value(b->tracer, walk, (imp_spec){b->L[0][k], b->L[1][k], b->L[2][k], 0});
+}

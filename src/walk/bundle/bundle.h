@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Walks in bundles: those of a few pixels of a picture, of which only the value counts, go
+ * together, one segment at a time. Each has the value that it has alone (walk.h,
+ * imp__walk_trace), to the bit; together they take less time, since kinds whose formulas are
+ * texts in lanes work on several at once.
+ *
+ * A bundle begins in bundle.c. Vertices are made in lanes (lanes_vertex.c) or, where a kind has no
+ * such text, one by one by the step of walks that go alone (alone_vertex.c). */
+#ifndef IMP_WALK_BUNDLE_H
+#define IMP_WALK_BUNDLE_H
+
+#include "walk/core/walk.h"
+
+/* The walks of such a tracer can be bundled. */
+bool imp__bundle_fits(const struct imp_tracer *tracer);
+/* The tracer if its walks can be bundled, and take less time so: where a register holds two
+ * doubles they take more. Else NULL. */
+static inline const struct imp_tracer *imp__bundle_use(const struct imp_tracer *tracer)
+{
+#if defined(__AVX2__)
+    return imp__bundle_fits(tracer) ? tracer : NULL;
+#else
+    (void)tracer;
+    return NULL;
+#endif
+}
+
+struct imp_bundle {
+    const struct imp_tracer *tracer;
+    int n;
+    int before; /* vertices before the first one that a ray leads to */
+    /* Of each walk: film position, time, its random numbers. */
+    double *px, *py, *time;
+    uint64_t *set; /* hash of the set, or the key of a walk of no set */
+    uint32_t *index;
+    /* Results: radiance at the sensor; is alpha 1; why it was dropped (enum imp_drop). */
+    double *L[3];
+    bool *valid;
+    uint8_t *dropped;
+};
+
+/* The walks with the given numbers [n_samples] of each of the pixels xy [n_pixels], pixel by pixel.
+ * *out lives as long as what is in the arena. False: no memory. */
+bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
+                       int n_pixels, const int (*xy)[2], int n_samples,
+                       const int64_t *samples, struct imp_bundle *out);
+
+/* Walk k of a bundle, with its values at the sensor. */
+void imp__bundle_walk(const struct imp_bundle *bundle, int k, struct imp_walk *walk);
+
+#endif

@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Walks of a bundle in columns: what one walk has in a struct lies here in a row of numbers for
+ * all of them, so that several are worked on at a time (math/lane_text.h). A segment takes rays to
+ * hits, a vertex takes hits to values, shadow rays and the rays that go on. Columns begin at
+ * multiples of 32 bytes, and IMP_COLUMN_SLACK more numbers than are used may be written. */
+#ifndef IMP_WALK_BUNDLE_COLUMNS_H
+#define IMP_WALK_BUNDLE_COLUMNS_H
+
+#include "base/arena.h"
+#include "scene/light_tree.h"
+#include "scene/ray_columns.h"
+#include <stdint.h>
+
+/* Rays in flight, with all that a walk under way is made of. */
+struct imp_flights {
+    struct imp_ray_columns ray;
+    double *from[3]; /* where it left, for densities of lights */
+    double
+        *pdf; /* of its direction per steradian; 0: the sensor or a delta lobe chose it */
+    double *beta[3]; /* throughput, for roulette */
+    double *eta;     /* product of index ratios */
+    struct imp_light_place
+        *left;     /* where it left, as the tree of lights sees it; NULL: none */
+    int32_t *walk; /* number of the walk */
+    int32_t *up;   /* place of the last vertex among the values of its depth */
+};
+
+/* Values of the vertices of a depth (walk.h: E, B, w), and what comes from beyond. */
+struct imp_bundle_values {
+    int n;
+    double *e[3], *b[3], *w[3], *beyond[3];
+    int32_t *up; /* place of the vertex before; of the first vertex, the walk's number */
+};
+
+/* Shadow rays, and the vertices whose B they decide. */
+struct imp_shadows {
+    struct imp_ray_columns ray;
+    int32_t *at;
+};
+
+/* Room for n of them, with `left` if asked for. False: no memory. */
+bool imp__flights_create(struct imp_arena *arena, size_t n, bool left,
+                         struct imp_flights *out);
+bool imp__hits_create(struct imp_arena *arena, size_t n, struct imp_hit_columns *out);
+bool imp__bundle_values_create(struct imp_arena *arena, size_t n,
+                               struct imp_bundle_values *out);
+bool imp__shadows_create(struct imp_arena *arena, size_t n, struct imp_shadows *out);
+
+static inline imp_v3 imp__column_v3(double *const c[3], int i)
+{
+    return imp__v3(c[0][i], c[1][i], c[2][i]);
+}
+static inline void imp__column_put(double *const c[3], int i, imp_v3 v)
+{
+    for (int k = 0; k < 3; k++) c[k][i] = v[k];
+}
+
+#endif

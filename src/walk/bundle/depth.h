@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What the vertices of a depth of a bundle take, and what they make. */
+#ifndef IMP_WALK_BUNDLE_DEPTH_H
+#define IMP_WALK_BUNDLE_DEPTH_H
+
+#include "bundle.h"
+#include "columns.h"
+#include "kind/lanes.h"
+#include "walk/core/step.h"
+
+/* The step that makes vertices one by one, and the shadow ray that it leaves. */
+struct imp_lone {
+    struct imp_step step; /* first */
+    struct imp_walk walk;
+    struct imp_shadow shadow;
+    imp_spec scratch[IMP_INPUTS_MAX];
+};
+
+struct imp_depth {
+    struct imp_bundle *bundle;
+    int depth;
+    const struct imp_flights *rays; /* that lead there */
+    const struct imp_hit_columns *hits;
+    struct imp_bundle_values *values; /* of the vertices, at their places */
+    struct imp_shadows *shadows;      /* appended */
+    struct imp_flights *next;         /* likewise */
+    struct imp_lone *lone;
+};
+
+/* The vertex that ray i leads to, at place `at` among the values (alone_vertex.c); and the sky,
+ * whose value goes to the vertex before. */
+void imp__vertex_alone(struct imp_depth *d, int i, int at);
+void imp__sky_alone(struct imp_depth *d, int i, double *const beyond[3]);
+/* What the rays meet by the step's own search, which passes lights that are hidden from the
+ * camera. */
+void imp__meet_alone(struct imp_depth *d, const struct imp_hit_columns *hits);
+/* The first vertex of a walk from a sensor that is a surface, `begun` (walk.h): number `walk`, at
+ * that place; weight: of the step to it. */
+void imp__meter_vertex(struct imp_depth *d, const struct imp_walk *begun, int walk,
+                       double *weight);
+
+/* Vertices on one shape, of a material with a form in lanes (lanes_vertex.c). */
+struct imp_bin {
+    const struct imp_shape *shape;
+    const struct imp_bsdf *bsdf;
+    const struct imp_shape_lanes *surface; /* NULL: point by point */
+    const struct imp_bsdf_lanes *kernel;
+    bool plain; /* its inputs are the constants `in` */
+    struct imp_wide_color in[IMP_INPUTS_MAX];
+};
+/* Walks of this tracer may have vertices in lanes. */
+bool imp__lanes_fit(const struct imp_tracer *tracer);
+/* False: vertices on this shape are made one by one. */
+bool imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *bin);
+/* The vertices of the rays order[n], whose next ones are not the last of their walks, at places
+ * `at` and on. */
+void imp__vertices_in_lanes(struct imp_depth *d, const struct imp_bin *bin,
+                            const int32_t *order, int n, int at);
+
+#endif

@@ -1,0 +1,194 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Light samples in lanes (core/light.c, of walks alone). */
+#include "lanes_light.h"
+#include "walk/core/emitted.h"
+#include "walk/core/light_point.h"
+
+static void truth_set(imp_wide_truth *m, int k, bool value) { (*m)[k] = -(int64_t)value; }
+
+/* The points of one light for the lanes with bits. */
+static void draw_lanes(const struct imp_emitter *e, const struct imp_emitter_lanes *lanes,
+                       const imp_wide3 *ref, const imp_wide u[2], imp_wide_truth here,
+                       struct imp_lanes_light *out)
+{
+    const imp_wide zero = imp__wide(0);
+    struct imp_wide_light own;
+    lanes->sample(e, ref, u, &own);
+    const imp_wide_truth lit = imp__wide_decide(own.cos_light) > zero;
+    own.drawn &= own.pdf > zero;
+    if (e->ops->flags & IMP_EMITTER_AREA) own.drawn &= own.cos_light > zero;
+    out->at.wi = imp__wide3_choose(here, own.wi, out->at.wi);
+    out->at.p = imp__wide3_choose(here, own.p, out->at.p);
+    out->at.pdf = imp__wide_choose(here, own.pdf, out->at.pdf);
+    out->at.drawn = (out->at.drawn & ~here) | (own.drawn & here);
+    const struct imp_wide_color le = imp__wide_color(e->input[0]->value);
+    for (int c = 0; c < 3; c++)
+        out->radiance.c[c] = imp__wide_choose(here, imp__wide_choose(lit, le.c[c], zero),
+                                              out->radiance.c[c]);
+    if (lanes->far) out->far |= here;
+    else out->far &= ~here;
+    out->delta &= ~here;
+}
+
+/* Point ls of a light, for lane k. */
+static void lane_put(const struct imp_scene *scene, int light, bool drawn,
+                     const struct imp_light_sample *ls, int k,
+                     struct imp_lanes_light *out)
+{
+    const struct imp_emitter *e = scene->emitters[light];
+    drawn = drawn && ls->pdf > 0 &&
+            !((e->ops->flags & IMP_EMITTER_AREA) && !(ls->cos_light > 0));
+    truth_set(&out->at.drawn, k, drawn);
+    if (!drawn) return;
+    const imp_spec le = imp__light_point_radiance(scene, NULL, light, ls);
+    imp__wide3_set(&out->at.wi, k, ls->wi);
+    imp__wide3_set(&out->at.p, k, ls->p);
+    out->at.pdf[k] = ls->pdf;
+    for (int c = 0; c < 3; c++) out->radiance.c[c][k] = le[c];
+    truth_set(&out->far, k, !isfinite(ls->dist));
+    truth_set(&out->delta, k, (e->ops->flags & IMP_EMITTER_DELTA) != 0);
+}
+
+static void draw_alone(const struct imp_scene *scene, int light, const imp_wide3 *ref,
+                       const imp_wide u[2], int k, struct imp_lanes_light *out)
+{
+    const struct imp_emitter *e = scene->emitters[light];
+    const imp_v3 p = imp__wide3_lane(ref, k);
+    struct imp_light_sample ls = {.located = {.prim = -1}};
+    const bool drawn = e->ops->sample(e, &p, (double[2]){u[0][k], u[1][k]}, &ls);
+    lane_put(scene, light, drawn, &ls, k, out);
+}
+
+void imp__lanes_tree_draw(const struct imp_scene *scene,
+                          const struct imp_light_place place[], const imp_wide u_drawn[2],
+                          imp_wide which, bool one, unsigned bits,
+                          struct imp_lanes_light *out)
+{
+    out->at.drawn = out->far = out->delta = (imp_wide_truth){0};
+    for (; bits; bits &= bits - 1) {
+        const int k = __builtin_ctz(bits);
+        double u[2] = {u_drawn[0][k], u_drawn[1][k]}, by = which[k], pmf = 0;
+        struct imp_light_sample ls = {.located = {.prim = -1}};
+        int prim;
+        const int light =
+            imp__light_tree_choose(scene->light_tree, &place[k], &by, &prim, &pmf);
+        if (light < 0) continue;
+        if (one) u[0] = by;
+        out->pmf[k] = pmf;
+        const struct imp_emitter *e = scene->emitters[light];
+        const bool drawn = prim >= 0 ? e->shape->ops->sample_triangle(e->shape, prim,
+                                                                      &place[k].p, u, &ls)
+                                     : e->ops->sample(e, &place[k].p, u, &ls);
+        lane_put(scene, light, drawn, &ls, k, out);
+    }
+}
+
+/* A form in lanes that serves: even radiance has no inputs to look up. */
+static const struct imp_emitter_lanes *lanes_of(const struct imp_emitter *e)
+{
+    return imp__emitter_even(e, NULL) ? imp__emitter_lanes(e) : NULL;
+}
+
+void imp__lanes_light_draw(const struct imp_scene *scene, const imp_wide3 *ref,
+                           const imp_wide u_drawn[2], imp_wide which, bool one,
+                           unsigned bits, struct imp_lanes_light *out)
+{
+    imp_wide u[2] = {u_drawn[0], u_drawn[1]};
+    const imp_wide_truth all = ~(imp_wide_truth){0};
+    int light[IMP_LANES] = {0};
+    out->at.drawn = out->far = out->delta = (imp_wide_truth){0};
+    if (scene->n_emitters == 1) {
+        const struct imp_emitter_lanes *lanes = lanes_of(scene->emitters[0]);
+        out->pmf = imp__wide(scene->light_cdf[0]);
+        if (!(scene->light_cdf[0] > 0)) return;
+        if (lanes) {
+            draw_lanes(scene->emitters[0], lanes, ref, u, all, out);
+            return;
+        }
+    } else {
+        for (int k = 0; k < IMP_LANES; k++) {
+            double pmf;
+            light[k] = imp__light_pick(scene, which[k], &pmf);
+            out->pmf[k] = pmf;
+            if (one) u[0][k] = imp__light_part(scene, light[k], which[k], pmf);
+        }
+    }
+    while (bits) {
+        const int one = light[__builtin_ctz(bits)];
+        const struct imp_emitter_lanes *lanes = lanes_of(scene->emitters[one]);
+        unsigned same = 0;
+        imp_wide_truth here = {0};
+        for (unsigned left = bits; left; left &= left - 1) {
+            const int k = __builtin_ctz(left);
+            if (light[k] != one) continue;
+            same |= 1u << k;
+            truth_set(&here, k, true);
+        }
+        bits &= ~same;
+        if (lanes && (same & (same - 1))) {
+            draw_lanes(scene->emitters[one], lanes, ref, u, here, out);
+            continue;
+        }
+        for (; same; same &= same - 1) {
+            const int k = __builtin_ctz(same);
+            if (out->pmf[k] > 0) draw_alone(scene, one, ref, u, k, out);
+        }
+    }
+}
+
+/* ---- The sky that is met ----------------------------------------------------------------- */
+
+bool imp__lanes_sky_fits(const struct imp_tracer *tracer)
+{
+    const struct imp_scene *scene = tracer->scene;
+    if (scene->n_environments != 1 || tracer->integrator->hide_emitters ||
+        (tracer->integrator->light_tree && scene->light_tree))
+        return false;
+    const struct imp_emitter_lanes *lanes =
+        lanes_of(scene->emitters[scene->environments[0]]);
+    return lanes && lanes->pdf;
+}
+
+static imp_wide power_heuristic(imp_wide a, imp_wide b)
+{
+    const imp_wide a2 = a * a, b2 = b * b;
+    return imp__wide_choose(a2 > imp__wide(0), a2 / (a2 + b2), imp__wide(0));
+}
+
+static inline void sky_work(struct imp_depth *d, const int32_t *order, int n,
+                            double *const beyond[3])
+{
+    const struct imp_tracer *t = d->bundle->tracer;
+    const int light = t->scene->environments[0];
+    const struct imp_emitter *e = t->scene->emitters[light];
+    const imp_wide3 from = imp__wide3_gather(d->rays->from, order),
+                    wi = imp__wide3_gather(d->rays->ray.d, order);
+    const imp_wide pdf = imp__wide_gather(d->rays->pdf, order), one = imp__wide(1);
+    const double chance =
+        t->scene->light_cdf[light] - (light ? t->scene->light_cdf[light - 1] : 0);
+    imp_wide weight = one;
+    if (t->integrator->lights)
+        weight = imp__wide_choose(pdf > imp__wide(0),
+                                  imp__wide_decide(power_heuristic(
+                                      pdf, chance * lanes_of(e)->pdf(e, &from, &wi))),
+                                  one);
+    for (int c = 0; c < 3; c++) {
+        const imp_wide met = e->input[0]->value[c] * weight;
+        for (int k = 0; k < n; k++) beyond[c][d->rays->up[order[k]]] = met[k];
+    }
+    for (int k = 0; k < n; k++) d->bundle->valid[d->rays->walk[order[k]]] = true;
+}
+
+void imp__lanes_sky_meet(struct imp_depth *d, const int32_t *order, int n,
+                         double *const beyond[3])
+{
+    const int max_depth = d->bundle->tracer->integrator->max_depth;
+    if (max_depth >= 0 && d->depth >= max_depth) return;
+    for (int i = 0; i < n; i += IMP_LANES) {
+        int32_t rest[IMP_LANES];
+        const int left = imp_min(n - i, IMP_LANES);
+        for (int k = 0; k < IMP_LANES; k++) rest[k] = order[i + (k < left ? k : 0)];
+        sky_work(d, rest, left, beyond);
+    }
+}

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Points of lights for vertices in lanes. */
+#ifndef IMP_WALK_BUNDLE_LANES_LIGHT_H
+#define IMP_WALK_BUNDLE_LANES_LIGHT_H
+
+#include "depth.h"
+#include "kind/lanes.h"
+
+/* Points of lights, and what they send. */
+struct imp_lanes_light {
+    struct imp_wide_light at;
+    imp_wide pmf;
+    struct imp_wide_color radiance;
+    imp_wide_truth far, delta; /* infinitely far; met by no direction */
+};
+
+/* What imp__light_point (core/drawn.h) draws for vertices at ref with the numbers u, in the lanes
+ * with bits; at.drawn: there is a light, which shows its front. `which` chooses the light; one: it
+ * is u[0], of which the part that is left draws the point. */
+void imp__lanes_light_draw(const struct imp_scene *scene, const imp_wide3 *ref,
+                           const imp_wide u[2], imp_wide which, bool one, unsigned bits,
+                           struct imp_lanes_light *out);
+
+/* The same where lights are chosen by the scene's tree: vertices at place [IMP_LANES]. */
+void imp__lanes_tree_draw(const struct imp_scene *scene,
+                          const struct imp_light_place place[], const imp_wide u[2],
+                          imp_wide which, bool one, unsigned bits,
+                          struct imp_lanes_light *out);
+
+/* Can the sky be met in lanes? It is one emitter, with a form in lanes, chosen by its weight, and seen
+ * by the camera. */
+bool imp__lanes_sky_fits(const struct imp_tracer *tracer);
+/* What the rays order[n] meet, which leave the scene: the values go to the vertices before. */
+void imp__lanes_sky_meet(struct imp_depth *d, const int32_t *order, int n,
+                         double *const beyond[3]);
+
+#endif
