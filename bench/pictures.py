@@ -1,0 +1,118 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Processor time of pictures by several versions of the program.
+
+    bench/pictures.py [--rounds N] [--spp N] IMPORTON OTHER...
+
+One thread, rounds interleaved; the pictures of all programs must have the same bytes. Scenes: the
+Cornell box, `textured`, and an open scene, which is `textured` with two meshes of 8,064 triangles
+with interpolated normals, one of rough gold and one diffuse; kinds whose formulas are not in lanes
+(glass and plastic); the office, read by its meters.
+"""
+import argparse
+import math
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+
+SCENES = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', 'scenes')
+
+
+def ball(path, phase, centre, radius, n=64):
+    """A sphere with waves, as an OBJ file."""
+    def point(i, j):
+        theta, phi = math.pi * i / n, 2 * math.pi * (j % n) / n
+        r = radius * (1 + .05 * math.sin(5 * theta + phase) * math.sin(6 * phi))
+        return (centre[0] + r * math.sin(theta) * math.cos(phi), centre[1] + r * math.cos(theta),
+                centre[2] + r * math.sin(theta) * math.sin(phi))
+
+    def number(i, j):
+        return 1 if i == 0 else 2 + n * (n - 1) if i == n else 2 + (i - 1) * n + j % n
+    with open(path, 'w') as f:
+        for v in [point(0, 0)] + [point(i, j) for i in range(1, n) for j in range(n)] + [point(n, 0)]:
+            f.write('v %.7g %.7g %.7g\n' % v)
+        for i in range(n):
+            for j in range(n):
+                a, b, c, d = number(i, j), number(i, j + 1), number(i + 1, j), number(i + 1, j + 1)
+                if i > 0:
+                    f.write('f %d %d %d\n' % (a, b, c))
+                if i + 1 < n:
+                    f.write('f %d %d %d\n' % (b, d, c))
+
+
+def open_scene(folder):
+    ball(folder + '/gold.obj', 1, (-1.3, .75, .2), .7)
+    ball(folder + '/clay.obj', 2, (1.6, .6, -.6), .55)
+    with open(os.path.join(SCENES, 'textured.xml')) as f:
+        text = f.read().replace('textured/', os.path.join(os.path.abspath(SCENES), 'textured/'))
+    extra = '''<shape type="obj"><string name="filename" value="gold.obj"/><bsdf type="roughconductor">
+<string name="material" value="Au"/><string name="distribution" value="ggx"/>
+<float name="alpha" value="0.3"/></bsdf></shape>
+<shape type="obj"><string name="filename" value="clay.obj"/><bsdf type="diffuse">
+<rgb name="reflectance" value="0.6,0.3,0.2"/></bsdf></shape></scene>'''
+    path = folder + '/open.xml'
+    with open(path, 'w') as f:
+        f.write(text.replace('</scene>', extra))
+    return path
+
+
+def glass_scene(folder):
+    path = folder + '/glass.xml'
+    with open(os.path.join(SCENES, 'textured.xml')) as f:
+        text = f.read().replace('textured/', os.path.join(os.path.abspath(SCENES), 'textured/'))
+    extra = ''.join('<shape type="sphere"><point name="center" x="%g" y=".4" z=".6"/>'
+                    '<float name="radius" value=".4"/><bsdf type="%s"/></shape>' % (x, kind)
+                    for x, kind in ((-1.2, 'dielectric'), (0, 'plastic'), (1.2, 'roughdielectric')))
+    with open(path, 'w') as f:
+        f.write(text.replace('</scene>', extra + '</scene>'))
+    return path
+
+
+def seconds(command):
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode:
+        sys.exit(done.stderr)
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+
+
+def main():
+    args = argparse.ArgumentParser(description=__doc__.split('\n')[0])
+    args.add_argument('--rounds', type=int, default=5)
+    args.add_argument('--spp', type=int, default=64)
+    args.add_argument('program', nargs='+')
+    args = args.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        picture = ['-o', folder + '/picture.pfm', '--no-preview']
+        cornell = os.path.join(SCENES, 'cornell.xml')
+        jobs = {
+            'Cornell box': ['render', cornell, '-D', 'res=128', *picture],
+            'textured': ['render', os.path.join(SCENES, 'textured.xml'), *picture],
+            'open scene': ['render', open_scene(folder), *picture],
+            'glass and plastic': ['render', glass_scene(folder), *picture],
+            'gradient, Cornell box': ['gradient', cornell, '-D', 'res=64', '--json'],
+            'office, read': ['read', os.path.join(SCENES, 'office.xml'), '-m', 'mono', '--json'],
+        }
+        print('%-22s %s' % ('', '  '.join('%-24s' % p[-24:] for p in args.program)))
+        for name, job in jobs.items():
+            time = {p: [] for p in args.program}
+            bytes_of = {}
+            for _ in range(args.rounds):
+                for p in args.program:
+                    time[p].append(seconds([p, *job, '--spp', str(args.spp), '-t', '1', '-q']))
+                    if 'render' in job:
+                        with open(folder + '/picture.pfm', 'rb') as f:
+                            bytes_of[p] = f.read()
+            if len(set(bytes_of.values())) > 1:
+                sys.exit(name + ': the pictures differ')
+            first = time[args.program[0]]
+            print('%-22s %s' % (name, '  '.join('%.3f s, %.2f (%.2f)   ' % (
+                min(time[p]), min(time[p]) / min(first), statistics.median(time[p]) / statistics.median(first))
+                for p in args.program)), flush=True)
+
+
+if __name__ == '__main__':
+    main()

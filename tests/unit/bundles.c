@@ -1,0 +1,315 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Walks in bundles (walk/bundle/) beside the same walks alone: radiance, film position, alpha and
+ * the cause of a drop, to the bit, of scenes whose vertices are made in lanes and of others. */
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include "walk/bundle/depth.h"
+#include <stdio.h>
+#include <unistd.h>
+
+enum { SIDE = 6, SAMPLES = 21 }; /* neither is a multiple of lanes */
+
+static imp_context *ctx;
+
+/* ---- Scenes ------------------------------------------------------------------------------ */
+
+#define PATH(rest) "<integrator type='path'>" rest "</integrator>"
+#define DEPTH(n)   "<integer name='max_depth' value='" n "'/>"
+#define RR(n)      "<integer name='rr_depth' value='" n "'/>"
+#define VIEW                                                                             \
+    "<transform name='to_world'><lookat origin='0.3,0.2,3.4' target='0,0,0' "            \
+    "up='0,1,0'/></transform><float name='fov' value='55'/>"
+#define CAMERA "perspective'>" VIEW
+
+#define AT(x, y, z, axis, angle, size)                                                   \
+    "<transform name='to_world'><scale value='" size "'/><rotate " axis                  \
+    "='1' angle='" angle "'/><translate x='" x "' y='" y "' z='" z "'/></transform>"
+#define DIFFUSE(rgb)                                                                     \
+    "<bsdf type='diffuse'><rgb name='reflectance' value='" rgb "'/></bsdf>"
+#define WALL(x, y, z, axis, angle, bsdf)                                                 \
+    "<shape type='rectangle'>" AT(x, y, z, axis, angle, "2") bsdf "</shape>"
+#define ROOM                                                                             \
+    WALL("0", "-2", "0", "x", "-90", DIFFUSE(".7,.6,.5"))                                \
+    WALL("0", "2", "0", "x", "90", DIFFUSE(".6,.7,.8"))                                  \
+    WALL("-2", "0", "0", "y", "90", DIFFUSE(".8,.1,.1"))                                 \
+    WALL("2", "0", "0", "y", "-90", DIFFUSE(".1,.8,.2"))                                 \
+    WALL("0", "0", "-2", "y", "0", DIFFUSE(".5,.5,.5"))
+#define AREA(rgb) "<emitter type='area'><rgb name='radiance' value='" rgb "'/></emitter>"
+#define LAMP(x, z, size)                                                                 \
+    "<shape type='rectangle'>" AT(x, "1.9", z, "x", "90", size) AREA("9,8,7") "</shape>"
+#define GOLD(more)                                                                       \
+    "<bsdf type='roughconductor'><string name='material' value='Au'/><string "           \
+    "name='distribution' value='ggx'/>" more "</bsdf>"
+#define ALPHA(name, v) "<float name='" name "' value='" v "'/>"
+#define BALL(x, y, bsdf)                                                                 \
+    "<shape type='sphere'><point name='center' x='" x "' y='" y                          \
+    "' z='0'/><float name='radius' value='.5'/>" bsdf "</shape>"
+#define CUBE(x, y, bsdf)                                                                 \
+    "<shape type='cube'>" AT(x, y, ".3", "y", "30", ".4") bsdf "</shape>"
+#define CHECKERS                                                                         \
+    "<bsdf type='diffuse'><texture type='checkerboard' name='reflectance'><transform "   \
+    "name='to_uv'><scale value='7'/></transform></texture></bsdf>"
+#define SKY "<emitter type='constant'><rgb name='radiance' value='.6,.8,1'/></emitter>"
+
+/* What a meter lies on. */
+#define WITHIN "<shape type='rectangle'>" AT("0", "-1", "0", "x", "-90", ".5")
+
+static bool same(double a, double b)
+{
+    return memcmp(&a, &b, sizeof a) == 0 || (isnan(a) && isnan(b));
+}
+
+/* lanes: so many shapes have vertices in lanes. */
+static void compare(const char *name, enum imp_color_mode mode, int lanes,
+                    const char *integrator, const char *sensor, const char *rest)
+{
+    static char xml[16384];
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'>%s%s<sensor type='%s<film type='hdrfilm'><integer "
+             "name='width' value='6'/><integer name='height' value='6'/><rfilter "
+             "type='box'/></film></sensor>%s</scene>",
+             integrator, strstr(sensor, "meter") ? WITHIN : "", sensor,
+             strstr(sensor, "meter") ? "</shape>" ROOM LAMP("0", "0", ".5") : rest);
+    imp_scene *scene = test_scene_text(ctx, xml, mode);
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_tracer tracer = {.scene = scene,
+                                .integrator = imp__walk_integrator(scene),
+                                .sensor = scene->sensors[0],
+                                .value_only = true,
+                                .seed = 5};
+    if (strstr(name, "independent")) run.points = IMP_POINTS_INDEPENDENT;
+    imp__tracer_numbers(&tracer, &run, SAMPLES);
+    struct imp_arena arena, alone;
+    imp__arena_init(&arena, ctx);
+    imp__arena_init(&alone, ctx);
+    int xy[SIDE * SIDE][2], wrong = 0, lit = 0, binned = 0;
+    int64_t samples[SAMPLES];
+    for (int p = 0; p < SIDE * SIDE; p++) xy[p][0] = p % SIDE, xy[p][1] = p / SIDE;
+    for (int k = 0; k < SAMPLES; k++) samples[k] = imp__set_number(4, SAMPLES, k);
+    struct imp_bundle b;
+    struct imp_bin bin;
+    const bool fits = imp__bundle_fits(&tracer);
+    for (int k = 0; k < scene->n_shapes; k++)
+        binned += imp__lanes_fit(&tracer) && imp__shape_bin(&tracer, k, &bin);
+    if (fits && imp__bundle_trace(&tracer, &arena, SIDE * SIDE, (const int(*)[2])xy,
+                                  SAMPLES, samples, &b))
+        for (int k = 0; k < b.n; k++) {
+            struct imp_walk one, other;
+            const int *at = xy[k / SAMPLES];
+            imp__walk_trace(&tracer, &alone, at[0], at[1], samples[k % SAMPLES], &one);
+            imp__bundle_walk(&b, k, &other);
+            wrong += !same(one.px, other.px) || !same(one.py, other.py) ||
+                     one.valid != other.valid || one.dropped != other.dropped ||
+                     !same(one.time, other.time);
+            for (int c = 0; c < 3; c++) wrong += !same(one.L[c], other.L[c]);
+            lit += one.L[0] > 0;
+            imp__arena_rewind(&alone, (struct imp_arena_mark){0});
+        }
+    tap_ok(fits && wrong == 0 && lit > SIDE * SIDE / 2 && binned == lanes,
+           "%s: of %d walks, %d lit, %d differ; %d shapes in lanes, %d expected", name,
+           SIDE * SIDE * SAMPLES, lit, wrong, binned, lanes);
+    imp__arena_free(&arena);
+    imp__arena_free(&alone);
+    imp_scene_destroy(scene);
+}
+
+static void boxes(void)
+{
+    static const char *const depths[] = {"1", "2", "3", "12", "-1"};
+    compare("a room", IMP_RGB, 7, PATH(""), CAMERA,
+            ROOM LAMP("0", "0", ".5") CUBE("-.6", "-1.2", DIFFUSE(".9,.9,.9"))
+                BALL("-.7", ".4", GOLD(ALPHA("alpha", ".3"))));
+    compare("independent walks", IMP_RGB, 7, PATH(""), CAMERA,
+            ROOM SKY LAMP("0", "0", ".5") CUBE("-.6", "-1.2", DIFFUSE(".9,.9,.9"))
+                BALL("-.7", ".4", GOLD(ALPHA("alpha", ".3"))));
+    compare("in grey", IMP_MONO, 6, PATH(""), CAMERA,
+            ROOM LAMP("0", "0", ".5") CUBE("-.6", "-1.2", DIFFUSE(".9,.9,.9")));
+    for (size_t k = 0; k < imp_count(depths); k++) {
+        char integrator[256], name[64];
+        snprintf(integrator, sizeof integrator,
+                 "<integrator type='path'><integer name='max_depth' value='%s'/>" RR(
+                     "2") "</integrator>",
+                 depths[k]);
+        snprintf(name, sizeof name, "a room, depth %s", depths[k]);
+        compare(name, IMP_RGB, 6, integrator, CAMERA,
+                ROOM SKY LAMP("0", "0", "1.2") CUBE("-.6", "-1.2", DIFFUSE(".9,.2,0")));
+    }
+}
+
+static void materials(void)
+{
+    compare("rough gold, from both sides", IMP_RGB, 5, PATH(DEPTH("6")), CAMERA,
+            SKY LAMP("0", "0", ".6")
+                CUBE(".7", "-.6", GOLD(ALPHA("alpha_u", ".05") ALPHA("alpha_v", ".4")))
+                    BALL("-.7", ".4",
+                         "<bsdf type='twosided'>" GOLD(ALPHA("alpha", ".15")) "</bsdf>")
+                        WALL("0", "-1.4", "0", "x", "90",
+                             "<bsdf type='twosided'>" DIFFUSE(".3,.6,.9") "</bsdf>")
+                            WALL("0", "0", "-1.8", "y", "40",
+                                 "<bsdf type='twosided'>" DIFFUSE(".3,.6,.9")
+                                     GOLD(ALPHA("alpha", ".2")) "</bsdf>")
+                                WALL("0", "0", "-1.9", "y", "0", DIFFUSE("0,0,.5")));
+    compare("textures", IMP_RGB, 4, PATH(DEPTH("5")), CAMERA,
+            SKY WALL("0", "-1", "0", "x", "-90", CHECKERS)
+                WALL("0", "0", "-1.5", "y", "10", CHECKERS) CUBE("-.6", "0", CHECKERS)
+                    BALL(".7", ".3", CHECKERS));
+    compare("kinds without lanes", IMP_RGB, 2, PATH(DEPTH("8")), CAMERA,
+            SKY WALL("0", "-1", "0", "x", "-90", DIFFUSE(".5,.6,.7"))
+                BALL(".7", ".3", "<bsdf type='dielectric'/>")
+                    BALL("-.7", ".3", "<bsdf type='plastic'/>")
+                        CUBE("0", "-.5", "<bsdf type='roughplastic'/>")
+                            BALL("0", "1",
+                                 "<bsdf type='mask'><float name='opacity' "
+                                 "value='.5'/>" DIFFUSE(".9,.1,.1") "</bsdf>")
+                                CUBE("1.6", ".9", DIFFUSE(".4,.4,.4")));
+}
+
+static void lights(void)
+{
+    compare("hidden lights", IMP_RGB, 6,
+            PATH(DEPTH("4") "<boolean name='hide_emitters' value='true'/>"), CAMERA,
+            ROOM SKY BALL("0", "0", AREA("1,2,3")) LAMP("0", "1", ".5")
+                CUBE("-.6", "-1.2", DIFFUSE(".9,.9,.9")));
+    compare("many lamps", IMP_RGB, 6,
+            PATH(DEPTH("4") "<string name='light_choice' value='weights'/>"), CAMERA,
+            ROOM LAMP("0", "0", ".3") LAMP("1", "0", ".2") LAMP("-1", "0", ".2")
+                LAMP("0", "1", ".1") LAMP("0", "-1", ".4")
+                    CUBE("-.6", "-1.2", DIFFUSE(".9,.9,.9")) SKY);
+    compare("many lamps, independent walks by a tree", IMP_RGB, 5,
+            PATH(DEPTH("4") "<string name='light_choice' value='tree'/>"), CAMERA,
+            ROOM LAMP("0", "0", ".3") LAMP("1", "0", ".2") LAMP("-1", "0", ".2"));
+    compare("many lamps, by a tree", IMP_RGB, 6,
+            PATH(DEPTH("4") "<string name='light_choice' value='tree'/>"), CAMERA,
+            ROOM LAMP("0", "0", ".3") LAMP("1", "0", ".2") LAMP("-1", "0", ".2")
+                BALL("1", "-1", AREA("2,3,4")) CUBE("-.6", "-1.2", DIFFUSE(".9,.9,.9"))
+                    SKY "<shape type='cube'>" AT(".3", ".6", "0", "y", "20", ".3")
+                        AREA("6,6,9") "</shape>");
+    compare(
+        "lights without lanes", IMP_RGB, 6, PATH(DEPTH("4")), CAMERA,
+        ROOM CUBE(
+            "-.6", "-1.2",
+            DIFFUSE(
+                ".9,.9,.9")) "<emitter type='point'><point name='position' x='.5' y='1' "
+                             "z='1'/><rgb "
+                             "name='intensity' value='3,4,5'/></emitter>" BALL(
+                                 ".8", ".8",
+                                 AREA("5,3,2")) "<emitter type='spot'><transform "
+                                                "name='to_world'><lookat "
+                                                "origin='-1,1,2' target='0,0,0' "
+                                                "up='0,1,0'/></transform></emitter>"
+                                                "<shape type='rectangle'>" AT(
+                                                    "0", "1.9", "0", "x", "90",
+                                                    ".6") "<emitter type='area'><texture "
+                                                          "type='checkerboard' "
+                                                          "name='radiance'/></emitter></"
+                                                          "shape>");
+    compare("a lamp that is a mesh", IMP_RGB, 5, PATH(DEPTH("4")), CAMERA,
+            ROOM "<shape type='cube'>" AT(".3", ".6", "0", "y", "20", ".3")
+                AREA("6,6,9") "</shape>");
+    compare("no light but the sky", IMP_RGB, 2, PATH(""), CAMERA,
+            SKY WALL("0", "-1", "0", "x", "-90", DIFFUSE(".5,.6,.7"))
+                CUBE("0", "-.5", DIFFUSE(".9,.9,.9")));
+}
+
+static void sensors(void)
+{
+    compare("a meter", IMP_RGB, 6, PATH(DEPTH("5")), "irradiancemeter'>", "");
+    compare("a meter, independent walks", IMP_RGB, 6, PATH(DEPTH("5")),
+            "irradiancemeter'>", "");
+    compare("a shutter", IMP_RGB, 6, PATH(DEPTH("4")),
+            "perspective'><float name='shutter_open' value='1'/><float "
+            "name='shutter_close' value='3'/>" VIEW,
+            ROOM LAMP("0", "0", ".5") CUBE("-.6", "-1.2", DIFFUSE(".9,.9,.9")));
+    compare("a thin lens", IMP_RGB, 5, PATH(DEPTH("4")),
+            "thinlens'><float name='aperture_radius' value='.2'/><float "
+            "name='focus_distance' value='3'/>" VIEW,
+            ROOM LAMP("0", "0", ".5"));
+    compare("clipped", IMP_RGB, 5, PATH(DEPTH("4")),
+            "perspective'><float name='near_clip' value='1.5'/><float name='far_clip' "
+            "value='5'/>" VIEW,
+            ROOM LAMP("0", "0", ".5"));
+}
+
+/* Many analytic shapes are Embree's, which calls back; instances, too. */
+static void scenes(void)
+{
+    char balls[4096] = "";
+    for (int k = 0; k < 12; k++)
+        snprintf(
+            balls + strlen(balls), sizeof balls - strlen(balls),
+            "<shape type='sphere'><point name='center' x='%g' y='%g' "
+            "z='0'/><float name='radius' value='.3'/>" DIFFUSE(".6,.5,.4") "</shape>",
+            k % 4 * .8 - 1.2, k / 4 * .8 - .8);
+    strcat(balls, SKY WALL("0", "-1", "0", "x", "-90", DIFFUSE(".5,.6,.7"))
+                      LAMP("0", "0", ".5"));
+    compare("twelve balls", IMP_RGB, 13, PATH(DEPTH("5")), CAMERA, balls);
+    compare("instances", IMP_RGB, 0, PATH(DEPTH("5")), CAMERA,
+            "<shape type='shapegroup' id='g'>" CUBE(
+                "0", "0",
+                DIFFUSE(".8,.3,.1")) "</shape><shape type='instance'><ref "
+                                     "id='g'/>" AT(
+                                         ".5", "0", "0", "y", "10",
+                                         "1.3") "</shape>" SKY WALL("0", "-1", "0", "x",
+                                                                    "-90",
+                                                                    DIFFUSE(".5,.6,.7")));
+    compare(
+        "disks, cylinders and 36 triangles", IMP_RGB, 7, PATH(DEPTH("5")), CAMERA,
+        SKY WALL("0", "-1", "0", "x", "-90", DIFFUSE(".5,.6,.7")) CUBE(
+            "-.6", "0", DIFFUSE(".8,.3,.1")) CUBE(".6", "0", DIFFUSE(".1,.3,.9"))
+            CUBE("0", ".8", CHECKERS) "<shape type='disk'>" AT("-1", "1", "-.5", "y",
+                                                               "10", ".6")
+                DIFFUSE(".5,.9,.4") "</shape><shape "
+                                    "type='cylinder'><float name='radius' "
+                                    "value='.2'/>" DIFFUSE(".5,.9,.4") "</shape>" CUBE(
+                                        "1.4", "1.2", DIFFUSE(".9,.9,.9")));
+}
+
+/* A mesh of a file: bumps of 2,048 triangles with interpolated normals, in Embree. */
+static void meshes(void)
+{
+    char path[] = "/tmp/imp_bundles_XXXXXX", shape[512];
+    const int fd = mkstemp(path), n = 32;
+    FILE *f = fd >= 0 ? fdopen(fd, "w") : NULL;
+    if (!f) {
+        tap_ok(false, "a file for a mesh");
+        return;
+    }
+    for (int j = 0; j <= n; j++)
+        for (int i = 0; i <= n; i++)
+            fprintf(f, "v %g %g %g\n", 2. * i / n - 1, 2. * j / n - 1,
+                    .2 * sin(.7 * i) * cos(.5 * j));
+    for (int j = 0; j < n; j++)
+        for (int i = 0; i < n; i++) {
+            const int a = j * (n + 1) + i + 1;
+            fprintf(f, "f %d %d %d\nf %d %d %d\n", a, a + 1, a + n + 2, a, a + n + 2,
+                    a + n + 1);
+        }
+    fclose(f);
+    for (int flat = 0; flat < 2; flat++) {
+        static char rest[4096];
+        snprintf(shape, sizeof shape,
+                 "<shape type='obj'><string name='filename' value='%s'/><boolean "
+                 "name='face_normals' value='%s'/>" GOLD(ALPHA("alpha", ".2")) "</shape>",
+                 path, flat ? "true" : "false");
+        snprintf(rest, sizeof rest, "%s%s", shape,
+                 SKY WALL("0", "0", "-1", "y", "0", DIFFUSE(".5,.6,.7"))
+                     LAMP("0", "1", ".5"));
+        compare(flat ? "a flat mesh" : "a smooth mesh", IMP_RGB, 2, PATH(DEPTH("5")),
+                CAMERA, rest);
+    }
+    unlink(path);
+}
+
+int main(void)
+{
+    ctx = test_context(1);
+    boxes();
+    materials();
+    lights();
+    sensors();
+    scenes();
+    meshes();
+    imp_context_destroy(ctx);
+    return tap_done();
+}
