@@ -6,7 +6,7 @@ measure() {
     importon measure "$SCENES/still.xml" left.png right.png -m mono --spp 2 -n 1 --rounds 1 --noise .3 --hold 'lamp.*' --hold '*.gamma.*' \
         "$@" >said 2>warned || echo "exit $?"
     grep ' by \|stays\|is not used' said
-    grep -v warning warned
+    grep -v 'warning\|EXIF' warned
 }
 make left.png 24 18 120 0.1 4 100 48
 make right.png 24 18 150 0.4 4 100 48
@@ -18,6 +18,9 @@ fi
 cat first
 make right.png 24 18 150
 measure -p '*.exposure.*' --stages exposure
+make left.png 24 18 120
+measure -p '*.exposure.*' --stages exposure
+grep EXIF warned
 for kind in 1 2 3 4 5 6 7; do
     make right.png 24 18 150 broken $kind
     importon measure "$SCENES/still.xml" right.png -m mono --spp 2 -n 1 --rounds 1 --noise .3 -p right.exposure --stages exposure >/dev/null 2>&1 ||
