@@ -9,7 +9,7 @@ a camera adds vignetting, exposure, white balance, the noise of light and of a s
 rounding to 8 bits. `importon measure` then has the shapes, the camera's calibrated curve, noise (unless --estimated) and coefficient of
 distortion, and rough guesses of the numbers that are counted, and answers with intervals. With --wrong one thing in the scene is
 wrong and held: the answer has to be "not explained", and that number among those that it names. --spp are importon's
-samples of an evaluation (default 8). Skips (77) without mitsuba.
+samples of an evaluation (default 64). Skips (77) without mitsuba.
 """
 import argparse
 import json
@@ -200,7 +200,7 @@ def main():
     p.add_argument("--first", type=int, default=0)
     p.add_argument("--kinds", default=",".join(photograph_cases.KINDS))
     p.add_argument("--wrong", choices=["lamp", "material"])
-    p.add_argument("--spp", type=int, default=8, help="of importon")
+    p.add_argument("--spp", type=int, default=64, help="of importon")
     p.add_argument("--rays", type=int, default=8192, help="of Mitsuba, in each pixel: its own noise is to be small beside the camera's")
     p.add_argument("--spectral", action="store_true")
     p.add_argument("--estimated", action="store_true", help="the camera's noise is not given, but estimated")
