@@ -185,7 +185,7 @@ def verdict(case, kind, seed, answer, truth, seconds, wrong):
         name, element = (row["name"][:-1].split("[") + [0])[:2] if row["name"].endswith("]") else (row["name"], 0)
         value = truth[name]
         value = value[int(element)] if isinstance(value, (tuple, list)) else value
-        if row.get("se") is None or row.get("lo95") is None:
+        if not row.get("se") or row.get("lo95") is None:  # 0: it is held
             continue
         out.append({"name": row["name"], "truth": float(value), "value": row["value"], "se": row["se"], "inside": bool(row["lo95"] <= value <= row["hi95"])})
     named = [line for line in answer["decisions"] if line.startswith("not measured, and may be wrong")]
