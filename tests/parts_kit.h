@@ -8,18 +8,20 @@
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include <importon/kinds.h>
+#include <importon/plan.h>
 #include <stdatomic.h>
 
 enum { WIDTH = 20, HEIGHT = 14, PIXELS = WIDTH * HEIGHT * 3, TEXELS = 20, SPP = 18 };
 enum { MANY = TEXELS * TEXELS * 3 + 64 }; /* more than 1,024: summed in fixed point */
 
-enum job { PICTURE, LOSS, TEXTURE, REVERSE, JACOBIAN, MEAN, JOBS, FIT = JOBS };
+enum job { PICTURE, LOSS, TEXTURE, REVERSE, JACOBIAN, MEAN, PLAN, JOBS, FIT = JOBS };
 static const char *const names[] __attribute__((unused)) = {"picture",
                                                             "loss and gradient",
                                                             "gradient of a texture",
                                                             "adjoint image",
                                                             "Jacobian and its table",
                                                             "mean of a picture",
+                                                            "plan",
                                                             "fit"};
 
 /* All that is compared, bit by bit. */
@@ -159,6 +161,38 @@ static void film_take(imp_film *film, struct result *r)
     imp_film_destroy(film);
 }
 
+static double plan_noise = 0.1;
+
+/* Four exposures, one of which has been taken: their gains and informations, and what is chosen. */
+static enum imp_status plan_run(imp_problem *p, const struct imp_run *run,
+                                struct result *r)
+{
+    struct imp_plan_candidate c[4];
+    struct imp_plan_options o = IMP_PLAN_OPTIONS_INIT;
+    const struct imp_plan_result *plan;
+    for (int i = 0; i < 4; i++) {
+        c[i] = (struct imp_plan_candidate)IMP_PLAN_CANDIDATE_INIT;
+        c[i].time = i + 1;
+        c[i].have = i == 1;
+    }
+    o.read = plan_noise;
+    o.take = 2;
+    const enum imp_status st = imp_plan(p, c, 4, &o, run, &plan);
+    double *to = r->gradient;
+    if (st != IMP_OK) return st;
+    for (size_t i = 0; i < plan->n_rows; i++) {
+        const struct imp_plan_row *row = IMP_ROW(imp_plan_row, plan->rows, i);
+        *to++ = row->gain.value;
+        *to++ = row->gain.se;
+        *to++ = (double)row->candidate;
+        for (size_t k = 0; k < plan->n * plan->n; k++) *to++ = row->information[k];
+    }
+    for (size_t k = 0; k < plan->n; k++) *to++ = plan->chosen_se[k];
+    r->objective[0] = plan->chosen_gain.value;
+    r->objective[1] = plan->chosen_gain.se;
+    return IMP_OK;
+}
+
 static enum imp_status job_run(imp_context *ctx, imp_scene *s, enum job job,
                                uint64_t seed, struct result *r)
 {
@@ -212,6 +246,7 @@ static enum imp_status job_run(imp_context *ctx, imp_scene *s, enum job job,
         r->objective[0] = e.value;
         r->objective[1] = e.se;
         break;
+    case PLAN: st = plan_run(p, &run, r); break;
     default: {
         struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
         const struct imp_fit_result *f;

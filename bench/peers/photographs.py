@@ -2,14 +2,14 @@
 """Photographs by another renderer, measured by importon: are its intervals right, does it name what is wrong?
 
     python3 bench/peers/photographs.py [-i IMPORTON] [--cases N] [--first K] [--kinds NAME,..] [--wrong lamp|material]
-                                       [--spp N] [--keep FOLDER] [--json FILE]
+                                       [--spp N] [--spectral] [--estimated] [--keep FOLDER] [--json FILE]
 
-Mitsuba 3 (llvm_ad_rgb) makes the light of each scene of photograph_cases.py along rays of a lens that distorts; here
+Mitsuba 3 (llvm_ad_rgb; with --spectral llvm_ad_spectral, and importon's -m spectral) makes the light of each scene of photograph_cases.py along rays of a lens that distorts; here
 a camera adds vignetting, exposure, white balance, the noise of light and of a sensor, a power of 1/gamma, clipping and
-rounding to 8 bits. `importon measure` then has the shapes, the camera's calibrated curve and coefficient of distortion,
-and rough guesses of the numbers that are counted, and answers with intervals. With --wrong one thing in the scene is
+rounding to 8 bits. `importon measure` then has the shapes, the camera's calibrated curve, noise (unless --estimated) and coefficient of
+distortion, and rough guesses of the numbers that are counted, and answers with intervals. With --wrong one thing in the scene is
 wrong and held: the answer has to be "not explained", and that number among those that it names. --spp are importon's
-samples of an evaluation (default 8). Skips (77) without mitsuba.
+samples of an evaluation (default 64). Skips (77) without mitsuba.
 """
 import argparse
 import json
@@ -31,6 +31,7 @@ root = os.path.dirname(os.path.dirname(here))
 WIDTH, HEIGHT = 24, 20
 FULL_WELL = 1000  # electrons at white: the noise of light
 READ = 0.004  # of white: the noise of the sensor
+PASS = 1024  # rays in each pixel of a pass
 
 
 # ---- The lens and the camera -----------------------------------------------------------------
@@ -66,8 +67,20 @@ def light(scene, camera, k1, spp, seed):
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(seed, len(o))
     ray = mi.RayDifferential3f(mi.Point3f(*o.T.astype(np.float32)), mi.Vector3f(*d.T.astype(np.float32)))
-    value = np.array(scene.integrator().sample(scene, sampler, ray)[0]).T.reshape(HEIGHT, WIDTH, spp, 3)
-    return value.astype(float).mean(2)
+    if mi.is_spectral:  # four wavelengths of a ray, a quarter of the distribution apart
+        u = sampler.next_1d()
+        ray.wavelengths, weight = mi.sample_rgb_spectrum(mi.Spectrum([u + .25 * k - mi.Float(u + .25 * k >= 1) for k in range(4)]))
+        value = scene.integrator().sample(scene, sampler, ray)[0]
+        value = mi.spectrum_to_srgb(value * weight, ray.wavelengths)
+    else:
+        value = scene.integrator().sample(scene, sampler, ray)[0]
+    return np.array(value).T.reshape(HEIGHT, WIDTH, spp, 3).astype(float).mean(2)
+
+
+def whole_light(scene, camera, k1, spp, seed):
+    """As light, in passes that fit into memory."""
+    passes = max(1, spp // PASS)
+    return sum(light(scene, camera, k1, spp // passes, passes * seed + i) for i in range(passes)) / passes
 
 
 def camera_numbers(rng, first):
@@ -141,7 +154,7 @@ def one_case(kind, seed, a, folder):
     with open(folder + "/truth.xml", "w") as f:
         f.write('<scene version="3.0.0">%s</scene>' % case.text(case.truth))
     scene = mi.load_file(folder + "/truth.xml", optimize=False)
-    pictures = [light(scene, c, n["k1"], a.rays, 100 * seed + k + 1) for k, (c, n) in enumerate(zip(case.cameras, cameras))]
+    pictures = [whole_light(scene, c, n["k1"], a.rays, 100 * seed + k + 1) for k, (c, n) in enumerate(zip(case.cameras, cameras))]
     unit = case.bright / np.percentile(pictures[0], 90)
     noise = np.random.default_rng(seed)
     for name, numbers, picture in zip(names, cameras, pictures):
@@ -154,6 +167,8 @@ def one_case(kind, seed, a, folder):
         f.write('<scene version="3.0.0">%s%s</scene>' % ("".join(map(sensor_text, names, case.guessed, guesses)), case.text(case.guess)))
     command = [a.importon, "measure", folder + "/guess.xml", *["%s/%s.ppm" % (folder, n) for n in names], "-q", "--json", "--spp", str(a.spp),
                "--seed", str(seed + 1), "-t", str(a.threads)]
+    command += ["-m", "spectral"] if a.spectral else []
+    command += [] if a.estimated else ["--noise", "read=%g,shot=%g" % (READ, 1 / FULL_WELL)]
     for word, items in (("--hold", case.hold + ["left.white_balance*", "left.exposure.*", "*.gamma.*"]), ("-p", case.params)):
         for item in items:
             command += [word, item]
@@ -170,7 +185,7 @@ def verdict(case, kind, seed, answer, truth, seconds, wrong):
         name, element = (row["name"][:-1].split("[") + [0])[:2] if row["name"].endswith("]") else (row["name"], 0)
         value = truth[name]
         value = value[int(element)] if isinstance(value, (tuple, list)) else value
-        if row.get("se") is None or row.get("lo95") is None:
+        if not row.get("se") or row.get("lo95") is None:  # 0: it is held
             continue
         out.append({"name": row["name"], "truth": float(value), "value": row["value"], "se": row["se"], "inside": bool(row["lo95"] <= value <= row["hi95"])})
     named = [line for line in answer["decisions"] if line.startswith("not measured, and may be wrong")]
@@ -185,14 +200,16 @@ def main():
     p.add_argument("--first", type=int, default=0)
     p.add_argument("--kinds", default=",".join(photograph_cases.KINDS))
     p.add_argument("--wrong", choices=["lamp", "material"])
-    p.add_argument("--spp", type=int, default=8, help="of importon")
-    p.add_argument("--rays", type=int, default=1024, help="of Mitsuba, in each pixel")
+    p.add_argument("--spp", type=int, default=64, help="of importon")
+    p.add_argument("--rays", type=int, default=8192, help="of Mitsuba, in each pixel: its own noise is to be small beside the camera's")
+    p.add_argument("--spectral", action="store_true")
+    p.add_argument("--estimated", action="store_true", help="the camera's noise is not given, but estimated")
     p.add_argument("-t", "--threads", type=int, default=2)
     p.add_argument("--keep", help="folder in which the files of each case stay")
     p.add_argument("--json")
     p.add_argument("-v", "--verbose", action="store_true")
     a = p.parse_args()
-    mi.set_variant("llvm_ad_rgb")
+    mi.set_variant("llvm_ad_spectral" if a.spectral else "llvm_ad_rgb")
     results = []
     for kind in a.kinds.split(","):
         for seed in range(a.first, a.first + a.cases):

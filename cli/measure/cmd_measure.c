@@ -13,6 +13,8 @@
 
 #include <stdbool.h>
 #include <stdlib.h>
+#include <string.h>
+#include <strings.h>
 #include <unistd.h>
 
 static struct {
@@ -106,6 +108,29 @@ static bool knows_exif(const struct photos *photos)
     return false;
 }
 
+/* Files of a kind that carries EXIF, and none of which does: what begins elsewhere then. Of those that only some
+ * have, the library tells. */
+static void exif_say(const struct photos *photos)
+{
+    static const char *const carry[] = {".jpg",  ".jpeg", ".png", ".tif",
+                                        ".tiff", ".dng",  NULL};
+    const char *first = NULL;
+    if (knows_exif(photos)) return;
+    if (!exif_is_built()) {
+        cli_say("importon: EXIF is not read: this importon was built without libexif");
+        return;
+    }
+    for (size_t i = 0; i < photos->n && !first; i++) {
+        const char *dot = strrchr(photos->path[i], '.');
+        for (int k = 0; dot && carry[k]; k++)
+            if (!strcasecmp(dot, carry[k])) first = photos->path[i];
+    }
+    if (first)
+        cli_say("importon: %s%s no EXIF: exposures begin by means, fields of view where "
+                "the scene has them",
+                first, photos->n > 1 ? " and the other photographs have" : " has");
+}
+
 static int run_measure(int n, char **operand)
 {
     struct photos photos = {0};
@@ -113,8 +138,7 @@ static int run_measure(int n, char **operand)
     int rc = photos_scene(n, operand, &scene);
     if (!rc) rc = cli_load(scene);
     if (!rc) rc = photos_read(n, operand, &photos);
-    if (!rc && !exif_is_built() && !knows_exif(&photos))
-        cli_say("importon: EXIF is not read: this importon was built without libexif");
+    if (!rc) exif_say(&photos);
     if (!rc && cli.out) {
         checkpoint = join_path(cli.out, "measure.checkpoint");
         rc = measure_answer_writable();

@@ -22,15 +22,15 @@ static struct {
 static const char *const criterion_words[] = {"D", "A", NULL};
 
 static const struct arg_option options[] = {
-    {ARG_INT, 'k', "take", "K", "choose K candidates together (default 1)", &o.take, 1,
-     4096, NULL},
-    {ARG_NUMBER, 0, "budget", "COST",
+    {ARG_INT | ARG_REPLAYS, 'k', "take", "K", "choose K candidates together (default 1)",
+     &o.take, 1, 4096, NULL},
+    {ARG_NUMBER | ARG_REPLAYS, 0, "budget", "COST",
      "choose as many as these costs allow (with --take: at most K)", &o.budget, 1e-12,
      1e12, NULL},
-    {ARG_CHOICE, 0, "criterion", "WORD",
+    {ARG_CHOICE | ARG_REPLAYS, 0, "criterion", "WORD",
      "D (default): determinant of the covariance; A: sum of the variances", &o.criterion,
      0, 0, criterion_words},
-    {ARG_TEXT, 0, "noise", "KEY=V[,..]",
+    {ARG_TEXT | ARG_REPLAYS, 0, "noise", "KEY=V[,..]",
      "of a value v at time of exposure 1: variance read^2 + shot v + (relative v)^2; "
      "with "
      "white=V values from V on are saturated (default: read is 1 % of the picture's "
@@ -45,6 +45,7 @@ static const struct arg_option options[] = {
      "pictures of which pixels of the best candidate tell of which number, and of the "
      "criterion",
      &o.map, 0, 0, NULL},
+    OPTION_PART,
     {0}};
 
 /* What we have, and the best candidate, which moves. The result belongs to the problem, and the
@@ -134,4 +135,4 @@ const struct command command_plan = {
     run_plan,
     1,
     1,
-    REPLAYS_NEVER};
+    REPLAYS_PARTS};

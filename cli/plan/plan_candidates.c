@@ -15,28 +15,28 @@ static struct {
 } o;
 
 const struct arg_option options_candidates[] = {
-    {ARG_TEXT, 0, "sensors", "N[,N..]",
+    {ARG_TEXT | ARG_REPLAYS, 0, "sensors", "N[,N..]",
      "candidates: these sensors (default: all that --have does not name)", &o.sensors, 0,
      0, NULL},
-    {ARG_TEXT, 0, "have", "N[,N..]", "pictures of these sensors have been taken already",
-     &o.have, 0, 0, NULL},
-    {ARG_TEXT, 0, "sphere", "X,Y,Z,R,N[,A,B]",
+    {ARG_TEXT | ARG_REPLAYS, 0, "have", "N[,N..]",
+     "pictures of these sensors have been taken already", &o.have, 0, 0, NULL},
+    {ARG_TEXT | ARG_REPLAYS, 0, "sphere", "X,Y,Z,R,N[,A,B]",
      "candidates: the camera of --sensor at N places, R from X,Y,Z, which it looks at, "
      "between the elevations A and B (default 0,90 degrees)",
      &o.sphere, 0, 0, NULL},
-    {ARG_TEXT, 0, "path", "FILE",
+    {ARG_TEXT | ARG_REPLAYS, 0, "path", "FILE",
      "candidates: the camera of --sensor at places: lines X Y Z, a point that it looks "
      "at, and a name, which may be left out",
      &o.path, 0, 0, NULL},
-    {ARG_TEXT, 0, "up", "X,Y,Z", "upwards, of --sphere and --path (default 0,1,0)", &o.up,
-     0, 0, NULL},
-    {ARG_LIST, 0, "lamps", "GLOB[,GLOB..]",
+    {ARG_TEXT | ARG_REPLAYS, 0, "up", "X,Y,Z",
+     "upwards, of --sphere and --path (default 0,1,0)", &o.up, 0, 0, NULL},
+    {ARG_LIST | ARG_REPLAYS, 0, "lamps", "GLOB[,GLOB..]",
      "each candidate with these lamps on and the others off; several: with each; "
      "'each': every lamp alone",
      &o.lamps, 0, 0, NULL},
-    {ARG_TEXT, 0, "exposures", "T[,T..]",
+    {ARG_TEXT | ARG_REPLAYS, 0, "exposures", "T[,T..]",
      "each candidate with these times of exposure (default 1)", &o.exposures, 0, 0, NULL},
-    {ARG_LIST, 0, "cost", "C|C+C1*t|GLOB=C",
+    {ARG_LIST | ARG_REPLAYS, 0, "cost", "C|C+C1*t|GLOB=C",
      "cost of a picture, with its time of exposure t, or of the candidates of these "
      "names "
      "(default 1)",

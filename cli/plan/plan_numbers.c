@@ -12,12 +12,12 @@
 static struct arg_list of, prior;
 
 const struct arg_option options_numbers[] = {
-    {ARG_LIST, 0, "of", "NAME",
+    {ARG_LIST | ARG_REPLAYS, 0, "of", "NAME",
      "the wanted numbers: a parameter, one of its numbers NAME[K], or a pattern "
      "(default: "
      "all active ones)",
      &of, 0, 0, NULL},
-    {ARG_LIST, 0, "prior", "NAME=SIGMA",
+    {ARG_LIST | ARG_REPLAYS, 0, "prior", "NAME=SIGMA",
      "known without pictures: one standard deviation of these numbers", &prior, 0, 0,
      NULL},
     {0}};

@@ -39,6 +39,14 @@ extern const struct command command_render, command_gradient, command_jacobian,
 
 /* Option tables, to be named in args_spec.group. -o is a file, or a folder for commands
  * that write several files. */
+/* --part, of options_limits and of commands that have no other limits. */
+#define OPTION_PART                                                                      \
+    {                                                                                    \
+        ARG_TEXT | ARG_ASIDE, 0, "part", "I/N",                                          \
+            "compute part I of N (from 1), to the file of -o; 'importon merge' makes "   \
+            "the whole",                                                                 \
+            &cli.part, 0, 0, NULL                                                        \
+    }
 extern const struct arg_option options_file[], options_folder[], options_file_or_folder[],
     options_general[], options_scene[], options_run[], options_limits[], options_guide[];
 

@@ -105,9 +105,7 @@ const struct arg_option options_run[] = {
 const struct arg_option options_limits[] = {
     {ARG_NUMBER, 0, "time", "SECONDS", "stop after this time and keep the results so far",
      &cli.time_s, 1e-3, 1e9, NULL},
-    {ARG_TEXT | ARG_ASIDE, 0, "part", "I/N",
-     "compute part I of N (from 1), to the file of -o; 'importon merge' makes the whole",
-     &cli.part, 0, 0, NULL},
+    OPTION_PART,
     {ARG_TEXT | ARG_ASIDE, 0, "manifest", "FILE",
      "write a manifest for 'importon verify', with sums of parts (render, gradient, fit)",
      &cli.manifest_path, 0, 0, NULL},

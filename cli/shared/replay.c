@@ -117,8 +117,9 @@ static int check(const char *path, enum replays kind, int argc, char **argv)
     if (!command || !(command->replays & kind))
         return cli_error(EXIT_USAGE, "%s: refused: its command is '%.200s'; %s carry %s",
                          path, argv[0], kind == REPLAYS_PARTS ? "parts" : "manifests",
-                         kind == REPLAYS_PARTS ? "render, gradient, jacobian or read"
-                                               : "render, gradient or fit");
+                         kind == REPLAYS_PARTS
+                             ? "render, gradient, jacobian, read or plan"
+                             : "render, gradient or fit");
     for (; k < argc && strcmp(argv[k], "--") != 0; k++) {
         const struct arg_option *o = args_find(&command->args, argv[k]);
         if (!o)

@@ -50,7 +50,8 @@ struct imp_photo {
     double focal_35mm, exposure_s, iso, f_number;
     /** Noise of a sensor: light of a value v (the value itself, but of a film with a gamma v^gamma) has the
      * variance read^2 + shot v + (relative v)^2, as in imp_plan_options, and rounding to `step` adds its
-     * own. Where one of them is above 0, `noise` is not used. */
+     * own. A gamma makes of it the variance of the value, and a shift of its mean, which is taken off. Where
+     * one of them is above 0, `noise` is not used. */
     double read, shot, relative;
 };
 #define IMP_PHOTO_INIT IMP_INIT_ZERO(struct imp_photo)

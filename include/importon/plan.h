@@ -123,8 +123,9 @@ struct imp_plan_result {
  *         one names no lamp or looks nowhere, more are to be chosen than there are, a number is
  *         out of its range, or all values of all of them are 0 or saturated (where those of one
  *         are, it is a warning with its name); IMP_E_UNSUPPORTED for a sensor that cannot be
- *         placed, as of imp_scene_add_pose, and where the context makes parts; and what
- *         imp_problem_jacobian refuses. Messages have the candidate's name.
+ *         placed, as of imp_scene_add_pose; and what imp_problem_jacobian refuses. Messages have the
+ *         candidate's name. Where the context makes parts, a part has whole candidates, 1/N of
+ *         them, and returns IMP_PART.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_plan(imp_problem *problem, const struct imp_plan_candidate *candidates, size_t n,
@@ -138,7 +139,8 @@ imp_plan(imp_problem *problem, const struct imp_plan_candidate *candidates, size
  * @param rounds  at most, 1 to 200.
  * @param[out] origin [3] the place found.
  * @param[out] gain   there, of random numbers of its own.
- * @return as imp_plan; IMP_E_ARG where no candidate is placed.
+ * @return as imp_plan; IMP_E_ARG where no candidate is placed; IMP_E_UNSUPPORTED where the context makes
+ *         parts.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_plan_improve(imp_problem *problem, const struct imp_plan_candidate *candidates,
@@ -156,7 +158,7 @@ IMP_API const char *imp_plan_lamp(const imp_scene *scene, int lamp);
  * information without bias, and noise may make single pixels negative.
  * @param pull [n][n], of imp_plan_row, or any other.
  * @param[out] films [n + 1] one for each number, then the criterion's; the caller destroys them.
- * @return as imp_plan.
+ * @return as imp_plan; IMP_E_UNSUPPORTED where the context makes parts.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_plan_map(imp_problem *problem, const struct imp_plan_candidate *candidate,

@@ -54,7 +54,7 @@ def part(function: Callable[..., Any], index: int, count: int, *arguments: Any, 
     ----------
     function : callable
         Loads its scene, and ends with one call of `render`, `render_forward`,
-        `render_backward`, `functional`, `jacobian` or `loss`, of which the part is computed.
+        `render_backward`, `functional`, `jacobian`, `loss` or `plan`, of which the part is computed.
         Fits and checks choose what to compute by what they found, so they have no parts.
     index, count : int
         From 1: parts 1 to `count` make a whole. Parts of different cuts go together where

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Parts: pictures, losses, gradients, Jacobians with their tables, and means have the
+ * Parts: pictures, losses, gradients, Jacobians with their tables, means and plans have the
  * bits of one run, for any cut; what does not belong together is refused. */
 #include "imp_fail_alloc.h"
 #include "math/hash.h"
@@ -67,6 +67,15 @@ static void refusals(void)
         tap_ok(st == IMP_E_ARG && strstr(error, bad[k].says), "refused: %s # %s",
                bad[k].says, error);
     }
+
+    for (int i = 1; i <= 2; i++) part_make("box", PLAN, i, 2, 1);
+    plan_noise = 0.2;
+    const enum imp_status other_noise =
+        merge("box", PLAN, (const int[][2]){{1, 2}, {2, 2}}, 2, .6, 5, &r, error);
+    tap_ok(other_noise == IMP_E_ARG && strstr(error, "other candidates, noise or priors"),
+           "refused: a plan with other noise # %s", error);
+    plan_noise = 0.1;
+    for (int i = 1; i <= 2; i++) part_make("box", PICTURE, i, 2, 1);
 
     /* The same part of two runs. */
     imp_parts *parts = NULL;

@@ -39,6 +39,7 @@
 #define FEW         30  /* values, below which the noise is not estimated */
 #define LEAST_NOISE 0.1 /* part of the variance of T - V that is the target's, at least */
 #define MOST_NOISE  0.03 /* of the range of the values: more is a scene that is wrong */
+#define FAR         4    /* standard deviations of T - V that noise alone may be */
 #define KNOWN_SE    0.25 /* V is expanded about where its relative error is smaller */
 
 bool imp__problem_clips(const struct imp_problem *p)
@@ -237,8 +238,11 @@ static void photograph_set(struct decision *d, size_t i)
     struct imp__clip *c = t->clip;
     const double T = at_level(c, i), V = (double)d->V[i], gamma = d->gamma;
     const double se = ((double)d->up[i] - (double)d->down[i]) / (2 * SIGMAS);
+    /* Where the target's noise is given, noise alone does not make a value far: tails that count otherwise
+     * than the rest would pull the mean. */
+    const double noise = t->value_noise ? (double)t->value_noise[i] : 0;
     if (V < IMP_PHOTOGRAPH_LEAST || se > KNOWN_SE * V ||
-        T < fmax(0.5, 1 - 0.5 / gamma) * V) {
+        T < fmin(fmax(0.5, 1 - 0.5 / gamma) * V, V - FAR * hypot(noise, se))) {
         const double far = T >= IMP_PHOTOGRAPH_LEAST ? T * (pow(V / T, gamma) - 1) : 0;
         const double plain = gamma * (V - T);
         c->base[i] = (float)T;

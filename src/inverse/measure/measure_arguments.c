@@ -192,6 +192,7 @@ static enum imp_status photo_take(struct imp__measure *m, size_t i)
     p->columns = (d->width + p->block - 1) / p->block;
     p->rows = (d->height + p->block - 1) / p->block;
     p->noise_se = imp__alloc(m->ctx, p->n_values, sizeof(float));
+    p->lift = imp__alloc(m->ctx, p->n_values, sizeof(float));
     p->weights = imp__alloc(m->ctx, p->n_pixels, sizeof(float));
     p->left = imp__alloc(m->ctx, p->n_values, sizeof(float));
     p->own = imp__alloc(m->ctx, p->n_values, sizeof(float));
@@ -200,7 +201,7 @@ static enum imp_status photo_take(struct imp__measure *m, size_t i)
     p->robust = imp__alloc(m->ctx, p->n_pixels, sizeof(float));
     p->edges = imp__alloc(m->ctx, p->n_pixels, sizeof(float));
     p->masked = imp__alloc(m->ctx, (size_t)p->columns * (size_t)p->rows, 1);
-    if (!p->noise_se || !p->weights || !p->left || !p->own || !p->square ||
+    if (!p->noise_se || !p->lift || !p->weights || !p->left || !p->own || !p->square ||
         !p->expected || !p->robust || !p->edges || !p->masked)
         return imp__error(m->ctx, IMP_E_NOMEM, "no memory for %s", p->name);
     for (size_t k = 0; k < p->n_pixels; k++)
@@ -229,6 +230,7 @@ void imp__measure_photos_free(struct imp__measure *m)
 {
     for (size_t i = 0; i < m->n_photos; i++) {
         imp__release(m->ctx, m->photos[i].noise_se);
+        imp__release(m->ctx, m->photos[i].lift);
         imp__release(m->ctx, m->photos[i].weights);
         imp__release(m->ctx, m->photos[i].square);
         imp__release(m->ctx, m->photos[i].left);

@@ -94,19 +94,44 @@ bool imp__measure_noise_varies(const struct imp__photo *p)
     return p->desc.read > 0 || p->desc.shot > 0 || p->desc.relative > 0;
 }
 
-/* A value V = v^(1/gamma) has the noise of v times V/(gamma v), which at black is taken where v is as large
- * as its noise. */
+#define REACH 4.0 /* standard deviations on either side of the mean, ... */
+#define NODES                                                                            \
+    8 /* ... and so many nodes, or, where the curve has its end among them, ... */
+#define MORE 128
+
+/* Mean and variance of max(v + s z, 0)^(1/gamma), z normal, by the trapezoidal rule. A curve that bends
+ * has a mean that is off v^(1/gamma), to the second order by s^2/2 times its second derivative: at a tenth of white
+ * and 1,000 electrons there by 3 % of the noise, which a few thousand values would see. */
+static void curve_moments(double v, double s, double gamma, double *mean,
+                          double *variance)
+{
+    const int nodes = v > REACH * s ? NODES : MORE;
+    double weights = 0, sum = 0, square = 0;
+    for (int k = -nodes; k <= nodes; k++) {
+        const double z = REACH * k / nodes, w = exp(-0.5 * z * z);
+        const double V = pow(fmax(v + s * z, 0), 1 / gamma);
+        weights += w;
+        sum += w * V;
+        square += w * V * V;
+    }
+    *mean = sum / weights;
+    *variance = fmax(square / weights - imp__sqr(*mean), 0);
+}
+
 void imp__measure_noise_by_light(struct imp__photo *p, const float *light, double gamma)
 {
     const struct imp_photo *d = &p->desc;
     double sum = 0;
     for (size_t i = 0; i < p->n_values; i++) {
         const double v = fmax((double)light[i], 0);
-        const double of_light =
-            sqrt(d->read * d->read + d->shot * v + imp__sqr(d->relative * v));
-        const double at = fmax(fmax(v, of_light), 1e-9);
-        const double slope = gamma == 1 ? 1 : pow(at, 1 / gamma - 1) / gamma;
-        const double variance = imp__sqr(slope * of_light) + d->step * d->step / 12;
+        double variance = d->read * d->read + d->shot * v + imp__sqr(d->relative * v);
+        p->lift[i] = 0;
+        if (gamma != 1) {
+            double mean;
+            curve_moments(v, sqrt(variance), gamma, &mean, &variance);
+            p->lift[i] = (float)(mean - pow(v, 1 / gamma));
+        }
+        variance += d->step * d->step / 12;
         p->noise_se[i] = (float)fmax(sqrt(variance), 1e-9);
         sum += variance;
     }

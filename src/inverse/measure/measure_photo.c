@@ -33,7 +33,7 @@ struct compared {
 };
 
 static struct compared value_compare(const struct imp__photo *p, double noise, double T,
-                                     double M, double M_se, double gamma)
+                                     double lift, double M, double M_se, double gamma)
 {
     const bool curve = gamma != 1;
     struct compared v = {NAN, 0};
@@ -46,7 +46,7 @@ static struct compared value_compare(const struct imp__photo *p, double noise, d
         v.residual = V > p->desc.high - doubt ? NAN : p->desc.high - V;
     else if (p->desc.clipped && T <= p->desc.low)
         v.residual = V < p->desc.low + doubt ? NAN : p->desc.low - V;
-    else v.residual = T - V;
+    else v.residual = T - lift - V;
     return v;
 }
 
@@ -184,9 +184,9 @@ enum imp_status imp__measure_residual(struct imp__measure *m, struct imp__photo 
     for (size_t i = 0; i < p->n_pixels; i++) {
         for (int c = 0; c < C; c++) {
             const size_t at = i * (size_t)C + (size_t)c;
-            const struct compared v =
-                value_compare(p, (double)p->noise_se[at], (double)p->desc.pixels[at],
-                              (double)mean[at], se ? (double)se[at] : 0, gamma);
+            const struct compared v = value_compare(
+                p, (double)p->noise_se[at], (double)p->desc.pixels[at],
+                (double)p->lift[at], (double)mean[at], se ? (double)se[at] : 0, gamma);
             p->left[at] = (float)v.residual;
             p->own[at] = (float)v.own;
         }

@@ -97,6 +97,23 @@ static void weights_make(const struct imp__photo *p, bool last, float *weights)
     }
 }
 
+/* The photograph's values without what its noise adds to their means; those that are clipped, and others, stay
+ * so. values [n_values]. */
+static void values_make(const struct imp__photo *p, float *values)
+{
+    const struct imp_photo *d = &p->desc;
+    const float low = (float)d->low, high = (float)d->high;
+    for (size_t i = 0; i < p->n_values; i++) {
+        const float T = d->pixels[i];
+        values[i] = T - p->lift[i];
+        if (!d->clipped) continue;
+        if (T <= low || T >= high) values[i] = T;
+        else
+            values[i] =
+                imp_clamp(values[i], nextafterf(low, high), nextafterf(high, low));
+    }
+}
+
 /* Levels also where nothing was clipped: pictures of the start then say how well walks know each value,
  * and a power is expanded about what the scene has. */
 static enum imp_status target_add(struct imp__measure *m, imp_problem *p, size_t i,
@@ -106,7 +123,7 @@ static enum imp_status target_add(struct imp__measure *m, imp_problem *p, size_t
     const struct imp__photo *photo = &m->photos[i];
     const struct imp_photo *d = &photo->desc;
     struct imp_target t = IMP_TARGET_INIT;
-    float *weights = NULL;
+    float *weights = NULL, *values = NULL;
     t.sensor = d->sensor;
     t.width = d->width;
     t.height = d->height;
@@ -121,12 +138,19 @@ static enum imp_status target_add(struct imp__measure *m, imp_problem *p, size_t
         weights_make(photo, last, weights);
         t.weights = weights;
     }
+    if (imp__measure_noise_varies(photo)) {
+        values = imp__alloc(m->ctx, photo->n_values, sizeof *values);
+        if (!values) IMP_TRY(imp__error(m->ctx, IMP_E_NOMEM, "no memory for a stage"));
+        values_make(photo, values);
+        t.pixels = values;
+    }
     st = imp_problem_add_target(p, &t);
     if (st != IMP_OK) IMP_TRY(imp__error_prefix(m->ctx, st, "%s", photo->name));
     IMP_TRY(imp_problem_clip(p, (int)i, d->clipped ? d->low : -NEVER,
                              d->clipped ? d->high : NEVER));
 out:
     imp__release(m->ctx, weights);
+    imp__release(m->ctx, values);
     return st;
 }
 

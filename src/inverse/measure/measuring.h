@@ -16,7 +16,9 @@ struct imp__photo {
     double noise;    /* one standard deviation; root of the mean square where it varies */
     double noise_of; /* relative error of its square; 0: it was given */
     float *noise_se; /* [n_values] all `noise`, unless it varies */
-    float *weights;  /* [n_pixels] desc.weights, 0 where masked */
+    float *
+        lift; /* [n_values] what noise of light adds to the mean of a value with a gamma */
+    float *weights; /* [n_pixels] desc.weights, 0 where masked */
     float *left,
         *own;      /* [n_values] residuals, NAN: not compared; the picture's variances */
     float *square; /* [n_pixels] sum of squared residuals of its compared values ... */
@@ -109,8 +111,8 @@ enum imp_status imp__measure_begin(struct imp__measure *m);
 /* ---- measure_noise.c ---- */
 /* Is it given by value? */
 bool imp__measure_noise_varies(const struct imp__photo *photo);
-/* Then: of all values, where the scene's light is light [n_values] and its film has this gamma; by the
- * picture and not by the photograph, whose noise would be in the weights. */
+/* Then: noise_se and lift of all values, where the scene's light is light [n_values] and its film has this
+ * gamma; by the picture and not by the photograph, whose noise would be in the weights. */
 void imp__measure_noise_by_light(struct imp__photo *photo, const float *light,
                                  double gamma);
 /* noise, and noise_of where it was not given. */

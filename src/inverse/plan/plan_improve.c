@@ -109,6 +109,7 @@ enum imp_status imp_plan_improve(imp_problem *problem,
     IMP_REQUIRE(ctx, origin, "origin");
     IMP_REQUIRE(ctx, gain, "gain");
     IMP_RUN(ctx, m.run, run);
+    IMP_CHECKED(imp__problem_no_parts(problem, "a search for a place"));
     m.options = (struct imp_plan_options)IMP_PLAN_OPTIONS_INIT;
     IMP_OPTIONS(ctx, m.options, options, "options");
     IMP_FINITE(ctx, m.options.budget, "options: budget");

@@ -78,7 +78,7 @@ enum imp_status imp_plan_map(imp_problem *problem,
     IMP_REQUIRE(ctx, films, "films");
     IMP_RUN(ctx, all, run);
     IMP_CHECKED(imp__run_traces(ctx, "imp_plan_map", &all));
-    IMP_CHECKED(imp__problem_no_parts(problem, "a plan"));
+    IMP_CHECKED(imp__problem_no_parts(problem, "a map of pixels"));
     IMP_CHECKED(imp__plan_options_take(problem, __func__, options, &own));
     IMP_FINITE_ALL(ctx, pull, n * n, "pull");
     IMP_FLOAT_MODE;

@@ -3,6 +3,7 @@
  * A plan: informations of all candidates, gains with their errors, groups that cannot be told
  * apart, the chosen set, and what no candidate determines. */
 #include "base/arguments.h"
+#include "base/team.h"
 #include "inverse/fit/fit.h"
 #include "math/rng.h"
 #include "plan_arguments.h"
@@ -35,7 +36,7 @@ struct plan {
     double *cost;    /* [n_open] */
     size_t n_have, n_open;
     struct imp__plan_known today, then;
-    size_t done; /* for progress */
+    size_t own, done; /* for progress: this process's candidates, and twice those found */
 };
 
 /* ---- Informations ---------------------------------------------------------------------- */
@@ -45,43 +46,61 @@ static int progress(const struct imp_progress *p, void *payload)
     const struct plan *plan = payload;
     struct imp_progress own = *p;
     own.stage = "plan";
-    own.fraction = ((double)plan->done + p->fraction) / (2 * (double)plan->n_all);
+    own.fraction = ((double)plan->done + p->fraction) / (2 * (double)plan->own);
     own.eta_s = own.fraction > 0 ? own.elapsed_s * (1 / own.fraction - 1) : -1;
     return ((const struct imp_run *)&plan->run)
         ->progress(&own, plan->run.progress_payload);
 }
 
+/* Candidate i's, by a run of its own. */
+static enum imp_status information_find(struct plan *plan, size_t i)
+{
+    imp_context *ctx = plan->p->ctx;
+    struct imp_run run = plan->run;
+    run.seed = imp__mix64(plan->run.seed ^ imp__mix64(SEED + i));
+    if (run.progress) {
+        run.progress = progress;
+        run.progress_payload = plan;
+    }
+    struct imp__team *team = imp__plan_part_alone(ctx);
+    const enum imp_status st = imp__plan_information(
+        plan->p, plan->blank, &plan->c[i], &plan->o, &run, plan->width, &plan->data[i]);
+    if (team) ctx->team = team;
+    plan->done += 2;
+    return st == IMP_OK || st == IMP_CANCELLED
+               ? st
+               : imp__error_prefix(ctx, st, "%s",
+                                   imp__plan_name(plan->p->scene, &plan->c[i]));
+}
+
 static enum imp_status informations(struct plan *plan)
 {
+    imp_context *ctx = plan->p->ctx;
     const size_t n = plan->n;
     size_t lit = 0;
+    IMP_CHECKED(imp__plan_parts_same(plan->p, plan->c, plan->n_all, &plan->o, plan->width,
+                                     &plan->run));
+    for (size_t i = 0; i < plan->n_all; i++)
+        plan->own += imp__plan_part_has(ctx, i, plan->n_all);
     for (size_t i = 0; i < plan->n_all; i++) {
         struct imp__plan_data *d = &plan->data[i];
-        struct imp_run run = plan->run;
-        run.seed = imp__mix64(plan->run.seed ^ imp__mix64(SEED + i));
-        if (run.progress) {
-            run.progress = progress;
-            run.progress_payload = plan;
-        }
-        d->H = imp__alloc(plan->p->ctx, (1 + IMP_DEVIATIONS) * n * n, sizeof *d->H);
-        if (!d->H) return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
+        const bool own = imp__plan_part_has(ctx, i, plan->n_all);
+        if (!own && !imp__team_merges(ctx)) continue;
+        d->H = imp__alloc(ctx, (1 + IMP_DEVIATIONS) * n * n, sizeof *d->H);
+        if (!d->H) return imp__error(ctx, IMP_E_NOMEM, "no memory for a plan");
         d->deviations = d->H + n * n;
-        plan->done = 2 * i;
-        const enum imp_status st = imp__plan_information(
-            plan->p, plan->blank, &plan->c[i], &plan->o, &run, plan->width, d);
-        if (st != IMP_OK)
-            return st == IMP_CANCELLED
-                       ? st
-                       : imp__error_prefix(plan->p->ctx, st, "%s",
-                                           imp__plan_name(plan->p->scene, &plan->c[i]));
-        if (d->lit == 0)
-            imp__warn(plan->p->ctx, "%s: all values are 0 or saturated: it tells nothing",
+        if (own) IMP_CHECKED(information_find(plan, i));
+    }
+    IMP_CHECKED(imp__plan_parts_share(ctx, plan->data, plan->n_all, n));
+    for (size_t i = 0; i < plan->n_all; i++) {
+        if (plan->data[i].lit == 0)
+            imp__warn(ctx, "%s: all values are 0 or saturated: it tells nothing",
                       imp__plan_name(plan->p->scene, &plan->c[i]));
         else lit += !plan->c[i].have;
     }
     return lit > 0 ? IMP_OK
                    : imp__error(
-                         plan->p->ctx, IMP_E_ARG,
+                         ctx, IMP_E_ARG,
                          "candidates: all values of all of them, %s the first, are 0 or "
                          "saturated",
                          imp__plan_name(plan->p->scene, &plan->c[0]));
@@ -413,7 +432,6 @@ enum imp_status imp_plan(imp_problem *problem,
     IMP_REQUIRE(ctx, result, "result");
     IMP_RUN(ctx, plan.run, run);
     IMP_CHECKED(imp__run_traces(ctx, "imp_plan", &plan.run));
-    IMP_CHECKED(imp__problem_no_parts(problem, "a plan"));
     IMP_CHECKED(imp__plan_options_take(problem, __func__, options, &plan.o));
     IMP_FLOAT_MODE;
     IMP_SETS(problem->scene, st);

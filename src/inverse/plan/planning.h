@@ -50,6 +50,23 @@ enum imp_status imp__plan_information(struct imp_problem *p, struct imp_problem 
                                       const struct imp_run *run, const double *width,
                                       struct imp__plan_data *out);
 
+/* ---- plan_parts.c ---------------------------------------------------------------------- */
+
+/* Is this process to find the information of candidate i of n_all? Of parts, one is; a merge is of none. */
+bool imp__plan_part_has(const imp_context *ctx, size_t candidate, size_t n_all);
+/* A part computes its candidates as one process would: it leaves the team of parts, which is to be put back
+ * into ctx->team if it is not NULL. */
+struct imp__team *imp__plan_part_alone(imp_context *ctx);
+/* Parts and their merge have the same candidates, noise, widths [p->n] and run. */
+enum imp_status imp__plan_parts_same(struct imp_problem *p,
+                                     const struct imp_plan_candidate *candidates,
+                                     size_t n_all, const struct imp_plan_options *options,
+                                     const double *width, const struct imp_run *run);
+/* data [n_all], whose H and deviations are one array: a part keeps its own and returns IMP_PART, a merge
+ * reads those of all. */
+enum imp_status imp__plan_parts_share(imp_context *ctx, struct imp__plan_data *data,
+                                      size_t n_all, size_t n);
+
 /* ---- plan_criterion.c ------------------------------------------------------------------ */
 
 struct imp__plan_model {

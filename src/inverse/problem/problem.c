@@ -297,7 +297,7 @@ static enum imp_status target_check(imp_problem *p, struct imp__target *t)
     return IMP_OK;
 }
 
-/* Values of a photograph are compared by their own size, whatever the exponent: their
+/* Values of a photograph are compared by their own size, whatever the exponent: in covariances their
  * noise is estimated from what is left over. */
 void imp__target_photograph(const struct imp_problem *p, struct imp__target *t)
 {
@@ -309,7 +309,7 @@ void imp__target_photograph(const struct imp_problem *p, struct imp__target *t)
                                             .width = t->desc.width,
                                             .height = t->desc.height,
                                             .channels = t->desc.channels};
-    imp__release(p->ctx, t->noise_se);
+    t->value_noise = t->noise_se;
     t->noise_se = NULL;
     t->desc.noise_se = NULL;
 }

@@ -20,8 +20,10 @@ struct imp__target {
     struct imp_target desc; /* pixels, weights, noise_se point to copies */
     float *pixels, *weights, *noise_se;
     struct imp_photograph photograph; /* the pixels, if they have a gamma; else NULL */
-    struct imp__clip *clip;           /* levels, and who has no weight; NULL: none */
-    const uint8_t *silent; /* of clip, [height][width][channels]; NULL: all count */
+    float *
+        value_noise; /* noise_se of a photograph, for what is far from the scene; NULL: not known */
+    struct imp__clip *clip; /* levels, and who has no weight; NULL: none */
+    const uint8_t *silent;  /* of clip, [height][width][channels]; NULL: all count */
     float *precision; /* a factor of the weight of each value, [height][width][channels];
                          NULL: 1 */
     /* A film with response curves, unless they are three: targets of up to three of

@@ -29,6 +29,7 @@ void imp__target_free(imp_context *ctx, struct imp__target *t)
     imp__release(ctx, t->pixels);
     imp__release(ctx, t->weights);
     imp__release(ctx, t->noise_se);
+    imp__release(ctx, t->value_noise);
     imp__release(ctx, t->precision);
 }
 

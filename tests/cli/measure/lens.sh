@@ -6,9 +6,10 @@ sed 's/<integer name="width" value="24"/<float name="vignetting_2" value="$dark"
 importon render scene.xml -m mono -q -s 0 --seed 9 --spp 256 -D dark=-.3 --set left.x_fov=43 --set left.opencv_k1=-.3 -o left.pfm
 python3 "$ROOT/tests/cli/measure/camera.py" left.pfm left.ppm 2.2 0.01 1
 measure() {
-    importon measure scene.xml left.ppm -m mono -D floor=.4 -D block=.45 --hold '*.gamma.*' --hold 'sky.*' --hold 'lamp.*' \
+    importon measure "$scene" --photo "left=$photo" -m mono -D floor=.4 -D block=.45 --hold '*.gamma.*' --hold 'sky.*' --hold 'lamp.*' \
         --noise .0104 --spp 8 --no-masks --rounds 1 "$@"
 }
+scene=scene.xml photo=left.ppm
 stages() { sed -n 's/^\(round 1, [a-z]*: [0-9]* numbers\).*/\1/p; s/^\(left\.[px][a-z]*_[^ ]*\) .*/\1/p; s/^\(left\.o[^ ]*\) .*/\1/p' | uniq; }
 measure --stages lens,exposure,materials -n 8 -o out | stages
 python3 - <<'P'
@@ -19,5 +20,10 @@ truth = {"left.x_fov": 43, "left.opencv_k1": -.3, "left.vignetting_2.value": -.3
 print(sorted(set(truth) ^ set(rows)), sum(not r["lo95"] <= truth[n] <= r["hi95"] for n, r in rows.items()) <= 1,
       [n for n, r in rows.items() if abs(r["value"] - truth[n]) > 3.5 * r["se"]], [n for n in rows if rows[n]["se"] > (1 if "fov" in n else .2 if "k1" in n else .03)])
 P
+# What is measured, by a smaller photograph.
+sed 's/value="24"/value="12"/; s/value="18"/value="9"/' scene.xml >small.xml
+importon render small.xml -m mono -q -s 0 --seed 9 --spp 64 -o small.pfm
+python3 "$ROOT/tests/cli/measure/camera.py" small.pfm small.ppm 2.2 0.01 1
+scene=small.xml photo=small.ppm
 measure -n 1 -p left.opencv_k2 -p left.principal_point_offset_x --stages cameras,lens | stages
 measure -n 1 --stages exposure,materials | grep -c 'opencv\|x_fov\|, lens' || true
