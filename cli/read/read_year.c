@@ -11,7 +11,7 @@
 #include <string.h>
 
 #define HOURS_MAX 8784 /* of a leap year, the longest that is read */
-#define SPP_LEAST 256  /* samples from which the bias of hours over a bound is small */
+#define SPP_LEAST 1024 /* samples from which the bias of hours over a bound is small */
 
 struct year_wanted year_wanted = {NULL, {8, 18}, 300};
 
@@ -220,10 +220,10 @@ int year_read(struct json *j, const struct imp_run *run, const char *csv, const 
     if (!rc && csv) rc = table_write(csv, &y);
     if (!rc && svg) rc = plan_write(svg, &y);
     if (!rc && cli_spp(run) < SPP_LEAST)
-        cli_say(
-            "importon: warning: %d samples: below %d the autonomy is low by about its "
-            "error, and its interval holds less often than 95 %%",
-            cli_spp(run), SPP_LEAST);
+        cli_say("importon: warning: %d samples: below %d the autonomy may be low by more "
+                "than "
+                "its error, and its interval holds less often than 95 %%",
+                cli_spp(run), SPP_LEAST);
     year_free(&y);
     return rc;
 }

@@ -215,7 +215,8 @@ enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *
     struct imp_job job = imp__job(scene, sensor, &own, NULL);
     imp__job_state(&job, IMP_HAS_PRINTED_WALKS, NULL);
     IMP_CHECKED(imp__job_allowed(&job));
-    integrator = job.walks;
+    struct imp_walk_integrator read;
+    integrator = own.guide ? job.walks : imp__walks_read(scene, sensor, job.walks, &read);
     struct imp_tracer tracer = {.scene = scene,
                                 .integrator = integrator,
                                 .sensor = sensor,

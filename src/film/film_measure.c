@@ -131,9 +131,11 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
                                 .guide = run->guide,
                                 .run = run,
                                 .n = names.n,
-                                .integrator = from,
                                 .from_lights = from && from->from_lights,
                                 .names = (char *)names.text.bytes.data};
+    if (!run->walks && !run->guide)
+        from = imp__walks_read(scene, sensor, from, &out->own);
+    out->integrator = from;
     struct imp_tracer tracer = {.scene = scene, .sensor = sensor};
     const int64_t samples = imp__walks_of(run, sensor);
     imp__tracer_numbers(&tracer, run, samples);

@@ -19,6 +19,7 @@ struct imp_measure {
     int spp;
     int set; /* of samples that depend on each other (imp_picture) */
     const struct imp_walk_integrator *integrator; /* of the scene, from the run's end */
+    struct imp_walk_integrator own;               /* of a grid, where it has its own */
     bool from_lights;
     struct imp_tracer tracer; /* of that integrator, for values */
     int n;                    /* channels */

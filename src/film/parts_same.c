@@ -85,11 +85,13 @@ int imp__same_run(const struct imp_scene *scene, const struct imp_run *run,
     const uint64_t theta[2] = {imp__fingerprint_rays(scene), theta_hash(scene)};
     const uint64_t how[3] = {run->seed, (uint64_t)(run->spp > 0 ? run->spp : sensor->spp),
                              (uint64_t)(run->guide != NULL) | (uint64_t)run->from << 1};
+    struct imp_walk_integrator own;
     int n = 0;
     same[n++] = (struct imp_same){"call", imp__hash_text(0, call)};
     same[n++] = (struct imp_same){"scene", imp__fingerprint_objects(scene)};
     same[n++] = (struct imp_same){"integrator",
-                                  imp__walk_integrator_hash(imp__walk_integrator(scene))};
+                                  imp__walk_integrator_hash(imp__walks_read(
+                                      scene, sensor, imp__walk_integrator(scene), &own))};
     same[n++] = (struct imp_same){"sensor", imp__fingerprint_sensor(sensor)};
     same[n++] =
         (struct imp_same){"set of parameter values", imp__hash(0, theta, sizeof theta)};

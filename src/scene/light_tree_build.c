@@ -7,6 +7,7 @@
  * heuristic of Conty Estevez and Kulla 2018, section 4.1, without energies, which move). */
 #include "base/context.h"
 #include "light_tree.h"
+#include "light_weights.h"
 #include "scene_build.h"
 
 #define BINS  12
@@ -225,21 +226,29 @@ static size_t items_of(const struct imp_emitter *e)
                                         : 1;
 }
 
+/* Chances of lights without end, and of all others against them. */
+static void far_set(struct imp_light_tree *t)
+{
+    const struct imp_scene *scene = t->scene;
+    double far = 0, near = 0;
+    for (int k = 0; k < scene->n_emitters; k++)
+        if (!is_far(scene->emitters[k])) near = imp_max(scene->emitters[k]->weight, near);
+    for (int k = 0; k < t->n_far; k++) {
+        t->far_share[k] = scene->emitters[t->far_light[k]]->weight;
+        far += t->far_share[k];
+    }
+    for (int k = 0; k < t->n_far && far > 0; k++) t->far_share[k] /= far;
+    t->near_chance = far + near > 0 ? near / (far + near) : 0;
+}
+
 static void items_fill(struct imp_light_tree *t)
 {
     struct imp_scene *scene = t->scene;
-    double far = 0, near = 0;
     for (int k = 0; k < scene->n_emitters; k++) {
         const struct imp_emitter *e = scene->emitters[k];
         const size_t n = items_of(e);
         t->first[k] = is_far(e) ? -1 : t->n_items;
-        if (is_far(e)) {
-            t->far_light[t->n_far] = k;
-            t->far_share[t->n_far++] = e->weight;
-            far += e->weight;
-        } else {
-            near = imp_max(e->weight, near);
-        }
+        if (is_far(e)) t->far_light[t->n_far++] = k;
         for (size_t j = 0; j < n; j++) {
             const bool all = !imp__light_in_triangles(e);
             t->item[t->n_items++] = (struct imp_light_item){
@@ -248,8 +257,14 @@ static void items_fill(struct imp_light_tree *t)
                 .part = all ? 1 : triangle_area(e->shape, (int)j) / e->shape->area};
         }
     }
-    for (int k = 0; k < t->n_far && far > 0; k++) t->far_share[k] /= far;
-    t->near_chance = far + near > 0 ? near / (far + near) : 0;
+    far_set(t);
+}
+
+void imp__light_tree_weigh(struct imp_scene *scene)
+{
+    if (!scene->light_tree) return;
+    far_set(scene->light_tree);
+    strengths_set(scene->light_tree);
 }
 
 enum imp_status imp__light_tree_build(struct imp_scene *scene)

@@ -31,7 +31,7 @@ static const char *shape_why(const struct imp_scene *scene, const struct imp_sha
     if (s->index >= imp__shapes_outside(scene)) return "it is in a shape group";
     if (scene->n_media + scene->n_bodies > 0 || scene->priorities)
         return "there are media";
-    if (scene->light_tree) return "lights are chosen by a tree (light_choice)";
+    if (scene->lights_in_tree) return "lights are chosen by a tree (light_choice)";
     if (scene->aims.aimed) return "directions are aimed at shapes";
     if (s->sensor && s->sensor->receiver)
         return "its meter is a grid, or not there, and stays where it is";
@@ -89,7 +89,7 @@ static const char *light_why(const struct imp_scene *scene, const struct imp_emi
         return "it is none of point, spot and ies without a shape (position), and "
                "directional, "
                "spot and ies (direction)";
-    if (scene->light_tree) return "lights are chosen by a tree (light_choice)";
+    if (scene->lights_in_tree) return "lights are chosen by a tree (light_choice)";
     return NULL;
 }
 
@@ -286,6 +286,7 @@ static enum imp_status geometry_add(struct imp_scene *scene, const char *object,
     struct imp_pose **end = &scene->poses;
     while (*end) end = &(*end)->next;
     *end = p;
+    scene->light_tree = NULL; /* that of grids alone: it would have to be made again */
     if (kind != IMP_POSE_VERTICES || !p->normals) return IMP_OK;
     imp__pose_changed(p); /* normals follow vertices from now on */
     return imp__poses_settle(scene);

@@ -145,6 +145,7 @@ struct imp_scene {
     int *environments;   /* [n_environments] emitter indices: radiances of a ray add up */
     double *light_cdf;   /* [n_emitters] by sampling_weight, last is 1 */
     bool lights_in_tree; /* some integrator chooses lights by the tree */
+    bool grids_by_tree;  /* some integrator does so for grids of illuminances alone */
     struct imp_light_tree *light_tree; /* NULL: none does (light_tree.h) */
     int n_bsdf_mixing;
     struct imp_mixing **bsdf_mixing; /* [n_bsdfs] NULL: the integrator's */

@@ -5,6 +5,7 @@
  * top by its name. */
 #include "scene_build.h"
 #include "instances.h"
+#include "kind/sensor/receiver.h"
 #include "light_tree.h"
 #include "priorities.h"
 
@@ -124,6 +125,16 @@ static enum imp_status lights_build(struct imp_scene *scene)
     return IMP_OK;
 }
 
+/* Are there grids of illuminances, which choose among several lights by the tree? */
+static bool grids_need_tree(const struct imp_scene *scene)
+{
+    bool grids = false;
+    if (!scene->grids_by_tree || scene->n_emitters < 2) return false;
+    for (int i = 0; i < scene->n_sensors; i++)
+        grids |= !scene->sensors[i]->gain && imp__has_grid(scene->sensors[i]);
+    return grids;
+}
+
 struct imp_ball imp__ball_around(const struct imp_scene *scene)
 {
     if (!(scene->lo[0] <= scene->hi[0])) return (struct imp_ball){{0}, 1};
@@ -165,7 +176,8 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
         imp__scene_release_files(scene); /* before a tree is built beside them */
         IMP_TRY(imp__intersector_create(scene));
         if (scene->aims.aimed) IMP_TRY(imp__aims_aim(scene));
-        if (scene->lights_in_tree) IMP_TRY(imp__light_tree_build(scene));
+        if (scene->lights_in_tree || grids_need_tree(scene))
+            IMP_TRY(imp__light_tree_build(scene));
         IMP_TRY(imp__media_survey(scene));
     }
     scene->committed = true;

@@ -19,7 +19,14 @@
 #include "walk/core/walk.h"
 #include <importon/rooms.h>
 
-enum { IMP__GROUPS = 16, IMP__VARIANTS = 2 * IMP__GROUPS - 1, IMP__AT_ONCE = 8 };
+/* A number of the year by all groups, by 15 pairs of halves, by 5 times 4 quarters of them. */
+enum {
+    IMP__GROUPS = 16,
+    IMP__HALVES = IMP__GROUPS - 1,
+    IMP__QUARTERED = 5,
+    IMP__VARIANTS = 1 + 2 * IMP__HALVES + 4 * IMP__QUARTERED,
+    IMP__AT_ONCE = 8
+};
 
 /* Numbers of as many hours: hour k is lane k % 8 of block k/8. Their readings have errors of a part
  * in a thousand or more, so floats are enough. */
@@ -101,8 +108,7 @@ void imp__annual_direct(const struct imp__annual *a, int x, int y,
 enum imp_status imp__annual_walks(const struct imp__annual *a, int x, int y,
                                   struct imp__annual_worker *w);
 
-/* annual_sums.c: numbers of a year of one point, each with the halves of groups added and left
- * out: [0] the groups' mean, then E + d and E - d of 15 balanced halves. */
+/* annual_sums.c: numbers of a year of one point, as all groups have them, halves and quarters. */
 enum imp__annual_number {
     IMP__AUTONOMY,
     IMP__CONTINUOUS,

@@ -255,8 +255,9 @@ static struct imp_estimate part_of(const struct imp__annual_numbers *x, size_t n
     for (size_t i = 0; i < n; i++)
         for (int k = 0; k < IMP__VARIANTS; k++) {
             const double here = x[i].of[m][k];
-            v[k] += (least ? here >= bound : here > bound) ? 1 / (double)n : 0;
+            v[k] += least ? here >= bound : here > bound;
         }
+    for (int k = 0; k < IMP__VARIANTS; k++) v[k] /= (double)n;
     struct imp_estimate e = imp__annual_estimate(v);
     e.value = imp_clamp(e.value, 0.0, 1.0);
     return e;

@@ -2,25 +2,32 @@
  *
  * Numbers of a year from the illuminances of its hours, by groups of walks.
  *
- * Most of them count hours. Their errors come from halves of the groups: with x_g the
- * illuminance of an hour by group g, and s_cg = +-1 the rows of Hadamard's matrix of order 16 (in
- * Walsh's way by g & c), the mean of one half and that of the other are
+ * Most of them count hours, and noise makes them wrong on average: it makes min(E, wanted) smaller,
+ * and carries hours over a bound to the side that has fewer. Let T be such a number of the mean
+ * of all 16 groups, and T2 its mean over halves of the groups, whose readings have twice the
+ * variance. An error in proportion to the variance cancels in
  *
- *     x +- d_c,   x = sum_g x_g / 16,   d_c = sum_g s_cg x_g / 16,   c = 1 ... 15
+ *     Q = 2 T - T2
  *
- * Let u_c = (T(x + d_c) - T(x - d_c))/2 and v_c = (T(x + d_c) + T(x - d_c))/2 - T(x) for a number T of
- * the year. Noise makes min(E, wanted) smaller, and carries hours over a bound to the side that
- * has fewer: the mean of v_c is as far from 0 as T(x) is from the truth on average, and is
- * taken off. What is left has the variance
+ * (Richardson 1911), and one in proportion to its square, too, in (8 T - 6 T2 + T4) / 3, with T4 of
+ * quarters. What this has more, (2 T - 3 T2 + T4) / 3, is taken as the error of the extrapolation;
+ * as the value it would have more noise where single hours decide.
  *
- *     sum_c (u_c^2 + 11 (v_c - v)^2) / 15 + v^2,   v = sum_c v_c / 15
+ * The groups' readings x_g of an hour make halves by the rows of Hadamard's matrix of order 16,
+ * s_cg = +-1 (in Walsh's way by g & c), c = 1 ... 15:
  *
- * For a mean v_c is 0, and that is s^2/16 exactly. For a count that many hours near a bound change
- * together, u_c is consistent, since d_c is as large as the error of x (balanced half-samples:
- * McCarthy 1969; Shao and Wu 1992). A single hour at its bound is counted as 2 [e > 0] - P(e),
- * with e the normal error of x and P its distribution: the variance is 7/12, u_c^2 is 1/8 and
- * (v_c - v)^2 is 1/24 on average, hence the factor 11. The correction v, an estimate of second
- * order, is itself a part of the error. */
+ *     x +- d_c,   x = sum_g x_g / 16,   d_c = sum_g s_cg x_g / 16
+ *
+ * The product of two rows is the row a ^ b, so the rows a, b, a ^ b make quarters,
+ * x + s d_a + t d_b + s t d_(a ^ b) with s, t = +-1. Five such triples have every row once: each of
+ * the 15 pairs of halves is divided into quarters, once. With Q+ and Q- of a pair, each half
+ * and its quarters by themselves, u_c = (Q+ - Q-) / 2 has the variance that Q has of all groups
+ * where variances go with 1/groups: that of a mean does, and of a count that many hours near a
+ * bound change together, since halves move as many hours as the noise does, with the covariance
+ * of hours and points in it (balanced half-samples: McCarthy 1969; Shao and Wu 1992). Where hours
+ * are counted one by one it falls more slowly: the variances V2 and V4 of T over halves and over
+ * quarters say how much, and the mean of u_c^2 counts 2 V2 / V4 times. For a single hour at its
+ * bound that is twice; T has the variance 1/4 there, Q 7/12, and the mean of u_c^2 is 5/16. */
 #include "annual.h"
 #include <math.h>
 #include <string.h>
@@ -37,33 +44,84 @@ static inline void walsh(double x[IMP__GROUPS])
             }
 }
 
-/* The mean of the groups, and of the halves. */
+/* Rows whose products are the third, every row in one of them. */
+static const uint8_t triple[IMP__QUARTERED][3] = {
+    {1, 2, 3}, {4, 8, 12}, {5, 10, 15}, {6, 11, 13}, {7, 9, 14}};
+
+/* Where the variants are: of half `sign` (0: x + d) by row c from 1 on; of quarter k of triple q,
+ * in the half 0 of the first row if k < 2, of the second if k is even. */
+static inline int half_at(int c, int sign) { return sign * IMP__HALVES + c; }
+static inline int quarter_at(int q, int k) { return 1 + 2 * IMP__HALVES + 4 * q + k; }
+
+/* The mean of the groups, of the halves and of the quarters, from sums by rows: x[0] the mean, x[c]
+ * what is d_c above. */
+#define VARIANTS_FILL(x, out)                                                            \
+    do {                                                                                 \
+        (out)[0] = (x)[0];                                                               \
+        for (int c_ = 1; c_ < IMP__GROUPS; c_++) {                                       \
+            (out)[half_at(c_, 0)] = (x)[0] + (x)[c_];                                    \
+            (out)[half_at(c_, 1)] = (x)[0] - (x)[c_];                                    \
+        }                                                                                \
+        for (int q_ = 0; q_ < IMP__QUARTERED; q_++) {                                    \
+            const uint8_t *r_ = triple[q_];                                              \
+            const int at_ = quarter_at(q_, 0);                                           \
+            (out)[at_] = (out)[half_at(r_[0], 0)] + ((x)[r_[1]] + (x)[r_[2]]);           \
+            (out)[at_ + 1] = (out)[half_at(r_[0], 0)] - ((x)[r_[1]] + (x)[r_[2]]);       \
+            (out)[at_ + 2] = (out)[half_at(r_[0], 1)] + ((x)[r_[1]] - (x)[r_[2]]);       \
+            (out)[at_ + 3] = (out)[half_at(r_[0], 1)] - ((x)[r_[1]] - (x)[r_[2]]);       \
+        }                                                                                \
+    } while (0)
+
 static inline void variants_of(const double group[IMP__GROUPS], double out[IMP__VARIANTS])
 {
     double x[IMP__GROUPS];
     for (int g = 0; g < IMP__GROUPS; g++) x[g] = group[g] * (1. / IMP__GROUPS);
     walsh(x);
-    out[0] = x[0];
-    for (int c = 1; c < IMP__GROUPS; c++) {
-        out[c] = x[0] + x[c];
-        out[IMP__GROUPS - 1 + c] = x[0] - x[c];
+    VARIANTS_FILL(x, out);
+}
+
+/* Quarters of the halves of row j of a triple. */
+static double quarters_mean(const double v[IMP__VARIANTS], int q, int j, int sign)
+{
+    static const uint8_t in[3][2][2] = {
+        {{0, 1}, {2, 3}}, {{0, 2}, {1, 3}}, {{0, 3}, {1, 2}}};
+    const uint8_t *k = in[j][sign];
+    return (v[quarter_at(q, k[0])] + v[quarter_at(q, k[1])]) / 2;
+}
+
+/* Sums over a triple's halves and quarters, of what they have more than all groups. */
+struct spread {
+    double half, quarter; /* means over all */
+    double own, halves,
+        quarters; /* means of u_c^2, and variances of T(half) and T(quarter) */
+};
+static void triple_add(const double v[IMP__VARIANTS], int q, struct spread *s)
+{
+    double mean = 0;
+    for (int k = 0; k < 4; k++) mean += v[quarter_at(q, k)] / 4;
+    for (int k = 0; k < 4; k++)
+        s->quarters += imp__sqr(v[quarter_at(q, k)] - mean) / (3 * IMP__QUARTERED);
+    s->quarter += (mean - v[0]) / IMP__QUARTERED;
+    for (int j = 0; j < 3; j++) {
+        double T[2], Q[2];
+        for (int sign = 0; sign < 2; sign++) {
+            T[sign] = v[half_at(triple[q][j], sign)] - v[0];
+            Q[sign] = 2 * T[sign] - (quarters_mean(v, q, j, sign) - v[0]);
+            s->half += T[sign] / (2 * IMP__HALVES);
+        }
+        s->own += imp__sqr((Q[0] - Q[1]) / 2) / IMP__HALVES;
+        s->halves += imp__sqr(T[0] - T[1]) / (2 * IMP__HALVES);
     }
 }
 
 struct imp_estimate imp__annual_estimate(const double v[IMP__VARIANTS])
 {
-    double across = 0, along = 0, bias = 0;
-    for (int c = 1; c < IMP__GROUPS; c++) {
-        const double up = v[c] - v[0], down = v[IMP__GROUPS - 1 + c] - v[0];
-        across += imp__sqr((up - down) / 2);
-        along += imp__sqr((up + down) / 2);
-        bias += (up + down) / 2;
-    }
-    const double n = IMP__GROUPS - 1;
-    bias /= n;
-    return (struct imp_estimate){
-        v[0] - bias,
-        sqrt(across / n + 11 * imp_max(along / n - bias * bias, 0.0) + bias * bias), 2};
+    struct spread s = {0};
+    for (int q = 0; q < IMP__QUARTERED; q++) triple_add(v, q, &s);
+    const double next = (s.quarter - 3 * s.half) / 3;
+    const double slower =
+        s.quarters > 0 ? imp_clamp(2 * s.halves / s.quarters, 1.0, 2.0) : 1;
+    return (struct imp_estimate){v[0] - s.half, sqrt(slower * s.own + imp__sqr(next)), 2};
 }
 
 /* A part of the hours. */
@@ -110,11 +168,7 @@ static inline void variants_at_once(const lanes group[IMP__GROUPS],
                 x[k] = a + b;
                 x[k + step] = a - b;
             }
-    out[0] = x[0];
-    for (int c = 1; c < IMP__GROUPS; c++) {
-        out[c] = x[0] + x[c];
-        out[IMP__GROUPS - 1 + c] = x[0] - x[c];
-    }
+    VARIANTS_FILL(x, out);
 }
 
 /* Sums over some blocks, by lanes: counts, and numbers of hours that are not whole. */

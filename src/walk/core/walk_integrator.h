@@ -84,6 +84,13 @@ const struct imp_walk_integrator *imp__walk_integrator(const struct imp_scene *s
  * has no such end. */
 const struct imp_walk_integrator *imp__walks_from(const struct imp_walk_integrator *of,
                                                   enum imp_from from);
+/* The settings of walks that read `sensor`: those of a grid of illuminances choose among several lights
+ * by the tree, if nobody said how (docs/decisions.md, rooms). *own holds them where they are
+ * not `of`. */
+const struct imp_walk_integrator *imp__walks_read(const struct imp_scene *scene,
+                                                  const struct imp_sensor *sensor,
+                                                  const struct imp_walk_integrator *of,
+                                                  struct imp_walk_integrator *own);
 /* Hash of the settings, for files made with walks (scene/fingerprint.h); NULL has one. */
 uint64_t imp__walk_integrator_hash(const struct imp_walk_integrator *integrator);
 

@@ -3,6 +3,7 @@
  * Settings of integrators of walks, read from the scene and settled when all of it is
  * there. */
 #include "walk_settings.h"
+#include "kind/sensor/receiver.h"
 
 enum imp_status imp__depth_read(const struct imp_build *build, int fallback,
                                 struct imp_integrator *i, struct imp_walk_integrator *w)
@@ -39,7 +40,22 @@ void imp__light_choice_ready(struct imp_scene *scene, struct imp_walk_integrator
         (w->light_choice == BY_TREE ||
          (w->light_choice == BY_COUNT && scene->n_emitters >= LIGHTS_MANY));
     scene->lights_in_tree |= w->light_tree;
+    scene->grids_by_tree |= w->lights && !w->both && w->light_choice == BY_COUNT;
     if (w->other_end) w->other_end->light_tree = w->light_tree;
+}
+
+const struct imp_walk_integrator *imp__walks_read(const struct imp_scene *scene,
+                                                  const struct imp_sensor *sensor,
+                                                  const struct imp_walk_integrator *of,
+                                                  struct imp_walk_integrator *own)
+{
+    if (!of || of->light_tree || of->light_choice != BY_COUNT || !of->lights ||
+        of->from_lights || of->both || !scene->light_tree || sensor->gain ||
+        !imp__has_grid(sensor))
+        return of;
+    *own = *of;
+    own->light_tree = true;
+    return own;
 }
 
 #define SPLIT_MAX 6
