@@ -5,6 +5,7 @@
  * a shape of the scene or on one that is not there, and for grids of points: planar, turned,
  * cylindrical and semicylindrical; below area lamps, point lamps and skies, behind a block. What is
  * refused. */
+#include "egg.h"
 #include "mean_gradient.h"
 #include "moves_numbers.h"
 
@@ -47,26 +48,16 @@
     "<shape type='sphere'><point name='center' x='0' y='0' z='.5'/><float "              \
     "name='radius' value='.2'/>" GREY                                                    \
     "<sensor type='irradiancemeter'>" FILM("1", "1") "</sensor></shape>"
+#define EGG_FILE "moved_meters_egg.obj"
 #define EGG                                                                              \
-    "<shape type='obj'><string name='filename' value='%s'/><transform name='to_world'>"  \
-    "<translate x='-1.5' z='.5'/></transform>" GREY "</shape>"
-
-static char egg_file[] = "/tmp/moved_meters_XXXXXX.obj";
-static void egg_write(void)
-{
-    FILE *f = fdopen(mkstemps(egg_file, 4), "w");
-    fputs("v .2 .2 .2\nv -.2 -.2 .2\nv -.2 .2 -.2\nv .2 -.2 -.2\nvn 1 1 1\nvn -1 -1 1\n"
-          "vn -1 1 -1\nvn 1 -1 -1\nf 1//1 3//3 2//2\nf 1//1 2//2 4//4\nf 1//1 4//4 "
-          "3//3\nf 2//2 3//3 4//4\n",
-          f);
-    fclose(f);
-}
+    "<shape type='obj' id='egg'><string name='filename' value='" EGG_FILE                \
+    "'/><transform name='to_world'><scale value='.5'/><translate x='-.6' y='-.4' "       \
+    "z='.7'/></transform>" GREY "</shape>"
 
 /* A floor, a wall, a block above the meter; REST: the meter, lights, integrator. */
 static imp_scene *room(const char *rest)
 {
-    char xml[8192], own[4096];
-    snprintf(own, sizeof own, rest, egg_file);
+    char xml[8192];
     snprintf(xml, sizeof xml,
              "<scene version='3.0.0'>%s"
              "<shape type='rectangle' id='floor'><transform name='to_world'><scale "
@@ -78,7 +69,7 @@ static imp_scene *room(const char *rest)
              "<shape type='cube' id='block'><transform name='to_world'><scale x='.4' "
              "y='.3' z='.1'/><rotate z='1' angle='25'/><rotate x='1' angle='15'/>"
              "<translate x='.3' y='.1' z='1.1'/></transform>" GREY "</shape></scene>",
-             own);
+             rest);
     return test_scene_text(ctx, xml, IMP_RGB);
 }
 
@@ -155,7 +146,7 @@ int main(int argc, char **argv)
                                           {NULL, 0, 0}};
     ctx = test_context(2);
     adjoint_make();
-    egg_write();
+    egg_write(EGG_FILE, true);
     point_test();
     numbers_compare("lamp", room(AREA DIRECT LAMP), 256 * more, 256 * more, .1, lamp);
     numbers_compare("over bounces", room(AREA PATH LAMP), 256 * more, 512 * more, .1,
@@ -182,6 +173,6 @@ int main(int argc, char **argv)
                    "vertex normals");
     number_refused("a grid that moves", room(VIRTUAL("") PATH LAMP), "table.pose",
                    "meter");
-    remove(egg_file);
+    remove(EGG_FILE);
     return tap_done();
 }
