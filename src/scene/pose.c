@@ -174,6 +174,10 @@ static enum imp_status pose_apply(struct imp_pose *p)
 {
     p->due = false;
     if (p->shape >= 0) return shape_apply(p);
+    if (p->instance >= 0) {
+        const struct imp_map by = map_of(p);
+        return imp__instance_apply(p, &by);
+    }
     if (p->sensor) return sensor_apply(p);
     light_apply(p);
     return IMP_OK;
@@ -266,7 +270,8 @@ enum imp_status imp__poses_settle(struct imp_scene *scene)
     if (imp_likely(!scene->moved)) return IMP_OK;
     for (struct imp_pose *p = scene->poses; p; p = p->next) {
         if (!p->due) continue;
-        scene->reshaped |= p->shape >= 0;
+        imp_v3 lo, hi;
+        scene->reshaped |= imp__pose_box(p, &lo, &hi);
         const char *wrong = NULL;
         const enum imp_status st = pose_apply(p);
         if (st != IMP_OK) {
@@ -292,8 +297,7 @@ enum imp_status imp__poses_settle(struct imp_scene *scene)
     }
     if (scene->reshaped) {
         bounds_update(scene);
-        imp__intersector_destroy(scene);
-        const enum imp_status st = imp__intersector_create(scene);
+        const enum imp_status st = imp__intersector_renew(scene);
         if (st != IMP_OK) return st;
     }
     scene->moved = scene->reshaped = false;

@@ -28,7 +28,8 @@ static const char *shape_why(const struct imp_scene *scene, const struct imp_sha
 {
     if (!s->ops->move)
         return "it is not made of triangles, and no sphere, disk or cylinder";
-    if (s->index >= imp__shapes_outside(scene)) return "it is in a shape group";
+    if (s->index >= imp__shapes_outside(scene))
+        return "it is in a shape group: its instances have poses";
     if (scene->n_media + scene->n_bodies > 0 || scene->priorities)
         return "there are media";
     if (scene->light_tree) return "lights are chosen by a tree (light_choice)";
@@ -134,19 +135,25 @@ static enum imp_status object_find(struct imp_scene *scene, const char *name,
     for (int k = 0; k < scene->n_emitters; k++)
         if (!scene->emitters[k]->shape && strcmp(scene->emitters[k]->name, name) == 0)
             return light_find(scene, k, p);
+    if (imp__instance_find(scene, name, p))
+        return found(scene, name, p, imp__instance_why(scene, p->instance, p->kind));
     char whole[256];
     snprintf(whole, sizeof whole, "%s.%s", name, imp__pose_tail(p->kind));
     return imp__error(scene->ctx, IMP_E_ARG, "there is no %s '%s'%s",
-                      p->kind >= IMP_POSE_POSITION ? "light" : "shape or camera", name,
-                      imp__theta_near(scene, whole).text);
+                      p->kind >= IMP_POSE_POSITION ? "light"
+                                                   : "shape, instance or camera",
+                      name, imp__theta_near(scene, whole).text);
 }
 
 static enum imp_status rest_keep(struct imp_scene *scene, struct imp_pose *p)
 {
     p->rest = imp__arena_take(&scene->arena, 1, p->rest_size);
     if (!p->rest) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
-    if (p->sensor || p->emitter) {
-        memcpy(p->rest, p->sensor ? p->sensor->self : p->emitter->self, p->rest_size);
+    if (p->shape < 0) {
+        const void *self = p->sensor    ? p->sensor->self
+                           : p->emitter ? p->emitter->self
+                                        : &scene->world->instance[p->instance];
+        memcpy(p->rest, self, p->rest_size);
         return IMP_OK;
     }
     const struct imp_shape *s = scene->shapes[p->shape];
@@ -247,7 +254,8 @@ static bool is_there(const struct imp_scene *scene, struct imp_pose *p)
 {
     p->object = p;
     for (struct imp_pose *q = scene->poses; q; q = q->next) {
-        if (q->shape != p->shape || q->sensor != p->sensor || q->emitter != p->emitter)
+        if (q->shape != p->shape || q->sensor != p->sensor || q->emitter != p->emitter ||
+            q->instance != p->instance)
             continue;
         if (q->kind == p->kind) return true;
         p->object = q->object;
@@ -271,7 +279,7 @@ static enum imp_status geometry_add(struct imp_scene *scene, const char *object,
     if (!p) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
     p->scene = scene;
     p->kind = kind;
-    p->shape = -1;
+    p->shape = p->instance = -1;
     IMP_CHECKED(object_find(scene, object, p));
     if (is_there(scene, p)) return IMP_OK;
     const bool others =
@@ -293,9 +301,10 @@ static enum imp_status geometry_add(struct imp_scene *scene, const char *object,
 
 /* ---- Names ---------------------------------------------------------------------------- */
 
-/* Object k: shapes, then sensors, then lights without a shape; may it have such a number? */
+/* Object k: shapes, then sensors, then lights without a shape, then instances; may it have such a
+ * number? */
 static const char *object_name(const struct imp_scene *scene, int k,
-                               enum imp_pose_kind kind)
+                               enum imp_pose_kind kind, char own[200])
 {
     imp_v3 centre;
     if (k < scene->n_shapes) {
@@ -307,17 +316,25 @@ static const char *object_name(const struct imp_scene *scene, int k,
         struct imp_sensor *s = scene->sensors[k];
         return sensor_why(s, kind, &centre) ? NULL : s->name;
     }
-    const struct imp_emitter *e = scene->emitters[k - scene->n_sensors];
+    k -= scene->n_sensors;
+    if (k >= scene->n_emitters) {
+        k -= scene->n_emitters;
+        imp__instance_name(scene, k, own);
+        return imp__instance_why(scene, k, kind) ? NULL : own;
+    }
+    const struct imp_emitter *e = scene->emitters[k];
     return e->shape || light_why(scene, e, kind) ? NULL : e->name;
 }
 
 bool imp__geometry_next(const struct imp_scene *scene, struct imp_geometry_walk *at)
 {
-    const int n = scene->n_shapes + scene->n_sensors + scene->n_emitters;
     if (!scene->committed || scene->rayless) return false;
+    const int n = scene->n_shapes + scene->n_sensors + scene->n_emitters +
+                  imp__pose_instances_listed(scene);
+    char own[200];
     for (; at->next < n * IMP_POSE_KINDS; at->next++) {
         const enum imp_pose_kind kind = (enum imp_pose_kind)(at->next % IMP_POSE_KINDS);
-        const char *name = object_name(scene, at->next / IMP_POSE_KINDS, kind);
+        const char *name = object_name(scene, at->next / IMP_POSE_KINDS, kind, own);
         if (!name) continue;
         snprintf(at->name, sizeof at->name, "%s.%s", name, imp__pose_tail(kind));
         at->next++;

@@ -70,37 +70,44 @@ static void circles_find(struct imp__boundary *b)
     }
 }
 
-static struct imp__edge_item round_item(const struct imp_scene *scene, int shape)
+static struct imp__edge_item round_item(const struct imp__boundary *b,
+                                        const struct imp__body *body)
 {
-    struct imp__edge_item item = {.kind = IMP_ITEM_ROUND, .shape = shape};
-    const bool disk = imp__moves_disk(scene, shape);
-    for (int k = 0; k < imp__rims(scene, shape); k++) {
-        int rim;
-        const int other = imp__rim_beside(scene, shape, k, &rim);
-        if (other < 0) continue;
-        if (disk) item.wall = imp__rim(scene, other, rim, 0).out;
+    const struct imp_scene *scene = b->tracer->scene;
+    struct imp__edge_item item = {
+        .kind = IMP_ITEM_ROUND, .shape = body->shape, .place = body->place};
+    const bool disk = imp__moves_disk(scene, body->shape);
+    for (int k = 0; k < imp__rims(scene, body->shape); k++) {
+        const struct imp__rim_name rim = {body->shape, body->place, k};
+        struct imp__rim_name beside;
+        if (!imp__rim_beside(b->edges, scene, &rim, &beside)) continue;
+        if (disk)
+            item.wall = imp__rim(scene, beside.shape, beside.place, beside.k, 0).out;
         else item.closed[k] = true;
     }
     return item;
 }
 
-/* What has edges that are in no list: two of a shape at most. */
+/* What has edges that are in no list: two of a body at most. */
 static enum imp_status items_find(struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
     const size_t most =
-        2 * (size_t)scene->n_shapes + IMP_SKY_CIRCLES * (size_t)scene->n_environments;
+        2 * b->edges->n_bodies + IMP_SKY_CIRCLES * (size_t)scene->n_environments;
     b->item = imp__alloc(scene->ctx, most + 1, sizeof *b->item);
     if (!b->item) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
     circles_find(b);
-    for (int k = 0; k < imp__shapes_outside(scene); k++) {
-        if (imp__shape_is_absent(scene->shapes[k])) continue;
-        if (imp__moves_curved(scene, k)) b->item[b->n_items++] = round_item(scene, k);
-        if (!imp__moves_smooth(scene, k)) continue;
+    for (size_t k = 0; k < b->edges->n_bodies; k++) {
+        const struct imp__body *body = &b->edges->body[k];
+        if (imp__moves_curved(scene, body->shape, body->place))
+            b->item[b->n_items++] = round_item(b, body);
+        if (!imp__moves_smooth(scene, body->shape)) continue;
         for (int i = 0; i < 2; i++) {
             struct imp__edge_item *item = &b->item[b->n_items++];
-            *item = (struct imp__edge_item){
-                .kind = i ? IMP_ITEM_HORIZON : IMP_ITEM_SHADING, .shape = k};
+            *item =
+                (struct imp__edge_item){.kind = i ? IMP_ITEM_HORIZON : IMP_ITEM_SHADING,
+                                        .shape = body->shape,
+                                        .place = body->place};
             IMP_CHECKED(imp__edge_item_measure(b, item));
         }
     }
@@ -120,11 +127,13 @@ static double item_length(const struct imp__boundary *b,
     const struct imp_shape *s = b->tracer->scene->shapes[item->shape];
     struct imp_round round;
     struct imp__tube tube;
-    if (imp__moves_sphere(b->tracer->scene, item->shape, &round))
+    if (imp__moves_sphere(b->tracer->scene, item->shape, item->place, &round))
         return IMP_2PI * round.radius;
-    if (imp__moves_cylinder(b->tracer->scene, item->shape, &tube))
+    if (imp__moves_cylinder(b->tracer->scene, item->shape, item->place, &tube))
         return 2 * IMP_2PI * tube.radius + 2 * tube.length;
-    if (item->kind == IMP_ITEM_ROUND) return IMP_2PI * sqrt(s->area * IMP_INV_PI);
+    if (item->kind == IMP_ITEM_ROUND)
+        return IMP_2PI * sqrt(s->area * IMP_INV_PI) *
+               imp__place_scale(b->tracer->scene, item->place);
     if (kind == IMP_BOUNDARY_LIGHT) return 0;
     if (kind == IMP_BOUNDARY_FILM && item->n_seen == 0) return 0;
     return IMP_PI * sqrt(item->until[s->triangles.n_triangles] * IMP_INV_PI / 4);

@@ -64,6 +64,7 @@ enum imp__edge_item_kind {
 struct imp__edge_item {
     enum imp__edge_item_kind kind;
     int shape;
+    int64_t place;                /* the instance that the shape is in; 0: none */
     struct imp_sky_circle circle; /* IMP_ITEM_SKY */
     /* IMP_ITEM_ROUND: rims of a cylinder that a disk closes, whose edge they are; of such a disk the
      * direction out of the cylinder, at its end; 0: it closes none. */
@@ -115,7 +116,7 @@ static inline int imp__flux_end_shape(const struct imp__flux_end *e)
 {
     return e->camera  ? IMP_MOVE_CAMERA
            : e->light ? IMP_MOVE_EMITTER(e->light - 1)
-                      : e->x.shape;
+                      : e->x.carrier;
 }
 
 /* What one draw brings to a film position: L times the sum of bar times velocity over its ends. */

@@ -36,7 +36,7 @@ struct imp__flux_end imp__meter_end(const struct imp__edge_draw *d,
 {
     const struct imp_sensor *s = d->b->tracer->sensor;
     const struct imp__glued x =
-        imp__glued_at(d->b->tracer->scene, s->shape->index, &to->located, to->ng);
+        imp__glued_at(d->b->tracer->scene, s->shape->index, &to->located, 0, to->ng);
     return imp__flux_glued(&x, bar);
 }
 
@@ -67,7 +67,7 @@ static void emission_add(struct imp__edge_draw *d, const struct imp_sensor_sampl
     struct imp__flux *f = jump_add(d, to, v->e * times, m);
     if (!f) return;
     const struct imp__glued y =
-        imp__glued_at(d->b->tracer->scene, v->d.shape, &v->d.located, v->ng);
+        imp__glued_at(d->b->tracer->scene, v->d.shape, &v->d.located, 0, v->ng);
     const double t_x = imp__length(d->p - to->p),
                  far = imp_clamp(1 - t_x / imp__length(y.p - to->p), 0.0, 1.0);
     f->end[f->n_ends++] = imp__meter_end(d, to, m * -far);
@@ -171,7 +171,7 @@ void imp__meter_reach(struct imp__edge_draw *d, const struct imp__meter_point *x
     const struct imp_located located =
         imp__located_drawn(s->shape, &x->at.located, x->at.uv);
     const struct imp__glued at =
-        imp__glued_at(d->b->tracer->scene, s->shape->index, &located, x->at.ng);
+        imp__glued_at(d->b->tracer->scene, s->shape->index, &located, 0, x->at.ng);
     f->end[f->n_ends++] = imp__flux_glued(&at, light->slide);
 }
 

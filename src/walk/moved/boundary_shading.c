@@ -19,30 +19,15 @@
 
 /* ---- Lists ------------------------------------------------------------------------------ */
 
-static imp_v3 triple(const float *array, uint32_t i)
+static struct imp__corners corners(const struct imp__boundary *b,
+                                   const struct imp__edge_item *item, size_t prim)
 {
-    const float *p = array + 3 * (size_t)i;
-    return imp__v3(p[0], p[1], p[2]);
-}
-
-struct corners {
-    imp_v3 p[3], n[3];
-};
-static struct corners corners(const struct imp_shape *s, size_t prim)
-{
-    const uint32_t *i = s->triangles.indices + 3 * prim;
-    const struct imp__mesh *m = s->self;
-    struct corners c;
-    for (int k = 0; k < 3; k++) {
-        c.p[k] = triple(s->triangles.positions, i[k]);
-        c.n[k] = triple(m->normals, i[k]);
-    }
-    return c;
+    return imp__corners(b->tracer->scene, item->shape, (int)prim, item->place);
 }
 
 /* May N.(eye - p) vanish in the triangle, for an eye within `radius` of the camera? It is a quadratic
  * form of the weights, between the least and the largest of its Bezier coefficients. */
-static bool may_turn(const struct corners *c, imp_v3 camera, double radius)
+static bool may_turn(const struct imp__corners *c, imp_v3 camera, double radius)
 {
     double lo = INFINITY, hi = -INFINITY, most = 0;
     for (int i = 0; i < 3; i++) most = imp_max(most, imp__length(c->n[i]));
@@ -56,7 +41,7 @@ static bool may_turn(const struct corners *c, imp_v3 camera, double radius)
     return lo <= most * radius && hi >= -most * radius;
 }
 
-static double perimeter(const struct corners *c)
+static double perimeter(const struct imp__corners *c)
 {
     return imp__length(c->p[1] - c->p[0]) + imp__length(c->p[2] - c->p[1]) +
            imp__length(c->p[0] - c->p[2]);
@@ -84,7 +69,7 @@ static enum imp_status seen_find(const struct imp__boundary *b,
     item->seen_until[0] = 0;
     const double radius = b->wide ? lens_radius(b) : 0;
     for (size_t k = 0; k < n; k++) {
-        const struct corners c = corners(s, k);
+        const struct imp__corners c = corners(b, item, k);
         const double distance = imp__length(c.p[0] - b->camera) + 1e-6 * b->size;
         if (!may_turn(&c, b->camera, radius) || !(item->until[k + 1] > item->until[k]))
             continue;
@@ -106,7 +91,7 @@ enum imp_status imp__edge_item_measure(const struct imp__boundary *b,
     if (!item->until) return imp__error(ctx, IMP_E_NOMEM, "no memory for vertex normals");
     item->until[0] = 0;
     for (size_t k = 0; k < n; k++) {
-        const struct corners c = corners(s, k);
+        const struct imp__corners c = corners(b, item, k);
         item->until[k + 1] =
             item->until[k] +
             0.5 * imp__length(imp__cross(c.p[1] - c.p[0], c.p[2] - c.p[0]));
@@ -140,9 +125,10 @@ static size_t entry_choose(const double *until, size_t n, double *u, double *cha
 static void surface_at(const struct imp__edge_draw *d, struct imp_hit *hit,
                        struct imp_surface *at)
 {
-    const struct imp_shape *s = d->b->tracer->scene->shapes[d->item->shape];
+    const imp_v3 unused = {0};
     hit->shape = d->item->shape;
-    s->ops->surface(s, hit, NULL, NULL, at);
+    hit->place = d->item->place;
+    imp__hit_surface(d->b->tracer->scene, hit, &unused, &unused, at);
 }
 
 bool imp__edge_item_point(struct imp__edge_draw *d, struct imp_hit *hit,
@@ -169,11 +155,10 @@ bool imp__edge_item_point(struct imp__edge_draw *d, struct imp_hit *hit,
 static bool seen_point(struct imp__edge_draw *d, struct imp_hit *hit)
 {
     const struct imp__edge_item *item = d->item;
-    const struct imp_shape *s = d->b->tracer->scene->shapes[item->shape];
     double chance, u = d->u;
     const int prim =
         item->seen[entry_choose(item->seen_until, item->n_seen, &u, &chance)];
-    const struct corners c = corners(s, (size_t)prim);
+    const struct imp__corners c = corners(d->b, item, (size_t)prim);
     const double round = perimeter(&c);
 
     /* A point of the perimeter, on side k, and a direction by the cosine to the side's normal. */
@@ -254,7 +239,7 @@ static bool turning_at(const struct imp__edge_draw *d, const struct imp_hit *hit
                        struct turning *out)
 {
     const struct imp_located located = {hit->prim, {(float)hit->u, (float)hit->v}};
-    out->x = imp__glued_at(d->b->tracer->scene, hit->shape, &located, at->ng);
+    out->x = imp__glued_at(d->b->tracer->scene, hit->shape, &located, hit->place, at->ng);
     if (!out->x.smooth) return false;
     const imp_v3 n = out->x.shade - out->x.n * imp__dot(out->x.n, out->x.shade);
     const imp_v3 grad = out->x.slope[0] * imp__dot(out->x.turn[0], w) +
@@ -278,8 +263,10 @@ static bool look_next(struct imp__edge_draw *d, const struct turning *x, double 
 {
     struct imp_hit hit;
     const imp_v3 r = imp__normalize(x->x.p + x->beside * sign - o), by = x->next * sign;
+    const struct imp__edge_face face = {
+        .shape = x->x.shape, .prim = x->x.prim, .place = x->x.place};
     if (!imp__intersect(d->b->tracer->scene, &o, &r, 0, INFINITY, &hit) ||
-        hit.shape != x->x.shape || hit.prim != x->x.prim || hit.place != 0)
+        !imp__edge_face_hit(d, &face, &hit))
         return false;
     hit.u = x->x.b[1] + imp__dot(x->x.slope[0], by);
     hit.v = x->x.b[2] + imp__dot(x->x.slope[1], by);

@@ -28,7 +28,7 @@ static bool is_textured(const struct imp_input *const *input, int n)
 
 static enum imp_status materials_allowed(const struct imp_tracer *t)
 {
-    for (int k = 0; k < t->scene->n_shapes; k++) {
+    for (int k = 0; k < t->scene->n_all_shapes; k++) {
         const struct imp_shape *s = t->scene->shapes[k];
         const struct imp_bsdf *b = imp__shape_bsdf(t->scene, s);
         const char *why =
@@ -61,7 +61,7 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
         if (!sky && (e->shaped || is_textured(e->input, e->n_in)))
             return refuse(t, "light", e->name, e->ops->name, "has a texture");
         if (e->shape && e->shape->geometry != IMP_TRIANGLES &&
-            !imp__moves_curved(t->scene, e->shape->index))
+            !imp__moves_curved(t->scene, e->shape->index, 0))
             return refuse(t, "light", e->name, e->ops->name,
                           "is on a shape that is not made of triangles, and no sphere, "
                           "disk or circular cylinder");
@@ -100,12 +100,12 @@ static enum imp_status meter_allowed(const struct imp_tracer *t)
     const struct imp_shape *on = s->shape;
     const bool flat = on->ops->flags & IMP_SHAPE_FLAT || s->receiver;
     if (!s->ops->connect || !flat ||
-        (on->geometry != IMP_TRIANGLES && !imp__moves_curved(t->scene, on->index)))
+        (on->geometry != IMP_TRIANGLES && !imp__moves_curved(t->scene, on->index, 0)))
         return refuse(t, "sensor", s->name, s->ops->name, "is on no flat shape");
     if (on->smooth)
         return refuse(t, "sensor", s->name, s->ops->name,
                       "is on a mesh with vertex normals (face_normals makes it flat)");
-    for (int k = 0; k < t->scene->n_shapes; k++)
+    for (int k = 0; k < t->scene->n_all_shapes; k++)
         if (imp__moves_smooth(t->scene, k))
             return refuse(t, "sensor", s->name, s->ops->name,
                           "sees a mesh with vertex normals (face_normals makes it flat)");
