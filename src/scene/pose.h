@@ -106,7 +106,8 @@ bool imp__pinhole(const struct imp_sensor *sensor, imp_v3 *centre);
 /* The point of its lens that rays with these numbers go through; a pinhole has one. False: none. */
 bool imp__lens_point(const struct imp_sensor *sensor, const double lens[2],
                      imp_v3 *point);
-/* That point, or the middle of a lens whose rays to a film position meet in a point. False: neither. */
+/* That point, or the middle of a lens whose rays to a film position meet in a point, or of the film of
+ * a camera that moves and has parallel rays. False: none of these. */
 bool imp__lens_middle(const struct imp_sensor *sensor, imp_v3 *centre);
 
 /* The rotation of a vector of rotation, row by row. */

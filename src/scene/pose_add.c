@@ -68,7 +68,7 @@ static const char *sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
 {
     if (kind != IMP_POSE_RIGID && !imp__pose_is_view(kind)) return "it is a sensor";
     double number[IMP_VIEW_NUMBERS];
-    if (!s->ops->move) return "it is no perspective camera or thin lens";
+    if (!s->ops->move) return "it is no perspective or orthographic camera or thin lens";
     if (s->medium) return "it is in a medium";
     if (!imp__lens_middle(s, centre)) return "its rays meet in no point";
     if (kind == IMP_POSE_RIGID) return NULL;

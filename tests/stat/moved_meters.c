@@ -140,6 +140,13 @@ int main(int argc, char **argv)
                                          {NULL, 0, 0}};
     static const struct number sun[] = {
         {"sun.direction", 0, .02}, {"block.pose", 3, .03}, {NULL, 0, 0}};
+    static const struct number egg[] = {{"egg.pose", 0, .02},
+                                        {"egg.pose", 2, .02},
+                                        {"egg.pose", 3, .01},
+                                        {"lamp.pose", 0, .03},
+                                        {NULL, 0, 0}};
+    static const struct number alone[] = {
+        {"egg.pose", 0, .02}, {"egg.pose", 2, .02}, {"egg.pose", 3, .01}, {NULL, 0, 0}};
     static const struct number block[] = {{"block.pose", 0, .03},
                                           {"block.pose", 2, .03},
                                           {"block.pose", 3, .03},
@@ -168,9 +175,11 @@ int main(int argc, char **argv)
                     512 * more, .5, lamp);
     numbers_compare("halves of cylinders", room(VIRTUAL(HALF) PATH LAMP), 256 * more,
                     512 * more, .3, lamp);
+    numbers_compare("an egg with vertex normals", room(AREA EGG PATH LAMP), 256 * more,
+                    512 * more, .2, egg);
+    numbers_compare("points and an egg", room(VIRTUAL(POINTS) EGG PATH SKY), 1024 * more,
+                    512 * more, .5, alone);
     number_refused("a ball", room(BALL PATH LAMP), "lamp.pose", "flat");
-    number_refused("a mesh with vertex normals", room(AREA EGG PATH LAMP), "lamp.pose",
-                   "vertex normals");
     number_refused("a grid that moves", room(VIRTUAL("") PATH LAMP), "table.pose",
                    "meter");
     remove(EGG_FILE);

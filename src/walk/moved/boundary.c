@@ -17,9 +17,11 @@
  * else by how much its faces turn. */
 static double film_measure(const struct imp__boundary *b, const struct imp__edge *e)
 {
-    const imp_v3 along = e->b - e->a, r = (e->a + e->b) * 0.5 - b->camera;
+    const imp_v3 along = e->b - e->a,
+                 r = b->parallel ? b->camera : (e->a + e->b) * 0.5 - b->camera;
     const imp_v3 m = imp__cross(along, r);
-    const double d2 = imp_max(imp__dot(r, r), 1e-12 * imp__sqr(b->size));
+    const double d2 =
+        b->parallel ? 1 : imp_max(imp__dot(r, r), 1e-12 * imp__sqr(b->size));
     const double jump =
         imp__edge_side(b->edges, e, m) == 0 ? imp__edge_turn(b->edges, e) : 1;
     return imp__length(m) / d2 * jump;
@@ -232,7 +234,13 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
         out->camera = (tracer->sensor->shape->lo + tracer->sensor->shape->hi) * 0.5;
     else imp__lens_middle(tracer->sensor, &out->camera);
     imp_v3 point;
-    out->wide = !imp__pinhole(tracer->sensor, &point);
+    struct imp_sensor_ray ray;
+    out->parallel = tracer->sensor->ops->flags & IMP_SENSOR_PARALLEL;
+    out->wide = !out->parallel && !imp__pinhole(tracer->sensor, &point);
+    if (out->parallel) {
+        tracer->sensor->ops->ray(tracer->sensor, 0, 0, (const double[2]){0.5, 0.5}, &ray);
+        out->camera = ray.d;
+    }
     if (st == IMP_OK) st = imp__boundary_allowed(out);
     if (st == IMP_OK) st = lights_make(out);
     if (st == IMP_OK) st = choices_make(out);
@@ -299,11 +307,10 @@ static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
     const enum imp__edge_item_kind item = d->item ? d->item->kind : IMP_ITEM_ROUND;
     switch (kind) {
     case IMP_BOUNDARY_FILM:
-        if (d->b->tracer->sensor->shape) {
-            imp__draw_meter(d);
-            break;
+        if (item == IMP_ITEM_ROUND) {
+            if (d->b->tracer->sensor->shape) imp__draw_meter(d);
+            else imp__draw_film(d);
         }
-        if (item == IMP_ITEM_ROUND) imp__draw_film(d);
         if (item == IMP_ITEM_SHADING) imp__draw_shading_film(d);
         if (item == IMP_ITEM_SKY) imp__draw_sky_film(d);
         break;

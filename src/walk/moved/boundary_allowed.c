@@ -85,7 +85,7 @@ static enum imp_status camera_allowed(const struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
     struct imp_hit first = {.shape = -1};
-    if (b->tracer->sensor->shape) return IMP_OK;
+    if (b->tracer->sensor->shape || b->parallel) return IMP_OK;
     for (uint32_t k = 0; k < PROBES; k++) {
         const struct imp_key key = imp__key(5, 3, k);
         const double u[2] = {imp__u01(key, 0), imp__u01(key, 1)};

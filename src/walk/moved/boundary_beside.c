@@ -91,15 +91,17 @@ void imp__look_at(struct imp__edge_draw *d, imp_v3 o, struct imp_hit *hit, int b
                     before, hit, walk);
 }
 
-bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, imp_v3 m, double apart,
-                         int before, struct imp_walk *walk)
+bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, bool parallel, imp_v3 m,
+                         double apart, int before, struct imp_walk *walk)
 {
     const imp_v3 w = imp__normalize(d->p - o);
     const struct imp__edge_face *f = d->edge ? face_seen(d, w, m) : NULL;
     if (!f) return false;
-    const imp_v3 to = imp__normalize(imp__edge_beside(d, w, m, apart) - o);
+    const imp_v3 past = imp__edge_beside(d, w, m, apart);
+    const imp_v3 from = parallel ? o + (past - d->p) : o,
+                 to = imp__normalize(past - from);
     struct imp_hit hit;
-    if (!imp__intersect(d->b->tracer->scene, &o, &to, 0, INFINITY, &hit) ||
+    if (!imp__intersect(d->b->tracer->scene, &from, &to, 0, INFINITY, &hit) ||
         !imp__edge_face_hit(d, f, &hit))
         return false;
     const struct imp__corners facet =
@@ -108,7 +110,9 @@ bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, imp_v3 m, double ap
     const imp_v3 middle = (p[0] + p[1] + p[2]) * (1.0 / 3) - d->p;
     const double across = imp__dot(middle, f->in), next = NEXT * apart;
     double b[2];
-    weights(p, d->p + middle * (across > 2 * next ? next / across : 0.5), b);
+    const imp_v3 on = middle * (across > 2 * next ? next / across : 0.5);
+    if (parallel) o += on;
+    weights(p, d->p + on, b);
     hit.u = b[0];
     hit.v = b[1];
     imp__look_at(d, o, &hit, before, walk);

@@ -106,10 +106,10 @@ static bool ball_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel
     return true;
 }
 
-bool imp__edge_any(struct imp__edge_draw *d, imp_v3 from)
+bool imp__edge_any(struct imp__edge_draw *d, imp_v3 from, bool parallel)
 {
     struct imp__edge_point p;
-    if (d->item) return ball_silhouette(d, from, false);
+    if (d->item) return ball_silhouette(d, from, parallel);
     imp__edge_choice_draw(d->choice, d->u, &p);
     return point_set(d, &p);
 }

@@ -21,9 +21,8 @@ bool imp__meter_is_points(const struct imp_sensor *s)
     return s->receiver && s->receiver->points;
 }
 
-/* The point that connections make of the first two numbers. */
-static void point_draw(const struct imp_sensor *s, const double u[4],
-                       struct imp_surface *at)
+void imp__meter_draw(const struct imp_sensor *s, const double u[4],
+                     struct imp_surface *at)
 {
     double on[2];
     imp__receiver_uv(s, u[0] * s->film.width, u[1] * s->film.height, on);
@@ -40,22 +39,6 @@ struct imp__flux_end imp__meter_end(const struct imp__edge_draw *d,
     return imp__flux_glued(&x, bar);
 }
 
-/* A jump by L at the edge, whose line has the velocity that the ends say. */
-static struct imp__flux *jump_add(struct imp__edge_draw *d,
-                                  const struct imp_sensor_sample *to, imp_spec L,
-                                  imp_v3 m)
-{
-    if (imp__is_zero_used(L, d->waves)) return NULL;
-    struct imp__flux *f = imp__flux_add(d, 3);
-    if (!f) return NULL;
-    const struct imp__glued edge = imp__edge_carried(d);
-    f->px = to->px;
-    f->py = to->py;
-    f->L = L;
-    f->end[f->n_ends++] = imp__flux_glued(&edge, m);
-    return f;
-}
-
 /* Emission that a look past the edge meets first, of a light at y:
  * V_line = (t_y x' + t_x V_y)/(t_x + t_y), of distances from the edge. */
 static void emission_add(struct imp__edge_draw *d, const struct imp_sensor_sample *to,
@@ -64,8 +47,10 @@ static void emission_add(struct imp__edge_draw *d, const struct imp_sensor_sampl
     const struct imp_vertex *v = walk->first;
     const int max = d->b->tracer->integrator->max_depth;
     if (walk->dropped || !v || v->d.scatterer == IMP_AT_SKY || max == 0) return;
-    struct imp__flux *f = jump_add(d, to, v->e * times, m);
+    struct imp__flux *f = imp__jump_add(d, to, v->e * times, 3);
     if (!f) return;
+    const struct imp__glued edge = imp__edge_carried(d);
+    f->end[f->n_ends++] = imp__flux_glued(&edge, m);
     const struct imp__glued y =
         imp__glued_at(d->b->tracer->scene, v->d.shape, &v->d.located, 0, v->ng);
     const double t_x = imp__length(d->p - to->p),
@@ -77,7 +62,7 @@ static void emission_add(struct imp__edge_draw *d, const struct imp_sensor_sampl
 static void look_beside(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 o,
                         imp_v3 m, double apart, struct imp_walk *walk)
 {
-    if (imp__edge_face_look(d, o, m, apart, 0, walk)) return;
+    if (imp__edge_face_look(d, o, false, m, apart, 0, walk)) return;
     imp__look_from(d, at, imp__edge_beside(d, d->p - o, m, apart), 0, walk);
 }
 
@@ -87,8 +72,8 @@ void imp__draw_meter(struct imp__edge_draw *d)
     const bool points = imp__meter_is_points(t->sensor);
     struct imp_sensor_sample to;
     struct imp_surface at = {.uv = {0}};
-    point_draw(t->sensor, d->lens, &at);
-    if (!imp__edge_any(d, at.p) ||
+    imp__meter_draw(t->sensor, d->lens, &at);
+    if (!imp__edge_any(d, at.p, false) ||
         !imp__sensor_connect(t->sensor, &d->p, false, d->lens, &to) ||
         !imp__light_on_film(t->sensor, &to))
         return;
@@ -106,8 +91,12 @@ void imp__draw_meter(struct imp__edge_draw *d)
     look_beside(d, &at, o, m, apart, &hi);
     const bool *drawn = points ? NULL : d->b->drawn_to_meter;
     const imp_spec jump = imp__arrives(t, &lo, 0, drawn) - imp__arrives(t, &hi, 0, drawn);
-    struct imp__flux *f = jump_add(d, &to, jump * times, m);
-    if (f) f->end[f->n_ends++] = imp__meter_end(d, &to, -m);
+    struct imp__flux *f = imp__jump_add(d, &to, jump * times, 2);
+    if (f) {
+        const struct imp__glued edge = imp__edge_carried(d);
+        f->end[f->n_ends++] = imp__flux_glued(&edge, m);
+        f->end[f->n_ends++] = imp__meter_end(d, &to, -m);
+    }
     if (!points) return;
     emission_add(d, &to, &lo, m, times);
     emission_add(d, &to, &hi, m, -times);

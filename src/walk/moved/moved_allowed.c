@@ -105,10 +105,6 @@ static enum imp_status meter_allowed(const struct imp_tracer *t)
     if (on->smooth)
         return refuse(t, "sensor", s->name, s->ops->name,
                       "is on a mesh with vertex normals (face_normals makes it flat)");
-    for (int k = 0; k < t->scene->n_all_shapes; k++)
-        if (imp__moves_smooth(t->scene, k))
-            return refuse(t, "sensor", s->name, s->ops->name,
-                          "sees a mesh with vertex normals (face_normals makes it flat)");
     return IMP_OK;
 }
 
@@ -119,7 +115,7 @@ static enum imp_status sensor_allowed(const struct imp_tracer *t)
     if (s->shape) return meter_allowed(t);
     if (!imp__lens_middle(s, &centre))
         return refuse(t, "sensor", s->name, s->ops->name,
-                      "has no point in which its rays meet, and is no thin lens");
+                      "is none of perspective, thinlens and orthographic");
     if (s->open != s->close)
         return refuse(t, "sensor", s->name, s->ops->name, "has a shutter");
     return IMP_OK;
