@@ -8,6 +8,7 @@
 #include "instances.h"
 #include "kind/emitter/from_point.h"
 #include "kind/emitter/ies.h"
+#include "kind/sensor/receiver.h"
 #include "kind/shape/shape.h"
 #include "math/motion.h"
 #include <string.h>
@@ -112,6 +113,16 @@ static enum imp_status sensor_apply(const struct imp_pose *p)
     return IMP_OK;
 }
 
+/* A meter's frame turns with its shape; at rest it is that of the file, to the bit. */
+static void receiver_apply(const struct imp_pose *p, const struct imp_map *by)
+{
+    const struct imp_shape *s = p->scene->shapes[p->shape];
+    if (!p->receiver) return;
+    struct imp_receiver *r = (struct imp_receiver *)(uintptr_t)s->sensor->receiver;
+    if (at_rest(imp__pose_beside(p, IMP_POSE_RIGID))) *r = *p->receiver;
+    else imp__receiver_turn(r, p->receiver, s, by->m);
+}
+
 static enum imp_status shape_apply(const struct imp_pose *p)
 {
     struct imp_shape *s = p->scene->shapes[p->shape];
@@ -119,8 +130,10 @@ static enum imp_status shape_apply(const struct imp_pose *p)
     const size_t n = 3 * s->triangles.n_vertices;
     float *positions = (float *)(uintptr_t)s->triangles.positions;
     memcpy(s->self, p->rest, p->rest_size);
+    const struct imp_map by = map_of(p);
     if (s->geometry != IMP_TRIANGLES) {
-        s->ops->move(s, map_of(p).m);
+        s->ops->move(s, by.m);
+        receiver_apply(p->object, &by);
         return IMP_OK;
     }
     if (p->positions) memcpy(positions, p->positions, n * sizeof *p->positions);
@@ -132,7 +145,8 @@ static enum imp_status shape_apply(const struct imp_pose *p)
         IMP_CHECKED(imp__mesh_normals(p->scene->ctx, s->triangles.n_vertices,
                                       s->triangles.n_triangles, positions,
                                       s->triangles.indices, normals));
-    s->ops->move(s, map_of(p).m); /* also at rest: frames of facets and the box follow */
+    s->ops->move(s, by.m); /* also at rest: frames of facets and the box follow */
+    receiver_apply(p->object, &by);
     return IMP_OK;
 }
 

@@ -65,7 +65,8 @@ struct imp_pose {
     /* As the file has it: the kind's object, and positions and normals of a mesh. */
     void *rest;
     size_t rest_size;
-    float *positions, *normals; /* NULL: in the object, or none */
+    float *positions, *normals;    /* NULL: in the object, or none */
+    struct imp_receiver *receiver; /* of a shape with a meter that has one; else NULL */
 };
 
 /* Its box now. False: it is no shape, and no instance. */

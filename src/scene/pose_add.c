@@ -34,8 +34,6 @@ static const char *shape_why(const struct imp_scene *scene, const struct imp_sha
         return "there are media";
     if (scene->light_tree) return "lights are chosen by a tree (light_choice)";
     if (scene->aims.aimed) return "directions are aimed at shapes";
-    if (s->sensor && s->sensor->receiver)
-        return "its meter is a grid, or not there, and stays where it is";
     if (s->placed || s->by_triangle) return "its textures need more than uv";
     return NULL;
 }
@@ -147,27 +145,26 @@ static enum imp_status object_find(struct imp_scene *scene, const char *name,
 
 static enum imp_status rest_keep(struct imp_scene *scene, struct imp_pose *p)
 {
+    const struct imp_shape *s = p->shape >= 0 ? scene->shapes[p->shape] : NULL;
+    const struct imp_receiver *r = s && s->sensor ? s->sensor->receiver : NULL;
+    const struct imp__mesh *m = s && s->ops->move == imp__mesh_move ? s->self : NULL;
+    const void *self = s            ? s->self
+                       : p->sensor  ? p->sensor->self
+                       : p->emitter ? p->emitter->self
+                                    : (void *)&scene->world->instance[p->instance];
+    const size_t n = m ? 3 * s->triangles.n_vertices : 0;
     p->rest = imp__arena_take(&scene->arena, 1, p->rest_size);
-    if (!p->rest) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
-    if (p->shape < 0) {
-        const void *self = p->sensor    ? p->sensor->self
-                           : p->emitter ? p->emitter->self
-                                        : &scene->world->instance[p->instance];
-        memcpy(p->rest, self, p->rest_size);
-        return IMP_OK;
-    }
-    const struct imp_shape *s = scene->shapes[p->shape];
-    memcpy(p->rest, s->self, p->rest_size);
-    const struct imp_triangles *t = &s->triangles;
-    const struct imp__mesh *m = s->ops->move == imp__mesh_move ? s->self : NULL;
-    if (!m) return IMP_OK; /* its positions are in the object */
-    const size_t n = 3 * t->n_vertices;
-    p->positions = imp__arena_take(&scene->arena, n, sizeof *p->positions);
-    if (m->normals) p->normals = imp__arena_take(&scene->arena, n, sizeof *p->normals);
-    if (!p->positions || (m->normals && !p->normals))
+    if (r) p->receiver = imp__arena_take(&scene->arena, 1, sizeof *r);
+    if (m) p->positions = imp__arena_take(&scene->arena, n, sizeof *p->positions);
+    if (m && m->normals)
+        p->normals = imp__arena_take(&scene->arena, n, sizeof *p->normals);
+    if (!p->rest || (r && !p->receiver) || (m && !p->positions) ||
+        (m && m->normals && !p->normals))
         return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
-    memcpy(p->positions, t->positions, n * sizeof *p->positions);
-    if (m->normals) memcpy(p->normals, m->normals, n * sizeof *p->normals);
+    memcpy(p->rest, self, p->rest_size);
+    if (r) *p->receiver = *r;
+    if (m) memcpy(p->positions, s->triangles.positions, n * sizeof *p->positions);
+    if (m && m->normals) memcpy(p->normals, m->normals, n * sizeof *p->normals);
     return IMP_OK;
 }
 

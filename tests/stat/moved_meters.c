@@ -39,6 +39,7 @@
     ON("<sensor type='irradiancemeter' id='meter'><boolean name='virtual' "              \
        "value='true'/>" MORE FILM("4", "3") "</sensor>")
 #define POINTS  "<string name='at' value='points'/>"
+#define LEANS   "<vector name='facing' x='.3' y='-.5' z='1'/>"
 #define UPRIGHT "<string name='receiver' value='cylindrical'/>"
 #define HALF                                                                             \
     "<string name='receiver' value='semicylindrical'/><vector name='facing' x='.3' "     \
@@ -134,6 +135,10 @@ int main(int argc, char **argv)
                                           {"table.pose", 2, .03},
                                           {"table.pose", 3, .03},
                                           {NULL, 0, 0}};
+    static const struct number upright[] = {{"table.pose", 2, .03},
+                                            {"table.pose", 4, .03},
+                                            {"table.pose", 5, .03},
+                                            {NULL, 0, 0}};
     static const struct number bulb[] = {{"bulb.position", 0, .03},
                                          {"bulb.position", 2, .03},
                                          {"block.pose", 0, .03},
@@ -180,8 +185,12 @@ int main(int argc, char **argv)
     numbers_compare("points and an egg", room(VIRTUAL(POINTS) EGG PATH SKY), 1024 * more,
                     512 * more, .5, alone);
     number_refused("a ball", room(BALL PATH LAMP), "lamp.pose", "flat");
-    number_refused("a grid that moves", room(VIRTUAL("") PATH LAMP), "table.pose",
-                   "meter");
+    numbers_compare("cells that move", room(VIRTUAL("") PATH LAMP), 256 * more,
+                    512 * more, .1, table);
+    numbers_compare("points that move below a sky", room(VIRTUAL(POINTS LEANS) PATH CIE),
+                    256 * more, 512 * more, .2, table);
+    numbers_compare("halves of cylinders that move", room(VIRTUAL(HALF) PATH CIE),
+                    256 * more, 512 * more, .2, upright);
     remove(EGG_FILE);
     return tap_done();
 }

@@ -100,16 +100,21 @@ static struct at placed(const struct moved *m, const struct imp__glued *x)
     return at;
 }
 
-/* Where a point of a shape, now at x, was when the walk was recorded. */
-static imp_v3 was_at(const struct moved *m, int carrier, imp_v3 x)
+/* A direction, and a point, of what moves, as they were when the walk was recorded. */
+static imp_v3 turned_back(const struct moved *m, int carrier, imp_v3 d)
 {
     const double *R = m->turn;
+    if (carrier != m->shape || m->pose->kind != IMP_POSE_RIGID) return d;
+    return imp__v3(R[0] * d[0] + R[3] * d[1] + R[6] * d[2],
+                   R[1] * d[0] + R[4] * d[1] + R[7] * d[2],
+                   R[2] * d[0] + R[5] * d[1] + R[8] * d[2]);
+}
+static imp_v3 was_at(const struct moved *m, int carrier, imp_v3 x)
+{
     const imp_v3 r = x - m->to;
     if (carrier != m->shape) return x;
     if (m->pose->kind == IMP_POSE_SCALE) return m->from + r * (1 / m->by);
-    return m->from + imp__v3(R[0] * r[0] + R[3] * r[1] + R[6] * r[2],
-                             R[1] * r[0] + R[4] * r[1] + R[7] * r[2],
-                             R[2] * r[0] + R[5] * r[1] + R[8] * r[2]);
+    return m->from + turned_back(m, carrier, r);
 }
 
 /* The shading normal at x, in the plane of a triangle with vertex normals. */
@@ -198,7 +203,7 @@ static void looked_up(const struct moved *m, const struct imp_vertex *v, imp_v3 
     imp__inputs_eval(v->bsdf->input, v->bsdf->n_in, &at, in);
 }
 
-/* The density of directions of a meter that stays. */
+/* The density of directions of a meter, where it was when the walk was recorded. */
 static double received(const struct moved *m, imp_v3 w)
 {
     const struct imp_receiver *r = m->c->tracer.sensor->receiver;
@@ -214,7 +219,8 @@ static imp_spec kernel_ratio(const struct moved *m, const struct imp_vertex *v,
     imp_spec in[IMP_INPUTS_MAX];
     const bool meter = v->prev && v->prev->d.scatterer == IMP_AT_SENSOR;
     if (meter && m->c->tracer.sensor->receiver)
-        return imp__spec(received(m, w[0]) / received(m, w[1]));
+        return imp__spec(received(m, turned_back(m, then->carrier, w[0])) /
+                         received(m, w[1]));
     if (meter || imp__is_plain(v->bsdf))
         return imp__spec(imp__dot(now->shade, w[0]) /
                          imp__dot(imp__shading_normal(then), w[1]));

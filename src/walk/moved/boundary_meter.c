@@ -171,19 +171,24 @@ struct imp__kernel_bar imp__meter_times(const struct imp_sensor *s, imp_v3 n, im
 {
     const struct imp_receiver *r = s->receiver;
     if (!r) return imp__lambert_times(n, w, bar);
-    const struct imp_frame *frame = &r->frame;
-    const imp_v3 axis = frame->n, f = imp__to_world(frame, r->facing);
-    if (r->kind == IMP_PLANAR) return imp__lambert_times(f, w, bar);
-    /* sin(e) is the part of w across the axis, and its gradient along that. */
-    const imp_v3 across = w - axis * imp__dot(axis, w);
-    const double sine = imp__length(across);
-    imp_v3 slope = across * (1 / sine);
-    double p = sine;
-    if (r->kind == IMP_SEMICYLINDRICAL) {
-        slope += f;
-        p += imp__dot(f, w);
-    }
     struct imp__kernel_bar out = {{0}, {0}, {0}, 0, {0}};
-    if (bar != 0 && sine > 0 && p > 0) out.wi = slope * (bar / p);
+    const imp_v3 axis = r->frame.n, f = imp__to_world(&r->frame, r->facing);
+    imp_v3 slope = f; /* of the density p, times a constant */
+    double p = imp__dot(f, w);
+    if (r->kind != IMP_PLANAR) {
+        /* sin(e) is the part of w across the axis, and its gradient along that. */
+        const imp_v3 across = w - axis * imp__dot(axis, w);
+        const double sine = imp__length(across);
+        if (!(sine > 0)) return out;
+        slope = across * (1 / sine);
+        if (r->kind == IMP_SEMICYLINDRICAL) slope += f;
+        p = imp__dot(slope, w);
+    }
+    if (bar == 0 || !(p > 0)) return out;
+    out.wi = slope * (bar / p);
+    /* p is of w in the frame, which turns with the shape (moved_kernel.h). */
+    const imp_v3 by_frame = imp__cross(out.wi, w);
+    out.n = imp__cross(by_frame, n);
+    out.turn = imp__dot(by_frame, n);
     return out;
 }
