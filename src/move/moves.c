@@ -181,7 +181,7 @@ void imp__pose_numbers_bar(const struct imp__moves *moves, const struct imp__mov
     for (int i = 3; i < 6; i++) bar[i] = 0;
     struct imp_round round;
     if (pose->shape >= 0 && imp__moves_sphere(pose->scene, pose->shape, 0, &round) &&
-        !looks_up(pose->scene, pose->shape))
+        !looks_up(pose->scene, pose->shape) && !pose->object->table)
         return; /* turned about its centre it is where it was */
     imp__rotation_bar(pose->number + 3, turn, bar + 3);
 }

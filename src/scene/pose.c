@@ -8,7 +8,6 @@
 #include "instances.h"
 #include "kind/emitter/from_point.h"
 #include "kind/emitter/ies.h"
-#include "kind/sensor/receiver.h"
 #include "kind/shape/shape.h"
 #include "math/motion.h"
 #include <string.h>
@@ -83,13 +82,6 @@ static struct imp_map map_of(const struct imp_pose *object)
     return out;
 }
 
-static bool at_rest(const struct imp_pose *rigid)
-{
-    bool rests = true;
-    for (int k = 0; rigid && k < 6; k++) rests &= rigid->number[k] == 0;
-    return rests;
-}
-
 static enum imp_status sensor_apply(const struct imp_pose *p)
 {
     struct imp_sensor *s = p->sensor;
@@ -109,18 +101,8 @@ static enum imp_status sensor_apply(const struct imp_pose *p)
             "the lens of camera '%s' folds its picture with k1, k2, p1, p2, "
             "k3 = %g, %g, %g, %g, %g",
             s->name, number[3], number[4], number[5], number[6], number[7]);
-    if (!at_rest(imp__pose_beside(p, IMP_POSE_RIGID))) s->ops->move(s, map_of(p).m);
+    if (!imp__pose_rests(p)) s->ops->move(s, map_of(p).m);
     return IMP_OK;
-}
-
-/* A meter's frame turns with its shape; at rest it is that of the file, to the bit. */
-static void receiver_apply(const struct imp_pose *p, const struct imp_map *by)
-{
-    const struct imp_shape *s = p->scene->shapes[p->shape];
-    if (!p->receiver) return;
-    struct imp_receiver *r = (struct imp_receiver *)(uintptr_t)s->sensor->receiver;
-    if (at_rest(imp__pose_beside(p, IMP_POSE_RIGID))) *r = *p->receiver;
-    else imp__receiver_turn(r, p->receiver, s, by->m);
 }
 
 static enum imp_status shape_apply(const struct imp_pose *p)
@@ -133,7 +115,7 @@ static enum imp_status shape_apply(const struct imp_pose *p)
     const struct imp_map by = map_of(p);
     if (s->geometry != IMP_TRIANGLES) {
         s->ops->move(s, by.m);
-        receiver_apply(p->object, &by);
+        imp__pose_carry(p->object, &by);
         return IMP_OK;
     }
     if (p->positions) memcpy(positions, p->positions, n * sizeof *p->positions);
@@ -146,7 +128,7 @@ static enum imp_status shape_apply(const struct imp_pose *p)
                                       s->triangles.n_triangles, positions,
                                       s->triangles.indices, normals));
     s->ops->move(s, by.m); /* also at rest: frames of facets and the box follow */
-    receiver_apply(p->object, &by);
+    imp__pose_carry(p->object, &by);
     return IMP_OK;
 }
 

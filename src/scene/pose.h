@@ -67,6 +67,7 @@ struct imp_pose {
     size_t rest_size;
     float *positions, *normals;    /* NULL: in the object, or none */
     struct imp_receiver *receiver; /* of a shape with a meter that has one; else NULL */
+    struct imp__ies *table;        /* of a shape that shines by a table; else NULL */
 };
 
 /* Its box now. False: it is no shape, and no instance. */
@@ -120,6 +121,15 @@ void imp__rotation_bar(const double a[3], imp_v3 turn_bar, double a_bar[3]);
 /* ---- pose.c for pose_add.c ---- */
 void imp__pose_changed(void *pose);
 
+/* ---- pose_rest.c for pose.c and pose_add.c ---- */
+/* Sets p->rest and what follows it. IMP_E_NOMEM. */
+enum imp_status imp__pose_rest_keep(struct imp_scene *scene, struct imp_pose *p);
+/* Is it turned and shifted by nothing? */
+bool imp__pose_rests(const struct imp_pose *p);
+/* Moves what a shape, which has been moved, carries along. p: the first parameter of the object. */
+struct imp_map;
+void imp__pose_carry(const struct imp_pose *p, const struct imp_map *by);
+
 /* ---- pose_instances.c for pose.c and pose_add.c ---- */
 /* Instances of the scene's own; those that are listed by name, none of more than so many. */
 #define IMP_POSE_INSTANCES_LISTED 1024
@@ -134,7 +144,6 @@ const char *imp__instance_why(const struct imp_scene *scene, int k,
 bool imp__instance_find(const struct imp_scene *scene, const char *name,
                         struct imp_pose *p);
 /* Moves it from where the file has it. */
-struct imp_map;
 enum imp_status imp__instance_apply(const struct imp_pose *p, const struct imp_map *by);
 
 /* ---- pose_folds.c for pose.c ---- */

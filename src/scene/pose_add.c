@@ -4,6 +4,7 @@
 #include "access.h"
 #include "base/arguments.h"
 #include "instances.h"
+#include "kind/emitter/ies.h"
 #include "kind/sensor/receiver.h"
 #include "kind/shape/shape.h"
 #include "pose.h"
@@ -11,7 +12,7 @@
 #include <stdio.h>
 #include <string.h>
 
-extern const struct imp_emitter_ops imp__spot_light, imp__ies_light;
+extern const struct imp_emitter_ops imp__spot_light;
 
 /* ---- Adding ------------------------------------------------------------------------- */
 
@@ -143,31 +144,6 @@ static enum imp_status object_find(struct imp_scene *scene, const char *name,
                       name, imp__theta_near(scene, whole).text);
 }
 
-static enum imp_status rest_keep(struct imp_scene *scene, struct imp_pose *p)
-{
-    const struct imp_shape *s = p->shape >= 0 ? scene->shapes[p->shape] : NULL;
-    const struct imp_receiver *r = s && s->sensor ? s->sensor->receiver : NULL;
-    const struct imp__mesh *m = s && s->ops->move == imp__mesh_move ? s->self : NULL;
-    const void *self = s            ? s->self
-                       : p->sensor  ? p->sensor->self
-                       : p->emitter ? p->emitter->self
-                                    : (void *)&scene->world->instance[p->instance];
-    const size_t n = m ? 3 * s->triangles.n_vertices : 0;
-    p->rest = imp__arena_take(&scene->arena, 1, p->rest_size);
-    if (r) p->receiver = imp__arena_take(&scene->arena, 1, sizeof *r);
-    if (m) p->positions = imp__arena_take(&scene->arena, n, sizeof *p->positions);
-    if (m && m->normals)
-        p->normals = imp__arena_take(&scene->arena, n, sizeof *p->normals);
-    if (!p->rest || (r && !p->receiver) || (m && !p->positions) ||
-        (m && m->normals && !p->normals))
-        return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
-    memcpy(p->rest, self, p->rest_size);
-    if (r) *p->receiver = *r;
-    if (m) memcpy(p->positions, s->triangles.positions, n * sizeof *p->positions);
-    if (m && m->normals) memcpy(p->normals, m->normals, n * sizeof *p->normals);
-    return IMP_OK;
-}
-
 /* Numbers, and what they are where the file has the object. */
 static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
 {
@@ -285,7 +261,7 @@ static enum imp_status geometry_add(struct imp_scene *scene, const char *object,
         ((kind == IMP_POSE_VERTICES && others) || imp__pose_beside(p, IMP_POSE_VERTICES)))
         return refuse(scene, object, kind,
                       "single vertices move, and the whole moves with them");
-    if (p->object == p) IMP_CHECKED(rest_keep(scene, p));
+    if (p->object == p) IMP_CHECKED(imp__pose_rest_keep(scene, p));
     IMP_CHECKED(numbers_make(scene, p));
     IMP_CHECKED(param_add(scene, object, p));
     struct imp_pose **end = &scene->poses;

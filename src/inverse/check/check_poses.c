@@ -277,9 +277,12 @@ static double light_ratio(const struct moved *m, const struct imp_vertex *v,
 static bool has_spots(const struct imp_scene *scene, const struct imp_walk *walk)
 {
     for (const struct imp_vertex *v = walk->first; v; v = v->next) {
+        if (v->d.scatterer != IMP_AT_SKY && v->d.met.emitter >= 0 &&
+            scene->emitters[v->d.met.emitter]->ops == &imp__ies_area)
+            return true;
         if (v->d.connection != IMP_CONNECTED) continue;
         const struct imp_emitter_ops *ops = scene->emitters[v->d.light.emitter]->ops;
-        if (ops->cone || ops == &imp__ies_light) return true;
+        if (ops->cone || ops == &imp__ies_light || ops == &imp__ies_area) return true;
     }
     return false;
 }

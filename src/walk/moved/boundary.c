@@ -188,8 +188,9 @@ static double light_power(const struct imp__boundary *b, int k)
     if (b->tracer->wavelengths)
         imp__input_most(e->input[0], &nowhere.p, &nowhere.p, &in[0]);
     else imp__inputs_eval(e->input, e->n_in, &nowhere, in);
-    const double size = e->shape                    ? e->shape->area
-                        : e->ops == &imp__ies_light ? imp__ies_flux(e->self) * IMP_INV_PI
+    const bool table = e->ops == &imp__ies_light || e->ops == &imp__ies_area;
+    const double size = table      ? imp__ies_flux(e->self) * IMP_INV_PI
+                        : e->shape ? e->shape->area
                         : e->ops->flags & IMP_EMITTER_FAR ? across
                                                           : 4;
     return size * imp__max_used(in[0], scene->lanes == 4);

@@ -3,6 +3,7 @@
  * What has a derivative by what moves that is whole, and what is refused by name (moved.h). */
 #include "base/context.h"
 #include "kind/emitter/ies.h"
+#include "math/warp.h"
 #include "moved.h"
 #include "moved_kernel.h"
 #include "scene/instances.h"
@@ -40,6 +41,23 @@ static enum imp_status materials_allowed(const struct imp_tracer *t)
     return IMP_OK;
 }
 
+/* Where light by this table jumps, in words that follow its name; NULL: nowhere. A flat shape hides what
+ * is sent behind it. */
+static const char *table_jump(const struct imp__ies *x)
+{
+    enum { AROUND = 64 };
+    const char *jump = imp__ies_jump(x->data);
+    if (jump || x->n_facets != 1) return jump;
+    const struct imp_frame f = imp__frame_from_normal(x->facets[0].n);
+    double most = 0;
+    for (int k = 0; k < AROUND; k++) {
+        const double a = IMP_2PI * (k + 0.5) / AROUND;
+        most = imp_max(most, imp__ies_intensity(x, f.s * cos(a) + f.t * sin(a)));
+    }
+    return most > 1e-6 * imp__ies_flux(x) ? "has light along the plane of its shape"
+                                          : NULL;
+}
+
 static enum imp_status lights_allowed(const struct imp_tracer *t)
 {
     for (int k = 0; k < t->scene->n_emitters; k++) {
@@ -48,14 +66,13 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
         if (sky ? !e->ops->jumps
                 : e->ops != &imp__area && e->ops != &imp__point_light &&
                       e->ops != &imp__spot_light && e->ops != &imp__directional &&
-                      e->ops != &imp__ies_light)
+                      e->ops != &imp__ies_light && e->ops != &imp__ies_area)
             return refuse(t, "light", e->name, e->ops->name,
                           sky ? "does not say where its radiance jumps"
-                              : "is none of area, point, spot, directional, ies without "
-                                "a shape, and skies");
-        if (e->ops == &imp__ies_light) {
-            const struct imp__ies *x = e->self;
-            const char *jump = imp__ies_jump(x->data);
+                              : "is none of area, point, spot, directional, ies, and "
+                                "skies");
+        if (e->ops == &imp__ies_light || e->ops == &imp__ies_area) {
+            const char *jump = table_jump(e->self);
             if (jump) return refuse(t, "the table of light", e->name, e->ops->name, jump);
         }
         if (!sky && (e->shaped || is_textured(e->input, e->n_in)))
