@@ -601,7 +601,8 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
 /** Make a number of geometry a parameter, behind all others. Setting it moves the object.
  *
  *     NAME.pose              as imp_scene_add_pose
- *     NAME.scale             of a shape: 1 as the scene file has it, about the middle of its box
+ *     NAME.scale             of a shape or instance: 1 as the scene file has it, about the middle of
+ *                            its box
  *     NAME.vertex_positions  of a mesh: [vertices][3], world; vertex normals, if it has any, are
  *                            computed from them
  *     NAME.x_fov             of a perspective camera: horizontal field of view, degrees
@@ -624,15 +625,15 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_add_geometry(imp_scene *scene,
                                                               const char *name);
 /** Names of what imp_scene_add_geometry accepts: of shapes, then of sensors, then of lights without
- * a shape. Those that are parameters already are among them.
+ * a shape, then of the scene's instances, if there are at most 1,024. Those that are parameters already are among them.
  * @param index  from 0.
  * @param name   [size] overwritten; 256 are enough for every name.
  * @return IMP_OK; IMP_E_ARG if there are no more, or size does not suffice. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_geometry_name(const imp_scene *scene, size_t index, size_t size, char *name);
-/** Make the pose of a shape or of a camera a parameter, `OBJECT.pose`, behind all others: six
- * numbers, a translation in scene units and a rotation vector in radians about the middle of the
- * shape's box, or the camera's own place, away from where the scene file has it. Setting it moves
+/** Make the pose of a shape, an instance or a camera a parameter, `OBJECT.pose`, behind all others:
+ * six numbers, a translation in scene units and a rotation vector in radians about the middle of the
+ * shape's box, of its group's box where the instance has it, or the camera's own place, away from where the scene file has it. Setting it moves
  * the object. Theta, and offsets in it, are longer afterwards; a pose that is there already
  * stays as it is. Gradients, derivative pictures and fits know it (docs/poses.md); patterns of
  * imp_problem_activate pass it over unless they end in ".pose".

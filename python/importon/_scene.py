@@ -159,7 +159,7 @@ class Scene:
         return i
 
     def add_pose(self, name: str) -> str:
-        """Make the pose of a shape or a camera a parameter.
+        """Make the pose of a shape, an instance or a camera a parameter.
 
         It is six numbers away from where the scene file has the object: a translation in scene
         units, and a rotation vector in radians about the middle of the shape's box or the
@@ -170,7 +170,7 @@ class Scene:
         Parameters
         ----------
         name : str
-            Of a mesh, cube, rectangle or perspective camera.
+            Of a shape, an instance or a camera.
 
         Returns
         -------
@@ -202,7 +202,7 @@ class Scene:
     def add_geometry(self, name: str) -> str:
         """Make a number of geometry a parameter.
 
-        `NAME.pose` as `add_pose`; `NAME.scale` of a shape; `NAME.vertex_positions` of a mesh;
+        `NAME.pose` as `add_pose`; `NAME.scale` of a shape or instance; `NAME.vertex_positions` of a mesh;
         `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y`, `NAME.opencv_k1`,
         `_k2`, `_p1`, `_p2` and `_k3` of a perspective camera or thin lens;
         `NAME.aperture_radius` and `NAME.focus_distance` of a thin lens; `NAME.position` of a point, spot or
@@ -268,7 +268,7 @@ class Scene:
 
     @property
     def geometry_names(self) -> list[str]:
-        """What `add_geometry` accepts: numbers of geometry of this scene's shapes, sensors and lights."""
+        """What `add_geometry` accepts: numbers of geometry of this scene's shapes, sensors, lights and instances."""
         names: list[str] = []
         buffer = ctypes.create_string_buffer(256)
         with self.lock:

@@ -8,6 +8,7 @@ void imp__edges_free(struct imp__edges *edges)
 {
     imp__release(edges->ctx, edges->edge);
     imp__release(edges->ctx, edges->face);
+    imp__release(edges->ctx, edges->body);
     *edges = (struct imp__edges){0};
 }
 
@@ -16,8 +17,7 @@ struct imp__glued imp__edge_glued(const struct imp__edges *edges,
                                   const struct imp__edge *e, imp_v3 p)
 {
     const struct imp__edge_face *f = &edges->face[e->first];
-    if (f->place > 0) return imp__glued_still(f->shape, p, f->n);
-    return imp__glued_near(scene, f->shape, f->prim, p, f->n);
+    return imp__glued_near(scene, f->shape, f->prim, f->place, p, f->n);
 }
 
 int imp__edge_side(const struct imp__edges *edges, const struct imp__edge *e, imp_v3 m)
@@ -64,11 +64,12 @@ static bool is_welded(const struct imp_scene *scene, int shape, int prim, int ot
 static bool move_apart(const struct imp__moves *moves, const struct imp__edge_face *f,
                        const struct imp__edge_face *g)
 {
-    if (f->shape == g->shape && f->place == g->place)
-        return vertices_move(moves, f->shape) &&
+    const int a = imp__carrier(moves->scene, f->shape, f->place),
+              b = imp__carrier(moves->scene, g->shape, g->place);
+    if (a == b)
+        return vertices_move(moves, a) &&
                !is_welded(moves->scene, f->shape, f->prim, g->prim, moves->seams_join);
-    return imp__moves_shape(moves, f->shape, NULL) ||
-           imp__moves_shape(moves, g->shape, NULL);
+    return imp__moves_shape(moves, a, NULL) || imp__moves_shape(moves, b, NULL);
 }
 
 const struct imp__edge *imp__edges_torn(const struct imp__edges *edges,
@@ -108,5 +109,5 @@ int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *s
             from = hit.t + END;
         }
     }
-    return imp__curved_pierced(scene, other);
+    return imp__curved_pierced(edges, scene, other);
 }

@@ -22,16 +22,24 @@ struct imp__edge {
     int n_faces; /* face[first .. first + n_faces) */
 };
 
+/* A shape that stands in the scene: outside of all groups, or in an instance. */
+struct imp__body {
+    int shape;
+    int64_t place; /* 0: in no instance */
+};
+
 struct imp__edges {
     imp_context *ctx;
+    size_t n_bodies;
+    struct imp__body *body; /* [n_bodies] all that rays can meet */
     size_t n, n_faces;
     struct imp__edge *edge; /* [n], along a curve through space: neighbours are near */
     struct imp__edge_face *face; /* [n_faces] */
 };
 
-/* All edges of the scene's shapes of triangles, flat or with vertex normals, and of flat ones in
- * instances that stand still. IMP_E_UNSUPPORTED, with its name: another shape that is no sphere, disk or
- * circular cylinder, or that is in an instance; an instance that moves. */
+/* All edges of the scene's shapes of triangles, flat or with vertex normals, also in instances.
+ * IMP_E_UNSUPPORTED, with its name: another shape that is no sphere, disk or circular cylinder, or that
+ * its instance makes none; an instance whose place changes with time. */
 enum imp_status imp__edges_build(const struct imp_scene *scene, struct imp__edges *out);
 void imp__edges_free(struct imp__edges *edges);
 
@@ -56,12 +64,14 @@ int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *s
 
 /* ---- edges_curved.c ---- */
 /* The same of curved shapes alone. */
-int imp__curved_pierced(const struct imp_scene *scene, int *other);
-/* A shape, and its rim, that lies on rim k of another one. -1: none. */
-int imp__rim_beside(const struct imp_scene *scene, int shape, int k, int *rim);
-/* A shape whose rim lies on another's, of which one moves, or which are not the lid and the wall of a
- * can. -1: none; *other: the other shape. */
-int imp__rims_torn(const struct imp_scene *scene, const struct imp__moves *moves,
-                   int *other);
+int imp__curved_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
+                        int *other);
+/* Does a rim lie on another one, *beside? */
+bool imp__rim_beside(const struct imp__edges *edges, const struct imp_scene *scene,
+                     const struct imp__rim_name *rim, struct imp__rim_name *beside);
+/* A shape whose rim lies on another's, of which one moves without the other, or which are not the lid
+ * and the wall of a can that stands still. -1: none; *other: the other shape. */
+int imp__rims_torn(const struct imp__edges *edges, const struct imp_scene *scene,
+                   const struct imp__moves *moves, int *other);
 
 #endif

@@ -3,6 +3,7 @@
  * Makes the list of edges (edges.h): the sides of all triangles, sorted by the line on which they
  * lie; along each line they are cut where one begins or ends, and what lies between two cuts is
  * one edge with the faces of all sides that cover it. */
+#include "base/arguments.h"
 #include "base/context.h"
 #include "edges.h"
 #include "kind/sensor/receiver.h"
@@ -36,12 +37,6 @@ struct building {
 static imp_v3 sense(void) { return imp__v3(0.5377, 0.6180, 0.5736); }
 static imp_v3 mark(void) { return imp__v3(-0.4423, 0.7071, -0.5515); }
 
-static imp_v3 vertex(const struct imp_triangles *t, uint32_t i)
-{
-    const float *p = t->positions + 3 * (size_t)i;
-    return imp__v3(p[0], p[1], p[2]);
-}
-
 static void side_add(struct building *x, const struct imp__edge_face *face, imp_v3 p,
                      imp_v3 q, imp_v3 apex)
 {
@@ -59,30 +54,58 @@ static void side_add(struct building *x, const struct imp__edge_face *face, imp_
     x->n++;
 }
 
-/* Its triangles, moved by the instance's map where it is in one. */
-static void shape_add(struct building *x, int shape, int64_t place,
-                      const struct imp_map *to_world)
+static void body_add(struct building *x, const struct imp__body *body)
 {
-    const struct imp_triangles *t = &x->scene->shapes[shape]->triangles;
-    if (x->scene->shapes[shape]->geometry != IMP_TRIANGLES ||
-        imp__shape_is_absent(x->scene->shapes[shape]))
-        return;
-    for (size_t j = 0; j < t->n_triangles; j++) {
+    const struct imp_shape *s = x->scene->shapes[body->shape];
+    struct imp_map map[2];
+    if (s->geometry != IMP_TRIANGLES) return;
+    if (body->place > 0) imp__place_map(x->scene, body->place, 0, &map[0], &map[1]);
+    for (size_t j = 0; j < s->triangles.n_triangles; j++) {
         const struct imp__edge_face face = {
-            .shape = shape, .prim = (int)j, .place = place};
-        imp_v3 p[3];
-        for (int c = 0; c < 3; c++) {
-            p[c] = vertex(t, t->indices[3 * j + (size_t)c]);
-            if (to_world) p[c] = imp__map_point(to_world, p[c]);
-        }
+            .shape = body->shape, .prim = (int)j, .place = body->place};
+        const struct imp__corners f = imp__corners_mapped(x->scene, body->shape, (int)j,
+                                                          body->place > 0 ? map : NULL);
         for (int c = 0; c < 3; c++)
-            side_add(x, &face, p[c], p[(c + 1) % 3], p[(c + 2) % 3]);
+            side_add(x, &face, f.p[c], f.p[(c + 1) % 3], f.p[(c + 2) % 3]);
     }
 }
 
 static int64_t places(const struct imp_scene *scene)
 {
     return scene->world ? scene->world->n_places : 0;
+}
+
+static enum imp_status bodies_take(struct building *x, size_t n)
+{
+    if (x->out->body || n == 0) return IMP_OK;
+    x->out->body = imp__alloc(x->ctx, n, sizeof *x->out->body);
+    return x->out->body ? IMP_OK : imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
+}
+
+/* All bodies: they are counted, then listed. */
+static enum imp_status bodies_list(struct building *x)
+{
+    const struct imp_scene *scene = x->scene;
+    for (int pass = 0; pass < 2; pass++) {
+        size_t n = 0;
+        for (int k = 0; k < imp__shapes_outside(scene); k++) {
+            if (imp__shape_is_absent(scene->shapes[k])) continue;
+            if (pass) x->out->body[n] = (struct imp__body){k, 0};
+            n++;
+        }
+        for (int64_t place = 1; place <= places(scene); place++) {
+            const struct imp_group *g = imp__place_group(scene, place);
+            if (!g)
+                return imp__error(
+                    x->ctx, IMP_E_UNSUPPORTED,
+                    "derivatives by what moves: an instance has a motion of its own");
+            for (int k = g->first; k < g->first + g->n_shapes; k++, n++)
+                if (pass) x->out->body[n] = (struct imp__body){k, place};
+        }
+        IMP_CHECKED(bodies_take(x, n));
+        x->out->n_bodies = n;
+    }
+    return IMP_OK;
 }
 
 static enum imp_status refuse(const struct building *x, const struct imp_shape *s,
@@ -97,55 +120,31 @@ static enum imp_status refuse(const struct building *x, const struct imp_shape *
 /* How many sides there are. */
 static enum imp_status sides_count(const struct building *x, size_t *n)
 {
-    const struct imp_scene *scene = x->scene;
     *n = 0;
-    for (int k = 0; k < imp__shapes_outside(scene); k++) {
-        const struct imp_shape *s = scene->shapes[k];
-        if (imp__moves_curved(scene, k) || imp__shape_is_absent(s)) continue;
-        if (s->smooth && !imp__moves_smooth(scene, k))
+    for (size_t k = 0; k < x->out->n_bodies; k++) {
+        const struct imp__body *body = &x->out->body[k];
+        const struct imp_shape *s = x->scene->shapes[body->shape];
+        if (imp__moves_curved(x->scene, body->shape, body->place)) continue;
+        if (s->smooth && !imp__moves_smooth(x->scene, body->shape))
             return refuse(x, s, "has normals of its own over its triangles");
+        if (imp__moves_curved(x->scene, body->shape, 0))
+            return refuse(x, s, "is stretched by its instance");
         if (s->geometry != IMP_TRIANGLES) return refuse(x, s, "is none");
         *n += 3 * s->triangles.n_triangles;
-    }
-    for (int64_t place = 1; place <= places(scene); place++) {
-        const struct imp_group *g = imp__place_group(scene, place);
-        if (!g)
-            return imp__error(
-                x->ctx, IMP_E_UNSUPPORTED,
-                "derivatives by what moves: an instance has a motion of its "
-                "own");
-        for (int k = g->first; k < g->first + g->n_shapes; k++) {
-            const struct imp_shape *s = scene->shapes[k];
-            if (s->geometry != IMP_TRIANGLES)
-                return refuse(x, s, "is in an instance, and not made of triangles");
-            if (s->smooth)
-                return refuse(x, s,
-                              "is in an instance, and has vertex normals (face_normals "
-                              "makes it flat)");
-            *n += 3 * s->triangles.n_triangles;
-        }
     }
     return IMP_OK;
 }
 
 static enum imp_status sides_make(struct building *x)
 {
-    const struct imp_scene *scene = x->scene;
     size_t n;
-    const enum imp_status st = sides_count(x, &n);
-    if (st != IMP_OK) return st;
+    IMP_CHECKED(bodies_list(x));
+    IMP_CHECKED(sides_count(x, &n));
     x->side = imp__alloc(x->ctx, n + 1, sizeof *x->side);
     x->cut = imp__alloc(x->ctx, 2 * n + 1, sizeof *x->cut);
     if (!x->side || !x->cut)
         return imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
-    for (int k = 0; k < imp__shapes_outside(scene); k++) shape_add(x, k, 0, NULL);
-    for (int64_t place = 1; place <= places(scene); place++) {
-        const struct imp_group *g = imp__place_group(scene, place);
-        struct imp_map to_world, to_local;
-        imp__place_map(scene, place, 0, &to_world, &to_local);
-        for (int k = g->first; k < g->first + g->n_shapes; k++)
-            shape_add(x, k, place, &to_world);
-    }
+    for (size_t k = 0; k < x->out->n_bodies; k++) body_add(x, &x->out->body[k]);
     return IMP_OK;
 }
 

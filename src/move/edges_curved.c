@@ -10,15 +10,14 @@
 #define END   1e-5 /* of a segment: nearer hits are of what begins there */
 
 /* The least and the largest distance of a triangle from a point. */
-static void triangle_distances(const struct imp_triangles *t, size_t prim, imp_v3 c,
-                               double *least, double *most)
+static void triangle_distances(const struct imp__corners *f, imp_v3 c, double *least,
+                               double *most)
 {
     imp_v3 p[3];
     *most = 0;
     *least = INFINITY;
     for (int k = 0; k < 3; k++) {
-        const float *at = t->positions + 3 * (size_t)t->indices[3 * prim + (size_t)k];
-        p[k] = imp__v3(at[0], at[1], at[2]) - c;
+        p[k] = f->p[k] - c;
         *most = imp_max(*most, imp__length(p[k]));
     }
     const imp_v3 cross = imp__cross(p[1] - p[0], p[2] - p[0]), n = imp__normalize(cross);
@@ -37,52 +36,66 @@ static void triangle_distances(const struct imp_triangles *t, size_t prim, imp_v
 #define CHORDS 128
 
 /* A disk and the surface of a sphere. */
-static bool disk_meets(const struct imp_scene *scene, int shape,
+static bool disk_meets(const struct imp_scene *scene, const struct imp__body *disk,
                        const struct imp_round *round)
 {
     double least = INFINITY, most = 0;
     bool over = true; /* is the centre above the disk? */
     for (int k = 0; k < CHORDS; k++) {
-        const struct imp__rim_point rim = imp__rim(scene, shape, 0, (double)k / CHORDS);
+        const struct imp__rim_point rim =
+            imp__rim(scene, disk->shape, disk->place, 0, (double)k / CHORDS);
         const imp_v3 r = rim.p - round->centre;
         least = imp_min(least, imp__length(r));
         most = imp_max(most, imp__length(r));
         over &= imp__dot(r, rim.out) > 0;
     }
-    const struct imp__rim_point rim = imp__rim(scene, shape, 0, 0);
+    const struct imp__rim_point rim = imp__rim(scene, disk->shape, disk->place, 0, 0);
     if (over) least = imp_min(least, fabs(imp__dot(rim.n, rim.p - round->centre)));
     return least < round->radius * (1 - TOUCH) && most > round->radius * (1 + TOUCH);
 }
 
-/* A shape that a segment from a to b of shape k passes through, from its ends inwards by `end` parts of
+static bool is_hit(const struct imp_hit *hit, int shape, int64_t place)
+{
+    return hit->shape == shape && hit->place == place;
+}
+
+/* A shape that a segment from a to b of a body passes through, from its ends inwards by `end` parts of
  * it; not `but`. -1: none. */
-static int segment_pierces(const struct imp_scene *scene, int k, int but, imp_v3 a,
-                           imp_v3 b, double end)
+static int segment_pierces(const struct imp_scene *scene, const struct imp__body *body,
+                           const struct imp__rim_name *but, imp_v3 a, imp_v3 b,
+                           double end)
 {
     const imp_v3 d = b - a;
     struct imp_hit hit;
     for (double from = end; imp__intersect(scene, &a, &d, from, 1 - end, &hit);
          from = hit.t + END)
-        if (hit.shape != k && hit.shape != but) return hit.shape;
+        if (!is_hit(&hit, body->shape, body->place) &&
+            !(but && is_hit(&hit, but->shape, but->place)))
+            return hit.shape;
     return -1;
 }
 
 /* A shape that a rim passes through, or a straight line in a cylinder. */
-static int rims_pierced(const struct imp_scene *scene, int *other)
+static int rims_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
+                        int *other)
 {
-    for (int k = 0; k < imp__shapes_outside(scene); k++) {
-        const int rims = imp__shape_is_absent(scene->shapes[k]) ? 0 : imp__rims(scene, k);
-        int beside = -1, unused;
-        *other = k;
+    for (size_t k = 0; k < edges->n_bodies; k++) {
+        const struct imp__body *body = &edges->body[k];
+        const int rims = imp__rims(scene, body->shape);
+        struct imp__rim_name beside, *but = NULL;
+        *other = body->shape;
         for (int j = 0; j < rims * CHORDS; j++) {
-            const int rim = j / CHORDS;
+            const struct imp__rim_name rim = {body->shape, body->place, j / CHORDS};
             const double v = (double)(j % CHORDS) / CHORDS;
-            const imp_v3 a = imp__rim(scene, k, rim, v).p,
-                         b = imp__rim(scene, k, rim, v + 1. / CHORDS).p;
-            if (j % CHORDS == 0) beside = imp__rim_beside(scene, k, rim, &unused);
-            int met = segment_pierces(scene, k, beside, a, b, 0);
-            if (met < 0 && rims == 2 && rim == 0)
-                met = segment_pierces(scene, k, -1, a, imp__rim(scene, k, 1, v).p, END);
+            const imp_v3 a = imp__rim(scene, rim.shape, rim.place, rim.k, v).p,
+                         b = imp__rim(scene, rim.shape, rim.place, rim.k, v + 1. / CHORDS)
+                                 .p;
+            if (j % CHORDS == 0)
+                but = imp__rim_beside(edges, scene, &rim, &beside) ? &beside : NULL;
+            int met = segment_pierces(scene, body, but, a, b, 0);
+            if (met < 0 && rims == 2 && rim.k == 0)
+                met = segment_pierces(scene, body, NULL, a,
+                                      imp__rim(scene, rim.shape, rim.place, 1, v).p, END);
             if (met >= 0) return met;
         }
     }
@@ -100,77 +113,110 @@ static bool tube_meets(const struct imp__tube *c, const struct imp_round *round)
     return least < round->radius * (1 - TOUCH) && most > round->radius * (1 + TOUCH);
 }
 
-/* Does the surface of a sphere meet this shape? Where they touch, it does not. */
-static bool meets_sphere(const struct imp_scene *scene, int shape,
+/* Is the sphere beside the box of a body in an instance? */
+static bool is_away(const struct imp_scene *scene, const struct imp__body *body,
+                    const struct imp_map *map, const struct imp_round *round)
+{
+    imp_v3 lo = scene->shapes[body->shape]->lo, hi = scene->shapes[body->shape]->hi;
+    bool away = false;
+    if (body->place > 0) imp__map_box(map, &lo, &hi);
+    for (int k = 0; k < 3; k++)
+        away |= round->centre[k] + round->radius < lo[k] ||
+                round->centre[k] - round->radius > hi[k];
+    return away;
+}
+
+/* Does the surface of a sphere meet this body? Where they touch, it does not. */
+static bool meets_sphere(const struct imp_scene *scene, const struct imp__body *body,
                          const struct imp_round *round)
 {
     const double inside = round->radius * (1 - TOUCH),
                  outside = round->radius * (1 + TOUCH);
-    const struct imp_triangles *t = &scene->shapes[shape]->triangles;
+    const struct imp_triangles *t = &scene->shapes[body->shape]->triangles;
+    const int64_t place = body->place;
+    struct imp_map map[2];
     struct imp__tube tube;
     struct imp_round other;
-    if (imp__moves_cylinder(scene, shape, &tube)) return tube_meets(&tube, round);
-    if (imp__moves_sphere(scene, shape, &other)) {
+    if (place > 0) imp__place_map(scene, place, 0, &map[0], &map[1]);
+    if (is_away(scene, body, &map[0], round)) return false;
+    if (imp__moves_cylinder(scene, body->shape, place, &tube))
+        return tube_meets(&tube, round);
+    if (imp__moves_sphere(scene, body->shape, place, &other)) {
         const double d = imp__length(other.centre - round->centre);
         return d < inside + other.radius &&
                d > fabs(round->radius - other.radius) + TOUCH * round->radius;
     }
-    if (imp__moves_disk(scene, shape)) return disk_meets(scene, shape, round);
-    if (scene->shapes[shape]->geometry != IMP_TRIANGLES) return false;
+    if (imp__moves_disk(scene, body->shape)) return disk_meets(scene, body, round);
+    if (scene->shapes[body->shape]->geometry != IMP_TRIANGLES) return false;
     for (size_t k = 0; k < t->n_triangles; k++) {
+        const struct imp__corners f =
+            imp__corners_mapped(scene, body->shape, (int)k, place > 0 ? map : NULL);
         double least, most;
-        triangle_distances(t, k, round->centre, &least, &most);
+        triangle_distances(&f, round->centre, &least, &most);
         if (least < inside && most > outside) return true;
     }
     return false;
 }
 
-static int spheres_pierced(const struct imp_scene *scene, int *other)
+static int spheres_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
+                           int *other)
 {
-    for (int k = 0; k < imp__shapes_outside(scene); k++) {
+    for (size_t k = 0; k < edges->n_bodies; k++) {
+        const struct imp__body *ball = &edges->body[k];
         struct imp_round round;
-        if (!imp__moves_sphere(scene, k, &round)) continue;
-        for (int j = 0; j < imp__shapes_outside(scene); j++)
-            if (j != k && !imp__shape_is_absent(scene->shapes[j]) &&
-                meets_sphere(scene, j, &round)) {
-                *other = j;
-                return k;
+        if (!imp__moves_sphere(scene, ball->shape, ball->place, &round)) continue;
+        for (size_t j = 0; j < edges->n_bodies; j++)
+            if (j != k && meets_sphere(scene, &edges->body[j], &round)) {
+                *other = edges->body[j].shape;
+                return ball->shape;
             }
     }
     return -1;
 }
 
-int imp__curved_pierced(const struct imp_scene *scene, int *other)
+int imp__curved_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
+                        int *other)
 {
-    const int pierced = spheres_pierced(scene, other);
-    return pierced >= 0 ? pierced : rims_pierced(scene, other);
+    const int pierced = spheres_pierced(edges, scene, other);
+    return pierced >= 0 ? pierced : rims_pierced(edges, scene, other);
 }
 
 /* ---- Rims that lie on each other ------------------------------------------------------ */
 
-int imp__rim_beside(const struct imp_scene *scene, int shape, int k, int *rim)
+static bool is_same(const struct imp__rim_name *a, const struct imp__rim_name *b)
 {
-    for (int other = 0; other < imp__shapes_outside(scene); other++)
-        for (*rim = 0; *rim < imp__rims(scene, other); ++*rim)
-            if ((other != shape || *rim != k) &&
-                imp__rims_meet(scene, shape, k, other, *rim))
-                return other;
-    return -1;
+    return a->shape == b->shape && a->place == b->place && a->k == b->k;
 }
 
-int imp__rims_torn(const struct imp_scene *scene, const struct imp__moves *moves,
-                   int *other)
+bool imp__rim_beside(const struct imp__edges *edges, const struct imp_scene *scene,
+                     const struct imp__rim_name *rim, struct imp__rim_name *beside)
 {
-    for (int shape = 0; shape < imp__shapes_outside(scene); shape++)
-        for (int k = 0; k < imp__rims(scene, shape); k++) {
-            int rim;
-            *other = imp__rim_beside(scene, shape, k, &rim);
-            if (*other < 0) continue;
+    for (size_t j = 0; j < edges->n_bodies; j++) {
+        const struct imp__body *body = &edges->body[j];
+        *beside = (struct imp__rim_name){body->shape, body->place, 0};
+        for (; beside->k < imp__rims(scene, body->shape); beside->k++)
+            if (!is_same(rim, beside) && imp__rims_meet(scene, rim, beside)) return true;
+    }
+    return false;
+}
+
+int imp__rims_torn(const struct imp__edges *edges, const struct imp_scene *scene,
+                   const struct imp__moves *moves, int *other)
+{
+    for (size_t j = 0; j < edges->n_bodies; j++) {
+        const struct imp__body *body = &edges->body[j];
+        struct imp__rim_name rim = {body->shape, body->place, 0}, beside;
+        for (; rim.k < imp__rims(scene, body->shape); rim.k++) {
+            if (!imp__rim_beside(edges, scene, &rim, &beside)) continue;
+            const int a = imp__carrier(scene, rim.shape, rim.place),
+                      b = imp__carrier(scene, beside.shape, beside.place);
             const bool lid =
-                imp__moves_disk(scene, shape) != imp__moves_disk(scene, *other);
-            if (!lid || imp__moves_shape(moves, shape, NULL) ||
-                imp__moves_shape(moves, *other, NULL))
-                return shape;
+                imp__moves_disk(scene, rim.shape) != imp__moves_disk(scene, beside.shape);
+            *other = beside.shape;
+            if (!lid || (a != b && (imp__moves_shape(moves, a, NULL) ||
+                                    imp__moves_shape(moves, b, NULL))))
+                return rim.shape;
         }
+    }
     return -1;
 }

@@ -59,7 +59,7 @@ static enum imp_status shape_mover(const struct imp__moves *moves, struct imp__m
 {
     imp_context *ctx = moves->scene->ctx;
     const struct imp_shape *s = moves->scene->shapes[m->shape];
-    if (s->geometry != IMP_TRIANGLES && !imp__moves_curved(moves->scene, m->shape))
+    if (s->geometry != IMP_TRIANGLES && !imp__moves_curved(moves->scene, m->shape, 0))
         return imp__error(ctx, IMP_E_UNSUPPORTED,
                           "shape '%s' (%s) is neither made of triangles nor a sphere, "
                           "disk or circular cylinder, and has no derivative by its place",
@@ -79,14 +79,25 @@ static enum imp_status shape_mover(const struct imp__moves *moves, struct imp__m
     return imp__fans_make(ctx, &s->triangles, &m->fans);
 }
 
+static enum imp_status instance_mover(const struct imp__moves *moves,
+                                      struct imp__mover *m)
+{
+    const struct imp_instance *p =
+        &moves->scene->world->instance[m->shape - IMP_MOVE_INSTANCE(0)];
+    m->centre = imp__map_point(&p->to_world, (p->group->lo + p->group->hi) * 0.5);
+    m->count = m->kind == IMP_MOVE_POSE ? 6 : 1;
+    return IMP_OK;
+}
+
 enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kind,
                                int shape)
 {
     imp_context *ctx = moves->scene->ctx;
     struct imp__mover m = {.kind = kind, .shape = shape, .first = moves->n, .rate = 1};
-    const enum imp_status st = shape >= 0                 ? shape_mover(moves, &m)
-                               : shape == IMP_MOVE_CAMERA ? camera_mover(moves, &m)
-                                                          : light_mover(moves, &m);
+    const enum imp_status st = shape >= 0                      ? shape_mover(moves, &m)
+                               : shape == IMP_MOVE_CAMERA      ? camera_mover(moves, &m)
+                               : imp__is_moved_instance(shape) ? instance_mover(moves, &m)
+                                                               : light_mover(moves, &m);
     if (st != IMP_OK) return st;
     struct imp__mover *more = imp__grow(ctx, moves->mover, &moves->cap_movers,
                                         (size_t)moves->n_movers + 1, sizeof *more);
@@ -121,7 +132,9 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
         [IMP_POSE_VERTICES] = IMP_MOVE_VERTICES,
         [IMP_POSE_POSITION] = IMP_MOVE_LIGHT,
         [IMP_POSE_DIRECTION] = IMP_MOVE_LIGHT};
-    int shape = pose->sensor ? IMP_MOVE_CAMERA : pose->shape;
+    int shape = pose->sensor          ? IMP_MOVE_CAMERA
+                : pose->instance >= 0 ? IMP_MOVE_INSTANCE(pose->instance)
+                                      : pose->shape;
     for (int k = 0; pose->emitter && k < moves->scene->n_emitters; k++)
         if (moves->scene->emitters[k] == pose->emitter) shape = IMP_MOVE_EMITTER(k);
     const bool turns = pose->kind == IMP_POSE_DIRECTION &&
@@ -136,7 +149,7 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
     if (st != IMP_OK) return st;
     struct imp__mover *m = &moves->mover[moves->n_movers - 1];
     const struct imp_pose *rigid = imp__pose_beside(pose, IMP_POSE_RIGID);
-    if (pose->shape >= 0 || pose->kind == IMP_POSE_RIGID) {
+    if (pose->shape >= 0 || pose->instance >= 0 || pose->kind == IMP_POSE_RIGID) {
         m->centre = pose->object->centre;
         for (int i = 0; rigid && i < 3; i++) m->centre[i] += rigid->number[i];
     }
@@ -167,8 +180,8 @@ void imp__pose_numbers_bar(const struct imp__moves *moves, const struct imp__mov
     const imp_v3 turn = imp__v3(bar[3], bar[4], bar[5]);
     for (int i = 3; i < 6; i++) bar[i] = 0;
     struct imp_round round;
-    if (pose->shape >= 0 && imp__moves_sphere(pose->scene, pose->shape, &round) &&
-        !looks_up(pose->scene, pose->shape))
+    if (pose->shape >= 0 && imp__moves_sphere(pose->scene, pose->shape, 0, &round) &&
+        !looks_up(pose->scene, pose->shape) && !pose->object->table)
         return; /* turned about its centre it is where it was */
     imp__rotation_bar(pose->number + 3, turn, bar + 3);
 }
@@ -181,7 +194,7 @@ bool imp__moves_shape(const struct imp__moves *moves, int shape,
     return false;
 }
 
-/* ---- Points ------------------------------------------------------------------------ */
+/* ---- Velocities -------------------------------------------------------------------- */
 
 struct corners {
     const uint32_t *index;
@@ -201,57 +214,6 @@ static struct corners corners(const struct imp_scene *scene, int shape, int prim
     const imp_v3 p0 = vertex(t, i[0]);
     return (struct corners){i, p0, vertex(t, i[1]) - p0, vertex(t, i[2]) - p0};
 }
-
-static struct imp__glued glued(const struct imp_scene *scene, int shape, int prim,
-                               double b1, double b2, imp_v3 side)
-{
-    const struct corners c = corners(scene, shape, prim);
-    struct imp__glued x = {.shape = shape, .prim = prim, .b = {1 - b1 - b2, b1, b2}};
-    x.p = c.p0 + c.e1 * b1 + c.e2 * b2;
-    x.n = imp__normalize(imp__cross(c.e1, c.e2));
-    if (imp__dot(x.n, side) < 0) x.n = -x.n;
-    imp__glued_shade(scene, &x, (const imp_v3[2]){c.e1, c.e2});
-    return x;
-}
-
-struct imp__glued imp__glued_at(const struct imp_scene *scene, int shape,
-                                const struct imp_located *x, imp_v3 n)
-{
-    const struct imp_shape *s = scene->shapes[shape];
-    if (s->geometry == IMP_TRIANGLES)
-        return glued(scene, shape, x->prim, x->at[0], x->at[1], n);
-    const double uv[2] = {x->at[0], x->at[1]};
-    struct imp_surface at;
-    int prim;
-    s->ops->place(s, uv, &at, &prim);
-    return imp__glued_curved(scene, shape, at.p, n);
-}
-
-struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int prim,
-                                  imp_v3 p, imp_v3 n)
-{
-    double b[3];
-    if (imp__moves_curved(scene, shape)) return imp__glued_curved(scene, shape, p, n);
-    imp__triangle_weights(scene->shapes[shape], prim, &p, b);
-    return glued(scene, shape, prim, b[1], b[2], n);
-}
-
-/* No mover has a shape of a group. */
-struct imp__glued imp__glued_still(int shape, imp_v3 p, imp_v3 n)
-{
-    return (struct imp__glued){.shape = shape, .b = {1, 0, 0}, .p = p, .n = n};
-}
-
-struct imp__glued imp__glued_placed(const struct imp_scene *scene, int shape,
-                                    const struct imp_located *x, int64_t place, imp_v3 n)
-{
-    struct imp_surface at;
-    if (place == 0) return imp__glued_at(scene, shape, x, n);
-    imp__located_surface(scene, shape, x, place, 0, &at);
-    return imp__glued_still(shape, at.p, imp__dot(at.ng, n) < 0 ? -at.ng : at.ng);
-}
-
-/* ---- Velocities -------------------------------------------------------------------- */
 
 /* s = in_edges[0] e1 + in_edges[1] e2. False: there is no s, or no triangle. */
 static bool edges_of(const struct corners *k, imp_v3 s, double in_edges[2])
@@ -329,7 +291,7 @@ struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
     struct imp__velocity out = {.area = 0};
     for (int k = 0; k < moves->n_movers; k++) {
         const struct imp__mover *m = &moves->mover[k];
-        if (m->shape != x->shape) continue;
+        if (m->shape != x->carrier) continue;
         const double *theta = theta_dot + m->first;
         const imp_v3 r = x->p - m->centre;
         switch (m->kind) {
@@ -355,7 +317,7 @@ void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *
 {
     for (int k = 0; k < moves->n_movers; k++) {
         const struct imp__mover *m = &moves->mover[k];
-        if (m->shape != x->shape) continue;
+        if (m->shape != x->carrier) continue;
         double *theta = theta_bar + m->first;
         const imp_v3 r = x->p - m->centre;
         switch (m->kind) {

@@ -29,6 +29,7 @@
 #include "scene/instances.h"
 #include "scene/located.h"
 #include "scene/pose.h"
+#include <limits.h>
 
 enum imp__move_kind {
     IMP_MOVE_POSE,
@@ -38,13 +39,16 @@ enum imp__move_kind {
     IMP_MOVE_AXIS,
     IMP_MOVE_VIEW /* + k: number k of a camera's view */
 };
-struct imp__fans;                      /* triangles around each vertex: shade.c */
-#define IMP_MOVE_CAMERA     (-1)       /* in place of a shape */
-#define IMP_MOVE_EMITTER(k) (-2 - (k)) /* in place of a shape: emitter k of the scene */
+struct imp__fans; /* triangles around each vertex: shade.c */
+/* In place of a shape: the camera, emitter k and instance k of the scene. */
+#define IMP_MOVE_CAMERA      (-1)
+#define IMP_MOVE_EMITTER(k)  (-2 - (k))
+#define IMP_MOVE_INSTANCE(k) (INT_MIN + (k))
+static inline bool imp__is_moved_instance(int shape) { return shape < INT_MIN / 2; }
 
 struct imp__mover {
     enum imp__move_kind kind;
-    int shape; /* index in the scene, IMP_MOVE_CAMERA, or IMP_MOVE_EMITTER(k) */
+    int shape; /* index in the scene, or one of IMP_MOVE_* */
     imp_v3 centre;
     imp_v3 axis;  /* of a spot or ies light; of parallel light its direction; unit */
     imp_v3 twist; /* of such an axis: a' turns its frame about it by twist.a' */
@@ -68,8 +72,10 @@ struct imp__moves {
 /* A point that is glued to its triangle, or to a sphere, disk or cylinder, world. */
 struct imp__glued {
     int shape, prim;
-    double b[3]; /* weights of the vertices, as the shape's indices have them */
-    imp_v3 p, n; /* place, and the unit geometric normal of either side */
+    int64_t place; /* the instance that the shape is in (imp_hit.place); 0: none */
+    int carrier;   /* by whose movers it moves, as imp__mover.shape */
+    double b[3];   /* weights of the vertices, as the shape's indices have them */
+    imp_v3 p, n;   /* place, and the unit geometric normal of either side */
     imp_v3 s; /* a unit direction in the surface that is glued to it; 0: none is wanted */
     double
         curvature; /* of the surface: the normal at a place shifted by x across n turns by
@@ -121,21 +127,9 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves,
  * object as it is, the parameter is one vector of rotation; normals follow vertices. */
 void imp__pose_numbers_bar(const struct imp__moves *moves, const struct imp__mover *mover,
                            const struct imp_pose *pose, double *bar);
-/* Does it move? By a mover that is not `but` (NULL: any). */
+/* Does it move (imp__mover.shape)? By a mover that is not `but` (NULL: any). */
 bool imp__moves_shape(const struct imp__moves *moves, int shape,
                       const struct imp__mover *but);
-
-/* The point of a triangle with these weights of its second and third vertex (located.h), or the
- * one next to p. n: the side of the normal that is wanted. */
-struct imp__glued imp__glued_at(const struct imp_scene *scene, int shape,
-                                const struct imp_located *x, imp_v3 n);
-struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int prim,
-                                  imp_v3 p, imp_v3 n);
-
-/* A point of a shape in an instance (place > 0), which stands still. */
-struct imp__glued imp__glued_still(int shape, imp_v3 p, imp_v3 n);
-struct imp__glued imp__glued_placed(const struct imp_scene *scene, int shape,
-                                    const struct imp_located *x, int64_t place, imp_v3 n);
 
 /* Velocity along theta_dot [moves->n]; the transpose adds to theta_bar [moves->n]. */
 struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
@@ -148,18 +142,44 @@ void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *
 #define IMP_TOUCHED_MOST 18
 size_t imp__mover_touched(const struct imp__moves *moves, const struct imp__mover *mover,
                           const struct imp__glued *x, size_t index[IMP_TOUCHED_MOST]);
-/* ---- curved.c ---- */
-/* Centre and radius of a sphere. False: another shape. */
-bool imp__moves_sphere(const struct imp_scene *scene, int shape, struct imp_round *out);
+
+/* ---- glued.c ---- */
+/* What carries a shape at a place, as imp__mover.shape: itself, or the instance that it is in. */
+int imp__carrier(const struct imp_scene *scene, int shape, int64_t place);
+/* Corners of a triangle, world, and the normals of its vertices, which are of unit length where the
+ * shape is in no instance; 0: it has none. */
+struct imp__corners {
+    imp_v3 p[3], n[3];
+    bool smooth;
+};
+struct imp__corners imp__corners(const struct imp_scene *scene, int shape, int prim,
+                                 int64_t place);
+/* The same by the maps of the place, to the world and back. NULL: there is none. */
+struct imp__corners imp__corners_mapped(const struct imp_scene *scene, int shape,
+                                        int prim, const struct imp_map *map);
+/* The point of a triangle with these weights of its second and third vertex (located.h), or the
+ * one next to p. n: the side of the normal that is wanted. */
+struct imp__glued imp__glued_at(const struct imp_scene *scene, int shape,
+                                const struct imp_located *x, int64_t place, imp_v3 n);
+struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int prim,
+                                  int64_t place, imp_v3 p, imp_v3 n);
+
+/* ---- curved.c: of a shape, in an instance where place > 0 ---- */
+/* Centre and radius of a sphere. False: another shape, or one that its instance stretches. */
+bool imp__moves_sphere(const struct imp_scene *scene, int shape, int64_t place,
+                       struct imp_round *out);
 bool imp__moves_disk(const struct imp_scene *scene, int shape);
 /* A circular cylinder, open at both ends. False: another shape. */
 struct imp__tube {
     imp_v3 base, axis; /* the middle of its first end; unit */
     double radius, length;
 };
-bool imp__moves_cylinder(const struct imp_scene *scene, int shape, struct imp__tube *out);
+bool imp__moves_cylinder(const struct imp_scene *scene, int shape, int64_t place,
+                         struct imp__tube *out);
 /* One of these? */
-bool imp__moves_curved(const struct imp_scene *scene, int shape);
+bool imp__moves_curved(const struct imp_scene *scene, int shape, int64_t place);
+/* The length of what has the length 1 in the group, on the average over volumes; 1: of the world. */
+double imp__place_scale(const struct imp_scene *scene, int64_t place);
 /* Rims: one of a disk, two of a cylinder, 0 of others. A point of rim k, by v of a turn, with its unit
  * direction, the unit direction in the surface away from it, the normal, and the length of dp/dv. */
 int imp__rims(const struct imp_scene *scene, int shape);
@@ -167,12 +187,19 @@ struct imp__rim_point {
     imp_v3 p, along, out, n;
     double rate;
 };
-struct imp__rim_point imp__rim(const struct imp_scene *scene, int shape, int k, double v);
-/* Do two rims lie on each other? */
-bool imp__rims_meet(const struct imp_scene *scene, int shape, int k, int other, int j);
+struct imp__rim_point imp__rim(const struct imp_scene *scene, int shape, int64_t place,
+                               int k, double v);
+/* A rim, and do two of them lie on each other? */
+struct imp__rim_name {
+    int shape;
+    int64_t place;
+    int k;
+};
+bool imp__rims_meet(const struct imp_scene *scene, const struct imp__rim_name *a,
+                    const struct imp__rim_name *b);
 /* The point next to p, whose normal n is on this side; in a direction from the middle of a sphere. */
-struct imp__glued imp__glued_curved(const struct imp_scene *scene, int shape, imp_v3 p,
-                                    imp_v3 n);
+struct imp__glued imp__glued_curved(const struct imp_scene *scene, int shape,
+                                    int64_t place, imp_v3 p, imp_v3 n);
 
 /* ---- cameras_lights.c ---- */
 /* Velocity of emitter k: of its place, or of the unit direction of parallel light. */
@@ -194,10 +221,8 @@ void imp__camera_velocity_bar(const struct imp__moves *moves, imp_v3 eye, imp_v3
 /* ---- shade.c ---- */
 /* Has this shape vertex normals, by which it is shaded? */
 bool imp__moves_smooth(const struct imp_scene *scene, int shape);
-/* Sets what a glued point of a triangle has of a mesh with vertex normals; e: edges from the first
- * vertex. Another shape: nothing. */
-void imp__glued_shade(const struct imp_scene *scene, struct imp__glued *x,
-                      const imp_v3 e[2]);
+/* Sets what a glued point of a triangle has of a mesh with vertex normals. Another shape: nothing. */
+void imp__glued_shade(struct imp__glued *x, const struct imp__corners *f);
 /* For each of n positions [n][3] the least vertex at the same one, to place [n]. IMP_E_NOMEM. */
 enum imp_status imp__vertex_places(imp_context *ctx, const float *positions, size_t n,
                                    uint32_t *place);

@@ -24,24 +24,21 @@ static imp_v3 triple(const float *array, uint32_t i)
     return imp__v3(p[0], p[1], p[2]);
 }
 
-void imp__glued_shade(const struct imp_scene *scene, struct imp__glued *x,
-                      const imp_v3 e[2])
+void imp__glued_shade(struct imp__glued *x, const struct imp__corners *f)
 {
-    if (!imp__moves_smooth(scene, x->shape)) return;
-    const struct imp_shape *s = scene->shapes[x->shape];
-    const struct imp__mesh *m = s->self;
-    const uint32_t *i = s->triangles.indices + 3 * (size_t)x->prim;
-    const imp_v3 n[3] = {triple(m->normals, i[0]), triple(m->normals, i[1]),
-                         triple(m->normals, i[2])};
-    const imp_v3 N = n[0] * x->b[0] + n[1] * x->b[1] + n[2] * x->b[2];
+    if (!f->smooth) return;
+    const imp_v3 e[2] = {f->p[1] - f->p[0], f->p[2] - f->p[0]};
+    const imp_v3 N = f->n[0] * x->b[0] + f->n[1] * x->b[1] + f->n[2] * x->b[2];
     const double aa = imp__dot(e[0], e[0]), ab = imp__dot(e[0], e[1]),
                  bb = imp__dot(e[1], e[1]), det = aa * bb - ab * ab;
     x->length = imp__length(N);
-    if (!(x->length > 1e-6) || !(det > 0)) return; /* as imp__mesh_point */
+    /* As imp__mesh_point, where the shape is in no instance. */
+    const double unit = x->place > 0 ? imp__length(f->n[0]) : 1;
+    if (!(x->length > 1e-6 * unit) || !(det > 0)) return;
     x->smooth = true;
     x->shade = N * (1 / x->length);
     for (int k = 0; k < 2; k++) {
-        const imp_v3 d = n[k + 1] - n[0];
+        const imp_v3 d = f->n[k + 1] - f->n[0];
         x->turn[k] = (d - x->shade * imp__dot(x->shade, d)) * (1 / x->length);
     }
     x->slope[0] = (e[0] * bb - e[1] * ab) * (1 / det);

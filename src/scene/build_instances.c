@@ -286,6 +286,10 @@ static enum imp_status instances_build(struct imp_scene *scene, struct imp_node 
         IMP_TRY(
             instance_build(scene, c->node, c->node->id ? c->node->id : name, depth, p));
         if (depth == 0) IMP_TRY(imp__bumps_place(scene, c->node, p));
+        if (depth == 0 && c->node->id) {
+            p->name = imp__arena_strdup(&scene->arena, c->node->id);
+            if (!p->name) return imp__build_no_memory(scene);
+        }
         p->before = g->n_places;
         if (__builtin_add_overflow(g->n_places, 1 + p->group->n_places, &g->n_places))
             IMP_TRY(imp__node_error(scene->ctx, c->node, IMP_E_SCENE,

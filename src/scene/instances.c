@@ -60,6 +60,11 @@ const struct imp_group *imp__place_group(const struct imp_scene *scene, int64_t 
     return moves ? NULL : g;
 }
 
+int imp__place_instance(const struct imp_scene *scene, int64_t place)
+{
+    return (int)(descend(scene->world, &place) - scene->world->instance);
+}
+
 void imp__place_map(const struct imp_scene *scene, int64_t place, double time,
                     struct imp_map *to_world, struct imp_map *to_local)
 {

@@ -26,6 +26,7 @@ struct imp_instance {
                           place (build_bumps.c); -1: they stand there themselves. NULL:
                           all do */
     int64_t before;    /* places in the instances before it */
+    const char *name;  /* of one of the scene's own that has an id; else NULL */
 };
 
 /* The shapes of a group with another material: copies of them, of which the first has
@@ -84,6 +85,8 @@ static inline int imp__shapes_outside(const struct imp_scene *scene)
 {
     return scene->world ? scene->world->n_shapes : scene->n_shapes;
 }
+/* Index of the scene's own instance that a place (> 0) is in. */
+int imp__place_instance(const struct imp_scene *scene, int64_t place);
 /* From the group that a place (> 0) is in to the world at a time, and back. */
 void imp__place_map(const struct imp_scene *scene, int64_t place, double time,
                     struct imp_map *to_world, struct imp_map *to_local);

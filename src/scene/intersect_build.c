@@ -362,6 +362,7 @@ enum imp_status imp__intersector_create(struct imp_scene *scene)
     for (int k = 0; k < scene->n_groups; k++) { /* those inside others come first */
         struct imp_group *g = scene->groups[k];
         const struct content c = {.group = g, .first = g->first, .n = g->n_shapes};
+        if (g->intersector) continue;
         IMP_TRY(intersector_make(scene, &c, &g->intersector));
     }
     const struct content c = {.group = scene->world, .n = scene->n_shapes};
@@ -386,6 +387,11 @@ static void intersector_release(struct imp_scene *scene, void **intersector)
     imp__facets_destroy(scene->ctx, x->facets);
     imp__release(scene->ctx, x);
     *intersector = NULL;
+}
+enum imp_status imp__intersector_renew(struct imp_scene *scene)
+{
+    intersector_release(scene, &scene->intersector);
+    return imp__intersector_create(scene);
 }
 void imp__intersector_destroy(struct imp_scene *scene)
 {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Where the rays of a camera meet (pose.h): in one point, or in a point of its lens. */
+ * Where the rays of a camera meet (pose.h): in one point, or in a point of its lens; parallel rays
+ * meet in none, and begin on a film. */
 #include "pose.h"
 
 /* By the rays through two corners of the film. */
@@ -28,8 +29,20 @@ bool imp__pinhole(const struct imp_sensor *s, imp_v3 *centre)
     return imp__length(apart) <= 1e-7 * (imp__length(r) + imp__length(elsewhere.o));
 }
 
+/* The middle of the film of parallel rays, where they begin. */
+static bool film_middle(const struct imp_sensor *s, imp_v3 *centre)
+{
+    struct imp_sensor_ray ray;
+    if (!s->ops->connect || !s->ops->move) return false;
+    s->ops->ray(s, s->film.width * 0.5, s->film.height * 0.5, (const double[2]){0.5, 0.5},
+                &ray);
+    *centre = ray.o;
+    return true;
+}
+
 bool imp__lens_middle(const struct imp_sensor *s, imp_v3 *centre)
 {
+    if (s->ops->flags & IMP_SENSOR_PARALLEL) return film_middle(s, centre);
     if (imp__pinhole(s, centre)) return true;
     return s->ops->connect && s->ops->lens_velocity &&
            imp__lens_point(s, (const double[2]){0.5, 0.5}, centre);

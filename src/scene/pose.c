@@ -82,13 +82,6 @@ static struct imp_map map_of(const struct imp_pose *object)
     return out;
 }
 
-static bool at_rest(const struct imp_pose *rigid)
-{
-    bool rests = true;
-    for (int k = 0; rigid && k < 6; k++) rests &= rigid->number[k] == 0;
-    return rests;
-}
-
 static enum imp_status sensor_apply(const struct imp_pose *p)
 {
     struct imp_sensor *s = p->sensor;
@@ -108,7 +101,7 @@ static enum imp_status sensor_apply(const struct imp_pose *p)
             "the lens of camera '%s' folds its picture with k1, k2, p1, p2, "
             "k3 = %g, %g, %g, %g, %g",
             s->name, number[3], number[4], number[5], number[6], number[7]);
-    if (!at_rest(imp__pose_beside(p, IMP_POSE_RIGID))) s->ops->move(s, map_of(p).m);
+    if (!imp__pose_rests(p)) s->ops->move(s, map_of(p).m);
     return IMP_OK;
 }
 
@@ -119,8 +112,10 @@ static enum imp_status shape_apply(const struct imp_pose *p)
     const size_t n = 3 * s->triangles.n_vertices;
     float *positions = (float *)(uintptr_t)s->triangles.positions;
     memcpy(s->self, p->rest, p->rest_size);
+    const struct imp_map by = map_of(p);
     if (s->geometry != IMP_TRIANGLES) {
-        s->ops->move(s, map_of(p).m);
+        s->ops->move(s, by.m);
+        imp__pose_carry(p->object, &by);
         return IMP_OK;
     }
     if (p->positions) memcpy(positions, p->positions, n * sizeof *p->positions);
@@ -132,7 +127,8 @@ static enum imp_status shape_apply(const struct imp_pose *p)
         IMP_CHECKED(imp__mesh_normals(p->scene->ctx, s->triangles.n_vertices,
                                       s->triangles.n_triangles, positions,
                                       s->triangles.indices, normals));
-    s->ops->move(s, map_of(p).m); /* also at rest: frames of facets and the box follow */
+    s->ops->move(s, by.m); /* also at rest: frames of facets and the box follow */
+    imp__pose_carry(p->object, &by);
     return IMP_OK;
 }
 
@@ -174,6 +170,10 @@ static enum imp_status pose_apply(struct imp_pose *p)
 {
     p->due = false;
     if (p->shape >= 0) return shape_apply(p);
+    if (p->instance >= 0) {
+        const struct imp_map by = map_of(p);
+        return imp__instance_apply(p, &by);
+    }
     if (p->sensor) return sensor_apply(p);
     light_apply(p);
     return IMP_OK;
@@ -266,7 +266,8 @@ enum imp_status imp__poses_settle(struct imp_scene *scene)
     if (imp_likely(!scene->moved)) return IMP_OK;
     for (struct imp_pose *p = scene->poses; p; p = p->next) {
         if (!p->due) continue;
-        scene->reshaped |= p->shape >= 0;
+        imp_v3 lo, hi;
+        scene->reshaped |= imp__pose_box(p, &lo, &hi);
         const char *wrong = NULL;
         const enum imp_status st = pose_apply(p);
         if (st != IMP_OK) {
@@ -292,8 +293,7 @@ enum imp_status imp__poses_settle(struct imp_scene *scene)
     }
     if (scene->reshaped) {
         bounds_update(scene);
-        imp__intersector_destroy(scene);
-        const enum imp_status st = imp__intersector_create(scene);
+        const enum imp_status st = imp__intersector_renew(scene);
         if (st != IMP_OK) return st;
     }
     scene->moved = scene->reshaped = false;

@@ -2,9 +2,9 @@
  *
  * Where things are, as parameters:
  *
- *     NAME.pose              of a shape or camera: e and a, six numbers; a point that the scene
+ *     NAME.pose              of a shape, instance or camera: e and a, six numbers; a point that the scene
  *                            file has at X0 is at  X = c + e + R(a) s (X0 - c)
- *     NAME.scale             of a shape: s
+ *     NAME.scale             of a shape or instance: s
  *     NAME.vertex_positions  of a mesh: the vertices, three numbers each, world
  *     NAME.x_fov             of a perspective camera: its horizontal field of view, degrees
  *     NAME.principal_point_offset_x, _y    of a camera, in parts of the film's width and height
@@ -13,7 +13,8 @@
  *     NAME.position          of a light at a point, world
  *     NAME.direction         along which parallel light travels, or of a spot's axis, of any length
  *
- * R(a): the rotation about a by |a| radians; c: the middle of a shape's box, a camera's own place.
+ * R(a): the rotation about a by |a| radians; c: the middle of a shape's box, or of a group's where an
+ * instance has it; a camera's own place.
  * They are parameters when they are asked for, behind all others: imp_scene_add_geometry. */
 #ifndef IMP_SCENE_POSE_H
 #define IMP_SCENE_POSE_H
@@ -51,6 +52,7 @@ struct imp_pose {
     struct imp_scene *scene;
     enum imp_pose_kind kind;
     int shape;                   /* index; -1: no shape */
+    int instance;                /* of the scene's own; -1: none */
     struct imp_sensor *sensor;   /* NULL: no sensor */
     struct imp_emitter *emitter; /* NULL: no light without a shape */
     int param;
@@ -63,8 +65,13 @@ struct imp_pose {
     /* As the file has it: the kind's object, and positions and normals of a mesh. */
     void *rest;
     size_t rest_size;
-    float *positions, *normals; /* NULL: in the object, or none */
+    float *positions, *normals;    /* NULL: in the object, or none */
+    struct imp_receiver *receiver; /* of a shape with a meter that has one; else NULL */
+    struct imp__ies *table;        /* of a shape that shines by a table; else NULL */
 };
+
+/* Its box now. False: it is no shape, and no instance. */
+bool imp__pose_box(const struct imp_pose *p, imp_v3 *lo, imp_v3 *hi);
 
 /* The last part of such a name, without its point. */
 const char *imp__pose_tail(enum imp_pose_kind kind);
@@ -101,7 +108,8 @@ bool imp__pinhole(const struct imp_sensor *sensor, imp_v3 *centre);
 /* The point of its lens that rays with these numbers go through; a pinhole has one. False: none. */
 bool imp__lens_point(const struct imp_sensor *sensor, const double lens[2],
                      imp_v3 *point);
-/* That point, or the middle of a lens whose rays to a film position meet in a point. False: neither. */
+/* That point, or the middle of a lens whose rays to a film position meet in a point, or of the film of
+ * a camera that moves and has parallel rays. False: none of these. */
 bool imp__lens_middle(const struct imp_sensor *sensor, imp_v3 *centre);
 
 /* The rotation of a vector of rotation, row by row. */
@@ -112,6 +120,31 @@ void imp__rotation_bar(const double a[3], imp_v3 turn_bar, double a_bar[3]);
 
 /* ---- pose.c for pose_add.c ---- */
 void imp__pose_changed(void *pose);
+
+/* ---- pose_rest.c for pose.c and pose_add.c ---- */
+/* Sets p->rest and what follows it. IMP_E_NOMEM. */
+enum imp_status imp__pose_rest_keep(struct imp_scene *scene, struct imp_pose *p);
+/* Is it turned and shifted by nothing? */
+bool imp__pose_rests(const struct imp_pose *p);
+/* Moves what a shape, which has been moved, carries along. p: the first parameter of the object. */
+struct imp_map;
+void imp__pose_carry(const struct imp_pose *p, const struct imp_map *by);
+
+/* ---- pose_instances.c for pose.c and pose_add.c ---- */
+/* Instances of the scene's own; those that are listed by name, none of more than so many. */
+#define IMP_POSE_INSTANCES_LISTED 1024
+int imp__pose_instances(const struct imp_scene *scene);
+int imp__pose_instances_listed(const struct imp_scene *scene);
+/* Its id, or "instance" and its index. */
+void imp__instance_name(const struct imp_scene *scene, int k, char out[200]);
+/* Why it has no such number. NULL: it has one. */
+const char *imp__instance_why(const struct imp_scene *scene, int k,
+                              enum imp_pose_kind kind);
+/* Sets the instance of this name, its centre and the size of what is kept. False: there is none. */
+bool imp__instance_find(const struct imp_scene *scene, const char *name,
+                        struct imp_pose *p);
+/* Moves it from where the file has it. */
+enum imp_status imp__instance_apply(const struct imp_pose *p, const struct imp_map *by);
 
 /* ---- pose_folds.c for pose.c ---- */
 /* A triangle of a mesh that its vertices' motion away from `rest` [3 n_vertices] makes vanish, or

@@ -4,6 +4,7 @@
 #include "access.h"
 #include "base/arguments.h"
 #include "instances.h"
+#include "kind/emitter/ies.h"
 #include "kind/sensor/receiver.h"
 #include "kind/shape/shape.h"
 #include "pose.h"
@@ -11,7 +12,7 @@
 #include <stdio.h>
 #include <string.h>
 
-extern const struct imp_emitter_ops imp__spot_light, imp__ies_light;
+extern const struct imp_emitter_ops imp__spot_light;
 
 /* ---- Adding ------------------------------------------------------------------------- */
 
@@ -28,13 +29,12 @@ static const char *shape_why(const struct imp_scene *scene, const struct imp_sha
 {
     if (!s->ops->move)
         return "it is not made of triangles, and no sphere, disk or cylinder";
-    if (s->index >= imp__shapes_outside(scene)) return "it is in a shape group";
+    if (s->index >= imp__shapes_outside(scene))
+        return "it is in a shape group: its instances have poses";
     if (scene->n_media + scene->n_bodies > 0 || scene->priorities)
         return "there are media";
     if (scene->lights_in_tree) return "lights are chosen by a tree (light_choice)";
     if (scene->aims.aimed) return "directions are aimed at shapes";
-    if (s->sensor && s->sensor->receiver)
-        return "its meter is a grid, or not there, and stays where it is";
     if (s->placed || s->by_triangle) return "its textures need more than uv";
     return NULL;
 }
@@ -67,7 +67,7 @@ static const char *sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
 {
     if (kind != IMP_POSE_RIGID && !imp__pose_is_view(kind)) return "it is a sensor";
     double number[IMP_VIEW_NUMBERS];
-    if (!s->ops->move) return "it is no perspective camera or thin lens";
+    if (!s->ops->move) return "it is no perspective or orthographic camera or thin lens";
     if (s->medium) return "it is in a medium";
     if (!imp__lens_middle(s, centre)) return "its rays meet in no point";
     if (kind == IMP_POSE_RIGID) return NULL;
@@ -134,34 +134,14 @@ static enum imp_status object_find(struct imp_scene *scene, const char *name,
     for (int k = 0; k < scene->n_emitters; k++)
         if (!scene->emitters[k]->shape && strcmp(scene->emitters[k]->name, name) == 0)
             return light_find(scene, k, p);
+    if (imp__instance_find(scene, name, p))
+        return found(scene, name, p, imp__instance_why(scene, p->instance, p->kind));
     char whole[256];
     snprintf(whole, sizeof whole, "%s.%s", name, imp__pose_tail(p->kind));
     return imp__error(scene->ctx, IMP_E_ARG, "there is no %s '%s'%s",
-                      p->kind >= IMP_POSE_POSITION ? "light" : "shape or camera", name,
-                      imp__theta_near(scene, whole).text);
-}
-
-static enum imp_status rest_keep(struct imp_scene *scene, struct imp_pose *p)
-{
-    p->rest = imp__arena_take(&scene->arena, 1, p->rest_size);
-    if (!p->rest) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
-    if (p->sensor || p->emitter) {
-        memcpy(p->rest, p->sensor ? p->sensor->self : p->emitter->self, p->rest_size);
-        return IMP_OK;
-    }
-    const struct imp_shape *s = scene->shapes[p->shape];
-    memcpy(p->rest, s->self, p->rest_size);
-    const struct imp_triangles *t = &s->triangles;
-    const struct imp__mesh *m = s->ops->move == imp__mesh_move ? s->self : NULL;
-    if (!m) return IMP_OK; /* its positions are in the object */
-    const size_t n = 3 * t->n_vertices;
-    p->positions = imp__arena_take(&scene->arena, n, sizeof *p->positions);
-    if (m->normals) p->normals = imp__arena_take(&scene->arena, n, sizeof *p->normals);
-    if (!p->positions || (m->normals && !p->normals))
-        return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
-    memcpy(p->positions, t->positions, n * sizeof *p->positions);
-    if (m->normals) memcpy(p->normals, m->normals, n * sizeof *p->normals);
-    return IMP_OK;
+                      p->kind >= IMP_POSE_POSITION ? "light"
+                                                   : "shape, instance or camera",
+                      name, imp__theta_near(scene, whole).text);
 }
 
 /* Numbers, and what they are where the file has the object. */
@@ -247,7 +227,8 @@ static bool is_there(const struct imp_scene *scene, struct imp_pose *p)
 {
     p->object = p;
     for (struct imp_pose *q = scene->poses; q; q = q->next) {
-        if (q->shape != p->shape || q->sensor != p->sensor || q->emitter != p->emitter)
+        if (q->shape != p->shape || q->sensor != p->sensor || q->emitter != p->emitter ||
+            q->instance != p->instance)
             continue;
         if (q->kind == p->kind) return true;
         p->object = q->object;
@@ -271,7 +252,7 @@ static enum imp_status geometry_add(struct imp_scene *scene, const char *object,
     if (!p) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
     p->scene = scene;
     p->kind = kind;
-    p->shape = -1;
+    p->shape = p->instance = -1;
     IMP_CHECKED(object_find(scene, object, p));
     if (is_there(scene, p)) return IMP_OK;
     const bool others =
@@ -280,7 +261,7 @@ static enum imp_status geometry_add(struct imp_scene *scene, const char *object,
         ((kind == IMP_POSE_VERTICES && others) || imp__pose_beside(p, IMP_POSE_VERTICES)))
         return refuse(scene, object, kind,
                       "single vertices move, and the whole moves with them");
-    if (p->object == p) IMP_CHECKED(rest_keep(scene, p));
+    if (p->object == p) IMP_CHECKED(imp__pose_rest_keep(scene, p));
     IMP_CHECKED(numbers_make(scene, p));
     IMP_CHECKED(param_add(scene, object, p));
     struct imp_pose **end = &scene->poses;
@@ -294,9 +275,10 @@ static enum imp_status geometry_add(struct imp_scene *scene, const char *object,
 
 /* ---- Names ---------------------------------------------------------------------------- */
 
-/* Object k: shapes, then sensors, then lights without a shape; may it have such a number? */
+/* Object k: shapes, then sensors, then lights without a shape, then instances; may it have such a
+ * number? */
 static const char *object_name(const struct imp_scene *scene, int k,
-                               enum imp_pose_kind kind)
+                               enum imp_pose_kind kind, char own[200])
 {
     imp_v3 centre;
     if (k < scene->n_shapes) {
@@ -308,17 +290,25 @@ static const char *object_name(const struct imp_scene *scene, int k,
         struct imp_sensor *s = scene->sensors[k];
         return sensor_why(s, kind, &centre) ? NULL : s->name;
     }
-    const struct imp_emitter *e = scene->emitters[k - scene->n_sensors];
+    k -= scene->n_sensors;
+    if (k >= scene->n_emitters) {
+        k -= scene->n_emitters;
+        imp__instance_name(scene, k, own);
+        return imp__instance_why(scene, k, kind) ? NULL : own;
+    }
+    const struct imp_emitter *e = scene->emitters[k];
     return e->shape || light_why(scene, e, kind) ? NULL : e->name;
 }
 
 bool imp__geometry_next(const struct imp_scene *scene, struct imp_geometry_walk *at)
 {
-    const int n = scene->n_shapes + scene->n_sensors + scene->n_emitters;
     if (!scene->committed || scene->rayless) return false;
+    const int n = scene->n_shapes + scene->n_sensors + scene->n_emitters +
+                  imp__pose_instances_listed(scene);
+    char own[200];
     for (; at->next < n * IMP_POSE_KINDS; at->next++) {
         const enum imp_pose_kind kind = (enum imp_pose_kind)(at->next % IMP_POSE_KINDS);
-        const char *name = object_name(scene, at->next / IMP_POSE_KINDS, kind);
+        const char *name = object_name(scene, at->next / IMP_POSE_KINDS, kind, own);
         if (!name) continue;
         snprintf(at->name, sizeof at->name, "%s.%s", name, imp__pose_tail(kind));
         at->next++;

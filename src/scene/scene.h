@@ -228,7 +228,9 @@ enum imp_status imp__param_check(const struct imp_scene *scene, const struct imp
                                  size_t k, double value);
 
 /* ---- intersect.c --------------------------------------------------------------- */
+/* With those of its groups; renew: of what stands in the scene itself has moved, and groups have not. */
 enum imp_status imp__intersector_create(struct imp_scene *scene);
+enum imp_status imp__intersector_renew(struct imp_scene *scene);
 void imp__intersector_destroy(struct imp_scene *scene);
 size_t imp__intersector_bytes(const struct imp_scene *scene);
 /* Nearest hit of o + t d, tmin < t < tmax, tmin >= 0, at a time. Rays that are not finite

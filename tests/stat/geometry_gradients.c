@@ -4,11 +4,10 @@
  * parallel light, through the public calls: imp_problem_reverse against central differences of
  * functionals of pictures with the numbers set and the same random numbers. Standard errors are
  * bounded; what cannot be moved is refused. */
-#include "imp_scene.h"
-#include "imp_tap.h"
+#include "ies_table.h"
+#include "moves_functional.h"
 
-enum { WIDTH = 24, HEIGHT = 16, NUMBERS_MAX = 80 };
-static imp_context *ctx;
+enum { NUMBERS_MAX = 80 };
 static char block_file[] = "/tmp/geometry_XXXXXX.obj";
 
 /* A welded box that is turned and leans. */
@@ -30,22 +29,8 @@ static void block_write(void)
 #define DIRECT "<integrator type='direct'/>"
 #define PATH   "<integrator type='path'><integer name='max_depth' value='3'/></integrator>"
 
-static char table_file[] = "/tmp/geometry_XXXXXX.ies",
-            dark_file[] = "/tmp/geometry_XXXXXX.ies";
-
-/* Another plane at each right angle; `last`: what is left at 90 degrees. */
-static void table_write(char *name, int last)
-{
-    const int fd = mkstemps(name, 4);
-    FILE *f = fdopen(fd, "w");
-    fputs("IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 5 5 1 2 0 0 0\n1 1 0\n"
-          "0 20 45 65 90\n0 90 180 270 360\n",
-          f);
-    for (int k = 0; k < 5; k++)
-        fprintf(f, "9000 %d %d %d %d\n", 9000 - 900 * (k % 4), 8000 - 1700 * (k % 4),
-                4000 + 900 * (k % 4), last);
-    fclose(f);
-}
+#define TABLE "geometry_gradients.ies"
+#define LEFT  "geometry_gradients_left.ies"
 
 /* The light `bulb` by that table. */
 static const char *luminaire(const char *name)
@@ -83,30 +68,16 @@ static imp_scene *room(const char *rest)
     return test_scene_text(ctx, xml, IMP_RGB);
 }
 
-static float adjoint[WIDTH * HEIGHT * 3];
-static void adjoint_make(void)
-{
-    for (int p = 0; p < WIDTH * HEIGHT; p++)
-        for (int c = 0; c < 3; c++) {
-            const double x = (p % WIDTH + .5) / WIDTH, y = (p / WIDTH + .5) / HEIGHT;
-            adjoint[3 * p + c] =
-                (float)((1 + 0.3 * sin(3 * x + 2 * y + c)) / (WIDTH * HEIGHT));
-        }
-}
-
 struct number {
     const char *name;
     size_t k;
     double step;
 };
 
-static double functional(imp_scene *scene, const struct number *x, double by,
-                         uint64_t seed, int spp)
+static double functional_at(imp_scene *scene, const struct number *x, double by,
+                            int64_t seed, int spp)
 {
-    struct imp_run run = IMP_RUN_INIT;
     struct imp_param_info info = {.size = sizeof info};
-    imp_problem *p;
-    struct imp_estimate value;
     double v[NUMBERS_MAX];
     size_t index;
     test_must(ctx, imp_scene_find_param(scene, x->name, &index));
@@ -114,14 +85,10 @@ static double functional(imp_scene *scene, const struct number *x, double by,
     test_must(ctx, imp_scene_get_values(scene, index, v));
     v[x->k] += by;
     test_must(ctx, imp_scene_set_values(scene, index, info.count, v));
-    run.spp = spp;
-    run.seed = seed;
-    test_must(ctx, imp_problem_create(scene, &p));
-    test_must(ctx, imp_problem_functional(p, adjoint, &run, &value, NULL, NULL));
-    imp_problem_destroy(p);
+    const double value = functional(scene, seed, spp);
     v[x->k] -= by;
     test_must(ctx, imp_scene_set_values(scene, index, info.count, v));
-    return value.value;
+    return value;
 }
 
 /* Seeds of a derivative, pairs of a difference: a third of them in the short run. */
@@ -182,7 +149,8 @@ static void room_test(const char *name, const char *rest, const struct number *n
         for (uint64_t g = 0; g < (uint64_t)groups; g++) {
             double value[2];
             for (int s = 0; s < 2; s++)
-                value[s] = functional(scene, x, (s ? 1 : -1) * x->step, 500 + g, spp_ref);
+                value[s] =
+                    functional_at(scene, x, (s ? 1 : -1) * x->step, 500 + g, spp_ref);
             tap_add(&ref, (value[1] - value[0]) / (2 * x->step));
         }
         const double se = sqrt(told[k] / seeds);
@@ -323,8 +291,8 @@ int main(int argc, char **argv)
     if (!is_long) seeds = 6, groups = 12;
     ctx = test_context(2);
     block_write();
-    table_write(table_file, 0);
-    table_write(dark_file, 300);
+    table_write(TABLE, 0);
+    table_write(LEFT, 300);
     adjoint_make();
     room_test("view", DIRECT LAMP, view, turned, 0.04, 64, 64);
     room_test("lens", DIRECT LAMP, lens, bent, 0.04, 64, 64);
@@ -332,7 +300,7 @@ int main(int argc, char **argv)
     room_test("corners", DIRECT LAMP, corners, NULL, 0.03, 64, 24);
     room_test("bulb", PATH BULB, bulb, NULL, 0.03, 64, 24);
     if (is_long) room_test("spot", DIRECT SPOT, bulb, NULL, 0.03, 64, 24);
-    room_test("luminaire", luminaire(table_file), aimed, leaning, 0.03, 64, 24);
+    room_test("luminaire", luminaire(TABLE), aimed, leaning, 0.03, 64, 24);
     if (is_long) room_test("bulb and lamp", DIRECT BULB LAMP, bulb, NULL, 0.04, 64, 24);
     room_test("sun", PATH SUN, sun, NULL, 0.03, 64, 24);
     if (is_long) room_test("ball", DIRECT BALL LAMP, ball, NULL, 0.1, 128, 32);
@@ -345,10 +313,10 @@ int main(int argc, char **argv)
     refused(DIRECT LAMP, "floor.vertex_positions", "no mesh");
     refused(DIRECT BULB, "bulb.direction", "bulb");
     refused(DIRECT BULB, "block.colour", "pose");
-    moved_refused(luminaire(dark_file), "bulb.position", "still has light");
+    moved_refused(luminaire(LEFT), "bulb.position", "still has light");
     remove(block_file);
-    remove(table_file);
-    remove(dark_file);
+    remove(TABLE);
+    remove(LEFT);
     imp_context_destroy(ctx);
     return tap_done();
 }

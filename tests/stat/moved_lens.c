@@ -4,9 +4,9 @@
  * closed form of what one pixel sees; imp_problem_reverse against central differences by poses of a
  * block, a ball and the camera, by its aperture, focus, field of view and principal point, by a mesh
  * with vertex normals, and below the sun. */
+#include "egg.h"
 #include "mean_gradient.h"
 #include "moves_numbers.h"
-#include <unistd.h>
 
 #define PATH "<integrator type='path'><integer name='max_depth' value='3'/></integrator>"
 #define LAMP                                                                             \
@@ -20,32 +20,15 @@
 #define BALL                                                                             \
     "<shape type='sphere' id='ball'><float name='radius' value='.4'/><point "            \
     "name='center' x='1.1' y='-.8' z='.5'/><ref id='grey'/></shape>"
+#define EGG_FILE "moved_lens_egg.obj"
 #define EGG                                                                              \
-    "<shape type='obj' id='egg'><string name='filename' value='%s'/><transform "         \
-    "name='to_world'><scale value='.5'/><translate x='1' y='-.8' z='.6'/></transform>"   \
-    "<ref id='grey'/></shape>"
-
-/* An octahedron with vertex normals. */
-static char egg_file[] = "/tmp/moved_lens_XXXXXX.obj";
-static void egg_write(void)
-{
-    FILE *f = fdopen(mkstemps(egg_file, 4), "w");
-    fputs("v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\nvn 1 0 0\nvn -1 0 0\n"
-          "vn 0 1 0\nvn 0 -1 0\nvn 0 0 1\nvn 0 0 -1\n",
-          f);
-    for (int k = 0; k < 8; k++) {
-        const int x = k & 1 ? 2 : 1, y = k & 2 ? 4 : 3, z = k & 4 ? 6 : 5;
-        const bool turned = (k & 1) ^ (k >> 1 & 1) ^ (k >> 2 & 1);
-        fprintf(f, "f %d//%d %d//%d %d//%d\n", x, x, turned ? z : y, turned ? z : y,
-                turned ? y : z, turned ? y : z);
-    }
-    fclose(f);
-}
+    "<shape type='obj' id='egg'><string name='filename' value='" EGG_FILE                \
+    "'/><transform name='to_world'><scale value='.6'/><translate x='1' y='-.8' "         \
+    "z='.6'/></transform><ref id='grey'/></shape>"
 
 static imp_scene *room(const char *rest)
 {
-    char xml[8192], own[4096];
-    snprintf(own, sizeof own, rest, egg_file);
+    char xml[8192];
     snprintf(xml, sizeof xml,
              "<scene version='3.0.0'><bsdf type='diffuse' id='grey'><rgb "
              "name='reflectance' value='.6,.5,.4'/></bsdf>%s"
@@ -60,7 +43,7 @@ static imp_scene *room(const char *rest)
              "<shape type='cube' id='block'><transform name='to_world'><scale x='.6' "
              "y='.5' z='.4'/><rotate z='1' angle='25'/><translate x='-.2' y='.3' "
              "z='.7'/></transform><ref id='grey'/></shape></scene>",
-             own);
+             rest);
     return test_scene_text(ctx, xml, IMP_RGB);
 }
 
@@ -134,7 +117,7 @@ int main(int argc, char **argv)
                                         {NULL, 0, 0}};
     ctx = test_context(2);
     adjoint_make();
-    egg_write();
+    egg_write(EGG_FILE, true);
     edge_test();
     numbers_compare("sky", room(PATH CLEAR), 32 * more, 48 * more, .2, sky);
     adjoint_sharpen();
@@ -142,6 +125,6 @@ int main(int argc, char **argv)
     numbers_compare("lens", room(PATH LAMP), 32 * more, 48 * more, .1, view);
     numbers_compare("ball", room(PATH LAMP BALL), 32 * more, 48 * more, .2, ball);
     numbers_compare("egg", room(PATH LAMP EGG), 32 * more, 48 * more, .2, egg);
-    remove(egg_file);
+    remove(EGG_FILE);
     return tap_done();
 }

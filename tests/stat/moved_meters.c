@@ -5,6 +5,7 @@
  * a shape of the scene or on one that is not there, and for grids of points: planar, turned,
  * cylindrical and semicylindrical; below area lamps, point lamps and skies, behind a block. What is
  * refused. */
+#include "egg.h"
 #include "mean_gradient.h"
 #include "moves_numbers.h"
 
@@ -38,6 +39,7 @@
     ON("<sensor type='irradiancemeter' id='meter'><boolean name='virtual' "              \
        "value='true'/>" MORE FILM("4", "3") "</sensor>")
 #define POINTS  "<string name='at' value='points'/>"
+#define LEANS   "<vector name='facing' x='.3' y='-.5' z='1'/>"
 #define UPRIGHT "<string name='receiver' value='cylindrical'/>"
 #define HALF                                                                             \
     "<string name='receiver' value='semicylindrical'/><vector name='facing' x='.3' "     \
@@ -47,26 +49,16 @@
     "<shape type='sphere'><point name='center' x='0' y='0' z='.5'/><float "              \
     "name='radius' value='.2'/>" GREY                                                    \
     "<sensor type='irradiancemeter'>" FILM("1", "1") "</sensor></shape>"
+#define EGG_FILE "moved_meters_egg.obj"
 #define EGG                                                                              \
-    "<shape type='obj'><string name='filename' value='%s'/><transform name='to_world'>"  \
-    "<translate x='-1.5' z='.5'/></transform>" GREY "</shape>"
-
-static char egg_file[] = "/tmp/moved_meters_XXXXXX.obj";
-static void egg_write(void)
-{
-    FILE *f = fdopen(mkstemps(egg_file, 4), "w");
-    fputs("v .2 .2 .2\nv -.2 -.2 .2\nv -.2 .2 -.2\nv .2 -.2 -.2\nvn 1 1 1\nvn -1 -1 1\n"
-          "vn -1 1 -1\nvn 1 -1 -1\nf 1//1 3//3 2//2\nf 1//1 2//2 4//4\nf 1//1 4//4 "
-          "3//3\nf 2//2 3//3 4//4\n",
-          f);
-    fclose(f);
-}
+    "<shape type='obj' id='egg'><string name='filename' value='" EGG_FILE                \
+    "'/><transform name='to_world'><scale value='.5'/><translate x='-.6' y='-.4' "       \
+    "z='.7'/></transform>" GREY "</shape>"
 
 /* A floor, a wall, a block above the meter; REST: the meter, lights, integrator. */
 static imp_scene *room(const char *rest)
 {
-    char xml[8192], own[4096];
-    snprintf(own, sizeof own, rest, egg_file);
+    char xml[8192];
     snprintf(xml, sizeof xml,
              "<scene version='3.0.0'>%s"
              "<shape type='rectangle' id='floor'><transform name='to_world'><scale "
@@ -78,7 +70,7 @@ static imp_scene *room(const char *rest)
              "<shape type='cube' id='block'><transform name='to_world'><scale x='.4' "
              "y='.3' z='.1'/><rotate z='1' angle='25'/><rotate x='1' angle='15'/>"
              "<translate x='.3' y='.1' z='1.1'/></transform>" GREY "</shape></scene>",
-             own);
+             rest);
     return test_scene_text(ctx, xml, IMP_RGB);
 }
 
@@ -143,19 +135,30 @@ int main(int argc, char **argv)
                                           {"table.pose", 2, .03},
                                           {"table.pose", 3, .03},
                                           {NULL, 0, 0}};
+    static const struct number upright[] = {{"table.pose", 2, .03},
+                                            {"table.pose", 4, .03},
+                                            {"table.pose", 5, .03},
+                                            {NULL, 0, 0}};
     static const struct number bulb[] = {{"bulb.position", 0, .03},
                                          {"bulb.position", 2, .03},
                                          {"block.pose", 0, .03},
                                          {NULL, 0, 0}};
     static const struct number sun[] = {
         {"sun.direction", 0, .02}, {"block.pose", 3, .03}, {NULL, 0, 0}};
+    static const struct number egg[] = {{"egg.pose", 0, .02},
+                                        {"egg.pose", 2, .02},
+                                        {"egg.pose", 3, .01},
+                                        {"lamp.pose", 0, .03},
+                                        {NULL, 0, 0}};
+    static const struct number alone[] = {
+        {"egg.pose", 0, .02}, {"egg.pose", 2, .02}, {"egg.pose", 3, .01}, {NULL, 0, 0}};
     static const struct number block[] = {{"block.pose", 0, .03},
                                           {"block.pose", 2, .03},
                                           {"block.pose", 3, .03},
                                           {NULL, 0, 0}};
     ctx = test_context(2);
     adjoint_make();
-    egg_write();
+    egg_write(EGG_FILE, true);
     point_test();
     numbers_compare("lamp", room(AREA DIRECT LAMP), 256 * more, 256 * more, .1, lamp);
     numbers_compare("over bounces", room(AREA PATH LAMP), 256 * more, 512 * more, .1,
@@ -177,11 +180,17 @@ int main(int argc, char **argv)
                     512 * more, .5, lamp);
     numbers_compare("halves of cylinders", room(VIRTUAL(HALF) PATH LAMP), 256 * more,
                     512 * more, .3, lamp);
+    numbers_compare("an egg with vertex normals", room(AREA EGG PATH LAMP), 256 * more,
+                    512 * more, .2, egg);
+    numbers_compare("points and an egg", room(VIRTUAL(POINTS) EGG PATH SKY), 1024 * more,
+                    512 * more, .5, alone);
     number_refused("a ball", room(BALL PATH LAMP), "lamp.pose", "flat");
-    number_refused("a mesh with vertex normals", room(AREA EGG PATH LAMP), "lamp.pose",
-                   "vertex normals");
-    number_refused("a grid that moves", room(VIRTUAL("") PATH LAMP), "table.pose",
-                   "meter");
-    remove(egg_file);
+    numbers_compare("cells that move", room(VIRTUAL("") PATH LAMP), 256 * more,
+                    512 * more, .1, table);
+    numbers_compare("points that move below a sky", room(VIRTUAL(POINTS LEANS) PATH CIE),
+                    256 * more, 512 * more, .2, table);
+    numbers_compare("halves of cylinders that move", room(VIRTUAL(HALF) PATH CIE),
+                    256 * more, 512 * more, .2, upright);
+    remove(EGG_FILE);
     return tap_done();
 }

@@ -99,6 +99,62 @@ static void object_test(const char *rest, const char *object, imp_v3 centre, int
     imp_scene_destroy(written);
 }
 
+#define GROUPS                                                                           \
+    "<shape type='shapegroup' id='cubes'><shape type='cube'><transform name='to_world'>" \
+    "<scale value='.25'/></transform></shape></shape><shape type='shapegroup' "          \
+    "id='pair'><shape type='instance'><ref id='cubes'/></shape><shape type='sphere'>"    \
+    "<point name='center' x='.5' y='0' z='0'/><float name='radius' value='.25'/>"        \
+    "</shape></shape><shape type='instance' id='it'><ref id='pair'/><transform "         \
+    "name='to_world'><scale x='.8' y='1.1' z='1'/><translate x='.9' y='-.8' z='1'/>%s"   \
+    "</transform></shape>"
+
+/* The middle of the group's box (-.25, .75) x (-.25, .25)^2, where the instance has it. */
+static void instance_test(void)
+{
+    const double pose[6] = {-.3, .2, .1, .2, -.4, .5}, none[6] = {0}, half = .5, one = 1;
+    const imp_v3 centre = imp__v3(.25 * .8 + .9, -.8, 1);
+    char text[1024], rest[4096];
+    size_t size;
+    bool same;
+    motion_text(pose, centre, text, sizeof text);
+    snprintf(rest, sizeof rest, GROUPS, "");
+    imp_scene *scene = room(rest, "", "", "");
+    char small[2048];
+    snprintf(small, sizeof small,
+             "<translate x='%.17g' y='%.17g' z='%.17g'/><scale value='.5'/><translate "
+             "x='%.17g' y='%.17g' z='%.17g'/>%s",
+             -centre[0], -centre[1], -centre[2], centre[0], centre[1], centre[2], text);
+    snprintf(rest, sizeof rest, GROUPS, small);
+    imp_scene *written = room(rest, "", "", "");
+    imp_film *before = picture(scene), *there = picture(written);
+    const double far = differs(before, there, &same);
+    pose_set(scene, "it", pose);
+    test_must(ctx, imp_scene_add_geometry(scene, "it.scale"));
+    test_must(ctx, imp_scene_find_param(scene, "it.scale", &size));
+    test_must(ctx, imp_scene_set_values(scene, size, 1, &half));
+    imp_film *moved = picture(scene);
+    const double near = differs(moved, there, &same);
+    tap_ok(
+        far > 0.1 && near < 0.01,
+        "an instance, smaller: the picture of a file that says so # %.3f of the values "
+        "differ, %.3f unmoved",
+        near, far);
+    pose_set(scene, "it", none);
+    test_must(ctx, imp_scene_set_values(scene, size, 1, &one));
+    imp_film *back = picture(scene);
+    differs(back, before, &same);
+    tap_ok(same, "an instance: moved back, the bits of before");
+    const enum imp_status st = imp_scene_add_geometry(scene, "it.vertex_positions");
+    tap_ok(st == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "instance"),
+           "an instance has no vertices # %s", imp_last_error(ctx));
+    imp_film_destroy(before);
+    imp_film_destroy(there);
+    imp_film_destroy(moved);
+    imp_film_destroy(back);
+    imp_scene_destroy(scene);
+    imp_scene_destroy(written);
+}
+
 static void rotations_test(void)
 {
     double worst = 0, transposed = 0;
@@ -155,6 +211,7 @@ int main(void)
                  "<translate x='%d' y='-20'/></transform></shape>",
                  k);
     ctx = test_context(1);
+    instance_test();
     rotations_test();
     object_test("", "block", imp__v3(-.2, .3, .7), 1);
     object_test(far, "block", imp__v3(-.2, .3, .7), 1);

@@ -86,7 +86,7 @@ struct at {
 static struct at placed(const struct moved *m, const struct imp__glued *x)
 {
     struct at at = {x->p, x->n, x->s, x->curvature, x->straight, imp__shading_normal(x)};
-    if (x->shape != m->shape) return at;
+    if (x->carrier != m->shape) return at;
     if (m->pose->kind == IMP_POSE_SCALE) {
         at.p = m->from + (x->p - m->from) * m->by;
         at.curvature /= m->by;
@@ -100,36 +100,39 @@ static struct at placed(const struct moved *m, const struct imp__glued *x)
     return at;
 }
 
-/* Where a point of a shape, now at x, was when the walk was recorded. */
-static imp_v3 was_at(const struct moved *m, int shape, imp_v3 x)
+/* A direction, and a point, of what moves, as they were when the walk was recorded. */
+static imp_v3 turned_back(const struct moved *m, int carrier, imp_v3 d)
 {
     const double *R = m->turn;
+    if (carrier != m->shape || m->pose->kind != IMP_POSE_RIGID) return d;
+    return imp__v3(R[0] * d[0] + R[3] * d[1] + R[6] * d[2],
+                   R[1] * d[0] + R[4] * d[1] + R[7] * d[2],
+                   R[2] * d[0] + R[5] * d[1] + R[8] * d[2]);
+}
+static imp_v3 was_at(const struct moved *m, int carrier, imp_v3 x)
+{
     const imp_v3 r = x - m->to;
-    if (shape != m->shape) return x;
+    if (carrier != m->shape) return x;
     if (m->pose->kind == IMP_POSE_SCALE) return m->from + r * (1 / m->by);
-    return m->from + imp__v3(R[0] * r[0] + R[3] * r[1] + R[6] * r[2],
-                             R[1] * r[0] + R[4] * r[1] + R[7] * r[2],
-                             R[2] * r[0] + R[5] * r[1] + R[8] * r[2]);
+    return m->from + turned_back(m, carrier, r);
 }
 
 /* The shading normal at x, in the plane of a triangle with vertex normals. */
 static imp_v3 shaded_at(const struct moved *m, const struct imp__glued *then, imp_v3 x)
 {
-    const struct imp_shape *s = m->c->problem->scene->shapes[then->shape];
-    const uint32_t *i = s->triangles.indices + 3 * (size_t)then->prim;
-    const imp_v3 r = was_at(m, then->shape, x) - then->p;
+    const struct imp__corners f =
+        imp__corners(m->c->problem->scene, then->shape, then->prim, then->place);
+    const imp_v3 r = was_at(m, then->carrier, x) - then->p;
     double b[3] = {then->b[0], then->b[1], then->b[2]};
     imp_v3 N = {0};
     for (int k = 0; k < 2; k++) {
         b[k + 1] += imp__dot(then->slope[k], r);
         b[0] -= imp__dot(then->slope[k], r);
     }
-    for (int k = 0; k < 3; k++) {
-        const float *n = ((const struct imp__mesh *)s->self)->normals + 3 * (size_t)i[k];
-        N += imp__v3(n[0], n[1], n[2]) * b[k];
-    }
+    for (int k = 0; k < 3; k++) N += f.n[k] * b[k];
     N = imp__normalize(N);
-    return then->shape == m->shape && m->pose->kind == IMP_POSE_RIGID ? turned(m, N) : N;
+    return then->carrier == m->shape && m->pose->kind == IMP_POSE_RIGID ? turned(m, N)
+                                                                        : N;
 }
 
 /* The point of a vertex, with its frame's s where its material is not Lambertian. */
@@ -137,7 +140,7 @@ static struct imp__glued vertex_glued(const struct imp_scene *scene,
                                       const struct imp_vertex *v, double time)
 {
     struct imp__glued x =
-        imp__glued_placed(scene, v->d.shape, &v->d.located, v->d.place, v->ng);
+        imp__glued_at(scene, v->d.shape, &v->d.located, v->d.place, v->ng);
     struct imp_surface at;
     if (v->bsdf && !imp__is_plain(v->bsdf) &&
         imp__decided_surface(scene, &v->d, time, &at))
@@ -184,11 +187,11 @@ static void looked_up(const struct moved *m, const struct imp_vertex *v, imp_v3 
     struct imp_texcoord at = imp__vertex_at(v);
     struct imp_surface old;
     imp_v3 grad[2];
-    if (moved) x = was_at(m, then->shape, x);
+    if (moved) x = was_at(m, then->carrier, x);
     if (then->curvature !=
         0) { /* the point itself, as one that a ray of no length hits */
-        const struct imp_hit hit = {.t = 0};
-        v->shape->ops->surface(v->shape, &hit, &x, &(imp_v3){0}, &old);
+        const struct imp_hit hit = {.shape = then->shape, .place = then->place};
+        imp__hit_surface(scene, &hit, &x, &(imp_v3){0}, &old);
         at.uv[0] = old.uv[0];
         if (imp__is_zero(then->straight)) at.uv[1] = old.uv[1];
         else /* the height of a cylinder is not of the point, but of the hit */
@@ -200,7 +203,7 @@ static void looked_up(const struct moved *m, const struct imp_vertex *v, imp_v3 
     imp__inputs_eval(v->bsdf->input, v->bsdf->n_in, &at, in);
 }
 
-/* The density of directions of a meter that stays. */
+/* The density of directions of a meter, where it was when the walk was recorded. */
 static double received(const struct moved *m, imp_v3 w)
 {
     const struct imp_receiver *r = m->c->tracer.sensor->receiver;
@@ -216,7 +219,8 @@ static imp_spec kernel_ratio(const struct moved *m, const struct imp_vertex *v,
     imp_spec in[IMP_INPUTS_MAX];
     const bool meter = v->prev && v->prev->d.scatterer == IMP_AT_SENSOR;
     if (meter && m->c->tracer.sensor->receiver)
-        return imp__spec(received(m, w[0]) / received(m, w[1]));
+        return imp__spec(received(m, turned_back(m, then->carrier, w[0])) /
+                         received(m, w[1]));
     if (meter || imp__is_plain(v->bsdf))
         return imp__spec(imp__dot(now->shade, w[0]) /
                          imp__dot(imp__shading_normal(then), w[1]));
@@ -262,7 +266,7 @@ static double light_ratio(const struct moved *m, const struct imp_vertex *v,
         return imp__dot(r_old, r_old) / imp__dot(r, r);
     }
     const struct imp__glued y =
-        imp__glued_at(scene, e->shape->index, &v->d.light.located, d);
+        imp__glued_at(scene, e->shape->index, &v->d.light.located, 0, d);
     const struct at there = placed(m, &y);
     w[0] = imp__normalize(there.p - x);
     w[1] = imp__normalize(y.p - old->p);
@@ -273,9 +277,12 @@ static double light_ratio(const struct moved *m, const struct imp_vertex *v,
 static bool has_spots(const struct imp_scene *scene, const struct imp_walk *walk)
 {
     for (const struct imp_vertex *v = walk->first; v; v = v->next) {
+        if (v->d.scatterer != IMP_AT_SKY && v->d.met.emitter >= 0 &&
+            scene->emitters[v->d.met.emitter]->ops == &imp__ies_area)
+            return true;
         if (v->d.connection != IMP_CONNECTED) continue;
         const struct imp_emitter_ops *ops = scene->emitters[v->d.light.emitter]->ops;
-        if (ops->cone || ops == &imp__ies_light) return true;
+        if (ops->cone || ops == &imp__ies_light || ops == &imp__ies_area) return true;
     }
     return false;
 }

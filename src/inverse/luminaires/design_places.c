@@ -94,6 +94,7 @@ static void default_bounds(struct imp__moving *v, size_t i, double clearance)
     const struct imp_scene *scene = v->m->scene;
     const struct imp_pose *pose = imp__pose_of(scene, v->param[i]);
     const size_t k = v->component[i];
+    imp_v3 lo, hi;
     if (pose->kind == IMP_POSE_DIRECTION) {
         const double reach = fmax(1, fabs(v->first[i]));
         v->lo[i] = -reach;
@@ -101,10 +102,9 @@ static void default_bounds(struct imp__moving *v, size_t i, double clearance)
     } else if (pose->kind == IMP_POSE_POSITION) {
         v->lo[i] = scene->lo[k] + clearance;
         v->hi[i] = scene->hi[k] - clearance;
-    } else if (k < 3 && pose->shape >= 0) {
-        const struct imp_shape *s = scene->shapes[pose->shape];
-        v->lo[i] = v->first[i] + scene->lo[k] + clearance - s->lo[k];
-        v->hi[i] = v->first[i] + scene->hi[k] - clearance - s->hi[k];
+    } else if (k < 3 && imp__pose_box(pose, &lo, &hi)) {
+        v->lo[i] = v->first[i] + scene->lo[k] + clearance - lo[k];
+        v->hi[i] = v->first[i] + scene->hi[k] - clearance - hi[k];
     } else {
         v->lo[i] = v->first[i] - 0.5;
         v->hi[i] = v->first[i] + 0.5;

@@ -356,6 +356,17 @@ void imp__ies_turn(struct imp__ies *x, const struct imp__ies *from, imp_v3 to)
     x->nadir = f.axis[2];
 }
 
+void imp__ies_move(struct imp__ies *x, const struct imp__ies *from, const double map[12])
+{
+    struct imp__ies_facet *facet = (struct imp__ies_facet *)(uintptr_t)x->facets;
+    x->nadir = imp__rows_vector(map, from->nadir);
+    x->c0 = imp__rows_vector(map, from->c0);
+    x->c90 = imp__rows_vector(map, from->c90);
+    x->axis = imp__rows_vector(map, from->axis);
+    for (int k = 0; k < x->n_facets; k++)
+        facet[k].n = imp__rows_vector(map, from->facets[k].n);
+}
+
 static bool emission_sample(const struct imp_emitter *e, const struct imp_ball *scene,
                             const double u[4], struct imp_emission_sample *out)
 {

@@ -37,6 +37,9 @@ double imp__ies_intensity(const struct imp__ies *x, imp_v3 w);
 const char *imp__ies_jump(const struct imp_ies_data *d);
 /* The frame of `from`, turned as little as possible until its nadir is along `to`. */
 void imp__ies_turn(struct imp__ies *x, const struct imp__ies *from, imp_v3 to);
+/* A luminaire that is a shape, moved with it by a rigid map from where `from` is; the facets of x are its
+ * own. */
+void imp__ies_move(struct imp__ies *x, const struct imp__ies *from, const double map[12]);
 /* Int I dw, at scale 1, in lm (or W). */
 double imp__ies_flux(const struct imp__ies *x);
 /* Area that faces w, projected along w. */

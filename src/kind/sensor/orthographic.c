@@ -53,6 +53,12 @@ static bool connect(const struct imp_sensor *s, const imp_v3 *ref, bool far,
     return true;
 }
 
+static void move(struct imp_sensor *s, const double to_world[12])
+{
+    struct orthographic *p = s->self;
+    imp__projection_move(&p->projection, to_world);
+}
+
 const struct imp_sensor_ops imp__orthographic = {.size = sizeof(struct imp_sensor_ops),
                                                  .name = "orthographic",
                                                  .object_size =
@@ -60,4 +66,5 @@ const struct imp_sensor_ops imp__orthographic = {.size = sizeof(struct imp_senso
                                                  .build = build,
                                                  .ray = ray,
                                                  .flags = IMP_SENSOR_PARALLEL,
-                                                 .connect = connect};
+                                                 .connect = connect,
+                                                 .move = move};

@@ -2,6 +2,7 @@
  *
  * Receivers of illuminance: densities of directions, draws, and places on the shape. */
 #include "receiver.h"
+#include "math/transform.h"
 #include "math/warp.h"
 
 void imp__receiver_uv(const struct imp_sensor *s, double px, double py, double uv[2])
@@ -28,6 +29,21 @@ double imp__receiver_density(const struct imp_receiver *r, imp_v3 w)
     const double across = sqrt(w[0] * w[0] + w[1] * w[1]);
     const double towards = r->kind == IMP_CYLINDRICAL ? 0 : imp__dot(w, r->facing);
     return imp_max(across + towards, 0.0) * (IMP_INV_PI * IMP_INV_PI);
+}
+
+void imp__receiver_turn(struct imp_receiver *r, const struct imp_receiver *rest,
+                        const struct imp_shape *s, const double map[12])
+{
+    struct imp_surface at;
+    const double middle[2] = {0.5, 0.5};
+    *r = *rest;
+    s->ops->sample_area(s, middle, &at);
+    r->frame = imp__frame_from_normal(at.ng);
+    if (r->kind == IMP_CYLINDRICAL || (r->kind == IMP_PLANAR && !r->turned)) return;
+    const imp_v3 f = imp__rows_vector(map, imp__to_world(&rest->frame, rest->facing));
+    imp_v3 facing = imp__to_local(&r->frame, f);
+    if (r->kind != IMP_PLANAR) facing[2] = 0;
+    r->facing = imp__normalize(facing);
 }
 
 /* y in [0, 2 pi] with y - sin y = 2 pi u: Newton's method inside a bracket. Below 1e-5 the

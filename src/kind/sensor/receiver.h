@@ -56,6 +56,9 @@ static inline bool imp__has_grid(const struct imp_sensor *s)
 void imp__receiver_uv(const struct imp_sensor *s, double px, double py, double uv[2]);
 /* p of direction w, in the shape's frame. */
 double imp__receiver_density(const struct imp_receiver *r, imp_v3 w);
+/* Turns the frame with its shape, which a map has moved, from where `rest` is. */
+void imp__receiver_turn(struct imp_receiver *r, const struct imp_receiver *rest,
+                        const struct imp_shape *s, const double map[12]);
 /* Draws w by p. */
 imp_v3 imp__receiver_direction(const struct imp_receiver *r, const double u[2]);
 

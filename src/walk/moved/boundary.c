@@ -17,9 +17,11 @@
  * else by how much its faces turn. */
 static double film_measure(const struct imp__boundary *b, const struct imp__edge *e)
 {
-    const imp_v3 along = e->b - e->a, r = (e->a + e->b) * 0.5 - b->camera;
+    const imp_v3 along = e->b - e->a,
+                 r = b->parallel ? b->camera : (e->a + e->b) * 0.5 - b->camera;
     const imp_v3 m = imp__cross(along, r);
-    const double d2 = imp_max(imp__dot(r, r), 1e-12 * imp__sqr(b->size));
+    const double d2 =
+        b->parallel ? 1 : imp_max(imp__dot(r, r), 1e-12 * imp__sqr(b->size));
     const double jump =
         imp__edge_side(b->edges, e, m) == 0 ? imp__edge_turn(b->edges, e) : 1;
     return imp__length(m) / d2 * jump;
@@ -70,37 +72,44 @@ static void circles_find(struct imp__boundary *b)
     }
 }
 
-static struct imp__edge_item round_item(const struct imp_scene *scene, int shape)
+static struct imp__edge_item round_item(const struct imp__boundary *b,
+                                        const struct imp__body *body)
 {
-    struct imp__edge_item item = {.kind = IMP_ITEM_ROUND, .shape = shape};
-    const bool disk = imp__moves_disk(scene, shape);
-    for (int k = 0; k < imp__rims(scene, shape); k++) {
-        int rim;
-        const int other = imp__rim_beside(scene, shape, k, &rim);
-        if (other < 0) continue;
-        if (disk) item.wall = imp__rim(scene, other, rim, 0).out;
+    const struct imp_scene *scene = b->tracer->scene;
+    struct imp__edge_item item = {
+        .kind = IMP_ITEM_ROUND, .shape = body->shape, .place = body->place};
+    const bool disk = imp__moves_disk(scene, body->shape);
+    for (int k = 0; k < imp__rims(scene, body->shape); k++) {
+        const struct imp__rim_name rim = {body->shape, body->place, k};
+        struct imp__rim_name beside;
+        if (!imp__rim_beside(b->edges, scene, &rim, &beside)) continue;
+        if (disk)
+            item.wall = imp__rim(scene, beside.shape, beside.place, beside.k, 0).out;
         else item.closed[k] = true;
     }
     return item;
 }
 
-/* What has edges that are in no list: two of a shape at most. */
+/* What has edges that are in no list: two of a body at most. */
 static enum imp_status items_find(struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
     const size_t most =
-        2 * (size_t)scene->n_shapes + IMP_SKY_CIRCLES * (size_t)scene->n_environments;
+        2 * b->edges->n_bodies + IMP_SKY_CIRCLES * (size_t)scene->n_environments;
     b->item = imp__alloc(scene->ctx, most + 1, sizeof *b->item);
     if (!b->item) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
     circles_find(b);
-    for (int k = 0; k < imp__shapes_outside(scene); k++) {
-        if (imp__shape_is_absent(scene->shapes[k])) continue;
-        if (imp__moves_curved(scene, k)) b->item[b->n_items++] = round_item(scene, k);
-        if (!imp__moves_smooth(scene, k)) continue;
+    for (size_t k = 0; k < b->edges->n_bodies; k++) {
+        const struct imp__body *body = &b->edges->body[k];
+        if (imp__moves_curved(scene, body->shape, body->place))
+            b->item[b->n_items++] = round_item(b, body);
+        if (!imp__moves_smooth(scene, body->shape)) continue;
         for (int i = 0; i < 2; i++) {
             struct imp__edge_item *item = &b->item[b->n_items++];
-            *item = (struct imp__edge_item){
-                .kind = i ? IMP_ITEM_HORIZON : IMP_ITEM_SHADING, .shape = k};
+            *item =
+                (struct imp__edge_item){.kind = i ? IMP_ITEM_HORIZON : IMP_ITEM_SHADING,
+                                        .shape = body->shape,
+                                        .place = body->place};
             IMP_CHECKED(imp__edge_item_measure(b, item));
         }
     }
@@ -120,11 +129,13 @@ static double item_length(const struct imp__boundary *b,
     const struct imp_shape *s = b->tracer->scene->shapes[item->shape];
     struct imp_round round;
     struct imp__tube tube;
-    if (imp__moves_sphere(b->tracer->scene, item->shape, &round))
+    if (imp__moves_sphere(b->tracer->scene, item->shape, item->place, &round))
         return IMP_2PI * round.radius;
-    if (imp__moves_cylinder(b->tracer->scene, item->shape, &tube))
+    if (imp__moves_cylinder(b->tracer->scene, item->shape, item->place, &tube))
         return 2 * IMP_2PI * tube.radius + 2 * tube.length;
-    if (item->kind == IMP_ITEM_ROUND) return IMP_2PI * sqrt(s->area * IMP_INV_PI);
+    if (item->kind == IMP_ITEM_ROUND)
+        return IMP_2PI * sqrt(s->area * IMP_INV_PI) *
+               imp__place_scale(b->tracer->scene, item->place);
     if (kind == IMP_BOUNDARY_LIGHT) return 0;
     if (kind == IMP_BOUNDARY_FILM && item->n_seen == 0) return 0;
     return IMP_PI * sqrt(item->until[s->triangles.n_triangles] * IMP_INV_PI / 4);
@@ -177,8 +188,9 @@ static double light_power(const struct imp__boundary *b, int k)
     if (b->tracer->wavelengths)
         imp__input_most(e->input[0], &nowhere.p, &nowhere.p, &in[0]);
     else imp__inputs_eval(e->input, e->n_in, &nowhere, in);
-    const double size = e->shape                    ? e->shape->area
-                        : e->ops == &imp__ies_light ? imp__ies_flux(e->self) * IMP_INV_PI
+    const bool table = e->ops == &imp__ies_light || e->ops == &imp__ies_area;
+    const double size = table      ? imp__ies_flux(e->self) * IMP_INV_PI
+                        : e->shape ? e->shape->area
                         : e->ops->flags & IMP_EMITTER_FAR ? across
                                                           : 4;
     return size * imp__max_used(in[0], scene->lanes == 4);
@@ -223,7 +235,13 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
         out->camera = (tracer->sensor->shape->lo + tracer->sensor->shape->hi) * 0.5;
     else imp__lens_middle(tracer->sensor, &out->camera);
     imp_v3 point;
-    out->wide = !imp__pinhole(tracer->sensor, &point);
+    struct imp_sensor_ray ray;
+    out->parallel = tracer->sensor->ops->flags & IMP_SENSOR_PARALLEL;
+    out->wide = !out->parallel && !imp__pinhole(tracer->sensor, &point);
+    if (out->parallel) {
+        tracer->sensor->ops->ray(tracer->sensor, 0, 0, (const double[2]){0.5, 0.5}, &ray);
+        out->camera = ray.d;
+    }
     if (st == IMP_OK) st = imp__boundary_allowed(out);
     if (st == IMP_OK) st = lights_make(out);
     if (st == IMP_OK) st = choices_make(out);
@@ -290,11 +308,10 @@ static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
     const enum imp__edge_item_kind item = d->item ? d->item->kind : IMP_ITEM_ROUND;
     switch (kind) {
     case IMP_BOUNDARY_FILM:
-        if (d->b->tracer->sensor->shape) {
-            imp__draw_meter(d);
-            break;
+        if (item == IMP_ITEM_ROUND) {
+            if (d->b->tracer->sensor->shape) imp__draw_meter(d);
+            else imp__draw_film(d);
         }
-        if (item == IMP_ITEM_ROUND) imp__draw_film(d);
         if (item == IMP_ITEM_SHADING) imp__draw_shading_film(d);
         if (item == IMP_ITEM_SKY) imp__draw_sky_film(d);
         break;

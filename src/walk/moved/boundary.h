@@ -4,9 +4,9 @@
  * which light jumps, of three kinds. V is the velocity of the edge, m normal to the plane of edge
  * and line of sight, dl a length along the edge, phi the angle between it and the line.
  *
- *     film     where the camera sees an edge, the picture jumps: with x' the velocity of the
- *              edge's picture at a fixed camera and N dl its normal on the film, times length,
- *                  dI = int [L(-) - L(+)] x'.N dl
+ *     film     where the camera sees an edge, the picture jumps: with u the velocity of what it sees
+ *              there at a fixed film position, and W the film's area over the area across its rays,
+ *                  dI = int dl sin(phi) W [L(-m) - L(+m)] m.(V - u)
  *     light    a line from a point y of a light, at distance t_y, passes a silhouette on its way to
  *              a vertex x, at distance t_x behind it; m points away from the edge's faces:
  *                  dI = -int dA_y dl Le cos_y sin(phi)/t_y^2 f W(x) m.(V - V_line),
@@ -32,7 +32,8 @@
  *              psi of directions across n_s and the jump of what p scatters, lit side first:
  *                  dI = int dA_p dpsi |n.w| W(x) [L(n_s.w > 0) - L(n_s.w < 0)] n_s'.w
  *              of p that slides along w; to the camera the curve n_s.w = 0 on the mesh:
- *                  dI_p = int dl_p [L - L] |n.w|/t^2 (n_s'.w + n_s.w')/|grad n_s.w|
+ *                  dI_p = int dl_p [L - L] |n.w| W (n_s'.w + n_s.w')/|grad n_s.w|
+ *              with w' = 0 to a point of a meter, and of parallel rays that do not turn
  *     horizon  a ray that leaves p below the plane of its facet begins behind it, and the kernel
  *              does not vanish there; with psi in the facet's plane
  *                  dI = int dA_p dpsi f |n_s.w| W(p) [L(above) - L(below)] n'.w
@@ -64,6 +65,7 @@ enum imp__edge_item_kind {
 struct imp__edge_item {
     enum imp__edge_item_kind kind;
     int shape;
+    int64_t place;                /* the instance that the shape is in; 0: none */
     struct imp_sky_circle circle; /* IMP_ITEM_SKY */
     /* IMP_ITEM_ROUND: rims of a cylinder that a disk closes, whose edge they are; of such a disk the
      * direction out of the cylinder, at its end; 0: it closes none. */
@@ -92,7 +94,8 @@ struct imp__boundary {
      * the rest is of edges. */
     double *part[IMP_BOUNDARY_KINDS];
     imp_v3 camera; /* where its rays meet, or the middle of its lens, or of a meter */
-    bool wide;     /* they do not: a lens with an aperture, or a meter */
+    bool parallel; /* its rays are: `camera` is their direction */
+    bool wide;     /* they do not meet: a lens with an aperture, or a meter */
     double size;   /* of the scene */
     int n_lights;
     double *light_cdf; /* [n_emitters] of those that have draws, by power; last is 1 */
@@ -115,7 +118,7 @@ static inline int imp__flux_end_shape(const struct imp__flux_end *e)
 {
     return e->camera  ? IMP_MOVE_CAMERA
            : e->light ? IMP_MOVE_EMITTER(e->light - 1)
-                      : e->x.shape;
+                      : e->x.carrier;
 }
 
 /* What one draw brings to a film position: L times the sum of bar times velocity over its ends. */

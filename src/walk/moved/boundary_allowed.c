@@ -15,9 +15,11 @@ static enum imp_status facets_allowed(const struct imp__boundary *b)
     for (int k = 0; k < scene->n_emitters; k++) {
         const struct imp_emitter *e = scene->emitters[k];
         if (!(e->ops->flags & IMP_EMITTER_DELTA)) continue;
-        for (int j = 0; j < imp__shapes_outside(scene); j++)
-            if (imp__moves_smooth(scene, j) &&
-                (imp__moves_shape(b->moves, j, NULL) ||
+        for (size_t j = 0; j < b->edges->n_bodies; j++) {
+            const struct imp__body *body = &b->edges->body[j];
+            if (imp__moves_smooth(scene, body->shape) &&
+                (imp__moves_shape(b->moves, imp__carrier(scene, body->shape, body->place),
+                                  NULL) ||
                  imp__moves_shape(b->moves, IMP_MOVE_EMITTER(k), NULL)))
                 return imp__error(
                     scene->ctx, IMP_E_UNSUPPORTED,
@@ -26,7 +28,9 @@ static enum imp_status facets_allowed(const struct imp__boundary *b)
                     "vertex normals, move against each other: facets that turn away from "
                     "a light without size become dark all at once (face_normals makes "
                     "the shape flat)",
-                    e->name ? e->name : "", e->ops->name, scene->shapes[j]->name);
+                    e->name ? e->name : "", e->ops->name,
+                    scene->shapes[body->shape]->name);
+        }
     }
     return IMP_OK;
 }
@@ -43,7 +47,7 @@ static enum imp_status edges_allowed(const struct imp__boundary *b)
             scene->shapes[b->edges->face[torn->first].shape]->name, torn->a[0],
             torn->a[1], torn->a[2]);
     int other = -1;
-    const int rim = imp__rims_torn(scene, b->moves, &other);
+    const int rim = imp__rims_torn(b->edges, scene, b->moves, &other);
     if (rim >= 0)
         return imp__error(
             scene->ctx, IMP_E_UNSUPPORTED,
@@ -61,18 +65,16 @@ static enum imp_status edges_allowed(const struct imp__boundary *b)
     return IMP_OK;
 }
 
-/* Does a ray from the camera meet the back of a shape that shows nothing there? Its index; -1: it
- * meets something else. */
-static int back_met(const struct imp__boundary *b, imp_v3 w)
+/* Does a ray from the camera meet the back of a shape that shows nothing there? */
+static bool back_met(const struct imp__boundary *b, imp_v3 w, struct imp_hit *hit)
 {
     const struct imp_scene *scene = b->tracer->scene;
-    struct imp_hit hit;
     struct imp_surface at;
-    if (!imp__intersect(scene, &b->camera, &w, 0, INFINITY, &hit)) return -1;
-    imp__hit_surface(scene, &hit, &b->camera, &w, &at);
-    const int met = imp__placed_shape(scene, hit.shape, hit.place);
+    if (!imp__intersect(scene, &b->camera, &w, 0, INFINITY, hit)) return false;
+    imp__hit_surface(scene, hit, &b->camera, &w, &at);
+    const int met = imp__placed_shape(scene, hit->shape, hit->place);
     const struct imp_bsdf *bsdf = imp__shape_bsdf(scene, scene->shapes[met]);
-    return imp__dot(at.ng, w) > 0 && bsdf->ops != &imp__twosided ? hit.shape : -1;
+    return imp__dot(at.ng, w) > 0 && bsdf->ops != &imp__twosided;
 }
 
 #define PROBES 64
@@ -82,16 +84,18 @@ static int back_met(const struct imp__boundary *b, imp_v3 w)
 static enum imp_status camera_allowed(const struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
-    int shape = -1;
-    if (b->tracer->sensor->shape) return IMP_OK;
+    struct imp_hit first = {.shape = -1};
+    if (b->tracer->sensor->shape || b->parallel) return IMP_OK;
     for (uint32_t k = 0; k < PROBES; k++) {
         const struct imp_key key = imp__key(5, 3, k);
         const double u[2] = {imp__u01(key, 0), imp__u01(key, 1)};
-        const int met = back_met(b, imp__uniform_sphere(u));
-        if (met < 0 || (shape >= 0 && met != shape)) return IMP_OK;
-        shape = met;
+        struct imp_hit met;
+        if (!back_met(b, imp__uniform_sphere(u), &met)) return IMP_OK;
+        if (k == 0) first = met;
+        else if (met.shape != first.shape || met.place != first.place) return IMP_OK;
     }
-    if (!imp__moves_shape(b->moves, shape, NULL) &&
+    const int shape = first.shape;
+    if (!imp__moves_shape(b->moves, imp__carrier(scene, shape, first.place), NULL) &&
         !imp__moves_shape(b->moves, IMP_MOVE_CAMERA, NULL))
         return IMP_OK;
     return imp__error(

@@ -31,19 +31,6 @@ static const struct imp__edge_face *face_seen(const struct imp__edge_draw *d, im
 
 #define NEXT 0.3 /* per `apart`: so far from the edge, in a face */
 
-static void corners(const struct imp_scene *scene, const struct imp__edge_face *f,
-                    imp_v3 p[3])
-{
-    const struct imp_triangles *t = &scene->shapes[f->shape]->triangles;
-    struct imp_map to_world, to_local;
-    if (f->place > 0) imp__place_map(scene, f->place, 0, &to_world, &to_local);
-    for (int k = 0; k < 3; k++) {
-        const float *at = t->positions + 3 * (size_t)t->indices[3 * f->prim + k];
-        p[k] = imp__v3(at[0], at[1], at[2]);
-        if (f->place > 0) p[k] = imp__map_point(&to_world, p[k]);
-    }
-}
-
 /* Is a point of the triangle's plane in it? */
 static bool is_inside(const imp_v3 p[3], imp_v3 n, imp_v3 q)
 {
@@ -61,8 +48,9 @@ imp_v3 imp__edge_beside(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m, doub
     const imp_v3 past = d->p + m * apart;
     const struct imp__edge_face *f = d->edge ? face_seen(d, w, m) : NULL;
     if (!f) return past;
-    imp_v3 p[3];
-    corners(d->b->tracer->scene, f, p);
+    const struct imp__corners facet =
+        imp__corners(d->b->tracer->scene, f->shape, f->prim, f->place);
+    const imp_v3 *p = facet.p;
     if (is_inside(p, f->n, past - w * (apart * imp__dot(m, f->n) / imp__dot(w, f->n))))
         return past;
     const imp_v3 middle = (p[0] + p[1] + p[2]) * (1.0 / 3) - d->p;
@@ -92,10 +80,9 @@ bool imp__edge_face_hit(const struct imp__edge_draw *d, const struct imp__edge_f
 void imp__look_at(struct imp__edge_draw *d, imp_v3 o, struct imp_hit *hit, int before,
                   struct imp_walk *walk)
 {
-    const struct imp__edge_face f = {
-        .shape = hit->shape, .prim = hit->prim, .place = hit->place};
-    imp_v3 p[3];
-    corners(d->b->tracer->scene, &f, p);
+    const struct imp__corners facet =
+        imp__corners(d->b->tracer->scene, hit->shape, hit->prim, hit->place);
+    const imp_v3 *p = facet.p;
     const imp_v3 r = p[0] + (p[1] - p[0]) * hit->u + (p[2] - p[0]) * hit->v - o;
     struct imp_sensor_ray ray = {.o = o, .t_near = 0, .t_far = INFINITY};
     hit->t = imp__length(r);
@@ -104,23 +91,28 @@ void imp__look_at(struct imp__edge_draw *d, imp_v3 o, struct imp_hit *hit, int b
                     before, hit, walk);
 }
 
-bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, imp_v3 m, double apart,
-                         int before, struct imp_walk *walk)
+bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, bool parallel, imp_v3 m,
+                         double apart, int before, struct imp_walk *walk)
 {
     const imp_v3 w = imp__normalize(d->p - o);
     const struct imp__edge_face *f = d->edge ? face_seen(d, w, m) : NULL;
     if (!f) return false;
-    const imp_v3 to = imp__normalize(imp__edge_beside(d, w, m, apart) - o);
+    const imp_v3 past = imp__edge_beside(d, w, m, apart);
+    const imp_v3 from = parallel ? o + (past - d->p) : o,
+                 to = imp__normalize(past - from);
     struct imp_hit hit;
-    if (!imp__intersect(d->b->tracer->scene, &o, &to, 0, INFINITY, &hit) ||
+    if (!imp__intersect(d->b->tracer->scene, &from, &to, 0, INFINITY, &hit) ||
         !imp__edge_face_hit(d, f, &hit))
         return false;
-    imp_v3 p[3];
-    corners(d->b->tracer->scene, f, p);
+    const struct imp__corners facet =
+        imp__corners(d->b->tracer->scene, f->shape, f->prim, f->place);
+    const imp_v3 *p = facet.p;
     const imp_v3 middle = (p[0] + p[1] + p[2]) * (1.0 / 3) - d->p;
     const double across = imp__dot(middle, f->in), next = NEXT * apart;
     double b[2];
-    weights(p, d->p + middle * (across > 2 * next ? next / across : 0.5), b);
+    const imp_v3 on = middle * (across > 2 * next ? next / across : 0.5);
+    if (parallel) o += on;
+    weights(p, d->p + on, b);
     hit.u = b[0];
     hit.v = b[1];
     imp__look_at(d, o, &hit, before, walk);

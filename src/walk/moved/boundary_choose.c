@@ -16,8 +16,13 @@ static bool point_set(struct imp__edge_draw *d, const struct imp__edge_point *p)
 
 bool imp__edge_item_choose(struct imp__edge_draw *d)
 {
-    int k = 0;
-    while (k < d->b->n_items && !(d->u < d->part[k + 1])) k++;
+    int k = 0,
+        last = d->b->n_items; /* the first that part[k + 1] is above u, or all edges */
+    while (k < last) {
+        const int half = k + (last - k) / 2;
+        if (d->u < d->part[half + 1]) last = half;
+        else k = half + 1;
+    }
     d->chance = d->part[k + 1] - d->part[k];
     if (!(d->chance > 0)) return false;
     d->u = imp_clamp((d->u - d->part[k]) / d->chance, 0.0, 1 - 0x1p-53);
@@ -29,18 +34,18 @@ bool imp__edge_item_choose(struct imp__edge_draw *d)
 
 static bool is_ball(const struct imp__edge_draw *d, struct imp_round *round)
 {
-    return imp__moves_sphere(d->b->tracer->scene, d->item->shape, round);
+    return imp__moves_sphere(d->b->tracer->scene, d->item->shape, d->item->place, round);
 }
 static bool is_tube(const struct imp__edge_draw *d, struct imp__tube *tube)
 {
-    return imp__moves_cylinder(d->b->tracer->scene, d->item->shape, tube);
+    return imp__moves_cylinder(d->b->tracer->scene, d->item->shape, d->item->place, tube);
 }
 
 /* A point of rim k. */
 static bool rim_set(struct imp__edge_draw *d, int k)
 {
     const struct imp__rim_point rim =
-        imp__rim(d->b->tracer->scene, d->item->shape, k, d->u);
+        imp__rim(d->b->tracer->scene, d->item->shape, d->item->place, k, d->u);
     d->rim = true;
     d->p = rim.p;
     d->along = rim.along;
@@ -101,10 +106,10 @@ static bool ball_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel
     return true;
 }
 
-bool imp__edge_any(struct imp__edge_draw *d, imp_v3 from)
+bool imp__edge_any(struct imp__edge_draw *d, imp_v3 from, bool parallel)
 {
     struct imp__edge_point p;
-    if (d->item) return ball_silhouette(d, from, false);
+    if (d->item) return ball_silhouette(d, from, parallel);
     imp__edge_choice_draw(d->choice, d->u, &p);
     return point_set(d, &p);
 }
@@ -162,8 +167,9 @@ bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w)
 struct imp__glued imp__edge_carried(const struct imp__edge_draw *d)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
-    return d->edge ? imp__edge_glued(d->b->edges, scene, d->edge, d->p)
-                   : imp__glued_near(scene, d->item->shape, 0, d->p, d->out);
+    return d->edge
+               ? imp__edge_glued(d->b->edges, scene, d->edge, d->p)
+               : imp__glued_near(scene, d->item->shape, 0, d->item->place, d->p, d->out);
 }
 
 imp_v3 imp__edge_clear(const struct imp__edge_draw *d)

@@ -6,26 +6,6 @@
 #include "walk/core/step.h"
 #include "walk/lights/light_step.h"
 
-/* Film velocity of a point at distance 1 whose velocity is W: (x.W, y.W). Of the direction of a
- * ray by film position it is the inverse: differences over a pixel are exact to 1e-9 of a smooth
- * film. */
-static void film_slopes(const struct imp_sensor *s, double px, double py,
-                        const double *lens, imp_v3 *x, imp_v3 *y)
-{
-    const double h = 1e-3;
-    struct imp_sensor_ray at, lo, hi;
-    s->ops->ray(s, px, py, lens, &at);
-    s->ops->ray(s, px - h, py, lens, &lo);
-    s->ops->ray(s, px + h, py, lens, &hi);
-    const imp_v3 a = (hi.d - lo.d) * (0.5 / h);
-    s->ops->ray(s, px, py - h, lens, &lo);
-    s->ops->ray(s, px, py + h, lens, &hi);
-    const imp_v3 b = (hi.d - lo.d) * (0.5 / h);
-    const imp_v3 across_b = imp__cross(b, at.d), across_a = imp__cross(at.d, a);
-    *x = across_b * (1 / imp__dot(a, across_b));
-    *y = across_a * (1 / imp__dot(b, across_a));
-}
-
 imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py)
 {
     const struct imp_tracer *t = d->b->tracer;
@@ -37,56 +17,63 @@ imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py)
     return walk.values;
 }
 
-/* What is seen past the draw's point on the side of the film that `shift` points to, or (sign -1) away
- * from; bar: the same direction in space, of any length. */
-static imp_spec look_beside(struct imp__edge_draw *d, const struct imp_sensor_sample *to,
-                            imp_v3 bar, double sign, const double shift[2])
+struct imp__flux *imp__jump_add(struct imp__edge_draw *d,
+                                const struct imp_sensor_sample *to, imp_spec L, int n)
 {
-    const struct imp_sensor *sensor = d->b->tracer->sensor;
-    const imp_v3 r = d->p - to->p, m = imp__normalize(bar) * sign;
-    const double apart = IMP_BESIDE * imp__length(r);
-    const imp_v3 past = d->p + m * apart, q = imp__edge_beside(d, r, m, apart);
+    if (imp__is_zero_used(L, d->waves)) return NULL;
+    struct imp__flux *f = imp__flux_add(d, n);
+    if (!f) return NULL;
+    f->px = to->px;
+    f->py = to->py;
+    f->L = L;
+    return f;
+}
+
+/* The point of the draw, or of a circle of a sky its direction, as connections have it. */
+static bool is_sky(const struct imp__edge_draw *d)
+{
+    return d->item && d->item->kind == IMP_ITEM_SKY;
+}
+
+/* What is seen past the draw's point, so far apart, on the side that m points to; w: the unit direction
+ * of the ray. */
+static imp_spec look_beside(struct imp__edge_draw *d, const struct imp_sensor_sample *to,
+                            imp_v3 w, imp_v3 m, double apart)
+{
     struct imp_sensor_sample at;
     struct imp_walk walk;
-    if (imp__edge_face_look(d, to->p, m, apart, 0, &walk)) return walk.values;
-    if (!imp__is_zero(q - past) && imp__sensor_connect(sensor, &q, false, d->lens, &at))
-        return imp__look_through(d, at.px, at.py);
-    return imp__look_through(d, to->px + sign * shift[0], to->py + sign * shift[1]);
+    const bool sky = is_sky(d);
+    if (!sky && imp__edge_face_look(d, to->p, d->b->parallel, m, apart, 0, &walk))
+        return walk.values;
+    const imp_v3 q =
+        sky ? imp__normalize(w + m * apart) : imp__edge_beside(d, w, m, apart);
+    if (!imp__sensor_connect(d->b->tracer->sensor, &q, sky, d->lens, &at))
+        return imp__spec(0);
+    return imp__look_through(d, at.px, at.py);
 }
 
 void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to)
 {
-    const imp_v3 camera = d->eye;
-    const double inverse = 1 / imp__length(d->p - camera);
-    imp_v3 x, y;
-    film_slopes(d->b->tracer->sensor, to->px, to->py, d->lens, &x, &y);
-    x *= inverse;
-    y *= inverse;
-    const double tangent[2] = {imp__dot(x, d->along), imp__dot(y, d->along)};
-    const double normal[2] = {-tangent[1], tangent[0]};
-    const double length = sqrt(imp__sqr(normal[0]) + imp__sqr(normal[1]));
-    if (!(length > 0)) return; /* it is seen end on */
-    const imp_v3 bar = x * normal[0] + y * normal[1];
-
-    /* A pixel is so wide at the distance 1. */
-    const double pixel = sqrt(1 / (imp__length(x) * imp__length(y))) * inverse;
-    const double beside = IMP_BESIDE / pixel / length;
-    const double shift[2] = {normal[0] * beside, normal[1] * beside};
+    const imp_v3 w = -to->wo, turned = imp__cross(d->along, w);
+    const double sine = imp__length(turned);
+    if (!(sine > 0)) return; /* it is seen end on */
+    const imp_v3 m = turned * (1 / sine);
+    const bool sky = is_sky(d);
+    /* A distance, or an angle. Parallel rays may begin next to what they meet. */
+    const double apart = IMP_BESIDE * (sky              ? 1
+                                       : d->b->parallel ? to->dist + imp__length(d->p)
+                                                        : imp__length(d->p - to->p));
     const imp_spec jump =
-        look_beside(d, to, bar, -1, shift) - look_beside(d, to, bar, 1, shift);
-    if (imp__is_zero_used(jump, d->waves)) return;
-    struct imp__flux *f = imp__flux_add(d, 2);
+        look_beside(d, to, w, -m, apart) - look_beside(d, to, w, m, apart);
+    struct imp__flux *f =
+        imp__jump_add(d, to, jump * (to->weight * sine * d->inv_pdf), 2);
     if (!f) return;
-    f->px = to->px;
-    f->py = to->py;
-    f->L = jump * d->inv_pdf;
     f->n_ends = 2;
-    const bool sky = d->item && d->item->kind == IMP_ITEM_SKY;
     const struct imp__glued at = sky ? (struct imp__glued){.p = d->p}
                                      : imp__edge_carried(d),
-                            eye = {.p = camera};
-    f->end[0] = sky ? imp__flux_camera(d, &eye, bar) : imp__flux_glued(&at, bar);
-    f->end[1] = imp__flux_camera(d, &at, -bar);
+                            eye = {.p = d->eye};
+    f->end[0] = sky ? imp__flux_camera(d, &eye, m) : imp__flux_glued(&at, m);
+    f->end[1] = imp__flux_camera(d, &at, -m);
     if (sky) f->end[0].eye = d->p; /* another point of the ray through the eye */
 }
 
@@ -112,7 +99,7 @@ void imp__draw_film(struct imp__edge_draw *d)
     const struct imp__boundary *b = d->b;
     const struct imp_sensor *sensor = b->tracer->sensor;
     struct imp_sensor_sample to;
-    if (!imp__edge_any(d, d->eye) || !sensor->ops->connect ||
+    if (!imp__edge_any(d, d->eye, b->parallel) || !sensor->ops->connect ||
         !imp__sensor_connect(sensor, &d->p, false, d->lens, &to) ||
         !imp__light_on_film(sensor, &to))
         return;

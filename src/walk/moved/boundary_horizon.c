@@ -26,7 +26,7 @@ static void emission_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
         imp__is_zero_used(v->e, d->waves))
         return;
     const struct imp__glued y =
-        imp__glued_at(d->b->tracer->scene, v->d.shape, &v->d.located, v->ng);
+        imp__glued_at(d->b->tracer->scene, v->d.shape, &v->d.located, 0, v->ng);
     const imp_v3 turn = x->n * (1 / imp__length(y.p - x->p));
     struct imp__edge_light light = {
         .w = -w, .light = v->e * times, .behind = 1, .horizon = true, .n_ends = 2};
@@ -49,7 +49,7 @@ void imp__draw_horizon(struct imp__edge_draw *d)
     look(d, &at, -at.ng, w, &below);
     const struct imp_located located = {hit.prim, {(float)hit.u, (float)hit.v}};
     const struct imp__glued x =
-        imp__glued_at(d->b->tracer->scene, hit.shape, &located, at.ng);
+        imp__glued_at(d->b->tracer->scene, hit.shape, &located, hit.place, at.ng);
     const double times = IMP_2PI * d->inv_pdf;
     emission_reach(d, &hit, &at, &x, &above, w, times);
     emission_reach(d, &hit, &at, &x, &below, w, -times);

@@ -61,7 +61,8 @@ static struct imp__flux_end source_end(const struct imp__edge_draw *d,
     if (!shape)
         return (struct imp__flux_end){{.p = s->p}, {.v = bar}, false, s->light + 1, {0}};
     const struct imp_located located = imp__located_drawn(shape, &s->y.located, s->y.uv);
-    const struct imp__glued lit = imp__glued_at(scene, shape->index, &located, s->y.ng);
+    const struct imp__glued lit =
+        imp__glued_at(scene, shape->index, &located, 0, s->y.ng);
     return imp__flux_glued(&lit, bar);
 }
 

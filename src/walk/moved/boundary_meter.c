@@ -21,9 +21,8 @@ bool imp__meter_is_points(const struct imp_sensor *s)
     return s->receiver && s->receiver->points;
 }
 
-/* The point that connections make of the first two numbers. */
-static void point_draw(const struct imp_sensor *s, const double u[4],
-                       struct imp_surface *at)
+void imp__meter_draw(const struct imp_sensor *s, const double u[4],
+                     struct imp_surface *at)
 {
     double on[2];
     imp__receiver_uv(s, u[0] * s->film.width, u[1] * s->film.height, on);
@@ -36,24 +35,8 @@ struct imp__flux_end imp__meter_end(const struct imp__edge_draw *d,
 {
     const struct imp_sensor *s = d->b->tracer->sensor;
     const struct imp__glued x =
-        imp__glued_at(d->b->tracer->scene, s->shape->index, &to->located, to->ng);
+        imp__glued_at(d->b->tracer->scene, s->shape->index, &to->located, 0, to->ng);
     return imp__flux_glued(&x, bar);
-}
-
-/* A jump by L at the edge, whose line has the velocity that the ends say. */
-static struct imp__flux *jump_add(struct imp__edge_draw *d,
-                                  const struct imp_sensor_sample *to, imp_spec L,
-                                  imp_v3 m)
-{
-    if (imp__is_zero_used(L, d->waves)) return NULL;
-    struct imp__flux *f = imp__flux_add(d, 3);
-    if (!f) return NULL;
-    const struct imp__glued edge = imp__edge_carried(d);
-    f->px = to->px;
-    f->py = to->py;
-    f->L = L;
-    f->end[f->n_ends++] = imp__flux_glued(&edge, m);
-    return f;
 }
 
 /* Emission that a look past the edge meets first, of a light at y:
@@ -64,10 +47,12 @@ static void emission_add(struct imp__edge_draw *d, const struct imp_sensor_sampl
     const struct imp_vertex *v = walk->first;
     const int max = d->b->tracer->integrator->max_depth;
     if (walk->dropped || !v || v->d.scatterer == IMP_AT_SKY || max == 0) return;
-    struct imp__flux *f = jump_add(d, to, v->e * times, m);
+    struct imp__flux *f = imp__jump_add(d, to, v->e * times, 3);
     if (!f) return;
+    const struct imp__glued edge = imp__edge_carried(d);
+    f->end[f->n_ends++] = imp__flux_glued(&edge, m);
     const struct imp__glued y =
-        imp__glued_at(d->b->tracer->scene, v->d.shape, &v->d.located, v->ng);
+        imp__glued_at(d->b->tracer->scene, v->d.shape, &v->d.located, 0, v->ng);
     const double t_x = imp__length(d->p - to->p),
                  far = imp_clamp(1 - t_x / imp__length(y.p - to->p), 0.0, 1.0);
     f->end[f->n_ends++] = imp__meter_end(d, to, m * -far);
@@ -77,7 +62,7 @@ static void emission_add(struct imp__edge_draw *d, const struct imp_sensor_sampl
 static void look_beside(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 o,
                         imp_v3 m, double apart, struct imp_walk *walk)
 {
-    if (imp__edge_face_look(d, o, m, apart, 0, walk)) return;
+    if (imp__edge_face_look(d, o, false, m, apart, 0, walk)) return;
     imp__look_from(d, at, imp__edge_beside(d, d->p - o, m, apart), 0, walk);
 }
 
@@ -87,8 +72,8 @@ void imp__draw_meter(struct imp__edge_draw *d)
     const bool points = imp__meter_is_points(t->sensor);
     struct imp_sensor_sample to;
     struct imp_surface at = {.uv = {0}};
-    point_draw(t->sensor, d->lens, &at);
-    if (!imp__edge_any(d, at.p) ||
+    imp__meter_draw(t->sensor, d->lens, &at);
+    if (!imp__edge_any(d, at.p, false) ||
         !imp__sensor_connect(t->sensor, &d->p, false, d->lens, &to) ||
         !imp__light_on_film(t->sensor, &to))
         return;
@@ -106,8 +91,12 @@ void imp__draw_meter(struct imp__edge_draw *d)
     look_beside(d, &at, o, m, apart, &hi);
     const bool *drawn = points ? NULL : d->b->drawn_to_meter;
     const imp_spec jump = imp__arrives(t, &lo, 0, drawn) - imp__arrives(t, &hi, 0, drawn);
-    struct imp__flux *f = jump_add(d, &to, jump * times, m);
-    if (f) f->end[f->n_ends++] = imp__meter_end(d, &to, -m);
+    struct imp__flux *f = imp__jump_add(d, &to, jump * times, 2);
+    if (f) {
+        const struct imp__glued edge = imp__edge_carried(d);
+        f->end[f->n_ends++] = imp__flux_glued(&edge, m);
+        f->end[f->n_ends++] = imp__meter_end(d, &to, -m);
+    }
     if (!points) return;
     emission_add(d, &to, &lo, m, times);
     emission_add(d, &to, &hi, m, -times);
@@ -171,7 +160,7 @@ void imp__meter_reach(struct imp__edge_draw *d, const struct imp__meter_point *x
     const struct imp_located located =
         imp__located_drawn(s->shape, &x->at.located, x->at.uv);
     const struct imp__glued at =
-        imp__glued_at(d->b->tracer->scene, s->shape->index, &located, x->at.ng);
+        imp__glued_at(d->b->tracer->scene, s->shape->index, &located, 0, x->at.ng);
     f->end[f->n_ends++] = imp__flux_glued(&at, light->slide);
 }
 
@@ -182,19 +171,24 @@ struct imp__kernel_bar imp__meter_times(const struct imp_sensor *s, imp_v3 n, im
 {
     const struct imp_receiver *r = s->receiver;
     if (!r) return imp__lambert_times(n, w, bar);
-    const struct imp_frame *frame = &r->frame;
-    const imp_v3 axis = frame->n, f = imp__to_world(frame, r->facing);
-    if (r->kind == IMP_PLANAR) return imp__lambert_times(f, w, bar);
-    /* sin(e) is the part of w across the axis, and its gradient along that. */
-    const imp_v3 across = w - axis * imp__dot(axis, w);
-    const double sine = imp__length(across);
-    imp_v3 slope = across * (1 / sine);
-    double p = sine;
-    if (r->kind == IMP_SEMICYLINDRICAL) {
-        slope += f;
-        p += imp__dot(f, w);
-    }
     struct imp__kernel_bar out = {{0}, {0}, {0}, 0, {0}};
-    if (bar != 0 && sine > 0 && p > 0) out.wi = slope * (bar / p);
+    const imp_v3 axis = r->frame.n, f = imp__to_world(&r->frame, r->facing);
+    imp_v3 slope = f; /* of the density p, times a constant */
+    double p = imp__dot(f, w);
+    if (r->kind != IMP_PLANAR) {
+        /* sin(e) is the part of w across the axis, and its gradient along that. */
+        const imp_v3 across = w - axis * imp__dot(axis, w);
+        const double sine = imp__length(across);
+        if (!(sine > 0)) return out;
+        slope = across * (1 / sine);
+        if (r->kind == IMP_SEMICYLINDRICAL) slope += f;
+        p = imp__dot(slope, w);
+    }
+    if (bar == 0 || !(p > 0)) return out;
+    out.wi = slope * (bar / p);
+    /* p is of w in the frame, which turns with the shape (moved_kernel.h). */
+    const imp_v3 by_frame = imp__cross(out.wi, w);
+    out.n = imp__cross(by_frame, n);
+    out.turn = imp__dot(by_frame, n);
     return out;
 }

@@ -30,7 +30,7 @@ struct imp__edge_draw {
     bool no_memory;
     double lens
         [4]; /* numbers of the point through which the sensor sees, and of connections */
-    imp_v3 eye; /* that point, of a camera */
+    imp_v3 eye; /* that point; of parallel rays their direction */
 };
 
 /* Random numbers of a draw; walks that leave it have others. */
@@ -62,8 +62,9 @@ static inline const struct imp_carried *imp__edge_waves(const struct imp__edge_d
 /* Chooses an item, or the edges. False: there is none. */
 bool imp__edge_item_choose(struct imp__edge_draw *d);
 /* Sets the edge and its point: of all edges, and of spheres' silhouettes from there; of silhouettes of
- * lines from there; of all edges, and lines that touch spheres, along *w. False: none. */
-bool imp__edge_any(struct imp__edge_draw *d, imp_v3 from);
+ * lines from there; of all edges, and lines that touch spheres, along *w. `from` is a direction where
+ * lines are parallel. False: none. */
+bool imp__edge_any(struct imp__edge_draw *d, imp_v3 from, bool parallel);
 bool imp__edge_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel);
 bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w);
 /* The edge's point as its surface carries it; and a place beside it that no rounding hides behind
@@ -83,10 +84,11 @@ bool imp__edge_face_hit(const struct imp__edge_draw *d, const struct imp__edge_f
 /* A walk from o to a hit of a triangle, behind `before` vertices: the point is as exact as its weights. */
 void imp__look_at(struct imp__edge_draw *d, imp_v3 o, struct imp_hit *hit, int before,
                   struct imp_walk *walk);
-/* Past the edge's point as imp__edge_beside, from o: where its face is what a ray there meets, the walk
- * begins at the face, next to the edge. False: no such face is met, or none is there. */
-bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, imp_v3 m, double apart,
-                         int before, struct imp_walk *walk);
+/* Past the edge's point as imp__edge_beside, from o, or, where `parallel`, in the direction from o to
+ * the edge: where its face is what a ray there meets, the walk begins at the face, next to the edge.
+ * False: no such face is met, or none is there. */
+bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, bool parallel, imp_v3 m,
+                         double apart, int before, struct imp_walk *walk);
 /* The point at which a look along w past the edge's point aims, on the side that the unit vector m, across
  * both, points to, so far apart: of a face that is narrower there, a point of it. */
 imp_v3 imp__edge_beside(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m, double apart);
@@ -101,6 +103,9 @@ imp__flux_camera(const struct imp__edge_draw *d, const struct imp__glued *x, imp
 {
     return (struct imp__flux_end){*x, {.v = bar}, true, 0, d->eye};
 }
+/* A jump by L at a film position, with room for n ends. NULL: nothing jumps, or no memory. */
+struct imp__flux *imp__jump_add(struct imp__edge_draw *d,
+                                const struct imp_sensor_sample *to, imp_spec L, int n);
 /* What the camera sees at a film position. */
 imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py);
 /* The flux of a jump of the picture where the draw's point is seen; of a circle of a sky, with the
@@ -141,6 +146,9 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
 /* ---- Meters: boundary_meter.c ---- */
 /* Has it a place for each pixel, and no area? */
 bool imp__meter_is_points(const struct imp_sensor *s);
+/* The point that connections make of the first two numbers. */
+void imp__meter_draw(const struct imp_sensor *s, const double u[4],
+                     struct imp_surface *at);
 /* What the velocity of a meter's point counts. */
 struct imp__flux_end imp__meter_end(const struct imp__edge_draw *d,
                                     const struct imp_sensor_sample *to, imp_v3 bar);

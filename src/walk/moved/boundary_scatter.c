@@ -59,7 +59,7 @@ static void look_beside(struct imp__edge_draw *d, const struct imp_surface *at, 
                         double apart, struct imp_walk *walk)
 {
     const imp_v3 r = d->p - at->p, o = imp__offset(at->p, at->ng, r);
-    if (imp__edge_face_look(d, o, m, apart, 1, walk)) return;
+    if (imp__edge_face_look(d, o, false, m, apart, 1, walk)) return;
     imp__look_from(d, at, imp__edge_beside(d, r, m, apart), 1, walk);
 }
 

@@ -19,53 +19,48 @@
 
 /* ---- Lists ------------------------------------------------------------------------------ */
 
-static imp_v3 triple(const float *array, uint32_t i)
+static struct imp__corners corners(const struct imp__boundary *b,
+                                   const struct imp__edge_item *item, size_t prim)
 {
-    const float *p = array + 3 * (size_t)i;
-    return imp__v3(p[0], p[1], p[2]);
+    return imp__corners(b->tracer->scene, item->shape, (int)prim, item->place);
 }
 
-struct corners {
-    imp_v3 p[3], n[3];
-};
-static struct corners corners(const struct imp_shape *s, size_t prim)
+/* From p to the eye, of any length. */
+static imp_v3 towards(const struct imp__boundary *b, imp_v3 eye, imp_v3 p)
 {
-    const uint32_t *i = s->triangles.indices + 3 * prim;
-    const struct imp__mesh *m = s->self;
-    struct corners c;
-    for (int k = 0; k < 3; k++) {
-        c.p[k] = triple(s->triangles.positions, i[k]);
-        c.n[k] = triple(m->normals, i[k]);
-    }
-    return c;
+    return b->parallel ? -eye : eye - p;
 }
 
 /* May N.(eye - p) vanish in the triangle, for an eye within `radius` of the camera? It is a quadratic
  * form of the weights, between the least and the largest of its Bezier coefficients. */
-static bool may_turn(const struct corners *c, imp_v3 camera, double radius)
+static bool may_turn(const struct imp__boundary *boundary, const struct imp__corners *c,
+                     double radius)
 {
     double lo = INFINITY, hi = -INFINITY, most = 0;
+    imp_v3 to[3];
+    for (int i = 0; i < 3; i++) to[i] = towards(boundary, boundary->camera, c->p[i]);
     for (int i = 0; i < 3; i++) most = imp_max(most, imp__length(c->n[i]));
     for (int i = 0; i < 3; i++)
         for (int j = 0; j <= i; j++) {
-            const double b = 0.5 * (imp__dot(c->n[i], camera - c->p[j]) +
-                                    imp__dot(c->n[j], camera - c->p[i]));
+            const double b = 0.5 * (imp__dot(c->n[i], to[j]) + imp__dot(c->n[j], to[i]));
             lo = imp_min(lo, b);
             hi = imp_max(hi, b);
         }
     return lo <= most * radius && hi >= -most * radius;
 }
 
-static double perimeter(const struct corners *c)
+static double perimeter(const struct imp__corners *c)
 {
     return imp__length(c->p[1] - c->p[0]) + imp__length(c->p[2] - c->p[1]) +
            imp__length(c->p[0] - c->p[2]);
 }
 
-static double lens_radius(const struct imp__boundary *b)
+/* How far the points through which it sees are from the middle. */
+static double eye_radius(const struct imp__boundary *b)
 {
     const struct imp_sensor *s = b->tracer->sensor;
     const double rim[2] = {1, 0.5};
+    if (s->shape) return 0.5 * imp__length(s->shape->hi - s->shape->lo);
     imp_v3 point = b->camera;
     imp__lens_point(s, rim, &point);
     return imp__length(point - b->camera);
@@ -82,12 +77,12 @@ static enum imp_status seen_find(const struct imp__boundary *b,
     if (!item->seen || !item->seen_until)
         return imp__error(ctx, IMP_E_NOMEM, "no memory for vertex normals");
     item->seen_until[0] = 0;
-    const double radius = b->wide ? lens_radius(b) : 0;
+    const double radius = b->wide ? eye_radius(b) : 0;
     for (size_t k = 0; k < n; k++) {
-        const struct corners c = corners(s, k);
-        const double distance = imp__length(c.p[0] - b->camera) + 1e-6 * b->size;
-        if (!may_turn(&c, b->camera, radius) || !(item->until[k + 1] > item->until[k]))
-            continue;
+        const struct imp__corners c = corners(b, item, k);
+        const double distance =
+            imp__length(towards(b, b->camera, c.p[0])) + 1e-6 * b->size;
+        if (!may_turn(b, &c, radius) || !(item->until[k + 1] > item->until[k])) continue;
         item->seen[item->n_seen] = (int)k;
         item->seen_until[item->n_seen + 1] =
             item->seen_until[item->n_seen] + perimeter(&c) / distance;
@@ -106,7 +101,7 @@ enum imp_status imp__edge_item_measure(const struct imp__boundary *b,
     if (!item->until) return imp__error(ctx, IMP_E_NOMEM, "no memory for vertex normals");
     item->until[0] = 0;
     for (size_t k = 0; k < n; k++) {
-        const struct corners c = corners(s, k);
+        const struct imp__corners c = corners(b, item, k);
         item->until[k + 1] =
             item->until[k] +
             0.5 * imp__length(imp__cross(c.p[1] - c.p[0], c.p[2] - c.p[0]));
@@ -140,9 +135,10 @@ static size_t entry_choose(const double *until, size_t n, double *u, double *cha
 static void surface_at(const struct imp__edge_draw *d, struct imp_hit *hit,
                        struct imp_surface *at)
 {
-    const struct imp_shape *s = d->b->tracer->scene->shapes[d->item->shape];
+    const imp_v3 unused = {0};
     hit->shape = d->item->shape;
-    s->ops->surface(s, hit, NULL, NULL, at);
+    hit->place = d->item->place;
+    imp__hit_surface(d->b->tracer->scene, hit, &unused, &unused, at);
 }
 
 bool imp__edge_item_point(struct imp__edge_draw *d, struct imp_hit *hit,
@@ -162,18 +158,17 @@ bool imp__edge_item_point(struct imp__edge_draw *d, struct imp_hit *hit,
     return true;
 }
 
-/* ---- To the camera ---------------------------------------------------------------------- */
+/* ---- To the sensor ---------------------------------------------------------------------- */
 
 /* A point of the curve on a random line; false: the line does not cross it. Sets d->inv_pdf, per
  * length of the curve. */
 static bool seen_point(struct imp__edge_draw *d, struct imp_hit *hit)
 {
     const struct imp__edge_item *item = d->item;
-    const struct imp_shape *s = d->b->tracer->scene->shapes[item->shape];
     double chance, u = d->u;
     const int prim =
         item->seen[entry_choose(item->seen_until, item->n_seen, &u, &chance)];
-    const struct corners c = corners(s, (size_t)prim);
+    const struct imp__corners c = corners(d->b, item, (size_t)prim);
     const double round = perimeter(&c);
 
     /* A point of the perimeter, on side k, and a direction by the cosine to the side's normal. */
@@ -204,16 +199,16 @@ static bool seen_point(struct imp__edge_draw *d, struct imp_hit *hit)
     for (int i = 0; i < 3; i++)
         if (i != (k + 2) % 3 && rate[i] < 0) until = imp_min(until, -b[i] / rate[i]);
 
-    /* N.(camera - p) along it: a quadratic. */
+    /* N.(eye - p) along it: a quadratic. */
     imp_v3 N = {0}, turn = {0}, p = {0};
     for (int i = 0; i < 3; i++) {
         N += c.n[i] * b[i];
         turn += c.n[i] * rate[i];
         p += c.p[i] * b[i];
     }
-    const imp_v3 r = d->eye - p;
-    const double g0 = imp__dot(N, r), g1 = imp__dot(turn, r) - imp__dot(N, q),
-                 g2 = -imp__dot(turn, q), square = g1 * g1 - 4 * g0 * g2;
+    const imp_v3 r = towards(d->b, d->eye, p), moves = d->b->parallel ? (imp_v3){0} : -q;
+    const double g0 = imp__dot(N, r), g1 = imp__dot(turn, r) + imp__dot(N, moves),
+                 g2 = imp__dot(turn, moves), square = g1 * g1 - 4 * g0 * g2;
     if (!(square >= 0) || !(until < INFINITY)) return false;
     const double half = -0.5 * (g1 + copysign(sqrt(square), g1));
     const double all[2] = {half / g2, g0 / half};
@@ -242,7 +237,8 @@ static double room_along(const struct imp__glued *x, imp_v3 D)
     return room;
 }
 
-/* A point where the shading normal turns away from w, at which something is t away. */
+/* A point where the shading normal turns away from w, at which something is t away; `far`: in a
+ * direction that is the same from everywhere. */
 struct turning {
     struct imp__glued x;
     imp_v3 beside; /* to the lit side of it, so far that a look is not lost in rounding */
@@ -250,15 +246,16 @@ struct turning {
     imp_v3 next;   /* to that side, much nearer */
 };
 static bool turning_at(const struct imp__edge_draw *d, const struct imp_hit *hit,
-                       const struct imp_surface *at, imp_v3 w, double t,
+                       const struct imp_surface *at, imp_v3 w, double t, bool far,
                        struct turning *out)
 {
     const struct imp_located located = {hit->prim, {(float)hit->u, (float)hit->v}};
-    out->x = imp__glued_at(d->b->tracer->scene, hit->shape, &located, at->ng);
+    out->x = imp__glued_at(d->b->tracer->scene, hit->shape, &located, hit->place, at->ng);
     if (!out->x.smooth) return false;
     const imp_v3 n = out->x.shade - out->x.n * imp__dot(out->x.n, out->x.shade);
     const imp_v3 grad = out->x.slope[0] * imp__dot(out->x.turn[0], w) +
-                        out->x.slope[1] * imp__dot(out->x.turn[1], w) - n * (1 / t);
+                        out->x.slope[1] * imp__dot(out->x.turn[1], w) -
+                        n * (far ? 0 : 1 / t);
     out->slope = imp__length(grad);
     if (!(out->slope > 0)) return false;
     const imp_v3 D = grad * (1 / out->slope), across = D - w * imp__dot(w, D);
@@ -278,8 +275,10 @@ static bool look_next(struct imp__edge_draw *d, const struct turning *x, double 
 {
     struct imp_hit hit;
     const imp_v3 r = imp__normalize(x->x.p + x->beside * sign - o), by = x->next * sign;
+    const struct imp__edge_face face = {
+        .shape = x->x.shape, .prim = x->x.prim, .place = x->x.place};
     if (!imp__intersect(d->b->tracer->scene, &o, &r, 0, INFINITY, &hit) ||
-        hit.shape != x->x.shape || hit.prim != x->x.prim || hit.place != 0)
+        !imp__edge_face_hit(d, &face, &hit))
         return false;
     hit.u = x->x.b[1] + imp__dot(x->x.slope[0], by);
     hit.v = x->x.b[2] + imp__dot(x->x.slope[1], by);
@@ -287,50 +286,61 @@ static bool look_next(struct imp__edge_draw *d, const struct turning *x, double 
     return true;
 }
 
-/* The curve's picture passes between two film positions. */
-static bool film_beside(const struct imp__edge_draw *d, imp_v3 p,
-                        struct imp_sensor_sample *to)
+/* What is seen beside the curve, from o: `from` of a meter, else through the film. */
+static imp_spec look_beside(struct imp__edge_draw *d, const struct turning *x,
+                            double sign, imp_v3 o, const struct imp_surface *from)
 {
-    return imp__sensor_connect(d->b->tracer->sensor, &p, false, d->lens, to);
+    const imp_v3 q = x->x.p + x->beside * sign;
+    struct imp_sensor_sample at;
+    struct imp_walk walk;
+    const imp_v3 own = d->b->parallel ? o + x->next * sign : o;
+    if (look_next(d, x, sign, own, 0, &walk)) return walk.values;
+    if (from) {
+        imp__look_from(d, from, q, 0, &walk);
+        return walk.values;
+    }
+    if (!imp__sensor_connect(d->b->tracer->sensor, &q, false, d->lens, &at))
+        return imp__spec(0);
+    return imp__look_through(d, at.px, at.py);
 }
 
 void imp__draw_shading_film(struct imp__edge_draw *d)
 {
     const struct imp_sensor *sensor = d->b->tracer->sensor;
-    struct imp_sensor_sample to, lit, dark;
-    struct imp_surface at;
+    const bool meter = sensor->shape != NULL, parallel = d->b->parallel;
+    struct imp_sensor_sample to;
+    struct imp_surface at, from = {.uv = {0}};
     struct imp_hit hit;
     struct turning x;
+    if (meter) imp__meter_draw(sensor, d->lens, &from);
+    if (meter) d->eye = from.p;
     if (!sensor->ops->connect || !seen_point(d, &hit)) return;
     surface_at(d, &hit, &at);
     d->p = at.p;
-    if (!film_beside(d, at.p, &to) || !imp__light_on_film(sensor, &to)) return;
-    const imp_v3 r = at.p - to.p;
-    const double t = imp__length(r);
-    if (imp__occluded_at(d->b->tracer->scene, 0, &to.p, &r, 0, 1 - IMP_BESIDE)) return;
-    if (!turning_at(d, &hit, &at, to.wo, t, &x)) return;
-    if (!film_beside(d, at.p + x.beside, &lit) || !film_beside(d, at.p - x.beside, &dark))
+    if (!imp__sensor_connect(sensor, &at.p, false, d->lens, &to) ||
+        !imp__light_on_film(sensor, &to))
         return;
-    struct imp_walk near;
-    imp_spec jump = look_next(d, &x, 1, to.p, 0, &near)
-                        ? near.values
-                        : imp__look_through(d, lit.px, lit.py);
-    jump -= look_next(d, &x, -1, to.p, 0, &near) ? near.values
-                                                 : imp__look_through(d, dark.px, dark.py);
-    if (imp__is_zero_used(jump, d->waves)) return;
-    struct imp__flux *f = imp__flux_add(d, 3);
+    const imp_v3 o = meter ? imp__offset(from.p, from.ng, at.p - from.p) : to.p,
+                 r = at.p - o;
+    const double t = imp__length(r);
+    if (imp__occluded_at(d->b->tracer->scene, 0, &o, &r, 0, 1 - IMP_BESIDE)) return;
+    if (!turning_at(d, &hit, &at, to.wo, t, parallel, &x)) return;
+    const imp_spec jump = look_beside(d, &x, 1, o, meter ? &from : NULL) -
+                          look_beside(d, &x, -1, o, meter ? &from : NULL);
+    const double times = fabs(imp__dot(at.ng, to.wo)) * to.weight * d->inv_pdf / x.slope;
+    struct imp__flux *f = imp__jump_add(d, &to, jump * times, 3);
     if (!f) return;
-    f->px = to.px;
-    f->py = to.py;
-    f->L = jump * (fabs(imp__dot(at.ng, to.wo)) * to.weight * d->inv_pdf / x.slope);
-    /* g' = n_s'.wo + n_s.wo', and the ray turns by (u(p) - u(o))/t, against wo. */
+    /* g' = n_s'.wo + n_s.wo', and a camera's ray turns by (u(p) - u(o))/t, against wo. */
     struct imp__link_point p = {.x = x.x, .bar = {.shade = to.wo}};
     const imp_v3 shift = imp__slide_bar(&p, to.wo), turn = x.x.shade * (1 / t);
-    const struct imp__glued o = {.p = to.p};
-    f->n_ends = 3;
-    f->end[0] = (struct imp__flux_end){p.x, p.bar, false, 0, {0}};
-    f->end[1] = imp__flux_camera(d, &p.x, shift - turn);
-    f->end[2] = imp__flux_camera(d, &o, turn);
+    const struct imp__glued eye = {.p = to.p};
+    f->end[f->n_ends++] = (struct imp__flux_end){p.x, p.bar, false, 0, {0}};
+    if (meter) {
+        f->end[f->n_ends++] = imp__meter_end(d, &to, shift);
+        return;
+    }
+    f->end[f->n_ends++] = imp__flux_camera(d, &p.x, shift - turn);
+    f->end[f->n_ends++] = imp__flux_camera(d, &eye, turn);
 }
 
 /* ---- To a vertex ------------------------------------------------------------------------ */
@@ -350,7 +360,7 @@ void imp__draw_shading_scatter(struct imp__edge_draw *d)
     const imp_v3 o = imp__offset(p.p, p.ng, w);
     if (!imp__intersect(scene, &o, &w, 0, INFINITY, &hit)) return;
     imp__hit_surface(scene, &hit, &o, &w, &at);
-    if (!turning_at(d, &from, &p, w, imp__length(at.p - p.p), &x)) return;
+    if (!turning_at(d, &from, &p, w, imp__length(at.p - p.p), false, &x)) return;
     const imp_v3 back = imp__offset(at.p, at.ng, -w);
     if (!look_next(d, &x, 1, back, 1, &lit))
         imp__look_from(d, &at, p.p + x.beside, 1, &lit);

@@ -3,6 +3,7 @@
  * What has a derivative by what moves that is whole, and what is refused by name (moved.h). */
 #include "base/context.h"
 #include "kind/emitter/ies.h"
+#include "math/warp.h"
 #include "moved.h"
 #include "moved_kernel.h"
 #include "scene/instances.h"
@@ -28,7 +29,7 @@ static bool is_textured(const struct imp_input *const *input, int n)
 
 static enum imp_status materials_allowed(const struct imp_tracer *t)
 {
-    for (int k = 0; k < t->scene->n_shapes; k++) {
+    for (int k = 0; k < t->scene->n_all_shapes; k++) {
         const struct imp_shape *s = t->scene->shapes[k];
         const struct imp_bsdf *b = imp__shape_bsdf(t->scene, s);
         const char *why =
@@ -40,6 +41,23 @@ static enum imp_status materials_allowed(const struct imp_tracer *t)
     return IMP_OK;
 }
 
+/* Where light by this table jumps, in words that follow its name; NULL: nowhere. A flat shape hides what
+ * is sent behind it. */
+static const char *table_jump(const struct imp__ies *x)
+{
+    enum { AROUND = 64 };
+    const char *jump = imp__ies_jump(x->data);
+    if (jump || x->n_facets != 1) return jump;
+    const struct imp_frame f = imp__frame_from_normal(x->facets[0].n);
+    double most = 0;
+    for (int k = 0; k < AROUND; k++) {
+        const double a = IMP_2PI * (k + 0.5) / AROUND;
+        most = imp_max(most, imp__ies_intensity(x, f.s * cos(a) + f.t * sin(a)));
+    }
+    return most > 1e-6 * imp__ies_flux(x) ? "has light along the plane of its shape"
+                                          : NULL;
+}
+
 static enum imp_status lights_allowed(const struct imp_tracer *t)
 {
     for (int k = 0; k < t->scene->n_emitters; k++) {
@@ -48,20 +66,19 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
         if (sky ? !e->ops->jumps
                 : e->ops != &imp__area && e->ops != &imp__point_light &&
                       e->ops != &imp__spot_light && e->ops != &imp__directional &&
-                      e->ops != &imp__ies_light)
+                      e->ops != &imp__ies_light && e->ops != &imp__ies_area)
             return refuse(t, "light", e->name, e->ops->name,
                           sky ? "does not say where its radiance jumps"
-                              : "is none of area, point, spot, directional, ies without "
-                                "a shape, and skies");
-        if (e->ops == &imp__ies_light) {
-            const struct imp__ies *x = e->self;
-            const char *jump = imp__ies_jump(x->data);
+                              : "is none of area, point, spot, directional, ies, and "
+                                "skies");
+        if (e->ops == &imp__ies_light || e->ops == &imp__ies_area) {
+            const char *jump = table_jump(e->self);
             if (jump) return refuse(t, "the table of light", e->name, e->ops->name, jump);
         }
         if (!sky && (e->shaped || is_textured(e->input, e->n_in)))
             return refuse(t, "light", e->name, e->ops->name, "has a texture");
         if (e->shape && e->shape->geometry != IMP_TRIANGLES &&
-            !imp__moves_curved(t->scene, e->shape->index))
+            !imp__moves_curved(t->scene, e->shape->index, 0))
             return refuse(t, "light", e->name, e->ops->name,
                           "is on a shape that is not made of triangles, and no sphere, "
                           "disk or circular cylinder");
@@ -100,15 +117,11 @@ static enum imp_status meter_allowed(const struct imp_tracer *t)
     const struct imp_shape *on = s->shape;
     const bool flat = on->ops->flags & IMP_SHAPE_FLAT || s->receiver;
     if (!s->ops->connect || !flat ||
-        (on->geometry != IMP_TRIANGLES && !imp__moves_curved(t->scene, on->index)))
+        (on->geometry != IMP_TRIANGLES && !imp__moves_curved(t->scene, on->index, 0)))
         return refuse(t, "sensor", s->name, s->ops->name, "is on no flat shape");
     if (on->smooth)
         return refuse(t, "sensor", s->name, s->ops->name,
                       "is on a mesh with vertex normals (face_normals makes it flat)");
-    for (int k = 0; k < t->scene->n_shapes; k++)
-        if (imp__moves_smooth(t->scene, k))
-            return refuse(t, "sensor", s->name, s->ops->name,
-                          "sees a mesh with vertex normals (face_normals makes it flat)");
     return IMP_OK;
 }
 
@@ -119,7 +132,7 @@ static enum imp_status sensor_allowed(const struct imp_tracer *t)
     if (s->shape) return meter_allowed(t);
     if (!imp__lens_middle(s, &centre))
         return refuse(t, "sensor", s->name, s->ops->name,
-                      "has no point in which its rays meet, and is no thin lens");
+                      "is none of perspective, thinlens and orthographic");
     if (s->open != s->close)
         return refuse(t, "sensor", s->name, s->ops->name, "has a shutter");
     return IMP_OK;

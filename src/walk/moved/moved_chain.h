@@ -23,7 +23,7 @@ static inline struct imp__link_point imp__surface_point(const struct imp_scene *
                                                         const struct imp_located *at,
                                                         int64_t place, imp_v3 n)
 {
-    return (struct imp__link_point){.x = imp__glued_placed(scene, shape, at, place, n)};
+    return (struct imp__link_point){.x = imp__glued_at(scene, shape, at, place, n)};
 }
 static inline struct imp__link_point imp__sky_point(imp_v3 d)
 {

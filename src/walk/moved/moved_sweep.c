@@ -2,6 +2,7 @@
  *
  * The interior derivative of a walk by what moves (moved.h): adjoints of its values from the first
  * vertex to the last, then adjoints of its places from the last to the first. */
+#include "kind/emitter/ies.h"
 #include "moved_chain.h"
 #include "moved_sky.h"
 #include "walk/core/vertex.h"
@@ -82,6 +83,24 @@ static imp_v3 sent_slope(const struct imp_emitter *e, imp_v3 d, int lanes,
         if (middle > 0)
             slope += across[k] * ((value[1] - value[0]) / (2 * TURN * middle));
     }
+    return slope;
+}
+
+/* Does the radiance of this light depend on its direction in a frame that turns with the shape? */
+static bool is_table(const struct imp_emitter *e) { return e->ops == &imp__ies_area; }
+
+/* The light at y along the unit direction d has this adjoint of its logarithm: of a turn of its shape.
+ * Returns the adjoint of d. */
+static imp_v3 table_bar(struct sweep *s, const struct imp_emitter *e,
+                        const struct imp__glued *y, imp_v3 d, double bar,
+                        const struct imp_carried *carried)
+{
+    if (imp_likely(!is_table(e)) || bar == 0) return (imp_v3){0};
+    const imp_v3 slope = sent_slope(e, d, s->tracer->scene->lanes, carried) * bar;
+    const imp_v3 by_frame = imp__cross(slope, d);
+    const struct imp__velocity turn = {.n = imp__cross(by_frame, y->n),
+                                       .turn = imp__dot(by_frame, y->n)};
+    imp__velocity_bar(s->moves, y, &turn, s->theta_bar);
     return slope;
 }
 
@@ -181,9 +200,10 @@ static void light_bar(struct sweep *s, int k, const struct imp_vertex *v)
     struct imp__link_point y = imp__surface_point(
         scene, e->shape->index, &v->d.light.located, 0, imp__decided_v3(v->d.light.d));
     const imp_v3 w = imp__link_direction(&s->at[k], &y);
-    const struct imp__kernel_bar kernel = light_kernel(s, k, v, w);
-    imp__connection_bar(&s->at[k], &y, &kernel,
-                        imp__sum_used(s->piece[k].light, scene->lanes));
+    const double bar = imp__sum_used(s->piece[k].light, scene->lanes);
+    struct imp__kernel_bar kernel = light_kernel(s, k, v, w);
+    kernel.wi -= table_bar(s, e, &y.x, -w, bar, v->carried);
+    imp__connection_bar(&s->at[k], &y, &kernel, bar);
     imp__velocity_bar(s->moves, &y.x, &y.bar, s->theta_bar);
 }
 
@@ -202,9 +222,12 @@ static void step_bar(struct sweep *s, int k, const struct imp_vertex *v)
     if (next->sky) return;
     x->moved_bar += imp__slide_bar(next, w);
     if (!imp__is_zero(piece->met)) {
-        const struct imp__kernel_bar met = kernel_bar(s, k, d, w, piece->met);
-        imp__connection_bar(x, next, &met,
-                            imp__sum_used(piece->met, s->tracer->scene->lanes));
+        const struct imp_scene *scene = s->tracer->scene;
+        const double bar = imp__sum_used(piece->met, scene->lanes);
+        struct imp__kernel_bar met = kernel_bar(s, k, d, w, piece->met);
+        met.wi -= table_bar(s, scene->emitters[v->next->d.met.emitter], &next->x, -w, bar,
+                            v->next->carried);
+        imp__connection_bar(x, next, &met, bar);
     }
     imp__velocity_bar(s->moves, &next->x, &next->bar, s->theta_bar);
 }
@@ -246,6 +269,12 @@ bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
         sky_seen_bar(&s, adjoint);
         return true;
     }
+    const struct imp_vertex *first = walk->first;
+    if (is_emitted(first))
+        s.wo_bar += table_bar(&s, tracer->scene->emitters[first->d.met.emitter],
+                              &s.at[0].x, imp__normalize(walk->ray.o - s.at[0].x.p),
+                              imp__sum_used(adjoint * first->e, tracer->scene->lanes),
+                              first->carried);
     imp__camera_bar(moves, walk->ray.o, &s.at[0], s.wo_bar, theta_bar);
     return true;
 }

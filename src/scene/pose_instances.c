@@ -1,0 +1,83 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Instances of the scene as objects that move (pose.h): with all that is in their groups. */
+#include "base/arguments.h"
+#include "instances.h"
+#include "kind/build.h"
+#include "pose.h"
+#include <stdio.h>
+#include <string.h>
+
+int imp__pose_instances(const struct imp_scene *scene)
+{
+    return scene->world ? scene->world->n_instances : 0;
+}
+
+int imp__pose_instances_listed(const struct imp_scene *scene)
+{
+    const int n = imp__pose_instances(scene);
+    return n <= IMP_POSE_INSTANCES_LISTED ? n : 0;
+}
+
+void imp__instance_name(const struct imp_scene *scene, int k, char out[200])
+{
+    const char *id = scene->world->instance[k].name;
+    if (id) snprintf(out, 200, "%s", id);
+    else snprintf(out, 200, "instance%d", k);
+}
+
+const char *imp__instance_why(const struct imp_scene *scene, int k,
+                              enum imp_pose_kind kind)
+{
+    const struct imp_instance *p = &scene->world->instance[k];
+    if (kind != IMP_POSE_RIGID && kind != IMP_POSE_SCALE) return "it is an instance";
+    if (p->motion) return "it has a motion of its own (to_world_end)";
+    if (scene->n_media + scene->n_bodies > 0 || scene->priorities)
+        return "there are media";
+    if (kind == IMP_POSE_SCALE && p->raised)
+        return "the heights of its bump maps are made for its size";
+    return NULL;
+}
+
+bool imp__instance_find(const struct imp_scene *scene, const char *name,
+                        struct imp_pose *p)
+{
+    char own[200];
+    for (int k = 0; k < imp__pose_instances(scene); k++) {
+        imp__instance_name(scene, k, own);
+        if (strcmp(own, name) != 0) continue;
+        const struct imp_instance *there = &scene->world->instance[k];
+        p->instance = k;
+        p->centre =
+            imp__map_point(&there->to_world, (there->group->lo + there->group->hi) * 0.5);
+        p->rest_size = sizeof *there;
+        return true;
+    }
+    return false;
+}
+
+bool imp__pose_box(const struct imp_pose *p, imp_v3 *lo, imp_v3 *hi)
+{
+    if (p->instance >= 0)
+        imp__instance_box(&p->scene->world->instance[p->instance], lo, hi);
+    if (p->shape >= 0) {
+        *lo = p->scene->shapes[p->shape]->lo;
+        *hi = p->scene->shapes[p->shape]->hi;
+    }
+    return p->instance >= 0 || p->shape >= 0;
+}
+
+enum imp_status imp__instance_apply(const struct imp_pose *p, const struct imp_map *by)
+{
+    struct imp_instance *there = &p->scene->world->instance[p->instance];
+    const struct imp_instance *rest = p->object->rest;
+    imp_v3 lo, hi;
+    there->to_world = imp__map_product(by, &rest->to_world);
+    bool fits = imp__map_inverse(&there->to_world, &there->to_local);
+    imp__instance_box(there, &lo, &hi);
+    for (int k = 0; k < 3; k++) fits &= lo[k] > -IMP_REACH_MAX && hi[k] < IMP_REACH_MAX;
+    return fits ? IMP_OK
+                : imp__error(p->scene->ctx, IMP_E_NUMERIC,
+                             "%s moves the instance beyond what numbers hold",
+                             p->scene->params[p->param].info.name);
+}
