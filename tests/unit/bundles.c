@@ -64,7 +64,7 @@ static bool same(double a, double b)
 static void compare(const char *name, enum imp_color_mode mode, int lanes,
                     const char *integrator, const char *sensor, const char *rest)
 {
-    static char xml[16384];
+    static char xml[40000];
     snprintf(xml, sizeof xml,
              "<scene version='3.0.0'>%s%s<sensor type='%s<film type='hdrfilm'><integer "
              "name='width' value='6'/><integer name='height' value='6'/><rfilter "
@@ -88,10 +88,9 @@ static void compare(const char *name, enum imp_color_mode mode, int lanes,
     for (int p = 0; p < SIDE * SIDE; p++) xy[p][0] = p % SIDE, xy[p][1] = p / SIDE;
     for (int k = 0; k < SAMPLES; k++) samples[k] = imp__set_number(4, SAMPLES, k);
     struct imp_bundle b;
-    struct imp_bin bin;
     const bool fits = imp__bundle_fits(&tracer);
     for (int k = 0; k < scene->n_shapes; k++)
-        binned += imp__lanes_fit(&tracer) && imp__shape_bin(&tracer, k, &bin);
+        binned += imp__lanes_fit(&tracer) && imp__shape_in_lanes(scene, k);
     if (fits && imp__bundle_trace(&tracer, &arena, SIDE * SIDE, (const int(*)[2])xy,
                                   SAMPLES, samples, &b))
         for (int k = 0; k < b.n; k++) {
@@ -244,6 +243,24 @@ static void scenes(void)
     strcat(balls, SKY WALL("0", "-1", "0", "x", "-90", DIFFUSE(".5,.6,.7"))
                       LAMP("0", "0", ".5"));
     compare("twelve balls", IMP_RGB, 13, PATH(DEPTH("5")), CAMERA, balls);
+    /* A hundred tiles of three materials: few rays meet each. */
+    static char tiles[32768];
+    snprintf(
+        tiles, sizeof tiles, "%s",
+        "<bsdf type='diffuse' id='a'><rgb name='reflectance' value='.9,.5,.2'/></bsdf>"
+        "<bsdf type='roughconductor' id='b'><string name='distribution' "
+        "value='ggx'/><float name='alpha' value='.3'/></bsdf>"
+        "<bsdf type='diffuse' id='c'><texture type='checkerboard' "
+        "name='reflectance'/></bsdf>" SKY LAMP("0", "0", ".5"));
+    for (int k = 0; k < 100; k++)
+        snprintf(
+            tiles + strlen(tiles), sizeof tiles - strlen(tiles),
+            "<shape type='%s'><transform name='to_world'><scale value='.18'/><rotate "
+            "y='1' angle='%d'/><translate x='%g' y='%g'/></transform><ref "
+            "id='%c'/></shape>",
+            k % 7 == 0 ? "cube" : "rectangle", k % 11 * 5, k % 10 * .4 - 1.8,
+            k / 10 * .4 - 1.8, 'a' + k % 3);
+    compare("tiles", IMP_RGB, 100, PATH(DEPTH("5")), CAMERA, tiles);
     compare("instances", IMP_RGB, 0, PATH(DEPTH("5")), CAMERA,
             "<shape type='shapegroup' id='g'>" CUBE(
                 "0", "0",

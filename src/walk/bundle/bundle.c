@@ -2,6 +2,7 @@
  *
  * A bundle of walks from its pixels to its radiance: rays of the sensor; segment after segment
  * hits, vertices and shadow rays; the fold. */
+#include "by_shape.h"
 #include "lanes_light.h"
 #include "scene/ray_columns.h"
 #include "walk/path/first_segment.h"
@@ -117,87 +118,6 @@ static void unlit(struct imp_bundle_values *values, const struct imp_shadows *sh
         if (hidden[k]) imp__column_put(values->b, shadows->at[k], (imp_v3){0});
 }
 
-/* Rays by the shape that they meet. */
-struct by_shape {
-    bool lanes, sky; /* vertices may be made, and the sky met, in lanes */
-    int32_t *count;  /* [shapes] 0 between depths */
-    int32_t *shape;  /* [rays] those that are met, in this order */
-    int32_t *order;  /* [rays] rays of the first shape, then of the second, ... */
-    int n;
-};
-
-static bool by_shape_create(const struct imp_tracer *tracer, struct imp_arena *arena,
-                            size_t n, struct by_shape *s)
-{
-    const size_t shapes = (size_t)tracer->scene->n_shapes;
-    s->lanes = imp__lanes_fit(tracer);
-    s->sky = s->lanes && imp__lanes_sky_fits(tracer);
-    s->count = imp__arena_array(arena, shapes, sizeof *s->count);
-    return s->count && TAKE(s->shape) && TAKE(s->order);
-}
-
-/* Sorts the rays that meet something; the sky goes to the others. */
-static void sort(struct imp_depth *d, double *const beyond[3], struct by_shape *s)
-{
-    int missed = 0;
-    s->n = 0;
-    for (int i = 0; i < d->rays->ray.n; i++) {
-        const int shape = d->hits->shape[i];
-        if (shape < 0) s->order[missed++] = i;
-        else if (s->count[shape]++ == 0) s->shape[s->n++] = shape;
-    }
-    if (s->sky) imp__lanes_sky_meet(d, s->order, missed, beyond);
-    else if (d->bundle->tracer->scene->n_environments > 0)
-        for (int k = 0; k < missed; k++) imp__sky_alone(d, s->order[k], beyond);
-    int from = 0;
-    for (int k = 0; k < s->n; k++) {
-        const int n = s->count[s->shape[k]];
-        s->count[s->shape[k]] = from;
-        from += n;
-    }
-    for (int i = 0; i < d->rays->ray.n; i++)
-        if (d->hits->shape[i] >= 0) s->order[s->count[d->hits->shape[i]]++] = i;
-}
-
-/* Fewer vertices on a shape are not worth lanes. */
-enum { FEW = IMP_LANES / 2 };
-
-/* One by one, as they come: shapes of groups have numbers of their own. */
-static void vertices_alone(struct imp_depth *d, double *const beyond[3])
-{
-    const bool sky = d->bundle->tracer->scene->n_environments > 0;
-    d->values->n = 0;
-    for (int i = 0; i < d->rays->ray.n; i++)
-        if (d->hits->shape[i] >= 0) imp__vertex_alone(d, i, d->values->n++);
-        else if (sky) imp__sky_alone(d, i, beyond);
-}
-
-static void vertices(struct imp_depth *d, double *const beyond[3], struct by_shape *s)
-{
-    if (!s->lanes) {
-        vertices_alone(d, beyond);
-        return;
-    }
-    const int max_depth = d->bundle->tracer->integrator->max_depth;
-    const bool last = max_depth >= 0 && d->depth + 1 >= max_depth;
-    struct imp_bin bin;
-    sort(d, beyond, s);
-    d->values->n = 0;
-    for (int k = 0, from = 0; k < s->n; k++) {
-        const int shape = s->shape[k], n = s->count[shape] - from;
-        const int32_t *order = s->order + from;
-        from += n;
-        const bool lanes = d->depth < IMP_WALK_MAX && (last || n >= FEW) &&
-                           imp__shape_bin(d->bundle->tracer, shape, &bin);
-        if (lanes && last) continue; /* nothing is met there, and nothing leaves */
-        if (lanes) imp__vertices_in_lanes(d, &bin, order, n, d->values->n);
-        else
-            for (int i = 0; i < n; i++) imp__vertex_alone(d, order[i], d->values->n + i);
-        d->values->n += n;
-    }
-    for (int k = 0; k < s->n; k++) s->count[s->shape[k]] = 0;
-}
-
 static void fold(const struct imp_bundle_values *v, double *const beyond[3])
 {
     for (int c = 0; c < 3; c++)
@@ -225,7 +145,7 @@ struct room {
     struct imp_flights flights[2];
     struct imp_hit_columns hits;
     struct imp_shadows shadows;
-    struct by_shape by_shape;
+    struct imp_by_shape by_shape;
     bool *hidden;
     struct imp_lone lone;
 };
@@ -239,7 +159,7 @@ static bool room_create(const struct imp_tracer *tracer, struct imp_arena *arena
         !imp__flights_create(arena, n, left, &r->flights[1]) ||
         !imp__hits_create(arena, n, &r->hits) ||
         !imp__shadows_create(arena, n, &r->shadows) ||
-        !by_shape_create(tracer, arena, n, &r->by_shape) || !TAKE(r->hidden))
+        !imp__by_shape_create(tracer, arena, n, &r->by_shape) || !TAKE(r->hidden))
         return false;
     if (!instant && (!TAKE(r->flights[0].ray.time) || !TAKE(r->flights[1].ray.time) ||
                      !TAKE(r->shadows.ray.time)))
@@ -348,7 +268,7 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
         if (d.depth == 0 && tracer->integrator->hide_emitters)
             imp__meet_alone(&d, &r.hits);
         else imp__intersect_columns(tracer->scene, &d.rays->ray, &r.hits);
-        vertices(&d, last ? last->values.beyond : b->L, &r.by_shape);
+        imp__vertices(&d, last ? last->values.beyond : b->L, &r.by_shape);
         see(&d, &r);
         r.flights[0].ray.near = NULL;
         last = here;

@@ -40,11 +40,11 @@ void imp__meet_alone(struct imp_depth *d, const struct imp_hit_columns *hits);
 void imp__meter_vertex(struct imp_depth *d, const struct imp_walk *begun, int walk,
                        double *weight);
 
-/* Vertices on one shape, of a material with a form in lanes (lanes_vertex.c). */
+/* Vertices of a material with a form in lanes (lanes_vertex.c), on one shape or several. */
 struct imp_bin {
-    const struct imp_shape *shape;
+    const struct imp_shape *shape; /* the one, or one of them */
     const struct imp_bsdf *bsdf;
-    const struct imp_shape_lanes *surface; /* NULL: point by point */
+    const struct imp_shape_lanes *surface; /* of the one; NULL: point by point */
     const struct imp_bsdf_lanes *kernel;
     bool plain; /* its inputs are the constants `in` */
     struct imp_wide_color in[IMP_INPUTS_MAX];
@@ -52,7 +52,9 @@ struct imp_bin {
 /* Walks of this tracer may have vertices in lanes. */
 bool imp__lanes_fit(const struct imp_tracer *tracer);
 /* False: vertices on this shape are made one by one. */
-bool imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *bin);
+bool imp__shape_in_lanes(const struct imp_scene *scene, int shape);
+/* Those of the others. */
+void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *bin);
 /* The vertices of the rays order[n], whose next ones are not the last of their walks, at places
  * `at` and on. */
 void imp__vertices_in_lanes(struct imp_depth *d, const struct imp_bin *bin,

@@ -18,34 +18,42 @@ bool imp__lanes_fit(const struct imp_tracer *t)
            t->scene->n_groups == 0;
 }
 
-bool imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *bin)
+bool imp__shape_in_lanes(const struct imp_scene *scene, int shape)
 {
-    const struct imp_scene *scene = tracer->scene;
     const struct imp_shape *s = scene->shapes[shape];
     const struct imp_bsdf *b = imp__shape_bsdf(scene, s);
-    if (s->emitter >= 0 || s->body || b->shaped || b->flags != IMP_BSDF_SMOOTH ||
-        b->n_in > IMP_INPUTS_MAX)
-        return false;
-    *bin = (struct imp_bin){.shape = s,
-                            .bsdf = b,
-                            .surface = imp__shape_lanes(s),
-                            .kernel = imp__bsdf_lanes(b),
-                            .plain = true};
-    if (!bin->kernel) return false;
+    return s->emitter < 0 && !s->body && !b->shaped && b->flags == IMP_BSDF_SMOOTH &&
+           b->n_in <= IMP_INPUTS_MAX && imp__bsdf_lanes(b);
+}
+
+void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *bin)
+{
+    const struct imp_shape *s = tracer->scene->shapes[shape];
+    const struct imp_bsdf *b = imp__shape_bsdf(tracer->scene, s);
+    bin->shape = s;
+    bin->bsdf = b;
+    bin->surface = imp__shape_lanes(s);
+    bin->kernel = imp__bsdf_lanes(b);
+    bin->plain = true;
     for (int j = 0; j < b->n_in; j++) bin->plain &= b->input[j]->plain;
     for (int j = 0; bin->plain && j < b->n_in; j++)
         bin->in[j] = imp__wide_color(b->input[j]->value);
-    return true;
 }
 
 /* ---- Where it is ------------------------------------------------------------------------- */
 
-/* By the shape's own function. */
-static void surface_alone(const struct imp_shape *s, const struct imp_wide_hits *h,
+static const struct imp_shape *shape_of(const struct imp_depth *d, int ray)
+{
+    return d->bundle->tracer->scene->shapes[d->hits->shape[ray]];
+}
+
+/* By the shapes' own functions. */
+static void surface_alone(const struct imp_depth *d, const struct imp_wide_hits *h,
                           struct imp_wide_surface *out)
 {
     for (int k = 0; k < IMP_LANES; k++) {
         const int i = h->at[k];
+        const struct imp_shape *s = shape_of(d, i);
         const struct imp_hit hit = {.shape = s->index,
                                     .prim = h->prim[i],
                                     .t = h->t[i],
@@ -65,16 +73,16 @@ static void surface_alone(const struct imp_shape *s, const struct imp_wide_hits 
 }
 
 /* Inputs that are textures, point by point. */
-static void inputs_alone(const struct imp_bin *bin, const struct imp_wide_hits *h,
-                         const struct imp_wide_surface *x, struct imp_wide_color *in)
+static void inputs_alone(const struct imp_depth *d, const struct imp_bsdf *b,
+                         const struct imp_wide_hits *h, const struct imp_wide_surface *x,
+                         struct imp_wide_color *in)
 {
-    const struct imp_bsdf *b = bin->bsdf;
     for (int k = 0; k < IMP_LANES; k++) {
         imp_spec own[IMP_INPUTS_MAX];
         const struct imp_texcoord at = {
             .uv = {imp__decide1(x->uv[0][k]), imp__decide1(x->uv[1][k])},
             .p = imp__decide(imp__wide3_lane(&x->p, k)),
-            .shape = bin->shape,
+            .shape = shape_of(d, h->at[k]),
             .prim = h->prim[h->at[k]]};
         imp__inputs_eval(b->input, b->n_in, &at, own);
         for (int j = 0; j < b->n_in; j++)
@@ -269,14 +277,14 @@ static inline void work(struct imp_depth *d, const struct imp_bin *bin,
     v.numbers =
         imp__wide_block(b->tracer->points, b->set, b->index, walk, imp__block(d->depth));
     if (bin->surface) bin->surface->surface(bin->shape, &hits, !bin->plain, &v.x);
-    else surface_alone(bin->shape, &hits, &v.x);
+    else surface_alone(d, &hits, &v.x);
     v.wo_drawn = imp__into_wide_frame(
         &v.x.frame, imp__wide3_opposite(imp__wide3_gather(d->rays->ray.d, order)));
     v.wo = imp__wide3_decide(v.wo_drawn);
     v.in = bin->in;
     if (imp_unlikely(d->next->left != NULL)) places(&v);
     if (!bin->plain) {
-        inputs_alone(bin, &hits, &v.x, in);
+        inputs_alone(d, bin->bsdf, &hits, &v.x, in);
         v.in = in;
     }
     if (b->tracer->integrator->lights) light(d, bin, &v, &brings);

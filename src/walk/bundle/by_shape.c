@@ -1,0 +1,135 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Vertices of a depth in an order that fills lanes: those on one shape together; those on shapes
+ * that few rays meet by their materials; the rest, and what has no form in lanes, one by one. */
+#include "by_shape.h"
+#include "lanes_light.h"
+
+/* Fewer vertices are not worth lanes. */
+enum { FEW = IMP_LANES / 2 };
+
+#define TAKE(p) ((p) = imp__arena_take(arena, n + IMP_COLUMN_SLACK, sizeof *(p)))
+
+bool imp__by_shape_create(const struct imp_tracer *tracer, struct imp_arena *arena,
+                          size_t n, struct imp_by_shape *s)
+{
+    const struct imp_scene *scene = tracer->scene;
+    s->lanes = imp__lanes_fit(tracer);
+    s->sky = s->lanes && imp__lanes_sky_fits(tracer);
+    s->count = imp__arena_array(arena, (size_t)scene->n_shapes, sizeof *s->count);
+    s->materials =
+        imp__arena_array(arena, (size_t)scene->n_bsdfs + 2, sizeof *s->materials);
+    return s->count && s->materials && TAKE(s->shape) && TAKE(s->order) && TAKE(s->few) &&
+           TAKE(s->by_material);
+}
+
+/* Sorts the rays that meet something; the sky goes to the others. */
+static void sort(struct imp_depth *d, double *const beyond[3], struct imp_by_shape *s)
+{
+    int missed = 0;
+    s->n = 0;
+    for (int i = 0; i < d->rays->ray.n; i++) {
+        const int shape = d->hits->shape[i];
+        if (shape < 0) s->order[missed++] = i;
+        else if (s->count[shape]++ == 0) s->shape[s->n++] = shape;
+    }
+    if (s->sky) imp__lanes_sky_meet(d, s->order, missed, beyond);
+    else if (d->bundle->tracer->scene->n_environments > 0)
+        for (int k = 0; k < missed; k++) imp__sky_alone(d, s->order[k], beyond);
+    int from = 0;
+    for (int k = 0; k < s->n; k++) {
+        const int n = s->count[s->shape[k]];
+        s->count[s->shape[k]] = from;
+        from += n;
+    }
+    for (int i = 0; i < d->rays->ray.n; i++)
+        if (d->hits->shape[i] >= 0) s->order[s->count[d->hits->shape[i]]++] = i;
+}
+
+static void alone(struct imp_depth *d, const int32_t *order, int n)
+{
+    for (int i = 0; i < n; i++) imp__vertex_alone(d, order[i], d->values->n++);
+}
+
+static void in_lanes(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order,
+                     int n)
+{
+    imp__vertices_in_lanes(d, bin, order, n, d->values->n);
+    d->values->n += n;
+}
+
+/* As they come: shapes of groups have numbers of their own. */
+static void all_alone(struct imp_depth *d, double *const beyond[3])
+{
+    const bool sky = d->bundle->tracer->scene->n_environments > 0;
+    for (int32_t i = 0; i < d->rays->ray.n; i++)
+        if (d->hits->shape[i] >= 0) alone(d, &i, 1);
+        else if (sky) imp__sky_alone(d, i, beyond);
+}
+
+static int material_of(const struct imp_depth *d, int ray)
+{
+    const struct imp_scene *scene = d->bundle->tracer->scene;
+    return scene->shapes[d->hits->shape[ray]]->bsdf + 2;
+}
+
+/* The n rays of s->few, on shapes with a form in lanes, by their materials. */
+static void few_vertices(struct imp_depth *d, struct imp_by_shape *s, int n)
+{
+    const struct imp_tracer *tracer = d->bundle->tracer;
+    const int materials = tracer->scene->n_bsdfs + 2;
+    for (int i = 0; i < n; i++) s->materials[material_of(d, s->few[i])]++;
+    for (int m = 0, from = 0; m < materials; m++) {
+        const int count = s->materials[m];
+        s->materials[m] = from;
+        from += count;
+    }
+    for (int i = 0; i < n; i++)
+        s->by_material[s->materials[material_of(d, s->few[i])]++] = s->few[i];
+    for (int m = 0, from = 0; m < materials; m++) {
+        const int count = s->materials[m] - from;
+        const int32_t *order = s->by_material + from;
+        from += count;
+        s->materials[m] = 0;
+        struct imp_bin bin;
+        if (count < FEW) {
+            alone(d, order, count);
+            continue;
+        }
+        imp__shape_bin(tracer, d->hits->shape[order[0]], &bin);
+        bin.surface = NULL; /* they are on several shapes */
+        in_lanes(d, &bin, order, count);
+    }
+}
+
+void imp__vertices(struct imp_depth *d, double *const beyond[3], struct imp_by_shape *s)
+{
+    const struct imp_tracer *tracer = d->bundle->tracer;
+    d->values->n = 0;
+    if (!s->lanes || d->depth >= IMP_WALK_MAX) {
+        all_alone(d, beyond);
+        return;
+    }
+    const int max_depth = tracer->integrator->max_depth;
+    const bool last = max_depth >= 0 && d->depth + 1 >= max_depth;
+    int few = 0;
+    sort(d, beyond, s);
+    for (int k = 0, from = 0; k < s->n; k++) {
+        const int shape = s->shape[k], n = s->count[shape] - from;
+        const int32_t *order = s->order + from;
+        struct imp_bin bin;
+        from += n;
+        s->count[shape] = 0;
+        if (!imp__shape_in_lanes(tracer->scene, shape)) {
+            alone(d, order, n);
+        } else if (last) {
+            continue; /* nothing is met there, and nothing leaves */
+        } else if (n >= FEW) {
+            imp__shape_bin(tracer, shape, &bin);
+            in_lanes(d, &bin, order, n);
+        } else {
+            for (int i = 0; i < n; i++) s->few[few++] = order[i];
+        }
+    }
+    if (few > 0) few_vertices(d, s, few);
+}

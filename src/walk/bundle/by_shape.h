@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The vertices of a depth, by the shapes that rays meet. */
+#ifndef IMP_WALK_BUNDLE_BY_SHAPE_H
+#define IMP_WALK_BUNDLE_BY_SHAPE_H
+
+#include "depth.h"
+
+/* Rays in the order of what they meet: of shapes, and of materials. Counts are 0 between
+ * depths. */
+struct imp_by_shape {
+    bool lanes, sky; /* vertices may be made, and the sky met, in lanes */
+    int32_t *count;  /* [shapes] */
+    int32_t *shape;  /* [rays] those that are met, in this order */
+    int32_t *order;  /* [rays] rays of the first shape, then of the second, ... */
+    int n;           /* shapes that are met */
+    int32_t *few;    /* [rays] those on shapes that few rays meet */
+    int32_t *by_material;
+    int32_t *materials; /* [materials] counts */
+};
+/* Room for n rays. False: no memory. */
+bool imp__by_shape_create(const struct imp_tracer *tracer, struct imp_arena *arena,
+                          size_t n, struct imp_by_shape *out);
+
+/* The vertices that d->rays lead to, and the sky, whose value goes to `beyond` of the vertices
+ * before. */
+void imp__vertices(struct imp_depth *d, double *const beyond[3], struct imp_by_shape *s);
+
+#endif
