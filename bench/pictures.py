@@ -90,6 +90,7 @@ def main():
         cornell = os.path.join(SCENES, 'cornell.xml')
         jobs = {
             'Cornell box': ['render', cornell, '-D', 'res=128', *picture],
+            'Cornell box, spectra': ['render', cornell, '-D', 'res=96', '-m', 'spectral', *picture],
             'textured': ['render', os.path.join(SCENES, 'textured.xml'), *picture],
             'open scene': ['render', open_scene(folder), *picture],
             'glass and plastic': ['render', glass_scene(folder), *picture],

@@ -12,13 +12,14 @@
 #include "math/wide.h"
 #include <importon/kinds.h>
 
-/* Colours: r, g, b. */
+/* Colours: r, g, b, or four wavelengths. */
 struct imp_wide_color {
-    imp_wide c[3];
+    imp_wide c[4];
 };
 static inline struct imp_wide_color imp__wide_color(imp_spec s)
 {
-    return (struct imp_wide_color){{imp__wide(s[0]), imp__wide(s[1]), imp__wide(s[2])}};
+    return (struct imp_wide_color){
+        {imp__wide(s[0]), imp__wide(s[1]), imp__wide(s[2]), imp__wide(s[3])}};
 }
 
 /* ---- Shapes ------------------------------------------------------------------------------ */
@@ -63,9 +64,9 @@ struct imp_bsdf_lanes {
     /* imp_bsdf_ops.sample, with a smooth lobe; u as there. Where it is true. */
     imp_wide_truth (*sample)(const struct imp_bsdf *b, const struct imp_wide_color *in,
                              const imp_wide3 *wo, const imp_wide u[3], imp_wide3 *wi);
-    /* imp_bsdf_ops.pdf_eval of smooth lobes. */
+    /* imp_bsdf_ops.pdf_eval of smooth lobes, of the first `colors` of c. */
     imp_wide (*pdf_eval)(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                         const imp_wide3 *wo, const imp_wide3 *wi,
+                         const imp_wide3 *wo, const imp_wide3 *wi, int colors,
                          struct imp_wide_color *f);
 };
 /* NULL: this material has none. Those that have one have neither an index ratio nor emission, and

@@ -102,6 +102,8 @@ static void compare(const char *name, enum imp_color_mode mode, int lanes,
                      one.valid != other.valid || one.dropped != other.dropped ||
                      !same(one.time, other.time);
             for (int c = 0; c < 3; c++) wrong += !same(one.L[c], other.L[c]);
+            for (int c = 0; one.waves && c < 4; c++)
+                wrong += !same(one.values[c], other.values[c]);
             lit += one.L[0] > 0;
             imp__arena_rewind(&alone, (struct imp_arena_mark){0});
         }
@@ -134,6 +136,20 @@ static void boxes(void)
         compare(name, IMP_RGB, 6, integrator, CAMERA,
                 ROOM SKY LAMP("0", "0", "1.2") CUBE("-.6", "-1.2", DIFFUSE(".9,.2,0")));
     }
+}
+
+/* Walks that carry four wavelengths. */
+static void spectra(void)
+{
+    compare("a room in spectra", IMP_SPECTRAL, 7, PATH(""), CAMERA,
+            ROOM SKY LAMP("0", "0", ".5") CUBE("-.6", "-1.2", DIFFUSE(".9,.4,.1"))
+                BALL("-.7", ".4", GOLD(ALPHA("alpha", ".3"))));
+    compare("independent walks in spectra", IMP_SPECTRAL, 7, PATH(DEPTH("4")), CAMERA,
+            ROOM LAMP("0", "0", ".5") LAMP("1", "0", ".2")
+                BALL("-.7", ".4", "<bsdf type='dielectric'/>")
+                    CUBE("-.6", "-1.2", CHECKERS) BALL(".8", ".8", DIFFUSE(".1,.2,.9")));
+    compare("a meter in spectra", IMP_SPECTRAL, 6, PATH(DEPTH("5")), "irradiancemeter'>",
+            "");
 }
 
 static void materials(void)
@@ -322,6 +338,7 @@ int main(void)
 {
     ctx = test_context(1);
     boxes();
+    spectra();
     materials();
     lights();
     sensors();

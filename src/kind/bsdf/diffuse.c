@@ -80,12 +80,12 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
     return imp__lambert_samples(u, wo, wi);
 }
 static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                               const imp_wide3 *wo, const imp_wide3 *wi,
+                               const imp_wide3 *wo, const imp_wide3 *wi, int colors,
                                struct imp_wide_color *f)
 {
     (void)b;
     const imp_wide p = imp__lamberts(wo, wi);
-    for (int c = 0; c < 3; c++) f->c[c] = in[RHO].c[c] * p;
+    for (int c = 0; c < colors; c++) f->c[c] = in[RHO].c[c] * p;
     return p;
 }
 

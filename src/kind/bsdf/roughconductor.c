@@ -167,7 +167,7 @@ static void roughness_lanes(const struct imp_bsdf *b, const struct imp_wide_colo
 }
 
 static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                               const imp_wide3 *wo, const imp_wide3 *wi,
+                               const imp_wide3 *wo, const imp_wide3 *wi, int colors,
                                struct imp_wide_color *f)
 {
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
@@ -179,7 +179,7 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_c
                    G = IMP_WIDE_OF(imp__ggx_g1)(au, av, *wi) * Go;
     const imp_wide vm = imp__wide3_inner(*wo, h), by = D * G / (4 * wo->z),
                    c = imp__wide_lesser(vm, one);
-    for (int k = 0; k < 3; k++)
+    for (int k = 0; k < colors; k++)
         f->c[k] = IMP_WIDE_OF(imp__conductor)(c, in[ETA].c[k], in[K].c[k]) *
                   (in[TINT].c[k] * by);
     const imp_wide drawn = imp__wide_choose(vm > zero, D * Go * vm / wo->z, zero);

@@ -223,7 +223,7 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
 }
 
 static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                               const imp_wide3 *wo, const imp_wide3 *wi,
+                               const imp_wide3 *wo, const imp_wide3 *wi, int colors,
                                struct imp_wide_color *f)
 {
     const imp_wide_truth back = wo->z < imp__wide(0);
@@ -234,10 +234,11 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_c
         struct imp_wide_color own;
         if (!is_asked(b, k, back)) continue;
         const imp_wide p =
-            imp__bsdf_lanes(c)->pdf_eval(c, in + b->child_in[k], &o, &i, &own);
+            imp__bsdf_lanes(c)->pdf_eval(c, in + b->child_in[k], &o, &i, colors, &own);
         const imp_wide_truth here = k > 0 ? back : ~(imp_wide_truth){0};
         pdf = imp__wide_choose(here, p, pdf);
-        for (int j = 0; j < 3; j++) f->c[j] = imp__wide_choose(here, own.c[j], f->c[j]);
+        for (int j = 0; j < colors; j++)
+            f->c[j] = imp__wide_choose(here, own.c[j], f->c[j]);
     }
     return pdf;
 }

@@ -43,12 +43,16 @@ static void take(struct imp_depth *d, int i)
     w->key.state = w->point.set = b->set[walk]; /* one of the two is used */
     w->point.index = b->index[walk];
     w->time = b->time[walk];
+    if (imp_unlikely(b->waves != NULL)) {
+        w->waves = b->waves[walk];
+        s->at.carried = &w->waves->carried;
+    }
     s->depth = d->depth;
     s->o = imp__column_v3(f->ray.o, i);
     s->d = imp__column_v3(f->ray.d, i);
     s->from = imp__column_v3(f->from, i);
     s->pdf = f->pdf[i];
-    s->beta = imp__column_v3(f->beta, i);
+    s->beta = imp__column_color(f->beta, b->colors, i);
     s->eta = f->eta[i];
     if (imp_unlikely(f->left != NULL)) s->left = f->left[i];
 }
@@ -81,7 +85,7 @@ static void ray_add(struct imp_flights *to, const struct imp_step *s, int walk, 
     if (to->ray.time) to->ray.time[n] = s->walk->time;
     imp__column_put(to->from, n, s->from);
     to->pdf[n] = s->pdf;
-    imp__column_put(to->beta, n, s->beta);
+    imp__color_put(to->beta, s->walk->waves ? 4 : 3, n, s->beta);
     to->eta[n] = s->eta;
     if (imp_unlikely(to->left != NULL)) to->left[n] = s->left;
     to->walk[n] = walk;
@@ -94,11 +98,12 @@ static void vertex_give_back(struct imp_depth *d, const struct imp_vertex *v,
 {
     const struct imp_step *s = &d->lone->step;
     const imp_spec none = {0};
+    const int colors = d->bundle->colors;
     d->values->up[at] = up;
-    imp__column_put(d->values->e, at, v ? v->e : none);
-    imp__column_put(d->values->b, at, v ? v->b : none);
-    imp__column_put(d->values->w, at, v ? v->w : none);
-    imp__column_put(d->values->beyond, at, none);
+    imp__color_put(d->values->e, colors, at, v ? v->e : none);
+    imp__color_put(d->values->b, colors, at, v ? v->b : none);
+    imp__color_put(d->values->w, colors, at, v ? v->w : none);
+    imp__color_put(d->values->beyond, colors, at, none);
     if (d->lone->shadow.wanted)
         shadow_add(d->shadows, &d->lone->shadow, s->walk->time, at);
     if (goes_on) ray_add(d->next, s, walk, at);
@@ -153,6 +158,7 @@ void imp__meter_vertex(struct imp_depth *d, const struct imp_walk *begun, int wa
     struct imp_surface surface;
     struct imp_frame frame;
     *w = *begun;
+    s->at.carried = w->waves ? &w->waves->carried : NULL;
     s->o = s->from = w->ray.o;
     s->d = w->ray.d;
     s->pdf = 0;
@@ -168,12 +174,13 @@ void imp__meter_vertex(struct imp_depth *d, const struct imp_walk *begun, int wa
     imp__arena_rewind(s->arena, mark);
 }
 
-void imp__sky_alone(struct imp_depth *d, int i, double *const beyond[3])
+void imp__sky_alone(struct imp_depth *d, int i, double *const beyond[4])
 {
     const struct imp_arena_mark mark = imp__arena_mark(d->lone->step.arena);
     take(d, i);
     imp__sky_meet(&d->lone->step);
-    imp__column_put(beyond, d->rays->up[i], imp__walk_fold(&d->lone->walk));
+    imp__color_put(beyond, d->bundle->colors, d->rays->up[i],
+                   imp__walk_fold(&d->lone->walk));
     give_back(d, d->rays->walk[i]);
     imp__arena_rewind(d->lone->step.arena, mark);
 }

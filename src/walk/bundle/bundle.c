@@ -8,13 +8,22 @@
 #include "walk/path/first_segment.h"
 #include <string.h>
 
+/* Is there a material whose lobes depend on the wavelength? Walks carry more there. */
+static bool is_shaped(const struct imp_scene *scene)
+{
+    for (int k = 0; k < scene->n_bsdfs; k++)
+        if (scene->bsdfs[k]->shaped) return true;
+    return false;
+}
+
 bool imp__bundle_fits(const struct imp_tracer *t)
 {
     const struct imp_walk_integrator *w = t->integrator;
-    return t->value_only && !t->active && !t->kept && !t->guide && !t->wavelengths &&
-           !t->mixing && t->split <= 1 && !w->mixes && !w->both &&
-           !(w->hide_emitters && t->sensor->shape) && !w->from_lights && !w->first_hit &&
-           !t->scene->priorities && imp__segment_first(t) == &imp__straight_ops;
+    return t->value_only && !t->active && !t->kept && !t->guide &&
+           (!t->wavelengths || !is_shaped(t->scene)) && !t->mixing && t->split <= 1 &&
+           !w->mixes && !w->both && !(w->hide_emitters && t->sensor->shape) &&
+           !w->from_lights && !w->first_hit && !t->scene->priorities &&
+           imp__segment_first(t) == &imp__straight_ops;
 }
 
 /* ---- The beginning ----------------------------------------------------------------------- */
@@ -25,44 +34,59 @@ static bool bundle_create(struct imp_arena *arena, size_t n, struct imp_bundle *
 {
     return TAKE(b->px) && TAKE(b->py) && TAKE(b->time) && TAKE(b->set) &&
            TAKE(b->index) && TAKE(b->L[0]) && TAKE(b->L[1]) && TAKE(b->L[2]) &&
-           TAKE(b->valid) && TAKE(b->dropped);
+           TAKE(b->L[3]) && (b->colors == 3 || TAKE(b->waves)) && TAKE(b->valid) &&
+           TAKE(b->dropped);
 }
 
 /* What walk k has from its ray alone. */
 static inline void ray_put(struct imp_bundle *b, int k, struct imp_flights *rays)
 {
     rays->pdf[k] = 0;
-    imp__column_put(rays->beta, k, imp__spec(1));
+    imp__color_put(rays->beta, b->colors, k, imp__spec(1));
     rays->eta[k] = 1;
     rays->walk[k] = rays->up[k] = k;
     if (rays->left) rays->left[k] = (struct imp_light_place){.faces = false};
     b->time[k] = b->tracer->sensor->open;
 }
 
-/* One by one. False: rays have a near end. */
-static bool rays_alone(struct imp_bundle *b, const int (*xy)[2], int n_samples,
-                       const int64_t *samples, struct imp_flights *rays)
+/* A walk before its first segment. False: no memory. */
+static bool begin_alone(struct imp_bundle *b, struct imp_arena *arena, const int at[2],
+                        int64_t sample, int k, struct imp_walk *walk)
 {
-    bool begin = true;
+    double lens[2];
+    imp__walk_begin(b->tracer, at[0], at[1], sample, walk, lens);
+    b->px[k] = walk->px;
+    b->py[k] = walk->py;
+    b->time[k] = walk->time;
+    b->set[k] = b->tracer->points ? walk->point.set : walk->key.state;
+    b->index[k] = walk->point.index;
+    if (imp_likely(!b->waves)) return true;
+    const bool ok =
+        imp__walk_wave(b->tracer, arena, imp__wave_draw(b->tracer, walk, sample), walk);
+    b->waves[k] = walk->waves;
+    return ok;
+}
+
+/* One by one. *begin: none has a near end. False: no memory. */
+static bool rays_alone(struct imp_bundle *b, struct imp_arena *arena, const int (*xy)[2],
+                       int n_samples, const int64_t *samples, struct imp_flights *rays,
+                       bool *begin)
+{
+    *begin = true;
     for (int k = 0; k < b->n; k++) {
-        const int *at = xy[k / n_samples];
         struct imp_walk walk;
-        double lens[2];
-        imp__walk_begin(b->tracer, at[0], at[1], samples[k % n_samples], &walk, lens);
+        if (!begin_alone(b, arena, xy[k / n_samples], samples[k % n_samples], k, &walk))
+            return false;
         ray_put(b, k, rays);
-        b->px[k] = walk.px;
-        b->py[k] = walk.py;
         b->time[k] = walk.time;
-        b->set[k] = b->tracer->points ? walk.point.set : walk.key.state;
-        b->index[k] = walk.point.index;
         imp__column_put(rays->ray.o, k, walk.ray.o);
         imp__column_put(rays->ray.d, k, walk.ray.d);
         rays->ray.near[k] = walk.ray.t_near;
         rays->ray.far[k] = walk.ray.t_far;
         imp__column_put(rays->from, k, walk.ray.o);
-        begin &= walk.ray.t_near == 0;
+        *begin &= walk.ray.t_near == 0;
     }
-    return begin;
+    return true;
 }
 
 /* In lanes, of a sensor whose shutter is open for an instant. */
@@ -111,16 +135,16 @@ static bool rays_in_lanes(struct imp_bundle *b, const struct imp_sensor_lanes *l
 /* ---- A depth ----------------------------------------------------------------------------- */
 
 /* What hidden lights would have brought. */
-static void unlit(struct imp_bundle_values *values, const struct imp_shadows *shadows,
-                  const bool *hidden)
+static void unlit(struct imp_bundle_values *values, int colors,
+                  const struct imp_shadows *shadows, const bool *hidden)
 {
     for (int k = 0; k < shadows->ray.n; k++)
-        if (hidden[k]) imp__column_put(values->b, shadows->at[k], (imp_v3){0});
+        if (hidden[k]) imp__color_put(values->b, colors, shadows->at[k], (imp_spec){0});
 }
 
-static void fold(const struct imp_bundle_values *v, double *const beyond[3])
+static void fold(const struct imp_bundle_values *v, int colors, double *const beyond[4])
 {
-    for (int c = 0; c < 3; c++)
+    for (int c = 0; c < colors; c++)
         for (int i = 0; i < v->n; i++)
             beyond[c][v->up[i]] = v->e[c][i] + v->w[c][i] * v->beyond[c][i] + v->b[c][i];
 }
@@ -132,10 +156,11 @@ struct link {
     struct imp_bundle_values values;
     struct link *before;
 };
-static struct link *link_add(struct imp_arena *arena, size_t n, struct link *before)
+static struct link *link_add(struct imp_arena *arena, size_t n, int colors,
+                             struct link *before)
 {
     struct link *link = imp__arena_take(arena, 1, sizeof *link);
-    if (!link || !imp__bundle_values_create(arena, n, &link->values)) return NULL;
+    if (!link || !imp__bundle_values_create(arena, n, colors, &link->values)) return NULL;
     link->before = before;
     return link;
 }
@@ -155,8 +180,10 @@ static bool room_create(const struct imp_tracer *tracer, struct imp_arena *arena
 {
     const bool left = tracer->integrator->light_tree && tracer->scene->light_tree;
     const bool instant = !(tracer->sensor->close > tracer->sensor->open);
-    if (!imp__flights_create(arena, n, left, &r->flights[0]) ||
-        !imp__flights_create(arena, n, left, &r->flights[1]) ||
+    if (!imp__flights_create(arena, n, tracer->wavelengths ? 4 : 3, left,
+                             &r->flights[0]) ||
+        !imp__flights_create(arena, n, tracer->wavelengths ? 4 : 3, left,
+                             &r->flights[1]) ||
         !imp__hits_create(arena, n, &r->hits) ||
         !imp__shadows_create(arena, n, &r->shadows) ||
         !imp__by_shape_create(tracer, arena, n, &r->by_shape) || !TAKE(r->hidden))
@@ -178,7 +205,7 @@ static bool room_create(const struct imp_tracer *tracer, struct imp_arena *arena
 static void see(struct imp_depth *d, struct room *r)
 {
     imp__occluded_columns(d->bundle->tracer->scene, &r->shadows.ray, r->hidden);
-    unlit(d->values, &r->shadows, r->hidden);
+    unlit(d->values, d->bundle->colors, &r->shadows, r->hidden);
     r->shadows.ray.n = 0;
 }
 
@@ -189,11 +216,13 @@ static bool camera_begin(struct imp_arena *arena, struct imp_bundle *b,
 {
     const size_t n = (size_t)b->n;
     const bool instant = !rays->ray.time;
-    const struct imp_sensor_lanes *lanes =
-        instant && b->tracer->points ? imp__sensor_lanes(b->tracer->sensor) : NULL;
+    const struct imp_sensor_lanes *lanes = instant && b->tracer->points && !b->waves
+                                               ? imp__sensor_lanes(b->tracer->sensor)
+                                               : NULL;
     if (!TAKE(rays->ray.near)) return false;
-    const bool begin = lanes ? rays_in_lanes(b, lanes, xy, n_samples, samples, rays)
-                             : rays_alone(b, xy, n_samples, samples, rays);
+    bool begin = true;
+    if (lanes) begin = rays_in_lanes(b, lanes, xy, n_samples, samples, rays);
+    else if (!rays_alone(b, arena, xy, n_samples, samples, rays, &begin)) return false;
     rays->ray.n = b->n;
     if (!instant) memcpy(rays->ray.time, b->time, n * sizeof *b->time);
     if (begin) rays->ray.near = NULL;
@@ -208,27 +237,23 @@ static struct link *meter_begin(struct imp_arena *arena, struct imp_depth *d,
 {
     struct imp_bundle *b = d->bundle;
     const size_t n = (size_t)b->n;
-    struct link *sensor = link_add(arena, n, NULL),
-                *first = sensor ? link_add(arena, n, sensor) : NULL;
+    struct link *sensor = link_add(arena, n, b->colors, NULL),
+                *first = sensor ? link_add(arena, n, b->colors, sensor) : NULL;
     if (!first) return NULL;
     sensor->values.n = first->values.n = b->n;
     d->values = &first->values;
     d->next = &r->flights[0];
     d->next->ray.n = r->shadows.ray.n = 0;
     for (int k = 0; k < b->n; k++) {
-        const int *at = xy[k / n_samples];
         struct imp_walk walk;
-        double lens[2], weight;
-        imp__walk_begin(b->tracer, at[0], at[1], samples[k % n_samples], &walk, lens);
-        b->px[k] = walk.px;
-        b->py[k] = walk.py;
-        b->time[k] = walk.time;
-        b->index[k] = walk.point.index;
+        double weight;
+        if (!begin_alone(b, arena, xy[k / n_samples], samples[k % n_samples], k, &walk))
+            return NULL;
         imp__meter_vertex(d, &walk, k, &weight);
-        imp__column_put(sensor->values.e, k, imp__spec(0));
-        imp__column_put(sensor->values.b, k, imp__spec(0));
-        imp__column_put(sensor->values.w, k, imp__spec(weight));
-        imp__column_put(sensor->values.beyond, k, imp__spec(0));
+        imp__color_put(sensor->values.e, b->colors, k, imp__spec(0));
+        imp__color_put(sensor->values.b, b->colors, k, imp__spec(0));
+        imp__color_put(sensor->values.w, b->colors, k, imp__spec(weight));
+        imp__color_put(sensor->values.beyond, b->colors, k, imp__spec(0));
         sensor->values.up[k] = k;
     }
     see(d, r);
@@ -244,12 +269,14 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
     struct imp_depth d = {
         .bundle = b, .hits = &r.hits, .shadows = &r.shadows, .lone = &r.lone};
     struct link *last = NULL;
-    *b = (struct imp_bundle){
-        .tracer = tracer, .n = (int)n, .before = tracer->sensor->shape ? 2 : 0};
+    *b = (struct imp_bundle){.tracer = tracer,
+                             .n = (int)n,
+                             .colors = tracer->wavelengths ? 4 : 3,
+                             .before = tracer->sensor->shape ? 2 : 0};
     if (!bundle_create(arena, n, b) || !room_create(tracer, arena, n, &r)) return false;
     memset(b->valid, 0, n * sizeof *b->valid);
     memset(b->dropped, 0, n * sizeof *b->dropped);
-    for (int c = 0; c < 3; c++) memset(b->L[c], 0, n * sizeof *b->L[c]);
+    for (int c = 0; c < 4; c++) memset(b->L[c], 0, n * sizeof *b->L[c]);
     if (!tracer->sensor->shape) {
         if (!camera_begin(arena, b, xy, n_samples, samples, &r.flights[0])) return false;
     } else {
@@ -261,7 +288,7 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
     for (d.depth = 0; r.flights[d.depth & 1].ray.n > 0; d.depth++) {
         d.rays = &r.flights[d.depth & 1];
         d.next = &r.flights[~d.depth & 1];
-        struct link *here = link_add(arena, (size_t)d.rays->ray.n, last);
+        struct link *here = link_add(arena, (size_t)d.rays->ray.n, b->colors, last);
         if (!here) return false;
         d.values = &here->values;
         d.next->ray.n = 0;
@@ -274,7 +301,7 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
         last = here;
     }
     for (; last; last = last->before)
-        fold(&last->values, last->before ? last->before->values.beyond : b->L);
+        fold(&last->values, b->colors, last->before ? last->before->values.beyond : b->L);
     return true;
 }
 
@@ -286,5 +313,6 @@ void imp__bundle_walk(const struct imp_bundle *b, int k, struct imp_walk *walk)
     walk->time = b->time[k];
     walk->valid = b->valid[k];
     walk->dropped = (enum imp_drop)b->dropped[k];
-    imp__walk_value(b->tracer, walk, (imp_spec){b->L[0][k], b->L[1][k], b->L[2][k], 0});
+    walk->waves = b->waves ? b->waves[k] : NULL;
+    imp__walk_value(b->tracer, walk, imp__column_color(b->L, b->colors, k));
 }

@@ -29,13 +29,15 @@ static inline const struct imp_tracer *imp__bundle_use(const struct imp_tracer *
 struct imp_bundle {
     const struct imp_tracer *tracer;
     int n;
+    int colors;                     /* 3, or the 4 wavelengths that each walk carries */
+    const struct imp_waves **waves; /* of each walk; NULL: colours */
     int before; /* vertices before the first one that a ray leads to */
     /* Of each walk: film position, time, its random numbers. */
     double *px, *py, *time;
     uint64_t *set; /* hash of the set, or the key of a walk of no set */
     uint32_t *index;
     /* Results: radiance at the sensor; is alpha 1; why it was dropped (enum imp_drop). */
-    double *L[3];
+    double *L[4];
     bool *valid;
     uint8_t *dropped;
 };

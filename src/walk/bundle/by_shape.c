@@ -24,7 +24,7 @@ bool imp__by_shape_create(const struct imp_tracer *tracer, struct imp_arena *are
 }
 
 /* Sorts the rays that meet something; the sky goes to the others. */
-static void sort(struct imp_depth *d, double *const beyond[3], struct imp_by_shape *s)
+static void sort(struct imp_depth *d, double *const beyond[4], struct imp_by_shape *s)
 {
     int missed = 0;
     s->n = 0;
@@ -59,7 +59,7 @@ static void in_lanes(struct imp_depth *d, const struct imp_bin *bin, const int32
 }
 
 /* As they come: shapes of groups have numbers of their own. */
-static void all_alone(struct imp_depth *d, double *const beyond[3])
+static void all_alone(struct imp_depth *d, double *const beyond[4])
 {
     const bool sky = d->bundle->tracer->scene->n_environments > 0;
     for (int32_t i = 0; i < d->rays->ray.n; i++)
@@ -102,7 +102,7 @@ static void few_vertices(struct imp_depth *d, struct imp_by_shape *s, int n)
     }
 }
 
-void imp__vertices(struct imp_depth *d, double *const beyond[3], struct imp_by_shape *s)
+void imp__vertices(struct imp_depth *d, double *const beyond[4], struct imp_by_shape *s)
 {
     const struct imp_tracer *tracer = d->bundle->tracer;
     d->values->n = 0;

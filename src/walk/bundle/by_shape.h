@@ -24,6 +24,6 @@ bool imp__by_shape_create(const struct imp_tracer *tracer, struct imp_arena *are
 
 /* The vertices that d->rays lead to, and the sky, whose value goes to `beyond` of the vertices
  * before. */
-void imp__vertices(struct imp_depth *d, double *const beyond[3], struct imp_by_shape *s);
+void imp__vertices(struct imp_depth *d, double *const beyond[4], struct imp_by_shape *s);
 
 #endif

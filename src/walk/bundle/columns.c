@@ -11,6 +11,8 @@ static void *column(struct imp_arena *arena, size_t n, size_t size, bool *ok)
     return p;
 }
 #define COLUMN(c) (c) = column(arena, n, sizeof *(c), &ok)
+#define COLOR(c)                                                                         \
+    for (int k = 0; k < colors; k++) COLUMN((c)[k])
 #define VECTOR(c)                                                                        \
     for (int k = 0; k < 3; k++) COLUMN((c)[k])
 
@@ -24,13 +26,13 @@ static bool rays_create(struct imp_arena *arena, size_t n, struct imp_ray_column
     return ok;
 }
 
-bool imp__flights_create(struct imp_arena *arena, size_t n, bool left,
+bool imp__flights_create(struct imp_arena *arena, size_t n, int colors, bool left,
                          struct imp_flights *out)
 {
     bool ok = rays_create(arena, n, &out->ray);
     VECTOR(out->from);
     COLUMN(out->pdf);
-    VECTOR(out->beta);
+    COLOR(out->beta);
     COLUMN(out->eta);
     COLUMN(out->walk);
     COLUMN(out->up);
@@ -51,15 +53,15 @@ bool imp__hits_create(struct imp_arena *arena, size_t n, struct imp_hit_columns 
     return ok;
 }
 
-bool imp__bundle_values_create(struct imp_arena *arena, size_t n,
+bool imp__bundle_values_create(struct imp_arena *arena, size_t n, int colors,
                                struct imp_bundle_values *out)
 {
     bool ok = true;
     out->n = 0;
-    VECTOR(out->e);
-    VECTOR(out->b);
-    VECTOR(out->w);
-    VECTOR(out->beyond);
+    COLOR(out->e);
+    COLOR(out->b);
+    COLOR(out->w);
+    COLOR(out->beyond);
     COLUMN(out->up);
     return ok;
 }

@@ -18,7 +18,7 @@ struct imp_flights {
     double *from[3]; /* where it left, for densities of lights */
     double
         *pdf; /* of its direction per steradian; 0: the sensor or a delta lobe chose it */
-    double *beta[3]; /* throughput, for roulette */
+    double *beta[4]; /* throughput, for roulette */
     double *eta;     /* product of index ratios */
     struct imp_light_place
         *left;     /* where it left, as the tree of lights sees it; NULL: none */
@@ -29,7 +29,7 @@ struct imp_flights {
 /* Values of the vertices of a depth (walk.h: E, B, w), and what comes from beyond. */
 struct imp_bundle_values {
     int n;
-    double *e[3], *b[3], *w[3], *beyond[3];
+    double *e[4], *b[4], *w[4], *beyond[4];
     int32_t *up; /* place of the vertex before; of the first vertex, the walk's number */
 };
 
@@ -39,11 +39,12 @@ struct imp_shadows {
     int32_t *at;
 };
 
-/* Room for n of them, with `left` if asked for. False: no memory. */
-bool imp__flights_create(struct imp_arena *arena, size_t n, bool left,
+/* Room for n of them, of so many colours: 3, or 4 wavelengths; with `left` if asked for. False: no
+ * memory. */
+bool imp__flights_create(struct imp_arena *arena, size_t n, int colors, bool left,
                          struct imp_flights *out);
 bool imp__hits_create(struct imp_arena *arena, size_t n, struct imp_hit_columns *out);
-bool imp__bundle_values_create(struct imp_arena *arena, size_t n,
+bool imp__bundle_values_create(struct imp_arena *arena, size_t n, int colors,
                                struct imp_bundle_values *out);
 bool imp__shadows_create(struct imp_arena *arena, size_t n, struct imp_shadows *out);
 
@@ -54,6 +55,15 @@ static inline imp_v3 imp__column_v3(double *const c[3], int i)
 static inline void imp__column_put(double *const c[3], int i, imp_v3 v)
 {
     for (int k = 0; k < 3; k++) c[k][i] = v[k];
+}
+/* Colours: three, or four. */
+static inline void imp__color_put(double *const c[4], int colors, int i, imp_spec v)
+{
+    for (int k = 0; k < colors; k++) c[k][i] = v[k];
+}
+static inline imp_spec imp__column_color(double *const c[4], int colors, int i)
+{
+    return (imp_spec){c[0][i], c[1][i], c[2][i], colors > 3 ? c[3][i] : 0};
 }
 
 #endif

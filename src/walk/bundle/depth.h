@@ -31,7 +31,7 @@ struct imp_depth {
 /* The vertex that ray i leads to, at place `at` among the values (alone_vertex.c); and the sky,
  * whose value goes to the vertex before. */
 void imp__vertex_alone(struct imp_depth *d, int i, int at);
-void imp__sky_alone(struct imp_depth *d, int i, double *const beyond[3]);
+void imp__sky_alone(struct imp_depth *d, int i, double *const beyond[4]);
 /* What the rays meet by the step's own search, which passes lights that are hidden from the
  * camera. */
 void imp__meet_alone(struct imp_depth *d, const struct imp_hit_columns *hits);

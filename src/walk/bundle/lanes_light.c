@@ -8,10 +8,13 @@
 static void truth_set(imp_wide_truth *m, int k, bool value) { (*m)[k] = -(int64_t)value; }
 
 /* The points of one light for the lanes with bits. */
-static void draw_lanes(const struct imp_emitter *e, const struct imp_emitter_lanes *lanes,
-                       const imp_wide3 *ref, const imp_wide u[2], imp_wide_truth here,
+static void draw_lanes(const struct imp_scene *scene,
+                       const struct imp_carried *const *carried, int light,
+                       const struct imp_emitter_lanes *lanes, const imp_wide3 *ref,
+                       const imp_wide u[2], imp_wide_truth here,
                        struct imp_lanes_light *out)
 {
+    const struct imp_emitter *e = scene->emitters[light];
     const imp_wide zero = imp__wide(0);
     struct imp_wide_light own;
     lanes->sample(e, ref, u, &own);
@@ -22,17 +25,30 @@ static void draw_lanes(const struct imp_emitter *e, const struct imp_emitter_lan
     out->at.p = imp__wide3_choose(here, own.p, out->at.p);
     out->at.pdf = imp__wide_choose(here, own.pdf, out->at.pdf);
     out->at.drawn = (out->at.drawn & ~here) | (own.drawn & here);
-    const struct imp_wide_color le = imp__wide_color(e->input[0]->value);
-    for (int c = 0; c < 3; c++)
-        out->radiance.c[c] = imp__wide_choose(here, imp__wide_choose(lit, le.c[c], zero),
-                                              out->radiance.c[c]);
+    if (carried) {
+        /* At each walk's wavelengths: of even light its side alone counts. */
+        for (unsigned left = imp__wide_bits(own.drawn & here); left; left &= left - 1) {
+            const int k = __builtin_ctz(left);
+            const struct imp_emission x = {.dist = lanes->far ? INFINITY : 1,
+                                           .cos_light = imp__decide1(own.cos_light[k])};
+            const imp_spec le =
+                imp__emitter_radiance(scene, light, &x, (imp_v3){0}, carried[k]);
+            for (int c = 0; c < 4; c++) out->radiance.c[c][k] = le[c];
+        }
+    } else {
+        const struct imp_wide_color le = imp__wide_color(e->input[0]->value);
+        for (int c = 0; c < 3; c++)
+            out->radiance.c[c] = imp__wide_choose(
+                here, imp__wide_choose(lit, le.c[c], zero), out->radiance.c[c]);
+    }
     if (lanes->far) out->far |= here;
     else out->far &= ~here;
     out->delta &= ~here;
 }
 
 /* Point ls of a light, for lane k. */
-static void lane_put(const struct imp_scene *scene, int light, bool drawn,
+static void lane_put(const struct imp_scene *scene,
+                     const struct imp_carried *const *carried, int light, bool drawn,
                      const struct imp_light_sample *ls, int k,
                      struct imp_lanes_light *out)
 {
@@ -41,26 +57,30 @@ static void lane_put(const struct imp_scene *scene, int light, bool drawn,
             !((e->ops->flags & IMP_EMITTER_AREA) && !(ls->cos_light > 0));
     truth_set(&out->at.drawn, k, drawn);
     if (!drawn) return;
-    const imp_spec le = imp__light_point_radiance(scene, NULL, light, ls);
+    const imp_spec le =
+        imp__light_point_radiance(scene, carried ? carried[k] : NULL, light, ls);
     imp__wide3_set(&out->at.wi, k, ls->wi);
     imp__wide3_set(&out->at.p, k, ls->p);
     out->at.pdf[k] = ls->pdf;
-    for (int c = 0; c < 3; c++) out->radiance.c[c][k] = le[c];
+    for (int c = 0; c < 4; c++) out->radiance.c[c][k] = le[c];
     truth_set(&out->far, k, !isfinite(ls->dist));
     truth_set(&out->delta, k, (e->ops->flags & IMP_EMITTER_DELTA) != 0);
 }
 
-static void draw_alone(const struct imp_scene *scene, int light, const imp_wide3 *ref,
-                       const imp_wide u[2], int k, struct imp_lanes_light *out)
+static void draw_alone(const struct imp_scene *scene,
+                       const struct imp_carried *const *carried, int light,
+                       const imp_wide3 *ref, const imp_wide u[2], int k,
+                       struct imp_lanes_light *out)
 {
     const struct imp_emitter *e = scene->emitters[light];
     const imp_v3 p = imp__wide3_lane(ref, k);
     struct imp_light_sample ls = {.located = {.prim = -1}};
     const bool drawn = e->ops->sample(e, &p, (double[2]){u[0][k], u[1][k]}, &ls);
-    lane_put(scene, light, drawn, &ls, k, out);
+    lane_put(scene, carried, light, drawn, &ls, k, out);
 }
 
 void imp__lanes_tree_draw(const struct imp_scene *scene,
+                          const struct imp_carried *const *carried,
                           const struct imp_light_place place[], const imp_wide u_drawn[2],
                           imp_wide which, bool one, unsigned bits,
                           struct imp_lanes_light *out)
@@ -80,7 +100,7 @@ void imp__lanes_tree_draw(const struct imp_scene *scene,
         const bool drawn = prim >= 0 ? e->shape->ops->sample_triangle(e->shape, prim,
                                                                       &place[k].p, u, &ls)
                                      : e->ops->sample(e, &place[k].p, u, &ls);
-        lane_put(scene, light, drawn, &ls, k, out);
+        lane_put(scene, carried, light, drawn, &ls, k, out);
     }
 }
 
@@ -90,7 +110,8 @@ static const struct imp_emitter_lanes *lanes_of(const struct imp_emitter *e)
     return imp__emitter_even(e, NULL) ? imp__emitter_lanes(e) : NULL;
 }
 
-void imp__lanes_light_draw(const struct imp_scene *scene, const imp_wide3 *ref,
+void imp__lanes_light_draw(const struct imp_scene *scene,
+                           const struct imp_carried *const *carried, const imp_wide3 *ref,
                            const imp_wide u_drawn[2], imp_wide which, bool one,
                            unsigned bits, struct imp_lanes_light *out)
 {
@@ -103,7 +124,7 @@ void imp__lanes_light_draw(const struct imp_scene *scene, const imp_wide3 *ref,
         out->pmf = imp__wide(scene->light_cdf[0]);
         if (!(scene->light_cdf[0] > 0)) return;
         if (lanes) {
-            draw_lanes(scene->emitters[0], lanes, ref, u, all, out);
+            draw_lanes(scene, carried, 0, lanes, ref, u, all, out);
             return;
         }
     } else {
@@ -127,12 +148,12 @@ void imp__lanes_light_draw(const struct imp_scene *scene, const imp_wide3 *ref,
         }
         bits &= ~same;
         if (lanes && (same & (same - 1))) {
-            draw_lanes(scene->emitters[one], lanes, ref, u, here, out);
+            draw_lanes(scene, carried, one, lanes, ref, u, here, out);
             continue;
         }
         for (; same; same &= same - 1) {
             const int k = __builtin_ctz(same);
-            if (out->pmf[k] > 0) draw_alone(scene, one, ref, u, k, out);
+            if (out->pmf[k] > 0) draw_alone(scene, carried, one, ref, u, k, out);
         }
     }
 }
@@ -142,7 +163,8 @@ void imp__lanes_light_draw(const struct imp_scene *scene, const imp_wide3 *ref,
 bool imp__lanes_sky_fits(const struct imp_tracer *tracer)
 {
     const struct imp_scene *scene = tracer->scene;
-    if (scene->n_environments != 1 || tracer->integrator->hide_emitters ||
+    if (scene->n_environments != 1 || tracer->wavelengths ||
+        tracer->integrator->hide_emitters ||
         (tracer->integrator->light_tree && scene->light_tree))
         return false;
     const struct imp_emitter_lanes *lanes =
@@ -157,7 +179,7 @@ static imp_wide power_heuristic(imp_wide a, imp_wide b)
 }
 
 static inline void sky_work(struct imp_depth *d, const int32_t *order, int n,
-                            double *const beyond[3])
+                            double *const beyond[4])
 {
     const struct imp_tracer *t = d->bundle->tracer;
     const int light = t->scene->environments[0];
@@ -181,7 +203,7 @@ static inline void sky_work(struct imp_depth *d, const int32_t *order, int n,
 }
 
 void imp__lanes_sky_meet(struct imp_depth *d, const int32_t *order, int n,
-                         double *const beyond[3])
+                         double *const beyond[4])
 {
     const int max_depth = d->bundle->tracer->integrator->max_depth;
     if (max_depth >= 0 && d->depth >= max_depth) return;

@@ -17,13 +17,16 @@ struct imp_lanes_light {
 
 /* What imp__light_point (core/drawn.h) draws for vertices at ref with the numbers u, in the lanes
  * with bits; at.drawn: there is a light, which shows its front. `which` chooses the light; one: it
- * is u[0], of which the part that is left draws the point. */
-void imp__lanes_light_draw(const struct imp_scene *scene, const imp_wide3 *ref,
+ * is u[0], of which the part that is left draws the point. carried [IMP_LANES]: wavelengths of the
+ * walks; NULL: colours. */
+void imp__lanes_light_draw(const struct imp_scene *scene,
+                           const struct imp_carried *const *carried, const imp_wide3 *ref,
                            const imp_wide u[2], imp_wide which, bool one, unsigned bits,
                            struct imp_lanes_light *out);
 
 /* The same where lights are chosen by the scene's tree: vertices at place [IMP_LANES]. */
 void imp__lanes_tree_draw(const struct imp_scene *scene,
+                          const struct imp_carried *const *carried,
                           const struct imp_light_place place[], const imp_wide u[2],
                           imp_wide which, bool one, unsigned bits,
                           struct imp_lanes_light *out);
@@ -33,6 +36,6 @@ void imp__lanes_tree_draw(const struct imp_scene *scene,
 bool imp__lanes_sky_fits(const struct imp_tracer *tracer);
 /* What the rays order[n] meet, which leave the scene: the values go to the vertices before. */
 void imp__lanes_sky_meet(struct imp_depth *d, const int32_t *order, int n,
-                         double *const beyond[3]);
+                         double *const beyond[4]);
 
 #endif

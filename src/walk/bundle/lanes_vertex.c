@@ -74,6 +74,7 @@ static void surface_alone(const struct imp_depth *d, const struct imp_wide_hits 
 
 /* Inputs that are textures, point by point. */
 static void inputs_alone(const struct imp_depth *d, const struct imp_bsdf *b,
+                         const struct imp_carried *const *carried,
                          const struct imp_wide_hits *h, const struct imp_wide_surface *x,
                          struct imp_wide_color *in)
 {
@@ -82,11 +83,12 @@ static void inputs_alone(const struct imp_depth *d, const struct imp_bsdf *b,
         const struct imp_texcoord at = {
             .uv = {imp__decide1(x->uv[0][k]), imp__decide1(x->uv[1][k])},
             .p = imp__decide(imp__wide3_lane(&x->p, k)),
+            .carried = carried ? carried[k] : NULL,
             .shape = shape_of(d, h->at[k]),
             .prim = h->prim[h->at[k]]};
         imp__inputs_eval(b->input, b->n_in, &at, own);
         for (int j = 0; j < b->n_in; j++)
-            for (int c = 0; c < 3; c++) in[j].c[c][k] = own[j][c];
+            for (int c = 0; c < 4; c++) in[j].c[c][k] = own[j][c];
     }
 }
 
@@ -101,10 +103,12 @@ static imp_wide3 offset(imp_wide3 p, imp_wide3 ng, imp_wide3 d)
                                                     imp__wide3_inner(ng, d))));
 }
 
-static imp_wide_truth is_zero(const struct imp_wide_color *f)
+static inline imp_wide_truth is_zero(const imp_wide f[4], int colors)
 {
     const imp_wide zero = imp__wide(0);
-    return (f->c[0] == zero) & (f->c[1] == zero) & (f->c[2] == zero);
+    imp_wide_truth all = (f[0] == zero) & (f[1] == zero) & (f[2] == zero);
+    if (colors > 3) all &= f[3] == zero;
+    return all;
 }
 
 /* ---- What leaves it ---------------------------------------------------------------------- */
@@ -120,7 +124,8 @@ struct vertices {
     unsigned on; /* a bit for each lane that counts */
     int at;      /* place of the first among the values of the depth */
     const int32_t *order;
-    struct imp_light_place place[IMP_LANES]; /* where there is a tree of lights */
+    struct imp_light_place place[IMP_LANES];      /* where there is a tree of lights */
+    const struct imp_carried *carried[IMP_LANES]; /* where walks carry wavelengths */
 };
 
 /* imp__light_place of all lanes: kernels in lanes send nothing through the surface. */
@@ -148,8 +153,9 @@ static imp_wide power_heuristic_over(imp_wide a, imp_wide b)
 }
 
 /* B of the vertices as if all lights were seen, and the shadow rays. */
-static inline void light(struct imp_depth *d, const struct imp_bin *bin,
-                         const struct vertices *v, struct imp_wide_color *brings)
+static inline __attribute__((always_inline)) void
+light(struct imp_depth *d, const struct imp_bin *bin, const struct vertices *v,
+      const int colors, struct imp_wide_color *brings)
 {
     const imp_wide zero = imp__wide(0);
     struct imp_lanes_light l;
@@ -160,18 +166,19 @@ static inline void light(struct imp_depth *d, const struct imp_bin *bin,
     const struct imp_scene *scene = d->bundle->tracer->scene;
     const imp_wide which =
         v->points || scene->n_emitters == 1 ? u[0] : number(v, IMP_DIM_LIGHT);
+    const struct imp_carried *const *carried = colors > 3 ? v->carried : NULL;
     if (imp_unlikely(d->next->left != NULL))
-        imp__lanes_tree_draw(scene, v->place, u, which, v->points, v->on, &l);
-    else imp__lanes_light_draw(scene, &v->x.p, u, which, v->points, v->on, &l);
+        imp__lanes_tree_draw(scene, carried, v->place, u, which, v->points, v->on, &l);
+    else imp__lanes_light_draw(scene, carried, &v->x.p, u, which, v->points, v->on, &l);
     const imp_wide3 wi = imp__wide3_decide(imp__into_wide_frame(&v->x.frame, l.at.wi));
-    const imp_wide pdf = bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, &wi, &f);
+    const imp_wide pdf = bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, &wi, colors, &f);
     const imp_wide p = l.at.pdf * l.pmf;
     const imp_wide weight =
         imp__wide_decide(imp__wide_choose(l.delta, 1 / p, power_heuristic_over(p, pdf)));
-    for (int c = 0; c < 3; c++) f.c[c] *= l.radiance.c[c];
-    const imp_wide_truth wanted = l.at.drawn & (pdf > zero) & ~is_zero(&f);
+    for (int c = 0; c < colors; c++) f.c[c] *= l.radiance.c[c];
+    const imp_wide_truth wanted = l.at.drawn & (pdf > zero) & ~is_zero(f.c, colors);
     const unsigned bits = imp__wide_bits(wanted) & v->on;
-    for (int c = 0; c < 3; c++)
+    for (int c = 0; c < colors; c++)
         brings->c[c] = imp__wide_choose(wanted, f.c[c] * weight, zero);
     if (!bits) return;
 
@@ -193,21 +200,23 @@ static inline void light(struct imp_depth *d, const struct imp_bin *bin,
 
 /* Survival as decided, and who survives. */
 static inline imp_wide_truth survives(const struct imp_depth *d, const struct vertices *v,
-                                      const imp_wide beta[3], imp_wide eta,
+                                      const imp_wide beta[4], int colors, imp_wide eta,
                                       imp_wide *survive)
 {
     const struct imp_tracer *t = d->bundle->tracer;
     *survive = imp__wide(1);
     if (d->depth + 1 < t->integrator->rr_depth) return ~(imp_wide_truth){0};
-    const imp_wide most = imp__wide_larger(beta[0], imp__wide_larger(beta[1], beta[2]));
+    imp_wide most = imp__wide_larger(beta[0], imp__wide_larger(beta[1], beta[2]));
+    if (colors > 3) most = imp__wide_larger(most, beta[3]);
     const imp_wide q = imp__wide_lesser(most * eta * eta, imp__wide(0.95));
     *survive = imp__wide_decide(imp__wide_larger(q, imp__wide(t->survival)));
     return number(v, IMP_DIM_SURVIVE) < *survive;
 }
 
 /* The weights of the vertices' steps, and the next rays. */
-static inline void scatter(struct imp_depth *d, const struct imp_bin *bin,
-                           const struct vertices *v, struct imp_wide_color *w)
+static inline __attribute__((always_inline)) void
+scatter(struct imp_depth *d, const struct imp_bin *bin, const struct vertices *v,
+        const int colors, struct imp_wide_color *w)
 {
     const imp_wide zero = imp__wide(0);
     const imp_wide u[3] = {number(v, IMP_DIM_LOBE), number(v, IMP_DIM_DIR_U),
@@ -217,17 +226,18 @@ static inline void scatter(struct imp_depth *d, const struct imp_bin *bin,
     imp_wide_truth goes = bin->kernel->sample(bin->bsdf, v->in, &v->wo_drawn, u, &wi);
     const imp_wide3 world = imp__out_of_wide_frame(&v->x.frame, wi);
     wi = imp__wide3_decide(wi);
-    const imp_wide pdf =
-        imp__wide_decide(bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, &wi, &f));
+    const imp_wide pdf = imp__wide_decide(
+        bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, &wi, colors, &f));
     const imp_wide by = 1 / pdf, eta = imp__wide_gather(d->rays->eta, v->order);
-    imp_wide beta[3], survive;
+    imp_wide beta[4], survive;
     goes &= pdf > zero;
-    for (int c = 0; c < 3; c++)
+    for (int c = 0; c < colors; c++)
         beta[c] = imp__wide_gather(d->rays->beta[c], v->order) * (f.c[c] * by);
-    goes &= ~((beta[0] == zero) & (beta[1] == zero) & (beta[2] == zero));
-    goes &= survives(d, v, beta, eta, &survive);
+    goes &= ~is_zero(beta, colors);
+    goes &= survives(d, v, beta, colors, eta, &survive);
     const imp_wide again = 1 / survive, scale = 1 / (pdf * survive);
-    for (int c = 0; c < 3; c++) w->c[c] = imp__wide_choose(goes, f.c[c] * scale, zero);
+    for (int c = 0; c < colors; c++)
+        w->c[c] = imp__wide_choose(goes, f.c[c] * scale, zero);
 
     struct imp_flights *to = d->next;
     const unsigned bits = imp__wide_bits(goes) & v->on;
@@ -237,7 +247,8 @@ static inline void scatter(struct imp_depth *d, const struct imp_bin *bin,
     imp__wide_append(&to->ray.far[n], bits, imp__wide(INFINITY));
     imp__wide3_append(to->from, n, bits, v->x.p);
     imp__wide_append(&to->pdf[n], bits, pdf);
-    for (int c = 0; c < 3; c++) imp__wide_append(&to->beta[c][n], bits, beta[c] * again);
+    for (int c = 0; c < colors; c++)
+        imp__wide_append(&to->beta[c][n], bits, beta[c] * again);
     imp__wide_append(&to->eta[n], bits, eta);
     for (unsigned left = bits; left; left &= left - 1) {
         const int k = __builtin_ctz(left), i = to->ray.n++, from = v->order[k];
@@ -250,13 +261,16 @@ static inline void scatter(struct imp_depth *d, const struct imp_bin *bin,
 
 /* ---- All --------------------------------------------------------------------------------- */
 
-static void color_store(double *const to[3], int at, const struct imp_wide_color *x)
+static inline void color_store(double *const to[4], int colors, int at,
+                               const struct imp_wide_color *x)
 {
-    for (int c = 0; c < 3; c++) imp__wide_store(&to[c][at], x->c[c]);
+    for (int c = 0; c < colors; c++) imp__wide_store(&to[c][at], x->c[c]);
 }
 
-static inline void work(struct imp_depth *d, const struct imp_bin *bin,
-                        const int32_t *order, int n, int at)
+static inline __attribute__((always_inline)) void work(struct imp_depth *d,
+                                                       const struct imp_bin *bin,
+                                                       const int32_t *order, int n,
+                                                       int at, const int colors)
 {
     const struct imp_bundle *b = d->bundle;
     const struct imp_wide_hits hits = {.o = d->rays->ray.o,
@@ -274,6 +288,8 @@ static inline void work(struct imp_depth *d, const struct imp_bin *bin,
                          .depth = d->depth};
     int32_t walk[IMP_LANES];
     for (int k = 0; k < IMP_LANES; k++) walk[k] = d->rays->walk[order[k]];
+    if (colors > 3)
+        for (int k = 0; k < IMP_LANES; k++) v.carried[k] = &b->waves[walk[k]]->carried;
     v.numbers =
         imp__wide_block(b->tracer->points, b->set, b->index, walk, imp__block(d->depth));
     if (bin->surface) bin->surface->surface(bin->shape, &hits, !bin->plain, &v.x);
@@ -283,19 +299,19 @@ static inline void work(struct imp_depth *d, const struct imp_bin *bin,
     v.wo = imp__wide3_decide(v.wo_drawn);
     v.in = bin->in;
     if (imp_unlikely(d->next->left != NULL)) places(&v);
-    if (!bin->plain) {
-        inputs_alone(d, bin->bsdf, &hits, &v.x, in);
+    if (colors > 3 || !bin->plain) {
+        inputs_alone(d, bin->bsdf, colors > 3 ? v.carried : NULL, &hits, &v.x, in);
         v.in = in;
     }
-    if (b->tracer->integrator->lights) light(d, bin, &v, &brings);
+    if (b->tracer->integrator->lights) light(d, bin, &v, colors, &brings);
     else brings = imp__wide_color(imp__spec(0));
-    scatter(d, bin, &v, &weight);
+    scatter(d, bin, &v, colors, &weight);
 
     const struct imp_wide_color none = imp__wide_color(imp__spec(0));
-    color_store(d->values->e, at, &none);
-    color_store(d->values->b, at, &brings);
-    color_store(d->values->w, at, &weight);
-    color_store(d->values->beyond, at, &none);
+    color_store(d->values->e, colors, at, &none);
+    color_store(d->values->b, colors, at, &brings);
+    color_store(d->values->w, colors, at, &weight);
+    color_store(d->values->beyond, colors, at, &none);
     for (int k = 0; k < n; k++) {
         d->values->up[at + k] = d->rays->up[order[k]];
         b->valid[walk[k]] = true;
@@ -313,6 +329,7 @@ void imp__vertices_in_lanes(struct imp_depth *d, const struct imp_bin *bin,
             for (int k = 0; k < IMP_LANES; k++) rest[k] = here[k < left ? k : 0];
             here = rest;
         }
-        work(d, bin, here, left, at + i);
+        if (imp_likely(d->bundle->colors == 3)) work(d, bin, here, left, at + i, 3);
+        else work(d, bin, here, left, at + i, 4);
     }
 }
