@@ -281,11 +281,12 @@ static inline __attribute__((always_inline)) void work(struct imp_depth *d,
                                        .prim = d->hits->prim,
                                        .at = order};
     struct imp_wide_color in[IMP_INPUTS_MAX], brings, weight;
-    struct vertices v = {.on = imp__bits_first(n),
-                         .at = at,
-                         .order = order,
-                         .points = b->tracer->points != NULL,
-                         .depth = d->depth};
+    struct vertices v; /* field by field: clearing all of it takes time */
+    v.on = imp__bits_first(n);
+    v.at = at;
+    v.order = order;
+    v.points = b->tracer->points != NULL;
+    v.depth = d->depth;
     int32_t walk[IMP_LANES];
     for (int k = 0; k < IMP_LANES; k++) walk[k] = d->rays->walk[order[k]];
     if (colors > 3)
