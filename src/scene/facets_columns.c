@@ -76,8 +76,8 @@ static inline struct rays rays_of(const struct imp_facets *f,
                                     ((outside.z > zero) & (from.z * d.z > zero)),
                              away = (outside.x > near.x) | (outside.y > near.y) |
                                     (outside.z > near.z);
-        gone |= imp__wide_bits(goes) << p * IMP_LANES;
-        r.away |= imp__wide_bits(away) << p * IMP_LANES;
+        gone |= imp__wide_bits(goes) << p * IMP_WIDE_LANES;
+        r.away |= imp__wide_bits(away) << p * IMP_WIDE_LANES;
         narrow3(r.o, p, from);
         narrow3(r.d, p, d);
         narrow(&r.lo, p, b->near[p]);

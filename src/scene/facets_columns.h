@@ -5,10 +5,10 @@
 #define IMP_SCENE_FACETS_COLUMNS_H
 
 #include "facets.h"
-#include "math/wide.h"
+#include "math/wide_real.h"
 
 /* Rays are taken so many at a time, in one or more registers. */
-enum { IMP_RAY_BLOCK = 8, IMP_RAY_PARTS = IMP_RAY_BLOCK / IMP_LANES };
+enum { IMP_RAY_BLOCK = 8, IMP_RAY_PARTS = IMP_RAY_BLOCK / IMP_WIDE_LANES };
 struct imp_ray_block {
     imp_wide3 o[IMP_RAY_PARTS], d[IMP_RAY_PARTS];
     imp_wide near[IMP_RAY_PARTS], far[IMP_RAY_PARTS];
@@ -16,19 +16,19 @@ struct imp_ray_block {
 /* Numbers of ray k. */
 static inline imp_v3 imp__block_origin(const struct imp_ray_block *b, int k)
 {
-    return imp__wide3_lane(&b->o[k / IMP_LANES], k % IMP_LANES);
+    return imp__wide3_lane(&b->o[k / IMP_WIDE_LANES], k % IMP_WIDE_LANES);
 }
 static inline imp_v3 imp__block_direction(const struct imp_ray_block *b, int k)
 {
-    return imp__wide3_lane(&b->d[k / IMP_LANES], k % IMP_LANES);
+    return imp__wide3_lane(&b->d[k / IMP_WIDE_LANES], k % IMP_WIDE_LANES);
 }
 static inline double imp__block_near(const struct imp_ray_block *b, int k)
 {
-    return b->near[k / IMP_LANES][k % IMP_LANES];
+    return b->near[k / IMP_WIDE_LANES][k % IMP_WIDE_LANES];
 }
 static inline double imp__block_far(const struct imp_ray_block *b, int k)
 {
-    return b->far[k / IMP_LANES][k % IMP_LANES];
+    return b->far[k / IMP_WIDE_LANES][k % IMP_WIDE_LANES];
 }
 
 /* on: a bit for each ray that is asked for. A bit for each that meets something, with its hit, or

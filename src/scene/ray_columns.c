@@ -50,7 +50,7 @@ static inline unsigned block_of(const struct imp_ray_columns *rays, int i,
 {
     unsigned on = 0;
     for (int p = 0; p < IMP_RAY_PARTS; p++) {
-        const int at = i + p * IMP_LANES;
+        const int at = i + p * IMP_WIDE_LANES;
         const imp_wide3 o = {imp__wide_load(&rays->o[0][at]),
                              imp__wide_load(&rays->o[1][at]),
                              imp__wide_load(&rays->o[2][at])},
@@ -66,7 +66,7 @@ static inline unsigned block_of(const struct imp_ray_columns *rays, int i,
                               (imp__wide_magnitude(o.z) + imp__wide_magnitude(d.z));
         on |= imp__wide_bits((size < imp__wide(IMP_REACH_MAX)) &
                              (b->near[p] >= imp__wide(0)) & (b->near[p] < b->far[p]))
-              << p * IMP_LANES;
+              << p * IMP_WIDE_LANES;
     }
     return on & (rays->n - i >= IMP_RAY_BLOCK ? ~0u : (1u << (rays->n - i)) - 1);
 }
@@ -83,7 +83,7 @@ static inline void block_put(imp_wide x, float *to)
 static void packet_fill(struct RTCRay8 *r, const struct imp_ray_block *b)
 {
     for (int p = 0; p < IMP_RAY_PARTS; p++) {
-        const int k = p * IMP_LANES;
+        const int k = p * IMP_WIDE_LANES;
         block_put(b->o[p].x, &r->org_x[k]);
         block_put(b->o[p].y, &r->org_y[k]);
         block_put(b->o[p].z, &r->org_z[k]);
@@ -140,7 +140,8 @@ static unsigned packet_occluded(const struct imp_intersector *x,
     rtcInitIntersectContext(&context);
     packet_fill(&r, b);
     packet_valid(on, valid);
-    for (int p = 0; p < IMP_RAY_PARTS; p++) block_put(b->far[p], &r.tfar[p * IMP_LANES]);
+    for (int p = 0; p < IMP_RAY_PARTS; p++)
+        block_put(b->far[p], &r.tfar[p * IMP_WIDE_LANES]);
     rtcOccluded8(valid, x->rtc, &context, &r);
     for (int k = 0; k < IMP_RAY_BLOCK; k++) hidden |= (unsigned)(r.tfar[k] < 0) << k;
     return hidden & on;
@@ -156,7 +157,7 @@ static void nearest_block(const struct imp_intersector *x,
     const unsigned on = block_of(rays, i, &b);
     unsigned met = 0;
     float far[IMP_RAY_BLOCK];
-    for (int p = 0; p < IMP_RAY_PARTS; p++) block_put(b.far[p], &far[p * IMP_LANES]);
+    for (int p = 0; p < IMP_RAY_PARTS; p++) block_put(b.far[p], &far[p * IMP_WIDE_LANES]);
     for (unsigned left = x->balls.n > 0 ? on : 0; left; left &= left - 1) {
         const int k = __builtin_ctz(left);
         const imp_v3 o = imp__block_origin(&b, k), d = imp__block_direction(&b, k);
@@ -165,7 +166,7 @@ static void nearest_block(const struct imp_intersector *x,
                                       &hit[k]))
             continue;
         far[k] = imp__triangle_far(&o, &d, end);
-        b.far[k / IMP_LANES][k % IMP_LANES] = (double)far[k];
+        b.far[k / IMP_WIDE_LANES][k % IMP_WIDE_LANES] = (double)far[k];
         met |= 1u << k;
     }
     if (x->facets) {

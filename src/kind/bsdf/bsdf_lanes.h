@@ -4,10 +4,10 @@
 #ifndef IMP_KIND_BSDF_LANES_H
 #define IMP_KIND_BSDF_LANES_H
 
-#include "kind/lanes.h"
+#include "kind/kind_lanes.h"
 #include "math/trig.h"
 
-#define IMP_WIDE IMP_LANES
+#define IMP_WIDE IMP_WIDE_LANES
 #define IMP_TEXT "math/warp_text.h"
 #include "math/lane_text.h"
 

@@ -144,10 +144,10 @@ const struct imp_bsdf_ops imp__roughconductor = {.size = sizeof(struct imp_bsdf_
 
 /* ---- In lanes: GGX, of visible normals ---------------------------------------------------- */
 
-#define IMP_WIDE IMP_LANES
+#define IMP_WIDE IMP_WIDE_LANES
 #define IMP_TEXT "kind/bsdf/microfacet_text.h"
 #include "math/lane_text.h"
-#define IMP_WIDE IMP_LANES
+#define IMP_WIDE IMP_WIDE_LANES
 #define IMP_TEXT "kind/bsdf/conductor_text.h"
 #include "math/lane_text.h"
 
@@ -197,7 +197,7 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
     const imp_wide3 w = imp__wide3_unit((imp_wide3){au * wo->x, av * wo->y, wo->z});
     const imp_wide phi = IMP_2PI * u[1], z = (1 - u[2]) * (1 + w.z) - w.z;
     const imp_wide r = imp__wide_root(imp__wide_larger((1 - z) * (1 + z), zero));
-    for (int k = 0; k < IMP_LANES; k++) {
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
         si[k] = sin(phi[k]);
         co[k] = cos(phi[k]);
     }

@@ -198,7 +198,8 @@ static imp_wide3 flips(const imp_wide3 *w, imp_wide_truth back)
 static bool is_asked(const struct imp_bsdf *b, int k, imp_wide_truth back)
 {
     const unsigned bits = imp__wide_bits(back);
-    return b->n_child == 1 || (k > 0 ? bits != 0 : bits != imp__bits_first(IMP_LANES));
+    return b->n_child == 1 ||
+           (k > 0 ? bits != 0 : bits != imp__bits_first(IMP_WIDE_LANES));
 }
 
 static imp_wide_truth sample_lanes(const struct imp_bsdf *b,

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Emitters in lanes: surfaces by their shapes, and the constant sky. */
-#include "kind/lanes.h"
+#include "kind/kind_lanes.h"
 #include "math/trig.h"
 
-#define IMP_WIDE IMP_LANES
+#define IMP_WIDE IMP_WIDE_LANES
 #define IMP_TEXT "math/warp_text.h"
 #include "math/lane_text.h"
 

@@ -5,7 +5,7 @@
  *   (t (1 - 2X), (t/a)(1 - 2Y), 1),   X = px/W + offset_x,  Y = py/H + offset_y
  *
  * unless a lens distorts the picture. */
-#include "kind/lanes.h"
+#include "kind/kind_lanes.h"
 #include "projection.h"
 
 struct perspective {

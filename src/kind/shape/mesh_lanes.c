@@ -11,7 +11,7 @@
 #define FACETS(m, prim, member)                                                          \
     ({                                                                                   \
         imp_wide3 v_;                                                                    \
-        for (int k = 0; k < IMP_LANES; k++)                                              \
+        for (int k = 0; k < IMP_WIDE_LANES; k++)                                         \
             imp__wide3_set(&v_, k, (m)->facets[(prim)[k]].member);                       \
         v_;                                                                              \
     })
@@ -20,7 +20,7 @@ static inline imp_wide3 vertices(const struct imp__mesh *m, const float *array,
                                  const int32_t prim[], int corner)
 {
     imp_wide3 v;
-    for (int k = 0; k < IMP_LANES; k++)
+    for (int k = 0; k < IMP_WIDE_LANES; k++)
         imp__wide3_set(
             &v, k,
             imp__mesh_load(array, m->indices[3 * (size_t)prim[k] + (size_t)corner]));
@@ -53,7 +53,7 @@ static void uv_at(const struct imp_shape *s, const int32_t prim[], imp_wide b1,
                   imp_wide b2, imp_wide uv[2])
 {
     const struct imp__mesh *m = s->self;
-    for (int k = 0; k < IMP_LANES; k++) {
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
         const struct imp_hit hit = {.prim = prim[k], .u = b1[k], .v = b2[k]};
         double own[2];
         imp__mesh_uv(m, &hit, own);
@@ -66,9 +66,9 @@ static void surfaces(const struct imp_shape *s, const struct imp_wide_hits *h, b
                      struct imp_wide_surface *out)
 {
     const struct imp__mesh *m = s->self;
-    const imp_wide b1 = imp__wide_gather(h->u, h->at), b2 = imp__wide_gather(h->v, h->at);
-    int32_t prim[IMP_LANES];
-    for (int k = 0; k < IMP_LANES; k++) prim[k] = h->prim[h->at[k]];
+    const imp_wide b1 = imp__wide_taken(h->u, h->at), b2 = imp__wide_taken(h->v, h->at);
+    int32_t prim[IMP_WIDE_LANES];
+    for (int k = 0; k < IMP_WIDE_LANES; k++) prim[k] = h->prim[h->at[k]];
     if (uv) uv_at(s, prim, b1, b2, out->uv);
     if (m->facets) {
         out->p = point_at(FACETS(m, prim, p0), FACETS(m, prim, e1), FACETS(m, prim, e2),
@@ -106,13 +106,13 @@ static inline imp_wide draw(const struct imp_shape *s, imp_wide u, int32_t prim[
         const double *c = m->cumulative;
         const imp_wide x = u * s->area;
         const imp_wide_truth first = imp__wide(c[1]) > x;
-        for (int k = 0; k < IMP_LANES; k++) prim[k] = 1 + (int32_t)first[k];
+        for (int k = 0; k < IMP_WIDE_LANES; k++) prim[k] = 1 + (int32_t)first[k];
         within = imp__wide_choose(first, x, x - c[1]) /
                  imp__wide_choose(first, imp__wide(c[1]), imp__wide(c[2] - c[1]));
         return imp__wide_lesser(imp__wide_larger(within, imp__wide(0)),
                                 imp__wide(0x1.fffffffffffffp-1));
     }
-    for (int k = 0; k < IMP_LANES; k++) {
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
         double own;
         prim[k] = (int32_t)imp__mesh_triangle_draw(s, m, u[k], &own);
         within[k] = own;
@@ -124,7 +124,7 @@ static void sample_toward(const struct imp_shape *s, const imp_wide3 *ref,
                           const imp_wide u[2], struct imp_wide_light *out)
 {
     const struct imp__mesh *m = s->self;
-    int32_t prim[IMP_LANES];
+    int32_t prim[IMP_WIDE_LANES];
     const imp_wide within = draw(s, u[0], prim);
     const imp_wide half =
         0.5 * imp__wide_lesser(within, u[1]); /* imp__uniform_triangle */

@@ -166,10 +166,11 @@ static void surfaces(const struct imp_shape *s, const struct imp_wide_hits *h, b
                      struct imp_wide_surface *out)
 {
     const struct rectangle *r = s->self;
-    const imp_wide u = imp__wide_gather(h->u, h->at), v = imp__wide_gather(h->v, h->at);
+    const imp_wide u = imp__wide_taken(h->u, h->at), v = imp__wide_taken(h->v, h->at);
     const imp_wide sum = u + v;
     imp_wide_truth before;
-    for (int k = 0; k < IMP_LANES; k++) before[k] = -(int64_t)(h->prim[h->at[k]] == 0);
+    for (int k = 0; k < IMP_WIDE_LANES; k++)
+        before[k] = -(int64_t)(h->prim[h->at[k]] == 0);
     const imp_wide at_u = imp__wide_choose(before, sum, u),
                    at_v = imp__wide_choose(before, v, sum);
     out->p = points_at(r, at_u, at_v);

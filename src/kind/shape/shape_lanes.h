@@ -4,11 +4,11 @@
 #ifndef IMP_KIND_SHAPE_LANES_H
 #define IMP_KIND_SHAPE_LANES_H
 
-#include "kind/lanes.h"
+#include "kind/kind_lanes.h"
 #include "math/trig.h"
 #include "shape.h"
 
-#define IMP_WIDE IMP_LANES
+#define IMP_WIDE IMP_WIDE_LANES
 #define IMP_TEXT "kind/shape/shape_text.h"
 #include "math/lane_text.h"
 

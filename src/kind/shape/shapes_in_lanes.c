@@ -11,7 +11,7 @@ const struct imp_shape_lanes *imp__shape_lanes(const struct imp_shape *s)
     if (s->ops == &imp__sphere) return &imp__sphere_lanes;
     if (s->ops->surface == imp__mesh_surface && !s->by_triangle) {
         const struct imp__mesh *m = s->self;
-        /* Of large meshes, those whose frames follow from positions and normals alone. */
+        /* Large meshes: those whose frames follow from positions and normals alone. */
         if (m->facets || !(m->uvs || m->face_tangents)) return &imp__mesh_lanes;
     }
     return NULL;

@@ -218,10 +218,10 @@ static void surfaces(const struct imp_shape *s, const struct imp_wide_hits *h, b
                      struct imp_wide_surface *out)
 {
     const struct sphere *p = s->self;
-    const imp_wide3 o = imp__wide3_gather(h->o, h->at),
-                    d = imp__wide3_gather(h->d, h->at), center = imp__wide3_of(p->center);
+    const imp_wide3 o = imp__wide3_taken(h->o, h->at), d = imp__wide3_taken(h->d, h->at),
+                    center = imp__wide3_of(p->center);
     const imp_wide3 outward = imp__wide3_unit(imp__wide3_minus(
-        imp__wide3_plus(o, imp__wide3_times(d, imp__wide_gather(h->t, h->at))), center));
+        imp__wide3_plus(o, imp__wide3_times(d, imp__wide_taken(h->t, h->at))), center));
     const imp_wide_frame axes = {imp__wide3_of(p->axes.s), imp__wide3_of(p->axes.t),
                                  imp__wide3_of(p->axes.n)};
     const imp_wide3 q = imp__into_wide_frame(&axes, outward);

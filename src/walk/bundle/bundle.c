@@ -109,10 +109,10 @@ static bool rays_in_lanes(struct imp_bundle *b, const struct imp_sensor_lanes *l
         b->py[k] = film->crop_y + at[1];
         ray_put(b, k, rays);
     }
-    for (int i = 0; i < b->n; i += IMP_LANES) {
-        int32_t at[IMP_LANES];
+    for (int i = 0; i < b->n; i += IMP_WIDE_LANES) {
+        int32_t at[IMP_WIDE_LANES];
         struct imp_wide_ray r;
-        for (int k = 0; k < IMP_LANES; k++) at[k] = imp_min(i + k, b->n - 1);
+        for (int k = 0; k < IMP_WIDE_LANES; k++) at[k] = imp_min(i + k, b->n - 1);
         const struct imp_wide_block block =
             imp__wide_block(t->points, b->set, b->index, at, 0);
         const imp_wide px = imp__wide_load(&b->px[i]) +

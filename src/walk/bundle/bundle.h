@@ -32,7 +32,7 @@ struct imp_bundle {
     int colors;                     /* 3, or the 4 wavelengths that each walk carries */
     const struct imp_waves **waves; /* of each walk; NULL: colours */
     int before; /* vertices before the first one that a ray leads to */
-    /* Of each walk: film position, time, its random numbers. */
+    /* Each walk has: film position, time, its random numbers. */
     double *px, *py, *time;
     uint64_t *set; /* hash of the set, or the key of a walk of no set */
     uint32_t *index;

@@ -6,7 +6,7 @@
 #include "lanes_light.h"
 
 /* Fewer vertices are not worth lanes. */
-enum { FEW = IMP_LANES / 2 };
+enum { FEW = IMP_WIDE_LANES / 2 };
 
 #define TAKE(p) ((p) = imp__arena_take(arena, n + IMP_COLUMN_SLACK, sizeof *(p)))
 

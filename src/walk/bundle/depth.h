@@ -6,7 +6,7 @@
 
 #include "bundle.h"
 #include "columns.h"
-#include "kind/lanes.h"
+#include "kind/kind_lanes.h"
 #include "walk/core/step.h"
 
 /* The step that makes vertices one by one, and the shadow ray that it leaves. */

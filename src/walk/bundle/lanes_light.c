@@ -117,7 +117,7 @@ void imp__lanes_light_draw(const struct imp_scene *scene,
 {
     imp_wide u[2] = {u_drawn[0], u_drawn[1]};
     const imp_wide_truth all = ~(imp_wide_truth){0};
-    int light[IMP_LANES] = {0};
+    int light[IMP_WIDE_LANES] = {0};
     out->at.drawn = out->far = out->delta = (imp_wide_truth){0};
     if (scene->n_emitters == 1) {
         const struct imp_emitter_lanes *lanes = lanes_of(scene->emitters[0]);
@@ -128,7 +128,7 @@ void imp__lanes_light_draw(const struct imp_scene *scene,
             return;
         }
     } else {
-        for (int k = 0; k < IMP_LANES; k++) {
+        for (int k = 0; k < IMP_WIDE_LANES; k++) {
             double pmf;
             light[k] = imp__light_pick(scene, which[k], &pmf);
             out->pmf[k] = pmf;
@@ -184,9 +184,9 @@ static inline void sky_work(struct imp_depth *d, const int32_t *order, int n,
     const struct imp_tracer *t = d->bundle->tracer;
     const int light = t->scene->environments[0];
     const struct imp_emitter *e = t->scene->emitters[light];
-    const imp_wide3 from = imp__wide3_gather(d->rays->from, order),
-                    wi = imp__wide3_gather(d->rays->ray.d, order);
-    const imp_wide pdf = imp__wide_gather(d->rays->pdf, order), one = imp__wide(1);
+    const imp_wide3 from = imp__wide3_taken(d->rays->from, order),
+                    wi = imp__wide3_taken(d->rays->ray.d, order);
+    const imp_wide pdf = imp__wide_taken(d->rays->pdf, order), one = imp__wide(1);
     const double chance =
         t->scene->light_cdf[light] - (light ? t->scene->light_cdf[light - 1] : 0);
     imp_wide weight = one;
@@ -207,10 +207,10 @@ void imp__lanes_sky_meet(struct imp_depth *d, const int32_t *order, int n,
 {
     const int max_depth = d->bundle->tracer->integrator->max_depth;
     if (max_depth >= 0 && d->depth >= max_depth) return;
-    for (int i = 0; i < n; i += IMP_LANES) {
-        int32_t rest[IMP_LANES];
-        const int left = imp_min(n - i, IMP_LANES);
-        for (int k = 0; k < IMP_LANES; k++) rest[k] = order[i + (k < left ? k : 0)];
+    for (int i = 0; i < n; i += IMP_WIDE_LANES) {
+        int32_t rest[IMP_WIDE_LANES];
+        const int left = imp_min(n - i, IMP_WIDE_LANES);
+        for (int k = 0; k < IMP_WIDE_LANES; k++) rest[k] = order[i + (k < left ? k : 0)];
         sky_work(d, rest, left, beyond);
     }
 }

@@ -5,7 +5,7 @@
 #define IMP_WALK_BUNDLE_LANES_LIGHT_H
 
 #include "depth.h"
-#include "kind/lanes.h"
+#include "kind/kind_lanes.h"
 
 /* Points of lights, and what they send. */
 struct imp_lanes_light {
@@ -17,14 +17,14 @@ struct imp_lanes_light {
 
 /* What imp__light_point (core/drawn.h) draws for vertices at ref with the numbers u, in the lanes
  * with bits; at.drawn: there is a light, which shows its front. `which` chooses the light; one: it
- * is u[0], of which the part that is left draws the point. carried [IMP_LANES]: wavelengths of the
+ * is u[0], of which the part that is left draws the point. carried [IMP_WIDE_LANES]: wavelengths of the
  * walks; NULL: colours. */
 void imp__lanes_light_draw(const struct imp_scene *scene,
                            const struct imp_carried *const *carried, const imp_wide3 *ref,
                            const imp_wide u[2], imp_wide which, bool one, unsigned bits,
                            struct imp_lanes_light *out);
 
-/* The same where lights are chosen by the scene's tree: vertices at place [IMP_LANES]. */
+/* The same where lights are chosen by the scene's tree: vertices at place [IMP_WIDE_LANES]. */
 void imp__lanes_tree_draw(const struct imp_scene *scene,
                           const struct imp_carried *const *carried,
                           const struct imp_light_place place[], const imp_wide u[2],

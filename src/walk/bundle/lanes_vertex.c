@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Vertices of a bundle in lanes: those on one shape, IMP_LANES at a time. What the one step does
+ * Vertices of a bundle in lanes: those on one shape, IMP_WIDE_LANES at a time. What the one step does
  * for a walk alone (path/sensor_end.h, core/scatter.c, core/light.c) stands here for walks that
  * have a kernel, light samples and roulette, and nothing more. */
-#include "kind/lanes.h"
+#include "kind/kind_lanes.h"
 #include "lanes_light.h"
 #include "math/offset.h"
 
@@ -51,7 +51,7 @@ static const struct imp_shape *shape_of(const struct imp_depth *d, int ray)
 static void surface_alone(const struct imp_depth *d, const struct imp_wide_hits *h,
                           struct imp_wide_surface *out)
 {
-    for (int k = 0; k < IMP_LANES; k++) {
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
         const int i = h->at[k];
         const struct imp_shape *s = shape_of(d, i);
         const struct imp_hit hit = {.shape = s->index,
@@ -78,7 +78,7 @@ static void inputs_alone(const struct imp_depth *d, const struct imp_bsdf *b,
                          const struct imp_wide_hits *h, const struct imp_wide_surface *x,
                          struct imp_wide_color *in)
 {
-    for (int k = 0; k < IMP_LANES; k++) {
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
         imp_spec own[IMP_INPUTS_MAX];
         const struct imp_texcoord at = {
             .uv = {imp__decide1(x->uv[0][k]), imp__decide1(x->uv[1][k])},
@@ -124,14 +124,14 @@ struct vertices {
     unsigned on; /* a bit for each lane that counts */
     int at;      /* place of the first among the values of the depth */
     const int32_t *order;
-    struct imp_light_place place[IMP_LANES];      /* where there is a tree of lights */
-    const struct imp_carried *carried[IMP_LANES]; /* where walks carry wavelengths */
+    struct imp_light_place place[IMP_WIDE_LANES]; /* where there is a tree of lights */
+    const struct imp_carried *carried[IMP_WIDE_LANES]; /* where walks carry wavelengths */
 };
 
 /* imp__light_place of all lanes: kernels in lanes send nothing through the surface. */
 static void places(struct vertices *v)
 {
-    for (int k = 0; k < IMP_LANES; k++) {
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
         const imp_v3 n = imp__wide3_lane(&v->x.frame.n, k);
         v->place[k] = (struct imp_light_place){.p = imp__wide3_lane(&v->x.p, k),
                                                .n = v->wo.z[k] < 0 ? -n : n,
@@ -228,11 +228,11 @@ scatter(struct imp_depth *d, const struct imp_bin *bin, const struct vertices *v
     wi = imp__wide3_decide(wi);
     const imp_wide pdf = imp__wide_decide(
         bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, &wi, colors, &f));
-    const imp_wide by = 1 / pdf, eta = imp__wide_gather(d->rays->eta, v->order);
+    const imp_wide by = 1 / pdf, eta = imp__wide_taken(d->rays->eta, v->order);
     imp_wide beta[4], survive;
     goes &= pdf > zero;
     for (int c = 0; c < colors; c++)
-        beta[c] = imp__wide_gather(d->rays->beta[c], v->order) * (f.c[c] * by);
+        beta[c] = imp__wide_taken(d->rays->beta[c], v->order) * (f.c[c] * by);
     goes &= ~is_zero(beta, colors);
     goes &= survives(d, v, beta, colors, eta, &survive);
     const imp_wide again = 1 / survive, scale = 1 / (pdf * survive);
@@ -287,16 +287,17 @@ static inline __attribute__((always_inline)) void work(struct imp_depth *d,
     v.order = order;
     v.points = b->tracer->points != NULL;
     v.depth = d->depth;
-    int32_t walk[IMP_LANES];
-    for (int k = 0; k < IMP_LANES; k++) walk[k] = d->rays->walk[order[k]];
+    int32_t walk[IMP_WIDE_LANES];
+    for (int k = 0; k < IMP_WIDE_LANES; k++) walk[k] = d->rays->walk[order[k]];
     if (colors > 3)
-        for (int k = 0; k < IMP_LANES; k++) v.carried[k] = &b->waves[walk[k]]->carried;
+        for (int k = 0; k < IMP_WIDE_LANES; k++)
+            v.carried[k] = &b->waves[walk[k]]->carried;
     v.numbers =
         imp__wide_block(b->tracer->points, b->set, b->index, walk, imp__block(d->depth));
     if (bin->surface) bin->surface->surface(bin->shape, &hits, !bin->plain, &v.x);
     else surface_alone(d, &hits, &v.x);
     v.wo_drawn = imp__into_wide_frame(
-        &v.x.frame, imp__wide3_opposite(imp__wide3_gather(d->rays->ray.d, order)));
+        &v.x.frame, imp__wide3_opposite(imp__wide3_taken(d->rays->ray.d, order)));
     v.wo = imp__wide3_decide(v.wo_drawn);
     v.in = bin->in;
     if (imp_unlikely(d->next->left != NULL)) places(&v);
@@ -322,12 +323,12 @@ static inline __attribute__((always_inline)) void work(struct imp_depth *d,
 void imp__vertices_in_lanes(struct imp_depth *d, const struct imp_bin *bin,
                             const int32_t *order, int n, int at)
 {
-    int32_t rest[IMP_LANES];
-    for (int i = 0; i < n; i += IMP_LANES) {
-        const int left = imp_min(n - i, IMP_LANES);
+    int32_t rest[IMP_WIDE_LANES];
+    for (int i = 0; i < n; i += IMP_WIDE_LANES) {
+        const int left = imp_min(n - i, IMP_WIDE_LANES);
         const int32_t *here = order + i;
-        if (left < IMP_LANES) { /* the lanes that are left repeat one */
-            for (int k = 0; k < IMP_LANES; k++) rest[k] = here[k < left ? k : 0];
+        if (left < IMP_WIDE_LANES) { /* the lanes that are left repeat one */
+            for (int k = 0; k < IMP_WIDE_LANES; k++) rest[k] = here[k < left ? k : 0];
             here = rest;
         }
         if (imp_likely(d->bundle->colors == 3)) work(d, bin, here, left, at + i, 3);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * As many numbers as a register of the processor holds, which walks in bundles are worked on
- * with: imp_wide, a vector of IMP_LANES doubles. Operators and the words of lane_text.h make
+ * with: imp_wide, a vector of IMP_WIDE_LANES doubles. Operators and the words of lane_text.h make
  * formulas; here is what takes lanes out of columns and puts them back. */
-#ifndef IMP_MATH_WIDE_H
-#define IMP_MATH_WIDE_H
+#ifndef IMP_MATH_WIDE_REAL_H
+#define IMP_MATH_WIDE_REAL_H
 
 #include "points.h"
 #include "reals.h"
@@ -14,23 +14,23 @@
 #endif
 
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
-#define IMP_LANES 8
+#define IMP_WIDE_LANES 8
 typedef imp_real_8 imp_wide;
 typedef imp_truth_8 imp_wide_truth;
 typedef uint64_t imp_wide_word __attribute__((vector_size(64)));
 typedef float imp_wide_float __attribute__((vector_size(32)));
 #else
-#define IMP_LANES 4
+#define IMP_WIDE_LANES 4
 typedef imp_real_4 imp_wide;
 typedef imp_truth_4 imp_wide_truth;
 typedef uint64_t imp_wide_word __attribute__((vector_size(32)));
 typedef float imp_wide_float __attribute__((vector_size(16)));
 #endif
 
-#define IMP_WIDE IMP_LANES
+#define IMP_WIDE IMP_WIDE_LANES
 #define IMP_TEXT "math/vec_text.h"
 #include "lane_text.h"
-#define IMP_WIDE_OF(name) IMP_WIDE_JOIN(name, IMP_LANES)
+#define IMP_WIDE_OF(name) IMP_WIDE_JOIN(name, IMP_WIDE_LANES)
 
 typedef struct IMP_WIDE_OF(imp_real3) imp_wide3;
 typedef struct IMP_WIDE_OF(imp_frames) imp_wide_frame;
@@ -64,24 +64,16 @@ static inline imp_wide3 imp__wide3_of(imp_v3 v) { return IMP_WIDE_OF(imp__vector
 /* A bit for each lane. */
 static inline unsigned imp__wide_bits(imp_wide_truth m)
 {
-#if IMP_LANES == 8
+#if IMP_WIDE_LANES == 8
     return (unsigned)_mm512_movepi64_mask((__m512i)m);
 #else
     return imp__lanes((imp_v3)m);
 #endif
 }
-/* True in the lanes before n. */
-static inline imp_wide_truth imp__wide_first(int n)
-{
-#if IMP_LANES == 8
-    return (imp_wide_truth){0, 1, 2, 3, 4, 5, 6, 7} < n;
-#else
-    return (imp_wide_truth){0, 1, 2, 3} < n;
-#endif
-}
+/* A bit for each of the first n lanes. */
 static inline unsigned imp__bits_first(int n)
 {
-    return n >= IMP_LANES ? (1u << IMP_LANES) - 1 : (1u << n) - 1;
+    return n >= IMP_WIDE_LANES ? (1u << IMP_WIDE_LANES) - 1 : (1u << n) - 1;
 }
 
 /* ---- Rounding ---------------------------------------------------------------------------- */
@@ -89,7 +81,7 @@ static inline unsigned imp__bits_first(int n)
 /* To float and back: what decisions store (walk/core/step.h). */
 static inline imp_wide imp__wide_decide(imp_wide x)
 {
-#if IMP_LANES == 8
+#if IMP_WIDE_LANES == 8
     return (imp_wide)_mm512_cvtps_pd(_mm512_cvtpd_ps((__m512d)x));
 #else
     return imp__widen(imp__narrow(x));
@@ -103,7 +95,7 @@ static inline imp_wide3 imp__wide3_decide(imp_wide3 v)
 
 static inline imp_wide_float imp__wide_narrow(imp_wide x)
 {
-#if IMP_LANES == 8
+#if IMP_WIDE_LANES == 8
     return (imp_wide_float)_mm512_cvtpd_ps((__m512d)x);
 #else
     return imp__narrow(x);
@@ -128,27 +120,27 @@ static inline void imp__wide3_store(double *const to[3], int at, imp_wide3 v)
 }
 
 /* Numbers at[k] of a column. */
-static inline imp_wide imp__wide_gather(const double *column, const int32_t *at)
+static inline imp_wide imp__wide_taken(const double *column, const int32_t *at)
 {
-#if IMP_LANES == 8
+#if IMP_WIDE_LANES == 8
     return (imp_wide)_mm512_i32gather_pd(_mm256_loadu_si256((const void *)at), column, 8);
 #else
     return (imp_wide){column[at[0]], column[at[1]], column[at[2]], column[at[3]]};
 #endif
 }
-static inline imp_wide3 imp__wide3_gather(double *const column[3], const int32_t *at)
+static inline imp_wide3 imp__wide3_taken(double *const column[3], const int32_t *at)
 {
-    return (imp_wide3){imp__wide_gather(column[0], at), imp__wide_gather(column[1], at),
-                       imp__wide_gather(column[2], at)};
+    return (imp_wide3){imp__wide_taken(column[0], at), imp__wide_taken(column[1], at),
+                       imp__wide_taken(column[2], at)};
 }
 
 /* The lanes with bits, side by side; writes all lanes. */
 static inline void imp__wide_append(double *to, unsigned bits, imp_wide x)
 {
-#if IMP_LANES == 8
+#if IMP_WIDE_LANES == 8
     _mm512_storeu_pd(to, _mm512_maskz_compress_pd((__mmask8)bits, (__m512d)x));
 #else
-    for (int k = 0, n = 0; k < IMP_LANES; n += (int)(bits >> k++ & 1)) to[n] = x[k];
+    for (int k = 0, n = 0; k < IMP_WIDE_LANES; n += (int)(bits >> k++ & 1)) to[n] = x[k];
 #endif
 }
 static inline void imp__wide3_append(double *const to[3], int n, unsigned bits,
@@ -198,11 +190,11 @@ static inline struct imp_wide_block imp__wide_block(const struct imp_point_table
                                                     const int32_t *at, uint32_t block)
 {
     struct imp_wide_block b;
-    for (int k = 0; k < IMP_LANES; k++) b.hash[k] = set[at[k]];
+    for (int k = 0; k < IMP_WIDE_LANES; k++) b.hash[k] = set[at[k]];
     b.low = b.high = (imp_wide_word){0};
     if (!points) return b;
     b.hash = imp__wide_mix64(b.hash + (uint64_t)(block + 1) * 0x9e3779b97f4a7c15u);
-    for (int k = 0; k < IMP_LANES; k++) {
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
         const uint64_t h = b.hash[k], i = (index[at[k]] ^ h) & (IMP_SET_POINTS - 1);
         const uint16_t *lead = points->number[h >> 58][i];
         b.low[k] = imp__four_leads(lead);
@@ -218,7 +210,7 @@ static inline imp_wide imp__wide_number(const struct imp_wide_block *b, uint32_t
         imp__wide_mix64(b->hash + (uint64_t)(k + 1) * 0x9e3779b97f4a7c15u);
     const imp_wide_word lead = (k < 4 ? b->low : b->high) >> 16 * (int)(k & 3) << 48;
     const imp_wide_word whole = (shift ^ lead) >> 11;
-#if IMP_LANES == 8
+#if IMP_WIDE_LANES == 8
     return (imp_wide)_mm512_cvtepi64_pd((__m512i)whole) * 0x1p-53;
 #else
     /* Below 2^53: its upper and its lower half are exact, and so is their sum. */

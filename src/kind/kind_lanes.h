@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Kinds in lanes: forms of a kind's functions that work on IMP_LANES points or directions at a
- * time (math/wide.h). Lane k of a result has the bits that the kind's own function (kinds.h) gives
+ * Kinds in lanes: forms of a kind's functions that work on IMP_WIDE_LANES points or directions at a
+ * time (math/wide_real.h). Lane k of a result has the bits that the kind's own function (kinds.h) gives
  * for lane k of the arguments. Where a lane's result does not count it may be anything.
  *
  * A kind without a form in lanes is called point by point. One that has some lists it in the table
  * of its concept (kind/bsdf/bsdfs_in_lanes.c, ...); tests/unit/bundles.c compares both forms. */
-#ifndef IMP_KIND_LANES_H
-#define IMP_KIND_LANES_H
+#ifndef IMP_KIND_KIND_LANES_H
+#define IMP_KIND_KIND_LANES_H
 
-#include "math/wide.h"
+#include "math/wide_real.h"
 #include <importon/kinds.h>
 
 /* Colours: r, g, b, or four wavelengths. */
@@ -29,7 +29,7 @@ struct imp_wide_hits {
     double *const *o, *const *d; /* [3] columns: the rays */
     const double *t, *u, *v;     /* as of struct imp_hit */
     const int32_t *prim;
-    const int32_t *at; /* [IMP_LANES] */
+    const int32_t *at; /* [IMP_WIDE_LANES] */
 };
 struct imp_wide_surface {
     imp_wide3 p, ng;
