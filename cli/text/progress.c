@@ -5,13 +5,17 @@
 
 #include <math.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
 
-static volatile sig_atomic_t stop_asked;  /* the library shall stop */
-static volatile sig_atomic_t interrupted; /* by this signal */
+/* Written by a signal's handler, in whichever thread it comes, and read by all: atomic objects
+ * without a lock may be both (C11 7.14.1.1). */
+_Static_assert(ATOMIC_INT_LOCK_FREE == 2, "int is atomic without a lock");
+static _Atomic int stop_asked;  /* the library shall stop */
+static _Atomic int interrupted; /* by this signal */
 static int show, drawn;
 static double deadline; /* on the monotonic clock; 0: none */
 
