@@ -82,6 +82,7 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     IMP_TRY(imp__props_float_in(ctx, node, "sampling_weight", 1, IMP_NOT_NEGATIVE,
                                 &e->weight));
     IMP_TRY(imp__build_course(scene, node, &e->course));
+    scene->timed_lights |= e->course != NULL;
     medium_child(node); /* walks have the place */
     if (ops->build) IMP_TRY(ops->build(&b, self, e));
     for (int j = 0; j < e->n_in; j++)

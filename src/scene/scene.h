@@ -143,6 +143,7 @@ struct imp_scene {
     int environment;                         /* emitter index of the first, -1: none */
     int n_environments;
     int *environments;   /* [n_environments] emitter indices: radiances of a ray add up */
+    bool timed_lights;   /* some vary in time */
     double *light_cdf;   /* [n_emitters] by sampling_weight, last is 1 */
     bool lights_in_tree; /* some integrator chooses lights by the tree */
     bool grids_by_tree;  /* some integrator does so for grids of illuminances alone */

@@ -12,10 +12,8 @@
 bool imp__lanes_fit(const struct imp_tracer *t)
 {
     const struct imp_walk_integrator *w = t->integrator;
-    for (int k = 0; k < t->scene->n_emitters; k++)
-        if (t->scene->emitters[k]->course) return false;
-    return w->ends_by == IMP_ENDS_BY_ROULETTE && w->directions && !w->only_points &&
-           t->scene->n_groups == 0;
+    return !t->scene->timed_lights && w->ends_by == IMP_ENDS_BY_ROULETTE &&
+           w->directions && !w->only_points && t->scene->n_groups == 0;
 }
 
 bool imp__shape_in_lanes(const struct imp_scene *scene, int shape)
