@@ -31,11 +31,12 @@ static inline double imp__block_far(const struct imp_ray_block *b, int k)
     return b->far[k / IMP_WIDE_LANES][k % IMP_WIDE_LANES];
 }
 
-/* on: a bit for each ray that is asked for. A bit for each that meets something, with its hit, or
- * that is hidden: as imp__facets_nearest and imp__facets_occluded say of it. */
+/* The nearest facet that each ray with a bit in `on` meets, as imp__facets_nearest gives it. The
+ * result has a bit for each ray that meets one, and `hit` its hit. */
 unsigned imp__facets_nearest_block(const struct imp_facets *f,
                                    const struct imp_ray_block *rays, unsigned on,
                                    struct imp_hit hit[IMP_RAY_BLOCK]);
+/* The rays with a bit in `on` that imp__facets_occluded calls hidden, a bit for each. */
 unsigned imp__facets_occluded_block(const struct imp_facets *f,
                                     const struct imp_ray_block *rays, unsigned on);
 

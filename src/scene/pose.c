@@ -101,7 +101,7 @@ static enum imp_status sensor_apply(const struct imp_pose *p)
             "the lens of camera '%s' folds its picture with k1, k2, p1, p2, "
             "k3 = %g, %g, %g, %g, %g",
             s->name, number[3], number[4], number[5], number[6], number[7]);
-    if (!imp__pose_rests(p)) s->ops->move(s, map_of(p).m);
+    if (!imp__pose_is_at_start(p)) s->ops->move(s, map_of(p).m);
     return IMP_OK;
 }
 

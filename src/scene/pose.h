@@ -125,7 +125,7 @@ void imp__pose_changed(void *pose);
 /* Sets p->rest and what follows it. IMP_E_NOMEM. */
 enum imp_status imp__pose_rest_keep(struct imp_scene *scene, struct imp_pose *p);
 /* Is it turned and shifted by nothing? */
-bool imp__pose_rests(const struct imp_pose *p);
+bool imp__pose_is_at_start(const struct imp_pose *p);
 /* Moves what a shape, which has been moved, carries along. p: the first parameter of the object. */
 struct imp_map;
 void imp__pose_carry(const struct imp_pose *p, const struct imp_map *by);

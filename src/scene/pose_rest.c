@@ -10,7 +10,7 @@
 #include "pose.h"
 #include <string.h>
 
-bool imp__pose_rests(const struct imp_pose *p)
+bool imp__pose_is_at_start(const struct imp_pose *p)
 {
     const struct imp_pose *rigid = imp__pose_beside(p, IMP_POSE_RIGID);
     bool rests = true;
@@ -77,6 +77,6 @@ void imp__pose_carry(const struct imp_pose *p, const struct imp_map *by)
     if (p->table) imp__ies_move(table_of(p)->self, p->table, by->m);
     if (!p->receiver) return;
     struct imp_receiver *r = (struct imp_receiver *)(uintptr_t)s->sensor->receiver;
-    if (imp__pose_rests(p)) *r = *p->receiver; /* to the bit */
+    if (imp__pose_is_at_start(p)) *r = *p->receiver; /* to the bit */
     else imp__receiver_turn(r, p->receiver, s, by->m);
 }

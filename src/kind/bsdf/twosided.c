@@ -194,7 +194,8 @@ static imp_wide3 flips(const imp_wide3 *w, imp_wide_truth back)
     return (imp_wide3){w->x, w->y, imp__wide_choose(back, -w->z, w->z)};
 }
 
-/* Are there lanes of which child k is asked? With one child all are. */
+/* Child k answers in some lane: the last one from behind, the first in front; an only child in
+ * all. */
 static bool is_asked(const struct imp_bsdf *b, int k, imp_wide_truth back)
 {
     const unsigned bits = imp__wide_bits(back);
