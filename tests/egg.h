@@ -9,6 +9,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+/* It stands in a room before a camera, of the material `grey`. */
+#define EGG_OF(file)                                                                     \
+    "<shape type='obj' id='egg'><string name='filename' value='" file                    \
+    "'/><transform name='to_world'><scale value='.6'/><translate x='1' y='-.8' "         \
+    "z='.6'/></transform><ref id='grey'/></shape>"
+
 /* An octahedron with every triangle cut into four, on an ellipsoid: 18 vertices. normals: of the
  * ellipsoid, in the file; else importon computes them. */
 static inline void egg_write(const char *file, bool normals)

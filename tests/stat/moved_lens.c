@@ -21,10 +21,7 @@
     "<shape type='sphere' id='ball'><float name='radius' value='.4'/><point "            \
     "name='center' x='1.1' y='-.8' z='.5'/><ref id='grey'/></shape>"
 #define EGG_FILE "moved_lens_egg.obj"
-#define EGG                                                                              \
-    "<shape type='obj' id='egg'><string name='filename' value='" EGG_FILE                \
-    "'/><transform name='to_world'><scale value='.6'/><translate x='1' y='-.8' "         \
-    "z='.6'/></transform><ref id='grey'/></shape>"
+#define EGG      EGG_OF(EGG_FILE)
 
 static imp_scene *room(const char *rest)
 {

@@ -24,10 +24,7 @@
     "name='p1' x='-1.1' y='-.8' z='1.1'/><float name='radius' value='.3'/><bsdf "        \
     "type='twosided'><ref id='grey'/></bsdf></shape>"
 #define EGG_FILE "moved_parallel_egg.obj"
-#define EGG                                                                              \
-    "<shape type='obj' id='egg'><string name='filename' value='" EGG_FILE                \
-    "'/><transform name='to_world'><scale value='.6'/><translate x='1' y='-.8' "         \
-    "z='.6'/></transform><ref id='grey'/></shape>"
+#define EGG      EGG_OF(EGG_FILE)
 
 static imp_scene *room(const char *rest)
 {
