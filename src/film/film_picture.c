@@ -126,51 +126,25 @@ static inline int64_t sample_number(const struct render *r, int k)
                : r->picture->first + (int64_t)k * imp_max(r->picture->step, 1);
 }
 
-/* Walks of a bundle, about: enough to fill lanes, few enough for a processor's own cache. */
-enum { BUNDLE = 512, BUNDLE_PIXELS = 64 };
-
-/* The bundles of a tile: a few pixels in a row each, in the order in which they are taken. */
-struct bundles {
-    struct imp_bundle at_work;
-    struct imp_arena_mark mark; /* of the arena, before it */
-    int64_t *numbers;           /* [n] of the samples of a pixel; NULL: no bundles */
-    int n, pixels;              /* of a bundle */
-    int next;                   /* pixel that the next bundle begins with */
-};
-
-static void bundles_begin(const struct render *r, struct imp_arena *arena, int s0, int s1,
-                          struct bundles *b)
+/* The walks of a tile in bundles: NULL, where samples are none, or not of such walks. */
+static struct imp_supply *supply_begin(const struct render *r, const struct imp_tile *t,
+                                       struct imp_arena *arena, int s0, int s1,
+                                       struct imp_supply *supply)
 {
-    *b = (struct bundles){.n = s1 - s0};
-    if (!r->picture->walks || b->n < 1 || b->n > BUNDLE) return;
-    b->numbers = imp__arena_take(arena, (size_t)b->n, sizeof *b->numbers);
-    b->pixels = imp_clamp(BUNDLE / b->n, 1, BUNDLE_PIXELS);
-    b->mark = imp__arena_mark(arena);
-    for (int k = 0; b->numbers && k < b->n; k++) b->numbers[k] = sample_number(r, s0 + k);
-}
-
-/* For sample k of the pixel, which follows the one before. */
-static void bundle_of(const struct render *r, const struct imp_tile *t, struct bundles *b,
-                      int k, struct imp_sample *s)
-{
-    const int across = t->x1 - t->x0, at = (s->y - t->y0) * across + s->x - t->x0;
-    const int all = across * (t->y1 - t->y0);
-    if (k == 0 && at == b->next) {
-        int xy[BUNDLE_PIXELS][2], n = 0;
-        for (; n < b->pixels && at + n < all; n++) {
-            xy[n][0] = t->x0 + (at + n) % across;
-            xy[n][1] = t->y0 + (at + n) / across;
-        }
-        b->next = at + n;
-        imp__arena_rewind(s->arena, b->mark);
-        s->in_bundle = 0;
-        s->bundle = imp__bundle_trace(r->picture->walks, s->arena, n, xy, b->n,
-                                      b->numbers, &b->at_work)
-                        ? &b->at_work
-                        : NULL;
-        return;
+    const int across = t->x1 - t->x0, n = across * (t->y1 - t->y0);
+    if (!r->picture->walks) return NULL;
+    int64_t *numbers = imp__arena_take(arena, (size_t)(s1 - s0), sizeof *numbers);
+    int(*xy)[2] = imp__arena_take(arena, (size_t)n, sizeof *xy);
+    for (int k = s0; numbers && k < s1; k++) numbers[k - s0] = sample_number(r, k);
+    for (int k = 0; xy && k < n; k++) {
+        xy[k][0] = t->x0 + k % across;
+        xy[k][1] = t->y0 + k / across;
     }
-    s->in_bundle++;
+    return numbers && xy &&
+                   imp__supply_begin(r->picture->walks, arena, (const int(*)[2])xy, n,
+                                     numbers, s1 - s0, 1, supply)
+               ? supply
+               : NULL;
 }
 
 static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worker *w,
@@ -181,13 +155,13 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
     int n_sets = 0;
     int64_t first = 0, n_set = 0; /* of the set at work */
     const int n = r->patch.n;
-    struct bundles bundles;
+    struct imp_supply walks;
     double *tile = result;
     double *patch = r->patches + (size_t)w->index * apart(imp__patch_size(&r->patch));
     struct imp_sample s = {.arena = &w->arena,
                            .value = r->values + (size_t)w->index * apart((size_t)n)};
     memset(tile, 0, imp__film_sums_pixels(&r->sums) * sizeof *tile);
-    bundles_begin(r, s.arena, s0, s1, &bundles);
+    s.supply = supply_begin(r, t, s.arena, s0, s1, &walks);
     for (s.y = t->y0; s.y < t->y1; s.y++)
         for (s.x = t->x0; s.x < t->x1; s.x++) {
             double *own =
@@ -195,7 +169,7 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
                            (size_t)n;
             for (int k = s0; k < s1; k++) {
                 s.index = sample_number(r, k);
-                if (bundles.numbers) bundle_of(r, t, &bundles, k - s0, &s);
+                if (s.supply) imp__supply_ready(s.supply);
                 sample_take(r, w, &s);
                 if (imp_unlikely(r->set > 1)) {
                     if (k == s0 || k >= first + n_set)

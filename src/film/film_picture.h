@@ -6,7 +6,7 @@
 
 #include "base/film.h"
 #include "film_filter.h"
-#include "walk/bundle/bundle.h"
+#include "walk/bundle/supply.h"
 #include "walk/kept/store.h"
 
 /* A sample of a pixel: which one, and what comes of it. */
@@ -14,9 +14,8 @@ struct imp_sample {
     int x, y;                /* pixel, from the crop's corner */
     int64_t index;           /* number of the sample in its pixel */
     struct imp_arena *arena; /* rewound afterwards */
-    const struct imp_bundle
-        *bundle; /* its walk is number `in_bundle` of it; NULL: of none */
-    int in_bundle;
+    struct imp_supply
+        *supply; /* gives its walk, if it is one; NULL: it is traced alone */
     /* Set by whoever takes the sample: */
     double *value; /* [n]; 0 if dropped */
     double px, py; /* film position */
@@ -68,7 +67,7 @@ static inline int64_t imp__walks_of(const struct imp_run *run,
 static inline void imp__sample_walk(struct imp_sample *s, const struct imp_tracer *tracer,
                                     struct imp_walk *walk)
 {
-    if (s->bundle) imp__bundle_walk(s->bundle, s->in_bundle, walk);
+    if (s->supply) imp__supply_take(s->supply, s->x, s->y, s->index, walk);
     else if (imp_likely(!tracer->kept))
         imp__walk_trace(tracer, s->arena, s->x, s->y, s->index, walk);
     else imp__store_walk_at(tracer, s->arena, s->x, s->y, s->index, walk);

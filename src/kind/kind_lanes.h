@@ -36,11 +36,14 @@ struct imp_wide_surface {
     imp_wide_frame frame; /* shading frame */
     imp_wide uv[2];
 };
-/* Points of a light as seen from others. */
+/* Points of a light as seen from others, as of struct imp_light_sample. */
 struct imp_wide_light {
     imp_wide3 wi, p;
-    imp_wide pdf, cos_light; /* as of struct imp_light_sample */
-    imp_wide_truth drawn;    /* there is one */
+    imp_wide pdf, cos_light;
+    imp_wide_truth drawn; /* there is one */
+    bool recorded;        /* given: what follows is wanted */
+    imp_wide dist, uv[2], located[2];
+    int32_t prim[IMP_WIDE_LANES];
 };
 
 struct imp_shape_lanes {
@@ -59,8 +62,9 @@ const struct imp_shape_lanes *imp__shape_lanes(const struct imp_shape *s);
 /* ---- Materials --------------------------------------------------------------------------- */
 
 struct imp_bsdf_lanes {
-    /* This one is covered: its parameters may say it is not. NULL: all are. */
-    bool (*covers)(const struct imp_bsdf *b);
+    /* This one is covered: its parameters may say it is not, and derivatives that are wanted
+     * (imp_dirs), for which it draws otherwise. NULL: all are. */
+    bool (*covers)(const struct imp_bsdf *b, uint64_t derivative);
     /* imp_bsdf_ops.sample, with a smooth lobe; u as there. Where it is true. */
     imp_wide_truth (*sample)(const struct imp_bsdf *b, const struct imp_wide_color *in,
                              const imp_wide3 *wo, const imp_wide u[3], imp_wide3 *wi);
@@ -69,9 +73,10 @@ struct imp_bsdf_lanes {
                          const imp_wide3 *wo, const imp_wide3 *wi, int colors,
                          struct imp_wide_color *f);
 };
-/* NULL: this material has none. Those that have one have neither an index ratio nor emission, and
+/* NULL: this material has none, with these derivatives wanted. Those that have one have neither an index ratio nor emission, and
  * no lobe that is not smooth. */
-const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b);
+const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b,
+                                             uint64_t derivative);
 
 /* ---- Emitters ---------------------------------------------------------------------------- */
 

@@ -59,6 +59,127 @@ static bool same(double a, double b)
 {
     return memcmp(&a, &b, sizeof a) == 0 || (isnan(a) && isnan(b));
 }
+static bool same_color(imp_spec a, imp_spec b, const struct imp_carried *carried)
+{
+    bool all = true;
+    for (int c = 0; c < (carried ? 4 : 3); c++) all &= same(a[c], b[c]);
+    return all;
+}
+static bool same_decided(const imp_decided *a, const imp_decided *b, int n)
+{
+    bool all = true;
+    for (int k = 0; k < n; k++) all &= same(a[k], b[k]);
+    return all;
+}
+
+/* ---- Records ----------------------------------------------------------------------------- */
+
+static bool same_located(const struct imp_located *a, const struct imp_located *b)
+{
+    return a->prim == b->prim && same(a->at[0], b->at[0]) && same(a->at[1], b->at[1]);
+}
+
+static bool same_step(const struct imp_vertex *a, const struct imp_vertex *b)
+{
+    const struct imp_decision *x = &a->d, *y = &b->d;
+    if (x->goes_on != y->goes_on) return false;
+    return !x->goes_on ||
+           (same_decided(x->wi, y->wi, 3) && same(x->pdf, y->pdf) && x->lobe == y->lobe &&
+            same(x->survive, y->survive) && same(x->share, y->share) &&
+            same(x->rest, y->rest) && x->drawn == y->drawn && x->alone == y->alone);
+}
+
+static bool same_light(const struct imp_vertex *a, const struct imp_vertex *b)
+{
+    const struct imp_light *x = &a->d.light, *y = &b->d.light;
+    if (a->d.connection != b->d.connection) return false;
+    return a->d.connection == IMP_NOT_CONNECTED ||
+           (x->emitter == y->emitter && same(x->weight, y->weight) &&
+            same_decided(x->uv, y->uv, 2) && same(x->dist, y->dist) &&
+            same(x->cos_light, y->cos_light) && same_decided(x->d, y->d, 3) &&
+            same_decided(x->p, y->p, 3) && same_decided(x->wi, y->wi, 3) &&
+            same_located(&x->located, &y->located) &&
+            same_color(a->light_f, b->light_f, a->carried) &&
+            same_color(a->light_e, b->light_e, a->carried) &&
+            same_color(a->light_w, b->light_w, a->carried));
+}
+
+static bool same_met(const struct imp_vertex *a, const struct imp_vertex *b)
+{
+    const struct imp_met *x = &a->d.met, *y = &b->d.met;
+    if (x->emitter != y->emitter) return false;
+    return x->emitter < 0 ||
+           (same(x->weight, y->weight) && same(x->dist, y->dist) &&
+            same(x->cos_light, y->cos_light) && same_decided(x->d, y->d, 3));
+}
+
+static bool same_vertex(const struct imp_vertex *a, const struct imp_vertex *b)
+{
+    const struct imp_decision *x = &a->d, *y = &b->d;
+    bool all = a->bsdf == b->bsdf && a->shape == b->shape && same(a->t, b->t) &&
+               same_color(a->scale, b->scale, a->carried) &&
+               same_color(a->e, b->e, a->carried) && same_color(a->b, b->b, a->carried) &&
+               same_color(a->w, b->w, a->carried) &&
+               same_color(a->beyond, b->beyond, a->carried) && !a->carried == !b->carried;
+    all &= x->shape == y->shape && x->scatterer == y->scatterer &&
+           same_decided(x->uv, y->uv, 2) && same_decided(x->p, y->p, 3);
+    for (int j = 0; a->bsdf && j < a->bsdf->n_in; j++)
+        all &= same_color(a->in[j], b->in[j], a->carried);
+    if (a->shape)
+        all &= same_decided(x->wo, y->wo, 3) && x->back == y->back &&
+               x->place == y->place && same_located(&x->located, &y->located) &&
+               x->glows == y->glows && same(a->ng[0], b->ng[0]) &&
+               same(a->ng[1], b->ng[1]) && same(a->ng[2], b->ng[2]);
+    return all && same_step(a, b) && same_light(a, b) && same_met(a, b);
+}
+
+/* Vertices that differ, of two records of a walk. */
+static int differing(const struct imp_walk *a, const struct imp_walk *b)
+{
+    const struct imp_vertex *v = a->first, *w = b->first;
+    int wrong = a->n != b->n || a->depth != b->depth || a->key.state != b->key.state ||
+                (a->point.points &&
+                 (a->point.set != b->point.set || a->point.index != b->point.index));
+    for (; v && w; v = v->next, w = w->next) wrong += !same_vertex(v, w);
+    return wrong + (v != w);
+}
+
+/* Walks of a bundle that differ from the same alone; *lit: those with light. */
+static int compared(const struct imp_tracer *tracer, int *lit)
+{
+    struct imp_arena arena, alone;
+    struct imp_bundle b;
+    int xy[SIDE * SIDE][2], wrong = 0;
+    int64_t samples[SAMPLES];
+    *lit = 0;
+    imp__arena_init(&arena, ctx);
+    imp__arena_init(&alone, ctx);
+    for (int p = 0; p < SIDE * SIDE; p++) xy[p][0] = p % SIDE, xy[p][1] = p / SIDE;
+    for (int k = 0; k < SAMPLES; k++) samples[k] = imp__set_number(4, SAMPLES, k);
+    if (!imp__bundle_fits(tracer) ||
+        !imp__bundle_trace(tracer, &arena, SIDE * SIDE, (const int(*)[2])xy, SAMPLES,
+                           samples, &b))
+        return -1;
+    for (int k = 0; k < b.n; k++) {
+        struct imp_walk one, other;
+        const int *at = xy[k / SAMPLES];
+        imp__walk_trace(tracer, &alone, at[0], at[1], samples[k % SAMPLES], &one);
+        imp__bundle_walk(&b, k, &other);
+        bool all = same(one.px, other.px) && same(one.py, other.py) &&
+                   one.valid == other.valid && one.dropped == other.dropped &&
+                   same(one.time, other.time);
+        for (int c = 0; c < 3; c++) all &= same(one.L[c], other.L[c]);
+        for (int c = 0; one.waves && c < 4; c++)
+            all &= same(one.values[c], other.values[c]);
+        if (!tracer->value_only) all &= differing(&one, &other) == 0;
+        wrong += !all;
+        *lit += one.L[0] > 0;
+        imp__arena_rewind(&alone, (struct imp_arena_mark){0});
+    }
+    imp__arena_free(&arena);
+    imp__arena_free(&alone);
+    return wrong;
+}
 
 /* lanes: so many shapes have vertices in lanes. */
 static void compare(const char *name, enum imp_color_mode mode, int lanes,
@@ -78,40 +199,27 @@ static void compare(const char *name, enum imp_color_mode mode, int lanes,
                                 .sensor = scene->sensors[0],
                                 .value_only = true,
                                 .seed = 5};
+    struct imp_active active;
+    static uint8_t chosen[1024];
+    int lit, binned = 0;
     if (strstr(name, "independent")) run.points = IMP_POINTS_INDEPENDENT;
     imp__tracer_numbers(&tracer, &run, SAMPLES);
-    struct imp_arena arena, alone;
-    imp__arena_init(&arena, ctx);
-    imp__arena_init(&alone, ctx);
-    int xy[SIDE * SIDE][2], wrong = 0, lit = 0, binned = 0;
-    int64_t samples[SAMPLES];
-    for (int p = 0; p < SIDE * SIDE; p++) xy[p][0] = p % SIDE, xy[p][1] = p / SIDE;
-    for (int k = 0; k < SAMPLES; k++) samples[k] = imp__set_number(4, SAMPLES, k);
-    struct imp_bundle b;
-    const bool fits = imp__bundle_fits(&tracer);
     for (int k = 0; k < scene->n_shapes; k++)
-        binned += imp__lanes_fit(&tracer) && imp__shape_in_lanes(scene, k);
-    if (fits && imp__bundle_trace(&tracer, &arena, SIDE * SIDE, (const int(*)[2])xy,
-                                  SAMPLES, samples, &b))
-        for (int k = 0; k < b.n; k++) {
-            struct imp_walk one, other;
-            const int *at = xy[k / SAMPLES];
-            imp__walk_trace(&tracer, &alone, at[0], at[1], samples[k % SAMPLES], &one);
-            imp__bundle_walk(&b, k, &other);
-            wrong += !same(one.px, other.px) || !same(one.py, other.py) ||
-                     one.valid != other.valid || one.dropped != other.dropped ||
-                     !same(one.time, other.time);
-            for (int c = 0; c < 3; c++) wrong += !same(one.L[c], other.L[c]);
-            for (int c = 0; one.waves && c < 4; c++)
-                wrong += !same(one.values[c], other.values[c]);
-            lit += one.L[0] > 0;
-            imp__arena_rewind(&alone, (struct imp_arena_mark){0});
-        }
-    tap_ok(fits && wrong == 0 && lit > SIDE * SIDE / 2 && binned == lanes,
+        binned += imp__lanes_fit(&tracer) && imp__shape_in_lanes(&tracer, k);
+    const int wrong = compared(&tracer, &lit);
+    tap_ok(wrong == 0 && lit > SIDE * SIDE / 2 && binned == lanes,
            "%s: of %d walks, %d lit, %d differ; %d shapes in lanes, %d expected", name,
            SIDE * SIDE * SAMPLES, lit, wrong, binned, lanes);
-    imp__arena_free(&arena);
-    imp__arena_free(&alone);
+
+    /* Recorded, with derivatives by all parameters. */
+    for (size_t k = 0; k < scene->n_params; k++)
+        chosen[k] = (scene->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE) != 0;
+    test_must(ctx, imp__active_create(scene, chosen, &active));
+    tracer.value_only = false;
+    tracer.active = &active;
+    const int records = compared(&tracer, &lit);
+    tap_ok(records == 0, "... recorded: %d differ", records);
+    imp__active_destroy(ctx, &active);
     imp_scene_destroy(scene);
 }
 

@@ -16,7 +16,8 @@ static void sample_radiance(const void *payload, struct imp_sample *s)
     const struct imp_tracer *tracer = payload;
     struct imp_walk walk;
     /* The index is the number of a sample, not its place among kept ones. */
-    imp__walk_trace(tracer, s->arena, s->x, s->y, s->index, &walk);
+    if (s->supply) imp__supply_take(s->supply, s->x, s->y, s->index, &walk);
+    else imp__walk_trace(tracer, s->arena, s->x, s->y, s->index, &walk);
     s->px = walk.px;
     s->py = walk.py;
     s->dropped = walk.dropped;
@@ -160,16 +161,17 @@ enum imp_status imp__splat_create(const struct imp_problem *p,
         own.walks =
             NULL; /* the tracer has them: a picture of run->walks takes them all */
         const int n = target ? s.channels : 1;
-        const struct imp_picture picture = {.sensor = tracer->sensor,
-                                            .stage = "picture",
-                                            .names = n == 3 ? "R,G,B" : "Y",
-                                            .n = n,
-                                            .sample = target ? sample_radiance
-                                                             : sample_position,
-                                            .payload = tracer,
-                                            .first = imp__replicates_first(plan, b, set),
-                                            .step = one_by_one ? plan.stride : 1,
-                                            .weights = s.weights[k]};
+        const struct imp_picture picture = {
+            .sensor = tracer->sensor,
+            .stage = "picture",
+            .names = n == 3 ? "R,G,B" : "Y",
+            .n = n,
+            .sample = target ? sample_radiance : sample_position,
+            .payload = tracer,
+            .first = imp__replicates_first(plan, b, set),
+            .step = one_by_one ? plan.stride : 1,
+            .weights = s.weights[k],
+            .walks = target ? imp__bundle_use(tracer) : NULL};
         IMP_TRY(imp__picture_make(ctx, &picture, &own, &s.films[k]));
         if (!target || set < s.m - 1) continue;
         double value = 0;

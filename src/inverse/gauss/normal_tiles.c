@@ -6,6 +6,7 @@
 #include "inverse/estimate/adjoint.h"
 
 #include "inverse/estimate/channel_sink.h"
+#include "inverse/estimate/tile_walks.h"
 #include "inverse/problem/loss.h"
 #include <math.h>
 #include <string.h>
@@ -22,7 +23,7 @@ static double seen(const struct imp__normal_job *j, const double *lanes, int c)
 
 /* Set s of a replicate: its mean radiance, and x, the mean of its derivatives. */
 static imp_spec set_mean(const struct imp__normal_job *j, struct imp_tile_worker *tile,
-                         int x, int y, int b, int s)
+                         struct imp__tile_walks *walks, int x, int y, int b, int s)
 {
     double *sum_x = j->workers[tile->index].x;
     const size_t width = j->K * (size_t)j->channels;
@@ -31,9 +32,10 @@ static imp_spec set_mean(const struct imp__normal_job *j, struct imp_tile_worker
     imp_spec L = {0};
     memset(sum_x, 0, width * sizeof *sum_x);
     for (int64_t sample = number; sample < number + n; sample++) {
+        imp__tile_walks_ready(walks);
         const struct imp_arena_mark mark = imp__arena_mark(&tile->arena);
         struct imp_walk walk;
-        imp__walk_trace(&j->tracer, &tile->arena, x, y, sample, &walk);
+        imp__tile_walk(walks, x, y, sample, &walk);
         imp__tile_drop(tile, walk.dropped, x, y, sample);
         imp__lanes_sweep(&j->tracer, &walk, sum_x);
         imp__arena_rewind(&tile->arena, mark);
@@ -48,6 +50,7 @@ static imp_spec set_mean(const struct imp__normal_job *j, struct imp_tile_worker
 
 struct pixel {
     struct imp__normal_worker *w;
+    struct imp__tile_walks *walks;
     size_t index;         /* of the pixel */
     int M;                /* units */
     size_t T;             /* values touched */
@@ -69,7 +72,7 @@ static void units_gather(const struct imp__normal_job *j, struct imp_tile_worker
         const int u1 = (int)(((int64_t)(u + 1) * sets + p->M - 1) / p->M);
         const int u0 = (int)(((int64_t)u * sets + p->M - 1) / p->M);
         const double part = 1.0 / (u1 - u0);
-        const imp_spec mean = set_mean(j, tile, x, y, b0 + i / m, i % m);
+        const imp_spec mean = set_mean(j, tile, p->walks, x, y, b0 + i / m, i % m);
         const double L[3] = {mean[0], mean[1], mean[2]};
         double *X = w->X + (size_t)u * K * S;
         for (size_t c = 0; c < S; c++) w->r[u][c] += part * seen(j, L, (int)c);
@@ -308,6 +311,12 @@ static void chi2_variance_add(const struct imp__normal_job *j, const struct pixe
 
 /* ---- Tiles ------------------------------------------------------------------------ */
 
+static bool counts(const void *job, int x, int y)
+{
+    const struct imp__normal_job *j = job;
+    return imp__target_counts(j->target, (size_t)y * (size_t)j->width + (size_t)x);
+}
+
 enum imp_status imp__normal_work(const struct imp_tile *t, struct imp_tile_worker *tile,
                                  void *result, void *payload)
 {
@@ -316,14 +325,17 @@ enum imp_status imp__normal_work(const struct imp_tile *t, struct imp_tile_worke
     const int b0 = imp__replicates_begin(j->plan, (int)t->part);
     const int b1 = imp__replicates_begin(j->plan, (int)t->part + 1);
     const double R = b1 - b0, all = j->plan.R;
+    struct imp__tile_walks walks;
     memset(result, 0, imp__normal_count(j->K, j->deviate) * sizeof(double));
+    imp__tile_walks_begin(&j->tracer, t, tile, j->plan, b0, b1, 1, counts, j, &walks);
     for (int y = t->y0; y < t->y1; y++)
         for (int x = t->x0; x < t->x1; x++) {
             struct pixel p = {.w = &j->workers[tile->index],
+                              .walks = &walks,
                               .index = (size_t)y * (size_t)j->width + (size_t)x,
                               .M = imp__normal_units((b1 - b0) * j->plan.m),
                               .share = R / all};
-            if (!imp__target_counts(j->target, p.index)) continue;
+            if (!counts(j, x, y)) continue;
             units_gather(j, tile, x, y, b0, b1, &p);
             const enum imp_status st = imp__tile_check(tile);
             if (st != IMP_OK) return st;

@@ -4,7 +4,7 @@
 #ifndef IMP_INVERSE_SPARSE_JOB_H
 #define IMP_INVERSE_SPARSE_JOB_H
 
-#include "film/film_tiles.h"
+#include "inverse/estimate/tile_walks.h"
 #include "sparse_rows.h"
 #include "sparse_sink.h"
 
@@ -37,10 +37,11 @@ struct imp__rows_job {
     double total[IMP_ROWS_SCALARS];
 };
 
-/* sparse_pixel.c: replicates [b0, b1) of a pixel, in units, to what the worker makes; adds
- * to the loss of the tile. */
+/* sparse_pixel.c: replicates [b0, b1) of a pixel, of whose tile these are the walks, in units, to
+ * what the worker makes; adds to the loss of the tile. */
 enum imp_status imp__rows_pixel(const struct imp__rows_job *j,
-                                struct imp_tile_worker *tile, int x, int y, int b0,
+                                struct imp_tile_worker *tile,
+                                struct imp__tile_walks *walks, int x, int y, int b0,
                                 int b1, double *sums);
 
 #endif

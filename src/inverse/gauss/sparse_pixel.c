@@ -9,15 +9,17 @@
 
 /* Adds set s of a replicate, `part` of the unit; returns its mean radiance. */
 static imp_spec set_add(const struct imp__rows_job *j, struct imp_tile_worker *tile,
-                        int x, int y, int b, int s, double part)
+                        struct imp__tile_walks *walks, int x, int y, int b, int s,
+                        double part)
 {
     const int64_t number = imp__replicates_first(j->plan, b, s);
     const int n = imp__replicates_set(j->plan, s + 1) - imp__replicates_set(j->plan, s);
     imp_spec L = {0};
     for (int64_t sample = number; sample < number + n; sample++) {
+        imp__tile_walks_ready(walks);
         const struct imp_arena_mark mark = imp__arena_mark(&tile->arena);
         struct imp_walk walk;
-        imp__walk_trace(&j->tracer, &tile->arena, x, y, sample, &walk);
+        imp__tile_walk(walks, x, y, sample, &walk);
         imp__tile_drop(tile, walk.dropped, x, y, sample);
         imp__sparse_sink_sweep(&j->workers[tile->index].sink, &j->tracer, &walk,
                                part / n);
@@ -92,7 +94,8 @@ static void pixel_weigh(const struct imp__rows_job *j, struct imp__rows_worker *
 }
 
 enum imp_status imp__rows_pixel(const struct imp__rows_job *j,
-                                struct imp_tile_worker *tile, int x, int y, int b0,
+                                struct imp_tile_worker *tile,
+                                struct imp__tile_walks *walks, int x, int y, int b0,
                                 int b1, double *sums)
 {
     struct imp__rows_worker *w = &j->workers[tile->index];
@@ -121,7 +124,7 @@ enum imp_status imp__rows_pixel(const struct imp__rows_job *j,
         const int u1 = (int)(((int64_t)(u + 1) * sets + M - 1) / M);
         const int u0 = (int)(((int64_t)u * sets + M - 1) / M);
         const double part = 1.0 / (u1 - u0);
-        const imp_spec mean = set_add(j, tile, x, y, b0 + i / m, i % m, part);
+        const imp_spec mean = set_add(j, tile, walks, x, y, b0 + i / m, i % m, part);
         const double L[3] = {mean[0], mean[1], mean[2]};
         for (size_t c = 0; c < S; c++) r[u][c] += part * imp__seen(luminance, L, (int)c);
         if (i + 1 == u1) { /* the last set of its unit */

@@ -81,6 +81,13 @@ static double noise_share(const struct imp__row_block *b)
     return all > 0 ? imp_clamp(pairs / all, 0.0, 1.0) : 0;
 }
 
+static bool counts(const void *job, int x, int y)
+{
+    const struct imp__rows_job *j = job;
+    const size_t index = (size_t)y * (size_t)j->tiles.width + (size_t)x;
+    return !j->target->weights || j->target->weights[index] != 0;
+}
+
 static enum imp_status work(const struct imp_tile *t, struct imp_tile_worker *tile,
                             void *result, void *payload)
 {
@@ -92,11 +99,12 @@ static enum imp_status work(const struct imp_tile *t, struct imp_tile_worker *ti
     memset(sums, 0, IMP_ROWS_SCALARS * sizeof *sums);
     w->made.n_pixels = w->made.n_rows = w->made.n_entries = 0;
     w->made.channels = j->target->desc.channels;
+    struct imp__tile_walks walks;
+    imp__tile_walks_begin(&j->tracer, t, tile, j->plan, b0, b1, 1, counts, j, &walks);
     for (int y = t->y0; y < t->y1; y++)
         for (int x = t->x0; x < t->x1; x++) {
-            const size_t index = (size_t)y * (size_t)j->tiles.width + (size_t)x;
-            if (j->target->weights && j->target->weights[index] == 0) continue;
-            enum imp_status st = imp__rows_pixel(j, tile, x, y, b0, b1, sums);
+            if (!counts(j, x, y)) continue;
+            enum imp_status st = imp__rows_pixel(j, tile, &walks, x, y, b0, b1, sums);
             if (st == IMP_OK) st = imp__tile_check(tile);
             if (st != IMP_OK) return st;
         }

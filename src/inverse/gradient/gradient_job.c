@@ -95,19 +95,28 @@ static void lone_add(const struct item *i, double value, double variance)
     i->out->variance += variance;
 }
 
+static bool counts(const void *job, int x, int y)
+{
+    return imp__gradient_counts(job, x, y);
+}
+
 static enum imp_status pixels_work(const struct imp_tile *t, struct imp_tile_worker *w,
                                    struct imp__replicates plan, struct item *i,
                                    double *moments)
 {
     const int b0 = imp__replicates_begin(plan, (int)t->part);
     const int b1 = imp__replicates_begin(plan, (int)t->part + 1);
+    struct imp__tile_walks walks = {.bundled = false};
+    if (!i->job->light)
+        imp__tile_walks_begin(&i->job->tracer, t, w, plan, b0, b1, plan.n, counts, i->job,
+                              &walks);
     for (int y = t->y0; y < t->y1; y++)
         for (int x = t->x0; x < t->x1; x++) {
             double sum = 0, square = 0, variance = 0;
             if (!imp__gradient_counts(i->job, x, y)) continue;
             for (int b = b0; b < b1; b++) {
                 const double v = imp__gradient_replicate(
-                    i->job, plan, w, x, y, b, (int)t->part, moments, &variance);
+                    i->job, plan, w, &walks, x, y, b, (int)t->part, moments, &variance);
                 sum += v;
                 square += v * v;
             }

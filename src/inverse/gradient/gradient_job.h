@@ -13,6 +13,7 @@
 #include "inverse/estimate/replicates.h"
 #include "inverse/estimate/splat.h"
 #include "inverse/estimate/tally.h"
+#include "inverse/estimate/tile_walks.h"
 #include "inverse/estimate/totals.h"
 #include "variate.h"
 
@@ -67,10 +68,11 @@ enum imp_status imp__gradient_job_run(struct imp__gradient_job *job,
                                       double lo, double hi, double start_s);
 
 /* ---- Of one pixel (gradient_replicate.c) ---- */
-/* Replicate b, in work item `part` of its tile: to the worker's tally; returns its estimate of
- * the loss. moments: of the variate. variance: of that estimate, from a lone replicate only. */
+/* Replicate b, in work item `part` of its tile, of which these are the walks: to the worker's tally;
+ * returns its estimate of the loss. moments: of the variate. variance: of that estimate, from a lone replicate only. */
 double imp__gradient_replicate(struct imp__gradient_job *job, struct imp__replicates plan,
-                               struct imp_tile_worker *worker, int x, int y, int b,
+                               struct imp_tile_worker *worker,
+                               struct imp__tile_walks *walks, int x, int y, int b,
                                int part, double *moments, double *variance);
 
 /* ---- Samples of tiles (gradient_samples.c) ---- */

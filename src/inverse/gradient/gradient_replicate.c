@@ -12,6 +12,7 @@ struct replicate {
     struct imp__replicates plan;
     struct imp_tile_worker *worker;
     struct imp_tally *tally;
+    struct imp__tile_walks *walks;
     int x, y, b;
     size_t pixel;
 };
@@ -19,7 +20,7 @@ struct replicate {
 static void trace(const struct replicate *r, int set, int i, struct imp_walk *walk)
 {
     const int64_t sample = imp__replicates_first(r->plan, r->b, set) + i;
-    imp__walk_trace(&r->job->tracer, &r->worker->arena, r->x, r->y, sample, walk);
+    imp__tile_walk(r->walks, r->x, r->y, sample, walk);
     imp__tile_drop(r->worker, walk->dropped, r->x, r->y, sample);
     r->tally->rays += imp_max(2 * walk->n - 1, 1);
 }
@@ -168,8 +169,9 @@ static double sweep_residuals(const struct replicate *r, int part, double *momen
 /* ---- Either ------------------------------------------------------------------------- */
 
 double imp__gradient_replicate(struct imp__gradient_job *j, struct imp__replicates plan,
-                               struct imp_tile_worker *w, int x, int y, int b, int part,
-                               double *moments, double *variance)
+                               struct imp_tile_worker *w, struct imp__tile_walks *walks,
+                               int x, int y, int b, int part, double *moments,
+                               double *variance)
 {
     if (imp_unlikely(j->light != NULL)) {
         imp__light_replicate(j, w, x, y, b);
@@ -180,11 +182,13 @@ double imp__gradient_replicate(struct imp__gradient_job *j, struct imp__replicat
         .plan = plan,
         .worker = w,
         .tally = &j->tallies[w->index],
+        .walks = walks,
         .x = x,
         .y = y,
         .b = b,
         .pixel = (size_t)y * (size_t)j->width + (size_t)x,
     };
+    imp__tile_walks_ready(walks);
     const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
     double value = 0;
     if (j->target && !j->splat) value = sweep_residuals(&r, part, moments, variance);

@@ -12,11 +12,13 @@ static const struct {
             {&imp__roughconductor, &imp__roughconductor_lanes},
             {&imp__twosided, &imp__twosided_lanes}};
 
-const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b)
+const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b,
+                                             uint64_t derivative)
 {
-    for (size_t k = 0; k < imp_count(list); k++)
+    for (size_t k = 0; k < imp_count(list); k++) {
+        const struct imp_bsdf_lanes *l = list[k].lanes;
         if (b->ops == list[k].ops)
-            return !list[k].lanes->covers || list[k].lanes->covers(b) ? list[k].lanes
-                                                                      : NULL;
+            return !l->covers || l->covers(b, derivative) ? l : NULL;
+    }
     return NULL;
 }

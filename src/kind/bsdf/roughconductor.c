@@ -151,10 +151,13 @@ const struct imp_bsdf_ops imp__roughconductor = {.size = sizeof(struct imp_bsdf_
 #define IMP_TEXT "kind/bsdf/conductor_text.h"
 #include "math/lane_text.h"
 
-static bool covers(const struct imp_bsdf *b)
+static bool covers(const struct imp_bsdf *b, uint64_t derivative)
 {
     const struct imp__roughness *r = b->self;
-    return r->type == IMP_GGX && r->visible;
+    const struct imp_dirs d = {.derivative = derivative};
+    const imp_spec in[3] = {imp__spec(1), imp__spec(1), imp__spec(1)};
+    return r->type == IMP_GGX && r->visible &&
+           !imp__roughness_drawn(r, in, &d, ALPHA).wanted;
 }
 
 static void roughness_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,

@@ -182,10 +182,12 @@ const struct imp_bsdf_ops imp__twosided = {.size = sizeof(struct imp_bsdf_ops),
 
 /* ---- In lanes ---------------------------------------------------------------------------- */
 
-static bool covers(const struct imp_bsdf *b)
+static bool covers(const struct imp_bsdf *b, uint64_t derivative)
 {
     for (int k = 0; k < b->n_child; k++)
-        if (!imp__bsdf_lanes(b->child[k])) return false;
+        if (!imp__bsdf_lanes(b->child[k],
+                             imp_wanted_of_child(derivative, b->child_in[k])))
+            return false;
     return true;
 }
 
@@ -214,8 +216,8 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
         const struct imp_bsdf *c = b->child[k];
         imp_wide3 own;
         if (!is_asked(b, k, back)) continue;
-        const imp_wide_truth some = imp__bsdf_lanes(c)->sample(c, in + b->child_in[k],
-                                                               &seen, u, &own),
+        const imp_wide_truth some = imp__bsdf_lanes(c, 0)->sample(c, in + b->child_in[k],
+                                                                  &seen, u, &own),
                              here = k > 0 ? back : ~(imp_wide_truth){0};
         own = flips(&own, back);
         *wi = imp__wide3_choose(here, own, *wi);
@@ -236,7 +238,7 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_c
         struct imp_wide_color own;
         if (!is_asked(b, k, back)) continue;
         const imp_wide p =
-            imp__bsdf_lanes(c)->pdf_eval(c, in + b->child_in[k], &o, &i, colors, &own);
+            imp__bsdf_lanes(c, 0)->pdf_eval(c, in + b->child_in[k], &o, &i, colors, &own);
         const imp_wide_truth here = k > 0 ? back : ~(imp_wide_truth){0};
         pdf = imp__wide_choose(here, p, pdf);
         for (int j = 0; j < colors; j++)

@@ -34,6 +34,9 @@ static void constant_sample(const struct imp_emitter *e, const imp_wide3 *ref,
     out->pdf = imp__wide(IMP_INV_PI / 4);
     out->cos_light = imp__wide(1);
     out->drawn = ~(imp_wide_truth){0};
+    out->dist = imp__wide(INFINITY);
+    out->uv[0] = out->uv[1] = out->located[0] = out->located[1] = imp__wide(0);
+    for (int k = 0; k < IMP_WIDE_LANES; k++) out->prim[k] = -1;
 }
 
 static imp_wide constant_pdf(const struct imp_emitter *e, const imp_wide3 *ref,

@@ -134,6 +134,11 @@ static void sample_toward(const struct imp_shape *s, const imp_wide3 *ref,
         point_at(FACETS(m, prim, p0), FACETS(m, prim, e1), FACETS(m, prim, e2), b1, b2);
     imp__lights_from_area(*ref, p, ng, normals_at(m, prim, b1, b2, ng),
                           imp__wide(m->inv_area), out);
+    if (!out->recorded) return;
+    for (int k = 0; k < IMP_WIDE_LANES; k++) out->prim[k] = prim[k];
+    out->located[0] = b1;
+    out->located[1] = b2;
+    uv_at(s, prim, b1, b2, out->uv);
 }
 
 /* Meshes of few triangles. */

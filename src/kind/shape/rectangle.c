@@ -188,6 +188,11 @@ static void sample_toward_lanes(const struct imp_shape *s, const imp_wide3 *ref,
     const imp_wide3 n = imp__wide3_of(r->n);
     imp__lights_from_area(*ref, points_at(r, u[0], u[1]), n, n, imp__wide(r->inv_area),
                           out);
+    if (!out->recorded) return;
+    for (int k = 0; k < IMP_WIDE_LANES; k++) out->prim[k] = 0;
+    out->located[0] = u[0] - u[1];
+    out->located[1] = out->uv[1] = u[1];
+    out->uv[0] = u[0];
 }
 
 const struct imp_shape_lanes imp__rectangle_lanes = {

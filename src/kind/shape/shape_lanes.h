@@ -32,6 +32,7 @@ static inline void imp__lights_from_area(imp_wide3 ref, imp_wide3 p, imp_wide3 n
     out->wi = imp__wide3_times(d, 1 / r);
     out->cos_light = -imp__wide3_inner(out->wi, n);
     out->p = p;
+    out->dist = r;
 }
 
 #endif

@@ -36,17 +36,22 @@ static void take(struct imp_depth *d, int i)
     struct imp_step *s = &d->lone->step;
     struct imp_walk *w = &d->lone->walk;
     const int walk = f->walk[i];
-    w->first = w->last = NULL;
-    w->n = d->depth + b->before;
-    w->valid = false;
-    w->dropped = IMP_DROP_NONE;
-    w->key.state = w->point.set = b->set[walk]; /* one of the two is used */
-    w->point.index = b->index[walk];
-    w->time = b->time[walk];
+    if (b->walks) {
+        s->walk = &b->walks[walk];
+    } else {
+        w->first = w->last = NULL;
+        w->n = d->depth + b->before;
+        w->valid = false;
+        w->dropped = IMP_DROP_NONE;
+        w->key.state = w->point.set = b->set[walk]; /* one of the two is used */
+        w->point.index = b->index[walk];
+        w->time = b->time[walk];
+    }
     if (imp_unlikely(b->waves != NULL)) {
         w->waves = b->waves[walk];
         s->at.carried = &w->waves->carried;
     }
+    for (int c = 0; f->zeros && c < 4; c++) s->zeros[c] = f->zeros[i] >> c & 1;
     s->depth = d->depth;
     s->o = imp__column_v3(f->ray.o, i);
     s->d = imp__column_v3(f->ray.d, i);
@@ -60,13 +65,14 @@ static void take(struct imp_depth *d, int i)
 static void give_back(struct imp_depth *d, int walk)
 {
     const struct imp_walk *w = &d->lone->walk;
+    if (d->bundle->walks) return;
     d->bundle->valid[walk] |= w->valid;
     if (imp_unlikely(w->dropped != IMP_DROP_NONE))
         d->bundle->dropped[walk] = (uint8_t)w->dropped;
 }
 
 static void shadow_add(struct imp_shadows *to, const struct imp_shadow *shadow,
-                       double time, int at)
+                       double time, int at, struct imp_vertex *of)
 {
     const int n = to->ray.n++;
     imp__column_put(to->ray.o, n, shadow->o);
@@ -74,6 +80,7 @@ static void shadow_add(struct imp_shadows *to, const struct imp_shadow *shadow,
     to->ray.far[n] = shadow->reach;
     if (to->ray.time) to->ray.time[n] = time;
     to->at[n] = at;
+    to->of[n] = of;
 }
 
 static void ray_add(struct imp_flights *to, const struct imp_step *s, int walk, int up)
@@ -88,26 +95,38 @@ static void ray_add(struct imp_flights *to, const struct imp_step *s, int walk, 
     imp__color_put(to->beta, s->walk->waves ? 4 : 3, n, s->beta);
     to->eta[n] = s->eta;
     if (imp_unlikely(to->left != NULL)) to->left[n] = s->left;
+    if (to->zeros) {
+        to->zeros[n] = 0;
+        for (int c = 0; c < 4; c++) to->zeros[n] |= (uint8_t)((s->zeros[c] > 0) << c);
+    }
     to->walk[n] = walk;
     to->up[n] = up;
 }
 
 /* Values, the shadow ray and the next ray of vertex v, at place `at`; NULL: it is dropped. */
-static void vertex_give_back(struct imp_depth *d, const struct imp_vertex *v,
-                             bool goes_on, int walk, int up, int at)
+static void vertex_give_back(struct imp_depth *d, struct imp_vertex *v, bool goes_on,
+                             int walk, int up, int at)
 {
     const struct imp_step *s = &d->lone->step;
     const imp_spec none = {0};
     const int colors = d->bundle->colors;
-    d->values->up[at] = up;
-    imp__color_put(d->values->e, colors, at, v ? v->e : none);
-    imp__color_put(d->values->b, colors, at, v ? v->b : none);
-    imp__color_put(d->values->w, colors, at, v ? v->w : none);
-    imp__color_put(d->values->beyond, colors, at, none);
+    if (!d->bundle->walks) {
+        d->values->up[at] = up;
+        imp__color_put(d->values->e, colors, at, v ? v->e : none);
+        imp__color_put(d->values->b, colors, at, v ? v->b : none);
+        imp__color_put(d->values->w, colors, at, v ? v->w : none);
+        imp__color_put(d->values->beyond, colors, at, none);
+    }
     if (d->lone->shadow.wanted)
-        shadow_add(d->shadows, &d->lone->shadow, s->walk->time, at);
+        shadow_add(d->shadows, &d->lone->shadow, s->walk->time, at, v);
     if (goes_on) ray_add(d->next, s, walk, at);
     give_back(d, walk);
+}
+
+/* What is recorded stays. */
+static void forget(const struct imp_depth *d, struct imp_arena_mark mark)
+{
+    if (!d->bundle->walks) imp__arena_rewind(d->lone->step.arena, mark);
 }
 
 void imp__vertex_alone(struct imp_depth *d, int i, int at)
@@ -130,7 +149,7 @@ void imp__vertex_alone(struct imp_depth *d, int i, int at)
     d->lone->shadow.wanted = false;
     const bool goes_on = v && imp__vertex_work(&bundle_end, s, v, &hit, &surface, &frame);
     vertex_give_back(d, v, goes_on, walk, d->rays->up[i], at);
-    imp__arena_rewind(s->arena, mark);
+    forget(d, mark);
 }
 
 void imp__meet_alone(struct imp_depth *d, const struct imp_hit_columns *hits)
@@ -153,11 +172,12 @@ void imp__meter_vertex(struct imp_depth *d, const struct imp_walk *begun, int wa
                        double *weight)
 {
     struct imp_step *s = &d->lone->step;
-    struct imp_walk *w = &d->lone->walk;
+    struct imp_walk *w = d->bundle->walks ? &d->bundle->walks[walk] : &d->lone->walk;
     const struct imp_arena_mark mark = imp__arena_mark(s->arena);
     struct imp_surface surface;
     struct imp_frame frame;
-    *w = *begun;
+    if (d->bundle->walks) s->walk = w;
+    else *w = *begun;
     s->at.carried = w->waves ? &w->waves->carried : NULL;
     s->o = s->from = w->ray.o;
     s->d = w->ray.d;
@@ -171,7 +191,7 @@ void imp__meter_vertex(struct imp_depth *d, const struct imp_walk *begun, int wa
     *weight = w->first ? w->first->w[0] : 0;
     d->bundle->set[walk] = w->point.points ? w->point.set : w->key.state;
     vertex_give_back(d, v, goes_on, walk, walk, walk);
-    imp__arena_rewind(s->arena, mark);
+    forget(d, mark);
 }
 
 void imp__sky_alone(struct imp_depth *d, int i, double *const beyond[4])
@@ -179,6 +199,7 @@ void imp__sky_alone(struct imp_depth *d, int i, double *const beyond[4])
     const struct imp_arena_mark mark = imp__arena_mark(d->lone->step.arena);
     take(d, i);
     imp__sky_meet(&d->lone->step);
+    if (d->bundle->walks) return;
     imp__color_put(beyond, d->bundle->colors, d->rays->up[i],
                    imp__walk_fold(&d->lone->walk));
     give_back(d, d->rays->walk[i]);

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A bundle of walks from its pixels to its radiance: rays of the sensor; segment after segment
- * hits, vertices and shadow rays; the fold. */
+ * hits, vertices and shadow rays; the fold. Recorded walks have vertices of their own (walk.h) in
+ * place of columns of values. */
 #include "by_shape.h"
 #include "lanes_light.h"
 #include "scene/ray_columns.h"
@@ -19,7 +20,7 @@ static bool is_shaped(const struct imp_scene *scene)
 bool imp__bundle_fits(const struct imp_tracer *t)
 {
     const struct imp_walk_integrator *w = t->integrator;
-    return t->value_only && !t->active && !t->kept && !t->guide &&
+    return t->value_only == !t->active && !t->kept && !t->guide &&
            (!t->wavelengths || !is_shaped(t->scene)) && !t->mixing && t->split <= 1 &&
            !w->mixes && !w->both && !(w->hide_emitters && t->sensor->shape) &&
            !w->from_lights && !w->first_hit && !t->scene->priorities &&
@@ -35,7 +36,7 @@ static bool bundle_create(struct imp_arena *arena, size_t n, struct imp_bundle *
     return TAKE(b->px) && TAKE(b->py) && TAKE(b->time) && TAKE(b->set) &&
            TAKE(b->index) && TAKE(b->L[0]) && TAKE(b->L[1]) && TAKE(b->L[2]) &&
            TAKE(b->L[3]) && (b->colors == 3 || TAKE(b->waves)) && TAKE(b->valid) &&
-           TAKE(b->dropped);
+           TAKE(b->dropped) && (b->tracer->value_only || TAKE(b->walks));
 }
 
 /* What walk k has from its ray alone. */
@@ -46,6 +47,7 @@ static inline void ray_put(struct imp_bundle *b, int k, struct imp_flights *rays
     rays->eta[k] = 1;
     rays->walk[k] = rays->up[k] = k;
     if (rays->left) rays->left[k] = (struct imp_light_place){.faces = false};
+    if (rays->zeros) rays->zeros[k] = 0;
     b->time[k] = b->tracer->sensor->open;
 }
 
@@ -74,19 +76,35 @@ static bool rays_alone(struct imp_bundle *b, struct imp_arena *arena, const int 
 {
     *begin = true;
     for (int k = 0; k < b->n; k++) {
-        struct imp_walk walk;
-        if (!begin_alone(b, arena, xy[k / n_samples], samples[k % n_samples], k, &walk))
+        struct imp_walk own, *walk = b->walks ? &b->walks[k] : &own;
+        if (!begin_alone(b, arena, xy[k / n_samples], samples[k % n_samples], k, walk))
             return false;
         ray_put(b, k, rays);
-        b->time[k] = walk.time;
-        imp__column_put(rays->ray.o, k, walk.ray.o);
-        imp__column_put(rays->ray.d, k, walk.ray.d);
-        rays->ray.near[k] = walk.ray.t_near;
-        rays->ray.far[k] = walk.ray.t_far;
-        imp__column_put(rays->from, k, walk.ray.o);
-        *begin &= walk.ray.t_near == 0;
+        b->time[k] = walk->time;
+        imp__column_put(rays->ray.o, k, walk->ray.o);
+        imp__column_put(rays->ray.d, k, walk->ray.d);
+        rays->ray.near[k] = walk->ray.t_near;
+        rays->ray.far[k] = walk->ray.t_far;
+        imp__column_put(rays->from, k, walk->ray.o);
+        *begin &= walk->ray.t_near == 0;
     }
     return true;
+}
+
+/* The beginning of a record, whose ray is made. */
+static void record_begin(struct imp_bundle *b, const struct imp_flights *rays, int k,
+                         const int at[2], int64_t sample)
+{
+    struct imp_walk *walk = &b->walks[k];
+    imp__walk_clear(walk);
+    imp__walk_numbers(b->tracer, at[0], at[1], sample, walk);
+    walk->px = b->px[k];
+    walk->py = b->py[k];
+    walk->time = b->time[k];
+    walk->ray = (struct imp_sensor_ray){.o = imp__column_v3(rays->ray.o, k),
+                                        .d = imp__column_v3(rays->ray.d, k),
+                                        .t_near = rays->ray.near[k],
+                                        .t_far = rays->ray.far[k]};
 }
 
 /* In lanes, of a sensor whose shutter is open for an instant. */
@@ -129,6 +147,8 @@ static bool rays_in_lanes(struct imp_bundle *b, const struct imp_sensor_lanes *l
         imp__wide_store(&rays->ray.far[i], r.far);
         begin &= !(imp__wide_bits(r.near != imp__wide(0)) & imp__bits_first(b->n - i));
     }
+    for (int k = 0; b->walks && k < b->n; k++)
+        record_begin(b, rays, k, xy[k / n_samples], samples[k % n_samples]);
     return begin;
 }
 
@@ -140,6 +160,16 @@ static void unlit(struct imp_bundle_values *values, int colors,
 {
     for (int k = 0; k < shadows->ray.n; k++)
         if (hidden[k]) imp__color_put(values->b, colors, shadows->at[k], (imp_spec){0});
+}
+
+/* The same of recorded vertices, which keep what became of their connection. */
+static void connect(const struct imp_shadows *shadows, const bool *hidden)
+{
+    for (int k = 0; k < shadows->ray.n; k++) {
+        struct imp_vertex *v = shadows->of[k];
+        if (hidden[k]) v->b = (imp_spec){0};
+        else v->d.connection = IMP_CONNECTED;
+    }
 }
 
 static void fold(const struct imp_bundle_values *v, int colors, double *const beyond[4])
@@ -173,17 +203,18 @@ struct room {
     struct imp_by_shape by_shape;
     bool *hidden;
     struct imp_lone lone;
+    struct imp_bundle_values recorded; /* in place of values that walks have themselves */
 };
 
 static bool room_create(const struct imp_tracer *tracer, struct imp_arena *arena,
                         size_t n, struct room *r)
 {
-    const bool left = tracer->integrator->light_tree && tracer->scene->light_tree;
-    const bool instant = !(tracer->sensor->close > tracer->sensor->open);
-    if (!imp__flights_create(arena, n, tracer->wavelengths ? 4 : 3, left,
-                             &r->flights[0]) ||
-        !imp__flights_create(arena, n, tracer->wavelengths ? 4 : 3, left,
-                             &r->flights[1]) ||
+    const bool left = tracer->integrator->light_tree && tracer->scene->light_tree,
+               zeros = tracer->active != NULL,
+               instant = !(tracer->sensor->close > tracer->sensor->open);
+    const int colors = tracer->wavelengths ? 4 : 3;
+    if (!imp__flights_create(arena, n, colors, left, zeros, &r->flights[0]) ||
+        !imp__flights_create(arena, n, colors, left, zeros, &r->flights[1]) ||
         !imp__hits_create(arena, n, &r->hits) ||
         !imp__shadows_create(arena, n, &r->shadows) ||
         !imp__by_shape_create(tracer, arena, n, &r->by_shape) || !TAKE(r->hidden))
@@ -193,6 +224,7 @@ static bool room_create(const struct imp_tracer *tracer, struct imp_arena *arena
         return false;
     r->flights[0].ray.instant = r->flights[1].ray.instant = r->shadows.ray.instant =
         tracer->sensor->open;
+    r->recorded = (struct imp_bundle_values){.n = 0};
     imp__walk_clear(&r->lone.walk);
     r->lone.walk.point.points = tracer->points;
     imp__step_begin(tracer, arena, &r->lone.walk, r->lone.scratch, &r->lone.step);
@@ -205,7 +237,8 @@ static bool room_create(const struct imp_tracer *tracer, struct imp_arena *arena
 static void see(struct imp_depth *d, struct room *r)
 {
     imp__occluded_columns(d->bundle->tracer->scene, &r->shadows.ray, r->hidden);
-    unlit(d->values, d->bundle->colors, &r->shadows, r->hidden);
+    if (d->bundle->walks) connect(&r->shadows, r->hidden);
+    else unlit(d->values, d->bundle->colors, &r->shadows, r->hidden);
     r->shadows.ray.n = 0;
 }
 
@@ -229,27 +262,28 @@ static bool camera_begin(struct imp_arena *arena, struct imp_bundle *b,
     return true;
 }
 
-/* Walks from a sensor that is a surface: their first vertices, in links of their own. NULL: no
+/* Walks from a sensor that is a surface: their first vertices, in links of their own. False: no
  * memory. */
-static struct link *meter_begin(struct imp_arena *arena, struct imp_depth *d,
-                                const int (*xy)[2], int n_samples, const int64_t *samples,
-                                struct room *r)
+static bool meter_begin(struct imp_arena *arena, struct imp_depth *d, const int (*xy)[2],
+                        int n_samples, const int64_t *samples, struct room *r,
+                        struct link **out)
 {
     struct imp_bundle *b = d->bundle;
     const size_t n = (size_t)b->n;
-    struct link *sensor = link_add(arena, n, b->colors, NULL),
+    struct link *sensor = b->walks ? NULL : link_add(arena, n, b->colors, NULL),
                 *first = sensor ? link_add(arena, n, b->colors, sensor) : NULL;
-    if (!first) return NULL;
-    sensor->values.n = first->values.n = b->n;
-    d->values = &first->values;
+    if (!b->walks && !first) return false;
+    if (first) sensor->values.n = first->values.n = b->n;
+    d->values = first ? &first->values : &r->recorded;
     d->next = &r->flights[0];
     d->next->ray.n = r->shadows.ray.n = 0;
     for (int k = 0; k < b->n; k++) {
-        struct imp_walk walk;
+        struct imp_walk own, *walk = b->walks ? &b->walks[k] : &own;
         double weight;
-        if (!begin_alone(b, arena, xy[k / n_samples], samples[k % n_samples], k, &walk))
-            return NULL;
-        imp__meter_vertex(d, &walk, k, &weight);
+        if (!begin_alone(b, arena, xy[k / n_samples], samples[k % n_samples], k, walk))
+            return false;
+        imp__meter_vertex(d, walk, k, &weight);
+        if (!sensor) continue;
         imp__color_put(sensor->values.e, b->colors, k, imp__spec(0));
         imp__color_put(sensor->values.b, b->colors, k, imp__spec(0));
         imp__color_put(sensor->values.w, b->colors, k, imp__spec(weight));
@@ -257,7 +291,8 @@ static struct link *meter_begin(struct imp_arena *arena, struct imp_depth *d,
         sensor->values.up[k] = k;
     }
     see(d, r);
-    return first;
+    *out = first;
+    return true;
 }
 
 bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
@@ -280,17 +315,17 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
     if (!tracer->sensor->shape) {
         if (!camera_begin(arena, b, xy, n_samples, samples, &r.flights[0])) return false;
     } else {
-        last = meter_begin(arena, &d, xy, n_samples, samples, &r);
-        if (!last) return false;
+        if (!meter_begin(arena, &d, xy, n_samples, samples, &r, &last)) return false;
     }
 
     r.shadows.ray.n = 0;
     for (d.depth = 0; r.flights[d.depth & 1].ray.n > 0; d.depth++) {
         d.rays = &r.flights[d.depth & 1];
         d.next = &r.flights[~d.depth & 1];
-        struct link *here = link_add(arena, (size_t)d.rays->ray.n, b->colors, last);
-        if (!here) return false;
-        d.values = &here->values;
+        struct link *here =
+            b->walks ? NULL : link_add(arena, (size_t)d.rays->ray.n, b->colors, last);
+        if (!b->walks && !here) return false;
+        d.values = here ? &here->values : &r.recorded;
         d.next->ray.n = 0;
         if (d.depth == 0 && tracer->integrator->hide_emitters)
             imp__meet_alone(&d, &r.hits);
@@ -302,11 +337,19 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
     }
     for (; last; last = last->before)
         fold(&last->values, b->colors, last->before ? last->before->values.beyond : b->L);
+    for (int k = 0; b->walks && k < b->n; k++) {
+        imp__vertex_fetch(b->walks[imp_min(k + 2, b->n - 1)].last, IMP_VERTEX_VALUES);
+        imp__walk_close(tracer, &b->walks[k]);
+    }
     return true;
 }
 
 void imp__bundle_walk(const struct imp_bundle *b, int k, struct imp_walk *walk)
 {
+    if (b->walks) {
+        *walk = b->walks[k];
+        return;
+    }
     imp__walk_clear(walk);
     walk->px = b->px[k];
     walk->py = b->py[k];

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Walks in bundles: those of a few pixels of a picture, of which only the value counts, go
- * together, one segment at a time. Each has the value that it has alone (walk.h,
- * imp__walk_trace), to the bit; together they take less time, since kinds whose formulas are
- * texts in lanes work on several at once.
+ * Walks in bundles: those of a few pixels of a picture go together, one segment at a time. Each
+ * has the value, and the record if it is recorded, that it has alone (walk.h, imp__walk_trace), to
+ * the bit; together they take less time, since kinds whose formulas are texts in lanes work on
+ * several at once.
  *
  * A bundle begins in bundle.c. Vertices are made in lanes (lanes_vertex.c) or, where a kind has no
  * such text, one by one by the step of walks that go alone (alone_vertex.c). */
@@ -36,10 +36,12 @@ struct imp_bundle {
     double *px, *py, *time;
     uint64_t *set; /* hash of the set, or the key of a walk of no set */
     uint32_t *index;
-    /* Results: radiance at the sensor; is alpha 1; why it was dropped (enum imp_drop). */
+    /* Results. Where the tracer wants values only: radiance at the sensor; is alpha 1; why it was
+     * dropped (enum imp_drop). */
     double *L[4];
     bool *valid;
     uint8_t *dropped;
+    struct imp_walk *walks; /* [n] records; NULL: values only */
 };
 
 /* The walks with the given numbers [n_samples] of each of the pixels xy [n_pixels], pixel by pixel.

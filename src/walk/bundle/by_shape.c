@@ -111,8 +111,8 @@ void imp__vertices(struct imp_depth *d, double *const beyond[4], struct imp_by_s
         return;
     }
     const int max_depth = tracer->integrator->max_depth;
-    const bool last = max_depth >= 0 && d->depth + 1 >= max_depth;
     int few = 0;
+    d->last = max_depth >= 0 && d->depth + 1 >= max_depth;
     sort(d, beyond, s);
     for (int k = 0, from = 0; k < s->n; k++) {
         const int shape = s->shape[k], n = s->count[shape] - from;
@@ -120,9 +120,9 @@ void imp__vertices(struct imp_depth *d, double *const beyond[4], struct imp_by_s
         struct imp_bin bin;
         from += n;
         s->count[shape] = 0;
-        if (!imp__shape_in_lanes(tracer->scene, shape)) {
+        if (!imp__shape_in_lanes(tracer, shape)) {
             alone(d, order, n);
-        } else if (last) {
+        } else if (d->last && tracer->value_only) {
             continue; /* nothing is met there, and nothing leaves */
         } else if (n >= FEW) {
             imp__shape_bin(tracer, shape, &bin);

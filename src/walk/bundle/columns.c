@@ -27,7 +27,7 @@ static bool rays_create(struct imp_arena *arena, size_t n, struct imp_ray_column
 }
 
 bool imp__flights_create(struct imp_arena *arena, size_t n, int colors, bool left,
-                         struct imp_flights *out)
+                         bool zeros, struct imp_flights *out)
 {
     bool ok = rays_create(arena, n, &out->ray);
     VECTOR(out->from);
@@ -38,6 +38,8 @@ bool imp__flights_create(struct imp_arena *arena, size_t n, int colors, bool lef
     COLUMN(out->up);
     out->left = NULL;
     if (left) COLUMN(out->left);
+    out->zeros = NULL;
+    if (zeros) COLUMN(out->zeros);
     return ok;
 }
 
@@ -70,5 +72,6 @@ bool imp__shadows_create(struct imp_arena *arena, size_t n, struct imp_shadows *
 {
     bool ok = rays_create(arena, n, &out->ray);
     COLUMN(out->at);
+    COLUMN(out->of);
     return ok;
 }

@@ -21,9 +21,11 @@ struct imp_flights {
     double *beta[4]; /* throughput, for roulette */
     double *eta;     /* product of index ratios */
     struct imp_light_place
-        *left;     /* where it left, as the tree of lights sees it; NULL: none */
-    int32_t *walk; /* number of the walk */
-    int32_t *up;   /* place of the last vertex among the values of its depth */
+        *left;      /* where it left, as the tree of lights sees it; NULL: none */
+    uint8_t *zeros; /* bit c: throughput c has left out a factor that is zero but has a
+                       derivative (core/scatter.c); NULL: there are no derivatives */
+    int32_t *walk;  /* number of the walk */
+    int32_t *up;    /* place of the last vertex among the values of its depth */
 };
 
 /* Values of the vertices of a depth (walk.h: E, B, w), and what comes from beyond. */
@@ -33,16 +35,18 @@ struct imp_bundle_values {
     int32_t *up; /* place of the vertex before; of the first vertex, the walk's number */
 };
 
-/* Shadow rays, and the vertices whose B they decide. */
+/* Shadow rays, and the vertices whose B they decide: places among the values, or the vertices of
+ * recorded walks. */
 struct imp_shadows {
     struct imp_ray_columns ray;
     int32_t *at;
+    struct imp_vertex **of;
 };
 
-/* Room for n of them, of so many colours: 3, or 4 wavelengths; with `left` if asked for. False: no
- * memory. */
+/* Room for n of them, of so many colours: 3, or 4 wavelengths; with `left`, and with `zeros`, if
+ * asked for. False: no memory. */
 bool imp__flights_create(struct imp_arena *arena, size_t n, int colors, bool left,
-                         struct imp_flights *out);
+                         bool zeros, struct imp_flights *out);
 bool imp__hits_create(struct imp_arena *arena, size_t n, struct imp_hit_columns *out);
 bool imp__bundle_values_create(struct imp_arena *arena, size_t n, int colors,
                                struct imp_bundle_values *out);

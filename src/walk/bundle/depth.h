@@ -20,11 +20,14 @@ struct imp_lone {
 struct imp_depth {
     struct imp_bundle *bundle;
     int depth;
+    bool last;                      /* nothing leaves its vertices, by max_depth */
     const struct imp_flights *rays; /* that lead there */
     const struct imp_hit_columns *hits;
-    struct imp_bundle_values *values; /* of the vertices, at their places */
-    struct imp_shadows *shadows;      /* appended */
-    struct imp_flights *next;         /* likewise */
+    struct imp_bundle_values
+        *values;                 /* of the vertices, at their places; of recorded walks
+                                         their number alone */
+    struct imp_shadows *shadows; /* appended */
+    struct imp_flights *next;    /* likewise */
     struct imp_lone *lone;
 };
 
@@ -52,11 +55,10 @@ struct imp_bin {
 /* Walks of this tracer may have vertices in lanes. */
 bool imp__lanes_fit(const struct imp_tracer *tracer);
 /* False: vertices on this shape are made one by one. */
-bool imp__shape_in_lanes(const struct imp_scene *scene, int shape);
+bool imp__shape_in_lanes(const struct imp_tracer *tracer, int shape);
 /* Those of the others. */
 void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *bin);
-/* The vertices of the rays order[n], whose next ones are not the last of their walks, at places
- * `at` and on. */
+/* The vertices of the rays order[n], at places `at` and on. */
 void imp__vertices_in_lanes(struct imp_depth *d, const struct imp_bin *bin,
                             const int32_t *order, int n, int at);
 

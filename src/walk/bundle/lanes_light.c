@@ -1,11 +1,28 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Light samples in lanes (core/light.c, of walks alone). */
-#include "lanes_light.h"
+#include "kind/shape/shape.h"
+#include "lanes_record.h"
 #include "walk/core/emitted.h"
 #include "walk/core/light_point.h"
 
 static void truth_set(imp_wide_truth *m, int k, bool value) { (*m)[k] = -(int64_t)value; }
+
+static void record_lanes(int light, imp_wide_truth here, const struct imp_wide_light *own,
+                         struct imp_lanes_light *out)
+{
+    out->at.cos_light = imp__wide_choose(here, own->cos_light, out->at.cos_light);
+    out->at.dist = imp__wide_choose(here, own->dist, out->at.dist);
+    for (int j = 0; j < 2; j++) {
+        out->at.uv[j] = imp__wide_choose(here, own->uv[j], out->at.uv[j]);
+        out->at.located[j] = imp__wide_choose(here, own->located[j], out->at.located[j]);
+    }
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
+        if (!here[k]) continue;
+        out->light[k] = light;
+        out->at.prim[k] = own->prim[k];
+    }
+}
 
 /* The points of one light for the lanes with bits. */
 static void draw_lanes(const struct imp_scene *scene,
@@ -17,6 +34,7 @@ static void draw_lanes(const struct imp_scene *scene,
     const struct imp_emitter *e = scene->emitters[light];
     const imp_wide zero = imp__wide(0);
     struct imp_wide_light own;
+    own.recorded = out->at.recorded;
     lanes->sample(e, ref, u, &own);
     const imp_wide_truth lit = imp__wide_decide(own.cos_light) > zero;
     own.drawn &= own.pdf > zero;
@@ -44,6 +62,7 @@ static void draw_lanes(const struct imp_scene *scene,
     if (lanes->far) out->far |= here;
     else out->far &= ~here;
     out->delta &= ~here;
+    if (own.recorded) record_lanes(light, here, &own, out);
 }
 
 /* Point ls of a light, for lane k. */
@@ -65,6 +84,16 @@ static void lane_put(const struct imp_scene *scene,
     for (int c = 0; c < 4; c++) out->radiance.c[c][k] = le[c];
     truth_set(&out->far, k, !isfinite(ls->dist));
     truth_set(&out->delta, k, (e->ops->flags & IMP_EMITTER_DELTA) != 0);
+    if (!out->at.recorded) return;
+    const struct imp_located located = imp__located_drawn(e->shape, &ls->located, ls->uv);
+    out->light[k] = light;
+    out->at.cos_light[k] = ls->cos_light;
+    out->at.dist[k] = ls->dist;
+    out->at.prim[k] = located.prim;
+    for (int j = 0; j < 2; j++) {
+        out->at.uv[j][k] = ls->uv[j];
+        out->at.located[j][k] = located.at[j];
+    }
 }
 
 static void draw_alone(const struct imp_scene *scene,
@@ -195,10 +224,14 @@ static inline void sky_work(struct imp_depth *d, const int32_t *order, int n,
                                   imp__wide_decide(power_heuristic(
                                       pdf, chance * lanes_of(e)->pdf(e, &from, &wi))),
                                   one);
-    for (int c = 0; c < 3; c++) {
-        const imp_wide met = e->input[0]->value[c] * weight;
-        for (int k = 0; k < n; k++) beyond[c][d->rays->up[order[k]]] = met[k];
+    struct imp_wide_color met;
+    for (int c = 0; c < 3; c++) met.c[c] = e->input[0]->value[c] * weight;
+    if (d->bundle->walks) {
+        imp__lanes_record_sky(d, order, n, light, &wi, &weight, &met);
+        return;
     }
+    for (int c = 0; c < 3; c++)
+        for (int k = 0; k < n; k++) beyond[c][d->rays->up[order[k]]] = met.c[c][k];
     for (int k = 0; k < n; k++) d->bundle->valid[d->rays->walk[order[k]]] = true;
 }
 

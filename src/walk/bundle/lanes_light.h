@@ -13,10 +13,11 @@ struct imp_lanes_light {
     imp_wide pmf;
     struct imp_wide_color radiance;
     imp_wide_truth far, delta; /* infinitely far; met by no direction */
+    int32_t light[IMP_WIDE_LANES];
 };
 
 /* What imp__light_point (core/drawn.h) draws for vertices at ref with the numbers u, in the lanes
- * with bits; at.drawn: there is a light, which shows its front. `which` chooses the light; one: it
+ * with bits; at.drawn: there is a light, which shows its front; at.recorded is given. `which` chooses the light; one: it
  * is u[0], of which the part that is left draws the point. carried [IMP_WIDE_LANES]: wavelengths of the
  * walks; NULL: colours. */
 void imp__lanes_light_draw(const struct imp_scene *scene,

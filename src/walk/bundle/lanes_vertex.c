@@ -3,8 +3,7 @@
  * Vertices of a bundle in lanes: those on one shape, IMP_WIDE_LANES at a time. What the one step does
  * for a walk alone (path/sensor_end.h, core/scatter.c, core/light.c) stands here for walks that
  * have a kernel, light samples and roulette, and nothing more. */
-#include "kind/kind_lanes.h"
-#include "lanes_light.h"
+#include "lanes_record.h"
 #include "math/offset.h"
 
 /* ---- What is in lanes -------------------------------------------------------------------- */
@@ -16,12 +15,22 @@ bool imp__lanes_fit(const struct imp_tracer *t)
            w->directions && !w->only_points && t->scene->n_groups == 0;
 }
 
-bool imp__shape_in_lanes(const struct imp_scene *scene, int shape)
+static const struct imp_bsdf_lanes *kernel_of(const struct imp_tracer *tracer,
+                                              const struct imp_bsdf *b)
 {
-    const struct imp_shape *s = scene->shapes[shape];
-    const struct imp_bsdf *b = imp__shape_bsdf(scene, s);
+    const struct imp_active *active = tracer->active;
+    return imp__bsdf_lanes(b, active && b->index >= 0 ? active->inputs[b->index] : 0);
+}
+
+bool imp__shape_in_lanes(const struct imp_tracer *tracer, int shape)
+{
+    const struct imp_shape *s = tracer->scene->shapes[shape];
+    const struct imp_bsdf *b = imp__shape_bsdf(tracer->scene, s);
     return s->emitter < 0 && !s->body && !b->shaped && b->flags == IMP_BSDF_SMOOTH &&
-           b->n_in <= IMP_INPUTS_MAX && imp__bsdf_lanes(b);
+           b->n_in <= IMP_INPUTS_MAX && kernel_of(tracer, b) &&
+           (tracer->value_only || s->geometry == IMP_TRIANGLES ||
+            s->geometry ==
+                IMP_ANALYTIC); /* else points are located by what is not in lanes */
 }
 
 void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *bin)
@@ -31,7 +40,7 @@ void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *
     bin->shape = s;
     bin->bsdf = b;
     bin->surface = imp__shape_lanes(s);
-    bin->kernel = imp__bsdf_lanes(b);
+    bin->kernel = kernel_of(tracer, b);
     bin->plain = true;
     for (int j = 0; j < b->n_in; j++) bin->plain &= b->input[j]->plain;
     for (int j = 0; bin->plain && j < b->n_in; j++)
@@ -111,23 +120,8 @@ static inline imp_wide_truth is_zero(const imp_wide f[4], int colors)
 
 /* ---- What leaves it ---------------------------------------------------------------------- */
 
-/* The vertices at work. */
-struct vertices {
-    struct imp_wide_surface x;
-    imp_wide3 wo, wo_drawn;
-    struct imp_wide_block numbers; /* of the walks' points, or of their keys */
-    bool points;
-    int depth;
-    const struct imp_wide_color *in;
-    unsigned on; /* a bit for each lane that counts */
-    int at;      /* place of the first among the values of the depth */
-    const int32_t *order;
-    struct imp_light_place place[IMP_WIDE_LANES]; /* where there is a tree of lights */
-    const struct imp_carried *carried[IMP_WIDE_LANES]; /* where walks carry wavelengths */
-};
-
 /* imp__light_place of all lanes: kernels in lanes send nothing through the surface. */
-static void places(struct vertices *v)
+static void places(struct imp_lanes_vertices *v)
 {
     for (int k = 0; k < IMP_WIDE_LANES; k++) {
         const imp_v3 n = imp__wide3_lane(&v->x.frame.n, k);
@@ -137,7 +131,7 @@ static void places(struct vertices *v)
     }
 }
 
-static inline imp_wide number(const struct vertices *v, int use)
+static inline imp_wide number(const struct imp_lanes_vertices *v, int use)
 {
     return imp__wide_number(&v->numbers, v->points ? (uint32_t)imp__slot(use)
                                                    : imp__dim(v->depth, use));
@@ -150,54 +144,67 @@ static imp_wide power_heuristic_over(imp_wide a, imp_wide b)
     return imp__wide_choose(a2 > imp__wide(0), a / (a2 + b2), imp__wide(0));
 }
 
-/* B of the vertices as if all lights were seen, and the shadow rays. */
+/* What lights bring to the vertices if they are seen. */
 static inline __attribute__((always_inline)) void
-light(struct imp_depth *d, const struct imp_bin *bin, const struct vertices *v,
-      const int colors, struct imp_wide_color *brings)
+light_weigh(struct imp_depth *d, const struct imp_bin *bin,
+            const struct imp_lanes_vertices *v, const int colors,
+            struct imp_lanes_lit *lit)
 {
     const imp_wide zero = imp__wide(0);
-    struct imp_lanes_light l;
-    struct imp_wide_color f;
-    const imp_wide u[2] = {number(v, IMP_DIM_LIGHT_U), number(v, IMP_DIM_LIGHT_V)};
-    *brings = imp__wide_color(imp__spec(0));
-    if (d->bundle->tracer->scene->n_emitters == 0) return;
     const struct imp_scene *scene = d->bundle->tracer->scene;
+    struct imp_lanes_light *l = &lit->light;
+    const imp_wide u[2] = {number(v, IMP_DIM_LIGHT_U), number(v, IMP_DIM_LIGHT_V)};
     const imp_wide which =
         v->points || scene->n_emitters == 1 ? u[0] : number(v, IMP_DIM_LIGHT);
     const struct imp_carried *const *carried = colors > 3 ? v->carried : NULL;
+    l->at.recorded = v->recorded;
     if (imp_unlikely(d->next->left != NULL))
-        imp__lanes_tree_draw(scene, carried, v->place, u, which, v->points, v->on, &l);
-    else imp__lanes_light_draw(scene, carried, &v->x.p, u, which, v->points, v->on, &l);
-    const imp_wide3 wi = imp__wide3_decide(imp__into_wide_frame(&v->x.frame, l.at.wi));
-    const imp_wide pdf = bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, &wi, colors, &f);
-    const imp_wide p = l.at.pdf * l.pmf;
-    const imp_wide weight =
-        imp__wide_decide(imp__wide_choose(l.delta, 1 / p, power_heuristic_over(p, pdf)));
-    for (int c = 0; c < colors; c++) f.c[c] *= l.radiance.c[c];
-    const imp_wide_truth wanted = l.at.drawn & (pdf > zero) & ~is_zero(f.c, colors);
-    const unsigned bits = imp__wide_bits(wanted) & v->on;
+        imp__lanes_tree_draw(scene, carried, v->place, u, which, v->points, v->on, l);
+    else imp__lanes_light_draw(scene, carried, &v->x.p, u, which, v->points, v->on, l);
+    lit->wi = imp__wide3_decide(imp__into_wide_frame(&v->x.frame, l->at.wi));
+    const imp_wide pdf =
+        bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, &lit->wi, colors, &lit->f);
+    const imp_wide p = l->at.pdf * l->pmf;
+    lit->weight =
+        imp__wide_decide(imp__wide_choose(l->delta, 1 / p, power_heuristic_over(p, pdf)));
+    imp_wide fl[4];
+    for (int c = 0; c < colors; c++) fl[c] = lit->f.c[c] * l->radiance.c[c];
+    const imp_wide_truth none = is_zero(fl, colors), drawn = l->at.drawn & (pdf > zero),
+                         wanted = drawn & ~none;
+    lit->on = imp__wide_bits(wanted) & v->on;
+    lit->dark = imp__wide_bits(drawn & none) & v->on;
     for (int c = 0; c < colors; c++)
-        brings->c[c] = imp__wide_choose(wanted, f.c[c] * weight, zero);
-    if (!bits) return;
+        lit->brings.c[c] = imp__wide_choose(wanted, fl[c] * lit->weight, zero);
+}
 
+/* Their shadow rays; v->record: of these vertices. */
+static inline __attribute__((always_inline)) void
+light_see(struct imp_depth *d, const struct imp_lanes_vertices *v,
+          const struct imp_lanes_lit *lit)
+{
+    const struct imp_lanes_light *l = &lit->light;
     struct imp_shadows *to = d->shadows;
+    const unsigned bits = lit->on;
     const int n = to->ray.n;
-    const imp_wide3 o = offset(v->x.p, v->x.ng, l.at.wi);
+    if (!bits) return;
+    const imp_wide3 o = offset(v->x.p, v->x.ng, l->at.wi);
     imp__wide3_append(to->ray.o, n, bits, o);
     imp__wide3_append(to->ray.d, n, bits,
-                      imp__wide3_choose(l.far, l.at.wi, imp__wide3_minus(l.at.p, o)));
+                      imp__wide3_choose(l->far, l->at.wi, imp__wide3_minus(l->at.p, o)));
     imp__wide_append(&to->ray.far[n], bits,
-                     imp__wide_choose(l.far, imp__wide(INFINITY),
+                     imp__wide_choose(l->far, imp__wide(INFINITY),
                                       imp__wide(1 - 10 * IMP_RAY_EPSILON)));
     for (unsigned left = bits; left; left &= left - 1) {
         const int k = __builtin_ctz(left), i = to->ray.n++;
         to->at[i] = v->at + k;
+        if (v->recorded) to->of[i] = v->record[k];
         if (to->ray.time) to->ray.time[i] = d->rays->ray.time[v->order[k]];
     }
 }
 
 /* Survival as decided, and who survives. */
-static inline imp_wide_truth survives(const struct imp_depth *d, const struct vertices *v,
+static inline imp_wide_truth survives(const struct imp_depth *d,
+                                      const struct imp_lanes_vertices *v,
                                       const imp_wide beta[4], int colors, imp_wide eta,
                                       imp_wide *survive)
 {
@@ -211,48 +218,65 @@ static inline imp_wide_truth survives(const struct imp_depth *d, const struct ve
     return number(v, IMP_DIM_SURVIVE) < *survive;
 }
 
-/* The weights of the vertices' steps, and the next rays. */
+/* Where walks go on, and what a step there weighs. */
 static inline __attribute__((always_inline)) void
-scatter(struct imp_depth *d, const struct imp_bin *bin, const struct vertices *v,
-        const int colors, struct imp_wide_color *w)
+scatter_weigh(struct imp_depth *d, const struct imp_bin *bin,
+              const struct imp_lanes_vertices *v, const int colors,
+              struct imp_lanes_step *s)
 {
     const imp_wide zero = imp__wide(0);
     const imp_wide u[3] = {number(v, IMP_DIM_LOBE), number(v, IMP_DIM_DIR_U),
                            number(v, IMP_DIM_DIR_V)};
-    imp_wide3 wi;
     struct imp_wide_color f;
-    imp_wide_truth goes = bin->kernel->sample(bin->bsdf, v->in, &v->wo_drawn, u, &wi);
-    const imp_wide3 world = imp__out_of_wide_frame(&v->x.frame, wi);
-    wi = imp__wide3_decide(wi);
-    const imp_wide pdf = imp__wide_decide(
-        bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, &wi, colors, &f));
-    const imp_wide by = 1 / pdf, eta = imp__wide_taken(d->rays->eta, v->order);
-    imp_wide beta[4], survive;
-    goes &= pdf > zero;
-    for (int c = 0; c < colors; c++)
-        beta[c] = imp__wide_taken(d->rays->beta[c], v->order) * (f.c[c] * by);
+    imp_wide_truth goes = bin->kernel->sample(bin->bsdf, v->in, &v->wo_drawn, u, &s->wi);
+    s->world = imp__out_of_wide_frame(&v->x.frame, s->wi);
+    s->wi = imp__wide3_decide(s->wi);
+    s->pdf = imp__wide_decide(
+        bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, &s->wi, colors, &f));
+    const imp_wide by = 1 / s->pdf;
+    imp_wide beta[4];
+    imp_wide_truth part = {0};
+    s->eta = imp__wide_taken(d->rays->eta, v->order);
+    goes &= s->pdf > zero;
+    for (int c = 0; c < colors; c++) {
+        const imp_wide factor = f.c[c] * by;
+        part |= factor == zero;
+        beta[c] = imp__wide_taken(d->rays->beta[c], v->order) * factor;
+    }
+    s->part = imp__wide_bits(part & goes) & v->on;
     goes &= ~is_zero(beta, colors);
-    goes &= survives(d, v, beta, colors, eta, &survive);
-    const imp_wide again = 1 / survive, scale = 1 / (pdf * survive);
-    for (int c = 0; c < colors; c++)
-        w->c[c] = imp__wide_choose(goes, f.c[c] * scale, zero);
+    goes &= survives(d, v, beta, colors, s->eta, &s->survive);
+    const imp_wide again = 1 / s->survive;
+    s->scale = 1 / (s->pdf * s->survive);
+    for (int c = 0; c < colors; c++) {
+        s->w.c[c] = imp__wide_choose(goes, f.c[c] * s->scale, zero);
+        s->beta.c[c] = beta[c] * again;
+    }
+    s->on = imp__wide_bits(goes) & v->on;
+}
 
+/* The next rays. */
+static inline __attribute__((always_inline)) void
+scatter_on(struct imp_depth *d, const struct imp_lanes_vertices *v, const int colors,
+           const struct imp_lanes_step *s)
+{
     struct imp_flights *to = d->next;
-    const unsigned bits = imp__wide_bits(goes) & v->on;
+    const unsigned bits = s->on;
     const int n = to->ray.n;
-    imp__wide3_append(to->ray.o, n, bits, offset(v->x.p, v->x.ng, world));
-    imp__wide3_append(to->ray.d, n, bits, world);
+    imp__wide3_append(to->ray.o, n, bits, offset(v->x.p, v->x.ng, s->world));
+    imp__wide3_append(to->ray.d, n, bits, s->world);
     imp__wide_append(&to->ray.far[n], bits, imp__wide(INFINITY));
     imp__wide3_append(to->from, n, bits, v->x.p);
-    imp__wide_append(&to->pdf[n], bits, pdf);
+    imp__wide_append(&to->pdf[n], bits, s->pdf);
     for (int c = 0; c < colors; c++)
-        imp__wide_append(&to->beta[c][n], bits, beta[c] * again);
-    imp__wide_append(&to->eta[n], bits, eta);
+        imp__wide_append(&to->beta[c][n], bits, s->beta.c[c]);
+    imp__wide_append(&to->eta[n], bits, s->eta);
     for (unsigned left = bits; left; left &= left - 1) {
         const int k = __builtin_ctz(left), i = to->ray.n++, from = v->order[k];
         to->walk[i] = d->rays->walk[from];
         to->up[i] = v->at + k;
         if (to->left) to->left[i] = v->place[k];
+        if (to->zeros) to->zeros[i] = d->rays->zeros[from];
         if (to->ray.time) to->ray.time[i] = d->rays->ray.time[from];
     }
 }
@@ -265,7 +289,8 @@ static inline void color_store(double *const to[4], int colors, int at,
     for (int c = 0; c < colors; c++) imp__wide_store(&to[c][at], x->c[c]);
 }
 
-static inline __attribute__((always_inline)) void work(struct imp_depth *d,
+/* False: they are to be made one by one, since a value that is zero has a derivative there. */
+static inline __attribute__((always_inline)) bool work(struct imp_depth *d,
                                                        const struct imp_bin *bin,
                                                        const int32_t *order, int n,
                                                        int at, const int colors)
@@ -278,21 +303,24 @@ static inline __attribute__((always_inline)) void work(struct imp_depth *d,
                                        .v = d->hits->v,
                                        .prim = d->hits->prim,
                                        .at = order};
-    struct imp_wide_color in[IMP_INPUTS_MAX], brings, weight;
-    struct vertices v; /* field by field: clearing all of it takes time */
+    struct imp_wide_color in[IMP_INPUTS_MAX];
+    struct imp_lanes_lit lit;
+    struct imp_lanes_step step;
+    struct imp_lanes_vertices v; /* field by field: clearing all of it takes time */
+    v.recorded = b->walks != NULL;
     v.on = imp__bits_first(n);
     v.at = at;
     v.order = order;
     v.points = b->tracer->points != NULL;
     v.depth = d->depth;
-    int32_t walk[IMP_WIDE_LANES];
-    for (int k = 0; k < IMP_WIDE_LANES; k++) walk[k] = d->rays->walk[order[k]];
+    for (int k = 0; k < IMP_WIDE_LANES; k++) v.walk[k] = d->rays->walk[order[k]];
     if (colors > 3)
         for (int k = 0; k < IMP_WIDE_LANES; k++)
-            v.carried[k] = &b->waves[walk[k]]->carried;
-    v.numbers =
-        imp__wide_block(b->tracer->points, b->set, b->index, walk, imp__block(d->depth));
-    if (bin->surface) bin->surface->surface(bin->shape, &hits, !bin->plain, &v.x);
+            v.carried[k] = &b->waves[v.walk[k]]->carried;
+    v.numbers = imp__wide_block(b->tracer->points, b->set, b->index, v.walk,
+                                imp__block(d->depth));
+    if (bin->surface)
+        bin->surface->surface(bin->shape, &hits, v.recorded || !bin->plain, &v.x);
     else surface_alone(d, &hits, &v.x);
     v.wo_drawn = imp__into_wide_frame(
         &v.x.frame, imp__wide3_opposite(imp__wide3_taken(d->rays->ray.d, order)));
@@ -303,19 +331,31 @@ static inline __attribute__((always_inline)) void work(struct imp_depth *d,
         inputs_alone(d, bin->bsdf, colors > 3 ? v.carried : NULL, &hits, &v.x, in);
         v.in = in;
     }
-    if (b->tracer->integrator->lights) light(d, bin, &v, colors, &brings);
-    else brings = imp__wide_color(imp__spec(0));
-    scatter(d, bin, &v, colors, &weight);
-
-    const struct imp_wide_color none = imp__wide_color(imp__spec(0));
-    color_store(d->values->e, colors, at, &none);
-    color_store(d->values->b, colors, at, &brings);
-    color_store(d->values->w, colors, at, &weight);
-    color_store(d->values->beyond, colors, at, &none);
-    for (int k = 0; k < n; k++) {
-        d->values->up[at + k] = d->rays->up[order[k]];
-        b->valid[walk[k]] = true;
+    lit.on = lit.dark = step.on = step.part = 0;
+    if (imp_likely(!d->last)) {
+        if (b->tracer->integrator->lights && b->tracer->scene->n_emitters > 0)
+            light_weigh(d, bin, &v, colors, &lit);
+        else lit.brings = imp__wide_color(imp__spec(0));
+        scatter_weigh(d, bin, &v, colors, &step);
     }
+
+    if (v.recorded) {
+        if (!imp__lanes_record(d, bin, &v, &lit, &step)) return false;
+    } else {
+        const struct imp_wide_color none = imp__wide_color(imp__spec(0));
+        color_store(d->values->e, colors, at, &none);
+        color_store(d->values->b, colors, at, &lit.brings);
+        color_store(d->values->w, colors, at, &step.w);
+        color_store(d->values->beyond, colors, at, &none);
+        for (int k = 0; k < n; k++) {
+            d->values->up[at + k] = d->rays->up[order[k]];
+            b->valid[v.walk[k]] = true;
+        }
+    }
+    if (imp_unlikely(d->last)) return true;
+    light_see(d, &v, &lit);
+    scatter_on(d, &v, colors, &step);
+    return true;
 }
 
 void imp__vertices_in_lanes(struct imp_depth *d, const struct imp_bin *bin,
@@ -329,7 +369,9 @@ void imp__vertices_in_lanes(struct imp_depth *d, const struct imp_bin *bin,
             for (int k = 0; k < IMP_WIDE_LANES; k++) rest[k] = here[k < left ? k : 0];
             here = rest;
         }
-        if (imp_likely(d->bundle->colors == 3)) work(d, bin, here, left, at + i, 3);
-        else work(d, bin, here, left, at + i, 4);
+        const bool made = imp_likely(d->bundle->colors == 3)
+                              ? work(d, bin, here, left, at + i, 3)
+                              : work(d, bin, here, left, at + i, 4);
+        for (int k = 0; !made && k < left; k++) imp__vertex_alone(d, here[k], at + i + k);
     }
 }

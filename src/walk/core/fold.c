@@ -8,6 +8,7 @@ imp_spec imp__walk_fold(struct imp_walk *walk)
     imp_spec L = {0};
     const struct imp_entry *entry = walk->entry ? walk->entry + walk->n : NULL;
     for (struct imp_vertex *v = walk->last; v; v = v->prev) {
+        imp__vertex_fetch(v->prev, IMP_VERTEX_VALUES);
         v->beyond = L;
         if (imp_likely(!entry)) {
             L = v->e + v->w * L + v->b;

@@ -80,6 +80,14 @@ struct imp_vertex {
 };
 #define IMP_VERTEX_VALUES offsetof(struct imp_vertex, ng) /* bytes */
 
+/* Asks for the first bytes of a vertex that is read soon: those of a walk in a bundle lie far
+ * apart. v may be NULL. */
+static inline void imp__vertex_fetch(const struct imp_vertex *v, size_t bytes)
+{
+    for (size_t at = 0; at < bytes; at += IMP_CACHE_LINE)
+        __builtin_prefetch((const char *)v + at);
+}
+
 /* Vertices of a walk. One of more is dropped: nothing ends it, as in a closed white room
  * without roulette. With roulette at 0.95 the chance to get here is 1e-365. */
 #define IMP_WALK_MAX (1 << 14)
@@ -301,7 +309,9 @@ static inline __attribute__((always_inline)) void imp__walk_clear(struct imp_wal
 void imp__walk_begin(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                      struct imp_walk *walk, double lens[2]);
 
-/* Its point alone, and its film position alone. */
+/* Its key and point alone, its point alone, and its film position alone. */
+void imp__walk_numbers(const struct imp_tracer *tracer, int x, int y, int64_t sample,
+                       struct imp_walk *walk);
 void imp__walk_point(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                      struct imp_point *point);
 void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t sample,

@@ -145,6 +145,7 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
     imp_spec P = adjoint;
     int depth = walk->depth;
     for (const struct imp_vertex *v = walk->first; v; v = v->next, depth++) {
+        imp__vertex_fetch(v->next, sizeof *v);
         for (const struct imp_side *s = v->side; s; s = s->next)
             imp__walk_sweep_values(tracer, &s->walk, P, sink);
         const struct imp_adjoints a = imp__adjoints_at(walk, depth, P);

@@ -33,6 +33,11 @@ static inline void number(const struct imp_tracer *tracer, int x, int y, int64_t
     walk->key = imp__key(tracer->seed, pixel, (uint64_t)sample);
     point_of(tracer, pixel, sample, &walk->point);
 }
+void imp__walk_numbers(const struct imp_tracer *tracer, int x, int y, int64_t sample,
+                       struct imp_walk *walk)
+{
+    number(tracer, x, y, sample, walk);
+}
 void imp__walk_point(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                      struct imp_point *point)
 {

@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Vertices in lanes while they are made (lanes_vertex.c), and their records. */
+#ifndef IMP_WALK_BUNDLE_LANES_RECORD_H
+#define IMP_WALK_BUNDLE_LANES_RECORD_H
+
+#include "lanes_light.h"
+
+/* The vertices at work. */
+struct imp_lanes_vertices {
+    struct imp_wide_surface x;
+    imp_wide3 wo, wo_drawn;        /* shading frame, as decided, and before */
+    struct imp_wide_block numbers; /* of the walks' points, or of their keys */
+    bool points, recorded;
+    int depth;
+    const struct imp_wide_color *in;
+    unsigned on; /* a bit for each lane that counts */
+    int at;      /* place of the first among the values of the depth */
+    const int32_t *order;
+    int32_t walk[IMP_WIDE_LANES];
+    struct imp_light_place place[IMP_WIDE_LANES]; /* where there is a tree of lights */
+    const struct imp_carried *carried[IMP_WIDE_LANES]; /* where walks carry wavelengths */
+    struct imp_vertex *record[IMP_WIDE_LANES];         /* where they are recorded */
+};
+
+/* Their connections to lights. */
+struct imp_lanes_lit {
+    struct imp_lanes_light light;
+    imp_wide3 wi; /* as decided */
+    struct imp_wide_color f, brings;
+    imp_wide weight;   /* as decided */
+    unsigned on, dark; /* lanes that get light if it is seen; that would get none */
+};
+
+/* Their steps to the next vertices. */
+struct imp_lanes_step {
+    imp_wide3 wi, world; /* in the shading frame, as decided; as drawn */
+    imp_wide pdf, survive, eta, scale;
+    struct imp_wide_color w, beta;
+    unsigned on, part; /* lanes that go on; whose factor is zero in a colour */
+};
+
+/* Records them, into v->record. False: nothing is done, since a value that is zero has a
+ * derivative: they are to be made one by one. */
+bool imp__lanes_record(struct imp_depth *d, const struct imp_bin *bin,
+                       struct imp_lanes_vertices *v, struct imp_lanes_lit *lit,
+                       struct imp_lanes_step *step);
+
+/* The sky that the rays order[n] of directions wi meet, with these MIS weights. */
+void imp__lanes_record_sky(struct imp_depth *d, const int32_t *order, int n, int light,
+                           const imp_wide3 *wi, const imp_wide *weight,
+                           const struct imp_wide_color *met);
+
+#endif

@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Bundles for lists of pixels. */
+#include "supply.h"
+
+/* Walks of a bundle, about: enough to fill lanes, few enough for a processor's own cache, in which
+ * records need more. A group may be larger than that. */
+enum { VALUES = 512, RECORDS = 256, GROUP_MOST = 1024 };
+
+bool imp__supply_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
+                       const int (*xy)[2], int n_pixels, const int64_t *numbers,
+                       int n_numbers, int group, struct imp_supply *out)
+{
+    const int most = tracer && !tracer->value_only ? RECORDS : VALUES;
+    if (!tracer || group < 1 || group > GROUP_MOST || n_numbers < 1) return false;
+    *out = (struct imp_supply){.tracer = tracer,
+                               .arena = arena,
+                               .mark = imp__arena_mark(arena),
+                               .xy = xy,
+                               .n_pixels = n_pixels,
+                               .numbers = numbers,
+                               .n_numbers = n_numbers,
+                               .group = group,
+                               .pixels = imp_max(most / n_numbers, 1)};
+    out->walks = n_numbers <= most ? n_numbers : imp_max(most / group * group, group);
+    return true;
+}
+
+static void make(struct imp_supply *s)
+{
+    const int walks = imp_min(s->walks, s->n_numbers - s->number),
+              pixels = imp_min(s->pixels, s->n_pixels - s->pixel);
+    imp__arena_rewind(s->arena, s->mark);
+    s->made = imp__bundle_trace(s->tracer, s->arena, pixels, s->xy + s->pixel, walks,
+                                s->numbers + s->number, &s->at_work);
+    s->left = pixels * walks;
+    s->place = 0;
+    s->number += walks;
+    if (s->number < s->n_numbers) return;
+    s->number = 0;
+    s->pixel += pixels;
+}
+
+void imp__supply_ready(struct imp_supply *s)
+{
+    if (s->left == 0) make(s);
+}
+
+void imp__supply_take(struct imp_supply *s, int x, int y, int64_t sample,
+                      struct imp_walk *walk)
+{
+    s->left--;
+    if (imp_likely(s->made)) imp__bundle_walk(&s->at_work, s->place++, walk);
+    else imp__walk_trace(s->tracer, s->arena, x, y, sample, walk);
+}

@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The walks of a list of pixels one behind the other, made in bundles of a few pixels, or of a part
+ * of one pixel's walks. Who takes them may lay things above them in the arena, and takes those away
+ * before a group of walks begins. */
+#ifndef IMP_WALK_BUNDLE_SUPPLY_H
+#define IMP_WALK_BUNDLE_SUPPLY_H
+
+#include "base/arena.h"
+#include "bundle.h"
+
+struct imp_supply {
+    const struct imp_tracer *tracer;
+    struct imp_arena *arena;
+    struct imp_arena_mark mark; /* of the arena, before a bundle */
+    const int (*xy)[2];         /* [n_pixels] */
+    const int64_t *numbers;     /* [n_numbers] of the walks of each pixel */
+    int n_pixels, n_numbers;
+    int group;         /* so many walks of a pixel are taken together */
+    int pixel, number; /* that the next bundle begins with */
+    int pixels, walks; /* of a bundle: pixels, walks of each */
+    struct imp_bundle at_work;
+    bool made;       /* at_work is there; else there was no memory for it */
+    int left, place; /* walks of it that were not taken; number of the next one */
+};
+
+/* Walks with the given numbers of each pixel, which are as many as a multiple of `group`; the lists
+ * live as long as the supply. False: walks of this tracer are not bundled, or a group is too large
+ * for a bundle. */
+bool imp__supply_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
+                       const int (*xy)[2], int n_pixels, const int64_t *numbers,
+                       int n_numbers, int group, struct imp_supply *out);
+
+/* Before the first walk of a group: the bundle that it is in is made. */
+void imp__supply_ready(struct imp_supply *supply);
+/* The next walk, which is that of this pixel and sample. */
+void imp__supply_take(struct imp_supply *supply, int x, int y, int64_t sample,
+                      struct imp_walk *walk);
+
+#endif
