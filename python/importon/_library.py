@@ -132,34 +132,38 @@ for _word, _value in _c.WORDS["imp_status"].items():
 # ---- The shared library ------------------------------------------------------------
 
 
-def _runs_v3() -> bool:
-    """Can this processor run the build for x86-64-v3?"""
-    wanted = {"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe", "xsave"}
+_LEVELS = {  # what processors must have for builds beside the one for all, the fastest first
+    "v4": {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"},
+    "v3": {"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe", "xsave"}}
+
+
+def _levels() -> list[str]:
+    """The builds that this processor can run beside the one for all, the fastest first."""
     try:
         with open("/proc/cpuinfo", encoding="ascii", errors="replace") as info:
             for line in info:
                 if line.startswith("flags"):
-                    return wanted <= set(line.split())
+                    has = set(line.split())
+                    return [level for level, wanted in _LEVELS.items()
+                            if _LEVELS["v3"] <= has and wanted <= has]
     except OSError:
         pass
-    return False
+    return []
 
 
 def _candidates() -> list[str]:
     """The library asked for; the one in the wheel; the build folder's around it; the
-    system's. The first two folders hold two builds, of which results are the same."""
+    system's. The first two folders hold several builds, of which results are the same."""
     asked = os.environ.get("IMPORTON_LIBRARY")
     if asked:
         return [asked]
     found = []
-    fast = _runs_v3()
-    for folder, v3 in ((os.path.join(_HERE, "..", ".importon.mesonpy.libs"), "libimporton-v3.so.0"),
-                       (os.path.join(_HERE, "..", "..", "lib"), "glibc-hwcaps/x86-64-v3/libimporton.so.0")):
-        found += [os.path.join(folder, v3)] if fast else []
-        found += [os.path.join(folder, "libimporton.so.0")]
+    wheel = ["libimporton-%s.so.0" % level for level in _levels()] + ["libimporton.so.0"]
+    found += [os.path.join(_HERE, "..", ".importon.mesonpy.libs", f) for f in wheel]
+    found += [os.path.join(_HERE, "..", "..", "lib", f) for f in
+              ["glibc-hwcaps/x86-64-%s/libimporton.so.0" % level for level in _levels()] + ["libimporton.so.0"]]
     for folder in sys.path:  # where machine code is installed apart from Python's
-        found += [os.path.join(folder, ".importon.mesonpy.libs", f) for f in
-                  (["libimporton-v3.so.0"] if fast else []) + ["libimporton.so.0"]]
+        found += [os.path.join(folder, ".importon.mesonpy.libs", f) for f in wheel]
     return [os.path.normpath(f) for f in found if os.path.exists(f)] + ["libimporton.so.0"]
 
 

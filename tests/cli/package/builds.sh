@@ -1,13 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-# The library for every x86-64 and the one for x86-64-v3 give the same bits, and the loader
-# takes the second where the processor can run it.
+# The library for every x86-64, the one for x86-64-v3 and the one for x86-64-v4 give the same bits, and
+# the loader takes the last that the processor can run.
 every=$BUILD/lib/libimporton.so.0 v3=$BUILD/lib/glibc-hwcaps/x86-64-v3/libimporton.so.0
+v4=$BUILD/lib/glibc-hwcaps/x86-64-v4/libimporton.so.0
 [[ -e $v3 ]] || exit 0 # one build only (-Dcpu=)
 nm -D "$every" | grep -qE '__(asan|tsan|ubsan)' && exit 0 # not to be preloaded
 objdump -d --no-show-raw-insn "$every" | grep -m1 %ymm && echo "the library for every processor uses AVX"
-objdump -d --no-show-raw-insn "$v3" | grep -m1 -E 'vfn?m(add|sub)' && echo "the v3 library uses FMA"
-grep -m1 '^flags' /proc/cpuinfo | grep -w avx2 | grep -w bmi2 | grep -qw fma || exit 0
-ldd "$(command -v importon)" | grep -q glibc-hwcaps/x86-64-v3 || echo "the loader takes the slow one"
+objdump -d --no-show-raw-insn "$v3" | grep -m1 %zmm && echo "the v3 library uses AVX-512"
+for library in "$v3" "$v4"; do
+    objdump -d --no-show-raw-insn "$library" | grep -m1 -E 'vfn?m(add|sub)' && echo "$library uses FMA"
+done
+# can FLAG...: the processor has all of them.
+can() {
+    for flag in "$@"; do grep -m1 '^flags' /proc/cpuinfo | grep -qw "$flag" || return 1; done
+}
+can avx2 bmi2 fma || exit 0
+best=v3
+can avx512f avx512bw avx512cd avx512dq avx512vl && best=v4
+ldd "$(command -v importon)" | grep -q glibc-hwcaps/x86-64-$best || echo "the loader takes a slow one"
 
 # answers COMMAND...: the numbers, without the time they took.
 answers() {
@@ -33,3 +43,6 @@ all() (
 all every "$every" || exit 9
 all v3 "$v3" || exit 9
 diff -rq every v3
+[[ $best == v4 ]] || exit 0
+all v4 "$v4" || exit 9
+diff -rq every v4
