@@ -83,7 +83,8 @@ def test_wheel():
     assert re.match(r"importon-[\d.]+-py3-none-linux_\w+\.whl", name), name
     files = zipfile.ZipFile(path).namelist()
     libraries = [f for f in files if ".so" in f]
-    assert sorted(os.path.basename(f) for f in libraries) == ["libimporton-v3.so.0", "libimporton.so.0"] or len(libraries) == 1
+    assert sorted(os.path.basename(f) for f in libraries) == \
+        ["libimporton-v3.so.0", "libimporton-v4.so.0", "libimporton.so.0"] or len(libraries) == 1
     assert all(f.startswith(("importon-", ".importon")) for f in files)
     assert any(f.endswith("importon/py.typed") for f in files) and not any("bin/" in f or f.endswith(".h") for f in files)
     python = venv("fresh", sys.executable, "numpy")

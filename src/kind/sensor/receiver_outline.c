@@ -91,8 +91,11 @@ static void turn(struct imp__outline *o, double c, double s)
     for (size_t i = 0; i < o->n; i++)
         for (int k = 0; k < 4; k += 2) {
             const double u = o->edge[i][k], v = o->edge[i][k + 1];
-            o->edge[i][k] = c * u + s * v;
-            o->edge[i][k + 1] = c * v - s * u;
+            double sv = s * v, su = s * u;
+            IMP_OPAQUE(sv); /* GCC 12 makes one fused operation of complex products */
+            IMP_OPAQUE(su);
+            o->edge[i][k] = c * u + sv;
+            o->edge[i][k + 1] = c * v - su;
         }
 }
 
