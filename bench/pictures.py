@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Processor time of pictures by several versions of the program.
+"""Processor time of pictures and gradients by several versions of the program.
 
     bench/pictures.py [--rounds N] [--spp N] IMPORTON OTHER...
 
 One thread, rounds interleaved; the pictures of all programs must have the same bytes. Scenes: the
 Cornell box, `textured`, and an open scene, which is `textured` with two meshes of 8,064 triangles
 with interpolated normals, one of rough gold and one diffuse; kinds whose formulas are not in lanes
-(glass and plastic); the office, read by its meters.
+(glass and plastic); the office, read by its meters. Losses with gradients compare with a picture of
+the same scene by the first program.
 """
 import argparse
 import math
@@ -94,10 +95,18 @@ def main():
             'textured': ['render', os.path.join(SCENES, 'textured.xml'), *picture],
             'open scene': ['render', open_scene(folder), *picture],
             'glass and plastic': ['render', glass_scene(folder), *picture],
-            'gradient, Cornell box': ['gradient', cornell, '-D', 'res=64', '--json'],
+            'functional, Cornell box': ['gradient', cornell, '-D', 'res=64', '--json'],
             'office, read': ['read', os.path.join(SCENES, 'office.xml'), '-m', 'mono', '--json'],
         }
-        print('%-22s %s' % ('', '  '.join('%-24s' % p[-24:] for p in args.program)))
+        losses = {'Cornell box': [cornell, '-D', 'res=64'],
+                  'textured': [os.path.join(SCENES, 'textured.xml')],
+                  'open scene': [folder + '/open.xml']}
+        for name, scene in losses.items():
+            target = '%s/%s.exr' % (folder, name.replace(' ', '_'))
+            subprocess.run([args.program[0], 'render', *scene, '--spp', '16', '-q', '--no-preview', '-o', target],
+                           check=True)
+            jobs['loss + gradient, ' + name] = ['gradient', *scene, '-T', target, '--json']
+        print('%-30s %s' % ('', '  '.join('%-24s' % p[-24:] for p in args.program)))
         for name, job in jobs.items():
             time = {p: [] for p in args.program}
             bytes_of = {}
@@ -110,7 +119,7 @@ def main():
             if len(set(bytes_of.values())) > 1:
                 sys.exit(name + ': the pictures differ')
             first = time[args.program[0]]
-            print('%-22s %s' % (name, '  '.join('%.3f s, %.2f (%.2f)   ' % (
+            print('%-30s %s' % (name, '  '.join('%.3f s, %.2f (%.2f)   ' % (
                 min(time[p]), min(time[p]) / min(first), statistics.median(time[p]) / statistics.median(first))
                 for p in args.program)), flush=True)
 

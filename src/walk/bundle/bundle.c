@@ -91,13 +91,10 @@ static bool rays_alone(struct imp_bundle *b, struct imp_arena *arena, const int 
     return true;
 }
 
-/* The beginning of a record, whose ray is made. */
-static void record_begin(struct imp_bundle *b, const struct imp_flights *rays, int k,
-                         const int at[2], int64_t sample)
+/* The beginning of a record, whose numbers and ray are made. */
+static void record_begin(struct imp_bundle *b, const struct imp_flights *rays, int k)
 {
     struct imp_walk *walk = &b->walks[k];
-    imp__walk_clear(walk);
-    imp__walk_numbers(b->tracer, at[0], at[1], sample, walk);
     walk->px = b->px[k];
     walk->py = b->py[k];
     walk->time = b->time[k];
@@ -107,21 +104,38 @@ static void record_begin(struct imp_bundle *b, const struct imp_flights *rays, i
                                         .t_far = rays->ray.far[k]};
 }
 
+/* Where its random numbers come from, and its wavelengths. False: no memory. */
+static bool numbers_of(struct imp_bundle *b, struct imp_arena *arena, const int at[2],
+                       int64_t sample, int k)
+{
+    struct imp_walk own, *walk = b->walks ? &b->walks[k] : &own;
+    if (b->walks) imp__walk_clear(walk);
+    imp__walk_numbers(b->tracer, at[0], at[1], sample, walk);
+    b->set[k] = b->tracer->points ? walk->point.set : walk->key.state;
+    if (!b->waves) return true;
+    const bool ok =
+        imp__walk_wave(b->tracer, arena, imp__wave_draw(b->tracer, walk, sample), walk);
+    b->waves[k] = walk->waves;
+    return ok;
+}
+
 /* In lanes, of a sensor whose shutter is open for an instant. */
-static bool rays_in_lanes(struct imp_bundle *b, const struct imp_sensor_lanes *lanes,
-                          const int (*xy)[2], int n_samples, const int64_t *samples,
-                          struct imp_flights *rays)
+static bool rays_in_lanes(struct imp_bundle *b, struct imp_arena *arena,
+                          const struct imp_sensor_lanes *lanes, const int (*xy)[2],
+                          int n_samples, const int64_t *samples, struct imp_flights *rays,
+                          bool *begins)
 {
     const struct imp_tracer *t = b->tracer;
     const struct imp_film_desc *film = &t->sensor->film;
+    const bool each =
+        !t->points || b->waves || b->walks; /* more than the set's numbers */
     bool begin = true;
     for (int k = 0; k < b->n; k++) {
         const int s = k % n_samples, *at = xy[k / n_samples];
-        if (s == 0 || samples[s] / IMP_SET_POINTS != samples[s - 1] / IMP_SET_POINTS) {
-            struct imp_point point;
-            imp__walk_point(t, at[0], at[1], samples[s], &point);
-            b->set[k] = point.set;
-        } else b->set[k] = b->set[k - 1];
+        const bool first =
+            s == 0 || samples[s] / IMP_SET_POINTS != samples[s - 1] / IMP_SET_POINTS;
+        if ((each || first) && !numbers_of(b, arena, at, samples[s], k)) return false;
+        if (!each && !first) b->set[k] = b->set[k - 1];
         b->index[k] = (uint32_t)samples[s] % IMP_SET_POINTS;
         b->px[k] = film->crop_x + at[0];
         b->py[k] = film->crop_y + at[1];
@@ -147,9 +161,9 @@ static bool rays_in_lanes(struct imp_bundle *b, const struct imp_sensor_lanes *l
         imp__wide_store(&rays->ray.far[i], r.far);
         begin &= !(imp__wide_bits(r.near != imp__wide(0)) & imp__bits_first(b->n - i));
     }
-    for (int k = 0; b->walks && k < b->n; k++)
-        record_begin(b, rays, k, xy[k / n_samples], samples[k % n_samples]);
-    return begin;
+    for (int k = 0; b->walks && k < b->n; k++) record_begin(b, rays, k);
+    *begins = begin;
+    return true;
 }
 
 /* ---- A depth ----------------------------------------------------------------------------- */
@@ -249,13 +263,13 @@ static bool camera_begin(struct imp_arena *arena, struct imp_bundle *b,
 {
     const size_t n = (size_t)b->n;
     const bool instant = !rays->ray.time;
-    const struct imp_sensor_lanes *lanes = instant && b->tracer->points && !b->waves
-                                               ? imp__sensor_lanes(b->tracer->sensor)
-                                               : NULL;
+    const struct imp_sensor_lanes *lanes =
+        instant ? imp__sensor_lanes(b->tracer->sensor) : NULL;
     if (!TAKE(rays->ray.near)) return false;
     bool begin = true;
-    if (lanes) begin = rays_in_lanes(b, lanes, xy, n_samples, samples, rays);
-    else if (!rays_alone(b, arena, xy, n_samples, samples, rays, &begin)) return false;
+    if (!(lanes ? rays_in_lanes(b, arena, lanes, xy, n_samples, samples, rays, &begin)
+                : rays_alone(b, arena, xy, n_samples, samples, rays, &begin)))
+        return false;
     rays->ray.n = b->n;
     if (!instant) memcpy(rays->ray.time, b->time, n * sizeof *b->time);
     if (begin) rays->ray.near = NULL;

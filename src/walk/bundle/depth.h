@@ -49,7 +49,8 @@ struct imp_bin {
     const struct imp_bsdf *bsdf;
     const struct imp_shape_lanes *surface; /* of the one; NULL: point by point */
     const struct imp_bsdf_lanes *kernel;
-    bool plain; /* its inputs are the constants `in` */
+    bool plain;   /* its inputs are the constants `in` */
+    bool spectra; /* where walks carry wavelengths: all are plain spectra */
     struct imp_wide_color in[IMP_INPUTS_MAX];
 };
 /* Walks of this tracer may have vertices in lanes. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Light samples in lanes (core/light.c, of walks alone). */
+#include "color/spectrum.h"
 #include "kind/shape/shape.h"
 #include "lanes_record.h"
 #include "walk/core/emitted.h"
@@ -45,12 +46,15 @@ static void draw_lanes(const struct imp_scene *scene,
     out->at.drawn = (out->at.drawn & ~here) | (own.drawn & here);
     if (carried) {
         /* At each walk's wavelengths: of even light its side alone counts. */
+        const struct imp_input *i = e->input[0];
         for (unsigned left = imp__wide_bits(own.drawn & here); left; left &= left - 1) {
             const int k = __builtin_ctz(left);
             const struct imp_emission x = {.dist = lanes->far ? INFINITY : 1,
                                            .cos_light = imp__decide1(own.cos_light[k])};
-            const imp_spec le =
-                imp__emitter_radiance(scene, light, &x, (imp_v3){0}, carried[k]);
+            imp_spec le = {0};
+            if (imp_unlikely(!i->plain || !i->spectrum))
+                le = imp__emitter_radiance(scene, light, &x, (imp_v3){0}, carried[k]);
+            else if (lit[k]) imp__spectrum_lanes(i->spectrum, carried[k]->nm, &le);
             for (int c = 0; c < 4; c++) out->radiance.c[c][k] = le[c];
         }
     } else {

@@ -3,6 +3,7 @@
  * Vertices of a bundle in lanes: those on one shape, IMP_WIDE_LANES at a time. What the one step does
  * for a walk alone (path/sensor_end.h, core/scatter.c, core/light.c) stands here for walks that
  * have a kernel, light samples and roulette, and nothing more. */
+#include "color/spectrum.h"
 #include "lanes_record.h"
 #include "math/offset.h"
 
@@ -41,8 +42,11 @@ void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *
     bin->bsdf = b;
     bin->surface = imp__shape_lanes(s);
     bin->kernel = kernel_of(tracer, b);
-    bin->plain = true;
-    for (int j = 0; j < b->n_in; j++) bin->plain &= b->input[j]->plain;
+    bin->plain = bin->spectra = true;
+    for (int j = 0; j < b->n_in; j++) {
+        bin->plain &= b->input[j]->plain;
+        bin->spectra &= b->input[j]->plain && b->input[j]->spectrum;
+    }
     for (int j = 0; bin->plain && j < b->n_in; j++)
         bin->in[j] = imp__wide_color(b->input[j]->value);
 }
@@ -97,6 +101,19 @@ static void inputs_alone(const struct imp_depth *d, const struct imp_bsdf *b,
         for (int j = 0; j < b->n_in; j++)
             for (int c = 0; c < 4; c++) in[j].c[c][k] = own[j][c];
     }
+}
+
+/* Inputs that are the same spectra everywhere, at each walk's wavelengths. */
+static void spectra_alone(const struct imp_bsdf *b,
+                          const struct imp_carried *const *carried,
+                          struct imp_wide_color *in)
+{
+    for (int j = 0; j < b->n_in; j++)
+        for (int k = 0; k < IMP_WIDE_LANES; k++) {
+            imp_spec own;
+            imp__spectrum_lanes(b->input[j]->spectrum, carried[k]->nm, &own);
+            for (int c = 0; c < 4; c++) in[j].c[c][k] = own[c];
+        }
 }
 
 /* imp__offset. */
@@ -327,7 +344,10 @@ static inline __attribute__((always_inline)) bool work(struct imp_depth *d,
     v.wo = imp__wide3_decide(v.wo_drawn);
     v.in = bin->in;
     if (imp_unlikely(d->next->left != NULL)) places(&v);
-    if (colors > 3 || !bin->plain) {
+    if (colors > 3 && bin->spectra) {
+        spectra_alone(bin->bsdf, v.carried, in);
+        v.in = in;
+    } else if (colors > 3 || !bin->plain) {
         inputs_alone(d, bin->bsdf, colors > 3 ? v.carried : NULL, &hits, &v.x, in);
         v.in = in;
     }

@@ -309,11 +309,9 @@ static inline __attribute__((always_inline)) void imp__walk_clear(struct imp_wal
 void imp__walk_begin(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                      struct imp_walk *walk, double lens[2]);
 
-/* Its key and point alone, its point alone, and its film position alone. */
+/* Its key and point alone, and its film position alone. */
 void imp__walk_numbers(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                        struct imp_walk *walk);
-void imp__walk_point(const struct imp_tracer *tracer, int x, int y, int64_t sample,
-                     struct imp_point *point);
 void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                         double *px, double *py);
 

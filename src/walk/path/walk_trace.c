@@ -38,11 +38,6 @@ void imp__walk_numbers(const struct imp_tracer *tracer, int x, int y, int64_t sa
 {
     number(tracer, x, y, sample, walk);
 }
-void imp__walk_point(const struct imp_tracer *tracer, int x, int y, int64_t sample,
-                     struct imp_point *point)
-{
-    point_of(tracer, pixel_number(tracer, x, y), sample, point);
-}
 
 static inline void position(const struct imp_tracer *tracer, const struct imp_walk *w,
                             int x, int y, double *px, double *py)
