@@ -33,6 +33,7 @@ static enum imp_status splat_prepare(struct imp__gradient_job *j,
         if (apart) ctx->team->alone++;
         /* Walks that nothing is made of but their radiance. */
         struct imp_tracer plain = j->tracer;
+        plain.value_only = true;
         if (j->moved) plain.active = NULL;
         st = imp__splat_create(j->problem, &plain, j->target, j->seed, j->plan, run,
                                splat);
@@ -90,8 +91,8 @@ static enum imp_status moved_estimate(struct imp__gradient_job *j,
                                                       : IMP_CONTRASTS,
                                     &moved->adjoint));
     IMP_TRY(imp__moved_learn(moved, run->spp));
+    imp__moved_share(moved);
     if (j->totals->many && !errors) {
-        imp__moved_share(moved);
         st = imp__gradient_job_run(j, run, "gradient", lo, hi, start_s);
         goto out;
     }

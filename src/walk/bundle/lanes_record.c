@@ -73,9 +73,8 @@ static inline void step_put(const struct imp_lanes_step *step, int colors, int k
     of->goes_on = true;
 }
 
-/* Is there a lane whose value is zero but has a derivative? */
-static bool differs(const struct imp_depth *d, const struct imp_bin *bin,
-                    const struct imp_lanes_lit *lit, const struct imp_lanes_step *step)
+bool imp__lanes_differ(const struct imp_depth *d, const struct imp_bin *bin,
+                       const struct imp_lanes_lit *lit, const struct imp_lanes_step *step)
 {
     const struct imp_active *active = d->bundle->tracer->active;
     const int material = bin->bsdf->index;
@@ -87,14 +86,13 @@ static bool differs(const struct imp_depth *d, const struct imp_bin *bin,
     return false;
 }
 
-bool imp__lanes_record(struct imp_depth *d, const struct imp_bin *bin,
+void imp__lanes_record(struct imp_depth *d, const struct imp_bin *bin,
                        struct imp_lanes_vertices *v, struct imp_lanes_lit *lit,
                        struct imp_lanes_step *step)
 {
     const struct imp_bundle *b = d->bundle;
     struct imp_step *s = &d->lone->step;
     const int n_in = bin->bsdf->n_in;
-    if (imp_unlikely(differs(d, bin, lit, step))) return false;
     for (unsigned left = v->on; left; left &= left - 1) {
         const int k = __builtin_ctz(left);
         const unsigned bit = 1u << k;
@@ -117,7 +115,6 @@ bool imp__lanes_record(struct imp_depth *d, const struct imp_bin *bin,
         if (lit->on & bit) light_put(lit, b->colors, k, out);
         if (step->on & bit) step_put(step, b->colors, k, out);
     }
-    return true;
 }
 
 void imp__lanes_record_sky(struct imp_depth *d, const int32_t *order, int n, int light,

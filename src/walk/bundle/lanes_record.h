@@ -40,9 +40,14 @@ struct imp_lanes_step {
     unsigned on, part; /* lanes that go on; whose factor is zero in a colour */
 };
 
-/* Records them, into v->record. False: nothing is done, since a value that is zero has a
- * derivative: they are to be made one by one. */
-bool imp__lanes_record(struct imp_depth *d, const struct imp_bin *bin,
+/* Where walks have derivatives: is there a lane with a value that is zero but has one? Then they are to
+ * be made one by one. */
+bool imp__lanes_differ(const struct imp_depth *d, const struct imp_bin *bin,
+                       const struct imp_lanes_lit *lit,
+                       const struct imp_lanes_step *step);
+
+/* Records them, into v->record. */
+void imp__lanes_record(struct imp_depth *d, const struct imp_bin *bin,
                        struct imp_lanes_vertices *v, struct imp_lanes_lit *lit,
                        struct imp_lanes_step *step);
 

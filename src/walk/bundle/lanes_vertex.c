@@ -174,7 +174,7 @@ light_weigh(struct imp_depth *d, const struct imp_bin *bin,
     const imp_wide which =
         v->points || scene->n_emitters == 1 ? u[0] : number(v, IMP_DIM_LIGHT);
     const struct imp_carried *const *carried = colors > 3 ? v->carried : NULL;
-    l->at.recorded = v->recorded;
+    l->at.recorded = v->recorded || d->bundle->tracer->active; /* which light it is */
     if (imp_unlikely(d->next->left != NULL))
         imp__lanes_tree_draw(scene, carried, v->place, u, which, v->points, v->on, l);
     else imp__lanes_light_draw(scene, carried, &v->x.p, u, which, v->points, v->on, l);
@@ -359,8 +359,10 @@ static inline __attribute__((always_inline)) bool work(struct imp_depth *d,
         scatter_weigh(d, bin, &v, colors, &step);
     }
 
+    if (b->tracer->active && imp_unlikely(imp__lanes_differ(d, bin, &lit, &step)))
+        return false;
     if (v.recorded) {
-        if (!imp__lanes_record(d, bin, &v, &lit, &step)) return false;
+        imp__lanes_record(d, bin, &v, &lit, &step);
     } else {
         const struct imp_wide_color none = imp__wide_color(imp__spec(0));
         color_store(d->values->e, colors, at, &none);
