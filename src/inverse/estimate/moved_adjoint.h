@@ -23,8 +23,9 @@
 
 #include "film/film_light.h"
 #include "inverse/estimate/splat.h"
+#include "walk/moved/boundary.h"
 
-#define IMP_CONTRASTS 64 /* signs are the bits of a word */
+#define IMP_CONTRASTS IMP_FLUX_CONTRASTS /* signs are the bits of a word */
 #define IMP_CONTRASTS_MANY                                                               \
     16 /* of gradients of many numbers: each has one of every number */
 

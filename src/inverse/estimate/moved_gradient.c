@@ -97,33 +97,53 @@ void imp__moved_numbers(const struct imp__moved_gradient *m, double *bar, imp_sp
     }
 }
 
-static double counts_at(const void *payload, const struct imp__flux *f)
+static double counts_at(const void *payload, const struct imp__flux *f, double *contrast)
 {
     const struct imp__moved_gradient *m = payload;
-    return imp__moved_adjoint_at(&m->adjoint, &m->scale, f->px, f->py, &f->L, NULL);
+    return imp__moved_adjoint_at(&m->adjoint, &m->scale, f->px, f->py, &f->L,
+                                 m->adjoint.contrasts > 0 ? contrast : NULL);
 }
 
 enum imp_status imp__moved_learn(struct imp__moved_gradient *m, int spp)
 {
     const struct imp_film_desc *film = &m->tracer->sensor->film;
-    return imp__boundary_learn(&m->boundary, (int64_t)film->crop_w * film->crop_h * spp,
-                               m->adjoint.image ? counts_at : NULL, m);
+    const int64_t walks = (int64_t)film->crop_w * film->crop_h * spp;
+    m->walks = (double)walks;
+    /* As many contrasts of few numbers as of many, so that draws do not depend on the others. */
+    return imp__boundary_learn(
+        &m->boundary, walks, m->adjoint.image ? counts_at : NULL,
+        m->adjoint.image ? imp_min(m->adjoint.contrasts, IMP_CONTRASTS_MANY) : 0, m);
 }
 
 /* With second moments M of one draw, n draws of a kind add M/n to the variance, and cost n c: of the
- * cost SHARED, n is in proportion to sqrt(M/c). Costs are relative to that of an edge that the camera
- * sees, and the sum of all is then about that of the walks. */
-#define SHARED 2
-static const double cost[IMP_BOUNDARY_KINDS] = {
-    [IMP_BOUNDARY_FILM] = 1, [IMP_BOUNDARY_LIGHT] = 2, [IMP_BOUNDARY_SCATTER] = 0.5};
+ * cost S of a walk's draws, n is in proportion to sqrt(M/c), and W walks have
+ *
+ *     Var = V + B/(W S),    B = (sum of sqrt(M c))^2,
+ *
+ * in the time W (a + S), with V the variance of the rest: that of the adjoint's noise, which the pilot
+ * has seen. Their product is least at S^2 = a B/(V W). Costs are relative to that of an edge that the
+ * camera sees. What the pilot says of moments are those of the best chances, about half of what draws
+ * have, and light that is scattered brings much by few draws, of which it may have seen none. */
+#define WALK    0.7 /* a */
+#define MOMENTS 2   /* true ones over those of the pilot */
+#define SHARED  2   /* S where V is not known */
+#define MOST    4
+static const double cost[IMP_BOUNDARY_KINDS] =
+    {[IMP_BOUNDARY_FILM] = 1, [IMP_BOUNDARY_LIGHT] = 2, [IMP_BOUNDARY_SCATTER] = 0.5},
+                    least[IMP_BOUNDARY_KINDS] = {[IMP_BOUNDARY_FILM] = 0.0625,
+                                                 [IMP_BOUNDARY_LIGHT] = 0.0625,
+                                                 [IMP_BOUNDARY_SCATTER] = 0.5};
 
 void imp__moved_share(struct imp__moved_gradient *m)
 {
-    const double *moment = m->boundary.moment;
-    double sum = 0;
+    const double *moment = m->boundary.moment, V = m->boundary.noise;
+    double sum = 0, S = SHARED;
     for (int k = 0; k < IMP_BOUNDARY_KINDS; k++) sum += sqrt(moment[k] * cost[k]);
-    for (int k = 0; k < IMP_BOUNDARY_KINDS && sum > 0 && sum < INFINITY; k++)
-        m->draws[k] = SHARED * sqrt(moment[k] / cost[k]) / sum;
+    if (!(sum > 0) || !(sum < INFINITY)) return;
+    if (m->adjoint.contrasts > 0)
+        S = V > 0 ? imp_min(sum * sqrt(MOMENTS * WALK / (V * m->walks)), MOST) : MOST;
+    for (int k = 0; k < IMP_BOUNDARY_KINDS; k++)
+        m->draws[k] = imp_max(S * sqrt(moment[k] / cost[k]) / sum, least[k]);
 }
 
 bool imp__moved_walk(const struct imp__moved_gradient *m, struct imp_arena *arena,
@@ -264,7 +284,7 @@ static void number_add(struct imp_sink *sink, int param, size_t element, int cha
 
 /* Not below this part of the variance at fixed adjoints, where contrasts, which are few, say that
  * the noise of A takes the rest away. */
-#define LEAST 0.1
+#define LEAST_PART 0.1
 
 enum imp_status imp__moved_variance(const struct imp__moved_gradient *m,
                                     const struct imp_active *active, double *contrasts,
@@ -288,7 +308,7 @@ enum imp_status imp__moved_variance(const struct imp__moved_gradient *m,
         }
     }
     for (size_t k = 0; k < n; k++)
-        if (more[k] != 0) more[k] = fmax(more[k], (LEAST - 1) * own[k]);
+        if (more[k] != 0) more[k] = fmax(more[k], (LEAST_PART - 1) * own[k]);
     imp__release(ctx, value);
     return IMP_OK;
 }

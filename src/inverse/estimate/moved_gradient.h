@@ -2,8 +2,9 @@
  *
  * Gradients by poses (scene/pose.h): what a walk gives to them with its adjoint, and the draws
  * from edges that complete it (walk/moved/boundary.h). A replicate of n walks of a pixel has n
- * draws of each kind, of scattered light four times as many, which lie anywhere on the film: pixels
- * only number them, and are strata along the list of edges. Draws of different replicates are
+ * draws of each kind, of scattered light four times as many, and of a loss as many as pay
+ * (imp__moved_share). They lie anywhere on the film: pixels only number them, and are strata along
+ * the list of edges. Draws of different replicates are
  * independent of each other and of the walks. With a fixed adjoint, standard errors are those of the
  * walks' sums; those of a loss are in moved_adjoint.h. */
 #ifndef IMP_INVERSE_MOVED_GRADIENT_H
@@ -22,6 +23,7 @@ struct imp__moved_gradient {
     const struct imp_pose **pose;      /* [moves.n_movers] that a mover is */
     struct imp__moved_adjoint adjoint; /* of gradients in reverse mode; else none */
     int64_t first;                     /* number of the first draw of each kind */
+    double walks;                      /* of the run, as its pilot was told */
     double draws[IMP_BOUNDARY_KINDS];  /* for each walk */
 };
 
@@ -39,8 +41,8 @@ enum imp_status imp__moved_learn(struct imp__moved_gradient *m, int spp);
 /* IMP_OK, or what imp__moved_begin and imp__problem_tracer say of the scene as it is: an object that
  * passes through another, edges that tear. */
 enum imp_status imp__moved_possible(struct imp_problem *p, const struct imp_run *run);
-/* Behind the pilot, for searches, which need no errors of a gradient: as many draws of each kind as
- * make its variance least for the time of the walks. Else draws are imp__moved_times. */
+/* Behind the pilot, of a loss: as many draws of each kind as make the variance of its gradient least for
+ * the time that they and the walks take. Else draws are imp__moved_times. */
 void imp__moved_share(struct imp__moved_gradient *m);
 /* `first` of a target's draws, which are not those of another. */
 static inline int64_t imp__moved_first(size_t target) { return (int64_t)target << 40; }

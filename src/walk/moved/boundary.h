@@ -87,6 +87,9 @@ struct imp__boundary {
     struct imp__edge_tree tree;
     /* By the pilot: the second moment of what a draw of each kind brings to shifts; all 0: none was made. */
     double moment[IMP_BOUNDARY_KINDS];
+    /* By the pilot, of all draws to shifts: the variance that the noise of what light counts adds,
+     * however many draws there are. Not above 0: not known, or too small to be seen. */
+    double noise;
     struct imp__edge_choice choice[IMP_BOUNDARY_KINDS];
     int n_items;
     struct imp__edge_item *item; /* [n_items] */
@@ -138,15 +141,19 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
                                     struct imp__boundary *out);
 void imp__boundary_free(struct imp__boundary *b);
 
-/* How much light at a film position counts; the sign is of no interest. */
-typedef double imp__flux_weight(const void *payload, const struct imp__flux *flux);
+/* How much light at a film position counts; the sign is of no interest. contrast: by so many samples of
+ * the noise of that as imp__boundary_learn was told. */
+typedef double imp__flux_weight(const void *payload, const struct imp__flux *flux,
+                                double *contrast);
+#define IMP_FLUX_CONTRASTS 64 /* at most */
 
 /* A pilot chooses where on the edges later draws look: by the second moments of what its own draws
  * bring to all movers, shifts and turns weighed alike. Later draws are independent of it, and have
  * the mean that they had. draws: about how many will follow, of each kind; the pilot has an eighth.
  * weight NULL: all light counts alike. */
 enum imp_status imp__boundary_learn(struct imp__boundary *b, int64_t draws,
-                                    imp__flux_weight *weight, const void *payload);
+                                    imp__flux_weight *weight, int contrasts,
+                                    const void *payload);
 
 /* Draw `index` of a kind: what it brings, in the arena; the mean over draws of all kinds, summed,
  * is the boundary's part of the derivative. Where draws are to be spread, index modulo `strata`

@@ -18,20 +18,37 @@ struct pilot {
     double *square; /* [n_groups] sums over the first draws, of each three alike */
     double *moment; /* [cells] */
     double *shift;  /* [cells] sums of squares of what shifts alone bring */
+    int contrasts;
+    /* [2][contrasts][3 movers] what the noise of light brings to shifts, by two halves of the draws, each
+     * as the mean over so many. */
+    double *noise[2], times;
     bool no_memory;
 };
 
-static double light_of(const struct pilot *x, const struct imp__flux *f)
+static double light_of(const struct pilot *x, const struct imp__flux *f, double *contrast)
 {
-    if (x->weight) return x->weight(x->payload, f);
+    if (x->weight) return x->weight(x->payload, f, contrast);
     return imp__sum_used(f->L, x->b->tracer->scene->channels);
 }
 
-/* What a flux makes of a shift of each mover, and of a turn about its centre. */
-static void groups_add(struct pilot *x, const struct imp__flux *f)
+/* A shift of mover k by the noise of a flux. */
+static void noise_add(struct pilot *x, int half, int k, imp_v3 shift,
+                      const double *contrast)
+{
+    const size_t n = 3 * (size_t)x->b->moves->n_movers;
+    for (int c = 0; c < x->contrasts; c++)
+        for (int j = 0; j < 3; j++)
+            x->noise[half][(size_t)c * n + (size_t)(3 * k + j)] +=
+                x->times * contrast[c] * shift[j];
+}
+
+/* What a flux makes of a shift of each mover, and of a turn about its centre. half: of the draws whose
+ * noise counts; -1: not of those. */
+static void groups_add(struct pilot *x, const struct imp__flux *f, int half)
 {
     const struct imp__moves *moves = x->b->moves;
-    const double light = light_of(x, f);
+    double contrast[IMP_FLUX_CONTRASTS];
+    const double light = light_of(x, f, contrast);
     for (int k = 0; k < moves->n_movers; k++) {
         const struct imp__mover *m = &moves->mover[k];
         for (int i = 0; i < f->n_ends; i++) {
@@ -41,6 +58,7 @@ static void groups_add(struct pilot *x, const struct imp__flux *f)
             if (e->x.smooth)
                 turn +=
                     imp__cross(e->x.n, e->bar.n) + imp__cross(e->x.shade, e->bar.shade);
+            if (half >= 0) noise_add(x, half, k, e->bar.v, contrast);
             for (int j = 0; j < 3; j++) {
                 x->group[6 * k + j] += light * e->bar.v[j];
                 x->group[6 * k + 3 + j] += light * turn[j];
@@ -49,9 +67,9 @@ static void groups_add(struct pilot *x, const struct imp__flux *f)
     }
 }
 
-/* One draw; false: it brings nothing. */
+/* One draw; false: it brings nothing. half: as of groups_add. */
 static bool look(struct pilot *x, enum imp__boundary_kind kind, int64_t index, int64_t n,
-                 struct imp__edge_draw *d)
+                 int half, struct imp__edge_draw *d)
 {
     const struct imp_arena_mark mark = imp__arena_mark(&x->arena);
     *d = (struct imp__edge_draw){
@@ -62,7 +80,7 @@ static bool look(struct pilot *x, enum imp__boundary_kind kind, int64_t index, i
     d->u = imp_min(d->u, 1 - 0x1p-53);
     for (int k = 0; k < x->n_groups; k++) x->group[k] = 0;
     imp__boundary_work(d, kind);
-    for (const struct imp__flux *f = d->first; f; f = f->next) groups_add(x, f);
+    for (const struct imp__flux *f = d->first; f; f = f->next) groups_add(x, f, half);
     imp__arena_rewind(&x->arena, mark);
     x->no_memory |= d->no_memory;
     return d->first != NULL;
@@ -114,12 +132,13 @@ static void kind_learn(struct pilot *x, enum imp__boundary_kind kind, int64_t n)
     struct imp__edge_draw d;
     for (int k = 0; k < x->n_groups; k++) x->square[k] = 0;
     for (int k = 0; k < c->n_cells + x->b->n_items; k++) x->moment[k] = x->shift[k] = 0;
+    x->times = 2.0 / (double)n;
     for (int64_t i = 0; i < n / 4; i++) {
-        if (!look(x, kind, i, n / 4, &d)) continue;
+        if (!look(x, kind, i, n / 4, -1, &d)) continue;
         for (int k = 0; k < x->n_groups; k += 3) x->square[k] += square3(x->group + k);
     }
     for (int64_t i = 0; i < n; i++) {
-        if (!look(x, kind, n + i, n, &d)) continue;
+        if (!look(x, kind, n + i, n, (int)(i & 1), &d)) continue;
         double sum = 0;
         for (int k = 0; k < x->n_groups; k += 6)
             x->shift[d.cell] += square3(x->group + k);
@@ -130,6 +149,16 @@ static void kind_learn(struct pilot *x, enum imp__boundary_kind kind, int64_t n)
     x->b->moment[kind] = moment_after(x, x->b->part[kind], c->n_cells, n);
     if (x->b->edges->n > 0) imp__edge_choice_learn(c, x->moment);
     if (x->b->n_items > 0) parts_learn(x, x->b->part[kind], c->n_cells);
+}
+
+/* The mean over contrasts of the squares of their sums; by two halves of the draws, whose own noise is
+ * not counted so. */
+static double noise_of(const struct pilot *x)
+{
+    const size_t n = 3 * (size_t)x->b->moves->n_movers * (size_t)x->contrasts;
+    double sum = 0;
+    for (size_t k = 0; k < n; k++) sum += x->noise[0][k] * x->noise[1][k];
+    return x->contrasts > 0 ? sum / x->contrasts : 0;
 }
 
 /* Cells in place of the one of the beginning. */
@@ -146,11 +175,13 @@ static enum imp_status cells_make(struct imp__boundary *b, int kind, int n)
 }
 
 enum imp_status imp__boundary_learn(struct imp__boundary *b, int64_t draws,
-                                    imp__flux_weight *weight, const void *payload)
+                                    imp__flux_weight *weight, int contrasts,
+                                    const void *payload)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = b->tracer->scene->ctx;
-    struct pilot x = {.b = b, .weight = weight, .payload = payload};
+    struct pilot x = {
+        .b = b, .weight = weight, .payload = payload, .contrasts = contrasts};
     if (b->edges->n == 0 && b->n_items == 0) return IMP_OK;
     const int64_t n = draws / PART;
     const int cells = (int)imp_min(n / LOOKS, (int64_t)IMP_EDGE_CELLS_MAX);
@@ -161,18 +192,24 @@ enum imp_status imp__boundary_learn(struct imp__boundary *b, int64_t draws,
     x.square = imp__alloc(ctx, (size_t)x.n_groups + 1, sizeof *x.square);
     x.moment = imp__alloc(ctx, (size_t)(cells + b->n_items), sizeof *x.moment);
     x.shift = imp__alloc(ctx, (size_t)(cells + b->n_items), sizeof *x.shift);
-    if (!x.group || !x.square || !x.moment || !x.shift)
+    for (int h = 0; h < 2; h++)
+        x.noise[h] =
+            imp__alloc(ctx, (size_t)(x.n_groups / 2 * contrasts) + 1, sizeof *x.noise[h]);
+    if (!x.group || !x.square || !x.moment || !x.shift || !x.noise[0] || !x.noise[1])
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for edges"));
     for (int kind = 0; kind < IMP_BOUNDARY_KINDS && !x.no_memory; kind++) {
         if (b->edges->n > 0) IMP_TRY(cells_make(b, kind, cells));
         kind_learn(&x, (enum imp__boundary_kind)kind, (int64_t)cells * LOOKS);
     }
     if (x.no_memory) st = imp__error(ctx, IMP_E_NOMEM, "no memory for edges");
+    b->noise = noise_of(&x);
 out:
     imp__arena_free(&x.arena);
     imp__release(ctx, x.group);
     imp__release(ctx, x.square);
     imp__release(ctx, x.moment);
     imp__release(ctx, x.shift);
+    imp__release(ctx, x.noise[0]);
+    imp__release(ctx, x.noise[1]);
     return st;
 }
