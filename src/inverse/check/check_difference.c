@@ -96,8 +96,10 @@ static enum imp_status functional(struct imp__fresh *f, const double *x_dot,
     const struct imp_sensor *sensor = f->check->tracer.sensor;
     struct imp_run run = f->check->run;
     struct sampled t = {f->check->tracer, x_dot};
+    if (!x_dot) t.tracer.active = NULL, t.tracer.value_only = true;
     const struct imp_picture picture = {.sensor = sensor,
                                         .stage = "check",
+                                        .walks = imp__bundle_use(&t.tracer),
                                         .names = f->channels == 3 ? "R,G,B" : "Y",
                                         .n = f->channels,
                                         .sample = sample,
@@ -105,7 +107,6 @@ static enum imp_status functional(struct imp__fresh *f, const double *x_dot,
     imp_film *film = NULL;
     if (t.tracer.integrator->from_lights)
         return functional_of_lights(f, x_dot, seed, value);
-    if (!x_dot) t.tracer.active = NULL, t.tracer.value_only = true;
     run.spp = imp__fresh_batch(f);
     run.seed = t.tracer.seed = seed;
     const enum imp_status st = imp__picture_make(f->check->ctx, &picture, &run, &film);

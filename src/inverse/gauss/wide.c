@@ -93,6 +93,7 @@ static enum imp_status replicates(struct imp__wide *w, const struct imp_tracer *
                                             .stage = "gauss-newton",
                                             .names = names,
                                             .n = n,
+                                            .walks = imp__bundle_use(tracer),
                                             .sample = sample,
                                             .payload = &pass,
                                             .first = imp__replicates_first(plan, b, 0)};
