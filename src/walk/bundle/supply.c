@@ -5,7 +5,7 @@
 
 /* Walks of a bundle, about: enough to fill lanes, few enough for a processor's own cache, in which
  * records need more. A group may be larger than that. */
-enum { VALUES = 512, RECORDS = 256, GROUP_MOST = 1024 };
+enum { VALUES = 512, RECORDS = 160, GROUP_MOST = 1024 };
 
 bool imp__supply_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
                        const int (*xy)[2], int n_pixels, const int64_t *numbers,

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * One step of a walk, from the ray in flight to the next one. This is the only place where
- * paths are recorded, whichever end they begin at: gradients and checks start from what it
- * records. Pictures have the same walks, most of them in bundles (bundle/lanes_vertex.c). Each end
+ * One step of a walk, from the ray in flight to the next one. It makes the record of a path,
+ * whichever end that begins at: gradients and checks start from what it records. Vertices of
+ * bundles that are made in lanes have the same record, to the bit (bundle/lanes_record.c). Each end
  * instantiates it with its table (ends.h). */
 #ifndef IMP_WALK_ONE_STEP_H
 #define IMP_WALK_ONE_STEP_H
