@@ -83,6 +83,18 @@ void imp__moved_end(struct imp__moved_gradient *m)
     *m = (struct imp__moved_gradient){0};
 }
 
+/* Of many numbers a replicate touches few: the others are passed over eight at a time. */
+static inline bool is_empty(const double *v, size_t k, size_t n)
+{
+    uint64_t bits = 0, one;
+    if (k % 8 != 0 || k + 8 > n) return false;
+    for (int i = 0; i < 8; i++) {
+        memcpy(&one, v + k + i, sizeof one);
+        bits |= one;
+    }
+    return bits == 0;
+}
+
 void imp__moved_numbers(const struct imp__moved_gradient *m, double *bar, imp_spec lane,
                         struct imp_sink *sink)
 {
@@ -91,6 +103,10 @@ void imp__moved_numbers(const struct imp__moved_gradient *m, double *bar, imp_sp
         double *own = bar + m->moves.mover[k].first;
         imp__pose_numbers_bar(&m->moves, &m->moves.mover[k], pose, own);
         for (size_t e = 0; e < pose->n; e++) {
+            if (is_empty(own, e, pose->n)) {
+                e += 7;
+                continue;
+            }
             const imp_spec lanes = lane * own[e];
             if (own[e] != 0) sink->add(sink, pose->param, e, 1, &lanes);
         }
@@ -162,12 +178,6 @@ struct draws {
     double *half[2];  /* [contrasts][moves.n]; NULL: not wanted */
 };
 
-/* times [n] v. */
-static void add_times(double *to, double times, const double *v, size_t n)
-{
-    for (size_t k = 0; k < n; k++) to[k] += times * v[k];
-}
-
 /* A number that a flux depends on. */
 static void number_count(const struct draws *d, size_t number, double counts,
                          const double *contrast, double *half)
@@ -232,26 +242,34 @@ static bool draws_add(const struct draws *d, struct imp_arena *arena,
 
 bool imp__moved_replicate(const struct imp__moved_gradient *m, struct imp_arena *arena,
                           struct imp__replicates plan, int x, int y, int b,
-                          const double *inside, double *contrasts, struct imp_sink *sink)
+                          double *inside, double *contrasts, struct imp_sink *sink)
 {
     const size_t n = m->moves.n, part = (size_t)m->adjoint.contrasts * n;
-    struct draws d = {.m = m};
-    d.velocity = imp__arena_array(arena, n, sizeof *d.velocity);
-    d.bar = imp__arena_array(arena, n, sizeof *d.bar);
-    if (!d.velocity || !d.bar) return false;
+    const int all = contrasts ? m->adjoint.contrasts : 0;
+    struct draws d = {.m = m, .velocity = inside + n, .bar = inside + 2 * n};
     if (contrasts) {
-        const uint64_t signs = imp__contrast_signs(&m->adjoint, x, y, b / 2);
-        const double share = (b % 2 ? -0.5 : 0.5) / m->adjoint.pairs;
-        for (size_t e = 0; e < n; e++)
-            for (int k = 0; inside[e] != 0 && k < m->adjoint.contrasts; k++)
-                contrasts[(size_t)k * n + e] +=
-                    imp__contrast_sign(signs, k) * share * inside[e];
         d.half[0] = contrasts + part;
         d.half[1] = contrasts + 2 * part;
     }
     if (!draws_add(&d, arena, plan, x, y, b)) return false;
-    add_times(d.bar, 1, inside, n);
+    const uint64_t signs = contrasts ? imp__contrast_signs(&m->adjoint, x, y, b / 2) : 0;
+    const double share = contrasts ? (b % 2 ? -0.5 : 0.5) / m->adjoint.pairs : 0;
+    for (size_t e = 0; e < n; e++) {
+        if (is_empty(inside, e, n)) {
+            e += 7;
+            continue;
+        }
+        if (inside[e] == 0) continue;
+        for (int k = 0; k < all; k++)
+            contrasts[(size_t)k * n + e] +=
+                imp__contrast_sign(signs, k) * share * inside[e];
+        d.bar[e] += inside[e];
+        inside[e] = 0;
+    }
     imp__moved_numbers(m, d.bar, (imp_spec){1, 0, 0, 0}, sink);
+    for (size_t e = 0; e < n; e++)
+        if (is_empty(d.bar, e, n)) e += 7;
+        else d.bar[e] = 0;
     return true;
 }
 

@@ -133,16 +133,17 @@ static enum imp_status pixels_work(const struct imp_tile *t, struct imp_tile_wor
 
 /* ---- Tiles --------------------------------------------------------------------- */
 
-/* The bars of a worker; NULL: replicates have their own. */
+/* The bars of a worker; NULL: there are none. */
 static double *item_bar(const struct imp__gradient_job *j, int worker)
 {
-    return j->item_bars ? j->item_bars + (size_t)worker * 2 * j->moved->moves.n : NULL;
+    const size_t n = j->item_bars ? IMP_MOVED_BARS * j->moved->moves.n : 0;
+    return j->item_bars ? j->item_bars + (size_t)worker * n : NULL;
 }
 
 /* What all replicates of the item gave to velocities goes to its tally at once. */
 static void item_bar_end(const struct item *i, double *bar)
 {
-    if (!bar) return;
+    if (!bar || i->job->bars_of_replicates) return;
     imp__moved_numbers(i->job->moved, bar, (imp_spec){1, 0, 0, 0}, &i->tally->sink);
     imp__tally_batch(i->tally, 0);
     imp__tally_pixel(i->tally, 1, 1 / i->all, 0);
@@ -164,7 +165,7 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
     double *own = contrasts ? j->item_contrasts + (size_t)w->index * contrasts : NULL;
     double *bar = item_bar(j, w->index);
     if (own) memset(own, 0, contrasts * sizeof *own);
-    if (bar) memset(bar, 0, 2 * j->moved->moves.n * sizeof *bar);
+    if (bar) memset(bar, 0, IMP_MOVED_BARS * j->moved->moves.n * sizeof *bar);
     imp__tally_clear(tally);
     tally->measured = tally->rays = 0;
     if (t->part < (size_t)plan.chunks) { /* other tiles may have more parts */
@@ -240,9 +241,11 @@ static enum imp_status tallies_create(struct imp__gradient_job *j)
             imp__alloc(ctx, (size_t)ctx->threads * contrasts, sizeof(double));
         if (!j->item_contrasts) return imp__error(ctx, IMP_E_NOMEM, "no memory");
     }
-    if (j->moved && j->totals->many && !j->want_errors) {
-        j->item_bars = imp__alloc_raw(ctx, (size_t)ctx->threads * 2 * j->moved->moves.n,
-                                      sizeof *j->item_bars);
+    j->bars_of_replicates = !j->totals->many || j->want_errors;
+    if (j->moved && j->totals->many) {
+        j->item_bars =
+            imp__alloc_raw(ctx, (size_t)ctx->threads * IMP_MOVED_BARS * j->moved->moves.n,
+                           sizeof *j->item_bars);
         if (!j->item_bars) return imp__error(ctx, IMP_E_NOMEM, "no memory");
     }
     for (int k = 0; k < ctx->threads; k++) {

@@ -50,9 +50,11 @@ struct imp__gradient_job {
     struct imp_tiles tiles;
     struct imp_tally *tallies; /* [threads] */
     double *item_contrasts; /* [threads][n] of `moved`, of the item at work; NULL: none */
-    /* [threads][2][n] of `moved`: what the item at work gives to velocities, and room for one draw.
-     * NULL: each replicate gives its own to the tally, where its errors are wanted. */
+    /* [threads][IMP_MOVED_BARS][n] of `moved`, of many numbers: what the item at work gives to
+     * velocities, and room for draws. NULL: replicates have room of their own. */
     double *item_bars;
+    bool
+        bars_of_replicates; /* each gives its own to the tally: errors are wanted, or few */
 };
 
 /* Has a pixel a part in the loss? One that has none has no walks. */

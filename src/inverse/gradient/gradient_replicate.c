@@ -37,14 +37,14 @@ static imp_spec adjoint_of(const struct replicate *r, int set, const struct imp_
     return P;
 }
 
-/* Where poses are active: room for what walks give to velocities. */
+/* Where poses are active: room for what walks give to velocities, and behind it for draws, all 0. */
 static double *inside_begin(const struct replicate *r)
 {
     const struct imp__moved_gradient *m = r->job->moved;
     if (imp_likely(!m)) return NULL;
-    if (r->job->item_bars)
-        return r->job->item_bars + (size_t)r->worker->index * 2 * m->moves.n;
-    double *inside = imp__arena_array(&r->worker->arena, m->moves.n, sizeof *inside);
+    const size_t n = IMP_MOVED_BARS * m->moves.n;
+    if (r->job->item_bars) return r->job->item_bars + (size_t)r->worker->index * n;
+    double *inside = imp__arena_array(&r->worker->arena, n, sizeof *inside);
     r->worker->no_memory |= !inside;
     return inside;
 }
@@ -52,7 +52,7 @@ static double *inside_begin(const struct replicate *r)
 static void inside_end(const struct replicate *r, double *inside)
 {
     const struct imp__gradient_job *j = r->job;
-    if (j->item_bars) {
+    if (!j->bars_of_replicates) {
         r->worker->no_memory |=
             !imp__moved_draws(j->moved, &r->worker->arena, r->plan, r->x, r->y, r->b,
                               inside, inside + j->moved->moves.n);
