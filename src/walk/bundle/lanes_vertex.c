@@ -122,19 +122,16 @@ struct vertices {
     unsigned on; /* a bit for each lane that counts */
     int at;      /* place of the first among the values of the depth */
     const int32_t *order;
-    struct imp_light_place place[IMP_WIDE_LANES]; /* where there is a tree of lights */
+    imp_wide3 faced; /* normals, where there is a tree of lights */
     const struct imp_carried *carried[IMP_WIDE_LANES]; /* where walks carry wavelengths */
 };
 
-/* imp__light_place of all lanes: kernels in lanes send nothing through the surface. */
-static void places(struct vertices *v)
+/* imp__light_place of lane k: kernels in lanes send nothing through the surface. */
+static inline struct imp_light_place place_of(const struct vertices *v, int k)
 {
-    for (int k = 0; k < IMP_WIDE_LANES; k++) {
-        const imp_v3 n = imp__wide3_lane(&v->x.frame.n, k);
-        v->place[k] = (struct imp_light_place){.p = imp__wide3_lane(&v->x.p, k),
-                                               .n = v->wo.z[k] < 0 ? -n : n,
-                                               .faces = true};
-    }
+    return (struct imp_light_place){.p = imp__wide3_lane(&v->x.p, k),
+                                    .n = imp__wide3_lane(&v->faced, k),
+                                    .faces = true};
 }
 
 static inline imp_wide number(const struct vertices *v, int use)
@@ -166,7 +163,8 @@ light(struct imp_depth *d, const struct imp_bin *bin, const struct vertices *v,
         v->points || scene->n_emitters == 1 ? u[0] : number(v, IMP_DIM_LIGHT);
     const struct imp_carried *const *carried = colors > 3 ? v->carried : NULL;
     if (imp_unlikely(d->next->left != NULL))
-        imp__lanes_tree_draw(scene, carried, v->place, u, which, v->points, v->on, &l);
+        imp__lanes_tree_draw(scene, carried, &v->x.p, &v->faced, u, which, v->points,
+                             v->on, &l);
     else imp__lanes_light_draw(scene, carried, &v->x.p, u, which, v->points, v->on, &l);
     const imp_wide3 wi = imp__wide3_decide(imp__into_wide_frame(&v->x.frame, l.at.wi));
     const imp_wide pdf = bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, &wi, colors, &f);
@@ -252,7 +250,7 @@ scatter(struct imp_depth *d, const struct imp_bin *bin, const struct vertices *v
         const int k = __builtin_ctz(left), i = to->ray.n++, from = v->order[k];
         to->walk[i] = d->rays->walk[from];
         to->up[i] = v->at + k;
-        if (to->left) to->left[i] = v->place[k];
+        if (to->left) to->left[i] = place_of(v, k);
         if (to->ray.time) to->ray.time[i] = d->rays->ray.time[from];
     }
 }
@@ -298,7 +296,9 @@ static inline __attribute__((always_inline)) void work(struct imp_depth *d,
         &v.x.frame, imp__wide3_opposite(imp__wide3_taken(d->rays->ray.d, order)));
     v.wo = imp__wide3_decide(v.wo_drawn);
     v.in = bin->in;
-    if (imp_unlikely(d->next->left != NULL)) places(&v);
+    if (imp_unlikely(d->next->left != NULL))
+        v.faced = imp__wide3_choose(v.wo.z < imp__wide(0),
+                                    imp__wide3_opposite(v.x.frame.n), v.x.frame.n);
     if (colors > 3 || !bin->plain) {
         inputs_alone(d, bin->bsdf, colors > 3 ? v.carried : NULL, &hits, &v.x, in);
         v.in = in;
