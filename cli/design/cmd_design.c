@@ -101,7 +101,7 @@ static int report_write(struct design_answer *a, size_t n)
         run.sensor = a->wants[k].sensor;
         run.spp = cli.spp;
         run.spp = PAGE_TIMES * cli_spp(&run);
-        rc = grid_read(run, 0, &g);
+        rc = grid_read(run, 0, 0, &g);
         if (!rc) room_page_add(page, &g);
     }
     if (!rc) rc = room_page_write(page, o.report, run, &met);

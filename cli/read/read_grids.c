@@ -66,6 +66,15 @@ static void feet_tell(const struct grid *g)
                 g->name, up, height);
 }
 
+static void points_say(const struct grid *g)
+{
+    cli_say("%s: each point within %.3g of itself in 95 of 100 cases%s (%lld samples a "
+            "point)",
+            g->name, g->end.relative,
+            g->end.reached ? "" : ", which is more than --until allows",
+            (long long)g->end.spp);
+}
+
 /* The grids of the sensors from `first` on that have one. */
 int grids_read(struct json *j, struct imp_run run, int first, int end,
                const struct grid_wanted *wanted, double most_z, int *apart, int *unlit,
@@ -90,15 +99,16 @@ int grids_read(struct json *j, struct imp_run run, int first, int end,
         struct grid g;
         if (!has_grid(s)) continue;
         run.sensor = s;
-        rc = grid_samples_check(run);
+        if (!(wanted->until > 0)) rc = grid_samples_check(run);
         if (rc) return rc;
-        rc = grid_read(run, wanted->ends, &g);
+        rc = grid_read(run, wanted->until, wanted->ends, &g);
         if (rc) return rc;
         *apart |= wanted->ends && !(fabs(g.z) <= most_z);
         if (g.summary.average.value == 0 && g.summary.average.hi == 0)
             unlit[(*n_unlit)++] = s;
         grid_tell(&g);
         feet_tell(&g);
+        if (g.until > 0) points_say(&g);
         if (cli.json) grid_json(j, &g);
         else grid_print(&g);
         if (wanted->csv) rc = grid_csv(wanted->csv, &g);

@@ -149,19 +149,26 @@ static void bundles_begin(const struct render *r, struct imp_arena *arena, int s
     for (int k = 0; b->numbers && k < b->n; k++) b->numbers[k] = sample_number(r, s0 + k);
 }
 
+static inline bool is_sampled(const struct render *r, int x, int y)
+{
+    return imp_likely(!r->picture->only) ||
+           r->picture->only[(size_t)y * (size_t)r->patch.film->crop_w + (size_t)x];
+}
+
 /* For sample k of the pixel, which follows the one before. */
 static void bundle_of(const struct render *r, const struct imp_tile *t, struct bundles *b,
                       int k, struct imp_sample *s)
 {
     const int across = t->x1 - t->x0, at = (s->y - t->y0) * across + s->x - t->x0;
     const int all = across * (t->y1 - t->y0);
-    if (k == 0 && at == b->next) {
-        int xy[BUNDLE_PIXELS][2], n = 0;
-        for (; n < b->pixels && at + n < all; n++) {
-            xy[n][0] = t->x0 + (at + n) % across;
-            xy[n][1] = t->y0 + (at + n) / across;
+    if (k == 0 && at >= b->next) {
+        int xy[BUNDLE_PIXELS][2], n = 0, i = at;
+        for (; n < b->pixels && i < all; i++) {
+            xy[n][0] = t->x0 + i % across;
+            xy[n][1] = t->y0 + i / across;
+            n += is_sampled(r, xy[n][0], xy[n][1]);
         }
-        b->next = at + n;
+        b->next = i;
         imp__arena_rewind(s->arena, b->mark);
         s->in_bundle = 0;
         s->bundle = imp__bundle_trace(r->picture->walks, s->arena, n, xy, b->n,
@@ -190,6 +197,7 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
     bundles_begin(r, s.arena, s0, s1, &bundles);
     for (s.y = t->y0; s.y < t->y1; s.y++)
         for (s.x = t->x0; s.x < t->x1; s.x++) {
+            if (!is_sampled(r, s.x, s.y)) continue;
             double *own =
                 tile + (size_t)((s.y - t->y0) * r->patch.tile_side + s.x - t->x0) * 2 *
                            (size_t)n;
