@@ -101,7 +101,7 @@ static int report_write(struct design_answer *a, size_t n)
         run.sensor = a->wants[k].sensor;
         run.spp = cli.spp;
         run.spp = PAGE_TIMES * cli_spp(&run);
-        rc = grid_read(run, 0, &g);
+        rc = grid_read(run, 0, 0, &g);
         if (!rc) room_page_add(page, &g);
     }
     if (!rc) rc = room_page_write(page, o.report, run, &met);
@@ -192,11 +192,6 @@ static int run_design(int n, char **operand)
     (void)n;
     int rc = design_catalogue_read();
     if (!rc) rc = cli_load(operand[0]);
-    if (!rc && cli.time_s > 0)
-        rc = cli_error(EXIT_USAGE, "design takes --spp samples, and has no --time");
-    if (!rc && cli_typed("sensor"))
-        rc = cli_error(EXIT_USAGE,
-                       "design is of the grids that --want names, and has no --sensor");
     if (!rc) rc = design_lamps_make(&lamps);
     if (!rc) rc = design(&lamps);
     design_lamps_free(&lamps);
@@ -207,7 +202,7 @@ const struct command command_design = {
     {"design",
      "SCENE",
      "which luminaires of a room, how far dimmed, for wanted lux",
-     {options_wants, options, options_lamps, options_moves, options_run, options_scene,
+     {options_wants, options, options_lamps, options_moves, options_walks, options_scene,
       options_file, options_general},
      1,
      1},

@@ -4,6 +4,7 @@
 #include "read_grid.h"
 #include "shared/command.h"
 #include "shared/output.h"
+#include "shared/wanted.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -51,6 +52,8 @@ int grid_open(int sensor, struct grid *out)
     struct grid *g = out;
     *g = (struct grid){.sensor = sensor, .z = NAN, .summary = IMP_GRID_SUMMARY_INIT};
     g->summary.size = sizeof g->summary;
+    g->end = (struct imp_until_end)IMP_UNTIL_END_INIT;
+    g->end.size = sizeof g->end;
     enum imp_status st = imp_scene_get_sensor(cli.scene, sensor, &info);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
     g->name = info.name;
@@ -66,16 +69,27 @@ int grid_open(int sensor, struct grid *out)
     return st == IMP_OK ? 0 : cli_fail(st, cli.scene_path);
 }
 
-int grid_read(struct imp_run run, int ends, struct grid *out)
+/* From one end, with samples by point or without. */
+static enum imp_status one_end(struct imp_run run, struct grid *g,
+                               struct imp_estimate *average, int64_t *sets)
+{
+    if (!(g->until > 0))
+        return imp_grid_read(cli.scene, &run, g->value, g->se, average, sets);
+    const struct imp_until_options until = until_options(g->until, &run);
+    return imp_grid_read_until(cli.scene, &run, &until, g->value, g->se, average, sets,
+                               &g->end);
+}
+
+int grid_read(struct imp_run run, double until, int ends, struct grid *out)
 {
     struct imp_estimate average;
     int64_t sets;
     struct grid g;
     int rc = grid_open(run.sensor, &g);
     if (ends) run.from = IMP_FROM_SENSOR, g.from = "sensor";
+    g.until = until;
     if (!rc) {
-        const enum imp_status st =
-            imp_grid_read(cli.scene, &run, g.value, g.se, &average, &sets);
+        const enum imp_status st = one_end(run, &g, &average, &sets);
         if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
     }
     if (!rc && ends) rc = other_end(run, &g, &average, &sets);
@@ -172,6 +186,10 @@ void grid_json(struct json *j, const struct grid *g)
     if (g->from) {
         json_text(j, "from", g->from);
         json_number(j, "z", g->z);
+    }
+    if (g->until > 0) {
+        until_json(j, g->until, &g->end);
+        json_integer(j, "samples", g->end.spp);
     }
     json_number(j, "confidence", s->confidence);
     interval_json(j, "average", &s->average);

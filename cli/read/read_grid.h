@@ -19,17 +19,19 @@ struct grid {
     size_t n;
     double *points;     /* [n][3] */
     double *value, *se; /* [n] */
-    const char *from;   /* which walks they are of: "sensor", "lights", or NULL */
-    double z;           /* of the averages of both ends; NAN: one was read */
+    double until; /* error that was wanted at each point; 0: as many samples as --spp */
+    struct imp_until_end end;
+    const char *from; /* which walks they are of: "sensor", "lights", or NULL */
+    double z;         /* of the averages of both ends; NAN: one was read */
     struct imp_grid_summary summary;
 };
 
 /* Errors come from two samples on: 0, or an exit code with the reason printed, where run.sensor has
  * fewer. */
 int grid_samples_check(struct imp_run run);
-/* Read the grid of run->sensor; `ends`: from both, and what has the smaller error counts.
- * 0, or an exit code with the reason printed. */
-int grid_read(struct imp_run run, int ends, struct grid *out);
+/* Read the grid of run->sensor; until > 0: to this part at each point; `ends`: from both, and what has the
+ * smaller error counts. 0, or an exit code with the reason printed. */
+int grid_read(struct imp_run run, double until, int ends, struct grid *out);
 /* The places of a sensor's pixels, with room for values and errors. 0, or an exit code with the
  * reason printed; grid_free in either case. */
 int grid_open(int sensor, struct grid *out);
@@ -45,6 +47,7 @@ void grid_tell(const struct grid *g);
 
 struct grid_wanted {
     int ends;               /* are they read from both ends? */
+    double until;           /* error of each point; 0: as many samples as --spp */
     const char *csv, *svg;  /* files; NULL: none */
     struct room_page *page; /* which takes the grids; NULL: none */
 };

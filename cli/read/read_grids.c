@@ -50,20 +50,57 @@ static int no_grid(int sensor)
                      sensor, info.name, info.type);
 }
 
-/* Is the grid a plane across z as high above the lowest shape as work planes are in feet? */
+/* The axis that a level grid lies across; -1: none. */
+static int across_of(const struct grid *g)
+{
+    for (int k = 0; k < 3; k++) {
+        double least = INFINITY, most = -INFINITY;
+        for (size_t i = 0; i < g->n; i++) {
+            least = fmin(least, g->points[3 * i + (size_t)k]);
+            most = fmax(most, g->points[3 * i + (size_t)k]);
+        }
+        if (g->n > 1 && most - least <= 1e-6) return k;
+    }
+    return -1;
+}
+
+/* Are all luminaires in the upper third of [lo, hi] along the axis? */
+static int hang(int axis, double lo, double hi)
+{
+    const int n = imp_scene_n_luminaires(cli.scene);
+    int all = n > 0;
+    for (int i = 0; i < n && all; i++) {
+        struct imp_luminaire_info l = {.size = sizeof l};
+        all = imp_scene_get_luminaire(cli.scene, i, &l) == IMP_OK &&
+              (!l.is_point || l.position[axis] > hi - (hi - lo) / 3);
+    }
+    return all;
+}
+
+/* Does the grid lie below lamps, as high above the lowest shape as work planes are in feet? What is
+ * up in a scene nobody says. */
 static void feet_tell(const struct grid *g)
 {
     struct imp_scene_info s = {.size = sizeof s};
+    const int k = across_of(g);
+    if (k < 0) return;
     imp_scene_get_info(cli.scene, &s);
-    const double height = s.bounds_max[2] - s.bounds_min[2];
-    const double up = g->n > 0 ? g->points[2] - s.bounds_min[2] : 0;
-    for (size_t i = 1; i < g->n; i++)
-        if (fabs(g->points[3 * i + 2] - g->points[2]) > 1e-6) return;
-    if (imp_scene_n_luminaires(cli.scene) > 0 && height >= 7 && height <= 14 &&
-        up >= 2.3 && up <= 2.9)
+    const double height = s.bounds_max[k] - s.bounds_min[k];
+    const double up = g->points[k] - s.bounds_min[k];
+    if (height >= 7 && height <= 14 && up >= 2.3 && up <= 2.9 &&
+        hang(k, s.bounds_min[k], s.bounds_max[k]))
         cli_say("importon: warning: grid '%s' is %g above the lowest shape, in a room %g "
                 "high: is the scene in feet? Luminaires take its units for metres",
                 g->name, up, height);
+}
+
+static void points_say(const struct grid *g)
+{
+    cli_say("%s: each point within %.3g of itself in 95 of 100 cases%s (%lld samples a "
+            "point)",
+            g->name, g->end.relative,
+            g->end.reached ? "" : ", which is more than --until allows",
+            (long long)g->end.spp);
 }
 
 /* The grids of the sensors from `first` on that have one. */
@@ -90,15 +127,16 @@ int grids_read(struct json *j, struct imp_run run, int first, int end,
         struct grid g;
         if (!has_grid(s)) continue;
         run.sensor = s;
-        rc = grid_samples_check(run);
+        if (!(wanted->until > 0)) rc = grid_samples_check(run);
         if (rc) return rc;
-        rc = grid_read(run, wanted->ends, &g);
+        rc = grid_read(run, wanted->until, wanted->ends, &g);
         if (rc) return rc;
         *apart |= wanted->ends && !(fabs(g.z) <= most_z);
         if (g.summary.average.value == 0 && g.summary.average.hi == 0)
             unlit[(*n_unlit)++] = s;
         grid_tell(&g);
         feet_tell(&g);
+        if (g.until > 0) points_say(&g);
         if (cli.json) grid_json(j, &g);
         else grid_print(&g);
         if (wanted->csv) rc = grid_csv(wanted->csv, &g);

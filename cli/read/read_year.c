@@ -219,6 +219,10 @@ int year_read(struct json *j, const struct imp_run *run, const char *csv, const 
     if (!rc && !cli.json) text_print(&y);
     if (!rc && csv) rc = table_write(csv, &y);
     if (!rc && svg) rc = plan_write(svg, &y);
+    if (!rc && y.all.average.mean.value == 0 && y.all.average.exposure.value > 0)
+        cli_say("importon: warning: %s: no hour of use (%d to %d, standard time) has "
+                "daylight at the grid, and others have: are --hours right?",
+                year_wanted.weather, year_wanted.hours[0], year_wanted.hours[1]);
     if (!rc && cli_spp(run) < SPP_LEAST)
         cli_say("importon: warning: %d samples: below %d the autonomy may be low by more "
                 "than "

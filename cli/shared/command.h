@@ -49,6 +49,8 @@ extern const struct command command_render, command_gradient, command_jacobian,
     }
 extern const struct arg_option options_file[], options_folder[], options_file_or_folder[],
     options_general[], options_scene[], options_run[], options_limits[], options_guide[];
+/* options_run of a command that is of no single sensor. */
+#define options_walks (options_run + 1)
 
 /* The running command. A process runs one, so there is one. */
 struct cli {

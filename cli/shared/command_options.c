@@ -73,34 +73,36 @@ const struct arg_option options_scene[] = {
      &cli.dump, 0, 0, NULL},
     {0}};
 
-const struct arg_option options_run[] = {
-    {ARG_INT | ARG_REPLAYS, 's', "sensor", "N", "index of the sensor, from 0",
-     &cli.sensor, 0, 1e6, NULL},
-    {ARG_INT | ARG_REPLAYS, 0, "spp", "N",
-     "samples per pixel (default: those of the scene)", &cli.spp, 1, 1e9, NULL},
-    {ARG_SEED | ARG_REPLAYS, 0, "seed", "N", "seed of the random numbers (default 0)",
-     &cli.seed, 0, 0, NULL},
-    {ARG_CHOICE | ARG_ASIDE, 0, "mpi-files", "HOW",
-     "with mpirun: broadcast (default: rank 0 reads files for all) or shared (each does)",
-     &cli.mpi_files, 0, 0, files_words},
-    {ARG_CHOICE | ARG_REPLAYS, 0, "wavelengths", "HOW",
-     "with -m spectral, single: stratified (default), independent, or importance",
-     &cli.wavelengths, 0, 0, wavelength_words},
-    {ARG_INT | ARG_REPLAYS, 0, "wavelength-set", "N",
-     "samples among which they are stratified (default: a quarter, at most 16)",
-     &cli.wavelength_set, 1, 1e9, NULL},
-    {ARG_TEXT | ARG_ASIDE, 0, "display", "HOST:PORT",
-     "show pictures in a viewer that listens there (tev: port 14158)", &cli.display, 0, 0,
-     NULL},
-    {ARG_CHOICE | ARG_REPLAYS, 0, "from", "END",
-     "where walks begin: scene (by its integrator, default), sensor, or lights (light "
-     "tracing)",
-     &cli.from, 0, 0, from_words},
-    {ARG_CHOICE | ARG_REPLAYS, 0, "points", "KIND",
-     "random numbers of a pixel's samples: independent, sobol, or scene (default: those "
-     "of the scene's sampler; where it is independent, or none, what has least noise)",
-     &cli.points, 0, 0, point_words},
-    {0}};
+const struct arg_option options_run[] =
+    {/* --sensor first: options_walks */
+     {ARG_INT | ARG_REPLAYS, 's', "sensor", "N", "index of the sensor, from 0",
+      &cli.sensor, 0, 1e6, NULL},
+     {ARG_INT | ARG_REPLAYS, 0, "spp", "N",
+      "samples per pixel (default: those of the scene)", &cli.spp, 1, 1e9, NULL},
+     {ARG_SEED | ARG_REPLAYS, 0, "seed", "N", "seed of the random numbers (default 0)",
+      &cli.seed, 0, 0, NULL},
+     {ARG_CHOICE | ARG_ASIDE, 0, "mpi-files", "HOW",
+      "with mpirun: broadcast (default: rank 0 reads files for all) or shared (each "
+      "does)",
+      &cli.mpi_files, 0, 0, files_words},
+     {ARG_CHOICE | ARG_REPLAYS, 0, "wavelengths", "HOW",
+      "with -m spectral, single: stratified (default), independent, or importance",
+      &cli.wavelengths, 0, 0, wavelength_words},
+     {ARG_INT | ARG_REPLAYS, 0, "wavelength-set", "N",
+      "samples among which they are stratified (default: a quarter, at most 16)",
+      &cli.wavelength_set, 1, 1e9, NULL},
+     {ARG_TEXT | ARG_ASIDE, 0, "display", "HOST:PORT",
+      "show pictures in a viewer that listens there (tev: port 14158)", &cli.display, 0,
+      0, NULL},
+     {ARG_CHOICE | ARG_REPLAYS, 0, "from", "END",
+      "where walks begin: scene (by its integrator, default), sensor, or lights (light "
+      "tracing)",
+      &cli.from, 0, 0, from_words},
+     {ARG_CHOICE | ARG_REPLAYS, 0, "points", "KIND",
+      "random numbers of a pixel's samples: independent, sobol, or scene (default: those "
+      "of the scene's sampler; where it is independent, or none, what has least noise)",
+      &cli.points, 0, 0, point_words},
+     {0}};
 
 const struct arg_option options_limits[] = {
     {ARG_NUMBER, 0, "time", "SECONDS", "stop after this time and keep the results so far",

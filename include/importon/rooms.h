@@ -9,6 +9,7 @@
 #define IMPORTON_ROOMS_H
 
 #include <importon/importon.h>
+#include <importon/until.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -61,6 +62,30 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_grid_cells(const imp_scene *scene, in
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_grid_read(imp_scene *scene, const struct imp_run *run, double *value, double *se,
               struct imp_estimate *average, int64_t *sets);
+
+/**
+ * imp_grid_read until each point is known to a part `relative`: each reading lies within relative times
+ * itself of the truth with probability 1 - risk (.95), each by itself. A pilot gives each
+ * point the samples that it needs; the readings are of fresh samples alone, so that they are
+ * unbiased, with honest errors (Stein 1945). Where a pilot finds no light a point has as many samples
+ * as the largest number of any other.
+ * @param run     run->spp: samples of a point in the first pilot, 0: 64; without
+ *                time_limit_s.
+ * @param options NULL for defaults; most_spp: of a point.
+ * @param[out] value [height][width] of the crop window, in the sensor's unit.
+ * @param[out] se    [height][width], one standard error each.
+ * @param[out] average the mean of all, with its error.
+ * @param[out] sets  [1] of the point with the fewest; may be NULL.
+ * @param[out] end   spp: the mean over points, pilots included; looks: pilots, and the reading;
+ *                   relative: the largest bound of a point that is not dark; may be NULL.
+ * @return as imp_grid_read; IMP_E_UNSUPPORTED for walks from lights or from both ends, and
+ *         integrators without walks.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_grid_read_until(imp_scene *scene, const struct imp_run *run,
+                    const struct imp_until_options *options, double *value, double *se,
+                    struct imp_estimate *average, int64_t *sets,
+                    struct imp_until_end *end);
 
 /** A number, and an interval around what it estimates. */
 struct imp_interval_estimate {

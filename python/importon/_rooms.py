@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Optional
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ._library import decode, failure, lib, make, run
 from ._params import SceneParameters
 from ._problem import check_scene, push, run_options
 from ._scene import Scene
+from ._until import Reached, _end, _options
 
 
 class Interval(NamedTuple):
@@ -47,6 +48,8 @@ class Grid(NamedTuple):
     those points that lie on the shape."""
     raster: tuple[int, int]
     """Columns and rows."""
+    reached: Optional[Reached] = None
+    """With `until`: how it ended; spp is the mean over the points, pilots included."""
 
 
 class Share(NamedTuple):
@@ -88,7 +91,8 @@ def call(scene: Scene, params: Any, options: Any, progress: Any, *call: Any) -> 
 
 
 def grid(scene: Scene, sensor: Any = 0, *, params: Any = None, confidence: float = 0.95, seed: int = 0, spp: int = 0,
-         points: str = "scene", walks_from: str = "scene", progress: Any = None) -> Grid:
+         until: float = 0, most_spp: int = 0, points: str = "scene", walks_from: str = "scene",
+         progress: Any = None) -> Grid:
     """The readings of an irradiancemeter's pixels, with average, extremes and uniformities.
 
     Parameters
@@ -98,6 +102,11 @@ def grid(scene: Scene, sensor: Any = 0, *, params: Any = None, confidence: float
         An irradiancemeter on a rectangle or, at points, on a disk or a flat mesh, or a radiancemeter with a grid.
     confidence : float
         Of each interval.
+    until : float
+        Each point gets the samples that it needs to be this close to the truth, as a part of its reading, in 95 of
+        100 cases; 0: all get `spp`. With it `spp` is that of the first pilot.
+    most_spp : int
+        With `until`: samples of a point, at most; 0: 65536.
     params, seed, spp, points, walks_from, progress
         As `render`'s.
 
@@ -112,6 +121,8 @@ def grid(scene: Scene, sensor: Any = 0, *, params: Any = None, confidence: float
     >>> g = importon.grid(scene, spp=64)
     >>> g.value.shape, g.minimum.lo <= 3.1416 <= g.minimum.hi
     ((6, 6), True)
+    >>> importon.grid(scene, until=0.05).reached.reached
+    True
     """
     scene = check_scene(scene)
     number = scene.sensor_index(sensor)
@@ -124,14 +135,19 @@ def grid(scene: Scene, sensor: Any = 0, *, params: Any = None, confidence: float
     scene._context.check(lib.imp_grid_points(scene.pointer, number, address(places), None))
     scene._context.check(lib.imp_grid_cells(scene.pointer, number, ctypes.byref(columns), ctypes.byref(rows),
                                             address(cells)))
-    call(scene, params, options, progress, lib.imp_grid_read, scene.pointer, ctypes.byref(options), address(value),
-          address(se), ctypes.byref(average), ctypes.byref(sets))
+    to = (address(value), address(se), ctypes.byref(average), ctypes.byref(sets))
+    wanted, end = _options(until, 0, most_spp), make(_c.imp_until_end)
+    if until:
+        call(scene, params, options, progress, lib.imp_grid_read_until, scene.pointer, ctypes.byref(options),
+             ctypes.byref(wanted), *to, ctypes.byref(end))
+    else:
+        call(scene, params, options, progress, lib.imp_grid_read, scene.pointer, ctypes.byref(options), *to)
     scene._context.check(lib.imp_grid_summarise(scene._context.pointer, value.size, address(value), address(se),
                                                 ctypes.byref(average), sets.value, float(confidence),
                                                 ctypes.byref(summary)))
     number_of = {k: getattr(summary, k) for k in ("average", "minimum", "maximum", "uniformity", "diversity")}
     return Grid(value, se, places, confidence=summary.confidence, cells=cells, raster=(columns.value, rows.value),
-                **{k: Interval(x.value, x.lo, x.hi) for k, x in number_of.items()})
+                reached=_end(end) if until else None, **{k: Interval(x.value, x.lo, x.hi) for k, x in number_of.items()})
 
 
 def shares(scene: Scene, sensor: Any = 0, *, params: Any = None, seed: int = 0, spp: int = 0, points: str = "scene",

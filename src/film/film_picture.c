@@ -126,19 +126,27 @@ static inline int64_t sample_number(const struct render *r, int k)
                : r->picture->first + (int64_t)k * imp_max(r->picture->step, 1);
 }
 
+static inline bool is_sampled(const struct render *r, int x, int y)
+{
+    return imp_likely(!r->picture->only) ||
+           r->picture->only[(size_t)y * (size_t)r->patch.film->crop_w + (size_t)x];
+}
+
 /* The walks of a tile in bundles: NULL, where samples are none, or not of such walks. */
 static struct imp_supply *supply_begin(const struct render *r, const struct imp_tile *t,
                                        struct imp_arena *arena, int s0, int s1,
                                        struct imp_supply *supply)
 {
-    const int across = t->x1 - t->x0, n = across * (t->y1 - t->y0);
+    const int across = t->x1 - t->x0, all = across * (t->y1 - t->y0);
+    int n = 0;
     if (!r->picture->walks) return NULL;
     int64_t *numbers = imp__arena_take(arena, (size_t)(s1 - s0), sizeof *numbers);
-    int(*xy)[2] = imp__arena_take(arena, (size_t)n, sizeof *xy);
+    int(*xy)[2] = imp__arena_take(arena, (size_t)all, sizeof *xy);
     for (int k = s0; numbers && k < s1; k++) numbers[k - s0] = sample_number(r, k);
-    for (int k = 0; xy && k < n; k++) {
-        xy[k][0] = t->x0 + k % across;
-        xy[k][1] = t->y0 + k / across;
+    for (int k = 0; xy && k < all; k++) {
+        xy[n][0] = t->x0 + k % across;
+        xy[n][1] = t->y0 + k / across;
+        n += is_sampled(r, xy[n][0], xy[n][1]);
     }
     return numbers && xy &&
                    imp__supply_begin(r->picture->walks, arena, (const int(*)[2])xy, n,
@@ -164,6 +172,7 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
     s.supply = supply_begin(r, t, s.arena, s0, s1, &walks);
     for (s.y = t->y0; s.y < t->y1; s.y++)
         for (s.x = t->x0; s.x < t->x1; s.x++) {
+            if (!is_sampled(r, s.x, s.y)) continue;
             double *own =
                 tile + (size_t)((s.y - t->y0) * r->patch.tile_side + s.x - t->x0) * 2 *
                            (size_t)n;

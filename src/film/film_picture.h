@@ -40,6 +40,9 @@ struct imp_picture {
     const struct imp_tracer
         *walks; /* a sample is one walk of it, and walks can be bundled
                                        (walk/bundle/); NULL: not so */
+    const bool
+        *only; /* [height][width] pixels that are sampled, the others stay 0, where a
+                         pixel's samples are its own; NULL: all */
     bool
         points; /* these sets are sets of points: samples are numbered by imp__set_number,
                     and `first` and `step` are not used */

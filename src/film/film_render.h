@@ -12,4 +12,10 @@
 enum imp_status imp__render_elements(const struct imp_measure *measure,
                                      const struct imp_run *run, imp_film **out);
 
+/* imp_render by a checked run, of some pixels [height][width] where a pixel's samples are its own: the
+ * others stay 0. only NULL: all. */
+enum imp_status imp__render_pixels(const struct imp_scene *scene,
+                                   const struct imp_run *run, const bool *only,
+                                   imp_film **out);
+
 #endif

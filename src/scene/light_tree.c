@@ -1,103 +1,111 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Choosing by the tree of lights. */
-#include "light_tree.h"
+#include "light_lanes.h"
+#include <math.h>
+#include <string.h>
 
 /* Angles and boxes are rounded: what is seen from nearly the edge of a bound still has a
  * probability. */
-#define SLACK 1e-6
+#define IMP_LIGHT_SLACK 1e-6
 /* A node is opened where the place is nearer than so many half diagonals, squared. */
-#define NEAR2 2.0
-#define CUT   128 /* nodes, at most */
+#define IMP_LIGHT_NEAR2 2.0
+#define CUT             128 /* nodes, at most */
+#define FEW             64  /* lights that are looked at one by one */
 
-/* cos(max(0, a - b)) of angles within [0, pi], from their sines and cosines. */
-static inline double cos_less(double sin_a, double cos_a, double sin_b, double cos_b)
+#define IMP_WIDE 1
+#define IMP_TEXT "scene/light_importance_text.h"
+#include "math/lane_text.h"
+#define IMP_WIDE IMP_WIDE_LANES
+#define IMP_TEXT "scene/light_importance_text.h"
+#include "math/lane_text.h"
+
+/* Where lights are chosen: a place, or lane k of several. */
+struct here {
+    const struct imp_light_place *place;
+    struct imp_light_lanes *lanes; /* NULL: a place alone */
+    int lane;
+};
+
+static double importance_alone(const struct imp_light_node *n,
+                               const struct imp_light_place *at, bool *near)
 {
-    return cos_a > cos_b ? 1 : cos_a * cos_b + sin_a * sin_b;
-}
-static inline double sin_less(double sin_a, double cos_a, double sin_b, double cos_b)
-{
-    return cos_a > cos_b ? 0 : sin_a * cos_b - cos_a * sin_b;
-}
-static inline double sin_of(double cosine)
-{
-    return sqrt(imp_max(0.0, 1 - cosine * cosine));
+    const double p[3] = {at->p[0], at->p[1], at->p[2]},
+                 normal[3] = {at->n[0], at->n[1], at->n[2]};
+    int so_near;
+    const double w = imp__light_importance_1(n, p, normal, at->faces, &so_near);
+    *near = so_near;
+    return w;
 }
 
-/* Mean of max(0, x) where x lies evenly in [m - e, m + e]. */
-static inline double mean_positive(double m, double e)
+/* All lanes have theirs when the first one asks: most ask for the same nodes. */
+static double importance_in_lanes(const struct imp_light_tree *t, int32_t i,
+                                  struct imp_light_lanes *l, int lane, bool *near)
 {
-    return m >= e ? m : m <= -e ? 0 : (m + e) * (m + e) / (4 * e);
+    const int slot = i % IMP_LIGHT_NODES;
+    if (l->node[slot] != i) {
+        imp_wide_truth so_near;
+        const imp_wide p[3] = {l->p.x, l->p.y, l->p.z}, n[3] = {l->n.x, l->n.y, l->n.z};
+        l->importance[slot] =
+            IMP_WIDE_OF(imp__light_importance)(&t->node[i], p, n, true, &so_near);
+        l->near[slot] = imp__wide_bits(so_near);
+        l->node[slot] = i;
+    }
+    *near = l->near[slot] >> lane & 1;
+    return l->importance[slot][lane];
 }
 
 /* *near: the place is so near that the node's box hardly bounds where its lights are. */
-static double importance(const struct imp_light_node *n, const struct imp_light_place *at,
-                         bool *near)
+static inline double importance(const struct imp_light_tree *t, int32_t i,
+                                const struct here *at, bool *near)
 {
-    double d[3], d2 = 0, r2 = 0, front = 0, depth = 0, axis = 0, along = 0;
     *near = false;
-    if (!(n->strength > 0)) return 0;
-    for (int k = 0; k < 3; k++) {
-        const double half = 0.5 * ((double)n->hi[k] - n->lo[k]);
-        d[k] = 0.5 * ((double)n->lo[k] + n->hi[k]) - at->p[k];
-        d2 += d[k] * d[k];
-        r2 += half * half;
-        front += d[k] * at->n[k];
-        depth += half * fabs(at->n[k]);
-        axis -= d[k] * n->axis[k];
-        along += half * fabs((double)n->axis[k]);
-    }
-    *near = d2 < NEAR2 * r2;
-    double out = n->strength * n->gain / imp_max(imp_max(d2, r2), 1e-60);
-    const double inverse = d2 > 0 ? 1 / sqrt(d2) : 0;
-    if (at->faces) {
-        if (!(front > -(1 + SLACK) * depth)) return 0;
-        const double cosine = mean_positive(front, depth) * inverse;
-        out *= d2 > r2 ? imp_clamp(cosine, SLACK, 1.0) : 1;
-    }
-    if (n->cos_normals > -1 && d2 > r2) {
-        const double cos_w = imp_clamp(axis * inverse, -1.0, 1.0), sin_w = sin_of(cos_w);
-        const double cos_o = n->cos_normals, sin_o = sin_of(cos_o);
-        const double sin2_b = r2 / d2, sin_b = sqrt(sin2_b), cos_b = sqrt(1 - sin2_b);
-        const double cos_x = cos_less(sin_w, cos_w, sin_o, cos_o),
-                     sin_x = sin_less(sin_w, cos_w, sin_o, cos_o);
-        if (cos_less(sin_x, cos_x, sin_b, cos_b) < n->cos_reach - SLACK) return 0;
-        if (n->cos_reach < 1)
-            out *= imp_clamp(mean_positive(cos_x, along * inverse), SLACK, 1.0);
-    }
-    return out;
+    if (!(t->node[i].strength > 0)) return 0;
+    return at->lanes ? importance_in_lanes(t, i, at->lanes, at->lane, near)
+                     : importance_alone(&t->node[i], at->place, near);
 }
 
 /* The nodes among which the first choice is made: the root, opened where it is near, and
- * so on, as in the sums of Barnes and Hut (1986). */
+ * so on, as in the sums of Barnes and Hut (1986); of few lights, all leaves. */
 struct cut {
     int n;
     double sum;
     int32_t node[CUT];
     double importance[CUT];
 };
-static void cut_make(const struct imp_light_tree *t, const struct imp_light_place *place,
-                     struct cut *c)
+static inline void cut_add(struct cut *c, int32_t i, double importance)
+{
+    c->node[c->n] = i;
+    c->importance[c->n++] = importance;
+    c->sum += importance;
+}
+static inline void cut_make(const struct imp_light_tree *t, const struct here *at,
+                            struct cut *c)
 {
     int32_t open[64];
     int n = 0;
+    bool near;
     c->n = 0;
     c->sum = 0;
     if (t->n_items == 0) return;
+    if (t->n_items <= FEW) {
+        for (int32_t i = 0; i < t->n_nodes; i++) {
+            const double w = t->node[i].second < 0 ? importance(t, i, at, &near) : 0;
+            if (w > 0) cut_add(c, i, w);
+        }
+        return;
+    }
     open[n++] = 0;
     while (n > 0) {
         const int32_t i = open[--n];
-        bool near;
-        const double w = importance(&t->node[i], place, &near);
+        const double w = importance(t, i, at, &near);
         if (!(w > 0)) continue;
         if (near && t->node[i].second >= 0 && n < 62 && c->n + n < CUT - 2) {
             open[n++] = t->node[i].second;
             open[n++] = i + 1;
             continue;
         }
-        c->node[c->n] = i;
-        c->importance[c->n++] = w;
-        c->sum += w;
+        cut_add(c, i, w);
     }
 }
 
@@ -108,12 +116,12 @@ static double near_chance(const struct imp_light_tree *t, const struct cut *c)
 }
 
 /* Probability of the first child of node i; < 0: neither can count. */
-static double first_chance(const struct imp_light_tree *t, int i,
-                           const struct imp_light_place *place)
+static inline double first_chance(const struct imp_light_tree *t, int i,
+                                  const struct here *at)
 {
     bool near;
-    const double a = importance(&t->node[i + 1], place, &near),
-                 b = importance(&t->node[t->node[i].second], place, &near);
+    const double a = importance(t, i + 1, at, &near),
+                 b = importance(t, t->node[i].second, at, &near);
     return a + b > 0 ? a / (a + b) : -1;
 }
 
@@ -135,12 +143,13 @@ static int far_choose(const struct imp_light_tree *t, double *u, double *chance)
     return t->far_light[k];
 }
 
-int imp__light_tree_choose(const struct imp_light_tree *t,
-                           const struct imp_light_place *place, double *u, int *prim,
-                           double *chance)
+static inline __attribute__((always_inline)) int choose_at(const struct imp_light_tree *t,
+                                                           const struct here *at,
+                                                           double *u, int *prim,
+                                                           double *chance)
 {
     struct cut c;
-    cut_make(t, place, &c);
+    cut_make(t, at, &c);
     const double near = near_chance(t, &c);
     *prim = -1;
     if (!(*u < near)) {
@@ -158,7 +167,7 @@ int imp__light_tree_choose(const struct imp_light_tree *t,
     *u = part_of(*u, below / c.sum, c.importance[k] / c.sum);
     int i = c.node[k];
     while (t->node[i].second >= 0) {
-        const double first = first_chance(t, i, place);
+        const double first = first_chance(t, i, at);
         if (first < 0) return -1;
         if (*u < first) {
             *chance *= first;
@@ -175,13 +184,37 @@ int imp__light_tree_choose(const struct imp_light_tree *t,
     return item->emitter;
 }
 
+int imp__light_tree_choose(const struct imp_light_tree *t,
+                           const struct imp_light_place *place, double *u, int *prim,
+                           double *chance)
+{
+    const struct here at = {.place = place};
+    return choose_at(t, &at, u, prim, chance);
+}
+
+void imp__light_lanes_begin(const imp_wide3 *p, const imp_wide3 *n,
+                            struct imp_light_lanes *out)
+{
+    out->p = *p;
+    out->n = *n;
+    memset(out->node, -1, sizeof out->node);
+}
+
+int imp__light_lanes_choose(const struct imp_light_tree *t, struct imp_light_lanes *lanes,
+                            int lane, double *u, int *prim, double *chance)
+{
+    const struct here at = {.lanes = lanes, .lane = lane};
+    return choose_at(t, &at, u, prim, chance);
+}
+
 static double item_chance(const struct imp_light_tree *t,
                           const struct imp_light_place *place, int item)
 {
+    const struct here at = {.place = place};
     struct cut c;
     int i = t->item[item].leaf, k = 0;
     if (!(t->node[i].strength > 0)) return 0;
-    cut_make(t, place, &c);
+    cut_make(t, &at, &c);
     /* The last node of the cut that does not come behind the leaf: it holds the leaf, or
      * none of them does. */
     while (k < c.n && c.node[k] <= i) k++;
@@ -189,7 +222,7 @@ static double item_chance(const struct imp_light_tree *t,
     double chance = near_chance(t, &c) * (c.importance[k] / c.sum);
     while (i > c.node[k] && chance > 0) {
         const int above = t->node[i].parent;
-        const double first = first_chance(t, above, place);
+        const double first = first_chance(t, above, &at);
         if (first < 0) return 0;
         chance *= i == above + 1 ? first : 1 - first;
         i = above;
@@ -209,8 +242,9 @@ double imp__light_tree_chance(const struct imp_light_tree *t,
     if (t->first[emitter] >= 0) return item_chance(t, place, item_of(t, emitter, prim));
     for (int k = 0; k < t->n_far; k++)
         if (t->far_light[k] == emitter) {
+            const struct here at = {.place = place};
             struct cut c;
-            cut_make(t, place, &c);
+            cut_make(t, &at, &c);
             return (1 - near_chance(t, &c)) * t->far_share[k];
         }
     return 0;

@@ -180,7 +180,7 @@ NOT_OK = {
 try: C.CDLL("libOpenImageDenoise.so.2")
 except OSError: NOT_OK["imp_denoise"] = NOT_OK["imp_denoiser_check"] = "there is no Open Image Denoise"
 # Pointers that may be NULL, by name, or by function and name.
-NULLABLE = {"imp_report_page.length", "imp_scene_set_text.name", "imp_problem_shares.walk_share", "imp_grid_read.sets", "imp_grid_cells.columns", "imp_grid_cells.rows", "imp_grid_cells.cell", "imp_grid_glare.se", "imp_grid_dgp.se", "imp_grid_dgp.illuminance", "imp_weather_read.hour", "imp_annual_read.point", "imp_annual_read.summary", "imp_annual_read.reading", "imp_annual_read.se", "imp_grid_summarise.average", "imp_reading_shares.share", "imp_reading_shares.reading", "imp_render_until.end", "imp_problem_until.end", "imp_problem_until.adjoint",
+NULLABLE = {"imp_report_page.length", "imp_scene_set_text.name", "imp_problem_shares.walk_share", "imp_grid_read.sets", "imp_grid_read_until.sets", "imp_grid_read_until.end", "imp_grid_cells.columns", "imp_grid_cells.rows", "imp_grid_cells.cell", "imp_grid_glare.se", "imp_grid_dgp.se", "imp_grid_dgp.illuminance", "imp_weather_read.hour", "imp_annual_read.point", "imp_annual_read.summary", "imp_annual_read.reading", "imp_annual_read.se", "imp_grid_summarise.average", "imp_reading_shares.share", "imp_reading_shares.reading", "imp_render_until.end", "imp_problem_until.end", "imp_problem_until.adjoint",
             "imp_problem_until.value", "imp_problem_until.gradient", "imp_report_data.length", "options", "run", "stats", "id", "objective", "gradient_se", "primal", "normals", "uvs",
             "axis", "hessian", "taps", "tap_bars", "tap_dots", "power", "bundle", "exit", "targets",
             "error", "order", "memory",

@@ -4,7 +4,7 @@
 #include "base/arguments.h"
 #include "base/film.h"
 #include "color/rgb.h"
-#include "film/film_measure.h"
+#include "grid_film.h"
 #include "kind/sensor/radiancemeter.h"
 #include "kind/sensor/receiver.h"
 #include "room_average.h"
@@ -106,53 +106,70 @@ static enum imp_status weights_of(const struct imp_scene *scene,
     return IMP_OK;
 }
 
+enum imp_status imp__grid_film_of(const struct imp_scene *scene,
+                                  const struct imp_run *run, struct imp_grid_film *out)
+{
+    struct imp_measure measure;
+    IMP_CHECKED(imp__run_sensor(scene, run, &out->sensor));
+    IMP_CHECKED(weights_of(scene, out->sensor, out->weight, &out->channels));
+    IMP_CHECKED(imp__measure_create(scene, run, &measure));
+    out->shared = measure.integrator && (measure.from_lights || measure.integrator->both);
+    imp__measure_destroy(&measure);
+    return IMP_OK;
+}
+
+enum imp_status imp__grid_film_check(const struct imp_grid_film *grid,
+                                     const imp_film *film)
+{
+    if (film->se) return IMP_OK;
+    return imp__error(film->ctx, IMP_E_UNSUPPORTED,
+                      "the readings of sensor '%s' have no standard errors: a pixel "
+                      "needs two samples, or two sets of them",
+                      grid->sensor->name);
+}
+
+void imp__grid_film_take(const struct imp_grid_film *grid, const imp_film *film,
+                         size_t pixel, double *value, double *se)
+{
+    *value = *se = 0;
+    for (int c = 0; c < grid->channels; c++) {
+        const size_t at = pixel * (size_t)film->channels + (size_t)c;
+        *value += grid->weight[c] * (double)film->mean[at];
+        *se += grid->weight[c] * (double)film->se[at];
+    }
+}
+
 enum imp_status imp_grid_read(imp_scene *scene, const struct imp_run *run, double *value,
                               double *se, struct imp_estimate *average, int64_t *sets)
 {
     enum imp_status st = IMP_OK;
-    const struct imp_sensor *s;
+    struct imp_grid_film grid;
     struct imp_run own;
     imp_film *film = NULL;
     imp_problem *problem = NULL;
     struct imp_estimate mean = {0, 0, 0};
-    double w[4], square = 0;
-    int n = 1;
+    double square = 0;
     IMP_REQUIRE(NULL, scene, "scene");
     IMP_REQUIRE(scene->ctx, value, "value");
     IMP_REQUIRE(scene->ctx, se, "se");
     IMP_REQUIRE(scene->ctx, average, "average");
     IMP_RUN(scene->ctx, own, run);
-    IMP_CHECKED(imp__run_sensor(scene, &own, &s));
-    IMP_CHECKED(weights_of(scene, s, w, &n));
-    struct imp_measure measure;
-    IMP_CHECKED(imp__measure_create(scene, &own, &measure));
-    const bool shared =
-        measure.integrator && (measure.from_lights || measure.integrator->both);
-    imp__measure_destroy(&measure);
+    IMP_CHECKED(imp__grid_film_of(scene, &own, &grid));
     IMP_TRY(imp_render(scene, &own, &film));
-    if (!film->se)
-        IMP_TRY(imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                           "the readings of sensor '%s' have no standard errors: a pixel "
-                           "needs two samples, or two sets of them",
-                           s->name));
+    IMP_TRY(imp__grid_film_check(&grid, film));
     const size_t pixels = (size_t)film->width * (size_t)film->height;
-    if (shared) {
+    if (grid.shared) {
         IMP_TRY(imp_problem_create(scene, &problem));
         IMP_TRY(imp__room_average(problem, &own, &mean, NULL, NULL));
     }
     for (size_t i = 0; i < pixels; i++) {
-        value[i] = se[i] = 0;
-        for (int c = 0; c < n; c++) {
-            const size_t at = i * (size_t)film->channels + (size_t)c;
-            value[i] += w[c] * (double)film->mean[at];
-            se[i] += w[c] * (double)film->se[at];
-        }
-        if (!shared) mean.value += value[i] / (double)pixels;
+        imp__grid_film_take(&grid, film, i, &value[i], &se[i]);
+        if (!grid.shared) mean.value += value[i] / (double)pixels;
         square += se[i] * se[i];
     }
-    if (!shared) mean.se = sqrt(square) / (double)pixels;
+    if (!grid.shared) mean.se = sqrt(square) / (double)pixels;
     *average = mean;
-    if (sets) *sets = film->sets > 0 ? film->sets : film->spp;
+    if (sets) *sets = imp__grid_film_sets(film);
 out:
     imp_problem_destroy(problem);
     imp_film_destroy(film);

@@ -7,6 +7,10 @@
 #include "base/props.h"
 #include "math/vec.h"
 
+struct imp_build;
+struct imp_shape;
+struct imp_surface;
+
 struct imp__ies_facet {
     imp_v3 n;
     double area;
@@ -42,6 +46,10 @@ void imp__ies_turn(struct imp__ies *x, const struct imp__ies *from, imp_v3 to);
 void imp__ies_move(struct imp__ies *x, const struct imp__ies *from, const double map[12]);
 /* Int I dw, at scale 1, in lm (or W). */
 double imp__ies_flux(const struct imp__ies *x);
+/* The shape that glows, and the first place on a flat one; refused: ovals, and many directions. */
+enum imp_status imp__ies_surface_read(const struct imp_build *b,
+                                      const struct imp_shape *s, struct imp__ies *x,
+                                      struct imp_surface *at);
 /* Area that faces w, projected along w. */
 double imp__ies_projected(const struct imp__ies *x, imp_v3 w);
 /* Luminous area that is seen along w by the file's opening, a box whose lower face shines with its

@@ -4,6 +4,7 @@
 #include "color/spectrum.h"
 #include "kind/shape/shape.h"
 #include "lanes_record.h"
+#include "scene/light_lanes.h"
 #include "walk/core/emitted.h"
 #include "walk/core/light_point.h"
 
@@ -101,40 +102,18 @@ static void lane_put(const struct imp_scene *scene,
 }
 
 static void draw_alone(const struct imp_scene *scene,
-                       const struct imp_carried *const *carried, int light,
+                       const struct imp_carried *const *carried, int light, int prim,
                        const imp_wide3 *ref, const imp_wide u[2], int k,
                        struct imp_lanes_light *out)
 {
     const struct imp_emitter *e = scene->emitters[light];
     const imp_v3 p = imp__wide3_lane(ref, k);
+    const double own[2] = {u[0][k], u[1][k]};
     struct imp_light_sample ls = {.located = {.prim = -1}};
-    const bool drawn = e->ops->sample(e, &p, (double[2]){u[0][k], u[1][k]}, &ls);
+    const bool drawn = prim >= 0
+                           ? e->shape->ops->sample_triangle(e->shape, prim, &p, own, &ls)
+                           : e->ops->sample(e, &p, own, &ls);
     lane_put(scene, carried, light, drawn, &ls, k, out);
-}
-
-void imp__lanes_tree_draw(const struct imp_scene *scene,
-                          const struct imp_carried *const *carried,
-                          const struct imp_light_place place[], const imp_wide u_drawn[2],
-                          imp_wide which, bool one, unsigned bits,
-                          struct imp_lanes_light *out)
-{
-    out->at.drawn = out->far = out->delta = (imp_wide_truth){0};
-    for (; bits; bits &= bits - 1) {
-        const int k = __builtin_ctz(bits);
-        double u[2] = {u_drawn[0][k], u_drawn[1][k]}, by = which[k], pmf = 0;
-        struct imp_light_sample ls = {.located = {.prim = -1}};
-        int prim;
-        const int light =
-            imp__light_tree_choose(scene->light_tree, &place[k], &by, &prim, &pmf);
-        if (light < 0) continue;
-        if (one) u[0] = by;
-        out->pmf[k] = pmf;
-        const struct imp_emitter *e = scene->emitters[light];
-        const bool drawn = prim >= 0 ? e->shape->ops->sample_triangle(e->shape, prim,
-                                                                      &place[k].p, u, &ls)
-                                     : e->ops->sample(e, &place[k].p, u, &ls);
-        lane_put(scene, carried, light, drawn, &ls, k, out);
-    }
 }
 
 /* A form in lanes that serves: even radiance has no inputs to look up. */
@@ -143,39 +122,27 @@ static const struct imp_emitter_lanes *lanes_of(const struct imp_emitter *e)
     return imp__emitter_even(e, NULL) ? imp__emitter_lanes(e) : NULL;
 }
 
-void imp__lanes_light_draw(const struct imp_scene *scene,
-                           const struct imp_carried *const *carried, const imp_wide3 *ref,
-                           const imp_wide u_drawn[2], imp_wide which, bool one,
-                           unsigned bits, struct imp_lanes_light *out)
+/* Lights that the lanes have chosen, with out->pmf. */
+struct choice {
+    int light[IMP_WIDE_LANES];
+    int prim[IMP_WIDE_LANES]; /* a triangle of it; -1: all of it */
+};
+
+/* Points of the lights chosen in the lanes with bits: of one light together. */
+static void draw_chosen(const struct imp_scene *scene,
+                        const struct imp_carried *const *carried, const imp_wide3 *ref,
+                        const imp_wide u[2], const struct choice *c, unsigned bits,
+                        struct imp_lanes_light *out)
 {
-    imp_wide u[2] = {u_drawn[0], u_drawn[1]};
-    const imp_wide_truth all = ~(imp_wide_truth){0};
-    int light[IMP_WIDE_LANES] = {0};
-    out->at.drawn = out->far = out->delta = (imp_wide_truth){0};
-    if (scene->n_emitters == 1) {
-        const struct imp_emitter_lanes *lanes = lanes_of(scene->emitters[0]);
-        out->pmf = imp__wide(scene->light_cdf[0]);
-        if (!(scene->light_cdf[0] > 0)) return;
-        if (lanes) {
-            draw_lanes(scene, carried, 0, lanes, ref, u, all, out);
-            return;
-        }
-    } else {
-        for (int k = 0; k < IMP_WIDE_LANES; k++) {
-            double pmf;
-            light[k] = imp__light_pick(scene, which[k], &pmf);
-            out->pmf[k] = pmf;
-            if (one) u[0][k] = imp__light_part(scene, light[k], which[k], pmf);
-        }
-    }
     while (bits) {
-        const int one = light[__builtin_ctz(bits)];
-        const struct imp_emitter_lanes *lanes = lanes_of(scene->emitters[one]);
+        const int first = __builtin_ctz(bits), one = c->light[first];
+        const struct imp_emitter_lanes *lanes =
+            c->prim[first] < 0 ? lanes_of(scene->emitters[one]) : NULL;
         unsigned same = 0;
         imp_wide_truth here = {0};
         for (unsigned left = bits; left; left &= left - 1) {
             const int k = __builtin_ctz(left);
-            if (light[k] != one) continue;
+            if (c->light[k] != one) continue;
             same |= 1u << k;
             truth_set(&here, k, true);
         }
@@ -186,9 +153,67 @@ void imp__lanes_light_draw(const struct imp_scene *scene,
         }
         for (; same; same &= same - 1) {
             const int k = __builtin_ctz(same);
-            if (out->pmf[k] > 0) draw_alone(scene, carried, one, ref, u, k, out);
+            draw_alone(scene, carried, one, c->prim[k], ref, u, k, out);
         }
     }
+}
+
+void imp__lanes_tree_draw(const struct imp_scene *scene,
+                          const struct imp_carried *const *carried, const imp_wide3 *p,
+                          const imp_wide3 *n, const imp_wide u_drawn[2], imp_wide which,
+                          bool one, unsigned bits, struct imp_lanes_light *out)
+{
+    imp_wide u[2] = {u_drawn[0], u_drawn[1]};
+    struct imp_light_lanes places;
+    struct choice c;
+    unsigned lit = 0;
+    out->at.drawn = out->far = out->delta = (imp_wide_truth){0};
+    imp__light_lanes_begin(p, n, &places);
+    for (; bits; bits &= bits - 1) {
+        const int k = __builtin_ctz(bits);
+        double by = which[k], pmf = 0;
+        c.light[k] =
+            imp__light_lanes_choose(scene->light_tree, &places, k, &by, &c.prim[k], &pmf);
+        out->pmf[k] = pmf;
+        if (c.light[k] < 0) continue;
+        if (one) u[0][k] = by;
+        lit |= 1u << k;
+    }
+    draw_chosen(scene, carried, p, u, &c, lit, out);
+}
+
+void imp__lanes_light_draw(const struct imp_scene *scene,
+                           const struct imp_carried *const *carried, const imp_wide3 *ref,
+                           const imp_wide u_drawn[2], imp_wide which, bool one,
+                           unsigned bits, struct imp_lanes_light *out)
+{
+    imp_wide u[2] = {u_drawn[0], u_drawn[1]};
+    const imp_wide_truth all = ~(imp_wide_truth){0};
+    struct choice c;
+    unsigned lit = 0;
+    out->at.drawn = out->far = out->delta = (imp_wide_truth){0};
+    if (scene->n_emitters == 1) {
+        const struct imp_emitter_lanes *lanes = lanes_of(scene->emitters[0]);
+        out->pmf = imp__wide(scene->light_cdf[0]);
+        if (!(scene->light_cdf[0] > 0)) return;
+        if (lanes) {
+            draw_lanes(scene, carried, 0, lanes, ref, u, all, out);
+            return;
+        }
+    }
+    for (; bits; bits &= bits - 1) {
+        const int k = __builtin_ctz(bits);
+        double pmf = scene->light_cdf[0];
+        c.light[k] = 0;
+        c.prim[k] = -1;
+        if (scene->n_emitters > 1) {
+            c.light[k] = imp__light_pick(scene, which[k], &pmf);
+            if (one) u[0][k] = imp__light_part(scene, c.light[k], which[k], pmf);
+        }
+        out->pmf[k] = pmf;
+        lit |= (unsigned)(pmf > 0) << k;
+    }
+    draw_chosen(scene, carried, ref, u, &c, lit, out);
 }
 
 /* ---- The sky that is met ----------------------------------------------------------------- */

@@ -25,12 +25,12 @@ void imp__lanes_light_draw(const struct imp_scene *scene,
                            const imp_wide u[2], imp_wide which, bool one, unsigned bits,
                            struct imp_lanes_light *out);
 
-/* The same where lights are chosen by the scene's tree: vertices at place [IMP_WIDE_LANES]. */
+/* The same where lights are chosen by the scene's tree: vertices at p, whose light comes from before n
+ * alone. */
 void imp__lanes_tree_draw(const struct imp_scene *scene,
-                          const struct imp_carried *const *carried,
-                          const struct imp_light_place place[], const imp_wide u[2],
-                          imp_wide which, bool one, unsigned bits,
-                          struct imp_lanes_light *out);
+                          const struct imp_carried *const *carried, const imp_wide3 *p,
+                          const imp_wide3 *n, const imp_wide u[2], imp_wide which,
+                          bool one, unsigned bits, struct imp_lanes_light *out);
 
 /* Can the sky be met in lanes? It is one emitter, with a form in lanes, chosen by its weight, and seen
  * by the camera. */

@@ -18,7 +18,7 @@ struct imp_lanes_vertices {
     int at;      /* place of the first among the values of the depth */
     const int32_t *order;
     int32_t walk[IMP_WIDE_LANES];
-    struct imp_light_place place[IMP_WIDE_LANES]; /* where there is a tree of lights */
+    imp_wide3 faced; /* normals, where there is a tree of lights */
     const struct imp_carried *carried[IMP_WIDE_LANES]; /* where walks carry wavelengths */
     struct imp_vertex *record[IMP_WIDE_LANES];         /* where they are recorded */
 };

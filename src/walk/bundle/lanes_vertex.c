@@ -137,15 +137,12 @@ static inline imp_wide_truth is_zero(const imp_wide f[4], int colors)
 
 /* ---- What leaves it ---------------------------------------------------------------------- */
 
-/* imp__light_place of all lanes: kernels in lanes send nothing through the surface. */
-static void places(struct imp_lanes_vertices *v)
+/* imp__light_place of lane k: kernels in lanes send nothing through the surface. */
+static inline struct imp_light_place place_of(const struct imp_lanes_vertices *v, int k)
 {
-    for (int k = 0; k < IMP_WIDE_LANES; k++) {
-        const imp_v3 n = imp__wide3_lane(&v->x.frame.n, k);
-        v->place[k] = (struct imp_light_place){.p = imp__wide3_lane(&v->x.p, k),
-                                               .n = v->wo.z[k] < 0 ? -n : n,
-                                               .faces = true};
-    }
+    return (struct imp_light_place){.p = imp__wide3_lane(&v->x.p, k),
+                                    .n = imp__wide3_lane(&v->faced, k),
+                                    .faces = true};
 }
 
 static inline imp_wide number(const struct imp_lanes_vertices *v, int use)
@@ -176,7 +173,8 @@ light_weigh(struct imp_depth *d, const struct imp_bin *bin,
     const struct imp_carried *const *carried = colors > 3 ? v->carried : NULL;
     l->at.recorded = v->recorded || d->bundle->tracer->active; /* which light it is */
     if (imp_unlikely(d->next->left != NULL))
-        imp__lanes_tree_draw(scene, carried, v->place, u, which, v->points, v->on, l);
+        imp__lanes_tree_draw(scene, carried, &v->x.p, &v->faced, u, which, v->points,
+                             v->on, l);
     else imp__lanes_light_draw(scene, carried, &v->x.p, u, which, v->points, v->on, l);
     lit->wi = imp__wide3_decide(imp__into_wide_frame(&v->x.frame, l->at.wi));
     const imp_wide pdf =
@@ -292,7 +290,7 @@ scatter_on(struct imp_depth *d, const struct imp_lanes_vertices *v, const int co
         const int k = __builtin_ctz(left), i = to->ray.n++, from = v->order[k];
         to->walk[i] = d->rays->walk[from];
         to->up[i] = v->at + k;
-        if (to->left) to->left[i] = v->place[k];
+        if (to->left) to->left[i] = place_of(v, k);
         if (to->zeros) to->zeros[i] = d->rays->zeros[from];
         if (to->ray.time) to->ray.time[i] = d->rays->ray.time[from];
     }
@@ -343,7 +341,9 @@ static inline __attribute__((always_inline)) bool work(struct imp_depth *d,
         &v.x.frame, imp__wide3_opposite(imp__wide3_taken(d->rays->ray.d, order)));
     v.wo = imp__wide3_decide(v.wo_drawn);
     v.in = bin->in;
-    if (imp_unlikely(d->next->left != NULL)) places(&v);
+    if (imp_unlikely(d->next->left != NULL))
+        v.faced = imp__wide3_choose(v.wo.z < imp__wide(0),
+                                    imp__wide3_opposite(v.x.frame.n), v.x.frame.n);
     if (colors > 3 && bin->spectra) {
         spectra_alone(bin->bsdf, v.carried, in);
         v.in = in;

@@ -48,10 +48,14 @@ cat >half.xml <<'X'
 <film type="hdrfilm"><integer name="width" value="4"/><integer name="height" value="1"/></film></sensor></shape></scene>
 X
 cp "$ROOT/scenes/lamps/opal.ldt" . && importon read half.xml -m mono --spp 64 --grid >/dev/null
-room() { # FILE UNITS_IN_A_METRE: a room of 6 m x 4 m x 2.8 m, and a work plane at .75 m
-python3 - "$2" >"$1" <<'X'
+room() { # FILE UNITS_IN_A_METRE [UP]: a room of 6 m x 4 m x 2.8 m, and a work plane at .75 m; UP: y is up
+python3 - "$2" "${3-z}" >"$1" <<'X'
 import sys
 u = float(sys.argv[1])
+def print(text, out=print):
+    if sys.argv[2] == "y":
+        text = text.replace("</transform>", '<rotate x="1" angle="-90"/></transform>')
+    out(text)
 print('<scene version="3.0.0"><integrator type="path"/><emitter type="ies" id="lamp"><string name="filename" value="opal.ldt"/>'
       '<transform name="to_world"><rotate x="1" angle="180"/><translate z="%g"/></transform></emitter>' % (2.7 * u))
 print('<shape type="cube"><transform name="to_world"><scale x="%g" y="%g" z="%g"/><translate z="%g"/></transform>'
@@ -61,4 +65,5 @@ print('<shape type="rectangle"><transform name="to_world"><scale value="%g"/><tr
       '<film type="hdrfilm"><integer name="width" value="2"/><integer name="height" value="2"/></film></sensor></shape></scene>' % (u, .75 * u))
 X
 }
+room units.xml 3.28084 y && importon read units.xml -m mono --spp 64 --grid >/dev/null
 for u in 1 3.28084 1000; do room units.xml $u && importon read units.xml -m mono --spp 64 --grid >/dev/null; done

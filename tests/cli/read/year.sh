@@ -29,6 +29,7 @@ importon read - --year - <"$ROOT/scenes/daylit.xml"
 importon read "$ROOT/scenes/daylit.xml" --year - </dev/null
 importon read "$ROOT/scenes/daylit.xml" -m mono -D spp=16 --year - --json -q <town.epw >/dev/null || exit 9
 importon read "$ROOT/scenes/daylit.xml" --year town.epw --hours 18,8
+importon read "$ROOT/scenes/daylit.xml" -m mono -D spp=1024 --year town.epw --hours 23,24 | sed -n '1p; $p'
 sed 100d town.epw >hole.epw
 importon read "$ROOT/scenes/daylit.xml" --year hole.epw
 sed '300s/,[0-9]*,999999,999999/,9999,999999,999999/' town.epw >missing.epw
