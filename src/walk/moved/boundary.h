@@ -18,6 +18,10 @@
  *              at every edge that it sees; w is a direction from the edge to it:
  *                  dI = int dl dw sin(phi) f W(x) [L(-m) - L(+m)] m.(V - x')
  *
+ * Where bodies pass through each other, the seam is such an edge to the film and to scattered light, with
+ * the velocity of the line in which two planes meet (move/edges_seams.h); the seam of a light is one
+ * to what it lights, too (boundary_seam.c).
+ *
  * A sphere has a silhouette from everywhere: the circle on which a line touches it is an edge to the
  * film and to lights, with m its outward normal; of all lines that touch it, by place p, dA, and
  * turn about the normal, psi, dl dw sin(phi) is  dA dpsi/r. Silhouettes of a cylinder are two straight

@@ -164,12 +164,29 @@ bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w)
     return true;
 }
 
-struct imp__glued imp__edge_carried(const struct imp__edge_draw *d)
+/* Face k of the edge carries its point. */
+static struct imp__glued carried_by(const struct imp__edge_draw *d, int k)
 {
-    const struct imp_scene *scene = d->b->tracer->scene;
-    return d->edge
-               ? imp__edge_glued(d->b->edges, scene, d->edge, d->p)
-               : imp__glued_near(scene, d->item->shape, 0, d->item->place, d->p, d->out);
+    return imp__edge_glued(d->b->edges, d->b->tracer->scene, d->edge, k, d->p);
+}
+
+int imp__edge_ends(const struct imp__edge_draw *d, imp_v3 m, struct imp__flux_end *end)
+{
+    imp_v3 bar[2];
+    if (!d->edge) {
+        const struct imp__glued at = imp__glued_near(d->b->tracer->scene, d->item->shape,
+                                                     0, d->item->place, d->p, d->out);
+        *end = imp__flux_glued(&at, m);
+        return 1;
+    }
+    const struct imp__glued first = carried_by(d, 0);
+    *end = imp__flux_glued(&first, m);
+    if (!d->edge->seam) return 1;
+    const struct imp__glued second = carried_by(d, 2);
+    imp__seam_bar(d->b->edges, d->edge, m, bar);
+    end[0].bar.v = bar[0];
+    end[1] = imp__flux_glued(&second, bar[1]);
+    return 2;
 }
 
 imp_v3 imp__edge_clear(const struct imp__edge_draw *d)
