@@ -360,6 +360,7 @@ int main(void)
 {
     ctx = test_context(1);
     kind_test(IMP_MOVE_POSE, "pose");
+    kind_test(IMP_MOVE_AFFINE, "affine");
     kind_test(IMP_MOVE_SCALE, "scale");
     kind_test(IMP_MOVE_VERTICES, "vertices");
     file_test();
