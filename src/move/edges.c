@@ -8,6 +8,7 @@ void imp__edges_free(struct imp__edges *edges)
 {
     imp__release(edges->ctx, edges->edge);
     imp__release(edges->ctx, edges->laid);
+    imp__release(edges->ctx, edges->arc);
     imp__release(edges->ctx, edges->face);
     imp__release(edges->ctx, edges->body);
     *edges = (struct imp__edges){0};
@@ -99,25 +100,32 @@ const struct imp__edge *imp__edges_torn(const struct imp__edges *edges,
  * that begin there. */
 #define END 1e-5
 
-static bool any_curved(const struct imp__edges *edges, const struct imp_scene *scene)
+/* A curved shape whose seams are in no list. */
+static bool is_seamless(const struct imp_scene *scene, int shape, int64_t place)
+{
+    struct imp_round round;
+    return imp__moves_curved(scene, shape, place) &&
+           !imp__moves_sphere(scene, shape, place, &round);
+}
+
+static bool any_seamless(const struct imp__edges *edges, const struct imp_scene *scene)
 {
     for (size_t k = 0; k < edges->n_bodies; k++)
-        if (imp__moves_curved(scene, edges->body[k].shape, edges->body[k].place))
-            return true;
+        if (is_seamless(scene, edges->body[k].shape, edges->body[k].place)) return true;
     return false;
 }
 
 int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
                        int *other)
 {
-    if (!any_curved(edges, scene)) return -1;
+    if (!any_seamless(edges, scene)) return -1;
     for (size_t k = 0; k < edges->n; k++) {
         const struct imp__edge *e = &edges->edge[k];
         const imp_v3 d = e->b - e->a;
         struct imp_hit hit;
         for (double from = END; imp__intersect(scene, &e->a, &d, from, 1 - END, &hit);
              from = hit.t + END) {
-            if (!imp__moves_curved(scene, hit.shape, hit.place)) continue;
+            if (!is_seamless(scene, hit.shape, hit.place)) continue;
             *other = edges->face[e->first].shape;
             return hit.shape;
         }

@@ -8,6 +8,7 @@
 #ifndef IMP_MOVE_EDGES_H
 #define IMP_MOVE_EDGES_H
 
+#include "math/warp.h"
 #include "moves.h"
 
 struct imp__edge_face {
@@ -30,6 +31,14 @@ struct imp__body {
     int64_t place; /* 0: in no instance */
 };
 
+/* A part of a circle in which a sphere passes through a triangle or another sphere: it is seen as a
+ * seam is. */
+struct imp__arc {
+    struct imp__edge_face side[2]; /* prim -1: a sphere, which has no n */
+    imp_v3 centre, s, t;           /* of the circle; unit, in its plane */
+    double radius, from, till;     /* turns, from s to t */
+};
+
 struct imp__edges {
     imp_context *ctx;
     size_t n_bodies;
@@ -41,6 +50,8 @@ struct imp__edges {
      * first two faces, then one of the other. They are in `edge`, too, with their own faces. */
     size_t n_laid;
     struct imp__edge *laid; /* [n_laid] */
+    size_t n_arcs;
+    struct imp__arc *arc; /* [n_arcs] */
 };
 
 /* All edges of the scene's shapes of triangles, flat or with vertex normals, also in instances.
@@ -67,12 +78,28 @@ double imp__edge_turn(const struct imp__edges *edges, const struct imp__edge *e)
  * NULL: none. */
 const struct imp__edge *imp__edges_torn(const struct imp__edges *edges,
                                         const struct imp__moves *moves);
-/* A sphere, disk or cylinder that passes through another shape: where they meet is an edge that is in
- * no list. -1: none; *other: the other shape. */
+/* A disk or cylinder that passes through another shape: where they meet is an edge that is in no list.
+ * -1: none; *other: the other shape. */
 int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
                        int *other);
 
+/* ---- edges_arcs.c ---- */
+/* Sets the arcs. */
+enum imp_status imp__arcs_find(const struct imp_scene *scene, struct imp__edges *edges);
+static inline double imp__arc_length(const struct imp__arc *arc)
+{
+    return IMP_2PI * arc->radius * (arc->till - arc->from);
+}
+/* A point, by a part u of its length, and the unit direction there. */
+void imp__arc_point(const struct imp__arc *arc, double u, imp_v3 *p, imp_v3 *along);
+/* The velocity of that point counts m: what that is to points of both surfaces. */
+void imp__arc_bar(const struct imp_scene *scene, const struct imp__arc *arc, imp_v3 p,
+                  imp_v3 along, imp_v3 m, struct imp__glued x[2], imp_v3 bar[2]);
+
 /* ---- edges_curved.c ---- */
+/* Is a sphere beside the box of a body? map: to the world, of its place. */
+bool imp__body_is_away(const struct imp_scene *scene, const struct imp__body *body,
+                       const struct imp_map *map, const struct imp_round *round);
 /* The same of curved shapes alone. */
 int imp__curved_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
                         int *other);

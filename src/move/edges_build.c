@@ -340,6 +340,7 @@ enum imp_status imp__edges_build(const struct imp_scene *scene, struct imp__edge
     }
     IMP_TRY(seams_add(&x));
     IMP_TRY(edges_order(&x));
+    IMP_TRY(imp__arcs_find(scene, out));
 out:
     imp__release(x.ctx, x.side);
     imp__release(x.ctx, x.cut);

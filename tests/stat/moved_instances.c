@@ -241,13 +241,13 @@ int main(int argc, char **argv)
                 "<transform name='to_world_end'><translate x='1.6' y='-1' "
                 "z='1'/></transform>"),
             "motion of its own");
-    refused("a ball through an instance",
+    refused("a tube through an instance",
             DIRECT
             "<shape type='shapegroup' id='g'><shape type='cube' id='box'><transform "
             "name='to_world'><scale value='.2'/></transform></shape></shape>"
-            "<shape type='sphere'><point name='center' x='1.6' y='-1' z='1.3'/><float "
-            "name='radius' value='.2'/></shape>" PLACED(
-                "g", "<translate x='1.5' y='-1' z='1'/>", ""),
+            "<shape type='cylinder'><point name='p0' x='1.6' y='-1' z='1.1'/><point "
+            "name='p1' x='1.6' y='-1' z='1.5'/><float name='radius' value='.1'/>"
+            "</shape>" PLACED("g", "<translate x='1.5' y='-1' z='1'/>", ""),
             "passes through");
     imp_scene *scene = room(true);
     tap_ok(imp_scene_add_pose(scene, "chair") != IMP_OK, "a group has no pose # %s",

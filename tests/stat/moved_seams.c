@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Derivatives by what moves where meshes pass through each other: a block that sinks into a floor, two
- * blades, a lamp through a board, an egg with vertex normals through a block, instances, and what meters
+ * blades, balls, a lamp through a board, an egg with vertex normals through a block, instances, and what meters
  * read of them, against central differences; the visible height of a block, against its closed form. What
  * is refused. */
 #include "egg.h"
@@ -38,6 +38,12 @@
     "<shape type='rectangle' id='board'><transform name='to_world'><scale x='1.6' "      \
     "y='.6'/><rotate x='1' angle='90'/><rotate z='1' angle='40'/><rotate x='1' "         \
     "angle='15'/><translate x='1' y='-.3' z='3'/></transform>" MATERIAL "</shape>"
+#define BALL(MORE)                                                                       \
+    "<shape type='sphere' id='ball'><float name='radius' value='.6'/><point "            \
+    "name='center' x='1.1' y='-.7' z='.25'/>" MORE "</shape>"
+#define OTHER                                                                            \
+    "<shape type='sphere' id='other'><float name='radius' value='.45'/><point "          \
+    "name='center' x='.5' y='-.9' z='.6'/>" BOTH "</shape>"
 #define EGG_FILE "moved_seams_egg.obj"
 #define EGG                                                                              \
     "<shape type='obj' id='egg'><string name='filename' value='" EGG_FILE                \
@@ -109,9 +115,41 @@ static void height_test(void)
     const double ref = 2 * 1.2 * sqrt(0.75) / 16;
     static const char *const names[] = {"block.pose", "floor.pose"};
     for (int k = 0; k < 2; k++) test_must(ctx, imp_scene_add_geometry(scene, names[k]));
-    for (int k = 0; k < 2; k++) mean_gradient(ctx, scene, names[k], 256, 16, g[k]);
+    for (int k = 0; k < 2; k++) mean_gradient(ctx, scene, names[k], 64, 16, g[k]);
     tap_z(&g[0][2], -ref, 3e-3 * ref, "what a block hides of a floor, by its height");
     tap_z(&g[1][2], ref, 3e-3 * ref, "by the floor's");
+    imp_scene_destroy(scene);
+}
+
+/* A black ball of radius r, whose centre is h below a floor in parallel light from above, seen from there:
+ * it hides  pi (r^2 - h^2)  of the floor, whose radiance is  rho E/pi. */
+static void ball_test(void)
+{
+    struct tap_stat g[6] = {{0, 0, 0}}, grows[1] = {{0, 0, 0}}, falls[6] = {{0, 0, 0}};
+    const double r = .9, h = .5, rho = .6, E = 4, ref = 2 * rho * E / 16;
+    imp_scene *scene = test_scene_text(
+        ctx,
+        "<scene version='3.0.0'>" DIRECT
+        "<sensor type='orthographic'><transform name='to_world'><scale value='2'/>"
+        "<lookat origin='.1,.2,5' target='.1,.2,0' up='0,1,0'/></transform><film "
+        "type='hdrfilm'><integer name='width' value='16'/><integer name='height' "
+        "value='16'/><rfilter type='box'/></film></sensor><emitter type='directional'>"
+        "<vector name='direction' value='0,0,-1'/><spectrum name='irradiance' value='4'/>"
+        "</emitter><shape type='rectangle' id='floor'><transform name='to_world'><scale "
+        "value='9'/></transform><bsdf type='diffuse'><spectrum name='reflectance' "
+        "value='.6'/></bsdf></shape><shape type='sphere' id='ball'><point name='center' "
+        "value='0,0,-.5'/><float name='radius' value='.9'/><bsdf type='diffuse'>"
+        "<spectrum name='reflectance' value='0'/></bsdf></shape></scene>",
+        IMP_MONO);
+    static const char *const names[] = {"ball.pose", "ball.scale", "floor.pose"};
+    for (int k = 0; k < 3; k++) test_must(ctx, imp_scene_add_geometry(scene, names[k]));
+    mean_gradient(ctx, scene, names[0], 64, 16, g);
+    mean_gradient(ctx, scene, names[1], 64, 16, grows);
+    mean_gradient(ctx, scene, names[2], 64, 16, falls);
+    tap_z(&g[0], 0, 3e-3 * ref * r, "a ball in a floor, shifted along it");
+    tap_z(&g[2], -ref * h, 3e-3 * ref * r, "a ball in a floor, by its height");
+    tap_z(&grows[0], -ref * r * r, 3e-3 * ref * r, "by its size");
+    tap_z(&falls[2], ref * h, 3e-3 * ref * r, "by the floor's height");
     imp_scene_destroy(scene);
 }
 
@@ -133,6 +171,9 @@ int main(int argc, char **argv)
                                          {"lamp.pose", 3, .02},   {"board.pose", 0, .02},
                                          {"board.pose", 1, .02},  {"board.pose", 5, .02},
                                          {"camera.pose", 5, .01}, {NULL, 0, 0}};
+    static const struct number balls[] = {{"ball.pose", 0, .02},   {"ball.pose", 2, .02},
+                                          {"ball.scale", 0, .02},  {"other.pose", 1, .02},
+                                          {"camera.pose", 0, .02}, {NULL, 0, 0}};
     static const struct number egg[] = {{"egg.pose", 0, .02},
                                         {"egg.pose", 2, .02},
                                         {"egg.pose", 4, .02},
@@ -157,12 +198,16 @@ int main(int argc, char **argv)
     adjoint_make();
     egg_write(EGG_FILE, true);
     height_test();
+    ball_test();
     numbers_compare("a block in a floor", room(DIRECT, SUNK), 24 * more, 32 * more, .1,
                     block);
     numbers_compare("two blades", room(PATH BLADES, ""), 24 * more, 32 * more, .15,
                     blades);
     numbers_compare("a lamp through a board", room(PATH BOARD(BLACK), ""), 64 * more,
                     32 * more, .15, lamp);
+    numbers_compare("balls in a floor and in each other",
+                    room(PATH BALL("<ref id='grey'/>") OTHER, ""), 24 * more, 32 * more,
+                    .2, balls);
     numbers_compare("a meter", meter(""), 128 * more, 1024 * more, .2, meters);
     if (is_long) {
         numbers_compare("a block aslant, over bounces", room(PATH SUN, SUNK_AND_TURNED),
@@ -178,11 +223,15 @@ int main(int argc, char **argv)
     }
     number_refused("a lamp through a board that reflects", room(DIRECT BOARD(BOTH), ""),
                    "camera.pose", "which reflects");
-    number_refused("a ball in the floor",
-                   room(DIRECT "<shape type='sphere' id='ball'><float name='radius' "
-                               "value='.3'/></shape>",
+    number_refused("a ball that shines in the floor",
+                   room(DIRECT BALL("<emitter type='area'/>"), ""), "block.pose",
+                   "one of them is a sphere");
+    number_refused("a disk in the floor",
+                   room(DIRECT "<shape type='disk' id='disk'><transform name='to_world'>"
+                               "<scale value='.3'/><rotate x='1' angle='60'/>"
+                               "</transform></shape>",
                         ""),
-                   "block.pose", "curved");
+                   "block.pose", "disk or cylinder");
     number_refused("a mesh whose vertices lie in a surface, on both sides of it",
                    room(DIRECT "<shape type='obj' id='egg'><string name='filename' "
                                "value='" EGG_FILE "'/></shape>",

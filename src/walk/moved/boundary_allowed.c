@@ -64,18 +64,20 @@ static bool is_black(const struct imp_scene *scene, const struct imp_bsdf *b)
 /* Points of a meter are glued to it, and what they see jumps where it passes through a surface. Next
  * to the seam of a light, d away, points of a surface and of the light have derivatives that grow like
  * 1/d: the surface must not reflect. */
-static enum imp_status seam_allowed(const struct imp__boundary *b, size_t own,
-                                    size_t other)
+static enum imp_status seam_allowed(const struct imp__boundary *b,
+                                    const struct imp__edge_face *f,
+                                    const struct imp__edge_face *g)
 {
     const struct imp_scene *scene = b->tracer->scene;
     const struct imp_sensor *sensor = b->tracer->sensor;
-    const struct imp__edge_face *f = &b->edges->face[own], *g = &b->edges->face[other];
+    const char *own = scene->shapes[f->shape]->name,
+               *other = scene->shapes[g->shape]->name;
     if (sensor->shape && f->place == 0 && f->shape == sensor->shape->index)
         return imp__error(
             scene->ctx, IMP_E_UNSUPPORTED,
             "derivatives by what moves: shape '%s' passes through '%s', the "
             "shape of meter '%s'",
-            face_name(b, other), face_name(b, own), sensor->name);
+            other, own, sensor->name);
     const int met = imp__placed_shape(scene, g->shape, g->place);
     if (scene->shapes[f->shape]->emitter >= 0 &&
         !is_black(scene, imp__shape_bsdf(scene, scene->shapes[met])))
@@ -83,7 +85,25 @@ static enum imp_status seam_allowed(const struct imp__boundary *b, size_t own,
                           "derivatives by what moves: light '%s' passes through shape "
                           "'%s', which reflects: next to where they meet derivatives "
                           "grow without bound (a black one may stand there)",
-                          face_name(b, own), face_name(b, other));
+                          own, other);
+    return IMP_OK;
+}
+
+/* A light's own circle has no draws. */
+static enum imp_status arc_allowed(const struct imp__boundary *b,
+                                   const struct imp__arc *arc)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    for (int k = 0; k < 2; k++) {
+        const struct imp__edge_face *f = &arc->side[k], *g = &arc->side[1 - k];
+        if (scene->shapes[f->shape]->emitter >= 0)
+            return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                              "derivatives by what moves: light '%s' passes through "
+                              "shape '%s', and one of them is a sphere",
+                              scene->shapes[f->shape]->name,
+                              scene->shapes[g->shape]->name);
+        IMP_CHECKED(seam_allowed(b, f, g));
+    }
     return IMP_OK;
 }
 
@@ -92,9 +112,12 @@ static enum imp_status seams_allowed(const struct imp__boundary *b)
     for (size_t k = 0; k < b->edges->n; k++) {
         const struct imp__edge *e = &b->edges->edge[k];
         if (!e->seam) continue;
-        IMP_CHECKED(seam_allowed(b, e->first, e->first + 2));
-        IMP_CHECKED(seam_allowed(b, e->first + 2, e->first));
+        const struct imp__edge_face *f = &b->edges->face[e->first];
+        IMP_CHECKED(seam_allowed(b, f, f + 2));
+        IMP_CHECKED(seam_allowed(b, f + 2, f));
     }
+    for (size_t k = 0; k < b->edges->n_arcs; k++)
+        IMP_CHECKED(arc_allowed(b, &b->edges->arc[k]));
     return IMP_OK;
 }
 
@@ -123,7 +146,7 @@ static enum imp_status edges_allowed(const struct imp__boundary *b)
         return imp__error(
             scene->ctx, IMP_E_UNSUPPORTED,
             "derivatives by what moves: shape '%s' passes through shape '%s', "
-            "and where they meet is no edge, since one of them is curved",
+            "and where they meet is no edge: one of them is a disk or cylinder",
             scene->shapes[other]->name, scene->shapes[pierced]->name);
     return seams_allowed(b);
 }
