@@ -34,6 +34,16 @@ static inline void pose_apply(const double *n, imp_v3 centre, real h, real p[3])
     for (int i = 0; i < 3; i++) p[i] = (real)centre[i] + out[i];
 }
 
+/* X + h (e + A (X - c)) of numbers e, A [12]. */
+static inline void affine_apply(const double *n, imp_v3 centre, real h, real p[3])
+{
+    real r[3];
+    for (int i = 0; i < 3; i++) r[i] = p[i] - (real)centre[i];
+    for (int i = 0; i < 3; i++)
+        for (int j = -1; j < 3; j++)
+            p[i] += h * (j < 0 ? (real)n[i] : n[3 + 3 * i + j] * r[j]);
+}
+
 /* The triangle of a shape where the movers have the numbers h theta. */
 static inline struct triangle triangle_moved(const struct imp__moves *m, int shape,
                                              int prim, const double *theta, real h)
@@ -49,7 +59,9 @@ static inline struct triangle triangle_moved(const struct imp__moves *m, int sha
             const double *n = theta + x->first;
             if (x->shape != shape) continue;
             if (x->kind == IMP_MOVE_POSE) pose_apply(n, x->centre, h, p);
-            for (int i = 0; i < 3 && x->kind != IMP_MOVE_POSE; i++)
+            if (x->kind == IMP_MOVE_AFFINE) affine_apply(n, x->centre, h, p);
+            const bool whole = x->kind == IMP_MOVE_POSE || x->kind == IMP_MOVE_AFFINE;
+            for (int i = 0; i < 3 && !whole; i++)
                 p[i] += h * (x->kind == IMP_MOVE_SCALE
                                  ? n[0] * (p[i] - (real)x->centre[i])
                                  : (real)n[3 * (size_t)index[c] + (size_t)i]);

@@ -605,6 +605,9 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *                            its box
  *     NAME.vertex_positions  of a mesh: [vertices][3], world; vertex normals, if it has any, are
  *                            computed from them
+ *     NAME.center, NAME.radius   of a sphere: world; not beside pose and scale
+ *     NAME.p0, NAME.p1, NAME.radius   of a circular cylinder without textures: the middles of its
+ *                            ends, world; likewise
  *     NAME.x_fov             of a perspective camera: horizontal field of view, degrees
  *     NAME.principal_point_offset_x, NAME.principal_point_offset_y   of a perspective camera:
  *                            in parts of the film's width and height

@@ -203,7 +203,8 @@ class Scene:
         """Make a number of geometry a parameter.
 
         `NAME.pose` as `add_pose`; `NAME.scale` of a shape or instance; `NAME.vertex_positions` of a mesh;
-        `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y`, `NAME.opencv_k1`,
+        `NAME.center` and `NAME.radius` of a sphere; `NAME.p0`, `NAME.p1` and `NAME.radius` of a circular
+        cylinder; `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y`, `NAME.opencv_k1`,
         `_k2`, `_p1`, `_p2` and `_k3` of a perspective camera or thin lens;
         `NAME.aperture_radius` and `NAME.focus_distance` of a thin lens; `NAME.position` of a point, spot or
         ies light; `NAME.direction` of a directional, spot or ies light. Otherwise as `add_pose`.

@@ -7,6 +7,8 @@
 void imp__edges_free(struct imp__edges *edges)
 {
     imp__release(edges->ctx, edges->edge);
+    imp__release(edges->ctx, edges->laid);
+    imp__release(edges->ctx, edges->arc);
     imp__release(edges->ctx, edges->face);
     imp__release(edges->ctx, edges->body);
     *edges = (struct imp__edges){0};
@@ -14,10 +16,18 @@ void imp__edges_free(struct imp__edges *edges)
 
 struct imp__glued imp__edge_glued(const struct imp__edges *edges,
                                   const struct imp_scene *scene,
-                                  const struct imp__edge *e, imp_v3 p)
+                                  const struct imp__edge *e, int k, imp_v3 p)
 {
-    const struct imp__edge_face *f = &edges->face[e->first];
+    const struct imp__edge_face *f = &edges->face[e->first + (size_t)k];
     return imp__glued_near(scene, f->shape, f->prim, f->place, p, f->n);
+}
+
+void imp__seam_bar(const struct imp__edges *edges, const struct imp__edge *e, imp_v3 m,
+                   imp_v3 bar[2])
+{
+    const struct imp__edge_face *f = &edges->face[e->first], *g = f + 2;
+    bar[0] = f->n * (imp__dot(m, g->in) / imp__dot(f->n, g->in));
+    bar[1] = g->n * (imp__dot(m, f->in) / imp__dot(g->n, f->in));
 }
 
 int imp__edge_side(const struct imp__edges *edges, const struct imp__edge *e, imp_v3 m)
@@ -75,9 +85,10 @@ static bool move_apart(const struct imp__moves *moves, const struct imp__edge_fa
 const struct imp__edge *imp__edges_torn(const struct imp__edges *edges,
                                         const struct imp__moves *moves)
 {
-    for (size_t k = 0; k < edges->n; k++) {
-        const struct imp__edge *e = &edges->edge[k];
-        for (int j = 1; j < e->n_faces; j++)
+    for (size_t k = 0; k < edges->n + edges->n_laid; k++) {
+        const struct imp__edge *e =
+            k < edges->n ? &edges->edge[k] : &edges->laid[k - edges->n];
+        for (int j = 1; j < e->n_faces && !e->seam; j++)
             if (move_apart(moves, &edges->face[e->first],
                            &edges->face[e->first + (size_t)j]))
                 return e;
@@ -89,24 +100,34 @@ const struct imp__edge *imp__edges_torn(const struct imp__edges *edges,
  * that begin there. */
 #define END 1e-5
 
+/* A curved shape whose seams are in no list. */
+static bool is_seamless(const struct imp_scene *scene, int shape, int64_t place)
+{
+    struct imp_round round;
+    return imp__moves_curved(scene, shape, place) &&
+           !imp__moves_sphere(scene, shape, place, &round);
+}
+
+static bool any_seamless(const struct imp__edges *edges, const struct imp_scene *scene)
+{
+    for (size_t k = 0; k < edges->n_bodies; k++)
+        if (is_seamless(scene, edges->body[k].shape, edges->body[k].place)) return true;
+    return false;
+}
+
 int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
                        int *other)
 {
+    if (!any_seamless(edges, scene)) return -1;
     for (size_t k = 0; k < edges->n; k++) {
         const struct imp__edge *e = &edges->edge[k];
         const imp_v3 d = e->b - e->a;
-        double from = END;
         struct imp_hit hit;
-        while (imp__intersect(scene, &e->a, &d, from, 1 - END, &hit)) {
-            bool own = false;
-            for (int j = 0; j < e->n_faces; j++)
-                own |= edges->face[e->first + (size_t)j].shape == hit.shape &&
-                       edges->face[e->first + (size_t)j].place == hit.place;
-            if (!own) {
-                *other = edges->face[e->first].shape;
-                return hit.shape;
-            }
-            from = hit.t + END;
+        for (double from = END; imp__intersect(scene, &e->a, &d, from, 1 - END, &hit);
+             from = hit.t + END) {
+            if (!is_seamless(scene, hit.shape, hit.place)) continue;
+            *other = edges->face[e->first].shape;
+            return hit.shape;
         }
     }
     return imp__curved_pierced(edges, scene, other);

@@ -3,10 +3,12 @@
  * The edges of a scene of triangles, each once: where what is seen past a place may jump. Edges
  * of different triangles, and of different shapes, that lie on each other are one edge with all
  * their faces; where they overlap in part they are cut. Inner edges of a flat face of one shape
- * are left out: nothing jumps there. */
+ * are left out: nothing jumps there. Where triangles of different bodies pass through each other
+ * their seam is an edge. */
 #ifndef IMP_MOVE_EDGES_H
 #define IMP_MOVE_EDGES_H
 
+#include "math/warp.h"
 #include "moves.h"
 
 struct imp__edge_face {
@@ -20,12 +22,21 @@ struct imp__edge {
     imp_v3 a, b; /* ends, world */
     size_t first;
     int n_faces; /* face[first .. first + n_faces) */
+    bool seam;   /* where two bodies pass through each other (edges_seams.h) */
 };
 
 /* A shape that stands in the scene: outside of all groups, or in an instance. */
 struct imp__body {
     int shape;
     int64_t place; /* 0: in no instance */
+};
+
+/* A part of a circle in which a sphere passes through a triangle or another sphere: it is seen as a
+ * seam is. */
+struct imp__arc {
+    struct imp__edge_face side[2]; /* prim -1: a sphere, which has no n */
+    imp_v3 centre, s, t;           /* of the circle; unit, in its plane */
+    double radius, from, till;     /* turns, from s to t */
 };
 
 struct imp__edges {
@@ -35,6 +46,12 @@ struct imp__edges {
     size_t n, n_faces;
     struct imp__edge *edge; /* [n], along a curve through space: neighbours are near */
     struct imp__edge_face *face; /* [n_faces] */
+    /* Edges of a body that lie in the surface of another and have faces on both sides of it: the
+     * first two faces, then one of the other. They are in `edge`, too, with their own faces. */
+    size_t n_laid;
+    struct imp__edge *laid; /* [n_laid] */
+    size_t n_arcs;
+    struct imp__arc *arc; /* [n_arcs] */
 };
 
 /* All edges of the scene's shapes of triangles, flat or with vertex normals, also in instances.
@@ -43,10 +60,13 @@ struct imp__edges {
 enum imp_status imp__edges_build(const struct imp_scene *scene, struct imp__edges *out);
 void imp__edges_free(struct imp__edges *edges);
 
-/* The point of an edge as one that its first face carries along. */
+/* The point of an edge as one that its face k carries along. */
 struct imp__glued imp__edge_glued(const struct imp__edges *edges,
                                   const struct imp_scene *scene,
-                                  const struct imp__edge *e, imp_v3 p);
+                                  const struct imp__edge *e, int k, imp_v3 p);
+/* The velocity of a seam counts m: what that is to the points that faces 0 and 2 carry. */
+void imp__seam_bar(const struct imp__edges *edges, const struct imp__edge *e, imp_v3 m,
+                   imp_v3 bar[2]);
 /* Is the edge a silhouette for a line through it: do all faces lie on one side of the plane of
  * edge and line, with this normal? 1: on the side that m points away from, -1: on the other;
  * 0: on both. */
@@ -54,15 +74,32 @@ int imp__edge_side(const struct imp__edges *edges, const struct imp__edge *e, im
 /* By how much its two faces turn, 0 to 1: sin of half the angle between their normals. 1: a border,
  * or more faces. */
 double imp__edge_turn(const struct imp__edges *edges, const struct imp__edge *e);
-/* An edge whose faces move apart: they belong to shapes with different velocities. NULL: none. */
+/* An edge whose faces move apart: they belong to shapes with different velocities, and it is no seam.
+ * NULL: none. */
 const struct imp__edge *imp__edges_torn(const struct imp__edges *edges,
                                         const struct imp__moves *moves);
-/* A shape through which an edge of another passes, or a sphere or cylinder whose surface another shape
- * passes: where they meet is an edge that is in no list. -1: none; *other: the other shape. */
+/* A disk or cylinder that passes through another shape: where they meet is an edge that is in no list.
+ * -1: none; *other: the other shape. */
 int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
                        int *other);
 
+/* ---- edges_arcs.c ---- */
+/* Sets the arcs. */
+enum imp_status imp__arcs_find(const struct imp_scene *scene, struct imp__edges *edges);
+static inline double imp__arc_length(const struct imp__arc *arc)
+{
+    return IMP_2PI * arc->radius * (arc->till - arc->from);
+}
+/* A point, by a part u of its length, and the unit direction there. */
+void imp__arc_point(const struct imp__arc *arc, double u, imp_v3 *p, imp_v3 *along);
+/* The velocity of that point counts m: what that is to points of both surfaces. */
+void imp__arc_bar(const struct imp_scene *scene, const struct imp__arc *arc, imp_v3 p,
+                  imp_v3 along, imp_v3 m, struct imp__glued x[2], imp_v3 bar[2]);
+
 /* ---- edges_curved.c ---- */
+/* Is a sphere beside the box of a body? map: to the world, of its place. */
+bool imp__body_is_away(const struct imp_scene *scene, const struct imp__body *body,
+                       const struct imp_map *map, const struct imp_round *round);
 /* The same of curved shapes alone. */
 int imp__curved_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
                         int *other);

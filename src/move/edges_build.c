@@ -5,7 +5,7 @@
  * one edge with the faces of all sides that cover it. */
 #include "base/arguments.h"
 #include "base/context.h"
-#include "edges.h"
+#include "edges_seams.h"
 #include "kind/sensor/receiver.h"
 #include <stdlib.h>
 
@@ -28,7 +28,7 @@ struct building {
     size_t n, cap; /* sides */
     struct side *side;
     double *cut; /* [2 n] */
-    size_t cap_edges, cap_faces;
+    size_t cap_edges, cap_laid, cap_faces;
     struct imp__edges *out;
 };
 
@@ -197,30 +197,6 @@ static void lines_find(struct building *x)
     }
 }
 
-/* Have two triangles a side in common, vertices and with them uv? */
-static bool is_welded(const struct imp_triangles *t, int prim, int other)
-{
-    const uint32_t *i = t->indices;
-    int common = 0;
-    for (int k = 0; k < 9; k++) common += i[3 * prim + k / 3] == i[3 * other + k % 3];
-    return common >= 2;
-}
-
-/* Two faces of one shape in one plane, on both sides: nothing is there, unless a texture has a
- * seam, or shading normals have one. */
-static bool is_inner(const struct building *x, const struct imp__edge_face *f, int n)
-{
-    if (n != 2 || f[0].shape != f[1].shape || f[0].place != f[1].place ||
-        !(imp__length(f[0].in + f[1].in) < 1e-6))
-        return false;
-    const struct imp_shape *s = x->scene->shapes[f[0].shape];
-    const struct imp_bsdf *b = imp__shape_bsdf(
-        x->scene, x->scene->shapes[imp__placed_shape(x->scene, f[0].shape, f[0].place)]);
-    bool varies = s->smooth;
-    for (int k = 0; k < b->n_in; k++) varies |= b->input[k]->texture != NULL;
-    return !varies || is_welded(&s->triangles, f[0].prim, f[1].prim);
-}
-
 static enum imp_status edge_add(struct building *x, const struct side *first, size_t n,
                                 double from, double till)
 {
@@ -239,7 +215,8 @@ static enum imp_status edge_add(struct building *x, const struct side *first, si
             long_one = s;
     }
     const int faces = (int)(out->n_faces - before);
-    if (faces == 0 || is_inner(x, &out->face[before], faces)) {
+    struct imp__edge_face *own = out->face + before;
+    if (faces == 0 || (faces == 2 && imp__edge_is_inner(x->scene, own))) {
         out->n_faces = before;
         return IMP_OK;
     }
@@ -252,7 +229,7 @@ static enum imp_status edge_add(struct building *x, const struct side *first, si
     more[out->n++] = (struct imp__edge){
         long_one->a + along * (imp_max(from, long_one->from) - long_one->from),
         long_one->a + along * (imp_min(till, long_one->till) - long_one->from), before,
-        faces};
+        faces, faces == 4 && imp__edge_is_crossing(x->scene, own)};
     return IMP_OK;
 }
 
@@ -276,6 +253,37 @@ static enum imp_status line_cut(struct building *x, const struct side *first, si
         from = x->cut[k];
     }
     return IMP_OK;
+}
+
+/* ---- Seams ------------------------------------------------------------------------------ */
+
+static enum imp_status seam_take(struct building *x, const struct imp__seam *seam)
+{
+    struct imp__edges *out = x->out;
+    struct imp__edge_face *faces =
+        imp__grow(x->ctx, out->face, &x->cap_faces, out->n_faces + 4, sizeof *faces);
+    if (faces) out->face = faces;
+    struct imp__edge **list = seam->laid ? &out->laid : &out->edge;
+    size_t *n = seam->laid ? &out->n_laid : &out->n;
+    struct imp__edge *more = imp__grow(
+        x->ctx, *list, seam->laid ? &x->cap_laid : &x->cap_edges, *n + 1, sizeof *more);
+    if (more) *list = more;
+    if (!faces || !more) return imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
+    more[(*n)++] = (struct imp__edge){seam->a, seam->b, out->n_faces, 4, !seam->laid};
+    for (int k = 0; k < 4; k++) faces[out->n_faces++] = seam->face[k];
+    return IMP_OK;
+}
+
+static enum imp_status seams_add(struct building *x)
+{
+    struct imp__seams seams;
+    IMP_CHECKED(imp__seams_find(x->scene, x->out->body, x->out->n_bodies, x->near,
+                                x->size, &seams));
+    enum imp_status st = IMP_OK;
+    for (size_t k = 0; k < seams.n && st == IMP_OK; k++)
+        st = seam_take(x, &seams.seam[k]);
+    imp__seams_free(&seams);
+    return st;
 }
 
 /* ---- Order of the list --------------------------------------------------------------- */
@@ -330,7 +338,9 @@ enum imp_status imp__edges_build(const struct imp_scene *scene, struct imp__edge
         for (n = 1; k + n < x.n && x.side[k + n].line == x.side[k].line;) n++;
         IMP_TRY(line_cut(&x, &x.side[k], n));
     }
+    IMP_TRY(seams_add(&x));
     IMP_TRY(edges_order(&x));
+    IMP_TRY(imp__arcs_find(scene, out));
 out:
     imp__release(x.ctx, x.side);
     imp__release(x.ctx, x.cut);

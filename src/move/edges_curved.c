@@ -9,28 +9,6 @@
 #define TOUCH 1e-5 /* of a sphere's radius: nearer surfaces touch it */
 #define END   1e-5 /* of a segment: nearer hits are of what begins there */
 
-/* The least and the largest distance of a triangle from a point. */
-static void triangle_distances(const struct imp__corners *f, imp_v3 c, double *least,
-                               double *most)
-{
-    imp_v3 p[3];
-    *most = 0;
-    *least = INFINITY;
-    for (int k = 0; k < 3; k++) {
-        p[k] = f->p[k] - c;
-        *most = imp_max(*most, imp__length(p[k]));
-    }
-    const imp_v3 cross = imp__cross(p[1] - p[0], p[2] - p[0]), n = imp__normalize(cross);
-    bool inside = true;
-    for (int k = 0; k < 3; k++) {
-        const imp_v3 e = p[(k + 1) % 3] - p[k];
-        const double s = imp_clamp(-imp__dot(p[k], e) / imp__dot(e, e), 0.0, 1.0);
-        *least = imp_min(*least, imp__length(p[k] + e * s));
-        inside &= imp__dot(imp__cross(e, -p[k]), n) >= 0;
-    }
-    if (inside) *least = imp_min(*least, fabs(imp__dot(p[0], n)));
-}
-
 /* Chords of a rim, by which it is tested: what is pierced by less than 3e-4 of the radius counts
  * as touched. */
 #define CHORDS 128
@@ -113,9 +91,8 @@ static bool tube_meets(const struct imp__tube *c, const struct imp_round *round)
     return least < round->radius * (1 - TOUCH) && most > round->radius * (1 + TOUCH);
 }
 
-/* Is the sphere beside the box of a body in an instance? */
-static bool is_away(const struct imp_scene *scene, const struct imp__body *body,
-                    const struct imp_map *map, const struct imp_round *round)
+bool imp__body_is_away(const struct imp_scene *scene, const struct imp__body *body,
+                       const struct imp_map *map, const struct imp_round *round)
 {
     imp_v3 lo = scene->shapes[body->shape]->lo, hi = scene->shapes[body->shape]->hi;
     bool away = false;
@@ -126,36 +103,18 @@ static bool is_away(const struct imp_scene *scene, const struct imp__body *body,
     return away;
 }
 
-/* Does the surface of a sphere meet this body? Where they touch, it does not. */
+/* Does the surface of a sphere meet this disk or cylinder? Where they touch, it does not. */
 static bool meets_sphere(const struct imp_scene *scene, const struct imp__body *body,
                          const struct imp_round *round)
 {
-    const double inside = round->radius * (1 - TOUCH),
-                 outside = round->radius * (1 + TOUCH);
-    const struct imp_triangles *t = &scene->shapes[body->shape]->triangles;
     const int64_t place = body->place;
     struct imp_map map[2];
     struct imp__tube tube;
-    struct imp_round other;
     if (place > 0) imp__place_map(scene, place, 0, &map[0], &map[1]);
-    if (is_away(scene, body, &map[0], round)) return false;
+    if (imp__body_is_away(scene, body, &map[0], round)) return false;
     if (imp__moves_cylinder(scene, body->shape, place, &tube))
         return tube_meets(&tube, round);
-    if (imp__moves_sphere(scene, body->shape, place, &other)) {
-        const double d = imp__length(other.centre - round->centre);
-        return d < inside + other.radius &&
-               d > fabs(round->radius - other.radius) + TOUCH * round->radius;
-    }
-    if (imp__moves_disk(scene, body->shape)) return disk_meets(scene, body, round);
-    if (scene->shapes[body->shape]->geometry != IMP_TRIANGLES) return false;
-    for (size_t k = 0; k < t->n_triangles; k++) {
-        const struct imp__corners f =
-            imp__corners_mapped(scene, body->shape, (int)k, place > 0 ? map : NULL);
-        double least, most;
-        triangle_distances(&f, round->centre, &least, &most);
-        if (least < inside && most > outside) return true;
-    }
-    return false;
+    return imp__moves_disk(scene, body->shape) && disk_meets(scene, body, round);
 }
 
 static int spheres_pierced(const struct imp__edges *edges, const struct imp_scene *scene,

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Movers, the velocities that they give, and the transposes (moves.h). */
-#include "moves.h"
+#include "affine.h"
+#include "base/arguments.h"
 #include "base/context.h"
 #include "kind/emitter/from_point.h"
 #include "kind/emitter/ies.h"
@@ -70,9 +71,10 @@ static enum imp_status shape_mover(const struct imp__moves *moves, struct imp__m
                           "shape '%s' (%s) is no mesh, and has no vertices that move",
                           s->name, s->ops->name);
     m->centre = (s->lo + s->hi) * 0.5;
-    m->count = m->kind == IMP_MOVE_POSE    ? 6
-               : m->kind == IMP_MOVE_SCALE ? 1
-                                           : 3 * s->triangles.n_vertices;
+    m->count = m->kind == IMP_MOVE_POSE     ? 6
+               : m->kind == IMP_MOVE_SCALE  ? 1
+               : m->kind == IMP_MOVE_AFFINE ? IMP_AFFINE_NUMBERS
+                                            : 3 * s->triangles.n_vertices;
     if (m->kind != IMP_MOVE_VERTICES || !imp__moves_smooth(moves->scene, m->shape))
         return IMP_OK;
     m->count *= 2;
@@ -124,8 +126,24 @@ static imp_v3 twist_of(const struct imp_pose *pose, imp_v3 a)
     return sum > 1e-9 ? imp__cross(z, a) * (-1 / sum) : (imp_v3){0};
 }
 
+/* A sphere or a cylinder as it is now. */
+static enum imp_status round_add(struct imp__moves *moves, const struct imp_pose *pose)
+{
+    struct imp_round round;
+    const bool ball = imp__moves_sphere(moves->scene, pose->shape, 0, &round);
+    IMP_CHECKED(imp__moves_add(moves,
+                               !ball                           ? IMP_MOVE_AFFINE
+                               : pose->kind == IMP_POSE_CENTER ? IMP_MOVE_POSE
+                                                               : IMP_MOVE_SCALE,
+                               pose->shape));
+    if (ball && pose->kind == IMP_POSE_RADIUS)
+        moves->mover[moves->n_movers - 1].rate = 1 / pose->number[0];
+    return IMP_OK;
+}
+
 enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_pose *pose)
 {
+    if (imp__pose_is_round(pose->kind)) return round_add(moves, pose);
     static const enum imp__move_kind kind[IMP_POSE_KINDS] = {
         [IMP_POSE_RIGID] = IMP_MOVE_POSE,
         [IMP_POSE_SCALE] = IMP_MOVE_SCALE,
@@ -161,27 +179,23 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
     return IMP_OK;
 }
 
-/* Has the shape's material textures? */
-static bool looks_up(const struct imp_scene *scene, int shape)
-{
-    const struct imp_bsdf *b = imp__shape_bsdf(scene, scene->shapes[shape]);
-    for (int k = 0; k < b->n_in; k++)
-        if (b->input[k]->texture) return true;
-    return false;
-}
-
 void imp__pose_numbers_bar(const struct imp__moves *moves, const struct imp__mover *mover,
                            const struct imp_pose *pose, double *bar)
 {
     if (mover->fans)
         imp__fans_normals_bar(mover->fans, &moves->scene->shapes[mover->shape]->triangles,
                               bar + mover->count / 2, bar);
+    struct imp__tube tube;
+    if (mover->kind == IMP_MOVE_AFFINE &&
+        imp__moves_cylinder(pose->scene, pose->shape, 0, &tube))
+        imp__ends_bar(&tube, mover->centre, pose->kind, bar);
     if (pose->kind != IMP_POSE_RIGID) return;
     const imp_v3 turn = imp__v3(bar[3], bar[4], bar[5]);
     for (int i = 3; i < 6; i++) bar[i] = 0;
     struct imp_round round;
     if (pose->shape >= 0 && imp__moves_sphere(pose->scene, pose->shape, 0, &round) &&
-        !looks_up(pose->scene, pose->shape) && !pose->object->table)
+        !imp__pose_looks_up(pose->scene, pose->scene->shapes[pose->shape]) &&
+        !pose->object->table)
         return; /* turned about its centre it is where it was */
     imp__rotation_bar(pose->number + 3, turn, bar + 3);
 }
@@ -306,6 +320,7 @@ struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
             out.area += 2 * m->rate * theta[0];
             break;
         case IMP_MOVE_VERTICES: vertices_velocity(moves, x, theta, &out); break;
+        case IMP_MOVE_AFFINE: imp__affine_velocity(x, r, theta, &out); break;
         default: break;
         }
     }
@@ -333,6 +348,7 @@ void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *
             theta[0] += m->rate * (imp__dot(r, bar->v) + 2 * bar->area);
             break;
         case IMP_MOVE_VERTICES: vertices_bar(moves, x, bar, theta); break;
+        case IMP_MOVE_AFFINE: imp__affine_bar(x, r, bar, theta); break;
         default: break;
         }
     }

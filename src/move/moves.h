@@ -5,6 +5,7 @@
  *
  *     pose      e, a: every point X has the velocity  V = e + a x (X - c), c the centre (6)
  *     scale     V = s (X - c) at the scale 1 of the shape as it is, or over that scale (1)
+ *     affine    V = e + A (X - c), A row by row (12): of what is stretched or turned as a whole
  *     vertices  V = b_0 e_0 + b_1 e_1 + b_2 e_2, of a triangle with weights b (3 each)
  *     view      of a camera: the velocity of what a fixed film position sees by its field of view,
  *               its principal point, a coefficient or the aperture of its lens
@@ -35,6 +36,7 @@ enum imp__move_kind {
     IMP_MOVE_POSE,
     IMP_MOVE_SCALE,
     IMP_MOVE_VERTICES,
+    IMP_MOVE_AFFINE,
     IMP_MOVE_LIGHT,
     IMP_MOVE_AXIS,
     IMP_MOVE_VIEW /* + k: number k of a camera's view */
@@ -124,7 +126,8 @@ enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kin
 enum imp_status imp__moves_add_pose(struct imp__moves *moves,
                                     const struct imp_pose *pose);
 /* From the adjoint of a mover's numbers to that of its parameter's, in place: a mover turns the
- * object as it is, the parameter is one vector of rotation; normals follow vertices. */
+ * object as it is, the parameter is one vector of rotation; normals follow vertices; ends and radius of
+ * a cylinder turn and stretch it. */
 void imp__pose_numbers_bar(const struct imp__moves *moves, const struct imp__mover *mover,
                            const struct imp_pose *pose, double *bar);
 /* Does it move (imp__mover.shape)? By a mover that is not `but` (NULL: any). */

@@ -61,13 +61,21 @@ const struct imp_pose *imp__pose_beside(const struct imp_pose *p, enum imp_pose_
     return NULL;
 }
 
-/* By the pose and the scale, which may be absent. */
+/* By the pose and the scale, or a sphere's centre and radius, which may be absent. */
 static struct imp_map map_of(const struct imp_pose *object)
 {
     const struct imp_pose *rigid = imp__pose_beside(object, IMP_POSE_RIGID);
     const struct imp_pose *scale = imp__pose_beside(object, IMP_POSE_SCALE);
     const double rest[6] = {0}, *number = rigid ? rigid->number : rest;
-    const double s = scale ? scale->number[0] : 1;
+    const struct imp_pose *center = imp__pose_beside(object, IMP_POSE_CENTER);
+    const struct imp_pose *radius = imp__pose_beside(object, IMP_POSE_RADIUS);
+    const double s = scale    ? scale->number[0]
+                     : radius ? radius->number[0] / radius->start[0]
+                              : 1;
+    double shifted[6] = {0};
+    for (int i = 0; center && i < 3; i++)
+        shifted[i] = center->number[i] - center->start[i];
+    if (center) number = shifted;
     struct imp_map out;
     double R[9];
     imp__rotation_of(number + 3, R);
@@ -105,6 +113,26 @@ static enum imp_status sensor_apply(const struct imp_pose *p)
     return IMP_OK;
 }
 
+/* False: it is no cylinder with numbers of its own. */
+static bool ends_apply(const struct imp_pose *p, struct imp_shape *s)
+{
+    const struct imp_pose *end[2] = {imp__pose_beside(p, IMP_POSE_END_0),
+                                     imp__pose_beside(p, IMP_POSE_END_1)},
+                          *radius = imp__pose_beside(p, IMP_POSE_RADIUS);
+    struct imp_round round;
+    imp_v3 at[2];
+    if (!(end[0] || end[1] || radius) || !imp__shape_round(s, &round) ||
+        imp__is_zero(round.axis))
+        return false;
+    at[0] = round.centre;
+    at[1] = round.centre + round.axis * (s->area / (IMP_2PI * round.radius));
+    for (int k = 0; k < 2; k++)
+        if (end[k])
+            at[k] = imp__v3(end[k]->number[0], end[k]->number[1], end[k]->number[2]);
+    imp__cylinder_set(s, at[0], at[1], radius ? radius->number[0] : round.radius);
+    return true;
+}
+
 static enum imp_status shape_apply(const struct imp_pose *p)
 {
     struct imp_shape *s = p->scene->shapes[p->shape];
@@ -114,7 +142,7 @@ static enum imp_status shape_apply(const struct imp_pose *p)
     memcpy(s->self, p->rest, p->rest_size);
     const struct imp_map by = map_of(p);
     if (s->geometry != IMP_TRIANGLES) {
-        s->ops->move(s, by.m);
+        if (!ends_apply(p, s)) s->ops->move(s, by.m);
         imp__pose_carry(p->object, &by);
         return IMP_OK;
     }
@@ -184,7 +212,8 @@ double imp__pose_large(const struct imp_pose *p, size_t e)
     const double scene = imp__length(p->scene->hi - p->scene->lo);
     switch (p->kind) {
     case IMP_POSE_RIGID: return e < 3 ? 0.1 * scene : 0.5;
-    case IMP_POSE_SCALE: return 0.3 * p->number[0];
+    case IMP_POSE_SCALE:
+    case IMP_POSE_RADIUS: return 0.3 * p->number[0];
     case IMP_POSE_VERTICES: {
         const struct imp_shape *s = p->scene->shapes[p->shape];
         return 0.1 * imp__length(s->hi - s->lo);
@@ -276,6 +305,8 @@ enum imp_status imp__poses_settle(struct imp_scene *scene)
         }
         if (p->shape >= 0 && !is_finite(scene->shapes[p->shape]))
             wrong = "moves the shape beyond what numbers hold";
+        if (imp__pose_is_round(p->kind) && !(scene->shapes[p->shape]->area > 0))
+            wrong = "makes the shape vanish";
         const struct imp_pose *to = imp__pose_beside(p, IMP_POSE_DIRECTION);
         if (to &&
             !(imp__length(imp__v3(to->number[0], to->number[1], to->number[2])) > 0))

@@ -6,6 +6,9 @@
  *                            file has at X0 is at  X = c + e + R(a) s (X0 - c)
  *     NAME.scale             of a shape or instance: s
  *     NAME.vertex_positions  of a mesh: the vertices, three numbers each, world
+ *     NAME.center, .radius   of a sphere, world
+ *     NAME.p0, .p1, .radius  of a circular cylinder: the middles of its ends, world; its points turn with
+ *                            the axis as little as possible
  *     NAME.x_fov             of a perspective camera: its horizontal field of view, degrees
  *     NAME.principal_point_offset_x, _y    of a camera, in parts of the film's width and height
  *     NAME.opencv_k1, _k2, _p1, _p2, _k3   of a camera, by which its lens distorts the picture
@@ -25,6 +28,10 @@ enum imp_pose_kind {
     IMP_POSE_RIGID,
     IMP_POSE_SCALE,
     IMP_POSE_VERTICES,
+    IMP_POSE_CENTER,
+    IMP_POSE_RADIUS,
+    IMP_POSE_END_0,
+    IMP_POSE_END_1,
     IMP_POSE_FOV,
     IMP_POSE_OFFSET_X,
     IMP_POSE_OFFSET_Y,
@@ -39,6 +46,12 @@ enum imp_pose_kind {
     IMP_POSE_DIRECTION,
     IMP_POSE_KINDS
 };
+
+/* A centre, radius or end of a sphere or cylinder. */
+static inline bool imp__pose_is_round(enum imp_pose_kind kind)
+{
+    return kind >= IMP_POSE_CENTER && kind <= IMP_POSE_END_1;
+}
 
 /* A number of a camera's view (imp_sensor_ops.view): number kind - IMP_POSE_FOV. */
 static inline bool imp__pose_is_view(enum imp_pose_kind kind)
@@ -57,7 +70,8 @@ struct imp_pose {
     struct imp_emitter *emitter; /* NULL: no light without a shape */
     int param;
     size_t n;
-    double *number; /* [n] */
+    double *number;  /* [n] */
+    double start[3]; /* of a centre, radius or end: as the file has it */
     imp_v3 centre;
     /* The first one of the same object has what follows. */
     struct imp_pose *object;
@@ -94,6 +108,9 @@ struct imp_geometry_walk {
     char name[256];
 };
 bool imp__geometry_next(const struct imp_scene *scene, struct imp_geometry_walk *at);
+
+/* Has the shape's material textures? */
+bool imp__pose_looks_up(const struct imp_scene *scene, const struct imp_shape *s);
 
 /* A large change of number e, in its unit: of a place a tenth of the scene, of a rotation half a
  * radian, of a vertex a tenth of its mesh, of a view ten degrees. */

@@ -54,12 +54,38 @@ static const char *size_why(const struct imp_scene *scene, const struct imp_shap
     return NULL;
 }
 
+bool imp__pose_looks_up(const struct imp_scene *scene, const struct imp_shape *s)
+{
+    const struct imp_bsdf *b = imp__shape_bsdf(scene, s);
+    for (int k = 0; k < b->n_in; k++)
+        if (b->input[k]->texture) return true;
+    return false;
+}
+
+/* A sphere, or a circular cylinder, and which of their numbers this is. */
+static const char *round_why(const struct imp_scene *scene, const struct imp_shape *s,
+                             enum imp_pose_kind kind)
+{
+    struct imp_round round;
+    const bool is_round = imp__shape_round(s, &round);
+    const bool has_axis = is_round && !imp__is_zero(round.axis);
+    if (!is_round || (kind == IMP_POSE_CENTER && has_axis) ||
+        ((kind == IMP_POSE_END_0 || kind == IMP_POSE_END_1) && !has_axis))
+        return "it is none of sphere (center, radius) and circular cylinder (p0, p1, "
+               "radius)";
+    if (has_axis && imp__pose_looks_up(scene, s))
+        return "its texture would turn about its axis";
+    return kind == IMP_POSE_CENTER ? NULL : size_why(scene, s, kind);
+}
+
 static const char *shape_kind_why(const struct imp_scene *scene,
                                   const struct imp_shape *s, enum imp_pose_kind kind)
 {
-    if (kind > IMP_POSE_VERTICES) return "it is a shape";
+    if (kind >= IMP_POSE_FOV) return "it is a shape";
     const char *why = shape_why(scene, s);
-    return why || kind == IMP_POSE_RIGID ? why : size_why(scene, s, kind);
+    if (why || kind == IMP_POSE_RIGID) return why;
+    return imp__pose_is_round(kind) ? round_why(scene, s, kind)
+                                    : size_why(scene, s, kind);
 }
 
 static const char *sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
@@ -144,6 +170,17 @@ static enum imp_status object_find(struct imp_scene *scene, const char *name,
                       name, imp__theta_near(scene, whole).text);
 }
 
+static void round_numbers(const struct imp_shape *s, enum imp_pose_kind kind,
+                          double out[3])
+{
+    struct imp_round round;
+    imp__shape_round(s, &round);
+    const double length = s->area / (IMP_2PI * round.radius);
+    const imp_v3 at = round.centre + round.axis * (kind == IMP_POSE_END_1 ? length : 0);
+    for (int i = 0; i < 3; i++) out[i] = at[i];
+    if (kind == IMP_POSE_RADIUS) out[0] = round.radius;
+}
+
 /* Numbers, and what they are where the file has the object. */
 static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
 {
@@ -151,9 +188,11 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
         p->shape >= 0 ? &scene->shapes[p->shape]->triangles : NULL;
     double view[IMP_VIEW_NUMBERS], aim[3];
     if (imp__pose_is_view(p->kind)) p->sensor->ops->view(p->sensor, view, false);
+    const bool place = p->kind >= IMP_POSE_POSITION ||
+                       (imp__pose_is_round(p->kind) && p->kind != IMP_POSE_RADIUS);
     p->n = p->kind == IMP_POSE_RIGID      ? 6
            : p->kind == IMP_POSE_VERTICES ? 3 * t->n_vertices
-           : p->kind >= IMP_POSE_POSITION ? 3
+           : place                        ? 3
                                           : 1;
     p->number = imp__arena_array(&scene->arena, p->n, sizeof *p->number);
     if (!p->number) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
@@ -166,6 +205,13 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
     case IMP_POSE_DIRECTION:
         imp__pose_aim(p->emitter, p->kind, aim);
         memcpy(p->number, aim, sizeof aim);
+        break;
+    case IMP_POSE_CENTER:
+    case IMP_POSE_RADIUS:
+    case IMP_POSE_END_0:
+    case IMP_POSE_END_1:
+        round_numbers(scene->shapes[p->shape], p->kind, p->start);
+        memcpy(p->number, p->start, p->n * sizeof *p->number);
         break;
     default:
         if (imp__pose_is_view(p->kind)) p->number[0] = view[p->kind - IMP_POSE_FOV];
@@ -180,6 +226,10 @@ static const struct tail {
     [IMP_POSE_RIGID] = {"pose", "scene units, radians", -INFINITY, INFINITY},
     [IMP_POSE_SCALE] = {"scale", "1", 1e-3, INFINITY},
     [IMP_POSE_VERTICES] = {"vertex_positions", "scene units", -INFINITY, INFINITY},
+    [IMP_POSE_CENTER] = {"center", "scene units", -INFINITY, INFINITY},
+    [IMP_POSE_RADIUS] = {"radius", "scene units", 1e-6, INFINITY},
+    [IMP_POSE_END_0] = {"p0", "scene units", -INFINITY, INFINITY},
+    [IMP_POSE_END_1] = {"p1", "scene units", -INFINITY, INFINITY},
     [IMP_POSE_FOV] = {"x_fov", "degree", 0.1, 179},
     [IMP_POSE_OFFSET_X] = {"principal_point_offset_x", "film width", -INFINITY, INFINITY},
     [IMP_POSE_OFFSET_Y] = {"principal_point_offset_y", "film height", -INFINITY,
@@ -237,6 +287,21 @@ static bool is_there(const struct imp_scene *scene, struct imp_pose *p)
     return false;
 }
 
+/* Numbers that say where the same points are, which may not be set beside each other. */
+static int family(enum imp_pose_kind kind)
+{
+    return kind == IMP_POSE_VERTICES ? 1 : imp__pose_is_round(kind) ? 2 : 0;
+}
+static const char *beside_why(const struct imp_pose *p)
+{
+    for (const struct imp_pose *q = p->object != p ? p->object : NULL; q; q = q->next)
+        if (q->object == p->object && family(q->kind) != family(p->kind))
+            return family(q->kind) == 1 || family(p->kind) == 1
+                       ? "single vertices move, and the whole moves with them"
+                       : "pose and scale say where it is, or center, p0, p1 and radius";
+    return NULL;
+}
+
 static enum imp_status geometry_add(struct imp_scene *scene, const char *object,
                                     enum imp_pose_kind kind)
 {
@@ -255,12 +320,8 @@ static enum imp_status geometry_add(struct imp_scene *scene, const char *object,
     p->shape = p->instance = -1;
     IMP_CHECKED(object_find(scene, object, p));
     if (is_there(scene, p)) return IMP_OK;
-    const bool others =
-        imp__pose_beside(p, IMP_POSE_RIGID) || imp__pose_beside(p, IMP_POSE_SCALE);
-    if (p->object != p &&
-        ((kind == IMP_POSE_VERTICES && others) || imp__pose_beside(p, IMP_POSE_VERTICES)))
-        return refuse(scene, object, kind,
-                      "single vertices move, and the whole moves with them");
+    const char *beside = beside_why(p);
+    if (beside) return refuse(scene, object, kind, beside);
     if (p->object == p) IMP_CHECKED(imp__pose_rest_keep(scene, p));
     IMP_CHECKED(numbers_make(scene, p));
     IMP_CHECKED(param_add(scene, object, p));
@@ -363,10 +424,11 @@ enum imp_status imp_scene_add_geometry(imp_scene *scene, const char *name)
         object[length] = 0;
         return geometry_add(scene, object, (enum imp_pose_kind)k);
     }
-    return imp__error(scene->ctx, IMP_E_ARG,
-                      "'%s' names no number of geometry: NAME.pose, scale, "
-                      "vertex_positions, x_fov, principal_point_offset_x, _y, "
-                      "opencv_k1, k2, p1, p2, k3, aperture_radius, "
-                      "focus_distance, position or direction",
-                      name);
+    return imp__error(
+        scene->ctx, IMP_E_ARG,
+        "'%s' names no number of geometry: NAME.pose, scale, "
+        "vertex_positions, center, radius, p0, p1, x_fov, principal_point_offset_x, _y, "
+        "opencv_k1, k2, p1, p2, k3, aperture_radius, "
+        "focus_distance, position or direction",
+        name);
 }

@@ -241,14 +241,13 @@ int main(int argc, char **argv)
                 "<transform name='to_world_end'><translate x='1.6' y='-1' "
                 "z='1'/></transform>"),
             "motion of its own");
-    refused("instances that pass through each other",
+    refused("a tube through an instance",
             DIRECT
             "<shape type='shapegroup' id='g'><shape type='cube' id='box'><transform "
-            "name='to_world'><scale value='.2'/></transform></shape></shape>" PLACED(
-                "g", "<translate x='1.5' y='-1' z='1'/>", "")
-                PLACED("g",
-                       "<rotate z='1' angle='30'/><translate x='1.7' y='-1' z='1.1'/>",
-                       ""),
+            "name='to_world'><scale value='.2'/></transform></shape></shape>"
+            "<shape type='cylinder'><point name='p0' x='1.6' y='-1' z='1.1'/><point "
+            "name='p1' x='1.6' y='-1' z='1.5'/><float name='radius' value='.1'/>"
+            "</shape>" PLACED("g", "<translate x='1.5' y='-1' z='1'/>", ""),
             "passes through");
     imp_scene *scene = room(true);
     tap_ok(imp_scene_add_pose(scene, "chair") != IMP_OK, "a group has no pose # %s",

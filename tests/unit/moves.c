@@ -307,9 +307,10 @@ static void edges_test(void)
                      "<shape type='cube' id='b'><transform name='to_world'><scale "
                      "value='.2'/><rotate x='1' y='1' angle='20'/></transform></shape>");
     test_must(ctx, imp__edges_build(scene, &e));
-    const int pierced = imp__edges_pierced(&e, scene, &other);
-    tap_ok((pierced == 0 && other == 2) || (pierced == 2 && other == 0),
-           "a box in a floor meets it where no edge is");
+    int seams = 0;
+    for (size_t k = 0; k < e.n; k++) seams += e.edge[k].seam;
+    tap_ok(imp__edges_pierced(&e, scene, &other) < 0 && seams >= 4,
+           "a box in a floor meets it in %d seams", seams);
     imp__edges_free(&e);
     imp_scene_destroy(scene);
 
@@ -359,6 +360,7 @@ int main(void)
 {
     ctx = test_context(1);
     kind_test(IMP_MOVE_POSE, "pose");
+    kind_test(IMP_MOVE_AFFINE, "affine");
     kind_test(IMP_MOVE_SCALE, "scale");
     kind_test(IMP_MOVE_VERTICES, "vertices");
     file_test();

@@ -112,7 +112,7 @@ int imp__fit_spp(const struct imp__fit *f)
 }
 
 /* Where poses are active: may objects be as x has them? Not so: what cannot be moved (numbers beyond
- * floats), or where edges are none (objects that pass through each other). */
+ * floats), or where edges are none (a tube that passes through a wall). */
 static enum imp_status poses_allow(const struct imp__fit *f, const double *x)
 {
     const enum imp_status st = imp_problem_set_x(f->problem, x);

@@ -215,6 +215,30 @@ static void move(struct imp_shape *s, const double to_world[12])
     box_set(k, s);
 }
 
+/* The rotation that takes the unit vector a to b, of a vector across which both may lie. */
+static imp_v3 turned(imp_v3 a, imp_v3 b, imp_v3 v)
+{
+    const imp_v3 w = imp__cross(a, b);
+    const double cosine = imp__dot(a, b);
+    if (!(cosine > -1 + 1e-12)) return v; /* half a turn: about whatever v is */
+    return v + imp__cross(w, v) + imp__cross(w, imp__cross(w, v)) * (1 / (1 + cosine));
+}
+
+void imp__cylinder_set(struct imp_shape *s, imp_v3 p0, imp_v3 p1, double radius)
+{
+    struct cylinder *k = s->self;
+    const imp_v3 n = imp__normalize(p1 - p0), was = imp__normalize(k->axes.n);
+    const bool opposite = !(imp__dot(n, was) > -1 + 1e-12);
+    k->base = p0;
+    k->length = imp__length(p1 - p0);
+    k->radius = radius;
+    k->axes = (struct imp_frame){turned(was, n, k->axes.s),
+                                 turned(was, n, k->axes.t) * (opposite ? -1.0 : 1.0), n};
+    k->inner = k->axes;
+    s->area = IMP_2PI * radius * k->length;
+    box_set(k, s);
+}
+
 const struct imp_shape_ops imp__cylinder = {.size = sizeof(struct imp_shape_ops),
                                             .name = "cylinder",
                                             .object_size = sizeof(struct cylinder),

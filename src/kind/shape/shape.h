@@ -147,6 +147,8 @@ struct imp__mesh {
 };
 void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit,
                        const imp_v3 *o, const imp_v3 *d, struct imp_surface *out);
+/* A circular cylinder between the middles of its ends; its frame turns as little as possible. */
+void imp__cylinder_set(struct imp_shape *s, imp_v3 p0, imp_v3 p1, double radius);
 /* As imp_shape_ops.move (mesh_build.c). */
 void imp__mesh_move(struct imp_shape *s, const double to_world[12]);
 /* As imp_shape_ops.place. */

@@ -90,15 +90,18 @@ static struct imp__edge_item round_item(const struct imp__boundary *b,
     return item;
 }
 
-/* What has edges that are in no list: two of a body at most. */
+/* What has edges that are in no list: two of a body at most, and arcs. */
 static enum imp_status items_find(struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
-    const size_t most =
-        2 * b->edges->n_bodies + IMP_SKY_CIRCLES * (size_t)scene->n_environments;
+    const size_t most = 2 * b->edges->n_bodies + b->edges->n_arcs +
+                        IMP_SKY_CIRCLES * (size_t)scene->n_environments;
     b->item = imp__alloc(scene->ctx, most + 1, sizeof *b->item);
     if (!b->item) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
     circles_find(b);
+    for (size_t k = 0; k < b->edges->n_arcs; k++)
+        b->item[b->n_items++] = (struct imp__edge_item){
+            .kind = IMP_ITEM_ARC, .shape = -1, .arc = &b->edges->arc[k]};
     for (size_t k = 0; k < b->edges->n_bodies; k++) {
         const struct imp__body *body = &b->edges->body[k];
         if (imp__moves_curved(scene, body->shape, body->place))
@@ -126,6 +129,8 @@ static double item_length(const struct imp__boundary *b,
         return kind == IMP_BOUNDARY_FILM
                    ? IMP_PI * b->size * sqrt(1 - imp__sqr(item->circle.cosine))
                    : 0;
+    if (item->kind == IMP_ITEM_ARC) /* it is no silhouette */
+        return kind == IMP_BOUNDARY_LIGHT ? 0 : imp__arc_length(item->arc);
     const struct imp_shape *s = b->tracer->scene->shapes[item->shape];
     struct imp_round round;
     struct imp__tube tube;
@@ -308,7 +313,7 @@ static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
     const enum imp__edge_item_kind item = d->item ? d->item->kind : IMP_ITEM_ROUND;
     switch (kind) {
     case IMP_BOUNDARY_FILM:
-        if (item == IMP_ITEM_ROUND) {
+        if (item == IMP_ITEM_ROUND || item == IMP_ITEM_ARC) {
             if (d->b->tracer->sensor->shape) imp__draw_meter(d);
             else imp__draw_film(d);
         }
@@ -317,7 +322,7 @@ static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
         break;
     case IMP_BOUNDARY_LIGHT: imp__draw_light(d); break;
     case IMP_BOUNDARY_SCATTER:
-        if (item == IMP_ITEM_ROUND) imp__draw_scatter(d);
+        if (item == IMP_ITEM_ROUND || item == IMP_ITEM_ARC) imp__draw_scatter(d);
         if (item == IMP_ITEM_SHADING) imp__draw_shading_scatter(d);
         if (item == IMP_ITEM_HORIZON) imp__draw_horizon(d);
         break;

@@ -18,6 +18,10 @@
  *              at every edge that it sees; w is a direction from the edge to it:
  *                  dI = int dl dw sin(phi) f W(x) [L(-m) - L(+m)] m.(V - x')
  *
+ * Where bodies pass through each other, the seam is such an edge to the film and to scattered light, with
+ * the velocity of the line in which two planes meet (move/edges_seams.h); the seam of a light is one
+ * to what it lights, too (boundary_seam.c). Spheres have circles for seams.
+ *
  * A sphere has a silhouette from everywhere: the circle on which a line touches it is an edge to the
  * film and to lights, with m its outward normal; of all lines that touch it, by place p, dA, and
  * turn about the normal, psi, dl dw sin(phi) is  dA dpsi/r. Silhouettes of a cylinder are two straight
@@ -58,6 +62,7 @@ enum imp__boundary_kind { IMP_BOUNDARY_FILM, IMP_BOUNDARY_LIGHT, IMP_BOUNDARY_SC
 /* What has edges that are in no list. */
 enum imp__edge_item_kind {
     IMP_ITEM_ROUND, /* silhouettes of spheres and cylinders, rims of disks and cylinders */
+    IMP_ITEM_ARC,   /* seams of spheres */
     IMP_ITEM_SHADING, /* of a mesh with vertex normals */
     IMP_ITEM_HORIZON,
     IMP_ITEM_SKY /* where the camera sees a sky jump; it has no shape */
@@ -67,6 +72,7 @@ struct imp__edge_item {
     int shape;
     int64_t place;                /* the instance that the shape is in; 0: none */
     struct imp_sky_circle circle; /* IMP_ITEM_SKY */
+    const struct imp__arc *arc;   /* IMP_ITEM_ARC */
     /* IMP_ITEM_ROUND: rims of a cylinder that a disk closes, whose edge they are; of such a disk the
      * direction out of the cylinder, at its end; 0: it closes none. */
     bool closed[2];

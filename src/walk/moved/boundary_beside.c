@@ -43,6 +43,19 @@ static bool is_inside(const imp_v3 p[3], imp_v3 n, imp_v3 q)
     return same == 3 || same == -3;
 }
 
+/* From the edge's point into the face: to its middle, or, where a seam divides it, to half the way to the
+ * corner that is farthest from the seam. */
+static imp_v3 inwards(const struct imp__edge_draw *d, const struct imp__edge_face *f,
+                      const imp_v3 p[3])
+{
+    imp_v3 r = (p[0] + p[1] + p[2]) * (1.0 / 3) - d->p;
+    if (!d->edge->seam) return r;
+    for (int k = 0; k < 3; k++)
+        if (k == 0 || imp__dot(p[k] - d->p, f->in) > 2 * imp__dot(r, f->in))
+            r = (p[k] - d->p) * 0.5;
+    return r;
+}
+
 imp_v3 imp__edge_beside(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m, double apart)
 {
     const imp_v3 past = d->p + m * apart;
@@ -53,7 +66,7 @@ imp_v3 imp__edge_beside(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m, doub
     const imp_v3 *p = facet.p;
     if (is_inside(p, f->n, past - w * (apart * imp__dot(m, f->n) / imp__dot(w, f->n))))
         return past;
-    const imp_v3 middle = (p[0] + p[1] + p[2]) * (1.0 / 3) - d->p;
+    const imp_v3 middle = inwards(d, f, p);
     const double across = imp__dot(middle, m);
     return d->p + middle * (across > 2 * apart ? apart / across : 0.5);
 }
@@ -107,7 +120,7 @@ bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, bool parallel, imp_
     const struct imp__corners facet =
         imp__corners(d->b->tracer->scene, f->shape, f->prim, f->place);
     const imp_v3 *p = facet.p;
-    const imp_v3 middle = (p[0] + p[1] + p[2]) * (1.0 / 3) - d->p;
+    const imp_v3 middle = inwards(d, f, p);
     const double across = imp__dot(middle, f->in), next = NEXT * apart;
     double b[2];
     const imp_v3 on = middle * (across > 2 * next ? next / across : 0.5);

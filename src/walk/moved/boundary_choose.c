@@ -106,9 +106,18 @@ static bool ball_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel
     return true;
 }
 
+static bool arc_set(struct imp__edge_draw *d)
+{
+    imp__arc_point(d->item->arc, d->u, &d->p, &d->along);
+    d->rim = true;
+    d->inv_pdf = imp__arc_length(d->item->arc) / d->chance;
+    return true;
+}
+
 bool imp__edge_any(struct imp__edge_draw *d, imp_v3 from, bool parallel)
 {
     struct imp__edge_point p;
+    if (d->item && d->item->arc) return arc_set(d);
     if (d->item) return ball_silhouette(d, from, parallel);
     imp__edge_choice_draw(d->choice, d->u, &p);
     return point_set(d, &p);
@@ -151,6 +160,7 @@ bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w)
         imp__edge_choice_draw(d->choice, d->u, &p);
         return point_set(d, &p);
     }
+    if (d->item->arc) return arc_set(d);
     const double at[2] = {d->u, u[0]};
     if (is_tube(d, &tube)) return tube_touched(d, &tube, u, w);
     if (!is_ball(d, &round)) return rim_set(d, 0);
@@ -164,12 +174,35 @@ bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w)
     return true;
 }
 
-struct imp__glued imp__edge_carried(const struct imp__edge_draw *d)
+/* Face k of the edge carries its point. */
+static struct imp__glued carried_by(const struct imp__edge_draw *d, int k)
 {
-    const struct imp_scene *scene = d->b->tracer->scene;
-    return d->edge
-               ? imp__edge_glued(d->b->edges, scene, d->edge, d->p)
-               : imp__glued_near(scene, d->item->shape, 0, d->item->place, d->p, d->out);
+    return imp__edge_glued(d->b->edges, d->b->tracer->scene, d->edge, k, d->p);
+}
+
+int imp__edge_ends(const struct imp__edge_draw *d, imp_v3 m, struct imp__flux_end *end)
+{
+    imp_v3 bar[2];
+    if (d->item && d->item->arc) {
+        struct imp__glued x[2];
+        imp__arc_bar(d->b->tracer->scene, d->item->arc, d->p, d->along, m, x, bar);
+        for (int k = 0; k < 2; k++) end[k] = imp__flux_glued(&x[k], bar[k]);
+        return 2;
+    }
+    if (!d->edge) {
+        const struct imp__glued at = imp__glued_near(d->b->tracer->scene, d->item->shape,
+                                                     0, d->item->place, d->p, d->out);
+        *end = imp__flux_glued(&at, m);
+        return 1;
+    }
+    const struct imp__glued first = carried_by(d, 0);
+    *end = imp__flux_glued(&first, m);
+    if (!d->edge->seam) return 1;
+    const struct imp__glued second = carried_by(d, 2);
+    imp__seam_bar(d->b->edges, d->edge, m, bar);
+    end[0].bar.v = bar[0];
+    end[1] = imp__flux_glued(&second, bar[1]);
+    return 2;
 }
 
 imp_v3 imp__edge_clear(const struct imp__edge_draw *d)
@@ -181,7 +214,8 @@ imp_v3 imp__edge_clear(const struct imp__edge_draw *d)
 bool imp__edge_merges(const struct imp__edge_draw *d, imp_v3 w, double beside)
 {
     struct imp__tube c;
-    if (!d->rim || !is_tube(d, &c) || imp__dot(w, d->out) >= 0) return false;
+    if (!d->rim || d->item->arc || !is_tube(d, &c) || imp__dot(w, d->out) >= 0)
+        return false;
     const imp_v3 r = d->p - c.base, n = imp__normalize(r - c.axis * imp__dot(c.axis, r));
     const double cosine = imp__dot(n, imp__normalize(w - c.axis * imp__dot(c.axis, w)));
     return cosine < 0 && 0.5 * c.radius * cosine * cosine < beside;

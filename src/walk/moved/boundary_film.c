@@ -66,15 +66,14 @@ void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to
     const imp_spec jump =
         look_beside(d, to, w, -m, apart) - look_beside(d, to, w, m, apart);
     struct imp__flux *f =
-        imp__jump_add(d, to, jump * (to->weight * sine * d->inv_pdf), 2);
+        imp__jump_add(d, to, jump * (to->weight * sine * d->inv_pdf), 1 + IMP_EDGE_ENDS);
     if (!f) return;
-    f->n_ends = 2;
-    const struct imp__glued at = sky ? (struct imp__glued){.p = d->p}
-                                     : imp__edge_carried(d),
-                            eye = {.p = d->eye};
-    f->end[0] = sky ? imp__flux_camera(d, &eye, m) : imp__flux_glued(&at, m);
-    f->end[1] = imp__flux_camera(d, &at, -m);
-    if (sky) f->end[0].eye = d->p; /* another point of the ray through the eye */
+    const struct imp__glued at = {.p = d->p}, eye = {.p = d->eye};
+    if (sky) {
+        f->end[f->n_ends] = imp__flux_camera(d, &eye, m);
+        f->end[f->n_ends++].eye = d->p; /* another point of the ray through the eye */
+    } else f->n_ends = imp__edge_ends(d, m, f->end);
+    f->end[f->n_ends++] = imp__flux_camera(d, &at, -m);
 }
 
 bool imp__edge_is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r)

@@ -103,10 +103,8 @@ static void ends_set(const struct imp__edge_draw *d, const struct line *l, doubl
 {
     const bool parallel = l->from->parallel;
     const double far = parallel ? 1 : l->t_y / (t_x + l->t_y); /* of V_line that is x' */
-    const struct imp__glued edge = imp__edge_carried(d);
     light->slide = l->m * -far;
-    light->end[0] = imp__flux_glued(&edge, l->m);
-    light->n_ends = 1;
+    light->n_ends = imp__edge_ends(d, l->m, light->end);
     if (!l->from->sky) /* which stays */
         light->end[light->n_ends++] =
             source_end(d, l->from, l->m * (parallel ? t_x : far - 1));

@@ -47,10 +47,9 @@ static void emission_add(struct imp__edge_draw *d, const struct imp_sensor_sampl
     const struct imp_vertex *v = walk->first;
     const int max = d->b->tracer->integrator->max_depth;
     if (walk->dropped || !v || v->d.scatterer == IMP_AT_SKY || max == 0) return;
-    struct imp__flux *f = imp__jump_add(d, to, v->e * times, 3);
+    struct imp__flux *f = imp__jump_add(d, to, v->e * times, 2 + IMP_EDGE_ENDS);
     if (!f) return;
-    const struct imp__glued edge = imp__edge_carried(d);
-    f->end[f->n_ends++] = imp__flux_glued(&edge, m);
+    f->n_ends = imp__edge_ends(d, m, f->end);
     const struct imp__glued y =
         imp__glued_at(d->b->tracer->scene, v->d.shape, &v->d.located, 0, v->ng);
     const double t_x = imp__length(d->p - to->p),
@@ -91,15 +90,14 @@ void imp__draw_meter(struct imp__edge_draw *d)
     look_beside(d, &at, o, m, apart, &hi);
     const bool *drawn = points ? NULL : d->b->drawn_to_meter;
     const imp_spec jump = imp__arrives(t, &lo, 0, drawn) - imp__arrives(t, &hi, 0, drawn);
-    struct imp__flux *f = imp__jump_add(d, &to, jump * times, 2);
+    struct imp__flux *f = imp__jump_add(d, &to, jump * times, 1 + IMP_EDGE_ENDS);
     if (f) {
-        const struct imp__glued edge = imp__edge_carried(d);
-        f->end[f->n_ends++] = imp__flux_glued(&edge, m);
+        f->n_ends = imp__edge_ends(d, m, f->end);
         f->end[f->n_ends++] = imp__meter_end(d, &to, -m);
     }
-    if (!points) return;
-    emission_add(d, &to, &lo, m, times);
-    emission_add(d, &to, &hi, m, -times);
+    /* Silhouettes before lights are found from there, unless it has no area; seams of lights are not. */
+    if (points || imp__seam_side(d, &lo) >= 0) emission_add(d, &to, &lo, m, times);
+    if (points || imp__seam_side(d, &hi) >= 0) emission_add(d, &to, &hi, m, -times);
 }
 
 bool imp__meter_meet(const struct imp__edge_draw *d, imp_v3 o, imp_v3 to,

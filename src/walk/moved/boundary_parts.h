@@ -67,9 +67,11 @@ bool imp__edge_item_choose(struct imp__edge_draw *d);
 bool imp__edge_any(struct imp__edge_draw *d, imp_v3 from, bool parallel);
 bool imp__edge_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel);
 bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w);
-/* The edge's point as its surface carries it; and a place beside it that no rounding hides behind
- * its own sphere. */
-struct imp__glued imp__edge_carried(const struct imp__edge_draw *d);
+/* The velocity of the edge's point, as its surface carries it, or its two surfaces, counts m: the ends
+ * of a flux, one or two. */
+#define IMP_EDGE_ENDS 2
+int imp__edge_ends(const struct imp__edge_draw *d, imp_v3 m, struct imp__flux_end *end);
+/* A place beside the edge's point that no rounding hides behind its own sphere. */
 imp_v3 imp__edge_clear(const struct imp__edge_draw *d);
 /* Where the picture of a cylinder's opening, into which a look along w goes, nears the outline, the wall
  * is thinner than the look is apart from the rim, `beside` it: it sees what is beside the outline, which
@@ -137,11 +139,19 @@ struct imp__edge_light {
     int behind;   /* segments of the path behind x */
     bool horizon; /* light is per area of x, and not times the cosine there */
     imp_v3 slide;
-    struct imp__flux_end end[2];
+    struct imp__flux_end end[1 + IMP_EDGE_ENDS];
     int n_ends;
 };
 void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
                      const struct imp_surface *at, const struct imp__edge_light *light);
+
+/* ---- Seams of lights: boundary_seam.c ---- */
+/* Which surface of a seam, 0 or 1, is a light that a walk meets first, at the seam. -1: none. */
+int imp__seam_side(const struct imp__edge_draw *d, const struct imp_walk *walk);
+/* What such a walk brings, on the side that m points away from, to what lies at a hit along w. */
+void imp__seam_emission(struct imp__edge_draw *d, const struct imp_hit *hit,
+                        const struct imp_surface *at, const struct imp_walk *walk,
+                        imp_v3 m, imp_v3 w, double times);
 
 /* ---- Meters: boundary_meter.c ---- */
 /* Has it a place for each pixel, and no area? */

@@ -89,15 +89,16 @@ void imp__draw_scatter(struct imp__edge_draw *d)
 
     int depths;
     const double times = (d->touches ? 1 : sine * 4 * IMP_PI) * d->inv_pdf;
+    imp__seam_emission(d, &hit, &at, &lo, m, w, times);
+    imp__seam_emission(d, &hit, &at, &hi, m, w, -times);
     imp_spec *jump = imp__jumps(d, &lo, &hi, times, b->drawn, &depths);
     if (!jump) return;
-    struct imp__edge_light light = {.w = w, .n_ends = 1, .slide = -m};
+    struct imp__edge_light light = {.w = w, .slide = -m};
     light.light = jump[0];
     if (max >= 0) {
         light.by_depth = jump;
         light.n_depths = depths;
     }
-    const struct imp__glued edge = imp__edge_carried(d);
-    light.end[0] = imp__flux_glued(&edge, m);
+    light.n_ends = imp__edge_ends(d, m, light.end);
     imp__edge_reach(d, &hit, &at, &light);
 }

@@ -13,6 +13,7 @@ render --set white.pose=1,0,0,0,0,0
 render --set tall_block.pose=1,2
 importon gradient -q -D res=8 --spp 4 -p tall_block.pose "$ROOT/scenes/cornell.xml" | grep -c 'tall_block.pose\['
 importon gradient -q -D res=8 --spp 4 -p tall_block.pose --target x.pfm "$ROOT/scenes/cornell.xml" | grep -c 'tall_block.pose\['
-importon fit -q -D res=8 --spp 4 -p tall_block.pose --target x.pfm --set tall_block.pose=0,-9,0,0,0,0 "$ROOT/scenes/cornell.xml"
+importon gradient -q -D res=8 --spp 4 -p tall_block.pose --set tall_block.pose=0,-9,0,0,0,0 "$ROOT/scenes/cornell.xml" | grep -c 'tall_block.pose\['
+importon fit -q -D res=8 --spp 4 -p tall_block.pose --target x.pfm --set light_panel.pose=0,-300,0,0,0,0 "$ROOT/scenes/cornell.xml"
 importon fit -q -D res=8 --spp 4 -p block.pose --target x.pfm --levels 2 --optimizer lbfgs "$ROOT/scenes/poses.xml"
 importon check -q -D res=8 --spp 4 -p tall_block.pose --only frozen "$ROOT/scenes/cornell.xml" | grep -c ok
