@@ -7,7 +7,7 @@
 #include "light_tree.h"
 #include "math/wide_real.h"
 
-/* Nodes that are remembered: all of a tree of 64 lights, the last ones of a larger tree. */
+/* Importances of nodes that are remembered: the last ones of each of so many. */
 enum { IMP_LIGHT_NODES = 128 };
 
 struct imp_light_lanes {
@@ -16,10 +16,16 @@ struct imp_light_lanes {
     unsigned near[IMP_LIGHT_NODES];
     imp_wide importance[IMP_LIGHT_NODES];
 };
-void imp__light_lanes_begin(const imp_wide3 *p, const imp_wide3 *n,
-                            struct imp_light_lanes *out);
-/* imp__light_tree_choose for one of the places. */
-int imp__light_lanes_choose(const struct imp_light_tree *t, struct imp_light_lanes *lanes,
-                            int lane, double *u, int *prim, double *chance);
+
+struct imp_lights_chosen {
+    int light[IMP_WIDE_LANES];
+    int prim[IMP_WIDE_LANES]; /* a triangle of it; -1: all of it */
+    imp_wide chance;
+};
+/* imp__light_tree_choose for places p that light reaches from before n alone, in the lanes with bits. A
+ * bit for each lane that has a light. */
+unsigned imp__light_lanes_choose(const struct imp_light_tree *t, const imp_wide3 *p,
+                                 const imp_wide3 *n, unsigned bits, imp_wide *u,
+                                 struct imp_lights_chosen *out);
 
 #endif

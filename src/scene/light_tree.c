@@ -192,19 +192,67 @@ int imp__light_tree_choose(const struct imp_light_tree *t,
     return choose_at(t, &at, u, prim, chance);
 }
 
-void imp__light_lanes_begin(const imp_wide3 *p, const imp_wide3 *n,
-                            struct imp_light_lanes *out)
+/* choose_at of few lights, without any that has no end, for all lanes at once. */
+static unsigned few_choose(const struct imp_light_tree *t,
+                           const struct imp_light_lanes *lanes, imp_wide *u,
+                           struct imp_lights_chosen *out)
 {
-    out->p = *p;
-    out->n = *n;
-    memset(out->node, -1, sizeof out->node);
+    const imp_wide p[3] = {lanes->p.x, lanes->p.y, lanes->p.z},
+                   n[3] = {lanes->n.x, lanes->n.y, lanes->n.z};
+    const imp_wide zero = imp__wide(0);
+    imp_wide weight[FEW], sum = zero, below = zero, before = zero, own = zero;
+    imp_wide_truth decided = u[0] < zero, item = decided;
+    int n_leaves = 0;
+    const struct imp_light_node *leaf[FEW];
+    for (int32_t i = 0; i < t->n_nodes; i++) {
+        imp_wide_truth near;
+        if (t->node[i].second >= 0 || !(t->node[i].strength > 0)) continue;
+        leaf[n_leaves] = &t->node[i];
+        weight[n_leaves] =
+            IMP_WIDE_OF(imp__light_importance)(&t->node[i], p, n, true, &near);
+        sum += weight[n_leaves++];
+    }
+    for (int k = 0; k < n_leaves; k++) {
+        const imp_wide_truth here = ~decided & (weight[k] > zero);
+        before = imp__wide_choose(here, below, before);
+        own = imp__wide_choose(here, weight[k], own);
+        item = (here & (-1 - (int64_t)leaf[k]->second)) | (~here & item);
+        below += weight[k];
+        decided |= here & (*u < below / sum);
+    }
+    out->chance = own / sum;
+    *u = imp__wide_larger(imp__wide_lesser((*u - before / sum) / out->chance,
+                                           imp__wide(0x1.fffffffffffffp-1)),
+                          zero);
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
+        const struct imp_light_item *x = &t->item[item[k]];
+        out->light[k] = x->emitter;
+        out->prim[k] = x->prim;
+    }
+    return imp__wide_bits(sum > zero);
 }
 
-int imp__light_lanes_choose(const struct imp_light_tree *t, struct imp_light_lanes *lanes,
-                            int lane, double *u, int *prim, double *chance)
+unsigned imp__light_lanes_choose(const struct imp_light_tree *t, const imp_wide3 *p,
+                                 const imp_wide3 *n, unsigned bits, imp_wide *u,
+                                 struct imp_lights_chosen *out)
 {
-    const struct here at = {.lanes = lanes, .lane = lane};
-    return choose_at(t, &at, u, prim, chance);
+    struct imp_light_lanes lanes;
+    unsigned lit = 0;
+    lanes.p = *p;
+    lanes.n = *n;
+    if (t->n_items > 0 && t->n_items <= FEW && t->n_far == 0)
+        return bits & few_choose(t, &lanes, u, out);
+    memset(lanes.node, -1, sizeof lanes.node);
+    for (; bits; bits &= bits - 1) {
+        const int k = __builtin_ctz(bits);
+        const struct here at = {.lanes = &lanes, .lane = k};
+        double by = (*u)[k], chance = 0;
+        out->light[k] = choose_at(t, &at, &by, &out->prim[k], &chance);
+        out->chance[k] = chance;
+        (*u)[k] = by;
+        lit |= (unsigned)(out->light[k] >= 0) << k;
+    }
+    return lit;
 }
 
 static double item_chance(const struct imp_light_tree *t,

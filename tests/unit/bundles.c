@@ -291,8 +291,19 @@ static void materials(void)
                                 CUBE("1.6", ".9", DIFFUSE(".4,.4,.4")));
 }
 
+#define LAMP_ROW(z)                                                                      \
+    LAMP("-1.8", z, ".05")                                                               \
+    LAMP("-1.3", z, ".05")                                                               \
+    LAMP("-.9", z, ".05") LAMP("-.4", z, ".05") LAMP("0", z, ".05") LAMP(".4", z, ".05") \
+        LAMP(".9", z, ".05") LAMP("1.3", z, ".05") LAMP("1.8", z, ".05")
+
 static void lights(void)
 {
+    /* More than are looked at one by one (scene/light_tree.c). */
+    compare("72 lamps, by a tree", IMP_RGB, 5,
+            PATH(DEPTH("4") "<string name='light_choice' value='tree'/>"), CAMERA,
+            ROOM LAMP_ROW("-1.8") LAMP_ROW("-1.3") LAMP_ROW("-.8") LAMP_ROW("-.3")
+                LAMP_ROW(".3") LAMP_ROW(".8") LAMP_ROW("1.3") LAMP_ROW("1.8"));
     compare("hidden lights", IMP_RGB, 6,
             PATH(DEPTH("4") "<boolean name='hide_emitters' value='true'/>"), CAMERA,
             ROOM SKY BALL("0", "0", AREA("1,2,3")) LAMP("0", "1", ".5")

@@ -122,17 +122,11 @@ static const struct imp_emitter_lanes *lanes_of(const struct imp_emitter *e)
     return imp__emitter_even(e, NULL) ? imp__emitter_lanes(e) : NULL;
 }
 
-/* Lights that the lanes have chosen, with out->pmf. */
-struct choice {
-    int light[IMP_WIDE_LANES];
-    int prim[IMP_WIDE_LANES]; /* a triangle of it; -1: all of it */
-};
-
 /* Points of the lights chosen in the lanes with bits: of one light together. */
 static void draw_chosen(const struct imp_scene *scene,
                         const struct imp_carried *const *carried, const imp_wide3 *ref,
-                        const imp_wide u[2], const struct choice *c, unsigned bits,
-                        struct imp_lanes_light *out)
+                        const imp_wide u[2], const struct imp_lights_chosen *c,
+                        unsigned bits, struct imp_lanes_light *out)
 {
     while (bits) {
         const int first = __builtin_ctz(bits), one = c->light[first];
@@ -164,21 +158,12 @@ void imp__lanes_tree_draw(const struct imp_scene *scene,
                           bool one, unsigned bits, struct imp_lanes_light *out)
 {
     imp_wide u[2] = {u_drawn[0], u_drawn[1]};
-    struct imp_light_lanes places;
-    struct choice c;
-    unsigned lit = 0;
+    struct imp_lights_chosen c;
     out->at.drawn = out->far = out->delta = (imp_wide_truth){0};
-    imp__light_lanes_begin(p, n, &places);
-    for (; bits; bits &= bits - 1) {
-        const int k = __builtin_ctz(bits);
-        double by = which[k], pmf = 0;
-        c.light[k] =
-            imp__light_lanes_choose(scene->light_tree, &places, k, &by, &c.prim[k], &pmf);
-        out->pmf[k] = pmf;
-        if (c.light[k] < 0) continue;
-        if (one) u[0][k] = by;
-        lit |= 1u << k;
-    }
+    const unsigned lit =
+        imp__light_lanes_choose(scene->light_tree, p, n, bits, &which, &c);
+    if (one) u[0] = which;
+    out->pmf = c.chance;
     draw_chosen(scene, carried, p, u, &c, lit, out);
 }
 
@@ -189,7 +174,7 @@ void imp__lanes_light_draw(const struct imp_scene *scene,
 {
     imp_wide u[2] = {u_drawn[0], u_drawn[1]};
     const imp_wide_truth all = ~(imp_wide_truth){0};
-    struct choice c;
+    struct imp_lights_chosen c;
     unsigned lit = 0;
     out->at.drawn = out->far = out->delta = (imp_wide_truth){0};
     if (scene->n_emitters == 1) {
