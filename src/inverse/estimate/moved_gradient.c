@@ -83,7 +83,7 @@ void imp__moved_end(struct imp__moved_gradient *m)
     *m = (struct imp__moved_gradient){0};
 }
 
-/* Of many numbers a replicate touches few: the others are passed over eight at a time. */
+/* A replicate touches few of many numbers: the others are passed over eight at a time. */
 static inline bool is_empty(const double *v, size_t k, size_t n)
 {
     uint64_t bits = 0, one;
