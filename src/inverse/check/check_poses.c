@@ -13,6 +13,7 @@
 #include "walk/core/vertex.h"
 #include "walk/moved/moved_chain.h"
 #include "walk/moved/moved_sky.h"
+#include "walk/path/first_segment.h"
 #include <math.h>
 #include <string.h>
 
@@ -217,7 +218,8 @@ static imp_spec kernel_ratio(const struct moved *m, const struct imp_vertex *v,
                              const imp_v3 w[2], const struct imp__glued *then, int lobe)
 {
     imp_spec in[IMP_INPUTS_MAX];
-    const bool meter = v->prev && v->prev->d.scatterer == IMP_AT_SENSOR;
+    const bool meter =
+        m->c->tracer.sensor->shape && v->prev && v->prev->d.scatterer == IMP_AT_SENSOR;
     if (meter && m->c->tracer.sensor->receiver)
         return imp__spec(received(m, turned_back(m, then->carrier, w[0])) /
                          received(m, w[1]));
@@ -287,71 +289,112 @@ static bool has_spots(const struct imp_scene *scene, const struct imp_walk *walk
     return false;
 }
 
-/* The walk's value, weighted by channels, where the pose has moved. */
+/* A vertex as it was recorded, and where it is now. */
+struct stop {
+    const struct imp_vertex *v; /* NULL: none */
+    struct imp__glued old;
+    struct at here;
+    imp_v3 x, from[2]; /* its place; directions of arrival, now and then */
+    imp_spec P;        /* of light that leaves it, where its kernel has not changed */
+};
+
+static imp_spec stop_ratio(const struct moved *m, const struct stop *s, const imp_v3 w[2],
+                           int lobe)
+{
+    return kernel_ratio(m, s->v, &s->here, s->x, s->from, w, &s->old, lobe);
+}
+
+/* What its light sample brings, of light that reaches it with P. */
+static double light_frozen(const struct moved *m, const struct stop *s, imp_spec P)
+{
+    imp_v3 to[2];
+    if (s->v->d.connection != IMP_CONNECTED) return 0;
+    const double ratio = light_ratio(m, s->v, &s->old, s->x, to);
+    return ratio * imp__sum_used(P * s->v->b * stop_ratio(m, s, to, IMP_SMOOTH),
+                                 m->c->problem->scene->lanes);
+}
+
+/* Emission that is met from there, glued to the light. */
+static double met_frozen(const struct moved *m, const struct stop *s,
+                         const struct stop *y)
+{
+    const imp_v3 to[2] = {imp__normalize(y->here.p - s->x),
+                          imp__normalize(y->old.p - s->old.p)};
+    return imp__sum_used(s->P * y->v->e * stop_ratio(m, s, to, s->v->d.lobe),
+                         m->c->problem->scene->lanes) *
+           receives(s->x, y->here.p, y->here.n) / receives(s->old.p, y->old.p, y->old.n);
+}
+
+/* The next stop of a walk, along a fixed direction behind `before` or, where it is NULL, along the
+ * camera's ray. */
+static struct stop stop_at(const struct moved *m, const struct imp_walk *walk,
+                           const struct imp_vertex *v, const struct stop *before)
+{
+    const bool turns = m->shape == IMP_MOVE_CAMERA && !before;
+    struct stop s = {.v = v, .old = vertex_glued(m->c->problem->scene, v, walk->time)};
+    imp_v3 o = before ? before->x : walk->ray.o;
+    s.from[1] = imp__normalize(s.old.p - (before ? before->old.p : o));
+    s.from[0] = turns ? turned(m, s.from[1]) : s.from[1];
+    if (turns) o = m->to + turned(m, o - m->from);
+    s.here = placed(m, &s.old);
+    const bool meter = !before && m->c->tracer.sensor->shape;
+    s.x = meter ? s.here.p : met_at(o, s.from[0], &s.here);
+    s.here.shade = s.old.smooth ? shaded_at(m, &s.old, s.x) : s.here.n;
+    return s;
+}
+
+/* What leaves a stop for the next vertex, in place of what reaches it; s->P. */
+static imp_spec step_frozen(const struct moved *m, struct stop *s, imp_spec P)
+{
+    const struct imp_scene *scene = m->c->problem->scene;
+    const struct imp_vertex *next = s->v->next;
+    imp_v3 w[2] = {s->from[0], s->from[1]};
+    s->P = P * s->v->w;
+    if (!imp__goes_straight(s->v))
+        w[0] = w[1] = imp__normalize(next->d.scatterer == IMP_AT_SKY
+                                         ? imp__decided_v3(next->d.p)
+                                         : vertex_glued(scene, next, 0).p - s->old.p);
+    return s->P * stop_ratio(m, s, w, s->v->d.lobe);
+}
+
+/* The walk's value, weighted by channels, where the pose has moved. What the camera sees through
+ * nothing does not change, and is left out. */
 static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spec P)
 {
     const struct imp_scene *scene = m->c->problem->scene;
+    const bool through = imp__segment_first(&m->c->tracer)->through;
     const struct imp_vertex *v = walk->first;
+    struct stop here = {.v = NULL}, from = {.v = NULL}; /* from which light is sampled */
+    bool seen = true;                                   /* by the camera's ray */
     double value = 0;
-    if (!v) return 0;
-    if (v->d.scatterer == IMP_AT_SKY) {
-        const imp_v3 d = walk->ray.d;
-        return imp__sum_used(
-            P * imp__skies_from(scene, m->shape == IMP_MOVE_CAMERA ? turned(m, d) : d,
-                                v->carried),
-            scene->lanes);
-    }
-    const bool meter = v->d.scatterer == IMP_AT_SENSOR;
-    if (meter) {
+    if (v && v->d.scatterer == IMP_AT_SENSOR) {
         P *= v->w;
         v = v->next;
-        if (!v) return 0;
     }
-    struct imp__glued old = vertex_glued(scene, v, walk->time);
-    imp_v3 o = walk->ray.o, w[2];
-    w[0] = w[1] = imp__normalize(old.p - o);
-    if (m->shape == IMP_MOVE_CAMERA) {
-        o = m->to + turned(m, o - m->from);
-        w[0] = turned(m, w[0]);
-    }
-    struct at here = placed(m, &old);
-    imp_v3 x = meter ? here.p : met_at(o, w[0], &here);
-    here.shade = old.smooth ? shaded_at(m, &old, x) : here.n;
     for (; v; v = v->next) {
-        const imp_v3 from[2] = {w[0], w[1]};
-        if (v->d.connection == IMP_CONNECTED) {
-            imp_v3 to[2];
-            const double ratio = light_ratio(m, v, &old, x, to);
-            value += ratio * imp__sum_used(P * v->b *
-                                               kernel_ratio(m, v, &here, x, from, to,
-                                                            &old, IMP_SMOOTH),
-                                           scene->lanes);
+        if (v->d.scatterer == IMP_AT_SKY) {
+            const imp_v3 d = walk->ray.d;
+            const imp_spec sky =
+                !seen ? here.v->beyond
+                      : imp__skies_from(scene,
+                                        m->shape == IMP_MOVE_CAMERA ? turned(m, d) : d,
+                                        v->carried);
+            return value + imp__sum_used(P * sky, scene->lanes);
         }
-        P *= v->w;
-        const struct imp_vertex *next = v->next;
-        if (!v->d.goes_on || !next) break;
-        const bool sky = next->d.scatterer == IMP_AT_SKY;
-        const struct imp__glued ahead = sky ? old : vertex_glued(scene, next, walk->time);
-        w[0] = w[1] = imp__normalize(sky ? imp__decided_v3(next->d.p) : ahead.p - old.p);
-        const imp_spec step = kernel_ratio(m, v, &here, x, from, w, &old, v->d.lobe);
-        if (sky) {
-            value += imp__sum_used(P * step * v->beyond, scene->lanes);
-            break;
+        const bool passed = here.v && imp__goes_straight(here.v);
+        here = stop_at(m, walk, v, seen ? NULL : &here);
+        if (v->d.met.emitter >= 0) {
+            if (from.v) value += met_frozen(m, &from, &here);
+            else if (passed) value += imp__sum_used(P * v->e, scene->lanes);
         }
-        struct at there = placed(m, &ahead);
-        if (next->d.met.emitter >= 0) {
-            const imp_v3 to[2] = {imp__normalize(there.p - x), w[1]};
-            value +=
-                imp__sum_used(P * next->e *
-                                  kernel_ratio(m, v, &here, x, from, to, &old, v->d.lobe),
-                              scene->lanes) *
-                receives(x, there.p, there.n) / receives(old.p, ahead.p, ahead.n);
-        }
-        x = met_at(x, w[0], &there);
-        there.shade = ahead.smooth ? shaded_at(m, &ahead, x) : there.n;
-        P *= step;
-        old = ahead;
-        here = there;
+        value += light_frozen(m, &here, P);
+        if (!v->d.goes_on || !v->next) break;
+        P = step_frozen(m, &here, P);
+        if (!imp__goes_straight(v)) {
+            from = here;
+            seen = false;
+        } else if (through) from.P *= v->w;
+        else from.v = NULL;
     }
     return value;
 }

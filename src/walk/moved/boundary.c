@@ -9,6 +9,7 @@
 #include "scene/camera_gain.h"
 #include "scene/pose.h"
 #include "walk/core/lane_mis.h"
+#include "walk/path/first_segment.h"
 
 /* A tenth of each measure is the length in space. */
 #define BY_LENGTH 0.1
@@ -235,6 +236,9 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
     const struct imp_scene *scene = tracer->scene;
     *out = (struct imp__boundary){.tracer = tracer, .moves = moves, .edges = edges};
     out->size = imp__length(scene->hi - scene->lo);
+    out->through = imp__segment_first(tracer)->through;
+    for (int k = 0; k < scene->n_all_shapes; k++)
+        out->passes |= imp__shape_bsdf(scene, scene->shapes[k])->straight != 0;
     enum imp_status st = imp__moved_allowed(tracer);
     if (tracer->sensor->shape) /* by which edges are chosen: the middle of a meter */
         out->camera = (tracer->sensor->shape->lo + tracer->sensor->shape->hi) * 0.5;

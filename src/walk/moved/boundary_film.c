@@ -79,15 +79,16 @@ void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to
 bool imp__edge_is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
-    if (!d->edge) return imp__occluded_at(scene, 0, &o, &r, 0, 1 - IMP_BESIDE);
+    struct imp__line line;
     struct imp_hit hit;
+    if (!d->edge) return !imp__edge_line(d, o, r, 1 - IMP_BESIDE, &line);
     double from = 0;
     while (imp__intersect(scene, &o, &r, from, 1 - IMP_BESIDE, &hit)) {
         bool own = false;
-        for (int k = 0; k < d->edge->n_faces; k++)
+        for (int k = 0; k < d->edge->n_faces && !own; k++)
             own |= imp__edge_face_hit(d, &d->b->edges->face[d->edge->first + (size_t)k],
                                       &hit);
-        if (!own) return true;
+        if (!own && imp_likely(!imp__hit_bsdf(scene, &hit)->straight)) return true;
         from = hit.t + 0.1 * IMP_BESIDE;
     }
     return false;

@@ -44,10 +44,10 @@ struct imp__flux_end imp__meter_end(const struct imp__edge_draw *d,
 static void emission_add(struct imp__edge_draw *d, const struct imp_sensor_sample *to,
                          const struct imp_walk *walk, imp_v3 m, double times)
 {
-    const struct imp_vertex *v = walk->first;
-    const int max = d->b->tracer->integrator->max_depth;
-    if (walk->dropped || !v || v->d.scatterer == IMP_AT_SKY || max == 0) return;
-    struct imp__flux *f = imp__jump_add(d, to, v->e * times, 2 + IMP_EDGE_ENDS);
+    imp_spec T;
+    const struct imp_vertex *v = imp__walk_met(d, walk, &T);
+    if (!v || d->b->tracer->integrator->max_depth == 0) return;
+    struct imp__flux *f = imp__jump_add(d, to, T * v->e * times, 2 + IMP_EDGE_ENDS);
     if (!f) return;
     f->n_ends = imp__edge_ends(d, m, f->end);
     const struct imp__glued y =
@@ -89,7 +89,8 @@ void imp__draw_meter(struct imp__edge_draw *d)
     look_beside(d, &at, o, -m, apart, &lo);
     look_beside(d, &at, o, m, apart, &hi);
     const bool *drawn = points ? NULL : d->b->drawn_to_meter;
-    const imp_spec jump = imp__arrives(t, &lo, 0, drawn) - imp__arrives(t, &hi, 0, drawn);
+    const imp_spec jump =
+        imp__arrives(d->b, &lo, 0, drawn) - imp__arrives(d->b, &hi, 0, drawn);
     struct imp__flux *f = imp__jump_add(d, &to, jump * times, 1 + IMP_EDGE_ENDS);
     if (f) {
         f->n_ends = imp__edge_ends(d, m, f->end);

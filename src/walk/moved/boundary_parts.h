@@ -6,6 +6,7 @@
 
 #include "boundary.h"
 #include "moved_chain.h"
+#include "scene/instances.h"
 
 struct imp__edge_draw {
     const struct imp__boundary *b;
@@ -47,6 +48,7 @@ enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
 #define IMP_EDGE_LOBE   (1u << 20) /* behind all of those: by which a lobe is chosen */
 #define IMP_EDGE_WAVE   (1u << 21) /* and from which wavelengths are drawn */
 #define IMP_EDGE_SENSOR (1u << 22) /* four, of a point of a meter or lens */
+#define IMP_EDGE_PASS   (1u << 23) /* whether light goes straight on through a mask */
 
 /* So far beside an edge, per distance to it, it is looked past; rays are traced in float, whose
  * rounding is a tenth of that. */
@@ -77,6 +79,33 @@ imp_v3 imp__edge_clear(const struct imp__edge_draw *d);
  * is thinner than the look is apart from the rim, `beside` it: it sees what is beside the outline, which
  * has draws of its own. */
 bool imp__edge_merges(const struct imp__edge_draw *d, imp_v3 w, double beside);
+/* ---- Straight lines: boundary_line.c ---- */
+/* The material of what was hit, which in an instance may be its own. */
+static inline const struct imp_bsdf *imp__hit_bsdf(const struct imp_scene *scene,
+                                                   const struct imp_hit *hit)
+{
+    return imp__shape_bsdf(
+        scene, scene->shapes[imp__placed_shape(scene, hit->shape, hit->place)]);
+}
+struct imp__line {
+    imp_spec T;   /* what it lets pass */
+    double times; /* one over the probability with which it was chosen */
+    int bounces;  /* surfaces that it passes, as max_depth counts them */
+};
+/* From o along r, up to the part `till` of it. False: nothing comes through. */
+bool imp__edge_line(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, double till,
+                    struct imp__line *line);
+/* From o + from w along the unit vector w to a surface that scatters light, through masks by chance:
+ * number `dims` of the draw's lines. hit->t is its distance. False: none. */
+bool imp__edge_follow(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
+                      unsigned dims, struct imp_hit *hit, struct imp_surface *at,
+                      struct imp__line *line);
+/* Does light go straight on through what the draw's edge belongs to? */
+bool imp__edge_passes(const struct imp__edge_draw *d);
+/* The vertex whose emission a light sample could have brought to where a recorded walk begins, and *T
+ * what passes on the way. NULL: there is none. */
+const struct imp_vertex *imp__walk_met(const struct imp__edge_draw *d,
+                                       const struct imp_walk *walk, imp_spec *T);
 /* Is the edge's point hidden from o, r away? Its own faces do not hide it, but a ray along one may meet
  * it anywhere. */
 bool imp__edge_is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r);
@@ -119,8 +148,8 @@ void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_
 /* What arrives along a recorded walk from a vertex x, without the emission of a light that it
  * meets first, which is glued to that, and of skies that are drawn [n_emitters] (NULL: none is).
  * Vertex i of it has number i + before of the whole path. */
-imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk, int before,
-                      const bool *drawn);
+imp_spec imp__arrives(const struct imp__boundary *b, const struct imp_walk *walk,
+                      int before, const bool *drawn);
 /* Vertices behind the edge for which light is known: what jumps by depth [*n], in the arena. NULL:
  * no memory, or nothing jumps. */
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,

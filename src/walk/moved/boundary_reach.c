@@ -10,6 +10,8 @@
 #include "walk/core/step.h"
 #include "walk/lights/light_step.h"
 
+extern const struct imp_bsdf_ops imp__mask;
+
 /* A vertex of the chain, on the way to the camera. */
 struct link {
     struct link *before; /* nearer to the edge; NULL: none */
@@ -92,40 +94,49 @@ static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_ligh
                               : imp__flux_camera(d, &last->x.x, shift);
 }
 
+/* Light for a path with so many vertices from the camera to where the light arrives. False: it would
+ * be too long. */
+static bool light_at(const struct imp_tracer *t, const struct imp__edge_light *light,
+                     int vertices, imp_spec *L)
+{
+    const int max = t->integrator->max_depth;
+    if (light->by_depth) {
+        if (vertices > light->n_depths) return false;
+        *L = light->by_depth[vertices - 1];
+        return true;
+    }
+    *L = light->light;
+    return max < 0 || vertices + light->behind <= max;
+}
+
+/* passed: vertices between the links where it went straight on. */
 static void connect(struct imp__edge_draw *d, const struct imp__edge_light *light,
-                    struct link *k, int depth, imp_spec brings)
+                    struct link *k, int depth, int passed, imp_spec T)
 {
     const struct imp_tracer *t = d->b->tracer;
     struct imp_sensor_sample to;
     struct imp_shadow shadow;
+    struct imp__line line;
+    imp_spec brings;
     if (!t->sensor->ops->connect ||
         !imp__sensor_connect(t->sensor, &k->at.p, false, d->lens, &to) ||
         !imp__light_on_film(t->sensor, &to))
         return;
-    const imp_spec L = brings * kernel(k, imp__to_local(&k->frame, to.wo)) * to.weight;
+    if (!light_at(t, light, depth + 1 + passed, &brings)) return;
+    imp_spec L = brings * T * kernel(k, imp__to_local(&k->frame, to.wo)) * to.weight;
     if (imp__is_zero_used(L, d->waves)) return;
     imp__light_shadow_aim(&k->at, &to, &shadow);
-    if (imp__occluded_at(t->scene, 0, &shadow.o, &shadow.d, 0, shadow.reach)) return;
+    if (!imp__edge_line(d, shadow.o, shadow.d, shadow.reach, &line)) return;
+    if (imp_unlikely(d->b->passes)) {
+        if (!light_at(t, light, depth + 1 + passed + line.bounces, &brings)) return;
+        L = brings * T * line.T * kernel(k, imp__to_local(&k->frame, to.wo)) * to.weight;
+    }
     struct imp__flux *f = imp__flux_add(d, light->n_ends + depth + 2);
     if (!f) return;
     f->px = to.px;
     f->py = to.py;
     f->L = L;
     ends_set(d, light, &to, k, depth, f);
-}
-
-/* Light for a chain of depth + 1 vertices. False: the path would be too long. */
-static bool light_at(const struct imp_tracer *t, const struct imp__edge_light *light,
-                     int depth, imp_spec *L)
-{
-    const int max = t->integrator->max_depth;
-    if (light->by_depth) {
-        if (depth >= light->n_depths) return false;
-        *L = light->by_depth[depth];
-        return true;
-    }
-    *L = light->light;
-    return max < 0 || depth + 1 + light->behind <= max;
 }
 
 /* Where the walk goes on, local, and its density: of Lambertian materials by the cosine on the side
@@ -136,7 +147,10 @@ static double direction_draw(const struct imp__edge_draw *d, const struct link *
     const double u[3] = {imp__u01(d->key, dims + IMP_EDGE_WALK_U),
                          imp__u01(d->key, dims + IMP_EDGE_WALK_V),
                          imp__u01(d->key, dims + IMP_EDGE_LOBE)};
-    if (imp__is_lambertian(k->bsdf)) {
+    const struct imp_bsdf *b = k->bsdf;
+    const imp_spec *in = k->in;
+    for (; b->ops == &imp__mask; b = b->child[0]) in += b->child_in[0]; /* it scatters */
+    if (imp__is_lambertian(b)) {
         *wo = imp__cosine_hemisphere(u);
         const double pdf = imp__cosine_hemisphere_pdf(*wo);
         if (k->wi[2] < 0) (*wo)[2] = -(*wo)[2];
@@ -144,9 +158,9 @@ static double direction_draw(const struct imp__edge_draw *d, const struct link *
     }
     struct imp_dirs dirs = {{0}, k->wi, IMP_SMOOTH, 0};
     const double by_lobe[3] = {u[2], u[0], u[1]};
-    if (!imp__bsdf_transposed_sample(k->bsdf, k->in, by_lobe, &dirs)) return 0;
+    if (!imp__bsdf_transposed_sample(b, in, by_lobe, &dirs)) return 0;
     *wo = dirs.wo;
-    return imp__bsdf_transposed_pdf(k->bsdf, k->in, &dirs);
+    return imp__bsdf_transposed_pdf(b, in, &dirs);
 }
 
 void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
@@ -155,8 +169,9 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
     const struct imp_tracer *t = d->b->tracer;
     struct link *k = link_make(d, NULL, hit, at, light->w, light->horizon);
     imp_spec T = imp__spec(1), L;
-    for (int depth = 0; k && light_at(t, light, depth, &L); depth++) {
-        connect(d, light, k, depth, L * T);
+    int passed = 0;
+    for (int depth = 0; k && light_at(t, light, depth + 1 + passed, &L); depth++) {
+        connect(d, light, k, depth, passed, T);
         const unsigned dims = IMP_EDGE_WALK + (unsigned)depth * IMP_EDGE_WALK_DIMS;
         imp_v3 wo, w;
         const double pdf = direction_draw(d, k, dims, &wo);
@@ -170,8 +185,11 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
         struct imp_surface there;
         w = imp__to_world(&k->frame, wo);
         const imp_v3 o = imp__offset(k->at.p, k->at.ng, w);
-        if (!imp__intersect(t->scene, &o, &w, 0, INFINITY, &next)) return;
-        imp__hit_surface(t->scene, &next, &o, &w, &there);
+        struct imp__line line;
+        const unsigned number = 1 + (unsigned)depth;
+        if (!imp__edge_follow(d, o, w, 0, number, &next, &there, &line)) return;
+        T *= line.T * line.times;
+        passed += line.bounces;
         k = link_make(d, k, &next, &there, w, false);
     }
 }

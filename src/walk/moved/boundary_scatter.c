@@ -4,22 +4,40 @@
 #include "boundary_parts.h"
 #include "moved_sky.h"
 #include "walk/core/step.h"
+#include "walk/core/vertex.h"
 
-imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk, int before,
-                      const bool *drawn)
+/* Does light go straight on there, and is that no vertex of a light sample's line? */
+static bool is_on_line(const struct imp__boundary *b, const struct imp_vertex *v)
 {
-    const int max = t->integrator->max_depth;
+    return v->d.scatterer == IMP_AT_SENSOR || (b->through && imp__goes_straight(v));
+}
+
+const struct imp_vertex *imp__walk_met(const struct imp__edge_draw *d,
+                                       const struct imp_walk *walk, imp_spec *T)
+{
+    const struct imp_vertex *v = walk->dropped ? NULL : walk->first;
+    *T = imp__spec(1);
+    for (; v && is_on_line(d->b, v); v = v->next) *T *= v->w;
+    return v && v->d.scatterer != IMP_AT_SKY ? v : NULL;
+}
+
+imp_spec imp__arrives(const struct imp__boundary *b, const struct imp_walk *walk,
+                      int before, const bool *drawn)
+{
+    const int max = b->tracer->integrator->max_depth;
     imp_spec L = {0}, T = imp__spec(1);
     int number = before;
+    bool first = true; /* nothing has scattered it yet */
     if (walk->dropped || !walk->first) return L;
-    const bool sky_first = walk->first->d.scatterer == IMP_AT_SKY;
     for (const struct imp_vertex *v = walk->first; v; v = v->next) {
+        const bool sky = v->d.scatterer == IMP_AT_SKY, on_line = is_on_line(b, v);
         /* To each sky a vertex. */
-        const bool left = sky_first ? drawn && drawn[v->d.met.emitter] : v == walk->first;
+        const bool left = first && (!sky || (drawn && drawn[v->d.met.emitter]));
         if (!left && (max < 0 || number < max)) L += T * v->e;
         if (max < 0 || number + 1 < max) L += T * v->b;
         T *= v->w;
-        number += v->d.scatterer != IMP_AT_SKY;
+        number += !sky && !on_line;
+        first &= sky || on_line;
     }
     return L;
 }
@@ -37,8 +55,7 @@ void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
                      const struct imp_walk *hi, double times, const bool *drawn, int *n)
 {
-    const struct imp_tracer *tracer = d->b->tracer;
-    const int max = tracer->integrator->max_depth;
+    const int max = d->b->tracer->integrator->max_depth;
     *n = max < 0 ? 1 : max - 1;
     imp_spec *jump = imp__arena_take(d->arena, (size_t)*n, sizeof *jump);
     if (!jump) {
@@ -47,8 +64,8 @@ imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
     }
     bool any = false;
     for (int k = 0; k < *n; k++) {
-        jump[k] = (imp__arrives(tracer, lo, k + 1, drawn) -
-                   imp__arrives(tracer, hi, k + 1, drawn)) *
+        jump[k] = (imp__arrives(d->b, lo, k + 1, drawn) -
+                   imp__arrives(d->b, hi, k + 1, drawn)) *
                   times;
         any |= !imp__is_zero_used(jump[k], d->waves);
     }
@@ -66,16 +83,14 @@ static void look_beside(struct imp__edge_draw *d, const struct imp_surface *at, 
 void imp__draw_scatter(struct imp__edge_draw *d)
 {
     const struct imp__boundary *b = d->b;
-    const struct imp_tracer *tracer = b->tracer;
-    const struct imp_scene *scene = tracer->scene;
-    const int max = tracer->integrator->max_depth;
+    const int max = b->tracer->integrator->max_depth;
     imp_v3 w;
     struct imp_hit hit;
     struct imp_surface at;
     if ((max >= 0 && max < 2) || !imp__edge_touched(d, &w)) return;
     const imp_v3 from = imp__edge_clear(d);
-    if (!imp__intersect(scene, &from, &w, IMP_CONTACT * b->size, INFINITY, &hit)) return;
-    imp__hit_surface(scene, &hit, &from, &w, &at);
+    struct imp__line line;
+    if (!imp__edge_follow(d, from, w, IMP_CONTACT * b->size, 0, &hit, &at, &line)) return;
 
     const imp_v3 turned = imp__cross(d->along, w);
     const double sine = imp__length(turned);
@@ -88,7 +103,7 @@ void imp__draw_scatter(struct imp__edge_draw *d)
     look_beside(d, &at, m, apart, &hi);
 
     int depths;
-    const double times = (d->touches ? 1 : sine * 4 * IMP_PI) * d->inv_pdf;
+    const double times = (d->touches ? 1 : sine * 4 * IMP_PI) * d->inv_pdf * line.times;
     imp__seam_emission(d, &hit, &at, &lo, m, w, times);
     imp__seam_emission(d, &hit, &at, &hi, m, w, -times);
     imp_spec *jump = imp__jumps(d, &lo, &hi, times, b->drawn, &depths);

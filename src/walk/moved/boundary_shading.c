@@ -312,6 +312,7 @@ void imp__draw_shading_film(struct imp__edge_draw *d)
     struct imp_surface at, from = {.uv = {0}};
     struct imp_hit hit;
     struct turning x;
+    struct imp__line line;
     if (meter) imp__meter_draw(sensor, d->lens, &from);
     if (meter) d->eye = from.p;
     if (!sensor->ops->connect || !seen_point(d, &hit)) return;
@@ -323,7 +324,7 @@ void imp__draw_shading_film(struct imp__edge_draw *d)
     const imp_v3 o = meter ? imp__offset(from.p, from.ng, at.p - from.p) : to.p,
                  r = at.p - o;
     const double t = imp__length(r);
-    if (imp__occluded_at(d->b->tracer->scene, 0, &o, &r, 0, 1 - IMP_BESIDE)) return;
+    if (!imp__edge_line(d, o, r, 1 - IMP_BESIDE, &line)) return;
     if (!turning_at(d, &hit, &at, to.wo, t, parallel, &x)) return;
     const imp_spec jump = look_beside(d, &x, 1, o, meter ? &from : NULL) -
                           look_beside(d, &x, -1, o, meter ? &from : NULL);
@@ -347,7 +348,6 @@ void imp__draw_shading_film(struct imp__edge_draw *d)
 
 void imp__draw_shading_scatter(struct imp__edge_draw *d)
 {
-    const struct imp_scene *scene = d->b->tracer->scene;
     const int max = d->b->tracer->integrator->max_depth;
     struct imp_hit from, hit;
     struct imp_surface p, at;
@@ -358,8 +358,8 @@ void imp__draw_shading_scatter(struct imp__edge_draw *d)
     const struct imp_frame f = imp__frame_from_normal(p.n);
     const imp_v3 w = f.s * cos(psi) + f.t * sin(psi);
     const imp_v3 o = imp__offset(p.p, p.ng, w);
-    if (!imp__intersect(scene, &o, &w, 0, INFINITY, &hit)) return;
-    imp__hit_surface(scene, &hit, &o, &w, &at);
+    struct imp__line line;
+    if (!imp__edge_follow(d, o, w, 0, 0, &hit, &at, &line)) return;
     if (!turning_at(d, &from, &p, w, imp__length(at.p - p.p), false, &x)) return;
     const imp_v3 back = imp__offset(at.p, at.ng, -w);
     if (!look_next(d, &x, 1, back, 1, &lit))
@@ -367,7 +367,7 @@ void imp__draw_shading_scatter(struct imp__edge_draw *d)
     if (!look_next(d, &x, -1, back, 1, &dark))
         imp__look_from(d, &at, p.p - x.beside, 1, &dark);
     int depths;
-    const double times = fabs(imp__dot(p.ng, w)) * IMP_2PI * d->inv_pdf;
+    const double times = fabs(imp__dot(p.ng, w)) * IMP_2PI * d->inv_pdf * line.times;
     imp_spec *jump = imp__jumps(d, &lit, &dark, times, NULL, &depths);
     if (!jump) return;
     struct imp__edge_light light = {.w = w, .light = jump[0], .n_ends = 1};

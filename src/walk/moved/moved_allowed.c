@@ -8,7 +8,9 @@
 #include "moved_kernel.h"
 #include "scene/instances.h"
 #include "scene/pose.h"
+#include "walk/path/first_segment.h"
 
+extern const struct imp_bsdf_ops imp__mask;
 extern const struct imp_emitter_ops imp__area, imp__point_light, imp__spot_light,
     imp__directional;
 
@@ -36,6 +38,12 @@ static enum imp_status materials_allowed(const struct imp_tracer *t)
             imp__kernel_without_d(b, s->geometry != IMP_TRIANGLES || s->smooth);
         if (!why) why = imp__textures_without_d(b, s);
         if (!why && b->shaped) why = "has a spectrum for a number";
+        if (!why && b->straight && s->emitter >= 0)
+            why = "lets light pass, and its shape is a light";
+        if (!why && b->ops == &imp__mask && b->input[0]->texture &&
+            imp__segment_first(t)->through)
+            why = "has an opacity with a texture, which light samples of volpath pass "
+                  "(those of path do not)";
         if (why) return refuse(t, "material", b->name, b->ops->name, why);
     }
     return IMP_OK;
@@ -125,10 +133,23 @@ static enum imp_status meter_allowed(const struct imp_tracer *t)
     return IMP_OK;
 }
 
+/* Has the scene masks, or others, which light samples pass? */
+static bool samples_pass(const struct imp_tracer *t)
+{
+    bool any = false;
+    for (int k = 0; k < t->scene->n_all_shapes; k++)
+        any |= imp__shape_bsdf(t->scene, t->scene->shapes[k])->straight != 0;
+    return any && imp__segment_first(t)->through;
+}
+
 static enum imp_status sensor_allowed(const struct imp_tracer *t)
 {
     const struct imp_sensor *s = t->sensor;
     imp_v3 centre;
+    if (s->shape && samples_pass(t))
+        return refuse(t, "sensor", s->name, s->ops->name,
+                      "is a surface, and its light samples pass masks (those of path do "
+                      "not)");
     if (s->shape) return meter_allowed(t);
     if (!imp__lens_middle(s, &centre))
         return refuse(t, "sensor", s->name, s->ops->name,

@@ -15,6 +15,7 @@ struct imp__link_point {
     struct imp__glued x;
     struct imp__velocity bar; /* of the surface there: V, n', d ln dA */
     imp_v3 moved_bar;         /* of v', the vertex itself */
+    imp_v3 wo_bar;            /* of the direction to the camera, across it */
     bool sky;
 };
 
@@ -104,12 +105,12 @@ static inline imp_v3 imp__slide_bar(struct imp__link_point *x, imp_v3 w)
     return shift;
 }
 
-/* The first vertex of a walk through a fixed film position, whose ray begins at o: the end of
- * the chain. wo_bar: of the direction towards the camera, across it. Adds to theta_bar. */
+/* A vertex that the ray of a fixed film position meets, which begins at o: the end of the chain. Adds
+ * to theta_bar. */
 static inline void imp__camera_bar(const struct imp__moves *moves, imp_v3 o,
-                                   struct imp__link_point *first, imp_v3 wo_bar,
-                                   double *theta_bar)
+                                   struct imp__link_point *first, double *theta_bar)
 {
+    const imp_v3 wo_bar = first->wo_bar;
     const double t = imp__length(first->x.p - o);
     const imp_v3 shift = imp__slide_bar(first, (first->x.p - o) * (1 / t));
     imp__camera_velocity_bar(moves, o, first->x.p, shift, theta_bar);

@@ -6,12 +6,14 @@
 #include "moved_chain.h"
 #include "moved_sky.h"
 #include "walk/core/vertex.h"
+#include "walk/path/first_segment.h"
 
 /* What the values of vertex k depend on, as adjoints of their logarithms, by lanes. */
 struct pieces {
     imp_spec light; /* its light sample */
-    imp_spec step;  /* the step, of all light but what is emitted at its end */
+    imp_spec step;  /* the step, of all light but `met` */
     imp_spec met;   /* emission at its end */
+    int lit;        /* vertex of that emission: the next one, or behind passes */
 };
 
 struct sweep {
@@ -21,13 +23,32 @@ struct sweep {
     struct imp__link_point *at; /* [n] */
     struct pieces *piece;       /* [n] */
     double *theta_bar;
-    imp_v3 wo_bar; /* of the direction from the first vertex to the camera */
-    int first;     /* vertex: 1 on a meter, behind that of the sensor */
+    int first; /* vertex: 1 where the sensor has one before it */
+    int front; /* the first vertex at which the camera's ray does not go straight on */
+    imp_spec seen; /* adjoint of the light that reaches it */
+    bool meter;    /* the sensor is a surface, which is vertex `first` */
+    bool through;  /* light samples pass what lets light go straight on */
 };
 
 static bool is_emitted(const struct imp_vertex *v)
 {
     return v->d.scatterer != IMP_AT_SKY && v->d.met.emitter >= 0;
+}
+
+/* Emission that the step from v meets, and that is glued to its light where a light sample could
+ * have brought it, from behind passes only if these let samples through. */
+static void met_read(const struct sweep *s, const struct imp_vertex *v, imp_spec P, int k,
+                     struct pieces *piece)
+{
+    const struct imp_vertex *y = v->next;
+    if (s->through && imp__goes_straight(v)) return;
+    for (k++; s->through && y && imp__goes_straight(y); k++) {
+        P *= y->w;
+        y = y->next;
+    }
+    if (!y || !is_emitted(y)) return;
+    piece->met = P * y->e;
+    piece->lit = k;
 }
 
 /* Places and adjoints of all vertices; their number. */
@@ -38,7 +59,7 @@ static int read_walk(struct sweep *s, imp_spec adjoint)
     int n = 0;
     for (const struct imp_vertex *v = s->walk->first; v; v = v->next, n++) {
         const bool sky = v->d.scatterer == IMP_AT_SKY;
-        s->piece[n] = (struct pieces){{0}, {0}, {0}};
+        s->piece[n] = (struct pieces){{0}, {0}, {0}, 0};
         if (n < s->first) {
             P *= v->w;
             continue;
@@ -47,10 +68,14 @@ static int read_walk(struct sweep *s, imp_spec adjoint)
             sky ? imp__sky_point(imp__normalize(imp__decided_v3(v->d.p)))
                 : imp__surface_point(scene, v->d.shape, &v->d.located, v->d.place, v->ng);
         struct pieces *piece = &s->piece[n];
+        if (n == s->front) {
+            s->seen = P;
+            if (imp_unlikely(imp__goes_straight(v))) s->front++;
+        }
         if (v->d.connection == IMP_CONNECTED) piece->light = P * v->b;
         P *= v->w;
         if (!v->d.goes_on || !v->next) continue;
-        if (is_emitted(v->next)) piece->met = P * v->next->e;
+        met_read(s, v, P, n, piece);
         piece->step = P * v->beyond - piece->met;
     }
     return n;
@@ -105,7 +130,7 @@ static imp_v3 table_bar(struct sweep *s, const struct imp_emitter *e,
 }
 
 /* Is it the point of a meter, in whose place a white surface is? */
-static bool is_meter(const struct sweep *s, int k) { return s->first == 1 && k == 1; }
+static bool is_meter(const struct sweep *s, int k) { return s->meter && k == s->first; }
 
 /* The derivatives of vertex k's kernel towards w, from the places of the chain, which are exact to
  * each other; recorded directions are rounded. False: it is Lambertian without textures, and w and
@@ -117,7 +142,7 @@ static bool kernel_derive(const struct sweep *s, int k, const struct imp_vertex 
     if (imp_likely(imp__is_plain(v->bsdf)) || is_meter(s, k) ||
         !imp__decided_surface(s->tracer->scene, &v->d, s->walk->time, &at))
         return false;
-    const imp_v3 from = k > 0 ? s->at[k - 1].x.p : s->walk->ray.o;
+    const imp_v3 from = k > s->front ? s->at[k - 1].x.p : s->walk->ray.o;
     const struct imp_frame frame = {at.s, at.t, at.n};
     const struct imp_dirs dirs = {
         imp__to_local(&frame, imp__normalize(from - s->at[k].x.p)),
@@ -141,7 +166,7 @@ static struct imp__kernel_bar kernel_bar(struct sweep *s, int k,
                                   imp__sum_used(bar, lanes));
     const struct imp__kernel_bar out = imp__kernel_times(derived, bar, lanes);
     s->at[k].x.s = derived->frame.s;
-    if (k == 0) s->wo_bar += out.wo;
+    if (k <= s->front) s->at[k].wo_bar += out.wo;
     return out;
 }
 
@@ -207,8 +232,48 @@ static void light_bar(struct sweep *s, int k, const struct imp_vertex *v)
     imp__velocity_bar(s->moves, &y.x, &y.bar, s->theta_bar);
 }
 
-/* The step from vertex k to the next one, which slides along it; emission that it meets there is
- * glued. */
+/* Vertex k passes light straight on: its place does not move what follows, but a texture may let
+ * pass another part. */
+static void pass_bar(struct sweep *s, int k, const struct imp_vertex *v)
+{
+    struct imp__link_point *x = &s->at[k], *next = x + 1;
+    const imp_v3 w = imp__link_direction(x, next);
+    const struct imp_scene *scene = s->tracer->scene;
+    const struct pieces *piece = &s->piece[k];
+    struct imp__kernel_d d;
+    if (imp__is_textured(v->bsdf) && kernel_derive(s, k, v, w, v->d.lobe, &d)) {
+        const struct imp__kernel_bar on =
+            imp__kernel_times(&d, piece->step + piece->met, scene->lanes);
+        imp__scatter_bar(x, &on);
+    }
+    if (next->sky || k < s->front) return; /* the camera's ray leads there */
+    x->moved_bar += imp__slide_bar(next, w);
+    if (!imp__is_zero(piece->met))
+        table_bar(s, scene->emitters[v->next->d.met.emitter], &next->x, -w,
+                  imp__sum_used(piece->met, scene->lanes), v->next->carried);
+    imp__velocity_bar(s->moves, &next->x, &next->bar, s->theta_bar);
+}
+
+/* Emission that the step from vertex k meets: a light sample could have brought it. */
+static void met_bar(struct sweep *s, int k, const struct imp_vertex *v, imp_v3 w,
+                    const struct imp__kernel_d *d)
+{
+    const struct imp_scene *scene = s->tracer->scene;
+    const struct pieces *piece = &s->piece[k];
+    struct imp__link_point *y = &s->at[piece->lit];
+    const struct imp_vertex *lit = v->next;
+    for (int i = k + 1; i < piece->lit; i++) lit = lit->next;
+    const double bar = imp__sum_used(piece->met, scene->lanes);
+    struct imp__kernel_bar met = kernel_bar(s, k, d, w, piece->met);
+    met.wi -=
+        table_bar(s, scene->emitters[lit->d.met.emitter], &y->x, -w, bar, lit->carried);
+    imp__connection_bar(&s->at[k], y, &met, bar);
+    if (piece->lit == k + 1) return;
+    imp__velocity_bar(s->moves, &y->x, &y->bar, s->theta_bar);
+    y->bar = (struct imp__velocity){.area = 0};
+}
+
+/* The step from vertex k to the next one, which slides along it. */
 static void step_bar(struct sweep *s, int k, const struct imp_vertex *v)
 {
     struct imp__link_point *x = &s->at[k], *next = x + 1;
@@ -221,35 +286,52 @@ static void step_bar(struct sweep *s, int k, const struct imp_vertex *v)
     imp__scatter_bar(x, &on);
     if (next->sky) return;
     x->moved_bar += imp__slide_bar(next, w);
-    if (!imp__is_zero(piece->met)) {
-        const struct imp_scene *scene = s->tracer->scene;
-        const double bar = imp__sum_used(piece->met, scene->lanes);
-        struct imp__kernel_bar met = kernel_bar(s, k, d, w, piece->met);
-        met.wi -= table_bar(s, scene->emitters[v->next->d.met.emitter], &next->x, -w, bar,
-                            v->next->carried);
-        imp__connection_bar(x, next, &met, bar);
-    }
+    if (!imp__is_zero(piece->met)) met_bar(s, k, v, w, d);
     imp__velocity_bar(s->moves, &next->x, &next->bar, s->theta_bar);
 }
 
 /* The sky through a fixed film position: the direction d of the ray turns by u(o + d) - u(o). */
-static void sky_seen_bar(const struct sweep *s, imp_spec adjoint)
+static void sky_seen_bar(const struct sweep *s)
 {
     const struct imp_sensor_ray *ray = &s->walk->ray;
     const imp_v3 slope =
-        imp__skies_slope(s->tracer->scene, ray->d, adjoint, s->walk->first->carried);
+        imp__skies_slope(s->tracer->scene, ray->d, s->seen, s->walk->first->carried);
     if (imp__is_zero(slope)) return;
     imp__camera_velocity_bar(s->moves, ray->o, ray->o + ray->d, slope, s->theta_bar);
     imp__camera_velocity_bar(s->moves, ray->o + ray->d, ray->o, -slope, s->theta_bar);
+}
+
+/* What the camera's ray meets: its vertices up to `front`. */
+static void front_bar(struct sweep *s)
+{
+    const struct imp_vertex *v = s->walk->first;
+    for (int k = 0; k < s->front; k++) v = v ? v->next : NULL;
+    if (v && s->at[s->front].sky) {
+        sky_seen_bar(s);
+        v = NULL;
+    }
+    if (v && is_emitted(v))
+        s->at[s->front].wo_bar +=
+            table_bar(s, s->tracer->scene->emitters[v->d.met.emitter], &s->at[s->front].x,
+                      imp__normalize(s->walk->ray.o - s->at[s->front].x.p),
+                      imp__sum_used(s->seen * v->e, s->tracer->scene->lanes), v->carried);
+    for (int k = v ? s->front : s->front - 1; k >= s->first; k--)
+        imp__camera_bar(s->moves, s->walk->ray.o, &s->at[k], s->theta_bar);
 }
 
 bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
                       const struct imp__moves *moves, const struct imp_walk *walk,
                       imp_spec adjoint, double *theta_bar)
 {
-    struct sweep s = {tracer, moves,     walk, NULL,
-                      NULL,   theta_bar, {0},  tracer->sensor->shape ? 1 : 0};
     if (walk->dropped || !walk->valid || !walk->first) return true;
+    struct sweep s = {.tracer = tracer,
+                      .moves = moves,
+                      .walk = walk,
+                      .theta_bar = theta_bar,
+                      .first = walk->first->d.scatterer == IMP_AT_SENSOR,
+                      .meter = tracer->sensor->shape != NULL,
+                      .through = imp__segment_first(tracer)->through};
+    s.front = s.first;
     s.at = imp__arena_take(arena, (size_t)walk->n, sizeof *s.at);
     s.piece = imp__arena_take(arena, (size_t)walk->n, sizeof *s.piece);
     if (!s.at || !s.piece) return false;
@@ -257,24 +339,16 @@ bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
     for (const struct imp_vertex *v = walk->last; v; v = v->prev, k--) {
         if (k < s.first || s.at[k].sky) continue;
         if (v->d.connection == IMP_CONNECTED) light_bar(&s, k, v);
-        if (v->d.goes_on && v->next) step_bar(&s, k, v);
+        if (!v->d.goes_on || !v->next) continue;
+        if (imp_unlikely(imp__goes_straight(v))) pass_bar(&s, k, v);
+        else step_bar(&s, k, v);
     }
-    if (s.first == 1) {
-        if (walk->n < 2) return true;
-        s.at[1].bar.v += s.at[1].moved_bar;
-        imp__velocity_bar(moves, &s.at[1].x, &s.at[1].bar, theta_bar);
+    if (walk->n <= s.first) return true;
+    if (!s.meter) {
+        front_bar(&s);
         return true;
     }
-    if (s.at[0].sky) {
-        sky_seen_bar(&s, adjoint);
-        return true;
-    }
-    const struct imp_vertex *first = walk->first;
-    if (is_emitted(first))
-        s.wo_bar += table_bar(&s, tracer->scene->emitters[first->d.met.emitter],
-                              &s.at[0].x, imp__normalize(walk->ray.o - s.at[0].x.p),
-                              imp__sum_used(adjoint * first->e, tracer->scene->lanes),
-                              first->carried);
-    imp__camera_bar(moves, walk->ray.o, &s.at[0], s.wo_bar, theta_bar);
+    s.at[1].bar.v += s.at[1].moved_bar;
+    imp__velocity_bar(moves, &s.at[1].x, &s.at[1].bar, theta_bar);
     return true;
 }
