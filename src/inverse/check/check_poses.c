@@ -32,6 +32,8 @@ struct moved {
     double turn[9];  /* R(a') R(a)^T */
     double by;       /* scale after over before */
     imp_v3 from, to; /* the centre, or a light's place or direction, before and after */
+    imp_spec
+        extinction; /* of a medium that fills the scene, by lanes; 0: there is none */
 };
 
 static bool is_of_kind(const struct imp_pose *p)
@@ -84,9 +86,14 @@ struct at {
     double curvature;
     imp_v3 straight, shade;
 };
+static struct at at_rest(const struct imp__glued *x)
+{
+    return (struct at){x->p,         x->n,        x->s,
+                       x->curvature, x->straight, imp__shading_normal(x)};
+}
 static struct at placed(const struct moved *m, const struct imp__glued *x)
 {
-    struct at at = {x->p, x->n, x->s, x->curvature, x->straight, imp__shading_normal(x)};
+    struct at at = at_rest(x);
     if (x->carrier != m->shape) return at;
     if (m->pose->kind == IMP_POSE_SCALE) {
         at.p = m->from + (x->p - m->from) * m->by;
@@ -228,6 +235,13 @@ static imp_spec kernel_ratio(const struct moved *m, const struct imp_vertex *v,
                          imp__dot(imp__shading_normal(then), w[1]));
     imp_spec K[2];
     const bool textured = imp__is_textured(v->bsdf);
+    if (v->d.scatterer == IMP_IN_MEDIUM) { /* its frame has the axes of the world */
+        for (int k = 0; k < 2; k++) {
+            const struct imp_dirs d = {-o[k], w[k], lobe, 0};
+            v->bsdf->ops->eval(v->bsdf, v->in, &d, &K[k]);
+        }
+        return K[0] / K[1];
+    }
     for (int k = 0; k < 2; k++) {
         if (textured) looked_up(m, v, k ? then->p : x, k == 0, then, in);
         const imp_v3 n = k ? imp__shading_normal(then) : now->shade,
@@ -242,16 +256,18 @@ static imp_spec kernel_ratio(const struct moved *m, const struct imp_vertex *v,
     return K[0];
 }
 
-/* Directions to the light sample of a vertex at x, now and at its recorded place; returns how what
- * it receives, without its kernel, has changed. */
+/* Directions to the light sample of a vertex at x, now and at its recorded place, and by how much it
+ * is farther away; returns how what it receives, without its kernel, has changed. */
 static double light_ratio(const struct moved *m, const struct imp_vertex *v,
-                          const struct imp__glued *old, imp_v3 x, imp_v3 w[2])
+                          const struct imp__glued *old, imp_v3 x, imp_v3 w[2],
+                          double *farther)
 {
     const struct imp_scene *scene = m->c->problem->scene;
     const struct imp_emitter *e = scene->emitters[v->d.light.emitter];
     const imp_v3 d = imp__decided_v3(v->d.light.d);
     const bool moves = m->pose->emitter == e;
     w[0] = w[1] = imp__normalize(-d);
+    *farther = 0;
     if (e->ops->flags & IMP_EMITTER_ENVIRONMENT) return 1;
     if (!e->shape && e->ops->flags & IMP_EMITTER_FAR) {
         const double side = imp__dot(d, m->from) < 0 ? 1 : -1;
@@ -265,6 +281,7 @@ static double light_ratio(const struct moved *m, const struct imp_vertex *v,
                      r_old = y - old->p;
         w[0] = imp__normalize(r);
         w[1] = imp__normalize(r_old);
+        *farther = imp__length(r) - imp__length(r_old);
         return imp__dot(r_old, r_old) / imp__dot(r, r);
     }
     const struct imp__glued y =
@@ -272,6 +289,7 @@ static double light_ratio(const struct moved *m, const struct imp_vertex *v,
     const struct at there = placed(m, &y);
     w[0] = imp__normalize(there.p - x);
     w[1] = imp__normalize(y.p - old->p);
+    *farther = imp__length(there.p - x) - imp__length(y.p - old->p);
     return receives(x, there.p, there.n) / receives(old->p, y.p, y.n);
 }
 
@@ -292,9 +310,11 @@ static bool has_spots(const struct imp_scene *scene, const struct imp_walk *walk
 /* A vertex as it was recorded, and where it is now. */
 struct stop {
     const struct imp_vertex *v; /* NULL: none */
+    bool floats;                /* it is a point of a medium */
     struct imp__glued old;
     struct at here;
     imp_v3 x, from[2]; /* its place; directions of arrival, now and then */
+    imp_spec grows;    /* how the light that arrives there has changed on the way */
     imp_spec P;        /* of light that leaves it, where its kernel has not changed */
 };
 
@@ -304,42 +324,122 @@ static imp_spec stop_ratio(const struct moved *m, const struct stop *s, const im
     return kernel_ratio(m, s->v, &s->here, s->x, s->from, w, &s->old, lobe);
 }
 
+/* What a way that is so much longer lets pass. */
+static imp_spec fades(const struct moved *m, double longer)
+{
+    imp_spec T = imp__spec(1);
+    if (imp__is_zero(m->extinction)) return T;
+    for (int c = 0; c < 4; c++) T[c] = exp(-m->extinction[c] * longer);
+    return T;
+}
+
+/* Light from a place of a lamp, now and then, to a stop: `glued` to the place, it has become so many
+ * times as much. Of a point of a medium only a part of it is glued, and the rest has a fixed
+ * direction. */
+static imp_spec lamp_ratio(const struct moved *m, const struct stop *s, int lobe,
+                           const struct imp_emitter *e, const struct at *now, imp_v3 then,
+                           imp_spec glued)
+{
+    imp_v3 w[2];
+    double unused;
+    if (!s->floats) return glued;
+    const double d[2] = {imp__length(now->p - s->x), imp__length(then - s->old.p)};
+    struct at met = *now;
+    w[0] = w[1] = imp__normalize(then - s->old.p);
+    const double fixed = imp__length(met_at(s->x, w[0], &met) - s->x);
+    return glued * imp__glued_part(e, d[0], &unused) +
+           stop_ratio(m, s, w, lobe) * fades(m, fixed - d[1]) *
+               (1 - imp__glued_part(e, fixed, &unused));
+}
+
 /* What its light sample brings, of light that reaches it with P. */
 static double light_frozen(const struct moved *m, const struct stop *s, imp_spec P)
 {
+    const struct imp_scene *scene = m->c->problem->scene;
+    const struct imp_light *l = &s->v->d.light;
     imp_v3 to[2];
+    double farther;
     if (s->v->d.connection != IMP_CONNECTED) return 0;
-    const double ratio = light_ratio(m, s->v, &s->old, s->x, to);
-    return ratio * imp__sum_used(P * s->v->b * stop_ratio(m, s, to, IMP_SMOOTH),
-                                 m->c->problem->scene->lanes);
+    const double ratio = light_ratio(m, s->v, &s->old, s->x, to, &farther);
+    const struct imp_emitter *e = scene->emitters[l->emitter];
+    imp_spec all = stop_ratio(m, s, to, IMP_SMOOTH);
+    if (s->floats && e->shape) {
+        const struct imp__glued y =
+            imp__glued_at(scene, e->shape->index, &l->located, 0, imp__decided_v3(l->d));
+        const struct at now = placed(m, &y);
+        all = lamp_ratio(m, s, IMP_SMOOTH, e, &now, y.p, all * ratio * fades(m, farther));
+        return imp__sum_used(P * s->v->b * all, scene->lanes);
+    }
+    return ratio * imp__sum_used(P * s->v->b * all * fades(m, farther), scene->lanes);
 }
 
 /* Emission that is met from there, glued to the light. */
 static double met_frozen(const struct moved *m, const struct stop *s,
                          const struct stop *y)
 {
+    const struct imp_scene *scene = m->c->problem->scene;
     const imp_v3 to[2] = {imp__normalize(y->here.p - s->x),
                           imp__normalize(y->old.p - s->old.p)};
-    return imp__sum_used(s->P * y->v->e * stop_ratio(m, s, to, s->v->d.lobe),
-                         m->c->problem->scene->lanes) *
-           receives(s->x, y->here.p, y->here.n) / receives(s->old.p, y->old.p, y->old.n);
+    const double now = receives(s->x, y->here.p, y->here.n),
+                 then = receives(s->old.p, y->old.p, y->old.n);
+    const double farther =
+        imp__length(y->here.p - s->x) - imp__length(y->old.p - s->old.p);
+    imp_spec all = stop_ratio(m, s, to, s->v->d.lobe);
+    if (!s->floats)
+        return imp__sum_used(s->P * y->v->e * all * fades(m, farther), scene->lanes) *
+               now / then;
+    all = lamp_ratio(m, s, s->v->d.lobe, scene->emitters[y->v->d.met.emitter], &y->here,
+                     y->old.p, all * (now / then) * fades(m, farther));
+    return imp__sum_used(s->P * y->v->e * all, scene->lanes);
 }
 
-/* The next stop of a walk, along a fixed direction behind `before` or, where it is NULL, along the
- * camera's ray. */
-static struct stop stop_at(const struct moved *m, const struct imp_walk *walk,
-                           const struct imp_vertex *v, const struct stop *before)
+/* A point of a medium, at a part of the way from `begin` (now and then) along the ray to what lies
+ * beyond. */
+static void float_at(const struct moved *m, struct stop *s, imp_v3 o,
+                     const imp_v3 begin[2])
 {
-    const bool turns = m->shape == IMP_MOVE_CAMERA && !before;
-    struct stop s = {.v = v, .old = vertex_glued(m->c->problem->scene, v, walk->time)};
-    imp_v3 o = before ? before->x : walk->ray.o;
-    s.from[1] = imp__normalize(s.old.p - (before ? before->old.p : o));
+    const struct imp_scene *scene = m->c->problem->scene;
+    struct imp__link_point p = imp__medium_point(imp__decided_v3(s->v->d.p));
+    imp__float_aim(scene, &p, begin[1]);
+    const double t = imp__length(p.x.p - begin[1]);
+    s->x = begin[0] + s->from[0] * t;
+    s->grows = imp__spec(1);
+    if (p.open) return;
+    const struct imp__glued beyond = imp__link_glued(&p);
+    struct at there = placed(m, &beyond), rest = at_rest(&beyond);
+    const double now = imp__length(met_at(o, s->from[0], &there) - begin[0]),
+                 then = imp__length(met_at(begin[1], s->from[1], &rest) - begin[1]);
+    s->x = begin[0] + s->from[0] * (t * now / then);
+    s->grows = fades(m, t * (now / then - 1)) * (now / then);
+}
+
+/* The next stop of a walk, behind `before` (NULL: the camera); seen: along the camera's ray, else along
+ * a fixed direction. */
+static struct stop stop_at(const struct moved *m, const struct imp_walk *walk,
+                           const struct imp_vertex *v, const struct stop *before,
+                           bool seen)
+{
+    const struct imp_scene *scene = m->c->problem->scene;
+    const bool turns = m->shape == IMP_MOVE_CAMERA && seen;
+    struct stop s = {.v = v, .floats = v->d.scatterer == IMP_IN_MEDIUM};
+    if (s.floats) s.old.p = imp__decided_v3(v->d.p);
+    else s.old = vertex_glued(scene, v, walk->time);
+    imp_v3 o = seen ? walk->ray.o : before->x;
+    s.from[1] = imp__normalize(s.old.p - (seen ? o : before->old.p));
     s.from[0] = turns ? turned(m, s.from[1]) : s.from[1];
     if (turns) o = m->to + turned(m, o - m->from);
+    const imp_v3 near[2] = {s.from[0] * walk->ray.t_near, s.from[1] * walk->ray.t_near};
+    const imp_v3 begin[2] = {before ? before->x : o + near[0],
+                             before ? before->old.p : walk->ray.o + near[1]};
+    if (s.floats) {
+        float_at(m, &s, o, begin);
+        return s;
+    }
     s.here = placed(m, &s.old);
     const bool meter = !before && m->c->tracer.sensor->shape;
     s.x = meter ? s.here.p : met_at(o, s.from[0], &s.here);
     s.here.shade = s.old.smooth ? shaded_at(m, &s.old, s.x) : s.here.n;
+    s.grows = fades(m, imp__length(s.x - begin[0]) - imp__length(s.old.p - begin[1]));
     return s;
 }
 
@@ -350,16 +450,19 @@ static imp_spec step_frozen(const struct moved *m, struct stop *s, imp_spec P)
     const struct imp_vertex *next = s->v->next;
     imp_v3 w[2] = {s->from[0], s->from[1]};
     s->P = P * s->v->w;
-    if (!imp__goes_straight(s->v))
-        w[0] = w[1] = imp__normalize(next->d.scatterer == IMP_AT_SKY
-                                         ? imp__decided_v3(next->d.p)
-                                         : vertex_glued(scene, next, 0).p - s->old.p);
+    if (!imp__goes_straight(s->v)) {
+        const bool place =
+            next->d.scatterer == IMP_AT_SKY || next->d.scatterer == IMP_IN_MEDIUM;
+        const imp_v3 p =
+            place ? imp__decided_v3(next->d.p) : vertex_glued(scene, next, 0).p;
+        w[0] = w[1] = imp__normalize(next->d.scatterer == IMP_AT_SKY ? p : p - s->old.p);
+    }
     return s->P * stop_ratio(m, s, w, s->v->d.lobe);
 }
 
 /* The walk's value, weighted by channels, where the pose has moved. What the camera sees through
  * nothing does not change, and is left out. */
-static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spec P)
+static double frozen(struct moved *m, const struct imp_walk *walk, imp_spec P)
 {
     const struct imp_scene *scene = m->c->problem->scene;
     const bool through = imp__segment_first(&m->c->tracer)->through;
@@ -367,6 +470,8 @@ static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spe
     struct stop here = {.v = NULL}, from = {.v = NULL}; /* from which light is sampled */
     bool seen = true;                                   /* by the camera's ray */
     double value = 0;
+    m->extinction = (imp_spec){0};
+    const bool fog = v && imp__fog(&m->c->tracer, v->carried, &m->extinction);
     if (v && v->d.scatterer == IMP_AT_SENSOR) {
         P *= v->w;
         v = v->next;
@@ -381,9 +486,11 @@ static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spe
                                         v->carried);
             return value + imp__sum_used(P * sky, scene->lanes);
         }
-        const bool passed = here.v && imp__goes_straight(here.v);
-        here = stop_at(m, walk, v, seen ? NULL : &here);
-        if (v->d.met.emitter >= 0) {
+        const struct stop before = here;
+        const bool passed = fog || (here.v && imp__goes_straight(here.v));
+        here = stop_at(m, walk, v, here.v ? &before : NULL, seen);
+        if (fog) P *= here.grows;
+        if (!here.floats && v->d.met.emitter >= 0) {
             if (from.v) value += met_frozen(m, &from, &here);
             else if (passed) value += imp__sum_used(P * v->e, scene->lanes);
         }

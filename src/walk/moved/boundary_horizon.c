@@ -53,7 +53,8 @@ void imp__draw_horizon(struct imp__edge_draw *d)
     emission_reach(d, &hit, &at, &x, &above, w, times);
     emission_reach(d, &hit, &at, &x, &below, w, -times);
     int depths;
-    imp_spec *jump = imp__jumps(d, &above, &below, times, NULL, &depths);
+    imp_spec *jump = imp__jumps(d, &above, &below, imp__spec(times),
+                                (struct imp__seen_from){.drawn = NULL}, &depths);
     if (!jump) return;
     struct imp__edge_light light = {
         .w = -w, .light = jump[0], .horizon = true, .n_ends = 1};

@@ -113,7 +113,7 @@ static void ends_set(const struct imp__edge_draw *d, const struct line *l, doubl
 #define INSIDE                                                                           \
     1e-3 /* the line inside meets what is behind the edge so much, or less, earlier */
 
-/* Where light samples pass masks: the line past the edge, from o along `out`, and beside it along `in`,
+/* Where light samples pass masks, and in a medium: the line past the edge, from o along `out`, and beside it along `in`,
  * which the edge's own faces may let pass in part; both of the length 1 to the edge, t_y away. Sets
  * what is met behind the edge, and *T, what passes out there less what passes inside. */
 static bool jump_follow(const struct imp__edge_draw *d, imp_v3 o, imp_v3 out, imp_v3 in,
@@ -140,7 +140,9 @@ void imp__draw_light(struct imp__edge_draw *d)
     if (b->n_lights == 0) return;
     const struct source s = source_draw(d);
     const struct imp_emitter *e = scene->emitters[s.light];
-    if (!(s.density > 0) || !imp__edge_silhouette(d, s.p, s.parallel)) return;
+    if (!(s.density > 0) || (s.parallel && b->fog) || /* none of it comes through */
+        !imp__edge_silhouette(d, s.p, s.parallel))
+        return;
 
     /* Parallel light: from outside the scene. */
     const imp_v3 from = s.parallel ? d->p - s.p * (2 * b->size) : s.p;
@@ -161,7 +163,7 @@ void imp__draw_light(struct imp__edge_draw *d)
     struct imp_hit hit;
     struct imp_surface at;
     imp_spec T = imp__spec(1);
-    const bool follows = b->passes && b->through;
+    const bool follows = b->fog || (b->passes && b->through);
     bool meets;
     if (imp_unlikely(follows)) {
         const imp_v3 inside = d->p - m * beside - o;
@@ -176,6 +178,10 @@ void imp__draw_light(struct imp__edge_draw *d)
     const double spread = s.parallel ? 1 : t_y * t_y;
     struct line line = {&s, m, t_y};
     struct imp__edge_light light = {.w = imp__normalize(to), .behind = 1};
+    if (imp_unlikely(follows && hit.shape < 0 && e->shape)) {
+        double slope;
+        T *= imp__glued_part(e, imp__length(at.p - s.p), &slope);
+    }
     light.light = T * le * (-cosine * sine * d->inv_pdf / (spread * s.density));
     struct imp__meter_point x;
     if (b->tracer->sensor->shape && (!s.sky || b->drawn_to_meter[s.light]) &&

@@ -71,6 +71,7 @@ void imp__draw_meter(struct imp__edge_draw *d)
     const bool points = imp__meter_is_points(t->sensor);
     struct imp_sensor_sample to;
     struct imp_surface at = {.uv = {0}};
+    imp_spec T;
     imp__meter_draw(t->sensor, d->lens, &at);
     if (!imp__edge_any(d, at.p, false) ||
         !imp__sensor_connect(t->sensor, &d->p, false, d->lens, &to) ||
@@ -81,16 +82,15 @@ void imp__draw_meter(struct imp__edge_draw *d)
     const double apart = IMP_BESIDE * (imp__length(r) + imp__length(d->p));
     const imp_v3 turned = imp__cross(d->along, d->p - to.p);
     if (!(imp__length(turned) > 0) || imp__edge_merges(d, r, apart) ||
-        imp__edge_is_hidden(d, o, r))
+        imp__edge_is_hidden(d, o, r, &T))
         return;
     const imp_v3 m = imp__normalize(turned);
     const double times = to.weight * d->inv_pdf * imp__length(turned) / to.dist;
     struct imp_walk lo, hi;
     look_beside(d, &at, o, -m, apart, &lo);
     look_beside(d, &at, o, m, apart, &hi);
-    const bool *drawn = points ? NULL : d->b->drawn_to_meter;
-    const imp_spec jump =
-        imp__arrives(d->b, &lo, 0, drawn) - imp__arrives(d->b, &hi, 0, drawn);
+    const struct imp__seen_from x = {.drawn = points ? NULL : d->b->drawn_to_meter};
+    const imp_spec jump = imp__arrives(d->b, &lo, x) - imp__arrives(d->b, &hi, x);
     struct imp__flux *f = imp__jump_add(d, &to, jump * times, 1 + IMP_EDGE_ENDS);
     if (f) {
         f->n_ends = imp__edge_ends(d, m, f->end);

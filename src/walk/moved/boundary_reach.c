@@ -25,25 +25,48 @@ struct link {
     imp_spec in[IMP_INPUTS_MAX];
 };
 
+/* A point of the medium. */
+static void link_float(const struct imp__edge_draw *d, struct link *k,
+                       const struct imp_surface *at, imp_v3 w)
+{
+    const struct imp_medium *m = d->b->fog;
+    const struct imp_texcoord place = {.p = at->p, .carried = imp__edge_waves(d)};
+    k->x = imp__medium_point(at->p);
+    k->bsdf = m->scatterer;
+    k->at = *at;
+    k->frame = (struct imp_frame){{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
+    k->wi = -w;
+    k->cos_i = 1;
+    imp__evaluate_inputs(k->bsdf, NULL, &place, k->in);
+}
+
+/* hit->shape -1: in the medium. */
 static struct link *link_make(struct imp__edge_draw *d, struct link *before,
                               const struct imp_hit *hit, const struct imp_surface *at,
                               imp_v3 w, bool horizon)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
-    const struct imp_shape *shape =
-        scene->shapes[imp__placed_shape(scene, hit->shape, hit->place)];
     struct link *k = imp__arena_take(d->arena, 1, sizeof *k);
     if (!k) {
         d->no_memory = true;
         return NULL;
     }
+    /* The chain comes from the camera. */
+    if (before && imp_unlikely(before->x.floats))
+        imp__float_aim(scene, &before->x, at->p);
+    k->before = before;
+    if (imp_unlikely(hit->shape < 0)) {
+        link_float(d, k, at, w);
+        return k;
+    }
+    const struct imp_shape *shape =
+        scene->shapes[imp__placed_shape(scene, hit->shape, hit->place)];
     const struct imp_texcoord place = {.uv = {at->uv[0], at->uv[1]},
                                        .p = at->p,
                                        .shape = shape,
                                        .prim = hit->prim,
                                        .carried = imp__edge_waves(d)};
     const struct imp_located located = imp__located_hit(scene, shape, hit, at);
-    k->before = before;
     k->x = imp__surface_point(scene, hit->shape, &located, hit->place, at->ng);
     k->bsdf = imp__shape_bsdf(scene, shape);
     k->at = *at;
@@ -54,12 +77,16 @@ static struct link *link_make(struct imp__edge_draw *d, struct link *before,
     return k;
 }
 
-/* The transposed kernel towards wo, local: f cos_o; with vertex normals f cos_i^s |cos_o/cos_i|,
+/* The transposed kernel towards wo, local: of a point of a medium per length; f cos_o; with vertex normals f cos_i^s |cos_o/cos_i|,
  * where ^s is of the shading normal (kind/bsdf/transport.h). */
-static imp_spec kernel(const struct link *k, imp_v3 wo)
+static imp_spec kernel(const struct imp__edge_draw *d, const struct link *k, imp_v3 wo)
 {
     const struct imp_dirs dirs = {wo, k->wi, IMP_SMOOTH, 0};
     imp_spec f;
+    if (imp_unlikely(k->x.floats)) {
+        k->bsdf->ops->eval(k->bsdf, k->in, &dirs, &f);
+        return f * d->extinction;
+    }
     if (k->x.x.smooth) {
         const double cos_o = fabs(imp__dot(k->at.ng, imp__to_world(&k->frame, wo)));
         k->bsdf->ops->eval(k->bsdf, k->in, &dirs, &f);
@@ -75,7 +102,7 @@ static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_ligh
                      struct imp__flux *f)
 {
     for (int k = 0; k < light->n_ends; k++) f->end[f->n_ends++] = light->end[k];
-    imp_v3 shift = light->slide;
+    imp_v3 shift = light->slide, far;
     /* From the edge to the camera; links lead the other way. */
     for (int j = 0; j <= depth; j++) {
         struct link *k = last, *after = NULL;
@@ -85,9 +112,16 @@ static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_ligh
         }
         struct imp__link_point x = k->x;
         const imp_v3 from = after ? after->x.x.p : to->p;
+        if (imp_unlikely(x.floats) && !after) {
+            const imp_v3 near = to->wo * -imp__edge_clip(d, to);
+            imp__float_aim(d->b->tracer->scene, &x, from + near);
+        }
         x.moved_bar = shift;
-        shift = imp__slide_bar(&x, imp__normalize(x.x.p - from));
-        f->end[f->n_ends++] = imp__flux_glued(&x.x, x.bar.v);
+        shift = imp__slide_bar(&x, imp__normalize(x.x.p - from), after ? NULL : &far);
+        const struct imp__glued on = imp__link_glued(&x);
+        if (!x.open) f->end[f->n_ends++] = imp__flux_glued(&on, x.bar.v);
+        if (!after && x.floats && !x.open)
+            f->end[f->n_ends++] = imp__flux_camera(d, &on, far);
     }
     f->end[f->n_ends++] = d->b->tracer->sensor->shape
                               ? imp__meter_end(d, to, shift)
@@ -123,15 +157,22 @@ static void connect(struct imp__edge_draw *d, const struct imp__edge_light *ligh
         !imp__light_on_film(t->sensor, &to))
         return;
     if (!light_at(t, light, depth + 1 + passed, &brings)) return;
-    imp_spec L = brings * T * kernel(k, imp__to_local(&k->frame, to.wo)) * to.weight;
+    imp_spec L = brings * T * kernel(d, k, imp__to_local(&k->frame, to.wo)) * to.weight;
     if (imp__is_zero_used(L, d->waves)) return;
     imp__light_shadow_aim(&k->at, &to, &shadow);
     if (!imp__edge_line(d, shadow.o, shadow.d, shadow.reach, &line)) return;
-    if (imp_unlikely(d->b->passes)) {
+    if (imp_unlikely(line.bounces > 0)) {
         if (!light_at(t, light, depth + 1 + passed + line.bounces, &brings)) return;
-        L = brings * T * line.T * kernel(k, imp__to_local(&k->frame, to.wo)) * to.weight;
+        L = brings * T * kernel(d, k, imp__to_local(&k->frame, to.wo)) * to.weight;
     }
-    struct imp__flux *f = imp__flux_add(d, light->n_ends + depth + 2);
+    if (imp_unlikely(d->b->fog != NULL)) {
+        const double clip = imp__edge_clip(d, &to);
+        if (!(to.dist > clip)) return;
+        L *= line.T * imp__edge_cleared(d, -clip);
+    } else {
+        L *= line.T;
+    }
+    struct imp__flux *f = imp__flux_add(d, light->n_ends + depth + 3);
     if (!f) return;
     f->px = to.px;
     f->py = to.py;
@@ -176,7 +217,7 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
         imp_v3 wo, w;
         const double pdf = direction_draw(d, k, dims, &wo);
         if (!(pdf > 0)) return;
-        T *= kernel(k, wo) * (1 / pdf);
+        T *= kernel(d, k, wo) * (1 / pdf);
         const double most = imp__max_used(T, d->waves),
                      survive = depth < 2 ? 1 : imp_min(most, 0.95);
         if (!(imp__u01(d->key, dims + IMP_EDGE_SURVIVE) < survive) || !(most > 0)) return;
