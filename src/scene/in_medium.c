@@ -3,6 +3,7 @@
  * A collision in a medium as a BSDF without a cosine: phase function times albedo, and emission
  * (1 - albedo) times the emitted radiance; with and without an albedo. */
 #include "in_medium.h"
+#include "base/compiler.h"
 #include "majorants.h"
 #include "math/vec.h"
 
@@ -124,6 +125,28 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     for (int j = m->n_own; j < m->n_in; j++) df[j] *= albedo;
 }
 
+/* A phase function p depends on the cosine c = -wo.wi alone: p' by differences of c, and
+ * dp/dwo = -p' wi, dp/dwi = -p' wo. */
+#define TURN 1e-6
+static void eval_directions_d(const struct imp_bsdf *b, const imp_spec *in,
+                              const struct imp_dirs *d, imp_spec d_wo[3],
+                              imp_spec d_wi[3])
+{
+    const double c = imp_clamp(imp_phase_cos(d), TURN - 1, 1 - TURN);
+    imp_spec f[2];
+    for (int k = 0; k < 2; k++) {
+        const double at = c + (k ? TURN : -TURN);
+        const struct imp_dirs turned = {
+            {0, 0, -1, 0}, {sqrt(imp_max(1 - at * at, 0.0)), 0, at, 0}, IMP_SMOOTH, 0};
+        eval(b, in, &turned, &f[k]);
+    }
+    const imp_spec slope = (f[1] - f[0]) * (1 / (2 * TURN));
+    for (int k = 0; k < 3; k++) {
+        d_wo[k] = -slope * d->wi[k];
+        d_wi[k] = -slope * d->wo[k];
+    }
+}
+
 /* What is absorbed at a collision is emitted there (1 - albedo times the emission). */
 static void emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                  imp_spec *e)
@@ -172,7 +195,8 @@ const struct imp_bsdf_ops imp__in_medium = {.size = sizeof(struct imp_bsdf_ops),
                                             .emit = emit,
                                             .emit_d = emit_d,
                                             .albedo = albedo,
-                                            .directional_albedo = directional_albedo};
+                                            .directional_albedo = directional_albedo,
+                                            .eval_directions_d = eval_directions_d};
 const struct imp_bsdf_ops imp__in_pure_medium = {.size = sizeof(struct imp_bsdf_ops),
                                                  .name = "medium of albedo 1",
                                                  .sample = sample,

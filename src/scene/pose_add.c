@@ -31,8 +31,9 @@ static const char *shape_why(const struct imp_scene *scene, const struct imp_sha
         return "it is not made of triangles, and no sphere, disk or cylinder";
     if (s->index >= imp__shapes_outside(scene))
         return "it is in a shape group: its instances have poses";
-    if (scene->n_media + scene->n_bodies > 0 || scene->priorities)
-        return "there are media";
+    if (scene->n_bodies > 0) return "there are media of graded index";
+    if (scene->priorities) return "shapes have priorities";
+    if (s->interior) return "it bounds a medium";
     if (scene->lights_in_tree) return "lights are chosen by a tree (light_choice)";
     if (scene->aims.aimed) return "directions are aimed at shapes";
     if (s->placed || s->by_triangle) return "its textures need more than uv";
@@ -94,7 +95,6 @@ static const char *sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
     if (kind != IMP_POSE_RIGID && !imp__pose_is_view(kind)) return "it is a sensor";
     double number[IMP_VIEW_NUMBERS];
     if (!s->ops->move) return "it is no perspective or orthographic camera or thin lens";
-    if (s->medium) return "it is in a medium";
     if (!imp__lens_middle(s, centre)) return "its rays meet in no point";
     if (kind == IMP_POSE_RIGID) return NULL;
     number[kind - IMP_POSE_FOV] = NAN;

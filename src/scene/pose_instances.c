@@ -32,8 +32,11 @@ const char *imp__instance_why(const struct imp_scene *scene, int k,
     const struct imp_instance *p = &scene->world->instance[k];
     if (kind != IMP_POSE_RIGID && kind != IMP_POSE_SCALE) return "it is an instance";
     if (p->motion) return "it has a motion of its own (to_world_end)";
-    if (scene->n_media + scene->n_bodies > 0 || scene->priorities)
-        return "there are media";
+    if (scene->n_bodies > 0) return "there are media of graded index";
+    if (scene->priorities) return "shapes have priorities";
+    for (int i = 0; i < p->group->n_within; i++)
+        if (scene->shapes[p->group->within[i]]->interior)
+            return "a shape in it bounds a medium";
     if (kind == IMP_POSE_SCALE && p->raised)
         return "the heights of its bump maps are made for its size";
     return NULL;

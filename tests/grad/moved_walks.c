@@ -158,6 +158,25 @@ static real receives(const real p[3], const struct place *y, real w[3])
     return dot_real(y->n, w) * y->area / (d2 * sqrtl(d2));
 }
 
+/* The camera's ray, through its centre and a point that it sees at rest. */
+static void camera_ray(const struct moved *m, const struct imp_walk *walk,
+                       const real p[3], real from[3], real w[3], real w0[3])
+{
+    real aim[3];
+    for (int i = 0; i < 3; i++) {
+        aim[i] = p[i];
+        from[i] = walk->ray.o[i];
+        w0[i] = aim[i] - from[i];
+    }
+    for (int k = 0; k < m->room->moves.n_movers; k++) {
+        const struct imp__mover *x = &m->room->moves.mover[k];
+        if (x->shape != IMP_MOVE_CAMERA) continue;
+        pose_apply(m->theta + x->first, x->centre, m->h, aim);
+        pose_apply(m->theta + x->first, x->centre, m->h, from);
+    }
+    for (int i = 0; i < 3; i++) w[i] = aim[i] - from[i];
+}
+
 /* Radiance of the recorded walk, sum of channels by `adjoint`: recorded values times what their
  * geometry and kernels are at h over what they are at 0. */
 static real walk_moved(const struct moved *m, const struct imp_walk *walk,
@@ -169,21 +188,9 @@ static real walk_moved(const struct moved *m, const struct imp_walk *walk,
     const struct imp_vertex *first = walk->first;
     for (int c = 0; c < 3; c++) L += adjoint[c] * (real)first->e[c];
     if (first->d.scatterer == IMP_AT_SKY) return L;
-    /* The camera's ray, through its centre and where the first vertex is at rest. */
     const struct place seen = place_of(&rest, first->d.shape, &first->d.located);
-    real aim[3];
-    for (int i = 0; i < 3; i++) {
-        aim[i] = seen.p[i];
-        from[i] = walk->ray.o[i];
-        w0[i] = aim[i] - from[i];
-    }
-    for (int k = 0; k < m->room->moves.n_movers; k++) {
-        const struct imp__mover *x = &m->room->moves.mover[k];
-        if (x->shape != IMP_MOVE_CAMERA) continue;
-        pose_apply(m->theta + x->first, x->centre, m->h, aim);
-        pose_apply(m->theta + x->first, x->centre, m->h, from);
-    }
-    for (int i = 0; i < 3; i++) w[i] = aim[i] - from[i];
+    camera_ray(m, walk, seen.p, from, w, w0);
+    bool seen_through = true;
     for (const struct imp_vertex *v = first; v; v = v->next) {
         const struct place x = place_of(m, v->d.shape, &v->d.located);
         const struct place x0 = place_of(&rest, v->d.shape, &v->d.located);
@@ -222,13 +229,17 @@ static real walk_moved(const struct moved *m, const struct imp_walk *walk,
         const bool sky = next->d.scatterer == IMP_AT_SKY;
         struct place y0 = {0};
         if (!sky) y0 = place_of(&rest, next->d.shape, &next->d.located);
-        for (int i = 0; i < 3; i++)
+        const bool pass = imp__goes_straight(v);
+        seen_through &= pass;
+        for (int i = 0; i < 3 && !seen_through; i++)
             w[i] = w0[i] = sky ? (real)next->d.p[i] : y0.p[i] - p0[i];
+        /* A mask does not turn the camera's ray. */
+        if (seen_through && !sky) camera_ray(m, walk, y0.p, p, w, w0);
         const imp_spec K0 = kernel_of(v, v->in, f0, wo0, w0, v->d.lobe),
                        step = kernel_of(v, in, f, wo, w, v->d.lobe);
         imp_spec met = step;
         real ratio = 1;
-        if (!sky && next->d.met.emitter >= 0) {
+        if (!sky && next->d.met.emitter >= 0 && !pass) {
             const struct place y = place_of(m, next->d.shape, &next->d.located);
             real to[3], to0[3];
             ratio = receives(p, &y, to) / receives(p0, &y0, to0);
@@ -369,6 +380,14 @@ static void refused(const char *rest, const char *word)
     "<texture type='bitmap' name='specular_reflectance'>" WAVES                          \
     "</texture></bsdf></bsdf>"
 
+#define HOLES                                                                            \
+    "<bsdf type='mask' id='grey'><texture type='bitmap' name='opacity'>" WAVES           \
+    "<boolean name='raw' value='true'/></texture><bsdf type='twosided'><bsdf "           \
+    "type='roughconductor'><float name='alpha' value='.4'/></bsdf></bsdf></bsdf>"
+#define GAUZE                                                                            \
+    "<bsdf type='mask' id='grey'><float name='opacity' value='.4'/><bsdf "               \
+    "type='twosided'><bsdf type='diffuse'/></bsdf></bsdf>"
+
 int main(void)
 {
     ctx = test_context(1);
@@ -391,6 +410,8 @@ int main(void)
     walks_test(DIRECT, PAINT, "a texture, all", add_all);
     walks_test(PATH, PAINT, "path, a texture, vertices", add_vertices);
     walks_test(PATH SKY, WORN, "path, textured metal, all", add_all);
+    walks_test(PATH SKY, HOLES, "path, a mask with a texture, all", add_all);
+    walks_test(PATH, GAUZE, "path, a mask, vertices", add_vertices);
     refused(PATH "<emitter type='projector' id='bulb'/>", "'bulb'");
     refused(PATH
             "<bsdf type='plastic' id='wax'/><shape type='cube'><ref id='wax'/></shape>",

@@ -5,16 +5,10 @@
  * place or direction of a light, its worst walk and number. Places are moved by these numbers
  * themselves, in double, and not by velocities. Other numbers of geometry have fresh rows alone.
  * What jumps at edges is not in it: fresh rows have that. */
-#include "check.h"
+#include "check_moved.h"
 #include "inverse/estimate/moved_gradient.h"
 #include "kind/emitter/ies.h"
-#include "kind/sensor/receiver.h"
-#include "scene/pose.h"
-#include "walk/core/vertex.h"
-#include "walk/moved/moved_chain.h"
-#include "walk/moved/moved_sky.h"
 #include <math.h>
-#include <string.h>
 
 #define FROZEN_LIMIT 1e-6
 #define TINY                                                                             \
@@ -23,254 +17,10 @@
     5 /* the last ones for vertices that slide fast, seen at a grazing angle */
 static const double steps[N_STEPS] = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
 
-/* One pose, scale, place or direction of a light, moved by h along one of its numbers. */
-struct moved {
-    const struct imp__check *c;
-    const struct imp_pose *pose;
-    int shape;       /* or IMP_MOVE_CAMERA, or that of a light */
-    double turn[9];  /* R(a') R(a)^T */
-    double by;       /* scale after over before */
-    imp_v3 from, to; /* the centre, or a light's place or direction, before and after */
-};
-
 static bool is_of_kind(const struct imp_pose *p)
 {
     return p->kind == IMP_POSE_RIGID || p->kind == IMP_POSE_SCALE ||
            p->kind == IMP_POSE_POSITION || p->kind == IMP_POSE_DIRECTION;
-}
-
-static void move_by(struct moved *m, size_t number, double h)
-{
-    const struct imp_pose *p = m->pose;
-    double there[6] = {0}, old[9], new[9];
-    memcpy(there, p->number, p->n * sizeof *there);
-    there[number] += h;
-    m->by = 1;
-    if (p->kind == IMP_POSE_SCALE) {
-        m->by = there[0] / p->number[0];
-        m->to = m->from;
-        return;
-    }
-    if (p->kind != IMP_POSE_RIGID) {
-        m->from = imp__v3(p->number[0], p->number[1], p->number[2]);
-        m->to = imp__v3(there[0], there[1], there[2]);
-        return;
-    }
-    imp__rotation_of(p->number + 3, old);
-    imp__rotation_of(there + 3, new);
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            double sum = 0;
-            for (int k = 0; k < 3; k++) sum += new[3 * i + k] * old[3 * j + k];
-            m->turn[3 * i + j] = sum;
-        }
-    m->from = p->centre + imp__v3(p->number[0], p->number[1], p->number[2]);
-    m->to = p->centre + imp__v3(there[0], there[1], there[2]);
-}
-
-static imp_v3 turned(const struct moved *m, imp_v3 d)
-{
-    const double *R = m->turn;
-    return imp__v3(R[0] * d[0] + R[1] * d[1] + R[2] * d[2],
-                   R[3] * d[0] + R[4] * d[1] + R[5] * d[2],
-                   R[6] * d[0] + R[7] * d[1] + R[8] * d[2]);
-}
-
-/* A point of a shape, its normal and a direction in it, and the curvature there, where the pose has
- * moved; the normal of its shading frame. */
-struct at {
-    imp_v3 p, n, s;
-    double curvature;
-    imp_v3 straight, shade;
-};
-static struct at placed(const struct moved *m, const struct imp__glued *x)
-{
-    struct at at = {x->p, x->n, x->s, x->curvature, x->straight, imp__shading_normal(x)};
-    if (x->carrier != m->shape) return at;
-    if (m->pose->kind == IMP_POSE_SCALE) {
-        at.p = m->from + (x->p - m->from) * m->by;
-        at.curvature /= m->by;
-    } else {
-        at.p = m->to + turned(m, x->p - m->from);
-        at.n = turned(m, x->n);
-        at.s = turned(m, x->s);
-        at.straight = turned(m, x->straight);
-        at.shade = turned(m, imp__shading_normal(x));
-    }
-    return at;
-}
-
-/* A direction, and a point, of what moves, as they were when the walk was recorded. */
-static imp_v3 turned_back(const struct moved *m, int carrier, imp_v3 d)
-{
-    const double *R = m->turn;
-    if (carrier != m->shape || m->pose->kind != IMP_POSE_RIGID) return d;
-    return imp__v3(R[0] * d[0] + R[3] * d[1] + R[6] * d[2],
-                   R[1] * d[0] + R[4] * d[1] + R[7] * d[2],
-                   R[2] * d[0] + R[5] * d[1] + R[8] * d[2]);
-}
-static imp_v3 was_at(const struct moved *m, int carrier, imp_v3 x)
-{
-    const imp_v3 r = x - m->to;
-    if (carrier != m->shape) return x;
-    if (m->pose->kind == IMP_POSE_SCALE) return m->from + r * (1 / m->by);
-    return m->from + turned_back(m, carrier, r);
-}
-
-/* The shading normal at x, in the plane of a triangle with vertex normals. */
-static imp_v3 shaded_at(const struct moved *m, const struct imp__glued *then, imp_v3 x)
-{
-    const struct imp__corners f =
-        imp__corners(m->c->problem->scene, then->shape, then->prim, then->place);
-    const imp_v3 r = was_at(m, then->carrier, x) - then->p;
-    double b[3] = {then->b[0], then->b[1], then->b[2]};
-    imp_v3 N = {0};
-    for (int k = 0; k < 2; k++) {
-        b[k + 1] += imp__dot(then->slope[k], r);
-        b[0] -= imp__dot(then->slope[k], r);
-    }
-    for (int k = 0; k < 3; k++) N += f.n[k] * b[k];
-    N = imp__normalize(N);
-    return then->carrier == m->shape && m->pose->kind == IMP_POSE_RIGID ? turned(m, N)
-                                                                        : N;
-}
-
-/* The point of a vertex, with its frame's s where its material is not Lambertian. */
-static struct imp__glued vertex_glued(const struct imp_scene *scene,
-                                      const struct imp_vertex *v, double time)
-{
-    struct imp__glued x =
-        imp__glued_at(scene, v->d.shape, &v->d.located, v->d.place, v->ng);
-    struct imp_surface at;
-    if (v->bsdf && !imp__is_plain(v->bsdf) &&
-        imp__decided_surface(scene, &v->d, time, &at))
-        x.s = at.s;
-    return x;
-}
-
-/* Where a ray from o along w meets the plane of a place, or the sphere that it lies on; the normal
- * there. */
-static imp_v3 met_at(imp_v3 o, imp_v3 w, struct at *x)
-{
-    const double plane = imp__dot(x->n, x->p - o) / imp__dot(x->n, w);
-    if (x->curvature == 0) return o + w * plane;
-    const imp_v3 centre = x->p - x->n * (1 / x->curvature);
-    /* A cylinder is met in the plane across its axis. */
-    const imp_v3 a = x->straight, flat = w - a * imp__dot(a, w);
-    imp_v3 r = centre - o;
-    r -= a * imp__dot(a, r);
-    const double slope = imp__length(flat), middle = imp__dot(r, flat) / slope;
-    const imp_v3 across = r - flat * (middle / slope);
-    const double half =
-        sqrt(fmax(imp__sqr(1 / x->curvature) - imp__dot(across, across), 0));
-    const double far = (middle + half) / slope, near = (middle - half) / slope;
-    const imp_v3 p = o + w * (fabs(far - plane) < fabs(near - plane) ? far : near);
-    const imp_v3 out = p - centre;
-    x->n = imp__normalize((out - a * imp__dot(a, out)) * x->curvature);
-    return p;
-}
-
-/* cos_y/d^2 from a point to another one. */
-static double receives(imp_v3 x, imp_v3 y, imp_v3 n_y)
-{
-    const imp_v3 r = y - x;
-    const double d = imp__length(r);
-    return imp__dot(n_y, r) / (d * d * d);
-}
-
-/* What the material looks up at x: of a shape that has moved since, where this point of it was when
- * the walk was recorded. */
-static void looked_up(const struct moved *m, const struct imp_vertex *v, imp_v3 x,
-                      bool moved, const struct imp__glued *then, imp_spec *in)
-{
-    const struct imp_scene *scene = m->c->problem->scene;
-    struct imp_texcoord at = imp__vertex_at(v);
-    struct imp_surface old;
-    imp_v3 grad[2];
-    if (moved) x = was_at(m, then->carrier, x);
-    if (then->curvature !=
-        0) { /* the point itself, as one that a ray of no length hits */
-        const struct imp_hit hit = {.shape = then->shape, .place = then->place};
-        imp__hit_surface(scene, &hit, &x, &(imp_v3){0}, &old);
-        at.uv[0] = old.uv[0];
-        if (imp__is_zero(then->straight)) at.uv[1] = old.uv[1];
-        else /* the height of a cylinder is not of the point, but of the hit */
-            at.uv[1] += imp__dot(old.dp_dv, x - then->p) / imp__dot(old.dp_dv, old.dp_dv);
-    } else if (imp__decided_surface(scene, &v->d, 0, &old)) {
-        imp__surface_grad(&old, grad);
-        for (int k = 0; k < 2; k++) at.uv[k] += imp__dot(grad[k], x - then->p);
-    }
-    imp__inputs_eval(v->bsdf->input, v->bsdf->n_in, &at, in);
-}
-
-/* The density of directions of a meter, where it was when the walk was recorded. */
-static double received(const struct moved *m, imp_v3 w)
-{
-    const struct imp_receiver *r = m->c->tracer.sensor->receiver;
-    return imp__receiver_density(r, imp__to_local(&r->frame, w));
-}
-
-/* The kernel of a vertex, now at x, over that at its recorded place, by lanes: between o and w, unit,
- * now and then. */
-static imp_spec kernel_ratio(const struct moved *m, const struct imp_vertex *v,
-                             const struct at *now, imp_v3 x, const imp_v3 o[2],
-                             const imp_v3 w[2], const struct imp__glued *then, int lobe)
-{
-    imp_spec in[IMP_INPUTS_MAX];
-    const bool meter = v->prev && v->prev->d.scatterer == IMP_AT_SENSOR;
-    if (meter && m->c->tracer.sensor->receiver)
-        return imp__spec(received(m, turned_back(m, then->carrier, w[0])) /
-                         received(m, w[1]));
-    if (meter || imp__is_plain(v->bsdf))
-        return imp__spec(imp__dot(now->shade, w[0]) /
-                         imp__dot(imp__shading_normal(then), w[1]));
-    imp_spec K[2];
-    const bool textured = imp__is_textured(v->bsdf);
-    for (int k = 0; k < 2; k++) {
-        if (textured) looked_up(m, v, k ? then->p : x, k == 0, then, in);
-        const imp_v3 n = k ? imp__shading_normal(then) : now->shade,
-                     across = k ? then->s : now->s;
-        const imp_v3 s = imp__normalize(across - n * imp__dot(n, across));
-        const struct imp_frame f = {s, imp__cross(n, s), n};
-        const struct imp_dirs d = {imp__to_local(&f, -o[k]), imp__to_local(&f, w[k]),
-                                   lobe, 0};
-        v->bsdf->ops->eval(v->bsdf, textured ? in : v->in, &d, &K[k]);
-    }
-    for (int c = 0; c < 4; c++) K[0][c] = K[1][c] != 0 ? K[0][c] / K[1][c] : 0;
-    return K[0];
-}
-
-/* Directions to the light sample of a vertex at x, now and at its recorded place; returns how what
- * it receives, without its kernel, has changed. */
-static double light_ratio(const struct moved *m, const struct imp_vertex *v,
-                          const struct imp__glued *old, imp_v3 x, imp_v3 w[2])
-{
-    const struct imp_scene *scene = m->c->problem->scene;
-    const struct imp_emitter *e = scene->emitters[v->d.light.emitter];
-    const imp_v3 d = imp__decided_v3(v->d.light.d);
-    const bool moves = m->pose->emitter == e;
-    w[0] = w[1] = imp__normalize(-d);
-    if (e->ops->flags & IMP_EMITTER_ENVIRONMENT) return 1;
-    if (!e->shape && e->ops->flags & IMP_EMITTER_FAR) {
-        const double side = imp__dot(d, m->from) < 0 ? 1 : -1;
-        if (moves) w[0] = imp__normalize(m->to) * side;
-        return 1;
-    }
-    if (!e->shape) {
-        double at[3];
-        e->ops->aim((struct imp_emitter *)(uintptr_t)e, at, false);
-        const imp_v3 y = imp__v3(at[0], at[1], at[2]), r = (moves ? m->to : y) - x,
-                     r_old = y - old->p;
-        w[0] = imp__normalize(r);
-        w[1] = imp__normalize(r_old);
-        return imp__dot(r_old, r_old) / imp__dot(r, r);
-    }
-    const struct imp__glued y =
-        imp__glued_at(scene, e->shape->index, &v->d.light.located, 0, d);
-    const struct at there = placed(m, &y);
-    w[0] = imp__normalize(there.p - x);
-    w[1] = imp__normalize(y.p - old->p);
-    return receives(x, there.p, there.n) / receives(old->p, y.p, y.n);
 }
 
 /* Has it light of a spot or ies light, whose intensity changes with the direction? */
@@ -287,83 +37,14 @@ static bool has_spots(const struct imp_scene *scene, const struct imp_walk *walk
     return false;
 }
 
-/* The walk's value, weighted by channels, where the pose has moved. */
-static double frozen(const struct moved *m, const struct imp_walk *walk, imp_spec P)
-{
-    const struct imp_scene *scene = m->c->problem->scene;
-    const struct imp_vertex *v = walk->first;
-    double value = 0;
-    if (!v) return 0;
-    if (v->d.scatterer == IMP_AT_SKY) {
-        const imp_v3 d = walk->ray.d;
-        return imp__sum_used(
-            P * imp__skies_from(scene, m->shape == IMP_MOVE_CAMERA ? turned(m, d) : d,
-                                v->carried),
-            scene->lanes);
-    }
-    const bool meter = v->d.scatterer == IMP_AT_SENSOR;
-    if (meter) {
-        P *= v->w;
-        v = v->next;
-        if (!v) return 0;
-    }
-    struct imp__glued old = vertex_glued(scene, v, walk->time);
-    imp_v3 o = walk->ray.o, w[2];
-    w[0] = w[1] = imp__normalize(old.p - o);
-    if (m->shape == IMP_MOVE_CAMERA) {
-        o = m->to + turned(m, o - m->from);
-        w[0] = turned(m, w[0]);
-    }
-    struct at here = placed(m, &old);
-    imp_v3 x = meter ? here.p : met_at(o, w[0], &here);
-    here.shade = old.smooth ? shaded_at(m, &old, x) : here.n;
-    for (; v; v = v->next) {
-        const imp_v3 from[2] = {w[0], w[1]};
-        if (v->d.connection == IMP_CONNECTED) {
-            imp_v3 to[2];
-            const double ratio = light_ratio(m, v, &old, x, to);
-            value += ratio * imp__sum_used(P * v->b *
-                                               kernel_ratio(m, v, &here, x, from, to,
-                                                            &old, IMP_SMOOTH),
-                                           scene->lanes);
-        }
-        P *= v->w;
-        const struct imp_vertex *next = v->next;
-        if (!v->d.goes_on || !next) break;
-        const bool sky = next->d.scatterer == IMP_AT_SKY;
-        const struct imp__glued ahead = sky ? old : vertex_glued(scene, next, walk->time);
-        w[0] = w[1] = imp__normalize(sky ? imp__decided_v3(next->d.p) : ahead.p - old.p);
-        const imp_spec step = kernel_ratio(m, v, &here, x, from, w, &old, v->d.lobe);
-        if (sky) {
-            value += imp__sum_used(P * step * v->beyond, scene->lanes);
-            break;
-        }
-        struct at there = placed(m, &ahead);
-        if (next->d.met.emitter >= 0) {
-            const imp_v3 to[2] = {imp__normalize(there.p - x), w[1]};
-            value +=
-                imp__sum_used(P * next->e *
-                                  kernel_ratio(m, v, &here, x, from, to, &old, v->d.lobe),
-                              scene->lanes) *
-                receives(x, there.p, there.n) / receives(old.p, ahead.p, ahead.n);
-        }
-        x = met_at(x, w[0], &there);
-        there.shade = ahead.smooth ? shaded_at(m, &ahead, x) : there.n;
-        P *= step;
-        old = ahead;
-        here = there;
-    }
-    return value;
-}
-
 /* A walk's slopes along the numbers against differences, each at its best step; *worst: the row of
  * the largest error so far. */
-static void compare(struct moved *m, const struct imp_walk *walk, imp_spec P,
+static void compare(struct imp__moved_by *m, const struct imp_walk *walk, imp_spec P,
                     const double slope[6], struct imp_check_row *worst)
 {
     static const double places[4] = {1, -1, 2, -2};
-    move_by(m, 0, 0);
-    const double still = fabs(frozen(m, walk, P));
+    imp__move_by(m, 0, 0);
+    const double still = fabs(imp__frozen_walk(m, walk, P));
     for (size_t e = 0; e < m->pose->n; e++) {
         const double scale = 0.1 * imp__pose_large(m->pose, e);
         struct imp_check_row best = {.error = INFINITY};
@@ -371,8 +52,8 @@ static void compare(struct moved *m, const struct imp_walk *walk, imp_spec P,
             const double h = steps[s] * scale;
             double f[4];
             for (int i = 0; i < 4; i++) {
-                move_by(m, e, places[i] * h);
-                f[i] = frozen(m, walk, P);
+                imp__move_by(m, e, places[i] * h);
+                f[i] = imp__frozen_walk(m, walk, P);
             }
             const double d = (8 * (f[0] - f[1]) - (f[2] - f[3])) / (12 * h);
             const double least = fmax(fabs(slope[e]), TINY * still / scale);
@@ -404,10 +85,10 @@ static enum imp_status pose_check(struct imp__check *c, struct imp__moved_gradie
 {
     const struct imp_film_desc *film = &c->tracer.sensor->film;
     const uint64_t pixels = (uint64_t)film->crop_w * (uint64_t)film->crop_h;
-    struct moved m = {.c = c,
-                      .pose = g->pose[mover],
-                      .shape = g->moves.mover[mover].shape,
-                      .from = g->moves.mover[mover].centre};
+    struct imp__moved_by m = {.c = c,
+                              .pose = g->pose[mover],
+                              .shape = g->moves.mover[mover].shape,
+                              .from = g->moves.mover[mover].centre};
     struct imp_check_row worst = {0};
     for (int t = 0; t < c->options.paths; t++) {
         const uint64_t pixel = imp__mix64((uint64_t)t + 0x51ed270b) % pixels;

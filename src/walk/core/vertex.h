@@ -52,4 +52,12 @@ static inline struct imp_dirs imp__light_dirs(const struct imp_vertex *v)
                              IMP_SMOOTH, 0};
 }
 
+/* Does light go straight on there, along the walk? */
+static inline bool imp__goes_straight(const struct imp_vertex *v)
+{
+    const int lobe = v->d.lobe;
+    return v->bsdf && imp_unlikely(v->bsdf->straight) && v->d.goes_on && lobe >= 0 &&
+           lobe < 64 && v->bsdf->straight >> lobe & 1;
+}
+
 #endif

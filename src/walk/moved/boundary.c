@@ -9,6 +9,7 @@
 #include "scene/camera_gain.h"
 #include "scene/pose.h"
 #include "walk/core/lane_mis.h"
+#include "walk/path/first_segment.h"
 
 /* A tenth of each measure is the length in space. */
 #define BY_LENGTH 0.1
@@ -235,6 +236,11 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
     const struct imp_scene *scene = tracer->scene;
     *out = (struct imp__boundary){.tracer = tracer, .moves = moves, .edges = edges};
     out->size = imp__length(scene->hi - scene->lo);
+    out->through = imp__segment_first(tracer)->through;
+    imp_spec extinction;
+    if (imp__fog(tracer, NULL, &extinction)) out->fog = tracer->sensor->medium;
+    for (int k = 0; k < scene->n_all_shapes; k++)
+        out->passes |= imp__shape_bsdf(scene, scene->shapes[k])->straight != 0;
     enum imp_status st = imp__moved_allowed(tracer);
     if (tracer->sensor->shape) /* by which edges are chosen: the middle of a meter */
         out->camera = (tracer->sensor->shape->lo + tracer->sensor->shape->hi) * 0.5;
@@ -334,7 +340,10 @@ void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
     d->part = d->b->part[kind];
     d->end = &d->first;
     eye_draw(d);
-    if (!waves_draw(d) || !imp__edge_item_choose(d)) return;
+    if (!waves_draw(d)) return;
+    if (imp_unlikely(d->b->fog != NULL))
+        imp__fog(d->b->tracer, imp__edge_waves(d), &d->extinction);
+    if (!imp__edge_item_choose(d)) return;
     kind_work(d, kind);
     for (struct imp__flux *f = d->waves ? d->first : NULL; f; f = f->next)
         f->L = imp__waves_channels(d->waves, f->L);

@@ -43,6 +43,14 @@
  *                  dI = int dA_p dpsi f |n_s.w| W(p) [L(above) - L(below)] n'.w
  *              where what is emitted by a light at y, glued to it, has n'.w + n.(V_y - V)/d.
  *
+ * Lines pass masks and null materials straight on (boundary_line.c). Where light samples stop at these
+ * (path), what a light sends through one is scattered light; where they pass (volpath), a silhouette
+ * counts by what passes outside it less what passes inside.
+ *
+ * In a medium that fills the scene x is also a point of it: f |cos| dA is then sigma p dV, p the phase
+ * function times the albedo, and L is times what passes from the edge to x. Of what a lamp sends to such a
+ * point a part is in `light`, and the rest in `scatter` (imp__glued_part).
+ *
  * x' is the velocity of a vertex that slides, along the chain from the camera. W(x), what the
  * sensor makes of a unit of radiance times projected area that leaves x, is a connection to the
  * camera, or the walk goes on from x by transposed kernels and is connected from there: a walk
@@ -105,7 +113,10 @@ struct imp__boundary {
     imp_v3 camera; /* where its rays meet, or the middle of its lens, or of a meter */
     bool parallel; /* its rays are: `camera` is their direction */
     bool wide;     /* they do not meet: a lens with an aperture, or a meter */
-    double size;   /* of the scene */
+    bool passes;   /* a material of the scene lets light go straight on */
+    bool through;  /* also light samples, and that is no bounce */
+    const struct imp_medium *fog; /* which fills the scene; NULL: none */
+    double size;                  /* of the scene */
     int n_lights;
     double *light_cdf; /* [n_emitters] of those that have draws, by power; last is 1 */
     /* [n_emitters] skies that have draws, and of these what a meter does not see by chance. */

@@ -78,6 +78,11 @@ static enum imp_status seam_allowed(const struct imp__boundary *b,
             "derivatives by what moves: shape '%s' passes through '%s', the "
             "shape of meter '%s'",
             other, own, sensor->name);
+    if (b->through && scene->shapes[f->shape]->emitter >= 0)
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "derivatives by what moves: light '%s' passes through shape "
+                          "'%s', and walks are those of volpath (path has them)",
+                          own, other);
     const int met = imp__placed_shape(scene, g->shape, g->place);
     if (scene->shapes[f->shape]->emitter >= 0 &&
         !is_black(scene, imp__shape_bsdf(scene, scene->shapes[met])))
@@ -121,6 +126,30 @@ static enum imp_status seams_allowed(const struct imp__boundary *b)
     return IMP_OK;
 }
 
+/* An edge at which faces meet that let light samples pass in different parts: it is no silhouette for
+ * a line through both, and the light jumps there. NULL: none. */
+static const struct imp__edge_face *edge_mixed(const struct imp__boundary *b)
+{
+    for (size_t k = 0; b->passes && b->through && k < 2 * b->edges->n_arcs; k++) {
+        const struct imp__edge_face *f = &b->edges->arc[k / 2].side[k % 2];
+        const struct imp_hit hit = {.shape = f->shape, .place = f->place};
+        if (imp__hit_bsdf(b->tracer->scene, &hit)->straight) return f;
+    }
+    for (size_t k = 0; b->passes && b->through && k < b->edges->n; k++) {
+        const struct imp__edge *e = &b->edges->edge[k];
+        const struct imp_bsdf *first = NULL;
+        for (int j = 0; j < e->n_faces; j++) {
+            const struct imp__edge_face *f = &b->edges->face[e->first + (size_t)j];
+            const struct imp_hit hit = {.shape = f->shape, .place = f->place};
+            const struct imp_bsdf *own = imp__hit_bsdf(b->tracer->scene, &hit);
+            if (!first) first = own;
+            if ((own->straight || first->straight) && (own != first || e->n_faces > 2))
+                return f;
+        }
+    }
+    return NULL;
+}
+
 static enum imp_status edges_allowed(const struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
@@ -141,6 +170,14 @@ static enum imp_status edges_allowed(const struct imp__boundary *b)
             "shape '%s', and they are not the wall and the lid of a can that "
             "stands still",
             scene->shapes[rim]->name, scene->shapes[other]->name);
+    const struct imp__edge_face *mixed = edge_mixed(b);
+    if (mixed)
+        return imp__error(
+            scene->ctx, IMP_E_UNSUPPORTED,
+            "derivatives by what moves: at an edge of shape '%s' materials meet that "
+            "let different parts of the light straight through, which light samples of "
+            "volpath see (those of path do not)",
+            scene->shapes[mixed->shape]->name);
     const int pierced = imp__edges_pierced(b->edges, scene, &other);
     if (pierced >= 0)
         return imp__error(
@@ -160,7 +197,7 @@ static bool back_met(const struct imp__boundary *b, imp_v3 w, struct imp_hit *hi
     imp__hit_surface(scene, hit, &b->camera, &w, &at);
     const int met = imp__placed_shape(scene, hit->shape, hit->place);
     const struct imp_bsdf *bsdf = imp__shape_bsdf(scene, scene->shapes[met]);
-    return imp__dot(at.ng, w) > 0 && bsdf->ops != &imp__twosided;
+    return imp__dot(at.ng, w) > 0 && bsdf->ops != &imp__twosided && !bsdf->straight;
 }
 
 #define PROBES 64

@@ -114,7 +114,7 @@ bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, bool parallel, imp_
     const imp_v3 from = parallel ? o + (past - d->p) : o,
                  to = imp__normalize(past - from);
     struct imp_hit hit;
-    if (!imp__intersect(d->b->tracer->scene, &from, &to, 0, INFINITY, &hit) ||
+    if (!imp__intersect(d->b->tracer->scene, &from, &to, d->near, INFINITY, &hit) ||
         !imp__edge_face_hit(d, f, &hit))
         return false;
     const struct imp__corners facet =

@@ -12,6 +12,7 @@ imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py)
     struct imp_sensor_ray ray;
     struct imp_walk walk;
     t->sensor->ops->ray(t->sensor, px, py, d->lens, &ray);
+    if (imp_unlikely(d->near > 0)) ray.t_near = d->near;
     imp__walk_along(t, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves, 0, NULL,
                     &walk);
     return walk.values;
@@ -52,7 +53,8 @@ static imp_spec look_beside(struct imp__edge_draw *d, const struct imp_sensor_sa
     return imp__look_through(d, at.px, at.py);
 }
 
-void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to)
+void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to,
+                    imp_spec T)
 {
     const imp_v3 w = -to->wo, turned = imp__cross(d->along, w);
     const double sine = imp__length(turned);
@@ -63,8 +65,9 @@ void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to
     const double apart = IMP_BESIDE * (sky              ? 1
                                        : d->b->parallel ? to->dist + imp__length(d->p)
                                                         : imp__length(d->p - to->p));
+    T = imp__edge_near(d, to->dist, apart, T);
     const imp_spec jump =
-        look_beside(d, to, w, -m, apart) - look_beside(d, to, w, m, apart);
+        T * (look_beside(d, to, w, -m, apart) - look_beside(d, to, w, m, apart));
     struct imp__flux *f =
         imp__jump_add(d, to, jump * (to->weight * sine * d->inv_pdf), 1 + IMP_EDGE_ENDS);
     if (!f) return;
@@ -76,18 +79,24 @@ void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to
     f->end[f->n_ends++] = imp__flux_camera(d, &at, -m);
 }
 
-bool imp__edge_is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r)
+bool imp__edge_is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, imp_spec *T)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
-    if (!d->edge) return imp__occluded_at(scene, 0, &o, &r, 0, 1 - IMP_BESIDE);
+    struct imp__line line;
     struct imp_hit hit;
+    if (!d->edge) {
+        const bool open = imp__edge_line(d, o, r, 1 - IMP_BESIDE, &line);
+        *T = line.T;
+        return !open;
+    }
+    *T = imp__edge_cleared(d, imp__length(r));
     double from = 0;
     while (imp__intersect(scene, &o, &r, from, 1 - IMP_BESIDE, &hit)) {
         bool own = false;
-        for (int k = 0; k < d->edge->n_faces; k++)
+        for (int k = 0; k < d->edge->n_faces && !own; k++)
             own |= imp__edge_face_hit(d, &d->b->edges->face[d->edge->first + (size_t)k],
                                       &hit);
-        if (!own) return true;
+        if (!own && !imp__edge_hit_passes(d, &hit, o, r, T)) return true;
         from = hit.t + 0.1 * IMP_BESIDE;
     }
     return false;
@@ -103,7 +112,9 @@ void imp__draw_film(struct imp__edge_draw *d)
         !imp__light_on_film(sensor, &to))
         return;
     const imp_v3 r = imp__edge_clear(d) - to.p;
+    imp_spec T;
     if (imp__edge_merges(d, r, IMP_BESIDE * imp__length(r))) return;
-    if (imp__edge_is_hidden(d, to.p, r)) return;
-    imp__film_jump(d, &to);
+    if (imp__edge_is_hidden(d, to.p, r, &T)) return;
+    if (imp_unlikely(b->fog != NULL)) T *= imp__edge_cleared(d, -imp__edge_clip(d, &to));
+    imp__film_jump(d, &to, T);
 }

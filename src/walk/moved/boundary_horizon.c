@@ -21,15 +21,14 @@ static void emission_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
                            const struct imp_surface *at, const struct imp__glued *x,
                            const struct imp_walk *walk, imp_v3 w, double times)
 {
-    const struct imp_vertex *v = walk->first;
-    if (walk->dropped || !v || v->d.scatterer == IMP_AT_SKY ||
-        imp__is_zero_used(v->e, d->waves))
-        return;
+    imp_spec T;
+    const struct imp_vertex *v = imp__walk_met(d, walk, &T);
+    if (!v || imp__is_zero_used(T * v->e, d->waves)) return;
     const struct imp__glued y =
         imp__glued_at(d->b->tracer->scene, v->d.shape, &v->d.located, 0, v->ng);
     const imp_v3 turn = x->n * (1 / imp__length(y.p - x->p));
     struct imp__edge_light light = {
-        .w = -w, .light = v->e * times, .behind = 1, .horizon = true, .n_ends = 2};
+        .w = -w, .light = T * v->e * times, .behind = 1, .horizon = true, .n_ends = 2};
     light.end[0] = (struct imp__flux_end){*x, {.n = w, .v = -turn}, false, 0, {0}};
     light.end[1] = imp__flux_glued(&y, turn);
     imp__edge_reach(d, hit, at, &light);
@@ -54,7 +53,8 @@ void imp__draw_horizon(struct imp__edge_draw *d)
     emission_reach(d, &hit, &at, &x, &above, w, times);
     emission_reach(d, &hit, &at, &x, &below, w, -times);
     int depths;
-    imp_spec *jump = imp__jumps(d, &above, &below, times, NULL, &depths);
+    imp_spec *jump = imp__jumps(d, &above, &below, imp__spec(times),
+                                (struct imp__seen_from){.drawn = NULL}, &depths);
     if (!jump) return;
     struct imp__edge_light light = {
         .w = -w, .light = jump[0], .horizon = true, .n_ends = 1};

@@ -110,6 +110,29 @@ static void ends_set(const struct imp__edge_draw *d, const struct line *l, doubl
             source_end(d, l->from, l->m * (parallel ? t_x : far - 1));
 }
 
+#define INSIDE                                                                           \
+    1e-3 /* the line inside meets what is behind the edge so much, or less, earlier */
+
+/* Where light samples pass masks, and in a medium: the line past the edge, from o along `out`, and beside it along `in`,
+ * which the edge's own faces may let pass in part; both of the length 1 to the edge, t_y away. Sets
+ * what is met behind the edge, and *T, what passes out there less what passes inside. */
+static bool jump_follow(const struct imp__edge_draw *d, imp_v3 o, imp_v3 out, imp_v3 in,
+                        double t_y, struct imp_hit *hit, struct imp_surface *at,
+                        imp_spec *T)
+{
+    const double contact = IMP_CONTACT * d->b->size;
+    struct imp__line before, behind, inside;
+    *T = imp__spec(0);
+    if (!imp__edge_line(d, o, out, 1 + contact / t_y, &before)) return false;
+    const imp_v3 w = imp__normalize(out);
+    if (!imp__edge_follow(d, o + out, w, contact, 0, hit, at, &behind)) return false;
+    const double till = 1 + (1 - INSIDE) * hit->t / t_y;
+    *T = before.T * behind.T;
+    if (imp__edge_passes(d) && imp__edge_line(d, o, in, till, &inside)) *T -= inside.T;
+    *T *= behind.times;
+    return true;
+}
+
 void imp__draw_light(struct imp__edge_draw *d)
 {
     const struct imp__boundary *b = d->b;
@@ -117,7 +140,9 @@ void imp__draw_light(struct imp__edge_draw *d)
     if (b->n_lights == 0) return;
     const struct source s = source_draw(d);
     const struct imp_emitter *e = scene->emitters[s.light];
-    if (!(s.density > 0) || !imp__edge_silhouette(d, s.p, s.parallel)) return;
+    if (!(s.density > 0) || (s.parallel && b->fog) || /* none of it comes through */
+        !imp__edge_silhouette(d, s.p, s.parallel))
+        return;
 
     /* Parallel light: from outside the scene. */
     const imp_v3 from = s.parallel ? d->p - s.p * (2 * b->size) : s.p;
@@ -137,14 +162,27 @@ void imp__draw_light(struct imp__edge_draw *d)
     if (imp__edge_merges(d, to, beside)) return;
     struct imp_hit hit;
     struct imp_surface at;
-    const bool meets = imp__intersect(scene, &o, &to, 0, INFINITY, &hit);
-    if (meets && hit.t < 1 + IMP_CONTACT * b->size / t_y) return;
+    imp_spec T = imp__spec(1);
+    const bool follows = b->fog || (b->passes && b->through);
+    bool meets;
+    if (imp_unlikely(follows)) {
+        const imp_v3 inside = d->p - m * beside - o;
+        meets = jump_follow(d, o, to, inside, t_y, &hit, &at, &T);
+        if (imp__is_zero_used(T, d->waves)) return;
+    } else {
+        meets = imp__intersect(scene, &o, &to, 0, INFINITY, &hit);
+        if (meets && hit.t < 1 + IMP_CONTACT * b->size / t_y) return;
+    }
 
     const imp_spec le = sent(d, &s, cosine, imp__normalize(to));
     const double spread = s.parallel ? 1 : t_y * t_y;
     struct line line = {&s, m, t_y};
     struct imp__edge_light light = {.w = imp__normalize(to), .behind = 1};
-    light.light = le * (-cosine * sine * d->inv_pdf / (spread * s.density));
+    if (imp_unlikely(follows && hit.shape < 0 && e->shape)) {
+        double slope;
+        T *= imp__glued_part(e, imp__length(at.p - s.p), &slope);
+    }
+    light.light = T * le * (-cosine * sine * d->inv_pdf / (spread * s.density));
     struct imp__meter_point x;
     if (b->tracer->sensor->shape && (!s.sky || b->drawn_to_meter[s.light]) &&
         imp__meter_meet(d, o, to, meets ? &hit : NULL, &x)) {
@@ -152,7 +190,7 @@ void imp__draw_light(struct imp__edge_draw *d)
         imp__meter_reach(d, &x, &light);
     }
     if (!meets) return;
-    imp__hit_surface(scene, &hit, &o, &to, &at);
+    if (imp_likely(!follows)) imp__hit_surface(scene, &hit, &o, &to, &at);
     ends_set(d, &line, imp__length(at.p - d->p), &light);
     imp__edge_reach(d, &hit, &at, &light);
 }

@@ -44,10 +44,10 @@ struct imp__flux_end imp__meter_end(const struct imp__edge_draw *d,
 static void emission_add(struct imp__edge_draw *d, const struct imp_sensor_sample *to,
                          const struct imp_walk *walk, imp_v3 m, double times)
 {
-    const struct imp_vertex *v = walk->first;
-    const int max = d->b->tracer->integrator->max_depth;
-    if (walk->dropped || !v || v->d.scatterer == IMP_AT_SKY || max == 0) return;
-    struct imp__flux *f = imp__jump_add(d, to, v->e * times, 2 + IMP_EDGE_ENDS);
+    imp_spec T;
+    const struct imp_vertex *v = imp__walk_met(d, walk, &T);
+    if (!v || d->b->tracer->integrator->max_depth == 0) return;
+    struct imp__flux *f = imp__jump_add(d, to, T * v->e * times, 2 + IMP_EDGE_ENDS);
     if (!f) return;
     f->n_ends = imp__edge_ends(d, m, f->end);
     const struct imp__glued y =
@@ -71,6 +71,7 @@ void imp__draw_meter(struct imp__edge_draw *d)
     const bool points = imp__meter_is_points(t->sensor);
     struct imp_sensor_sample to;
     struct imp_surface at = {.uv = {0}};
+    imp_spec T;
     imp__meter_draw(t->sensor, d->lens, &at);
     if (!imp__edge_any(d, at.p, false) ||
         !imp__sensor_connect(t->sensor, &d->p, false, d->lens, &to) ||
@@ -81,15 +82,15 @@ void imp__draw_meter(struct imp__edge_draw *d)
     const double apart = IMP_BESIDE * (imp__length(r) + imp__length(d->p));
     const imp_v3 turned = imp__cross(d->along, d->p - to.p);
     if (!(imp__length(turned) > 0) || imp__edge_merges(d, r, apart) ||
-        imp__edge_is_hidden(d, o, r))
+        imp__edge_is_hidden(d, o, r, &T))
         return;
     const imp_v3 m = imp__normalize(turned);
     const double times = to.weight * d->inv_pdf * imp__length(turned) / to.dist;
     struct imp_walk lo, hi;
     look_beside(d, &at, o, -m, apart, &lo);
     look_beside(d, &at, o, m, apart, &hi);
-    const bool *drawn = points ? NULL : d->b->drawn_to_meter;
-    const imp_spec jump = imp__arrives(t, &lo, 0, drawn) - imp__arrives(t, &hi, 0, drawn);
+    const struct imp__seen_from x = {.drawn = points ? NULL : d->b->drawn_to_meter};
+    const imp_spec jump = imp__arrives(d->b, &lo, x) - imp__arrives(d->b, &hi, x);
     struct imp__flux *f = imp__jump_add(d, &to, jump * times, 1 + IMP_EDGE_ENDS);
     if (f) {
         f->n_ends = imp__edge_ends(d, m, f->end);

@@ -6,6 +6,7 @@
 
 #include "boundary.h"
 #include "moved_chain.h"
+#include "scene/instances.h"
 
 struct imp__edge_draw {
     const struct imp__boundary *b;
@@ -30,7 +31,9 @@ struct imp__edge_draw {
     bool no_memory;
     double lens
         [4]; /* numbers of the point through which the sensor sees, and of connections */
-    imp_v3 eye; /* that point; of parallel rays their direction */
+    imp_v3 eye;          /* that point; of parallel rays their direction */
+    imp_spec extinction; /* of the medium; 0: there is none */
+    double near; /* walks that look past the edge scatter behind this distance alone */
 };
 
 /* Random numbers of a draw; walks that leave it have others. */
@@ -47,6 +50,8 @@ enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
 #define IMP_EDGE_LOBE   (1u << 20) /* behind all of those: by which a lobe is chosen */
 #define IMP_EDGE_WAVE   (1u << 21) /* and from which wavelengths are drawn */
 #define IMP_EDGE_SENSOR (1u << 22) /* four, of a point of a meter or lens */
+#define IMP_EDGE_PASS   (1u << 23) /* whether light goes straight on through a mask */
+#define IMP_EDGE_FLIGHT (1u << 24) /* two, of how far it goes in a medium: of each line */
 
 /* So far beside an edge, per distance to it, it is looked past; rays are traced in float, whose
  * rounding is a tenth of that. */
@@ -77,9 +82,47 @@ imp_v3 imp__edge_clear(const struct imp__edge_draw *d);
  * is thinner than the look is apart from the rim, `beside` it: it sees what is beside the outline, which
  * has draws of its own. */
 bool imp__edge_merges(const struct imp__edge_draw *d, imp_v3 w, double beside);
+/* ---- Straight lines: boundary_line.c ---- */
+/* The material of what was hit, which in an instance may be its own. */
+static inline const struct imp_bsdf *imp__hit_bsdf(const struct imp_scene *scene,
+                                                   const struct imp_hit *hit)
+{
+    return imp__shape_bsdf(
+        scene, scene->shapes[imp__placed_shape(scene, hit->shape, hit->place)]);
+}
+struct imp__line {
+    imp_spec T;   /* what it lets pass */
+    double times; /* one over the probability with which it was chosen */
+    int bounces;  /* surfaces that it passes, as max_depth counts them */
+};
+/* From o along r, up to the part `till` of it. False: nothing comes through. */
+bool imp__edge_line(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, double till,
+                    struct imp__line *line);
+/* From o + from w along the unit vector w to where light is scattered, through masks by chance, at a
+ * surface or (hit->shape -1) in the medium: number `dims` of the draw's lines. hit->t is its
+ * distance. False: nowhere. */
+bool imp__edge_follow(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
+                      unsigned dims, struct imp_hit *hit, struct imp_surface *at,
+                      struct imp__line *line);
+/* What the medium lets pass over this length; and before which distance from the camera it is not. */
+imp_spec imp__edge_cleared(const struct imp__edge_draw *d, double length);
+double imp__edge_clip(const struct imp__edge_draw *d, const struct imp_sensor_sample *to);
+/* Does light go straight on through what a ray from o along r hit? *T is multiplied by its part. */
+bool imp__edge_hit_passes(const struct imp__edge_draw *d, const struct imp_hit *hit,
+                          imp_v3 o, imp_v3 r, imp_spec *T);
+/* Does light go straight on through what the draw's edge belongs to? */
+bool imp__edge_passes(const struct imp__edge_draw *d);
+/* The vertex whose emission a light sample could have brought to where a recorded walk begins, and *T
+ * what passes on the way. NULL: there is none. */
+const struct imp_vertex *imp__walk_met(const struct imp__edge_draw *d,
+                                       const struct imp_walk *walk, imp_spec *T);
+/* Looks from here past a point so far away, of a draw in a medium, begin next to it; what passes on the
+ * way there (T) is then the caller's factor, which is returned, and else that of the walks. */
+imp_spec imp__edge_near(struct imp__edge_draw *d, double distance, double apart,
+                        imp_spec T);
 /* Is the edge's point hidden from o, r away? Its own faces do not hide it, but a ray along one may meet
- * it anywhere. */
-bool imp__edge_is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r);
+ * it anywhere. *T: what passes on the way. */
+bool imp__edge_is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, imp_spec *T);
 /* Is a hit one of this face? */
 bool imp__edge_face_hit(const struct imp__edge_draw *d, const struct imp__edge_face *f,
                         const struct imp_hit *hit);
@@ -111,20 +154,27 @@ struct imp__flux *imp__jump_add(struct imp__edge_draw *d,
 /* What the camera sees at a film position. */
 imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py);
 /* The flux of a jump of the picture where the draw's point is seen; of a circle of a sky, with the
- * point d->p at the distance 1 from the camera. */
-void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to);
+ * point d->p at the distance 1 from the camera. T: what passes on the way there. */
+void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to,
+                    imp_spec T);
 /* What a vertex at a hit sees towards a place, behind `before` vertices. */
 void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 to,
                     int before, struct imp_walk *walk);
 /* What arrives along a recorded walk from a vertex x, without the emission of a light that it
- * meets first, which is glued to that, and of skies that are drawn [n_emitters] (NULL: none is).
- * Vertex i of it has number i + before of the whole path. */
-imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk, int before,
-                      const bool *drawn);
+ * meets first, which is glued to that (of x in a medium a part), and of skies that are drawn
+ * [n_emitters] (NULL: none is). Vertex i of it has number i + before of the whole path. */
+struct imp__seen_from {
+    int before;
+    bool floats;
+    const bool *drawn;
+};
+imp_spec imp__arrives(const struct imp__boundary *b, const struct imp_walk *walk,
+                      struct imp__seen_from x);
 /* Vertices behind the edge for which light is known: what jumps by depth [*n], in the arena. NULL:
- * no memory, or nothing jumps. */
+ * no memory, or nothing jumps. x.before has no effect. */
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
-                     const struct imp_walk *hi, double times, const bool *drawn, int *n);
+                     const struct imp_walk *hi, imp_spec times, struct imp__seen_from x,
+                     int *n);
 
 /* What light that arrives at `at` (a hit of this shape) along w brings to the sensor: from there,
  * and over further vertices. Light: radiance times all factors but f W(x). `back`: vertices that
@@ -151,7 +201,7 @@ int imp__seam_side(const struct imp__edge_draw *d, const struct imp_walk *walk);
 /* What such a walk brings, on the side that m points away from, to what lies at a hit along w. */
 void imp__seam_emission(struct imp__edge_draw *d, const struct imp_hit *hit,
                         const struct imp_surface *at, const struct imp_walk *walk,
-                        imp_v3 m, imp_v3 w, double times);
+                        imp_v3 m, imp_v3 w, imp_spec times);
 
 /* ---- Meters: boundary_meter.c ---- */
 /* Has it a place for each pixel, and no area? */

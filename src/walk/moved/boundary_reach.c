@@ -10,6 +10,8 @@
 #include "walk/core/step.h"
 #include "walk/lights/light_step.h"
 
+extern const struct imp_bsdf_ops imp__mask;
+
 /* A vertex of the chain, on the way to the camera. */
 struct link {
     struct link *before; /* nearer to the edge; NULL: none */
@@ -23,25 +25,48 @@ struct link {
     imp_spec in[IMP_INPUTS_MAX];
 };
 
+/* A point of the medium. */
+static void link_float(const struct imp__edge_draw *d, struct link *k,
+                       const struct imp_surface *at, imp_v3 w)
+{
+    const struct imp_medium *m = d->b->fog;
+    const struct imp_texcoord place = {.p = at->p, .carried = imp__edge_waves(d)};
+    k->x = imp__medium_point(at->p);
+    k->bsdf = m->scatterer;
+    k->at = *at;
+    k->frame = (struct imp_frame){{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
+    k->wi = -w;
+    k->cos_i = 1;
+    imp__evaluate_inputs(k->bsdf, NULL, &place, k->in);
+}
+
+/* hit->shape -1: in the medium. */
 static struct link *link_make(struct imp__edge_draw *d, struct link *before,
                               const struct imp_hit *hit, const struct imp_surface *at,
                               imp_v3 w, bool horizon)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
-    const struct imp_shape *shape =
-        scene->shapes[imp__placed_shape(scene, hit->shape, hit->place)];
     struct link *k = imp__arena_take(d->arena, 1, sizeof *k);
     if (!k) {
         d->no_memory = true;
         return NULL;
     }
+    /* The chain comes from the camera. */
+    if (before && imp_unlikely(before->x.floats))
+        imp__float_aim(scene, &before->x, at->p);
+    k->before = before;
+    if (imp_unlikely(hit->shape < 0)) {
+        link_float(d, k, at, w);
+        return k;
+    }
+    const struct imp_shape *shape =
+        scene->shapes[imp__placed_shape(scene, hit->shape, hit->place)];
     const struct imp_texcoord place = {.uv = {at->uv[0], at->uv[1]},
                                        .p = at->p,
                                        .shape = shape,
                                        .prim = hit->prim,
                                        .carried = imp__edge_waves(d)};
     const struct imp_located located = imp__located_hit(scene, shape, hit, at);
-    k->before = before;
     k->x = imp__surface_point(scene, hit->shape, &located, hit->place, at->ng);
     k->bsdf = imp__shape_bsdf(scene, shape);
     k->at = *at;
@@ -52,12 +77,16 @@ static struct link *link_make(struct imp__edge_draw *d, struct link *before,
     return k;
 }
 
-/* The transposed kernel towards wo, local: f cos_o; with vertex normals f cos_i^s |cos_o/cos_i|,
+/* The transposed kernel towards wo, local: of a point of a medium per length; f cos_o; with vertex normals f cos_i^s |cos_o/cos_i|,
  * where ^s is of the shading normal (kind/bsdf/transport.h). */
-static imp_spec kernel(const struct link *k, imp_v3 wo)
+static imp_spec kernel(const struct imp__edge_draw *d, const struct link *k, imp_v3 wo)
 {
     const struct imp_dirs dirs = {wo, k->wi, IMP_SMOOTH, 0};
     imp_spec f;
+    if (imp_unlikely(k->x.floats)) {
+        k->bsdf->ops->eval(k->bsdf, k->in, &dirs, &f);
+        return f * d->extinction;
+    }
     if (k->x.x.smooth) {
         const double cos_o = fabs(imp__dot(k->at.ng, imp__to_world(&k->frame, wo)));
         k->bsdf->ops->eval(k->bsdf, k->in, &dirs, &f);
@@ -73,7 +102,7 @@ static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_ligh
                      struct imp__flux *f)
 {
     for (int k = 0; k < light->n_ends; k++) f->end[f->n_ends++] = light->end[k];
-    imp_v3 shift = light->slide;
+    imp_v3 shift = light->slide, far;
     /* From the edge to the camera; links lead the other way. */
     for (int j = 0; j <= depth; j++) {
         struct link *k = last, *after = NULL;
@@ -83,49 +112,72 @@ static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_ligh
         }
         struct imp__link_point x = k->x;
         const imp_v3 from = after ? after->x.x.p : to->p;
+        if (imp_unlikely(x.floats) && !after) {
+            const imp_v3 near = to->wo * -imp__edge_clip(d, to);
+            imp__float_aim(d->b->tracer->scene, &x, from + near);
+        }
         x.moved_bar = shift;
-        shift = imp__slide_bar(&x, imp__normalize(x.x.p - from));
-        f->end[f->n_ends++] = imp__flux_glued(&x.x, x.bar.v);
+        shift = imp__slide_bar(&x, imp__normalize(x.x.p - from), after ? NULL : &far);
+        const struct imp__glued on = imp__link_glued(&x);
+        if (!x.open) f->end[f->n_ends++] = imp__flux_glued(&on, x.bar.v);
+        if (!after && x.floats && !x.open)
+            f->end[f->n_ends++] = imp__flux_camera(d, &on, far);
     }
     f->end[f->n_ends++] = d->b->tracer->sensor->shape
                               ? imp__meter_end(d, to, shift)
                               : imp__flux_camera(d, &last->x.x, shift);
 }
 
+/* Light for a path with so many vertices from the camera to where the light arrives. False: it would
+ * be too long. */
+static bool light_at(const struct imp_tracer *t, const struct imp__edge_light *light,
+                     int vertices, imp_spec *L)
+{
+    const int max = t->integrator->max_depth;
+    if (light->by_depth) {
+        if (vertices > light->n_depths) return false;
+        *L = light->by_depth[vertices - 1];
+        return true;
+    }
+    *L = light->light;
+    return max < 0 || vertices + light->behind <= max;
+}
+
+/* passed: vertices between the links where it went straight on. */
 static void connect(struct imp__edge_draw *d, const struct imp__edge_light *light,
-                    struct link *k, int depth, imp_spec brings)
+                    struct link *k, int depth, int passed, imp_spec T)
 {
     const struct imp_tracer *t = d->b->tracer;
     struct imp_sensor_sample to;
     struct imp_shadow shadow;
+    struct imp__line line;
+    imp_spec brings;
     if (!t->sensor->ops->connect ||
         !imp__sensor_connect(t->sensor, &k->at.p, false, d->lens, &to) ||
         !imp__light_on_film(t->sensor, &to))
         return;
-    const imp_spec L = brings * kernel(k, imp__to_local(&k->frame, to.wo)) * to.weight;
+    if (!light_at(t, light, depth + 1 + passed, &brings)) return;
+    imp_spec L = brings * T * kernel(d, k, imp__to_local(&k->frame, to.wo)) * to.weight;
     if (imp__is_zero_used(L, d->waves)) return;
     imp__light_shadow_aim(&k->at, &to, &shadow);
-    if (imp__occluded_at(t->scene, 0, &shadow.o, &shadow.d, 0, shadow.reach)) return;
-    struct imp__flux *f = imp__flux_add(d, light->n_ends + depth + 2);
+    if (!imp__edge_line(d, shadow.o, shadow.d, shadow.reach, &line)) return;
+    if (imp_unlikely(line.bounces > 0)) {
+        if (!light_at(t, light, depth + 1 + passed + line.bounces, &brings)) return;
+        L = brings * T * kernel(d, k, imp__to_local(&k->frame, to.wo)) * to.weight;
+    }
+    if (imp_unlikely(d->b->fog != NULL)) {
+        const double clip = imp__edge_clip(d, &to);
+        if (!(to.dist > clip)) return;
+        L *= line.T * imp__edge_cleared(d, -clip);
+    } else {
+        L *= line.T;
+    }
+    struct imp__flux *f = imp__flux_add(d, light->n_ends + depth + 3);
     if (!f) return;
     f->px = to.px;
     f->py = to.py;
     f->L = L;
     ends_set(d, light, &to, k, depth, f);
-}
-
-/* Light for a chain of depth + 1 vertices. False: the path would be too long. */
-static bool light_at(const struct imp_tracer *t, const struct imp__edge_light *light,
-                     int depth, imp_spec *L)
-{
-    const int max = t->integrator->max_depth;
-    if (light->by_depth) {
-        if (depth >= light->n_depths) return false;
-        *L = light->by_depth[depth];
-        return true;
-    }
-    *L = light->light;
-    return max < 0 || depth + 1 + light->behind <= max;
 }
 
 /* Where the walk goes on, local, and its density: of Lambertian materials by the cosine on the side
@@ -136,7 +188,10 @@ static double direction_draw(const struct imp__edge_draw *d, const struct link *
     const double u[3] = {imp__u01(d->key, dims + IMP_EDGE_WALK_U),
                          imp__u01(d->key, dims + IMP_EDGE_WALK_V),
                          imp__u01(d->key, dims + IMP_EDGE_LOBE)};
-    if (imp__is_lambertian(k->bsdf)) {
+    const struct imp_bsdf *b = k->bsdf;
+    const imp_spec *in = k->in;
+    for (; b->ops == &imp__mask; b = b->child[0]) in += b->child_in[0]; /* it scatters */
+    if (imp__is_lambertian(b)) {
         *wo = imp__cosine_hemisphere(u);
         const double pdf = imp__cosine_hemisphere_pdf(*wo);
         if (k->wi[2] < 0) (*wo)[2] = -(*wo)[2];
@@ -144,9 +199,9 @@ static double direction_draw(const struct imp__edge_draw *d, const struct link *
     }
     struct imp_dirs dirs = {{0}, k->wi, IMP_SMOOTH, 0};
     const double by_lobe[3] = {u[2], u[0], u[1]};
-    if (!imp__bsdf_transposed_sample(k->bsdf, k->in, by_lobe, &dirs)) return 0;
+    if (!imp__bsdf_transposed_sample(b, in, by_lobe, &dirs)) return 0;
     *wo = dirs.wo;
-    return imp__bsdf_transposed_pdf(k->bsdf, k->in, &dirs);
+    return imp__bsdf_transposed_pdf(b, in, &dirs);
 }
 
 void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
@@ -155,13 +210,14 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
     const struct imp_tracer *t = d->b->tracer;
     struct link *k = link_make(d, NULL, hit, at, light->w, light->horizon);
     imp_spec T = imp__spec(1), L;
-    for (int depth = 0; k && light_at(t, light, depth, &L); depth++) {
-        connect(d, light, k, depth, L * T);
+    int passed = 0;
+    for (int depth = 0; k && light_at(t, light, depth + 1 + passed, &L); depth++) {
+        connect(d, light, k, depth, passed, T);
         const unsigned dims = IMP_EDGE_WALK + (unsigned)depth * IMP_EDGE_WALK_DIMS;
         imp_v3 wo, w;
         const double pdf = direction_draw(d, k, dims, &wo);
         if (!(pdf > 0)) return;
-        T *= kernel(k, wo) * (1 / pdf);
+        T *= kernel(d, k, wo) * (1 / pdf);
         const double most = imp__max_used(T, d->waves),
                      survive = depth < 2 ? 1 : imp_min(most, 0.95);
         if (!(imp__u01(d->key, dims + IMP_EDGE_SURVIVE) < survive) || !(most > 0)) return;
@@ -170,8 +226,11 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
         struct imp_surface there;
         w = imp__to_world(&k->frame, wo);
         const imp_v3 o = imp__offset(k->at.p, k->at.ng, w);
-        if (!imp__intersect(t->scene, &o, &w, 0, INFINITY, &next)) return;
-        imp__hit_surface(t->scene, &next, &o, &w, &there);
+        struct imp__line line;
+        const unsigned number = 1 + (unsigned)depth;
+        if (!imp__edge_follow(d, o, w, 0, number, &next, &there, &line)) return;
+        T *= line.T * line.times;
+        passed += line.bounces;
         k = link_make(d, k, &next, &there, w, false);
     }
 }

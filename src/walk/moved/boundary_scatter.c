@@ -4,22 +4,55 @@
 #include "boundary_parts.h"
 #include "moved_sky.h"
 #include "walk/core/step.h"
+#include "walk/core/vertex.h"
 
-imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk, int before,
-                      const bool *drawn)
+/* Does light go straight on there, and is that no vertex of a light sample's line? */
+static bool is_on_line(const struct imp__boundary *b, const struct imp_vertex *v)
 {
-    const int max = t->integrator->max_depth;
+    return v->d.scatterer == IMP_AT_SENSOR || (b->through && imp__goes_straight(v));
+}
+
+const struct imp_vertex *imp__walk_met(const struct imp__edge_draw *d,
+                                       const struct imp_walk *walk, imp_spec *T)
+{
+    const struct imp_vertex *v = walk->dropped ? NULL : walk->first;
+    *T = imp__spec(1);
+    for (; v && is_on_line(d->b, v); v = v->next) *T *= v->w;
+    return v && v->d.scatterer != IMP_AT_SKY ? v : NULL;
+}
+
+/* The part of the emission at v that is not glued to its light, as a walk from a point of a medium
+ * sees it. */
+static double unglued_part(const struct imp__boundary *b, const struct imp_walk *walk,
+                           const struct imp_vertex *v)
+{
+    double slope;
+    if (v->d.met.emitter < 0) return 0;
+    return 1 - imp__glued_part(b->tracer->scene->emitters[v->d.met.emitter],
+                               imp__length(imp__decided_v3(v->d.p) - walk->ray.o),
+                               &slope);
+}
+
+imp_spec imp__arrives(const struct imp__boundary *b, const struct imp_walk *walk,
+                      struct imp__seen_from x)
+{
+    const int max = b->tracer->integrator->max_depth;
     imp_spec L = {0}, T = imp__spec(1);
-    int number = before;
+    int number = x.before;
+    bool first = true; /* nothing has scattered it yet */
     if (walk->dropped || !walk->first) return L;
-    const bool sky_first = walk->first->d.scatterer == IMP_AT_SKY;
     for (const struct imp_vertex *v = walk->first; v; v = v->next) {
+        const bool sky = v->d.scatterer == IMP_AT_SKY, on_line = is_on_line(b, v);
         /* To each sky a vertex. */
-        const bool left = sky_first ? drawn && drawn[v->d.met.emitter] : v == walk->first;
-        if (!left && (max < 0 || number < max)) L += T * v->e;
+        const bool left = first && (!sky || (x.drawn && x.drawn[v->d.met.emitter]));
+        const bool counts = max < 0 || number < max;
+        if (!left && counts) L += T * v->e;
+        if (imp_unlikely(left && x.floats && !sky && counts))
+            L += T * v->e * unglued_part(b, walk, v);
         if (max < 0 || number + 1 < max) L += T * v->b;
         T *= v->w;
-        number += v->d.scatterer != IMP_AT_SKY;
+        number += !sky && !on_line;
+        first &= sky || on_line;
     }
     return L;
 }
@@ -27,7 +60,7 @@ imp_spec imp__arrives(const struct imp_tracer *t, const struct imp_walk *walk, i
 void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 to,
                     int before, struct imp_walk *walk)
 {
-    struct imp_sensor_ray ray = {.t_near = 0, .t_far = INFINITY};
+    struct imp_sensor_ray ray = {.t_near = d->near, .t_far = INFINITY};
     ray.o = imp__offset(at->p, at->ng, to - at->p);
     ray.d = imp__normalize(to - ray.o);
     imp__walk_along(d->b->tracer, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves,
@@ -35,10 +68,10 @@ void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_
 }
 
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
-                     const struct imp_walk *hi, double times, const bool *drawn, int *n)
+                     const struct imp_walk *hi, imp_spec times, struct imp__seen_from x,
+                     int *n)
 {
-    const struct imp_tracer *tracer = d->b->tracer;
-    const int max = tracer->integrator->max_depth;
+    const int max = d->b->tracer->integrator->max_depth;
     *n = max < 0 ? 1 : max - 1;
     imp_spec *jump = imp__arena_take(d->arena, (size_t)*n, sizeof *jump);
     if (!jump) {
@@ -47,9 +80,8 @@ imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
     }
     bool any = false;
     for (int k = 0; k < *n; k++) {
-        jump[k] = (imp__arrives(tracer, lo, k + 1, drawn) -
-                   imp__arrives(tracer, hi, k + 1, drawn)) *
-                  times;
+        x.before = k + 1;
+        jump[k] = (imp__arrives(d->b, lo, x) - imp__arrives(d->b, hi, x)) * times;
         any |= !imp__is_zero_used(jump[k], d->waves);
     }
     return any ? jump : NULL;
@@ -66,16 +98,14 @@ static void look_beside(struct imp__edge_draw *d, const struct imp_surface *at, 
 void imp__draw_scatter(struct imp__edge_draw *d)
 {
     const struct imp__boundary *b = d->b;
-    const struct imp_tracer *tracer = b->tracer;
-    const struct imp_scene *scene = tracer->scene;
-    const int max = tracer->integrator->max_depth;
+    const int max = b->tracer->integrator->max_depth;
     imp_v3 w;
     struct imp_hit hit;
     struct imp_surface at;
     if ((max >= 0 && max < 2) || !imp__edge_touched(d, &w)) return;
     const imp_v3 from = imp__edge_clear(d);
-    if (!imp__intersect(scene, &from, &w, IMP_CONTACT * b->size, INFINITY, &hit)) return;
-    imp__hit_surface(scene, &hit, &from, &w, &at);
+    struct imp__line line;
+    if (!imp__edge_follow(d, from, w, IMP_CONTACT * b->size, 0, &hit, &at, &line)) return;
 
     const imp_v3 turned = imp__cross(d->along, w);
     const double sine = imp__length(turned);
@@ -83,15 +113,18 @@ void imp__draw_scatter(struct imp__edge_draw *d)
     const imp_v3 m = turned * (1 / sine);
     const double apart = IMP_BESIDE * (hit.t + imp__length(d->p));
     if (imp__edge_merges(d, -w, apart)) return;
+    const imp_spec T = imp__edge_near(d, hit.t, apart, line.T);
     struct imp_walk lo, hi;
     look_beside(d, &at, -m, apart, &lo);
     look_beside(d, &at, m, apart, &hi);
 
     int depths;
-    const double times = (d->touches ? 1 : sine * 4 * IMP_PI) * d->inv_pdf;
+    const imp_spec times =
+        T * ((d->touches ? 1 : sine * 4 * IMP_PI) * d->inv_pdf * line.times);
     imp__seam_emission(d, &hit, &at, &lo, m, w, times);
     imp__seam_emission(d, &hit, &at, &hi, m, w, -times);
-    imp_spec *jump = imp__jumps(d, &lo, &hi, times, b->drawn, &depths);
+    const struct imp__seen_from x = {.floats = hit.shape < 0, .drawn = b->drawn};
+    imp_spec *jump = imp__jumps(d, &lo, &hi, times, x, &depths);
     if (!jump) return;
     struct imp__edge_light light = {.w = w, .slide = -m};
     light.light = jump[0];

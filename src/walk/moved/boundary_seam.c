@@ -25,7 +25,7 @@ int imp__seam_side(const struct imp__edge_draw *d, const struct imp_walk *walk)
 
 void imp__seam_emission(struct imp__edge_draw *d, const struct imp_hit *hit,
                         const struct imp_surface *at, const struct imp_walk *walk,
-                        imp_v3 m, imp_v3 w, double times)
+                        imp_v3 m, imp_v3 w, imp_spec times)
 {
     const int side = imp__seam_side(d, walk);
     struct imp__edge_light light = {.w = w, .behind = 1, .n_ends = 2};

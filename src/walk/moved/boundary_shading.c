@@ -277,7 +277,7 @@ static bool look_next(struct imp__edge_draw *d, const struct turning *x, double 
     const imp_v3 r = imp__normalize(x->x.p + x->beside * sign - o), by = x->next * sign;
     const struct imp__edge_face face = {
         .shape = x->x.shape, .prim = x->x.prim, .place = x->x.place};
-    if (!imp__intersect(d->b->tracer->scene, &o, &r, 0, INFINITY, &hit) ||
+    if (!imp__intersect(d->b->tracer->scene, &o, &r, d->near, INFINITY, &hit) ||
         !imp__edge_face_hit(d, &face, &hit))
         return false;
     hit.u = x->x.b[1] + imp__dot(x->x.slope[0], by);
@@ -312,6 +312,7 @@ void imp__draw_shading_film(struct imp__edge_draw *d)
     struct imp_surface at, from = {.uv = {0}};
     struct imp_hit hit;
     struct turning x;
+    struct imp__line line;
     if (meter) imp__meter_draw(sensor, d->lens, &from);
     if (meter) d->eye = from.p;
     if (!sensor->ops->connect || !seen_point(d, &hit)) return;
@@ -323,16 +324,19 @@ void imp__draw_shading_film(struct imp__edge_draw *d)
     const imp_v3 o = meter ? imp__offset(from.p, from.ng, at.p - from.p) : to.p,
                  r = at.p - o;
     const double t = imp__length(r);
-    if (imp__occluded_at(d->b->tracer->scene, 0, &o, &r, 0, 1 - IMP_BESIDE)) return;
+    if (!imp__edge_line(d, o, r, 1 - IMP_BESIDE, &line)) return;
     if (!turning_at(d, &hit, &at, to.wo, t, parallel, &x)) return;
+    if (imp_unlikely(d->b->fog != NULL))
+        line.T *= imp__edge_cleared(d, -imp__edge_clip(d, &to));
+    const imp_spec T = imp__edge_near(d, t, IMP_BESIDE * (t + imp__length(at.p)), line.T);
     const imp_spec jump = look_beside(d, &x, 1, o, meter ? &from : NULL) -
                           look_beside(d, &x, -1, o, meter ? &from : NULL);
     const double times = fabs(imp__dot(at.ng, to.wo)) * to.weight * d->inv_pdf / x.slope;
-    struct imp__flux *f = imp__jump_add(d, &to, jump * times, 3);
+    struct imp__flux *f = imp__jump_add(d, &to, T * jump * times, 3);
     if (!f) return;
     /* g' = n_s'.wo + n_s.wo', and a camera's ray turns by (u(p) - u(o))/t, against wo. */
     struct imp__link_point p = {.x = x.x, .bar = {.shade = to.wo}};
-    const imp_v3 shift = imp__slide_bar(&p, to.wo), turn = x.x.shade * (1 / t);
+    const imp_v3 shift = imp__slide_bar(&p, to.wo, NULL), turn = x.x.shade * (1 / t);
     const struct imp__glued eye = {.p = to.p};
     f->end[f->n_ends++] = (struct imp__flux_end){p.x, p.bar, false, 0, {0}};
     if (meter) {
@@ -347,7 +351,6 @@ void imp__draw_shading_film(struct imp__edge_draw *d)
 
 void imp__draw_shading_scatter(struct imp__edge_draw *d)
 {
-    const struct imp_scene *scene = d->b->tracer->scene;
     const int max = d->b->tracer->integrator->max_depth;
     struct imp_hit from, hit;
     struct imp_surface p, at;
@@ -358,17 +361,21 @@ void imp__draw_shading_scatter(struct imp__edge_draw *d)
     const struct imp_frame f = imp__frame_from_normal(p.n);
     const imp_v3 w = f.s * cos(psi) + f.t * sin(psi);
     const imp_v3 o = imp__offset(p.p, p.ng, w);
-    if (!imp__intersect(scene, &o, &w, 0, INFINITY, &hit)) return;
-    imp__hit_surface(scene, &hit, &o, &w, &at);
+    struct imp__line line;
+    if (!imp__edge_follow(d, o, w, 0, 0, &hit, &at, &line)) return;
     if (!turning_at(d, &from, &p, w, imp__length(at.p - p.p), false, &x)) return;
+    const imp_spec T =
+        imp__edge_near(d, hit.t, IMP_BESIDE * (hit.t + imp__length(p.p)), line.T);
     const imp_v3 back = imp__offset(at.p, at.ng, -w);
     if (!look_next(d, &x, 1, back, 1, &lit))
         imp__look_from(d, &at, p.p + x.beside, 1, &lit);
     if (!look_next(d, &x, -1, back, 1, &dark))
         imp__look_from(d, &at, p.p - x.beside, 1, &dark);
     int depths;
-    const double times = fabs(imp__dot(p.ng, w)) * IMP_2PI * d->inv_pdf;
-    imp_spec *jump = imp__jumps(d, &lit, &dark, times, NULL, &depths);
+    const imp_spec times =
+        T * (fabs(imp__dot(p.ng, w)) * IMP_2PI * d->inv_pdf * line.times);
+    imp_spec *jump = imp__jumps(
+        d, &lit, &dark, times, (struct imp__seen_from){.floats = hit.shape < 0}, &depths);
     if (!jump) return;
     struct imp__edge_light light = {.w = w, .light = jump[0], .n_ends = 1};
     if (max >= 0) {
@@ -376,7 +383,7 @@ void imp__draw_shading_scatter(struct imp__edge_draw *d)
         light.n_depths = depths;
     }
     struct imp__link_point slides = {.x = x.x, .bar = {.shade = w}};
-    light.slide = imp__slide_bar(&slides, w);
+    light.slide = imp__slide_bar(&slides, w, NULL);
     light.end[0] = (struct imp__flux_end){slides.x, slides.bar, false, 0, {0}};
     imp__edge_reach(d, &hit, &at, &light);
 }

@@ -19,12 +19,13 @@ void imp__draw_sky_film(struct imp__edge_draw *d)
     const struct imp_frame f = imp__frame_from_normal(c->axis);
     const imp_v3 w = c->axis * c->cosine + (f.s * cos(psi) + f.t * sin(psi)) * sine;
     struct imp_sensor_sample to;
+    struct imp__line line;
+    if (d->b->fog) return; /* none of it comes through */
     if (!sensor->ops->connect || !imp__sensor_connect(sensor, &w, true, d->lens, &to) ||
-        !imp__light_on_film(sensor, &to) ||
-        imp__occluded_at(tracer->scene, 0, &to.p, &w, 0, INFINITY))
+        !imp__light_on_film(sensor, &to) || !imp__edge_line(d, to.p, w, INFINITY, &line))
         return;
     d->along = f.t * cos(psi) - f.s * sin(psi);
     d->inv_pdf = IMP_2PI * sine / d->chance;
     d->p = d->eye + w;
-    imp__film_jump(d, &to);
+    imp__film_jump(d, &to, line.T);
 }

@@ -16,6 +16,13 @@
  *     d ln w_k = n'.w/(n.w)
  *     d ln B_k = (n'.w + n.w')/(n.w) + (n_y'.w + n_y.w')/(n_y.w) - 2 w.(V_y - v_k')/d + d ln dA_y
  *
+ * A point of a medium of extinction sigma, at the part s of the length D of the ray from v_k to the
+ * surface beyond it, and light on a line of length d through that medium:
+ *
+ *     v_{k+1}' = v_k' + s w D',  D' = n.(V - v_k')/(n.w)
+ *     d ln w_k = (1 - sigma s D) D'/D,  of what reaches the surface  -sigma D'
+ *     d ln B_k = ... - sigma d'
+ *
  * of Lambertian materials (of others moved_kernel.h), w' the part of (V_y - v_k')/d across w; of a light at a point without
  * cos_y and dA_y, of parallel light (n'.w + n.w')/(n.w) alone. Of emission that is met the
  * same holds as of a light sample: MIS weights are constants, so both techniques move one point in
@@ -29,6 +36,21 @@
 /* May walks of this tracer be differentiated by what moves? IMP_E_UNSUPPORTED with the name of
  * what has no such derivative: a material, light, shape, medium, sensor or integrator. */
 enum imp_status imp__moved_allowed(const struct imp_tracer *tracer);
+
+/* Do its walks go through a medium that fills the scene? Its extinction, by lanes. */
+bool imp__fog(const struct imp_tracer *tracer, const struct imp_carried *carried,
+              imp_spec *extinction);
+
+/* Light that a point of a medium has from a lamp nearby would have a derivative as large as one over
+ * the distance d if it were glued to the lamp. So only the part  g = d^2/(d^2 + a^2)  of it is, with a
+ * quarter of the lamp's width; the rest keeps its direction, and the lamp has edges to it. *slope:
+ * g'. */
+static inline double imp__glued_part(const struct imp_emitter *e, double d, double *slope)
+{
+    const double a2 = e->shape->area / 16, all = d * d + a2;
+    *slope = 2 * d * a2 / (all * all);
+    return d * d / all;
+}
 
 /* Interior, reverse mode: adds adjoint times the derivative of the recorded walk's values to
  * theta_bar [moves->n]. False: no memory. */

@@ -8,7 +8,10 @@
 #include "moved_kernel.h"
 #include "scene/instances.h"
 #include "scene/pose.h"
+#include "walk/media/tracking.h"
+#include "walk/path/first_segment.h"
 
+extern const struct imp_bsdf_ops imp__mask;
 extern const struct imp_emitter_ops imp__area, imp__point_light, imp__spot_light,
     imp__directional;
 
@@ -36,6 +39,12 @@ static enum imp_status materials_allowed(const struct imp_tracer *t)
             imp__kernel_without_d(b, s->geometry != IMP_TRIANGLES || s->smooth);
         if (!why) why = imp__textures_without_d(b, s);
         if (!why && b->shaped) why = "has a spectrum for a number";
+        if (!why && b->straight && s->emitter >= 0)
+            why = "lets light pass, and its shape is a light";
+        if (!why && b->ops == &imp__mask && b->input[0]->texture &&
+            imp__segment_first(t)->through)
+            why = "has an opacity with a texture, which light samples of volpath pass "
+                  "(those of path do not)";
         if (why) return refuse(t, "material", b->name, b->ops->name, why);
     }
     return IMP_OK;
@@ -92,16 +101,74 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
     return IMP_OK;
 }
 
+/* Why walks through this medium have no such derivative; NULL: they have. */
+static const char *medium_without_d(const struct imp_medium *m)
+{
+    if (m->majorants) return "has an extinction that varies";
+    if (m->emits) return "emits light";
+    if (is_textured(m->input, m->n_in)) return "has numbers that vary";
+    if (m->scatterer->shaped) return "has a spectrum for a number";
+    return NULL;
+}
+
+static bool scatters(const struct imp_medium *m)
+{
+    imp_spec in[IMP_INPUTS_MAX];
+    struct imp_coefficients c;
+    const struct imp_texcoord nowhere = {.prim = 0};
+    imp__inputs_eval(m->input, m->n_own, &nowhere, in);
+    m->ops->eval(m, in, &c);
+    return !imp__is_zero(c.scattering);
+}
+
+/* Is the medium the same on both sides of a shape, as far as light goes there? */
+static bool is_filled(const struct imp_tracer *t, const struct imp_shape *s,
+                      const struct imp_medium *m)
+{
+    const struct imp_bsdf *b = imp__shape_bsdf(t->scene, s);
+    if (!s->interior && !s->exterior) return true;
+    return s->exterior == m && (s->interior == m || !(b->flags & IMP_BSDF_TRANSMIT));
+}
+
+/* A medium that fills the scene, of one extinction. */
+static enum imp_status media_allowed(const struct imp_tracer *t)
+{
+    const struct imp_scene *scene = t->scene;
+    const struct imp_medium *m = t->sensor->medium;
+    imp_spec extinction;
+    if (scene->n_media == 0 || !imp__segment_first(t)->through) return IMP_OK;
+    for (int k = 0; k < scene->n_all_shapes; k++)
+        if (!is_filled(t, scene->shapes[k], m))
+            return refuse(t, "shape", scene->shapes[k]->name, scene->shapes[k]->ops->name,
+                          "bounds a medium, or the sensor is in another one (a medium "
+                          "fills the scene, and is that of the sensor)");
+    if (!imp__fog(t, NULL, &extinction)) return IMP_OK;
+    const char *why = medium_without_d(m);
+    if (why) return refuse(t, "medium", m->name, m->ops->name, why);
+    if (t->sensor->shape)
+        return refuse(t, "sensor", t->sensor->name, t->sensor->ops->name,
+                      "is a surface in a medium");
+    for (int k = 0; k < scene->n_emitters && scatters(m); k++) {
+        const struct imp_emitter *e = scene->emitters[k];
+        if (e->ops->flags & IMP_EMITTER_DELTA && !(e->ops->flags & IMP_EMITTER_FAR))
+            return refuse(t, "light", e->name, e->ops->name,
+                          "has no size, in a medium that scatters: what points next to "
+                          "it receive has no bounded derivative");
+    }
+    return IMP_OK;
+}
+
 static enum imp_status walks_allowed(const struct imp_tracer *t)
 {
     const struct imp_scene *scene = t->scene;
     const struct imp_walk_integrator *i = t->integrator;
     const bool many = scene->world && scene->world->n_places >= IMP_PLACE_MOST;
-    const char *why = many ? "there are too many instances"
-                      : scene->n_media + scene->n_bodies > 0 ? "there are media"
-                      : i->from_lights                       ? "walks begin at the lights"
-                      : i->ends_by != IMP_ENDS_BY_ROULETTE   ? "walks end by absorption"
-                      : i->hide_emitters                     ? "emitters are hidden"
+    const char *why = many                  ? "there are too many instances"
+                      : scene->n_bodies > 0 ? "there are media of graded index"
+                      : scene->priorities   ? "shapes have priorities"
+                      : i->from_lights      ? "walks begin at the lights"
+                      : i->ends_by != IMP_ENDS_BY_ROULETTE ? "walks end by absorption"
+                      : i->hide_emitters                   ? "emitters are hidden"
                       : i->mixes || i->split > 1 || t->split > 1 || t->guide
                           ? "directions have densities beside the material's"
                       : t->kept ? "walks are kept"
@@ -125,10 +192,23 @@ static enum imp_status meter_allowed(const struct imp_tracer *t)
     return IMP_OK;
 }
 
+/* Has the scene masks, or others, which light samples pass? */
+static bool samples_pass(const struct imp_tracer *t)
+{
+    bool any = false;
+    for (int k = 0; k < t->scene->n_all_shapes; k++)
+        any |= imp__shape_bsdf(t->scene, t->scene->shapes[k])->straight != 0;
+    return any && imp__segment_first(t)->through;
+}
+
 static enum imp_status sensor_allowed(const struct imp_tracer *t)
 {
     const struct imp_sensor *s = t->sensor;
     imp_v3 centre;
+    if (s->shape && samples_pass(t))
+        return refuse(t, "sensor", s->name, s->ops->name,
+                      "is a surface, and its light samples pass masks (those of path do "
+                      "not)");
     if (s->shape) return meter_allowed(t);
     if (!imp__lens_middle(s, &centre))
         return refuse(t, "sensor", s->name, s->ops->name,
@@ -138,9 +218,20 @@ static enum imp_status sensor_allowed(const struct imp_tracer *t)
     return IMP_OK;
 }
 
+bool imp__fog(const struct imp_tracer *tracer, const struct imp_carried *carried,
+              imp_spec *extinction)
+{
+    const struct imp_medium *m = tracer->sensor->medium;
+    imp_spec in[IMP_INPUTS_MAX];
+    if (imp_likely(!m) || !imp__segment_first(tracer)->through) return false;
+    *extinction = imp__extinction_at(m, (imp_v3){0}, carried, in);
+    return true;
+}
+
 enum imp_status imp__moved_allowed(const struct imp_tracer *tracer)
 {
     enum imp_status st = walks_allowed(tracer);
+    if (st == IMP_OK) st = media_allowed(tracer);
     if (st == IMP_OK) st = sensor_allowed(tracer);
     if (st == IMP_OK) st = materials_allowed(tracer);
     if (st == IMP_OK) st = lights_allowed(tracer);

@@ -10,12 +10,19 @@
 #include "moved_kernel.h"
 
 /* A vertex: the glued point of its surface, and adjoints of its velocity. At the sky x.p is the
- * direction. */
+ * direction. A point of a medium floats at a part of the way to the surface beyond it, which is its
+ * x, but for x.p. */
 struct imp__link_point {
     struct imp__glued x;
     struct imp__velocity bar; /* of the surface there: V, n', d ln dA */
     imp_v3 moved_bar;         /* of v', the vertex itself */
+    imp_v3 wo_bar;            /* of the direction to the camera, across it */
+    double along;             /* of the length of the ray that leads to the surface */
     bool sky;
+    bool floats;
+    bool open;     /* it floats, and no surface is beyond it */
+    double part;   /* 1: on the surface */
+    imp_v3 beyond; /* the place of x on the surface */
 };
 
 static inline struct imp__link_point imp__surface_point(const struct imp_scene *scene,
@@ -24,6 +31,12 @@ static inline struct imp__link_point imp__surface_point(const struct imp_scene *
                                                         int64_t place, imp_v3 n)
 {
     return (struct imp__link_point){.x = imp__glued_at(scene, shape, at, place, n)};
+}
+/* It floats, and has no surface beyond it yet. */
+static inline struct imp__link_point imp__medium_point(imp_v3 p)
+{
+    return (struct imp__link_point){
+        .x = {.shape = -1, .p = p}, .floats = true, .open = true};
 }
 static inline struct imp__link_point imp__sky_point(imp_v3 d)
 {
@@ -47,21 +60,24 @@ static inline void imp__scatter_bar(struct imp__link_point *x,
     x->bar.v -= kernel->slide;
 }
 
-/* Adds the adjoint of the logarithm of 1/d^2 (`bar`), and of what else depends on the unit
- * direction w from x towards y (`turn`), d away: to x, which slides; returns that of y. */
+/* Adds the adjoint of the logarithm of 1/d^2 (`bar`), of the distance d (`along`), and of what else
+ * depends on the unit direction w from x towards y (`turn`), d away: to x, which slides; returns that
+ * of y. */
 static inline imp_v3 imp__apart_bar(struct imp__link_point *x, imp_v3 w, double d,
-                                    imp_v3 turn, double bar)
+                                    imp_v3 turn, double bar, double along)
 {
-    const imp_v3 apart = (turn - w * (imp__dot(w, turn) + 2 * bar)) * (1 / d);
+    imp_v3 apart = (turn - w * (imp__dot(w, turn) + 2 * bar)) * (1 / d);
+    if (imp_unlikely(along != 0)) apart += w * along;
     x->moved_bar -= apart;
     return apart;
 }
 
 /* The adjoint of the kernel at x, which slides, and (`bar`) of the logarithm of cos_y dA_y/d^2 of
- * y, which is glued. */
+ * y, which is glued; of d (`along`). */
 static inline void imp__connection_bar(struct imp__link_point *x,
                                        struct imp__link_point *y,
-                                       const struct imp__kernel_bar *kernel, double bar)
+                                       const struct imp__kernel_bar *kernel, double bar,
+                                       double along)
 {
     const imp_v3 r = y->x.p - x->x.p;
     const double d = imp__length(r);
@@ -70,55 +86,116 @@ static inline void imp__connection_bar(struct imp__link_point *x,
     imp__scatter_bar(x, kernel);
     y->bar.n += w * by;
     y->bar.area += bar;
-    y->bar.v += imp__apart_bar(x, w, d, kernel->wi + y->x.n * by, bar);
+    y->bar.v += imp__apart_bar(x, w, d, kernel->wi + y->x.n * by, bar, along);
 }
 
 /* The adjoint of the kernel at x, and of the logarithm of 1/d^2 between x, which slides, and a
  * light at the point y; returns that of the light's velocity. */
 static inline imp_v3 imp__point_bar(struct imp__link_point *x, imp_v3 y,
-                                    const struct imp__kernel_bar *kernel, double bar)
+                                    const struct imp__kernel_bar *kernel, double bar,
+                                    double along)
 {
     const imp_v3 r = y - x->x.p;
     const double d = imp__length(r);
     imp__scatter_bar(x, kernel);
-    return imp__apart_bar(x, r * (1 / d), d, kernel->wi, bar);
+    return imp__apart_bar(x, r * (1 / d), d, kernel->wi, bar, along);
+}
+
+/* The surface that a ray along w meets: by `on` times the shift of the point where it does along the
+ * ray. Returns the adjoint of a shift of the ray there. */
+static inline imp_v3 imp__reached_bar(struct imp__link_point *x, imp_v3 w, double on)
+{
+    const imp_v3 across = x->x.n * (on / imp__dot(x->x.n, w));
+    x->bar.v += across;
+    return -across;
 }
 
 /* The vertex that a ray along w meets slides along it: what its adjoint is to the surface it
- * lies on, which is added there, and to a shift of the ray, which is returned. */
-static inline imp_v3 imp__slide_bar(struct imp__link_point *x, imp_v3 w)
+ * lies on, which is added there, and to a shift of the ray, which is returned. *far, where it is not
+ * NULL: of that the part of a shift where the ray meets the surface beyond a point that floats. */
+static inline imp_v3 imp__slide_bar(struct imp__link_point *x, imp_v3 w, imp_v3 *far)
 {
-    /* On a curved surface the normal turns as the vertex slides over it; on a mesh with vertex
-     * normals the shading normal does. */
-    imp_v3 turn = (x->bar.n - x->x.n * imp__dot(x->x.n, x->bar.n)) * x->x.curvature;
-    turn -= x->x.straight * imp__dot(x->x.straight, turn);
-    if (x->x.smooth)
-        turn = x->x.slope[0] * imp__dot(x->x.turn[0], x->bar.shade) +
-               x->x.slope[1] * imp__dot(x->x.turn[1], x->bar.shade);
-    x->moved_bar += turn;
-    x->bar.v -= turn;
-    const imp_v3 across = x->x.n * (imp__dot(w, x->moved_bar) / imp__dot(x->x.n, w));
-    const imp_v3 shift = x->moved_bar - across;
-    x->bar.v += across;
+    imp_v3 shift;
+    if (imp_unlikely(x->floats)) {
+        const double on = x->part * imp__dot(w, x->moved_bar) + x->along;
+        const imp_v3 there = x->open ? (imp_v3){0} : imp__reached_bar(x, w, on);
+        shift = x->moved_bar + (far ? (imp_v3){0} : there);
+        if (far) *far = there;
+    } else {
+        /* On a curved surface the normal turns as the vertex slides over it; on a mesh with vertex
+         * normals the shading normal does. */
+        imp_v3 turn = (x->bar.n - x->x.n * imp__dot(x->x.n, x->bar.n)) * x->x.curvature;
+        turn -= x->x.straight * imp__dot(x->x.straight, turn);
+        if (x->x.smooth)
+            turn = x->x.slope[0] * imp__dot(x->x.turn[0], x->bar.shade) +
+                   x->x.slope[1] * imp__dot(x->x.turn[1], x->bar.shade);
+        x->moved_bar += turn;
+        x->bar.v -= turn;
+        shift =
+            x->moved_bar + imp__reached_bar(x, w, imp__dot(w, x->moved_bar) + x->along);
+        if (far) *far = (imp_v3){0};
+    }
     x->moved_bar = (imp_v3){0};
+    x->along = 0;
     return shift;
 }
 
-/* The first vertex of a walk through a fixed film position, whose ray begins at o: the end of
- * the chain. wo_bar: of the direction towards the camera, across it. Adds to theta_bar. */
-static inline void imp__camera_bar(const struct imp__moves *moves, imp_v3 o,
-                                   struct imp__link_point *first, imp_v3 wo_bar,
-                                   double *theta_bar)
+/* A point that floats on a ray from `from`: the surface beyond it. */
+static inline void imp__float_aim(const struct imp_scene *scene,
+                                  struct imp__link_point *x, imp_v3 from)
 {
-    const double t = imp__length(first->x.p - o);
-    const imp_v3 shift = imp__slide_bar(first, (first->x.p - o) * (1 / t));
-    imp__camera_velocity_bar(moves, o, first->x.p, shift, theta_bar);
+    const imp_v3 p = x->x.p, r = p - from;
+    const double t = imp__length(r);
+    const imp_v3 w = r * (1 / t);
+    struct imp_hit hit;
+    struct imp_surface at;
+    x->open = !imp__intersect(scene, &p, &w, 0, INFINITY, &hit);
+    if (x->open) return;
+    imp__hit_surface(scene, &hit, &p, &w, &at);
+    /* In double; hits are as exact as floats. */
+    const double far = imp_max(imp__dot(at.ng, at.p - from) / imp__dot(at.ng, w), t);
+    x->beyond = from + w * far;
+    x->x = imp__glued_near(scene, hit.shape, hit.prim, hit.place, x->beyond, at.ng);
+    x->x.p = p;
+    x->part = t / far;
+}
+
+/* What its surface moves by, as one that is glued there. */
+static inline struct imp__glued imp__link_glued(const struct imp__link_point *x)
+{
+    struct imp__glued g = x->x;
+    if (x->floats) g.p = x->beyond;
+    return g;
+}
+static inline void imp__link_velocity_bar(const struct imp__moves *moves,
+                                          const struct imp__link_point *x,
+                                          double *theta_bar)
+{
+    if (imp_likely(!x->floats)) {
+        imp__velocity_bar(moves, &x->x, &x->bar, theta_bar);
+        return;
+    }
+    const struct imp__glued g = imp__link_glued(x);
+    if (!x->open) imp__velocity_bar(moves, &g, &x->bar, theta_bar);
+}
+
+/* A vertex that the ray of a fixed film position meets, which begins at o: the end of the chain. Adds
+ * to theta_bar. */
+static inline void imp__camera_bar(const struct imp__moves *moves, imp_v3 o,
+                                   struct imp__link_point *x, double *theta_bar)
+{
+    const double t = imp__length(x->x.p - o);
+    imp_v3 far;
+    const imp_v3 shift = imp__slide_bar(x, (x->x.p - o) * (1 / t), &far),
+                 wo_bar = x->wo_bar;
+    imp__camera_velocity_bar(moves, o, x->x.p, shift, theta_bar);
+    if (!imp__is_zero(far)) imp__camera_velocity_bar(moves, o, x->beyond, far, theta_bar);
     if (!imp__is_zero(wo_bar)) {
         /* The ray turns by (u(p) - u(o))/t, and wo against it. */
-        imp__camera_velocity_bar(moves, o, first->x.p, wo_bar * (-1 / t), theta_bar);
-        imp__camera_velocity_bar(moves, first->x.p, o, wo_bar * (1 / t), theta_bar);
+        imp__camera_velocity_bar(moves, o, x->x.p, wo_bar * (-1 / t), theta_bar);
+        imp__camera_velocity_bar(moves, x->x.p, o, wo_bar * (1 / t), theta_bar);
     }
-    imp__velocity_bar(moves, &first->x, &first->bar, theta_bar);
+    imp__link_velocity_bar(moves, x, theta_bar);
 }
 
 #endif

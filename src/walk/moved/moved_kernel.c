@@ -9,7 +9,7 @@
 #include "walk/core/vertex.h"
 #include <float.h>
 
-extern const struct imp_bsdf_ops imp__diffuse, imp__twosided, imp__black;
+extern const struct imp_bsdf_ops imp__diffuse, imp__twosided, imp__black, imp__mask;
 
 bool imp__is_lambertian(const struct imp_bsdf *b)
 {
@@ -79,7 +79,8 @@ void imp__kernel_derive(const struct imp_vertex *v, const struct imp_surface *at
     out->wi = imp__to_world(&frame, dirs->wi);
     imp_spec K;
     v->bsdf->ops->eval(v->bsdf, v->in, dirs, &K);
-    v->bsdf->ops->eval_directions_d(v->bsdf, v->in, dirs, out->d_wo, out->d_wi);
+    if (imp_likely(dirs->lobe == IMP_SMOOTH))
+        v->bsdf->ops->eval_directions_d(v->bsdf, v->in, dirs, out->d_wo, out->d_wi);
     if (v->shape && imp__is_textured(v->bsdf)) {
         imp__surface_grad(at, out->grad);
         textures_derive(v, dirs, out->d_uv);
@@ -145,9 +146,10 @@ static bool has_grain(const struct imp_bsdf *b)
 
 const char *imp__kernel_without_d(const struct imp_bsdf *b, bool round)
 {
-    if (imp__is_lambertian(b)) return NULL;
-    if (b->flags & IMP_BSDF_NULL) return "lets light pass as if nothing were there";
+    if (imp__is_lambertian(b) || b->flags & IMP_BSDF_NULL) return NULL;
     if (b->flags & IMP_BSDF_TURNED) return "has normals of its own";
+    if (b->ops == &imp__mask && !(b->child[0]->flags & IMP_BSDF_DELTA))
+        return imp__kernel_without_d(b->child[0], round);
     if (b->flags & IMP_BSDF_DELTA)
         return "reflects or lets pass in single directions: edges that are seen in it "
                "have no "

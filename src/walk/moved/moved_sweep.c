@@ -6,12 +6,15 @@
 #include "moved_chain.h"
 #include "moved_sky.h"
 #include "walk/core/vertex.h"
+#include "walk/path/first_segment.h"
 
 /* What the values of vertex k depend on, as adjoints of their logarithms, by lanes. */
 struct pieces {
     imp_spec light; /* its light sample */
-    imp_spec step;  /* the step, of all light but what is emitted at its end */
+    imp_spec step;  /* the step, of all light but `met` */
     imp_spec met;   /* emission at its end */
+    int lit;        /* vertex of that emission: the next one, or behind passes */
+    imp_spec all;   /* what the camera sees of it, up to `front` */
 };
 
 struct sweep {
@@ -21,13 +24,40 @@ struct sweep {
     struct imp__link_point *at; /* [n] */
     struct pieces *piece;       /* [n] */
     double *theta_bar;
-    imp_v3 wo_bar; /* of the direction from the first vertex to the camera */
-    int first;     /* vertex: 1 on a meter, behind that of the sensor */
+    int first; /* vertex: 1 where the sensor has one before it */
+    int front; /* the first vertex at which the camera's ray does not go straight on */
+    imp_spec seen; /* adjoint of the light that reaches it */
+    bool meter;    /* the sensor is a surface, which is vertex `first` */
+    bool through;  /* light samples pass what lets light go straight on */
+    bool fog;      /* a medium fills the scene */
+    imp_spec extinction;
 };
 
 static bool is_emitted(const struct imp_vertex *v)
 {
     return v->d.scatterer != IMP_AT_SKY && v->d.met.emitter >= 0;
+}
+
+/* Emission that the step from v meets, and that is glued to its light where a light sample could
+ * have brought it, from behind passes only if these let samples through. */
+static void met_read(const struct sweep *s, const struct imp_vertex *v, imp_spec P, int k,
+                     struct pieces *piece)
+{
+    const struct imp_vertex *y = v->next;
+    for (k++; s->through && y && imp__goes_straight(y); k++) {
+        P *= y->w;
+        y = y->next;
+    }
+    if (!y || !is_emitted(y)) return;
+    piece->met = P * y->e;
+    piece->lit = k;
+}
+
+/* Where the ray to vertex k begins; of the camera's, in front of its near clip nothing fades. */
+static imp_v3 ray_begin(const struct sweep *s, int k)
+{
+    const struct imp_sensor_ray *ray = &s->walk->ray;
+    return k > s->first ? s->at[k - 1].x.p : ray->o + ray->d * ray->t_near;
 }
 
 /* Places and adjoints of all vertices; their number. */
@@ -38,19 +68,29 @@ static int read_walk(struct sweep *s, imp_spec adjoint)
     int n = 0;
     for (const struct imp_vertex *v = s->walk->first; v; v = v->next, n++) {
         const bool sky = v->d.scatterer == IMP_AT_SKY;
-        s->piece[n] = (struct pieces){{0}, {0}, {0}};
+        s->piece[n] = (struct pieces){.lit = 0};
         if (n < s->first) {
             P *= v->w;
             continue;
         }
-        s->at[n] =
-            sky ? imp__sky_point(imp__normalize(imp__decided_v3(v->d.p)))
-                : imp__surface_point(scene, v->d.shape, &v->d.located, v->d.place, v->ng);
         struct pieces *piece = &s->piece[n];
+        if (imp_unlikely(v->d.scatterer == IMP_IN_MEDIUM)) {
+            s->at[n] = imp__medium_point(imp__decided_v3(v->d.p));
+            imp__float_aim(scene, &s->at[n], ray_begin(s, n));
+        } else {
+            s->at[n] = sky ? imp__sky_point(imp__normalize(imp__decided_v3(v->d.p)))
+                           : imp__surface_point(scene, v->d.shape, &v->d.located,
+                                                v->d.place, v->ng);
+        }
+        if (n == s->front) {
+            s->seen = P;
+            piece->all = P * (v->e + v->b + v->w * v->beyond);
+            if (imp_unlikely(imp__goes_straight(v))) s->front++;
+        }
         if (v->d.connection == IMP_CONNECTED) piece->light = P * v->b;
         P *= v->w;
         if (!v->d.goes_on || !v->next) continue;
-        if (is_emitted(v->next)) piece->met = P * v->next->e;
+        met_read(s, v, P, n, piece);
         piece->step = P * v->beyond - piece->met;
     }
     return n;
@@ -105,7 +145,7 @@ static imp_v3 table_bar(struct sweep *s, const struct imp_emitter *e,
 }
 
 /* Is it the point of a meter, in whose place a white surface is? */
-static bool is_meter(const struct sweep *s, int k) { return s->first == 1 && k == 1; }
+static bool is_meter(const struct sweep *s, int k) { return s->meter && k == s->first; }
 
 /* The derivatives of vertex k's kernel towards w, from the places of the chain, which are exact to
  * each other; recorded directions are rounded. False: it is Lambertian without textures, and w and
@@ -113,11 +153,12 @@ static bool is_meter(const struct sweep *s, int k) { return s->first == 1 && k =
 static bool kernel_derive(const struct sweep *s, int k, const struct imp_vertex *v,
                           imp_v3 w, int lobe, struct imp__kernel_d *out)
 {
-    struct imp_surface at;
+    struct imp_surface at = {.s = {1, 0, 0, 0}, .t = {0, 1, 0, 0}, .n = {0, 0, 1, 0}};
     if (imp_likely(imp__is_plain(v->bsdf)) || is_meter(s, k) ||
-        !imp__decided_surface(s->tracer->scene, &v->d, s->walk->time, &at))
+        (imp_likely(!s->at[k].floats) &&
+         !imp__decided_surface(s->tracer->scene, &v->d, s->walk->time, &at)))
         return false;
-    const imp_v3 from = k > 0 ? s->at[k - 1].x.p : s->walk->ray.o;
+    const imp_v3 from = k > s->front ? s->at[k - 1].x.p : s->walk->ray.o;
     const struct imp_frame frame = {at.s, at.t, at.n};
     const struct imp_dirs dirs = {
         imp__to_local(&frame, imp__normalize(from - s->at[k].x.p)),
@@ -139,9 +180,14 @@ static struct imp__kernel_bar kernel_bar(struct sweep *s, int k,
     if (!derived)
         return imp__lambert_times(imp__shading_normal(&s->at[k].x), w,
                                   imp__sum_used(bar, lanes));
-    const struct imp__kernel_bar out = imp__kernel_times(derived, bar, lanes);
-    s->at[k].x.s = derived->frame.s;
-    if (k == 0) s->wo_bar += out.wo;
+    struct imp__kernel_bar out = imp__kernel_times(derived, bar, lanes);
+    if (imp_unlikely(s->at[k].floats)) { /* its frame has the axes of the world */
+        out.n = (imp_v3){0};
+        out.turn = 0;
+    } else {
+        s->at[k].x.s = derived->frame.s;
+    }
+    if (k <= s->front) s->at[k].wo_bar += out.wo;
     return out;
 }
 
@@ -152,6 +198,28 @@ static struct imp__kernel_bar light_kernel(struct sweep *s, int k,
     struct imp__kernel_d d;
     const bool derived = kernel_derive(s, k, v, w, IMP_SMOOTH, &d);
     return kernel_bar(s, k, derived ? &d : NULL, w, s->piece[k].light);
+}
+
+/* An adjoint of the logarithm of the light on a line is this one of the line's length. */
+static double length_bar(const struct sweep *s, imp_spec bar)
+{
+    return imp_likely(!s->fog)
+               ? 0
+               : -imp__sum_used(bar * s->extinction, s->tracer->scene->lanes);
+}
+
+/* The ray from a vertex, or from the camera, to vertex k carries light of this adjoint, of which the
+ * logarithm changes with its length: by what the surface there moves, or, where k floats at the part s
+ * of the length D,  ln(sigma exp(-sigma s D) D). */
+static double reach_bar(const struct sweep *s, int k, imp_spec bar)
+{
+    const struct imp__link_point *x = &s->at[k];
+    if (imp_likely(!s->fog)) return 0;
+    if (!x->floats) return length_bar(s, bar);
+    if (x->open) return 0;
+    return (imp__sum_used(bar, s->tracer->scene->lanes) /
+            imp__length(x->beyond - ray_begin(s, k))) +
+           x->part * length_bar(s, bar);
 }
 
 /* A light sample of a point, or of parallel light. */
@@ -177,9 +245,30 @@ static void delta_bar(struct sweep *s, int k, const struct imp_vertex *v)
     /* The light turned by a vector sends along d what it sent along d turned back. */
     imp__light_axis_bar(s->moves, light, imp__cross(slope, d), s->theta_bar);
     const struct imp__kernel_bar kernel = light_kernel(s, k, v, r * (-1 / distance));
-    const imp_v3 bar = imp__point_bar(&s->at[k], at, &kernel, weight) - turn;
+    const imp_v3 bar =
+        imp__point_bar(&s->at[k], at, &kernel, weight, length_bar(s, s->piece[k].light)) -
+        turn;
     s->at[k].moved_bar += turn;
     imp__light_velocity_bar(s->moves, light, bar, s->theta_bar);
+}
+
+/* Light from the point y of a lamp that reaches vertex k, along -w. */
+static void lamp_bar(struct sweep *s, int k, struct imp__link_point *y, imp_v3 w,
+                     struct imp__kernel_bar *kernel, const struct imp_emitter *e,
+                     imp_spec light)
+{
+    struct imp__link_point *x = &s->at[k];
+    const double bar = imp__sum_used(light, s->tracer->scene->lanes),
+                 along = length_bar(s, light);
+    if (imp_likely(!x->floats)) {
+        imp__connection_bar(x, y, kernel, bar, along);
+        return;
+    }
+    double slope;
+    const double part = imp__glued_part(e, imp__length(y->x.p - x->x.p), &slope);
+    kernel->wi *= part;
+    imp__connection_bar(x, y, kernel, bar * part, along * part + bar * slope);
+    x->moved_bar += imp__reached_bar(y, w, along * (1 - part) - bar * slope);
 }
 
 /* The light sample of vertex k. */
@@ -200,15 +289,62 @@ static void light_bar(struct sweep *s, int k, const struct imp_vertex *v)
     struct imp__link_point y = imp__surface_point(
         scene, e->shape->index, &v->d.light.located, 0, imp__decided_v3(v->d.light.d));
     const imp_v3 w = imp__link_direction(&s->at[k], &y);
-    const double bar = imp__sum_used(s->piece[k].light, scene->lanes);
+    const imp_spec light = s->piece[k].light;
+    const double bar = imp__sum_used(light, scene->lanes);
     struct imp__kernel_bar kernel = light_kernel(s, k, v, w);
     kernel.wi -= table_bar(s, e, &y.x, -w, bar, v->carried);
-    imp__connection_bar(&s->at[k], &y, &kernel, bar);
+    lamp_bar(s, k, &y, w, &kernel, e, light);
     imp__velocity_bar(s->moves, &y.x, &y.bar, s->theta_bar);
 }
 
-/* The step from vertex k to the next one, which slides along it; emission that it meets there is
- * glued. */
+/* Vertex k passes light straight on: its place does not move what follows, but a texture may let
+ * pass another part. */
+static void pass_bar(struct sweep *s, int k, const struct imp_vertex *v)
+{
+    struct imp__link_point *x = &s->at[k], *next = x + 1;
+    const imp_v3 w = imp__link_direction(x, next);
+    const struct imp_scene *scene = s->tracer->scene;
+    const struct pieces *piece = &s->piece[k];
+    struct imp__kernel_d d;
+    if (imp__is_textured(v->bsdf) && kernel_derive(s, k, v, w, v->d.lobe, &d)) {
+        const struct imp__kernel_bar on =
+            imp__kernel_times(&d, piece->step + piece->met, scene->lanes);
+        imp__scatter_bar(x, &on);
+    }
+    if (next->sky || k < s->front) return; /* the camera's ray leads there */
+    next->along += reach_bar(s, k + 1, piece->step);
+    x->moved_bar += imp__slide_bar(next, w, NULL);
+    if (!s->through && !imp__is_zero(piece->met))
+        table_bar(s, scene->emitters[v->next->d.met.emitter], &next->x, -w,
+                  imp__sum_used(piece->met, scene->lanes), v->next->carried);
+    imp__link_velocity_bar(s->moves, next, s->theta_bar);
+}
+
+/* Emission that the step from vertex k meets: a light sample could have brought it. */
+static void met_bar(struct sweep *s, int k, const struct imp_vertex *v, imp_v3 w,
+                    const struct imp__kernel_d *d)
+{
+    const struct imp_scene *scene = s->tracer->scene;
+    const struct pieces *piece = &s->piece[k];
+    struct imp__link_point *y = &s->at[piece->lit];
+    const struct imp_vertex *lit = v->next;
+    for (int i = k + 1; i < piece->lit; i++) lit = lit->next;
+    const double bar = imp__sum_used(piece->met, scene->lanes);
+    struct imp__kernel_d behind;
+    if (imp_unlikely(piece->lit > k + 1)) { /* places of passes are not exact */
+        w = imp__link_direction(&s->at[k], y);
+        d = kernel_derive(s, k, v, w, v->d.lobe, &behind) ? &behind : NULL;
+    }
+    struct imp__kernel_bar met = kernel_bar(s, k, d, w, piece->met);
+    const struct imp_emitter *e = scene->emitters[lit->d.met.emitter];
+    met.wi -= table_bar(s, e, &y->x, -w, bar, lit->carried);
+    lamp_bar(s, k, y, w, &met, e, piece->met);
+    if (piece->lit == k + 1) return;
+    imp__velocity_bar(s->moves, &y->x, &y->bar, s->theta_bar);
+    y->bar = (struct imp__velocity){.area = 0};
+}
+
+/* The step from vertex k to the next one, which slides along it. */
 static void step_bar(struct sweep *s, int k, const struct imp_vertex *v)
 {
     struct imp__link_point *x = &s->at[k], *next = x + 1;
@@ -220,36 +356,65 @@ static void step_bar(struct sweep *s, int k, const struct imp_vertex *v)
     const struct imp__kernel_bar on = kernel_bar(s, k, d, w, piece->step);
     imp__scatter_bar(x, &on);
     if (next->sky) return;
-    x->moved_bar += imp__slide_bar(next, w);
-    if (!imp__is_zero(piece->met)) {
-        const struct imp_scene *scene = s->tracer->scene;
-        const double bar = imp__sum_used(piece->met, scene->lanes);
-        struct imp__kernel_bar met = kernel_bar(s, k, d, w, piece->met);
-        met.wi -= table_bar(s, scene->emitters[v->next->d.met.emitter], &next->x, -w, bar,
-                            v->next->carried);
-        imp__connection_bar(x, next, &met, bar);
-    }
-    imp__velocity_bar(s->moves, &next->x, &next->bar, s->theta_bar);
+    next->along += reach_bar(s, k + 1, piece->step);
+    x->moved_bar += imp__slide_bar(next, w, NULL);
+    if (!imp__is_zero(piece->met)) met_bar(s, k, v, w, d);
+    imp__link_velocity_bar(s->moves, next, s->theta_bar);
 }
 
 /* The sky through a fixed film position: the direction d of the ray turns by u(o + d) - u(o). */
-static void sky_seen_bar(const struct sweep *s, imp_spec adjoint)
+static void sky_seen_bar(const struct sweep *s)
 {
     const struct imp_sensor_ray *ray = &s->walk->ray;
     const imp_v3 slope =
-        imp__skies_slope(s->tracer->scene, ray->d, adjoint, s->walk->first->carried);
+        imp__skies_slope(s->tracer->scene, ray->d, s->seen, s->walk->first->carried);
     if (imp__is_zero(slope)) return;
     imp__camera_velocity_bar(s->moves, ray->o, ray->o + ray->d, slope, s->theta_bar);
     imp__camera_velocity_bar(s->moves, ray->o + ray->d, ray->o, -slope, s->theta_bar);
+}
+
+/* What the camera's ray meets: its vertices up to `front`. */
+static void front_bar(struct sweep *s)
+{
+    const struct imp_vertex *v = s->walk->first;
+    for (int k = 0; k < s->front; k++) v = v ? v->next : NULL;
+    if (v && s->at[s->front].sky) {
+        sky_seen_bar(s);
+        v = NULL;
+    }
+    if (v && is_emitted(v))
+        s->at[s->front].wo_bar +=
+            table_bar(s, s->tracer->scene->emitters[v->d.met.emitter], &s->at[s->front].x,
+                      imp__normalize(s->walk->ray.o - s->at[s->front].x.p),
+                      imp__sum_used(s->seen * v->e, s->tracer->scene->lanes), v->carried);
+    for (int k = v ? s->front : s->front - 1; k >= s->first; k--) {
+        /* From the surface before it, which moves along the ray itself, or from the camera. */
+        struct imp__link_point *x = &s->at[k];
+        const double along = reach_bar(s, k, s->piece[k].all);
+        x->along += along;
+        if (imp_unlikely(s->fog && k > s->first))
+            x[-1].along +=
+                (x->floats ? 1 - x->part : 0) *
+                    imp__dot(x->moved_bar, imp__normalize(x->x.p - x[-1].x.p)) -
+                along;
+        imp__camera_bar(s->moves, s->walk->ray.o, x, s->theta_bar);
+    }
 }
 
 bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
                       const struct imp__moves *moves, const struct imp_walk *walk,
                       imp_spec adjoint, double *theta_bar)
 {
-    struct sweep s = {tracer, moves,     walk, NULL,
-                      NULL,   theta_bar, {0},  tracer->sensor->shape ? 1 : 0};
     if (walk->dropped || !walk->valid || !walk->first) return true;
+    struct sweep s = {.tracer = tracer,
+                      .moves = moves,
+                      .walk = walk,
+                      .theta_bar = theta_bar,
+                      .first = walk->first->d.scatterer == IMP_AT_SENSOR,
+                      .meter = tracer->sensor->shape != NULL,
+                      .through = imp__segment_first(tracer)->through};
+    s.front = s.first;
+    s.fog = imp__fog(tracer, walk->first->carried, &s.extinction);
     s.at = imp__arena_take(arena, (size_t)walk->n, sizeof *s.at);
     s.piece = imp__arena_take(arena, (size_t)walk->n, sizeof *s.piece);
     if (!s.at || !s.piece) return false;
@@ -257,24 +422,16 @@ bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
     for (const struct imp_vertex *v = walk->last; v; v = v->prev, k--) {
         if (k < s.first || s.at[k].sky) continue;
         if (v->d.connection == IMP_CONNECTED) light_bar(&s, k, v);
-        if (v->d.goes_on && v->next) step_bar(&s, k, v);
+        if (!v->d.goes_on || !v->next) continue;
+        if (imp_unlikely(imp__goes_straight(v))) pass_bar(&s, k, v);
+        else step_bar(&s, k, v);
     }
-    if (s.first == 1) {
-        if (walk->n < 2) return true;
-        s.at[1].bar.v += s.at[1].moved_bar;
-        imp__velocity_bar(moves, &s.at[1].x, &s.at[1].bar, theta_bar);
+    if (walk->n <= s.first) return true;
+    if (!s.meter) {
+        front_bar(&s);
         return true;
     }
-    if (s.at[0].sky) {
-        sky_seen_bar(&s, adjoint);
-        return true;
-    }
-    const struct imp_vertex *first = walk->first;
-    if (is_emitted(first))
-        s.wo_bar += table_bar(&s, tracer->scene->emitters[first->d.met.emitter],
-                              &s.at[0].x, imp__normalize(walk->ray.o - s.at[0].x.p),
-                              imp__sum_used(adjoint * first->e, tracer->scene->lanes),
-                              first->carried);
-    imp__camera_bar(moves, walk->ray.o, &s.at[0], s.wo_bar, theta_bar);
+    s.at[1].bar.v += s.at[1].moved_bar;
+    imp__velocity_bar(moves, &s.at[1].x, &s.at[1].bar, theta_bar);
     return true;
 }

@@ -189,9 +189,10 @@ void imp__walk_along(const struct imp_tracer *tracer, struct imp_arena *arena,
     walk->time = imp__walk_time(tracer, walk);
     step_begin(tracer, arena, walk, scratch, &s);
     s.depth = depth;
-    if (hit) imp__walk_on_hit(&s, hit);
-    else if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s))
-        imp__walk_on(&s);
+    if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s)) {
+        if (hit) imp__walk_on_hit(&s, hit);
+        else imp__walk_on(&s);
+    }
     walk_close(tracer, walk);
 }
 

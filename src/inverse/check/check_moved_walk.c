@@ -1,0 +1,208 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A recorded walk from stop to stop where something has moved (check_moved.h). */
+#include "check_moved.h"
+#include "walk/moved/moved_sky.h"
+#include "walk/path/first_segment.h"
+#include <math.h>
+
+/* A vertex as it was recorded, and where it is now. */
+struct stop {
+    const struct imp_vertex *v; /* NULL: none */
+    bool floats;                /* it is a point of a medium */
+    struct imp__glued old;
+    struct imp__moved_at here;
+    imp_v3 x, from[2]; /* its place; directions of arrival, now and then */
+    imp_spec grows;    /* how the light that arrives there has changed on the way */
+    imp_spec P;        /* of light that leaves it, where its kernel has not changed */
+};
+
+static imp_spec stop_ratio(const struct imp__moved_by *m, const struct stop *s,
+                           const imp_v3 w[2], int lobe)
+{
+    return imp__moved_kernel(m, s->v, &s->here, s->x, s->from, w, &s->old, lobe);
+}
+
+/* What a way that is so much longer lets pass. */
+static imp_spec fades(const struct imp__moved_by *m, double longer)
+{
+    imp_spec T = imp__spec(1);
+    if (imp__is_zero(m->extinction)) return T;
+    for (int c = 0; c < 4; c++) T[c] = exp(-m->extinction[c] * longer);
+    return T;
+}
+
+/* Light from a place of a lamp, now and then, to a stop: `glued` to the place, it has become so many
+ * times as much. Of a point of a medium only a part of it is glued, and the rest has a fixed
+ * direction. */
+static imp_spec lamp_ratio(const struct imp__moved_by *m, const struct stop *s, int lobe,
+                           const struct imp_emitter *e, const struct imp__moved_at *now,
+                           imp_v3 then, imp_spec glued)
+{
+    imp_v3 w[2];
+    double unused;
+    if (!s->floats) return glued;
+    const double d[2] = {imp__length(now->p - s->x), imp__length(then - s->old.p)};
+    struct imp__moved_at met = *now;
+    w[0] = w[1] = imp__normalize(then - s->old.p);
+    const double fixed = imp__length(imp__moved_met(s->x, w[0], &met) - s->x);
+    return glued * imp__glued_part(e, d[0], &unused) +
+           stop_ratio(m, s, w, lobe) * fades(m, fixed - d[1]) *
+               (1 - imp__glued_part(e, fixed, &unused));
+}
+
+/* What its light sample brings, of light that reaches it with P. */
+static double light_frozen(const struct imp__moved_by *m, const struct stop *s,
+                           imp_spec P)
+{
+    const struct imp_scene *scene = m->c->problem->scene;
+    const struct imp_light *l = &s->v->d.light;
+    imp_v3 to[2];
+    double farther;
+    if (s->v->d.connection != IMP_CONNECTED) return 0;
+    const double ratio = imp__moved_light(m, s->v, &s->old, s->x, to, &farther);
+    const struct imp_emitter *e = scene->emitters[l->emitter];
+    imp_spec all = stop_ratio(m, s, to, IMP_SMOOTH);
+    if (s->floats && e->shape) {
+        const struct imp__glued y =
+            imp__glued_at(scene, e->shape->index, &l->located, 0, imp__decided_v3(l->d));
+        const struct imp__moved_at now = imp__moved_placed(m, &y);
+        all = lamp_ratio(m, s, IMP_SMOOTH, e, &now, y.p, all * ratio * fades(m, farther));
+        return imp__sum_used(P * s->v->b * all, scene->lanes);
+    }
+    return ratio * imp__sum_used(P * s->v->b * all * fades(m, farther), scene->lanes);
+}
+
+/* Emission that is met from there, glued to the light. */
+static double met_frozen(const struct imp__moved_by *m, const struct stop *s,
+                         const struct stop *y)
+{
+    const struct imp_scene *scene = m->c->problem->scene;
+    const imp_v3 to[2] = {imp__normalize(y->here.p - s->x),
+                          imp__normalize(y->old.p - s->old.p)};
+    const double now = imp__moved_receives(s->x, y->here.p, y->here.n),
+                 then = imp__moved_receives(s->old.p, y->old.p, y->old.n);
+    const double farther =
+        imp__length(y->here.p - s->x) - imp__length(y->old.p - s->old.p);
+    imp_spec all = stop_ratio(m, s, to, s->v->d.lobe);
+    if (!s->floats)
+        return imp__sum_used(s->P * y->v->e * all * fades(m, farther), scene->lanes) *
+               now / then;
+    all = lamp_ratio(m, s, s->v->d.lobe, scene->emitters[y->v->d.met.emitter], &y->here,
+                     y->old.p, all * (now / then) * fades(m, farther));
+    return imp__sum_used(s->P * y->v->e * all, scene->lanes);
+}
+
+/* A point of a medium, at a part of the way from `begin` (now and then) along the ray to what lies
+ * beyond. */
+static void float_at(const struct imp__moved_by *m, struct stop *s, imp_v3 o,
+                     const imp_v3 begin[2])
+{
+    const struct imp_scene *scene = m->c->problem->scene;
+    struct imp__link_point p = imp__medium_point(imp__decided_v3(s->v->d.p));
+    imp__float_aim(scene, &p, begin[1]);
+    const double t = imp__length(p.x.p - begin[1]);
+    s->x = begin[0] + s->from[0] * t;
+    s->grows = imp__spec(1);
+    if (p.open) return;
+    const struct imp__glued beyond = imp__link_glued(&p);
+    struct imp__moved_at there = imp__moved_placed(m, &beyond),
+                         rest = imp__moved_rest(&beyond);
+    const double now = imp__length(imp__moved_met(o, s->from[0], &there) - begin[0]),
+                 then =
+                     imp__length(imp__moved_met(begin[1], s->from[1], &rest) - begin[1]);
+    s->x = begin[0] + s->from[0] * (t * now / then);
+    s->grows = fades(m, t * (now / then - 1)) * (now / then);
+}
+
+/* The next stop of a walk, behind `before` (NULL: the camera); seen: along the camera's ray, else along
+ * a fixed direction. */
+static struct stop stop_at(const struct imp__moved_by *m, const struct imp_walk *walk,
+                           const struct imp_vertex *v, const struct stop *before,
+                           bool seen)
+{
+    const struct imp_scene *scene = m->c->problem->scene;
+    const bool turns = m->shape == IMP_MOVE_CAMERA && seen;
+    struct stop s = {.v = v, .floats = v->d.scatterer == IMP_IN_MEDIUM};
+    if (s.floats) s.old.p = imp__decided_v3(v->d.p);
+    else s.old = imp__moved_glued(scene, v, walk->time);
+    imp_v3 o = seen ? walk->ray.o : before->x;
+    s.from[1] = imp__normalize(s.old.p - (seen ? o : before->old.p));
+    s.from[0] = turns ? imp__moved_turn(m, s.from[1]) : s.from[1];
+    if (turns) o = m->to + imp__moved_turn(m, o - m->from);
+    const imp_v3 near[2] = {s.from[0] * walk->ray.t_near, s.from[1] * walk->ray.t_near};
+    const imp_v3 begin[2] = {before ? before->x : o + near[0],
+                             before ? before->old.p : walk->ray.o + near[1]};
+    if (s.floats) {
+        float_at(m, &s, o, begin);
+        return s;
+    }
+    s.here = imp__moved_placed(m, &s.old);
+    const bool meter = !before && m->c->tracer.sensor->shape;
+    s.x = meter ? s.here.p : imp__moved_met(o, s.from[0], &s.here);
+    s.here.shade = s.old.smooth ? imp__moved_shade(m, &s.old, s.x) : s.here.n;
+    s.grows = fades(m, imp__length(s.x - begin[0]) - imp__length(s.old.p - begin[1]));
+    return s;
+}
+
+/* What leaves a stop for the next vertex, in place of what reaches it; s->P. */
+static imp_spec step_frozen(const struct imp__moved_by *m, struct stop *s, imp_spec P)
+{
+    const struct imp_scene *scene = m->c->problem->scene;
+    const struct imp_vertex *next = s->v->next;
+    imp_v3 w[2] = {s->from[0], s->from[1]};
+    s->P = P * s->v->w;
+    if (!imp__goes_straight(s->v)) {
+        const bool place =
+            next->d.scatterer == IMP_AT_SKY || next->d.scatterer == IMP_IN_MEDIUM;
+        const imp_v3 p =
+            place ? imp__decided_v3(next->d.p) : imp__moved_glued(scene, next, 0).p;
+        w[0] = w[1] = imp__normalize(next->d.scatterer == IMP_AT_SKY ? p : p - s->old.p);
+    }
+    return s->P * stop_ratio(m, s, w, s->v->d.lobe);
+}
+
+double imp__frozen_walk(struct imp__moved_by *m, const struct imp_walk *walk, imp_spec P)
+{
+    const struct imp_scene *scene = m->c->problem->scene;
+    const bool through = imp__segment_first(&m->c->tracer)->through;
+    const struct imp_vertex *v = walk->first;
+    struct stop here = {.v = NULL}, from = {.v = NULL}; /* from which light is sampled */
+    bool seen = true;                                   /* by the camera's ray */
+    double value = 0;
+    m->extinction = (imp_spec){0};
+    const bool fog = v && imp__fog(&m->c->tracer, v->carried, &m->extinction);
+    if (v && v->d.scatterer == IMP_AT_SENSOR) {
+        P *= v->w;
+        v = v->next;
+    }
+    for (; v; v = v->next) {
+        if (v->d.scatterer == IMP_AT_SKY) {
+            const imp_v3 d = walk->ray.d;
+            const imp_spec sky =
+                !seen
+                    ? here.v->beyond
+                    : imp__skies_from(
+                          scene, m->shape == IMP_MOVE_CAMERA ? imp__moved_turn(m, d) : d,
+                          v->carried);
+            return value + imp__sum_used(P * sky, scene->lanes);
+        }
+        const struct stop before = here;
+        const bool passed = fog || (here.v && imp__goes_straight(here.v));
+        here = stop_at(m, walk, v, here.v ? &before : NULL, seen);
+        if (fog) P *= here.grows;
+        if (!here.floats && v->d.met.emitter >= 0) {
+            if (from.v) value += met_frozen(m, &from, &here);
+            else if (passed) value += imp__sum_used(P * v->e, scene->lanes);
+        }
+        value += light_frozen(m, &here, P);
+        if (!v->d.goes_on || !v->next) break;
+        P = step_frozen(m, &here, P);
+        if (!imp__goes_straight(v)) {
+            from = here;
+            seen = false;
+        } else if (through) from.P *= v->w;
+        else from.v = NULL;
+    }
+    return value;
+}

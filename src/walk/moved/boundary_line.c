@@ -1,0 +1,221 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Straight lines between the points of a draw (boundary.h): masks let a part of the light pass, null
+ * materials all of it. What passes is a factor, and moves no point behind it. */
+#include "boundary_parts.h"
+#include "walk/media/tracking.h"
+
+#define PASSES_MOST 1024 /* surfaces on a line: of more, nothing comes through */
+
+/* What goes straight on through a surface, along the unit vector w. */
+static imp_spec passed(const struct imp__edge_draw *d, const struct imp_bsdf *b,
+                       const struct imp_hit *hit, const struct imp_surface *at, imp_v3 w)
+{
+    const struct imp_scene *scene = d->b->tracer->scene;
+    const struct imp_shape *shape =
+        scene->shapes[imp__placed_shape(scene, hit->shape, hit->place)];
+    const struct imp_frame frame = {at->s, at->t, at->n};
+    const imp_v3 wi = imp__to_local(&frame, w);
+    const struct imp_texcoord place = {.uv = {at->uv[0], at->uv[1]},
+                                       .p = at->p,
+                                       .shape = shape,
+                                       .prim = hit->prim,
+                                       .carried = imp__edge_waves(d)};
+    imp_spec in[IMP_INPUTS_MAX], f, sum = {0};
+    imp__evaluate_inputs(b, shape, &place, in);
+    for (int l = 0; l < 64; l++) {
+        if (!(b->straight >> l & 1)) continue;
+        const struct imp_dirs dirs = {-wi, wi, l, 0};
+        imp__bsdf_eval(b, place.carried, in, &dirs, &f);
+        sum += f;
+    }
+    return sum;
+}
+
+imp_spec imp__edge_cleared(const struct imp__edge_draw *d, double length)
+{
+    return imp_likely(!d->b->fog) ? imp__spec(1)
+                                  : imp__attenuation(d->extinction, length);
+}
+
+static bool is_open(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, double till,
+                    struct imp__line *line)
+{
+    const struct imp_scene *scene = d->b->tracer->scene;
+    if (imp_likely(!d->b->passes)) return !imp__occluded_at(scene, 0, &o, &r, 0, till);
+    const imp_v3 end = o + r * till;
+    for (int n = 0; n < PASSES_MOST; n++) {
+        struct imp_hit hit;
+        struct imp_surface at;
+        const double reach = isfinite(till) ? 1 : INFINITY;
+        const imp_v3 way = isfinite(till) ? end - o : r;
+        if (!imp__intersect(scene, &o, &way, 0, reach, &hit)) return true;
+        const struct imp_bsdf *b = imp__hit_bsdf(scene, &hit);
+        if (!b->straight) return false;
+        imp__hit_surface(scene, &hit, &o, &way, &at);
+        line->T *= passed(d, b, &hit, &at, imp__normalize(way));
+        line->bounces += !d->b->through;
+        o = imp__offset(at.p, at.ng, r);
+        if (imp__is_zero_used(line->T, d->waves)) return false;
+        if (isfinite(till) && !(imp__dot(end - o, r) > 0)) return true;
+    }
+    return false;
+}
+
+double imp__edge_clip(const struct imp__edge_draw *d, const struct imp_sensor_sample *to)
+{
+    const struct imp_sensor *s = d->b->tracer->sensor;
+    struct imp_sensor_ray ray;
+    s->ops->ray(s, to->px, to->py, d->lens, &ray);
+    return ray.t_near;
+}
+
+bool imp__edge_hit_passes(const struct imp__edge_draw *d, const struct imp_hit *hit,
+                          imp_v3 o, imp_v3 r, imp_spec *T)
+{
+    const struct imp_bsdf *b = imp__hit_bsdf(d->b->tracer->scene, hit);
+    struct imp_surface at;
+    if (imp_likely(!b->straight)) return false;
+    imp__hit_surface(d->b->tracer->scene, hit, &o, &r, &at);
+    *T *= passed(d, b, hit, &at, imp__normalize(r));
+    return true;
+}
+
+bool imp__edge_line(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, double till,
+                    struct imp__line *line)
+{
+    *line = (struct imp__line){imp__edge_cleared(d, imp__length(r) * till), 1, 0};
+    return !imp__is_zero_used(line->T, d->waves) && is_open(d, o, r, till, line);
+}
+
+/* How far light goes in a medium before it is scattered: by the extinction of a lane that is chosen
+ * (Wilkie et al. 2014) or, since what it brings to a camera nearby is one over a distance squared, by
+ * the angle under which that sees it (Kulla and Fajardo 2012). One chance is as good as the other. */
+struct flight {
+    bool aims;
+    double nearest, apart,
+        first; /* the eye: along the line, off it; angle where it begins */
+};
+
+static struct flight flight_of(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w)
+{
+    struct flight f = {.aims = !d->b->parallel};
+    const imp_v3 r = d->eye - o;
+    if (!f.aims) return f;
+    f.nearest = imp__dot(r, w);
+    f.apart = imp_max(imp__length(r - w * f.nearest), 1e-6 * d->b->size);
+    f.first = atan(-f.nearest / f.apart);
+    return f;
+}
+
+static double flight_draw(const struct imp__edge_draw *d, const struct flight *f,
+                          unsigned dims)
+{
+    const int lanes = d->b->tracer->scene->lanes;
+    const unsigned first = IMP_EDGE_FLIGHT + 2 * dims;
+    double u = imp__u01(d->key, first);
+    const double v = imp__u01(d->key, first + 1);
+    if (f->aims && u < 0.5)
+        return imp_max(
+            f->nearest + f->apart * tan(f->first + v * (IMP_PI / 2 - f->first)), 0.0);
+    if (f->aims) u = 2 * u - 1;
+    const double sigma = d->extinction[imp_min((int)(u * lanes), lanes - 1)];
+    return sigma > 0 ? -log(1 - v) / sigma : INFINITY;
+}
+
+/* The line ends after this length, on a surface or in the medium: what passes, and the density. */
+static void flight_end(const struct imp__edge_draw *d, const struct flight *f,
+                       double length, bool floats, struct imp__line *line)
+{
+    const int lanes = d->b->tracer->scene->lanes;
+    const imp_spec T = imp__edge_cleared(d, length);
+    double p = imp__sum_used(floats ? d->extinction * T : T, lanes) / lanes;
+    if (f->aims) {
+        const double x = (length - f->nearest) / f->apart, all = IMP_PI / 2 - f->first;
+        const double aimed =
+            floats ? 1 / (f->apart * (1 + x * x) * all) : (IMP_PI / 2 - atan(x)) / all;
+        p = 0.5 * (p + aimed);
+    }
+    line->T *= T;
+    line->times *= 1 / p;
+}
+
+#define PASS_LEAST 0.1 /* probability of either choice at a mask */
+
+bool imp__edge_follow(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
+                      unsigned dims, struct imp_hit *hit, struct imp_surface *at,
+                      struct imp__line *line)
+{
+    const struct imp_scene *scene = d->b->tracer->scene;
+    const imp_v3 start = o;
+    struct flight f = {.aims = false};
+    double flight = INFINITY;
+    *line = (struct imp__line){imp__spec(1), 1, 0};
+    if (imp_unlikely(d->b->fog != NULL)) {
+        f = flight_of(d, o, w);
+        flight = flight_draw(d, &f, dims);
+    }
+    for (unsigned n = 0; n < PASSES_MOST; n++) {
+        const bool meets = imp__intersect(scene, &o, &w, from, INFINITY, hit);
+        if (meets) imp__hit_surface(scene, hit, &o, &w, at);
+        if (imp_unlikely(n > 0) && meets) hit->t = imp__dot(at->p - start, w);
+        if (imp_unlikely(flight < INFINITY) && (!meets || flight < hit->t)) {
+            *hit = (struct imp_hit){.shape = -1, .t = flight};
+            *at = (struct imp_surface){.p = start + w * flight};
+            flight_end(d, &f, flight, true, line);
+            return true;
+        }
+        if (!meets) return false;
+        const struct imp_bsdf *b = imp__hit_bsdf(scene, hit);
+        const imp_spec T =
+            imp_likely(!b->straight) ? (imp_spec){0} : passed(d, b, hit, at, w);
+        const double pass =
+            imp_likely(!b->straight) ? 0
+            : b->flags & IMP_BSDF_SMOOTH
+                ? imp_clamp(imp__max_used(T, d->waves), PASS_LEAST, 1 - PASS_LEAST)
+                : 1;
+        if (pass == 0 ||
+            imp__u01(d->key, IMP_EDGE_PASS + dims * PASSES_MOST + n) >= pass) {
+            line->times *= 1 / (1 - pass);
+            if (imp_unlikely(d->b->fog != NULL)) flight_end(d, &f, hit->t, false, line);
+            return true;
+        }
+        line->times *= 1 / pass;
+        line->T *= T;
+        line->bounces += !d->b->through;
+        if (imp__is_zero_used(line->T, d->waves)) return false;
+        o = imp__offset(at->p, at->ng, w);
+        from = 0;
+    }
+    return false;
+}
+
+#define SHORT_OF                                                                         \
+    30 /* so far before the edge a look begins, per what it is apart from it */
+
+imp_spec imp__edge_near(struct imp__edge_draw *d, double distance, double apart,
+                        imp_spec T)
+{
+    d->near = d->b->fog ? imp_max(distance - SHORT_OF * apart, 0.0) : 0;
+    return d->b->fog ? T : imp__spec(1);
+}
+
+bool imp__edge_passes(const struct imp__edge_draw *d)
+{
+    const struct imp_scene *scene = d->b->tracer->scene;
+    const struct imp__edges *edges = d->b->edges;
+    struct imp_hit own = {.shape = -1};
+    if (imp_likely(!d->b->passes)) return false;
+    if (!d->edge) {
+        if (d->item->shape < 0) return false;
+        own.shape = d->item->shape;
+        own.place = d->item->place;
+        return imp__hit_bsdf(scene, &own)->straight;
+    }
+    for (int k = 0; k < d->edge->n_faces; k++) {
+        own.shape = edges->face[d->edge->first + (size_t)k].shape;
+        own.place = edges->face[d->edge->first + (size_t)k].place;
+        if (imp__hit_bsdf(scene, &own)->straight) return true;
+    }
+    return false;
+}
