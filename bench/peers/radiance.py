@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Illuminances of a grid beside Radiance's rtrace: agreement, and processor time to 2 % at the points.
 
-    python3 bench/peers/radiance.py [-b IMPORTON] [-r FOLDER] [--polygons N ...] [--seed S]
+    python3 bench/peers/radiance.py [-b IMPORTON] [-r FOLDER] [--polygons N ...] [--rooms N] [--seed S]
 
 FOLDER has oconv and rtrace (`pip install pyradiance` brings them, in pyradiance/bin); without them the script
-skips with 77. The room is made by a generator with a seed: 10 m x 8 m x 3 m, reflectance .5, four luminous
+skips with 77. Rooms are made by a generator with a seed: 10 m x 8 m x 3 m, reflectance .5, four luminous
 squares below the ceiling, and boxes of any rotation below .7 m, N polygons in all. The grid has 10 x 10 points
-at .75 m. Light is direct and reflected up to five times in both. The reference is a long run of `importon read`;
-for each program the samples (read: --spp; rtrace: -ad, interpolated with -aa .15 -ar 128) are doubled until the relative
-errors of all 100 points are below 2 % (with --rms: the root of their mean square), with the processor seconds of that
-run, start included. rtrace has -ds .02, since with larger parts of the lamps its error does not fall below 3 %.
+at .75 m. Light is direct and reflected up to five times in both. The reference is a long run of `importon read`.
+For each program the samples (read: --spp; rtrace: -ad, interpolated with -aa .15 -ar 128) are doubled until the
+largest relative error of the 100 points (with --rms: the root of their mean square), a geometric mean over the rooms,
+is below 2 %; samples and processor seconds, start included, are those for 2 %, on the line through the last two
+numbers of samples in logarithms. The error of one room is a matter of luck: it falls below 2 % at half of the samples,
+or at twice as many. rtrace has -ds .02, since with larger parts of the lamps its error does not fall below 3 %.
 """
 import argparse
 import json
@@ -134,15 +136,41 @@ def worst(values, truth):
     return max(abs(v / t - 1) for v, t in zip(values, truth))
 
 
-def until(run, first, most, truth, error_of):
-    """The first number of samples, doubled, with an error below 2 %: samples, error, mean ratio, seconds."""
-    n = first
+def mean_log(numbers):
+    return sum(math.log(x) for x in numbers) / len(numbers)
+
+
+def until(run, first, most, rooms, error_of):
+    """Samples, doubled until the rooms' error is below 2 %: samples, error, ratio of the means, seconds, at 2 % where
+    two numbers of samples are around it. run(room, samples): values and seconds."""
+    n, before = first, None
     while True:
-        values, seconds = run(n)
-        error = error_of(values, truth)
-        if error < .02 or n >= most or seconds > 200:
-            return n, error, sum(v / t for v, t in zip(values, truth)) / len(truth), seconds
-        n *= 2
+        runs = [(room, *run(room, n)) for room in rooms]
+        error = mean_log([error_of(values, room.truth) for room, values, _ in runs])
+        seconds = mean_log([s for _, _, s in runs])
+        ratio = sum(sum(v / t for v, t in zip(values, room.truth)) / len(room.truth) for room, values, _ in runs) / len(rooms)
+        if error < math.log(.02) and before:
+            part = (before[1] - math.log(.02)) / (before[1] - error)
+            at = [a + part * (b - a) for a, b in zip(before, (math.log(n), math.log(.02), seconds))]
+            return math.exp(at[0]), .02, ratio, math.exp(at[2])
+        if error < math.log(.02) or n >= most or math.exp(seconds) > 200:
+            return n, math.exp(error), ratio, math.exp(seconds)
+        n, before = 2 * n, (math.log(n), error, seconds)
+
+
+class Room:
+    """A room in both formats, in a folder, with the reference."""
+
+    def __init__(self, folder, polygons, seed, a):
+        os.mkdir(folder)
+        faces = walls() + boxes(polygons - 10, seed)
+        self.polygons = len(faces) + len(LAMPS)
+        self.scene = importon_scene(folder, faces)
+        rad, self.octree = os.path.join(folder, "room.rad"), os.path.join(folder, "room.oct")
+        radiance_scene(rad, faces)
+        with open(self.octree, "wb") as f:
+            subprocess.run([os.path.join(a.radiance, "oconv"), rad], stdout=f, check=True)
+        self.truth = read(a.importon, self.scene, 32768, 12345)[0]
 
 
 def main():
@@ -150,6 +178,7 @@ def main():
     ap.add_argument("-b", "--importon", default=os.path.join(root, "build/cli/importon"))
     ap.add_argument("-r", "--radiance", default=os.path.dirname(shutil.which("rtrace") or ""))
     ap.add_argument("--polygons", type=int, nargs="+", default=[1000, 10000, 100000])
+    ap.add_argument("--rooms", type=int, default=5, help="as many rooms of each size, by so many seeds")
     ap.add_argument("--seed", type=int, default=1)
     ap.add_argument("--rms", action="store_true", help="2 %% of all points together, in place of each")
     ap.add_argument("--plain", action="store_true", help="without interpolated irradiances, which take minutes")
@@ -160,23 +189,17 @@ def main():
     os.environ.setdefault("RAYPATH", os.path.join(os.path.dirname(a.radiance), "lib"))
     for n in a.polygons:
         with tempfile.TemporaryDirectory() as folder:
-            faces = walls() + boxes(n - 10, a.seed)
-            scene = importon_scene(folder, faces)
-            rad, octree = os.path.join(folder, "room.rad"), os.path.join(folder, "room.oct")
-            radiance_scene(rad, faces)
-            with open(octree, "wb") as f:
-                subprocess.run([os.path.join(a.radiance, "oconv"), rad], stdout=f, check=True)
-            truth, _ = read(a.importon, scene, 65536, 12345)
+            rooms = [Room(os.path.join(folder, str(k)), n, a.seed + k, a) for k in range(a.rooms)]
             error_of = rms if a.rms else worst
-            start = read(a.importon, scene, 2, 0)[1]
-            rows = [("read", until(lambda spp: read(a.importon, scene, spp, 1), 8, 1 << 16, truth, error_of)),
-                    ("rtrace", until(lambda ad: rtrace(a.radiance, octree, ad, False), 8, 1 << 14, truth, error_of))]
+            start = min(read(a.importon, room.scene, 2, 0)[1] for room in rooms)
+            rows = [("read", until(lambda room, spp: read(a.importon, room.scene, spp, 1), 16, 1 << 16, rooms, error_of)),
+                    ("rtrace", until(lambda room, ad: rtrace(a.radiance, room.octree, ad, False), 16, 1 << 14, rooms, error_of))]
             if not a.plain:
                 rows.append(("rtrace, interpolated",
-                             until(lambda ad: rtrace(a.radiance, octree, ad, True), 8, 1 << 13, truth, error_of)))
-            print("%d polygons, start of read %.2f s" % (len(faces) + len(LAMPS), start))
+                             until(lambda room, ad: rtrace(a.radiance, room.octree, ad, True), 8, 1 << 13, rooms, error_of)))
+            print("%d polygons, %d rooms, start of read %.2f s" % (rooms[0].polygons, len(rooms), start))
             for name, (samples, error, mean, seconds) in rows:
-                print("    %-22s samples %-6d error %.4f  mean ratio %.4f  %.2f s  %.1f times read's"
+                print("    %-22s samples %-6.0f error %.4f  mean ratio %.4f  %.3f s  %.1f times read's"
                       % (name, samples, error, mean, seconds, seconds / rows[0][1][3]))
             sys.stdout.flush()
 
