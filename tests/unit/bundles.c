@@ -297,8 +297,7 @@ static void materials(void)
     LAMP("-.9", z, ".05")                                                                \
     LAMP("-.4", z, ".05")                                                                \
     LAMP("0", z, ".05")                                                                  \
-    LAMP(".4", z, ".05") LAMP(".9", z, ".05") LAMP("1.3", z, ".05")                      \
-        LAMP("1.8", z, ".05")
+    LAMP(".4", z, ".05") LAMP(".9", z, ".05") LAMP("1.3", z, ".05") LAMP("1.8", z, ".05")
 
 static void lights(void)
 {
