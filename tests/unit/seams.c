@@ -13,6 +13,7 @@
 
 #define EGG_FILE  "seams_egg.obj"
 #define GRID_FILE "seams_grid.obj"
+#define PAIR_FILE "seams_pair.obj"
 #define EGG(id, place)                                                                   \
     "<shape type='obj' id='" id "'><string name='filename' value='" EGG_FILE "'/>"       \
     "<boolean name='face_normals' value='true'/><transform name='to_world'>" place       \
@@ -48,6 +49,26 @@ static void grid_write(void)
         const int v = k / 4 * 5 + k % 4 + 1;
         fprintf(f, "f %d %d %d\nf %d %d %d\n", v, v + 1, v + 6, v, v + 6, v + 5);
     }
+    fclose(f);
+}
+
+/* Two boxes of sides 2, one shifted by (.5, .4, .3), in one mesh. */
+static void pair_write(void)
+{
+    static const int face[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
+                                   {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+    FILE *f = fopen(PAIR_FILE, "w");
+    if (!f) exit(99);
+    for (int box = 0; box < 2; box++)
+        for (int k = 0; k < 8; k++)
+            fprintf(f, "v %g %g %g\n", (k & 1 ? 1 : -1) + .5 * box,
+                    (k & 2 ? 1 : -1) + .4 * box, (k & 4 ? 1 : -1) + .3 * box);
+    for (int box = 0; box < 2; box++)
+        for (int k = 0; k < 6; k++) {
+            const int v = 8 * box + 1, *c = face[k];
+            fprintf(f, "f %d %d %d\nf %d %d %d\n", v + c[0], v + c[1], v + c[2], v + c[0],
+                    v + c[2], v + c[3]);
+        }
     fclose(f);
 }
 
@@ -185,6 +206,7 @@ int main(void)
     ctx = test_context(1);
     egg_write(EGG_FILE, false);
     grid_write();
+    pair_write();
     /* Sides of .6 and .4. */
     expect("a box in a floor", FLOOR BOX("<translate x='.11' y='.07' z='.1'/>"), 2, true,
            0);
@@ -214,7 +236,16 @@ int main(void)
            0, false, 0);
     expect("an egg whose equator lies in a floor",
            FLOOR EGG("egg", "<scale value='.6'/>"), 0, false, 1);
+    /* The part in common has sides 1.5, 1.6, 1.7, of whose twelve six are on both. */
+    expect("two boxes in one mesh",
+           "<shape type='sphere' id='far'><point name='center' x='9' y='0' z='0'/>"
+           "</shape><shape type='obj' id='pair'><string name='filename' value='" PAIR_FILE
+           "'/><boolean name='face_normals' value='true'/></shape>",
+           9.6, true, 0);
+    expect("an egg and a grid, which do not pass through themselves",
+           GRID("g", "") EGG("egg", "<translate z='3'/>"), 0, false, 0);
     velocity_test();
+    remove(PAIR_FILE);
     remove(EGG_FILE);
     remove(GRID_FILE);
     imp_context_destroy(ctx);
