@@ -4,6 +4,7 @@
  * seams of finer meshes, meshes that are crossed along their own edges, what only touches, and the velocity
  * of a seam against planes that are moved. */
 #include "egg.h"
+#include "imp_fail_alloc.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "math/rng.h"
@@ -201,6 +202,34 @@ static void velocity_test(void)
     imp_scene_destroy(scene);
 }
 
+/* Without memory for one thing after the other: an error, and nothing is left. */
+static void memory_test(void)
+{
+    struct fail_alloc heap = {0};
+    imp_context *whole = ctx;
+    ctx = fail_alloc_context(&heap);
+    imp_scene *scene =
+        scene_of(FLOOR GRID("g", "<scale value='.6'/><rotate x='1' angle='90'/>")
+                     EGG("egg", "<translate x='.3' z='.2'/>") "<shape type='sphere'/>");
+    enum imp_status st = IMP_E_NOMEM;
+    const long live = heap.live;
+    int failed = 0, wrong = 0;
+    struct imp__edges e;
+    for (long k = 1; st == IMP_E_NOMEM && k < 1000; k++) {
+        heap.fail_at = heap.calls + k;
+        st = imp__edges_build(scene, &e);
+        heap.fail_at = 0;
+        if (st == IMP_OK) imp__edges_free(&e);
+        failed += st == IMP_E_NOMEM;
+        wrong += heap.live != live;
+    }
+    tap_ok(st == IMP_OK && failed > 10 && wrong == 0,
+           "memory that ends at each of %d places is an error", failed);
+    imp_scene_destroy(scene);
+    imp_context_destroy(ctx);
+    ctx = whole;
+}
+
 int main(void)
 {
     ctx = test_context(1);
@@ -245,6 +274,7 @@ int main(void)
     expect("an egg and a grid, which do not pass through themselves",
            GRID("g", "") EGG("egg", "<translate z='3'/>"), 0, false, 0);
     velocity_test();
+    memory_test();
     remove(PAIR_FILE);
     remove(EGG_FILE);
     remove(GRID_FILE);
