@@ -126,10 +126,26 @@ static enum imp_status descend(const struct pairs *x, size_t i, size_t j)
     return descend(x, i, b->second);
 }
 
+/* Pairs within a node of one tree. */
+static enum imp_status descend_own(const struct pairs *x, size_t i)
+{
+    const struct imp__body_node *a = &x->a->node[i];
+    if (a->second > 0) {
+        IMP_CHECKED(descend_own(x, i + 1));
+        IMP_CHECKED(descend_own(x, a->second));
+        return descend(x, i + 1, a->second);
+    }
+    for (size_t k = a->from; k < a->till; k++)
+        for (size_t l = k + 1; l < a->till; l++)
+            IMP_CHECKED(x->work(x->payload, &x->a->triangle[k], &x->a->triangle[l]));
+    return IMP_OK;
+}
+
 enum imp_status imp__body_pairs(const struct imp__body_tree *a,
                                 const struct imp__body_tree *b, imp__body_pair *work,
                                 void *payload)
 {
     const struct pairs x = {a, b, work, payload};
-    return a->n > 0 && b->n > 0 ? descend(&x, 0, 0) : IMP_OK;
+    if (a->n == 0 || b->n == 0) return IMP_OK;
+    return a == b ? descend_own(&x, 0) : descend(&x, 0, 0);
 }

@@ -31,7 +31,8 @@ void imp__body_tree_free(imp_context *ctx, struct imp__body_tree *tree);
 /* Two triangles whose boxes meet. */
 typedef enum imp_status imp__body_pair(void *payload, const struct imp__body_triangle *f,
                                        const struct imp__body_triangle *g);
-/* All pairs of a triangle of `a` and one of `b`, in an order that depends on these alone. */
+/* All pairs of a triangle of `a` and one of `b`, which may be `a`, in an order that depends on these
+ * alone. */
 enum imp_status imp__body_pairs(const struct imp__body_tree *a,
                                 const struct imp__body_tree *b, imp__body_pair *work,
                                 void *payload);

@@ -3,8 +3,8 @@
  * The edges of a scene of triangles, each once: where what is seen past a place may jump. Edges
  * of different triangles, and of different shapes, that lie on each other are one edge with all
  * their faces; where they overlap in part they are cut. Inner edges of a flat face of one shape
- * are left out: nothing jumps there. Where triangles of different bodies pass through each other
- * their seam is an edge. */
+ * are left out: nothing jumps there. Where triangles pass through each other, of different bodies or of
+ * one, their seam is an edge. */
 #ifndef IMP_MOVE_EDGES_H
 #define IMP_MOVE_EDGES_H
 

@@ -148,10 +148,20 @@ static enum imp_status lying_add(struct seeking *x, size_t body, size_t other,
     return IMP_OK;
 }
 
+/* Triangles of one mesh that have a corner in common meet there, and do not cross. */
+static bool are_joined(const struct imp__body_triangle *f,
+                       const struct imp__body_triangle *g)
+{
+    for (int k = 0; k < 9; k++)
+        if (imp__is_zero(f->p[k / 3] - g->p[k % 3])) return true;
+    return false;
+}
+
 static enum imp_status pair_work(void *payload, const struct imp__body_triangle *f,
                                  const struct imp__body_triangle *g)
 {
     struct seeking *x = payload;
+    if (x->f == x->g && are_joined(f, g)) return IMP_OK;
     const imp_v3 n_g = imp__cross(g->p[1] - g->p[0], g->p[2] - g->p[0]),
                  n_f = imp__cross(f->p[1] - f->p[0], f->p[2] - f->p[0]);
     if (imp__is_zero(n_g) || imp__is_zero(n_f)) return IMP_OK;
@@ -253,7 +263,7 @@ static enum imp_status bodies_work(struct seeking *x, size_t f, size_t g)
     /* In the order of the scene, whatever that of the boxes. */
     x->f = f < g ? f : g;
     x->g = f < g ? g : f;
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k < 1 + (f != g); k++) {
         const size_t body = k ? x->g : x->f;
         if (x->tree[body].n == 0)
             IMP_CHECKED(imp__body_tree_build(x->scene, &x->body[body], &x->tree[body]));
@@ -295,10 +305,14 @@ enum imp_status imp__seams_find(const struct imp_scene *scene,
     if (!box || !x.tree) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for edges"));
     const size_t n = boxes_make(&x, n_bodies, box);
     qsort(box, n, sizeof *box, by_lo);
-    for (size_t i = 0; i < n; i++)
+    for (size_t i = 0; i < n; i++) {
+        const struct imp_shape *s = scene->shapes[body[box[i].body].shape];
+        if (!(s->ops->flags & IMP_SHAPE_CONVEX))
+            IMP_TRY(bodies_work(&x, box[i].body, box[i].body));
         for (size_t j = i + 1; j < n && box[j].lo[0] <= box[i].hi[0]; j++)
             if (boxes_cross(&box[i], &box[j], near))
                 IMP_TRY(bodies_work(&x, box[i].body, box[j].body));
+    }
     IMP_TRY(lying_work(&x));
 out:
     for (size_t k = 0; x.tree && k < n_bodies; k++) imp__body_tree_free(ctx, &x.tree[k]);

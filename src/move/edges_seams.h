@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Seams: where triangles of different bodies pass through each other. A seam is an edge with four
+ * Seams: where triangles pass through each other, of different bodies or of a mesh that passes through
+ * itself. A seam is an edge with four
  * faces, two halves of each triangle, and is never a silhouette: on each side of a line through it
  * lies a half of each. It moves as the line in which two moving planes meet: with V_1, V_2 what the
  * triangles' points there have, d its direction and i_1, i_2 across it in the triangles,
@@ -30,7 +31,7 @@ struct imp__seams {
     struct imp__seam *seam;
 };
 
-/* All seams between bodies made of triangles. near: lengths below are none. */
+/* All seams of bodies made of triangles. near: lengths below are none. */
 enum imp_status imp__seams_find(const struct imp_scene *scene,
                                 const struct imp__body *body, size_t n_bodies,
                                 double near, double size, struct imp__seams *out);

@@ -34,6 +34,9 @@
     "<shape type='sphere' id='ball'><point name='center' x='0' y='-2' z='1'/><float "    \
     "name='radius' value='.3'/><bsdf type='null'/><medium name='interior' "              \
     "type='homogeneous'/><ref name='exterior' id='fog'/></shape>"
+#define SUNK                                                                             \
+    "<shape type='sphere' id='ball'><float name='radius' value='.6'/><point "            \
+    "name='center' x='1.1' y='-.7' z='.25'/><ref id='grey'/></shape>"
 #define FLOOR                                                                            \
     "<shape type='rectangle' id='floor'><bsdf type='diffuse'><rgb name='reflectance' "   \
     "value='.5'/></bsdf></shape><emitter type='point' id='bulb'><point name='position' " \
@@ -154,7 +157,10 @@ int main(int argc, char **argv)
                                numbers[] = {{"block.pose", 3, .02},
                                             {"lamp.pose", 2, .03},
                                             {"camera.pose", 0, .02},
-                                            {NULL, 0, 0}};
+                                            {NULL, 0, 0}},
+                               balls[] = {{"ball.pose", 2, .02},
+                                          {"camera.pose", 0, .02},
+                                          {NULL, 0, 0}};
     ctx = test_context(2);
     adjoint_make();
     closed_test(more);
@@ -162,6 +168,9 @@ int main(int argc, char **argv)
                     64 * more, .03, few);
     numbers_compare("scatters", room(FOG(".12,.15,.2", ".8,.7,.6", FORWARD) VOLPATH("3")),
                     192 * more, 64 * more, .04, numbers);
+    numbers_compare("a ball in the floor",
+                    room(FOG(".12,.15,.2", "0", "") VOLPATH("3") SUNK), 32 * more,
+                    64 * more, .1, balls);
     refused_test();
     imp_context_destroy(ctx);
     return tap_done();

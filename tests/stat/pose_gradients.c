@@ -113,9 +113,8 @@ static void refusals_test(void)
     test_must(ctx, imp_scene_find_param(scene, "block.pose", &index));
     test_must(ctx, imp_scene_set_values(scene, index, 6, pierced));
     st = imp_problem_objective(p, NULL, &run, &value, g, NULL);
-    tap_ok(st == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "'block'") &&
-               strstr(imp_last_error(ctx), "'floor'"),
-           "a block in the floor # %s", imp_last_error(ctx));
+    tap_ok(st == IMP_OK, "a block in the floor # %s",
+           st == IMP_OK ? "" : imp_last_error(ctx));
     st = imp_scene_set_values(scene, index, 6, far);
     tap_ok(st == IMP_E_NUMERIC && strstr(imp_last_error(ctx), "block.pose"),
            "beyond floats # %s", imp_last_error(ctx));

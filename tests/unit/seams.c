@@ -4,6 +4,7 @@
  * seams of finer meshes, meshes that are crossed along their own edges, what only touches, and the velocity
  * of a seam against planes that are moved. */
 #include "egg.h"
+#include "imp_fail_alloc.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "math/rng.h"
@@ -13,6 +14,7 @@
 
 #define EGG_FILE  "seams_egg.obj"
 #define GRID_FILE "seams_grid.obj"
+#define PAIR_FILE "seams_pair.obj"
 #define EGG(id, place)                                                                   \
     "<shape type='obj' id='" id "'><string name='filename' value='" EGG_FILE "'/>"       \
     "<boolean name='face_normals' value='true'/><transform name='to_world'>" place       \
@@ -48,6 +50,26 @@ static void grid_write(void)
         const int v = k / 4 * 5 + k % 4 + 1;
         fprintf(f, "f %d %d %d\nf %d %d %d\n", v, v + 1, v + 6, v, v + 6, v + 5);
     }
+    fclose(f);
+}
+
+/* Two boxes of sides 2, one shifted by (.5, .4, .3), in one mesh. */
+static void pair_write(void)
+{
+    static const int face[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
+                                   {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+    FILE *f = fopen(PAIR_FILE, "w");
+    if (!f) exit(99);
+    for (int box = 0; box < 2; box++)
+        for (int k = 0; k < 8; k++)
+            fprintf(f, "v %g %g %g\n", (k & 1 ? 1 : -1) + .5 * box,
+                    (k & 2 ? 1 : -1) + .4 * box, (k & 4 ? 1 : -1) + .3 * box);
+    for (int box = 0; box < 2; box++)
+        for (int k = 0; k < 6; k++) {
+            const int v = 8 * box + 1, *c = face[k];
+            fprintf(f, "f %d %d %d\nf %d %d %d\n", v + c[0], v + c[1], v + c[2], v + c[0],
+                    v + c[2], v + c[3]);
+        }
     fclose(f);
 }
 
@@ -180,11 +202,40 @@ static void velocity_test(void)
     imp_scene_destroy(scene);
 }
 
+/* Without memory for one thing after the other: an error, and nothing is left. */
+static void memory_test(void)
+{
+    struct fail_alloc heap = {0};
+    imp_context *whole = ctx;
+    ctx = fail_alloc_context(&heap);
+    imp_scene *scene =
+        scene_of(FLOOR GRID("g", "<scale value='.6'/><rotate x='1' angle='90'/>")
+                     EGG("egg", "<translate x='.3' z='.2'/>") "<shape type='sphere'/>");
+    enum imp_status st = IMP_E_NOMEM;
+    const long live = heap.live;
+    int failed = 0, wrong = 0;
+    struct imp__edges e;
+    for (long k = 1; st == IMP_E_NOMEM && k < 1000; k++) {
+        heap.fail_at = heap.calls + k;
+        st = imp__edges_build(scene, &e);
+        heap.fail_at = 0;
+        if (st == IMP_OK) imp__edges_free(&e);
+        failed += st == IMP_E_NOMEM;
+        wrong += heap.live != live;
+    }
+    tap_ok(st == IMP_OK && failed > 10 && wrong == 0,
+           "memory that ends at each of %d places is an error", failed);
+    imp_scene_destroy(scene);
+    imp_context_destroy(ctx);
+    ctx = whole;
+}
+
 int main(void)
 {
     ctx = test_context(1);
     egg_write(EGG_FILE, false);
     grid_write();
+    pair_write();
     /* Sides of .6 and .4. */
     expect("a box in a floor", FLOOR BOX("<translate x='.11' y='.07' z='.1'/>"), 2, true,
            0);
@@ -214,7 +265,17 @@ int main(void)
            0, false, 0);
     expect("an egg whose equator lies in a floor",
            FLOOR EGG("egg", "<scale value='.6'/>"), 0, false, 1);
+    /* The part in common has sides 1.5, 1.6, 1.7, of whose twelve six are on both. */
+    expect("two boxes in one mesh",
+           "<shape type='sphere' id='far'><point name='center' x='9' y='0' z='0'/>"
+           "</shape><shape type='obj' id='pair'><string name='filename' value='" PAIR_FILE
+           "'/><boolean name='face_normals' value='true'/></shape>",
+           9.6, true, 0);
+    expect("an egg and a grid, which do not pass through themselves",
+           GRID("g", "") EGG("egg", "<translate z='3'/>"), 0, false, 0);
     velocity_test();
+    memory_test();
+    remove(PAIR_FILE);
     remove(EGG_FILE);
     remove(GRID_FILE);
     imp_context_destroy(ctx);

@@ -191,13 +191,22 @@ bool imp__edge_follow(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double
 }
 
 #define SHORT_OF                                                                         \
-    30 /* so far before the edge a look begins, per what it is apart from it */
+    30           /* so far before the edge a look begins, per what it is apart from it; */
+#define CURVED 4 /* of a curved shape, per root of that and the scene's size */
 
 imp_spec imp__edge_near(struct imp__edge_draw *d, double distance, double apart,
                         imp_spec T)
 {
-    d->near = d->b->fog ? imp_max(distance - SHORT_OF * apart, 0.0) : 0;
-    return d->b->fog ? T : imp__spec(1);
+    double shorter = SHORT_OF * apart;
+    d->near = 0;
+    if (imp_likely(!d->b->fog)) return imp__spec(1);
+    /* A ray that passes a sphere's silhouette inside meets it sqrt(2 r apart) before. */
+    if (!d->edge && d->item->kind <= IMP_ITEM_ARC) {
+        shorter = imp_max(shorter, CURVED * sqrt(d->b->size * apart));
+        T *= imp__edge_cleared(d, -imp_min(shorter, distance));
+    }
+    d->near = imp_max(distance - shorter, 0.0);
+    return T;
 }
 
 bool imp__edge_passes(const struct imp__edge_draw *d)
