@@ -4,6 +4,7 @@
  * the cause of a drop, to the bit, of scenes whose vertices are made in lanes and of others. */
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include "inverse/estimate/lamp_levels.h"
 #include "walk/bundle/depth.h"
 #include <stdio.h>
 #include <unistd.h>
@@ -11,6 +12,7 @@
 enum { SIDE = 6, SAMPLES = 21 }; /* neither is a multiple of lanes */
 
 static imp_context *ctx;
+static const double *level; /* of emitters; NULL: as they are */
 
 /* ---- Scenes ------------------------------------------------------------------------------ */
 
@@ -200,10 +202,12 @@ static void compare(const char *name, enum imp_color_mode mode, int lanes,
                                 .value_only = true,
                                 .seed = 5};
     struct imp_active active;
+    struct imp__lamp_levels levels = {0};
     static uint8_t chosen[1024];
     int lit, binned = 0;
     if (strstr(name, "independent")) run.points = IMP_POINTS_INDEPENDENT;
     imp__tracer_numbers(&tracer, &run, SAMPLES);
+    if (level) test_must(ctx, imp__lamp_levels_begin(scene, level, &levels));
     for (int k = 0; k < scene->n_shapes; k++)
         binned += imp__lanes_fit(&tracer) && imp__shape_in_lanes(&tracer, k);
     const int wrong = compared(&tracer, &lit);
@@ -223,6 +227,7 @@ static void compare(const char *name, enum imp_color_mode mode, int lanes,
            "... with derivatives: %d differ, and of those that are recorded %d", values,
            records);
     imp__active_destroy(ctx, &active);
+    imp__lamp_levels_end(&levels);
     imp_scene_destroy(scene);
 }
 
@@ -343,6 +348,10 @@ static void lights(void)
                                                           "type='checkerboard' "
                                                           "name='radiance'/></emitter></"
                                                           "shape>");
+    level = (const double[]){.3, NAN, 0};
+    compare("lamps at levels", IMP_RGB, 0, PATH(DEPTH("4")), CAMERA,
+            ROOM LAMP("0", "0", ".5") LAMP("1", "0", ".3") LAMP("-1", "0", ".3"));
+    level = NULL;
     compare("a lamp that is a mesh", IMP_RGB, 5, PATH(DEPTH("4")), CAMERA,
             ROOM "<shape type='cube'>" AT(".3", ".6", "0", "y", "20", ".3")
                 AREA("6,6,9") "</shape>");

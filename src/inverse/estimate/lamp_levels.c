@@ -20,7 +20,7 @@ enum imp_status imp__lamp_levels_begin(struct imp_scene *scene, const double *le
         imp__release(scene->ctx, numbers);
         return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for the levels of lamps");
     }
-    *out = (struct imp__lamp_levels){scene, before, now, numbers};
+    *out = (struct imp__lamp_levels){scene, before, now, numbers, scene->timed_lights};
     for (size_t k = 0; k < n; k++) {
         struct imp_emitter *e = scene->emitters[k];
         double *time = numbers + k, *value = numbers + n + k;
@@ -32,6 +32,7 @@ enum imp_status imp__lamp_levels_begin(struct imp_scene *scene, const double *le
             now[k] = (struct imp_course){1, time, value};
             e->course = &now[k];
             e->weight *= level[k];
+            scene->timed_lights = true;
         }
         sum += e->weight;
         scene->light_cdf[k] = sum;
@@ -52,6 +53,7 @@ void imp__lamp_levels_end(struct imp__lamp_levels *l)
         scene->light_cdf[k] = l->numbers[2 * n + k];
         scene->emitters[k]->weight = l->numbers[3 * n + k];
     }
+    scene->timed_lights = l->timed;
     imp__light_tree_weigh(scene);
     imp__release(scene->ctx, l->before);
     imp__release(scene->ctx, l->now);

@@ -14,6 +14,7 @@ struct imp__lamp_levels {
     const struct imp_course **before; /* [n_emitters] what they were */
     struct imp_course *now;           /* [n_emitters] */
     double *numbers;                  /* times and values of `now`, the chances before */
+    bool timed;                       /* did lights of the scene vary in time before? */
 };
 
 /* level [n_emitters]: of each emitter in the scene's order, not negative; NAN: as it is. The
