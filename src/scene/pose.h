@@ -147,7 +147,16 @@ bool imp__pose_is_at_start(const struct imp_pose *p);
 struct imp_map;
 void imp__pose_carry(const struct imp_pose *p, const struct imp_map *by);
 
-/* ---- pose_instances.c for pose.c and pose_add.c ---- */
+/* ---- pose_add.c for pose_names.c ---- */
+/* Why an object has no such number; NULL: it has. Sets the middle of a sensor's lens. */
+const char *imp__pose_shape_why(const struct imp_scene *scene, const struct imp_shape *s,
+                                enum imp_pose_kind kind);
+const char *imp__pose_sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
+                                 imp_v3 *centre);
+const char *imp__pose_light_why(const struct imp_scene *scene,
+                                const struct imp_emitter *e, enum imp_pose_kind kind);
+
+/* ---- pose_instances.c for pose.c, pose_add.c and pose_names.c ---- */
 /* Instances of the scene's own; those that are listed by name, none of more than so many. */
 #define IMP_POSE_INSTANCES_LISTED 1024
 int imp__pose_instances(const struct imp_scene *scene);

@@ -79,8 +79,8 @@ static const char *round_why(const struct imp_scene *scene, const struct imp_sha
     return kind == IMP_POSE_CENTER ? NULL : size_why(scene, s, kind);
 }
 
-static const char *shape_kind_why(const struct imp_scene *scene,
-                                  const struct imp_shape *s, enum imp_pose_kind kind)
+const char *imp__pose_shape_why(const struct imp_scene *scene, const struct imp_shape *s,
+                                enum imp_pose_kind kind)
 {
     if (kind >= IMP_POSE_FOV) return "it is a shape";
     const char *why = shape_why(scene, s);
@@ -89,8 +89,8 @@ static const char *shape_kind_why(const struct imp_scene *scene,
                                     : size_why(scene, s, kind);
 }
 
-static const char *sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
-                              imp_v3 *centre)
+const char *imp__pose_sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
+                                 imp_v3 *centre)
 {
     if (kind != IMP_POSE_RIGID && !imp__pose_is_view(kind)) return "it is a sensor";
     double number[IMP_VIEW_NUMBERS];
@@ -103,8 +103,8 @@ static const char *sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
     return isnan(number[kind - IMP_POSE_FOV]) ? "it is no thin lens" : NULL;
 }
 
-static const char *light_why(const struct imp_scene *scene, const struct imp_emitter *e,
-                             enum imp_pose_kind kind)
+const char *imp__pose_light_why(const struct imp_scene *scene,
+                                const struct imp_emitter *e, enum imp_pose_kind kind)
 {
     const bool far = e->ops->flags & IMP_EMITTER_FAR;
     const bool has = kind == IMP_POSE_POSITION ? !far
@@ -131,7 +131,7 @@ static enum imp_status shape_find(struct imp_scene *scene, int k, struct imp_pos
     p->shape = k;
     p->centre = (s->lo + s->hi) * 0.5;
     p->rest_size = s->ops->object_size;
-    return found(scene, s->name, p, shape_kind_why(scene, s, p->kind));
+    return found(scene, s->name, p, imp__pose_shape_why(scene, s, p->kind));
 }
 
 static enum imp_status sensor_find(struct imp_scene *scene, int k, struct imp_pose *p)
@@ -139,7 +139,7 @@ static enum imp_status sensor_find(struct imp_scene *scene, int k, struct imp_po
     struct imp_sensor *s = scene->sensors[k];
     p->sensor = s;
     p->rest_size = s->ops->object_size;
-    return found(scene, s->name, p, sensor_why(s, p->kind, &p->centre));
+    return found(scene, s->name, p, imp__pose_sensor_why(s, p->kind, &p->centre));
 }
 
 static enum imp_status light_find(struct imp_scene *scene, int k, struct imp_pose *p)
@@ -147,7 +147,7 @@ static enum imp_status light_find(struct imp_scene *scene, int k, struct imp_pos
     struct imp_emitter *e = scene->emitters[k];
     p->emitter = e;
     p->rest_size = e->ops->object_size;
-    return found(scene, e->name, p, light_why(scene, e, p->kind));
+    return found(scene, e->name, p, imp__pose_light_why(scene, e, p->kind));
 }
 
 static enum imp_status object_find(struct imp_scene *scene, const char *name,
@@ -332,70 +332,6 @@ static enum imp_status geometry_add(struct imp_scene *scene, const char *object,
     if (kind != IMP_POSE_VERTICES || !p->normals) return IMP_OK;
     imp__pose_changed(p); /* normals follow vertices from now on */
     return imp__poses_settle(scene);
-}
-
-/* ---- Names ---------------------------------------------------------------------------- */
-
-/* Object k: shapes, then sensors, then lights without a shape, then instances; may it have such a
- * number? */
-static const char *object_name(const struct imp_scene *scene, int k,
-                               enum imp_pose_kind kind, char own[200])
-{
-    imp_v3 centre;
-    if (k < scene->n_shapes) {
-        const struct imp_shape *s = scene->shapes[k];
-        return shape_kind_why(scene, s, kind) ? NULL : s->name;
-    }
-    k -= scene->n_shapes;
-    if (k < scene->n_sensors) {
-        struct imp_sensor *s = scene->sensors[k];
-        return sensor_why(s, kind, &centre) ? NULL : s->name;
-    }
-    k -= scene->n_sensors;
-    if (k >= scene->n_emitters) {
-        k -= scene->n_emitters;
-        imp__instance_name(scene, k, own);
-        return imp__instance_why(scene, k, kind) ? NULL : own;
-    }
-    const struct imp_emitter *e = scene->emitters[k];
-    return e->shape || light_why(scene, e, kind) ? NULL : e->name;
-}
-
-bool imp__geometry_next(const struct imp_scene *scene, struct imp_geometry_walk *at)
-{
-    if (!scene->committed || scene->rayless) return false;
-    const int n = scene->n_shapes + scene->n_sensors + scene->n_emitters +
-                  imp__pose_instances_listed(scene);
-    char own[200];
-    for (; at->next < n * IMP_POSE_KINDS; at->next++) {
-        const enum imp_pose_kind kind = (enum imp_pose_kind)(at->next % IMP_POSE_KINDS);
-        const char *name = object_name(scene, at->next / IMP_POSE_KINDS, kind, own);
-        if (!name) continue;
-        snprintf(at->name, sizeof at->name, "%s.%s", name, imp__pose_tail(kind));
-        at->next++;
-        return true;
-    }
-    return false;
-}
-
-enum imp_status imp_scene_geometry_name(const imp_scene *scene, size_t index, size_t size,
-                                        char *name)
-{
-    IMP_REQUIRE(NULL, scene, "scene");
-    IMP_REQUIRE(scene->ctx, name, "name");
-    IMP_READS(scene);
-    struct imp_geometry_walk at = {0};
-    size_t k = 0;
-    while (imp__geometry_next(scene, &at))
-        if (k++ == index) {
-            if (size <= strlen(at.name))
-                return imp__error(scene->ctx, IMP_E_ARG,
-                                  "%zu characters are too few for '%s'", size, at.name);
-            memcpy(name, at.name, strlen(at.name) + 1);
-            return IMP_OK;
-        }
-    return imp__error(scene->ctx, IMP_E_ARG,
-                      "there is no number of geometry %zu (there are %zu)", index, k);
 }
 
 enum imp_status imp_scene_add_pose(imp_scene *scene, const char *object)

@@ -234,6 +234,9 @@ void imp__draw_meter(struct imp__edge_draw *d);
 void imp__draw_light(struct imp__edge_draw *d);
 void imp__draw_scatter(struct imp__edge_draw *d);
 void imp__draw_sky_film(struct imp__edge_draw *d);
+/* ---- boundary_items.c ---- */
+/* Edges, by measures of each kind, and items. IMP_E_NOMEM. */
+enum imp_status imp__boundary_choices_make(struct imp__boundary *b);
 /* ---- Of meshes with vertex normals: boundary_shading.c, boundary_horizon.c ---- */
 void imp__draw_shading_film(struct imp__edge_draw *d);
 void imp__draw_shading_scatter(struct imp__edge_draw *d);

@@ -2,8 +2,8 @@
  *
  * The interior derivative of a walk by what moves (moved.h): adjoints of its values from the first
  * vertex to the last, then adjoints of its places from the last to the first. */
-#include "kind/emitter/ies.h"
 #include "moved_chain.h"
+#include "moved_sent.h"
 #include "moved_sky.h"
 #include "walk/core/vertex.h"
 #include "walk/path/first_segment.h"
@@ -96,52 +96,13 @@ static int read_walk(struct sweep *s, imp_spec adjoint)
     return n;
 }
 
-/* Derivative of the logarithm of what a light at a point sends along d, by d across itself: by
- * differences, whose kinks at the borders of a spot's beam are so wide. */
-#define TURN 1e-6
-static imp_v3 sent_slope(const struct imp_emitter *e, imp_v3 d, int lanes,
-                         const struct imp_carried *carried)
-{
-    const struct imp_frame f = imp__frame_from_normal(d);
-    const struct imp_texcoord nowhere = {.carried = carried};
-    const imp_v3 across[2] = {f.s, f.t};
-    imp_spec in[IMP_INPUTS_MAX];
-    imp_v3 slope = {0};
-    imp__inputs_eval(e->input, e->n_in, &nowhere, in);
-    for (int k = 0; k < 2; k++) {
-        double value[2];
-        for (int j = 0; j < 2; j++) {
-            const struct imp_emission x = {
-                .dist = 1,
-                .cos_light = 1,
-                .d = imp__normalize(d + across[k] * (j ? TURN : -TURN))};
-            imp_spec le;
-            e->ops->eval(e, in, &x, &le);
-            value[j] = imp__sum_used(le, lanes);
-        }
-        const double middle = 0.5 * (value[0] + value[1]);
-        if (middle > 0)
-            slope += across[k] * ((value[1] - value[0]) / (2 * TURN * middle));
-    }
-    return slope;
-}
-
-/* Does the radiance of this light depend on its direction in a frame that turns with the shape? */
-static bool is_table(const struct imp_emitter *e) { return e->ops == &imp__ies_area; }
-
-/* The light at y along the unit direction d has this adjoint of its logarithm: of a turn of its shape.
- * Returns the adjoint of d. */
+/* The light at y along d, of this adjoint; that of d. */
 static imp_v3 table_bar(struct sweep *s, const struct imp_emitter *e,
                         const struct imp__glued *y, imp_v3 d, double bar,
                         const struct imp_carried *carried)
 {
-    if (imp_likely(!is_table(e)) || bar == 0) return (imp_v3){0};
-    const imp_v3 slope = sent_slope(e, d, s->tracer->scene->lanes, carried) * bar;
-    const imp_v3 by_frame = imp__cross(slope, d);
-    const struct imp__velocity turn = {.n = imp__cross(by_frame, y->n),
-                                       .turn = imp__dot(by_frame, y->n)};
-    imp__velocity_bar(s->moves, y, &turn, s->theta_bar);
-    return slope;
+    return imp__table_bar(s->moves, e, y, d, bar, s->tracer->scene->lanes, carried,
+                          s->theta_bar);
 }
 
 /* Is it the point of a meter, in whose place a white surface is? */
@@ -240,7 +201,8 @@ static void delta_bar(struct sweep *s, int k, const struct imp_vertex *v)
     const imp_v3 r = s->at[k].x.p - at;
     const double distance = imp__length(r);
     const imp_v3 d = r * (1 / distance);
-    const imp_v3 slope = sent_slope(e, d, s->tracer->scene->lanes, v->carried) * weight;
+    const imp_v3 slope =
+        imp__sent_slope(e, d, s->tracer->scene->lanes, v->carried) * weight;
     const imp_v3 turn = slope * (1 / distance);
     /* The light turned by a vector sends along d what it sent along d turned back. */
     imp__light_axis_bar(s->moves, light, imp__cross(slope, d), s->theta_bar);

@@ -1,0 +1,175 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What draws of the boundary choose among (boundary.h): edges, by measures of what they may be, and
+ * curved shapes, shading and skies, whose edges are in no list. */
+#include "base/arguments.h"
+#include "boundary_parts.h"
+
+/* A tenth of each measure is the length in space. */
+#define BY_LENGTH 0.1
+
+/* What an edge may be to the picture: its length as the camera sees it, where it is a silhouette, or
+ * else by how much its faces turn. */
+static double film_measure(const struct imp__boundary *b, const struct imp__edge *e)
+{
+    const imp_v3 along = e->b - e->a,
+                 r = b->parallel ? b->camera : (e->a + e->b) * 0.5 - b->camera;
+    const imp_v3 m = imp__cross(along, r);
+    const double d2 =
+        b->parallel ? 1 : imp_max(imp__dot(r, r), 1e-12 * imp__sqr(b->size));
+    const double jump =
+        imp__edge_side(b->edges, e, m) == 0 ? imp__edge_turn(b->edges, e) : 1;
+    return imp__length(m) / d2 * jump;
+}
+
+/* To lights: of all lines through it, a silhouette to so many; to scattered light, all that jumps is
+ * made by the turn. */
+static double turn_measure(const struct imp__boundary *b, const struct imp__edge *e)
+{
+    return imp__length(e->b - e->a) * imp__edge_turn(b->edges, e);
+}
+
+static enum imp_status choice_make(struct imp__boundary *b, enum imp__boundary_kind kind)
+{
+    const struct imp__edges *edges = b->edges;
+    double *measure = imp__alloc(edges->ctx, edges->n + 1, sizeof *measure);
+    double sum = 0, all = 0;
+    if (!measure) return imp__error(edges->ctx, IMP_E_NOMEM, "no memory for edges");
+    for (size_t k = 0; k < edges->n; k++) {
+        const struct imp__edge *e = &edges->edge[k];
+        sum += measure[k] =
+            kind == IMP_BOUNDARY_FILM ? film_measure(b, e) : turn_measure(b, e);
+        all += imp__length(e->b - e->a);
+    }
+    for (size_t k = 0; k < edges->n; k++) {
+        const struct imp__edge *e = &edges->edge[k];
+        measure[k] = BY_LENGTH * imp__length(e->b - e->a) / all +
+                     (sum > 0 ? (1 - BY_LENGTH) * measure[k] / sum : 0);
+    }
+    const enum imp_status st =
+        imp__edge_choice_begin(edges, &b->tree, measure, 1, &b->choice[kind]);
+    imp__release(edges->ctx, measure);
+    return st;
+}
+
+/* Circles of a camera's pictures of skies, if it moves. */
+static void circles_find(struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    if (!imp__moves_shape(b->moves, IMP_MOVE_CAMERA, NULL)) return;
+    for (int k = 0; k < scene->n_environments; k++) {
+        const struct imp_emitter *e = scene->emitters[scene->environments[k]];
+        struct imp_sky_circle circle[IMP_SKY_CIRCLES];
+        const int n = e->ops->jumps(e, circle);
+        for (int i = 0; i < n; i++)
+            b->item[b->n_items++] = (struct imp__edge_item){
+                .kind = IMP_ITEM_SKY, .shape = -1, .circle = circle[i]};
+    }
+}
+
+static struct imp__edge_item round_item(const struct imp__boundary *b,
+                                        const struct imp__body *body)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    struct imp__edge_item item = {
+        .kind = IMP_ITEM_ROUND, .shape = body->shape, .place = body->place};
+    const bool disk = imp__moves_disk(scene, body->shape);
+    for (int k = 0; k < imp__rims(scene, body->shape); k++) {
+        const struct imp__rim_name rim = {body->shape, body->place, k};
+        struct imp__rim_name beside;
+        if (!imp__rim_beside(b->edges, scene, &rim, &beside)) continue;
+        if (disk)
+            item.wall = imp__rim(scene, beside.shape, beside.place, beside.k, 0).out;
+        else item.closed[k] = true;
+    }
+    return item;
+}
+
+/* What has edges that are in no list: two of a body at most, and arcs. */
+static enum imp_status items_find(struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    const size_t most = 2 * b->edges->n_bodies + b->edges->n_arcs +
+                        IMP_SKY_CIRCLES * (size_t)scene->n_environments;
+    b->item = imp__alloc(scene->ctx, most + 1, sizeof *b->item);
+    if (!b->item) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
+    circles_find(b);
+    for (size_t k = 0; k < b->edges->n_arcs; k++)
+        b->item[b->n_items++] = (struct imp__edge_item){
+            .kind = IMP_ITEM_ARC, .shape = -1, .arc = &b->edges->arc[k]};
+    for (size_t k = 0; k < b->edges->n_bodies; k++) {
+        const struct imp__body *body = &b->edges->body[k];
+        if (imp__moves_curved(scene, body->shape, body->place))
+            b->item[b->n_items++] = round_item(b, body);
+        if (!imp__moves_smooth(scene, body->shape)) continue;
+        for (int i = 0; i < 2; i++) {
+            struct imp__edge_item *item = &b->item[b->n_items++];
+            *item =
+                (struct imp__edge_item){.kind = i ? IMP_ITEM_HORIZON : IMP_ITEM_SHADING,
+                                        .shape = body->shape,
+                                        .place = body->place};
+            IMP_CHECKED(imp__edge_item_measure(b, item));
+        }
+    }
+    return IMP_OK;
+}
+
+/* The circumference of a circle that is as large, about: of spheres and disks; of cylinders the length
+ * of all edges; half of it of what meshes with vertex normals have, which between lights and vertices is
+ * nothing. */
+static double item_length(const struct imp__boundary *b,
+                          const struct imp__edge_item *item, int kind)
+{
+    if (item->kind == IMP_ITEM_SKY) /* as large as the scene */
+        return kind == IMP_BOUNDARY_FILM
+                   ? IMP_PI * b->size * sqrt(1 - imp__sqr(item->circle.cosine))
+                   : 0;
+    if (item->kind == IMP_ITEM_ARC) /* it is no silhouette */
+        return kind == IMP_BOUNDARY_LIGHT ? 0 : imp__arc_length(item->arc);
+    const struct imp_shape *s = b->tracer->scene->shapes[item->shape];
+    struct imp_round round;
+    struct imp__tube tube;
+    if (imp__moves_sphere(b->tracer->scene, item->shape, item->place, &round))
+        return IMP_2PI * round.radius;
+    if (imp__moves_cylinder(b->tracer->scene, item->shape, item->place, &tube))
+        return 2 * IMP_2PI * tube.radius + 2 * tube.length;
+    if (item->kind == IMP_ITEM_ROUND)
+        return IMP_2PI * sqrt(s->area * IMP_INV_PI) *
+               imp__place_scale(b->tracer->scene, item->place);
+    if (kind == IMP_BOUNDARY_LIGHT) return 0;
+    if (kind == IMP_BOUNDARY_FILM && item->n_seen == 0) return 0;
+    return IMP_PI * sqrt(item->until[s->triangles.n_triangles] * IMP_INV_PI / 4);
+}
+
+/* Items by such lengths, edges by theirs. */
+static enum imp_status items_make(struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    double edges = 0, sum = 0;
+    IMP_CHECKED(items_find(b));
+    for (size_t k = 0; k < b->edges->n; k++) edges += turn_measure(b, &b->edges->edge[k]);
+    for (int kind = 0; kind < IMP_BOUNDARY_KINDS; kind++) {
+        double *part =
+            imp__alloc(scene->ctx, (size_t)b->n_items + 2, sizeof *b->part[kind]);
+        if (!part) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
+        b->part[kind] = part;
+        sum = part[0] = 0;
+        for (int k = 0; k < b->n_items; k++)
+            part[k + 1] = sum += item_length(b, &b->item[k], kind);
+        sum += edges;
+        for (int k = 0; k <= b->n_items && sum > 0; k++) part[k] /= sum;
+        if (!(edges > 0)) part[b->n_items] = 1;
+        part[b->n_items + 1] = 1;
+    }
+    return IMP_OK;
+}
+
+enum imp_status imp__boundary_choices_make(struct imp__boundary *b)
+{
+    IMP_CHECKED(items_make(b));
+    if (b->edges->n == 0) return IMP_OK;
+    IMP_CHECKED(imp__edge_tree_build(b->edges, &b->tree));
+    for (int k = 0; k < IMP_BOUNDARY_KINDS; k++)
+        IMP_CHECKED(choice_make(b, (enum imp__boundary_kind)k));
+    return IMP_OK;
+}
