@@ -140,6 +140,7 @@ static enum imp_status shape_apply(const struct imp_pose *p)
     const size_t n = 3 * s->triangles.n_vertices;
     float *positions = (float *)(uintptr_t)s->triangles.positions;
     memcpy(s->self, p->rest, p->rest_size);
+    s->area = p->rest_area;
     const struct imp_map by = map_of(p);
     if (s->geometry != IMP_TRIANGLES) {
         if (!ends_apply(p, s)) s->ops->move(s, by.m);

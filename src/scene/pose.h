@@ -79,6 +79,7 @@ struct imp_pose {
     /* As the file has it: the kind's object, and positions and normals of a mesh. */
     void *rest;
     size_t rest_size;
+    double rest_area;              /* of a shape, as it was then */
     float *positions, *normals;    /* NULL: in the object, or none */
     struct imp_receiver *receiver; /* of a shape with a meter that has one; else NULL */
     struct imp__ies *table;        /* of a shape that shines by a table; else NULL */

@@ -65,6 +65,7 @@ enum imp_status imp__pose_rest_keep(struct imp_scene *scene, struct imp_pose *p)
         (m && m->normals && !p->normals))
         return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
     memcpy(p->rest, self, p->rest_size);
+    p->rest_area = s ? s->area : 0;
     if (r) *p->receiver = *r;
     if (m) memcpy(p->positions, s->triangles.positions, n * sizeof *p->positions);
     if (m && m->normals) memcpy(p->normals, m->normals, n * sizeof *p->normals);

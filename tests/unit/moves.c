@@ -356,6 +356,48 @@ static void cornell_test(void)
     imp_scene_destroy(scene);
 }
 
+/* ---- A number does not depend on what it was before ------------------------------------ */
+
+static void number_set(imp_scene *s, const char *name, double v)
+{
+    struct imp_param_info info = {.size = sizeof info};
+    double value[3] = {v, v, v};
+    size_t at;
+    test_must(ctx, imp_scene_find_param(s, name, &at));
+    test_must(ctx, imp_scene_get_param(s, at, &info));
+    test_must(ctx, imp_scene_set_values(s, at, info.count, value));
+}
+
+/* Area, and length, of a cylinder with one number at these values, one after the other. */
+static void tube_after(const char *name, int n, const double v[], double out[2])
+{
+    imp_scene *s =
+        scene_of("<shape type='cylinder' id='tube'><point name='p0' x='0' y='0' "
+                 "z='0'/><point name='p1' x='0' y='0' z='2'/><float "
+                 "name='radius' value='.5'/></shape>");
+    struct imp__tube tube;
+    test_must(ctx, imp_scene_add_geometry(s, name));
+    for (int k = 0; k < n; k++) number_set(s, name, v[k]);
+    out[0] = s->shapes[0]->area;
+    out[1] = imp__moves_cylinder(s, 0, 0, &tube) ? tube.length : NAN;
+    imp_scene_destroy(s);
+}
+
+static void again_test(void)
+{
+    static const char *const names[] = {"tube.radius", "tube.p0", "tube.p1",
+                                        "tube.scale"};
+    static const double many[] = {.3, 1.5, 1.5, .7};
+    for (size_t k = 0; k < imp_count(names); k++) {
+        double once[2], after[2];
+        tube_after(names[k], 1, many + 3, once);
+        tube_after(names[k], 4, many, after);
+        tap_ok(once[0] == after[0] && once[1] == after[1],
+               "%s: area %g and length %g, after other values %g and %g", names[k],
+               once[0], once[1], after[0], after[1]);
+    }
+}
+
 int main(void)
 {
     ctx = test_context(1);
@@ -367,6 +409,7 @@ int main(void)
     camera_test();
     edges_test();
     cornell_test();
+    again_test();
     imp_context_destroy(ctx);
     return tap_done();
 }
