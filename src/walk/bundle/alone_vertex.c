@@ -43,7 +43,7 @@ static void take(struct imp_depth *d, int i)
         w->n = d->depth + b->before;
         w->valid = false;
         w->dropped = IMP_DROP_NONE;
-        w->key.state = w->point.set = b->set[walk]; /* one of the two is used */
+        w->key.state = w->point.set = b->set[walk]; /* the second with points */
         w->point.index = b->index[walk];
         w->time = b->time[walk];
     }

@@ -106,7 +106,7 @@ void imp__vertices(struct imp_depth *d, double *const beyond[4], struct imp_by_s
 {
     const struct imp_tracer *tracer = d->bundle->tracer;
     d->values->n = 0;
-    if (!s->lanes || d->depth >= IMP_WALK_MAX) {
+    if (!s->lanes || d->depth + d->bundle->before >= IMP_WALK_MAX) {
         all_alone(d, beyond);
         return;
     }

@@ -30,9 +30,14 @@ static void make(struct imp_supply *s)
 {
     const int walks = imp_min(s->walks, s->n_numbers - s->number),
               pixels = imp_min(s->pixels, s->n_pixels - s->pixel);
+    const bool failed = s->arena->failed;
     imp__arena_rewind(s->arena, s->mark);
     s->made = imp__bundle_trace(s->tracer, s->arena, pixels, s->xy + s->pixel, walks,
                                 s->numbers + s->number, &s->at_work);
+    if (!s->made) { /* its walks go alone, which takes less */
+        imp__arena_rewind(s->arena, s->mark);
+        s->arena->failed = failed;
+    }
     s->left = pixels * walks;
     s->place = 0;
     s->number += walks;
