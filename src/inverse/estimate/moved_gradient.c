@@ -122,8 +122,10 @@ static double counts_at(const void *payload, const struct imp__flux *f, double *
 
 enum imp_status imp__moved_learn(struct imp__moved_gradient *m, int spp)
 {
-    const struct imp_film_desc *film = &m->tracer->sensor->film;
-    const int64_t walks = (int64_t)film->crop_w * film->crop_h * spp;
+    const struct imp_sensor *sensor = m->tracer->sensor;
+    const struct imp_film_desc *film = &sensor->film;
+    const int64_t walks =
+        (int64_t)film->crop_w * film->crop_h * (spp > 0 ? spp : sensor->spp);
     m->walks = (double)walks;
     /* As many contrasts of few numbers as of many, so that draws do not depend on the others. */
     return imp__boundary_learn(
@@ -233,7 +235,7 @@ static bool draws_add(const struct draws *d, struct imp_arena *arena,
                      &m->boundary, arena, (enum imp__boundary_kind)kind, index, pixels,
                      &no_memory);
                  f; f = f->next)
-                flux_add(d, f, 1 / ((double)n * (double)pixels), (i + x + y) & 1);
+                flux_add(d, f, 1 / ((double)n * (double)pixels), (i + x + y + b) & 1);
             imp__arena_rewind(arena, mark);
         }
     }

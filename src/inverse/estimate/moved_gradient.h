@@ -33,8 +33,8 @@ enum imp_status imp__moved_begin(const struct imp_problem *p,
                                  const struct imp_tracer *tracer,
                                  struct imp__moved_gradient *out);
 void imp__moved_end(struct imp__moved_gradient *m);
-/* The pilot of the draws (imp__boundary_learn), for spp walks a pixel: by the adjoint, where there is
- * one; else all light counts alike. Once, before the first draw. */
+/* The pilot of the draws (imp__boundary_learn), for spp walks a pixel, 0: those of the sensor: by the
+ * adjoint, where there is one; else all light counts alike. Once, before the first draw. */
 #define IMP_MOVED_PILOT                                                                  \
     8 /* spp of pictures, however many walks their parts and passes have */
 enum imp_status imp__moved_learn(struct imp__moved_gradient *m, int spp);
