@@ -96,6 +96,11 @@ static void feet_tell(const struct grid *g)
 
 static void points_say(const struct grid *g)
 {
+    if (!isfinite(g->end.relative)) {
+        cli_say("%s: no point gets light (%lld samples a point)", g->name,
+                (long long)g->end.spp);
+        return;
+    }
     cli_say("%s: each point within %.3g of itself in 95 of 100 cases%s (%lld samples a "
             "point)",
             g->name, g->end.relative,

@@ -329,12 +329,22 @@ static enum imp_status show(struct render *r, imp_film *preview, int64_t spp)
 
 /* Passes over all tiles; how many samples every pixel got. preview: NULL, or room for
  * what is shown meanwhile. */
+/* Without the margin, which a picture of some pixels alone has not. */
+static double pixels_sampled(const struct render *r)
+{
+    const size_t all = (size_t)r->sums.width * (size_t)r->sums.height;
+    size_t n = 0;
+    if (!r->picture->only) return (double)all;
+    for (size_t k = 0; k < all; k++) n += r->picture->only[k];
+    return (double)n;
+}
+
 static enum imp_status render_run(struct render *r, imp_film *preview, int64_t *spp)
 {
     enum imp_status st = IMP_OK;
     const bool timed = r->run->time_limit_s > 0;
     const double start = imp__now();
-    const double pixels = (double)r->sums.width * r->sums.height;
+    const double pixels = pixels_sampled(r);
     const double sampled =
         pixels +
         2. * r->sums.margin * (r->sums.width + r->sums.height + 2. * r->sums.margin);

@@ -103,7 +103,7 @@ static double fresh_samples(struct stages *s)
     const struct imp_until_options *o = &s->looks->options;
     const double z = -imp__normal_quantile(o->risk / 2),
                  t = imp__student_of_normal(z, s->freedom);
-    int64_t largest = LEAST;
+    int64_t largest = imp_min((int64_t)LEAST, (int64_t)o->most_spp);
     double bound = 0;
     bool lit = false;
     for (size_t i = 0; i < s->n; i++) {
