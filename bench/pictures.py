@@ -2,16 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Processor time of pictures and gradients by several versions of the program.
 
-    bench/pictures.py [--rounds N] [--spp N] IMPORTON OTHER...
+    bench/pictures.py [--rounds N] [--spp N] [--only WORDS] IMPORTON OTHER...
 
 One thread, rounds interleaved; the pictures of all programs must have the same bytes. Scenes: the
 Cornell box, `textured`, and an open scene, which is `textured` with two meshes of 8,064 triangles
 with interpolated normals, one of rough gold and one diffuse; kinds whose formulas are not in lanes
 (glass and plastic); the office, read by its meters. Losses with gradients compare with a picture of
 the same scene by the first program; those by poses, of a block and of an egg of 19,800 facets, with
-one of another pose.
+one of another pose. Behind times of gradients, where they differ: standard errors over those of the
+first program, geometric means over the numbers.
 """
 import argparse
+import json
 import math
 import os
 import resource
@@ -96,13 +98,20 @@ def seconds(command):
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         sys.exit(done.stderr)
-    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before, done.stdout
+
+
+def errors(answer):
+    """Standard errors of the numbers of a gradient."""
+    each = [p.get('se', 0) for p in json.loads(answer).get('params', [])]
+    return [se for own in each for se in (own if isinstance(own, list) else [own]) if se > 0]
 
 
 def main():
     args = argparse.ArgumentParser(description=__doc__.split('\n')[0])
     args.add_argument('--rounds', type=int, default=5)
     args.add_argument('--spp', type=int, default=64)
+    args.add_argument('--only', default='', help='jobs whose name has these words')
     args.add_argument('program', nargs='+')
     args = args.parse_args()
     with tempfile.TemporaryDirectory() as folder:
@@ -133,20 +142,30 @@ def main():
             jobs['loss + gradient, pose of ' + name] = ['gradient', scene, '-T', target, '-p', shape + '.pose', '--json']
         print('%-30s %s' % ('', '  '.join('%-24s' % p[-24:] for p in args.program)))
         for name, job in jobs.items():
+            if args.only not in name:
+                continue
             time = {p: [] for p in args.program}
-            bytes_of = {}
+            bytes_of, se = {}, {}
             for _ in range(args.rounds):
                 for p in args.program:
-                    time[p].append(seconds([p, *job, '--spp', str(args.spp), '-t', '1', '-q']))
+                    took, answer = seconds([p, *job, '--spp', str(args.spp), '-t', '1', '-q'])
+                    time[p].append(took)
+                    if 'gradient' in job:
+                        se[p] = errors(answer)
                     if 'render' in job:
                         with open(folder + '/picture.pfm', 'rb') as f:
                             bytes_of[p] = f.read()
             if len(set(bytes_of.values())) > 1:
                 sys.exit(name + ': the pictures differ')
-            first = time[args.program[0]]
-            print('%-30s %s' % (name, '  '.join('%.3f s, %.2f (%.2f)   ' % (
-                min(time[p]), min(time[p]) / min(first), statistics.median(time[p]) / statistics.median(first))
-                for p in args.program)), flush=True)
+            first, se_first = time[args.program[0]], se.get(args.program[0], [])
+            line = []
+            for p in args.program:
+                line.append('%.3f s, %.2f (%.2f)' % (min(time[p]), min(time[p]) / min(first),
+                                                     statistics.median(time[p]) / statistics.median(first)))
+                if len(se_first) == len(se.get(p, [])) and se_first != se.get(p, []):
+                    line[-1] += ', errors %.2f' % statistics.geometric_mean(
+                        b / a for a, b in zip(se_first, se[p]))
+            print('%-30s %s' % (name, '  '.join('%-24s' % x for x in line)), flush=True)
 
 
 if __name__ == '__main__':
