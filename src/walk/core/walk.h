@@ -84,8 +84,9 @@ struct imp_vertex {
  * apart. v may be NULL. */
 static inline void imp__vertex_fetch(const struct imp_vertex *v, size_t bytes)
 {
+    const uintptr_t from = (uintptr_t)v;
     for (size_t at = 0; at < bytes; at += IMP_CACHE_LINE)
-        __builtin_prefetch((const char *)v + at);
+        __builtin_prefetch((const void *)(from + at));
 }
 
 /* Vertices of a walk. One of more is dropped: nothing ends it, as in a closed white room
