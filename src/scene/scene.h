@@ -161,7 +161,8 @@ struct imp_scene {
     struct imp_listener *listeners;
     struct imp_pose *poses; /* in the order in which they were added (pose.h) */
     bool moved, reshaped; /* some pose has changed; a shape's, since the tree was made */
-    bool in_problem;      /* a problem has been created: no parameter is added any more */
+    _Atomic bool in_problem; /* a problem has been created, by any thread: no parameter is
+                                added any more */
 
     void *intersector;
     imp_v3 lo, hi;        /* bounds of all shapes */
