@@ -9,6 +9,17 @@
 #include "imp_tap.h"
 #include "move/moves.h"
 
+/* Materials that both sides of thin things have. */
+#define THIN_GREEN                                                                       \
+    "<bsdf type='twosided'><bsdf type='diffuse'><rgb name='reflectance' "                \
+    "value='.4,.7,.5'/></bsdf></bsdf>"
+#define THIN_PALE                                                                        \
+    "<bsdf type='twosided'><bsdf type='diffuse'><rgb name='reflectance' "                \
+    "value='.7,.6,.5'/></bsdf></bsdf>"
+#define THIN_RED                                                                         \
+    "<bsdf type='twosided'><bsdf type='diffuse'><rgb name='reflectance' "                \
+    "value='.8,.2,.1'/></bsdf></bsdf>"
+
 typedef long double real;
 
 struct triangle {

@@ -19,9 +19,6 @@
     "name='p0' value='0,0,-.6'/><point name='p1' value='0,0,.6'/><transform "            \
     "name='to_world'><rotate x='1' y='.4' angle='50'/><translate x='1.1' y='-.6' "       \
     "z='1.1'/></transform>" inside "</shape>"
-#define BOTH                                                                             \
-    "<bsdf type='twosided'><bsdf type='diffuse'><rgb name='reflectance' "                \
-    "value='.7,.6,.5'/></bsdf></bsdf>"
 #define METAL                                                                            \
     "<bsdf type='twosided'><bsdf type='roughconductor'><string name='material' "         \
     "value='Cu'/><float name='alpha' value='.4'/></bsdf></bsdf>"
@@ -163,8 +160,9 @@ int main(int argc, char **argv)
     ctx = test_context(2);
     adjoint_make();
     outline_test();
-    numbers_compare("a tube", room(DIRECT TUBE(BOTH)), 32 * more, 48 * more, .1, numbers);
-    numbers_compare("a tube that grows in the sun", room(DIRECT SUN TUBE(BOTH)),
+    numbers_compare("a tube", room(DIRECT TUBE(THIN_PALE)), 32 * more, 48 * more, .1,
+                    numbers);
+    numbers_compare("a tube that grows in the sun", room(DIRECT SUN TUBE(THIN_PALE)),
                     32 * more, 48 * more, .1, scale);
     numbers_compare("a tube that shines", room(DIRECT TUBE(GLOW)), 64 * more, 48 * more,
                     .2, glow);
@@ -173,8 +171,8 @@ int main(int argc, char **argv)
     numbers_compare("copper under a sky", room(PATH SKY TUBE(METAL)), 16 * more,
                     16 * more, .4, is_long ? numbers : glow);
     if (is_long)
-        numbers_compare("over bounces, under a sky", room(PATH SKY TUBE(BOTH)), 32 * more,
-                        64 * more, .1, numbers);
+        numbers_compare("over bounces, under a sky", room(PATH SKY TUBE(THIN_PALE)),
+                        32 * more, 64 * more, .1, numbers);
     number_refused("a lid that moves", room(DIRECT CAN), "lid.pose", "'side'");
     number_refused(
         "tubes on each other",
@@ -183,12 +181,12 @@ int main(int argc, char **argv)
              "<point name='p0' value='1.2,-.5,1.2'/><point name='p1' "
              "value='1.2,-.5,1.4'/></shape>"),
         "block.pose", "rim of shape");
-    number_refused(
-        "a tube through a ball",
-        room(DIRECT TUBE(BOTH) "<shape type='sphere' id='ball'><float name='radius' "
-                               "value='.3'/><point name='center' value='1.5,-.6,1.1'/>"
-                               "</shape>"),
-        "block.pose", "passes through");
+    number_refused("a tube through a ball",
+                   room(DIRECT TUBE(
+                       THIN_PALE) "<shape type='sphere' id='ball'><float name='radius' "
+                                  "value='.3'/><point name='center' value='1.5,-.6,1.1'/>"
+                                  "</shape>"),
+                   "block.pose", "passes through");
     number_refused(
         "a tube through the wall",
         room(DIRECT

@@ -16,12 +16,6 @@
     "<shape type='cube'><transform name='to_world'><scale x='.3' y='.2' z='.2'/>%s"      \
     "</transform>%s</shape><shape type='rectangle'><transform name='to_world'><scale "   \
     "value='.25'/><rotate y='1' angle='70'/><translate z='.6'/>%s</transform>%s</shape>"
-#define BOTH                                                                             \
-    "<bsdf type='twosided'><bsdf type='diffuse'><rgb name='reflectance' "                \
-    "value='.4,.7,.5'/></bsdf></bsdf>"
-#define RED                                                                              \
-    "<bsdf type='twosided'><bsdf type='diffuse'><rgb name='reflectance' "                \
-    "value='.8,.2,.1'/></bsdf></bsdf>"
 #define LEFT "<rotate z='1' angle='30'/><translate x='1.3' y='-.9' z='.3'/>"
 #define RIGHT                                                                            \
     "<scale x='1.4' y='1' z='.8'/><rotate x='1' angle='40'/><translate x='-1.5' "        \
@@ -39,16 +33,16 @@ static void chair(char *out, size_t n, const char *place, const char *material)
 static imp_scene *room(bool placed)
 {
     char own[2048], left[2048], right[2048], above[2048], rest[16384], xml[32768];
-    chair(own, sizeof own, "", BOTH);
-    chair(left, sizeof left, LEFT, BOTH);
-    chair(right, sizeof right, RIGHT, RED);
-    chair(above, sizeof above, SHIFT LEFT, BOTH);
+    chair(own, sizeof own, "", THIN_GREEN);
+    chair(left, sizeof left, LEFT, THIN_GREEN);
+    chair(right, sizeof right, RIGHT, THIN_RED);
+    chair(above, sizeof above, SHIFT LEFT, THIN_GREEN);
     if (placed)
         snprintf(rest, sizeof rest,
                  PATH "<shape type='shapegroup' id='chair'>%s</shape><shape "
                       "type='shapegroup' id='pair'>" PLACED("chair", "", "")
                           PLACED("chair", SHIFT, "") "</shape>" PLACED("pair", LEFT, "")
-                              PLACED("chair", RIGHT, RED),
+                              PLACED("chair", RIGHT, THIN_RED),
                  own);
     else snprintf(rest, sizeof rest, PATH "%s%s%s", left, above, right);
     room_write(&(struct room_parts){.rest = rest}, xml, sizeof xml);
@@ -120,8 +114,8 @@ static void moved_test(void)
     "<shape type='sphere' %s>%s<bsdf type='roughconductor'><float name='alpha' "         \
     "value='.4'/></bsdf></shape>"
 #define CUBE "<shape type='cube' %s>%s" GREY "</shape>"
-#define TUBE "<shape type='cylinder' %s>%s" BOTH "</shape>"
-#define DISK "<shape type='disk' %s>%s" BOTH "</shape>"
+#define TUBE "<shape type='cylinder' %s>%s" THIN_GREEN "</shape>"
+#define DISK "<shape type='disk' %s>%s" THIN_GREEN "</shape>"
 #define TURNED                                                                           \
     "<transform name='to_world'><scale value='.4'/><rotate x='1' y='.4' angle='50'/>"    \
     "<translate x='1.3' y='-.8' z='.8'/></transform>"

@@ -9,12 +9,9 @@
 
 #define DIRECT "<integrator type='direct'/>"
 #define PATH   "<integrator type='path'><integer name='max_depth' value='3'/></integrator>"
-#define BOTH                                                                             \
-    "<bsdf type='twosided'><bsdf type='diffuse'><rgb name='reflectance' "                \
-    "value='.7,.6,.5'/></bsdf></bsdf>"
 #define TUBE                                                                             \
     "<shape type='cylinder' id='tube'><float name='radius' value='.35'/><point "         \
-    "name='p0' value='.8,-.9,.5'/><point name='p1' value='1.3,-.4,1.4'/>" BOTH           \
+    "name='p0' value='.8,-.9,.5'/><point name='p1' value='1.3,-.4,1.4'/>" THIN_PALE      \
     "</shape>"
 #define BALL(MORE)                                                                       \
     "<shape type='sphere' id='ball'><float name='radius' value='.4'/><point "            \

@@ -18,19 +18,13 @@
 #define SUNK_AND_TURNED                                                                  \
     "<translate x='.2' y='-.3' z='-.7'/><rotate x='1' y='.5' angle='20'/>"               \
     "<translate x='-.2' y='.3' z='.3'/>"
-#define BOTH                                                                             \
-    "<bsdf type='twosided'><bsdf type='diffuse'><rgb name='reflectance' "                \
-    "value='.4,.7,.5'/></bsdf></bsdf>"
-#define RED                                                                              \
-    "<bsdf type='twosided'><bsdf type='diffuse'><rgb name='reflectance' "                \
-    "value='.8,.2,.1'/></bsdf></bsdf>"
 #define BLADES                                                                           \
     "<shape type='rectangle' id='blade'><transform name='to_world'><scale x='.6' "       \
     "y='.5'/><rotate y='1' angle='60'/><rotate z='1' angle='20'/><translate x='1.3' "    \
-    "y='-.9' z='.8'/></transform>" BOTH "</shape>"                                       \
+    "y='-.9' z='.8'/></transform>" THIN_GREEN "</shape>"                                 \
     "<shape type='rectangle' id='other'><transform name='to_world'><scale x='.5' "       \
     "y='.7'/><rotate y='1' angle='-20'/><rotate z='1' angle='50'/><translate x='1.2' "   \
-    "y='-1' z='.9'/></transform>" RED "</shape>"
+    "y='-1' z='.9'/></transform>" THIN_RED "</shape>"
 #define BLACK                                                                            \
     "<bsdf type='twosided'><bsdf type='diffuse'><rgb name='reflectance' value='0'/>"     \
     "</bsdf></bsdf>"
@@ -43,7 +37,7 @@
     "name='center' x='1.1' y='-.7' z='.25'/>" MORE "</shape>"
 #define OTHER                                                                            \
     "<shape type='sphere' id='other'><float name='radius' value='.45'/><point "          \
-    "name='center' x='.5' y='-.9' z='.6'/>" BOTH "</shape>"
+    "name='center' x='.5' y='-.9' z='.6'/>" THIN_GREEN "</shape>"
 #define EGG_FILE "moved_seams_egg.obj"
 #define EGG                                                                              \
     "<shape type='obj' id='egg'><string name='filename' value='" EGG_FILE                \
@@ -51,7 +45,7 @@
     "z='.9'/></transform><ref id='grey'/></shape>"
 #define PLACED                                                                           \
     "<shape type='shapegroup' id='g'><shape type='cube'><transform name='to_world'>"     \
-    "<scale x='.4' y='.3' z='.3'/></transform>" BOTH "</shape></shape>"                  \
+    "<scale x='.4' y='.3' z='.3'/></transform>" THIN_GREEN "</shape></shape>"            \
     "<shape type='instance' id='left'><ref id='g'/><transform name='to_world'><rotate "  \
     "x='1' y='1' angle='30'/><translate x='1.2' y='-1' z='.2'/></transform></shape>"     \
     "<shape type='instance' id='right'><ref id='g'/><transform name='to_world'><rotate " \
@@ -70,10 +64,10 @@ static imp_scene *meter(const char *kind)
         xml, sizeof xml,
         "<scene version='3.0.0'>" PATH
         "<shape type='rectangle' id='floor'><transform name='to_world'><scale "
-        "value='3'/></transform>" BOTH "</shape>"
+        "value='3'/></transform>" THIN_GREEN "</shape>"
         "<shape type='cube' id='block'><transform name='to_world'><scale x='.4' "
         "y='.5' z='.6'/><rotate x='1' z='1' angle='25'/><translate x='1.1' y='.3' "
-        "z='.2'/></transform>" RED "</shape>"
+        "z='.2'/></transform>" THIN_RED "</shape>"
         "<shape type='rectangle' id='lamp'><transform name='to_world'><scale x='.5' "
         "y='.7'/><rotate x='1' angle='170'/><translate x='.9' y='-.2' z='2.2'/>"
         "</transform><emitter type='area'><rgb name='radiance' value='9,8,7'/>"
@@ -221,8 +215,8 @@ int main(int argc, char **argv)
                               "value='points'/>"),
                         64 * more, 2048 * more, .3, points);
     }
-    number_refused("a lamp through a board that reflects", room(DIRECT BOARD(BOTH), ""),
-                   "camera.pose", "which reflects");
+    number_refused("a lamp through a board that reflects",
+                   room(DIRECT BOARD(THIN_GREEN), ""), "camera.pose", "which reflects");
     number_refused("a ball that shines in the floor",
                    room(DIRECT BALL("<emitter type='area'/>"), ""), "block.pose",
                    "one of them is a sphere");

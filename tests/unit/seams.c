@@ -173,12 +173,12 @@ static void velocity_test(void)
         const double psi = 7.0 * (double)k, h = 1e-5;
         const imp_v3 w = frame.s * cos(psi) + frame.t * sin(psi);
         imp_v3 bar[2], at[2];
-        double told = 0;
+        double rate = 0;
         imp__seam_bar(&e, x, w, bar);
         struct imp__glued g[2];
         for (int i = 0; i < 2; i++) {
             g[i] = imp__edge_glued(&e, scene, x, 2 * i, p);
-            told += imp__dot(bar[i], imp__velocity_of(&m, &g[i], theta).v);
+            rate += imp__dot(bar[i], imp__velocity_of(&m, &g[i], theta).v);
         }
         for (int s = 0; s < 2; s++) {
             const double by = s ? h : -h;
@@ -189,7 +189,7 @@ static void velocity_test(void)
             at[s] = meeting(planes);
         }
         const double seen = imp__dot(w, at[1] - at[0]) / (2 * h);
-        worst = fmax(worst, fabs(told - seen) / (1 + fabs(seen)));
+        worst = fmax(worst, fabs(rate - seen) / (1 + fabs(seen)));
         tested++;
     }
     tap_ok(tested > 20 && worst < 1e-6,

@@ -23,7 +23,7 @@ struct imp__moved_gradient {
     const struct imp_pose **pose;      /* [moves.n_movers] that a mover is */
     struct imp__moved_adjoint adjoint; /* of gradients in reverse mode; else none */
     int64_t first;                     /* number of the first draw of each kind */
-    double walks;                      /* of the run, as its pilot was told */
+    double walks;                      /* of the run */
     double draws[IMP_BOUNDARY_KINDS];  /* for each walk */
 };
 

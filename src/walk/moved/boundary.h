@@ -158,8 +158,8 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
                                     struct imp__boundary *out);
 void imp__boundary_free(struct imp__boundary *b);
 
-/* How much light at a film position counts; the sign is of no interest. contrast: by so many samples of
- * the noise of that as imp__boundary_learn was told. */
+/* How much light at a film position counts; the sign is of no interest. contrast [contrasts of
+ * imp__boundary_learn]: by samples of the noise of that. */
 typedef double imp__flux_weight(const void *payload, const struct imp__flux *flux,
                                 double *contrast);
 #define IMP_FLUX_CONTRASTS 64 /* at most */
