@@ -126,8 +126,9 @@ static inline int64_t sample_number(const struct render *r, int k)
                : r->picture->first + (int64_t)k * imp_max(r->picture->step, 1);
 }
 
-static inline bool is_sampled(const struct render *r, int x, int y)
+static bool is_sampled(const void *payload, int x, int y)
 {
+    const struct render *r = payload;
     return imp_likely(!r->picture->only) ||
            r->picture->only[(size_t)y * (size_t)r->patch.film->crop_w + (size_t)x];
 }
@@ -137,20 +138,12 @@ static struct imp_supply *supply_begin(const struct render *r, const struct imp_
                                        struct imp_arena *arena, int s0, int s1,
                                        struct imp_supply *supply)
 {
-    const int across = t->x1 - t->x0, all = across * (t->y1 - t->y0);
-    int n = 0;
+    const struct imp_supply_pixels pixels = {t->x0, t->y0, t->x1, t->y1, is_sampled, r};
     if (!r->picture->walks) return NULL;
     int64_t *numbers = imp__arena_take(arena, (size_t)(s1 - s0), sizeof *numbers);
-    int(*xy)[2] = imp__arena_take(arena, (size_t)all, sizeof *xy);
     for (int k = s0; numbers && k < s1; k++) numbers[k - s0] = sample_number(r, k);
-    for (int k = 0; xy && k < all; k++) {
-        xy[n][0] = t->x0 + k % across;
-        xy[n][1] = t->y0 + k / across;
-        n += is_sampled(r, xy[n][0], xy[n][1]);
-    }
-    return numbers && xy &&
-                   imp__supply_begin(r->picture->walks, arena, (const int(*)[2])xy, n,
-                                     numbers, s1 - s0, 1, supply)
+    return numbers && imp__supply_begin(r->picture->walks, arena, &pixels, numbers,
+                                        s1 - s0, 1, supply)
                ? supply
                : NULL;
 }

@@ -11,29 +11,23 @@ void imp__tile_walks_begin(const struct imp_tracer *tracer, const struct imp_til
 {
     struct imp_arena *arena = &worker->arena;
     const struct imp_tracer *bundled = imp__bundle_use(tracer);
-    const size_t pixels = (size_t)(tile->x1 - tile->x0) * (size_t)(tile->y1 - tile->y0);
-    int n = 0, n_numbers = 0;
+    const struct imp_supply_pixels pixels = {tile->x0, tile->y0, tile->x1,
+                                             tile->y1, counts,   payload};
+    int n = 0;
     out->tracer = tracer;
     out->arena = arena;
     out->bundled = false;
     if (!bundled) return;
-    int(*xy)[2] = imp__arena_take(arena, pixels, sizeof *xy);
     int64_t *numbers =
         imp__arena_take(arena, (size_t)(b1 - b0) * (size_t)plan.n, sizeof *numbers);
-    if (!xy || !numbers) return;
-    for (int y = tile->y0; y < tile->y1; y++)
-        for (int x = tile->x0; x < tile->x1; x++) {
-            if (!counts(payload, x, y)) continue;
-            xy[n][0] = x;
-            xy[n++][1] = y;
-        }
+    if (!numbers) return;
     for (int b = b0; b < b1; b++)
         for (int s = 0; s < plan.m; s++) {
             const int size =
                 imp__replicates_set(plan, s + 1) - imp__replicates_set(plan, s);
             for (int i = 0; i < size; i++)
-                numbers[n_numbers++] = imp__replicates_first(plan, b, s) + i;
+                numbers[n++] = imp__replicates_first(plan, b, s) + i;
         }
-    out->bundled = imp__supply_begin(bundled, arena, (const int(*)[2])xy, n, numbers,
-                                     n_numbers, group, &out->supply);
+    out->bundled =
+        imp__supply_begin(bundled, arena, &pixels, numbers, n, group, &out->supply);
 }

@@ -8,16 +8,26 @@
 enum { VALUES = 512, RECORDS = 160, GROUP_MOST = 1024 };
 
 bool imp__supply_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
-                       const int (*xy)[2], int n_pixels, const int64_t *numbers,
+                       const struct imp_supply_pixels *pixels, const int64_t *numbers,
                        int n_numbers, int group, struct imp_supply *out)
 {
     const int most = tracer && !tracer->value_only ? RECORDS : VALUES;
+    const size_t all =
+        (size_t)(pixels->x1 - pixels->x0) * (size_t)(pixels->y1 - pixels->y0);
     if (!tracer || group < 1 || group > GROUP_MOST || n_numbers < 1) return false;
+    int n = 0, (*xy)[2] = imp__arena_take(arena, all, sizeof *xy);
+    if (!xy) return false;
+    for (int y = pixels->y0; y < pixels->y1; y++)
+        for (int x = pixels->x0; x < pixels->x1; x++) {
+            if (!pixels->counts(pixels->payload, x, y)) continue;
+            xy[n][0] = x;
+            xy[n++][1] = y;
+        }
     *out = (struct imp_supply){.tracer = tracer,
                                .arena = arena,
                                .mark = imp__arena_mark(arena),
-                               .xy = xy,
-                               .n_pixels = n_pixels,
+                               .xy = (const int(*)[2])xy,
+                               .n_pixels = n,
                                .numbers = numbers,
                                .n_numbers = n_numbers,
                                .group = group,

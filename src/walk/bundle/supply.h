@@ -24,11 +24,18 @@ struct imp_supply {
     int left, place; /* walks of it that were not taken; number of the next one */
 };
 
-/* Walks with the given numbers of each pixel, which are as many as a multiple of `group`; the lists
- * live as long as the supply. False: walks of this tracer are not bundled, or a group is too large
- * for a bundle. */
+/* Pixels of a rectangle, row by row, for which counts(payload, x, y). */
+struct imp_supply_pixels {
+    int x0, y0, x1, y1; /* without x1 and y1 */
+    bool (*counts)(const void *payload, int x, int y);
+    const void *payload;
+};
+
+/* Walks with the given numbers of each pixel, which are as many as a multiple of `group`; `numbers`
+ * lives as long as the supply. False: tracer is NULL (imp__bundle_use), a group is too large for a
+ * bundle, or there is no memory. */
 bool imp__supply_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
-                       const int (*xy)[2], int n_pixels, const int64_t *numbers,
+                       const struct imp_supply_pixels *pixels, const int64_t *numbers,
                        int n_numbers, int group, struct imp_supply *out);
 
 /* Before the first walk of a group: the bundle that it is in is made. */
