@@ -10,6 +10,7 @@
 #include "kind/emitter/ies.h"
 #include "kind/shape/shape.h"
 #include "math/motion.h"
+#include "sealed.h"
 #include <string.h>
 
 /* ---- Rotations --------------------------------------------------------------------- */
@@ -328,6 +329,7 @@ enum imp_status imp__poses_settle(struct imp_scene *scene)
         const enum imp_status st = imp__intersector_renew(scene);
         if (st != IMP_OK) return st;
     }
+    imp__sealed_renew(scene);
     scene->moved = scene->reshaped = false;
     return IMP_OK;
 }

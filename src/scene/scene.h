@@ -137,6 +137,7 @@ struct imp_scene {
     int n_media;
     struct imp_medium **media; /* those that scatter */
     bool media_open;           /* some lie in others that their shapes do not name */
+    bool *sealed; /* [n_media] no light sample leaves it (sealed.h); NULL: no media */
     struct imp_priorities *priorities; /* NULL: no shape has one */
     struct imp_bsdf *default_bsdf, *black_bsdf;
     const struct imp_integrator *integrator; /* NULL: none was written */

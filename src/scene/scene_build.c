@@ -8,6 +8,7 @@
 #include "kind/sensor/receiver.h"
 #include "light_tree.h"
 #include "priorities.h"
+#include "sealed.h"
 
 /* Top-level objects without id: <tag><n>, counted per tag. */
 struct tag_counts {
@@ -179,6 +180,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
         if (scene->lights_in_tree || grids_need_tree(scene))
             IMP_TRY(imp__light_tree_build(scene));
         IMP_TRY(imp__media_survey(scene));
+        IMP_TRY(imp__sealed_create(scene));
     }
     scene->committed = true;
 out:

@@ -8,7 +8,8 @@
 
 static double uniform(struct imp_free_flight *w) { return imp__u01(w->key, w->n++); }
 /* 1 - u is exact. */
-static double free_path(struct imp_free_flight *w) { return -log(1 - uniform(w)); }
+static double path_by(double u) { return -log(1 - u); }
+static double free_path(struct imp_free_flight *w) { return path_by(uniform(w)); }
 
 struct imp_free_flight imp__flight_from(struct imp_step *s, imp_v3 o, imp_v3 d,
                                         int stream)
@@ -57,19 +58,59 @@ no_memory:
  * but what light there is to scatter is near the scene. */
 #define DEEP_OPEN 0.1
 
+/* A stretch whose collisions are fixed. Lengths are those of all lanes. */
+static inline double depth_least(const struct imp_free_flight *w)
+{
+    return DEEP * imp__lane_mis_count(w->s);
+}
+static inline double sigma_sum(const struct imp_free_flight *w, imp_spec sigma)
+{
+    double sum = 0;
+    for (int c = 0; c < imp__lane_mis_count(w->s); c++) sum += sigma[c];
+    return sum;
+}
+static inline bool open_is_fixed(const struct imp_free_flight *w, double sum)
+{
+    return sum * w->s->scene->ball.radius >= DEEP_OPEN * imp__lane_mis_count(w->s);
+}
+
+#define REACH_SLACK 1e-5 /* of a distance; that of float is 6e-8 */
+
+double imp__flight_reach(struct imp_free_flight *w, const struct imp_medium *m,
+                         double near)
+{
+    imp_spec in[IMP_INPUTS_MAX];
+    if (m->majorants) return INFINITY;
+    w->ahead = m;
+    w->sigma = imp__extinction_at(m, w->o, w->s->at.carried, in);
+    w->path = path_by(imp__u01(w->key, w->n)); /* uniform_fly counts it */
+    const double mine = w->sigma[imp__lane_mis_drew(w->s)], sum = sigma_sum(w, w->sigma);
+    if (!(mine > 0)) return INFINITY;
+    double length = w->path / mine;
+    /* A derivative asks whether the stretch is deep, too. */
+    if (w->s->recorded || w->s->probing) {
+        if (!open_is_fixed(w, sum)) return INFINITY;
+        length = imp_max(length, depth_least(w) / sum);
+    }
+    return (near + length) * (1 + REACH_SLACK) + REACH_SLACK * w->s->scene->ball.radius;
+}
+
 static bool uniform_fly(struct imp_free_flight *w, const struct imp_medium *m,
                         double near, double far, bool collides, double *t, bool *fixed)
 {
     imp_spec in[IMP_INPUTS_MAX];
-    const imp_spec sigma = imp__extinction_at(m, w->o, w->s->at.carried, in);
-    double length = far - near, sum = 0;
+    const bool known = collides && w->ahead == m;
+    const imp_spec sigma =
+        known ? w->sigma : imp__extinction_at(m, w->o, w->s->at.carried, in);
+    const double sum = sigma_sum(w, sigma);
+    double length = far - near;
     bool hit = false;
-    for (int c = 0; c < imp__lane_mis_count(w->s); c++) sum += sigma[c];
-    *fixed = collides && (isfinite(far) ? sum * length >= DEEP * imp__lane_mis_count(w->s)
-                                        : sum * w->s->scene->ball.radius >=
-                                              DEEP_OPEN * imp__lane_mis_count(w->s));
+    *fixed = collides &&
+             (isfinite(far) ? sum * length >= depth_least(w) : open_is_fixed(w, sum));
     if (collides) {
-        const double path = free_path(w), mine = sigma[imp__lane_mis_drew(w->s)];
+        const double path = known ? w->path : path_by(imp__u01(w->key, w->n)),
+                     mine = sigma[imp__lane_mis_drew(w->s)];
+        w->n++;
         hit = mine > 0 && path < length * mine;
         if (hit) length = path / mine;
     }

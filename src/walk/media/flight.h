@@ -27,6 +27,10 @@ struct imp_free_flight {
     struct imp_event line;   /* IMP_LINE_AT so far; bound 0: none */
     double length;           /* of the stretches that it was chosen from */
     double control;          /* optical depth of controls on the way */
+    /* Of the next stretch, where looked at before it is flown through: */
+    const struct imp_medium *ahead; /* its medium; NULL: not looked at */
+    imp_spec sigma;                 /* its extinction */
+    double path;                    /* optical depth to the collision */
 };
 
 /* Streams of random numbers of a vertex. */
@@ -36,6 +40,11 @@ struct imp_free_flight imp__flight_from(struct imp_step *s, imp_v3 o, imp_v3 d,
                                         int stream);
 /* Keep an event where the walk is recorded. False: no memory. */
 bool imp__flight_event(struct imp_free_flight *w, struct imp_event e);
+/* How far from the start a surface can lie and change the flight through m from near on, with
+ * room for the rounding of rays; INFINITY: any distance. It looks at the number that imp__fly then
+ * has, so that a ray need not look behind the collision. */
+double imp__flight_reach(struct imp_free_flight *w, const struct imp_medium *m,
+                         double near);
 /* From near to far in a medium; true: a collision at *t. */
 bool imp__fly(struct imp_free_flight *w, const struct imp_medium *m, double near,
               double far, bool collides, double *t);

@@ -171,11 +171,12 @@ static enum imp_meeting meet(struct imp_step *s, struct imp_hit *hit)
     struct imp_free_flight w = imp__flight_from(s, start, d, IMP_FLIGHT_ALONG);
     double t, t_max = s->t_max, base = 0;
     for (int passed = 0;; passed++) {
-        const bool found =
-            imp__intersect_at(scene, s->walk->time, &s->o, &d, s->t_min, t_max, hit);
-        const double near = passed ? base : imp_max(s->t_min, s->flight.behind),
-                     far = base + (found ? hit->t : t_max);
         const struct imp_medium *m = s->flight.medium;
+        const double near = passed ? base : imp_max(s->t_min, s->flight.behind),
+                     reach = m ? imp__flight_reach(&w, m, near) - base : INFINITY;
+        const bool found = imp__intersect_at(scene, s->walk->time, &s->o, &d, s->t_min,
+                                             imp_min(t_max, reach), hit);
+        const double far = base + (found ? hit->t : t_max);
         s->flight.base = base;
         w.open = !found;
         if (m && imp__fly(&w, m, near, far, true, &t)) {

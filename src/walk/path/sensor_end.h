@@ -12,6 +12,7 @@
 #ifndef IMP_WALK_SENSOR_END_H
 #define IMP_WALK_SENSOR_END_H
 
+#include "scene/sealed.h"
 #include "walk/core/one_step.h"
 
 /* Light that leaves the vertex by itself: what its BSDF glows with, and its emitter. */
@@ -101,11 +102,19 @@ static inline void imp__end_goes_on(struct imp_step *s, const struct imp_vertex 
         s->walk->valid = true;
 }
 
+/* A point of a medium that no light sample leaves. */
+static inline bool imp__end_is_sealed(const struct imp_step *s,
+                                      const struct imp_vertex *v)
+{
+    return imp_unlikely(s->scene->sealed != NULL) && !v->shape && s->flight.here &&
+           imp__is_sealed(s->scene, s->flight.here);
+}
+
 static inline bool imp__end_link_draw(struct imp_step *s, const struct imp_vertex *v,
                                       const struct imp_surface *at, struct imp_link *link)
 {
     return s->segment->connects && s->tracer->integrator->lights && imp__end_bounces(s) &&
-           !imp__end_looks_past_lights(s) &&
+           !imp__end_looks_past_lights(s) && !imp__end_is_sealed(s, v) &&
            imp__light_point(s, v->bsdf, at, &link->light);
 }
 
