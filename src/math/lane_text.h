@@ -22,6 +22,10 @@
 #define real       WIDE(imp_real)
 #define truth      WIDE(imp_truth)
 #define number     WIDE(imp__real) /* the same in all lanes */
+#define whole      WIDE(imp_whole) /* the bits of numbers */
+#define whole_of   WIDE(imp__whole_of)
+#define real_of    WIDE(imp__real_of)
+#define exponent   WIDE(imp__exponent)
 #define choose     WIDE(imp__choose)
 #define root_of    WIDE(imp__root)
 #define larger     WIDE(imp__larger)
@@ -41,6 +45,10 @@
 #undef real
 #undef truth
 #undef number
+#undef whole
+#undef whole_of
+#undef real_of
+#undef exponent
 #undef choose
 #undef root_of
 #undef larger

@@ -6,6 +6,7 @@
 #define IMP_MATH_REALS_H
 
 #include "vec.h"
+#include <string.h>
 #ifdef __AVX512F__
 #include <immintrin.h>
 #endif
@@ -17,6 +18,34 @@ typedef imp_spec imp_real_4;
 typedef int64_t imp_truth_4 __attribute__((vector_size(32)));
 typedef double imp_real_8 __attribute__((vector_size(64)));
 typedef int64_t imp_truth_8 __attribute__((vector_size(64)));
+
+/* Their bits. */
+typedef int64_t imp_whole_1;
+typedef imp_truth_4 imp_whole_4;
+typedef imp_truth_8 imp_whole_8;
+static inline imp_whole_1 imp__whole_of_1(double x)
+{
+    imp_whole_1 bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
+}
+static inline double imp__real_of_1(imp_whole_1 bits)
+{
+    double x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+static inline imp_whole_4 imp__whole_of_4(imp_real_4 x) { return (imp_whole_4)x; }
+static inline imp_real_4 imp__real_of_4(imp_whole_4 bits) { return (imp_real_4)bits; }
+static inline imp_whole_8 imp__whole_of_8(imp_real_8 x) { return (imp_whole_8)x; }
+static inline imp_real_8 imp__real_of_8(imp_whole_8 bits) { return (imp_real_8)bits; }
+/* k 2^52: as bits, an exponent. */
+static inline imp_whole_1 imp__exponent_1(imp_whole_1 k)
+{
+    return (imp_whole_1)((uint64_t)k << 52);
+}
+static inline imp_whole_4 imp__exponent_4(imp_whole_4 k) { return k << 52; }
+static inline imp_whole_8 imp__exponent_8(imp_whole_8 k) { return k << 52; }
 
 /* a where m is true, else b. */
 static inline double imp__choose_1(int m, double a, double b) { return m ? a : b; }

@@ -3,6 +3,7 @@
  * Formulas in lanes (math/lane_text.h): the text for four and for eight numbers gives every bit of
  * that for one. */
 #include "imp_tap.h"
+#include "math/exp.h"
 #include "math/rng.h"
 #include "math/trig.h"
 #include <string.h>
@@ -87,6 +88,43 @@ static void angles(void)
     tap_ok(wrong == 0, "sines, cosines and angles in lanes: %d differ", wrong);
 }
 
+/* Exponential function and logarithm, and their errors: x in [-700, 700], and of the logarithm all
+ * magnitudes and what is close to 1. */
+static void exponentials(void)
+{
+    int wrong = 0;
+    double e_worst = 0, l_worst = 0;
+    for (int i = 0; i < DRAWS; i++) {
+        double x[MOST], y[MOST];
+        imp_real_4 x4, y4;
+        imp_real_8 x8, y8;
+        for (int k = 0; k < MOST; k++) {
+            const struct imp_key key = imp__key(4, (uint64_t)i, (uint64_t)k);
+            const double u = imp__u01(key, 0), v = imp__u01(key, 1);
+            x8[k] = x[k] = 1400 * u - 700;
+            y8[k] = y[k] = k & 1 ? ldexp(.5 + u / 2, (int)(2000 * v) - 1000)
+                                 : 1 - ldexp(u, -(int)(54 * v));
+            if (k < 4) x4[k] = x[k], y4[k] = y[k];
+        }
+        const imp_real_4 e4 = imp__exp_4(x4), l4 = imp__log_4(y4);
+        const imp_real_8 e8 = imp__exp_8(x8), l8 = imp__log_8(y8);
+        for (int k = 0; k < MOST; k++) {
+            const double e = imp__exp_1(x[k]), l = imp__log_1(y[k]);
+            const long double e_true = expl(x[k]), l_true = logl(y[k]);
+            wrong += !same(e, e8[k]) || !same(l, l8[k]);
+            if (k < 4) wrong += !same(e, e4[k]) || !same(l, l4[k]);
+            e_worst = fmax(e_worst, (double)fabsl(e / e_true - 1));
+            if (y[k] == 1) wrong += l != 0;
+            else l_worst = fmax(l_worst, (double)fabsl(l / l_true - 1));
+        }
+    }
+    tap_ok(wrong == 0, "exponentials and logarithms in lanes: %d differ", wrong);
+    tap_ok(e_worst < 0x1.7p-53 && l_worst < 0x1p-52,
+           "their errors # exp 2^%.2f, log 2^%.2f", log2(e_worst), log2(l_worst));
+    tap_ok(imp__exp_1(-800) == 0 && imp__exp_1(800) == INFINITY && imp__exp_1(-0.) == 1,
+           "far below 0 and above");
+}
+
 /* Cosine and index of a conductor, and all that follows from them. */
 static void conductors(void)
 {
@@ -130,6 +168,7 @@ int main(void)
 {
     functions();
     angles();
+    exponentials();
     conductors();
     return tap_done();
 }

@@ -3,12 +3,13 @@
  * Free flights through media: closed form where extinction is uniform, delta tracking
  * where it varies. */
 #include "flight.h"
+#include "math/exp.h"
 #include "probe.h"
 #include "scene/majorants.h"
 
 static double uniform(struct imp_free_flight *w) { return imp__u01(w->key, w->n++); }
 /* 1 - u is exact. */
-static double path_by(double u) { return -log(1 - u); }
+static double path_by(double u) { return -imp__log_1(1 - u); }
 static double free_path(struct imp_free_flight *w) { return path_by(uniform(w)); }
 
 struct imp_free_flight imp__flight_from(struct imp_step *s, imp_v3 o, imp_v3 d,

@@ -6,7 +6,7 @@
 
 imp_spec imp__attenuation(imp_spec sigma, double t)
 {
-    return imp__choose_4(sigma > 0, imp__exp(-sigma * t), imp__spec(1));
+    return imp__choose_4(sigma > 0, imp__exp_4(-sigma * t), imp__spec(1));
 }
 
 imp_spec imp__extinction_at(const struct imp_medium *m, imp_v3 p,
