@@ -25,7 +25,8 @@ bool imp__shape_in_lanes(const struct imp_tracer *tracer, int shape)
 {
     const struct imp_shape *s = tracer->scene->shapes[shape];
     const struct imp_bsdf *b = imp__shape_bsdf(tracer->scene, s);
-    return s->emitter < 0 && !s->body && !b->shaped && b->flags == IMP_BSDF_SMOOTH &&
+    const unsigned lobes = IMP_BSDF_SMOOTH | IMP_BSDF_DELTA | IMP_BSDF_TRANSMIT;
+    return s->emitter < 0 && !s->body && !b->shaped && !(b->flags & ~lobes) &&
            b->n_in <= IMP_INPUTS_MAX && kernel_of(tracer, b) &&
            (tracer->value_only || s->geometry == IMP_TRIANGLES ||
             s->geometry ==

@@ -36,6 +36,7 @@ struct imp_lanes_lit {
 struct imp_lanes_step {
     imp_wide3 wi, world; /* in the shading frame, as decided; as drawn */
     imp_wide pdf, survive, eta, scale;
+    imp_wide_lobe lobe;
     struct imp_wide_color w, beta;
     unsigned on, part; /* lanes that go on; whose factor is zero in a colour */
 };
