@@ -61,20 +61,32 @@ const struct imp_shape_lanes *imp__shape_lanes(const struct imp_shape *s);
 
 /* ---- Materials --------------------------------------------------------------------------- */
 
+/* Lobes, as of struct imp_dirs: IMP_SMOOTH, or the index of a delta lobe. */
+typedef imp_wide_truth imp_wide_lobe;
+static inline imp_wide_lobe imp__wide_smooth(void) { return ~(imp_wide_lobe){0}; }
+static inline imp_wide_truth imp__is_smooth(imp_wide_lobe lobe)
+{
+    return lobe == imp__wide_smooth();
+}
+
 struct imp_bsdf_lanes {
     /* This one is covered: its parameters may say it is not, and derivatives that are wanted
      * (imp_dirs), for which it draws otherwise. NULL: all are. */
     bool (*covers)(const struct imp_bsdf *b, uint64_t derivative);
-    /* imp_bsdf_ops.sample, with a smooth lobe; u as there. Where it is true. */
+    /* imp_bsdf_ops.sample; u as there. Where it is true. *lobe is given as smooth. */
     imp_wide_truth (*sample)(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                             const imp_wide3 *wo, const imp_wide u[3], imp_wide3 *wi);
-    /* imp_bsdf_ops.pdf_eval of smooth lobes, of the first `colors` of c. */
+                             const imp_wide3 *wo, const imp_wide u[3], imp_wide3 *wi,
+                             imp_wide_lobe *lobe);
+    /* imp_bsdf_ops.pdf_eval, of the first `colors` of c. */
     imp_wide (*pdf_eval)(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                         const imp_wide3 *wo, const imp_wide3 *wi, int colors,
-                         struct imp_wide_color *f);
+                         const imp_wide3 *wo, const imp_wide3 *wi,
+                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *f);
+    /* imp_bsdf_ops.index_ratio, of kinds that have one. */
+    imp_wide (*index_ratio)(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                            const imp_wide3 *wo, const imp_wide3 *wi,
+                            const imp_wide_lobe *lobe);
 };
-/* NULL: this material has none, with these derivatives wanted. Those that have one have neither an index ratio nor emission, and
- * no lobe that is not smooth. */
+/* NULL: this material has none, with these derivatives wanted. Those that have one have no emission. */
 const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b,
                                              uint64_t derivative);
 

@@ -260,7 +260,7 @@ static void spectra(void)
     compare("a room in spectra", IMP_SPECTRAL, 7, PATH(""), CAMERA,
             ROOM SKY LAMP("0", "0", ".5") CUBE("-.6", "-1.2", DIFFUSE(".9,.4,.1"))
                 BALL("-.7", ".4", GOLD(ALPHA("alpha", ".3"))));
-    compare("independent walks in spectra", IMP_SPECTRAL, 7, PATH(DEPTH("4")), CAMERA,
+    compare("independent walks in spectra", IMP_SPECTRAL, 8, PATH(DEPTH("4")), CAMERA,
             ROOM LAMP("0", "0", ".5") LAMP("1", "0", ".2")
                 BALL("-.7", ".4", "<bsdf type='dielectric'/>")
                     CUBE("-.6", "-1.2", CHECKERS) BALL(".8", ".8", DIFFUSE(".1,.2,.9")));
@@ -287,13 +287,50 @@ static void materials(void)
                     BALL(".7", ".3", CHECKERS));
     compare("kinds without lanes", IMP_RGB, 2, PATH(DEPTH("8")), CAMERA,
             SKY WALL("0", "-1", "0", "x", "-90", DIFFUSE(".5,.6,.7"))
-                BALL(".7", ".3", "<bsdf type='dielectric'/>")
+                BALL(".7", ".3", "<bsdf type='thindielectric'/>")
                     BALL("-.7", ".3", "<bsdf type='plastic'/>")
                         CUBE("0", "-.5", "<bsdf type='roughplastic'/>")
                             BALL("0", "1",
                                  "<bsdf type='mask'><float name='opacity' "
                                  "value='.5'/>" DIFFUSE(".9,.1,.1") "</bsdf>")
                                 CUBE("1.6", ".9", DIFFUSE(".4,.4,.4")));
+}
+
+/* Lobes without a density. */
+static void ideal(void)
+{
+    static const char *const things = BALL(".8", ".3", "<bsdf type='dielectric'/>")
+        BALL("-.8", ".3",
+             "<bsdf type='dielectric'><rgb name='specular_reflectance' "
+             "value='0,.5,1'/><rgb name='specular_transmittance' "
+             "value='1,.2,0'/></bsdf>")
+            CUBE("0", "-.6",
+                 "<bsdf type='conductor'><string name='material' "
+                 "value='Au'/></bsdf>")
+                BALL("0", "1.2",
+                     "<bsdf type='twosided'><bsdf type='conductor'><rgb "
+                     "name='specular_reflectance' value='.9,0,.5'/></bsdf>" DIFFUSE(
+                         ".2,.9,.4") "</bsdf>")
+                    CUBE("1.4", "-1.3",
+                         "<bsdf type='twosided'><boolean name='allow_transmission' "
+                         "value='true'/><bsdf type='dielectric'><float name='int_ior' "
+                         "value='1'/><float name='ext_ior' value='2'/></bsdf></bsdf>");
+    static char rest[8192];
+    snprintf(rest, sizeof rest, "%s%s", ROOM LAMP("0", "0", ".5"), things);
+    compare("glass and mirrors", IMP_RGB, 10, PATH(DEPTH("12") RR("2")), CAMERA, rest);
+    compare("glass and mirrors, independent walks", IMP_RGB, 10, PATH(DEPTH("5")), CAMERA,
+            rest);
+    compare("glass and mirrors in spectra", IMP_SPECTRAL, 10, PATH(DEPTH("8")), CAMERA,
+            rest);
+    snprintf(rest, sizeof rest, "%s%s",
+             ROOM LAMP("0", "0", ".3") LAMP("1", "0", ".2") LAMP("-1", "0", ".2"),
+             things);
+    compare("glass and mirrors, lamps by a tree", IMP_RGB, 10,
+            PATH(DEPTH("6") "<string name='light_choice' value='tree'/>"), CAMERA, rest);
+    snprintf(rest, sizeof rest, "%s%s",
+             SKY WALL("0", "-1.7", "0", "x", "-90", CHECKERS) LAMP("0", "0", ".5"),
+             things);
+    compare("glass and mirrors under a sky", IMP_RGB, 6, PATH(DEPTH("9")), CAMERA, rest);
 }
 
 #define LAMP_ROW(z)                                                                      \
@@ -473,6 +510,7 @@ int main(void)
     boxes();
     spectra();
     materials();
+    ideal();
     lights();
     sensors();
     scenes();

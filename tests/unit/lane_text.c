@@ -11,11 +11,20 @@
 #define IMP_WIDE 1
 #define IMP_TEXT "kind/bsdf/conductor_text.h"
 #include "math/lane_text.h"
+#define IMP_WIDE 1
+#define IMP_TEXT "kind/bsdf/dielectric_text.h"
+#include "math/lane_text.h"
 #define IMP_WIDE 4
 #define IMP_TEXT "kind/bsdf/conductor_text.h"
 #include "math/lane_text.h"
+#define IMP_WIDE 4
+#define IMP_TEXT "kind/bsdf/dielectric_text.h"
+#include "math/lane_text.h"
 #define IMP_WIDE 8
 #define IMP_TEXT "kind/bsdf/conductor_text.h"
+#include "math/lane_text.h"
+#define IMP_WIDE 8
+#define IMP_TEXT "kind/bsdf/dielectric_text.h"
 #include "math/lane_text.h"
 
 enum { DRAWS = 20000, MOST = 8 };
@@ -164,11 +173,41 @@ static void conductors(void)
            "reflectance of conductors and its derivatives in lanes: %d differ", wrong);
 }
 
+/* Cosine, of either side, and index of a dielectric. */
+static void dielectrics(void)
+{
+    int wrong = 0, total = 0;
+    for (int i = 0; i < DRAWS; i++) {
+        double c[MOST], eta[MOST];
+        imp_real_4 c4, eta4, t4, e4;
+        imp_real_8 c8, eta8, t8, e8;
+        for (int j = 0; j < MOST; j++) {
+            const struct imp_key key = imp__key(4, (uint64_t)i, (uint64_t)j);
+            const double u = imp__u01(key, 0);
+            c8[j] = c[j] = u < .05 ? 0 : u > .95 ? 1 : 2 * u - 1;
+            eta8[j] = eta[j] = fabs(number(key, 1));
+            if (j < 4) c4[j] = c[j], eta4[j] = eta[j];
+        }
+        const imp_real_4 f4 = imp__dielectric_4(c4, eta4, &t4, &e4);
+        const imp_real_8 f8 = imp__dielectric_8(c8, eta8, &t8, &e8);
+        for (int j = 0; j < MOST; j++) {
+            double t, e;
+            const double f = imp__dielectric_1(c[j], eta[j], &t, &e);
+            total += f == 1;
+            wrong += !same(f, f8[j]) || !same(t, t8[j]) || !same(e, e8[j]);
+            if (j < 4) wrong += !same(f, f4[j]) || !same(t, t4[j]) || !same(e, e4[j]);
+        }
+    }
+    tap_ok(wrong == 0 && total > DRAWS && total < MOST * DRAWS - DRAWS,
+           "reflectance of dielectrics in lanes: %d differ", wrong);
+}
+
 int main(void)
 {
     functions();
     angles();
     exponentials();
     conductors();
+    dielectrics();
     return tap_done();
 }

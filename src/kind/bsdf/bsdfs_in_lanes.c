@@ -3,14 +3,17 @@
  * Which materials have forms in lanes. */
 #include "bsdf_lanes.h"
 
-extern const struct imp_bsdf_ops imp__diffuse, imp__roughconductor, imp__twosided;
+extern const struct imp_bsdf_ops imp__conductor, imp__dielectric, imp__diffuse,
+    imp__roughconductor, imp__twosided;
 
 static const struct {
     const struct imp_bsdf_ops *ops;
     const struct imp_bsdf_lanes *lanes;
 } list[] = {{&imp__diffuse, &imp__diffuse_lanes},
             {&imp__roughconductor, &imp__roughconductor_lanes},
-            {&imp__twosided, &imp__twosided_lanes}};
+            {&imp__twosided, &imp__twosided_lanes},
+            {&imp__dielectric, &imp__dielectric_lanes},
+            {&imp__conductor, &imp__conductor_lanes}};
 
 const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b,
                                              uint64_t derivative)

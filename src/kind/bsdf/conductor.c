@@ -3,7 +3,9 @@
  * conductor: a smooth mirror of complex index eta + i k. One delta lobe, tint times
  * Fresnel; its derivatives are those of the coefficient (docs/estimators.md 9.3). Front
  * only. */
+#include "bsdf_lanes.h"
 #include "fresnel.h"
+#include "fresnel_lanes.h"
 #include "kind/build.h"
 #include "presets.h"
 
@@ -74,3 +76,31 @@ const struct imp_bsdf_ops imp__conductor = {.size = sizeof(struct imp_bsdf_ops),
                                             .pdf = pdf,
                                             .eval_d = eval_d,
                                             .directional_albedo = directional_albedo};
+
+/* ---- In lanes ---------------------------------------------------------------------------- */
+
+static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
+                                   const struct imp_wide_color *in, const imp_wide3 *wo,
+                                   const imp_wide u[3], imp_wide3 *wi,
+                                   imp_wide_lobe *lobe)
+{
+    (void)b, (void)in, (void)u;
+    *wi = imp__mirrors(wo);
+    *lobe = (imp_wide_lobe){0};
+    return wo->z > imp__wide(0);
+}
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                               const imp_wide3 *wo, const imp_wide3 *wi,
+                               const imp_wide_lobe *lobe, int colors,
+                               struct imp_wide_color *f)
+{
+    (void)b, (void)wi;
+    for (int c = 0; c < colors; c++)
+        f->c[c] =
+            IMP_WIDE_OF(imp__conductor)(wo->z, in[ETA].c[c], in[K].c[c]) * in[TINT].c[c];
+    return imp__wide_choose((*lobe == (imp_wide_lobe){0}) & (wo->z > imp__wide(0)),
+                            imp__wide(1), imp__wide(0));
+}
+
+const struct imp_bsdf_lanes imp__conductor_lanes = {.sample = sample_lanes,
+                                                    .pdf_eval = pdf_eval_lanes};

@@ -6,7 +6,9 @@
  * F, whatever the tints are, so that a tint of 0 keeps its derivative. The index bends
  * paths and has no gradient: it can be set, and a request for its derivative is refused
  * (docs/estimators.md 9.3). */
+#include "bsdf_lanes.h"
 #include "fresnel.h"
+#include "fresnel_lanes.h"
 #include "kind/build.h"
 #include "presets.h"
 
@@ -124,3 +126,56 @@ const struct imp_bsdf_ops imp__dielectric = {.size = sizeof(struct imp_bsdf_ops)
                                              .index_ratio = index_ratio,
                                              .eval_d = eval_d,
                                              .directional_albedo = directional_albedo};
+
+/* ---- In lanes ---------------------------------------------------------------------------- */
+
+static imp_wide_truth is_lobe(const imp_wide_lobe *lobe, int k)
+{
+    return *lobe == (imp_wide_lobe){0} + k;
+}
+
+static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
+                                   const struct imp_wide_color *in, const imp_wide3 *wo,
+                                   const imp_wide u[3], imp_wide3 *wi,
+                                   imp_wide_lobe *lobe)
+{
+    imp_wide cos_t, eta_t;
+    (void)b;
+    const imp_wide F = IMP_WIDE_OF(imp__dielectric)(wo->z, in[ETA].c[0], &cos_t, &eta_t);
+    const imp_wide_truth reflects = u[0] < F;
+    const imp_wide3 through = {-wo->x / eta_t, -wo->y / eta_t,
+                               -imp__wide_signed_as(cos_t, wo->z)};
+    *wi = imp__wide3_choose(reflects, imp__mirrors(wo), through);
+    imp__lobe_set(lobe, reflects, REFLECT);
+    imp__lobe_set(lobe, ~reflects, REFRACT);
+    return wo->z != imp__wide(0);
+}
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                               const imp_wide3 *wo, const imp_wide3 *wi,
+                               const imp_wide_lobe *lobe, int colors,
+                               struct imp_wide_color *f)
+{
+    imp_wide cos_t, eta_t;
+    const imp_wide zero = imp__wide(0);
+    (void)b, (void)wi;
+    const imp_wide F = IMP_WIDE_OF(imp__dielectric)(wo->z, in[ETA].c[0], &cos_t, &eta_t);
+    const imp_wide_truth reflects = is_lobe(lobe, REFLECT);
+    const imp_wide chance = imp__wide_choose(reflects, F, 1 - F),
+                   of = imp__wide_choose(reflects, F, (1 - F) / (eta_t * eta_t));
+    for (int c = 0; c < colors; c++)
+        f->c[c] = imp__wide_choose(reflects, in[TINT_R].c[c], in[TINT_T].c[c]) * of;
+    return imp__wide_choose((wo->z != zero) & ~imp__is_smooth(*lobe), chance, zero);
+}
+static imp_wide index_ratio_lanes(const struct imp_bsdf *b,
+                                  const struct imp_wide_color *in, const imp_wide3 *wo,
+                                  const imp_wide3 *wi, const imp_wide_lobe *lobe)
+{
+    const imp_wide eta = in[ETA].c[0];
+    (void)b, (void)wi;
+    return imp__wide_choose(is_lobe(lobe, REFRACT),
+                            imp__wide_choose(wo->z > imp__wide(0), eta, 1 / eta),
+                            imp__wide(1));
+}
+
+const struct imp_bsdf_lanes imp__dielectric_lanes = {
+    .sample = sample_lanes, .pdf_eval = pdf_eval_lanes, .index_ratio = index_ratio_lanes};

@@ -5,6 +5,9 @@
 #include "fresnel.h"
 
 #define IMP_WIDE 1
+#define IMP_TEXT "kind/bsdf/dielectric_text.h"
+#include "math/lane_text.h"
+#define IMP_WIDE 1
 #define IMP_TEXT "kind/bsdf/conductor_text.h"
 #include "math/lane_text.h"
 #define IMP_WIDE 4
@@ -13,15 +16,7 @@
 
 double imp__fresnel_dielectric(double c, double eta, double *cos_t, double *eta_t)
 {
-    const double e = c >= 0 ? eta : 1 / eta, ci = fabs(c);
-    const double ct2 = 1 - (1 - ci * ci) / (e * e);
-    *eta_t = e;
-    *cos_t = ct2 > 0 ? sqrt(ct2) : 0;
-    if (e == 1) return 0;
-    if (!(ct2 > 0)) return 1; /* total reflection */
-    const double ct = *cos_t;
-    const double a = (ci - e * ct) / (ci + e * ct), b = (ct - e * ci) / (ct + e * ci);
-    return 0.5 * (a * a + b * b);
+    return imp__dielectric_1(c, eta, cos_t, eta_t);
 }
 
 double imp__fresnel_dielectric_d(double c, double e, double *d_c, double *d_e)

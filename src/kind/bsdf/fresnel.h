@@ -7,9 +7,7 @@
 
 #include "math/vec.h"
 
-/* Dielectric: c is the cosine on the side of the ray, its sign the side (c > 0: outside);
- * eta = inside/outside. *cos_t: cosine of refraction, >= 0, 0 under total reflection;
- * *eta_t: index on the far side over index on the near side. */
+/* Dielectric, as dielectric_text.h has it for one number. */
 double imp__fresnel_dielectric(double c, double eta, double *cos_t, double *eta_t);
 
 /* F for c > 0 and index e = far/near, with its derivatives: 0 under total reflection. */

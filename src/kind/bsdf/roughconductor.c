@@ -9,6 +9,7 @@
  * mirroring wo in it gives p(wi) = p(h)/(4 c). */
 #include "bsdf_lanes.h"
 #include "fresnel.h"
+#include "fresnel_lanes.h"
 #include "lambert.h"
 #include "presets.h"
 #include "roughness.h"
@@ -147,9 +148,6 @@ const struct imp_bsdf_ops imp__roughconductor = {.size = sizeof(struct imp_bsdf_
 #define IMP_WIDE IMP_WIDE_LANES
 #define IMP_TEXT "kind/bsdf/microfacet_text.h"
 #include "math/lane_text.h"
-#define IMP_WIDE IMP_WIDE_LANES
-#define IMP_TEXT "kind/bsdf/conductor_text.h"
-#include "math/lane_text.h"
 
 static bool covers(const struct imp_bsdf *b, uint64_t derivative)
 {
@@ -170,11 +168,13 @@ static void roughness_lanes(const struct imp_bsdf *b, const struct imp_wide_colo
 }
 
 static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                               const imp_wide3 *wo, const imp_wide3 *wi, int colors,
+                               const imp_wide3 *wo, const imp_wide3 *wi,
+                               const imp_wide_lobe *lobe, int colors,
                                struct imp_wide_color *f)
 {
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
     imp_wide au, av;
+    (void)lobe;
     roughness_lanes(b, in, &au, &av);
     const imp_wide3 h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
     const imp_wide D = IMP_WIDE_OF(imp__ggx_d)(au, av, h),
@@ -192,10 +192,12 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_c
 /* ggx_visible of microfacet.c, and the mirror image of wo in that normal. */
 static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
                                    const struct imp_wide_color *in, const imp_wide3 *wo,
-                                   const imp_wide u[3], imp_wide3 *wi)
+                                   const imp_wide u[3], imp_wide3 *wi,
+                                   imp_wide_lobe *lobe)
 {
     const imp_wide zero = imp__wide(0);
     imp_wide au, av, si, co;
+    (void)lobe;
     roughness_lanes(b, in, &au, &av);
     const imp_wide3 w = imp__wide3_unit((imp_wide3){au * wo->x, av * wo->y, wo->z});
     const imp_wide phi = IMP_2PI * u[1], z = (1 - u[2]) * (1 + w.z) - w.z;

@@ -207,7 +207,8 @@ static bool is_asked(const struct imp_bsdf *b, int k, imp_wide_truth back)
 
 static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
                                    const struct imp_wide_color *in, const imp_wide3 *wo,
-                                   const imp_wide u[3], imp_wide3 *wi)
+                                   const imp_wide u[3], imp_wide3 *wi,
+                                   imp_wide_lobe *lobe)
 {
     const imp_wide_truth back = wo->z < imp__wide(0);
     const imp_wide3 seen = flips(wo, back);
@@ -215,11 +216,13 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
     for (int k = 0; k < b->n_child; k++) {
         const struct imp_bsdf *c = b->child[k];
         imp_wide3 own;
+        imp_wide_lobe way = imp__wide_smooth();
         if (!is_asked(b, k, back)) continue;
         const imp_wide_truth some = imp__bsdf_lanes(c, 0)->sample(c, in + b->child_in[k],
-                                                                  &seen, u, &own),
+                                                                  &seen, u, &own, &way),
                              here = k > 0 ? back : ~(imp_wide_truth){0};
         own = flips(&own, back);
+        *lobe = (*lobe & ~here) | (way & here);
         *wi = imp__wide3_choose(here, own, *wi);
         drawn = (drawn & ~here) | (some & here);
     }
@@ -227,7 +230,8 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
 }
 
 static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                               const imp_wide3 *wo, const imp_wide3 *wi, int colors,
+                               const imp_wide3 *wo, const imp_wide3 *wi,
+                               const imp_wide_lobe *lobe, int colors,
                                struct imp_wide_color *f)
 {
     const imp_wide_truth back = wo->z < imp__wide(0);
@@ -237,8 +241,8 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_c
         const struct imp_bsdf *c = b->child[k];
         struct imp_wide_color own;
         if (!is_asked(b, k, back)) continue;
-        const imp_wide p =
-            imp__bsdf_lanes(c, 0)->pdf_eval(c, in + b->child_in[k], &o, &i, colors, &own);
+        const imp_wide p = imp__bsdf_lanes(c, 0)->pdf_eval(c, in + b->child_in[k], &o, &i,
+                                                           lobe, colors, &own);
         const imp_wide_truth here = k > 0 ? back : ~(imp_wide_truth){0};
         pdf = imp__wide_choose(here, p, pdf);
         for (int j = 0; j < colors; j++)

@@ -67,7 +67,7 @@ static inline void step_put(const struct imp_lanes_step *step, int colors, int k
     out->scale = imp__spec(step->scale[k]);
     out->w = color_lane(&step->w, colors, k);
     direction_put(of->wi, &step->wi, k);
-    of->lobe = IMP_SMOOTH;
+    of->lobe = (int8_t)step->lobe[k];
     of->pdf = (imp_decided)step->pdf[k];
     of->survive = (imp_decided)step->survive[k];
     of->goes_on = true;

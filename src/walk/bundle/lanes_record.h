@@ -36,9 +36,19 @@ struct imp_lanes_lit {
 struct imp_lanes_step {
     imp_wide3 wi, world; /* in the shading frame, as decided; as drawn */
     imp_wide pdf, survive, eta, scale;
+    imp_wide_lobe lobe;
     struct imp_wide_color w, beta;
     unsigned on, part; /* lanes that go on; whose factor is zero in a colour */
 };
+
+/* Points and frames by the shapes' own functions; inputs that are not the constants bin->in, at each
+ * walk's wavelengths or, with carried NULL, in colours (lanes_place.c). */
+void imp__lanes_surface(const struct imp_depth *d, const struct imp_wide_hits *hits,
+                        struct imp_wide_surface *out);
+void imp__lanes_inputs(const struct imp_depth *d, const struct imp_bin *bin,
+                       const struct imp_carried *const *carried,
+                       const struct imp_wide_hits *hits, const struct imp_wide_surface *x,
+                       struct imp_wide_color *in);
 
 /* Where walks have derivatives: is there a lane with a value that is zero but has one? Then they are to
  * be made one by one. */

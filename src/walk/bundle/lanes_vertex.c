@@ -3,118 +3,10 @@
  * Vertices of a bundle in lanes: those on one shape, IMP_WIDE_LANES at a time. What the one step does
  * for a walk alone (path/sensor_end.h, core/scatter.c, core/light.c) stands here for walks that
  * have a kernel, light samples and roulette, and nothing more. */
-#include "color/spectrum.h"
 #include "lanes_record.h"
 #include "math/offset.h"
 
-/* ---- What is in lanes -------------------------------------------------------------------- */
-
-bool imp__lanes_fit(const struct imp_tracer *t)
-{
-    const struct imp_walk_integrator *w = t->integrator;
-    return !t->scene->timed_lights && w->ends_by == IMP_ENDS_BY_ROULETTE &&
-           w->directions && !w->only_points && t->scene->n_groups == 0;
-}
-
-static const struct imp_bsdf_lanes *kernel_of(const struct imp_tracer *tracer,
-                                              const struct imp_bsdf *b)
-{
-    const struct imp_active *active = tracer->active;
-    return imp__bsdf_lanes(b, active && b->index >= 0 ? active->inputs[b->index] : 0);
-}
-
-bool imp__shape_in_lanes(const struct imp_tracer *tracer, int shape)
-{
-    const struct imp_shape *s = tracer->scene->shapes[shape];
-    const struct imp_bsdf *b = imp__shape_bsdf(tracer->scene, s);
-    return s->emitter < 0 && !s->body && !b->shaped && b->flags == IMP_BSDF_SMOOTH &&
-           b->n_in <= IMP_INPUTS_MAX && kernel_of(tracer, b) &&
-           (tracer->value_only || s->geometry == IMP_TRIANGLES ||
-            s->geometry ==
-                IMP_ANALYTIC); /* else points are located by what is not in lanes */
-}
-
-void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *bin)
-{
-    const struct imp_shape *s = tracer->scene->shapes[shape];
-    const struct imp_bsdf *b = imp__shape_bsdf(tracer->scene, s);
-    bin->shape = s;
-    bin->bsdf = b;
-    bin->surface = imp__shape_lanes(s);
-    bin->kernel = kernel_of(tracer, b);
-    bin->plain = bin->spectra = true;
-    for (int j = 0; j < b->n_in; j++) {
-        bin->plain &= b->input[j]->plain;
-        bin->spectra &= b->input[j]->plain && b->input[j]->spectrum;
-    }
-    for (int j = 0; bin->plain && j < b->n_in; j++)
-        bin->in[j] = imp__wide_color(b->input[j]->value);
-}
-
-/* ---- Where it is ------------------------------------------------------------------------- */
-
-static const struct imp_shape *shape_of(const struct imp_depth *d, int ray)
-{
-    return d->bundle->tracer->scene->shapes[d->hits->shape[ray]];
-}
-
-/* By the shapes' own functions. */
-static void surface_alone(const struct imp_depth *d, const struct imp_wide_hits *h,
-                          struct imp_wide_surface *out)
-{
-    for (int k = 0; k < IMP_WIDE_LANES; k++) {
-        const int i = h->at[k];
-        const struct imp_shape *s = shape_of(d, i);
-        const struct imp_hit hit = {.shape = s->index,
-                                    .prim = h->prim[i],
-                                    .t = h->t[i],
-                                    .u = h->u[i],
-                                    .v = h->v[i]};
-        const imp_v3 o = imp__column_v3(h->o, i), d = imp__column_v3(h->d, i);
-        struct imp_surface x;
-        s->ops->surface(s, &hit, &o, &d, &x);
-        imp__wide3_set(&out->p, k, x.p);
-        imp__wide3_set(&out->ng, k, x.ng);
-        imp__wide3_set(&out->frame.s, k, x.s);
-        imp__wide3_set(&out->frame.t, k, x.t);
-        imp__wide3_set(&out->frame.n, k, x.n);
-        out->uv[0][k] = x.uv[0];
-        out->uv[1][k] = x.uv[1];
-    }
-}
-
-/* Inputs that are textures, point by point. */
-static void inputs_alone(const struct imp_depth *d, const struct imp_bsdf *b,
-                         const struct imp_carried *const *carried,
-                         const struct imp_wide_hits *h, const struct imp_wide_surface *x,
-                         struct imp_wide_color *in)
-{
-    for (int k = 0; k < IMP_WIDE_LANES; k++) {
-        imp_spec own[IMP_INPUTS_MAX];
-        const struct imp_texcoord at = {
-            .uv = {imp__decide1(x->uv[0][k]), imp__decide1(x->uv[1][k])},
-            .p = imp__decide(imp__wide3_lane(&x->p, k)),
-            .carried = carried ? carried[k] : NULL,
-            .shape = shape_of(d, h->at[k]),
-            .prim = h->prim[h->at[k]]};
-        imp__inputs_eval(b->input, b->n_in, &at, own);
-        for (int j = 0; j < b->n_in; j++)
-            for (int c = 0; c < 4; c++) in[j].c[c][k] = own[j][c];
-    }
-}
-
-/* Inputs that are the same spectra everywhere, at each walk's wavelengths. */
-static void spectra_alone(const struct imp_bsdf *b,
-                          const struct imp_carried *const *carried,
-                          struct imp_wide_color *in)
-{
-    for (int j = 0; j < b->n_in; j++)
-        for (int k = 0; k < IMP_WIDE_LANES; k++) {
-            imp_spec own;
-            imp__spectrum_lanes(b->input[j]->spectrum, carried[k]->nm, &own);
-            for (int c = 0; c < 4; c++) in[j].c[c][k] = own[c];
-        }
-}
+/* ---- What leaves it ---------------------------------------------------------------------- */
 
 /* imp__offset. */
 static imp_wide3 offset(imp_wide3 p, imp_wide3 ng, imp_wide3 d)
@@ -135,14 +27,14 @@ static inline imp_wide_truth is_zero(const imp_wide f[4], int colors)
     return all;
 }
 
-/* ---- What leaves it ---------------------------------------------------------------------- */
-
-/* imp__light_place of lane k: kernels in lanes send nothing through the surface. */
-static inline struct imp_light_place place_of(const struct imp_lanes_vertices *v, int k)
+/* imp__light_place of lane k. */
+static inline struct imp_light_place place_of(const struct imp_lanes_vertices *v,
+                                              const bool ideal, const struct imp_bsdf *b,
+                                              int k)
 {
     return (struct imp_light_place){.p = imp__wide3_lane(&v->x.p, k),
                                     .n = imp__wide3_lane(&v->faced, k),
-                                    .faces = true};
+                                    .faces = !ideal || !(b->flags & IMP_BSDF_TRANSMIT)};
 }
 
 static inline imp_wide number(const struct imp_lanes_vertices *v, int use)
@@ -177,8 +69,9 @@ light_weigh(struct imp_depth *d, const struct imp_bin *bin,
                              v->on, l);
     else imp__lanes_light_draw(scene, carried, &v->x.p, u, which, v->points, v->on, l);
     lit->wi = imp__wide3_decide(imp__into_wide_frame(&v->x.frame, l->at.wi));
-    const imp_wide pdf =
-        bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, &lit->wi, colors, &lit->f);
+    const imp_wide_lobe smooth = imp__wide_smooth();
+    const imp_wide pdf = bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, &lit->wi,
+                                               &smooth, colors, &lit->f);
     const imp_wide p = l->at.pdf * l->pmf;
     lit->weight =
         imp__wide_decide(imp__wide_choose(l->delta, 1 / p, power_heuristic_over(p, pdf)));
@@ -236,22 +129,26 @@ static inline imp_wide_truth survives(const struct imp_depth *d,
 /* Where walks go on, and what a step there weighs. */
 static inline __attribute__((always_inline)) void
 scatter_weigh(struct imp_depth *d, const struct imp_bin *bin,
-              const struct imp_lanes_vertices *v, const int colors,
+              const struct imp_lanes_vertices *v, const int colors, const bool ideal,
               struct imp_lanes_step *s)
 {
     const imp_wide zero = imp__wide(0);
     const imp_wide u[3] = {number(v, IMP_DIM_LOBE), number(v, IMP_DIM_DIR_U),
                            number(v, IMP_DIM_DIR_V)};
     struct imp_wide_color f;
-    imp_wide_truth goes = bin->kernel->sample(bin->bsdf, v->in, &v->wo_drawn, u, &s->wi);
+    s->lobe = imp__wide_smooth();
+    imp_wide_truth goes =
+        bin->kernel->sample(bin->bsdf, v->in, &v->wo_drawn, u, &s->wi, &s->lobe);
     s->world = imp__out_of_wide_frame(&v->x.frame, s->wi);
     s->wi = imp__wide3_decide(s->wi);
     s->pdf = imp__wide_decide(
-        bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, &s->wi, colors, &f));
+        bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, &s->wi, &s->lobe, colors, &f));
     const imp_wide by = 1 / s->pdf;
     imp_wide beta[4];
     imp_wide_truth part = {0};
     s->eta = imp__wide_taken(d->rays->eta, v->order);
+    if (ideal && bin->kernel->index_ratio)
+        s->eta *= bin->kernel->index_ratio(bin->bsdf, v->in, &v->wo, &s->wi, &s->lobe);
     goes &= s->pdf > zero;
     for (int c = 0; c < colors; c++) {
         const imp_wide factor = f.c[c] * by;
@@ -272,7 +169,8 @@ scatter_weigh(struct imp_depth *d, const struct imp_bin *bin,
 
 /* The next rays. */
 static inline __attribute__((always_inline)) void
-scatter_on(struct imp_depth *d, const struct imp_lanes_vertices *v, const int colors,
+scatter_on(struct imp_depth *d, const struct imp_bin *bin,
+           const struct imp_lanes_vertices *v, const int colors, const bool ideal,
            const struct imp_lanes_step *s)
 {
     struct imp_flights *to = d->next;
@@ -282,7 +180,9 @@ scatter_on(struct imp_depth *d, const struct imp_lanes_vertices *v, const int co
     imp__wide3_append(to->ray.d, n, bits, s->world);
     imp__wide_append(&to->ray.far[n], bits, imp__wide(INFINITY));
     imp__wide3_append(to->from, n, bits, v->x.p);
-    imp__wide_append(&to->pdf[n], bits, s->pdf);
+    imp__wide_append(
+        &to->pdf[n], bits,
+        ideal ? imp__wide_choose(imp__is_smooth(s->lobe), s->pdf, imp__wide(0)) : s->pdf);
     for (int c = 0; c < colors; c++)
         imp__wide_append(&to->beta[c][n], bits, s->beta.c[c]);
     imp__wide_append(&to->eta[n], bits, s->eta);
@@ -290,7 +190,7 @@ scatter_on(struct imp_depth *d, const struct imp_lanes_vertices *v, const int co
         const int k = __builtin_ctz(left), i = to->ray.n++, from = v->order[k];
         to->walk[i] = d->rays->walk[from];
         to->up[i] = v->at + k;
-        if (to->left) to->left[i] = place_of(v, k);
+        if (to->left) to->left[i] = place_of(v, ideal, bin->bsdf, k);
         if (to->zeros) to->zeros[i] = d->rays->zeros[from];
         if (to->ray.time) to->ray.time[i] = d->rays->ray.time[from];
     }
@@ -304,11 +204,11 @@ static inline void color_store(double *const to[4], int colors, int at,
     for (int c = 0; c < colors; c++) imp__wide_store(&to[c][at], x->c[c]);
 }
 
-/* False: they are to be made one by one, since a value that is zero has a derivative there. */
-static inline __attribute__((always_inline)) bool work(struct imp_depth *d,
-                                                       const struct imp_bin *bin,
-                                                       const int32_t *order, int n,
-                                                       int at, const int colors)
+/* ideal: their material has ideal lobes, or lets light through. False: they are to be made one by
+ * one, since a value that is zero has a derivative there. */
+static inline __attribute__((always_inline)) bool
+work(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order, int n, int at,
+     const int colors, const bool ideal)
 {
     const struct imp_bundle *b = d->bundle;
     const struct imp_wide_hits hits = {.o = d->rays->ray.o,
@@ -336,7 +236,7 @@ static inline __attribute__((always_inline)) bool work(struct imp_depth *d,
                                 imp__block(d->depth));
     if (bin->surface)
         bin->surface->surface(bin->shape, &hits, v.recorded || !bin->plain, &v.x);
-    else surface_alone(d, &hits, &v.x);
+    else imp__lanes_surface(d, &hits, &v.x);
     v.wo_drawn = imp__into_wide_frame(
         &v.x.frame, imp__wide3_opposite(imp__wide3_taken(d->rays->ray.d, order)));
     v.wo = imp__wide3_decide(v.wo_drawn);
@@ -344,19 +244,17 @@ static inline __attribute__((always_inline)) bool work(struct imp_depth *d,
     if (imp_unlikely(d->next->left != NULL))
         v.faced = imp__wide3_choose(v.wo.z < imp__wide(0),
                                     imp__wide3_opposite(v.x.frame.n), v.x.frame.n);
-    if (colors > 3 && bin->spectra) {
-        spectra_alone(bin->bsdf, v.carried, in);
-        v.in = in;
-    } else if (colors > 3 || !bin->plain) {
-        inputs_alone(d, bin->bsdf, colors > 3 ? v.carried : NULL, &hits, &v.x, in);
+    if (colors > 3 || !bin->plain) {
+        imp__lanes_inputs(d, bin, colors > 3 ? v.carried : NULL, &hits, &v.x, in);
         v.in = in;
     }
     lit.on = lit.dark = step.on = step.part = 0;
     if (imp_likely(!d->last)) {
-        if (b->tracer->integrator->lights && b->tracer->scene->n_emitters > 0)
+        if (b->tracer->integrator->lights && b->tracer->scene->n_emitters > 0 &&
+            (!ideal || bin->bsdf->flags & IMP_BSDF_SMOOTH))
             light_weigh(d, bin, &v, colors, &lit);
         else lit.brings = imp__wide_color(imp__spec(0));
-        scatter_weigh(d, bin, &v, colors, &step);
+        scatter_weigh(d, bin, &v, colors, ideal, &step);
     }
 
     if (b->tracer->active && imp_unlikely(imp__lanes_differ(d, bin, &lit, &step)))
@@ -376,13 +274,30 @@ static inline __attribute__((always_inline)) bool work(struct imp_depth *d,
     }
     if (imp_unlikely(d->last)) return true;
     light_see(d, &v, &lit);
-    scatter_on(d, &v, colors, &step);
+    scatter_on(d, bin, &v, colors, ideal, &step);
     return true;
 }
+
+#define WORK(name, colors, ideal)                                                        \
+    static __attribute__((noinline)) bool name(struct imp_depth *d,                      \
+                                               const struct imp_bin *bin,                \
+                                               const int32_t *order, int n, int at)      \
+    {                                                                                    \
+        return work(d, bin, order, n, at, colors, ideal);                                \
+    }
+typedef bool work_fn(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order,
+                     int n, int at);
+WORK(work_3, 3, false)
+WORK(work_4, 4, false)
+WORK(work_ideal_3, 3, true)
+WORK(work_ideal_4, 4, true)
 
 void imp__vertices_in_lanes(struct imp_depth *d, const struct imp_bin *bin,
                             const int32_t *order, int n, int at)
 {
+    static work_fn *const works[2][2] = {{work_3, work_4}, {work_ideal_3, work_ideal_4}};
+    work_fn *const work_as =
+        works[bin->bsdf->flags != IMP_BSDF_SMOOTH][d->bundle->colors > 3];
     int32_t rest[IMP_WIDE_LANES];
     for (int i = 0; i < n; i += IMP_WIDE_LANES) {
         const int left = imp_min(n - i, IMP_WIDE_LANES);
@@ -391,9 +306,7 @@ void imp__vertices_in_lanes(struct imp_depth *d, const struct imp_bin *bin,
             for (int k = 0; k < IMP_WIDE_LANES; k++) rest[k] = here[k < left ? k : 0];
             here = rest;
         }
-        const bool made = imp_likely(d->bundle->colors == 3)
-                              ? work(d, bin, here, left, at + i, 3)
-                              : work(d, bin, here, left, at + i, 4);
+        const bool made = work_as(d, bin, here, left, at + i);
         for (int k = 0; !made && k < left; k++) imp__vertex_alone(d, here[k], at + i + k);
     }
 }

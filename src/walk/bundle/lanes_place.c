@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Which vertices are made in lanes (lanes_vertex.c), and where they are if their shape or their inputs
+ * have no form in lanes. */
+#include "color/spectrum.h"
+#include "lanes_record.h"
+
+/* ---- What is in lanes -------------------------------------------------------------------- */
+
+bool imp__lanes_fit(const struct imp_tracer *t)
+{
+    const struct imp_walk_integrator *w = t->integrator;
+    return !t->scene->timed_lights && w->ends_by == IMP_ENDS_BY_ROULETTE &&
+           w->directions && !w->only_points && t->scene->n_groups == 0;
+}
+
+static const struct imp_bsdf_lanes *kernel_of(const struct imp_tracer *tracer,
+                                              const struct imp_bsdf *b)
+{
+    const struct imp_active *active = tracer->active;
+    return imp__bsdf_lanes(b, active && b->index >= 0 ? active->inputs[b->index] : 0);
+}
+
+bool imp__shape_in_lanes(const struct imp_tracer *tracer, int shape)
+{
+    const struct imp_shape *s = tracer->scene->shapes[shape];
+    const struct imp_bsdf *b = imp__shape_bsdf(tracer->scene, s);
+    const unsigned lobes = IMP_BSDF_SMOOTH | IMP_BSDF_DELTA | IMP_BSDF_TRANSMIT;
+    return s->emitter < 0 && !s->body && !b->shaped && !(b->flags & ~lobes) &&
+           b->n_in <= IMP_INPUTS_MAX && kernel_of(tracer, b) &&
+           (tracer->value_only || s->geometry == IMP_TRIANGLES ||
+            s->geometry ==
+                IMP_ANALYTIC); /* else points are located by what is not in lanes */
+}
+
+void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *bin)
+{
+    const struct imp_shape *s = tracer->scene->shapes[shape];
+    const struct imp_bsdf *b = imp__shape_bsdf(tracer->scene, s);
+    bin->shape = s;
+    bin->bsdf = b;
+    bin->surface = imp__shape_lanes(s);
+    bin->kernel = kernel_of(tracer, b);
+    bin->plain = bin->spectra = true;
+    for (int j = 0; j < b->n_in; j++) {
+        bin->plain &= b->input[j]->plain;
+        bin->spectra &= b->input[j]->plain && b->input[j]->spectrum;
+    }
+    for (int j = 0; bin->plain && j < b->n_in; j++)
+        bin->in[j] = imp__wide_color(b->input[j]->value);
+}
+
+/* ---- Where it is ------------------------------------------------------------------------- */
+
+static const struct imp_shape *shape_of(const struct imp_depth *d, int ray)
+{
+    return d->bundle->tracer->scene->shapes[d->hits->shape[ray]];
+}
+
+void imp__lanes_surface(const struct imp_depth *d, const struct imp_wide_hits *h,
+                        struct imp_wide_surface *out)
+{
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
+        const int i = h->at[k];
+        const struct imp_shape *s = shape_of(d, i);
+        const struct imp_hit hit = {.shape = s->index,
+                                    .prim = h->prim[i],
+                                    .t = h->t[i],
+                                    .u = h->u[i],
+                                    .v = h->v[i]};
+        const imp_v3 o = imp__column_v3(h->o, i), d = imp__column_v3(h->d, i);
+        struct imp_surface x;
+        s->ops->surface(s, &hit, &o, &d, &x);
+        imp__wide3_set(&out->p, k, x.p);
+        imp__wide3_set(&out->ng, k, x.ng);
+        imp__wide3_set(&out->frame.s, k, x.s);
+        imp__wide3_set(&out->frame.t, k, x.t);
+        imp__wide3_set(&out->frame.n, k, x.n);
+        out->uv[0][k] = x.uv[0];
+        out->uv[1][k] = x.uv[1];
+    }
+}
+
+/* Inputs that are textures, point by point. */
+static void inputs_alone(const struct imp_depth *d, const struct imp_bsdf *b,
+                         const struct imp_carried *const *carried,
+                         const struct imp_wide_hits *h, const struct imp_wide_surface *x,
+                         struct imp_wide_color *in)
+{
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
+        imp_spec own[IMP_INPUTS_MAX];
+        const struct imp_texcoord at = {
+            .uv = {imp__decide1(x->uv[0][k]), imp__decide1(x->uv[1][k])},
+            .p = imp__decide(imp__wide3_lane(&x->p, k)),
+            .carried = carried ? carried[k] : NULL,
+            .shape = shape_of(d, h->at[k]),
+            .prim = h->prim[h->at[k]]};
+        imp__inputs_eval(b->input, b->n_in, &at, own);
+        for (int j = 0; j < b->n_in; j++)
+            for (int c = 0; c < 4; c++) in[j].c[c][k] = own[j][c];
+    }
+}
+
+/* Inputs that are the same spectra everywhere, at each walk's wavelengths. */
+static void spectra_alone(const struct imp_bsdf *b,
+                          const struct imp_carried *const *carried,
+                          struct imp_wide_color *in)
+{
+    for (int j = 0; j < b->n_in; j++)
+        for (int k = 0; k < IMP_WIDE_LANES; k++) {
+            imp_spec own;
+            imp__spectrum_lanes(b->input[j]->spectrum, carried[k]->nm, &own);
+            for (int c = 0; c < 4; c++) in[j].c[c][k] = own[c];
+        }
+}
+
+void imp__lanes_inputs(const struct imp_depth *d, const struct imp_bin *bin,
+                       const struct imp_carried *const *carried,
+                       const struct imp_wide_hits *h, const struct imp_wide_surface *x,
+                       struct imp_wide_color *in)
+{
+    if (carried && bin->spectra) spectra_alone(bin->bsdf, carried, in);
+    else inputs_alone(d, bin->bsdf, carried, h, x, in);
+}
