@@ -7,25 +7,17 @@
 
 /* ---- Segments ---------------------------------------------------------------------- */
 
-/* The medium on the side of the surface that d points to. */
-static const struct imp_medium *beyond(const struct imp_shape *shape, imp_v3 ng, imp_v3 d,
-                                       const struct imp_medium *here)
-{
-    if (!shape || (!shape->interior && !shape->exterior)) return here;
-    return imp__dot(ng, d) < 0 ? shape->interior : shape->exterior;
-}
-
 /* Go from a surface to the side that d points to, in a nest without the surface. False:
  * the walk is dropped. */
 static bool side_take(struct imp_step *s, const struct imp_shape *shape, imp_v3 ng,
                       imp_v3 d, struct imp_nest *nest, const struct imp_medium **medium)
 {
     if (imp_likely(s->scene->priorities == NULL)) {
-        *medium = beyond(shape, ng, d, *medium);
+        *medium = imp__medium_beyond(shape, ng, d, *medium);
         return true;
     }
     if (!shape || shape->priority == 0) {
-        nest->around = beyond(shape, ng, d, nest->around);
+        nest->around = imp__medium_beyond(shape, ng, d, nest->around);
     } else if (imp__dot(ng, d) < 0 && !imp__nest_enter(nest, shape->index)) {
         s->walk->dropped = IMP_DROP_MEDIUM;
         return false;
@@ -33,10 +25,6 @@ static bool side_take(struct imp_step *s, const struct imp_shape *shape, imp_v3 
     *medium = imp__nest_medium(s->scene, nest);
     return true;
 }
-
-/* Rays from a point of a medium begin a little behind it: a boundary as near as Embree's
- * rounding is met then, and met from its wrong side it is not there. */
-static double behind(imp_v3 p) { return (1 + imp__max3(imp__abs(p))) * IMP_RAY_EPSILON; }
 
 /* A surface that a ray passes as if it were not there, though media may change. */
 static bool is_passed(const struct imp_scene *scene, const struct imp_shape *shape)
@@ -51,7 +39,7 @@ static bool consistent(const struct imp_step *s, const struct imp_shape *shape, 
     if (imp_unlikely(shape->priority > 0))
         return (imp__dot(ng, d) < 0) != imp__nest_has(nest, shape->index);
     if (imp_unlikely(s->scene->priorities != NULL)) m = nest->around;
-    return s->scene->media_open || beyond(shape, ng, -d, m) == m;
+    return s->scene->media_open || imp__medium_beyond(shape, ng, -d, m) == m;
 }
 
 /* A ray arrives at a surface with a priority, which is taken out of its nest: is another
@@ -149,7 +137,7 @@ static void look_closely(const struct imp_step *s, imp_v3 d, bool hide,
                          const struct imp_medium *m, int passed, struct surface_ahead *a)
 {
     const imp_v3 p = s->o + d * hit->t;
-    const double back = imp_min(behind(p) + hit->t * IMP_RAY_EPSILON, hit->t);
+    const double back = imp_min(imp__begins_behind(p) + hit->t * IMP_RAY_EPSILON, hit->t);
     const imp_v3 from = s->o + d * (hit->t - back);
     struct imp_hit first;
     if (!imp__intersect_at(s->scene, s->walk->time, &from, &d, 0, 2 * back, &first)) {
@@ -160,6 +148,36 @@ static void look_closely(const struct imp_step *s, imp_v3 d, bool hide,
     first.t += hit->t - back;
     *hit = first;
     look(s, d, hide, hit, nest, m, passed, a);
+}
+
+enum imp_passing imp__surface_ahead(struct imp_step *s, bool hide, int passed,
+                             struct imp_hit *hit)
+{
+    const imp_v3 d = s->d;
+    struct surface_ahead a;
+    struct imp_nest *nest = &s->flight.nest_here;
+    const struct imp_medium *m = s->flight.here;
+    look(s, d, hide, hit, nest, m, passed, &a);
+    if (imp_unlikely(a.wrong)) look_closely(s, d, hide, hit, nest, m, passed, &a);
+    if (a.plain) return IMP_PASSING_ENDS;
+    if (a.wrong) {
+        s->walk->dropped = IMP_DROP_MEDIUM;
+        return IMP_PASSING_DROPS;
+    }
+    bool passes = a.passes;
+    if (imp_unlikely(a.shape->priority > 0) && !a.left)
+        passes |= hidden(s, a.shape, a.at.ng, d, nest);
+    if (!passes && !a.left) return IMP_PASSING_ENDS;
+    if (passed == IMP_WALK_MAX) {
+        s->walk->dropped = IMP_DROP_LONG;
+        return IMP_PASSING_DROPS;
+    }
+    if (!a.left && !side_take(s, a.shape, a.at.ng, d, nest, &s->flight.medium))
+        return IMP_PASSING_DROPS;
+    if (imp_unlikely(s->scene->priorities != NULL)) s->flight.nest = *nest;
+    s->o = imp__offset(a.at.p, a.at.ng, d);
+    s->t_min = 0;
+    return IMP_PASSING_GOES_ON;
 }
 
 static enum imp_meeting meet(struct imp_step *s, struct imp_hit *hit)
@@ -189,39 +207,14 @@ static enum imp_meeting meet(struct imp_step *s, struct imp_hit *hit)
         if (!found) break;
 
         /* A surface: does the ray end there, and what is behind it? */
-        struct surface_ahead a;
-        struct imp_nest *nest = &s->flight.nest_here;
-        look(s, d, hide, hit, nest, m, passed, &a);
-        if (imp_unlikely(a.wrong)) look_closely(s, d, hide, hit, nest, m, passed, &a);
-        if (a.plain) {
+        const enum imp_passing ahead = imp__surface_ahead(s, hide, passed, hit);
+        if (ahead == IMP_PASSING_DROPS) return IMP_MEETS_DROP;
+        if (ahead == IMP_PASSING_ENDS) {
             met = IMP_MEETS_SURFACE;
             break;
         }
-        if (a.wrong) {
-            s->walk->dropped = IMP_DROP_MEDIUM;
-            return IMP_MEETS_DROP;
-        }
-        const struct imp_shape *shape = a.shape;
-        const struct imp_surface at = a.at;
-        const bool left = a.left;
-        bool passes = a.passes;
-        if (imp_unlikely(shape->priority > 0) && !left)
-            passes |= hidden(s, shape, at.ng, d, nest);
-        if (!passes && !left) {
-            met = IMP_MEETS_SURFACE;
-            break;
-        }
-        if (passed == IMP_WALK_MAX) {
-            s->walk->dropped = IMP_DROP_LONG;
-            return IMP_MEETS_DROP;
-        }
-        if (!left && !side_take(s, shape, at.ng, d, nest, &s->flight.medium))
-            return IMP_MEETS_DROP;
-        if (imp_unlikely(scene->priorities != NULL)) s->flight.nest = *nest;
-        s->o = imp__offset(at.p, at.ng, d);
         base = imp__dot(s->o - start, d);
         t_max -= hit->t;
-        s->t_min = 0;
     }
     pass(s, &w);
     return met;
@@ -241,7 +234,7 @@ static void leave(struct imp_step *s, const struct imp_vertex *v,
     s->flight.medium = s->flight.here;
     s->flight.nest = s->flight.nest_here;
     side_take(s, v->shape, at->ng, s->d, &s->flight.nest, &s->flight.medium);
-    s->flight.behind = v->shape ? 0 : behind(at->p);
+    s->flight.behind = v->shape ? 0 : imp__begins_behind(at->p);
     s->o -= s->d * s->flight.behind;
 }
 
@@ -315,7 +308,7 @@ static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surf
 {
     const double length = imp__length(shadow->d);
     const imp_v3 d = shadow->d * (1 / length);
-    const double back = imp__is_zero(from->ng) ? behind(from->p) : 0;
+    const double back = imp__is_zero(from->ng) ? imp__begins_behind(from->p) : 0;
     const imp_v3 start = shadow->o - d * back;
     const double end = shadow->reach * length + back;
     const struct imp_medium *m = s->flight.here;

@@ -69,6 +69,30 @@ struct imp_track {
 
 extern const struct imp_segment_ops imp__tracking;
 
+/* The medium on the side of the surface that d points to; `here` where it bounds none. */
+static inline const struct imp_medium *imp__medium_beyond(const struct imp_shape *shape,
+                                                          imp_v3 ng, imp_v3 d,
+                                                          const struct imp_medium *here)
+{
+    if (!shape || (!shape->interior && !shape->exterior)) return here;
+    return imp__dot(ng, d) < 0 ? shape->interior : shape->exterior;
+}
+
+/* Rays from a point of a medium begin a little behind it: a boundary as near as Embree's
+ * rounding is met then, and met from its wrong side it is not there. */
+static inline double imp__begins_behind(imp_v3 p)
+{
+    return (1 + imp__max3(imp__abs(p))) * IMP_RAY_EPSILON;
+}
+
+/* A surface that is met: the segment ends there; or it goes on behind it, from s->o, in
+ * s->flight.medium; or the walk is dropped. */
+enum imp_passing { IMP_PASSING_ENDS, IMP_PASSING_GOES_ON, IMP_PASSING_DROPS };
+/* Which it is of the ray in flight, in medium s->flight.here, at *hit, in place of which another may
+ * be found. passed: surfaces before it; hide: lights are passed as well. */
+enum imp_passing imp__surface_ahead(struct imp_step *s, bool hide, int passed,
+                             struct imp_hit *hit);
+
 /* The segment's value at the scene's present parameters. */
 imp_spec imp__track_eval(const struct imp_scene *scene, const struct imp_track *track,
                          const struct imp_carried *carried);
