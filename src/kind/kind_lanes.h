@@ -90,6 +90,18 @@ struct imp_bsdf_lanes {
 const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b,
                                              uint64_t derivative);
 
+/* ---- Phase functions ---------------------------------------------------------------------- */
+
+/* One value for all colours, which is the density, too; inputs are constants. */
+struct imp_phase_lanes {
+    imp_wide3 (*sample)(const struct imp_phase *p, const imp_wide3 *wo,
+                        const imp_wide u[3]);
+    imp_wide (*value)(const struct imp_phase *p, const imp_wide3 *wo,
+                      const imp_wide3 *wi);
+};
+/* NULL: this phase function has none. */
+const struct imp_phase_lanes *imp__phase_lanes(const struct imp_phase *p);
+
 /* ---- Emitters ---------------------------------------------------------------------------- */
 
 struct imp_emitter_lanes {

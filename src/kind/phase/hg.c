@@ -23,31 +23,20 @@ static const struct imp_input_desc inputs[] = {{.name = "g",
 /* Directions are drawn for one of three colours, which is once for all if they agree. */
 #define COLOURS 3
 
-static double value(double g, double c)
-{
-    const double D = 1 + g * g - 2 * g * c;
-    return (1 - g * g) * IMP_INV_PI / (4 * D * sqrt(D));
-}
-
 static void sample(const struct imp_phase *p, const imp_spec *in, const double u[3],
                    struct imp_dirs *d)
 {
     (void)p;
     const double g = in[G][imp_min((int)(u[0] * COLOURS), COLOURS - 1)];
-    double c = 1 - 2 * u[1];
-    if (fabs(g) > 1e-4) { /* the inverse of the cumulative density */
-        const double q = (1 - g * g) / (1 - g + 2 * g * u[1]);
-        c = imp_clamp((1 + g * g - q * q) / (2 * g), -1.0, 1.0);
-    }
-    d->wi = imp__turn(d->wo, c, u[2]);
+    d->wi = imp__turn(d->wo, imp__hg_cosine_1(g, u[1]), u[2]);
 }
 static double pdf(const struct imp_phase *p, const imp_spec *in, const struct imp_dirs *d)
 {
     (void)p;
     const double c = imp_phase_cos(d);
     const imp_spec g = in[G];
-    if (g[0] == g[1] && g[0] == g[2]) return value(g[0], c);
-    return (value(g[0], c) + value(g[1], c) + value(g[2], c)) / COLOURS;
+    if (g[0] == g[1] && g[0] == g[2]) return imp__hg_value_1(g[0], c);
+    return (imp__hg_value_1(g[0], c) + imp__hg_value_1(g[1], c) + imp__hg_value_1(g[2], c)) / COLOURS;
 }
 static void eval(const struct imp_phase *p, const imp_spec *in, const struct imp_dirs *d,
                  imp_spec *f)
@@ -55,9 +44,9 @@ static void eval(const struct imp_phase *p, const imp_spec *in, const struct imp
     (void)p;
     const double c = imp_phase_cos(d);
     const imp_spec g = in[G];
-    *f = imp__spec(value(g[0], c));
+    *f = imp__spec(imp__hg_value_1(g[0], c));
     for (int k = 1; k < 4; k++)
-        if (g[k] != g[0]) (*f)[k] = value(g[k], c);
+        if (g[k] != g[0]) (*f)[k] = imp__hg_value_1(g[k], c);
 }
 static void eval_d(const struct imp_phase *p, const imp_spec *in,
                    const struct imp_dirs *d, imp_spec *df)
