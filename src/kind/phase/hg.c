@@ -36,7 +36,9 @@ static double pdf(const struct imp_phase *p, const imp_spec *in, const struct im
     const double c = imp_phase_cos(d);
     const imp_spec g = in[G];
     if (g[0] == g[1] && g[0] == g[2]) return imp__hg_value_1(g[0], c);
-    return (imp__hg_value_1(g[0], c) + imp__hg_value_1(g[1], c) + imp__hg_value_1(g[2], c)) / COLOURS;
+    return (imp__hg_value_1(g[0], c) + imp__hg_value_1(g[1], c) +
+            imp__hg_value_1(g[2], c)) /
+           COLOURS;
 }
 static void eval(const struct imp_phase *p, const imp_spec *in, const struct imp_dirs *d,
                  imp_spec *f)

@@ -27,7 +27,10 @@ static bool hg_covers(const struct imp_phase *p)
     const struct imp_input *g = p->input[0];
     return g->plain && g->value[0] == g->value[1] && g->value[0] == g->value[2];
 }
-static imp_wide hg_g(const struct imp_phase *p) { return imp__wide(p->input[0]->value[0]); }
+static imp_wide hg_g(const struct imp_phase *p)
+{
+    return imp__wide(p->input[0]->value[0]);
+}
 static imp_wide3 hg_sample(const struct imp_phase *p, const imp_wide3 *wo,
                            const imp_wide u[3])
 {

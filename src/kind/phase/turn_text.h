@@ -28,7 +28,8 @@ static inline real WIDE(imp__hg_value)(real g, real c)
 }
 static inline real WIDE(imp__hg_cosine)(real g, real u)
 {
-    const truth even = magnitude(g) <= 1e-4; /* else the inverse of the cumulative density */
+    const truth even =
+        magnitude(g) <= 1e-4; /* else the inverse of the cumulative density */
     const real q = (1 - g * g) / (1 - g + 2 * g * u);
     const real c = lesser(larger((1 + g * g - q * q) / (2 * g), number(-1)), number(1));
     return choose(even, 1 - 2 * u, c);

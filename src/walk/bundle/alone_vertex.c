@@ -2,7 +2,8 @@
  *
  * A vertex of a bundle by the step of walks that go alone (core/one_step.h): out of the columns,
  * through the kinds' functions, and back. */
-#include "depth.h"
+#include "in_media.h"
+#include "walk/media/tracking.h"
 #include "walk/path/sensor_end.h"
 #include "walk/path/surface_sensor.h"
 
@@ -10,9 +11,14 @@
 static inline void link_see(struct imp_step *s, struct imp_vertex *v,
                             const struct imp_surface *at, const struct imp_link *link)
 {
-    (void)at;
+    struct imp_lone *lone = (struct imp_lone *)s;
     v->b = link->shadow.brings;
-    ((struct imp_lone *)s)->shadow = link->shadow;
+    lone->shadow = link->shadow;
+    if (imp_likely(s->segment->sees == NULL)) return;
+    const imp_v3 d = link->shadow.d * (1 / imp__length(link->shadow.d));
+    lone->medium = imp__media_beyond(v->shape, at->ng, d,
+                                     s->flight.here ? s->flight.here->index : -1);
+    lone->behind = imp__is_zero(at->ng) ? imp__begins_behind(at->p) : 0;
 }
 
 static const struct imp_end_ops bundle_end = {.nothing = imp__sky_meet,
@@ -59,6 +65,14 @@ static void take(struct imp_depth *d, int i)
     s->pdf = f->pdf[i];
     s->beta = imp__column_color(f->beta, b->colors, i);
     s->eta = f->eta[i];
+    if (f->medium) {
+        const int here = d->media->here[i];
+        s->flight.here = here < 0 ? NULL : s->scene->media[here];
+        s->flight.medium = s->flight.here;
+        s->lanes.ratio = (imp_spec){f->ratio[0][i], f->ratio[1][i], f->ratio[2][i], 1};
+        s->lanes.weight = f->share[i];
+        s->lanes.drew = (int)b->drew[walk];
+    }
     if (imp_unlikely(f->left != NULL)) s->left = f->left[i];
 }
 
@@ -71,9 +85,10 @@ static void give_back(struct imp_depth *d, int walk)
         d->bundle->dropped[walk] = (uint8_t)w->dropped;
 }
 
-static void shadow_add(struct imp_shadows *to, const struct imp_shadow *shadow,
-                       double time, int at, struct imp_vertex *of)
+static void shadow_add(struct imp_shadows *to, const struct imp_lone *lone, double time,
+                       int walk, int at, struct imp_vertex *of)
 {
+    const struct imp_shadow *shadow = &lone->shadow;
     const int n = to->ray.n++;
     imp__column_put(to->ray.o, n, shadow->o);
     imp__column_put(to->ray.d, n, shadow->d);
@@ -81,6 +96,10 @@ static void shadow_add(struct imp_shadows *to, const struct imp_shadow *shadow,
     if (to->ray.time) to->ray.time[n] = time;
     to->at[n] = at;
     to->of[n] = of;
+    if (!to->medium) return;
+    to->walk[n] = walk;
+    to->medium[n] = lone->medium;
+    to->behind[n] = lone->behind;
 }
 
 static void ray_add(struct imp_flights *to, const struct imp_step *s, int walk, int up)
@@ -98,6 +117,12 @@ static void ray_add(struct imp_flights *to, const struct imp_step *s, int walk, 
     if (to->zeros) {
         to->zeros[n] = 0;
         for (int c = 0; c < 4; c++) to->zeros[n] |= (uint8_t)((s->zeros[c] > 0) << c);
+    }
+    if (to->medium) {
+        to->medium[n] = s->flight.medium ? s->flight.medium->index : -1;
+        to->behind[n] = s->flight.behind;
+        imp__column_put(to->ratio, n, s->lanes.ratio);
+        to->share[n] = s->lanes.weight;
     }
     to->walk[n] = walk;
     to->up[n] = up;
@@ -118,7 +143,7 @@ static void vertex_give_back(struct imp_depth *d, struct imp_vertex *v, bool goe
         imp__color_put(d->values->beyond, colors, at, none);
     }
     if (d->lone->shadow.wanted)
-        shadow_add(d->shadows, &d->lone->shadow, s->walk->time, at, v);
+        shadow_add(d->shadows, d->lone, s->walk->time, walk, at, v);
     if (goes_on) ray_add(d->next, s, walk, at);
     give_back(d, walk);
 }
@@ -148,6 +173,26 @@ void imp__vertex_alone(struct imp_depth *d, int i, int at)
     struct imp_vertex *v = imp__surface_meet(s, &hit, &surface, &frame);
     d->lone->shadow.wanted = false;
     const bool goes_on = v && imp__vertex_work(&bundle_end, s, v, &hit, &surface, &frame);
+    vertex_give_back(d, v, goes_on, walk, d->rays->up[i], at);
+    forget(d, mark);
+}
+
+void imp__collision_alone(struct imp_depth *d, int i, int at)
+{
+    struct imp_step *s = &d->lone->step;
+    const int walk = d->rays->walk[i];
+    const struct imp_arena_mark mark = imp__arena_mark(s->arena);
+    const imp_v3 p = imp__v3(d->hits->t[i], d->hits->u[i], d->hits->v[i]);
+    struct imp_surface surface;
+    struct imp_frame frame;
+    take(d, i);
+    imp__step_numbers(s);
+    struct imp_vertex *v = imp__medium_meet(
+        s, s->flight.here->scatterer, s->flight.here->index, p, 0, &surface, &frame);
+    const struct imp_hit none = {.shape = -1};
+    d->lone->shadow.wanted = false;
+    const bool goes_on =
+        v && imp__vertex_work(&bundle_end, s, v, &none, &surface, &frame);
     vertex_give_back(d, v, goes_on, walk, d->rays->up[i], at);
     forget(d, mark);
 }

@@ -4,6 +4,7 @@
  * hits, vertices and shadow rays; the fold. Recorded walks have vertices of their own (walk.h) in
  * place of columns of values. */
 #include "by_shape.h"
+#include "in_media.h"
 #include "lanes_light.h"
 #include "scene/ray_columns.h"
 #include "walk/path/first_segment.h"
@@ -24,7 +25,12 @@ bool imp__bundle_fits(const struct imp_tracer *t)
            (!t->wavelengths || !is_shaped(t->scene)) && !t->mixing && t->split <= 1 &&
            !w->mixes && !w->both && !(w->hide_emitters && t->sensor->shape) &&
            !w->from_lights && !w->first_hit && !t->scene->priorities &&
-           imp__segment_first(t) == &imp__straight_ops;
+           (imp__segment_first(t) == &imp__straight_ops || imp__media_fit(t));
+}
+
+static bool crosses_media(const struct imp_tracer *t)
+{
+    return imp__segment_first(t) != &imp__straight_ops;
 }
 
 /* ---- The beginning ----------------------------------------------------------------------- */
@@ -36,7 +42,8 @@ static bool bundle_create(struct imp_arena *arena, size_t n, struct imp_bundle *
     return TAKE(b->px) && TAKE(b->py) && TAKE(b->time) && TAKE(b->set) &&
            TAKE(b->index) && TAKE(b->L[0]) && TAKE(b->L[1]) && TAKE(b->L[2]) &&
            TAKE(b->L[3]) && (b->colors == 3 || TAKE(b->waves)) && TAKE(b->valid) &&
-           TAKE(b->dropped) && (b->tracer->value_only || TAKE(b->walks));
+           TAKE(b->dropped) && (b->tracer->value_only || TAKE(b->walks)) &&
+           (!crosses_media(b->tracer) || (TAKE(b->keys) && TAKE(b->drew)));
 }
 
 /* What walk k has from its ray alone. */
@@ -48,7 +55,21 @@ static inline void ray_put(struct imp_bundle *b, int k, struct imp_flights *rays
     rays->walk[k] = rays->up[k] = k;
     if (rays->left) rays->left[k] = (struct imp_light_place){.faces = false};
     if (rays->zeros) rays->zeros[k] = 0;
+    if (rays->medium) {
+        const struct imp_medium *m = b->tracer->sensor->medium;
+        rays->medium[k] = m ? m->index : -1;
+        rays->behind[k] = 0;
+        imp__column_put(rays->ratio, k, imp__spec(1));
+        rays->share[k] = 1;
+    }
     b->time[k] = b->tracer->sensor->open;
+}
+
+static void key_put(struct imp_bundle *b, int k, const struct imp_walk *walk)
+{
+    if (imp_likely(!b->keys)) return;
+    b->keys[k] = walk->key.state;
+    b->drew[k] = imp__lane_drawn(walk->key, b->tracer->scene->channels);
 }
 
 /* A walk before its first segment. False: no memory. */
@@ -62,6 +83,7 @@ static bool begin_alone(struct imp_bundle *b, struct imp_arena *arena, const int
     b->time[k] = walk->time;
     b->set[k] = b->tracer->points ? walk->point.set : walk->key.state;
     b->index[k] = walk->point.index;
+    key_put(b, k, walk);
     if (imp_likely(!b->waves)) return true;
     const bool ok =
         imp__walk_wave(b->tracer, arena, imp__wave_draw(b->tracer, walk, sample), walk);
@@ -112,6 +134,7 @@ static bool numbers_of(struct imp_bundle *b, struct imp_arena *arena, const int 
     if (b->walks) imp__walk_clear(walk);
     imp__walk_numbers(b->tracer, at[0], at[1], sample, walk);
     b->set[k] = b->tracer->points ? walk->point.set : walk->key.state;
+    key_put(b, k, walk);
     if (!b->waves) return true;
     const bool ok =
         imp__walk_wave(b->tracer, arena, imp__wave_draw(b->tracer, walk, sample), walk);
@@ -128,7 +151,7 @@ static bool rays_in_lanes(struct imp_bundle *b, struct imp_arena *arena,
     const struct imp_tracer *t = b->tracer;
     const struct imp_film_desc *film = &t->sensor->film;
     const bool each =
-        !t->points || b->waves || b->walks; /* more than the set's numbers */
+        !t->points || b->waves || b->walks || b->keys; /* more than the set's numbers */
     bool begin = true;
     for (int k = 0; k < b->n; k++) {
         const int s = k % n_samples, *at = xy[k / n_samples];
@@ -223,14 +246,16 @@ struct room {
 static bool room_create(const struct imp_tracer *tracer, struct imp_arena *arena,
                         size_t n, struct room *r)
 {
-    const bool left = tracer->integrator->light_tree && tracer->scene->light_tree,
-               zeros = tracer->active != NULL,
-               instant = !(tracer->sensor->close > tracer->sensor->open);
+    const struct imp_columns_wanted wanted = {.left = tracer->integrator->light_tree &&
+                                                      tracer->scene->light_tree,
+                                              .zeros = tracer->active != NULL,
+                                              .media = crosses_media(tracer)};
+    const bool instant = !(tracer->sensor->close > tracer->sensor->open);
     const int colors = tracer->wavelengths ? 4 : 3;
-    if (!imp__flights_create(arena, n, colors, left, zeros, &r->flights[0]) ||
-        !imp__flights_create(arena, n, colors, left, zeros, &r->flights[1]) ||
+    if (!imp__flights_create(arena, n, colors, wanted, &r->flights[0]) ||
+        !imp__flights_create(arena, n, colors, wanted, &r->flights[1]) ||
         !imp__hits_create(arena, n, &r->hits) ||
-        !imp__shadows_create(arena, n, &r->shadows) ||
+        !imp__shadows_create(arena, n, wanted, &r->shadows) ||
         !imp__by_shape_create(tracer, arena, n, &r->by_shape) || !TAKE(r->hidden))
         return false;
     if (!instant && (!TAKE(r->flights[0].ray.time) || !TAKE(r->flights[1].ray.time) ||
@@ -250,6 +275,10 @@ static bool room_create(const struct imp_tracer *tracer, struct imp_arena *arena
 /* The lights of the depth's vertices that are hidden. */
 static void see(struct imp_depth *d, struct room *r)
 {
+    if (imp_unlikely(d->media != NULL)) {
+        imp__media_see(d);
+        return;
+    }
     imp__occluded_columns(d->bundle->tracer->scene, &r->shadows.ray, r->hidden);
     if (d->bundle->walks) connect(&r->shadows, r->hidden);
     else unlit(d->values, d->bundle->colors, &r->shadows, r->hidden);
@@ -276,6 +305,23 @@ static bool camera_begin(struct imp_arena *arena, struct imp_bundle *b,
     return true;
 }
 
+/* Values of vertices where walks from a sensor begin, with these weights set or to be set. */
+static struct link *sensor_link(struct imp_arena *arena, struct imp_bundle *b,
+                                struct link *before)
+{
+    struct link *link = link_add(arena, (size_t)b->n, b->colors, before);
+    if (!link) return NULL;
+    link->values.n = b->n;
+    for (int k = 0; k < b->n; k++) {
+        imp__color_put(link->values.e, b->colors, k, imp__spec(0));
+        imp__color_put(link->values.b, b->colors, k, imp__spec(0));
+        imp__color_put(link->values.w, b->colors, k, imp__spec(1));
+        imp__color_put(link->values.beyond, b->colors, k, imp__spec(0));
+        link->values.up[k] = k;
+    }
+    return link;
+}
+
 /* Walks from a sensor that is a surface: their first vertices, in links of their own. False: no
  * memory. */
 static bool meter_begin(struct imp_arena *arena, struct imp_depth *d, const int (*xy)[2],
@@ -284,10 +330,10 @@ static bool meter_begin(struct imp_arena *arena, struct imp_depth *d, const int 
 {
     struct imp_bundle *b = d->bundle;
     const size_t n = (size_t)b->n;
-    struct link *sensor = b->walks ? NULL : link_add(arena, n, b->colors, NULL),
+    struct link *sensor = b->walks ? NULL : sensor_link(arena, b, NULL),
                 *first = sensor ? link_add(arena, n, b->colors, sensor) : NULL;
     if (!b->walks && !first) return false;
-    if (first) sensor->values.n = first->values.n = b->n;
+    if (first) first->values.n = b->n;
     d->values = first ? &first->values : &r->recorded;
     d->next = &r->flights[0];
     d->next->ray.n = r->shadows.ray.n = 0;
@@ -297,12 +343,7 @@ static bool meter_begin(struct imp_arena *arena, struct imp_depth *d, const int 
         if (!begin_alone(b, arena, xy[k / n_samples], samples[k % n_samples], k, walk))
             return false;
         imp__meter_vertex(d, walk, k, &weight);
-        if (!sensor) continue;
-        imp__color_put(sensor->values.e, b->colors, k, imp__spec(0));
-        imp__color_put(sensor->values.b, b->colors, k, imp__spec(0));
-        imp__color_put(sensor->values.w, b->colors, k, imp__spec(weight));
-        imp__color_put(sensor->values.beyond, b->colors, k, imp__spec(0));
-        sensor->values.up[k] = k;
+        if (sensor) imp__color_put(sensor->values.w, b->colors, k, imp__spec(weight));
     }
     see(d, r);
     *out = first;
@@ -321,13 +362,20 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
     *b = (struct imp_bundle){.tracer = tracer,
                              .n = (int)n,
                              .colors = tracer->wavelengths ? 4 : 3,
-                             .before = tracer->sensor->shape ? 2 : 0};
+                             .before = tracer->sensor->shape   ? 2
+                                       : crosses_media(tracer) ? 1
+                                                               : 0};
     if (!bundle_create(arena, n, b) || !room_create(tracer, arena, n, &r)) return false;
     memset(b->valid, 0, n * sizeof *b->valid);
     memset(b->dropped, 0, n * sizeof *b->dropped);
     for (int c = 0; c < 4; c++) memset(b->L[c], 0, n * sizeof *b->L[c]);
     if (!tracer->sensor->shape) {
         if (!camera_begin(arena, b, xy, n_samples, samples, &r.flights[0])) return false;
+        if (crosses_media(tracer)) {
+            d.media = imp__in_media_create(tracer, arena, n);
+            last = sensor_link(arena, b, NULL);
+            if (!d.media || !last) return false;
+        }
     } else {
         if (!meter_begin(arena, &d, xy, n_samples, samples, &r, &last)) return false;
     }
@@ -341,7 +389,8 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
         if (!b->walks && !here) return false;
         d.values = here ? &here->values : &r.recorded;
         d.next->ray.n = 0;
-        if (d.depth == 0 && tracer->integrator->hide_emitters)
+        if (d.media) imp__media_meet(&d, &last->values);
+        else if (d.depth == 0 && tracer->integrator->hide_emitters)
             imp__meet_alone(&d, &r.hits);
         else imp__intersect_columns(tracer->scene, &d.rays->ray, &r.hits);
         imp__vertices(&d, last ? last->values.beyond : b->L, &r.by_shape);

@@ -36,6 +36,9 @@ struct imp_bundle {
     double *px, *py, *time;
     uint64_t *set; /* hash of the set, or the key of a walk of no set */
     uint32_t *index;
+    uint64_t *
+        keys; /* in media: its key, also of a point in a set; and the colour that draws */
+    double *drew;
     /* Results. Where the tracer wants values only: radiance at the sensor; is alpha 1; why it was
      * dropped (enum imp_drop). */
     double *L[4];

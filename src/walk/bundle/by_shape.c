@@ -3,6 +3,7 @@
  * Vertices of a depth in an order that fills lanes: those on one shape together; those on shapes
  * that few rays meet by their materials; the rest, and what has no form in lanes, one by one. */
 #include "by_shape.h"
+#include "in_media.h"
 #include "lanes_light.h"
 
 /* Fewer vertices are not worth lanes. */
@@ -30,8 +31,8 @@ static void sort(struct imp_depth *d, double *const beyond[4], struct imp_by_sha
     s->n = 0;
     for (int i = 0; i < d->rays->ray.n; i++) {
         const int shape = d->hits->shape[i];
-        if (shape < 0) s->order[missed++] = i;
-        else if (s->count[shape]++ == 0) s->shape[s->n++] = shape;
+        if (shape == -1) s->order[missed++] = i;
+        else if (shape >= 0 && s->count[shape]++ == 0) s->shape[s->n++] = shape;
     }
     if (s->sky) imp__lanes_sky_meet(d, s->order, missed, beyond);
     else if (d->bundle->tracer->scene->n_environments > 0)
@@ -64,7 +65,9 @@ static void all_alone(struct imp_depth *d, double *const beyond[4])
     const bool sky = d->bundle->tracer->scene->n_environments > 0;
     for (int32_t i = 0; i < d->rays->ray.n; i++)
         if (d->hits->shape[i] >= 0) alone(d, &i, 1);
-        else if (sky) imp__sky_alone(d, i, beyond);
+        else if (d->hits->shape[i] == IMP_HIT_COLLISION)
+            imp__collision_alone(d, i, d->values->n++);
+        else if (sky && d->hits->shape[i] == -1) imp__sky_alone(d, i, beyond);
 }
 
 static int material_of(const struct imp_depth *d, int ray)
@@ -102,6 +105,32 @@ static void few_vertices(struct imp_depth *d, struct imp_by_shape *s, int n)
     }
 }
 
+/* Those in media, medium by medium. s->few is free. */
+static void collisions(struct imp_depth *d, struct imp_by_shape *s)
+{
+    int n = 0;
+    for (int i = 0; i < d->rays->ray.n; i++)
+        if (d->hits->shape[i] == IMP_HIT_COLLISION) s->few[n++] = i;
+    for (int i = 0; d->last && i < n; i++)
+        d->bundle->valid[d->rays->walk[s->few[i]]] = true;
+    while (n > 0 && !d->last) {
+        const int medium = d->media->here[s->few[0]];
+        struct imp_bin bin;
+        int here = 0, rest = 0;
+        for (int i = 0; i < n; i++) {
+            const int32_t ray = s->few[i];
+            if (d->media->here[ray] == medium) s->order[here++] = ray;
+            else s->few[rest++] = ray;
+        }
+        n = rest;
+        if (here >= FEW && imp__collision_bin(d->bundle->tracer, medium, &bin))
+            in_lanes(d, &bin, s->order, here);
+        else
+            for (int i = 0; i < here; i++)
+                imp__collision_alone(d, s->order[i], d->values->n++);
+    }
+}
+
 void imp__vertices(struct imp_depth *d, double *const beyond[4], struct imp_by_shape *s)
 {
     const struct imp_tracer *tracer = d->bundle->tracer;
@@ -132,4 +161,5 @@ void imp__vertices(struct imp_depth *d, double *const beyond[4], struct imp_by_s
         }
     }
     if (few > 0) few_vertices(d, s, few);
+    if (d->media) collisions(d, s);
 }

@@ -26,8 +26,8 @@ static bool rays_create(struct imp_arena *arena, size_t n, struct imp_ray_column
     return ok;
 }
 
-bool imp__flights_create(struct imp_arena *arena, size_t n, int colors, bool left,
-                         bool zeros, struct imp_flights *out)
+bool imp__flights_create(struct imp_arena *arena, size_t n, int colors,
+                         struct imp_columns_wanted wanted, struct imp_flights *out)
 {
     bool ok = rays_create(arena, n, &out->ray);
     VECTOR(out->from);
@@ -37,9 +37,16 @@ bool imp__flights_create(struct imp_arena *arena, size_t n, int colors, bool lef
     COLUMN(out->walk);
     COLUMN(out->up);
     out->left = NULL;
-    if (left) COLUMN(out->left);
+    if (wanted.left) COLUMN(out->left);
     out->zeros = NULL;
-    if (zeros) COLUMN(out->zeros);
+    if (wanted.zeros) COLUMN(out->zeros);
+    out->medium = NULL;
+    if (wanted.media) {
+        COLUMN(out->medium);
+        COLUMN(out->behind);
+        VECTOR(out->ratio);
+        COLUMN(out->share);
+    }
     return ok;
 }
 
@@ -68,10 +75,17 @@ bool imp__bundle_values_create(struct imp_arena *arena, size_t n, int colors,
     return ok;
 }
 
-bool imp__shadows_create(struct imp_arena *arena, size_t n, struct imp_shadows *out)
+bool imp__shadows_create(struct imp_arena *arena, size_t n,
+                         struct imp_columns_wanted wanted, struct imp_shadows *out)
 {
     bool ok = rays_create(arena, n, &out->ray);
     COLUMN(out->at);
     COLUMN(out->of);
+    out->medium = NULL;
+    if (wanted.media) {
+        COLUMN(out->walk);
+        COLUMN(out->medium);
+        COLUMN(out->behind);
+    }
     return ok;
 }

@@ -24,8 +24,13 @@ struct imp_flights {
         *left;      /* where it left, as the tree of lights sees it; NULL: none */
     uint8_t *zeros; /* bit c: throughput c has left out a factor that is zero but has a
                        derivative (core/scatter.c); NULL: there are no derivatives */
-    int32_t *walk;  /* number of the walk */
-    int32_t *up;    /* place of the last vertex among the values of its depth */
+    /* In media (in_media.h), else NULL: index of the medium that the ray is in, -1 for none; how far
+     * it begins behind the point that it leaves; of walks one of whose colours draws, p_j/p_drew and W
+     * (core/lane_mis.h). */
+    int32_t *medium;
+    double *behind, *ratio[3], *share;
+    int32_t *walk; /* number of the walk */
+    int32_t *up;   /* place of the last vertex among the values of its depth */
 };
 
 /* Values of the vertices of a depth (walk.h: E, B, w), and what comes from beyond. */
@@ -41,16 +46,24 @@ struct imp_shadows {
     struct imp_ray_columns ray;
     int32_t *at;
     struct imp_vertex **of;
+    /* In media, else NULL: number of the walk; the medium where the ray begins, -1 for none; and how
+     * far behind its beginning that is. */
+    int32_t *walk, *medium;
+    double *behind;
 };
 
-/* Room for n of them, of so many colours: 3, or 4 wavelengths; with `left`, and with `zeros`, if
- * asked for. False: no memory. */
-bool imp__flights_create(struct imp_arena *arena, size_t n, int colors, bool left,
-                         bool zeros, struct imp_flights *out);
+/* Room for n of them, of so many colours: 3, or 4 wavelengths; with what is asked for. False: no
+ * memory. */
+struct imp_columns_wanted {
+    bool left, zeros, media;
+};
+bool imp__flights_create(struct imp_arena *arena, size_t n, int colors,
+                         struct imp_columns_wanted wanted, struct imp_flights *out);
 bool imp__hits_create(struct imp_arena *arena, size_t n, struct imp_hit_columns *out);
 bool imp__bundle_values_create(struct imp_arena *arena, size_t n, int colors,
                                struct imp_bundle_values *out);
-bool imp__shadows_create(struct imp_arena *arena, size_t n, struct imp_shadows *out);
+bool imp__shadows_create(struct imp_arena *arena, size_t n,
+                         struct imp_columns_wanted wanted, struct imp_shadows *out);
 
 static inline imp_v3 imp__column_v3(double *const c[3], int i)
 {

@@ -14,6 +14,8 @@ struct imp_lone {
     struct imp_step step; /* first */
     struct imp_walk walk;
     struct imp_shadow shadow;
+    int medium; /* where it begins, in media (struct imp_shadows) */
+    double behind;
     imp_spec scratch[IMP_INPUTS_MAX];
 };
 
@@ -29,6 +31,7 @@ struct imp_depth {
     struct imp_shadows *shadows; /* appended */
     struct imp_flights *next;    /* likewise */
     struct imp_lone *lone;
+    struct imp_in_media *media; /* in_media.h; NULL: walks cross none */
 };
 
 /* The vertex that ray i leads to, at place `at` among the values (alone_vertex.c); and the sky,
@@ -38,6 +41,8 @@ void imp__sky_alone(struct imp_depth *d, int i, double *const beyond[4]);
 /* What the rays meet by the step's own search, which passes lights that are hidden from the
  * camera. */
 void imp__meet_alone(struct imp_depth *d, const struct imp_hit_columns *hits);
+/* The collision that ray i ends in. */
+void imp__collision_alone(struct imp_depth *d, int i, int at);
 /* The first vertex of a walk from a sensor that is a surface, `begun` (walk.h): number `walk`, at
  * that place; weight: of the step to it. */
 void imp__meter_vertex(struct imp_depth *d, const struct imp_walk *begun, int walk,
@@ -45,6 +50,8 @@ void imp__meter_vertex(struct imp_depth *d, const struct imp_walk *begun, int wa
 
 /* Vertices of a material with a form in lanes (lanes_vertex.c), on one shape or several. */
 struct imp_bin {
+    int medium;  /* they are collisions in it; -1: they lie on surfaces */
+    bool sealed; /* ... and no light sample leaves it (scene/sealed.h) */
     const struct imp_shape *shape; /* the one, or one of them */
     const struct imp_bsdf *bsdf;
     const struct imp_shape_lanes *surface; /* of the one; NULL: point by point */
@@ -59,6 +66,8 @@ bool imp__lanes_fit(const struct imp_tracer *tracer);
 bool imp__shape_in_lanes(const struct imp_tracer *tracer, int shape);
 /* Those of the others. */
 void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *bin);
+/* Those of collisions. False: they are made one by one. */
+bool imp__collision_bin(const struct imp_tracer *tracer, int medium, struct imp_bin *bin);
 /* The vertices of the rays order[n], at places `at` and on. */
 void imp__vertices_in_lanes(struct imp_depth *d, const struct imp_bin *bin,
                             const int32_t *order, int n, int at);

@@ -37,6 +37,8 @@ void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *
 {
     const struct imp_shape *s = tracer->scene->shapes[shape];
     const struct imp_bsdf *b = imp__shape_bsdf(tracer->scene, s);
+    bin->medium = -1;
+    bin->sealed = false;
     bin->shape = s;
     bin->bsdf = b;
     bin->surface = imp__shape_lanes(s);

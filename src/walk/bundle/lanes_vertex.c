@@ -3,8 +3,10 @@
  * Vertices of a bundle in lanes: those on one shape, IMP_WIDE_LANES at a time. What the one step does
  * for a walk alone (path/sensor_end.h, core/scatter.c, core/light.c) stands here for walks that
  * have a kernel, light samples and roulette, and nothing more. */
+#include "in_media.h"
 #include "lanes_record.h"
 #include "math/offset.h"
+#include "walk/media/tracking.h"
 
 /* ---- What leaves it ---------------------------------------------------------------------- */
 
@@ -85,9 +87,51 @@ light_weigh(struct imp_depth *d, const struct imp_bin *bin,
         lit->brings.c[c] = imp__wide_choose(wanted, fl[c] * lit->weight, zero);
 }
 
+/* The medium on the side of vertex k that dir points to. */
+static int medium_beyond(const struct imp_depth *d, const struct imp_bin *bin,
+                         const struct imp_lanes_vertices *v, imp_v3 dir, int k)
+{
+    const int ray = v->order[k], here = d->media->here[ray];
+    if (bin->medium >= 0) return here;
+    return imp__media_beyond(d->bundle->tracer->scene->shapes[d->hits->shape[ray]],
+                             imp__wide3_lane(&v->x.ng, k), dir, here);
+}
+/* How far rays from vertex k begin behind it. */
+static double begins_behind(const struct imp_bin *bin, const struct imp_lanes_vertices *v,
+                            int k)
+{
+    return bin->medium >= 0 ? imp__begins_behind(imp__wide3_lane(&v->x.p, k)) : 0;
+}
+
+/* Shadow ray i, of vertex k, in media. */
+static void shadow_in_media(struct imp_depth *d, const struct imp_bin *bin,
+                            const struct imp_lanes_vertices *v, int k, int i)
+{
+    struct imp_shadows *to = d->shadows;
+    const imp_v3 dir = imp__column_v3(to->ray.d, i);
+    to->walk[i] = v->walk[k];
+    to->medium[i] = medium_beyond(d, bin, v, dir * (1 / imp__length(dir)), k);
+    to->behind[i] = begins_behind(bin, v, k);
+}
+
+/* The next ray, number i, of vertex k. */
+static void ray_in_media(struct imp_depth *d, const struct imp_bin *bin,
+                         const struct imp_lanes_vertices *v, int k, int i)
+{
+    struct imp_flights *to = d->next;
+    const int from = v->order[k];
+    const imp_v3 dir = imp__column_v3(to->ray.d, i);
+    to->medium[i] = medium_beyond(d, bin, v, dir, k);
+    to->behind[i] = begins_behind(bin, v, k);
+    imp__column_put(to->ray.o, i, imp__column_v3(to->ray.o, i) - dir * to->behind[i]);
+    for (int c = 0; c < 3; c++) to->ratio[c][i] = d->rays->ratio[c][from];
+    to->share[i] = d->rays->share[from];
+}
+
 /* Their shadow rays; v->record: of these vertices. */
 static inline __attribute__((always_inline)) void
-light_see(struct imp_depth *d, const struct imp_lanes_vertices *v,
+light_see(struct imp_depth *d, const struct imp_bin *bin,
+          const struct imp_lanes_vertices *v, const bool media,
           const struct imp_lanes_lit *lit)
 {
     const struct imp_lanes_light *l = &lit->light;
@@ -107,6 +151,7 @@ light_see(struct imp_depth *d, const struct imp_lanes_vertices *v,
         to->at[i] = v->at + k;
         if (v->recorded) to->of[i] = v->record[k];
         if (to->ray.time) to->ray.time[i] = d->rays->ray.time[v->order[k]];
+        if (media) shadow_in_media(d, bin, v, k, i);
     }
 }
 
@@ -171,7 +216,7 @@ scatter_weigh(struct imp_depth *d, const struct imp_bin *bin,
 static inline __attribute__((always_inline)) void
 scatter_on(struct imp_depth *d, const struct imp_bin *bin,
            const struct imp_lanes_vertices *v, const int colors, const bool ideal,
-           const struct imp_lanes_step *s)
+           const bool media, const struct imp_lanes_step *s)
 {
     struct imp_flights *to = d->next;
     const unsigned bits = s->on;
@@ -193,7 +238,20 @@ scatter_on(struct imp_depth *d, const struct imp_bin *bin,
         if (to->left) to->left[i] = place_of(v, ideal, bin->bsdf, k);
         if (to->zeros) to->zeros[i] = d->rays->zeros[from];
         if (to->ray.time) to->ray.time[i] = d->rays->ray.time[from];
+        if (media) ray_in_media(d, bin, v, k, i);
     }
+}
+
+/* Collisions, whose frames have the axes of the world. */
+static void collision_places(const struct imp_depth *d, const int32_t *order,
+                             struct imp_wide_surface *out)
+{
+    const struct imp_wide_surface none = {
+        .frame = {.s.x = imp__wide(1), .t.y = imp__wide(1), .n.z = imp__wide(1)}};
+    *out = none;
+    out->p = (imp_wide3){imp__wide_taken(d->hits->t, order),
+                         imp__wide_taken(d->hits->u, order),
+                         imp__wide_taken(d->hits->v, order)};
 }
 
 /* ---- All --------------------------------------------------------------------------------- */
@@ -208,7 +266,7 @@ static inline void color_store(double *const to[4], int colors, int at,
  * one, since a value that is zero has a derivative there. */
 static inline __attribute__((always_inline)) bool
 work(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order, int n, int at,
-     const int colors, const bool ideal)
+     const int colors, const bool ideal, const bool media)
 {
     const struct imp_bundle *b = d->bundle;
     const struct imp_wide_hits hits = {.o = d->rays->ray.o,
@@ -234,7 +292,8 @@ work(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order, int n
             v.carried[k] = &b->waves[v.walk[k]]->carried;
     v.numbers = imp__wide_block(b->tracer->points, b->set, b->index, v.walk,
                                 imp__block(d->depth));
-    if (bin->surface)
+    if (media && bin->medium >= 0) collision_places(d, order, &v.x);
+    else if (bin->surface)
         bin->surface->surface(bin->shape, &hits, v.recorded || !bin->plain, &v.x);
     else imp__lanes_surface(d, &hits, &v.x);
     v.wo_drawn = imp__into_wide_frame(
@@ -251,7 +310,7 @@ work(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order, int n
     lit.on = lit.dark = step.on = step.part = 0;
     if (imp_likely(!d->last)) {
         if (b->tracer->integrator->lights && b->tracer->scene->n_emitters > 0 &&
-            (!ideal || bin->bsdf->flags & IMP_BSDF_SMOOTH))
+            (!ideal || bin->bsdf->flags & IMP_BSDF_SMOOTH) && !(media && bin->sealed))
             light_weigh(d, bin, &v, colors, &lit);
         else lit.brings = imp__wide_color(imp__spec(0));
         scatter_weigh(d, bin, &v, colors, ideal, &step);
@@ -273,31 +332,33 @@ work(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order, int n
         }
     }
     if (imp_unlikely(d->last)) return true;
-    light_see(d, &v, &lit);
-    scatter_on(d, bin, &v, colors, ideal, &step);
+    light_see(d, bin, &v, media, &lit);
+    scatter_on(d, bin, &v, colors, ideal, media, &step);
     return true;
 }
 
-#define WORK(name, colors, ideal)                                                        \
+#define WORK(name, colors, ideal, media)                                                 \
     static __attribute__((noinline)) bool name(struct imp_depth *d,                      \
                                                const struct imp_bin *bin,                \
                                                const int32_t *order, int n, int at)      \
     {                                                                                    \
-        return work(d, bin, order, n, at, colors, ideal);                                \
+        return work(d, bin, order, n, at, colors, ideal, media);                         \
     }
 typedef bool work_fn(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order,
                      int n, int at);
-WORK(work_3, 3, false)
-WORK(work_4, 4, false)
-WORK(work_ideal_3, 3, true)
-WORK(work_ideal_4, 4, true)
+WORK(work_3, 3, false, false)
+WORK(work_4, 4, false, false)
+WORK(work_ideal_3, 3, true, false)
+WORK(work_ideal_4, 4, true, false)
+WORK(work_in_media, 3, true, true)
 
 void imp__vertices_in_lanes(struct imp_depth *d, const struct imp_bin *bin,
                             const int32_t *order, int n, int at)
 {
     static work_fn *const works[2][2] = {{work_3, work_4}, {work_ideal_3, work_ideal_4}};
     work_fn *const work_as =
-        works[bin->bsdf->flags != IMP_BSDF_SMOOTH][d->bundle->colors > 3];
+        d->media ? work_in_media
+                 : works[bin->bsdf->flags != IMP_BSDF_SMOOTH][d->bundle->colors > 3];
     int32_t rest[IMP_WIDE_LANES];
     for (int i = 0; i < n; i += IMP_WIDE_LANES) {
         const int left = imp_min(n - i, IMP_WIDE_LANES);
@@ -307,6 +368,8 @@ void imp__vertices_in_lanes(struct imp_depth *d, const struct imp_bin *bin,
             here = rest;
         }
         const bool made = work_as(d, bin, here, left, at + i);
-        for (int k = 0; !made && k < left; k++) imp__vertex_alone(d, here[k], at + i + k);
+        for (int k = 0; !made && k < left; k++)
+            if (bin->medium >= 0) imp__collision_alone(d, here[k], at + i + k);
+            else imp__vertex_alone(d, here[k], at + i + k);
     }
 }

@@ -75,8 +75,6 @@ static inline bool open_is_fixed(const struct imp_free_flight *w, double sum)
     return sum * w->s->scene->ball.radius >= DEEP_OPEN * imp__lane_mis_count(w->s);
 }
 
-#define REACH_SLACK 1e-5 /* of a distance; that of float is 6e-8 */
-
 double imp__flight_reach(struct imp_free_flight *w, const struct imp_medium *m,
                          double near)
 {
@@ -93,7 +91,8 @@ double imp__flight_reach(struct imp_free_flight *w, const struct imp_medium *m,
         if (!open_is_fixed(w, sum)) return INFINITY;
         length = imp_max(length, depth_least(w) / sum);
     }
-    return (near + length) * (1 + REACH_SLACK) + REACH_SLACK * w->s->scene->ball.radius;
+    return (near + length) * (1 + IMP_REACH_SLACK) +
+           IMP_REACH_SLACK * w->s->scene->ball.radius;
 }
 
 static bool uniform_fly(struct imp_free_flight *w, const struct imp_medium *m,

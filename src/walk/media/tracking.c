@@ -151,7 +151,7 @@ static void look_closely(const struct imp_step *s, imp_v3 d, bool hide,
 }
 
 enum imp_passing imp__surface_ahead(struct imp_step *s, bool hide, int passed,
-                             struct imp_hit *hit)
+                                    struct imp_hit *hit)
 {
     const imp_v3 d = s->d;
     struct surface_ahead a;

@@ -91,7 +91,7 @@ enum imp_passing { IMP_PASSING_ENDS, IMP_PASSING_GOES_ON, IMP_PASSING_DROPS };
 /* Which it is of the ray in flight, in medium s->flight.here, at *hit, in place of which another may
  * be found. passed: surfaces before it; hide: lights are passed as well. */
 enum imp_passing imp__surface_ahead(struct imp_step *s, bool hide, int passed,
-                             struct imp_hit *hit);
+                                    struct imp_hit *hit);
 
 /* The segment's value at the scene's present parameters. */
 imp_spec imp__track_eval(const struct imp_scene *scene, const struct imp_track *track,
