@@ -892,7 +892,8 @@ enum imp_sensor_flags {
     IMP_SENSOR_AREA = 1,     /* its rays start on the shape that it belongs to */
     IMP_SENSOR_PARALLEL = 2, /* its rays are parallel: `connect` has no point without
                                 end */
-    IMP_SENSOR_GROUP = 4     /* its children are sensors */
+    IMP_SENSOR_GROUP = 4,    /* its children are sensors */
+    IMP_SENSOR_PINHOLE = 8   /* `connect` reads none of its numbers */
 };
 #define IMP_VIEW_NUMBERS 10
 struct imp_sensor_ops {

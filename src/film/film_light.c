@@ -4,6 +4,7 @@
  * errors from the spread of groups (film_light.h). */
 #include "film_light.h"
 #include "base/team.h"
+#include "walk/lights/light_supply.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -89,17 +90,20 @@ static void walk_drop(const struct job *j, struct worker *w, enum imp_drop cause
     imp__drops_add(&w->drops, &key);
 }
 
-/* Adds walk `index` to the item's sums, [pixels][n][2]; with groups [pixels][n], since
- * the square of their sum is needed. */
-static enum imp_status walk_add(const struct job *j, struct worker *w, int64_t index,
+/* Adds walk `index`, the next of the supply, to the item's sums, [pixels][n][2]; with groups
+ * [pixels][n], since the square of their sum is needed. */
+static enum imp_status walk_add(const struct job *j, struct worker *w,
+                                struct imp_light_supply *supply, int64_t index,
                                 double *sums)
 {
     const struct imp_light_picture *p = j->picture;
+    struct imp_light_walk walk = {.walk = {.dropped = IMP_DROP_MEMORY}};
+    const struct imp_light_walk *made =
+        imp_likely(!p->trace) ? imp__light_supply_take(supply) : NULL;
     const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
-    struct imp_light_walk walk;
     enum imp_status st = IMP_OK;
-    if (imp_unlikely(p->trace != NULL)) p->trace(p->payload, &w->arena, index, &walk);
-    else imp__light_walk_trace(p->tracer, &w->arena, index, &walk);
+    if (made) walk = *made;
+    else if (p->trace) p->trace(p->payload, &w->arena, index, &walk);
     if (imp_unlikely(walk.walk.dropped == IMP_DROP_MEMORY || w->arena.failed))
         IMP_TRY(imp__error(j->ctx, IMP_E_NOMEM, "no memory to record a walk"));
     if (imp_unlikely(walk.walk.dropped)) walk_drop(j, w, walk.walk.dropped, index);
@@ -173,12 +177,14 @@ static enum imp_status item_work(size_t item, int worker, void *result, void *pa
     from += p->first;
     to += p->first;
     memset(sums, 0, result_size(j));
+    struct imp_light_supply supply = imp__light_supply(p->tracer, &w->arena, from, to);
     for (int64_t i = from; i < to && st == IMP_OK; i++) {
-        st = walk_add(j, w, i, sums);
+        st = walk_add(j, w, &supply, i, sums);
         if (st == IMP_OK && (i - from) % CHECK_WALKS == 0 && imp__drops_total(&w->drops))
             st = imp__drops_budget(j->ctx, &w->drops, p->run->drop_budget,
                                    (double)p->walks, "");
     }
+    imp__arena_rewind(&w->arena, supply.mark);
     if (imp__drops_total(&w->drops) > 0) {
         pthread_mutex_lock(&j->lock);
         imp__drops_merge(&j->drops, &w->drops);

@@ -46,6 +46,15 @@ struct imp_wide_light {
     int32_t prim[IMP_WIDE_LANES];
 };
 
+/* Starts of walks from lights, as of struct imp_emission_sample. */
+struct imp_wide_emission {
+    imp_wide3 p, d;
+    imp_v3 ng; /* the same of all */
+    imp_wide uv[2], located[2], cos_light, cos_p, pdf_d;
+    double pdf_p;
+    imp_wide_truth drawn; /* there is one */
+};
+
 struct imp_shape_lanes {
     /* imp_shape_ops.surface; uv only if `uv`. */
     void (*surface)(const struct imp_shape *s, const struct imp_wide_hits *hits, bool uv,
@@ -55,6 +64,9 @@ struct imp_shape_lanes {
     void (*sample_toward)(const struct imp_shape *s, const imp_wide3 *ref,
                           const imp_wide u[2], struct imp_wide_light *out);
     bool (*lights)(const struct imp_shape *s);
+    /* imp_shape_ops.sample_area, of flat shapes: p, uv and located. NULL: point by point. */
+    void (*sample_area)(const struct imp_shape *s, const imp_wide u[2],
+                        struct imp_wide_emission *out);
 };
 /* NULL: this shape has none. */
 const struct imp_shape_lanes *imp__shape_lanes(const struct imp_shape *s);
@@ -113,6 +125,10 @@ struct imp_emitter_lanes {
     /* imp_emitter_ops.pdf, where they are; else NULL. */
     imp_wide (*pdf)(const struct imp_emitter *e, const imp_wide3 *ref,
                     const imp_wide3 *wi);
+    /* imp_emitter_ops.sample_emission, where `emits`, or that is NULL. NULL: one by one. */
+    void (*emission)(const struct imp_emitter *e, const imp_wide u[4],
+                     struct imp_wide_emission *out);
+    bool (*emits)(const struct imp_emitter *e);
 };
 /* NULL: this emitter has none. */
 const struct imp_emitter_lanes *imp__emitter_lanes(const struct imp_emitter *e);

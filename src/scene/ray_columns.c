@@ -147,6 +147,28 @@ static unsigned packet_occluded(const struct imp_intersector *x,
     return hidden & on;
 }
 
+/* Those of the rays that may meet a ball (imp__shape_balls_met), in lanes. */
+static unsigned balls_met(const struct imp_shape_balls *f, const struct imp_ray_block *b,
+                          unsigned on)
+{
+    unsigned met = 0;
+    for (int k = 0; k < f->n; k++) {
+        const int g = k / 4, j = k % 4;
+        for (int p = 0; p < IMP_RAY_PARTS; p++) {
+            const imp_wide3 o = b->o[p], d = b->d[p];
+            const imp_wide x = f->x[g][j] - o.x, y = f->y[g][j] - o.y,
+                           z = f->z[g][j] - o.z;
+            const imp_wide along = x * d.x + y * d.y + z * d.z,
+                           out = (x * x + y * y + z * z) * (1 - 1e-14) - f->r2[g][j],
+                           zero = imp__wide(0);
+            met |= imp__wide_bits((along * along >= out * imp__wide3_inner(d, d)) &
+                                  ((along >= zero) | (out <= zero)))
+                   << p * IMP_WIDE_LANES;
+        }
+    }
+    return met & on;
+}
+
 /* As imp__intersect_at, of eight rays. */
 static void nearest_block(const struct imp_intersector *x,
                           const struct imp_ray_columns *rays, int i,
@@ -158,7 +180,7 @@ static void nearest_block(const struct imp_intersector *x,
     unsigned met = 0;
     float far[IMP_RAY_BLOCK];
     for (int p = 0; p < IMP_RAY_PARTS; p++) block_put(b.far[p], &far[p * IMP_WIDE_LANES]);
-    for (unsigned left = x->balls.n > 0 ? on : 0; left; left &= left - 1) {
+    for (unsigned left = balls_met(&x->balls, &b, on); left; left &= left - 1) {
         const int k = __builtin_ctz(left);
         const imp_v3 o = imp__block_origin(&b, k), d = imp__block_direction(&b, k);
         double end = imp__block_far(&b, k);
@@ -190,7 +212,7 @@ static void occluded_block(const struct imp_intersector *x,
     struct imp_ray_block b;
     const unsigned on = block_of(rays, i, &b);
     unsigned behind = 0;
-    for (unsigned left = x->balls.n > 0 ? on : 0; left; left &= left - 1) {
+    for (unsigned left = balls_met(&x->balls, &b, on); left; left &= left - 1) {
         const int k = __builtin_ctz(left);
         const imp_v3 o = imp__block_origin(&b, k), d = imp__block_direction(&b, k);
         if (imp__shape_balls_occluded(&x->balls, &o, &d, imp__block_near(&b, k),

@@ -24,6 +24,27 @@ static void area_sample(const struct imp_emitter *e, const imp_wide3 *ref,
     imp__shape_lanes(e->shape)->sample_toward(e->shape, ref, u, out);
 }
 
+static bool area_emits(const struct imp_emitter *e)
+{
+    return imp__shape_lanes(e->shape)->sample_area != NULL;
+}
+/* imp__surface_emission_sample, of a flat shape. */
+static void area_emission(const struct imp_emitter *e, const imp_wide u[4],
+                          struct imp_wide_emission *out)
+{
+    imp__shape_lanes(e->shape)->sample_area(e->shape, u, out);
+    const struct imp_frame frame = imp__frame_from_normal(out->ng);
+    const imp_wide_frame axes = {imp__wide3_of(frame.s), imp__wide3_of(frame.t),
+                                 imp__wide3_of(frame.n)};
+    const imp_wide3 local = IMP_WIDE_OF(imp__cosine_directions)(u[2], u[3]);
+    out->d = imp__wide3_unit(imp__out_of_wide_frame(&axes, local));
+    out->cos_light = imp__wide3_inner(axes.n, out->d);
+    out->cos_p = imp__wide_magnitude(out->cos_light);
+    out->pdf_p = 1 / e->shape->area;
+    out->pdf_d = local.z * IMP_INV_PI;
+    out->drawn = local.z > imp__wide(0);
+}
+
 /* ---- The constant sky -------------------------------------------------------------------- */
 
 static void constant_sample(const struct imp_emitter *e, const imp_wide3 *ref,
@@ -49,7 +70,9 @@ static imp_wide constant_pdf(const struct imp_emitter *e, const imp_wide3 *ref,
 /* ---- All --------------------------------------------------------------------------------- */
 
 static const struct imp_emitter_lanes area = {.covers = area_covers,
-                                              .sample = area_sample},
+                                              .sample = area_sample,
+                                              .emission = area_emission,
+                                              .emits = area_emits},
                                       constant = {.sample = constant_sample,
                                                   .far = true,
                                                   .pdf = constant_pdf};

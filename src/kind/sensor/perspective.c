@@ -67,6 +67,7 @@ static void view_velocity(const struct imp_sensor *s, int k, const imp_v3 *r, im
 const struct imp_sensor_ops imp__perspective = {.size = sizeof(struct imp_sensor_ops),
                                                 .name = "perspective",
                                                 .object_size = sizeof(struct perspective),
+                                                .flags = IMP_SENSOR_PINHOLE,
                                                 .build = build,
                                                 .ray = ray,
                                                 .connect = connect,

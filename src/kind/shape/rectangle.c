@@ -195,5 +195,20 @@ static void sample_toward_lanes(const struct imp_shape *s, const imp_wide3 *ref,
     out->uv[0] = u[0];
 }
 
-const struct imp_shape_lanes imp__rectangle_lanes = {
-    .surface = surfaces, .sample_toward = sample_toward_lanes};
+static void sample_area_lanes(const struct imp_shape *s, const imp_wide u[2],
+                              struct imp_wide_emission *out)
+{
+    const struct rectangle *r = s->self;
+    const imp_wide sum = imp__wide_lesser(u[0], u[1]) + imp__wide_magnitude(u[0] - u[1]);
+    const imp_wide_truth behind = u[1] > u[0];
+    out->uv[0] = imp__wide_choose(behind, u[0], sum);
+    out->uv[1] = imp__wide_choose(behind, sum, u[1]);
+    out->p = points_at(r, out->uv[0], out->uv[1]);
+    out->ng = r->n;
+    out->located[0] = out->uv[0] - out->uv[1];
+    out->located[1] = out->uv[1];
+}
+
+const struct imp_shape_lanes imp__rectangle_lanes = {.surface = surfaces,
+                                                     .sample_toward = sample_toward_lanes,
+                                                     .sample_area = sample_area_lanes};

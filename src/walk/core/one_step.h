@@ -68,18 +68,15 @@ IMP_STEP_INLINE bool imp__vertex_work(const struct imp_end_ops *end, struct imp_
     return imp__vertex_leave(end, s, v, at, frame, goes_on);
 }
 
-IMP_STEP_INLINE bool imp__one_step(const struct imp_end_ops *end, struct imp_step *s)
+/* What the ray has met is a vertex. */
+IMP_STEP_INLINE bool imp__step_on(const struct imp_end_ops *end, struct imp_step *s,
+                                  enum imp_meeting met, struct imp_hit *hit)
 {
-    struct imp_hit hit;
     struct imp_surface at;
     struct imp_frame frame;
     struct imp_vertex *v;
-
-    /* Follow the ray to what it meets. Which numbers the vertex there has does not depend on
-     * it: they come from memory meanwhile. */
-    imp__step_numbers(s);
-    switch (s->segment->meet(s, &hit)) {
-    case IMP_MEETS_SURFACE: v = imp__surface_meet(s, &hit, &at, &frame); break;
+    switch (met) {
+    case IMP_MEETS_SURFACE: v = imp__surface_meet(s, hit, &at, &frame); break;
     case IMP_MEETS_MEDIUM:
         v = imp__medium_meet(s, s->flight.here->scatterer, s->flight.here->index,
                              s->flight.at, s->flight.t, &at, &frame);
@@ -89,8 +86,18 @@ IMP_STEP_INLINE bool imp__one_step(const struct imp_end_ops *end, struct imp_ste
         return false;
     default: return false;
     }
-    return v && (!end->arrive || end->arrive(s, v, &hit, &at, &frame)) &&
-           imp__vertex_work(end, s, v, &hit, &at, &frame);
+    return v && (!end->arrive || end->arrive(s, v, hit, &at, &frame)) &&
+           imp__vertex_work(end, s, v, hit, &at, &frame);
+}
+
+IMP_STEP_INLINE bool imp__one_step(const struct imp_end_ops *end, struct imp_step *s)
+{
+    struct imp_hit hit;
+    /* Follow the ray to what it meets. Which numbers the vertex there has does not depend on
+     * it: they come from memory meanwhile. */
+    imp__step_numbers(s);
+    const enum imp_meeting met = s->segment->meet(s, &hit);
+    return imp__step_on(end, s, met, &hit);
 }
 
 #endif

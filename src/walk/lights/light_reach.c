@@ -177,11 +177,11 @@ bool imp__light_link_draw(struct imp_step *s, const struct imp_vertex *v,
 {
     const struct imp_sensor *sensor = s->tracer->sensor;
     const struct imp_walk_integrator *i = s->tracer->integrator;
-    double u[4];
+    double u[4] = {0};
     if (!i->lights || !imp__light_depth_allows(s, s->depth + 1)) return false;
     if (!sensor->ops->connect || (i->hide_emitters && v->shape && v->shape->emitter >= 0))
         return false;
-    imp__light_sensor_numbers(s, u);
+    if (!(sensor->ops->flags & IMP_SENSOR_PINHOLE)) imp__light_sensor_numbers(s, u);
     return imp__sensor_connect(sensor, &at->p, false, u, &link->sensor) &&
            imp__light_on_film(sensor, &link->sensor);
 }

@@ -93,8 +93,9 @@ static bool itself_draw(const struct imp_step *s, const struct sent *l, struct i
     const struct imp_sensor *sensor = s->tracer->sensor;
     const struct imp_emission_sample *start = &l->start;
     const imp_v3 ref = l->far ? -start->d : start->p;
-    double u[4];
-    imp__light_sensor_numbers(s, u);
+    double u[4] = {0};
+    if (!(sensor->ops->flags & IMP_SENSOR_PINHOLE) || l->far)
+        imp__light_sensor_numbers(s, u);
     if (!imp__sensor_connect(sensor, &ref, l->far, u, &x->to) ||
         !imp__light_on_film(sensor, &x->to))
         return false;
@@ -201,6 +202,24 @@ static void itself_connect(struct imp_light_step *w, struct imp_vertex *v,
 
 /* ---- The walk ---------------------------------------------------------------------- */
 
+/* What follows from light and start. False: nothing is sent. */
+static bool sent_set(struct imp_light_step *w, struct sent *l)
+{
+    const struct imp_emission_sample *start = &l->start;
+    l->e = w->s.scene->emitters[l->light];
+    l->per = l->pmf * start->pdf_p * start->pdf_d;
+    l->far = is_far(l->e);
+    l->surface = imp__dot(start->ng, start->ng) > 0;
+    /* The shading normal is not in the sample: a shape that is smooth gives it again. */
+    l->n = start->ng;
+    if (l->per > 0 && l->surface && l->e->shape->smooth) {
+        struct imp_surface at;
+        l->e->shape->ops->sample_area(l->e->shape, w->point, &at);
+        l->n = at.n;
+    }
+    return l->per > 0;
+}
+
 /* Choose a light, and draw a point of it and a direction. False: nothing is sent. */
 static bool light_draw(struct imp_light_step *w, struct sent *l)
 {
@@ -209,6 +228,15 @@ static bool light_draw(struct imp_light_step *w, struct sent *l)
     const struct imp_key key = s->walk->key;
     struct imp_emission_sample *start = &l->start;
     if (scene->n_emitters == 0) return false;
+    if (w->given) {
+        l->light = 0;
+        l->pmf = scene->light_cdf[0];
+        *start = w->given->start;
+        w->point[0] = w->given->point[0];
+        w->point[1] = w->given->point[1];
+        if (!w->given->drawn) return false;
+        return sent_set(w, l);
+    }
     const struct imp_guide *guide =
         s->guided.guide && s->guided.guide->send ? s->guided.guide : NULL;
     l->light = imp__light_pick_by(
@@ -226,17 +254,7 @@ static bool light_draw(struct imp_light_step *w, struct sent *l)
     start->pdf_d *= on_direction;
     w->point[0] = u[0];
     w->point[1] = u[1];
-    l->per = l->pmf * start->pdf_p * start->pdf_d;
-    l->far = is_far(l->e);
-    l->surface = imp__dot(start->ng, start->ng) > 0;
-    /* The shading normal is not in the sample: a shape that is smooth gives it again. */
-    l->n = start->ng;
-    if (l->per > 0 && l->surface && l->e->shape->smooth) {
-        struct imp_surface at;
-        l->e->shape->ops->sample_area(l->e->shape, u, &at);
-        l->n = at.n;
-    }
-    return l->per > 0;
+    return sent_set(w, l);
 }
 
 static void vertex_record(struct imp_vertex *v, const struct imp_step *s,

@@ -14,6 +14,13 @@
 #include "walk/core/ends.h"
 #include "walk/core/guided.h"
 
+/* What a walk from the scene's only light begins with, where it is drawn beforehand. */
+struct imp_light_given {
+    bool drawn; /* there is one */
+    double point[2];
+    struct imp_emission_sample start;
+};
+
 struct imp_light_step {
     struct imp_step s; /* first: ends are handed it */
     struct imp_light_walk *out;
@@ -24,6 +31,7 @@ struct imp_light_step {
                       have been made: light went straight on in between */
     double point[2];       /* numbers that the point on the light was made of */
     struct imp_both *both; /* of a sample from both ends; NULL: none */
+    const struct imp_light_given *given; /* NULL: it is drawn where it begins */
 };
 
 static inline bool imp__light_depth_allows(const struct imp_step *s, int segments)
@@ -38,6 +46,24 @@ void imp__light_walk_follow(const struct imp_tracer *tracer, struct imp_arena *a
                             struct imp_light_walk *out);
 /* The values of what reaches the film. */
 void imp__light_walk_close(const struct imp_tracer *tracer, struct imp_light_walk *out);
+
+/* Can walks be made some at a time? */
+bool imp__light_walks_go_together(const struct imp_tracer *tracer);
+/* Walks first, .., first + n - 1, of such a tracer: their rays go together. False: no memory. */
+bool imp__light_walks_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
+                            int64_t first, int n, struct imp_light_walk *out);
+
+/* In place of a pixel in the key: no pixel of a film has this number. */
+static inline struct imp_key imp__light_key(const struct imp_tracer *tracer,
+                                            int64_t index)
+{
+    return imp__key(tracer->seed, UINT64_C(0x4c69676874000000), (uint64_t)index);
+}
+
+/* ---- light_given.c ---- */
+/* Where walks first, .., first + n - 1 begin. False: they are drawn one by one. */
+bool imp__light_starts(const struct imp_tracer *tracer, int64_t first, int n,
+                       struct imp_light_given *out);
 
 /* ---- light_start.c ---- */
 /* Vertex 0: the light that sends the walk, and the ray that leaves it. False: nothing is

@@ -4,13 +4,13 @@
  * (core/one_step.h) does there. Light scatters by transposed kernels, is connected to the
  * sensor, and meets the sensor where that is a surface. */
 #include "kind/bsdf/transport.h"
+#include "light_supply.h"
+#include "scene/ray_columns.h"
 #include "walk/both/both.h"
 #include "walk/core/one_step.h"
 #include "walk/core/scatter_with.h"
+#include "walk/path/first_segment.h"
 #include <float.h>
-
-/* In place of a pixel in the key: no pixel of a film has this number. */
-#define LIGHT_WALKS UINT64_C(0x4c69676874000000)
 
 /* ---- The continuation -------------------------------------------------------------- */
 
@@ -200,40 +200,150 @@ void imp__light_walk_close(const struct imp_tracer *tracer, struct imp_light_wal
     out->n_reach = 0;
 }
 
+static void step_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
+                       imp_spec *scratch, struct imp_light_walk *out,
+                       struct imp_light_step *w)
+{
+    imp__step_begin(tracer, arena, &out->walk, scratch, &w->s);
+    w->out = out;
+    w->end = &out->reach;
+    w->pdf_across = w->passed = 0;
+    w->both = out->both;
+    w->given = NULL;
+    if (out->both)
+        w->s.lanes.drew = imp__lane_drawn(out->both->eye.key, imp__lane_mis_count(&w->s));
+}
+
 void imp__light_walk_follow(const struct imp_tracer *tracer, struct imp_arena *arena,
                             struct imp_light_walk *out)
 {
-    struct imp_walk *walk = &out->walk;
     imp_spec scratch[IMP_INPUTS_MAX];
     struct imp_light_step w;
-    imp__step_begin(tracer, arena, walk, scratch, &w.s);
-    w.out = out;
-    w.end = &out->reach;
-    w.pdf_across = w.passed = 0;
-    w.both = out->both;
-    if (out->both)
-        w.s.lanes.drew = imp__lane_drawn(out->both->eye.key, imp__lane_mis_count(&w.s));
+    step_begin(tracer, arena, scratch, out, &w);
     if (imp__light_start(&w))
         while (imp__one_step(&light_end, &w.s)) w.s.depth++;
+}
+
+static void walk_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
+                       int64_t index, struct imp_light_walk *out)
+{
+    imp__light_walk_begin(tracer, &out->walk, imp__light_key(tracer, index));
+    out->reach = NULL;
+    out->n_reach = 0;
+    out->both = NULL;
+    out->arena = arena;
+}
+
+/* The wavelengths that it carries. False: no memory. */
+static bool waves_take(const struct imp_tracer *tracer, struct imp_arena *arena,
+                       int64_t index, struct imp_walk *walk)
+{
+    return !tracer->wavelengths ||
+           imp__walk_wave(tracer, arena, imp__wave_draw(tracer, walk, index), walk);
 }
 
 void imp__light_walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
                            int64_t index, struct imp_light_walk *out)
 {
-    const struct imp_key key = imp__key(tracer->seed, LIGHT_WALKS, (uint64_t)index);
-    struct imp_walk *walk = &out->walk;
-    imp__light_walk_begin(tracer, walk, key);
-    out->reach = NULL;
-    out->n_reach = 0;
-    out->both = NULL;
-    out->arena = arena;
+    walk_begin(tracer, arena, index, out);
     if (tracer->integrator->both) {
         imp__both_trace(tracer, arena, index, out);
         return;
     }
-    if (tracer->wavelengths &&
-        !imp__walk_wave(tracer, arena, imp__wave_draw(tracer, walk, index), walk))
-        return;
+    if (!waves_take(tracer, arena, index, &out->walk)) return;
     imp__light_walk_follow(tracer, arena, out);
     imp__light_walk_close(tracer, out);
+}
+
+/* ---- Some at a time -------------------------------------------------------------------- */
+
+bool imp__light_walks_go_together(const struct imp_tracer *t)
+{
+    return !t->integrator->both && !t->integrator->hide_emitters && !t->kept &&
+           imp__segment_first(t) == &imp__straight_ops;
+}
+
+#define TAKE(p, n)                                                                       \
+    ((p) = imp__arena_take(arena, (size_t)(n) + IMP_COLUMN_SLACK, sizeof *(p)))
+
+/* Walks under way, and what their rays meet. */
+struct together {
+    struct imp_light_step *step;
+    struct imp_ray_columns rays;
+    struct imp_hit_columns hits;
+    int *going; /* walks whose rays are in flight */
+    int n_going;
+};
+
+static bool together_create(struct imp_arena *arena, int n, struct together *t)
+{
+    bool ok = TAKE(t->step, n) && TAKE(t->going, n) && TAKE(t->rays.near, n) &&
+              TAKE(t->rays.far, n) && TAKE(t->rays.time, n) && TAKE(t->hits.t, n) &&
+              TAKE(t->hits.u, n) && TAKE(t->hits.v, n) && TAKE(t->hits.shape, n) &&
+              TAKE(t->hits.prim, n) && TAKE(t->hits.place, n);
+    for (int c = 0; c < 3; c++) ok = ok && TAKE(t->rays.o[c], n) && TAKE(t->rays.d[c], n);
+    t->n_going = 0;
+    return ok;
+}
+
+static void rays_put(struct together *t)
+{
+    struct imp_ray_columns *rays = &t->rays;
+    rays->n = t->n_going;
+    for (int i = 0; i < t->n_going; i++) {
+        const struct imp_step *s = &t->step[t->going[i]].s;
+        for (int c = 0; c < 3; c++) {
+            rays->o[c][i] = s->o[c];
+            rays->d[c][i] = s->d[c];
+        }
+        rays->near[i] = s->t_min;
+        rays->far[i] = s->t_max;
+        rays->time[i] = s->walk->time;
+    }
+}
+
+/* The step of the walk whose ray is number i. True: it goes on. */
+static bool step_on(struct together *t, int i)
+{
+    struct imp_step *s = &t->step[t->going[i]].s;
+    struct imp_hit hit = {.shape = t->hits.shape[i],
+                          .prim = t->hits.prim[i],
+                          .t = t->hits.t[i],
+                          .u = t->hits.u[i],
+                          .v = t->hits.v[i],
+                          .place = t->hits.place[i],
+                          .time = s->walk->time};
+    const bool found = hit.shape >= 0;
+    imp__step_numbers(s);
+    if (!imp__step_on(&light_end, s, found ? IMP_MEETS_SURFACE : IMP_MEETS_NOTHING, &hit))
+        return false;
+    s->depth++;
+    return true;
+}
+
+bool imp__light_walks_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
+                            int64_t first, int n, struct imp_light_walk *out)
+{
+    struct together t;
+    struct imp_light_given *given;
+    imp_spec scratch[IMP_INPUTS_MAX]; /* of the step at work */
+    if (!TAKE(given, n) || !together_create(arena, n, &t)) return false;
+    const bool known = imp__light_starts(tracer, first, n, given);
+    for (int k = 0; k < n; k++) {
+        walk_begin(tracer, arena, first + k, &out[k]);
+        if (!waves_take(tracer, arena, first + k, &out[k].walk)) continue;
+        step_begin(tracer, arena, scratch, &out[k], &t.step[k]);
+        if (known) t.step[k].given = &given[k];
+        if (imp__light_start(&t.step[k])) t.going[t.n_going++] = k;
+    }
+    while (t.n_going > 0) {
+        int next = 0;
+        rays_put(&t);
+        imp__intersect_columns(tracer->scene, &t.rays, &t.hits);
+        for (int i = 0; i < t.n_going; i++)
+            if (step_on(&t, i)) t.going[next++] = t.going[i];
+        t.n_going = next;
+    }
+    for (int k = 0; k < n; k++) imp__light_walk_close(tracer, &out[k]);
+    return true;
 }
