@@ -1,51 +1,58 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Intersection of eight rays at a time with one facet after the other: the floats of facets.c,
- * with rays and facets exchanged, and its confirmation in double. */
+ * Intersection of a block of rays with one facet after the other: the floats of facets.c, with
+ * rays and facets exchanged, and its confirmation in double. */
 #include "facets_columns.h"
 #include "facets_lanes.h"
 
-/* Conditions of eight rays, and choice by them: with AVX-512 GCC 12 takes two operations for what
- * has one. */
-#if defined(__AVX512F__) && defined(__AVX512VL__)
-typedef __mmask8 truth;
-static inline truth at_most(lanes a, lanes b)
+/* Floats of the rays of a block. */
+typedef float block __attribute__((vector_size(4 * IMP_RAY_BLOCK)));
+typedef int32_t whole __attribute__((vector_size(4 * IMP_RAY_BLOCK)));
+
+static inline block splat(float x) { return x - (block){0}; }
+static inline block magnitude(block a) { return (block)((whole)a & INT32_MAX); }
+
+/* Conditions of rays, and choice by them: with AVX-512 GCC 12 takes two operations for what has
+ * one. */
+#if IMP_WIDE_LANES == 8
+typedef __mmask16 truth;
+static inline truth at_most(block a, block b)
 {
-    return _mm256_cmp_ps_mask((__m256)a, (__m256)b, _CMP_LE_OQ);
+    return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_LE_OQ);
 }
-static inline truth below(lanes a, lanes b)
+static inline truth below(block a, block b)
 {
-    return _mm256_cmp_ps_mask((__m256)a, (__m256)b, _CMP_LT_OQ);
+    return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_LT_OQ);
 }
-static inline lanes pick(truth m, lanes a, lanes b)
+static inline block pick(truth m, block a, block b)
 {
-    return (lanes)_mm256_mask_blend_ps(m, (__m256)b, (__m256)a);
+    return (block)_mm512_mask_blend_ps(m, (__m512)b, (__m512)a);
 }
 static inline unsigned bits(truth m) { return m; }
 #else
 typedef mask truth;
-static inline truth at_most(lanes a, lanes b) { return a <= b; }
-static inline truth below(lanes a, lanes b) { return a < b; }
-static inline lanes pick(truth m, lanes a, lanes b) { return imp__lanes_choose(m, a, b); }
+static inline truth at_most(block a, block b) { return a <= b; }
+static inline truth below(block a, block b) { return a < b; }
+static inline block pick(truth m, block a, block b) { return imp__lanes_choose(m, a, b); }
 static inline unsigned bits(truth m) { return imp__lanes_bits(m); }
 #endif
 
-/* Eight rays about the facets' centre. */
+/* Rays about the facets' centre. */
 struct rays {
-    lanes o[3], d[3];
-    lanes lo, hi;
-    lanes stretch, least; /* as of one ray (facets.c) */
+    block o[3], d[3];
+    block lo, hi;
+    block stretch, least; /* as of one ray (facets.c) */
     unsigned comes;       /* a bit for each that may meet something */
     unsigned away;        /* for those that begin far away, which go one by one */
 };
 
 /* Numbers of the rays of part p, as floats. */
-static inline void narrow(lanes *to, int p, imp_wide x)
+static inline void narrow(block *to, int p, imp_wide x)
 {
     const imp_wide_float f = imp__wide_narrow(x);
     memcpy((char *)to + (size_t)p * sizeof f, &f, sizeof f);
 }
-static inline void narrow3(lanes to[3], int p, imp_wide3 v)
+static inline void narrow3(block to[3], int p, imp_wide3 v)
 {
     narrow(&to[0], p, v.x);
     narrow(&to[1], p, v.y);
@@ -92,22 +99,21 @@ static inline struct rays rays_of(const struct imp_facets *f,
 
 /* Which rays may meet facet k of a group, and where. */
 static inline truth facet_met(const struct group *g, int k, const struct rays *r,
-                              float slack, lanes *t, lanes *sum)
+                              float slack, block *t, block *sum)
 {
-    const lanes nd = g->n[0][k] * r->d[0] + g->n[1][k] * r->d[1] + g->n[2][k] * r->d[2];
-    const lanes inv = -1 / pick(below(imp__lanes_magnitude(nd), r->least), r->least, nd);
-    const lanes size = imp__lanes_magnitude(inv), aside = r->stretch * size * g->slack[k];
-    const lanes far = size * slack, side = 1 + aside;
+    const block nd = g->n[0][k] * r->d[0] + g->n[1][k] * r->d[1] + g->n[2][k] * r->d[2];
+    const block inv = -1 / pick(below(magnitude(nd), r->least), r->least, nd);
+    const block size = magnitude(inv), aside = r->stretch * size * g->slack[k];
+    const block far = size * slack, side = 1 + aside;
     *t = (g->n[0][k] * r->o[0] + g->n[1][k] * r->o[1] + g->n[2][k] * r->o[2] +
           g->n[3][k]) *
          inv;
-    const lanes x = r->o[0] + *t * r->d[0], y = r->o[1] + *t * r->d[1],
+    const block x = r->o[0] + *t * r->d[0], y = r->o[1] + *t * r->d[1],
                 z = r->o[2] + *t * r->d[2];
-    const lanes u = g->u[0][k] * x + g->u[1][k] * y + g->u[2][k] * z + g->u[3][k];
-    const lanes v = g->v[0][k] * x + g->v[1][k] * y + g->v[2][k] * z + g->v[3][k];
+    const block u = g->u[0][k] * x + g->u[1][k] * y + g->u[2][k] * z + g->u[3][k];
+    const block v = g->v[0][k] * x + g->v[1][k] * y + g->v[2][k] * z + g->v[3][k];
     *sum = u + v;
-    return (truth)(at_most(imp__lanes_magnitude(u), side) &
-                   at_most(imp__lanes_magnitude(v), side) &
+    return (truth)(at_most(magnitude(u), side) & at_most(magnitude(v), side) &
                    at_most(*sum, g->sum[k] + aside) & below(r->lo - far, *t) &
                    below(*t, r->hi + 4 * far));
 }
@@ -117,19 +123,19 @@ static inline bool is_facet(const struct group *g, int k) { return g->slack[k] >
 
 unsigned imp__facets_nearest_block(const struct imp_facets *f,
                                    const struct imp_ray_block *b, unsigned on,
-                                   struct imp_hit hit[LANES])
+                                   struct imp_hit hit[IMP_RAY_BLOCK])
 {
     const struct rays r = rays_of(f, b, on);
-    lanes best = imp__splat(INFINITY), in = imp__splat(0), half = imp__splat(0);
-    const lanes never = best;
+    block best = splat(INFINITY), in = splat(0), half = splat(0);
+    const block never = best;
     unsigned met = 0;
     for (int g = 0; g < f->n_groups; g++) {
-        lanes at = imp__splat((float)(LANES * g));
+        block at = splat((float)(LANES * g));
         for (int k = 0; k < LANES && is_facet(&f->group[g], k); k++, at += 1) {
             /* What one facet waits for of the one before is `best` alone. */
-            lanes t, sum;
+            block t, sum;
             const truth m = facet_met(&f->group[g], k, &r, f->slack, &t, &sum);
-            const lanes here = pick(m, t, never);
+            const block here = pick(m, t, never);
             const truth nearer = below(here, best);
             best = pick(nearer, here, best);
             in = pick(nearer, at, in);
@@ -165,7 +171,7 @@ unsigned imp__facets_occluded_block(const struct imp_facets *f,
     unsigned hidden = 0, left = r.comes;
     for (int g = 0; g < f->n_groups && left; g++)
         for (int k = 0; k < LANES && left && is_facet(&f->group[g], k); k++) {
-            lanes t, sum;
+            block t, sum;
             unsigned ask =
                 left & bits(facet_met(&f->group[g], k, &r, f->slack, &t, &sum));
             for (; ask; ask &= ask - 1) {

@@ -1,14 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Facets (facets.h) against eight rays. */
+ * Facets (facets.h) against sixteen or eight rays. */
 #ifndef IMP_SCENE_FACETS_COLUMNS_H
 #define IMP_SCENE_FACETS_COLUMNS_H
 
 #include "facets.h"
 #include "math/wide_real.h"
 
-/* Rays are taken so many at a time, in one or more registers. */
-enum { IMP_RAY_BLOCK = 8, IMP_RAY_PARTS = IMP_RAY_BLOCK / IMP_WIDE_LANES };
+/* Rays are taken as many at a time as a register has floats, their doubles in two. */
+enum {
+    IMP_RAY_BLOCK = IMP_WIDE_LANES > 4 ? 16 : 8,
+    IMP_RAY_PARTS = IMP_RAY_BLOCK / IMP_WIDE_LANES
+};
 struct imp_ray_block {
     imp_wide3 o[IMP_RAY_PARTS], d[IMP_RAY_PARTS];
     imp_wide near[IMP_RAY_PARTS], far[IMP_RAY_PARTS];

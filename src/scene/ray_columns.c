@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Rays in columns, eight at a time: few analytic shapes one by one, facets together (facets_columns.c),
+ * Rays in columns, a block at a time: few analytic shapes one by one, facets together (facets_columns.c),
  * and Embree's triangles in its packets of eight. Where Embree calls back, rays go one by one. */
 #include "ray_columns.h"
 #include "facets_columns.h"
@@ -42,7 +42,7 @@ static void occluded_alone(const struct imp_scene *scene,
     }
 }
 
-/* ---- Eight at a time --------------------------------------------------------------------- */
+/* ---- A block at a time --------------------------------------------------------------------- */
 
 /* Rays i and on; a bit for each that is there and within Embree's numbers (imp__ray_valid). */
 static inline unsigned block_of(const struct imp_ray_columns *rays, int i,
@@ -77,13 +77,15 @@ static inline void block_put(imp_wide x, float *to)
     memcpy(to, &f, sizeof f);
 }
 
+enum { PACKET = 8, PACKET_BITS = 0xff };
 #define PACKET_PUT(field, value)                                                         \
-    for (int k = 0; k < IMP_RAY_BLOCK; k++) field[k] = (value)
+    for (int k = 0; k < PACKET; k++) field[k] = (value)
 
-static void packet_fill(struct RTCRay8 *r, const struct imp_ray_block *b)
+/* The rays of a block from `first` on, eight of them. */
+static void packet_fill(struct RTCRay8 *r, const struct imp_ray_block *b, int first)
 {
-    for (int p = 0; p < IMP_RAY_PARTS; p++) {
-        const int k = p * IMP_WIDE_LANES;
+    for (int k = 0; k < PACKET; k += IMP_WIDE_LANES) {
+        const int p = (first + k) / IMP_WIDE_LANES;
         block_put(b->o[p].x, &r->org_x[k]);
         block_put(b->o[p].y, &r->org_y[k]);
         block_put(b->o[p].z, &r->org_z[k]);
@@ -97,21 +99,21 @@ static void packet_fill(struct RTCRay8 *r, const struct imp_ray_block *b)
     PACKET_PUT(r->id, 0);
     PACKET_PUT(r->flags, 0);
 }
-static void packet_valid(unsigned on, int valid[IMP_RAY_BLOCK])
+static void packet_valid(unsigned on, int valid[PACKET])
 {
-    for (int k = 0; k < IMP_RAY_BLOCK; k++) valid[k] = on >> k & 1 ? -1 : 0;
+    for (int k = 0; k < PACKET; k++) valid[k] = on >> k & 1 ? -1 : 0;
 }
 
 static unsigned packet_nearest(const struct imp_intersector *x,
-                               const struct imp_ray_block *b, const float far[],
-                               unsigned on, struct imp_hit hit[])
+                               const struct imp_ray_block *b, int first,
+                               const float far[], unsigned on, struct imp_hit hit[])
 {
     struct RTCIntersectContext context;
     struct RTCRayHit8 r;
-    int valid[IMP_RAY_BLOCK] __attribute__((aligned(32)));
+    int valid[PACKET] __attribute__((aligned(32)));
     unsigned met = 0;
     rtcInitIntersectContext(&context);
-    packet_fill(&r.ray, b);
+    packet_fill(&r.ray, b, first);
     packet_valid(on, valid);
     PACKET_PUT(r.ray.tfar, far[k]);
     PACKET_PUT(r.hit.geomID, RTC_INVALID_GEOMETRY_ID);
@@ -131,19 +133,19 @@ static unsigned packet_nearest(const struct imp_intersector *x,
 }
 
 static unsigned packet_occluded(const struct imp_intersector *x,
-                                const struct imp_ray_block *b, unsigned on)
+                                const struct imp_ray_block *b, int first, unsigned on)
 {
     struct RTCIntersectContext context;
     struct RTCRay8 r;
-    int valid[IMP_RAY_BLOCK] __attribute__((aligned(32)));
+    int valid[PACKET] __attribute__((aligned(32)));
     unsigned hidden = 0;
     rtcInitIntersectContext(&context);
-    packet_fill(&r, b);
+    packet_fill(&r, b, first);
     packet_valid(on, valid);
-    for (int p = 0; p < IMP_RAY_PARTS; p++)
-        block_put(b->far[p], &r.tfar[p * IMP_WIDE_LANES]);
+    for (int k = 0; k < PACKET; k += IMP_WIDE_LANES)
+        block_put(b->far[(first + k) / IMP_WIDE_LANES], &r.tfar[k]);
     rtcOccluded8(valid, x->rtc, &context, &r);
-    for (int k = 0; k < IMP_RAY_BLOCK; k++) hidden |= (unsigned)(r.tfar[k] < 0) << k;
+    for (int k = 0; k < PACKET; k++) hidden |= (unsigned)(r.tfar[k] < 0) << k;
     return hidden & on;
 }
 
@@ -169,7 +171,7 @@ static unsigned balls_met(const struct imp_shape_balls *f, const struct imp_ray_
     return met & on;
 }
 
-/* As imp__intersect_at, of eight rays. */
+/* As imp__intersect_at, of a block of rays. */
 static void nearest_block(const struct imp_intersector *x,
                           const struct imp_ray_columns *rays, int i,
                           const struct imp_hit_columns *hits)
@@ -199,7 +201,9 @@ static void nearest_block(const struct imp_intersector *x,
         }
         met |= more;
     }
-    if (x->holds) met |= packet_nearest(x, &b, far, on, hit);
+    for (int k = 0; x->holds && k < IMP_RAY_BLOCK; k += PACKET)
+        if (on >> k & PACKET_BITS)
+            met |= packet_nearest(x, &b, k, far + k, on >> k & PACKET_BITS, hit + k) << k;
     const int n = imp_min(rays->n - i, (int)IMP_RAY_BLOCK);
     for (int k = 0; k < n; k++)
         if (met >> k & 1) imp__hit_put(hits, i + k, &hit[k]);
@@ -221,7 +225,10 @@ static void occluded_block(const struct imp_intersector *x,
     }
     if (x->facets && (on & ~behind))
         behind |= imp__facets_occluded_block(x->facets, &b, on & ~behind);
-    if (x->holds && (on & ~behind)) behind |= packet_occluded(x, &b, on & ~behind);
+    for (int k = 0; x->holds && k < IMP_RAY_BLOCK; k += PACKET) {
+        const unsigned left = (on & ~behind) >> k & PACKET_BITS;
+        if (left) behind |= packet_occluded(x, &b, k, left) << k;
+    }
     const int n = imp_min(rays->n - i, (int)IMP_RAY_BLOCK);
     for (int k = 0; k < n; k++) hidden[i + k] = behind >> k & 1;
 }

@@ -8,7 +8,7 @@
 
 #include "scene.h"
 
-#define IMP_COLUMN_SLACK 8
+#define IMP_COLUMN_SLACK 16
 
 struct imp_ray_columns {
     int n;
