@@ -50,26 +50,49 @@ double imp__spectrum_value(const struct imp_spectrum *s, double nm);
 /* The same at the wavelengths of a walk, to the bit. */
 void imp__spectrum_lanes_any(const struct imp_spectrum *s, const double nm[4],
                              imp_spec *value);
-/* Equidistant samples without a call. */
+/* Equidistant samples, whose wavelengths are found without a call. */
+static inline bool imp__spectrum_is_even(const struct imp_spectrum *s)
+{
+    return s->form == IMP_SPECTRUM_POINTS && s->per_nm > 0 && !s->times && !s->over;
+}
+/* Where wavelengths lie among them: of all such spectra with the same lo, hi, per_nm and n. */
+struct imp__even_place {
+    imp_int4 k;
+    imp_spec part;
+    __typeof__((imp_spec){0} >= (imp_spec){0}) inside;
+};
+static inline struct imp__even_place imp__spectrum_place(const struct imp_spectrum *s,
+                                                         const double nm[4])
+{
+    struct imp__even_place p;
+    const imp_spec l = {nm[0], nm[1], nm[2], nm[3]}, zero = {0};
+    p.inside = (l >= zero + s->lo) & (l <= zero + s->hi);
+    const imp_spec at =
+        (imp_spec)((__typeof__(p.inside))((l - s->lo) * s->per_nm) & p.inside);
+    p.k = __builtin_convertvector(at, imp_int4);
+    p.k += p.k > (int)s->n - 2; /* true is -1: the last point ends the last interval */
+    p.part = at - __builtin_convertvector(p.k, imp_spec);
+    return p;
+}
+static inline imp_spec imp__spectrum_there(const struct imp_spectrum *s,
+                                           const struct imp__even_place *p)
+{
+    const double *v = s->value;
+    const imp_int4 k = p->k;
+    const imp_spec low = {v[k[0]], v[k[1]], v[k[2]], v[k[3]]},
+                   high = {v[k[0] + 1], v[k[1] + 1], v[k[2] + 1], v[k[3] + 1]};
+    const imp_spec x = low + p->part * (high - low);
+    return (imp_spec)((__typeof__(p->inside))x & p->inside);
+}
 static inline void imp__spectrum_lanes(const struct imp_spectrum *s, const double nm[4],
                                        imp_spec *value)
 {
-    if (imp_unlikely(s->form != IMP_SPECTRUM_POINTS || !(s->per_nm > 0) || s->times ||
-                     s->over)) {
+    if (imp_unlikely(!imp__spectrum_is_even(s))) {
         imp__spectrum_lanes_any(s, nm, value);
         return;
     }
-    typedef __typeof__((imp_spec){0} >= (imp_spec){0}) mask;
-    const imp_spec l = {nm[0], nm[1], nm[2], nm[3]}, zero = {0};
-    const mask inside = (l >= zero + s->lo) & (l <= zero + s->hi);
-    const imp_spec at = (imp_spec)((mask)((l - s->lo) * s->per_nm) & inside);
-    imp_int4 k = __builtin_convertvector(at, imp_int4);
-    k += k > (int)s->n - 2; /* true is -1: the last point ends the last interval */
-    const double *v = s->value;
-    const imp_spec low = {v[k[0]], v[k[1]], v[k[2]], v[k[3]]},
-                   high = {v[k[0] + 1], v[k[1] + 1], v[k[2] + 1], v[k[3] + 1]};
-    const imp_spec x = low + (at - __builtin_convertvector(k, imp_spec)) * (high - low);
-    *value = (imp_spec)((mask)x & inside);
+    const struct imp__even_place p = imp__spectrum_place(s, nm);
+    *value = imp__spectrum_there(s, &p);
 }
 void imp__spectrum_at(const struct imp_spectrum *s, double nm,
                       struct imp__spectrum_at *out);

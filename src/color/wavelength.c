@@ -45,8 +45,29 @@ void imp__waves_make(const struct imp_wavelengths *w, double u, struct imp_waves
         out->density[j] = p * n;
     }
     for (int j = n; j < 4; j++) out->carried.nm[j] = out->carried.nm[0];
-    for (int c = 0; c < out->n_channels; c++)
-        imp__waves_response(out, &w->response[c], &out->channel[c]);
+    if (!w->one_grid) {
+        for (int c = 0; c < out->n_channels; c++)
+            imp__waves_response(out, &w->response[c], &out->channel[c]);
+        return;
+    }
+    const struct imp__even_place at =
+        imp__spectrum_place(&w->response[0], out->carried.nm);
+    for (int c = 0; c < out->n_channels; c++) {
+        out->channel[c] = imp__spectrum_there(&w->response[c], &at) / out->density;
+        for (int j = n; j < 4; j++) out->channel[c][j] = 0;
+    }
+}
+
+bool imp__responses_share_grid(const struct imp_wavelengths *w)
+{
+    const struct imp_spectrum *first = w->response;
+    for (int c = 0; c < imp_min(w->n_channels, IMP_CHANNELS_MAX); c++) {
+        const struct imp_spectrum *r = &w->response[c];
+        if (!imp__spectrum_is_even(r) || r->lo != first->lo || r->hi != first->hi ||
+            r->per_nm != first->per_nm || r->n != first->n)
+            return false;
+    }
+    return w->n_channels > 0;
 }
 
 struct imp_spectrum *imp__rgb_responses(struct imp_arena *arena)

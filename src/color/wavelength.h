@@ -24,6 +24,7 @@ struct imp_wavelengths {
     const double *cdf;
     int n_channels;
     const struct imp_spectrum *response; /* [n_channels] r_c, per nm */
+    bool one_grid; /* those that walks have are samples at the same wavelengths */
 };
 
 /* The wavelengths of one walk. */
@@ -34,6 +35,9 @@ struct imp_waves {
     int n_channels;
     imp_spec channel[IMP_CHANNELS_MAX]; /* channel c is channel[c] . L */
 };
+
+/* For one_grid. */
+bool imp__responses_share_grid(const struct imp_wavelengths *w);
 
 /* u: uniform on [0, 1). The hero is lane 0. */
 void imp__waves_make(const struct imp_wavelengths *w, double u, struct imp_waves *out);

@@ -172,6 +172,7 @@ enum imp_status imp__waves_build(struct imp_scene *scene)
             w.lo = imp_max(film->srf->lo, w.lo);
             w.hi = imp_min(film->srf->hi, w.hi);
         }
+        w.one_grid = imp__responses_share_grid(&w);
         IMP_TRY(lit_check(scene, scene->sensors[s]));
         all[s * IMP_WAVES_DRAWN + IMP_WAVES_UNIFORM] = w;
         IMP_TRY(density_make(scene, film, &w));
