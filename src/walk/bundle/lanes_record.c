@@ -110,7 +110,9 @@ void imp__lanes_record(struct imp_depth *d, const struct imp_bin *bin,
         out->shape = b->tracer->scene->shapes[d->hits->shape[v->order[k]]];
         out->d.shape = out->shape->index;
         out->d.scatterer = IMP_AT_SURFACE;
-        for (int j = 0; j < n_in; j++) out->in[j] = color_lane(&v->in[j], 4, k);
+        for (int j = 0; j < n_in; j++)
+            out->in[j] =
+                bin->kernel ? color_lane(&v->in[j], 4, k) : v->each[k * v->stride + j];
         surface_put(d, v, k, out);
         if (lit->on & bit) light_put(lit, b->colors, k, out);
         if (step->on & bit) step_put(step, b->colors, k, out);
