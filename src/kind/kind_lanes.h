@@ -22,6 +22,11 @@ static inline struct imp_wide_color imp__wide_color(imp_spec s)
         {imp__wide(s[0]), imp__wide(s[1]), imp__wide(s[2]), imp__wide(s[3])}};
 }
 
+static inline imp_spec imp__color_lane(const struct imp_wide_color *x, int colors, int k)
+{
+    return (imp_spec){x->c[0][k], x->c[1][k], x->c[2][k], colors > 3 ? x->c[3][k] : 0};
+}
+
 /* ---- Shapes ------------------------------------------------------------------------------ */
 
 /* Hits of one shape: rows at[k] of columns. */
@@ -58,6 +63,18 @@ struct imp_shape_lanes {
 };
 /* NULL: this shape has none. */
 const struct imp_shape_lanes *imp__shape_lanes(const struct imp_shape *s);
+
+/* ---- Textures ---------------------------------------------------------------------------- */
+
+struct imp_texture_lanes {
+    bool (*covers)(const struct imp_texture *t);
+    /* imp_texture_ops.eval in colours, of shapes that are not looked up by triangle; c[3] is
+     * anything. */
+    void (*eval)(const struct imp_texture *t, const imp_wide uv[2], bool scalar,
+                 struct imp_wide_color *value);
+};
+/* NULL: this texture has none. */
+const struct imp_texture_lanes *imp__texture_lanes(const struct imp_texture *t);
 
 /* ---- Materials --------------------------------------------------------------------------- */
 

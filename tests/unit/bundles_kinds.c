@@ -68,6 +68,40 @@ static void ideal(void)
     "name='raw' value='true'/></texture>"
 #define GGX "<string name='distribution' value='ggx'/>"
 
+/* Bitmaps by all their wrap modes and filters, as colours and as numbers. */
+static void bitmaps(void)
+{
+    static const char *const wraps[] = {"repeat", "mirror", "clamp"};
+    static char path[64], rest[16384], each[1024];
+    if (!picture_write(path)) {
+        tap_ok(false, "a file for a picture");
+        return;
+    }
+    strcpy(rest, SKY LAMP("0", "0", ".5"));
+    for (int k = 0; k < 12; k++) {
+        const bool number = k >= 6;
+        snprintf(each, sizeof each,
+                 "<shape type='rectangle'><transform name='to_world'><scale "
+                 "value='.5'/><rotate y='1' angle='%d'/><translate x='%g' y='%g' "
+                 "z='%g'/></transform><bsdf type='%s'>%s<texture type='bitmap' "
+                 "name='%s'><string name='filename' value='%s'/><string name='wrap_mode' "
+                 "value='%s'/><string name='filter_type' value='%s'/>%s</texture></bsdf>"
+                 "</shape>",
+                 k * 7 - 30, k % 4 * .9 - 1.4, k / 4 * .9 - .9, -.2 * (k % 3),
+                 number ? "roughconductor" : "diffuse", number ? GGX : "",
+                 number ? "alpha" : "reflectance", path, wraps[k % 3],
+                 k % 2 ? "nearest" : "bilinear",
+                 k == 4 ? ""
+                        : "<transform name='to_uv'><scale value='2.7'/><rotate z='1' "
+                          "angle='20'/><translate x='-.9' y='-.8'/></transform>");
+        strcat(rest, each);
+    }
+    compare("bitmaps", IMP_RGB, 12, PATH(DEPTH("5")), CAMERA, rest);
+    compare("bitmaps in grey", IMP_MONO, 12, PATH(DEPTH("5")), CAMERA, rest);
+    compare("bitmaps in spectra", IMP_SPECTRAL, 12, PATH(DEPTH("4")), CAMERA, rest);
+    unlink(path);
+}
+
 /* Kinds without a form in lanes, called lane by lane, with texels among their inputs. */
 static void lane_by_lane(void)
 {
@@ -129,6 +163,7 @@ int main(void)
     ctx = test_context(1);
     materials();
     ideal();
+    bitmaps();
     lane_by_lane();
     imp_context_destroy(ctx);
     return tap_done();

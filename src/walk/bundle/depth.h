@@ -53,6 +53,8 @@ struct imp_bin {
     uint64_t derivative;                   /* as of struct imp_dirs */
     bool plain;   /* its inputs are the constants `in`, without a kernel `each` */
     bool spectra; /* where walks carry wavelengths: all are plain spectra */
+    bool
+        texels; /* in colours: those that are not plain are textures with a form in lanes */
     union {
         struct imp_wide_color in[IMP_INPUTS_MAX];
         imp_spec each[IMP_INPUTS_MAX];

@@ -25,6 +25,13 @@ bool imp__shape_in_lanes(const struct imp_tracer *tracer, int shape)
                 IMP_ANALYTIC); /* else points are located by what is not in lanes */
 }
 
+/* A texture that is looked up in lanes. */
+static bool has_lanes(const struct imp_input *i)
+{
+    return i->texture && !i->bump && !i->vector && !i->luminance && !i->component &&
+           imp__texture_lanes(i->texture);
+}
+
 void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *bin)
 {
     const struct imp_shape *s = tracer->scene->shapes[shape];
@@ -40,6 +47,9 @@ void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *
         bin->plain &= b->input[j]->plain;
         bin->spectra &= b->input[j]->plain && b->input[j]->spectrum;
     }
+    bin->texels = !bin->plain && bin->surface && !s->by_triangle;
+    for (int j = 0; bin->texels && j < b->n_in; j++)
+        bin->texels = b->input[j]->plain || has_lanes(b->input[j]);
     for (int j = 0; bin->plain && j < b->n_in; j++)
         if (bin->kernel) bin->in[j] = imp__wide_color(b->input[j]->value);
         else bin->each[j] = b->input[j]->value;
@@ -104,6 +114,18 @@ static void inputs_alone(const struct imp_depth *d, const struct imp_bsdf *b,
     }
 }
 
+/* Inputs that are constants, or textures with a form in lanes. */
+static void inputs_in_lanes(const struct imp_bsdf *b, const struct imp_wide_surface *x,
+                            struct imp_wide_color *in)
+{
+    const imp_wide uv[2] = {imp__wide_decide(x->uv[0]), imp__wide_decide(x->uv[1])};
+    for (int j = 0; j < b->n_in; j++) {
+        const struct imp_input *i = b->input[j];
+        if (i->plain) in[j] = imp__wide_color(i->value);
+        else imp__texture_lanes(i->texture)->eval(i->texture, uv, i->scalar, &in[j]);
+    }
+}
+
 /* Inputs that are the same spectra everywhere, at each walk's wavelengths. */
 static void spectra_alone(const struct imp_bsdf *b,
                           const struct imp_carried *const *carried,
@@ -123,6 +145,7 @@ void imp__lanes_inputs(const struct imp_depth *d, const struct imp_bin *bin,
                        struct imp_wide_color *in)
 {
     if (carried && bin->spectra) spectra_alone(bin->bsdf, carried, in);
+    else if (!carried && bin->texels) inputs_in_lanes(bin->bsdf, x, in);
     else inputs_alone(d, bin->bsdf, carried, h, x, in);
 }
 
@@ -132,8 +155,18 @@ void imp__lanes_inputs_each(const struct imp_depth *d, const struct imp_bin *bin
                             const struct imp_wide_surface *x, unsigned bits,
                             imp_spec *each)
 {
+    const int n = bin->bsdf->n_in;
+    if (!carried && bin->texels) {
+        struct imp_wide_color in[IMP_INPUTS_MAX];
+        inputs_in_lanes(bin->bsdf, x, in);
+        for (; bits; bits &= bits - 1) {
+            const int k = __builtin_ctz(bits);
+            for (int j = 0; j < n; j++) each[k * n + j] = imp__color_lane(&in[j], 4, k);
+        }
+        return;
+    }
     for (; bits; bits &= bits - 1) {
         const int k = __builtin_ctz(bits);
-        inputs_of_lane(d, bin->bsdf, carried, h, x, k, each + k * bin->bsdf->n_in);
+        inputs_of_lane(d, bin->bsdf, carried, h, x, k, each + k * n);
     }
 }
