@@ -22,6 +22,11 @@ static inline struct imp_wide_color imp__wide_color(imp_spec s)
         {imp__wide(s[0]), imp__wide(s[1]), imp__wide(s[2]), imp__wide(s[3])}};
 }
 
+static inline imp_spec imp__color_lane(const struct imp_wide_color *x, int colors, int k)
+{
+    return (imp_spec){x->c[0][k], x->c[1][k], x->c[2][k], colors > 3 ? x->c[3][k] : 0};
+}
+
 /* ---- Shapes ------------------------------------------------------------------------------ */
 
 /* Hits of one shape: rows at[k] of columns. */
@@ -71,6 +76,18 @@ struct imp_shape_lanes {
 /* NULL: this shape has none. */
 const struct imp_shape_lanes *imp__shape_lanes(const struct imp_shape *s);
 
+/* ---- Textures ---------------------------------------------------------------------------- */
+
+struct imp_texture_lanes {
+    bool (*covers)(const struct imp_texture *t);
+    /* imp_texture_ops.eval in colours, of shapes that are not looked up by triangle; c[3] is
+     * anything. */
+    void (*eval)(const struct imp_texture *t, const imp_wide uv[2], bool scalar,
+                 struct imp_wide_color *value);
+};
+/* NULL: this texture has none. */
+const struct imp_texture_lanes *imp__texture_lanes(const struct imp_texture *t);
+
 /* ---- Materials --------------------------------------------------------------------------- */
 
 /* Lobes, as of struct imp_dirs: IMP_SMOOTH, or the index of a delta lobe. */
@@ -118,7 +135,7 @@ const struct imp_phase_lanes *imp__phase_lanes(const struct imp_phase *p);
 
 struct imp_emitter_lanes {
     bool (*covers)(const struct imp_emitter *e); /* NULL: all are */
-    /* imp_emitter_ops.sample. */
+    /* imp_emitter_ops.sample; out->drawn is given as the lanes that count. */
     void (*sample)(const struct imp_emitter *e, const imp_wide3 *ref, const imp_wide u[2],
                    struct imp_wide_light *out);
     bool far; /* its points are infinitely far */
@@ -129,6 +146,10 @@ struct imp_emitter_lanes {
     void (*emission)(const struct imp_emitter *e, const imp_wide u[4],
                      struct imp_wide_emission *out);
     bool (*emits)(const struct imp_emitter *e);
+    /* Radiance in colours that arrives from the directions wi, as decided, of those that are far and
+     * not even (walk/core/emitted.h); else NULL. */
+    void (*radiance)(const struct imp_emitter *e, const imp_wide3 *wi,
+                     struct imp_wide_color *le);
 };
 /* NULL: this emitter has none. */
 const struct imp_emitter_lanes *imp__emitter_lanes(const struct imp_emitter *e);

@@ -102,6 +102,18 @@ static inline imp_wide_float imp__wide_narrow(imp_wide x)
 #endif
 }
 
+/* The whole number below. */
+static inline imp_wide imp__wide_floor(imp_wide x)
+{
+#if IMP_WIDE_LANES == 8
+    return (imp_wide)_mm512_floor_pd((__m512d)x);
+#elif defined(__AVX__)
+    return (imp_wide)_mm256_floor_pd((__m256d)x);
+#else
+    return (imp_wide){floor(x[0]), floor(x[1]), floor(x[2]), floor(x[3])};
+#endif
+}
+
 /* ---- Columns ----------------------------------------------------------------------------- */
 
 static inline imp_wide imp__wide_load(const double *from)
@@ -132,6 +144,27 @@ static inline imp_wide3 imp__wide3_taken(double *const column[3], const int32_t 
 {
     return (imp_wide3){imp__wide_taken(column[0], at), imp__wide_taken(column[1], at),
                        imp__wide_taken(column[2], at)};
+}
+
+/* Numbers at index, whole numbers below 2^31; and floats. */
+static inline imp_wide imp__wide_found(const double *from, imp_wide index)
+{
+#if IMP_WIDE_LANES == 8
+    return (imp_wide)_mm512_i32gather_pd(_mm512_cvtpd_epi32((__m512d)index), from, 8);
+#else
+    return (imp_wide){from[(int32_t)index[0]], from[(int32_t)index[1]],
+                      from[(int32_t)index[2]], from[(int32_t)index[3]]};
+#endif
+}
+static inline imp_wide imp__wide_gathered(const float *from, imp_wide index)
+{
+#if IMP_WIDE_LANES == 8
+    const __m256i at = _mm512_cvtpd_epi32((__m512d)index);
+    return (imp_wide)_mm512_cvtps_pd(_mm256_i32gather_ps(from, at, 4));
+#else
+    return (imp_wide){from[(int32_t)index[0]], from[(int32_t)index[1]],
+                      from[(int32_t)index[2]], from[(int32_t)index[3]]};
+#endif
 }
 
 /* The lanes with bits, side by side; writes all lanes. */

@@ -11,7 +11,8 @@
 enum { IMP_LIGHT_NODES = 128 };
 
 struct imp_light_lanes {
-    imp_wide3 p, n; /* places that are faced by lights before them alone */
+    imp_wide3 p, n;
+    bool faces; /* what arrives from behind n counts for nothing */
     int32_t node[IMP_LIGHT_NODES];
     unsigned near[IMP_LIGHT_NODES];
     imp_wide importance[IMP_LIGHT_NODES];
@@ -22,8 +23,8 @@ struct imp_lights_chosen {
     int prim[IMP_WIDE_LANES]; /* a triangle of it; -1: all of it */
     imp_wide chance;
 };
-/* imp__light_tree_choose for places p that light reaches from before n alone, in the lanes with bits. A
- * bit for each lane that has a light. */
+/* imp__light_tree_choose for places p that light reaches from before n alone, or, with n NULL, from
+ * everywhere, in the lanes with bits. A bit for each lane that has a light. */
 unsigned imp__light_lanes_choose(const struct imp_light_tree *t, const imp_wide3 *p,
                                  const imp_wide3 *n, unsigned bits, imp_wide *u,
                                  struct imp_lights_chosen *out);

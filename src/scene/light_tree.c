@@ -47,7 +47,7 @@ static double importance_in_lanes(const struct imp_light_tree *t, int32_t i,
         imp_wide_truth so_near;
         const imp_wide p[3] = {l->p.x, l->p.y, l->p.z}, n[3] = {l->n.x, l->n.y, l->n.z};
         l->importance[slot] =
-            IMP_WIDE_OF(imp__light_importance)(&t->node[i], p, n, true, &so_near);
+            IMP_WIDE_OF(imp__light_importance)(&t->node[i], p, n, l->faces, &so_near);
         l->near[slot] = imp__wide_bits(so_near);
         l->node[slot] = i;
     }
@@ -209,7 +209,7 @@ static unsigned few_choose(const struct imp_light_tree *t,
         if (t->node[i].second >= 0 || !(t->node[i].strength > 0)) continue;
         leaf[n_leaves] = &t->node[i];
         weight[n_leaves] =
-            IMP_WIDE_OF(imp__light_importance)(&t->node[i], p, n, true, &near);
+            IMP_WIDE_OF(imp__light_importance)(&t->node[i], p, n, lanes->faces, &near);
         sum += weight[n_leaves++];
     }
     for (int k = 0; k < n_leaves; k++) {
@@ -239,7 +239,8 @@ unsigned imp__light_lanes_choose(const struct imp_light_tree *t, const imp_wide3
     struct imp_light_lanes lanes;
     unsigned lit = 0;
     lanes.p = *p;
-    lanes.n = *n;
+    lanes.n = n ? *n : *p;
+    lanes.faces = n != NULL;
     if (t->n_items > 0 && t->n_items <= FEW && t->n_far == 0)
         return bits & few_choose(t, &lanes, u, out);
     memset(lanes.node, -1, sizeof lanes.node);

@@ -5,33 +5,15 @@
  * itself: eval, scatter and tangent all go through `footprint`. */
 #include "bitmap.h"
 #include "base/required.h"
+#include "bitmap_data.h"
 #include "color/rgb.h"
 #include "color/spectrum.h"
 #include "input.h"
-#include "lifted_texels.h"
 #include "math/vec.h"
-#include "uv.h"
 #include <math.h>
 #include <string.h>
 
-enum wrap { WRAP_REPEAT, WRAP_MIRROR, WRAP_CLAMP };
-enum filter { FILTER_BILINEAR, FILTER_NEAREST };
-
 extern const struct imp_texture_ops imp__bitmap;
-
-struct bitmap {
-    int width, height, channels; /* 1 or 3 */
-    enum wrap wrap;
-    enum filter filter;
-    bool identity; /* to_uv does nothing */
-    struct imp__to_uv to_uv;
-    float *data;      /* [height][width][channels], and one number more */
-    int64_t negative; /* as of struct imp__texels */
-    double negative_value;
-    bool spectral;                    /* walks carry wavelengths */
-    bool daylight;                    /* ... in which it is times daylight */
-    struct imp__lifted_texels lifted; /* of three channels in a spectral mode */
-};
 
 /* Pixels with one more value than needed: three channels are read with one load of four.
  */

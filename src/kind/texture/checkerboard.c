@@ -4,6 +4,7 @@
  * two are swapped, as in Mitsuba (docs/scene-format.md 6.1, 15: followed so that pictures
  * agree). */
 #include "input.h"
+#include "texture_lanes.h"
 #include "uv.h"
 
 extern const struct imp_texture_ops imp__checkerboard;
@@ -74,3 +75,32 @@ const struct imp_texture_ops imp__checkerboard = {.size = sizeof(struct imp_text
                                                   .eval = eval,
                                                   .scatter = scatter,
                                                   .tangent = tangent};
+
+/* ---- In lanes ---------------------------------------------------------------------------- */
+
+static bool covers(const struct imp_texture *t)
+{
+    return !t->input[0]->texture && !t->input[1]->texture;
+}
+static void eval_lanes(const struct imp_texture *t, const imp_wide uv[2], bool scalar,
+                       struct imp_wide_color *value)
+{
+    const struct checkerboard *c = t->self;
+    const struct imp_texcoord anywhere = {.prim = -1};
+    imp_wide_truth second[2];
+    imp_spec color[2];
+    for (int k = 0; k < 2; k++) {
+        const imp_wide x =
+            c->to_uv.m[k][0] * uv[0] + c->to_uv.m[k][1] * uv[1] + c->to_uv.m[k][2];
+        second[k] = x - imp__wide_floor(x) > imp__wide(0.5);
+        imp_input_eval(t->input[k], &anywhere, scalar, &color[k]);
+    }
+    const imp_wide_truth differ = second[0] ^ second[1],
+                         first = scalar ? differ : ~differ;
+    for (int k = 0; k < 4; k++)
+        value->c[k] =
+            imp__wide_choose(first, imp__wide(color[0][k]), imp__wide(color[1][k]));
+}
+
+const struct imp_texture_lanes imp__checkerboard_lanes = {.covers = covers,
+                                                          .eval = eval_lanes};

@@ -5,8 +5,9 @@
  * the bit; together they take less time, since kinds whose formulas are texts in lanes work on
  * several at once.
  *
- * A bundle begins in bundle.c. Vertices are made in lanes (lanes_vertex.c) or, where a kind has no
- * such text, one by one by the step of walks that go alone (alone_vertex.c). */
+ * A bundle begins in bundle.c. Vertices are made in lanes (lanes_vertex.c), where kinds without such
+ * a text are called lane by lane; those on lights, and few on a shape, are made one by one by the
+ * step of walks that go alone (alone_vertex.c). */
 #ifndef IMP_WALK_BUNDLE_H
 #define IMP_WALK_BUNDLE_H
 

@@ -17,6 +17,7 @@ struct imp_lone {
     int medium; /* where it begins, in media (struct imp_shadows) */
     double behind;
     imp_spec scratch[IMP_INPUTS_MAX];
+    imp_spec each[IMP_WIDE_LANES * IMP_INPUTS_MAX]; /* inputs of vertices in lanes */
 };
 
 struct imp_depth {
@@ -48,17 +49,23 @@ void imp__collision_alone(struct imp_depth *d, int i, int at);
 void imp__meter_vertex(struct imp_depth *d, const struct imp_walk *begun, int walk,
                        double *weight);
 
-/* Vertices of a material with a form in lanes (lanes_vertex.c), on one shape or several. */
+/* Vertices of a material that are made in lanes (lanes_vertex.c), on one shape or several. */
 struct imp_bin {
     int medium;  /* they are collisions in it; -1: they lie on surfaces */
     bool sealed; /* ... and no light sample leaves it (scene/sealed.h) */
     const struct imp_shape *shape; /* the one, or one of them */
     const struct imp_bsdf *bsdf;
     const struct imp_shape_lanes *surface; /* of the one; NULL: point by point */
-    const struct imp_bsdf_lanes *kernel;
-    bool plain;   /* its inputs are the constants `in` */
+    const struct imp_bsdf_lanes *kernel;   /* NULL: lane by lane (lone_kernel.c) */
+    uint64_t derivative;                   /* as of struct imp_dirs */
+    bool plain;   /* its inputs are the constants `in`, without a kernel `each` */
     bool spectra; /* where walks carry wavelengths: all are plain spectra */
-    struct imp_wide_color in[IMP_INPUTS_MAX];
+    bool
+        texels; /* in colours: those that are not plain are textures with a form in lanes */
+    union {
+        struct imp_wide_color in[IMP_INPUTS_MAX];
+        imp_spec each[IMP_INPUTS_MAX];
+    };
 };
 /* Walks of this tracer may have vertices in lanes. */
 bool imp__lanes_fit(const struct imp_tracer *tracer);

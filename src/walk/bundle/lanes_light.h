@@ -26,7 +26,7 @@ void imp__lanes_light_draw(const struct imp_scene *scene,
                            struct imp_lanes_light *out);
 
 /* The same where lights are chosen by the scene's tree: vertices at p, whose light comes from before n
- * alone. */
+ * alone, or, with n NULL, from everywhere. */
 void imp__lanes_tree_draw(const struct imp_scene *scene,
                           const struct imp_carried *const *carried, const imp_wide3 *p,
                           const imp_wide3 *n, const imp_wide u[2], imp_wide which,

@@ -14,42 +14,47 @@ bool imp__lanes_fit(const struct imp_tracer *t)
            w->directions && !w->only_points && t->scene->n_groups == 0;
 }
 
-static const struct imp_bsdf_lanes *kernel_of(const struct imp_tracer *tracer,
-                                              const struct imp_bsdf *b)
-{
-    const struct imp_active *active = tracer->active;
-    return imp__bsdf_lanes(b, active && b->index >= 0 ? active->inputs[b->index] : 0);
-}
-
 bool imp__shape_in_lanes(const struct imp_tracer *tracer, int shape)
 {
     const struct imp_shape *s = tracer->scene->shapes[shape];
     const struct imp_bsdf *b = imp__shape_bsdf(tracer->scene, s);
-    const unsigned lobes = IMP_BSDF_SMOOTH | IMP_BSDF_DELTA | IMP_BSDF_TRANSMIT;
-    return s->emitter < 0 && !s->body && !b->shaped && !(b->flags & ~lobes) &&
-           b->n_in <= IMP_INPUTS_MAX && kernel_of(tracer, b) &&
+    return s->emitter < 0 && !s->body && !b->shaped &&
+           !(b->flags & (IMP_BSDF_EMIT | IMP_BSDF_NULL)) && b->n_in <= IMP_INPUTS_MAX &&
            (tracer->value_only || s->geometry == IMP_TRIANGLES ||
             s->geometry ==
                 IMP_ANALYTIC); /* else points are located by what is not in lanes */
+}
+
+/* A texture that is looked up in lanes. */
+static bool has_lanes(const struct imp_input *i)
+{
+    return i->texture && !i->bump && !i->vector && !i->luminance && !i->component &&
+           imp__texture_lanes(i->texture);
 }
 
 void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *bin)
 {
     const struct imp_shape *s = tracer->scene->shapes[shape];
     const struct imp_bsdf *b = imp__shape_bsdf(tracer->scene, s);
+    const struct imp_active *active = tracer->active;
     bin->medium = -1;
     bin->sealed = false;
     bin->shape = s;
     bin->bsdf = b;
     bin->surface = imp__shape_lanes(s);
-    bin->kernel = kernel_of(tracer, b);
+    bin->derivative = active && b->index >= 0 ? active->inputs[b->index] : 0;
+    bin->kernel = imp__bsdf_lanes(b, bin->derivative);
     bin->plain = bin->spectra = true;
     for (int j = 0; j < b->n_in; j++) {
         bin->plain &= b->input[j]->plain;
         bin->spectra &= b->input[j]->plain && b->input[j]->spectrum;
     }
+    bin->texels = !bin->plain && bin->surface && !s->by_triangle;
+    for (int j = 0; bin->texels && j < b->n_in; j++)
+        bin->texels = b->input[j]->plain || has_lanes(b->input[j]);
     for (int j = 0; bin->plain && j < b->n_in; j++)
-        bin->in[j] = imp__wide_color(b->input[j]->value);
+        if (bin->kernel) bin->in[j] = imp__wide_color(b->input[j]->value);
+        else bin->each[j] = b->input[j]->value;
 }
 
 /* ---- Where it is ------------------------------------------------------------------------- */
@@ -83,6 +88,20 @@ void imp__lanes_surface(const struct imp_depth *d, const struct imp_wide_hits *h
     }
 }
 
+static inline void inputs_of_lane(const struct imp_depth *d, const struct imp_bsdf *b,
+                                  const struct imp_carried *const *carried,
+                                  const struct imp_wide_hits *h,
+                                  const struct imp_wide_surface *x, int k, imp_spec *own)
+{
+    const struct imp_texcoord at = {
+        .uv = {imp__decide1(x->uv[0][k]), imp__decide1(x->uv[1][k])},
+        .p = imp__decide(imp__wide3_lane(&x->p, k)),
+        .carried = carried ? carried[k] : NULL,
+        .shape = shape_of(d, h->at[k]),
+        .prim = h->prim[h->at[k]]};
+    imp__inputs_eval(b->input, b->n_in, &at, own);
+}
+
 /* Inputs that are textures, point by point. */
 static void inputs_alone(const struct imp_depth *d, const struct imp_bsdf *b,
                          const struct imp_carried *const *carried,
@@ -91,15 +110,21 @@ static void inputs_alone(const struct imp_depth *d, const struct imp_bsdf *b,
 {
     for (int k = 0; k < IMP_WIDE_LANES; k++) {
         imp_spec own[IMP_INPUTS_MAX];
-        const struct imp_texcoord at = {
-            .uv = {imp__decide1(x->uv[0][k]), imp__decide1(x->uv[1][k])},
-            .p = imp__decide(imp__wide3_lane(&x->p, k)),
-            .carried = carried ? carried[k] : NULL,
-            .shape = shape_of(d, h->at[k]),
-            .prim = h->prim[h->at[k]]};
-        imp__inputs_eval(b->input, b->n_in, &at, own);
+        inputs_of_lane(d, b, carried, h, x, k, own);
         for (int j = 0; j < b->n_in; j++)
             for (int c = 0; c < 4; c++) in[j].c[c][k] = own[j][c];
+    }
+}
+
+/* Inputs that are constants, or textures with a form in lanes. */
+static void inputs_in_lanes(const struct imp_bsdf *b, const struct imp_wide_surface *x,
+                            struct imp_wide_color *in)
+{
+    const imp_wide uv[2] = {imp__wide_decide(x->uv[0]), imp__wide_decide(x->uv[1])};
+    for (int j = 0; j < b->n_in; j++) {
+        const struct imp_input *i = b->input[j];
+        if (i->plain) in[j] = imp__wide_color(i->value);
+        else imp__texture_lanes(i->texture)->eval(i->texture, uv, i->scalar, &in[j]);
     }
 }
 
@@ -122,5 +147,28 @@ void imp__lanes_inputs(const struct imp_depth *d, const struct imp_bin *bin,
                        struct imp_wide_color *in)
 {
     if (carried && bin->spectra) spectra_alone(bin->bsdf, carried, in);
+    else if (!carried && bin->texels) inputs_in_lanes(bin->bsdf, x, in);
     else inputs_alone(d, bin->bsdf, carried, h, x, in);
+}
+
+void imp__lanes_inputs_each(const struct imp_depth *d, const struct imp_bin *bin,
+                            const struct imp_carried *const *carried,
+                            const struct imp_wide_hits *h,
+                            const struct imp_wide_surface *x, unsigned bits,
+                            imp_spec *each)
+{
+    const int n = bin->bsdf->n_in;
+    if (!carried && bin->texels) {
+        struct imp_wide_color in[IMP_INPUTS_MAX];
+        inputs_in_lanes(bin->bsdf, x, in);
+        for (; bits; bits &= bits - 1) {
+            const int k = __builtin_ctz(bits);
+            for (int j = 0; j < n; j++) each[k * n + j] = imp__color_lane(&in[j], 4, k);
+        }
+        return;
+    }
+    for (; bits; bits &= bits - 1) {
+        const int k = __builtin_ctz(bits);
+        inputs_of_lane(d, bin->bsdf, carried, h, x, k, each + k * n);
+    }
 }

@@ -5,10 +5,6 @@
 #include "lanes_record.h"
 #include "walk/core/vertices.h"
 
-static inline imp_spec color_lane(const struct imp_wide_color *x, int colors, int k)
-{
-    return (imp_spec){x->c[0][k], x->c[1][k], x->c[2][k], colors > 3 ? x->c[3][k] : 0};
-}
 static inline void direction_put(imp_decided out[3], const imp_wide3 *v, int k)
 {
     out[0] = (imp_decided)v->x[k];
@@ -53,9 +49,9 @@ static inline void light_put(const struct imp_lanes_lit *lit, int colors, int k,
     l->located = (struct imp_located){x->prim[k],
                                       {(float)x->located[0][k], (float)x->located[1][k]}};
     out->d.connection = IMP_OCCLUDED;
-    out->b = color_lane(&lit->brings, colors, k);
-    out->light_f = color_lane(&lit->f, colors, k);
-    out->light_e = color_lane(&lit->light.radiance, colors, k);
+    out->b = imp__color_lane(&lit->brings, colors, k);
+    out->light_f = imp__color_lane(&lit->f, colors, k);
+    out->light_e = imp__color_lane(&lit->light.radiance, colors, k);
     out->light_w = imp__spec(lit->weight[k]);
 }
 
@@ -65,7 +61,7 @@ static inline void step_put(const struct imp_lanes_step *step, int colors, int k
 {
     struct imp_decision *of = &out->d;
     out->scale = imp__spec(step->scale[k]);
-    out->w = color_lane(&step->w, colors, k);
+    out->w = imp__color_lane(&step->w, colors, k);
     direction_put(of->wi, &step->wi, k);
     of->lobe = (int8_t)step->lobe[k];
     of->pdf = (imp_decided)step->pdf[k];
@@ -110,7 +106,9 @@ void imp__lanes_record(struct imp_depth *d, const struct imp_bin *bin,
         out->shape = b->tracer->scene->shapes[d->hits->shape[v->order[k]]];
         out->d.shape = out->shape->index;
         out->d.scatterer = IMP_AT_SURFACE;
-        for (int j = 0; j < n_in; j++) out->in[j] = color_lane(&v->in[j], 4, k);
+        for (int j = 0; j < n_in; j++)
+            out->in[j] = bin->kernel ? imp__color_lane(&v->in[j], 4, k)
+                                     : v->each[k * v->stride + j];
         surface_put(d, v, k, out);
         if (lit->on & bit) light_put(lit, b->colors, k, out);
         if (step->on & bit) step_put(step, b->colors, k, out);
@@ -131,7 +129,7 @@ void imp__lanes_record_sky(struct imp_depth *d, const int32_t *order, int n, int
         struct imp_decision *of = &out->d;
         s->walk->valid = true;
         out->t = INFINITY;
-        out->e = color_lane(met, 3, k);
+        out->e = imp__color_lane(met, 3, k);
         of->scatterer = IMP_AT_SKY;
         of->uv[0] = of->uv[1] = 0;
         direction_put(of->p, wi, k);

@@ -14,6 +14,10 @@ struct imp_lanes_vertices {
     bool points, recorded;
     int depth;
     const struct imp_wide_color *in;
+    const imp_spec
+        *each; /* of materials without a kernel in place of `in`: those of lane k
+                             begin at number k stride */
+    int stride;
     unsigned on; /* a bit for each lane that counts */
     int at;      /* place of the first among the values of the depth */
     const int32_t *order;
@@ -49,6 +53,24 @@ void imp__lanes_inputs(const struct imp_depth *d, const struct imp_bin *bin,
                        const struct imp_carried *const *carried,
                        const struct imp_wide_hits *hits, const struct imp_wide_surface *x,
                        struct imp_wide_color *in);
+/* The same of the lanes with bits, for materials without a kernel; each [lanes n_in]. */
+void imp__lanes_inputs_each(const struct imp_depth *d, const struct imp_bin *bin,
+                            const struct imp_carried *const *carried,
+                            const struct imp_wide_hits *hits,
+                            const struct imp_wide_surface *x, unsigned bits,
+                            imp_spec *each);
+
+/* What kernels of struct imp_bsdf_lanes do, for materials without one: for the lanes that count, or
+ * those with bits, where a density is wanted (lone_kernel.c). */
+imp_wide_truth imp__lone_sample(const struct imp_bin *bin,
+                                const struct imp_lanes_vertices *v, const imp_wide u[3],
+                                imp_wide3 *wi, imp_wide_lobe *lobe);
+imp_wide imp__lone_pdf_eval(const struct imp_bin *bin, const struct imp_lanes_vertices *v,
+                            const imp_wide3 *wi, const imp_wide_lobe *lobe, unsigned bits,
+                            struct imp_wide_color *f);
+imp_wide imp__lone_index_ratio(const struct imp_bin *bin,
+                               const struct imp_lanes_vertices *v, const imp_wide3 *wi,
+                               const imp_wide_lobe *lobe, unsigned bits);
 
 /* Where walks have derivatives: is there a lane with a value that is zero but has one? Then they are to
  * be made one by one. */

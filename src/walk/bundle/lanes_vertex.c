@@ -31,12 +31,12 @@ static inline imp_wide_truth is_zero(const imp_wide f[4], int colors)
 
 /* imp__light_place of lane k. */
 static inline struct imp_light_place place_of(const struct imp_lanes_vertices *v,
-                                              const bool ideal, const struct imp_bsdf *b,
+                                              const bool any, const struct imp_bsdf *b,
                                               int k)
 {
     return (struct imp_light_place){.p = imp__wide3_lane(&v->x.p, k),
                                     .n = imp__wide3_lane(&v->faced, k),
-                                    .faces = !ideal || !(b->flags & IMP_BSDF_TRANSMIT)};
+                                    .faces = !any || imp__is_faced(b)};
 }
 
 static inline imp_wide number(const struct imp_lanes_vertices *v, int use)
@@ -52,10 +52,40 @@ static imp_wide power_heuristic_over(imp_wide a, imp_wide b)
     return imp__wide_choose(a2 > imp__wide(0), a / (a2 + b2), imp__wide(0));
 }
 
+/* The kernel's functions (kind/kind_lanes.h), or those of a material that has none. `of`: the lanes for
+ * which a density is wanted. */
+static inline __attribute__((always_inline)) imp_wide
+pdf_eval(const struct imp_bin *bin, const struct imp_lanes_vertices *v,
+         const imp_wide3 *wi, const imp_wide_lobe *lobe, imp_wide_truth of,
+         const int colors, const bool any, struct imp_wide_color *f)
+{
+    return any && !bin->kernel
+               ? imp__lone_pdf_eval(bin, v, wi, lobe, imp__wide_bits(of) & v->on, f)
+               : bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, wi, lobe, colors, f);
+}
+static inline __attribute__((always_inline)) imp_wide_truth
+sample(const struct imp_bin *bin, const struct imp_lanes_vertices *v, const imp_wide u[3],
+       const bool any, imp_wide3 *wi, imp_wide_lobe *lobe)
+{
+    return any && !bin->kernel
+               ? imp__lone_sample(bin, v, u, wi, lobe)
+               : bin->kernel->sample(bin->bsdf, v->in, &v->wo_drawn, u, wi, lobe);
+}
+static inline __attribute__((always_inline)) imp_wide
+index_ratio(const struct imp_bin *bin, const struct imp_lanes_vertices *v,
+            const imp_wide3 *wi, const imp_wide_lobe *lobe, imp_wide_truth of)
+{
+    if (!bin->kernel)
+        return imp__lone_index_ratio(bin, v, wi, lobe, imp__wide_bits(of) & v->on);
+    return bin->kernel->index_ratio
+               ? bin->kernel->index_ratio(bin->bsdf, v->in, &v->wo, wi, lobe)
+               : imp__wide(1);
+}
+
 /* What lights bring to the vertices if they are seen. */
 static inline __attribute__((always_inline)) void
 light_weigh(struct imp_depth *d, const struct imp_bin *bin,
-            const struct imp_lanes_vertices *v, const int colors,
+            const struct imp_lanes_vertices *v, const int colors, const bool any,
             struct imp_lanes_lit *lit)
 {
     const imp_wide zero = imp__wide(0);
@@ -67,13 +97,14 @@ light_weigh(struct imp_depth *d, const struct imp_bin *bin,
     const struct imp_carried *const *carried = colors > 3 ? v->carried : NULL;
     l->at.recorded = v->recorded || d->bundle->tracer->active; /* which light it is */
     if (imp_unlikely(d->next->left != NULL))
-        imp__lanes_tree_draw(scene, carried, &v->x.p, &v->faced, u, which, v->points,
-                             v->on, l);
+        imp__lanes_tree_draw(scene, carried, &v->x.p,
+                             !any || imp__is_faced(bin->bsdf) ? &v->faced : NULL, u,
+                             which, v->points, v->on, l);
     else imp__lanes_light_draw(scene, carried, &v->x.p, u, which, v->points, v->on, l);
     lit->wi = imp__wide3_decide(imp__into_wide_frame(&v->x.frame, l->at.wi));
     const imp_wide_lobe smooth = imp__wide_smooth();
-    const imp_wide pdf = bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, &lit->wi,
-                                               &smooth, colors, &lit->f);
+    const imp_wide pdf =
+        pdf_eval(bin, v, &lit->wi, &smooth, l->at.drawn, colors, any, &lit->f);
     const imp_wide p = l->at.pdf * l->pmf;
     lit->weight =
         imp__wide_decide(imp__wide_choose(l->delta, 1 / p, power_heuristic_over(p, pdf)));
@@ -174,7 +205,7 @@ static inline imp_wide_truth survives(const struct imp_depth *d,
 /* Where walks go on, and what a step there weighs. */
 static inline __attribute__((always_inline)) void
 scatter_weigh(struct imp_depth *d, const struct imp_bin *bin,
-              const struct imp_lanes_vertices *v, const int colors, const bool ideal,
+              const struct imp_lanes_vertices *v, const int colors, const bool any,
               struct imp_lanes_step *s)
 {
     const imp_wide zero = imp__wide(0);
@@ -182,18 +213,15 @@ scatter_weigh(struct imp_depth *d, const struct imp_bin *bin,
                            number(v, IMP_DIM_DIR_V)};
     struct imp_wide_color f;
     s->lobe = imp__wide_smooth();
-    imp_wide_truth goes =
-        bin->kernel->sample(bin->bsdf, v->in, &v->wo_drawn, u, &s->wi, &s->lobe);
+    imp_wide_truth goes = sample(bin, v, u, any, &s->wi, &s->lobe);
     s->world = imp__out_of_wide_frame(&v->x.frame, s->wi);
     s->wi = imp__wide3_decide(s->wi);
-    s->pdf = imp__wide_decide(
-        bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, &s->wi, &s->lobe, colors, &f));
+    s->pdf = imp__wide_decide(pdf_eval(bin, v, &s->wi, &s->lobe, goes, colors, any, &f));
     const imp_wide by = 1 / s->pdf;
     imp_wide beta[4];
     imp_wide_truth part = {0};
     s->eta = imp__wide_taken(d->rays->eta, v->order);
-    if (ideal && bin->kernel->index_ratio)
-        s->eta *= bin->kernel->index_ratio(bin->bsdf, v->in, &v->wo, &s->wi, &s->lobe);
+    if (any) s->eta *= index_ratio(bin, v, &s->wi, &s->lobe, goes);
     goes &= s->pdf > zero;
     for (int c = 0; c < colors; c++) {
         const imp_wide factor = f.c[c] * by;
@@ -215,7 +243,7 @@ scatter_weigh(struct imp_depth *d, const struct imp_bin *bin,
 /* The next rays. */
 static inline __attribute__((always_inline)) void
 scatter_on(struct imp_depth *d, const struct imp_bin *bin,
-           const struct imp_lanes_vertices *v, const int colors, const bool ideal,
+           const struct imp_lanes_vertices *v, const int colors, const bool any,
            const bool media, const struct imp_lanes_step *s)
 {
     struct imp_flights *to = d->next;
@@ -225,9 +253,9 @@ scatter_on(struct imp_depth *d, const struct imp_bin *bin,
     imp__wide3_append(to->ray.d, n, bits, s->world);
     imp__wide_append(&to->ray.far[n], bits, imp__wide(INFINITY));
     imp__wide3_append(to->from, n, bits, v->x.p);
-    imp__wide_append(
-        &to->pdf[n], bits,
-        ideal ? imp__wide_choose(imp__is_smooth(s->lobe), s->pdf, imp__wide(0)) : s->pdf);
+    imp__wide_append(&to->pdf[n], bits,
+                     any ? imp__wide_choose(imp__is_smooth(s->lobe), s->pdf, imp__wide(0))
+                         : s->pdf);
     for (int c = 0; c < colors; c++)
         imp__wide_append(&to->beta[c][n], bits, s->beta.c[c]);
     imp__wide_append(&to->eta[n], bits, s->eta);
@@ -235,7 +263,7 @@ scatter_on(struct imp_depth *d, const struct imp_bin *bin,
         const int k = __builtin_ctz(left), i = to->ray.n++, from = v->order[k];
         to->walk[i] = d->rays->walk[from];
         to->up[i] = v->at + k;
-        if (to->left) to->left[i] = place_of(v, ideal, bin->bsdf, k);
+        if (to->left) to->left[i] = place_of(v, any, bin->bsdf, k);
         if (to->zeros) to->zeros[i] = d->rays->zeros[from];
         if (to->ray.time) to->ray.time[i] = d->rays->ray.time[from];
         if (media) ray_in_media(d, bin, v, k, i);
@@ -262,11 +290,12 @@ static inline void color_store(double *const to[4], int colors, int at,
     for (int c = 0; c < colors; c++) imp__wide_store(&to[c][at], x->c[c]);
 }
 
-/* ideal: their material has ideal lobes, or lets light through. False: they are to be made one by
+/* any: their material may be any; else it has a kernel and smooth lobes that send no light through.
+ * False: they are to be made one by
  * one, since a value that is zero has a derivative there. */
 static inline __attribute__((always_inline)) bool
 work(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order, int n, int at,
-     const int colors, const bool ideal, const bool media)
+     const int colors, const bool any, const bool media)
 {
     const struct imp_bundle *b = d->bundle;
     const struct imp_wide_hits hits = {.o = d->rays->ray.o,
@@ -303,17 +332,26 @@ work(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order, int n
     if (imp_unlikely(d->next->left != NULL))
         v.faced = imp__wide3_choose(v.wo.z < imp__wide(0),
                                     imp__wide3_opposite(v.x.frame.n), v.x.frame.n);
-    if (colors > 3 || !bin->plain) {
-        imp__lanes_inputs(d, bin, colors > 3 ? v.carried : NULL, &hits, &v.x, in);
+    const struct imp_carried *const *carried = colors > 3 ? v.carried : NULL;
+    if (any && !bin->kernel) {
+        v.each = bin->each;
+        v.stride = 0;
+        if (colors > 3 || !bin->plain) {
+            imp__lanes_inputs_each(d, bin, carried, &hits, &v.x, v.on, d->lone->each);
+            v.each = d->lone->each;
+            v.stride = bin->bsdf->n_in;
+        }
+    } else if (colors > 3 || !bin->plain) {
+        imp__lanes_inputs(d, bin, carried, &hits, &v.x, in);
         v.in = in;
     }
     lit.on = lit.dark = step.on = step.part = 0;
     if (imp_likely(!d->last)) {
         if (b->tracer->integrator->lights && b->tracer->scene->n_emitters > 0 &&
-            (!ideal || bin->bsdf->flags & IMP_BSDF_SMOOTH) && !(media && bin->sealed))
-            light_weigh(d, bin, &v, colors, &lit);
+            (!any || bin->bsdf->flags & IMP_BSDF_SMOOTH) && !(media && bin->sealed))
+            light_weigh(d, bin, &v, colors, any, &lit);
         else lit.brings = imp__wide_color(imp__spec(0));
-        scatter_weigh(d, bin, &v, colors, ideal, &step);
+        scatter_weigh(d, bin, &v, colors, any, &step);
     }
 
     if (b->tracer->active && imp_unlikely(imp__lanes_differ(d, bin, &lit, &step)))
@@ -333,32 +371,31 @@ work(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order, int n
     }
     if (imp_unlikely(d->last)) return true;
     light_see(d, bin, &v, media, &lit);
-    scatter_on(d, bin, &v, colors, ideal, media, &step);
+    scatter_on(d, bin, &v, colors, any, media, &step);
     return true;
 }
 
-#define WORK(name, colors, ideal, media)                                                 \
+#define WORK(name, colors, any, media)                                                   \
     static __attribute__((noinline)) bool name(struct imp_depth *d,                      \
                                                const struct imp_bin *bin,                \
                                                const int32_t *order, int n, int at)      \
     {                                                                                    \
-        return work(d, bin, order, n, at, colors, ideal, media);                         \
+        return work(d, bin, order, n, at, colors, any, media);                           \
     }
 typedef bool work_fn(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order,
                      int n, int at);
 WORK(work_3, 3, false, false)
 WORK(work_4, 4, false, false)
-WORK(work_ideal_3, 3, true, false)
-WORK(work_ideal_4, 4, true, false)
+WORK(work_any_3, 3, true, false)
+WORK(work_any_4, 4, true, false)
 WORK(work_in_media, 3, true, true)
 
 void imp__vertices_in_lanes(struct imp_depth *d, const struct imp_bin *bin,
                             const int32_t *order, int n, int at)
 {
-    static work_fn *const works[2][2] = {{work_3, work_4}, {work_ideal_3, work_ideal_4}};
-    work_fn *const work_as =
-        d->media ? work_in_media
-                 : works[bin->bsdf->flags != IMP_BSDF_SMOOTH][d->bundle->colors > 3];
+    static work_fn *const works[2][2] = {{work_3, work_4}, {work_any_3, work_any_4}};
+    const bool any = !bin->kernel || bin->bsdf->flags != IMP_BSDF_SMOOTH;
+    work_fn *const work_as = d->media ? work_in_media : works[any][d->bundle->colors > 3];
     int32_t rest[IMP_WIDE_LANES];
     for (int i = 0; i < n; i += IMP_WIDE_LANES) {
         const int left = imp_min(n - i, IMP_WIDE_LANES);

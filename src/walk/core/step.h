@@ -275,16 +275,21 @@ static inline double imp__direction_pdf(const struct imp_step *s, double kernel,
                : (*competing = kernel);
 }
 
+/* Lights behind the normal bring nothing to this material. */
+static inline bool imp__is_faced(const struct imp_bsdf *b)
+{
+    return !(b->flags & (IMP_BSDF_TRANSMIT | IMP_BSDF_TURNED));
+}
+
 /* A vertex of material b as the tree of lights sees it. */
 static inline struct imp_light_place imp__light_place(const struct imp_step *s,
                                                       const struct imp_bsdf *b,
                                                       const struct imp_surface *at)
 {
     const bool medium = at->n[0] == 0 && at->n[1] == 0 && at->n[2] == 0;
-    return (struct imp_light_place){
-        .p = at->p,
-        .n = s->wo[2] < 0 ? -at->n : at->n,
-        .faces = !medium && !(b->flags & (IMP_BSDF_TRANSMIT | IMP_BSDF_TURNED))};
+    return (struct imp_light_place){.p = at->p,
+                                    .n = s->wo[2] < 0 ? -at->n : at->n,
+                                    .faces = !medium && imp__is_faced(b)};
 }
 
 /* A light by cumulative probabilities [scene->n_emitters], and its own. */

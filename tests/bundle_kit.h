@@ -1,0 +1,250 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Walks in bundles (walk/bundle/) beside the same walks alone: radiance, film position, alpha, the
+ * cause of a drop, and every number of a record, to the bit. */
+#ifndef IMP_TESTS_BUNDLE_KIT_H
+#define IMP_TESTS_BUNDLE_KIT_H
+
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include "inverse/estimate/lamp_levels.h"
+#include "walk/bundle/depth.h"
+#include <stdio.h>
+#include <unistd.h>
+
+enum { SIDE = 6, SAMPLES = 21 }; /* neither is a multiple of lanes */
+
+static imp_context *ctx;
+static const double *level; /* of emitters; NULL: as they are */
+
+/* ---- Scenes ------------------------------------------------------------------------------ */
+
+#define PATH(rest) "<integrator type='path'>" rest "</integrator>"
+#define DEPTH(n)   "<integer name='max_depth' value='" n "'/>"
+#define RR(n)      "<integer name='rr_depth' value='" n "'/>"
+#define VIEW                                                                             \
+    "<transform name='to_world'><lookat origin='0.3,0.2,3.4' target='0,0,0' "            \
+    "up='0,1,0'/></transform><float name='fov' value='55'/>"
+#define CAMERA "perspective'>" VIEW
+
+#define AT(x, y, z, axis, angle, size)                                                   \
+    "<transform name='to_world'><scale value='" size "'/><rotate " axis                  \
+    "='1' angle='" angle "'/><translate x='" x "' y='" y "' z='" z "'/></transform>"
+#define DIFFUSE(rgb)                                                                     \
+    "<bsdf type='diffuse'><rgb name='reflectance' value='" rgb "'/></bsdf>"
+#define WALL(x, y, z, axis, angle, bsdf)                                                 \
+    "<shape type='rectangle'>" AT(x, y, z, axis, angle, "2") bsdf "</shape>"
+#define ROOM                                                                             \
+    WALL("0", "-2", "0", "x", "-90", DIFFUSE(".7,.6,.5"))                                \
+    WALL("0", "2", "0", "x", "90", DIFFUSE(".6,.7,.8"))                                  \
+    WALL("-2", "0", "0", "y", "90", DIFFUSE(".8,.1,.1"))                                 \
+    WALL("2", "0", "0", "y", "-90", DIFFUSE(".1,.8,.2"))                                 \
+    WALL("0", "0", "-2", "y", "0", DIFFUSE(".5,.5,.5"))
+#define AREA(rgb) "<emitter type='area'><rgb name='radiance' value='" rgb "'/></emitter>"
+#define LAMP(x, z, size)                                                                 \
+    "<shape type='rectangle'>" AT(x, "1.9", z, "x", "90", size) AREA("9,8,7") "</shape>"
+#define GOLD(more)                                                                       \
+    "<bsdf type='roughconductor'><string name='material' value='Au'/><string "           \
+    "name='distribution' value='ggx'/>" more "</bsdf>"
+#define ALPHA(name, v) "<float name='" name "' value='" v "'/>"
+#define BALL(x, y, bsdf)                                                                 \
+    "<shape type='sphere'><point name='center' x='" x "' y='" y                          \
+    "' z='0'/><float name='radius' value='.5'/>" bsdf "</shape>"
+#define CUBE(x, y, bsdf)                                                                 \
+    "<shape type='cube'>" AT(x, y, ".3", "y", "30", ".4") bsdf "</shape>"
+#define CHECKERS                                                                         \
+    "<bsdf type='diffuse'><texture type='checkerboard' name='reflectance'><transform "   \
+    "name='to_uv'><scale value='7'/></transform></texture></bsdf>"
+#define SKY "<emitter type='constant'><rgb name='radiance' value='.6,.8,1'/></emitter>"
+
+/* What a meter lies on. */
+#define WITHIN "<shape type='rectangle'>" AT("0", "-1", "0", "x", "-90", ".5")
+
+static bool same(double a, double b)
+{
+    return memcmp(&a, &b, sizeof a) == 0 || (isnan(a) && isnan(b));
+}
+static bool same_color(imp_spec a, imp_spec b, const struct imp_carried *carried)
+{
+    bool all = true;
+    for (int c = 0; c < (carried ? 4 : 3); c++) all &= same(a[c], b[c]);
+    return all;
+}
+static bool same_decided(const imp_decided *a, const imp_decided *b, int n)
+{
+    bool all = true;
+    for (int k = 0; k < n; k++) all &= same(a[k], b[k]);
+    return all;
+}
+
+/* A picture of 8 x 4 texels. */
+static bool picture_write(char path[64])
+{
+    strcpy(path, "/tmp/imp_bundles_XXXXXX.ppm");
+    const int fd = mkstemps(path, 4);
+    FILE *f = fd >= 0 ? fdopen(fd, "w") : NULL;
+    if (!f) return false;
+    fprintf(f, "P6 8 4 255\n");
+    for (int k = 0; k < 96; k++) fputc(k * 37 % 256, f);
+    return fclose(f) == 0;
+}
+
+/* ---- Records ----------------------------------------------------------------------------- */
+
+static bool same_located(const struct imp_located *a, const struct imp_located *b)
+{
+    return a->prim == b->prim && same(a->at[0], b->at[0]) && same(a->at[1], b->at[1]);
+}
+
+static bool same_step(const struct imp_vertex *a, const struct imp_vertex *b)
+{
+    const struct imp_decision *x = &a->d, *y = &b->d;
+    if (x->goes_on != y->goes_on) return false;
+    return !x->goes_on ||
+           (same_decided(x->wi, y->wi, 3) && same(x->pdf, y->pdf) && x->lobe == y->lobe &&
+            same(x->survive, y->survive) && same(x->share, y->share) &&
+            same(x->rest, y->rest) && x->drawn == y->drawn && x->alone == y->alone);
+}
+
+static bool same_light(const struct imp_vertex *a, const struct imp_vertex *b)
+{
+    const struct imp_light *x = &a->d.light, *y = &b->d.light;
+    if (a->d.connection != b->d.connection) return false;
+    return a->d.connection == IMP_NOT_CONNECTED ||
+           (x->emitter == y->emitter && same(x->weight, y->weight) &&
+            same_decided(x->uv, y->uv, 2) && same(x->dist, y->dist) &&
+            same(x->cos_light, y->cos_light) && same_decided(x->d, y->d, 3) &&
+            same_decided(x->p, y->p, 3) && same_decided(x->wi, y->wi, 3) &&
+            same_located(&x->located, &y->located) &&
+            same_color(a->light_f, b->light_f, a->carried) &&
+            same_color(a->light_e, b->light_e, a->carried) &&
+            same_color(a->light_w, b->light_w, a->carried));
+}
+
+static bool same_met(const struct imp_vertex *a, const struct imp_vertex *b)
+{
+    const struct imp_met *x = &a->d.met, *y = &b->d.met;
+    if (x->emitter != y->emitter) return false;
+    return x->emitter < 0 ||
+           (same(x->weight, y->weight) && same(x->dist, y->dist) &&
+            same(x->cos_light, y->cos_light) && same_decided(x->d, y->d, 3));
+}
+
+static bool same_vertex(const struct imp_vertex *a, const struct imp_vertex *b)
+{
+    const struct imp_decision *x = &a->d, *y = &b->d;
+    bool all = a->bsdf == b->bsdf && a->shape == b->shape && same(a->t, b->t) &&
+               same_color(a->scale, b->scale, a->carried) &&
+               same_color(a->e, b->e, a->carried) && same_color(a->b, b->b, a->carried) &&
+               same_color(a->w, b->w, a->carried) &&
+               same_color(a->beyond, b->beyond, a->carried) && !a->carried == !b->carried;
+    all &= x->shape == y->shape && x->scatterer == y->scatterer &&
+           same_decided(x->uv, y->uv, 2) && same_decided(x->p, y->p, 3);
+    for (int j = 0; a->bsdf && j < a->bsdf->n_in; j++)
+        all &= same_color(a->in[j], b->in[j], a->carried);
+    if (a->shape)
+        all &= same_decided(x->wo, y->wo, 3) && x->back == y->back &&
+               x->place == y->place && same_located(&x->located, &y->located) &&
+               x->glows == y->glows && same(a->ng[0], b->ng[0]) &&
+               same(a->ng[1], b->ng[1]) && same(a->ng[2], b->ng[2]);
+    return all && same_step(a, b) && same_light(a, b) && same_met(a, b);
+}
+
+/* Vertices that differ, of two records of a walk. */
+static int differing(const struct imp_walk *a, const struct imp_walk *b)
+{
+    const struct imp_vertex *v = a->first, *w = b->first;
+    int wrong = a->n != b->n || a->depth != b->depth || a->key.state != b->key.state ||
+                (a->point.points &&
+                 (a->point.set != b->point.set || a->point.index != b->point.index));
+    for (; v && w; v = v->next, w = w->next) wrong += !same_vertex(v, w);
+    return wrong + (v != w);
+}
+
+/* Walks of a bundle that differ from the same alone; *lit: those with light. */
+static int compared(const struct imp_tracer *tracer, int *lit)
+{
+    struct imp_arena arena, alone;
+    struct imp_bundle b;
+    int xy[SIDE * SIDE][2], wrong = 0;
+    int64_t samples[SAMPLES];
+    *lit = 0;
+    imp__arena_init(&arena, ctx);
+    imp__arena_init(&alone, ctx);
+    for (int p = 0; p < SIDE * SIDE; p++) xy[p][0] = p % SIDE, xy[p][1] = p / SIDE;
+    for (int k = 0; k < SAMPLES; k++) samples[k] = imp__set_number(4, SAMPLES, k);
+    if (!imp__bundle_fits(tracer) ||
+        !imp__bundle_trace(tracer, &arena, SIDE * SIDE, (const int(*)[2])xy, SAMPLES,
+                           samples, &b))
+        return -1;
+    for (int k = 0; k < b.n; k++) {
+        struct imp_walk one, other;
+        const int *at = xy[k / SAMPLES];
+        imp__walk_trace(tracer, &alone, at[0], at[1], samples[k % SAMPLES], &one);
+        imp__bundle_walk(&b, k, &other);
+        bool all = same(one.px, other.px) && same(one.py, other.py) &&
+                   one.valid == other.valid && one.dropped == other.dropped &&
+                   same(one.time, other.time);
+        for (int c = 0; c < 3; c++) all &= same(one.L[c], other.L[c]);
+        for (int c = 0; one.waves && c < 4; c++)
+            all &= same(one.values[c], other.values[c]);
+        if (!tracer->value_only) all &= differing(&one, &other) == 0;
+        wrong += !all;
+        *lit += one.L[0] > 0;
+        imp__arena_rewind(&alone, (struct imp_arena_mark){0});
+    }
+    imp__arena_free(&arena);
+    imp__arena_free(&alone);
+    return wrong;
+}
+
+/* lanes: so many shapes have vertices in lanes. */
+static void compare(const char *name, enum imp_color_mode mode, int lanes,
+                    const char *integrator, const char *sensor, const char *rest)
+{
+    static char xml[40000];
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'>%s%s<sensor type='%s<film type='hdrfilm'><integer "
+             "name='width' value='6'/><integer name='height' value='6'/><rfilter "
+             "type='box'/></film></sensor>%s</scene>",
+             integrator, strstr(sensor, "meter") ? WITHIN : "", sensor,
+             strstr(sensor, "meter") ? "</shape>" ROOM LAMP("0", "0", ".5") : rest);
+    imp_scene *scene = test_scene_text(ctx, xml, mode);
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_tracer tracer = {.scene = scene,
+                                .integrator = imp__walk_integrator(scene),
+                                .sensor = scene->sensors[0],
+                                .value_only = true,
+                                .seed = 5};
+    struct imp_active active;
+    struct imp__lamp_levels levels = {0};
+    static uint8_t chosen[1024];
+    int lit, binned = 0;
+    if (strstr(name, "independent")) run.points = IMP_POINTS_INDEPENDENT;
+    imp__tracer_numbers(&tracer, &run, SAMPLES);
+    if (level) test_must(ctx, imp__lamp_levels_begin(scene, level, &levels));
+    for (int k = 0; k < scene->n_shapes; k++)
+        binned += imp__lanes_fit(&tracer) && imp__shape_in_lanes(&tracer, k);
+    const int wrong = compared(&tracer, &lit);
+    tap_ok(wrong == 0 && lit > SIDE * SIDE / 2 && binned == lanes,
+           "%s: of %d walks, %d lit, %d differ; %d shapes in lanes, %d expected", name,
+           SIDE * SIDE * SAMPLES, lit, wrong, binned, lanes);
+
+    /* Recorded, with derivatives by all parameters. */
+    for (size_t k = 0; k < scene->n_params; k++)
+        chosen[k] = (scene->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE) != 0;
+    test_must(ctx, imp__active_create(scene, chosen, &active));
+    tracer.active = &active;
+    const int values = compared(&tracer, &lit);
+    tracer.value_only = false;
+    const int records = compared(&tracer, &lit);
+    /* Those that cross media are recorded alone. */
+    tap_ok(values == 0 && records == (strstr(integrator, "volpath") ? -1 : 0),
+           "... with derivatives: %d differ, and of those that are recorded %d", values,
+           records);
+    imp__active_destroy(ctx, &active);
+    imp__lamp_levels_end(&levels);
+    imp_scene_destroy(scene);
+}
+
+#endif
