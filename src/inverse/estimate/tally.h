@@ -23,24 +23,30 @@ struct imp__tally_triple { /* three adjacent values */
     imp_spec batch;
     uint32_t key;
     bool touched;
-    _Alignas(IMP_CACHE_LINE) imp_spec sum, square;
+    _Alignas(IMP_CACHE_LINE) imp_spec error;
+    imp_spec sum, square;
     double mean[3], variance[3]; /* of the tile so far */
 };
 struct imp__tally_single {
-    double batch, sum, square, mean, variance;
+    double batch, error, sum, square, mean, variance;
     uint32_t key;
     bool touched;
 };
 
 struct imp_tally {
     struct imp_sink sink; /* first: the sweep gets a pointer to it */
+    /* What has the mean 0 and the variance of the pixel's gradient (imp__tally_error). */
+    struct imp_tally_errors {
+        struct imp_sink sink; /* first */
+        struct imp_tally *of;
+    } errors;
     imp_context *ctx;
     const struct imp_active *active;
     int lanes; /* of what sweeps bring: 1, 3 or 4 */
     bool dense, failed;
     int R; /* replicates of pixels that share walks; 0: pixels share none */
     /* dense: [n] each; tile: variance of sums over the tile, from of_tile [R][n] */
-    double *batch, *sum, *square, *mean, *variance, *tile, *of_tile;
+    double *batch, *error, *sum, *square, *mean, *variance, *tile, *of_tile;
     /* hash: of each entry [R] sums over the tile */
     double *singles_of_tile;
     imp_spec *triples_of_tile;
@@ -65,10 +71,14 @@ struct imp_tally {
     double rays; /* of the tile's walks: one to each vertex, and one from it to a light */
 };
 
-/* R: replicates of pixels that share walks; 0: of others. */
+/* R: replicates of pixels that share walks; 0: of others. *out is to stay where it is: `errors` refers
+ * to it. */
 enum imp_status imp__tally_create(imp_context *ctx, const struct imp_active *active,
                                   int lanes, int R, struct imp_tally *out);
 void imp__tally_destroy(struct imp_tally *t);
+/* tally_add.c: both sinks; a larger table, or the first one. False: no memory. */
+void imp__tally_sinks(struct imp_tally *t);
+bool imp__tally_table_grow(struct imp_tally *t);
 /* Between tiles. */
 void imp__tally_clear(struct imp_tally *t);
 /* After the sweeps of one replicate, number b of the pixel. */
@@ -77,7 +87,7 @@ void imp__tally_batch(struct imp_tally *t, int b);
  * (sum of squares - sum^2/replicates). */
 void imp__tally_pixel(struct imp_tally *t, double replicates, double by_mean,
                       double by_variance);
-/* After the sweeps of what has the mean 0 and the variance of the pixel's gradient: its square. */
+/* After the sweeps into `errors`: their squares. */
 void imp__tally_error(struct imp_tally *t);
 /* Many numbers, between pixels that share no walks: has the tile so many that they are to
  * be flushed and cleared before it goes on? Memory then does not grow with the samples, and

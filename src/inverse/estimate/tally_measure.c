@@ -28,7 +28,7 @@ void imp__tally_probe_error(struct imp_tally *t)
     const double *probe = t->metric->probes;
     for (size_t p = 0; p < t->metric->n_probes; p++, probe += t->active->n) {
         double sum = 0;
-        for (size_t k = 0; k < t->active->n; k++) sum += probe[k] * t->batch[k];
+        for (size_t k = 0; k < t->active->n; k++) sum += probe[k] * t->error[k];
         t->measured += sum * sum;
     }
 }

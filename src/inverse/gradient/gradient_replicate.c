@@ -112,33 +112,26 @@ static void sets_trace(const struct replicate *r, struct imp_walk *walks, imp_sp
     }
 }
 
+/* E: adjoints of the errors of a replicate that has no other beside it; NULL: none are wanted. */
 static void sets_sweep(const struct replicate *r, const struct imp_walk *walks,
-                       const imp_spec *P)
+                       const imp_spec *P, const imp_spec *E)
 {
+    const struct imp_tracer *tracer = &r->job->tracer;
     for (int s = 0; s < r->plan.m; s++) {
         const int first = imp__replicates_set(r->plan, s);
         const int end = imp__replicates_set(r->plan, s + 1);
-        imp_spec mean = P[s];
-        if (end - first > 1) mean /= imp__spec(end - first);
+        imp_spec mean = P[s], error = E ? E[s] : P[s];
+        if (end - first > 1) {
+            mean /= imp__spec(end - first);
+            error /= imp__spec(end - first);
+        }
         for (int i = first; i < end; i++)
-            imp__walk_sweep(&r->job->tracer, &walks[i], mean, &r->tally->sink);
+            if (E)
+                imp__walk_sweep_both(tracer, &walks[i], mean, error, &r->tally->sink,
+                                     &r->tally->errors.sink);
+            else imp__walk_sweep(tracer, &walks[i], mean, &r->tally->sink);
     }
-}
-
-/* Once more, for the errors of a replicate that has no other beside it. */
-static double errors_sweep(const struct replicate *r, const struct imp_walk *walks,
-                           const imp_spec *L, const imp_spec *P)
-{
-    const struct imp__gradient_job *j = r->job;
-    imp_spec E[2];
-    const double variance =
-        imp__replicate_errors(j->target, j->channels, r->pixel, L, P, E);
-    if (j->want_gradient && j->want_errors) {
-        imp__tally_batch(r->tally, r->b);
-        sets_sweep(r, walks, E);
-        imp__tally_error(r->tally);
-    }
-    return variance;
+    if (E) imp__tally_error(r->tally);
 }
 
 static double sweep_residuals(const struct replicate *r, int part, double *moments,
@@ -161,8 +154,11 @@ static double sweep_residuals(const struct replicate *r, int part, double *momen
                                j->look ? NULL : moments);
     const double value = imp__replicate_adjoints(j->target, j->channels, r->pixel,
                                                  r->plan.m, L, j->variate ? H : L, P);
-    if (j->want_gradient) sets_sweep(r, walks, P);
-    if (r->plan.lone) *variance = errors_sweep(r, walks, L, P);
+    imp_spec E[2];
+    if (r->plan.lone)
+        *variance = imp__replicate_errors(j->target, j->channels, r->pixel, L, P, E);
+    if (j->want_gradient)
+        sets_sweep(r, walks, P, r->plan.lone && j->want_errors ? E : NULL);
     return value;
 }
 

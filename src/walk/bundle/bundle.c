@@ -46,149 +46,6 @@ static bool bundle_create(struct imp_arena *arena, size_t n, struct imp_bundle *
            (!crosses_media(b->tracer) || (TAKE(b->keys) && TAKE(b->drew)));
 }
 
-/* What walk k has from its ray alone. */
-static inline void ray_put(struct imp_bundle *b, int k, struct imp_flights *rays)
-{
-    rays->pdf[k] = 0;
-    imp__color_put(rays->beta, b->colors, k, imp__spec(1));
-    rays->eta[k] = 1;
-    rays->walk[k] = rays->up[k] = k;
-    if (rays->left) rays->left[k] = (struct imp_light_place){.faces = false};
-    if (rays->zeros) rays->zeros[k] = 0;
-    if (rays->medium) {
-        const struct imp_medium *m = b->tracer->sensor->medium;
-        rays->medium[k] = m ? m->index : -1;
-        rays->behind[k] = 0;
-        imp__column_put(rays->ratio, k, imp__spec(1));
-        rays->share[k] = 1;
-    }
-    b->time[k] = b->tracer->sensor->open;
-}
-
-static void key_put(struct imp_bundle *b, int k, const struct imp_walk *walk)
-{
-    if (imp_likely(!b->keys)) return;
-    b->keys[k] = walk->key.state;
-    b->drew[k] = imp__lane_drawn(walk->key, b->tracer->scene->channels);
-}
-
-/* A walk before its first segment. False: no memory. */
-static bool begin_alone(struct imp_bundle *b, struct imp_arena *arena, const int at[2],
-                        int64_t sample, int k, struct imp_walk *walk)
-{
-    double lens[2];
-    imp__walk_begin(b->tracer, at[0], at[1], sample, walk, lens);
-    b->px[k] = walk->px;
-    b->py[k] = walk->py;
-    b->time[k] = walk->time;
-    b->set[k] = b->tracer->points ? walk->point.set : walk->key.state;
-    b->index[k] = walk->point.index;
-    key_put(b, k, walk);
-    if (imp_likely(!b->waves)) return true;
-    const bool ok =
-        imp__walk_wave(b->tracer, arena, imp__wave_draw(b->tracer, walk, sample), walk);
-    b->waves[k] = walk->waves;
-    return ok;
-}
-
-/* One by one. *begin: none has a near end. False: no memory. */
-static bool rays_alone(struct imp_bundle *b, struct imp_arena *arena, const int (*xy)[2],
-                       int n_samples, const int64_t *samples, struct imp_flights *rays,
-                       bool *begin)
-{
-    *begin = true;
-    for (int k = 0; k < b->n; k++) {
-        struct imp_walk own, *walk = b->walks ? &b->walks[k] : &own;
-        if (!begin_alone(b, arena, xy[k / n_samples], samples[k % n_samples], k, walk))
-            return false;
-        ray_put(b, k, rays);
-        b->time[k] = walk->time;
-        imp__column_put(rays->ray.o, k, walk->ray.o);
-        imp__column_put(rays->ray.d, k, walk->ray.d);
-        rays->ray.near[k] = walk->ray.t_near;
-        rays->ray.far[k] = walk->ray.t_far;
-        imp__column_put(rays->from, k, walk->ray.o);
-        *begin &= walk->ray.t_near == 0;
-    }
-    return true;
-}
-
-/* The beginning of a record, whose numbers and ray are made. */
-static void record_begin(struct imp_bundle *b, const struct imp_flights *rays, int k)
-{
-    struct imp_walk *walk = &b->walks[k];
-    walk->px = b->px[k];
-    walk->py = b->py[k];
-    walk->time = b->time[k];
-    walk->ray = (struct imp_sensor_ray){.o = imp__column_v3(rays->ray.o, k),
-                                        .d = imp__column_v3(rays->ray.d, k),
-                                        .t_near = rays->ray.near[k],
-                                        .t_far = rays->ray.far[k]};
-}
-
-/* Where its random numbers come from, and its wavelengths. False: no memory. */
-static bool numbers_of(struct imp_bundle *b, struct imp_arena *arena, const int at[2],
-                       int64_t sample, int k)
-{
-    struct imp_walk own, *walk = b->walks ? &b->walks[k] : &own;
-    if (b->walks) imp__walk_clear(walk);
-    imp__walk_numbers(b->tracer, at[0], at[1], sample, walk);
-    b->set[k] = b->tracer->points ? walk->point.set : walk->key.state;
-    key_put(b, k, walk);
-    if (!b->waves) return true;
-    const bool ok =
-        imp__walk_wave(b->tracer, arena, imp__wave_draw(b->tracer, walk, sample), walk);
-    b->waves[k] = walk->waves;
-    return ok;
-}
-
-/* In lanes, of a sensor whose shutter is open for an instant. */
-static bool rays_in_lanes(struct imp_bundle *b, struct imp_arena *arena,
-                          const struct imp_sensor_lanes *lanes, const int (*xy)[2],
-                          int n_samples, const int64_t *samples, struct imp_flights *rays,
-                          bool *begins)
-{
-    const struct imp_tracer *t = b->tracer;
-    const struct imp_film_desc *film = &t->sensor->film;
-    const bool each =
-        !t->points || b->waves || b->walks || b->keys; /* more than the set's numbers */
-    bool begin = true;
-    for (int k = 0; k < b->n; k++) {
-        const int s = k % n_samples, *at = xy[k / n_samples];
-        const bool first =
-            s == 0 || samples[s] / IMP_SET_POINTS != samples[s - 1] / IMP_SET_POINTS;
-        if ((each || first) && !numbers_of(b, arena, at, samples[s], k)) return false;
-        if (!each && !first) b->set[k] = b->set[k - 1];
-        b->index[k] = (uint32_t)samples[s] % IMP_SET_POINTS;
-        b->px[k] = film->crop_x + at[0];
-        b->py[k] = film->crop_y + at[1];
-        ray_put(b, k, rays);
-    }
-    for (int i = 0; i < b->n; i += IMP_WIDE_LANES) {
-        int32_t at[IMP_WIDE_LANES];
-        struct imp_wide_ray r;
-        for (int k = 0; k < IMP_WIDE_LANES; k++) at[k] = imp_min(i + k, b->n - 1);
-        const struct imp_wide_block block =
-            imp__wide_block(t->points, b->set, b->index, at, 0);
-        const imp_wide px = imp__wide_load(&b->px[i]) +
-                            imp__wide_number(&block, IMP_DIM_PIXEL_X),
-                       py = imp__wide_load(&b->py[i]) +
-                            imp__wide_number(&block, IMP_DIM_PIXEL_Y);
-        lanes->ray(t->sensor, px, py, &r);
-        imp__wide_store(&b->px[i], px);
-        imp__wide_store(&b->py[i], py);
-        imp__wide3_store(rays->ray.o, i, r.o);
-        imp__wide3_store(rays->ray.d, i, r.d);
-        imp__wide3_store(rays->from, i, r.o);
-        imp__wide_store(&rays->ray.near[i], r.near);
-        imp__wide_store(&rays->ray.far[i], r.far);
-        begin &= !(imp__wide_bits(r.near != imp__wide(0)) & imp__bits_first(b->n - i));
-    }
-    for (int k = 0; b->walks && k < b->n; k++) record_begin(b, rays, k);
-    *begins = begin;
-    return true;
-}
-
 /* ---- A depth ----------------------------------------------------------------------------- */
 
 /* What hidden lights would have brought. */
@@ -285,26 +142,6 @@ static void see(struct imp_depth *d, struct room *r)
     r->shadows.ray.n = 0;
 }
 
-/* Walks from a camera: their first rays. False: no memory. */
-static bool camera_begin(struct imp_arena *arena, struct imp_bundle *b,
-                         const int (*xy)[2], int n_samples, const int64_t *samples,
-                         struct imp_flights *rays)
-{
-    const size_t n = (size_t)b->n;
-    const bool instant = !rays->ray.time;
-    const struct imp_sensor_lanes *lanes =
-        instant ? imp__sensor_lanes(b->tracer->sensor) : NULL;
-    if (!TAKE(rays->ray.near)) return false;
-    bool begin = true;
-    if (!(lanes ? rays_in_lanes(b, arena, lanes, xy, n_samples, samples, rays, &begin)
-                : rays_alone(b, arena, xy, n_samples, samples, rays, &begin)))
-        return false;
-    rays->ray.n = b->n;
-    if (!instant) memcpy(rays->ray.time, b->time, n * sizeof *b->time);
-    if (begin) rays->ray.near = NULL;
-    return true;
-}
-
 /* Values of vertices where walks from a sensor begin, with these weights set or to be set. */
 static struct link *sensor_link(struct imp_arena *arena, struct imp_bundle *b,
                                 struct link *before)
@@ -340,7 +177,8 @@ static bool meter_begin(struct imp_arena *arena, struct imp_depth *d, const int 
     for (int k = 0; k < b->n; k++) {
         struct imp_walk own, *walk = b->walks ? &b->walks[k] : &own;
         double weight;
-        if (!begin_alone(b, arena, xy[k / n_samples], samples[k % n_samples], k, walk))
+        if (!imp__begin_alone(b, arena, xy[k / n_samples], samples[k % n_samples], k,
+                              walk))
             return false;
         imp__meter_vertex(d, walk, k, &weight);
         if (sensor) imp__color_put(sensor->values.w, b->colors, k, imp__spec(weight));
@@ -370,7 +208,8 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
     memset(b->dropped, 0, n * sizeof *b->dropped);
     for (int c = 0; c < 4; c++) memset(b->L[c], 0, n * sizeof *b->L[c]);
     if (!tracer->sensor->shape) {
-        if (!camera_begin(arena, b, xy, n_samples, samples, &r.flights[0])) return false;
+        if (!imp__camera_begin(arena, b, xy, n_samples, samples, &r.flights[0]))
+            return false;
         if (crosses_media(tracer)) {
             d.media = imp__in_media_create(tracer, arena, n);
             last = sensor_link(arena, b, NULL);

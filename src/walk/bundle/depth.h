@@ -35,6 +35,13 @@ struct imp_depth {
     struct imp_in_media *media; /* in_media.h; NULL: walks cross none */
 };
 
+/* A walk before its first segment; first rays of walks from a camera (bundle_begin.c). False: no
+ * memory. */
+bool imp__begin_alone(struct imp_bundle *b, struct imp_arena *arena, const int at[2],
+                      int64_t sample, int k, struct imp_walk *walk);
+bool imp__camera_begin(struct imp_arena *arena, struct imp_bundle *b, const int (*xy)[2],
+                       int n_samples, const int64_t *samples, struct imp_flights *rays);
+
 /* The vertex that ray i leads to, at place `at` among the values (alone_vertex.c); and the sky,
  * whose value goes to the vertex before. */
 void imp__vertex_alone(struct imp_depth *d, int i, int at);

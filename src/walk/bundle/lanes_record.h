@@ -72,6 +72,15 @@ imp_wide imp__lone_index_ratio(const struct imp_bin *bin,
                                const struct imp_lanes_vertices *v, const imp_wide3 *wi,
                                const imp_wide_lobe *lobe, unsigned bits);
 
+/* In media (media_collisions.c): places of collisions, whose frames have the axes of the world; what
+ * shadow ray i, and the next ray, number i, of vertex k have besides. */
+void imp__collision_places(const struct imp_depth *d, const int32_t *order,
+                           struct imp_wide_surface *out);
+void imp__shadow_in_media(struct imp_depth *d, const struct imp_bin *bin,
+                          const struct imp_lanes_vertices *v, int k, int i);
+void imp__ray_in_media(struct imp_depth *d, const struct imp_bin *bin,
+                       const struct imp_lanes_vertices *v, int k, int i);
+
 /* Where walks have derivatives: is there a lane with a value that is zero but has one? Then they are to
  * be made one by one. */
 bool imp__lanes_differ(const struct imp_depth *d, const struct imp_bin *bin,

@@ -6,7 +6,6 @@
 #include "in_media.h"
 #include "lanes_record.h"
 #include "math/offset.h"
-#include "walk/media/tracking.h"
 
 /* ---- What leaves it ---------------------------------------------------------------------- */
 
@@ -118,47 +117,6 @@ light_weigh(struct imp_depth *d, const struct imp_bin *bin,
         lit->brings.c[c] = imp__wide_choose(wanted, fl[c] * lit->weight, zero);
 }
 
-/* The medium on the side of vertex k that dir points to. */
-static int medium_beyond(const struct imp_depth *d, const struct imp_bin *bin,
-                         const struct imp_lanes_vertices *v, imp_v3 dir, int k)
-{
-    const int ray = v->order[k], here = d->media->here[ray];
-    if (bin->medium >= 0) return here;
-    return imp__media_beyond(d->bundle->tracer->scene->shapes[d->hits->shape[ray]],
-                             imp__wide3_lane(&v->x.ng, k), dir, here);
-}
-/* How far rays from vertex k begin behind it. */
-static double begins_behind(const struct imp_bin *bin, const struct imp_lanes_vertices *v,
-                            int k)
-{
-    return bin->medium >= 0 ? imp__begins_behind(imp__wide3_lane(&v->x.p, k)) : 0;
-}
-
-/* Shadow ray i, of vertex k, in media. */
-static void shadow_in_media(struct imp_depth *d, const struct imp_bin *bin,
-                            const struct imp_lanes_vertices *v, int k, int i)
-{
-    struct imp_shadows *to = d->shadows;
-    const imp_v3 dir = imp__column_v3(to->ray.d, i);
-    to->walk[i] = v->walk[k];
-    to->medium[i] = medium_beyond(d, bin, v, dir * (1 / imp__length(dir)), k);
-    to->behind[i] = begins_behind(bin, v, k);
-}
-
-/* The next ray, number i, of vertex k. */
-static void ray_in_media(struct imp_depth *d, const struct imp_bin *bin,
-                         const struct imp_lanes_vertices *v, int k, int i)
-{
-    struct imp_flights *to = d->next;
-    const int from = v->order[k];
-    const imp_v3 dir = imp__column_v3(to->ray.d, i);
-    to->medium[i] = medium_beyond(d, bin, v, dir, k);
-    to->behind[i] = begins_behind(bin, v, k);
-    imp__column_put(to->ray.o, i, imp__column_v3(to->ray.o, i) - dir * to->behind[i]);
-    for (int c = 0; c < 3; c++) to->ratio[c][i] = d->rays->ratio[c][from];
-    to->share[i] = d->rays->share[from];
-}
-
 /* Their shadow rays; v->record: of these vertices. */
 static inline __attribute__((always_inline)) void
 light_see(struct imp_depth *d, const struct imp_bin *bin,
@@ -182,7 +140,7 @@ light_see(struct imp_depth *d, const struct imp_bin *bin,
         to->at[i] = v->at + k;
         if (v->recorded) to->of[i] = v->record[k];
         if (to->ray.time) to->ray.time[i] = d->rays->ray.time[v->order[k]];
-        if (media) shadow_in_media(d, bin, v, k, i);
+        if (media) imp__shadow_in_media(d, bin, v, k, i);
     }
 }
 
@@ -266,20 +224,8 @@ scatter_on(struct imp_depth *d, const struct imp_bin *bin,
         if (to->left) to->left[i] = place_of(v, any, bin->bsdf, k);
         if (to->zeros) to->zeros[i] = d->rays->zeros[from];
         if (to->ray.time) to->ray.time[i] = d->rays->ray.time[from];
-        if (media) ray_in_media(d, bin, v, k, i);
+        if (media) imp__ray_in_media(d, bin, v, k, i);
     }
-}
-
-/* Collisions, whose frames have the axes of the world. */
-static void collision_places(const struct imp_depth *d, const int32_t *order,
-                             struct imp_wide_surface *out)
-{
-    const struct imp_wide_surface none = {
-        .frame = {.s.x = imp__wide(1), .t.y = imp__wide(1), .n.z = imp__wide(1)}};
-    *out = none;
-    out->p = (imp_wide3){imp__wide_taken(d->hits->t, order),
-                         imp__wide_taken(d->hits->u, order),
-                         imp__wide_taken(d->hits->v, order)};
 }
 
 /* ---- All --------------------------------------------------------------------------------- */
@@ -321,7 +267,7 @@ work(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order, int n
             v.carried[k] = &b->waves[v.walk[k]]->carried;
     v.numbers = imp__wide_block(b->tracer->points, b->set, b->index, v.walk,
                                 imp__block(d->depth));
-    if (media && bin->medium >= 0) collision_places(d, order, &v.x);
+    if (media && bin->medium >= 0) imp__collision_places(d, order, &v.x);
     else if (bin->surface)
         bin->surface->surface(bin->shape, &hits, v.recorded || !bin->plain, &v.x);
     else imp__lanes_surface(d, &hits, &v.x);

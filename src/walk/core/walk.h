@@ -445,6 +445,11 @@ static inline void imp__walk_sweep(const struct imp_tracer *tracer,
         imp__gain_sweep(tracer, walk, adjoint, sink);
 }
 
+/* ... and for another adjoint into a second sink, with each derivative computed once. */
+void imp__walk_sweep_both(const struct imp_tracer *tracer, const struct imp_walk *walk,
+                          imp_spec adjoint, imp_spec other, struct imp_sink *sink,
+                          struct imp_sink *second);
+
 /* Forward mode: dL in the direction x_dot [active->n]. */
 imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_walk *walk,
                            const double *x_dot);

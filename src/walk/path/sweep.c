@@ -50,7 +50,20 @@ struct reverse {
     struct imp_sink *sink;
     imp_spec bar[IMP_INPUTS_MAX]; /* of the scatterer's inputs */
     bool any;
+    /* Of a sweep with two adjoints: where pieces go with the second, and what that is over the first,
+     * lane by lane. */
+    struct imp_sink *second;
+    imp_spec ratio;
 };
+
+/* Pieces d [n] of inputs, in turn to both sinks. */
+static inline void second_scatter(const struct reverse *r,
+                                  const struct imp_input *const *input, int n,
+                                  const struct imp_texcoord *at, imp_spec *d)
+{
+    for (int j = 0; j < n; j++) d[j] *= r->ratio;
+    imp__inputs_scatter(input, n, at, d, r->second);
+}
 
 static inline __attribute__((always_inline)) void
 emitter_scatter(const struct imp_tracer *tracer, int emitter, struct imp_emission *x,
@@ -73,6 +86,17 @@ static inline void reverse_emitter(void *taker, struct imp_emitter_piece *p)
     const struct reverse *r = taker;
     emitter_scatter(r->tracer, p->emitter, &p->x, &p->at,
                     p->adjoint * p->through[0] * p->through[1], r->sink);
+}
+static inline void both_emitter(void *taker, struct imp_emitter_piece *p)
+{
+    const struct reverse *r = taker;
+    const struct imp_emitter *e = r->tracer->scene->emitters[p->emitter];
+    const imp_spec bar = p->adjoint * p->through[0] * p->through[1];
+    imp_spec d[IMP_INPUTS_MAX];
+    emitter_d(e, r->tracer->active, &p->x, &p->at, d);
+    for (int j = 0; j < e->n_in; j++) d[j] *= bar;
+    imp__inputs_scatter(e->input, e->n_in, &p->at, d, r->sink);
+    second_scatter(r, e->input, e->n_in, &p->at, d);
 }
 
 static inline void vertex_scatter(const struct imp_tracer *tracer,
@@ -110,6 +134,15 @@ static inline void reverse_end(void *taker, const struct imp_vertex *v)
     if (r->any) vertex_scatter(r->tracer, v, r->bar, r->sink);
 }
 
+static inline void both_end(void *taker, const struct imp_vertex *v)
+{
+    struct reverse *r = taker;
+    if (!r->any) return;
+    vertex_scatter(r->tracer, v, r->bar, r->sink);
+    for (int j = 0; j < v->bsdf->n_in; j++) r->bar[j] *= r->ratio;
+    vertex_scatter(r->tracer, v, r->bar, r->second);
+}
+
 static void reverse_track(void *taker, const struct imp_track *track,
                           const struct imp_carried *carried, const imp_spec *value,
                           imp_spec adjoint)
@@ -124,12 +157,56 @@ static void reverse_input(void *taker, const struct imp_input *const *input,
     imp__inputs_scatter(input, 1, at, d, r->sink);
 }
 
+static void both_track(void *taker, const struct imp_track *track,
+                       const struct imp_carried *carried, const imp_spec *value,
+                       imp_spec adjoint)
+{
+    const struct reverse *r = taker;
+    reverse_track(taker, track, carried, value, adjoint);
+    imp__track_sweep(r->tracer, track, carried, value, adjoint * r->ratio, r->second);
+}
+static void both_input(void *taker, const struct imp_input *const *input,
+                       const struct imp_texcoord *at, const imp_spec *d)
+{
+    imp_spec own = *d;
+    reverse_input(taker, input, at, d);
+    second_scatter(taker, input, 1, at, &own);
+}
+
 static const struct imp_pieces_ops reverse_ops = {.emitter = reverse_emitter,
                                                   .scatterer_begin = reverse_begin,
                                                   .scatterer = reverse_scatterer,
                                                   .scatterer_end = reverse_end,
                                                   .track = reverse_track,
                                                   .input = reverse_input};
+
+static const struct imp_pieces_ops both_ops = {.emitter = both_emitter,
+                                               .scatterer_begin = reverse_begin,
+                                               .scatterer = reverse_scatterer,
+                                               .scatterer_end = both_end,
+                                               .track = both_track,
+                                               .input = both_input};
+
+/* From the first vertex to the last. */
+static inline __attribute__((always_inline)) void
+reverse_sweep(const struct imp_pieces_ops *ops, struct reverse *r,
+              const struct imp_walk *walk, imp_spec P)
+{
+    const struct imp_tracer *tracer = r->tracer;
+    int depth = walk->depth;
+    for (const struct imp_vertex *v = walk->first; v; v = v->next, depth++) {
+        imp__vertex_fetch(v->next, sizeof *v);
+        for (const struct imp_side *s = v->side; s; s = s->next) {
+            imp__walk_sweep_values(tracer, &s->walk, P, r->sink);
+            if (r->second)
+                imp__walk_sweep_values(tracer, &s->walk, P * r->ratio, r->second);
+        }
+        const struct imp_adjoints a = imp__adjoints_at(walk, depth, P);
+        imp__vertex_pieces(ops, r, tracer, walk, v, depth, &a);
+        P *= v->w;
+        if (imp__is_zero_used(P, v->carried)) break;
+    }
+}
 
 void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_walk *walk,
                             imp_spec adjoint, struct imp_sink *sink)
@@ -142,18 +219,38 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
     struct reverse reverse;
     reverse.tracer = tracer;
     reverse.sink = sink;
-    imp_spec P = adjoint;
-    int depth = walk->depth;
-    for (const struct imp_vertex *v = walk->first; v; v = v->next, depth++) {
-        imp__vertex_fetch(v->next, sizeof *v);
-        for (const struct imp_side *s = v->side; s; s = s->next)
-            imp__walk_sweep_values(tracer, &s->walk, P, sink);
-        const struct imp_adjoints a = imp__adjoints_at(walk, depth, P);
-        imp__vertex_pieces(&reverse_ops, &reverse, tracer, walk, v, depth, &a);
-        P *= v->w;
-        if (imp__is_zero_used(P, v->carried)) break;
-    }
+    reverse.second = NULL;
+    reverse_sweep(&reverse_ops, &reverse, walk, adjoint);
     if (walk->moving) walk->moving->sweep(tracer, walk, adjoint, sink);
+}
+
+/* The second adjoint over the first, lane by lane. False: the first is 0 where the second is not. */
+static bool adjoints_divide(imp_spec first, imp_spec second, imp_spec *ratio)
+{
+    for (int c = 0; c < 4; c++) {
+        if (first[c] == 0 && second[c] != 0) return false;
+        (*ratio)[c] = first[c] != 0 ? second[c] / first[c] : 0;
+    }
+    return true;
+}
+
+void imp__walk_sweep_both(const struct imp_tracer *tracer, const struct imp_walk *walk,
+                          imp_spec adjoint, imp_spec other, struct imp_sink *sink,
+                          struct imp_sink *second)
+{
+    struct reverse reverse;
+    if (walk->dropped || !walk->valid) return;
+    if (imp_unlikely(walk->reduced || walk->moving || tracer->sensor->gain) ||
+        !adjoints_divide(imp__walk_values(tracer, walk, adjoint),
+                         imp__walk_values(tracer, walk, other), &reverse.ratio)) {
+        imp__walk_sweep(tracer, walk, adjoint, sink);
+        imp__walk_sweep(tracer, walk, other, second);
+        return;
+    }
+    reverse.tracer = tracer;
+    reverse.sink = sink;
+    reverse.second = second;
+    reverse_sweep(&both_ops, &reverse, walk, imp__walk_values(tracer, walk, adjoint));
 }
 
 /* ---- Forward: pieces along a direction ------------------------------------------- */
