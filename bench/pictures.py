@@ -6,10 +6,10 @@
 
 One thread, rounds interleaved; the pictures of all programs must have the same bytes. Scenes: the
 Cornell box, `textured`, and an open scene, which is `textured` with two meshes of 8,064 triangles
-with interpolated normals, one of rough gold and one diffuse; kinds whose formulas are not in lanes
-(glass and plastic); the office, read by its meters. Losses with gradients compare with a picture of
-the same scene by the first program; those by poses, of a block and of an egg of 19,800 facets, with
-one of another pose. Behind times of gradients, where they differ: standard errors over those of the
+with interpolated normals, one of rough gold and one diffuse; glass and plastic; wax, a slab of three
+colours, and a caustic by light tracing; the office, read by its meters. Losses with gradients compare
+with a picture of the same scene by the first program; those by poses, of a block and of an egg of
+19,800 facets, with one of another pose. Behind times of gradients, where they differ: standard errors over those of the
 first program, geometric means over the numbers.
 """
 import argparse
@@ -75,6 +75,43 @@ def glass_scene(folder):
     return path
 
 
+SLAB = '''<scene version="3.0.0"><integrator type="volpath"><integer name="max_depth" value="64"/>
+<integer name="rr_depth" value="16"/></integrator><medium type="homogeneous" id="m">
+<rgb name="sigma_t" value="1,2,4"/><rgb name="albedo" value=".98,.95,.9"/>
+<phase type="hg"><float name="g" value=".6"/></phase></medium>
+<shape type="cube"><transform name="to_world"><scale x="4" y=".5" z="4"/></transform><bsdf type="null"/>
+<ref id="m" name="interior"/></shape><shape type="rectangle"><transform name="to_world"><scale value="1.5"/>
+<lookat origin="0,4,0" target="0,0,0" up="0,0,1"/></transform><emitter type="area">
+<rgb name="radiance" value="7,6.5,5.8"/></emitter></shape>
+<emitter type="constant"><rgb name="radiance" value=".12,.14,.18"/></emitter>
+<sensor type="perspective"><float name="fov" value="40"/><transform name="to_world"><lookat origin=".6,-5,4.6"
+target="0,0,0" up="0,1,0"/></transform><film type="hdrfilm"><integer name="width" value="64"/>
+<integer name="height" value="64"/><rfilter type="box"/></film></sensor></scene>'''
+CAUSTIC = '''<scene version="3.0.0"><integrator type="ptracer"><integer name="max_depth" value="8"/>
+<integer name="rr_depth" value="100"/></integrator><sensor type="perspective"><float name="fov" value="30"/>
+<transform name="to_world"><lookat origin="0,3,4" target="0,0,1" up="0,1,0"/></transform><film type="hdrfilm">
+<integer name="width" value="96"/><integer name="height" value="64"/><rfilter type="box"/></film></sensor>
+<shape type="rectangle"><transform name="to_world"><scale value="4"/><rotate x="1" angle="-90"/></transform>
+<bsdf type="diffuse"><rgb name="reflectance" value=".5"/></bsdf></shape>
+<shape type="rectangle"><transform name="to_world"><scale value=".1"/><rotate x="1" angle="125"/>
+<translate y="2.5" z="-2"/></transform><emitter type="area"><rgb name="radiance" value="50"/></emitter></shape>
+<shape type="sphere"><float name="radius" value=".6"/><point name="center" x="0" y=".9" z="-.4"/>
+<bsdf type="dielectric"><float name="int_ior" value="1.5"/><float name="ext_ior" value="1"/></bsdf></shape></scene>'''
+
+
+def written(folder, name, text):
+    path = '%s/%s.xml' % (folder, name)
+    with open(path, 'w') as f:
+        f.write(text)
+    return path
+
+
+def wax_mesh(folder):
+    subprocess.run([sys.executable, os.path.join(SCENES, 'wax', 'make.py'), folder + '/wax.ply'], check=True,
+                   capture_output=True)
+    return folder + '/wax.ply'
+
+
 def egg_scene(folder):
     """A ball with waves, of 19,800 flat facets, on a floor under a lamp."""
     ball(folder + '/egg.obj', 0, (0, 0, 1), .8, 100)
@@ -123,6 +160,10 @@ def main():
             'textured': ['render', os.path.join(SCENES, 'textured.xml'), *picture],
             'open scene': ['render', open_scene(folder), *picture],
             'glass and plastic': ['render', glass_scene(folder), *picture],
+            'wax, a quarter of the samples': ['render', os.path.join(SCENES, 'wax.xml'), '-D',
+                                              'mesh=' + wax_mesh(folder), *picture],
+            'slab of three colours': ['render', written(folder, 'slab', SLAB), *picture],
+            'caustic from the lamp, 8 times': ['render', written(folder, 'caustic', CAUSTIC), *picture],
             'functional, Cornell box': ['gradient', cornell, '-D', 'res=64', '--json'],
             'office, read': ['read', os.path.join(SCENES, 'office.xml'), '-m', 'mono', '--json'],
         }
@@ -148,7 +189,8 @@ def main():
             bytes_of, se = {}, {}
             for _ in range(args.rounds):
                 for p in args.program:
-                    took, answer = seconds([p, *job, '--spp', str(args.spp), '-t', '1', '-q'])
+                    spp = args.spp // 4 if 'quarter' in name else args.spp * (8 if '8 times' in name else 1)
+                    took, answer = seconds([p, *job, '--spp', str(spp), '-t', '1', '-q'])
                     time[p].append(took)
                     if 'gradient' in job:
                         se[p] = errors(answer)
