@@ -78,7 +78,7 @@ static bool same_decided(const imp_decided *a, const imp_decided *b, int n)
 }
 
 /* A picture of 8 x 4 texels. */
-static inline bool picture_write(char path[64])
+static bool picture_write(char path[64])
 {
     strcpy(path, "/tmp/imp_bundles_XXXXXX.ppm");
     const int fd = mkstemps(path, 4);

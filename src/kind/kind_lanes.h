@@ -111,13 +111,17 @@ const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b,
 
 struct imp_emitter_lanes {
     bool (*covers)(const struct imp_emitter *e); /* NULL: all are */
-    /* imp_emitter_ops.sample. */
+    /* imp_emitter_ops.sample; out->drawn is given as the lanes that count. */
     void (*sample)(const struct imp_emitter *e, const imp_wide3 *ref, const imp_wide u[2],
                    struct imp_wide_light *out);
     bool far; /* its points are infinitely far */
     /* imp_emitter_ops.pdf, where they are; else NULL. */
     imp_wide (*pdf)(const struct imp_emitter *e, const imp_wide3 *ref,
                     const imp_wide3 *wi);
+    /* Radiance in colours that arrives from the directions wi, as decided, of those that are far and
+     * not even (walk/core/emitted.h); else NULL. */
+    void (*radiance)(const struct imp_emitter *e, const imp_wide3 *wi,
+                     struct imp_wide_color *le);
 };
 /* NULL: this emitter has none. */
 const struct imp_emitter_lanes *imp__emitter_lanes(const struct imp_emitter *e);

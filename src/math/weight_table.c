@@ -21,11 +21,12 @@ void imp__weight_table_sum(struct imp__weight_table *t, const double *scale)
 static int find(const double *sum, int n, double u, double *rest)
 {
     const double x = u * sum[n - 1];
-    int lo = 0, hi = n - 1;
-    while (lo < hi) {
-        const int middle = (lo + hi) / 2;
-        if (x < sum[middle]) hi = middle;
-        else lo = middle + 1;
+    int lo = 0;
+    for (int left = n - 1; left > 0;) { /* without branches on x, which nobody foresees */
+        const int half = left / 2;
+        const bool above = !(x < sum[lo + half]);
+        lo = above ? lo + half + 1 : lo;
+        left = above ? left - half - 1 : half;
     }
     while (lo > 0 && !(sum[lo] > sum[lo - 1])) lo--; /* x rounded up to the total */
     const double before = lo ? sum[lo - 1] : 0;

@@ -104,6 +104,49 @@ static void lights(void)
                 CUBE("0", "-.5", DIFFUSE(".9,.9,.9")));
 }
 
+#define TREE "<string name='light_choice' value='tree'/>"
+#define THINGS                                                                           \
+    WALL("0", "-1", "0", "x", "-90", DIFFUSE(".5,.6,.7"))                                \
+    CUBE("0", "-.5", DIFFUSE(".9,.9,.9"))                                                \
+    BALL(".9", ".3", "<bsdf type='dielectric'/>")                                        \
+    BALL("-.9", ".3", GOLD(ALPHA("alpha", ".2")))
+
+/* Skies that differ by direction, and several of them. */
+static void skies(void)
+{
+    static char path[64], rest[8192];
+    static const char *const map =
+        "<emitter type='envmap'><string name='filename' value='%s'/><float name='scale' "
+        "value='1.5'/><float name='rotation' value='40'/><transform "
+        "name='to_world'><rotate x='1' angle='70'/></transform>%s</emitter>%s";
+    if (!picture_write(path)) {
+        tap_ok(false, "a file for a picture");
+        return;
+    }
+    snprintf(rest, sizeof rest, map, path, "", THINGS);
+    compare("an environment", IMP_RGB, 4, PATH(""), CAMERA, rest);
+    compare("an environment, independent walks", IMP_RGB, 4, PATH(DEPTH("4")), CAMERA,
+            rest);
+    compare("an environment in spectra", IMP_SPECTRAL, 4, PATH(DEPTH("4")), CAMERA, rest);
+    compare("an environment in grey", IMP_MONO, 4, PATH(DEPTH("4")), CAMERA, rest);
+    compare("a hidden environment", IMP_RGB, 4,
+            PATH("<boolean name='hide_emitters' value='true'/>"), CAMERA, rest);
+    snprintf(rest, sizeof rest, map, path,
+             "<string name='projection' value='equal_area'/>",
+             THINGS LAMP("0", "0", ".5"));
+    compare("an environment of equal areas, and a lamp", IMP_RGB, 4, PATH(DEPTH("5")),
+            CAMERA, rest);
+    compare("an environment and a lamp, by a tree", IMP_RGB, 4, PATH(DEPTH("5") TREE),
+            CAMERA, rest);
+    snprintf(rest, sizeof rest, map, path, "", SKY THINGS);
+    compare("two skies", IMP_RGB, 4, PATH(DEPTH("5")), CAMERA, rest);
+    compare("sun and sky", IMP_RGB, 4, PATH(DEPTH("5")), CAMERA,
+            "<emitter type='sunsky'/>" THINGS);
+    compare("sun and sky and a lamp, by a tree", IMP_RGB, 4, PATH(DEPTH("5") TREE),
+            CAMERA, "<emitter type='sunsky'/>" THINGS LAMP("0", "0", ".5"));
+    unlink(path);
+}
+
 static void sensors(void)
 {
     compare("a meter", IMP_RGB, 6, PATH(DEPTH("5")), "irradiancemeter'>", "");
@@ -217,6 +260,7 @@ int main(void)
     boxes();
     spectra();
     lights();
+    skies();
     sensors();
     scenes();
     meshes();

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Emitters in lanes: surfaces by their shapes, and the constant sky. */
-#include "kind/kind_lanes.h"
+#include "emitter_lanes.h"
 #include "math/trig.h"
 
 #define IMP_WIDE IMP_WIDE_LANES
 #define IMP_TEXT "math/warp_text.h"
 #include "math/lane_text.h"
 
-extern const struct imp_emitter_ops imp__area, imp__constant;
+extern const struct imp_emitter_ops imp__area, imp__constant, imp__envmap;
 
 /* ---- Surfaces ---------------------------------------------------------------------------- */
 
@@ -30,13 +30,9 @@ static void constant_sample(const struct imp_emitter *e, const imp_wide3 *ref,
                             const imp_wide u[2], struct imp_wide_light *out)
 {
     (void)e, (void)ref;
-    out->wi = out->p = IMP_WIDE_OF(imp__sphere_directions)(u[0], u[1]);
+    out->wi = IMP_WIDE_OF(imp__sphere_directions)(u[0], u[1]);
+    imp__wide_light_far(out);
     out->pdf = imp__wide(IMP_INV_PI / 4);
-    out->cos_light = imp__wide(1);
-    out->drawn = ~(imp_wide_truth){0};
-    out->dist = imp__wide(INFINITY);
-    out->uv[0] = out->uv[1] = out->located[0] = out->located[1] = imp__wide(0);
-    for (int k = 0; k < IMP_WIDE_LANES; k++) out->prim[k] = -1;
 }
 
 static imp_wide constant_pdf(const struct imp_emitter *e, const imp_wide3 *ref,
@@ -57,5 +53,6 @@ static const struct imp_emitter_lanes area = {.covers = area_covers,
 const struct imp_emitter_lanes *imp__emitter_lanes(const struct imp_emitter *e)
 {
     if (e->ops == &imp__area && area_covers(e)) return &area;
+    if (e->ops == &imp__envmap && imp__envmap_lanes.covers(e)) return &imp__envmap_lanes;
     return e->ops == &imp__constant ? &constant : NULL;
 }

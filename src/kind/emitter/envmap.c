@@ -17,9 +17,11 @@
  * visibility. */
 #include "color/rgb.h"
 #include "emission.h"
+#include "emitter_lanes.h"
 #include "kind/build.h"
 #include "kind/shape/shape.h"
 #include "kind/texture/bitmap.h"
+#include "math/trig.h"
 #include "math/warp.h"
 #include "math/weight_table.h"
 #include "sphere_map.h"
@@ -48,8 +50,9 @@ struct envmap {
     struct imp__sphere_map map;
     struct imp__texels texels;
     struct imp__weight_table table;
-    double *weight; /* [height] solid angle of a texel's hat */
-    imp_v3 axis[3]; /* of the map, world, unit */
+    double *weight;              /* [height] solid angle of a texel's hat */
+    struct imp__sphere_row *row; /* [height] */
+    imp_v3 axis[3];              /* of the map, world, unit */
 };
 
 /* ---- Building ------------------------------------------------------------------ */
@@ -124,9 +127,13 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
         w, h, imp_build_alloc(b, (size_t)h, sizeof(double)),
         imp_build_alloc(b, (size_t)w * (size_t)h, sizeof(double))};
     s->weight = imp_build_alloc(b, (size_t)h, sizeof(double));
-    if (!s->table.row || !s->table.column || !s->weight)
+    s->row = imp_build_alloc(b, (size_t)h, sizeof *s->row);
+    if (!s->table.row || !s->table.column || !s->weight || !s->row)
         IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "scene: no memory for an environment"));
-    for (int i = 0; i < h; i++) s->weight[i] = imp__sphere_map_weight(&s->map, i);
+    for (int i = 0; i < h; i++) {
+        s->weight[i] = imp__sphere_map_weight(&s->map, i);
+        s->row[i] = imp__sphere_map_row(&s->map, i);
+    }
     changed(e);
 out:
     return st;
@@ -194,21 +201,23 @@ static double density(const struct imp_emitter *e, imp_v3 w)
     return l[0] / total;
 }
 
+static imp_v3 draw(const struct imp_emitter *e, const double u[2])
+{
+    const struct envmap *s = e->self;
+    double r[2], cos_theta, sin_theta;
+    int i, j;
+    if (!(imp__weight_table_total(&s->table) > 0)) return imp__uniform_sphere(u);
+    imp__weight_table_draw(&s->table, u, &i, &j, r);
+    imp__sphere_map_draw(&s->map, &s->row[i], i, r[1], &cos_theta, &sin_theta);
+    const double column = (j + 0.5 + imp__hat_draw(r[0])) / s->map.width;
+    const imp_v3 d = imp__sphere_direction(column - turns(e), cos_theta, sin_theta);
+    return s->axis[0] * d[0] + s->axis[1] * d[1] + s->axis[2] * d[2];
+}
 static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double u[2],
                    struct imp_light_sample *out)
 {
-    const struct envmap *s = e->self;
-    imp_v3 w = imp__uniform_sphere(u);
+    const imp_v3 w = draw(e, u);
     (void)ref;
-    if (imp__weight_table_total(&s->table) > 0) {
-        double r[2], cos_theta, sin_theta;
-        int i, j;
-        imp__weight_table_draw(&s->table, u, &i, &j, r);
-        imp__sphere_map_draw(&s->map, i, r[1], &cos_theta, &sin_theta);
-        const double column = (j + 0.5 + imp__hat_draw(r[0])) / s->map.width;
-        const imp_v3 d = imp__sphere_direction(column - turns(e), cos_theta, sin_theta);
-        w = s->axis[0] * d[0] + s->axis[1] * d[1] + s->axis[2] * d[2];
-    }
     *out = (struct imp_light_sample){
         .wi = w, .dist = INFINITY, .pdf = density(e, w), .cos_light = 1};
     return true;
@@ -238,3 +247,74 @@ const struct imp_emitter_ops imp__envmap = {.size = sizeof(struct imp_emitter_op
                                             .sample_emission = imp__sky_emission_sample,
                                             .pdf_emission = imp__sky_emission_pdf,
                                             .jumps = imp__sky_without_jumps};
+
+/* ---- In lanes ---------------------------------------------------------------------------- */
+
+static bool covers(const struct imp_emitter *e)
+{
+    return imp__texture_lanes(e->input[DATA]->texture) && e->input[SCALE]->plain;
+}
+
+/* imp__sphere_map_place, and lookup. */
+static void lookups(const struct imp_emitter *e, const imp_wide3 *w, imp_wide uv[2])
+{
+    const struct envmap *s = e->self;
+    const imp_wide zero = imp__wide(0);
+    const double height = s->map.height, last = s->map.height - 1;
+    const imp_wide3 d = {imp__wide3_inner(*w, imp__wide3_of(s->axis[0])),
+                         imp__wide3_inner(*w, imp__wide3_of(s->axis[1])),
+                         imp__wide3_inner(*w, imp__wide3_of(s->axis[2]))};
+    const imp_wide out = imp__wide_root(d.x * d.x + d.z * d.z),
+                   around = IMP_WIDE_OF(imp__angles_signed)(-d.z, d.x) * (IMP_INV_PI / 2);
+    const imp_wide u = imp__wide_choose(around < zero, around + 1, around) + turns(e);
+    const imp_wide row =
+        s->map.projection == IMP_LATLONG
+            ? IMP_WIDE_OF(imp__angles_signed)(d.y, out) * IMP_INV_PI * last
+            : (1 - d.y) * 0.5 * height - 0.5;
+    uv[0] = u - imp__wide_floor(u);
+    uv[1] =
+        (imp__wide_larger(imp__wide_lesser(row, imp__wide(last)), zero) + 0.5) / height;
+}
+
+static imp_wide pdf_lanes(const struct imp_emitter *e, const imp_wide3 *ref,
+                          const imp_wide3 *wi)
+{
+    const struct envmap *s = e->self;
+    const struct imp_texture *map = e->input[DATA]->texture;
+    const double total = imp__weight_table_total(&s->table);
+    imp_wide uv[2];
+    struct imp_wide_color l;
+    (void)ref;
+    if (!(total > 0)) return imp__wide(IMP_INV_PI / 4);
+    lookups(e, wi, uv);
+    imp__texture_lanes(map)->eval(map, uv, true, &l);
+    return l.c[0] / total;
+}
+static void sample_lanes(const struct imp_emitter *e, const imp_wide3 *ref,
+                         const imp_wide u[2], struct imp_wide_light *out)
+{
+    const struct envmap *s = e->self;
+    unsigned left = imp__wide_bits(out->drawn);
+    out->wi = imp__wide3_of(s->axis[1]);
+    for (; left; left &= left - 1) {
+        const int k = __builtin_ctz(left);
+        imp__wide3_set(&out->wi, k, draw(e, (double[]){u[0][k], u[1][k]}));
+    }
+    imp__wide_light_far(out);
+    out->pdf = pdf_lanes(e, ref, &out->wi);
+}
+static void radiance_lanes(const struct imp_emitter *e, const imp_wide3 *wi,
+                           struct imp_wide_color *le)
+{
+    const struct imp_texture *map = e->input[DATA]->texture;
+    imp_wide uv[2];
+    lookups(e, wi, uv);
+    imp__texture_lanes(map)->eval(map, uv, false, le);
+    for (int c = 0; c < 3; c++) le->c[c] *= e->input[SCALE]->value[0];
+}
+
+const struct imp_emitter_lanes imp__envmap_lanes = {.covers = covers,
+                                                    .sample = sample_lanes,
+                                                    .far = true,
+                                                    .pdf = pdf_lanes,
+                                                    .radiance = radiance_lanes};

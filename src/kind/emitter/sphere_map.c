@@ -63,10 +63,11 @@ double imp__sphere_map_weight(const struct imp__sphere_map *m, int i)
 
 /* t in [0, delta] with density (1 - t/delta) sin(theta + t): Newton's method on the
  * integral, kept inside an interval that holds the root. */
-static double half_hat_draw(double theta, double delta, double r)
+static double half_hat_draw(const struct imp__sphere_row *row, int side, double theta,
+                            double delta, double r)
 {
-    const double sine = sin(theta), cosine = cos(theta);
-    const double goal = r * half_hat(theta, delta);
+    const double sine = row->sine[side], cosine = row->cosine[side];
+    const double goal = r * row->hat[side];
     double lo = 0, hi = delta, t = delta * (1 - sqrt(1 - r)); /* were the sine constant */
     for (int k = 0; k < 30 && hi - lo > 1e-13 * delta; k++) {
         const double s = sin(theta + t), c = cos(theta + t), left = 1 - t / delta;
@@ -81,26 +82,44 @@ static double half_hat_draw(double theta, double delta, double r)
     return t;
 }
 
-static void latlong_draw(const struct imp__sphere_map *m, int i, double r,
+struct imp__sphere_row imp__sphere_map_row(const struct imp__sphere_map *m, int i)
+{
+    const double delta = row_step(m), theta[2] = {i * delta, IMP_PI - i * delta};
+    struct imp__sphere_row row;
+    for (int k = 0; k < 2; k++) {
+        row.sine[k] = sin(theta[k]);
+        row.cosine[k] = cos(theta[k]);
+        row.hat[k] = half_hat(theta[k], delta);
+    }
+    if (i == m->height - 1) row.hat[0] = 0;
+    if (i == 0) row.hat[1] = 0;
+    return row;
+}
+
+static void latlong_draw(const struct imp__sphere_map *m,
+                         const struct imp__sphere_row *row, int i, double r,
                          double *cos_theta, double *sin_theta)
 {
     const double delta = row_step(m), theta = i * delta;
-    const double below = i < m->height - 1 ? half_hat(theta, delta) : 0;
-    const double above = i > 0 ? half_hat(IMP_PI - theta, delta) : 0;
+    const double below = row->hat[0], above = row->hat[1];
     const double at = r * (above + below);
     double t;
     if (at < above || below == 0)
-        t = theta - half_hat_draw(IMP_PI - theta, delta, imp_max(1 - at / above, 0.0));
-    else t = theta + half_hat_draw(theta, delta, imp_min((at - above) / below, 1.0));
+        t = theta -
+            half_hat_draw(row, 1, IMP_PI - theta, delta, imp_max(1 - at / above, 0.0));
+    else
+        t = theta +
+            half_hat_draw(row, 0, theta, delta, imp_min((at - above) / below, 1.0));
     *cos_theta = cos(t);
     *sin_theta = sin(t);
 }
 
-void imp__sphere_map_draw(const struct imp__sphere_map *m, int i, double r,
+void imp__sphere_map_draw(const struct imp__sphere_map *m,
+                          const struct imp__sphere_row *row, int i, double r,
                           double *cos_theta, double *sin_theta)
 {
     if (m->projection == IMP_LATLONG) {
-        latlong_draw(m, i, r, cos_theta, sin_theta);
+        latlong_draw(m, row, i, r, cos_theta, sin_theta);
         return;
     }
     double x = imp__hat_draw(r);

@@ -36,8 +36,15 @@ double imp__sphere_map_cosine(const struct imp__sphere_map *m, double row);
 
 /* Solid angle of the hat of a texel in row i, Int hat dw; the sum over all texels is 4 pi. */
 double imp__sphere_map_weight(const struct imp__sphere_map *m, int i);
-/* theta with the density of the hat of row i per solid angle, from a uniform number. */
-void imp__sphere_map_draw(const struct imp__sphere_map *m, int i, double r,
+/* What draws in a row need of it, for maps that are IMP_LATLONG: sine and cosine of theta, and half the
+ * hat's integral, towards the next row [0] and, with pi - theta, towards the one before [1]. */
+struct imp__sphere_row {
+    double sine[2], cosine[2], hat[2];
+};
+struct imp__sphere_row imp__sphere_map_row(const struct imp__sphere_map *m, int i);
+/* theta with the density of the hat of row i per solid angle, from a uniform number; row: as above. */
+void imp__sphere_map_draw(const struct imp__sphere_map *m,
+                          const struct imp__sphere_row *row, int i, double r,
                           double *cos_theta, double *sin_theta);
 /* Offset in columns with the density of a hat, 1 - |x|. */
 static inline double imp__hat_draw(double r)

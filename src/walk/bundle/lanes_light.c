@@ -35,8 +35,10 @@ static void draw_lanes(const struct imp_scene *scene,
 {
     const struct imp_emitter *e = scene->emitters[light];
     const imp_wide zero = imp__wide(0);
+    struct imp_wide_color le;
     struct imp_wide_light own;
     own.recorded = out->at.recorded;
+    own.drawn = here;
     lanes->sample(e, ref, u, &own);
     const imp_wide_truth lit = imp__wide_decide(own.cos_light) > zero;
     own.drawn &= own.pdf > zero;
@@ -51,15 +53,22 @@ static void draw_lanes(const struct imp_scene *scene,
         for (unsigned left = imp__wide_bits(own.drawn & here); left; left &= left - 1) {
             const int k = __builtin_ctz(left);
             const struct imp_emission x = {.dist = lanes->far ? INFINITY : 1,
-                                           .cos_light = imp__decide1(own.cos_light[k])};
-            imp_spec le = {0};
-            if (imp_unlikely(!i->plain || !i->spectrum))
-                le = imp__emitter_radiance(scene, light, &x, (imp_v3){0}, carried[k]);
-            else if (lit[k]) imp__spectrum_lanes(i->spectrum, carried[k]->nm, &le);
-            for (int c = 0; c < 4; c++) out->radiance.c[c][k] = le[c];
+                                           .cos_light = imp__decide1(own.cos_light[k]),
+                                           .d =
+                                               imp__decide(-imp__wide3_lane(&own.wi, k))};
+            imp_spec at = {0};
+            if (imp_unlikely(lanes->radiance || !i->plain || !i->spectrum))
+                at = imp__emitter_radiance(scene, light, &x, (imp_v3){0}, carried[k]);
+            else if (lit[k]) imp__spectrum_lanes(i->spectrum, carried[k]->nm, &at);
+            for (int c = 0; c < 4; c++) out->radiance.c[c][k] = at[c];
         }
+    } else if (lanes->radiance) {
+        const imp_wide3 wi = imp__wide3_decide(own.wi);
+        lanes->radiance(e, &wi, &le);
+        for (int c = 0; c < 3; c++)
+            out->radiance.c[c] = imp__wide_choose(here, le.c[c], out->radiance.c[c]);
     } else {
-        const struct imp_wide_color le = imp__wide_color(e->input[0]->value);
+        le = imp__wide_color(e->input[0]->value);
         for (int c = 0; c < 3; c++)
             out->radiance.c[c] = imp__wide_choose(
                 here, imp__wide_choose(lit, le.c[c], zero), out->radiance.c[c]);
@@ -119,7 +128,8 @@ static void draw_alone(const struct imp_scene *scene,
 /* A form in lanes that serves: even radiance has no inputs to look up. */
 static const struct imp_emitter_lanes *lanes_of(const struct imp_emitter *e)
 {
-    return imp__emitter_even(e, NULL) ? imp__emitter_lanes(e) : NULL;
+    const struct imp_emitter_lanes *lanes = imp__emitter_lanes(e);
+    return lanes && (lanes->radiance || imp__emitter_even(e, NULL)) ? lanes : NULL;
 }
 
 /* Points of the lights chosen in the lanes with bits: of one light together. */
@@ -206,13 +216,56 @@ void imp__lanes_light_draw(const struct imp_scene *scene,
 bool imp__lanes_sky_fits(const struct imp_tracer *tracer)
 {
     const struct imp_scene *scene = tracer->scene;
-    if (scene->n_environments != 1 || tracer->wavelengths ||
-        tracer->integrator->hide_emitters ||
-        (tracer->integrator->light_tree && scene->light_tree))
-        return false;
-    const struct imp_emitter_lanes *lanes =
-        lanes_of(scene->emitters[scene->environments[0]]);
-    return lanes && lanes->pdf;
+    return scene->n_environments == 1 && !tracer->wavelengths &&
+           !tracer->integrator->hide_emitters;
+}
+
+/* Densities of points of the sky along wi, seen from `from`: by lanes, or one by one. */
+static imp_wide sky_pdf(const struct imp_emitter *e,
+                        const struct imp_emitter_lanes *lanes, const imp_wide3 *from,
+                        const imp_wide3 *wi)
+{
+    if (lanes) return lanes->pdf(e, from, wi);
+    imp_wide pdf;
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
+        const imp_v3 ref = imp__wide3_lane(from, k), w = imp__wide3_lane(wi, k);
+        pdf[k] = e->ops->pdf(e, &ref, &w, NULL, NULL);
+    }
+    return pdf;
+}
+
+static void sky_radiance(const struct imp_scene *scene, int light,
+                         const struct imp_emitter_lanes *lanes, const imp_wide3 *wi,
+                         struct imp_wide_color *le)
+{
+    const struct imp_emitter *e = scene->emitters[light];
+    const imp_wide3 decided = imp__wide3_decide(*wi);
+    if (imp__emitter_even(e, NULL)) {
+        *le = imp__wide_color(e->input[0]->value);
+        return;
+    }
+    if (lanes) {
+        lanes->radiance(e, &decided, le);
+        return;
+    }
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
+        const imp_v3 w = imp__wide3_lane(&decided, k);
+        const struct imp_emission x = {.dist = INFINITY, .cos_light = 1, .d = -w};
+        const imp_spec own = imp__emitter_radiance(scene, light, &x, w, NULL);
+        for (int c = 0; c < 3; c++) le->c[c][k] = own[c];
+    }
+}
+
+/* Probabilities of the sky among the lights, where the rays order[lanes] left. */
+static imp_wide sky_chance(const struct imp_depth *d, const int32_t *order, int light)
+{
+    const struct imp_scene *scene = d->bundle->tracer->scene;
+    imp_wide chance =
+        imp__wide(scene->light_cdf[light] - (light ? scene->light_cdf[light - 1] : 0));
+    for (int k = 0; d->rays->left && k < IMP_WIDE_LANES; k++)
+        chance[k] = imp__light_tree_factor(scene->light_tree, &d->rays->left[order[k]],
+                                           light, -1);
+    return chance;
 }
 
 static imp_wide power_heuristic(imp_wide a, imp_wide b)
@@ -230,16 +283,18 @@ static inline void sky_work(struct imp_depth *d, const int32_t *order, int n,
     const imp_wide3 from = imp__wide3_taken(d->rays->from, order),
                     wi = imp__wide3_taken(d->rays->ray.d, order);
     const imp_wide pdf = imp__wide_taken(d->rays->pdf, order), one = imp__wide(1);
-    const double chance =
-        t->scene->light_cdf[light] - (light ? t->scene->light_cdf[light - 1] : 0);
+    const struct imp_emitter_lanes *lanes = lanes_of(e);
+    const imp_wide_truth weighed = pdf > imp__wide(0);
     imp_wide weight = one;
-    if (t->integrator->lights)
-        weight = imp__wide_choose(pdf > imp__wide(0),
-                                  imp__wide_decide(power_heuristic(
-                                      pdf, chance * lanes_of(e)->pdf(e, &from, &wi))),
-                                  one);
+    if (t->integrator->lights && imp__wide_bits(weighed))
+        weight = imp__wide_choose(
+            weighed,
+            imp__wide_decide(power_heuristic(pdf, sky_chance(d, order, light) *
+                                                      sky_pdf(e, lanes, &from, &wi))),
+            one);
     struct imp_wide_color met;
-    for (int c = 0; c < 3; c++) met.c[c] = e->input[0]->value[c] * weight;
+    sky_radiance(t->scene, light, lanes, &wi, &met);
+    for (int c = 0; c < 3; c++) met.c[c] *= weight;
     if (d->bundle->walks) {
         imp__lanes_record_sky(d, order, n, light, &wi, &weight, &met);
         return;
