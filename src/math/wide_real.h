@@ -146,7 +146,16 @@ static inline imp_wide3 imp__wide3_taken(double *const column[3], const int32_t 
                        imp__wide_taken(column[2], at)};
 }
 
-/* Floats at index, whole numbers below 2^31. */
+/* Numbers at index, whole numbers below 2^31; and floats. */
+static inline imp_wide imp__wide_found(const double *from, imp_wide index)
+{
+#if IMP_WIDE_LANES == 8
+    return (imp_wide)_mm512_i32gather_pd(_mm512_cvtpd_epi32((__m512d)index), from, 8);
+#else
+    return (imp_wide){from[(int32_t)index[0]], from[(int32_t)index[1]],
+                      from[(int32_t)index[2]], from[(int32_t)index[3]]};
+#endif
+}
 static inline imp_wide imp__wide_gathered(const float *from, imp_wide index)
 {
 #if IMP_WIDE_LANES == 8

@@ -12,7 +12,8 @@
 #include "math/lane_text.h"
 
 extern const struct imp_bsdf_lanes imp__conductor_lanes, imp__dielectric_lanes,
-    imp__diffuse_lanes, imp__roughconductor_lanes, imp__twosided_lanes;
+    imp__diffuse_lanes, imp__plastic_lanes, imp__roughconductor_lanes,
+    imp__roughplastic_lanes, imp__twosided_lanes;
 
 static inline imp_wide_truth imp__fronts(const imp_wide3 *wo, const imp_wide3 *wi)
 {
@@ -28,6 +29,18 @@ static inline imp_wide3 imp__mirrors(const imp_wide3 *wo)
 static inline void imp__lobe_set(imp_wide_lobe *lobe, imp_wide_truth here, int k)
 {
     *lobe = (*lobe & ~here) | (((imp_wide_lobe){0} + k) & here);
+}
+/* imp__coated_chance (blending.h), where no derivative is wanted. */
+static inline imp_wide imp__coated_chances(const struct imp_wide_color *coat,
+                                           const struct imp_wide_color *base, imp_wide F)
+{
+    const imp_wide zero = imp__wide(0);
+    const imp_wide most[2] = {
+        imp__wide_larger(coat->c[0], imp__wide_larger(coat->c[1], coat->c[2])),
+        imp__wide_larger(base->c[0], imp__wide_larger(base->c[1], base->c[2]))};
+    const imp_wide s = F * imp__wide_larger(most[0], zero),
+                   r = (1 - F) * imp__wide_larger(most[1], zero);
+    return imp__wide_choose(s + r > zero, s / (s + r), imp__wide(1));
 }
 static inline imp_wide imp__lamberts(const imp_wide3 *wo, const imp_wide3 *wi)
 {

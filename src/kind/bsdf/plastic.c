@@ -10,7 +10,9 @@
  * k = rho if `nonlinear`, so that the base's colour deepens with every reflection, else 1.
  * The index bends no path that is followed, and has a gradient. */
 #include "blending.h"
+#include "bsdf_lanes.h"
 #include "fresnel.h"
+#include "fresnel_lanes.h"
 #include "lambert.h"
 #include "presets.h"
 
@@ -161,3 +163,56 @@ const struct imp_bsdf_ops imp__plastic = {.size = sizeof(struct imp_bsdf_ops),
                                           .eval_d = eval_d,
                                           .albedo = albedo,
                                           .eval_directions_d = eval_directions_d};
+
+/* ---- In lanes ---------------------------------------------------------------------------- */
+
+static bool covers(const struct imp_bsdf *b, uint64_t derivative)
+{
+    (void)b;
+    return derivative == 0;
+}
+
+static imp_wide fresnels(const struct imp_wide_color *in, imp_wide c)
+{
+    imp_wide cos_t, eta_t;
+    return IMP_WIDE_OF(imp__dielectric)(c, in[ETA].c[0], &cos_t, &eta_t);
+}
+
+static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
+                                   const struct imp_wide_color *in, const imp_wide3 *wo,
+                                   const imp_wide u[3], imp_wide3 *wi,
+                                   imp_wide_lobe *lobe)
+{
+    (void)b;
+    const imp_wide_truth mirrors =
+        u[0] < imp__coated_chances(&in[TINT], &in[DIFFUSE], fresnels(in, wo->z));
+    const imp_wide_truth drawn = imp__lambert_samples(u, wo, wi);
+    *wi = imp__wide3_choose(mirrors, imp__mirrors(wo), *wi);
+    imp__lobe_set(lobe, mirrors, MIRROR);
+    return (wo->z > imp__wide(0)) & (mirrors | drawn);
+}
+
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                               const imp_wide3 *wo, const imp_wide3 *wi,
+                               const imp_wide_lobe *lobe, int colors,
+                               struct imp_wide_color *f)
+{
+    const struct plastic *p = b->self;
+    const imp_wide zero = imp__wide(0), eta = in[ETA].c[0];
+    const imp_wide Fo = fresnels(in, wo->z), lambert = imp__lamberts(wo, wi),
+                   q = imp__coated_chances(&in[TINT], &in[DIFFUSE], Fo);
+    const imp_wide_truth smooth = imp__is_smooth(*lobe);
+    double d_e; /* the index is a number: the same in all lanes */
+    const double r = imp__fresnel_diffuse(1 / eta[0], &d_e);
+    const imp_wide through = (1 - Fo) * (1 - fresnels(in, wi->z)) / (eta * eta) * lambert;
+    for (int c = 0; c < colors; c++) {
+        const imp_wide rho = in[DIFFUSE].c[c];
+        const imp_wide again = 1 / (1 - (p->nonlinear ? rho : imp__wide(1)) * r);
+        f->c[c] = imp__wide_choose(smooth, rho * again * through, in[TINT].c[c] * Fo);
+    }
+    return imp__wide_choose(wo->z > zero, imp__wide_choose(smooth, (1 - q) * lambert, q),
+                            zero);
+}
+
+const struct imp_bsdf_lanes imp__plastic_lanes = {
+    .covers = covers, .sample = sample_lanes, .pdf_eval = pdf_eval_lanes};

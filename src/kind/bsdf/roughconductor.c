@@ -7,7 +7,7 @@
  *
  * Light that meets a second facet is lost, as in the format. Drawing a normal and
  * mirroring wo in it gives p(wi) = p(h)/(4 c). */
-#include "bsdf_lanes.h"
+#include "facet_lanes.h"
 #include "fresnel.h"
 #include "fresnel_lanes.h"
 #include "lambert.h"
@@ -145,10 +145,6 @@ const struct imp_bsdf_ops imp__roughconductor = {.size = sizeof(struct imp_bsdf_
 
 /* ---- In lanes: GGX, of visible normals ---------------------------------------------------- */
 
-#define IMP_WIDE IMP_WIDE_LANES
-#define IMP_TEXT "kind/bsdf/microfacet_text.h"
-#include "math/lane_text.h"
-
 static bool covers(const struct imp_bsdf *b, uint64_t derivative)
 {
     const struct imp__roughness *r = b->self;
@@ -185,33 +181,22 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_c
     for (int k = 0; k < colors; k++)
         f->c[k] = IMP_WIDE_OF(imp__conductor)(c, in[ETA].c[k], in[K].c[k]) *
                   (in[TINT].c[k] * by);
-    const imp_wide drawn = imp__wide_choose(vm > zero, D * Go * vm / wo->z, zero);
-    return imp__wide_choose(imp__fronts(wo, wi), drawn / (4 * vm), zero);
+    return imp__wide_choose(imp__fronts(wo, wi),
+                            imp__ggx_normals_pdf(wo, vm, D, Go) / (4 * vm), zero);
 }
 
-/* ggx_visible of microfacet.c, and the mirror image of wo in that normal. */
 static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
                                    const struct imp_wide_color *in, const imp_wide3 *wo,
                                    const imp_wide u[3], imp_wide3 *wi,
                                    imp_wide_lobe *lobe)
 {
-    const imp_wide zero = imp__wide(0);
-    imp_wide au, av, si, co;
+    imp_wide au, av;
     (void)lobe;
     roughness_lanes(b, in, &au, &av);
-    const imp_wide3 w = imp__wide3_unit((imp_wide3){au * wo->x, av * wo->y, wo->z});
-    const imp_wide phi = IMP_2PI * u[1], z = (1 - u[2]) * (1 + w.z) - w.z;
-    const imp_wide r = imp__wide_root(imp__wide_larger((1 - z) * (1 + z), zero));
-    for (int k = 0; k < IMP_WIDE_LANES; k++) {
-        si[k] = sin(phi[k]);
-        co[k] = cos(phi[k]);
-    }
-    const imp_wide3 cap = imp__wide3_plus((imp_wide3){r * co, r * si, z}, w);
-    const imp_wide3 h = imp__wide3_unit(
-        (imp_wide3){au * cap.x, av * cap.y, imp__wide_larger(cap.z, zero)});
+    const imp_wide3 h = imp__ggx_normals(au, av, wo, &u[1]);
     const imp_wide c = imp__wide3_inner(*wo, h);
-    *wi = imp__wide3_unit(imp__wide3_minus(imp__wide3_times(h, 2 * c), *wo));
-    return imp__fronts(wo, wi) & (c > zero);
+    *wi = imp__mirrors_in(wo, &h, c);
+    return imp__fronts(wo, wi) & (c > imp__wide(0));
 }
 
 const struct imp_bsdf_lanes imp__roughconductor_lanes = {

@@ -10,7 +10,9 @@
  * tables that are made for them, and made anew when they change. */
 #include "blending.h"
 #include "coat.h"
+#include "facet_lanes.h"
 #include "fresnel.h"
+#include "fresnel_lanes.h"
 #include "lambert.h"
 #include "presets.h"
 #include "roughness.h"
@@ -235,3 +237,103 @@ const struct imp_bsdf_ops imp__roughplastic = {.size = sizeof(struct imp_bsdf_op
                                                .albedo = albedo,
                                                .changed = changed,
                                                .eval_directions_d = eval_directions_d};
+
+/* ---- In lanes: GGX, of visible normals ---------------------------------------------------- */
+
+static bool covers(const struct imp_bsdf *b, uint64_t derivative)
+{
+    const struct roughplastic *p = b->self;
+    return derivative == 0 && p->type == IMP_GGX && p->visible;
+}
+
+/* Roughness and index are numbers, the same in all lanes. */
+static struct at at_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in)
+{
+    imp_spec own[N_INPUTS] = {0};
+    own[ALPHA] = imp__spec(in[ALPHA].c[0][0]);
+    own[ETA] = imp__spec(in[ETA].c[0][0]);
+    return at_inputs(b, own);
+}
+
+/* number() of imp__coat_T at mu. */
+static imp_wide lets_through(const struct at *a, imp_wide mu)
+{
+    const imp_wide zero = imp__wide(0), one = imp__wide(1);
+    const struct imp__coat *coat = &a->p->coat;
+    const double d_alpha = a->alpha - coat->alpha, d_eta = a->eta - coat->eta;
+    const imp_wide x =
+        imp__wide_larger(imp__wide_lesser(mu, one), zero) * (IMP_COAT_NODES - 1);
+    const imp_wide k =
+        imp__wide_lesser(imp__wide_floor(x), imp__wide(IMP_COAT_NODES - 2));
+    imp_wide own[3];
+    for (int j = 0; j < 3; j++) {
+        /* As a rule they are the table's own, and the rest is 0. */
+        if (j > 0 && d_alpha == 0 && d_eta == 0) {
+            own[j] = zero;
+            continue;
+        }
+        const double *from = (const double *)coat->T + j;
+        const imp_wide T = imp__wide_found(from, 4 * k),
+                       next = imp__wide_found(from + 4, 4 * k);
+        own[j] = T + (next - T) * (x - k);
+    }
+    return own[0] + own[1] * d_alpha + own[2] * d_eta;
+}
+
+static imp_wide facet_chances(const struct imp_wide_color *in, imp_wide through)
+{
+    const imp_wide T =
+        imp__wide_larger(imp__wide_lesser(through, imp__wide(1)), imp__wide(0));
+    return imp__coated_chances(&in[TINT], &in[DIFFUSE], 1 - T);
+}
+
+static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
+                                   const struct imp_wide_color *in, const imp_wide3 *wo,
+                                   const imp_wide u[3], imp_wide3 *wi,
+                                   imp_wide_lobe *lobe)
+{
+    const struct at a = at_lanes(b, in);
+    const imp_wide alpha = imp__wide(a.alpha);
+    const imp_wide_truth facets = u[0] < facet_chances(in, lets_through(&a, wo->z));
+    const imp_wide3 h = imp__ggx_normals(alpha, alpha, wo, &u[1]);
+    const imp_wide c = imp__wide3_inner(*wo, h);
+    const imp_wide_truth drawn = imp__lambert_samples(u, wo, wi);
+    (void)lobe;
+    *wi = imp__wide3_choose(facets, imp__mirrors_in(wo, &h, c), *wi);
+    return imp__fronts(wo, wi) & ((facets & (c > imp__wide(0))) | (~facets & drawn));
+}
+
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                               const imp_wide3 *wo, const imp_wide3 *wi,
+                               const imp_wide_lobe *lobe, int colors,
+                               struct imp_wide_color *f)
+{
+    const struct at a = at_lanes(b, in);
+    const imp_wide alpha = imp__wide(a.alpha), eta = imp__wide(a.eta);
+    const imp_wide3 h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
+    const imp_wide vm = imp__wide3_inner(*wo, h), lambert = imp__lamberts(wo, wi);
+    const imp_wide D = IMP_WIDE_OF(imp__ggx_d)(alpha, alpha, h),
+                   Go = IMP_WIDE_OF(imp__ggx_g1)(alpha, alpha, *wo),
+                   Gi = IMP_WIDE_OF(imp__ggx_g1)(alpha, alpha, *wi);
+    const imp_wide To = lets_through(&a, wo->z), Ti = lets_through(&a, wi->z);
+    imp_wide cos_t, eta_t;
+    (void)lobe;
+    const imp_wide F = IMP_WIDE_OF(imp__dielectric)(imp__wide_lesser(vm, imp__wide(1)),
+                                                    eta, &cos_t, &eta_t);
+    const imp_wide facets = F * D * Gi * Go / (4 * wo->z),
+                   base = Ti * To / (eta * eta) * lambert;
+    const double R = number(&a, a.p->coat.R_int);
+    for (int c = 0; c < colors; c++) {
+        const imp_wide rho = in[DIFFUSE].c[c];
+        const imp_wide again = 1 / (1 - (a.p->nonlinear ? rho : imp__wide(1)) * R);
+        f->c[c] = in[TINT].c[c] * facets + rho * again * base;
+    }
+    const imp_wide q = facet_chances(in, To);
+    return imp__wide_choose(imp__fronts(wo, wi),
+                            q * imp__ggx_normals_pdf(wo, vm, D, Go) / (4 * vm) +
+                                (1 - q) * lambert,
+                            imp__wide(0));
+}
+
+const struct imp_bsdf_lanes imp__roughplastic_lanes = {
+    .covers = covers, .sample = sample_lanes, .pdf_eval = pdf_eval_lanes};
