@@ -8,6 +8,9 @@
 #include "walk/core/emitted.h"
 #include "walk/core/light_point.h"
 
+/* So many lights are chosen by comparing with all. */
+enum { FEW_LIGHTS = 8 };
+
 static void truth_set(imp_wide_truth *m, int k, bool value) { (*m)[k] = -(int64_t)value; }
 
 static void record_lanes(int light, imp_wide_truth here, const struct imp_wide_light *own,
@@ -138,18 +141,14 @@ static void draw_chosen(const struct imp_scene *scene,
                         const imp_wide u[2], const struct imp_lights_chosen *c,
                         unsigned bits, struct imp_lanes_light *out)
 {
+    imp_wide_truth light;
+    for (int k = 0; k < IMP_WIDE_LANES; k++) light[k] = bits >> k & 1 ? c->light[k] : -1;
     while (bits) {
         const int first = __builtin_ctz(bits), one = c->light[first];
         const struct imp_emitter_lanes *lanes =
             c->prim[first] < 0 ? lanes_of(scene->emitters[one]) : NULL;
-        unsigned same = 0;
-        imp_wide_truth here = {0};
-        for (unsigned left = bits; left; left &= left - 1) {
-            const int k = __builtin_ctz(left);
-            if (c->light[k] != one) continue;
-            same |= 1u << k;
-            truth_set(&here, k, true);
-        }
+        const imp_wide_truth here = light == (imp_wide_truth){0} + one;
+        unsigned same = imp__wide_bits(here);
         bits &= ~same;
         if (lanes && (same & (same - 1))) {
             draw_lanes(scene, carried, one, lanes, ref, u, here, out);
@@ -177,6 +176,33 @@ void imp__lanes_tree_draw(const struct imp_scene *scene,
     draw_chosen(scene, carried, p, u, &c, lit, out);
 }
 
+/* imp__light_pick, and imp__light_part if `one`, of a few lights. A bit for each lane that has a
+ * light. */
+static unsigned few_pick(const struct imp_scene *scene, imp_wide which, bool one,
+                         imp_wide u[2], imp_wide *pmf, struct imp_lights_chosen *out)
+{
+    const double *cdf = scene->light_cdf;
+    const imp_wide zero = imp__wide(0);
+    imp_wide below = zero, above = imp__wide(cdf[0]);
+    imp_wide_truth light = {0};
+    for (int k = 0; k + 1 < scene->n_emitters; k++) {
+        const imp_wide_truth past = ~(which < imp__wide(cdf[k]));
+        below = imp__wide_choose(past, imp__wide(cdf[k]), below);
+        above = imp__wide_choose(past, imp__wide(cdf[k + 1]), above);
+        light -= past;
+    }
+    *pmf = above - below;
+    if (one && scene->n_emitters > 1)
+        u[0] = imp__wide_larger(
+            imp__wide_lesser((which - below) / *pmf, imp__wide(0x1.fffffffffffffp-1)),
+            zero);
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
+        out->light[k] = (int)light[k];
+        out->prim[k] = -1;
+    }
+    return imp__wide_bits(*pmf > zero);
+}
+
 void imp__lanes_light_draw(const struct imp_scene *scene,
                            const struct imp_carried *const *carried, const imp_wide3 *ref,
                            const imp_wide u_drawn[2], imp_wide which, bool one,
@@ -196,15 +222,16 @@ void imp__lanes_light_draw(const struct imp_scene *scene,
             return;
         }
     }
+    if (scene->n_emitters <= FEW_LIGHTS) {
+        lit = few_pick(scene, which, one, u, &out->pmf, &c) & bits;
+        bits = 0;
+    }
     for (; bits; bits &= bits - 1) {
         const int k = __builtin_ctz(bits);
-        double pmf = scene->light_cdf[0];
-        c.light[k] = 0;
+        double pmf;
+        c.light[k] = imp__light_pick(scene, which[k], &pmf);
         c.prim[k] = -1;
-        if (scene->n_emitters > 1) {
-            c.light[k] = imp__light_pick(scene, which[k], &pmf);
-            if (one) u[0][k] = imp__light_part(scene, c.light[k], which[k], pmf);
-        }
+        if (one) u[0][k] = imp__light_part(scene, c.light[k], which[k], pmf);
         out->pmf[k] = pmf;
         lit |= (unsigned)(pmf > 0) << k;
     }
