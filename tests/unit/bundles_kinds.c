@@ -119,6 +119,14 @@ static void all_kinds(void)
         KIND("principled",
              PICTURE("base_color") ALPHA("metallic", ".4") ALPHA("clearcoat", ".5")),
         KIND("principled", ALPHA("spec_trans", ".8") ALPHA("roughness", ".3")),
+        KIND("principled",
+             "<rgb name='base_color' value='.8,.3,.1'/>" ALPHA("spec_tint", ".6")
+                 ALPHA("sheen", ".7") ALPHA("sheen_tint", ".5") ALPHA("flatness", ".3")
+                     ALPHA("anisotropic", ".6") ALPHA("roughness", ".4")
+                         ALPHA("metallic", ".3")),
+        KIND("principled", PICTURE("base_color") ALPHA("eta", ".7") ALPHA("sheen", ".4")
+                               ALPHA("sheen_tint", "1")),
+        KIND("principled", PICTURE("roughness") ALPHA("specular", ".9")),
         KIND("thindielectric", ""),
         KIND("mask", ALPHA("opacity", ".5") DIFFUSE(".9,.1,.1")),
         KIND("blendbsdf",
@@ -128,7 +136,7 @@ static void all_kinds(void)
         KIND("twosided", KIND("phong", RED)),
         KIND("null", ""),
     };
-    static char path[64], rest[40000], at[12288], with[2048], text[1024];
+    static char path[64], rest[40000], at[16384], with[2048], text[1024];
     if (!picture_write(path)) {
         tap_ok(false, "a file for a picture");
         return;
@@ -138,8 +146,8 @@ static void all_kinds(void)
         snprintf(text, sizeof text, kinds[k], path);
         snprintf(with, sizeof with,
                  "<shape type='sphere'><point name='center' x='%g' y='%g' z='%g'/><float "
-                 "name='radius' value='.45'/>%s</shape>",
-                 (double)(k % 5) * .9 - 1.8, (double)(k / 5) * .9 - .9, k % 2 * .5 - .5,
+                 "name='radius' value='.29'/>%s</shape>",
+                 (double)(k % 7) * .6 - 1.8, (double)(k / 7) * .6 - 1.2, k % 2 * .5 - .5,
                  text);
         strcat(at, with);
     }
