@@ -6,8 +6,8 @@
 
 One thread, rounds interleaved; the pictures of all programs must have the same bytes. Scenes: the
 Cornell box, `textured`, and an open scene, which is `textured` with two meshes of 8,064 triangles
-with interpolated normals, one of rough gold and one diffuse; kinds whose formulas are not in lanes
-(glass and plastic); the office, read by its meters. Losses with gradients compare with a picture of
+with interpolated normals, one of rough gold and one diffuse; `textured` with balls of glass, plastic
+and rough glass, with other floors, or under a picture of the sky; the office, read by its meters. Losses with gradients compare with a picture of
 the same scene by the first program; those by poses, of a block and of an egg of 19,800 facets, with
 one of another pose. Behind times of gradients, where they differ: standard errors over those of the
 first program, geometric means over the numbers.
@@ -75,6 +75,30 @@ def glass_scene(folder):
     return path
 
 
+def floor_scene(folder, kind, colour):
+    """`textured` with its floor of another material."""
+    path = '%s/%s.xml' % (folder, kind)
+    with open(os.path.join(SCENES, 'textured.xml')) as f:
+        text = f.read().replace('textured/', os.path.join(os.path.abspath(SCENES), 'textured/'))
+    head, floor = text.split('<bsdf type="diffuse" id="floor">')
+    ggx = '<string name="distribution" value="ggx"/>' if kind == 'roughplastic' else ''
+    with open(path, 'w') as f:
+        f.write(head + '<bsdf type="%s" id="floor">' % kind + ggx + floor.replace('"reflectance"', '"%s"' % colour, 1))
+    return path
+
+
+def sky_scene(folder):
+    path = folder + '/sky.xml'
+    with open(os.path.join(SCENES, 'textured.xml')) as f:
+        text = f.read().replace('textured/', os.path.join(os.path.abspath(SCENES), 'textured/'))
+    picture = os.path.join(os.path.abspath(SCENES), 'textured/waves.png')
+    head, rest = text.split('<emitter type="constant" id="sky">')
+    sky = '<emitter type="envmap" id="sky"><string name="filename" value="%s"/></emitter>' % picture
+    with open(path, 'w') as f:
+        f.write(head + sky + rest.split('</emitter>', 1)[1])
+    return path
+
+
 def egg_scene(folder):
     """A ball with waves, of 19,800 flat facets, on a floor under a lamp."""
     ball(folder + '/egg.obj', 0, (0, 0, 1), .8, 100)
@@ -123,6 +147,10 @@ def main():
             'textured': ['render', os.path.join(SCENES, 'textured.xml'), *picture],
             'open scene': ['render', open_scene(folder), *picture],
             'glass and plastic': ['render', glass_scene(folder), *picture],
+            'floor of principled': ['render', floor_scene(folder, 'principled', 'base_color'), *picture],
+            'floor of plastic': ['render', floor_scene(folder, 'plastic', 'diffuse_reflectance'), *picture],
+            'floor of rough plastic': ['render', floor_scene(folder, 'roughplastic', 'diffuse_reflectance'), *picture],
+            'picture of the sky': ['render', sky_scene(folder), *picture],
             'functional, Cornell box': ['gradient', cornell, '-D', 'res=64', '--json'],
             'office, read': ['read', os.path.join(SCENES, 'office.xml'), '-m', 'mono', '--json'],
         }
