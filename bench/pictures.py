@@ -6,10 +6,11 @@
 
 One thread, rounds interleaved; the pictures of all programs must have the same bytes. Scenes: the
 Cornell box, `textured`, and an open scene, which is `textured` with two meshes of 8,064 triangles
-with interpolated normals, one of rough gold and one diffuse; glass and plastic; wax, a slab of three
-colours, and a caustic by light tracing; the office, read by its meters. Losses with gradients compare
-with a picture of the same scene by the first program; those by poses, of a block and of an egg of
-19,800 facets, with one of another pose. Behind times of gradients, where they differ: standard errors over those of the
+with interpolated normals, one of rough gold and one diffuse; `textured` with balls of glass, plastic
+and rough glass, with other floors, or under a picture of the sky; wax, a slab of three colours, and a
+caustic by light tracing; the office, read by its meters. Losses with gradients compare with a picture
+of the same scene by the first program; those by poses, of a block and of an egg of 19,800 facets,
+with one of another pose. Behind times of gradients, where they differ: standard errors over those of the
 first program, geometric means over the numbers.
 """
 import argparse
@@ -112,6 +113,30 @@ def wax_mesh(folder):
     return folder + '/wax.ply'
 
 
+def floor_scene(folder, kind, colour):
+    """`textured` with its floor of another material."""
+    path = '%s/%s.xml' % (folder, kind)
+    with open(os.path.join(SCENES, 'textured.xml')) as f:
+        text = f.read().replace('textured/', os.path.join(os.path.abspath(SCENES), 'textured/'))
+    head, floor = text.split('<bsdf type="diffuse" id="floor">')
+    ggx = '<string name="distribution" value="ggx"/>' if kind == 'roughplastic' else ''
+    with open(path, 'w') as f:
+        f.write(head + '<bsdf type="%s" id="floor">' % kind + ggx + floor.replace('"reflectance"', '"%s"' % colour, 1))
+    return path
+
+
+def sky_scene(folder):
+    path = folder + '/sky.xml'
+    with open(os.path.join(SCENES, 'textured.xml')) as f:
+        text = f.read().replace('textured/', os.path.join(os.path.abspath(SCENES), 'textured/'))
+    picture = os.path.join(os.path.abspath(SCENES), 'textured/waves.png')
+    head, rest = text.split('<emitter type="constant" id="sky">')
+    sky = '<emitter type="envmap" id="sky"><string name="filename" value="%s"/></emitter>' % picture
+    with open(path, 'w') as f:
+        f.write(head + sky + rest.split('</emitter>', 1)[1])
+    return path
+
+
 def egg_scene(folder):
     """A ball with waves, of 19,800 flat facets, on a floor under a lamp."""
     ball(folder + '/egg.obj', 0, (0, 0, 1), .8, 100)
@@ -164,6 +189,10 @@ def main():
                                               'mesh=' + wax_mesh(folder), *picture],
             'slab of three colours': ['render', written(folder, 'slab', SLAB), *picture],
             'caustic from the lamp, 8 times': ['render', written(folder, 'caustic', CAUSTIC), *picture],
+            'floor of principled': ['render', floor_scene(folder, 'principled', 'base_color'), *picture],
+            'floor of plastic': ['render', floor_scene(folder, 'plastic', 'diffuse_reflectance'), *picture],
+            'floor of rough plastic': ['render', floor_scene(folder, 'roughplastic', 'diffuse_reflectance'), *picture],
+            'picture of the sky': ['render', sky_scene(folder), *picture],
             'functional, Cornell box': ['gradient', cornell, '-D', 'res=64', '--json'],
             'office, read': ['read', os.path.join(SCENES, 'office.xml'), '-m', 'mono', '--json'],
         }

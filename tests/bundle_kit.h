@@ -230,19 +230,26 @@ static void compare(const char *name, enum imp_color_mode mode, int lanes,
            "%s: of %d walks, %d lit, %d differ; %d shapes in lanes, %d expected", name,
            SIDE * SIDE * SAMPLES, lit, wrong, binned, lanes);
 
-    /* Recorded, with derivatives by all parameters. */
-    for (size_t k = 0; k < scene->n_params; k++)
+    /* Recorded, with derivatives by all parameters, and by the last one alone. */
+    size_t last = 0;
+    for (size_t k = 0; k < scene->n_params; k++) {
         chosen[k] = (scene->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE) != 0;
-    test_must(ctx, imp__active_create(scene, chosen, &active));
-    tracer.active = &active;
-    const int values = compared(&tracer, &lit);
-    tracer.value_only = false;
-    const int records = compared(&tracer, &lit);
-    /* Those that cross media are recorded alone. */
-    tap_ok(values == 0 && records == (strstr(integrator, "volpath") ? -1 : 0),
-           "... with derivatives: %d differ, and of those that are recorded %d", values,
-           records);
-    imp__active_destroy(ctx, &active);
+        if (chosen[k]) last = k;
+    }
+    for (int alone = 0; alone < 2; alone++) {
+        for (size_t k = 0; alone && k < last; k++) chosen[k] = false;
+        test_must(ctx, imp__active_create(scene, chosen, &active));
+        tracer.active = &active;
+        tracer.value_only = true;
+        const int values = compared(&tracer, &lit);
+        tracer.value_only = false;
+        const int records = compared(&tracer, &lit);
+        /* Those that cross media are recorded alone. */
+        tap_ok(values == 0 && records == (strstr(integrator, "volpath") ? -1 : 0),
+               "... with derivatives%s: %d differ, and of those that are recorded %d",
+               alone ? " by one parameter" : "", values, records);
+        imp__active_destroy(ctx, &active);
+    }
     imp__lamp_levels_end(&levels);
     imp_scene_destroy(scene);
 }

@@ -5,7 +5,8 @@
  * for lane k of the arguments. Where a lane's result does not count it may be anything.
  *
  * A kind without a form in lanes is called point by point. One that has some lists it in the table
- * of its concept (kind/bsdf/bsdfs_in_lanes.c, ...); tests/unit/bundles.c compares both forms. */
+ * of its concept (kind/bsdf/bsdfs_in_lanes.c, ...); tests/unit/bundles.c and bundles_kinds.c compare
+ * both forms. */
 #ifndef IMP_KIND_KIND_LANES_H
 #define IMP_KIND_KIND_LANES_H
 

@@ -185,10 +185,11 @@ static void rows(int projection)
         const struct imp__sphere_map m = {(enum imp_sky_projection)projection, 2, h};
         for (int i = 0; i < h; i += 1 + h / 7) {
             enum { N = 4000 };
+            const struct imp__sphere_row row = imp__sphere_map_row(&m, i);
             double drawn[2] = {0}, exact[2] = {0}, weight = 0;
             for (int k = 0; k < N; k++) {
                 double c, s;
-                imp__sphere_map_draw(&m, i, (k + 0.5) / N, &c, &s);
+                imp__sphere_map_draw(&m, &row, i, (k + 0.5) / N, &c, &s);
                 drawn[0] += c / N;
                 drawn[1] += c * c / N;
             }

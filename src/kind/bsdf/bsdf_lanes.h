@@ -12,8 +12,9 @@
 #include "math/lane_text.h"
 
 extern const struct imp_bsdf_lanes imp__conductor_lanes, imp__dielectric_lanes,
-    imp__diffuse_lanes, imp__plastic_lanes, imp__roughconductor_lanes,
-    imp__roughplastic_lanes, imp__twosided_lanes;
+    imp__diffuse_lanes, imp__plastic_lanes, imp__principled_lanes,
+    imp__roughconductor_lanes, imp__roughdielectric_lanes, imp__roughplastic_lanes,
+    imp__twosided_lanes;
 
 static inline imp_wide_truth imp__fronts(const imp_wide3 *wo, const imp_wide3 *wi)
 {

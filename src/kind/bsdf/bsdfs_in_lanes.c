@@ -4,7 +4,8 @@
 #include "bsdf_lanes.h"
 
 extern const struct imp_bsdf_ops imp__conductor, imp__dielectric, imp__diffuse,
-    imp__plastic, imp__roughconductor, imp__roughplastic, imp__twosided;
+    imp__plastic, imp__principled, imp__roughconductor, imp__roughdielectric,
+    imp__roughplastic, imp__twosided;
 
 static const struct {
     const struct imp_bsdf_ops *ops;
@@ -15,7 +16,9 @@ static const struct {
             {&imp__dielectric, &imp__dielectric_lanes},
             {&imp__conductor, &imp__conductor_lanes},
             {&imp__plastic, &imp__plastic_lanes},
-            {&imp__roughplastic, &imp__roughplastic_lanes}};
+            {&imp__roughplastic, &imp__roughplastic_lanes},
+            {&imp__roughdielectric, &imp__roughdielectric_lanes},
+            {&imp__principled, &imp__principled_lanes}};
 
 const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b,
                                              uint64_t derivative)

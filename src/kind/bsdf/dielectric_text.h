@@ -6,15 +6,22 @@
  *
  *   F = (a^2 + b^2)/2,  a = (c - e t)/(c + e t),  b = (t - e c)/(t + e c),  t = cos_t, e = eta_t */
 
+/* c > 0, e far/near, as of imp__fresnel_dielectric_d: at e = 1 it is 0 up to rounding. */
+static inline real WIDE(imp__dielectric_from)(real c, real e, real *cos_t)
+{
+    const real zero = number(0), ct2 = 1 - (1 - c * c) / (e * e);
+    const truth passes = ct2 > zero;
+    const real ct = root_of(choose(passes, ct2, zero));
+    const real a = (c - e * ct) / (c + e * ct), b = (ct - e * c) / (ct + e * c);
+    *cos_t = ct;
+    return choose(passes, 0.5 * (a * a + b * b), number(1));
+}
+
 static inline real WIDE(imp__dielectric)(real c, real eta, real *cos_t, real *eta_t)
 {
     const real zero = number(0), one = number(1);
-    const real e = choose(c >= zero, eta, 1 / eta), ci = magnitude(c);
-    const real ct2 = 1 - (1 - ci * ci) / (e * e);
-    const truth passes = ct2 > zero;
-    const real ct = root_of(choose(passes, ct2, zero));
-    const real a = (ci - e * ct) / (ci + e * ct), b = (ct - e * ci) / (ct + e * ci);
+    const real e = choose(c >= zero, eta, 1 / eta);
+    const real F = WIDE(imp__dielectric_from)(magnitude(c), e, cos_t);
     *eta_t = e;
-    *cos_t = ct;
-    return choose(e == one, zero, choose(passes, 0.5 * (a * a + b * b), one));
+    return choose(e == one, zero, F);
 }

@@ -5,10 +5,32 @@
 #define IMP_KIND_BSDF_FACET_LANES_H
 
 #include "bsdf_lanes.h"
+#include "roughness.h"
 
 #define IMP_WIDE IMP_WIDE_LANES
 #define IMP_TEXT "kind/bsdf/microfacet_text.h"
 #include "math/lane_text.h"
+
+/* These facets, without a part of the draws for a derivative that is wanted. The first of the three
+ * inputs of roughness.h has bit `first`. */
+static inline bool imp__facets_cover(const struct imp__roughness *r, uint64_t derivative,
+                                     int first)
+{
+    const struct imp_dirs d = {.derivative = derivative};
+    const imp_spec in[3] = {imp__spec(1), imp__spec(1), imp__spec(1)};
+    return r->type == IMP_GGX && r->visible &&
+           !imp__roughness_drawn(r, in, &d, first).wanted;
+}
+
+/* in: the three inputs. */
+static inline void imp__roughness_lanes(const struct imp__roughness *r,
+                                        const struct imp_wide_color *in, imp_wide *au,
+                                        imp_wide *av)
+{
+    const imp_wide least = imp__wide(IMP_ALPHA_MIN);
+    *au = imp__wide_larger(in[r->anisotropic ? 1 : 0].c[0], least);
+    *av = imp__wide_larger(in[r->anisotropic ? 2 : 0].c[0], least);
+}
 
 /* ggx_visible: a normal for wo, wo.z > 0. */
 static inline imp_wide3 imp__ggx_normals(imp_wide au, imp_wide av, const imp_wide3 *wo,

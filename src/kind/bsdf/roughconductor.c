@@ -12,7 +12,6 @@
 #include "fresnel_lanes.h"
 #include "lambert.h"
 #include "presets.h"
-#include "roughness.h"
 
 enum { ETA, K, TINT, ALPHA, ALPHA_U, ALPHA_V, N_INPUTS };
 
@@ -147,20 +146,7 @@ const struct imp_bsdf_ops imp__roughconductor = {.size = sizeof(struct imp_bsdf_
 
 static bool covers(const struct imp_bsdf *b, uint64_t derivative)
 {
-    const struct imp__roughness *r = b->self;
-    const struct imp_dirs d = {.derivative = derivative};
-    const imp_spec in[3] = {imp__spec(1), imp__spec(1), imp__spec(1)};
-    return r->type == IMP_GGX && r->visible &&
-           !imp__roughness_drawn(r, in, &d, ALPHA).wanted;
-}
-
-static void roughness_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                            imp_wide *au, imp_wide *av)
-{
-    const struct imp__roughness *r = b->self;
-    const imp_wide least = imp__wide(IMP_ALPHA_MIN);
-    *au = imp__wide_larger(in[r->anisotropic ? ALPHA_U : ALPHA].c[0], least);
-    *av = imp__wide_larger(in[r->anisotropic ? ALPHA_V : ALPHA].c[0], least);
+    return imp__facets_cover(b->self, derivative, ALPHA);
 }
 
 static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
@@ -171,7 +157,7 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_c
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
     imp_wide au, av;
     (void)lobe;
-    roughness_lanes(b, in, &au, &av);
+    imp__roughness_lanes(b->self, &in[ALPHA], &au, &av);
     const imp_wide3 h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
     const imp_wide D = IMP_WIDE_OF(imp__ggx_d)(au, av, h),
                    Go = IMP_WIDE_OF(imp__ggx_g1)(au, av, *wo),
@@ -192,7 +178,7 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
 {
     imp_wide au, av;
     (void)lobe;
-    roughness_lanes(b, in, &au, &av);
+    imp__roughness_lanes(b->self, &in[ALPHA], &au, &av);
     const imp_wide3 h = imp__ggx_normals(au, av, wo, &u[1]);
     const imp_wide c = imp__wide3_inner(*wo, h);
     *wi = imp__mirrors_in(wo, &h, c);

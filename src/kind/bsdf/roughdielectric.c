@@ -15,9 +15,10 @@
  *
  * The index has a gradient: a rough boundary spreads light over directions, and at fixed
  * directions the value is smooth in the index, unlike a ray that it bends. */
+#include "facet_lanes.h"
 #include "fresnel.h"
+#include "fresnel_lanes.h"
 #include "presets.h"
-#include "roughness.h"
 
 enum { TINT_R, TINT_T, ETA, ALPHA, ALPHA_U, ALPHA_V, N_INPUTS };
 
@@ -186,3 +187,102 @@ const struct imp_bsdf_ops imp__roughdielectric = {.size = sizeof(struct imp_bsdf
                                                   .pdf = pdf,
                                                   .index_ratio = index_ratio,
                                                   .eval_d = eval_d};
+
+/* ---- In lanes: GGX, of visible normals ---------------------------------------------------- */
+
+static bool covers(const struct imp_bsdf *b, uint64_t derivative)
+{
+    return imp__facets_cover(b->self, derivative, ALPHA);
+}
+
+/* struct view, and what facet_of makes of it. */
+struct views {
+    imp_wide3 wo, wi;
+    imp_wide e;
+    imp_wide_truth back, reflects;
+};
+static struct views views_of(const struct imp_wide_color *in, const imp_wide3 *wo,
+                             const imp_wide3 *wi)
+{
+    const imp_wide zero = imp__wide(0), eta = in[ETA].c[0];
+    const imp_wide_truth back = wo->z < zero;
+    struct views v = {.wo = *wo, .wi = *wi, .back = back};
+    v.wo.z = imp__wide_choose(back, -wo->z, wo->z);
+    v.wi.z = imp__wide_choose(back, -wi->z, wi->z);
+    v.e = imp__wide_choose(back, 1 / eta, eta);
+    v.reflects = v.wi.z > zero;
+    return v;
+}
+
+static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
+                                   const struct imp_wide_color *in, const imp_wide3 *wo,
+                                   const imp_wide u[3], imp_wide3 *wi,
+                                   imp_wide_lobe *lobe)
+{
+    const imp_wide zero = imp__wide(0);
+    const struct views v = views_of(in, wo, wo);
+    imp_wide au, av, cos_t, eta_t;
+    (void)lobe;
+    imp__roughness_lanes(b->self, &in[ALPHA], &au, &av);
+    const imp_wide3 m = imp__ggx_normals(au, av, &v.wo, &u[1]);
+    const imp_wide c = imp__wide3_inner(v.wo, m);
+    const imp_wide_truth reflects =
+        u[0] < IMP_WIDE_OF(imp__dielectric)(imp__wide_lesser(c, imp__wide(1)), v.e,
+                                            &cos_t, &eta_t);
+    const imp_wide3 mirrored = imp__wide3_minus(imp__wide3_times(m, 2 * c), v.wo),
+                    refracted = imp__wide3_minus(imp__wide3_times(m, c / v.e - cos_t),
+                                                 imp__wide3_times(v.wo, 1 / v.e));
+    *wi = imp__wide3_unit(imp__wide3_choose(reflects, mirrored, refracted));
+    const imp_wide_truth kept =
+        ~((wi->z > zero) ^ reflects); /* its side is the right one */
+    wi->z = imp__wide_choose(v.back, -wi->z, wi->z);
+    return (v.wo.z > zero) & (c > zero) & kept;
+}
+
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                               const imp_wide3 *wo, const imp_wide3 *wi,
+                               const imp_wide_lobe *lobe, int colors,
+                               struct imp_wide_color *f)
+{
+    const imp_wide zero = imp__wide(0), one = imp__wide(1);
+    const struct views v = views_of(in, wo, wi);
+    imp_wide au, av, cos_t, eta_t;
+    imp__roughness_lanes(b->self, &in[ALPHA], &au, &av);
+    const imp_wide3 h = imp__wide3_plus(
+        v.wo, imp__wide3_times(v.wi, imp__wide_choose(v.reflects, one, v.e)));
+    const imp_wide n = imp__wide_signed_as(imp__wide3_norm(h), h.z);
+    const imp_wide3 m = imp__wide3_times(h, 1 / n);
+    const imp_wide vm = imp__wide3_inner(v.wo, m), om = imp__wide_lesser(vm, one),
+                   im = imp__wide3_inner(v.wi, m);
+    const imp_wide_truth there = imp__is_smooth(*lobe) & (v.wo.z > zero) &
+                                 (v.wi.z != zero) & (imp__wide_magnitude(n) > zero) &
+                                 (om > zero) & ~((im > zero) ^ v.reflects) & (im != zero);
+    const imp_wide D = IMP_WIDE_OF(imp__ggx_d)(au, av, m),
+                   Go = IMP_WIDE_OF(imp__ggx_g1)(au, av, v.wo),
+                   DG = D * IMP_WIDE_OF(imp__ggx_g1)(au, av, v.wi) * Go;
+    const imp_wide F = IMP_WIDE_OF(imp__dielectric)(om, v.e, &cos_t, &eta_t);
+    const imp_wide of = imp__wide_choose(v.reflects, F * DG / (4 * v.wo.z),
+                                         (1 - F) * DG * om * -im / (v.wo.z * n * n));
+    for (int c = 0; c < colors; c++)
+        f->c[c] = imp__wide_choose(v.reflects, in[TINT_R].c[c], in[TINT_T].c[c]) * of;
+    const imp_wide p = imp__ggx_normals_pdf(&v.wo, vm, D, Go);
+    return imp__wide_choose(there,
+                            imp__wide_choose(v.reflects, F * p / (4 * om),
+                                             (1 - F) * p * v.e * v.e * -im / (n * n)),
+                            zero);
+}
+
+static imp_wide index_ratio_lanes(const struct imp_bsdf *b,
+                                  const struct imp_wide_color *in, const imp_wide3 *wo,
+                                  const imp_wide3 *wi, const imp_wide_lobe *lobe)
+{
+    const struct views v = views_of(in, wo, wi);
+    (void)b, (void)lobe;
+    return imp__wide_choose(v.reflects, imp__wide(1), v.e);
+}
+
+const struct imp_bsdf_lanes imp__roughdielectric_lanes = {.covers = covers,
+                                                          .sample = sample_lanes,
+                                                          .pdf_eval = pdf_eval_lanes,
+                                                          .index_ratio =
+                                                              index_ratio_lanes};

@@ -25,6 +25,12 @@ bool imp__shape_in_lanes(const struct imp_tracer *tracer, int shape)
                 IMP_ANALYTIC); /* else points are located by what is not in lanes */
 }
 
+/* The input, or that of which it is the luminance. */
+static const struct imp_input *colour_of(const struct imp_input *const *i)
+{
+    return i[-(*i)->luminance];
+}
+
 /* A texture that is looked up in lanes. */
 static bool has_lanes(const struct imp_input *i)
 {
@@ -46,15 +52,20 @@ void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *
     bin->kernel = imp__bsdf_lanes(b, bin->derivative);
     bin->plain = bin->spectra = true;
     for (int j = 0; j < b->n_in; j++) {
-        bin->plain &= b->input[j]->plain;
+        bin->plain &= colour_of(&b->input[j])->plain;
         bin->spectra &= b->input[j]->plain && b->input[j]->spectrum;
     }
     bin->texels = !bin->plain && bin->surface && !s->by_triangle;
     for (int j = 0; bin->texels && j < b->n_in; j++)
-        bin->texels = b->input[j]->plain || has_lanes(b->input[j]);
-    for (int j = 0; bin->plain && j < b->n_in; j++)
-        if (bin->kernel) bin->in[j] = imp__wide_color(b->input[j]->value);
-        else bin->each[j] = b->input[j]->value;
+        bin->texels =
+            colour_of(&b->input[j])->plain || has_lanes(colour_of(&b->input[j]));
+    if (!bin->plain) return;
+    const struct imp_texcoord anywhere = {.prim = -1};
+    imp_spec own[IMP_INPUTS_MAX];
+    imp__inputs_eval(b->input, b->n_in, &anywhere, own);
+    for (int j = 0; j < b->n_in; j++)
+        if (bin->kernel) bin->in[j] = imp__wide_color(own[j]);
+        else bin->each[j] = own[j];
 }
 
 /* ---- Where it is ------------------------------------------------------------------------- */
@@ -116,7 +127,17 @@ static void inputs_alone(const struct imp_depth *d, const struct imp_bsdf *b,
     }
 }
 
-/* Inputs that are constants, or textures with a form in lanes. */
+/* weighted of input.c. */
+static void luminances(const struct imp_wide_color *colour, imp_spec weight,
+                       struct imp_wide_color *out)
+{
+    imp_wide sum = imp__wide(0);
+    for (int c = 0; c < 4; c++)
+        if (weight[c] != 0) sum += weight[c] * colour->c[c];
+    for (int c = 0; c < 4; c++) out->c[c] = sum;
+}
+
+/* Inputs that are constants, textures with a form in lanes, or luminances of such. */
 static void inputs_in_lanes(const struct imp_bsdf *b, const struct imp_wide_surface *x,
                             struct imp_wide_color *in)
 {
@@ -124,6 +145,7 @@ static void inputs_in_lanes(const struct imp_bsdf *b, const struct imp_wide_surf
     for (int j = 0; j < b->n_in; j++) {
         const struct imp_input *i = b->input[j];
         if (i->plain) in[j] = imp__wide_color(i->value);
+        else if (i->luminance) luminances(&in[j - i->luminance], i->weight, &in[j]);
         else imp__texture_lanes(i->texture)->eval(i->texture, uv, i->scalar, &in[j]);
     }
 }
