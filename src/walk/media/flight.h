@@ -27,7 +27,7 @@ struct imp_free_flight {
     struct imp_event line;   /* IMP_LINE_AT so far; bound 0: none */
     double length;           /* of the stretches that it was chosen from */
     double control;          /* optical depth of controls on the way */
-    /* Of the next stretch, where looked at before it is flown through: */
+    /* The next stretch, where it is looked at before it is flown through: */
     const struct imp_medium *ahead; /* its medium; NULL: not looked at */
     imp_spec sigma;                 /* its extinction */
     double path;                    /* optical depth to the collision */

@@ -50,7 +50,7 @@ struct reverse {
     struct imp_sink *sink;
     imp_spec bar[IMP_INPUTS_MAX]; /* of the scatterer's inputs */
     bool any;
-    /* Of a sweep with two adjoints: where pieces go with the second, and what that is over the first,
+    /* In a sweep with two adjoints: where pieces go with the second, and what that is over the first,
      * lane by lane. */
     struct imp_sink *second;
     imp_spec ratio;
