@@ -24,7 +24,7 @@ static const enum imp_loss losses[] = {IMP_LOSS_L2, IMP_LOSS_RELATIVE_L2, IMP_LO
 const struct arg_option options_params[] = {
     {ARG_LIST | ARG_REPLAYS, 'p', "param", "GLOB",
      "active parameters: a name or a pattern (default '*'); of geometry NAME.pose, "
-     "scale, "
+     "scale, to_world, "
      "vertex_positions, center, radius, p0, p1, x_fov, position, direction",
      &problem_options.params, 0, 0, NULL},
     {ARG_LIST | ARG_REPLAYS, 0, "same", "GLOB,..",

@@ -603,6 +603,9 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *     NAME.pose              as imp_scene_add_pose
  *     NAME.scale             of a shape or instance: 1 as the scene file has it, about the middle of
  *                            its box
+ *     NAME.to_world          of a shape, instance, camera or spot: [3][4], the upper rows of the matrix
+ *                            that puts it there; not beside pose, scale and what else says where it
+ *                            is; IMP_E_NUMERIC where it makes another kind of thing of it
  *     NAME.vertex_positions  of a mesh: [vertices][3], world; vertex normals, if it has any, are
  *                            computed from them
  *     NAME.center, NAME.radius   of a sphere: world; not beside pose and scale

@@ -703,6 +703,11 @@ struct imp_shape_ops {
      * three rows of four. Positions of triangles are written where `triangles` has them. NULL:
      * its pose is no parameter. */
     void (*move)(struct imp_shape *s, const double to_world[12]);
+    /* The map, three rows of four, that has put the kind's unit shape where it is, with what else
+     * says so (a sphere's center and radius), as to_world of mi.traverse: reads it, or, with `set`,
+     * puts it there, by a map whose determinant has the sign of the former one. False: such a map
+     * makes another kind of shape, which may be left in any place. NULL: there is none. */
+    bool (*placed)(struct imp_shape *s, double to_world[12], bool set);
 };
 
 /* ---- Emitter ------------------------------------------------------------------- */
@@ -931,6 +936,8 @@ struct imp_sensor_ops {
      * two points of it, from the middle of the lens. */
     void (*lens_velocity)(const struct imp_sensor *s, int k, const imp_v3 *r,
                           const imp_v3 *other, imp_v3 *out);
+    /* As imp_shape_ops.placed. */
+    bool (*placed)(struct imp_sensor *s, double to_world[12], bool set);
 };
 
 /* ---- Versions of this header ----------------------------------------------------- */

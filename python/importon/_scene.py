@@ -202,7 +202,8 @@ class Scene:
     def add_geometry(self, name: str) -> str:
         """Make a number of geometry a parameter.
 
-        `NAME.pose` as `add_pose`; `NAME.scale` of a shape or instance; `NAME.vertex_positions` of a mesh;
+        `NAME.pose` as `add_pose`; `NAME.scale` of a shape or instance; `NAME.to_world` of a shape,
+        instance, camera or spot, the upper three rows of its matrix; `NAME.vertex_positions` of a mesh;
         `NAME.center` and `NAME.radius` of a sphere; `NAME.p0`, `NAME.p1` and `NAME.radius` of a circular
         cylinder; `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y`, `NAME.opencv_k1`,
         `_k2`, `_p1`, `_p2` and `_k3` of a perspective camera or thin lens;

@@ -49,6 +49,24 @@ static inline imp_v3 imp__rows_normal(const double *m, imp_v3 n)
                    m[2] * n[0] + m[6] * n[1] + m[10] * n[2]);
 }
 
+/* Three rows of four, of the images of the axes and the origin; and as a matrix. */
+static inline void imp__rows_of_columns(imp_v3 x, imp_v3 y, imp_v3 z, imp_v3 origin,
+                                        double m[12])
+{
+    for (int i = 0; i < 3; i++) {
+        m[4 * i] = x[i];
+        m[4 * i + 1] = y[i];
+        m[4 * i + 2] = z[i];
+        m[4 * i + 3] = origin[i];
+    }
+}
+static inline struct imp_mat4 imp__mat4_of_rows(const double m[12])
+{
+    struct imp_mat4 out = imp__mat4_identity();
+    for (int k = 0; k < 12; k++) out.m[k] = m[k];
+    return out;
+}
+
 /* Affine maps: the last row is taken to be 0 0 0 1. */
 static inline imp_v3 imp__point(const struct imp_mat4 *a, imp_v3 p)
 {

@@ -10,14 +10,22 @@
 #define IMP_AFFINE_NUMBERS 12
 
 /* r = X - c; adds to *out, or to bar's numbers. */
-void imp__affine_velocity(const struct imp__glued *x, imp_v3 r, const double *number,
-                          struct imp__velocity *out);
-void imp__affine_bar(const struct imp__glued *x, imp_v3 r,
+void imp__affine_velocity(const struct imp_scene *scene, const struct imp__glued *x,
+                          imp_v3 r, const double *number, struct imp__velocity *out);
+void imp__affine_bar(const struct imp_scene *scene, const struct imp__glued *x, imp_v3 r,
                      const struct imp__velocity *bar, double *number_bar);
+/* The velocity of a place, and its transpose. */
+imp_v3 imp__affine_place(imp_v3 r, const double *number);
+void imp__affine_place_bar(imp_v3 r, imp_v3 bar, double *number_bar);
+/* The transpose of a turn by a rotation vector, which A - A^T is. */
+void imp__affine_turn_bar(imp_v3 turn_bar, double *number_bar);
 
 /* The transpose of how ends and radius of a cylinder move it: in place, from bars of an affine mover
  * about c to those of the parameter. */
 void imp__ends_bar(const struct imp__tube *tube, imp_v3 c, enum imp_pose_kind kind,
                    double bar[IMP_AFFINE_NUMBERS]);
+/* The same of the three rows of to_world. */
+void imp__world_bar(const struct imp_pose *pose, imp_v3 c,
+                    double bar[IMP_AFFINE_NUMBERS]);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Velocities of cameras and lights, and the transposes (moves.h). */
-#include "moves.h"
+#include "affine.h"
 
 /* At p, by the one number of a mover that is no pose. */
 static imp_v3 view_velocity(const struct imp__moves *moves, const struct imp__mover *m,
@@ -28,6 +28,7 @@ imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 eye, imp_v3 p
         if (m->kind == IMP_MOVE_POSE)
             u += imp__move_vector(theta) +
                  imp__cross(imp__move_vector(theta + 3), p - m->centre);
+        else if (m->kind == IMP_MOVE_AFFINE) u += imp__affine_place(p - m->centre, theta);
         else u += view_velocity(moves, m, eye, p) * theta[0];
     }
     return u;
@@ -43,6 +44,8 @@ void imp__camera_velocity_bar(const struct imp__moves *moves, imp_v3 eye, imp_v3
             imp__move_vector_bar(theta_bar + m->first, bar);
             imp__move_vector_bar(theta_bar + m->first + 3,
                                  imp__cross(p - m->centre, bar));
+        } else if (m->kind == IMP_MOVE_AFFINE) {
+            imp__affine_place_bar(p - m->centre, bar, theta_bar + m->first);
         } else {
             theta_bar[m->first] += imp__dot(view_velocity(moves, m, eye, p), bar);
         }
@@ -63,7 +66,10 @@ imp_v3 imp__light_velocity(const struct imp__moves *moves, int k, const double *
     imp_v3 out = {0};
     for (int j = 0; j < moves->n_movers; j++) {
         const struct imp__mover *m = &moves->mover[j];
-        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_LIGHT)
+        if (m->shape != IMP_MOVE_EMITTER(k)) continue;
+        if (m->kind == IMP_MOVE_AFFINE) /* a light at a point, the middle */
+            out += imp__move_vector(theta_dot + m->first);
+        if (m->kind == IMP_MOVE_LIGHT)
             out += light_part(moves, m, imp__move_vector(theta_dot + m->first));
     }
     return out;
@@ -74,7 +80,9 @@ void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 bar,
 {
     for (int j = 0; j < moves->n_movers; j++) {
         const struct imp__mover *m = &moves->mover[j];
-        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_LIGHT)
+        if (m->shape != IMP_MOVE_EMITTER(k)) continue;
+        if (m->kind == IMP_MOVE_AFFINE) imp__move_vector_bar(theta_bar + m->first, bar);
+        if (m->kind == IMP_MOVE_LIGHT)
             imp__move_vector_bar(theta_bar + m->first, light_part(moves, m, bar));
     }
 }
@@ -84,7 +92,10 @@ void imp__light_axis_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
 {
     for (int j = 0; j < moves->n_movers; j++) {
         const struct imp__mover *m = &moves->mover[j];
-        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_AXIS)
+        if (m->shape != IMP_MOVE_EMITTER(k)) continue;
+        if (m->kind == IMP_MOVE_AFFINE)
+            imp__affine_turn_bar(turn_bar, theta_bar + m->first);
+        if (m->kind == IMP_MOVE_AXIS)
             imp__move_vector_bar(theta_bar + m->first,
                                  light_part(moves, m,
                                             imp__cross(turn_bar, m->axis) +

@@ -23,15 +23,17 @@ void imp__moves_free(struct imp__moves *moves)
 
 static enum imp_status camera_mover(const struct imp__moves *moves, struct imp__mover *m)
 {
-    if ((m->kind != IMP_MOVE_POSE && m->kind < IMP_MOVE_VIEW) ||
+    const bool whole = m->kind == IMP_MOVE_POSE || m->kind == IMP_MOVE_AFFINE;
+    if ((!whole && m->kind < IMP_MOVE_VIEW) ||
         !imp__lens_middle(moves->sensor, &m->centre))
         return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
                           "sensor '%s': its rays meet in no point, and it has no "
                           "derivative by its pose",
                           moves->sensor->name);
-    m->count = m->kind == IMP_MOVE_POSE ? 6 : 1;
-    if (m->kind == IMP_MOVE_POSE || moves->sensor->ops->view_velocity ||
-        moves->sensor->ops->lens_velocity)
+    m->count = m->kind == IMP_MOVE_POSE     ? 6
+               : m->kind == IMP_MOVE_AFFINE ? IMP_AFFINE_NUMBERS
+                                            : 1;
+    if (whole || moves->sensor->ops->view_velocity || moves->sensor->ops->lens_velocity)
         return IMP_OK;
     return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
                       "sensor '%s' has no field of view that moves", moves->sensor->name);
@@ -47,7 +49,7 @@ static enum imp_status light_mover(const struct imp__moves *moves, struct imp__m
                           "light '%s' (%s) has no derivative by its %s", e->name,
                           e->ops->name, m->kind == IMP_MOVE_AXIS ? "direction" : "place");
     e->ops->aim(e, v, false);
-    m->count = 3;
+    m->count = m->kind == IMP_MOVE_AFFINE ? IMP_AFFINE_NUMBERS : 3;
     m->centre = m->axis = imp__v3(v[0], v[1], v[2]);
     if (m->kind == IMP_MOVE_AXIS) {
         imp__pose_aim(e, IMP_POSE_DIRECTION, v);
@@ -87,7 +89,9 @@ static enum imp_status instance_mover(const struct imp__moves *moves,
     const struct imp_instance *p =
         &moves->scene->world->instance[m->shape - IMP_MOVE_INSTANCE(0)];
     m->centre = imp__map_point(&p->to_world, (p->group->lo + p->group->hi) * 0.5);
-    m->count = m->kind == IMP_MOVE_POSE ? 6 : 1;
+    m->count = m->kind == IMP_MOVE_POSE     ? 6
+               : m->kind == IMP_MOVE_AFFINE ? IMP_AFFINE_NUMBERS
+                                            : 1;
     return IMP_OK;
 }
 
@@ -145,11 +149,9 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
 {
     if (imp__pose_is_round(pose->kind)) return round_add(moves, pose);
     static const enum imp__move_kind kind[IMP_POSE_KINDS] = {
-        [IMP_POSE_RIGID] = IMP_MOVE_POSE,
-        [IMP_POSE_SCALE] = IMP_MOVE_SCALE,
-        [IMP_POSE_VERTICES] = IMP_MOVE_VERTICES,
-        [IMP_POSE_POSITION] = IMP_MOVE_LIGHT,
-        [IMP_POSE_DIRECTION] = IMP_MOVE_LIGHT};
+        [IMP_POSE_RIGID] = IMP_MOVE_POSE,     [IMP_POSE_SCALE] = IMP_MOVE_SCALE,
+        [IMP_POSE_WORLD] = IMP_MOVE_AFFINE,   [IMP_POSE_VERTICES] = IMP_MOVE_VERTICES,
+        [IMP_POSE_POSITION] = IMP_MOVE_LIGHT, [IMP_POSE_DIRECTION] = IMP_MOVE_LIGHT};
     int shape = pose->sensor          ? IMP_MOVE_CAMERA
                 : pose->instance >= 0 ? IMP_MOVE_INSTANCE(pose->instance)
                                       : pose->shape;
@@ -171,6 +173,7 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
         m->centre = pose->object->centre;
         for (int i = 0; rigid && i < 3; i++) m->centre[i] += rigid->number[i];
     }
+    if (pose->kind == IMP_POSE_WORLD) m->centre = imp__world_centre(pose);
     if (pose->kind == IMP_POSE_SCALE) m->rate = 1 / pose->number[0];
     if (pose->kind == IMP_POSE_DIRECTION)
         m->rate =
@@ -186,6 +189,10 @@ void imp__pose_numbers_bar(const struct imp__moves *moves, const struct imp__mov
         imp__fans_normals_bar(mover->fans, &moves->scene->shapes[mover->shape]->triangles,
                               bar + mover->count / 2, bar);
     struct imp__tube tube;
+    if (pose->kind == IMP_POSE_WORLD) {
+        imp__world_bar(pose, mover->centre, bar);
+        return;
+    }
     if (mover->kind == IMP_MOVE_AFFINE &&
         imp__moves_cylinder(pose->scene, pose->shape, 0, &tube))
         imp__ends_bar(&tube, mover->centre, pose->kind, bar);
@@ -320,7 +327,9 @@ struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
             out.area += 2 * m->rate * theta[0];
             break;
         case IMP_MOVE_VERTICES: vertices_velocity(moves, x, theta, &out); break;
-        case IMP_MOVE_AFFINE: imp__affine_velocity(x, r, theta, &out); break;
+        case IMP_MOVE_AFFINE:
+            imp__affine_velocity(moves->scene, x, r, theta, &out);
+            break;
         default: break;
         }
     }
@@ -348,7 +357,7 @@ void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *
             theta[0] += m->rate * (imp__dot(r, bar->v) + 2 * bar->area);
             break;
         case IMP_MOVE_VERTICES: vertices_bar(moves, x, bar, theta); break;
-        case IMP_MOVE_AFFINE: imp__affine_bar(x, r, bar, theta); break;
+        case IMP_MOVE_AFFINE: imp__affine_bar(moves->scene, x, r, bar, theta); break;
         default: break;
         }
     }

@@ -91,6 +91,13 @@ static struct imp_map map_of(const struct imp_pose *object)
     return out;
 }
 
+/* Its to_world where that has been changed; else NULL. */
+static const struct imp_pose *world_of(const struct imp_pose *object)
+{
+    const struct imp_pose *world = imp__pose_beside(object, IMP_POSE_WORLD);
+    return world && imp__world_is_moved(world) ? world : NULL;
+}
+
 static enum imp_status sensor_apply(const struct imp_pose *p)
 {
     struct imp_sensor *s = p->sensor;
@@ -110,6 +117,8 @@ static enum imp_status sensor_apply(const struct imp_pose *p)
             "the lens of camera '%s' folds its picture with k1, k2, p1, p2, "
             "k3 = %g, %g, %g, %g, %g",
             s->name, number[3], number[4], number[5], number[6], number[7]);
+    const struct imp_pose *world = world_of(p);
+    if (world) return imp__world_apply(world);
     if (!imp__pose_is_at_start(p)) s->ops->move(s, map_of(p).m);
     return IMP_OK;
 }
@@ -143,6 +152,8 @@ static enum imp_status shape_apply(const struct imp_pose *p)
     memcpy(s->self, p->rest, p->rest_size);
     s->area = p->rest_area;
     const struct imp_map by = map_of(p);
+    const struct imp_pose *world = world_of(p);
+    if (world && s->geometry != IMP_TRIANGLES) return imp__world_apply(world);
     if (s->geometry != IMP_TRIANGLES) {
         if (!ends_apply(p, s)) s->ops->move(s, by.m);
         imp__pose_carry(p->object, &by);
@@ -157,6 +168,7 @@ static enum imp_status shape_apply(const struct imp_pose *p)
         IMP_CHECKED(imp__mesh_normals(p->scene->ctx, s->triangles.n_vertices,
                                       s->triangles.n_triangles, positions,
                                       s->triangles.indices, normals));
+    if (world) return imp__world_apply(world);
     s->ops->move(s, by.m); /* also at rest: frames of facets and the box follow */
     imp__pose_carry(p->object, &by);
     return IMP_OK;
@@ -179,8 +191,14 @@ void imp__pose_aim(struct imp_emitter *e, enum imp_pose_kind kind, double v[3])
     for (int k = 0; k < 3; k++) v[k] = axis[k];
 }
 
-static void light_apply(const struct imp_pose *p)
+static enum imp_status light_apply(const struct imp_pose *p)
 {
+    const struct imp_pose *world = world_of(p);
+    if (world) return imp__world_apply(world);
+    if (imp__pose_beside(p, IMP_POSE_WORLD)) {
+        memcpy(p->emitter->self, p->rest, p->rest_size);
+        return IMP_OK;
+    }
     const struct imp_pose *at = imp__pose_beside(p, IMP_POSE_POSITION),
                           *to = imp__pose_beside(p, IMP_POSE_DIRECTION);
     const bool far = p->emitter->ops->flags & IMP_EMITTER_FAR;
@@ -189,11 +207,12 @@ static void light_apply(const struct imp_pose *p)
         memcpy(v, far ? to->number : at->number, sizeof v);
         p->emitter->ops->aim(p->emitter, v, true);
     }
-    if (!to || far) return;
+    if (!to || far) return IMP_OK;
     const imp_v3 axis = imp__v3(to->number[0], to->number[1], to->number[2]);
     if (p->emitter->ops == &imp__ies_light)
         imp__ies_turn(p->emitter->self, p->rest, axis);
     else imp__light_frame_turn(p->emitter->self, p->rest, axis);
+    return IMP_OK;
 }
 
 static enum imp_status pose_apply(struct imp_pose *p)
@@ -201,18 +220,21 @@ static enum imp_status pose_apply(struct imp_pose *p)
     p->due = false;
     if (p->shape >= 0) return shape_apply(p);
     if (p->instance >= 0) {
+        const struct imp_pose *world = world_of(p);
         const struct imp_map by = map_of(p);
-        return imp__instance_apply(p, &by);
+        return world ? imp__world_apply(world) : imp__instance_apply(p, &by);
     }
-    if (p->sensor) return sensor_apply(p);
-    light_apply(p);
-    return IMP_OK;
+    return p->sensor ? sensor_apply(p) : light_apply(p);
 }
 
 double imp__pose_large(const struct imp_pose *p, size_t e)
 {
     const double scene = imp__length(p->scene->hi - p->scene->lo);
     switch (p->kind) {
+    case IMP_POSE_WORLD:
+        return e % 4 == 3 ? 0.1 * scene
+                          : 0.3 * hypot(hypot(p->start[e % 4], p->start[4 + e % 4]),
+                                        p->start[8 + e % 4]);
     case IMP_POSE_RIGID: return e < 3 ? 0.1 * scene : 0.5;
     case IMP_POSE_SCALE:
     case IMP_POSE_RADIUS: return 0.3 * p->number[0];

@@ -5,6 +5,8 @@
  *     NAME.pose              of a shape, instance or camera: e and a, six numbers; a point that the scene
  *                            file has at X0 is at  X = c + e + R(a) s (X0 - c)
  *     NAME.scale             of a shape or instance: s
+ *     NAME.to_world          of a shape, instance, camera or spot: the upper three rows of the matrix M
+ *                            that puts what the kind has at x at  X = M x, as mi.traverse has it
  *     NAME.vertex_positions  of a mesh: the vertices, three numbers each, world
  *     NAME.center, .radius   of a sphere, world
  *     NAME.p0, .p1, .radius  of a circular cylinder: the middles of its ends, world; its points turn with
@@ -27,6 +29,7 @@
 enum imp_pose_kind {
     IMP_POSE_RIGID,
     IMP_POSE_SCALE,
+    IMP_POSE_WORLD,
     IMP_POSE_VERTICES,
     IMP_POSE_CENTER,
     IMP_POSE_RADIUS,
@@ -70,8 +73,8 @@ struct imp_pose {
     struct imp_emitter *emitter; /* NULL: no light without a shape */
     int param;
     size_t n;
-    double *number;  /* [n] */
-    double start[3]; /* of a centre, radius or end: as the file has it */
+    double *number;   /* [n] */
+    double start[12]; /* of a map, centre, radius or end: as the file has it */
     imp_v3 centre;
     /* The first one of the same object has what follows. */
     struct imp_pose *object;
@@ -157,6 +160,24 @@ const char *imp__pose_sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
 const char *imp__pose_light_why(const struct imp_scene *scene,
                                 const struct imp_emitter *e, enum imp_pose_kind kind);
 
+/* ---- pose_world.c ---- */
+/* May the object's to_world be any map that does not mirror? Not where it would make another kind
+ * of thing: of a sphere one that stretches it, of a camera one that does more than turn it. */
+bool imp__world_is_free(const struct imp_pose *p);
+/* The object's centre where it is now. */
+imp_v3 imp__world_centre(const struct imp_pose *p);
+/* ---- pose_world.c for pose.c and pose_add.c ---- */
+/* Why an object, whose other numbers of this kind there are, has no to_world. NULL: it has. */
+const char *imp__world_shape_why(const struct imp_scene *scene,
+                                 const struct imp_shape *s);
+const char *imp__world_instance_why(const struct imp_scene *scene, int k);
+/* Where the object is now. */
+void imp__world_read(const struct imp_pose *p, double to_world[12]);
+/* Is it elsewhere than in the file? */
+bool imp__world_is_moved(const struct imp_pose *p);
+/* Puts the object, which is where the file has it, where p says. IMP_E_NUMERIC: it cannot be there. */
+enum imp_status imp__world_apply(const struct imp_pose *p);
+
 /* ---- pose_instances.c for pose.c, pose_add.c and pose_names.c ---- */
 /* Instances of the scene's own; those that are listed by name, none of more than so many. */
 #define IMP_POSE_INSTANCES_LISTED 1024
@@ -172,6 +193,8 @@ bool imp__instance_find(const struct imp_scene *scene, const char *name,
                         struct imp_pose *p);
 /* Moves it from where the file has it. */
 enum imp_status imp__instance_apply(const struct imp_pose *p, const struct imp_map *by);
+enum imp_status imp__instance_place(const struct imp_pose *p,
+                                    const struct imp_map *to_world);
 
 /* ---- pose_folds.c for pose.c ---- */
 /* A triangle of a mesh that its vertices' motion away from `rest` [3 n_vertices] makes vanish, or

@@ -85,6 +85,7 @@ const char *imp__pose_shape_why(const struct imp_scene *scene, const struct imp_
     if (kind >= IMP_POSE_FOV) return "it is a shape";
     const char *why = shape_why(scene, s);
     if (why || kind == IMP_POSE_RIGID) return why;
+    if (kind == IMP_POSE_WORLD) return imp__world_shape_why(scene, s);
     return imp__pose_is_round(kind) ? round_why(scene, s, kind)
                                     : size_why(scene, s, kind);
 }
@@ -92,11 +93,12 @@ const char *imp__pose_shape_why(const struct imp_scene *scene, const struct imp_
 const char *imp__pose_sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
                                  imp_v3 *centre)
 {
-    if (kind != IMP_POSE_RIGID && !imp__pose_is_view(kind)) return "it is a sensor";
+    const bool whole = kind == IMP_POSE_RIGID || kind == IMP_POSE_WORLD;
+    if (!whole && !imp__pose_is_view(kind)) return "it is a sensor";
     double number[IMP_VIEW_NUMBERS];
     if (!s->ops->move) return "it is no perspective or orthographic camera or thin lens";
     if (!imp__lens_middle(s, centre)) return "its rays meet in no point";
-    if (kind == IMP_POSE_RIGID) return NULL;
+    if (whole) return kind == IMP_POSE_WORLD && !s->ops->placed ? "it has none" : NULL;
     number[kind - IMP_POSE_FOV] = NAN;
     if (!s->ops->view || !s->ops->view(s, number, false))
         return "it has no field of view";
@@ -110,11 +112,10 @@ const char *imp__pose_light_why(const struct imp_scene *scene,
     const bool has = kind == IMP_POSE_POSITION ? !far
                      : kind == IMP_POSE_DIRECTION
                          ? far || e->ops == &imp__spot_light || e->ops == &imp__ies_light
-                         : false;
+                         : kind == IMP_POSE_WORLD && e->ops == &imp__spot_light;
     if (!e->ops->aim || !has)
-        return "it is none of point, spot and ies without a shape (position), and "
-               "directional, "
-               "spot and ies (direction)";
+        return "it is none of point, spot and ies without a shape (position), "
+               "directional, spot and ies (direction), and spot (to_world)";
     if (scene->lights_in_tree) return "lights are chosen by a tree (light_choice)";
     return NULL;
 }
@@ -191,6 +192,7 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
     const bool place = p->kind >= IMP_POSE_POSITION ||
                        (imp__pose_is_round(p->kind) && p->kind != IMP_POSE_RADIUS);
     p->n = p->kind == IMP_POSE_RIGID      ? 6
+           : p->kind == IMP_POSE_WORLD    ? 12
            : p->kind == IMP_POSE_VERTICES ? 3 * t->n_vertices
            : place                        ? 3
                                           : 1;
@@ -198,6 +200,11 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
     if (!p->number) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
     switch (p->kind) {
     case IMP_POSE_SCALE: p->number[0] = 1; break;
+    case IMP_POSE_WORLD:
+        imp__world_read(p, p->start);
+        if (p->emitter) p->centre = imp__v3(p->start[3], p->start[7], p->start[11]);
+        memcpy(p->number, p->start, sizeof p->start);
+        break;
     case IMP_POSE_VERTICES:
         for (size_t k = 0; k < p->n; k++) p->number[k] = t->positions[k];
         break;
@@ -225,6 +232,7 @@ static const struct tail {
 } tails[IMP_POSE_KINDS] = {
     [IMP_POSE_RIGID] = {"pose", "scene units, radians", -INFINITY, INFINITY},
     [IMP_POSE_SCALE] = {"scale", "1", 1e-3, INFINITY},
+    [IMP_POSE_WORLD] = {"to_world", "1, scene units", -INFINITY, INFINITY},
     [IMP_POSE_VERTICES] = {"vertex_positions", "scene units", -INFINITY, INFINITY},
     [IMP_POSE_CENTER] = {"center", "scene units", -INFINITY, INFINITY},
     [IMP_POSE_RADIUS] = {"radius", "scene units", 1e-6, INFINITY},
@@ -254,13 +262,18 @@ static enum imp_status param_add(struct imp_scene *scene, const char *object,
     char *name = imp__arena_take(&scene->arena, length, 1);
     if (!name) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
     snprintf(name, length, "%s.%s", object, tail->name);
-    const bool rows = p->kind == IMP_POSE_VERTICES;
+    const bool rows = p->kind == IMP_POSE_VERTICES, map = p->kind == IMP_POSE_WORLD;
     const struct imp_param param = {
         .info = {.size = sizeof param.info,
                  .name = name,
                  .unit = tail->unit,
-                 .dims = {rows ? p->n / 3 : p->n, rows ? 3 : 0},
-                 .n_dims = rows ? 2 : 1,
+                 .dims = {map    ? 3
+                          : rows ? p->n / 3
+                                 : p->n,
+                          map    ? 4
+                          : rows ? 3
+                                 : 0},
+                 .n_dims = map || rows ? 2 : 1,
                  .lo = tail->lo,
                  .hi = tail->hi,
                  .flags = IMP_PARAM_DIFFERENTIABLE | (rows ? IMP_PARAM_LIST : 0u)},
@@ -287,18 +300,28 @@ static bool is_there(const struct imp_scene *scene, struct imp_pose *p)
     return false;
 }
 
-/* Numbers that say where the same points are, which may not be set beside each other. */
+/* Numbers that say where the same points are, which may not be set beside each other. A camera's view
+ * goes with all of them. */
 static int family(enum imp_pose_kind kind)
 {
-    return kind == IMP_POSE_VERTICES ? 1 : imp__pose_is_round(kind) ? 2 : 0;
+    return imp__pose_is_view(kind)     ? 0
+           : kind == IMP_POSE_VERTICES ? 2
+           : imp__pose_is_round(kind)  ? 3
+           : kind == IMP_POSE_WORLD    ? 4
+                                       : 1;
 }
 static const char *beside_why(const struct imp_pose *p)
 {
-    for (const struct imp_pose *q = p->object != p ? p->object : NULL; q; q = q->next)
-        if (q->object == p->object && family(q->kind) != family(p->kind))
-            return family(q->kind) == 1 || family(p->kind) == 1
-                       ? "single vertices move, and the whole moves with them"
-                       : "pose and scale say where it is, or center, p0, p1 and radius";
+    const int own = family(p->kind);
+    for (const struct imp_pose *q = p->object != p ? p->object : NULL; q; q = q->next) {
+        const int other = family(q->kind);
+        if (q->object != p->object || other == own || !own || !other) continue;
+        if (own == 2 || other == 2)
+            return "single vertices move, and the whole moves with them";
+        return own == 4 || other == 4
+                   ? "to_world says where it is, or other numbers"
+                   : "pose and scale say where it is, or center, p0, p1 and radius";
+    }
     return NULL;
 }
 
@@ -362,7 +385,7 @@ enum imp_status imp_scene_add_geometry(imp_scene *scene, const char *name)
     }
     return imp__error(
         scene->ctx, IMP_E_ARG,
-        "'%s' names no number of geometry: NAME.pose, scale, "
+        "'%s' names no number of geometry: NAME.pose, scale, to_world, "
         "vertex_positions, center, radius, p0, p1, x_fov, principal_point_offset_x, _y, "
         "opencv_k1, k2, p1, p2, k3, aperture_radius, "
         "focus_distance, position or direction",

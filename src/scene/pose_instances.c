@@ -30,16 +30,16 @@ const char *imp__instance_why(const struct imp_scene *scene, int k,
                               enum imp_pose_kind kind)
 {
     const struct imp_instance *p = &scene->world->instance[k];
-    if (kind != IMP_POSE_RIGID && kind != IMP_POSE_SCALE) return "it is an instance";
+    if (kind > IMP_POSE_WORLD) return "it is an instance";
     if (p->motion) return "it has a motion of its own (to_world_end)";
     if (scene->n_bodies > 0) return "there are media of graded index";
     if (scene->priorities) return "shapes have priorities";
     for (int i = 0; i < p->group->n_within; i++)
         if (scene->shapes[p->group->within[i]]->interior)
             return "a shape in it bounds a medium";
-    if (kind == IMP_POSE_SCALE && p->raised)
+    if (kind != IMP_POSE_RIGID && p->raised)
         return "the heights of its bump maps are made for its size";
-    return NULL;
+    return kind == IMP_POSE_WORLD ? imp__world_instance_why(scene, k) : NULL;
 }
 
 bool imp__instance_find(const struct imp_scene *scene, const char *name,
@@ -70,12 +70,12 @@ bool imp__pose_box(const struct imp_pose *p, imp_v3 *lo, imp_v3 *hi)
     return p->instance >= 0 || p->shape >= 0;
 }
 
-enum imp_status imp__instance_apply(const struct imp_pose *p, const struct imp_map *by)
+enum imp_status imp__instance_place(const struct imp_pose *p,
+                                    const struct imp_map *to_world)
 {
     struct imp_instance *there = &p->scene->world->instance[p->instance];
-    const struct imp_instance *rest = p->object->rest;
     imp_v3 lo, hi;
-    there->to_world = imp__map_product(by, &rest->to_world);
+    there->to_world = *to_world;
     bool fits = imp__map_inverse(&there->to_world, &there->to_local);
     imp__instance_box(there, &lo, &hi);
     for (int k = 0; k < 3; k++) fits &= lo[k] > -IMP_REACH_MAX && hi[k] < IMP_REACH_MAX;
@@ -83,4 +83,11 @@ enum imp_status imp__instance_apply(const struct imp_pose *p, const struct imp_m
                 : imp__error(p->scene->ctx, IMP_E_NUMERIC,
                              "%s moves the instance beyond what numbers hold",
                              p->scene->params[p->param].info.name);
+}
+
+enum imp_status imp__instance_apply(const struct imp_pose *p, const struct imp_map *by)
+{
+    const struct imp_instance *rest = p->object->rest;
+    const struct imp_map to_world = imp__map_product(by, &rest->to_world);
+    return imp__instance_place(p, &to_world);
 }

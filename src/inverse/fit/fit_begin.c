@@ -4,6 +4,7 @@
  * needs besides, and its release. */
 #include "fit.h"
 #include "inverse/gradient/variate.h"
+#include "scene/pose.h"
 #include "walk/kept/store.h"
 #include "walk/lights/light_walk.h"
 #include "walk/run/run.h"
@@ -88,6 +89,24 @@ static enum imp__loss_use use_of(const struct imp__fit *f)
                                                                : IMP_LOSS_SOUGHT;
 }
 
+/* A sphere, a cylinder, a camera or a spot may be put by few maps, and a step by single numbers leads to
+ * none of them, unless the first three columns are held. */
+static enum imp_status worlds_check(const struct imp_problem *p)
+{
+    for (size_t k = 0; k < p->n_blocks; k++) {
+        const struct imp__block *b = &p->blocks[k];
+        const struct imp_pose *pose = imp__pose_of(p->scene, b->param);
+        if (!pose || pose->kind != IMP_POSE_WORLD || imp__world_is_free(pose)) continue;
+        for (size_t e = 0; e < b->count; e++)
+            if (e % 4 != 3 && !imp__block_held(p, b, e))
+                return imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                                  "%s: a step by its numbers makes another kind of thing "
+                                  "of it; fit its pose, or hold numbers 0-2, 4-6, 8-10",
+                                  p->scene->params[b->param].info.name);
+    }
+    return IMP_OK;
+}
+
 static enum imp_status options_check(const struct imp_problem *p,
                                      const struct imp_fit_options *o)
 {
@@ -109,6 +128,7 @@ static enum imp_status options_check(const struct imp_problem *p,
     if ((unsigned)o->allocation > IMP_ALLOCATION_VARIANCE)
         return imp__error(ctx, IMP_E_ARG, "allocation %d does not exist",
                           (int)o->allocation);
+    IMP_CHECKED(worlds_check(p));
     IMP_CHECKED(imp__fit_levels_allowed(p, o));
     IMP_CHECKED(imp__fit_clipped_allowed(p, o));
     if (o->resume && !o->checkpoint)

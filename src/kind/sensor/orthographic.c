@@ -59,6 +59,12 @@ static void move(struct imp_sensor *s, const double to_world[12])
     imp__projection_move(&p->projection, to_world);
 }
 
+static bool placed(struct imp_sensor *s, double to_world[12], bool set)
+{
+    struct orthographic *p = s->self;
+    return imp__projection_placed(&p->projection, false, to_world, set);
+}
+
 const struct imp_sensor_ops imp__orthographic = {.size = sizeof(struct imp_sensor_ops),
                                                  .name = "orthographic",
                                                  .object_size =
@@ -67,4 +73,5 @@ const struct imp_sensor_ops imp__orthographic = {.size = sizeof(struct imp_senso
                                                  .ray = ray,
                                                  .flags = IMP_SENSOR_PARALLEL,
                                                  .connect = connect,
-                                                 .move = move};
+                                                 .move = move,
+                                                 .placed = placed};

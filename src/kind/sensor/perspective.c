@@ -48,6 +48,12 @@ static void move(struct imp_sensor *s, const double to_world[12])
     imp__projection_move(&p->projection, to_world);
 }
 
+static bool placed(struct imp_sensor *s, double to_world[12], bool set)
+{
+    struct perspective *p = s->self;
+    return imp__projection_placed(&p->projection, true, to_world, set);
+}
+
 static bool view(struct imp_sensor *s, double number[IMP_VIEW_NUMBERS], bool set)
 {
     struct perspective *p = s->self;
@@ -73,7 +79,8 @@ const struct imp_sensor_ops imp__perspective = {.size = sizeof(struct imp_sensor
                                                 .connect = connect,
                                                 .move = move,
                                                 .view = view,
-                                                .view_velocity = view_velocity};
+                                                .view_velocity = view_velocity,
+                                                .placed = placed};
 
 /* ---- In lanes: without a lens ------------------------------------------------------------- */
 

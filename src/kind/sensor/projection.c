@@ -78,6 +78,35 @@ void imp__projection_move(struct imp_projection *p, const double to_world[12])
     imp__mat4_inverse(&p->to_world, &p->to_local);
 }
 
+/* B = A A_0^-1: B B^T = 1. */
+static bool is_turned(const struct imp_mat4 *from, const struct imp_mat4 *to)
+{
+    struct imp_mat4 back;
+    if (!imp__mat4_inverse(from, &back)) return false;
+    const struct imp_mat4 by = imp__mat4_multiply(to, &back);
+    bool turned = true;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j <= i; j++) {
+            const double *r = by.m + 4 * i, *s = by.m + 4 * j;
+            const double dot = r[0] * s[0] + r[1] * s[1] + r[2] * s[2];
+            turned &= fabs(dot - (i == j)) <= 1e-6;
+        }
+    return turned;
+}
+
+bool imp__projection_placed(struct imp_projection *p, bool rigid, double to_world[12],
+                            bool set)
+{
+    if (!set) {
+        memcpy(to_world, p->to_world.m, 12 * sizeof *to_world);
+        return true;
+    }
+    const struct imp_mat4 to = imp__mat4_of_rows(to_world);
+    const bool fits = !rigid || is_turned(&p->to_world, &to);
+    p->to_world = to;
+    return imp__mat4_inverse(&p->to_world, &p->to_local) && fits;
+}
+
 /* Where the pinhole's x, y is seen, and film area over that without the lens. False: not
  * on the film, or only where the polynomials have folded the plane back onto it. */
 static bool seen_by_lens(const struct imp_film_plane *film, double *x, double *y,

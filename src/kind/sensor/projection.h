@@ -31,6 +31,10 @@ enum imp_status imp__fov_build(const struct imp_build *b, double aspect,
 
 /* Moves its place in the world (imp_sensor_ops.move). */
 void imp__projection_move(struct imp_projection *p, const double to_world[12]);
+/* Its place as a map (imp_sensor_ops.placed). `rigid`: that may turn and shift it from where it is,
+ * and no more (tolerance 1e-6). */
+bool imp__projection_placed(struct imp_projection *p, bool rigid, double to_world[12],
+                            bool set);
 
 /* A ray through local point o along v (v_z > 0), starting on the near plane: t is
  * measured from there. */

@@ -56,6 +56,12 @@ static void move(struct imp_sensor *s, const double to_world[12])
     imp__projection_move(&p->projection, to_world);
 }
 
+static bool placed(struct imp_sensor *s, double to_world[12], bool set)
+{
+    struct thinlens *p = s->self;
+    return imp__projection_placed(&p->projection, true, to_world, set);
+}
+
 enum { APERTURE = 8, FOCUS };
 
 static bool view(struct imp_sensor *s, double number[IMP_VIEW_NUMBERS], bool set)
@@ -103,4 +109,5 @@ const struct imp_sensor_ops imp__thinlens = {.size = sizeof(struct imp_sensor_op
                                              .connect = connect,
                                              .move = move,
                                              .view = view,
-                                             .lens_velocity = lens_velocity};
+                                             .lens_velocity = lens_velocity,
+                                             .placed = placed};

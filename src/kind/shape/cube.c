@@ -40,4 +40,5 @@ const struct imp_shape_ops imp__cube = {.size = sizeof(struct imp_shape_ops),
                                         .pdf_toward = imp__mesh_pdf,
                                         .sample_area = imp__mesh_sample_area,
                                         .place = imp__mesh_place,
-                                        .move = imp__mesh_move};
+                                        .move = imp__mesh_move,
+                                        .placed = imp__mesh_placed};

@@ -239,6 +239,27 @@ void imp__cylinder_set(struct imp_shape *s, imp_v3 p0, imp_v3 p1, double radius)
     box_set(k, s);
 }
 
+static bool placed(struct imp_shape *s, double to_world[12], bool set)
+{
+    struct cylinder *k = s->self;
+    double scale[3];
+    if (k->oval) return false;
+    if (!set) {
+        imp__rows_of_columns(k->axes.s * k->radius, k->axes.t * k->radius,
+                             k->axes.n * k->length, k->base, to_world);
+        return true;
+    }
+    const struct imp_mat4 m = imp__mat4_of_rows(to_world);
+    const bool round = imp__placement_frame(&m, 2, &k->axes, scale);
+    k->inner = k->axes;
+    k->base = imp__mat4_column(&m, 3);
+    k->radius = scale[0];
+    k->length = scale[2];
+    s->area = IMP_2PI * k->radius * k->length;
+    box_set(k, s);
+    return round;
+}
+
 const struct imp_shape_ops imp__cylinder = {.size = sizeof(struct imp_shape_ops),
                                             .name = "cylinder",
                                             .object_size = sizeof(struct cylinder),
@@ -250,4 +271,5 @@ const struct imp_shape_ops imp__cylinder = {.size = sizeof(struct imp_shape_ops)
                                             .round = round_of,
                                             .sample_area = sample_area,
                                             .place = place,
-                                            .move = move};
+                                            .move = move,
+                                            .placed = placed};

@@ -12,7 +12,7 @@ struct disk {
 };
 
 /* Area and box, of where it is. */
-static void placed(struct disk *k, struct imp_shape *s)
+static void settle(struct disk *k, struct imp_shape *s)
 {
     const imp_v3 a = imp__mat4_column(&k->to_world, 0),
                  c = imp__mat4_column(&k->to_world, 1);
@@ -28,6 +28,13 @@ static void placed(struct disk *k, struct imp_shape *s)
     s->lo[3] = s->hi[3] = 0;
 }
 
+static void face(struct disk *k, const struct imp_shape *s, bool mirrored)
+{
+    k->n = imp__normalize(imp__cross(imp__mat4_column(&k->to_world, 0),
+                                     imp__mat4_column(&k->to_world, 1))) *
+           ((mirrored != s->flip_normals) ? -1.0 : 1.0);
+}
+
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_shape *s)
 {
     struct disk *k = self;
@@ -36,13 +43,10 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     if (st != IMP_OK) return st;
     k->to_world = at.to_world;
     k->to_local = at.to_local;
-    const imp_v3 a = imp__mat4_column(&at.to_world, 0),
-                 c = imp__mat4_column(&at.to_world, 1);
-    placed(k, s);
+    face(k, s, at.mirrored);
+    settle(k, s);
     if (!(s->area > 0) || !isfinite(s->area))
         return imp_build_error(b, NULL, IMP_E_SCENE, "its area is %g", s->area);
-    k->n = imp__normalize(imp__cross(a, c)) *
-           ((at.mirrored != s->flip_normals) ? -1.0 : 1.0);
     s->geometry = IMP_ANALYTIC;
     return IMP_OK;
 }
@@ -129,7 +133,21 @@ static void move(struct imp_shape *s, const double to_world[12])
     k->to_world = imp__mat4_multiply(&by, &k->to_world);
     k->to_local = imp__mat4_multiply(&k->to_local, &back);
     k->n = imp__normalize(imp__rows_vector(to_world, k->n));
-    placed(k, s);
+    settle(k, s);
+}
+
+static bool placed(struct imp_shape *s, double to_world[12], bool set)
+{
+    struct disk *k = s->self;
+    if (!set) {
+        memcpy(to_world, k->to_world.m, 12 * sizeof *to_world);
+        return true;
+    }
+    k->to_world = imp__mat4_of_rows(to_world);
+    if (!imp__mat4_inverse(&k->to_world, &k->to_local)) return false;
+    face(k, s, imp__mat4_det3(&k->to_world) < 0);
+    settle(k, s);
+    return true;
 }
 
 const struct imp_shape_ops imp__disk = {.size = sizeof(struct imp_shape_ops),
@@ -143,4 +161,5 @@ const struct imp_shape_ops imp__disk = {.size = sizeof(struct imp_shape_ops),
                                         .pdf_toward = pdf_toward,
                                         .sample_area = sample_area,
                                         .place = place,
-                                        .move = move};
+                                        .move = move,
+                                        .placed = placed};

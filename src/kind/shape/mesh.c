@@ -229,7 +229,8 @@ static enum imp_status serialized_build(const struct imp_build *b, void *self,
         .surface = imp__mesh_surface, .sample_toward = imp__mesh_sample,                 \
         .pdf_toward = imp__mesh_pdf, .sample_area = imp__mesh_sample_area,               \
         .flags = IMP_SHAPE_TRIANGLES, .place = imp__mesh_place,                          \
-        .sample_triangle = imp__mesh_sample_triangle, .move = imp__mesh_move             \
+        .sample_triangle = imp__mesh_sample_triangle, .move = imp__mesh_move,            \
+        .placed = imp__mesh_placed                                                       \
     }
 
 const struct imp_shape_ops imp__mesh = MESH_OPS("mesh", mesh_build);

@@ -271,6 +271,7 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
         IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory"));
     IMP_TRY(positions_place(b, s, data, &at, positions));
     m->positions = positions;
+    memcpy(m->to_world, at.to_world.m, sizeof m->to_world);
     m->uvs = data->uvs;
     m->indices = data->indices;
     m->reversed = at.mirrored != s->flip_normals;
@@ -304,7 +305,9 @@ out:
     return st;
 }
 
-void imp__mesh_move(struct imp_shape *s, const double to_world[12])
+/* By an affine map; `back`: its inverse, NULL of one that turns normals as it turns vectors. */
+static void arrays_move(struct imp_shape *s, const double to_world[12],
+                        const struct imp_map *back)
 {
     struct imp__mesh *m = s->self;
     const size_t n = s->triangles.n_vertices;
@@ -316,9 +319,12 @@ void imp__mesh_move(struct imp_shape *s, const double to_world[12])
     for (size_t k = 0; k < n; k++) {
         const imp_v3 p =
             imp__rows_point(to_world, imp__mesh_load(m->positions, (uint32_t)k));
-        const imp_v3 t =
-            normals ? imp__rows_vector(to_world, imp__mesh_load(m->normals, (uint32_t)k))
-                    : p;
+        imp_v3 t = p;
+        if (normals) {
+            const imp_v3 n = imp__mesh_load(m->normals, (uint32_t)k);
+            t = back ? imp__normalize(imp__map_normal(back, n))
+                     : imp__rows_vector(to_world, n);
+        }
         for (int i = 0; i < 3; i++) {
             positions[3 * k + (size_t)i] = (float)p[i];
             if (normals) normals[3 * k + (size_t)i] = (float)t[i];
@@ -332,4 +338,27 @@ void imp__mesh_move(struct imp_shape *s, const double to_world[12])
     if (m->facets)
         facets_fill(m, s->triangles.n_triangles,
                     (struct imp__facet *)(uintptr_t)m->facets);
+}
+
+void imp__mesh_move(struct imp_shape *s, const double to_world[12])
+{
+    arrays_move(s, to_world, NULL);
+}
+
+bool imp__mesh_placed(struct imp_shape *s, double to_world[12], bool set)
+{
+    struct imp__mesh *m = s->self;
+    struct imp_map from, by, back;
+    if (!set) {
+        memcpy(to_world, m->to_world, sizeof m->to_world);
+        return true;
+    }
+    memcpy(by.m, to_world, sizeof by.m);
+    memcpy(from.m, m->to_world, sizeof from.m);
+    if (!imp__map_inverse(&from, &from)) return false;
+    by = imp__map_product(&by, &from);
+    if (!imp__map_inverse(&by, &back)) return false;
+    arrays_move(s, by.m, &back);
+    memcpy(m->to_world, to_world, sizeof m->to_world);
+    return true;
 }

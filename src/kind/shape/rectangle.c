@@ -8,6 +8,7 @@
 
 struct rectangle {
     imp_v3 corner, eu, ev; /* p = corner + u eu + v ev, so eu and ev are dp_du, dp_dv */
+    imp_v3 up;             /* the image of local +z, of which the side alone matters */
     imp_v3 s, t, n;        /* the shading frame is the same everywhere */
     double inv_area;
     float positions[12 + 4]; /* and Embree's 16 bytes */
@@ -35,6 +36,22 @@ static void settle(struct rectangle *r, struct imp_shape *s)
     s->lo[3] = s->hi[3] = 0;
 }
 
+/* By to_world, all but what follows. */
+static void lay(struct rectangle *r, struct imp_shape *s, const struct imp_mat4 *to_world,
+                bool mirrored)
+{
+    r->corner = imp__point(to_world, imp__v3(-1, -1, 0));
+    r->eu = imp__vector(to_world, imp__v3(2, 0, 0));
+    r->ev = imp__vector(to_world, imp__v3(0, 2, 0));
+    r->up = imp__mat4_column(to_world, 2);
+    s->area = imp__length(imp__cross(r->eu, r->ev));
+    r->inv_area = 1 / s->area;
+    /* The image of local +z as normals go, so that mirroring in the plane keeps its side.
+     */
+    r->n = imp__normalize(imp__cross(r->eu, r->ev)) *
+           ((mirrored != s->flip_normals) ? -1.0 : 1.0);
+}
+
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_shape *s)
 {
     struct rectangle *r = self;
@@ -42,17 +59,9 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     const enum imp_status st = imp__shape_placement(b, s, &at);
     if (st != IMP_OK) return st;
 
-    r->corner = imp__point(&at.to_world, imp__v3(-1, -1, 0));
-    r->eu = imp__vector(&at.to_world, imp__v3(2, 0, 0));
-    r->ev = imp__vector(&at.to_world, imp__v3(0, 2, 0));
-    s->area = imp__length(imp__cross(r->eu, r->ev));
+    lay(r, s, &at.to_world, at.mirrored);
     if (!(s->area > 0) || !isfinite(s->area))
         return imp_build_error(b, NULL, IMP_E_SCENE, "its area is %g", s->area);
-    r->inv_area = 1 / s->area;
-    /* The image of local +z as normals go, so that mirroring in the plane keeps its side.
-     */
-    r->n = imp__normalize(imp__cross(r->eu, r->ev)) *
-           ((at.mirrored != s->flip_normals) ? -1.0 : 1.0);
 
     static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
     memcpy(r->indices, indices, sizeof indices);
@@ -68,8 +77,23 @@ static void move(struct imp_shape *s, const double to_world[12])
     r->corner = imp__rows_point(to_world, r->corner);
     r->eu = imp__rows_vector(to_world, r->eu);
     r->ev = imp__rows_vector(to_world, r->ev);
+    r->up = imp__rows_vector(to_world, r->up);
     r->n = imp__normalize(imp__rows_vector(to_world, r->n));
     settle(r, s);
+}
+
+static bool placed(struct imp_shape *s, double to_world[12], bool set)
+{
+    struct rectangle *r = s->self;
+    if (set) {
+        const struct imp_mat4 m = imp__mat4_of_rows(to_world);
+        lay(r, s, &m, imp__mat4_det3(&m) < 0);
+        settle(r, s);
+    } else {
+        imp__rows_of_columns(r->eu * 0.5, r->ev * 0.5, r->up,
+                             r->corner + (r->eu + r->ev) * 0.5, to_world);
+    }
+    return true;
 }
 
 static inline void surface_at(const struct rectangle *r, double u, double v,
@@ -151,7 +175,8 @@ const struct imp_shape_ops imp__rectangle = {.size = sizeof(struct imp_shape_ops
                                              .pdf_toward = pdf_toward,
                                              .sample_area = sample_area,
                                              .place = place,
-                                             .move = move};
+                                             .move = move,
+                                             .placed = placed};
 
 /* ---- In lanes ---------------------------------------------------------------------------- */
 

@@ -144,6 +144,7 @@ struct imp__mesh {
     const double *face_tangents; /* [3 n_triangles] s of the shading frame of flat meshes,
                                     where it does not vary over a triangle; else NULL */
     const struct imp__facet *facets; /* [n_triangles]; NULL: too many */
+    double to_world[12];
 };
 void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit,
                        const imp_v3 *o, const imp_v3 *d, struct imp_surface *out);
@@ -151,6 +152,7 @@ void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit,
 void imp__cylinder_set(struct imp_shape *s, imp_v3 p0, imp_v3 p1, double radius);
 /* As imp_shape_ops.move (mesh_build.c). */
 void imp__mesh_move(struct imp_shape *s, const double to_world[12]);
+bool imp__mesh_placed(struct imp_shape *s, double to_world[12], bool set);
 /* As imp_shape_ops.place. */
 void imp__mesh_place(const struct imp_shape *s, const double uv[2],
                      struct imp_surface *out, int *prim);

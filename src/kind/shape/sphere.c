@@ -182,6 +182,15 @@ static void round_of(const struct imp_shape *s, struct imp_round *out)
     *out = (struct imp_round){.centre = p->center, .radius = p->radius};
 }
 
+/* Area and box, of where it is. */
+static void measure(const struct sphere *p, struct imp_shape *s)
+{
+    const imp_v3 r = imp__v3(p->radius, p->radius, p->radius);
+    s->area = 4 * IMP_PI * p->radius * p->radius;
+    s->lo = p->center - r;
+    s->hi = p->center + r;
+}
+
 static void move(struct imp_shape *s, const double to_world[12])
 {
     struct sphere *p = s->self;
@@ -192,10 +201,24 @@ static void move(struct imp_shape *s, const double to_world[12])
     p->axes.t = imp__rows_vector(to_world, p->axes.t) * (1 / scale);
     p->axes.n = imp__rows_vector(to_world, p->axes.n) * (1 / scale);
     p->radius *= scale;
-    s->area = 4 * IMP_PI * p->radius * p->radius;
-    const imp_v3 r = imp__v3(p->radius, p->radius, p->radius);
-    s->lo = p->center - r;
-    s->hi = p->center + r;
+    measure(p, s);
+}
+
+static bool placed(struct imp_shape *s, double to_world[12], bool set)
+{
+    struct sphere *p = s->self;
+    double scale[3];
+    if (!set) {
+        imp__rows_of_columns(p->axes.s * p->radius, p->axes.t * p->radius,
+                             p->axes.n * p->radius, p->center, to_world);
+        return true;
+    }
+    const struct imp_mat4 m = imp__mat4_of_rows(to_world);
+    const bool round = imp__placement_frame(&m, 3, &p->axes, scale);
+    p->center = imp__mat4_column(&m, 3);
+    p->radius = scale[0];
+    measure(p, s);
+    return round;
 }
 
 const struct imp_shape_ops imp__sphere = {.size = sizeof(struct imp_shape_ops),
@@ -210,7 +233,8 @@ const struct imp_shape_ops imp__sphere = {.size = sizeof(struct imp_shape_ops),
                                           .round = round_of,
                                           .sample_area = sample_area,
                                           .place = place,
-                                          .move = move};
+                                          .move = move,
+                                          .placed = placed};
 
 /* ---- In lanes ---------------------------------------------------------------------------- */
 

@@ -17,3 +17,10 @@ importon gradient -q -D res=8 --spp 4 -p tall_block.pose --set tall_block.pose=0
 importon fit -q -D res=8 --spp 4 -p tall_block.pose --target x.pfm --set light_panel.pose=0,-300,0,0,0,0 "$ROOT/scenes/cornell.xml"
 importon fit -q -D res=8 --spp 4 -p block.pose --target x.pfm --levels 2 --optimizer lbfgs "$ROOT/scenes/poses.xml"
 importon check -q -D res=8 --spp 4 -p tall_block.pose --only frozen "$ROOT/scenes/cornell.xml" | grep -c ok
+importon gradient -q -D res=8 --spp 4 -p tall_block.to_world "$ROOT/scenes/cornell.xml" | grep -c 'tall_block.to_world\['
+render --set tall_block.to_world=1,0,0,0,0,1,0,0,0,0,0,0
+render --set tall_block.to_world=-1,0,0,0,0,1,0,0,0,0,1,0
+render --set camera.to_world=2,0,0,0,0,1,0,0,0,0,1,0
+render --set tall_block.pose=0,0,0,0,0,0 --set tall_block.to_world=1
+importon fit -q -D res=8 --spp 4 -p camera.to_world --target x.pfm "$ROOT/scenes/cornell.xml"
+importon check -q -D res=8 --spp 4 -p camera.to_world --only fresh "$ROOT/scenes/cornell.xml" | grep -c open
