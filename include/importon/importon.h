@@ -618,8 +618,10 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *                            IMP_E_NUMERIC where it would fold the picture
  *     NAME.aperture_radius, NAME.focus_distance   of a thin lens
  *     NAME.position          of a point, spot or ies light: [3], world
- *     NAME.direction         of a directional light, of a spot's axis or an ies light's nadir: [3],
- *                            of any length
+ *     NAME.direction         of a directional light or a sun, of a spot's axis or an ies light's
+ *                            nadir: [3], of any length
+ *     NAME.turn              of an envmap, sunsky, ciesky or perezsky: [3], a rotation vector in
+ *                            radians away from what the file says
  *
  * An ies light is one without a shape.
  *

@@ -812,7 +812,8 @@ struct imp_emitter_ops {
     /* For a delta light: light leaves within a cone about `axis` alone, of this cosine, as
      * its inputs are now. NULL: all around. */
     void (*cone)(const struct imp_emitter *e, imp_v3 *axis, double *cosine);
-    /* Where a light at a point is, or the unit direction in which parallel light travels, world:
+    /* Where a light at a point is, or the unit direction in which parallel light travels, or that of
+     * an environment from its middle, world:
      * reads it, or, with `set`, puts the light there (a direction of any length), turned as it was.
      * NULL: another light. */
     void (*aim)(struct imp_emitter *e, double v[3], bool set);
@@ -820,6 +821,9 @@ struct imp_emitter_ops {
      * jumps; returns how many. Elsewhere it is continuous, with a derivative by the direction almost
      * everywhere. NULL: it may jump anywhere, and derivatives by what moves are refused. */
     int (*jumps)(const struct imp_emitter *e, struct imp_sky_circle out[IMP_SKY_CIRCLES]);
+    /* Turns an environment as it is now by an affine map of the world that is a rotation: three rows
+     * of four. NULL: its turn is no parameter. */
+    void (*move)(struct imp_emitter *e, const double to_world[12]);
 };
 
 /* ---- Sensor and filter --------------------------------------------------------- */

@@ -61,23 +61,31 @@ static imp_v3 light_part(const struct imp__moves *moves, const struct imp__mover
     return (v - m->axis * imp__dot(m->axis, v)) * m->rate;
 }
 
-imp_v3 imp__light_velocity(const struct imp__moves *moves, int k, const double *theta_dot)
+imp_v3 imp__light_velocity(const struct imp__moves *moves, int k, imp_v3 p,
+                           const double *theta_dot)
 {
+    const bool sky = moves->scene->emitters[k]->ops->flags & IMP_EMITTER_ENVIRONMENT;
     imp_v3 out = {0};
     for (int j = 0; j < moves->n_movers; j++) {
         const struct imp__mover *m = &moves->mover[j];
         if (m->shape != IMP_MOVE_EMITTER(k)) continue;
-        if (m->kind == IMP_MOVE_AFFINE) /* a light at a point, the middle */
-            out += imp__move_vector(theta_dot + m->first);
-        if (m->kind == IMP_MOVE_LIGHT)
-            out += light_part(moves, m, imp__move_vector(theta_dot + m->first));
+        const imp_v3 e = imp__move_vector(theta_dot + m->first);
+        if (m->kind == IMP_MOVE_AFFINE) out += e; /* a light at a point, the middle */
+        if (m->kind == IMP_MOVE_LIGHT) out += light_part(moves, m, e);
+        if (m->kind == IMP_MOVE_TURN) out += imp__cross(e, p);
+        if (m->kind == IMP_MOVE_AXIS && sky)
+            out += imp__cross(imp__cross(m->axis, light_part(moves, m, e)), p);
     }
     return out;
 }
 
-void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 bar,
+void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 p, imp_v3 bar,
                              double *theta_bar)
 {
+    if (moves->scene->emitters[k]->ops->flags & IMP_EMITTER_ENVIRONMENT) {
+        imp__light_turn_bar(moves, k, imp__cross(p, bar), theta_bar);
+        return;
+    }
     for (int j = 0; j < moves->n_movers; j++) {
         const struct imp__mover *m = &moves->mover[j];
         if (m->shape != IMP_MOVE_EMITTER(k)) continue;
@@ -87,7 +95,7 @@ void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 bar,
     }
 }
 
-void imp__light_axis_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
+void imp__light_turn_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
                          double *theta_bar)
 {
     for (int j = 0; j < moves->n_movers; j++) {
@@ -95,6 +103,8 @@ void imp__light_axis_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
         if (m->shape != IMP_MOVE_EMITTER(k)) continue;
         if (m->kind == IMP_MOVE_AFFINE)
             imp__affine_turn_bar(turn_bar, theta_bar + m->first);
+        if (m->kind == IMP_MOVE_TURN)
+            imp__move_vector_bar(theta_bar + m->first, turn_bar);
         if (m->kind == IMP_MOVE_AXIS)
             imp__move_vector_bar(theta_bar + m->first,
                                  light_part(moves, m,

@@ -39,18 +39,23 @@ static enum imp_status camera_mover(const struct imp__moves *moves, struct imp__
                       "sensor '%s' has no field of view that moves", moves->sensor->name);
 }
 
-static enum imp_status light_mover(const struct imp__moves *moves, struct imp__mover *m)
+static enum imp_status light_mover(struct imp__moves *moves, struct imp__mover *m)
 {
     struct imp_emitter *e = moves->scene->emitters[IMP_MOVE_EMITTER(m->shape)];
+    const bool sky = e->ops->flags & IMP_EMITTER_ENVIRONMENT;
     double v[3];
-    if (!e->ops->aim ||
-        (m->kind == IMP_MOVE_AXIS && !e->ops->cone && e->ops != &imp__ies_light))
+    m->count = m->kind == IMP_MOVE_AFFINE ? IMP_AFFINE_NUMBERS : 3;
+    moves->skies |= sky;
+    if (sky && m->kind == IMP_MOVE_TURN) return IMP_OK; /* about the middle of all */
+    if (!e->ops->aim || m->kind == IMP_MOVE_TURN ||
+        (m->kind == IMP_MOVE_AXIS && !e->ops->cone && e->ops != &imp__ies_light && !sky))
         return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
                           "light '%s' (%s) has no derivative by its %s", e->name,
                           e->ops->name, m->kind == IMP_MOVE_AXIS ? "direction" : "place");
     e->ops->aim(e, v, false);
-    m->count = m->kind == IMP_MOVE_AFFINE ? IMP_AFFINE_NUMBERS : 3;
-    m->centre = m->axis = imp__v3(v[0], v[1], v[2]);
+    m->axis = imp__v3(v[0], v[1], v[2]);
+    if (sky) return IMP_OK;
+    m->centre = m->axis;
     if (m->kind == IMP_MOVE_AXIS) {
         imp__pose_aim(e, IMP_POSE_DIRECTION, v);
         m->axis = imp__v3(v[0], v[1], v[2]);
@@ -151,7 +156,8 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
     static const enum imp__move_kind kind[IMP_POSE_KINDS] = {
         [IMP_POSE_RIGID] = IMP_MOVE_POSE,     [IMP_POSE_SCALE] = IMP_MOVE_SCALE,
         [IMP_POSE_WORLD] = IMP_MOVE_AFFINE,   [IMP_POSE_VERTICES] = IMP_MOVE_VERTICES,
-        [IMP_POSE_POSITION] = IMP_MOVE_LIGHT, [IMP_POSE_DIRECTION] = IMP_MOVE_LIGHT};
+        [IMP_POSE_POSITION] = IMP_MOVE_LIGHT, [IMP_POSE_DIRECTION] = IMP_MOVE_LIGHT,
+        [IMP_POSE_TURN] = IMP_MOVE_TURN};
     int shape = pose->sensor          ? IMP_MOVE_CAMERA
                 : pose->instance >= 0 ? IMP_MOVE_INSTANCE(pose->instance)
                                       : pose->shape;
@@ -178,7 +184,7 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
     if (pose->kind == IMP_POSE_DIRECTION)
         m->rate =
             1 / imp__length(imp__v3(pose->number[0], pose->number[1], pose->number[2]));
-    if (turns) m->twist = twist_of(pose, m->axis);
+    if (turns && !imp__pose_is_far(pose->emitter)) m->twist = twist_of(pose, m->axis);
     return IMP_OK;
 }
 
@@ -196,15 +202,17 @@ void imp__pose_numbers_bar(const struct imp__moves *moves, const struct imp__mov
     if (mover->kind == IMP_MOVE_AFFINE &&
         imp__moves_cylinder(pose->scene, pose->shape, 0, &tube))
         imp__ends_bar(&tube, mover->centre, pose->kind, bar);
-    if (pose->kind != IMP_POSE_RIGID) return;
-    const imp_v3 turn = imp__v3(bar[3], bar[4], bar[5]);
-    for (int i = 3; i < 6; i++) bar[i] = 0;
+    if (pose->kind != IMP_POSE_RIGID && pose->kind != IMP_POSE_TURN) return;
+    double *a_bar = bar + (pose->kind == IMP_POSE_TURN ? 0 : 3);
+    const double *a = pose->number + (a_bar - bar);
+    const imp_v3 turn = imp__move_vector(a_bar);
+    for (int i = 0; i < 3; i++) a_bar[i] = 0;
     struct imp_round round;
     if (pose->shape >= 0 && imp__moves_sphere(pose->scene, pose->shape, 0, &round) &&
         !imp__pose_looks_up(pose->scene, pose->scene->shapes[pose->shape]) &&
         !pose->object->table)
         return; /* turned about its centre it is where it was */
-    imp__rotation_bar(pose->number + 3, turn, bar + 3);
+    imp__rotation_bar(a, turn, a_bar);
 }
 
 bool imp__moves_shape(const struct imp__moves *moves, int shape,

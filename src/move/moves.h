@@ -15,6 +15,8 @@
  *     axis      of a spot or ies light, by a direction of any length, likewise (3); the frame turns
  *               as little as possible from where the file has its axis, z:
  *                   a x a' - a (z x a).a'/(1 + z.a)
+ *     turn      of a sky, a rotation vector: its light from w, a unit vector, comes from where w goes,
+ *               V = a x w (3). The direction of a sun, an axis, turns it likewise
  *
  * e: a translation in scene units; a: a rotation vector in radians. Velocities are linear in the
  * numbers; each function that applies the map has its transpose beside it. The geometric normal is
@@ -39,6 +41,7 @@ enum imp__move_kind {
     IMP_MOVE_AFFINE,
     IMP_MOVE_LIGHT,
     IMP_MOVE_AXIS,
+    IMP_MOVE_TURN,
     IMP_MOVE_VIEW /* + k: number k of a camera's view */
 };
 struct imp__fans; /* triangles around each vertex: shade.c */
@@ -65,7 +68,8 @@ struct imp__moves {
     int n_movers;
     size_t cap_movers;
     struct imp__mover *mover;
-    size_t n; /* numbers in all */
+    size_t n;   /* numbers in all */
+    bool skies; /* a sky is among them */
     /* Vertices of a mesh at one place move together, as the caller sees to: what is wanted of their
      * numbers is the sum. */
     bool seams_join;
@@ -205,13 +209,14 @@ struct imp__glued imp__glued_curved(const struct imp_scene *scene, int shape,
                                     int64_t place, imp_v3 p, imp_v3 n);
 
 /* ---- cameras_lights.c ---- */
-/* Velocity of emitter k: of its place, or of the unit direction of parallel light. */
-imp_v3 imp__light_velocity(const struct imp__moves *moves, int k,
+/* Velocity of emitter k: of its place, or of the unit direction in which parallel light, or that of a
+ * sky, travels, which is p. */
+imp_v3 imp__light_velocity(const struct imp__moves *moves, int k, imp_v3 p,
                            const double *theta_dot);
-void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 bar,
+void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 p, imp_v3 bar,
                              double *theta_bar);
-/* The transpose of the turn of a spot's axis, a rotation vector across it. */
-void imp__light_axis_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
+/* The transpose of the turn of a spot's axis or a sky, a rotation vector. */
+void imp__light_turn_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
                          double *theta_bar);
 /* Velocity of what the camera sees at p through a fixed film position and, of a lens, fixed numbers of
  * its point: origin and direction of the ray move with the camera, the distance is held. eye: another

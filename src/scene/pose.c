@@ -178,7 +178,7 @@ void imp__pose_aim(struct imp_emitter *e, enum imp_pose_kind kind, double v[3])
 {
     imp_v3 axis;
     double cosine;
-    if (kind != IMP_POSE_DIRECTION || e->ops->flags & IMP_EMITTER_FAR) {
+    if (kind != IMP_POSE_DIRECTION || imp__pose_is_far(e)) {
         e->ops->aim(e, v, false);
         return;
     }
@@ -191,6 +191,17 @@ void imp__pose_aim(struct imp_emitter *e, enum imp_pose_kind kind, double v[3])
     for (int k = 0; k < 3; k++) v[k] = axis[k];
 }
 
+static void sky_turn(const struct imp_pose *p)
+{
+    double R[9], by[12] = {0};
+    const bool rests = p->number[0] == 0 && p->number[1] == 0 && p->number[2] == 0;
+    memcpy(p->emitter->self, p->rest, p->rest_size);
+    if (rests) return;
+    imp__rotation_of(p->number, R);
+    for (int k = 0; k < 9; k++) by[4 * (k / 3) + k % 3] = R[k];
+    p->emitter->ops->move(p->emitter, by);
+}
+
 static enum imp_status light_apply(const struct imp_pose *p)
 {
     const struct imp_pose *world = world_of(p);
@@ -201,8 +212,13 @@ static enum imp_status light_apply(const struct imp_pose *p)
     }
     const struct imp_pose *at = imp__pose_beside(p, IMP_POSE_POSITION),
                           *to = imp__pose_beside(p, IMP_POSE_DIRECTION);
-    const bool far = p->emitter->ops->flags & IMP_EMITTER_FAR;
+    const bool far = imp__pose_is_far(p->emitter);
+    const struct imp_pose *turn = imp__pose_beside(p, IMP_POSE_TURN);
     double v[3];
+    if (turn) {
+        sky_turn(turn);
+        return IMP_OK;
+    }
     if (at || far) {
         memcpy(v, far ? to->number : at->number, sizeof v);
         p->emitter->ops->aim(p->emitter, v, true);
@@ -227,6 +243,16 @@ static enum imp_status pose_apply(struct imp_pose *p)
     return p->sensor ? sensor_apply(p) : light_apply(p);
 }
 
+/* Turns of a light that is far away: not beyond what its sun is wide. */
+static double turn_large(const struct imp_emitter *e, double large)
+{
+    struct imp_sky_circle circle[IMP_SKY_CIRCLES];
+    const int n = e->ops->jumps ? e->ops->jumps(e, circle) : 0;
+    for (int k = 0; k < n; k++)
+        large = imp_min(large, 1.5 * acos(imp_clamp(circle[k].cosine, -1.0, 1.0)));
+    return large;
+}
+
 double imp__pose_large(const struct imp_pose *p, size_t e)
 {
     const double scene = imp__length(p->scene->hi - p->scene->lo);
@@ -235,6 +261,7 @@ double imp__pose_large(const struct imp_pose *p, size_t e)
         return e % 4 == 3 ? 0.1 * scene
                           : 0.3 * hypot(hypot(p->start[e % 4], p->start[4 + e % 4]),
                                         p->start[8 + e % 4]);
+    case IMP_POSE_TURN: return turn_large(p->emitter, 0.5);
     case IMP_POSE_RIGID: return e < 3 ? 0.1 * scene : 0.5;
     case IMP_POSE_SCALE:
     case IMP_POSE_RADIUS: return 0.3 * p->number[0];
@@ -253,7 +280,8 @@ double imp__pose_large(const struct imp_pose *p, size_t e)
     case IMP_POSE_APERTURE: return 0.3 * p->number[0] + 1e-3 * scene;
     case IMP_POSE_FOCUS: return 0.2 * p->number[0];
     case IMP_POSE_DIRECTION:
-        return 0.3 * imp__length(imp__v3(p->number[0], p->number[1], p->number[2]));
+        return turn_large(p->emitter, 0.3) *
+               imp__length(imp__v3(p->number[0], p->number[1], p->number[2]));
     default: return 0.1 * scene;
     }
 }

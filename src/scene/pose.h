@@ -16,7 +16,9 @@
  *     NAME.opencv_k1, _k2, _p1, _p2, _k3   of a camera, by which its lens distorts the picture
  *     NAME.aperture_radius, NAME.focus_distance   of a thin lens
  *     NAME.position          of a light at a point, world
- *     NAME.direction         along which parallel light travels, or of a spot's axis, of any length
+ *     NAME.direction         along which parallel light or that of a sun's middle travels, or of a
+ *                            spot's axis, of any length
+ *     NAME.turn              of a sky: a rotation vector, away from what the file says
  *
  * R(a): the rotation about a by |a| radians; c: the middle of a shape's box, or of a group's where an
  * instance has it; a camera's own place.
@@ -47,6 +49,7 @@ enum imp_pose_kind {
     IMP_POSE_FOCUS,
     IMP_POSE_POSITION,
     IMP_POSE_DIRECTION,
+    IMP_POSE_TURN,
     IMP_POSE_KINDS
 };
 
@@ -120,6 +123,11 @@ bool imp__pose_looks_up(const struct imp_scene *scene, const struct imp_shape *s
  * radian, of a vertex a tenth of its mesh, of a view ten degrees. */
 double imp__pose_large(const struct imp_pose *p, size_t e);
 
+/* Is its direction that of its light, which comes from far away, and not of a frame? */
+static inline bool imp__pose_is_far(const struct imp_emitter *e)
+{
+    return e->ops->flags & (IMP_EMITTER_FAR | IMP_EMITTER_ENVIRONMENT);
+}
 /* Where a light is, or where it shines: the unit direction of parallel light, or a spot's axis. */
 void imp__pose_aim(struct imp_emitter *e, enum imp_pose_kind kind, double v[3]);
 

@@ -108,14 +108,16 @@ const char *imp__pose_sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
 const char *imp__pose_light_why(const struct imp_scene *scene,
                                 const struct imp_emitter *e, enum imp_pose_kind kind)
 {
-    const bool far = e->ops->flags & IMP_EMITTER_FAR;
-    const bool has = kind == IMP_POSE_POSITION ? !far
+    const bool spot = e->ops == &imp__spot_light, far = imp__pose_is_far(e);
+    const bool has = kind == IMP_POSE_POSITION ? e->ops->aim && !far
                      : kind == IMP_POSE_DIRECTION
-                         ? far || e->ops == &imp__spot_light || e->ops == &imp__ies_light
-                         : kind == IMP_POSE_WORLD && e->ops == &imp__spot_light;
-    if (!e->ops->aim || !has)
+                         ? e->ops->aim && (far || spot || e->ops == &imp__ies_light)
+                     : kind == IMP_POSE_TURN ? e->ops->move != NULL
+                                             : kind == IMP_POSE_WORLD && spot;
+    if (!has)
         return "it is none of point, spot and ies without a shape (position), "
-               "directional, spot and ies (direction), and spot (to_world)";
+               "directional, sun, spot and ies (direction), spot (to_world), and "
+               "envmap, sunsky, ciesky and perezsky (turn)";
     if (scene->lights_in_tree) return "lights are chosen by a tree (light_choice)";
     return NULL;
 }
@@ -250,7 +252,8 @@ static const struct tail {
     [IMP_POSE_APERTURE] = {"aperture_radius", "scene units", 0, INFINITY},
     [IMP_POSE_FOCUS] = {"focus_distance", "scene units", 1e-6, INFINITY},
     [IMP_POSE_POSITION] = {"position", "scene units", -INFINITY, INFINITY},
-    [IMP_POSE_DIRECTION] = {"direction", "1", -INFINITY, INFINITY}};
+    [IMP_POSE_DIRECTION] = {"direction", "1", -INFINITY, INFINITY},
+    [IMP_POSE_TURN] = {"turn", "radians", -INFINITY, INFINITY}};
 
 const char *imp__pose_tail(enum imp_pose_kind kind) { return tails[kind].name; }
 
@@ -388,6 +391,6 @@ enum imp_status imp_scene_add_geometry(imp_scene *scene, const char *name)
         "'%s' names no number of geometry: NAME.pose, scale, to_world, "
         "vertex_positions, center, radius, p0, p1, x_fov, principal_point_offset_x, _y, "
         "opencv_k1, k2, p1, p2, k3, aperture_radius, "
-        "focus_distance, position or direction",
+        "focus_distance, position, direction or turn",
         name);
 }

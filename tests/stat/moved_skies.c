@@ -9,69 +9,9 @@
 #include "mean_gradient.h"
 #include "moves_kit.h"
 #include "moves_numbers.h"
+#include "sky_field.h"
 #include "walk/moved/moved_sky.h"
-#include <stdio.h>
 #include <unistd.h>
-
-#define MAP "moved_skies_map.pfm"
-
-enum { COLUMNS = 12, ROWS = 7 };
-static double texel(int i, int j, int c) /* row, column, channel */
-{
-    const double light = .4 + .3 * cos(1.3 * i + c) * sin(.9 * j + .3 * c);
-    return light + (i == 1 && j == 4 ? 12 : 0);
-}
-static void map_write(void)
-{
-    FILE *f = fopen(MAP, "wb");
-    if (!f) exit(99);
-    fprintf(f, "PF\n%d %d\n-1\n", COLUMNS, ROWS);
-    for (int i = ROWS - 1; i >= 0; i--)
-        for (int j = 0; j < COLUMNS; j++)
-            for (int c = 0; c < 3; c++) {
-                const float x = (float)texel(i, j, c);
-                fwrite(&x, sizeof x, 1, f);
-            }
-    fclose(f);
-}
-
-#define DIRECT "<integrator type='direct'/>"
-#define PATH   "<integrator type='path'><integer name='max_depth' value='4'/></integrator>"
-#define UP     "<transform name='to_world'><rotate x='1' angle='90'/></transform>"
-#define ENVMAP                                                                           \
-    "<emitter type='envmap' id='sky'><string name='filename' value='" MAP "'/>" UP       \
-    "</emitter>"
-#define CIE                                                                              \
-    "<emitter type='ciesky' id='sky'><integer name='sky' value='12'/><vector "           \
-    "name='sun_direction' value='.5,-.6,.7'/></emitter>"
-#define CLEAR                                                                            \
-    "<emitter type='sunsky' id='sky'><vector name='sun_direction' value='-.5,1.2,.4'/>"  \
-    "<float name='sun_aperture' value='12'/><float name='sun_scale' value='.004'/>"      \
-    "<float name='sky_scale' value='20'/></emitter>"
-#define SUN                                                                              \
-    "<emitter type='sun' id='sun'><vector name='direction' value='.5,-1.2,-.5'/>"        \
-    "<float name='radius' value='.15'/><rgb name='radiance' value='9,8,7'/></emitter>"
-
-/* It looks a little up, over the block to the horizon. */
-static imp_scene *field(const char *rest)
-{
-    char xml[8192];
-    snprintf(xml, sizeof xml,
-             "<scene version='3.0.0'>%s<bsdf type='diffuse' id='grey'><rgb "
-             "name='reflectance' value='.6,.5,.4'/></bsdf>"
-             "<sensor type='perspective' id='camera'><float name='fov' value='60'/>"
-             "<transform name='to_world'><lookat origin='.4,-5.5,1.6' target='.1,0,1.5' "
-             "up='0,0,1'/></transform><film type='hdrfilm'><integer name='width' "
-             "value='24'/><integer name='height' value='16'/><rfilter type='box'/></film>"
-             "</sensor>"
-             "<shape type='rectangle' id='floor'><transform name='to_world'><scale "
-             "value='3'/></transform><ref id='grey'/></shape>"
-             "<shape type='cube' id='block'><transform name='to_world'><scale x='.6' "
-             "y='.5' z='.4'/><rotate z='1' angle='25'/><translate x='-.2' y='.3' "
-             "z='.7'/></transform><ref id='grey'/></shape></scene>",
-             rest);
-    return test_scene_text(ctx, xml, IMP_RGB);
-}
 
 /* ---- Where skies jump ----------------------------------------------------------------------- */
 
@@ -207,7 +147,7 @@ static void turns_test(void)
 
 static void jumps_of(const char *what, const char *sky)
 {
-    imp_scene *scene = field(sky);
+    imp_scene *scene = sky_field(sky);
     jumps_test(what, scene);
     imp_scene_destroy(scene);
 }
@@ -226,29 +166,33 @@ int main(int argc, char **argv)
     adjoint_make();
     if (!mkdtemp(folder) || chdir(folder) != 0)
         exit(99); /* the long form may run beside it */
-    map_write();
+    sky_map_write();
     turns_test();
-    jumps_of("a map", ENVMAP);
-    jumps_of("a CIE sky", CIE);
+    jumps_of("a map", SKY_ENVMAP);
+    jumps_of("a CIE sky", SKY_CIE);
     jumps_of("an overcast sky", "<emitter type='ciesky'/>");
     jumps_of("Perez' sky",
              "<emitter type='perezsky'><float name='diffuse' value='100'/><float "
              "name='direct' value='300'/><vector name='sun_direction' "
              "value='.5,-.6,.7'/></emitter>");
-    jumps_of("sky and sun", CLEAR);
-    jumps_of("the sun", SUN);
+    jumps_of("sky and sun", SKY_CLEAR);
+    jumps_of("the sun", SKY_SUN);
     if (is_long) {
-        numbers_compare("a map", field(DIRECT ENVMAP), 256, 1024, .06, numbers);
-        numbers_compare("a CIE sky", field(PATH CIE), 256, 1024, .06, numbers);
-        numbers_compare("sky and sun", field(DIRECT CLEAR), 256, 1024, .06, numbers);
-        numbers_compare("a map and a sun", field(DIRECT ENVMAP SUN), 256, 1024, .2,
+        numbers_compare("a map", sky_field(SKY_DIRECT SKY_ENVMAP), 256, 1024, .06,
                         numbers);
+        numbers_compare("a CIE sky", sky_field(SKY_PATH SKY_CIE), 256, 1024, .06,
+                        numbers);
+        numbers_compare("sky and sun", sky_field(SKY_DIRECT SKY_CLEAR), 256, 1024, .06,
+                        numbers);
+        numbers_compare("a map and a sun", sky_field(SKY_DIRECT SKY_ENVMAP SKY_SUN), 256,
+                        1024, .2, numbers);
     } else {
-        numbers_compare("a map", field(DIRECT ENVMAP), 32, 64, .06, few);
-        numbers_compare("a CIE sky", field(PATH CIE), 32, 32, .06, few);
-        numbers_compare("a map and a sun", field(DIRECT ENVMAP SUN), 16, 32, .2, few);
+        numbers_compare("a map", sky_field(SKY_DIRECT SKY_ENVMAP), 32, 64, .06, few);
+        numbers_compare("a CIE sky", sky_field(SKY_PATH SKY_CIE), 32, 32, .06, few);
+        numbers_compare("a map and a sun", sky_field(SKY_DIRECT SKY_ENVMAP SKY_SUN), 16,
+                        32, .2, few);
     }
-    if (remove(MAP) != 0 || chdir("..") != 0 || rmdir(folder) != 0) exit(99);
+    if (remove(SKY_MAP) != 0 || chdir("..") != 0 || rmdir(folder) != 0) exit(99);
     imp_context_destroy(ctx);
     return tap_done();
 }

@@ -129,6 +129,12 @@ enum imp_status imp__sky_axes(const struct imp_build *b, imp_v3 axis[3])
     return IMP_OK;
 }
 
+void imp__sky_axes_turn(imp_v3 axis[3], const double to_world[12])
+{
+    for (int k = 0; k < 3; k++)
+        axis[k] = imp__normalize(imp__rows_vector(to_world, axis[k]));
+}
+
 enum imp_status imp__travel_read(const struct imp_build *b, imp_v3 *along)
 {
     enum imp_status st = IMP_OK;

@@ -33,6 +33,9 @@ double imp__along_emission_pdf(const struct imp_emitter *e, const struct imp_emi
  * it only. */
 enum imp_status imp__sky_axes(const struct imp_build *b, imp_v3 axis[3]);
 
+/* The same axes after imp_emitter_ops.move. */
+void imp__sky_axes_turn(imp_v3 axis[3], const double to_world[12]);
+
 /* Whither light from infinitely far travels, unit: reads `direction`, or to_world, whose +z
  * it is. */
 enum imp_status imp__travel_read(const struct imp_build *b, imp_v3 *along);

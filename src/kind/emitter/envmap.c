@@ -230,6 +230,12 @@ static double pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *
     return density(e, *wi);
 }
 
+static void move(struct imp_emitter *e, const double to_world[12])
+{
+    struct envmap *s = e->self;
+    imp__sky_axes_turn(s->axis, to_world);
+}
+
 const struct imp_emitter_ops imp__envmap = {.size = sizeof(struct imp_emitter_ops),
                                             .name = "envmap",
                                             .object_size = sizeof(struct envmap),
@@ -246,7 +252,8 @@ const struct imp_emitter_ops imp__envmap = {.size = sizeof(struct imp_emitter_op
                                             .place_d = place_d,
                                             .sample_emission = imp__sky_emission_sample,
                                             .pdf_emission = imp__sky_emission_pdf,
-                                            .jumps = imp__sky_without_jumps};
+                                            .jumps = imp__sky_without_jumps,
+                                            .move = move};
 
 /* ---- In lanes ---------------------------------------------------------------------------- */
 

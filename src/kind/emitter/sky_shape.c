@@ -3,6 +3,7 @@
  * Values, draws and integrals of skies by their angles to the zenith and the sun. */
 #include "sky_shape.h"
 #include "emission.h"
+#include "math/transform.h"
 #include "math/warp.h"
 #include "sun_position.h"
 #include <math.h>
@@ -115,4 +116,11 @@ int imp__sky_shape_jumps(const struct imp_emitter *e,
     const struct imp__sky_shape *s = e->self;
     out[0] = (struct imp_sky_circle){s->axis[2], 0}; /* the horizon */
     return 1;
+}
+
+void imp__sky_shape_move(struct imp_emitter *e, const double to_world[12])
+{
+    struct imp__sky_shape *s = e->self;
+    imp__sky_axes_turn(s->axis, to_world);
+    s->sun = imp__normalize(imp__rows_vector(to_world, s->sun));
 }

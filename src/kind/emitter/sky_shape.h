@@ -43,7 +43,8 @@ double imp__sky_shape_horizontal(const struct imp__sky_shape *s);
     .inputs = imp__sky_shape_inputs, .eval = imp__sky_shape_eval,                        \
     .eval_d = imp__sky_shape_eval_d, .sample = imp__sky_shape_sample,                    \
     .pdf = imp__sky_shape_pdf, .sample_emission = imp__sky_emission_sample,              \
-    .pdf_emission = imp__sky_emission_pdf, .jumps = imp__sky_shape_jumps
+    .pdf_emission = imp__sky_emission_pdf, .jumps = imp__sky_shape_jumps,                \
+    .move = imp__sky_shape_move
 void imp__sky_shape_eval(const struct imp_emitter *e, const imp_spec *in,
                          const struct imp_emission *x, imp_spec *le);
 void imp__sky_shape_eval_d(const struct imp_emitter *e, const imp_spec *in,
@@ -55,5 +56,6 @@ double imp__sky_shape_pdf(const struct imp_emitter *e, const imp_v3 *ref,
                           const struct imp_surface *at);
 int imp__sky_shape_jumps(const struct imp_emitter *e,
                          struct imp_sky_circle out[IMP_SKY_CIRCLES]);
+void imp__sky_shape_move(struct imp_emitter *e, const double to_world[12]);
 
 #endif

@@ -106,6 +106,14 @@ static int jumps(const struct imp_emitter *e, struct imp_sky_circle out[IMP_SKY_
     return 1;
 }
 
+static void aim(struct imp_emitter *e, double v[3], bool set)
+{
+    struct sun *s = e->self;
+    const imp_v3 along = imp__v3(v[0], v[1], v[2]);
+    if (set && imp__length(along) > 0) s->axis = -imp__normalize(along);
+    for (int k = 0; k < 3; k++) v[k] = -s->axis[k];
+}
+
 const struct imp_emitter_ops imp__sun = {.size = sizeof(struct imp_emitter_ops),
                                          .name = "sun",
                                          .object_size = sizeof(struct sun),
@@ -119,7 +127,8 @@ const struct imp_emitter_ops imp__sun = {.size = sizeof(struct imp_emitter_ops),
                                          .changed = changed,
                                          .sample_emission = imp__sky_emission_sample,
                                          .pdf_emission = imp__sky_emission_pdf,
-                                         .jumps = jumps};
+                                         .jumps = jumps,
+                                         .aim = aim};
 
 bool imp__sun_disc(const struct imp_emitter *e, imp_v3 *axis, double *size)
 {

@@ -369,6 +369,12 @@ static int jumps(const struct imp_emitter *e, struct imp_sky_circle out[IMP_SKY_
     return 2;
 }
 
+static void move(struct imp_emitter *e, const double to_world[12])
+{
+    struct sunsky *s = e->self;
+    imp__sky_axes_turn(s->axis, to_world);
+}
+
 const struct imp_emitter_ops imp__sunsky = {.size = sizeof(struct imp_emitter_ops),
                                             .name = "sunsky",
                                             .object_size = sizeof(struct sunsky),
@@ -382,4 +388,5 @@ const struct imp_emitter_ops imp__sunsky = {.size = sizeof(struct imp_emitter_op
                                             .changed = changed,
                                             .sample_emission = imp__sky_emission_sample,
                                             .pdf_emission = imp__sky_emission_pdf,
-                                            .jumps = jumps};
+                                            .jumps = jumps,
+                                            .move = move};

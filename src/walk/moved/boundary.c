@@ -47,7 +47,9 @@ static enum imp_status lights_make(struct imp__boundary *b)
     for (int k = 0; k < scene->n_emitters; k++) {
         const bool sky = scene->emitters[k]->ops->flags & IMP_EMITTER_ENVIRONMENT;
         b->drawn[k] = sky && imp__sky_has_draws(scene, k);
-        b->drawn_to_meter[k] = b->drawn[k] && imp__sky_is_narrow(b->tracer, k);
+        b->drawn_to_meter[k] =
+            b->drawn[k] && (imp__moves_shape(b->moves, IMP_MOVE_EMITTER(k), NULL) ||
+                            imp__sky_is_narrow(b->tracer, k));
         if (!sky || b->drawn[k]) {
             sum += light_power(b, k);
             b->n_lights++;
@@ -215,7 +217,8 @@ double imp__flux_velocity(const struct imp__moves *moves, const struct imp__flux
         const struct imp__flux_end *e = &flux->end[k];
         struct imp__velocity v = {.area = 0};
         if (e->camera) v.v = imp__camera_velocity(moves, e->eye, e->x.p, theta_dot);
-        else if (e->light) v.v = imp__light_velocity(moves, e->light - 1, theta_dot);
+        else if (e->light)
+            v.v = v.v = imp__light_velocity(moves, e->light - 1, e->x.p, theta_dot);
         else v = imp__velocity_of(moves, &e->x, theta_dot);
         sum += velocity_times(&e->x, &e->bar, &v);
     }
@@ -230,7 +233,8 @@ void imp__flux_bar(const struct imp__moves *moves, const struct imp__flux *flux,
         const struct imp__velocity v = {
             .v = e->bar.v * bar, .n = e->bar.n * bar, .shade = e->bar.shade * bar};
         if (e->camera) imp__camera_velocity_bar(moves, e->eye, e->x.p, v.v, theta_bar);
-        else if (e->light) imp__light_velocity_bar(moves, e->light - 1, v.v, theta_bar);
+        else if (e->light)
+            imp__light_velocity_bar(moves, e->light - 1, e->x.p, v.v, theta_bar);
         else imp__velocity_bar(moves, &e->x, &v, theta_bar);
     }
 }

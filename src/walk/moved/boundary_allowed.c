@@ -228,9 +228,40 @@ static enum imp_status camera_allowed(const struct imp__boundary *b)
         b->tracer->sensor->name, scene->shapes[shape]->name);
 }
 
+/* What has edges past which light of a sky jumps that stay, while the sky turns: none is drawn along its
+ * own directions. */
+static const char *turn_why(const struct imp__boundary *b)
+{
+    const struct imp_sensor *sensor = b->tracer->sensor;
+    if (b->passes) return "a material of the scene lets light straight through";
+    if (imp__meter_is_points(sensor)) return "the sensor is a meter at points";
+    for (size_t j = 0; j < b->edges->n_bodies; j++)
+        if (imp__moves_smooth(b->tracer->scene, b->edges->body[j].shape))
+            return "a shape has vertex normals (face_normals makes it flat)";
+    return NULL;
+}
+
+static enum imp_status turns_allowed(const struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    for (int k = 0; k < scene->n_emitters && b->moves->skies; k++) {
+        const struct imp_emitter *e = scene->emitters[k];
+        const char *why = NULL;
+        if (e->ops->flags & IMP_EMITTER_ENVIRONMENT &&
+            imp__moves_shape(b->moves, IMP_MOVE_EMITTER(k), NULL))
+            why = turn_why(b);
+        if (why)
+            return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                              "derivatives by what moves: light '%s' (%s) turns, and %s",
+                              e->name ? e->name : "", e->ops->name, why);
+    }
+    return IMP_OK;
+}
+
 enum imp_status imp__boundary_allowed(const struct imp__boundary *b)
 {
     enum imp_status st = edges_allowed(b);
+    if (st == IMP_OK) st = turns_allowed(b);
     if (st == IMP_OK) st = facets_allowed(b);
     if (st == IMP_OK) st = camera_allowed(b);
     return st;

@@ -30,7 +30,6 @@ struct imp__flux *imp__jump_add(struct imp__edge_draw *d,
     return f;
 }
 
-/* The point of the draw, or of a circle of a sky its direction, as connections have it. */
 static bool is_sky(const struct imp__edge_draw *d)
 {
     return d->item && d->item->kind == IMP_ITEM_SKY;
@@ -43,12 +42,10 @@ static imp_spec look_beside(struct imp__edge_draw *d, const struct imp_sensor_sa
 {
     struct imp_sensor_sample at;
     struct imp_walk walk;
-    const bool sky = is_sky(d);
-    if (!sky && imp__edge_face_look(d, to->p, d->b->parallel, m, apart, 0, &walk))
+    if (imp__edge_face_look(d, to->p, d->b->parallel, m, apart, 0, &walk))
         return walk.values;
-    const imp_v3 q =
-        sky ? imp__normalize(w + m * apart) : imp__edge_beside(d, w, m, apart);
-    if (!imp__sensor_connect(d->b->tracer->sensor, &q, sky, d->lens, &at))
+    const imp_v3 q = imp__edge_beside(d, w, m, apart);
+    if (!imp__sensor_connect(d->b->tracer->sensor, &q, false, d->lens, &at))
         return imp__spec(0);
     return imp__look_through(d, at.px, at.py);
 }
@@ -61,13 +58,13 @@ void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to
     if (!(sine > 0)) return; /* it is seen end on */
     const imp_v3 m = turned * (1 / sine);
     const bool sky = is_sky(d);
-    /* A distance, or an angle. Parallel rays may begin next to what they meet. */
-    const double apart = IMP_BESIDE * (sky              ? 1
-                                       : d->b->parallel ? to->dist + imp__length(d->p)
-                                                        : imp__length(d->p - to->p));
-    T = imp__edge_near(d, to->dist, apart, T);
+    /* Parallel rays may begin next to what they meet. */
+    const double apart = IMP_BESIDE * (d->b->parallel ? to->dist + imp__length(d->p)
+                                                      : imp__length(d->p - to->p));
+    if (!sky) T = imp__edge_near(d, to->dist, apart, T);
     const imp_spec jump =
-        T * (look_beside(d, to, w, -m, apart) - look_beside(d, to, w, m, apart));
+        T * (sky ? imp__sky_jump(d, w, m)
+                 : look_beside(d, to, w, -m, apart) - look_beside(d, to, w, m, apart));
     struct imp__flux *f =
         imp__jump_add(d, to, jump * (to->weight * sine * d->inv_pdf), 1 + IMP_EDGE_ENDS);
     if (!f) return;
@@ -75,6 +72,8 @@ void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to
     if (sky) {
         f->end[f->n_ends] = imp__flux_camera(d, &eye, m);
         f->end[f->n_ends++].eye = d->p; /* another point of the ray through the eye */
+        f->end[f->n_ends++] =
+            (struct imp__flux_end){{.p = w}, {.v = m}, false, d->item->sky + 1, {0}};
     } else f->n_ends = imp__edge_ends(d, m, f->end);
     f->end[f->n_ends++] = imp__flux_camera(d, &at, -m);
 }

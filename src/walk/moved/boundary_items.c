@@ -52,18 +52,21 @@ static enum imp_status choice_make(struct imp__boundary *b, enum imp__boundary_k
     return st;
 }
 
-/* Circles of a camera's pictures of skies, if it moves. */
+/* Circles of a camera's pictures of skies, if it or the sky moves. */
 static void circles_find(struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
-    if (!imp__moves_shape(b->moves, IMP_MOVE_CAMERA, NULL)) return;
+    const bool camera = imp__moves_shape(b->moves, IMP_MOVE_CAMERA, NULL);
+    if (b->tracer->sensor->shape) return; /* what a meter sees is glued to the sky */
     for (int k = 0; k < scene->n_environments; k++) {
-        const struct imp_emitter *e = scene->emitters[scene->environments[k]];
+        const int sky = scene->environments[k];
+        const struct imp_emitter *e = scene->emitters[sky];
+        if (!camera && !imp__moves_shape(b->moves, IMP_MOVE_EMITTER(sky), NULL)) continue;
         struct imp_sky_circle circle[IMP_SKY_CIRCLES];
         const int n = e->ops->jumps(e, circle);
         for (int i = 0; i < n; i++)
             b->item[b->n_items++] = (struct imp__edge_item){
-                .kind = IMP_ITEM_SKY, .shape = -1, .circle = circle[i]};
+                .kind = IMP_ITEM_SKY, .shape = -1, .sky = sky, .circle = circle[i]};
     }
 }
 
@@ -120,9 +123,10 @@ static enum imp_status items_find(struct imp__boundary *b)
 static double item_length(const struct imp__boundary *b,
                           const struct imp__edge_item *item, int kind)
 {
-    if (item->kind == IMP_ITEM_SKY) /* as large as the scene */
+    if (item->kind == IMP_ITEM_SKY) /* as large as the scene, if anything is there */
         return kind == IMP_BOUNDARY_FILM
-                   ? IMP_PI * b->size * sqrt(1 - imp__sqr(item->circle.cosine))
+                   ? IMP_PI * (b->size > 0 && b->size < INFINITY ? b->size : 1) *
+                         sqrt(1 - imp__sqr(item->circle.cosine))
                    : 0;
     if (item->kind == IMP_ITEM_ARC) /* it is no silhouette */
         return kind == IMP_BOUNDARY_LIGHT ? 0 : imp__arc_length(item->arc);

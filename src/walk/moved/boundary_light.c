@@ -105,7 +105,7 @@ static void ends_set(const struct imp__edge_draw *d, const struct line *l, doubl
     const double far = parallel ? 1 : l->t_y / (t_x + l->t_y); /* of V_line that is x' */
     light->slide = l->m * -far;
     light->n_ends = imp__edge_ends(d, l->m, light->end);
-    if (!l->from->sky) /* which stays */
+    if (!l->from->sky || d->b->moves->skies)
         light->end[light->n_ends++] =
             source_end(d, l->from, l->m * (parallel ? t_x : far - 1));
 }

@@ -6,8 +6,24 @@
 #include "boundary_parts.h"
 #include "kind/cleared.h"
 #include "math/warp.h"
+#include "moved_sky.h"
 #include "walk/core/step.h"
 #include "walk/lights/light_step.h"
+
+/* Directions are exact here, and a sky may be as steep as the root of the angle beside its circle: next to
+ * the horizon a hundred-thousandth away would be .3 % of its light. */
+#define BESIDE 1e-10
+imp_spec imp__sky_jump(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m)
+{
+    const struct imp_tracer *t = d->b->tracer;
+    imp_spec L[2];
+    if (t->integrator->max_depth == 0) return imp__spec(0);
+    for (int k = 0; k < 2; k++)
+        L[k] = imp__sky_radiance_from(t->scene, d->item->sky,
+                                      imp__normalize(w + m * (k ? BESIDE : -BESIDE)),
+                                      imp__edge_waves(d));
+    return L[0] - L[1];
+}
 
 void imp__draw_sky_film(struct imp__edge_draw *d)
 {

@@ -32,33 +32,50 @@ static bool jumps_between(const struct imp_emitter *e, imp_v3 a, imp_v3 b)
     return any;
 }
 
-/* By differences, whose kinks at the borders of texels are so wide; on one side where a jump is on
- * the other, which is an edge's. */
-#define TURN 1e-6
-imp_v3 imp__skies_slope(const struct imp_scene *scene, imp_v3 w, imp_spec bar,
-                        const struct imp_carried *carried)
+/* bar, by lanes, times the derivative of a sky's radiance by w, across w: by differences, whose kinks at
+ * the borders of texels are so wide. Where a jump is as near, which is an edge's, they are narrower: a
+ * sky may be as steep there as a root. */
+#define TURN       1e-6
+#define TURN_LEAST 1e-11
+static void slope_add(const struct imp_scene *scene, int emitter, imp_v3 w, imp_spec bar,
+                      const struct imp_carried *carried, imp_v3 *slope)
 {
     const struct imp_frame f = imp__frame_from_normal(w);
     const imp_v3 across[2] = {f.s, f.t};
+    const struct imp_emitter *e = scene->emitters[emitter];
+    if (imp__emitter_even(e, carried)) return;
+    for (int i = 0; i < 2; i++) {
+        double by = TURN, value[2];
+        while (by > TURN_LEAST && jumps_between(e, imp__normalize(w - across[i] * by),
+                                                imp__normalize(w + across[i] * by)))
+            by *= 0.25;
+        if (!(by > TURN_LEAST)) continue;
+        for (int j = 0; j < 2; j++) {
+            const imp_v3 at = imp__normalize(w + across[i] * (j ? by : -by));
+            const imp_spec L = imp__sky_radiance_from(scene, emitter, at, carried);
+            value[j] = imp__sum_used(L * bar, scene->lanes);
+        }
+        *slope += across[i] * ((value[1] - value[0]) / (2 * by));
+    }
+}
+
+void imp__skies_seen_bar(const struct imp__moves *moves, const struct imp_sensor_ray *ray,
+                         imp_spec seen, const struct imp_carried *carried,
+                         double *theta_bar)
+{
+    const struct imp_scene *scene = moves->scene;
     imp_v3 slope = {0};
     for (int k = 0; k < scene->n_environments; k++) {
         const int sky = scene->environments[k];
-        const struct imp_emitter *e = scene->emitters[sky];
-        if (imp__emitter_even(e, carried)) continue;
-        for (int i = 0; i < 2; i++) {
-            double value[2], between = 0;
-            for (int j = 0; j < 2; j++) {
-                const double by = j ? TURN : -TURN;
-                imp_v3 at = imp__normalize(w + across[i] * by);
-                if (jumps_between(e, w, at)) at = w;
-                else between += TURN;
-                const imp_spec L = imp__sky_radiance_from(scene, sky, at, carried);
-                value[j] = imp__sum_used(L * bar, scene->lanes);
-            }
-            if (between > 0) slope += across[i] * ((value[1] - value[0]) / between);
-        }
+        const imp_v3 before = slope;
+        slope_add(scene, sky, ray->d, seen, carried, &slope);
+        if (imp_unlikely(moves->skies))
+            imp__light_turn_bar(moves, sky, imp__cross(slope - before, ray->d),
+                                theta_bar);
     }
-    return slope;
+    if (imp__is_zero(slope)) return;
+    imp__camera_velocity_bar(moves, ray->o, ray->o + ray->d, slope, theta_bar);
+    imp__camera_velocity_bar(moves, ray->o + ray->d, ray->o, -slope, theta_bar);
 }
 
 bool imp__sky_has_draws(const struct imp_scene *scene, int emitter)

@@ -6,20 +6,31 @@
  *
  *     dL = dL/dd.d'
  *
- * and jumps across the circles of imp_emitter_ops.jumps, whose pictures are edges. */
+ * and jumps across the circles of imp_emitter_ops.jumps, whose pictures are edges.
+ *
+ * Of a sky that turns by the rotation vector O, light samples and directions in which it is met are
+ * glued to it, w' = O x w. What it sends along does not change, nor does the density of samples:
+ *
+ *     d ln B = d ln K/dw.(O x w),   and for the camera   dL = dL/dd.(d' - O x d);
+ *
+ * its circles, and lines from it past silhouettes, turn likewise. */
 #ifndef IMP_WALK_MOVED_SKY_H
 #define IMP_WALK_MOVED_SKY_H
 
+#include "move/moves.h"
 #include "walk/core/walk.h"
 
 /* Radiance of a sky, environment `emitter`, that arrives from the unit direction w, by lanes. */
 imp_spec imp__sky_radiance_from(const struct imp_scene *scene, int emitter, imp_v3 w,
                                 const struct imp_carried *carried);
-/* The same of all skies; bar, by lanes, times its derivative by w, across w. */
+/* The same of all skies. */
 imp_spec imp__skies_from(const struct imp_scene *scene, imp_v3 w,
                          const struct imp_carried *carried);
-imp_v3 imp__skies_slope(const struct imp_scene *scene, imp_v3 w, imp_spec bar,
-                        const struct imp_carried *carried);
+/* Skies through a fixed film position, by the adjoint of what arrives there: the direction d of the ray
+ * turns by u(o + d) - u(o), and skies under it. Adds to theta_bar. */
+void imp__skies_seen_bar(const struct imp__moves *moves, const struct imp_sensor_ray *ray,
+                         imp_spec seen, const struct imp_carried *carried,
+                         double *theta_bar);
 /* Are silhouettes looked for along directions that the sky draws? One that is the same from
  * everywhere comes with scattered light. */
 bool imp__sky_has_draws(const struct imp_scene *scene, int emitter);

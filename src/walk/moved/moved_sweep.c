@@ -13,6 +13,7 @@ struct pieces {
     imp_spec light; /* its light sample */
     imp_spec step;  /* the step, of all light but `met` */
     imp_spec met;   /* emission at its end */
+    imp_spec on;    /* what goes on along the step */
     int lit;        /* vertex of that emission: the next one, or behind passes */
     imp_spec all;   /* what the camera sees of it, up to `front` */
 };
@@ -90,6 +91,7 @@ static int read_walk(struct sweep *s, imp_spec adjoint)
         if (v->d.connection == IMP_CONNECTED) piece->light = P * v->b;
         P *= v->w;
         if (!v->d.goes_on || !v->next) continue;
+        piece->on = P;
         met_read(s, v, P, n, piece);
         piece->step = P * v->beyond - piece->met;
     }
@@ -130,18 +132,25 @@ static bool kernel_derive(const struct sweep *s, int k, const struct imp_vertex 
 
 /* The adjoint of vertex k's kernel towards w from that of its logarithm, by lanes. derived: by
  * kernel_derive; NULL: Lambertian. */
+static struct imp__kernel_bar kernel_part(const struct sweep *s, int k,
+                                          const struct imp__kernel_d *derived, imp_v3 w,
+                                          imp_spec bar)
+{
+    const int lanes = s->tracer->scene->lanes;
+    const imp_v3 n = imp__shading_normal(&s->at[k].x);
+    if (imp_unlikely(derived)) return imp__kernel_times(derived, bar, lanes);
+    const double sum = imp__sum_used(bar, lanes);
+    return is_meter(s, k) ? imp__meter_times(s->tracer->sensor, s->at[k].x.n, w, sum)
+                          : imp__lambert_times(n, w, sum);
+}
+
+/* And what it is to the direction to the camera. */
 static struct imp__kernel_bar kernel_bar(struct sweep *s, int k,
                                          const struct imp__kernel_d *derived, imp_v3 w,
                                          imp_spec bar)
 {
-    const int lanes = s->tracer->scene->lanes;
-    if (is_meter(s, k))
-        return imp__meter_times(s->tracer->sensor, s->at[k].x.n, w,
-                                imp__sum_used(bar, lanes));
-    if (!derived)
-        return imp__lambert_times(imp__shading_normal(&s->at[k].x), w,
-                                  imp__sum_used(bar, lanes));
-    struct imp__kernel_bar out = imp__kernel_times(derived, bar, lanes);
+    struct imp__kernel_bar out = kernel_part(s, k, derived, w, bar);
+    if (!derived) return out;
     if (imp_unlikely(s->at[k].floats)) { /* its frame has the axes of the world */
         out.n = (imp_v3){0};
         out.turn = 0;
@@ -195,7 +204,7 @@ static void delta_bar(struct sweep *s, int k, const struct imp_vertex *v)
     if (e->ops->flags & IMP_EMITTER_FAR) {
         const struct imp__kernel_bar far = light_kernel(s, k, v, -at);
         imp__scatter_bar(&s->at[k], &far);
-        imp__light_velocity_bar(s->moves, light, -far.wi, s->theta_bar);
+        imp__light_velocity_bar(s->moves, light, at, -far.wi, s->theta_bar);
         return;
     }
     const imp_v3 r = s->at[k].x.p - at;
@@ -205,13 +214,13 @@ static void delta_bar(struct sweep *s, int k, const struct imp_vertex *v)
         imp__sent_slope(e, d, s->tracer->scene->lanes, v->carried) * weight;
     const imp_v3 turn = slope * (1 / distance);
     /* The light turned by a vector sends along d what it sent along d turned back. */
-    imp__light_axis_bar(s->moves, light, imp__cross(slope, d), s->theta_bar);
+    imp__light_turn_bar(s->moves, light, imp__cross(slope, d), s->theta_bar);
     const struct imp__kernel_bar kernel = light_kernel(s, k, v, r * (-1 / distance));
     const imp_v3 bar =
         imp__point_bar(&s->at[k], at, &kernel, weight, length_bar(s, s->piece[k].light)) -
         turn;
     s->at[k].moved_bar += turn;
-    imp__light_velocity_bar(s->moves, light, bar, s->theta_bar);
+    imp__light_velocity_bar(s->moves, light, at, bar, s->theta_bar);
 }
 
 /* Light from the point y of a lamp that reaches vertex k, along -w. */
@@ -246,6 +255,8 @@ static void light_bar(struct sweep *s, int k, const struct imp_vertex *v)
         const imp_v3 w = imp__normalize(-imp__decided_v3(v->d.light.d));
         const struct imp__kernel_bar kernel = light_kernel(s, k, v, w);
         imp__scatter_bar(&s->at[k], &kernel);
+        imp__light_turn_bar(s->moves, v->d.light.emitter, imp__cross(w, kernel.wi),
+                            s->theta_bar);
         return;
     }
     struct imp__link_point y = imp__surface_point(
@@ -306,6 +317,19 @@ static void met_bar(struct sweep *s, int k, const struct imp_vertex *v, imp_v3 w
     y->bar = (struct imp__velocity){.area = 0};
 }
 
+/* The skies that the step from vertex k along w meets, each a vertex: a light sample could have brought
+ * what they send. */
+static void skies_met_bar(const struct sweep *s, int k, const struct imp_vertex *v,
+                          imp_v3 w, const struct imp__kernel_d *d)
+{
+    for (const struct imp_vertex *y = v->next; y; y = y->next) {
+        if (imp__is_zero(y->e)) continue;
+        const struct imp__kernel_bar met = kernel_part(s, k, d, w, s->piece[k].on * y->e);
+        imp__light_turn_bar(s->moves, y->d.met.emitter, imp__cross(w, met.wi),
+                            s->theta_bar);
+    }
+}
+
 /* The step from vertex k to the next one, which slides along it. */
 static void step_bar(struct sweep *s, int k, const struct imp_vertex *v)
 {
@@ -317,22 +341,14 @@ static void step_bar(struct sweep *s, int k, const struct imp_vertex *v)
         kernel_derive(s, k, v, w, v->d.lobe, &derived) ? &derived : NULL;
     const struct imp__kernel_bar on = kernel_bar(s, k, d, w, piece->step);
     imp__scatter_bar(x, &on);
-    if (next->sky) return;
+    if (next->sky) {
+        if (imp_unlikely(s->moves->skies)) skies_met_bar(s, k, v, w, d);
+        return;
+    }
     next->along += reach_bar(s, k + 1, piece->step);
     x->moved_bar += imp__slide_bar(next, w, NULL);
     if (!imp__is_zero(piece->met)) met_bar(s, k, v, w, d);
     imp__link_velocity_bar(s->moves, next, s->theta_bar);
-}
-
-/* The sky through a fixed film position: the direction d of the ray turns by u(o + d) - u(o). */
-static void sky_seen_bar(const struct sweep *s)
-{
-    const struct imp_sensor_ray *ray = &s->walk->ray;
-    const imp_v3 slope =
-        imp__skies_slope(s->tracer->scene, ray->d, s->seen, s->walk->first->carried);
-    if (imp__is_zero(slope)) return;
-    imp__camera_velocity_bar(s->moves, ray->o, ray->o + ray->d, slope, s->theta_bar);
-    imp__camera_velocity_bar(s->moves, ray->o + ray->d, ray->o, -slope, s->theta_bar);
 }
 
 /* What the camera's ray meets: its vertices up to `front`. */
@@ -341,7 +357,8 @@ static void front_bar(struct sweep *s)
     const struct imp_vertex *v = s->walk->first;
     for (int k = 0; k < s->front; k++) v = v ? v->next : NULL;
     if (v && s->at[s->front].sky) {
-        sky_seen_bar(s);
+        imp__skies_seen_bar(s->moves, &s->walk->ray, s->seen, s->walk->first->carried,
+                            s->theta_bar);
         v = NULL;
     }
     if (v && is_emitted(v))
