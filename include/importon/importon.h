@@ -620,8 +620,8 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *     NAME.position          of a point, spot or ies light: [3], world
  *     NAME.direction         of a directional light or a sun, of a spot's axis or an ies light's
  *                            nadir: [3], of any length
- *     NAME.turn              of an envmap, sunsky, ciesky or perezsky: [3], a rotation vector in
- *                            radians away from what the file says
+ *     NAME.turn              of an envmap, sunsky, ciesky or perezsky, or a distant sensor without a
+ *                            target: [3], a rotation vector in radians away from what the file says
  *
  * An ies light is one without a shape.
  *

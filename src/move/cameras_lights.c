@@ -28,6 +28,8 @@ imp_v3 imp__camera_velocity(const struct imp__moves *moves, imp_v3 eye, imp_v3 p
         if (m->kind == IMP_MOVE_POSE)
             u += imp__move_vector(theta) +
                  imp__cross(imp__move_vector(theta + 3), p - m->centre);
+        else if (m->kind == IMP_MOVE_TURN)
+            u += imp__cross(imp__move_vector(theta), p - m->centre);
         else if (m->kind == IMP_MOVE_AFFINE) u += imp__affine_place(p - m->centre, theta);
         else u += view_velocity(moves, m, eye, p) * theta[0];
     }
@@ -44,6 +46,8 @@ void imp__camera_velocity_bar(const struct imp__moves *moves, imp_v3 eye, imp_v3
             imp__move_vector_bar(theta_bar + m->first, bar);
             imp__move_vector_bar(theta_bar + m->first + 3,
                                  imp__cross(p - m->centre, bar));
+        } else if (m->kind == IMP_MOVE_TURN) {
+            imp__move_vector_bar(theta_bar + m->first, imp__cross(p - m->centre, bar));
         } else if (m->kind == IMP_MOVE_AFFINE) {
             imp__affine_place_bar(p - m->centre, bar, theta_bar + m->first);
         } else {

@@ -23,7 +23,8 @@ void imp__moves_free(struct imp__moves *moves)
 
 static enum imp_status camera_mover(const struct imp__moves *moves, struct imp__mover *m)
 {
-    const bool whole = m->kind == IMP_MOVE_POSE || m->kind == IMP_MOVE_AFFINE;
+    const bool whole = m->kind == IMP_MOVE_POSE || m->kind == IMP_MOVE_AFFINE ||
+                       m->kind == IMP_MOVE_TURN;
     if ((!whole && m->kind < IMP_MOVE_VIEW) ||
         !imp__lens_middle(moves->sensor, &m->centre))
         return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
@@ -31,8 +32,11 @@ static enum imp_status camera_mover(const struct imp__moves *moves, struct imp__
                           "derivative by its pose",
                           moves->sensor->name);
     m->count = m->kind == IMP_MOVE_POSE     ? 6
+               : m->kind == IMP_MOVE_TURN   ? 3
                : m->kind == IMP_MOVE_AFFINE ? IMP_AFFINE_NUMBERS
                                             : 1;
+    /* A distant sensor is about the middle of the scene. */
+    if (m->kind == IMP_MOVE_TURN) m->centre = moves->scene->ball.centre;
     if (whole || moves->sensor->ops->view_velocity || moves->sensor->ops->lens_velocity)
         return IMP_OK;
     return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,

@@ -16,7 +16,8 @@
  *               as little as possible from where the file has its axis, z:
  *                   a x a' - a (z x a).a'/(1 + z.a)
  *     turn      of a sky, a rotation vector: its light from w, a unit vector, comes from where w goes,
- *               V = a x w (3). The direction of a sun, an axis, turns it likewise
+ *               V = a x w (3). The direction of a sun, an axis, turns it likewise. Of a distant sensor
+ *               V = a x (X - c), c the middle of the scene
  *
  * e: a translation in scene units; a: a rotation vector in radians. Velocities are linear in the
  * numbers; each function that applies the map has its transpose beside it. The geometric normal is

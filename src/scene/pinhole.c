@@ -4,6 +4,8 @@
  * meet in none, and begin on a film. */
 #include "pose.h"
 
+extern const struct imp_sensor_ops imp__distant;
+
 /* By the rays through two corners of the film. */
 bool imp__lens_point(const struct imp_sensor *s, const double lens[2], imp_v3 *point)
 {
@@ -29,15 +31,18 @@ bool imp__pinhole(const struct imp_sensor *s, imp_v3 *centre)
     return imp__length(apart) <= 1e-7 * (imp__length(r) + imp__length(elsewhere.o));
 }
 
-/* The middle of the film of parallel rays, where they begin. */
+/* The middle of the film of parallel rays, where they begin. A single ray has no film. */
 static bool film_middle(const struct imp_sensor *s, imp_v3 *centre)
 {
+    const double u[4] = {0.5, 0.5, 0.5, 0.5};
     struct imp_sensor_ray ray;
+    struct imp_sensor_sample back;
     if (!s->ops->connect || !s->ops->move) return false;
-    s->ops->ray(s, s->film.width * 0.5, s->film.height * 0.5, (const double[2]){0.5, 0.5},
-                &ray);
+    s->ops->ray(s, s->film.width * 0.5, s->film.height * 0.5, u, &ray);
     *centre = ray.o;
-    return true;
+    const imp_v3 on =
+        ray.o + ray.d * imp_min(1e-3 * imp__length(ray.o) + 1e-3, ray.t_far / 2);
+    return s->ops != &imp__distant || s->ops->connect(s, &on, false, u, &back);
 }
 
 bool imp__lens_middle(const struct imp_sensor *s, imp_v3 *centre)

@@ -98,6 +98,15 @@ static const struct imp_pose *world_of(const struct imp_pose *object)
     return world && imp__world_is_moved(world) ? world : NULL;
 }
 
+/* The rows of a turn. False: it is none. */
+static bool turn_of(const struct imp_pose *p, double by[12])
+{
+    double R[9];
+    imp__rotation_of(p->number, R);
+    for (int k = 0; k < 12; k++) by[k] = k % 4 == 3 ? 0 : R[3 * (k / 4) + k % 4];
+    return p->number[0] != 0 || p->number[1] != 0 || p->number[2] != 0;
+}
+
 static enum imp_status sensor_apply(const struct imp_pose *p)
 {
     struct imp_sensor *s = p->sensor;
@@ -117,8 +126,11 @@ static enum imp_status sensor_apply(const struct imp_pose *p)
             "the lens of camera '%s' folds its picture with k1, k2, p1, p2, "
             "k3 = %g, %g, %g, %g, %g",
             s->name, number[3], number[4], number[5], number[6], number[7]);
-    const struct imp_pose *world = world_of(p);
+    const struct imp_pose *world = world_of(p),
+                          *turn = imp__pose_beside(p, IMP_POSE_TURN);
     if (world) return imp__world_apply(world);
+    double by[12];
+    if (turn && turn_of(turn, by)) s->ops->move(s, by);
     if (!imp__pose_is_at_start(p)) s->ops->move(s, map_of(p).m);
     return IMP_OK;
 }
@@ -193,13 +205,9 @@ void imp__pose_aim(struct imp_emitter *e, enum imp_pose_kind kind, double v[3])
 
 static void sky_turn(const struct imp_pose *p)
 {
-    double R[9], by[12] = {0};
-    const bool rests = p->number[0] == 0 && p->number[1] == 0 && p->number[2] == 0;
+    double by[12];
     memcpy(p->emitter->self, p->rest, p->rest_size);
-    if (rests) return;
-    imp__rotation_of(p->number, R);
-    for (int k = 0; k < 9; k++) by[4 * (k / 3) + k % 3] = R[k];
-    p->emitter->ops->move(p->emitter, by);
+    if (turn_of(p, by)) p->emitter->ops->move(p->emitter, by);
 }
 
 static enum imp_status light_apply(const struct imp_pose *p)
@@ -261,7 +269,7 @@ double imp__pose_large(const struct imp_pose *p, size_t e)
         return e % 4 == 3 ? 0.1 * scene
                           : 0.3 * hypot(hypot(p->start[e % 4], p->start[4 + e % 4]),
                                         p->start[8 + e % 4]);
-    case IMP_POSE_TURN: return turn_large(p->emitter, 0.5);
+    case IMP_POSE_TURN: return p->emitter ? turn_large(p->emitter, 0.5) : 0.5;
     case IMP_POSE_RIGID: return e < 3 ? 0.1 * scene : 0.5;
     case IMP_POSE_SCALE:
     case IMP_POSE_RADIUS: return 0.3 * p->number[0];

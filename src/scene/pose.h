@@ -18,7 +18,7 @@
  *     NAME.position          of a light at a point, world
  *     NAME.direction         along which parallel light or that of a sun's middle travels, or of a
  *                            spot's axis, of any length
- *     NAME.turn              of a sky: a rotation vector, away from what the file says
+ *     NAME.turn              of a sky or a distant sensor: a rotation vector, away from what the file says
  *
  * R(a): the rotation about a by |a| radians; c: the middle of a shape's box, or of a group's where an
  * instance has it; a camera's own place.

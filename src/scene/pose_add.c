@@ -13,6 +13,7 @@
 #include <string.h>
 
 extern const struct imp_emitter_ops imp__spot_light;
+extern const struct imp_sensor_ops imp__distant;
 
 /* ---- Adding ------------------------------------------------------------------------- */
 
@@ -93,11 +94,17 @@ const char *imp__pose_shape_why(const struct imp_scene *scene, const struct imp_
 const char *imp__pose_sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
                                  imp_v3 *centre)
 {
-    const bool whole = kind == IMP_POSE_RIGID || kind == IMP_POSE_WORLD;
-    if (!whole && !imp__pose_is_view(kind)) return "it is a sensor";
+    const bool whole = kind == IMP_POSE_RIGID || kind == IMP_POSE_WORLD,
+               distant = s->ops == &imp__distant;
+    if (!whole && kind != IMP_POSE_TURN && !imp__pose_is_view(kind))
+        return "it is a sensor";
+    if (distant != (kind == IMP_POSE_TURN))
+        return distant ? "it is far away: it has a turn" : "it is no distant sensor";
     double number[IMP_VIEW_NUMBERS];
     if (!s->ops->move) return "it is no perspective or orthographic camera or thin lens";
-    if (!imp__lens_middle(s, centre)) return "its rays meet in no point";
+    if (!imp__lens_middle(s, centre))
+        return distant ? "it has one ray" : "its rays meet in no point";
+    if (distant) return NULL;
     if (whole) return kind == IMP_POSE_WORLD && !s->ops->placed ? "it has none" : NULL;
     number[kind - IMP_POSE_FOV] = NAN;
     if (!s->ops->view || !s->ops->view(s, number, false))

@@ -83,10 +83,19 @@ static bool connect(const struct imp_sensor *s, const imp_v3 *ref, bool far,
     return true;
 }
 
+static void move(struct imp_sensor *s, const double to_world[12])
+{
+    struct distant *p = s->self;
+    p->frame = (struct imp_frame){imp__rows_vector(to_world, p->frame.s),
+                                  imp__rows_vector(to_world, p->frame.t),
+                                  imp__rows_vector(to_world, p->frame.n)};
+}
+
 const struct imp_sensor_ops imp__distant = {.size = sizeof(struct imp_sensor_ops),
                                             .name = "distant",
                                             .object_size = sizeof(struct distant),
                                             .build = build,
                                             .ray = ray,
                                             .flags = IMP_SENSOR_PARALLEL,
-                                            .connect = connect};
+                                            .connect = connect,
+                                            .move = move};

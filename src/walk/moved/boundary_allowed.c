@@ -6,6 +6,7 @@
 #include "math/warp.h"
 
 extern const struct imp_bsdf_ops imp__twosided;
+extern const struct imp_sensor_ops imp__distant;
 
 /* A light at a point, or parallel light, and a mesh with vertex normals that move against each
  * other: a facet that turns away from it becomes dark all at once. */
@@ -258,10 +259,39 @@ static enum imp_status turns_allowed(const struct imp__boundary *b)
     return IMP_OK;
 }
 
+#define AT_BORDER 1e-6 /* of the scene's size */
+
+/* A distant sensor is a mean over the ball around the scene's box: what moves must not move that. */
+static enum imp_status ball_allowed(const struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    const struct imp_sensor *sensor = b->tracer->sensor;
+    const double near = AT_BORDER * b->size;
+    for (const struct imp_pose *p = sensor->ops == &imp__distant ? scene->poses : NULL; p;
+         p = p->next) {
+        imp_v3 lo, hi;
+        bool inside = true;
+        const int shape = p->instance >= 0 ? IMP_MOVE_INSTANCE(p->instance) : p->shape;
+        if (!imp__pose_box(p, &lo, &hi) || !imp__moves_shape(b->moves, shape, NULL))
+            continue;
+        for (int i = 0; i < 3; i++)
+            inside &= lo[i] > scene->lo[i] + near && hi[i] < scene->hi[i] - near;
+        if (!inside)
+            return imp__error(
+                scene->ctx, IMP_E_UNSUPPORTED,
+                "derivatives by what moves: %s is at the border of the scene, and "
+                "sensor '%s' (%s) is a mean over the ball around that, which would move "
+                "(something larger around it may stay)",
+                scene->params[p->param].info.name, sensor->name, sensor->ops->name);
+    }
+    return IMP_OK;
+}
+
 enum imp_status imp__boundary_allowed(const struct imp__boundary *b)
 {
     enum imp_status st = edges_allowed(b);
     if (st == IMP_OK) st = turns_allowed(b);
+    if (st == IMP_OK) st = ball_allowed(b);
     if (st == IMP_OK) st = facets_allowed(b);
     if (st == IMP_OK) st = camera_allowed(b);
     return st;
