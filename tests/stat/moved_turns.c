@@ -45,6 +45,34 @@ static void opposite_test(const char *what, const char *xml, const char *number)
     imp_scene_destroy(scene);
 }
 
+/* ---- Transposes ----------------------------------------------------------------------------------- */
+
+/* theta_bar.theta is bar.V of the light, or of the camera, for any of them. */
+static void transposed_test(const char *what, imp_scene *scene, const char *name)
+{
+    struct imp__moves moves = imp__moves_begin(scene, scene->sensors[0]);
+    double theta[12], bar[12] = {0}, sum[2] = {0};
+    test_must(ctx, imp_scene_add_geometry(scene, name));
+    test_must(ctx, imp__moves_add_pose(&moves, scene->poses));
+    const imp_v3 p = imp__normalize(imp__v3(.3, -.8, .5)), v = imp__v3(1.2, .7, -.4),
+                 eye = imp__v3(.1, .2, .3);
+    for (size_t k = 0; k < moves.n; k++) theta[k] = cos(1.7 * (double)k + .4);
+    if (scene->poses->sensor) {
+        sum[0] = imp__dot(v, imp__camera_velocity(&moves, eye, p, theta));
+        imp__camera_velocity_bar(&moves, eye, p, v, bar);
+    } else {
+        int k = 0;
+        while (scene->emitters[k] != scene->poses->emitter) k++;
+        sum[0] = imp__dot(v, imp__light_velocity(&moves, k, p, theta));
+        imp__light_velocity_bar(&moves, k, p, v, bar);
+    }
+    for (size_t k = 0; k < moves.n; k++) sum[1] += bar[k] * theta[k];
+    tap_ok(fabs(sum[0] - sum[1]) < 1e-12 && fabs(sum[0]) > 1e-3,
+           "%s and its transpose # %.6g off %.1e", what, sum[0], sum[0] - sum[1]);
+    imp__moves_free(&moves);
+    imp_scene_destroy(scene);
+}
+
 /* ---- Closed form -------------------------------------------------------------------------------- */
 
 /* A sun of the angular radius a, above a plane's horizon in whole, brings it pi L sin^2(a) n.w. */
@@ -169,6 +197,11 @@ int main(int argc, char **argv)
                   "sun.direction");
     numbers_compare("a clear sky alone", test_scene_text(ctx, ALONE(SKY_CLEAR), IMP_MONO),
                     32 * more, 64 * more, .06, alone);
+    transposed_test("the turn of a sky", sky_field(SKY_CIE), "sky.turn");
+    transposed_test("the direction of a sun", sky_field(SKY_SUN), "sun.direction");
+    transposed_test("the matrix of a camera", sky_field(SKY_SUN), "camera.to_world");
+    transposed_test("the matrix of a spot", sky_field("<emitter type='spot' id='spot'/>"),
+                    "spot.to_world");
     elevation_test();
     rotation_test();
     numbers_compare("a map", sky_field(SKY_PATH SKY_ENVMAP), 32 * more, 64 * more, .06,

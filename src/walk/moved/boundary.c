@@ -218,7 +218,7 @@ double imp__flux_velocity(const struct imp__moves *moves, const struct imp__flux
         struct imp__velocity v = {.area = 0};
         if (e->camera) v.v = imp__camera_velocity(moves, e->eye, e->x.p, theta_dot);
         else if (e->light)
-            v.v = v.v = imp__light_velocity(moves, e->light - 1, e->x.p, theta_dot);
+            v.v = imp__light_velocity(moves, e->light - 1, e->x.p, theta_dot);
         else v = imp__velocity_of(moves, &e->x, theta_dot);
         sum += velocity_times(&e->x, &e->bar, &v);
     }
