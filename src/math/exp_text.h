@@ -20,7 +20,7 @@ static inline real WIDE(imp__exp)(real x)
     const real c = (1. / 3628800 + r * (1. / 39916800)) +
                    z * (1. / 479001600 + r * (1. / 6227020800));
     const real e = 1 + (r + z * ((a + z2 * b) + z4 * c));
-    const real power = real_of(exponent(whole_of(t) - whole_of(shift) + 1023));
+    const real power = power_of(whole_of(t), whole_of(shift));
     const real least = choose(x < -708, number(0), e * power);
     return choose(x > 709, number(INFINITY), least);
 }

@@ -10,7 +10,7 @@
  *     #include "math/lane_text.h"      (imp__conductor_4, of four imp_real_4)
  *
  * Lane i of a result has the bits that the text for one number gives for lane i of its arguments:
- * there are sums, products, quotients and roots alone, and no branches. */
+ * there are sums, products, quotients, roots and bits of numbers alone, and no branches. */
 #include "reals.h"
 
 #ifndef IMP_WIDE_JOIN
@@ -26,6 +26,7 @@
 #define whole_of   WIDE(imp__whole_of)
 #define real_of    WIDE(imp__real_of)
 #define exponent   WIDE(imp__exponent)
+#define power_of   WIDE(imp__power)
 #define choose     WIDE(imp__choose)
 #define root_of    WIDE(imp__root)
 #define larger     WIDE(imp__larger)
@@ -49,6 +50,7 @@
 #undef whole_of
 #undef real_of
 #undef exponent
+#undef power_of
 #undef choose
 #undef root_of
 #undef larger

@@ -39,6 +39,20 @@ static inline imp_whole_4 imp__whole_of_4(imp_real_4 x) { return (imp_whole_4)x;
 static inline imp_real_4 imp__real_of_4(imp_whole_4 bits) { return (imp_real_4)bits; }
 static inline imp_whole_8 imp__whole_of_8(imp_real_8 x) { return (imp_whole_8)x; }
 static inline imp_real_8 imp__real_of_8(imp_whole_8 bits) { return (imp_real_8)bits; }
+/* 2^(a - b) of bits that count ones. */
+static inline double imp__power_1(imp_whole_1 a, imp_whole_1 b)
+{
+    return imp__real_of_1((imp_whole_1)(((uint64_t)a - (uint64_t)b + 1023) << 52));
+}
+static inline imp_real_4 imp__power_4(imp_whole_4 a, imp_whole_4 b)
+{
+    return (imp_real_4)((a - b + 1023) << 52);
+}
+static inline imp_real_8 imp__power_8(imp_whole_8 a, imp_whole_8 b)
+{
+    return (imp_real_8)((a - b + 1023) << 52);
+}
+
 /* k 2^52: as bits, an exponent. */
 static inline imp_whole_1 imp__exponent_1(imp_whole_1 k)
 {

@@ -138,6 +138,7 @@ struct imp_scene {
     struct imp_medium **media; /* those that scatter */
     bool media_open;           /* some lie in others that their shapes do not name */
     bool *sealed; /* [n_media] no light sample leaves it (sealed.h); NULL: no media */
+    bool *closed; /* [n_all_shapes] bounds a medium, and is closed; with `sealed` */
     struct imp_priorities *priorities; /* NULL: no shape has one */
     struct imp_bsdf *default_bsdf, *black_bsdf;
     const struct imp_integrator *integrator; /* NULL: none was written */

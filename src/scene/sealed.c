@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Which media are sealed (sealed.h). A surface is closed where each of its edges is passed in both
- * directions equally often. A line from a light, around which it winds 0 times, then passes it
- * before it reaches a point around which it winds once, and walks are dropped where the side of a
- * boundary that they meet is not the one of their medium (tracking.c), so that all points where
- * they collide are such. */
+ * directions equally often. Around points outside of its box it winds 0 times, around points that its
+ * outward normals have behind them once: a line between the two passes it. Collisions in the medium
+ * behind it lie at such points, since walks are dropped where the side of a boundary that they meet is
+ * not the one of their medium (tracking.c). */
 #include "sealed.h"
 #include "math/rng.h"
 #include "scene_build.h"
@@ -48,10 +48,23 @@ static bool is_closed_mesh(const struct imp_triangles *m)
     return sum == 0;
 }
 
+/* Are the sphere's normals outward? By a ray from its middle. */
+static bool is_outward_sphere(const struct imp_shape *s)
+{
+    const imp_v3 o = (s->lo + s->hi) * 0.5, d = {0, 0, 1, 0};
+    struct imp_surface at;
+    struct imp_hit hit;
+    if (!s->ops->intersect(s, &o, &d, 0, INFINITY, &hit)) return false;
+    s->ops->surface(s, &hit, &o, &d, &at);
+    return at.ng[2] > 0;
+}
+
+/* Closed, with normals that point outwards. */
 static bool is_closed(const struct imp_shape *s)
 {
-    return s->ops == &imp__sphere ||
-           (s->geometry == IMP_TRIANGLES && is_closed_mesh(&s->triangles));
+    if (s->ops == &imp__sphere) return is_outward_sphere(s);
+    return s->geometry == IMP_TRIANGLES && s->triangles.volume > 0 &&
+           is_closed_mesh(&s->triangles);
 }
 
 /* ---- Lights outside ------------------------------------------------------------------- */
@@ -67,7 +80,7 @@ static bool is_outside(const struct imp_emitter *e, const struct imp_shape *s)
 {
     if (e->shape) return apart(e->shape->lo, e->shape->hi, s);
     if (e->ops->flags & (IMP_EMITTER_ENVIRONMENT | IMP_EMITTER_FAR)) return true;
-    /* A light at a point says where that is to whoever asks for a sample. */
+    /* A sample of a light at a point has its place. */
     const imp_v3 ref = (s->lo + s->hi) * 0.5;
     const double u[2] = {0.5, 0.5};
     struct imp_light_sample there;
@@ -88,7 +101,7 @@ static bool is_bound(const struct imp_scene *scene, const struct imp_medium *m)
         if (b->straight || b->flags & IMP_BSDF_NULL || s->emitter >= 0) return false;
         for (int e = 0; e < scene->n_emitters; e++)
             if (!is_outside(scene->emitters[e], s)) return false;
-        if (!is_closed(s)) return false;
+        if (!scene->closed[k]) return false;
         any = true;
     }
     for (int k = 0; k < scene->n_sensors; k++)
@@ -107,7 +120,12 @@ enum imp_status imp__sealed_create(struct imp_scene *scene)
 {
     if (scene->n_media == 0) return IMP_OK;
     scene->sealed = imp__arena_array(&scene->arena, (size_t)scene->n_media, sizeof(bool));
-    if (!scene->sealed) return imp__build_no_memory(scene);
+    scene->closed =
+        imp__arena_array(&scene->arena, (size_t)scene->n_all_shapes + 1, sizeof(bool));
+    if (!scene->sealed || !scene->closed) return imp__build_no_memory(scene);
+    /* A shape that bounds a medium has no pose: it stays as it is. */
+    for (int k = 0; k < scene->n_all_shapes; k++)
+        scene->closed[k] = scene->shapes[k]->interior && is_closed(scene->shapes[k]);
     imp__sealed_renew(scene);
     return IMP_OK;
 }

@@ -167,10 +167,55 @@ static void all_kinds(void)
     unlink(path);
 }
 
+/* One material on many shapes, of which one has textures by triangle: a mesh with an attribute. */
+static void by_triangle(void)
+{
+    static char path[64], rest[16384];
+    strcpy(path, "/tmp/imp_bundles_XXXXXX");
+    const int fd = mkstemp(path), n = 12;
+    FILE *f = fd >= 0 ? fdopen(fd, "w") : NULL;
+    if (!f) {
+        tap_ok(false, "a file for a mesh");
+        return;
+    }
+    fprintf(
+        f, "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+           "property float z\nproperty float u\nproperty float v\nproperty float r\n"
+           "property float g\nproperty float b\nelement face 2\n"
+           "property list uchar int vertex_indices\nend_header\n");
+    for (int k = 0; k < 4; k++)
+        fprintf(f, "%g %g 0 %d %d 1 .5 .2\n", k % 2 ? .3 : -.3, k / 2 ? .3 : -.3, k % 2,
+                k / 2);
+    fprintf(f, "3 0 1 3\n3 0 3 2\n");
+    fclose(f);
+    size_t at = (size_t)snprintf(
+        rest, sizeof rest,
+        SKY LAMP("0", "0",
+                 ".5") "<bsdf type='diffuse' id='squares'><texture "
+                       "type='checkerboard' name='reflectance'><transform "
+                       "name='to_uv'><scale value='9'/></transform></texture></bsdf>");
+    for (int k = 0; k < n * n; k++) {
+        const double x = 3.6 * (k % n + .5) / n - 1.8, y = 3.6 * (k / n + .5) / n - 1.8;
+        char file[128];
+        snprintf(file, sizeof file,
+                 "<shape type='ply'><string name='filename' value='%s'/>", path);
+        at += (size_t)snprintf(
+            rest + at, sizeof rest - at,
+            "%s<transform name='to_world'><scale value='%g'/><rotate x='1' angle='%d'/>"
+            "<translate x='%.3g' y='%.3g'/></transform><ref id='squares'/></shape>",
+            k % 4 == 1 ? file : "<shape type='rectangle'>", k % 4 == 1 ? .45 : .14,
+            (k * 37) % 120 - 60, x, y);
+        if (at + 512 > sizeof rest) break;
+    }
+    compare("one texture on many shapes", IMP_RGB, -1, PATH(DEPTH("6")), CAMERA, rest);
+    unlink(path);
+}
+
 int main(void)
 {
     ctx = test_context(1);
     materials();
+    by_triangle();
     ideal();
     bitmaps();
     all_kinds();

@@ -60,6 +60,15 @@ static void kinds(void)
         {"rough glass",
          "<shape type='sphere'><bsdf type='roughdielectric'/>" IN "</shape>" LAMP("3"),
          true},
+        {"milk around a bubble with the camera",
+         "<shape type='sphere'><boolean name='flip_normals' value='true'/>"
+         "<float name='radius' value='20'/>" GLASS "</shape>" LAMP("30"),
+         false},
+        {"the same of a cube",
+         "<shape type='cube'><boolean name='flip_normals' value='true'/>"
+         "<transform name='to_world'><scale value='20'/></transform>" GLASS
+         "</shape>" LAMP("30"),
+         false},
         {"a lamp inside", "<shape type='sphere'>" GLASS "</shape>" LAMP(".1"), false},
         {"a lamp in its box", "<shape type='sphere'>" GLASS "</shape>" LAMP("1.1"),
          false},

@@ -100,7 +100,9 @@ static void few_vertices(struct imp_depth *d, struct imp_by_shape *s, int n)
             continue;
         }
         imp__shape_bin(tracer, d->hits->shape[order[0]], &bin);
-        bin.surface = NULL; /* they are on several shapes */
+        bin.surface = NULL;             /* they are on several shapes, */
+        for (int i = 0; i < count; i++) /* of which some have textures by triangle */
+            bin.texels &= !tracer->scene->shapes[d->hits->shape[order[i]]]->by_triangle;
         in_lanes(d, &bin, order, count);
     }
 }

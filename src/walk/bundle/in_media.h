@@ -2,7 +2,7 @@
  *
  * Bundles in media (walk/media/tracking.h, of walks alone): values of walks through media whose
  * extinction is uniform. A segment takes rays through the boundaries on their way to a collision or a
- * surface, leg by leg: rays in columns, free paths and transmittances in lanes, boundaries one by one.
+ * surface, stretch by stretch: rays in columns, free paths and transmittances in lanes, boundaries one by one.
  * Shadow rays go likewise. Collisions are vertices like others, in lanes where the phase function is. */
 #ifndef IMP_WALK_BUNDLE_IN_MEDIA_H
 #define IMP_WALK_BUNDLE_IN_MEDIA_H
@@ -12,20 +12,20 @@
 /* What hit columns have in place of a shape, besides -1. */
 enum { IMP_HIT_COLLISION = -2, IMP_HIT_DROPPED = -3 };
 
-/* A bundle's room for legs; columns have a row for each ray. */
+/* A bundle's room for stretches; columns have a row for each ray. */
 struct imp_in_media {
     int n_lanes;      /* colours that have numbers of their own */
     double *sigma[3]; /* [n_media] */
     int32_t *
         here; /* medium that the vertex lies in, or is reached from; -1: none. The point of a
                          collision stands in t, u and v of the hit */
-    /* While legs go on: */
+    /* While stretches go on: */
     double *start[3], *base, *near, *far, *tmax, *path, *f[3];
     int32_t *medium;
     uint32_t *number; /* of random numbers used */
     bool *crossed;
     int32_t *active, *flying, *going; /* rays */
-    struct imp_ray_columns legs;
+    struct imp_ray_columns ahead;
     struct imp_hit_columns met;
 };
 

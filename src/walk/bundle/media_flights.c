@@ -49,19 +49,19 @@ struct imp_in_media *imp__in_media_create(const struct imp_tracer *tracer,
     x->n_lanes = scene->channels;
     for (int c = 0; c < 3; c++) {
         x->sigma[c] = imp__arena_take(arena, (size_t)scene->n_media + 1, sizeof(double));
-        if (!x->sigma[c] || !TAKE(x->start[c]) || !TAKE(x->f[c]) || !TAKE(x->legs.o[c]) ||
-            !TAKE(x->legs.d[c]))
+        if (!x->sigma[c] || !TAKE(x->start[c]) || !TAKE(x->f[c]) ||
+            !TAKE(x->ahead.o[c]) || !TAKE(x->ahead.d[c]))
             return NULL;
     }
     if (!TAKE(x->here) || !TAKE(x->base) || !TAKE(x->near) || !TAKE(x->far) ||
         !TAKE(x->tmax) || !TAKE(x->path) || !TAKE(x->medium) || !TAKE(x->number) ||
         !TAKE(x->crossed) || !TAKE(x->active) || !TAKE(x->flying) || !TAKE(x->going) ||
-        !TAKE(x->legs.far) || !imp__hits_create(arena, n, &x->met))
+        !TAKE(x->ahead.far) || !imp__hits_create(arena, n, &x->met))
         return NULL;
-    x->legs.near = NULL;
-    x->legs.time = NULL;
-    x->legs.instant = tracer->sensor->open;
-    if (tracer->sensor->close > tracer->sensor->open && !TAKE(x->legs.time)) return NULL;
+    x->ahead.near = NULL;
+    x->ahead.time = NULL;
+    x->ahead.instant = tracer->sensor->open;
+    if (tracer->sensor->close > tracer->sensor->open && !TAKE(x->ahead.time)) return NULL;
     for (int m = 0; m < scene->n_media; m++) {
         imp_spec in[IMP_INPUTS_MAX];
         const imp_spec sigma = imp__extinction_at(scene->media[m], nowhere, NULL, in);
@@ -172,7 +172,7 @@ static void fly(struct imp_depth *d, const int32_t *list, int n)
     }
 }
 
-/* What the way was, to throughput, colours (lane_mis.c) and the vertex before. */
+/* Transmittance of the whole way, to throughput, colours (lane_mis.c) and the vertex before. */
 static void pass(struct imp_depth *d, const struct imp_bundle_values *before,
                  const int32_t *list, int n)
 {
@@ -212,24 +212,24 @@ static void pass(struct imp_depth *d, const struct imp_bundle_values *before,
     }
 }
 
-/* ---- Legs -------------------------------------------------------------------------------- */
+/* ---- Stretches -------------------------------------------------------------------------------- */
 
-/* Rays list[n] to the next surfaces, of which the first leg's search has been made. */
-static void legs_meet(struct imp_depth *d, const int32_t *list, int n)
+/* Rays list[n] to the next surfaces, of which the first search has been made. */
+static void stretches_meet(struct imp_depth *d, const int32_t *list, int n)
 {
     struct imp_in_media *x = d->media;
     const struct imp_ray_columns *rays = &d->rays->ray;
     const struct imp_hit_columns *hits = d->hits;
     for (int k = 0; k < n; k++) {
         for (int c = 0; c < 3; c++) {
-            x->legs.o[c][k] = rays->o[c][list[k]];
-            x->legs.d[c][k] = rays->d[c][list[k]];
+            x->ahead.o[c][k] = rays->o[c][list[k]];
+            x->ahead.d[c][k] = rays->d[c][list[k]];
         }
-        x->legs.far[k] = rays->far[list[k]];
-        if (x->legs.time) x->legs.time[k] = rays->time[list[k]];
+        x->ahead.far[k] = rays->far[list[k]];
+        if (x->ahead.time) x->ahead.time[k] = rays->time[list[k]];
     }
-    x->legs.n = n;
-    imp__intersect_columns(d->bundle->tracer->scene, &x->legs, &x->met);
+    x->ahead.n = n;
+    imp__intersect_columns(d->bundle->tracer->scene, &x->ahead, &x->met);
     for (int k = 0; k < n; k++) {
         const int i = list[k];
         hits->t[i] = x->met.t[k];
@@ -308,8 +308,8 @@ static void begin(struct imp_depth *d)
     }
 }
 
-/* One leg of the rays active[n]; those that go on are in x->active. Their number. */
-static int leg(struct imp_depth *d, int n, int passed)
+/* One stretch of the rays active[n]; those that go on are in x->active. Their number. */
+static int stretch(struct imp_depth *d, int n, int passed)
 {
     struct imp_in_media *x = d->media;
     const struct imp_hit_columns *hits = d->hits;
@@ -319,7 +319,7 @@ static int leg(struct imp_depth *d, int n, int passed)
     paths_draw(d, x->flying, in_medium);
     if (passed == 0)
         imp__intersect_columns(d->bundle->tracer->scene, &d->rays->ray, d->hits);
-    else legs_meet(d, x->active, n);
+    else stretches_meet(d, x->active, n);
 
     in_medium = 0;
     for (int k = 0; k < n; k++) {
@@ -342,7 +342,9 @@ void imp__media_meet(struct imp_depth *d, const struct imp_bundle_values *before
     struct imp_in_media *x = d->media;
     int n = d->rays->ray.n, crossed = 0;
     begin(d);
-    for (int passed = 0; n > 0; passed++) n = leg(d, n, passed);
+    for (int passed = 0; n > 0; passed++) n = stretch(d, n, passed);
+    for (int i = 0; i < d->rays->ray.n; i++) /* or dropped on the way to a light */
+        if (d->bundle->dropped[d->rays->walk[i]]) d->hits->shape[i] = IMP_HIT_DROPPED;
     for (int i = 0; i < d->rays->ray.n; i++)
         if (x->crossed[i] && d->hits->shape[i] != IMP_HIT_DROPPED)
             x->flying[crossed++] = i;

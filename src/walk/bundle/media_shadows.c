@@ -70,7 +70,7 @@ static void hide(struct imp_depth *d, int i)
     for (int c = 0; c < 3; c++) d->values->b[c][at] = 0;
 }
 
-/* Ray i, leg k, behind the null surface that it has met. True: it goes on. */
+/* Ray i, number k, behind the null surface that it has met. True: it goes on. */
 static bool passes(struct imp_depth *d, int i, int k, int passed)
 {
     struct imp_in_media *x = d->media;
@@ -100,7 +100,7 @@ static bool passes(struct imp_depth *d, int i, int k, int passed)
     return false;
 }
 
-static int leg(struct imp_depth *d, int n, int passed)
+static int stretch(struct imp_depth *d, int n, int passed)
 {
     struct imp_in_media *x = d->media;
     const struct imp_scene *scene = d->bundle->tracer->scene;
@@ -109,14 +109,14 @@ static int leg(struct imp_depth *d, int n, int passed)
     for (int k = 0; k < n; k++) {
         const int i = x->active[k];
         for (int c = 0; c < 3; c++) {
-            x->legs.o[c][k] = rays->o[c][i];
-            x->legs.d[c][k] = rays->d[c][i];
+            x->ahead.o[c][k] = rays->o[c][i];
+            x->ahead.d[c][k] = rays->d[c][i];
         }
-        x->legs.far[k] = x->tmax[i] - x->base[i];
-        if (x->legs.time) x->legs.time[k] = rays->time[i];
+        x->ahead.far[k] = x->tmax[i] - x->base[i];
+        if (x->ahead.time) x->ahead.time[k] = rays->time[i];
     }
-    x->legs.n = n;
-    imp__intersect_columns(scene, &x->legs, &x->met);
+    x->ahead.n = n;
+    imp__intersect_columns(scene, &x->ahead, &x->met);
     for (int k = 0; k < n; k++) {
         const int i = x->active[k], shape = x->met.shape[k];
         x->far[i] = shape >= 0 ? x->base[i] + x->met.t[k] : x->tmax[i];
@@ -141,6 +141,6 @@ void imp__media_see(struct imp_depth *d)
 {
     int n = d->shadows->ray.n;
     begin(d);
-    for (int passed = 0; n > 0; passed++) n = leg(d, n, passed);
+    for (int passed = 0; n > 0; passed++) n = stretch(d, n, passed);
     d->shadows->ray.n = 0;
 }

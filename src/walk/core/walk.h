@@ -445,7 +445,8 @@ static inline void imp__walk_sweep(const struct imp_tracer *tracer,
         imp__gain_sweep(tracer, walk, adjoint, sink);
 }
 
-/* ... and for another adjoint into a second sink, with each derivative computed once. */
+/* ... and for another adjoint into a second sink. Derivatives of kernels and emitters are computed
+ * once for both, where the first adjoint is nowhere 0 alone. */
 void imp__walk_sweep_both(const struct imp_tracer *tracer, const struct imp_walk *walk,
                           imp_spec adjoint, imp_spec other, struct imp_sink *sink,
                           struct imp_sink *second);

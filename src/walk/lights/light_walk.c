@@ -345,5 +345,5 @@ bool imp__light_walks_trace(const struct imp_tracer *tracer, struct imp_arena *a
         t.n_going = next;
     }
     for (int k = 0; k < n; k++) imp__light_walk_close(tracer, &out[k]);
-    return true;
+    return !arena->failed;
 }

@@ -86,7 +86,7 @@ double imp__flight_reach(struct imp_free_flight *w, const struct imp_medium *m,
     const double mine = w->sigma[imp__lane_mis_drew(w->s)], sum = sigma_sum(w, w->sigma);
     if (!(mine > 0)) return INFINITY;
     double length = w->path / mine;
-    /* A derivative asks whether the stretch is deep, too. */
+    /* The form of a derivative depends on whether the stretch is deep, too. */
     if (w->s->recorded || w->s->probing) {
         if (!open_is_fixed(w, sum)) return INFINITY;
         length = imp_max(length, depth_least(w) / sum);

@@ -40,10 +40,10 @@ struct imp_free_flight imp__flight_from(struct imp_step *s, imp_v3 o, imp_v3 d,
                                         int stream);
 /* Keep an event where the walk is recorded. False: no memory. */
 bool imp__flight_event(struct imp_free_flight *w, struct imp_event e);
+#define IMP_REACH_SLACK 1e-5 /* of a distance; that of float is 6e-8 */
 /* How far from the start a surface can lie and change the flight through m from near on, with
  * room for the rounding of rays; INFINITY: any distance. It looks at the number that imp__fly then
  * has, so that a ray need not look behind the collision. */
-#define IMP_REACH_SLACK 1e-5 /* of a distance; that of float is 6e-8 */
 double imp__flight_reach(struct imp_free_flight *w, const struct imp_medium *m,
                          double near);
 /* From near to far in a medium; true: a collision at *t. */
