@@ -119,7 +119,7 @@ static void vector_add(const struct setting *o, const struct imp_run *run, struc
 {
     const size_t n = imp_problem_n_variables(o->problem);
     double *g = zeros(2 * n, sizeof *g), *se = g + n;
-    struct imp_estimate e = {0, 0, 0};
+    struct imp_estimate e = {0};
     if (o->job == LOSS) must(imp_problem_objective(o->problem, NULL, run, &e, g, se));
     else if (o->job == READ)
         must(imp_problem_functional(o->problem, NULL, run, &e, n ? g : NULL,

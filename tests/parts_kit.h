@@ -199,7 +199,7 @@ static enum imp_status job_run(imp_context *ctx, imp_scene *s, enum job job,
     struct imp_run run = IMP_RUN_INIT;
     enum imp_status st;
     imp_film *film = NULL, *films[3] = {0};
-    struct imp_estimate e = {0, 0, 0};
+    struct imp_estimate e = {0};
     run.seed = seed;
     run.points = points;
     memset(r, 0, sizeof *r);

@@ -49,7 +49,7 @@ static inline enum imp_status toy_eval(const double *x, uint64_t seed,
             g_se[k] += t->mc * t->mc * t->A[p][k] * t->A[p][k];
     }
     for (int k = 0; g_se && k < TOY_N; k++) g_se[k] = sqrt(g_se[k]);
-    *f = (struct imp_estimate){value, sqrt(var), 0};
+    *f = (struct imp_estimate){.value = value, .se = sqrt(var)};
     return IMP_OK;
 }
 

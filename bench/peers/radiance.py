@@ -6,7 +6,7 @@
 FOLDER has oconv and rtrace (`pip install pyradiance` brings them, in pyradiance/bin); without them the script
 skips with 77. Rooms are made by a generator with a seed: 10 m x 8 m x 3 m, reflectance .5, four luminous
 squares below the ceiling, and boxes of any rotation below .7 m, N polygons in all. The grid has 10 x 10 points
-at .75 m. Light is direct and reflected up to five times in both. The reference is a long run of `importon read`.
+at .75 m. Light is direct and reflected up to five times in both (max_depth 6, -ab 5). The reference is a long run of `importon read`.
 For each program the samples (read: --spp; rtrace: -ad, interpolated with -aa .15 -ar 128) are doubled until the
 largest relative error of the 100 points (with --rms: the root of their mean square), a geometric mean over the rooms,
 is below 2 %; samples and processor seconds, start included, are those for 2 %, on the line through the last two
@@ -85,7 +85,7 @@ def importon_scene(folder, faces):
         for k in range(len(faces)):
             f.write("f %d %d %d %d\n" % tuple(4 * k + c for c in (1, 2, 3, 4)))
     grey = '<bsdf type="diffuse"><rgb name="reflectance" value=".5"/></bsdf>'
-    text = ['<scene version="3.0.0"><integrator type="path"><integer name="max_depth" value="7"/></integrator>',
+    text = ['<scene version="3.0.0"><integrator type="path"><integer name="max_depth" value="6"/></integrator>',
             '<shape type="obj"><string name="filename" value="room.obj"/><boolean name="face_normals" value="true"/>'
             '<bsdf type="twosided">%s</bsdf></shape>' % grey]
     for x, y in LAMPS:

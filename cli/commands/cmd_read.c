@@ -152,7 +152,7 @@ static int number_read(imp_problem *problem, struct json *j, struct imp_run run,
     const size_t n = n_blocks ? imp_problem_n_variables(problem) : 0;
     struct reading r = {.grad = n ? cli_alloc(n, sizeof(double)) : NULL,
                         .se = n ? cli_alloc(n, sizeof(double)) : NULL};
-    struct imp_estimate other = {0, 0, 0};
+    struct imp_estimate other = {0};
     int rc = 0;
     if (o.ends) run.from = IMP_FROM_SENSOR;
     enum imp_status st =
@@ -182,7 +182,8 @@ static int pixel_read(struct imp_run run, int n, struct imp_estimate *out)
     const enum imp_status st = imp_render(cli.scene, &run, &film);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
     for (int c = 0; c < n; c++)
-        out[c] = (struct imp_estimate){imp_film_mean(film)[c], imp_film_se(film)[c], 0};
+        out[c] = (struct imp_estimate){.value = imp_film_mean(film)[c],
+                                       .se = imp_film_se(film)[c]};
     imp_film_destroy(film);
     return 0;
 }
@@ -253,7 +254,7 @@ static int shares_read(struct json *j, const struct imp_run *run, struct finding
         free(share);
         return cli_fail(st, cli.scene_path);
     }
-    number_print(j, &info, "Y", reading, (struct imp_estimate){0, 0, 0}, found);
+    number_print(j, &info, "Y", reading, (struct imp_estimate){0}, found);
     if (cli.json) json_array(j, "shares");
     for (size_t k = 0; k < n; k++) {
         const struct imp_share *s = &share[k];

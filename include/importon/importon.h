@@ -957,6 +957,7 @@ typedef struct imp_problem imp_problem;
 struct imp_estimate {
     double value, se;
     int bias_order; /**< 0: no bias; 1: O(1/N), 2: O(1/N^2) in the samples per pixel */
+    int freedom;    /**< degrees of freedom of se; 0: not said */
 };
 
 /** Nothing is active until imp_problem_activate. The scene must outlive the problem, and

@@ -51,9 +51,9 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_grid_cells(const imp_scene *scene, in
  * of the colours' errors by their weights; pixel format luminance has the error itself.
  * @param run      its sensor, end, seed and spp; NULL for defaults.
  * @param[out] value [height][width] of the crop window, in the sensor's unit.
- * @param[out] se    [height][width], one standard error each.
- * @param[out] average the mean of all, with its own error: light walks reach many pixels,
- *                  whose errors are not independent.
+ * @param[out] se    [height][width], one standard error each. Neighbours share what walks from the
+ *                  sensor meet, and light walks reach many pixels: errors are not independent.
+ * @param[out] average the mean of all, with its own error.
  * @param[out] sets  [1] independent sets of samples of a pixel from which the errors come, for
  *                   imp_grid_summarise; may be NULL.
  * @return IMP_OK; IMP_E_ARG; IMP_E_UNSUPPORTED for films of response curves or of XYZ, and

@@ -94,7 +94,7 @@ static enum imp_status goal_eval(const double *x, uint64_t seed, struct imp_esti
     f->rays_done += (double)f->b->n;
     f->last_value = value;
     if (value < f->best_value) f->best_value = value;
-    *e = (struct imp_estimate){value, 0, 0};
+    *e = (struct imp_estimate){.value = value, .se = 0};
     for (size_t k = 0; g && k < f->goal.n; k++) g[k] = f->bar[f->at[k]];
     for (size_t k = 0; g_se && k < f->goal.n; k++) g_se[k] = 0;
     return IMP_OK;

@@ -195,7 +195,8 @@ enum imp_status imp__lbfgs(const struct imp__goal *goal,
         for (size_t k = 0; k < n; k++)
             moved = fmax(moved, fabs(s->array[X][k] - s->x[k]) / goal->scale[k]);
         memcpy(s->x, s->array[X], n * sizeof(double));
-        IMP_TRY(imp__search_log(s, (struct imp_estimate){s->scalar[VALUE], 0, 0}, s->x));
+        IMP_TRY(imp__search_log(
+            s, (struct imp_estimate){.value = s->scalar[VALUE], .se = 0}, s->x));
         if (moved < options->tolerance) {
             imp__search_finish(s, IMP_FINISH_STEPS);
         }

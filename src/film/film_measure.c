@@ -152,10 +152,33 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
     return st;
 }
 
+/* A sample is one walk. */
+static bool is_one(const struct imp_measure *m)
+{
+    return m->integrator && !imp__channels_of(m->scene->integrator);
+}
+
+enum imp_status imp__measure_together(struct imp_measure *m)
+{
+    struct names names = {.text.ctx = m->scene->ctx};
+    if (!is_one(m) || m->run->preview || !imp__reuse_fits(&m->tracer)) return IMP_OK;
+    for (int half = 0; half < 2; half++)
+        names_add(&names, half > 0 ? "alone." : "", "", m->names);
+    if (names.text.failed) {
+        imp__bytes_free(m->scene->ctx, &names.text.bytes);
+        return imp__error(m->scene->ctx, IMP_E_NOMEM, "no memory for channels");
+    }
+    imp__release(m->scene->ctx, m->names);
+    m->names = (char *)names.text.bytes.data;
+    m->n *= 2;
+    m->together = true;
+    m->tracer.together = IMP_REUSE_MOST;
+    return IMP_OK;
+}
+
 const struct imp_tracer *imp__measure_bundles(const struct imp_measure *m)
 {
-    const bool one = m->integrator && !imp__channels_of(m->scene->integrator);
-    return one ? imp__bundle_use(&m->tracer) : NULL;
+    return !is_one(m) ? NULL : m->together ? &m->tracer : imp__bundle_use(&m->tracer);
 }
 
 void imp__measure_destroy(struct imp_measure *m)
@@ -264,7 +287,11 @@ void imp__measure_sample(const void *measure, struct imp_sample *s)
     int n;
     if (!more) {
         radiance(m, m->integrator, s, &L, &alpha, &walk);
-        if (m->sensor->film.n_responses == 0) imp__measure_base(m, L, alpha, value);
+        if (m->sensor->film.n_responses > 0) return;
+        n = imp__measure_base(m, L, alpha, value);
+        if (m->together)
+            imp__measure_base(m, s->supply ? imp__supply_alone(s->supply, &walk) : L,
+                              alpha, value + n);
         return;
     }
 

@@ -23,13 +23,19 @@ struct imp_measure {
     bool from_lights;
     struct imp_tracer tracer; /* of that integrator, for values */
     int n;                    /* channels */
-    char *names;              /* "R,G,B,..." for imp__film_create */
+    bool
+        together; /* points of a grid share; the second half of the channels is without that */
+    char *names; /* "R,G,B,..." for imp__film_create */
 };
 
 /* IMP_E_SCENE without a sensor or integrator; names are released by measure_destroy. */
 enum imp_status imp__measure_create(const struct imp_scene *scene,
                                     const struct imp_run *run, struct imp_measure *out);
 void imp__measure_destroy(struct imp_measure *m);
+/* Points of a grid share what their walks meet, where they can (walk/bundle/reuse.h). Then pixels
+ * depend on each other, but their sum is what it is if they do not share. Behind the channels there
+ * are as many again, of independent pixels that do not. IMP_E_NOMEM. */
+enum imp_status imp__measure_together(struct imp_measure *m);
 /* The tracer whose walks can be bundled where a sample is one walk; else NULL. */
 const struct imp_tracer *imp__measure_bundles(const struct imp_measure *m);
 /* Takes the sample (payload: the measure). */

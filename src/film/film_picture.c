@@ -148,6 +148,17 @@ static struct imp_supply *supply_begin(const struct render *r, const struct imp_
                : NULL;
 }
 
+/* Pixel i of a tile, in the order in which its walks are made. False: there are not so many. */
+static inline bool place_take(const struct imp_tile *t, int i, struct imp_sample *s)
+{
+    const int width = t->x1 - t->x0;
+    const struct imp_supply *walks = s->supply;
+    if (i >= (walks ? walks->n_pixels : width * (t->y1 - t->y0))) return false;
+    s->x = walks ? walks->xy[i][0] : t->x0 + i % width;
+    s->y = walks ? walks->xy[i][1] : t->y0 + i / width;
+    return true;
+}
+
 static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worker *w,
                                  void *result, void *payload)
 {
@@ -163,37 +174,35 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
                            .value = r->values + (size_t)w->index * apart((size_t)n)};
     memset(tile, 0, imp__film_sums_pixels(&r->sums) * sizeof *tile);
     s.supply = supply_begin(r, t, s.arena, s0, s1, &walks);
-    for (s.y = t->y0; s.y < t->y1; s.y++)
-        for (s.x = t->x0; s.x < t->x1; s.x++) {
-            if (!is_sampled(r, s.x, s.y)) continue;
-            double *own =
-                tile + (size_t)((s.y - t->y0) * r->patch.tile_side + s.x - t->x0) * 2 *
-                           (size_t)n;
-            for (int k = s0; k < s1; k++) {
-                s.index = sample_number(r, k);
-                if (s.supply) imp__supply_ready(s.supply);
-                sample_take(r, w, &s);
-                if (imp_unlikely(r->set > 1)) {
-                    if (k == s0 || k >= first + n_set)
-                        imp__set_at(r->set, r->period, k, &first, &n_set);
-                    const bool last = k + 1 == first + n_set || k + 1 == s1;
-                    set_take(r, t, w->index, &s, own, patch, last ? (int)n_set : 0);
-                    n_sets += last;
-                    continue;
-                }
-                if (r->patch.border > 0) {
-                    imp__patch_splat(&r->patch, t, patch, &s);
-                    continue;
-                }
-                box_add(s.value, n, own);
+    for (int i = 0; place_take(t, i, &s); i++) {
+        if (!is_sampled(r, s.x, s.y)) continue;
+        double *own = tile + (size_t)((s.y - t->y0) * r->patch.tile_side + s.x - t->x0) *
+                                 2 * (size_t)n;
+        for (int k = s0; k < s1; k++) {
+            s.index = sample_number(r, k);
+            if (s.supply) imp__supply_ready(s.supply);
+            sample_take(r, w, &s);
+            if (imp_unlikely(r->set > 1)) {
+                if (k == s0 || k >= first + n_set)
+                    imp__set_at(r->set, r->period, k, &first, &n_set);
+                const bool last = k + 1 == first + n_set || k + 1 == s1;
+                set_take(r, t, w->index, &s, own, patch, last ? (int)n_set : 0);
+                n_sets += last;
+                continue;
             }
-            if (r->patch.border > 0)
-                imp__patch_add(&r->patch, t, patch, s.x, s.y,
-                               r->set > 1 ? n_sets : s1 - s0, tile);
-            n_sets = 0;
-            const enum imp_status st = imp__tile_check(w);
-            if (st != IMP_OK) return st;
+            if (r->patch.border > 0) {
+                imp__patch_splat(&r->patch, t, patch, &s);
+                continue;
+            }
+            box_add(s.value, n, own);
         }
+        if (r->patch.border > 0)
+            imp__patch_add(&r->patch, t, patch, s.x, s.y, r->set > 1 ? n_sets : s1 - s0,
+                           tile);
+        n_sets = 0;
+        const enum imp_status st = imp__tile_check(w);
+        if (st != IMP_OK) return st;
+    }
     return IMP_OK;
 }
 

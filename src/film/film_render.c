@@ -9,9 +9,9 @@
 #include "walk/rules/features.h"
 #include "walk/run/run.h"
 
-enum imp_status imp__render_pixels(const struct imp_scene *scene,
-                                   const struct imp_run *run, const bool *only,
-                                   imp_film **out)
+/* alone: as of imp__render_grid; NULL: pixels are independent. */
+static enum imp_status render(const struct imp_scene *scene, const struct imp_run *run,
+                              const bool *only, int *alone, imp_film **out)
 {
     struct imp_measure measure;
     struct imp_same same[IMP_SAME_MAX];
@@ -29,7 +29,14 @@ enum imp_status imp__render_pixels(const struct imp_scene *scene,
     if (st != IMP_OK) return st;
     st = imp__measure_create(scene, run, &measure);
     if (st != IMP_OK) return st;
-    if (solves) {
+    if (alone) {
+        *alone = 0;
+        if (!solves && !measure.from_lights) st = imp__measure_together(&measure);
+        if (measure.together) *alone = measure.n / 2;
+    }
+    if (st != IMP_OK) {
+        /* nothing is rendered */
+    } else if (solves) {
         st = imp__render_elements(&measure, run, out);
     } else if (measure.from_lights) {
         st = imp__render_from_lights(&measure, run, out);
@@ -48,6 +55,19 @@ enum imp_status imp__render_pixels(const struct imp_scene *scene,
     }
     imp__measure_destroy(&measure);
     return st;
+}
+
+enum imp_status imp__render_pixels(const struct imp_scene *scene,
+                                   const struct imp_run *run, const bool *only,
+                                   imp_film **out)
+{
+    return render(scene, run, only, NULL, out);
+}
+
+enum imp_status imp__render_grid(const struct imp_scene *scene, const struct imp_run *run,
+                                 int *alone, imp_film **out)
+{
+    return render(scene, run, NULL, alone, out);
 }
 
 enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,

@@ -17,5 +17,9 @@ enum imp_status imp__render_elements(const struct imp_measure *measure,
 enum imp_status imp__render_pixels(const struct imp_scene *scene,
                                    const struct imp_run *run, const bool *only,
                                    imp_film **out);
+/* imp__render_pixels of all points of a grid, which share what they meet where they can
+ * (imp__measure_together). *alone: the first channel without that; 0: they do not share. */
+enum imp_status imp__render_grid(const struct imp_scene *scene, const struct imp_run *run,
+                                 int *alone, imp_film **out);
 
 #endif

@@ -26,6 +26,7 @@ struct obj {
     const struct imp_mesh_source *source;
     imp_context *ctx;
     int64_t line;
+    size_t at; /* of the text, where the line begins */
     struct column v, t, n;
     struct corner *vertices;
     size_t n_vertices, cap_vertices;
@@ -62,12 +63,31 @@ static const char *skip(const char *s, const char *end)
     return s;
 }
 
+/* Room for n elements of an array that holds `used`: for twice as many, or of many as many as the whole
+ * text has if it goes on like this, so that large files are not copied. What is not used is not
+ * written, and takes no memory. NULL: there is none, and the array stays. */
+static void *room_for(struct obj *o, void *array, size_t *capacity, size_t used, size_t n,
+                      size_t size)
+{
+    enum { MANY = 4096 };
+    if (n <= *capacity) return array;
+    const double part = (double)(o->at + 1) / (double)o->source->text.size;
+    size_t wanted = 2 * n + MANY;
+    if (n > MANY) wanted = imp_max(wanted, (size_t)((double)n / part));
+    void *p = imp__alloc_raw(o->ctx, wanted, size);
+    if (!p) return NULL;
+    if (used > 0) memcpy(p, array, used * size);
+    imp__release(o->ctx, array);
+    *capacity = wanted;
+    return p;
+}
+
 /* Up to `width` numbers; those that may be missing are 0. More than that are ignored. */
 static enum imp_status row_read(struct obj *o, struct column *c, const char *what,
                                 int needed, const char *s, const char *end)
 {
     float *grown =
-        imp__grow(o->ctx, c->at, &c->capacity, c->n + (size_t)c->width, sizeof *grown);
+        room_for(o, c->at, &c->capacity, c->n, c->n + (size_t)c->width, sizeof *grown);
     if (!grown) return no_memory(o);
     c->at = grown;
     for (int i = 0; i < c->width; i++) {
@@ -102,12 +122,13 @@ static enum imp_status index_read(struct obj *o, const struct column *c, const c
     return IMP_OK;
 }
 
+/* Vertices side by side in a file are so in the table, which lies in no cache, if they have a place
+ * alone. */
 static size_t hash(struct corner k)
 {
-    uint64_t h = k.v * 0x9e3779b97f4a7c15u;
-    h = (h ^ (h >> 29) ^ k.t) * 0xbf58476d1ce4e5b9u;
+    uint64_t h = k.t * 0xbf58476d1ce4e5b9u;
     h = (h ^ (h >> 32) ^ k.n) * 0x94d049bb133111ebu;
-    return (size_t)(h ^ (h >> 31));
+    return (size_t)(k.v + (h ^ (h >> 31)));
 }
 
 static uint32_t *slot(const struct obj *o, struct corner k)
@@ -140,8 +161,8 @@ static enum imp_status vertex_of(struct obj *o, struct corner k, uint32_t *out)
     uint32_t *s = slot(o, k);
     if (*s == 0) {
         if (o->n_vertices >= IMP_MESH_MAX) IMP_TRY(line_error(o, "mesh is too large"));
-        struct corner *grown = imp__grow(o->ctx, o->vertices, &o->cap_vertices,
-                                         o->n_vertices + 1, sizeof *grown);
+        struct corner *grown = room_for(o, o->vertices, &o->cap_vertices, o->n_vertices,
+                                        o->n_vertices + 1, sizeof *grown);
         if (!grown) IMP_TRY(no_memory(o));
         o->vertices = grown;
         o->vertices[o->n_vertices++] = k;
@@ -184,8 +205,8 @@ static enum imp_status face_read(struct obj *o, const char *s, const char *end)
         IMP_TRY(corner_read(o, &s, end, &k));
         IMP_TRY(vertex_of(o, k, &next));
         if (n >= 2) {
-            uint32_t *grown = imp__grow(o->ctx, o->indices, &o->cap_indices,
-                                        o->n_indices + 3, sizeof *grown);
+            uint32_t *grown = room_for(o, o->indices, &o->cap_indices, o->n_indices,
+                                       o->n_indices + 3, sizeof *grown);
             if (!grown) IMP_TRY(no_memory(o));
             o->indices = grown;
             o->indices[o->n_indices++] = first;
@@ -267,6 +288,7 @@ enum imp_status imp__obj_parse_names(const struct imp_mesh_source *source,
         const char *stop = memchr(s, '\n', (size_t)(end - s));
         if (!stop) stop = end;
         o.line++;
+        o.at = (size_t)(s - (const char *)source->text.data);
         IMP_TRY(line_read(&o, s, stop));
         s = stop + 1;
     }

@@ -115,6 +115,8 @@ struct imp_bsdf_lanes {
     imp_wide (*index_ratio)(const struct imp_bsdf *b, const struct imp_wide_color *in,
                             const imp_wide3 *wo, const imp_wide3 *wi,
                             const imp_wide_lobe *lobe);
+    /* Its value is the same for all wo on one side of the surface. NULL: it is not. */
+    bool (*even)(const struct imp_bsdf *b);
 };
 /* NULL: this material has none, with these derivatives wanted. Those that have one have no emission. */
 const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b,

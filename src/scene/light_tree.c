@@ -10,8 +10,7 @@
 #define IMP_LIGHT_SLACK 1e-6
 /* A node is opened where the place is nearer than so many half diagonals, squared. */
 #define IMP_LIGHT_NEAR2 2.0
-#define CUT             128 /* nodes, at most */
-#define FEW             64  /* lights that are looked at one by one */
+#define FEW             64 /* lights that are looked at one by one */
 
 #define IMP_WIDE 1
 #define IMP_TEXT "scene/light_importance_text.h"
@@ -67,20 +66,14 @@ static inline double importance(const struct imp_light_tree *t, int32_t i,
 
 /* The nodes among which the first choice is made: the root, opened where it is near, and
  * so on, as in the sums of Barnes and Hut (1986); of few lights, all leaves. */
-struct cut {
-    int n;
-    double sum;
-    int32_t node[CUT];
-    double importance[CUT];
-};
-static inline void cut_add(struct cut *c, int32_t i, double importance)
+static inline void cut_add(struct imp_light_cut *c, int32_t i, double importance)
 {
     c->node[c->n] = i;
     c->importance[c->n++] = importance;
     c->sum += importance;
 }
 static inline void cut_make(const struct imp_light_tree *t, const struct here *at,
-                            struct cut *c)
+                            struct imp_light_cut *c)
 {
     int32_t open[64];
     int n = 0;
@@ -100,7 +93,7 @@ static inline void cut_make(const struct imp_light_tree *t, const struct here *a
         const int32_t i = open[--n];
         const double w = importance(t, i, at, &near);
         if (!(w > 0)) continue;
-        if (near && t->node[i].second >= 0 && n < 62 && c->n + n < CUT - 2) {
+        if (near && t->node[i].second >= 0 && n < 62 && c->n + n < IMP_LIGHT_CUT - 2) {
             open[n++] = t->node[i].second;
             open[n++] = i + 1;
             continue;
@@ -110,7 +103,7 @@ static inline void cut_make(const struct imp_light_tree *t, const struct here *a
 }
 
 /* Probability of the tree, against the lights without end. */
-static double near_chance(const struct imp_light_tree *t, const struct cut *c)
+static double near_chance(const struct imp_light_tree *t, const struct imp_light_cut *c)
 {
     return t->n_far == 0 ? c->sum > 0 : c->sum > 0 ? t->near_chance : 0;
 }
@@ -143,14 +136,11 @@ static int far_choose(const struct imp_light_tree *t, double *u, double *chance)
     return t->far_light[k];
 }
 
-static inline __attribute__((always_inline)) int choose_at(const struct imp_light_tree *t,
-                                                           const struct here *at,
-                                                           double *u, int *prim,
-                                                           double *chance)
+static inline __attribute__((always_inline)) int
+choose_at(const struct imp_light_tree *t, const struct here *at,
+          const struct imp_light_cut *c, double *u, int *prim, double *chance)
 {
-    struct cut c;
-    cut_make(t, at, &c);
-    const double near = near_chance(t, &c);
+    const double near = near_chance(t, c);
     *prim = -1;
     if (!(*u < near)) {
         if (t->n_far == 0) return -1;
@@ -161,11 +151,11 @@ static inline __attribute__((always_inline)) int choose_at(const struct imp_ligh
     *u = part_of(*u, 0, near);
     int k = 0;
     double below = 0;
-    while (k < c.n - 1 && !(*u < (below + c.importance[k]) / c.sum))
-        below += c.importance[k++];
-    *chance = near * (c.importance[k] / c.sum);
-    *u = part_of(*u, below / c.sum, c.importance[k] / c.sum);
-    int i = c.node[k];
+    while (k < c->n - 1 && !(*u < (below + c->importance[k]) / c->sum))
+        below += c->importance[k++];
+    *chance = near * (c->importance[k] / c->sum);
+    *u = part_of(*u, below / c->sum, c->importance[k] / c->sum);
+    int i = c->node[k];
     while (t->node[i].second >= 0) {
         const double first = first_chance(t, i, at);
         if (first < 0) return -1;
@@ -184,12 +174,31 @@ static inline __attribute__((always_inline)) int choose_at(const struct imp_ligh
     return item->emitter;
 }
 
+static bool is_at(const struct imp_light_cut *c, const struct imp_light_place *place)
+{
+    const struct imp_light_place *was = &c->place;
+    bool same = c->made && was->faces == place->faces;
+    for (int k = 0; k < 3; k++)
+        same &= was->p[k] == place->p[k] && was->n[k] == place->n[k];
+    return same;
+}
+
 int imp__light_tree_choose(const struct imp_light_tree *t,
-                           const struct imp_light_place *place, double *u, int *prim,
-                           double *chance)
+                           const struct imp_light_place *place, struct imp_light_cut *cut,
+                           double *u, int *prim, double *chance)
 {
     const struct here at = {.place = place};
-    return choose_at(t, &at, u, prim, chance);
+    struct imp_light_cut own;
+    if (!cut) {
+        cut_make(t, &at, &own);
+        return choose_at(t, &at, &own, u, prim, chance);
+    }
+    if (!is_at(cut, place)) {
+        cut_make(t, &at, cut);
+        cut->place = *place;
+        cut->made = true;
+    }
+    return choose_at(t, &at, cut, u, prim, chance);
 }
 
 /* choose_at of few lights, without any that has no end, for all lanes at once. */
@@ -248,7 +257,9 @@ unsigned imp__light_lanes_choose(const struct imp_light_tree *t, const imp_wide3
         const int k = __builtin_ctz(bits);
         const struct here at = {.lanes = &lanes, .lane = k};
         double by = (*u)[k], chance = 0;
-        out->light[k] = choose_at(t, &at, &by, &out->prim[k], &chance);
+        struct imp_light_cut cut;
+        cut_make(t, &at, &cut);
+        out->light[k] = choose_at(t, &at, &cut, &by, &out->prim[k], &chance);
         out->chance[k] = chance;
         (*u)[k] = by;
         lit |= (unsigned)(out->light[k] >= 0) << k;
@@ -260,7 +271,7 @@ static double item_chance(const struct imp_light_tree *t,
                           const struct imp_light_place *place, int item)
 {
     const struct here at = {.place = place};
-    struct cut c;
+    struct imp_light_cut c;
     int i = t->item[item].leaf, k = 0;
     if (!(t->node[i].strength > 0)) return 0;
     cut_make(t, &at, &c);
@@ -292,7 +303,7 @@ double imp__light_tree_chance(const struct imp_light_tree *t,
     for (int k = 0; k < t->n_far; k++)
         if (t->far_light[k] == emitter) {
             const struct here at = {.place = place};
-            struct cut c;
+            struct imp_light_cut c;
             cut_make(t, &at, &c);
             return (1 - near_chance(t, &c)) * t->far_share[k];
         }

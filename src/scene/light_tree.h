@@ -59,14 +59,26 @@ struct imp_light_place {
     bool faces; /* what arrives from behind n counts for nothing */
 };
 
+/* The nodes among which the first choice is made at a place, for more choices there. Begins as {0}. */
+enum { IMP_LIGHT_CUT = 128 }; /* nodes, at most */
+struct imp_light_cut {
+    bool made;
+    struct imp_light_place place;
+    int n;
+    double sum;
+    int32_t node[IMP_LIGHT_CUT];
+    double importance[IMP_LIGHT_CUT];
+};
+
 /* Made when all objects are there. It listens to the lights' parameters. */
 enum imp_status imp__light_tree_build(struct imp_scene *scene);
 
 /* A light, and the triangle of it that is to be sampled (-1: all of it), by u on [0, 1);
- * its probability. *u is uniform on [0, 1) again. -1: no light can count here. */
+ * its probability. *u is uniform on [0, 1) again. -1: no light can count here. cut: of the last
+ * place, for walks that have many from one place; NULL: they have not. */
 int imp__light_tree_choose(const struct imp_light_tree *t,
-                           const struct imp_light_place *place, double *u, int *prim,
-                           double *chance);
+                           const struct imp_light_place *place, struct imp_light_cut *cut,
+                           double *u, int *prim, double *chance);
 /* Probability that it chooses this. prim: the triangle, of lights in triangles. */
 double imp__light_tree_chance(const struct imp_light_tree *t,
                               const struct imp_light_place *place, int emitter, int prim);

@@ -83,7 +83,8 @@ static double objective(unsigned n, const double *y, double *gradient, void *pay
     /* After a forced stop some methods still finish a line search. */
     if (c->st != IMP_OK || s->scalar[STALE] != 0) return HUGE_VAL;
     if (at + row <= s->array_n[RECORD]) { /* replayed */
-        f = (struct imp_estimate){s->array[RECORD][at], s->array[RECORD][at + 1], 0};
+        f = (struct imp_estimate){.value = s->array[RECORD][at],
+                                  .se = s->array[RECORD][at + 1]};
         for (size_t k = 0; k < n; k++) c->g[k] = s->array[RECORD][at + 2 + k];
     } else {
         for (size_t k = 0; k < n; k++)

@@ -41,7 +41,7 @@ static enum imp_status half_norm(const double *x, uint64_t seed, struct imp_esti
         f += w * x[k] * x[k] / 2;
         if (g) g[k] = w * x[k];
     }
-    *e = (struct imp_estimate){f, 0, 0};
+    *e = (struct imp_estimate){.value = f, .se = 0};
     return IMP_OK;
 }
 static double dot(size_t n, const double *a, const double *b)

@@ -251,7 +251,7 @@ static void closing(void)
     for (uint64_t seed = 1; seed <= FITS && st == IMP_OK; seed++) {
         struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
         struct imp_run run = run_of(64, seed);
-        struct imp_estimate one = {0, 0, 0}, many = {0, 0, 0};
+        struct imp_estimate one = {0}, many = {0, 0, 0};
         const struct imp_fit_result *r = NULL;
         imp_problem *p = problem_of(s, globs, 2);
         o.optimizer = IMP_LM;

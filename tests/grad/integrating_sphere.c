@@ -87,12 +87,12 @@ static struct reading measure(double rho, int depth, int spp)
     test_must(ctx, imp_problem_reverse(p, ones, &run, g, se));
     const size_t i = test_variable(p, s, ctx, "wall.reflectance.value");
     /* d(pi/rho L) = pi/rho (dL - L/rho); errors added, for they are of the same walks. */
-    r.drho = (struct imp_estimate){scale * g[i] - r.R.value / rho,
-                                   scale * se[i] + r.R.se / rho, 0};
+    r.drho = (struct imp_estimate){.value = scale * g[i] - r.R.value / rho,
+                                   .se = scale * se[i] + r.R.se / rho};
     const size_t k0 = test_variable(p, s, ctx, "cap.radiance.data");
     for (int k = 0; k < ROWS; k++)
-        r.de[k] = (struct imp_estimate){scale * g[k0 + (size_t)k],
-                                        scale * se[k0 + (size_t)k], 0};
+        r.de[k] = (struct imp_estimate){.value = scale * g[k0 + (size_t)k],
+                                        .se = scale * se[k0 + (size_t)k]};
     imp_problem_destroy(p);
     imp_scene_destroy(s);
     return r;
@@ -148,8 +148,8 @@ int main(int argc, char **argv)
     const double h = .1, lo = .5 + h, hi = .5 - h;
     const struct reading up = measure(.5 + h, -1, 400 * more),
                          down = measure(.5 - h, -1, 400 * more);
-    agrees((struct imp_estimate){(up.drho.value - down.drho.value) / (2 * h),
-                                 hypot(up.drho.se, down.drho.se) / (2 * h), 0},
+    agrees((struct imp_estimate){.value = (up.drho.value - down.drho.value) / (2 * h),
+                                 .se = hypot(up.drho.se, down.drho.se) / (2 * h)},
            direct * (1 / (hi * hi) - 1 / (lo * lo)) / (2 * h), 4 * limit,
            "second derivative, from gradients", .5);
     imp_context_destroy(ctx);

@@ -92,8 +92,8 @@ static void check(const struct row *r, bool reflected, int spp)
         if (k == 1 && above[k] > 1) above[k] = 1;
         const double slope = (truth(r, reflected, above) - truth(r, reflected, below)) /
                              (above[k] - below[k]);
-        agrees((struct imp_estimate){g[i], se[i], 0}, slope, 12 * tight, r, names[k],
-               reflected);
+        agrees((struct imp_estimate){.value = g[i], .se = se[i]}, slope, 12 * tight, r,
+               names[k], reflected);
     }
     imp_problem_destroy(p);
     imp_scene_destroy(s);

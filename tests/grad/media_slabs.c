@@ -97,8 +97,9 @@ static void check(const struct row *r, bool reflected, double mu, int spp,
         below = truth(r, reflected, mu, at[0], at[1], at[2]);
         at[k] += 2 * h;
         const double above = truth(r, reflected, mu, at[0], at[1], at[2]);
-        agrees((struct imp_estimate){g[i], se[i], 0}, (above - below) / (2 * h),
-               most[k + 1] / sqrt(spp), r, names[k], reflected, mu);
+        agrees((struct imp_estimate){.value = g[i], .se = se[i]},
+               (above - below) / (2 * h), most[k + 1] / sqrt(spp), r, names[k], reflected,
+               mu);
     }
     imp_problem_destroy(p);
     imp_scene_destroy(s);

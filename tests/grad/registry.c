@@ -532,7 +532,7 @@ static void fresh(imp_scene *s, imp_problem *p, size_t param, const double *v,
         }
         seed += (uint64_t)n_batches;
         for (int b = 0; b < n_batches; b++) tap_add(&differences, d[b]);
-        fd = (struct imp_estimate){differences.mean, tap_se(&differences), 0};
+        fd = (struct imp_estimate){.value = differences.mean, .se = tap_se(&differences)};
         /* Pictures are floats: 6e-8 of each of them. */
         rounding = 6e-8 * size_F * (fabs(factor[0]) + fabs(factor[1]));
         const double off = fmax(fabs(mine.value - fd.value) - rounding, 0);

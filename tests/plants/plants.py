@@ -108,7 +108,7 @@ PLANTS = [
     ("pick", "lights: probability of a pick times 1.05", "materials", "src/walk/core/step.h",
      "    *pmf = cdf[light] - (light ? cdf[light - 1] : 0);", "    *pmf = 1.05 * (cdf[light] - (light ? cdf[light - 1] : 0));"),
     ("chance", "light tree: chance times .9", "lamps", "src/scene/light_tree.c",
-     "    *chance = near * (c.importance[k] / c.sum);", "    *chance = .9 * near * (c.importance[k] / c.sum);"),
+     "    *chance = near * (c->importance[k] / c->sum);", "    *chance = .9 * near * (c->importance[k] / c->sum);"),
     ("first", "light tree: chance of the first child exchanged with the second's", "lamps", "src/scene/light_tree.c",
      "        chance *= i == above + 1 ? first : 1 - first;", "        chance *= i == above + 1 ? 1 - first : first;"),
     ("both", "light tree: chance of the first child exchanged in all claims", "lamps", "src/scene/light_tree.c",

@@ -93,7 +93,7 @@ static void gradients(int at)
 {
     double g[2 * N], H_all[3 * N * N];
     float seed[W * H * C] = {0};
-    struct imp_estimate J = {-7, -7, 0};
+    struct imp_estimate J = {.value = -7, .se = -7};
     for (int i = 0; i < 2 * N; i++) g[i] = -7;
     for (int i = 0; i < 3 * N * N; i++) H_all[i] = -7;
 

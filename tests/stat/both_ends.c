@@ -156,8 +156,8 @@ static void sphere_read(const struct sphere *s, enum imp_from from, int spp,
     run.spp = spp;
     run.seed = 41 + (uint64_t)from;
     test_must(ctx, imp_problem_functional(p, NULL, &run, R, g, se));
-    *drho = (struct imp_estimate){s->sensor * g[i], s->sensor * se[i], 0};
-    *de = (struct imp_estimate){s->sensor * g[j], s->sensor * se[j], 0};
+    *drho = (struct imp_estimate){.value = s->sensor * g[i], .se = s->sensor * se[i]};
+    *de = (struct imp_estimate){.value = s->sensor * g[j], .se = s->sensor * se[j]};
     R->value *= s->sensor;
     R->se *= s->sensor;
     imp_problem_destroy(p);
@@ -207,8 +207,8 @@ static void spheres(void)
             direct = s.sensor * M_PI * RADIANCE * s.lamp / s.whole;
             imp_scene_destroy(s.scene);
         }
-        agrees((struct imp_estimate){(drho[0].value - drho[1].value) / (2 * h),
-                                     hypot(drho[0].se, drho[1].se) / (2 * h), 0},
+        agrees((struct imp_estimate){.value = (drho[0].value - drho[1].value) / (2 * h),
+                                     .se = hypot(drho[0].se, drho[1].se) / (2 * h)},
                direct * (1 / (hi * hi) - 1 / (lo * lo)) / (2 * h), .04 / sqrt(more),
                "d2R/drho2, from gradients", .5, from);
     }
@@ -235,8 +235,8 @@ static void spectral_sphere(void)
             const double truth = s.sensor * M_PI * s.lamp / s.whole * integral;
             char what[48];
             snprintf(what, sizeof what, "R of %d to %d nm", 400 + 100 * c, 500 + 100 * c);
-            agrees((struct imp_estimate){s.sensor * imp_film_mean(film)[c],
-                                         s.sensor * imp_film_se(film)[c], 0},
+            agrees((struct imp_estimate){.value = s.sensor * imp_film_mean(film)[c],
+                                         .se = s.sensor * imp_film_se(film)[c]},
                    truth, .015 / sqrt(more), what, .3, from);
         }
         imp_film_destroy(film);

@@ -196,7 +196,8 @@ static void flux(void)
         sum += area * e.value;
         square += area * area * e.se * e.se;
     }
-    hold("5.4 flux", (struct imp_estimate){sum, sqrt(square), 0}, 10 * M_PI * 16);
+    hold("5.4 flux", (struct imp_estimate){.value = sum, .se = sqrt(square)},
+         10 * M_PI * 16);
 }
 
 static void pane_and_surfaces(void)

@@ -180,7 +180,7 @@ static void picks(const imp_scene *s, const char *what, uint32_t places)
         for (uint32_t d = 0; d < DRAWS; d++) {
             double u = imp__u01(imp__key(7, k, d), 0), chance = 0;
             int prim;
-            const int e = imp__light_tree_choose(t, &q, &u, &prim, &chance);
+            const int e = imp__light_tree_choose(t, &q, NULL, &u, &prim, &chance);
             wrong += !(u >= 0 && u < 1);
             if (e < 0) {
                 none++;

@@ -158,7 +158,7 @@ static struct result functional(imp_scene *s, int spp, uint64_t seed)
 {
     struct result r = {.n = 0};
     struct imp_run run = IMP_RUN_INIT;
-    struct imp_estimate value = {0, 0, 0};
+    struct imp_estimate value = {0};
     imp_problem *p = test_problem(ctx, s, "*");
     run.spp = spp;
     run.seed = seed;

@@ -38,7 +38,7 @@ static void means(imp_scene *s, int spp, int channels, struct imp_estimate *out)
             sum += (double)mean[p * channels + c] / pixels;
             square += imp__sqr((double)se[p * channels + c] / pixels);
         }
-        out[c] = (struct imp_estimate){sum, sqrt(square), 0};
+        out[c] = (struct imp_estimate){.value = sum, .se = sqrt(square)};
     }
     imp_film_destroy(f);
 }

@@ -40,7 +40,8 @@ static enum imp_status eval(const double *x, uint64_t seed, struct imp_estimate 
         value += 0.5 * curvature(k) * d * d;
         g[k] = b->gain * curvature(k) * (d + 0.5 * noise);
     }
-    *f = (struct imp_estimate){b->gain * value, b->gain * 0.01 * (double)b->n, 0};
+    *f = (struct imp_estimate){.value = b->gain * value,
+                               .se = b->gain * 0.01 * (double)b->n};
     return IMP_OK;
 }
 

@@ -326,7 +326,8 @@ static void empty(void)
         test_must(ctx, imp_render(s, &run, &film[k]));
         double variance = 0;
         for (int i = 0; i < 48; i += 3) variance += pow(imp_film_se(film[k])[i], 2);
-        e[k] = (struct imp_estimate){mean_of(film[k]), sqrt(variance) / 16, 0};
+        e[k] =
+            (struct imp_estimate){.value = mean_of(film[k]), .se = sqrt(variance) / 16};
         imp_film_destroy(film[k]);
         imp_scene_destroy(s);
     }

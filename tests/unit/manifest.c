@@ -54,7 +54,7 @@ static enum imp_status job_run(imp_context *ctx, imp_scene *s, enum job job,
         test_must(ctx, imp_problem_create(s, &p));
         test_must(ctx, imp_problem_activate(p, "ball.*"));
         test_must(ctx, imp_problem_add_target(p, &t));
-        struct imp_estimate e = {0, 0, 0};
+        struct imp_estimate e = {0};
         if (job == GRADIENT) {
             st = imp_problem_objective(p, NULL, &run, &e, result + 2, result + 3);
             result[0] = e.value, result[1] = e.se;

@@ -178,7 +178,7 @@ static enum imp_status lobe_normal(const double *x, uint64_t seed, int rounds,
             for (int l = 0; l < 2; l++) h[2 * k + l] += J[k] * J[l];
         }
     }
-    out->f = (struct imp_estimate){value, 0.1, 0};
+    out->f = (struct imp_estimate){.value = value, .se = 0.1};
     memcpy(out->g, g, sizeof g);
     for (int k = 0; k < 4; k++) {
         out->H[k] = out->H_same[k] = h[k];

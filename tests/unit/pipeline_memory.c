@@ -77,7 +77,7 @@ static enum imp_status render_wide(void)
 static enum imp_status objective_of(imp_problem *p)
 {
     const size_t n = imp_problem_n_variables(p);
-    struct imp_estimate J = {-1, -1, -1};
+    struct imp_estimate J = {.value = -1, .se = -1, .bias_order = -1};
     double *g = calloc(2 * n, sizeof *g);
     g[0] = -7;
     enum imp_status st = imp_problem_objective(p, NULL, &run, &J, g, g + n);
@@ -174,7 +174,7 @@ static enum imp_status problem_make(void)
 
 static enum imp_status functional(void)
 {
-    struct imp_estimate F = {-1, -1, -1};
+    struct imp_estimate F = {.value = -1, .se = -1, .bias_order = -1};
     double g[64] = {-7};
     enum imp_status st = imp_problem_functional(problem, NULL, &run, &F, g, NULL);
     if (st != IMP_OK && (F.value != -1 || g[0] != -7)) st = IMP_E_NUMERIC;

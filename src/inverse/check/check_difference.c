@@ -76,7 +76,7 @@ static enum imp_status functional_of_lights(struct imp__fresh *f, const double *
 {
     struct imp_problem *p = f->check->problem;
     struct imp_run run = f->check->run;
-    struct imp_estimate F = {0, 0, 0};
+    struct imp_estimate F = {0};
     double *g = x_dot ? imp__alloc(p->ctx, p->n, sizeof *g) : NULL;
     if (x_dot && !g) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for a check");
     run.spp = imp__fresh_batch(f);
@@ -124,7 +124,7 @@ static struct imp_estimate batches_mean(int n, double sum, double square)
 {
     const double mean = sum / n;
     const double variance = fmax(square / n - mean * mean, 0) / (n - 1);
-    return (struct imp_estimate){mean, sqrt(variance), 0};
+    return (struct imp_estimate){.value = mean, .se = sqrt(variance)};
 }
 
 static enum imp_status batches(struct imp__fresh *f, const double *x_dot, int n,

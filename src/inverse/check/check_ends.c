@@ -185,7 +185,7 @@ static enum imp_status sensor_slopes(struct ends *e)
                      count = p->scene->params[s->param].info.count;
         const size_t i = base + (s->element < 0 ? 0 : (size_t)s->element);
         if (count <= IMP_CHECK_SINGLY) {
-            e->sensor[k + 1] = (struct imp_estimate){g[i], g[p->n + i], 0};
+            e->sensor[k + 1] = (struct imp_estimate){.value = g[i], .se = g[p->n + i]};
             continue;
         }
         for (size_t j = 0; j < p->n; j++)
@@ -251,7 +251,7 @@ static struct imp_check_row judged(const struct imp__check *c, struct imp_estima
 
 static struct imp_check_row judged_row(const struct ends *e, size_t k)
 {
-    return judged(e->check, (struct imp_estimate){e->lights[k], e->se[k], 0},
+    return judged(e->check, (struct imp_estimate){.value = e->lights[k], .se = e->se[k]},
                   e->sensor[k]);
 }
 

@@ -56,8 +56,9 @@ static double pooled(int before, double a, int more, double b)
 static struct imp_estimate pool(int before, struct imp_estimate a, int more,
                                 struct imp_estimate b)
 {
-    return (struct imp_estimate){pooled(before, a.value, more, b.value),
-                                 hypot(before * a.se, more * b.se) / (before + more), 0};
+    return (struct imp_estimate){.value = pooled(before, a.value, more, b.value),
+                                 .se =
+                                     hypot(before * a.se, more * b.se) / (before + more)};
 }
 
 static void judge(struct comparison *m, struct imp_check_row *row)
@@ -232,7 +233,8 @@ static enum imp_status comparison_round(struct rows *r, struct comparison *c, in
         const size_t e = c->element < 0 ? 0 : (size_t)c->element;
         const char *why = NULL;
         weight[e] = 1;
-        mine = (struct imp_estimate){r->gradient[base + e], r->gradient_se[base + e], 0};
+        mine = (struct imp_estimate){.value = r->gradient[base + e],
+                                     .se = r->gradient_se[base + e]};
         if (imp__pose_of(p->scene, c->param)) IMP_TRY(has_room(r, &m, e, &why));
         if (why) { /* nothing is decided */
             const struct imp_check_row row = {.step = IMP_FRESH_STEP * m.scale,
@@ -295,8 +297,9 @@ static enum imp_status gradient_round(struct rows *r, int before)
     IMP_TRY(imp_problem_reverse(c->problem, r->fresh.pattern, &run, g, g + n));
     for (size_t k = 0; k < n; k++) {
         const struct imp_estimate sum =
-            pool(before, (struct imp_estimate){r->gradient[k], r->gradient_se[k], 0},
-                 r->fresh.more, (struct imp_estimate){g[k], g[n + k], 0});
+            pool(before,
+                 (struct imp_estimate){.value = r->gradient[k], .se = r->gradient_se[k]},
+                 r->fresh.more, (struct imp_estimate){.value = g[k], .se = g[n + k]});
         r->gradient[k] = sum.value;
         r->gradient_se[k] = sum.se;
     }

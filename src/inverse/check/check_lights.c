@@ -60,7 +60,7 @@ static int choice_draw(const struct choices *c, int place, double u, double *cha
     int prim = -1;
     if (!c->tree) return imp__light_pick(c->scene, u, chance);
     const int light =
-        imp__light_tree_choose(c->tree, &c->v.lit[place], &u, &prim, chance);
+        imp__light_tree_choose(c->tree, &c->v.lit[place], NULL, &u, &prim, chance);
     return light < 0 ? -1 : number_of(c, light, prim);
 }
 /* The chance that is claimed; `met`: by the factor that weighs light that was met. */

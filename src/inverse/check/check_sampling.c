@@ -170,7 +170,7 @@ static struct imp_estimate block_mean(const imp_film *f, int channel, const int 
             sum += f->mean[i];
             square += imp__sqr(f->se[i]);
         }
-    return (struct imp_estimate){sum / n, sqrt(square) / n, 0};
+    return (struct imp_estimate){.value = sum / n, .se = sqrt(square) / n};
 }
 
 static struct imp_estimate block_at(const imp_film *f, int channel, int k, int from[2],

@@ -89,13 +89,13 @@ enum imp_status imp__design_eval(const double *x, uint64_t seed, struct imp_esti
     (void)seed;
     st = imp__design_at(d, x);
     if (st == IMP_E_NUMERIC) { /* reflections do not converge: the worst value */
-        *f = (struct imp_estimate){HUGE_VAL, 0, 0};
+        *f = (struct imp_estimate){.value = HUGE_VAL, .se = 0};
         if (g) memset(g, 0, d->n * sizeof *g);
         if (g_se) memset(g_se, 0, d->n * sizeof *g_se);
         return imp__el_sweep(d->e, 1, true, true); /* not from those values */
     }
     IMP_TRY(st);
-    *f = (struct imp_estimate){imp__design_value(d), 0, 0};
+    *f = (struct imp_estimate){.value = imp__design_value(d), .se = 0};
     if (g) {
         memset(g, 0, d->n * sizeof *g);
         for (size_t k = 0; k < d->goals; k++) d->unit[k] = d->w[k] * (d->J[k] - d->t[k]);
@@ -135,7 +135,7 @@ enum imp_status imp__design_normal(const double *x, uint64_t seed, int rounds,
     memcpy(out->H_same, out->H, n * n * sizeof *out->H_same);
     out->chi2 = 2 * imp__design_value(d);
     out->f = (struct imp_estimate){
-        imp__design_value(d) + imp__regularise(d->p, x, out->g), 0, 0};
+        .value = imp__design_value(d) + imp__regularise(d->p, x, out->g), .se = 0};
     out->pairs = out->f;
     out->n_residuals = (double)d->goals;
     out->noise_known = true;

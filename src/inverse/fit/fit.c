@@ -280,8 +280,8 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
             IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for the result of a fit"));
     }
     if (s->n_history > 0)
-        a.objective = (struct imp_estimate){s->history[s->n_history - 1],
-                                            s->history_se[s->n_history - 1], 0};
+        a.objective = (struct imp_estimate){.value = s->history[s->n_history - 1],
+                                            .se = s->history_se[s->n_history - 1]};
     f.final_calls = 0;
     f.final_total = final_total(&f);
     if (ended == IMP_OK) ended = answers_find(&f, &o, &s, rows, &a);

@@ -134,7 +134,7 @@ static enum imp_status eval(const double *x, uint64_t seed, struct imp_estimate 
     fit->run.seed = seed;
     fit->final_calls++;
     if (!g && fit->goal.possible && !possible(x, fit)) {
-        *f = (struct imp_estimate){INFINITY, 0, 0};
+        *f = (struct imp_estimate){.value = INFINITY, .se = 0};
         return IMP_OK;
     }
     enum imp_status st = imp__fit_take_walks(fit, x, seed);
@@ -188,8 +188,10 @@ static enum imp_status normal(const double *x, uint64_t seed, int rounds,
     const double prior = imp__regularise(fit->problem, x, out->g);
     out->f = gn.objective;
     out->f.value += prior;
-    out->pairs = (struct imp_estimate){quadratic(fit) ? 0.5 * gn.chi2 + prior : NAN,
-                                       0.5 * gn.chi2_se, out->f.bias_order};
+    out->pairs =
+        (struct imp_estimate){.value = quadratic(fit) ? 0.5 * gn.chi2 + prior : NAN,
+                              .se = 0.5 * gn.chi2_se,
+                              .bias_order = out->f.bias_order};
     out->chi2 = gn.chi2;
     out->n_residuals = gn.n_residuals;
     out->noise_known = true;

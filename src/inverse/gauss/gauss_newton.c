@@ -190,9 +190,10 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
     }
     /* Where pixels share walks, the same estimate as that of trial steps from the same walks. */
     const struct imp__normal_sums total = imp__normal_at(j.total, j.K, j.deviate);
-    struct imp_estimate objective = {total.scalars[IMP_NORMAL_OBJECTIVE],
-                                     sqrt(fmax(0, total.scalars[IMP_NORMAL_VARIANCE])),
-                                     bias_order};
+    struct imp_estimate objective = {
+        .value = total.scalars[IMP_NORMAL_OBJECTIVE],
+        .se = sqrt(fmax(0, total.scalars[IMP_NORMAL_VARIANCE])),
+        .bias_order = bias_order};
     if (wide) IMP_TRY(data_term(p, &own, &objective));
     matrix_copy(out->H, total.H, j.K);
     matrix_copy(out->H_same, total.H_same, j.K);

@@ -142,7 +142,7 @@ static enum imp_status picture_value(imp_context *ctx, struct imp__functional *f
     static const char *const names[] = {"0", "0,1", "0,1,2", "0,1,2,3"};
     const bool box = !weights;
     const int n = f->channels + box;
-    struct imp_estimate value = {0, 0, 0};
+    struct imp_estimate value = {0};
     imp_film *film = NULL;
     f->tracer.active = NULL; /* nothing is differentiated here, and no walk is swept */
     f->tracer.value_only = true;
@@ -194,7 +194,7 @@ enum imp_status imp_problem_functional(imp_problem *p, const float *adjoint,
     IMP_FLOAT_MODE;
     IMP_READS(p->scene);
     struct imp__functional f = {0};
-    struct imp_estimate estimate = {0, 0, 0};
+    struct imp_estimate estimate = {0};
     double *weights = NULL, *g = NULL;
     float *ones = NULL;
     IMP_TRY(begin(p, adjoint, &own, &f, &weights, &ones));
@@ -348,8 +348,10 @@ enum imp_status imp_problem_jacobian_sums(imp_problem *p, const float *adjoint,
         if (ended != IMP_CANCELLED && f.moved) IMP_TRY(edge_errors(ctx, &f, &own, se));
         if (ended == IMP_PART) IMP_TRY(IMP_PART);
     }
-    if (value) *value = (struct imp_estimate){inner_product(&f, primal), se[0], 0};
-    for (size_t g = 0; g < n; g++) sums[g] = (struct imp_estimate){0, se[g + 1], 0};
+    if (value)
+        *value = (struct imp_estimate){.value = inner_product(&f, primal), .se = se[0]};
+    for (size_t g = 0; g < n; g++)
+        sums[g] = (struct imp_estimate){.value = 0, .se = se[g + 1]};
     for (size_t k = 0; k < p->n; k++) sums[each[k]].value += inner_product(&f, films[k]);
 out:
     imp__moved_end(&moved);

@@ -116,15 +116,18 @@ static struct imp_estimate term(const struct imp__design_model *m, size_t want, 
     const struct imp_estimate *e = &r->average[g];
     const double c = 4 * pow(10, w / 8) * IMP_INV_PI;
     switch (m->want[want].of) {
-    case IMP_WANT_AVERAGE: return (struct imp_estimate){e->value, e->se, 0};
-    case IMP_WANT_MINIMUM: return (struct imp_estimate){r->value[p], r->se[p], 0};
-    case IMP_WANT_MAXIMUM: return (struct imp_estimate){-r->value[p], r->se[p], 0};
+    case IMP_WANT_AVERAGE: return (struct imp_estimate){.value = e->value, .se = e->se};
+    case IMP_WANT_MINIMUM:
+        return (struct imp_estimate){.value = r->value[p], .se = r->se[p]};
+    case IMP_WANT_MAXIMUM:
+        return (struct imp_estimate){.value = -r->value[p], .se = r->se[p]};
     case IMP_WANT_UNIFORMITY:
-        return (struct imp_estimate){r->value[p] - w * e->value, r->se[p] + w * e->se, 0};
+        return (struct imp_estimate){.value = r->value[p] - w * e->value,
+                                     .se = r->se[p] + w * e->se};
     case IMP_WANT_UGR: break;
     }
     const double direct = j < m->n ? m->direct[p * m->n + j] : m->base_direct[p];
-    return (struct imp_estimate){c * (r->value[p] - direct), c * r->se[p], 0};
+    return (struct imp_estimate){.value = c * (r->value[p] - direct), .se = c * r->se[p]};
 }
 
 void imp__design_rows_set(struct imp__design_model *m, size_t k, double wanted, double z)

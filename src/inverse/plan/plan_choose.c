@@ -133,7 +133,8 @@ enum imp_status imp__plan_choose(const struct imp__plan_choice *c, size_t *chose
     }
     if (s.n_chosen > 0) IMP_TRY(score(&s, &now));
     else IMP_TRY(imp__plan_evaluate(c->model, s.set, c->n_have, known));
-    *gain = (struct imp_estimate){known->phi - s.today, 0, 1};
+    *gain =
+        (struct imp_estimate){.value = known->phi - s.today, .se = 0, .bias_order = 1};
     error_of(&s, today, hidden, gain);
     *n_chosen = s.n_chosen;
 out:

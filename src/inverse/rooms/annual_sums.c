@@ -121,7 +121,9 @@ struct imp_estimate imp__annual_estimate(const double v[IMP__VARIANTS])
     const double next = (s.quarter - 3 * s.half) / 3;
     const double slower =
         s.quarters > 0 ? imp_clamp(2 * s.halves / s.quarters, 1.0, 2.0) : 1;
-    return (struct imp_estimate){v[0] - s.half, sqrt(slower * s.own + imp__sqr(next)), 2};
+    return (struct imp_estimate){.value = v[0] - s.half,
+                                 .se = sqrt(slower * s.own + imp__sqr(next)),
+                                 .bias_order = 2};
 }
 
 /* A part of the hours. */

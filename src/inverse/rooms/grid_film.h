@@ -10,6 +10,7 @@ struct imp_grid_film {
     const struct imp_sensor *sensor;
     double weight[4]; /* of the channels in the luminance */
     int channels;
+    int alone;   /* the first channel of points that do not share (imp__render_grid) */
     bool shared; /* walks reach many pixels, whose errors are not independent */
 };
 /* What imp_grid_read refuses. run: checked. */
@@ -21,6 +22,11 @@ enum imp_status imp__grid_film_check(const struct imp_grid_film *grid,
 /* Reading and error of a pixel. */
 void imp__grid_film_take(const struct imp_grid_film *grid, const imp_film *film,
                          size_t pixel, double *value, double *se);
+/* Mean of all pixels, where none depends on another or they share: error and degrees of freedom. */
+enum imp_status imp__grid_film_mean(const struct imp_grid_film *grid,
+                                    const imp_film *film, struct imp_estimate *out);
+/* Degrees of freedom of the sum of n independent variances se^2, each of k. */
+double imp__grid_freedom(size_t n, const double *se, double k);
 /* Independent sets of samples of a pixel. */
 static inline int64_t imp__grid_film_sets(const imp_film *film)
 {

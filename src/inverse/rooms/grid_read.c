@@ -3,11 +3,14 @@
  * The pixels of a meter as a grid: where they are, and what they read. */
 #include "base/arguments.h"
 #include "base/film.h"
+#include "base/float_mode.h"
 #include "color/rgb.h"
+#include "film/film_render.h"
 #include "grid_film.h"
 #include "kind/sensor/radiancemeter.h"
 #include "kind/sensor/receiver.h"
 #include "room_average.h"
+#include "scene/access.h"
 #include "walk/run/run.h"
 #include <importon/rooms.h>
 #include <math.h>
@@ -128,15 +131,53 @@ enum imp_status imp__grid_film_check(const struct imp_grid_film *grid,
                       grid->sensor->name);
 }
 
+static double error_of(const struct imp_grid_film *grid, const imp_film *film,
+                       size_t pixel, int first)
+{
+    double se = 0;
+    for (int c = 0; c < grid->channels; c++)
+        se += grid->weight[c] *
+              (double)film->se[pixel * (size_t)film->channels + (size_t)(first + c)];
+    return se;
+}
+
+enum imp_status imp__grid_film_mean(const struct imp_grid_film *grid,
+                                    const imp_film *film, struct imp_estimate *out)
+{
+    const size_t n = (size_t)film->width * (size_t)film->height;
+    double *se = imp__alloc(film->ctx, n, sizeof *se), square = 0;
+    if (!se) return imp__error(film->ctx, IMP_E_NOMEM, "no memory for the readings");
+    *out = (struct imp_estimate){0};
+    for (size_t i = 0; i < n; i++) {
+        double value, own;
+        imp__grid_film_take(grid, film, i, &value, &own);
+        out->value += value / (double)n;
+        se[i] = error_of(grid, film, i, grid->alone);
+        square += se[i] * se[i];
+    }
+    const double k = (double)imp__grid_film_sets(film) - 1;
+    out->se = sqrt(square) / (double)n;
+    out->freedom = (int)imp_clamp(imp__grid_freedom(n, se, k), 1.0, 1e9);
+    imp__release(film->ctx, se);
+    return IMP_OK;
+}
+
 void imp__grid_film_take(const struct imp_grid_film *grid, const imp_film *film,
                          size_t pixel, double *value, double *se)
 {
-    *value = *se = 0;
-    for (int c = 0; c < grid->channels; c++) {
-        const size_t at = pixel * (size_t)film->channels + (size_t)c;
-        *value += grid->weight[c] * (double)film->mean[at];
-        *se += grid->weight[c] * (double)film->se[at];
-    }
+    *value = 0;
+    for (int c = 0; c < grid->channels; c++)
+        *value += grid->weight[c] *
+                  (double)film->mean[pixel * (size_t)film->channels + (size_t)c];
+    *se = error_of(grid, film, pixel, 0);
+}
+
+static enum imp_status grid_render(imp_scene *scene, const struct imp_run *run,
+                                   int *alone, imp_film **film)
+{
+    IMP_FLOAT_MODE;
+    IMP_READS(scene);
+    return imp__render_grid(scene, run, alone, film);
 }
 
 enum imp_status imp_grid_read(imp_scene *scene, const struct imp_run *run, double *value,
@@ -147,27 +188,24 @@ enum imp_status imp_grid_read(imp_scene *scene, const struct imp_run *run, doubl
     struct imp_run own;
     imp_film *film = NULL;
     imp_problem *problem = NULL;
-    struct imp_estimate mean = {0, 0, 0};
-    double square = 0;
+    struct imp_estimate mean = {0};
     IMP_REQUIRE(NULL, scene, "scene");
     IMP_REQUIRE(scene->ctx, value, "value");
     IMP_REQUIRE(scene->ctx, se, "se");
     IMP_REQUIRE(scene->ctx, average, "average");
     IMP_RUN(scene->ctx, own, run);
     IMP_CHECKED(imp__grid_film_of(scene, &own, &grid));
-    IMP_TRY(imp_render(scene, &own, &film));
+    IMP_TRY(grid_render(scene, &own, &grid.alone, &film));
     IMP_TRY(imp__grid_film_check(&grid, film));
     const size_t pixels = (size_t)film->width * (size_t)film->height;
-    if (grid.shared) {
+    if (!grid.shared) {
+        IMP_TRY(imp__grid_film_mean(&grid, film, &mean));
+    } else {
         IMP_TRY(imp_problem_create(scene, &problem));
         IMP_TRY(imp__room_average(problem, &own, &mean, NULL, NULL));
     }
-    for (size_t i = 0; i < pixels; i++) {
+    for (size_t i = 0; i < pixels; i++)
         imp__grid_film_take(&grid, film, i, &value[i], &se[i]);
-        if (!grid.shared) mean.value += value[i] / (double)pixels;
-        square += se[i] * se[i];
-    }
-    if (!grid.shared) mean.se = sqrt(square) / (double)pixels;
     *average = mean;
     if (sets) *sets = imp__grid_film_sets(film);
 out:

@@ -3,6 +3,7 @@
  * Average, extremes and uniformities of a grid, with intervals (importon/rooms.h has their
  * derivation). */
 #include "base/arguments.h"
+#include "grid_film.h"
 #include "math/stat.h"
 #include "math/vec.h"
 #include <importon/rooms.h>
@@ -31,7 +32,7 @@ struct grid {
 
 /* Degrees of freedom of a sum of independent variances s^2, each estimated with k (Satterthwaite
  * 1946; E[s^4] = (1 + 2/k) sigma^4). */
-static double freedom_of_sum(size_t n, const double *se, double k)
+double imp__grid_freedom(size_t n, const double *se, double k)
 {
     double sum = 0, square = 0;
     for (size_t i = 0; i < n; i++) {
@@ -138,7 +139,7 @@ enum imp_status imp_grid_summarise(imp_context *context, size_t n, const double 
     if (n == 0) return imp__error(context, IMP_E_ARG, "a grid of no points");
     IMP_FINITE_ALL(context, value, n, "value");
     IMP_FINITE_ALL(context, se, n, "se");
-    struct imp_estimate all = {0, 0, 0};
+    struct imp_estimate all = {0};
     for (size_t i = 0; i < n; i++) {
         if (se[i] < 0)
             return imp__error(context, IMP_E_ARG, "se[%zu] = %g is negative", i, se[i]);
@@ -156,7 +157,9 @@ enum imp_status imp_grid_summarise(imp_context *context, size_t n, const double 
         return imp__error(context, IMP_E_ARG, "confidence = %g is not in (0, 1)",
                           confidence);
     const struct grid g = {n, value, se, k,
-                           k >= 1 && apart ? freedom_of_sum(n, se, k) : k};
+                           average && average->freedom > 0 ? average->freedom
+                           : k >= 1 && apart               ? imp__grid_freedom(n, se, k)
+                                                           : k};
     struct imp_grid_summary s = {.size = sizeof s, .n = n, .confidence = confidence};
     const double side = (1 - confidence) / 2;
     size_t at;

@@ -215,7 +215,7 @@ enum imp_status imp_grid_read_until(imp_scene *scene, const struct imp_run *run,
         sum += value[i] / (double)s.n;
         square += se[i] * se[i];
     }
-    *average = (struct imp_estimate){sum, sqrt(square) / (double)s.n, 0};
+    *average = (struct imp_estimate){.value = sum, .se = sqrt(square) / (double)s.n};
     if (sets) *sets = least;
     if (end) IMP_GIVE(scene->ctx, end, ended, "end");
 out:

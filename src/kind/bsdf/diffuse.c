@@ -91,5 +91,11 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_c
     return p;
 }
 
-const struct imp_bsdf_lanes imp__diffuse_lanes = {.sample = sample_lanes,
-                                                  .pdf_eval = pdf_eval_lanes};
+static bool even(const struct imp_bsdf *b)
+{
+    (void)b;
+    return true;
+}
+
+const struct imp_bsdf_lanes imp__diffuse_lanes = {
+    .sample = sample_lanes, .pdf_eval = pdf_eval_lanes, .even = even};

@@ -251,5 +251,14 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_c
     return pdf;
 }
 
+static bool even(const struct imp_bsdf *b)
+{
+    for (int k = 0; k < b->n_child; k++) {
+        const struct imp_bsdf_lanes *child = imp__bsdf_lanes(b->child[k], 0);
+        if (!child || !child->even || !child->even(b->child[k])) return false;
+    }
+    return true;
+}
+
 const struct imp_bsdf_lanes imp__twosided_lanes = {
-    .covers = covers, .sample = sample_lanes, .pdf_eval = pdf_eval_lanes};
+    .covers = covers, .sample = sample_lanes, .pdf_eval = pdf_eval_lanes, .even = even};

@@ -3,6 +3,7 @@
  * A vertex of a bundle by the step of walks that go alone (core/one_step.h): out of the columns,
  * through the kinds' functions, and back. */
 #include "in_media.h"
+#include "reuse.h"
 #include "walk/media/tracking.h"
 #include "walk/path/sensor_end.h"
 #include "walk/path/surface_sensor.h"
@@ -173,6 +174,12 @@ void imp__vertex_alone(struct imp_depth *d, int i, int at)
     struct imp_vertex *v = imp__surface_meet(s, &hit, &surface, &frame);
     d->lone->shadow.wanted = false;
     const bool goes_on = v && imp__vertex_work(&bundle_end, s, v, &hit, &surface, &frame);
+    if (imp_unlikely(d->reuse != NULL) && d->depth == 0) {
+        imp__column_put(d->reuse->x, at, surface.p);
+        imp__column_put(d->reuse->ng, at, surface.ng);
+        imp__column_put(d->reuse->n, at, frame.n);
+        d->reuse->even[at] = v && imp__shape_is_even(d->bundle->tracer, hit.shape);
+    }
     vertex_give_back(d, v, goes_on, walk, d->rays->up[i], at);
     forget(d, mark);
 }
@@ -233,6 +240,8 @@ void imp__meter_vertex(struct imp_depth *d, const struct imp_walk *begun, int wa
     struct imp_vertex *v = imp__meter_begin(s, &surface, &frame);
     d->lone->shadow.wanted = false;
     const bool goes_on = v && imp__vertex_work(&bundle_end, s, v, NULL, &surface, &frame);
+    if (imp_unlikely(d->reuse != NULL) && v)
+        imp__reuse_point(d->reuse, walk, surface.p, surface.ng);
     *weight = w->first ? w->first->w[0] : 0;
     d->bundle->set[walk] = w->point.points ? w->point.set : w->key.state;
     vertex_give_back(d, v, goes_on, walk, walk, walk);

@@ -6,6 +6,7 @@
 #include "by_shape.h"
 #include "in_media.h"
 #include "lanes_light.h"
+#include "reuse.h"
 #include "scene/ray_columns.h"
 #include "walk/path/first_segment.h"
 #include <string.h>
@@ -43,6 +44,8 @@ static bool bundle_create(struct imp_arena *arena, size_t n, struct imp_bundle *
            TAKE(b->index) && TAKE(b->L[0]) && TAKE(b->L[1]) && TAKE(b->L[2]) &&
            TAKE(b->L[3]) && (b->colors == 3 || TAKE(b->waves)) && TAKE(b->valid) &&
            TAKE(b->dropped) && (b->tracer->value_only || TAKE(b->walks)) &&
+           (b->tracer->together == 0 || (TAKE(b->alone[0]) && TAKE(b->alone[1]) &&
+                                         TAKE(b->alone[2]) && TAKE(b->alone[3]))) &&
            (!crosses_media(b->tracer) || (TAKE(b->keys) && TAKE(b->drew)));
 }
 
@@ -124,6 +127,8 @@ static bool room_create(const struct imp_tracer *tracer, struct imp_arena *arena
     imp__walk_clear(&r->lone.walk);
     r->lone.walk.point.points = tracer->points;
     imp__step_begin(tracer, arena, &r->lone.walk, r->lone.scratch, &r->lone.step);
+    r->lone.cut.made = false;
+    if (tracer->sensor->shape) r->lone.step.cut = &r->lone.cut;
     r->lone.step.t_min = 0;
     r->lone.step.t_max = INFINITY;
     return true;
@@ -194,11 +199,13 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
 {
     const size_t n = (size_t)n_pixels * (size_t)n_samples;
     struct room r;
+    struct imp_reuse reuse;
     struct imp_depth d = {
         .bundle = b, .hits = &r.hits, .shadows = &r.shadows, .lone = &r.lone};
-    struct link *last = NULL;
+    struct link *last = NULL, *met_first = NULL; /* met_first: by points that share */
     *b = (struct imp_bundle){.tracer = tracer,
                              .n = (int)n,
+                             .n_samples = n_samples,
                              .colors = tracer->wavelengths ? 4 : 3,
                              .before = tracer->sensor->shape   ? 2
                                        : crosses_media(tracer) ? 1
@@ -207,6 +214,10 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
     memset(b->valid, 0, n * sizeof *b->valid);
     memset(b->dropped, 0, n * sizeof *b->dropped);
     for (int c = 0; c < 4; c++) memset(b->L[c], 0, n * sizeof *b->L[c]);
+    if (imp_unlikely(tracer->together > 0)) {
+        if (!imp__reuse_create(arena, b, &reuse)) return false;
+        d.reuse = &reuse;
+    }
     if (!tracer->sensor->shape) {
         if (!imp__camera_begin(arena, b, xy, n_samples, samples, &r.flights[0]))
             return false;
@@ -234,11 +245,20 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
         else imp__intersect_columns(tracer->scene, &d.rays->ray, &r.hits);
         imp__vertices(&d, last ? last->values.beyond : b->L, &r.by_shape);
         see(&d, &r);
+        if (imp_unlikely(d.reuse != NULL) && d.depth == 0) {
+            imp__reuse_connect(&reuse, d.values, &r.shadows, r.hidden);
+            met_first = here;
+        }
         r.flights[0].ray.near = NULL;
         last = here;
     }
-    for (; last; last = last->before)
+    for (; last; last = last->before) {
+        if (imp_unlikely(last == met_first))
+            imp__reuse_give(&reuse, &last->values, &last->before->values);
         fold(&last->values, b->colors, last->before ? last->before->values.beyond : b->L);
+    }
+    if (imp_unlikely(met_first != NULL))
+        imp__reuse_alone(&reuse, &met_first->before->before->values, b);
     for (int k = 0; b->walks && k < b->n; k++) {
         imp__vertex_fetch(b->walks[imp_min(k + 2, b->n - 1)].last, IMP_VERTEX_VALUES);
         imp__walk_close(tracer, &b->walks[k]);

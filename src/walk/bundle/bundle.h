@@ -2,7 +2,7 @@
  *
  * Walks in bundles: those of a few pixels of a picture go together, one segment at a time. Each
  * has the value, and the record if it is recorded, that it has alone (walk.h, imp__walk_trace), to
- * the bit; together they take less time, since kinds whose formulas are texts in lanes work on
+ * the bit, where points of a grid do not share (reuse.h); together they take less time, since kinds whose formulas are texts in lanes work on
  * several at once.
  *
  * A bundle begins in bundle.c. Vertices are made in lanes (lanes_vertex.c), where kinds without such
@@ -15,6 +15,9 @@
 
 /* The walks of such a tracer can be bundled. */
 bool imp__bundle_fits(const struct imp_tracer *tracer);
+/* And its points can share what they meet first (reuse.h), so many of them. */
+enum { IMP_REUSE_MOST = 8 };
+bool imp__reuse_fits(const struct imp_tracer *tracer);
 /* The tracer if its walks can be bundled, and take less time so: where a register holds two
  * doubles they take more. Else NULL. */
 static inline const struct imp_tracer *imp__bundle_use(const struct imp_tracer *tracer)
@@ -29,7 +32,7 @@ static inline const struct imp_tracer *imp__bundle_use(const struct imp_tracer *
 
 struct imp_bundle {
     const struct imp_tracer *tracer;
-    int n;
+    int n, n_samples;               /* in all, of each pixel */
     int colors;                     /* 3, or the 4 wavelengths that each walk carries */
     const struct imp_waves **waves; /* of each walk; NULL: colours */
     int before; /* vertices before the first one that a ray leads to */
@@ -43,6 +46,7 @@ struct imp_bundle {
     /* Results. Where the tracer wants values only: radiance at the sensor; is alpha 1; why it was
      * dropped (enum imp_drop). */
     double *L[4];
+    double *alone[4]; /* where points share: what L is without that */
     bool *valid;
     uint8_t *dropped;
     struct imp_walk *walks; /* [n] records; NULL: values only */

@@ -16,10 +16,12 @@ struct imp_lone {
     struct imp_shadow shadow;
     int medium; /* where it begins, in media (struct imp_shadows) */
     double behind;
+    struct imp_light_cut cut; /* at the point of a meter */
     imp_spec scratch[IMP_INPUTS_MAX];
     imp_spec each[IMP_WIDE_LANES * IMP_INPUTS_MAX]; /* inputs of vertices in lanes */
 };
 
+struct imp_reuse;
 struct imp_depth {
     struct imp_bundle *bundle;
     int depth;
@@ -33,6 +35,8 @@ struct imp_depth {
     struct imp_flights *next;    /* likewise */
     struct imp_lone *lone;
     struct imp_in_media *media; /* in_media.h; NULL: walks cross none */
+    struct imp_reuse
+        *reuse; /* what it is told of points and of the surfaces met; NULL: nothing */
 };
 
 /* A walk before its first segment; first rays of walks from a camera (bundle_begin.c). False: no
@@ -66,6 +70,7 @@ struct imp_bin {
     const struct imp_bsdf_lanes *kernel;   /* NULL: lane by lane (lone_kernel.c) */
     uint64_t derivative;                   /* as of struct imp_dirs */
     bool plain;   /* its inputs are the constants `in`, without a kernel `each` */
+    bool even;    /* it sends the same to all who see one side of it */
     bool spectra; /* where walks carry wavelengths: all are plain spectra */
     bool
         texels; /* in colours: those that are not plain are textures with a form in lanes */
@@ -82,6 +87,8 @@ bool imp__shape_in_lanes(const struct imp_tracer *tracer, int shape);
 void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *bin);
 /* Those of collisions. False: they are made one by one. */
 bool imp__collision_bin(const struct imp_tracer *tracer, int medium, struct imp_bin *bin);
+/* Does it send the same to all who see one side of it? Such vertices are in lanes where they are many. */
+bool imp__shape_is_even(const struct imp_tracer *tracer, int shape);
 /* The vertices of the rays order[n], at places `at` and on. */
 void imp__vertices_in_lanes(struct imp_depth *d, const struct imp_bin *bin,
                             const int32_t *order, int n, int at);

@@ -25,6 +25,17 @@ bool imp__shape_in_lanes(const struct imp_tracer *tracer, int shape)
                 IMP_ANALYTIC); /* else points are located by what is not in lanes */
 }
 
+static bool is_even(const struct imp_bsdf *b, const struct imp_bsdf_lanes *kernel)
+{
+    return kernel && kernel->even && kernel->even(b);
+}
+bool imp__shape_is_even(const struct imp_tracer *tracer, int shape)
+{
+    const struct imp_scene *scene = tracer->scene;
+    const struct imp_bsdf *b = imp__shape_bsdf(scene, scene->shapes[shape]);
+    return imp__shape_in_lanes(tracer, shape) && is_even(b, imp__bsdf_lanes(b, 0));
+}
+
 /* The input, or that of which it is the luminance. */
 static const struct imp_input *colour_of(const struct imp_input *const *i)
 {
@@ -50,6 +61,7 @@ void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *
     bin->surface = imp__shape_lanes(s);
     bin->derivative = active && b->index >= 0 ? active->inputs[b->index] : 0;
     bin->kernel = imp__bsdf_lanes(b, bin->derivative);
+    bin->even = is_even(b, bin->kernel);
     bin->plain = bin->spectra = true;
     for (int j = 0; j < b->n_in; j++) {
         bin->plain &= colour_of(&b->input[j])->plain;

@@ -5,20 +5,10 @@
  * have a kernel, light samples and roulette, and nothing more. */
 #include "in_media.h"
 #include "lanes_record.h"
-#include "math/offset.h"
+#include "math/wide_offset.h"
+#include "reuse.h"
 
 /* ---- What leaves it ---------------------------------------------------------------------- */
-
-/* imp__offset. */
-static imp_wide3 offset(imp_wide3 p, imp_wide3 ng, imp_wide3 d)
-{
-    const imp_wide scale = imp__wide_larger(
-        imp__wide_magnitude(p.x),
-        imp__wide_larger(imp__wide_magnitude(p.y), imp__wide_magnitude(p.z)));
-    return imp__wide3_plus(
-        p, imp__wide3_times(ng, imp__wide_signed_as((1 + scale) * IMP_RAY_EPSILON,
-                                                    imp__wide3_inner(ng, d))));
-}
 
 static inline imp_wide_truth is_zero(const imp_wide f[4], int colors)
 {
@@ -128,7 +118,7 @@ light_see(struct imp_depth *d, const struct imp_bin *bin,
     const unsigned bits = lit->on;
     const int n = to->ray.n;
     if (!bits) return;
-    const imp_wide3 o = offset(v->x.p, v->x.ng, l->at.wi);
+    const imp_wide3 o = imp__wide_offset(v->x.p, v->x.ng, l->at.wi);
     imp__wide3_append(to->ray.o, n, bits, o);
     imp__wide3_append(to->ray.d, n, bits,
                       imp__wide3_choose(l->far, l->at.wi, imp__wide3_minus(l->at.p, o)));
@@ -207,7 +197,7 @@ scatter_on(struct imp_depth *d, const struct imp_bin *bin,
     struct imp_flights *to = d->next;
     const unsigned bits = s->on;
     const int n = to->ray.n;
-    imp__wide3_append(to->ray.o, n, bits, offset(v->x.p, v->x.ng, s->world));
+    imp__wide3_append(to->ray.o, n, bits, imp__wide_offset(v->x.p, v->x.ng, s->world));
     imp__wide3_append(to->ray.d, n, bits, s->world);
     imp__wide_append(&to->ray.far[n], bits, imp__wide(INFINITY));
     imp__wide3_append(to->from, n, bits, v->x.p);
@@ -314,6 +304,12 @@ work(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order, int n
             d->values->up[at + k] = d->rays->up[order[k]];
             b->valid[v.walk[k]] = true;
         }
+    }
+    if (imp_unlikely(d->reuse != NULL) && d->depth == 0) {
+        imp__wide3_store(d->reuse->x, at, v.x.p);
+        imp__wide3_store(d->reuse->ng, at, v.x.ng);
+        imp__wide3_store(d->reuse->n, at, v.x.frame.n);
+        for (int k = 0; k < n; k++) d->reuse->even[at + k] = bin->even;
     }
     if (imp_unlikely(d->last)) return true;
     light_see(d, bin, &v, media, &lit);

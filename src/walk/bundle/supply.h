@@ -24,7 +24,8 @@ struct imp_supply {
     int left, place; /* walks of it that were not taken; number of the next one */
 };
 
-/* Pixels of a rectangle, row by row, for which counts(payload, x, y). */
+/* Pixels of a rectangle for which counts(payload, x, y): row by row, or where points of a grid share
+ * what they meet, four neighbours at a time. */
 struct imp_supply_pixels {
     int x0, y0, x1, y1; /* without x1 and y1 */
     bool (*counts)(const void *payload, int x, int y);
@@ -43,5 +44,7 @@ void imp__supply_ready(struct imp_supply *supply);
 /* The next walk, which is that of this pixel and sample. */
 void imp__supply_take(struct imp_supply *supply, int x, int y, int64_t sample,
                       struct imp_walk *walk);
+/* Where points share: what the walk that was taken last has without that. */
+imp_spec imp__supply_alone(const struct imp_supply *supply, const struct imp_walk *walk);
 
 #endif

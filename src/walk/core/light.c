@@ -89,7 +89,8 @@ static __attribute__((noinline)) int tree_sample(const struct imp_step *s,
     double which = one ? u[0] : imp__step_number(s, IMP_DIM_LIGHT);
     int prim;
     *pmf = 0;
-    const int light = imp__light_tree_choose(s->light_tree, &place, &which, &prim, pmf);
+    const int light =
+        imp__light_tree_choose(s->light_tree, &place, s->cut, &which, &prim, pmf);
     if (light < 0) return -1;
     if (one) u[0] = which;
     const struct imp_emitter *e = s->scene->emitters[light];

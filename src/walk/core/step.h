@@ -97,7 +97,9 @@ struct imp_step {
     struct imp_both *both; /* of a sample from both ends, whose weights it has; NULL */
     /* Where lights are chosen by a tree. */
     const struct imp_light_tree *light_tree; /* NULL: by their weights */
-    struct imp_light_place left;             /* where the ray in flight left */
+    struct imp_light_cut
+        *cut; /* of the last place, where many walks begin; NULL: none is kept */
+    struct imp_light_place left; /* where the ray in flight left */
 };
 
 /* Depth of the vertex at work as max_depth counts it. */

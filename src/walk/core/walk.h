@@ -179,6 +179,8 @@ struct imp_tracer {
     bool collisions_fixed; /* the derivative of a frozen walk is wanted, whose collisions
                               stay where they are, also of extinctions: no probes */
     const struct imp_photograph *photograph; /* that is compared with; NULL: none */
+    int together; /* points of a grid that share what their walks meet first, where these are
+                     bundled (bundle/reuse.h); 0: none do */
     int split; /* continuations of the first vertex, each with its share; 0: one. Scenes
                   with media have one */
     double

@@ -124,6 +124,7 @@ static inline void step_begin(const struct imp_tracer *tracer, struct imp_arena 
     s->at.carried = walk->waves ? &walk->waves->carried : NULL;
     s->at.surface = NULL;
     s->at.prim = 0;
+    s->cut = NULL;
     s->light_tree = tracer->integrator->light_tree ? tracer->scene->light_tree : NULL;
     s->segment = imp__segment_first(tracer);
     s->o = s->from = walk->ray.o;
