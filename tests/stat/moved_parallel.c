@@ -113,7 +113,7 @@ int main(int argc, char **argv)
                     sky);
     number_refused("a camera without a place",
                    room(PATH LAMP "<sensor type='distant' id='far'/>"), "far.pose",
-                   "perspective");
+                   "it has a turn");
     remove(EGG_FILE);
     imp_context_destroy(ctx);
     return tap_done();
