@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Processor time of pictures and gradients by several versions of the program.
 
-    bench/pictures.py [--rounds N] [--spp N] [--only WORDS] IMPORTON OTHER...
+    bench/pictures.py [--rounds N] [--spp N] [--only WORDS] [--differ] IMPORTON OTHER...
 
-One thread, rounds interleaved; the pictures of all programs must have the same bytes. Scenes: the
+One thread, rounds interleaved; the pictures of all programs must have the same bytes (--differ: need not,
+and what a program cannot do is left out). Scenes: the
 Cornell box, `textured`, and an open scene, which is `textured` with two meshes of 8,064 triangles
 with interpolated normals, one of rough gold and one diffuse; `textured` with balls of glass, plastic
 and rough glass, with other floors, or under a picture of the sky; wax, a slab of three colours, and a
@@ -159,7 +160,7 @@ def seconds(command):
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
-        sys.exit(done.stderr)
+        raise RuntimeError(done.stderr)
     return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before, done.stdout
 
 
@@ -169,11 +170,42 @@ def errors(answer):
     return [se for own in each for se in (own if isinstance(own, list) else [own]) if se > 0]
 
 
+def compared(args, name, job, folder):
+    """A line of times, ratios, and ratios of errors."""
+    picture = folder + '/picture.pfm'
+    time = {p: [] for p in args.program}
+    bytes_of, se = {}, {}
+    spp = args.spp // 4 if 'quarter' in name else args.spp * (8 if '8 times' in name else 1)
+    for _ in range(args.rounds):
+        for p in args.program:
+            for old in (picture, picture + '.manifest'):
+                if os.path.exists(old):
+                    os.remove(old)
+            took, answer = seconds([p, *job, '--spp', str(spp), '-t', '1', '-q'])
+            time[p].append(took)
+            if 'gradient' in job:
+                se[p] = errors(answer)
+            if 'render' in job:
+                with open(picture, 'rb') as f:
+                    bytes_of[p] = f.read()
+    if len(set(bytes_of.values())) > 1 and not args.differ:
+        sys.exit(name + ': the pictures differ')
+    first, se_first = time[args.program[0]], se.get(args.program[0], [])
+    line = []
+    for p in args.program:
+        line.append('%.3f s, %.2f (%.2f)' % (min(time[p]), min(time[p]) / min(first),
+                                             statistics.median(time[p]) / statistics.median(first)))
+        if len(se_first) == len(se.get(p, [])) and se_first != se.get(p, []):
+            line[-1] += ', errors %.2f' % statistics.geometric_mean(b / a for a, b in zip(se_first, se[p]))
+    return '  '.join('%-24s' % x for x in line)
+
+
 def main():
     args = argparse.ArgumentParser(description=__doc__.split('\n')[0])
     args.add_argument('--rounds', type=int, default=5)
     args.add_argument('--spp', type=int, default=64)
     args.add_argument('--only', default='', help='jobs whose name has these words')
+    args.add_argument('--differ', action='store_true', help='programs of other versions, which may lack something')
     args.add_argument('program', nargs='+')
     args = args.parse_args()
     with tempfile.TemporaryDirectory() as folder:
@@ -207,36 +239,23 @@ def main():
         for name, scene, shape in (('block', os.path.join(SCENES, 'poses.xml'), 'block'),
                                    ('egg', egg_scene(folder), 'egg')):
             target = '%s/%s.exr' % (folder, name)
-            subprocess.run([args.program[0], 'render', scene, '--set', shape + '.pose=.08,.05,0,0,0,.15', '--seed', '77',
-                            '--spp', '256', '-q', '--no-preview', '-o', target], check=True)
+            made = subprocess.run([args.program[0], 'render', scene, '--set', shape + '.pose=.08,.05,0,0,0,.15', '--seed', '77',
+                            '--spp', '256', '-q', '--no-preview', '-o', target],
+                                  capture_output=args.differ)
+            if made.returncode and not args.differ:
+                sys.exit('no target')
+            if made.returncode:
+                continue
             jobs['loss + gradient, pose of ' + name] = ['gradient', scene, '-T', target, '-p', shape + '.pose', '--json']
         print('%-30s %s' % ('', '  '.join('%-24s' % p[-24:] for p in args.program)))
         for name, job in jobs.items():
             if args.only not in name:
                 continue
-            time = {p: [] for p in args.program}
-            bytes_of, se = {}, {}
-            for _ in range(args.rounds):
-                for p in args.program:
-                    spp = args.spp // 4 if 'quarter' in name else args.spp * (8 if '8 times' in name else 1)
-                    took, answer = seconds([p, *job, '--spp', str(spp), '-t', '1', '-q'])
-                    time[p].append(took)
-                    if 'gradient' in job:
-                        se[p] = errors(answer)
-                    if 'render' in job:
-                        with open(folder + '/picture.pfm', 'rb') as f:
-                            bytes_of[p] = f.read()
-            if len(set(bytes_of.values())) > 1:
-                sys.exit(name + ': the pictures differ')
-            first, se_first = time[args.program[0]], se.get(args.program[0], [])
-            line = []
-            for p in args.program:
-                line.append('%.3f s, %.2f (%.2f)' % (min(time[p]), min(time[p]) / min(first),
-                                                     statistics.median(time[p]) / statistics.median(first)))
-                if len(se_first) == len(se.get(p, [])) and se_first != se.get(p, []):
-                    line[-1] += ', errors %.2f' % statistics.geometric_mean(
-                        b / a for a, b in zip(se_first, se[p]))
-            print('%-30s %s' % (name, '  '.join('%-24s' % x for x in line)), flush=True)
+            try:
+                print('%-30s %s' % (name, compared(args, name, job, folder)), flush=True)
+            except RuntimeError as error:
+                if not args.differ:
+                    sys.exit(str(error))
 
 
 if __name__ == '__main__':
