@@ -122,7 +122,7 @@ struct imp_grid_summary {
  * @param value   [n], finite.
  * @param se      [n], finite, not negative.
  * @param average as imp_grid_read gives it; NULL: the mean of value, whose errors are
- *                then taken as independent.
+ *                then taken as independent, which those of imp_grid_read are not.
  * @param sets    of imp_grid_read; below 2: errors are taken as exact.
  * @param confidence in (0, 1); 0: .95.
  * @param[out] out set out->size first.

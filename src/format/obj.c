@@ -64,8 +64,9 @@ static const char *skip(const char *s, const char *end)
 }
 
 /* Room for n elements of an array that holds `used`: for twice as many, or of many as many as the whole
- * text has if it goes on like this, so that large files are not copied. What is not used is not
- * written, and takes no memory. NULL: there is none, and the array stays. */
+ * text has if it goes on like this, so that large files are not copied. A number, or a corner with
+ * its triangle, takes two bytes of the text at least. What is not used is not written, and takes no
+ * memory. NULL: there is none, and the array stays. */
 static void *room_for(struct obj *o, void *array, size_t *capacity, size_t used, size_t n,
                       size_t size)
 {
@@ -73,7 +74,9 @@ static void *room_for(struct obj *o, void *array, size_t *capacity, size_t used,
     if (n <= *capacity) return array;
     const double part = (double)(o->at + 1) / (double)o->source->text.size;
     size_t wanted = 2 * n + MANY;
-    if (n > MANY) wanted = imp_max(wanted, (size_t)((double)n / part));
+    const size_t most = n + 2 * (o->source->text.size - o->at);
+    if (n > MANY)
+        wanted = imp_max(wanted, (size_t)imp_min((double)n / part, (double)most));
     void *p = imp__alloc_raw(o->ctx, wanted, size);
     if (!p) return NULL;
     if (used > 0) memcpy(p, array, used * size);
@@ -122,13 +125,14 @@ static enum imp_status index_read(struct obj *o, const struct column *c, const c
     return IMP_OK;
 }
 
-/* Vertices side by side in a file are so in the table, which lies in no cache, if they have a place
- * alone. */
+/* Eight vertices side by side in a file are so in the table, which lies in no cache; eights are
+ * scattered, since runs of places that are taken would make searches long. */
 static size_t hash(struct corner k)
 {
-    uint64_t h = k.t * 0xbf58476d1ce4e5b9u;
+    uint64_t h = (k.v >> 3) * 0x9e3779b97f4a7c15u;
+    h = (h ^ (h >> 29) ^ k.t) * 0xbf58476d1ce4e5b9u;
     h = (h ^ (h >> 32) ^ k.n) * 0x94d049bb133111ebu;
-    return (size_t)(k.v + (h ^ (h >> 31)));
+    return (size_t)((h ^ (h >> 31)) << 3 | (k.v & 7));
 }
 
 static uint32_t *slot(const struct obj *o, struct corner k)

@@ -169,7 +169,10 @@ void imp__world_bar(const struct imp_pose *pose, imp_v3 c, double bar[IMP_AFFINE
     double A[9];
     for (int k = 0; k < 9; k++) A[k] = bar[3 + k];
     outer_add(A, e_bar, c - t);
-    if (!imp__mat4_inverse(&M, &back)) return; /* no object is placed so */
+    if (!imp__mat4_inverse(&M, &back)) { /* no object is placed so */
+        for (int k = 0; k < IMP_AFFINE_NUMBERS; k++) bar[k] = 0;
+        return;
+    }
     const bool is_flat =
         pose->shape >= 0 && pose->scene->shapes[pose->shape]->ops->flags & IMP_SHAPE_FLAT;
     if (!imp__world_is_free(pose)) kind_keep(pose, A);

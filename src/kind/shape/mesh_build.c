@@ -322,8 +322,8 @@ static void arrays_move(struct imp_shape *s, const double to_world[12],
         imp_v3 t = p;
         if (normals) {
             const imp_v3 n = imp__mesh_load(m->normals, (uint32_t)k);
-            t = back ? imp__normalize(imp__map_normal(back, n))
-                     : imp__rows_vector(to_world, n);
+            t = back && !imp__is_zero(n) ? imp__normalize(imp__map_normal(back, n))
+                                         : imp__rows_vector(to_world, n);
         }
         for (int i = 0; i < 3; i++) {
             positions[3 * k + (size_t)i] = (float)p[i];

@@ -259,6 +259,9 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
     }
     if (imp_unlikely(met_first != NULL))
         imp__reuse_alone(&reuse, &met_first->before->before->values, b);
+    else if (tracer->together > 0) /* no walk has a segment */
+        for (int c = 0; c < b->colors; c++)
+            memcpy(b->alone[c], b->L[c], n * sizeof(double));
     for (int k = 0; b->walks && k < b->n; k++) {
         imp__vertex_fetch(b->walks[imp_min(k + 2, b->n - 1)].last, IMP_VERTEX_VALUES);
         imp__walk_close(tracer, &b->walks[k]);
