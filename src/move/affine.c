@@ -8,9 +8,8 @@
  * which stretches it along its axis and turns it, about no axis but those across it.
  *
  * By a map X = M x + t:  A = M' M^-1, e = t' + A (c - t), so that  dL/dM = (dL/dA + dL/de (c - t)^T) M^-T
- * and  dL/dt = dL/de.  Where a thing is not to
- * be stretched in every way, only such A are asked for as keep it what it is, and dL/dA is the part
- * of it that is of their kind,
+ * and  dL/dt = dL/de.  A sphere, a
+ * cylinder and a camera have only such A as keep their kind, and dL/dA is projected on these,
  *
  *     turns  (dL/dA - dL/dA^T)/2,   of a sphere also  1 tr(dL/dA)/3,
  *     of a cylinder also  a a^T (a.dL/dA a) + P (tr(dL/dA) - a.dL/dA a)/2,

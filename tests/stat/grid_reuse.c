@@ -86,14 +86,14 @@ static void alone(imp_context *ctx, imp_scene *s, uint64_t seed, struct reading 
 }
 
 struct sums {
-    double mean[N], square[N], told;
+    double mean[N], square[N], stated;
 };
 static void add(struct sums *s, const struct reading *r)
 {
     for (int i = 0; i < N; i++) {
         s->mean[i] += r->value[i] / RUNS;
         s->square[i] += r->value[i] * r->value[i] / RUNS;
-        s->told += r->se[i] * r->se[i] / RUNS;
+        s->stated += r->se[i] * r->se[i] / RUNS;
     }
 }
 static double variance(const struct sums *s, int i)
@@ -131,8 +131,8 @@ static void compare(imp_context *ctx, const char *what, imp_scene *scene)
     tap_ok(off < 3.9 && chi2 < N + 3.5 * sqrt(2. * N * 1.1),
            "%s: means of %d runs as of points alone: z %.1f at most, chi2 %.0f of %d",
            what, RUNS, off, chi2, N);
-    tap_ok(fabs(sqrt(one.told / seen) - 1) < .12, "errors are %.2f times those seen",
-           sqrt(one.told / seen));
+    tap_ok(fabs(sqrt(one.stated / seen) - 1) < .12, "errors are %.2f times those seen",
+           sqrt(one.stated / seen));
     tap_ok(seen < .75 * before, "with %.2f of the variance", seen / before);
     tap_ok(sum < 1e-6 && error < 1e-4,
            "the mean is that of points alone, but for %.1g, with its error (%.1g)", sum,

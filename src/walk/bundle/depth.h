@@ -36,7 +36,7 @@ struct imp_depth {
     struct imp_lone *lone;
     struct imp_in_media *media; /* in_media.h; NULL: walks cross none */
     struct imp_reuse
-        *reuse; /* what it is told of points and of the surfaces met; NULL: nothing */
+        *reuse; /* records the points and the surfaces met; NULL: not shared */
 };
 
 /* A walk before its first segment; first rays of walks from a camera (bundle_begin.c). False: no

@@ -8,8 +8,8 @@
  *
  * and jumps across the circles of imp_emitter_ops.jumps, whose pictures are edges.
  *
- * Of a sky that turns by the rotation vector O, light samples and directions in which it is met are
- * glued to it, w' = O x w. What it sends along does not change, nor does the density of samples:
+ * Light samples of a sky that turns by the rotation vector O, and directions in which it is met, are
+ * glued to the sky, w' = O x w. The radiance along them does not change, nor does the density of samples:
  *
  *     d ln B = d ln K/dw.(O x w),   and for the camera   dL = dL/dd.(d' - O x d);
  *
