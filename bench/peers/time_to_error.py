@@ -20,8 +20,10 @@ take turns, seed by seed.
              and coolings of FITS. Lights start at half of their radiance, grey
 
 Errors come from the spread of seeds. Variance falls as 1/time, so that seconds to 1 % are seconds of a run times its
-relative variance over .0001; fits are run to it. Mitsuba's loss is unbiased: two renders, one for the residual
-and one for its derivative. Points: independent, and the best of each: sobol here, multijitter there.
+relative variance over .0001; fits are run to it. Mitsuba's loss is unbiased: two renders of all samples, one for
+the residual and one for its derivative; importon's has two sets of half of them. Points: independent, and the best
+of each: sobol here, of pictures whole (one set a pixel, without standard errors, which Mitsuba does not have
+either); multijitter there.
 """
 import argparse
 import os
@@ -113,6 +115,7 @@ def clocked(function):
 class Own:
     name = "importon"
     best = "sobol"
+    best_picture = "whole"
 
     def __init__(self, case):
         self.scene = im.load_file(case.path, **case.told)
@@ -138,7 +141,7 @@ class Own:
 
 class Peer:
     name = "Mitsuba"
-    best = "multijitter"
+    best = best_picture = "multijitter"
 
     def __init__(self, case, own):
         mi.set_variant(case.variant)
@@ -227,7 +230,8 @@ def told(what, rows, note=""):
 
 
 def pictures(case, own, peer, a):
-    got = in_turn((own, peer), both_points, a.seeds, lambda p, points, seed: p.picture(points, samples(p, a), seed))
+    got = in_turn((own, peer), lambda p: ("independent", p.best_picture), a.seeds,
+                  lambda p, points, seed: p.picture(points, samples(p, a), seed))
     mean = got["importon", "independent"][1].mean(axis=0)
     lit = mean > 1e-3 * mean.mean()
     told(case.name + " picture, 1 %", {k: s * float(np.median(v.var(axis=0, ddof=1)[lit] / mean[lit] ** 2)) / 1e-4

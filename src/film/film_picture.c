@@ -310,6 +310,14 @@ static int sweep_passes(const struct render *r, int done)
     return imp_min(n, r->passes - done);
 }
 
+/* The spread of so few sets of points tells too little of a pixel's error. */
+static void no_errors(const struct render *r, imp_film *film)
+{
+    if (r->run->points != IMP_POINTS_WHOLE || !r->picture->points || r->sets > 3) return;
+    imp__release(film->ctx, film->se);
+    film->se = NULL;
+}
+
 /* Were errors of a wide filter taken within strata? */
 static bool in_strata(const struct render *r)
 {
@@ -415,6 +423,7 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
     }
     IMP_TRY(imp__film_sums_finish(&r.sums, in_strata(&r), picture->weights, films));
     for (int k = 0; k < n_films; k++) {
+        no_errors(&r, films[k]);
         films[k]->spp = spp;
         films[k]->sets = r.set > 1 ? spp / r.set : 0;
         films[k]->drops = r.tiles.drops;

@@ -76,7 +76,7 @@ enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
     struct imp_run own;
     IMP_REQUIRE(NULL, scene, "scene");
     IMP_REQUIRE(scene->ctx, out, "out");
-    IMP_RUN(scene->ctx, own, run);
+    IMP_RUN_PICTURE(scene->ctx, own, run);
     IMP_FLOAT_MODE;
     IMP_READS(scene);
     return imp__render_pixels(scene, &own, NULL, out);

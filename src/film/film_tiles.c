@@ -50,9 +50,9 @@ void imp__tile_drop(struct imp_tile_worker *w, enum imp_drop cause, int x, int y
 
 const char *imp__points_word(const struct imp_run *run)
 {
-    return run->points == IMP_POINTS_SCENE   ? ""
-           : run->points == IMP_POINTS_SOBOL ? " --points sobol"
-                                             : " --points independent";
+    return run->points == IMP_POINTS_SCENE         ? ""
+           : run->points == IMP_POINTS_INDEPENDENT ? " --points independent"
+                                                   : " --points sobol";
 }
 
 enum imp_status imp__tile_check(struct imp_tile_worker *w)

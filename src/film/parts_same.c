@@ -97,7 +97,8 @@ int imp__same_run(const struct imp_scene *scene, const struct imp_run *run,
         (struct imp_same){"set of parameter values", imp__hash(0, theta, sizeof theta)};
     same[n++] =
         (struct imp_same){"seed or number of samples", imp__hash(0, how, sizeof how)};
-    same[n++] = (struct imp_same){"kind of points",
-                                  imp__points_of(sensor, run) == IMP_POINTS_SOBOL};
+    same[n++] = (struct imp_same){
+        "kind of points", (uint64_t)(imp__points_of(sensor, run) == IMP_POINTS_SOBOL) |
+                              (uint64_t)(run->points == IMP_POINTS_WHOLE) << 1};
     return n;
 }

@@ -174,6 +174,7 @@ struct imp_tracer {
     /* NULL: a pixel's walks are independent. Else those with the numbers 64 s to 64 s + 63
      * are set s of points, of which any prefix may be used. */
     const struct imp_point_table *points;
+    bool whole; /* as few such sets as hold a pixel's walks (IMP_POINTS_WHOLE) */
     const struct imp_mixing *mixing; /* densities in place of the integrator's and the
                                         materials'; NULL: those */
     bool collisions_fixed; /* the derivative of a frozen walk is wanted, whose collisions
@@ -220,7 +221,7 @@ static inline enum imp_points imp__points_of(const struct imp_sensor *sensor,
 {
     const enum imp_points asked =
         run->points != IMP_POINTS_SCENE ? run->points : sensor->points;
-    return asked != IMP_POINTS_SCENE ? asked : IMP_POINTS_SOBOL;
+    return asked == IMP_POINTS_INDEPENDENT ? asked : IMP_POINTS_SOBOL;
 }
 
 /* ---- Wavelengths (waves.c) ------------------------------------------------------- */

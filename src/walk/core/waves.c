@@ -18,13 +18,14 @@ static int set_default(int64_t n)
     return n > 0 ? (int)imp_clamp(n / 4, (int64_t)1, (int64_t)SET_MAX) : SET_TIMED;
 }
 /* The same of points, which gain with the size of a set. */
-static int set_of_points(const struct imp_film_desc *film, int64_t n)
+static int set_of_points(const struct imp_film_desc *film, int64_t n, bool whole)
 {
     if (n <= 0) return SET_TIMED;
     const double pixels = (double)film->crop_w * film->crop_h;
     const int64_t free = imp_min((int64_t)ceil(FREEDOM / pixels) + 1, n / 4);
-    const int64_t most = (n - 1) / IMP_SET_POINTS + 1;
-    const int64_t sets = imp_max(imp_max(most, free), (int64_t)SETS);
+    const int64_t full = (n - 1) / IMP_SET_POINTS + 1;
+    const int64_t sets =
+        whole ? full : imp_max(imp_max(full, free), (int64_t)SETS);
     return (int)imp_max(n / sets, (int64_t)1);
 }
 static int set_of(const struct imp_run *run, int64_t n)
@@ -43,6 +44,7 @@ void imp__tracer_numbers(struct imp_tracer *tracer, const struct imp_run *run, i
     const struct imp_sensor *sensor = scene->sensors[run->sensor];
     tracer->points =
         imp__points_of(sensor, run) == IMP_POINTS_SOBOL ? imp__points() : NULL;
+    tracer->whole = run->points == IMP_POINTS_WHOLE;
     if (!all) return;
     const int drawn = run->wavelengths == IMP_WAVELENGTHS_IMPORTANCE
                           ? IMP_WAVES_IMPORTANCE
@@ -58,7 +60,7 @@ int imp__tracer_set(const struct imp_tracer *tracer, int64_t n)
     if (tracer->kept && imp__walk_source(tracer)->set > 0)
         return imp__walk_source(tracer)->set;
     if (tracer->set > 1) return tracer->set;
-    return tracer->points ? set_of_points(&tracer->sensor->film, n) : 1;
+    return tracer->points ? set_of_points(&tracer->sensor->film, n, tracer->whole) : 1;
 }
 
 /* Walk k of a set of n covers the k-th of n parts of [0, 1); of a hero with C wavelengths

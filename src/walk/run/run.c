@@ -5,8 +5,8 @@
 #include "walk/kept/store.h"
 #include <math.h>
 
-enum imp_status imp__run_take(imp_context *ctx, const char *function,
-                              const struct imp_run *run, struct imp_run *own)
+enum imp_status imp__run_take_picture(imp_context *ctx, const char *function,
+                                      const struct imp_run *run, struct imp_run *own)
 {
     struct imp_run r = IMP_RUN_INIT;
     IMP_CHECKED(imp__options_take(ctx, function, "run", run, &r, sizeof r));
@@ -27,12 +27,28 @@ enum imp_status imp__run_take(imp_context *ctx, const char *function,
     if ((int)r.from < 0 || r.from > IMP_FROM_LIGHTS)
         return imp__error(ctx, IMP_E_ARG, "%s: run->from %d is not known", function,
                           (int)r.from);
-    if ((int)r.points < 0 || r.points > IMP_POINTS_SOBOL)
+    if ((int)r.points < 0 || r.points > IMP_POINTS_WHOLE)
         return imp__error(ctx, IMP_E_ARG, "%s: run->points %d is not known", function,
                           (int)r.points);
+    if (r.points == IMP_POINTS_WHOLE && (r.time_limit_s > 0 || r.walks))
+        return imp__error(ctx, IMP_E_ARG,
+                          "%s: run->points: whole pixels want a number of samples, and "
+                          "walks that are traced: not with %s",
+                          function, r.walks ? "recorded walks" : "a time limit");
     if (r.walks) IMP_CHECKED(imp__walks_run(ctx, function, &r));
     *own = r;
     return IMP_OK;
+}
+
+enum imp_status imp__run_take(imp_context *ctx, const char *function,
+                              const struct imp_run *run, struct imp_run *own)
+{
+    IMP_CHECKED(imp__run_take_picture(ctx, function, run, own));
+    if (own->points != IMP_POINTS_WHOLE) return IMP_OK;
+    return imp__error(ctx, IMP_E_ARG,
+                      "%s: run->points: whole pixels have no standard errors: they are for "
+                      "imp_render alone",
+                      function);
 }
 
 enum imp_status imp__run_traces(imp_context *ctx, const char *function,
