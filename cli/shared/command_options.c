@@ -100,8 +100,10 @@ const struct arg_option options_run[] =
       &cli.from, 0, 0, from_words},
      {ARG_CHOICE | ARG_REPLAYS, 0, "points", "KIND",
       "random numbers of a pixel's samples: independent, sobol, or scene (default: those "
-      "of the scene's sampler; where it is independent, or none, what has least noise); of "
-      "render also whole: sobol with less noise, and up to 192 samples no standard errors",
+      "of the scene's sampler; where it is independent, or none, what has least noise); "
+      "of "
+      "render also whole: sobol with less noise, and up to 192 samples no standard "
+      "errors",
       &cli.points, 0, 0, point_words},
      {0}};
 

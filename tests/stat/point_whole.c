@@ -61,7 +61,8 @@ static void picture(const char *name, imp_scene *scene, int spp, double most)
         ratio[used++] = v[2] / v[1];
     }
     qsort(ratio, used, sizeof *ratio, by_value);
-    tap_ok(with_errors == 0, "%s, %d samples: errors of sets, none of one set", name, spp);
+    tap_ok(with_errors == 0, "%s, %d samples: errors of sets, none of one set", name,
+           spp);
     tap_ok(used > n / 2 && fabs(z2 / (double)used - 1) < .25,
            "%s, %d samples: same mean # z^2 %.3f", name, spp, z2 / (double)used);
     tap_ok(ratio[used / 2] <= most,
@@ -84,8 +85,8 @@ static void sets(imp_scene *scene)
             test_must(ctx, imp_render(scene, &run, &film[kind]));
         }
         const size_t n = values(film[0]);
-        const bool same = !memcmp(imp_film_mean(film[0]), imp_film_mean(film[1]),
-                                  n * sizeof(float));
+        const bool same =
+            !memcmp(imp_film_mean(film[0]), imp_film_mean(film[1]), n * sizeof(float));
         const float *se = imp_film_se(film[1]);
         if (spp == 192)
             tap_ok(!se && !same, "192 samples: three sets have no standard errors");
