@@ -24,8 +24,7 @@ static int set_of_points(const struct imp_film_desc *film, int64_t n, bool whole
     const double pixels = (double)film->crop_w * film->crop_h;
     const int64_t free = imp_min((int64_t)ceil(FREEDOM / pixels) + 1, n / 4);
     const int64_t full = (n - 1) / IMP_SET_POINTS + 1;
-    const int64_t sets =
-        whole ? full : imp_max(imp_max(full, free), (int64_t)SETS);
+    const int64_t sets = whole ? full : imp_max(imp_max(full, free), (int64_t)SETS);
     return (int)imp_max(n / sets, (int64_t)1);
 }
 static int set_of(const struct imp_run *run, int64_t n)

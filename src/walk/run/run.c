@@ -45,10 +45,11 @@ enum imp_status imp__run_take(imp_context *ctx, const char *function,
 {
     IMP_CHECKED(imp__run_take_picture(ctx, function, run, own));
     if (own->points != IMP_POINTS_WHOLE) return IMP_OK;
-    return imp__error(ctx, IMP_E_ARG,
-                      "%s: run->points: whole pixels have no standard errors: they are for "
-                      "imp_render alone",
-                      function);
+    return imp__error(
+        ctx, IMP_E_ARG,
+        "%s: run->points: whole pixels have no standard errors: they are for "
+        "imp_render alone",
+        function);
 }
 
 enum imp_status imp__run_traces(imp_context *ctx, const char *function,
