@@ -853,10 +853,10 @@ enum imp_points {
      * standard errors come from the spread of independent sets, four of each pixel at
      * least in pictures of 8 samples or more. */
     IMP_POINTS_SOBOL,
-    /** Of imp_render alone: the same, in as few sets of each pixel as hold its samples,
-     * which makes errors smaller. Up to 64 samples are one set, of which nothing tells how
-     * far it is off: pictures of fewer than four sets have no standard errors. Walks from
-     * the lights have independent samples, and errors, as ever. */
+    /** The same, in as few sets of each pixel as hold its samples, for imp_render alone:
+     * errors are smaller, but pictures of fewer than four sets (192 samples or less) have
+     * no standard errors. Walks from the lights have independent samples, and errors, as
+     * ever. */
     IMP_POINTS_WHOLE
 };
 

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+# Not under sanitizers: minutes of fitting; the other cases of this folder go through the same code there.
 # A lens whose field of view and distortion nobody knew is measured beside the paints and the vignetting: intervals hold
 # the truth, and none is wide; principal points where they are named, and no lens where nobody asks for it.
 sed 's/<integer name="width" value="24"/<float name="vignetting_2" value="$dark"\/> &/

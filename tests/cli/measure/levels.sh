@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+# Not under sanitizers: minutes of fitting; the other cases of this folder go through the same code there.
 # Coarse to fine, a camera is found by a photograph with a gamma, 8 bits, clipped values and masked pixels, from
 # a third of the picture away.
 importon render "$SCENES/still.xml" -m mono -q -s 1 --seed 9 --spp 512 -D right_exposure=3.4 -o right.pfm
