@@ -2,6 +2,7 @@
  *
  * A recorded walk from stop to stop where something has moved (check_moved.h). */
 #include "check_moved.h"
+#include "walk/moved/moved_mirror.h"
 #include "walk/moved/moved_sky.h"
 #include "walk/path/first_segment.h"
 #include <math.h>
@@ -13,6 +14,8 @@ struct stop {
     struct imp__glued old;
     struct imp__moved_at here;
     imp_v3 x, from[2]; /* its place; directions of arrival, now and then */
+    bool turns;        /* the ray beyond it comes from a mirror */
+    imp_v3 leaves[2];  /* its direction, now and then */
     imp_spec grows;    /* how the light that arrives there has changed on the way */
     imp_spec P;        /* of light that leaves it, where its kernel has not changed */
 };
@@ -115,6 +118,13 @@ static void float_at(const struct imp__moved_by *m, struct stop *s, imp_v3 o,
     s->grows = fades(m, t * (now / then - 1)) * (now / then);
 }
 
+/* The direction of what leaves a mirror, or a pass behind one, now, of that which was recorded, and
+ * rounded. */
+static imp_v3 leaving(const struct stop *s, imp_v3 then)
+{
+    return imp__normalize(s->leaves[0] + then - s->leaves[1]);
+}
+
 /* The next stop of a walk, behind `before` (NULL: the camera); seen: along the camera's ray, else along
  * a fixed direction. */
 static struct stop stop_at(const struct imp__moved_by *m, const struct imp_walk *walk,
@@ -128,7 +138,9 @@ static struct stop stop_at(const struct imp__moved_by *m, const struct imp_walk 
     else s.old = imp__moved_glued(scene, v, walk->time);
     imp_v3 o = seen ? walk->ray.o : before->x;
     s.from[1] = imp__normalize(s.old.p - (seen ? o : before->old.p));
-    s.from[0] = turns ? imp__moved_turn(m, s.from[1]) : s.from[1];
+    s.from[0] = turns                     ? imp__moved_turn(m, s.from[1])
+                : before && before->turns ? leaving(before, s.from[1])
+                                          : s.from[1];
     if (turns) o = m->to + imp__moved_turn(m, o - m->from);
     const imp_v3 near[2] = {s.from[0] * walk->ray.t_near, s.from[1] * walk->ray.t_near};
     const imp_v3 begin[2] = {before ? before->x : o + near[0],
@@ -152,12 +164,18 @@ static imp_spec step_frozen(const struct imp__moved_by *m, struct stop *s, imp_s
     const struct imp_vertex *next = s->v->next;
     imp_v3 w[2] = {s->from[0], s->from[1]};
     s->P = P * s->v->w;
+    const bool mirrored = imp__is_mirrored(s->v);
+    s->turns |= mirrored;
+    for (int k = 0; k < 2; k++)
+        s->leaves[k] = mirrored ? imp__mirror_turn(k ? s->old.n : s->here.n, s->from[k])
+                                : s->from[k];
     if (!imp__goes_straight(s->v)) {
         const bool place =
             next->d.scatterer == IMP_AT_SKY || next->d.scatterer == IMP_IN_MEDIUM;
         const imp_v3 p =
             place ? imp__decided_v3(next->d.p) : imp__moved_glued(scene, next, 0).p;
-        w[0] = w[1] = imp__normalize(next->d.scatterer == IMP_AT_SKY ? p : p - s->old.p);
+        w[1] = imp__normalize(next->d.scatterer == IMP_AT_SKY ? p : p - s->old.p);
+        w[0] = mirrored ? leaving(s, w[1]) : w[1];
     }
     return s->P * stop_ratio(m, s, w, s->v->d.lobe);
 }
@@ -180,7 +198,8 @@ double imp__frozen_walk(struct imp__moved_by *m, const struct imp_walk *walk, im
         if (v->d.scatterer == IMP_AT_SKY) {
             const imp_v3 d = walk->ray.d;
             const imp_spec sky =
-                !seen
+                here.v && here.turns ? imp__skies_from(scene, here.leaves[0], v->carried)
+                : !seen
                     ? here.v->beyond
                     : imp__skies_from(
                           scene, m->shape == IMP_MOVE_CAMERA ? imp__moved_turn(m, d) : d,
@@ -188,8 +207,9 @@ double imp__frozen_walk(struct imp__moved_by *m, const struct imp_walk *walk, im
             return value + imp__sum_used(P * sky, scene->lanes);
         }
         const struct stop before = here;
-        const bool passed = fog || (here.v && imp__goes_straight(here.v));
+        const bool passed = fog || (here.v && (here.turns || imp__goes_straight(here.v)));
         here = stop_at(m, walk, v, here.v ? &before : NULL, seen);
+        here.turns = before.v && before.turns && imp__goes_straight(v);
         if (fog) P *= here.grows;
         if (!here.floats && v->d.met.emitter >= 0) {
             if (from.v) value += met_frozen(m, &from, &here);
@@ -198,7 +218,10 @@ double imp__frozen_walk(struct imp__moved_by *m, const struct imp_walk *walk, im
         value += light_frozen(m, &here, P);
         if (!v->d.goes_on || !v->next) break;
         P = step_frozen(m, &here, P);
-        if (!imp__goes_straight(v)) {
+        if (imp__is_mirrored(v)) {
+            from.v = NULL;
+            seen = false;
+        } else if (!imp__goes_straight(v)) {
             from = here;
             seen = false;
         } else if (through) from.P *= v->w;

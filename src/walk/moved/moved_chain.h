@@ -19,6 +19,7 @@ struct imp__link_point {
     imp_v3 wo_bar;            /* of the direction to the camera, across it */
     double along;             /* of the length of the ray that leads to the surface */
     bool sky;
+    bool turns; /* the ray that leads there comes from a mirror, and turns with it */
     bool floats;
     bool open;     /* it floats, and no surface is beyond it */
     double part;   /* 1: on the surface */

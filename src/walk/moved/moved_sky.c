@@ -59,6 +59,15 @@ static void slope_add(const struct imp_scene *scene, int emitter, imp_v3 w, imp_
     }
 }
 
+imp_v3 imp__skies_slope(const struct imp_scene *scene, imp_v3 w, imp_spec bar,
+                        const struct imp_carried *carried)
+{
+    imp_v3 slope = {0};
+    for (int k = 0; k < scene->n_environments; k++)
+        slope_add(scene, scene->environments[k], w, bar, carried, &slope);
+    return slope;
+}
+
 void imp__skies_seen_bar(const struct imp__moves *moves, const struct imp_sensor_ray *ray,
                          imp_spec seen, const struct imp_carried *carried,
                          double *theta_bar)

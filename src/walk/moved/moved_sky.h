@@ -26,6 +26,10 @@ imp_spec imp__sky_radiance_from(const struct imp_scene *scene, int emitter, imp_
 /* The same of all skies. */
 imp_spec imp__skies_from(const struct imp_scene *scene, imp_v3 w,
                          const struct imp_carried *carried);
+/* bar, by lanes, times the derivative of what arrives of all skies from the unit direction w, by w, across
+ * it. */
+imp_v3 imp__skies_slope(const struct imp_scene *scene, imp_v3 w, imp_spec bar,
+                        const struct imp_carried *carried);
 /* Skies through a fixed film position, by the adjoint of what arrives there: the direction d of the ray
  * turns by u(o + d) - u(o), and skies under it. Adds to theta_bar. */
 void imp__skies_seen_bar(const struct imp__moves *moves, const struct imp_sensor_ray *ray,

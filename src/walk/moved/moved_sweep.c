@@ -2,87 +2,55 @@
  *
  * The interior derivative of a walk by what moves (moved.h): adjoints of its values from the first
  * vertex to the last, then adjoints of its places from the last to the first. */
-#include "moved_chain.h"
-#include "moved_sent.h"
+#include "moved_sweep.h"
+#include "moved_mirror.h"
 #include "moved_sky.h"
-#include "walk/core/vertex.h"
 #include "walk/path/first_segment.h"
-
-/* What the values of vertex k depend on, as adjoints of their logarithms, by lanes. */
-struct pieces {
-    imp_spec light; /* its light sample */
-    imp_spec step;  /* the step, of all light but `met` */
-    imp_spec met;   /* emission at its end */
-    imp_spec on;    /* what goes on along the step */
-    int lit;        /* vertex of that emission: the next one, or behind passes */
-    imp_spec all;   /* what the camera sees of it, up to `front` */
-};
-
-struct sweep {
-    const struct imp_tracer *tracer;
-    const struct imp__moves *moves;
-    const struct imp_walk *walk;
-    struct imp__link_point *at; /* [n] */
-    struct pieces *piece;       /* [n] */
-    double *theta_bar;
-    int first; /* vertex: 1 where the sensor has one before it */
-    int front; /* the first vertex at which the camera's ray does not go straight on */
-    imp_spec seen; /* adjoint of the light that reaches it */
-    bool meter;    /* the sensor is a surface, which is vertex `first` */
-    bool through;  /* light samples pass what lets light go straight on */
-    bool fog;      /* a medium fills the scene */
-    imp_spec extinction;
-};
-
-static bool is_emitted(const struct imp_vertex *v)
-{
-    return v->d.scatterer != IMP_AT_SKY && v->d.met.emitter >= 0;
-}
 
 /* Emission that the step from v meets, and that is glued to its light where a light sample could
  * have brought it, from behind passes only if these let samples through. */
-static void met_read(const struct sweep *s, const struct imp_vertex *v, imp_spec P, int k,
-                     struct pieces *piece)
+static void met_read(const struct imp__sweep *s, const struct imp_vertex *v, imp_spec P,
+                     int k, struct imp__pieces *piece)
 {
     const struct imp_vertex *y = v->next;
     for (k++; s->through && y && imp__goes_straight(y); k++) {
         P *= y->w;
         y = y->next;
     }
-    if (!y || !is_emitted(y)) return;
+    if (!y || !imp__sweep_emitted(y)) return;
     piece->met = P * y->e;
     piece->lit = k;
 }
 
-/* Where the ray to vertex k begins; of the camera's, in front of its near clip nothing fades. */
-static imp_v3 ray_begin(const struct sweep *s, int k)
+/* Does what is seen from this vertex turn with a mirror? */
+static bool turns_on(const struct imp__link_point *x, const struct imp_vertex *v)
 {
-    const struct imp_sensor_ray *ray = &s->walk->ray;
-    return k > s->first ? s->at[k - 1].x.p : ray->o + ray->d * ray->t_near;
+    return imp__is_mirrored(v) || (x->turns && imp__goes_straight(v));
 }
 
 /* Places and adjoints of all vertices; their number. */
-static int read_walk(struct sweep *s, imp_spec adjoint)
+static int read_walk(struct imp__sweep *s, imp_spec adjoint)
 {
     const struct imp_scene *scene = s->tracer->scene;
     imp_spec P = adjoint;
     int n = 0;
     for (const struct imp_vertex *v = s->walk->first; v; v = v->next, n++) {
         const bool sky = v->d.scatterer == IMP_AT_SKY;
-        s->piece[n] = (struct pieces){.lit = 0};
+        s->piece[n] = (struct imp__pieces){.lit = 0};
         if (n < s->first) {
             P *= v->w;
             continue;
         }
-        struct pieces *piece = &s->piece[n];
+        struct imp__pieces *piece = &s->piece[n];
         if (imp_unlikely(v->d.scatterer == IMP_IN_MEDIUM)) {
             s->at[n] = imp__medium_point(imp__decided_v3(v->d.p));
-            imp__float_aim(scene, &s->at[n], ray_begin(s, n));
+            imp__float_aim(scene, &s->at[n], imp__sweep_begin(s, n));
         } else {
             s->at[n] = sky ? imp__sky_point(imp__normalize(imp__decided_v3(v->d.p)))
                            : imp__surface_point(scene, v->d.shape, &v->d.located,
                                                 v->d.place, v->ng);
         }
+        s->at[n].turns = n > s->first && imp_unlikely(turns_on(&s->at[n - 1], v->prev));
         if (n == s->front) {
             s->seen = P;
             piece->all = P * (v->e + v->b + v->w * v->beyond);
@@ -92,28 +60,22 @@ static int read_walk(struct sweep *s, imp_spec adjoint)
         P *= v->w;
         if (!v->d.goes_on || !v->next) continue;
         piece->on = P;
-        met_read(s, v, P, n, piece);
+        if (imp_likely(!imp__is_mirrored(v))) met_read(s, v, P, n, piece);
         piece->step = P * v->beyond - piece->met;
     }
     return n;
 }
 
-/* The light at y along d, of this adjoint; that of d. */
-static imp_v3 table_bar(struct sweep *s, const struct imp_emitter *e,
-                        const struct imp__glued *y, imp_v3 d, double bar,
-                        const struct imp_carried *carried)
-{
-    return imp__table_bar(s->moves, e, y, d, bar, s->tracer->scene->lanes, carried,
-                          s->theta_bar);
-}
-
 /* Is it the point of a meter, in whose place a white surface is? */
-static bool is_meter(const struct sweep *s, int k) { return s->meter && k == s->first; }
+static bool is_meter(const struct imp__sweep *s, int k)
+{
+    return s->meter && k == s->first;
+}
 
 /* The derivatives of vertex k's kernel towards w, from the places of the chain, which are exact to
  * each other; recorded directions are rounded. False: it is Lambertian without textures, and w and
  * its normal are enough. */
-static bool kernel_derive(const struct sweep *s, int k, const struct imp_vertex *v,
+static bool kernel_derive(const struct imp__sweep *s, int k, const struct imp_vertex *v,
                           imp_v3 w, int lobe, struct imp__kernel_d *out)
 {
     struct imp_surface at = {.s = {1, 0, 0, 0}, .t = {0, 1, 0, 0}, .n = {0, 0, 1, 0}};
@@ -132,7 +94,7 @@ static bool kernel_derive(const struct sweep *s, int k, const struct imp_vertex 
 
 /* The adjoint of vertex k's kernel towards w from that of its logarithm, by lanes. derived: by
  * kernel_derive; NULL: Lambertian. */
-static struct imp__kernel_bar kernel_part(const struct sweep *s, int k,
+static struct imp__kernel_bar kernel_part(const struct imp__sweep *s, int k,
                                           const struct imp__kernel_d *derived, imp_v3 w,
                                           imp_spec bar)
 {
@@ -145,7 +107,7 @@ static struct imp__kernel_bar kernel_part(const struct sweep *s, int k,
 }
 
 /* And what it is to the direction to the camera. */
-static struct imp__kernel_bar kernel_bar(struct sweep *s, int k,
+static struct imp__kernel_bar kernel_bar(struct imp__sweep *s, int k,
                                          const struct imp__kernel_d *derived, imp_v3 w,
                                          imp_spec bar)
 {
@@ -157,12 +119,12 @@ static struct imp__kernel_bar kernel_bar(struct sweep *s, int k,
     } else {
         s->at[k].x.s = derived->frame.s;
     }
-    if (k <= s->front) s->at[k].wo_bar += out.wo;
+    if (k <= s->front || imp_unlikely(s->at[k].turns)) s->at[k].wo_bar += out.wo;
     return out;
 }
 
 /* The same of its light sample, towards w. */
-static struct imp__kernel_bar light_kernel(struct sweep *s, int k,
+static struct imp__kernel_bar light_kernel(struct imp__sweep *s, int k,
                                            const struct imp_vertex *v, imp_v3 w)
 {
     struct imp__kernel_d d;
@@ -170,30 +132,8 @@ static struct imp__kernel_bar light_kernel(struct sweep *s, int k,
     return kernel_bar(s, k, derived ? &d : NULL, w, s->piece[k].light);
 }
 
-/* An adjoint of the logarithm of the light on a line is this one of the line's length. */
-static double length_bar(const struct sweep *s, imp_spec bar)
-{
-    return imp_likely(!s->fog)
-               ? 0
-               : -imp__sum_used(bar * s->extinction, s->tracer->scene->lanes);
-}
-
-/* The ray from a vertex, or from the camera, to vertex k carries light of this adjoint, of which the
- * logarithm changes with its length: by what the surface there moves, or, where k floats at the part s
- * of the length D,  ln(sigma exp(-sigma s D) D). */
-static double reach_bar(const struct sweep *s, int k, imp_spec bar)
-{
-    const struct imp__link_point *x = &s->at[k];
-    if (imp_likely(!s->fog)) return 0;
-    if (!x->floats) return length_bar(s, bar);
-    if (x->open) return 0;
-    return (imp__sum_used(bar, s->tracer->scene->lanes) /
-            imp__length(x->beyond - ray_begin(s, k))) +
-           x->part * length_bar(s, bar);
-}
-
 /* A light sample of a point, or of parallel light. */
-static void delta_bar(struct sweep *s, int k, const struct imp_vertex *v)
+static void delta_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
 {
     const int light = v->d.light.emitter;
     struct imp_emitter *e = s->tracer->scene->emitters[light];
@@ -216,21 +156,21 @@ static void delta_bar(struct sweep *s, int k, const struct imp_vertex *v)
     /* The light turned by a vector sends along d what it sent along d turned back. */
     imp__light_turn_bar(s->moves, light, imp__cross(slope, d), s->theta_bar);
     const struct imp__kernel_bar kernel = light_kernel(s, k, v, r * (-1 / distance));
-    const imp_v3 bar =
-        imp__point_bar(&s->at[k], at, &kernel, weight, length_bar(s, s->piece[k].light)) -
-        turn;
+    const imp_v3 bar = imp__point_bar(&s->at[k], at, &kernel, weight,
+                                      imp__sweep_length_bar(s, s->piece[k].light)) -
+                       turn;
     s->at[k].moved_bar += turn;
     imp__light_velocity_bar(s->moves, light, at, bar, s->theta_bar);
 }
 
 /* Light from the point y of a lamp that reaches vertex k, along -w. */
-static void lamp_bar(struct sweep *s, int k, struct imp__link_point *y, imp_v3 w,
+static void lamp_bar(struct imp__sweep *s, int k, struct imp__link_point *y, imp_v3 w,
                      struct imp__kernel_bar *kernel, const struct imp_emitter *e,
                      imp_spec light)
 {
     struct imp__link_point *x = &s->at[k];
     const double bar = imp__sum_used(light, s->tracer->scene->lanes),
-                 along = length_bar(s, light);
+                 along = imp__sweep_length_bar(s, light);
     if (imp_likely(!x->floats)) {
         imp__connection_bar(x, y, kernel, bar, along);
         return;
@@ -243,7 +183,7 @@ static void lamp_bar(struct sweep *s, int k, struct imp__link_point *y, imp_v3 w
 }
 
 /* The light sample of vertex k. */
-static void light_bar(struct sweep *s, int k, const struct imp_vertex *v)
+static void light_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
 {
     const struct imp_scene *scene = s->tracer->scene;
     const struct imp_emitter *e = scene->emitters[v->d.light.emitter];
@@ -265,40 +205,17 @@ static void light_bar(struct sweep *s, int k, const struct imp_vertex *v)
     const imp_spec light = s->piece[k].light;
     const double bar = imp__sum_used(light, scene->lanes);
     struct imp__kernel_bar kernel = light_kernel(s, k, v, w);
-    kernel.wi -= table_bar(s, e, &y.x, -w, bar, v->carried);
+    kernel.wi -= imp__sweep_table_bar(s, e, &y.x, -w, bar, v->carried);
     lamp_bar(s, k, &y, w, &kernel, e, light);
     imp__velocity_bar(s->moves, &y.x, &y.bar, s->theta_bar);
 }
 
-/* Vertex k passes light straight on: its place does not move what follows, but a texture may let
- * pass another part. */
-static void pass_bar(struct sweep *s, int k, const struct imp_vertex *v)
-{
-    struct imp__link_point *x = &s->at[k], *next = x + 1;
-    const imp_v3 w = imp__link_direction(x, next);
-    const struct imp_scene *scene = s->tracer->scene;
-    const struct pieces *piece = &s->piece[k];
-    struct imp__kernel_d d;
-    if (imp__is_textured(v->bsdf) && kernel_derive(s, k, v, w, v->d.lobe, &d)) {
-        const struct imp__kernel_bar on =
-            imp__kernel_times(&d, piece->step + piece->met, scene->lanes);
-        imp__scatter_bar(x, &on);
-    }
-    if (next->sky || k < s->front) return; /* the camera's ray leads there */
-    next->along += reach_bar(s, k + 1, piece->step);
-    x->moved_bar += imp__slide_bar(next, w, NULL);
-    if (!s->through && !imp__is_zero(piece->met))
-        table_bar(s, scene->emitters[v->next->d.met.emitter], &next->x, -w,
-                  imp__sum_used(piece->met, scene->lanes), v->next->carried);
-    imp__link_velocity_bar(s->moves, next, s->theta_bar);
-}
-
 /* Emission that the step from vertex k meets: a light sample could have brought it. */
-static void met_bar(struct sweep *s, int k, const struct imp_vertex *v, imp_v3 w,
+static void met_bar(struct imp__sweep *s, int k, const struct imp_vertex *v, imp_v3 w,
                     const struct imp__kernel_d *d)
 {
     const struct imp_scene *scene = s->tracer->scene;
-    const struct pieces *piece = &s->piece[k];
+    const struct imp__pieces *piece = &s->piece[k];
     struct imp__link_point *y = &s->at[piece->lit];
     const struct imp_vertex *lit = v->next;
     for (int i = k + 1; i < piece->lit; i++) lit = lit->next;
@@ -310,7 +227,7 @@ static void met_bar(struct sweep *s, int k, const struct imp_vertex *v, imp_v3 w
     }
     struct imp__kernel_bar met = kernel_bar(s, k, d, w, piece->met);
     const struct imp_emitter *e = scene->emitters[lit->d.met.emitter];
-    met.wi -= table_bar(s, e, &y->x, -w, bar, lit->carried);
+    met.wi -= imp__sweep_table_bar(s, e, &y->x, -w, bar, lit->carried);
     lamp_bar(s, k, y, w, &met, e, piece->met);
     if (piece->lit == k + 1) return;
     imp__velocity_bar(s->moves, &y->x, &y->bar, s->theta_bar);
@@ -319,7 +236,7 @@ static void met_bar(struct sweep *s, int k, const struct imp_vertex *v, imp_v3 w
 
 /* The skies that the step from vertex k along w meets, each a vertex: a light sample could have brought
  * what they send. */
-static void skies_met_bar(const struct sweep *s, int k, const struct imp_vertex *v,
+static void skies_met_bar(const struct imp__sweep *s, int k, const struct imp_vertex *v,
                           imp_v3 w, const struct imp__kernel_d *d)
 {
     for (const struct imp_vertex *y = v->next; y; y = y->next) {
@@ -331,10 +248,10 @@ static void skies_met_bar(const struct sweep *s, int k, const struct imp_vertex 
 }
 
 /* The step from vertex k to the next one, which slides along it. */
-static void step_bar(struct sweep *s, int k, const struct imp_vertex *v)
+static void step_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
 {
     struct imp__link_point *x = &s->at[k], *next = x + 1;
-    const struct pieces *piece = &s->piece[k];
+    const struct imp__pieces *piece = &s->piece[k];
     const imp_v3 w = imp__link_direction(x, next);
     struct imp__kernel_d derived;
     const struct imp__kernel_d *d =
@@ -345,14 +262,14 @@ static void step_bar(struct sweep *s, int k, const struct imp_vertex *v)
         if (imp_unlikely(s->moves->skies)) skies_met_bar(s, k, v, w, d);
         return;
     }
-    next->along += reach_bar(s, k + 1, piece->step);
+    next->along += imp__sweep_reach_bar(s, k + 1, piece->step);
     x->moved_bar += imp__slide_bar(next, w, NULL);
     if (!imp__is_zero(piece->met)) met_bar(s, k, v, w, d);
     imp__link_velocity_bar(s->moves, next, s->theta_bar);
 }
 
 /* What the camera's ray meets: its vertices up to `front`. */
-static void front_bar(struct sweep *s)
+static void front_bar(struct imp__sweep *s)
 {
     const struct imp_vertex *v = s->walk->first;
     for (int k = 0; k < s->front; k++) v = v ? v->next : NULL;
@@ -361,15 +278,15 @@ static void front_bar(struct sweep *s)
                             s->theta_bar);
         v = NULL;
     }
-    if (v && is_emitted(v))
-        s->at[s->front].wo_bar +=
-            table_bar(s, s->tracer->scene->emitters[v->d.met.emitter], &s->at[s->front].x,
-                      imp__normalize(s->walk->ray.o - s->at[s->front].x.p),
-                      imp__sum_used(s->seen * v->e, s->tracer->scene->lanes), v->carried);
+    if (v && imp__sweep_emitted(v))
+        s->at[s->front].wo_bar += imp__sweep_table_bar(
+            s, s->tracer->scene->emitters[v->d.met.emitter], &s->at[s->front].x,
+            imp__normalize(s->walk->ray.o - s->at[s->front].x.p),
+            imp__sum_used(s->seen * v->e, s->tracer->scene->lanes), v->carried);
     for (int k = v ? s->front : s->front - 1; k >= s->first; k--) {
         /* From the surface before it, which moves along the ray itself, or from the camera. */
         struct imp__link_point *x = &s->at[k];
-        const double along = reach_bar(s, k, s->piece[k].all);
+        const double along = imp__sweep_reach_bar(s, k, s->piece[k].all);
         x->along += along;
         if (imp_unlikely(s->fog && k > s->first))
             x[-1].along +=
@@ -385,13 +302,13 @@ bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
                       imp_spec adjoint, double *theta_bar)
 {
     if (walk->dropped || !walk->valid || !walk->first) return true;
-    struct sweep s = {.tracer = tracer,
-                      .moves = moves,
-                      .walk = walk,
-                      .theta_bar = theta_bar,
-                      .first = walk->first->d.scatterer == IMP_AT_SENSOR,
-                      .meter = tracer->sensor->shape != NULL,
-                      .through = imp__segment_first(tracer)->through};
+    struct imp__sweep s = {.tracer = tracer,
+                           .moves = moves,
+                           .walk = walk,
+                           .theta_bar = theta_bar,
+                           .first = walk->first->d.scatterer == IMP_AT_SENSOR,
+                           .meter = tracer->sensor->shape != NULL,
+                           .through = imp__segment_first(tracer)->through};
     s.front = s.first;
     s.fog = imp__fog(tracer, walk->first->carried, &s.extinction);
     s.at = imp__arena_take(arena, (size_t)walk->n, sizeof *s.at);
@@ -402,7 +319,8 @@ bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
         if (k < s.first || s.at[k].sky) continue;
         if (v->d.connection == IMP_CONNECTED) light_bar(&s, k, v);
         if (!v->d.goes_on || !v->next) continue;
-        if (imp_unlikely(imp__goes_straight(v))) pass_bar(&s, k, v);
+        if (imp_unlikely(imp__goes_straight(v))) imp__pass_bar(&s, k, v);
+        else if (imp_unlikely(imp__is_mirrored(v))) imp__mirror_bar(&s, k, v);
         else step_bar(&s, k, v);
     }
     if (walk->n <= s.first) return true;

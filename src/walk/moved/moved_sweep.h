@@ -1,0 +1,93 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Inside of the interior derivative (moved_sweep.c, moved_pass.c): a walk while its adjoints are swept. */
+#ifndef IMP_WALK_MOVED_SWEEP_H
+#define IMP_WALK_MOVED_SWEEP_H
+
+#include "moved_chain.h"
+#include "moved_sent.h"
+#include "walk/core/vertex.h"
+
+/* What the values of vertex k depend on, as adjoints of their logarithms, by lanes. */
+struct imp__pieces {
+    imp_spec light; /* its light sample */
+    imp_spec step;  /* the step, of all light but `met` */
+    imp_spec met;   /* emission at its end */
+    imp_spec on;    /* what goes on along the step */
+    int lit;        /* vertex of that emission: the next one, or behind passes */
+    imp_spec all;   /* what the camera sees of it, up to `front` */
+};
+
+struct imp__sweep {
+    const struct imp_tracer *tracer;
+    const struct imp__moves *moves;
+    const struct imp_walk *walk;
+    struct imp__link_point *at; /* [n] */
+    struct imp__pieces *piece;  /* [n] */
+    double *theta_bar;
+    int first; /* vertex: 1 where the sensor has one before it */
+    int front; /* the first vertex at which the camera's ray does not go straight on */
+    imp_spec seen; /* adjoint of the light that reaches it */
+    bool meter;    /* the sensor is a surface, which is vertex `first` */
+    bool through;  /* light samples pass what lets light go straight on */
+    bool fog;      /* a medium fills the scene */
+    imp_spec extinction;
+};
+
+static inline bool imp__sweep_emitted(const struct imp_vertex *v)
+{
+    return v->d.scatterer != IMP_AT_SKY && v->d.met.emitter >= 0;
+}
+
+/* Where the ray to vertex k begins; of the camera's, in front of its near clip nothing fades. */
+static inline imp_v3 imp__sweep_begin(const struct imp__sweep *s, int k)
+{
+    const struct imp_sensor_ray *ray = &s->walk->ray;
+    return k > s->first ? s->at[k - 1].x.p : ray->o + ray->d * ray->t_near;
+}
+
+/* Where the ray to vertex k comes from, as its direction has it. */
+static inline imp_v3 imp__sweep_from(const struct imp__sweep *s, int k)
+{
+    return k > s->front ? s->at[k - 1].x.p : s->walk->ray.o;
+}
+
+/* The light at y along d, of this adjoint; that of d. */
+static inline imp_v3 imp__sweep_table_bar(const struct imp__sweep *s,
+                                          const struct imp_emitter *e,
+                                          const struct imp__glued *y, imp_v3 d,
+                                          double bar, const struct imp_carried *carried)
+{
+    return imp__table_bar(s->moves, e, y, d, bar, s->tracer->scene->lanes, carried,
+                          s->theta_bar);
+}
+
+/* An adjoint of the logarithm of the light on a line is this one of the line's length. */
+static inline double imp__sweep_length_bar(const struct imp__sweep *s, imp_spec bar)
+{
+    return imp_likely(!s->fog)
+               ? 0
+               : -imp__sum_used(bar * s->extinction, s->tracer->scene->lanes);
+}
+
+/* The ray from a vertex, or from the camera, to vertex k carries light of this adjoint, of which the
+ * logarithm changes with its length: by what the surface there moves, or, where k floats at the part s
+ * of the length D,  ln(sigma exp(-sigma s D) D). */
+static inline double imp__sweep_reach_bar(const struct imp__sweep *s, int k, imp_spec bar)
+{
+    const struct imp__link_point *x = &s->at[k];
+    if (imp_likely(!s->fog)) return 0;
+    if (!x->floats) return imp__sweep_length_bar(s, bar);
+    if (x->open) return 0;
+    return (imp__sum_used(bar, s->tracer->scene->lanes) /
+            imp__length(x->beyond - imp__sweep_begin(s, k))) +
+           x->part * imp__sweep_length_bar(s, bar);
+}
+
+/* Vertex k passes light straight on: its place does not move what follows, but a texture may let
+ * pass another part, and a pane as it turns. */
+void imp__pass_bar(struct imp__sweep *s, int k, const struct imp_vertex *v);
+/* Vertex k is a mirror to what follows. */
+void imp__mirror_bar(struct imp__sweep *s, int k, const struct imp_vertex *v);
+
+#endif
