@@ -413,9 +413,10 @@ int main(void)
     walks_test(PATH SKY, HOLES, "path, a mask with a texture, all", add_all);
     walks_test(PATH, GAUZE, "path, a mask, vertices", add_vertices);
     refused(PATH "<emitter type='projector' id='bulb'/>", "'bulb'");
-    refused(PATH
-            "<bsdf type='plastic' id='wax'/><shape type='cube'><ref id='wax'/></shape>",
-            "'wax'");
+    refused(
+        PATH
+        "<bsdf type='dielectric' id='wax'/><shape type='cube'><ref id='wax'/></shape>",
+        "'wax'");
     refused(PATH "<shape type='cube'><bsdf type='diffuse' id='tiles'><texture "
                  "type='checkerboard' name='reflectance'/></bsdf></shape>",
             "values jump");

@@ -220,13 +220,13 @@ int main(int argc, char **argv)
             "name='radius' value='.2'/></shape></shape>" PLACED(
                 "g", "<scale x='1.2'/><translate x='1.5' y='-1' z='1'/>", ""),
             "'ball'");
-    refused("a mirror in an instance",
+    refused("glass in an instance",
             DIRECT
             "<shape type='shapegroup' id='g'><shape type='cube'><transform "
-            "name='to_world'><scale value='.2'/></transform><bsdf type='conductor' "
-            "id='mirror'/></shape></shape>" PLACED(
+            "name='to_world'><scale value='.2'/></transform><bsdf type='dielectric' "
+            "id='clear'/></shape></shape>" PLACED(
                 "g", "<translate x='1.5' y='-1' z='1'/>", ""),
-            "'mirror'");
+            "'clear'");
     refused("an instance that moves",
             DIRECT
             "<shape type='shapegroup' id='g'><shape type='cube'><transform "

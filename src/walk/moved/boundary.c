@@ -5,6 +5,7 @@
 #include "boundary_parts.h"
 #include "kind/emitter/ies.h"
 #include "kind/sensor/receiver.h"
+#include "moved_mirror.h"
 #include "moved_sky.h"
 #include "scene/camera_gain.h"
 #include "scene/pose.h"
@@ -72,8 +73,11 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
     out->through = imp__segment_first(tracer)->through;
     imp_spec extinction;
     if (imp__fog(tracer, NULL, &extinction)) out->fog = tracer->sensor->medium;
-    for (int k = 0; k < scene->n_all_shapes; k++)
-        out->passes |= imp__shape_bsdf(scene, scene->shapes[k])->straight != 0;
+    for (int k = 0; k < scene->n_all_shapes; k++) {
+        const struct imp_bsdf *bsdf = imp__shape_bsdf(scene, scene->shapes[k]);
+        out->passes |= bsdf->straight != 0;
+        out->mirrors |= imp__mirror_lobes(bsdf) != 0;
+    }
     enum imp_status st = imp__moved_allowed(tracer);
     if (tracer->sensor->shape) /* by which edges are chosen: the middle of a meter */
         out->camera = (tracer->sensor->shape->lo + tracer->sensor->shape->hi) * 0.5;
@@ -87,6 +91,7 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
         out->camera = ray.d;
     }
     if (st == IMP_OK) st = imp__boundary_allowed(out);
+    if (st == IMP_OK) st = imp__mirrors_find(out);
     if (st == IMP_OK) st = lights_make(out);
     if (st == IMP_OK) st = imp__boundary_choices_make(out);
     return st;
@@ -96,6 +101,7 @@ void imp__boundary_free(struct imp__boundary *b)
 {
     if (b->tracer) imp__release(b->tracer->scene->ctx, b->light_cdf);
     if (b->tracer) imp__release(b->tracer->scene->ctx, b->drawn);
+    if (b->tracer) imp__release(b->tracer->scene->ctx, b->plane);
     for (int k = 0; k < IMP_BOUNDARY_KINDS; k++) {
         imp__edge_choice_free(&b->choice[k]);
         if (b->tracer) imp__release(b->tracer->scene->ctx, b->part[k]);
@@ -145,6 +151,24 @@ static void eye_draw(struct imp__edge_draw *d)
         d->lens[k] = d->b->wide ? imp__u01(d->key, IMP_EDGE_SENSOR + k) : 0;
     d->eye = d->b->camera;
     if (d->b->wide && !s->shape) imp__lens_point(s, d->lens, &d->eye);
+    if (imp_unlikely(s->shape && d->b->n_planes > 0)) {
+        struct imp_surface at = {.uv = {0}};
+        imp__meter_draw(s, d->lens, &at);
+        d->eye = at.p;
+    }
+}
+
+/* An edge as the sensor sees it, and in mirrors. */
+static void film_work(struct imp__edge_draw *d)
+{
+    const double u = d->u, chance = d->chance;
+    if (d->b->tracer->sensor->shape) imp__draw_meter(d);
+    else imp__draw_film(d);
+    if (imp_likely(d->b->n_planes == 0)) return;
+    d->u = u;
+    d->chance = chance;
+    d->rim = d->touches = false;
+    imp__draw_mirrored(d);
 }
 
 static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
@@ -152,11 +176,11 @@ static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
     const enum imp__edge_item_kind item = d->item ? d->item->kind : IMP_ITEM_ROUND;
     switch (kind) {
     case IMP_BOUNDARY_FILM:
-        if (item == IMP_ITEM_ROUND || item == IMP_ITEM_ARC) {
-            if (d->b->tracer->sensor->shape) imp__draw_meter(d);
-            else imp__draw_film(d);
+        if (item == IMP_ITEM_ROUND || item == IMP_ITEM_ARC) film_work(d);
+        if (item == IMP_ITEM_SHADING) {
+            imp__draw_shading_film(d);
+            if (imp_unlikely(d->b->n_planes > 0)) imp__draw_shading_mirrored(d);
         }
-        if (item == IMP_ITEM_SHADING) imp__draw_shading_film(d);
         if (item == IMP_ITEM_SKY) imp__draw_sky_film(d);
         break;
     case IMP_BOUNDARY_LIGHT: imp__draw_light(d); break;

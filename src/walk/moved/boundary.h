@@ -47,6 +47,12 @@
  * (path), what a light sends through one is scattered light; where they pass (volpath), a silhouette
  * counts by what passes outside it less what passes inside.
  *
+ * Flat mirrors reflect lines, too (boundary_mirror.c). Lengths, angles and sides of an edge's image are
+ * those of the edge, so that all formulas hold from where the image of the viewer stands; V - x' is then
+ * what moves against the edge in its own space, also because mirrors do (moved_mirror.h). From an edge to
+ * a vertex lines are reflected by chance; to the camera they are aimed, over chains of planes that are
+ * drawn. Light samples meet no mirror: what a light sends over one is scattered light.
+ *
  * In a medium that fills the scene x is also a point of it: f |cos| dA is then sigma p dV, p the phase
  * function times the albedo, and L is times what passes from the edge to x. Of what a lamp sends to such a
  * point a part is in `light`, and the rest in `scatter` (imp__glued_part).
@@ -95,6 +101,8 @@ struct imp__edge_item {
     double *seen_until;
 };
 
+struct imp__plane;
+
 struct imp__boundary {
     const struct imp_tracer *tracer;
     const struct imp__moves *moves;
@@ -114,10 +122,13 @@ struct imp__boundary {
     imp_v3 camera; /* where its rays meet, or the middle of its lens, or of a meter */
     bool parallel; /* its rays are: `camera` is their direction */
     bool wide;     /* they do not meet: a lens with an aperture, or a meter */
+    bool mirrors;  /* a material of the scene is a mirror, in part */
     bool passes;   /* a material of the scene lets light go straight on */
     bool through;  /* also light samples, and that is no bounce */
     const struct imp_medium *fog; /* which fills the scene; NULL: none */
     double size;                  /* of the scene */
+    size_t n_planes, cap_planes;
+    struct imp__plane *plane; /* [n_planes] of flat mirrors: boundary_mirror.c */
     int n_lights;
     double *light_cdf; /* [n_emitters] of those that have draws, by power; last is 1 */
     /* [n_emitters] skies that have draws, and of these what a meter does not see by chance. */

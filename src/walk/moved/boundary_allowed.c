@@ -4,6 +4,7 @@
 #include "base/arguments.h"
 #include "boundary_parts.h"
 #include "math/warp.h"
+#include "moved_mirror.h"
 
 extern const struct imp_bsdf_ops imp__twosided;
 extern const struct imp_sensor_ops imp__distant;
@@ -235,6 +236,7 @@ static const char *turn_why(const struct imp__boundary *b)
 {
     const struct imp_sensor *sensor = b->tracer->sensor;
     if (b->passes) return "a material of the scene lets light straight through";
+    if (b->mirrors) return "the scene has mirrors";
     if (imp__meter_is_points(sensor)) return "the sensor is a meter at points";
     for (size_t j = 0; j < b->edges->n_bodies; j++)
         if (imp__moves_smooth(b->tracer->scene, b->edges->body[j].shape))
@@ -255,6 +257,31 @@ static enum imp_status turns_allowed(const struct imp__boundary *b)
             return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
                               "derivatives by what moves: light '%s' (%s) turns, and %s",
                               e->name ? e->name : "", e->ops->name, why);
+    }
+    return IMP_OK;
+}
+
+/* Where mirrors or the camera turn, circles at which a sky jumps are seen to move in mirrors: none is drawn
+ * there. */
+static enum imp_status skies_allowed(const struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    for (int k = 0; k < scene->n_environments && b->mirrors; k++) {
+        const struct imp_emitter *e = scene->emitters[scene->environments[k]];
+        struct imp_sky_circle circle[IMP_SKY_CIRCLES];
+        bool turns = imp__moves_shape(b->moves, IMP_MOVE_CAMERA, NULL);
+        for (size_t j = 0; j < b->edges->n_bodies; j++) {
+            const struct imp__body *x = &b->edges->body[j];
+            const struct imp_hit hit = {.shape = x->shape, .place = x->place};
+            turns |=
+                imp__mirror_lobes(imp__hit_bsdf(scene, &hit)) &&
+                imp__moves_shape(b->moves, imp__carrier(scene, x->shape, x->place), NULL);
+        }
+        if (turns && e->ops->jumps(e, circle) > 0)
+            return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                              "derivatives by what moves: light '%s' (%s) jumps at its "
+                              "horizon or sun, which is seen in mirrors",
+                              e->name ? e->name : "", e->ops->name);
     }
     return IMP_OK;
 }
@@ -291,6 +318,7 @@ enum imp_status imp__boundary_allowed(const struct imp__boundary *b)
 {
     enum imp_status st = edges_allowed(b);
     if (st == IMP_OK) st = turns_allowed(b);
+    if (st == IMP_OK) st = skies_allowed(b);
     if (st == IMP_OK) st = ball_allowed(b);
     if (st == IMP_OK) st = facets_allowed(b);
     if (st == IMP_OK) st = camera_allowed(b);

@@ -101,6 +101,39 @@ bool imp__edge_is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, imp
     return false;
 }
 
+void imp__draw_mirrored(struct imp__edge_draw *d)
+{
+    const bool meter = d->b->tracer->sensor->shape != NULL;
+    struct imp__sight s;
+    imp_spec hidden;
+    if (!imp__sight_draw(d, 0, &s) || !imp__edge_any(d, s.eye, d->b->parallel) ||
+        !imp__sight_reach(d, &s, d->p))
+        return;
+    const struct imp_surface *at = &s.mirrors.first->at;
+    const imp_v3 r = d->p - at->p, o = imp__offset(at->p, at->ng, r),
+                 w = imp__normalize(r), turned = imp__cross(d->along, w);
+    const double far = imp__length(r), apart = IMP_BESIDE * (far + imp__length(d->p)),
+                 sine = imp__length(turned);
+    if (!(sine > 0) || far < IMP_SHORT_OF * apart || imp__edge_merges(d, r, apart) ||
+        imp__edge_is_hidden(d, o, imp__edge_clear(d) - o, &hidden))
+        return;
+    const imp_v3 m = turned * (1 / sine);
+    struct imp_walk lo, hi;
+    imp__look_past(d, at, -m, apart, s.bounces, &lo);
+    imp__look_past(d, at, m, apart, s.bounces, &hi);
+    struct imp__flux *f = imp__jump_add(d, &s.to,
+                                        s.T * (lo.values - hi.values) *
+                                            (s.to.weight * sine * d->inv_pdf / s.chance),
+                                        1 + IMP_EDGE_ENDS + s.n);
+    if (!f) return;
+    imp_v3 p = d->p;
+    f->n_ends = imp__edge_ends(d, m, f->end);
+    const imp_v3 bar = imp__mirrors_bar(&s.mirrors, &p, -m, f->end, &f->n_ends);
+    const struct imp__glued image = {.p = p};
+    f->end[f->n_ends++] =
+        meter ? imp__meter_end(d, &s.to, bar) : imp__flux_camera(d, &image, bar);
+}
+
 void imp__draw_film(struct imp__edge_draw *d)
 {
     const struct imp__boundary *b = d->b;

@@ -141,7 +141,7 @@ static double item_length(const struct imp__boundary *b,
         return IMP_2PI * sqrt(s->area * IMP_INV_PI) *
                imp__place_scale(b->tracer->scene, item->place);
     if (kind == IMP_BOUNDARY_LIGHT) return 0;
-    if (kind == IMP_BOUNDARY_FILM && item->n_seen == 0) return 0;
+    if (kind == IMP_BOUNDARY_FILM && item->n_seen == 0 && b->n_planes == 0) return 0;
     return IMP_PI * sqrt(item->until[s->triangles.n_triangles] * IMP_INV_PI / 4);
 }
 

@@ -55,7 +55,7 @@ static void groups_add(struct pilot *x, const struct imp__flux *f, int half)
             const struct imp__flux_end *e = &f->end[i];
             if (imp__flux_end_shape(e) != m->shape) continue;
             imp_v3 turn = imp__cross(e->x.p - m->centre, e->bar.v);
-            if (e->x.smooth)
+            if (e->x.smooth || !imp__is_zero(e->bar.n))
                 turn +=
                     imp__cross(e->x.n, e->bar.n) + imp__cross(e->x.shade, e->bar.shade);
             if (half >= 0) noise_add(x, half, k, e->bar.v, contrast);

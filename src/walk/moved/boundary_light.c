@@ -116,7 +116,7 @@ static void ends_set(const struct imp__edge_draw *d, const struct line *l, doubl
 /* Where light samples pass masks, and in a medium: the line past the edge, from o along `out`, and beside it along `in`,
  * which the edge's own faces may let pass in part; both of the length 1 to the edge, t_y away. Sets
  * what is met behind the edge, and *T, what passes out there less what passes inside. */
-static bool jump_follow(const struct imp__edge_draw *d, imp_v3 o, imp_v3 out, imp_v3 in,
+static bool jump_follow(struct imp__edge_draw *d, imp_v3 o, imp_v3 out, imp_v3 in,
                         double t_y, struct imp_hit *hit, struct imp_surface *at,
                         imp_spec *T)
 {
@@ -125,7 +125,9 @@ static bool jump_follow(const struct imp__edge_draw *d, imp_v3 o, imp_v3 out, im
     *T = imp__spec(0);
     if (!imp__edge_line(d, o, out, 1 + contact / t_y, &before)) return false;
     const imp_v3 w = imp__normalize(out);
-    if (!imp__edge_follow(d, o + out, w, contact, 0, hit, at, &behind)) return false;
+    if (!imp__edge_follow(d, o + out, w, contact, 0, hit, at, &behind) ||
+        behind.mirrors.n > 0)
+        return false;
     const double till = 1 + (1 - INSIDE) * hit->t / t_y;
     *T = before.T * behind.T;
     if (imp__edge_passes(d) && imp__edge_line(d, o, in, till, &inside)) *T -= inside.T;

@@ -3,6 +3,7 @@
  * Straight lines between the points of a draw (boundary.h): masks let a part of the light pass, null
  * materials all of it. What passes is a factor, and moves no point behind it. */
 #include "boundary_parts.h"
+#include "moved_mirror.h"
 #include "walk/media/tracking.h"
 
 #define PASSES_MOST 1024 /* surfaces on a line: of more, nothing comes through */
@@ -84,7 +85,8 @@ bool imp__edge_hit_passes(const struct imp__edge_draw *d, const struct imp_hit *
 bool imp__edge_line(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, double till,
                     struct imp__line *line)
 {
-    *line = (struct imp__line){imp__edge_cleared(d, imp__length(r) * till), 1, 0};
+    *line =
+        (struct imp__line){.T = imp__edge_cleared(d, imp__length(r) * till), .times = 1};
     return !imp__is_zero_used(line->T, d->waves) && is_open(d, o, r, till, line);
 }
 
@@ -140,17 +142,64 @@ static void flight_end(const struct imp__edge_draw *d, const struct flight *f,
     line->times *= 1 / p;
 }
 
-#define PASS_LEAST 0.1 /* probability of either choice at a mask */
+#define PASS_LEAST   0.1 /* probability of either choice at a mask */
+#define MIRRORS_SURE 4 /* behind so many mirrors, a line goes on with this probability */
+#define MIRRORS_GO   0.8
 
-bool imp__edge_follow(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
+/* A mirror is met, of what it reflects: *start is the image of where the line began. */
+static bool reflect(struct imp__edge_draw *d, const struct imp_hit *hit,
+                    const struct imp_surface *at, imp_spec F, imp_v3 *start,
+                    struct imp__line *line)
+{
+    if (!imp__mirror_add(d, &line->mirrors, hit, at)) return false;
+    const struct imp__glued *x = &line->mirrors.last->x;
+    line->w = imp__mirror_turn(x->n, line->w);
+    *start = imp__mirror_image(x->p, x->n, *start);
+    if (line->mirrors.n == 1) {
+        line->T_mirrored = imp__spec(1);
+        line->bounces_mirrored = 0;
+    }
+    line->T *= F;
+    line->T_mirrored *= F;
+    line->bounces++;
+    line->bounces_mirrored++;
+    return true;
+}
+
+/* Probabilities with which a line goes straight on, or is reflected, at a surface. */
+struct fates {
+    double pass, reflect;
+};
+static struct fates fates_of(const struct imp__edge_draw *d, const struct imp_bsdf *b,
+                             imp_spec T, imp_spec F, int mirrors)
+{
+    struct fates out = {0, 0};
+    const double t = imp__max_used(T, d->waves), r = imp__max_used(F, d->waves);
+    if (b->flags & IMP_BSDF_SMOOTH) {
+        if (b->straight) out.pass = imp_clamp(t, PASS_LEAST, 1 - PASS_LEAST);
+        if (r > 0)
+            out.reflect = imp_clamp(r, PASS_LEAST, 1 - PASS_LEAST) * (1 - out.pass);
+        return out;
+    }
+    const double go = mirrors < MIRRORS_SURE ? 1 : MIRRORS_GO;
+    if (!(r > 0)) {
+        out.pass = b->straight ? 1 : 0;
+        return out;
+    }
+    if (b->straight) out.pass = imp_clamp(t / (t + r), PASS_LEAST, 1 - PASS_LEAST) * go;
+    out.reflect = go - out.pass;
+    return out;
+}
+
+bool imp__edge_follow(struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
                       unsigned dims, struct imp_hit *hit, struct imp_surface *at,
                       struct imp__line *line)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
-    const imp_v3 start = o;
+    imp_v3 start = o;
     struct flight f = {.aims = false};
     double flight = INFINITY;
-    *line = (struct imp__line){imp__spec(1), 1, 0};
+    *line = (struct imp__line){.T = imp__spec(1), .times = 1, .w = w};
     if (imp_unlikely(d->b->fog != NULL)) {
         f = flight_of(d, o, w);
         flight = flight_draw(d, &f, dims);
@@ -167,22 +216,33 @@ bool imp__edge_follow(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double
         }
         if (!meets) return false;
         const struct imp_bsdf *b = imp__hit_bsdf(scene, hit);
-        const imp_spec T =
-            imp_likely(!b->straight) ? (imp_spec){0} : passed(d, b, hit, at, w);
-        const double pass =
-            imp_likely(!b->straight) ? 0
-            : b->flags & IMP_BSDF_SMOOTH
-                ? imp_clamp(imp__max_used(T, d->waves), PASS_LEAST, 1 - PASS_LEAST)
-                : 1;
-        if (pass == 0 ||
-            imp__u01(d->key, IMP_EDGE_PASS + dims * PASSES_MOST + n) >= pass) {
-            line->times *= 1 / (1 - pass);
+        const bool mirrors = imp__mirror_lobes(b) != 0;
+        struct fates fate = {0, 0};
+        imp_spec T = {0}, F = {0};
+        double u = 1;
+        if (imp_unlikely(b->straight || mirrors)) {
+            if (b->straight) T = passed(d, b, hit, at, w);
+            if (mirrors) F = imp__edge_reflected(d, hit, at, w);
+            fate = fates_of(d, b, T, F, line->mirrors.n);
+            u = imp__u01(d->key, IMP_EDGE_PASS + dims * PASSES_MOST + n);
+        }
+        if (u >= fate.pass + fate.reflect) {
+            if (mirrors && !(b->flags & IMP_BSDF_SMOOTH)) return false;
+            line->times *= 1 / (1 - fate.pass - fate.reflect);
             if (imp_unlikely(d->b->fog != NULL)) flight_end(d, &f, hit->t, false, line);
             return true;
         }
-        line->times *= 1 / pass;
-        line->T *= T;
-        line->bounces += !d->b->through;
+        const bool passes = u < fate.pass;
+        line->times *= 1 / (passes ? fate.pass : fate.reflect);
+        if (passes) {
+            line->T *= T;
+            line->T_mirrored *= T;
+            line->bounces += !d->b->through;
+            line->bounces_mirrored += !d->b->through;
+        } else {
+            if (!reflect(d, hit, at, F, &start, line)) return false;
+            w = line->w;
+        }
         if (imp__is_zero_used(line->T, d->waves)) return false;
         o = imp__offset(at->p, at->ng, w);
         from = 0;
@@ -190,14 +250,13 @@ bool imp__edge_follow(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double
     return false;
 }
 
-#define SHORT_OF                                                                         \
-    30           /* so far before the edge a look begins, per what it is apart from it; */
-#define CURVED 4 /* of a curved shape, per root of that and the scene's size */
+#define CURVED                                                                           \
+    4 /* IMP_SHORT_OF of a curved shape, per root of that and the scene's size */
 
 imp_spec imp__edge_near(struct imp__edge_draw *d, double distance, double apart,
                         imp_spec T)
 {
-    double shorter = SHORT_OF * apart;
+    double shorter = IMP_SHORT_OF * apart;
     d->near = 0;
     if (imp_likely(!d->b->fog)) return imp__spec(1);
     /* A ray that passes a sphere's silhouette inside meets it sqrt(2 r apart) before. */

@@ -31,7 +31,8 @@ struct imp__edge_draw {
     bool no_memory;
     double lens
         [4]; /* numbers of the point through which the sensor sees, and of connections */
-    imp_v3 eye;          /* that point; of parallel rays their direction */
+    imp_v3
+        eye; /* that point; of parallel rays their direction; of meters among mirrors */
     imp_spec extinction; /* of the medium; 0: there is none */
     double near; /* walks that look past the edge scatter behind this distance alone */
 };
@@ -52,10 +53,13 @@ enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
 #define IMP_EDGE_SENSOR (1u << 22) /* four, of a point of a meter or lens */
 #define IMP_EDGE_PASS   (1u << 23) /* whether light goes straight on through a mask */
 #define IMP_EDGE_FLIGHT (1u << 24) /* two, of how far it goes in a medium: of each line */
+#define IMP_EDGE_MIRROR (1u << 25) /* by which mirrors it is seen: of each connection */
 
 /* So far beside an edge, per distance to it, it is looked past; rays are traced in float, whose
  * rounding is a tenth of that. */
 #define IMP_BESIDE 1e-5
+/* So far before the edge a look begins at least, per what it is apart from it. */
+#define IMP_SHORT_OF 30
 /* Surfaces nearer behind an edge, per size of the scene, are what it stands on. */
 #define IMP_CONTACT 2e-5
 
@@ -82,6 +86,49 @@ imp_v3 imp__edge_clear(const struct imp__edge_draw *d);
  * is thinner than the look is apart from the rim, `beside` it: it sees what is beside the outline, which
  * has draws of its own. */
 bool imp__edge_merges(const struct imp__edge_draw *d, imp_v3 w, double beside);
+/* ---- Mirrors: boundary_mirror.c ---- */
+/* Planes of the scene that are mirrors. */
+enum imp_status imp__mirrors_find(struct imp__boundary *b);
+/* Mirrors on a line, from where it begins on. */
+struct imp__mirror {
+    struct imp__mirror *on; /* the next one; NULL: none */
+    struct imp__glued x;
+    struct imp_surface at;
+};
+struct imp__mirrors {
+    int n;
+    struct imp__mirror *first, *last;
+};
+bool imp__mirror_add(struct imp__edge_draw *d, struct imp__mirrors *all,
+                     const struct imp_hit *hit, const struct imp_surface *at);
+/* What a hit reflects of light along the unit vector w. */
+imp_spec imp__edge_reflected(const struct imp__edge_draw *d, const struct imp_hit *hit,
+                             const struct imp_surface *at, imp_v3 w);
+/* An adjoint of the velocity of the point *p, where the line begins, as what is seen from its other end:
+ * what that is to the mirrors, n ends more, and, returned, to the velocity of the image there, *p then. */
+imp_v3 imp__mirrors_bar(const struct imp__mirrors *all, imp_v3 *p, imp_v3 bar,
+                        struct imp__flux_end *end, int *n_ends);
+/* How the camera may see a place: over planes, the first next to the camera, which are drawn with a
+ * probability; `eye` is the camera's image, next to the place, or that of the direction of its rays.
+ * False: there are no mirrors. */
+#define IMP_SIGHT_MAX 64
+struct imp__sight {
+    int n;
+    const struct imp__plane *plane[IMP_SIGHT_MAX];
+    double chance;
+    imp_v3 eye;
+    /* By imp__sight_reach: mirrors from the place on, what they let pass to the camera, from the
+     * first one on, how many surfaces that are; the image of the place, and its connection. */
+    struct imp__mirrors mirrors;
+    imp_spec T;
+    int bounces;
+    imp_v3 image;
+    struct imp_sensor_sample to;
+};
+bool imp__sight_draw(const struct imp__edge_draw *d, unsigned dims, struct imp__sight *s);
+/* False: it is not seen so. The line to the first mirror is the caller's. */
+bool imp__sight_reach(struct imp__edge_draw *d, struct imp__sight *s, imp_v3 p);
+
 /* ---- Straight lines: boundary_line.c ---- */
 /* The material of what was hit, which in an instance may be its own. */
 static inline const struct imp_bsdf *imp__hit_bsdf(const struct imp_scene *scene,
@@ -94,14 +141,20 @@ struct imp__line {
     imp_spec T;   /* what it lets pass */
     double times; /* one over the probability with which it was chosen */
     int bounces;  /* surfaces that it passes, as max_depth counts them */
+    /* By imp__edge_follow alone: mirrors, its direction behind them, and T and bounces from the first
+     * one on. */
+    struct imp__mirrors mirrors;
+    imp_v3 w;
+    imp_spec T_mirrored;
+    int bounces_mirrored;
 };
 /* From o along r, up to the part `till` of it. False: nothing comes through. */
 bool imp__edge_line(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, double till,
                     struct imp__line *line);
-/* From o + from w along the unit vector w to where light is scattered, through masks by chance, at a
- * surface or (hit->shape -1) in the medium: number `dims` of the draw's lines. hit->t is its
- * distance. False: nowhere. */
-bool imp__edge_follow(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
+/* From o + from w along the unit vector w to where light is scattered, through masks and over mirrors by
+ * chance, at a surface or (hit->shape -1) in the medium: number `dims` of the draw's lines. hit->t is
+ * its distance. False: nowhere. */
+bool imp__edge_follow(struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
                       unsigned dims, struct imp_hit *hit, struct imp_surface *at,
                       struct imp__line *line);
 /* What the medium lets pass over this length; and before which distance from the camera it is not. */
@@ -157,6 +210,10 @@ imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py)
  * point d->p at the distance 1 from the camera. T: what passes on the way there. */
 void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to,
                     imp_spec T);
+/* What is seen past the edge's point, so far apart, on the side that m points to, from a vertex at a
+ * surface, behind `before` vertices. */
+void imp__look_past(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 m,
+                    double apart, int before, struct imp_walk *walk);
 /* What a vertex at a hit sees towards a place, behind `before` vertices. */
 void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 to,
                     int before, struct imp_walk *walk);
@@ -166,12 +223,13 @@ void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_
 struct imp__seen_from {
     int before;
     bool floats;
+    bool mirrored; /* a mirror is between, and no light sample comes that way */
     const bool *drawn;
 };
 imp_spec imp__arrives(const struct imp__boundary *b, const struct imp_walk *walk,
                       struct imp__seen_from x);
 /* Vertices behind the edge for which light is known: what jumps by depth [*n], in the arena. NULL:
- * no memory, or nothing jumps. x.before has no effect. */
+ * no memory, or nothing jumps. x.before: vertices between x and where the walks begin. */
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
                      const struct imp_walk *hi, imp_spec times, struct imp__seen_from x,
                      int *n);
@@ -191,6 +249,8 @@ struct imp__edge_light {
     imp_v3 slide;
     struct imp__flux_end end[1 + IMP_EDGE_ENDS];
     int n_ends;
+    const struct imp__flux_end *mirror_end; /* [n_mirror_ends], more of these */
+    int n_mirror_ends;
 };
 void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
                      const struct imp_surface *at, const struct imp__edge_light *light);
@@ -231,6 +291,8 @@ enum imp_status imp__boundary_allowed(const struct imp__boundary *b);
 void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind);
 void imp__draw_film(struct imp__edge_draw *d);
 void imp__draw_meter(struct imp__edge_draw *d);
+/* As the sensor sees it over a chain of mirrors. */
+void imp__draw_mirrored(struct imp__edge_draw *d);
 void imp__draw_light(struct imp__edge_draw *d);
 void imp__draw_scatter(struct imp__edge_draw *d);
 void imp__draw_sky_film(struct imp__edge_draw *d);
@@ -240,13 +302,21 @@ imp_spec imp__sky_jump(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m);
 /* ---- boundary_items.c ---- */
 /* Edges, by measures of each kind, and items. IMP_E_NOMEM. */
 enum imp_status imp__boundary_choices_make(struct imp__boundary *b);
-/* ---- Of meshes with vertex normals: boundary_shading.c, boundary_horizon.c ---- */
+/* ---- Of meshes with vertex normals: boundary_shading.c, boundary_turning.c, boundary_horizon.c ---- */
 void imp__draw_shading_film(struct imp__edge_draw *d);
+void imp__draw_shading_mirrored(struct imp__edge_draw *d);
 void imp__draw_shading_scatter(struct imp__edge_draw *d);
 void imp__draw_horizon(struct imp__edge_draw *d);
 /* A point of the item's mesh by area, d->inv_pdf per area; false: it has none. */
 bool imp__edge_item_point(struct imp__edge_draw *d, struct imp_hit *hit,
                           struct imp_surface *at);
+/* The surface of the item's mesh at hit->prim, u and v; sets the rest of the hit. */
+void imp__edge_item_surface(const struct imp__edge_draw *d, struct imp_hit *hit,
+                            struct imp_surface *at);
+/* A point of the curve N.(eye - p) = 0 on a random line; false: the line does not cross it. Sets d->inv_pdf,
+ * per length of the curve. mirrored: the eye is an image of the sensor's. */
+bool imp__edge_turning_point(struct imp__edge_draw *d, imp_v3 eye, bool mirrored,
+                             struct imp_hit *hit);
 /* Sets the lists of an item; freed by imp__edge_item_free. */
 enum imp_status imp__edge_item_measure(const struct imp__boundary *b,
                                        struct imp__edge_item *item);

@@ -14,7 +14,9 @@ extern const struct imp_bsdf_ops imp__mask;
 
 /* A vertex of the chain, on the way to the camera. */
 struct link {
-    struct link *before; /* nearer to the edge; NULL: none */
+    struct link *before;         /* nearer to the edge; NULL: none */
+    struct imp__mirrors mirrors; /* from there on */
+    int n_mirrors;               /* of all links so far */
     struct imp__link_point x;
     const struct imp_bsdf *bsdf;
     struct imp_surface at;
@@ -42,6 +44,7 @@ static void link_float(const struct imp__edge_draw *d, struct link *k,
 
 /* hit->shape -1: in the medium. */
 static struct link *link_make(struct imp__edge_draw *d, struct link *before,
+                              const struct imp__mirrors *mirrors,
                               const struct imp_hit *hit, const struct imp_surface *at,
                               imp_v3 w, bool horizon)
 {
@@ -55,6 +58,8 @@ static struct link *link_make(struct imp__edge_draw *d, struct link *before,
     if (before && imp_unlikely(before->x.floats))
         imp__float_aim(scene, &before->x, at->p);
     k->before = before;
+    k->mirrors = *mirrors;
+    k->n_mirrors = mirrors->n + (before ? before->n_mirrors : 0);
     if (imp_unlikely(hit->shape < 0)) {
         link_float(d, k, at, w);
         return k;
@@ -96,12 +101,16 @@ static imp_spec kernel(const struct imp__edge_draw *d, const struct link *k, imp
     return f;
 }
 
-/* All ends of a flux whose chain has `last` next to the camera. */
+/* All ends of a flux whose chain has `last` next to the camera, which sees it over these mirrors. */
 static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_light *light,
-                     const struct imp_sensor_sample *to, struct link *last, int depth,
+                     const struct imp_sensor_sample *to,
+                     const struct imp__mirrors *mirrors, struct link *last, int depth,
                      struct imp__flux *f)
 {
+    struct imp__glued seen = last->x.x; /* by the camera */
     for (int k = 0; k < light->n_ends; k++) f->end[f->n_ends++] = light->end[k];
+    for (int k = 0; k < light->n_mirror_ends; k++)
+        f->end[f->n_ends++] = light->mirror_end[k];
     imp_v3 shift = light->slide, far;
     /* From the edge to the camera; links lead the other way. */
     for (int j = 0; j <= depth; j++) {
@@ -111,7 +120,10 @@ static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_ligh
             k = k->before;
         }
         struct imp__link_point x = k->x;
-        const imp_v3 from = after ? after->x.x.p : to->p;
+        const struct imp__mirrors *between = after ? &after->mirrors : mirrors;
+        const imp_v3 from = between->n > 0 ? between->first->x.p
+                            : after        ? after->x.x.p
+                                           : to->p;
         if (imp_unlikely(x.floats) && !after) {
             const imp_v3 near = to->wo * -imp__edge_clip(d, to);
             imp__float_aim(d->b->tracer->scene, &x, from + near);
@@ -122,10 +134,13 @@ static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_ligh
         if (!x.open) f->end[f->n_ends++] = imp__flux_glued(&on, x.bar.v);
         if (!after && x.floats && !x.open)
             f->end[f->n_ends++] = imp__flux_camera(d, &on, far);
+        if (imp_likely(between->n == 0)) continue;
+        imp_v3 p = x.x.p;
+        shift = imp__mirrors_bar(between, &p, shift, f->end, &f->n_ends);
+        if (!after) seen.p = p;
     }
-    f->end[f->n_ends++] = d->b->tracer->sensor->shape
-                              ? imp__meter_end(d, to, shift)
-                              : imp__flux_camera(d, &last->x.x, shift);
+    f->end[f->n_ends++] = d->b->tracer->sensor->shape ? imp__meter_end(d, to, shift)
+                                                      : imp__flux_camera(d, &seen, shift);
 }
 
 /* Light for a path with so many vertices from the camera to where the light arrives. False: it would
@@ -143,7 +158,21 @@ static bool light_at(const struct imp_tracer *t, const struct imp__edge_light *l
     return max < 0 || vertices + light->behind <= max;
 }
 
-/* passed: vertices between the links where it went straight on. */
+static void flux_make(struct imp__edge_draw *d, const struct imp__edge_light *light,
+                      const struct imp_sensor_sample *to,
+                      const struct imp__mirrors *mirrors, struct link *k, int depth,
+                      imp_spec L)
+{
+    struct imp__flux *f = imp__flux_add(d, light->n_ends + light->n_mirror_ends + depth +
+                                               3 + k->n_mirrors + mirrors->n);
+    if (!f) return;
+    f->px = to->px;
+    f->py = to->py;
+    f->L = L;
+    ends_set(d, light, to, mirrors, k, depth, f);
+}
+
+/* passed: vertices between the links that are mirrors, or where it went straight on. */
 static void connect(struct imp__edge_draw *d, const struct imp__edge_light *light,
                     struct link *k, int depth, int passed, imp_spec T)
 {
@@ -172,12 +201,34 @@ static void connect(struct imp__edge_draw *d, const struct imp__edge_light *ligh
     } else {
         L *= line.T;
     }
-    struct imp__flux *f = imp__flux_add(d, light->n_ends + depth + 3);
-    if (!f) return;
-    f->px = to.px;
-    f->py = to.py;
-    f->L = L;
-    ends_set(d, light, &to, k, depth, f);
+    static const struct imp__mirrors none = {0};
+    flux_make(d, light, &to, &none, k, depth, L);
+}
+
+/* The same over mirrors. */
+static void connect_mirrored(struct imp__edge_draw *d,
+                             const struct imp__edge_light *light, struct link *k,
+                             int depth, int passed, imp_spec T)
+{
+    struct imp__sight s;
+    struct imp__line line;
+    imp_spec brings;
+    if (!d->b->tracer->sensor->ops->connect ||
+        !light_at(d->b->tracer, light, depth + 2 + passed, &brings) ||
+        !imp__sight_draw(d, 1 + (unsigned)depth, &s) || !imp__sight_reach(d, &s, k->at.p))
+        return;
+    const struct imp_surface *mirror = &s.mirrors.first->at;
+    const imp_v3 r = mirror->p - k->at.p;
+    const imp_spec K = kernel(d, k, imp__to_local(&k->frame, imp__normalize(r)));
+    if (imp__is_zero_used(K * T, d->waves)) return;
+    const imp_v3 o = imp__offset(k->at.p, k->at.ng, r),
+                 end = imp__offset(mirror->p, mirror->ng, -r);
+    if (!imp__edge_line(d, o, end - o, 1, &line) ||
+        !light_at(d->b->tracer, light, depth + 1 + passed + line.bounces + s.bounces,
+                  &brings))
+        return;
+    flux_make(d, light, &s.to, &s.mirrors, k, depth,
+              brings * T * K * line.T * s.T * (s.to.weight / s.chance));
 }
 
 /* Where the walk goes on, local, and its density: of Lambertian materials by the cosine on the side
@@ -201,18 +252,22 @@ static double direction_draw(const struct imp__edge_draw *d, const struct link *
     const double by_lobe[3] = {u[2], u[0], u[1]};
     if (!imp__bsdf_transposed_sample(b, in, by_lobe, &dirs)) return 0;
     *wo = dirs.wo;
-    return imp__bsdf_transposed_pdf(b, in, &dirs);
+    /* What is reflected was followed to another vertex. */
+    return dirs.lobe == IMP_SMOOTH ? imp__bsdf_transposed_pdf(b, in, &dirs) : 0;
 }
 
 void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
                      const struct imp_surface *at, const struct imp__edge_light *light)
 {
     const struct imp_tracer *t = d->b->tracer;
-    struct link *k = link_make(d, NULL, hit, at, light->w, light->horizon);
+    static const struct imp__mirrors none = {0};
+    struct link *k = link_make(d, NULL, &none, hit, at, light->w, light->horizon);
     imp_spec T = imp__spec(1), L;
     int passed = 0;
     for (int depth = 0; k && light_at(t, light, depth + 1 + passed, &L); depth++) {
         connect(d, light, k, depth, passed, T);
+        if (imp_unlikely(d->b->n_planes > 0))
+            connect_mirrored(d, light, k, depth, passed, T);
         const unsigned dims = IMP_EDGE_WALK + (unsigned)depth * IMP_EDGE_WALK_DIMS;
         imp_v3 wo, w;
         const double pdf = direction_draw(d, k, dims, &wo);
@@ -231,6 +286,6 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
         if (!imp__edge_follow(d, o, w, 0, number, &next, &there, &line)) return;
         T *= line.T * line.times;
         passed += line.bounces;
-        k = link_make(d, k, &next, &there, w, false);
+        k = link_make(d, k, &line.mirrors, &next, &there, line.w, false);
     }
 }

@@ -44,7 +44,8 @@ imp_spec imp__arrives(const struct imp__boundary *b, const struct imp_walk *walk
     for (const struct imp_vertex *v = walk->first; v; v = v->next) {
         const bool sky = v->d.scatterer == IMP_AT_SKY, on_line = is_on_line(b, v);
         /* To each sky a vertex. */
-        const bool left = first && (!sky || (x.drawn && x.drawn[v->d.met.emitter]));
+        const bool left =
+            first && !x.mirrored && (!sky || (x.drawn && x.drawn[v->d.met.emitter]));
         const bool counts = max < 0 || number < max;
         if (!left && counts) L += T * v->e;
         if (imp_unlikely(left && x.floats && !sky && counts))
@@ -79,20 +80,37 @@ imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
         return NULL;
     }
     bool any = false;
+    const int between = x.before;
     for (int k = 0; k < *n; k++) {
-        x.before = k + 1;
+        x.before = k + 1 + between;
         jump[k] = (imp__arrives(d->b, lo, x) - imp__arrives(d->b, hi, x)) * times;
         any |= !imp__is_zero_used(jump[k], d->waves);
     }
     return any ? jump : NULL;
 }
 
-static void look_beside(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 m,
-                        double apart, struct imp_walk *walk)
+void imp__look_past(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 m,
+                    double apart, int before, struct imp_walk *walk)
 {
     const imp_v3 r = d->p - at->p, o = imp__offset(at->p, at->ng, r);
-    if (imp__edge_face_look(d, o, false, m, apart, 1, walk)) return;
-    imp__look_from(d, at, imp__edge_beside(d, r, m, apart), 1, walk);
+    if (imp__edge_face_look(d, o, false, m, apart, before, walk)) return;
+    imp__look_from(d, at, imp__edge_beside(d, r, m, apart), before, walk);
+}
+
+/* A line over mirrors: its light's ends at these, and what x counts. False: no memory. */
+static bool mirrored_ends(struct imp__edge_draw *d, const struct imp__mirrors *mirrors,
+                          imp_v3 m, struct imp__edge_light *light)
+{
+    imp_v3 p = d->p;
+    struct imp__flux_end *end =
+        imp__arena_take(d->arena, (size_t)mirrors->n, sizeof *end);
+    if (!end) {
+        d->no_memory = true;
+        return false;
+    }
+    light->mirror_end = end;
+    light->slide = imp__mirrors_bar(mirrors, &p, -m, end, &light->n_mirror_ends);
+    return true;
 }
 
 void imp__draw_scatter(struct imp__edge_draw *d)
@@ -111,22 +129,35 @@ void imp__draw_scatter(struct imp__edge_draw *d)
     const double sine = imp__length(turned);
     if (!(sine > 0)) return;
     const imp_v3 m = turned * (1 / sine);
-    const double apart = IMP_BESIDE * (hit.t + imp__length(d->p));
-    if (imp__edge_merges(d, -w, apart)) return;
-    const imp_spec T = imp__edge_near(d, hit.t, apart, line.T);
+    /* What sees the edge: x, or the mirror next to the edge. */
+    const bool mirrored = line.mirrors.n > 0;
+    const struct imp_surface *viewer = mirrored ? &line.mirrors.first->at : &at;
+    const double far = mirrored ? imp__length(viewer->p - d->p) : hit.t;
+    const double apart = IMP_BESIDE * (far + imp__length(d->p));
+    if (imp__edge_merges(d, -w, apart) || (mirrored && far < IMP_SHORT_OF * apart))
+        return;
+    const imp_spec T = imp_unlikely(mirrored) ? line.T_mirrored
+                                              : imp__edge_near(d, hit.t, apart, line.T);
+    const int between = mirrored ? line.bounces_mirrored : 0;
     struct imp_walk lo, hi;
-    look_beside(d, &at, -m, apart, &lo);
-    look_beside(d, &at, m, apart, &hi);
+    imp__look_past(d, viewer, -m, apart, 1 + between, &lo);
+    imp__look_past(d, viewer, m, apart, 1 + between, &hi);
 
     int depths;
     const imp_spec times =
         T * ((d->touches ? 1 : sine * 4 * IMP_PI) * d->inv_pdf * line.times);
-    imp__seam_emission(d, &hit, &at, &lo, m, w, times);
-    imp__seam_emission(d, &hit, &at, &hi, m, w, -times);
-    const struct imp__seen_from x = {.floats = hit.shape < 0, .drawn = b->drawn};
+    if (imp_likely(!mirrored)) {
+        imp__seam_emission(d, &hit, &at, &lo, m, w, times);
+        imp__seam_emission(d, &hit, &at, &hi, m, w, -times);
+    }
+    const struct imp__seen_from x = {.before = between,
+                                     .floats = hit.shape < 0,
+                                     .mirrored = mirrored,
+                                     .drawn = b->drawn};
     imp_spec *jump = imp__jumps(d, &lo, &hi, times, x, &depths);
     if (!jump) return;
-    struct imp__edge_light light = {.w = w, .slide = -m};
+    struct imp__edge_light light = {.w = line.w, .slide = -m};
+    if (imp_unlikely(mirrored) && !mirrored_ends(d, &line.mirrors, m, &light)) return;
     light.light = jump[0];
     if (max >= 0) {
         light.by_depth = jump;

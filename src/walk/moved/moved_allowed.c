@@ -6,6 +6,7 @@
 #include "math/warp.h"
 #include "moved.h"
 #include "moved_kernel.h"
+#include "moved_mirror.h"
 #include "scene/instances.h"
 #include "scene/pose.h"
 #include "walk/media/tracking.h"
@@ -30,6 +31,19 @@ static bool is_textured(const struct imp_input *const *input, int n)
     return false;
 }
 
+/* Why a shape that is a mirror, in part, has no draws for what is seen in it; NULL: it has. */
+static const char *mirror_without_d(const struct imp_tracer *t, const struct imp_shape *s)
+{
+    if (s->smooth)
+        return "is a mirror on a mesh with vertex normals (face_normals makes it flat)";
+    if (s->geometry != IMP_TRIANGLES && !(s->ops->flags & IMP_SHAPE_FLAT))
+        return "is a mirror on a curved shape: edges that are seen in it have no draws";
+    if (s->emitter >= 0) return "is a mirror, and its shape is a light";
+    if (t->scene->n_media > 0 && imp__segment_first(t)->through && t->sensor->medium)
+        return "is a mirror in a medium";
+    return NULL;
+}
+
 static enum imp_status materials_allowed(const struct imp_tracer *t)
 {
     for (int k = 0; k < t->scene->n_all_shapes; k++) {
@@ -38,6 +52,10 @@ static enum imp_status materials_allowed(const struct imp_tracer *t)
         const char *why =
             imp__kernel_without_d(b, s->geometry != IMP_TRIANGLES || s->smooth);
         if (!why) why = imp__textures_without_d(b, s);
+        if (!why && imp__mirror_lobes(b)) why = mirror_without_d(t, s);
+        if (!why && imp__passes_by_angle(b) && imp__segment_first(t)->through)
+            why = "lets light samples of volpath through, by parts that change with the "
+                  "angle (those of path stop there)";
         if (!why && b->shaped) why = "has a spectrum for a number";
         if (!why && b->straight && s->emitter >= 0)
             why = "lets light pass, and its shape is a light";

@@ -6,6 +6,7 @@
 #include "kind/shape/shape.h"
 #include "math/rng.h"
 #include "math/warp.h"
+#include "moved_mirror.h"
 #include "walk/core/vertex.h"
 #include <float.h>
 
@@ -150,10 +151,12 @@ const char *imp__kernel_without_d(const struct imp_bsdf *b, bool round)
     if (b->flags & IMP_BSDF_TURNED) return "has normals of its own";
     if (b->ops == &imp__mask && !(b->child[0]->flags & IMP_BSDF_DELTA))
         return imp__kernel_without_d(b->child[0], round);
-    if (b->flags & IMP_BSDF_DELTA)
-        return "reflects or lets pass in single directions: edges that are seen in it "
-               "have no "
-               "draws";
+    if (b->flags & IMP_BSDF_DELTA && b->ops == &imp__mask)
+        return "reflects or lets pass in single directions under a mask: edges that are "
+               "seen in it have no draws";
+    if (b->flags & IMP_BSDF_DELTA && !imp__bends_nothing(b))
+        return "bends light: edges that are seen through it have no draws";
+    if (b->flags & IMP_BSDF_DELTA && !(b->flags & IMP_BSDF_SMOOTH)) return NULL;
     if (b->flags & IMP_BSDF_EMIT) return "emits light by itself";
     if (imp__bsdf_without_directions_d(b)) return "has no derivative by directions";
     if (round && has_grain(b))

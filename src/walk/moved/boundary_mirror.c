@@ -1,0 +1,239 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What draws of the boundary see in flat mirrors (boundary.h): which planes are mirrors, chains of them
+ * between a place and the camera, and velocities of images. */
+#include "base/arguments.h"
+#include "base/context.h"
+#include "boundary_parts.h"
+#include "kind/cleared.h"
+#include "moved_mirror.h"
+#include "walk/core/shaped.h"
+#include "walk/core/step.h"
+#include "walk/lights/light_step.h"
+
+/* ---- Planes ------------------------------------------------------------------------ */
+
+struct imp__plane {
+    int shape; /* as imp_hit has it */
+    int64_t place;
+    imp_v3 p, n; /* a point; unit normal */
+};
+
+#define SAME 1e-6 /* planes: of their normals, and of the scene's size */
+#define MOST 4096 /* planes of a shape */
+
+static enum imp_status plane_add(struct imp__boundary *b, const struct imp__body *body,
+                                 size_t first, imp_v3 p, imp_v3 n)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    for (size_t k = first; k < b->n_planes; k++) {
+        const struct imp__plane *x = &b->plane[k];
+        if (imp__length(imp__cross(x->n, n)) < SAME &&
+            fabs(imp__dot(n, x->p - p)) < SAME * b->size)
+            return IMP_OK;
+    }
+    if (b->n_planes - first >= MOST)
+        return imp__error(
+            scene->ctx, IMP_E_UNSUPPORTED,
+            "derivatives by what moves: shape '%s' is a mirror of more than "
+            "%d facets",
+            scene->shapes[body->shape]->name, MOST);
+    struct imp__plane *more =
+        imp__grow(scene->ctx, b->plane, &b->cap_planes, b->n_planes + 1, sizeof *more);
+    if (!more) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for mirrors");
+    b->plane = more;
+    b->plane[b->n_planes++] = (struct imp__plane){body->shape, body->place, p, n};
+    return IMP_OK;
+}
+
+enum imp_status imp__mirrors_find(struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    for (size_t k = 0; k < b->edges->n_bodies; k++) {
+        const struct imp__body *body = &b->edges->body[k];
+        const struct imp_shape *s = scene->shapes[body->shape];
+        const int placed = imp__placed_shape(scene, body->shape, body->place);
+        const size_t first = b->n_planes;
+        if (!imp__mirror_lobes(imp__shape_bsdf(scene, scene->shapes[placed]))) continue;
+        if (s->geometry != IMP_TRIANGLES) {
+            const struct imp__rim_point rim =
+                imp__rim(scene, body->shape, body->place, 0, 0);
+            IMP_CHECKED(plane_add(b, body, first, rim.p, rim.n));
+            continue;
+        }
+        for (size_t i = 0; i < s->triangles.n_triangles; i++) {
+            const struct imp__corners f =
+                imp__corners(scene, body->shape, (int)i, body->place);
+            const imp_v3 n = imp__cross(f.p[1] - f.p[0], f.p[2] - f.p[0]);
+            if (imp__is_zero(n)) continue;
+            IMP_CHECKED(plane_add(b, body, first, f.p[0], imp__normalize(n)));
+        }
+    }
+    return IMP_OK;
+}
+
+/* ---- Lines ------------------------------------------------------------------------- */
+
+imp_spec imp__edge_reflected(const struct imp__edge_draw *d, const struct imp_hit *hit,
+                             const struct imp_surface *at, imp_v3 w)
+{
+    const struct imp_scene *scene = d->b->tracer->scene;
+    const struct imp_bsdf *b = imp__hit_bsdf(scene, hit);
+    const struct imp_shape *shape =
+        scene->shapes[imp__placed_shape(scene, hit->shape, hit->place)];
+    const struct imp_frame frame = {at->s, at->t, at->n};
+    const imp_v3 back = imp__to_local(&frame, -w);
+    const struct imp_texcoord place = {.uv = {at->uv[0], at->uv[1]},
+                                       .p = at->p,
+                                       .shape = shape,
+                                       .prim = hit->prim,
+                                       .carried = imp__edge_waves(d)};
+    imp_spec in[IMP_INPUTS_MAX], f, sum = {0};
+    imp__evaluate_inputs(b, shape, &place, in);
+    for (uint64_t left = imp__mirror_lobes(b); left; left &= left - 1) {
+        const struct imp_dirs dirs = {imp__v3(-back[0], -back[1], back[2]), back,
+                                      __builtin_ctzll(left), 0};
+        imp__bsdf_eval(b, place.carried, in, &dirs, &f);
+        sum += f;
+    }
+    return sum;
+}
+
+bool imp__mirror_add(struct imp__edge_draw *d, struct imp__mirrors *all,
+                     const struct imp_hit *hit, const struct imp_surface *at)
+{
+    const struct imp_scene *scene = d->b->tracer->scene;
+    struct imp__mirror *m = imp__arena_take(d->arena, 1, sizeof *m);
+    if (!m) {
+        d->no_memory = true;
+        return false;
+    }
+    const struct imp_shape *shape =
+        scene->shapes[imp__placed_shape(scene, hit->shape, hit->place)];
+    const struct imp_located located = imp__located_hit(scene, shape, hit, at);
+    *m = (struct imp__mirror){.on = NULL, .at = *at};
+    m->x = imp__glued_at(scene, hit->shape, &located, hit->place, at->ng);
+    if (all->last) all->last->on = m;
+    else all->first = m;
+    all->last = m;
+    all->n++;
+    return true;
+}
+
+imp_v3 imp__mirrors_bar(const struct imp__mirrors *all, imp_v3 *p, imp_v3 bar,
+                        struct imp__flux_end *end, int *n_ends)
+{
+    for (const struct imp__mirror *m = all->first; m; m = m->on) {
+        struct imp__flux_end *e = &end[(*n_ends)++];
+        *e = imp__flux_glued(&m->x, (imp_v3){0});
+        /* p is the image of y. */
+        const imp_v3 y = imp__mirror_image(m->x.p, m->x.n, *p);
+        bar = imp__mirror_image_bar(m->x.p, m->x.n, y, bar, &e->bar);
+        *p = y;
+    }
+    return bar;
+}
+
+/* ---- To the camera ------------------------------------------------------------------- */
+
+bool imp__sight_draw(const struct imp__edge_draw *d, unsigned dims, struct imp__sight *s)
+{
+    const struct imp__boundary *b = d->b;
+    const size_t n = b->n_planes;
+    const unsigned first = IMP_EDGE_MIRROR + dims * 2 * IMP_SIGHT_MAX;
+    *s = (struct imp__sight){.chance = 1, .eye = d->eye};
+    if (n == 0) return false;
+    do {
+        const double u = imp__u01(d->key, first + 2 * (unsigned)s->n);
+        size_t k;
+        if (s->n == 0) {
+            k = imp_min((size_t)(u * (double)n), n - 1);
+            s->chance /= (double)n;
+        } else { /* one after the other is not in the same plane */
+            k = imp_min((size_t)(u * (double)(n - 1)), n - 2);
+            k += &b->plane[k] >= s->plane[s->n - 1];
+            s->chance /= (double)(n - 1);
+        }
+        const struct imp__plane *x = &b->plane[k];
+        s->plane[s->n++] = x;
+        s->eye = b->parallel ? imp__mirror_turn(x->n, s->eye)
+                             : imp__mirror_image(x->p, x->n, s->eye);
+        if (n == 1) return true;
+        s->chance *= 0.5;
+    } while (s->n < IMP_SIGHT_MAX &&
+             imp__u01(d->key, first + 2 * (unsigned)s->n - 1) < 0.5);
+    return true;
+}
+
+/* The mirror of a plane at q, where a line along the unit vector w meets it. False: it is not there. */
+static bool mirror_met(struct imp__edge_draw *d, const struct imp__plane *x, imp_v3 q,
+                       imp_v3 w, struct imp_hit *hit, struct imp_surface *at)
+{
+    const struct imp_scene *scene = d->b->tracer->scene;
+    const imp_v3 o = imp__offset(q, x->n, -w);
+    const double near = imp__dot(x->n, q - o) / imp__dot(x->n, w);
+    if (!imp__intersect(scene, &o, &w, 0, 2 * near, hit)) return false;
+    if (hit->place != x->place ||
+        (hit->shape != x->shape &&
+         hit->shape != imp__placed_shape(scene, x->shape, x->place)))
+        return false;
+    imp__hit_surface(scene, hit, &o, &w, at);
+    at->p = q;
+    return imp__length(imp__cross(at->ng, x->n)) < 1e-4;
+}
+
+/* Light on the line between two mirrors, or from the last one to the camera. */
+static bool leg_add(const struct imp__edge_draw *d, struct imp__sight *s, imp_v3 o,
+                    imp_v3 r, double till)
+{
+    struct imp__line line;
+    if (!imp__edge_line(d, o, r, till, &line)) return false;
+    s->T *= line.T;
+    s->bounces += line.bounces;
+    return true;
+}
+
+bool imp__sight_reach(struct imp__edge_draw *d, struct imp__sight *s, imp_v3 p)
+{
+    const struct imp_sensor *sensor = d->b->tracer->sensor;
+    struct imp_shadow shadow;
+    struct imp_sensor_sample last;
+    imp_v3 behind[IMP_SIGHT_MAX + 1], at = p;
+    s->T = imp__spec(1);
+    behind[0] = d->eye;
+    for (int k = 0; k < s->n; k++)
+        behind[k + 1] =
+            d->b->parallel ? imp__mirror_turn(s->plane[k]->n, behind[k])
+                           : imp__mirror_image(s->plane[k]->p, s->plane[k]->n, behind[k]);
+    for (int k = s->n - 1; k >= 0; k--) {
+        const struct imp__plane *x = s->plane[k];
+        const imp_v3 r = d->b->parallel ? -behind[k + 1] : behind[k + 1] - at;
+        const double apart = imp__dot(x->n, x->p - at), till = apart / imp__dot(x->n, r);
+        if (!(till > 0) || fabs(apart) < SAME * d->b->size ||
+            !(d->b->parallel || till < 1))
+            return false;
+        const imp_v3 q = at + r * till, w = imp__normalize(r);
+        struct imp_hit hit;
+        struct imp_surface there;
+        if (!mirror_met(d, x, q, w, &hit, &there)) return false;
+        const imp_spec F = imp__edge_reflected(d, &hit, &there, w);
+        if (imp__is_zero_used(F, d->waves)) return false;
+        if (k < s->n - 1) {
+            const imp_v3 o = imp__offset(at, s->plane[k + 1]->n, r),
+                         end = imp__offset(q, x->n, -r);
+            if (!leg_add(d, s, o, end - o, 1)) return false;
+        }
+        s->T *= F;
+        s->bounces++;
+        if (!imp__mirror_add(d, &s->mirrors, &hit, &there)) return false;
+        at = q;
+    }
+    if (!imp__sensor_connect(sensor, &at, false, d->lens, &last)) return false;
+    imp__light_shadow_aim(&s->mirrors.last->at, &last, &shadow);
+    if (!leg_add(d, s, shadow.o, shadow.d, shadow.reach)) return false;
+    s->image = p;
+    for (const struct imp__mirror *m = s->mirrors.first; m; m = m->on)
+        s->image = imp__mirror_image(m->x.p, m->x.n, s->image);
+    return imp__sensor_connect(sensor, &s->image, false, d->lens, &s->to) &&
+           imp__light_on_film(sensor, &s->to);
+}
