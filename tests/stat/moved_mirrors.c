@@ -20,6 +20,9 @@
 #define PLASTIC                                                                          \
     "<bsdf type='plastic' id='grey'><rgb name='diffuse_reflectance' value='.6,.5,.4'/>"  \
     "</bsdf>"
+#define MATT                                                                             \
+    "<bsdf type='roughplastic' id='grey'><float name='alpha' value='.4'/><rgb "          \
+    "name='diffuse_reflectance' value='.6,.5,.4'/></bsdf>"
 #define DARK "<bsdf type='diffuse' id='grey'><rgb name='reflectance' value='0'/></bsdf>"
 #define ROUGH                                                                            \
     "<bsdf type='roughconductor' id='grey'><float name='alpha' value='.3'/></bsdf>"
@@ -116,6 +119,25 @@ static void refused_test(void)
                    "horizon");
 }
 
+/* The horizon of a sky, beside a tilted mirror and in it; a black block hides a part. */
+static imp_scene *horizon(void)
+{
+    char xml[8192], camera[4096];
+    snprintf(camera, sizeof camera, ROOM_CAMERA, "<rotate x='1' angle='7'/>",
+             "type='box'");
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'><integrator type='direct'/><emitter type='ciesky'/>"
+             "%s" DARK "<shape type='cube' id='block'><transform name='to_world'><scale "
+             "x='.6' y='.5' z='.4'/><rotate z='1' angle='25'/><translate x='-.2' y='.3' "
+             "z='.7'/></transform><ref id='grey'/></shape>"
+             "<shape type='rectangle' id='mirror'><transform name='to_world'><scale "
+             "x='1.1' y='.9'/><rotate x='1' angle='87'/><rotate y='1' angle='8'/><rotate "
+             "z='1' angle='-20'/><translate x='.9' y='1.6' z='1.8'/></transform>" MIRROR
+             "</shape></scene>",
+             camera);
+    return test_scene_text(ctx, xml, IMP_RGB);
+}
+
 /* A meter on the floor beside a block and a mirror, under a lamp. */
 static imp_scene *meter(void)
 {
@@ -207,6 +229,11 @@ int main(int argc, char **argv)
                                            {"mirror.pose", 5, .01},
                                            {"camera.pose", 5, .01},
                                            {NULL, 0, 0}},
+                               turns[] = {{"camera.pose", 3, .01},
+                                          {"camera.pose", 4, .01},
+                                          {"camera.pose", 5, .01},
+                                          {"block.pose", 0, .02},
+                                          {NULL, 0, 0}},
                                eggs[] = {{"egg.pose", 0, .01},
                                          {"egg.pose", 2, .01},
                                          {"mirror.pose", 1, .03},
@@ -224,6 +251,7 @@ int main(int argc, char **argv)
         "images before a sky",
         room_of("<integrator type='direct'/>" SKY BATHROOM(MIRROR) BALL, DARK),
         128 * more, 192 * more, .1, images);
+    numbers_compare("a horizon", horizon(), 64 * more, 128 * more, .05, turns);
     numbers_compare("a mirror", room(PATH BATHROOM(MIRROR)), 32 * more, 32 * more, most,
                     one);
     numbers_compare("plastic", room_of(PATH, PLASTIC), 32 * more, 32 * more, most,
@@ -234,7 +262,7 @@ int main(int argc, char **argv)
         numbers_compare("two mirrors", room(DEEP BATHROOM(MIRROR) OTHER(MIRROR)), 512,
                         512, .15, two);
         numbers_compare("a sky", room(SKY PATH BATHROOM(MIRROR)), 512, 512, .15, one);
-        numbers_compare("rough metal", room_of(PATH BATHROOM(MIRROR), ROUGH), 512, 512,
+        numbers_compare("rough plastic", room_of(PATH BATHROOM(MIRROR), MATT), 512, 512,
                         .2, one);
         numbers_compare("a cube of mirrors", room(PATH PLACED), 512, 512, .15, placed);
         egg_write(EGG, true);

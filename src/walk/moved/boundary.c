@@ -181,7 +181,10 @@ static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
             imp__draw_shading_film(d);
             if (imp_unlikely(d->b->n_planes > 0)) imp__draw_shading_mirrored(d);
         }
-        if (item == IMP_ITEM_SKY) imp__draw_sky_film(d);
+        if (item == IMP_ITEM_SKY) {
+            imp__draw_sky_film(d);
+            if (imp_unlikely(d->b->n_planes > 0)) imp__draw_sky_mirrored(d);
+        }
         break;
     case IMP_BOUNDARY_LIGHT: imp__draw_light(d); break;
     case IMP_BOUNDARY_SCATTER:

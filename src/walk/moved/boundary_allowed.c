@@ -261,15 +261,15 @@ static enum imp_status turns_allowed(const struct imp__boundary *b)
     return IMP_OK;
 }
 
-/* Where mirrors or the camera turn, circles at which a sky jumps are seen to move in mirrors: none is drawn
- * there. */
+/* Where a mirror turns, circles at which a sky jumps move in it as any vertex sees it, and none is drawn
+ * there but what the camera sees; of parallel rays not that either. */
 static enum imp_status skies_allowed(const struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
     for (int k = 0; k < scene->n_environments && b->mirrors; k++) {
         const struct imp_emitter *e = scene->emitters[scene->environments[k]];
         struct imp_sky_circle circle[IMP_SKY_CIRCLES];
-        bool turns = imp__moves_shape(b->moves, IMP_MOVE_CAMERA, NULL);
+        bool turns = b->parallel && imp__moves_shape(b->moves, IMP_MOVE_CAMERA, NULL);
         for (size_t j = 0; j < b->edges->n_bodies; j++) {
             const struct imp__body *x = &b->edges->body[j];
             const struct imp_hit hit = {.shape = x->shape, .place = x->place};

@@ -296,6 +296,7 @@ void imp__draw_mirrored(struct imp__edge_draw *d);
 void imp__draw_light(struct imp__edge_draw *d);
 void imp__draw_scatter(struct imp__edge_draw *d);
 void imp__draw_sky_film(struct imp__edge_draw *d);
+void imp__draw_sky_mirrored(struct imp__edge_draw *d);
 /* How much more arrives from next to w, a point of the item's circle, on the side that m points away
  * from. */
 imp_spec imp__sky_jump(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m);

@@ -25,23 +25,60 @@ imp_spec imp__sky_jump(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m)
     return L[0] - L[1];
 }
 
-void imp__draw_sky_film(struct imp__edge_draw *d)
+/* A direction of the item's circle; sets d->along and d->inv_pdf, per length at the distance 1. */
+static imp_v3 circle_draw(struct imp__edge_draw *d)
 {
-    const struct imp_tracer *tracer = d->b->tracer;
-    const struct imp_sensor *sensor = tracer->sensor;
     const struct imp_sky_circle *c = &d->item->circle;
     const double psi = IMP_2PI * d->u;
     const double sine = sqrt(imp_max(1 - imp__sqr(c->cosine), 0.0));
     const struct imp_frame f = imp__frame_from_normal(c->axis);
-    const imp_v3 w = c->axis * c->cosine + (f.s * cos(psi) + f.t * sin(psi)) * sine;
+    d->along = f.t * cos(psi) - f.s * sin(psi);
+    d->inv_pdf = IMP_2PI * sine / d->chance;
+    return c->axis * c->cosine + (f.s * cos(psi) + f.t * sin(psi)) * sine;
+}
+
+void imp__draw_sky_film(struct imp__edge_draw *d)
+{
+    const struct imp_sensor *sensor = d->b->tracer->sensor;
+    const imp_v3 w = circle_draw(d);
     struct imp_sensor_sample to;
     struct imp__line line;
     if (d->b->fog) return; /* none of it comes through */
     if (!sensor->ops->connect || !imp__sensor_connect(sensor, &w, true, d->lens, &to) ||
         !imp__light_on_film(sensor, &to) || !imp__edge_line(d, to.p, w, INFINITY, &line))
         return;
-    d->along = f.t * cos(psi) - f.s * sin(psi);
-    d->inv_pdf = IMP_2PI * sine / d->chance;
     d->p = d->eye + w;
     imp__film_jump(d, &to, line.T);
+}
+
+void imp__draw_sky_mirrored(struct imp__edge_draw *d)
+{
+    const int max = d->b->tracer->integrator->max_depth;
+    const imp_v3 w = circle_draw(d), m = imp__cross(d->along, w);
+    const double far = 4 * d->b->size;
+    struct imp__sight s;
+    struct imp__line line;
+    if (!d->b->tracer->sensor->ops->connect || !imp__sight_draw(d, 0, &s) ||
+        !imp__sight_reach(d, &s, s.eye + w * far))
+        return;
+    const struct imp_surface *at = &s.mirrors.first->at;
+    const imp_v3 o = imp__offset(at->p, at->ng, w);
+    if (!imp__edge_line(d, o, w, INFINITY, &line) ||
+        (max >= 0 && s.bounces + line.bounces >= max))
+        return;
+    const double spread = s.to.weight * imp__sqr(far); /* at the distance 1 */
+    struct imp__flux *f = imp__jump_add(d, &s.to,
+                                        s.T * line.T * imp__sky_jump(d, w, m) *
+                                            (spread * d->inv_pdf / s.chance),
+                                        2 + 2 * s.n);
+    if (!f) return;
+    /* The ray turns by (u(e + w) - u(e)), e the eye's image. */
+    imp_v3 p[2] = {s.eye, s.eye + w}, bar[2] = {m, -m};
+    for (int k = 0; k < 2; k++)
+        bar[k] = imp__mirrors_bar(&s.mirrors, &p[k], bar[k], f->end, &f->n_ends);
+    for (int k = 0; k < 2; k++) {
+        const struct imp__glued seen = {.p = p[k]};
+        f->end[f->n_ends] = imp__flux_camera(d, &seen, bar[k]);
+        f->end[f->n_ends++].eye = p[1 - k]; /* another point of the ray */
+    }
 }
