@@ -72,7 +72,6 @@ bool imp__passes_by_angle(const struct imp_bsdf *b)
 
 bool imp__bends_nothing(const struct imp_bsdf *b)
 {
-    if (b->ops->index_ratio) return false;
     for (uint32_t k = 0; k < PROBES; k++) {
         const struct imp_key key = imp__key(7, 3, k);
         const double v[2] = {imp__u01(key, 0), imp__u01(key, 1)},
@@ -82,6 +81,7 @@ bool imp__bends_nothing(const struct imp_bsdf *b)
         imp_spec in[IMP_INPUTS_MAX];
         imp__inputs_eval(b->input, b->n_in, &at, in);
         if (!b->ops->sample(b, in, u, &d) || d.lobe == IMP_SMOOTH) continue;
+        if (b->ops->index_ratio && b->ops->index_ratio(b, in, &d) != 1) return false;
         const bool straight = b->straight >> d.lobe & 1;
         const imp_v3 back = imp__v3(-d.wo[0], -d.wo[1], straight ? -d.wo[2] : d.wo[2]);
         if (imp__length(d.wi - back) > 1e-9) return false;
