@@ -3,6 +3,7 @@
  * Decimal numbers from text and to text. The C library's own functions follow the
  * locale of the host, which may write a comma for the decimal point. */
 #include "number.h"
+#include "little.h"
 #include <locale.h>
 #include <math.h>
 #include <stdio.h>
@@ -11,7 +12,28 @@
 
 #define DIGITS_MAX 19 /* always fit 64 bits */
 
+static const uint64_t power_of_ten[] = {1,      10,      100,      1000,     10000,
+                                        100000, 1000000, 10000000, 100000000};
+
 static bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+/* How many of the eight characters at p are digits, up to the first that is none, and how many of those
+ * are leading zeros; the digits as a number. Of w, with a digit in each byte, the first one lowest,
+ * pairs, fours and eights are made by three multiplications. */
+static int eight_digits(const char *p, uint64_t *value, int *zeros)
+{
+    uint64_t w = imp__little_u64((const unsigned char *)p) ^ 0x3030303030303030u;
+    const uint64_t other = ((w + 0x7676767676767676u) | w) & 0x8080808080808080u;
+    const int n = other ? __builtin_ctzll(other) / 8 : 8;
+    if (n == 0) return 0;
+    w <<= 64 - 8 * n;
+    *zeros = w ? __builtin_ctzll(w) / 8 - (8 - n) : n;
+    w = 10 * w + (w >> 8);
+    w = (w & 0x000000ff000000ffu) * 0x000f424000000064u +
+        ((w >> 16) & 0x000000ff000000ffu) * 0x0000271000000001u;
+    *value = w >> 32;
+    return n;
+}
 
 static bool word(const char **s, const char *end, const char *text, size_t n)
 {
@@ -56,6 +78,17 @@ bool imp__number(const char **s, const char *end, double *out)
     int kept = 0, exponent = 0;
     bool any = false, fraction = false;
     for (; p < end; p++) {
+        uint64_t v;
+        int zeros, n;
+        if (end - p >= 8 && kept <= DIGITS_MAX - 8 && exponent > -100000 &&
+            (n = eight_digits(p, &v, &zeros)) > 0) {
+            kept += mantissa ? n : n - zeros;
+            mantissa = power_of_ten[n] * mantissa + v;
+            if (fraction) exponent -= n;
+            any = true;
+            p += n - 1;
+            continue;
+        }
         if (*p == '.' && !fraction) {
             fraction = true;
             continue;
@@ -103,9 +136,15 @@ bool imp__integer(const char **s, const char *end, int64_t *out)
 {
     const char *p = *s;
     bool negative = false;
+    int zeros, n;
+    uint64_t first;
     if (p < end && (*p == '+' || *p == '-')) negative = *p++ == '-';
     if (p >= end || !is_digit(*p)) return false;
     int64_t value = 0;
+    if (end - p >= 8 && (n = eight_digits(p, &first, &zeros)) > 0) {
+        value = negative ? -(int64_t)first : (int64_t)first;
+        p += n;
+    }
     for (; p < end && is_digit(*p); p++)
         if (__builtin_mul_overflow(value, 10, &value) ||
             (negative ? __builtin_sub_overflow(value, *p - '0', &value)

@@ -4,6 +4,7 @@
  * polygons are fanned from their first corner. A vertex is a distinct (v, vt, vn). What
  * objects, materials and their files are called goes to who asks for it (obj_parts.c);
  * all other lines are ignored. */
+#include "base/arguments.h"
 #include "base/number.h"
 #include "obj_parts.h"
 #include <math.h>
@@ -26,14 +27,17 @@ struct obj {
     const struct imp_mesh_source *source;
     imp_context *ctx;
     int64_t line;
-    size_t at; /* of the text, where the line begins */
+    size_t at;       /* of the text, where the line begins */
+    size_t faces_at; /* ... where that of the first face does */
     struct column v, t, n;
     struct corner *vertices;
     size_t n_vertices, cap_vertices;
     uint32_t *indices;
     size_t n_indices, cap_indices;
-    uint32_t *table; /* vertex + 1 by hash of its corner; 0: free */
-    size_t cap_table;
+    uint32_t *alone; /* vertex + 1 by v, of the first corner that has it; 0: none */
+    size_t n_alone, cap_alone;
+    uint32_t *table; /* vertex + 1 of the others by hash of their corner; 0: free */
+    size_t cap_table, n_table;
     bool missing_normal;
     struct imp__obj_names *names; /* NULL: nobody asks */
 };
@@ -64,15 +68,16 @@ static const char *skip(const char *s, const char *end)
 }
 
 /* Room for n elements of an array that holds `used`: for twice as many, or of many as many as the whole
- * text has if it goes on like this, so that large files are not copied. A number, or a corner with
+ * text has if it goes on as from `since` on, so that large files are not copied. A number, or a corner with
  * its triangle, takes two bytes of the text at least. What is not used is not written, and takes no
  * memory. NULL: there is none, and the array stays. */
 static void *room_for(struct obj *o, void *array, size_t *capacity, size_t used, size_t n,
-                      size_t size)
+                      size_t size, size_t since)
 {
     enum { MANY = 4096 };
     if (n <= *capacity) return array;
-    const double part = (double)(o->at + 1) / (double)o->source->text.size;
+    const double part =
+        (double)(o->at - since + 1) / (double)(o->source->text.size - since);
     size_t wanted = 2 * n + MANY;
     const size_t most = n + 2 * (o->source->text.size - o->at);
     if (n > MANY)
@@ -90,7 +95,7 @@ static enum imp_status row_read(struct obj *o, struct column *c, const char *wha
                                 int needed, const char *s, const char *end)
 {
     float *grown =
-        room_for(o, c->at, &c->capacity, c->n, c->n + (size_t)c->width, sizeof *grown);
+        room_for(o, c->at, &c->capacity, c->n, c->n + (size_t)c->width, sizeof *grown, 0);
     if (!grown) return no_memory(o);
     c->at = grown;
     for (int i = 0; i < c->width; i++) {
@@ -148,25 +153,50 @@ static uint32_t *slot(const struct obj *o, struct corner k)
 static enum imp_status table_grow(struct obj *o)
 {
     uint32_t *old = o->table;
-    const size_t wanted = o->cap_table ? 2 * o->cap_table : 1024;
+    const size_t n_old = o->cap_table, wanted = n_old ? 2 * n_old : 1024;
     uint32_t *table = imp__alloc(o->ctx, wanted, sizeof *table);
     if (!table) return no_memory(o);
     o->table = table;
     o->cap_table = wanted;
-    for (size_t i = 0; i < o->n_vertices; i++) *slot(o, o->vertices[i]) = (uint32_t)i + 1;
+    for (size_t i = 0; i < n_old; i++)
+        if (old[i]) *slot(o, o->vertices[old[i] - 1]) = old[i];
     imp__release(o->ctx, old);
+    return IMP_OK;
+}
+
+/* Where the number of a corner's vertex is kept: most positions have one corner, which needs no
+ * search. */
+static enum imp_status place_of(struct obj *o, struct corner k, uint32_t **out)
+{
+    const size_t known = o->v.n / 3;
+    if (o->n_alone < known) {
+        uint32_t *grown =
+            room_for(o, o->alone, &o->cap_alone, o->n_alone, known, sizeof *grown, 0);
+        if (!grown) return no_memory(o);
+        memset(grown + o->n_alone, 0, (known - o->n_alone) * sizeof *grown);
+        o->alone = grown;
+        o->n_alone = known;
+    }
+    uint32_t *s = &o->alone[k.v - 1];
+    const struct corner *first = *s ? &o->vertices[*s - 1] : &k;
+    if (first->t != k.t || first->n != k.n) {
+        if (2 * (o->n_table + 1) > o->cap_table) IMP_CHECKED(table_grow(o));
+        s = slot(o, k);
+        o->n_table += *s == 0;
+    }
+    *out = s;
     return IMP_OK;
 }
 
 static enum imp_status vertex_of(struct obj *o, struct corner k, uint32_t *out)
 {
     enum imp_status st = IMP_OK;
-    if (2 * (o->n_vertices + 1) > o->cap_table) IMP_TRY(table_grow(o));
-    uint32_t *s = slot(o, k);
+    uint32_t *s = NULL;
+    IMP_TRY(place_of(o, k, &s));
     if (*s == 0) {
         if (o->n_vertices >= IMP_MESH_MAX) IMP_TRY(line_error(o, "mesh is too large"));
         struct corner *grown = room_for(o, o->vertices, &o->cap_vertices, o->n_vertices,
-                                        o->n_vertices + 1, sizeof *grown);
+                                        o->n_vertices + 1, sizeof *grown, o->faces_at);
         if (!grown) IMP_TRY(no_memory(o));
         o->vertices = grown;
         o->vertices[o->n_vertices++] = k;
@@ -204,13 +234,14 @@ static enum imp_status face_read(struct obj *o, const char *s, const char *end)
     enum imp_status st = IMP_OK;
     uint32_t first = 0, last = 0, next;
     int n = 0;
+    if (o->n_vertices == 0) o->faces_at = o->at;
     for (s = skip(s, end); s < end; s = skip(s, end), n++) {
         struct corner k;
         IMP_TRY(corner_read(o, &s, end, &k));
         IMP_TRY(vertex_of(o, k, &next));
         if (n >= 2) {
             uint32_t *grown = room_for(o, o->indices, &o->cap_indices, o->n_indices,
-                                       o->n_indices + 3, sizeof *grown);
+                                       o->n_indices + 3, sizeof *grown, o->faces_at);
             if (!grown) IMP_TRY(no_memory(o));
             o->indices = grown;
             o->indices[o->n_indices++] = first;
@@ -303,6 +334,7 @@ out:
     imp__release(o.ctx, o.n.at);
     imp__release(o.ctx, o.vertices);
     imp__release(o.ctx, o.indices);
+    imp__release(o.ctx, o.alone);
     imp__release(o.ctx, o.table);
     return st;
 }

@@ -106,6 +106,45 @@ static void check_obj(void)
     }
 }
 
+/* Corners that come again, with other texture coordinates and normals or the same, against a search
+ * through all vertices so far. */
+static void check_obj_corners(void)
+{
+    enum { ROWS = 40, FACES = 3000 };
+    static char text[FACES * 64];
+    static uint32_t vertex[3 * FACES][3], want[3 * FACES];
+    size_t at = 0, n = 0;
+    struct loaded l;
+    for (int k = 0; k < ROWS; k++)
+        at += (size_t)sprintf(text + at, "v %d 0 0\nvt 0 %d\nvn 0 0 %d\n", k, k, k + 1);
+    for (int i = 0; i < FACES; i++) {
+        at += (size_t)sprintf(text + at, "f");
+        for (int c = 0; c < 3; c++) {
+            const struct imp_key key = imp__key(9, 0, (uint64_t)(3 * i + c));
+            uint32_t k[3];
+            for (uint32_t j = 0; j < 3; j++) /* few of each, but many v */
+                k[j] = 1 + (uint32_t)(imp__u01(key, j) * (j ? 2 + i % 3 : ROWS));
+            at += (size_t)sprintf(text + at, " %u/%u/%u", k[0], k[1], k[2]);
+            size_t old = 0;
+            while (old < n && memcmp(vertex[old], k, sizeof k) != 0) old++;
+            if (old == n) memcpy(vertex[n++], k, sizeof k);
+            want[3 * i + c] = (uint32_t)old;
+        }
+        at += (size_t)sprintf(text + at, "\n");
+    }
+    const enum imp_status st = load(ctx, text, at, "corners.obj", false, &l);
+    tap_ok(st == IMP_OK && l.m.n_vertices == n && l.m.n_triangles == FACES &&
+               memcmp(l.m.indices, want, sizeof want) == 0,
+           "%zu vertices of %d corners, in the order in which they come # %s", n,
+           3 * FACES, st ? imp_last_error(ctx) : "");
+    size_t wrong = 0;
+    for (size_t i = 0; st == IMP_OK && i < n; i++)
+        wrong += l.m.positions[3 * i] != (float)(vertex[i][0] - 1) ||
+                 l.m.uvs[2 * i + 1] != (float)(vertex[i][1] - 1) || !l.m.normals;
+    tap_ok(wrong == 0, "with their own numbers # %zu have not", wrong);
+    unload(&l);
+}
+
 /* ---- PLY ----------------------------------------------------------------------- */
 
 enum { ASCII, LITTLE, BIG };
@@ -529,6 +568,7 @@ int main(void)
     o.threads = 1;
     if (imp_context_create(&o, &ctx) != IMP_OK) return 1;
     check_obj();
+    check_obj_corners();
     check_ply();
     for (int bare = 0; bare < 2; bare++) {
         check_copied(1, bare);

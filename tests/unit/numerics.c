@@ -2,6 +2,7 @@
  *
  * Distributions, quadrature and small linear algebra against published or exact numbers.
  */
+#include "base/number.h"
 #include "imp_tap.h"
 #include "math/exp.h"
 #include "math/linalg.h"
@@ -191,9 +192,49 @@ static void exponentials(void)
            "of 0, of what is too large, and of no number");
 }
 
+/* Decimal numbers of up to 24 digits, with leading zeros, points and exponents, that end where the text
+ * ends or before it; and whole numbers. The program's locale is "C". */
+static void decimals(void)
+{
+    int wrong = 0, whole = 0, n = 0;
+    for (uint64_t i = 0; i < 200000; i++) {
+        const struct imp_key key = imp__key(6, 0, i);
+        char text[80];
+        const int digits = 1 + (int)(24 * imp__u01(key, 0) * imp__u01(key, 1)),
+                  point = (int)((digits + 2) * imp__u01(key, 2)),
+                  zeros = imp__u01(key, 3) < 0.3 ? digits / 2 : 0;
+        int at = imp__u01(key, 4) < 0.3 ? sprintf(text, "-") : 0;
+        for (int k = 0; k < digits; k++) {
+            if (k == point) text[at++] = '.';
+            text[at++] =
+                (char)(k < zeros ? '0'
+                                 : '0' + (int)(10 * imp__u01(key, 8 + (uint32_t)k)));
+        }
+        const int before = at;
+        if (imp__u01(key, 5) < 0.3)
+            at += sprintf(text + at, "e%d", (int)(40 * imp__u01(key, 6)) - 20);
+        const int number_ends = at;
+        at += sprintf(text + at, "%s", imp__u01(key, 7) < 0.5 ? "" : " 12345678901");
+        const char *s = text, *end = text + at;
+        double x = 0;
+        wrong += !imp__number(&s, end, &x) || s != text + number_ends ||
+                 x != strtod(text, NULL);
+        if (point < digits || digits > 18) continue;
+        int64_t j = 0;
+        s = text;
+        whole += !imp__integer(&s, end, &j) || s != text + before ||
+                 j != strtoll(text, NULL, 10);
+        n++;
+    }
+    tap_ok(wrong == 0, "decimal numbers as strtod reads them # %d of 200000 differ",
+           wrong);
+    tap_ok(whole == 0 && n > 5000, "whole ones as strtoll # %d of %d differ", whole, n);
+}
+
 int main(void)
 {
     angles();
+    decimals();
     exponentials();
     distributions();
     quadrature();
