@@ -8,16 +8,18 @@
 enum { BITS = 6 }; /* of a point's index */
 _Static_assert(1 << BITS == IMP_SET_POINTS, "bits of an index");
 
-/* Owen's nested scrambling of the leading BITS bits of x < 2^BITS: each bit is flipped at
- * random, by what the bits above it are. */
-static uint32_t scramble(uint32_t x, uint64_t seed)
+/* Owen's nested scrambling of all x < 2^BITS: each bit is flipped at random, by what the bits above
+ * it are. */
+static void scramble(uint64_t seed, uint32_t out[IMP_SET_POINTS])
 {
-    uint32_t out = 0;
-    for (int b = BITS - 1; b >= 0; b--) {
-        const uint64_t above = (uint64_t)1 << (BITS - b) | x >> (b + 1);
-        out |= (x ^ (uint32_t)(imp__mix64(seed + above) & 1) << b) & 1u << b;
-    }
-    return out;
+    for (uint32_t x = 0; x < IMP_SET_POINTS; x++) out[x] = x;
+    for (int b = BITS - 1; b >= 0; b--)
+        for (uint32_t high = 0; high < 1u << (BITS - 1 - b); high++) {
+            const uint64_t above = (uint64_t)1 << (BITS - b) | high;
+            const uint32_t flip = (uint32_t)(imp__mix64(seed + above) & 1) << b;
+            for (uint32_t low = 0; low < 2u << b; low++)
+                out[high << (b + 1) | low] ^= flip;
+        }
 }
 
 /* Radical inverse of i in base 2, times 2^BITS. */
@@ -44,9 +46,12 @@ void imp__points_make(struct imp_point_table *points)
         for (uint64_t k = 0; k < IMP_BLOCK_NUMBERS; k++) {
             const uint64_t order = imp__mix64(0x5eed0001 + (b << 8 | k >> 1));
             const uint64_t digits = imp__mix64(0x5eed0002 + (b << 8 | k));
+            uint32_t place[IMP_SET_POINTS], scrambled[IMP_SET_POINTS];
+            scramble(order, place);
+            scramble(digits, scrambled);
             for (uint32_t i = 0; i < IMP_SET_POINTS; i++) {
-                const uint32_t at = scramble(i, order);
-                const uint32_t x = scramble(k & 1 ? second(at) : reversed(at), digits);
+                const uint32_t at = place[i];
+                const uint32_t x = scrambled[k & 1 ? second(at) : reversed(at)];
                 /* Bits below those of the net are random. */
                 const uint64_t rest = imp__mix64(digits + ((uint64_t)(i + 1) << 32));
                 points->number[b][i][k] =
