@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Rays against the scene. Triangles are Embree's own work, in float, where there are more than
- * a few (facets.h); analytic shapes are met through their ops, in double, and their hits never
- * pass through a float (where Embree has them in its tree, struct query carries ray and hit past
- * it). Instances are shapes of this kind, too: each takes the ray to its group, in double, and
- * intersects the group's own scene of Embree. So they can be nested and move, and one costs 232
- * bytes and 63 in Embree's tree (of 200,000); Embree's own instances cost 375 to 400, and those
- * of Debian cannot be nested. */
+ * a few (facets.h); where a pair of them is met is computed again, in double (tree_quads.h). Analytic
+ * shapes are met through their ops, in double, and their hits never pass through a float (where
+ * Embree has them in its tree, struct query carries ray and hit past it). Instances are shapes of
+ * this kind, too: each takes the ray to its group, in double, and intersects the group's own scene
+ * of Embree. So they can be nested and move, and one costs 232 bytes and 63 in Embree's tree (of
+ * 200,000); Embree's own instances cost 375 to 400, and those of Debian cannot be nested. */
 #include "instances.h"
 #include "intersector.h"
 #include <string.h>
@@ -188,12 +188,8 @@ nearest(const struct imp_intersector *x, double time, const imp_v3 *o, const imp
         *hit = q.hit;
         return true;
     }
-    hit->shape = x->first + (int)r.hit.geomID;
-    hit->prim = (int)r.hit.primID;
-    hit->t = r.ray.tfar;
-    hit->u = r.hit.u;
-    hit->v = r.hit.v;
-    hit->place = 0;
+    imp__mesh_hit(x, *o, *d, r.hit.geomID, r.hit.primID, r.ray.tfar, r.hit.u, r.hit.v,
+                  hit);
     return true;
 }
 

@@ -110,92 +110,6 @@ static enum imp_status device_get(imp_context *ctx, RTCDevice *out)
     return st;
 }
 
-static void bounds_set(imp_v3 lo, imp_v3 hi, struct RTCBounds *b)
-{
-    b->lower_x = nextafterf((float)lo[0], -INFINITY);
-    b->lower_y = nextafterf((float)lo[1], -INFINITY);
-    b->lower_z = nextafterf((float)lo[2], -INFINITY);
-    b->upper_x = nextafterf((float)hi[0], INFINITY);
-    b->upper_y = nextafterf((float)hi[1], INFINITY);
-    b->upper_z = nextafterf((float)hi[2], INFINITY);
-}
-
-static void analytic_bounds(const struct RTCBoundsFunctionArguments *args)
-{
-    const struct imp_shape *s = args->geometryUserPtr;
-    const imp_v3 a = imp__abs(s->lo), b = imp__abs(s->hi);
-    const double size = fmax(fmax(fmax(a[0], a[1]), a[2]), fmax(fmax(b[0], b[1]), b[2]));
-    /* It is intersected also where a triangle was met that may lie behind it. */
-    const imp_v3 more = imp__spec((1 + size) * IMP_RAY_EPSILON);
-    bounds_set(s->lo - more, s->hi + more, args->bounds_o);
-}
-
-static void instance_bounds(const struct RTCBoundsFunctionArguments *args)
-{
-    const struct imp_group *g = args->geometryUserPtr;
-    imp_v3 lo, hi;
-    imp__instance_box(&g->instance[args->primID], &lo, &hi);
-    bounds_set(lo, hi, args->bounds_o);
-}
-
-static RTCGeometry instances_create(RTCDevice rtc, const struct imp_group *g)
-{
-    RTCGeometry made = rtcNewGeometry(rtc, RTC_GEOMETRY_TYPE_USER);
-    if (!made) return NULL;
-    rtcSetGeometryUserPrimitiveCount(made, (unsigned)g->n_instances);
-    rtcSetGeometryUserData(made, (void *)(uintptr_t)g);
-    rtcSetGeometryBoundsFunction(made, instance_bounds, NULL);
-    rtcSetGeometryIntersectFunction(made, imp__instance_intersect);
-    rtcSetGeometryOccludedFunction(made, imp__instance_occluded);
-    rtcCommitGeometry(made);
-    return made;
-}
-
-static RTCGeometry curves_create(RTCDevice rtc, const struct imp_curves *c)
-{
-    const bool cones = c->degree == 1;
-    RTCGeometry g = rtcNewGeometry(rtc, cones ? RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE
-                                              : RTC_GEOMETRY_TYPE_ROUND_BSPLINE_CURVE);
-    if (!g) return NULL;
-    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, c->points,
-                               0, 4 * sizeof(float), c->n_points);
-    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, c->first, 0,
-                               sizeof(uint32_t), c->n_segments);
-    if (cones)
-        rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_FLAGS, 0, RTC_FORMAT_UCHAR,
-                                   c->joined, 0, 1, c->n_segments);
-    rtcSetGeometryIntersectFilterFunction(g, imp__curve_filter);
-    rtcSetGeometryOccludedFilterFunction(g, imp__curve_filter);
-    rtcCommitGeometry(g);
-    return g;
-}
-
-/* all: its geometries report all hits of a ray, not the nearest. */
-static RTCGeometry geometry_create(RTCDevice rtc, const struct imp_shape *s, bool all)
-{
-    if (s->geometry == IMP_CURVES) return curves_create(rtc, &s->curves);
-    const bool analytic = s->geometry == IMP_ANALYTIC;
-    RTCGeometry g = rtcNewGeometry(rtc, analytic ? RTC_GEOMETRY_TYPE_USER
-                                                 : RTC_GEOMETRY_TYPE_TRIANGLE);
-    if (!g) return NULL;
-    if (analytic) {
-        rtcSetGeometryUserPrimitiveCount(g, 1);
-        rtcSetGeometryUserData(g, (void *)(uintptr_t)s);
-        rtcSetGeometryBoundsFunction(g, analytic_bounds, NULL);
-        rtcSetGeometryIntersectFunction(g, all ? imp__gather_analytic
-                                               : imp__analytic_intersect);
-        rtcSetGeometryOccludedFunction(g, imp__analytic_occluded);
-    } else {
-        const struct imp_triangles *t = &s->triangles;
-        rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                   t->positions, 0, 3 * sizeof(float), t->n_vertices);
-        rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                   t->indices, 0, 3 * sizeof(uint32_t), t->n_triangles);
-    }
-    rtcCommitGeometry(g);
-    return g;
-}
-
 /* Does light travel on the inner side of the mesh: in a room, a body of glass, a medium?
  * Among 10^8 rays in closed rooms and through bodies, 22 slip between two triangles without
  * Embree's robust flag, 20 of them in rooms of 20,480 triangles; 1 slips with the flag
@@ -288,6 +202,31 @@ static bool is_few(const struct imp_scene *scene, const struct content *c)
     return !c->aims && n <= IMP_SHAPE_BALLS;
 }
 
+static void intersector_free(imp_context *ctx, struct imp_intersector *x)
+{
+    imp__facets_destroy(ctx, x->facets);
+    for (int i = 0; i < x->n_quads; i++) imp__tree_quads_destroy(ctx, x->quads[i]);
+    imp__release(ctx, x->quads);
+    imp__release(ctx, x);
+}
+
+/* Aims, whose hits are gathered one by one, stay triangles. False: out of memory. */
+static bool quads_create(const struct imp_scene *scene, const struct content *c,
+                         struct imp_intersector *x)
+{
+    if (c->aims || x->facets || c->n == 0) return true;
+    x->quads = imp__alloc(scene->ctx, (size_t)c->n, sizeof(struct imp_tree_quads *));
+    if (!x->quads) return false;
+    x->n_quads = c->n;
+    for (int i = 0; i < c->n; i++) {
+        const struct imp_shape *s = shape_at(scene, c, i);
+        if (s->geometry == IMP_TRIANGLES && !imp__shape_is_absent(s) &&
+            !imp__tree_quads_create(scene->ctx, &s->triangles, &x->quads[i], &x->bytes))
+            return false;
+    }
+    return true;
+}
+
 static enum imp_status intersector_make(struct imp_scene *scene, const struct content *c,
                                         void **out)
 {
@@ -302,10 +241,11 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
 
     /* Where analytic shapes are in the tree, it decides which of two at one place is met. */
     const bool few = is_few(scene, c);
-    if (few && c->n > 0 &&
-        !imp__facets_create(scene->ctx, scene->shapes + c->first, c->n, &x->facets,
-                            &x->bytes)) {
-        imp__release(scene->ctx, x);
+    if ((few && c->n > 0 &&
+         !imp__facets_create(scene->ctx, scene->shapes + c->first, c->n, &x->facets,
+                             &x->bytes)) ||
+        !quads_create(scene, c, x)) {
+        intersector_free(scene->ctx, x);
         IMP_TRY(imp__error(scene->ctx, IMP_E_NOMEM, "out of memory for triangles"));
     }
     told_clear();
@@ -326,8 +266,9 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
             continue;
         }
         if (s && s->geometry == IMP_TRIANGLES && x->facets) continue;
-        RTCGeometry g = s ? geometry_create(rtc, s, c->aims != NULL)
-                          : instances_create(rtc, c->group);
+        RTCGeometry g = s ? imp__geometry_create(rtc, s, x->quads ? x->quads[i] : NULL,
+                                                 c->aims != NULL)
+                          : imp__instances_create(rtc, c->group);
         if (!g) break;
         rtcAttachGeometryByID(x->rtc, g, (unsigned)i);
         rtcReleaseGeometry(g); /* the scene holds it now */
@@ -346,8 +287,7 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
     x->bytes += told.bytes;
     if (error != RTC_ERROR_NONE) {
         if (x->rtc) rtcReleaseScene(x->rtc);
-        imp__facets_destroy(scene->ctx, x->facets);
-        imp__release(scene->ctx, x);
+        intersector_free(scene->ctx, x);
         IMP_TRY(device_error(scene->ctx, error, told.message));
     }
     *out = x;
@@ -384,8 +324,7 @@ static void intersector_release(struct imp_scene *scene, void **intersector)
     build_enter();
     rtcReleaseScene(x->rtc);
     build_leave();
-    imp__facets_destroy(scene->ctx, x->facets);
-    imp__release(scene->ctx, x);
+    intersector_free(scene->ctx, x);
     *intersector = NULL;
 }
 enum imp_status imp__intersector_renew(struct imp_scene *scene)

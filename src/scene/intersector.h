@@ -6,6 +6,7 @@
 
 #include "facets.h"
 #include "shape_balls.h"
+#include "tree_quads.h"
 #include <embree3/rtcore.h>
 
 struct imp_intersector {
@@ -17,6 +18,9 @@ struct imp_intersector {
     bool calls_back; /* for analytic shapes or instances */
     bool packets;    /* it takes eight rays at a time, and each has its numbers then */
     int first;       /* index of its first shape */
+    struct imp_tree_quads *
+        *quads; /* [n_quads] those of its shapes; NULL: its triangles are alone */
+    int n_quads;
     int64_t bytes;
 };
 
@@ -39,6 +43,27 @@ static inline bool imp__ray_valid(const imp_v3 *o, const imp_v3 *d, double tmin,
     const imp_v3 size = imp__abs(*o) + imp__abs(*d);
     return (size[0] + size[1]) + size[2] < IMP_REACH_MAX && tmin >= 0 && tmin < tmax;
 }
+
+/* Embree's hit of a mesh. */
+static inline void imp__mesh_hit(const struct imp_intersector *x, imp_v3 o, imp_v3 d,
+                                 unsigned geometry, unsigned prim, float t, float u,
+                                 float v, struct imp_hit *hit)
+{
+    hit->shape = x->first + (int)geometry;
+    hit->prim = (int)prim;
+    hit->t = (double)t;
+    hit->u = (double)u;
+    hit->v = (double)v;
+    hit->place = 0;
+    if (x->quads && x->quads[geometry])
+        imp__tree_quads_hit(x->quads[geometry], prim, hit->u, hit->v, o, d, hit);
+}
+
+/* For a scene of Embree; NULL: it has no memory. quads: of a mesh, or NULL; all: all hits of a ray are
+ * reported, not the nearest. */
+RTCGeometry imp__geometry_create(RTCDevice rtc, const struct imp_shape *s,
+                                 const struct imp_tree_quads *quads, bool all);
+RTCGeometry imp__instances_create(RTCDevice rtc, const struct imp_group *g);
 
 /* What Embree calls for analytic shapes. */
 void imp__analytic_intersect(const struct RTCIntersectFunctionNArguments *args);

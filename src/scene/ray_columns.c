@@ -122,11 +122,10 @@ static unsigned packet_nearest(const struct imp_intersector *x,
     for (; on; on &= on - 1) {
         const int k = __builtin_ctz(on);
         if (r.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID) continue;
-        hit[k] = (struct imp_hit){.shape = x->first + (int)r.hit.geomID[k],
-                                  .prim = (int)r.hit.primID[k],
-                                  .t = (double)r.ray.tfar[k],
-                                  .u = (double)r.hit.u[k],
-                                  .v = (double)r.hit.v[k]};
+        hit[k] = (struct imp_hit){.place = 0};
+        imp__mesh_hit(x, imp__block_origin(b, first + k),
+                      imp__block_direction(b, first + k), r.hit.geomID[k],
+                      r.hit.primID[k], r.ray.tfar[k], r.hit.u[k], r.hit.v[k], &hit[k]);
         met |= 1u << k;
     }
     return met;

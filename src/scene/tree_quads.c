@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Which triangles of a mesh are pairs. */
+#include "tree_quads.h"
+#include <math.h>
+
+enum { ALONE = 4 * 3 };
+
+/* For a triangle and the next one, which shares an edge that runs the other way there: as
+ * imp_tree_quads.turned. */
+static int turned_of(const uint32_t *a, bool next)
+{
+    const uint32_t *b = a + 3;
+    for (int j = 0; next && j < 3; j++)
+        for (int k = 0; k < 3; k++)
+            if (a[(j + 1) % 3] == b[(k + 2) % 3] && a[(j + 2) % 3] == b[(k + 1) % 3])
+                return j + 4 * k;
+    return ALONE;
+}
+
+void imp__tree_quads_destroy(imp_context *ctx, struct imp_tree_quads *q)
+{
+    if (!q) return;
+    imp__release(ctx, q->corner);
+    imp__release(ctx, q->first);
+    imp__release(ctx, q->turned);
+    imp__release(ctx, q);
+}
+
+static void fill(const struct imp_triangles *mesh, struct imp_tree_quads *q)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < mesh->n_triangles; i++, n++) {
+        const uint32_t *a = mesh->indices + 3 * i;
+        const int turned = turned_of(a, i + 1 < mesh->n_triangles), j = turned & 3,
+                  k = turned >> 2;
+        q->first[n] = (uint32_t)i;
+        q->turned[n] = (uint8_t)turned;
+        q->corner[n][0] = a[j];
+        q->corner[n][1] = a[(j + 1) % 3];
+        q->corner[n][3] = a[(j + 2) % 3];
+        q->corner[n][2] = turned == ALONE ? q->corner[n][3] : a[3 + k];
+        i += turned != ALONE;
+    }
+}
+
+bool imp__tree_quads_create(imp_context *ctx, const struct imp_triangles *mesh,
+                            struct imp_tree_quads **out, int64_t *bytes)
+{
+    size_t n = 0;
+    *out = NULL;
+    for (size_t i = 0; i < mesh->n_triangles; i++, n++)
+        i += turned_of(mesh->indices + 3 * i, i + 1 < mesh->n_triangles) != ALONE;
+    if (3 * n > 2 * mesh->n_triangles) return true;
+    struct imp_tree_quads *q = imp__alloc(ctx, 1, sizeof *q);
+    if (!q) return false;
+    q->n = n;
+    q->positions = mesh->positions;
+    q->corner = imp__alloc_raw(ctx, n, sizeof *q->corner);
+    q->first = imp__alloc_raw(ctx, n, sizeof *q->first);
+    q->turned = imp__alloc_raw(ctx, n, sizeof *q->turned);
+    if (!q->corner || !q->first || !q->turned) {
+        imp__tree_quads_destroy(ctx, q);
+        return false;
+    }
+    fill(mesh, q);
+    *bytes += (int64_t)(n * (sizeof *q->corner + sizeof *q->first + sizeof *q->turned));
+    *out = q;
+    return true;
+}
+
+static imp_v3 position(const struct imp_tree_quads *q, unsigned prim, int corner)
+{
+    const float *p = q->positions + 3 * (size_t)q->corner[prim][corner];
+    return imp__v3((double)p[0], (double)p[1], (double)p[2]);
+}
+
+/* Where a ray meets the plane of a triangle (Moeller and Trumbore, "Fast, minimum storage ray-triangle
+ * intersection", 1997), with u and v of b and c. */
+struct plane_hit {
+    double t, u, v;
+};
+static struct plane_hit plane_hit(imp_v3 a, imp_v3 b, imp_v3 c, imp_v3 o, imp_v3 d)
+{
+    const imp_v3 e1 = b - a, e2 = c - a, s = o - a, h = imp__cross(d, e2),
+                 q = imp__cross(s, e1);
+    const double inverse = 1 / imp__dot(e1, h);
+    return (struct plane_hit){imp__dot(e2, q) * inverse, imp__dot(s, h) * inverse,
+                              imp__dot(d, q) * inverse};
+}
+static double least_part(const struct plane_hit *x)
+{
+    return imp_min(imp_min(x->u, x->v), 1 - x->u - x->v);
+}
+
+#define DIAGONAL 1e-3 /* nearer to it doubles decide which half is met */
+
+void imp__tree_quads_hit(const struct imp_tree_quads *q, unsigned prim, double u,
+                         double v, imp_v3 o, imp_v3 d, struct imp_hit *hit)
+{
+    const int j = q->turned[prim] & 3, k = q->turned[prim] >> 2;
+    const imp_v3 p1 = position(q, prim, 1), p3 = position(q, prim, 3);
+    const bool near = k < 3 && fabs(u + v - 1) < DIAGONAL;
+    bool second = k < 3 && u + v > 1;
+    struct plane_hit x = {0}, other = {0};
+    if (!second || near) x = plane_hit(position(q, prim, 0), p1, p3, o, d);
+    if (second || near) other = plane_hit(position(q, prim, 2), p3, p1, o, d);
+    if (near) second = least_part(&other) > least_part(&x);
+    if (second) x = other;
+    const double a = imp_clamp(x.u, 0.0, 1.0), b = imp_clamp(x.v, 0.0, 1 - a),
+                 part[3] = {1 - a - b, a, b}; /* of corner `at` and those after it */
+    const int at = second ? k : j;
+    hit->prim = (int)q->first[prim] + second;
+    hit->u = part[(4 - at) % 3];
+    hit->v = part[(5 - at) % 3];
+    if (isfinite(x.t)) hit->t = x.t;
+}
