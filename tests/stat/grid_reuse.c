@@ -10,7 +10,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { COLUMNS = 7, ROWS = 5, N = COLUMNS * ROWS, RUNS = 48 };
+enum { COLUMNS = 7, ROWS = 5, N = COLUMNS * ROWS, RUNS = 96 };
 
 static const char *const room =
     "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='6'/>"
@@ -38,8 +38,7 @@ static const char *const room =
     "type='diffuse'><rgb "
     "name='reflectance' value='.5'/></bsdf><emitter type='area'><rgb name='radiance' "
     "value='9'/></emitter></shape>"
-    "<emitter type='point'><point name='position' x='-2' y='-1' z='2'/><rgb "
-    "name='intensity' value='3'/></emitter>"
+    "%s"
     "<shape type='rectangle'><transform name='to_world'><scale x='2.9' "
     "y='1.9'/><translate "
     "z='.8'/></transform><sensor type='irradiancemeter'><boolean name='virtual' "
@@ -47,6 +46,10 @@ static const char *const room =
     "value='%s'/>%s<film "
     "type='hdrfilm'><integer name='width' value='7'/><integer name='height' value='5'/>"
     "</film></sensor></shape></scene>";
+
+static const char lamp[] =
+    "<emitter type='point'><point name='position' x='-2' y='-1' z='2'/><rgb "
+    "name='intensity' value='3'/></emitter>";
 
 struct reading {
     double value[N], se[N];
@@ -87,6 +90,7 @@ static void alone(imp_context *ctx, imp_scene *s, uint64_t seed, struct reading 
 
 struct sums {
     double mean[N], square[N], stated;
+    double average, average_square, average_stated;
 };
 static void add(struct sums *s, const struct reading *r)
 {
@@ -95,24 +99,30 @@ static void add(struct sums *s, const struct reading *r)
         s->square[i] += r->value[i] * r->value[i] / RUNS;
         s->stated += r->se[i] * r->se[i] / RUNS;
     }
+    s->average += r->mean.value / RUNS;
+    s->average_square += r->mean.value * r->mean.value / RUNS;
+    s->average_stated += r->mean.se * r->mean.se / RUNS;
 }
 static double variance(const struct sums *s, int i)
 {
     return fmax(s->square[i] - s->mean[i] * s->mean[i], 0) * RUNS / (RUNS - 1);
 }
 
+static double average_variance(const struct sums *s)
+{
+    return (s->average_square - s->average * s->average) * RUNS / (RUNS - 1);
+}
+
 static void compare(imp_context *ctx, const char *what, imp_scene *scene)
 {
     static struct reading a, b;
     struct sums one = {0}, other = {0};
-    double sum = 0, error = 0, chi2 = 0, seen = 0, before = 0;
+    double chi2 = 0, seen = 0, before = 0;
     for (int k = 0; k < RUNS; k++) {
         shared(ctx, scene, 1 + (uint64_t)k, &a);
         alone(ctx, scene, 1 + (uint64_t)k, &b);
         add(&one, &a);
         add(&other, &b);
-        sum = fmax(sum, fabs(a.mean.value / b.mean.value - 1));
-        error = fmax(error, fabs(a.mean.se / b.mean.se - 1));
     }
     struct sums fresh = {0};
     for (int k = 0; k < RUNS; k++) {
@@ -134,9 +144,30 @@ static void compare(imp_context *ctx, const char *what, imp_scene *scene)
     tap_ok(fabs(sqrt(one.stated / seen) - 1) < .12, "errors are %.2f times those seen",
            sqrt(one.stated / seen));
     tap_ok(seen < .75 * before, "with %.2f of the variance", seen / before);
+    const double v = average_variance(&one), w = average_variance(&fresh),
+                 z = (one.average - fresh.average) / sqrt((v + w) / RUNS),
+                 stated = sqrt(one.average_stated / v);
+    tap_ok(fabs(z) < 3.5 && fabs(log(stated)) < 3.5 / sqrt(2. * (RUNS - 1)),
+           "the mean as of points alone: z %.1f, its error %.2f times what is seen", z,
+           stated);
+}
+
+/* With one lamp the light samples are those of points alone, too, and so is the mean: what is given
+ * adds up to what is there. */
+static void one_lamp(imp_context *ctx, imp_scene *scene, const char *what)
+{
+    static struct reading a, b;
+    double sum = 0, error = 0;
+    for (uint64_t seed = 1; seed < 7; seed++) {
+        shared(ctx, scene, seed, &a);
+        alone(ctx, scene, seed, &b);
+        sum = fmax(sum, fabs(a.mean.value / b.mean.value - 1));
+        error = fmax(error, fabs(a.mean.se / b.mean.se - 1));
+    }
     tap_ok(sum < 1e-6 && error < 1e-4,
-           "the mean is that of points alone, but for %.1g, with its error (%.1g)", sum,
-           error);
+           "%s, one lamp: the mean is that of points alone, but for %.1g, with its error "
+           "(%.1g)",
+           what, sum, error);
 }
 
 static void threads(imp_context *ctx, imp_scene *scene, const char *xml)
@@ -161,11 +192,13 @@ int main(void)
                                           {"semicylindrical", "points", "semicylindrical",
                                            "<vector name='facing' x='1' y='0' z='0'/>"}};
     imp_context *ctx = test_context(1);
-    for (int k = 0; k < 4; k++) {
+    for (int k = 0; k < 8; k++) {
+        const char *const *how = kind[k / 2];
         char xml[8192];
-        snprintf(xml, sizeof xml, room, kind[k][1], kind[k][2], kind[k][3]);
+        snprintf(xml, sizeof xml, room, k % 2 ? "" : lamp, how[1], how[2], how[3]);
         imp_scene *scene = test_scene_text(ctx, xml, IMP_RGB);
-        compare(ctx, kind[k][0], scene);
+        if (k % 2) one_lamp(ctx, scene, how[0]);
+        else compare(ctx, how[0], scene);
         if (k == 0) threads(ctx, scene, xml);
         imp_scene_destroy(scene);
     }

@@ -35,6 +35,26 @@ static const struct imp_end_ops bundle_end = {.nothing = imp__sky_meet,
                                               .direction_draw = imp__direction_begin,
                                               .scatter = imp__scatter_along};
 
+/* Points of a grid that share have their light samples later (meter_lanes.h). */
+static inline bool link_later(struct imp_step *s, const struct imp_vertex *v,
+                              const struct imp_surface *at, struct imp_link *link)
+{
+    (void)s, (void)v, (void)at, (void)link;
+    return false;
+}
+static const struct imp_end_ops meter_end = {.nothing = imp__sky_meet,
+                                             .arrive = imp__end_arrive,
+                                             .bounces = imp__end_bounces,
+                                             .passes = imp__end_counts,
+                                             .densities = imp__end_densities,
+                                             .meet = imp__end_meet,
+                                             .goes_on = imp__end_goes_on,
+                                             .link_draw = link_later,
+                                             .link_weigh = imp__end_link_weigh,
+                                             .link_see = link_see,
+                                             .direction_draw = imp__direction_begin,
+                                             .scatter = imp__scatter_along};
+
 /* The ray in flight, as it has been for a walk that goes alone. */
 static void take(struct imp_depth *d, int i)
 {
@@ -239,9 +259,13 @@ void imp__meter_vertex(struct imp_depth *d, const struct imp_walk *begun, int wa
     s->depth = 0;
     struct imp_vertex *v = imp__meter_begin(s, &surface, &frame);
     d->lone->shadow.wanted = false;
-    const bool goes_on = v && imp__vertex_work(&bundle_end, s, v, NULL, &surface, &frame);
-    if (imp_unlikely(d->reuse != NULL) && v)
+    bool goes_on = false;
+    if (v && imp_unlikely(d->reuse != NULL)) {
+        goes_on = imp__vertex_work(&meter_end, s, v, NULL, &surface, &frame);
         imp__reuse_point(d->reuse, walk, surface.p, surface.ng);
+    } else if (v) {
+        goes_on = imp__vertex_work(&bundle_end, s, v, NULL, &surface, &frame);
+    }
     *weight = w->first ? w->first->w[0] : 0;
     d->bundle->set[walk] = w->point.points ? w->point.set : w->key.state;
     vertex_give_back(d, v, goes_on, walk, walk, walk);

@@ -6,6 +6,7 @@
 #include "by_shape.h"
 #include "in_media.h"
 #include "lanes_light.h"
+#include "meter_lanes.h"
 #include "reuse.h"
 #include "scene/ray_columns.h"
 #include "walk/path/first_segment.h"
@@ -179,16 +180,23 @@ static bool meter_begin(struct imp_arena *arena, struct imp_depth *d, const int 
     d->values = first ? &first->values : &r->recorded;
     d->next = &r->flights[0];
     d->next->ray.n = r->shadows.ray.n = 0;
+    const bool lanes = imp__meter_in_lanes(b->tracer);
     for (int k = 0; k < b->n; k++) {
         struct imp_walk own, *walk = b->walks ? &b->walks[k] : &own;
+        const int rays = d->next->ray.n;
         double weight;
         if (!imp__begin_alone(b, arena, xy[k / n_samples], samples[k % n_samples], k,
                               walk))
             return false;
         imp__meter_vertex(d, walk, k, &weight);
         if (sensor) imp__color_put(sensor->values.w, b->colors, k, imp__spec(weight));
+        if (imp_likely(!lanes) || k % n_samples > 0 || d->next->ray.n == rays) continue;
+        imp__meter_others(d, k, xy[k / n_samples], n_samples, samples);
+        for (int last = k + n_samples - 1; k < last; k++)
+            imp__color_put(sensor->values.w, b->colors, k + 1, imp__spec(weight));
     }
-    see(d, r);
+    if (imp_unlikely(d->reuse != NULL)) imp__meter_lights(d, r->hidden);
+    else see(d, r);
     *out = first;
     return true;
 }

@@ -1,0 +1,211 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * First vertices and light samples of points of a grid. */
+#include "meter_lanes.h"
+#include "kind/sensor/receiver.h"
+#include "lanes_light.h"
+#include "math/trig.h"
+#include "math/wide_offset.h"
+#include "reuse.h"
+
+#define IMP_WIDE IMP_WIDE_LANES
+#define IMP_TEXT "math/warp_text.h"
+#include "math/lane_text.h"
+
+/* Light samples of a walk, at most: four take as much longer as they gain. */
+enum { MOST = 2 };
+
+/* ---- Walks of one point ------------------------------------------------------------------ */
+
+bool imp__meter_in_lanes(const struct imp_tracer *t)
+{
+    const struct imp_receiver *r = t->sensor->receiver;
+    return t->together > 0 && t->points && t->integrator->rr_depth > 0 && r &&
+           r->kind == IMP_PLANAR && !r->turned && r->points;
+}
+
+/* As imp__begin_alone and imp__meter_begin make them. */
+static void numbers_set(struct imp_bundle *b, int walk, const int at[2],
+                        const int64_t *samples, int k)
+{
+    if (samples[k] / IMP_SET_POINTS == samples[k - 1] / IMP_SET_POINTS) {
+        b->set[walk] = b->set[walk - 1];
+    } else {
+        struct imp_walk own;
+        imp__walk_numbers(b->tracer, at[0], at[1], samples[k], &own);
+        b->set[walk] = imp__key_branch((struct imp_key){own.point.set}, 0, 1).state;
+    }
+    b->index[walk] = (uint32_t)samples[k] % IMP_SET_POINTS;
+}
+
+/* What walk `to` has of walk `from`. */
+static void walk_copy(struct imp_depth *d, int from, int to)
+{
+    struct imp_bundle *b = d->bundle;
+    struct imp_reuse *r = d->reuse;
+    struct imp_bundle_values *v = d->values;
+    b->px[to] = b->px[from];
+    b->py[to] = b->py[from];
+    b->time[to] = b->time[from];
+    b->valid[to] = b->valid[from];
+    for (int c = 0; c < b->colors; c++) {
+        v->e[c][to] = v->e[c][from];
+        v->b[c][to] = v->beyond[c][to] = 0;
+        v->w[c][to] = v->w[c][from];
+    }
+    v->up[to] = to;
+    for (int c = 0; c < 3; c++) {
+        r->from[c][to] = r->from[c][from];
+        r->normal[c][to] = r->normal[c][from];
+        r->facing[c][to] = r->facing[c][from];
+    }
+    r->begun[to] = true;
+}
+
+void imp__meter_others(struct imp_depth *d, int first, const int at[2], int n,
+                       const int64_t *samples)
+{
+    struct imp_bundle *b = d->bundle;
+    struct imp_flights *to = d->next;
+    const int like = to->ray.n - 1; /* the ray of `first` */
+    const imp_v3 p = imp__column_v3(d->reuse->from, first),
+                 normal = imp__column_v3(d->reuse->normal, first);
+    const struct imp_frame own = imp__frame_from_normal(normal);
+    const imp_wide3 ng = imp__wide3_of(normal), x = imp__wide3_of(p);
+    const imp_wide_frame frame = {imp__wide3_of(own.s), imp__wide3_of(own.t), ng};
+    for (int k = 1; k < n; k++) {
+        numbers_set(b, first + k, at, samples, k);
+        walk_copy(d, first, first + k);
+    }
+    for (int k = 1; k < n; k += IMP_WIDE_LANES) {
+        int32_t walk[IMP_WIDE_LANES];
+        for (int j = 0; j < IMP_WIDE_LANES; j++) walk[j] = first + imp_min(k + j, n - 1);
+        const struct imp_wide_block numbers =
+            imp__wide_block(b->tracer->points, b->set, b->index, walk, imp__block(-1));
+        const imp_wide3 wi = IMP_WIDE_OF(imp__cosine_directions)(
+            imp__wide_number(&numbers, (uint32_t)imp__slot(IMP_DIM_DIR_U)),
+            imp__wide_number(&numbers, (uint32_t)imp__slot(IMP_DIM_DIR_V)));
+        const imp_wide3 world = imp__out_of_wide_frame(&frame, wi);
+        const unsigned on = imp__bits_first(n - k) & imp__wide_bits(wi.z > imp__wide(0));
+        const int at_ray = to->ray.n;
+        imp__wide3_append(to->ray.o, at_ray, on, imp__wide_offset(x, ng, world));
+        imp__wide3_append(to->ray.d, at_ray, on, world);
+        imp__wide_append(&to->ray.far[at_ray], on, imp__wide(INFINITY));
+        imp__wide3_append(to->from, at_ray, on, x);
+        imp__wide_append(&to->pdf[at_ray], on, imp__wide_decide(wi.z * IMP_INV_PI));
+        for (int c = 0; c < b->colors; c++)
+            imp__wide_append(&to->beta[c][at_ray], on, imp__wide(to->beta[c][like]));
+        imp__wide_append(&to->eta[at_ray], on, imp__wide(to->eta[like]));
+        for (unsigned left = on; left; left &= left - 1) {
+            const int i = to->ray.n++;
+            to->walk[i] = to->up[i] = walk[__builtin_ctz(left)];
+            if (to->left) to->left[i] = to->left[like];
+        }
+    }
+}
+
+/* ---- Light samples ----------------------------------------------------------------------- */
+
+/* By which a receiver weighs light from wi, and walks leave it (receiver.h). */
+static imp_wide receives(const struct imp_reuse *r, imp_wide3 wi, imp_wide3 facing,
+                         imp_wide3 normal)
+{
+    const imp_wide zero = imp__wide(0);
+    imp_wide seen = imp__wide3_inner(wi, facing);
+    if (!r->across) return imp__wide_larger(seen, zero) * IMP_INV_PI;
+    const imp_wide up = imp__wide3_inner(wi, normal);
+    seen += imp__wide_root(imp__wide_larger(1 - up * up, zero));
+    return imp__wide_larger(seen, zero) * (IMP_INV_PI * IMP_INV_PI);
+}
+
+/* The power heuristic with exponent 2, over the density a. */
+static imp_wide heuristic_over(imp_wide a, imp_wide b)
+{
+    const imp_wide a2 = a * a, b2 = b * b;
+    return imp__wide_choose(a2 > imp__wide(0), a / (a2 + b2), imp__wide(0));
+}
+
+/* Sample l of `samples` of the walks [lanes]. */
+static void light_draw(const struct imp_depth *d, const int32_t *walk, unsigned on, int l,
+                       int samples, struct imp_lanes_light *out)
+{
+    const struct imp_bundle *b = d->bundle;
+    const struct imp_tracer *t = b->tracer;
+    const struct imp_receiver *receiver = t->sensor->receiver;
+    const bool faces = !receiver || !(receiver->bsdf.flags & IMP_BSDF_TRANSMIT),
+               one = t->points != NULL;
+    const imp_wide3 p = imp__wide3_taken(d->reuse->from, walk),
+                    normal = imp__wide3_taken(d->reuse->normal, walk);
+    const struct imp_wide_block numbers =
+        imp__wide_block(t->points, b->set, b->index, walk, imp__block(-1));
+    imp_wide u[3];
+    static const int uses[] = {IMP_DIM_LIGHT_U, IMP_DIM_LIGHT_V, IMP_DIM_LIGHT};
+    for (int k = 0; k < 3; k++)
+        u[k] = imp__wide_number(&numbers, one ? (uint32_t)imp__slot(uses[k])
+                                              : imp__dim(-1, uses[k]));
+    const imp_wide which = ((one ? u[0] : u[2]) + l) / samples;
+    if (one) u[0] = which;
+    out->at.recorded = false;
+    if (d->next->left)
+        imp__lanes_tree_draw(t->scene, NULL, &p, faces ? &normal : NULL, u, which, one,
+                             on, out);
+    else imp__lanes_light_draw(t->scene, NULL, &p, u, which, one, on, out);
+}
+
+/* The same of the walks from i on: their shadow rays, and what they bring. */
+static void light_add(struct imp_depth *d, int i, int l, int samples)
+{
+    const struct imp_bundle *b = d->bundle;
+    struct imp_reuse *r = d->reuse;
+    struct imp_shadows *to = d->shadows;
+    struct imp_lanes_light light;
+    int32_t walk[IMP_WIDE_LANES];
+    unsigned on = imp__bits_first(b->n - i);
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
+        walk[k] = imp_min(i + k, b->n - 1);
+        if (!r->begun[walk[k]]) on &= ~(1u << k);
+    }
+    if (!on) return;
+    light_draw(d, walk, on, l, samples, &light);
+    const imp_wide3 p = imp__wide3_taken(r->from, walk),
+                    normal = imp__wide3_taken(r->normal, walk);
+    const imp_wide by = receives(r, light.at.wi, imp__wide3_taken(r->facing, walk),
+                                 normal),
+                   density = light.at.pdf * light.pmf;
+    const imp_wide weight =
+        by / samples *
+        imp__wide_choose(light.delta, 1 / density, heuristic_over(density, by));
+    on &= imp__wide_bits(light.at.drawn & (by > imp__wide(0)));
+    if (!on) return;
+    const int n = to->ray.n;
+    const imp_wide3 o = imp__wide_offset(p, normal, light.at.wi);
+    imp__wide3_append(to->ray.o, n, on, o);
+    imp__wide3_append(
+        to->ray.d, n, on,
+        imp__wide3_choose(light.far, light.at.wi, imp__wide3_minus(light.at.p, o)));
+    imp__wide_append(&to->ray.far[n], on,
+                     imp__wide_choose(light.far, imp__wide(INFINITY),
+                                      imp__wide(1 - 10 * IMP_RAY_EPSILON)));
+    for (int c = 0; c < b->colors; c++)
+        imp__wide_append(&r->sent[c][n], on, light.radiance.c[c] * weight);
+    for (unsigned left = on; left; left &= left - 1)
+        to->at[to->ray.n++] = walk[__builtin_ctz(left)];
+}
+
+void imp__meter_lights(struct imp_depth *d, bool *hidden)
+{
+    const struct imp_bundle *b = d->bundle;
+    const struct imp_tracer *t = b->tracer;
+    struct imp_shadows *rays = d->shadows;
+    const int samples = imp_min(t->scene->n_emitters, (int)MOST);
+    if (!t->integrator->lights || t->integrator->max_depth == 0) return;
+    for (int l = 0; l < samples; l++) {
+        rays->ray.n = 0;
+        for (int i = 0; i < b->n; i += IMP_WIDE_LANES) light_add(d, i, l, samples);
+        imp__occluded_columns(t->scene, &rays->ray, hidden);
+        for (int c = 0; c < b->colors; c++)
+            for (int k = 0; k < rays->ray.n; k++)
+                if (!hidden[k]) d->values->b[c][rays->at[k]] += d->reuse->sent[c][k];
+    }
+    rays->ray.n = 0;
+}
