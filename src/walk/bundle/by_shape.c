@@ -6,9 +6,6 @@
 #include "in_media.h"
 #include "lanes_light.h"
 
-/* Fewer vertices are not worth lanes. */
-enum { FEW = IMP_WIDE_LANES / 2 };
-
 #define TAKE(p) ((p) = imp__arena_take(arena, n + IMP_COLUMN_SLACK, sizeof *(p)))
 
 bool imp__by_shape_create(const struct imp_tracer *tracer, struct imp_arena *arena,
@@ -24,27 +21,39 @@ bool imp__by_shape_create(const struct imp_tracer *tracer, struct imp_arena *are
            TAKE(s->by_material);
 }
 
-/* Sorts the rays that meet something; the sky goes to the others. */
-static void sort(struct imp_depth *d, double *const beyond[4], struct imp_by_shape *s)
+int imp__by_shape_count(struct imp_by_shape *s, const struct imp_hit_columns *hits, int n)
 {
     int missed = 0;
     s->n = 0;
-    for (int i = 0; i < d->rays->ray.n; i++) {
-        const int shape = d->hits->shape[i];
+    for (int i = 0; i < n; i++) {
+        const int shape = hits->shape[i];
         if (shape == -1) s->order[missed++] = i;
         else if (shape >= 0 && s->count[shape]++ == 0) s->shape[s->n++] = shape;
     }
+    return missed;
+}
+
+void imp__by_shape_order(struct imp_by_shape *s, const struct imp_hit_columns *hits,
+                         int n)
+{
+    int from = 0;
+    for (int k = 0; k < s->n; k++) {
+        const int count = s->count[s->shape[k]];
+        s->count[s->shape[k]] = from;
+        from += count;
+    }
+    for (int i = 0; i < n; i++)
+        if (hits->shape[i] >= 0) s->order[s->count[hits->shape[i]]++] = i;
+}
+
+/* Sorts the rays that meet something; the sky goes to the others. */
+static void sort(struct imp_depth *d, double *const beyond[4], struct imp_by_shape *s)
+{
+    const int n = d->rays->ray.n, missed = imp__by_shape_count(s, d->hits, n);
     if (s->sky) imp__lanes_sky_meet(d, s->order, missed, beyond);
     else if (d->bundle->tracer->scene->n_environments > 0)
         for (int k = 0; k < missed; k++) imp__sky_alone(d, s->order[k], beyond);
-    int from = 0;
-    for (int k = 0; k < s->n; k++) {
-        const int n = s->count[s->shape[k]];
-        s->count[s->shape[k]] = from;
-        from += n;
-    }
-    for (int i = 0; i < d->rays->ray.n; i++)
-        if (d->hits->shape[i] >= 0) s->order[s->count[d->hits->shape[i]]++] = i;
+    imp__by_shape_order(s, d->hits, n);
 }
 
 static void alone(struct imp_depth *d, const int32_t *order, int n)
@@ -76,11 +85,10 @@ static int material_of(const struct imp_depth *d, int ray)
     return scene->shapes[d->hits->shape[ray]]->bsdf + 2;
 }
 
-/* The n rays of s->few, on shapes with a form in lanes, by their materials. */
-static void few_vertices(struct imp_depth *d, struct imp_by_shape *s, int n)
+void imp__by_shape_few(struct imp_depth *d, struct imp_by_shape *s, int n,
+                       imp__few_make *make)
 {
-    const struct imp_tracer *tracer = d->bundle->tracer;
-    const int materials = tracer->scene->n_bsdfs + 2;
+    const int materials = d->bundle->tracer->scene->n_bsdfs + 2;
     for (int i = 0; i < n; i++) s->materials[material_of(d, s->few[i])]++;
     for (int m = 0, from = 0; m < materials; m++) {
         const int count = s->materials[m];
@@ -91,20 +99,31 @@ static void few_vertices(struct imp_depth *d, struct imp_by_shape *s, int n)
         s->by_material[s->materials[material_of(d, s->few[i])]++] = s->few[i];
     for (int m = 0, from = 0; m < materials; m++) {
         const int count = s->materials[m] - from;
-        const int32_t *order = s->by_material + from;
+        if (count > 0) make(d, s->by_material + from, count);
         from += count;
         s->materials[m] = 0;
-        struct imp_bin bin;
-        if (count < FEW) {
-            alone(d, order, count);
-            continue;
-        }
-        imp__shape_bin(tracer, d->hits->shape[order[0]], &bin);
-        bin.surface = NULL;             /* they are on several shapes, */
-        for (int i = 0; i < count; i++) /* of which some have textures by triangle */
-            bin.texels &= !tracer->scene->shapes[d->hits->shape[order[i]]]->by_triangle;
-        in_lanes(d, &bin, order, count);
     }
+}
+
+void imp__few_bin(const struct imp_depth *d, const int32_t *order, int n,
+                  struct imp_bin *bin)
+{
+    const struct imp_tracer *tracer = d->bundle->tracer;
+    imp__shape_bin(tracer, d->hits->shape[order[0]], bin);
+    bin->surface = NULL;        /* they are on several shapes, */
+    for (int i = 0; i < n; i++) /* of which some have textures by triangle */
+        bin->texels &= !tracer->scene->shapes[d->hits->shape[order[i]]]->by_triangle;
+}
+
+static void few_vertices(struct imp_depth *d, const int32_t *order, int n)
+{
+    struct imp_bin bin;
+    if (n < IMP_LANES_FEW) {
+        alone(d, order, n);
+        return;
+    }
+    imp__few_bin(d, order, n, &bin);
+    in_lanes(d, &bin, order, n);
 }
 
 /* Those in media, medium by medium. s->few is free. */
@@ -125,7 +144,7 @@ static void collisions(struct imp_depth *d, struct imp_by_shape *s)
             else s->few[rest++] = ray;
         }
         n = rest;
-        if (here >= FEW && imp__collision_bin(d->bundle->tracer, medium, &bin))
+        if (here >= IMP_LANES_FEW && imp__collision_bin(d->bundle->tracer, medium, &bin))
             in_lanes(d, &bin, s->order, here);
         else
             for (int i = 0; i < here; i++)
@@ -155,13 +174,13 @@ void imp__vertices(struct imp_depth *d, double *const beyond[4], struct imp_by_s
             alone(d, order, n);
         } else if (d->last && tracer->value_only) {
             continue; /* nothing is met there, and nothing leaves */
-        } else if (n >= FEW) {
+        } else if (n >= IMP_LANES_FEW) {
             imp__shape_bin(tracer, shape, &bin);
             in_lanes(d, &bin, order, n);
         } else {
             for (int i = 0; i < n; i++) s->few[few++] = order[i];
         }
     }
-    if (few > 0) few_vertices(d, s, few);
+    if (few > 0) imp__by_shape_few(d, s, few, few_vertices);
     if (d->media) collisions(d, s);
 }

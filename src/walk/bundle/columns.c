@@ -16,7 +16,7 @@ static void *column(struct imp_arena *arena, size_t n, size_t size, bool *ok)
 #define VECTOR(c)                                                                        \
     for (int k = 0; k < 3; k++) COLUMN((c)[k])
 
-static bool rays_create(struct imp_arena *arena, size_t n, struct imp_ray_columns *out)
+bool imp__rays_create(struct imp_arena *arena, size_t n, struct imp_ray_columns *out)
 {
     bool ok = true;
     *out = (struct imp_ray_columns){.n = 0};
@@ -29,7 +29,7 @@ static bool rays_create(struct imp_arena *arena, size_t n, struct imp_ray_column
 bool imp__flights_create(struct imp_arena *arena, size_t n, int colors,
                          struct imp_columns_wanted wanted, struct imp_flights *out)
 {
-    bool ok = rays_create(arena, n, &out->ray);
+    bool ok = imp__rays_create(arena, n, &out->ray);
     VECTOR(out->from);
     COLUMN(out->pdf);
     COLOR(out->beta);
@@ -78,7 +78,7 @@ bool imp__bundle_values_create(struct imp_arena *arena, size_t n, int colors,
 bool imp__shadows_create(struct imp_arena *arena, size_t n,
                          struct imp_columns_wanted wanted, struct imp_shadows *out)
 {
-    bool ok = rays_create(arena, n, &out->ray);
+    bool ok = imp__rays_create(arena, n, &out->ray);
     COLUMN(out->at);
     COLUMN(out->of);
     out->medium = NULL;

@@ -57,6 +57,7 @@ struct imp_columns_wanted {
     bool left, zeros, media;
 };
 /* Columns for n rays, in 3 colours or 4 wavelengths. False: no memory. */
+bool imp__rays_create(struct imp_arena *arena, size_t n, struct imp_ray_columns *out);
 bool imp__flights_create(struct imp_arena *arena, size_t n, int colors,
                          struct imp_columns_wanted wanted, struct imp_flights *out);
 bool imp__hits_create(struct imp_arena *arena, size_t n, struct imp_hit_columns *out);

@@ -66,11 +66,13 @@ imp_wide_truth imp__lone_sample(const struct imp_bin *bin,
                                 const struct imp_lanes_vertices *v, const imp_wide u[3],
                                 imp_wide3 *wi, imp_wide_lobe *lobe);
 imp_wide imp__lone_pdf_eval(const struct imp_bin *bin, const struct imp_lanes_vertices *v,
-                            const imp_wide3 *wi, const imp_wide_lobe *lobe, unsigned bits,
+                            const imp_wide3 *wo, const imp_wide3 *wi,
+                            const imp_wide_lobe *lobe, unsigned bits,
                             struct imp_wide_color *f);
 imp_wide imp__lone_index_ratio(const struct imp_bin *bin,
-                               const struct imp_lanes_vertices *v, const imp_wide3 *wi,
-                               const imp_wide_lobe *lobe, unsigned bits);
+                               const struct imp_lanes_vertices *v, const imp_wide3 *wo,
+                               const imp_wide3 *wi, const imp_wide_lobe *lobe,
+                               unsigned bits);
 
 /* In media (media_collisions.c): places of collisions, whose frames have the axes of the world; what
  * shadow ray i, and the next ray, number i, of vertex k have besides. */

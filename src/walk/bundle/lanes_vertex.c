@@ -4,19 +4,11 @@
  * for a walk alone (path/sensor_end.h, core/scatter.c, core/light.c) stands here for walks that
  * have a kernel, light samples and roulette, and nothing more. */
 #include "in_media.h"
-#include "lanes_record.h"
+#include "lanes_kernel.h"
 #include "math/wide_offset.h"
 #include "reuse.h"
 
 /* ---- What leaves it ---------------------------------------------------------------------- */
-
-static inline imp_wide_truth is_zero(const imp_wide f[4], int colors)
-{
-    const imp_wide zero = imp__wide(0);
-    imp_wide_truth all = (f[0] == zero) & (f[1] == zero) & (f[2] == zero);
-    if (colors > 3) all &= f[3] == zero;
-    return all;
-}
 
 /* imp__light_place of lane k. */
 static inline struct imp_light_place place_of(const struct imp_lanes_vertices *v,
@@ -41,36 +33,6 @@ static imp_wide power_heuristic_over(imp_wide a, imp_wide b)
     return imp__wide_choose(a2 > imp__wide(0), a / (a2 + b2), imp__wide(0));
 }
 
-/* The kernel's functions (kind/kind_lanes.h), or those of a material that has none. `of`: the lanes for
- * which a density is wanted. */
-static inline __attribute__((always_inline)) imp_wide
-pdf_eval(const struct imp_bin *bin, const struct imp_lanes_vertices *v,
-         const imp_wide3 *wi, const imp_wide_lobe *lobe, imp_wide_truth of,
-         const int colors, const bool any, struct imp_wide_color *f)
-{
-    return any && !bin->kernel
-               ? imp__lone_pdf_eval(bin, v, wi, lobe, imp__wide_bits(of) & v->on, f)
-               : bin->kernel->pdf_eval(bin->bsdf, v->in, &v->wo, wi, lobe, colors, f);
-}
-static inline __attribute__((always_inline)) imp_wide_truth
-sample(const struct imp_bin *bin, const struct imp_lanes_vertices *v, const imp_wide u[3],
-       const bool any, imp_wide3 *wi, imp_wide_lobe *lobe)
-{
-    return any && !bin->kernel
-               ? imp__lone_sample(bin, v, u, wi, lobe)
-               : bin->kernel->sample(bin->bsdf, v->in, &v->wo_drawn, u, wi, lobe);
-}
-static inline __attribute__((always_inline)) imp_wide
-index_ratio(const struct imp_bin *bin, const struct imp_lanes_vertices *v,
-            const imp_wide3 *wi, const imp_wide_lobe *lobe, imp_wide_truth of)
-{
-    if (!bin->kernel)
-        return imp__lone_index_ratio(bin, v, wi, lobe, imp__wide_bits(of) & v->on);
-    return bin->kernel->index_ratio
-               ? bin->kernel->index_ratio(bin->bsdf, v->in, &v->wo, wi, lobe)
-               : imp__wide(1);
-}
-
 /* What lights bring to the vertices if they are seen. */
 static inline __attribute__((always_inline)) void
 light_weigh(struct imp_depth *d, const struct imp_bin *bin,
@@ -93,14 +55,15 @@ light_weigh(struct imp_depth *d, const struct imp_bin *bin,
     lit->wi = imp__wide3_decide(imp__into_wide_frame(&v->x.frame, l->at.wi));
     const imp_wide_lobe smooth = imp__wide_smooth();
     const imp_wide pdf =
-        pdf_eval(bin, v, &lit->wi, &smooth, l->at.drawn, colors, any, &lit->f);
+        imp__kernel_pdf_eval(bin, v, &v->wo, &lit->wi, &smooth,
+                             imp__wide_bits(l->at.drawn), colors, any, &lit->f);
     const imp_wide p = l->at.pdf * l->pmf;
     lit->weight =
         imp__wide_decide(imp__wide_choose(l->delta, 1 / p, power_heuristic_over(p, pdf)));
     imp_wide fl[4];
     for (int c = 0; c < colors; c++) fl[c] = lit->f.c[c] * l->radiance.c[c];
-    const imp_wide_truth none = is_zero(fl, colors), drawn = l->at.drawn & (pdf > zero),
-                         wanted = drawn & ~none;
+    const imp_wide_truth none = imp__colors_vanish(fl, colors),
+                         drawn = l->at.drawn & (pdf > zero), wanted = drawn & ~none;
     lit->on = imp__wide_bits(wanted) & v->on;
     lit->dark = imp__wide_bits(drawn & none) & v->on;
     for (int c = 0; c < colors; c++)
@@ -161,15 +124,18 @@ scatter_weigh(struct imp_depth *d, const struct imp_bin *bin,
                            number(v, IMP_DIM_DIR_V)};
     struct imp_wide_color f;
     s->lobe = imp__wide_smooth();
-    imp_wide_truth goes = sample(bin, v, u, any, &s->wi, &s->lobe);
+    imp_wide_truth goes = imp__kernel_sample(bin, v, u, any, &s->wi, &s->lobe);
     s->world = imp__out_of_wide_frame(&v->x.frame, s->wi);
     s->wi = imp__wide3_decide(s->wi);
-    s->pdf = imp__wide_decide(pdf_eval(bin, v, &s->wi, &s->lobe, goes, colors, any, &f));
+    s->pdf = imp__wide_decide(imp__kernel_pdf_eval(
+        bin, v, &v->wo, &s->wi, &s->lobe, imp__wide_bits(goes), colors, any, &f));
     const imp_wide by = 1 / s->pdf;
     imp_wide beta[4];
     imp_wide_truth part = {0};
     s->eta = imp__wide_taken(d->rays->eta, v->order);
-    if (any) s->eta *= index_ratio(bin, v, &s->wi, &s->lobe, goes);
+    if (any)
+        s->eta *= imp__kernel_index_ratio(bin, v, &v->wo, &s->wi, &s->lobe,
+                                          imp__wide_bits(goes));
     goes &= s->pdf > zero;
     for (int c = 0; c < colors; c++) {
         const imp_wide factor = f.c[c] * by;
@@ -177,7 +143,7 @@ scatter_weigh(struct imp_depth *d, const struct imp_bin *bin,
         beta[c] = imp__wide_taken(d->rays->beta[c], v->order) * factor;
     }
     s->part = imp__wide_bits(part & goes) & v->on;
-    goes &= ~is_zero(beta, colors);
+    goes &= ~imp__colors_vanish(beta, colors);
     goes &= survives(d, v, beta, colors, s->eta, &s->survive);
     const imp_wide again = 1 / s->survive;
     s->scale = 1 / (s->pdf * s->survive);
@@ -234,53 +200,15 @@ work(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order, int n
      const int colors, const bool any, const bool media)
 {
     const struct imp_bundle *b = d->bundle;
-    const struct imp_wide_hits hits = {.o = d->rays->ray.o,
-                                       .d = d->rays->ray.d,
-                                       .t = d->hits->t,
-                                       .u = d->hits->u,
-                                       .v = d->hits->v,
-                                       .prim = d->hits->prim,
-                                       .at = order};
     struct imp_wide_color in[IMP_INPUTS_MAX];
     struct imp_lanes_lit lit;
     struct imp_lanes_step step;
     struct imp_lanes_vertices v; /* field by field: clearing all of it takes time */
-    v.recorded = b->walks != NULL;
-    v.on = imp__bits_first(n);
     v.at = at;
-    v.order = order;
-    v.points = b->tracer->points != NULL;
-    v.depth = d->depth;
-    for (int k = 0; k < IMP_WIDE_LANES; k++) v.walk[k] = d->rays->walk[order[k]];
-    if (colors > 3)
-        for (int k = 0; k < IMP_WIDE_LANES; k++)
-            v.carried[k] = &b->waves[v.walk[k]]->carried;
-    v.numbers = imp__wide_block(b->tracer->points, b->set, b->index, v.walk,
-                                imp__block(d->depth));
-    if (media && bin->medium >= 0) imp__collision_places(d, order, &v.x);
-    else if (bin->surface)
-        bin->surface->surface(bin->shape, &hits, v.recorded || !bin->plain, &v.x);
-    else imp__lanes_surface(d, &hits, &v.x);
-    v.wo_drawn = imp__into_wide_frame(
-        &v.x.frame, imp__wide3_opposite(imp__wide3_taken(d->rays->ray.d, order)));
-    v.wo = imp__wide3_decide(v.wo_drawn);
-    v.in = bin->in;
+    imp__lanes_arrive(d, bin, order, n, b->tracer->points, colors, any, media, in, &v);
     if (imp_unlikely(d->next->left != NULL))
         v.faced = imp__wide3_choose(v.wo.z < imp__wide(0),
                                     imp__wide3_opposite(v.x.frame.n), v.x.frame.n);
-    const struct imp_carried *const *carried = colors > 3 ? v.carried : NULL;
-    if (any && !bin->kernel) {
-        v.each = bin->each;
-        v.stride = 0;
-        if (colors > 3 || !bin->plain) {
-            imp__lanes_inputs_each(d, bin, carried, &hits, &v.x, v.on, d->lone->each);
-            v.each = d->lone->each;
-            v.stride = bin->bsdf->n_in;
-        }
-    } else if (colors > 3 || !bin->plain) {
-        imp__lanes_inputs(d, bin, carried, &hits, &v.x, in);
-        v.in = in;
-    }
     lit.on = lit.dark = step.on = step.part = 0;
     if (imp_likely(!d->last)) {
         if (b->tracer->integrator->lights && b->tracer->scene->n_emitters > 0 &&

@@ -31,25 +31,25 @@ imp_wide_truth imp__lone_sample(const struct imp_bin *bin,
     return drawn;
 }
 
-static struct imp_dirs dirs_of(const struct imp_bin *bin,
-                               const struct imp_lanes_vertices *v, const imp_wide3 *wi,
-                               const imp_wide_lobe *lobe, int k)
+static struct imp_dirs dirs_of(const struct imp_bin *bin, const imp_wide3 *wo,
+                               const imp_wide3 *wi, const imp_wide_lobe *lobe, int k)
 {
-    return (struct imp_dirs){.wo = imp__wide3_lane(&v->wo, k),
+    return (struct imp_dirs){.wo = imp__wide3_lane(wo, k),
                              .wi = imp__wide3_lane(wi, k),
                              .lobe = (int)(*lobe)[k],
                              .derivative = bin->derivative};
 }
 
 imp_wide imp__lone_pdf_eval(const struct imp_bin *bin, const struct imp_lanes_vertices *v,
-                            const imp_wide3 *wi, const imp_wide_lobe *lobe, unsigned bits,
+                            const imp_wide3 *wo, const imp_wide3 *wi,
+                            const imp_wide_lobe *lobe, unsigned bits,
                             struct imp_wide_color *f)
 {
     imp_wide pdf = imp__wide(0);
     *f = imp__wide_color((imp_spec){0});
     for (; bits; bits &= bits - 1) {
         const int k = __builtin_ctz(bits);
-        const struct imp_dirs d = dirs_of(bin, v, wi, lobe, k);
+        const struct imp_dirs d = dirs_of(bin, wo, wi, lobe, k);
         imp_spec own;
         pdf[k] = imp__bsdf_pdf_eval(bin->bsdf, inputs_of(v, k), &d, &own);
         for (int c = 0; c < 4 && pdf[k] > 0; c++) f->c[c][k] = own[c];
@@ -58,14 +58,15 @@ imp_wide imp__lone_pdf_eval(const struct imp_bin *bin, const struct imp_lanes_ve
 }
 
 imp_wide imp__lone_index_ratio(const struct imp_bin *bin,
-                               const struct imp_lanes_vertices *v, const imp_wide3 *wi,
-                               const imp_wide_lobe *lobe, unsigned bits)
+                               const struct imp_lanes_vertices *v, const imp_wide3 *wo,
+                               const imp_wide3 *wi, const imp_wide_lobe *lobe,
+                               unsigned bits)
 {
     const struct imp_bsdf *b = bin->bsdf;
     imp_wide ratio = imp__wide(1);
     for (; b->ops->index_ratio && bits; bits &= bits - 1) {
         const int k = __builtin_ctz(bits);
-        const struct imp_dirs d = dirs_of(bin, v, wi, lobe, k);
+        const struct imp_dirs d = dirs_of(bin, wo, wi, lobe, k);
         ratio[k] = b->ops->index_ratio(b, inputs_of(v, k), &d);
     }
     return ratio;
