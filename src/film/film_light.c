@@ -97,27 +97,27 @@ static enum imp_status walk_add(const struct job *j, struct worker *w,
                                 double *sums)
 {
     const struct imp_light_picture *p = j->picture;
-    struct imp_light_walk walk = {.walk = {.dropped = IMP_DROP_MEMORY}};
-    const struct imp_light_walk *made =
+    struct imp_light_walk own = {.walk = {.dropped = IMP_DROP_MEMORY}};
+    const struct imp_light_walk *walk =
         imp_likely(!p->trace) ? imp__light_supply_take(supply) : NULL;
     const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
     enum imp_status st = IMP_OK;
-    if (made) walk = *made;
-    else if (p->trace) p->trace(p->payload, &w->arena, index, &walk);
-    if (imp_unlikely(walk.walk.dropped == IMP_DROP_MEMORY || w->arena.failed))
+    if (p->trace) p->trace(p->payload, &w->arena, index, &own);
+    if (!walk) walk = &own;
+    if (imp_unlikely(walk->walk.dropped == IMP_DROP_MEMORY || w->arena.failed))
         IMP_TRY(imp__error(j->ctx, IMP_E_NOMEM, "no memory to record a walk"));
-    if (imp_unlikely(walk.walk.dropped)) walk_drop(j, w, walk.walk.dropped, index);
-    if (p->whole && walk.reach) {
-        p->whole(p->payload, &walk, w->value);
+    if (imp_unlikely(walk->walk.dropped)) walk_drop(j, w, walk->walk.dropped, index);
+    if (p->whole && walk->reach) {
+        p->whole(p->payload, walk, w->value);
         if (imp_unlikely(w->arena.failed))
             IMP_TRY(imp__error(j->ctx, IMP_E_NOMEM, "no memory for a walk's derivative"));
         IMP_TRY(touch(j, w, 0, 1));
     }
-    for (const struct imp_reach *r = p->whole ? NULL : walk.reach; r; r = r->next) {
+    for (const struct imp_reach *r = p->whole ? NULL : walk->reach; r; r = r->next) {
         struct imp_splat_taps taps;
         imp__splat_taps(j->film, &j->scale, r->px, r->py, &taps);
         if (taps.across.n <= 0 || taps.down.n <= 0) continue;
-        p->values(p->payload, &walk, r, w->value);
+        p->values(p->payload, walk, r, w->value);
         for (int y = 0; y < taps.down.n; y++)
             for (int x = 0; x < taps.across.n; x++)
                 IMP_TRY(touch(j, w,

@@ -163,11 +163,20 @@ struct imp_wide_ray {
     imp_wide3 o, d;
     imp_wide near, far; /* as of struct imp_sensor_ray */
 };
+/* Points that see the sensor, as of struct imp_sensor_sample. */
+struct imp_wide_seen {
+    imp_wide3 p, wo;
+    imp_wide px, py, weight;
+    imp_wide_truth drawn; /* it may be on the film */
+};
 struct imp_sensor_lanes {
     bool (*covers)(const struct imp_sensor *s); /* NULL: all are */
     /* imp_sensor_ops.ray, without the numbers of a lens. */
     void (*ray)(const struct imp_sensor *s, imp_wide px, imp_wide py,
                 struct imp_wide_ray *out);
+    /* imp_sensor_ops.connect from points, without random numbers. */
+    void (*connect)(const struct imp_sensor *s, const imp_wide3 *ref,
+                    struct imp_wide_seen *out);
 };
 /* NULL: this sensor has none. */
 const struct imp_sensor_lanes *imp__sensor_lanes(const struct imp_sensor *s);

@@ -117,7 +117,32 @@ static void rays(const struct imp_sensor *s, imp_wide px, imp_wide py,
     out->far = (p->projection.far_clip - near) * length;
 }
 
-static const struct imp_sensor_lanes lanes = {.covers = covers, .ray = rays};
+/* imp__projection_connect. */
+static void connects(const struct imp_sensor *s, const imp_wide3 *ref,
+                     struct imp_wide_seen *out)
+{
+    const struct perspective *p = s->self;
+    const struct imp_film_plane *film = &p->film;
+    const imp_wide zero = imp__wide(0);
+    const imp_wide3 q = points(p->projection.to_local.m, *ref);
+    out->drawn = (q.z > imp__wide(p->projection.near_clip)) &
+                 (q.z < imp__wide(p->projection.far_clip)) &
+                 ~(q.x < film->x_least * q.z) & ~(q.x > film->x_most * q.z) &
+                 ~(q.y < film->y_least * q.z) & ~(q.y > film->y_most * q.z);
+    if (!imp__wide_bits(out->drawn)) return;
+    const imp_wide3 v = imp__wide3_times(q, 1 / q.z);
+    const imp_wide length = imp__wide3_norm(v);
+    out->wo = imp__wide3_opposite(imp__wide3_unit(vectors(p->projection.to_world.m, v)));
+    out->p = points(p->projection.to_world.m,
+                    imp__wide3_times(v, imp__wide(p->projection.near_clip)));
+    out->px = (zero + v.x - film->x0) / film->dx;
+    out->py = (zero + v.y - film->y0) / film->dy;
+    out->weight =
+        length * length * length / (fabs(film->dx * film->dy) * imp__wide3_inner(q, q));
+}
+
+static const struct imp_sensor_lanes lanes = {
+    .covers = covers, .ray = rays, .connect = connects};
 
 const struct imp_sensor_lanes *imp__sensor_lanes(const struct imp_sensor *s)
 {

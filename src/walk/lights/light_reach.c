@@ -74,11 +74,10 @@ void imp__light_meet_sensor(struct imp_light_step *w, struct imp_vertex *v,
 
 bool imp__light_on_film(const struct imp_sensor *s, const struct imp_sensor_sample *to)
 {
-    const struct imp_film_desc *f = &s->film;
-    const double margin = f->sample_border ? ceil(f->filter.radius) : 0;
-    const double x = to->px - f->crop_x, y = to->py - f->crop_y;
-    return x >= -margin && x < f->crop_w + margin && y >= -margin &&
-           y < f->crop_h + margin;
+    const struct imp_film_bounds f = imp__light_film(s);
+    const double x = to->px - f.x, y = to->py - f.y;
+    return x >= -f.margin && x < f.width + f.margin && y >= -f.margin &&
+           y < f.height + f.margin;
 }
 
 /* With hide_emitters the sensor looks past area lights on the first segment of its rays. */
@@ -135,7 +134,7 @@ void imp__light_shadow_aim(const struct imp_surface *from,
     const bool surface = imp__dot(from->ng, from->ng) > 0;
     shadow->o = surface ? imp__offset(from->p, from->ng, to->wo) : from->p;
     shadow->d = to->p - shadow->o;
-    shadow->reach = imp__dot(to->ng, to->ng) > 0 ? 1 - 10 * IMP_RAY_EPSILON : 1;
+    shadow->reach = imp__light_shadow_reach(to);
     shadow->wanted = true;
 }
 

@@ -173,7 +173,7 @@ static const struct imp_end_ops light_end = {.arrive = arrive,
 
 /* ---- Walks ------------------------------------------------------------------------ */
 
-static void value_set(const struct imp_tracer *tracer, struct imp_walk *walk,
+void imp__reach_value(const struct imp_tracer *tracer, struct imp_walk *walk,
                       struct imp_reach *r, imp_spec values)
 {
     imp_spec used = r->values = values;
@@ -190,19 +190,20 @@ void imp__light_walk_close(const struct imp_tracer *tracer, struct imp_light_wal
     struct imp_reach *r = out->reach;
     for (struct imp_vertex *v = walk->first; v && r && !walk->dropped; v = v->next) {
         for (; r && r->vertex == v; r = r->next)
-            value_set(tracer, walk, r, P * (r->met ? v->e : v->b));
+            imp__reach_value(tracer, walk, r, P * (r->met ? v->e : v->b));
         P *= v->w;
     }
     if (r && !r->vertex && !walk->dropped)
-        value_set(tracer, walk, r, imp__walk_fold(&out->both->eye) * out->both->pixels);
+        imp__reach_value(tracer, walk, r,
+                         imp__walk_fold(&out->both->eye) * out->both->pixels);
     if (!walk->dropped) return;
     out->reach = NULL;
     out->n_reach = 0;
 }
 
-static void step_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
-                       imp_spec *scratch, struct imp_light_walk *out,
-                       struct imp_light_step *w)
+void imp__light_step_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
+                           imp_spec *scratch, struct imp_light_walk *out,
+                           struct imp_light_step *w)
 {
     imp__step_begin(tracer, arena, &out->walk, scratch, &w->s);
     w->out = out;
@@ -219,7 +220,7 @@ void imp__light_walk_follow(const struct imp_tracer *tracer, struct imp_arena *a
 {
     imp_spec scratch[IMP_INPUTS_MAX];
     struct imp_light_step w;
-    step_begin(tracer, arena, scratch, out, &w);
+    imp__light_step_begin(tracer, arena, scratch, out, &w);
     if (imp__light_start(&w))
         while (imp__one_step(&light_end, &w.s)) w.s.depth++;
 }
@@ -234,23 +235,24 @@ static void walk_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
     out->arena = arena;
 }
 
-/* The wavelengths that it carries. False: no memory. */
-static bool waves_take(const struct imp_tracer *tracer, struct imp_arena *arena,
-                       int64_t index, struct imp_walk *walk)
+bool imp__light_walk_start(const struct imp_tracer *tracer, struct imp_arena *arena,
+                           int64_t index, struct imp_light_walk *out)
 {
+    walk_begin(tracer, arena, index, out);
     return !tracer->wavelengths ||
-           imp__walk_wave(tracer, arena, imp__wave_draw(tracer, walk, index), walk);
+           imp__walk_wave(tracer, arena, imp__wave_draw(tracer, &out->walk, index),
+                          &out->walk);
 }
 
 void imp__light_walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
                            int64_t index, struct imp_light_walk *out)
 {
-    walk_begin(tracer, arena, index, out);
     if (tracer->integrator->both) {
+        walk_begin(tracer, arena, index, out);
         imp__both_trace(tracer, arena, index, out);
         return;
     }
-    if (!waves_take(tracer, arena, index, &out->walk)) return;
+    if (!imp__light_walk_start(tracer, arena, index, out)) return;
     imp__light_walk_follow(tracer, arena, out);
     imp__light_walk_close(tracer, out);
 }
@@ -330,9 +332,8 @@ bool imp__light_walks_trace(const struct imp_tracer *tracer, struct imp_arena *a
     if (!TAKE(given, n) || !together_create(arena, n, &t)) return false;
     const bool known = imp__light_starts(tracer, first, n, given);
     for (int k = 0; k < n; k++) {
-        walk_begin(tracer, arena, first + k, &out[k]);
-        if (!waves_take(tracer, arena, first + k, &out[k].walk)) continue;
-        step_begin(tracer, arena, scratch, &out[k], &t.step[k]);
+        if (!imp__light_walk_start(tracer, arena, first + k, &out[k])) continue;
+        imp__light_step_begin(tracer, arena, scratch, &out[k], &t.step[k]);
         if (known) t.step[k].given = &given[k];
         if (imp__light_start(&t.step[k])) t.going[t.n_going++] = k;
     }
