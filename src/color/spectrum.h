@@ -10,6 +10,7 @@
 #include "base/compiler.h"
 #include "upsample.h"
 #include <importon/kinds.h>
+#include <string.h>
 
 enum imp__spectrum_form {
     IMP_SPECTRUM_POINTS,    /* values at increasing wavelengths, linear between them */
@@ -77,10 +78,14 @@ static inline struct imp__even_place imp__spectrum_place(const struct imp_spectr
 static inline imp_spec imp__spectrum_there(const struct imp_spectrum *s,
                                            const struct imp__even_place *p)
 {
-    const double *v = s->value;
-    const imp_int4 k = p->k;
-    const imp_spec low = {v[k[0]], v[k[1]], v[k[2]], v[k[3]]},
-                   high = {v[k[0] + 1], v[k[1] + 1], v[k[2] + 1], v[k[3] + 1]};
+    /* A sample and the next one are loaded together. */
+    typedef double pair __attribute__((vector_size(16)));
+    pair at[4];
+    for (int j = 0; j < 4; j++) memcpy(&at[j], &s->value[p->k[j]], sizeof at[j]);
+    const imp_spec even = __builtin_shufflevector(at[0], at[2], 0, 1, 2, 3),
+                   odd = __builtin_shufflevector(at[1], at[3], 0, 1, 2, 3),
+                   low = __builtin_shufflevector(even, odd, 0, 4, 2, 6),
+                   high = __builtin_shufflevector(even, odd, 1, 5, 3, 7);
     const imp_spec x = low + p->part * (high - low);
     return (imp_spec)((__typeof__(p->inside))x & p->inside);
 }

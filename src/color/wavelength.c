@@ -30,14 +30,24 @@ void imp__waves_response(const struct imp_waves *waves,
     for (int j = waves->carried.n; j < 4; j++) (*weight)[j] = 0;
 }
 
-void imp__waves_make(const struct imp_wavelengths *w, double u, struct imp_waves *out)
+/* Four, uniformly: no branch goes by the draw. */
+static void four_even(const struct imp_wavelengths *w, double u, struct imp_waves *out)
+{
+    const double range = w->hi - w->lo;
+    const imp_spec zero = {0}, at = u + (imp_spec){0, .25, .5, .75},
+                   over =
+                       (imp_spec)((__typeof__(at >= zero))(zero + 1) & (at >= zero + 1)),
+                   nm = w->lo + (at - over) * range;
+    for (int j = 0; j < 4; j++) out->carried.nm[j] = nm[j];
+    out->density = zero + 1 / range * 4;
+}
+
+static void some(const struct imp_wavelengths *w, double u, struct imp_waves *out)
 {
     const int n = w->lanes;
-    out->carried.n = n;
-    out->n_channels = imp_min(w->n_channels, IMP_CHANNELS_MAX);
-    out->density = (imp_spec){1, 1, 1, 1};
     const double range = w->hi - w->lo;
     double p = 1 / range;
+    out->density = (imp_spec){1, 1, 1, 1};
     for (int j = 0; j < n; j++) {
         double at = u + (double)j / n;
         if (at >= 1) at -= 1;
@@ -45,6 +55,15 @@ void imp__waves_make(const struct imp_wavelengths *w, double u, struct imp_waves
         out->density[j] = p * n;
     }
     for (int j = n; j < 4; j++) out->carried.nm[j] = out->carried.nm[0];
+}
+
+void imp__waves_make(const struct imp_wavelengths *w, double u, struct imp_waves *out)
+{
+    const int n = w->lanes;
+    out->carried.n = n;
+    out->n_channels = imp_min(w->n_channels, IMP_CHANNELS_MAX);
+    if (imp_likely(n == 4 && !w->cdf)) four_even(w, u, out);
+    else some(w, u, out);
     if (!w->one_grid) {
         for (int c = 0; c < out->n_channels; c++)
             imp__waves_response(out, &w->response[c], &out->channel[c]);

@@ -28,6 +28,38 @@ static inline imp_spec imp__color_lane(const struct imp_wide_color *x, int color
     return (imp_spec){x->c[0][k], x->c[1][k], x->c[2][k], colors > 3 ? x->c[3][k] : 0};
 }
 
+/* Lane k is row[k]. */
+static inline struct imp_wide_color imp__color_of_rows(const imp_spec row[IMP_WIDE_LANES])
+{
+    struct imp_wide_color out;
+#if IMP_WIDE_LANES == 8
+    imp_wide r[4], even[2], odd[2];
+    for (int k = 0; k < 4; k++)
+        r[k] = __builtin_shufflevector(row[k], row[k + 4], 0, 1, 2, 3, 4, 5, 6, 7);
+    for (int k = 0; k < 2; k++) {
+        even[k] =
+            __builtin_shufflevector(r[2 * k], r[2 * k + 1], 0, 8, 2, 10, 4, 12, 6, 14);
+        odd[k] =
+            __builtin_shufflevector(r[2 * k], r[2 * k + 1], 1, 9, 3, 11, 5, 13, 7, 15);
+    }
+    out.c[0] = __builtin_shufflevector(even[0], even[1], 0, 1, 8, 9, 4, 5, 12, 13);
+    out.c[1] = __builtin_shufflevector(odd[0], odd[1], 0, 1, 8, 9, 4, 5, 12, 13);
+    out.c[2] = __builtin_shufflevector(even[0], even[1], 2, 3, 10, 11, 6, 7, 14, 15);
+    out.c[3] = __builtin_shufflevector(odd[0], odd[1], 2, 3, 10, 11, 6, 7, 14, 15);
+#else
+    imp_wide even[2], odd[2];
+    for (int k = 0; k < 2; k++) {
+        even[k] = __builtin_shufflevector(row[2 * k], row[2 * k + 1], 0, 4, 2, 6);
+        odd[k] = __builtin_shufflevector(row[2 * k], row[2 * k + 1], 1, 5, 3, 7);
+    }
+    out.c[0] = __builtin_shufflevector(even[0], even[1], 0, 1, 4, 5);
+    out.c[1] = __builtin_shufflevector(odd[0], odd[1], 0, 1, 4, 5);
+    out.c[2] = __builtin_shufflevector(even[0], even[1], 2, 3, 6, 7);
+    out.c[3] = __builtin_shufflevector(odd[0], odd[1], 2, 3, 6, 7);
+#endif
+    return out;
+}
+
 /* ---- Shapes ------------------------------------------------------------------------------ */
 
 /* Hits of one shape: rows at[k] of columns. */

@@ -21,12 +21,17 @@ struct imp_key {
     uint64_t state;
 };
 
+/* In two steps: what the keys of a pixel have in common, and one of them. */
+#define IMP_KEY_SAMPLE 0x8cb92ba72f3d8dd7u
+static inline uint64_t imp__key_pixel(uint64_t seed, uint64_t pixel)
+{
+    const uint64_t h = imp__mix64(seed + 0x9e3779b97f4a7c15u);
+    return imp__mix64(h ^ (pixel + 0xd1b54a32d192ed03u));
+}
 static inline struct imp_key imp__key(uint64_t seed, uint64_t pixel, uint64_t sample)
 {
-    uint64_t h = imp__mix64(seed + 0x9e3779b97f4a7c15u);
-    h = imp__mix64(h ^ (pixel + 0xd1b54a32d192ed03u));
-    h = imp__mix64(h ^ (sample + 0x8cb92ba72f3d8dd7u));
-    return (struct imp_key){h};
+    const uint64_t h = imp__key_pixel(seed, pixel);
+    return (struct imp_key){imp__mix64(h ^ (sample + IMP_KEY_SAMPLE))};
 }
 
 /* The key of branch i (from 1) that leaves a walk at a vertex. */

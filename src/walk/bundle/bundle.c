@@ -215,6 +215,7 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
                              .n = (int)n,
                              .n_samples = n_samples,
                              .colors = tracer->wavelengths ? 4 : 3,
+                             .arena = arena,
                              .before = tracer->sensor->shape   ? 2
                                        : crosses_media(tracer) ? 1
                                                                : 0};

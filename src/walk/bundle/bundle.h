@@ -30,11 +30,21 @@ static inline const struct imp_tracer *imp__bundle_use(const struct imp_tracer *
 #endif
 }
 
+/* Values of a spectrum at the wavelengths of all walks. */
+struct imp_spectrum_kept {
+    const struct imp_spectrum *of;
+    imp_spec *row;
+};
+enum { IMP_SPECTRA_KEPT = 6 };
+
 struct imp_bundle {
     const struct imp_tracer *tracer;
     int n, n_samples;               /* in all, of each pixel */
     int colors;                     /* 3, or the 4 wavelengths that each walk carries */
     const struct imp_waves **waves; /* of each walk; NULL: colours */
+    struct imp_arena *arena;
+    struct imp_spectrum_kept kept[IMP_SPECTRA_KEPT]; /* (lanes_spectra.c) */
+    int n_kept;
     int before; /* vertices before the first one that a ray leads to */
     /* Each walk has: film position, time, its random numbers. */
     double *px, *py, *time;

@@ -88,20 +88,58 @@ static void record_begin(struct imp_bundle *b, const struct imp_flights *rays, i
                                         .t_far = rays->ray.far[k]};
 }
 
-/* Where its random numbers come from, and its wavelengths. False: no memory. */
-static bool numbers_of(struct imp_bundle *b, struct imp_arena *arena, const int at[2],
-                       int64_t sample, int k)
+/* What wavelengths are drawn from: keys before they are mixed; of each walk a number, and one of its
+ * lanes. */
+struct draws {
+    uint64_t *key;
+    double *u, *lane;
+};
+
+/* Where its random numbers come from. */
+static void numbers_of(struct imp_bundle *b, const int at[2], int64_t sample, int k,
+                       struct draws *draws)
 {
     struct imp_walk own, *walk = b->walks ? &b->walks[k] : &own;
     if (b->walks) imp__walk_clear(walk);
     imp__walk_numbers(b->tracer, at[0], at[1], sample, walk);
     b->set[k] = b->tracer->points ? walk->point.set : walk->key.state;
     key_put(b, k, walk);
-    if (!b->waves) return true;
-    const bool ok =
-        imp__walk_wave(b->tracer, arena, imp__wave_draw(b->tracer, walk, sample), walk);
-    b->waves[k] = walk->waves;
-    return ok;
+    if (b->waves && b->tracer->set > 1)
+        draws->u[k] = imp__wave_draw(b->tracer, walk, sample);
+}
+
+/* imp__wave_draw where walks are in no set, and imp__lane_drawn, of the walks at[lanes]; block: of
+ * their points. */
+static void draws_put(const struct imp_tracer *t, const struct imp_wide_block *block,
+                      const int32_t *at, int i, struct draws *draws)
+{
+    struct imp_wide_block keys = imp__wide_block(NULL, draws->key, NULL, at, 0);
+    const int n = t->wavelengths->lanes;
+    keys.hash = imp__wide_mix64(keys.hash);
+    const imp_wide lane =
+        imp__wide_floor(imp__wide_number(&keys, imp__dim_start(IMP_DIM_LANE)) * n);
+    imp__wide_store(&draws->lane[i], imp__wide_lesser(lane, imp__wide(n - 1)));
+    if (t->set > 1) return;
+    imp_wide u = imp__wide_number(&keys, imp__dim_start(IMP_DIM_WAVELENGTH));
+    if (t->points && t->stratified)
+        u = (imp__wide_floor(n * u) + imp__wide_number(block, IMP_SLOT_WAVELENGTH)) / n;
+    imp__wide_store(&draws->u[i], u);
+}
+
+/* The wavelengths that are drawn so. False: no memory. */
+static bool waves_put(struct imp_bundle *b, struct imp_arena *arena,
+                      const struct draws *draws)
+{
+    struct imp_waves *all = imp__arena_take(arena, (size_t)b->n, sizeof *all);
+    for (int k = 0; all && k < b->n; k++) {
+        imp__waves_make(b->tracer->wavelengths, draws->u[k], &all[k]);
+        all[k].drew = (int)draws->lane[k];
+        b->waves[k] = &all[k];
+        if (!b->walks) continue;
+        b->walks[k].wave = draws->u[k];
+        b->walks[k].waves = &all[k];
+    }
+    return all;
 }
 
 /* In lanes, of a sensor whose shutter is open for an instant. */
@@ -112,19 +150,31 @@ static bool rays_in_lanes(struct imp_bundle *b, struct imp_arena *arena,
 {
     const struct imp_tracer *t = b->tracer;
     const struct imp_film_desc *film = &t->sensor->film;
-    const bool each =
-        !t->points || b->waves || b->walks || b->keys; /* more than the set's numbers */
+    /* More than the set's numbers. */
+    const bool each = !t->points || (b->waves && t->set > 1) || b->walks || b->keys;
+    const size_t n = (size_t)b->n;
     bool begin = true;
-    for (int k = 0; k < b->n; k++) {
-        const int s = k % n_samples, *at = xy[k / n_samples];
+    struct draws draws = {0};
+    uint64_t pixel = 0;
+    if (b->waves && (!TAKE(draws.key) || !TAKE(draws.u) || !TAKE(draws.lane)))
+        return false;
+    for (int k = 0, s = 0, p = 0; k < b->n; k++) {
+        const int *at = xy[p];
         const bool first =
             s == 0 || samples[s] / IMP_SET_POINTS != samples[s - 1] / IMP_SET_POINTS;
-        if ((each || first) && !numbers_of(b, arena, at, samples[s], k)) return false;
+        if (each || first) numbers_of(b, at, samples[s], k, &draws);
         if (!each && !first) b->set[k] = b->set[k - 1];
+        if (b->waves) {
+            if (s == 0) pixel = imp__walk_pixel(t, at[0], at[1]);
+            draws.key[k] = pixel ^ ((uint64_t)samples[s] + IMP_KEY_SAMPLE);
+        }
         b->index[k] = (uint32_t)samples[s] % IMP_SET_POINTS;
         b->px[k] = film->crop_x + at[0];
         b->py[k] = film->crop_y + at[1];
         ray_put(b, k, rays);
+        if (++s < n_samples) continue;
+        s = 0;
+        p++;
     }
     for (int i = 0; i < b->n; i += IMP_WIDE_LANES) {
         int32_t at[IMP_WIDE_LANES];
@@ -136,6 +186,7 @@ static bool rays_in_lanes(struct imp_bundle *b, struct imp_arena *arena,
                             imp__wide_number(&block, IMP_DIM_PIXEL_X),
                        py = imp__wide_load(&b->py[i]) +
                             imp__wide_number(&block, IMP_DIM_PIXEL_Y);
+        if (b->waves) draws_put(t, &block, at, i, &draws);
         lanes->ray(t->sensor, px, py, &r);
         imp__wide_store(&b->px[i], px);
         imp__wide_store(&b->py[i], py);
@@ -146,6 +197,7 @@ static bool rays_in_lanes(struct imp_bundle *b, struct imp_arena *arena,
         imp__wide_store(&rays->ray.far[i], r.far);
         begin &= !(imp__wide_bits(r.near != imp__wide(0)) & imp__bits_first(b->n - i));
     }
+    if (b->waves && !waves_put(b, arena, &draws)) return false;
     for (int k = 0; b->walks && k < b->n; k++) record_begin(b, rays, k);
     *begins = begin;
     return true;

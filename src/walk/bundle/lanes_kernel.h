@@ -44,9 +44,6 @@ IMP_LANES_INLINE void imp__lanes_arrive(struct imp_depth *d, const struct imp_bi
     v->points = points != NULL;
     v->depth = d->depth;
     for (int k = 0; k < IMP_WIDE_LANES; k++) v->walk[k] = d->rays->walk[order[k]];
-    if (colors > 3)
-        for (int k = 0; k < IMP_WIDE_LANES; k++)
-            v->carried[k] = &b->waves[v->walk[k]]->carried;
     v->numbers = imp__wide_block(points, b->set, b->index, v->walk, imp__block(d->depth));
     if (media && bin->medium >= 0) imp__collision_places(d, order, &v->x);
     else if (bin->surface)
@@ -56,17 +53,16 @@ IMP_LANES_INLINE void imp__lanes_arrive(struct imp_depth *d, const struct imp_bi
         &v->x.frame, imp__wide3_opposite(imp__wide3_taken(d->rays->ray.d, order)));
     v->wo = imp__wide3_decide(v->wo_drawn);
     v->in = bin->in;
-    const struct imp_carried *const *carried = colors > 3 ? v->carried : NULL;
     if (any && !bin->kernel) {
         v->each = bin->each;
         v->stride = 0;
         if (colors > 3 || !bin->plain) {
-            imp__lanes_inputs_each(d, bin, carried, &hits, &v->x, v->on, d->lone->each);
+            imp__lanes_inputs_each(d, bin, &hits, v, d->lone->each);
             v->each = d->lone->each;
             v->stride = bin->bsdf->n_in;
         }
     } else if (colors > 3 || !bin->plain) {
-        imp__lanes_inputs(d, bin, carried, &hits, &v->x, in);
+        imp__lanes_inputs(d, bin, &hits, v, in);
         v->in = in;
     }
 }

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Light samples in lanes (core/light.c, of walks alone). */
-#include "color/spectrum.h"
 #include "kind/shape/shape.h"
 #include "lanes_record.h"
 #include "scene/light_lanes.h"
@@ -29,13 +28,31 @@ static void record_lanes(int light, imp_wide_truth here, const struct imp_wide_l
     }
 }
 
+/* What the points of a light send, in spectra, for the lanes with bits. */
+static struct imp_wide_color radiance_alone(const struct imp_bundle *b,
+                                            const struct imp_lanes_vertices *v, int light,
+                                            bool far, const struct imp_wide_light *own,
+                                            unsigned bits)
+{
+    imp_spec rows[IMP_WIDE_LANES] = {{0}};
+    for (; bits; bits &= bits - 1) {
+        const int k = __builtin_ctz(bits);
+        const struct imp_emission x = {.dist = far ? INFINITY : 1,
+                                       .cos_light = imp__decide1(own->cos_light[k]),
+                                       .d = imp__decide(-imp__wide3_lane(&own->wi, k))};
+        rows[k] = imp__emitter_radiance(b->tracer->scene, light, &x, (imp_v3){0},
+                                        imp__lanes_carried(b, v, k));
+    }
+    return imp__color_of_rows(rows);
+}
+
 /* The points of one light for the lanes with bits. */
-static void draw_lanes(const struct imp_scene *scene,
-                       const struct imp_carried *const *carried, int light,
-                       const struct imp_emitter_lanes *lanes, const imp_wide3 *ref,
-                       const imp_wide u[2], imp_wide_truth here,
+static void draw_lanes(const struct imp_bundle *b, const struct imp_lanes_vertices *v,
+                       int light, const struct imp_emitter_lanes *lanes,
+                       const imp_wide3 *ref, const imp_wide u[2], imp_wide_truth here,
                        struct imp_lanes_light *out)
 {
+    const struct imp_scene *scene = b->tracer->scene;
     const struct imp_emitter *e = scene->emitters[light];
     const imp_wide zero = imp__wide(0);
     struct imp_wide_color le;
@@ -50,21 +67,18 @@ static void draw_lanes(const struct imp_scene *scene,
     out->at.p = imp__wide3_choose(here, own.p, out->at.p);
     out->at.pdf = imp__wide_choose(here, own.pdf, out->at.pdf);
     out->at.drawn = (out->at.drawn & ~here) | (own.drawn & here);
-    if (carried) {
+    if (b->colors > 3) {
         /* At each walk's wavelengths: of even light its side alone counts. */
         const struct imp_input *i = e->input[0];
-        for (unsigned left = imp__wide_bits(own.drawn & here); left; left &= left - 1) {
-            const int k = __builtin_ctz(left);
-            const struct imp_emission x = {.dist = lanes->far ? INFINITY : 1,
-                                           .cos_light = imp__decide1(own.cos_light[k]),
-                                           .d =
-                                               imp__decide(-imp__wide3_lane(&own.wi, k))};
-            imp_spec at = {0};
-            if (imp_unlikely(lanes->radiance || !i->plain || !i->spectrum))
-                at = imp__emitter_radiance(scene, light, &x, (imp_v3){0}, carried[k]);
-            else if (lit[k]) imp__spectrum_lanes(i->spectrum, carried[k]->nm, &at);
-            for (int c = 0; c < 4; c++) out->radiance.c[c][k] = at[c];
+        const unsigned wanted = imp__wide_bits(own.drawn & here);
+        if (imp_likely(!lanes->radiance && i->plain && i->spectrum)) {
+            imp__lanes_spectrum(b, i->spectrum, v, wanted & imp__wide_bits(lit), &le);
+            for (int c = 0; c < 4; c++) le.c[c] = imp__wide_choose(lit, le.c[c], zero);
+        } else {
+            le = radiance_alone(b, v, light, lanes->far, &own, wanted);
         }
+        for (int c = 0; c < 4; c++)
+            out->radiance.c[c] = imp__wide_choose(here, le.c[c], out->radiance.c[c]);
     } else if (lanes->radiance) {
         const imp_wide3 wi = imp__wide3_decide(own.wi);
         lanes->radiance(e, &wi, &le);
@@ -83,18 +97,18 @@ static void draw_lanes(const struct imp_scene *scene,
 }
 
 /* Point ls of a light, for lane k. */
-static void lane_put(const struct imp_scene *scene,
-                     const struct imp_carried *const *carried, int light, bool drawn,
-                     const struct imp_light_sample *ls, int k,
+static void lane_put(const struct imp_bundle *b, const struct imp_lanes_vertices *v,
+                     int light, bool drawn, const struct imp_light_sample *ls, int k,
                      struct imp_lanes_light *out)
 {
+    const struct imp_scene *scene = b->tracer->scene;
     const struct imp_emitter *e = scene->emitters[light];
     drawn = drawn && ls->pdf > 0 &&
             !((e->ops->flags & IMP_EMITTER_AREA) && !(ls->cos_light > 0));
     truth_set(&out->at.drawn, k, drawn);
     if (!drawn) return;
     const imp_spec le =
-        imp__light_point_radiance(scene, carried ? carried[k] : NULL, light, ls);
+        imp__light_point_radiance(scene, imp__lanes_carried(b, v, k), light, ls);
     imp__wide3_set(&out->at.wi, k, ls->wi);
     imp__wide3_set(&out->at.p, k, ls->p);
     out->at.pdf[k] = ls->pdf;
@@ -113,19 +127,18 @@ static void lane_put(const struct imp_scene *scene,
     }
 }
 
-static void draw_alone(const struct imp_scene *scene,
-                       const struct imp_carried *const *carried, int light, int prim,
-                       const imp_wide3 *ref, const imp_wide u[2], int k,
-                       struct imp_lanes_light *out)
+static void draw_alone(const struct imp_bundle *b, const struct imp_lanes_vertices *v,
+                       int light, int prim, const imp_wide3 *ref, const imp_wide u[2],
+                       int k, struct imp_lanes_light *out)
 {
-    const struct imp_emitter *e = scene->emitters[light];
+    const struct imp_emitter *e = b->tracer->scene->emitters[light];
     const imp_v3 p = imp__wide3_lane(ref, k);
     const double own[2] = {u[0][k], u[1][k]};
     struct imp_light_sample ls = {.located = {.prim = -1}};
     const bool drawn = prim >= 0
                            ? e->shape->ops->sample_triangle(e->shape, prim, &p, own, &ls)
                            : e->ops->sample(e, &p, own, &ls);
-    lane_put(scene, carried, light, drawn, &ls, k, out);
+    lane_put(b, v, light, drawn, &ls, k, out);
 }
 
 /* A form in lanes that serves: even radiance has no inputs to look up. */
@@ -136,11 +149,12 @@ static const struct imp_emitter_lanes *lanes_of(const struct imp_emitter *e)
 }
 
 /* Points of the lights chosen in the lanes with bits: of one light together. */
-static void draw_chosen(const struct imp_scene *scene,
-                        const struct imp_carried *const *carried, const imp_wide3 *ref,
-                        const imp_wide u[2], const struct imp_lights_chosen *c,
-                        unsigned bits, struct imp_lanes_light *out)
+static void draw_chosen(const struct imp_bundle *b, const struct imp_lanes_vertices *v,
+                        const imp_wide3 *ref, const imp_wide u[2],
+                        const struct imp_lights_chosen *c, unsigned bits,
+                        struct imp_lanes_light *out)
 {
+    const struct imp_scene *scene = b->tracer->scene;
     imp_wide_truth light;
     for (int k = 0; k < IMP_WIDE_LANES; k++) light[k] = bits >> k & 1 ? c->light[k] : -1;
     while (bits) {
@@ -151,29 +165,28 @@ static void draw_chosen(const struct imp_scene *scene,
         unsigned same = imp__wide_bits(here);
         bits &= ~same;
         if (lanes && (same & (same - 1))) {
-            draw_lanes(scene, carried, one, lanes, ref, u, here, out);
+            draw_lanes(b, v, one, lanes, ref, u, here, out);
             continue;
         }
         for (; same; same &= same - 1) {
             const int k = __builtin_ctz(same);
-            draw_alone(scene, carried, one, c->prim[k], ref, u, k, out);
+            draw_alone(b, v, one, c->prim[k], ref, u, k, out);
         }
     }
 }
 
-void imp__lanes_tree_draw(const struct imp_scene *scene,
-                          const struct imp_carried *const *carried, const imp_wide3 *p,
+void imp__lanes_tree_draw(const struct imp_bundle *b, const struct imp_lanes_vertices *v,
                           const imp_wide3 *n, const imp_wide u_drawn[2], imp_wide which,
-                          bool one, unsigned bits, struct imp_lanes_light *out)
+                          struct imp_lanes_light *out)
 {
     imp_wide u[2] = {u_drawn[0], u_drawn[1]};
     struct imp_lights_chosen c;
     out->at.drawn = out->far = out->delta = (imp_wide_truth){0};
-    const unsigned lit =
-        imp__light_lanes_choose(scene->light_tree, p, n, bits, &which, &c);
-    if (one) u[0] = which;
+    const unsigned lit = imp__light_lanes_choose(b->tracer->scene->light_tree, &v->x.p, n,
+                                                 v->on, &which, &c);
+    if (v->points) u[0] = which;
     out->pmf = c.chance;
-    draw_chosen(scene, carried, p, u, &c, lit, out);
+    draw_chosen(b, v, &v->x.p, u, &c, lit, out);
 }
 
 /* imp__light_pick, and imp__light_part if `one`, of a few lights. A bit for each lane that has a
@@ -203,22 +216,23 @@ static unsigned few_pick(const struct imp_scene *scene, imp_wide which, bool one
     return imp__wide_bits(*pmf > zero);
 }
 
-void imp__lanes_light_draw(const struct imp_scene *scene,
-                           const struct imp_carried *const *carried, const imp_wide3 *ref,
-                           const imp_wide u_drawn[2], imp_wide which, bool one,
-                           unsigned bits, struct imp_lanes_light *out)
+void imp__lanes_light_draw(const struct imp_bundle *b, const struct imp_lanes_vertices *v,
+                           const imp_wide u_drawn[2], imp_wide which,
+                           struct imp_lanes_light *out)
 {
+    const struct imp_scene *scene = b->tracer->scene;
+    const bool one = v->points;
     imp_wide u[2] = {u_drawn[0], u_drawn[1]};
     const imp_wide_truth all = ~(imp_wide_truth){0};
     struct imp_lights_chosen c;
-    unsigned lit = 0;
+    unsigned lit = 0, bits = v->on;
     out->at.drawn = out->far = out->delta = (imp_wide_truth){0};
     if (scene->n_emitters == 1) {
         const struct imp_emitter_lanes *lanes = lanes_of(scene->emitters[0]);
         out->pmf = imp__wide(scene->light_cdf[0]);
         if (!(scene->light_cdf[0] > 0)) return;
         if (lanes) {
-            draw_lanes(scene, carried, 0, lanes, ref, u, all, out);
+            draw_lanes(b, v, 0, lanes, &v->x.p, u, all, out);
             return;
         }
     }
@@ -235,7 +249,7 @@ void imp__lanes_light_draw(const struct imp_scene *scene,
         out->pmf[k] = pmf;
         lit |= (unsigned)(pmf > 0) << k;
     }
-    draw_chosen(scene, carried, ref, u, &c, lit, out);
+    draw_chosen(b, v, &v->x.p, u, &c, lit, out);
 }
 
 /* ---- The sky that is met ----------------------------------------------------------------- */

@@ -16,21 +16,19 @@ struct imp_lanes_light {
     int32_t light[IMP_WIDE_LANES];
 };
 
-/* What imp__light_point (core/drawn.h) draws for vertices at ref with the numbers u, in the lanes
- * with bits; at.drawn: there is a light, which shows its front; at.recorded is given. `which` chooses the light; one: it
- * is u[0], of which the part that is left draws the point. carried [IMP_WIDE_LANES]: wavelengths of the
- * walks; NULL: colours. */
-void imp__lanes_light_draw(const struct imp_scene *scene,
-                           const struct imp_carried *const *carried, const imp_wide3 *ref,
-                           const imp_wide u[2], imp_wide which, bool one, unsigned bits,
+struct imp_lanes_vertices;
+/* What imp__light_point (core/drawn.h) draws for vertices with the numbers u; at.drawn: there is a
+ * light, which shows its front; at.recorded is given. `which` chooses the light; where walks have
+ * points it is u[0], of which the part that is left draws the point. */
+void imp__lanes_light_draw(const struct imp_bundle *b, const struct imp_lanes_vertices *v,
+                           const imp_wide u[2], imp_wide which,
                            struct imp_lanes_light *out);
 
-/* The same where lights are chosen by the scene's tree: vertices at p, whose light comes from before n
- * alone, or, with n NULL, from everywhere. */
-void imp__lanes_tree_draw(const struct imp_scene *scene,
-                          const struct imp_carried *const *carried, const imp_wide3 *p,
+/* The same where lights are chosen by the scene's tree: light comes from before n alone, or, with n
+ * NULL, from everywhere. */
+void imp__lanes_tree_draw(const struct imp_bundle *b, const struct imp_lanes_vertices *v,
                           const imp_wide3 *n, const imp_wide u[2], imp_wide which,
-                          bool one, unsigned bits, struct imp_lanes_light *out);
+                          struct imp_lanes_light *out);
 
 /* Can the sky be met in lanes? It is one emitter, with a form in lanes, chosen by its weight, and seen
  * by the camera. */

@@ -2,7 +2,6 @@
  *
  * Which vertices are made in lanes (lanes_vertex.c), and where they are if their shape or their inputs
  * have no form in lanes. */
-#include "color/spectrum.h"
 #include "lanes_record.h"
 
 /* ---- What is in lanes -------------------------------------------------------------------- */
@@ -112,14 +111,15 @@ void imp__lanes_surface(const struct imp_depth *d, const struct imp_wide_hits *h
 }
 
 static inline void inputs_of_lane(const struct imp_depth *d, const struct imp_bsdf *b,
-                                  const struct imp_carried *const *carried,
                                   const struct imp_wide_hits *h,
-                                  const struct imp_wide_surface *x, int k, imp_spec *own)
+                                  const struct imp_lanes_vertices *v, int k,
+                                  imp_spec *own)
 {
+    const struct imp_wide_surface *x = &v->x;
     const struct imp_texcoord at = {
         .uv = {imp__decide1(x->uv[0][k]), imp__decide1(x->uv[1][k])},
         .p = imp__decide(imp__wide3_lane(&x->p, k)),
-        .carried = carried ? carried[k] : NULL,
+        .carried = imp__lanes_carried(d->bundle, v, k),
         .shape = shape_of(d, h->at[k]),
         .prim = h->prim[h->at[k]]};
     imp__inputs_eval(b->input, b->n_in, &at, own);
@@ -127,16 +127,16 @@ static inline void inputs_of_lane(const struct imp_depth *d, const struct imp_bs
 
 /* Inputs that are textures, point by point. */
 static void inputs_alone(const struct imp_depth *d, const struct imp_bsdf *b,
-                         const struct imp_carried *const *carried,
-                         const struct imp_wide_hits *h, const struct imp_wide_surface *x,
-                         struct imp_wide_color *in)
+                         const struct imp_wide_hits *h,
+                         const struct imp_lanes_vertices *v, struct imp_wide_color *in)
 {
+    imp_spec rows[IMP_INPUTS_MAX][IMP_WIDE_LANES];
     for (int k = 0; k < IMP_WIDE_LANES; k++) {
         imp_spec own[IMP_INPUTS_MAX];
-        inputs_of_lane(d, b, carried, h, x, k, own);
-        for (int j = 0; j < b->n_in; j++)
-            for (int c = 0; c < 4; c++) in[j].c[c][k] = own[j][c];
+        inputs_of_lane(d, b, h, v, k, own);
+        for (int j = 0; j < b->n_in; j++) rows[j][k] = own[j];
     }
+    for (int j = 0; j < b->n_in; j++) in[j] = imp__color_of_rows(rows[j]);
 }
 
 /* weighted of input.c. */
@@ -162,39 +162,29 @@ static void inputs_in_lanes(const struct imp_bsdf *b, const struct imp_wide_surf
     }
 }
 
-/* Inputs that are the same spectra everywhere, at each walk's wavelengths. */
-static void spectra_alone(const struct imp_bsdf *b,
-                          const struct imp_carried *const *carried,
-                          struct imp_wide_color *in)
-{
-    for (int j = 0; j < b->n_in; j++)
-        for (int k = 0; k < IMP_WIDE_LANES; k++) {
-            imp_spec own;
-            imp__spectrum_lanes(b->input[j]->spectrum, carried[k]->nm, &own);
-            for (int c = 0; c < 4; c++) in[j].c[c][k] = own[c];
-        }
-}
-
 void imp__lanes_inputs(const struct imp_depth *d, const struct imp_bin *bin,
-                       const struct imp_carried *const *carried,
-                       const struct imp_wide_hits *h, const struct imp_wide_surface *x,
+                       const struct imp_wide_hits *h, const struct imp_lanes_vertices *v,
                        struct imp_wide_color *in)
 {
-    if (carried && bin->spectra) spectra_alone(bin->bsdf, carried, in);
-    else if (!carried && bin->texels) inputs_in_lanes(bin->bsdf, x, in);
-    else inputs_alone(d, bin->bsdf, carried, h, x, in);
+    const struct imp_bsdf *b = bin->bsdf;
+    const bool spectral = d->bundle->colors > 3;
+    if (!spectral && bin->texels) inputs_in_lanes(b, &v->x, in);
+    else if (!spectral || !bin->spectra) inputs_alone(d, b, h, v, in);
+    else
+        for (int j = 0; j < b->n_in; j++)
+            imp__lanes_spectrum(d->bundle, b->input[j]->spectrum, v,
+                                imp__bits_first(IMP_WIDE_LANES), &in[j]);
 }
 
 void imp__lanes_inputs_each(const struct imp_depth *d, const struct imp_bin *bin,
-                            const struct imp_carried *const *carried,
                             const struct imp_wide_hits *h,
-                            const struct imp_wide_surface *x, unsigned bits,
-                            imp_spec *each)
+                            const struct imp_lanes_vertices *v, imp_spec *each)
 {
     const int n = bin->bsdf->n_in;
-    if (!carried && bin->texels) {
+    unsigned bits = v->on;
+    if (d->bundle->colors == 3 && bin->texels) {
         struct imp_wide_color in[IMP_INPUTS_MAX];
-        inputs_in_lanes(bin->bsdf, x, in);
+        inputs_in_lanes(bin->bsdf, &v->x, in);
         for (; bits; bits &= bits - 1) {
             const int k = __builtin_ctz(bits);
             for (int j = 0; j < n; j++) each[k * n + j] = imp__color_lane(&in[j], 4, k);
@@ -203,6 +193,6 @@ void imp__lanes_inputs_each(const struct imp_depth *d, const struct imp_bin *bin
     }
     for (; bits; bits &= bits - 1) {
         const int k = __builtin_ctz(bits);
-        inputs_of_lane(d, bin->bsdf, carried, h, x, k, each + k * n);
+        inputs_of_lane(d, bin->bsdf, h, v, k, each + k * n);
     }
 }

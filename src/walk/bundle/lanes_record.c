@@ -93,7 +93,7 @@ void imp__lanes_record(struct imp_depth *d, const struct imp_bin *bin,
         const int k = __builtin_ctz(left);
         const unsigned bit = 1u << k;
         s->walk = &b->walks[v->walk[k]];
-        s->at.carried = b->colors > 3 ? v->carried[k] : NULL;
+        s->at.carried = imp__lanes_carried(b, v, k);
         struct imp_vertex *out = imp__vertex_add_here(s, n_in);
         v->record[k] = out;
         if (!out) { /* the walk is dropped */

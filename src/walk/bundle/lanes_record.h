@@ -23,9 +23,15 @@ struct imp_lanes_vertices {
     const int32_t *order;
     int32_t walk[IMP_WIDE_LANES];
     imp_wide3 faced; /* normals, where there is a tree of lights */
-    const struct imp_carried *carried[IMP_WIDE_LANES]; /* where walks carry wavelengths */
-    struct imp_vertex *record[IMP_WIDE_LANES];         /* where they are recorded */
+    struct imp_vertex *record[IMP_WIDE_LANES]; /* where they are recorded */
 };
+
+/* The wavelengths of the walk of lane k; NULL: colours. */
+static inline const struct imp_carried *
+imp__lanes_carried(const struct imp_bundle *b, const struct imp_lanes_vertices *v, int k)
+{
+    return b->waves ? &b->waves[v->walk[k]]->carried : NULL;
+}
 
 /* Their connections to lights. */
 struct imp_lanes_lit {
@@ -46,19 +52,24 @@ struct imp_lanes_step {
 };
 
 /* Points and frames by the shapes' own functions; inputs that are not the constants bin->in, at each
- * walk's wavelengths or, with carried NULL, in colours (lanes_place.c). */
+ * walk's wavelengths or in colours (lanes_place.c). */
 void imp__lanes_surface(const struct imp_depth *d, const struct imp_wide_hits *hits,
                         struct imp_wide_surface *out);
 void imp__lanes_inputs(const struct imp_depth *d, const struct imp_bin *bin,
-                       const struct imp_carried *const *carried,
-                       const struct imp_wide_hits *hits, const struct imp_wide_surface *x,
-                       struct imp_wide_color *in);
+                       const struct imp_wide_hits *hits,
+                       const struct imp_lanes_vertices *v, struct imp_wide_color *in);
 /* The same of the lanes with bits, for materials without a kernel; each [lanes n_in]. */
 void imp__lanes_inputs_each(const struct imp_depth *d, const struct imp_bin *bin,
-                            const struct imp_carried *const *carried,
                             const struct imp_wide_hits *hits,
-                            const struct imp_wide_surface *x, unsigned bits,
-                            imp_spec *each);
+                            const struct imp_lanes_vertices *v, imp_spec *each);
+
+/* ---- lanes_spectra.c ---- */
+/* Before n vertices are made, in spectra: what they look up. */
+void imp__lanes_spectra_keep(struct imp_bundle *b, const struct imp_bin *bin, int n);
+/* s at the wavelengths of the walks of v with bits. */
+void imp__lanes_spectrum(const struct imp_bundle *b, const struct imp_spectrum *s,
+                         const struct imp_lanes_vertices *v, unsigned bits,
+                         struct imp_wide_color *out);
 
 /* What kernels of struct imp_bsdf_lanes do, for materials without one: for the lanes that count, or
  * those with bits, where a density is wanted (lone_kernel.c). */

@@ -45,13 +45,12 @@ light_weigh(struct imp_depth *d, const struct imp_bin *bin,
     const imp_wide u[2] = {number(v, IMP_DIM_LIGHT_U), number(v, IMP_DIM_LIGHT_V)};
     const imp_wide which =
         v->points || scene->n_emitters == 1 ? u[0] : number(v, IMP_DIM_LIGHT);
-    const struct imp_carried *const *carried = colors > 3 ? v->carried : NULL;
     l->at.recorded = v->recorded || d->bundle->tracer->active; /* which light it is */
     if (imp_unlikely(d->next->left != NULL))
-        imp__lanes_tree_draw(scene, carried, &v->x.p,
+        imp__lanes_tree_draw(d->bundle, v,
                              !any || imp__is_faced(bin->bsdf) ? &v->faced : NULL, u,
-                             which, v->points, v->on, l);
-    else imp__lanes_light_draw(scene, carried, &v->x.p, u, which, v->points, v->on, l);
+                             which, l);
+    else imp__lanes_light_draw(d->bundle, v, u, which, l);
     lit->wi = imp__wide3_decide(imp__into_wide_frame(&v->x.frame, l->at.wi));
     const imp_wide_lobe smooth = imp__wide_smooth();
     const imp_wide pdf =
@@ -267,6 +266,7 @@ void imp__vertices_in_lanes(struct imp_depth *d, const struct imp_bin *bin,
     const bool any = !bin->kernel || bin->bsdf->flags != IMP_BSDF_SMOOTH;
     work_fn *const work_as = d->media ? work_in_media : works[any][d->bundle->colors > 3];
     int32_t rest[IMP_WIDE_LANES];
+    if (d->bundle->colors > 3) imp__lanes_spectra_keep(d->bundle, bin, n);
     for (int i = 0; i < n; i += IMP_WIDE_LANES) {
         const int left = imp_min(n - i, IMP_WIDE_LANES);
         const int32_t *here = order + i;

@@ -3,7 +3,7 @@
  * First vertices and light samples of points of a grid. */
 #include "meter_lanes.h"
 #include "kind/sensor/receiver.h"
-#include "lanes_light.h"
+#include "lanes_record.h"
 #include "math/trig.h"
 #include "math/wide_offset.h"
 #include "reuse.h"
@@ -134,8 +134,11 @@ static void light_draw(const struct imp_depth *d, const int32_t *walk, unsigned 
     const struct imp_receiver *receiver = t->sensor->receiver;
     const bool faces = !receiver || !(receiver->bsdf.flags & IMP_BSDF_TRANSMIT),
                one = t->points != NULL;
-    const imp_wide3 p = imp__wide3_taken(d->reuse->from, walk),
-                    normal = imp__wide3_taken(d->reuse->normal, walk);
+    struct imp_lanes_vertices v; /* what lights in colours ask of it */
+    v.x.p = imp__wide3_taken(d->reuse->from, walk);
+    v.points = one;
+    v.on = on;
+    const imp_wide3 normal = imp__wide3_taken(d->reuse->normal, walk);
     const struct imp_wide_block numbers =
         imp__wide_block(t->points, b->set, b->index, walk, imp__block(-1));
     imp_wide u[3];
@@ -146,10 +149,8 @@ static void light_draw(const struct imp_depth *d, const int32_t *walk, unsigned 
     const imp_wide which = ((one ? u[0] : u[2]) + l) / samples;
     if (one) u[0] = which;
     out->at.recorded = false;
-    if (d->next->left)
-        imp__lanes_tree_draw(t->scene, NULL, &p, faces ? &normal : NULL, u, which, one,
-                             on, out);
-    else imp__lanes_light_draw(t->scene, NULL, &p, u, which, one, on, out);
+    if (d->next->left) imp__lanes_tree_draw(b, &v, faces ? &normal : NULL, u, which, out);
+    else imp__lanes_light_draw(b, &v, u, which, out);
 }
 
 /* The same of the walks from i on: their shadow rays, and what they bring. */

@@ -313,7 +313,9 @@ static inline __attribute__((always_inline)) void imp__walk_clear(struct imp_wal
 void imp__walk_begin(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                      struct imp_walk *walk, double lens[2]);
 
-/* Its key and point alone, and its film position alone. */
+/* What the keys of a pixel have in common (math/rng.h); the key and the point of a walk alone, and its
+ * film position alone. */
+uint64_t imp__walk_pixel(const struct imp_tracer *tracer, int x, int y);
 void imp__walk_numbers(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                        struct imp_walk *walk);
 void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t sample,

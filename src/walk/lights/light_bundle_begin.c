@@ -44,7 +44,7 @@ static void radiance(const struct imp_light_bundle *l, const struct imp_wide_emi
             le->c[c] = imp__wide_choose(cosine > imp__wide(0), le->c[c], imp__wide(0));
         return;
     }
-    *le = imp__wide_color((imp_spec){0});
+    imp_spec rows[IMP_WIDE_LANES] = {{0}};
     for (; bits; bits &= bits - 1) {
         const int k = __builtin_ctz(bits);
         const struct imp_emission at = {
@@ -52,11 +52,11 @@ static void radiance(const struct imp_light_bundle *l, const struct imp_wide_emi
             .dist = 1,
             .cos_light = cosine[k],
             .d = imp__decide(imp__wide3_lane(&x->d, k))};
-        const imp_spec own =
+        rows[k] =
             imp__emitter_radiance(scene, 0, &at, imp__decide(imp__wide3_lane(&x->p, k)),
                                   &l->bundle.waves[first + k]->carried);
-        for (int c = 0; c < 4; c++) le->c[c][k] = own[c];
     }
+    *le = imp__color_of_rows(rows);
 }
 
 /* Walks k, .., of which those with bits have a point and a direction. */

@@ -33,6 +33,10 @@ static inline void number(const struct imp_tracer *tracer, int x, int y, int64_t
     walk->key = imp__key(tracer->seed, pixel, (uint64_t)sample);
     point_of(tracer, pixel, sample, &walk->point);
 }
+uint64_t imp__walk_pixel(const struct imp_tracer *tracer, int x, int y)
+{
+    return imp__key_pixel(tracer->seed, pixel_number(tracer, x, y));
+}
 void imp__walk_numbers(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                        struct imp_walk *walk)
 {
