@@ -86,9 +86,9 @@ struct imp_wide_light {
 
 /* Starts of walks from lights, as of struct imp_emission_sample. */
 struct imp_wide_emission {
-    imp_wide3 p, d;
-    imp_v3 ng; /* the same of all */
+    imp_wide3 p, d, ng, n; /* n: shading normals */
     imp_wide uv[2], located[2], cos_light, cos_p, pdf_d;
+    int32_t prim[IMP_WIDE_LANES];
     double pdf_p;
     imp_wide_truth drawn; /* there is one */
 };
@@ -102,7 +102,8 @@ struct imp_shape_lanes {
     void (*sample_toward)(const struct imp_shape *s, const imp_wide3 *ref,
                           const imp_wide u[2], struct imp_wide_light *out);
     bool (*lights)(const struct imp_shape *s);
-    /* imp_shape_ops.sample_area, of flat shapes: p, uv and located. NULL: point by point. */
+    /* imp_shape_ops.sample_area, of the same shapes unless they are looked up by triangle: p, ng, n, uv
+     * and located. NULL: point by point. */
     void (*sample_area)(const struct imp_shape *s, const imp_wide u[2],
                         struct imp_wide_emission *out);
 };

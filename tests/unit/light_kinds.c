@@ -50,10 +50,9 @@ static const struct {
     {"phong", TWOSIDED(KIND("phong", RED))},
 };
 
-/* Bumps of 512 triangles. */
-static bool bumps_write(char path[64])
+/* Bumps of 2 n^2 triangles. */
+static bool bumps_write(char path[64], int n, double height)
 {
-    const int n = 16;
     strcpy(path, "/tmp/imp_bundles_XXXXXX.obj");
     const int fd = mkstemps(path, 4);
     FILE *f = fd >= 0 ? fdopen(fd, "w") : NULL;
@@ -61,7 +60,7 @@ static bool bumps_write(char path[64])
     for (int j = 0; j <= n; j++)
         for (int i = 0; i <= n; i++)
             fprintf(f, "v %g %g %g\n", 2. * i / n - 1, 2. * j / n - 1,
-                    .15 * sin(1.4 * i) * cos(j));
+                    height * sin(1.4 * i) * cos(j));
     for (int j = 0; j < n; j++)
         for (int i = 0; i < n; i++) {
             const int a = j * (n + 1) + i + 1;
@@ -75,7 +74,7 @@ static void all_kinds(void)
 {
     static char body[32768], bsdf[1024];
     char picture[64], bumps[64];
-    if (!picture_write(picture) || !bumps_write(bumps)) {
+    if (!picture_write(picture) || !bumps_write(bumps, 16, .15)) {
         tap_ok(false, "files for a picture and a mesh");
         return;
     }
@@ -94,10 +93,41 @@ static void all_kinds(void)
     unlink(bumps);
 }
 
+/* A lamp of triangles: flat, with interpolated normals, and of more than have a form in lanes. */
+static void lamps(void)
+{
+    static const struct {
+        const char *name;
+        int n;
+        double height;
+        const char *flat;
+    } made[] = {{"a lamp of two triangles", 1, 0, "true"},
+                {"a lamp of a flat mesh", 3, 0, "false"},
+                {"a lamp of facets", 4, .3, "true"},
+                {"a lamp with interpolated normals", 4, .3, "false"},
+                {"a lamp of many triangles", 12, .1, "false"}};
+    static char body[16384];
+    for (size_t k = 0; k < imp_count(made); k++) {
+        char path[64];
+        if (!bumps_write(path, made[k].n, made[k].height)) {
+            tap_ok(false, "a file for a mesh");
+            return;
+        }
+        snprintf(body, sizeof body,
+                 "%s<shape type='obj'><string name='filename' value='%s'/>"
+                 "<boolean name='face_normals' value='%s'/>%s</shape>",
+                 SEEN ROOM BALL("0", "-1.3", "<bsdf type='dielectric'/>"), path,
+                 made[k].flat, AT("0", "1.8", "0", "x", "80", ".4") AREA("9,8,7"));
+        compare(made[k].name, k == 3 ? IMP_SPECTRAL : IMP_RGB, true, DEPTH("6"), body);
+        unlink(path);
+    }
+}
+
 int main(void)
 {
     ctx = test_context(1);
     all_kinds();
+    lamps();
     imp_context_destroy(ctx);
     return tap_done();
 }

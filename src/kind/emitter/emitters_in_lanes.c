@@ -2,6 +2,7 @@
  *
  * Emitters in lanes: surfaces by their shapes, and the constant sky. */
 #include "emitter_lanes.h"
+#include "kind/shape/shape_lanes.h"
 #include "math/trig.h"
 
 #define IMP_WIDE IMP_WIDE_LANES
@@ -26,20 +27,19 @@ static void area_sample(const struct imp_emitter *e, const imp_wide3 *ref,
 
 static bool area_emits(const struct imp_emitter *e)
 {
-    return imp__shape_lanes(e->shape)->sample_area != NULL;
+    return imp__shape_lanes(e->shape)->sample_area && !e->shape->by_triangle;
 }
-/* imp__surface_emission_sample, of a flat shape. */
+/* imp__surface_emission_sample. */
 static void area_emission(const struct imp_emitter *e, const imp_wide u[4],
                           struct imp_wide_emission *out)
 {
     imp__shape_lanes(e->shape)->sample_area(e->shape, u, out);
-    const struct imp_frame frame = imp__frame_from_normal(out->ng);
-    const imp_wide_frame axes = {imp__wide3_of(frame.s), imp__wide3_of(frame.t),
-                                 imp__wide3_of(frame.n)};
+    imp_wide_frame axes = {.n = out->n};
+    IMP_WIDE_OF(imp__axes_across)(axes.n, &axes.s, &axes.t);
     const imp_wide3 local = IMP_WIDE_OF(imp__cosine_directions)(u[2], u[3]);
     out->d = imp__wide3_unit(imp__out_of_wide_frame(&axes, local));
     out->cos_light = imp__wide3_inner(axes.n, out->d);
-    out->cos_p = imp__wide_magnitude(out->cos_light);
+    out->cos_p = imp__wide_magnitude(imp__wide3_inner(out->ng, out->d));
     out->pdf_p = 1 / e->shape->area;
     out->pdf_d = local.z * IMP_INV_PI;
     out->drawn = local.z > imp__wide(0);

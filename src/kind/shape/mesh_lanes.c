@@ -120,15 +120,40 @@ static inline imp_wide draw(const struct imp_shape *s, imp_wide u, int32_t prim[
     return within;
 }
 
+/* Its point, by the weights of the triangle's second and third vertex. */
+static inline void draw_at(const struct imp_shape *s, const imp_wide u[2], int32_t prim[],
+                           imp_wide *b1, imp_wide *b2)
+{
+    const imp_wide within = draw(s, u[0], prim);
+    const imp_wide half =
+        0.5 * imp__wide_lesser(within, u[1]); /* imp__uniform_triangle */
+    *b1 = within - half;
+    *b2 = u[1] - half;
+}
+
+static void sample_area(const struct imp_shape *s, const imp_wide u[2],
+                        struct imp_wide_emission *out)
+{
+    const struct imp__mesh *m = s->self;
+    int32_t *prim = out->prim;
+    imp_wide b1, b2;
+    draw_at(s, u, prim, &b1, &b2);
+    out->p =
+        point_at(FACETS(m, prim, p0), FACETS(m, prim, e1), FACETS(m, prim, e2), b1, b2);
+    out->ng = FACETS(m, prim, ng);
+    out->n = normals_at(m, prim, b1, b2, out->ng);
+    out->located[0] = b1;
+    out->located[1] = b2;
+    uv_at(s, prim, b1, b2, out->uv);
+}
+
 static void sample_toward(const struct imp_shape *s, const imp_wide3 *ref,
                           const imp_wide u[2], struct imp_wide_light *out)
 {
     const struct imp__mesh *m = s->self;
     int32_t prim[IMP_WIDE_LANES];
-    const imp_wide within = draw(s, u[0], prim);
-    const imp_wide half =
-        0.5 * imp__wide_lesser(within, u[1]); /* imp__uniform_triangle */
-    const imp_wide b1 = within - half, b2 = u[1] - half;
+    imp_wide b1, b2;
+    draw_at(s, u, prim, &b1, &b2);
     const imp_wide3 ng = FACETS(m, prim, ng);
     const imp_wide3 p =
         point_at(FACETS(m, prim, p0), FACETS(m, prim, e1), FACETS(m, prim, e2), b1, b2);
@@ -147,5 +172,7 @@ static bool lights(const struct imp_shape *s)
     return ((const struct imp__mesh *)s->self)->facets != NULL;
 }
 
-const struct imp_shape_lanes imp__mesh_lanes = {
-    .surface = surfaces, .sample_toward = sample_toward, .lights = lights};
+const struct imp_shape_lanes imp__mesh_lanes = {.surface = surfaces,
+                                                .sample_toward = sample_toward,
+                                                .lights = lights,
+                                                .sample_area = sample_area};

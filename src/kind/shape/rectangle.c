@@ -229,7 +229,8 @@ static void sample_area_lanes(const struct imp_shape *s, const imp_wide u[2],
     out->uv[0] = imp__wide_choose(behind, u[0], sum);
     out->uv[1] = imp__wide_choose(behind, sum, u[1]);
     out->p = points_at(r, out->uv[0], out->uv[1]);
-    out->ng = r->n;
+    out->ng = out->n = imp__wide3_of(r->n);
+    for (int k = 0; k < IMP_WIDE_LANES; k++) out->prim[k] = 0;
     out->located[0] = out->uv[0] - out->uv[1];
     out->located[1] = out->uv[1];
 }

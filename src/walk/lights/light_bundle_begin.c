@@ -75,8 +75,7 @@ static void send(struct imp_light_bundle *l, const struct imp_wide_emission *x, 
     if (colors > 3) none &= le.c[3] == zero;
     bits &= ~imp__wide_bits(none);
     const imp_wide by = 1 / imp__wide_decide(per / x->cos_p);
-    imp__wide3_append(to->rays.ray.o, n, bits,
-                      imp__wide_offset(x->p, imp__wide3_of(x->ng), x->d));
+    imp__wide3_append(to->rays.ray.o, n, bits, imp__wide_offset(x->p, x->ng, x->d));
     imp__wide3_append(to->rays.ray.d, n, bits, x->d);
     imp__wide_append(&to->rays.ray.far[n], bits, imp__wide(INFINITY));
     for (int c = 0; c < colors; c++) {
@@ -135,8 +134,7 @@ bool imp__light_bundle_begin(struct imp_light_bundle *l, struct imp_arena *arena
         for (int k = 0; k < n; k++) begin_alone(l, arena, k, NULL);
         return !arena->failed;
     }
-    const struct imp_emitter *e = t->scene->emitters[0];
-    const bool even = imp__emitter_even(e, NULL) && !(e->shape && e->shape->smooth);
+    const bool even = imp__emitter_even(t->scene->emitters[0], NULL);
     for (int k = 0; k < n; k += IMP_WIDE_LANES)
         begin(l, arena, lanes, even, k, imp_min(n - k, IMP_WIDE_LANES));
     return !arena->failed;

@@ -30,15 +30,16 @@ struct imp_light_given imp__light_given(const struct imp_wide_emission *x,
     return (struct imp_light_given){
         .drawn = x->drawn[k],
         .point = {point[0][k], point[1][k]},
-        .start = {.p = imp__wide3_lane(&x->p, k),
-                  .ng = x->ng,
-                  .d = imp__wide3_lane(&x->d, k),
-                  .uv = {x->uv[0][k], x->uv[1][k]},
-                  .cos_light = x->cos_light[k],
-                  .cos_p = x->cos_p[k],
-                  .pdf_p = x->pdf_p,
-                  .pdf_d = x->pdf_d[k],
-                  .located = {0, {(float)x->located[0][k], (float)x->located[1][k]}}}};
+        .start = {
+            .p = imp__wide3_lane(&x->p, k),
+            .ng = imp__wide3_lane(&x->ng, k),
+            .d = imp__wide3_lane(&x->d, k),
+            .uv = {x->uv[0][k], x->uv[1][k]},
+            .cos_light = x->cos_light[k],
+            .cos_p = x->cos_p[k],
+            .pdf_p = x->pdf_p,
+            .pdf_d = x->pdf_d[k],
+            .located = {x->prim[k], {(float)x->located[0][k], (float)x->located[1][k]}}}};
 }
 
 bool imp__light_starts(const struct imp_tracer *t, int64_t first, int n,
