@@ -19,16 +19,18 @@
 #include "walk/core/walk.h"
 
 struct imp_both;
-/* Light that reaches the sensor from a vertex; NULL: what the walk from the sensor brings
- * of a sample from both ends. */
+/* Light that reaches the sensor from a vertex, or what the walk from the sensor brings of a
+ * sample from both ends. */
 struct imp_reach {
-    struct imp_reach *next;    /* of the walk, in order */
-    struct imp_vertex *vertex; /* from which it comes */
-    int number;                /* of the vertex */
-    bool met;                  /* E of the vertex; else B */
-    double px, py;             /* film position, pixels of the full film */
-    imp_spec values;           /* by lanes */
-    imp_spec L;                /* by the scene's channels */
+    struct imp_reach *next; /* of the walk, in order */
+    struct imp_vertex
+        *vertex;     /* from which it comes; NULL: from that walk, or from a vertex
+                                  that was not kept, in lanes (light_bundle.h) */
+    int number;      /* of the vertex */
+    bool met;        /* E of the vertex; else B */
+    double px, py;   /* film position, pixels of the full film */
+    imp_spec values; /* by lanes */
+    imp_spec L;      /* by the scene's channels */
 };
 
 struct imp_light_walk {
