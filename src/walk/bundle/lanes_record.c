@@ -70,12 +70,11 @@ static inline void step_put(const struct imp_lanes_step *step, int colors, int k
 }
 
 bool imp__lanes_differ(const struct imp_depth *d, const struct imp_bin *bin,
-                       const struct imp_lanes_lit *lit, const struct imp_lanes_step *step)
+                       const struct imp_lanes_lit *lit)
 {
     const struct imp_active *active = d->bundle->tracer->active;
     const int material = bin->bsdf->index;
     const bool by_material = material >= 0 && active->bsdf[material];
-    if (by_material && step->part) return true;
     for (unsigned left = lit->dark; left; left &= left - 1)
         if (by_material || active->emitter[lit->light.light[__builtin_ctz(left)]])
             return true;

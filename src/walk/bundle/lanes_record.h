@@ -48,7 +48,9 @@ struct imp_lanes_step {
     imp_wide pdf, survive, eta, scale;
     imp_wide_lobe lobe;
     struct imp_wide_color w, beta;
-    unsigned on, part; /* lanes that go on; whose factor is zero in a colour */
+    unsigned on; /* lanes that go on */
+    uint8_t zeros
+        [IMP_WIDE_LANES]; /* of theirs, where walks are for derivatives (columns.h) */
 };
 
 /* Points and frames by the shapes' own functions; inputs that are not the constants bin->in, at each
@@ -97,8 +99,7 @@ void imp__ray_in_media(struct imp_depth *d, const struct imp_bin *bin,
 /* Where walks have derivatives: is there a lane with a value that is zero but has one? Then they are to
  * be made one by one. */
 bool imp__lanes_differ(const struct imp_depth *d, const struct imp_bin *bin,
-                       const struct imp_lanes_lit *lit,
-                       const struct imp_lanes_step *step);
+                       const struct imp_lanes_lit *lit);
 
 /* Records them, into v->record. */
 void imp__lanes_record(struct imp_depth *d, const struct imp_bin *bin,

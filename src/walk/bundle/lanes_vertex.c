@@ -112,6 +112,30 @@ static inline imp_wide_truth survives(const struct imp_depth *d,
     return number(v, IMP_DIM_SURVIVE) < *survive;
 }
 
+/* Factors of throughputs that are zero but have a derivative are left out, as by imp__throughput_part. */
+static __attribute__((noinline)) void zeros_leave_out(const struct imp_depth *d,
+                                                      const struct imp_bin *bin,
+                                                      const struct imp_lanes_vertices *v,
+                                                      unsigned on, int colors,
+                                                      imp_wide factor[4], uint8_t *zeros)
+{
+    const struct imp_tracer *t = d->bundle->tracer;
+    const int material = bin->bsdf->index;
+    imp_wide most = factor[0];
+    for (int c = 1; c < colors; c++) most = imp__wide_larger(most, factor[c]);
+    for (int k = 0; k < IMP_WIDE_LANES; k++) zeros[k] = d->rays->zeros[v->order[k]];
+    if (material < 0 || !t->active->inputs[material]) return;
+    for (int c = 0; c < colors; c++) {
+        unsigned left = imp__wide_bits(factor[c] == imp__wide(0)) & on;
+        for (; left; left &= left - 1) {
+            const int k = __builtin_ctz(left);
+            if (!(zeros[k] >> c & 1) || t->elsewhere)
+                factor[c][k] = imp_max(most[k], 0.5);
+            zeros[k] |= (uint8_t)(1 << c);
+        }
+    }
+}
+
 /* Where walks go on, and what a step there weighs. */
 static inline __attribute__((always_inline)) void
 scatter_weigh(struct imp_depth *d, const struct imp_bin *bin,
@@ -130,18 +154,16 @@ scatter_weigh(struct imp_depth *d, const struct imp_bin *bin,
         bin, v, &v->wo, &s->wi, &s->lobe, imp__wide_bits(goes), colors, any, &f));
     const imp_wide by = 1 / s->pdf;
     imp_wide beta[4];
-    imp_wide_truth part = {0};
     s->eta = imp__wide_taken(d->rays->eta, v->order);
     if (any)
         s->eta *= imp__kernel_index_ratio(bin, v, &v->wo, &s->wi, &s->lobe,
                                           imp__wide_bits(goes));
     goes &= s->pdf > zero;
-    for (int c = 0; c < colors; c++) {
-        const imp_wide factor = f.c[c] * by;
-        part |= factor == zero;
-        beta[c] = imp__wide_taken(d->rays->beta[c], v->order) * factor;
-    }
-    s->part = imp__wide_bits(part & goes) & v->on;
+    for (int c = 0; c < colors; c++) beta[c] = f.c[c] * by;
+    if (imp_unlikely(d->rays->zeros != NULL))
+        zeros_leave_out(d, bin, v, imp__wide_bits(goes) & v->on, colors, beta, s->zeros);
+    for (int c = 0; c < colors; c++)
+        beta[c] = imp__wide_taken(d->rays->beta[c], v->order) * beta[c];
     goes &= ~imp__colors_vanish(beta, colors);
     goes &= survives(d, v, beta, colors, s->eta, &s->survive);
     const imp_wide again = 1 / s->survive;
@@ -177,7 +199,7 @@ scatter_on(struct imp_depth *d, const struct imp_bin *bin,
         to->walk[i] = d->rays->walk[from];
         to->up[i] = v->at + k;
         if (to->left) to->left[i] = place_of(v, any, bin->bsdf, k);
-        if (to->zeros) to->zeros[i] = d->rays->zeros[from];
+        if (to->zeros) to->zeros[i] = s->zeros[k];
         if (to->ray.time) to->ray.time[i] = d->rays->ray.time[from];
         if (media) imp__ray_in_media(d, bin, v, k, i);
     }
@@ -208,7 +230,7 @@ work(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order, int n
     if (imp_unlikely(d->next->left != NULL))
         v.faced = imp__wide3_choose(v.wo.z < imp__wide(0),
                                     imp__wide3_opposite(v.x.frame.n), v.x.frame.n);
-    lit.on = lit.dark = step.on = step.part = 0;
+    lit.on = lit.dark = step.on = 0;
     if (imp_likely(!d->last)) {
         if (b->tracer->integrator->lights && b->tracer->scene->n_emitters > 0 &&
             (!any || bin->bsdf->flags & IMP_BSDF_SMOOTH) && !(media && bin->sealed))
@@ -217,8 +239,7 @@ work(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order, int n
         scatter_weigh(d, bin, &v, colors, any, &step);
     }
 
-    if (b->tracer->active && imp_unlikely(imp__lanes_differ(d, bin, &lit, &step)))
-        return false;
+    if (b->tracer->active && imp_unlikely(imp__lanes_differ(d, bin, &lit))) return false;
     if (v.recorded) {
         imp__lanes_record(d, bin, &v, &lit, &step);
     } else {
