@@ -208,7 +208,8 @@ class Scene:
         cylinder; `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y`, `NAME.opencv_k1`,
         `_k2`, `_p1`, `_p2` and `_k3` of a perspective camera or thin lens;
         `NAME.aperture_radius` and `NAME.focus_distance` of a thin lens; `NAME.position` of a point, spot or
-        ies light; `NAME.direction` of a directional, sun, spot or ies light; `NAME.turn` of a sky or a distant sensor. Otherwise as `add_pose`.
+        ies light; `NAME.direction` of a directional, sun, spot or ies light; `NAME.turn` of a sky or a distant sensor;
+        `NAME.sun_direction` of a sunsky, ciesky or perezsky, `NAME.sun_radius` of a sun or sunsky. Otherwise as `add_pose`.
 
         Parameters
         ----------

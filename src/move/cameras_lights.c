@@ -61,8 +61,18 @@ static imp_v3 light_part(const struct imp__moves *moves, const struct imp__mover
                          imp_v3 v)
 {
     const struct imp_emitter *e = moves->scene->emitters[IMP_MOVE_EMITTER(m->shape)];
-    if (m->kind != IMP_MOVE_AXIS && !(e->ops->flags & IMP_EMITTER_FAR)) return v;
+    if (m->kind != IMP_MOVE_AXIS && m->kind != IMP_MOVE_SUN &&
+        !(e->ops->flags & IMP_EMITTER_FAR))
+        return v;
     return (v - m->axis * imp__dot(m->axis, v)) * m->rate;
+}
+
+/* Of the direction p to a disc about the axis, or from it, at the angle g: (p cos g - axis)/sin g points
+ * away from the middle, and tan(g/2)/sin g = 1/(1 + cos g). */
+static imp_v3 disc_velocity(const struct imp__mover *m, imp_v3 p)
+{
+    const double c = imp__dot(m->axis, p), side = c < 0 ? -1 : 1;
+    return (p * c - m->axis) * (side * m->rate / (1 + fabs(c)));
 }
 
 imp_v3 imp__light_velocity(const struct imp__moves *moves, int k, imp_v3 p,
@@ -77,7 +87,8 @@ imp_v3 imp__light_velocity(const struct imp__moves *moves, int k, imp_v3 p,
         if (m->kind == IMP_MOVE_AFFINE) out += e; /* a light at a point, the middle */
         if (m->kind == IMP_MOVE_LIGHT) out += light_part(moves, m, e);
         if (m->kind == IMP_MOVE_TURN) out += imp__cross(e, p);
-        if (m->kind == IMP_MOVE_AXIS && sky)
+        if (m->kind == IMP_MOVE_DISC) out += disc_velocity(m, p) * theta_dot[m->first];
+        if (m->kind == IMP_MOVE_SUN || (m->kind == IMP_MOVE_AXIS && sky))
             out += imp__cross(imp__cross(m->axis, light_part(moves, m, e)), p);
     }
     return out;
@@ -88,6 +99,11 @@ void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 p, im
 {
     if (moves->scene->emitters[k]->ops->flags & IMP_EMITTER_ENVIRONMENT) {
         imp__light_turn_bar(moves, k, imp__cross(p, bar), theta_bar);
+        for (int j = 0; j < moves->n_movers; j++) {
+            const struct imp__mover *m = &moves->mover[j];
+            if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_DISC)
+                theta_bar[m->first] += imp__dot(disc_velocity(m, p), bar);
+        }
         return;
     }
     for (int j = 0; j < moves->n_movers; j++) {
@@ -109,7 +125,7 @@ void imp__light_turn_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
             imp__affine_turn_bar(turn_bar, theta_bar + m->first);
         if (m->kind == IMP_MOVE_TURN)
             imp__move_vector_bar(theta_bar + m->first, turn_bar);
-        if (m->kind == IMP_MOVE_AXIS)
+        if (m->kind == IMP_MOVE_AXIS || m->kind == IMP_MOVE_SUN)
             imp__move_vector_bar(theta_bar + m->first,
                                  light_part(moves, m,
                                             imp__cross(turn_bar, m->axis) +

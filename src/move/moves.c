@@ -4,8 +4,8 @@
 #include "affine.h"
 #include "base/arguments.h"
 #include "base/context.h"
-#include "kind/emitter/from_point.h"
 #include "kind/emitter/ies.h"
+#include "suns.h"
 
 struct imp__moves imp__moves_begin(const struct imp_scene *scene,
                                    const struct imp_sensor *sensor)
@@ -15,8 +15,10 @@ struct imp__moves imp__moves_begin(const struct imp_scene *scene,
 
 void imp__moves_free(struct imp__moves *moves)
 {
-    for (int k = 0; k < moves->n_movers; k++)
+    for (int k = 0; k < moves->n_movers; k++) {
         imp__fans_free(moves->scene->ctx, moves->mover[k].fans);
+        imp__release(moves->scene->ctx, moves->mover[k].suns);
+    }
     if (moves->scene) imp__release(moves->scene->ctx, moves->mover);
     *moves = (struct imp__moves){0};
 }
@@ -43,6 +45,20 @@ static enum imp_status camera_mover(const struct imp__moves *moves, struct imp__
                       "sensor '%s' has no field of view that moves", moves->sensor->name);
 }
 
+static enum imp_status sun_mover(const struct imp__moves *moves, struct imp__mover *m)
+{
+    const struct imp_emitter *e = moves->scene->emitters[IMP_MOVE_EMITTER(m->shape)];
+    struct imp__sky_sun sun;
+    if (!imp__sky_sun_read(e, &sun))
+        return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
+                          "light '%s' (%s) has no sun", e->name, e->ops->name);
+    m->axis = sun.towards;
+    if (m->kind == IMP_MOVE_SUN) return imp__suns_make(moves->scene->ctx, e, &m->suns);
+    m->count = 1;
+    m->rate = 1 / tan(sun.radius / 2);
+    return IMP_OK;
+}
+
 static enum imp_status light_mover(struct imp__moves *moves, struct imp__mover *m)
 {
     struct imp_emitter *e = moves->scene->emitters[IMP_MOVE_EMITTER(m->shape)];
@@ -50,6 +66,7 @@ static enum imp_status light_mover(struct imp__moves *moves, struct imp__mover *
     double v[3];
     m->count = m->kind == IMP_MOVE_AFFINE ? IMP_AFFINE_NUMBERS : 3;
     moves->skies |= sky;
+    if (m->kind == IMP_MOVE_SUN || m->kind == IMP_MOVE_DISC) return sun_mover(moves, m);
     if (sky && m->kind == IMP_MOVE_TURN) return IMP_OK; /* about the middle of all */
     if (!e->ops->aim || m->kind == IMP_MOVE_TURN ||
         (m->kind == IMP_MOVE_AXIS && !e->ops->cone && e->ops != &imp__ies_light && !sky))
@@ -118,105 +135,13 @@ enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kin
                                         (size_t)moves->n_movers + 1, sizeof *more);
     if (!more) {
         imp__fans_free(ctx, m.fans);
+        imp__release(ctx, m.suns);
         return imp__error(ctx, IMP_E_NOMEM, "no memory for what moves");
     }
     moves->mover = more;
     moves->mover[moves->n_movers++] = m;
     moves->n += m.count;
     return IMP_OK;
-}
-
-/* ---- Parameters -------------------------------------------------------------------- */
-
-/* imp__mover.twist of a light's axis a. Opposite to z the frame may turn in any way: 0. */
-static imp_v3 twist_of(const struct imp_pose *pose, imp_v3 a)
-{
-    const void *rest = pose->object->rest;
-    const imp_v3 z = pose->emitter->ops == &imp__ies_light
-                         ? ((const struct imp__ies *)rest)->nadir
-                         : ((const struct imp__light_frame *)rest)->axis[2];
-    const double sum = 1 + imp__dot(z, a);
-    return sum > 1e-9 ? imp__cross(z, a) * (-1 / sum) : (imp_v3){0};
-}
-
-/* A sphere or a cylinder as it is now. */
-static enum imp_status round_add(struct imp__moves *moves, const struct imp_pose *pose)
-{
-    struct imp_round round;
-    const bool ball = imp__moves_sphere(moves->scene, pose->shape, 0, &round);
-    IMP_CHECKED(imp__moves_add(moves,
-                               !ball                           ? IMP_MOVE_AFFINE
-                               : pose->kind == IMP_POSE_CENTER ? IMP_MOVE_POSE
-                                                               : IMP_MOVE_SCALE,
-                               pose->shape));
-    if (ball && pose->kind == IMP_POSE_RADIUS)
-        moves->mover[moves->n_movers - 1].rate = 1 / pose->number[0];
-    return IMP_OK;
-}
-
-enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_pose *pose)
-{
-    if (imp__pose_is_round(pose->kind)) return round_add(moves, pose);
-    static const enum imp__move_kind kind[IMP_POSE_KINDS] = {
-        [IMP_POSE_RIGID] = IMP_MOVE_POSE,     [IMP_POSE_SCALE] = IMP_MOVE_SCALE,
-        [IMP_POSE_WORLD] = IMP_MOVE_AFFINE,   [IMP_POSE_VERTICES] = IMP_MOVE_VERTICES,
-        [IMP_POSE_POSITION] = IMP_MOVE_LIGHT, [IMP_POSE_DIRECTION] = IMP_MOVE_LIGHT,
-        [IMP_POSE_TURN] = IMP_MOVE_TURN};
-    int shape = pose->sensor          ? IMP_MOVE_CAMERA
-                : pose->instance >= 0 ? IMP_MOVE_INSTANCE(pose->instance)
-                                      : pose->shape;
-    for (int k = 0; pose->emitter && k < moves->scene->n_emitters; k++)
-        if (moves->scene->emitters[k] == pose->emitter) shape = IMP_MOVE_EMITTER(k);
-    const bool turns = pose->kind == IMP_POSE_DIRECTION &&
-                       !(pose->emitter->ops->flags & IMP_EMITTER_FAR);
-    const enum imp_status st = imp__moves_add(
-        moves,
-        turns ? IMP_MOVE_AXIS
-        : imp__pose_is_view(pose->kind)
-            ? (enum imp__move_kind)(IMP_MOVE_VIEW + pose->kind - IMP_POSE_FOV)
-            : kind[pose->kind],
-        shape);
-    if (st != IMP_OK) return st;
-    struct imp__mover *m = &moves->mover[moves->n_movers - 1];
-    const struct imp_pose *rigid = imp__pose_beside(pose, IMP_POSE_RIGID);
-    if (pose->shape >= 0 || pose->instance >= 0 || pose->kind == IMP_POSE_RIGID) {
-        m->centre = pose->object->centre;
-        for (int i = 0; rigid && i < 3; i++) m->centre[i] += rigid->number[i];
-    }
-    if (pose->kind == IMP_POSE_WORLD) m->centre = imp__world_centre(pose);
-    if (pose->kind == IMP_POSE_SCALE) m->rate = 1 / pose->number[0];
-    if (pose->kind == IMP_POSE_DIRECTION)
-        m->rate =
-            1 / imp__length(imp__v3(pose->number[0], pose->number[1], pose->number[2]));
-    if (turns && !imp__pose_is_far(pose->emitter)) m->twist = twist_of(pose, m->axis);
-    return IMP_OK;
-}
-
-void imp__pose_numbers_bar(const struct imp__moves *moves, const struct imp__mover *mover,
-                           const struct imp_pose *pose, double *bar)
-{
-    if (mover->fans)
-        imp__fans_normals_bar(mover->fans, &moves->scene->shapes[mover->shape]->triangles,
-                              bar + mover->count / 2, bar);
-    struct imp__tube tube;
-    if (pose->kind == IMP_POSE_WORLD) {
-        imp__world_bar(pose, mover->centre, bar);
-        return;
-    }
-    if (mover->kind == IMP_MOVE_AFFINE &&
-        imp__moves_cylinder(pose->scene, pose->shape, 0, &tube))
-        imp__ends_bar(&tube, mover->centre, pose->kind, bar);
-    if (pose->kind != IMP_POSE_RIGID && pose->kind != IMP_POSE_TURN) return;
-    double *a_bar = bar + (pose->kind == IMP_POSE_TURN ? 0 : 3);
-    const double *a = pose->number + (a_bar - bar);
-    const imp_v3 turn = imp__move_vector(a_bar);
-    for (int i = 0; i < 3; i++) a_bar[i] = 0;
-    struct imp_round round;
-    if (pose->shape >= 0 && imp__moves_sphere(pose->scene, pose->shape, 0, &round) &&
-        !imp__pose_looks_up(pose->scene, pose->scene->shapes[pose->shape]) &&
-        !pose->object->table)
-        return; /* turned about its centre it is where it was */
-    imp__rotation_bar(a, turn, a_bar);
 }
 
 bool imp__moves_shape(const struct imp__moves *moves, int shape,

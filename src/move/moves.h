@@ -19,6 +19,12 @@
  *               V = a x w (3). The direction of a sun, an axis, turns it likewise. Of a distant sensor
  *               V = a x (X - c), c the middle of the scene
  *
+ *     sun       of a sky, towards its sun, of any length: its disc, and what that sends, turns as by an
+ *               axis; what is around it stays, and changes with the sun's place (3)
+ *     disc      of a sun or such a sky, by the angular radius r: what its disc sends from the angle g to
+ *               its middle comes from where g' = tan(g/2)/tan(r/2), so that the solid angle keeps its
+ *               parts of the disc's (1)
+ *
  * e: a translation in scene units; a: a rotation vector in radians. Velocities are linear in the
  * numbers; each function that applies the map has its transpose beside it. The geometric normal is
  * the same all over a triangle or disk; on a sphere it turns with the place.
@@ -43,9 +49,12 @@ enum imp__move_kind {
     IMP_MOVE_LIGHT,
     IMP_MOVE_AXIS,
     IMP_MOVE_TURN,
+    IMP_MOVE_SUN,
+    IMP_MOVE_DISC,
     IMP_MOVE_VIEW /* + k: number k of a camera's view */
 };
 struct imp__fans; /* triangles around each vertex: shade.c */
+struct imp__suns; /* a sky with its sun beside its place: suns.h */
 /* In place of a shape: the camera, emitter k and instance k of the scene. */
 #define IMP_MOVE_CAMERA      (-1)
 #define IMP_MOVE_EMITTER(k)  (-2 - (k))
@@ -56,11 +65,13 @@ struct imp__mover {
     enum imp__move_kind kind;
     int shape; /* index in the scene, or one of IMP_MOVE_* */
     imp_v3 centre;
-    imp_v3 axis;  /* of a spot or ies light; of parallel light its direction; unit */
-    imp_v3 twist; /* of such an axis: a' turns its frame about it by twist.a' */
-    double rate;  /* the velocities' factor */
+    imp_v3
+        axis; /* of a spot or ies light; of parallel light its direction; towards a sun; unit */
+    imp_v3 twist;           /* of such an axis: a' turns its frame about it by twist.a' */
+    double rate;            /* the velocities' factor */
     size_t first, count;    /* its numbers */
     struct imp__fans *fans; /* of vertices with normals; else NULL */
+    struct imp__suns *suns; /* of IMP_MOVE_SUN; else NULL */
 };
 
 struct imp__moves {
@@ -70,7 +81,7 @@ struct imp__moves {
     size_t cap_movers;
     struct imp__mover *mover;
     size_t n;   /* numbers in all */
-    bool skies; /* a sky is among them */
+    bool skies; /* a sky, or its sun, is among them */
     /* Vertices of a mesh at one place move together, as the caller sees to: what is wanted of their
      * numbers is the sum. */
     bool seams_join;
@@ -211,7 +222,7 @@ struct imp__glued imp__glued_curved(const struct imp_scene *scene, int shape,
 
 /* ---- cameras_lights.c ---- */
 /* Velocity of emitter k: of its place, or of the unit direction in which parallel light, or that of a
- * sky, travels, which is p. */
+ * sky, travels, or comes from, which is p; where its sun moves, of what the disc sends. */
 imp_v3 imp__light_velocity(const struct imp__moves *moves, int k, imp_v3 p,
                            const double *theta_dot);
 void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 p, imp_v3 bar,

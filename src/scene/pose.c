@@ -6,8 +6,6 @@
 #include "access.h"
 #include "base/arguments.h"
 #include "instances.h"
-#include "kind/emitter/from_point.h"
-#include "kind/emitter/ies.h"
 #include "kind/shape/shape.h"
 #include "math/motion.h"
 #include "sealed.h"
@@ -98,8 +96,7 @@ static const struct imp_pose *world_of(const struct imp_pose *object)
     return world && imp__world_is_moved(world) ? world : NULL;
 }
 
-/* The rows of a turn. False: it is none. */
-static bool turn_of(const struct imp_pose *p, double by[12])
+bool imp__pose_turn_of(const struct imp_pose *p, double by[12])
 {
     double R[9];
     imp__rotation_of(p->number, R);
@@ -130,7 +127,7 @@ static enum imp_status sensor_apply(const struct imp_pose *p)
                           *turn = imp__pose_beside(p, IMP_POSE_TURN);
     if (world) return imp__world_apply(world);
     double by[12];
-    if (turn && turn_of(turn, by)) s->ops->move(s, by);
+    if (turn && imp__pose_turn_of(turn, by)) s->ops->move(s, by);
     if (!imp__pose_is_at_start(p)) s->ops->move(s, map_of(p).m);
     return IMP_OK;
 }
@@ -186,59 +183,6 @@ static enum imp_status shape_apply(const struct imp_pose *p)
     return IMP_OK;
 }
 
-void imp__pose_aim(struct imp_emitter *e, enum imp_pose_kind kind, double v[3])
-{
-    imp_v3 axis;
-    double cosine;
-    if (kind != IMP_POSE_DIRECTION || imp__pose_is_far(e)) {
-        e->ops->aim(e, v, false);
-        return;
-    }
-    if (e->ops == &imp__ies_light) {
-        const struct imp__ies *x = e->self;
-        for (int k = 0; k < 3; k++) v[k] = x->nadir[k];
-        return;
-    }
-    e->ops->cone(e, &axis, &cosine);
-    for (int k = 0; k < 3; k++) v[k] = axis[k];
-}
-
-static void sky_turn(const struct imp_pose *p)
-{
-    double by[12];
-    memcpy(p->emitter->self, p->rest, p->rest_size);
-    if (turn_of(p, by)) p->emitter->ops->move(p->emitter, by);
-}
-
-static enum imp_status light_apply(const struct imp_pose *p)
-{
-    const struct imp_pose *world = world_of(p);
-    if (world) return imp__world_apply(world);
-    if (imp__pose_beside(p, IMP_POSE_WORLD)) {
-        memcpy(p->emitter->self, p->rest, p->rest_size);
-        return IMP_OK;
-    }
-    const struct imp_pose *at = imp__pose_beside(p, IMP_POSE_POSITION),
-                          *to = imp__pose_beside(p, IMP_POSE_DIRECTION);
-    const bool far = imp__pose_is_far(p->emitter);
-    const struct imp_pose *turn = imp__pose_beside(p, IMP_POSE_TURN);
-    double v[3];
-    if (turn) {
-        sky_turn(turn);
-        return IMP_OK;
-    }
-    if (at || far) {
-        memcpy(v, far ? to->number : at->number, sizeof v);
-        p->emitter->ops->aim(p->emitter, v, true);
-    }
-    if (!to || far) return IMP_OK;
-    const imp_v3 axis = imp__v3(to->number[0], to->number[1], to->number[2]);
-    if (p->emitter->ops == &imp__ies_light)
-        imp__ies_turn(p->emitter->self, p->rest, axis);
-    else imp__light_frame_turn(p->emitter->self, p->rest, axis);
-    return IMP_OK;
-}
-
 static enum imp_status pose_apply(struct imp_pose *p)
 {
     p->due = false;
@@ -248,17 +192,7 @@ static enum imp_status pose_apply(struct imp_pose *p)
         const struct imp_map by = map_of(p);
         return world ? imp__world_apply(world) : imp__instance_apply(p, &by);
     }
-    return p->sensor ? sensor_apply(p) : light_apply(p);
-}
-
-/* Turns of a light that is far away: not beyond what its sun is wide. */
-static double turn_large(const struct imp_emitter *e, double large)
-{
-    struct imp_sky_circle circle[IMP_SKY_CIRCLES];
-    const int n = e->ops->jumps ? e->ops->jumps(e, circle) : 0;
-    for (int k = 0; k < n; k++)
-        large = imp_min(large, 1.5 * acos(imp_clamp(circle[k].cosine, -1.0, 1.0)));
-    return large;
+    return p->sensor ? sensor_apply(p) : imp__pose_light_apply(p, world_of(p));
 }
 
 double imp__pose_large(const struct imp_pose *p, size_t e)
@@ -269,8 +203,9 @@ double imp__pose_large(const struct imp_pose *p, size_t e)
         return e % 4 == 3 ? 0.1 * scene
                           : 0.3 * hypot(hypot(p->start[e % 4], p->start[4 + e % 4]),
                                         p->start[8 + e % 4]);
-    case IMP_POSE_TURN: return p->emitter ? turn_large(p->emitter, 0.5) : 0.5;
+    case IMP_POSE_TURN: return p->emitter ? imp__pose_turn_large(p->emitter, 0.5) : 0.5;
     case IMP_POSE_RIGID: return e < 3 ? 0.1 * scene : 0.5;
+    case IMP_POSE_SUN_RADIUS:
     case IMP_POSE_SCALE:
     case IMP_POSE_RADIUS: return 0.3 * p->number[0];
     case IMP_POSE_VERTICES: {
@@ -287,8 +222,9 @@ double imp__pose_large(const struct imp_pose *p, size_t e)
     case IMP_POSE_P2: return 0.02;
     case IMP_POSE_APERTURE: return 0.3 * p->number[0] + 1e-3 * scene;
     case IMP_POSE_FOCUS: return 0.2 * p->number[0];
+    case IMP_POSE_SUN:
     case IMP_POSE_DIRECTION:
-        return turn_large(p->emitter, 0.3) *
+        return imp__pose_turn_large(p->emitter, 0.3) *
                imp__length(imp__v3(p->number[0], p->number[1], p->number[2]));
     default: return 0.1 * scene;
     }

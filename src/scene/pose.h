@@ -19,6 +19,8 @@
  *     NAME.direction         along which parallel light or that of a sun's middle travels, or of a
  *                            spot's axis, of any length
  *     NAME.turn              of a sky or a distant sensor: a rotation vector, away from what the file says
+ *     NAME.sun_direction     of a clear sky: towards its sun, world, of any length
+ *     NAME.sun_radius        of a sun or of a sky with one: that of its disc, radians
  *
  * R(a): the rotation about a by |a| radians; c: the middle of a shape's box, or of a group's where an
  * instance has it; a camera's own place.
@@ -50,6 +52,8 @@ enum imp_pose_kind {
     IMP_POSE_POSITION,
     IMP_POSE_DIRECTION,
     IMP_POSE_TURN,
+    IMP_POSE_SUN,
+    IMP_POSE_SUN_RADIUS,
     IMP_POSE_KINDS
 };
 
@@ -150,6 +154,15 @@ void imp__rotation_bar(const double a[3], imp_v3 turn_bar, double a_bar[3]);
 /* ---- pose.c for pose_add.c ---- */
 void imp__pose_changed(void *pose);
 
+/* The rows of a turn. False: it is none. */
+bool imp__pose_turn_of(const struct imp_pose *p, double by[12]);
+/* ---- pose_lights.c for pose.c ---- */
+/* Puts a light where p says. world: its to_world where that has been changed; else NULL. */
+enum imp_status imp__pose_light_apply(const struct imp_pose *p,
+                                      const struct imp_pose *world);
+/* A large turn of a light that is far away: not beyond what its sun is wide. */
+double imp__pose_turn_large(const struct imp_emitter *e, double large);
+
 /* ---- pose_rest.c for pose.c and pose_add.c ---- */
 /* Sets p->rest and what follows it. IMP_E_NOMEM. */
 enum imp_status imp__pose_rest_keep(struct imp_scene *scene, struct imp_pose *p);
@@ -159,7 +172,7 @@ bool imp__pose_is_at_start(const struct imp_pose *p);
 struct imp_map;
 void imp__pose_carry(const struct imp_pose *p, const struct imp_map *by);
 
-/* ---- pose_add.c for pose_names.c ---- */
+/* ---- pose_why.c for pose_add.c and pose_names.c ---- */
 /* Why an object has no such number; NULL: it has. Sets the middle of a sensor's lens. */
 const char *imp__pose_shape_why(const struct imp_scene *scene, const struct imp_shape *s,
                                 enum imp_pose_kind kind);

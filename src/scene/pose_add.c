@@ -4,16 +4,13 @@
 #include "access.h"
 #include "base/arguments.h"
 #include "instances.h"
-#include "kind/emitter/ies.h"
+#include "kind/emitter/sky_sun.h"
 #include "kind/sensor/receiver.h"
 #include "kind/shape/shape.h"
 #include "pose.h"
 #include "theta_near.h"
 #include <stdio.h>
 #include <string.h>
-
-extern const struct imp_emitter_ops imp__spot_light;
-extern const struct imp_sensor_ops imp__distant;
 
 /* ---- Adding ------------------------------------------------------------------------- */
 
@@ -22,111 +19,6 @@ static enum imp_status refuse(const struct imp_scene *scene, const char *name,
 {
     return imp__error(scene->ctx, IMP_E_UNSUPPORTED, "'%s' has no %s: %s",
                       name ? name : "", imp__pose_tail(kind), why);
-}
-
-/* What else is made from where shapes are, and is not made again. NULL: nothing is in the way, as
- * below. */
-static const char *shape_why(const struct imp_scene *scene, const struct imp_shape *s)
-{
-    if (!s->ops->move)
-        return "it is not made of triangles, and no sphere, disk or cylinder";
-    if (s->index >= imp__shapes_outside(scene))
-        return "it is in a shape group: its instances have poses";
-    if (scene->n_bodies > 0) return "there are media of graded index";
-    if (scene->priorities) return "shapes have priorities";
-    if (s->interior) return "it bounds a medium";
-    if (scene->lights_in_tree) return "lights are chosen by a tree (light_choice)";
-    if (scene->aims.aimed) return "directions are aimed at shapes";
-    if (s->placed || s->by_triangle) return "its textures need more than uv";
-    return NULL;
-}
-
-/* What a scale or single vertices change beside places. */
-static const char *size_why(const struct imp_scene *scene, const struct imp_shape *s,
-                            enum imp_pose_kind kind)
-{
-    const bool is_mesh =
-        s->geometry == IMP_TRIANGLES && s->ops->surface == imp__mesh_surface;
-    for (int k = 0; k < scene->n_emitters; k++)
-        if (scene->emitters[k]->shape == s)
-            return "it is a light, whose points are drawn by areas that stay";
-    for (int k = 0; k < scene->n_sensors; k++)
-        if (scene->sensors[k]->shape == s) return "it is a sensor";
-    if (kind == IMP_POSE_VERTICES && !is_mesh) return "it is no mesh";
-    return NULL;
-}
-
-bool imp__pose_looks_up(const struct imp_scene *scene, const struct imp_shape *s)
-{
-    const struct imp_bsdf *b = imp__shape_bsdf(scene, s);
-    for (int k = 0; k < b->n_in; k++)
-        if (b->input[k]->texture) return true;
-    return false;
-}
-
-/* A sphere, or a circular cylinder, and which of their numbers this is. */
-static const char *round_why(const struct imp_scene *scene, const struct imp_shape *s,
-                             enum imp_pose_kind kind)
-{
-    struct imp_round round;
-    const bool is_round = imp__shape_round(s, &round);
-    const bool has_axis = is_round && !imp__is_zero(round.axis);
-    if (!is_round || (kind == IMP_POSE_CENTER && has_axis) ||
-        ((kind == IMP_POSE_END_0 || kind == IMP_POSE_END_1) && !has_axis))
-        return "it is none of sphere (center, radius) and circular cylinder (p0, p1, "
-               "radius)";
-    if (has_axis && imp__pose_looks_up(scene, s))
-        return "its texture would turn about its axis";
-    return kind == IMP_POSE_CENTER ? NULL : size_why(scene, s, kind);
-}
-
-const char *imp__pose_shape_why(const struct imp_scene *scene, const struct imp_shape *s,
-                                enum imp_pose_kind kind)
-{
-    if (kind >= IMP_POSE_FOV) return "it is a shape";
-    const char *why = shape_why(scene, s);
-    if (why || kind == IMP_POSE_RIGID) return why;
-    if (kind == IMP_POSE_WORLD) return imp__world_shape_why(scene, s);
-    return imp__pose_is_round(kind) ? round_why(scene, s, kind)
-                                    : size_why(scene, s, kind);
-}
-
-const char *imp__pose_sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
-                                 imp_v3 *centre)
-{
-    const bool whole = kind == IMP_POSE_RIGID || kind == IMP_POSE_WORLD,
-               distant = s->ops == &imp__distant;
-    if (!whole && kind != IMP_POSE_TURN && !imp__pose_is_view(kind))
-        return "it is a sensor";
-    if (distant != (kind == IMP_POSE_TURN))
-        return distant ? "it is far away: it has a turn" : "it is no distant sensor";
-    double number[IMP_VIEW_NUMBERS];
-    if (!s->ops->move) return "it is no perspective or orthographic camera or thin lens";
-    if (!imp__lens_middle(s, centre))
-        return distant ? "it has one ray" : "its rays meet in no point";
-    if (distant) return NULL;
-    if (whole) return kind == IMP_POSE_WORLD && !s->ops->placed ? "it has none" : NULL;
-    number[kind - IMP_POSE_FOV] = NAN;
-    if (!s->ops->view || !s->ops->view(s, number, false))
-        return "it has no field of view";
-    return isnan(number[kind - IMP_POSE_FOV]) ? "it is no thin lens" : NULL;
-}
-
-const char *imp__pose_light_why(const struct imp_scene *scene,
-                                const struct imp_emitter *e, enum imp_pose_kind kind)
-{
-    const bool spot = e->ops == &imp__spot_light, far = imp__pose_is_far(e);
-    const bool has = kind == IMP_POSE_POSITION ? e->ops->aim && !far
-                     : kind == IMP_POSE_DIRECTION
-                         ? e->ops->aim && (far || spot || e->ops == &imp__ies_light)
-                     : kind == IMP_POSE_TURN ? e->ops->move != NULL
-                                             : kind == IMP_POSE_WORLD && spot;
-    if (!has)
-        return "it is none of point, spot and ies without a shape (position), "
-               "directional, sun, spot and ies (direction), spot (to_world), and "
-               "envmap, sunsky, ciesky and perezsky (turn)";
-    if (scene->lights_in_tree) return "lights are chosen by a tree (light_choice)";
-    return NULL;
 }
 
 static enum imp_status found(const struct imp_scene *scene, const char *name,
@@ -197,8 +89,9 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
     const struct imp_triangles *t =
         p->shape >= 0 ? &scene->shapes[p->shape]->triangles : NULL;
     double view[IMP_VIEW_NUMBERS], aim[3];
+    struct imp__sky_sun sun;
     if (imp__pose_is_view(p->kind)) p->sensor->ops->view(p->sensor, view, false);
-    const bool place = p->kind >= IMP_POSE_POSITION ||
+    const bool place = (p->kind >= IMP_POSE_POSITION && p->kind != IMP_POSE_SUN_RADIUS) ||
                        (imp__pose_is_round(p->kind) && p->kind != IMP_POSE_RADIUS);
     p->n = p->kind == IMP_POSE_RIGID      ? 6
            : p->kind == IMP_POSE_WORLD    ? 12
@@ -221,6 +114,13 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
     case IMP_POSE_DIRECTION:
         imp__pose_aim(p->emitter, p->kind, aim);
         memcpy(p->number, aim, sizeof aim);
+        break;
+    case IMP_POSE_SUN:
+    case IMP_POSE_SUN_RADIUS:
+        imp__sky_sun_read(p->emitter, &sun);
+        for (int i = 0; i < 3; i++) p->start[i] = sun.towards[i];
+        if (p->kind == IMP_POSE_SUN_RADIUS) p->start[0] = sun.radius;
+        memcpy(p->number, p->start, p->n * sizeof *p->number);
         break;
     case IMP_POSE_CENTER:
     case IMP_POSE_RADIUS:
@@ -260,7 +160,9 @@ static const struct tail {
     [IMP_POSE_FOCUS] = {"focus_distance", "scene units", 1e-6, INFINITY},
     [IMP_POSE_POSITION] = {"position", "scene units", -INFINITY, INFINITY},
     [IMP_POSE_DIRECTION] = {"direction", "1", -INFINITY, INFINITY},
-    [IMP_POSE_TURN] = {"turn", "radians", -INFINITY, INFINITY}};
+    [IMP_POSE_TURN] = {"turn", "radians", -INFINITY, INFINITY},
+    [IMP_POSE_SUN] = {"sun_direction", "1", -INFINITY, INFINITY},
+    [IMP_POSE_SUN_RADIUS] = {"sun_radius", "radians", 1e-6, 1.5}};
 
 const char *imp__pose_tail(enum imp_pose_kind kind) { return tails[kind].name; }
 
@@ -323,6 +225,12 @@ static int family(enum imp_pose_kind kind)
 static const char *beside_why(const struct imp_pose *p)
 {
     const int own = family(p->kind);
+    for (int k = 0; k < 2; k++)
+        if ((p->kind == IMP_POSE_TURN &&
+             imp__pose_beside(p, k ? IMP_POSE_SUN : IMP_POSE_SUN_RADIUS)) ||
+            (p->kind == (k ? IMP_POSE_SUN : IMP_POSE_SUN_RADIUS) &&
+             imp__pose_beside(p, IMP_POSE_TURN)))
+            return "a turn of the sky takes its sun along";
     for (const struct imp_pose *q = p->object != p ? p->object : NULL; q; q = q->next) {
         const int other = family(q->kind);
         if (q->object != p->object || other == own || !own || !other) continue;
@@ -398,6 +306,6 @@ enum imp_status imp_scene_add_geometry(imp_scene *scene, const char *name)
         "'%s' names no number of geometry: NAME.pose, scale, to_world, "
         "vertex_positions, center, radius, p0, p1, x_fov, principal_point_offset_x, _y, "
         "opencv_k1, k2, p1, p2, k3, aperture_radius, "
-        "focus_distance, position, direction or turn",
+        "focus_distance, position, direction, turn, sun_direction or sun_radius",
         name);
 }

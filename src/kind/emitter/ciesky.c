@@ -23,6 +23,12 @@ static const double numbers[15][5] = {
     {-1, -.55, 5, -2.5, .3},  {-1, -.55, 10, -3, .45}, {-1, -.32, 10, -3, .45},
     {-1, -.32, 16, -3, .3},   {-1, -.15, 16, -3, .3},  {-1, -.15, 24, -2.8, .15}};
 
+static void fit_now(struct imp__sky_shape *s)
+{
+    s->factor = s->level / (s->on_ground ? imp__sky_shape_horizontal(s)
+                                         : imp__sky_shape_at(s, s->axis[2]));
+}
+
 static enum imp_status level_read(const struct imp_build *b, struct imp__sky_shape *s)
 {
     enum imp_status st = IMP_OK;
@@ -34,9 +40,10 @@ static enum imp_status level_read(const struct imp_build *b, struct imp__sky_sha
         IMP_TRY(imp_build_error(b, "illuminance", IMP_E_SCENE,
                                 "illuminance = %g and zenith = %g: give one of them",
                                 illuminance, zenith));
-    s->factor = imp_build_has(b, "illuminance")
-                    ? illuminance / imp__sky_shape_horizontal(s)
-                    : zenith / imp__sky_shape_at(s, s->axis[2]);
+    s->on_ground = imp_build_has(b, "illuminance");
+    s->level = s->on_ground ? illuminance : zenith;
+    s->fit = fit_now;
+    fit_now(s);
 out:
     return st;
 }

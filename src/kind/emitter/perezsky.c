@@ -100,6 +100,12 @@ void imp__perez_efficacy(const struct imp__perez_weather *w, double up, double d
     }
 }
 
+static void fit_now(struct imp__sky_shape *s)
+{
+    imp__perez_shape(s, &s->weather);
+    s->factor = s->level / imp__sky_shape_horizontal(s);
+}
+
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_emitter *e)
 {
     enum imp_status st = IMP_OK;
@@ -121,13 +127,14 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
                                 &level));
     IMP_TRY(imp__sky_shape_place(b, s, &of_world));
     IMP_TRY(imp__sky_shape_by_day(b, s, of_world, "Perez'"));
-    imp__perez_shape(s, &(struct imp__perez_weather){diffuse, direct, outside});
-    const double all = imp__sky_shape_horizontal(s);
-    if (!(all > 0) || !isfinite(all))
+    s->weather = (struct imp__perez_weather){diffuse, direct, outside};
+    s->level = level;
+    s->fit = fit_now;
+    fit_now(s);
+    if (!(s->factor > 0) || !isfinite(s->factor))
         IMP_TRY(imp_build_error(b, "diffuse", IMP_E_SCENE,
                                 "%g W/m^2 and direct = %g: the model has no sky for them",
                                 diffuse, direct));
-    s->factor = level / all;
 out:
     return st;
 }

@@ -8,12 +8,6 @@
 
 #define IMP__SOLAR_CONSTANT 1367 /* W m^-2, with which the model was fitted */
 
-/* Diffuse irradiance of level ground, above 0, and direct irradiance across the sun's rays. */
-struct imp__perez_weather {
-    double diffuse, direct;  /* W m^-2 */
-    double extraterrestrial; /* W m^-2 */
-};
-
 /* a to e and h, from the weather and from s->sun and s->axis; the sun counts as on the
  * horizon where it is below. The factor is left as it is. */
 void imp__perez_shape(struct imp__sky_shape *s, const struct imp__perez_weather *w);

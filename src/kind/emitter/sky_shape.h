@@ -13,12 +13,23 @@
 #include "kind/build.h"
 #include "math/vec.h"
 
+/* Diffuse irradiance of level ground, above 0, and direct irradiance across the sun's rays. */
+struct imp__perez_weather {
+    double diffuse, direct;  /* W m^-2 */
+    double extraterrestrial; /* W m^-2 */
+};
+
 struct imp__sky_shape {
     imp_v3 axis[3]; /* x, y and z (up) of the sky, world */
     imp_v3 sun;     /* unit, world */
     double n[5], h; /* a to e */
     bool overcast;  /* (1 + 2 cos Z)/3 in place of f g */
     double factor;  /* L at scale 1 over f g */
+    /* What follows from the sun's place: a to e and the factor. Set by the kind, with what it needs. */
+    void (*fit)(struct imp__sky_shape *s);
+    double level; /* of the zenith, or of level ground */
+    bool on_ground;
+    struct imp__perez_weather weather;
 };
 
 extern const struct imp_input_desc imp__sky_shape_inputs[]; /* scale */

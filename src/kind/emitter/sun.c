@@ -5,14 +5,15 @@
  *
  *     Omega = 2 pi (1 - cos a)
  *
- * Its edge moves with the radius, so that this has no derivative. The fallback is the mean
- * radius of the sun, 6.866e-5 sr. */
+ * Its edge moves with the radius, so that this has a derivative among what moves alone
+ * (NAME.sun_radius). The fallback is the mean radius of the sun, 6.866e-5 sr. */
 #include "sun.h"
 #include "emission.h"
 #include "kind/build.h"
 #include "math/transform.h"
 #include "math/vec.h"
 #include "math/warp.h"
+#include "sky_sun.h"
 #include <math.h>
 
 enum { RADIANCE, RADIUS };
@@ -137,4 +138,11 @@ bool imp__sun_disc(const struct imp_emitter *e, imp_v3 *axis, double *size)
     *axis = s->axis;
     *size = IMP_2PI * s->versed;
     return true;
+}
+
+void imp__sun_radius_set(struct imp_emitter *e, double radius)
+{
+    struct imp_input *in = (struct imp_input *)(uintptr_t)e->input[RADIUS];
+    in->value = imp__spec(radius);
+    changed(e);
 }

@@ -18,6 +18,7 @@
 #include "math/transform.h"
 #include "math/trig.h"
 #include "math/weight_table.h"
+#include "sky_sun.h"
 #include "skylight.h"
 #include "sun_position.h"
 
@@ -314,6 +315,18 @@ static double pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *
 
 /* ---- Building -------------------------------------------------------------------- */
 
+/* In their frame. */
+static void sun_place(struct sunsky *s, imp_v3 sun, double radius)
+{
+    const double half = sin(radius / 2), own = sin(SUN_RADIUS_DEGREES * IMP_PI / 360);
+    s->sun = sun;
+    s->cos_radius = cos(radius);
+    s->sun_solid = 4 * IMP_PI * half * half;
+    s->dim = own * own / (half * half);
+    s->dark = sun[2] < 0;
+    imp__skylight_set(&s->light, asin(imp_clamp(sun[2], 0.0, 1.0)), radius, s->by_wave);
+}
+
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_emitter *e)
 {
     enum imp_status st = IMP_OK;
@@ -329,12 +342,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
     IMP_TRY(imp__props_float_in(b->ctx, b->node, "sun_aperture", 2 * SUN_RADIUS_DEGREES,
                                 (struct imp_interval){0, 180, IMP_OPEN}, &aperture));
     IMP_TRY(imp_build_bool(b, "complex_sun", false, &s->limb));
-    const double radius = aperture * IMP_PI / 360;
-    const double half = sin(radius / 2), own = sin(SUN_RADIUS_DEGREES * IMP_PI / 360);
-    s->cos_radius = cos(radius);
-    s->sun_solid = 4 * IMP_PI * half * half;
-    s->dim = own * own / (half * half);
-    s->dark = s->sun[2] < 0;
+    sun_place(s, s->sun, aperture * IMP_PI / 360);
     if (s->dark) {
         char where[512];
         imp__warn(b->ctx,
@@ -344,8 +352,6 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
                   b->node->id ? b->node->id : "", b->node->type,
                   asin(imp_min(-s->sun[2], 1.0)) * 180 / IMP_PI);
     }
-    imp__skylight_set(&s->light, asin(imp_clamp(s->sun[2], 0.0, 1.0)), radius,
-                      s->by_wave);
     s->table = (struct imp__weight_table){
         TURNS, HEIGHTS, imp_build_alloc(b, HEIGHTS, sizeof(double)),
         imp_build_alloc(b, (size_t)HEIGHTS * TURNS, sizeof(double))};
@@ -357,16 +363,37 @@ out:
     return st;
 }
 
+static imp_v3 towards(const struct sunsky *s)
+{
+    return s->axis[0] * s->sun[0] + s->axis[1] * s->sun[1] + s->axis[2] * s->sun[2];
+}
+
 /* The horizon, and the border of the disc. */
 static int jumps(const struct imp_emitter *e, struct imp_sky_circle out[IMP_SKY_CIRCLES])
 {
     const struct sunsky *s = e->self;
-    const imp_v3 sun =
-        s->axis[0] * s->sun[0] + s->axis[1] * s->sun[1] + s->axis[2] * s->sun[2];
     if (s->dark) return 0;
     out[0] = (struct imp_sky_circle){s->axis[2], 0};
-    out[1] = (struct imp_sky_circle){sun, s->cos_radius};
+    out[1] = (struct imp_sky_circle){towards(s), s->cos_radius};
     return 2;
+}
+
+bool imp__sunsky_sun_read(const struct imp_emitter *e, struct imp__sky_sun *out)
+{
+    const struct sunsky *s = e->self;
+    *out = (struct imp__sky_sun){
+        .towards = towards(s), .radius = s->light.radius, .power = true};
+    return !s->dark;
+}
+bool imp__sunsky_sun_set(struct imp_emitter *e, const struct imp__sky_sun *sun)
+{
+    struct sunsky *s = e->self;
+    sun_place(s, local(s, sun->towards), sun->radius);
+    return !s->dark;
+}
+void imp__sunsky_part(bool disc, imp_spec *in)
+{
+    in[disc ? SKY_SCALE : SUN_SCALE] = imp__spec(0);
 }
 
 static void move(struct imp_emitter *e, const double to_world[12])

@@ -87,6 +87,7 @@ struct imp__edge_item {
     int64_t place;                /* the instance that the shape is in; 0: none */
     struct imp_sky_circle circle; /* IMP_ITEM_SKY */
     int sky;                      /* the emitter whose circle it is */
+    bool glued;                   /* it goes with that */
     const struct imp__arc *arc;   /* IMP_ITEM_ARC */
     /* IMP_ITEM_ROUND: rims of a cylinder that a disk closes, whose edge they are; of such a disk the
      * direction out of the cylinder, at its end; 0: it closes none. */

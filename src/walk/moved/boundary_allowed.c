@@ -5,6 +5,7 @@
 #include "boundary_parts.h"
 #include "math/warp.h"
 #include "moved_mirror.h"
+#include "moved_sky.h"
 
 extern const struct imp_bsdf_ops imp__twosided;
 extern const struct imp_sensor_ops imp__distant;
@@ -250,13 +251,22 @@ static enum imp_status turns_allowed(const struct imp__boundary *b)
     for (int k = 0; k < scene->n_emitters && b->moves->skies; k++) {
         const struct imp_emitter *e = scene->emitters[k];
         const char *why = NULL;
-        if (e->ops->flags & IMP_EMITTER_ENVIRONMENT &&
-            imp__moves_shape(b->moves, IMP_MOVE_EMITTER(k), NULL))
-            why = turn_why(b);
+        struct imp__sky_sun sun;
+        const bool moves = e->ops->flags & IMP_EMITTER_ENVIRONMENT &&
+                           imp__moves_shape(b->moves, IMP_MOVE_EMITTER(k), NULL),
+                   parts = moves && imp__sky_in_parts(b->moves, k);
+        if (parts) imp__sky_sun_read(e, &sun);
+        if (moves && !(parts && sun.radius == 0)) why = turn_why(b);
         if (why)
             return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
                               "derivatives by what moves: light '%s' (%s) turns, and %s",
                               e->name ? e->name : "", e->ops->name, why);
+        if (parts && !imp__sky_sun_is_clear(e))
+            return imp__error(
+                scene->ctx, IMP_E_UNSUPPORTED,
+                "derivatives by what moves: the sun of light '%s' (%s) touches the "
+                "horizon, which cuts it",
+                e->name ? e->name : "", e->ops->name);
     }
     return IMP_OK;
 }

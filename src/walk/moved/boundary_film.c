@@ -72,8 +72,9 @@ void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to
     if (sky) {
         f->end[f->n_ends] = imp__flux_camera(d, &eye, m);
         f->end[f->n_ends++].eye = d->p; /* another point of the ray through the eye */
-        f->end[f->n_ends++] =
-            (struct imp__flux_end){{.p = w}, {.v = m}, false, d->item->sky + 1, {0}};
+        if (d->item->glued)
+            f->end[f->n_ends++] =
+                (struct imp__flux_end){{.p = w}, {.v = m}, false, d->item->sky + 1, {0}};
     } else f->n_ends = imp__edge_ends(d, m, f->end);
     f->end[f->n_ends++] = imp__flux_camera(d, &at, -m);
 }

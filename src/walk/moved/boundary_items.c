@@ -4,6 +4,7 @@
  * curved shapes, shading and skies, whose edges are in no list. */
 #include "base/arguments.h"
 #include "boundary_parts.h"
+#include "moved_sky.h"
 
 /* A tenth of each measure is the length in space. */
 #define BY_LENGTH 0.1
@@ -52,6 +53,12 @@ static enum imp_status choice_make(struct imp__boundary *b, enum imp__boundary_k
     return st;
 }
 
+/* Is it that of the sun's disc? */
+static bool is_border(const struct imp__sky_sun *sun, const struct imp_sky_circle *c)
+{
+    return sun->radius > 0 && c->cosine > 0 && imp__dot(c->axis, sun->towards) > 1 - 1e-9;
+}
+
 /* Circles of a camera's pictures of skies, if it or the sky moves. */
 static void circles_find(struct imp__boundary *b)
 {
@@ -62,11 +69,20 @@ static void circles_find(struct imp__boundary *b)
         const int sky = scene->environments[k];
         const struct imp_emitter *e = scene->emitters[sky];
         if (!camera && !imp__moves_shape(b->moves, IMP_MOVE_EMITTER(sky), NULL)) continue;
+        const bool parts = imp__sky_in_parts(b->moves, sky);
+        struct imp__sky_sun sun;
+        imp__sky_sun_read(e, &sun);
         struct imp_sky_circle circle[IMP_SKY_CIRCLES];
         const int n = e->ops->jumps(e, circle);
-        for (int i = 0; i < n; i++)
-            b->item[b->n_items++] = (struct imp__edge_item){
-                .kind = IMP_ITEM_SKY, .shape = -1, .sky = sky, .circle = circle[i]};
+        for (int i = 0; i < n; i++) {
+            const bool glued = !parts || is_border(&sun, &circle[i]);
+            if (camera || glued)
+                b->item[b->n_items++] = (struct imp__edge_item){.kind = IMP_ITEM_SKY,
+                                                                .shape = -1,
+                                                                .sky = sky,
+                                                                .circle = circle[i],
+                                                                .glued = glued};
+        }
     }
 }
 

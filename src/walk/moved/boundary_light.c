@@ -19,8 +19,26 @@ struct source {
     struct imp_surface y; /* of a light with a shape */
     imp_v3 p; /* its point; of parallel light the direction in which it travels */
     bool parallel, sky;
+    enum imp__sky_part part; /* of a sky */
+    bool glued;              /* the line's end goes with the light */
     double density; /* of the light, and of its point per area, or direction of a sky */
 };
+
+/* Where its sun moves, a sky is the disc or what is around it, by what they send along the line. */
+static void part_draw(const struct imp__edge_draw *d, struct source *s)
+{
+    const struct imp_scene *scene = d->b->tracer->scene;
+    const struct imp_emitter *e = scene->emitters[s->light];
+    const struct imp_carried *carried = imp__edge_waves(d);
+    const double disc = imp__sum_used(imp__sky_part_from(e, IMP_SKY_DISC, -s->p, carried),
+                                      scene->lanes),
+                 rest = imp__sum_used(
+                     imp__sky_part_from(e, IMP_SKY_AROUND, -s->p, carried), scene->lanes);
+    const double share = disc > 0 ? disc / (disc + rest) : 0;
+    s->glued = imp__u01(d->key, IMP_EDGE_PART) < share;
+    s->part = s->glued ? IMP_SKY_DISC : IMP_SKY_AROUND;
+    s->density *= s->glued ? share : 1 - share;
+}
 
 static struct source source_draw(const struct imp__edge_draw *d)
 {
@@ -44,6 +62,8 @@ static struct source source_draw(const struct imp__edge_draw *d)
         s.density *= e->ops->sample(e, &from, u, &to) ? to.pdf : 0;
         s.p = -to.wi;
         s.parallel = s.sky = true;
+        s.glued = d->b->moves->skies;
+        if (s.density > 0 && imp__sky_in_parts(d->b->moves, s.light)) part_draw(d, &s);
         return s;
     }
     e->ops->aim(e, aim, false);
@@ -75,6 +95,8 @@ static imp_spec sent(const struct imp__edge_draw *d, const struct source *s,
     const struct imp_texcoord there = {.shape = e->shape, .carried = imp__edge_waves(d)};
     const struct imp_emission x = {.dist = 1, .cos_light = cosine, .d = along};
     imp_spec in[IMP_INPUTS_MAX], le;
+    if (s->sky && s->part != IMP_SKY_WHOLE)
+        return imp__sky_part_from(e, s->part, -s->p, imp__edge_waves(d));
     if (s->sky) return imp__sky_radiance_from(scene, s->light, -s->p, imp__edge_waves(d));
     imp__inputs_eval(e->input, e->n_in, &there, in);
     e->ops->eval(e, in, &x, &le);
@@ -105,7 +127,7 @@ static void ends_set(const struct imp__edge_draw *d, const struct line *l, doubl
     const double far = parallel ? 1 : l->t_y / (t_x + l->t_y); /* of V_line that is x' */
     light->slide = l->m * -far;
     light->n_ends = imp__edge_ends(d, l->m, light->end);
-    if (!l->from->sky || d->b->moves->skies)
+    if (!l->from->sky || l->from->glued)
         light->end[light->n_ends++] =
             source_end(d, l->from, l->m * (parallel ? t_x : far - 1));
 }

@@ -5,6 +5,16 @@
 #include "moved_sky.h"
 #include "moved_sweep.h"
 
+/* What skies beyond vertex k change by with their suns: none that is glued to one is seen so. */
+static void skies_sent_bar(struct imp__sweep *s, int k, const struct imp_vertex *v,
+                           imp_v3 w)
+{
+    for (const struct imp_vertex *y = v->next; y; y = y->next)
+        if (!imp__is_zero(y->e))
+            imp__sky_sent_bar(s->moves, y->d.met.emitter, w, s->piece[k].on * y->e,
+                              v->carried, s->theta_bar);
+}
+
 /* What lies beyond vertex k, which does not scatter: what it is to a shift of the ray, which is added to
  * vertex k, and, returned, to its direction. */
 static imp_v3 beyond_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
@@ -13,10 +23,10 @@ static imp_v3 beyond_bar(struct imp__sweep *s, int k, const struct imp_vertex *v
     struct imp__link_point *x = &s->at[k], *next = x + 1;
     const imp_v3 w = imp__link_direction(x, next);
     if (next->sky) { /* the recorded direction is rounded */
-        const imp_v3 in = imp__normalize(x->x.p - imp__sweep_from(s, k));
-        return imp__skies_slope(scene,
-                                imp__is_mirrored(v) ? imp__mirror_turn(x->x.n, in) : in,
-                                s->piece[k].on, v->carried);
+        const imp_v3 in = imp__normalize(x->x.p - imp__sweep_from(s, k)),
+                     out = imp__is_mirrored(v) ? imp__mirror_turn(x->x.n, in) : in;
+        if (imp_unlikely(s->moves->skies)) skies_sent_bar(s, k, v, out);
+        return imp__skies_slope(scene, out, s->piece[k].on, v->carried);
     }
     next->along += imp__sweep_reach_bar(s, k + 1, s->piece[k].step);
     const bool glued = s->through && !x->turns && !imp__is_mirrored(v);
@@ -39,7 +49,7 @@ void imp__pass_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
                       piece->step + piece->met, x);
     if (k < s->front) return; /* the camera's ray leads there */
     if (x->turns) x->wo_bar -= beyond_bar(s, k, v);
-    else if (!x[1].sky) beyond_bar(s, k, v);
+    else if (!x[1].sky || s->moves->skies) beyond_bar(s, k, v);
 }
 
 void imp__mirror_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)

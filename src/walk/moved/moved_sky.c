@@ -37,8 +37,9 @@ static bool jumps_between(const struct imp_emitter *e, imp_v3 a, imp_v3 b)
  * sky may be as steep there as a root. */
 #define TURN       1e-6
 #define TURN_LEAST 1e-11
-static void slope_add(const struct imp_scene *scene, int emitter, imp_v3 w, imp_spec bar,
-                      const struct imp_carried *carried, imp_v3 *slope)
+static void slope_add(const struct imp_scene *scene, int emitter, enum imp__sky_part part,
+                      imp_v3 w, imp_spec bar, const struct imp_carried *carried,
+                      imp_v3 *slope)
 {
     const struct imp_frame f = imp__frame_from_normal(w);
     const imp_v3 across[2] = {f.s, f.t};
@@ -52,7 +53,9 @@ static void slope_add(const struct imp_scene *scene, int emitter, imp_v3 w, imp_
         if (!(by > TURN_LEAST)) continue;
         for (int j = 0; j < 2; j++) {
             const imp_v3 at = imp__normalize(w + across[i] * (j ? by : -by));
-            const imp_spec L = imp__sky_radiance_from(scene, emitter, at, carried);
+            const imp_spec L = part == IMP_SKY_WHOLE
+                                   ? imp__sky_radiance_from(scene, emitter, at, carried)
+                                   : imp__sky_part_from(e, part, at, carried);
             value[j] = imp__sum_used(L * bar, scene->lanes);
         }
         *slope += across[i] * ((value[1] - value[0]) / (2 * by));
@@ -64,7 +67,99 @@ imp_v3 imp__skies_slope(const struct imp_scene *scene, imp_v3 w, imp_spec bar,
 {
     imp_v3 slope = {0};
     for (int k = 0; k < scene->n_environments; k++)
-        slope_add(scene, scene->environments[k], w, bar, carried, &slope);
+        slope_add(scene, scene->environments[k], IMP_SKY_WHOLE, w, bar, carried, &slope);
+    return slope;
+}
+
+/* ---- A sun that moves -------------------------------------------------------------------- */
+
+imp_spec imp__sky_part_from(const struct imp_emitter *e, enum imp__sky_part part,
+                            imp_v3 w, const struct imp_carried *carried)
+{
+    const struct imp_emission x = {.dist = INFINITY, .cos_light = 1, .d = -w};
+    const struct imp_texcoord at = {.p = w, .carried = carried};
+    imp_spec in[IMP_INPUTS_MAX], le;
+    imp__inputs_eval(e->input, e->n_in, &at, in);
+    imp__sky_part(e, part, in);
+    imp__light_eval(e, carried, in, &x, &le);
+    return le;
+}
+
+bool imp__sky_in_parts(const struct imp__moves *moves, int emitter)
+{
+    return imp__sun_mover(moves, emitter, IMP_MOVE_SUN) ||
+           imp__sun_mover(moves, emitter, IMP_MOVE_DISC);
+}
+
+/* What a part of the sky changes by with the sun's place, of w at rest, or of the disc, of w that goes
+ * with it; bar: the adjoint of its radiance, by lanes. */
+static void sun_slope_bar(const struct imp__moves *moves, const struct imp__mover *m,
+                          enum imp__sky_part part, imp_v3 w, imp_spec bar,
+                          const struct imp_carried *carried, double *theta_bar)
+{
+    const int lanes = moves->scene->lanes;
+    imp_v3 slope = {0};
+    for (int i = 0; i < 2; i++) {
+        imp_spec L[2];
+        for (int j = 0; j < 2; j++) {
+            const imp_v3 at =
+                part == IMP_SKY_DISC ? imp__suns_turned(m->suns, i, j, w) : w;
+            L[j] = imp__sky_part_from(&m->suns->beside[i][j], part, at, carried);
+        }
+        if (part == IMP_SKY_DISC && (imp__is_zero(L[0]) || imp__is_zero(L[1])))
+            continue; /* its border, rounded */
+        slope += m->suns->across[i] *
+                 (imp__sum_used((L[1] - L[0]) * bar, lanes) / (2 * IMP_SUNS_BESIDE));
+    }
+    imp__move_vector_bar(theta_bar + m->first, slope * m->rate);
+}
+
+/* By both numbers of a sun; *disc: L of the disc. */
+static void sun_radiance_bar(const struct imp__moves *moves, int emitter, imp_v3 w,
+                             imp_spec bar, const struct imp_carried *carried,
+                             imp_spec *disc, double *theta_bar)
+{
+    const struct imp_emitter *e = moves->scene->emitters[emitter];
+    const struct imp__mover *sun = imp__sun_mover(moves, emitter, IMP_MOVE_SUN),
+                            *radius = imp__sun_mover(moves, emitter, IMP_MOVE_DISC);
+    struct imp__sky_sun now;
+    imp__sky_sun_read(e, &now);
+    *disc =
+        now.radius > 0 ? imp__sky_part_from(e, IMP_SKY_DISC, w, carried) : (imp_spec){0};
+    if (sun) sun_slope_bar(moves, sun, IMP_SKY_AROUND, w, bar, carried, theta_bar);
+    if (sun && !imp__is_zero(*disc))
+        sun_slope_bar(moves, sun, IMP_SKY_DISC, w, bar, carried, theta_bar);
+    if (radius && now.power) /* as dim as its solid angle 4 pi sin^2(r/2) is large */
+        theta_bar[radius->first] -=
+            radius->rate * imp__sum_used(bar * *disc, moves->scene->lanes);
+}
+
+imp_spec imp__sky_sent_bar(const struct imp__moves *moves, int emitter, imp_v3 w,
+                           imp_spec bar, const struct imp_carried *carried,
+                           double *theta_bar)
+{
+    if (!imp__sky_in_parts(moves, emitter)) return bar;
+    const struct imp__mover *radius = imp__sun_mover(moves, emitter, IMP_MOVE_DISC);
+    const imp_spec L = imp__sky_radiance_from(moves->scene, emitter, w, carried);
+    imp_spec one = {0}, disc;
+    for (int c = 0; c < 4; c++) one[c] = L[c] != 0 ? bar[c] / L[c] : 0;
+    sun_radiance_bar(moves, emitter, w, one, carried, &disc, theta_bar);
+    if (radius) /* its draws are as far apart */
+        theta_bar[radius->first] +=
+            radius->rate * imp__sum_used(one * disc, moves->scene->lanes);
+    return one * disc;
+}
+
+/* Of what the camera sees of it along a direction at rest. Returns the slope of the disc. */
+static imp_v3 sun_seen_bar(const struct imp__moves *moves, int emitter, imp_v3 w,
+                           imp_spec seen, const struct imp_carried *carried,
+                           double *theta_bar)
+{
+    imp_v3 slope = {0};
+    imp_spec disc;
+    sun_radiance_bar(moves, emitter, w, seen, carried, &disc, theta_bar);
+    if (!imp__is_zero(disc))
+        slope_add(moves->scene, emitter, IMP_SKY_DISC, w, seen, carried, &slope);
     return slope;
 }
 
@@ -76,11 +171,13 @@ void imp__skies_seen_bar(const struct imp__moves *moves, const struct imp_sensor
     imp_v3 slope = {0};
     for (int k = 0; k < scene->n_environments; k++) {
         const int sky = scene->environments[k];
-        const imp_v3 before = slope;
-        slope_add(scene, sky, ray->d, seen, carried, &slope);
-        if (imp_unlikely(moves->skies))
-            imp__light_turn_bar(moves, sky, imp__cross(slope - before, ray->d),
-                                theta_bar);
+        imp_v3 own = {0};
+        slope_add(scene, sky, IMP_SKY_WHOLE, ray->d, seen, carried, &own);
+        slope += own;
+        if (imp_likely(!moves->skies)) continue;
+        if (imp__sky_in_parts(moves, sky))
+            own = sun_seen_bar(moves, sky, ray->d, seen, carried, theta_bar);
+        imp__light_velocity_bar(moves, sky, ray->d, -own, theta_bar);
     }
     if (imp__is_zero(slope)) return;
     imp__camera_velocity_bar(moves, ray->o, ray->o + ray->d, slope, theta_bar);

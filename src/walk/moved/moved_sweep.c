@@ -182,6 +182,30 @@ static void lamp_bar(struct imp__sweep *s, int k, struct imp__link_point *y, imp
     x->moved_bar += imp__reached_bar(y, w, along * (1 - part) - bar * slope);
 }
 
+/* What a sky sends to vertex k along w: the part that is glued to it goes with it. */
+static void sky_bar(const struct imp__sweep *s, int k, int sky, imp_v3 w,
+                    const struct imp__kernel_d *d, imp_spec bar,
+                    const struct imp_carried *carried)
+{
+    const imp_spec glued =
+        imp__sky_sent_bar(s->moves, sky, w, bar, carried, s->theta_bar);
+    const struct imp__kernel_bar kernel = kernel_part(s, k, d, w, glued);
+    imp__light_velocity_bar(s->moves, sky, w, kernel.wi, s->theta_bar);
+}
+
+/* The light sample of a sky. */
+static void sky_sample_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
+{
+    const imp_v3 w = imp__normalize(-imp__decided_v3(v->d.light.d));
+    struct imp__kernel_d derived;
+    const struct imp__kernel_d *d =
+        kernel_derive(s, k, v, w, IMP_SMOOTH, &derived) ? &derived : NULL;
+    const struct imp__kernel_bar kernel = kernel_bar(s, k, d, w, s->piece[k].light);
+    imp__scatter_bar(&s->at[k], &kernel);
+    if (imp_unlikely(s->moves->skies))
+        sky_bar(s, k, v->d.light.emitter, w, d, s->piece[k].light, v->carried);
+}
+
 /* The light sample of vertex k. */
 static void light_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
 {
@@ -192,11 +216,7 @@ static void light_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
         return;
     }
     if (e->ops->flags & IMP_EMITTER_ENVIRONMENT) {
-        const imp_v3 w = imp__normalize(-imp__decided_v3(v->d.light.d));
-        const struct imp__kernel_bar kernel = light_kernel(s, k, v, w);
-        imp__scatter_bar(&s->at[k], &kernel);
-        imp__light_turn_bar(s->moves, v->d.light.emitter, imp__cross(w, kernel.wi),
-                            s->theta_bar);
+        sky_sample_bar(s, k, v);
         return;
     }
     struct imp__link_point y = imp__surface_point(
@@ -241,9 +261,7 @@ static void skies_met_bar(const struct imp__sweep *s, int k, const struct imp_ve
 {
     for (const struct imp_vertex *y = v->next; y; y = y->next) {
         if (imp__is_zero(y->e)) continue;
-        const struct imp__kernel_bar met = kernel_part(s, k, d, w, s->piece[k].on * y->e);
-        imp__light_turn_bar(s->moves, y->d.met.emitter, imp__cross(w, met.wi),
-                            s->theta_bar);
+        sky_bar(s, k, y->d.met.emitter, w, d, s->piece[k].on * y->e, v->carried);
     }
 }
 
