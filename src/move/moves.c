@@ -37,8 +37,9 @@ static enum imp_status camera_mover(const struct imp__moves *moves, struct imp__
                : m->kind == IMP_MOVE_TURN   ? 3
                : m->kind == IMP_MOVE_AFFINE ? IMP_AFFINE_NUMBERS
                                             : 1;
-    /* A distant sensor is about the middle of the scene. */
-    if (m->kind == IMP_MOVE_TURN) m->centre = moves->scene->ball.centre;
+    /* A distant sensor turns about its target, or the middle of the scene. */
+    if (m->kind == IMP_MOVE_TURN && !imp__sees_rays(moves->sensor, &m->centre))
+        m->centre = moves->scene->ball.centre;
     if (whole || moves->sensor->ops->view_velocity || moves->sensor->ops->lens_velocity)
         return IMP_OK;
     return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,

@@ -4,7 +4,20 @@
  * meet in none, and begin on a film. */
 #include "pose.h"
 
-extern const struct imp_sensor_ops imp__distant;
+extern const struct imp_sensor_ops imp__distant, imp__radiancemeter;
+
+bool imp__sees_rays(const struct imp_sensor *s, imp_v3 *centre)
+{
+    struct imp_sensor_ray a, b;
+    if (s->ops != &imp__distant && s->ops != &imp__radiancemeter) return false;
+    s->ops->ray(s, 0, 0, (const double[2]){0.5, 0.5}, &a);
+    *centre = a.o;
+    if (s->ops == &imp__radiancemeter) return true;
+    s->ops->ray(s, s->film.width, s->film.height * 0.5, (const double[2]){0.5, 0.5}, &b);
+    const bool aimed = imp__is_zero(a.o - b.o);
+    if (aimed) *centre += a.d * (2 * s->scene->radius); /* the target */
+    return aimed;
+}
 
 /* By the rays through two corners of the film. */
 bool imp__lens_point(const struct imp_sensor *s, const double lens[2], imp_v3 *point)
@@ -31,22 +44,20 @@ bool imp__pinhole(const struct imp_sensor *s, imp_v3 *centre)
     return imp__length(apart) <= 1e-7 * (imp__length(r) + imp__length(elsewhere.o));
 }
 
-/* The middle of the film of parallel rays, where they begin. A single ray has no film. */
+/* The middle of the film of parallel rays, where they begin. */
 static bool film_middle(const struct imp_sensor *s, imp_v3 *centre)
 {
     const double u[4] = {0.5, 0.5, 0.5, 0.5};
     struct imp_sensor_ray ray;
-    struct imp_sensor_sample back;
     if (!s->ops->connect || !s->ops->move) return false;
     s->ops->ray(s, s->film.width * 0.5, s->film.height * 0.5, u, &ray);
     *centre = ray.o;
-    const imp_v3 on =
-        ray.o + ray.d * imp_min(1e-3 * imp__length(ray.o) + 1e-3, ray.t_far / 2);
-    return s->ops != &imp__distant || s->ops->connect(s, &on, false, u, &back);
+    return true;
 }
 
 bool imp__lens_middle(const struct imp_sensor *s, imp_v3 *centre)
 {
+    if (imp__sees_rays(s, centre)) return true;
     if (s->ops->flags & IMP_SENSOR_PARALLEL) return film_middle(s, centre);
     if (imp__pinhole(s, centre)) return true;
     return s->ops->connect && s->ops->lens_velocity &&

@@ -2,7 +2,7 @@
  *
  * Where things are, as parameters:
  *
- *     NAME.pose              of a shape, instance or camera: e and a, six numbers; a point that the scene
+ *     NAME.pose              of a shape, instance, camera or radiancemeter: e and a, six numbers; a point that the scene
  *                            file has at X0 is at  X = c + e + R(a) s (X0 - c)
  *     NAME.scale             of a shape or instance: s
  *     NAME.to_world          of a shape, instance, camera or spot: the upper three rows of the matrix M
@@ -18,7 +18,7 @@
  *     NAME.position          of a light at a point, world
  *     NAME.direction         along which parallel light or that of a sun's middle travels, or of a
  *                            spot's axis, of any length
- *     NAME.turn              of a sky or a distant sensor: a rotation vector, away from what the file says
+ *     NAME.turn              of a sky or a distant sensor, about its target: a rotation vector, away from what the file says
  *     NAME.sun_direction     of a clear sky: towards its sun, world, of any length
  *     NAME.sun_radius        of a sun or of a sky with one: that of its disc, radians
  *
@@ -141,8 +141,11 @@ bool imp__pinhole(const struct imp_sensor *sensor, imp_v3 *centre);
 /* The point of its lens that rays with these numbers go through; a pinhole has one. False: none. */
 bool imp__lens_point(const struct imp_sensor *sensor, const double lens[2],
                      imp_v3 *point);
-/* That point, or the middle of a lens whose rays to a film position meet in a point, or of the film of
- * a camera that moves and has parallel rays. False: none of these. */
+/* Is what it reads that along one ray, or one for each pixel, all from a point (radiancemeter) or
+ * towards one (distant), which is the centre? No line from anywhere meets these. */
+bool imp__sees_rays(const struct imp_sensor *sensor, imp_v3 *centre);
+/* One of these points, or the middle of a lens whose rays to a film position meet in a point, or of the
+ * film of a camera that moves and has parallel rays. False: none of these. */
 bool imp__lens_middle(const struct imp_sensor *sensor, imp_v3 *centre);
 
 /* The rotation of a vector of rotation, row by row. */

@@ -87,11 +87,14 @@ const char *imp__pose_sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
     if (distant != (kind == IMP_POSE_TURN))
         return distant ? "it is far away: it has a turn" : "it is no distant sensor";
     double number[IMP_VIEW_NUMBERS];
-    if (!s->ops->move) return "it is no perspective or orthographic camera or thin lens";
-    if (!imp__lens_middle(s, centre))
-        return distant ? "it has one ray" : "its rays meet in no point";
+    double rows[12];
+    if (!s->ops->move)
+        return "it is no perspective or orthographic camera, thin lens or radiancemeter";
+    if (!imp__lens_middle(s, centre)) return "its rays meet in no point";
     if (distant) return NULL;
-    if (whole) return kind == IMP_POSE_WORLD && !s->ops->placed ? "it has none" : NULL;
+    if (kind == IMP_POSE_WORLD)
+        return s->ops->placed && s->ops->placed(s, rows, false) ? NULL : "it has none";
+    if (whole) return NULL;
     number[kind - IMP_POSE_FOV] = NAN;
     if (!s->ops->view || !s->ops->view(s, number, false))
         return "it has no field of view";

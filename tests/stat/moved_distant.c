@@ -87,14 +87,6 @@ int main(int argc, char **argv)
     number_refused("a floor at the border",
                    block(SENSOR(".3,.5,-.8", "") FILM("24", "16")), "floor.pose",
                    "border");
-    number_refused(
-        "one ray does not turn",
-        block(SENSOR("0,0,-1", "<point name='target' value='0,0,0'/>") FILM("1", "1")),
-        "far.turn", "one ray");
-    number_refused(
-        "one ray meets no edge",
-        block(SENSOR("0,0,-1", "<point name='target' value='0,0,0'/>") FILM("1", "1")),
-        "block.pose", "without a target");
     number_refused("a distant sensor has no pose",
                    block(SENSOR(".3,.5,-.8", "") FILM("24", "16")), "far.pose",
                    "it has a turn");

@@ -9,7 +9,8 @@
 
 struct radiancemeter {
     imp_v3 o, d;
-    bool grid;
+    bool grid, placed; /* placed: by this map, not by numbers of its own */
+    struct imp_projection by;
     imp_v3 middle, u, v, n; /* of the rectangle: half of its sides, its normal */
 };
 
@@ -82,6 +83,8 @@ static enum imp_status ray_read(const struct imp_build *b, const struct imp_sens
         IMP_TRY(imp_build_error(b, by_ray ? "direction" : "to_world", IMP_E_SCENE,
                                 "its direction has length %g", length));
     r->d *= imp__spec(1 / length);
+    r->placed = !by_ray;
+    r->by = (struct imp_projection){.to_world = m, .to_local = inverse};
 out:
     return st;
 }
@@ -113,12 +116,36 @@ static void ray(const struct imp_sensor *s, double px, double py, const double l
     *out = (struct imp_sensor_ray){r->o, d, 0, INFINITY};
 }
 
+/* The observer, with the rectangle that is looked at. */
+static void move(struct imp_sensor *s, const double to_world[12])
+{
+    struct radiancemeter *r = s->self;
+    r->o = imp__rows_point(to_world, r->o);
+    r->d = imp__rows_vector(to_world, r->d);
+    r->middle = imp__rows_point(to_world, r->middle);
+    r->u = imp__rows_vector(to_world, r->u);
+    r->v = imp__rows_vector(to_world, r->v);
+    r->n = imp__rows_vector(to_world, r->n);
+    imp__projection_move(&r->by, to_world);
+}
+
+static bool placed(struct imp_sensor *s, double to_world[12], bool set)
+{
+    struct radiancemeter *r = s->self;
+    if (!r->placed || !imp__projection_placed(&r->by, true, to_world, set)) return false;
+    r->o = imp__point(&r->by.to_world, imp__v3(0, 0, 0));
+    r->d = imp__normalize(imp__vector(&r->by.to_world, imp__v3(0, 0, 1)));
+    return true;
+}
+
 const struct imp_sensor_ops imp__radiancemeter = {.size = sizeof(struct imp_sensor_ops),
                                                   .name = "radiancemeter",
                                                   .object_size =
                                                       sizeof(struct radiancemeter),
                                                   .build = build,
-                                                  .ray = ray};
+                                                  .ray = ray,
+                                                  .move = move,
+                                                  .placed = placed};
 
 bool imp__looks_at_grid(const struct imp_sensor *s)
 {

@@ -84,8 +84,10 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
     else imp__lens_middle(tracer->sensor, &out->camera);
     imp_v3 point;
     struct imp_sensor_ray ray;
-    out->parallel = tracer->sensor->ops->flags & IMP_SENSOR_PARALLEL;
-    out->wide = !out->parallel && !imp__pinhole(tracer->sensor, &point);
+    out->rays = imp__sees_rays(tracer->sensor, &point);
+    out->parallel = !out->rays && tracer->sensor->ops->flags & IMP_SENSOR_PARALLEL;
+    out->wide = out->rays || (!out->parallel && !imp__pinhole(tracer->sensor, &point));
+    if (out->rays) imp__ray_looked_at(out, &out->camera);
     if (out->parallel) {
         tracer->sensor->ops->ray(tracer->sensor, 0, 0, (const double[2]){0.5, 0.5}, &ray);
         out->camera = ray.d;
@@ -150,7 +152,8 @@ static void eye_draw(struct imp__edge_draw *d)
     for (unsigned k = 0; k < 4; k++)
         d->lens[k] = d->b->wide ? imp__u01(d->key, IMP_EDGE_SENSOR + k) : 0;
     d->eye = d->b->camera;
-    if (d->b->wide && !s->shape) imp__lens_point(s, d->lens, &d->eye);
+    if (imp_unlikely(d->b->rays)) imp__ray_draw(d);
+    else if (d->b->wide && !s->shape) imp__lens_point(s, d->lens, &d->eye);
     if (imp_unlikely(s->shape && d->b->n_planes > 0)) {
         struct imp_surface at = {.uv = {0}};
         imp__meter_draw(s, d->lens, &at);
@@ -163,6 +166,7 @@ static void film_work(struct imp__edge_draw *d)
 {
     const double u = d->u, chance = d->chance;
     if (d->b->tracer->sensor->shape) imp__draw_meter(d);
+    else if (d->b->rays) imp__draw_ray(d);
     else imp__draw_film(d);
     if (imp_likely(d->b->n_planes == 0)) return;
     d->u = u;
@@ -177,7 +181,7 @@ static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
     switch (kind) {
     case IMP_BOUNDARY_FILM:
         if (item == IMP_ITEM_ROUND || item == IMP_ITEM_ARC) film_work(d);
-        if (item == IMP_ITEM_SHADING) {
+        if (item == IMP_ITEM_SHADING && !d->b->rays) {
             imp__draw_shading_film(d);
             if (imp_unlikely(d->b->n_planes > 0)) imp__draw_shading_mirrored(d);
         }

@@ -63,7 +63,8 @@
  * from an edge is a walk from a light with a sign. Points on edges are chosen by what a pilot has
  * found (move/edge_choice.h); those between a light and what it lights among the silhouettes seen
  * from the light's point. A meter sees edges from a point of its own in each draw, and that point
- * moves with its shape (boundary_meter.c). */
+ * moves with its shape (boundary_meter.c); a sensor of single rays from the point that its ray meets
+ * (boundary_ray.c). */
 #ifndef IMP_WALK_BOUNDARY_H
 #define IMP_WALK_BOUNDARY_H
 
@@ -122,6 +123,7 @@ struct imp__boundary {
     double *part[IMP_BOUNDARY_KINDS];
     imp_v3 camera; /* where its rays meet, or the middle of its lens, or of a meter */
     bool parallel; /* its rays are: `camera` is their direction */
+    bool rays;     /* they are one, or one for each pixel, and met by no line */
     bool wide;     /* they do not meet: a lens with an aperture, or a meter */
     bool mirrors;  /* a material of the scene is a mirror, in part */
     bool passes;   /* a material of the scene lets light go straight on */

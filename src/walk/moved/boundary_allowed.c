@@ -211,7 +211,7 @@ static enum imp_status camera_allowed(const struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
     struct imp_hit first = {.shape = -1};
-    if (b->tracer->sensor->shape || b->parallel) return IMP_OK;
+    if (b->tracer->sensor->shape || b->parallel || b->rays) return IMP_OK;
     for (uint32_t k = 0; k < PROBES; k++) {
         const struct imp_key key = imp__key(5, 3, k);
         const double u[2] = {imp__u01(key, 0), imp__u01(key, 1)};
@@ -239,6 +239,7 @@ static const char *turn_why(const struct imp__boundary *b)
     if (b->passes) return "a material of the scene lets light straight through";
     if (b->mirrors) return "the scene has mirrors";
     if (imp__meter_is_points(sensor)) return "the sensor is a meter at points";
+    if (b->rays) return "the sensor measures along single rays";
     for (size_t j = 0; j < b->edges->n_bodies; j++)
         if (imp__moves_smooth(b->tracer->scene, b->edges->body[j].shape))
             return "a shape has vertex normals (face_normals makes it flat)";
@@ -304,8 +305,8 @@ static enum imp_status ball_allowed(const struct imp__boundary *b)
     const struct imp_scene *scene = b->tracer->scene;
     const struct imp_sensor *sensor = b->tracer->sensor;
     const double near = AT_BORDER * b->size;
-    for (const struct imp_pose *p = sensor->ops == &imp__distant ? scene->poses : NULL; p;
-         p = p->next) {
+    const bool whole = sensor->ops == &imp__distant && !b->rays;
+    for (const struct imp_pose *p = whole ? scene->poses : NULL; p; p = p->next) {
         imp_v3 lo, hi;
         bool inside = true;
         const int shape = p->instance >= 0 ? IMP_MOVE_INSTANCE(p->instance) : p->shape;
@@ -330,6 +331,7 @@ enum imp_status imp__boundary_allowed(const struct imp__boundary *b)
     if (st == IMP_OK) st = turns_allowed(b);
     if (st == IMP_OK) st = skies_allowed(b);
     if (st == IMP_OK) st = ball_allowed(b);
+    if (st == IMP_OK) st = imp__rays_allowed(b);
     if (st == IMP_OK) st = facets_allowed(b);
     if (st == IMP_OK) st = camera_allowed(b);
     return st;

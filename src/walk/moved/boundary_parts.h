@@ -8,6 +8,15 @@
 #include "moved_chain.h"
 #include "scene/instances.h"
 
+/* A ray of a sensor that has one for each pixel, and what it meets. */
+struct imp__edge_ray {
+    struct imp_hit hit;
+    struct imp_surface at;
+    imp_v3 o, d;
+    double px, py;
+    bool meets;
+};
+
 struct imp__edge_draw {
     const struct imp__boundary *b;
     struct imp_arena *arena;
@@ -33,7 +42,8 @@ struct imp__edge_draw {
         [4]; /* numbers of the point through which the sensor sees, and of connections */
     imp_v3
         eye; /* that point; of parallel rays their direction; of meters among mirrors */
-    imp_spec extinction; /* of the medium; 0: there is none */
+    struct imp__edge_ray ray; /* where b->rays */
+    imp_spec extinction;      /* of the medium; 0: there is none */
     double near; /* walks that look past the edge scatter behind this distance alone */
 };
 
@@ -255,6 +265,16 @@ struct imp__edge_light {
 };
 void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
                      const struct imp_surface *at, const struct imp__edge_light *light);
+
+/* ---- Single rays: boundary_ray.c ---- */
+/* The point in the middle of what the sensor looks at, by which edges are chosen; its own centre where it
+ * looks at nothing. */
+void imp__ray_looked_at(const struct imp__boundary *b, imp_v3 *at);
+/* A pixel and its ray, by d->lens. */
+void imp__ray_draw(struct imp__edge_draw *d);
+void imp__draw_ray(struct imp__edge_draw *d);
+/* IMP_E_UNSUPPORTED, with the name of what a ray must not meet. */
+enum imp_status imp__rays_allowed(const struct imp__boundary *b);
 
 /* ---- Seams of lights: boundary_seam.c ---- */
 /* Which surface of a seam, 0 or 1, is a light that a walk meets first, at the seam. -1: none. */

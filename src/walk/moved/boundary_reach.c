@@ -172,6 +172,38 @@ static void flux_make(struct imp__edge_draw *d, const struct imp__edge_light *li
     ends_set(d, light, to, mirrors, k, depth, f);
 }
 
+/* To the point that a single ray looks at, and from there to the sensor: radiance times area that leaves
+ * k brings  f cos_i/r^2  of its own there. */
+static void ray_connect(struct imp__edge_draw *d, const struct imp__edge_light *light,
+                        struct link *k, int depth, imp_spec T)
+{
+    const struct imp_tracer *t = d->b->tracer;
+    const struct imp__edge_ray *ray = &d->ray;
+    const imp_v3 r = ray->at.p - k->at.p;
+    const double distance = imp__length(r);
+    const struct imp_sensor_sample to = {
+        .p = ray->o, .wo = -ray->d, .px = ray->px, .py = ray->py};
+    struct imp_sensor_sample there = {.p = ray->at.p, .dist = distance};
+    static const struct imp__mirrors none = {0};
+    struct imp_shadow shadow;
+    struct imp__line line;
+    imp_spec L, f;
+    if (!ray->meets || !(distance > 0) || !light_at(t, light, depth + 2, &L)) return;
+    there.wo = r * (1 / distance);
+    struct link *end = link_make(d, k, &none, &ray->hit, &ray->at, there.wo, false);
+    if (!end) return;
+    const struct imp_dirs dirs = {imp__to_local(&end->frame, to.wo), end->wi, IMP_SMOOTH,
+                                  0};
+    end->bsdf->ops->eval(end->bsdf, end->in, &dirs, &f);
+    L *= T * f * kernel(d, k, imp__to_local(&k->frame, there.wo)) *
+         (t->sensor->film.width * t->sensor->film.height / imp__sqr(distance));
+    if (imp__is_zero_used(L, d->waves)) return;
+    there.p = imp__offset(ray->at.p, ray->at.ng, -there.wo);
+    imp__light_shadow_aim(&k->at, &there, &shadow);
+    if (!imp__edge_line(d, shadow.o, shadow.d, shadow.reach, &line)) return;
+    flux_make(d, light, &to, &none, end, depth + 1, L);
+}
+
 /* passed: vertices between the links that are mirrors, or where it went straight on. */
 static void connect(struct imp__edge_draw *d, const struct imp__edge_light *light,
                     struct link *k, int depth, int passed, imp_spec T)
@@ -181,6 +213,10 @@ static void connect(struct imp__edge_draw *d, const struct imp__edge_light *ligh
     struct imp_shadow shadow;
     struct imp__line line;
     imp_spec brings;
+    if (imp_unlikely(d->b->rays)) {
+        ray_connect(d, light, k, depth, T);
+        return;
+    }
     if (!t->sensor->ops->connect ||
         !imp__sensor_connect(t->sensor, &k->at.p, false, d->lens, &to) ||
         !imp__light_on_film(t->sensor, &to))

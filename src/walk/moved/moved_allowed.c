@@ -230,8 +230,8 @@ static enum imp_status sensor_allowed(const struct imp_tracer *t)
     if (s->shape) return meter_allowed(t);
     if (!imp__lens_middle(s, &centre))
         return refuse(t, "sensor", s->name, s->ops->name,
-                      "is none of perspective, thinlens, orthographic and distant "
-                      "without a target");
+                      "is none of perspective, thinlens, orthographic, distant and "
+                      "radiancemeter");
     if (s->open != s->close)
         return refuse(t, "sensor", s->name, s->ops->name, "has a shutter");
     return IMP_OK;
