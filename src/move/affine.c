@@ -111,6 +111,11 @@ void imp__affine_place_bar(imp_v3 r, imp_v3 bar, double *number_bar)
 }
 
 /* A = [w]: A_21 - A_12 = 2 w_0. */
+imp_v3 imp__affine_turn(const double *number)
+{
+    const double *A = number + 3;
+    return imp__v3(0.5 * (A[7] - A[5]), 0.5 * (A[2] - A[6]), 0.5 * (A[3] - A[1]));
+}
 void imp__affine_turn_bar(imp_v3 turn_bar, double *number_bar)
 {
     double *A = number_bar + 3;

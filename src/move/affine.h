@@ -17,7 +17,8 @@ void imp__affine_bar(const struct imp_scene *scene, const struct imp__glued *x, 
 /* The velocity of a place, and its transpose. */
 imp_v3 imp__affine_place(imp_v3 r, const double *number);
 void imp__affine_place_bar(imp_v3 r, imp_v3 bar, double *number_bar);
-/* The transpose of a turn by a rotation vector, which A - A^T is. */
+/* The turn by a rotation vector, which A - A^T is, and the transpose. */
+imp_v3 imp__affine_turn(const double *number);
 void imp__affine_turn_bar(imp_v3 turn_bar, double *number_bar);
 
 /* The transpose of how ends and radius of a cylinder move it: in place, from bars of an affine mover

@@ -115,6 +115,23 @@ void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 p, im
     }
 }
 
+imp_v3 imp__light_turn(const struct imp__moves *moves, int k, const double *theta_dot)
+{
+    imp_v3 out = {0};
+    for (int j = 0; j < moves->n_movers; j++) {
+        const struct imp__mover *m = &moves->mover[j];
+        if (m->shape != IMP_MOVE_EMITTER(k)) continue;
+        const double *theta = theta_dot + m->first;
+        if (m->kind == IMP_MOVE_AFFINE) out += imp__affine_turn(theta);
+        if (m->kind == IMP_MOVE_TURN) out += imp__move_vector(theta);
+        if (m->kind == IMP_MOVE_AXIS || m->kind == IMP_MOVE_SUN) {
+            const imp_v3 e = light_part(moves, m, imp__move_vector(theta));
+            out += imp__cross(m->axis, e) + m->axis * imp__dot(m->twist, e);
+        }
+    }
+    return out;
+}
+
 void imp__light_turn_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
                          double *theta_bar)
 {

@@ -4,6 +4,7 @@
 #include "affine.h"
 #include "base/arguments.h"
 #include "base/context.h"
+#include "kind/emitter/from_point.h"
 #include "kind/emitter/ies.h"
 #include "suns.h"
 
@@ -70,7 +71,8 @@ static enum imp_status light_mover(struct imp__moves *moves, struct imp__mover *
     if (m->kind == IMP_MOVE_SUN || m->kind == IMP_MOVE_DISC) return sun_mover(moves, m);
     if (sky && m->kind == IMP_MOVE_TURN) return IMP_OK; /* about the middle of all */
     if (!e->ops->aim || m->kind == IMP_MOVE_TURN ||
-        (m->kind == IMP_MOVE_AXIS && !e->ops->cone && e->ops != &imp__ies_light && !sky))
+        (m->kind == IMP_MOVE_AXIS && !imp__light_frame_of(e) &&
+         e->ops != &imp__ies_light && !sky))
         return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
                           "light '%s' (%s) has no derivative by its %s", e->name,
                           e->ops->name, m->kind == IMP_MOVE_AXIS ? "direction" : "place");

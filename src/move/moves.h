@@ -12,7 +12,7 @@
  *               (imp_sensor_ops.view_velocity, lens_velocity) (1 each)
  *     light     a point light's position V = e, or the direction d of parallel light, of any
  *               length |d|: the unit direction turns by  e/|d| across d (3)
- *     axis      of a spot or ies light, by a direction of any length, likewise (3); the frame turns
+ *     axis      of a spot, projector or ies light, by a direction of any length, likewise (3); the frame turns
  *               as little as possible from where the file has its axis, z:
  *                   a x a' - a (z x a).a'/(1 + z.a)
  *     turn      of a sky, a rotation vector: its light from w, a unit vector, comes from where w goes,
@@ -227,7 +227,8 @@ imp_v3 imp__light_velocity(const struct imp__moves *moves, int k, imp_v3 p,
                            const double *theta_dot);
 void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 p, imp_v3 bar,
                              double *theta_bar);
-/* The transpose of the turn of a spot's axis or a sky, a rotation vector. */
+/* The turn of a spot's or projector's frame or a sky, a rotation vector, and the transpose. */
+imp_v3 imp__light_turn(const struct imp__moves *moves, int k, const double *theta_dot);
 void imp__light_turn_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
                          double *theta_bar);
 /* Velocity of what the camera sees at p through a fixed film position and, of a lens, fixed numbers of

@@ -5,7 +5,7 @@
  *     NAME.pose              of a shape, instance, camera or radiancemeter: e and a, six numbers; a point that the scene
  *                            file has at X0 is at  X = c + e + R(a) s (X0 - c)
  *     NAME.scale             of a shape or instance: s
- *     NAME.to_world          of a shape, instance, camera or spot: the upper three rows of the matrix M
+ *     NAME.to_world          of a shape, instance, camera, spot or projector: the upper three rows of the matrix M
  *                            that puts what the kind has at x at  X = M x, as mi.traverse has it
  *     NAME.vertex_positions  of a mesh: the vertices, three numbers each, world
  *     NAME.center, .radius   of a sphere, world
@@ -17,7 +17,7 @@
  *     NAME.aperture_radius, NAME.focus_distance   of a thin lens
  *     NAME.position          of a light at a point, world
  *     NAME.direction         along which parallel light or that of a sun's middle travels, or of a
- *                            spot's axis, of any length
+ *                            spot's or projector's axis, of any length
  *     NAME.turn              of a sky or a distant sensor, about its target: a rotation vector, away from what the file says
  *     NAME.sun_direction     of a clear sky: towards its sun, world, of any length
  *     NAME.sun_radius        of a sun or of a sky with one: that of its disc, radians

@@ -11,8 +11,6 @@
 
 void imp__pose_aim(struct imp_emitter *e, enum imp_pose_kind kind, double v[3])
 {
-    imp_v3 axis;
-    double cosine;
     if (kind != IMP_POSE_DIRECTION || imp__pose_is_far(e)) {
         e->ops->aim(e, v, false);
         return;
@@ -22,8 +20,7 @@ void imp__pose_aim(struct imp_emitter *e, enum imp_pose_kind kind, double v[3])
         for (int k = 0; k < 3; k++) v[k] = x->nadir[k];
         return;
     }
-    e->ops->cone(e, &axis, &cosine);
-    for (int k = 0; k < 3; k++) v[k] = axis[k];
+    for (int k = 0; k < 3; k++) v[k] = imp__light_frame_of(e)->axis[2][k];
 }
 
 static void sky_turn(const struct imp_pose *p)

@@ -2,12 +2,12 @@
  *
  * Which numbers of geometry (pose.h) an object has, and why it has not the others. */
 #include "instances.h"
+#include "kind/emitter/from_point.h"
 #include "kind/emitter/ies.h"
 #include "kind/emitter/sky_sun.h"
 #include "kind/shape/shape.h"
 #include "pose.h"
 
-extern const struct imp_emitter_ops imp__spot_light;
 extern const struct imp_sensor_ops imp__distant;
 
 /* What else is made from where shapes are, and is not made again. NULL: nothing is in the way, as
@@ -104,7 +104,7 @@ const char *imp__pose_sensor_why(struct imp_sensor *s, enum imp_pose_kind kind,
 const char *imp__pose_light_why(const struct imp_scene *scene,
                                 const struct imp_emitter *e, enum imp_pose_kind kind)
 {
-    const bool spot = e->ops == &imp__spot_light, far = imp__pose_is_far(e);
+    const bool spot = imp__light_frame_of(e) != NULL, far = imp__pose_is_far(e);
     struct imp__sky_sun sun;
     const bool sunny = imp__sky_sun_read(e, &sun);
     if (kind == IMP_POSE_SUN && !(sunny && !sun.alone))
@@ -119,9 +119,10 @@ const char *imp__pose_light_why(const struct imp_scene *scene,
                          ? e->ops->move != NULL
                          : kind >= IMP_POSE_SUN || (kind == IMP_POSE_WORLD && spot);
     if (!has)
-        return "it is none of point, spot and ies without a shape (position), "
-               "directional, sun, spot and ies (direction), spot (to_world), and "
-               "envmap, sunsky, ciesky and perezsky (turn)";
+        return "it is none of point, spot, projector and ies without a shape (position), "
+               "directional, sun, spot, projector and ies (direction), spot and "
+               "projector "
+               "(to_world), and envmap, sunsky, ciesky and perezsky (turn)";
     if (scene->lights_in_tree) return "lights are chosen by a tree (light_choice)";
     return NULL;
 }

@@ -412,7 +412,9 @@ int main(void)
     walks_test(PATH SKY, WORN, "path, textured metal, all", add_all);
     walks_test(PATH SKY, HOLES, "path, a mask with a texture, all", add_all);
     walks_test(PATH, GAUZE, "path, a mask, vertices", add_vertices);
-    refused(PATH "<emitter type='projector' id='bulb'/>", "'bulb'");
+    refused(PATH
+            "<shape type='rectangle'><emitter type='directionalarea' id='bulb'/></shape>",
+            "'bulb'");
     refused(
         PATH
         "<bsdf type='dielectric' id='wax'/><shape type='cube'><ref id='wax'/></shape>",

@@ -7,6 +7,7 @@
  * What jumps at edges is not in it: fresh rows have that. */
 #include "check_moved.h"
 #include "inverse/estimate/moved_gradient.h"
+#include "kind/emitter/from_point.h"
 #include "kind/emitter/ies.h"
 #include <math.h>
 
@@ -33,7 +34,9 @@ static bool has_spots(const struct imp_scene *scene, const struct imp_walk *walk
             return true;
         if (v->d.connection != IMP_CONNECTED) continue;
         const struct imp_emitter_ops *ops = scene->emitters[v->d.light.emitter]->ops;
-        if (ops->cone || ops == &imp__ies_light || ops == &imp__ies_area) return true;
+        if (imp__light_frame_of(scene->emitters[v->d.light.emitter]) ||
+            ops == &imp__ies_light || ops == &imp__ies_area)
+            return true;
     }
     return false;
 }

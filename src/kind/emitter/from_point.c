@@ -7,6 +7,13 @@
 #include "math/vec.h"
 #include <math.h>
 
+extern const struct imp_emitter_ops imp__spot_light, imp__projector;
+
+struct imp__light_frame *imp__light_frame_of(const struct imp_emitter *e)
+{
+    return e->ops == &imp__spot_light || e->ops == &imp__projector ? e->self : NULL;
+}
+
 bool imp__point_light_sample(imp_v3 light, imp_v3 ref, struct imp_light_sample *out)
 {
     const imp_v3 d = light - ref;

@@ -20,6 +20,8 @@ double imp__point_light_pdf(const struct imp_emitter *e, const imp_v3 *ref,
 struct imp__light_frame {
     imp_v3 axis[3], origin;
 };
+/* That of a spot or projector; NULL: another light. */
+struct imp__light_frame *imp__light_frame_of(const struct imp_emitter *e);
 /* Reads to_world; an error if it scales or shears (tolerance 1e-3, as for cameras). */
 enum imp_status imp__light_frame_read(const struct imp_build *b,
                                       struct imp__light_frame *out);

@@ -7,6 +7,7 @@
  *
  * across the ray, with t = tan(fov_x/2) and a = width/height of the picture: Mitsuba's
  * factors. */
+#include "projector.h"
 #include "from_point.h"
 #include "kind/sensor/projection.h"
 #include "kind/texture/bitmap.h"
@@ -25,8 +26,8 @@ static const struct imp_input_desc inputs[] = {
     {0}};
 
 struct projector {
-    struct imp__light_frame frame;
-    double tan_half[2]; /* of the horizontal and vertical field of view */
+    struct imp__light_frame frame; /* first: imp__light_frame_of */
+    double tan_half[2];            /* of the horizontal and vertical field of view */
 };
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_emitter *e)
@@ -115,6 +116,26 @@ static bool sample_emission(const struct imp_emitter *e, const struct imp_ball *
     return out->pdf_d > 0;
 }
 
+static void aim(struct imp_emitter *e, double v[3], bool set)
+{
+    struct projector *p = e->self;
+    if (set) p->frame.origin = imp__v3(v[0], v[1], v[2]);
+    for (int k = 0; k < 3; k++) v[k] = p->frame.origin[k];
+}
+
+void imp__projector_border(const struct imp_emitter *e, double u, imp_v3 *at,
+                           imp_v3 *along, imp_v3 *inside)
+{
+    const struct projector *p = e->self;
+    const double *t = p->tan_half, side = imp_min(floor(4 * u), 3.0);
+    const int i = (int)side % 2, j = 1 - i;
+    const double sign = side < 2 ? -1 : 1, part = 2 * (4 * u - side) - 1;
+    *along = p->frame.axis[j] * (8 * t[j]);
+    *inside = p->frame.axis[i] * -sign;
+    *at = p->frame.axis[2] + p->frame.axis[i] * (sign * t[i]) +
+          p->frame.axis[j] * (part * t[j]);
+}
+
 const struct imp_emitter_ops imp__projector = {.size = sizeof(struct imp_emitter_ops),
                                                .name = "projector",
                                                .object_size = sizeof(struct projector),
@@ -127,4 +148,5 @@ const struct imp_emitter_ops imp__projector = {.size = sizeof(struct imp_emitter
                                                .pdf = imp__point_light_pdf,
                                                .place = place,
                                                .sample_emission = sample_emission,
-                                               .pdf_emission = pdf_emission};
+                                               .pdf_emission = pdf_emission,
+                                               .aim = aim};

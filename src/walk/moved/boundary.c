@@ -12,6 +12,20 @@
 #include "walk/core/lane_mis.h"
 #include "walk/path/first_segment.h"
 
+/* The mean of a picture, roughly; one that seems to be black may have light between. */
+static void picture_mean(const struct imp_emitter *e, imp_spec *in)
+{
+    enum { SIDE = 8 };
+    imp_spec sum = {0};
+    for (int k = 0; k < SIDE * SIDE; k++) {
+        const struct imp_texcoord at = {
+            .uv = {(k % SIDE + 0.5) / SIDE, (k / SIDE + 0.5) / SIDE}};
+        imp__inputs_eval(e->input, e->n_in, &at, in);
+        sum += in[0] * (1. / (SIDE * SIDE));
+    }
+    in[0] = imp__is_zero(sum) ? imp__spec(1) : sum;
+}
+
 /* Power of a light, over pi: A Le, 4 I, or R^2 E of a scene within R; of a sky E is the integral of its
  * radiance over all directions. */
 static double light_power(const struct imp__boundary *b, int k)
@@ -23,7 +37,8 @@ static double light_power(const struct imp__boundary *b, int k)
     imp_spec in[IMP_INPUTS_MAX];
     if (e->ops->flags & IMP_EMITTER_ENVIRONMENT)
         return across * imp__sky_whole(b->tracer, k);
-    if (b->tracer->wavelengths)
+    if (e->input[0]->texture) picture_mean(e, in);
+    else if (b->tracer->wavelengths)
         imp__input_most(e->input[0], &nowhere.p, &nowhere.p, &in[0]);
     else imp__inputs_eval(e->input, e->n_in, &nowhere, in);
     const bool table = e->ops == &imp__ies_light || e->ops == &imp__ies_area;
@@ -190,7 +205,10 @@ static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
             if (imp_unlikely(d->b->n_planes > 0)) imp__draw_sky_mirrored(d);
         }
         break;
-    case IMP_BOUNDARY_LIGHT: imp__draw_light(d); break;
+    case IMP_BOUNDARY_LIGHT:
+        if (item == IMP_ITEM_BORDER) imp__draw_border(d);
+        else imp__draw_light(d);
+        break;
     case IMP_BOUNDARY_SCATTER:
         if (item == IMP_ITEM_ROUND || item == IMP_ITEM_ARC) imp__draw_scatter(d);
         if (item == IMP_ITEM_SHADING) imp__draw_shading_scatter(d);
@@ -249,11 +267,20 @@ double imp__flux_velocity(const struct imp__moves *moves, const struct imp__flux
         struct imp__velocity v = {.area = 0};
         if (e->camera) v.v = imp__camera_velocity(moves, e->eye, e->x.p, theta_dot);
         else if (e->light)
-            v.v = imp__light_velocity(moves, e->light - 1, e->x.p, theta_dot);
+            v.v = imp__light_velocity(moves, e->light - 1, e->x.p, theta_dot) +
+                  imp__cross(imp__light_turn(moves, e->light - 1, theta_dot), e->eye);
         else v = imp__velocity_of(moves, &e->x, theta_dot);
         sum += velocity_times(&e->x, &e->bar, &v);
     }
     return sum;
+}
+
+static void light_bar(const struct imp__moves *moves, const struct imp__flux_end *e,
+                      imp_v3 bar, double *theta_bar)
+{
+    imp__light_velocity_bar(moves, e->light - 1, e->x.p, bar, theta_bar);
+    if (!imp__is_zero(e->eye))
+        imp__light_turn_bar(moves, e->light - 1, imp__cross(e->eye, bar), theta_bar);
 }
 
 void imp__flux_bar(const struct imp__moves *moves, const struct imp__flux *flux,
@@ -264,8 +291,7 @@ void imp__flux_bar(const struct imp__moves *moves, const struct imp__flux *flux,
         const struct imp__velocity v = {
             .v = e->bar.v * bar, .n = e->bar.n * bar, .shade = e->bar.shade * bar};
         if (e->camera) imp__camera_velocity_bar(moves, e->eye, e->x.p, v.v, theta_bar);
-        else if (e->light)
-            imp__light_velocity_bar(moves, e->light - 1, e->x.p, v.v, theta_bar);
+        else if (e->light) light_bar(moves, e, v.v, theta_bar);
         else imp__velocity_bar(moves, &e->x, &v, theta_bar);
     }
 }

@@ -18,6 +18,8 @@
  *              at every edge that it sees; w is a direction from the edge to it:
  *                  dI = int dl dw sin(phi) f W(x) [L(-m) - L(+m)] m.(V - x')
  *
+ * The border of a projector's picture is one to what it lights (boundary_border.c).
+ *
  * Where bodies pass through each other, the seam is such an edge to the film and to scattered light, with
  * the velocity of the line in which two planes meet (move/edges_seams.h); the seam of a light is one
  * to what it lights, too (boundary_seam.c). Spheres have circles for seams.
@@ -80,14 +82,15 @@ enum imp__edge_item_kind {
     IMP_ITEM_ARC,   /* seams of spheres */
     IMP_ITEM_SHADING, /* of a mesh with vertex normals */
     IMP_ITEM_HORIZON,
-    IMP_ITEM_SKY /* where the camera sees a sky jump; it has no shape */
+    IMP_ITEM_BORDER, /* of a projector's picture, to what it lights; it has no shape */
+    IMP_ITEM_SKY     /* where the camera sees a sky jump; it has no shape */
 };
 struct imp__edge_item {
     enum imp__edge_item_kind kind;
     int shape;
     int64_t place;                /* the instance that the shape is in; 0: none */
     struct imp_sky_circle circle; /* IMP_ITEM_SKY */
-    int sky;                      /* the emitter whose circle it is */
+    int sky;                      /* the emitter whose circle or border it is */
     bool glued;                   /* it goes with that */
     const struct imp__arc *arc;   /* IMP_ITEM_ARC */
     /* IMP_ITEM_ROUND: rims of a cylinder that a disk closes, whose edge they are; of such a disk the
@@ -144,8 +147,10 @@ struct imp__flux_end {
     struct imp__glued x;
     struct imp__velocity bar; /* of a camera or light: bar.v alone */
     bool camera;
-    int light;  /* emitter, plus 1, whose place or direction it is; 0: none */
-    imp_v3 eye; /* of a camera: the point of its lens */
+    int light; /* emitter, plus 1, whose place or direction it is; 0: none */
+    /* Of a camera: the point of its lens. Of a light at a point: how far from it lies what goes and turns
+     * with it; 0: it is the light itself. */
+    imp_v3 eye;
 };
 
 /* As imp__mover.shape. */

@@ -6,6 +6,8 @@
 #include "boundary_parts.h"
 #include "moved_sky.h"
 
+extern const struct imp_emitter_ops imp__projector;
+
 /* A tenth of each measure is the length in space. */
 #define BY_LENGTH 0.1
 
@@ -86,6 +88,16 @@ static void circles_find(struct imp__boundary *b)
     }
 }
 
+/* Borders of the pictures of projectors. */
+static void borders_find(struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    for (int k = 0; k < scene->n_emitters; k++)
+        if (scene->emitters[k]->ops == &imp__projector)
+            b->item[b->n_items++] =
+                (struct imp__edge_item){.kind = IMP_ITEM_BORDER, .shape = -1, .sky = k};
+}
+
 static struct imp__edge_item round_item(const struct imp__boundary *b,
                                         const struct imp__body *body)
 {
@@ -109,10 +121,12 @@ static enum imp_status items_find(struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
     const size_t most = 2 * b->edges->n_bodies + b->edges->n_arcs +
-                        IMP_SKY_CIRCLES * (size_t)scene->n_environments;
+                        IMP_SKY_CIRCLES * (size_t)scene->n_environments +
+                        (size_t)scene->n_emitters;
     b->item = imp__alloc(scene->ctx, most + 1, sizeof *b->item);
     if (!b->item) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
     circles_find(b);
+    borders_find(b);
     for (size_t k = 0; k < b->edges->n_arcs; k++)
         b->item[b->n_items++] = (struct imp__edge_item){
             .kind = IMP_ITEM_ARC, .shape = -1, .arc = &b->edges->arc[k]};
@@ -139,6 +153,7 @@ static enum imp_status items_find(struct imp__boundary *b)
 static double item_length(const struct imp__boundary *b,
                           const struct imp__edge_item *item, int kind)
 {
+    if (item->kind == IMP_ITEM_BORDER) return kind == IMP_BOUNDARY_LIGHT ? b->size : 0;
     if (item->kind == IMP_ITEM_SKY) /* as large as the scene, if anything is there */
         return kind == IMP_BOUNDARY_FILM
                    ? IMP_PI * (b->size > 0 && b->size < INFINITY ? b->size : 1) *

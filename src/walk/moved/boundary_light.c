@@ -3,6 +3,7 @@
  * Silhouettes between a light and what it lights (boundary.h). */
 #include "boundary_parts.h"
 #include "moved_sky.h"
+#include "walk/core/emitted.h"
 
 static int light_choose(const struct imp__boundary *b, double u, double *pmf)
 {
@@ -86,21 +87,28 @@ static struct imp__flux_end source_end(const struct imp__edge_draw *d,
     return imp__flux_glued(&lit, bar);
 }
 
-/* Radiance along the line, intensity or irradiance. */
+imp_spec imp__edge_sent(const struct imp__edge_draw *d, int light, double cosine,
+                        imp_v3 along)
+{
+    const struct imp_emitter *e = d->b->tracer->scene->emitters[light];
+    struct imp_texcoord there = {.shape = e->shape, .carried = imp__edge_waves(d)};
+    const struct imp_emission x = {.dist = 1, .cos_light = cosine, .d = along};
+    imp_spec in[IMP_INPUTS_MAX], le;
+    imp__emitter_place(e, &x, &there);
+    imp__inputs_eval(e->input, e->n_in, &there, in);
+    e->ops->eval(e, in, &x, &le);
+    return le;
+}
+
 static imp_spec sent(const struct imp__edge_draw *d, const struct source *s,
                      double cosine, imp_v3 along)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
     const struct imp_emitter *e = scene->emitters[s->light];
-    const struct imp_texcoord there = {.shape = e->shape, .carried = imp__edge_waves(d)};
-    const struct imp_emission x = {.dist = 1, .cos_light = cosine, .d = along};
-    imp_spec in[IMP_INPUTS_MAX], le;
     if (s->sky && s->part != IMP_SKY_WHOLE)
         return imp__sky_part_from(e, s->part, -s->p, imp__edge_waves(d));
     if (s->sky) return imp__sky_radiance_from(scene, s->light, -s->p, imp__edge_waves(d));
-    imp__inputs_eval(e->input, e->n_in, &there, in);
-    e->ops->eval(e, in, &x, &le);
-    return le;
+    return imp__edge_sent(d, s->light, cosine, along);
 }
 
 /* As imp__edge_side, of a curved shape. */

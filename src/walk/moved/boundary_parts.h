@@ -315,6 +315,11 @@ void imp__draw_meter(struct imp__edge_draw *d);
 /* As the sensor sees it over a chain of mirrors. */
 void imp__draw_mirrored(struct imp__edge_draw *d);
 void imp__draw_light(struct imp__edge_draw *d);
+void imp__draw_border(struct imp__edge_draw *d);
+/* Radiance, intensity or irradiance of a light with or without a shape along a line, which leaves it at
+ * this cosine. */
+imp_spec imp__edge_sent(const struct imp__edge_draw *d, int light, double cosine,
+                        imp_v3 along);
 void imp__draw_scatter(struct imp__edge_draw *d);
 void imp__draw_sky_film(struct imp__edge_draw *d);
 void imp__draw_sky_mirrored(struct imp__edge_draw *d);

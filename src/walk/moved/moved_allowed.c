@@ -2,6 +2,7 @@
  *
  * What has a derivative by what moves that is whole, and what is refused by name (moved.h). */
 #include "base/context.h"
+#include "kind/emitter/from_point.h"
 #include "kind/emitter/ies.h"
 #include "math/warp.h"
 #include "moved.h"
@@ -14,7 +15,7 @@
 
 extern const struct imp_bsdf_ops imp__mask;
 extern const struct imp_emitter_ops imp__area, imp__point_light, imp__spot_light,
-    imp__directional;
+    imp__directional, imp__projector;
 
 static enum imp_status refuse(const struct imp_tracer *t, const char *what,
                               const char *name, const char *kind, const char *why)
@@ -85,6 +86,17 @@ static const char *table_jump(const struct imp__ies *x)
                                           : NULL;
 }
 
+/* A picture turns with a spot or projector; other textures of lights stay refused. */
+static const char *picture_why(const struct imp_emitter *e)
+{
+    if (e->shaped) return "has a texture or spectrum of many wavelengths";
+    if (!is_textured(e->input, e->n_in)) return NULL;
+    if (!imp__light_frame_of(e)) return "has a texture";
+    for (int k = 0; k < e->n_in; k++)
+        if (imp__input_jumps(e->input[k])) return "has a texture whose values jump";
+    return NULL;
+}
+
 static enum imp_status lights_allowed(const struct imp_tracer *t)
 {
     for (int k = 0; k < t->scene->n_emitters; k++) {
@@ -93,17 +105,18 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
         if (sky ? !e->ops->jumps
                 : e->ops != &imp__area && e->ops != &imp__point_light &&
                       e->ops != &imp__spot_light && e->ops != &imp__directional &&
-                      e->ops != &imp__ies_light && e->ops != &imp__ies_area)
+                      e->ops != &imp__ies_light && e->ops != &imp__ies_area &&
+                      e->ops != &imp__projector)
             return refuse(t, "light", e->name, e->ops->name,
                           sky ? "does not say where its radiance jumps"
-                              : "is none of area, point, spot, directional, ies, and "
-                                "skies");
+                              : "is none of area, point, spot, projector, directional, "
+                                "ies, and skies");
         if (e->ops == &imp__ies_light || e->ops == &imp__ies_area) {
             const char *jump = table_jump(e->self);
             if (jump) return refuse(t, "the table of light", e->name, e->ops->name, jump);
         }
-        if (!sky && (e->shaped || is_textured(e->input, e->n_in)))
-            return refuse(t, "light", e->name, e->ops->name, "has a texture");
+        const char *picture = picture_why(e);
+        if (!sky && picture) return refuse(t, "light", e->name, e->ops->name, picture);
         if (e->shape && e->shape->geometry != IMP_TRIANGLES &&
             !imp__moves_curved(t->scene, e->shape->index, 0))
             return refuse(t, "light", e->name, e->ops->name,

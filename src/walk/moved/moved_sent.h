@@ -12,6 +12,13 @@
 imp_v3 imp__sent_slope(const struct imp_emitter *e, imp_v3 d, int lanes,
                        const struct imp_carried *carried);
 
+/* Has it a picture, or a border across which its light ends? */
+bool imp__has_picture(const struct imp_emitter *e);
+/* The same of a light with a picture, times an adjoint of the logarithm by lanes, of which each has its own
+ * slope; where the picture ends it is an edge's. */
+imp_v3 imp__picture_slope(const struct imp_emitter *e, imp_v3 d, imp_spec bar, int lanes,
+                          const struct imp_carried *carried);
+
 /* The light at y along the unit direction d has this adjoint of its logarithm: of a turn of its shape, to
  * theta_bar, where its radiance depends on directions in a frame that turns with it. Returns the
  * adjoint of d. */

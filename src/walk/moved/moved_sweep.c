@@ -150,8 +150,11 @@ static void delta_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
     const imp_v3 r = s->at[k].x.p - at;
     const double distance = imp__length(r);
     const imp_v3 d = r * (1 / distance);
+    const int lanes = s->tracer->scene->lanes;
     const imp_v3 slope =
-        imp__sent_slope(e, d, s->tracer->scene->lanes, v->carried) * weight;
+        imp_unlikely(imp__has_picture(e))
+            ? imp__picture_slope(e, d, s->piece[k].light, lanes, v->carried)
+            : imp__sent_slope(e, d, lanes, v->carried) * weight;
     const imp_v3 turn = slope * (1 / distance);
     /* The light turned by a vector sends along d what it sent along d turned back. */
     imp__light_turn_bar(s->moves, light, imp__cross(slope, d), s->theta_bar);

@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The border of a projector's picture. */
+#ifndef IMP_KIND_EMITTER_PROJECTOR_H
+#define IMP_KIND_EMITTER_PROJECTOR_H
+
+#include "kind/build.h"
+#include "math/vec.h"
+
+/* The point of the border by u in [0, 1), of the screen at distance 1, from the light, world; its
+ * derivative by u, and the unit direction across it into the picture. */
+void imp__projector_border(const struct imp_emitter *e, double u, imp_v3 *at,
+                           imp_v3 *along, imp_v3 *inside);
+
+#endif
