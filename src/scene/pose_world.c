@@ -11,7 +11,7 @@
 #include <string.h>
 
 extern const struct imp_emitter_ops imp__area;
-extern const struct imp_shape_ops imp__rectangle, imp__disk;
+extern const struct imp_shape_ops imp__rectangle, imp__disk, imp__cylinder;
 
 /* Points of lights and meters are drawn by areas. Those of a rectangle or disk are evenly spread
  * wherever it is, and its own area follows. */
@@ -44,7 +44,8 @@ const char *imp__world_instance_why(const struct imp_scene *scene, int k)
     for (int i = 0; i < group->n_within; i++) {
         const struct imp_shape *s = scene->shapes[group->within[i]];
         struct imp_round round;
-        if (imp__shape_round(s, &round))
+        if (imp__shape_round(s, &round) ||
+            s->ops == &imp__cylinder) /* an oval one, too */
             return "a sphere or cylinder in it would be stretched: it has a pose and a "
                    "scale";
     }

@@ -179,6 +179,44 @@ def test_poses():
     return "the mean along z %.4f +- %.4f, about x %.4f +- %.4f" % (g[2], se[2], g[3], se[3])
 
 
+def test_to_world():
+    """to_world is a 3 x 4 array with the matrix of the file; it moves, stretches, and has a gradient"""
+    def scene():
+        d = im.cornell_box(res=12)
+        d["integrator"]["max_depth"] = 2
+        del d["large-box"]
+        return d, im.load_dict(d)
+    d, s = scene()
+    assert s.add_geometry("small-box.to_world") == "small-box.to_world" and "light.to_world" in s.geometry_names
+    p = im.traverse(s)
+    there = np.array(p["small-box.to_world"])
+    assert there.shape == (3, 4) and p.info("small-box.to_world").differentiable
+    assert np.allclose(there, np.array(d["small-box"]["to_world"].matrix)[:3], atol=1e-6)
+
+    # A shift and a stretch, as the dictionary has them.
+    change = np.eye(4)
+    change[0, 0], change[:3, 3] = 1.2, (.1, -.05, .2)
+    moved = change @ np.vstack([there, (0, 0, 0, 1)])
+    p["small-box.to_world"] = moved[:3]
+    d["small-box"]["to_world"] = im.ScalarTransform4f(moved)
+    assert np.allclose(im.render(s, spp=4), im.render(im.load_dict(d), spp=4), rtol=1e-4, atol=1e-5)
+    raises(im.NumericError, lambda: p.__setitem__("small-box.to_world", np.zeros((3, 4))), "to_world", "singular")
+    p["small-box.to_world"] = moved[:3]
+
+    # The last column is a translation: that of a pose of the same box, with the same random numbers.
+    by_matrix = im.functional(s, "small-box.to_world", spp=64, seed=3)
+    other = im.load_dict(d)
+    other.add_pose("small-box")
+    by_pose = im.functional(other, "small-box.pose", spp=64, seed=3)
+    g, e = by_matrix.grad["small-box.to_world"], by_pose.grad["small-box.pose"]
+    assert g.shape == (3, 4)
+    assert np.allclose(g[:, 3], e[:3], rtol=1e-4, atol=1e-5 * np.abs(e[:3]).max()), (g[:, 3], e[:3])
+    posed = scene()[1]
+    posed.add_pose("small-box")
+    raises(im.UnsupportedError, lambda: posed.add_geometry("small-box.to_world"), "to_world says where it is")
+    return "the mean by a translation %s" % np.round(g[:, 3], 4)
+
+
 def test_time():
     """Reading or setting a number takes less than 20 us; loading the package 50 ms beyond NumPy"""
     p = im.traverse(box())

@@ -324,6 +324,13 @@ int main(int argc, char **argv)
     number_refused("to_world beside a pose", scene, "block.to_world",
                    "to_world says where it is");
     remove(EGG_FILE);
+    number_refused("an oval cylinder in an instance",
+                   room(DIRECT
+                        "<shape type='shapegroup' id='pipe'><shape type='cylinder'>"
+                        "<transform name='to_world'><scale x='.2' y='.3'/></transform>"
+                        "</shape></shape><shape type='instance' id='oval'><ref "
+                        "id='pipe'/></shape>"),
+                   "oval.to_world", "would be stretched");
     imp_context_destroy(ctx);
     return tap_done();
 }
