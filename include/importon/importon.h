@@ -603,9 +603,10 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *     NAME.pose              as imp_scene_add_pose
  *     NAME.scale             of a shape or instance: 1 as the scene file has it, about the middle of
  *                            its box
- *     NAME.to_world          of a shape, instance, camera or spot: [3][4], the upper rows of the matrix
- *                            that puts it there; not beside pose, scale and what else says where it
- *                            is; IMP_E_NUMERIC where it makes another kind of thing of it
+ *     NAME.to_world          of a shape, instance, camera, spot or projector: [3][4], the upper rows
+ *                            of the matrix that puts it there; not beside pose, scale and what else
+ *                            says where it is; IMP_E_NUMERIC where it makes another kind of thing
+ *                            of it
  *     NAME.vertex_positions  of a mesh: [vertices][3], world; vertex normals, if it has any, are
  *                            computed from them
  *     NAME.center, NAME.radius   of a sphere: world; not beside pose and scale
@@ -617,11 +618,13 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *     NAME.opencv_k1, _k2, _p1, _p2, _k3   of a perspective camera: the distortion of its lens;
  *                            IMP_E_NUMERIC where it would fold the picture
  *     NAME.aperture_radius, NAME.focus_distance   of a thin lens
- *     NAME.position          of a point, spot or ies light: [3], world
- *     NAME.direction         of a directional light or a sun, of a spot's axis or an ies light's
- *                            nadir: [3], of any length
- *     NAME.turn              of an envmap, sunsky, ciesky or perezsky, or a distant sensor without a
- *                            target: [3], a rotation vector in radians away from what the file says
+ *     NAME.position          of a point, spot, projector or ies light: [3], world
+ *     NAME.direction         of a directional light or a sun, of a spot's or projector's axis or an
+ *                            ies light's nadir: [3], of any length
+ *     NAME.turn              of an envmap, sunsky, ciesky or perezsky, or a distant sensor: [3], a
+ *                            rotation vector in radians away from what the file says
+ *     NAME.sun_direction     of a sunsky, ciesky or perezsky: [3], towards its sun, of any length
+ *     NAME.sun_radius        of a sun or sunsky: of its disc, radians
  *
  * An ies light is one without a shape.
  *

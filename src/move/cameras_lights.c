@@ -67,8 +67,8 @@ static imp_v3 light_part(const struct imp__moves *moves, const struct imp__mover
     return (v - m->axis * imp__dot(m->axis, v)) * m->rate;
 }
 
-/* Of the direction p to a disc about the axis, or from it, at the angle g: (p cos g - axis)/sin g points
- * away from the middle, and tan(g/2)/sin g = 1/(1 + cos g). */
+/* The velocity of the direction p to a disc about the axis, or from it, at the angle g to that:
+ * (p cos g - axis)/sin g points away from the middle, and tan(g/2)/sin g = 1/(1 + cos g). */
 static imp_v3 disc_velocity(const struct imp__mover *m, imp_v3 p)
 {
     const double c = imp__dot(m->axis, p), side = c < 0 ? -1 : 1;

@@ -148,8 +148,8 @@ struct imp__flux_end {
     struct imp__velocity bar; /* of a camera or light: bar.v alone */
     bool camera;
     int light; /* emitter, plus 1, whose place or direction it is; 0: none */
-    /* Of a camera: the point of its lens. Of a light at a point: how far from it lies what goes and turns
-     * with it; 0: it is the light itself. */
+    /* The point of a camera's lens; or, from a light at a point, to what goes and turns with it; 0: that is
+     * the light itself. */
     imp_v3 eye;
 };
 

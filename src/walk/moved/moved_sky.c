@@ -150,7 +150,7 @@ imp_spec imp__sky_sent_bar(const struct imp__moves *moves, int emitter, imp_v3 w
     return one * disc;
 }
 
-/* Of what the camera sees of it along a direction at rest. Returns the slope of the disc. */
+/* The same of what the camera sees along a direction at rest. Returns the slope of the disc. */
 static imp_v3 sun_seen_bar(const struct imp__moves *moves, int emitter, imp_v3 w,
                            imp_spec seen, const struct imp_carried *carried,
                            double *theta_bar)
