@@ -188,8 +188,8 @@ nearest(const struct imp_intersector *x, double time, const imp_v3 *o, const imp
         *hit = q.hit;
         return true;
     }
-    imp__mesh_hit(x, *o, *d, r.hit.geomID, r.hit.primID, r.ray.tfar, r.hit.u, r.hit.v,
-                  hit);
+    imp__mesh_hit(x, *o, *d, tmin, r.hit.geomID, r.hit.primID, r.ray.tfar, r.hit.u,
+                  r.hit.v, hit);
     return true;
 }
 
@@ -252,7 +252,7 @@ void imp__instance_intersect(const struct RTCIntersectFunctionNArguments *args)
     const double tmax = imp_min((double)r->ray.tfar, q->tmax);
     if (!nearest(x, q->time, &o, &d, q->tmin, tmax, &hit)) return;
     hit.place += p->before + 1;
-    float far = (float)hit.t; /* a triangle's, in it, is one */
+    float far = (float)hit.t; /* not beyond it */
     if (far > hit.t) far = nextafterf(far, 0);
     query_hit(q, &hit, far, args);
 }

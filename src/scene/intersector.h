@@ -46,8 +46,8 @@ static inline bool imp__ray_valid(const imp_v3 *o, const imp_v3 *d, double tmin,
 
 /* Embree's hit of a mesh. */
 static inline void imp__mesh_hit(const struct imp_intersector *x, imp_v3 o, imp_v3 d,
-                                 unsigned geometry, unsigned prim, float t, float u,
-                                 float v, struct imp_hit *hit)
+                                 double tmin, unsigned geometry, unsigned prim, float t,
+                                 float u, float v, struct imp_hit *hit)
 {
     hit->shape = x->first + (int)geometry;
     hit->prim = (int)prim;
@@ -56,7 +56,7 @@ static inline void imp__mesh_hit(const struct imp_intersector *x, imp_v3 o, imp_
     hit->v = (double)v;
     hit->place = 0;
     if (x->quads && x->quads[geometry])
-        imp__tree_quads_hit(x->quads[geometry], prim, hit->u, hit->v, o, d, hit);
+        imp__tree_quads_hit(x->quads[geometry], prim, hit->u, hit->v, o, d, tmin, hit);
 }
 
 /* For a scene of Embree; NULL: it has no memory. quads: of a mesh, or NULL; all: all hits of a ray are

@@ -124,8 +124,9 @@ static unsigned packet_nearest(const struct imp_intersector *x,
         if (r.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID) continue;
         hit[k] = (struct imp_hit){.place = 0};
         imp__mesh_hit(x, imp__block_origin(b, first + k),
-                      imp__block_direction(b, first + k), r.hit.geomID[k],
-                      r.hit.primID[k], r.ray.tfar[k], r.hit.u[k], r.hit.v[k], &hit[k]);
+                      imp__block_direction(b, first + k), imp__block_near(b, first + k),
+                      r.hit.geomID[k], r.hit.primID[k], r.ray.tfar[k], r.hit.u[k],
+                      r.hit.v[k], &hit[k]);
         met |= 1u << k;
     }
     return met;

@@ -6,15 +6,30 @@
 
 enum { ALONE = 4 * 3 };
 
-/* For a triangle and the next one, which shares an edge that runs the other way there: as
- * imp_tree_quads.turned. */
-static int turned_of(const uint32_t *a, bool next)
+static imp_v3 position(const float *positions, uint32_t corner)
 {
-    const uint32_t *b = a + 3;
-    for (int j = 0; next && j < 3; j++)
+    const float *p = positions + 3 * (size_t)corner;
+    return imp__v3((double)p[0], (double)p[1], (double)p[2]);
+}
+
+#define THINNEST 1e-20 /* square of the sine of an angle */
+static bool has_area(const struct imp_triangles *mesh, const uint32_t *corner)
+{
+    const imp_v3 a = position(mesh->positions, corner[0]),
+                 e1 = position(mesh->positions, corner[1]) - a,
+                 e2 = position(mesh->positions, corner[2]) - a, n = imp__cross(e1, e2);
+    return imp__dot(n, n) > THINNEST * imp__dot(e1, e1) * imp__dot(e2, e2);
+}
+
+/* For triangle i and the next one, which shares an edge that runs the other way there: as
+ * imp_tree_quads.turned. */
+static int turned_of(const struct imp_triangles *mesh, size_t i)
+{
+    const uint32_t *a = mesh->indices + 3 * i, *b = a + 3;
+    for (int j = 0; i + 1 < mesh->n_triangles && j < 3; j++)
         for (int k = 0; k < 3; k++)
             if (a[(j + 1) % 3] == b[(k + 2) % 3] && a[(j + 2) % 3] == b[(k + 1) % 3])
-                return j + 4 * k;
+                return has_area(mesh, a) && has_area(mesh, b) ? j + 4 * k : ALONE;
     return ALONE;
 }
 
@@ -32,8 +47,7 @@ static void fill(const struct imp_triangles *mesh, struct imp_tree_quads *q)
     size_t n = 0;
     for (size_t i = 0; i < mesh->n_triangles; i++, n++) {
         const uint32_t *a = mesh->indices + 3 * i;
-        const int turned = turned_of(a, i + 1 < mesh->n_triangles), j = turned & 3,
-                  k = turned >> 2;
+        const int turned = turned_of(mesh, i), j = turned & 3, k = turned >> 2;
         q->first[n] = (uint32_t)i;
         q->turned[n] = (uint8_t)turned;
         q->corner[n][0] = a[j];
@@ -49,8 +63,7 @@ bool imp__tree_quads_create(imp_context *ctx, const struct imp_triangles *mesh,
 {
     size_t n = 0;
     *out = NULL;
-    for (size_t i = 0; i < mesh->n_triangles; i++, n++)
-        i += turned_of(mesh->indices + 3 * i, i + 1 < mesh->n_triangles) != ALONE;
+    for (size_t i = 0; i < mesh->n_triangles; i++, n++) i += turned_of(mesh, i) != ALONE;
     if (3 * n > 2 * mesh->n_triangles) return true;
     struct imp_tree_quads *q = imp__alloc(ctx, 1, sizeof *q);
     if (!q) return false;
@@ -67,12 +80,6 @@ bool imp__tree_quads_create(imp_context *ctx, const struct imp_triangles *mesh,
     *bytes += (int64_t)(n * (sizeof *q->corner + sizeof *q->first + sizeof *q->turned));
     *out = q;
     return true;
-}
-
-static imp_v3 position(const struct imp_tree_quads *q, unsigned prim, int corner)
-{
-    const float *p = q->positions + 3 * (size_t)q->corner[prim][corner];
-    return imp__v3((double)p[0], (double)p[1], (double)p[2]);
 }
 
 /* Where a ray meets the plane of a triangle (Moeller and Trumbore, "Fast, minimum storage ray-triangle
@@ -93,19 +100,39 @@ static double least_part(const struct plane_hit *x)
     return imp_min(imp_min(x->u, x->v), 1 - x->u - x->v);
 }
 
+static bool is_met(const struct plane_hit *x, double tmin)
+{
+    return least_part(x) >= 0 && x->t >= tmin;
+}
+
 #define DIAGONAL 1e-3 /* nearer to it doubles decide which half is met */
 
+/* Is it the second? The halves need not lie in a plane: a ray may meet both beside their edge, where the
+ * nearer counts, or leave one and meet the other. By rounding it may meet neither. */
+static bool is_second(const struct plane_hit *first, const struct plane_hit *second,
+                      double tmin)
+{
+    const bool a = is_met(first, tmin), b = is_met(second, tmin);
+    if (a && b) return second->t < first->t;
+    if (a || b) return b;
+    if ((first->t >= tmin) != (second->t >= tmin)) return second->t >= tmin;
+    return least_part(second) > least_part(first);
+}
+
 void imp__tree_quads_hit(const struct imp_tree_quads *q, unsigned prim, double u,
-                         double v, imp_v3 o, imp_v3 d, struct imp_hit *hit)
+                         double v, imp_v3 o, imp_v3 d, double tmin, struct imp_hit *hit)
 {
     const int j = q->turned[prim] & 3, k = q->turned[prim] >> 2;
-    const imp_v3 p1 = position(q, prim, 1), p3 = position(q, prim, 3);
+    const uint32_t *corner = q->corner[prim];
+    const imp_v3 p1 = position(q->positions, corner[1]),
+                 p3 = position(q->positions, corner[3]);
     const bool near = k < 3 && fabs(u + v - 1) < DIAGONAL;
     bool second = k < 3 && u + v > 1;
     struct plane_hit x = {0}, other = {0};
-    if (!second || near) x = plane_hit(position(q, prim, 0), p1, p3, o, d);
-    if (second || near) other = plane_hit(position(q, prim, 2), p3, p1, o, d);
-    if (near) second = least_part(&other) > least_part(&x);
+    if (!second || near) x = plane_hit(position(q->positions, corner[0]), p1, p3, o, d);
+    if (second || near)
+        other = plane_hit(position(q->positions, corner[2]), p3, p1, o, d);
+    if (near) second = is_second(&x, &other, tmin);
     if (second) x = other;
     const double a = imp_clamp(x.u, 0.0, 1.0), b = imp_clamp(x.v, 0.0, 1 - a),
                  part[3] = {1 - a - b, a, b}; /* of corner `at` and those after it */
@@ -113,5 +140,5 @@ void imp__tree_quads_hit(const struct imp_tree_quads *q, unsigned prim, double u
     hit->prim = (int)q->first[prim] + second;
     hit->u = part[(4 - at) % 3];
     hit->v = part[(5 - at) % 3];
-    if (isfinite(x.t)) hit->t = x.t;
+    if (x.t >= tmin && isfinite(x.t)) hit->t = x.t;
 }

@@ -18,7 +18,7 @@ struct imp_tree_quads {
                               k = 3: there is no second */
 };
 /* Those of a mesh most of whose triangles are in pairs; *out is NULL of others. Those that are alone have
- * a second half without area. False: out of memory. */
+ * a second half without area, and a triangle without area is alone. False: out of memory. */
 bool imp__tree_quads_create(imp_context *ctx, const struct imp_triangles *mesh,
                             struct imp_tree_quads **out, int64_t *bytes);
 void imp__tree_quads_destroy(imp_context *ctx, struct imp_tree_quads *quads);
@@ -26,8 +26,8 @@ void imp__tree_quads_destroy(imp_context *ctx, struct imp_tree_quads *quads);
 /* The hit of quadrilateral `prim` by a ray, in double: the rounding of Embree's numbers is not the same
  * for one ray and for eight. u, v: where it says it is, barycentric of v1 and v3 in the first half; in
  * the second, of v3 and v1, from 1. Beside the quadrilateral, by that rounding, the nearest point of an
- * edge counts. */
+ * edge counts; hit->t is Embree's before, and stays where the plane is met before tmin. */
 void imp__tree_quads_hit(const struct imp_tree_quads *q, unsigned prim, double u,
-                         double v, imp_v3 o, imp_v3 d, struct imp_hit *hit);
+                         double v, imp_v3 o, imp_v3 d, double tmin, struct imp_hit *hit);
 
 #endif
