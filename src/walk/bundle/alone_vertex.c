@@ -50,8 +50,6 @@ static const struct imp_end_ops meter_end = {.nothing = imp__sky_meet,
                                              .meet = imp__end_meet,
                                              .goes_on = imp__end_goes_on,
                                              .link_draw = link_later,
-                                             .link_weigh = imp__end_link_weigh,
-                                             .link_see = link_see,
                                              .direction_draw = imp__direction_begin,
                                              .scatter = imp__scatter_along};
 

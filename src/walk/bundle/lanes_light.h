@@ -16,6 +16,13 @@ struct imp_lanes_light {
     int32_t light[IMP_WIDE_LANES];
 };
 
+/* Weights of light samples: the power heuristic with exponent 2, over the density a. */
+static inline imp_wide imp__wide_power_over(imp_wide a, imp_wide b)
+{
+    const imp_wide a2 = a * a, b2 = b * b;
+    return imp__wide_choose(a2 > imp__wide(0), a / (a2 + b2), imp__wide(0));
+}
+
 struct imp_lanes_vertices;
 /* What imp__light_point (core/drawn.h) draws for vertices with the numbers u; at.drawn: there is a
  * light, which shows its front; at.recorded is given. `which` chooses the light; where walks have

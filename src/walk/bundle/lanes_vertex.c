@@ -26,13 +26,6 @@ static inline imp_wide number(const struct imp_lanes_vertices *v, int use)
                                                    : imp__dim(v->depth, use));
 }
 
-/* The power heuristic with exponent 2, over the density a. */
-static imp_wide power_heuristic_over(imp_wide a, imp_wide b)
-{
-    const imp_wide a2 = a * a, b2 = b * b;
-    return imp__wide_choose(a2 > imp__wide(0), a / (a2 + b2), imp__wide(0));
-}
-
 /* What lights bring to the vertices if they are seen. */
 static inline __attribute__((always_inline)) void
 light_weigh(struct imp_depth *d, const struct imp_bin *bin,
@@ -58,7 +51,7 @@ light_weigh(struct imp_depth *d, const struct imp_bin *bin,
                              imp__wide_bits(l->at.drawn), colors, any, &lit->f);
     const imp_wide p = l->at.pdf * l->pmf;
     lit->weight =
-        imp__wide_decide(imp__wide_choose(l->delta, 1 / p, power_heuristic_over(p, pdf)));
+        imp__wide_decide(imp__wide_choose(l->delta, 1 / p, imp__wide_power_over(p, pdf)));
     imp_wide fl[4];
     for (int c = 0; c < colors; c++) fl[c] = lit->f.c[c] * l->radiance.c[c];
     const imp_wide_truth none = imp__colors_vanish(fl, colors),

@@ -7,6 +7,7 @@
 #include "math/trig.h"
 #include "math/wide_offset.h"
 #include "reuse.h"
+#include <string.h>
 
 #define IMP_WIDE IMP_WIDE_LANES
 #define IMP_TEXT "math/warp_text.h"
@@ -118,13 +119,6 @@ static imp_wide receives(const struct imp_reuse *r, imp_wide3 wi, imp_wide3 faci
     return imp__wide_larger(seen, zero) * (IMP_INV_PI * IMP_INV_PI);
 }
 
-/* The power heuristic with exponent 2, over the density a. */
-static imp_wide heuristic_over(imp_wide a, imp_wide b)
-{
-    const imp_wide a2 = a * a, b2 = b * b;
-    return imp__wide_choose(a2 > imp__wide(0), a / (a2 + b2), imp__wide(0));
-}
-
 /* Sample l of `samples` of the walks [lanes]. */
 static void light_draw(const struct imp_depth *d, const int32_t *walk, unsigned on, int l,
                        int samples, struct imp_lanes_light *out)
@@ -132,12 +126,13 @@ static void light_draw(const struct imp_depth *d, const int32_t *walk, unsigned 
     const struct imp_bundle *b = d->bundle;
     const struct imp_tracer *t = b->tracer;
     const struct imp_receiver *receiver = t->sensor->receiver;
-    const bool faces = !receiver || !(receiver->bsdf.flags & IMP_BSDF_TRANSMIT),
+    const bool faces = !receiver || imp__is_faced(&receiver->bsdf),
                one = t->points != NULL;
     struct imp_lanes_vertices v; /* what lights in colours ask of it */
     v.x.p = imp__wide3_taken(d->reuse->from, walk);
     v.points = one;
     v.on = on;
+    memcpy(v.walk, walk, sizeof v.walk);
     const imp_wide3 normal = imp__wide3_taken(d->reuse->normal, walk);
     const struct imp_wide_block numbers =
         imp__wide_block(t->points, b->set, b->index, walk, imp__block(-1));
@@ -146,7 +141,8 @@ static void light_draw(const struct imp_depth *d, const int32_t *walk, unsigned 
     for (int k = 0; k < 3; k++)
         u[k] = imp__wide_number(&numbers, one ? (uint32_t)imp__slot(uses[k])
                                               : imp__dim(-1, uses[k]));
-    const imp_wide which = ((one ? u[0] : u[2]) + l) / samples;
+    const imp_wide which = imp__wide_lesser(((one ? u[0] : u[2]) + l) / samples,
+                                            imp__wide(0x1.fffffffffffffp-1));
     if (one) u[0] = which;
     out->at.recorded = false;
     if (d->next->left) imp__lanes_tree_draw(b, &v, faces ? &normal : NULL, u, which, out);
@@ -175,7 +171,7 @@ static void light_add(struct imp_depth *d, int i, int l, int samples)
                    density = light.at.pdf * light.pmf;
     const imp_wide weight =
         by / samples *
-        imp__wide_choose(light.delta, 1 / density, heuristic_over(density, by));
+        imp__wide_choose(light.delta, 1 / density, imp__wide_power_over(density, by));
     on &= imp__wide_bits(light.at.drawn & (by > imp__wide(0)));
     if (!on) return;
     const int n = to->ray.n;
