@@ -89,8 +89,8 @@ static void vertices(struct imp_light_bundle *l)
     if (few > 0) imp__by_shape_few(&l->at, s, few, few_vertices);
 }
 
-/* What the sensor sees reaches it. */
-static void see(struct imp_light_bundle *l, struct imp_arena *arena)
+/* What the sensor sees reaches it. False: no memory. */
+static bool see(struct imp_light_bundle *l, struct imp_arena *arena)
 {
     struct imp_light_views *v = &l->views;
     imp__occluded_columns(l->bundle.tracer->scene, &v->ray, l->hidden);
@@ -98,7 +98,7 @@ static void see(struct imp_light_bundle *l, struct imp_arena *arena)
         struct imp_light_walk *out = &l->out[v->walk[i]];
         if (l->hidden[i] || out->walk.dropped) continue;
         struct imp_reach *r = imp__arena_take(arena, 1, sizeof *r);
-        if (!r) return;
+        if (!r) return false;
         *r = (struct imp_reach){.number = l->at.depth, .px = v->px[i], .py = v->py[i]};
         *l->end[v->walk[i]] = r;
         l->end[v->walk[i]] = &r->next;
@@ -107,6 +107,7 @@ static void see(struct imp_light_bundle *l, struct imp_arena *arena)
                          imp__column_color(v->brings, l->bundle.colors, i));
     }
     v->ray.n = 0;
+    return !arena->failed;
 }
 
 /* Walks that would have too many vertices. */
@@ -141,7 +142,7 @@ bool imp__light_bundle_trace(const struct imp_tracer *tracer, struct imp_arena *
             break;
         }
         vertices(&l);
-        see(&l, arena);
+        if (!see(&l, arena)) return false;
     }
     for (int k = 0; k < n; k++) {
         if (!out[k].walk.dropped) continue;
