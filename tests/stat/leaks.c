@@ -64,6 +64,35 @@ static struct imp_mesh_data ball(int n)
                                   .positions = positions,
                                   .indices = indices};
 }
+/* A cube of n x n cells a face, pushed out to the sphere: two triangles a cell, which share corners and
+ * are folded, but for cells have corners of their own. They are quadrilaterals to Embree. */
+static struct imp_mesh_data ball_of_pairs(int n)
+{
+    const size_t cells = 6 * (size_t)n * (size_t)n;
+    float *positions = malloc((12 * cells + 4) * sizeof *positions);
+    uint32_t *indices = malloc(6 * cells * sizeof *indices);
+    for (size_t k = 0; k < cells; k++) {
+        const int face = (int)k % 6, i = (int)(k / 6) % n, j = (int)(k / 6) / n;
+        static const int own[6] = {0, 1, 2, 2, 3, 0};
+        for (int c = 0; c < 4; c++) {
+            const int out = face % 2 ? -n : n, a = 2 * (i + (c == 1 || c == 2)) - n,
+                      b = 2 * (j + c / 2) - n;
+            int x[3];
+            x[face / 2] = out;
+            x[(face / 2 + 1) % 3] = face % 2 ? b : a;
+            x[(face / 2 + 2) % 3] = face % 2 ? a : b;
+            const double l = sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
+            for (int d = 0; d < 3; d++)
+                positions[12 * k + 3 * (size_t)c + (size_t)d] = (float)(x[d] / l);
+        }
+        for (int c = 0; c < 6; c++)
+            indices[6 * k + (size_t)c] = (uint32_t)(4 * k) + (uint32_t)own[c];
+    }
+    return (struct imp_mesh_data){.n_vertices = 4 * cells,
+                                  .n_triangles = 2 * cells,
+                                  .positions = positions,
+                                  .indices = indices};
+}
 static void ball_free(struct imp_mesh_data *m)
 {
     free((void *)(uintptr_t)m->positions);
@@ -162,24 +191,57 @@ static void measure(const char *what, int room, imp_v3 centre, size_t rays, size
     world_end();
 }
 
+/* Rooms and bodies of these meshes. */
+static void balls(size_t rays, size_t most, imp_v3 at, struct imp_mesh_data *fine,
+                  struct imp_mesh_data *rough, const char *of)
+{
+    struct imp_node *n;
+    char what[100];
+
+    room_begin(&wall);
+    n = node_new("shape", "mesh");
+    n->mesh = fine;
+    shape(n, placed(at, 1.7), true);
+    snprintf(what, sizeof what, "a ball of %zu triangles, %s", fine->n_triangles, of);
+    measure(what, 1, at, rays, most);
+
+    room_begin(&glass);
+    shape(node_new("shape", "sphere"), placed(at, 3), true);
+    n = node_new("shape", "mesh");
+    n->mesh = rough;
+    shape(n, placed(at + imp__v3(1, 0, 0), .6), false);
+    n = node_new("shape", "mesh");
+    n->mesh = fine;
+    shape(n, placed(at + imp__v3(-1, 0, 0), .6), false);
+    shape(node_new("shape", "cube"), placed(at + imp__v3(0, 1.2, 0), .4), false);
+    shape(node_new("shape", "sphere"), placed(at + imp__v3(0, -1.2, 0), .5), false);
+    snprintf(what, sizeof what, "glass bodies of %s in a sphere", of);
+    measure(what, 1, at, rays, most);
+
+    room_begin(&glass);
+    n = node_new("shape", "mesh");
+    n->mesh = fine;
+    shape(n, placed(at, 300), true);
+    shape(node_new("shape", "cube"), placed(at + imp__v3(80, 0, 0), 40), false);
+    n = node_new("shape", "mesh");
+    n->mesh = fine;
+    shape(n, placed(at + imp__v3(-80, 0, 0), 60), false);
+    snprintf(what, sizeof what, "bodies in a large ball, of %s", of);
+    measure(what, 1, at, rays, most);
+}
+
 int main(int argc, char **argv)
 {
     const bool full = argc > 1 && strcmp(argv[1], "long") == 0;
     const size_t rays = (full ? 100000000 : 10000000) / 5, most = full ? 2 : 1;
     const imp_v3 at = {.31, -.17, .53, 0};
-    struct imp_mesh_data fine = ball(5), rough = ball(1);
-    struct imp_node *n;
+    struct imp_mesh_data fine = ball(5), rough = ball(1), fine_pairs = ball_of_pairs(41),
+                         rough_pairs = ball_of_pairs(3);
     if (imp_context_create(NULL, &ctx) != IMP_OK) return 3;
 
     room_begin(&wall);
     shape(node_new("shape", "cube"), placed(at, 1.7), true);
     measure("a cube of 12 triangles", 1, at, rays, most);
-
-    room_begin(&wall);
-    n = node_new("shape", "mesh");
-    n->mesh = &fine;
-    shape(n, placed(at, 1.7), true);
-    measure("a ball of 20,480 triangles", 1, at, rays, most);
 
     /* Walls that are shapes of their own: edges meet, vertices are rounded apart. */
     room_begin(&wall);
@@ -194,30 +256,13 @@ int main(int argc, char **argv)
     }
     measure("six rectangles", 6, at, rays, most);
 
-    room_begin(&glass);
-    shape(node_new("shape", "sphere"), placed(at, 3), true);
-    n = node_new("shape", "mesh");
-    n->mesh = &rough;
-    shape(n, placed(at + imp__v3(1, 0, 0), .6), false);
-    n = node_new("shape", "mesh");
-    n->mesh = &fine;
-    shape(n, placed(at + imp__v3(-1, 0, 0), .6), false);
-    shape(node_new("shape", "cube"), placed(at + imp__v3(0, 1.2, 0), .4), false);
-    shape(node_new("shape", "sphere"), placed(at + imp__v3(0, -1.2, 0), .5), false);
-    measure("glass bodies in a sphere", 1, at, rays, most);
-
-    room_begin(&glass);
-    n = node_new("shape", "mesh");
-    n->mesh = &fine;
-    shape(n, placed(at, 300), true);
-    shape(node_new("shape", "cube"), placed(at + imp__v3(80, 0, 0), 40), false);
-    n = node_new("shape", "mesh");
-    n->mesh = &fine;
-    shape(n, placed(at + imp__v3(-80, 0, 0), 60), false);
-    measure("bodies in a large ball", 1, at, rays, most);
+    balls(rays, most, at, &fine, &rough, "single triangles");
+    balls(full ? rays : rays / 2, most, at, &fine_pairs, &rough_pairs, "pairs");
 
     ball_free(&fine);
     ball_free(&rough);
+    ball_free(&fine_pairs);
+    ball_free(&rough_pairs);
     imp_context_destroy(ctx);
     return tap_done();
 }
