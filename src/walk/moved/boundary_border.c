@@ -35,7 +35,8 @@ void imp__draw_border(struct imp__edge_draw *d)
     bool meets;
     if (imp_unlikely(b->fog || (b->passes && b->through))) {
         struct imp__line line;
-        meets = imp__edge_follow(d, o, w, 0, 0, &hit, &at, &line);
+        /* Over a mirror no light sample of a projector comes. */
+        meets = imp__edge_follow(d, o, w, 0, 0, &hit, &at, &line) && line.mirrors.n == 0;
         if (meets) T = line.T * line.times;
     } else {
         meets = imp__intersect(scene, &o, &w, 0, INFINITY, &hit);

@@ -64,7 +64,7 @@ enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
 #define IMP_EDGE_PASS   (1u << 23) /* whether light goes straight on through a mask */
 #define IMP_EDGE_PART   (1u << 25) /* which part of a sky whose sun moves */
 #define IMP_EDGE_FLIGHT (1u << 24) /* two, of how far it goes in a medium: of each line */
-#define IMP_EDGE_MIRROR (1u << 25) /* by which mirrors it is seen: of each connection */
+#define IMP_EDGE_MIRROR (1u << 26) /* by which mirrors it is seen: of each connection */
 
 /* So far beside an edge, per distance to it, it is looked past; rays are traced in float, whose
  * rounding is a tenth of that. */
