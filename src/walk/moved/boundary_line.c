@@ -143,8 +143,7 @@ static void flight_end(const struct imp__edge_draw *d, const struct flight *f,
 }
 
 #define PASS_LEAST   0.1 /* probability of either choice at a mask */
-#define MIRRORS_SURE 4 /* behind so many mirrors, a line goes on with this probability */
-#define MIRRORS_GO   0.8
+#define MIRRORS_SURE 4   /* behind so many mirrors, a line goes on by what it carries */
 
 /* A mirror is met, of what it reflects: *start is the image of where the line began. */
 static bool reflect(struct imp__edge_draw *d, const struct imp_hit *hit,
@@ -166,12 +165,13 @@ static bool reflect(struct imp__edge_draw *d, const struct imp_hit *hit,
     return true;
 }
 
-/* Probabilities with which a line goes straight on, or is reflected, at a surface. */
+/* Probabilities with which a line goes straight on, or is reflected, at a surface. Behind many mirrors
+ * what it carries over these never becomes more than 1, so that its square has a mean. */
 struct fates {
     double pass, reflect;
 };
 static struct fates fates_of(const struct imp__edge_draw *d, const struct imp_bsdf *b,
-                             imp_spec T, imp_spec F, int mirrors)
+                             imp_spec T, imp_spec F, const struct imp__line *line)
 {
     struct fates out = {0, 0};
     const double t = imp__max_used(T, d->waves), r = imp__max_used(F, d->waves);
@@ -181,7 +181,8 @@ static struct fates fates_of(const struct imp__edge_draw *d, const struct imp_bs
             out.reflect = imp_clamp(r, PASS_LEAST, 1 - PASS_LEAST) * (1 - out.pass);
         return out;
     }
-    const double go = mirrors < MIRRORS_SURE ? 1 : MIRRORS_GO;
+    const double left = imp__max_used(line->T * (T + F), d->waves) * line->times,
+                 go = line->mirrors.n < MIRRORS_SURE ? 1 : imp_min(left, 1.0);
     if (!(r > 0)) {
         out.pass = b->straight ? 1 : 0;
         return out;
@@ -199,6 +200,7 @@ bool imp__edge_follow(struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
     imp_v3 start = o;
     struct flight f = {.aims = false};
     double flight = INFINITY;
+    const int longest = d->b->tracer->integrator->max_depth;
     *line = (struct imp__line){.T = imp__spec(1), .times = 1, .w = w};
     if (imp_unlikely(d->b->fog != NULL)) {
         f = flight_of(d, o, w);
@@ -223,7 +225,7 @@ bool imp__edge_follow(struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
         if (imp_unlikely(b->straight || mirrors)) {
             if (b->straight) T = passed(d, b, hit, at, w);
             if (mirrors) F = imp__edge_reflected(d, hit, at, w);
-            fate = fates_of(d, b, T, F, line->mirrors.n);
+            fate = fates_of(d, b, T, F, line);
             u = imp__u01(d->key, IMP_EDGE_PASS + dims * PASSES_MOST + n);
         }
         if (u >= fate.pass + fate.reflect) {
@@ -240,7 +242,9 @@ bool imp__edge_follow(struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
             line->bounces += !d->b->through;
             line->bounces_mirrored += !d->b->through;
         } else {
-            if (!reflect(d, hit, at, F, &start, line)) return false;
+            if (!reflect(d, hit, at, F, &start, line) ||
+                (longest >= 0 && line->bounces >= longest))
+                return false;
             w = line->w;
         }
         if (imp__is_zero_used(line->T, d->waves)) return false;
