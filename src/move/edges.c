@@ -124,7 +124,7 @@ int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *s
         const imp_v3 d = e->b - e->a;
         struct imp_hit hit;
         for (double from = END; imp__intersect(scene, &e->a, &d, from, 1 - END, &hit);
-             from = hit.t + END) {
+             from = imp_max(from, (double)hit.t) + END) {
             if (!is_seamless(scene, hit.shape, hit.place)) continue;
             *other = edges->face[e->first].shape;
             return hit.shape;

@@ -62,33 +62,75 @@ static imp_scene *room_of(const char *rest, const char *grey)
 static imp_scene *room(const char *rest) { return room_of(rest, NULL); }
 
 /* An orthographic camera that looks along +y on 2 x 2, at a mirror that turns its rays to +x, where a
- * wall of radiance 3 glows; a black disk of radius r is before it. */
-static imp_scene *disk_scene(void)
+ * wall of radiance 3 glows; a black disk of radius r, or a square, is before it. `place`: where all of that is;
+ * `mirror`: from -1 to 1 in x and y. */
+static imp_scene *disk_scene(const char *place, const char *mirror, const char *disk)
 {
-    return test_scene_text(
-        ctx,
+    char xml[8192];
+    snprintf(
+        xml, sizeof xml,
         "<scene version='3.0.0'>" PATH
         "<sensor type='orthographic' id='camera'><transform name='to_world'><lookat "
-        "origin='0,-2,0' target='0,0,0' up='0,0,1'/></transform><film type='hdrfilm'>"
+        "origin='0,-2,0' target='0,0,0' up='0,0,1'/>%s</transform><film type='hdrfilm'>"
         "<integer name='width' value='8'/><integer name='height' value='8'/><rfilter "
         "type='box'/></film></sensor>"
-        "<shape type='rectangle' id='mirror'><transform name='to_world'><scale x='1.8' "
-        "y='1.5'/><rotate x='1' angle='90'/><rotate z='1' angle='-45'/></transform>"
+        "<shape id='mirror' %s<transform name='to_world'><scale x='1.8' y='1.5'/>"
+        "<rotate x='1' angle='90'/><rotate z='1' angle='-45'/>%s</transform>"
         "<bsdf type='twosided'>" PERFECT "</bsdf></shape>"
-        "<shape type='disk' id='disk'><transform name='to_world'><scale value='.4'/>"
-        "<rotate y='1' angle='-90'/><translate x='-2' y='-.3' z='.2'/></transform>"
+        "<shape type='%s' id='disk'><transform name='to_world'><scale value='.4'/>"
+        "<rotate y='1' angle='-90'/><translate x='-2' y='-.3' z='.2'/>%s</transform>"
         "<bsdf type='twosided'>" BLACK "</bsdf></shape>"
         "<shape type='rectangle' id='wall'><transform name='to_world'><scale x='3' "
-        "y='2'/><rotate y='1' angle='90'/><translate x='-4' "
-        "y='-1.3'/></transform><emitter "
-        "type='area'><spectrum name='radiance' value='3'/></emitter></shape></scene>",
-        IMP_MONO);
+        "y='2'/><rotate y='1' angle='90'/><translate x='-4' y='-1.3'/>%s</transform>"
+        "<emitter type='area'><spectrum name='radiance' value='3'/></emitter></shape>"
+        "</scene>",
+        place, mirror, place, disk, place, place);
+    return test_scene_text(ctx, xml, IMP_MONO);
+}
+
+#define GRID "moved_mirrors_grid.obj"
+/* A square of 20 x 20 squares. */
+static void grid_write(void)
+{
+    enum { N = 20 };
+    FILE *f = fopen(GRID, "w");
+    if (!f) exit(99);
+    for (int k = 0; k < (N + 1) * (N + 1); k++)
+        fprintf(f, "v %.9g %.9g 0\n", k % (N + 1) * 2. / N - 1, k / (N + 1) * 2. / N - 1);
+    for (int k = 0; k < N * N; k++) {
+        const int a = k / N * (N + 1) + k % N + 1;
+        fprintf(f, "f %d %d %d %d\n", a, a + 1, a + N + 2, a + N + 1);
+    }
+    fclose(f);
+}
+
+/* Two facets of a flat mirror whose corners are rounded are one plane, and so are 800. */
+static void facets_test(void)
+{
+    static const char *const mirror[] =
+        {"type='rectangle'>", "type='obj'><string name='filename' value='" GRID
+                              "'/><boolean name='face_normals' value='true'/>"},
+                             *const what[] = {"a square in a small mirror",
+                                              "a square in a small mirror of 800 facets"};
+    const double r = .4;
+    grid_write();
+    for (int k = 0; k < 2; k++) {
+        struct tap_stat size[1] = {{0, 0, 0}};
+        imp_scene *scene = disk_scene("<scale value='.012'/><rotate x='1' y='.3' z='.7' "
+                                      "angle='41'/><translate x='1.3' y='-.7' z='2.1'/>",
+                                      mirror[k], "rectangle");
+        test_must(ctx, imp_scene_add_geometry(scene, "disk.scale"));
+        mean_gradient(ctx, scene, "disk.scale", 128, 16, size);
+        tap_z(&size[0], -3 * 2 * 4 * r * r / 4, k ? .03 : .006, what[k]);
+        imp_scene_destroy(scene);
+    }
+    remove(GRID);
 }
 
 static void disk_test(void)
 {
     struct tap_stat size[1] = {{0, 0, 0}}, wall[6] = {{0, 0, 0}}, turn[6] = {{0, 0, 0}};
-    imp_scene *scene = disk_scene();
+    imp_scene *scene = disk_scene("", "type='rectangle'>", "disk");
     static const char *const names[] = {"disk.scale", "wall.pose", "mirror.pose"};
     for (int k = 0; k < 3; k++) test_must(ctx, imp_scene_add_geometry(scene, names[k]));
     mean_gradient(ctx, scene, names[0], 64, 16, size);
@@ -246,6 +288,7 @@ int main(int argc, char **argv)
     ctx = test_context(2);
     adjoint_make();
     disk_test();
+    facets_test();
     walks_test();
     numbers_compare(
         "images before a sky",

@@ -119,6 +119,7 @@ void imp__boundary_free(struct imp__boundary *b)
     if (b->tracer) imp__release(b->tracer->scene->ctx, b->light_cdf);
     if (b->tracer) imp__release(b->tracer->scene->ctx, b->drawn);
     if (b->tracer) imp__release(b->tracer->scene->ctx, b->plane);
+    if (b->tracer) imp__release(b->tracer->scene->ctx, b->plane_of);
     for (int k = 0; k < IMP_BOUNDARY_KINDS; k++) {
         imp__edge_choice_free(&b->choice[k]);
         if (b->tracer) imp__release(b->tracer->scene->ctx, b->part[k]);

@@ -133,8 +133,9 @@ struct imp__boundary {
     bool through;  /* also light samples, and that is no bounce */
     const struct imp_medium *fog; /* which fills the scene; NULL: none */
     double size;                  /* of the scene */
-    size_t n_planes, cap_planes;
+    size_t n_planes, cap_planes, n_facets, cap_facets;
     struct imp__plane *plane; /* [n_planes] of flat mirrors: boundary_mirror.c */
+    int *plane_of;            /* [n_facets] of these; -1: a facet without an area */
     int n_lights;
     double *light_cdf; /* [n_emitters] of those that have draws, by power; last is 1 */
     /* [n_emitters] skies that have draws, and of these what a meter does not see by chance. */

@@ -16,33 +16,89 @@
 struct imp__plane {
     int shape; /* as imp_hit has it */
     int64_t place;
-    imp_v3 p, n; /* a point; unit normal */
+    int64_t facet; /* of the shape's first one: where plane_of has it; -1: it is a disk */
+    imp_v3 p, n;   /* a point; unit normal */
+    double loose;  /* how far from that the normal may be, in radians */
 };
 
-#define SAME 1e-6 /* planes: of their normals, and of the scene's size */
-#define MOST 4096 /* planes of a shape */
+#define SAME 1e-6 /* of the scene's size: what is nearer is in the plane */
+#define ROUND                                                                            \
+    1e-6 /* of corners, which are floats or decimals in a file, per coordinate */
+#define LOOSE 1e-3 /* of slivers: what they are in is not known better than this */
+#define MOST  4096 /* planes of a shape */
 
-static enum imp_status plane_add(struct imp__boundary *b, const struct imp__body *body,
-                                 size_t first, imp_v3 p, imp_v3 n)
+static enum imp_status plane_add(struct imp__boundary *b, const struct imp__plane *x)
 {
     const struct imp_scene *scene = b->tracer->scene;
-    for (size_t k = first; k < b->n_planes; k++) {
-        const struct imp__plane *x = &b->plane[k];
-        if (imp__length(imp__cross(x->n, n)) < SAME &&
-            fabs(imp__dot(n, x->p - p)) < SAME * b->size)
-            return IMP_OK;
-    }
-    if (b->n_planes - first >= MOST)
-        return imp__error(
-            scene->ctx, IMP_E_UNSUPPORTED,
-            "derivatives by what moves: shape '%s' is a mirror of more than "
-            "%d facets",
-            scene->shapes[body->shape]->name, MOST);
     struct imp__plane *more =
         imp__grow(scene->ctx, b->plane, &b->cap_planes, b->n_planes + 1, sizeof *more);
     if (!more) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for mirrors");
     b->plane = more;
-    b->plane[b->n_planes++] = (struct imp__plane){body->shape, body->place, p, n};
+    b->plane[b->n_planes++] = *x;
+    return IMP_OK;
+}
+
+static double most(imp_v3 p)
+{
+    return imp_max(imp_max(fabs(p[0]), fabs(p[1])), fabs(p[2]));
+}
+
+/* Is a triangle in the plane, as far as corners that are rounded tell? */
+static bool plane_has(const struct imp__plane *x, const imp_v3 p[3])
+{
+    for (int k = 0; k < 3; k++) {
+        const imp_v3 r = p[k] - x->p;
+        if (fabs(imp__dot(x->n, r)) > ROUND * most(p[k]) + x->loose * imp__length(r))
+            return false;
+    }
+    return true;
+}
+
+/* The plane of a triangle among those of its shape, from `first` on: the largest one tells its normal. */
+static enum imp_status facet_add(struct imp__boundary *b, size_t first,
+                                 struct imp__plane x, const imp_v3 p[3], int *plane)
+{
+    const imp_v3 n = imp__cross(p[1] - p[0], p[2] - p[0]);
+    double longest = 0, far = 0;
+    *plane = -1;
+    if (imp__is_zero(n)) return IMP_OK;
+    for (int k = 0; k < 3; k++) {
+        longest = imp_max(longest, imp__length(p[k] - p[(k + 1) % 3]));
+        far = imp_max(far, most(p[k]));
+    }
+    x.p = p[0];
+    x.n = imp__normalize(n);
+    x.loose = imp_min(ROUND * far * longest / imp__length(n), LOOSE);
+    size_t k = first;
+    while (k < b->n_planes && !plane_has(&b->plane[k], p)) k++;
+    *plane = (int)k;
+    if (k == b->n_planes) return plane_add(b, &x);
+    if (x.loose < b->plane[k].loose) b->plane[k] = x;
+    return IMP_OK;
+}
+
+static enum imp_status facets_add(struct imp__boundary *b, const struct imp__body *body)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    const struct imp_shape *s = scene->shapes[body->shape];
+    const size_t first = b->n_planes, n = s->triangles.n_triangles;
+    int *more =
+        imp__grow(scene->ctx, b->plane_of, &b->cap_facets, b->n_facets + n, sizeof *more);
+    if (!more) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for mirrors");
+    b->plane_of = more;
+    const struct imp__plane x = {
+        .shape = body->shape, .place = body->place, .facet = (int64_t)b->n_facets};
+    for (size_t i = 0; i < n; i++) {
+        const struct imp__corners f =
+            imp__corners(scene, body->shape, (int)i, body->place);
+        IMP_CHECKED(facet_add(b, first, x, f.p, &b->plane_of[b->n_facets++]));
+        if (b->n_planes - first > MOST)
+            return imp__error(
+                scene->ctx, IMP_E_UNSUPPORTED,
+                "derivatives by what moves: shape '%s' is a mirror of more than "
+                "%d facets",
+                s->name, MOST);
+    }
     return IMP_OK;
 }
 
@@ -51,23 +107,15 @@ enum imp_status imp__mirrors_find(struct imp__boundary *b)
     const struct imp_scene *scene = b->tracer->scene;
     for (size_t k = 0; k < b->edges->n_bodies; k++) {
         const struct imp__body *body = &b->edges->body[k];
-        const struct imp_shape *s = scene->shapes[body->shape];
         const int placed = imp__placed_shape(scene, body->shape, body->place);
-        const size_t first = b->n_planes;
         if (!imp__mirror_lobes(imp__shape_bsdf(scene, scene->shapes[placed]))) continue;
-        if (s->geometry != IMP_TRIANGLES) {
-            const struct imp__rim_point rim =
-                imp__rim(scene, body->shape, body->place, 0, 0);
-            IMP_CHECKED(plane_add(b, body, first, rim.p, rim.n));
+        if (scene->shapes[body->shape]->geometry == IMP_TRIANGLES) {
+            IMP_CHECKED(facets_add(b, body));
             continue;
         }
-        for (size_t i = 0; i < s->triangles.n_triangles; i++) {
-            const struct imp__corners f =
-                imp__corners(scene, body->shape, (int)i, body->place);
-            const imp_v3 n = imp__cross(f.p[1] - f.p[0], f.p[2] - f.p[0]);
-            if (imp__is_zero(n)) continue;
-            IMP_CHECKED(plane_add(b, body, first, f.p[0], imp__normalize(n)));
-        }
+        const struct imp__rim_point rim = imp__rim(scene, body->shape, body->place, 0, 0);
+        const struct imp__plane x = {body->shape, body->place, -1, rim.p, rim.n, 0};
+        IMP_CHECKED(plane_add(b, &x));
     }
     return IMP_OK;
 }
@@ -141,8 +189,10 @@ bool imp__sight_draw(const struct imp__edge_draw *d, unsigned dims, struct imp__
     const struct imp__boundary *b = d->b;
     const size_t n = b->n_planes;
     const unsigned first = IMP_EDGE_MIRROR + dims * 2 * IMP_SIGHT_MAX;
+    const int depth = d->b->tracer->integrator->max_depth,
+              longest = depth < 0 ? IMP_SIGHT_MAX : imp_min(depth - 1, IMP_SIGHT_MAX);
     *s = (struct imp__sight){.chance = 1, .eye = d->eye};
-    if (n == 0) return false;
+    if (n == 0 || longest < 1) return false;
     do {
         const double u = imp__u01(d->key, first + 2 * (unsigned)s->n);
         size_t k;
@@ -159,9 +209,10 @@ bool imp__sight_draw(const struct imp__edge_draw *d, unsigned dims, struct imp__
         s->eye = b->parallel ? imp__mirror_turn(x->n, s->eye)
                              : imp__mirror_image(x->p, x->n, s->eye);
         if (n == 1) return true;
-        s->chance *= 0.5;
-    } while (s->n < IMP_SIGHT_MAX &&
-             imp__u01(d->key, first + 2 * (unsigned)s->n - 1) < 0.5);
+        /* k of them have the chance 1/(k (k + 1)), whose inverse grows less than F^2k falls. */
+    } while (s->n < longest &&
+             imp__u01(d->key, first + 2 * (unsigned)s->n - 1) * (s->n + 1) < s->n);
+    s->chance /= s->n < longest ? s->n * (s->n + 1.0) : s->n;
     return true;
 }
 
@@ -177,9 +228,11 @@ static bool mirror_met(struct imp__edge_draw *d, const struct imp__plane *x, imp
         (hit->shape != x->shape &&
          hit->shape != imp__placed_shape(scene, x->shape, x->place)))
         return false;
+    if (x->facet >= 0 && d->b->plane_of[x->facet + hit->prim] != x - d->b->plane)
+        return false; /* a facet of another plane */
     imp__hit_surface(scene, hit, &o, &w, at);
     at->p = q;
-    return imp__length(imp__cross(at->ng, x->n)) < 1e-4;
+    return true;
 }
 
 /* Light on the line between two mirrors, or from the last one to the camera. */
