@@ -62,7 +62,8 @@ static imp_scene *room_of(const char *rest, const char *grey)
 static imp_scene *room(const char *rest) { return room_of(rest, NULL); }
 
 /* An orthographic camera that looks along +y on 2 x 2, at a mirror that turns its rays to +x, where a
- * wall of radiance 3 glows; a black disk of radius r, or a square, is before it. `place`: where all of that is;
+ * wall of radiance 3 glows; a black disk of radius r, or a square, is before it. Images
+ * are behind far_clip, and the mirror is not. `place`: where all of that is;
  * `mirror`: from -1 to 1 in x and y. */
 static imp_scene *disk_scene(const char *place, const char *mirror, const char *disk)
 {
@@ -70,8 +71,9 @@ static imp_scene *disk_scene(const char *place, const char *mirror, const char *
     snprintf(
         xml, sizeof xml,
         "<scene version='3.0.0'>" PATH
-        "<sensor type='orthographic' id='camera'><transform name='to_world'><lookat "
-        "origin='0,-2,0' target='0,0,0' up='0,0,1'/>%s</transform><film type='hdrfilm'>"
+        "<sensor type='orthographic' id='camera'><float name='far_clip' value='3.5'/>"
+        "<transform name='to_world'><lookat origin='0,-2,0' target='0,0,0' "
+        "up='0,0,1'/>%s</transform><film type='hdrfilm'>"
         "<integer name='width' value='8'/><integer name='height' value='8'/><rfilter "
         "type='box'/></film></sensor>"
         "<shape id='mirror' %s<transform name='to_world'><scale x='1.8' y='1.5'/>"

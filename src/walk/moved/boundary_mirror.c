@@ -246,47 +246,72 @@ static bool leg_add(const struct imp__edge_draw *d, struct imp__sight *s, imp_v3
     return true;
 }
 
-bool imp__sight_reach(struct imp__edge_draw *d, struct imp__sight *s, imp_v3 p)
+/* The film position is that of the mirror next to the camera: a connection of the image itself would be
+ * clipped, though only the way to that mirror is. path: from there to the place; 0: to a direction. */
+static bool film_set(const struct imp__edge_draw *d, struct imp__sight *s, imp_v3 mirror,
+                     double path)
 {
-    const struct imp_sensor *sensor = d->b->tracer->sensor;
+    const double r = imp__length(mirror - d->eye);
     struct imp_shadow shadow;
-    struct imp_sensor_sample last;
-    imp_v3 behind[IMP_SIGHT_MAX + 1], at = p;
+    if (!imp__sensor_connect(d->b->tracer->sensor, &mirror, false, d->lens, &s->to) ||
+        !imp__light_on_film(d->b->tracer->sensor, &s->to))
+        return false;
+    imp__light_shadow_aim(&s->mirrors.last->at, &s->to, &shadow);
+    if (!leg_add(d, s, shadow.o, shadow.d, shadow.reach)) return false;
+    if (!d->b->parallel) s->to.weight *= imp__sqr(path > 0 ? r / (r + path) : r);
+    s->to.dist = path > 0 ? s->to.dist + path : INFINITY;
+    return true;
+}
+
+/* far: `at` is a direction. */
+static bool sight_go(struct imp__edge_draw *d, struct imp__sight *s, imp_v3 at, bool far)
+{
+    imp_v3 behind[IMP_SIGHT_MAX + 1];
+    double path = 0;
+    const imp_v3 w = at;
     s->T = imp__spec(1);
     behind[0] = d->eye;
     for (int k = 0; k < s->n; k++)
         behind[k + 1] =
             d->b->parallel ? imp__mirror_turn(s->plane[k]->n, behind[k])
                            : imp__mirror_image(s->plane[k]->p, s->plane[k]->n, behind[k]);
+    if (far) at = behind[s->n];
     for (int k = s->n - 1; k >= 0; k--) {
         const struct imp__plane *x = s->plane[k];
-        const imp_v3 r = d->b->parallel ? -behind[k + 1] : behind[k + 1] - at;
+        const bool first = k == s->n - 1, comes = far && first;
+        const imp_v3 r = comes            ? -w
+                         : d->b->parallel ? -behind[k + 1]
+                                          : behind[k + 1] - at;
         const double apart = imp__dot(x->n, x->p - at), till = apart / imp__dot(x->n, r);
-        if (!(till > 0) || fabs(apart) < SAME * d->b->size ||
-            !(d->b->parallel || till < 1))
+        if (!(comes ? till < 0 : till > 0) || fabs(apart) < SAME * d->b->size ||
+            !(comes || d->b->parallel || till < 1))
             return false;
-        const imp_v3 q = at + r * till, w = imp__normalize(r);
+        const imp_v3 q = at + r * till, to = imp__normalize(r);
         struct imp_hit hit;
         struct imp_surface there;
-        if (!mirror_met(d, x, q, w, &hit, &there)) return false;
-        const imp_spec F = imp__edge_reflected(d, &hit, &there, w);
+        if (!mirror_met(d, x, q, to, &hit, &there)) return false;
+        const imp_spec F = imp__edge_reflected(d, &hit, &there, to);
         if (imp__is_zero_used(F, d->waves)) return false;
-        if (k < s->n - 1) {
+        if (!first) {
             const imp_v3 o = imp__offset(at, s->plane[k + 1]->n, r),
                          end = imp__offset(q, x->n, -r);
             if (!leg_add(d, s, o, end - o, 1)) return false;
         }
+        path += imp__length(q - at);
         s->T *= F;
         s->bounces++;
         if (!imp__mirror_add(d, &s->mirrors, &hit, &there)) return false;
         at = q;
     }
-    if (!imp__sensor_connect(sensor, &at, false, d->lens, &last)) return false;
-    imp__light_shadow_aim(&s->mirrors.last->at, &last, &shadow);
-    if (!leg_add(d, s, shadow.o, shadow.d, shadow.reach)) return false;
-    s->image = p;
-    for (const struct imp__mirror *m = s->mirrors.first; m; m = m->on)
-        s->image = imp__mirror_image(m->x.p, m->x.n, s->image);
-    return imp__sensor_connect(sensor, &s->image, false, d->lens, &s->to) &&
-           imp__light_on_film(sensor, &s->to);
+    return film_set(d, s, at, far ? 0 : path);
+}
+
+bool imp__sight_reach(struct imp__edge_draw *d, struct imp__sight *s, imp_v3 p)
+{
+    return sight_go(d, s, p, false);
+}
+
+bool imp__sight_reach_far(struct imp__edge_draw *d, struct imp__sight *s, imp_v3 w)
+{
+    return !d->b->parallel && sight_go(d, s, w, true);
 }

@@ -129,16 +129,17 @@ struct imp__sight {
     double chance;
     imp_v3 eye;
     /* By imp__sight_reach: mirrors from the place on, what they let pass to the camera, from the
-     * first one on, how many surfaces that are; the image of the place, and its connection. */
+     * first one on, how many surfaces that are; the connection of the image. */
     struct imp__mirrors mirrors;
     imp_spec T;
     int bounces;
-    imp_v3 image;
     struct imp_sensor_sample to;
 };
 bool imp__sight_draw(const struct imp__edge_draw *d, unsigned dims, struct imp__sight *s);
 /* False: it is not seen so. The line to the first mirror is the caller's. */
 bool imp__sight_reach(struct imp__edge_draw *d, struct imp__sight *s, imp_v3 p);
+/* The same of what is infinitely far along the unit vector w. */
+bool imp__sight_reach_far(struct imp__edge_draw *d, struct imp__sight *s, imp_v3 w);
 
 /* ---- Straight lines: boundary_line.c ---- */
 /* The material of what was hit, which in an instance may be its own. */

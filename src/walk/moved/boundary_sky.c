@@ -55,21 +55,19 @@ void imp__draw_sky_mirrored(struct imp__edge_draw *d)
 {
     const int max = d->b->tracer->integrator->max_depth;
     const imp_v3 w = circle_draw(d), m = imp__cross(d->along, w);
-    const double far = 4 * d->b->size;
     struct imp__sight s;
     struct imp__line line;
     if (!d->b->tracer->sensor->ops->connect || !imp__sight_draw(d, 0, &s) ||
-        !imp__sight_reach(d, &s, s.eye + w * far))
+        !imp__sight_reach_far(d, &s, w))
         return;
     const struct imp_surface *at = &s.mirrors.first->at;
     const imp_v3 o = imp__offset(at->p, at->ng, w);
     if (!imp__edge_line(d, o, w, INFINITY, &line) ||
         (max >= 0 && s.bounces + line.bounces >= max))
         return;
-    const double spread = s.to.weight * imp__sqr(far); /* at the distance 1 */
     struct imp__flux *f = imp__jump_add(d, &s.to,
                                         s.T * line.T * imp__sky_jump(d, w, m) *
-                                            (spread * d->inv_pdf / s.chance),
+                                            (s.to.weight * d->inv_pdf / s.chance),
                                         2 + 2 * s.n);
     if (!f) return;
     /* The ray turns by (u(e + w) - u(e)), e the eye's image. */
