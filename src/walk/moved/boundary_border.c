@@ -51,8 +51,11 @@ void imp__draw_border(struct imp__edge_draw *d)
         /* Where the meter is must be behind an edge: one next to the light. */
         const double near = 1e-6 * (meets ? hit.t : b->size);
         const imp_v3 to = w * near;
-        struct imp_hit scaled = hit;
-        scaled.t = (float)(hit.t / near);
+        struct imp_hit scaled;
+        if (meets) {
+            scaled = hit;
+            scaled.t = (float)(hit.t / near);
+        }
         if (imp__meter_meet(d, o, to, meets ? &scaled : NULL, &x)) {
             const imp_v3 r = x.at.p - o;
             light.light = sent * (1 / imp__length(r));
