@@ -14,7 +14,7 @@ static imp_context *ctx;
 
 /* Smooth over the picture, in steps of pixels that no difference notices. */
 static float adjoint[WIDTH * HEIGHT * 3];
-static void adjoint_make(void)
+static inline void adjoint_make(void)
 {
     for (int p = 0; p < WIDTH * HEIGHT; p++)
         for (int c = 0; c < 3; c++) {

@@ -197,8 +197,9 @@ static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
     switch (kind) {
     case IMP_BOUNDARY_FILM:
         if (item == IMP_ITEM_ROUND || item == IMP_ITEM_ARC) film_work(d);
-        if (item == IMP_ITEM_SHADING && !d->b->rays) {
-            imp__draw_shading_film(d);
+        if (item == IMP_ITEM_SHADING) {
+            if (d->b->rays) imp__draw_shading_ray(d);
+            else imp__draw_shading_film(d);
             if (imp_unlikely(d->b->n_planes > 0)) imp__draw_shading_mirrored(d);
         }
         if (item == IMP_ITEM_SKY) {

@@ -274,6 +274,13 @@ void imp__ray_looked_at(const struct imp__boundary *b, imp_v3 *at);
 /* A pixel and its ray, by d->lens. */
 void imp__ray_draw(struct imp__edge_draw *d);
 void imp__draw_ray(struct imp__edge_draw *d);
+/* f cos of light from w at the point that the ray meets. */
+imp_spec imp__ray_receives(const struct imp__edge_draw *d, imp_v3 w);
+/* A jump by L of the ray's reading. NULL: nothing jumps, or no memory. */
+struct imp__flux *imp__ray_jump_add(struct imp__edge_draw *d, imp_spec L);
+/* The point slides along the ray: two ends of f, where a shift of the point counts `shift`. */
+void imp__ray_point_ends(const struct imp__edge_draw *d, imp_v3 shift,
+                         struct imp__flux *f);
 /* IMP_E_UNSUPPORTED, with the name of what a ray must not meet. */
 enum imp_status imp__rays_allowed(const struct imp__boundary *b);
 
@@ -332,6 +339,7 @@ imp_spec imp__sky_jump(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m);
 enum imp_status imp__boundary_choices_make(struct imp__boundary *b);
 /* ---- Of meshes with vertex normals: boundary_shading.c, boundary_turning.c, boundary_horizon.c ---- */
 void imp__draw_shading_film(struct imp__edge_draw *d);
+void imp__draw_shading_ray(struct imp__edge_draw *d);
 void imp__draw_shading_mirrored(struct imp__edge_draw *d);
 void imp__draw_shading_scatter(struct imp__edge_draw *d);
 void imp__draw_horizon(struct imp__edge_draw *d);

@@ -7,7 +7,8 @@
  *
  *     dI = int dl sin(phi)/r^2 f cos_x [L(-) - L(+)] m.(V - V_line),   r = |p - x|,
  *
- * and x slides along the ray. Other vertices are connected to x (boundary_reach.c). */
+ * and x slides along the ray. So does a curve where the shading normal of a mesh turns away from x
+ * (boundary_shading.c). Other vertices are connected to x (boundary_reach.c). */
 #include "boundary_parts.h"
 #include "kind/cleared.h"
 #include "scene/located.h"
@@ -66,8 +67,7 @@ enum imp_status imp__rays_allowed(const struct imp__boundary *b)
                : IMP_OK;
 }
 
-/* f cos of light from w at the point that the ray meets. */
-static imp_spec receives(const struct imp__edge_draw *d, imp_v3 w)
+imp_spec imp__ray_receives(const struct imp__edge_draw *d, imp_v3 w)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
     const struct imp__edge_ray *ray = &d->ray;
@@ -88,8 +88,8 @@ static imp_spec receives(const struct imp__edge_draw *d, imp_v3 w)
     return f;
 }
 
-/* The point slides along the ray, where its shift is `shift`. */
-static void point_ends(const struct imp__edge_draw *d, imp_v3 shift, struct imp__flux *f)
+void imp__ray_point_ends(const struct imp__edge_draw *d, imp_v3 shift,
+                         struct imp__flux *f)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
     const struct imp__edge_ray *ray = &d->ray;
@@ -105,7 +105,7 @@ static void point_ends(const struct imp__edge_draw *d, imp_v3 shift, struct imp_
     f->end[f->n_ends++] = imp__flux_camera(d, &x.x, on_ray);
 }
 
-static struct imp__flux *jump_add(struct imp__edge_draw *d, imp_spec L)
+struct imp__flux *imp__ray_jump_add(struct imp__edge_draw *d, imp_spec L)
 {
     const struct imp_sensor_sample to = {.px = d->ray.px, .py = d->ray.py};
     return imp__jump_add(d, &to, L, IMP_EDGE_ENDS + 3);
@@ -118,7 +118,7 @@ static void emission_add(struct imp__edge_draw *d, const struct imp_walk *walk, 
     imp_spec T;
     const struct imp_vertex *v = imp__walk_met(d, walk, &T);
     if (!v) return;
-    struct imp__flux *f = jump_add(d, T * v->e * times);
+    struct imp__flux *f = imp__ray_jump_add(d, T * v->e * times);
     if (!f) return;
     f->n_ends = imp__edge_ends(d, m, f->end);
     const struct imp__glued y =
@@ -127,7 +127,7 @@ static void emission_add(struct imp__edge_draw *d, const struct imp_walk *walk, 
     const double far =
         imp_clamp(1 - imp__length(d->p - x) / imp__length(y.p - x), 0.0, 1.0);
     f->end[f->n_ends++] = imp__flux_glued(&y, m * (far - 1));
-    point_ends(d, m * -far, f);
+    imp__ray_point_ends(d, m * -far, f);
 }
 
 static void look_beside(struct imp__edge_draw *d, imp_v3 o, imp_v3 m, double apart,
@@ -146,7 +146,7 @@ void imp__draw_ray(struct imp__edge_draw *d)
     const imp_v3 r = d->p - x, turned = imp__cross(d->along, r);
     const double distance = imp__length(r);
     if (!(imp__length(turned) > 0)) return;
-    const imp_spec times = receives(d, r * (1 / distance)) *
+    const imp_spec times = imp__ray_receives(d, r * (1 / distance)) *
                            (film->width * film->height * d->inv_pdf *
                             imp__length(turned) / (distance * distance * distance));
     if (imp__is_zero_used(times, d->waves)) return;
@@ -160,10 +160,10 @@ void imp__draw_ray(struct imp__edge_draw *d)
     look_beside(d, o, m, apart, &hi);
     const struct imp__seen_from from = {.before = 1};
     const imp_spec jump = imp__arrives(d->b, &lo, from) - imp__arrives(d->b, &hi, from);
-    struct imp__flux *f = jump_add(d, jump * times);
+    struct imp__flux *f = imp__ray_jump_add(d, jump * times);
     if (f) {
         f->n_ends = imp__edge_ends(d, m, f->end);
-        point_ends(d, -m, f);
+        imp__ray_point_ends(d, -m, f);
     }
     emission_add(d, &lo, m, times);
     emission_add(d, &hi, m, -times);

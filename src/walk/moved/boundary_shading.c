@@ -139,6 +139,46 @@ void imp__draw_shading_film(struct imp__edge_draw *d)
     f->end[f->n_ends++] = imp__flux_camera(d, &eye, turn);
 }
 
+void imp__draw_shading_ray(struct imp__edge_draw *d)
+{
+    const struct imp_film_desc *film = &d->b->tracer->sensor->film;
+    const int max = d->b->tracer->integrator->max_depth;
+    const struct imp_surface *viewer = &d->ray.at;
+    struct imp_surface at;
+    struct imp_hit hit;
+    struct turning x;
+    struct imp__line line;
+    struct imp_walk lit, dark;
+    if (!d->ray.meets || (max >= 0 && max < 2) ||
+        !imp__edge_turning_point(d, viewer->p, false, &hit))
+        return;
+    imp__edge_item_surface(d, &hit, &at);
+    d->p = at.p;
+    const imp_v3 o = imp__offset(viewer->p, viewer->ng, at.p - viewer->p), r = at.p - o,
+                 wo = imp__normalize(-r);
+    const double t = imp__length(r);
+    const imp_spec times =
+        imp__ray_receives(d, -wo) *
+        (film->width * film->height * fabs(imp__dot(at.ng, wo)) * d->inv_pdf / (t * t));
+    if (imp__is_zero_used(times, d->waves) ||
+        !imp__edge_line(d, o, r, 1 - IMP_BESIDE, &line) ||
+        !turning_at(d, &hit, &at, wo, t, false, &x))
+        return;
+    if (!look_next(d, &x, 1, o, 1, &lit))
+        imp__look_from(d, viewer, x.x.p + x.beside, 1, &lit);
+    if (!look_next(d, &x, -1, o, 1, &dark))
+        imp__look_from(d, viewer, x.x.p - x.beside, 1, &dark);
+    const struct imp__seen_from from = {.before = 1};
+    const imp_spec jump =
+        imp__arrives(d->b, &lit, from) - imp__arrives(d->b, &dark, from);
+    struct imp__flux *f = imp__ray_jump_add(d, jump * times * (1 / x.slope));
+    if (!f) return;
+    struct imp__link_point p = {.x = x.x, .bar = {.shade = wo}};
+    const imp_v3 shift = imp__slide_bar(&p, wo, NULL);
+    f->end[f->n_ends++] = (struct imp__flux_end){p.x, p.bar, false, 0, {0}};
+    imp__ray_point_ends(d, shift, f);
+}
+
 /* A ray over mirrors leads to p and comes from its image t away along wo. What its shift at p, and its
  * turn times n, count: to the mirrors, and (at, bar) to two points of the ray at its other end. */
 struct ray_ends {

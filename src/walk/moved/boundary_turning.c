@@ -48,11 +48,12 @@ static double perimeter(const struct imp__corners *c)
            imp__length(c->p[0] - c->p[2]);
 }
 
-/* How far the points through which it sees are from the middle. */
+/* How far the points through which it sees, or of rays those that they look at, are from the middle. */
 static double eye_radius(const struct imp__boundary *b)
 {
     const struct imp_sensor *s = b->tracer->sensor;
     const double rim[2] = {1, 0.5};
+    if (b->rays) return s->film.width * s->film.height > 1 ? INFINITY : 0;
     if (s->shape) return 0.5 * imp__length(s->shape->hi - s->shape->lo);
     imp_v3 point = b->camera;
     imp__lens_point(s, rim, &point);
