@@ -55,10 +55,12 @@ static enum imp_status sun_mover(const struct imp__moves *moves, struct imp__mov
         return imp__error(moves->scene->ctx, IMP_E_UNSUPPORTED,
                           "light '%s' (%s) has no sun", e->name, e->ops->name);
     m->axis = sun.towards;
-    if (m->kind == IMP_MOVE_SUN) return imp__suns_make(moves->scene->ctx, e, &m->suns);
-    m->count = 1;
-    m->rate = 1 / tan(sun.radius / 2);
-    return IMP_OK;
+    if (m->kind == IMP_MOVE_DISC) {
+        m->count = 1;
+        m->rate = 1 / tan(sun.radius / 2);
+        if (!sun.power) return IMP_OK; /* it is as bright */
+    }
+    return imp__suns_make(moves->scene->ctx, e, m->kind, &m->suns);
 }
 
 static enum imp_status light_mover(struct imp__moves *moves, struct imp__mover *m)

@@ -71,7 +71,8 @@ struct imp__mover {
     double rate;            /* the velocities' factor */
     size_t first, count;    /* its numbers */
     struct imp__fans *fans; /* of vertices with normals; else NULL */
-    struct imp__suns *suns; /* of IMP_MOVE_SUN; else NULL */
+    struct imp__suns *suns; /* of IMP_MOVE_SUN, and of IMP_MOVE_DISC that changes what
+                                it sends; else NULL */
 };
 
 struct imp__moves {

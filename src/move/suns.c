@@ -12,13 +12,20 @@ static imp_v3 sun_at(const struct imp__suns *s, int i, int j)
     return s->towards * cos(by) + s->across[i] * sin(by);
 }
 
-enum imp_status imp__suns_make(imp_context *ctx, const struct imp_emitter *e,
-                               struct imp__suns **out)
+static double radius_at(const struct imp__suns *s, int j)
 {
+    return s->radius * (j ? 1 + IMP_SUNS_WIDER : 1 - IMP_SUNS_WIDER);
+}
+
+enum imp_status imp__suns_make(imp_context *ctx, const struct imp_emitter *e,
+                               enum imp__move_kind kind, struct imp__suns **out)
+{
+    const int first = kind == IMP_MOVE_DISC ? IMP_SUNS_WIDTH : 0,
+              until = kind == IMP_MOVE_DISC ? IMP_SUNS_WAYS : IMP_SUNS_WIDTH;
     const size_t size = e->ops->object_size, align = _Alignof(max_align_t),
                  each = (size + align - 1) / align * align,
                  head = (sizeof **out + align - 1) / align * align;
-    struct imp__suns *s = imp__alloc(ctx, 1, head + 4 * each);
+    struct imp__suns *s = imp__alloc(ctx, 1, head + 2 * IMP_SUNS_WAYS * each);
     struct imp__sky_sun sun;
     if (!s) return imp__error(ctx, IMP_E_NOMEM, "no memory for a sun that moves");
     imp__sky_sun_read(e, &sun);
@@ -26,13 +33,16 @@ enum imp_status imp__suns_make(imp_context *ctx, const struct imp_emitter *e,
     s->towards = sun.towards;
     s->across[0] = f.s;
     s->across[1] = f.t;
-    for (int k = 0; k < 4; k++) {
+    s->radius = sun.radius;
+    for (int k = 2 * first; k < 2 * until; k++) {
         struct imp_emitter *beside = &s->beside[k / 2][k % 2];
+        struct imp__sky_sun there = sun;
         *beside = *e;
         beside->self = (char *)s + head + (size_t)k * each;
         memcpy(beside->self, e->self, size);
-        sun.towards = sun_at(s, k / 2, k % 2);
-        imp__sky_sun_set(beside, &sun); /* it is above the horizon by more than that */
+        if (first) there.radius = radius_at(s, k % 2);
+        else there.towards = sun_at(s, k / 2, k % 2);
+        imp__sky_sun_set(beside, &there); /* it is above the horizon by more than that */
     }
     *out = s;
     return IMP_OK;
@@ -48,8 +58,22 @@ const struct imp__mover *imp__sun_mover(const struct imp__moves *moves, int emit
     return NULL;
 }
 
+/* cos g' = 1 - 2 sin^2(g'/2), and the part across the axis as long as sin g'. */
+static imp_v3 widened(const struct imp__suns *s, int j, imp_v3 w)
+{
+    const imp_v3 chord = w - s->towards,
+                 across = w - s->towards * imp__dot(s->towards, w);
+    const double ratio =
+                     sin(radius_at(s, j) / 2) / sin(s->radius / 2), /* 4 sin^2(g'/2): */
+        square = imp_min(imp__dot(chord, chord) * ratio * ratio, 4.0),
+                 sine = sqrt(square * (1 - square / 4)), length = imp__length(across);
+    if (!(length > 0)) return w;
+    return s->towards * (1 - square / 2) + across * (sine / length);
+}
+
 imp_v3 imp__suns_turned(const struct imp__suns *s, int i, int j, imp_v3 w)
 {
+    if (i == IMP_SUNS_WIDTH) return widened(s, j, w);
     const double by = j ? IMP_SUNS_BESIDE : -IMP_SUNS_BESIDE;
     const imp_v3 axis = imp__cross(s->towards, s->across[i]);
     return w * cos(by) + imp__cross(axis, w) * sin(by) +

@@ -134,6 +134,13 @@ static void cie_test(void)
     "<float name='sun_aperture' value='16'/><float name='sun_scale' value='.004'/>"      \
     "<float name='sky_scale' value='20'/><boolean name='complex_sun' value='true'/>"     \
     "</emitter>"
+/* Its upper half through a telescope, where what it sends depends on the height of a place in it. */
+#define INSIDE                                                                           \
+    "<scene version='3.0.0'><integrator type='direct'/><sensor type='perspective' "      \
+    "id='camera'><float name='fov' value='5'/><transform name='to_world'><lookat "       \
+    "origin='0,0,0' target='-.2,1.2,.49' up='0,0,1'/></transform><film "                 \
+    "type='hdrfilm'><integer name='width' value='24'/><integer name='height' "           \
+    "value='16'/><rfilter type='box'/></film></sensor>" SKY_LIMB "</scene>"
 #define MIRROR                                                                           \
     "<shape type='rectangle'><transform name='to_world'><scale value='1.2'/><rotate "    \
     "x='1' angle='70'/><translate x='1.3' y='-1.4' z='1.1'/></transform><bsdf "          \
@@ -156,6 +163,10 @@ int main(int argc, char **argv)
                                          {"sky.sun_radius", 0, .004},
                                          {"block.pose", 0, .03},
                                          {NULL, 0, 0}},
+                               inside[] = {{"sky.sun_radius", 0, .0002},
+                                           {"sky.sun_direction", 0, .002},
+                                           {"sky.sun_direction", 2, .002},
+                                           {NULL, 0, 0}},
                                seen[] = {{"sky.sun_direction", 0, .002},
                                          {"sky.sun_direction", 2, .002},
                                          {"camera.pose", 4, .002},
@@ -172,6 +183,8 @@ int main(int argc, char **argv)
                     16, 16 * more, .01, place);
     numbers_compare("a clear sky alone", test_scene_text(ctx, ALONE(SKY_LIMB), IMP_MONO),
                     64 * more, 64 * more, .06, seen);
+    numbers_compare("inside of a sun", test_scene_text(ctx, INSIDE, IMP_MONO), 16, 16,
+                    .01, inside);
     numbers_compare("a CIE sky", sky_field(SKY_PATH SKY_CIE), 16 * more, 16 * more, .03,
                     place);
     numbers_compare("a CIE sky behind a mask", sky_field(SKY_PATH SKY_CIE MASK),

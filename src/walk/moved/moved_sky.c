@@ -91,26 +91,31 @@ bool imp__sky_in_parts(const struct imp__moves *moves, int emitter)
            imp__sun_mover(moves, emitter, IMP_MOVE_DISC);
 }
 
-/* What a part of the sky changes by with the sun's place, of w at rest, or of the disc, of w that goes
- * with it; bar: the adjoint of its radiance, by lanes. */
+/* bar, by lanes, times what a part of the sky changes by from one side to the other of a way of the sun:
+ * of w at rest, or, of the disc, of w that goes with it. */
+static double sun_change(const struct imp__moves *moves, const struct imp__mover *m,
+                         int way, enum imp__sky_part part, imp_v3 w, imp_spec bar,
+                         const struct imp_carried *carried)
+{
+    imp_spec L[2];
+    for (int j = 0; j < 2; j++) {
+        const imp_v3 at = part == IMP_SKY_DISC ? imp__suns_turned(m->suns, way, j, w) : w;
+        L[j] = imp__sky_part_from(&m->suns->beside[way][j], part, at, carried);
+    }
+    if (part == IMP_SKY_DISC && (imp__is_zero(L[0]) || imp__is_zero(L[1])))
+        return 0; /* its border, rounded */
+    return imp__sum_used((L[1] - L[0]) * bar, moves->scene->lanes);
+}
+
+/* By the sun's place; bar: the adjoint of the part's radiance. */
 static void sun_slope_bar(const struct imp__moves *moves, const struct imp__mover *m,
                           enum imp__sky_part part, imp_v3 w, imp_spec bar,
                           const struct imp_carried *carried, double *theta_bar)
 {
-    const int lanes = moves->scene->lanes;
     imp_v3 slope = {0};
-    for (int i = 0; i < 2; i++) {
-        imp_spec L[2];
-        for (int j = 0; j < 2; j++) {
-            const imp_v3 at =
-                part == IMP_SKY_DISC ? imp__suns_turned(m->suns, i, j, w) : w;
-            L[j] = imp__sky_part_from(&m->suns->beside[i][j], part, at, carried);
-        }
-        if (part == IMP_SKY_DISC && (imp__is_zero(L[0]) || imp__is_zero(L[1])))
-            continue; /* its border, rounded */
+    for (int i = 0; i < 2; i++)
         slope += m->suns->across[i] *
-                 (imp__sum_used((L[1] - L[0]) * bar, lanes) / (2 * IMP_SUNS_BESIDE));
-    }
+                 (sun_change(moves, m, i, part, w, bar, carried) / (2 * IMP_SUNS_BESIDE));
     imp__move_vector_bar(theta_bar + m->first, slope * m->rate);
 }
 
@@ -129,9 +134,10 @@ static void sun_radiance_bar(const struct imp__moves *moves, int emitter, imp_v3
     if (sun) sun_slope_bar(moves, sun, IMP_SKY_AROUND, w, bar, carried, theta_bar);
     if (sun && !imp__is_zero(*disc))
         sun_slope_bar(moves, sun, IMP_SKY_DISC, w, bar, carried, theta_bar);
-    if (radius && now.power) /* as dim as its solid angle 4 pi sin^2(r/2) is large */
-        theta_bar[radius->first] -=
-            radius->rate * imp__sum_used(bar * *disc, moves->scene->lanes);
+    if (radius && now.power && !imp__is_zero(*disc)) /* as dim as it is large */
+        theta_bar[radius->first] +=
+            sun_change(moves, radius, IMP_SUNS_WIDTH, IMP_SKY_DISC, w, bar, carried) /
+            (2 * IMP_SUNS_WIDER * now.radius);
 }
 
 imp_spec imp__sky_sent_bar(const struct imp__moves *moves, int emitter, imp_v3 w,
