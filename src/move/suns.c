@@ -42,7 +42,13 @@ enum imp_status imp__suns_make(imp_context *ctx, const struct imp_emitter *e,
         memcpy(beside->self, e->self, size);
         if (first) there.radius = radius_at(s, k % 2);
         else there.towards = sun_at(s, k / 2, k % 2);
-        imp__sky_sun_set(beside, &there); /* it is above the horizon by more than that */
+        const char *wrong = imp__sky_sun_set(beside, &there);
+        if (!wrong) continue;
+        imp__release(ctx, s);
+        return imp__error(ctx, IMP_E_NUMERIC,
+                          "derivatives by the sun of light '%s' (%s), which beside its "
+                          "place %s",
+                          e->name, e->ops->name, wrong);
     }
     *out = s;
     return IMP_OK;

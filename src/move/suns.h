@@ -25,7 +25,7 @@ struct imp__suns {
                              [2]; /* [way][its two signs]; of those of its kind */
 };
 
-/* Those of this kind; released as a whole. IMP_E_NOMEM. */
+/* Those of this kind; released as a whole. IMP_E_NOMEM; IMP_E_NUMERIC where the sky cannot be beside. */
 enum imp_status imp__suns_make(imp_context *ctx, const struct imp_emitter *e,
                                enum imp__move_kind kind, struct imp__suns **out);
 /* The movers of this kind of a light: the first, or NULL. */

@@ -120,6 +120,10 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
         imp__sky_sun_read(p->emitter, &sun);
         for (int i = 0; i < 3; i++) p->start[i] = sun.towards[i];
         if (p->kind == IMP_POSE_SUN_RADIUS) p->start[0] = sun.radius;
+        if (p->kind == IMP_POSE_SUN_RADIUS && imp__sun_radius_at(p->emitter)) {
+            p->number = imp__sun_radius_at(p->emitter); /* one number by two names */
+            p->start[0] = p->number[0];
+        }
         memcpy(p->number, p->start, p->n * sizeof *p->number);
         break;
     case IMP_POSE_CENTER:

@@ -48,10 +48,11 @@ static enum imp_status sun_apply(const struct imp_pose *p, const struct imp_pose
     if (radius) sun.radius = radius->number[0];
     const bool moved = (at && memcmp(at->number, at->start, 3 * sizeof(double)) != 0) ||
                        (radius && radius->number[0] != radius->start[0]);
-    if ((moved || sun.alone) && !imp__sky_sun_set(e, &sun))
-        return imp__error(p->scene->ctx, IMP_E_NUMERIC,
-                          "%s puts the sun below the horizon",
-                          p->scene->params[at ? at->param : radius->param].info.name);
+    const char *wrong = moved || sun.alone ? imp__sky_sun_set(e, &sun) : NULL;
+    if (wrong)
+        return imp__error(p->scene->ctx, IMP_E_NUMERIC, "%s %s",
+                          p->scene->params[at ? at->param : radius->param].info.name,
+                          wrong);
     if (e->ops->changed) e->ops->changed(e);
     return IMP_OK;
 }

@@ -116,6 +116,78 @@ static void cie_test(void)
     imp_scene_destroy(scene);
 }
 
+/* ---- Values ----------------------------------------------------------------------------------- */
+
+static size_t index_of(imp_scene *scene, const char *name)
+{
+    size_t index;
+    test_must(ctx, imp_scene_find_param(scene, name, &index));
+    return index;
+}
+static double value_of(imp_scene *scene, const char *name)
+{
+    double v;
+    test_must(ctx, imp_scene_get_values(scene, index_of(scene, name), &v));
+    return v;
+}
+static void value_set(imp_scene *scene, const char *name, double v)
+{
+    test_must(ctx, imp_scene_set_values(scene, index_of(scene, name), 1, &v));
+}
+
+/* A sun's radius has two names. */
+static void names_test(void)
+{
+    static const char *const name[2] = {"sun.radius.value", "sun.sun_radius"};
+    const double radius[2] = {.3, .1}, along[3] = {.5, -.6, -.8};
+    const imp_v3 w = imp__normalize(imp__v3(-.5, .6, .8));
+    imp_scene *scene = test_scene_text(
+        ctx,
+        METER_BELOW("<emitter type='sun' id='sun'><vector name='direction' "
+                    "value='.5,-.6,-.9'/><float name='radius' value='.2'/><rgb "
+                    "name='radiance' value='7'/></emitter>"),
+        IMP_MONO);
+    test_must(ctx, imp_scene_add_geometry(scene, "sun.sun_radius"));
+    test_must(ctx, imp_scene_add_geometry(scene, "sun.direction"));
+    for (int k = 0; k < 2; k++) {
+        struct tap_stat lit = {0};
+        char what[80];
+        value_set(scene, name[k], radius[k]);
+        test_must(
+            ctx, imp_scene_set_values(scene, index_of(scene, "sun.direction"), 3, along));
+        tap_ok(value_of(scene, name[0]) == radius[k] &&
+                   value_of(scene, name[1]) == radius[k],
+               "a sun's radius by both names, set as %s # %g %g", name[k],
+               value_of(scene, name[0]), value_of(scene, name[1]));
+        for (uint64_t s = 0; s < 24; s++) tap_add(&lit, mean_of(scene, 64, 500 + s));
+        snprintf(what, sizeof what, "irradiance, set as %s", name[k]);
+        tap_z(&lit, IMP_PI * 7 * imp__sqr(sin(radius[k])) * w[2], .002, what);
+    }
+    imp_scene_destroy(scene);
+}
+
+/* Bright and even, which the model has under a high sun alone. */
+static void no_sky_test(void)
+{
+    const double low[3] = {.8, .5, .35};
+    double there[3];
+    imp_scene *scene = test_scene_text(
+        ctx,
+        METER_BELOW("<emitter type='perezsky' id='sky'><float name='diffuse' "
+                    "value='800'/><float name='direct' value='0'/><vector "
+                    "name='sun_direction' value='.4,.2,.9'/></emitter>"),
+        IMP_MONO);
+    test_must(ctx, imp_scene_add_geometry(scene, "sky.sun_direction"));
+    const size_t index = index_of(scene, "sky.sun_direction");
+    const double before = mean_of(scene, 64, 3);
+    const enum imp_status st = imp_scene_set_values(scene, index, 3, low);
+    tap_ok(st == IMP_E_NUMERIC && strstr(imp_last_error(ctx), "no sky"),
+           "a sun for which the model has no sky # %s", imp_last_error(ctx));
+    test_must(ctx, imp_scene_get_values(scene, index, there));
+    tap_ok(there[2] > .8 && mean_of(scene, 64, 3) == before, "all is as before");
+    imp_scene_destroy(scene);
+}
+
 /* ---- Differences ------------------------------------------------------------------------------- */
 
 #define ALONE(sky)                                                                       \
@@ -179,6 +251,8 @@ int main(int argc, char **argv)
     radius_test();
     dimmer_test();
     cie_test();
+    names_test();
+    no_sky_test();
     numbers_compare("a Perez sky alone", test_scene_text(ctx, ALONE(SKY_PEREZ), IMP_MONO),
                     16, 16 * more, .01, place);
     numbers_compare("a clear sky alone", test_scene_text(ctx, ALONE(SKY_LIMB), IMP_MONO),

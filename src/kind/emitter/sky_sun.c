@@ -29,18 +29,26 @@ bool imp__sky_sun_read(const struct imp_emitter *e, struct imp__sky_sun *out)
     return !s->overcast && (s->n[2] != 0 || s->n[4] != 0 || e->ops == &imp__perezsky);
 }
 
-bool imp__sky_sun_set(struct imp_emitter *e, const struct imp__sky_sun *sun)
+const char *imp__sky_sun_set(struct imp_emitter *e, const struct imp__sky_sun *sun)
 {
-    if (e->ops == &imp__sunsky) return imp__sunsky_sun_set(e, sun);
+    static const char below[] = "puts the sun below the horizon";
+    if (e->ops == &imp__sunsky) return imp__sunsky_sun_set(e, sun) ? NULL : below;
     if (!is_shape(e)) {
         imp__sun_radius_set(e, sun->radius);
-        return true;
+        return NULL;
     }
     struct imp__sky_shape *s = e->self;
     s->sun = sun->towards;
-    if (imp__dot(s->sun, s->axis[2]) < 0) return false;
+    if (imp__dot(s->sun, s->axis[2]) < 0) return below;
     s->fit(s);
-    return true;
+    return s->factor > 0 && isfinite(s->factor)
+               ? NULL
+               : "puts the sun where the model has no sky for its numbers";
+}
+
+double *imp__sun_radius_at(const struct imp_emitter *e)
+{
+    return e->ops == &imp__sun ? imp__sun_radius_number(e) : NULL;
 }
 
 bool imp__sky_sun_is_clear(const struct imp_emitter *e)

@@ -18,9 +18,11 @@ struct imp__sky_sun {
 /* sunsky whose sun is above the horizon, ciesky and perezsky that depend on it, and sun. False: another
  * light. */
 bool imp__sky_sun_read(const struct imp_emitter *e, struct imp__sky_sun *out);
-/* Puts it there, with `towards` and `radius`; the sampling of directions follows by ops->changed. False:
- * that is below the horizon. */
-bool imp__sky_sun_set(struct imp_emitter *e, const struct imp__sky_sun *sun);
+/* Puts it there, with `towards` and `radius`; the sampling of directions follows by ops->changed. NULL,
+ * or what is wrong with it. */
+const char *imp__sky_sun_set(struct imp_emitter *e, const struct imp__sky_sun *sun);
+/* The radius of a `sun`, where it is kept: its input's number. NULL: another light. */
+double *imp__sun_radius_at(const struct imp_emitter *e);
 
 /* Is its disc above the horizon in whole, by an angle that no difference crosses? */
 bool imp__sky_sun_is_clear(const struct imp_emitter *e);
@@ -34,5 +36,6 @@ bool imp__sunsky_sun_read(const struct imp_emitter *e, struct imp__sky_sun *out)
 bool imp__sunsky_sun_set(struct imp_emitter *e, const struct imp__sky_sun *sun);
 void imp__sunsky_part(bool disc, imp_spec *in);
 void imp__sun_radius_set(struct imp_emitter *e, double radius);
+double *imp__sun_radius_number(const struct imp_emitter *e);
 
 #endif

@@ -140,9 +140,18 @@ bool imp__sun_disc(const struct imp_emitter *e, imp_v3 *axis, double *size)
     return true;
 }
 
+static imp_spec *radius_lanes(const struct imp_emitter *e)
+{
+    return &((struct imp_input *)(uintptr_t)e->input[RADIUS])->value;
+}
+
 void imp__sun_radius_set(struct imp_emitter *e, double radius)
 {
-    struct imp_input *in = (struct imp_input *)(uintptr_t)e->input[RADIUS];
-    in->value = imp__spec(radius);
+    *radius_lanes(e) = imp__spec(radius);
     changed(e);
+}
+
+double *imp__sun_radius_number(const struct imp_emitter *e)
+{
+    return (double *)radius_lanes(e);
 }
