@@ -115,6 +115,10 @@ int cli_run_command(int argc, char **argv)
     cli.n_operands = argc - first;
     cli.operand = argv + first;
     for (int i = first; rc == 0 && i < argc; i++) overwrite_protect(argv[i]);
+    if (rc == 0 && cli.points == IMP_POINTS_WHOLE && strcmp(cli.name, "render"))
+        rc = cli_error(EXIT_USAGE,
+                       "--points whole is for pictures without standard errors: "
+                       "'importon render' alone has it");
     if (rc == 0) rc = part_begin();
     if (rc == 0 && command->prints && !cli.verifies) rc = cli_redirect();
     if (rc == 0) {

@@ -225,6 +225,9 @@ static int sampling_refused(void)
     if (o.pixel[0] != NO_PIXEL || o.paths)
         return cli_error(EXIT_USAGE, "--verify-sampling is about the picture: not with "
                                      "--pixel and --paths");
+    if (cli.points == IMP_POINTS_WHOLE)
+        return cli_error(EXIT_USAGE, "--verify-sampling wants standard errors: not with "
+                                     "--points whole");
     if (cli.part || cli.manifest_path || cli.verifies)
         return cli_error(EXIT_USAGE,
                          "--verify-sampling of render: not with parts and "

@@ -856,10 +856,11 @@ enum imp_points {
      * standard errors come from the spread of independent sets, four of each pixel at
      * least in pictures of 8 samples or more. */
     IMP_POINTS_SOBOL,
-    /** The same, in as few sets of each pixel as hold its samples, for imp_render alone:
-     * errors are smaller, but pictures of fewer than four sets (192 samples or less) have
-     * no standard errors. Walks from the lights have independent samples, and errors, as
-     * ever. */
+    /** The same, in as few sets of each pixel as hold its samples, for pictures alone
+     * (imp_render, imp_denoise, imp_walk_describe), without a time limit and recorded
+     * walks: errors are smaller, but pictures of fewer than four sets (192 samples or
+     * less) have no standard errors, and no previews. Walks from the lights have
+     * independent samples, and errors, as ever. */
     IMP_POINTS_WHOLE
 };
 

@@ -72,7 +72,7 @@ enum imp_status imp_denoise(const imp_scene *scene, const struct imp_run *run,
     IMP_REQUIRE(NULL, scene, "scene");
     IMP_REQUIRE(scene->ctx, film, "picture");
     IMP_REQUIRE(scene->ctx, out, "out");
-    IMP_RUN(scene->ctx, own, run);
+    IMP_RUN_PICTURE(scene->ctx, own, run);
     IMP_CHECKED(imp__run_traces(scene->ctx, __func__, &own));
     IMP_FLOAT_MODE;
     IMP_READS(scene);

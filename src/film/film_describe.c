@@ -185,7 +185,7 @@ enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *
     struct imp_run own;
     IMP_REQUIRE(NULL, scene, "scene");
     IMP_REQUIRE(scene->ctx, out, "text");
-    IMP_RUN(scene->ctx, own, run);
+    IMP_RUN_PICTURE(scene->ctx, own, run);
     IMP_CHECKED(imp__run_traces(scene->ctx, __func__, &own));
     IMP_FLOAT_MODE;
     IMP_READS(scene);

@@ -310,10 +310,13 @@ static int sweep_passes(const struct render *r, int done)
     return imp_min(n, r->passes - done);
 }
 
-/* The spread of so few sets of points tells too little of a pixel's error. */
-static void no_errors(const struct render *r, imp_film *film)
+/* The spread of too few sets of points tells too little of a pixel's error. */
+static bool has_errors(const struct render *r)
 {
-    if (r->run->points != IMP_POINTS_WHOLE || !r->picture->points || r->sets > 3) return;
+    return r->run->points != IMP_POINTS_WHOLE || !r->picture->points || r->sets > 3;
+}
+static void errors_drop(imp_film *film)
+{
     imp__release(film->ctx, film->se);
     film->se = NULL;
 }
@@ -409,7 +412,7 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
         IMP_TRY(imp__film_describe(ctx, r.sums.width, r.sums.height, picture->names,
                                    &films[k]));
     IMP_TRY(buffers_create(&r, ctx));
-    if (run->preview && n_films == 1)
+    if (run->preview && n_films == 1 && has_errors(&r))
         IMP_TRY(imp__film_create(ctx, r.sums.width, r.sums.height, picture->names, true,
                                  &preview));
     ended = render_run(&r, preview, &spp);
@@ -423,7 +426,7 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
     }
     IMP_TRY(imp__film_sums_finish(&r.sums, in_strata(&r), picture->weights, films));
     for (int k = 0; k < n_films; k++) {
-        no_errors(&r, films[k]);
+        if (!has_errors(&r)) errors_drop(films[k]);
         films[k]->spp = spp;
         films[k]->sets = r.set > 1 ? spp / r.set : 0;
         films[k]->drops = r.tiles.drops;

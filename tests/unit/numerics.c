@@ -10,6 +10,7 @@
 #include "math/rng.h"
 #include "math/stat.h"
 #include "math/trig.h"
+#include <stdlib.h>
 
 static void distributions(void)
 {

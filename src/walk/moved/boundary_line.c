@@ -165,8 +165,8 @@ static bool reflect(struct imp__edge_draw *d, const struct imp_hit *hit,
     return true;
 }
 
-/* Probabilities with which a line goes straight on, or is reflected, at a surface. Behind many mirrors
- * what it carries over these never becomes more than 1, so that its square has a mean. */
+/* Probabilities with which a line goes straight on, or is reflected, at a surface. Behind many perfect
+ * mirrors what it carries over these never becomes more than 1, so that its square has a mean. */
 struct fates {
     double pass, reflect;
 };

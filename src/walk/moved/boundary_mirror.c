@@ -43,9 +43,12 @@ static double most(imp_v3 p)
     return imp_max(imp_max(fabs(p[0]), fabs(p[1])), fabs(p[2]));
 }
 
-/* Is a triangle in the plane, as far as corners that are rounded tell? */
-static bool plane_has(const struct imp__plane *x, const imp_v3 p[3])
+/* Is a triangle with the normal n, known to `loose`, in the plane, as far as corners that are rounded
+ * tell? Of slivers beside each other corners alone would tell too little. */
+static bool plane_has(const struct imp__plane *x, const imp_v3 p[3], imp_v3 n,
+                      double loose)
 {
+    if (imp__length(imp__cross(x->n, n)) > x->loose + loose) return false;
     for (int k = 0; k < 3; k++) {
         const imp_v3 r = p[k] - x->p;
         if (fabs(imp__dot(x->n, r)) > ROUND * most(p[k]) + x->loose * imp__length(r))
@@ -68,9 +71,10 @@ static enum imp_status facet_add(struct imp__boundary *b, size_t first,
     }
     x.p = p[0];
     x.n = imp__normalize(n);
-    x.loose = imp_min(ROUND * far * longest / imp__length(n), LOOSE);
+    const double loose = ROUND * far * longest / imp__length(n);
+    x.loose = imp_min(loose, LOOSE);
     size_t k = first;
-    while (k < b->n_planes && !plane_has(&b->plane[k], p)) k++;
+    while (k < b->n_planes && !plane_has(&b->plane[k], p, x.n, loose)) k++;
     *plane = (int)k;
     if (k == b->n_planes) return plane_add(b, &x);
     if (x.loose < b->plane[k].loose) b->plane[k] = x;

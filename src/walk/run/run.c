@@ -48,7 +48,7 @@ enum imp_status imp__run_take(imp_context *ctx, const char *function,
     return imp__error(
         ctx, IMP_E_ARG,
         "%s: run->points: whole pixels have no standard errors: they are for "
-        "imp_render alone",
+        "pictures alone",
         function);
 }
 

@@ -8,5 +8,10 @@ for k in 1 2; do "${render[@]}" -o $k.part --part $k/2; done
 importon merge 1.part 2.part -q -o parts.pfm && cmp whole.pfm parts.pfm
 importon gradient "$box" -D res=16 --spp 16 --points whole
 echo $?
+importon read "$box" -D res=16 --spp 16 --points whole
+echo $?
+"${render[@]}" --pixel 3,4 --sample 2 | head -n 1
+"${render[@]}" --verify-sampling -o checked.exr
+echo $?
 importon render "$box" -D res=16 --points whole --time 1 -o timed.exr
 echo $?
