@@ -25,8 +25,10 @@ importon render scene.xml -m mono -q --spp 64 --seed 5 -o light.pfm
 python3 "$ROOT/tests/cli/measure/camera.py" light.pfm view.ppm 2.2 0.01 1
 importon measure scene.xml view.ppm -m mono --stages lights --spp 2 -n 1 --rounds 1 --hold sky.data 2>/dev/null | grep 'by the means' |
     sed 's/:.*//'
-# A light that is held at a wrong intensity is named, though nothing that moves has derivatives beside such a floor.
-sed 's/type="diffuse" id="floor"/type="plastic" id="floor"/' scene.xml >glossy.xml
+# A light that is held at a wrong intensity is named, though nothing that moves has derivatives beside a ball of glass.
+sed 's/type="diffuse" id="floor"/type="plastic" id="floor"/
+    s|^</scene>|<shape type="sphere"> <point name="center" x="0" y="-5" z="0"/> <float name="radius" value=".1"/> <bsdf type="dielectric"/> </shape>&|' \
+    scene.xml >glossy.xml
 cone="--set lamp.cutoff_angle=12 --set lamp.beam_width=8"
 importon render glossy.xml -m mono -q --spp 1024 --seed 6 $cone --set lamp.intensity=4 -o view.pfm
 importon measure glossy.xml view.pfm -m mono --spp 16 --rounds 1 $cone --noise .005 --stages cameras,lights --hold 'lamp.*' \
