@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What Embree is told of shapes and of instances: triangles and curves as they are, others by their
- * bounds and what it calls for them. */
+ * Embree's geometries of shapes and of instances: triangles and curves are its own, others are user
+ * geometries with bounds and callbacks. */
 #include "instances.h"
 #include "intersector.h"
 #include "math/offset.h"

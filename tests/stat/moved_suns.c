@@ -18,18 +18,17 @@
 
 /* ---- Closed forms ------------------------------------------------------------------------------ */
 
+#define WIDE_SUN                                                                         \
+    "<emitter type='sun' id='sun'><vector name='direction' value='.5,-.6,-.9'/><float "  \
+    "name='radius' value='.2'/><rgb name='radiance' value='7'/></emitter>"
+
 /* A sun of the angular radius a, above a plane's horizon in whole, brings it pi L sin^2(a) n.w; where its
  * power stays, of which 4 pi sin^2(a/2) L is a measure, pi L' 4 cos^2(a/2) n.w. */
 static void radius_test(void)
 {
     struct tap_stat g = {0};
     const imp_v3 w = imp__normalize(imp__v3(-.5, .6, .9));
-    imp_scene *scene = test_scene_text(
-        ctx,
-        METER_BELOW("<emitter type='sun' id='sun'><vector name='direction' "
-                    "value='.5,-.6,-.9'/><float name='radius' value='.2'/><rgb "
-                    "name='radiance' value='7'/></emitter>"),
-        IMP_MONO);
+    imp_scene *scene = test_scene_text(ctx, METER_BELOW(WIDE_SUN), IMP_MONO);
     test_must(ctx, imp_scene_add_geometry(scene, "sun.sun_radius"));
     mean_gradient(ctx, scene, "sun.sun_radius", 64, 24, &g);
     tap_z(&g, IMP_PI * 7 * sin(.4) * w[2], .02, "irradiance by the radius of a sun");
@@ -141,12 +140,7 @@ static void names_test(void)
     static const char *const name[2] = {"sun.radius.value", "sun.sun_radius"};
     const double radius[2] = {.3, .1}, along[3] = {.5, -.6, -.8};
     const imp_v3 w = imp__normalize(imp__v3(-.5, .6, .8));
-    imp_scene *scene = test_scene_text(
-        ctx,
-        METER_BELOW("<emitter type='sun' id='sun'><vector name='direction' "
-                    "value='.5,-.6,-.9'/><float name='radius' value='.2'/><rgb "
-                    "name='radiance' value='7'/></emitter>"),
-        IMP_MONO);
+    imp_scene *scene = test_scene_text(ctx, METER_BELOW(WIDE_SUN), IMP_MONO);
     test_must(ctx, imp_scene_add_geometry(scene, "sun.sun_radius"));
     test_must(ctx, imp_scene_add_geometry(scene, "sun.direction"));
     for (int k = 0; k < 2; k++) {

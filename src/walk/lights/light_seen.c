@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * How the sensor sees points in lanes (light_reach.c, of walks alone): sensors without a form in
- * lanes, and those that take random numbers, are asked point by point. */
+ * Connections of points to the sensor, in lanes (light_reach.c: of one walk). Sensors without a form in
+ * lanes, and those that take random numbers, are evaluated one point at a time. */
 #include "kind/cleared.h"
 #include "light_bundle.h"
 
