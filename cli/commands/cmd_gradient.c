@@ -7,6 +7,7 @@
 #include "shared/command.h"
 #include "shared/overwrite.h"
 #include "shared/picture_files.h"
+#include "shared/places.h"
 #include "shared/plot.h"
 #include "shared/problem_options.h"
 #include "shared/proof.h"
@@ -233,6 +234,7 @@ static void print_json(const struct imp_run *run, const struct result *r,
         json_end_object(&j);
     }
     json_end_array(&j);
+    places_json(&j, blocks, n_blocks, NULL);
     cli_json_end(&j);
 }
 

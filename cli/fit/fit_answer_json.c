@@ -3,6 +3,7 @@
  * What a fit has found, in JSON. */
 #include "fit_answer.h"
 #include "shared/command.h"
+#include "shared/places.h"
 #include "text/progress.h"
 
 #include <math.h>
@@ -196,6 +197,8 @@ void fit_answer_json(struct json *j, const struct fit_answer *a, char **paths)
                          cli_number_name(&b->info, i, name, sizeof name));
     }
     json_end_array(j);
+    const struct places_way way = {r->history_x ? r->n_history : 0, r->n, r->history_x};
+    places_json(j, a->blocks, a->n_blocks, &way);
     put_curves(j, a);
     if (a->looked) fit_missing_json(j, a);
 }

@@ -134,7 +134,7 @@ void view_values(double *value)
 
 /* ---- What is shown ------------------------------------------------------------------- */
 
-static struct json stream_open(char **text, size_t *size)
+struct json view_stream(char **text, size_t *size)
 {
     FILE *f = open_memstream(text, size);
     if (!f) exit(cli_error(EXIT_RUN, "out of memory"));
@@ -145,7 +145,7 @@ static void send_progress(const struct imp_progress *p)
 {
     char *text;
     size_t size;
-    struct json j = stream_open(&text, &size);
+    struct json j = view_stream(&text, &size);
     json_object(&j, NULL);
     json_text(&j, "stage", p->stage);
     json_number(&j, "fraction", p->fraction);
@@ -175,7 +175,7 @@ void view_state(enum view_state state, const char *message)
     static const char *const words[] = {"running", "stopped", "done"};
     char *text;
     size_t size;
-    struct json j = stream_open(&text, &size);
+    struct json j = view_stream(&text, &size);
     v.state = state;
     json_object(&j, NULL);
     json_text(&j, "state", words[state]);
@@ -187,6 +187,26 @@ void view_state(enum view_state state, const char *message)
     json_end_object(&j);
     fclose(j.file);
     http_send(CHANNEL_STATE, "state", text);
+}
+
+const char *view_unit(const struct imp_param_info *info, size_t e)
+{
+    if (strcmp(info->unit, "scene units, radians") != 0) return info->unit;
+    return e < 3 ? "scene units" : "radians";
+}
+
+double view_reach(const struct imp_param_info *info, size_t e)
+{
+    struct imp_scene_info scene = {.size = sizeof scene};
+    double diagonal = 0;
+    const char *unit = view_unit(info, e);
+    if (!strcmp(unit, "radians")) return 3.14159265358979;
+    if (strcmp(unit, "scene units") != 0 ||
+        imp_scene_get_info(cli.scene, &scene) != IMP_OK)
+        return 0;
+    for (int k = 0; k < 3; k++)
+        diagonal = hypot(diagonal, scene.bounds_max[k] - scene.bounds_min[k]);
+    return diagonal / 4;
 }
 
 void view_numbers(struct view_number *number, size_t n)
@@ -202,7 +222,7 @@ void view_numbers_are(const double *value)
 {
     char *text;
     size_t size;
-    struct json j = stream_open(&text, &size);
+    struct json j = view_stream(&text, &size);
     json_array(&j, NULL);
     pthread_mutex_lock(&v.lock);
     for (size_t i = 0; i < v.n; i++) {
@@ -216,6 +236,7 @@ void view_numbers_are(const double *value)
         json_number(&j, "max", a->hi);
         json_number(&j, "start", a->start);
         json_number(&j, "value", a->value);
+        json_number(&j, "reach", a->reach);
         json_end_object(&j);
     }
     pthread_mutex_unlock(&v.lock);
@@ -248,6 +269,14 @@ void view_show_json(enum view_channel channel, const char *kind, const char *nam
     item.json = json;
     view_show(channel, &item, 1);
     free(json);
+}
+
+void view_show_places(struct json *j, char **text)
+{
+    json_end_object(j);
+    fclose(j->file);
+    if (strcmp(*text, "{}")) view_show_json(VIEW_PLACES, "places", NULL, *text);
+    else free(*text);
 }
 
 void view_show_film(enum view_channel channel, const imp_film *film, const char *name,

@@ -15,6 +15,8 @@ struct view_number {
     const char *unit;
     double lo, hi; /* bounds, may be infinite */
     double start, value;
+    double
+        reach; /* of its slider where it has no bounds, to both sides; 0: by the value */
 };
 
 /* Wishes of a page, until they are taken. */
@@ -43,6 +45,9 @@ int view_open(const struct view_kind *kind, int port);
 /* Serve no more, and free the numbers. */
 void view_close(void);
 
+/* The unit of element e alone, and how far its slider reaches (view_number.reach); of cli.scene. */
+const char *view_unit(const struct imp_param_info *info, size_t e);
+double view_reach(const struct imp_param_info *info, size_t e);
 /* The numbers with sliders, [n]; taken over, with their names. */
 void view_numbers(struct view_number *number, size_t n);
 /* Show that they have these values [n]. */
@@ -67,6 +72,7 @@ enum view_channel {
     VIEW_START,
     VIEW_PICTURE,
     VIEW_ANSWER,
+    VIEW_PLACES,
     VIEW_WALKS,
     VIEW_RAYS
 };
@@ -76,6 +82,11 @@ void view_show_json(enum view_channel channel, const char *kind, const char *nam
                     char *json);
 /* Walks of a pixel, in a call-back of the library or between its calls. */
 void view_walks(const int pixel[2]);
+/* A JSON text in memory: *text, to be freed, is there once the stream is closed. */
+struct json view_stream(char **text, size_t *size);
+/* Where things are (shared/places.h), of an object that was opened in such a stream, which it closes;
+ * without members nothing is shown. */
+void view_show_places(struct json *j, char **text);
 void view_show_film(enum view_channel channel, const imp_film *film, const char *name,
                     const char *role, int view);
 

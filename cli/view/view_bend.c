@@ -52,7 +52,8 @@ static void numbers_open(void)
                                          -INFINITY,
                                          INFINITY,
                                          theta[i],
-                                         theta[i]};
+                                         theta[i],
+                                         0};
     view_numbers(number, b.n);
 }
 
@@ -67,9 +68,7 @@ static void numbers_move(void)
 
 static struct json item_open(char **text, size_t *size)
 {
-    FILE *to = open_memstream(text, size);
-    if (!to) exit(cli_error(EXIT_RUN, "out of memory"));
-    struct json j = {to, 0};
+    struct json j = view_stream(text, size);
     json_object(&j, NULL);
     return j;
 }

@@ -9,6 +9,7 @@
 #include "fit/fit_options.h"
 #include "fit/fit_pictures.h"
 #include "shared/picture_files.h"
+#include "shared/places.h"
 #include "shared/problem_options.h"
 #include "text/progress.h"
 
@@ -76,9 +77,13 @@ static void numbers_open(void)
         char name[512];
         for (size_t i = 0; !block_is_large(b) && i < b->n; i++) {
             cli_number_name(&b->info, i, name, sizeof name);
-            number[n++] = (struct view_number){
-                cli_strdup(name), b->info.unit,         b->info.lo,
-                b->info.hi,       shown(b, f.start, i), shown(b, f.start, i)};
+            number[n++] = (struct view_number){cli_strdup(name),
+                                               view_unit(&b->info, i),
+                                               b->info.lo,
+                                               b->info.hi,
+                                               shown(b, f.start, i),
+                                               shown(b, f.start, i),
+                                               view_reach(&b->info, i)};
         }
     }
     view_numbers(number, n);
@@ -106,9 +111,7 @@ static void numbers_move(void)
 
 static struct json answer_open(char **text, size_t *size)
 {
-    FILE *to = open_memstream(text, size);
-    if (!to) exit(cli_error(EXIT_RUN, "out of memory"));
-    struct json j = {to, 0};
+    struct json j = view_stream(text, size);
     json_object(&j, NULL);
     json_text(&j, "importon", imp_version());
     json_text(&j, "command", "fit");
@@ -158,6 +161,19 @@ static void step_show(const struct imp_fit_step *s)
     answer_show(&j, &text);
 }
 
+/* What moves, over the pictures: at the scene's numbers, with the way there. */
+static void places_show(const struct imp_fit_step *s)
+{
+    const struct places_way way = {s && s->history_x ? s->n_history : 0, f.n,
+                                   s ? s->history_x : NULL};
+    char *text;
+    size_t size;
+    struct json j = view_stream(&text, &size);
+    json_object(&j, NULL);
+    places_json(&j, f.blocks, f.n_blocks, &way);
+    view_show_places(&j, &text);
+}
+
 /* An imp_fit_step_fn. */
 static int step(const struct imp_fit_step *s, void *payload)
 {
@@ -171,6 +187,7 @@ static int step(const struct imp_fit_step *s, void *payload)
             imp_problem_set_x(f.problem, s->x) == IMP_OK) {
             const double start = cli_now();
             view_pictures(VIEW_PICTURE, "recovered", "picture", SPP);
+            places_show(s);
             f.pictures_s += cli_now() - start;
         }
     }
@@ -221,6 +238,9 @@ static int run_fit(bool *whole)
         result_show();
         imp_problem_get_x(f.problem, x);
         numbers_show(x);
+        const struct imp_fit_step last = {.n_history = f.result->n_history,
+                                          .history_x = f.result->history_x};
+        places_show(&last);
         view_pictures(VIEW_PICTURE, "recovered", "picture", 0);
     }
     free(x);
@@ -266,6 +286,7 @@ static int work(void)
             running = false;
         } else if (moved) { /* the sliders' values, until more is wanted */
             view_state(VIEW_STOPPED, "a picture of the numbers as they are");
+            places_show(NULL);
             view_pictures(VIEW_PICTURE, "recovered", "picture", 1);
             view_pictures(VIEW_PICTURE, "recovered", "picture", 8);
             view_pictures(VIEW_PICTURE, "recovered", "picture", 0);
@@ -339,6 +360,7 @@ int view_fit(void)
     if (!rc) rc = view_open(&kind, view_options.port);
     if (!rc) {
         numbers_show(f.start);
+        places_show(NULL);
         view_targets();
         view_pictures(VIEW_START, "start", NULL, 0);
         if (cli.out) rc = fit_pictures_write("before", 0);

@@ -6,7 +6,9 @@
 #include "view.h"
 
 #include "shared/picture_files.h"
+#include "shared/places.h"
 #include "shared/problem_options.h"
+#include "shared/settings.h"
 #include "text/progress.h"
 
 #include <fnmatch.h>
@@ -47,6 +49,12 @@ static double value_at(size_t param, size_t element)
 
 static int numbers_open(void)
 {
+    const struct arg_list *wanted = &problem_options.params;
+    for (size_t i = 0; i < wanted->n; i++) {
+        const bool one = !strpbrk(wanted->item[i], "*?[");
+        const enum imp_status st = one ? settings_pose(wanted->item[i]) : IMP_OK;
+        if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    }
     const size_t n_params = imp_scene_n_params(cli.scene);
     struct view_number *number = cli_alloc(SLIDERS, sizeof *number);
     size_t left_out = 0;
@@ -65,9 +73,9 @@ static int numbers_open(void)
             cli_number_name(&info, e, name, sizeof name);
             r.param[r.n] = k;
             r.element[r.n] = e;
-            number[r.n++] =
-                (struct view_number){cli_strdup(name), info.unit,      info.lo,
-                                     info.hi,          value_at(k, e), value_at(k, e)};
+            number[r.n++] = (struct view_number){
+                cli_strdup(name), view_unit(&info, e), info.lo, info.hi, value_at(k, e),
+                value_at(k, e),   view_reach(&info, e)};
         }
     }
     if (!r.n && problem_options.params.n) {
@@ -87,6 +95,17 @@ static void numbers_show(void)
     double value[SLIDERS];
     for (size_t i = 0; i < r.n; i++) value[i] = value_at(r.param[i], r.element[i]);
     view_numbers_are(value);
+}
+
+/* What moves, over the picture. */
+static void places_show(void)
+{
+    char *text;
+    size_t size;
+    struct json j = view_stream(&text, &size);
+    json_object(&j, NULL);
+    places_params_json(&j, r.param, r.n);
+    view_show_places(&j, &text);
 }
 
 /* The scene as the sliders are. A value that the scene does not take (one of several that
@@ -257,6 +276,7 @@ static int work(void)
         if (!w.moved) continue;
         numbers_move();
         numbers_show();
+        places_show();
         forget();
         running = fresh = true;
     }
@@ -285,6 +305,7 @@ int view_scene(void)
     if (!rc) rc = view_open(&kind, view_options.port);
     if (!rc) {
         numbers_show();
+        places_show();
         rc = work();
     }
     view_close();

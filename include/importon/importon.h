@@ -655,6 +655,25 @@ imp_scene_geometry_name(const imp_scene *scene, size_t index, size_t size, char 
  *         instances, media, or what else is made from places; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_add_pose(imp_scene *scene,
                                                           const char *object);
+/** Where what a number of geometry moves is now: the point that a pose turns about, a light's or
+ * camera's own place, else the middle of the box of the shape or instance.
+ * @param middle  [3] overwritten; world.
+ * @param radius  [1] overwritten; half the diagonal of that box, of what has no size a twentieth of the
+ *                scene's radius.
+ * @return IMP_OK; IMP_E_ARG if there is no such parameter, or it is no number of geometry or moves
+ *         what has no place (a sky, a camera's lens). */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_scene_place(const imp_scene *scene, size_t param, double middle[3], double *radius);
+/** Where a sensor sees a point: in pixels from the upper left corner of its picture, through the
+ * middle of its lens, whatever hides the point.
+ * @param point  [3] world.
+ * @param film   [2] overwritten; NaN if the point is not in the picture.
+ * @return IMP_OK; IMP_E_ARG if there is no such sensor; IMP_E_UNSUPPORTED of one that has no such
+ *         picture (a meter, `distant`, `radiancemeter`). */
+IMP_API IMP_MUST_CHECK enum imp_status imp_scene_film_point(const imp_scene *scene,
+                                                            int sensor,
+                                                            const double point[3],
+                                                            double film[2]);
 /** Parameters by text: lines NAME=VALUE or NAME=VALUE,VALUE,.., as of --set @FILE and
  * recovered.txt; empty lines and lines that begin with # are skipped. Names of geometry, NAME.pose and
  * the like, become parameters first, as by imp_scene_add_geometry.

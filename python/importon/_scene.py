@@ -7,6 +7,8 @@ import threading
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Optional
 
+import numpy as np
+
 from . import _c
 from ._library import (ArgumentError, Handle, choice, context, decode, lib, make, not_inside, register_lock,
                        text, warn_said, word)
@@ -278,6 +280,83 @@ class Scene:
             while lib.imp_scene_geometry_name(self.pointer, len(names), len(buffer), buffer) == 0:
                 names.append(buffer.value.decode())
         return names
+
+    def place(self, name: str) -> tuple[Any, float]:
+        """Where what a number of geometry moves is now: its middle and its radius.
+
+        The middle is the point that a pose turns about, a light's or camera's own place, else the
+        middle of the box of the shape; the radius is half the diagonal of that box, of what has no
+        size a twentieth of the scene's.
+
+        Parameters
+        ----------
+        name : str
+            A parameter of geometry (`add_geometry`).
+
+        Returns
+        -------
+        numpy.ndarray [3], float
+
+        Raises
+        ------
+        ParameterError
+            There is no such parameter.
+        ArgumentError
+            It moves nothing that has a place.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> middle, radius = scene.place(scene.add_geometry("small-box.pose"))
+        """
+        from . import _params
+
+        not_inside()
+        index = _params.find(self, name).position
+        middle, radius = (ctypes.c_double * 3)(), ctypes.c_double()
+        with self.lock:
+            self._context.check(lib.imp_scene_place(self.pointer, index, middle, ctypes.byref(radius)))
+        return np.array(middle), radius.value
+
+    def film_points(self, points: Any, sensor: int = 0) -> Any:
+        """Where a sensor sees points, in pixels from the upper left corner of its picture.
+
+        Parameters
+        ----------
+        points : array_like [..., 3]
+            In the scene's units.
+        sensor : int
+            Its number, as of `render`.
+
+        Returns
+        -------
+        numpy.ndarray [..., 2]
+            NaN where a point is not in the picture; what hides a point does not count.
+
+        Raises
+        ------
+        ArgumentError
+            There is no such sensor, or points have other shapes.
+        UnsupportedError
+            It has no picture in which a point is seen.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> scene.film_points([0, 0, 0]).round(6).tolist()
+        [4.0, 4.0]
+        """
+        not_inside()
+        p = np.ascontiguousarray(points, dtype=np.float64)
+        if p.ndim < 1 or p.shape[-1] != 3:
+            raise ArgumentError("points have a shape [..., 3], not %r" % (p.shape,))
+        film = np.empty(p.shape[:-1] + (2,))
+        flat, out = p.reshape(-1, 3), (ctypes.c_double * 2)()
+        with self.lock:
+            for row, to in zip(flat, film.reshape(-1, 2)):
+                self._context.check(lib.imp_scene_film_point(self.pointer, sensor, (ctypes.c_double * 3)(*row), out))
+                to[:] = out
+        return film
 
     @property
     def pointer(self) -> int:

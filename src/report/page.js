@@ -24,17 +24,22 @@ function all_layers(items) {
 
 /* Sections in their order: the kinds of items that each is made of, and the elements that
  * it makes. A section whose items change is made again, and the others stay. */
-const known_kinds = ["picture", "explained", "derivative", "fit", "check", "walks", "rays", "bend", "elements", "mesh", "image", "truth"];
+const known_kinds = ["picture", "explained", "derivative", "fit", "check", "walks", "rays", "bend", "elements", "mesh", "image", "truth", "places"];
 const listed_kinds = ["bend", "elements"]; /* they have sections, and the answer is a table besides */
 const sections = [
     {kinds: ["fit", "elements", "explained"], make: (report, of, page) => [make("header", {}, make("h1", {}, report.title || "importon report"), ...explained_lines(of("explained"), of("picture"), (r, view) => { if (page.pictures) page.pictures.show(view, "residual", Math.floor(r.x + r.width / 2), Math.floor(r.y + r.height / 2)); }),
         ...(of("fit").length && of("fit")[0].data ? verdict(of("fit")[0].data) : []),
         ...of("elements").filter((i) => i.data).flatMap((i) => elements_verdict(i.data)))]},
+    {kinds: ["places", "fit", "gradient"], make: (report, of, page) => {
+        page.things = things_of(report.items);
+        if (page.pictures) page.pictures.redraw();
+        return [];
+    }},
     {kinds: ["picture", "derivative"], make: (report, of, page) => {
         const {layers, failed} = all_layers([...of("picture"), ...of("derivative")]);
         const notes = failed.map((text) => make("p", {class: "error"}, `This picture cannot be shown: ${text}`));
         if (page.pictures && layers.length) page.pictures.update(layers);
-        else page.pictures = layers.length ? picture_section(layers, page.live) : null;
+        else page.pictures = layers.length ? picture_section(layers, page) : null;
         page.layers = layers;
         page.derivatives = layers.filter((l) => l.signed && l.role === "");
         return [...notes, page.pictures];
@@ -65,7 +70,7 @@ function truths_set(items) {
 }
 
 function page_of(report) {
-    const page = {live: null, places: sections.map(() => make("div"))}, main = document.getElementById("page");
+    const page = {live: null, things: [], places: sections.map(() => make("div"))}, main = document.getElementById("page");
     const empty = make("p", {class: "warning"}, "This report holds nothing: no picture, no fit, no check.");
     /* changed: kinds of items; null: all. */
     page.update = (changed) => {

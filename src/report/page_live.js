@@ -6,9 +6,11 @@
 
 /* ---- Sliders -------------------------------------------------------------------------- */
 
-/* The range of a slider: the bounds, or four times the start about it. */
+/* The range of a slider: the bounds, or four times the start about it; of places and angles what
+ * the server says. */
 function slider_range(n) {
     const size = Math.max(Math.abs(n.start), Math.abs(n.value)) || 1;
+    if (n.reach > 0) return [Math.max(n.start - n.reach, is_number(n.min) ? n.min : -Infinity), Math.min(n.start + n.reach, is_number(n.max) ? n.max : Infinity)];
     const lo = is_number(n.min) ? n.min : -4 * size, hi = is_number(n.max) ? n.max : 4 * size;
     return is_number(n.min) && is_number(n.max) ? [lo, hi] : is_number(n.min) ? [lo, Math.max(hi, lo + 4 * size)] : is_number(n.max) ? [Math.min(lo, hi - 4 * size), hi] : [lo, hi];
 }
@@ -22,7 +24,8 @@ function slider_of(n, moved) {
     slider.addEventListener("input", () => { field.value = Number(Number(slider.value).toPrecision(6)); moved(n.name, Number(slider.value)); });
     field.addEventListener("change", () => { if (field.value !== "" && field.checkValidity()) { slider.value = field.value; moved(n.name, Number(field.value)); } });
     const row = make("div", {class: "slider"}, make("label", {for: id, class: "mono"}, n.name), slider, field, make("span", {class: "faint"}, n.unit === "1" || !n.unit ? "" : n.unit));
-    return {row, set(value) { if (document.activeElement !== slider && document.activeElement !== field) { slider.value = value; field.value = Number(value.toPrecision(6)); } },
+    return {row, name: n.name, move(by) { field.value = Number((Number(field.value) + by).toPrecision(6)); slider.value = field.value; moved(n.name, Number(field.value)); },
+        set(value) { if (document.activeElement !== slider && document.activeElement !== field) { slider.value = value; field.value = Number(value.toPrecision(6)); } },
         enable(on) { slider.disabled = field.disabled = !on; }};
 }
 
@@ -117,7 +120,15 @@ function live_section(report, page) {
         document.documentElement.dataset.news = String(Number(document.documentElement.dataset.news || 0) + 1);
     }
     events.onerror = () => { said.textContent = events.readyState === 2 ? "importon has ended; this is the last that it told." : "The connection is lost; trying again."; };
-    page.live = {ask, walks: false};
+    /* Things are dragged where sliders could be moved: their numbers shift by v. */
+    const follows = () => state.now.what === "render" || state.now.state !== "running";
+    function shift(place, v) {
+        place.shifts.forEach((number, k) => {
+            const name = `${place.name}[${number}]`, slider = state.sliders.find((s) => s.name === name);
+            if (slider) slider.move(v[k]);
+        });
+    }
+    page.live = {ask, walks: false, movable: follows, shift};
     enable();
     return make("section", {id: "live", class: "noprint"}, said, make("div", {class: "bar"}, bar, note), make("div", {class: "bar", role: "toolbar", "aria-label": "run"}, stop, go, again, save), numbers);
 }

@@ -5,9 +5,10 @@
  * compared in place; "side by side" shows several with one zoom. */
 "use strict";
 
-function picture_section(layers, live) {
+function picture_section(layers, page) {
+    const live = page.live;
     let views = [...new Set(layers.map((l) => l.view))];
-    const state = {view: views[0], current: 0, beside: false, gain: 0, scale: 0, false_colour: false, zoom: 1, x: 0, y: 0, px: -1, py: -1};
+    const state = {view: views[0], current: 0, beside: false, gain: 0, scale: 0, false_colour: false, things: true, zoom: 1, x: 0, y: 0, px: -1, py: -1};
     const of_view = () => layers.filter((l) => l.view === state.view);
     const buttons = make("div", {class: "bar noprint", role: "toolbar", "aria-label": "layers"});
     const readout = make("div", {class: "scroll", "aria-live": "polite"});
@@ -18,6 +19,9 @@ function picture_section(layers, live) {
     const exposure_text = make("span", {class: "mono"}, "0");
     const false_box = make("input", {type: "checkbox", change: () => { state.false_colour = false_box.checked; redraw(); }});
     const beside_box = make("input", {type: "checkbox", change: () => { state.beside = beside_box.checked; rebuild(); }});
+
+    const things_box = make("input", {type: "checkbox", checked: "", change: () => { state.things = things_box.checked; redraw(); }});
+    const things_label = make("label", {}, things_box, "what moves"), things_text = make("p", {class: "faint"});
 
     const look_of = (layer) => ({
         mode: layer.signed ? "signed" : state.false_colour || !layer.luminance ? "false" : "colour",
@@ -47,8 +51,11 @@ function picture_section(layers, live) {
             const canvas = canvases.querySelectorAll("canvas")[i], context = canvas.getContext("2d");
             const at = window_of(layer, canvas);
             draw(context, layer, look_of(layer), at);
+            if (state.things) things_draw(context, layer, at, page.things);
             mark(context, layer, at);
         });
+        things_label.hidden = !page.things.length;
+        things_text.textContent = state.things ? things_legend(page.things, Boolean(live)) : "";
         [...buttons.children].forEach((b, i) => b.setAttribute("aria-pressed", String(i === state.current)));
         scale_box.replaceChildren(scale_of(shown()[0], look_of(shown()[0])));
         tell();
@@ -99,11 +106,20 @@ function picture_section(layers, live) {
         const scale = Math.max(1, Math.min(16, Math.ceil(720 / layer.width)));
         const canvas = make("canvas", {class: "view", tabindex: 0, width: layer.width * scale, height: layer.height * scale,
             role: "img", "aria-label": `${layer.name}, ${layer.width} x ${layer.height}`});
-        let drag = null;
-        canvas.addEventListener("pointerdown", (e) => { drag = {x: e.clientX, y: e.clientY, moved: false}; canvas.setPointerCapture(e.pointerId); });
+        let drag = null, held = null;
+        const film_at = (e) => {
+            const box = canvas.getBoundingClientRect(), at = window_of(layer, canvas), per = canvas.width / box.width;
+            return {at, x: (e.clientX - box.left) * per, y: (e.clientY - box.top) * per, near: 12 * per};
+        };
+        canvas.addEventListener("pointerdown", (e) => {
+            const p = film_at(e);
+            held = state.things && live && live.movable() ? thing_at(page.things, layer, p.at, p.x, p.y, p.near) : null;
+            drag = {x: e.clientX, y: e.clientY, moved: false};
+            canvas.setPointerCapture(e.pointerId);
+        });
         canvas.addEventListener("pointerup", (e) => {
-            const still = drag && !drag.moved;
-            drag = null;
+            const still = drag && !drag.moved && !held;
+            drag = held = null;
             if (!still) return;
             pick(layer, canvas, e);
             ask_walks();
@@ -112,6 +128,13 @@ function picture_section(layers, live) {
             if (!drag) { pick(layer, canvas, e); return; }
             drag.moved = drag.moved || Math.abs(e.clientX - drag.x) + Math.abs(e.clientY - drag.y) > 2;
             if (!drag.moved) return;
+            if (held) {
+                const p = film_at(e), to = [p.at.x + p.x * p.at.step, p.at.y + p.y * p.at.step];
+                live.shift(held, shift_of(held, to.map((x, i) => x - held.at[i])));
+                held.at = to;
+                redraw();
+                return;
+            }
             const step = window_of(layer, canvas).step * canvas.width / canvas.getBoundingClientRect().width;
             state.x -= (e.clientX - drag.x) * step;
             state.y -= (e.clientY - drag.y) * step;
@@ -165,8 +188,8 @@ function picture_section(layers, live) {
     const section = make("section", {id: "pictures"}, make("h2", {}, "Pictures"), buttons,
         make("div", {class: "bar noprint"}, view_box, make("label", {}, "exposure ", exposure, exposure_text),
             make("label", {}, false_box, "false colour"), make("label", {}, beside_box, "side by side"),
-            make("span", {class: "faint"}, "keys 1 to 9 change the layer; on the picture: arrows, + and -, 0; drag moves it")),
-        make("div", {class: "stage"}, make("div", {}, canvases, scale_box), readout));
+            things_label, make("span", {class: "faint"}, "keys 1 to 9 change the layer; on the picture: arrows, + and -, 0; drag moves it")),
+        make("div", {class: "stage"}, make("div", {}, canvases, things_text, scale_box), readout));
     const bad = layers.filter((l) => l.not_finite > 0 && !l.name.endsWith(".interval")); /* there NaN: no interval */
     if (bad.length) section.append(make("p", {class: "warning"}, `Numbers that are not finite (NaN or infinite) are drawn in magenta: ${bad.slice(0, 5).map((l) => `${l.name}: ${l.not_finite}${l.not_finite === l.planes[0].length * l.of_channels ? ", all of it" : ""}`).join("; ")}.`));
     rebuild();
@@ -182,6 +205,7 @@ function picture_section(layers, live) {
         if (same) redraw();
         else rebuild();
     };
+    section.redraw = redraw;
     /* The layer of a role, with a marked pixel. */
     section.show = (view, role, x, y) => {
         const layer = layers.find((l) => l.view === view && l.role === role) || layers.find((l) => l.view === view);

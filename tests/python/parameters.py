@@ -217,6 +217,29 @@ def test_to_world():
     return "the mean by a translation %s" % np.round(g[:, 3], 4)
 
 
+def test_places():
+    """place and film_points: where a thing is, in the scene and in its picture"""
+    s = im.load_dict(im.cornell_box(res=32))
+    name = s.add_geometry("small-box.pose")
+    middle, radius = s.place(name)
+    im.traverse(s)[name] = [.1, 0, .2, 0, .3, 0]
+    moved, same = s.place(name)
+    assert np.allclose(moved - middle, [.1, 0, .2]) and np.isclose(radius, same, rtol=.2)
+    seen = s.film_points([moved, [0, 0, 1e6], [[0, 0, 0]][0]])
+    assert seen.shape == (3, 2) and np.isfinite(seen[0]).all() and np.isnan(seen[1]).all()
+    assert np.allclose(seen[2], 16, atol=1e-4) and s.film_points(moved).shape == (2,)
+    # The light's share of the picture is brighter than what is around it: the lamp is seen there.
+    light, _ = s.place(s.add_geometry("light.pose"))
+    x, y = s.film_points(light)
+    picture = im.render(s, spp=4)
+    assert picture[int(y), int(x)].sum() > 10 * np.median(picture.sum(axis=2))
+    raises(im.ArgumentError, lambda: s.place("red.reflectance.value"), "red.reflectance.value")
+    raises(im.ParameterError, lambda: s.place("nothing"), "nothing")
+    raises(im.ArgumentError, lambda: s.film_points([1, 2]), "shape")
+    raises(im.ArgumentError, lambda: s.film_points([1, 2, 3], sensor=4), "sensor")
+    return "the lamp is at %.1f, %.1f" % (x, y)
+
+
 def test_time():
     """Reading or setting a number takes less than 20 us; loading the package 50 ms beyond NumPy"""
     p = im.traverse(box())

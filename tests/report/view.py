@@ -310,6 +310,37 @@ try:
 finally:
     if view.process.poll() is None: view.process.kill()
 
+# ---- What moves ------------------------------------------------------------------------------------
+poses = [os.path.join(scenes, "poses.xml"), "-D", "res=16", "--seed", "3", "-p", "block.pose", "--spp", "4"]
+view = View(*poses)
+try:
+    ok(view.state("done") is not None, "a picture with the sliders of a pose")
+    sliders = view.wait(lambda e, v: e == "numbers")
+    ok([n["name"] for n in sliders] == ["block.pose[%d]" % k for k in range(6)] and [n["unit"] for n in sliders] == ["scene units"] * 3 + ["radians"] * 3
+       and all(n["reach"] > .3 for n in sliders), "whose units and lengths are those of shifts and turns # %s" % [round(n["reach"], 2) for n in sliders])
+    before = view.items("places")[-1]["data"]["places"][0]
+    n = len(view.news)
+    view.act("set", name="block.pose[0]", value="0.1")
+    moved = view.wait(lambda e, v: e == "report" and v["items"][0]["kind"] == "places", n)
+    ok(view.wait(lambda e, v: e == "numbers" and v[0]["value"] == .1, n) is not None and moved is not None and view.state("done", n) is not None, "moved")
+    now = moved["items"][0]["data"]["places"][0]
+    off = [now["at"][i] - before["at"][i] - .1 * before["axes"][0][i] for i in range(2)]
+    ok(max(map(abs, off)) < .02 and abs(before["axes"][0][0]) > 1, "and its place in the picture by what its axis said # off by %.2g pixels" % max(map(abs, off)))
+    ok(view.end() == 130, "ended")
+finally:
+    if view.process.poll() is None: view.process.kill()
+run("render", *poses[:5], "--spp", "16", "-q", "--no-preview", "-o", folder + "/block.exr")
+view = View(*poses, "--target", folder + "/block.exr", "--set", "block.pose=.1,0,.1,0,0,0", "--optimizer", "adam", "-n", "4")
+try:
+    ok(view.state("done") is not None, "a fit of it")
+    places = view.items("places")
+    first, last = (p["data"]["places"][0] for p in (places[0], places[-1]))
+    start = last["way"][0]
+    ok(len(last["way"]) == 4 and max(abs(start[i] - first["at"][i]) for i in range(2)) < 1e-6, "its way in the picture begins where it was # %d places" % len(last["way"]))
+    ok(view.end() == 130, "ended")
+finally:
+    if view.process.poll() is None: view.process.kill()
+
 # ---- Bent rays -----------------------------------------------------------------------------------
 lens = os.path.join(scenes, "bend", "focus.xml")
 view = View(lens, "-n", "12")
