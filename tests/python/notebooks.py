@@ -75,4 +75,24 @@ def test_measured_room():
     return execute("measured_room")
 
 
+def test_object_pose():
+    """Where an object stands"""
+    return execute("object_pose")
+
+
+def test_camera_pose():
+    """Where a camera was"""
+    return execute("camera_pose")
+
+
+def test_mesh_shape():
+    """A mesh from six pictures"""
+    return execute("mesh_shape")
+
+
+def test_lamp_place():
+    """Where to put a lamp"""
+    return execute("lamp_place")
+
+
 run(globals())
