@@ -763,7 +763,7 @@ int main(int argc, char **argv)
                                             imp__texture_kinds[i]->inputs &&
                                             imp__texture_kinds[i]->inputs[0].name);
                  nested++)
-                if (is_long || (i + k + 2 * nested) % 4 == 1)
+                if (is_long || (i + k + 2 * nested) % 6 == 1)
                     check(&(struct subject){
                         .bsdf = ops, .texture = imp__texture_kinds[i], .nested = nested});
         }

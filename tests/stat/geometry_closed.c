@@ -4,7 +4,7 @@
  * rectangle; the penumbra of a half plane that moves before a square lamp; the picture of a lit
  * square by the field of view; the
  * solid angle of a ball before a sky; and an identity of fields of view and turns of a camera, the flux of
- * radiance through the frame of the picture. */
+ * radiance through the frame of the picture, with the argument `long`. */
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "math/rng.h"
@@ -411,7 +411,7 @@ static void frame_test(void)
     imp_scene_destroy(scene);
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
     ctx = test_context(2);
     point_test();
@@ -422,7 +422,7 @@ int main(void)
     view_test();
     ball_test();
     lens_test();
-    frame_test();
+    if (tap_is_long(argc, argv)) frame_test();
     imp_context_destroy(ctx);
     return tap_done();
 }

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+# Not under sanitizers: walks by the million take five times as long there.
 # The plume's numbers come back from deflections, the same with 1 and 2 threads.
 for t in 1 2; do
     importon bend fit "$ROOT/scenes/bend/plume.xml" -D count=25 -n 60 -q -t $t --json -o out$t >$t.json ||
