@@ -17,7 +17,9 @@
  * sigma is not given, the squared residual replaces sigma^2, pixel by pixel, which
  * holds however the noise differs between pixels (White, Econometrica 48, 1980); residual
  * and J^T J come from different halves of the units, so that their own noise is not
- * correlated. */
+ * correlated. Channels of a pixel share their noise, in a rendered picture nearly all of it:
+ * sigma^2 J^T J is a sum over pairs of channels, with the product of their residuals, or with
+ * the given sigmas times the correlation of residuals over sigma. */
 #include "gauss_newton.h"
 #include "base/arguments.h"
 #include "film/film_filter.h"
@@ -67,7 +69,7 @@ static enum imp_status pictures_add(struct imp__normal_job *j, const struct imp_
 {
     const struct imp_problem *p = j->problem;
     enum imp_status st = IMP_OK;
-    struct imp__normal_sums total = imp__normal_at(j->total, j->K, j->deviate);
+    struct imp__normal_sums total = imp__normal_at(j, j->total);
     struct imp__moved_gradient moved = {0};
     if (imp__problem_moves(p)) {
         IMP_TRY(imp__moved_begin(p, &j->tracer, &moved));
@@ -103,17 +105,16 @@ static enum imp_status target_add(struct imp__normal_job *j,
     j->width = film->crop_w;
     j->plan = imp__replicates_normal(p->scene, target, &own, rounds);
     const double walks = (double)film->crop_w * film->crop_h * j->plan.n * j->plan.R;
-    j->tiles =
-        (struct imp_tiles){.ctx = p->ctx,
-                           .run = &own,
-                           .walks = walks,
-                           .width = film->crop_w,
-                           .height = film->crop_h,
-                           .work = imp__normal_work,
-                           .size = imp__normal_count(j->K, j->deviate) * sizeof(double),
-                           .add = imp__normal_add,
-                           .take = imp__normal_take,
-                           .payload = j};
+    j->tiles = (struct imp_tiles){.ctx = p->ctx,
+                                  .run = &own,
+                                  .walks = walks,
+                                  .width = film->crop_w,
+                                  .height = film->crop_h,
+                                  .work = imp__normal_work,
+                                  .size = imp__normal_count(j) * sizeof(double),
+                                  .add = imp__normal_add,
+                                  .take = imp__normal_take,
+                                  .payload = j};
     const struct imp_tiles_pass pass = {.stage = "gauss-newton",
                                         .rate_unit = "walks",
                                         .units = walks,
@@ -124,6 +125,8 @@ static enum imp_status target_add(struct imp__normal_job *j,
     st = imp__tiles_create(&j->tiles);
     if (st == IMP_OK) st = imp__tiles_run(&j->tiles, &pass);
     imp__tiles_destroy(&j->tiles);
+    struct imp__normal_sums total = imp__normal_at(j, j->total);
+    if (st == IMP_OK) imp__normal_cross(j, &total);
     return st;
 }
 
@@ -169,8 +172,10 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
     if (x) IMP_TRY(imp_problem_set_x(p, x));
     imp__team_state(p->scene, &own);
     p->edge_terms = true;
+    for (size_t t = 0; t < p->n_targets; t++)
+        j.cross |= p->targets[t].noise_se && p->targets[t].desc.channels > 1;
     j.workers = imp__alloc(ctx, (size_t)ctx->threads, sizeof *j.workers);
-    j.total = imp__alloc(ctx, imp__normal_count(j.K, j.deviate), sizeof *j.total);
+    j.total = imp__alloc(ctx, imp__normal_count(&j), sizeof *j.total);
     if (!j.workers || !j.total)
         IMP_TRY(
             imp__error(ctx, IMP_E_NOMEM, "no memory for %zu x %zu matrices", j.K, j.K));
@@ -189,7 +194,7 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
         wide |= shares_walks(&j.tracer) || imp__problem_moves(p);
     }
     /* Where pixels share walks, the same estimate as that of trial steps from the same walks. */
-    const struct imp__normal_sums total = imp__normal_at(j.total, j.K, j.deviate);
+    const struct imp__normal_sums total = imp__normal_at(&j, j.total);
     struct imp_estimate objective = {
         .value = total.scalars[IMP_NORMAL_OBJECTIVE],
         .se = sqrt(fmax(0, total.scalars[IMP_NORMAL_VARIANCE])),

@@ -8,6 +8,7 @@
 #include "inverse/estimate/replicates.h"
 #include "inverse/problem/target_channels.h"
 #include "search/optimize.h"
+#include <math.h>
 
 /* Gauss-Newton pieces for all targets, from one set of walks, K = p->n <= 256
  * (docs/estimators.md 15). Regularisers are not included. Targets that are not quadratic have
@@ -34,8 +35,19 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
                                   const struct imp_run *run,
                                   struct imp__gauss_newton *out);
 
+/* Correlation of two channels' noise by sums of products of residuals over sigma; 0 where their own
+ * are not above their noise. */
+static inline double imp__noise_correlation(double cc, double dd, double cd)
+{
+    if (!(cc > 0 && dd > 0)) return 0;
+    return fmin(fmax(cd / sqrt(cc * dd), -1), 1);
+}
+
 struct imp__normal_sums { /* matrices [K*K], lower triangles */
     double *H, *H_same, *H_meas, *cov_g, *cov_excess, *g;
+    /* Where the sigmas of a target with several channels are given: the parts of H_meas by pairs of
+     * channels 01, 02, 12 as if they were fully correlated, [3][K*K]; else NULL. */
+    double *cross;
     double *scalars;    /* [IMP_NORMAL_SCALARS] */
     double *deviations; /* [IMP_DEVIATIONS][K*K], or NULL */
 };
@@ -47,6 +59,8 @@ enum {
     IMP_NORMAL_CHI2,
     IMP_NORMAL_CHI2_VARIANCE, /* its jackknife, */
     IMP_NORMAL_CHI2_EXCESS,   /* and what that has too much (excess.h) */
+    IMP_NORMAL_CHANNELS, /* six: products of residuals over sigma of 00, 11, 22, 01, 02, 12 */
+    IMP_NORMAL_CHANNELS_LAST = IMP_NORMAL_CHANNELS + 5,
     IMP_NORMAL_SCALARS
 };
 

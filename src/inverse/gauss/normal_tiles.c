@@ -107,16 +107,21 @@ static void touched_find(const struct imp__normal_job *j, struct pixel *p)
 
 /* ---- One channel ---------------------------------------------------------------- */
 
-/* Mean of r_a r_b over pairs of units of [a0, a1). */
-static double square_residual(const struct pixel *p, size_t c, int a0, int a1)
+/* Mean over pairs of different units of [a0, a1) of the residuals' product, of two channels. */
+static double residual_product(const struct pixel *p, size_t c, size_t d, int a0, int a1)
 {
     const double n = a1 - a0;
-    double sum = 0, square = 0;
+    double sc = 0, sd = 0, both = 0;
     for (int a = a0; a < a1; a++) {
-        sum += p->w->r[a][c];
-        square += p->w->r[a][c] * p->w->r[a][c];
+        sc += p->w->r[a][c];
+        sd += p->w->r[a][d];
+        both += p->w->r[a][c] * p->w->r[a][d];
     }
-    return (sum * sum - square) / (n * (n - 1));
+    return (sc * sd - both) / (n * (n - 1));
+}
+static double square_residual(const struct pixel *p, size_t c, int a0, int a1)
+{
+    return residual_product(p, c, c, a0, a1);
 }
 
 /* Sums of x and x x^T over units [a0, a1). */
@@ -206,6 +211,99 @@ static void channel_add(const struct imp__normal_job *j, const struct pixel *p, 
         for (int a = 0; a < p->M; a++)
             out->g[touched[k]] +=
                 p->share * factor[a] * w->X[((size_t)a * S + c) * T + k];
+}
+
+/* ---- Two channels ------------------------------------------------------------------ */
+
+/* Sums of x of two channels, and of x_c x_d^T, over units [a0, a1). */
+static void pair_products(const struct imp__normal_job *j, const struct pixel *p,
+                          size_t c, size_t d, int a0, int a1, double *sum_c,
+                          double *sum_d, double *xx)
+{
+    const size_t T = p->T, S = (size_t)seen_channels(j);
+    memset(sum_c, 0, T * sizeof *sum_c);
+    memset(sum_d, 0, T * sizeof *sum_d);
+    memset(xx, 0, T * T * sizeof *xx);
+    for (int a = a0; a < a1; a++) {
+        const double *xc = p->w->X + ((size_t)a * S + c) * T;
+        const double *xd = p->w->X + ((size_t)a * S + d) * T;
+        for (size_t k = 0; k < T; k++) {
+            sum_c[k] += xc[k];
+            sum_d[k] += xd[k];
+            if (xc[k] == 0) continue;
+            for (size_t l = 0; l < T; l++) xx[k * T + l] += xc[k] * xd[l];
+        }
+    }
+}
+
+/* What the noise of channels c < d has together: the cross-fitted product of residuals in place of
+ * sigma^2; with given sigmas these and both, for a correlation that is known at the end. */
+static void pair_add(const struct imp__normal_job *j, const struct pixel *p, size_t c,
+                     size_t d, struct imp__normal_sums *out)
+{
+    const struct imp__normal_worker *w = p->w;
+    const size_t K = j->K, S = (size_t)seen_channels(j), T = p->T;
+    const float *se = j->target->noise_se;
+    const int half = p->M / 2;
+    const double M = p->M, n0 = half, n1 = M - half;
+    const double weight = w->weight[c] * w->weight[d] * p->share;
+    double *c0 = w->sum, *c1 = w->sum1, *d0 = w->e, *d1 = w->e + T, *xx0 = w->sum_xx,
+           *xx1 = w->sum1_xx, *to = out->H_meas, m0 = 0, m1 = 0, m = 0;
+    if (weight == 0) return;
+    if (se) {
+        const double both = (double)se[p->index * S + c] * (double)se[p->index * S + d];
+        if (both > 0) {
+            const double product = residual_product(p, c, d, 0, p->M);
+            out->scalars[IMP_NORMAL_CHANNELS + 2 + c + d] += p->share * product / both;
+        }
+        m = weight * both / (M * (M - 1));
+        to = out->cross + (c + d - 1) * K * K;
+    } else {
+        m0 = 0.5 * weight / (n0 * (n0 - 1)) * residual_product(p, c, d, half, p->M);
+        m1 = 0.5 * weight / (n1 * (n1 - 1)) * residual_product(p, c, d, 0, half);
+    }
+    pair_products(j, p, c, d, 0, half, c0, d0, xx0);
+    pair_products(j, p, c, d, half, p->M, c1, d1, xx1);
+    for (size_t k = 0; k < T; k++)
+        for (size_t l = 0; l <= k; l++) {
+            const size_t kl = k * T + l, lk = l * T + k;
+            const double same0 = xx0[kl] + xx0[lk], same1 = xx1[kl] + xx1[lk];
+            const double u0 = c0[k] * d0[l] + c0[l] * d0[k] - same0,
+                         u1 = c1[k] * d1[l] + c1[l] * d1[k] - same1;
+            const double u = (c0[k] + c1[k]) * (d0[l] + d1[l]) +
+                             (c0[l] + c1[l]) * (d0[k] + d1[k]) - same0 - same1;
+            to[w->touched[k] * K + w->touched[l]] += se ? m * u : m0 * u0 + m1 * u1;
+        }
+}
+
+static void pairs_add(const struct imp__normal_job *j, const struct pixel *p,
+                      struct imp__normal_sums *out)
+{
+    const size_t S = (size_t)seen_channels(j);
+    const float *se = j->target->noise_se;
+    if (S < 2) return;
+    for (size_t c = 0; c < S; c++) {
+        const double sigma = se ? se[p->index * S + c] : 0;
+        if (sigma > 0 && p->w->weight[c] > 0)
+            out->scalars[IMP_NORMAL_CHANNELS + c] +=
+                p->share * square_residual(p, c, 0, p->M) / (sigma * sigma);
+        for (size_t d = c + 1; d < S; d++) pair_add(j, p, c, d, out);
+    }
+}
+
+void imp__normal_cross(const struct imp__normal_job *j, struct imp__normal_sums *sums)
+{
+    const size_t KK = j->K * j->K;
+    double *z = sums->scalars + IMP_NORMAL_CHANNELS;
+    if (!sums->cross) return;
+    for (size_t c = 0; c < 3; c++)
+        for (size_t d = c + 1; d < 3; d++) {
+            const double rho = imp__noise_correlation(z[c], z[d], z[2 + c + d]);
+            double *cross = sums->cross + (c + d - 1) * KK;
+            for (size_t i = 0; i < KK; i++) sums->H_meas[i] += rho * cross[i];
+        }
+    memset(sums->cross, 0, 3 * KK * sizeof *sums->cross);
+    memset(z, 0, 6 * sizeof *z);
 }
 
 /* ---- The gradient and its noise --------------------------------------------------- */
@@ -321,12 +419,12 @@ enum imp_status imp__normal_work(const struct imp_tile *t, struct imp_tile_worke
                                  void *result, void *payload)
 {
     struct imp__normal_job *j = payload;
-    struct imp__normal_sums out = imp__normal_at(result, j->K, j->deviate);
+    struct imp__normal_sums out = imp__normal_at(j, result);
     const int b0 = imp__replicates_begin(j->plan, (int)t->part);
     const int b1 = imp__replicates_begin(j->plan, (int)t->part + 1);
     const double R = b1 - b0, all = j->plan.R;
     struct imp__tile_walks walks;
-    memset(result, 0, imp__normal_count(j->K, j->deviate) * sizeof(double));
+    memset(result, 0, imp__normal_count(j) * sizeof(double));
     imp__tile_walks_begin(&j->tracer, t, tile, j->plan, b0, b1, 1, counts, j, &walks);
     for (int y = t->y0; y < t->y1; y++)
         for (int x = t->x0; x < t->x1; x++) {
@@ -342,6 +440,7 @@ enum imp_status imp__normal_work(const struct imp_tile *t, struct imp_tile_worke
             touched_find(j, &p);
             for (size_t c = 0; c < (size_t)seen_channels(j); c++)
                 channel_add(j, &p, c, &out);
+            pairs_add(j, &p, &out);
             gradient_add(j, &p, &out);
             chi2_variance_add(j, &p, &out.scalars[IMP_NORMAL_CHI2_VARIANCE],
                               &out.scalars[IMP_NORMAL_CHI2_EXCESS]);
@@ -357,7 +456,7 @@ void imp__normal_add(void *into, const void *from, void *payload)
     const struct imp__normal_job *j = payload;
     double *a = into;
     const double *b = from;
-    for (size_t k = 0; k < imp__normal_count(j->K, j->deviate); k++) a[k] += b[k];
+    for (size_t k = 0; k < imp__normal_count(j); k++) a[k] += b[k];
 }
 
 enum imp_status imp__normal_take(size_t group, const void *sum, void *payload)

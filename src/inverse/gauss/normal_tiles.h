@@ -22,6 +22,7 @@ struct imp__normal_job {
     int width, channels;
     size_t K;
     bool deviate; /* the deviations of J^T W J, too */
+    bool cross;   /* some target has several channels and given sigmas */
     struct imp_tiles tiles;
     struct imp__normal_worker {
         double *x;              /* [K][channels] of one set: mean */
@@ -39,22 +40,27 @@ struct imp__normal_job {
     double *total; /* [imp__normal_count] */
 };
 
-static inline size_t imp__normal_count(size_t K, bool deviate)
+static inline size_t imp__normal_count(const struct imp__normal_job *j)
 {
-    return (5 + (deviate ? IMP_DEVIATIONS : 0)) * K * K + K + IMP_NORMAL_SCALARS;
+    const size_t matrices = 5 + (j->cross ? 3 : 0) + (j->deviate ? IMP_DEVIATIONS : 0);
+    return matrices * j->K * j->K + j->K + IMP_NORMAL_SCALARS;
 }
 
-static inline struct imp__normal_sums imp__normal_at(double *p, size_t K, bool deviate)
+static inline struct imp__normal_sums imp__normal_at(const struct imp__normal_job *j,
+                                                     double *p)
 {
+    const size_t K = j->K, KK = K * K;
+    double *more = p + 5 * KK + K + IMP_NORMAL_SCALARS;
     return (struct imp__normal_sums){
         .H = p,
-        .H_same = p + K * K,
-        .H_meas = p + 2 * K * K,
-        .cov_g = p + 3 * K * K,
-        .cov_excess = p + 4 * K * K,
-        .g = p + 5 * K * K,
-        .scalars = p + 5 * K * K + K,
-        .deviations = deviate ? p + 5 * K * K + K + IMP_NORMAL_SCALARS : NULL};
+        .H_same = p + KK,
+        .H_meas = p + 2 * KK,
+        .cov_g = p + 3 * KK,
+        .cov_excess = p + 4 * KK,
+        .g = p + 5 * KK,
+        .scalars = p + 5 * KK + K,
+        .cross = j->cross ? more : NULL,
+        .deviations = j->deviate ? more + (j->cross ? 3 * KK : 0) : NULL};
 }
 
 /* normal_units.c: units of a pixel that has so many sets. */
@@ -67,6 +73,9 @@ double imp__normal_residuals(const struct imp__target *target, size_t pixel, siz
 
 /* Channels of pixels whose weight is not 0. */
 double imp__normal_residual_count(const struct imp__target *target);
+
+/* Adds `cross` of a target, which is complete, to its H_meas, with the channels' correlations. */
+void imp__normal_cross(const struct imp__normal_job *j, struct imp__normal_sums *sums);
 
 /* For imp__tiles_run. */
 enum imp_status imp__normal_work(const struct imp_tile *t, struct imp_tile_worker *tile,

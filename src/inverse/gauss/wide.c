@@ -147,22 +147,29 @@ static enum imp_status light_replicates(struct imp__wide *w,
     return IMP_OK;
 }
 
+/* Value k of a pixel as the target sees it, 0: the radiance, in replicate b. */
+static inline double seen_of(const struct imp__wide *w, size_t pixel, int c, int b,
+                             size_t k)
+{
+    const size_t at = pixel * (w->K + 1) * (size_t)w->channels + k * (size_t)w->channels;
+    double lanes[3];
+    for (size_t l = 0; l < (size_t)w->channels; l++)
+        lanes[l] = w->films[b] ? (double)w->films[b]->mean[at + l] : w->rows[b][at + l];
+    return imp__seen(w->luminance, lanes, c);
+}
+
+void imp__wide_radiances(const struct imp__wide *w, size_t pixel, int c,
+                         double L[IMP_WIDE_REPLICATES])
+{
+    for (int b = 0; b < w->R; b++) L[b] = seen_of(w, pixel, c, b, 0);
+}
+
 void imp__wide_gather(struct imp__wide *w, size_t pixel, int c)
 {
-    const size_t stride = (w->K + 1) * (size_t)w->channels;
-    for (int b = 0; b < w->R; b++) {
-        const float *from = w->films[b] ? w->films[b]->mean + pixel * stride : NULL;
-        for (size_t k = 0; k <= w->K; k++) {
-            double lanes[3];
-            for (int l = 0; l < w->channels; l++) {
-                const size_t at = k * (size_t)w->channels + (size_t)l;
-                lanes[l] = from ? (double)from[at] : w->rows[b][pixel * stride + at];
-            }
-            const double v = imp__seen(w->luminance, lanes, c);
-            if (k == 0) w->L[b] = v;
-            else w->X[(size_t)b * w->K + k - 1] = v;
-        }
-    }
+    imp__wide_radiances(w, pixel, c, w->L);
+    for (int b = 0; b < w->R; b++)
+        for (size_t k = 0; k < w->K; k++)
+            w->X[(size_t)b * w->K + k] = seen_of(w, pixel, c, b, k + 1);
 }
 
 double imp__wide_weight(const struct imp__wide *w, size_t pixel, int c, double mean,

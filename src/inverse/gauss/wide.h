@@ -24,12 +24,15 @@ struct imp__wide {
     double *L, *X;                        /* of a pixel and channel: [R], [R][K] */
     double *sum;                          /* [K] */
     struct imp__pair_noise noise, loss_noise; /* of the gradient; of chi^2 */
-    /* One channel of half of the replicates, for H_meas: [pixels], [K][pixels]. */
+    /* Of two channels, for H_meas: [pixels], [K][pixels] each. */
     double *sigma2, *Xc, *Xd, *row;
 };
 
 /* L, X of a pixel and channel, as the target sees them. */
 void imp__wide_gather(struct imp__wide *w, size_t pixel, int c);
+/* The L alone. */
+void imp__wide_radiances(const struct imp__wide *w, size_t pixel, int c,
+                         double L[IMP_WIDE_REPLICATES]);
 /* Weight of a pixel and channel, and the target that makes its loss 1/2 w (I - T)^2. */
 double imp__wide_weight(const struct imp__wide *w, size_t pixel, int c, double mean,
                         double *T);

@@ -5,7 +5,9 @@
  *
  *     H_meas = sum_pq w_p w_q rho(p - q) sigma_p^2 J_p J_q
  *
- * with the squared residual for sigma^2 where that is not given. */
+ * with the squared residual for sigma^2 where that is not given. Channels of a pixel are correlated,
+ * too, in pictures that were rendered nearly fully: sigma_p^2 J_p J_q is a sum over pairs of channels,
+ * with the product of two residuals, or the given sigmas times a correlation. */
 #include "inverse/problem/loss.h"
 #include "wide.h"
 #include <stdlib.h>
@@ -46,44 +48,115 @@ static void smooth(double *image, int n, size_t stride, int count, size_t step,
     }
 }
 
-/* sigma^2 from half of the replicates, w J from two quarters each, so that our own noise
- * is not correlated between the factors. */
-static void measurement_fill(struct imp__wide *w, int c, int half)
+/* Mean over pairs of different replicates [b0, b1) of r_c r_d, the residuals of two channels. */
+static double residual_product(const double *rc, const double *rd, int b0, int b1)
+{
+    const double n = b1 - b0;
+    double sc = 0, sd = 0, both = 0;
+    for (int b = b0; b < b1; b++) {
+        sc += rc[b];
+        sd += rd[b];
+        both += rc[b] * rd[b];
+    }
+    return (sc * sd - both) / (n * (n - 1));
+}
+
+/* Residuals of a pixel and channel; its weight. */
+static double residuals(struct imp__wide *w, size_t p, int c,
+                        double r[IMP_WIDE_REPLICATES])
+{
+    double all = 0, T;
+    imp__wide_radiances(w, p, c, r);
+    for (int b = 0; b < w->R; b++) all += r[b];
+    const double weight = imp__wide_weight(w, p, c, all / w->R, &T);
+    for (int b = 0; b < w->R; b++) r[b] -= T;
+    return weight;
+}
+
+/* Correlation of two channels' noise where their sigmas are given: that of the residuals over
+ * sigma, over the picture. */
+static double channel_correlation(struct imp__wide *w, int c, int d)
+{
+    const size_t pixels = (size_t)w->width * (size_t)w->height, S = (size_t)w->seen;
+    double cc = 0, dd = 0, cd = 0;
+    if (c == d) return 1;
+    for (size_t p = 0; p < pixels; p++) {
+        const double sc = w->noise_se[p * S + (size_t)c],
+                     sd = w->noise_se[p * S + (size_t)d];
+        double rc[IMP_WIDE_REPLICATES], rd[IMP_WIDE_REPLICATES];
+        if (!(sc > 0 && sd > 0) || residuals(w, p, c, rc) == 0 ||
+            residuals(w, p, d, rd) == 0)
+            continue;
+        cc += residual_product(rc, rc, 0, w->R) / (sc * sc);
+        dd += residual_product(rd, rd, 0, w->R) / (sd * sd);
+        cd += residual_product(rc, rd, 0, w->R) / (sc * sd);
+    }
+    return imp__noise_correlation(cc, dd, cd);
+}
+
+/* The covariance of the noise of two channels at each pixel, from half of the replicates. */
+static void covariance_fill(struct imp__wide *w, int c, int d, int half)
+{
+    const size_t pixels = (size_t)w->width * (size_t)w->height, S = (size_t)w->seen;
+    const int h = w->R / 2;
+    const double rho = w->noise_se ? channel_correlation(w, c, d) : 0;
+    for (size_t p = 0; p < pixels; p++) {
+        double rc[IMP_WIDE_REPLICATES], rd[IMP_WIDE_REPLICATES];
+        if (w->noise_se) {
+            w->sigma2[p] =
+                rho * w->noise_se[p * S + (size_t)c] * w->noise_se[p * S + (size_t)d];
+            continue;
+        }
+        residuals(w, p, c, rc);
+        residuals(w, p, d, rd);
+        w->sigma2[p] = residual_product(rc, rd, half * h, half * h + h);
+    }
+}
+
+/* w J of a channel, [K][pixels], from a quarter of the replicates in the half that is not `half`. */
+static void derivatives_fill(struct imp__wide *w, int c, int half, int quarter,
+                             double *out)
 {
     const size_t K = w->K, pixels = (size_t)w->width * (size_t)w->height;
-    const int h = w->R / 2, quarter = w->R / 4;
+    const int q = w->R / 4, first = (half ? 0 : w->R / 2) + quarter * q;
     for (size_t p = 0; p < pixels; p++) {
-        double S = 0, S2 = 0, all = 0, T;
+        double all = 0, T;
         imp__wide_gather(w, p, c);
-        for (int b = 0; b < w->R; b++) {
-            all += w->L[b];
-            if (b / h != half) continue;
-            S += w->L[b];
-            S2 += w->L[b] * w->L[b];
-        }
+        for (int b = 0; b < w->R; b++) all += w->L[b];
         const double weight = imp__wide_weight(w, p, c, all / w->R, &T);
-        w->sigma2[p] = w->noise_se
-                           ? imp__sqr(w->noise_se[p * (size_t)w->seen + (size_t)c])
-                           : 2 * imp__loss_unbiased(1, T, h, S, S2);
         for (size_t k = 0; k < K; k++) {
-            double x[2] = {0, 0};
-            for (int b = 0; b < w->R; b++)
-                if (b / h != half)
-                    x[b % h / quarter] += w->X[(size_t)b * K + k] / quarter;
-            w->Xc[k * pixels + p] = weight * x[0];
-            w->Xd[k * pixels + p] = weight * x[1];
+            double x = 0;
+            for (int b = first; b < first + q; b++) x += w->X[(size_t)b * K + k];
+            out[k * pixels + p] = weight * x / q;
         }
     }
 }
 
+/* Adds what channels c, of Xc, and d, of Xd, have together. */
+static void products_add(const struct imp__wide *w, double *H)
+{
+    const size_t K = w->K, pixels = (size_t)w->width * (size_t)w->height;
+    for (size_t k = 0; k < K; k++)
+        for (size_t m = 0; m <= k; m++) {
+            const double *ck = w->Xc + k * pixels, *cm = w->Xc + m * pixels,
+                         *dk = w->Xd + k * pixels, *dm = w->Xd + m * pixels;
+            double sum = 0;
+            for (size_t p = 0; p < pixels; p++)
+                sum += w->sigma2[p] * (ck[p] * dm[p] + cm[p] * dk[p]);
+            H[k * K + m] += sum / 4; /* symmetric; two halves */
+        }
+}
+
+/* sigma^2 from half of the replicates, w J from two quarters of the other half each, so that our own
+ * noise is not correlated between the factors. */
 void imp__wide_measurement(struct imp__wide *w, struct imp__normal_sums *out)
 {
     const size_t K = w->K, pixels = (size_t)w->width * (size_t)w->height;
     double rho[TAPS];
     const int taps = correlation(&w->film->filter, rho);
-    for (int c = 0; c < w->seen; c++)
-        for (int half = 0; half < 2; half++) {
-            measurement_fill(w, c, half);
+    for (int half = 0; half < 2; half++)
+        for (int d = 0; d < w->seen; d++) {
+            derivatives_fill(w, d, half, 1, w->Xd);
             for (size_t k = 0; k < K; k++) {
                 double *image = w->Xd + k * pixels;
                 smooth(image, w->width, 1, w->height, (size_t)w->width, rho, taps,
@@ -91,14 +164,10 @@ void imp__wide_measurement(struct imp__wide *w, struct imp__normal_sums *out)
                 smooth(image, w->height, (size_t)w->width, w->width, 1, rho, taps,
                        w->row);
             }
-            for (size_t k = 0; k < K; k++)
-                for (size_t m = 0; m <= k; m++) {
-                    double sum = 0;
-                    for (size_t p = 0; p < pixels; p++)
-                        sum += w->sigma2[p] *
-                               (w->Xc[k * pixels + p] * w->Xd[m * pixels + p] +
-                                w->Xc[m * pixels + p] * w->Xd[k * pixels + p]);
-                    out->H_meas[k * K + m] += sum / 4; /* symmetric; two halves */
-                }
+            for (int c = 0; c < w->seen; c++) {
+                covariance_fill(w, c, d, half);
+                derivatives_fill(w, c, half, 0, w->Xc);
+                products_add(w, out->H_meas);
+            }
         }
 }

@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Rendered targets have nearly one noise in all channels of a pixel: intervals of numbers that change
+ * all channels, in fits to such targets, against the spread of the fits, with and without the target's
+ * standard errors, with filters of one pixel and wider. Taken for independent, three channels would
+ * make the mean square of (value - truth)/se three. And targets whose channels are independent. */
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include "math/rng.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIDE = 16, FITS = 60, SPP = 64, TARGET = 8 };
+#define TRUTH 0.5
+
+static imp_context *ctx;
+
+static imp_scene *ball(const char *filter)
+{
+    char xml[2048];
+    snprintf(
+        xml, sizeof xml,
+        "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' "
+        "value='3'/></integrator>"
+        "<sensor type='perspective'><float name='fov' value='40'/><transform "
+        "name='to_world'><lookat origin='0,-5,1' target='0,0,0' up='0,0,1'/>"
+        "</transform><film type='hdrfilm'><integer name='width' value='%d'/><integer "
+        "name='height' value='%d'/><rfilter type='%s'/></film></sensor>"
+        "<shape type='sphere'><bsdf type='diffuse' id='paint'><float "
+        "name='reflectance' value='%g'/></bsdf></shape>"
+        "<shape type='rectangle'><transform name='to_world'><scale value='3'/>"
+        "<translate z='-1'/></transform><bsdf type='diffuse'/></shape>"
+        "<shape type='sphere'><point name='center' x='2' y='-2' z='3'/><float "
+        "name='radius' value='.7'/><emitter type='area'><rgb name='radiance' "
+        "value='9,6,3'/></emitter></shape></scene>",
+        SIDE, SIDE, filter, TRUTH);
+    return test_scene_text(ctx, xml, IMP_RGB);
+}
+
+/* The truth with noise: rendered, or of independent channels as large. */
+static void target_make(imp_scene *s, const float *mean, int fit, bool rendered,
+                        float pixels[SIDE * SIDE * 3], float se[SIDE * SIDE * 3])
+{
+    struct imp_run run = IMP_RUN_INIT;
+    imp_film *film;
+    run.spp = TARGET;
+    run.points = IMP_POINTS_INDEPENDENT;
+    run.seed = 1000 + (uint64_t)fit;
+    test_must(ctx, imp_render(s, &run, &film));
+    memcpy(pixels, imp_film_mean(film), SIDE * SIDE * 3 * sizeof *pixels);
+    imp_film_destroy(film);
+    const struct imp_key key = imp__key(7, (uint64_t)fit, 1);
+    for (int i = 0; !rendered && i < SIDE * SIDE * 3; i++) {
+        const double u = imp__u01(key, 2 * (uint32_t)i),
+                     v = imp__u01(key, 2 * (uint32_t)i + 1);
+        pixels[i] = mean[i] + (float)(se[i] * sqrt(-2 * log(1 - u)) * cos(2 * M_PI * v));
+    }
+}
+
+/* Standard errors of such a target, from many more samples, and the mean. */
+static void noise_find(imp_scene *s, float mean[SIDE * SIDE * 3],
+                       float se[SIDE * SIDE * 3])
+{
+    struct imp_run run = IMP_RUN_INIT;
+    imp_film *film;
+    run.spp = 4096;
+    run.points = IMP_POINTS_INDEPENDENT;
+    test_must(ctx, imp_render(s, &run, &film));
+    memcpy(mean, imp_film_mean(film), SIDE * SIDE * 3 * sizeof *mean);
+    for (int i = 0; i < SIDE * SIDE * 3; i++)
+        se[i] = (float)(imp_film_se(film)[i] * sqrt(4096. / TARGET));
+    imp_film_destroy(film);
+}
+
+static void fits(const char *filter, bool known, bool rendered)
+{
+    static float mean[SIDE * SIDE * 3], se[SIDE * SIDE * 3], pixels[SIDE * SIDE * 3];
+    double square = 0;
+    imp_scene *truth = ball(filter);
+    noise_find(truth, mean, se);
+    for (int k = 0; k < FITS; k++) {
+        imp_scene *s = ball(filter);
+        imp_problem *p = test_problem(ctx, s, "paint.reflectance.value");
+        struct imp_target t = IMP_TARGET_INIT;
+        struct imp_fit_options options = IMP_FIT_OPTIONS_INIT;
+        struct imp_run run = IMP_RUN_INIT;
+        const struct imp_fit_result *r;
+        target_make(truth, mean, k, rendered, pixels, se);
+        t.width = t.height = SIDE;
+        t.channels = 3;
+        t.pixels = pixels;
+        t.noise_se = known ? se : NULL;
+        test_must(ctx, imp_problem_add_target(p, &t));
+        options.optimizer = IMP_LM;
+        options.intervals = true;
+        run.spp = SPP;
+        run.seed = 5000 + (uint64_t)k;
+        test_must(ctx, imp_fit(p, &options, &run, &r));
+        const struct imp_fit_variable *v = &r->variables[0];
+        square += (v->value - TRUTH) * (v->value - TRUTH) / (v->se * v->se) / FITS;
+        imp_problem_destroy(p);
+        imp_scene_destroy(s);
+    }
+    imp_scene_destroy(truth);
+    /* Four standard errors of the mean of so many squares. */
+    const double allowed = 4 * sqrt(2. / FITS);
+    tap_ok(square > 1 - 0.75 * allowed && square < 1 + allowed,
+           "%s, noise %s, %s: mean square # %.2f", filter,
+           known ? "given" : "of residuals",
+           rendered ? "rendered" : "independent channels", square);
+}
+
+int main(void)
+{
+    ctx = test_context(2);
+    for (int known = 0; known < 2; known++) {
+        fits("box", known, true);
+        fits("box", known, false);
+        fits("gaussian", known, true);
+    }
+    imp_context_destroy(ctx);
+    return tap_done();
+}
