@@ -8,7 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Of a thing's radius: the step of the differences along the axes. */
+/* The step of the differences along the axes, in radii of the thing. */
 #define STEP 0.01
 
 /* Which of its numbers shift the thing along x, y, z, and whether the next three turn it. */

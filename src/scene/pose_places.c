@@ -7,7 +7,7 @@
 #include "pose.h"
 #include <math.h>
 
-/* Of a camera or a light, which have no size, in parts of the scene's radius. */
+/* Radius of a camera or a light, which have no size, in parts of the scene's. */
 #define SIZE_OF_POINTS 0.05
 
 /* The middle of what moves. False: it has no place. */
