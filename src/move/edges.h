@@ -42,7 +42,8 @@ struct imp__arc {
 struct imp__edges {
     imp_context *ctx;
     size_t n_bodies;
-    struct imp__body *body; /* [n_bodies] all that rays can meet */
+    struct imp__body
+        *body; /* [n_bodies] all that rays can meet, but for borders of media */
     size_t n, n_faces;
     struct imp__edge *edge; /* [n], along a curve through space: neighbours are near */
     struct imp__edge_face *face; /* [n_faces] */

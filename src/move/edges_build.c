@@ -89,7 +89,8 @@ static enum imp_status bodies_list(struct building *x)
     for (int pass = 0; pass < 2; pass++) {
         size_t n = 0;
         for (int k = 0; k < imp__shapes_outside(scene); k++) {
-            if (imp__shape_is_absent(scene->shapes[k])) continue;
+            const struct imp_shape *s = scene->shapes[k];
+            if (imp__shape_is_absent(s) || imp__is_border(scene, s)) continue;
             if (pass) x->out->body[n] = (struct imp__body){k, 0};
             n++;
         }

@@ -47,7 +47,8 @@ static int segment_pierces(const struct imp_scene *scene, const struct imp__body
     struct imp_hit hit;
     for (double from = end; imp__intersect(scene, &a, &d, from, 1 - end, &hit);
          from = hit.t + END)
-        if (!is_hit(&hit, body->shape, body->place) &&
+        if (!imp__is_border(scene, scene->shapes[hit.shape]) &&
+            !is_hit(&hit, body->shape, body->place) &&
             !(but && is_hit(&hit, but->shape, but->place)))
             return hit.shape;
     return -1;

@@ -11,7 +11,10 @@
 struct imp__moves imp__moves_begin(const struct imp_scene *scene,
                                    const struct imp_sensor *sensor)
 {
-    return (struct imp__moves){.scene = scene, .sensor = sensor};
+    return (struct imp__moves){
+        .scene = scene,
+        .sensor = sensor,
+        .borders = imp__borders_of(scene, sensor ? sensor->medium : NULL)};
 }
 
 void imp__moves_free(struct imp__moves *moves)

@@ -38,6 +38,7 @@
 
 #include "scene/instances.h"
 #include "scene/located.h"
+#include "scene/media_around.h"
 #include "scene/pose.h"
 #include <limits.h>
 
@@ -81,8 +82,9 @@ struct imp__moves {
     int n_movers;
     size_t cap_movers;
     struct imp__mover *mover;
-    size_t n;   /* numbers in all */
-    bool skies; /* a sky, or its sun, is among them */
+    size_t n;                    /* numbers in all */
+    bool skies;                  /* a sky, or its sun, is among them */
+    struct imp__borders borders; /* of media, as far as walks go through any */
     /* Vertices of a mesh at one place move together, as the caller sees to: what is wanted of their
      * numbers is the sum. */
     bool seams_join;

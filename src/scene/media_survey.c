@@ -14,10 +14,9 @@
 
 static const char *name_of(const struct imp_medium *m) { return m ? m->name : "none"; }
 
-/* The next surface that bounds media, from *o along d, opaque ones passed; those with a
- * priority do not determine the medium around them. */
-static const struct imp_shape *boundary(const struct imp_scene *scene, imp_v3 *o,
-                                        imp_v3 d, bool *outwards)
+/* Those with a priority do not determine the medium around them. */
+const struct imp_shape *imp__border_next(const struct imp_scene *scene, imp_v3 *o,
+                                         imp_v3 d, bool *outwards)
 {
     for (int k = 0; k < HITS_MAX; k++) {
         struct imp_hit hit;
@@ -36,8 +35,39 @@ const struct imp_medium *imp__medium_around(const struct imp_scene *scene, imp_v
                                             imp_v3 d, const struct imp_medium *otherwise)
 {
     bool outwards;
-    const struct imp_shape *s = boundary(scene, &p, d, &outwards);
+    const struct imp_shape *s = imp__border_next(scene, &p, d, &outwards);
     return !s ? otherwise : outwards ? s->interior : s->exterior;
+}
+
+/* A ray through this point meets the shape. */
+static imp_v3 inner_point(const struct imp_shape *s)
+{
+    const struct imp_triangles *t = &s->triangles;
+    imp_v3 p = {0};
+    if (s->geometry != IMP_TRIANGLES || t->n_triangles == 0) return (s->lo + s->hi) * 0.5;
+    for (int k = 0; k < 3; k++) {
+        const float *v = t->positions + 3 * (size_t)t->indices[k];
+        p += imp__v3(v[0], v[1], v[2]) * (1. / 3);
+    }
+    return p;
+}
+
+struct imp__borders imp__borders_of(const struct imp_scene *scene,
+                                    const struct imp_medium *otherwise)
+{
+    struct imp__borders out = {.scene = scene, .outside = otherwise};
+    for (int k = 0; k < scene->n_all_shapes; k++) {
+        const struct imp_shape *s = scene->shapes[k];
+        if (!imp__is_border(scene, s)) continue;
+        /* From far away, a ray meets some border from outside. */
+        const imp_v3 d = imp__normalize(imp__v3(0.61, 0.53, 0.59));
+        const imp_v3 o =
+            inner_point(s) - d * (2 * (1 + imp__length(scene->hi - scene->lo)));
+        out.any = true;
+        out.outside = imp__medium_around(scene, o, d, otherwise);
+        break;
+    }
+    return out;
 }
 
 /* In shapes with priorities a camera's medium follows from them. */
@@ -73,7 +103,7 @@ static enum imp_status camera_check(const struct imp_scene *scene,
         const enum imp_status st = nest_check(scene, sensor, &ray);
         if (st != IMP_OK) return st;
     }
-    const struct imp_shape *s = boundary(scene, &ray.o, ray.d, &outwards);
+    const struct imp_shape *s = imp__border_next(scene, &ray.o, ray.d, &outwards);
     if (!s) return IMP_OK;
     const struct imp_medium *around = outwards ? s->interior : s->exterior;
     if (around == sensor->medium) return IMP_OK;
@@ -102,7 +132,8 @@ static bool line_check(struct imp_scene *scene, const struct imp_shape *shape, i
     d[axis] = 1;
     d = imp__normalize(d);
     imp_v3 o = centre - d * (2 * (1 + imp__length(scene->hi - scene->lo)));
-    for (int k = 0; k < HITS_MAX && (s = boundary(scene, &o, d, &outwards)); k++) {
+    for (int k = 0; k < HITS_MAX && (s = imp__border_next(scene, &o, d, &outwards));
+         k++) {
         const struct imp_medium *before = outwards ? s->interior : s->exterior;
         if (known && before != m) {
             imp__warn(scene->ctx,

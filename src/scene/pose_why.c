@@ -6,6 +6,7 @@
 #include "kind/emitter/ies.h"
 #include "kind/emitter/sky_sun.h"
 #include "kind/shape/shape.h"
+#include "media_around.h"
 #include "pose.h"
 
 extern const struct imp_sensor_ops imp__distant;
@@ -20,7 +21,8 @@ static const char *shape_why(const struct imp_scene *scene, const struct imp_sha
         return "it is in a shape group: its instances have poses";
     if (scene->n_bodies > 0) return "there are media of graded index";
     if (scene->priorities) return "shapes have priorities";
-    if (s->interior) return "it bounds a medium";
+    if (s->interior && !imp__is_border(scene, s))
+        return "it bounds a medium, with a surface that is not null";
     if (scene->lights_in_tree) return "lights are chosen by a tree (light_choice)";
     if (scene->aims.aimed) return "directions are aimed at shapes";
     if (s->placed || s->by_triangle) return "its textures need more than uv";

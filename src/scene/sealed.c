@@ -123,9 +123,11 @@ enum imp_status imp__sealed_create(struct imp_scene *scene)
     scene->closed =
         imp__arena_array(&scene->arena, (size_t)scene->n_all_shapes + 1, sizeof(bool));
     if (!scene->sealed || !scene->closed) return imp__build_no_memory(scene);
-    /* A shape that bounds a medium has no pose: it stays as it is. */
-    for (int k = 0; k < scene->n_all_shapes; k++)
-        scene->closed[k] = scene->shapes[k]->interior && is_closed(scene->shapes[k]);
+    /* Neither poses nor vertices open a shape that is closed. */
+    for (int k = 0; k < scene->n_all_shapes; k++) {
+        const struct imp_shape *s = scene->shapes[k];
+        scene->closed[k] = (s->interior || s->exterior) && is_closed(s);
+    }
     imp__sealed_renew(scene);
     return IMP_OK;
 }

@@ -30,10 +30,6 @@
 #define DISK                                                                             \
     "<shape type='disk' id='disk'><emitter type='area'><rgb name='radiance' value='3'/>" \
     "</emitter></shape>"
-#define BALL                                                                             \
-    "<shape type='sphere' id='ball'><point name='center' x='0' y='-2' z='1'/><float "    \
-    "name='radius' value='.3'/><bsdf type='null'/><medium name='interior' "              \
-    "type='homogeneous'/><ref name='exterior' id='fog'/></shape>"
 #define SUNK                                                                             \
     "<shape type='sphere' id='ball'><float name='radius' value='.6'/><point "            \
     "name='center' x='1.1' y='-.7' z='.25'/><ref id='grey'/></shape>"
@@ -142,10 +138,6 @@ static void refused_test(void)
         room("<medium type='homogeneous' id='fog'><rgb name='sigma_t' value='.2'/><rgb "
              "name='emission' value='1'/></medium>" VOLPATH("2")),
         "block.pose", "emits");
-    number_refused("another medium", room(FOG(".2", ".5", "") VOLPATH("2") BALL),
-                   "block.pose", "bounds a medium");
-    number_refused("a boundary that moves", room(FOG(".2", ".5", "") VOLPATH("2") BALL),
-                   "ball.pose", "bounds a medium");
 }
 
 int main(int argc, char **argv)

@@ -18,8 +18,9 @@ struct imp__moved_by {
     double turn[9];  /* R(a') R(a)^T */
     double by;       /* scale after over before */
     imp_v3 from, to; /* the centre, or a light's place or direction, before and after */
-    imp_spec
-        extinction; /* of a medium that fills the scene, by lanes; 0: there is none */
+    struct imp__borders borders; /* of media */
+    bool fades;                  /* there are media */
+    imp_spec extinction;         /* of one that fills the scene, by lanes; else 0 */
 };
 
 /* Moves it by h along a number. */

@@ -2,6 +2,8 @@
  *
  * A recorded walk from stop to stop where something has moved (check_moved.h). */
 #include "check_moved.h"
+#include "math/offset.h"
+#include "walk/media/tracking.h"
 #include "walk/moved/moved_mirror.h"
 #include "walk/moved/moved_sky.h"
 #include "walk/path/first_segment.h"
@@ -26,13 +28,35 @@ static imp_spec stop_ratio(const struct imp__moved_by *m, const struct stop *s,
     return imp__moved_kernel(m, s->v, &s->here, s->x, s->from, w, &s->old, lobe);
 }
 
-/* What a way that is so much longer lets pass. */
-static imp_spec fades(const struct imp__moved_by *m, double longer)
+/* What a way lets pass that is so much longer in a medium of this extinction. */
+static imp_spec fades(imp_spec extinction, double longer)
 {
     imp_spec T = imp__spec(1);
-    if (imp__is_zero(m->extinction)) return T;
-    for (int c = 0; c < 4; c++) T[c] = exp(-m->extinction[c] * longer);
+    if (imp__is_zero(extinction)) return T;
+    for (int c = 0; c < 4; c++) T[c] = exp(-extinction[c] * longer);
     return T;
+}
+
+/* The same of a line, now and then so long, that has become longer all over: in media that this track
+ * crosses. */
+static imp_spec line_fades(const struct imp__moved_by *m, const struct imp_track *track,
+                           const struct imp_carried *carried, const double d[2])
+{
+    if (!m->borders.any) return fades(m->extinction, d[0] - d[1]);
+    if (!track || !isfinite(d[1])) return imp__spec(1);
+    return fades(imp__track_depth(m->c->problem->scene, track, carried),
+                 (d[0] - d[1]) / d[1]);
+}
+
+/* The extinction where a ray along w meets the surface at p. */
+static imp_spec extinction_before(const struct imp__moved_by *m, imp_v3 p, imp_v3 n,
+                                  imp_v3 w, const struct imp_carried *carried)
+{
+    imp_spec in[IMP_INPUTS_MAX];
+    if (!m->borders.any) return m->extinction;
+    const struct imp_medium *medium =
+        imp__borders_at(&m->borders, imp__offset(p, n, -w), -w);
+    return medium ? imp__extinction_at(medium, p, carried, in) : imp__spec(0);
 }
 
 /* Light from a place of a lamp, now and then, to a stop: `glued` to the place, it has become so many
@@ -40,17 +64,19 @@ static imp_spec fades(const struct imp__moved_by *m, double longer)
  * direction. */
 static imp_spec lamp_ratio(const struct imp__moved_by *m, const struct stop *s, int lobe,
                            const struct imp_emitter *e, const struct imp__moved_at *now,
-                           imp_v3 then, imp_spec glued)
+                           const struct imp__glued *then, imp_spec glued)
 {
     imp_v3 w[2];
     double unused;
     if (!s->floats) return glued;
-    const double d[2] = {imp__length(now->p - s->x), imp__length(then - s->old.p)};
+    const double d[2] = {imp__length(now->p - s->x), imp__length(then->p - s->old.p)};
     struct imp__moved_at met = *now;
-    w[0] = w[1] = imp__normalize(then - s->old.p);
+    w[0] = w[1] = imp__normalize(then->p - s->old.p);
     const double fixed = imp__length(imp__moved_met(s->x, w[0], &met) - s->x);
+    const imp_spec extinction =
+        extinction_before(m, then->p, then->n, w[0], s->v->carried);
     return glued * imp__glued_part(e, d[0], &unused) +
-           stop_ratio(m, s, w, lobe) * fades(m, fixed - d[1]) *
+           stop_ratio(m, s, w, lobe) * fades(extinction, fixed - d[1]) *
                (1 - imp__glued_part(e, fixed, &unused));
 }
 
@@ -66,14 +92,16 @@ static double light_frozen(const struct imp__moved_by *m, const struct stop *s,
     const double ratio = imp__moved_light(m, s->v, &s->old, s->x, to, &farther);
     const struct imp_emitter *e = scene->emitters[l->emitter];
     imp_spec all = stop_ratio(m, s, to, IMP_SMOOTH);
+    const double then = l->dist, d[2] = {then + farther, then};
+    const imp_spec T = line_fades(m, s->v->to_light, s->v->carried, d);
     if (s->floats && e->shape) {
         const struct imp__glued y =
             imp__glued_at(scene, e->shape->index, &l->located, 0, imp__decided_v3(l->d));
         const struct imp__moved_at now = imp__moved_placed(m, &y);
-        all = lamp_ratio(m, s, IMP_SMOOTH, e, &now, y.p, all * ratio * fades(m, farther));
+        all = lamp_ratio(m, s, IMP_SMOOTH, e, &now, &y, all * ratio * T);
         return imp__sum_used(P * s->v->b * all, scene->lanes);
     }
-    return ratio * imp__sum_used(P * s->v->b * all * fades(m, farther), scene->lanes);
+    return ratio * imp__sum_used(P * s->v->b * all * T, scene->lanes);
 }
 
 /* Emission that is met from there, glued to the light. */
@@ -85,25 +113,25 @@ static double met_frozen(const struct imp__moved_by *m, const struct stop *s,
                           imp__normalize(y->old.p - s->old.p)};
     const double now = imp__moved_receives(s->x, y->here.p, y->here.n),
                  then = imp__moved_receives(s->old.p, y->old.p, y->old.n);
-    const double farther =
-        imp__length(y->here.p - s->x) - imp__length(y->old.p - s->old.p);
+    const double d[2] = {imp__length(y->here.p - s->x), imp__length(y->old.p - s->old.p)};
+    const imp_spec T = line_fades(m, s->v->on, s->v->carried, d);
     imp_spec all = stop_ratio(m, s, to, s->v->d.lobe);
     if (!s->floats)
-        return imp__sum_used(s->P * y->v->e * all * fades(m, farther), scene->lanes) *
-               now / then;
+        return imp__sum_used(s->P * y->v->e * all * T, scene->lanes) * now / then;
     all = lamp_ratio(m, s, s->v->d.lobe, scene->emitters[y->v->d.met.emitter], &y->here,
-                     y->old.p, all * (now / then) * fades(m, farther));
+                     &y->old, all * (now / then) * T);
     return imp__sum_used(s->P * y->v->e * all, scene->lanes);
 }
 
-/* A point of a medium, at a part of the way from `begin` (now and then) along the ray to what lies
+/* A point of a medium, at a part of its stretch of the ray from `begin` (now and then) to what lies
  * beyond. */
 static void float_at(const struct imp__moved_by *m, struct stop *s, imp_v3 o,
                      const imp_v3 begin[2])
 {
     const struct imp_scene *scene = m->c->problem->scene;
     struct imp__link_point p = imp__medium_point(imp__decided_v3(s->v->d.p));
-    imp__float_aim(scene, &p, begin[1]);
+    imp_spec in[IMP_INPUTS_MAX];
+    imp__float_aim(&m->borders, &p, begin[1]);
     const double t = imp__length(p.x.p - begin[1]);
     s->x = begin[0] + s->from[0] * t;
     s->grows = imp__spec(1);
@@ -111,11 +139,13 @@ static void float_at(const struct imp__moved_by *m, struct stop *s, imp_v3 o,
     const struct imp__glued beyond = imp__link_glued(&p);
     struct imp__moved_at there = imp__moved_placed(m, &beyond),
                          rest = imp__moved_rest(&beyond);
-    const double now = imp__length(imp__moved_met(o, s->from[0], &there) - begin[0]),
-                 then =
-                     imp__length(imp__moved_met(begin[1], s->from[1], &rest) - begin[1]);
-    s->x = begin[0] + s->from[0] * (t * now / then);
-    s->grows = fades(m, t * (now / then - 1)) * (now / then);
+    const double longer =
+        imp__length(imp__moved_met(o, s->from[0], &there) - begin[0]) -
+        imp__length(imp__moved_met(begin[1], s->from[1], &rest) - begin[1]);
+    const imp_spec extinction =
+        imp__extinction_at(scene->media[s->v->d.shape], p.x.p, s->v->carried, in);
+    s->x = begin[0] + s->from[0] * (t + p.part * longer);
+    s->grows = fades(extinction, p.part * longer) * (1 + longer / p.stretch);
 }
 
 /* The direction of what leaves a mirror, or a pass behind one, now, of that which was recorded, and
@@ -153,7 +183,10 @@ static struct stop stop_at(const struct imp__moved_by *m, const struct imp_walk 
     const bool meter = !before && m->c->tracer.sensor->shape;
     s.x = meter ? s.here.p : imp__moved_met(o, s.from[0], &s.here);
     s.here.shade = s.old.smooth ? imp__moved_shade(m, &s.old, s.x) : s.here.n;
-    s.grows = fades(m, imp__length(s.x - begin[0]) - imp__length(s.old.p - begin[1]));
+    if (m->fades)
+        s.grows =
+            fades(extinction_before(m, s.old.p, s.old.n, s.old.p - begin[1], v->carried),
+                  imp__length(s.x - begin[0]) - imp__length(s.old.p - begin[1]));
     return s;
 }
 
@@ -189,7 +222,10 @@ double imp__frozen_walk(struct imp__moved_by *m, const struct imp_walk *walk, im
     bool seen = true;                                   /* by the camera's ray */
     double value = 0;
     m->extinction = (imp_spec){0};
-    const bool fog = v && imp__fog(&m->c->tracer, v->carried, &m->extinction);
+    m->borders = (struct imp__borders){.scene = scene};
+    if (through) m->borders = imp__borders_of(scene, m->c->tracer.sensor->medium);
+    m->fades =
+        m->borders.any || (v && imp__fog(&m->c->tracer, v->carried, &m->extinction));
     if (v && v->d.scatterer == IMP_AT_SENSOR) {
         P *= v->w;
         v = v->next;
@@ -207,10 +243,11 @@ double imp__frozen_walk(struct imp__moved_by *m, const struct imp_walk *walk, im
             return value + imp__sum_used(P * sky, scene->lanes);
         }
         const struct stop before = here;
-        const bool passed = fog || (here.v && (here.turns || imp__goes_straight(here.v)));
+        const bool passed =
+            m->fades || (here.v && (here.turns || imp__goes_straight(here.v)));
         here = stop_at(m, walk, v, here.v ? &before : NULL, seen);
         here.turns = before.v && before.turns && imp__goes_straight(v);
-        if (fog) P *= here.grows;
+        if (m->fades) P *= here.grows;
         if (!here.floats && v->d.met.emitter >= 0) {
             if (from.v) value += met_frozen(m, &from, &here);
             else if (passed) value += imp__sum_used(P * v->e, scene->lanes);

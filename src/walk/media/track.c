@@ -159,6 +159,20 @@ imp_spec imp__track_eval(const struct imp_scene *scene, const struct imp_track *
     return f;
 }
 
+imp_spec imp__track_depth(const struct imp_scene *scene, const struct imp_track *track,
+                          const struct imp_carried *carried)
+{
+    imp_spec depth = {0}, in[IMP_INPUTS_MAX];
+    for (int i = 0; i < track->n; i++) {
+        const struct imp_event *e = &track->event[i];
+        if (e->kind == IMP_CROSSES)
+            depth += imp__extinction_at(scene->media[e->medium], event_place(track, e),
+                                        carried, in) *
+                     (double)e->t;
+    }
+    return depth;
+}
+
 imp_spec imp__track_density(const struct imp_scene *scene, const struct imp_track *track,
                             const struct imp_carried *carried, double least)
 {

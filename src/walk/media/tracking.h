@@ -93,6 +93,9 @@ enum imp_passing { IMP_PASSING_ENDS, IMP_PASSING_GOES_ON, IMP_PASSING_DROPS };
 enum imp_passing imp__surface_ahead(struct imp_step *s, bool hide, int passed,
                                     struct imp_hit *hit);
 
+/* Optical depth of the uniform media that it crosses. */
+imp_spec imp__track_depth(const struct imp_scene *scene, const struct imp_track *track,
+                          const struct imp_carried *carried);
 /* The segment's value at the scene's present parameters. */
 imp_spec imp__track_eval(const struct imp_scene *scene, const struct imp_track *track,
                          const struct imp_carried *carried);

@@ -87,7 +87,9 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
     out->size = imp__length(scene->hi - scene->lo);
     out->through = imp__segment_first(tracer)->through;
     imp_spec extinction;
-    if (imp__fog(tracer, NULL, &extinction)) out->fog = tracer->sensor->medium;
+    out->media = out->through && moves->borders.any;
+    if (!out->media && imp__fog(tracer, NULL, &extinction))
+        out->fog = tracer->sensor->medium;
     for (int k = 0; k < scene->n_all_shapes; k++) {
         const struct imp_bsdf *bsdf = imp__shape_bsdf(scene, scene->shapes[k]);
         out->passes |= bsdf->straight != 0;
@@ -206,15 +208,18 @@ static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
             imp__draw_sky_film(d);
             if (imp_unlikely(d->b->n_planes > 0)) imp__draw_sky_mirrored(d);
         }
+        if (item == IMP_ITEM_MEDIUM) imp__draw_border_film(d);
         break;
     case IMP_BOUNDARY_LIGHT:
         if (item == IMP_ITEM_BORDER) imp__draw_border(d);
+        else if (item == IMP_ITEM_MEDIUM) imp__draw_border_light(d);
         else imp__draw_light(d);
         break;
     case IMP_BOUNDARY_SCATTER:
         if (item == IMP_ITEM_ROUND || item == IMP_ITEM_ARC) imp__draw_scatter(d);
         if (item == IMP_ITEM_SHADING) imp__draw_shading_scatter(d);
         if (item == IMP_ITEM_HORIZON) imp__draw_horizon(d);
+        if (item == IMP_ITEM_MEDIUM) imp__draw_border_scatter(d);
         break;
     }
 }

@@ -55,9 +55,19 @@
  * a vertex lines are reflected by chance; to the camera they are aimed, over chains of planes that are
  * drawn. Light samples meet no mirror: what a light sends over one is scattered light.
  *
- * In a medium that fills the scene x is also a point of it: f |cos| dA is then sigma p dV, p the phase
+ * In a medium x is also a point of it: f |cos| dA is then sigma p dV, p the phase
  * function times the albedo, and L is times what passes from the edge to x. Of what a lamp sends to such a
  * point a part is in `light`, and the rest in `scatter` (imp__glued_part).
+ *
+ * The border of a medium, of type null and with the outward normal n, has no edges, and is a boundary
+ * all over. With D sigma the extinction inside less that outside, and D k = D(sigma p):
+ *
+ *     film     dI = -int dA W D sigma L n.(V - u),  L what the camera sees behind the border
+ *     light    dI = int dA dA_y Le cos_y/t_y^2 [n.(V - x'') D k W(p) - n.(V - V_line) D sigma f W(x)]
+ *     scatter  dI = int dA dw L [n.(V - x'') D k W(p) - n.(V - x') D sigma f W(x)]
+ *
+ * with p the place on the border, which scatters light, and x'' the velocity of what sees that: points
+ * of a medium whose stretch of a ray ends at a border keep their distances (moved.h).
  *
  * x' is the velocity of a vertex that slides, along the chain from the camera. W(x), what the
  * sensor makes of a unit of radiance times projected area that leaves x, is a connection to the
@@ -83,7 +93,8 @@ enum imp__edge_item_kind {
     IMP_ITEM_SHADING, /* of a mesh with vertex normals */
     IMP_ITEM_HORIZON,
     IMP_ITEM_BORDER, /* of a projector's picture, to what it lights; it has no shape */
-    IMP_ITEM_SKY     /* where the camera sees a sky jump; it has no shape */
+    IMP_ITEM_SKY,    /* where the camera sees a sky jump; it has no shape */
+    IMP_ITEM_MEDIUM  /* the border of a medium, which has no edges */
 };
 struct imp__edge_item {
     enum imp__edge_item_kind kind;
@@ -132,6 +143,7 @@ struct imp__boundary {
     bool passes;   /* a material of the scene lets light go straight on */
     bool through;  /* also light samples, and that is no bounce */
     const struct imp_medium *fog; /* which fills the scene; NULL: none */
+    bool media;                   /* media end within the scene: moves->borders */
     double size;                  /* of the scene */
     size_t n_planes, cap_planes, n_facets, cap_facets;
     struct imp__plane *plane; /* [n_planes] of flat mirrors: boundary_mirror.c */

@@ -100,8 +100,7 @@ void imp__look_at(struct imp__edge_draw *d, imp_v3 o, struct imp_hit *hit, int b
     struct imp_sensor_ray ray = {.o = o, .t_near = 0, .t_far = INFINITY};
     hit->t = imp__length(r);
     ray.d = r * (1 / hit->t);
-    imp__walk_along(d->b->tracer, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves,
-                    before, hit, walk);
+    imp__edge_walk(d, &ray, before, hit, walk);
 }
 
 bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, bool parallel, imp_v3 m,

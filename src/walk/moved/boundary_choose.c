@@ -190,8 +190,8 @@ int imp__edge_ends(const struct imp__edge_draw *d, imp_v3 m, struct imp__flux_en
         return 2;
     }
     if (!d->edge) {
-        const struct imp__glued at = imp__glued_near(d->b->tracer->scene, d->item->shape,
-                                                     0, d->item->place, d->p, d->out);
+        const struct imp__glued at = imp__glued_near(
+            d->b->tracer->scene, d->item->shape, d->prim, d->item->place, d->p, d->out);
         *end = imp__flux_glued(&at, m);
         return 1;
     }

@@ -6,15 +6,14 @@
 #include "walk/core/step.h"
 #include "walk/lights/light_step.h"
 
-imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py)
+imp_spec imp__look_through(struct imp__edge_draw *d, double px, double py)
 {
     const struct imp_tracer *t = d->b->tracer;
     struct imp_sensor_ray ray;
     struct imp_walk walk;
     t->sensor->ops->ray(t->sensor, px, py, d->lens, &ray);
     if (imp_unlikely(d->near > 0)) ray.t_near = d->near;
-    imp__walk_along(t, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves, 0, NULL,
-                    &walk);
+    imp__edge_walk(d, &ray, 0, NULL, &walk);
     return walk.values;
 }
 
@@ -61,7 +60,7 @@ void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to
     /* Parallel rays may begin next to what they meet. */
     const double apart = IMP_BESIDE * (d->b->parallel ? to->dist + imp__length(d->p)
                                                       : imp__length(d->p - to->p));
-    if (!sky) T = imp__edge_near(d, to->dist, apart, T);
+    if (!sky) T = imp__edge_near(d, w, to->dist, apart, T);
     const imp_spec jump =
         T * (sky ? imp__sky_jump(d, w, m)
                  : look_beside(d, to, w, -m, apart) - look_beside(d, to, w, m, apart));
@@ -89,7 +88,8 @@ bool imp__edge_is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, imp
         *T = line.T;
         return !open;
     }
-    *T = imp__edge_cleared(d, imp__length(r));
+    const double length = imp__length(r);
+    *T = imp__edge_cleared(d, o, r * (1 / length), length);
     double from = 0;
     while (imp__intersect(scene, &o, &r, from, 1 - IMP_BESIDE, &hit)) {
         bool own = false;
@@ -148,6 +148,6 @@ void imp__draw_film(struct imp__edge_draw *d)
     imp_spec T;
     if (imp__edge_merges(d, r, IMP_BESIDE * imp__length(r))) return;
     if (imp__edge_is_hidden(d, to.p, r, &T)) return;
-    if (imp_unlikely(b->fog != NULL)) T *= imp__edge_cleared(d, -imp__edge_clip(d, &to));
+    if (imp_unlikely(imp__edge_fades(d))) T *= imp__edge_unclipped(d, &to);
     imp__film_jump(d, &to, T);
 }

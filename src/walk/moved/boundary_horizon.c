@@ -12,8 +12,7 @@ static void look(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 
 {
     struct imp_sensor_ray ray = {.d = w, .t_near = 0, .t_far = INFINITY};
     ray.o = imp__offset(at->p, at->ng, up);
-    imp__walk_along(d->b->tracer, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves,
-                    1, NULL, walk);
+    imp__edge_walk(d, &ray, 1, NULL, walk);
 }
 
 /* Emission of a light that is met first, which moves with the light. */
@@ -40,7 +39,8 @@ void imp__draw_horizon(struct imp__edge_draw *d)
     struct imp_hit hit;
     struct imp_surface at;
     struct imp_walk above, below;
-    if ((max >= 0 && max < 2) || !imp__edge_item_point(d, &hit, &at)) return;
+    if ((max >= 0 && max < 2) || !imp__edge_item_point(d, IMP_EDGE_LIGHT_U, &hit, &at))
+        return;
     const double psi = IMP_2PI * imp__u01(d->key, IMP_EDGE_DIR_U);
     const struct imp_frame f = imp__frame_from_normal(at.ng);
     const imp_v3 w = f.s * cos(psi) + f.t * sin(psi);

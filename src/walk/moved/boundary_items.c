@@ -5,6 +5,7 @@
 #include "base/arguments.h"
 #include "boundary_parts.h"
 #include "moved_sky.h"
+#include "walk/media/tracking.h"
 
 extern const struct imp_emitter_ops imp__projector;
 
@@ -116,17 +117,32 @@ static struct imp__edge_item round_item(const struct imp__boundary *b,
     return item;
 }
 
+/* Borders of media: they move, or what sees them does. */
+static enum imp_status media_find(struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    for (int k = 0; k < imp__shapes_outside(scene) && b->media; k++) {
+        const struct imp_shape *s = scene->shapes[k];
+        if (!imp__is_border(scene, s)) continue;
+        struct imp__edge_item *item = &b->item[b->n_items++];
+        *item = (struct imp__edge_item){.kind = IMP_ITEM_MEDIUM, .shape = k};
+        if (s->geometry == IMP_TRIANGLES) IMP_CHECKED(imp__edge_item_measure(b, item));
+    }
+    return IMP_OK;
+}
+
 /* What has edges that are in no list: two of a body at most, and arcs. */
 static enum imp_status items_find(struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
     const size_t most = 2 * b->edges->n_bodies + b->edges->n_arcs +
                         IMP_SKY_CIRCLES * (size_t)scene->n_environments +
-                        (size_t)scene->n_emitters;
+                        (size_t)scene->n_emitters + (size_t)scene->n_all_shapes;
     b->item = imp__alloc(scene->ctx, most + 1, sizeof *b->item);
     if (!b->item) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
     circles_find(b);
     borders_find(b);
+    IMP_CHECKED(media_find(b));
     for (size_t k = 0; k < b->edges->n_arcs; k++)
         b->item[b->n_items++] = (struct imp__edge_item){
             .kind = IMP_ITEM_ARC, .shape = -1, .arc = &b->edges->arc[k]};
@@ -147,6 +163,22 @@ static enum imp_status items_find(struct imp__boundary *b)
     return IMP_OK;
 }
 
+/* As long as an edge that hides as much, about: its area times the change of extinction, or, where no
+ * light comes through, what it is across. What is scattered may change where the extinction does not. */
+static double border_length(const struct imp_shape *s, double area)
+{
+    const struct imp_medium *side[2] = {s->interior, s->exterior};
+    imp_spec sigma[2] = {{0}, {0}}, in[IMP_INPUTS_MAX];
+    for (int k = 0; k < 2; k++)
+        if (side[k]) sigma[k] = imp__extinction_at(side[k], (imp_v3){0}, NULL, in);
+    double most = 0;
+    for (int c = 0; c < 3; c++) {
+        const double least = BY_LENGTH * imp_max(sigma[0][c], sigma[1][c]);
+        most = imp_max(most, imp_max(fabs(sigma[0][c] - sigma[1][c]), least));
+    }
+    return imp_min(area * most, 2 * sqrt(area));
+}
+
 /* The circumference of a circle that is as large, about: of spheres and disks; of cylinders the length
  * of all edges; half of it of what meshes with vertex normals have, which between lights and vertices is
  * nothing. */
@@ -164,6 +196,9 @@ static double item_length(const struct imp__boundary *b,
     const struct imp_shape *s = b->tracer->scene->shapes[item->shape];
     struct imp_round round;
     struct imp__tube tube;
+    if (item->kind == IMP_ITEM_MEDIUM)
+        return border_length(s, item->until ? item->until[s->triangles.n_triangles]
+                                            : s->area);
     if (imp__moves_sphere(b->tracer->scene, item->shape, item->place, &round))
         return IMP_2PI * round.radius;
     if (imp__moves_cylinder(b->tracer->scene, item->shape, item->place, &tube))

@@ -165,6 +165,12 @@ static bool jump_follow(struct imp__edge_draw *d, imp_v3 o, imp_v3 out, imp_v3 i
     return true;
 }
 
+/* Parallel light does not, where the medium around the scene has no end. */
+static bool comes_through(const struct imp__edge_draw *d, const struct source *s)
+{
+    return !s->parallel || !(d->b->media ? d->b->moves->borders.outside : d->b->fog);
+}
+
 void imp__draw_light(struct imp__edge_draw *d)
 {
     const struct imp__boundary *b = d->b;
@@ -172,7 +178,7 @@ void imp__draw_light(struct imp__edge_draw *d)
     if (b->n_lights == 0) return;
     const struct source s = source_draw(d);
     const struct imp_emitter *e = scene->emitters[s.light];
-    if (!(s.density > 0) || (s.parallel && b->fog) || /* none of it comes through */
+    if (!(s.density > 0) || !comes_through(d, &s) ||
         !imp__edge_silhouette(d, s.p, s.parallel))
         return;
 
@@ -195,7 +201,7 @@ void imp__draw_light(struct imp__edge_draw *d)
     struct imp_hit hit;
     struct imp_surface at;
     imp_spec T = imp__spec(1);
-    const bool follows = b->fog || (b->passes && b->through);
+    const bool follows = imp__edge_fades(d) || (b->passes && b->through);
     bool meets;
     if (imp_unlikely(follows)) {
         const imp_v3 inside = d->p - m * beside - o;
@@ -223,6 +229,46 @@ void imp__draw_light(struct imp__edge_draw *d)
     }
     if (!meets) return;
     if (imp_likely(!follows)) imp__hit_surface(scene, &hit, &o, &to, &at);
+    ends_set(d, &line, imp__length(at.p - d->p), &light);
+    imp__edge_reach(d, &hit, &at, &light);
+}
+
+/* A line through a border, and what is scattered there. */
+void imp__draw_border_light(struct imp__edge_draw *d)
+{
+    const struct imp__boundary *b = d->b;
+    struct imp__border_point x;
+    if (b->n_lights == 0) return;
+    const struct source s = source_draw(d);
+    const struct imp_emitter *e = b->tracer->scene->emitters[s.light];
+    if (!(s.density > 0) || !comes_through(d, &s) || !imp__border_point(d, &x)) return;
+
+    const imp_v3 from = s.parallel ? d->p - s.p * (2 * b->size) : s.p;
+    const imp_v3 r = d->p - from, w = imp__normalize(r);
+    const double t_y = imp__length(r), cosine = e->shape ? imp__dot(s.y.n, w) : 1;
+    if (!(cosine > IMP_GRAZING)) return;
+    const imp_v3 o = e->shape ? imp__offset(from, s.y.ng, r) : from;
+    struct imp__line before, behind;
+    if (!imp__edge_line(d, o, d->p - o, 1 - IMP_BESIDE, &before)) return;
+    const double spread = s.parallel ? 1 : t_y * t_y;
+    const imp_spec arrives =
+        before.T * sent(d, &s, cosine, w) * (cosine * d->inv_pdf / (spread * s.density));
+    struct imp__edge_light light = {
+        .w = w, .light = arrives, .behind = 1, .slide = -d->out};
+    light.n_ends = imp__edge_ends(d, d->out, light.end);
+    imp__border_scatter(d, &x, light);
+
+    struct imp_hit hit;
+    struct imp_surface at;
+    if (imp__is_zero_used(x.more, d->waves) ||
+        !imp__edge_follow(d, imp__offset(d->p, d->out, w), w, 0, 0, &hit, &at, &behind))
+        return;
+    const struct line line = {&s, d->out, t_y};
+    light.light = arrives * behind.T * x.more * -behind.times;
+    if (hit.shape < 0 && e->shape) {
+        double slope;
+        light.light *= imp__glued_part(e, imp__length(at.p - s.p), &slope);
+    }
     ends_set(d, &line, imp__length(at.p - d->p), &light);
     imp__edge_reach(d, &hit, &at, &light);
 }

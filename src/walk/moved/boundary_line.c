@@ -33,12 +33,6 @@ static imp_spec passed(const struct imp__edge_draw *d, const struct imp_bsdf *b,
     return sum;
 }
 
-imp_spec imp__edge_cleared(const struct imp__edge_draw *d, double length)
-{
-    return imp_likely(!d->b->fog) ? imp__spec(1)
-                                  : imp__attenuation(d->extinction, length);
-}
-
 static bool is_open(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, double till,
                     struct imp__line *line)
 {
@@ -85,60 +79,89 @@ bool imp__edge_hit_passes(const struct imp__edge_draw *d, const struct imp_hit *
 bool imp__edge_line(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, double till,
                     struct imp__line *line)
 {
-    *line =
-        (struct imp__line){.T = imp__edge_cleared(d, imp__length(r) * till), .times = 1};
+    const double length = imp__length(r);
+    *line = (struct imp__line){
+        .T = imp__edge_cleared(d, o, r * (1 / length), length * till), .times = 1};
     return !imp__is_zero_used(line->T, d->waves) && is_open(d, o, r, till, line);
 }
 
-/* How far light goes in a medium before it is scattered: by the extinction of a lane that is chosen
+/* How far light goes in media before it is scattered: by the extinction of a lane that is chosen
  * (Wilkie et al. 2014) or, since what it brings to a camera nearby is one over a distance squared, by
- * the angle under which that sees it (Kulla and Fajardo 2012). One chance is as good as the other. */
+ * the angle under which that sees it (Kulla and Fajardo 2012). One chance is as good as the other. A
+ * distance by the angle may lie where nothing scatters; then the line brings nothing. */
 struct flight {
     bool aims;
     double nearest, apart,
         first; /* the eye: along the line, off it; angle where it begins */
+    const struct imp_medium *medium; /* of the next stretch */
+    double aimed;                    /* by the angle; INFINITY: not chosen so */
+    int lane;                        /* of `depth` */
+    double depth;                    /* optical, that is left; INFINITY: not chosen so */
+    double gone;                     /* length so far */
+    imp_spec T;                      /* what the media let pass of that */
 };
 
-static struct flight flight_of(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w)
+static struct flight flight_of(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w,
+                               double from, unsigned dims)
 {
-    struct flight f = {.aims = !d->b->parallel};
+    struct flight f = {
+        .aims = !d->b->parallel, .aimed = INFINITY, .depth = INFINITY, .T = imp__spec(1)};
+    f.medium = imp__edge_medium(d, o + w * from, w);
     const imp_v3 r = d->eye - o;
-    if (!f.aims) return f;
-    f.nearest = imp__dot(r, w);
-    f.apart = imp_max(imp__length(r - w * f.nearest), 1e-6 * d->b->size);
-    f.first = atan(-f.nearest / f.apart);
-    return f;
-}
-
-static double flight_draw(const struct imp__edge_draw *d, const struct flight *f,
-                          unsigned dims)
-{
     const int lanes = d->b->tracer->scene->lanes;
     const unsigned first = IMP_EDGE_FLIGHT + 2 * dims;
     double u = imp__u01(d->key, first);
     const double v = imp__u01(d->key, first + 1);
-    if (f->aims && u < 0.5)
-        return imp_max(
-            f->nearest + f->apart * tan(f->first + v * (IMP_PI / 2 - f->first)), 0.0);
-    if (f->aims) u = 2 * u - 1;
-    const double sigma = d->extinction[imp_min((int)(u * lanes), lanes - 1)];
-    return sigma > 0 ? -log(1 - v) / sigma : INFINITY;
+    if (f.aims) {
+        f.nearest = imp__dot(r, w);
+        f.apart = imp_max(imp__length(r - w * f.nearest), 1e-6 * d->b->size);
+        f.first = atan(-f.nearest / f.apart);
+    }
+    if (f.aims && u < 0.5) {
+        f.aimed =
+            imp_max(f.nearest + f.apart * tan(f.first + v * (IMP_PI / 2 - f.first)), 0.0);
+        return f;
+    }
+    if (f.aims) u = 2 * u - 1;
+    f.lane = imp_min((int)(u * lanes), lanes - 1);
+    f.depth = -log(1 - v);
+    return f;
 }
 
-/* The line ends after this length, on a surface or in the medium: what passes, and the density. */
+enum flown { FLOWN_THROUGH, FLOWN_SCATTERED, FLOWN_LOST };
+
+/* On to this length, or to where light is scattered before, f->gone then. */
+static enum flown flight_on(const struct imp__edge_draw *d, struct flight *f, double till)
+{
+    const imp_spec sigma = imp__edge_extinction(d, f->medium);
+    const double mine = sigma[f->lane],
+                 far = f->aimed < till ? f->aimed
+                       : mine > 0      ? imp_min(till, f->gone + f->depth / mine)
+                                       : till;
+    f->T *= imp__attenuation(sigma, imp_max(far - f->gone, 0.0));
+    if (far < till) {
+        f->gone = far;
+        return imp__is_zero_used(sigma, d->waves) ? FLOWN_LOST : FLOWN_SCATTERED;
+    }
+    f->depth = mine > 0 ? f->depth - (till - f->gone) * mine : f->depth;
+    f->gone = till;
+    return FLOWN_THROUGH;
+}
+
+/* The line ends after this length, on a surface or in a medium: what passes, and the density. */
 static void flight_end(const struct imp__edge_draw *d, const struct flight *f,
                        double length, bool floats, struct imp__line *line)
 {
     const int lanes = d->b->tracer->scene->lanes;
-    const imp_spec T = imp__edge_cleared(d, length);
-    double p = imp__sum_used(floats ? d->extinction * T : T, lanes) / lanes;
+    const imp_spec sigma = floats ? imp__edge_extinction(d, f->medium) : imp__spec(1);
+    double p = imp__sum_used(sigma * f->T, lanes) / lanes;
     if (f->aims) {
         const double x = (length - f->nearest) / f->apart, all = IMP_PI / 2 - f->first;
         const double aimed =
             floats ? 1 / (f->apart * (1 + x * x) * all) : (IMP_PI / 2 - atan(x)) / all;
         p = 0.5 * (p + aimed);
     }
-    line->T *= T;
+    line->T *= f->T;
     line->times *= 1 / p;
 }
 
@@ -198,23 +221,25 @@ bool imp__edge_follow(struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
 {
     const struct imp_scene *scene = d->b->tracer->scene;
     imp_v3 start = o;
-    struct flight f = {.aims = false};
-    double flight = INFINITY;
+    struct flight f;
+    const bool fades = imp__edge_fades(d);
     const int longest = d->b->tracer->integrator->max_depth;
     *line = (struct imp__line){.T = imp__spec(1), .times = 1, .w = w};
-    if (imp_unlikely(d->b->fog != NULL)) {
-        f = flight_of(d, o, w);
-        flight = flight_draw(d, &f, dims);
-    }
+    if (imp_unlikely(fades)) f = flight_of(d, o, w, from, dims);
     for (unsigned n = 0; n < PASSES_MOST; n++) {
         const bool meets = imp__intersect(scene, &o, &w, from, INFINITY, hit);
         if (meets) imp__hit_surface(scene, hit, &o, &w, at);
         if (imp_unlikely(n > 0) && meets) hit->t = imp__dot(at->p - start, w);
-        if (imp_unlikely(flight < INFINITY) && (!meets || flight < hit->t)) {
-            *hit = (struct imp_hit){.shape = -1, .t = flight};
-            *at = (struct imp_surface){.p = start + w * flight};
-            flight_end(d, &f, flight, true, line);
-            return true;
+        if (imp_unlikely(fades)) {
+            const enum flown flown = flight_on(d, &f, meets ? hit->t : INFINITY);
+            if (flown == FLOWN_LOST) return false;
+            if (flown == FLOWN_SCATTERED) {
+                *hit =
+                    (struct imp_hit){.shape = -1, .prim = f.medium->index, .t = f.gone};
+                *at = (struct imp_surface){.p = start + w * f.gone};
+                flight_end(d, &f, f.gone, true, line);
+                return true;
+            }
         }
         if (!meets) return false;
         const struct imp_bsdf *b = imp__hit_bsdf(scene, hit);
@@ -231,7 +256,7 @@ bool imp__edge_follow(struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
         if (u >= fate.pass + fate.reflect) {
             if (mirrors && !(b->flags & IMP_BSDF_SMOOTH)) return false;
             line->times *= 1 / (1 - fate.pass - fate.reflect);
-            if (imp_unlikely(d->b->fog != NULL)) flight_end(d, &f, hit->t, false, line);
+            if (imp_unlikely(fades)) flight_end(d, &f, hit->t, false, line);
             return true;
         }
         const bool passes = u < fate.pass;
@@ -248,6 +273,8 @@ bool imp__edge_follow(struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
             w = line->w;
         }
         if (imp__is_zero_used(line->T, d->waves)) return false;
+        if (imp_unlikely(d->b->media))
+            f.medium = imp__medium_beyond(scene->shapes[hit->shape], at->ng, w, f.medium);
         o = imp__offset(at->p, at->ng, w);
         from = 0;
     }
@@ -257,16 +284,17 @@ bool imp__edge_follow(struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
 #define CURVED                                                                           \
     4 /* IMP_SHORT_OF of a curved shape, per root of that and the scene's size */
 
-imp_spec imp__edge_near(struct imp__edge_draw *d, double distance, double apart,
+imp_spec imp__edge_near(struct imp__edge_draw *d, imp_v3 w, double distance, double apart,
                         imp_spec T)
 {
     double shorter = IMP_SHORT_OF * apart;
     d->near = 0;
-    if (imp_likely(!d->b->fog)) return imp__spec(1);
+    if (imp_likely(!imp__edge_fades(d))) return imp__spec(1);
     /* A ray that passes a sphere's silhouette inside meets it sqrt(2 r apart) before. */
     if (!d->edge && d->item->kind <= IMP_ITEM_ARC) {
         shorter = imp_max(shorter, CURVED * sqrt(d->b->size * apart));
-        T *= imp__edge_cleared(d, -imp_min(shorter, distance));
+        shorter = imp_min(shorter, distance);
+        T *= imp__edge_uncleared(d, d->p - w * shorter, w, shorter);
     }
     d->near = imp_max(distance - shorter, 0.0);
     return T;

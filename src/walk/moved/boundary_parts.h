@@ -36,6 +36,7 @@ struct imp__edge_draw {
         out; /* of a line that touches: the outward normal; of a rim: in its surface, away from it */
     double inv_pdf; /* of the point, per length; of a line that touches a sphere */
     int cell;       /* of the choice; behind all cells, of which sphere */
+    int prim;       /* of a medium's border: where the point is */
     struct imp__flux *first, **end;
     bool no_memory;
     double lens
@@ -65,6 +66,7 @@ enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
 #define IMP_EDGE_PART   (1u << 25) /* which part of a sky whose sun moves */
 #define IMP_EDGE_FLIGHT (1u << 24) /* two, of how far it goes in a medium: of each line */
 #define IMP_EDGE_MIRROR (1u << 26) /* by which mirrors it is seen: of each connection */
+#define IMP_EDGE_MEDIUM (1u << 27) /* of the point of a medium's border */
 
 /* So far beside an edge, per distance to it, it is looked past; rays are traced in float, whose
  * rounding is a tenth of that. */
@@ -169,8 +171,24 @@ bool imp__edge_line(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, double t
 bool imp__edge_follow(struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
                       unsigned dims, struct imp_hit *hit, struct imp_surface *at,
                       struct imp__line *line);
-/* What the medium lets pass over this length; and before which distance from the camera it is not. */
-imp_spec imp__edge_cleared(const struct imp__edge_draw *d, double length);
+/* ---- Media: boundary_media.c ---- */
+static inline bool imp__edge_fades(const struct imp__edge_draw *d)
+{
+    return d->b->fog || d->b->media;
+}
+/* The medium in which a line from o along w begins. NULL: none. */
+const struct imp_medium *imp__edge_medium(const struct imp__edge_draw *d, imp_v3 o,
+                                          imp_v3 w);
+imp_spec imp__edge_extinction(const struct imp__edge_draw *d, const struct imp_medium *m);
+/* What media let pass from o along the unit vector w over this length; and one over that. */
+imp_spec imp__edge_cleared(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w,
+                           double length);
+imp_spec imp__edge_uncleared(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w,
+                             double length);
+/* What the first part of the camera's ray, before its near clip, which nothing fades in, would not let
+ * pass, of a line from there: one over that. */
+imp_spec imp__edge_unclipped(const struct imp__edge_draw *d,
+                             const struct imp_sensor_sample *to);
 double imp__edge_clip(const struct imp__edge_draw *d, const struct imp_sensor_sample *to);
 /* Does light go straight on through what a ray from o along r hit? *T is multiplied by its part. */
 bool imp__edge_hit_passes(const struct imp__edge_draw *d, const struct imp_hit *hit,
@@ -181,10 +199,14 @@ bool imp__edge_passes(const struct imp__edge_draw *d);
  * what passes on the way. NULL: there is none. */
 const struct imp_vertex *imp__walk_met(const struct imp__edge_draw *d,
                                        const struct imp_walk *walk, imp_spec *T);
-/* Looks from here past a point so far away, of a draw in a medium, begin next to it; what passes on the
- * way there (T) is then the caller's factor, which is returned, and else that of the walks. */
-imp_spec imp__edge_near(struct imp__edge_draw *d, double distance, double apart,
+/* Looks from here along the unit vector w past the draw's point, so far away, in media begin next to it;
+ * what passes on the way there (T) is then the caller's factor, which is returned, and else that of the
+ * walks. */
+imp_spec imp__edge_near(struct imp__edge_draw *d, imp_v3 w, double distance, double apart,
                         imp_spec T);
+/* A walk along a ray, behind `before` vertices. hit: what it meets; NULL: that is traced. */
+void imp__edge_walk(struct imp__edge_draw *d, const struct imp_sensor_ray *ray,
+                    int before, struct imp_hit *hit, struct imp_walk *walk);
 /* Is the edge's point hidden from o, r away? Its own faces do not hide it, but a ray along one may meet
  * it anywhere. *T: what passes on the way. */
 bool imp__edge_is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, imp_spec *T);
@@ -217,7 +239,7 @@ imp__flux_camera(const struct imp__edge_draw *d, const struct imp__glued *x, imp
 struct imp__flux *imp__jump_add(struct imp__edge_draw *d,
                                 const struct imp_sensor_sample *to, imp_spec L, int n);
 /* What the camera sees at a film position. */
-imp_spec imp__look_through(const struct imp__edge_draw *d, double px, double py);
+imp_spec imp__look_through(struct imp__edge_draw *d, double px, double py);
 /* The flux of a jump of the picture where the draw's point is seen; of a circle of a sky, with the
  * point d->p at the distance 1 from the camera. T: what passes on the way there. */
 void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to,
@@ -235,7 +257,8 @@ void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_
 struct imp__seen_from {
     int before;
     bool floats;
-    bool mirrored; /* a mirror is between, and no light sample comes that way */
+    double farther; /* from x to where the walk begins */
+    bool mirrored;  /* a mirror is between, and no light sample comes that way */
     const bool *drawn;
 };
 imp_spec imp__arrives(const struct imp__boundary *b, const struct imp_walk *walk,
@@ -258,6 +281,7 @@ struct imp__edge_light {
     int n_depths;
     int behind;   /* segments of the path behind x */
     bool horizon; /* light is per area of x, and not times the cosine there */
+    bool border;  /* x is on the border of its medium */
     imp_v3 slide;
     struct imp__flux_end end[1 + IMP_EDGE_ENDS];
     int n_ends;
@@ -267,6 +291,19 @@ struct imp__edge_light {
 void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
                      const struct imp_surface *at, const struct imp__edge_light *light);
 
+/* ---- Borders of media: boundary_media.c, boundary_light.c ---- */
+struct imp__border_point {
+    const struct imp_medium *inside, *outside;
+    imp_spec more; /* extinction inside, less that outside */
+};
+/* Sets the point d->p of the item's border, with its normal d->out. False: it has none. */
+bool imp__border_point(struct imp__edge_draw *d, struct imp__border_point *x);
+/* Light that arrives at the border, per area of it: what it scatters there. */
+void imp__border_scatter(struct imp__edge_draw *d, const struct imp__border_point *x,
+                         struct imp__edge_light light);
+void imp__draw_border_film(struct imp__edge_draw *d);
+void imp__draw_border_light(struct imp__edge_draw *d);
+void imp__draw_border_scatter(struct imp__edge_draw *d);
 /* ---- Single rays: boundary_ray.c ---- */
 /* The point in the middle of what the sensor looks at, by which edges are chosen; its own centre where it
  * looks at nothing. */
@@ -343,8 +380,9 @@ void imp__draw_shading_ray(struct imp__edge_draw *d);
 void imp__draw_shading_mirrored(struct imp__edge_draw *d);
 void imp__draw_shading_scatter(struct imp__edge_draw *d);
 void imp__draw_horizon(struct imp__edge_draw *d);
-/* A point of the item's mesh by area, d->inv_pdf per area; false: it has none. */
-bool imp__edge_item_point(struct imp__edge_draw *d, struct imp_hit *hit,
+/* A point of the item's mesh by area, with the draw's number `dim`, d->inv_pdf per area; false: it has
+ * none. */
+bool imp__edge_item_point(struct imp__edge_draw *d, unsigned dim, struct imp_hit *hit,
                           struct imp_surface *at);
 /* The surface of the item's mesh at hit->prim, u and v; sets the rest of the hit. */
 void imp__edge_item_surface(const struct imp__edge_draw *d, struct imp_hit *hit,

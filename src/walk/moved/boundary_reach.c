@@ -25,13 +25,13 @@ struct link {
     double
         cos_i; /* of shading normals: |n.wi| of the geometric one, by which the light counts */
     imp_spec in[IMP_INPUTS_MAX];
+    imp_spec extinction; /* of a point of a medium */
 };
 
-/* A point of the medium. */
+/* A point of a medium. */
 static void link_float(const struct imp__edge_draw *d, struct link *k,
-                       const struct imp_surface *at, imp_v3 w)
+                       const struct imp_medium *m, const struct imp_surface *at, imp_v3 w)
 {
-    const struct imp_medium *m = d->b->fog;
     const struct imp_texcoord place = {.p = at->p, .carried = imp__edge_waves(d)};
     k->x = imp__medium_point(at->p);
     k->bsdf = m->scatterer;
@@ -39,10 +39,11 @@ static void link_float(const struct imp__edge_draw *d, struct link *k,
     k->frame = (struct imp_frame){{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
     k->wi = -w;
     k->cos_i = 1;
+    k->extinction = imp__edge_extinction(d, m);
     imp__evaluate_inputs(k->bsdf, NULL, &place, k->in);
 }
 
-/* hit->shape -1: in the medium. */
+/* hit->shape -1: in medium hit->prim. */
 static struct link *link_make(struct imp__edge_draw *d, struct link *before,
                               const struct imp__mirrors *mirrors,
                               const struct imp_hit *hit, const struct imp_surface *at,
@@ -56,12 +57,12 @@ static struct link *link_make(struct imp__edge_draw *d, struct link *before,
     }
     /* The chain comes from the camera. */
     if (before && imp_unlikely(before->x.floats))
-        imp__float_aim(scene, &before->x, at->p);
+        imp__float_aim(&d->b->moves->borders, &before->x, at->p);
     k->before = before;
     k->mirrors = *mirrors;
     k->n_mirrors = mirrors->n + (before ? before->n_mirrors : 0);
     if (imp_unlikely(hit->shape < 0)) {
-        link_float(d, k, at, w);
+        link_float(d, k, scene->media[hit->prim], at, w);
         return k;
     }
     const struct imp_shape *shape =
@@ -84,13 +85,13 @@ static struct link *link_make(struct imp__edge_draw *d, struct link *before,
 
 /* The transposed kernel towards wo, local: of a point of a medium per length; f cos_o; with vertex normals f cos_i^s |cos_o/cos_i|,
  * where ^s is of the shading normal (kind/bsdf/transport.h). */
-static imp_spec kernel(const struct imp__edge_draw *d, const struct link *k, imp_v3 wo)
+static imp_spec kernel(const struct link *k, imp_v3 wo)
 {
     const struct imp_dirs dirs = {wo, k->wi, IMP_SMOOTH, 0};
     imp_spec f;
     if (imp_unlikely(k->x.floats)) {
         k->bsdf->ops->eval(k->bsdf, k->in, &dirs, &f);
-        return f * d->extinction;
+        return f * k->extinction;
     }
     if (k->x.x.smooth) {
         const double cos_o = fabs(imp__dot(k->at.ng, imp__to_world(&k->frame, wo)));
@@ -126,7 +127,7 @@ static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_ligh
                                            : to->p;
         if (imp_unlikely(x.floats) && !after) {
             const imp_v3 near = to->wo * -imp__edge_clip(d, to);
-            imp__float_aim(d->b->tracer->scene, &x, from + near);
+            imp__float_aim(&d->b->moves->borders, &x, from + near);
         }
         x.moved_bar = shift;
         shift = imp__slide_bar(&x, imp__normalize(x.x.p - from), after ? NULL : &far);
@@ -195,7 +196,7 @@ static void ray_connect(struct imp__edge_draw *d, const struct imp__edge_light *
     const struct imp_dirs dirs = {imp__to_local(&end->frame, to.wo), end->wi, IMP_SMOOTH,
                                   0};
     end->bsdf->ops->eval(end->bsdf, end->in, &dirs, &f);
-    L *= T * f * kernel(d, k, imp__to_local(&k->frame, there.wo)) *
+    L *= T * f * kernel(k, imp__to_local(&k->frame, there.wo)) *
          (t->sensor->film.width * t->sensor->film.height / imp__sqr(distance));
     if (imp__is_zero_used(L, d->waves)) return;
     there.p = imp__offset(ray->at.p, ray->at.ng, -there.wo);
@@ -222,18 +223,17 @@ static void connect(struct imp__edge_draw *d, const struct imp__edge_light *ligh
         !imp__light_on_film(t->sensor, &to))
         return;
     if (!light_at(t, light, depth + 1 + passed, &brings)) return;
-    imp_spec L = brings * T * kernel(d, k, imp__to_local(&k->frame, to.wo)) * to.weight;
+    imp_spec L = brings * T * kernel(k, imp__to_local(&k->frame, to.wo)) * to.weight;
     if (imp__is_zero_used(L, d->waves)) return;
     imp__light_shadow_aim(&k->at, &to, &shadow);
     if (!imp__edge_line(d, shadow.o, shadow.d, shadow.reach, &line)) return;
     if (imp_unlikely(line.bounces > 0)) {
         if (!light_at(t, light, depth + 1 + passed + line.bounces, &brings)) return;
-        L = brings * T * kernel(d, k, imp__to_local(&k->frame, to.wo)) * to.weight;
+        L = brings * T * kernel(k, imp__to_local(&k->frame, to.wo)) * to.weight;
     }
-    if (imp_unlikely(d->b->fog != NULL)) {
-        const double clip = imp__edge_clip(d, &to);
-        if (!(to.dist > clip)) return;
-        L *= line.T * imp__edge_cleared(d, -clip);
+    if (imp_unlikely(imp__edge_fades(d))) {
+        if (!(to.dist > imp__edge_clip(d, &to))) return;
+        L *= line.T * imp__edge_unclipped(d, &to);
     } else {
         L *= line.T;
     }
@@ -255,7 +255,7 @@ static void connect_mirrored(struct imp__edge_draw *d,
         return;
     const struct imp_surface *mirror = &s.mirrors.first->at;
     const imp_v3 r = mirror->p - k->at.p;
-    const imp_spec K = kernel(d, k, imp__to_local(&k->frame, imp__normalize(r)));
+    const imp_spec K = kernel(k, imp__to_local(&k->frame, imp__normalize(r)));
     if (imp__is_zero_used(K * T, d->waves)) return;
     const imp_v3 o = imp__offset(k->at.p, k->at.ng, r),
                  end = imp__offset(mirror->p, mirror->ng, -r);
@@ -298,6 +298,7 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
     const struct imp_tracer *t = d->b->tracer;
     static const struct imp__mirrors none = {0};
     struct link *k = link_make(d, NULL, &none, hit, at, light->w, light->horizon);
+    if (k) k->x.stays = light->border;
     imp_spec T = imp__spec(1), L;
     int passed = 0;
     for (int depth = 0; k && light_at(t, light, depth + 1 + passed, &L); depth++) {
@@ -308,7 +309,7 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
         imp_v3 wo, w;
         const double pdf = direction_draw(d, k, dims, &wo);
         if (!(pdf > 0)) return;
-        T *= kernel(d, k, wo) * (1 / pdf);
+        T *= kernel(k, wo) * (1 / pdf);
         const double most = imp__max_used(T, d->waves),
                      survive = depth < 2 ? 1 : imp_min(most, 0.95);
         if (!(imp__u01(d->key, dims + IMP_EDGE_SURVIVE) < survive) || !(most > 0)) return;

@@ -24,13 +24,13 @@ const struct imp_vertex *imp__walk_met(const struct imp__edge_draw *d,
 /* The part of the emission at v that is not glued to its light, as a walk from a point of a medium
  * sees it. */
 static double unglued_part(const struct imp__boundary *b, const struct imp_walk *walk,
-                           const struct imp_vertex *v)
+                           const struct imp_vertex *v, double farther)
 {
     double slope;
     if (v->d.met.emitter < 0) return 0;
-    return 1 - imp__glued_part(b->tracer->scene->emitters[v->d.met.emitter],
-                               imp__length(imp__decided_v3(v->d.p) - walk->ray.o),
-                               &slope);
+    return 1 - imp__glued_part(
+                   b->tracer->scene->emitters[v->d.met.emitter],
+                   imp__length(imp__decided_v3(v->d.p) - walk->ray.o) + farther, &slope);
 }
 
 imp_spec imp__arrives(const struct imp__boundary *b, const struct imp_walk *walk,
@@ -49,7 +49,7 @@ imp_spec imp__arrives(const struct imp__boundary *b, const struct imp_walk *walk
         const bool counts = max < 0 || number < max;
         if (!left && counts) L += T * v->e;
         if (imp_unlikely(left && x.floats && !sky && counts))
-            L += T * v->e * unglued_part(b, walk, v);
+            L += T * v->e * unglued_part(b, walk, v, x.farther);
         if (max < 0 || number + 1 < max) L += T * v->b;
         T *= v->w;
         number += !sky && !on_line;
@@ -64,8 +64,7 @@ void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_
     struct imp_sensor_ray ray = {.t_near = d->near, .t_far = INFINITY};
     ray.o = imp__offset(at->p, at->ng, to - at->p);
     ray.d = imp__normalize(to - ray.o);
-    imp__walk_along(d->b->tracer, d->arena, imp__key_branch(d->key, 0, 1), &ray, d->waves,
-                    before, NULL, walk);
+    imp__edge_walk(d, &ray, before, NULL, walk);
 }
 
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
@@ -136,8 +135,9 @@ void imp__draw_scatter(struct imp__edge_draw *d)
     const double apart = IMP_BESIDE * (far + imp__length(d->p));
     if (imp__edge_merges(d, -w, apart) || (mirrored && far < IMP_SHORT_OF * apart))
         return;
-    const imp_spec T = imp_unlikely(mirrored) ? line.T_mirrored
-                                              : imp__edge_near(d, hit.t, apart, line.T);
+    const imp_spec T = imp_unlikely(mirrored)
+                           ? line.T_mirrored
+                           : imp__edge_near(d, -w, hit.t, apart, line.T);
     const int between = mirrored ? line.bounces_mirrored : 0;
     struct imp_walk lo, hi;
     imp__look_past(d, viewer, -m, apart, 1 + between, &lo);

@@ -118,9 +118,9 @@ void imp__draw_shading_film(struct imp__edge_draw *d)
     const double t = imp__length(r);
     if (!imp__edge_line(d, o, r, 1 - IMP_BESIDE, &line)) return;
     if (!turning_at(d, &hit, &at, to.wo, t, parallel, &x)) return;
-    if (imp_unlikely(d->b->fog != NULL))
-        line.T *= imp__edge_cleared(d, -imp__edge_clip(d, &to));
-    const imp_spec T = imp__edge_near(d, t, IMP_BESIDE * (t + imp__length(at.p)), line.T);
+    if (imp_unlikely(imp__edge_fades(d))) line.T *= imp__edge_unclipped(d, &to);
+    const imp_spec T =
+        imp__edge_near(d, r * (1 / t), t, IMP_BESIDE * (t + imp__length(at.p)), line.T);
     const imp_spec jump = look_beside(d, &x, 1, o, meter ? &from : NULL, 0) -
                           look_beside(d, &x, -1, o, meter ? &from : NULL, 0);
     const double times = fabs(imp__dot(at.ng, to.wo)) * to.weight * d->inv_pdf / x.slope;
@@ -246,7 +246,8 @@ void imp__draw_shading_scatter(struct imp__edge_draw *d)
     struct imp_surface p, at;
     struct turning x;
     struct imp_walk lit, dark;
-    if ((max >= 0 && max < 2) || !imp__edge_item_point(d, &from, &p)) return;
+    if ((max >= 0 && max < 2) || !imp__edge_item_point(d, IMP_EDGE_LIGHT_U, &from, &p))
+        return;
     const double psi = IMP_2PI * imp__u01(d->key, IMP_EDGE_DIR_U);
     const struct imp_frame f = imp__frame_from_normal(p.n);
     const imp_v3 w = f.s * cos(psi) + f.t * sin(psi);
@@ -261,8 +262,9 @@ void imp__draw_shading_scatter(struct imp__edge_draw *d)
     if (!turning_at(d, &from, &p, w, t, false, &x) ||
         (mirrored && imp__length(viewer->p - p.p) < IMP_SHORT_OF * apart))
         return;
-    const imp_spec T = imp_unlikely(mirrored) ? line.T_mirrored
-                                              : imp__edge_near(d, hit.t, apart, line.T);
+    const imp_spec T = imp_unlikely(mirrored)
+                           ? line.T_mirrored
+                           : imp__edge_near(d, -w, hit.t, apart, line.T);
     const imp_v3 back = imp__offset(viewer->p, viewer->ng, -w);
     if (!look_next(d, &x, 1, back, 1 + between, &lit))
         imp__look_from(d, viewer, p.p + x.beside, 1 + between, &lit);

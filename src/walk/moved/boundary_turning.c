@@ -135,7 +135,7 @@ void imp__edge_item_surface(const struct imp__edge_draw *d, struct imp_hit *hit,
     imp__hit_surface(d->b->tracer->scene, hit, &unused, &unused, at);
 }
 
-bool imp__edge_item_point(struct imp__edge_draw *d, struct imp_hit *hit,
+bool imp__edge_item_point(struct imp__edge_draw *d, unsigned dim, struct imp_hit *hit,
                           struct imp_surface *at)
 {
     const struct imp_shape *s = d->b->tracer->scene->shapes[d->item->shape];
@@ -143,7 +143,7 @@ bool imp__edge_item_point(struct imp__edge_draw *d, struct imp_hit *hit,
     double chance, b[2], u = d->u;
     if (!(d->item->until[n] > 0)) return false;
     const size_t prim = entry_choose(d->item->until, n, &u, &chance);
-    const double v[2] = {u, imp__u01(d->key, IMP_EDGE_LIGHT_U)};
+    const double v[2] = {u, imp__u01(d->key, dim)};
     imp__uniform_triangle(v, b);
     *hit = (struct imp_hit){.prim = (int)prim, .u = b[0], .v = b[1]};
     imp__edge_item_surface(d, hit, at);

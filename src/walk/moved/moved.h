@@ -16,12 +16,15 @@
  *     d ln w_k = n'.w/(n.w)
  *     d ln B_k = (n'.w + n.w')/(n.w) + (n_y'.w + n_y.w')/(n_y.w) - 2 w.(V_y - v_k')/d + d ln dA_y
  *
- * A point of a medium of extinction sigma, at the part s of the length D of the ray from v_k to the
- * surface beyond it, and light on a line of length d through that medium:
+ * A point of a medium of extinction sigma, at the part s of its stretch of the ray from v_k to the
+ * surface beyond it, of the length D, from v_k or from a border of the medium on; and light on a line of
+ * length d through media of the optical depth tau:
  *
  *     v_{k+1}' = v_k' + s w D',  D' = n.(V - v_k')/(n.w)
  *     d ln w_k = (1 - sigma s D) D'/D,  of what reaches the surface  -sigma D'
- *     d ln B_k = ... - sigma d'
+ *     d ln B_k = ... - tau d'/d
+ *
+ * Where a border ends the stretch, D' = 0: that the border moves is a part of the boundary (boundary.h).
  *
  * of Lambertian materials (of others moved_kernel.h), w' the part of (V_y - v_k')/d across w; of a light at a point without
  * cos_y and dA_y, of parallel light (n'.w + n.w')/(n.w) alone. Of emission that is met the
@@ -40,6 +43,8 @@ enum imp_status imp__moved_allowed(const struct imp_tracer *tracer);
 /* Do its walks go through a medium that fills the scene? Its extinction, by lanes. */
 bool imp__fog(const struct imp_tracer *tracer, const struct imp_carried *carried,
               imp_spec *extinction);
+
+bool imp__medium_scatters(const struct imp_medium *m);
 
 /* Light that a point of a medium has from a lamp nearby would have a derivative as large as one over
  * the distance d if it were glued to the lamp. So only the part  g = d^2/(d^2 + a^2)  of it is, with a

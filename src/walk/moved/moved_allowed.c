@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What has a derivative by what moves that is whole, and what is refused by name (moved.h). */
+#include "base/arguments.h"
 #include "base/context.h"
 #include "kind/emitter/from_point.h"
 #include "kind/emitter/ies.h"
@@ -142,7 +143,7 @@ static const char *medium_without_d(const struct imp_medium *m)
     return NULL;
 }
 
-static bool scatters(const struct imp_medium *m)
+bool imp__medium_scatters(const struct imp_medium *m)
 {
     imp_spec in[IMP_INPUTS_MAX];
     struct imp_coefficients c;
@@ -161,32 +162,94 @@ static bool is_filled(const struct imp_tracer *t, const struct imp_shape *s,
     return s->exterior == m && (s->interior == m || !(b->flags & IMP_BSDF_TRANSMIT));
 }
 
-/* A medium that fills the scene, of one extinction. */
+/* Why a shape cannot stand in a scene in which media end; NULL: it can. */
+static const char *border_why(const struct imp_tracer *t, const struct imp_shape *s)
+{
+    const struct imp_scene *scene = t->scene;
+    const struct imp_bsdf *b = imp__shape_bsdf(scene, s);
+    const bool names = s->interior || s->exterior;
+    if (imp__mirror_lobes(b)) return "is a mirror, in a scene where media end";
+    if (b->straight && !(b->flags & IMP_BSDF_NULL))
+        return "lets light go straight on, in a scene where media end";
+    if (names && s->index >= imp__shapes_outside(scene))
+        return "bounds a medium, in a shape group";
+    if (!imp__is_border(scene, s))
+        return names && s->interior != s->exterior && b->flags & IMP_BSDF_TRANSMIT
+                   ? "bounds a medium, and is not of type null"
+                   : NULL;
+    if (s->emitter >= 0) return "bounds a medium, and is a light";
+    if (s->smooth) return "bounds a medium, and has vertex normals (face_normals)";
+    if (!scene->closed[s->index])
+        return "bounds a medium, and is no sphere or mesh that is closed, with normals "
+               "that point outwards";
+    return NULL;
+}
+
+static enum imp_status borders_allowed(const struct imp_tracer *t)
+{
+    const struct imp_scene *scene = t->scene;
+    const struct imp_sensor *sensor = t->sensor;
+    imp_v3 point;
+    for (int k = 0; k < scene->n_all_shapes; k++) {
+        const struct imp_shape *s = scene->shapes[k];
+        const char *why = border_why(t, s);
+        if (why) return refuse(t, "shape", s->name, s->ops->name, why);
+        if (scene->media_open && (s->interior || s->exterior))
+            return refuse(t, "shape", s->name, s->ops->name,
+                          "bounds a medium, and others lie in one that they do not name");
+    }
+    if (sensor->shape || imp__sees_rays(sensor, &point))
+        return refuse(t, "sensor", sensor->name, sensor->ops->name,
+                      "is a surface, or measures along single rays, in a scene where "
+                      "media end");
+    return IMP_OK;
+}
+
+/* What one medium, and lights in a scene where it is, must not be. */
+static enum imp_status medium_allowed(const struct imp_tracer *t,
+                                      const struct imp_medium *m)
+{
+    const struct imp_scene *scene = t->scene;
+    const char *why = medium_without_d(m);
+    if (why) return refuse(t, "medium", m->name, m->ops->name, why);
+    for (int k = 0; k < scene->n_emitters && imp__medium_scatters(m); k++) {
+        const struct imp_emitter *e = scene->emitters[k];
+        if (e->ops->flags & IMP_EMITTER_DELTA && !(e->ops->flags & IMP_EMITTER_FAR))
+            return refuse(t, "light", e->name, e->ops->name,
+                          "has no size, in a scene with a medium that scatters: what "
+                          "points next to it receive has no bounded derivative");
+    }
+    return IMP_OK;
+}
+
+/* A medium that fills the scene, of one extinction, or media of one each that end within it. */
 static enum imp_status media_allowed(const struct imp_tracer *t)
 {
     const struct imp_scene *scene = t->scene;
     const struct imp_medium *m = t->sensor->medium;
     imp_spec extinction;
     if (scene->n_media == 0 || !imp__segment_first(t)->through) return IMP_OK;
+    if (imp__borders_of(scene, m).any) {
+        IMP_CHECKED(borders_allowed(t));
+        if (m) IMP_CHECKED(medium_allowed(t, m));
+        for (int k = 0; k < scene->n_all_shapes; k++) {
+            const struct imp_shape *s = scene->shapes[k];
+            if (s->interior) IMP_CHECKED(medium_allowed(t, s->interior));
+            if (s->exterior) IMP_CHECKED(medium_allowed(t, s->exterior));
+        }
+        return IMP_OK;
+    }
     for (int k = 0; k < scene->n_all_shapes; k++)
         if (!is_filled(t, scene->shapes[k], m))
             return refuse(t, "shape", scene->shapes[k]->name, scene->shapes[k]->ops->name,
                           "bounds a medium, or the sensor is in another one (a medium "
-                          "fills the scene, and is that of the sensor)");
+                          "fills the scene, and is that of the sensor, or ends at shapes "
+                          "of type null)");
     if (!imp__fog(t, NULL, &extinction)) return IMP_OK;
-    const char *why = medium_without_d(m);
-    if (why) return refuse(t, "medium", m->name, m->ops->name, why);
     if (t->sensor->shape)
         return refuse(t, "sensor", t->sensor->name, t->sensor->ops->name,
                       "is a surface in a medium");
-    for (int k = 0; k < scene->n_emitters && scatters(m); k++) {
-        const struct imp_emitter *e = scene->emitters[k];
-        if (e->ops->flags & IMP_EMITTER_DELTA && !(e->ops->flags & IMP_EMITTER_FAR))
-            return refuse(t, "light", e->name, e->ops->name,
-                          "has no size, in a medium that scatters: what points next to "
-                          "it receive has no bounded derivative");
-    }
-    return IMP_OK;
+    return medium_allowed(t, m);
 }
 
 static enum imp_status walks_allowed(const struct imp_tracer *t)

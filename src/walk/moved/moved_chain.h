@@ -10,8 +10,8 @@
 #include "moved_kernel.h"
 
 /* A vertex: the glued point of its surface, and adjoints of its velocity. At the sky x.p is the
- * direction. A point of a medium floats at a part of the way to the surface beyond it, which is its
- * x, but for x.p. */
+ * direction. A point of a medium floats at a part of the way to the surface beyond it, from a border on
+ * where one is on that way; its x is of that surface, but for x.p. */
 struct imp__link_point {
     struct imp__glued x;
     struct imp__velocity bar; /* of the surface there: V, n', d ln dA */
@@ -21,9 +21,12 @@ struct imp__link_point {
     bool sky;
     bool turns; /* the ray that leads there comes from a mirror, and turns with it */
     bool floats;
-    bool open;     /* it floats, and no surface is beyond it */
-    double part;   /* 1: on the surface */
-    imp_v3 beyond; /* the place of x on the surface */
+    bool open;  /* it floats, and no surface, or the border of its medium, is beyond it */
+    bool stays; /* it floats on a border, and is open */
+    double part;         /* of its stretch of the medium; 1: on the surface */
+    double stretch;      /* the length of that */
+    imp_spec extinction; /* of the medium before it, or in which it is; 0: none */
+    imp_v3 beyond;       /* the place of x on the surface */
 };
 
 static inline struct imp__link_point imp__surface_point(const struct imp_scene *scene,
@@ -141,8 +144,27 @@ static inline imp_v3 imp__slide_bar(struct imp__link_point *x, imp_v3 w, imp_v3 
     return shift;
 }
 
-/* A point that floats on a ray from `from`: the surface beyond it. */
-static inline void imp__float_aim(const struct imp_scene *scene,
+/* What ends the stretch of a medium behind o along w: the border of that, or what does not pass light as
+ * if nothing were there. False: nothing. */
+static inline bool imp__stretch_end(const struct imp_scene *scene, imp_v3 o, imp_v3 w,
+                                    struct imp_hit *hit, struct imp_surface *at,
+                                    bool *border)
+{
+    enum { PASSES = 256 };
+    for (int n = 0; n < PASSES; n++) {
+        if (!imp__intersect(scene, &o, &w, 0, INFINITY, hit)) return false;
+        const struct imp_shape *s = scene->shapes[hit->shape];
+        imp__hit_surface(scene, hit, &o, &w, at);
+        *border = imp__is_border(scene, s);
+        if (*border || !(imp__shape_bsdf(scene, s)->flags & IMP_BSDF_NULL)) return true;
+        o = imp__offset(at->p, at->ng, w);
+    }
+    return false;
+}
+
+/* A point that floats on a ray from `from`: the stretch of the medium that it is in, from there or from a
+ * border on, and the surface that ends it. */
+static inline void imp__float_aim(const struct imp__borders *borders,
                                   struct imp__link_point *x, imp_v3 from)
 {
     const imp_v3 p = x->x.p, r = p - from;
@@ -150,15 +172,22 @@ static inline void imp__float_aim(const struct imp_scene *scene,
     const imp_v3 w = r * (1 / t);
     struct imp_hit hit;
     struct imp_surface at;
-    x->open = !imp__intersect(scene, &p, &w, 0, INFINITY, &hit);
+    bool border;
+    double start = 0;
+    x->open =
+        x->stays || !imp__stretch_end(borders->scene, p, w, &hit, &at, &border) || border;
     if (x->open) return;
-    imp__hit_surface(scene, &hit, &p, &w, &at);
     /* In double; hits are as exact as floats. */
     const double far = imp_max(imp__dot(at.ng, at.p - from) / imp__dot(at.ng, w), t);
     x->beyond = from + w * far;
-    x->x = imp__glued_near(scene, hit.shape, hit.prim, hit.place, x->beyond, at.ng);
+    x->x =
+        imp__glued_near(borders->scene, hit.shape, hit.prim, hit.place, x->beyond, at.ng);
     x->x.p = p;
-    x->part = t / far;
+    if (imp_unlikely(borders->any) &&
+        imp__stretch_end(borders->scene, p, -w, &hit, &at, &border) && border)
+        start = imp_max(t - imp__length(at.p - p), 0.0);
+    x->part = (t - start) / (far - start);
+    x->stretch = far - start;
 }
 
 /* What its surface moves by, as one that is glued there. */

@@ -22,6 +22,42 @@ static void met_read(const struct imp__sweep *s, const struct imp_vertex *v, imp
     piece->lit = k;
 }
 
+double imp__sweep_line_bar(const struct imp__sweep *s, imp_spec bar,
+                           const struct imp_track *track,
+                           const struct imp_carried *carried, double d)
+{
+    if (imp_likely(!s->fog && !s->media)) return 0;
+    if (s->fog) return imp__sweep_length_bar(s, bar, s->extinction);
+    const struct imp_scene *scene = s->tracer->scene;
+    return track ? imp__sweep_length_bar(
+                       s, bar, imp__track_depth(scene, track, carried) * (1 / d))
+                 : 0;
+}
+
+/* The extinction on the side of a surface that w, which leads there, comes from. */
+static imp_spec extinction_before(const struct imp__sweep *s, imp_v3 p, imp_v3 ng,
+                                  imp_v3 w, const struct imp_carried *carried)
+{
+    imp_spec in[IMP_INPUTS_MAX];
+    if (imp_likely(!s->media)) return s->extinction;
+    const struct imp_medium *m =
+        imp__borders_at(&s->moves->borders, imp__offset(p, ng, -w), -w);
+    return m ? imp__extinction_at(m, p, carried, in) : imp__spec(0);
+}
+
+/* What vertex k is in, or lies behind. */
+static void media_read(struct imp__sweep *s, int k, const struct imp_vertex *v)
+{
+    struct imp__link_point *x = &s->at[k];
+    imp_spec in[IMP_INPUTS_MAX];
+    if (x->floats)
+        x->extinction = imp__extinction_at(s->tracer->scene->media[v->d.shape], x->x.p,
+                                           v->carried, in);
+    else if (!x->sky)
+        x->extinction = extinction_before(s, x->x.p, x->x.n,
+                                          x->x.p - imp__sweep_begin(s, k), v->carried);
+}
+
 /* Does what is seen from this vertex turn with a mirror? */
 static bool turns_on(const struct imp__link_point *x, const struct imp_vertex *v)
 {
@@ -44,12 +80,13 @@ static int read_walk(struct imp__sweep *s, imp_spec adjoint)
         struct imp__pieces *piece = &s->piece[n];
         if (imp_unlikely(v->d.scatterer == IMP_IN_MEDIUM)) {
             s->at[n] = imp__medium_point(imp__decided_v3(v->d.p));
-            imp__float_aim(scene, &s->at[n], imp__sweep_begin(s, n));
+            imp__float_aim(&s->moves->borders, &s->at[n], imp__sweep_begin(s, n));
         } else {
             s->at[n] = sky ? imp__sky_point(imp__normalize(imp__decided_v3(v->d.p)))
                            : imp__surface_point(scene, v->d.shape, &v->d.located,
                                                 v->d.place, v->ng);
         }
+        if (imp_unlikely(s->fog || s->media)) media_read(s, n, v);
         s->at[n].turns = n > s->first && imp_unlikely(turns_on(&s->at[n - 1], v->prev));
         if (n == s->front) {
             s->seen = P;
@@ -159,30 +196,34 @@ static void delta_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
     /* The light turned by a vector sends along d what it sent along d turned back. */
     imp__light_turn_bar(s->moves, light, imp__cross(slope, d), s->theta_bar);
     const struct imp__kernel_bar kernel = light_kernel(s, k, v, r * (-1 / distance));
-    const imp_v3 bar = imp__point_bar(&s->at[k], at, &kernel, weight,
-                                      imp__sweep_length_bar(s, s->piece[k].light)) -
-                       turn;
+    const double along =
+        imp__sweep_line_bar(s, s->piece[k].light, v->to_light, v->carried, distance);
+    const imp_v3 bar = imp__point_bar(&s->at[k], at, &kernel, weight, along) - turn;
     s->at[k].moved_bar += turn;
     imp__light_velocity_bar(s->moves, light, at, bar, s->theta_bar);
 }
 
-/* Light from the point y of a lamp that reaches vertex k, along -w. */
+/* Light from the point y of a lamp that reaches vertex k, along -w, over media that it has crossed. */
 static void lamp_bar(struct imp__sweep *s, int k, struct imp__link_point *y, imp_v3 w,
                      struct imp__kernel_bar *kernel, const struct imp_emitter *e,
-                     imp_spec light)
+                     imp_spec light, const struct imp_track *track,
+                     const struct imp_carried *carried)
 {
     struct imp__link_point *x = &s->at[k];
-    const double bar = imp__sum_used(light, s->tracer->scene->lanes),
-                 along = imp__sweep_length_bar(s, light);
+    const double d = imp__length(y->x.p - x->x.p),
+                 bar = imp__sum_used(light, s->tracer->scene->lanes),
+                 along = imp__sweep_line_bar(s, light, track, carried, d);
     if (imp_likely(!x->floats)) {
         imp__connection_bar(x, y, kernel, bar, along);
         return;
     }
     double slope;
-    const double part = imp__glued_part(e, imp__length(y->x.p - x->x.p), &slope);
+    const double part = imp__glued_part(e, d, &slope),
+                 fixed = imp__sweep_length_bar(
+                     s, light, extinction_before(s, y->x.p, y->x.n, w, carried));
     kernel->wi *= part;
     imp__connection_bar(x, y, kernel, bar * part, along * part + bar * slope);
-    x->moved_bar += imp__reached_bar(y, w, along * (1 - part) - bar * slope);
+    x->moved_bar += imp__reached_bar(y, w, fixed * (1 - part) - bar * slope);
 }
 
 /* What a sky sends to vertex k along w: the part that is glued to it goes with it. */
@@ -229,7 +270,7 @@ static void light_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
     const double bar = imp__sum_used(light, scene->lanes);
     struct imp__kernel_bar kernel = light_kernel(s, k, v, w);
     kernel.wi -= imp__sweep_table_bar(s, e, &y.x, -w, bar, v->carried);
-    lamp_bar(s, k, &y, w, &kernel, e, light);
+    lamp_bar(s, k, &y, w, &kernel, e, light, v->to_light, v->carried);
     imp__velocity_bar(s->moves, &y.x, &y.bar, s->theta_bar);
 }
 
@@ -251,7 +292,7 @@ static void met_bar(struct imp__sweep *s, int k, const struct imp_vertex *v, imp
     struct imp__kernel_bar met = kernel_bar(s, k, d, w, piece->met);
     const struct imp_emitter *e = scene->emitters[lit->d.met.emitter];
     met.wi -= imp__sweep_table_bar(s, e, &y->x, -w, bar, lit->carried);
-    lamp_bar(s, k, y, w, &met, e, piece->met);
+    lamp_bar(s, k, y, w, &met, e, piece->met, v->on, v->carried);
     if (piece->lit == k + 1) return;
     imp__velocity_bar(s->moves, &y->x, &y->bar, s->theta_bar);
     y->bar = (struct imp__velocity){.area = 0};
@@ -331,7 +372,8 @@ bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
                            .meter = tracer->sensor->shape != NULL,
                            .through = imp__segment_first(tracer)->through};
     s.front = s.first;
-    s.fog = imp__fog(tracer, walk->first->carried, &s.extinction);
+    s.media = s.through && moves->borders.any;
+    s.fog = !s.media && imp__fog(tracer, walk->first->carried, &s.extinction);
     s.at = imp__arena_take(arena, (size_t)walk->n, sizeof *s.at);
     s.piece = imp__arena_take(arena, (size_t)walk->n, sizeof *s.piece);
     if (!s.at || !s.piece) return false;

@@ -7,6 +7,7 @@
 #include "moved_chain.h"
 #include "moved_sent.h"
 #include "walk/core/vertex.h"
+#include "walk/media/tracking.h"
 
 /* What the values of vertex k depend on, as adjoints of their logarithms, by lanes. */
 struct imp__pieces {
@@ -27,11 +28,12 @@ struct imp__sweep {
     double *theta_bar;
     int first; /* vertex: 1 where the sensor has one before it */
     int front; /* the first vertex at which the camera's ray does not go straight on */
-    imp_spec seen; /* adjoint of the light that reaches it */
-    bool meter;    /* the sensor is a surface, which is vertex `first` */
-    bool through;  /* light samples pass what lets light go straight on */
-    bool fog;      /* a medium fills the scene */
-    imp_spec extinction;
+    imp_spec seen;       /* adjoint of the light that reaches it */
+    bool meter;          /* the sensor is a surface, which is vertex `first` */
+    bool through;        /* light samples pass what lets light go straight on */
+    bool fog;            /* a medium fills the scene */
+    bool media;          /* media end within it */
+    imp_spec extinction; /* fog: of that */
 };
 
 static inline bool imp__sweep_emitted(const struct imp_vertex *v)
@@ -62,26 +64,31 @@ static inline imp_v3 imp__sweep_table_bar(const struct imp__sweep *s,
                           s->theta_bar);
 }
 
-/* An adjoint of the logarithm of the light on a line is this one of the line's length. */
-static inline double imp__sweep_length_bar(const struct imp__sweep *s, imp_spec bar)
+/* An adjoint of the logarithm of the light on a line that ends in a medium of this extinction is this one
+ * of the line's length there. */
+static inline double imp__sweep_length_bar(const struct imp__sweep *s, imp_spec bar,
+                                           imp_spec extinction)
 {
-    return imp_likely(!s->fog)
-               ? 0
-               : -imp__sum_used(bar * s->extinction, s->tracer->scene->lanes);
+    return -imp__sum_used(bar * extinction, s->tracer->scene->lanes);
 }
 
+/* The same where both ends move, and all between them in proportion, over media that this track has
+ * crossed (NULL: none): of the length d. */
+double imp__sweep_line_bar(const struct imp__sweep *s, imp_spec bar,
+                           const struct imp_track *track,
+                           const struct imp_carried *carried, double d);
+
 /* The ray from a vertex, or from the camera, to vertex k carries light of this adjoint, of which the
- * logarithm changes with its length: by what the surface there moves, or, where k floats at the part s
- * of the length D,  ln(sigma exp(-sigma s D) D). */
+ * logarithm changes with its length: by what the surface there moves or, where k floats at the part s
+ * of a stretch of length D,  ln(sigma exp(-sigma s D) D). Borders stay. */
 static inline double imp__sweep_reach_bar(const struct imp__sweep *s, int k, imp_spec bar)
 {
     const struct imp__link_point *x = &s->at[k];
-    if (imp_likely(!s->fog)) return 0;
-    if (!x->floats) return imp__sweep_length_bar(s, bar);
+    if (imp_likely(!s->fog && !s->media)) return 0;
+    const double along = imp__sweep_length_bar(s, bar, x->extinction);
+    if (!x->floats) return along;
     if (x->open) return 0;
-    return (imp__sum_used(bar, s->tracer->scene->lanes) /
-            imp__length(x->beyond - imp__sweep_begin(s, k))) +
-           x->part * imp__sweep_length_bar(s, bar);
+    return imp__sum_used(bar, s->tracer->scene->lanes) / x->stretch + x->part * along;
 }
 
 /* Vertex k passes light straight on: its place does not move what follows, but a texture may let

@@ -1,0 +1,211 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Derivatives by what moves where media end within the scene, at borders of type null: balls and slabs
+ * of a medium before a wall that glows, and one that scatters the light of a sun once, against
+ * quadrature; imp_problem_reverse against central differences in a room. What is refused. */
+#include "mean_gradient.h"
+#include "moves_kit.h"
+#include "moves_numbers.h"
+
+#define VOLPATH(DEPTH)                                                                   \
+    "<integrator type='volpath'><integer name='max_depth' value='" DEPTH                 \
+    "'/></integrator>"
+#define MEDIUM(SIGMA, ALBEDO, PHASE)                                                     \
+    "<medium type='homogeneous' name='interior'><rgb name='sigma_t' value='" SIGMA       \
+    "'/><rgb name='albedo' value='" ALBEDO "'/>" PHASE "</medium>"
+#define NULL_BALL(PLACE, RADIUS, MEDIUM)                                                 \
+    "<shape type='sphere' id='fog'><point name='center' value='" PLACE                   \
+    "'/><float name='radius' value='" RADIUS "'/><bsdf type='null'/>" MEDIUM "</shape>"
+#define CAMERA                                                                           \
+    "<sensor type='perspective' id='camera'><float name='fov' value='60'/><float "       \
+    "name='near_clip' value='1e-6'/><transform name='to_world'><lookat "                 \
+    "origin='0,0,3' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>"        \
+    "<integer name='width' value='16'/><integer name='height' value='16'/><rfilter "     \
+    "type='box'/></film></sensor>"
+#define GLOWING                                                                          \
+    "<shape type='rectangle' id='wall'><transform name='to_world'><scale value='50'/>"   \
+    "<translate z='-2'/></transform><emitter type='area'><rgb name='radiance' "          \
+    "value='3'/></emitter></shape>"
+
+/* The mean of the picture through a ball of radius r at the distance D before a wall of radiance 3: the
+ * film holds 4 tan^2(30 deg) of the plane at the distance 1, where the ball is a disk; a ray beside the
+ * axis by the angle a has the chord 2 sqrt(r^2 - D^2 sin^2(a)). */
+static double ball_seen(double D, double r, double sigma)
+{
+    enum { STEPS = 20000 };
+    double sum = 0;
+    for (int k = 0; k < STEPS; k++) {
+        const double v = (k + .5) / STEPS, s = sqrt(1 - v * v) * r / D; /* of v dv */
+        const double chord = 2 * r * v, c = sqrt(1 - s * s);
+        /* d(tan^2 a)/2 = s ds/c^4, s ds = (r/D)^2 v dv */
+        sum += 2 * IMP_PI * (exp(-sigma * chord) - 1) * imp__sqr(r / D) * v /
+               imp__sqr(c * c) / STEPS;
+    }
+    return 3 * (1 + sum / (4 * imp__sqr(tan(IMP_PI / 6))));
+}
+
+/* A slab of the thickness 1.4 and of a width that no pixel sees, in a sun that shines straight down, as
+ * parallel rays from above see it: of single scattering in all directions alike
+ *
+ *     L = sigma_s/(4 pi) E int_0^h exp(-2 sigma t) dt,  dL/dh = sigma_s/(4 pi) E exp(-2 sigma h)
+ */
+#define SLAB                                                                             \
+    "<sensor type='orthographic' id='camera'><transform name='to_world'><lookat "        \
+    "origin='0,0,3' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>"        \
+    "<integer name='width' value='8'/><integer name='height' value='8'/><rfilter "       \
+    "type='box'/></film></sensor><emitter type='directional'><vector name='direction' "  \
+    "value='0,0,-1'/><rgb name='irradiance' value='5'/></emitter>"                       \
+    "<shape type='cube' id='fog'><transform name='to_world'><scale x='1.5' y='1.5' "     \
+    "z='.7'/></transform><bsdf type='null'/>" MEDIUM(".8", ".75", "") "</shape>"
+
+static void mean_test(const char *what, const char *rest, const char *name, int number,
+                      int spp, double ref, double most)
+{
+    char xml[4096];
+    struct tap_stat g[12] = {{0, 0, 0}};
+    snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", rest);
+    imp_scene *scene = test_scene_text(ctx, xml, IMP_MONO);
+    test_must(ctx, imp_scene_add_geometry(scene, name));
+    mean_gradient(ctx, scene, name, spp, 16, g);
+    tap_z(&g[number], ref, most, what);
+    imp_scene_destroy(scene);
+}
+
+static void closed_test(int more)
+{
+    static const char ball[] =
+        VOLPATH("2") CAMERA GLOWING NULL_BALL("0,0,0", "1", MEDIUM("1.2", "0", ""));
+    static const char slab[] = VOLPATH("2") SLAB;
+    const double h = 1e-4, sigma = .8, thick = 1.4;
+    const double by_radius =
+                     (ball_seen(3, 1 + h, 1.2) - ball_seen(3, 1 - h, 1.2)) / (2 * h),
+                 nearer = (ball_seen(3 - h, 1, 1.2) - ball_seen(3 + h, 1, 1.2)) / (2 * h),
+                 by_depth = .75 * sigma / (4 * IMP_PI) * 5 * exp(-2 * sigma * thick);
+    const int spp = 64 * more;
+    mean_test("a ball that absorbs becomes larger", ball, "fog.radius", 0, spp, by_radius,
+              .005);
+    mean_test("it comes nearer", ball, "fog.pose", 2, spp, nearer, .005);
+    mean_test("the camera comes nearer", ball, "camera.pose", 2, spp, -nearer, .005);
+    mean_test("a slab that scatters becomes thicker", slab, "fog.scale", 0, 4 * spp,
+              by_depth * thick, .025 * by_depth * thick);
+    mean_test("it is farther away", slab, "fog.pose", 2, 4 * spp, 0,
+              .025 * by_depth * thick);
+}
+
+/* The room of moves_kit.h; with its camera in medium 'a'. */
+static imp_scene *room(const char *rest)
+{
+    return room_build(ctx, &(struct room_parts){.rest = rest});
+}
+static imp_scene *filled(const char *rest)
+{
+    char xml[16384], filled[16384];
+    room_write(&(struct room_parts){.rest = rest}, xml, sizeof xml);
+    const char *film = strstr(xml, "<film");
+    snprintf(filled, sizeof filled, "%.*s<ref name='medium' id='a'/>%s",
+             (int)(film - xml), xml, film);
+    return test_scene_text(ctx, filled, IMP_RGB);
+}
+
+#define BOX(MEDIUM)                                                                      \
+    "<shape type='cube' id='fog'><transform name='to_world'><scale x='1.1' y='.9' "      \
+    "z='.7'/><rotate z='1' angle='20'/><translate x='.2' y='-.3' z='1.1'/></transform>"  \
+    "<bsdf type='null'/>" MEDIUM "</shape>"
+#define IN_BOX                                                                           \
+    "<shape type='sphere' id='ball'><point name='center' value='0,-.5,1.2'/><float "     \
+    "name='radius' value='.4'/><bsdf type='null'/><medium name='interior' "              \
+    "type='homogeneous'><rgb name='sigma_t' value='1.5,1,.4'/><rgb name='albedo' "       \
+    "value='.4,.9,.8'/></medium><ref name='exterior' id='a'/></shape>"
+#define HOLE                                                                             \
+    "<shape type='sphere' id='ball'><point name='center' value='0,-.8,1.2'/><float "     \
+    "name='radius' value='.7'/><bsdf type='null'/><ref name='exterior' id='a'/></shape>"
+#define NAMED(SIGMA, ALBEDO)                                                             \
+    "<medium type='homogeneous' id='a'><rgb name='sigma_t' value='" SIGMA                \
+    "'/><rgb name='albedo' value='" ALBEDO                                               \
+    "'/><phase type='hg'><float name='g' value='.5'/></phase></medium>"
+#define BULB                                                                             \
+    "<emitter type='point' id='bulb'><point name='position' value='.2,-1,2.5'/><rgb "    \
+    "name='intensity' value='4'/></emitter>"
+
+static void refused_test(void)
+{
+    static const char fog[] = BOX(MEDIUM(".5", ".5", "")) VOLPATH("2");
+    char xml[4096];
+    number_refused("a border that is open",
+                   room("<shape type='rectangle' id='fog'><bsdf type='null'/>" MEDIUM(
+                       ".5", "0", "") "</shape>" VOLPATH("2")),
+                   "block.pose", "closed");
+    number_refused("a medium that glows",
+                   room(BOX("<medium name='interior' type='homogeneous'><rgb name="
+                            "'sigma_t' value='.2'/><rgb name='emission' value='1'/>"
+                            "</medium>") VOLPATH("2")),
+                   "fog.pose", "emits");
+    snprintf(xml, sizeof xml, "%s" BULB, fog);
+    number_refused("a lamp without a size", room(xml), "fog.pose", "no size");
+    snprintf(xml, sizeof xml,
+             "%s<shape type='rectangle' id='veil'><bsdf type='mask'><float "
+             "name='opacity' value='.5'/><bsdf type='diffuse'/></bsdf></shape>",
+             fog);
+    number_refused("a mask", room(xml), "fog.pose", "straight on");
+    number_refused("glass around a medium",
+                   room("<shape type='sphere' id='ball'><bsdf type='dielectric'/>" MEDIUM(
+                       ".5", "0", "") "</shape>" VOLPATH("2")),
+                   "ball.pose", "not null");
+    number_refused("media that path does not see",
+                   room(BOX(MEDIUM(".5", ".5", "")) BULB "<integrator type='path'/>"),
+                   "block.pose", NULL);
+}
+
+/* What takes more than a moment. */
+static void long_test(int more)
+{
+    static const struct number box[] = {{"fog.pose", 0, .02},
+                                        {"fog.pose", 5, .03},
+                                        {"block.pose", 3, .02},
+                                        {"lamp.pose", 0, .03},
+                                        {NULL, 0, 0}},
+                               nest[] = {{"fog.pose", 0, .02},    {"ball.center", 0, .02},
+                                         {"ball.radius", 0, .02}, {"lamp.pose", 0, .03},
+                                         {"camera.pose", 0, .02}, {NULL, 0, 0}},
+                               hole[] = {{"ball.center", 0, .02},
+                                         {"lamp.pose", 2, .03},
+                                         {"camera.pose", 2, .02},
+                                         {NULL, 0, 0}};
+    numbers_compare("more of the box",
+                    room(NAMED(".5,.7,.9", ".9,.8,.7")
+                             BOX("<ref name='interior' id='a'/>") VOLPATH("4")),
+                    8 * more, 8 * more, .05, box);
+    numbers_compare("a ball in the box",
+                    room(NAMED(".5,.6,.7", ".8,.7,.6")
+                             BOX("<ref name='interior' id='a'/>") IN_BOX VOLPATH("4")),
+                    8 * more, 8 * more, .05, nest);
+    numbers_compare("a hole in what fills the room",
+                    filled(NAMED(".2,.25,.3", ".8,.7,.6") HOLE VOLPATH("3")), 8 * more,
+                    8 * more, .05, hole);
+}
+
+int main(int argc, char **argv)
+{
+    const int more = tap_is_long(argc, argv) ? 8 : 1;
+    static const struct number box[] = {{"fog.pose", 2, .02},
+                                        {"fog.scale", 0, .02},
+                                        {"camera.pose", 0, .02},
+                                        {NULL, 0, 0}},
+                               bulb[] = {{"fog.pose", 2, .02},
+                                         {"bulb.position", 2, .02},
+                                         {NULL, 0, 0}};
+    ctx = test_context(2);
+    adjoint_make();
+    closed_test(more);
+    numbers_compare("a box that scatters",
+                    room(NAMED(".5,.7,.9", ".9,.8,.7")
+                             BOX("<ref name='interior' id='a'/>") VOLPATH("4")),
+                    64 * more, 32 * more, .05, box);
+    numbers_compare("a bulb beside a box that absorbs",
+                    room(BOX(MEDIUM(".5,.7,.9", "0", "")) BULB VOLPATH("3")), 32 * more,
+                    32 * more, .05, bulb);
+    if (more > 1) long_test(more);
+    refused_test();
+    imp_context_destroy(ctx);
+    return tap_done();
+}
