@@ -8,6 +8,7 @@
 #include "color/rgb.h"
 #include "film_aov.h"
 #include "film_integrator.h"
+#include "walk/bundle/near_walls.h"
 #include "walk/rules/features.h"
 #include <stdio.h>
 #include <string.h>
@@ -173,6 +174,8 @@ enum imp_status imp__measure_together(struct imp_measure *m)
     m->n *= 2;
     m->together = true;
     m->tracer.together = IMP_REUSE_MOST;
+    IMP_CHECKED(imp__near_walls(&m->tracer, &m->more));
+    m->tracer.more = m->more;
     return IMP_OK;
 }
 
@@ -184,6 +187,7 @@ const struct imp_tracer *imp__measure_bundles(const struct imp_measure *m)
 void imp__measure_destroy(struct imp_measure *m)
 {
     imp__release(m->scene->ctx, m->names);
+    imp__release(m->scene->ctx, m->more);
 }
 
 /* ---- Values -------------------------------------------------------------------- */

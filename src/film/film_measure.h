@@ -25,7 +25,8 @@ struct imp_measure {
     int n;                    /* channels */
     bool
         together; /* points of a grid share; the second half of the channels is without that */
-    char *names; /* "R,G,B,..." for imp__film_create */
+    uint8_t *more; /* of such points (walk/bundle/near_walls.h) */
+    char *names;   /* "R,G,B,..." for imp__film_create */
 };
 
 /* IMP_E_SCENE without a sensor or integrator; names are released by measure_destroy. */

@@ -3,7 +3,8 @@
  * Points of a grid that share what their walks meet, against the same walks that do not
  * (imp_render): in a room with a screen between the points, a mirror, a texture, a sheet with two
  * faces, a ball that answers on its outside alone and a lamp that reflects. Values without bias,
- * errors as seen, the mean with its error and a smaller variance; the same bits on any threads. */
+ * errors as seen, the mean with its error and a smaller variance; the same bits on any threads. Planar
+ * points near the walls and the screen have more walks, those of a small grid have not. */
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include <importon/rooms.h>
@@ -39,8 +40,7 @@ static const char *const room =
     "name='reflectance' value='.5'/></bsdf><emitter type='area'><rgb name='radiance' "
     "value='9'/></emitter></shape>"
     "%s"
-    "<shape type='rectangle'><transform name='to_world'><scale x='2.9' "
-    "y='1.9'/><translate "
+    "<shape type='rectangle'><transform name='to_world'>%s<translate "
     "z='.8'/></transform><sensor type='irradiancemeter'><boolean name='virtual' "
     "value='true'/><string name='at' value='%s'/><string name='receiver' "
     "value='%s'/>%s<film "
@@ -152,8 +152,8 @@ static void compare(imp_context *ctx, const char *what, imp_scene *scene)
            stated);
 }
 
-/* With one lamp the light samples are those of points alone, too, and so is the mean: what is given
- * adds up to what is there. */
+/* With one lamp the light samples are those of points alone, too, and so is the mean where points have no
+ * walks that give only: what is given adds up to what is there. */
 static void one_lamp(imp_context *ctx, imp_scene *scene, const char *what)
 {
     static struct reading a, b;
@@ -191,11 +191,15 @@ int main(void)
                                           {"cylindrical", "points", "cylindrical", ""},
                                           {"semicylindrical", "points", "semicylindrical",
                                            "<vector name='facing' x='1' y='0' z='0'/>"}};
+    static const char *const all = "<scale x='2.9' y='1.9'/>",
+                             *const away =
+                                 "<scale value='.5'/><translate x='-1.2' y='-.9'/>";
     imp_context *ctx = test_context(1);
     for (int k = 0; k < 8; k++) {
         const char *const *how = kind[k / 2];
         char xml[8192];
-        snprintf(xml, sizeof xml, room, k % 2 ? "" : lamp, how[1], how[2], how[3]);
+        snprintf(xml, sizeof xml, room, k % 2 ? "" : lamp, k == 1 ? away : all, how[1],
+                 how[2], how[3]);
         imp_scene *scene = test_scene_text(ctx, xml, IMP_RGB);
         if (k % 2) one_lamp(ctx, scene, how[0]);
         else compare(ctx, how[0], scene);

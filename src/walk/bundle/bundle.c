@@ -152,10 +152,10 @@ static void see(struct imp_depth *d, struct room *r)
 static struct link *sensor_link(struct imp_arena *arena, struct imp_bundle *b,
                                 struct link *before)
 {
-    struct link *link = link_add(arena, (size_t)b->n, b->colors, before);
+    struct link *link = link_add(arena, (size_t)b->all, b->colors, before);
     if (!link) return NULL;
-    link->values.n = b->n;
-    for (int k = 0; k < b->n; k++) {
+    link->values.n = b->all;
+    for (int k = 0; k < b->all; k++) {
         imp__color_put(link->values.e, b->colors, k, imp__spec(0));
         imp__color_put(link->values.b, b->colors, k, imp__spec(0));
         imp__color_put(link->values.w, b->colors, k, imp__spec(1));
@@ -172,11 +172,19 @@ static bool meter_begin(struct imp_arena *arena, struct imp_depth *d, const int 
                         struct link **out)
 {
     struct imp_bundle *b = d->bundle;
-    const size_t n = (size_t)b->n;
+    const size_t n = (size_t)b->all;
+    int giver = b->n;
     struct link *sensor = b->walks ? NULL : sensor_link(arena, b, NULL),
                 *first = sensor ? link_add(arena, n, b->colors, sensor) : NULL;
     if (!b->walks && !first) return false;
-    if (first) first->values.n = b->n;
+    if (first) first->values.n = b->all;
+    for (int k = b->n; k < b->all; k++) { /* where the film's first walk has no ray */
+        imp__color_put(first->values.e, b->colors, k, imp__spec(0));
+        imp__color_put(first->values.b, b->colors, k, imp__spec(0));
+        imp__color_put(first->values.w, b->colors, k, imp__spec(0));
+        imp__color_put(first->values.beyond, b->colors, k, imp__spec(0));
+        first->values.up[k] = k;
+    }
     d->values = first ? &first->values : &r->recorded;
     d->next = &r->flights[0];
     d->next->ray.n = r->shadows.ray.n = 0;
@@ -191,7 +199,21 @@ static bool meter_begin(struct imp_arena *arena, struct imp_depth *d, const int 
         imp__meter_vertex(d, walk, k, &weight);
         if (sensor) imp__color_put(sensor->values.w, b->colors, k, imp__spec(weight));
         if (imp_likely(!lanes) || k % n_samples > 0 || d->next->ray.n == rays) continue;
-        imp__meter_others(d, k, xy[k / n_samples], n_samples, samples);
+        struct imp_meter_others others = {.first = k,
+                                          .ray = rays,
+                                          .from = k + 1,
+                                          .n = n_samples - 1,
+                                          .at = xy[k / n_samples],
+                                          .samples = samples + 1};
+        imp__meter_others(d, &others);
+        others.n = n_samples;
+        others.samples = samples;
+        for (int left = imp__reuse_more(b->tracer, others.at); left > 0; left--) {
+            others.copy++;
+            others.from = giver;
+            imp__meter_others(d, &others);
+            giver += n_samples;
+        }
         for (int last = k + n_samples - 1; k < last; k++)
             imp__color_put(sensor->values.w, b->colors, k + 1, imp__spec(weight));
     }
@@ -205,26 +227,29 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
                        int n_pixels, const int (*xy)[2], int n_samples,
                        const int64_t *samples, struct imp_bundle *b)
 {
-    const size_t n = (size_t)n_pixels * (size_t)n_samples;
     struct room r;
     struct imp_reuse reuse;
     struct imp_depth d = {
         .bundle = b, .hits = &r.hits, .shadows = &r.shadows, .lone = &r.lone};
     struct link *last = NULL, *met_first = NULL; /* met_first: by points that share */
     *b = (struct imp_bundle){.tracer = tracer,
-                             .n = (int)n,
+                             .n = n_pixels * n_samples,
+                             .all = n_pixels * n_samples,
                              .n_samples = n_samples,
                              .colors = tracer->wavelengths ? 4 : 3,
                              .arena = arena,
                              .before = tracer->sensor->shape   ? 2
                                        : crosses_media(tracer) ? 1
                                                                : 0};
+    for (int k = 0; tracer->more && k < n_pixels; k++)
+        b->all += imp__reuse_more(tracer, xy[k]) * n_samples;
+    const size_t n = (size_t)b->all;
     if (!bundle_create(arena, n, b) || !room_create(tracer, arena, n, &r)) return false;
     memset(b->valid, 0, n * sizeof *b->valid);
     memset(b->dropped, 0, n * sizeof *b->dropped);
     for (int c = 0; c < 4; c++) memset(b->L[c], 0, n * sizeof *b->L[c]);
     if (imp_unlikely(tracer->together > 0)) {
-        if (!imp__reuse_create(arena, b, &reuse)) return false;
+        if (!imp__reuse_create(arena, b, xy, &reuse)) return false;
         d.reuse = &reuse;
     }
     if (!tracer->sensor->shape) {

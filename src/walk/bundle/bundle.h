@@ -39,8 +39,9 @@ enum { IMP_SPECTRA_KEPT = 6 };
 
 struct imp_bundle {
     const struct imp_tracer *tracer;
-    int n, n_samples;               /* in all, of each pixel */
-    int colors;                     /* 3, or the 4 wavelengths that each walk carries */
+    int n, n_samples; /* in all, of each pixel */
+    int all;          /* with those that give only (near_walls.h), which follow */
+    int colors;       /* 3, or the 4 wavelengths that each walk carries */
     const struct imp_waves **waves; /* of each walk; NULL: colours */
     struct imp_arena *arena;
     struct imp_spectrum_kept kept[IMP_SPECTRA_KEPT]; /* (lanes_spectra.c) */

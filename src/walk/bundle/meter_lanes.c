@@ -13,8 +13,8 @@
 #define IMP_TEXT "math/warp_text.h"
 #include "math/lane_text.h"
 
-/* Light samples of a walk, at most: four take as much longer as they gain. */
-enum { MOST = 2 };
+/* Light samples of a walk, at most. */
+enum { MOST = 4 };
 
 /* ---- Walks of one point ------------------------------------------------------------------ */
 
@@ -25,18 +25,36 @@ bool imp__meter_in_lanes(const struct imp_tracer *t)
            r->kind == IMP_PLANAR && !r->turned && r->points;
 }
 
-/* As imp__begin_alone and imp__meter_begin make them. */
-static void numbers_set(struct imp_bundle *b, int walk, const int at[2],
-                        const int64_t *samples, int k)
+static bool in_set(const int64_t *samples, int k)
 {
-    if (samples[k] / IMP_SET_POINTS == samples[k - 1] / IMP_SET_POINTS) {
+    return k > 0 && samples[k] / IMP_SET_POINTS == samples[k - 1] / IMP_SET_POINTS;
+}
+
+/* Points of a set, at most. */
+static int set_of(const struct imp_meter_others *o)
+{
+    int most = 1, n = 0;
+    for (int k = 0; k < o->n; k++) {
+        n = in_set(o->samples, k) ? n + 1 : 1;
+        most = imp_max(most, n);
+    }
+    return most;
+}
+
+/* As imp__begin_alone and imp__meter_begin make them; set: points of one. */
+static void numbers_set(struct imp_bundle *b, const struct imp_meter_others *o, int k,
+                        int set)
+{
+    const int walk = o->from + k, fit = IMP_SET_POINTS / set;
+    if (in_set(o->samples, k)) {
         b->set[walk] = b->set[walk - 1];
     } else {
         struct imp_walk own;
-        imp__walk_numbers(b->tracer, at[0], at[1], samples[k], &own);
+        const int64_t further = (int64_t)(o->copy / fit) << 40;
+        imp__walk_numbers(b->tracer, o->at[0], o->at[1], o->samples[k] + further, &own);
         b->set[walk] = imp__key_branch((struct imp_key){own.point.set}, 0, 1).state;
     }
-    b->index[walk] = (uint32_t)samples[k] % IMP_SET_POINTS;
+    b->index[walk] = (uint32_t)(o->samples[k] + o->copy % fit * set) % IMP_SET_POINTS;
 }
 
 /* What walk `to` has of walk `from`. */
@@ -63,24 +81,24 @@ static void walk_copy(struct imp_depth *d, int from, int to)
     r->begun[to] = true;
 }
 
-void imp__meter_others(struct imp_depth *d, int first, const int at[2], int n,
-                       const int64_t *samples)
+void imp__meter_others(struct imp_depth *d, const struct imp_meter_others *o)
 {
     struct imp_bundle *b = d->bundle;
     struct imp_flights *to = d->next;
-    const int like = to->ray.n - 1; /* the ray of `first` */
-    const imp_v3 p = imp__column_v3(d->reuse->from, first),
-                 normal = imp__column_v3(d->reuse->normal, first);
+    const int like = o->ray, n = o->n, set = o->copy > 0 ? set_of(o) : 1;
+    const imp_v3 p = imp__column_v3(d->reuse->from, o->first),
+                 normal = imp__column_v3(d->reuse->normal, o->first);
     const struct imp_frame own = imp__frame_from_normal(normal);
     const imp_wide3 ng = imp__wide3_of(normal), x = imp__wide3_of(p);
     const imp_wide_frame frame = {imp__wide3_of(own.s), imp__wide3_of(own.t), ng};
-    for (int k = 1; k < n; k++) {
-        numbers_set(b, first + k, at, samples, k);
-        walk_copy(d, first, first + k);
+    for (int k = 0; k < n; k++) {
+        numbers_set(b, o, k, set);
+        walk_copy(d, o->first, o->from + k);
     }
-    for (int k = 1; k < n; k += IMP_WIDE_LANES) {
+    for (int k = 0; k < n; k += IMP_WIDE_LANES) {
         int32_t walk[IMP_WIDE_LANES];
-        for (int j = 0; j < IMP_WIDE_LANES; j++) walk[j] = first + imp_min(k + j, n - 1);
+        for (int j = 0; j < IMP_WIDE_LANES; j++)
+            walk[j] = o->from + imp_min(k + j, n - 1);
         const struct imp_wide_block numbers =
             imp__wide_block(b->tracer->points, b->set, b->index, walk, imp__block(-1));
         const imp_wide3 wi = IMP_WIDE_OF(imp__cosine_directions)(

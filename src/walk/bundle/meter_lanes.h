@@ -15,10 +15,17 @@
 /* Are all walks of a pixel from one point, in directions by the cosine from its normal? Then only
  * the first is made by imp__meter_vertex. */
 bool imp__meter_in_lanes(const struct imp_tracer *tracer);
-/* Walks first + 1 to first + n - 1 of the pixel at xy, with these samples [n], as walk `first`, which
- * has the vertex of the same number and the last of the rays d->next. */
-void imp__meter_others(struct imp_depth *d, int first, const int at[2], int n,
-                       const int64_t *samples);
+/* Walks `from` to from + n - 1 of the pixel `at`, with these samples [n], as walk `first`, which has the
+ * vertex of that number and this one of the rays d->next. Of the walks that give only (near_walls.h)
+ * copy > 0 has the points of a set that follow those of copies before, and sets of its own where
+ * there are no more. */
+struct imp_meter_others {
+    int first, ray, from, n;
+    const int *at;
+    const int64_t *samples;
+    int copy;
+};
+void imp__meter_others(struct imp_depth *d, const struct imp_meter_others *others);
 /* Adds light samples to the values d->values of the points, whose places d->reuse knows. hidden: room
  * for as many rays. */
 void imp__meter_lights(struct imp_depth *d, bool *hidden);

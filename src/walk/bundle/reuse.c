@@ -18,25 +18,32 @@ bool imp__reuse_fits(const struct imp_tracer *t)
 
 #define TAKE(p) ((p) = imp__arena_take(arena, n + IMP_COLUMN_SLACK, sizeof *(p)))
 
-/* The samples of a pixel lie side by side; the last point of a group is followed by the first. */
-static void groups_make(struct imp_reuse *r)
+/* The samples of a pixel lie side by side, and behind all of these the walks that give only; the last
+ * point of a group is followed by the first. */
+static void groups_make(struct imp_reuse *r, const int (*xy)[2])
 {
     const struct imp_bundle *b = r->bundle;
     const int m = b->tracer->together, pixels = b->n / b->n_samples;
-    for (int pixel = 0, k = 0; pixel < pixels; pixel++) {
-        const int first = pixel / m * m, n = imp_min(m, pixels - first);
-        for (int s = 0; s < b->n_samples; s++, k++)
+    for (int pixel = 0, k = 0, giver = b->n; pixel < pixels; pixel++) {
+        const int first = pixel / m * m, n = imp_min(m, pixels - first),
+                  more = imp__reuse_more(b->tracer, xy[pixel]);
+        for (int s = 0; s < b->n_samples; s++, k++) {
             for (int next = 0; next < m; next++)
                 r->on[next][k] =
                     next < n ? (first + (pixel - first + next) % n) * b->n_samples + s
                              : -1;
+            r->times[k] = 1 + more;
+        }
+        for (int other = 0; other < more * b->n_samples; other++, giver++)
+            for (int next = 0; next < m; next++)
+                r->on[next][giver] = r->on[next][k - b->n_samples + other % b->n_samples];
     }
 }
 
 bool imp__reuse_create(struct imp_arena *arena, const struct imp_bundle *b,
-                       struct imp_reuse *r)
+                       const int (*xy)[2], struct imp_reuse *r)
 {
-    const size_t n = (size_t)b->n;
+    const size_t n = (size_t)b->all;
     *r = (struct imp_reuse){.bundle = b};
     for (int c = 0; c < 3; c++)
         if (!TAKE(r->from[c]) || !TAKE(r->normal[c]) || !TAKE(r->facing[c]) ||
@@ -46,12 +53,13 @@ bool imp__reuse_create(struct imp_arena *arena, const struct imp_bundle *b,
         if (!TAKE(r->sent[c]) || !TAKE(r->taken[c])) return false;
     for (int next = 0; next < b->tracer->together; next++)
         if (!TAKE(r->part[next]) || !TAKE(r->on[next])) return false;
-    if (!TAKE(r->begun) || !TAKE(r->even)) return false;
+    if (!TAKE(r->begun) || !TAKE(r->even) || !TAKE(r->times) || !TAKE(r->given))
+        return false;
     memset(r->begun, 0, n * sizeof *r->begun);
     memset(r->even, 0, n * sizeof *r->even);
     const struct imp_receiver *receiver = b->tracer->sensor->receiver;
     r->across = receiver && receiver->kind != IMP_PLANAR;
-    groups_make(r);
+    groups_make(r, xy);
     return true;
 }
 
@@ -162,15 +170,22 @@ void imp__reuse_connect(struct imp_reuse *r, const struct imp_bundle_values *val
     for (int at = 0; at < values->n; at++) {
         double sum = 0;
         if (!r->even[at]) continue;
-        for (int next = 0; next < m; next++) sum += r->part[next][at];
+        double given = 0;
+        for (int next = 0; next < m; next++)
+            if (r->part[next][at] > 0) {
+                sum += r->times[r->on[next][values->up[at]]] * r->part[next][at];
+                given += r->part[next][at];
+            }
         for (int next = 0; next < m; next++) r->part[next][at] /= sum;
+        r->given[at] = given / sum;
     }
 }
 
 /* ---- What is sent ------------------------------------------------------------------------ */
 
 /* S of all places, away from the values; 0 where nothing is shared. */
-static void sent_take(struct imp_reuse *r, struct imp_bundle_values *values)
+static void sent_take(struct imp_reuse *r, struct imp_bundle_values *values,
+                      struct imp_bundle_values *points)
 {
     const int colors = r->bundle->colors;
     for (int at = 0; at < values->n; at++) {
@@ -178,11 +193,13 @@ static void sent_take(struct imp_reuse *r, struct imp_bundle_values *values)
         for (int c = 0; r->even[at] && c < colors; c++)
             s[c] = values->b[c][at] + values->w[c][at] * values->beyond[c][at];
         const bool shared =
-            r->even[at] && imp__is_within(s, FLT_MAX); /* else the own walk
-                                                                         alone is dropped */
+            r->even[at] &&
+            imp__is_within(s, FLT_MAX); /* else the walk alone is dropped */
+        const int own = r->on[0][values->up[at]];
         for (int c = 0; c < colors; c++) {
             r->sent[c][at] = shared ? s[c] : 0;
             if (shared) values->b[c][at] = values->w[c][at] = 0;
+            else if (r->even[at] && own != values->up[at]) points->b[c][own] += s[c];
         }
     }
 }
@@ -191,7 +208,7 @@ void imp__reuse_give(struct imp_reuse *r, struct imp_bundle_values *values,
                      struct imp_bundle_values *points)
 {
     const struct imp_bundle *b = r->bundle;
-    sent_take(r, values);
+    sent_take(r, values, points);
     for (int c = 0; c < b->colors; c++) {
         double *taken = r->taken[c];
         for (int k = 0; k < b->n; k++) taken[k] = 0;
@@ -202,7 +219,8 @@ void imp__reuse_give(struct imp_reuse *r, struct imp_bundle_values *values,
                         r->part[next][at] * r->sent[c][at];
         for (int k = 0; k < b->n; k++) points->b[c][k] += taken[k];
         for (int at = 0; at < values->n; at++) /* what others have more, from now on */
-            taken[values->up[at]] -= r->sent[c][at];
+            if (r->even[at])
+                taken[r->on[0][values->up[at]]] -= r->given[at] * r->sent[c][at];
     }
 }
 

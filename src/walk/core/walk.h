@@ -182,6 +182,8 @@ struct imp_tracer {
     const struct imp_photograph *photograph; /* that is compared with; NULL: none */
     int together; /* points of a grid that share what their walks meet first, where these are
                      bundled (bundle/reuse.h); 0: none do */
+    const uint8_t
+        *more; /* [pixels] their walks beside the film's (bundle/near_walls.h) */
     int split; /* continuations of the first vertex, each with its share; 0: one. Scenes
                   with media have one */
     double
