@@ -24,7 +24,7 @@ struct imp__wide {
     double *L, *X;                        /* of a pixel and channel: [R], [R][K] */
     double *sum;                          /* [K] */
     struct imp__pair_noise noise, loss_noise; /* of the gradient; of chi^2 */
-    /* Of two channels, for H_meas: [pixels], [K][pixels] each. */
+    /* For H_meas, of two channels: [pixels], [K][pixels] each. */
     double *sigma2, *Xc, *Xd, *row;
 };
 
