@@ -74,6 +74,20 @@ uint64_t imp__contrast_signs(const struct imp__moved_adjoint *a, int x, int y, i
     return imp__mix64((row << 34 ^ column << 4 ^ (uint64_t)pair) + 0x9e3779b97f4a7c15u);
 }
 
+/* contrast[m] += x, or -x where bit m of `minus` is set: without a branch, so that lanes do it. */
+static void signed_add(int n, uint64_t minus, double x, double *contrast)
+{
+    union {
+        double x;
+        uint64_t bits;
+    } v;
+    for (int m = 0; m < n; m++) {
+        v.x = x;
+        v.bits ^= (minus >> m & 1) << 63;
+        contrast[m] += v.x;
+    }
+}
+
 double imp__moved_adjoint_at(const struct imp__moved_adjoint *a,
                              const struct imp_splat_scale *scale, double px, double py,
                              const imp_spec *L, double *contrast)
@@ -97,8 +111,7 @@ double imp__moved_adjoint_at(const struct imp__moved_adjoint *a,
                 for (size_t c = 0; c < C; c++)
                     apart += a->apart[(size_t)q * n + at + c] * (*L)[c];
                 apart *= w;
-                for (int m = 0; m < a->contrasts; m++)
-                    contrast[m] += signs >> m & 1 ? apart : -apart;
+                signed_add(a->contrasts, ~signs, apart, contrast);
             }
         }
     return sum;

@@ -23,16 +23,19 @@ static enum imp_status movers_add(const struct imp_problem *p,
                                   struct imp__moved_gradient *m)
 {
     const struct imp_sensor *sensor = m->tracer->sensor;
-    int n = 0;
+    int n = 0, others = 0; /* active parameters that are no pose */
     for (const struct imp_pose *q = p->scene->poses; q; q = q->next) n++;
     m->pose = imp__alloc(p->ctx, (size_t)n, sizeof *m->pose);
     if (!m->pose) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for poses");
+    for (size_t i = 0; i < p->scene->n_params; i++) others += p->active.base[i] >= 0;
     for (const struct imp_pose *q = next_active(p, p->scene->poses); q;
          q = next_active(p, q->next)) {
+        others--;
         if (q->sensor && q->sensor != sensor) continue; /* it is not looked through */
         IMP_CHECKED(imp__moves_add_pose(&m->moves, q));
         m->pose[m->moves.n_movers - 1] = q;
     }
+    m->alone = others == 0;
     return IMP_OK;
 }
 
@@ -177,20 +180,21 @@ struct draws {
     const struct imp__moved_gradient *m;
     double *velocity; /* [moves.n] of a flux; 0 between fluxes */
     double *bar;      /* [moves.n] sum over draws */
-    double *half[2];  /* [contrasts][moves.n]; NULL: not wanted */
+    double *half[2];  /* [moves.n][contrasts]; NULL: not wanted */
 };
 
 /* A number that a flux depends on. */
 static void number_count(const struct draws *d, size_t number, double counts,
                          const double *contrast, double *half)
 {
-    const size_t n = d->m->moves.n;
+    const int all = d->m->adjoint.contrasts;
     const double v = d->velocity[number];
     if (v == 0) return; /* of no use, or counted already */
     d->velocity[number] = 0;
     d->bar[number] += counts * v;
-    for (int k = 0; half && k < d->m->adjoint.contrasts; k++)
-        half[(size_t)k * n + number] += contrast[k] * v;
+    if (!half) return;
+    half += number * (size_t)all;
+    for (int k = 0; k < all; k++) half[k] += contrast[k] * v;
 }
 
 static void flux_add(const struct draws *d, const struct imp__flux *f, double weight,
@@ -263,7 +267,7 @@ bool imp__moved_replicate(const struct imp__moved_gradient *m, struct imp_arena 
         }
         if (inside[e] == 0) continue;
         for (int k = 0; k < all; k++)
-            contrasts[(size_t)k * n + e] +=
+            contrasts[e * (size_t)all + (size_t)k] +=
                 imp__contrast_sign(signs, k) * share * inside[e];
         d.bar[e] += inside[e];
         inside[e] = 0;
@@ -307,20 +311,21 @@ static void number_add(struct imp_sink *sink, int param, size_t element, int cha
 #define LEAST_PART 0.1
 
 enum imp_status imp__moved_variance(const struct imp__moved_gradient *m,
-                                    const struct imp_active *active, double *contrasts,
-                                    const double *own, double *more)
+                                    const struct imp_active *active,
+                                    const double *contrasts, const double *own,
+                                    double *more)
 {
     imp_context *ctx = m->tracer->scene->ctx;
     const size_t n = active->n, N = m->moves.n, all = (size_t)m->adjoint.contrasts;
-    double *value = imp__alloc(ctx, 3 * n, sizeof *value);
+    double *value = imp__alloc(ctx, 3 * n + N, sizeof *value), *bar = value + 3 * n;
     if (!value) return imp__error(ctx, IMP_E_NOMEM, "no memory for errors");
     memset(more, 0, n * sizeof *more);
     for (size_t c = 0; c < all; c++) {
         memset(value, 0, 3 * n * sizeof *value);
         for (size_t part = 0; part < 3; part++) {
             struct numbers s = {{number_add, false}, active, value + part * n};
-            imp__moved_numbers(m, contrasts + (part * all + c) * N,
-                               (imp_spec){1, 0, 0, 0}, &s.sink);
+            for (size_t e = 0; e < N; e++) bar[e] = contrasts[(part * N + e) * all + c];
+            imp__moved_numbers(m, bar, (imp_spec){1, 0, 0, 0}, &s.sink);
         }
         for (size_t k = 0; k < n; k++) {
             const double inside = value[k], one = value[n + k], other = value[2 * n + k];

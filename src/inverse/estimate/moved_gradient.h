@@ -21,6 +21,7 @@ struct imp__moved_gradient {
     struct imp__edges edges;
     struct imp__boundary boundary;
     const struct imp_pose **pose;      /* [moves.n_movers] that a mover is */
+    bool alone;                        /* no other number of the problem is active */
     struct imp__moved_adjoint adjoint; /* of gradients in reverse mode; else none */
     int64_t first;                     /* number of the first draw of each kind */
     double walks;                      /* of the run */
@@ -54,12 +55,18 @@ extern const int imp__moved_times[IMP_BOUNDARY_KINDS];
 void imp__moved_numbers(const struct imp__moved_gradient *m, double *bar, imp_spec lane,
                         struct imp_sink *sink);
 
+/* Has a walk anything to give to bar? */
+static inline bool imp__moved_touched(const struct imp__moved_gradient *m,
+                                      const struct imp_walk *walk)
+{
+    return imp__moved_touches(m->tracer, &m->moves, walk);
+}
 /* A walk with an adjoint of its channels, to bar [moves.n]. False: no memory. */
 bool imp__moved_walk(const struct imp__moved_gradient *m, struct imp_arena *arena,
                      const struct imp_walk *walk, imp_spec adjoint, double *bar);
 
 /* Numbers of an item's contrasts: inside of walks, and at edges by two halves of the draws,
- * [3][adjoint.contrasts][moves.n]; 0 with a fixed adjoint. */
+ * [3][moves.n][adjoint.contrasts]; 0 with a fixed adjoint. */
 static inline size_t imp__moved_contrasts(const struct imp__moved_gradient *m)
 {
     return m && m->adjoint.pairs > 0 ? 3 * (size_t)m->adjoint.contrasts * m->moves.n : 0;
@@ -76,10 +83,11 @@ bool imp__moved_replicate(const struct imp__moved_gradient *m, struct imp_arena 
 bool imp__moved_draws(const struct imp__moved_gradient *m, struct imp_arena *arena,
                       struct imp__replicates plan, int x, int y, int b, double *bar,
                       double *velocity);
-/* The contrasts of all items, which it overwrites: what they add to the variance at fixed adjoints,
+/* The contrasts of all items: what they add to the variance at fixed adjoints,
  * own [active->n], to more [active->n]. IMP_E_NOMEM. */
 enum imp_status imp__moved_variance(const struct imp__moved_gradient *m,
-                                    const struct imp_active *active, double *contrasts,
-                                    const double *own, double *more);
+                                    const struct imp_active *active,
+                                    const double *contrasts, const double *own,
+                                    double *more);
 
 #endif

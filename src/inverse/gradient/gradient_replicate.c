@@ -76,11 +76,16 @@ static void sweep_each(const struct replicate *r)
             const struct imp_arena_mark mark = imp__arena_mark(&r->worker->arena);
             struct imp_walk walk;
             trace(r, s, i, &walk);
-            const imp_spec P = adjoint_of(r, s, &walk);
-            imp__walk_sweep(&j->tracer, &walk, P, &r->tally->sink);
-            if (imp_unlikely(inside != NULL))
-                r->worker->no_memory |=
-                    !imp__moved_walk(j->moved, &r->worker->arena, &walk, P, inside);
+            const bool moves = imp_unlikely(inside != NULL) &&
+                               imp__moved_touched(j->moved, &walk),
+                       sweeps = imp_likely(!inside) || !j->moved->alone;
+            if (moves || sweeps) {
+                const imp_spec P = adjoint_of(r, s, &walk);
+                if (sweeps) imp__walk_sweep(&j->tracer, &walk, P, &r->tally->sink);
+                if (moves)
+                    r->worker->no_memory |=
+                        !imp__moved_walk(j->moved, &r->worker->arena, &walk, P, inside);
+            }
             imp__arena_rewind(&r->worker->arena, mark);
         }
     }

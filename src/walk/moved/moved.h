@@ -57,6 +57,10 @@ static inline double imp__glued_part(const struct imp_emitter *e, double d, doub
     return d * d / all;
 }
 
+/* Does a surface, light or camera of the recorded walk move? If none does, its derivative is 0. */
+bool imp__moved_touches(const struct imp_tracer *tracer, const struct imp__moves *moves,
+                        const struct imp_walk *walk);
+
 /* Interior, reverse mode: adds adjoint times the derivative of the recorded walk's values to
  * theta_bar [moves->n]. False: no memory. */
 bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,

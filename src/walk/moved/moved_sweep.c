@@ -359,6 +359,35 @@ static void front_bar(struct imp__sweep *s)
     }
 }
 
+/* Shapes are all that moves, and the sensor's is not among them. */
+static bool shapes_alone(const struct imp_tracer *tracer, const struct imp__moves *moves)
+{
+    const struct imp_shape *meter = tracer->sensor->shape;
+    for (int k = 0; k < moves->n_movers; k++) {
+        const int shape = moves->mover[k].shape;
+        if (shape < 0 && !imp__is_moved_instance(shape)) return false;
+    }
+    return !meter || !imp__moves_shape(moves, meter->index, NULL);
+}
+
+bool imp__moved_touches(const struct imp_tracer *tracer, const struct imp__moves *moves,
+                        const struct imp_walk *walk)
+{
+    const struct imp_scene *scene = tracer->scene;
+    imp_spec extinction;
+    if (imp__fog(tracer, NULL, &extinction) || !shapes_alone(tracer, moves)) return true;
+    for (const struct imp_vertex *v = walk->first; v; v = v->next) {
+        const struct imp_decision *d = &v->d;
+        if (v->shape &&
+            imp__moves_shape(moves, imp__carrier(scene, d->shape, d->place), NULL))
+            return true;
+        if (d->connection != IMP_CONNECTED || d->light.emitter < 0) continue;
+        const struct imp_shape *lamp = scene->emitters[d->light.emitter]->shape;
+        if (lamp && imp__moves_shape(moves, lamp->index, NULL)) return true;
+    }
+    return false;
+}
+
 bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
                       const struct imp__moves *moves, const struct imp_walk *walk,
                       imp_spec adjoint, double *theta_bar)
