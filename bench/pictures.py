@@ -246,6 +246,7 @@ def main():
                 sys.exit('no target')
             if made.returncode:
                 continue
+            jobs['picture, for pose of ' + name] = ['render', scene, *picture]
             jobs['loss + gradient, pose of ' + name] = ['gradient', scene, '-T', target, '-p', shape + '.pose', '--json']
         print('%-30s %s' % ('', '  '.join('%-24s' % p[-24:] for p in args.program)))
         for name, job in jobs.items():

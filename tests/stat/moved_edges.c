@@ -161,9 +161,9 @@ static void derivatives_of(const char *rest, int spp, int draws, struct derivati
             const int n = kind == IMP_BOUNDARY_SCATTER ? 10 * draws : draws;
             for (int i = 0; i < n / GROUPS; i++) {
                 const struct imp_arena_mark mark = imp__arena_mark(&arena);
-                for (struct imp__flux *f =
-                         imp__boundary_draw(&b, &arena, (enum imp__boundary_kind)kind,
-                                            (int64_t)g * n + i, 1, &no_memory);
+                for (struct imp__flux *f = imp__boundary_draw(
+                         &b, &arena, (enum imp__boundary_kind)kind, (int64_t)g * n + i,
+                         (struct imp__stratum){0, 1}, &no_memory);
                      f; f = f->next)
                     imp__flux_bar(&m, f, weighed(f->L, f->px, f->py) * GROUPS / n,
                                   part[1 + kind]);
@@ -275,7 +275,7 @@ static void together_test(void)
             const struct imp_arena_mark mark = imp__arena_mark(&arena);
             for (struct imp__flux *f = imp__boundary_draw(
                      &b, &arena, (enum imp__boundary_kind)(i % IMP_BOUNDARY_KINDS),
-                     (int64_t)g * DRAWS + i, 1, &no_memory);
+                     (int64_t)g * DRAWS + i, (struct imp__stratum){0, 1}, &no_memory);
                  f; f = f->next)
                 imp__flux_bar(&m, f, weighed(f->L, f->px, f->py) * GROUPS / DRAWS,
                               part[1]);
@@ -340,8 +340,9 @@ static void square_test(void)
         double bar[13] = {0};
         for (int i = 0; i < DRAWS / GROUPS; i++) {
             const struct imp_arena_mark mark = imp__arena_mark(&arena);
-            for (struct imp__flux *f = imp__boundary_draw(&b, &arena, IMP_BOUNDARY_FILM,
-                                                          g * DRAWS + i, 1, &no_memory);
+            for (struct imp__flux *f =
+                     imp__boundary_draw(&b, &arena, IMP_BOUNDARY_FILM, g * DRAWS + i,
+                                        (struct imp__stratum){0, 1}, &no_memory);
                  f; f = f->next)
                 imp__flux_bar(&m, f, f->L[0] * GROUPS / DRAWS, bar);
             imp__arena_rewind(&arena, mark);

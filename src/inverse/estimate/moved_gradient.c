@@ -123,6 +123,13 @@ static double counts_at(const void *payload, const struct imp__flux *f, double *
                                  m->adjoint.contrasts > 0 ? contrast : NULL);
 }
 
+#define LOSS_WALKS 4  /* for a draw of each kind */
+#define LOSS_EDGE  64 /* draws for an edge */
+/* Costs, in those of a draw from an edge that the camera sees: of the pilot for a draw of each kind that
+ * is said to follow, and of an edge on the list. */
+#define PILOT 0.4
+#define EDGE  2
+
 enum imp_status imp__moved_learn(struct imp__moved_gradient *m, int spp)
 {
     const struct imp_sensor *sensor = m->tracer->sensor;
@@ -130,9 +137,14 @@ enum imp_status imp__moved_learn(struct imp__moved_gradient *m, int spp)
     const int64_t walks =
         (int64_t)film->crop_w * film->crop_h * (spp > 0 ? spp : sensor->spp);
     m->walks = (double)walks;
+    /* Of a loss a fraction of a draw of each kind follows for each walk (imp__moved_share); many edges
+     * need a pilot that sees them. */
+    const int64_t few = imp_max(walks / LOSS_WALKS, (int64_t)m->edges.n * LOSS_EDGE),
+                  draws = m->adjoint.pairs > 0 ? imp_min(few, walks) : walks;
+    m->ahead = PILOT * (double)draws + EDGE * (double)m->edges.n;
     /* As many contrasts of few numbers as of many, so that draws do not depend on the others. */
     return imp__boundary_learn(
-        &m->boundary, walks, m->adjoint.image ? counts_at : NULL,
+        &m->boundary, draws, m->adjoint.image ? counts_at : NULL,
         m->adjoint.image ? imp_min(m->adjoint.contrasts, IMP_CONTRASTS_MANY) : 0, m);
 }
 
@@ -142,29 +154,36 @@ enum imp_status imp__moved_learn(struct imp__moved_gradient *m, int spp)
  *     Var = V + B/(W S),    B = (sum of sqrt(M c))^2,
  *
  * in the time W (a + S), with V the variance of the rest: that of the adjoint's noise, which the pilot
- * has seen. Their product is least at S^2 = a B/(V W). Costs are relative to that of an edge that the
- * camera sees. What the pilot says of moments are those of the best chances, about half of what draws
- * have, and light that is scattered brings much by few draws, of which it may have seen none. */
-#define WALK    0.7 /* a */
+ * has seen. Their product is least at S^2 = a B/(V W), and nowhere between a/2 and 3 a more than 1.5
+ * times that. S stays there, since what the pilot knows of V may be all wrong. Costs are relative to
+ * that of an edge that the camera sees; a is that of a walk, with its part of what came before. What the
+ * pilot says of moments are those of the best chances, about half of what draws have, and light that is
+ * scattered brings much by few draws, of which it may have seen none. */
+#define WALK    0.25
 #define MOMENTS 2   /* true ones over those of the pilot */
-#define SHARED  2   /* S where V is not known */
-#define MOST    4
+#define LEAST   0.5 /* S over a */
+#define UNKNOWN 2   /* where the pilot saw none of V */
+#define MOST    3
+#define UNSEEN  2 /* S, where it did not look, and more of the rare light */
+#define RARE    4
 static const double cost[IMP_BOUNDARY_KINDS] =
-    {[IMP_BOUNDARY_FILM] = 1, [IMP_BOUNDARY_LIGHT] = 2, [IMP_BOUNDARY_SCATTER] = 0.5},
-                    least[IMP_BOUNDARY_KINDS] = {[IMP_BOUNDARY_FILM] = 0.0625,
-                                                 [IMP_BOUNDARY_LIGHT] = 0.0625,
-                                                 [IMP_BOUNDARY_SCATTER] = 0.5};
+    {[IMP_BOUNDARY_FILM] = 1, [IMP_BOUNDARY_LIGHT] = 1, [IMP_BOUNDARY_SCATTER] = 0.35},
+                    least[IMP_BOUNDARY_KINDS] = {[IMP_BOUNDARY_FILM] = 0.03,
+                                                 [IMP_BOUNDARY_LIGHT] = 0.06,
+                                                 [IMP_BOUNDARY_SCATTER] = 0.2};
 
 void imp__moved_share(struct imp__moved_gradient *m)
 {
     const double *moment = m->boundary.moment, V = m->boundary.noise;
-    double sum = 0, S = SHARED;
+    const double a = WALK + m->ahead / m->walks,
+                 rare = m->adjoint.contrasts > 0 ? 1 : RARE;
+    double sum = 0, S = m->adjoint.contrasts > 0 ? UNKNOWN * a : UNSEEN;
     for (int k = 0; k < IMP_BOUNDARY_KINDS; k++) sum += sqrt(moment[k] * cost[k]);
     if (!(sum > 0) || !(sum < INFINITY)) return;
-    if (m->adjoint.contrasts > 0)
-        S = V > 0 ? imp_min(sum * sqrt(MOMENTS * WALK / (V * m->walks)), MOST) : MOST;
+    if (m->adjoint.contrasts > 0 && V > 0)
+        S = imp_clamp(sum * sqrt(MOMENTS * a / (V * m->walks)), LEAST * a, MOST * a);
     for (int k = 0; k < IMP_BOUNDARY_KINDS; k++)
-        m->draws[k] = imp_max(S * sqrt(moment[k] / cost[k]) / sum, least[k]);
+        m->draws[k] = imp_max(S * sqrt(moment[k] / cost[k]) / sum, rare * least[k]);
 }
 
 bool imp__moved_walk(const struct imp__moved_gradient *m, struct imp_arena *arena,
@@ -231,15 +250,15 @@ static bool draws_add(const struct draws *d, struct imp_arena *arena,
     const int64_t pixel = (int64_t)(y + margin) * width + x + margin;
     bool no_memory = false;
     for (int kind = 0; kind < IMP_BOUNDARY_KINDS; kind++) {
-        const int n = imp_max((int)lround(plan.n * m->draws[kind]), 1);
-        for (int i = 0; i < n && !no_memory; i++) {
+        /* Of all pixels; this one has its part of them, which may be none. */
+        const int64_t n = imp_max(
+            (int64_t)llround(plan.n * m->draws[kind] * (double)pixels), (int64_t)1);
+        for (int64_t i = pixel * n / pixels; i < (pixel + 1) * n / pixels; i++) {
             const struct imp_arena_mark mark = imp__arena_mark(arena);
-            const int64_t index = m->first + ((int64_t)b * n + i) * pixels + pixel;
-            for (const struct imp__flux *f = imp__boundary_draw(
-                     &m->boundary, arena, (enum imp__boundary_kind)kind, index, pixels,
-                     &no_memory);
-                 f; f = f->next)
-                flux_add(d, f, 1 / ((double)n * (double)pixels), (i + x + y + b) & 1);
+            const struct imp__flux *f = imp__boundary_draw(
+                &m->boundary, arena, (enum imp__boundary_kind)kind, m->first + b * n + i,
+                (struct imp__stratum){i, n}, &no_memory);
+            for (; f; f = f->next) flux_add(d, f, 1 / (double)n, (i + b) & 1);
             imp__arena_rewind(arena, mark);
         }
     }

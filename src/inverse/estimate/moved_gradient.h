@@ -3,10 +3,10 @@
  * Gradients by poses (scene/pose.h): what a walk gives to them with its adjoint, and the draws
  * from edges that complete it (walk/moved/boundary.h). A replicate of n walks of a pixel has n
  * draws of each kind, of scattered light four times as many, and of a loss as many as pay
- * (imp__moved_share). They lie anywhere on the film: pixels only number them, and are strata along
- * the list of edges. Draws of different replicates are
- * independent of each other and of the walks. With a fixed adjoint, standard errors are those of the
- * walks' sums; those of a loss are in moved_adjoint.h. */
+ * (imp__moved_share). They lie anywhere on the film: those of a replicate in all pixels are equal
+ * parts of the list of edges, of which a pixel has the same in every replicate, or none. Draws of
+ * different replicates are independent of each other and of the walks. With a fixed adjoint, standard
+ * errors are those of the walks' sums; those of a loss are in moved_adjoint.h. */
 #ifndef IMP_INVERSE_MOVED_GRADIENT_H
 #define IMP_INVERSE_MOVED_GRADIENT_H
 
@@ -25,7 +25,8 @@ struct imp__moved_gradient {
     struct imp__moved_adjoint adjoint; /* of gradients in reverse mode; else none */
     int64_t first;                     /* number of the first draw of each kind */
     double walks;                      /* of the run */
-    double draws[IMP_BOUNDARY_KINDS];  /* for each walk */
+    double ahead; /* cost of what comes before them (imp__moved_share) */
+    double draws[IMP_BOUNDARY_KINDS]; /* for each walk */
 };
 
 /* For walks of this tracer, which stays where it is. IMP_E_UNSUPPORTED, by name, as

@@ -66,9 +66,10 @@ static void sample_draw(const void *payload, struct imp_arena *arena, int64_t in
     for (int kind = 0; kind < IMP_BOUNDARY_KINDS; kind++) {
         const int times = imp__moved_times[kind];
         for (int i = 0; i < times; i++) {
+            const int64_t number = m->first + index * times + i, n = own->strata * times;
             struct imp__flux *f = imp__boundary_draw(
-                &m->boundary, arena, (enum imp__boundary_kind)kind,
-                m->first + index * times + i, own->strata * times, &no_memory);
+                &m->boundary, arena, (enum imp__boundary_kind)kind, number,
+                (struct imp__stratum){number % n, n}, &no_memory);
             for (; f; f = f->next) {
                 struct edge_reach *r = imp__arena_array(arena, 1, sizeof *r);
                 no_memory |= !r;

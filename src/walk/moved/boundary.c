@@ -84,6 +84,9 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
 {
     const struct imp_scene *scene = tracer->scene;
     *out = (struct imp__boundary){.tracer = tracer, .moves = moves, .edges = edges};
+    out->plain = *tracer;
+    out->plain.value_only = true;
+    out->plain.active = NULL;
     out->size = imp__length(scene->hi - scene->lo);
     out->through = imp__segment_first(tracer)->through;
     imp_spec extinction;
@@ -241,13 +244,13 @@ void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
 struct imp__flux *imp__boundary_draw(const struct imp__boundary *b,
                                      struct imp_arena *arena,
                                      enum imp__boundary_kind kind, int64_t index,
-                                     int64_t strata, bool *no_memory)
+                                     struct imp__stratum stratum, bool *no_memory)
 {
     struct imp__edge_draw d = {.b = b, .arena = arena, .choice = &b->choice[kind]};
     if (b->edges->n == 0 && b->n_items == 0) return NULL;
     /* Walks of pictures have smaller numbers in the place of the kind. */
     d.key = imp__key(b->tracer->seed, UINT64_MAX - (uint64_t)kind, (uint64_t)index);
-    d.u = ((double)(index % strata) + imp__u01(d.key, IMP_EDGE_WHICH)) / (double)strata;
+    d.u = ((double)stratum.k + imp__u01(d.key, IMP_EDGE_WHICH)) / (double)stratum.n;
     d.u = imp_min(d.u, 1 - 0x1p-53);
     imp__boundary_work(&d, kind);
     *no_memory |= d.no_memory;

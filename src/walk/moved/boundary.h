@@ -121,6 +121,7 @@ struct imp__plane;
 
 struct imp__boundary {
     const struct imp_tracer *tracer;
+    struct imp_tracer plain; /* the same for walks of which the values alone count */
     const struct imp__moves *moves;
     const struct imp__edges *edges;
     struct imp__edge_tree tree;
@@ -205,14 +206,17 @@ enum imp_status imp__boundary_learn(struct imp__boundary *b, int64_t draws,
                                     imp__flux_weight *weight, int contrasts,
                                     const void *payload);
 
-/* Draw `index` of a kind: what it brings, in the arena; the mean over draws of all kinds, summed,
- * is the boundary's part of the derivative. Where draws are to be spread, index modulo `strata`
- * is the stratum, along the list of edges; 1: all are alike. NULL: nothing. *no_memory is set
+/* One of n equal parts of the list of edges. */
+struct imp__stratum {
+    int64_t k, n;
+};
+/* Draw `index` of a kind, which looks there: what it brings, in the arena; the mean over draws of
+ * all kinds, summed, is the boundary's part of the derivative. NULL: nothing. *no_memory is set
  * where there is none. */
 struct imp__flux *imp__boundary_draw(const struct imp__boundary *b,
                                      struct imp_arena *arena,
                                      enum imp__boundary_kind kind, int64_t index,
-                                     int64_t strata, bool *no_memory);
+                                     struct imp__stratum stratum, bool *no_memory);
 
 /* Along theta_dot: the sum of bar.V; its transpose, times bar, added to theta_bar. */
 double imp__flux_velocity(const struct imp__moves *moves, const struct imp__flux *flux,

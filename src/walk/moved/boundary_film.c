@@ -61,6 +61,7 @@ void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to
     const double apart = IMP_BESIDE * (d->b->parallel ? to->dist + imp__length(d->p)
                                                       : imp__length(d->p - to->p));
     if (!sky) T = imp__edge_near(d, w, to->dist, apart, T);
+    d->values = true;
     const imp_spec jump =
         T * (sky ? imp__sky_jump(d, w, m)
                  : look_beside(d, to, w, -m, apart) - look_beside(d, to, w, m, apart));

@@ -33,22 +33,66 @@ static double turn_measure(const struct imp__boundary *b, const struct imp__edge
     return imp__length(e->b - e->a) * imp__edge_turn(b->edges, e);
 }
 
+/* The picture alone jumps at an edge, and of a camera at rest only at one that moves: a meter or a ray
+ * also receives light past edges at rest, and mirrors may move their images. */
+static bool film_at_rest(const struct imp__boundary *b)
+{
+    return !b->tracer->sensor->shape && !b->rays && b->n_planes == 0 &&
+           !imp__moves_shape(b->moves, IMP_MOVE_CAMERA, NULL);
+}
+static bool shape_moves(const struct imp__boundary *b, int shape, int64_t place)
+{
+    return imp__moves_shape(b->moves, imp__carrier(b->tracer->scene, shape, place), NULL);
+}
+static bool edge_moves(const struct imp__boundary *b, const struct imp__edge *e)
+{
+    for (int k = 0; k < e->n_faces; k++) {
+        const struct imp__edge_face *f = &b->edges->face[e->first + (size_t)k];
+        if (shape_moves(b, f->shape, f->place)) return true;
+    }
+    return false;
+}
+
+/* Does it matter to a kind of draws that this edge, or this item, is seen? */
+static bool edge_counts(const struct imp__boundary *b, const struct imp__edge *e,
+                        int kind)
+{
+    return kind != IMP_BOUNDARY_FILM || !film_at_rest(b) || edge_moves(b, e);
+}
+static bool item_counts(const struct imp__boundary *b, const struct imp__edge_item *item,
+                        int kind)
+{
+    if (kind != IMP_BOUNDARY_FILM || !film_at_rest(b) || item->kind == IMP_ITEM_SKY)
+        return true;
+    if (item->kind != IMP_ITEM_ARC) return shape_moves(b, item->shape, item->place);
+    const struct imp__edge_face *side = item->arc->side;
+    return shape_moves(b, side[0].shape, side[0].place) ||
+           shape_moves(b, side[1].shape, side[1].place);
+}
+
 static enum imp_status choice_make(struct imp__boundary *b, enum imp__boundary_kind kind)
 {
     const struct imp__edges *edges = b->edges;
     double *measure = imp__alloc(edges->ctx, edges->n + 1, sizeof *measure);
     double sum = 0, all = 0;
+    size_t n = 0;
     if (!measure) return imp__error(edges->ctx, IMP_E_NOMEM, "no memory for edges");
     for (size_t k = 0; k < edges->n; k++) {
         const struct imp__edge *e = &edges->edge[k];
+        measure[k] = 0;
+        if (!edge_counts(b, e, kind)) continue;
         sum += measure[k] =
             kind == IMP_BOUNDARY_FILM ? film_measure(b, e) : turn_measure(b, e);
         all += imp__length(e->b - e->a);
+        n++;
     }
     for (size_t k = 0; k < edges->n; k++) {
         const struct imp__edge *e = &edges->edge[k];
-        measure[k] = BY_LENGTH * imp__length(e->b - e->a) / all +
-                     (sum > 0 ? (1 - BY_LENGTH) * measure[k] / sum : 0);
+        if (n > 0 && !edge_counts(b, e, kind)) continue;
+        if (n == 0) measure[k] = 1; /* none is chosen (items_make) */
+        else
+            measure[k] = BY_LENGTH * imp__length(e->b - e->a) / all +
+                         (sum > 0 ? (1 - BY_LENGTH) * measure[k] / sum : 0);
     }
     const enum imp_status st =
         imp__edge_choice_begin(edges, &b->tree, measure, 1, &b->choice[kind]);
@@ -215,17 +259,21 @@ static double item_length(const struct imp__boundary *b,
 static enum imp_status items_make(struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
-    double edges = 0, sum = 0;
     IMP_CHECKED(items_find(b));
-    for (size_t k = 0; k < b->edges->n; k++) edges += turn_measure(b, &b->edges->edge[k]);
     for (int kind = 0; kind < IMP_BOUNDARY_KINDS; kind++) {
         double *part =
             imp__alloc(scene->ctx, (size_t)b->n_items + 2, sizeof *b->part[kind]);
         if (!part) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for spheres");
         b->part[kind] = part;
-        sum = part[0] = 0;
-        for (int k = 0; k < b->n_items; k++)
-            part[k + 1] = sum += item_length(b, &b->item[k], kind);
+        double edges = 0, sum = part[0] = 0;
+        for (size_t k = 0; k < b->edges->n; k++)
+            if (edge_counts(b, &b->edges->edge[k], kind))
+                edges += turn_measure(b, &b->edges->edge[k]);
+        for (int k = 0; k < b->n_items; k++) {
+            if (item_counts(b, &b->item[k], kind))
+                sum += item_length(b, &b->item[k], kind);
+            part[k + 1] = sum;
+        }
         sum += edges;
         for (int k = 0; k <= b->n_items && sum > 0; k++) part[k] /= sum;
         if (!(edges > 0)) part[b->n_items] = 1;

@@ -19,6 +19,7 @@ struct imp__edge_ray {
 
 struct imp__edge_draw {
     const struct imp__boundary *b;
+    bool values; /* of its walks the values alone count: they are not recorded */
     struct imp_arena *arena;
     struct imp_key key;
     const struct imp_waves *waves; /* of all its walks; NULL: colours */
@@ -79,6 +80,11 @@ enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
 static inline const struct imp_carried *imp__edge_waves(const struct imp__edge_draw *d)
 {
     return d->waves ? &d->waves->carried : NULL;
+}
+
+static inline const struct imp_tracer *imp__edge_tracer(const struct imp__edge_draw *d)
+{
+    return d->values ? &d->b->plain : d->b->tracer;
 }
 
 /* Chooses an item, or the edges. False: there is none. */
