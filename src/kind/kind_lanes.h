@@ -133,17 +133,18 @@ static inline imp_wide_truth imp__is_smooth(imp_wide_lobe lobe)
 }
 
 struct imp_bsdf_lanes {
-    /* This one is covered: its parameters may say it is not, and derivatives that are wanted
-     * (imp_dirs), for which it draws otherwise. NULL: all are. */
-    bool (*covers)(const struct imp_bsdf *b, uint64_t derivative);
-    /* imp_bsdf_ops.sample; u as there. Where it is true. *lobe is given as smooth. */
-    imp_wide_truth (*sample)(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                             const imp_wide3 *wo, const imp_wide u[3], imp_wide3 *wi,
-                             imp_wide_lobe *lobe);
+    /* This one is covered: its parameters may say it is not. NULL: all are. */
+    bool (*covers)(const struct imp_bsdf *b);
+    /* imp_bsdf_ops.sample; u as there; derivative as of imp_dirs. Where it is true. *lobe is given
+     * as smooth. */
+    imp_wide_truth (*sample)(const struct imp_bsdf *b, uint64_t derivative,
+                             const struct imp_wide_color *in, const imp_wide3 *wo,
+                             const imp_wide u[3], imp_wide3 *wi, imp_wide_lobe *lobe);
     /* imp_bsdf_ops.pdf_eval, of the first `colors` of c. */
-    imp_wide (*pdf_eval)(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                         const imp_wide3 *wo, const imp_wide3 *wi,
-                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *f);
+    imp_wide (*pdf_eval)(const struct imp_bsdf *b, uint64_t derivative,
+                         const struct imp_wide_color *in, const imp_wide3 *wo,
+                         const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
+                         struct imp_wide_color *f);
     /* imp_bsdf_ops.index_ratio, of kinds that have one. */
     imp_wide (*index_ratio)(const struct imp_bsdf *b, const struct imp_wide_color *in,
                             const imp_wide3 *wo, const imp_wide3 *wi,
@@ -151,9 +152,8 @@ struct imp_bsdf_lanes {
     /* Its value is the same for all wo on one side of the surface. NULL: it is not. */
     bool (*even)(const struct imp_bsdf *b);
 };
-/* NULL: this material has none, with these derivatives wanted. Those that have one have no emission. */
-const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b,
-                                             uint64_t derivative);
+/* NULL: this material has none. Those that have one have no emission. */
+const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b);
 
 /* ---- Phase functions ---------------------------------------------------------------------- */
 

@@ -43,17 +43,24 @@ static inline double imp__mixing_rest(double u, double lo, double hi)
 /* Probability of the coat's lobe over that of a base, where the coat reflects F: its share,
  * roughly. Where derivatives are taken, dark colours keep a part, and the coat a larger one
  * if they are by one of its own inputs, `wanted`. */
+static inline double imp__coated_least(uint64_t derivative)
+{
+    return derivative ? 0.1 : 0;
+}
+static inline double imp__coat_least(uint64_t derivative, uint64_t wanted)
+{
+    return derivative & wanted ? IMP_WANTED_LEAST : IMP_MIXING_LEAST;
+}
 static inline double imp__coated_chance(imp_spec coat, imp_spec base,
                                         const struct imp_dirs *d, double F,
                                         uint64_t wanted)
 {
-    const double least = d->derivative ? 0.1 : 0;
+    const double least = imp__coated_least(d->derivative);
     const double s = F * imp_max(imp__max3(coat), least),
                  r = (1 - F) * imp_max(imp__max3(base), least);
     const double q = s + r > 0 ? s / (s + r) : 1;
     if (!d->derivative) return q;
-    return imp_clamp(q, d->derivative & wanted ? IMP_WANTED_LEAST : IMP_MIXING_LEAST,
-                     1 - IMP_MIXING_LEAST);
+    return imp_clamp(q, imp__coat_least(d->derivative, wanted), 1 - IMP_MIXING_LEAST);
 }
 
 /* Delta lobes of a material. */

@@ -4,6 +4,7 @@
 #ifndef IMP_KIND_BSDF_LANES_H
 #define IMP_KIND_BSDF_LANES_H
 
+#include "blending.h"
 #include "kind/kind_lanes.h"
 #include "math/trig.h"
 
@@ -31,17 +32,26 @@ static inline void imp__lobe_set(imp_wide_lobe *lobe, imp_wide_truth here, int k
 {
     *lobe = (*lobe & ~here) | (((imp_wide_lobe){0} + k) & here);
 }
-/* imp__coated_chance (blending.h), where no derivative is wanted. */
-static inline imp_wide imp__coated_chances(const struct imp_wide_color *coat,
-                                           const struct imp_wide_color *base, imp_wide F)
+static inline imp_wide imp__wide_clamp(imp_wide x, double lo, double hi)
 {
-    const imp_wide zero = imp__wide(0);
+    return imp__wide_larger(imp__wide_lesser(x, imp__wide(hi)), imp__wide(lo));
+}
+/* imp__coated_chance (blending.h). */
+static inline imp_wide imp__coated_chances(const struct imp_wide_color *coat,
+                                           const struct imp_wide_color *base,
+                                           uint64_t derivative, imp_wide F,
+                                           uint64_t wanted)
+{
+    const imp_wide least = imp__wide(imp__coated_least(derivative));
     const imp_wide most[2] = {
         imp__wide_larger(coat->c[0], imp__wide_larger(coat->c[1], coat->c[2])),
         imp__wide_larger(base->c[0], imp__wide_larger(base->c[1], base->c[2]))};
-    const imp_wide s = F * imp__wide_larger(most[0], zero),
-                   r = (1 - F) * imp__wide_larger(most[1], zero);
-    return imp__wide_choose(s + r > zero, s / (s + r), imp__wide(1));
+    const imp_wide s = F * imp__wide_larger(most[0], least),
+                   r = (1 - F) * imp__wide_larger(most[1], least);
+    const imp_wide q = imp__wide_choose(s + r > imp__wide(0), s / (s + r), imp__wide(1));
+    return derivative ? imp__wide_clamp(q, imp__coat_least(derivative, wanted),
+                                        1 - IMP_MIXING_LEAST)
+                      : q;
 }
 static inline imp_wide imp__lamberts(const imp_wide3 *wo, const imp_wide3 *wi)
 {

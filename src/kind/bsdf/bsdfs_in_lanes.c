@@ -20,13 +20,11 @@ static const struct {
             {&imp__roughdielectric, &imp__roughdielectric_lanes},
             {&imp__principled, &imp__principled_lanes}};
 
-const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b,
-                                             uint64_t derivative)
+const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b)
 {
     for (size_t k = 0; k < imp_count(list); k++) {
         const struct imp_bsdf_lanes *l = list[k].lanes;
-        if (b->ops == list[k].ops)
-            return !l->covers || l->covers(b, derivative) ? l : NULL;
+        if (b->ops == list[k].ops) return !l->covers || l->covers(b) ? l : NULL;
     }
     return NULL;
 }

@@ -79,22 +79,22 @@ const struct imp_bsdf_ops imp__conductor = {.size = sizeof(struct imp_bsdf_ops),
 
 /* ---- In lanes ---------------------------------------------------------------------------- */
 
-static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
+static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                    const struct imp_wide_color *in, const imp_wide3 *wo,
                                    const imp_wide u[3], imp_wide3 *wi,
                                    imp_wide_lobe *lobe)
 {
-    (void)b, (void)in, (void)u;
+    (void)b, (void)derivative, (void)in, (void)u;
     *wi = imp__mirrors(wo);
     *lobe = (imp_wide_lobe){0};
     return wo->z > imp__wide(0);
 }
-static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                               const imp_wide3 *wo, const imp_wide3 *wi,
-                               const imp_wide_lobe *lobe, int colors,
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
+                               const struct imp_wide_color *in, const imp_wide3 *wo,
+                               const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
                                struct imp_wide_color *f)
 {
-    (void)b, (void)wi;
+    (void)b, (void)derivative, (void)wi;
     for (int c = 0; c < colors; c++)
         f->c[c] =
             IMP_WIDE_OF(imp__conductor)(wo->z, in[ETA].c[c], in[K].c[c]) * in[TINT].c[c];

@@ -134,13 +134,13 @@ static imp_wide_truth is_lobe(const imp_wide_lobe *lobe, int k)
     return *lobe == (imp_wide_lobe){0} + k;
 }
 
-static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
+static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                    const struct imp_wide_color *in, const imp_wide3 *wo,
                                    const imp_wide u[3], imp_wide3 *wi,
                                    imp_wide_lobe *lobe)
 {
     imp_wide cos_t, eta_t;
-    (void)b;
+    (void)b, (void)derivative;
     const imp_wide F = IMP_WIDE_OF(imp__dielectric)(wo->z, in[ETA].c[0], &cos_t, &eta_t);
     const imp_wide_truth reflects = u[0] < F;
     const imp_wide3 through = {-wo->x / eta_t, -wo->y / eta_t,
@@ -150,14 +150,14 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
     imp__lobe_set(lobe, ~reflects, REFRACT);
     return wo->z != imp__wide(0);
 }
-static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                               const imp_wide3 *wo, const imp_wide3 *wi,
-                               const imp_wide_lobe *lobe, int colors,
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
+                               const struct imp_wide_color *in, const imp_wide3 *wo,
+                               const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
                                struct imp_wide_color *f)
 {
     imp_wide cos_t, eta_t;
     const imp_wide zero = imp__wide(0);
-    (void)b, (void)wi;
+    (void)b, (void)derivative, (void)wi;
     const imp_wide F = IMP_WIDE_OF(imp__dielectric)(wo->z, in[ETA].c[0], &cos_t, &eta_t);
     const imp_wide_truth reflects = is_lobe(lobe, REFLECT);
     const imp_wide chance = imp__wide_choose(reflects, F, 1 - F),

@@ -72,20 +72,20 @@ const struct imp_bsdf_ops imp__diffuse = {.size = sizeof(struct imp_bsdf_ops),
 
 /* ---- In lanes ---------------------------------------------------------------------------- */
 
-static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
+static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                    const struct imp_wide_color *in, const imp_wide3 *wo,
                                    const imp_wide u[3], imp_wide3 *wi,
                                    imp_wide_lobe *lobe)
 {
-    (void)b, (void)in, (void)lobe;
+    (void)b, (void)derivative, (void)in, (void)lobe;
     return imp__lambert_samples(u, wo, wi);
 }
-static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                               const imp_wide3 *wo, const imp_wide3 *wi,
-                               const imp_wide_lobe *lobe, int colors,
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
+                               const struct imp_wide_color *in, const imp_wide3 *wo,
+                               const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
                                struct imp_wide_color *f)
 {
-    (void)b, (void)lobe;
+    (void)b, (void)derivative, (void)lobe;
     const imp_wide p = imp__lamberts(wo, wi);
     for (int c = 0; c < colors; c++) f->c[c] = in[RHO].c[c] * p;
     return p;

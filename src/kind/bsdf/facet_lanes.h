@@ -10,16 +10,13 @@
 #define IMP_WIDE IMP_WIDE_LANES
 #define IMP_TEXT "kind/bsdf/microfacet_text.h"
 #include "math/lane_text.h"
+#define IMP_WIDE IMP_WIDE_LANES
+#define IMP_TEXT "kind/bsdf/microfacet_score_text.h"
+#include "math/lane_text.h"
 
-/* These facets, without a part of the draws for a derivative that is wanted. The first of the three
- * inputs of roughness.h has bit `first`. */
-static inline bool imp__facets_cover(const struct imp__roughness *r, uint64_t derivative,
-                                     int first)
+static inline bool imp__facets_cover(const struct imp__roughness *r)
 {
-    const struct imp_dirs d = {.derivative = derivative};
-    const imp_spec in[3] = {imp__spec(1), imp__spec(1), imp__spec(1)};
-    return r->type == IMP_GGX && r->visible &&
-           !imp__roughness_drawn(r, in, &d, first).wanted;
+    return r->type == IMP_GGX && r->visible;
 }
 
 /* in: the three inputs. */
@@ -33,8 +30,8 @@ static inline void imp__roughness_lanes(const struct imp__roughness *r,
 }
 
 /* ggx_visible: a normal for wo, wo.z > 0. */
-static inline imp_wide3 imp__ggx_normals(imp_wide au, imp_wide av, const imp_wide3 *wo,
-                                         const imp_wide u[2])
+static inline imp_wide3 imp__ggx_visible_normals(imp_wide au, imp_wide av,
+                                                 const imp_wide3 *wo, const imp_wide u[2])
 {
     const imp_wide zero = imp__wide(0);
     imp_wide si, co;
@@ -50,12 +47,41 @@ static inline imp_wide3 imp__ggx_normals(imp_wide au, imp_wide av, const imp_wid
         (imp_wide3){au * cap.x, av * cap.y, imp__wide_larger(cap.z, zero)});
 }
 
+/* imp__microfacet_sample: a part of them where D changes, one by one. */
+static inline imp_wide3 imp__ggx_normals(imp_wide au, imp_wide av, unsigned wanted,
+                                         const imp_wide3 *wo, const imp_wide u[2])
+{
+    const double below = 0x1.fffffffffffffp-1;
+    if (imp_likely(!wanted)) return imp__ggx_visible_normals(au, av, wo, u);
+    const imp_wide share = IMP_WIDE_OF(imp__facets_share)(au, av);
+    const imp_wide_truth parted = share > imp__wide(0);
+    const imp_wide rest = imp__wide_clamp((u[0] - share) / (1 - share), 0, below);
+    const imp_wide own[2] = {imp__wide_choose(parted, rest, u[0]), u[1]};
+    imp_wide3 h = imp__ggx_visible_normals(au, av, wo, own);
+    for (unsigned left = imp__wide_bits(parted & (u[0] < share)); left;
+         left &= left - 1) {
+        const int k = __builtin_ctz(left);
+        const struct imp__microfacet f = {IMP_GGX, true, au[k], av[k], wanted};
+        const double v[2] = {imp_min(u[0][k] / share[k], below), u[1][k]};
+        imp__wide3_set(&h, k, imp__score_sample(&f, v));
+    }
+    return h;
+}
+
 /* imp__microfacet_pdf_of: the density of that normal h, where D of it and G1 of wo are known; vm =
  * wo.h. */
-static inline imp_wide imp__ggx_normals_pdf(const imp_wide3 *wo, imp_wide vm, imp_wide D,
-                                            imp_wide G1)
+static inline imp_wide imp__ggx_normals_pdf(imp_wide au, imp_wide av, unsigned wanted,
+                                            const imp_wide3 *wo, const imp_wide3 *h,
+                                            imp_wide vm, imp_wide D, imp_wide G1)
 {
-    return imp__wide_choose(vm > imp__wide(0), D * G1 * vm / wo->z, imp__wide(0));
+    imp_wide p = D * G1 * vm / wo->z;
+    if (imp_unlikely(wanted != 0)) {
+        const imp_wide share = IMP_WIDE_OF(imp__facets_share)(au, av),
+                       score = IMP_WIDE_OF(imp__ggx_score_pdf)(au, av, h->x, h->y, h->z,
+                                                               D, wanted);
+        p = imp__wide_choose(share > imp__wide(0), p + share * (score - p), p);
+    }
+    return imp__wide_choose(vm > imp__wide(0), p, imp__wide(0));
 }
 
 /* The mirror image of wo in h, which it is before. */

@@ -31,13 +31,13 @@ enum imp__score {
     IMP_SCORE_V = 4,
     IMP_SCORE_ASPECT = 8
 };
+/* Means of |d ln D|/2 for scale and aspect, and of |d ln D| for au, under D cos(theta), of GGX. */
+#define IMP_GGX_SCORE_SCALE  0.5
+#define IMP_GGX_SCORE_AU     0.82699334313268808 /* 3 sqrt(3)/(2 pi) */
+#define IMP_GGX_SCORE_ASPECT 0.63661977236758134 /* 2/pi: of 2 v |2 a - 1| */
 /* That part, of f with `wanted`: where lobes are wide nothing is gained (docs/estimators.md 8.2),
  * and then there is none. */
-static inline double imp__score_share(const struct imp__microfacet *f)
-{
-    const double alpha = sqrt(f->au * f->av);
-    return f->wanted ? 0.25 * imp_clamp((0.2 - alpha) / 0.1, 0, 1) : 0;
-}
+double imp__score_share(const struct imp__microfacet *f);
 
 /* D, in 1/sr; 0 for m below the surface. d_log (may be NULL): d ln D / d(au, av). */
 double imp__microfacet_d(const struct imp__microfacet *f, const imp_v3 *m,

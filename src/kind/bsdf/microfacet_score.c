@@ -19,34 +19,34 @@
  * equation, y = t exp(-t) (Lambert's function) or a cubic one. */
 #include "microfacet.h"
 
+#define IMP_WIDE 1
+#define IMP_TEXT "kind/bsdf/microfacet_score_text.h"
+#include "math/lane_text.h"
+
 /* ---- Density --------------------------------------------------------------------- */
 
-/* Means of |d ln D|/2 for scale and aspect, and of |d ln D| for au, under D cos(theta). */
-#define GGX_SCALE       0.5
-#define GGX_AU          0.82699334313268808 /* 3 sqrt(3)/(2 pi) */
-#define GGX_ASPECT      0.63661977236758134 /* 2/pi: of 2 v |2 a - 1| */
+/* As IMP_GGX_SCORE_SCALE and those that follow it. */
 #define BECKMANN_SCALE  0.73575888234288467 /* 2/e */
 #define BECKMANN_AU     0.96788289807657199 /* 4 exp(-1/2)/sqrt(2 pi) */
 #define BECKMANN_ASPECT 0.63661977236758134 /* 2/pi: of t |2 a - 1| */
 
+double imp__score_share(const struct imp__microfacet *f)
+{
+    return f->wanted ? imp__facets_share_1(f->au, f->av) : 0;
+}
+
 double imp__score_pdf(const struct imp__microfacet *f, const imp_v3 *m, double D)
 {
     const double x = (*m)[0] / f->au, y = (*m)[1] / f->av, z = (*m)[2];
+    if (f->type == IMP_GGX)
+        return imp__ggx_score_pdf_1(f->au, f->av, (*m)[0], (*m)[1], z, D, f->wanted);
     if (!(z > 0)) return 0;
+    const double s = 1 / (z * z), tx = x * x * s, ty = y * y * s;
     double sum = 0;
-    if (f->type == IMP_GGX) {
-        const double s = 1 / (x * x + y * y + z * z), vx = x * x * s, vy = y * y * s;
-        if (f->wanted & IMP_SCORE_SCALE) sum += fabs(2 * (vx + vy) - 1) / GGX_SCALE;
-        if (f->wanted & IMP_SCORE_U) sum += fabs(4 * vx - 1) / GGX_AU;
-        if (f->wanted & IMP_SCORE_V) sum += fabs(4 * vy - 1) / GGX_AU;
-        if (f->wanted & IMP_SCORE_ASPECT) sum += 2 * fabs(vx - vy) / GGX_ASPECT;
-    } else {
-        const double s = 1 / (z * z), tx = x * x * s, ty = y * y * s;
-        if (f->wanted & IMP_SCORE_SCALE) sum += fabs(tx + ty - 1) / BECKMANN_SCALE;
-        if (f->wanted & IMP_SCORE_U) sum += fabs(2 * tx - 1) / BECKMANN_AU;
-        if (f->wanted & IMP_SCORE_V) sum += fabs(2 * ty - 1) / BECKMANN_AU;
-        if (f->wanted & IMP_SCORE_ASPECT) sum += fabs(tx - ty) / BECKMANN_ASPECT;
-    }
+    if (f->wanted & IMP_SCORE_SCALE) sum += fabs(tx + ty - 1) / BECKMANN_SCALE;
+    if (f->wanted & IMP_SCORE_U) sum += fabs(2 * tx - 1) / BECKMANN_AU;
+    if (f->wanted & IMP_SCORE_V) sum += fabs(2 * ty - 1) / BECKMANN_AU;
+    if (f->wanted & IMP_SCORE_ASPECT) sum += fabs(tx - ty) / BECKMANN_ASPECT;
     return D * z * sum / __builtin_popcount(f->wanted);
 }
 

@@ -52,10 +52,11 @@ static double fresnel(const imp_spec *in, double c)
     return imp__fresnel_dielectric(c, in[ETA][0], &cos_t, &eta_t);
 }
 
-/* Probability of the mirror lobe: its share of what is reflected, roughly. */
+/* Probability of the mirror lobe: its share of what is reflected, roughly. Its own input: */
+#define OF_MIRROR IMP_INPUT_BIT(TINT)
 static double mirror_chance(const imp_spec *in, const struct imp_dirs *d, double F)
 {
-    return imp__coated_chance(in[TINT], in[DIFFUSE], d, F, IMP_INPUT_BIT(TINT));
+    return imp__coated_chance(in[TINT], in[DIFFUSE], d, F, OF_MIRROR);
 }
 
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
@@ -166,41 +167,37 @@ const struct imp_bsdf_ops imp__plastic = {.size = sizeof(struct imp_bsdf_ops),
 
 /* ---- In lanes ---------------------------------------------------------------------------- */
 
-static bool covers(const struct imp_bsdf *b, uint64_t derivative)
-{
-    (void)b;
-    return derivative == 0;
-}
-
 static imp_wide fresnels(const struct imp_wide_color *in, imp_wide c)
 {
     imp_wide cos_t, eta_t;
     return IMP_WIDE_OF(imp__dielectric)(c, in[ETA].c[0], &cos_t, &eta_t);
 }
 
-static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
+static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                    const struct imp_wide_color *in, const imp_wide3 *wo,
                                    const imp_wide u[3], imp_wide3 *wi,
                                    imp_wide_lobe *lobe)
 {
     (void)b;
     const imp_wide_truth mirrors =
-        u[0] < imp__coated_chances(&in[TINT], &in[DIFFUSE], fresnels(in, wo->z));
+        u[0] < imp__coated_chances(&in[TINT], &in[DIFFUSE], derivative,
+                                   fresnels(in, wo->z), OF_MIRROR);
     const imp_wide_truth drawn = imp__lambert_samples(u, wo, wi);
     *wi = imp__wide3_choose(mirrors, imp__mirrors(wo), *wi);
     imp__lobe_set(lobe, mirrors, MIRROR);
     return (wo->z > imp__wide(0)) & (mirrors | drawn);
 }
 
-static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                               const imp_wide3 *wo, const imp_wide3 *wi,
-                               const imp_wide_lobe *lobe, int colors,
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
+                               const struct imp_wide_color *in, const imp_wide3 *wo,
+                               const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
                                struct imp_wide_color *f)
 {
     const struct plastic *p = b->self;
     const imp_wide zero = imp__wide(0), eta = in[ETA].c[0];
     const imp_wide Fo = fresnels(in, wo->z), lambert = imp__lamberts(wo, wi),
-                   q = imp__coated_chances(&in[TINT], &in[DIFFUSE], Fo);
+                   q = imp__coated_chances(&in[TINT], &in[DIFFUSE], derivative, Fo,
+                                           OF_MIRROR);
     const imp_wide_truth smooth = imp__is_smooth(*lobe);
     double d_e; /* the index is a number: the same in all lanes */
     const double r = imp__fresnel_diffuse(1 / eta[0], &d_e);
@@ -214,5 +211,5 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_c
                             zero);
 }
 
-const struct imp_bsdf_lanes imp__plastic_lanes = {
-    .covers = covers, .sample = sample_lanes, .pdf_eval = pdf_eval_lanes};
+const struct imp_bsdf_lanes imp__plastic_lanes = {.sample = sample_lanes,
+                                                  .pdf_eval = pdf_eval_lanes};

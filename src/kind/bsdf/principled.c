@@ -66,8 +66,7 @@ struct imp__principled_look imp__principled_look(const struct imp_bsdf *b,
     l.metallic = in[METALLIC][0];
     l.trans = p->transmits ? in[TRANS][0] : 0;
     l.facets = imp__burley_facets(in[ROUGHNESS][0], in[ANISOTROPIC][0]);
-    l.facets.f.wanted = imp__burley_wanted(d->derivative & IMP_INPUT_BIT(ROUGHNESS),
-                                           d->derivative & IMP_INPUT_BIT(ANISOTROPIC));
+    l.facets.f.wanted = imp__principled_wanted(d->derivative);
     return l;
 }
 bool imp__principled_half(struct imp__principled_look *l)
@@ -234,15 +233,6 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
 struct chances {
     double facets, glass, diffuse, coat;
 };
-/* Inputs that are weights of a lobe, or that only its shape depends on. */
-#define BIT        IMP_INPUT_BIT
-#define OF_FACETS  (BIT(ROUGHNESS) | BIT(ANISOTROPIC) | BIT(METALLIC) | BIT(SPEC_TINT))
-#define OF_GLASS   (BIT(ROUGHNESS) | BIT(ANISOTROPIC) | BIT(METALLIC) | BIT(TRANS))
-#define OF_DIFFUSE (BIT(METALLIC) | BIT(TRANS) | BIT(SHEEN))
-static double least(uint64_t derivative, uint64_t of)
-{
-    return derivative & of ? IMP_WANTED_PART : derivative ? 0.1 : 0.02;
-}
 static struct chances chances_of(const struct imp__principled_look *l, const imp_spec *in,
                                  uint64_t derivative)
 {
@@ -250,13 +240,16 @@ static struct chances chances_of(const struct imp__principled_look *l, const imp
     const double m = l->metallic, t = l->trans;
     const double F = imp__fresnel_dielectric(l->wo[2], l->e, &cos_t, &eta_t);
     const double sheen = in[SHEEN][0], coat = 0.25 * in[CLEARCOAT][0];
-    struct chances q = {imp_max(m + (1 - m) * F, least(derivative, OF_FACETS)), 0, 0, 0};
+    struct chances q = {
+        imp_max(m + (1 - m) * F, imp__lobe_least(derivative, IMP_OF_FACETS)), 0, 0, 0};
     if (l->p->transmits && (derivative || t > 0))
-        q.glass = imp_max((1 - m) * t * (1 - F), least(derivative, OF_GLASS));
+        q.glass =
+            imp_max((1 - m) * t * (1 - F), imp__lobe_least(derivative, IMP_OF_GLASS));
     if (!l->back) {
         const double diffuse = (1 - m) * imp_max(1 - t, sheen);
-        q.diffuse =
-            derivative ? imp_max(diffuse, least(derivative, OF_DIFFUSE)) : diffuse;
+        q.diffuse = derivative
+                        ? imp_max(diffuse, imp__lobe_least(derivative, IMP_OF_DIFFUSE))
+                        : diffuse;
         if (l->p->coated && (derivative || coat > 0)) q.coat = imp_max(coat, 0.03);
     }
     const double all = 1 / (q.facets + q.glass + q.diffuse + q.coat);

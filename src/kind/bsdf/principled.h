@@ -4,6 +4,7 @@
 #ifndef IMP_PRINCIPLED_H
 #define IMP_PRINCIPLED_H
 
+#include "blending.h"
 #include "burley.h"
 #include "kind/registry.h"
 
@@ -24,6 +25,27 @@ enum {
     GLOSS,
     N_INPUTS
 };
+
+/* Inputs that are weights of a lobe, or that only its shape depends on. */
+#define IMP_OF_FACETS                                                                    \
+    (IMP_INPUT_BIT(ROUGHNESS) | IMP_INPUT_BIT(ANISOTROPIC) | IMP_INPUT_BIT(METALLIC) |   \
+     IMP_INPUT_BIT(SPEC_TINT))
+#define IMP_OF_GLASS                                                                     \
+    (IMP_INPUT_BIT(ROUGHNESS) | IMP_INPUT_BIT(ANISOTROPIC) | IMP_INPUT_BIT(METALLIC) |   \
+     IMP_INPUT_BIT(TRANS))
+#define IMP_OF_DIFFUSE                                                                   \
+    (IMP_INPUT_BIT(METALLIC) | IMP_INPUT_BIT(TRANS) | IMP_INPUT_BIT(SHEEN))
+/* The least part of a lobe in what is drawn, with these derivatives wanted. */
+static inline double imp__lobe_least(uint64_t derivative, uint64_t of)
+{
+    return derivative & of ? IMP_WANTED_PART : derivative ? 0.1 : 0.02;
+}
+/* Those by the shape of the facets (enum imp__score). */
+static inline unsigned imp__principled_wanted(uint64_t derivative)
+{
+    return imp__burley_wanted(derivative & IMP_INPUT_BIT(ROUGHNESS),
+                              derivative & IMP_INPUT_BIT(ANISOTROPIC));
+}
 
 struct imp__principled_self {
     bool transmits, coated, by_eta;

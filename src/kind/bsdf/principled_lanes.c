@@ -6,10 +6,10 @@
 #include "fresnel_lanes.h"
 #include "principled.h"
 
-static bool covers(const struct imp_bsdf *b, uint64_t derivative)
+static bool covers(const struct imp_bsdf *b)
 {
     const struct imp__principled_self *p = b->self;
-    return derivative == 0 && !p->transmits && !p->coated;
+    return !p->transmits && !p->coated;
 }
 
 /* Numbers, cut. */
@@ -38,30 +38,34 @@ static void roughness_of(const struct imp_wide_color *in, imp_wide *au, imp_wide
 }
 
 /* Chances of the facets and of the diffuse lobe (chances_of). */
-static void chances_of(const struct imp_wide_color *in, imp_wide cos_o, imp_wide e,
-                       imp_wide *facets, imp_wide *diffuse)
+static void chances_of(const struct imp_wide_color *in, uint64_t derivative,
+                       imp_wide cos_o, imp_wide e, imp_wide *facets, imp_wide *diffuse)
 {
     imp_wide cos_t, eta_t;
     const imp_wide m = cut(in, METALLIC),
                    F = IMP_WIDE_OF(imp__dielectric)(cos_o, e, &cos_t, &eta_t);
-    const imp_wide f = imp__wide_larger(m + (1 - m) * F, imp__wide(0.02)),
-                   d = (1 - m) * imp__wide_larger(imp__wide(1), cut(in, SHEEN));
+    const imp_wide f = imp__wide_larger(
+        m + (1 - m) * F, imp__wide(imp__lobe_least(derivative, IMP_OF_FACETS)));
+    imp_wide d = (1 - m) * imp__wide_larger(imp__wide(1), cut(in, SHEEN));
+    if (derivative)
+        d = imp__wide_larger(d, imp__wide(imp__lobe_least(derivative, IMP_OF_DIFFUSE)));
     const imp_wide all = 1 / (f + d);
     *facets = f * all;
     *diffuse = d * all;
 }
 
-static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
+static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                    const struct imp_wide_color *in, const imp_wide3 *wo,
                                    const imp_wide u[3], imp_wide3 *wi,
                                    imp_wide_lobe *lobe)
 {
     imp_wide au, av, facets, diffuse;
     (void)lobe;
-    chances_of(in, wo->z, index_of(b->self, in), &facets, &diffuse);
+    chances_of(in, derivative, wo->z, index_of(b->self, in), &facets, &diffuse);
     roughness_of(in, &au, &av);
     const imp_wide_truth lambert = u[0] < diffuse;
-    const imp_wide3 m = imp__ggx_normals(au, av, wo, &u[1]);
+    const imp_wide3 m =
+        imp__ggx_normals(au, av, imp__principled_wanted(derivative), wo, &u[1]);
     const imp_wide c = imp__wide3_inner(*wo, m);
     imp__lambert_samples(u, wo, wi);
     *wi = imp__wide3_choose(lambert, *wi, imp__mirrors_in(wo, &m, c));
@@ -100,15 +104,15 @@ static imp_wide burley(imp_wide cos_o, imp_wide cos_i, imp_wide cos_d, imp_wide 
     return full + (flat - full) * flatness;
 }
 
-static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                               const imp_wide3 *wo, const imp_wide3 *wi,
-                               const imp_wide_lobe *lobe, int colors,
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
+                               const struct imp_wide_color *in, const imp_wide3 *wo,
+                               const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
                                struct imp_wide_color *f)
 {
     const imp_wide zero = imp__wide(0), one = imp__wide(1), e = index_of(b->self, in);
     imp_wide au, av, q_facets, q_diffuse, cos_t;
     (void)lobe;
-    chances_of(in, wo->z, e, &q_facets, &q_diffuse);
+    chances_of(in, derivative, wo->z, e, &q_facets, &q_diffuse);
     roughness_of(in, &au, &av);
     const imp_wide3 h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
     const imp_wide vm = imp__wide3_inner(*wo, h), om = imp__wide_lesser(vm, one);
@@ -138,10 +142,14 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_c
         f->c[k] = Fp * (DG * c) + base * (value * lambert * brdf) +
                   dye * (sheen * (1 - m) * gloss);
     }
-    return imp__wide_choose(there,
-                            q_facets * imp__ggx_normals_pdf(wo, vm, D, Go) / (4 * om) +
-                                q_diffuse * cos_i * IMP_INV_PI,
-                            zero);
+    return imp__wide_choose(
+        there,
+        q_facets *
+                imp__ggx_normals_pdf(au, av, imp__principled_wanted(derivative), wo, &h,
+                                     vm, D, Go) /
+                (4 * om) +
+            q_diffuse * cos_i * IMP_INV_PI,
+        zero);
 }
 
 const struct imp_bsdf_lanes imp__principled_lanes = {

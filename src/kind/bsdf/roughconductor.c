@@ -144,14 +144,11 @@ const struct imp_bsdf_ops imp__roughconductor = {.size = sizeof(struct imp_bsdf_
 
 /* ---- In lanes: GGX, of visible normals ---------------------------------------------------- */
 
-static bool covers(const struct imp_bsdf *b, uint64_t derivative)
-{
-    return imp__facets_cover(b->self, derivative, ALPHA);
-}
+static bool covers(const struct imp_bsdf *b) { return imp__facets_cover(b->self); }
 
-static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                               const imp_wide3 *wo, const imp_wide3 *wi,
-                               const imp_wide_lobe *lobe, int colors,
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
+                               const struct imp_wide_color *in, const imp_wide3 *wo,
+                               const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
                                struct imp_wide_color *f)
 {
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
@@ -167,11 +164,15 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_c
     for (int k = 0; k < colors; k++)
         f->c[k] = IMP_WIDE_OF(imp__conductor)(c, in[ETA].c[k], in[K].c[k]) *
                   (in[TINT].c[k] * by);
-    return imp__wide_choose(imp__fronts(wo, wi),
-                            imp__ggx_normals_pdf(wo, vm, D, Go) / (4 * vm), zero);
+    return imp__wide_choose(
+        imp__fronts(wo, wi),
+        imp__ggx_normals_pdf(au, av, imp__roughness_wanted(b->self, derivative, ALPHA),
+                             wo, &h, vm, D, Go) /
+            (4 * vm),
+        zero);
 }
 
-static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
+static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                    const struct imp_wide_color *in, const imp_wide3 *wo,
                                    const imp_wide u[3], imp_wide3 *wi,
                                    imp_wide_lobe *lobe)
@@ -179,7 +180,8 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
     imp_wide au, av;
     (void)lobe;
     imp__roughness_lanes(b->self, &in[ALPHA], &au, &av);
-    const imp_wide3 h = imp__ggx_normals(au, av, wo, &u[1]);
+    const imp_wide3 h = imp__ggx_normals(
+        au, av, imp__roughness_wanted(b->self, derivative, ALPHA), wo, &u[1]);
     const imp_wide c = imp__wide3_inner(*wo, h);
     *wi = imp__mirrors_in(wo, &h, c);
     return imp__fronts(wo, wi) & (c > imp__wide(0));

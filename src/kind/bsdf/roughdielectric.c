@@ -190,10 +190,7 @@ const struct imp_bsdf_ops imp__roughdielectric = {.size = sizeof(struct imp_bsdf
 
 /* ---- In lanes: GGX, of visible normals ---------------------------------------------------- */
 
-static bool covers(const struct imp_bsdf *b, uint64_t derivative)
-{
-    return imp__facets_cover(b->self, derivative, ALPHA);
-}
+static bool covers(const struct imp_bsdf *b) { return imp__facets_cover(b->self); }
 
 /* struct view, and what facet_of makes of it. */
 struct views {
@@ -214,7 +211,7 @@ static struct views views_of(const struct imp_wide_color *in, const imp_wide3 *w
     return v;
 }
 
-static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
+static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                    const struct imp_wide_color *in, const imp_wide3 *wo,
                                    const imp_wide u[3], imp_wide3 *wi,
                                    imp_wide_lobe *lobe)
@@ -224,7 +221,8 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
     imp_wide au, av, cos_t, eta_t;
     (void)lobe;
     imp__roughness_lanes(b->self, &in[ALPHA], &au, &av);
-    const imp_wide3 m = imp__ggx_normals(au, av, &v.wo, &u[1]);
+    const imp_wide3 m = imp__ggx_normals(
+        au, av, imp__roughness_wanted(b->self, derivative, ALPHA), &v.wo, &u[1]);
     const imp_wide c = imp__wide3_inner(v.wo, m);
     const imp_wide_truth reflects =
         u[0] < IMP_WIDE_OF(imp__dielectric)(imp__wide_lesser(c, imp__wide(1)), v.e,
@@ -239,9 +237,9 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
     return (v.wo.z > zero) & (c > zero) & kept;
 }
 
-static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                               const imp_wide3 *wo, const imp_wide3 *wi,
-                               const imp_wide_lobe *lobe, int colors,
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
+                               const struct imp_wide_color *in, const imp_wide3 *wo,
+                               const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
                                struct imp_wide_color *f)
 {
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
@@ -265,7 +263,8 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_c
                                          (1 - F) * DG * om * -im / (v.wo.z * n * n));
     for (int c = 0; c < colors; c++)
         f->c[c] = imp__wide_choose(v.reflects, in[TINT_R].c[c], in[TINT_T].c[c]) * of;
-    const imp_wide p = imp__ggx_normals_pdf(&v.wo, vm, D, Go);
+    const imp_wide p = imp__ggx_normals_pdf(
+        au, av, imp__roughness_wanted(b->self, derivative, ALPHA), &v.wo, &m, vm, D, Go);
     return imp__wide_choose(there,
                             imp__wide_choose(v.reflects, F * p / (4 * om),
                                              (1 - F) * p * v.e * v.e * -im / (n * n)),

@@ -38,17 +38,23 @@ static inline struct imp__microfacet imp__roughness_at(const struct imp__roughne
     return (struct imp__microfacet){r->type, r->visible, imp_max(au, IMP_ALPHA_MIN),
                                     imp_max(av, IMP_ALPHA_MIN), 0};
 }
-/* The same for drawing directions: with the derivatives that d wants. The first of the three
- * inputs has bit `first`. */
+/* Derivatives that are wanted (imp_dirs), those by roughness (enum imp__score). The first of the
+ * three inputs has bit `first`. */
+static inline unsigned imp__roughness_wanted(const struct imp__roughness *r,
+                                             uint64_t derivative, int first)
+{
+    const unsigned by = (unsigned)(derivative >> first) & 7;
+    return !r->anisotropic ? (by & 1 ? IMP_SCORE_SCALE : 0)
+                           : (by & 2 ? IMP_SCORE_U : 0) | (by & 4 ? IMP_SCORE_V : 0);
+}
+/* The same for drawing directions: with the derivatives that d wants. */
 static inline struct imp__microfacet imp__roughness_drawn(const struct imp__roughness *r,
                                                           const imp_spec *in,
                                                           const struct imp_dirs *d,
                                                           int first)
 {
     struct imp__microfacet f = imp__roughness_at(r, in);
-    const unsigned by = (unsigned)(d->derivative >> first) & 7;
-    f.wanted = !r->anisotropic ? (by & 1 ? IMP_SCORE_SCALE : 0)
-                               : (by & 2 ? IMP_SCORE_U : 0) | (by & 4 ? IMP_SCORE_V : 0);
+    f.wanted = imp__roughness_wanted(r, d->derivative, first);
     return f;
 }
 

@@ -80,12 +80,16 @@ static struct at at_inputs(const struct imp_bsdf *b, const imp_spec *in)
     return (struct at){p, {p->type, p->visible, alpha, alpha, 0}, alpha, in[ETA][0]};
 }
 
+static unsigned wanted_of(uint64_t derivative)
+{
+    return derivative & IMP_INPUT_BIT(ALPHA) ? IMP_SCORE_SCALE : 0;
+}
 /* The same, for drawing directions. */
 static struct at at_drawn(const struct imp_bsdf *b, const imp_spec *in,
                           const struct imp_dirs *d)
 {
     struct at a = at_inputs(b, in);
-    if (d->derivative & IMP_INPUT_BIT(ALPHA)) a.facets.wanted = IMP_SCORE_SCALE;
+    a.facets.wanted = wanted_of(d->derivative);
     return a;
 }
 
@@ -94,13 +98,13 @@ static double number(const struct at *a, imp__dual x)
     return imp__coat_at(&a->p->coat, x, a->alpha, a->eta);
 }
 
-/* Probability of the lobe of facets. */
+/* Probability of the lobe of facets. Its own inputs: */
+#define OF_FACETS (IMP_INPUT_BIT(TINT) | IMP_INPUT_BIT(ALPHA))
 static double facet_chance(const struct at *a, const imp_spec *in,
                            const struct imp_dirs *d)
 {
     const double T = imp_clamp(number(a, imp__coat_T(&a->p->coat, d->wo[2])), 0, 1);
-    return imp__coated_chance(in[TINT], in[DIFFUSE], d, 1 - T,
-                              IMP_INPUT_BIT(TINT) | IMP_INPUT_BIT(ALPHA));
+    return imp__coated_chance(in[TINT], in[DIFFUSE], d, 1 - T, OF_FACETS);
 }
 
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
@@ -240,10 +244,10 @@ const struct imp_bsdf_ops imp__roughplastic = {.size = sizeof(struct imp_bsdf_op
 
 /* ---- In lanes: GGX, of visible normals ---------------------------------------------------- */
 
-static bool covers(const struct imp_bsdf *b, uint64_t derivative)
+static bool covers(const struct imp_bsdf *b)
 {
     const struct roughplastic *p = b->self;
-    return derivative == 0 && p->type == IMP_GGX && p->visible;
+    return p->type == IMP_GGX && p->visible;
 }
 
 /* Roughness and index are numbers, the same in all lanes. */
@@ -280,22 +284,24 @@ static imp_wide lets_through(const struct at *a, imp_wide mu)
     return own[0] + own[1] * d_alpha + own[2] * d_eta;
 }
 
-static imp_wide facet_chances(const struct imp_wide_color *in, imp_wide through)
+static imp_wide facet_chances(const struct imp_wide_color *in, uint64_t derivative,
+                              imp_wide through)
 {
     const imp_wide T =
         imp__wide_larger(imp__wide_lesser(through, imp__wide(1)), imp__wide(0));
-    return imp__coated_chances(&in[TINT], &in[DIFFUSE], 1 - T);
+    return imp__coated_chances(&in[TINT], &in[DIFFUSE], derivative, 1 - T, OF_FACETS);
 }
 
-static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
+static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                    const struct imp_wide_color *in, const imp_wide3 *wo,
                                    const imp_wide u[3], imp_wide3 *wi,
                                    imp_wide_lobe *lobe)
 {
     const struct at a = at_lanes(b, in);
     const imp_wide alpha = imp__wide(a.alpha);
-    const imp_wide_truth facets = u[0] < facet_chances(in, lets_through(&a, wo->z));
-    const imp_wide3 h = imp__ggx_normals(alpha, alpha, wo, &u[1]);
+    const imp_wide_truth facets =
+        u[0] < facet_chances(in, derivative, lets_through(&a, wo->z));
+    const imp_wide3 h = imp__ggx_normals(alpha, alpha, wanted_of(derivative), wo, &u[1]);
     const imp_wide c = imp__wide3_inner(*wo, h);
     const imp_wide_truth drawn = imp__lambert_samples(u, wo, wi);
     (void)lobe;
@@ -303,9 +309,9 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
     return imp__fronts(wo, wi) & ((facets & (c > imp__wide(0))) | (~facets & drawn));
 }
 
-static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                               const imp_wide3 *wo, const imp_wide3 *wi,
-                               const imp_wide_lobe *lobe, int colors,
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
+                               const struct imp_wide_color *in, const imp_wide3 *wo,
+                               const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
                                struct imp_wide_color *f)
 {
     const struct at a = at_lanes(b, in);
@@ -328,11 +334,13 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_c
         const imp_wide again = 1 / (1 - (a.p->nonlinear ? rho : imp__wide(1)) * R);
         f->c[c] = in[TINT].c[c] * facets + rho * again * base;
     }
-    const imp_wide q = facet_chances(in, To);
-    return imp__wide_choose(imp__fronts(wo, wi),
-                            q * imp__ggx_normals_pdf(wo, vm, D, Go) / (4 * vm) +
-                                (1 - q) * lambert,
-                            imp__wide(0));
+    const imp_wide q = facet_chances(in, derivative, To);
+    return imp__wide_choose(
+        imp__fronts(wo, wi),
+        q * imp__ggx_normals_pdf(alpha, alpha, wanted_of(derivative), wo, &h, vm, D, Go) /
+                (4 * vm) +
+            (1 - q) * lambert,
+        imp__wide(0));
 }
 
 const struct imp_bsdf_lanes imp__roughplastic_lanes = {

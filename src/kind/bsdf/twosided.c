@@ -182,12 +182,10 @@ const struct imp_bsdf_ops imp__twosided = {.size = sizeof(struct imp_bsdf_ops),
 
 /* ---- In lanes ---------------------------------------------------------------------------- */
 
-static bool covers(const struct imp_bsdf *b, uint64_t derivative)
+static bool covers(const struct imp_bsdf *b)
 {
     for (int k = 0; k < b->n_child; k++)
-        if (!imp__bsdf_lanes(b->child[k],
-                             imp_wanted_of_child(derivative, b->child_in[k])))
-            return false;
+        if (!imp__bsdf_lanes(b->child[k])) return false;
     return true;
 }
 
@@ -205,7 +203,7 @@ static bool is_asked(const struct imp_bsdf *b, int k, imp_wide_truth back)
            (k > 0 ? bits != 0 : bits != imp__bits_first(IMP_WIDE_LANES));
 }
 
-static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
+static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                    const struct imp_wide_color *in, const imp_wide3 *wo,
                                    const imp_wide u[3], imp_wide3 *wi,
                                    imp_wide_lobe *lobe)
@@ -218,8 +216,9 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
         imp_wide3 own;
         imp_wide_lobe way = imp__wide_smooth();
         if (!is_asked(b, k, back)) continue;
-        const imp_wide_truth some = imp__bsdf_lanes(c, 0)->sample(c, in + b->child_in[k],
-                                                                  &seen, u, &own, &way),
+        const imp_wide_truth some = imp__bsdf_lanes(c)->sample(
+                                 c, imp_wanted_of_child(derivative, b->child_in[k]),
+                                 in + b->child_in[k], &seen, u, &own, &way),
                              here = k > 0 ? back : ~(imp_wide_truth){0};
         own = flips(&own, back);
         *lobe = (*lobe & ~here) | (way & here);
@@ -229,9 +228,9 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b,
     return drawn;
 }
 
-static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                               const imp_wide3 *wo, const imp_wide3 *wi,
-                               const imp_wide_lobe *lobe, int colors,
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
+                               const struct imp_wide_color *in, const imp_wide3 *wo,
+                               const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
                                struct imp_wide_color *f)
 {
     const imp_wide_truth back = wo->z < imp__wide(0);
@@ -241,8 +240,9 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_c
         const struct imp_bsdf *c = b->child[k];
         struct imp_wide_color own;
         if (!is_asked(b, k, back)) continue;
-        const imp_wide p = imp__bsdf_lanes(c, 0)->pdf_eval(c, in + b->child_in[k], &o, &i,
-                                                           lobe, colors, &own);
+        const imp_wide p = imp__bsdf_lanes(c)->pdf_eval(
+            c, imp_wanted_of_child(derivative, b->child_in[k]), in + b->child_in[k], &o,
+            &i, lobe, colors, &own);
         const imp_wide_truth here = k > 0 ? back : ~(imp_wide_truth){0};
         pdf = imp__wide_choose(here, p, pdf);
         for (int j = 0; j < colors; j++)
@@ -254,7 +254,7 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, const struct imp_wide_c
 static bool even(const struct imp_bsdf *b)
 {
     for (int k = 0; k < b->n_child; k++) {
-        const struct imp_bsdf_lanes *child = imp__bsdf_lanes(b->child[k], 0);
+        const struct imp_bsdf_lanes *child = imp__bsdf_lanes(b->child[k]);
         if (!child || !child->even || !child->even(b->child[k])) return false;
     }
     return true;

@@ -75,18 +75,18 @@ IMP_LANES_INLINE imp_wide imp__kernel_pdf_eval(const struct imp_bin *bin,
                                                const int colors, const bool any,
                                                struct imp_wide_color *f)
 {
-    return any && !bin->kernel
-               ? imp__lone_pdf_eval(bin, v, wo, wi, lobe, of & v->on, f)
-               : bin->kernel->pdf_eval(bin->bsdf, v->in, wo, wi, lobe, colors, f);
+    return any && !bin->kernel ? imp__lone_pdf_eval(bin, v, wo, wi, lobe, of & v->on, f)
+                               : bin->kernel->pdf_eval(bin->bsdf, bin->derivative, v->in,
+                                                       wo, wi, lobe, colors, f);
 }
 IMP_LANES_INLINE imp_wide_truth imp__kernel_sample(const struct imp_bin *bin,
                                                    const struct imp_lanes_vertices *v,
                                                    const imp_wide u[3], const bool any,
                                                    imp_wide3 *wi, imp_wide_lobe *lobe)
 {
-    return any && !bin->kernel
-               ? imp__lone_sample(bin, v, u, wi, lobe)
-               : bin->kernel->sample(bin->bsdf, v->in, &v->wo_drawn, u, wi, lobe);
+    return any && !bin->kernel ? imp__lone_sample(bin, v, u, wi, lobe)
+                               : bin->kernel->sample(bin->bsdf, bin->derivative, v->in,
+                                                     &v->wo_drawn, u, wi, lobe);
 }
 IMP_LANES_INLINE imp_wide imp__kernel_index_ratio(const struct imp_bin *bin,
                                                   const struct imp_lanes_vertices *v,

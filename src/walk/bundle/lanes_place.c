@@ -32,7 +32,7 @@ bool imp__shape_is_even(const struct imp_tracer *tracer, int shape)
 {
     const struct imp_scene *scene = tracer->scene;
     const struct imp_bsdf *b = imp__shape_bsdf(scene, scene->shapes[shape]);
-    return imp__shape_in_lanes(tracer, shape) && is_even(b, imp__bsdf_lanes(b, 0));
+    return imp__shape_in_lanes(tracer, shape) && is_even(b, imp__bsdf_lanes(b));
 }
 
 /* The input, or that of which it is the luminance. */
@@ -59,7 +59,7 @@ void imp__shape_bin(const struct imp_tracer *tracer, int shape, struct imp_bin *
     bin->bsdf = b;
     bin->surface = imp__shape_lanes(s);
     bin->derivative = active && b->index >= 0 ? active->inputs[b->index] : 0;
-    bin->kernel = imp__bsdf_lanes(b, bin->derivative);
+    bin->kernel = imp__bsdf_lanes(b);
     bin->even = is_even(b, bin->kernel);
     bin->plain = bin->spectra = true;
     for (int j = 0; j < b->n_in; j++) {

@@ -14,21 +14,22 @@ static const struct imp_phase *phase_of(const struct imp_bsdf *b)
     return m->phase;
 }
 
-static imp_wide_truth sample(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                             const imp_wide3 *wo, const imp_wide u[3], imp_wide3 *wi,
-                             imp_wide_lobe *lobe)
+static imp_wide_truth sample(const struct imp_bsdf *b, uint64_t derivative,
+                             const struct imp_wide_color *in, const imp_wide3 *wo,
+                             const imp_wide u[3], imp_wide3 *wi, imp_wide_lobe *lobe)
 {
-    (void)in, (void)lobe;
+    (void)derivative, (void)in, (void)lobe;
     *wi = imp__phase_lanes(phase_of(b))->sample(phase_of(b), wo, u);
     return ~(imp_wide_truth){0};
 }
 
 /* in[0]: the albedo */
-static imp_wide pdf_eval(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                         const imp_wide3 *wo, const imp_wide3 *wi,
-                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *f)
+static imp_wide pdf_eval(const struct imp_bsdf *b, uint64_t derivative,
+                         const struct imp_wide_color *in, const imp_wide3 *wo,
+                         const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
+                         struct imp_wide_color *f)
 {
-    (void)lobe;
+    (void)derivative, (void)lobe;
     const imp_wide p = imp__phase_lanes(phase_of(b))->value(phase_of(b), wo, wi);
     for (int c = 0; c < colors; c++) f->c[c] = p * in[0].c[c];
     return p;
