@@ -77,10 +77,12 @@ void imp__tally_batch(struct imp_tally *t, int b)
     for (size_t k = 0; k < t->touched_triples.n; k++) {
         const size_t number = t->touched_triples.index[k];
         struct imp__tally_triple *e = &t->triples[number];
-        e->sum += e->batch;
-        e->square += e->batch * e->batch;
-        if (R) t->triples_of_tile[number * R + at] += e->batch;
-        e->batch = (imp_spec){0};
+        for (int c = 0; c < 3; c++) {
+            e->sum[c] += e->batch[c];
+            e->square[c] += e->batch[c] * e->batch[c];
+            if (R) t->triples_of_tile[number * R + at][c] += e->batch[c];
+            e->batch[c] = 0;
+        }
     }
     for (size_t k = 0; k < t->touched_singles.n; k++) {
         const size_t number = t->touched_singles.index[k];
@@ -107,12 +109,11 @@ void imp__tally_pixel(struct imp_tally *t, double replicates, double by_mean,
     }
     for (size_t k = 0; k < t->touched_triples.n; k++) {
         struct imp__tally_triple *e = &t->triples[t->touched_triples.index[k]];
-        const imp_spec spread = e->square - e->sum * e->sum * r;
         for (int c = 0; c < 3; c++) {
             e->mean[c] += by_mean * e->sum[c];
-            e->variance[c] += by_variance * spread[c];
+            e->variance[c] += by_variance * (e->square[c] - e->sum[c] * e->sum[c] * r);
+            e->sum[c] = e->square[c] = 0;
         }
-        e->sum = e->square = (imp_spec){0};
         e->touched = false;
     }
     for (size_t k = 0; k < t->touched_singles.n; k++) {
@@ -134,8 +135,10 @@ void imp__tally_error(struct imp_tally *t)
     }
     for (size_t k = 0; k < t->touched_triples.n; k++) {
         struct imp__tally_triple *e = &t->triples[t->touched_triples.index[k]];
-        for (int c = 0; c < 3; c++) e->variance[c] += e->error[c] * e->error[c];
-        e->error = (imp_spec){0};
+        for (int c = 0; c < 3; c++) {
+            e->variance[c] += e->error[c] * e->error[c];
+            e->error[c] = 0;
+        }
     }
     for (size_t k = 0; k < t->touched_singles.n; k++) {
         struct imp__tally_single *e = &t->singles[t->touched_singles.index[k]];

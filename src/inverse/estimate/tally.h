@@ -19,12 +19,13 @@
 #define IMP_TALLY_FULL  16384
 
 struct imp__tally_triple { /* three adjacent values */
-    /* Sums of the present pixel. What an addition needs is on one cache line. */
-    imp_spec batch;
+    /* Sums of the present pixel. What additions need is on one cache line. */
+    _Alignas(IMP_CACHE_LINE) double batch[3];
+    double error[3];
     uint32_t key;
     bool touched;
-    _Alignas(IMP_CACHE_LINE) imp_spec error;
-    imp_spec sum, square;
+    _Alignas(IMP_CACHE_LINE) double sum[3];
+    double square[3];
     double mean[3], variance[3]; /* of the tile so far */
 };
 struct imp__tally_single {

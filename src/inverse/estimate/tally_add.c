@@ -170,10 +170,13 @@ static bool touch(struct imp_tally *t, struct imp__tally_list *list, size_t entr
 static inline void entry_to(struct imp_tally *t, size_t k, bool single, bool error,
                             const imp_spec *bar)
 {
-    if (single)
+    if (single) {
         *(error ? &t->singles[k].error : &t->singles[k].batch) +=
             imp__sum_used(*bar, t->lanes);
-    else *(error ? &t->triples[k].error : &t->triples[k].batch) += *bar;
+    } else {
+        double *sum = error ? t->triples[k].error : t->triples[k].batch;
+        for (int c = 0; c < 3; c++) sum[c] += (*bar)[c];
+    }
 }
 
 /* The first addition of a pixel to an entry, which the tile may not have yet. */
