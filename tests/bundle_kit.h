@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Walks in bundles (walk/bundle/) beside the same walks alone: radiance, film position, alpha, the
- * cause of a drop, and every number of a record, to the bit. */
+ * cause of a drop, every number of a record, and what sweeps give, to the bit. */
 #ifndef IMP_TESTS_BUNDLE_KIT_H
 #define IMP_TESTS_BUNDLE_KIT_H
 
@@ -9,7 +9,7 @@
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "inverse/estimate/lamp_levels.h"
-#include "walk/bundle/depth.h"
+#include "walk/bundle/swept.h"
 
 enum { SIDE = 6, SAMPLES = 21 }; /* neither is a multiple of lanes */
 
@@ -142,6 +142,75 @@ static int compared(const struct imp_tracer *tracer, int *lit)
     return wrong;
 }
 
+/* ---- Sweeps ------------------------------------------------------------------------------ */
+
+enum { NUMBERS_MOST = 1 << 16 };
+struct into {
+    struct imp_sink sink; /* first */
+    const struct imp_active *active;
+    double *sum; /* [NUMBERS_MOST] */
+};
+static void add_into(struct imp_sink *sink, int param, size_t element, int channels,
+                     const imp_spec *bar)
+{
+    const struct into *to = (struct into *)sink;
+    const int64_t base = to->active->base[param];
+    if (base < 0) return;
+    double *sum = to->sum + base + element;
+    for (int c = 0; channels == 3 && c < 3; c++) sum[c] += (*bar)[c];
+    if (channels != 3) *sum += (*bar)[0] + (*bar)[1] + (*bar)[2] + (*bar)[3];
+}
+
+/* Walks of a bundle that keeps what is swept, beside the same alone: of so many numbers those differ that
+ * sweeps with one adjoint and with two give. *some: those that are not 0. -1: the bundle keeps records. */
+static int swept(struct imp_tracer tracer, int *some)
+{
+    static double sums[2][3][NUMBERS_MOST];
+    const size_t n = tracer.active->n;
+    struct imp_arena arena, alone;
+    struct imp_bundle b;
+    int xy[SIDE * SIDE][2], wrong = 0;
+    int64_t samples[SAMPLES];
+    struct into to[2][3];
+    for (int i = 0; i < 6; i++) {
+        to[i / 3][i % 3] =
+            (struct into){{.add = add_into},
+                          tracer.active,
+                          memset(sums[i / 3][i % 3], 0, sizeof(sums[0][0]))};
+    }
+    imp__arena_init(&arena, ctx);
+    imp__arena_init(&alone, ctx);
+    tracer.swept_only = true;
+    for (int p = 0; p < SIDE * SIDE; p++) xy[p][0] = p % SIDE, xy[p][1] = p / SIDE;
+    for (int k = 0; k < SAMPLES; k++) samples[k] = imp__set_number(4, SAMPLES, k);
+    const bool made = imp__bundle_fits(&tracer) &&
+                      imp__bundle_trace(&tracer, &arena, SIDE * SIDE, (const int(*)[2])xy,
+                                        SAMPLES, samples, &b) &&
+                      b.swept;
+    for (int k = 0; made && k < b.n; k++) {
+        struct imp_walk walk[2];
+        const int *at = xy[k / SAMPLES];
+        const imp_spec P = {.3 + k % 5, -1.7, 2.1 / (1 + k)}, Q = {-.4, k % 3, .01 * k};
+        imp__walk_trace(&tracer, &alone, at[0], at[1], samples[k % SAMPLES], &walk[0]);
+        imp__bundle_walk(&b, k, &walk[1]);
+        wrong += walk[0].n != walk[1].n;
+        for (int i = 0; i < 2; i++) {
+            imp__walk_sweep(&tracer, &walk[i], Q, &to[i][0].sink);
+            imp__walk_sweep_both(&tracer, &walk[i], P, Q, &to[i][1].sink, &to[i][2].sink);
+        }
+        imp__arena_rewind(&alone, (struct imp_arena_mark){0});
+    }
+    *some = 0;
+    for (size_t j = 0; j < 3 * n; j++) {
+        const double x = sums[0][j / n][j % n], y = sums[1][j / n][j % n];
+        wrong += !same(x, y);
+        *some += x != 0;
+    }
+    imp__arena_free(&arena);
+    imp__arena_free(&alone);
+    return made ? wrong : -1;
+}
+
 /* lanes: so many shapes have vertices in lanes; -1: any number. */
 static void compare(const char *name, enum imp_color_mode mode, int lanes,
                     const char *integrator, const char *sensor, const char *rest)
@@ -192,6 +261,11 @@ static void compare(const char *name, enum imp_color_mode mode, int lanes,
         tap_ok(values == 0 && records == (strstr(integrator, "volpath") ? -1 : 0),
                "... with derivatives%s: %d differ, and of those that are recorded %d",
                alone ? " by one parameter" : "", values, records);
+        int some = 0;
+        const int sums = active.n <= NUMBERS_MOST ? swept(tracer, &some) : 1;
+        const bool kept = !strstr(integrator, "volpath") && !strstr(sensor, "meter");
+        tap_ok(sums == (kept ? 0 : -1) && (alone || !kept || some > 0),
+               "... swept: of %d numbers that are not 0, %d differ", some, sums);
         imp__active_destroy(ctx, &active);
     }
     imp__lamp_levels_end(&levels);

@@ -145,6 +145,11 @@ struct imp_bsdf_lanes {
                          const struct imp_wide_color *in, const imp_wide3 *wo,
                          const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
                          struct imp_wide_color *f);
+    /* imp_bsdf_ops.eval_d, of kinds with smooth lobes alone; d [n_in]. False: this one has none. NULL: none
+     * has. */
+    bool (*eval_d)(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                   const imp_wide3 *wo, const imp_wide3 *wi, int colors,
+                   struct imp_wide_color *d);
     /* imp_bsdf_ops.index_ratio, of kinds that have one. */
     imp_wide (*index_ratio)(const struct imp_bsdf *b, const struct imp_wide_color *in,
                             const imp_wide3 *wo, const imp_wide3 *wi,

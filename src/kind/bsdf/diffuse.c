@@ -91,11 +91,23 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
     return p;
 }
 
+static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                         const imp_wide3 *wo, const imp_wide3 *wi, int colors,
+                         struct imp_wide_color *d)
+{
+    (void)b, (void)in;
+    const imp_wide p = imp__lamberts(wo, wi);
+    for (int c = 0; c < colors; c++) d[RHO].c[c] = p;
+    return true;
+}
+
 static bool even(const struct imp_bsdf *b)
 {
     (void)b;
     return true;
 }
 
-const struct imp_bsdf_lanes imp__diffuse_lanes = {
-    .sample = sample_lanes, .pdf_eval = pdf_eval_lanes, .even = even};
+const struct imp_bsdf_lanes imp__diffuse_lanes = {.sample = sample_lanes,
+                                                  .pdf_eval = pdf_eval_lanes,
+                                                  .eval_d = eval_d_lanes,
+                                                  .even = even};

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * GGX (microfacet.h), a text in lanes (math/lane_text.h): D of normals m, and G1 of directions v. */
+ * GGX (microfacet.h), a text in lanes (math/lane_text.h): D of normals m, and G1 of directions v, with
+ * d ln D and dG1 by au and av. */
 
 static inline real WIDE(imp__ggx_d)(real au, real av, real3 m)
 {
@@ -13,4 +14,22 @@ static inline real WIDE(imp__ggx_g1)(real au, real av, real3 v)
 {
     const real z2 = v.z * v.z, x2 = v.x * v.x / z2, y2 = v.y * v.y / z2;
     return 2 / (1 + root_of(1 + (au * au * x2 + av * av * y2)));
+}
+
+static inline void WIDE(imp__ggx_d_log)(real au, real av, real3 m, real d[2])
+{
+    const real x = m.x / au, y = m.y / av, z = m.z;
+    const real s = (x * x + y * y) + z * z;
+    d[0] = choose(z > 0, (4 * x * x / s - 1) / au, number(0));
+    d[1] = choose(z > 0, (4 * y * y / s - 1) / av, number(0));
+}
+
+static inline real WIDE(imp__ggx_g1_d)(real au, real av, real3 v, real d[2])
+{
+    const real z2 = v.z * v.z, x2 = v.x * v.x / z2, y2 = v.y * v.y / z2;
+    const real r = root_of(1 + (au * au * x2 + av * av * y2)), g = 2 / (1 + r);
+    const real slope = -0.5 * g * g / (2 * r);
+    d[0] = slope * 2 * au * x2;
+    d[1] = slope * 2 * av * y2;
+    return g;
 }

@@ -187,5 +187,46 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative
     return imp__fronts(wo, wi) & (c > imp__wide(0));
 }
 
-const struct imp_bsdf_lanes imp__roughconductor_lanes = {
-    .covers = covers, .sample = sample_lanes, .pdf_eval = pdf_eval_lanes};
+static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                         const imp_wide3 *wo, const imp_wide3 *wi, int colors,
+                         struct imp_wide_color *d)
+{
+    const struct imp__roughness *r = b->self;
+    const imp_wide zero = imp__wide(0);
+    imp_wide au, av, dlog_D[2], dGi[2], dGo[2];
+    imp__roughness_lanes(r, &in[ALPHA], &au, &av);
+    const imp_wide3 h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
+    const imp_wide Gi = IMP_WIDE_OF(imp__ggx_g1_d)(au, av, *wi, dGi),
+                   Go = IMP_WIDE_OF(imp__ggx_g1_d)(au, av, *wo, dGo);
+    IMP_WIDE_OF(imp__ggx_d_log)(au, av, h, dlog_D);
+    const imp_wide c = imp__wide_choose(
+        imp__fronts(wo, wi), IMP_WIDE_OF(imp__ggx_d)(au, av, h) / (4 * wo->z), zero);
+    imp_wide by[2];
+    for (int j = 0; j < 2; j++) {
+        const int input = r->anisotropic ? ALPHA_U + j : ALPHA;
+        by[j] = c * (dlog_D[j] * Gi * Go + dGi[j] * Go + Gi * dGo[j]);
+        by[j] = imp__wide_choose(imp__fronts(wo, wi) & ~(in[input].c[0] < IMP_ALPHA_MIN),
+                                 by[j], zero);
+    }
+    const imp_wide om = imp__wide_lesser(imp__wide3_inner(*wo, h), imp__wide(1)),
+                   all = c * Gi * Go;
+    for (int k = 0; k < colors; k++) {
+        const imp_wide tint = in[TINT].c[k];
+        imp_wide F_eta, F_k;
+        const imp_wide F =
+            IMP_WIDE_OF(imp__conductor_d)(om, in[ETA].c[k], in[K].c[k], &F_eta, &F_k);
+        d[TINT].c[k] = F * all;
+        d[ETA].c[k] = tint * F_eta * all;
+        d[K].c[k] = tint * F_k * all;
+        const imp_wide of = tint * F;
+        d[ALPHA].c[k] = r->anisotropic ? zero : of * by[0] + of * by[1];
+        d[ALPHA_U].c[k] = r->anisotropic ? of * by[0] : zero;
+        d[ALPHA_V].c[k] = r->anisotropic ? of * by[1] : zero;
+    }
+    return true;
+}
+
+const struct imp_bsdf_lanes imp__roughconductor_lanes = {.covers = covers,
+                                                         .sample = sample_lanes,
+                                                         .pdf_eval = pdf_eval_lanes,
+                                                         .eval_d = eval_d_lanes};

@@ -251,6 +251,29 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
     return pdf;
 }
 
+static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                         const imp_wide3 *wo, const imp_wide3 *wi, int colors,
+                         struct imp_wide_color *d)
+{
+    const imp_wide zero = imp__wide(0);
+    const imp_wide_truth back = wo->z < zero;
+    const imp_wide3 o = flips(wo, back), i = flips(wi, back);
+    for (int k = 0; k < b->n_child; k++) {
+        const struct imp_bsdf *c = b->child[k];
+        const struct imp_bsdf_lanes *lanes = imp__bsdf_lanes(c);
+        struct imp_wide_color *own = d + b->child_in[k];
+        const imp_wide_truth all = ~(imp_wide_truth){0}, here = b->n_child == 1 ? all
+                                                                : k > 0         ? back
+                                                                                : ~back;
+        if (!lanes->eval_d || !lanes->eval_d(c, in + b->child_in[k], &o, &i, colors, own))
+            return false;
+        for (int j = 0; b->n_child > 1 && j < c->n_in; j++)
+            for (int m = 0; m < colors; m++)
+                own[j].c[m] = imp__wide_choose(here, own[j].c[m], zero);
+    }
+    return true;
+}
+
 static bool even(const struct imp_bsdf *b)
 {
     for (int k = 0; k < b->n_child; k++) {
@@ -260,5 +283,8 @@ static bool even(const struct imp_bsdf *b)
     return true;
 }
 
-const struct imp_bsdf_lanes imp__twosided_lanes = {
-    .covers = covers, .sample = sample_lanes, .pdf_eval = pdf_eval_lanes, .even = even};
+const struct imp_bsdf_lanes imp__twosided_lanes = {.covers = covers,
+                                                   .sample = sample_lanes,
+                                                   .pdf_eval = pdf_eval_lanes,
+                                                   .eval_d = eval_d_lanes,
+                                                   .even = even};

@@ -4,6 +4,7 @@
  * through the kinds' functions, and back. */
 #include "in_media.h"
 #include "reuse.h"
+#include "swept.h"
 #include "walk/media/tracking.h"
 #include "walk/path/sensor_end.h"
 #include "walk/path/surface_sensor.h"
@@ -164,13 +165,15 @@ static void vertex_give_back(struct imp_depth *d, struct imp_vertex *v, bool goe
     if (d->lone->shadow.wanted)
         shadow_add(d->shadows, d->lone, s->walk->time, walk, at, v);
     if (goes_on) ray_add(d->next, s, walk, at);
+    if (d->bundle->swept) imp__swept_alone(d->bundle, walk, at, IMP_SWEPT_ALONE, v);
     give_back(d, walk);
 }
 
 /* What is recorded stays. */
 static void forget(const struct imp_depth *d, struct imp_arena_mark mark)
 {
-    if (!d->bundle->walks) imp__arena_rewind(d->lone->step.arena, mark);
+    if (!d->bundle->walks && !d->bundle->swept)
+        imp__arena_rewind(d->lone->step.arena, mark);
 }
 
 void imp__vertex_alone(struct imp_depth *d, int i, int at)
@@ -270,14 +273,29 @@ void imp__meter_vertex(struct imp_depth *d, const struct imp_walk *begun, int wa
     forget(d, mark);
 }
 
+/* A vertex of its own. */
+static void sky_swept(struct imp_depth *d, int i, imp_spec met)
+{
+    struct imp_bundle_values *values = d->values;
+    const int colors = d->bundle->colors, at = values->n++;
+    const imp_spec none = {0};
+    imp__color_put(values->e, colors, at, met);
+    imp__color_put(values->b, colors, at, none);
+    imp__color_put(values->w, colors, at, none);
+    imp__color_put(values->beyond, colors, at, none);
+    values->up[at] = d->rays->up[i];
+    imp__swept_alone(d->bundle, d->rays->walk[i], at, IMP_SWEPT_SKY, d->lone->walk.first);
+}
+
 void imp__sky_alone(struct imp_depth *d, int i, double *const beyond[4])
 {
     const struct imp_arena_mark mark = imp__arena_mark(d->lone->step.arena);
     take(d, i);
     imp__sky_meet(&d->lone->step);
     if (d->bundle->walks) return;
-    imp__color_put(beyond, d->bundle->colors, d->rays->up[i],
-                   imp__walk_fold(&d->lone->walk));
+    const imp_spec met = imp__walk_fold(&d->lone->walk);
+    if (d->bundle->swept) sky_swept(d, i, met);
+    else imp__color_put(beyond, d->bundle->colors, d->rays->up[i], met);
     give_back(d, d->rays->walk[i]);
-    imp__arena_rewind(d->lone->step.arena, mark);
+    forget(d, mark);
 }

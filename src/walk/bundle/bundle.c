@@ -2,13 +2,14 @@
  *
  * A bundle of walks from its pixels to its radiance: rays of the sensor; segment after segment
  * hits, vertices and shadow rays; the fold. Recorded walks have vertices of their own (walk.h) in
- * place of columns of values. */
+ * place of columns of values, or columns of what a sweep takes (swept.h). */
 #include "by_shape.h"
 #include "in_media.h"
 #include "lanes_light.h"
 #include "meter_lanes.h"
 #include "reuse.h"
 #include "scene/ray_columns.h"
+#include "swept.h"
 #include "walk/path/first_segment.h"
 #include <string.h>
 
@@ -44,7 +45,7 @@ static bool bundle_create(struct imp_arena *arena, size_t n, struct imp_bundle *
     return TAKE(b->px) && TAKE(b->py) && TAKE(b->time) && TAKE(b->set) &&
            TAKE(b->index) && TAKE(b->L[0]) && TAKE(b->L[1]) && TAKE(b->L[2]) &&
            TAKE(b->L[3]) && (b->colors == 3 || TAKE(b->waves)) && TAKE(b->valid) &&
-           TAKE(b->dropped) && (b->tracer->value_only || TAKE(b->walks)) &&
+           TAKE(b->dropped) && (b->tracer->value_only || b->swept || TAKE(b->walks)) &&
            (b->tracer->together == 0 || (TAKE(b->alone[0]) && TAKE(b->alone[1]) &&
                                          TAKE(b->alone[2]) && TAKE(b->alone[3]))) &&
            (!crosses_media(b->tracer) || (TAKE(b->keys) && TAKE(b->drew)));
@@ -145,6 +146,7 @@ static void see(struct imp_depth *d, struct room *r)
     imp__occluded_columns(d->bundle->tracer->scene, &r->shadows.ray, r->hidden);
     if (d->bundle->walks) connect(&r->shadows, r->hidden);
     else unlit(d->values, d->bundle->colors, &r->shadows, r->hidden);
+    if (d->bundle->swept) imp__swept_connect(d->bundle, &r->shadows, r->hidden);
     r->shadows.ray.n = 0;
 }
 
@@ -229,10 +231,16 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
 {
     struct room r;
     struct imp_reuse reuse;
+    struct imp_swept *swept = NULL;
     struct imp_depth d = {
         .bundle = b, .hits = &r.hits, .shadows = &r.shadows, .lone = &r.lone};
     struct link *last = NULL, *met_first = NULL; /* met_first: by points that share */
+    if (imp__swept_fits(tracer)) {
+        swept = imp__arena_take(arena, 1, sizeof *swept);
+        if (!swept) return false;
+    }
     *b = (struct imp_bundle){.tracer = tracer,
+                             .swept = swept,
                              .n = n_pixels * n_samples,
                              .all = n_pixels * n_samples,
                              .n_samples = n_samples,
@@ -244,7 +252,9 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
     for (int k = 0; tracer->more && k < n_pixels; k++)
         b->all += imp__reuse_more(tracer, xy[k]) * n_samples;
     const size_t n = (size_t)b->all;
-    if (!bundle_create(arena, n, b) || !room_create(tracer, arena, n, &r)) return false;
+    if (!bundle_create(arena, n, b) || !room_create(tracer, arena, n, &r) ||
+        (swept && !imp__swept_create(arena, b, swept)))
+        return false;
     memset(b->valid, 0, n * sizeof *b->valid);
     memset(b->dropped, 0, n * sizeof *b->dropped);
     for (int c = 0; c < 4; c++) memset(b->L[c], 0, n * sizeof *b->L[c]);
@@ -272,6 +282,8 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
             b->walks ? NULL : link_add(arena, (size_t)d.rays->ray.n, b->colors, last);
         if (!b->walks && !here) return false;
         d.values = here ? &here->values : &r.recorded;
+        if (swept && !imp__swept_deeper(arena, b, (size_t)d.rays->ray.n, d.values))
+            return false;
         d.next->ray.n = 0;
         if (d.media) imp__media_meet(&d, &last->values);
         else if (d.depth == 0 && tracer->integrator->hide_emitters)
@@ -316,5 +328,9 @@ void imp__bundle_walk(const struct imp_bundle *b, int k, struct imp_walk *walk)
     walk->valid = b->valid[k];
     walk->dropped = (enum imp_drop)b->dropped[k];
     walk->waves = b->waves ? b->waves[k] : NULL;
+    if (b->swept) {
+        walk->n = b->swept->count[k];
+        walk->reduced = &b->swept->walks[k].ops;
+    }
     imp__walk_value(b->tracer, walk, imp__column_color(b->L, b->colors, k));
 }

@@ -37,6 +37,7 @@ struct imp_spectrum_kept {
 };
 enum { IMP_SPECTRA_KEPT = 6 };
 
+struct imp_swept;
 struct imp_bundle {
     const struct imp_tracer *tracer;
     int n, n_samples; /* in all, of each pixel */
@@ -60,7 +61,8 @@ struct imp_bundle {
     double *alone[4]; /* where points share: what L is without that */
     bool *valid;
     uint8_t *dropped;
-    struct imp_walk *walks; /* [n] records; NULL: values only */
+    struct imp_walk *walks;  /* [n] records; NULL: values only, or what is swept */
+    struct imp_swept *swept; /* swept.h; NULL: records, or values only */
 };
 
 /* The walks with the given numbers [n_samples] of each of the pixels xy [n_pixels], pixel by pixel.

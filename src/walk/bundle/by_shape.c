@@ -5,6 +5,7 @@
 #include "by_shape.h"
 #include "in_media.h"
 #include "lanes_light.h"
+#include "swept.h"
 
 #define TAKE(p) ((p) = imp__arena_take(arena, n + IMP_COLUMN_SLACK, sizeof *(p)))
 
@@ -66,6 +67,13 @@ static void in_lanes(struct imp_depth *d, const struct imp_bin *bin, const int32
 {
     imp__vertices_in_lanes(d, bin, order, n, d->values->n);
     d->values->n += n;
+}
+
+/* Nothing is met there, and nothing leaves. */
+static void ends(struct imp_depth *d, const int32_t *order, int n)
+{
+    const struct imp_swept *s = d->bundle->swept;
+    for (int i = 0; s && i < n; i++) s->count[d->rays->walk[order[i]]]++;
 }
 
 /* As they come: shapes of groups have numbers of their own. */
@@ -172,8 +180,8 @@ void imp__vertices(struct imp_depth *d, double *const beyond[4], struct imp_by_s
         s->count[shape] = 0;
         if (!imp__shape_in_lanes(tracer, shape)) {
             alone(d, order, n);
-        } else if (d->last && tracer->value_only) {
-            continue; /* nothing is met there, and nothing leaves */
+        } else if (d->last && !d->bundle->walks) {
+            ends(d, order, n);
         } else if (n >= IMP_LANES_FEW) {
             imp__shape_bin(tracer, shape, &bin);
             in_lanes(d, &bin, order, n);

@@ -4,6 +4,7 @@
 #include "kind/shape/shape.h"
 #include "lanes_record.h"
 #include "scene/light_lanes.h"
+#include "swept.h"
 #include "walk/core/emitted.h"
 #include "walk/core/light_point.h"
 
@@ -315,6 +316,24 @@ static imp_wide power_heuristic(imp_wide a, imp_wide b)
     return imp__wide_choose(a2 > imp__wide(0), a2 / (a2 + b2), imp__wide(0));
 }
 
+/* As a vertex, of walks that are swept. */
+static void sky_keep(struct imp_depth *d, const int32_t *order, int n, int light,
+                     const imp_wide3 *wi, const imp_wide *weight,
+                     const struct imp_wide_color *met)
+{
+    struct imp_bundle_values *values = d->values;
+    imp__lanes_keep_sky(d, order, n, values->n, light, wi, weight);
+    for (int k = 0; k < n; k++) {
+        const int at = values->n++;
+        imp__color_put(values->e, 3, at, imp__color_lane(met, 3, k));
+        imp__color_put(values->b, 3, at, imp__spec(0));
+        imp__color_put(values->w, 3, at, imp__spec(0));
+        imp__color_put(values->beyond, 3, at, imp__spec(0));
+        values->up[at] = d->rays->up[order[k]];
+        d->bundle->valid[d->rays->walk[order[k]]] = true;
+    }
+}
+
 static inline void sky_work(struct imp_depth *d, const int32_t *order, int n,
                             double *const beyond[4])
 {
@@ -338,6 +357,10 @@ static inline void sky_work(struct imp_depth *d, const int32_t *order, int n,
     for (int c = 0; c < 3; c++) met.c[c] *= weight;
     if (d->bundle->walks) {
         imp__lanes_record_sky(d, order, n, light, &wi, &weight, &met);
+        return;
+    }
+    if (d->bundle->swept) {
+        sky_keep(d, order, n, light, &wi, &weight, &met);
         return;
     }
     for (int c = 0; c < 3; c++)

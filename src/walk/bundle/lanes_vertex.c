@@ -7,6 +7,7 @@
 #include "lanes_kernel.h"
 #include "math/wide_offset.h"
 #include "reuse.h"
+#include "swept.h"
 
 /* ---- What leaves it ---------------------------------------------------------------------- */
 
@@ -236,6 +237,7 @@ work(struct imp_depth *d, const struct imp_bin *bin, const int32_t *order, int n
     if (v.recorded) {
         imp__lanes_record(d, bin, &v, &lit, &step);
     } else {
+        if (b->swept) imp__lanes_keep(d, bin, &v, &lit, &step);
         const struct imp_wide_color none = imp__wide_color(imp__spec(0));
         color_store(d->values->e, colors, at, &none);
         color_store(d->values->b, colors, at, &lit.brings);

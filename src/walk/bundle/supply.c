@@ -2,11 +2,11 @@
  *
  * Bundles for lists of pixels. */
 #include "supply.h"
-#include "columns.h"
+#include "swept.h"
 
 /* Walks of a bundle, about: enough to fill lanes, few enough for a processor's own cache, in which
  * records need more. A group may be larger than that. */
-enum { VALUES = 512, RECORDS = 160, GROUP_MOST = 1024 };
+enum { VALUES = 512, SWEPT = 256, RECORDS = 160, GROUP_MOST = 1024 };
 
 static int block_add(const struct imp_supply_pixels *p, int x0, int y0, int side,
                      int (*xy)[2], int n)
@@ -24,7 +24,9 @@ bool imp__supply_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
                        const struct imp_supply_pixels *pixels, const int64_t *numbers,
                        int n_numbers, int group, struct imp_supply *out)
 {
-    const int most = tracer && !tracer->value_only ? RECORDS : VALUES;
+    const int most = !tracer || tracer->value_only ? VALUES
+                     : imp__swept_fits(tracer)     ? SWEPT
+                                                   : RECORDS;
     const size_t all =
         (size_t)(pixels->x1 - pixels->x0) * (size_t)(pixels->y1 - pixels->y0);
     if (!tracer || group < 1 || group > GROUP_MOST || n_numbers < 1) return false;

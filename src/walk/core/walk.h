@@ -127,11 +127,15 @@ struct imp_walk {
 };
 
 /* Sweep and tangent of what takes the place of vertices: the first member of struct
- * imp_reduced_of (kept/reduced.h). The arguments are those of imp__walk_sweep_values and
+ * imp_reduced_of (kept/reduced.h) or of struct imp_swept_walk (bundle/swept.h), which has no tangent. The arguments are those of imp__walk_sweep_values and
  * imp__walk_tangent_values. */
 struct imp_reduced_ops {
     void (*sweep)(const struct imp_tracer *tracer, const struct imp_walk *walk,
                   imp_spec adjoint, struct imp_sink *sink);
+    /* Likewise with `ratio` times the adjoint, lane by lane, into a second sink. NULL: swept twice. */
+    void (*both)(const struct imp_tracer *tracer, const struct imp_walk *walk,
+                 imp_spec adjoint, imp_spec ratio, struct imp_sink *sink,
+                 struct imp_sink *second);
     imp_spec (*tangent)(const struct imp_tracer *tracer, const struct imp_walk *walk,
                         imp_dot_fn *dot, const void *x_dot);
 };
@@ -163,6 +167,7 @@ struct imp_tracer {
     uint64_t seed;
     const struct imp_guide *guide; /* imp__guide_of; NULL: none */
     bool value_only;               /* a walk's L is wanted, and no record of it */
+    bool swept_only; /* ... or what a sweep takes of the record (bundle/swept.h) */
     /* How walks draw the wavelengths they carry; NULL: they carry the scene's colours. */
     const struct imp_wavelengths *wavelengths;
     /* The walks of a pixel: each whole `period` is cut into sets of about `set`

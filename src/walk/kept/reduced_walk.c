@@ -187,12 +187,13 @@ bool imp__reduced_walk(const struct imp_reduced *r, const struct imp_record *rec
         struct imp_reduced_of *of = imp__arena_take(arena, 1, sizeof *of);
         enough = of != NULL;
         if (enough) {
-            *of = (struct imp_reduced_of){{imp__reduced_sweep, imp__reduced_tangent},
-                                          r,
-                                          begin->op,
-                                          begin[1].op - begin->op,
-                                          begin[1].word,
-                                          NULL};
+            *of = (struct imp_reduced_of){
+                {.sweep = imp__reduced_sweep, .tangent = imp__reduced_tangent},
+                r,
+                begin->op,
+                begin[1].op - begin->op,
+                begin[1].word,
+                NULL};
             walk->reduced = &of->ops;
             enough = walk_sum(r, begin, arena, of, &L);
         }

@@ -5,6 +5,7 @@
  * Tangent: derivative and radiance together, from the last vertex to the first. Fold, sweep
  * and tangent differ only in the order in which the product rule is read; sweep and tangent
  * take the same pieces (vertex_pieces.h). */
+#include "sweep.h"
 #include "vertex_pieces.h"
 
 /* ---- d radiance of an emitter / d its inputs ------------------------------------- */
@@ -46,24 +47,10 @@ static inline void emitter_d(const struct imp_emitter *e, const struct imp_activ
 /* ---- Reverse: pieces go to a sink ------------------------------------------------ */
 
 struct reverse {
-    const struct imp_tracer *tracer;
-    struct imp_sink *sink;
+    struct imp_sweep to;
     imp_spec bar[IMP_INPUTS_MAX]; /* of the scatterer's inputs */
     bool any;
-    /* In a sweep with two adjoints: where pieces go with the second, and what that is over the first,
-     * lane by lane. */
-    struct imp_sink *second;
-    imp_spec ratio;
 };
-
-/* Pieces d [n] of inputs, in turn to both sinks. */
-static inline void second_scatter(const struct reverse *r,
-                                  const struct imp_input *const *input, int n,
-                                  const struct imp_texcoord *at, imp_spec *d)
-{
-    for (int j = 0; j < n; j++) d[j] *= r->ratio;
-    imp__inputs_scatter(input, n, at, d, r->second);
-}
 
 static inline __attribute__((always_inline)) void
 emitter_scatter(const struct imp_tracer *tracer, int emitter, struct imp_emission *x,
@@ -81,22 +68,24 @@ void imp__emitter_scatter(const struct imp_tracer *tracer, int emitter,
 {
     emitter_scatter(tracer, emitter, x, at, bar, sink);
 }
+void imp__sweep_emitter(const struct imp_sweep *s, struct imp_emitter_piece *p)
+{
+    const struct imp_emitter *e = s->tracer->scene->emitters[p->emitter];
+    const imp_spec bar = p->adjoint * p->through[0] * p->through[1];
+    imp_spec d[IMP_INPUTS_MAX];
+    emitter_d(e, s->tracer->active, &p->x, &p->at, d);
+    for (int j = 0; j < e->n_in; j++) d[j] *= bar;
+    imp__sweep_inputs(s, e->input, e->n_in, &p->at, d);
+}
 static inline void reverse_emitter(void *taker, struct imp_emitter_piece *p)
 {
     const struct reverse *r = taker;
-    emitter_scatter(r->tracer, p->emitter, &p->x, &p->at,
-                    p->adjoint * p->through[0] * p->through[1], r->sink);
+    emitter_scatter(r->to.tracer, p->emitter, &p->x, &p->at,
+                    p->adjoint * p->through[0] * p->through[1], r->to.sink);
 }
 static inline void both_emitter(void *taker, struct imp_emitter_piece *p)
 {
-    const struct reverse *r = taker;
-    const struct imp_emitter *e = r->tracer->scene->emitters[p->emitter];
-    const imp_spec bar = p->adjoint * p->through[0] * p->through[1];
-    imp_spec d[IMP_INPUTS_MAX];
-    emitter_d(e, r->tracer->active, &p->x, &p->at, d);
-    for (int j = 0; j < e->n_in; j++) d[j] *= bar;
-    imp__inputs_scatter(e->input, e->n_in, &p->at, d, r->sink);
-    second_scatter(r, e->input, e->n_in, &p->at, d);
+    imp__sweep_emitter(&((struct reverse *)taker)->to, p);
 }
 
 static inline void vertex_scatter(const struct imp_tracer *tracer,
@@ -131,16 +120,16 @@ static inline void reverse_scatterer(void *taker, const struct imp_vertex *v,
 static inline void reverse_end(void *taker, const struct imp_vertex *v)
 {
     const struct reverse *r = taker;
-    if (r->any) vertex_scatter(r->tracer, v, r->bar, r->sink);
+    if (r->any) vertex_scatter(r->to.tracer, v, r->bar, r->to.sink);
 }
 
 static inline void both_end(void *taker, const struct imp_vertex *v)
 {
     struct reverse *r = taker;
     if (!r->any) return;
-    vertex_scatter(r->tracer, v, r->bar, r->sink);
-    for (int j = 0; j < v->bsdf->n_in; j++) r->bar[j] *= r->ratio;
-    vertex_scatter(r->tracer, v, r->bar, r->second);
+    vertex_scatter(r->to.tracer, v, r->bar, r->to.sink);
+    for (int j = 0; j < v->bsdf->n_in; j++) r->bar[j] *= r->to.ratio;
+    vertex_scatter(r->to.tracer, v, r->bar, r->to.second);
 }
 
 static void reverse_track(void *taker, const struct imp_track *track,
@@ -148,13 +137,13 @@ static void reverse_track(void *taker, const struct imp_track *track,
                           imp_spec adjoint)
 {
     const struct reverse *r = taker;
-    imp__track_sweep(r->tracer, track, carried, value, adjoint, r->sink);
+    imp__track_sweep(r->to.tracer, track, carried, value, adjoint, r->to.sink);
 }
 static void reverse_input(void *taker, const struct imp_input *const *input,
                           const struct imp_texcoord *at, const imp_spec *d)
 {
     const struct reverse *r = taker;
-    imp__inputs_scatter(input, 1, at, d, r->sink);
+    imp__inputs_scatter(input, 1, at, d, r->to.sink);
 }
 
 static void both_track(void *taker, const struct imp_track *track,
@@ -163,14 +152,14 @@ static void both_track(void *taker, const struct imp_track *track,
 {
     const struct reverse *r = taker;
     reverse_track(taker, track, carried, value, adjoint);
-    imp__track_sweep(r->tracer, track, carried, value, adjoint * r->ratio, r->second);
+    imp__track_sweep(r->to.tracer, track, carried, value, adjoint * r->to.ratio,
+                     r->to.second);
 }
 static void both_input(void *taker, const struct imp_input *const *input,
                        const struct imp_texcoord *at, const imp_spec *d)
 {
     imp_spec own = *d;
-    reverse_input(taker, input, at, d);
-    second_scatter(taker, input, 1, at, &own);
+    imp__sweep_inputs(&((struct reverse *)taker)->to, input, 1, at, &own);
 }
 
 static const struct imp_pieces_ops reverse_ops = {.emitter = reverse_emitter,
@@ -187,25 +176,45 @@ static const struct imp_pieces_ops both_ops = {.emitter = both_emitter,
                                                .track = both_track,
                                                .input = both_input};
 
-/* From the first vertex to the last. */
-static inline __attribute__((always_inline)) void
+/* From v to the last vertex. */
+static inline __attribute__((always_inline)) bool
 reverse_sweep(const struct imp_pieces_ops *ops, struct reverse *r,
-              const struct imp_walk *walk, imp_spec P)
+              const struct imp_walk *walk, const struct imp_vertex *v, int depth,
+              imp_spec *adjoint)
 {
-    const struct imp_tracer *tracer = r->tracer;
-    int depth = walk->depth;
-    for (const struct imp_vertex *v = walk->first; v; v = v->next, depth++) {
+    const struct imp_tracer *tracer = r->to.tracer;
+    imp_spec P = *adjoint;
+    for (; v; v = v->next, depth++) {
         imp__vertex_fetch(v->next, sizeof *v);
         for (const struct imp_side *s = v->side; s; s = s->next) {
-            imp__walk_sweep_values(tracer, &s->walk, P, r->sink);
-            if (r->second)
-                imp__walk_sweep_values(tracer, &s->walk, P * r->ratio, r->second);
+            imp__walk_sweep_values(tracer, &s->walk, P, r->to.sink);
+            if (r->to.second)
+                imp__walk_sweep_values(tracer, &s->walk, P * r->to.ratio, r->to.second);
         }
         const struct imp_adjoints a = imp__adjoints_at(walk, depth, P);
         imp__vertex_pieces(ops, r, tracer, walk, v, depth, &a);
         P *= v->w;
-        if (imp__is_zero_used(P, v->carried)) break;
+        if (imp__is_zero_used(P, v->carried)) return false;
     }
+    *adjoint = P;
+    return true;
+}
+
+/* `one`: nothing goes to a second sink. */
+static inline __attribute__((always_inline)) bool
+vertices_sweep(const struct imp_sweep *s, const bool one, const struct imp_walk *walk,
+               const struct imp_vertex *v, int depth, imp_spec *P)
+{
+    struct reverse reverse; /* clearing all of it takes time */
+    reverse.to = *s;
+    return reverse_sweep(one ? &reverse_ops : &both_ops, &reverse, walk, v, depth, P);
+}
+
+bool imp__sweep_vertices(const struct imp_sweep *s, const struct imp_walk *walk,
+                         const struct imp_vertex *v, int depth, imp_spec *P)
+{
+    return s->second ? vertices_sweep(s, false, walk, v, depth, P)
+                     : vertices_sweep(s, true, walk, v, depth, P);
 }
 
 void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_walk *walk,
@@ -216,11 +225,9 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
         walk->reduced->sweep(tracer, walk, adjoint, sink);
         return;
     }
-    struct reverse reverse;
-    reverse.tracer = tracer;
-    reverse.sink = sink;
-    reverse.second = NULL;
-    reverse_sweep(&reverse_ops, &reverse, walk, adjoint);
+    const struct imp_sweep to = {tracer, sink, NULL, {0}};
+    imp_spec P = adjoint;
+    vertices_sweep(&to, true, walk, walk->first, walk->depth, &P);
     if (walk->moving) walk->moving->sweep(tracer, walk, adjoint, sink);
 }
 
@@ -238,19 +245,19 @@ void imp__walk_sweep_both(const struct imp_tracer *tracer, const struct imp_walk
                           imp_spec adjoint, imp_spec other, struct imp_sink *sink,
                           struct imp_sink *second)
 {
-    struct reverse reverse;
+    struct imp_sweep to = {tracer, sink, second, {0}};
     if (walk->dropped || !walk->valid) return;
-    if (imp_unlikely(walk->reduced || walk->moving || tracer->sensor->gain) ||
+    if (imp_unlikely(walk->moving || tracer->sensor->gain) ||
+        (walk->reduced && !walk->reduced->both) ||
         !adjoints_divide(imp__walk_values(tracer, walk, adjoint),
-                         imp__walk_values(tracer, walk, other), &reverse.ratio)) {
+                         imp__walk_values(tracer, walk, other), &to.ratio)) {
         imp__walk_sweep(tracer, walk, adjoint, sink);
         imp__walk_sweep(tracer, walk, other, second);
         return;
     }
-    reverse.tracer = tracer;
-    reverse.sink = sink;
-    reverse.second = second;
-    reverse_sweep(&both_ops, &reverse, walk, imp__walk_values(tracer, walk, adjoint));
+    imp_spec P = imp__walk_values(tracer, walk, adjoint);
+    if (walk->reduced) walk->reduced->both(tracer, walk, P, to.ratio, sink, second);
+    else vertices_sweep(&to, false, walk, walk->first, walk->depth, &P);
 }
 
 /* ---- Forward: pieces along a direction ------------------------------------------- */
