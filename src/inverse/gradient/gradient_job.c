@@ -296,7 +296,7 @@ enum imp_status imp__gradient_job_run(struct imp__gradient_job *j,
                                   .take = tile_take,
                                   .payload = j};
     IMP_TRY(imp__tiles_create(&j->tiles));
-    j->tracer.swept_only = j->want_gradient && !j->variate && !j->moved;
+    j->tracer.swept_only = !j->variate && !j->moved;
     imp__gradient_samples(j);
     j->want_errors = j->totals->wants_errors || imp__gradient_metric(j);
     if (j->variate) IMP_TRY(imp__variate_room(ctx, j->variate, j->parts));

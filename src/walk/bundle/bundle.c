@@ -24,7 +24,7 @@ static bool is_shaped(const struct imp_scene *scene)
 bool imp__bundle_fits(const struct imp_tracer *t)
 {
     const struct imp_walk_integrator *w = t->integrator;
-    return (t->value_only || t->active) && !t->kept && !t->guide &&
+    return (t->value_only || t->active || imp__swept_fits(t)) && !t->kept && !t->guide &&
            (!t->wavelengths || !is_shaped(t->scene)) && !t->mixing && t->split <= 1 &&
            !w->mixes && !w->both && !(w->hide_emitters && t->sensor->shape) &&
            !w->from_lights && !w->first_hit && !t->scene->priorities &&

@@ -130,7 +130,7 @@ static struct imp_swept_lanes *lanes_keep(struct imp_depth *d, const struct imp_
     const struct imp_active *active = b->tracer->active;
     struct imp_arena *arena = d->lone->step.arena;
     const int material = bin->bsdf->index;
-    const bool differs = material >= 0 && active->bsdf[material],
+    const bool differs = active && material >= 0 && active->bsdf[material],
                light = is_active(b, lit);
     if (!differs && !light) return &b->swept->nothing;
     struct imp_swept_lanes *out = imp__arena_take(arena, 1, sizeof *out);
@@ -175,7 +175,7 @@ void imp__lanes_keep_sky(struct imp_depth *d, const int32_t *order, int n, int a
     struct imp_arena *arena = d->lone->step.arena;
     struct imp_swept_depth *to = b->swept->last;
     struct imp_swept_lanes *of = NULL;
-    if (b->tracer->active->emitter[light]) {
+    if (b->swept->lights && b->tracer->active->emitter[light]) {
         of = imp__arena_take(arena, 1, sizeof *of);
         struct imp_swept_light *l = wide_take(arena, sizeof *l);
         if (of && l) {

@@ -2,14 +2,13 @@
  *
  * Room for walks of a bundle that are swept, and which vertices they have. */
 #include "swept.h"
-#include "in_media.h"
 #include <string.h>
 
 bool imp__swept_fits(const struct imp_tracer *t)
 {
-    return t->swept_only && !t->value_only && t->active && !t->sensor->shape &&
-           !t->sensor->gain && !t->active->body && !t->elsewhere &&
-           t->integrator->alpha_gradient == IMP_ALPHA_DETACHED && !imp__media_fit(t);
+    return t->swept_only && !t->value_only && !t->sensor->shape && !t->sensor->gain &&
+           !(t->active && t->active->body) && !t->elsewhere &&
+           t->integrator->alpha_gradient == IMP_ALPHA_DETACHED;
 }
 
 bool imp__swept_create(struct imp_arena *arena, struct imp_bundle *b,
@@ -24,7 +23,7 @@ bool imp__swept_create(struct imp_arena *arena, struct imp_bundle *b,
     for (int k = 0; k < b->n; k++)
         out->walks[k] = (struct imp_swept_walk){
             {.sweep = imp__swept_sweep, .both = imp__swept_both}, b, k};
-    for (int k = 0; k < t->scene->n_emitters; k++)
+    for (int k = 0; t->active && k < t->scene->n_emitters; k++)
         out->lights |= t->active->emitter[k] != 0;
     return true;
 }
