@@ -54,6 +54,7 @@ static void map_make(imp_scene *s, bool bump)
 static void nested_make(imp_scene *s, const char *type)
 {
     imp_scene_begin(s, "bsdf", type, "nested", NULL);
+    if (strcmp(type, "principledthin") == 0) imp_scene_float(s, "spec_trans", 0.5);
     if (strcmp(type, "diffuse") == 0) imp_scene_rgb(s, "reflectance", reflectance);
     if (strcmp(type, "roughconductor") == 0) {
         imp_scene_string(s, "material", "none");

@@ -17,6 +17,19 @@ static inline double imp__schlick(double c, double *d_c)
     return x2 * x2 * x;
 }
 
+/* At the angle on the side of the lower index, e = behind over before, and its slope by c. */
+static inline double imp__schlick_beside(double c, double e, double *d_c)
+{
+    double slope;
+    *d_c = 0;
+    if (e > 1) return imp__schlick(c, d_c);
+    const double ct2 = 1 - (1 - c * c) / (e * e);
+    if (!(ct2 > 0)) return 1;
+    const double ct = sqrt(ct2), w = imp__schlick(ct, &slope);
+    *d_c = slope * c / (e * e * ct);
+    return w;
+}
+
 /* Diffuse lobe over base_color cos_i/pi: Burley's with its retro-reflection, and the
  * flat one that imitates scattering below the surface. */
 struct imp__burley {

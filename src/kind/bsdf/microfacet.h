@@ -61,6 +61,15 @@ struct imp__facet_turns {
 };
 struct imp__facet_turns imp__microfacet_turns(const struct imp__microfacet *f,
                                               const imp_v3 *wo, const imp_v3 *wi);
+/* Facets between clear media, with the index e behind over that before, and wo above: derivatives by
+ * the two directions of F D G/(4 wo_z), wi above, or of (1 - F) D G |wo.m| |wi.m|/(wo_z (wo.m + e wi.m)^2),
+ * m ~ wo + e wi, where these are not structurally zero. */
+struct imp__clear_turns {
+    imp_v3 by_wo, by_wi;
+};
+struct imp__clear_turns imp__microfacet_clear_turns(const struct imp__microfacet *f,
+                                                    const imp_v3 *wo, const imp_v3 *wi,
+                                                    double e);
 /* A normal for direction v (v.z > 0), and its density per steradian of normals. */
 imp_v3 imp__microfacet_sample(const struct imp__microfacet *f, const imp_v3 *v,
                               const double u[2]);

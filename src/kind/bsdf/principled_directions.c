@@ -21,19 +21,6 @@ static void add_om(struct turns *t, imp_spec by_om, imp_v3 m)
     add(t, by_om, m * 0.5, m * 0.5);
 }
 
-/* Schlick's weight as principled.c has it, and its slope by om. */
-static double weight_turned(const struct imp__principled_look *l, double *d_om)
-{
-    double slope;
-    *d_om = 0;
-    if (l->e > 1) return imp__schlick(l->om, d_om);
-    const double s2 = 1 - l->om * l->om, ct2 = 1 - s2 / (l->e * l->e);
-    if (!(ct2 > 0)) return 1;
-    const double ct = sqrt(ct2), w = imp__schlick(ct, &slope);
-    *d_om = slope * l->om / (l->e * l->e * ct);
-    return w;
-}
-
 /* 0.25 clearcoat D1(m) G(wo) G(wi) cos_i (0.04 + 0.96 W), with D1 of the form c/q. */
 static void coat_turns(const struct imp__principled_look *l, const imp_spec *in, double W,
                        double W_om, struct turns *t)
@@ -58,7 +45,7 @@ static void front_turns(const struct imp__principled_look *l, const imp_spec *in
 {
     const double m = l->metallic, cos_o = l->wo[2], cos_i = l->wi[2];
     double W_om, F_c, F_e, gloss_om;
-    const double W = weight_turned(l, &W_om),
+    const double W = imp__schlick_beside(l->om, l->e, &W_om),
                  F = imp__fresnel_dielectric_d(l->om, l->e, &F_c, &F_e);
     const double r = (l->e - 1) / (l->e + 1), R0 = r * r, st = in[SPEC_TINT][0];
     const imp_spec one = imp__spec(1), base = in[BASE];
@@ -93,44 +80,15 @@ static void front_turns(const struct imp__principled_look *l, const imp_spec *in
     coat_turns(l, in, W, W_om, t);
 }
 
-/* Reflection from inside. */
-static void inside_turns(const struct imp__principled_look *l, struct turns *t)
+/* Reflection from inside, and transmission. */
+static void glass_turns(const struct imp__principled_look *l, const imp_spec *in,
+                        struct turns *t)
 {
-    double F_c, F_e;
-    const double F = imp__fresnel_dielectric_d(l->om, l->e, &F_c, &F_e);
-    const struct imp__facet_turns x = imp__microfacet_turns(&l->facets.f, &l->wo, &l->wi);
-    const double c = (1 - l->metallic) * l->trans / (4 * l->wo[2]);
-    add(t, imp__spec(F * c), x.by_wo, x.by_wi);
-    add_om(t, imp__spec(F_c * x.DG * c), l->m);
-    t->wo[2] -= F * x.DG * c / l->wo[2];
-}
-
-/* (1 - F) c D G, c = |om im|/(wo_z n^2): of m, om, im and n, and n m = wo + e wi. */
-static void through_turns(const struct imp__principled_look *l, const imp_spec *in,
-                          struct turns *t)
-{
-    double F_c, F_e;
-    const double F = imp__fresnel_dielectric_d(l->om, l->e, &F_c, &F_e);
-    const double c = l->om * -l->im / (l->wo[2] * l->n * l->n), S = (1 - F) * c;
-    const double S_om = S / l->om - F_c * c, S_im = S / l->im;
-    imp_v3 dGo, dGi, dlog_D = imp__v3(0, 0, 0);
-    const double D = imp__microfacet_d(&l->facets.f, &l->m, NULL);
-    const double Go = imp__microfacet_g1_turned(&l->facets.f, &l->wo, &dGo),
-                 Gi = imp__microfacet_g1_turned(&l->facets.f, &l->wi, &dGi);
-    const double DG = D * Go * Gi;
-    for (int k = 0; k < 3; k++) {
-        imp_v3 e = imp__v3(0, 0, 0);
-        e[k] = 1;
-        dlog_D[k] = imp__microfacet_d_turned(&l->facets.f, &l->m, &e);
-    }
-    const imp_v3 by_m = (dlog_D * S + l->wo * S_om + l->wi * S_im) * DG;
-    const imp_v3 by_h =
-        (by_m - l->m * imp__dot(by_m, l->m)) * (1 / l->n) - l->m * (2 * S * DG / l->n);
+    const struct imp__clear_turns x =
+        imp__microfacet_clear_turns(&l->facets.f, &l->wo, &l->wi, l->e);
     imp_spec color = imp__spec((1 - l->metallic) * l->trans);
-    for (int k = 0; k < 4; k++) color[k] *= sqrt(in[BASE][k]);
-    add(t, color, by_h + l->m * (DG * S_om) + dGo * (S * D * Gi),
-        by_h * l->e + l->m * (DG * S_im) + dGi * (S * D * Go));
-    t->wo[2] -= color * (S * DG / l->wo[2]);
+    for (int k = 0; k < 4 && !l->reflects; k++) color[k] *= sqrt(in[BASE][k]);
+    add(t, color, x.by_wo, x.by_wi);
 }
 
 void imp__principled_directions_d(const struct imp_bsdf *b, const imp_spec *in,
@@ -142,8 +100,7 @@ void imp__principled_directions_d(const struct imp_bsdf *b, const imp_spec *in,
     imp__principled_cut(in, x);
     struct imp__principled_look l = imp__principled_look(b, x, d);
     if (imp__principled_half(&l)) {
-        if (!l.reflects) through_turns(&l, x, &t);
-        else if (l.back) inside_turns(&l, &t);
+        if (l.back || !l.reflects) glass_turns(&l, x, &t);
         else front_turns(&l, x, &t);
     }
     for (int k = 0; k < 3; k++) {

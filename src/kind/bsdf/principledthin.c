@@ -69,7 +69,9 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_b
     (void)self;
     for (size_t k = 0; k < imp_count(rates); k++)
         IMP_TRY(imp_build_float(b, rates[k], 1, &rate));
-    bsdf->flags = IMP_BSDF_SMOOTH | IMP_BSDF_TRANSMIT;
+    /* Transmission by facets ends where wi passes the plane of its own. */
+    bsdf->flags = IMP_BSDF_SMOOTH | IMP_BSDF_TRANSMIT |
+                  (imp_build_has(b, "spec_trans") ? IMP_BSDF_STEPS : 0);
 out:
     return st;
 }
@@ -160,6 +162,12 @@ static void reflect_add(const struct sheet *s, const imp_spec *x, imp_spec *f,
     df[DIFF_TRANS] -= matt * (0.5 * (1 - t));
 }
 
+/* As the format has it, light passes facets only where wi itself is behind them. */
+static bool is_behind(const struct sheet *s)
+{
+    return imp__dot(s->wi, s->h) < 2 * s->wi[2] * s->h[2];
+}
+
 static void transmit_add(const struct sheet *s, const imp_spec *x, imp_spec *f,
                          imp_spec *df)
 {
@@ -170,9 +178,8 @@ static void transmit_add(const struct sheet *s, const imp_spec *x, imp_spec *f,
         imp__burley_lobe(&s->facets, &s->h, &s->wo, &s->wi);
     const double c = 1 / (4 * s->wo[2]), lambert = s->wi[2] * IMP_INV_PI;
     const double clear = (1 - F) * lobe.DG * c, matt = dt * lambert;
-    /* As the format has it, only where wi itself is behind the facet. */
-    const bool is_behind = imp__dot(s->wi, s->h) < 2 * s->wi[2] * s->h[2];
-    const double behind = is_behind ? t : 0;
+    const bool there = is_behind(s);
+    const double behind = there ? t : 0;
     const imp_spec base = x[BASE];
 
     *f += base * (behind * clear + (1 - t) * matt);
@@ -180,7 +187,7 @@ static void transmit_add(const struct sheet *s, const imp_spec *x, imp_spec *f,
     df[BASE] += imp__spec(behind * clear + (1 - t) * matt);
     df[ROUGHNESS] += base * (behind * (1 - F) * c * lobe.d_roughness * s->spread);
     df[ANISOTROPIC] += base * (behind * (1 - F) * c * lobe.d_anisotropic);
-    df[TRANS] += base * ((is_behind ? clear : 0) - matt);
+    df[TRANS] += base * ((there ? clear : 0) - matt);
     df[ETA] +=
         base * (behind * c *
                 ((1 - F) * lobe.d_roughness * x[ROUGHNESS][0] * 0.65 - F_e * lobe.DG));
@@ -213,6 +220,89 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     (void)b;
     for (int j = 0; j < N_INPUTS; j++) df[j] = imp__spec(0);
     lobes_add(in, d, &f, df);
+}
+
+/* ---- Directions ---------------------------------------------------------------- */
+
+/* Derivatives by wo and wi, both above. */
+struct turns {
+    imp_spec wo[3], wi[3];
+};
+static void turns_add(struct turns *t, imp_spec factor, imp_v3 by_wo, imp_v3 by_wi)
+{
+    for (int k = 0; k < 3; k++) {
+        t->wo[k] += factor * by_wo[k];
+        t->wi[k] += factor * by_wi[k];
+    }
+}
+/* By c: 1 + wo.wi = 2 c^2. */
+static void turns_add_c(struct turns *t, const struct sheet *s, imp_spec by_c)
+{
+    turns_add(t, by_c, s->h * 0.5, s->h * 0.5);
+}
+/* F D G/(4 cos_o), F of the slope F_c. */
+static void facets_turn(const struct sheet *s, imp_spec F, imp_spec F_c, struct turns *t)
+{
+    const struct imp__facet_turns x = imp__microfacet_turns(&s->facets.f, &s->wo, &s->wi);
+    const double by = 1 / (4 * s->wo[2]);
+    turns_add(t, F * by, x.by_wo, x.by_wi);
+    turns_add_c(t, s, F_c * (x.DG * by));
+    t->wo[2] -= F * (x.DG * by / s->wo[2]);
+}
+
+static void reflect_turn(const struct sheet *s, const imp_spec *x, struct turns *t)
+{
+    double F_c, F_e, W_c, gloss_c;
+    const double eta = x[ETA][0], st = x[SPEC_TINT][0], cos_i = s->wi[2];
+    const double F = imp__fresnel_dielectric_d(s->c, eta, &F_c, &F_e);
+    const double r = (eta - 1) / (eta + 1), R0 = r * r;
+    const double W = imp__schlick_beside(s->c, eta, &W_c),
+                 gloss = imp__schlick(s->c, &gloss_c);
+    const imp_spec one = imp__spec(1), base = x[BASE];
+    imp_spec T_base, T_lum;
+    const imp_spec tint = imp__burley_tint(&base, x[LUM][0], &T_base, &T_lum);
+    const imp_spec dyed = tint * R0 + (one - tint * R0) * W;
+    facets_turn(s, (dyed * st + (1 - st) * F) * x[TRANS][0],
+                ((one - tint * R0) * (W_c * st) + (1 - st) * F_c) * x[TRANS][0], t);
+
+    const double rest = (1 - x[TRANS][0]) * (1 - 0.5 * x[DIFF_TRANS][0]);
+    const double rough = x[ROUGHNESS][0], flat = x[FLATNESS][0];
+    const struct imp__burley lobe = imp__burley(s->wo[2], cos_i, s->c, rough, flat);
+    const struct imp__burley_turns by =
+        imp__burley_turns(s->wo[2], cos_i, s->c, rough, flat);
+    const imp_spec matt = base * (rest * IMP_INV_PI),
+                   sheen = (one + (tint - one) * x[SHEEN_TINT][0]) * (rest * x[SHEEN][0]);
+    t->wo[2] += matt * (cos_i * by.by_o);
+    t->wi[2] += matt * (lobe.value + cos_i * by.by_i) + sheen * gloss;
+    turns_add_c(t, s, matt * (cos_i * by.by_d) + sheen * (cos_i * gloss_c));
+}
+
+static void transmit_turn(const struct sheet *s, const imp_spec *x, struct turns *t)
+{
+    double F_c, F_e;
+    const double F = imp__fresnel_dielectric_d(s->c, x[ETA][0], &F_c, &F_e);
+    const imp_spec clear = x[BASE] * x[TRANS][0];
+    if (is_behind(s)) facets_turn(s, clear * (1 - F), clear * -F_c, t);
+    t->wi[2] += x[BASE] * ((1 - x[TRANS][0]) * 0.5 * x[DIFF_TRANS][0] * IMP_INV_PI);
+}
+
+static void eval_directions_d(const struct imp_bsdf *b, const imp_spec *in,
+                              const struct imp_dirs *d, imp_spec d_wo[3],
+                              imp_spec d_wi[3])
+{
+    imp_spec x[N_INPUTS];
+    struct turns t = {{{0}, {0}, {0}}, {{0}, {0}, {0}}};
+    struct sheet s;
+    (void)b;
+    inputs_cut(in, x);
+    if (sheet_of(x, d, &s)) {
+        if (s.reflects) reflect_turn(&s, x, &t);
+        else transmit_turn(&s, x, &t);
+    }
+    for (int k = 0; k < 3; k++) {
+        d_wo[k] = t.wo[k] * (k == 2 && d->wo[2] < 0 ? -1. : 1.);
+        d_wi[k] = t.wi[k] * (k == 2 && d->wi[2] < 0 ? -1. : 1.);
+    }
 }
 
 /* Probabilities of the lobes: facets and diffuse, of either side. Where derivatives are
@@ -301,4 +391,5 @@ const struct imp_bsdf_ops imp__principledthin = {.size = sizeof(struct imp_bsdf_
                                                  .eval = eval,
                                                  .pdf = pdf,
                                                  .eval_d = eval_d,
-                                                 .albedo = albedo};
+                                                 .albedo = albedo,
+                                                 .eval_directions_d = eval_directions_d};

@@ -175,6 +175,24 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     df[ETA] = tint * (d_e * rest * Gi * Go * (v.back ? -v.e * v.e : 1));
 }
 
+static void eval_directions_d(const struct imp_bsdf *b, const imp_spec *in,
+                              const struct imp_dirs *d, imp_spec d_wo[3],
+                              imp_spec d_wi[3])
+{
+    const struct view v = view_of(in, d);
+    struct facet x;
+    for (int k = 0; k < 3; k++) d_wo[k] = d_wi[k] = imp__spec(0);
+    if (!facet_of(&v, &x)) return;
+    const struct imp__microfacet q = imp__roughness_at(b->self, &in[ALPHA]);
+    const struct imp__clear_turns t = imp__microfacet_clear_turns(&q, &v.wo, &v.wi, v.e);
+    const imp_spec tint = in[v.reflects ? TINT_R : TINT_T];
+    for (int k = 0; k < 3; k++) {
+        const imp_spec by = k == 2 && v.back ? -tint : tint;
+        d_wo[k] = by * t.by_wo[k];
+        d_wi[k] = by * t.by_wi[k];
+    }
+}
+
 const struct imp_bsdf_ops imp__roughdielectric = {.size = sizeof(struct imp_bsdf_ops),
                                                   .name = "roughdielectric",
                                                   .object_size =
@@ -186,7 +204,8 @@ const struct imp_bsdf_ops imp__roughdielectric = {.size = sizeof(struct imp_bsdf
                                                   .eval = eval,
                                                   .pdf = pdf,
                                                   .index_ratio = index_ratio,
-                                                  .eval_d = eval_d};
+                                                  .eval_d = eval_d,
+                                                  .eval_directions_d = eval_directions_d};
 
 /* ---- In lanes: GGX, of visible normals ---------------------------------------------------- */
 

@@ -58,7 +58,8 @@ enum imp_status imp__turning_build(const struct imp_build *b, struct imp__turnin
         IMP_TRY(imp_build_error(b, "flip_invalid_normals", IMP_E_SCENE,
                                 "a normal is either flipped or clamped; leave out "
                                 "clamp_invalid_normals"));
-    if (!self->clamp) bsdf->flags |= IMP_BSDF_STEPS;
+    /* Without the shadowing wi that passes the surface's own plane may be seen by n'. */
+    if (!self->clamp || !self->shadow) bsdf->flags |= IMP_BSDF_STEPS;
     IMP_TRY(reason(b, self, c, &bsdf->why));
     self->moves = !bsdf->why;
     bsdf->fixed = self->moves ? 0 : (UINT64_C(1) << IMP_TURNED_OWN) - 1;

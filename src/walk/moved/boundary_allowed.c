@@ -200,7 +200,8 @@ static bool back_met(const struct imp__boundary *b, imp_v3 w, struct imp_hit *hi
     imp__hit_surface(scene, hit, &b->camera, &w, &at);
     const int met = imp__placed_shape(scene, hit->shape, hit->place);
     const struct imp_bsdf *bsdf = imp__shape_bsdf(scene, scene->shapes[met]);
-    return imp__dot(at.ng, w) > 0 && bsdf->ops != &imp__twosided && !bsdf->straight;
+    return imp__dot(at.ng, w) > 0 && bsdf->ops != &imp__twosided &&
+           !(bsdf->flags & IMP_BSDF_TRANSMIT) && !bsdf->straight;
 }
 
 #define PROBES 64

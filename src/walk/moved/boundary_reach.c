@@ -267,6 +267,25 @@ static void connect_mirrored(struct imp__edge_draw *d,
               brings * T * K * line.T * s.T * (s.to.weight / s.chance));
 }
 
+/* With normals of its own a material scatters light into directions from which `sample` does not draw:
+ * half of all are drawn by the cosine, on both sides where it lets light through. 0: nowhere. */
+static double turned_draw(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
+                          struct imp_dirs *dirs)
+{
+    const bool through = b->flags & IMP_BSDF_TRANSMIT, even = u[0] < 0.5;
+    const double own = imp_min(even ? 2 * u[0] : 2 * u[0] - 1, 1 - 0x1p-53),
+                 by_lobe[3] = {own, u[1], u[2]};
+    const bool behind = through ? own < 0.5 : dirs->wi[2] < 0;
+    dirs->lobe = IMP_SMOOTH;
+    if (even) dirs->wo = imp__cosine_hemisphere(&u[1]);
+    if (even && behind) dirs->wo[2] = -dirs->wo[2];
+    if (!even && !imp__bsdf_transposed_sample(b, in, by_lobe, dirs)) return 0;
+    const bool lit = through || dirs->wo[2] * dirs->wi[2] > 0;
+    const imp_v3 up = imp__v3(dirs->wo[0], dirs->wo[1], fabs(dirs->wo[2]));
+    return 0.5 * imp__bsdf_transposed_pdf(b, in, dirs) +
+           (lit ? imp__cosine_hemisphere_pdf(up) * (through ? 0.25 : 0.5) : 0);
+}
+
 /* Where the walk goes on, local, and its density: of Lambertian materials by the cosine on the side
  * it came from, of others as light that arrives is scattered. 0: nowhere. */
 static double direction_draw(const struct imp__edge_draw *d, const struct link *k,
@@ -286,6 +305,11 @@ static double direction_draw(const struct imp__edge_draw *d, const struct link *
     }
     struct imp_dirs dirs = {{0}, k->wi, IMP_SMOOTH, 0};
     const double by_lobe[3] = {u[2], u[0], u[1]};
+    if (b->flags & IMP_BSDF_TURNED) {
+        const double pdf = turned_draw(b, in, by_lobe, &dirs);
+        *wo = dirs.wo;
+        return pdf;
+    }
     if (!imp__bsdf_transposed_sample(b, in, by_lobe, &dirs)) return 0;
     *wo = dirs.wo;
     /* What is reflected was followed to another vertex. */

@@ -52,6 +52,18 @@ static void luminance_slope(const struct imp_input *colour, imp_spec weight,
     for (int k = 0; k < 2; k++) d_uv[k] = imp__spec(imp__sum_used(weight * d_uv[k], 3));
 }
 
+/* Slope of a number of a vector, whatever the walk carries. */
+static void component_slope(const struct imp_input *vector, int component,
+                            const struct imp_texcoord *at, imp_spec d_uv[2])
+{
+    const struct imp_texture *t = vector->texture;
+    struct imp_texcoord plain = *at;
+    plain.carried = NULL;
+    if (!t) return;
+    t->ops->slope(t, &plain, false, d_uv);
+    for (int k = 0; k < 2; k++) d_uv[k] = imp__spec(d_uv[k][component]);
+}
+
 /* d K/du and d K/dv. */
 static void textures_derive(const struct imp_vertex *v, const struct imp_dirs *dirs,
                             imp_spec d_uv[2])
@@ -66,7 +78,9 @@ static void textures_derive(const struct imp_vertex *v, const struct imp_dirs *d
         d_in[j][0] = d_in[j][1] = imp__spec(0);
         if (i->luminance)
             luminance_slope(b->input[j - i->luminance], i->weight, &at, d_in[j]);
-        else if (t) t->ops->slope(t, &at, i->scalar, d_in[j]);
+        else if (i->component)
+            component_slope(b->input[j - i->component], i->component - 1, &at, d_in[j]);
+        else if (t && !i->vector) t->ops->slope(t, &at, i->scalar, d_in[j]);
         for (int k = 0; k < 2; k++) d_uv[k] += df[j] * d_in[j][k];
     }
 }
@@ -145,20 +159,34 @@ static bool has_grain(const struct imp_bsdf *b)
     return false;
 }
 
+/* Why its value jumps where directions turn. */
+static const char *steps_why(const struct imp_bsdf *b)
+{
+    return b->flags & IMP_BSDF_TURNED
+               ? "has normals of its own, and jumps where they turn away "
+                 "(clamp_invalid_normals, with the shadowing function, makes it "
+                 "continuous)"
+               : "has a value that jumps where directions turn";
+}
+
 const char *imp__kernel_without_d(const struct imp_bsdf *b, bool round)
 {
     if (imp__is_lambertian(b) || b->flags & IMP_BSDF_NULL) return NULL;
-    if (b->flags & IMP_BSDF_TURNED) return "has normals of its own";
+    const struct imp_bsdf *without = imp__bsdf_without_directions_d(b);
     if (b->ops == &imp__mask && !(b->child[0]->flags & IMP_BSDF_DELTA))
         return imp__kernel_without_d(b->child[0], round);
     if (b->flags & IMP_BSDF_DELTA && b->ops == &imp__mask)
         return "reflects or lets pass in single directions under a mask: edges that are "
                "seen in it have no draws";
+    if (b->flags & IMP_BSDF_DELTA && b->flags & IMP_BSDF_TURNED)
+        return "has normals of its own, with which single directions turn";
     if (b->flags & IMP_BSDF_DELTA && !imp__bends_nothing(b))
         return "bends light: edges that are seen through it have no draws";
     if (b->flags & IMP_BSDF_DELTA && !(b->flags & IMP_BSDF_SMOOTH)) return NULL;
     if (b->flags & IMP_BSDF_EMIT) return "emits light by itself";
-    if (imp__bsdf_without_directions_d(b)) return "has no derivative by directions";
+    if (without)
+        return without->ops->eval_directions_d ? steps_why(without)
+                                               : "has no derivative by directions";
     if (round && has_grain(b))
         return "has a grain, whose direction turns over this shape";
     return NULL;
@@ -193,7 +221,9 @@ const char *imp__textures_without_d(const struct imp_bsdf *b, const struct imp_s
         const struct imp_texture *t = b->input[k]->texture;
         imp_spec d_uv[2];
         if (!t) continue;
-        if (b->input[k]->vector || b->input[k]->bump) return "has normals of its own";
+        if (b->input[k]->bump)
+            return "has a bump map, whose normals jump from texel to texel (those of a "
+                   "normalmap do not)";
         if (!t->ops->slope || !t->ops->slope(t, &middle, b->input[k]->scalar, d_uv))
             return "has a texture whose values jump (bilinear bitmaps do not)";
     }
