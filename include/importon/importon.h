@@ -612,7 +612,7 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *     NAME.center, NAME.radius   of a sphere: world; not beside pose and scale
  *     NAME.p0, NAME.p1, NAME.radius   of a circular cylinder without textures: the middles of its
  *                            ends, world; likewise
- *     NAME.x_fov             of a perspective camera: horizontal field of view, degrees
+ *     NAME.x_fov             of a perspective camera or projector: horizontal field of view, degrees
  *     NAME.principal_point_offset_x, NAME.principal_point_offset_y   of a perspective camera:
  *                            in parts of the film's width and height
  *     NAME.opencv_k1, _k2, _p1, _p2, _k3   of a perspective camera: the distortion of its lens;

@@ -209,7 +209,7 @@ class Scene:
         `NAME.center` and `NAME.radius` of a sphere; `NAME.p0`, `NAME.p1` and `NAME.radius` of a circular
         cylinder; `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y`, `NAME.opencv_k1`,
         `_k2`, `_p1`, `_p2` and `_k3` of a perspective camera or thin lens;
-        `NAME.aperture_radius` and `NAME.focus_distance` of a thin lens; `NAME.position` of a point, spot,
+        `NAME.x_fov` of a projector; `NAME.aperture_radius` and `NAME.focus_distance` of a thin lens; `NAME.position` of a point, spot,
         projector or ies light; `NAME.direction` of a directional, sun, spot, projector or ies light; `NAME.turn` of a sky or a distant sensor;
         `NAME.sun_direction` of a sunsky, ciesky or perezsky, `NAME.sun_radius` of a sun or sunsky. Otherwise as `add_pose`.
 

@@ -82,7 +82,7 @@ imp_v3 imp__light_velocity(const struct imp__moves *moves, int k, imp_v3 p,
     imp_v3 out = {0};
     for (int j = 0; j < moves->n_movers; j++) {
         const struct imp__mover *m = &moves->mover[j];
-        if (m->shape != IMP_MOVE_EMITTER(k)) continue;
+        if (m->shape != IMP_MOVE_EMITTER(k) || m->kind == IMP_MOVE_SPREAD) continue;
         const imp_v3 e = imp__move_vector(theta_dot + m->first);
         if (m->kind == IMP_MOVE_AFFINE) out += e; /* a light at a point, the middle */
         if (m->kind == IMP_MOVE_LIGHT) out += light_part(moves, m, e);
@@ -147,5 +147,33 @@ void imp__light_turn_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
                                  light_part(moves, m,
                                             imp__cross(turn_bar, m->axis) +
                                                 m->twist * imp__dot(turn_bar, m->axis)));
+    }
+}
+
+/* By the logarithm of the screen's width. */
+static imp_v3 spread_velocity(const struct imp__mover *m, imp_v3 r)
+{
+    return (r - m->axis * imp__dot(m->axis, r)) * m->rate;
+}
+
+imp_v3 imp__light_spread(const struct imp__moves *moves, int k, imp_v3 r,
+                         const double *theta_dot)
+{
+    imp_v3 out = {0};
+    for (int j = 0; j < moves->n_movers; j++) {
+        const struct imp__mover *m = &moves->mover[j];
+        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_SPREAD)
+            out += spread_velocity(m, r) * theta_dot[m->first];
+    }
+    return out;
+}
+
+void imp__light_spread_bar(const struct imp__moves *moves, int k, imp_v3 r, imp_v3 bar,
+                           double *theta_bar)
+{
+    for (int j = 0; j < moves->n_movers; j++) {
+        const struct imp__mover *m = &moves->mover[j];
+        if (m->shape == IMP_MOVE_EMITTER(k) && m->kind == IMP_MOVE_SPREAD)
+            theta_bar[m->first] += imp__dot(spread_velocity(m, r), bar);
     }
 }

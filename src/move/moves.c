@@ -6,6 +6,7 @@
 #include "base/context.h"
 #include "kind/emitter/from_point.h"
 #include "kind/emitter/ies.h"
+#include "kind/emitter/projector.h"
 #include "suns.h"
 
 struct imp__moves imp__moves_begin(const struct imp_scene *scene,
@@ -75,6 +76,12 @@ static enum imp_status light_mover(struct imp__moves *moves, struct imp__mover *
     moves->skies |= sky;
     if (m->kind == IMP_MOVE_SUN || m->kind == IMP_MOVE_DISC) return sun_mover(moves, m);
     if (sky && m->kind == IMP_MOVE_TURN) return IMP_OK; /* about the middle of all */
+    if (m->kind == IMP_MOVE_SPREAD) {
+        m->count = 1;
+        m->axis = imp__light_frame_of(e)->axis[2];
+        imp__projector_fov(e, &m->rate);
+        return IMP_OK;
+    }
     if (!e->ops->aim || m->kind == IMP_MOVE_TURN ||
         (m->kind == IMP_MOVE_AXIS && !imp__light_frame_of(e) &&
          e->ops != &imp__ies_light && !sky))

@@ -24,6 +24,8 @@
  *     disc      of a sun or such a sky, by the angular radius r: what its disc sends from the angle g to
  *               its middle comes from where g' = tan(g/2)/tan(r/2), so that the solid angle keeps its
  *               parts of the disc's (1)
+ *     spread    of a projector, by its field of view: its picture grows about the axis a, a unit vector;
+ *               a part of it at r from the light has the velocity  (r - a a.r)  times d ln tan (1)
  *
  * e: a translation in scene units; a: a rotation vector in radians. Velocities are linear in the
  * numbers; each function that applies the map has its transpose beside it. The geometric normal is
@@ -52,6 +54,7 @@ enum imp__move_kind {
     IMP_MOVE_TURN,
     IMP_MOVE_SUN,
     IMP_MOVE_DISC,
+    IMP_MOVE_SPREAD,
     IMP_MOVE_VIEW /* + k: number k of a camera's view */
 };
 struct imp__fans; /* triangles around each vertex: shade.c */
@@ -234,6 +237,12 @@ void imp__light_velocity_bar(const struct imp__moves *moves, int k, imp_v3 p, im
 imp_v3 imp__light_turn(const struct imp__moves *moves, int k, const double *theta_dot);
 void imp__light_turn_bar(const struct imp__moves *moves, int k, imp_v3 turn_bar,
                          double *theta_bar);
+/* The velocity of the part of a projector's picture at r from it, by its field of view, and the
+ * transpose. */
+imp_v3 imp__light_spread(const struct imp__moves *moves, int k, imp_v3 r,
+                         const double *theta_dot);
+void imp__light_spread_bar(const struct imp__moves *moves, int k, imp_v3 r, imp_v3 bar,
+                           double *theta_bar);
 /* Velocity of what the camera sees at p through a fixed film position and, of a lens, fixed numbers of
  * its point: origin and direction of the ray move with the camera, the distance is held. eye: another
  * point of the ray. */

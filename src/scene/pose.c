@@ -212,6 +212,7 @@ double imp__pose_large(const struct imp_pose *p, size_t e)
         const struct imp_shape *s = p->scene->shapes[p->shape];
         return 0.1 * imp__length(s->hi - s->lo);
     }
+    case IMP_POSE_PICTURE:
     case IMP_POSE_FOV: return 10;
     case IMP_POSE_OFFSET_X:
     case IMP_POSE_OFFSET_Y:

@@ -11,7 +11,7 @@
  *     NAME.center, .radius   of a sphere, world
  *     NAME.p0, .p1, .radius  of a circular cylinder: the middles of its ends, world; its points turn with
  *                            the axis as little as possible
- *     NAME.x_fov             of a perspective camera: its horizontal field of view, degrees
+ *     NAME.x_fov             of a perspective camera or a projector: its horizontal field of view, degrees
  *     NAME.principal_point_offset_x, _y    of a camera, in parts of the film's width and height
  *     NAME.opencv_k1, _k2, _p1, _p2, _k3   of a camera, by which its lens distorts the picture
  *     NAME.aperture_radius, NAME.focus_distance   of a thin lens
@@ -54,6 +54,7 @@ enum imp_pose_kind {
     IMP_POSE_TURN,
     IMP_POSE_SUN,
     IMP_POSE_SUN_RADIUS,
+    IMP_POSE_PICTURE, /* x_fov of a projector */
     IMP_POSE_KINDS
 };
 

@@ -4,6 +4,7 @@
 #include "access.h"
 #include "base/arguments.h"
 #include "instances.h"
+#include "kind/emitter/projector.h"
 #include "kind/emitter/sky_sun.h"
 #include "kind/sensor/receiver.h"
 #include "kind/shape/shape.h"
@@ -49,6 +50,7 @@ static enum imp_status light_find(struct imp_scene *scene, int k, struct imp_pos
     struct imp_emitter *e = scene->emitters[k];
     p->emitter = e;
     p->rest_size = e->ops->object_size;
+    if (p->kind == IMP_POSE_FOV) p->kind = IMP_POSE_PICTURE; /* by the same name */
     return found(scene, e->name, p, imp__pose_light_why(scene, e, p->kind));
 }
 
@@ -88,10 +90,10 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
 {
     const struct imp_triangles *t =
         p->shape >= 0 ? &scene->shapes[p->shape]->triangles : NULL;
-    double view[IMP_VIEW_NUMBERS], aim[3];
+    double view[IMP_VIEW_NUMBERS], aim[3], rate;
     struct imp__sky_sun sun;
     if (imp__pose_is_view(p->kind)) p->sensor->ops->view(p->sensor, view, false);
-    const bool place = (p->kind >= IMP_POSE_POSITION && p->kind != IMP_POSE_SUN_RADIUS) ||
+    const bool place = (p->kind >= IMP_POSE_POSITION && p->kind <= IMP_POSE_SUN) ||
                        (imp__pose_is_round(p->kind) && p->kind != IMP_POSE_RADIUS);
     p->n = p->kind == IMP_POSE_RIGID      ? 6
            : p->kind == IMP_POSE_WORLD    ? 12
@@ -125,6 +127,9 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
             p->start[0] = p->number[0];
         }
         memcpy(p->number, p->start, p->n * sizeof *p->number);
+        break;
+    case IMP_POSE_PICTURE:
+        p->number[0] = p->start[0] = imp__projector_fov(p->emitter, &rate);
         break;
     case IMP_POSE_CENTER:
     case IMP_POSE_RADIUS:
@@ -166,7 +171,8 @@ static const struct tail {
     [IMP_POSE_DIRECTION] = {"direction", "1", -INFINITY, INFINITY},
     [IMP_POSE_TURN] = {"turn", "radians", -INFINITY, INFINITY},
     [IMP_POSE_SUN] = {"sun_direction", "1", -INFINITY, INFINITY},
-    [IMP_POSE_SUN_RADIUS] = {"sun_radius", "radians", 1e-6, 1.5}};
+    [IMP_POSE_SUN_RADIUS] = {"sun_radius", "radians", 1e-6, 1.5},
+    [IMP_POSE_PICTURE] = {"x_fov", "degree", 0.1, 179}};
 
 const char *imp__pose_tail(enum imp_pose_kind kind) { return tails[kind].name; }
 
@@ -216,11 +222,12 @@ static bool is_there(const struct imp_scene *scene, struct imp_pose *p)
     return false;
 }
 
-/* Numbers that say where the same points are, which may not be set beside each other. A camera's view
- * goes with all of them. */
+/* Numbers that say where the same points are, which may not be set beside each other. The view of a
+ * camera or projector goes with all of them. */
 static int family(enum imp_pose_kind kind)
 {
-    return imp__pose_is_view(kind)     ? 0
+    const bool view = imp__pose_is_view(kind) || kind == IMP_POSE_PICTURE;
+    return view                        ? 0
            : kind == IMP_POSE_VERTICES ? 2
            : imp__pose_is_round(kind)  ? 3
            : kind == IMP_POSE_WORLD    ? 4

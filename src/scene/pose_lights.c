@@ -5,6 +5,7 @@
 #include "base/context.h"
 #include "kind/emitter/from_point.h"
 #include "kind/emitter/ies.h"
+#include "kind/emitter/projector.h"
 #include "kind/emitter/sky_sun.h"
 #include "pose.h"
 #include <string.h>
@@ -57,8 +58,7 @@ static enum imp_status sun_apply(const struct imp_pose *p, const struct imp_pose
     return IMP_OK;
 }
 
-enum imp_status imp__pose_light_apply(const struct imp_pose *p,
-                                      const struct imp_pose *world)
+static enum imp_status place_apply(const struct imp_pose *p, const struct imp_pose *world)
 {
     const struct imp_pose *sun = imp__pose_beside(p, IMP_POSE_SUN),
                           *radius = imp__pose_beside(p, IMP_POSE_SUN_RADIUS);
@@ -86,6 +86,17 @@ enum imp_status imp__pose_light_apply(const struct imp_pose *p,
     if (p->emitter->ops == &imp__ies_light)
         imp__ies_turn(p->emitter->self, p->rest, axis);
     else imp__light_frame_turn(p->emitter->self, p->rest, axis);
+    return IMP_OK;
+}
+
+enum imp_status imp__pose_light_apply(const struct imp_pose *p,
+                                      const struct imp_pose *world)
+{
+    const struct imp_pose *picture = imp__pose_beside(p, IMP_POSE_PICTURE);
+    if (picture) memcpy(p->emitter->self, p->rest, p->rest_size);
+    IMP_CHECKED(place_apply(p, world));
+    if (picture && picture->number[0] != picture->start[0])
+        imp__projector_fov_set(p->emitter, picture->number[0]);
     return IMP_OK;
 }
 

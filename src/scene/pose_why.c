@@ -10,6 +10,7 @@
 #include "pose.h"
 
 extern const struct imp_sensor_ops imp__distant;
+extern const struct imp_emitter_ops imp__projector;
 
 /* What else is made from where shapes are, and is not made again. NULL: nothing is in the way, as
  * below. */
@@ -109,6 +110,10 @@ const char *imp__pose_light_why(const struct imp_scene *scene,
     const bool spot = imp__light_frame_of(e) != NULL, far = imp__pose_is_far(e);
     struct imp__sky_sun sun;
     const bool sunny = imp__sky_sun_read(e, &sun);
+    if (kind == IMP_POSE_PICTURE)
+        return e->ops != &imp__projector ? "it is no camera and no projector"
+               : scene->lights_in_tree   ? "lights are chosen by a tree (light_choice)"
+                                         : NULL;
     if (kind == IMP_POSE_SUN && !(sunny && !sun.alone))
         return "it is none of sunsky by day, and ciesky and perezsky that depend on "
                "their sun";

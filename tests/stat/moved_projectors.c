@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Derivatives by the place and direction of a projector, whose picture slides over what it lights and ends
- * at a border: what a meter reads of a picture that it holds in part, in closed form; a room in the light
- * of a picture against differences. A spot with a texture. What is refused. */
+ * Derivatives by the place, direction and field of view of a projector, whose picture slides over what it
+ * lights and ends at a border: what a meter reads of a picture that it holds in part, in closed form; a
+ * room in the light of a picture against differences. A spot with a texture. What is refused. */
 #include "mean_gradient.h"
 #include "moves_kit.h"
 #include "moves_numbers.h"
@@ -17,7 +17,7 @@ static void closed_test(void)
 {
     const double h = 1.5, x = .8, t = tan(20 * IMP_PI / 180), w = 1 - x + t * h,
                  lit = IMP_PI * 3 * 2 * t / (4 * h);
-    struct tap_stat g[3] = {{0}}, axis[3] = {{0}};
+    struct tap_stat g[3] = {{0}}, axis[3] = {{0}}, view[1] = {{0}};
     imp_scene *scene = test_scene_text(
         ctx,
         "<scene version='3.0.0'><integrator type='direct'/><emitter type='projector' "
@@ -30,6 +30,8 @@ static void closed_test(void)
         IMP_MONO);
     test_must(ctx, imp_scene_add_geometry(scene, "lamp.position"));
     test_must(ctx, imp_scene_add_geometry(scene, "lamp.direction"));
+    test_must(ctx, imp_scene_add_geometry(scene, "lamp.x_fov"));
+    mean_gradient(ctx, scene, "lamp.x_fov", 64, 16, view);
     mean_gradient(ctx, scene, "lamp.position", 64, 16, g);
     mean_gradient(ctx, scene, "lamp.direction", 64, 16, axis);
     tap_z(&g[0], -lit, 3e-3 * lit, "a picture that slides over a meter");
@@ -45,6 +47,9 @@ static void closed_test(void)
     }
     const double sum = (u[1] - u[0]) / 2e-4;
     tap_z(&axis[0], IMP_PI * 3 * 2 * t / 4 * sum, 3e-3 * lit, "a picture that turns");
+    /* Wider by a degree, t grows by (1 + t^2)/2 pi/180. */
+    tap_z(&view[0], lit / t * (w + t * h) * (1 + t * t) / 2 * IMP_PI / 180, 3e-4 * lit,
+          "a picture that grows");
     imp_scene_destroy(scene);
 }
 
@@ -113,9 +118,12 @@ int main(int argc, char **argv)
                                         {"lamp.position", 2, .02},
                                         {"lamp.direction", 0, .01},
                                         {"lamp.direction", 2, .01},
+                                        {"lamp.x_fov", 0, .5},
                                         {"block.pose", 0, .02},
                                         {NULL, 0, 0}},
-                               world[] = {{"lamp.to_world", 3, .02}, {NULL, 0, 0}},
+                               world[] = {{"lamp.to_world", 3, .02},
+                                          {"lamp.x_fov", 0, .5},
+                                          {NULL, 0, 0}},
                                some[] = {{"lamp.position", 1, .02},
                                          {"lamp.direction", 0, .01},
                                          {NULL, 0, 0}};
@@ -131,6 +139,8 @@ int main(int argc, char **argv)
                     world);
     numbers_compare("a spot with a picture", room(DIRECT, SPOT), 32 * more, 64 * more,
                     .06, some);
+    number_refused("a spot, whose cone is in its inputs", room(DIRECT, SPOT),
+                   "lamp.x_fov", "no projector");
     number_refused("a picture that jumps", room(DIRECT, NEAREST), "lamp.position",
                    "values jump");
     if (remove("picture.pfm") != 0 || chdir("..") != 0 || rmdir(folder) != 0) exit(99);

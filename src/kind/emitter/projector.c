@@ -28,6 +28,7 @@ static const struct imp_input_desc inputs[] = {
 struct projector {
     struct imp__light_frame frame; /* first: imp__light_frame_of */
     double tan_half[2];            /* of the horizontal and vertical field of view */
+    double aspect;                 /* width over height of the picture */
 };
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_emitter *e)
@@ -43,6 +44,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
     IMP_TRY(imp__light_frame_read(b, &p->frame));
     IMP_TRY(imp__fov_build(b, aspect, &p->tan_half[0]));
     p->tan_half[1] = p->tan_half[0] / aspect;
+    p->aspect = aspect;
 out:
     return st;
 }
@@ -121,6 +123,21 @@ static void aim(struct imp_emitter *e, double v[3], bool set)
     struct projector *p = e->self;
     if (set) p->frame.origin = imp__v3(v[0], v[1], v[2]);
     for (int k = 0; k < 3; k++) v[k] = p->frame.origin[k];
+}
+
+double imp__projector_fov(const struct imp_emitter *e, double *rate)
+{
+    const struct projector *p = e->self;
+    const double t = p->tan_half[0];
+    *rate = (1 + t * t) / (2 * t) * (IMP_PI / 180);
+    return atan(t) * (360 / IMP_PI);
+}
+
+void imp__projector_fov_set(struct imp_emitter *e, double degrees)
+{
+    struct projector *p = e->self;
+    p->tan_half[0] = tan(degrees * (IMP_PI / 360));
+    p->tan_half[1] = p->tan_half[0] / p->aspect;
 }
 
 void imp__projector_border(const struct imp_emitter *e, double u, imp_v3 *at,

@@ -7,6 +7,10 @@
 #include "kind/build.h"
 #include "math/vec.h"
 
+/* The horizontal field of view, in degrees, and the derivative of the logarithm of the screen's width by
+ * it. */
+double imp__projector_fov(const struct imp_emitter *e, double *rate);
+void imp__projector_fov_set(struct imp_emitter *e, double degrees);
 /* The point of the border by u in [0, 1), of the screen at distance 1, from the light, world; its
  * derivative by u, and the unit direction across it into the picture. */
 void imp__projector_border(const struct imp_emitter *e, double u, imp_v3 *at,

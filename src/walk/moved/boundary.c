@@ -278,7 +278,8 @@ double imp__flux_velocity(const struct imp__moves *moves, const struct imp__flux
         if (e->camera) v.v = imp__camera_velocity(moves, e->eye, e->x.p, theta_dot);
         else if (e->light)
             v.v = imp__light_velocity(moves, e->light - 1, e->x.p, theta_dot) +
-                  imp__cross(imp__light_turn(moves, e->light - 1, theta_dot), e->eye);
+                  imp__cross(imp__light_turn(moves, e->light - 1, theta_dot), e->eye) +
+                  imp__light_spread(moves, e->light - 1, e->eye, theta_dot);
         else v = imp__velocity_of(moves, &e->x, theta_dot);
         sum += velocity_times(&e->x, &e->bar, &v);
     }
@@ -291,6 +292,7 @@ static void light_bar(const struct imp__moves *moves, const struct imp__flux_end
     imp__light_velocity_bar(moves, e->light - 1, e->x.p, bar, theta_bar);
     if (!imp__is_zero(e->eye))
         imp__light_turn_bar(moves, e->light - 1, imp__cross(e->eye, bar), theta_bar);
+    imp__light_spread_bar(moves, e->light - 1, e->eye, bar, theta_bar);
 }
 
 void imp__flux_bar(const struct imp__moves *moves, const struct imp__flux *flux,

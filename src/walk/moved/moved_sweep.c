@@ -3,9 +3,12 @@
  * The interior derivative of a walk by what moves (moved.h): adjoints of its values from the first
  * vertex to the last, then adjoints of its places from the last to the first. */
 #include "moved_sweep.h"
+#include "kind/emitter/from_point.h"
 #include "moved_mirror.h"
 #include "moved_sky.h"
 #include "walk/path/first_segment.h"
+
+extern const struct imp_emitter_ops imp__projector;
 
 /* Emission that the step from v meets, and that is glued to its light where a light sample could
  * have brought it, from behind passes only if these let samples through. */
@@ -193,6 +196,14 @@ static void delta_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
             ? imp__picture_slope(e, d, s->piece[k].light, lanes, v->carried)
             : imp__sent_slope(e, d, lanes, v->carried) * weight;
     const imp_v3 turn = slope * (1 / distance);
+    if (imp_unlikely(e->ops == &imp__projector)) {
+        /* Along d another place of the picture comes, as bright as it is by the angle: the part of the
+         * slope that is not  d ln 1/cos^3. */
+        const imp_v3 axis = imp__light_frame_of(e)->axis[2];
+        const imp_v3 of_picture = slope - axis * (-3 * weight / imp__dot(axis, d));
+        imp__light_spread_bar(s->moves, light, d,
+                              d * imp__dot(d, of_picture) - of_picture, s->theta_bar);
+    }
     /* The light turned by a vector sends along d what it sent along d turned back. */
     imp__light_turn_bar(s->moves, light, imp__cross(slope, d), s->theta_bar);
     const struct imp__kernel_bar kernel = light_kernel(s, k, v, r * (-1 / distance));
