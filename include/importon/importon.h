@@ -601,8 +601,8 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
 /** Make a number of geometry a parameter, behind all others. Setting it moves the object.
  *
  *     NAME.pose              as imp_scene_add_pose
- *     NAME.scale             of a shape or instance: 1 as the scene file has it, about the middle of
- *                            its box
+ *     NAME.scale             of a shape, instance or group: 1 as the scene file has it, about the
+ *                            middle of its box
  *     NAME.to_world          of a shape, instance, camera, spot or projector: [3][4], the upper rows
  *                            of the matrix that puts it there; not beside pose, scale and what else
  *                            says where it is; IMP_E_NUMERIC where it makes another kind of thing

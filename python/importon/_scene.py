@@ -204,7 +204,7 @@ class Scene:
     def add_geometry(self, name: str) -> str:
         """Make a number of geometry a parameter.
 
-        `NAME.pose` as `add_pose`; `NAME.scale` of a shape or instance; `NAME.to_world` of a shape,
+        `NAME.pose` as `add_pose`; `NAME.scale` of a shape, instance or group; `NAME.to_world` of a shape,
         instance, camera, spot or projector, the upper three rows of its matrix; `NAME.vertex_positions` of a mesh;
         `NAME.center` and `NAME.radius` of a sphere; `NAME.p0`, `NAME.p1` and `NAME.radius` of a circular
         cylinder; `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y`, `NAME.opencv_k1`,

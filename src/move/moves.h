@@ -144,7 +144,7 @@ void imp__moves_free(struct imp__moves *moves);
  * meet in no point. */
 enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kind,
                                int shape);
-/* The mover of a parameter, at its value now. */
+/* The mover of a parameter, at its value now; of a group one for each of its instances. */
 enum imp_status imp__moves_add_pose(struct imp__moves *moves,
                                     const struct imp_pose *pose);
 /* From the adjoint of a mover's numbers to that of its parameter's, in place: a mover turns the

@@ -5,6 +5,8 @@
 #include "base/arguments.h"
 #include "kind/emitter/from_point.h"
 #include "kind/emitter/ies.h"
+#include <math.h>
+#include <string.h>
 
 /* imp__mover.twist of a light's axis a. Opposite to z the frame may turn in any way: 0. */
 static imp_v3 twist_of(const struct imp_pose *pose, imp_v3 a)
@@ -32,9 +34,46 @@ static enum imp_status round_add(struct imp__moves *moves, const struct imp_pose
     return IMP_OK;
 }
 
+/* A mover for each instance, about where the group's centre is in it. */
+static enum imp_status group_add(struct imp__moves *moves, const struct imp_pose *pose)
+{
+    const struct imp_pose *rigid = imp__pose_beside(pose, IMP_POSE_RIGID);
+    const struct imp_instance *rest = pose->object->rest;
+    imp_v3 centre = pose->object->centre;
+    for (int i = 0; rigid && i < 3; i++) centre[i] += rigid->number[i];
+    for (int k = 0; k < moves->scene->world->n_instances; k++) {
+        if (!imp__group_has(pose, k)) continue;
+        IMP_CHECKED(imp__moves_add(
+            moves, pose->kind == IMP_POSE_SCALE ? IMP_MOVE_SCALE : IMP_MOVE_POSE,
+            IMP_MOVE_INSTANCE(k)));
+        struct imp__mover *m = &moves->mover[moves->n_movers - 1];
+        m->centre = imp__map_point(&rest[k].to_world, centre);
+        if (pose->kind == IMP_POSE_SCALE) m->rate = 1 / pose->number[0];
+    }
+    return IMP_OK;
+}
+
+/* An instance that its group moves by e, a moves by  L e  and turns by  det(L) L a/|det L|^(4/3),
+ * with L the linear part of its placement, which turns, scales and mirrors alone. */
+static void group_bar(const struct imp__mover *mover, const struct imp_pose *pose,
+                      double *bar)
+{
+    const struct imp_instance *rest = pose->object->rest;
+    const struct imp_map *L = &rest[mover->shape - IMP_MOVE_INSTANCE(0)].to_world;
+    const imp_v3 x = imp__v3(L->m[0], L->m[4], L->m[8]),
+                 y = imp__v3(L->m[1], L->m[5], L->m[9]),
+                 z = imp__v3(L->m[2], L->m[6], L->m[10]);
+    const double det = imp__dot(x, imp__cross(y, z)), turn = det / pow(fabs(det), 4. / 3);
+    const imp_v3 e = imp__move_vector(bar), a = imp__move_vector(bar + 3) * turn;
+    const double out[6] = {imp__dot(x, e), imp__dot(y, e), imp__dot(z, e),
+                           imp__dot(x, a), imp__dot(y, a), imp__dot(z, a)};
+    memcpy(bar, out, sizeof out);
+}
+
 enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_pose *pose)
 {
     if (imp__pose_is_round(pose->kind)) return round_add(moves, pose);
+    if (pose->group >= 0) return group_add(moves, pose);
     static const enum imp__move_kind kind[IMP_POSE_KINDS] = {
         [IMP_POSE_RIGID] = IMP_MOVE_POSE,      [IMP_POSE_SCALE] = IMP_MOVE_SCALE,
         [IMP_POSE_WORLD] = IMP_MOVE_AFFINE,    [IMP_POSE_VERTICES] = IMP_MOVE_VERTICES,
@@ -86,6 +125,7 @@ void imp__pose_numbers_bar(const struct imp__moves *moves, const struct imp__mov
         imp__moves_cylinder(pose->scene, pose->shape, 0, &tube))
         imp__ends_bar(&tube, mover->centre, pose->kind, bar);
     if (pose->kind != IMP_POSE_RIGID && pose->kind != IMP_POSE_TURN) return;
+    if (pose->group >= 0) group_bar(mover, pose, bar);
     double *a_bar = bar + (pose->kind == IMP_POSE_TURN ? 0 : 3);
     const double *a = pose->number + (a_bar - bar);
     const imp_v3 turn = imp__move_vector(a_bar);

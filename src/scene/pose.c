@@ -192,6 +192,10 @@ static enum imp_status pose_apply(struct imp_pose *p)
         const struct imp_map by = map_of(p);
         return world ? imp__world_apply(world) : imp__instance_apply(p, &by);
     }
+    if (p->group >= 0) {
+        const struct imp_map by = map_of(p);
+        return imp__group_apply(p, &by);
+    }
     return p->sensor ? sensor_apply(p) : imp__pose_light_apply(p, world_of(p));
 }
 
@@ -204,7 +208,9 @@ double imp__pose_large(const struct imp_pose *p, size_t e)
                           : 0.3 * hypot(hypot(p->start[e % 4], p->start[4 + e % 4]),
                                         p->start[8 + e % 4]);
     case IMP_POSE_TURN: return p->emitter ? imp__pose_turn_large(p->emitter, 0.5) : 0.5;
-    case IMP_POSE_RIGID: return e < 3 ? 0.1 * scene : 0.5;
+    case IMP_POSE_RIGID:
+        if (e >= 3) return 0.5;
+        return 0.1 * scene / (p->group >= 0 ? imp__group_size(p) : 1);
     case IMP_POSE_SUN_RADIUS:
     case IMP_POSE_SCALE:
     case IMP_POSE_RADIUS: return 0.3 * p->number[0];

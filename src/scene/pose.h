@@ -2,9 +2,9 @@
  *
  * Where things are, as parameters:
  *
- *     NAME.pose              of a shape, instance, camera or radiancemeter: e and a, six numbers; a point that the scene
+ *     NAME.pose              of a shape, instance, group, camera or radiancemeter: e and a, six numbers; a point that the scene
  *                            file has at X0 is at  X = c + e + R(a) s (X0 - c)
- *     NAME.scale             of a shape or instance: s
+ *     NAME.scale             of a shape, instance or group: s
  *     NAME.to_world          of a shape, instance, camera, spot or projector: the upper three rows of the matrix M
  *                            that puts what the kind has at x at  X = M x, as mi.traverse has it
  *     NAME.vertex_positions  of a mesh: the vertices, three numbers each, world
@@ -21,6 +21,8 @@
  *     NAME.turn              of a sky or a distant sensor, about its target: a rotation vector, away from what the file says
  *     NAME.sun_direction     of a clear sky: towards its sun, world, of any length
  *     NAME.sun_radius        of a sun or of a sky with one: that of its disc, radians
+ *
+ * Of a group X is in its own space, and all its instances follow.
  *
  * R(a): the rotation about a by |a| radians; c: the middle of a shape's box, or of a group's where an
  * instance has it; a camera's own place.
@@ -77,6 +79,7 @@ struct imp_pose {
     enum imp_pose_kind kind;
     int shape;                   /* index; -1: no shape */
     int instance;                /* of the scene's own; -1: none */
+    int group;                   /* of the scene's, with all its instances; -1: none */
     struct imp_sensor *sensor;   /* NULL: no sensor */
     struct imp_emitter *emitter; /* NULL: no light without a shape */
     int param;
@@ -218,8 +221,18 @@ bool imp__instance_find(const struct imp_scene *scene, const char *name,
                         struct imp_pose *p);
 /* Moves it from where the file has it. */
 enum imp_status imp__instance_apply(const struct imp_pose *p, const struct imp_map *by);
-enum imp_status imp__instance_place(const struct imp_pose *p,
+/* Puts instance k there, for the sake of p. */
+enum imp_status imp__instance_place(const struct imp_pose *p, int k,
                                     const struct imp_map *to_world);
+
+/* ---- pose_groups.c, likewise ---- */
+const char *imp__group_why(const struct imp_scene *scene, int k, enum imp_pose_kind kind);
+bool imp__group_find(const struct imp_scene *scene, const char *name, struct imp_pose *p);
+/* Is p of a group, of which this is an instance? */
+bool imp__group_has(const struct imp_pose *p, int instance);
+/* What a length of its first instance is in the world. */
+double imp__group_size(const struct imp_pose *p);
+enum imp_status imp__group_apply(const struct imp_pose *p, const struct imp_map *by);
 
 /* ---- pose_folds.c for pose.c ---- */
 /* A triangle of a mesh that its vertices' motion away from `rest` [3 n_vertices] makes vanish, or

@@ -66,6 +66,8 @@ static enum imp_status object_find(struct imp_scene *scene, const char *name,
             return light_find(scene, k, p);
     if (imp__instance_find(scene, name, p))
         return found(scene, name, p, imp__instance_why(scene, p->instance, p->kind));
+    if (imp__group_find(scene, name, p))
+        return found(scene, name, p, imp__group_why(scene, p->group, p->kind));
     char whole[256];
     snprintf(whole, sizeof whole, "%s.%s", name, imp__pose_tail(p->kind));
     return imp__error(scene->ctx, IMP_E_ARG, "there is no %s '%s'%s",
@@ -213,7 +215,7 @@ static bool is_there(const struct imp_scene *scene, struct imp_pose *p)
     p->object = p;
     for (struct imp_pose *q = scene->poses; q; q = q->next) {
         if (q->shape != p->shape || q->sensor != p->sensor || q->emitter != p->emitter ||
-            q->instance != p->instance)
+            q->instance != p->instance || q->group != p->group)
             continue;
         if (q->kind == p->kind) return true;
         p->object = q->object;
@@ -242,6 +244,10 @@ static const char *beside_why(const struct imp_pose *p)
             (p->kind == (k ? IMP_POSE_SUN : IMP_POSE_SUN_RADIUS) &&
              imp__pose_beside(p, IMP_POSE_TURN)))
             return "a turn of the sky takes its sun along";
+    for (const struct imp_pose *q = p->scene->poses; q; q = q->next)
+        if ((p->instance >= 0 && imp__group_has(q, p->instance)) ||
+            (q->instance >= 0 && imp__group_has(p, q->instance)))
+            return "a group moves, or instances of it do";
     for (const struct imp_pose *q = p->object != p ? p->object : NULL; q; q = q->next) {
         const int other = family(q->kind);
         if (q->object != p->object || other == own || !own || !other) continue;
@@ -269,7 +275,7 @@ static enum imp_status geometry_add(struct imp_scene *scene, const char *object,
     if (!p) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
     p->scene = scene;
     p->kind = kind;
-    p->shape = p->instance = -1;
+    p->shape = p->instance = p->group = -1;
     IMP_CHECKED(object_find(scene, object, p));
     if (is_there(scene, p)) return IMP_OK;
     const char *beside = beside_why(p);

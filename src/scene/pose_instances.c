@@ -63,17 +63,30 @@ bool imp__pose_box(const struct imp_pose *p, imp_v3 *lo, imp_v3 *hi)
 {
     if (p->instance >= 0)
         imp__instance_box(&p->scene->world->instance[p->instance], lo, hi);
+    if (p->group >= 0) {
+        *lo = imp__v3(INFINITY, INFINITY, INFINITY);
+        *hi = -*lo;
+        for (int k = 0; k < imp__pose_instances(p->scene); k++) {
+            imp_v3 box[2];
+            if (!imp__group_has(p, k)) continue;
+            imp__instance_box(&p->scene->world->instance[k], &box[0], &box[1]);
+            for (int i = 0; i < 3; i++) {
+                (*lo)[i] = imp_min((*lo)[i], box[0][i]);
+                (*hi)[i] = imp_max((*hi)[i], box[1][i]);
+            }
+        }
+    }
     if (p->shape >= 0) {
         *lo = p->scene->shapes[p->shape]->lo;
         *hi = p->scene->shapes[p->shape]->hi;
     }
-    return p->instance >= 0 || p->shape >= 0;
+    return p->instance >= 0 || p->group >= 0 || p->shape >= 0;
 }
 
-enum imp_status imp__instance_place(const struct imp_pose *p,
+enum imp_status imp__instance_place(const struct imp_pose *p, int instance,
                                     const struct imp_map *to_world)
 {
-    struct imp_instance *there = &p->scene->world->instance[p->instance];
+    struct imp_instance *there = &p->scene->world->instance[instance];
     imp_v3 lo, hi;
     there->to_world = *to_world;
     bool fits = imp__map_inverse(&there->to_world, &there->to_local);
@@ -89,5 +102,5 @@ enum imp_status imp__instance_apply(const struct imp_pose *p, const struct imp_m
 {
     const struct imp_instance *rest = p->object->rest;
     const struct imp_map to_world = imp__map_product(by, &rest->to_world);
-    return imp__instance_place(p, &to_world);
+    return imp__instance_place(p, p->instance, &to_world);
 }

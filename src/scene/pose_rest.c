@@ -51,10 +51,11 @@ enum imp_status imp__pose_rest_keep(struct imp_scene *scene, struct imp_pose *p)
     const struct imp_shape *s = p->shape >= 0 ? scene->shapes[p->shape] : NULL;
     const struct imp_receiver *r = s && s->sensor ? s->sensor->receiver : NULL;
     const struct imp__mesh *m = s && s->ops->move == imp__mesh_move ? s->self : NULL;
-    const void *self = s            ? s->self
-                       : p->sensor  ? p->sensor->self
-                       : p->emitter ? p->emitter->self
-                                    : (void *)&scene->world->instance[p->instance];
+    const void *self = s               ? s->self
+                       : p->sensor     ? p->sensor->self
+                       : p->emitter    ? p->emitter->self
+                       : p->group >= 0 ? (void *)scene->world->instance
+                                       : (void *)&scene->world->instance[p->instance];
     const size_t n = m ? 3 * s->triangles.n_vertices : 0;
     p->rest = imp__arena_take(&scene->arena, 1, p->rest_size);
     if (r) p->receiver = imp__arena_take(&scene->arena, 1, sizeof *r);

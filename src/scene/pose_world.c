@@ -129,7 +129,7 @@ static const char *placed(const struct imp_pose *p)
 static enum imp_status instance_place(const struct imp_pose *p, const struct imp_mat4 *to)
 {
     const struct imp_map map = imp__map_of(to);
-    return imp__instance_place(p, &map);
+    return imp__instance_place(p, p->instance, &map);
 }
 
 enum imp_status imp__world_apply(const struct imp_pose *p)

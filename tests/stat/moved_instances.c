@@ -4,7 +4,7 @@
  * where they are placed, also of nested groups, stretched ones, and one with a material of its own; and
  * the same pictures of a block that was moved. By the pose and scale of an instance of one shape, flat,
  * curved or with vertex normals, as by those of the shape; of instances of several against central
- * differences. What is refused. */
+ * differences. By those of a group as by those of its instances. What is refused. */
 #include "egg.h"
 #include "moves_kit.h"
 #include "moves_numbers.h"
@@ -195,6 +195,82 @@ static void crowd_test(int more)
                     32 * more, .2, numbers);
 }
 
+/* ---- Groups ------------------------------------------------------------------------------ */
+
+/* Two instances, one of which is smaller and mirrored: columns of their placements' linear parts. */
+#define TWO                                                                              \
+    HEAP NAMED("one", "heap",                                                            \
+               "<rotate z='1' angle='20'/><translate x='1.2' y='-1' z='.4'/>")           \
+        NAMED("other", "heap",                                                           \
+              "<scale x='-.7' y='.7' z='.7'/><rotate y='1' angle='35'/>"                 \
+              "<translate x='-1.5' y='-.9' z='.6'/>")
+static const double angle[2] = {20, 35};
+
+static void gradient_of(imp_scene *scene, const char *const *name, int n, double *g)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    imp_problem *p;
+    for (int k = 0; k < n; k++) test_must(ctx, imp_scene_add_geometry(scene, name[k]));
+    test_must(ctx, imp_problem_create(scene, &p));
+    for (int k = 0; k < n; k++) test_must(ctx, imp_problem_activate(p, name[k]));
+    run.spp = 8;
+    test_must(ctx, imp_problem_reverse(p, adjoint, &run, g, NULL));
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+}
+
+/* By a group's numbers as by those of its instances, taken to its space. */
+static void group_test(void)
+{
+    static const char *const whole[] = {"heap.pose", "heap.scale"}, *const each[] = {
+                                                                        "one.pose",
+                                                                        "other.pose",
+                                                                        "one.scale",
+                                                                        "other.scale"};
+    double g[7], own[14], sum[7] = {0}, most = 0, worst = 0;
+    const struct room_parts parts = {.rest = PATH TWO};
+    gradient_of(room_build(ctx, &parts), whole, 2, g);
+    gradient_of(room_build(ctx, &parts), each, 4, own);
+    for (int k = 0; k < 2; k++) {
+        const double c = cos(angle[k] * IMP_PI / 180), s = sin(angle[k] * IMP_PI / 180);
+        const double size = k ? .7 : 1, x = k ? -1 : 1; /* of the turned x axis */
+        const double L[3][3] = {{x * c, k ? 0 : -s, k ? s : 0},
+                                {k ? 0 : s, k ? 1 : c, 0},
+                                {k ? -x * s : 0, 0, k ? c : 1}};
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++) {
+                sum[i] += size * L[j][i] * own[6 * k + j];
+                sum[3 + i] += x * L[j][i] * own[6 * k + 3 + j];
+            }
+        sum[6] += own[12 + k];
+    }
+    for (int i = 0; i < 7; i++) {
+        most = fmax(most, fabs(g[i]));
+        worst = fmax(worst, fabs(g[i] - sum[i]));
+    }
+    tap_ok(most > 1e-3 && worst < 1e-9 * most,
+           "a group moves as its instances do # off %.1e of %.3g", worst, most);
+}
+
+static void groups_test(int more)
+{
+    static const struct number numbers[] = {{"heap.pose", 0, .02},  {"heap.pose", 2, .02},
+                                            {"heap.pose", 4, .01},  {"heap.pose", 5, .02},
+                                            {"heap.scale", 0, .02}, {NULL, 0, 0}};
+    group_test();
+    numbers_compare("a group that moves",
+                    room_build(ctx, &(struct room_parts){.rest = DIRECT TWO}), 48 * more,
+                    64 * more, .2, numbers);
+    number_refused("a group of which an instance stretches",
+                   room_build(ctx, &(struct room_parts){.rest = PATH CROWD}), "heap.pose",
+                   "stretches it");
+    imp_scene *scene = room_build(ctx, &(struct room_parts){.rest = PATH TWO});
+    test_must(ctx, imp_scene_add_pose(scene, "heap"));
+    tap_ok(imp_scene_add_pose(scene, "one") == IMP_E_UNSUPPORTED,
+           "a group and one of its instances # %s", imp_last_error(ctx));
+    imp_scene_destroy(scene);
+}
+
 static void refused(const char *what, const char *rest, const char *word)
 {
     number_refused(what, room_build(ctx, &(struct room_parts){.rest = rest}),
@@ -243,8 +319,10 @@ int main(int argc, char **argv)
             "name='p1' x='1.6' y='-1' z='1.5'/><float name='radius' value='.1'/>"
             "</shape>" PLACED("g", "<translate x='1.5' y='-1' z='1'/>", ""),
             "passes through");
+    groups_test(tap_is_long(argc, argv) ? 32 : 1);
     imp_scene *scene = room(true);
-    tap_ok(imp_scene_add_pose(scene, "chair") != IMP_OK, "a group has no pose # %s",
+    tap_ok(imp_scene_add_pose(scene, "chair") == IMP_E_UNSUPPORTED,
+           "a group that is stretched, and in another one, has no pose # %s",
            imp_last_error(ctx));
     imp_scene_destroy(scene);
     remove(EGG_FILE);

@@ -21,6 +21,7 @@ static const double steps[N_STEPS] = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
 static bool is_of_kind(const struct imp_pose *p)
 {
     if (p->emitter && p->emitter->ops->flags & IMP_EMITTER_ENVIRONMENT) return false;
+    if (p->group >= 0) return false; /* several instances move by the same numbers */
     return p->kind == IMP_POSE_RIGID || p->kind == IMP_POSE_SCALE ||
            p->kind == IMP_POSE_POSITION || p->kind == IMP_POSE_DIRECTION;
 }

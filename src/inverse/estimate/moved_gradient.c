@@ -18,13 +18,15 @@ static const struct imp_pose *next_active(const struct imp_problem *p,
     return from;
 }
 
-/* A mover for each active pose, about where the object's centre is now. */
+/* Movers for each active pose, about where the object's centre is now. */
 static enum imp_status movers_add(const struct imp_problem *p,
                                   struct imp__moved_gradient *m)
 {
     const struct imp_sensor *sensor = m->tracer->sensor;
+    const int instances = imp__pose_instances(p->scene);
     int n = 0, others = 0; /* active parameters that are no pose */
-    for (const struct imp_pose *q = p->scene->poses; q; q = q->next) n++;
+    for (const struct imp_pose *q = p->scene->poses; q; q = q->next)
+        n += q->group >= 0 ? instances : 1;
     m->pose = imp__alloc(p->ctx, (size_t)n, sizeof *m->pose);
     if (!m->pose) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for poses");
     for (size_t i = 0; i < p->scene->n_params; i++) others += p->active.base[i] >= 0;
@@ -32,8 +34,9 @@ static enum imp_status movers_add(const struct imp_problem *p,
          q = next_active(p, q->next)) {
         others--;
         if (q->sensor && q->sensor != sensor) continue; /* it is not looked through */
+        const int before = m->moves.n_movers;
         IMP_CHECKED(imp__moves_add_pose(&m->moves, q));
-        m->pose[m->moves.n_movers - 1] = q;
+        for (int k = before; k < m->moves.n_movers; k++) m->pose[k] = q;
     }
     m->alone = others == 0;
     return IMP_OK;

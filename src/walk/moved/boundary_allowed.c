@@ -311,7 +311,8 @@ static enum imp_status ball_allowed(const struct imp__boundary *b)
         imp_v3 lo, hi;
         bool inside = true;
         const int shape = p->instance >= 0 ? IMP_MOVE_INSTANCE(p->instance) : p->shape;
-        if (!imp__pose_box(p, &lo, &hi) || !imp__moves_shape(b->moves, shape, NULL))
+        if (!imp__pose_box(p, &lo, &hi) ||
+            (p->group < 0 && !imp__moves_shape(b->moves, shape, NULL)))
             continue;
         for (int i = 0; i < 3; i++)
             inside &= lo[i] > scene->lo[i] + near && hi[i] < scene->hi[i] - near;
