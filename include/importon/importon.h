@@ -609,6 +609,7 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *                            of it
  *     NAME.vertex_positions  of a mesh: [vertices][3], world; vertex normals, if it has any, are
  *                            computed from them
+ *     NAME.vertex_normals    of a mesh with vertex normals: [vertices][3], world, of any length
  *     NAME.center, NAME.radius   of a sphere: world; not beside pose and scale
  *     NAME.p0, NAME.p1, NAME.radius   of a circular cylinder without textures: the middles of its
  *                            ends, world; likewise

@@ -205,7 +205,7 @@ class Scene:
         """Make a number of geometry a parameter.
 
         `NAME.pose` as `add_pose`; `NAME.scale` of a shape, instance or group; `NAME.to_world` of a shape,
-        instance, camera, spot or projector, the upper three rows of its matrix; `NAME.vertex_positions` of a mesh;
+        instance, camera, spot or projector, the upper three rows of its matrix; `NAME.vertex_positions` and `NAME.vertex_normals` of a mesh;
         `NAME.center` and `NAME.radius` of a sphere; `NAME.p0`, `NAME.p1` and `NAME.radius` of a circular
         cylinder; `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y`, `NAME.opencv_k1`,
         `_k2`, `_p1`, `_p2` and `_k3` of a perspective camera or thin lens;

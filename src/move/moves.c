@@ -108,7 +108,7 @@ static enum imp_status shape_mover(const struct imp__moves *moves, struct imp__m
                           "shape '%s' (%s) is neither made of triangles nor a sphere, "
                           "disk or circular cylinder, and has no derivative by its place",
                           s->name, s->ops->name);
-    if (m->kind == IMP_MOVE_VERTICES &&
+    if ((m->kind == IMP_MOVE_VERTICES || m->kind == IMP_MOVE_NORMALS) &&
         (s->geometry != IMP_TRIANGLES || s->ops->surface != imp__mesh_surface))
         return imp__error(ctx, IMP_E_UNSUPPORTED,
                           "shape '%s' (%s) is no mesh, and has no vertices that move",
@@ -163,7 +163,9 @@ bool imp__moves_shape(const struct imp__moves *moves, int shape,
                       const struct imp__mover *but)
 {
     for (int k = 0; k < moves->n_movers; k++)
-        if (moves->mover[k].shape == shape && &moves->mover[k] != but) return true;
+        if (moves->mover[k].shape == shape && &moves->mover[k] != but &&
+            moves->mover[k].kind != IMP_MOVE_NORMALS)
+            return true;
     return false;
 }
 
@@ -200,6 +202,31 @@ static bool edges_of(const struct corners *k, imp_v3 s, double in_edges[2])
     return true;
 }
 
+/* N/|N| by the normals [3 n_vertices] of a triangle's vertices. */
+static void normals_velocity(const struct imp__glued *x, const uint32_t index[3],
+                             const double *normals, struct imp__velocity *out)
+{
+    imp_v3 dot = {0};
+    if (!x->smooth) return;
+    for (int i = 0; i < 3; i++)
+        dot += imp__move_vector(normals + 3 * (size_t)index[i]) * (x->b[i] / x->length);
+    out->shade += dot - x->shade * imp__dot(x->shade, dot);
+}
+static void normals_bar(const struct imp__glued *x, const uint32_t index[3],
+                        const struct imp__velocity *bar, double *normals)
+{
+    if (!x->smooth) return;
+    const imp_v3 across = bar->shade - x->shade * imp__dot(x->shade, bar->shade);
+    for (int i = 0; i < 3; i++)
+        imp__move_vector_bar(normals + 3 * (size_t)index[i],
+                             across * (x->b[i] / x->length));
+}
+static const uint32_t *vertices_of(const struct imp__moves *moves,
+                                   const struct imp__glued *x)
+{
+    return moves->scene->shapes[x->shape]->triangles.indices + 3 * (size_t)x->prim;
+}
+
 /* n = c/|c|, c = e1 x e2: n' and the logarithm of |c|. */
 static void vertices_velocity(const struct imp__moves *moves, const struct imp__glued *x,
                               const double *theta, struct imp__velocity *out)
@@ -215,15 +242,9 @@ static void vertices_velocity(const struct imp__moves *moves, const struct imp__
     out->v += v0 * x->b[0] + v1 * x->b[1] + v2 * x->b[2];
     out->n += (c_dot * inverse - n * along) * side;
     out->area += along;
-    if (x->smooth) {
-        const double *normals =
-            theta + 3 * moves->scene->shapes[x->shape]->triangles.n_vertices;
-        imp_v3 dot = {0};
-        for (int i = 0; i < 3; i++)
-            dot += imp__move_vector(normals + 3 * (size_t)k.index[i]) *
-                   (x->b[i] / x->length);
-        out->shade += dot - x->shade * imp__dot(x->shade, dot);
-    }
+    normals_velocity(x, k.index,
+                     theta + 3 * moves->scene->shapes[x->shape]->triangles.n_vertices,
+                     out);
     double in_edges[2];
     if (!edges_of(&k, x->s, in_edges)) return;
     const imp_v3 s_dot = (v1 - v0) * in_edges[0] + (v2 - v0) * in_edges[1];
@@ -249,13 +270,8 @@ static void vertices_bar(const struct imp__moves *moves, const struct imp__glued
                          bar->v * x->b[0] - e1_bar - e2_bar);
     imp__move_vector_bar(theta_bar + 3 * (size_t)k.index[1], bar->v * x->b[1] + e1_bar);
     imp__move_vector_bar(theta_bar + 3 * (size_t)k.index[2], bar->v * x->b[2] + e2_bar);
-    if (!x->smooth) return;
-    double *normals =
-        theta_bar + 3 * moves->scene->shapes[x->shape]->triangles.n_vertices;
-    const imp_v3 across = bar->shade - x->shade * imp__dot(x->shade, bar->shade);
-    for (int i = 0; i < 3; i++)
-        imp__move_vector_bar(normals + 3 * (size_t)k.index[i],
-                             across * (x->b[i] / x->length));
+    normals_bar(x, k.index, bar,
+                theta_bar + 3 * moves->scene->shapes[x->shape]->triangles.n_vertices);
 }
 
 struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
@@ -279,6 +295,9 @@ struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
             out.area += 2 * m->rate * theta[0];
             break;
         case IMP_MOVE_VERTICES: vertices_velocity(moves, x, theta, &out); break;
+        case IMP_MOVE_NORMALS:
+            normals_velocity(x, vertices_of(moves, x), theta, &out);
+            break;
         case IMP_MOVE_AFFINE:
             imp__affine_velocity(moves->scene, x, r, theta, &out);
             break;
@@ -309,6 +328,7 @@ void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *
             theta[0] += m->rate * (imp__dot(r, bar->v) + 2 * bar->area);
             break;
         case IMP_MOVE_VERTICES: vertices_bar(moves, x, bar, theta); break;
+        case IMP_MOVE_NORMALS: normals_bar(x, vertices_of(moves, x), bar, theta); break;
         case IMP_MOVE_AFFINE: imp__affine_bar(moves->scene, x, r, bar, theta); break;
         default: break;
         }
@@ -319,7 +339,7 @@ size_t imp__mover_touched(const struct imp__moves *moves, const struct imp__move
                           const struct imp__glued *x, size_t index[IMP_TOUCHED_MOST])
 {
     size_t n = 0;
-    if (mover->kind != IMP_MOVE_VERTICES) {
+    if (mover->kind != IMP_MOVE_VERTICES && mover->kind != IMP_MOVE_NORMALS) {
         for (; n < mover->count; n++) index[n] = mover->first + n;
         return n;
     }

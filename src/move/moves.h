@@ -7,6 +7,8 @@
  *     scale     V = s (X - c) at the scale 1 of the shape as it is, or over that scale (1)
  *     affine    V = e + A (X - c), A row by row (12): of what is stretched or turned as a whole
  *     vertices  V = b_0 e_0 + b_1 e_1 + b_2 e_2, of a triangle with weights b (3 each)
+ *     normals   V = 0, of a triangle with weights b of the vertex normals n_i:  N' = b_0 n_0' + b_1 n_1'
+ *               + b_2 n_2' (3 each)
  *     view      of a camera: the velocity of what a fixed film position sees by its field of view,
  *               its principal point, a coefficient or the aperture of its lens
  *               (imp_sensor_ops.view_velocity, lens_velocity) (1 each)
@@ -48,6 +50,7 @@ enum imp__move_kind {
     IMP_MOVE_POSE,
     IMP_MOVE_SCALE,
     IMP_MOVE_VERTICES,
+    IMP_MOVE_NORMALS,
     IMP_MOVE_AFFINE,
     IMP_MOVE_LIGHT,
     IMP_MOVE_AXIS,
@@ -152,7 +155,7 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves,
  * a cylinder turn and stretch it. */
 void imp__pose_numbers_bar(const struct imp__moves *moves, const struct imp__mover *mover,
                            const struct imp_pose *pose, double *bar);
-/* Does it move (imp__mover.shape)? By a mover that is not `but` (NULL: any). */
+/* Does it move (imp__mover.shape)? By a mover that is not `but` (NULL: any). Normals alone move nothing. */
 bool imp__moves_shape(const struct imp__moves *moves, int shape,
                       const struct imp__mover *but);
 

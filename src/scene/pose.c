@@ -155,7 +155,8 @@ static bool ends_apply(const struct imp_pose *p, struct imp_shape *s)
 static enum imp_status shape_apply(const struct imp_pose *p)
 {
     struct imp_shape *s = p->scene->shapes[p->shape];
-    const struct imp_pose *vertices = imp__pose_beside(p, IMP_POSE_VERTICES);
+    const struct imp_pose *vertices = imp__pose_beside(p, IMP_POSE_VERTICES),
+                          *turned = imp__pose_beside(p, IMP_POSE_NORMALS);
     const size_t n = 3 * s->triangles.n_vertices;
     float *positions = (float *)(uintptr_t)s->triangles.positions;
     memcpy(s->self, p->rest, p->rest_size);
@@ -173,6 +174,7 @@ static enum imp_status shape_apply(const struct imp_pose *p)
     float *normals =
         p->normals ? (float *)(uintptr_t)((struct imp__mesh *)s->self)->normals : NULL;
     if (normals && !vertices) memcpy(normals, p->normals, n * sizeof *normals);
+    for (size_t k = 0; turned && k < n; k++) normals[k] = (float)turned->number[k];
     if (normals && vertices)
         IMP_CHECKED(imp__mesh_normals(p->scene->ctx, s->triangles.n_vertices,
                                       s->triangles.n_triangles, positions,
@@ -214,6 +216,7 @@ double imp__pose_large(const struct imp_pose *p, size_t e)
     case IMP_POSE_SUN_RADIUS:
     case IMP_POSE_SCALE:
     case IMP_POSE_RADIUS: return 0.3 * p->number[0];
+    case IMP_POSE_NORMALS: return 0.3;
     case IMP_POSE_VERTICES: {
         const struct imp_shape *s = p->scene->shapes[p->shape];
         return 0.1 * imp__length(s->hi - s->lo);
@@ -286,6 +289,16 @@ static bool is_finite(const struct imp_shape *s)
     return isfinite(size[0]) && isfinite(size[1]) && isfinite(size[2]);
 }
 
+static bool normals_are_directions(const struct imp_pose *p)
+{
+    for (size_t k = 0; k < p->n; k += 3) {
+        const double length = imp__length(imp__v3(
+            (float)p->number[k], (float)p->number[k + 1], (float)p->number[k + 2]));
+        if (!(length > 0) || !isfinite(length)) return false;
+    }
+    return true;
+}
+
 void imp__pose_changed(void *payload)
 {
     struct imp_pose *p = payload;
@@ -308,6 +321,8 @@ enum imp_status imp__poses_settle(struct imp_scene *scene)
         }
         if (p->shape >= 0 && !is_finite(scene->shapes[p->shape]))
             wrong = "moves the shape beyond what numbers hold";
+        if (p->kind == IMP_POSE_NORMALS && !normals_are_directions(p))
+            wrong = "holds a normal without a direction";
         if (imp__pose_is_round(p->kind) && !(scene->shapes[p->shape]->area > 0))
             wrong = "makes the shape vanish";
         const struct imp_pose *to = imp__pose_beside(p, IMP_POSE_DIRECTION);

@@ -8,6 +8,8 @@
  *     NAME.to_world          of a shape, instance, camera, spot or projector: the upper three rows of the matrix M
  *                            that puts what the kind has at x at  X = M x, as mi.traverse has it
  *     NAME.vertex_positions  of a mesh: the vertices, three numbers each, world
+ *     NAME.vertex_normals    of a mesh that has some: three numbers each, world, of any length; in a
+ *                            triangle they are weighted, and the sum is made unit
  *     NAME.center, .radius   of a sphere, world
  *     NAME.p0, .p1, .radius  of a circular cylinder: the middles of its ends, world; its points turn with
  *                            the axis as little as possible
@@ -37,6 +39,7 @@ enum imp_pose_kind {
     IMP_POSE_SCALE,
     IMP_POSE_WORLD,
     IMP_POSE_VERTICES,
+    IMP_POSE_NORMALS,
     IMP_POSE_CENTER,
     IMP_POSE_RADIUS,
     IMP_POSE_END_0,

@@ -95,13 +95,14 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
     double view[IMP_VIEW_NUMBERS], aim[3], rate;
     struct imp__sky_sun sun;
     if (imp__pose_is_view(p->kind)) p->sensor->ops->view(p->sensor, view, false);
+    const bool rows = p->kind == IMP_POSE_VERTICES || p->kind == IMP_POSE_NORMALS;
     const bool place = (p->kind >= IMP_POSE_POSITION && p->kind <= IMP_POSE_SUN) ||
                        (imp__pose_is_round(p->kind) && p->kind != IMP_POSE_RADIUS);
-    p->n = p->kind == IMP_POSE_RIGID      ? 6
-           : p->kind == IMP_POSE_WORLD    ? 12
-           : p->kind == IMP_POSE_VERTICES ? 3 * t->n_vertices
-           : place                        ? 3
-                                          : 1;
+    p->n = p->kind == IMP_POSE_RIGID   ? 6
+           : p->kind == IMP_POSE_WORLD ? 12
+           : rows                      ? 3 * t->n_vertices
+           : place                     ? 3
+                                       : 1;
     p->number = imp__arena_array(&scene->arena, p->n, sizeof *p->number);
     if (!p->number) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
     switch (p->kind) {
@@ -114,6 +115,11 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
     case IMP_POSE_VERTICES:
         for (size_t k = 0; k < p->n; k++) p->number[k] = t->positions[k];
         break;
+    case IMP_POSE_NORMALS: {
+        const struct imp__mesh *m = scene->shapes[p->shape]->self;
+        for (size_t k = 0; k < p->n; k++) p->number[k] = m->normals[k];
+        break;
+    }
     case IMP_POSE_POSITION:
     case IMP_POSE_DIRECTION:
         imp__pose_aim(p->emitter, p->kind, aim);
@@ -154,6 +160,7 @@ static const struct tail {
     [IMP_POSE_SCALE] = {"scale", "1", 1e-3, INFINITY},
     [IMP_POSE_WORLD] = {"to_world", "1, scene units", -INFINITY, INFINITY},
     [IMP_POSE_VERTICES] = {"vertex_positions", "scene units", -INFINITY, INFINITY},
+    [IMP_POSE_NORMALS] = {"vertex_normals", "1", -INFINITY, INFINITY},
     [IMP_POSE_CENTER] = {"center", "scene units", -INFINITY, INFINITY},
     [IMP_POSE_RADIUS] = {"radius", "scene units", 1e-6, INFINITY},
     [IMP_POSE_END_0] = {"p0", "scene units", -INFINITY, INFINITY},
@@ -186,7 +193,8 @@ static enum imp_status param_add(struct imp_scene *scene, const char *object,
     char *name = imp__arena_take(&scene->arena, length, 1);
     if (!name) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
     snprintf(name, length, "%s.%s", object, tail->name);
-    const bool rows = p->kind == IMP_POSE_VERTICES, map = p->kind == IMP_POSE_WORLD;
+    const bool rows = p->kind == IMP_POSE_VERTICES || p->kind == IMP_POSE_NORMALS,
+               map = p->kind == IMP_POSE_WORLD;
     const struct imp_param param = {
         .info = {.size = sizeof param.info,
                  .name = name,
@@ -231,6 +239,7 @@ static int family(enum imp_pose_kind kind)
     const bool view = imp__pose_is_view(kind) || kind == IMP_POSE_PICTURE;
     return view                        ? 0
            : kind == IMP_POSE_VERTICES ? 2
+           : kind == IMP_POSE_NORMALS  ? 5
            : imp__pose_is_round(kind)  ? 3
            : kind == IMP_POSE_WORLD    ? 4
                                        : 1;
@@ -251,6 +260,10 @@ static const char *beside_why(const struct imp_pose *p)
     for (const struct imp_pose *q = p->object != p ? p->object : NULL; q; q = q->next) {
         const int other = family(q->kind);
         if (q->object != p->object || other == own || !own || !other) continue;
+        if (own == 5 || other == 5)
+            return own + other == 7
+                       ? "vertex normals follow vertex_positions"
+                       : "single normals turn, and the whole turns with them";
         if (own == 2 || other == 2)
             return "single vertices move, and the whole moves with them";
         return own == 4 || other == 4
@@ -321,7 +334,8 @@ enum imp_status imp_scene_add_geometry(imp_scene *scene, const char *name)
     return imp__error(
         scene->ctx, IMP_E_ARG,
         "'%s' names no number of geometry: NAME.pose, scale, to_world, "
-        "vertex_positions, center, radius, p0, p1, x_fov, principal_point_offset_x, _y, "
+        "vertex_positions, vertex_normals, center, radius, p0, p1, x_fov, "
+        "principal_point_offset_x, _y, "
         "opencv_k1, k2, p1, p2, k3, aperture_radius, "
         "focus_distance, position, direction, turn, sun_direction or sun_radius",
         name);

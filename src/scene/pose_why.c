@@ -42,6 +42,8 @@ static const char *size_why(const struct imp_scene *scene, const struct imp_shap
     for (int k = 0; k < scene->n_sensors; k++)
         if (scene->sensors[k]->shape == s) return "it is a sensor";
     if (kind == IMP_POSE_VERTICES && !is_mesh) return "it is no mesh";
+    if (kind == IMP_POSE_NORMALS && !(is_mesh && s->smooth))
+        return "it is no mesh with vertex normals";
     return NULL;
 }
 

@@ -3,11 +3,12 @@
  * Derivatives by what moves in scenes of meshes with vertex normals: imp_problem_reverse against
  * central differences of pictures with the same random numbers. An egg of 32 triangles, on which
  * shading and geometric normals are up to 25 degrees apart, is moved, turned, scaled, and bent at
- * single vertices; the camera and the lamp move past it. Standard errors are bounded. What would
- * be biased is refused by name. */
+ * single vertices, and its normals are turned alone; the camera and the lamp move past it. A tile
+ * whose light is a formula of its normals. Standard errors are bounded. What would be biased is
+ * refused by name. */
 #include "egg.h"
-#include "imp_scene.h"
 #include "imp_tap.h"
+#include "mean_gradient.h"
 #include "moves_kit.h"
 #include "moves_numbers.h"
 #include <stdio.h>
@@ -50,6 +51,60 @@ static void numbers_test(const char *what, const char *rest, const char *white, 
     numbers_compare(what, room(rest, white), spp, spp_ref, largest, numbers);
 }
 
+/* ---- Normals alone ---------------------------------------------------------------------------- */
+
+#define TILE "moved_smooth_tile.obj"
+
+/* The middle of a triangle, where each normal n_i counts a third, reflects  rho/pi E N.w/|N|. */
+static void tile_test(void)
+{
+    static const double to_sun[3] = {.48, -.36, .8};
+    double n[9], ref[9], N[3] = {0}, most = 0, worst = 0;
+    struct tap_stat g[MEAN_NUMBERS_MAX] = {{0, 0, 0}};
+    size_t count, index;
+    FILE *f = fopen(TILE, "w");
+    if (!f) exit(99);
+    fprintf(f, "v -1 -1 0\nv 2 -1 0\nv -1 2 0\nvn .2 .1 1\nvn -.3 .2 .8\nvn .1 -.4 .9\n"
+               "f 1//1 2//2 3//3\n");
+    fclose(f);
+    imp_scene *scene = test_scene_text(
+        ctx,
+        "<scene version='3.0.0'>" DIRECT
+        "<sensor type='perspective'><float name='fov' value='.01'/><transform "
+        "name='to_world'><lookat origin='.6,-.4,3' target='0,0,0' up='0,1,0'/>"
+        "</transform><film type='hdrfilm'><integer name='width' value='1'/><integer "
+        "name='height' value='1'/><rfilter type='box'/></film></sensor><shape type='obj' "
+        "id='tile'><string name='filename' value='" TILE "'/><bsdf type='diffuse'>"
+        "<spectrum name='reflectance' value='.5'/></bsdf></shape><emitter "
+        "type='directional'><vector name='direction' value='-.48,.36,-.8'/><spectrum "
+        "name='irradiance' value='3'/></emitter></scene>",
+        IMP_MONO);
+    test_must(ctx, imp_scene_add_geometry(scene, "tile.vertex_normals"));
+    values_get(scene, "tile.vertex_normals", n, &count, &index);
+    n[0] *= 1.5; /* of other lengths than 1 */
+    n[4] += .3;
+    test_must(ctx, imp_scene_set_values(scene, index, count, n));
+    mean_gradient(ctx, scene, "tile.vertex_normals", 64, 1, g);
+    for (int k = 0; k < 9; k++) N[k % 3] += n[k] / 3;
+    const double length = sqrt(N[0] * N[0] + N[1] * N[1] + N[2] * N[2]);
+    double cosine = 0;
+    for (int i = 0; i < 3; i++) cosine += N[i] / length * to_sun[i];
+    for (int k = 0; k < 9; k++) {
+        ref[k] =
+            .5 * 3 / IMP_PI / 3 * (to_sun[k % 3] - N[k % 3] / length * cosine) / length;
+        most = fmax(most, fabs(ref[k]));
+        worst = fmax(worst, fabs(ref[k] - g[k].mean));
+    }
+    tap_ok(count == 9 && worst < 1e-4 * most, "normals of a tile # off %.1e of %.3g",
+           worst, most);
+    memset(n, 0, 3 * sizeof *n);
+    tap_ok(imp_scene_set_values(scene, index, count, n) == IMP_E_NUMERIC &&
+               strstr(imp_last_error(ctx), "tile.vertex_normals"),
+           "a normal without a direction is refused # %s", imp_last_error(ctx));
+    imp_scene_destroy(scene);
+    remove(TILE);
+}
+
 #define BULB                                                                             \
     DIRECT "<emitter type='point' id='bulb'><point name='position' value='1,-1,3'/>"     \
            "</emitter>"
@@ -80,6 +135,10 @@ int main(int argc, char **argv)
                                              {"egg.vertex_positions", 31, .02},
                                              {"egg.vertex_positions", 38, .02},
                                              {NULL, 0, 0}};
+    static const struct number normals[] = {
+        {"egg.vertex_normals", 1, .05},  {"egg.vertex_normals", 14, .05},
+        {"egg.vertex_normals", 31, .05}, {"egg.vertex_normals", 27, .05},
+        {"egg.vertex_normals", 38, .05}, {NULL, 0, 0}};
     ctx = test_context(2);
     adjoint_make();
     egg_write(EGG, true);
@@ -93,6 +152,14 @@ int main(int argc, char **argv)
         numbers_test("path, rough metal", PATH, METAL, 512, 1024, .1, whole);
         numbers_test("path, a scale", PATH, WHITE, 512, 1024, .1, sizes);
     }
+    tile_test();
+    numbers_test("normals", DIRECT, WHITE, 64, 192, .1, normals);
+    if (is_long) {
+        numbers_test("normals, path and a sky", PATH SKY, WHITE, 512, 1024, .1, normals);
+        numbers_test("normals, rough metal", DIRECT, METAL, 512, 1024, .1, normals);
+    }
+    number_refused("normals of a rectangle", room(DIRECT, WHITE), "floor.vertex_normals",
+                   "vertex normals");
     egg_write(EGG, false);
     numbers_test("vertices", DIRECT, WHITE, 64, 128, .1, vertices);
     number_refused("a bulb and an egg that moves", room(BULB, WHITE), "egg.pose",
