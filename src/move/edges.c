@@ -79,7 +79,7 @@ static bool move_apart(const struct imp__moves *moves, const struct imp__edge_fa
     if (a == b)
         return vertices_move(moves, a) &&
                !is_welded(moves->scene, f->shape, f->prim, g->prim, moves->seams_join);
-    return imp__moves_shape(moves, a, NULL) || imp__moves_shape(moves, b, NULL);
+    return imp__moves_place(moves, a) || imp__moves_place(moves, b);
 }
 
 const struct imp__edge *imp__edges_torn(const struct imp__edges *edges,

@@ -163,8 +163,14 @@ bool imp__moves_shape(const struct imp__moves *moves, int shape,
                       const struct imp__mover *but)
 {
     for (int k = 0; k < moves->n_movers; k++)
-        if (moves->mover[k].shape == shape && &moves->mover[k] != but &&
-            moves->mover[k].kind != IMP_MOVE_NORMALS)
+        if (moves->mover[k].shape == shape && &moves->mover[k] != but) return true;
+    return false;
+}
+
+bool imp__moves_place(const struct imp__moves *moves, int shape)
+{
+    for (int k = 0; k < moves->n_movers; k++)
+        if (moves->mover[k].shape == shape && moves->mover[k].kind != IMP_MOVE_NORMALS)
             return true;
     return false;
 }

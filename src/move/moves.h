@@ -155,9 +155,11 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves,
  * a cylinder turn and stretch it. */
 void imp__pose_numbers_bar(const struct imp__moves *moves, const struct imp__mover *mover,
                            const struct imp_pose *pose, double *bar);
-/* Does it move (imp__mover.shape)? By a mover that is not `but` (NULL: any). Normals alone move nothing. */
+/* Does it move (imp__mover.shape)? By a mover that is not `but` (NULL: any). */
 bool imp__moves_shape(const struct imp__moves *moves, int shape,
                       const struct imp__mover *but);
+/* Do its points? Those of a mesh stay where its normals alone turn. */
+bool imp__moves_place(const struct imp__moves *moves, int shape);
 
 /* Velocity along theta_dot [moves->n]; the transpose adds to theta_bar [moves->n]. */
 struct imp__velocity imp__velocity_of(const struct imp__moves *moves,

@@ -21,8 +21,8 @@ static enum imp_status facets_allowed(const struct imp__boundary *b)
         for (size_t j = 0; j < b->edges->n_bodies; j++) {
             const struct imp__body *body = &b->edges->body[j];
             if (imp__moves_smooth(scene, body->shape) &&
-                (imp__moves_shape(b->moves, imp__carrier(scene, body->shape, body->place),
-                                  NULL) ||
+                (imp__moves_place(b->moves,
+                                  imp__carrier(scene, body->shape, body->place)) ||
                  imp__moves_shape(b->moves, IMP_MOVE_EMITTER(k), NULL)))
                 return imp__error(
                     scene->ctx, IMP_E_UNSUPPORTED,
@@ -222,7 +222,7 @@ static enum imp_status camera_allowed(const struct imp__boundary *b)
         else if (met.shape != first.shape || met.place != first.place) return IMP_OK;
     }
     const int shape = first.shape;
-    if (!imp__moves_shape(b->moves, imp__carrier(scene, shape, first.place), NULL) &&
+    if (!imp__moves_place(b->moves, imp__carrier(scene, shape, first.place)) &&
         !imp__moves_shape(b->moves, IMP_MOVE_CAMERA, NULL))
         return IMP_OK;
     return imp__error(
@@ -312,7 +312,7 @@ static enum imp_status ball_allowed(const struct imp__boundary *b)
         bool inside = true;
         const int shape = p->instance >= 0 ? IMP_MOVE_INSTANCE(p->instance) : p->shape;
         if (!imp__pose_box(p, &lo, &hi) ||
-            (p->group < 0 && !imp__moves_shape(b->moves, shape, NULL)))
+            (p->group < 0 && !imp__moves_place(b->moves, shape)))
             continue;
         for (int i = 0; i < 3; i++)
             inside &= lo[i] > scene->lo[i] + near && hi[i] < scene->hi[i] - near;
