@@ -16,11 +16,12 @@ struct shifts {
     const char *tail;
     int number[3];
     bool turns;
+    bool alone; /* no other of its numbers shifts the middle */
 };
-static const struct shifts known[] = {{".pose", {0, 1, 2}, true},
-                                      {".center", {0, 1, 2}, false},
-                                      {".position", {0, 1, 2}, false},
-                                      {".to_world", {3, 7, 11}, false}};
+static const struct shifts known[] = {{".pose", {0, 1, 2}, true, true},
+                                      {".center", {0, 1, 2}, false, true},
+                                      {".position", {0, 1, 2}, false, true},
+                                      {".to_world", {3, 7, 11}, false, false}};
 
 static const struct shifts *shifts_of(const char *name)
 {
@@ -93,7 +94,7 @@ static void place_put(struct json *j, bool *opened, size_t param, int view, int 
     for (int k = 0; k < 3; k++) json_integer(j, NULL, s->number[k]);
     json_end_array(j);
     json_bool(j, "turns", s->turns);
-    if (way && way->n) way_put(j, sensor, middle, s, way, first, now);
+    if (way && way->n && s->alone) way_put(j, sensor, middle, s, way, first, now);
     json_end_object(j);
 }
 

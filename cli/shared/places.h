@@ -7,7 +7,8 @@
 
 #include "problem_options.h"
 
-/* Numbers of a search [n][n_numbers], as imp_fit_step.history_x; n 0: none. */
+/* Numbers of a search [n][n_numbers], as imp_fit_step.history_x; n 0: none. Things with a to_world
+ * have no way, since their matrices move the middle, too. */
 struct places_way {
     size_t n, n_numbers;
     const double *x;

@@ -275,8 +275,11 @@ void view_show_places(struct json *j, char **text)
 {
     json_end_object(j);
     fclose(j->file);
-    if (strcmp(*text, "{}")) view_show_json(VIEW_PLACES, "places", NULL, *text);
-    else free(*text);
+    if (!strcmp(*text, "{}")) { /* what the page has is no longer in the picture */
+        free(*text);
+        *text = cli_strdup("{\"places\":[]}");
+    }
+    view_show_json(VIEW_PLACES, "places", NULL, *text);
 }
 
 void view_show_film(enum view_channel channel, const imp_film *film, const char *name,

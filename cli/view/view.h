@@ -84,8 +84,7 @@ void view_show_json(enum view_channel channel, const char *kind, const char *nam
 void view_walks(const int pixel[2]);
 /* A JSON text in memory: *text, to be freed, is there once the stream is closed. */
 struct json view_stream(char **text, size_t *size);
-/* Where things are (shared/places.h), of an object that was opened in such a stream, which it closes;
- * without members nothing is shown. */
+/* Where things are (shared/places.h), of an object that was opened in such a stream, which it closes. */
 void view_show_places(struct json *j, char **text);
 void view_show_film(enum view_channel channel, const imp_film *film, const char *name,
                     const char *role, int view);

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Optional
 import numpy as np
 
 from . import _c
-from ._library import (ArgumentError, Handle, choice, context, decode, lib, make, not_inside, register_lock,
+from ._library import (ArgumentError, Handle, choice, context, decode, integer, lib, make, not_inside, register_lock,
                        text, warn_said, word)
 
 _mode = "rgb"
@@ -350,11 +350,12 @@ class Scene:
         p = np.ascontiguousarray(points, dtype=np.float64)
         if p.ndim < 1 or p.shape[-1] != 3:
             raise ArgumentError("points have a shape [..., 3], not %r" % (p.shape,))
+        number = integer(sensor, "sensor")
         film = np.empty(p.shape[:-1] + (2,))
         flat, out = p.reshape(-1, 3), (ctypes.c_double * 2)()
         with self.lock:
             for row, to in zip(flat, film.reshape(-1, 2)):
-                self._context.check(lib.imp_scene_film_point(self.pointer, sensor, (ctypes.c_double * 3)(*row), out))
+                self._context.check(lib.imp_scene_film_point(self.pointer, number, (ctypes.c_double * 3)(*row), out))
                 to[:] = out
         return film
 

@@ -24,7 +24,8 @@ function slider_of(n, moved) {
     slider.addEventListener("input", () => { field.value = Number(Number(slider.value).toPrecision(6)); moved(n.name, Number(slider.value)); });
     field.addEventListener("change", () => { if (field.value !== "" && field.checkValidity()) { slider.value = field.value; moved(n.name, Number(field.value)); } });
     const row = make("div", {class: "slider"}, make("label", {for: id, class: "mono"}, n.name), slider, field, make("span", {class: "faint"}, n.unit === "1" || !n.unit ? "" : n.unit));
-    return {row, name: n.name, move(by) { field.value = Number((Number(field.value) + by).toPrecision(6)); slider.value = field.value; moved(n.name, Number(field.value)); },
+    return {row, name: n.name, value() { return Number(field.value); },
+        move(to) { field.value = Number(to.toPrecision(6)); slider.value = field.value; moved(n.name, Number(field.value)); },
         set(value) { if (document.activeElement !== slider && document.activeElement !== field) { slider.value = value; field.value = Number(value.toPrecision(6)); } },
         enable(on) { slider.disabled = field.disabled = !on; }};
 }
@@ -120,15 +121,15 @@ function live_section(report, page) {
         document.documentElement.dataset.news = String(Number(document.documentElement.dataset.news || 0) + 1);
     }
     events.onerror = () => { said.textContent = events.readyState === 2 ? "importon has ended; this is the last that it told." : "The connection is lost; trying again."; };
-    /* Things are dragged where sliders could be moved: their numbers shift by v. */
+    /* Things are dragged where sliders could be moved: held() has their numbers as they are, and the
+     * function that it returns shifts these by v. */
     const follows = () => state.now.what === "render" || state.now.state !== "running";
-    function shift(place, v) {
-        place.shifts.forEach((number, k) => {
-            const name = `${place.name}[${number}]`, slider = state.sliders.find((s) => s.name === name);
-            if (slider) slider.move(v[k]);
-        });
+    function held(place) {
+        const sliders = place.shifts.map((number) => state.sliders.find((s) => s.name === `${place.name}[${number}]`));
+        const start = sliders.map((s) => (s ? s.value() : 0));
+        return (v) => sliders.forEach((s, k) => { if (s) s.move(start[k] + v[k]); });
     }
-    page.live = {ask, walks: false, movable: follows, shift};
+    page.live = {ask, walks: false, movable: follows, held};
     enable();
     return make("section", {id: "live", class: "noprint"}, said, make("div", {class: "bar"}, bar, note), make("div", {class: "bar", role: "toolbar", "aria-label": "run"}, stop, go, again, save), numbers);
 }

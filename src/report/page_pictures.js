@@ -113,7 +113,8 @@ function picture_section(layers, page) {
         };
         canvas.addEventListener("pointerdown", (e) => {
             const p = film_at(e);
-            held = state.things && live && live.movable() ? thing_at(page.things, layer, p.at, p.x, p.y, p.near) : null;
+            const thing = state.things && live && live.movable() ? thing_at(page.things, layer, p.at, p.x, p.y, p.near) : null;
+            held = thing && {thing, at: thing.at, axes: thing.axes, shift: live.held(thing)};
             drag = {x: e.clientX, y: e.clientY, moved: false};
             canvas.setPointerCapture(e.pointerId);
         });
@@ -130,8 +131,8 @@ function picture_section(layers, page) {
             if (!drag.moved) return;
             if (held) {
                 const p = film_at(e), to = [p.at.x + p.x * p.at.step, p.at.y + p.y * p.at.step];
-                live.shift(held, shift_of(held, to.map((x, i) => x - held.at[i])));
-                held.at = to;
+                held.shift(shift_of(held, to.map((x, i) => x - held.at[i])));
+                held.thing.at = to;
                 redraw();
                 return;
             }

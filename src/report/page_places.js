@@ -14,7 +14,7 @@ function things_of(items) {
     const answers = (kind) => items.filter((i) => i.kind === kind && i.data && Array.isArray(i.data.places)).map((i) => i.data);
     const now = answers("places").length ? answers("places") : answers("fit"), by = answers("gradient");
     return [...now, ...by].flatMap((data) => data.places
-        .filter((p) => p && of_length(p.at, 2) && of_length(p.axes && p.axes.flat(), 6) && of_length(p.shifts, 3) && is_number(p.radius))
+        .filter((p) => p && of_length(p.at, 2) && Array.isArray(p.axes) && of_length(p.axes.flat(), 6) && of_length(p.shifts, 3) && is_number(p.radius))
         .map((p) => ({...p, by: by.includes(data) && Array.isArray(data.params) ? derivative_of(data, p) : null})));
 }
 

@@ -328,42 +328,6 @@ static void chi2_of(struct setting *s, int p, int n, double *chi2, double *varia
     *variance += mean * mean - apart;
 }
 
-/* Correlation of two channels' noise: of residuals over sigma, by different samples. */
-static double correlation_of(struct setting *s, int n, int c, int d)
-{
-    double z[3] = {0};
-    for (int p = 0; p < PIXELS; p++)
-        for (int i = 0; i < n; i++)
-            for (int j = 0; j < n; j++) {
-                const double sc = s->noise[C * p + c], sd = s->noise[C * p + d];
-                const double rc = L(s, p, i, c) - target(s, p, c),
-                             rd = L(s, p, j, d) - target(s, p, d);
-                if (i == j || weight(s, p) == 0) continue;
-                z[0] += rc * (L(s, p, j, c) - target(s, p, c)) / (sc * sc);
-                z[1] += (L(s, p, i, d) - target(s, p, d)) * rd / (sd * sd);
-                z[2] += rc * rd / (sc * sd);
-            }
-    return z[0] > 0 && z[1] > 0 ? fmin(fmax(z[2] / sqrt(z[0] * z[1]), -1), 1) : 0;
-}
-
-/* The noise of the target, by pairs of channels. */
-static void noise_of(struct setting *s, int n, double meas[9])
-{
-    for (int c = 0; c < C; c++)
-        for (int d = 0; d < C; d++) {
-            const double rho = c == d ? 1 : correlation_of(s, n, c, d);
-            for (int p = 0; p < PIXELS; p++) {
-                const double by = weight(s, p) * weight(s, p) * rho *
-                                  s->noise[C * p + c] * s->noise[C * p + d];
-                for (int i = 0; i < n; i++)
-                    for (int j = 0; j < n; j++)
-                        for (size_t k = 0; i != j && k < 9; k++)
-                            meas[k] += by * X(s, p, i, k / 3, c) * X(s, p, j, k % 3, d) /
-                                       (n * (n - 1));
-            }
-        }
-}
-
 static void gauss_newton(void)
 {
     struct setting s;
@@ -377,7 +341,7 @@ static void gauss_newton(void)
         covariance_of(&s, p, n, g, cov);
         chi2_of(&s, p, n, &chi2, &chi2_variance);
         for (int c = 0; c < C; c++) {
-            const double w = weight(&s, p);
+            const double w = weight(&s, p), sigma = s.noise[C * p + c];
             for (int i = 0; i < n; i++)
                 for (int j = 0; j < n; j++)
                     for (size_t k = 0; k < 9; k++) {
@@ -385,10 +349,10 @@ static void gauss_newton(void)
                         same[k] += w * x / (n * n);
                         if (i == j) continue;
                         H[k] += w * x / (n * (n - 1));
+                        meas[k] += w * w * sigma * sigma * x / (n * (n - 1));
                     }
         }
     }
-    noise_of(&s, n, meas);
     struct imp__gauss_newton out = {.H = mine[0],
                                     .H_same = mine[1],
                                     .H_meas = mine[2],

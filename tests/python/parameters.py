@@ -237,6 +237,8 @@ def test_places():
     raises(im.ParameterError, lambda: s.place("nothing"), "nothing")
     raises(im.ArgumentError, lambda: s.film_points([1, 2]), "shape")
     raises(im.ArgumentError, lambda: s.film_points([1, 2, 3], sensor=4), "sensor")
+    raises(im.ArgumentError, lambda: s.film_points([1, 2, 3], sensor=-2**40), "sensor")
+    raises(TypeError, lambda: s.film_points([1, 2, 3], sensor=1.5), "sensor")
     return "the lamp is at %.1f, %.1f" % (x, y)
 
 

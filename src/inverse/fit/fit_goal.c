@@ -195,10 +195,12 @@ static enum imp_status normal(const double *x, uint64_t seed, int rounds,
     out->chi2 = gn.chi2;
     out->n_residuals = gn.n_residuals;
     out->noise_known = true;
-    /* A fit of n variables reduces the squared residuals of M pixels by (M - n)/M on
-     * average; corrected where they are used as estimates of the noise. */
-    const double freedom = gn.n_residuals - (double)(n - imp__held_count(fit->problem));
-    const double widen = fit->noise_known || freedom < 1 ? 1 : gn.n_residuals / freedom;
+    /* A fit of n variables reduces the squared residuals of M observations by (M - n)/M on
+     * average; corrected where they are used as estimates of the noise. A pixel is one where its
+     * channels may share their noise. */
+    const double observations = gn.n_pixels > 0 ? gn.n_pixels : gn.n_residuals;
+    const double freedom = observations - (double)(n - imp__held_count(fit->problem));
+    const double widen = fit->noise_known || freedom < 1 ? 1 : observations / freedom;
     for (size_t i = 0; i < n * n; i++) out->H_meas[i] *= widen;
     for (size_t i = 0; i < n * n; i++) {
         out->H_prior[i] = fit->H_prior[i];

@@ -19,7 +19,7 @@
  * and J^T J come from different halves of the units, so that their own noise is not
  * correlated. Channels of a pixel share their noise, in a rendered picture nearly all of it:
  * sigma^2 J^T J is a sum over pairs of channels, with the product of their residuals, or with
- * the given sigmas times the correlation of residuals over sigma. */
+ * the given sigmas times the correlation of residuals. */
 #include "gauss_newton.h"
 #include "base/arguments.h"
 #include "film/film_filter.h"
@@ -33,6 +33,9 @@
 #include "walk/rules/features.h"
 
 #define GAUSS_NEWTON_MAX 256
+/* Pixels that products of two channels' residuals take for each value: with fewer, a fit follows their
+ * noise, and what is left of it tells little. */
+#define PIXELS_A_VALUE 4
 
 static enum imp_status workers_create(struct imp__normal_job *j, imp_context *ctx)
 {
@@ -77,7 +80,7 @@ static enum imp_status pictures_add(struct imp__normal_job *j, const struct imp_
         moved.first = imp__moved_first(number);
     }
     IMP_TRY(imp__gauss_newton_wide(p, &j->tracer, moved.moves.n > 0 ? &moved : NULL,
-                                   j->target, run, rounds, lo, hi, &total));
+                                   j->target, run, rounds, j->pairs, lo, hi, &total));
 out:
     imp__moved_end(&moved);
     return st;
@@ -125,8 +128,6 @@ static enum imp_status target_add(struct imp__normal_job *j,
     st = imp__tiles_create(&j->tiles);
     if (st == IMP_OK) st = imp__tiles_run(&j->tiles, &pass);
     imp__tiles_destroy(&j->tiles);
-    struct imp__normal_sums total = imp__normal_at(j, j->total);
-    if (st == IMP_OK) imp__normal_cross(j, &total);
     return st;
 }
 
@@ -172,8 +173,11 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
     if (x) IMP_TRY(imp_problem_set_x(p, x));
     imp__team_state(p->scene, &own);
     p->edge_terms = true;
+    out->n_pixels = imp__normal_pixel_count(p);
+    if (out->n_pixels < PIXELS_A_VALUE * (double)p->n) out->n_pixels = 0;
+    j.pairs = out->n_pixels > 0;
     for (size_t t = 0; t < p->n_targets; t++)
-        j.cross |= p->targets[t].noise_se && p->targets[t].desc.channels > 1;
+        j.cross |= j.pairs && p->targets[t].noise_se && p->targets[t].desc.channels > 1;
     j.workers = imp__alloc(ctx, (size_t)ctx->threads, sizeof *j.workers);
     j.total = imp__alloc(ctx, imp__normal_count(&j), sizeof *j.total);
     if (!j.workers || !j.total)
@@ -194,7 +198,8 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
         wide |= shares_walks(&j.tracer) || imp__problem_moves(p);
     }
     /* Where pixels share walks, the same estimate as that of trial steps from the same walks. */
-    const struct imp__normal_sums total = imp__normal_at(&j, j.total);
+    struct imp__normal_sums total = imp__normal_at(&j, j.total);
+    imp__normal_cross(&j, &total);
     struct imp_estimate objective = {
         .value = total.scalars[IMP_NORMAL_OBJECTIVE],
         .se = sqrt(fmax(0, total.scalars[IMP_NORMAL_VARIANCE])),

@@ -30,17 +30,30 @@ struct imp__gauss_newton {
      * are quadratic in the picture */
     double chi2, chi2_se;
     double n_residuals;
+    /* Where channels of a pixel may share their noise in H_meas: pixels that count. 0: there are too
+     * few of them for so many values, and channels are independent in it. */
+    double n_pixels;
 };
 enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
                                   const struct imp_run *run,
                                   struct imp__gauss_newton *out);
 
-/* Correlation of two channels' noise by sums of products of residuals over sigma; 0 where their own
- * are not above their noise. */
-static inline double imp__noise_correlation(double cc, double dd, double cd)
+/* What tells how the noise of two channels whose sigmas are given is correlated: sums over the pixels
+ * where both count. */
+struct imp__channel_pair {
+    double cc, dd, cd; /* of products of residuals, without our own noise */
+    double c, d;       /* of sigma^2 */
+    double pixels;
+};
+_Static_assert(sizeof(struct imp__channel_pair) == 6 * sizeof(double), "six sums");
+/* Their correlation. 0, as if they were independent, where pixels are few, and where residuals are not
+ * the noise that was given: then they tell of a model that does not fit. */
+static inline double imp__channel_correlation(const struct imp__channel_pair *p)
 {
-    if (!(cc > 0 && dd > 0)) return 0;
-    return fmin(fmax(cd / sqrt(cc * dd), -1), 1);
+    const bool fits = p->cc > 0.5 * p->c && p->cc < 1.5 * p->c && p->dd > 0.5 * p->d &&
+                      p->dd < 1.5 * p->d;
+    if (p->pixels < 64 || !fits) return 0;
+    return fmin(fmax(p->cd / sqrt(p->cc * p->dd), -1), 1);
 }
 
 struct imp__normal_sums { /* matrices [K*K], lower triangles */
@@ -59,8 +72,8 @@ enum {
     IMP_NORMAL_CHI2,
     IMP_NORMAL_CHI2_VARIANCE, /* its jackknife, */
     IMP_NORMAL_CHI2_EXCESS,   /* and what that has too much (excess.h) */
-    IMP_NORMAL_CHANNELS, /* six: products of residuals over sigma of 00, 11, 22, 01, 02, 12 */
-    IMP_NORMAL_CHANNELS_LAST = IMP_NORMAL_CHANNELS + 5,
+    IMP_NORMAL_CHANNELS,      /* struct imp__channel_pair of 01, 02, 12 */
+    IMP_NORMAL_CHANNELS_LAST = IMP_NORMAL_CHANNELS + 3 * 6 - 1,
     IMP_NORMAL_SCALARS
 };
 
@@ -68,13 +81,14 @@ struct imp__moved_gradient;
 
 /* Adds H, H_same, H_meas, g, cov_g, cov_excess, deviations and chi2 of a target whose
  * pixels share walks (a filter wider than a pixel, or light walks) or draws from edges (moved; NULL:
- * no pose is active), from `rounds` times the samples of an evaluation; lo, hi: the part of the
- * caller's progress. */
+ * no pose is active), from `rounds` times the samples of an evaluation; pairs: channels may share their
+ * noise; lo, hi: the part of the caller's progress. */
 enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                                        const struct imp_tracer *tracer,
                                        const struct imp__moved_gradient *moved,
                                        const struct imp__target *target,
-                                       const struct imp_run *run, int rounds, double lo,
-                                       double hi, struct imp__normal_sums *out);
+                                       const struct imp_run *run, int rounds, bool pairs,
+                                       double lo, double hi,
+                                       struct imp__normal_sums *out);
 
 #endif

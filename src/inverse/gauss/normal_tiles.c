@@ -237,7 +237,7 @@ static void pair_products(const struct imp__normal_job *j, const struct pixel *p
 }
 
 /* What the noise of channels c < d has together: the cross-fitted product of residuals in place of
- * sigma^2; with given sigmas these and both, for a correlation that is known at the end. */
+ * sigma^2; with given sigmas these, for a correlation that is known at the end. */
 static void pair_add(const struct imp__normal_job *j, const struct pixel *p, size_t c,
                      size_t d, struct imp__normal_sums *out)
 {
@@ -251,12 +251,16 @@ static void pair_add(const struct imp__normal_job *j, const struct pixel *p, siz
            *xx1 = w->sum1_xx, *to = out->H_meas, m0 = 0, m1 = 0, m = 0;
     if (weight == 0) return;
     if (se) {
-        const double both = (double)se[p->index * S + c] * (double)se[p->index * S + d];
-        if (both > 0) {
-            const double product = residual_product(p, c, d, 0, p->M);
-            out->scalars[IMP_NORMAL_CHANNELS + 2 + c + d] += p->share * product / both;
-        }
-        m = weight * both / (M * (M - 1));
+        const double sc = se[p->index * S + c], sd = se[p->index * S + d];
+        const double share = p->share;
+        double *z = out->scalars + IMP_NORMAL_CHANNELS + 6 * (c + d - 1);
+        z[0] += share * square_residual(p, c, 0, p->M);
+        z[1] += share * square_residual(p, d, 0, p->M);
+        z[2] += share * residual_product(p, c, d, 0, p->M);
+        z[3] += share * sc * sc;
+        z[4] += share * sd * sd;
+        z[5] += share;
+        m = weight * sc * sd / (M * (M - 1));
         to = out->cross + (c + d - 1) * K * K;
     } else {
         m0 = 0.5 * weight / (n0 * (n0 - 1)) * residual_product(p, c, d, half, p->M);
@@ -280,30 +284,20 @@ static void pairs_add(const struct imp__normal_job *j, const struct pixel *p,
                       struct imp__normal_sums *out)
 {
     const size_t S = (size_t)seen_channels(j);
-    const float *se = j->target->noise_se;
-    if (S < 2) return;
-    for (size_t c = 0; c < S; c++) {
-        const double sigma = se ? se[p->index * S + c] : 0;
-        if (sigma > 0 && p->w->weight[c] > 0)
-            out->scalars[IMP_NORMAL_CHANNELS + c] +=
-                p->share * square_residual(p, c, 0, p->M) / (sigma * sigma);
+    for (size_t c = 0; j->pairs && c < S; c++)
         for (size_t d = c + 1; d < S; d++) pair_add(j, p, c, d, out);
-    }
 }
 
 void imp__normal_cross(const struct imp__normal_job *j, struct imp__normal_sums *sums)
 {
     const size_t KK = j->K * j->K;
-    double *z = sums->scalars + IMP_NORMAL_CHANNELS;
-    if (!sums->cross) return;
-    for (size_t c = 0; c < 3; c++)
-        for (size_t d = c + 1; d < 3; d++) {
-            const double rho = imp__noise_correlation(z[c], z[d], z[2 + c + d]);
-            double *cross = sums->cross + (c + d - 1) * KK;
-            for (size_t i = 0; i < KK; i++) sums->H_meas[i] += rho * cross[i];
-        }
-    memset(sums->cross, 0, 3 * KK * sizeof *sums->cross);
-    memset(z, 0, 6 * sizeof *z);
+    for (size_t pair = 0; sums->cross && pair < 3; pair++) {
+        struct imp__channel_pair z;
+        memcpy(&z, sums->scalars + IMP_NORMAL_CHANNELS + 6 * pair, sizeof z);
+        const double rho = imp__channel_correlation(&z);
+        for (size_t i = 0; i < KK; i++)
+            sums->H_meas[i] += rho * sums->cross[pair * KK + i];
+    }
 }
 
 /* ---- The gradient and its noise --------------------------------------------------- */

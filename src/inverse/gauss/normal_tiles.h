@@ -22,7 +22,8 @@ struct imp__normal_job {
     int width, channels;
     size_t K;
     bool deviate; /* the deviations of J^T W J, too */
-    bool cross;   /* some target has several channels and given sigmas */
+    bool pairs;   /* channels may share their noise */
+    bool cross;   /* they do, and some target has given sigmas */
     struct imp_tiles tiles;
     struct imp__normal_worker {
         double *x;              /* [K][channels] of one set: mean */
@@ -71,10 +72,11 @@ int imp__normal_units(int sets);
 double imp__normal_residuals(const struct imp__target *target, size_t pixel, size_t c,
                              int units, double r[][3], double *factor);
 
-/* Channels of pixels whose weight is not 0. */
+/* Channels of pixels whose weight is not 0; and pixels with such a channel, of all targets. */
 double imp__normal_residual_count(const struct imp__target *target);
+double imp__normal_pixel_count(const struct imp_problem *problem);
 
-/* Adds `cross` of a target, which is complete, to its H_meas, with the channels' correlations. */
+/* Adds `cross` of all targets to H_meas, with the channels' correlations. */
 void imp__normal_cross(const struct imp__normal_job *j, struct imp__normal_sums *sums);
 
 /* For imp__tiles_run. */

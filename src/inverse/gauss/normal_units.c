@@ -59,3 +59,19 @@ double imp__normal_residual_count(const struct imp__target *t)
             count += imp__target_weight(t, i, c) > 0;
     return count;
 }
+
+double imp__normal_pixel_count(const struct imp_problem *problem)
+{
+    double count = 0;
+    for (size_t k = 0; k < problem->n_targets; k++) {
+        const struct imp__target *t = &problem->targets[k];
+        const size_t n = (size_t)t->desc.width * (size_t)t->desc.height;
+        for (size_t i = 0; i < n; i++) {
+            bool counts = false;
+            for (int c = 0; c < t->desc.channels; c++)
+                counts |= imp__target_weight(t, i, c) > 0;
+            count += counts;
+        }
+    }
+    return count;
+}

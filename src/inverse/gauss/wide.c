@@ -303,8 +303,8 @@ enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                                        const struct imp_tracer *tracer,
                                        const struct imp__moved_gradient *moved,
                                        const struct imp__target *target,
-                                       const struct imp_run *run, int rounds, double lo,
-                                       double hi, struct imp__normal_sums *out)
+                                       const struct imp_run *run, int rounds, bool pairs,
+                                       double lo, double hi, struct imp__normal_sums *out)
 {
     enum imp_status st = IMP_OK;
     struct imp__wide w = {.ctx = p->ctx,
@@ -318,6 +318,7 @@ enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                           .channels = p->scene->channels,
                           .seen = target->desc.channels,
                           .luminance = imp__sees_luminance(target, p->scene->channels),
+                          .pairs = pairs,
                           .K = p->n};
     const bool lights = tracer->integrator->from_lights;
     if (lights) IMP_TRY(light_plan(&w, tracer, run, rounds));

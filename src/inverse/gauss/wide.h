@@ -16,6 +16,7 @@ struct imp__wide {
     const struct imp_film_desc *film;
     int width, height, channels, seen;       /* of the scene, of the target */
     bool luminance;                          /* that is what the target sees */
+    bool pairs;                              /* channels may share their noise */
     const struct imp__moved_gradient *moved; /* NULL: no pose is active */
     int R;
     size_t K;

@@ -73,25 +73,22 @@ static double residuals(struct imp__wide *w, size_t p, int c,
     return weight;
 }
 
-/* Correlation of two channels' noise where their sigmas are given: that of the residuals over
- * sigma, over the picture. */
 static double channel_correlation(struct imp__wide *w, int c, int d)
 {
     const size_t pixels = (size_t)w->width * (size_t)w->height, S = (size_t)w->seen;
-    double cc = 0, dd = 0, cd = 0;
+    struct imp__channel_pair sums = {0};
     if (c == d) return 1;
     for (size_t p = 0; p < pixels; p++) {
-        const double sc = w->noise_se[p * S + (size_t)c],
-                     sd = w->noise_se[p * S + (size_t)d];
         double rc[IMP_WIDE_REPLICATES], rd[IMP_WIDE_REPLICATES];
-        if (!(sc > 0 && sd > 0) || residuals(w, p, c, rc) == 0 ||
-            residuals(w, p, d, rd) == 0)
-            continue;
-        cc += residual_product(rc, rc, 0, w->R) / (sc * sc);
-        dd += residual_product(rd, rd, 0, w->R) / (sd * sd);
-        cd += residual_product(rc, rd, 0, w->R) / (sc * sd);
+        if (residuals(w, p, c, rc) == 0 || residuals(w, p, d, rd) == 0) continue;
+        sums.cc += residual_product(rc, rc, 0, w->R);
+        sums.dd += residual_product(rd, rd, 0, w->R);
+        sums.cd += residual_product(rc, rd, 0, w->R);
+        sums.c += imp__sqr(w->noise_se[p * S + (size_t)c]);
+        sums.d += imp__sqr(w->noise_se[p * S + (size_t)d]);
+        sums.pixels++;
     }
-    return imp__noise_correlation(cc, dd, cd);
+    return imp__channel_correlation(&sums);
 }
 
 /* The covariance of the noise of two channels at each pixel, from half of the replicates. */
@@ -165,6 +162,7 @@ void imp__wide_measurement(struct imp__wide *w, struct imp__normal_sums *out)
                        w->row);
             }
             for (int c = 0; c < w->seen; c++) {
+                if (c != d && !w->pairs) continue;
                 covariance_fill(w, c, d, half);
                 derivatives_fill(w, c, half, 0, w->Xc);
                 products_add(w, out->H_meas);

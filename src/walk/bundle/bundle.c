@@ -200,7 +200,15 @@ static bool meter_begin(struct imp_arena *arena, struct imp_depth *d, const int 
             return false;
         imp__meter_vertex(d, walk, k, &weight);
         if (sensor) imp__color_put(sensor->values.w, b->colors, k, imp__spec(weight));
-        if (imp_likely(!lanes) || k % n_samples > 0 || d->next->ray.n == rays) continue;
+        if (imp_likely(!lanes) || k % n_samples > 0) continue;
+        const int more = imp__reuse_more(b->tracer, xy[k / n_samples]);
+        if (imp_unlikely(d->next->ray.n ==
+                         rays)) { /* those that give only have none either */
+            for (int of = k; of < k + n_samples && d->reuse; of++)
+                d->reuse->times[of] = 1;
+            giver += more * n_samples;
+            continue;
+        }
         struct imp_meter_others others = {.first = k,
                                           .ray = rays,
                                           .from = k + 1,
@@ -210,7 +218,7 @@ static bool meter_begin(struct imp_arena *arena, struct imp_depth *d, const int 
         imp__meter_others(d, &others);
         others.n = n_samples;
         others.samples = samples;
-        for (int left = imp__reuse_more(b->tracer, others.at); left > 0; left--) {
+        for (int left = more; left > 0; left--) {
             others.copy++;
             others.from = giver;
             imp__meter_others(d, &others);
