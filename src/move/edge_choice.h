@@ -45,7 +45,8 @@ enum imp_status imp__edge_tree_build(const struct imp__edges *edges,
                                      struct imp__edge_tree *out);
 void imp__edge_tree_free(struct imp__edge_tree *tree);
 
-/* Edges by measure [n], each positive. NULL: their lengths. The tree is borrowed. */
+/* Edges by measure [n], at least 0; one of measure 0 has no chance, and is never asked for by the tree.
+ * NULL: their lengths. The tree is borrowed. */
 enum imp_status imp__edge_choice_begin(const struct imp__edges *edges,
                                        const struct imp__edge_tree *tree,
                                        const double *measure, int n_cells,

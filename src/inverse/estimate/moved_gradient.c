@@ -205,6 +205,12 @@ struct draws {
     double *half[2];  /* [moves.n][contrasts]; NULL: not wanted */
 };
 
+/* floor(k n/of), whose product may be beyond 64 bits. */
+static int64_t part_of(int64_t k, int64_t n, int64_t of)
+{
+    return (int64_t)((__int128)k * n / of);
+}
+
 /* A number that a flux depends on. */
 static void number_count(const struct draws *d, size_t number, double counts,
                          const double *contrast, double *half)
@@ -256,7 +262,9 @@ static bool draws_add(const struct draws *d, struct imp_arena *arena,
         /* Of all pixels; this one has its part of them, which may be none. */
         const int64_t n = imp_max(
             (int64_t)llround(plan.n * m->draws[kind] * (double)pixels), (int64_t)1);
-        for (int64_t i = pixel * n / pixels; i < (pixel + 1) * n / pixels; i++) {
+        const int64_t first = part_of(pixel, n, pixels),
+                      behind = part_of(pixel + 1, n, pixels);
+        for (int64_t i = first; i < behind; i++) {
             const struct imp_arena_mark mark = imp__arena_mark(arena);
             const struct imp__flux *f = imp__boundary_draw(
                 &m->boundary, arena, (enum imp__boundary_kind)kind, m->first + b * n + i,
