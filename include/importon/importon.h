@@ -669,8 +669,8 @@ imp_scene_place(const imp_scene *scene, size_t param, double middle[3], double *
  * middle of its lens, whatever hides the point.
  * @param point  [3] world.
  * @param film   [2] overwritten; NaN if the point is not in the picture.
- * @return IMP_OK; IMP_E_ARG if there is no such sensor; IMP_E_UNSUPPORTED of one that has no such
- *         picture (a meter, `distant`, `radiancemeter`). */
+ * @return IMP_OK; IMP_E_ARG if there is no such sensor, or the point is not finite; IMP_E_UNSUPPORTED of
+ *         one that has no such picture (a meter, `distant`, `radiancemeter`). */
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_film_point(const imp_scene *scene,
                                                             int sensor,
                                                             const double point[3],

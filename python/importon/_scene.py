@@ -336,7 +336,7 @@ class Scene:
         Raises
         ------
         ArgumentError
-            There is no such sensor, or points have other shapes.
+            There is no such sensor, or points have other shapes or are not finite.
         UnsupportedError
             It has no picture in which a point is seen.
 

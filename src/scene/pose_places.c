@@ -65,9 +65,12 @@ enum imp_status imp_scene_film_point(const imp_scene *scene, int sensor,
                           s->name, s->ops->name);
     struct imp_sensor_sample seen;
     const imp_v3 at = imp__v3(point[0], point[1], point[2]);
-    const bool finite = isfinite(at[0]) && isfinite(at[1]) && isfinite(at[2]);
+    for (int k = 0; k < 3; k++)
+        if (!isfinite(point[k]))
+            return imp__error(scene->ctx, IMP_E_ARG, "point[%d] = %g is not finite", k,
+                              point[k]);
     film[0] = film[1] = NAN;
-    if (!finite || !imp__sensor_connect(s, &at, false, lens, &seen)) return IMP_OK;
+    if (!imp__sensor_connect(s, &at, false, lens, &seen)) return IMP_OK;
     film[0] = seen.px - s->film.crop_x;
     film[1] = seen.py - s->film.crop_y;
     return IMP_OK;

@@ -276,6 +276,10 @@ class Fixture:
                     function.split("_")[-1], (b"shape", b"mesh"))
                 lib.imp_scene_begin(s, tag, kind, None, None)
                 return s
+            if function == "imp_scene_place":  # with a pose behind its other parameters
+                s = self.make("imp_scene_load_string", context, SCENE, len(SCENE), b"test", None)
+                if lib.imp_scene_add_pose(s, b"lamp") != OK: raise RuntimeError(self.said())
+                return s
             return scene
         if kind == "imp_film" and function == "imp_problem_jacobian_sums":
             return self.jacobian()[0]
@@ -425,6 +429,7 @@ class Fixture:
             zeros = {"scalar", "status", "cause", "sensor", "channel", "x", "y", "sample", "json", "i", "from_here",
                      "kind", "of", "time", "nm", "progress", "rays", "ray", "bundle", "n_walks", "target", "edge", "most", "subject", "from", "to", "luminaire", "lamp", "room", "sets", "stage"}
             if key == "imp_problem_tie.kind": return constants["IMP_TIE_LOG"], None
+            if key == "imp_scene_place.param": return lib.imp_scene_n_params(self.scene), None
             if key == "imp_bend_image.target": return 4, None  # the fixture adds it
             if function == "imp_parts_create": return {"index": 1, "count": 2}[a.name], None
             if a.name in scalars: return scalars[a.name], None
