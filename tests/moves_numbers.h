@@ -46,16 +46,34 @@ static struct tap_stat difference_of(imp_scene *scene, const struct number *x, i
     return out;
 }
 
+/* Errors told over the spread of so many seeds, of n numbers with sums `square` of squares of the former;
+ * of how many. */
+static double told_over_seen(const struct tap_stat *g, const double *square, size_t n,
+                             int seeds, int *counted)
+{
+    double told = 0;
+    *counted = 0;
+    for (size_t k = 0; k < n; k++) {
+        if (!(square[k] > 0)) continue;
+        const double own = imp__sqr(tap_se(&g[k])) * seeds;
+        told += log(sqrt(square[k] / seeds / own));
+        ++*counted;
+    }
+    return exp(told / *counted);
+}
+
 /* Parameters are added, and some of their numbers compared; the standard error is at most
  * `largest` of the largest number of the same parameter. Ends the scene. */
 static inline void numbers_compare(const char *what, imp_scene *scene, int spp,
                                    int spp_ref, double largest,
                                    const struct number *numbers)
 {
-    enum { SEEDS = 12 };
+    /* What few seeds say of spreads is within a fifth; where it is farther off, there are more. */
+    enum { FEW = 12, MANY = 48 };
     imp_problem *p;
     static struct tap_stat g[3 * NUMBERS_MAX];
-    double told = 0, seen = 0;
+    double ratio = 1;
+    int counted = 0, seeds = FEW;
     memset(g, 0, sizeof g);
     for (const struct number *x = numbers; x->name; x++)
         test_must(ctx, imp_scene_add_geometry(scene, x->name));
@@ -73,7 +91,7 @@ static inline void numbers_compare(const char *what, imp_scene *scene, int spp,
     first[n_active] = (int)n;
     static double square[3 * NUMBERS_MAX];
     memset(square, 0, sizeof square);
-    for (int s = 0; s < SEEDS; s++) {
+    for (int s = 0; s < seeds; s++) {
         struct imp_run run = IMP_RUN_INIT;
         double v[3 * NUMBERS_MAX], se[3 * NUMBERS_MAX];
         run.spp = spp;
@@ -81,19 +99,14 @@ static inline void numbers_compare(const char *what, imp_scene *scene, int spp,
         test_must(ctx, imp_problem_reverse(p, adjoint, &run, v, se));
         for (size_t k = 0; k < n; k++) {
             tap_add(&g[k], v[k]);
-            square[k] += se[k] * se[k] / SEEDS;
+            square[k] += se[k] * se[k];
         }
+        if (s != FEW - 1) continue;
+        ratio = told_over_seen(g, square, n, FEW, &counted);
+        if (!(ratio > 0.8 && ratio < 1.2)) seeds = MANY;
     }
     imp_problem_destroy(p);
-    int counted = 0;
-    for (size_t k = 0; k < n; k++) {
-        if (!(square[k] > 0)) continue;
-        const double own = imp__sqr(tap_se(&g[k])) * SEEDS;
-        told += log(sqrt(square[k] / own));
-        counted++;
-        seen += own;
-    }
-    const double ratio = exp(told / counted);
+    ratio = told_over_seen(g, square, n, seeds, &counted);
     tap_ok(ratio > 0.75 && ratio < 1.3,
            "%s: errors told over errors seen, mean of %d numbers # %.3f", what, counted,
            ratio);
@@ -104,7 +117,7 @@ static inline void numbers_compare(const char *what, imp_scene *scene, int spp,
         for (int k = first[a]; k < first[a + 1]; k++) most = fmax(most, fabs(g[k].mean));
         const struct tap_stat ref = difference_of(scene, x, spp_ref),
                               *own = &g[first[a] + x->k];
-        const double se = sqrt(square[first[a] + x->k] / SEEDS);
+        const double se = sqrt(square[first[a] + x->k]) / seeds;
         const double z = (own->mean - ref.mean) / hypot(se, tap_se(&ref));
         tap_ok(fabs(z) < 3.5 && se < largest * most,
                "%s, %s[%d] # %.5f se %.5f ref %.5f se %.5f z %.2f", what, x->name, x->k,

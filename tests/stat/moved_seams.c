@@ -202,7 +202,7 @@ int main(int argc, char **argv)
     numbers_compare("balls in a floor and in each other",
                     room(PATH BALL("<ref id='grey'/>") OTHER, ""), 24 * more, 32 * more,
                     .2, balls);
-    numbers_compare("a meter", meter(""), 128 * more, 1024 * more, .2, meters);
+    numbers_compare("a meter", meter(""), 512 * more, 1024 * more, .2, meters);
     if (is_long) {
         numbers_compare("a block aslant, over bounces", room(PATH SUN, SUNK_AND_TURNED),
                         32 * more, 48 * more, .15, block);
