@@ -11,6 +11,8 @@
 #include "scene_build.h"
 
 #define HITS_MAX 256 /* boundaries that a ray is followed through */
+#define PASSES_MAX                                                                       \
+    65536 /* other surfaces before one: a ray that meets more stands still */
 
 static const char *name_of(const struct imp_medium *m) { return m ? m->name : "none"; }
 
@@ -18,7 +20,7 @@ static const char *name_of(const struct imp_medium *m) { return m ? m->name : "n
 const struct imp_shape *imp__border_next(const struct imp_scene *scene, imp_v3 *o,
                                          imp_v3 d, bool *outwards)
 {
-    for (int k = 0; k < HITS_MAX; k++) {
+    for (int k = 0; k < PASSES_MAX; k++) {
         struct imp_hit hit;
         struct imp_surface at;
         if (!imp__intersect(scene, o, &d, 0, INFINITY, &hit)) return NULL;

@@ -383,7 +383,7 @@ static void furnace(void)
 
 static void refused(const char *medium, const char *more, const char *why)
 {
-    char text[4096];
+    char text[48000];
     snprintf(text, sizeof text,
              "<scene version='3.0.0'><integrator type='volpath'/>%s"
              "<shape type='sphere'><bsdf type='null'/><ref id='fog' name='interior'/>%s"
@@ -592,6 +592,14 @@ int main(void)
     refused(FOG("") "<sensor type='perspective'><transform name='to_world'>"
                     "<translate z='-5'/></transform><ref id='fog'/></sensor>",
             "", "is in medium fog");
+    /* Whatever stands before the border. */
+    char panes[40000] = FOG("") "<sensor type='perspective'/>";
+    for (int k = 0; k < 300; k++)
+        snprintf(panes + strlen(panes), sizeof panes - strlen(panes),
+                 "<shape type='rectangle'><transform name='to_world'><translate "
+                 "z='%g'/></transform></shape>",
+                 .1 + .002 * k);
+    refused(panes, "", "is inside shape");
     float bad[2] = {1, -1};
     char path[64], text[512];
     vol_write(path, 1, 1, 2, 1, bad);
