@@ -125,8 +125,10 @@ int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *s
         struct imp_hit hit;
         for (double from = END; imp__intersect(scene, &e->a, &d, from, 1 - END, &hit);
              from = imp_max(from, (double)hit.t) + END) {
-            if (!is_seamless(scene, hit.shape, hit.place)) continue;
             *other = edges->face[e->first].shape;
+            if (!is_seamless(scene, hit.shape, hit.place) ||
+                !imp__edges_pair(edges, scene, hit.shape, *other))
+                continue;
             return hit.shape;
         }
     }

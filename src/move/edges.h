@@ -39,11 +39,19 @@ struct imp__arc {
     double radius, from, till;     /* turns, from s to t */
 };
 
+/* Whose edges they are. */
+enum imp__edges_of {
+    IMP_EDGES_ALL,
+    IMP_EDGES_BUT_BORDERS, /* where walks go through media that end within the scene */
+    IMP_EDGES_LAMPS_BORDERS /* shapes that shine, and borders: by which the two are found to meet */
+};
+
 struct imp__edges {
     imp_context *ctx;
     size_t n_bodies;
     struct imp__body
-        *body; /* [n_bodies] all that rays can meet, but for borders of media */
+        *body; /* [n_bodies] all that rays can meet, as far as it is among `of` */
+    enum imp__edges_of of;
     size_t n, n_faces;
     struct imp__edge *edge; /* [n], along a curve through space: neighbours are near */
     struct imp__edge_face *face; /* [n_faces] */
@@ -58,7 +66,8 @@ struct imp__edges {
 /* All edges of the scene's shapes of triangles, flat or with vertex normals, also in instances.
  * IMP_E_UNSUPPORTED, with its name: another shape that is no sphere, disk or circular cylinder, or that
  * its instance makes none; an instance whose place changes with time. */
-enum imp_status imp__edges_build(const struct imp_scene *scene, struct imp__edges *out);
+enum imp_status imp__edges_build(const struct imp_scene *scene, enum imp__edges_of of,
+                                 struct imp__edges *out);
 void imp__edges_free(struct imp__edges *edges);
 
 /* The point of an edge as one that its face k carries along. */
@@ -83,6 +92,17 @@ const struct imp__edge *imp__edges_torn(const struct imp__edges *edges,
  * -1: none; *other: the other shape. */
 int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
                        int *other);
+
+/* Is it asked whether these two shapes pass through each other? */
+static inline bool imp__edges_pair(const struct imp__edges *edges,
+                                   const struct imp_scene *scene, int a, int b)
+{
+    const struct imp_shape *s = scene->shapes[a], *t = scene->shapes[b];
+    if (edges->of == IMP_EDGES_ALL) return true;
+    const bool first = imp__is_border(scene, s), second = imp__is_border(scene, t);
+    if (edges->of == IMP_EDGES_BUT_BORDERS) return !first && !second;
+    return (first && t->emitter >= 0) || (second && s->emitter >= 0);
+}
 
 /* ---- edges_arcs.c ---- */
 /* Sets the arcs. */

@@ -82,6 +82,14 @@ static enum imp_status bodies_take(struct building *x, size_t n)
     return x->out->body ? IMP_OK : imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
 }
 
+static bool is_among(const struct building *x, const struct imp_shape *s)
+{
+    const enum imp__edges_of of = x->out->of;
+    if (of == IMP_EDGES_ALL) return true;
+    const bool border = imp__is_border(x->scene, s);
+    return of == IMP_EDGES_BUT_BORDERS ? !border : border || s->emitter >= 0;
+}
+
 /* All bodies: they are counted, then listed. */
 static enum imp_status bodies_list(struct building *x)
 {
@@ -90,11 +98,13 @@ static enum imp_status bodies_list(struct building *x)
         size_t n = 0;
         for (int k = 0; k < imp__shapes_outside(scene); k++) {
             const struct imp_shape *s = scene->shapes[k];
-            if (imp__shape_is_absent(s) || imp__is_border(scene, s)) continue;
+            if (imp__shape_is_absent(s) || !is_among(x, s)) continue;
             if (pass) x->out->body[n] = (struct imp__body){k, 0};
             n++;
         }
-        for (int64_t place = 1; place <= places(scene); place++) {
+        /* In instances neither is a border nor a lamp. */
+        const bool alone = x->out->of == IMP_EDGES_LAMPS_BORDERS;
+        for (int64_t place = 1; place <= places(scene) && !alone; place++) {
             const struct imp_group *g = imp__place_group(scene, place);
             if (!g)
                 return imp__error(
@@ -323,11 +333,12 @@ static enum imp_status edges_order(struct building *x)
     return IMP_OK;
 }
 
-enum imp_status imp__edges_build(const struct imp_scene *scene, struct imp__edges *out)
+enum imp_status imp__edges_build(const struct imp_scene *scene, enum imp__edges_of of,
+                                 struct imp__edges *out)
 {
     enum imp_status st = IMP_OK;
     struct building x = {.ctx = scene->ctx, .scene = scene, .out = out};
-    *out = (struct imp__edges){.ctx = scene->ctx};
+    *out = (struct imp__edges){.ctx = scene->ctx, .of = of};
     x.middle = (scene->lo + scene->hi) * 0.5;
     x.size = imp__length(scene->hi - scene->lo);
     x.near = NEAR * x.size;

@@ -39,15 +39,15 @@ static bool is_hit(const struct imp_hit *hit, int shape, int64_t place)
 
 /* A shape that a segment from a to b of a body passes through, from its ends inwards by `end` parts of
  * it; not `but`. -1: none. */
-static int segment_pierces(const struct imp_scene *scene, const struct imp__body *body,
-                           const struct imp__rim_name *but, imp_v3 a, imp_v3 b,
-                           double end)
+static int segment_pierces(const struct imp__edges *edges, const struct imp_scene *scene,
+                           const struct imp__body *body, const struct imp__rim_name *but,
+                           imp_v3 a, imp_v3 b, double end)
 {
     const imp_v3 d = b - a;
     struct imp_hit hit;
     for (double from = end; imp__intersect(scene, &a, &d, from, 1 - end, &hit);
          from = hit.t + END)
-        if (!imp__is_border(scene, scene->shapes[hit.shape]) &&
+        if (imp__edges_pair(edges, scene, hit.shape, body->shape) &&
             !is_hit(&hit, body->shape, body->place) &&
             !(but && is_hit(&hit, but->shape, but->place)))
             return hit.shape;
@@ -71,9 +71,9 @@ static int rims_pierced(const struct imp__edges *edges, const struct imp_scene *
                                  .p;
             if (j % CHORDS == 0)
                 but = imp__rim_beside(edges, scene, &rim, &beside) ? &beside : NULL;
-            int met = segment_pierces(scene, body, but, a, b, 0);
+            int met = segment_pierces(edges, scene, body, but, a, b, 0);
             if (met < 0 && rims == 2 && rim.k == 0)
-                met = segment_pierces(scene, body, NULL, a,
+                met = segment_pierces(edges, scene, body, NULL, a,
                                       imp__rim(scene, rim.shape, rim.place, 1, v).p, END);
             if (met >= 0) return met;
         }
@@ -126,7 +126,9 @@ static int spheres_pierced(const struct imp__edges *edges, const struct imp_scen
         struct imp_round round;
         if (!imp__moves_sphere(scene, ball->shape, ball->place, &round)) continue;
         for (size_t j = 0; j < edges->n_bodies; j++)
-            if (j != k && meets_sphere(scene, &edges->body[j], &round)) {
+            if (j != k &&
+                imp__edges_pair(edges, scene, ball->shape, edges->body[j].shape) &&
+                meets_sphere(scene, &edges->body[j], &round)) {
                 *other = edges->body[j].shape;
                 return ball->shape;
             }

@@ -13,9 +13,7 @@ struct imp__moves imp__moves_begin(const struct imp_scene *scene,
                                    const struct imp_sensor *sensor)
 {
     return (struct imp__moves){
-        .scene = scene,
-        .sensor = sensor,
-        .borders = imp__borders_of(scene, sensor ? sensor->medium : NULL)};
+        .scene = scene, .sensor = sensor, .borders = {.scene = scene}};
 }
 
 void imp__moves_free(struct imp__moves *moves)

@@ -138,7 +138,7 @@ static inline void imp__move_vector_bar(double *bar, imp_v3 v)
     for (int i = 0; i < 3; i++) bar[i] += v[i];
 }
 
-/* Without movers. imp__moves_free releases them. */
+/* Without movers and borders. imp__moves_free releases them. */
 struct imp__moves imp__moves_begin(const struct imp_scene *scene,
                                    const struct imp_sensor *sensor);
 void imp__moves_free(struct imp__moves *moves);

@@ -7,6 +7,7 @@
  * not the one of their medium (tracking.c). */
 #include "sealed.h"
 #include "math/rng.h"
+#include "pose.h"
 #include "scene_build.h"
 #include <string.h>
 
@@ -14,10 +15,11 @@ extern const struct imp_shape_ops imp__sphere;
 
 /* ---- Closed surfaces ----------------------------------------------------------------- */
 
-/* By its place alone: vertices that files repeat count as one. */
-static uint64_t vertex_hash(const float *positions, uint32_t index)
+/* By its place: vertices that files repeat count as one; welded: each is another one. */
+static uint64_t vertex_hash(const float *positions, uint32_t index, bool welded)
 {
     uint64_t h = 0;
+    if (welded) return imp__mix64(index + 0x9e3779b97f4a7c15u);
     for (int c = 0; c < 3; c++) {
         const float x =
             positions[3 * (size_t)index + (size_t)c] + 0.0F; /* -0 becomes 0 */
@@ -35,17 +37,35 @@ static uint64_t edge_hash(uint64_t from, uint64_t to)
 
 /* The sum over edges of a hash of each, less that of the edge turned round, is 0 where all have
  * a counterpart; else it is 0 with a probability of 2^-64. */
-static bool is_closed_mesh(const struct imp_triangles *m)
+static bool is_closed_mesh(const struct imp_triangles *m, bool welded)
 {
     uint64_t sum = 0;
     for (size_t k = 0; k < m->n_triangles; k++) {
         uint64_t v[3];
         for (int c = 0; c < 3; c++)
-            v[c] = vertex_hash(m->positions, m->indices[3 * k + (size_t)c]);
+            v[c] = vertex_hash(m->positions, m->indices[3 * k + (size_t)c], welded);
         for (int c = 0; c < 3; c++)
             sum += edge_hash(v[c], v[(c + 1) % 3]) - edge_hash(v[(c + 1) % 3], v[c]);
     }
     return sum == 0;
+}
+
+bool imp__is_welded(const struct imp_triangles *m) { return is_closed_mesh(m, true); }
+
+/* Are the mesh's normals outward? By its volume, as it is now. */
+static bool is_outward_mesh(const struct imp_triangles *m)
+{
+    double volume = 0;
+    for (size_t k = 0; k < m->n_triangles; k++) {
+        imp_v3 r[3] = {{0}, {0}, {0}};
+        for (int c = 0; c < 3; c++) {
+            const float *p = m->positions + 3 * (size_t)m->indices[3 * k + (size_t)c],
+                        *o = m->positions + 3 * (size_t)m->indices[0];
+            for (int i = 0; i < 3; i++) r[c][i] = (double)p[i] - (double)o[i];
+        }
+        volume += imp__dot(r[0], imp__cross(r[1], r[2]));
+    }
+    return volume > 0;
 }
 
 /* Are the sphere's normals outward? By a ray from its middle. */
@@ -63,8 +83,8 @@ static bool is_outward_sphere(const struct imp_shape *s)
 static bool is_closed(const struct imp_shape *s)
 {
     if (s->ops == &imp__sphere) return is_outward_sphere(s);
-    return s->geometry == IMP_TRIANGLES && s->triangles.volume > 0 &&
-           is_closed_mesh(&s->triangles);
+    return s->geometry == IMP_TRIANGLES && is_outward_mesh(&s->triangles) &&
+           is_closed_mesh(&s->triangles, false);
 }
 
 /* ---- Lights outside ------------------------------------------------------------------- */
@@ -109,8 +129,19 @@ static bool is_bound(const struct imp_scene *scene, const struct imp_medium *m)
     return any;
 }
 
+static void closed_find(struct imp_scene *scene, int shape)
+{
+    const struct imp_shape *s = scene->shapes[shape];
+    scene->closed[shape] = (s->interior || s->exterior) && is_closed(s);
+}
+
+/* A vertex that is repeated opens a mesh where it moves alone, and a matrix may mirror a shape; other
+ * poses do neither. */
 void imp__sealed_renew(struct imp_scene *scene)
 {
+    for (const struct imp_pose *p = scene->closed ? scene->poses : NULL; p; p = p->next)
+        if (p->shape >= 0 && (p->kind == IMP_POSE_VERTICES || p->kind == IMP_POSE_WORLD))
+            closed_find(scene, p->shape);
     const bool known = !scene->media_open && !scene->priorities && !scene->world;
     for (int k = 0; scene->sealed && k < scene->n_media; k++)
         scene->sealed[k] = known && is_bound(scene, scene->media[k]);
@@ -123,11 +154,7 @@ enum imp_status imp__sealed_create(struct imp_scene *scene)
     scene->closed =
         imp__arena_array(&scene->arena, (size_t)scene->n_all_shapes + 1, sizeof(bool));
     if (!scene->sealed || !scene->closed) return imp__build_no_memory(scene);
-    /* Neither poses nor vertices open a shape that is closed. */
-    for (int k = 0; k < scene->n_all_shapes; k++) {
-        const struct imp_shape *s = scene->shapes[k];
-        scene->closed[k] = (s->interior || s->exterior) && is_closed(s);
-    }
+    for (int k = 0; k < scene->n_all_shapes; k++) closed_find(scene, k);
     imp__sealed_renew(scene);
     return IMP_OK;
 }

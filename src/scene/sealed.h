@@ -13,6 +13,9 @@ enum imp_status imp__sealed_create(struct imp_scene *scene);
 /* ... as shapes and lights are now. */
 void imp__sealed_renew(struct imp_scene *scene);
 
+/* Does a closed mesh stay closed whichever of its vertices move? */
+bool imp__is_welded(const struct imp_triangles *m);
+
 static inline bool imp__is_sealed(const struct imp_scene *scene,
                                   const struct imp_medium *m)
 {

@@ -138,7 +138,7 @@ static void derivatives_of(const char *rest, int spp, int draws, struct derivati
         test_must(ctx, imp__moves_add(&m, IMP_MOVE_SCALE, scene->n_shapes - 2 + k));
     }
     test_must(ctx, imp__moves_add(&m, IMP_MOVE_POSE, IMP_MOVE_CAMERA));
-    test_must(ctx, imp__edges_build(scene, &edges));
+    test_must(ctx, imp__edges_build(scene, IMP_EDGES_ALL, &edges));
     test_must(ctx, imp__boundary_begin(&t, &m, &edges, &b));
     bool no_memory = false;
     for (int g = 0; g < GROUPS; g++) {
@@ -253,7 +253,7 @@ static void together_test(void)
     imp__arena_init(&arena, ctx);
     for (int k = -1; k < MOVERS - 1; k++)
         test_must(ctx, imp__moves_add(&m, IMP_MOVE_POSE, k));
-    test_must(ctx, imp__edges_build(scene, &edges));
+    test_must(ctx, imp__edges_build(scene, IMP_EDGES_ALL, &edges));
     test_must(ctx, imp__boundary_begin(&t, &m, &edges, &b));
     bool no_memory = false;
     for (int g = 0; g < GROUPS; g++) {
@@ -333,7 +333,7 @@ static void square_test(void)
     test_must(ctx, imp__moves_add(&m, IMP_MOVE_POSE, 0));
     test_must(ctx, imp__moves_add(&m, IMP_MOVE_SCALE, 0));
     test_must(ctx, imp__moves_add(&m, IMP_MOVE_POSE, IMP_MOVE_CAMERA));
-    test_must(ctx, imp__edges_build(scene, &edges));
+    test_must(ctx, imp__edges_build(scene, IMP_EDGES_ALL, &edges));
     test_must(ctx, imp__boundary_begin(&t, &m, &edges, &b));
     bool no_memory = false;
     for (int g = 0; g < GROUPS; g++) {

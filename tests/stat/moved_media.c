@@ -123,6 +123,26 @@ static imp_scene *filled(const char *rest)
     "<medium type='homogeneous' id='a'><rgb name='sigma_t' value='" SIGMA                \
     "'/><rgb name='albedo' value='" ALBEDO                                               \
     "'/><phase type='hg'><float name='g' value='.5'/></phase></medium>"
+/* A camera outside of a medium with a block in it: of what moves, its walks may meet nothing. */
+#define SMOKE                                                                            \
+    "<scene version='3.0.0'>" VOLPATH(                                                   \
+        "3") "<sensor type='perspective' id='camera'>"                                   \
+             "<float name='fov' value='40'/><transform name='to_world'><lookat "         \
+             "origin='0,-5,0' target='0,0,0' up='0,0,1'/></transform><film "             \
+             "type='hdrfilm'>"                                                           \
+             "<integer name='width' value='24'/><integer name='height' "                 \
+             "value='16'/><rfilter "                                                     \
+             "type='box'/></film></sensor><shape type='cube' id='fog'><bsdf "            \
+             "type='null'/>" MEDIUM(                                                     \
+                 "1", ".9",                                                              \
+                 "") "</shape><shape type='cube' id='block'><transform "                 \
+                     "name='to_world'><scale value='.4'/></transform></shape><shape "    \
+                     "type='rectangle' "                                                 \
+                     "id='lamp'><transform name='to_world'><rotate x='1' "               \
+                     "angle='180'/><translate "                                          \
+                     "z='2.6'/></transform><emitter type='area'><rgb name='radiance' "   \
+                     "value='10'/>"                                                      \
+                     "</emitter></shape></scene>"
 #define BULB                                                                             \
     "<emitter type='point' id='bulb'><point name='position' value='.2,-1,2.5'/><rgb "    \
     "name='intensity' value='4'/></emitter>"
@@ -151,9 +171,100 @@ static void refused_test(void)
                    room("<shape type='sphere' id='ball'><bsdf type='dielectric'/>" MEDIUM(
                        ".5", "0", "") "</shape>" VOLPATH("2")),
                    "ball.pose", "not null");
-    number_refused("media that path does not see",
-                   room(BOX(MEDIUM(".5", ".5", "")) BULB "<integrator type='path'/>"),
-                   "block.pose", NULL);
+}
+
+/* A lamp at the top of the box, which is at the height 1.8. */
+#define SHINES "<emitter type='area'><rgb name='radiance' value='2'/></emitter></shape>"
+#define PANEL(Z)                                                                         \
+    "<shape type='rectangle' id='panel'><transform name='to_world'><scale value='.2'/>"  \
+    "<rotate x='1' angle='90'/><translate x='.2' y='-.3' z='" Z "'/></transform>" SHINES
+
+static void lamps_test(void)
+{
+    static const char fog[] = BOX(MEDIUM(".5", ".5", "")) VOLPATH("2");
+    static const struct {
+        const char *what, *lamp, *word;
+    } at[] = {
+        {"a lamp that crosses a border", PANEL("1.75"), "'panel' meets shape 'fog'"},
+        {"one that stands on it", PANEL("2"), "'panel' meets shape 'fog'"},
+        {"one beside it", PANEL("2.01"), NULL},
+        {"one behind it", PANEL("1.59"), NULL},
+        {"a ball",
+         "<shape type='sphere' id='panel'><point name='center' value='.2,-.3,1.9'/>"
+         "<float name='radius' value='.15'/>" SHINES,
+         "'panel' meets shape 'fog'"},
+        {"a disk",
+         "<shape type='disk' id='panel'><transform name='to_world'><scale value='.2'/>"
+         "<rotate x='1' angle='60'/><translate x='.2' y='-.3' "
+         "z='1.85'/></transform>" SHINES,
+         "meets shape"}};
+    char xml[4096];
+    for (size_t k = 0; k < sizeof at / sizeof *at; k++) {
+        snprintf(xml, sizeof xml, "%s%s", fog, at[k].lamp);
+        number_refused(at[k].what, room(xml), "block.pose", at[k].word);
+    }
+    number_refused(
+        "a ball of a medium that a lamp crosses",
+        room(NULL_BALL("0,-.6,3.2", "1.2", MEDIUM(".5", ".5", "")) VOLPATH("2")),
+        "block.pose", "'lamp' meets shape 'fog'");
+}
+
+/* A cube has four vertices for each side: it opens where one of them moves, and where one has. */
+static void opened_test(void)
+{
+    static const char fog[] = BOX(MEDIUM(".5", ".5", "")) VOLPATH("2");
+    double there[NUMBERS_MAX];
+    size_t n, index;
+    number_refused("a border that repeats vertices", room(fog), "fog.vertex_positions",
+                   "opens where one of them moves");
+    imp_scene *scene = room(fog);
+    test_must(ctx, imp_scene_add_geometry(scene, "fog.vertex_positions"));
+    values_get(scene, "fog.vertex_positions", there, &n, &index);
+    for (int k = 0; k < 2; k++) {
+        imp_problem *p;
+        struct imp_run run = IMP_RUN_INIT;
+        double g[6];
+        run.spp = 2;
+        if (k == 0) test_must(ctx, imp_scene_add_geometry(scene, "block.pose"));
+        there[0] += k ? -.1 : .1;
+        test_must(ctx, imp_scene_set_values(scene, index, n, there));
+        test_must(ctx, imp_problem_create(scene, &p));
+        test_must(ctx, imp_problem_activate(p, "block.pose"));
+        const enum imp_status st = imp_problem_reverse(p, adjoint, &run, g, NULL);
+        tap_ok(k ? st == IMP_OK
+                 : st == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "closed"),
+               "a border whose vertex %s # %s", k ? "is back" : "has moved",
+               st == IMP_OK ? "" : imp_last_error(ctx));
+        imp_problem_destroy(p);
+    }
+    imp_scene_destroy(scene);
+}
+
+/* For walks that go through no media a border is a surface like others, which light samples do not
+ * pass: the same numbers as without its medium. */
+static void unseen_test(void)
+{
+    static const char *const name[] = {"lamp.pose", "block.pose", "fog.pose"};
+    double g[2][18];
+    for (int k = 0; k < 2; k++) {
+        imp_scene *scene =
+            room(k ? BOX(MEDIUM(".5", ".5", "")) "<integrator type='path'/>"
+                   : BOX("") "<integrator type='path'/>");
+        struct imp_run run = IMP_RUN_INIT;
+        imp_problem *p;
+        for (int i = 0; i < 3; i++)
+            test_must(ctx, imp_scene_add_geometry(scene, name[i]));
+        test_must(ctx, imp_problem_create(scene, &p));
+        for (int i = 0; i < 3; i++) test_must(ctx, imp_problem_activate(p, name[i]));
+        run.spp = 8;
+        test_must(ctx, imp_problem_reverse(p, adjoint, &run, g[k], NULL));
+        imp_problem_destroy(p);
+        imp_scene_destroy(scene);
+    }
+    double most = 0;
+    for (int i = 12; i < 18; i++) most = fmax(most, fabs(g[0][i]));
+    tap_ok(memcmp(g[0], g[1], sizeof g[0]) == 0 && most > 1e-3,
+           "media that path does not see # fog.pose up to %.3g", most);
 }
 
 /* What takes more than a moment. */
@@ -191,6 +302,9 @@ int main(int argc, char **argv)
                                         {"fog.scale", 0, .02},
                                         {"camera.pose", 0, .02},
                                         {NULL, 0, 0}},
+                               smoke[] = {{"block.pose", 1, .05},
+                                          {"block.pose", 2, .05},
+                                          {NULL, 0, 0}},
                                bulb[] = {{"fog.pose", 2, .02},
                                          {"bulb.position", 2, .02},
                                          {NULL, 0, 0}};
@@ -204,8 +318,13 @@ int main(int argc, char **argv)
     numbers_compare("a bulb beside a box that absorbs",
                     room(BOX(MEDIUM(".5,.7,.9", "0", "")) BULB VOLPATH("3")), 32 * more,
                     32 * more, .05, bulb);
+    numbers_compare("a block in smoke", test_scene_text(ctx, SMOKE, IMP_RGB), 32 * more,
+                    48 * more, .04, smoke);
+    unseen_test();
     if (more > 1) long_test(more);
     refused_test();
+    lamps_test();
+    opened_test();
     imp_context_destroy(ctx);
     return tap_done();
 }

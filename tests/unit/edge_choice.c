@@ -108,7 +108,7 @@ static void choice_test(int rings)
     struct imp__edge_choice c;
     double *measure, *moment;
     enum { CELLS = 700 };
-    test_must(ctx, imp__edges_build(scene, &edges));
+    test_must(ctx, imp__edges_build(scene, IMP_EDGES_ALL, &edges));
     test_must(ctx, imp__edge_tree_build(&edges, &tree));
     test_must(ctx, imp__edge_choice_begin(&edges, &tree, NULL, 1, &c));
     draws_test(&c, "by length", 0.03);

@@ -218,7 +218,7 @@ static void edges_test(void)
 {
     struct imp__edges e;
     imp_scene *scene = scene_of(CUBE);
-    test_must(ctx, imp__edges_build(scene, &e));
+    test_must(ctx, imp__edges_build(scene, IMP_EDGES_ALL, &e));
     bool pairs = e.n == 12;
     for (size_t k = 0; k < e.n; k++) pairs &= e.edge[k].n_faces == 2;
     tap_ok(pairs && fabs(total(&e) - 8 * (.7 + .4 + .9)) < 1e-5,
@@ -265,7 +265,7 @@ static void edges_test(void)
     /* Two boxes of one face in common: 12 + 12 - 4 edges, 4 of which have 4 faces. */
     scene = scene_of("<shape type='cube'/><shape type='cube'><transform name='to_world'>"
                      "<translate x='2'/></transform></shape>");
-    test_must(ctx, imp__edges_build(scene, &e));
+    test_must(ctx, imp__edges_build(scene, IMP_EDGES_ALL, &e));
     int four = 0;
     for (size_t k = 0; k < e.n; k++) four += e.edge[k].n_faces == 4;
     tap_ok(e.n == 20 && four == 4, "edges that lie on each other count once # %zu, %d",
@@ -289,7 +289,7 @@ static void edges_test(void)
     scene = scene_of("<shape type='rectangle'/><shape type='rectangle'><transform "
                      "name='to_world'><scale value='.5'/><rotate x='1' angle='90'/>"
                      "<translate y='-1' z='.5'/></transform></shape>");
-    test_must(ctx, imp__edges_build(scene, &e));
+    test_must(ctx, imp__edges_build(scene, IMP_EDGES_ALL, &e));
     int two = 0;
     for (size_t k = 0; k < e.n; k++) {
         const struct imp__edge *x = &e.edge[k];
@@ -306,7 +306,7 @@ static void edges_test(void)
     scene = scene_of("<shape type='rectangle' id='floor'/>" CUBE
                      "<shape type='cube' id='b'><transform name='to_world'><scale "
                      "value='.2'/><rotate x='1' y='1' angle='20'/></transform></shape>");
-    test_must(ctx, imp__edges_build(scene, &e));
+    test_must(ctx, imp__edges_build(scene, IMP_EDGES_ALL, &e));
     int seams = 0;
     for (size_t k = 0; k < e.n; k++) seams += e.edge[k].seam;
     tap_ok(imp__edges_pierced(&e, scene, &other) < 0 && seams >= 4,
@@ -316,7 +316,7 @@ static void edges_test(void)
 
     scene = scene_of("<shape type='cylinder' id='ball'><transform name='to_world'><scale "
                      "x='2'/></transform></shape>");
-    const enum imp_status refused = imp__edges_build(scene, &e);
+    const enum imp_status refused = imp__edges_build(scene, IMP_EDGES_ALL, &e);
     tap_ok(refused == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "'ball'"),
            "what has no edges is refused by name # %s", imp_last_error(ctx));
     m = imp__moves_begin(scene, NULL);
@@ -332,7 +332,7 @@ static void cornell_test(void)
 {
     imp_scene *scene = test_scene(ctx, "cornell.xml", IMP_MONO, NULL);
     struct imp__edges e;
-    test_must(ctx, imp__edges_build(scene, &e));
+    test_must(ctx, imp__edges_build(scene, IMP_EDGES_ALL, &e));
     size_t shared = 0, open = 0;
     for (size_t k = 0; k < e.n; k++) {
         shared += e.edge[k].n_faces > 1;

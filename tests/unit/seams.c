@@ -107,7 +107,7 @@ static struct seen seams_of(const char *shapes, int moves, bool *torn)
     imp_scene *scene = scene_of(shapes);
     struct imp__edges e;
     struct imp__moves m = imp__moves_begin(scene, NULL);
-    test_must(ctx, imp__edges_build(scene, &e));
+    test_must(ctx, imp__edges_build(scene, IMP_EDGES_ALL, &e));
     test_must(ctx, imp__moves_add(&m, IMP_MOVE_POSE, moves));
     *torn = imp__edges_torn(&e, &m) != NULL;
     const struct seen s = look(&e);
@@ -161,7 +161,7 @@ static void velocity_test(void)
     struct imp__moves m = imp__moves_begin(scene, NULL);
     double theta[12], worst = 0;
     int tested = 0;
-    test_must(ctx, imp__edges_build(scene, &e));
+    test_must(ctx, imp__edges_build(scene, IMP_EDGES_ALL, &e));
     for (int k = 0; k < 2; k++) test_must(ctx, imp__moves_add(&m, IMP_MOVE_POSE, k));
     for (int k = 0; k < 12; k++)
         theta[k] = imp__u01(imp__key(4, 1, 0), (unsigned)k) - 0.5;
@@ -217,7 +217,7 @@ static void memory_test(void)
     struct imp__edges e;
     for (long k = 1; st == IMP_E_NOMEM && k < 1000; k++) {
         heap.fail_at = heap.calls + k;
-        st = imp__edges_build(scene, &e);
+        st = imp__edges_build(scene, IMP_EDGES_ALL, &e);
         heap.fail_at = 0;
         if (st == IMP_OK) imp__edges_free(&e);
         failed += st == IMP_E_NOMEM;

@@ -5,6 +5,7 @@
 #include "base/arguments.h"
 #include "problem_tracer.h"
 #include "scene/pose.h"
+#include "walk/path/first_segment.h"
 #include <math.h>
 #include <string.h>
 
@@ -51,9 +52,13 @@ enum imp_status imp__moved_begin(const struct imp_problem *p,
     for (int k = 0; k < IMP_BOUNDARY_KINDS; k++) out->draws[k] = imp__moved_times[k];
     out->moves = imp__moves_begin(p->scene, tracer->sensor);
     out->moves.seams_join = p->seams_join;
+    if (imp__segment_first(tracer)->through)
+        out->moves.borders = imp__borders_of(p->scene, tracer->sensor->medium);
     IMP_TRY(imp__moved_allowed(tracer));
     IMP_TRY(movers_add(p, out));
-    IMP_TRY(imp__edges_build(p->scene, &out->edges));
+    IMP_TRY(imp__edges_build(
+        p->scene, out->moves.borders.any ? IMP_EDGES_BUT_BORDERS : IMP_EDGES_ALL,
+        &out->edges));
     IMP_TRY(imp__boundary_begin(tracer, &out->moves, &out->edges, &out->boundary));
     IMP_TRY(imp__splat_scale_create(p->ctx, &tracer->sensor->film, &out->scale));
 out:

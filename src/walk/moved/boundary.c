@@ -90,7 +90,7 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
     out->size = imp__length(scene->hi - scene->lo);
     out->through = imp__segment_first(tracer)->through;
     imp_spec extinction;
-    out->media = out->through && moves->borders.any;
+    out->media = moves->borders.any;
     if (!out->media && imp__fog(tracer, NULL, &extinction))
         out->fog = tracer->sensor->medium;
     for (int k = 0; k < scene->n_all_shapes; k++) {

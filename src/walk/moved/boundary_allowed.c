@@ -330,6 +330,7 @@ static enum imp_status ball_allowed(const struct imp__boundary *b)
 enum imp_status imp__boundary_allowed(const struct imp__boundary *b)
 {
     enum imp_status st = edges_allowed(b);
+    if (st == IMP_OK) st = imp__borders_allowed(b);
     if (st == IMP_OK) st = turns_allowed(b);
     if (st == IMP_OK) st = skies_allowed(b);
     if (st == IMP_OK) st = ball_allowed(b);

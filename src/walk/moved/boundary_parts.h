@@ -358,6 +358,8 @@ void imp__meter_reach(struct imp__edge_draw *d, const struct imp__meter_point *x
 /* IMP_E_UNSUPPORTED, with names: edges that tear, shapes that pass through each other, facets that
  * become lit at once, a camera inside of a shape. */
 enum imp_status imp__boundary_allowed(const struct imp__boundary *b);
+/* ... of borders of media. */
+enum imp_status imp__borders_allowed(const struct imp__boundary *b);
 
 /* ---- One draw of each kind ---- */
 void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind);

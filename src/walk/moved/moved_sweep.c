@@ -386,7 +386,10 @@ bool imp__moved_touches(const struct imp_tracer *tracer, const struct imp__moves
 {
     const struct imp_scene *scene = tracer->scene;
     imp_spec extinction;
-    if (imp__fog(tracer, NULL, &extinction) || !shapes_alone(tracer, moves)) return true;
+    /* A point of a medium moves with what lies beyond it, which is no vertex. */
+    if (moves->borders.any || imp__fog(tracer, NULL, &extinction) ||
+        !shapes_alone(tracer, moves))
+        return true;
     for (const struct imp_vertex *v = walk->first; v; v = v->next) {
         const struct imp_decision *d = &v->d;
         if (v->shape &&
@@ -412,7 +415,7 @@ bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
                            .meter = tracer->sensor->shape != NULL,
                            .through = imp__segment_first(tracer)->through};
     s.front = s.first;
-    s.media = s.through && moves->borders.any;
+    s.media = moves->borders.any;
     s.fog = !s.media && imp__fog(tracer, walk->first->carried, &s.extinction);
     s.at = imp__arena_take(arena, (size_t)walk->n, sizeof *s.at);
     s.piece = imp__arena_take(arena, (size_t)walk->n, sizeof *s.piece);
