@@ -115,6 +115,8 @@ static void all_kinds(void)
         KIND("roughdielectric", GGX ALPHA("alpha_u", ".1") ALPHA("alpha_v", ".5")
                                     ALPHA("int_ior", "1") ALPHA("ext_ior", "1.6")),
         KIND("roughdielectric", ALPHA("alpha", ".2")),
+        KIND("roughdielectric", GGX ALPHA("alpha", ".08")),
+        KIND("roughdielectric", GGX ALPHA("alpha_u", ".05") ALPHA("alpha_v", ".3")),
         KIND("roughconductor", ALPHA("alpha", ".2")),
         KIND("principled",
              PICTURE("base_color") ALPHA("metallic", ".4") ALPHA("clearcoat", ".5")),

@@ -376,7 +376,7 @@ imp_spec imp__walk_tangent_values(const struct imp_tracer *tracer,
     f.direction = (struct direction){tracer->active, x_dot};
     f.L_dot = f.on_segments = (imp_spec){0};
     if (walk->dropped || !walk->valid) return f.L_dot;
-    if (imp_unlikely(walk->reduced != NULL))
+    if (imp_unlikely(walk->reduced != NULL)) /* never of imp_tracer.swept_only */
         return walk->reduced->tangent(tracer, walk, direction_at, &f.direction);
     for (const struct imp_vertex *v = walk->last; v; v = v->prev, depth--) {
         f.L_dot *= v->w;
