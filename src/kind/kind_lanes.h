@@ -146,7 +146,7 @@ struct imp_bsdf_lanes {
                          const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
                          struct imp_wide_color *f);
     /* imp_bsdf_ops.eval_d, of kinds with smooth lobes alone; d [n_in]. False: this one has none. NULL: none
-     * has. */
+     * has. Not called where an input is the luminance or a component of another. */
     bool (*eval_d)(const struct imp_bsdf *b, const struct imp_wide_color *in,
                    const imp_wide3 *wo, const imp_wide3 *wi, int colors,
                    struct imp_wide_color *d);

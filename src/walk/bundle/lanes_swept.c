@@ -21,6 +21,14 @@ static void derivatives(const struct imp_wide_color *d, uint64_t inputs, int col
     }
 }
 
+/* Luminances and components of others have derivatives, but no bit among the active inputs. */
+static bool all_own(const struct imp_bsdf *b)
+{
+    for (int j = 0; j < b->n_in; j++)
+        if (b->input[j]->luminance || b->input[j]->component) return false;
+    return true;
+}
+
 /* False: the kind has none in lanes. */
 static bool derivatives_keep(struct imp_arena *arena, const struct imp_bin *bin,
                              const struct imp_lanes_vertices *v, const imp_wide lit[4],
@@ -31,7 +39,8 @@ static bool derivatives_keep(struct imp_arena *arena, const struct imp_bin *bin,
     struct imp_wide_color d[IMP_INPUTS_MAX];
     const imp_wide scale[4] = {step->scale, step->scale, step->scale, step->scale};
     const size_t n = (size_t)__builtin_popcountll(out->inputs) * (size_t)colors;
-    if (!bin->kernel || !bin->kernel->eval_d || !out->inputs) return false;
+    if (!bin->kernel || !bin->kernel->eval_d || !out->inputs || !all_own(bin->bsdf))
+        return false;
     if (out->lit) {
         if (!bin->kernel->eval_d(bin->bsdf, v->in, &v->wo, &light->wi, colors, d))
             return false;
@@ -145,7 +154,7 @@ static struct imp_swept_lanes *lanes_keep(struct imp_depth *d, const struct imp_
     for (int c = 0; c < b->colors; c++) by[c] = lit->light.radiance.c[c] * lit->weight;
     if (!derivatives_keep(arena, bin, v, by, lit, step, b->colors, out))
         dirs_keep(arena, bin, v, by, lit, step, b->colors, out);
-    if (!bin->plain || b->colors > 3) place_keep(arena, d, v, out);
+    if (!bin->plain) place_keep(arena, d, v, out);
     return out;
 }
 

@@ -86,7 +86,7 @@ static inline imp_spec bar_kept(const struct imp_swept_lanes *of, int at, int co
     return bar;
 }
 
-/* By constants, which are looked up nowhere. */
+/* By constants in colours, which are looked up nowhere. */
 static inline void constants_sweep(const struct imp_sweep *s,
                                    const struct imp_swept_lanes *of, int k, int colors,
                                    const struct arriving *a)
@@ -145,7 +145,7 @@ static inline void lane_sweep(const struct imp_sweep *s, const struct imp_swept_
     if (!of->inputs && !of->dirs) return;
     a.on = (of->on >> k & 1) && !imp__is_zero_used(a.step, carried);
     if (!a.lit && !a.on) return;
-    if (!of->place && !of->dirs) constants_sweep(s, of, k, colors, &a);
+    if (!of->place && !of->dirs && !carried) constants_sweep(s, of, k, colors, &a);
     else inputs_sweep(s, of, k, colors, carried, &a);
 }
 
