@@ -11,12 +11,14 @@
 #define IMP_FAIL_ALLOC_H
 
 #include <importon/importon.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 struct fail_alloc {
     long fail_at;       /* 1: the first */
+    bool once;          /* those after it succeed */
     long calls;         /* so far */
     long live;          /* blocks not released */
     size_t bytes, peak; /* in them; the most so far, by one thread */
@@ -28,7 +30,8 @@ static inline void *fail_alloc_allocate(size_t bytes, void *payload)
     struct fail_alloc *heap = payload;
     const long n = __atomic_add_fetch(&heap->calls, 1, __ATOMIC_RELAXED);
     void *p = NULL;
-    if (heap->fail_at && n >= heap->fail_at) return NULL;
+    if (heap->fail_at && (heap->once ? n == heap->fail_at : n >= heap->fail_at))
+        return NULL;
     if (bytes > SIZE_MAX - FAIL_ALLOC_HEAD ||
         posix_memalign(&p, 64, bytes + FAIL_ALLOC_HEAD) != 0)
         return NULL;

@@ -2,6 +2,7 @@
  *
  * Walks in bundles beside the same walks alone (bundle_kit.h): rooms, lights, sensors, shapes. */
 #include "bundle_kit.h"
+#include "imp_fail_alloc.h"
 
 static void boxes(void)
 {
@@ -254,6 +255,59 @@ static void meshes(void)
     unlink(path);
 }
 
+/* Bundles of swept walks with every allocation failing in turn: each is refused, so that its walks go
+ * alone, until none fails. */
+static void short_of_memory(const char *name, const char *rest)
+{
+    struct fail_alloc heap = {.once = true};
+    imp_context *fragile = fail_alloc_context(&heap);
+    static char xml[8192];
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'>%s<sensor type='%s<film type='hdrfilm'><integer "
+             "name='width' value='6'/><integer name='height' value='6'/></film></sensor>"
+             "%s</scene>",
+             PATH(DEPTH("7")), CAMERA, rest);
+    imp_scene *scene = test_scene_text(fragile, xml, IMP_RGB);
+    struct imp_active active;
+    static uint8_t chosen[256];
+    for (size_t k = 0; k < scene->n_params; k++)
+        chosen[k] = (scene->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE) != 0;
+    test_must(fragile, imp__active_create(scene, chosen, &active));
+    const struct imp_tracer tracer = {.scene = scene,
+                                      .integrator = imp__walk_integrator(scene),
+                                      .sensor = scene->sensors[0],
+                                      .seed = 5,
+                                      .active = &active,
+                                      .swept_only = true};
+    int xy[SIDE * SIDE][2], refused = 0, made = 0, wrong = 0;
+    int64_t samples[SAMPLES];
+    for (int p = 0; p < SIDE * SIDE; p++) xy[p][0] = p % SIDE, xy[p][1] = p / SIDE;
+    for (int k = 0; k < SAMPLES; k++) samples[k] = k;
+    for (size_t filled = 0; filled < 40; filled++) { /* so that blocks end anywhere */
+        bool whole = false;
+        for (int n = 1; !whole && n < 100; n++) {
+            struct imp_arena arena;
+            struct imp_bundle b;
+            imp__arena_init(&arena, fragile);
+            (void)imp__arena_take(&arena, filled, 9973);
+            heap.fail_at = heap.calls + n;
+            whole = imp__bundle_trace(&tracer, &arena, SIDE * SIDE, (const int(*)[2])xy,
+                                      SAMPLES, samples, &b);
+            wrong += whole == (heap.calls >= heap.fail_at) || (whole && arena.failed);
+            heap.fail_at = 0;
+            if (whole) made++;
+            else refused++;
+            imp__arena_free(&arena);
+        }
+    }
+    tap_ok(made == 40 && refused > 100 && wrong == 0,
+           "%s: %d bundles refused for want of memory, %d made, %d wrongly", name,
+           refused, made, wrong);
+    imp__active_destroy(fragile, &active);
+    imp_scene_destroy(scene);
+    imp_context_destroy(fragile);
+}
+
 int main(void)
 {
     ctx = test_context(1);
@@ -264,6 +318,11 @@ int main(void)
     sensors();
     scenes();
     meshes();
+    short_of_memory("vertices in lanes",
+                    ROOM LAMP("0", "0", ".5") CUBE("0", "0", CHECKERS));
+    short_of_memory("vertices alone",
+                    SKY BALL("0", "0", "<bsdf type='thindielectric'/>")
+                        BALL(".5", "0", "<bsdf type='null'/>") LAMP("0", "0", ".5"));
     imp_context_destroy(ctx);
     return tap_done();
 }

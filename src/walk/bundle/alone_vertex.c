@@ -169,10 +169,11 @@ static void vertex_give_back(struct imp_depth *d, struct imp_vertex *v, bool goe
     give_back(d, walk);
 }
 
-/* What is recorded stays. */
+/* What is recorded stays, and what is swept. */
 static void forget(const struct imp_depth *d, struct imp_arena_mark mark)
 {
-    if (!d->bundle->walks && !d->bundle->swept)
+    const struct imp_bundle *b = d->bundle;
+    if (!b->walks && !(b->swept && b->tracer->active))
         imp__arena_rewind(d->lone->step.arena, mark);
 }
 

@@ -243,9 +243,11 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
     struct imp_depth d = {
         .bundle = b, .hits = &r.hits, .shadows = &r.shadows, .lone = &r.lone};
     struct link *last = NULL, *met_first = NULL; /* met_first: by points that share */
+    const bool failed = arena->failed;           /* not here */
     if (imp__swept_fits(tracer)) {
         swept = imp__arena_take(arena, 1, sizeof *swept);
         if (!swept) return false;
+        arena->failed = false;
     }
     *b = (struct imp_bundle){.tracer = tracer,
                              .swept = swept,
@@ -320,6 +322,8 @@ bool imp__bundle_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
         imp__vertex_fetch(b->walks[imp_min(k + 2, b->n - 1)].last, IMP_VERTEX_VALUES);
         imp__walk_close(tracer, &b->walks[k]);
     }
+    if (swept && imp_unlikely(arena->failed)) return false;
+    if (swept) arena->failed = failed;
     return true;
 }
 

@@ -159,22 +159,19 @@ static struct imp_swept_lanes *lanes_keep(struct imp_depth *d, const struct imp_
 }
 
 void imp__lanes_keep(struct imp_depth *d, const struct imp_bin *bin,
-                     struct imp_lanes_vertices *v, struct imp_lanes_lit *lit,
-                     struct imp_lanes_step *step)
+                     const struct imp_lanes_vertices *v, const struct imp_lanes_lit *lit,
+                     const struct imp_lanes_step *step)
 {
     struct imp_bundle *b = d->bundle;
     struct imp_swept_depth *to = b->swept->last;
     struct imp_swept_lanes *of = lanes_keep(d, bin, v, lit, step);
-    const bool failed = b->arena->failed;
     for (unsigned left = v->on; left; left &= left - 1) {
         const int k = __builtin_ctz(left), walk = v->walk[k];
         b->swept->count[walk]++;
         to->place[walk] = v->at + k;
-        to->of[v->at + k] = failed ? NULL : of;
+        to->of[v->at + k] = of;
         to->lane[v->at + k] = (int8_t)k;
-        if (imp_unlikely(failed)) b->dropped[walk] = IMP_DROP_MEMORY;
     }
-    if (imp_unlikely(failed)) lit->on = step->on = 0;
 }
 
 void imp__lanes_keep_sky(struct imp_depth *d, const int32_t *order, int n, int at,
@@ -199,8 +196,7 @@ void imp__lanes_keep_sky(struct imp_depth *d, const int32_t *order, int n, int a
         const int walk = d->rays->walk[order[k]];
         b->swept->count[walk]++;
         to->place[walk] = at + k;
-        to->of[at + k] = arena->failed ? NULL : of;
+        to->of[at + k] = of;
         to->lane[at + k] = (int8_t)k;
-        if (imp_unlikely(arena->failed)) b->dropped[walk] = IMP_DROP_MEMORY;
     }
 }

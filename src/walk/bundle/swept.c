@@ -14,13 +14,13 @@ bool imp__swept_fits(const struct imp_tracer *t)
 bool imp__swept_create(struct imp_arena *arena, struct imp_bundle *b,
                        struct imp_swept *out)
 {
-    const size_t n = (size_t)b->n;
+    const size_t n = (size_t)b->all;
     const struct imp_tracer *t = b->tracer;
     *out = (struct imp_swept){.first = NULL};
     out->count = imp__arena_array(arena, n, sizeof *out->count);
     out->walks = imp__arena_take(arena, n, sizeof *out->walks);
     if (!out->count || !out->walks) return false;
-    for (int k = 0; k < b->n; k++)
+    for (int k = 0; k < b->all; k++)
         out->walks[k] = (struct imp_swept_walk){
             {.sweep = imp__swept_sweep, .both = imp__swept_both}, b, k};
     for (int k = 0; t->active && k < t->scene->n_emitters; k++)
@@ -36,11 +36,11 @@ bool imp__swept_deeper(struct imp_arena *arena, struct imp_bundle *b, size_t n,
     if (!d) return false;
     *d = (struct imp_swept_depth){
         .values = values,
-        .place = imp__arena_take(arena, (size_t)b->n, sizeof *d->place),
+        .place = imp__arena_take(arena, (size_t)b->all, sizeof *d->place),
         .of = imp__arena_take(arena, n, sizeof *d->of),
         .lane = imp__arena_take(arena, n, sizeof *d->lane)};
     if (!d->place || !d->of || !d->lane) return false;
-    memset(d->place, 0xff, (size_t)b->n * sizeof *d->place);
+    memset(d->place, 0xff, (size_t)b->all * sizeof *d->place);
     if (s->last) s->last->next = d;
     else s->first = d;
     s->last = d;
@@ -52,7 +52,7 @@ void imp__swept_alone(struct imp_bundle *b, int walk, int at, int8_t kind,
 {
     struct imp_swept_depth *d = b->swept->last;
     d->place[walk] = at;
-    d->of[at] = v;
+    d->of[at] = b->tracer->active ? v : NULL;
     d->lane[at] = kind;
     for (; v; v = v->next) b->swept->count[walk]++;
 }
@@ -63,6 +63,7 @@ void imp__swept_connect(const struct imp_bundle *b, const struct imp_shadows *sh
     const struct imp_swept_depth *d = b->swept->last;
     for (int k = 0; k < shadows->ray.n; k++) {
         const int at = shadows->at[k], lane = d->lane[at];
+        if (!d->of[at]) continue; /* it is counted alone, or there was no memory */
         if (lane < 0) {
             struct imp_vertex *v = d->of[at];
             if (!hidden[k]) v->d.connection = IMP_CONNECTED;

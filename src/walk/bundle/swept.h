@@ -53,7 +53,7 @@ struct imp_swept_depth {
     const struct imp_bundle_values *values;
     int32_t *place; /* [walks] of the walk's vertex; -1: it has none there */
     /* A vertex in lanes: struct imp_swept_lanes and its lane; else its record, or those of the sky,
-     * and which of the two. NULL: nothing goes on there. */
+     * and which of the two. NULL: nothing goes on there, or no number is active. */
     void **of;
     int8_t *lane;
 };
@@ -81,13 +81,14 @@ bool imp__swept_create(struct imp_arena *arena, struct imp_bundle *bundle,
 /* Another depth, with room for n vertices. False: no memory. */
 bool imp__swept_deeper(struct imp_arena *arena, struct imp_bundle *bundle, size_t n,
                        const struct imp_bundle_values *values);
-/* The record v of the vertex of a walk at this place; kind: alone, or the sky. */
+/* The record v of the vertex of a walk at this place; kind: alone, or the sky. Without active numbers it
+ * is counted, and not kept. */
 void imp__swept_alone(struct imp_bundle *bundle, int walk, int at, int8_t kind,
                       struct imp_vertex *v);
-/* Vertices in lanes: where they end walks for want of memory, lit and step have no lanes. */
+/* Vertices in lanes. Where memory is short arena->failed says so, and the bundle is given up. */
 void imp__lanes_keep(struct imp_depth *d, const struct imp_bin *bin,
-                     struct imp_lanes_vertices *v, struct imp_lanes_lit *lit,
-                     struct imp_lanes_step *step);
+                     const struct imp_lanes_vertices *v, const struct imp_lanes_lit *lit,
+                     const struct imp_lanes_step *step);
 /* The sky that the rays order[n] of directions wi meet, with these MIS weights, at places `at` and on. */
 void imp__lanes_keep_sky(struct imp_depth *d, const int32_t *order, int n, int at,
                          int light, const imp_wide3 *wi, const imp_wide *weight);
