@@ -10,12 +10,13 @@
 /* Radius of a camera or a light, which have no size, in parts of the scene's. */
 #define SIZE_OF_POINTS 0.05
 
-/* The middle of what moves. False: it has no place. */
+/* The middle of what moves. False: it has no place; a group has one for each instance. */
 static bool middle_of(const struct imp_pose *p, imp_v3 *middle)
 {
     imp_v3 lo, hi;
     const double *x = p->number;
     const bool boxed = imp__pose_box(p, &lo, &hi);
+    if (p->group >= 0) return false;
     switch (p->kind) {
     case IMP_POSE_RIGID: *middle = p->centre + imp__v3(x[0], x[1], x[2]); return true;
     case IMP_POSE_POSITION: *middle = imp__v3(x[0], x[1], x[2]); return true;

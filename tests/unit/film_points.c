@@ -18,6 +18,11 @@ static imp_context *ctx;
     "<translate x='1' y='2' z='3'/></transform></shape>"                                 \
     "<shape type='sphere' id='ball'><point name='center' x='-2' y='0' z='1'/>"           \
     "<float name='radius' value='.5'/></shape>"                                          \
+    "<shape type='shapegroup' id='pair'><shape type='sphere'/></shape>"                  \
+    "<shape type='instance'><ref id='pair'/><transform name='to_world'><translate "      \
+    "x='5' z='3'/></transform></shape>"                                                  \
+    "<shape type='instance'><ref id='pair'/><transform name='to_world'><translate "      \
+    "x='5' z='-3'/></transform></shape>"                                                 \
     "<emitter type='point' id='lamp'><point name='position' x='0' y='4' z='0'/>"         \
     "<rgb name='intensity' value='1'/></emitter>"                                        \
     "<emitter type='constant' id='sky'><rgb name='radiance' value='1'/></emitter>"
@@ -129,6 +134,15 @@ static void places_test(void)
     tap_ok(imp_scene_place(s, param, at, &r) == IMP_E_ARG &&
                strstr(imp_last_error(ctx), "sky.radiance.value"),
            "what has no place # %s", imp_last_error(ctx));
+    test_must(ctx, imp_scene_add_geometry(s, "pair.pose"));
+    test_must(ctx, imp_scene_add_geometry(s, "pair.scale"));
+    for (int k = 0; k < 2; k++) {
+        static const char *const names[] = {"pair.pose", "pair.scale"};
+        test_must(ctx, imp_scene_find_param(s, names[k], &param));
+        tap_ok(imp_scene_place(s, param, at, &r) == IMP_E_ARG &&
+                   strstr(imp_last_error(ctx), names[k]),
+               "a group, which is in two places # %s", imp_last_error(ctx));
+    }
     tap_ok(imp_scene_place(s, 1000000, at, &r) == IMP_E_ARG, "no such parameter # %s",
            imp_last_error(ctx));
     imp_scene_destroy(s);
