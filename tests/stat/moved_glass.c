@@ -2,7 +2,8 @@
  *
  * Derivatives by what moves where light goes through rough glass: a point of a pane before a bulb, from
  * all sides, against the formula of Walter et al. (2007) in long double; imp_problem_reverse against
- * central differences in a room with frosted glass, flat and round, and through a leaf. */
+ * central differences in a room with frosted glass, flat and round, through a leaf, and of a lamp across
+ * the curve where transmission ends; and what is refused where it ends with a jump. */
 #include "mean_gradient.h"
 #include "moves_kit.h"
 #include "moves_numbers.h"
@@ -11,23 +12,24 @@
 #define DIRECT "<integrator type='direct'/>"
 #define SKY    "<emitter type='constant'><rgb name='radiance' value='.4,.5,.6'/></emitter>"
 #define FROSTED(ALPHA)                                                                   \
-    "<bsdf type='roughdielectric'><float name='alpha' value='" ALPHA                     \
-    "'/><string name='distribution' value='ggx'/></bsdf>"
+    "<bsdf type='roughdielectric'><float name='alpha' value='" ALPHA "'/></bsdf>"
 
 /* ---- One point --------------------------------------------------------------------------------- */
 
 #define INDEX 1.4L
-#define ALPHA .35L
+#define ALPHA .7L
 
+/* Walter's fit. */
 static real smith(real z)
 {
-    const real tan2 = (1 - z * z) / (z * z);
-    return 2 / (1 + sqrtl(1 + ALPHA * ALPHA * tan2));
+    const real a = fabsl(z) / (ALPHA * sqrtl(1 - z * z));
+    return a >= 1.6L ? 1
+                     : (3.535L * a + 2.181L * a * a) / (1 + 2.276L * a + 2.577L * a * a);
 }
-static real ggx(real z)
+static real beckmann(real z)
 {
-    const real k = z * z * (ALPHA * ALPHA - 1) + 1;
-    return ALPHA * ALPHA / ((real)IMP_PI * k * k);
+    const real z2 = z * z, A = ALPHA * ALPHA;
+    return expl((1 - 1 / z2) / A) / ((real)IMP_PI * A * z2 * z2);
 }
 /* Unpolarised, from the cosine c > 0 into a medium of the relative index e. */
 static real fresnel(real c, real e)
@@ -69,7 +71,7 @@ static real seen(const real eye[3], const real d[3], const real p[3], const real
     const real up = dot_real(m, n) * side > 0 ? 1 : -1;
     for (int i = 0; i < 3; i++) m[i] *= up;
     const real om = dot_real(wo, m), im = dot_real(wi, m), F = fresnel(om, e),
-               DG = ggx(dot_real(m, n)) * smith(cos_o) * smith(cos_i);
+               DG = beckmann(dot_real(m, n)) * smith(cos_o) * smith(cos_i);
     if (cos_i > 0) return F * DG / (4 * cos_o) / apart;
     return (1 - F) * DG * om * -im / (cos_o * h2) / apart;
 }
@@ -104,8 +106,8 @@ static void point_test(const char *what, const double eye[3], const double bulb[
              "name='width' value='1'/><integer name='height' value='1'/><rfilter "
              "type='box'/></film></sensor><shape type='rectangle' id='pane'><transform "
              "name='to_world'><scale value='2'/></transform><bsdf type='roughdielectric'>"
-             "<float name='alpha' value='%Lg'/><string name='distribution' value='ggx'/>"
-             "<float name='int_ior' value='%Lg'/><float name='ext_ior' value='1'/></bsdf>"
+             "<float name='alpha' value='%Lg'/><float name='int_ior' value='%Lg'/><float "
+             "name='ext_ior' value='1'/></bsdf>"
              "</shape><emitter type='point' id='bulb'><point name='position' "
              "value='%g,%g,%g'/><spectrum name='intensity' value='1'/></emitter></scene>",
              eye[0], eye[1], eye[2], at[0] - eye[0], at[1] - eye[1], at[2] - eye[2],
@@ -138,10 +140,11 @@ static void point_test(const char *what, const double eye[3], const double bulb[
 /* ---- Rooms ------------------------------------------------------------------------------------- */
 
 /* Before the camera, smaller than its picture; beside the block, under the lamp. */
-#define PANE                                                                             \
+#define PANE_OF(BSDF)                                                                    \
     "<shape type='rectangle' id='pane'><transform name='to_world'><scale x='.5' "        \
     "y='.4'/><rotate x='1' angle='80'/><translate x='.2' y='-2.5' "                      \
-    "z='1.4'/></transform>" FROSTED(".3") "</shape>"
+    "z='1.4'/></transform>" BSDF "</shape>"
+#define PANE PANE_OF(FROSTED(".3"))
 #define BALL                                                                             \
     "<shape type='sphere' id='ball'><point name='center' value='1,-.6,.7'/><float "      \
     "name='radius' value='.5'/>" FROSTED(".3") "</shape>"
@@ -156,9 +159,51 @@ static void point_test(const char *what, const double eye[3], const double bulb[
     "<rotate z='1' angle='30'/><translate x='1.2' y='-.8' z='.6'/></transform>" FROSTED( \
         ".4") "</shape>"
 
+/* Very rough, so that there is light next to the curve, which is 50 degrees beside the pane's normal;
+ * the lamp is there. */
+#define BESIDE                                                                           \
+    "<shape type='rectangle' id='beside'><transform name='to_world'><scale value='.8'/>" \
+    "<lookat origin='1.7,-1.2,1.4' target='.2,-2.5,1.4' up='0,0,1'/></transform>"        \
+    "<emitter type='area'><rgb name='radiance' value='5,6,7'/></emitter></shape>"
+#define GGX_GLASS                                                                        \
+    "<bsdf type='roughdielectric' id='glass'><string name='distribution' value='ggx'/>"  \
+    "<float name='alpha' value='.3'/></bsdf>"
+#define BURLEY_GLASS(INDEX)                                                              \
+    "<bsdf type='principled' id='glass'><float name='spec_trans' value='.5'/>" INDEX     \
+    "</bsdf>"
+
 static imp_scene *room(const char *rest)
 {
     return room_build(ctx, &(struct room_parts){.rest = rest});
+}
+
+/* By the index, and by what does not move the jump. */
+static void inputs_test(const char *what, const char *rest, const char *index,
+                        const char *other)
+{
+    imp_scene *scene = room(rest);
+    imp_problem *p;
+    test_must(ctx, imp_problem_create(scene, &p));
+    tap_ok(imp_problem_activate(p, index) == IMP_E_BIAS &&
+               strstr(imp_last_error(ctx), "facets of GGX"),
+           "%s, its index # %s", what, imp_last_error(ctx));
+    tap_ok(imp_problem_activate(p, other) == IMP_OK, "%s, %s", what, other);
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+}
+static void jumps_test(void)
+{
+    static const char *const why = "roughdielectric with the distribution beckmann";
+    number_refused("glass of GGX", room(DIRECT PANE_OF(GGX_GLASS)), "lamp.pose", why);
+    number_refused("glass of principled", room(DIRECT PANE_OF(BURLEY_GLASS(""))),
+                   "pane.pose", why);
+    inputs_test("glass of GGX", DIRECT PANE_OF(GGX_GLASS), "glass.eta.value",
+                "glass.alpha.value");
+    inputs_test("glass of principled", DIRECT PANE_OF(BURLEY_GLASS("")),
+                "glass.specular.value", "glass.roughness.value");
+    inputs_test("glass of principled with eta",
+                DIRECT PANE_OF(BURLEY_GLASS("<float name='eta' value='1.4'/>")),
+                "glass.eta.value", "glass.spec_trans.value");
 }
 
 int main(int argc, char **argv)
@@ -170,6 +215,10 @@ int main(int argc, char **argv)
                                          {"pane.pose", 3, .012},
                                          {"camera.pose", 4, .004},
                                          {NULL, 0, 0}},
+                               beside[] = {{"beside.pose", 0, .01},
+                                           {"beside.pose", 5, .01},
+                                           {"pane.pose", 3, .01},
+                                           {NULL, 0, 0}},
                                cube[] = {{"cube.pose", 0, .012},
                                          {"cube.pose", 5, .02},
                                          {"lamp.pose", 0, .02},
@@ -188,6 +237,9 @@ int main(int argc, char **argv)
     point_test("in a pane", above, aside);
     point_test("in a pane from behind", below, deep);
     numbers_compare("direct, a pane", room(DIRECT PANE), 48, 192, .05, pane);
+    numbers_compare("direct, a lamp beside a pane",
+                    room(DIRECT PANE_OF(FROSTED("1.5")) BESIDE), 48, 96, .05, beside);
+    jumps_test();
     numbers_compare("direct, a leaf", room(DIRECT LEAF), 48, 96, .05, leaf);
     if (is_long) {
         numbers_compare("direct, a pane and a sky", room(DIRECT SKY PANE), 512, 1024, .03,

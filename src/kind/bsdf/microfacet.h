@@ -70,6 +70,10 @@ struct imp__clear_turns {
 struct imp__clear_turns imp__microfacet_clear_turns(const struct imp__microfacet *f,
                                                     const imp_v3 *wo, const imp_v3 *wi,
                                                     double e);
+/* Transmission ends where m lies in the surface, and D is 1/(pi au av (x^2/au^2 + y^2/av^2)^2) there
+ * for GGX, 0 for Beckmann. No draw looks at that curve, which moves with directions and with the
+ * index: such glass has neither derivative. index: the input. For imp_bsdf_ops.build. */
+void imp__ggx_glass_jumps(struct imp_bsdf *bsdf, int index);
 /* A normal for direction v (v.z > 0), and its density per steradian of normals. */
 imp_v3 imp__microfacet_sample(const struct imp__microfacet *f, const imp_v3 *v,
                               const double u[2]);

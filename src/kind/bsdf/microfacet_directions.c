@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Derivatives of D and G1 with respect to directions. */
+ * Derivatives of D and G1 with respect to directions, and what glass of GGX lacks. */
 #include "fresnel.h"
 #include "microfacet.h"
 
@@ -84,6 +84,16 @@ static struct imp__clear_turns refracted(const struct imp__microfacet *f,
                                    by_h * e + m * (DG * S_im) + dGi * (S * D * Go)};
     out.by_wo[2] -= S * DG / (*wo)[2];
     return out;
+}
+
+void imp__ggx_glass_jumps(struct imp_bsdf *bsdf, int index)
+{
+    bsdf->flags |= IMP_BSDF_STEPS;
+    bsdf->fixed |= UINT64_C(1) << index;
+    bsdf->why =
+        "light passes facets of GGX up to those that lie in the surface, where the "
+        "value jumps, and the jump moves with the index (roughdielectric with the "
+        "distribution beckmann has none)";
 }
 
 struct imp__clear_turns imp__microfacet_clear_turns(const struct imp__microfacet *f,

@@ -15,7 +15,8 @@
  *      + (1 - metallic) spec_tint Schlick(R0 tint),  R0 = ((e - 1)/(e + 1))^2
  *
  * and behind Fp = (1 - metallic) spec_trans F. Where spec_trans is not written, or the
- * number 0, nothing is transmitted. The clearcoat has no 1/(4 cos cos), as in the format.
+ * number 0, nothing is transmitted; where something is, the index has no derivative
+ * (imp__ggx_glass_jumps). The clearcoat has no 1/(4 cos cos), as in the format.
  *
  * Where derivatives are taken, all lobes keep a part of the draws, since the derivative
  * with respect to a weight does not vanish with it. */
@@ -43,8 +44,7 @@ static double eta_of(const struct imp__principled_self *p, const imp_spec *in,
     if (p->by_eta) return in[ETA][0];
     const double least = p->transmits ? 1e-3 : 1e-14;
     const double q = sqrt(0.08 * imp_max(in[SPECULAR][0], least));
-    *slope =
-        p->transmits && in[SPECULAR][0] < least ? 0 : 2 / ((1 - q) * (1 - q)) * 0.04 / q;
+    *slope = 2 / ((1 - q) * (1 - q)) * 0.04 / q;
     return 2 / (1 - q) - 1;
 }
 
@@ -60,7 +60,6 @@ struct imp__principled_look imp__principled_look(const struct imp_bsdf *b,
         l.wo[2] = -l.wo[2];
         l.wi[2] = -l.wi[2];
         l.e = 1 / l.e;
-        l.de *= -l.e * l.e;
     }
     l.reflects = l.wi[2] > 0;
     l.metallic = in[METALLIC][0];
@@ -150,13 +149,16 @@ static void front_add(const struct imp__principled_look *l, const imp_spec *in,
     df[ANISOTROPIC] += Fp * (lobe.d_anisotropic * c);
     df[METALLIC] += (metal - dyed * st - (1 - st) * F) * (lobe.DG * c) -
                     base * (burley.value * lambert * (1 - t)) - dye * (sheen * gloss);
-    if (l->p->transmits) df[TRANS] -= base * (burley.value * lambert * (1 - m));
     df[SPEC_TINT] += (dyed - F) * ((1 - m) * lobe.DG * c);
     df[SHEEN] += dye * ((1 - m) * gloss);
     df[SHEEN_TINT] += (tint - one) * (sheen * (1 - m) * gloss);
     df[FLATNESS] += base * (burley.d_flatness * lambert * brdf);
     df[CLEARCOAT] += imp__spec(coat * coat_F);
     df[GLOSS] += imp__spec(cc * coat * coat_F * dlog_coat);
+    if (l->p->transmits) {
+        df[TRANS] -= base * (burley.value * lambert * (1 - m));
+        return;
+    }
     const imp_spec d_e =
         ((one - base) * (m * W_e) +
          ((one - tint * R0) * W_e + tint * ((1 - W) * dR0)) * ((1 - m) * st) +
@@ -186,20 +188,11 @@ static void glass_add(const struct imp__principled_look *l, const imp_spec *in,
     *f += color * (both * share * lobe.DG);
     if (!df) return;
 
-    double d_e = F_e * c;
-    if (!l->reflects) { /* the facet turns with the index: roughdielectric.c */
-        const imp_v3 dm = (l->wi - l->m * l->im) * (1 / l->n);
-        const double dom = imp__dot(l->wo, dm), dim = imp__dot(l->wi, dm);
-        const double dlog = imp__microfacet_d_turned(&l->facets.f, &l->m, &dm) +
-                            dom / l->om + dim / l->im - 2 * l->im / l->n;
-        d_e = share * dlog - (F_e + F_c * dom) * c;
-    }
     df[BASE] += d_color * (both * share * lobe.DG);
     df[ROUGHNESS] += color * (both * share * lobe.d_roughness);
     df[ANISOTROPIC] += color * (both * share * lobe.d_anisotropic);
     df[METALLIC] -= color * (t * share * lobe.DG);
     df[TRANS] += color * ((1 - m) * share * lobe.DG);
-    df[l->p->by_eta ? ETA : SPECULAR] += color * (both * d_e * lobe.DG * l->de);
 }
 
 static void lobes_add(const struct imp_bsdf *b, const imp_spec *in,

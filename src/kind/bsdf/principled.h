@@ -56,7 +56,7 @@ struct imp__principled_look {
     const struct imp__principled_self *p;
     imp_v3 wo, wi, m; /* m: half-vector, upwards */
     bool back, reflects;
-    double e, de;     /* index behind over before; d e/d(eta or specular) */
+    double e, de;     /* index behind over before; d e/d(eta or specular) in front */
     double n, om, im; /* |wo + e wi| with the sign that turns m up; wo.m, wi.m */
     double metallic, trans;
     struct imp__burley_facets facets;
@@ -69,7 +69,7 @@ struct imp__principled_look imp__principled_look(const struct imp_bsdf *b,
                                                  const struct imp_dirs *d);
 /* Sets the half-vector. False: structurally zero. */
 bool imp__principled_half(struct imp__principled_look *l);
-/* For imp_bsdf_ops. */
+/* For imp_bsdf_ops, where nothing is transmitted: with transmission the value jumps. */
 void imp__principled_directions_d(const struct imp_bsdf *b, const imp_spec *in,
                                   const struct imp_dirs *d, imp_spec d_wo[3],
                                   imp_spec d_wi[3]);

@@ -76,6 +76,7 @@ enum imp_status imp__principled_build(const struct imp_build *b, void *self,
     p->coated = imp_build_has(b, "clearcoat");
     p->by_eta = imp_build_has(b, "eta");
     bsdf->flags = IMP_BSDF_SMOOTH | (p->transmits ? IMP_BSDF_TRANSMIT : 0);
+    if (p->transmits) imp__ggx_glass_jumps(bsdf, p->by_eta ? ETA : SPECULAR);
 out:
     return st;
 }

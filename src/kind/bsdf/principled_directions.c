@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Derivatives of the principled material with respect to directions, lobe by lobe as in
- * principled.c. On reflection om = wo.m has the derivative m/2 by either direction. */
+ * Derivatives of the principled material that transmits nothing with respect to directions, lobe
+ * by lobe as in principled.c. On reflection om = wo.m has the derivative m/2 by either direction. */
 #include "fresnel.h"
 #include "principled.h"
+#include <string.h>
 
 /* A derivative by wo and wi, as `look` has them. */
 struct turns {
@@ -68,7 +69,7 @@ static void front_turns(const struct imp__principled_look *l, const imp_spec *in
         imp__burley(cos_o, cos_i, l->om, in[ROUGHNESS][0], in[FLATNESS][0]);
     const struct imp__burley_turns by =
         imp__burley_turns(cos_o, cos_i, l->om, in[ROUGHNESS][0], in[FLATNESS][0]);
-    const imp_spec diffuse = base * (IMP_INV_PI * (1 - m) * (1 - l->trans));
+    const imp_spec diffuse = base * (IMP_INV_PI * (1 - m));
     t->wo[2] += diffuse * (cos_i * by.by_o);
     t->wi[2] += diffuse * (burley.value + cos_i * by.by_i);
     add_om(t, diffuse * (cos_i * by.by_d), l->m);
@@ -80,17 +81,6 @@ static void front_turns(const struct imp__principled_look *l, const imp_spec *in
     coat_turns(l, in, W, W_om, t);
 }
 
-/* Reflection from inside, and transmission. */
-static void glass_turns(const struct imp__principled_look *l, const imp_spec *in,
-                        struct turns *t)
-{
-    const struct imp__clear_turns x =
-        imp__microfacet_clear_turns(&l->facets.f, &l->wo, &l->wi, l->e);
-    imp_spec color = imp__spec((1 - l->metallic) * l->trans);
-    for (int k = 0; k < 4 && !l->reflects; k++) color[k] *= sqrt(in[BASE][k]);
-    add(t, color, x.by_wo, x.by_wi);
-}
-
 void imp__principled_directions_d(const struct imp_bsdf *b, const imp_spec *in,
                                   const struct imp_dirs *d, imp_spec d_wo[3],
                                   imp_spec d_wi[3])
@@ -99,13 +89,7 @@ void imp__principled_directions_d(const struct imp_bsdf *b, const imp_spec *in,
     struct turns t = {{{0}, {0}, {0}}, {{0}, {0}, {0}}};
     imp__principled_cut(in, x);
     struct imp__principled_look l = imp__principled_look(b, x, d);
-    if (imp__principled_half(&l)) {
-        if (l.back || !l.reflects) glass_turns(&l, x, &t);
-        else front_turns(&l, x, &t);
-    }
-    for (int k = 0; k < 3; k++) {
-        const double side = k == 2 && l.back ? -1 : 1;
-        d_wo[k] = t.wo[k] * side;
-        d_wi[k] = t.wi[k] * side;
-    }
+    if (imp__principled_half(&l)) front_turns(&l, x, &t);
+    memcpy(d_wo, t.wo, sizeof t.wo);
+    memcpy(d_wi, t.wi, sizeof t.wi);
 }

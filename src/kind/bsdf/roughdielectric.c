@@ -13,8 +13,9 @@
  * reflection with probability F(c) and refraction with 1 - F(c), whatever the tints are,
  * so that a tint of 0 keeps its derivative.
  *
- * The index has a gradient: a rough boundary spreads light over directions, and at fixed
- * directions the value is smooth in the index, unlike a ray that it bends. */
+ * Transmission ends where the facet lies in the surface, wo_z + e wi_z = 0. D of Beckmann
+ * goes to 0 there: at fixed directions the value is smooth in the index, unlike a ray that it
+ * bends, and the index has a gradient. With GGX it jumps (imp__ggx_glass_jumps). */
 #include "facet_lanes.h"
 #include "fresnel.h"
 #include "fresnel_lanes.h"
@@ -36,8 +37,11 @@ static enum imp_status prepare(const struct imp_build *b)
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_bsdf *bsdf)
 {
+    const struct imp__roughness *r = self;
+    const enum imp_status st = imp__roughness_build(b, self);
     bsdf->flags = IMP_BSDF_SMOOTH | IMP_BSDF_TRANSMIT;
-    return imp__roughness_build(b, self);
+    if (st == IMP_OK && r->type == IMP_GGX) imp__ggx_glass_jumps(bsdf, ETA);
+    return st;
 }
 
 /* Seen from behind the boundary is the same with z reversed and the index inverted: below
@@ -136,7 +140,7 @@ static double index_ratio(const struct imp_bsdf *b, const imp_spec *in,
 }
 
 /* ln f = ln tint + ln F + ln D + ln G1(wi) + ln G1(wo) + ..., one term an input. The index
- * turns the facet of a transmission, with h = wo + e wi and m = h/n:
+ * (of Beckmann) turns the facet of a transmission, with h = wo + e wi and m = h/n:
  *
  *   dm/de = (wi - m (m.wi))/n,   dn/de = m.wi                                        */
 static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
@@ -164,6 +168,7 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
             tint * (share * rest * (dlog_D[j] * Gi * Go + dGi[j] * Go + Gi * dGo[j]));
     imp__roughness_d(b->self, &in[ALPHA], d_alpha, &df[ALPHA]);
 
+    if (q.type == IMP_GGX) return;
     double d_e = F_e;
     if (!v.reflects) {
         const imp_v3 dm = (v.wi - x.m * x.im) * (1 / x.n);

@@ -166,6 +166,9 @@ static const char *steps_why(const struct imp_bsdf *b)
                ? "has normals of its own, and jumps where they turn away "
                  "(clamp_invalid_normals, with the shadowing function, makes it "
                  "continuous)"
+           : b->flags & IMP_BSDF_TRANSMIT
+               ? "lets light through its facets up to an angle, and jumps there "
+                 "(roughdielectric with the distribution beckmann does not)"
                : "has a value that jumps where directions turn";
 }
 
