@@ -145,7 +145,7 @@ enum imp_status imp__moved_learn(struct imp__moved_gradient *m, int spp)
     const int64_t walks =
         (int64_t)film->crop_w * film->crop_h * (spp > 0 ? spp : sensor->spp);
     m->walks = (double)walks;
-    /* Of a loss a fraction of a draw of each kind follows for each walk (imp__moved_share); many edges
+    /* In a loss a fraction of a draw of each kind follows for each walk (imp__moved_share); many edges
      * need a pilot that sees them. */
     const int64_t few = imp_max(walks / LOSS_WALKS, (int64_t)m->edges.n * LOSS_EDGE),
                   draws = m->adjoint.pairs > 0 ? imp_min(few, walks) : walks;
@@ -264,7 +264,7 @@ static bool draws_add(const struct draws *d, struct imp_arena *arena,
     const int64_t pixel = (int64_t)(y + margin) * width + x + margin;
     bool no_memory = false;
     for (int kind = 0; kind < IMP_BOUNDARY_KINDS; kind++) {
-        /* Of all pixels; this one has its part of them, which may be none. */
+        /* They are those of all pixels; this one has its part of them, which may be none. */
         const int64_t n = imp_max(
             (int64_t)llround(plan.n * m->draws[kind] * (double)pixels), (int64_t)1);
         const int64_t first = part_of(pixel, n, pixels),
