@@ -4,7 +4,8 @@
  * the picture and in the fit, from 20 degrees and a tenth of the room away, and how often their 95 %
  * intervals hold the truth. The bound is that of 95 % and a binomial number. Adam; a pose together
  * with a material, the lamp's radiance and an exposure; steps that would lead into the floor. With
- * the argument `long`: 200 fits, or so many as a second one says, of 64 x 64 pixels and 64 samples. */
+ * the argument `long`: 200 fits, or so many as a second one says, of 64 x 64 pixels and 64 samples, or
+ * as many on a side and samples as a third and a fourth one say. */
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "math/rng.h"
@@ -197,7 +198,8 @@ int main(int argc, char **argv)
     const bool all = argc > 1 && strcmp(argv[1], "long") == 0;
     ctx = test_context(2);
     if (all) {
-        coverage_test(argc > 2 ? atoi(argv[2]) : 200, 64, 64, 4);
+        coverage_test(argc > 2 ? atoi(argv[2]) : 200, argc > 3 ? atoi(argv[3]) : 64,
+                      argc > 4 ? atoi(argv[4]) : 64, 4);
     } else {
         coverage_test(3, 32, 8, 3);
         together_test();
