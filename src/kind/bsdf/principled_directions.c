@@ -2,29 +2,19 @@
  *
  * Derivatives of the principled material that transmits nothing with respect to directions, lobe
  * by lobe as in principled.c. On reflection om = wo.m has the derivative m/2 by either direction. */
+#include "by_directions.h"
 #include "fresnel.h"
 #include "principled.h"
 #include <string.h>
 
-/* A derivative by wo and wi, as `look` has them. */
-struct turns {
-    imp_spec wo[3], wi[3];
-};
-static void add(struct turns *t, imp_spec factor, imp_v3 by_wo, imp_v3 by_wi)
+static void add_om(struct imp__by_directions *t, imp_spec by_om, imp_v3 m)
 {
-    for (int k = 0; k < 3; k++) {
-        t->wo[k] += factor * by_wo[k];
-        t->wi[k] += factor * by_wi[k];
-    }
-}
-static void add_om(struct turns *t, imp_spec by_om, imp_v3 m)
-{
-    add(t, by_om, m * 0.5, m * 0.5);
+    imp__by_directions_add(t, by_om, m * 0.5, m * 0.5);
 }
 
 /* 0.25 clearcoat D1(m) G(wo) G(wi) cos_i (0.04 + 0.96 W), with D1 of the form c/q. */
 static void coat_turns(const struct imp__principled_look *l, const imp_spec *in, double W,
-                       double W_om, struct turns *t)
+                       double W_om, struct imp__by_directions *t)
 {
     const struct imp__microfacet quarter = {IMP_GGX, true, 0.25, 0.25, 0};
     const double alpha = 0.1 - 0.099 * in[GLOSS][0], A = alpha * alpha, z = l->m[2];
@@ -35,14 +25,15 @@ static void coat_turns(const struct imp__principled_look *l, const imp_spec *in,
     const double k = 0.25 * in[CLEARCOAT][0], F = 0.04 + 0.96 * W, cos_i = l->wi[2];
     const double by_z = D * -2 * (A - 1) * z / q;
     const imp_v3 by_sum = (imp__v3(0, 0, by_z) - l->m * (z * by_z)) * (1 / l->n);
-    add(t, imp__spec(k * F * cos_i), by_sum * (Go * Gi) + dGo * (D * Gi),
-        by_sum * (Go * Gi) + dGi * (D * Go));
+    imp__by_directions_add(t, imp__spec(k * F * cos_i),
+                           by_sum * (Go * Gi) + dGo * (D * Gi),
+                           by_sum * (Go * Gi) + dGi * (D * Go));
     t->wi[2] += k * F * D * Go * Gi;
     add_om(t, imp__spec(k * D * Go * Gi * cos_i * 0.96 * W_om), l->m);
 }
 
 static void front_turns(const struct imp__principled_look *l, const imp_spec *in,
-                        struct turns *t)
+                        struct imp__by_directions *t)
 {
     const double m = l->metallic, cos_o = l->wo[2], cos_i = l->wi[2];
     double W_om, F_c, F_e, gloss_om;
@@ -61,7 +52,7 @@ static void front_turns(const struct imp__principled_look *l, const imp_spec *in
 
     const struct imp__facet_turns x = imp__microfacet_turns(&l->facets.f, &l->wo, &l->wi);
     const double c = 1 / (4 * cos_o);
-    add(t, Fp * c, x.by_wo, x.by_wi);
+    imp__by_directions_add(t, Fp * c, x.by_wo, x.by_wi);
     add_om(t, Fp_om * (x.DG * c), l->m);
     t->wo[2] -= Fp * (x.DG * c / cos_o);
 
@@ -86,7 +77,7 @@ void imp__principled_directions_d(const struct imp_bsdf *b, const imp_spec *in,
                                   imp_spec d_wi[3])
 {
     imp_spec x[N_INPUTS];
-    struct turns t = {{{0}, {0}, {0}}, {{0}, {0}, {0}}};
+    struct imp__by_directions t = {{{0}, {0}, {0}}, {{0}, {0}, {0}}};
     imp__principled_cut(in, x);
     struct imp__principled_look l = imp__principled_look(b, x, d);
     if (imp__principled_half(&l)) front_turns(&l, x, &t);

@@ -15,6 +15,7 @@
  * where wi is behind the facet h. Nothing is bent. Not reciprocal, by that condition. */
 #include "blending.h"
 #include "burley.h"
+#include "by_directions.h"
 #include "fresnel.h"
 #include "math/warp.h"
 
@@ -224,33 +225,25 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
 
 /* ---- Directions ---------------------------------------------------------------- */
 
-/* Derivatives by wo and wi, both above. */
-struct turns {
-    imp_spec wo[3], wi[3];
-};
-static void turns_add(struct turns *t, imp_spec factor, imp_v3 by_wo, imp_v3 by_wi)
-{
-    for (int k = 0; k < 3; k++) {
-        t->wo[k] += factor * by_wo[k];
-        t->wi[k] += factor * by_wi[k];
-    }
-}
 /* By c: 1 + wo.wi = 2 c^2. */
-static void turns_add_c(struct turns *t, const struct sheet *s, imp_spec by_c)
+static void turns_add_c(struct imp__by_directions *t, const struct sheet *s,
+                        imp_spec by_c)
 {
-    turns_add(t, by_c, s->h * 0.5, s->h * 0.5);
+    imp__by_directions_add(t, by_c, s->h * 0.5, s->h * 0.5);
 }
 /* F D G/(4 cos_o), F of the slope F_c. */
-static void facets_turn(const struct sheet *s, imp_spec F, imp_spec F_c, struct turns *t)
+static void facets_turn(const struct sheet *s, imp_spec F, imp_spec F_c,
+                        struct imp__by_directions *t)
 {
     const struct imp__facet_turns x = imp__microfacet_turns(&s->facets.f, &s->wo, &s->wi);
     const double by = 1 / (4 * s->wo[2]);
-    turns_add(t, F * by, x.by_wo, x.by_wi);
+    imp__by_directions_add(t, F * by, x.by_wo, x.by_wi);
     turns_add_c(t, s, F_c * (x.DG * by));
     t->wo[2] -= F * (x.DG * by / s->wo[2]);
 }
 
-static void reflect_turn(const struct sheet *s, const imp_spec *x, struct turns *t)
+static void reflect_turn(const struct sheet *s, const imp_spec *x,
+                         struct imp__by_directions *t)
 {
     double F_c, F_e, W_c, gloss_c;
     const double eta = x[ETA][0], st = x[SPEC_TINT][0], cos_i = s->wi[2];
@@ -277,7 +270,8 @@ static void reflect_turn(const struct sheet *s, const imp_spec *x, struct turns 
     turns_add_c(t, s, matt * (cos_i * by.by_d) + sheen * (cos_i * gloss_c));
 }
 
-static void transmit_turn(const struct sheet *s, const imp_spec *x, struct turns *t)
+static void transmit_turn(const struct sheet *s, const imp_spec *x,
+                          struct imp__by_directions *t)
 {
     double F_c, F_e;
     const double F = imp__fresnel_dielectric_d(s->c, x[ETA][0], &F_c, &F_e);
@@ -291,7 +285,7 @@ static void eval_directions_d(const struct imp_bsdf *b, const imp_spec *in,
                               imp_spec d_wi[3])
 {
     imp_spec x[N_INPUTS];
-    struct turns t = {{{0}, {0}, {0}}, {{0}, {0}, {0}}};
+    struct imp__by_directions t = {{{0}, {0}, {0}}, {{0}, {0}, {0}}};
     struct sheet s;
     (void)b;
     inputs_cut(in, x);
