@@ -46,20 +46,20 @@ static struct tap_stat difference_of(imp_scene *scene, const struct number *x, i
     return out;
 }
 
-/* Errors told over the spread of so many seeds, of n numbers with sums `square` of squares of the former;
- * of how many. */
-static double told_over_seen(const struct tap_stat *g, const double *square, size_t n,
-                             int seeds, int *counted)
+/* The geometric mean of reported over observed standard errors of n derivatives; squares [n]: sums of
+ * the squares of the reported ones over the seeds. *counted: derivatives with an error. */
+static double error_ratio(const struct tap_stat *g, const double *squares, size_t n,
+                          int seeds, int *counted)
 {
-    double told = 0;
+    double sum = 0;
     *counted = 0;
     for (size_t k = 0; k < n; k++) {
-        if (!(square[k] > 0)) continue;
-        const double own = imp__sqr(tap_se(&g[k])) * seeds;
-        told += log(sqrt(square[k] / seeds / own));
+        if (!(squares[k] > 0)) continue;
+        const double variance = imp__sqr(tap_se(&g[k])) * seeds;
+        sum += 0.5 * log(squares[k] / seeds / variance);
         ++*counted;
     }
-    return exp(told / *counted);
+    return exp(sum / *counted);
 }
 
 /* Parameters are added, and some of their numbers compared; the standard error is at most
@@ -102,11 +102,11 @@ static inline void numbers_compare(const char *what, imp_scene *scene, int spp,
             square[k] += se[k] * se[k];
         }
         if (s != FEW - 1) continue;
-        ratio = told_over_seen(g, square, n, FEW, &counted);
+        ratio = error_ratio(g, square, n, FEW, &counted);
         if (!(ratio > 0.8 && ratio < 1.2)) seeds = MANY;
     }
     imp_problem_destroy(p);
-    ratio = told_over_seen(g, square, n, seeds, &counted);
+    ratio = error_ratio(g, square, n, seeds, &counted);
     tap_ok(ratio > 0.75 && ratio < 1.3,
            "%s: errors told over errors seen, mean of %d numbers # %.3f", what, counted,
            ratio);

@@ -24,7 +24,7 @@
  *     NAME.sun_direction     of a clear sky: towards its sun, world, of any length
  *     NAME.sun_radius        of a sun or of a sky with one: that of its disc, radians
  *
- * Of a group X is in its own space, and all its instances follow.
+ * A group's X is in the group's own space, and all its instances follow.
  *
  * R(a): the rotation about a by |a| radians; c: the middle of a shape's box, or of a group's where an
  * instance has it; a camera's own place.
