@@ -12,7 +12,7 @@ gradient=(importon gradient scene.xml -D res=16 -T plain.exr --spp 8)
 "${gradient[@]}" -o answer.txt --manifest answer.proof
 cmp plain.txt <(tail -n +2 answer.txt) # behind the mark of its first line
 importon verify answer.proof
-fit=(importon fit scene.xml -D res=16 -T plain.exr -p 'ball.*' --set ball.reflectance.value=0.8 --spp 8 -n 4 --optimizer lm -q)
+fit=(importon fit scene.xml -D res=16 -T plain.exr -p 'ball.*' --set ball.reflectance.value=0.8 --spp 8 -n 2 --optimizer lm -q)
 "${fit[@]}" -o result --manifest fit.proof --checkpoint state >fit.txt
 importon verify fit.proof
 importon verify fit.proof --fraction 0.2 --seed 7 --json
@@ -52,7 +52,7 @@ importon render scene.xml -D res=160 --spp 1 -q --no-preview -o large.exr
 importon verify large.exr.manifest --fraction 0.5
 "${fit[@]}" -o kept >/dev/null
 importon verify kept/manifest --fraction 0.1 --seed 1
-"${fit[@]}" -n 6 --checkpoint state --resume -o resumed >/dev/null
+"${fit[@]}" -n 4 --checkpoint state --resume -o resumed >/dev/null
 importon verify resumed/manifest --fraction 0.1
 "${render[@]}" -o none.exr --no-manifest
 "${render[@]}" -o none.exr --time 1
