@@ -4,8 +4,7 @@
  * the first 2^k passes are a node of the tree over passes, so what is there and the next
  * sweep are its two children, and one set of sums is enough for a picture that can be had
  * at any time. */
-#include "film_patch.h"
-#include <float.h>
+#include "film_pass.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -21,210 +20,7 @@
  * want to wait for a part of it. */
 #define LARGE_PICTURE 16e6
 
-struct render {
-    const struct imp_run *run;
-    const struct imp_picture *picture;
-    struct imp_patch patch;
-    struct imp_tiles tiles;
-    struct imp_film_sums sums;
-    int spp, passes, pass_spp;
-    /* Rows of the threads on cache lines of their own. */
-    double *values;      /* [threads][n] */
-    double *patches;     /* [threads][imp__patch_size] what one pixel sends in a
-                        pass through a wide filter */
-    int set;             /* samples that depend on each other, about; 1: none do */
-    int64_t period;      /* samples of a pixel; 0: not known */
-    int sets, pass_sets; /* in all of them, in a pass */
-    double *set_values;  /* [threads][n] box: sums of a set */
-    double *set_patches; /* [threads] as patches, of a set: sums of w and w v alone */
-    int sweep_spp;       /* samples of a pixel in the sweep at work */
-};
-
-/* ---- One tile and pass ----------------------------------------------------------- */
-
-/* Doubles from one thread's row of n to the next's: no cache line is written by two. */
-static size_t apart(size_t n)
-{
-    const size_t line = IMP_CACHE_LINE / sizeof(double);
-    return (n + line - 1) / line * line;
-}
-
-/* A picture holds floats. */
-static IMP_COLD enum imp_drop cause_of(const double *value, int n)
-{
-    for (int c = 0; c < n; c++)
-        if (isnan(value[c])) return IMP_DROP_NAN;
-    return IMP_DROP_INFINITE;
-}
-static inline enum imp_drop beyond_float(const double *value, int n)
-{
-    bool fine = true;
-    for (int c = 0; c < n; c++) fine &= fabs(value[c]) <= FLT_MAX;
-    return imp_likely(fine) ? IMP_DROP_NONE : cause_of(value, n);
-}
-
-/* Sums of n values and of their squares. */
-static inline void box_add(const double *restrict value, int n, double *restrict sums)
-{
-    for (int c = 0; c < n; c++) {
-        sums[2 * c] += value[c];
-        sums[2 * c + 1] += value[c] * value[c];
-    }
-}
-
-static void sample_take(const struct render *r, struct imp_tile_worker *w,
-                        struct imp_sample *s)
-{
-    const struct imp_arena_mark mark = imp__arena_mark(s->arena);
-    s->dropped = IMP_DROP_NONE;
-    r->picture->sample(r->picture->payload, s);
-    imp__arena_rewind(s->arena, mark);
-    if (s->dropped == IMP_DROP_NONE) s->dropped = beyond_float(s->value, r->patch.n);
-    if (imp_likely(s->dropped == IMP_DROP_NONE)) return;
-    memset(s->value, 0, (size_t)r->patch.n * sizeof *s->value);
-    imp__tile_drop(w, s->dropped, s->x, s->y, s->index);
-}
-
-/* A sample of a set; n > 0: the set's last, of n. With a box filter sets of all sizes
- * count the same: their sums are scaled to the mean size. */
-static void set_take(const struct render *r, const struct imp_tile *t, int worker,
-                     const struct imp_sample *s, double *own, double *patch, int n)
-{
-    const size_t width = IMP_WIDE_SUMS(r->patch.n);
-    if (r->patch.border > 0) {
-        double *set = r->set_patches + (size_t)worker * apart(imp__patch_size(&r->patch));
-        const size_t side = (size_t)imp__patch_side(&r->patch);
-        imp__patch_splat(&r->patch, t, set, s);
-        for (size_t i = 0; n > 0 && i < side * side; i++)
-            imp__patch_set(patch + i * width, set + i * width, r->patch.n);
-        return;
-    }
-    double *sum = r->set_values + (size_t)worker * apart((size_t)r->patch.n);
-    const double scale = r->sets > 0 && n > 0 ? (double)r->period / r->sets / n : 1;
-    for (int c = 0; c < r->patch.n; c++) sum[c] += s->value[c];
-    for (int c = 0; n > 0 && c < r->patch.n; c++) {
-        const double all = scale * sum[c];
-        own[2 * c] += all;
-        own[2 * c + 1] += all * all;
-        sum[c] = 0;
-    }
-}
-
-/* First sample of a pass; passes end with sets. */
-static int pass_begin(const struct render *r, int pass)
-{
-    if (r->set > 1 && r->sets > 0)
-        return (int)((int64_t)r->sets * pass / r->passes * r->period / r->sets);
-    return (int)imp_min((int64_t)pass * r->pass_spp, (int64_t)r->spp);
-}
-
-/* Number of sample k of a pixel. */
-static inline int64_t sample_number(const struct render *r, int k)
-{
-    return r->picture->points
-               ? imp__set_number(r->set, r->period, k)
-               : r->picture->first + (int64_t)k * imp_max(r->picture->step, 1);
-}
-
-static bool is_sampled(const void *payload, int x, int y)
-{
-    const struct render *r = payload;
-    return imp_likely(!r->picture->only) ||
-           r->picture->only[(size_t)y * (size_t)r->patch.film->crop_w + (size_t)x];
-}
-
-/* The walks of a tile in bundles: NULL, where samples are none, or not of such walks. */
-static struct imp_supply *supply_begin(const struct render *r, const struct imp_tile *t,
-                                       struct imp_arena *arena, int s0, int s1,
-                                       struct imp_supply *supply)
-{
-    const struct imp_supply_pixels pixels = {t->x0, t->y0, t->x1, t->y1, is_sampled, r};
-    if (!r->picture->walks) return NULL;
-    int64_t *numbers = imp__arena_take(arena, (size_t)(s1 - s0), sizeof *numbers);
-    for (int k = s0; numbers && k < s1; k++) numbers[k - s0] = sample_number(r, k);
-    return numbers && imp__supply_begin(r->picture->walks, arena, &pixels, numbers,
-                                        s1 - s0, 1, supply)
-               ? supply
-               : NULL;
-}
-
-/* Pixel i of a tile, in the order in which its walks are made. False: there are not so many. */
-static inline bool place_take(const struct imp_tile *t, int i, struct imp_sample *s)
-{
-    const int width = t->x1 - t->x0;
-    const struct imp_supply *walks = s->supply;
-    if (i >= (walks ? walks->n_pixels : width * (t->y1 - t->y0))) return false;
-    s->x = walks ? walks->xy[i][0] : t->x0 + i % width;
-    s->y = walks ? walks->xy[i][1] : t->y0 + i / width;
-    return true;
-}
-
-static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worker *w,
-                                 void *result, void *payload)
-{
-    struct render *r = payload;
-    const int s0 = pass_begin(r, (int)t->part), s1 = pass_begin(r, (int)t->part + 1);
-    int n_sets = 0;
-    int64_t first = 0, n_set = 0; /* of the set at work */
-    const int n = r->patch.n;
-    struct imp_supply walks;
-    double *tile = result;
-    double *patch = r->patches + (size_t)w->index * apart(imp__patch_size(&r->patch));
-    struct imp_sample s = {.arena = &w->arena,
-                           .value = r->values + (size_t)w->index * apart((size_t)n)};
-    memset(tile, 0, imp__film_sums_pixels(&r->sums) * sizeof *tile);
-    s.supply = supply_begin(r, t, s.arena, s0, s1, &walks);
-    for (int i = 0; place_take(t, i, &s); i++) {
-        if (!is_sampled(r, s.x, s.y)) continue;
-        double *own = tile + (size_t)((s.y - t->y0) * r->patch.tile_side + s.x - t->x0) *
-                                 2 * (size_t)n;
-        for (int k = s0; k < s1; k++) {
-            s.index = sample_number(r, k);
-            if (s.supply) imp__supply_ready(s.supply);
-            sample_take(r, w, &s);
-            if (imp_unlikely(r->set > 1)) {
-                if (k == s0 || k >= first + n_set)
-                    imp__set_at(r->set, r->period, k, &first, &n_set);
-                const bool last = k + 1 == first + n_set || k + 1 == s1;
-                set_take(r, t, w->index, &s, own, patch, last ? (int)n_set : 0);
-                n_sets += last;
-                continue;
-            }
-            if (r->patch.border > 0) {
-                imp__patch_splat(&r->patch, t, patch, &s);
-                continue;
-            }
-            box_add(s.value, n, own);
-        }
-        if (r->patch.border > 0)
-            imp__patch_add(&r->patch, t, patch, s.x, s.y, r->set > 1 ? n_sets : s1 - s0,
-                           tile);
-        n_sets = 0;
-        const enum imp_status st = imp__tile_check(w);
-        if (st != IMP_OK) return st;
-    }
-    return IMP_OK;
-}
-
-static void tile_add(void *into, const void *from, void *payload)
-{
-    const struct render *r = payload;
-    const size_t n = imp__film_sums_pixels(&r->sums);
-    double *a = into;
-    const double *b = from;
-    for (size_t k = 0; k < n; k++) a[k] += b[k];
-}
-
-static enum imp_status tile_take(size_t tile, const void *sum, void *payload)
-{
-    struct render *r = payload;
-    imp__film_sums_add(&r->sums, tile, sum, r->sweep_spp);
-    return IMP_OK;
-}
-
-/* ---- All ------------------------------------------------------------------------- */
-
-static enum imp_status render_plan(struct render *r, imp_context *ctx)
+static enum imp_status render_plan(struct imp_passes *r, imp_context *ctx)
 {
     const struct imp_picture *p = r->picture;
     const struct imp_run *run = r->run;
@@ -255,9 +51,9 @@ static enum imp_status render_plan(struct render *r, imp_context *ctx)
                            .height = height,
                            .margin = r->patch.film->sample_border ? r->patch.border : 0,
                            .side = r->patch.tile_side,
-                           .work = tile_work,
-                           .add = tile_add,
-                           .take = tile_take,
+                           .work = imp__pass_work,
+                           .add = imp__pass_add,
+                           .take = imp__pass_take,
                            .payload = r};
     const enum imp_status st = imp__tiles_create(&r->tiles);
     r->sums =
@@ -276,22 +72,23 @@ static enum imp_status render_plan(struct render *r, imp_context *ctx)
     return st;
 }
 
-static enum imp_status buffers_create(struct render *r, imp_context *ctx)
+static enum imp_status buffers_create(struct imp_passes *r, imp_context *ctx)
 {
     char what[80];
     snprintf(what, sizeof what, "a picture of %d x %d with %d channels", r->sums.width,
              r->sums.height, r->patch.n);
     enum imp_status st = imp__memory_check(ctx, imp__film_sums_bytes(&r->sums), what);
     if (st != IMP_OK) return st;
-    r->values =
-        imp__alloc(ctx, (size_t)ctx->threads, apart((size_t)r->patch.n) * sizeof(double));
+    r->values = imp__alloc(ctx, (size_t)ctx->threads,
+                           imp__row_apart((size_t)r->patch.n) * sizeof(double));
     r->patches = imp__alloc(ctx, (size_t)ctx->threads,
-                            apart(imp__patch_size(&r->patch)) * sizeof(double));
+                            imp__row_apart(imp__patch_size(&r->patch)) * sizeof(double));
     if (r->set > 1) {
         r->set_values = imp__alloc(ctx, (size_t)ctx->threads,
-                                   apart((size_t)r->patch.n) * sizeof(double));
-        r->set_patches = imp__alloc(ctx, (size_t)ctx->threads,
-                                    apart(imp__patch_size(&r->patch)) * sizeof(double));
+                                   imp__row_apart((size_t)r->patch.n) * sizeof(double));
+        r->set_patches =
+            imp__alloc(ctx, (size_t)ctx->threads,
+                       imp__row_apart(imp__patch_size(&r->patch)) * sizeof(double));
     }
     if (!r->values || !r->patches || (r->set > 1 && (!r->set_values || !r->set_patches)))
         return imp__error(ctx, IMP_E_NOMEM, "no memory for samples of %d channels",
@@ -302,7 +99,7 @@ static enum imp_status buffers_create(struct render *r, imp_context *ctx)
 /* Passes of the next sweep, a power of two that divides `done`. With a time limit, when
  * sums cannot be repeated anyway, they are shorter, so that tiles end with nearly equal
  * numbers of samples. */
-static int sweep_passes(const struct render *r, int done)
+static int sweep_passes(const struct imp_passes *r, int done)
 {
     int n = 1;
     const int most = r->run->time_limit_s > 0 ? done / 4 : done;
@@ -311,7 +108,7 @@ static int sweep_passes(const struct render *r, int done)
 }
 
 /* The spread of too few sets of points tells too little of a pixel's error. */
-static bool has_errors(const struct render *r)
+static bool has_errors(const struct imp_passes *r)
 {
     return r->run->points != IMP_POINTS_WHOLE || !r->picture->points || r->sets > 3;
 }
@@ -322,7 +119,7 @@ static void errors_drop(imp_film *film)
 }
 
 /* Were errors of a wide filter taken within strata? */
-static bool in_strata(const struct render *r)
+static bool in_strata(const struct imp_passes *r)
 {
     return r->patch.border > 0 &&
            (r->set > 1 && r->sets > 0 ? r->sets > 1
@@ -330,7 +127,7 @@ static bool in_strata(const struct render *r)
 }
 
 /* Between sweeps, show what is there. */
-static enum imp_status show(struct render *r, imp_film *preview, int64_t spp)
+static enum imp_status show(struct imp_passes *r, imp_film *preview, int64_t spp)
 {
     if (!preview) return IMP_OK;
     const enum imp_status st = imp__film_sums_look(&r->sums, in_strata(r), &preview);
@@ -340,10 +137,8 @@ static enum imp_status show(struct render *r, imp_film *preview, int64_t spp)
     return IMP_OK;
 }
 
-/* Passes over all tiles; how many samples every pixel got. preview: NULL, or room for
- * what is shown meanwhile. */
 /* Without the margin, which a picture of some pixels alone has not. */
-static double pixels_sampled(const struct render *r)
+static double pixels_sampled(const struct imp_passes *r)
 {
     const size_t all = (size_t)r->sums.width * (size_t)r->sums.height;
     size_t n = 0;
@@ -352,7 +147,9 @@ static double pixels_sampled(const struct render *r)
     return (double)n;
 }
 
-static enum imp_status render_run(struct render *r, imp_film *preview, int64_t *spp)
+/* Passes over all tiles; how many samples every pixel got. preview: NULL, or room for
+ * what is shown meanwhile. */
+static enum imp_status render_run(struct imp_passes *r, imp_film *preview, int64_t *spp)
 {
     enum imp_status st = IMP_OK;
     const bool timed = r->run->time_limit_s > 0;
@@ -363,7 +160,8 @@ static enum imp_status render_run(struct render *r, imp_film *preview, int64_t *
         2. * r->sums.margin * (r->sums.width + r->sums.height + 2. * r->sums.margin);
     for (int done = 0; done < r->passes && st == IMP_OK;) {
         const int n = sweep_passes(r, done);
-        const int64_t before = pass_begin(r, done), after = pass_begin(r, done + n);
+        const int64_t before = imp__pass_begin(r, done),
+                      after = imp__pass_begin(r, done + n);
         r->sweep_spp = (int)(after - before);
         r->tiles.walks = sampled * (double)(timed ? after : (int64_t)r->spp);
         const struct imp_tiles_pass pass = {
@@ -401,7 +199,7 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
                                   const struct imp_run *run, imp_film **out)
 {
     enum imp_status st = IMP_OK, ended;
-    struct render r = {.picture = picture, .run = run};
+    struct imp_passes r = {.picture = picture, .run = run};
     const int n_films = imp_max(picture->n_films, 1);
     int64_t spp = 0;
     imp_film *preview = NULL;

@@ -1,49 +1,24 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A plan: informations of all candidates, gains with their errors, groups that cannot be told
- * apart, the chosen set, and what no candidate determines. */
+ * A plan: informations of all candidates, their rows (plan_rows.c), the chosen set, and what
+ * no candidate determines. */
 #include "base/arguments.h"
 #include "base/team.h"
 #include "inverse/fit/fit.h"
 #include "math/rng.h"
 #include "plan_arguments.h"
-#include "walk/run/run.h"
+#include "plan_rows.h"
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define SEED  0x91a2
 #define KNOWN 1e-6 /* the width of a number that is held, in large changes */
-#define APART 2.5  /* standard errors of a difference that is significant */
-
-struct plan {
-    struct imp_problem *p, *blank;
-    struct imp_arena *arena;
-    struct imp_plan_options o;
-    struct imp_plan_candidate *c; /* [n_all] */
-    size_t n_all, n;              /* candidates; variables */
-    struct imp_run run;
-    double *width;     /* [n] standard deviations of the priors */
-    double *span;      /* [n] large changes */
-    const bool *given; /* [n] they are the caller's */
-    const bool *held;  /* [n] numbers that stay */
-    double *unit;      /* [n] own unit over that of x */
-    struct imp__plan_model model;
-    struct imp__plan_data *data; /* [n_all] */
-    const struct imp__plan_data **have,
-        **open;      /* those that we have, and that are ranked */
-    size_t *open_at; /* [n_open] index of the candidate */
-    double *cost;    /* [n_open] */
-    size_t n_have, n_open;
-    struct imp__plan_known today, then;
-    size_t own, done; /* for progress: this process's candidates, and twice those found */
-};
 
 /* ---- Informations ---------------------------------------------------------------------- */
 
 static int progress(const struct imp_progress *p, void *payload)
 {
-    const struct plan *plan = payload;
+    const struct imp__plan_work *plan = payload;
     struct imp_progress own = *p;
     own.stage = "plan";
     own.fraction = ((double)plan->done + p->fraction) / (2 * (double)plan->own);
@@ -53,7 +28,7 @@ static int progress(const struct imp_progress *p, void *payload)
 }
 
 /* Candidate i's, by a run of its own. */
-static enum imp_status information_find(struct plan *plan, size_t i)
+static enum imp_status information_find(struct imp__plan_work *plan, size_t i)
 {
     imp_context *ctx = plan->p->ctx;
     struct imp_run run = plan->run;
@@ -73,7 +48,7 @@ static enum imp_status information_find(struct plan *plan, size_t i)
                                    imp__plan_name(plan->p->scene, &plan->c[i]));
 }
 
-static enum imp_status informations(struct plan *plan)
+static enum imp_status informations(struct imp__plan_work *plan)
 {
     imp_context *ctx = plan->p->ctx;
     const size_t n = plan->n;
@@ -106,163 +81,9 @@ static enum imp_status informations(struct plan *plan)
                          imp__plan_name(plan->p->scene, &plan->c[0]));
 }
 
-/* ---- Rows -------------------------------------------------------------------------------- */
-
-/* The standard deviations that a covariance has, in the numbers' own units. */
-static enum imp_status errors_give(const struct plan *plan, const double *C,
-                                   const double **out)
-{
-    const size_t n = plan->n;
-    double *se = imp__arena_array(plan->arena, n, sizeof *se);
-    if (!se) return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
-    for (size_t k = 0; k < n; k++) {
-        const double part = sqrt(C[k * n + k]);
-        se[k] = !plan->given[k] && part * part > 1. / (1 + IMP_PLAN_LOOSE)
-                    ? INFINITY
-                    : part * plan->width[k] * plan->unit[k];
-        if (plan->held[k]) se[k] = 0;
-    }
-    *out = se;
-    return IMP_OK;
-}
-
-/* Matrices from the units of the priors to those of x; power -1: informations; 1: pulls. */
-static enum imp_status matrix_give(const struct plan *plan, const double *A, int power,
-                                   const double **out)
-{
-    const size_t n = plan->n;
-    double *B = imp__arena_array(plan->arena, n * n, sizeof *B);
-    if (!B) return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
-    for (size_t k = 0; k < n; k++)
-        for (size_t l = 0; l < n; l++) {
-            const double units = plan->width[k] * plan->width[l];
-            B[k * n + l] = power > 0 ? A[k * n + l] * units : A[k * n + l] / units;
-        }
-    *out = B;
-    return IMP_OK;
-}
-
-/* What the deviations of a candidate, and of what we have, do to its worth. */
-struct moves {
-    double own[IMP_DEVIATIONS], hidden;
-    double *have; /* [n_have][IMP_DEVIATIONS] */
-};
-
-static enum imp_status moves_find(const struct plan *plan,
-                                  const struct imp__plan_data *item, double cost,
-                                  struct moves *m)
-{
-    const size_t n = plan->n;
-    m->have = imp__alloc(plan->p->ctx, plan->n_have * IMP_DEVIATIONS + 1, sizeof(double));
-    if (!m->have) return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
-    imp__plan_deviations(n, plan->then.pull, item, m->own);
-    for (int g = 0; g < IMP_DEVIATIONS; g++) m->own[g] /= cost;
-    m->hidden = plan->then.hidden / cost;
-    for (size_t i = 0; i < plan->n_have; i++) {
-        double before[IMP_DEVIATIONS], *after = m->have + i * IMP_DEVIATIONS;
-        imp__plan_deviations(n, plan->today.pull, plan->have[i], before);
-        imp__plan_deviations(n, plan->then.pull, plan->have[i], after);
-        for (int g = 0; g < IMP_DEVIATIONS; g++) after[g] = (after[g] - before[g]) / cost;
-    }
-    return IMP_OK;
-}
-
-/* Variance of the worth, or of the difference of two. */
-static double moves_variance(const struct plan *plan, const struct moves *a,
-                             const struct moves *b)
-{
-    double sum = imp__sqr(a->hidden) + (b ? imp__sqr(b->hidden) : 0);
-    for (int g = 0; g < IMP_DEVIATIONS; g++)
-        sum += imp__sqr(a->own[g]) + (b ? imp__sqr(b->own[g]) : 0);
-    for (size_t i = 0; i < plan->n_have * IMP_DEVIATIONS; i++)
-        sum += imp__sqr(a->have[i] - (b ? b->have[i] : 0));
-    return sum;
-}
-
-static enum imp_status row_make(struct plan *plan, size_t k, struct imp_plan_row *row,
-                                struct moves *moves)
-{
-    enum imp_status st = IMP_OK;
-    const size_t n = plan->n;
-    const struct imp__plan_data *d = plan->open[k];
-    double *error = plan->then.work;
-    plan->have[plan->n_have] = d; /* there is room for one more */
-    IMP_TRY(imp__plan_evaluate(&plan->model, plan->have, plan->n_have + 1, &plan->then));
-    IMP_TRY(moves_find(plan, d, plan->cost[k], moves));
-    const double gain = plan->then.phi - plan->today.phi;
-    const double se = hypot(sqrt(moves_variance(plan, moves, NULL)),
-                            plan->today.hidden / plan->cost[k]);
-    *row = (struct imp_plan_row){.size = sizeof *row,
-                                 .candidate = plan->open_at[k],
-                                 .gain = {gain, se * plan->cost[k], 1},
-                                 .worth = {gain / plan->cost[k], se, 1},
-                                 .lit = d->lit};
-    IMP_TRY(errors_give(plan, plan->then.C, &row->se));
-    IMP_TRY(matrix_give(plan, d->H, -1, &row->information));
-    IMP_TRY(matrix_give(plan, plan->then.pull, 1, &row->pull));
-    for (size_t i = 0; i < n * n; i++) {
-        error[i] = 0;
-        for (size_t g = 0; g < IMP_DEVIATIONS; g++)
-            error[i] += imp__sqr(d->deviations[g * n * n + i]);
-        error[i] = sqrt(error[i]);
-    }
-    IMP_TRY(matrix_give(plan, error, -1, &row->information_se));
-out:
-    return st;
-}
-
-struct ranked {
-    double worth;
-    size_t at;
-};
-static int by_worth(const void *a, const void *b)
-{
-    const struct ranked *x = a, *y = b;
-    if (x->worth != y->worth) return x->worth > y->worth ? -1 : 1;
-    return x->at < y->at ? -1 : x->at > y->at;
-}
-
-static enum imp_status rows_make(struct plan *plan, struct imp_plan_result *r)
-{
-    enum imp_status st = IMP_OK;
-    imp_context *ctx = plan->p->ctx;
-    const size_t n = plan->n_open;
-    struct imp_plan_row *made = imp__alloc(ctx, n, sizeof *made);
-    struct ranked *order = imp__alloc(ctx, n, sizeof *order);
-    struct moves *moves = imp__alloc(ctx, n, sizeof *moves);
-    struct imp_plan_row *rows = imp__arena_array(plan->arena, n, sizeof *rows);
-    if (!made || !order || !moves || !rows)
-        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a plan"));
-    for (size_t k = 0; k < n; k++) {
-        IMP_TRY(row_make(plan, k, &made[k], &moves[k]));
-        order[k] = (struct ranked){made[k].worth.value, k};
-    }
-    qsort(order, n, sizeof *order, by_worth);
-    size_t first = 0, group = 0;
-    for (size_t i = 0; i < n; i++) {
-        const size_t k = order[i].at, f = order[first].at;
-        const double apart = order[first].worth - order[i].worth;
-        const double se = sqrt(moves_variance(plan, &moves[f], &moves[k]));
-        if (i > 0 && apart > APART * se) {
-            group++;
-            first = i;
-        }
-        rows[i] = made[k];
-        rows[i].group = group;
-    }
-    r->rows = rows;
-    r->n_rows = n;
-out:
-    for (size_t k = 0; moves && k < n; k++) imp__release(ctx, moves[k].have);
-    imp__release(ctx, moves);
-    imp__release(ctx, made);
-    imp__release(ctx, order);
-    return st;
-}
-
 /* ---- The set, and what stays open ---------------------------------------------------------- */
 
-static enum imp_status set_choose(struct plan *plan, struct imp_plan_result *r)
+static enum imp_status set_choose(struct imp__plan_work *plan, struct imp_plan_result *r)
 {
     const struct imp__plan_choice choice = {.model = &plan->model,
                                             .have = plan->have,
@@ -278,11 +99,11 @@ static enum imp_status set_choose(struct plan *plan, struct imp_plan_result *r)
         imp__plan_choose(&choice, chosen, &r->n_chosen, &plan->then, &r->chosen_gain));
     for (size_t k = 0; k < r->n_chosen; k++) chosen[k] = plan->open_at[chosen[k]];
     r->chosen = chosen;
-    return errors_give(plan, plan->then.C, &r->chosen_se);
+    return imp__plan_errors(plan, plan->then.C, &r->chosen_se);
 }
 
 /* From the units of the priors to those of large changes. */
-static void data_rescale(const struct plan *plan, struct imp__plan_data *d)
+static void data_rescale(const struct imp__plan_work *plan, struct imp__plan_data *d)
 {
     const size_t n = plan->n;
     for (size_t g = 0; g <= IMP_DEVIATIONS; g++) {
@@ -296,7 +117,7 @@ static void data_rescale(const struct plan *plan, struct imp__plan_data *d)
 
 /* The last one to use the informations, whose units it changes: what pictures determine is
  * not a matter of priors. */
-static enum imp_status loose_find(struct plan *plan, struct imp_plan_result *r)
+static enum imp_status loose_find(struct imp__plan_work *plan, struct imp_plan_result *r)
 {
     enum imp_status st = IMP_OK;
     const size_t n = plan->n;
@@ -321,7 +142,7 @@ out:
 
 /* ---- All of it ----------------------------------------------------------------------------- */
 
-static enum imp_status widths_set(struct plan *plan)
+static enum imp_status widths_set(struct imp__plan_work *plan)
 {
     const struct imp_problem *p = plan->p;
     const size_t n = p->n;
@@ -359,7 +180,7 @@ out:
     return st;
 }
 
-static enum imp_status lists_make(struct plan *plan)
+static enum imp_status lists_make(struct imp__plan_work *plan)
 {
     imp_context *ctx = plan->p->ctx;
     const size_t n = plan->n_all;
@@ -382,7 +203,7 @@ static enum imp_status lists_make(struct plan *plan)
     return imp__plan_take_check(plan->p, &plan->o, plan->n_open);
 }
 
-static enum imp_status model_make(struct plan *plan)
+static enum imp_status model_make(struct imp__plan_work *plan)
 {
     size_t *of = imp__arena_array(plan->arena, plan->n, sizeof *of);
     if (!of) return imp__error(plan->p->ctx, IMP_E_NOMEM, "no memory for a plan");
@@ -403,7 +224,7 @@ static enum imp_status model_make(struct plan *plan)
     return imp__plan_known_create(&plan->model, &plan->then);
 }
 
-static void plan_end(struct plan *plan)
+static void plan_end(struct imp__plan_work *plan)
 {
     imp_context *ctx = plan->p->ctx;
     for (size_t i = 0; plan->data && i < plan->n_all; i++)
@@ -427,7 +248,8 @@ enum imp_status imp_plan(imp_problem *problem,
     enum imp_status st = IMP_OK;
     IMP_REQUIRE(NULL, problem, "problem");
     imp_context *ctx = problem->ctx;
-    struct plan plan = {.p = problem, .arena = &problem->plan_arena, .n = problem->n};
+    struct imp__plan_work plan = {
+        .p = problem, .arena = &problem->plan_arena, .n = problem->n};
     IMP_REQUIRE(ctx, candidates, "candidates");
     IMP_REQUIRE(ctx, result, "result");
     IMP_RUN(ctx, plan.run, run);
@@ -452,8 +274,8 @@ enum imp_status imp_plan(imp_problem *problem,
     r->prior = plan.width;
     r->span = plan.span;
     IMP_TRY(imp__plan_evaluate(&plan.model, plan.have, plan.n_have, &plan.today));
-    IMP_TRY(errors_give(&plan, plan.today.C, &r->today));
-    IMP_TRY(rows_make(&plan, r));
+    IMP_TRY(imp__plan_errors(&plan, plan.today.C, &r->today));
+    IMP_TRY(imp__plan_rows(&plan, r));
     IMP_TRY(set_choose(&plan, r));
     IMP_TRY(loose_find(&plan, r));
     *result = r;
