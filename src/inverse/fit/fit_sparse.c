@@ -126,9 +126,11 @@ enum imp_status imp__fit_sparse(const double *x, uint64_t seed, int rounds,
     eq.f.value += imp__regularise(p, x, eq.g);
     eq.n_residuals = e->rows.n_residuals;
     /* A fit of n variables reduces the squared residuals of M pixels by (M - n)/M on
-     * average; corrected where they are used as estimates of the noise. */
-    const double freedom = eq.n_residuals - (double)(n - imp__held_count(f->problem));
-    e->widen = f->noise_known || freedom < 1 ? 1 : sqrt(eq.n_residuals / freedom);
+     * average; corrected where they are used as estimates of the noise. Channels that share
+     * their noise are one observation. */
+    const double observations = e->rows.n_pixels > 0 ? e->rows.n_pixels : eq.n_residuals;
+    const double freedom = observations - (double)(n - imp__held_count(f->problem));
+    e->widen = f->noise_known || freedom < 1 ? 1 : sqrt(observations / freedom);
     *out = eq;
     return IMP_OK;
 out:

@@ -33,9 +33,6 @@
 #include "walk/rules/features.h"
 
 #define GAUSS_NEWTON_MAX 256
-/* Pixels that products of two channels' residuals take for each value: with fewer, a fit follows their
- * noise, and what is left of it tells little. */
-#define PIXELS_A_VALUE 4
 
 static enum imp_status workers_create(struct imp__normal_job *j, imp_context *ctx)
 {
@@ -174,7 +171,7 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
     imp__team_state(p->scene, &own);
     p->edge_terms = true;
     out->n_pixels = imp__normal_pixel_count(p);
-    if (out->n_pixels < PIXELS_A_VALUE * (double)p->n) out->n_pixels = 0;
+    if (out->n_pixels < IMP_PIXELS_A_VALUE * (double)p->n) out->n_pixels = 0;
     j.pairs = out->n_pixels > 0;
     for (size_t t = 0; t < p->n_targets; t++)
         j.cross |= j.pairs && p->targets[t].noise_se && p->targets[t].desc.channels > 1;

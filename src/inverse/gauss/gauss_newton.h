@@ -38,6 +38,10 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
                                   const struct imp_run *run,
                                   struct imp__gauss_newton *out);
 
+/* Pixels that products of two channels' residuals take for each value: with fewer, a fit follows their
+ * noise, and what is left of it tells little. */
+#define IMP_PIXELS_A_VALUE 4
+
 /* What tells how the noise of two channels whose sigmas are given is correlated: sums over the pixels
  * where both count. */
 struct imp__channel_pair {

@@ -162,6 +162,11 @@ enum imp_status imp__rows_gradient(const struct imp__rows *rows, double *g)
 
 /* ---- Draws ---------------------------------------------------------------------- */
 
+struct noise_draw {
+    uint64_t seed;
+    const struct imp__rows *rows;
+};
+
 /* Signs of a pixel: bit k of number n of the vector `of`. */
 static uint64_t bits(uint64_t seed, uint64_t key, int of, int number)
 {
@@ -194,7 +199,7 @@ static struct residuals residuals_of(const struct imp__row_block *b,
 static void gradient_draw(const struct imp__row_block *b, const struct imp__row_pixel *p,
                           int width, const void *payload, double *f)
 {
-    const uint64_t seed = *(const uint64_t *)payload;
+    const uint64_t seed = ((const struct noise_draw *)payload)->seed;
     const size_t S = (size_t)b->channels;
     const double M = p->units, scale = p->share * sqrt(4 / (M * (M - 1)));
     for (size_t c = 0; c < S; c++) {
@@ -216,7 +221,7 @@ static void gradient_draw(const struct imp__row_block *b, const struct imp__row_
 static void excess_draw(const struct imp__row_block *b, const struct imp__row_pixel *p,
                         int width, const void *payload, double *f)
 {
-    const uint64_t seed = *(const uint64_t *)payload;
+    const uint64_t seed = ((const struct noise_draw *)payload)->seed;
     const size_t S = (size_t)b->channels;
     const double M = p->units, pairs = M * (M - 1) / 2;
     const double scale = p->share * sqrt(4 / (M * (M - 1) * (M - 2) * (M - 3)));
@@ -244,22 +249,35 @@ static void excess_draw(const struct imp__row_block *b, const struct imp__row_pi
     }
 }
 
+/* xi of channel c. Residuals of one pixel have one sign: their products are the noise that channels
+ * share (White 1980, by groups). */
+static double channel_sign(const struct imp__rows *rows, uint64_t word, size_t c,
+                           bool known)
+{
+    double xi = 0;
+    if (!known) return sign(word, rows->n_pixels > 0 ? 0 : (int)c);
+    for (size_t k = 0; k <= c; k++) xi += rows->mix[c][k] * sign(word, (int)k);
+    return xi;
+}
+
 /* Noise of the target moves g by -w X sigma xi, X the mean over units; where sigma is not
  * known the residual replaces it, less what walks make of it. Parts of a pixel share
- * its sign. */
+ * its signs. */
 static void measurement_draw(const struct imp__row_block *b,
                              const struct imp__row_pixel *p, int width,
                              const void *payload, double *f)
 {
-    const uint64_t seed = *(const uint64_t *)payload;
+    const struct noise_draw *draw = payload;
     const size_t S = (size_t)b->channels;
     const double M = p->units;
     for (size_t c = 0; c < S; c++) {
         const struct residuals s = residuals_of(b, p, c);
+        const bool known = p->noise_se[c] >= 0;
         const double sigma =
-            p->noise_se[c] >= 0 ? (double)p->noise_se[c] : s.R / M * sqrt(b->noise_share);
+            known ? (double)p->noise_se[c] : s.R / M * sqrt(b->noise_share);
         for (int v = 0; v < width; v++) {
-            const double xi = sign(bits(seed, p->key, v, 63), (int)c);
+            const double xi =
+                channel_sign(draw->rows, bits(draw->seed, p->key, v, 63), c, known);
             for (int a = 0; a < p->units; a++)
                 f[((size_t)a * S + c) * (size_t)width + (size_t)v] =
                     p->share * p->weight[c] * sigma * xi / M;
@@ -273,5 +291,6 @@ enum imp_status imp__rows_draw(const struct imp__rows *rows, enum imp__draw what
     factors_fn *const factors[] = {[IMP_DRAW_GRADIENT] = gradient_draw,
                                    [IMP_DRAW_EXCESS] = excess_draw,
                                    [IMP_DRAW_MEASUREMENT] = measurement_draw};
-    return combine(rows, WIDTH, factors[what], &seed, z);
+    const struct noise_draw draw = {seed, rows};
+    return combine(rows, WIDTH, factors[what], &draw, z);
 }

@@ -276,6 +276,7 @@ enum imp_status imp__rows_take(struct imp_problem *p, const double *x,
         if (bias && (!rows.objective.bias_order || bias < rows.objective.bias_order))
             rows.objective.bias_order = bias;
     }
+    imp__rows_share_noise(&rows, p);
     rows.objective.value = j.total[IMP_ROWS_OBJECTIVE];
     rows.objective.se = sqrt(fmax(0, j.total[IMP_ROWS_VARIANCE]));
     *out = rows;

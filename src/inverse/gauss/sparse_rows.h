@@ -45,6 +45,12 @@ struct imp__rows {
     size_t n_blocks;
     struct imp__row_block *block;
     double n_residuals;
+    /* Where channels of a pixel share their noise: pixels that count. 0: there are too few of them for
+     * so many values, and channels are independent. */
+    double n_pixels;
+    /* Where sigmas are given, channel c has the noise sigma_c sum_k mix[c][k] xi_k, k <= c, with
+     * independent xi of variance 1. */
+    double mix[3][3];
     struct imp_estimate objective; /* of the data, as an evaluation with the same walks */
     double *sums; /* [IMP_ROW_GROUPS][n][IMP_SPARSE_WIDTH]: sums of groups of blocks */
 };
@@ -70,6 +76,11 @@ enum imp_status imp__rows_gradient(const struct imp__rows *rows, double *g);
 /* z [n][IMP_SPARSE_WIDTH]: vectors of mean 0 with the given covariance. */
 enum imp_status imp__rows_draw(const struct imp__rows *rows, enum imp__draw what,
                                uint64_t seed, double *z);
+
+/* ---- sparse_channels.c ----------------------------------------------------------- */
+
+/* Finds n_pixels and mix, of rows that are there. */
+void imp__rows_share_noise(struct imp__rows *rows, const struct imp_problem *p);
 
 /* ---- sparse_diagonal.c ----------------------------------------------------------- */
 
