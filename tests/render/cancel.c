@@ -129,7 +129,7 @@ static void fits(int at)
         o.intervals = 1;
         if (kind == IMP_ADAM) run.spp = 8;
         if (kind == IMP_LBFGS)
-            run.spp = 100000; /* each sample of its walks has a number in memory */
+            run.spp = 10000; /* each sample of its walks has a number in memory */
         const enum imp_status st = imp_fit(problem, &o, &run, &r);
         imp_problem_get_x(problem, x);
         int fine = st == IMP_CANCELLED && r && r->n == N;
