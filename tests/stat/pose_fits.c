@@ -5,7 +5,7 @@
  * intervals hold the truth. The bound is that of 95 % and a binomial number. Adam; a pose together
  * with a material, the lamp's radiance and an exposure; steps that would lead into the floor. With
  * the argument `long`: 200 fits, or so many as a second one says, of 64 x 64 pixels and 64 samples, or
- * as many on a side and samples as a third and a fourth one say. */
+ * as many on a side, samples and levels as a third, a fourth and a fifth one say. */
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "math/rng.h"
@@ -120,8 +120,8 @@ static void coverage_test(int fits, int res, int spp, int levels)
             intervals += 6;
             missed += own;
         }
-        printf("# fit %d: %s, %d missed, %d iterations\n", k,
-               near ? "there" : "elsewhere", own, result->iterations);
+        printf("# fit %d: %s, %d missed, %d iterations, %s\n", k,
+               near ? "there" : "elsewhere", own, result->iterations, result->reason);
         imp_problem_destroy(p);
         imp_scene_destroy(scene);
     }
@@ -199,7 +199,7 @@ int main(int argc, char **argv)
     ctx = test_context(2);
     if (all) {
         coverage_test(argc > 2 ? atoi(argv[2]) : 200, argc > 3 ? atoi(argv[3]) : 64,
-                      argc > 4 ? atoi(argv[4]) : 64, 4);
+                      argc > 4 ? atoi(argv[4]) : 64, argc > 5 ? atoi(argv[5]) : 5);
     } else {
         coverage_test(3, 32, 8, 3);
         together_test();
