@@ -24,14 +24,8 @@ enum {
     IMP__GROUPS = 16,
     IMP__HALVES = IMP__GROUPS - 1,
     IMP__QUARTERED = 5,
-    IMP__VARIANTS = 1 + 2 * IMP__HALVES + 4 * IMP__QUARTERED,
-    IMP__AT_ONCE = 8
+    IMP__VARIANTS = 1 + 2 * IMP__HALVES + 4 * IMP__QUARTERED
 };
-
-/* Numbers of as many hours: hour k is lane k % 8 of block k/8. Their readings have errors of a part
- * in a thousand or more, so floats are enough. */
-typedef float imp__annual_lanes __attribute__((vector_size(4 * IMP__AT_ONCE)));
-typedef int32_t imp__annual_mask __attribute__((vector_size(4 * IMP__AT_ONCE)));
 
 /* Two suns of a table from which one is drawn (Walker 1977): the first below `part`. */
 struct imp__annual_sun {
@@ -40,7 +34,7 @@ struct imp__annual_sun {
     uint16_t cell[2];
 };
 
-/* Hours with light. */
+/* Hours with light: hour k is lane k % 8 of block k/8. */
 struct imp__annual_hours {
     size_t n, blocks;
     size_t *hour;                           /* [n] of the caller's */
@@ -75,19 +69,20 @@ static inline double imp__annual_light(bool mono, imp_spec x)
     return mono ? x[0] : imp__luminance(x[0], x[1], x[2]);
 }
 
-/* Coefficients of one point. */
-struct imp__annual_coefficients {
-    float (*C)[IMP__GROUPS]; /* [IMP__PATCHES] */
-    float (*I)[IMP__GROUPS]; /* [n_cells] */
-    double *C_sum, *I_sum;   /* of a group, while it is summed */
+/* One point: its coefficients, [IMP__PATCHES] and [n_cells]; its hours, [hours.blocks]: all light, and
+ * the sun's alone. */
+struct imp__annual_at {
+    float (*C)[IMP__GROUPS], (*I)[IMP__GROUPS];
+    imp__annual_lanes (*E)[IMP__GROUPS], (*S)[IMP__GROUPS];
 };
 
+/* Points that a worker has at once: the skies, which are large, are read once for all of them. */
+enum { IMP__POINTS = 4 };
 struct imp__annual_worker {
     struct imp_arena arena;
     struct imp_drops drops;
-    struct imp__annual_coefficients at;
-    /* [hours.blocks] all light; the sun alone */
-    imp__annual_lanes (*E)[IMP__GROUPS], (*S)[IMP__GROUPS];
+    struct imp__annual_at at[IMP__POINTS];
+    double *C_sum, *I_sum; /* coefficients of a group, while it is summed */
 };
 
 /* annual_hours.c: IMP_E_ARG for numbers out of range; skies and suns of hours that are checked. */
@@ -100,13 +95,18 @@ void imp__annual_hours_free(imp_context *ctx, struct imp__annual_hours *h);
 
 /* annual_sun.c: what of the light from direction w reaches o: 0 or 1 but for panes. */
 imp_spec imp__annual_passes(const struct imp__annual *a, double time, imp_v3 o, imp_v3 w);
-/* Adds the sun of hour h, straight to the point of pixel (x, y), to S, by groups. */
+/* S: the suns of all hours, straight to the point of pixel (x, y), by groups. */
 void imp__annual_direct(const struct imp__annual *a, int x, int y,
-                        struct imp__annual_worker *w);
+                        struct imp__annual_at *at);
 
 /* annual_walks.c: coefficients of pixel (x, y). */
 enum imp_status imp__annual_walks(const struct imp__annual *a, int x, int y,
-                                  struct imp__annual_worker *w);
+                                  struct imp__annual_worker *w,
+                                  struct imp__annual_at *at);
+
+/* annual_light.c: E of points. */
+void imp__annual_hours_light(const struct imp__annual *a, const struct imp__annual_at *at,
+                             size_t points);
 
 /* annual_sums.c: numbers of a year of one point, as all groups have them, halves and quarters. */
 enum imp__annual_number {
@@ -124,7 +124,7 @@ struct imp__annual_numbers {
 /* used [hours.blocks]: -1 of an hour of use, else 0. all: how many of the year are, lit or not. */
 void imp__annual_add(const struct imp__annual *a, const struct imp_annual_options *o,
                      const imp__annual_mask *used, size_t all,
-                     const struct imp__annual_worker *w, struct imp__annual_numbers *out);
+                     const struct imp__annual_at *at, struct imp__annual_numbers *out);
 /* Value and error of a number's variants. */
 struct imp_estimate imp__annual_estimate(const double variant[IMP__VARIANTS]);
 void imp__annual_point_set(const struct imp__annual_numbers *x,

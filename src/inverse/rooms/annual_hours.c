@@ -57,32 +57,36 @@ struct job {
     struct imp__annual_hours *out;
 };
 
-static void sky_make(const struct job *j, size_t k)
+/* Without light: a sky of one radiance, which counts 0 times. */
+static double sky_of(const struct job *j, size_t k, struct imp__sky_shape *out)
 {
-    const struct imp_weather_hour *h = &j->hour[j->out->hour[k]];
     const struct imp__sky_patches *p = j->patches;
-    imp__annual_lanes *out = j->out->sky[k / IMP__AT_ONCE];
-    double L[IMP__PATCHES];
-    if (!(h->diffuse_illuminance > 0)) return;
-    struct imp__sky_shape s = {.axis = {p->axis[0], p->axis[1], p->axis[2]}};
+    *out = (struct imp__sky_shape){.axis = {p->axis[0], p->axis[1], p->axis[2]}};
+    if (k >= j->out->n) return 0;
+    const struct imp_weather_hour *h = &j->hour[j->out->hour[k]];
+    if (!(h->diffuse_illuminance > 0)) return 0;
     const double up = h->sun[2];
-    s.sun = sun_of(p, h);
+    out->sun = sun_of(p, h);
     if (up < 0) { /* it has just set, or is about to rise */
-        const imp_v3 level = s.sun - p->axis[2] * up;
-        s.sun = imp__length(level) > 1e-9 ? imp__normalize(level) : p->axis[0];
+        const imp_v3 level = out->sun - p->axis[2] * up;
+        out->sun = imp__length(level) > 1e-9 ? imp__normalize(level) : p->axis[0];
     }
     /* Illuminances alone make a sky, too: a diffuse irradiance below 1 W/m^2 is night's end. */
-    imp__perez_shape(&s, &(struct imp__perez_weather){fmax(h->diffuse, 1), h->direct,
-                                                      IMP__SOLAR_CONSTANT});
-    imp__sky_patches_fill(p, &s, h->diffuse_illuminance, L);
-    for (int i = 0; i < IMP__PATCHES; i++) out[i][k % IMP__AT_ONCE] = (float)L[i];
+    imp__perez_shape(out, &(struct imp__perez_weather){fmax(h->diffuse, 1), h->direct,
+                                                       IMP__SOLAR_CONSTANT});
+    return h->diffuse_illuminance;
 }
 
 static enum imp_status skies_make(size_t first, size_t end, void *payload)
 {
     const struct job *j = payload;
-    for (size_t k = first * IMP__AT_ONCE; k < end * IMP__AT_ONCE && k < j->out->n; k++)
-        sky_make(j, k);
+    for (size_t block = first; block < end; block++) {
+        struct imp__sky_shape sky[IMP__AT_ONCE];
+        double level[IMP__AT_ONCE];
+        for (size_t t = 0; t < IMP__AT_ONCE; t++)
+            level[t] = sky_of(j, block * IMP__AT_ONCE + t, &sky[t]);
+        imp__sky_patches_fill(j->patches, sky, level, j->out->sky[block]);
+    }
     return IMP_OK;
 }
 

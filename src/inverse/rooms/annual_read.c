@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Daylight of a year at the points of a grid: options, scenes without it, and the loop over the
- * points. A point is one item of work with sums of its own: the number of threads changes no
- * bit. */
+ * points. An item of work is one or some points with sums of their own: the number of threads changes
+ * no bit. */
 #include "annual.h"
 #include "base/arguments.h"
 #include "film/film_measure.h"
@@ -23,6 +23,7 @@ struct job {
     size_t n;                            /* hours as given */
     imp__annual_mask *used;              /* [hours.blocks] -1: an hour of use */
     size_t n_used;                       /* of the year */
+    size_t points, each;                 /* of all; of an item of work */
     struct imp__annual_worker *worker;   /* [threads] */
     struct imp__annual_numbers *numbers; /* [points] */
     double *reading, *se;
@@ -132,99 +133,79 @@ static enum imp_status annual_begin(const struct imp_scene *scene,
 
 /* ---- A point ------------------------------------------------------------------------- */
 
-/* E = sum_p C_p L_p + S + E_s I of the hours of a block, for half of the groups: as many sums as
- * processors have registers for, beside what they are made of. */
-static void block_light(const struct imp__annual *a, const struct imp__annual_worker *w,
-                        const int *seen, int n, size_t block, int half)
-{
-    enum { HALF = IMP__GROUPS / 2 };
-    const struct imp__annual_hours *h = &a->hours;
-    const imp__annual_lanes *L = h->sky[block];
-    imp__annual_lanes E[HALF];
-    for (int g = 0; g < HALF; g++) E[g] = w->S[block][half * HALF + g];
-    for (size_t t = 0; t < IMP__AT_ONCE && block * IMP__AT_ONCE + t < h->n; t++) {
-        const size_t k = block * IMP__AT_ONCE + t;
-        const float *I = h->cell[k] >= 0 ? w->at.I[h->cell[k]] + half * HALF : NULL;
-        for (int g = 0; I && g < HALF; g++) E[g][t] += (float)h->sun[k] * I[g];
-    }
-    const size_t ahead = block + 1 < h->blocks ? IMP__PATCHES : 0; /* of the next block */
-    for (int i = 0; i < n; i++) {
-        const float *C = w->at.C[seen[i]] + half * HALF;
-        if (half == 0) __builtin_prefetch(L + ahead + seen[i]);
-        for (int g = 0; g < HALF; g++) E[g] += L[seen[i]] * C[g];
-    }
-    for (int g = 0; g < HALF; g++) w->E[block][half * HALF + g] = E[g];
-}
-
-static void hours_light(const struct imp__annual *a, const struct imp__annual_worker *w)
-{
-    int seen[IMP__PATCHES], n = 0; /* patches from which any light comes */
-    for (int p = 0; p < IMP__PATCHES; p++) {
-        bool any = false;
-        for (int g = 0; g < IMP__GROUPS; g++) any |= w->at.C[p][g] != 0;
-        if (any) seen[n++] = p;
-    }
-    for (size_t b = 0; b < a->hours.blocks; b++)
-        for (int half = 0; half < 2; half++) block_light(a, w, seen, n, b, half);
-}
-
-static void hours_give(const struct job *j, size_t point,
-                       const struct imp__annual_worker *w)
+static void hours_give(const struct job *j, size_t point, const struct imp__annual_at *at)
 {
     const struct imp__annual_hours *h = &j->a->hours;
     for (size_t k = 0; k < h->n; k++) {
         double group[IMP__GROUPS];
         for (int g = 0; g < IMP__GROUPS; g++)
-            group[g] = (double)w->E[k / IMP__AT_ONCE][g][k % IMP__AT_ONCE];
+            group[g] = (double)at->E[k / IMP__AT_ONCE][g][k % IMP__AT_ONCE];
         const struct imp_estimate e = imp__annual_mean(group);
         if (j->reading) j->reading[point * j->n + h->hour[k]] = e.value;
         if (j->se) j->se[point * j->n + h->hour[k]] = e.se;
     }
 }
 
-static enum imp_status point_work(size_t i, int worker, int slot, void *payload)
+static enum imp_status point_walk(const struct imp__annual *a, size_t point,
+                                  struct imp__annual_worker *w, struct imp__annual_at *at)
 {
-    struct job *j = payload;
-    const struct imp__annual *a = j->a;
-    struct imp__annual_worker *w = &j->worker[worker];
     const int width = a->sensor->film.crop_w;
-    const int x = (int)(i % (size_t)width), y = (int)(i / (size_t)width);
+    const int x = (int)(point % (size_t)width), y = (int)(point / (size_t)width);
+    const enum imp_status st = imp__annual_walks(a, x, y, w, at);
+    if (st == IMP_E_NOMEM)
+        return imp__error(a->scene->ctx, st, "no memory for walks of a year");
+    if (st == IMP_OK) imp__annual_direct(a, x, y, at);
+    return st;
+}
+
+static enum imp_status points_work(size_t i, int worker, int slot, void *payload)
+{
+    enum imp_status st = IMP_OK;
+    struct job *j = payload;
+    struct imp__annual_worker *w = &j->worker[worker];
+    const size_t first = i * j->each, n = imp_min(j->each, j->points - first);
     (void)slot;
-    const enum imp_status st = imp__annual_walks(a, x, y, w);
+    for (size_t k = 0; k < n && st == IMP_OK; k++)
+        st = point_walk(j->a, first + k, w, &w->at[k]);
     if (imp__drops_total(&w->drops) > 0) {
         pthread_mutex_lock(&j->lock);
         imp__drops_merge(&j->drops, &w->drops);
         pthread_mutex_unlock(&j->lock);
         memset(&w->drops, 0, sizeof w->drops);
     }
-    if (st != IMP_OK)
-        return st == IMP_E_NOMEM
-                   ? imp__error(a->scene->ctx, st, "no memory for walks of a year")
-                   : st;
-    imp__annual_direct(a, x, y, w);
-    hours_light(a, w);
-    imp__annual_add(a, &j->options, j->used, j->n_used, w, &j->numbers[i]);
-    if (j->reading || j->se) hours_give(j, i, w);
+    if (st != IMP_OK) return st;
+    imp__annual_hours_light(j->a, w->at, n);
+    for (size_t k = 0; k < n; k++) {
+        imp__annual_add(j->a, &j->options, j->used, j->n_used, &w->at[k],
+                        &j->numbers[first + k]);
+        if (j->reading || j->se) hours_give(j, first + k, &w->at[k]);
+    }
     return IMP_OK;
+}
+
+static bool at_make(imp_context *ctx, const struct imp__annual_hours *h,
+                    struct imp__annual_at *at)
+{
+    at->C = imp__alloc(ctx, IMP__PATCHES, sizeof *at->C);
+    at->I = imp__alloc(ctx, (size_t)h->n_cells + 1, sizeof *at->I);
+    at->E = imp__alloc(ctx, h->blocks, sizeof *at->E);
+    at->S = imp__alloc(ctx, h->blocks, sizeof *at->S);
+    return at->C && at->I && at->E && at->S;
 }
 
 static enum imp_status workers_make(struct job *j, int threads)
 {
-    const struct imp__annual_hours *h = &j->a->hours;
     imp_context *ctx = j->a->scene->ctx;
     j->worker = imp__alloc(ctx, (size_t)threads, sizeof *j->worker);
     if (!j->worker) return IMP_E_NOMEM;
     for (int t = 0; t < threads; t++) {
         struct imp__annual_worker *w = &j->worker[t];
         imp__arena_init(&w->arena, ctx);
-        w->at.C = imp__alloc(ctx, IMP__PATCHES, sizeof *w->at.C);
-        w->at.I = imp__alloc(ctx, (size_t)h->n_cells + 1, sizeof *w->at.I);
-        w->at.C_sum = imp__alloc(ctx, IMP__PATCHES, sizeof *w->at.C_sum);
-        w->at.I_sum = imp__alloc(ctx, IMP__PATCHES, sizeof *w->at.I_sum);
-        w->E = imp__alloc(ctx, h->blocks, sizeof *w->E);
-        w->S = imp__alloc(ctx, h->blocks, sizeof *w->S);
-        if (!w->at.C || !w->at.I || !w->at.C_sum || !w->at.I_sum || !w->E || !w->S)
-            return IMP_E_NOMEM;
+        w->C_sum = imp__alloc(ctx, IMP__PATCHES, sizeof *w->C_sum);
+        w->I_sum = imp__alloc(ctx, IMP__PATCHES, sizeof *w->I_sum);
+        bool got = w->C_sum && w->I_sum;
+        for (size_t k = 0; k < j->each; k++) got &= at_make(ctx, &j->a->hours, &w->at[k]);
+        if (!got) return IMP_E_NOMEM;
     }
     return IMP_OK;
 }
@@ -234,12 +215,14 @@ static void workers_free(struct job *j, int threads)
     for (int t = 0; j->worker && t < threads; t++) {
         struct imp__annual_worker *w = &j->worker[t];
         if (w->arena.ctx) imp__arena_free(&w->arena);
-        imp__release(ctx, w->at.C);
-        imp__release(ctx, w->at.I);
-        imp__release(ctx, w->at.C_sum);
-        imp__release(ctx, w->at.I_sum);
-        imp__release(ctx, w->E);
-        imp__release(ctx, w->S);
+        imp__release(ctx, w->C_sum);
+        imp__release(ctx, w->I_sum);
+        for (int k = 0; k < IMP__POINTS; k++) {
+            imp__release(ctx, w->at[k].C);
+            imp__release(ctx, w->at[k].I);
+            imp__release(ctx, w->at[k].E);
+            imp__release(ctx, w->at[k].S);
+        }
     }
     imp__release(ctx, j->worker);
 }
@@ -327,6 +310,10 @@ enum imp_status imp_annual_read(imp_scene *scene, const struct imp_run *run, siz
     IMP_TRY(imp__annual_hours_make(&a, n, hour, &a.hours));
     IMP_TRY(use_set(&j, hour));
     const size_t points = (size_t)sensor->film.crop_w * (size_t)sensor->film.crop_h;
+    j.points = points;
+    /* Some, unless threads would go without. */
+    j.each =
+        imp_clamp(points / (4 * (size_t)ctx->threads), (size_t)1, (size_t)IMP__POINTS);
     IMP_TRY(workers_make(&j, ctx->threads));
     j.numbers = imp__alloc(ctx, points, sizeof *j.numbers);
     if (!j.numbers) IMP_TRY(IMP_E_NOMEM);
@@ -335,7 +322,8 @@ enum imp_status imp_annual_read(imp_scene *scene, const struct imp_run *run, siz
     locked = pthread_mutex_init(&j.lock, NULL) == 0;
     if (!locked) IMP_TRY(IMP_E_NOMEM);
     const double walks = (double)a.walks * IMP__GROUPS * (double)points;
-    IMP_TRY(imp__point_loop(ctx, &own, points, walks, "year", point_work, &j, &j.drops));
+    IMP_TRY(imp__point_loop(ctx, &own, (points + j.each - 1) / j.each, walks, "year",
+                            points_work, &j, &j.drops));
     for (size_t i = 0; point && i < points; i++)
         imp__annual_point_set(&j.numbers[i], &point[i]);
     if (summary) {

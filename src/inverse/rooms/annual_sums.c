@@ -214,7 +214,7 @@ static void groups_flush(lanes x[IMP__GROUPS], double sum[IMP__GROUPS])
 
 void imp__annual_add(const struct imp__annual *a, const struct imp_annual_options *o,
                      const imp__annual_mask *used, size_t all,
-                     const struct imp__annual_worker *w, struct imp__annual_numbers *out)
+                     const struct imp__annual_at *at, struct imp__annual_numbers *out)
 {
     const struct imp__annual_hours *h = &a->hours;
     double mean[IMP__GROUPS] = {0}, exposure[IMP__GROUPS] = {0};
@@ -223,7 +223,7 @@ void imp__annual_add(const struct imp__annual *a, const struct imp_annual_option
     memset(&s, 0, sizeof s);
     *out = (struct imp__annual_numbers){{{0}}};
     for (size_t b = 0; b < h->blocks; b++) {
-        block_add(o, w->E[b], w->S[b], used[b], &s);
+        block_add(o, at->E[b], at->S[b], used[b], &s);
         for (int t = 0; t < IMP__AT_ONCE; t++) lit += used[b][t] != 0;
         if ((b + 1) % BLOCKS != 0 && b + 1 < h->blocks) continue;
         groups_flush(s.mean, mean);

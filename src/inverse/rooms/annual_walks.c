@@ -33,9 +33,9 @@ static void sky_add(struct walk_job *j, imp_v3 w, imp_spec light, bool bent)
     if (patch < 0) return;
     const double x = imp__annual_light(j->mono, light);
     const int cell = a->hours.cell_of[patch];
-    j->w->at.C_sum[patch] += x;
+    j->w->C_sum[patch] += x;
     if (bent && cell >= 0)
-        j->w->at.I_sum[cell] += x / imp__sky_patch_size(&a->patches, patch);
+        j->w->I_sum[cell] += x / imp__sky_patch_size(&a->patches, patch);
 }
 
 /* P: throughput up to v; k: its number in the walk, which numbers its random numbers. */
@@ -74,7 +74,7 @@ static void suns_add(struct walk_job *j, const struct imp_vertex *v, imp_spec P,
         f *= P;
         if (imp__is_zero_used(f, false)) continue;
         f *= imp__annual_passes(a, j->walk->time, imp__offset(at.p, at.ng, w), w);
-        j->w->at.I_sum[cell] += imp__annual_light(j->mono, f) * h->times[cell] / rays;
+        j->w->I_sum[cell] += imp__annual_light(j->mono, f) * h->times[cell] / rays;
     }
 }
 
@@ -123,14 +123,14 @@ static int64_t sample_of(const struct imp__annual *a, int g, int64_t i)
 }
 
 enum imp_status imp__annual_walks(const struct imp__annual *a, int x, int y,
-                                  struct imp__annual_worker *w)
+                                  struct imp__annual_worker *w, struct imp__annual_at *at)
 {
     struct walk_job j = {.a = a, .w = w, .mono = a->scene->mode == IMP_MONO};
     struct imp_walk walk;
     const double each = 1 / (double)a->walks;
     for (int g = 0; g < IMP__GROUPS; g++) {
-        memset(w->at.C_sum, 0, IMP__PATCHES * sizeof *w->at.C_sum);
-        memset(w->at.I_sum, 0, IMP__PATCHES * sizeof *w->at.I_sum);
+        memset(w->C_sum, 0, IMP__PATCHES * sizeof *w->C_sum);
+        memset(w->I_sum, 0, IMP__PATCHES * sizeof *w->I_sum);
         for (int64_t i = 0; i < a->walks; i++) {
             const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
             const int64_t sample = sample_of(a, g, i);
@@ -150,10 +150,9 @@ enum imp_status imp__annual_walks(const struct imp__annual *a, int x, int y,
             imp__arena_rewind(&w->arena, mark);
             if (j.st != IMP_OK) return j.st;
         }
-        for (int p = 0; p < IMP__PATCHES; p++)
-            w->at.C[p][g] = (float)(w->at.C_sum[p] * each);
+        for (int p = 0; p < IMP__PATCHES; p++) at->C[p][g] = (float)(w->C_sum[p] * each);
         for (int c = 0; c < a->hours.n_cells; c++)
-            w->at.I[c][g] = (float)(w->at.I_sum[c] * each);
+            at->I[c][g] = (float)(w->I_sum[c] * each);
     }
     return IMP_OK;
 }
