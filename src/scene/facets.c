@@ -4,6 +4,8 @@
  * double (facets.h). */
 #include "facets_lanes.h"
 
+_Static_assert(IMP_FACETS <= 32, "a facet is a bit");
+
 static inline lanes lesser(lanes a, lanes b) { return imp__lanes_choose(a < b, a, b); }
 static inline float least(lanes a)
 {
@@ -80,22 +82,17 @@ static inline mask group_met(const struct group *g, const struct ray *r, float s
            (*sum <= g->sum + aside) & (*t > r->lo - far) & (*t < r->hi + 4 * far);
 }
 
-/* Where the facet that floats chose is not met. */
-static IMP_COLD bool nearest_of_all(const struct imp_facets *f, const struct ray *r,
-                                    imp_v3 from, imp_v3 d, double tmin, double tmax,
-                                    struct imp_hit *hit)
+/* Where the facet that floats chose is not met, as that which a ray has just left: of the others. */
+static __attribute__((noinline)) bool nearest_of(const struct imp_facets *f, uint32_t ask,
+                                                 imp_v3 from, imp_v3 d, double tmin,
+                                                 double tmax, struct imp_hit *hit)
 {
     bool met = false;
-    for (int g = 0; g < f->n_groups; g++) {
-        lanes t, sum;
-        unsigned ask = imp__lanes_bits(group_met(&f->group[g], r, f->slack, &t, &sum));
-        for (; ask; ask &= ask - 1)
-            if (imp__facet_met(f->facet[LANES * g + __builtin_ctz(ask)], 0, from, d, tmin,
-                               tmax, hit)) {
-                tmax = hit->t;
-                met = true;
-            }
-    }
+    for (; ask; ask &= ask - 1)
+        if (imp__facet_met(f->facet[__builtin_ctz(ask)], 0, from, d, tmin, tmax, hit)) {
+            tmax = hit->t;
+            met = true;
+        }
     return met;
 }
 
@@ -106,9 +103,12 @@ bool imp__facets_nearest(const struct imp_facets *f, const imp_v3 *o, const imp_
     struct ray r;
     if (!ray_of(f, from, d, tmin, tmax, &r)) return false;
     lanes best = imp__splat(INFINITY), in = imp__splat(0), half = imp__splat(0);
+    uint32_t ask = 0; /* facets that may be met */
     for (int g = 0; g < f->n_groups; g++) {
         lanes t, sum;
-        const mask m = group_met(&f->group[g], &r, f->slack, &t, &sum) & (t < best);
+        const mask may = group_met(&f->group[g], &r, f->slack, &t, &sum),
+                   m = may & (t < best);
+        ask |= (uint32_t)imp__lanes_bits(may) << (LANES * g);
         best = imp__lanes_choose(m, t, best);
         in = imp__lanes_choose(m, imp__splat((float)g), in);
         half = imp__lanes_choose(m, sum, half);
@@ -121,10 +121,11 @@ bool imp__facets_nearest(const struct imp_facets *f, const imp_v3 *o, const imp_
         const int other = __builtin_ctz(equal);
         if (in[other] < in[k]) k = other;
     }
-    if (imp_likely(imp__facet_met(f->facet[LANES * (int)in[k] + k], half[k] > 0, from, *d,
-                                  tmin, tmax, hit)))
+    const int chosen = LANES * (int)in[k] + k;
+    if (imp_likely(
+            imp__facet_met(f->facet[chosen], half[k] > 0, from, *d, tmin, tmax, hit)))
         return true;
-    return nearest_of_all(f, &r, from, *d, tmin, tmax, hit);
+    return nearest_of(f, ask & ~(1u << chosen), from, *d, tmin, tmax, hit);
 }
 
 bool imp__facets_occluded(const struct imp_facets *f, const imp_v3 *o, const imp_v3 *d,

@@ -48,6 +48,9 @@ static void suns_add(struct walk_job *j, const struct imp_vertex *v, imp_spec P,
     const int n = (int)(rays + imp__u01(key, 2 * SUNS));
     struct imp_surface at;
     if (n == 0) return;
+    /* The sun's disc is small beside the patch. Entries side by side are read at once. */
+    size_t entry = (size_t)(imp__u01(key, 2 * SUNS + 1) * (double)h->n_suns);
+    __builtin_prefetch(&h->suns[entry]);
     if (!imp__decided_surface(a->scene, &v->d, j->walk->time, &at)) {
         j->st = imp__error(a->scene->ctx, IMP_E_UNSUPPORTED,
                            "shape %d (%s) does not say where its points are: the sun "
@@ -58,8 +61,6 @@ static void suns_add(struct walk_job *j, const struct imp_vertex *v, imp_spec P,
     const struct imp_frame frame = {at.s, at.t, at.n};
     const imp_v3 wo = imp__vertex_wo(v);
     const bool opaque = !(v->bsdf->flags & IMP_BSDF_TRANSMIT);
-    /* The sun's disc is small beside the patch. Entries side by side are read at once. */
-    size_t entry = (size_t)(imp__u01(key, 2 * SUNS + 1) * (double)h->n_suns);
     for (int i = 0; i < n; i++, entry++) {
         if (entry >= h->n_suns) entry = 0;
         const struct imp__annual_sun *sun = &h->suns[entry];
