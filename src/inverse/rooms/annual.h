@@ -34,14 +34,15 @@ struct imp__annual_sun {
     uint16_t cell[2];
 };
 
-/* Hours with light: hour k is lane k % 8 of block k/8. */
+/* Hours with light: hour k is lane k % 8 of block k/8. Blocks are in pairs: the last ones may be
+ * without hours. */
 struct imp__annual_hours {
     size_t n, blocks;
-    size_t *hour;                           /* [n] of the caller's */
-    imp__annual_lanes (*sky)[IMP__PATCHES]; /* [blocks] */
-    double *sun;                            /* [n] E_s, lx; 0: none */
-    imp_v3 *to_sun;                         /* [n] unit, world */
-    int *cell;                              /* [n] of the sun; -1: none */
+    size_t *hour;                              /* [n] of the caller's */
+    imp__annual_lanes (*sky)[IMP__PATCHES][2]; /* [blocks / 2] */
+    double *sun;                               /* [n] E_s, lx; 0: none */
+    imp_v3 *to_sun;                            /* [n] unit, world */
+    int *cell;                                 /* [n] of the sun; -1: none */
     /* Patches in which the sun is at some hour. */
     int n_cells;
     int cell_of[IMP__PATCHES];  /* -1: the sun is never there */

@@ -85,7 +85,9 @@ static enum imp_status skies_make(size_t first, size_t end, void *payload)
         double level[IMP__AT_ONCE];
         for (size_t t = 0; t < IMP__AT_ONCE; t++)
             level[t] = sky_of(j, block * IMP__AT_ONCE + t, &sky[t]);
-        imp__sky_patches_fill(j->patches, sky, level, j->out->sky[block]);
+        imp__annual_lanes(*pair)[2] = j->out->sky[block / 2];
+        imp__sky_patches_fill(j->patches, sky, level,
+                              (imp__annual_lanes(*)[2]) & pair[0][block % 2]);
     }
     return IMP_OK;
 }
@@ -198,9 +200,9 @@ enum imp_status imp__annual_hours_make(const struct imp__annual *a, size_t n,
     for (size_t i = 0; i < n; i++) h.n += has_light(&hour[i]);
     if (h.n == 0)
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "none of the %zu hours has any daylight", n));
-    h.blocks = (h.n + IMP__AT_ONCE - 1) / IMP__AT_ONCE;
+    h.blocks = 2 * ((h.n + 2 * IMP__AT_ONCE - 1) / (2 * IMP__AT_ONCE));
     h.hour = imp__alloc(ctx, h.n, sizeof *h.hour);
-    h.sky = imp__alloc(ctx, h.blocks, sizeof *h.sky);
+    h.sky = imp__alloc(ctx, h.blocks / 2, sizeof *h.sky);
     h.sun = imp__alloc(ctx, h.n, sizeof *h.sun);
     h.to_sun = imp__alloc(ctx, h.n, sizeof *h.to_sun);
     h.cell = imp__alloc(ctx, h.n, sizeof *h.cell);

@@ -39,24 +39,57 @@ static inline void suns_light(const struct imp__annual_hours *h,
     turn_over(out);
 }
 
-/* E = sum_p C_p L_p + S + E_s I of the hours of a block, for half of the groups: as many sums as
- * processors have registers for, beside what they are made of. */
-static void block_light(const struct imp__annual *a, const struct imp__annual_at *at,
-                        const int *seen, int n, size_t block, int half)
+/* The hours of two blocks. */
+typedef float pair __attribute__((vector_size(8 * IMP__AT_ONCE)));
+/* As many sums as there are registers for, beside what they are made of. */
+#ifdef __AVX512F__
+enum { SUMS = IMP__GROUPS / 2 };
+#else
+enum { SUMS = IMP__GROUPS / 4 };
+#endif
+
+static inline pair joined(imp__annual_lanes a, imp__annual_lanes b)
 {
-    enum { HALF = IMP__GROUPS / 2 };
-    const struct imp__annual_hours *h = &a->hours;
-    const imp__annual_lanes *L = h->sky[block];
-    imp__annual_lanes E[HALF];
-    suns_light(h, at, block, half * HALF, E);
-    for (int g = 0; g < HALF; g++) E[g] = at->S[block][half * HALF + g] + E[g];
-    const size_t ahead = block + 1 < h->blocks ? IMP__PATCHES : 0; /* of the next block */
+    return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14,
+                                   15);
+}
+
+/* sum_p C_p L_p + S of the hours of two blocks, for the groups from `first` on. */
+static void pair_light(const struct imp__annual *a, const struct imp__annual_at *at,
+                       const int *seen, int n, size_t block, int first)
+{
+    const imp__annual_lanes(*L)[2] = a->hours.sky[block / 2];
+    const size_t ahead = /* of the next blocks */
+        block + 2 < a->hours.blocks ? IMP__PATCHES : 0;
+    imp__annual_lanes(*E)[IMP__GROUPS] = &at->E[block];
+    pair sum[SUMS];
+    for (int g = 0; g < SUMS; g++) sum[g] = joined(E[0][first + g], E[1][first + g]);
     for (int i = 0; i < n; i++) {
-        const float *C = at->C[seen[i]] + half * HALF;
-        if (half == 0) __builtin_prefetch(L + ahead + seen[i]);
-        for (int g = 0; g < HALF; g++) E[g] += L[seen[i]] * C[g];
+        const float *C = at->C[seen[i]] + first;
+        const pair here = joined(L[seen[i]][0], L[seen[i]][1]);
+        if (first == 0) __builtin_prefetch(L + ahead + seen[i]);
+        for (int g = 0; g < SUMS; g++) sum[g] += here * C[g];
     }
-    for (int g = 0; g < HALF; g++) at->E[block][half * HALF + g] = E[g];
+    for (int g = 0; g < SUMS; g++) {
+        E[0][first + g] = __builtin_shufflevector(sum[g], sum[g], 0, 1, 2, 3, 4, 5, 6, 7);
+        E[1][first + g] =
+            __builtin_shufflevector(sum[g], sum[g], 8, 9, 10, 11, 12, 13, 14, 15);
+    }
+}
+
+/* E = sum_p C_p L_p + S + E_s I of two blocks. */
+static void blocks_light(const struct imp__annual *a, const struct imp__annual_at *at,
+                         const int *seen, int n, size_t block)
+{
+    for (size_t b = block; b < block + 2; b++)
+        for (int first = 0; first < IMP__GROUPS; first += IMP__AT_ONCE) {
+            imp__annual_lanes x[IMP__AT_ONCE];
+            suns_light(&a->hours, at, b, first, x);
+            for (int g = 0; g < IMP__AT_ONCE; g++)
+                at->E[b][first + g] = at->S[b][first + g] + x[g];
+        }
+    for (int first = 0; first < IMP__GROUPS; first += SUMS)
+        pair_light(a, at, seen, n, block, first);
 }
 
 /* Patches from which any light comes. */
@@ -76,8 +109,6 @@ void imp__annual_hours_light(const struct imp__annual *a, const struct imp__annu
 {
     int seen[IMP__POINTS][IMP__PATCHES], n[IMP__POINTS];
     for (size_t i = 0; i < points; i++) n[i] = seen_of(&at[i], seen[i]);
-    for (size_t b = 0; b < a->hours.blocks; b++)
-        for (size_t i = 0; i < points; i++)
-            for (int half = 0; half < 2; half++)
-                block_light(a, &at[i], seen[i], n[i], b, half);
+    for (size_t b = 0; b < a->hours.blocks; b += 2)
+        for (size_t i = 0; i < points; i++) blocks_light(a, &at[i], seen[i], n[i], b);
 }

@@ -33,11 +33,12 @@ void imp__sky_patches_set(struct imp__sky_patches *p, const imp_v3 axis[3]);
 int imp__sky_patch_of(const struct imp__sky_patches *p, imp_v3 w);
 /* Its solid angle. */
 double imp__sky_patch_size(const struct imp__sky_patches *p, int patch);
-/* The mean radiance over each patch, [IMP__PATCHES], of eight skies whose axes are those of p, at four
- * points (of the cap: eight), so scaled that level ground has the illuminance `level`: Int L cos dw
- * with L constant in each patch. A sky that is dark everywhere is taken as uniform. */
+/* The mean radiance over each patch of eight skies whose axes are those of p, at four points (of the
+ * cap: eight), so scaled that level ground has the illuminance `level`: Int L cos dw with L constant in
+ * each patch. A sky that is dark everywhere is taken as uniform. Into the first of two of L
+ * [IMP__PATCHES]. */
 void imp__sky_patches_fill(const struct imp__sky_patches *p,
                            const struct imp__sky_shape sky[IMP__AT_ONCE],
-                           const double level[IMP__AT_ONCE], imp__annual_lanes *L);
+                           const double level[IMP__AT_ONCE], imp__annual_lanes (*L)[2]);
 
 #endif
