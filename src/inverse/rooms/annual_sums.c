@@ -179,6 +179,15 @@ struct sums {
     lanes part[IMP__VARIANTS], mean[IMP__GROUPS], exposure[IMP__GROUPS];
 };
 
+static inline bool any_light(const lanes group[IMP__GROUPS])
+{
+    mask any = {0};
+    for (int g = 0; g < IMP__GROUPS; g++) any |= group[g] != splat(0);
+    int bits = 0;
+    for (int t = 0; t < IMP__AT_ONCE; t++) bits |= any[t];
+    return bits != 0;
+}
+
 static void block_add(const struct imp_annual_options *o, const lanes all[IMP__GROUPS],
                       const lanes straight[IMP__GROUPS], mask used, struct sums *s)
 {
@@ -187,7 +196,8 @@ static void block_add(const struct imp_annual_options *o, const lanes all[IMP__G
                 hi = splat(o->useful[2]), sunlit = splat(o->sunlit);
     lanes E[IMP__VARIANTS], S[IMP__VARIANTS];
     variants_at_once(all, E);
-    variants_at_once(straight, S);
+    const bool sun = any_light(straight);
+    if (sun) variants_at_once(straight, S);
     for (int g = 0; g < IMP__GROUPS; g++) {
         s->mean[g] += only(used, all[g]);
         s->exposure[g] += all[g];
@@ -200,8 +210,9 @@ static void block_add(const struct imp_annual_options *o, const lanes all[IMP__G
         s->count[IMP__USEFUL + 1][v] -= (E[v] >= lo) & (E[v] < middle) & used;
         s->count[IMP__USEFUL + 2][v] -= (E[v] >= middle) & (E[v] <= hi) & used;
         s->count[IMP__USEFUL + 3][v] -= (E[v] > hi) & used;
-        s->count[IMP__SUNLIT][v] -= (S[v] >= sunlit) & used;
     }
+    for (int v = 0; sun && v < IMP__VARIANTS; v++)
+        s->count[IMP__SUNLIT][v] -= (S[v] >= sunlit) & used;
 }
 
 static void groups_flush(lanes x[IMP__GROUPS], double sum[IMP__GROUPS])
