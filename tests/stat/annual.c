@@ -312,7 +312,7 @@ static void patches(void)
             (struct imp__sky_shape){.axis = {axis[0], axis[1], axis[2]}, .sun = axis[2]};
         level[t] = 5 * t;
     }
-    imp__sky_patches_fill(&p, sky, level, L);
+    imp__sky_patches_fill(&p, sky, level, L[0]);
     for (int k = 0; k < IMP__PATCHES; k++) {
         for (int t = 0; t < IMP__AT_ONCE; t++)
             worst = fmax(worst, fabs((double)L[k][0][t] - level[t] / M_PI));

@@ -52,8 +52,8 @@ static void skies(void)
         turned[t] = sky[(t + 3) % 8];
         turned_level[t] = level[(t + 3) % 8];
     }
-    imp__sky_patches_fill(&p, sky, level, L);
-    imp__sky_patches_fill(&p, turned, turned_level, other);
+    imp__sky_patches_fill(&p, sky, level, L[0]);
+    imp__sky_patches_fill(&p, turned, turned_level, other[0]);
     bool same = true, none = true;
     for (int k = 0; k < IMP__PATCHES; k++) {
         none &= L[k][0][3] == 0;

@@ -85,9 +85,8 @@ static enum imp_status skies_make(size_t first, size_t end, void *payload)
         double level[IMP__AT_ONCE];
         for (size_t t = 0; t < IMP__AT_ONCE; t++)
             level[t] = sky_of(j, block * IMP__AT_ONCE + t, &sky[t]);
-        imp__annual_lanes(*pair)[2] = j->out->sky[block / 2];
         imp__sky_patches_fill(j->patches, sky, level,
-                              (imp__annual_lanes(*)[2]) & pair[0][block % 2]);
+                              &j->out->sky[block / 2][0][block % 2]);
     }
     return IMP_OK;
 }

@@ -158,7 +158,7 @@ static inline doubles widen(lanes x) { return __builtin_convertvector(x, doubles
 
 /* The patches of a row, at heights even in sin(altitude). */
 static void row_fill(const struct imp__sky_patches *p, const struct imp__sky_shape *sky,
-                     const struct skies *s, int row, lanes (*L)[2])
+                     const struct skies *s, int row, lanes *L)
 {
     const double lo = p->sine[row], hi = p->sine[row + 1];
     const float *c = p->turn[0] + HALVES * p->first[row],
@@ -179,7 +179,8 @@ static void row_fill(const struct imp__sky_patches *p, const struct imp__sky_sha
             x[0][j] = relative(s, g[0], level * r[0] + z[0]);
             x[1][j] = relative(s, g[1], level * r[1] + z[1]);
         }
-        L[k][0] = ((x[0][0] + x[0][1]) + (x[1][0] + x[1][1])) * (1.f / (HALVES * HALVES));
+        L[2 * k] =
+            ((x[0][0] + x[0][1]) + (x[1][0] + x[1][1])) * (1.f / (HALVES * HALVES));
     }
 }
 
@@ -205,20 +206,20 @@ static doubles cap(const struct imp__sky_patches *p, const struct imp__sky_shape
 
 void imp__sky_patches_fill(const struct imp__sky_patches *p,
                            const struct imp__sky_shape sky[IMP__AT_ONCE],
-                           const double level[IMP__AT_ONCE], lanes (*L)[2])
+                           const double level[IMP__AT_ONCE], lanes *L)
 {
     const struct skies s = skies_of(p, sky);
     doubles ground = {0}, factor; /* Int L cos dw: cos dw = d(z^2)/2 dphi */
     lanes even;
     mask dark;
     for (int row = 0; row < IMP__PATCH_ROWS; row++) {
-        lanes(*here)[2] = L + p->first[row];
+        lanes *here = L + 2 * p->first[row];
         row_fill(p, sky, &s, row, here);
         const int n = count_of(row);
         const double each =
             IMP_PI / n *
             (p->sine[row + 1] * p->sine[row + 1] - p->sine[row] * p->sine[row]);
-        for (int k = 0; k < n; k++) ground += each * widen(here[k][0]);
+        for (int k = 0; k < n; k++) ground += each * widen(here[2 * k]);
     }
     const double edge = p->sine[IMP__PATCH_ROWS];
     const doubles top = cap(p, sky, &s);
@@ -230,6 +231,6 @@ void imp__sky_patches_fill(const struct imp__sky_patches *p,
         factor[t] = level[t] / ground[t];
     }
     for (int k = 0; k < IMP__PATCHES - 1; k++)
-        L[k][0] = choose(dark, even, narrow(widen(L[k][0]) * factor));
-    L[IMP__PATCHES - 1][0] = choose(dark, even, narrow(top * factor));
+        L[2 * k] = choose(dark, even, narrow(widen(L[2 * k]) * factor));
+    L[2 * (IMP__PATCHES - 1)] = choose(dark, even, narrow(top * factor));
 }

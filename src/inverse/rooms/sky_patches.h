@@ -35,10 +35,9 @@ int imp__sky_patch_of(const struct imp__sky_patches *p, imp_v3 w);
 double imp__sky_patch_size(const struct imp__sky_patches *p, int patch);
 /* The mean radiance over each patch of eight skies whose axes are those of p, at four points (of the
  * cap: eight), so scaled that level ground has the illuminance `level`: Int L cos dw with L constant in
- * each patch. A sky that is dark everywhere is taken as uniform. Into the first of two of L
- * [IMP__PATCHES]. */
+ * each patch. A sky that is dark everywhere is taken as uniform. Patch k is L[2 k]; the others stay. */
 void imp__sky_patches_fill(const struct imp__sky_patches *p,
                            const struct imp__sky_shape sky[IMP__AT_ONCE],
-                           const double level[IMP__AT_ONCE], imp__annual_lanes (*L)[2]);
+                           const double level[IMP__AT_ONCE], imp__annual_lanes *L);
 
 #endif
