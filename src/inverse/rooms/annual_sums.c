@@ -156,6 +156,11 @@ static inline lanes splat(double x)
 
 /* x as it is in lanes where m is -1, else 0. */
 static inline lanes only(mask m, lanes x) { return (lanes)((mask)x & m); }
+static inline lanes lesser(lanes a, lanes b)
+{
+    const mask m = a < b;
+    return (lanes)(((mask)a & m) | ((mask)b & ~m));
+}
 
 /* As variants_of, of the hours of a block. */
 static inline void variants_at_once(const lanes group[IMP__GROUPS],
@@ -173,7 +178,8 @@ static inline void variants_at_once(const lanes group[IMP__GROUPS],
     VARIANTS_FILL(x, out);
 }
 
-/* Sums over some blocks, by lanes: counts, and numbers of hours that are not whole. */
+/* Sums over some blocks, by lanes: counts, and numbers of hours that are not whole. Those of useful
+ * daylight count what is below each bound, until the last block is there. */
 struct sums {
     mask count[IMP__ANNUAL_NUMBERS][IMP__VARIANTS];
     lanes part[IMP__VARIANTS], mean[IMP__GROUPS], exposure[IMP__GROUPS];
@@ -203,13 +209,11 @@ static void block_add(const struct imp_annual_options *o, const lanes all[IMP__G
         s->exposure[g] += all[g];
     }
     for (int v = 0; v < IMP__VARIANTS; v++) {
-        const lanes part = E[v] * each;
         s->count[IMP__AUTONOMY][v] -= (E[v] >= wanted) & used;
-        s->part[v] += only((part < one) & used, part) + only((part >= one) & used, one);
+        s->part[v] += only(used, lesser(E[v] * each, one));
         s->count[IMP__USEFUL][v] -= (E[v] < lo) & used;
-        s->count[IMP__USEFUL + 1][v] -= (E[v] >= lo) & (E[v] < middle) & used;
-        s->count[IMP__USEFUL + 2][v] -= (E[v] >= middle) & (E[v] <= hi) & used;
-        s->count[IMP__USEFUL + 3][v] -= (E[v] > hi) & used;
+        s->count[IMP__USEFUL + 1][v] -= (E[v] < middle) & used;
+        s->count[IMP__USEFUL + 2][v] -= (E[v] <= hi) & used;
     }
     for (int v = 0; sun && v < IMP__VARIANTS; v++)
         s->count[IMP__SUNLIT][v] -= (S[v] >= sunlit) & used;
@@ -248,6 +252,13 @@ void imp__annual_add(const struct imp__annual *a, const struct imp_annual_option
     for (int m = 0; m < IMP__ANNUAL_NUMBERS; m++)
         for (int v = 0; v < IMP__VARIANTS; v++)
             for (int t = 0; t < IMP__AT_ONCE; t++) out->of[m][v] += s.count[m][v][t];
+    for (int v = 0; v < IMP__VARIANTS; v++) { /* what is between the bounds */
+        double *of[4];
+        for (int k = 0; k < 4; k++) of[k] = &out->of[IMP__USEFUL + k][v];
+        *of[3] = (double)lit - *of[2];
+        *of[2] -= *of[1];
+        *of[1] -= *of[0];
+    }
     if (o->useful[0] > 0) /* hours without light */
         for (int v = 0; v < IMP__VARIANTS; v++)
             out->of[IMP__USEFUL][v] += (double)(all - lit);
