@@ -210,7 +210,7 @@ static void block_add(const struct imp_annual_options *o, const lanes all[IMP__G
     }
     for (int v = 0; v < IMP__VARIANTS; v++) {
         s->count[IMP__AUTONOMY][v] -= (E[v] >= wanted) & used;
-        s->part[v] += only(used, lesser(E[v] * each, one));
+        s->part[v] += only(used, lesser(one, E[v] * each));
         s->count[IMP__USEFUL][v] -= (E[v] < lo) & used;
         s->count[IMP__USEFUL + 1][v] -= (E[v] < middle) & used;
         s->count[IMP__USEFUL + 2][v] -= (E[v] <= hi) & used;

@@ -217,18 +217,20 @@ struct direct {
 static bool is_hidden(const struct direct *d, imp_v3 w)
 {
     const unsigned n = imp_min(d->curtains, (unsigned)CURTAINS);
+    if (n == 0) return false;
+    const imp_v3 o = imp__offset(d->at.p, d->at.ng, w); /* as rays begin */
     for (unsigned k = 1; k <= n; k++)
-        if (hides(&d->curtain[(d->curtains - k) % CURTAINS], d->at.p, w)) return true;
+        if (hides(&d->curtain[(d->curtains - k) % CURTAINS], o, w)) return true;
     return false;
 }
 
 /* ... or what has stopped a ray from o to a point of its disc? */
 static bool hides_all(struct direct *d, const struct imp_hit *hit, imp_v3 o, imp_v3 w)
 {
-    struct curtain *c = &d->curtain[d->curtains % CURTAINS];
-    if (hit->shape < 0 || !curtain_of(d->a->scene, hit, c) || !hides(c, o, w))
+    struct curtain c;
+    if (hit->shape < 0 || !curtain_of(d->a->scene, hit, &c) || !hides(&c, o, w))
         return false;
-    d->curtains++;
+    d->curtain[d->curtains++ % CURTAINS] = c;
     return true;
 }
 
