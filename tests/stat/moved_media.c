@@ -155,11 +155,6 @@ static void refused_test(void)
                    room("<shape type='rectangle' id='fog'><bsdf type='null'/>" MEDIUM(
                        ".5", "0", "") "</shape>" VOLPATH("2")),
                    "block.pose", "closed");
-    number_refused("a medium that glows",
-                   room(BOX("<medium name='interior' type='homogeneous'><rgb name="
-                            "'sigma_t' value='.2'/><rgb name='emission' value='1'/>"
-                            "</medium>") VOLPATH("2")),
-                   "fog.pose", "emits");
     snprintf(xml, sizeof xml, "%s" BULB, fog);
     number_refused("a lamp without a size", room(xml), "fog.pose", "no size");
     snprintf(xml, sizeof xml,

@@ -248,6 +248,7 @@ double imp__frozen_walk(struct imp__moved_by *m, const struct imp_walk *walk, im
         here = stop_at(m, walk, v, here.v ? &before : NULL, seen);
         here.turns = before.v && before.turns && imp__goes_straight(v);
         if (m->fades) P *= here.grows;
+        if (here.floats) value += imp__sum_used(P * v->e, scene->lanes);
         if (!here.floats && v->d.met.emitter >= 0) {
             if (from.v) value += met_frozen(m, &from, &here);
             else if (passed) value += imp__sum_used(P * v->e, scene->lanes);

@@ -60,11 +60,12 @@
  * point a part is in `light`, and the rest in `scatter` (imp__glued_part).
  *
  * The border of a medium, of type null and with the outward normal n, has no edges, and is a boundary
- * all over. With D sigma the extinction inside less that outside, and D k = D(sigma p):
+ * all over. With D sigma the extinction inside less that outside, D k = D(sigma p), and D g that of what is
+ * emitted per length:
  *
- *     film     dI = -int dA W D sigma L n.(V - u),  L what the camera sees behind the border
+ *     film     dI = int dA W [D g - D sigma L] n.(V - u),  L what the camera sees behind the border
  *     light    dI = int dA dA_y Le cos_y/t_y^2 [n.(V - x'') D k W(p) - n.(V - V_line) D sigma f W(x)]
- *     scatter  dI = int dA dw L [n.(V - x'') D k W(p) - n.(V - x') D sigma f W(x)]
+ *     scatter  dI = int dA dw [L n.(V - x'') D k W(p) + (D g - D sigma L) n.(V - x') f W(x)]
  *
  * with p the place on the border, which scatters light, and x'' the velocity of what sees that: points
  * of a medium whose stretch of a ray ends at a border keep their distances (moved.h).

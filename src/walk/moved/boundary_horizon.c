@@ -53,7 +53,7 @@ void imp__draw_horizon(struct imp__edge_draw *d)
     emission_reach(d, &hit, &at, &x, &above, w, times);
     emission_reach(d, &hit, &at, &x, &below, w, -times);
     int depths;
-    imp_spec *jump = imp__jumps(d, &above, &below, imp__spec(times),
+    imp_spec *jump = imp__jumps(d, &above, &below, imp__spec(times), imp__spec(0),
                                 (struct imp__seen_from){.drawn = NULL}, &depths);
     if (!jump) return;
     struct imp__edge_light light = {

@@ -6,8 +6,8 @@
  * A border of type null that moves leaves points of the media, and rays, where they are: on the side
  * that its normal n points away from more is of the one medium, by n.(V - x') for each area of it,
  * where x is what sees it along a fixed direction. With D the difference of coefficients, inside less
- * outside, light that passes changes by -D sigma_t L, and what is scattered there is
- * D sigma_s p(w, w') L (boundary.h). Neither has a pole where the border is seen at a flat angle,
+ * outside, light that passes changes by -D sigma_t L, what is scattered there is
+ * D sigma_s p(w, w') L, and what is emitted D(sigma_a Le) (boundary.h). Neither has a pole where the border is seen at a flat angle,
  * as lengths of chords would have; and edges of a border have no part of their own. */
 #include "boundary_parts.h"
 #include "kind/cleared.h"
@@ -84,6 +84,18 @@ void imp__edge_walk(struct imp__edge_draw *d, const struct imp_sensor_ray *ray,
 
 /* ---- Borders ---------------------------------------------------------------------------- */
 
+/* What a medium emits per length. NULL: nothing. */
+static imp_spec glow_of(const struct imp__edge_draw *d, const struct imp_medium *m)
+{
+    const struct imp_texcoord nowhere = {.prim = -1, .carried = imp__edge_waves(d)};
+    imp_spec in[IMP_INPUTS_MAX];
+    struct imp_coefficients c;
+    if (!m || !m->emits) return imp__spec(0);
+    imp__inputs_eval(m->input, m->n_own, &nowhere, in);
+    m->ops->eval(m, in, &c);
+    return (c.extinction - c.scattering) * c.emission;
+}
+
 bool imp__border_point(struct imp__edge_draw *d, struct imp__border_point *x)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
@@ -105,6 +117,7 @@ bool imp__border_point(struct imp__edge_draw *d, struct imp__border_point *x)
     x->inside = s->interior;
     x->outside = s->exterior;
     x->more = imp__edge_extinction(d, s->interior) - imp__edge_extinction(d, s->exterior);
+    x->glow = glow_of(d, s->interior) - glow_of(d, s->exterior);
     return true;
 }
 
@@ -134,7 +147,13 @@ void imp__border_scatter(struct imp__edge_draw *d, const struct imp__border_poin
     }
 }
 
-/* As the camera sees it: what lies beyond. */
+/* Does it matter where it is to what passes through it, or is emitted there? */
+static bool is_seen(const struct imp__edge_draw *d, const struct imp__border_point *x)
+{
+    return !imp__is_zero_used(x->more, d->waves) || !imp__is_zero_used(x->glow, d->waves);
+}
+
+/* As the camera sees it: what lies beyond, and what is emitted. */
 void imp__draw_border_film(struct imp__edge_draw *d)
 {
     const struct imp_sensor *sensor = d->b->tracer->sensor;
@@ -142,8 +161,7 @@ void imp__draw_border_film(struct imp__edge_draw *d)
     struct imp_sensor_sample to;
     struct imp__line line;
     struct imp_walk walk;
-    if (!imp__border_point(d, &x) || !sensor->ops->connect ||
-        imp__is_zero_used(x.more, d->waves) ||
+    if (!imp__border_point(d, &x) || !sensor->ops->connect || !is_seen(d, &x) ||
         !imp__sensor_connect(sensor, &d->p, false, d->lens, &to) ||
         !imp__light_on_film(sensor, &to) || !(to.dist > imp__edge_clip(d, &to)))
         return;
@@ -152,7 +170,9 @@ void imp__draw_border_film(struct imp__edge_draw *d)
     const struct imp_sensor_ray ray = {
         .o = imp__offset(d->p, d->out, w), .d = w, .t_near = 0, .t_far = INFINITY};
     imp__edge_walk(d, &ray, 0, NULL, &walk);
-    const imp_spec L = walk.values * line.T * imp__edge_unclipped(d, &to) * x.more;
+    const bool emits = d->b->tracer->integrator->max_depth != 0;
+    const imp_spec L = (walk.values * x.more - (emits ? x.glow : imp__spec(0))) * line.T *
+                       imp__edge_unclipped(d, &to);
     struct imp__flux *f = imp__jump_add(d, &to, L * (-to.weight * d->inv_pdf), 2);
     if (!f) return;
     const struct imp__glued at = {.p = d->p};
@@ -182,7 +202,8 @@ void imp__draw_border_scatter(struct imp__edge_draw *d)
     struct imp__seen_from from = {.drawn = b->drawn};
     struct imp__edge_light light = {.w = w, .slide = -d->out};
     light.n_ends = imp__edge_ends(d, d->out, light.end);
-    imp_spec *jump = imp__jumps(d, &walk, &none, imp__spec(times), from, &depths);
+    imp_spec *jump =
+        imp__jumps(d, &walk, &none, imp__spec(times), imp__spec(0), from, &depths);
     if (jump) {
         light.light = jump[0];
         light.by_depth = max >= 0 ? jump : NULL;
@@ -194,13 +215,11 @@ void imp__draw_border_scatter(struct imp__edge_draw *d)
     struct imp_surface at;
     struct imp__line line;
     const imp_v3 o = imp__offset(d->p, d->out, w);
-    if (imp__is_zero_used(x.more, d->waves) ||
-        !imp__edge_follow(d, o, w, 0, 0, &hit, &at, &line))
-        return;
+    if (!is_seen(d, &x) || !imp__edge_follow(d, o, w, 0, 0, &hit, &at, &line)) return;
     from.floats = hit.shape < 0;
     from.farther = hit.t;
-    jump = imp__jumps(d, &walk, &none, line.T * x.more * (-times * line.times), from,
-                      &depths);
+    const imp_spec passes = line.T * (times * line.times);
+    jump = imp__jumps(d, &walk, &none, -passes * x.more, passes * x.glow, from, &depths);
     if (!jump) return;
     light.light = jump[0];
     light.by_depth = max >= 0 ? jump : NULL;

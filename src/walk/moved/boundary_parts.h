@@ -270,10 +270,11 @@ struct imp__seen_from {
 imp_spec imp__arrives(const struct imp__boundary *b, const struct imp_walk *walk,
                       struct imp__seen_from x);
 /* Vertices behind the edge for which light is known: what jumps by depth [*n], in the arena. NULL:
- * no memory, or nothing jumps. x.before: vertices between x and where the walks begin. */
+ * no memory, or nothing jumps. x.before: vertices between x and where the walks begin; more: what is
+ * emitted there, for all depths. */
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
-                     const struct imp_walk *hi, imp_spec times, struct imp__seen_from x,
-                     int *n);
+                     const struct imp_walk *hi, imp_spec times, imp_spec more,
+                     struct imp__seen_from x, int *n);
 
 /* What light that arrives at `at` (a hit of this shape) along w brings to the sensor: from there,
  * and over further vertices. Light: radiance times all factors but f W(x). `back`: vertices that
@@ -301,6 +302,7 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
 struct imp__border_point {
     const struct imp_medium *inside, *outside;
     imp_spec more; /* extinction inside, less that outside */
+    imp_spec glow; /* radiance per length that is emitted inside, less that outside */
 };
 /* Sets the point d->p of the item's border, with its normal d->out. False: it has none. */
 bool imp__border_point(struct imp__edge_draw *d, struct imp__border_point *x);

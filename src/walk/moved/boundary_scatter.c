@@ -18,7 +18,8 @@ const struct imp_vertex *imp__walk_met(const struct imp__edge_draw *d,
     const struct imp_vertex *v = walk->dropped ? NULL : walk->first;
     *T = imp__spec(1);
     for (; v && is_on_line(d->b, v); v = v->next) *T *= v->w;
-    return v && v->d.scatterer != IMP_AT_SKY ? v : NULL;
+    return v && v->d.scatterer != IMP_AT_SKY && v->d.scatterer != IMP_IN_MEDIUM ? v
+                                                                                : NULL;
 }
 
 /* The part of the emission at v that is not glued to its light, as a walk from a point of a medium
@@ -43,9 +44,9 @@ imp_spec imp__arrives(const struct imp__boundary *b, const struct imp_walk *walk
     if (walk->dropped || !walk->first) return L;
     for (const struct imp_vertex *v = walk->first; v; v = v->next) {
         const bool sky = v->d.scatterer == IMP_AT_SKY, on_line = is_on_line(b, v);
-        /* To each sky a vertex. */
-        const bool left =
-            first && !x.mirrored && (!sky || (x.drawn && x.drawn[v->d.met.emitter]));
+        /* To each sky a vertex; what a medium emits is no light's. */
+        const bool left = first && !x.mirrored && v->d.scatterer != IMP_IN_MEDIUM &&
+                          (!sky || (x.drawn && x.drawn[v->d.met.emitter]));
         const bool counts = max < 0 || number < max;
         if (!left && counts) L += T * v->e;
         if (imp_unlikely(left && x.floats && !sky && counts))
@@ -68,8 +69,8 @@ void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_
 }
 
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
-                     const struct imp_walk *hi, imp_spec times, struct imp__seen_from x,
-                     int *n)
+                     const struct imp_walk *hi, imp_spec times, imp_spec more,
+                     struct imp__seen_from x, int *n)
 {
     const int max = d->b->tracer->integrator->max_depth;
     *n = max < 0 ? 1 : max - 1;
@@ -82,7 +83,7 @@ imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
     const int between = x.before;
     for (int k = 0; k < *n; k++) {
         x.before = k + 1 + between;
-        jump[k] = (imp__arrives(d->b, lo, x) - imp__arrives(d->b, hi, x)) * times;
+        jump[k] = (imp__arrives(d->b, lo, x) - imp__arrives(d->b, hi, x)) * times + more;
         any |= !imp__is_zero_used(jump[k], d->waves);
     }
     return any ? jump : NULL;
@@ -154,7 +155,7 @@ void imp__draw_scatter(struct imp__edge_draw *d)
                                      .floats = hit.shape < 0,
                                      .mirrored = mirrored,
                                      .drawn = b->drawn};
-    imp_spec *jump = imp__jumps(d, &lo, &hi, times, x, &depths);
+    imp_spec *jump = imp__jumps(d, &lo, &hi, times, imp__spec(0), x, &depths);
     if (!jump) return;
     struct imp__edge_light light = {.w = line.w, .slide = -m};
     if (imp_unlikely(mirrored) && !mirrored_ends(d, &line.mirrors, m, &light)) return;

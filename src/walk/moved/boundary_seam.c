@@ -13,7 +13,8 @@ int imp__seam_side(const struct imp__edge_draw *d, const struct imp_walk *walk)
 {
     const struct imp_vertex *v = walk->first;
     if (!d->edge || !d->edge->seam || walk->dropped || !v ||
-        v->d.scatterer == IMP_AT_SKY || imp__is_zero_used(v->e, d->waves))
+        v->d.scatterer == IMP_AT_SKY || v->d.scatterer == IMP_IN_MEDIUM ||
+        imp__is_zero_used(v->e, d->waves))
         return -1;
     for (int k = 0; k < 4; k += 2) {
         const struct imp__edge_face *f = &d->b->edges->face[d->edge->first + (size_t)k];

@@ -274,7 +274,7 @@ void imp__draw_shading_scatter(struct imp__edge_draw *d)
     const imp_spec times =
         T * (fabs(imp__dot(p.ng, w)) * IMP_2PI * d->inv_pdf * line.times);
     imp_spec *jump =
-        imp__jumps(d, &lit, &dark, times,
+        imp__jumps(d, &lit, &dark, times, imp__spec(0),
                    (struct imp__seen_from){
                        .before = between, .floats = hit.shape < 0, .mirrored = mirrored},
                    &depths);

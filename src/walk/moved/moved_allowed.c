@@ -137,7 +137,6 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
 static const char *medium_without_d(const struct imp_medium *m)
 {
     if (m->majorants) return "has an extinction that varies";
-    if (m->emits) return "emits light";
     if (is_textured(m->input, m->n_in)) return "has numbers that vary";
     if (m->scatterer->shaped) return "has a spectrum for a number";
     return NULL;
