@@ -601,10 +601,10 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
 /** Make a number of geometry a parameter, behind all others. Setting it moves the object.
  *
  *     NAME.pose              as imp_scene_add_pose
- *     NAME.scale             of a shape, instance or group: 1 as the scene file has it, about the
+ *     NAME.scale             of a shape, instance, group or volume: 1 as the scene file has it, about the
  *                            middle of its box
- *     NAME.to_world          of a shape, instance, camera, spot or projector: [3][4], the upper rows
- *                            of the matrix that puts it there; not beside pose, scale and what else
+ *     NAME.to_world          of a shape, instance, volume, camera, spot or projector: [3][4], the
+ *                            upper rows of the matrix that puts it there; not beside pose, scale and what else
  *                            says where it is; IMP_E_NUMERIC where it makes another kind of thing
  *                            of it
  *     NAME.vertex_positions  of a mesh: [vertices][3], world; vertex normals, if it has any, are

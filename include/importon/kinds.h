@@ -337,6 +337,7 @@ struct imp_texcoord {
     const struct imp_surface *surface;
 };
 
+struct imp_placed;
 struct imp_texture {
     const struct imp_texture_ops *ops;
     void *self;
@@ -346,6 +347,8 @@ struct imp_texture {
     const char *name;
     const struct imp_input_desc *asked; /* the first input that it serves; NULL: none yet.
                                            `changed` is called when it is known */
+    const struct imp_placed
+        *placed; /* the engine's: numbers by which a volume is moved */
 };
 
 enum imp_texture_flags {
@@ -399,6 +402,13 @@ struct imp_texture_ops {
     void (*slope_tangent)(const struct imp_texture *t, const struct imp_texcoord *at,
                           bool scalar, imp_dot_fn *dot, const void *x_dot,
                           imp_spec d_uv_dot[2]);
+
+    /* For volumes that may be moved: both or neither. The affine map that puts it where it is,
+     * three rows of four: read or, one that has an inverse, set. */
+    void (*place)(const struct imp_texture *t, double to_world[12], bool set);
+    /* The derivative of eval with respect to the place in the world. False: values jump. */
+    bool (*gradient)(const struct imp_texture *t, const struct imp_texcoord *at,
+                     bool scalar, imp_spec d_p[3]);
 };
 
 /* ---- Phase function ------------------------------------------------------------ */

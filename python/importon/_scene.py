@@ -204,8 +204,8 @@ class Scene:
     def add_geometry(self, name: str) -> str:
         """Make a number of geometry a parameter.
 
-        `NAME.pose` as `add_pose`; `NAME.scale` of a shape, instance or group; `NAME.to_world` of a shape,
-        instance, camera, spot or projector, the upper three rows of its matrix; `NAME.vertex_positions` and `NAME.vertex_normals` of a mesh;
+        `NAME.pose` as `add_pose`; `NAME.scale` of a shape, instance, group or gridvolume; `NAME.to_world` of a shape,
+        instance, gridvolume, camera, spot or projector, the upper three rows of its matrix; `NAME.vertex_positions` and `NAME.vertex_normals` of a mesh;
         `NAME.center` and `NAME.radius` of a sphere; `NAME.p0`, `NAME.p1` and `NAME.radius` of a circular
         cylinder; `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y`, `NAME.opencv_k1`,
         `_k2`, `_p1`, `_p2` and `_k3` of a perspective camera or thin lens;
@@ -273,7 +273,7 @@ class Scene:
 
     @property
     def geometry_names(self) -> list[str]:
-        """What `add_geometry` accepts: numbers of geometry of this scene's shapes, sensors, lights and instances."""
+        """What `add_geometry` accepts: numbers of geometry of this scene's shapes, sensors, lights, instances and volumes."""
         names: list[str] = []
         buffer = ctypes.create_string_buffer(256)
         with self.lock:

@@ -137,6 +137,7 @@ enum imp_status imp__majorants_create(struct imp_scene *scene,
     g = imp__arena_array(&scene->arena, 1, sizeof *g);
     if (!g) return imp__build_no_memory(scene);
     *g = (struct imp_majorants){.medium = m,
+                                .box = box,
                                 .channels = scene->channels,
                                 .ends = true,
                                 .to_unit = imp__mat4_identity(),
@@ -158,6 +159,17 @@ enum imp_status imp__majorants_create(struct imp_scene *scene,
     m->majorants = g;
 out:
     return st;
+}
+
+void imp__majorants_renew(struct imp_majorants *g)
+{
+    int cells[3];
+    if (!g) return;
+    if (g->box) {
+        g->box->ops->extent(g->box, g->to_unit.m, cells);
+        imp__mat4_inverse(&g->to_unit, &g->to_world);
+    }
+    fill(g);
 }
 
 enum imp_status imp__majorants_control(struct imp_scene *scene, struct imp_majorants *g)

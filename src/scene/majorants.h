@@ -10,6 +10,7 @@
 
 struct imp_majorants {
     const struct imp_medium *medium;
+    const struct imp_texture *box; /* the volume whose box it is; NULL: the unit cube */
     int channels;
     bool ends;               /* outside the box there is none of the medium */
     struct imp_mat4 to_unit; /* world to unit cube */
@@ -28,6 +29,9 @@ struct imp_majorants {
 /* Makes m->majorants, unless its extinction is the same everywhere. */
 enum imp_status imp__majorants_create(struct imp_scene *scene,
                                       const struct imp_node *node, struct imp_medium *m);
+
+/* A volume has been moved. NULL: there are none. */
+void imp__majorants_renew(struct imp_majorants *g);
 
 enum imp_status imp__majorants_control(struct imp_scene *scene, struct imp_majorants *g);
 

@@ -194,9 +194,9 @@ static enum imp_status pose_apply(struct imp_pose *p)
         const struct imp_map by = map_of(p);
         return world ? imp__world_apply(world) : imp__instance_apply(p, &by);
     }
-    if (p->group >= 0) {
+    if (p->group >= 0 || p->texture) {
         const struct imp_map by = map_of(p);
-        return imp__group_apply(p, &by);
+        return p->texture ? imp__volume_apply(p, &by) : imp__group_apply(p, &by);
     }
     return p->sensor ? sensor_apply(p) : imp__pose_light_apply(p, world_of(p));
 }

@@ -2,11 +2,11 @@
  *
  * Where things are, as parameters:
  *
- *     NAME.pose              of a shape, instance, group, camera or radiancemeter: e and a, six numbers; a point that the scene
- *                            file has at X0 is at  X = c + e + R(a) s (X0 - c)
- *     NAME.scale             of a shape, instance or group: s
- *     NAME.to_world          of a shape, instance, camera, spot or projector: the upper three rows of the matrix M
- *                            that puts what the kind has at x at  X = M x, as mi.traverse has it
+ *     NAME.pose              of a shape, instance, group, volume, camera or radiancemeter: e and a, six numbers; a point that the
+ *                            scene file has at X0 is at  X = c + e + R(a) s (X0 - c)
+ *     NAME.scale             of a shape, instance, group or volume: s
+ *     NAME.to_world          of a shape, instance, volume, camera, spot or projector: the upper three rows of the
+ *                            matrix M that puts what the kind has at x at  X = M x, as mi.traverse has it
  *     NAME.vertex_positions  of a mesh: the vertices, three numbers each, world
  *     NAME.vertex_normals    of a mesh that has some: three numbers each, world, of any length; in a
  *                            triangle they are weighted, and the sum is made unit
@@ -85,6 +85,7 @@ struct imp_pose {
     int group;                   /* of the scene's, with all its instances; -1: none */
     struct imp_sensor *sensor;   /* NULL: no sensor */
     struct imp_emitter *emitter; /* NULL: no light without a shape */
+    struct imp_texture *texture; /* NULL: no volume */
     int param;
     size_t n;
     double *number;   /* [n] */
@@ -93,7 +94,7 @@ struct imp_pose {
     /* The first one of the same object has what follows. */
     struct imp_pose *object;
     bool due; /* its numbers, or another's of the object, changed since it was moved */
-    /* As the file has it: the kind's object, and positions and normals of a mesh. */
+    /* As the file has it: the kind's object, a volume's to_world, and positions and normals of a mesh. */
     void *rest;
     size_t rest_size;
     double rest_area;              /* of a shape, as it was then */
@@ -101,6 +102,9 @@ struct imp_pose {
     struct imp_receiver *receiver; /* of a shape with a meter that has one; else NULL */
     struct imp__ies *table;        /* of a shape that shines by a table; else NULL */
 };
+
+/* Does it move anything that rays meet? A volume moves its values alone. */
+static inline bool imp__pose_moves(const struct imp_pose *p) { return !p->texture; }
 
 /* Its box now. False: it is no shape, and no instance. */
 bool imp__pose_box(const struct imp_pose *p, imp_v3 *lo, imp_v3 *hi);
@@ -236,6 +240,22 @@ bool imp__group_has(const struct imp_pose *p, int instance);
 /* What a length of its first instance is in the world. */
 double imp__group_size(const struct imp_pose *p);
 enum imp_status imp__group_apply(const struct imp_pose *p, const struct imp_map *by);
+
+/* ---- pose_volumes.c, likewise ---- */
+/* The volume of this name that may be placed; NULL: there is none. */
+struct imp_texture *imp__volume_find(const struct imp_scene *scene, const char *name);
+const char *imp__volume_why(const struct imp_scene *scene, const struct imp_texture *t,
+                            enum imp_pose_kind kind);
+/* Where it is in the file is kept, of its first number. */
+enum imp_status imp__volume_keep(struct imp_scene *scene, struct imp_pose *p);
+/* It is a parameter now. */
+void imp__volume_added(struct imp_scene *scene, struct imp_pose *p);
+enum imp_status imp__volume_apply(const struct imp_pose *p, const struct imp_map *by);
+bool imp__volume_box(const struct imp_texture *t, imp_v3 *lo, imp_v3 *hi);
+/* A medium that ends at the box of this volume, where it is not 0: a derivative by its place would need
+ * what is scattered there. NULL: none. */
+const struct imp_medium *imp__volume_jumps(const struct imp_scene *scene,
+                                           const struct imp_pose *p);
 
 /* ---- pose_folds.c for pose.c ---- */
 /* A triangle of a mesh that its vertices' motion away from `rest` [3 n_vertices] makes vanish, or

@@ -54,6 +54,13 @@ static enum imp_status light_find(struct imp_scene *scene, int k, struct imp_pos
     return found(scene, e->name, p, imp__pose_light_why(scene, e, p->kind));
 }
 
+static enum imp_status volume_find(struct imp_scene *scene, struct imp_texture *t,
+                                   struct imp_pose *p)
+{
+    p->texture = t;
+    return found(scene, t->name, p, imp__volume_why(scene, t, p->kind));
+}
+
 static enum imp_status object_find(struct imp_scene *scene, const char *name,
                                    struct imp_pose *p)
 {
@@ -68,6 +75,8 @@ static enum imp_status object_find(struct imp_scene *scene, const char *name,
         return found(scene, name, p, imp__instance_why(scene, p->instance, p->kind));
     if (imp__group_find(scene, name, p))
         return found(scene, name, p, imp__group_why(scene, p->group, p->kind));
+    struct imp_texture *volume = imp__volume_find(scene, name);
+    if (volume) return volume_find(scene, volume, p);
     char whole[256];
     snprintf(whole, sizeof whole, "%s.%s", name, imp__pose_tail(p->kind));
     return imp__error(scene->ctx, IMP_E_ARG, "there is no %s '%s'%s",
@@ -223,7 +232,8 @@ static bool is_there(const struct imp_scene *scene, struct imp_pose *p)
     p->object = p;
     for (struct imp_pose *q = scene->poses; q; q = q->next) {
         if (q->shape != p->shape || q->sensor != p->sensor || q->emitter != p->emitter ||
-            q->instance != p->instance || q->group != p->group)
+            q->texture != p->texture || q->instance != p->instance ||
+            q->group != p->group)
             continue;
         if (q->kind == p->kind) return true;
         p->object = q->object;
@@ -293,12 +303,18 @@ static enum imp_status geometry_add(struct imp_scene *scene, const char *object,
     if (is_there(scene, p)) return IMP_OK;
     const char *beside = beside_why(p);
     if (beside) return refuse(scene, object, kind, beside);
-    if (p->object == p) IMP_CHECKED(imp__pose_rest_keep(scene, p));
+    if (p->object == p)
+        IMP_CHECKED(p->texture ? imp__volume_keep(scene, p)
+                               : imp__pose_rest_keep(scene, p));
     IMP_CHECKED(numbers_make(scene, p));
     IMP_CHECKED(param_add(scene, object, p));
     struct imp_pose **end = &scene->poses;
     while (*end) end = &(*end)->next;
     *end = p;
+    if (p->texture) {
+        imp__volume_added(scene, p);
+        return imp__poses_settle(scene);
+    }
     scene->light_tree = NULL; /* that of grids alone: it would have to be made again */
     if (kind != IMP_POSE_VERTICES || !p->normals) return IMP_OK;
     imp__pose_changed(p); /* normals follow vertices from now on */

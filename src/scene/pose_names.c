@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Object k: shapes, then sensors, then lights without a shape, instances and groups; may it have such a
+/* Object k: shapes, then sensors, then lights without a shape, instances, groups and volumes; may it have such a
  * number? */
 static const char *object_name(const struct imp_scene *scene, int k,
                                enum imp_pose_kind kind, char own[200])
@@ -28,6 +28,10 @@ static const char *object_name(const struct imp_scene *scene, int k,
         k -= scene->n_emitters;
         if (k >= imp__pose_instances_listed(scene)) {
             k -= imp__pose_instances_listed(scene);
+            if (k >= scene->n_groups) {
+                const struct imp_texture *t = scene->textures[k - scene->n_groups];
+                return imp__volume_why(scene, t, kind) ? NULL : t->name;
+            }
             return imp__group_why(scene, k, kind) ? NULL : scene->groups[k]->name;
         }
         imp__instance_name(scene, k, own);
@@ -41,7 +45,7 @@ bool imp__geometry_next(const struct imp_scene *scene, struct imp_geometry_walk 
 {
     if (!scene->committed || scene->rayless) return false;
     const int n = scene->n_shapes + scene->n_sensors + scene->n_emitters +
-                  imp__pose_instances_listed(scene) + scene->n_groups;
+                  imp__pose_instances_listed(scene) + scene->n_groups + scene->n_textures;
     char own[200];
     for (; at->next < n * IMP_POSE_KINDS; at->next++) {
         const enum imp_pose_kind kind = (enum imp_pose_kind)(at->next % IMP_POSE_KINDS);

@@ -15,7 +15,8 @@ static bool middle_of(const struct imp_pose *p, imp_v3 *middle)
 {
     imp_v3 lo, hi;
     const double *x = p->number;
-    const bool boxed = imp__pose_box(p, &lo, &hi);
+    const bool boxed =
+        p->texture ? imp__volume_box(p->texture, &lo, &hi) : imp__pose_box(p, &lo, &hi);
     if (p->group >= 0) return false;
     switch (p->kind) {
     case IMP_POSE_RIGID: *middle = p->centre + imp__v3(x[0], x[1], x[2]); return true;

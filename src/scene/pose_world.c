@@ -57,7 +57,8 @@ bool imp__world_is_free(const struct imp_pose *p)
     struct imp_round round;
     if (p->sensor) return p->sensor->ops->flags & IMP_SENSOR_PARALLEL;
     if (p->emitter) return false;
-    return p->shape < 0 || !imp__shape_round(p->scene->shapes[p->shape], &round);
+    return p->texture || p->shape < 0 ||
+           !imp__shape_round(p->scene->shapes[p->shape], &round);
 }
 
 bool imp__world_is_moved(const struct imp_pose *p)
@@ -84,6 +85,8 @@ void imp__world_read(const struct imp_pose *p, double to_world[12])
                12 * sizeof *to_world);
     } else if (p->sensor) {
         p->sensor->ops->placed(p->sensor, to_world, false);
+    } else if (p->texture) {
+        p->texture->ops->place(p->texture, to_world, false);
     } else {
         const struct imp__light_frame *f = p->emitter->self;
         imp__rows_of_columns(f->axis[0], f->axis[1], f->axis[2], f->origin, to_world);

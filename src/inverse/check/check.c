@@ -167,7 +167,10 @@ static enum imp_status layout_of(struct imp_problem *p, const uint8_t *chosen, b
     uint8_t *some = imp__alloc(p->ctx, n + 1, 1);
     if (!some) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for a check");
     memcpy(some, chosen, n);
-    for (size_t k = 0; k < n; k++) some[k] &= imp__pose_of(p->scene, k) ? poses : !poses;
+    for (size_t k = 0; k < n; k++) {
+        const struct imp_pose *pose = imp__pose_of(p->scene, k);
+        some[k] &= pose && imp__pose_moves(pose) ? poses : !poses;
+    }
     const enum imp_status st = imp__problem_layout(p, some);
     imp__release(p->ctx, some);
     return st;

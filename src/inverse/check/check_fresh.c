@@ -201,7 +201,8 @@ static enum imp_status has_room(struct rows *r, const struct imp__motion *m, siz
         imp__param_set(&param, e, m->old[e] + side * IMP_FRESH_STEP * m->scale);
         imp__theta_announce(p->scene);
         st = imp__poses_settle(p->scene); /* a place that the object cannot have */
-        if (st == IMP_OK) st = imp__moved_possible(p, &r->fresh.check->run);
+        if (st == IMP_OK && imp__problem_moves(p))
+            st = imp__moved_possible(p, &r->fresh.check->run);
         if (st != IMP_E_UNSUPPORTED && st != IMP_E_NUMERIC) IMP_TRY(st);
         else IMP_TRY(reason_keep(p, side, why));
     }

@@ -2,7 +2,9 @@
  *
  * Recorded walks evaluated at other parameters, with their vertices as they were: central
  * differences of their radiance against the gradient of the sweep. */
+#include "base/arguments.h"
 #include "check_walks.h"
+#include "scene/pose.h"
 #include <math.h>
 #include <string.h>
 
@@ -46,6 +48,7 @@ static enum imp_status frozen_work(size_t item, int worker, int slot, void *payl
 static enum imp_status evaluate(const struct imp__kept *k, double *value)
 {
     imp__theta_announce(k->check->problem->scene);
+    IMP_CHECKED(imp__poses_settle(k->check->problem->scene));
     struct frozen_job job = {k, value};
     const struct imp_loop loop = {.n_items = (k->n + PER_ITEM - 1) / PER_ITEM,
                                   .work = frozen_work,
@@ -151,7 +154,8 @@ static enum imp_status difference(struct imp__kept *k, struct direction *d, doub
 out:
     place(d, 0);
     imp__theta_announce(k->check->problem->scene);
-    return st;
+    const enum imp_status back = imp__poses_settle(k->check->problem->scene);
+    return st == IMP_OK ? back : st;
 }
 
 static double along(const struct imp__kept_walk *w, size_t base, const double *moved,

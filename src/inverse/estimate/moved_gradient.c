@@ -15,7 +15,8 @@ const int imp__moved_times[IMP_BOUNDARY_KINDS] = {
 static const struct imp_pose *next_active(const struct imp_problem *p,
                                           const struct imp_pose *from)
 {
-    while (from && p->active.base[from->param] < 0) from = from->next;
+    while (from && (p->active.base[from->param] < 0 || !imp__pose_moves(from)))
+        from = from->next;
     return from;
 }
 

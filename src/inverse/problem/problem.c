@@ -188,7 +188,7 @@ out:
 bool imp__problem_moves(const struct imp_problem *p)
 {
     for (const struct imp_pose *q = p->scene->poses; q; q = q->next)
-        if (p->active.base[q->param] >= 0) return true;
+        if (imp__pose_moves(q) && p->active.base[q->param] >= 0) return true;
     return false;
 }
 

@@ -10,6 +10,7 @@
 #include "color/spectrum.h"
 #include "kind/shape/shape.h"
 #include "math/vec.h"
+#include "placed.h"
 
 static void weighted_scatter(struct imp_sink *sink, int param, size_t element,
                              imp_spec bar, const double weight[3])
@@ -205,9 +206,11 @@ static void input_scatter(const struct imp_input *input, const struct imp_texcoo
                           bool scalar, const imp_spec *bar, struct imp_sink *sink)
 {
     if (input->bump) return;
-    if (input->texture)
+    if (input->texture) {
         input->texture->ops->scatter(input->texture, at, scalar, bar, sink);
-    else if (input->param < 0) return;
+        if (imp_unlikely(input->texture->placed))
+            imp__placed_scatter(input->texture, at, scalar, bar, sink);
+    } else if (input->param < 0) return;
     else if (by_wavelength(input, at, scalar))
         spectrum_scatter(input, at->carried, bar, sink);
     else if (by_colour(input, at, scalar)) colour_scatter(input, scalar, bar, sink);
@@ -224,6 +227,8 @@ static void input_tangent(const struct imp_input *input, const struct imp_texcoo
         *value_dot = imp__spec(0);
     } else if (input->texture) {
         input->texture->ops->tangent(input->texture, at, scalar, dot, x_dot, value_dot);
+        if (imp_unlikely(input->texture->placed))
+            imp__placed_tangent(input->texture, at, scalar, dot, x_dot, value_dot);
     } else if (input->param < 0) {
         *value_dot = imp__spec(0);
     } else if (by_wavelength(input, at, scalar)) {

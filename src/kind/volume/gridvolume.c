@@ -19,25 +19,27 @@ struct gridvolume {
     enum wrap wrap;
     enum filter filter;
     struct imp_mat4 to_unit;
+    struct imp_mat4 box;              /* the unit cube to where to_world finds it */
     float *data;                      /* [n[2]][n[1]][n[0]][channels] */
     bool spectral;                    /* three channels, and walks carry wavelengths */
     struct imp__lifted_texels lifted; /* ... of the cells */
 };
 
 static enum imp_status box_read(const struct imp_build *b, const struct imp_grid_data *g,
-                                struct imp_mat4 *to_unit)
+                                struct imp_mat4 *box, struct imp_mat4 *to_unit)
 {
     enum imp_status st = IMP_OK;
     bool use_box;
+    *box = imp__mat4_identity();
     IMP_TRY(imp__box_read(b, to_unit));
     IMP_TRY(imp_build_bool(b, "use_grid_bbox", false, &use_box));
     if (use_box) { /* to_world is applied to the file's box */
-        struct imp_mat4 box = imp__mat4_identity(), from_box;
+        struct imp_mat4 from_box;
         for (int a = 0; a < 3; a++) {
-            box.m[5 * a] = g->box[3 + a] - g->box[a];
-            box.m[4 * a + 3] = g->box[a];
+            box->m[5 * a] = g->box[3 + a] - g->box[a];
+            box->m[4 * a + 3] = g->box[a];
         }
-        if (!imp__mat4_inverse(&box, &from_box))
+        if (!imp__mat4_inverse(box, &from_box))
             IMP_TRY(imp_build_error(b, "use_grid_bbox", IMP_E_SCENE,
                                     "the box of its file is flat"));
         *to_unit = imp__mat4_multiply(&from_box, to_unit);
@@ -75,7 +77,7 @@ static enum imp_status build(const struct imp_build *b, void *self,
     IMP_TRY(imp_build_bool(b, "accel", true, &accel)); /* Mitsuba's */
     IMP_TRY(imp_build_float(b, "max_value", 0, &max_value));
     if (!g) IMP_TRY(imp__node_missing(b->ctx, b->node, "filename"));
-    IMP_TRY(box_read(b, g, &v->to_unit));
+    IMP_TRY(box_read(b, g, &v->box, &v->to_unit));
     v->wrap = (enum wrap)wrap;
     v->filter = (enum filter)filter;
     memcpy(v->n, g->n, sizeof v->n);
@@ -131,38 +133,58 @@ struct footprint {
     double weight[8];
 };
 
-static inline void footprint(const struct gridvolume *v, imp_v3 p, struct footprint *f)
-{
-    const imp_v3 u = imp__point(&v->to_unit, p);
-    const size_t nx = (size_t)v->n[0], ny = (size_t)v->n[1];
-    const bool linear = v->filter == FILTER_TRILINEAR;
+/* Cells next to a place along each axis, and how far it is from the first to the second. */
+struct corner {
     size_t at[3][2];
     double w[3];
+};
+
+static inline void corner_of(const struct gridvolume *v, imp_v3 p, struct corner *c)
+{
+    const imp_v3 u = imp__point(&v->to_unit, p);
+    const bool linear = v->filter == FILTER_TRILINEAR;
     for (int a = 0; a < 3; a++) {
         const int n = v->n[a];
         /* Far outside any cell will do: an int holds it. */
         const double x = imp_clamp(u[a], -1e5, 1e5) * n;
         const double shifted = imp_clamp(linear ? x - 0.5 : x, -1e9, 1e9);
         const int below = floor_of(shifted);
-        w[a] = shifted - below;
-        at[a][0] = (size_t)wrapped(below, n, v->wrap);
-        at[a][1] = (size_t)wrapped(below + 1, n, v->wrap);
+        c->w[a] = shifted - below;
+        c->at[a][0] = (size_t)wrapped(below, n, v->wrap);
+        c->at[a][1] = (size_t)wrapped(below + 1, n, v->wrap);
     }
-    f->n = linear ? 8 : 1;
-    if (!linear) {
-        f->cell[0] = (at[2][0] * ny + at[1][0]) * nx + at[0][0];
-        f->weight[0] = 1;
-        return;
-    }
-    const double x[2] = {1 - w[0], w[0]}, y[2] = {1 - w[1], w[1]},
-                 z[2] = {1 - w[2], w[2]};
+}
+
+/* The eight cells, with products of these weights along the axes. */
+static inline void eight(const struct gridvolume *v, const struct corner *c,
+                         double weight[3][2], struct footprint *f)
+{
+    const size_t nx = (size_t)v->n[0], ny = (size_t)v->n[1];
+    const double *x = weight[0], *y = weight[1], *z = weight[2];
+    f->n = 8;
     for (int k = 0; k < 4; k++) {
-        const size_t row = (at[2][k >> 1] * ny + at[1][k & 1]) * nx;
-        f->cell[2 * k] = row + at[0][0];
-        f->cell[2 * k + 1] = row + at[0][1];
+        const size_t row = (c->at[2][k >> 1] * ny + c->at[1][k & 1]) * nx;
+        f->cell[2 * k] = row + c->at[0][0];
+        f->cell[2 * k + 1] = row + c->at[0][1];
         f->weight[2 * k] = x[0] * y[k & 1] * z[k >> 1];
         f->weight[2 * k + 1] = x[1] * y[k & 1] * z[k >> 1];
     }
+}
+
+static inline void footprint(const struct gridvolume *v, imp_v3 p, struct footprint *f)
+{
+    struct corner c;
+    corner_of(v, p, &c);
+    if (v->filter != FILTER_TRILINEAR) {
+        f->n = 1;
+        f->cell[0] =
+            (c.at[2][0] * (size_t)v->n[1] + c.at[1][0]) * (size_t)v->n[0] + c.at[0][0];
+        f->weight[0] = 1;
+        return;
+    }
+    double weight[3][2] = {
+        {1 - c.w[0], c.w[0]}, {1 - c.w[1], c.w[1]}, {1 - c.w[2], c.w[2]}};
+    eight(v, &c, weight, f);
 }
 
 static bool by_wavelength(const struct gridvolume *v, const struct imp_texcoord *at,
@@ -171,29 +193,75 @@ static bool by_wavelength(const struct gridvolume *v, const struct imp_texcoord 
     return imp_unlikely(at->carried != NULL) && v->spectral && !scalar;
 }
 
+/* The sum over these cells. */
+static inline void sum_of(const struct gridvolume *v, const struct footprint *f,
+                          const struct imp_texcoord *at, bool scalar, imp_spec *value)
+{
+    if (by_wavelength(v, at, scalar)) {
+        const struct imp__texel_sum seen = {f->n, f->cell, f->weight};
+        imp__lifted_texels_eval(&v->lifted, &seen, at->carried, value);
+        return;
+    }
+    if (v->channels == 1) {
+        double sum = 0;
+        for (int k = 0; k < f->n; k++) sum += f->weight[k] * v->data[f->cell[k]];
+        *value = imp__spec(sum);
+        return;
+    }
+    imp_spec sum = {0};
+    for (int k = 0; k < f->n; k++) {
+        const float *c = v->data + 3 * f->cell[k];
+        sum += (imp_spec){c[0], c[1], c[2], 0} * f->weight[k];
+    }
+    *value = scalar ? imp__spec(imp__luminance(sum[0], sum[1], sum[2])) : sum;
+}
+
 static void eval(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
                  imp_spec *value)
 {
     const struct gridvolume *v = t->self;
     struct footprint f;
     footprint(v, at->p, &f);
-    if (by_wavelength(v, at, scalar)) {
-        const struct imp__texel_sum seen = {f.n, f.cell, f.weight};
-        imp__lifted_texels_eval(&v->lifted, &seen, at->carried, value);
+    sum_of(v, &f, at, scalar, value);
+}
+
+/* Along the axes of the cells, then of the world. */
+static bool gradient(const struct imp_texture *t, const struct imp_texcoord *at,
+                     bool scalar, imp_spec d_p[3])
+{
+    const struct gridvolume *v = t->self;
+    struct corner c;
+    if (v->filter != FILTER_TRILINEAR) return false;
+    corner_of(v, at->p, &c);
+    for (int i = 0; i < 3; i++) d_p[i] = (imp_spec){0};
+    for (int a = 0; a < 3; a++) {
+        struct footprint f;
+        imp_spec slope;
+        double weight[3][2];
+        for (int i = 0; i < 3; i++) {
+            weight[i][0] = i == a ? -v->n[a] : 1 - c.w[i];
+            weight[i][1] = i == a ? v->n[a] : c.w[i];
+        }
+        eight(v, &c, weight, &f);
+        sum_of(v, &f, at, scalar, &slope);
+        for (int i = 0; i < 3; i++) d_p[i] += slope * v->to_unit.m[4 * a + i];
+    }
+    return true;
+}
+
+static void place(const struct imp_texture *t, double to_world[12], bool set)
+{
+    struct gridvolume *v = t->self;
+    struct imp_mat4 world;
+    if (set) {
+        const struct imp_mat4 to = imp__mat4_of_rows(to_world);
+        world = imp__mat4_multiply(&to, &v->box);
+        imp__mat4_inverse(&world, &v->to_unit);
         return;
     }
-    if (v->channels == 1) {
-        double sum = 0;
-        for (int k = 0; k < f.n; k++) sum += f.weight[k] * v->data[f.cell[k]];
-        *value = imp__spec(sum);
-        return;
-    }
-    imp_spec sum = {0};
-    for (int k = 0; k < f.n; k++) {
-        const float *c = v->data + 3 * f.cell[k];
-        sum += (imp_spec){c[0], c[1], c[2], 0} * f.weight[k];
-    }
-    *value = scalar ? imp__spec(imp__luminance(sum[0], sum[1], sum[2])) : sum;
+    const struct imp_mat4 unboxed = imp__mat4_multiply(&v->box, &v->to_unit);
+    imp__mat4_inverse(&unboxed, &world);
+    memcpy(to_world, world.m, 12 * sizeof *to_world);
 }
 
 static void scatter(const struct imp_texture *t, const struct imp_texcoord *at,
@@ -297,4 +365,6 @@ const struct imp_texture_ops imp__gridvolume = {.size = sizeof(struct imp_textur
                                                 .tangent = tangent,
                                                 .bound = bound,
                                                 .extent = extent,
-                                                .changed = changed};
+                                                .changed = changed,
+                                                .place = place,
+                                                .gradient = gradient};

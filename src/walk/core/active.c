@@ -2,6 +2,7 @@
  *
  * Which objects depend on which active numbers, found once a job so that the sweep can
  * pass by a material nobody asked about. */
+#include "kind/texture/placed.h"
 #include "walk.h"
 #include <string.h>
 
@@ -16,6 +17,8 @@ bool imp__input_depends(const struct imp_input *in, const uint8_t *chosen)
 static bool texture_depends(const struct imp_texture *t, const uint8_t *chosen)
 {
     if (t->param >= 0 && chosen[t->param]) return true;
+    for (int k = 0; t->placed && k < t->placed->n; k++)
+        if (chosen[t->placed->by[k].param]) return true;
     for (int k = 0; k < t->n_in; k++)
         if (imp__input_depends(t->input[k], chosen)) return true;
     return false;

@@ -337,8 +337,20 @@ FOUND(EXTINCTION_ZERO_ACTIVE)
 FOUND(POSE_ACTIVE)
 {
     for (const struct imp_pose *p = j->active ? j->scene->poses : NULL; p; p = p->next) {
-        if (j->active->base[p->param] < 0) continue;
+        if (j->active->base[p->param] < 0 || !imp__pose_moves(p)) continue;
         *by = (struct imp_bearer){.name = j->scene->params[p->param].info.name};
+        return true;
+    }
+    return false;
+}
+FOUND(VOLUME_JUMPS)
+{
+    for (const struct imp_pose *p = j->active ? j->scene->poses : NULL; p; p = p->next) {
+        if (j->active->base[p->param] < 0 || imp__pose_moves(p)) continue;
+        const struct imp_medium *m = imp__volume_jumps(j->scene, p);
+        if (!m) continue;
+        *by = (struct imp_bearer){.name = j->scene->params[p->param].info.name,
+                                  .more = m->name};
         return true;
     }
     return false;

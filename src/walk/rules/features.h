@@ -71,6 +71,7 @@ struct imp_active;
     X(EXTINCTION_FIELD_ACTIVE, "an active extinction that varies in space")              \
     X(EXTINCTION_ZERO_ACTIVE, "an active extinction that is 0")                          \
     X(POSE_ACTIVE, "an active pose")                                                     \
+    X(VOLUME_JUMPS, "an active place of a volume that does not end at 0")                \
     X(RAYS_ACTIVE, "active parameters that bend rays")                                   \
     X(COLLISIONS_ACTIVE, "active parameters by which collisions are drawn")
 /* ... and stated by the call that asks. */

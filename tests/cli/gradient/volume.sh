@@ -27,3 +27,9 @@ for name in grid.data.vol grid.data.se.vol; do
     "${gradient[@]}" --overwrite; echo "exit $?"
     head -c 3 out/$name; echo
 done
+# Where the grid is: not while it ends with ones, at the border of a box that moves.
+importon info fog.xml | grep '^grid'
+importon gradient -q --spp 4 -p grid.pose fog.xml
+sed 's|<scale value="0.5"/>|<scale value="0.4"/>|' fog.xml >inside.xml
+importon gradient -q --spp 4 -p grid.pose -p grid.scale inside.xml | grep -c '^grid'
+importon gradient -q --spp 4 --set grid.to_world=0,0,0,0,0,0,0,0,0,0,0,0 -p grid.to_world inside.xml
