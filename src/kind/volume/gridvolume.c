@@ -19,31 +19,34 @@ struct gridvolume {
     enum wrap wrap;
     enum filter filter;
     struct imp_mat4 to_unit;
-    struct imp_mat4 box;              /* the unit cube to where to_world finds it */
-    float *data;                      /* [n[2]][n[1]][n[0]][channels] */
-    bool spectral;                    /* three channels, and walks carry wavelengths */
-    struct imp__lifted_texels lifted; /* ... of the cells */
+    struct imp_mat4 box;                /* the unit cube to where to_world finds it */
+    struct imp_mat4 rest, rest_to_unit; /* to_world, and to_unit, as the file has them */
+    float *data;                        /* [n[2]][n[1]][n[0]][channels] */
+    bool spectral;                      /* three channels, and walks carry wavelengths */
+    struct imp__lifted_texels lifted;   /* ... of the cells */
 };
 
 static enum imp_status box_read(const struct imp_build *b, const struct imp_grid_data *g,
-                                struct imp_mat4 *box, struct imp_mat4 *to_unit)
+                                struct gridvolume *v)
 {
     enum imp_status st = IMP_OK;
     bool use_box;
-    *box = imp__mat4_identity();
-    IMP_TRY(imp__box_read(b, to_unit));
+    v->box = imp__mat4_identity();
+    IMP_TRY(imp__box_read(b, &v->to_unit));
+    imp__mat4_inverse(&v->to_unit, &v->rest);
     IMP_TRY(imp_build_bool(b, "use_grid_bbox", false, &use_box));
     if (use_box) { /* to_world is applied to the file's box */
         struct imp_mat4 from_box;
         for (int a = 0; a < 3; a++) {
-            box->m[5 * a] = g->box[3 + a] - g->box[a];
-            box->m[4 * a + 3] = g->box[a];
+            v->box.m[5 * a] = g->box[3 + a] - g->box[a];
+            v->box.m[4 * a + 3] = g->box[a];
         }
-        if (!imp__mat4_inverse(box, &from_box))
+        if (!imp__mat4_inverse(&v->box, &from_box))
             IMP_TRY(imp_build_error(b, "use_grid_bbox", IMP_E_SCENE,
                                     "the box of its file is flat"));
-        *to_unit = imp__mat4_multiply(&from_box, to_unit);
+        v->to_unit = imp__mat4_multiply(&from_box, &v->to_unit);
     }
+    v->rest_to_unit = v->to_unit;
 out:
     return st;
 }
@@ -77,7 +80,7 @@ static enum imp_status build(const struct imp_build *b, void *self,
     IMP_TRY(imp_build_bool(b, "accel", true, &accel)); /* Mitsuba's */
     IMP_TRY(imp_build_float(b, "max_value", 0, &max_value));
     if (!g) IMP_TRY(imp__node_missing(b->ctx, b->node, "filename"));
-    IMP_TRY(box_read(b, g, &v->box, &v->to_unit));
+    IMP_TRY(box_read(b, g, v));
     v->wrap = (enum wrap)wrap;
     v->filter = (enum filter)filter;
     memcpy(v->n, g->n, sizeof v->n);
@@ -249,19 +252,23 @@ static bool gradient(const struct imp_texture *t, const struct imp_texcoord *at,
     return true;
 }
 
+/* Set to where the file has it, it is there to the last bit. */
 static void place(const struct imp_texture *t, double to_world[12], bool set)
 {
     struct gridvolume *v = t->self;
-    struct imp_mat4 world;
-    if (set) {
-        const struct imp_mat4 to = imp__mat4_of_rows(to_world);
-        world = imp__mat4_multiply(&to, &v->box);
-        imp__mat4_inverse(&world, &v->to_unit);
+    const size_t rows = 12 * sizeof *to_world;
+    if (!set) {
+        const struct imp_mat4 unboxed = imp__mat4_multiply(&v->box, &v->to_unit);
+        struct imp_mat4 world;
+        imp__mat4_inverse(&unboxed, &world);
+        const bool rests = memcmp(&v->to_unit, &v->rest_to_unit, sizeof world) == 0;
+        memcpy(to_world, rests ? v->rest.m : world.m, rows);
         return;
     }
-    const struct imp_mat4 unboxed = imp__mat4_multiply(&v->box, &v->to_unit);
-    imp__mat4_inverse(&unboxed, &world);
-    memcpy(to_world, world.m, 12 * sizeof *to_world);
+    const struct imp_mat4 to = imp__mat4_of_rows(to_world),
+                          world = imp__mat4_multiply(&to, &v->box);
+    if (memcmp(to.m, v->rest.m, rows) == 0) v->to_unit = v->rest_to_unit;
+    else imp__mat4_inverse(&world, &v->to_unit);
 }
 
 static void scatter(const struct imp_texture *t, const struct imp_texcoord *at,
