@@ -10,13 +10,17 @@
 /* Radius of a camera or a light, which have no size, in parts of the scene's. */
 #define SIZE_OF_POINTS 0.05
 
+static bool box_of(const struct imp_pose *p, imp_v3 *lo, imp_v3 *hi)
+{
+    return p->texture ? imp__volume_box(p->texture, lo, hi) : imp__pose_box(p, lo, hi);
+}
+
 /* The middle of what moves. False: it has no place; a group has one for each instance. */
 static bool middle_of(const struct imp_pose *p, imp_v3 *middle)
 {
     imp_v3 lo, hi;
     const double *x = p->number;
-    const bool boxed =
-        p->texture ? imp__volume_box(p->texture, &lo, &hi) : imp__pose_box(p, &lo, &hi);
+    const bool boxed = box_of(p, &lo, &hi);
     if (p->group >= 0) return false;
     switch (p->kind) {
     case IMP_POSE_RIGID: *middle = p->centre + imp__v3(x[0], x[1], x[2]); return true;
@@ -44,8 +48,8 @@ enum imp_status imp_scene_place(const imp_scene *scene, size_t param, double mid
                           "'%s' is no number of a thing that has a place",
                           scene->params[param].info.name);
     for (int k = 0; k < 3; k++) middle[k] = at[k];
-    *radius = imp__pose_box(p, &lo, &hi) ? 0.5 * imp__length(hi - lo)
-                                         : SIZE_OF_POINTS * scene->ball.radius;
+    *radius = box_of(p, &lo, &hi) ? 0.5 * imp__length(hi - lo)
+                                  : SIZE_OF_POINTS * scene->ball.radius;
     return IMP_OK;
 }
 

@@ -317,6 +317,12 @@ static void refused_test(void)
     double there[12], back[12];
     size_t n, index;
     values_get(scene, "cloud.to_world", there, &n, &index);
+    double middle[3], radius;
+    test_must(ctx, imp_scene_place(scene, index, middle, &radius));
+    tap_ok(fabs(middle[0] - .2) + fabs(middle[1] + .5) + fabs(middle[2] - 1.2) < 1e-9 &&
+               radius > 1.7 && radius < 2.2,
+           "where a cloud is # %g %g %g, radius %g", middle[0], middle[1], middle[2],
+           radius);
     for (int k = 0; k < 3; k++) there[k] = 0;
     tap_ok(imp_scene_set_values(scene, index, n, there) == IMP_E_NUMERIC &&
                strstr(imp_last_error(ctx), "singular"),
