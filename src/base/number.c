@@ -3,6 +3,7 @@
  * Decimal numbers from text and to text. The C library's own functions follow the
  * locale of the host, which may write a comma for the decimal point. */
 #include "number.h"
+#include "compiler.h"
 #include "little.h"
 #include <locale.h>
 #include <math.h>
@@ -17,22 +18,40 @@ static const uint64_t power_of_ten[] = {1,      10,      100,      1000,     100
 
 static bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-/* How many of the eight characters at p are digits, up to the first that is none, and how many of those
- * are leading zeros; the digits as a number. Of w, with a digit in each byte, the first one lowest,
- * pairs, fours and eights are made by three multiplications. */
-static int eight_digits(const char *p, uint64_t *value, int *zeros)
+/* How many of the eight characters at p are digits, up to the first that is none; the digits as a
+ * number. Of w, with a digit in each byte, the first one lowest, pairs, fours and eights are made by
+ * three multiplications. */
+static int eight_digits(const char *p, uint64_t *value)
 {
     uint64_t w = imp__little_u64((const unsigned char *)p) ^ 0x3030303030303030u;
     const uint64_t other = ((w + 0x7676767676767676u) | w) & 0x8080808080808080u;
     const int n = other ? __builtin_ctzll(other) / 8 : 8;
     if (n == 0) return 0;
     w <<= 64 - 8 * n;
-    *zeros = w ? __builtin_ctzll(w) / 8 - (8 - n) : n;
     w = 10 * w + (w >> 8);
     w = (w & 0x000000ff000000ffu) * 0x000f424000000064u +
         ((w >> 16) & 0x000000ff000000ffu) * 0x0000271000000001u;
     *value = w >> 32;
     return n;
+}
+
+/* The digits at p behind those of *value, which wraps beyond DIGITS_MAX. Returns the first character that
+ * is none. Where branches say where digits end, the processor reads on before the digits are known. */
+static const char *digits_read(const char *p, const char *end, uint64_t *value)
+{
+    while (p < end && is_digit(*p)) {
+        uint64_t v = (uint64_t)(*p - '0');
+        int n = 1;
+        if (end - p >= 8 && is_digit(p[1])) n = eight_digits(p, &v);
+        if (n == 8) {
+            *value = 100000000 * *value + v;
+            p += 8;
+            continue;
+        }
+        *value = power_of_ten[n] * *value + v;
+        p += n;
+    }
+    return p;
 }
 
 static bool word(const char **s, const char *end, const char *text, size_t n)
@@ -42,91 +61,113 @@ static bool word(const char **s, const char *end, const char *text, size_t n)
     return true;
 }
 
-/* mantissa * 10^exponent, correctly rounded. Both factors exact below 2^53 and 10^22: one
- * rounding (Clinger, "How to read floating point numbers accurately", 1990). Otherwise
- * the C library does it in its "C" locale; `sticky`: non-zero digits were cut
- * off. */
-static double scale10(uint64_t mantissa, int exponent, bool sticky)
+IMP_COLD static bool word_read(const char **s, const char *end, double *out)
 {
-    static const double power[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
-                                   1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
-                                   1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
-    if (mantissa == 0) return 0;
-    if (mantissa <= (uint64_t)1 << 53 && !sticky) {
-        if (exponent >= 0 && exponent <= 22) return (double)mantissa * power[exponent];
-        if (exponent < 0 && exponent >= -22) return (double)mantissa / power[-exponent];
-    }
-    if (exponent > 400) return INFINITY;
-    if (exponent < -400) return 0;
+    *out = NAN;
+    if (word(s, end, "nan", 3)) return true;
+    *out = INFINITY;
+    return word(s, end, "infinity", 8) || word(s, end, "inf", 3);
+}
+
+/* mantissa * 10^exponent. */
+struct decimal {
+    uint64_t mantissa;
+    int exponent;
+    bool sticky; /* digits other than 0 were cut off */
+};
+
+/* By the C library in its "C" locale. */
+IMP_COLD static double value_rounded(const struct decimal *x)
+{
+    if (x->exponent > 400) return INFINITY;
+    if (x->exponent < -400) return 0;
     char text[64];
-    snprintf(text, sizeof text, "%llu%se%d", (unsigned long long)mantissa,
-             sticky ? "1" : "", exponent - sticky);
+    snprintf(text, sizeof text, "%llu%se%d", (unsigned long long)x->mantissa,
+             x->sticky ? "1" : "", x->exponent - x->sticky);
     const locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-    if (!c) return (double)mantissa * pow(10, exponent);
+    if (!c) return (double)x->mantissa * pow(10, x->exponent);
     const double value = strtod_l(text, NULL, c);
     freelocale(c);
     return value;
 }
 
+/* Correctly rounded. Both factors exact below 2^53 and 10^22: one rounding (Clinger, "How to read
+ * floating point numbers accurately", 1990). */
+static double value_of(const struct decimal *x)
+{
+    static const double power[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                   1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+                                   1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
+    if (x->mantissa == 0) return 0;
+    if (x->mantissa <= (uint64_t)1 << 53 && !x->sticky) {
+        if (x->exponent < 0 && x->exponent >= -22)
+            return (double)x->mantissa / power[-x->exponent];
+        if (x->exponent >= 0 && x->exponent <= 22)
+            return (double)x->mantissa * power[x->exponent];
+    }
+    return value_rounded(x);
+}
+
+/* Digits with at most one point among them, more than DIGITS_MAX, leading zeros included: the first
+ * that count are kept. */
+IMP_COLD static void long_decimal(const char *p, const char *end, struct decimal *out)
+{
+    int kept = 0;
+    bool fraction = false;
+    *out = (struct decimal){0};
+    for (; p < end; p++) {
+        if (*p == '.') {
+            fraction = true;
+        } else if (kept < DIGITS_MAX) {
+            out->mantissa = 10 * out->mantissa + (uint64_t)(*p - '0');
+            kept += out->mantissa != 0; /* leading zeros are free */
+            if (fraction && out->exponent > -100000) out->exponent--;
+        } else {
+            out->sticky |= *p != '0';
+            if (!fraction && out->exponent < 100000) out->exponent++;
+        }
+    }
+}
+
+/* What follows an 'e' at *s counts if it is a number. */
+IMP_COLD static void exponent_read(const char **s, const char *end, int *exponent)
+{
+    const char *p = *s + 1;
+    bool minus = false;
+    if (p < end && (*p == '+' || *p == '-')) minus = *p++ == '-';
+    if (p >= end || !is_digit(*p)) return;
+    int e = 0;
+    for (; p < end && is_digit(*p); p++)
+        if (e < 100000) e = 10 * e + (*p - '0');
+    *exponent += minus ? -e : e;
+    *s = p;
+}
+
 bool imp__number(const char **s, const char *end, double *out)
 {
     const char *p = *s;
-    bool negative = false, sticky = false;
-    if (p < end && (*p == '+' || *p == '-')) negative = *p++ == '-';
+    const bool negative = p < end && *p == '-';
+    if (negative || (p < end && *p == '+')) p++;
 
-    uint64_t mantissa = 0;
-    int kept = 0, exponent = 0;
-    bool any = false, fraction = false;
-    for (; p < end; p++) {
-        uint64_t v;
-        int zeros, n;
-        if (end - p >= 8 && kept <= DIGITS_MAX - 8 && exponent > -100000 &&
-            (n = eight_digits(p, &v, &zeros)) > 0) {
-            kept += mantissa ? n : n - zeros;
-            mantissa = power_of_ten[n] * mantissa + v;
-            if (fraction) exponent -= n;
-            any = true;
-            p += n - 1;
-            continue;
-        }
-        if (*p == '.' && !fraction) {
-            fraction = true;
-            continue;
-        }
-        if (!is_digit(*p)) break;
-        any = true;
-        if (kept < DIGITS_MAX) {
-            mantissa = 10 * mantissa + (uint64_t)(*p - '0');
-            kept += mantissa != 0; /* leading zeros are free */
-            if (fraction && exponent > -100000) exponent--;
-        } else {
-            sticky |= *p != '0';
-            if (!fraction && exponent < 100000) exponent++;
-        }
+    const char *first = p;
+    struct decimal x = {0};
+    p = digits_read(p, end, &x.mantissa);
+    ptrdiff_t digits = p - first;
+    if (p < end && *p == '.') {
+        const char *point = p++;
+        p = digits_read(p, end, &x.mantissa);
+        digits += p - point - 1;
+        x.exponent = (int)(point + 1 - p);
     }
-    if (!any) {
-        p = *s + (*s < end && (**s == '+' || **s == '-'));
-        double value;
-        if (word(&p, end, "infinity", 8) || word(&p, end, "inf", 3)) value = INFINITY;
-        else if (word(&p, end, "nan", 3)) value = NAN;
-        else return false;
-        *s = p;
-        *out = negative ? -value : value;
-        return true;
+    double value;
+    if (digits > 0) {
+        if (digits > DIGITS_MAX) long_decimal(first, p, &x);
+        if (p < end && (*p == 'e' || *p == 'E')) exponent_read(&p, end, &x.exponent);
+        value = value_of(&x);
+    } else {
+        p = first;
+        if (!word_read(&p, end, &value)) return false;
     }
-    if (p < end && (*p == 'e' || *p == 'E')) {
-        const char *q = p + 1;
-        bool minus = false;
-        if (q < end && (*q == '+' || *q == '-')) minus = *q++ == '-';
-        if (q < end && is_digit(*q)) {
-            int e = 0;
-            for (; q < end && is_digit(*q); q++)
-                if (e < 100000) e = 10 * e + (*q - '0');
-            exponent += minus ? -e : e;
-            p = q;
-        }
-    }
-    const double value = scale10(mantissa, exponent, sticky);
     *s = p;
     *out = negative ? -value : value;
     return true;
@@ -136,12 +177,12 @@ bool imp__integer(const char **s, const char *end, int64_t *out)
 {
     const char *p = *s;
     bool negative = false;
-    int zeros, n;
+    int n;
     uint64_t first;
     if (p < end && (*p == '+' || *p == '-')) negative = *p++ == '-';
     if (p >= end || !is_digit(*p)) return false;
     int64_t value = 0;
-    if (end - p >= 8 && (n = eight_digits(p, &first, &zeros)) > 0) {
+    if (end - p >= 8 && (n = eight_digits(p, &first)) > 0) {
         value = negative ? -(int64_t)first : (int64_t)first;
         p += n;
     }

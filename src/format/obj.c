@@ -16,6 +16,7 @@
 struct column { /* v, vt or vn as read */
     float *at;
     size_t n, capacity; /* of numbers */
+    size_t rows;
     int width;
 };
 
@@ -27,8 +28,10 @@ struct obj {
     const struct imp_mesh_source *source;
     imp_context *ctx;
     int64_t line;
-    size_t at;       /* of the text, where the line begins */
-    size_t faces_at; /* ... where that of the first face does */
+    size_t at;           /* of the text, where the line begins */
+    size_t faces_at;     /* ... where that of the first face does */
+    const char *end;     /* of the text: behind a line is what no number has */
+    const char *comment; /* the first '#' at or behind the line, or the end */
     struct column v, t, n;
     struct corner *vertices;
     size_t n_vertices, cap_vertices;
@@ -102,25 +105,25 @@ static enum imp_status row_read(struct obj *o, struct column *c, const char *wha
         double x = 0;
         s = skip(s, end);
         if (s < end || i < needed)
-            if (!imp__number(&s, end, &x) || (s < end && !blank(*s)))
+            if (!imp__number(&s, o->end, &x) || (s < end && !blank(*s)))
                 return line_error(o, "%s needs %d numbers", what, needed);
         const float value = (float)x;
         if (!isfinite(value))
-            return line_error(o, "%s %zu is not finite", what,
-                              c->n / (size_t)c->width + 1);
+            return line_error(o, "%s %zu is not finite", what, c->rows + 1);
         c->at[c->n + (size_t)i] = value;
     }
     c->n += (size_t)c->width;
-    if (c->n / (size_t)c->width > IMP_MESH_MAX) return line_error(o, "mesh is too large");
+    if (++c->rows > IMP_MESH_MAX) return line_error(o, "mesh is too large");
     return IMP_OK;
 }
 
 static enum imp_status index_read(struct obj *o, const struct column *c, const char *what,
-                                  const char **s, const char *end, uint32_t *out)
+                                  const char **s, uint32_t *out)
 {
-    const size_t n = c->n / (size_t)c->width;
+    const size_t n = c->rows;
     int64_t i;
-    if (!imp__integer(s, end, &i)) return line_error(o, "malformed index of a %s", what);
+    if (!imp__integer(s, o->end, &i))
+        return line_error(o, "malformed index of a %s", what);
     if (i == 0) return line_error(o, "index 0 of a %s", what);
     if (i < 0 && i >= -(int64_t)n) i += (int64_t)n + 1;
     if (i < 1 || (uint64_t)i > n)
@@ -168,7 +171,7 @@ static enum imp_status table_grow(struct obj *o)
  * search. */
 static enum imp_status place_of(struct obj *o, struct corner k, uint32_t **out)
 {
-    const size_t known = o->v.n / 3;
+    const size_t known = o->v.rows;
     if (o->n_alone < known) {
         uint32_t *grown =
             room_for(o, o->alone, &o->cap_alone, o->n_alone, known, sizeof *grown, 0);
@@ -213,14 +216,14 @@ static enum imp_status corner_read(struct obj *o, const char **s, const char *en
 {
     enum imp_status st = IMP_OK;
     *k = (struct corner){0};
-    IMP_TRY(index_read(o, &o->v, "vertex", s, end, &k->v));
+    IMP_TRY(index_read(o, &o->v, "vertex", s, &k->v));
     if (*s < end && **s == '/') {
         ++*s;
         if (*s < end && **s != '/' && !blank(**s))
-            IMP_TRY(index_read(o, &o->t, "texture coordinate", s, end, &k->t));
+            IMP_TRY(index_read(o, &o->t, "texture coordinate", s, &k->t));
         if (*s < end && **s == '/') {
             ++*s;
-            IMP_TRY(index_read(o, &o->n, "normal", s, end, &k->n));
+            IMP_TRY(index_read(o, &o->n, "normal", s, &k->n));
         }
     }
     if (*s < end && !blank(**s)) IMP_TRY(line_error(o, "malformed corner of a face"));
@@ -261,8 +264,11 @@ static enum imp_status line_read(struct obj *o, const char *s, const char *end)
 {
     if (end - s > LINE_MAX_BYTES)
         return line_error(o, "line is longer than %d bytes", LINE_MAX_BYTES);
-    const char *comment = memchr(s, '#', (size_t)(end - s));
-    if (comment) end = comment;
+    if (o->comment < s) {
+        o->comment = memchr(s, '#', (size_t)(o->end - s));
+        if (!o->comment) o->comment = o->end;
+    }
+    end = imp_min(end, o->comment);
     s = skip(s, end);
     const char *word = s;
     while (s < end && !blank(*s)) s++;
@@ -319,6 +325,7 @@ enum imp_status imp__obj_parse_names(const struct imp_mesh_source *source,
                     .n.width = 3,
                     .names = names};
     const char *s = (const char *)source->text.data, *end = s + source->text.size;
+    o.end = end;
     while (s < end) {
         const char *stop = memchr(s, '\n', (size_t)(end - s));
         if (!stop) stop = end;
