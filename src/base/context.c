@@ -39,7 +39,7 @@ static bool fits_machine(size_t bytes)
 static void *default_allocate(size_t bytes, void *payload)
 {
     (void)payload;
-    const bool large = bytes >= 2 * HUGE_PAGE;
+    const bool large = bytes >= HUGE_PAGE;
     void *p = NULL;
     if (!fits_machine(bytes)) return NULL;
     if (posix_memalign(&p, large ? HUGE_PAGE : IMP_CACHE_LINE, bytes) != 0) return NULL;

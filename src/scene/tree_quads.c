@@ -44,12 +44,11 @@ void imp__tree_quads_destroy(imp_context *ctx, struct imp_tree_quads *q)
 
 static void fill(const struct imp_triangles *mesh, struct imp_tree_quads *q)
 {
-    size_t n = 0;
-    for (size_t i = 0; i < mesh->n_triangles; i++, n++) {
+    size_t i = 0;
+    for (size_t n = 0; n < q->n; n++, i++) {
         const uint32_t *a = mesh->indices + 3 * i;
-        const int turned = turned_of(mesh, i), j = turned & 3, k = turned >> 2;
+        const int turned = q->turned[n], j = turned & 3, k = turned >> 2;
         q->first[n] = (uint32_t)i;
-        q->turned[n] = (uint8_t)turned;
         q->corner[n][0] = a[j];
         q->corner[n][1] = a[(j + 1) % 3];
         q->corner[n][3] = a[(j + 2) % 3];
@@ -58,28 +57,43 @@ static void fill(const struct imp_triangles *mesh, struct imp_tree_quads *q)
     }
 }
 
+/* Sets n and turned. False: most triangles are alone. */
+static bool pairs_find(const struct imp_triangles *mesh, struct imp_tree_quads *q)
+{
+    const size_t most = 2 * mesh->n_triangles / 3;
+    size_t n = 0;
+    for (size_t i = 0; i < mesh->n_triangles; i++, n++) {
+        if (n == most) return false;
+        q->turned[n] = (uint8_t)turned_of(mesh, i);
+        i += q->turned[n] != ALONE;
+    }
+    q->n = n;
+    return true;
+}
+
 bool imp__tree_quads_create(imp_context *ctx, const struct imp_triangles *mesh,
                             struct imp_tree_quads **out, int64_t *bytes)
 {
-    size_t n = 0;
-    *out = NULL;
-    for (size_t i = 0; i < mesh->n_triangles; i++, n++) i += turned_of(mesh, i) != ALONE;
-    if (3 * n > 2 * mesh->n_triangles) return true;
+    bool fits = true;
     struct imp_tree_quads *q = imp__alloc(ctx, 1, sizeof *q);
+    *out = NULL;
     if (!q) return false;
-    q->n = n;
     q->positions = mesh->positions;
-    q->corner = imp__alloc_raw(ctx, n, sizeof *q->corner);
-    q->first = imp__alloc_raw(ctx, n, sizeof *q->first);
-    q->turned = imp__alloc_raw(ctx, n, sizeof *q->turned);
-    if (!q->corner || !q->first || !q->turned) {
-        imp__tree_quads_destroy(ctx, q);
-        return false;
+    q->turned = imp__alloc_raw(ctx, 2 * mesh->n_triangles / 3 + 1, sizeof *q->turned);
+    fits = q->turned != NULL;
+    if (fits && pairs_find(mesh, q)) {
+        q->corner = imp__alloc_raw(ctx, q->n, sizeof *q->corner);
+        q->first = imp__alloc_raw(ctx, q->n, sizeof *q->first);
+        fits = q->corner && q->first;
+        if (fits) {
+            fill(mesh, q);
+            *bytes += (int64_t)(q->n * (sizeof *q->corner + sizeof *q->first +
+                                        sizeof *q->turned));
+            *out = q;
+        }
     }
-    fill(mesh, q);
-    *bytes += (int64_t)(n * (sizeof *q->corner + sizeof *q->first + sizeof *q->turned));
-    *out = q;
-    return true;
+    if (!*out) imp__tree_quads_destroy(ctx, q);
+    return fits;
 }
 
 /* Where a ray meets the plane of a triangle (Moeller and Trumbore, "Fast, minimum storage ray-triangle
