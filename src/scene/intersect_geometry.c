@@ -88,7 +88,7 @@ RTCGeometry imp__geometry_create(RTCDevice rtc, const struct imp_shape *s,
                                    t->positions, 0, 3 * sizeof(float), t->n_vertices);
         if (quads)
             rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4,
-                                       quads->corner, 0, sizeof *quads->corner, quads->n);
+                                       quads->quad, 0, sizeof *quads->quad, quads->n);
         else
             rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                        t->indices, 0, 3 * sizeof(uint32_t),

@@ -22,7 +22,7 @@ static bool has_area(const struct imp_triangles *mesh, const uint32_t *corner)
 }
 
 /* For triangle i and the next one, which shares an edge that runs the other way there: as
- * imp_tree_quads.turned. */
+ * imp_tree_quad.turned. */
 static int turned_of(const struct imp_triangles *mesh, size_t i)
 {
     const uint32_t *a = mesh->indices + 3 * i, *b = a + 3;
@@ -36,64 +36,61 @@ static int turned_of(const struct imp_triangles *mesh, size_t i)
 void imp__tree_quads_destroy(imp_context *ctx, struct imp_tree_quads *q)
 {
     if (!q) return;
-    imp__release(ctx, q->corner);
-    imp__release(ctx, q->first);
-    imp__release(ctx, q->turned);
+    imp__release(ctx, q->quad);
     imp__release(ctx, q);
 }
 
-static void fill(const struct imp_triangles *mesh, struct imp_tree_quads *q)
-{
-    size_t i = 0;
-    for (size_t n = 0; n < q->n; n++, i++) {
-        const uint32_t *a = mesh->indices + 3 * i;
-        const int turned = q->turned[n], j = turned & 3, k = turned >> 2;
-        q->first[n] = (uint32_t)i;
-        q->corner[n][0] = a[j];
-        q->corner[n][1] = a[(j + 1) % 3];
-        q->corner[n][3] = a[(j + 2) % 3];
-        q->corner[n][2] = turned == ALONE ? q->corner[n][3] : a[3 + k];
-        i += turned != ALONE;
-    }
-}
-
-/* Sets n and turned. False: most triangles are alone. */
-static bool pairs_find(const struct imp_triangles *mesh, struct imp_tree_quads *q)
+/* Returns how many there are, with `turned` of each; 0: most triangles are alone. */
+static size_t pairs_find(const struct imp_triangles *mesh, uint8_t *turned)
 {
     const size_t most = 2 * mesh->n_triangles / 3;
     size_t n = 0;
     for (size_t i = 0; i < mesh->n_triangles; i++, n++) {
-        if (n == most) return false;
-        q->turned[n] = (uint8_t)turned_of(mesh, i);
-        i += q->turned[n] != ALONE;
+        if (n == most) return 0;
+        turned[n] = (uint8_t)turned_of(mesh, i);
+        i += turned[n] != ALONE;
     }
-    q->n = n;
-    return true;
+    return n;
+}
+
+static void fill(const struct imp_triangles *mesh, const uint8_t *turned,
+                 struct imp_tree_quads *q)
+{
+    size_t i = 0;
+    for (size_t n = 0; n < q->n; n++, i++) {
+        const uint32_t *a = mesh->indices + 3 * i;
+        const int j = turned[n] & 3, k = turned[n] >> 2;
+        const uint32_t c0 = a[j], c1 = a[(j + 1) % 3], c3 = a[(j + 2) % 3];
+        q->quad[n] = (struct imp_tree_quad){
+            {c0, c1, k < 3 ? a[3 + k] : c3, c3}, (uint32_t)i, turned[n]};
+        i += k < 3;
+    }
 }
 
 bool imp__tree_quads_create(imp_context *ctx, const struct imp_triangles *mesh,
                             struct imp_tree_quads **out, int64_t *bytes)
 {
-    bool fits = true;
-    struct imp_tree_quads *q = imp__alloc(ctx, 1, sizeof *q);
+    bool done = false;
+    struct imp_tree_quads *q = NULL;
+    uint8_t *turned = imp__alloc_raw(ctx, 2 * mesh->n_triangles / 3 + 1, sizeof *turned);
     *out = NULL;
-    if (!q) return false;
-    q->positions = mesh->positions;
-    q->turned = imp__alloc_raw(ctx, 2 * mesh->n_triangles / 3 + 1, sizeof *q->turned);
-    fits = q->turned != NULL;
-    if (fits && pairs_find(mesh, q)) {
-        q->corner = imp__alloc_raw(ctx, q->n, sizeof *q->corner);
-        q->first = imp__alloc_raw(ctx, q->n, sizeof *q->first);
-        fits = q->corner && q->first;
-        if (fits) {
-            fill(mesh, q);
-            *bytes += (int64_t)(q->n * (sizeof *q->corner + sizeof *q->first +
-                                        sizeof *q->turned));
-            *out = q;
-        }
+    if (!turned) return false;
+    const size_t n = pairs_find(mesh, turned);
+    done = n == 0;
+    if (n > 0) q = imp__alloc(ctx, 1, sizeof *q);
+    if (q) {
+        q->n = n;
+        q->positions = mesh->positions;
+        q->quad = imp__alloc_raw(ctx, n, sizeof *q->quad);
+        done = q->quad != NULL;
     }
-    if (!*out) imp__tree_quads_destroy(ctx, q);
-    return fits;
+    if (q && done) {
+        fill(mesh, turned, q);
+        *bytes += (int64_t)(n * sizeof *q->quad);
+        *out = q;
+    } else imp__tree_quads_destroy(ctx, q);
+    imp__release(ctx, turned);
+    return done;
 }
 
 /* Where a ray meets the plane of a triangle (Moeller and Trumbore, "Fast, minimum storage ray-triangle
@@ -136,8 +133,9 @@ static bool is_second(const struct plane_hit *first, const struct plane_hit *sec
 void imp__tree_quads_hit(const struct imp_tree_quads *q, unsigned prim, double u,
                          double v, imp_v3 o, imp_v3 d, double tmin, struct imp_hit *hit)
 {
-    const int j = q->turned[prim] & 3, k = q->turned[prim] >> 2;
-    const uint32_t *corner = q->corner[prim];
+    const struct imp_tree_quad *quad = &q->quad[prim];
+    const int j = quad->turned & 3, k = (int)(quad->turned >> 2);
+    const uint32_t *corner = quad->corner;
     const imp_v3 p1 = position(q->positions, corner[1]),
                  p3 = position(q->positions, corner[3]);
     const bool near = k < 3 && fabs(u + v - 1) < DIAGONAL;
@@ -151,7 +149,7 @@ void imp__tree_quads_hit(const struct imp_tree_quads *q, unsigned prim, double u
     const double a = imp_clamp(x.u, 0.0, 1.0), b = imp_clamp(x.v, 0.0, 1 - a),
                  part[3] = {1 - a - b, a, b}; /* of corner `at` and those after it */
     const int at = second ? k : j;
-    hit->prim = (int)q->first[prim] + second;
+    hit->prim = (int)quad->first + second;
     hit->u = part[(4 - at) % 3];
     hit->v = part[(5 - at) % 3];
     if (x.t >= tmin && isfinite(x.t)) hit->t = x.t;

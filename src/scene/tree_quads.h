@@ -8,14 +8,16 @@
 
 #include "scene.h"
 
+struct imp_tree_quad {
+    uint32_t corner[4]; /* Embree's indices, with a stride */
+    uint32_t first;     /* the triangle of the first half; the other is the next one */
+    uint32_t turned; /* j + 4 k: v0 is corner j of the first, v2 corner k of the second;
+                           k = 3: there is no second */
+};
 struct imp_tree_quads {
     size_t n;
     const float *positions; /* the mesh's */
-    uint32_t (*corner)[4];  /* [n] */
-    uint32_t *first; /* [n] the triangle of the first half; the other is the next one */
-    uint8_t
-        *turned; /* [n] j + 4 k: v0 is corner j of the first, v2 corner k of the second;
-                              k = 3: there is no second */
+    struct imp_tree_quad *quad;
 };
 /* Those of a mesh most of whose triangles are in pairs; *out is NULL of others. Those that are alone have
  * a second half without area, and a triangle without area is alone. False: out of memory. */
