@@ -104,9 +104,40 @@ static double extent(const struct imp__body_node *node)
 
 struct pairs {
     const struct imp__body_tree *a, *b;
+    double apart;
     imp__body_pair *work;
     void *payload;
 };
+
+struct box {
+    imp_v3 lo, hi;
+};
+static struct box box_of(const struct imp__body_triangle *f, double more)
+{
+    struct box box;
+    for (int k = 0; k < 3; k++) {
+        box.lo[k] = imp_min(imp_min(f->p[0][k], f->p[1][k]), f->p[2][k]) - more;
+        box.hi[k] = imp_max(imp_max(f->p[0][k], f->p[1][k]), f->p[2][k]) + more;
+    }
+    return box;
+}
+
+/* A triangle with those of a leaf, from `from` on. */
+static enum imp_status leaf_work(const struct pairs *x,
+                                 const struct imp__body_triangle *f, size_t from,
+                                 size_t till)
+{
+    const struct box own = box_of(f, x->apart);
+    for (size_t l = from; l < till; l++) {
+        const struct imp__body_triangle *g = &x->b->triangle[l];
+        const struct box other = box_of(g, 0);
+        bool apart = false;
+        for (int k = 0; k < 3; k++)
+            apart |= own.lo[k] > other.hi[k] || other.lo[k] > own.hi[k];
+        if (!apart) IMP_CHECKED(x->work(x->payload, f, g));
+    }
+    return IMP_OK;
+}
 
 static enum imp_status descend(const struct pairs *x, size_t i, size_t j)
 {
@@ -114,8 +145,7 @@ static enum imp_status descend(const struct pairs *x, size_t i, size_t j)
     if (are_apart(a, b)) return IMP_OK;
     if (a->second == 0 && b->second == 0) {
         for (size_t k = a->from; k < a->till; k++)
-            for (size_t l = b->from; l < b->till; l++)
-                IMP_CHECKED(x->work(x->payload, &x->a->triangle[k], &x->b->triangle[l]));
+            IMP_CHECKED(leaf_work(x, &x->a->triangle[k], b->from, b->till));
         return IMP_OK;
     }
     if (b->second == 0 || (a->second > 0 && extent(a) >= extent(b))) {
@@ -136,16 +166,15 @@ static enum imp_status descend_own(const struct pairs *x, size_t i)
         return descend(x, i + 1, a->second);
     }
     for (size_t k = a->from; k < a->till; k++)
-        for (size_t l = k + 1; l < a->till; l++)
-            IMP_CHECKED(x->work(x->payload, &x->a->triangle[k], &x->a->triangle[l]));
+        IMP_CHECKED(leaf_work(x, &x->a->triangle[k], k + 1, a->till));
     return IMP_OK;
 }
 
 enum imp_status imp__body_pairs(const struct imp__body_tree *a,
-                                const struct imp__body_tree *b, imp__body_pair *work,
-                                void *payload)
+                                const struct imp__body_tree *b, double apart,
+                                imp__body_pair *work, void *payload)
 {
-    const struct pairs x = {a, b, work, payload};
+    const struct pairs x = {a, b, apart, work, payload};
     if (a->n == 0 || b->n == 0) return IMP_OK;
     return a == b ? descend_own(&x, 0) : descend(&x, 0, 0);
 }

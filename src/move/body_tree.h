@@ -28,13 +28,13 @@ enum imp_status imp__body_tree_build(const struct imp_scene *scene,
                                      struct imp__body_tree *out);
 void imp__body_tree_free(imp_context *ctx, struct imp__body_tree *tree);
 
-/* Two triangles whose boxes meet. */
+/* Two triangles whose boxes meet, nearly. */
 typedef enum imp_status imp__body_pair(void *payload, const struct imp__body_triangle *f,
                                        const struct imp__body_triangle *g);
 /* All pairs of a triangle of `a` and one of `b`, which may be `a`, in an order that depends on these
- * alone. */
+ * alone, but for some that are further than `apart` from each other. */
 enum imp_status imp__body_pairs(const struct imp__body_tree *a,
-                                const struct imp__body_tree *b, imp__body_pair *work,
-                                void *payload);
+                                const struct imp__body_tree *b, double apart,
+                                imp__body_pair *work, void *payload);
 
 #endif

@@ -17,61 +17,88 @@ struct imp__edge_node {
     size_t second; /* its second child, the first is the next node; 0: a leaf */
 };
 
-/* Normals of the two faces, turned the same way round. False: the edge is a border, or has more
- * faces. It is a silhouette of a line r where r.a and r.b have different signs. */
-static bool normals(const struct imp__edges *edges, const struct imp__edge *e, imp_v3 *a,
-                    imp_v3 *b)
+/* Normals of the two faces, turned the same way round. It is a silhouette of a line r where r.a and r.b
+ * have different signs. */
+struct turned {
+    imp_v3 a, b;
+    bool two; /* else it is a border, or has more faces */
+};
+
+static struct turned normals(const struct imp__edges *edges, const struct imp__edge *e)
 {
     const struct imp__edge_face *f = &edges->face[e->first];
-    if (e->n_faces != 2) return false;
+    if (e->n_faces != 2) return (struct turned){.two = false};
     const imp_v3 along = imp__normalize(e->b - e->a);
-    *a = imp__cross(along, f[0].in);
-    *b = imp__cross(f[1].in, along);
-    if (imp__dot(*a, f[0].n) < 0) {
-        *a = -*a;
-        *b = -*b;
+    struct turned t = {imp__cross(along, f[0].in), imp__cross(f[1].in, along), true};
+    if (imp__dot(t.a, f[0].n) < 0) {
+        t.a = -t.a;
+        t.b = -t.b;
     }
-    return true;
+    return t;
 }
 
-static void node_bound(const struct imp__edges *edges, struct imp__edge_node *node)
+struct making {
+    struct imp__edge_tree *tree;
+    const struct turned *turned; /* of each edge */
+};
+
+/* A cone that has all normals, if any has. */
+static void cone_find(const struct making *x, struct imp__edge_node *node)
 {
-    imp_v3 lo = edges->edge[node->lo].a, hi = lo, sum = {0}, a, b;
-    bool any = true;
-    for (size_t k = node->lo; k < node->hi; k++) {
-        const struct imp__edge *e = &edges->edge[k];
-        for (int i = 0; i < 3; i++) {
-            lo[i] = imp_min(lo[i], imp_min(e->a[i], e->b[i]));
-            hi[i] = imp_max(hi[i], imp_max(e->a[i], e->b[i]));
-        }
-        if (normals(edges, e, &a, &b)) sum += a + b;
-        else any = false;
-    }
-    node->centre = (lo + hi) * 0.5;
-    node->radius = 0.5 * imp__length(hi - lo);
+    imp_v3 sum = {0};
+    bool all = true;
     node->cosine = -1;
-    if (!any || !(imp__length(sum) > 0)) return;
+    for (size_t k = node->lo; k < node->hi && all; k++) {
+        all = x->turned[k].two;
+        sum += x->turned[k].a + x->turned[k].b;
+    }
+    if (!all || !(imp__length(sum) > 0)) return;
     node->axis = imp__normalize(sum);
     double least = 1;
-    for (size_t k = node->lo; k < node->hi; k++) {
-        normals(edges, &edges->edge[k], &a, &b);
-        least = imp_min(least, imp__dot(node->axis, a));
-        least = imp_min(least, imp__dot(node->axis, b));
+    for (size_t k = node->lo; k < node->hi && least > 0; k++) {
+        least = imp_min(least, imp__dot(node->axis, x->turned[k].a));
+        least = imp_min(least, imp__dot(node->axis, x->turned[k].b));
     }
     node->cosine = least;
     node->sine = sqrt(imp_max(1 - least * least, 0.0));
 }
 
-/* Returns the node behind the last. */
-static size_t node_make(struct imp__edge_tree *t, size_t k, size_t lo, size_t hi)
+struct box {
+    imp_v3 lo, hi;
+};
+static void box_add(struct box *box, imp_v3 lo, imp_v3 hi)
 {
-    struct imp__edge_node *node = &t->node[k];
+    for (int i = 0; i < 3; i++) {
+        box->lo[i] = imp_min(box->lo[i], lo[i]);
+        box->hi[i] = imp_max(box->hi[i], hi[i]);
+    }
+}
+
+/* Returns the node behind the last. */
+static size_t node_make(const struct making *x, size_t k, size_t lo, size_t hi,
+                        struct box *box)
+{
+    struct imp__edge_node *node = &x->tree->node[k];
+    const struct imp__edge *edge = x->tree->edges->edge;
+    size_t next = k + 1;
     *node = (struct imp__edge_node){.lo = lo, .hi = hi};
-    node_bound(t->edges, node);
-    if (hi - lo <= LEAF) return k + 1;
-    const size_t half = lo + (hi - lo) / 2;
-    node->second = node_make(t, k + 1, lo, half);
-    return node_make(t, node->second, half, hi);
+    *box = (struct box){edge[lo].a, edge[lo].a};
+    if (hi - lo <= LEAF) {
+        for (size_t j = lo; j < hi; j++) {
+            box_add(box, edge[j].a, edge[j].a);
+            box_add(box, edge[j].b, edge[j].b);
+        }
+    } else {
+        const size_t half = lo + (hi - lo) / 2;
+        struct box second;
+        node->second = node_make(x, k + 1, lo, half, box);
+        next = node_make(x, node->second, half, hi, &second);
+        box_add(box, second.lo, second.hi);
+    }
+    node->centre = (box->lo + box->hi) * 0.5;
+    node->radius = 0.5 * imp__length(box->hi - box->lo);
+    cone_find(x, node);
+    return next;
 }
 
 enum imp_status imp__edge_tree_build(const struct imp__edges *edges,
@@ -79,10 +106,17 @@ enum imp_status imp__edge_tree_build(const struct imp__edges *edges,
 {
     *out = (struct imp__edge_tree){.ctx = edges->ctx, .edges = edges};
     if (edges->n == 0) return IMP_OK;
-    out->node = imp__alloc(edges->ctx, 2 * edges->n, sizeof *out->node);
-    if (!out->node) return imp__error(edges->ctx, IMP_E_NOMEM, "no memory for edges");
-    node_make(out, 0, 0, edges->n);
-    return IMP_OK;
+    out->node = imp__alloc_raw(edges->ctx, 2 * edges->n, sizeof *out->node);
+    struct turned *turned = imp__alloc_raw(edges->ctx, edges->n, sizeof *turned);
+    if (out->node && turned) {
+        struct box box;
+        for (size_t k = 0; k < edges->n; k++) turned[k] = normals(edges, &edges->edge[k]);
+        node_make(&(struct making){out, turned}, 0, 0, edges->n, &box);
+    }
+    imp__release(edges->ctx, turned);
+    return out->node && turned
+               ? IMP_OK
+               : imp__error(edges->ctx, IMP_E_NOMEM, "no memory for edges");
 }
 
 void imp__edge_tree_free(struct imp__edge_tree *tree)

@@ -1,74 +1,26 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Makes the list of edges (edges.h): the sides of all triangles, sorted by the line on which they
- * lie; along each line they are cut where one begins or ends, and what lies between two cuts is
- * one edge with the faces of all sides that cover it. */
+ * Makes the list of edges (edges.h): the sides of all triangles by the line on which they lie
+ * (edges_sides.h); along each line they are cut where one begins or ends, and what lies between two
+ * cuts is one edge with the faces of all sides that cover it. */
 #include "base/arguments.h"
 #include "base/context.h"
+#include "base/radix.h"
 #include "edges_seams.h"
+#include "edges_sides.h"
 #include "kind/sensor/receiver.h"
 #include <stdlib.h>
 
 #define NEAR 2e-6 /* of the scene's size: sides nearer to each other lie on each other */
 
-/* One side of a triangle. */
-struct side {
-    imp_v3 a, b;
-    double key;        /* the same for sides on one line, and with luck for no other */
-    double from, till; /* along the line that represents them */
-    size_t line;
-    struct imp__edge_face face;
-};
-
 struct building {
     imp_context *ctx;
     const struct imp_scene *scene;
-    imp_v3 middle;
-    double near, size;
-    size_t n, cap; /* sides */
-    struct side *side;
-    double *cut; /* [2 n] */
+    struct imp__sides sides;
+    double *cut; /* [2 sides] */
     size_t cap_edges, cap_laid, cap_faces;
     struct imp__edges *out;
 };
-
-/* Directions that no scene is aligned with: by the first a line gets its sense, by the second
- * the point of it that is nearest to the middle becomes a number. */
-static imp_v3 sense(void) { return imp__v3(0.5377, 0.6180, 0.5736); }
-static imp_v3 mark(void) { return imp__v3(-0.4423, 0.7071, -0.5515); }
-
-static void side_add(struct building *x, const struct imp__edge_face *face, imp_v3 p,
-                     imp_v3 q, imp_v3 apex)
-{
-    struct side *s = &x->side[x->n];
-    const bool turned = imp__dot(q - p, sense()) < 0;
-    s->a = turned ? q : p;
-    s->b = turned ? p : q;
-    const imp_v3 d = imp__normalize(s->b - s->a), r = s->a - x->middle;
-    const imp_v3 in = apex - s->a, across = in - d * imp__dot(in, d);
-    if (!(imp__length(s->b - s->a) > x->near) || !(imp__length(across) > 0)) return;
-    s->key = imp__dot(r - d * imp__dot(r, d), mark());
-    s->face = *face;
-    s->face.in = imp__normalize(across);
-    s->face.n = imp__normalize(imp__cross(q - p, apex - p));
-    x->n++;
-}
-
-static void body_add(struct building *x, const struct imp__body *body)
-{
-    const struct imp_shape *s = x->scene->shapes[body->shape];
-    struct imp_map map[2];
-    if (s->geometry != IMP_TRIANGLES) return;
-    if (body->place > 0) imp__place_map(x->scene, body->place, 0, &map[0], &map[1]);
-    for (size_t j = 0; j < s->triangles.n_triangles; j++) {
-        const struct imp__edge_face face = {
-            .shape = body->shape, .prim = (int)j, .place = body->place};
-        const struct imp__corners f = imp__corners_mapped(x->scene, body->shape, (int)j,
-                                                          body->place > 0 ? map : NULL);
-        for (int c = 0; c < 3; c++)
-            side_add(x, &face, f.p[c], f.p[(c + 1) % 3], f.p[(c + 2) % 3]);
-    }
-}
 
 static int64_t places(const struct imp_scene *scene)
 {
@@ -128,10 +80,9 @@ static enum imp_status refuse(const struct building *x, const struct imp_shape *
                       s->name, s->ops->name, why);
 }
 
-/* How many sides there are. */
-static enum imp_status sides_count(const struct building *x, size_t *n)
+/* Are all shapes some whose edges are known? */
+static enum imp_status bodies_allowed(const struct building *x)
 {
-    *n = 0;
     for (size_t k = 0; k < x->out->n_bodies; k++) {
         const struct imp__body *body = &x->out->body[k];
         const struct imp_shape *s = x->scene->shapes[body->shape];
@@ -141,87 +92,60 @@ static enum imp_status sides_count(const struct building *x, size_t *n)
         if (imp__moves_curved(x->scene, body->shape, 0))
             return refuse(x, s, "is stretched by its instance");
         if (s->geometry != IMP_TRIANGLES) return refuse(x, s, "is none");
-        *n += 3 * s->triangles.n_triangles;
     }
     return IMP_OK;
 }
 
-static enum imp_status sides_make(struct building *x)
+/* Room for what a closed surface has. What is not used is not written, and takes no memory. */
+static enum imp_status room_make(struct building *x)
 {
-    size_t n;
-    IMP_CHECKED(bodies_list(x));
-    IMP_CHECKED(sides_count(x, &n));
-    x->side = imp__alloc(x->ctx, n + 1, sizeof *x->side);
-    x->cut = imp__alloc(x->ctx, 2 * n + 1, sizeof *x->cut);
-    if (!x->side || !x->cut)
-        return imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
-    for (size_t k = 0; k < x->out->n_bodies; k++) body_add(x, &x->out->body[k]);
-    return IMP_OK;
+    const size_t n = x->sides.n;
+    x->cut = imp__alloc_raw(x->ctx, 2 * n, sizeof *x->cut);
+    x->cap_faces = n;
+    x->out->face = imp__alloc_raw(x->ctx, n, sizeof *x->out->face);
+    x->cap_edges = n / 2 + 1;
+    x->out->edge = imp__alloc_raw(x->ctx, x->cap_edges, sizeof *x->out->edge);
+    return x->cut && x->out->face && x->out->edge
+               ? IMP_OK
+               : imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
 }
 
-static int by_key(const void *a, const void *b)
-{
-    const struct side *x = a, *y = b;
-    if (x->key != y->key) return x->key < y->key ? -1 : 1;
-    if (x->face.shape != y->face.shape) return x->face.shape < y->face.shape ? -1 : 1;
-    if (x->face.place != y->face.place) return x->face.place < y->face.place ? -1 : 1;
-    return x->face.prim < y->face.prim ? -1 : x->face.prim > y->face.prim;
-}
-static int by_line(const void *a, const void *b)
-{
-    const struct side *x = a, *y = b;
-    if (x->line != y->line) return x->line < y->line ? -1 : 1;
-    return x->from != y->from ? (x->from < y->from ? -1 : 1) : by_key(a, b);
-}
 static int by_value(const void *a, const void *b)
 {
     const double x = *(const double *)a, y = *(const double *)b;
     return x < y ? -1 : x > y;
 }
 
-static double off_line(const struct side *line, imp_v3 p)
+static void cuts_sort(double *cut, size_t n)
 {
-    const imp_v3 d = imp__normalize(line->b - line->a), r = p - line->a;
-    return imp__length(r - d * imp__dot(r, d));
-}
-
-/* Sides on one line get its number: the first of them in the order of keys. */
-static void lines_find(struct building *x)
-{
-    /* A side's own length tells its direction to near/length, and with the way to the middle
-     * that moves the key. */
-    const double window = 1e-5 * x->size;
-    for (size_t k = 0; k < x->n; k++) x->side[k].line = SIZE_MAX;
-    for (size_t k = 0; k < x->n; k++) {
-        struct side *line = &x->side[k];
-        if (line->line != SIZE_MAX) continue;
-        const imp_v3 d = imp__normalize(line->b - line->a);
-        for (size_t j = k; j < x->n && x->side[j].key - line->key <= window; j++) {
-            struct side *s = &x->side[j];
-            if (s->line != SIZE_MAX || off_line(line, s->a) > x->near ||
-                off_line(line, s->b) > x->near)
-                continue;
-            s->line = k;
-            s->from = imp__dot(s->a - line->a, d);
-            s->till = imp__dot(s->b - line->a, d);
-        }
+    enum { FEW = 16 };
+    if (n > FEW) {
+        qsort(cut, n, sizeof *cut, by_value);
+        return;
+    }
+    for (size_t k = 1; k < n; k++) {
+        const double own = cut[k];
+        size_t j = k;
+        for (; j > 0 && cut[j - 1] > own; j--) cut[j] = cut[j - 1];
+        cut[j] = own;
     }
 }
 
-static enum imp_status edge_add(struct building *x, const struct side *first, size_t n,
-                                double from, double till)
+static enum imp_status edge_add(struct building *x, struct imp__side *const *side,
+                                size_t n, double from, double till)
 {
     struct imp__edges *out = x->out;
+    const double near = x->sides.near;
     const size_t before = out->n_faces;
-    const struct side *long_one = NULL;
+    const struct imp__side *long_one = NULL;
     for (size_t k = 0; k < n; k++) {
-        const struct side *s = &first[k];
-        if (s->from > from + x->near || s->till < till - x->near) continue;
+        const struct imp__side *s = side[k];
+        if (s->from > from + near || s->till < till - near) continue;
         struct imp__edge_face *more =
             imp__grow(x->ctx, out->face, &x->cap_faces, out->n_faces + 1, sizeof *more);
         if (!more) return imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
         out->face = more;
-        more[out->n_faces++] = s->face;
+        more[out->n_faces++] = imp__side_face(&x->sides, s);
         if (!long_one || s->till - s->from > long_one->till - long_one->from)
             long_one = s;
     }
@@ -235,32 +159,34 @@ static enum imp_status edge_add(struct building *x, const struct side *first, si
         imp__grow(x->ctx, out->edge, &x->cap_edges, out->n + 1, sizeof *more);
     if (!more) return imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
     out->edge = more;
-    const imp_v3 along =
-        (long_one->b - long_one->a) * (1 / (long_one->till - long_one->from));
+    const imp_v3 a = imp__side_a(long_one),
+                 along = (imp__side_b(long_one) - a) *
+                         (1 / (long_one->till - long_one->from));
     more[out->n++] = (struct imp__edge){
-        long_one->a + along * (imp_max(from, long_one->from) - long_one->from),
-        long_one->a + along * (imp_min(till, long_one->till) - long_one->from), before,
-        faces, faces == 4 && imp__edge_is_crossing(x->scene, own)};
+        a + along * (imp_max(from, long_one->from) - long_one->from),
+        a + along * (imp_min(till, long_one->till) - long_one->from), before, faces,
+        faces == 4 && imp__edge_is_crossing(x->scene, own)};
     return IMP_OK;
 }
 
 /* All edges of one line: between each cut and the next. */
-static enum imp_status line_cut(struct building *x, const struct side *first, size_t n)
+static enum imp_status line_cut(void *payload, struct imp__side *const *side, size_t n)
 {
+    struct building *x = payload;
+    const double near = x->sides.near;
     for (size_t k = 0; k < n; k++) {
-        x->cut[2 * k] = first[k].from;
-        x->cut[2 * k + 1] = first[k].till;
+        x->cut[2 * k] = side[k]->from;
+        x->cut[2 * k + 1] = side[k]->till;
     }
-    qsort(x->cut, 2 * n, sizeof *x->cut, by_value);
+    cuts_sort(x->cut, 2 * n);
     double from = x->cut[0];
     for (size_t k = 1; k < 2 * n; k++) {
-        if (!(x->cut[k] - from > x->near)) continue;
+        if (!(x->cut[k] - from > near)) continue;
         /* The sides that may cover it: sorted by their beginning. */
         size_t lo = 0, hi = 0;
-        while (hi < n && first[hi].from <= from + x->near) hi++;
-        while (lo < hi && first[lo].till < x->cut[k] - x->near) lo++;
-        const enum imp_status st = edge_add(x, first + lo, hi - lo, from, x->cut[k]);
-        if (st != IMP_OK) return st;
+        while (hi < n && side[hi]->from <= from + near) hi++;
+        while (lo < hi && side[lo]->till < x->cut[k] - near) lo++;
+        IMP_CHECKED(edge_add(x, side + lo, hi - lo, from, x->cut[k]));
         from = x->cut[k];
     }
     return IMP_OK;
@@ -288,8 +214,8 @@ static enum imp_status seam_take(struct building *x, const struct imp__seam *sea
 static enum imp_status seams_add(struct building *x)
 {
     struct imp__seams seams;
-    IMP_CHECKED(imp__seams_find(x->scene, x->out->body, x->out->n_bodies, x->near,
-                                x->size, &seams));
+    IMP_CHECKED(imp__seams_find(x->scene, x->out->body, x->out->n_bodies, x->sides.near,
+                                x->sides.size, &seams));
     enum imp_status st = IMP_OK;
     for (size_t k = 0; k < seams.n && st == IMP_OK; k++)
         st = seam_take(x, &seams.seam[k]);
@@ -299,62 +225,83 @@ static enum imp_status seams_add(struct building *x)
 
 /* ---- Order of the list --------------------------------------------------------------- */
 
-/* An edge and where the middle of it is on Morton's curve through the scene's box. */
-struct placed {
-    uint64_t code;
-    struct imp__edge edge;
-};
-
-static int by_code(const void *a, const void *b)
+/* Where the middle of an edge is on Morton's curve through the scene's box. */
+static uint64_t code_of(const struct building *x, const struct imp__edge *e)
 {
-    const struct placed *x = a, *y = b;
-    if (x->code != y->code) return x->code < y->code ? -1 : 1;
-    return x->edge.first < y->edge.first ? -1 : x->edge.first > y->edge.first;
+    const imp_v3 r = (e->a + e->b) * 0.5 - x->sides.middle;
+    uint32_t cell[3];
+    uint64_t code = 0;
+    for (int i = 0; i < 3; i++)
+        cell[i] = (uint32_t)(imp_clamp(r[i] / x->sides.size + 0.5, 0.0, 1.0) * 1048575);
+    for (int bit = 19; bit >= 0; bit--)
+        for (int i = 0; i < 3; i++) code = code << 1 | (cell[i] >> bit & 1);
+    return code;
 }
 
+static void faces_move(const struct imp__edges *out, struct imp__edge_face *to, size_t *n,
+                       struct imp__edge *e)
+{
+    for (int k = 0; k < e->n_faces; k++)
+        to[*n + (size_t)k] = out->face[e->first + (size_t)k];
+    e->first = *n;
+    *n += (size_t)e->n_faces;
+}
+
+/* Edges along the curve, and their faces as they are. */
 static enum imp_status edges_order(struct building *x)
 {
     struct imp__edges *out = x->out;
-    struct placed *placed = imp__alloc(x->ctx, out->n + 1, sizeof *placed);
-    if (!placed) return imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
-    for (size_t k = 0; k < out->n; k++) {
-        const imp_v3 r = (out->edge[k].a + out->edge[k].b) * 0.5 - x->middle;
-        placed[k].edge = out->edge[k];
-        for (int bit = 19; bit >= 0; bit--)
-            for (int i = 0; i < 3; i++) {
-                const double at = imp_clamp(r[i] / x->size + 0.5, 0.0, 1.0);
-                const uint32_t cell = (uint32_t)(at * 1048575);
-                placed[k].code = placed[k].code << 1 | (cell >> bit & 1);
-            }
+    const size_t n = out->n;
+    struct imp_keyed *keyed = imp__alloc_raw(x->ctx, 2 * n, sizeof *keyed);
+    struct imp__edge *edge = imp__alloc_raw(x->ctx, n, sizeof *edge);
+    struct imp__edge_face *face = imp__alloc_raw(x->ctx, out->n_faces, sizeof *face);
+    const bool fits = keyed && edge && face;
+    for (size_t k = 0; k < n && fits; k++)
+        keyed[k] = (struct imp_keyed){code_of(x, &out->edge[k]), k};
+    if (fits) {
+        size_t n_faces = 0;
+        imp__radix_sort(keyed, n, keyed + n);
+        for (size_t k = 0; k < n; k++) {
+            edge[k] = out->edge[keyed[k].value];
+            faces_move(out, face, &n_faces, &edge[k]);
+        }
+        for (size_t k = 0; k < out->n_laid; k++)
+            faces_move(out, face, &n_faces, &out->laid[k]);
+        imp__release(x->ctx, out->edge);
+        imp__release(x->ctx, out->face);
+        out->edge = edge;
+        out->face = face;
+    } else {
+        imp__release(x->ctx, edge);
+        imp__release(x->ctx, face);
     }
-    qsort(placed, out->n, sizeof *placed, by_code);
-    for (size_t k = 0; k < out->n; k++) out->edge[k] = placed[k].edge;
-    imp__release(x->ctx, placed);
-    return IMP_OK;
+    imp__release(x->ctx, keyed);
+    return fits ? IMP_OK : imp__error(x->ctx, IMP_E_NOMEM, "no memory for edges");
 }
 
 enum imp_status imp__edges_build(const struct imp_scene *scene, enum imp__edges_of of,
                                  struct imp__edges *out)
 {
     enum imp_status st = IMP_OK;
-    struct building x = {.ctx = scene->ctx, .scene = scene, .out = out};
+    const double size = imp__length(scene->hi - scene->lo);
+    struct building x = {.ctx = scene->ctx,
+                         .scene = scene,
+                         .sides = {.scene = scene,
+                                   .middle = (scene->lo + scene->hi) * 0.5,
+                                   .near = NEAR * size,
+                                   .size = size},
+                         .out = out};
     *out = (struct imp__edges){.ctx = scene->ctx, .of = of};
-    x.middle = (scene->lo + scene->hi) * 0.5;
-    x.size = imp__length(scene->hi - scene->lo);
-    x.near = NEAR * x.size;
-    IMP_TRY(sides_make(&x));
-    qsort(x.side, x.n, sizeof *x.side, by_key);
-    lines_find(&x);
-    qsort(x.side, x.n, sizeof *x.side, by_line);
-    for (size_t k = 0, n; k < x.n; k += n) {
-        for (n = 1; k + n < x.n && x.side[k + n].line == x.side[k].line;) n++;
-        IMP_TRY(line_cut(&x, &x.side[k], n));
-    }
+    IMP_TRY(bodies_list(&x));
+    IMP_TRY(bodies_allowed(&x));
+    IMP_TRY(imp__sides_make(&x.sides, out->body, out->n_bodies));
+    IMP_TRY(room_make(&x));
+    IMP_TRY(imp__lines_find(&x.sides, line_cut, &x));
     IMP_TRY(seams_add(&x));
     IMP_TRY(edges_order(&x));
     IMP_TRY(imp__arcs_find(scene, out));
 out:
-    imp__release(x.ctx, x.side);
+    imp__sides_free(&x.sides);
     imp__release(x.ctx, x.cut);
     if (st != IMP_OK) imp__edges_free(out);
     return st;

@@ -12,6 +12,10 @@
 #include "body_tree.h"
 #include <stdlib.h>
 
+/* Contacts: triangles whose boxes are so far from each other do not touch, as near as they are taken
+ * to. */
+#define APART 4
+
 /* A side of a triangle that lies in another one, as far as it does. */
 struct lying {
     imp_v3 a, b;
@@ -268,7 +272,8 @@ static enum imp_status bodies_work(struct seeking *x, size_t f, size_t g)
         if (x->tree[body].n == 0)
             IMP_CHECKED(imp__body_tree_build(x->scene, &x->body[body], &x->tree[body]));
     }
-    return imp__body_pairs(&x->tree[x->f], &x->tree[x->g], pair_work, x);
+    return imp__body_pairs(&x->tree[x->f], &x->tree[x->g], APART * x->contact, pair_work,
+                           x);
 }
 
 static size_t boxes_make(const struct seeking *x, size_t n_bodies, struct boxed *box)

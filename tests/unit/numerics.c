@@ -3,6 +3,7 @@
  * Distributions, quadrature and small linear algebra against published or exact numbers.
  */
 #include "base/number.h"
+#include "base/radix.h"
 #include "imp_tap.h"
 #include "math/exp.h"
 #include "math/linalg.h"
@@ -232,9 +233,36 @@ static void decimals(void)
     tap_ok(whole == 0 && n > 5000, "whole ones as strtoll # %d of %d differ", whole, n);
 }
 
+/* Of doubles of all sizes and both signs, some of them equal, and both zeros. */
+static void keys(void)
+{
+    enum { N = 20000 };
+    static double x[N];
+    static struct imp_keyed list[N], spare[N];
+    int wrong = 0, equal = 0, changed = 0;
+    for (uint64_t k = 0; k < N; k++) {
+        const struct imp_key key = imp__key(7, 0, k);
+        x[k] = (imp__u01(key, 0) - 0.5) * pow(10, floor(600 * imp__u01(key, 1)) - 300);
+        if (imp__u01(key, 2) < 0.3) x[k] = floor(20 * imp__u01(key, 3)) - 10;
+        if (x[k] == 0 && k % 2) x[k] = -0.0;
+        list[k] = (struct imp_keyed){imp__radix_key(x[k]), k};
+        changed += imp__radix_double(list[k].key) != x[k];
+    }
+    imp__radix_sort(list, N, spare);
+    for (int k = 1; k < N; k++) {
+        const size_t a = list[k - 1].value, b = list[k].value;
+        wrong += x[a] > x[b] || (x[a] == x[b] && a >= b);
+        equal += x[a] == x[b];
+    }
+    tap_ok(wrong == 0 && equal > N / 5, "radix sort # %d of %d misplaced, %d equal",
+           wrong, N, equal);
+    tap_ok(changed == 0, "doubles of keys");
+}
+
 int main(void)
 {
     angles();
+    keys();
     decimals();
     exponentials();
     distributions();
