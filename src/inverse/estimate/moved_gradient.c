@@ -137,7 +137,7 @@ static double counts_at(const void *payload, const struct imp__flux *f, double *
 /* Costs, in those of a draw from an edge that the camera sees: of the pilot for a draw of each kind that
  * is said to follow, and of an edge on the list. */
 #define PILOT 0.4
-#define EDGE  2
+#define EDGE  0.6
 
 enum imp_status imp__moved_learn(struct imp__moved_gradient *m, int spp)
 {
