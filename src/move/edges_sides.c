@@ -1,21 +1,23 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Sides are sorted by keys, then made again in that order; the first of them that has no line yet is
+ * Sides are sorted by keys, in whose order they are put then; the first of them that has no line yet is
  * one, and takes those that lie on it (edges_sides.h). */
 #include "edges_sides.h"
 #include "base/arguments.h"
 #include "base/context.h"
 #include "base/radix.h"
 #include <stdlib.h>
+#include <string.h>
 
 /* Directions that no scene is aligned with: by the first a line gets its sense, by the second
  * the point of it that is nearest to the middle becomes a number. */
 static imp_v3 sense(void) { return imp__v3(0.5377, 0.6180, 0.5736); }
 static imp_v3 mark(void) { return imp__v3(-0.4423, 0.7071, -0.5515); }
 
-/* Which side it is. */
+/* Which side it is, and where. */
 struct name {
     uint32_t body, prim, corner;
+    double a[3], b[3];
 };
 
 /* A side with its triangle. */
@@ -114,7 +116,11 @@ static void names_make(struct imp__sides *x, struct name *name, struct imp_keyed
                 const struct ends e = ends_of(&f, c);
                 double key;
                 if (!key_find(x, &e, &key)) continue;
-                name[x->n] = (struct name){(uint32_t)k, (uint32_t)j, (uint32_t)c};
+                name[x->n] = (struct name){(uint32_t)k,
+                                           (uint32_t)j,
+                                           (uint32_t)c,
+                                           {e.a[0], e.a[1], e.a[2]},
+                                           {e.b[0], e.b[1], e.b[2]}};
                 keyed[x->n] = (struct imp_keyed){imp__radix_key(key), x->n};
                 x->n++;
             }
@@ -122,19 +128,14 @@ static void names_make(struct imp__sides *x, struct name *name, struct imp_keyed
     }
 }
 
-static void side_fill(const struct imp__sides *x, const struct name *name, uint64_t key,
-                      struct imp__side *out)
+static void side_fill(const struct name *name, uint64_t key, struct imp__side *out)
 {
-    const struct imp__corners f = corners_of(x, name->body, name->prim);
-    const struct ends e = ends_of(&f, (int)name->corner);
     *out = (struct imp__side){.key = imp__radix_double(key),
                               .body = name->body,
                               .prim = name->prim,
                               .corner = (uint8_t)name->corner};
-    for (int i = 0; i < 3; i++) {
-        out->a[i] = e.a[i];
-        out->b[i] = e.b[i];
-    }
+    memcpy(out->a, name->a, sizeof out->a);
+    memcpy(out->b, name->b, sizeof out->b);
 }
 
 enum imp_status imp__sides_make(struct imp__sides *x, const struct imp__body *body,
@@ -154,7 +155,7 @@ enum imp_status imp__sides_make(struct imp__sides *x, const struct imp__body *bo
     x->side = imp__alloc_raw(ctx, x->n, sizeof *x->side);
     if (!x->side) IMP_TRY(no_memory(x));
     for (size_t k = 0; k < x->n; k++)
-        side_fill(x, &name[keyed[k].value], keyed[k].key, &x->side[k]);
+        side_fill(&name[keyed[k].value], keyed[k].key, &x->side[k]);
 out:
     imp__release(ctx, name);
     imp__release(ctx, keyed);

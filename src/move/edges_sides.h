@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The sides of all triangles, and the lines on which they lie: those on one line have nearly one key. A
- * side is kept without what can be read from its triangle again, since there are many. */
+ * side has no face, which can be made of its triangle again, since there are many. */
 #ifndef IMP_MOVE_EDGES_SIDES_H
 #define IMP_MOVE_EDGES_SIDES_H
 
