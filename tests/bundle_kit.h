@@ -197,7 +197,8 @@ static int swept(struct imp_tracer tracer, int *some)
         wrong += walk[0].n != walk[1].n;
         for (int i = 0; i < 2; i++) {
             imp__walk_sweep(&tracer, &walk[i], Q, &to[i][0].sink);
-            imp__walk_sweep_both(&tracer, &walk[i], P, Q, &to[i][1].sink, &to[i][2].sink);
+            const struct imp_sink_pair pair = {&to[i][1].sink, &to[i][2].sink, NULL};
+            imp__walk_sweep_both(&tracer, &walk[i], P, Q, &pair);
         }
         imp__arena_rewind(&alone, (struct imp_arena_mark){0});
     }

@@ -112,12 +112,24 @@ const struct imp_shape_lanes *imp__shape_lanes(const struct imp_shape *s);
 
 /* ---- Textures ---------------------------------------------------------------------------- */
 
+/* What the derivative of a value goes to: of lane k the weights [n] times it to as many numbers of its
+ * parameter, as of imp_sink.add, from its elements [n] on. */
+struct imp_wide_texels {
+    imp_wide element[4], weight[4];
+    int32_t param[IMP_WIDE_LANES]; /* < 0: to none */
+    int8_t channels[IMP_WIDE_LANES];
+    int n;
+};
+
 struct imp_texture_lanes {
     bool (*covers)(const struct imp_texture *t);
     /* imp_texture_ops.eval in colours, of shapes that are not looked up by triangle; c[3] is
      * anything. */
     void (*eval)(const struct imp_texture *t, const imp_wide uv[2], bool scalar,
                  struct imp_wide_color *value);
+    /* imp_texture_ops.scatter, likewise. False: it has no such form. */
+    bool (*texels)(const struct imp_texture *t, const imp_wide uv[2], bool scalar,
+                   struct imp_wide_texels *out);
 };
 /* NULL: this texture has none. */
 const struct imp_texture_lanes *imp__texture_lanes(const struct imp_texture *t);
@@ -145,11 +157,11 @@ struct imp_bsdf_lanes {
                          const struct imp_wide_color *in, const imp_wide3 *wo,
                          const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
                          struct imp_wide_color *f);
-    /* imp_bsdf_ops.eval_d, of kinds with smooth lobes alone; d [n_in]. False: this one has none. NULL: none
-     * has. Not called where an input is the luminance or a component of another. */
+    /* imp_bsdf_ops.eval_d; d [n_in]. False: this one has none. NULL: none has. Not called where an
+     * input is a component of another. */
     bool (*eval_d)(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                   const imp_wide3 *wo, const imp_wide3 *wi, int colors,
-                   struct imp_wide_color *d);
+                   const imp_wide3 *wo, const imp_wide3 *wi, const imp_wide_lobe *lobe,
+                   int colors, struct imp_wide_color *d);
     /* imp_bsdf_ops.index_ratio, of kinds that have one. */
     imp_wide (*index_ratio)(const struct imp_bsdf *b, const struct imp_wide_color *in,
                             const imp_wide3 *wo, const imp_wide3 *wi,

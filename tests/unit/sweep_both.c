@@ -58,7 +58,8 @@ static void compare(const char *file, const char *more, enum imp_color_mode mode
             imp__walk_trace(&tracer, &arena, 7 * (x % SIDE), 7 * (x / SIDE), k, &walk);
             imp__walk_sweep(&tracer, &walk, P, &one.sink);
             imp__walk_sweep(&tracer, &walk, E, &two.sink);
-            imp__walk_sweep_both(&tracer, &walk, P, E, &both.sink, &second.sink);
+            imp__walk_sweep_both(&tracer, &walk, P, E,
+                                 &(struct imp_sink_pair){&both.sink, &second.sink, NULL});
             imp__arena_rewind(&arena, (struct imp_arena_mark){0});
         }
     for (int k = 0; k < PARAMS; k++) {

@@ -27,9 +27,8 @@ enum imp_status imp__tally_create(imp_context *ctx, const struct imp_active *act
     } else if (!imp__tally_table_grow(&t)) {
         return imp__error(ctx, IMP_E_NOMEM, "no memory for gradients");
     }
-    imp__tally_sinks(&t);
     *out = t;
-    out->errors.of = out;
+    imp__tally_sinks(out);
     return IMP_OK;
 }
 

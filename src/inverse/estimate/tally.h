@@ -41,6 +41,7 @@ struct imp_tally {
         struct imp_sink sink; /* first */
         struct imp_tally *of;
     } errors;
+    struct imp_sink_pair both; /* sink and errors.sink */
     imp_context *ctx;
     const struct imp_active *active;
     int lanes; /* of what sweeps bring: 1, 3 or 4 */
@@ -72,12 +73,12 @@ struct imp_tally {
     double rays; /* of the tile's walks: one to each vertex, and one from it to a light */
 };
 
-/* R: replicates of pixels that share walks; 0: of others. *out is to stay where it is: `errors` refers
- * to it. */
+/* R: replicates of pixels that share walks; 0: of others. *out is to stay where it is: `errors` and
+ * `both` refer to it. */
 enum imp_status imp__tally_create(imp_context *ctx, const struct imp_active *active,
                                   int lanes, int R, struct imp_tally *out);
 void imp__tally_destroy(struct imp_tally *t);
-/* tally_add.c: both sinks; a larger table, or the first one. False: no memory. */
+/* tally_add.c: the sinks; a larger table, or the first one. False: no memory. */
 void imp__tally_sinks(struct imp_tally *t);
 bool imp__tally_table_grow(struct imp_tally *t);
 /* Between tiles. */

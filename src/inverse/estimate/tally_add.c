@@ -49,6 +49,13 @@ static void error_dense(struct imp_sink *sink, int param, size_t element, int ch
     const struct imp_tally *t = of_errors(sink);
     dense_to(t, t->error, param, element, channels, bar);
 }
+static void both_dense(const struct imp_sink_pair *to, int param, size_t element,
+                       int channels, const imp_spec *bar, const imp_spec *other)
+{
+    const struct imp_tally *t = (const struct imp_tally *)to->first;
+    dense_to(t, t->batch, param, element, channels, bar);
+    dense_to(t, t->error, param, element, channels, other);
+}
 static void add_dense_tied(struct imp_sink *sink, int param, size_t element, int channels,
                            const imp_spec *bar)
 {
@@ -180,8 +187,9 @@ static inline void entry_to(struct imp_tally *t, size_t k, bool single, bool err
 }
 
 /* The first addition of a pixel to an entry, which the tile may not have yet. */
-static __attribute__((noinline)) void
-add_first(struct imp_tally *t, uint32_t key, bool single, bool error, const imp_spec *bar)
+static __attribute__((noinline)) void add_first(struct imp_tally *t, uint32_t key,
+                                                bool single, const imp_spec *bar,
+                                                const imp_spec *other)
 {
     const struct imp__tally_slot *s = slot_of(t, key, single);
     size_t k = s->entry;
@@ -191,20 +199,26 @@ add_first(struct imp_tally *t, uint32_t key, bool single, bool error, const imp_
         return;
     }
     *(single ? &t->singles[k].touched : &t->triples[k].touched) = true;
-    entry_to(t, k, single, error, bar);
+    if (bar) entry_to(t, k, single, false, bar);
+    if (other) entry_to(t, k, single, true, other);
 }
 
+/* bar NULL: nothing to the sums; other NULL: nothing to those of errors. */
 static inline __attribute__((always_inline)) void add_entry(struct imp_tally *t,
                                                             size_t at, bool single,
-                                                            const bool error,
-                                                            const imp_spec *bar)
+                                                            const imp_spec *bar,
+                                                            const imp_spec *other)
 {
     const uint32_t key = (uint32_t)at;
     const struct imp__tally_slot *s = slot_of(t, key, single);
-    if (imp_likely(s->tag != 0) &&
-        imp_likely(single ? t->singles[s->entry].touched : t->triples[s->entry].touched))
-        entry_to(t, s->entry, single, error, bar);
-    else add_first(t, key, single, error, bar);
+    if (imp_unlikely(s->tag == 0) ||
+        imp_unlikely(single ? !t->singles[s->entry].touched
+                            : !t->triples[s->entry].touched)) {
+        add_first(t, key, single, bar, other);
+        return;
+    }
+    if (bar) entry_to(t, s->entry, single, false, bar);
+    if (other) entry_to(t, s->entry, single, true, other);
 }
 
 static void add_hashed(struct imp_sink *sink, int param, size_t element, int channels,
@@ -212,14 +226,21 @@ static void add_hashed(struct imp_sink *sink, int param, size_t element, int cha
 {
     struct imp_tally *t = (struct imp_tally *)sink;
     const int64_t base = t->active->base[param];
-    if (base >= 0) add_entry(t, (size_t)base + element, channels != 3, false, bar);
+    if (base >= 0) add_entry(t, (size_t)base + element, channels != 3, bar, NULL);
 }
 static void error_hashed(struct imp_sink *sink, int param, size_t element, int channels,
                          const imp_spec *bar)
 {
     struct imp_tally *t = of_errors(sink);
     const int64_t base = t->active->base[param];
-    if (base >= 0) add_entry(t, (size_t)base + element, channels != 3, true, bar);
+    if (base >= 0) add_entry(t, (size_t)base + element, channels != 3, NULL, bar);
+}
+static void both_hashed(const struct imp_sink_pair *to, int param, size_t element,
+                        int channels, const imp_spec *bar, const imp_spec *other)
+{
+    struct imp_tally *t = (struct imp_tally *)to->first;
+    const int64_t base = t->active->base[param];
+    if (base >= 0) add_entry(t, (size_t)base + element, channels != 3, bar, other);
 }
 
 /* Where some values are tied to others. */
@@ -233,8 +254,9 @@ static void hashed_tied_to(struct imp_tally *t, int param, size_t element, int c
         tied[c] = (*bar)[c] *
                   imp__active_slope(t->active, param, element + (single ? 0 : (size_t)c));
     const bool one = t->active->tied[param].factor != NULL;
-    add_entry(t, imp__active_at(t->active, param, element), single || one, error,
-              one && !single ? &(imp_spec){tied[0] + tied[1] + tied[2]} : &tied);
+    if (one && !single) tied = (imp_spec){tied[0] + tied[1] + tied[2]};
+    add_entry(t, imp__active_at(t->active, param, element), single || one,
+              error ? NULL : &tied, error ? &tied : NULL);
 }
 static void add_hashed_tied(struct imp_sink *sink, int param, size_t element,
                             int channels, const imp_spec *bar)
@@ -251,6 +273,11 @@ static void error_hashed_tied(struct imp_sink *sink, int param, size_t element,
 
 void imp__tally_sinks(struct imp_tally *t)
 {
+    t->errors.of = t;
+    t->both = (struct imp_sink_pair){&t->sink, &t->errors.sink,
+                                     t->active->tied ? NULL
+                                     : t->dense      ? both_dense
+                                                     : both_hashed};
     if (t->active->tied) {
         t->sink.add = t->dense ? add_dense_tied : add_hashed_tied;
         t->errors.sink.add = t->dense ? error_dense_tied : error_hashed_tied;

@@ -131,9 +131,7 @@ static void sets_sweep(const struct replicate *r, const struct imp_walk *walks,
             error /= imp__spec(end - first);
         }
         for (int i = first; i < end; i++)
-            if (E)
-                imp__walk_sweep_both(tracer, &walks[i], mean, error, &r->tally->sink,
-                                     &r->tally->errors.sink);
+            if (E) imp__walk_sweep_both(tracer, &walks[i], mean, error, &r->tally->both);
             else imp__walk_sweep(tracer, &walks[i], mean, &r->tally->sink);
     }
     if (E) imp__tally_error(r->tally);

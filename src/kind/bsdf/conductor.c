@@ -102,5 +102,24 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
                             imp__wide(1), imp__wide(0));
 }
 
-const struct imp_bsdf_lanes imp__conductor_lanes = {.sample = sample_lanes,
-                                                    .pdf_eval = pdf_eval_lanes};
+static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                         const imp_wide3 *wo, const imp_wide3 *wi,
+                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
+{
+    const imp_wide zero = imp__wide(0);
+    const imp_wide_truth here = (*lobe == (imp_wide_lobe){0}) & (wo->z > zero);
+    (void)b, (void)wi;
+    for (int c = 0; c < colors; c++) {
+        imp_wide F_eta, F_k;
+        const imp_wide tint = in[TINT].c[c],
+                       F = IMP_WIDE_OF(imp__conductor_d)(wo->z, in[ETA].c[c], in[K].c[c],
+                                                         &F_eta, &F_k);
+        d[TINT].c[c] = imp__wide_choose(here, F, zero);
+        d[ETA].c[c] = imp__wide_choose(here, F_eta * tint, zero);
+        d[K].c[c] = imp__wide_choose(here, F_k * tint, zero);
+    }
+    return true;
+}
+
+const struct imp_bsdf_lanes imp__conductor_lanes = {
+    .sample = sample_lanes, .pdf_eval = pdf_eval_lanes, .eval_d = eval_d_lanes};

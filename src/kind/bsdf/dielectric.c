@@ -166,6 +166,23 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
         f->c[c] = imp__wide_choose(reflects, in[TINT_R].c[c], in[TINT_T].c[c]) * of;
     return imp__wide_choose((wo->z != zero) & ~imp__is_smooth(*lobe), chance, zero);
 }
+static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                         const imp_wide3 *wo, const imp_wide3 *wi,
+                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
+{
+    imp_wide cos_t, eta_t;
+    const imp_wide zero = imp__wide(0);
+    (void)b, (void)wi;
+    const imp_wide F = IMP_WIDE_OF(imp__dielectric)(wo->z, in[ETA].c[0], &cos_t, &eta_t);
+    const imp_wide_truth there = wo->z != zero;
+    for (int c = 0; c < colors; c++) {
+        d[TINT_R].c[c] = imp__wide_choose(there & is_lobe(lobe, REFLECT), F, zero);
+        d[TINT_T].c[c] = imp__wide_choose(there & is_lobe(lobe, REFRACT),
+                                          (1 - F) / (eta_t * eta_t), zero);
+        d[ETA].c[c] = zero;
+    }
+    return true;
+}
 static imp_wide index_ratio_lanes(const struct imp_bsdf *b,
                                   const struct imp_wide_color *in, const imp_wide3 *wo,
                                   const imp_wide3 *wi, const imp_wide_lobe *lobe)
@@ -177,5 +194,7 @@ static imp_wide index_ratio_lanes(const struct imp_bsdf *b,
                             imp__wide(1));
 }
 
-const struct imp_bsdf_lanes imp__dielectric_lanes = {
-    .sample = sample_lanes, .pdf_eval = pdf_eval_lanes, .index_ratio = index_ratio_lanes};
+const struct imp_bsdf_lanes imp__dielectric_lanes = {.sample = sample_lanes,
+                                                     .pdf_eval = pdf_eval_lanes,
+                                                     .eval_d = eval_d_lanes,
+                                                     .index_ratio = index_ratio_lanes};

@@ -17,6 +17,28 @@ static inline real WIDE(imp__dielectric_from)(real c, real e, real *cos_t)
     return choose(passes, 0.5 * (a * a + b * b), number(1));
 }
 
+/* Likewise, with derivatives by c and e. */
+static inline real WIDE(imp__dielectric_d)(real c, real e, real *d_c, real *d_e)
+{
+    const real zero = number(0), one = number(1);
+    const real ct2 = 1 - (1 - c * c) / (e * e);
+    const truth passes = ct2 > zero;
+    const real t = root_of(choose(passes, ct2, one)), s = c + e * t, p = t + e * c;
+    const real a = (c - e * t) / s, b = (t - e * c) / p;
+    const real dt[2] = {c / (e * e * t), (1 - c * c) / (e * e * e * t)}; /* by c, e */
+    const real dc[2] = {one, zero}, de[2] = {zero, one};
+    real d[2];
+    for (int k = 0; k < 2; k++) {
+        const real et = e * dt[k] + de[k] * t, ec = e * dc[k] + de[k] * c;
+        const real da = ((dc[k] - et) - a * (dc[k] + et)) / s;
+        const real db = ((dt[k] - ec) - b * (dt[k] + ec)) / p;
+        d[k] = choose(passes, a * da + b * db, zero);
+    }
+    *d_c = d[0];
+    *d_e = d[1];
+    return choose(passes, 0.5 * (a * a + b * b), one);
+}
+
 static inline real WIDE(imp__dielectric)(real c, real eta, real *cos_t, real *eta_t)
 {
     const real zero = number(0), one = number(1);

@@ -92,10 +92,10 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
 }
 
 static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                         const imp_wide3 *wo, const imp_wide3 *wi, int colors,
-                         struct imp_wide_color *d)
+                         const imp_wide3 *wo, const imp_wide3 *wi,
+                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
 {
-    (void)b, (void)in;
+    (void)b, (void)in, (void)lobe;
     const imp_wide p = imp__lamberts(wo, wi);
     for (int c = 0; c < colors; c++) d[RHO].c[c] = p;
     return true;

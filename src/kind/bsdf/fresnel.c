@@ -21,21 +21,7 @@ double imp__fresnel_dielectric(double c, double eta, double *cos_t, double *eta_
 
 double imp__fresnel_dielectric_d(double c, double e, double *d_c, double *d_e)
 {
-    const double ct2 = 1 - (1 - c * c) / (e * e);
-    *d_c = *d_e = 0;
-    if (!(ct2 > 0)) return 1;
-    const double t = sqrt(ct2), s = c + e * t, p = t + e * c;
-    const double a = (c - e * t) / s, b = (t - e * c) / p;
-    const double dt[2] = {c / (e * e * t), (1 - c * c) / (e * e * e * t)}; /* by c, e */
-    double *const out[2] = {d_c, d_e};
-    for (int k = 0; k < 2; k++) {
-        const double dc = k == 0, de = k == 1;
-        const double et = e * dt[k] + de * t, ec = e * dc + de * c;
-        const double da = ((dc - et) - a * (dc + et)) / s;
-        const double db = ((dt[k] - ec) - b * (dt[k] + ec)) / p;
-        *out[k] = a * da + b * db;
-    }
-    return 0.5 * (a * a + b * b);
+    return imp__dielectric_d_1(c, e, d_c, d_e);
 }
 
 /* int_0^1 2 c F(c, n) dc for n >= 1, and its derivative (Walsh, Dept. Sci. Ind. Res.

@@ -211,5 +211,36 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
                             zero);
 }
 
-const struct imp_bsdf_lanes imp__plastic_lanes = {.sample = sample_lanes,
-                                                  .pdf_eval = pdf_eval_lanes};
+static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                         const imp_wide3 *wo, const imp_wide3 *wi,
+                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
+{
+    const struct plastic *p = b->self;
+    const imp_wide zero = imp__wide(0), one = imp__wide(1), eta = in[ETA].c[0];
+    imp_wide d_c, dFo, dFi;
+    double dr_de;
+    const double r = imp__fresnel_diffuse(1 / eta[0], &dr_de);
+    const imp_wide Fo = IMP_WIDE_OF(imp__dielectric_d)(wo->z, eta, &d_c, &dFo),
+                   Fi = IMP_WIDE_OF(imp__dielectric_d)(wi->z, eta, &d_c, &dFi);
+    const imp_wide_truth above = wo->z > zero,
+                         mirrors = above & (*lobe == (imp_wide_lobe){0} + MIRROR),
+                         base = imp__fronts(wo, wi) & imp__is_smooth(*lobe);
+    const imp_wide inv2 = 1 / (eta * eta), lambert = imp__lamberts(wo, wi) * inv2,
+                   T = (1 - Fo) * (1 - Fi);
+    const imp_wide through = T * lambert, again = dr_de * inv2 * T * lambert,
+                   by_eta = lambert * (-dFo * (1 - Fi) - dFi * (1 - Fo) - 2 * T / eta);
+    for (int c = 0; c < colors; c++) {
+        const imp_wide rho = in[DIFFUSE].c[c], k = p->nonlinear ? rho : one;
+        const imp_wide q = 1 / (1 - k * r), d_rho = p->nonlinear ? q * q : q,
+                       d_r = k * rho * q * q;
+        d[DIFFUSE].c[c] = imp__wide_choose(base, d_rho * through, zero);
+        d[TINT].c[c] = imp__wide_choose(mirrors, Fo, zero);
+        d[ETA].c[c] =
+            imp__wide_choose(base, rho * q * by_eta - d_r * again,
+                             imp__wide_choose(mirrors, in[TINT].c[c] * dFo, zero));
+    }
+    return true;
+}
+
+const struct imp_bsdf_lanes imp__plastic_lanes = {
+    .sample = sample_lanes, .pdf_eval = pdf_eval_lanes, .eval_d = eval_d_lanes};

@@ -73,6 +73,8 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative
            (lambert | ((c > imp__wide(0)) & (u[0] < diffuse + facets)));
 }
 
+/* ---- Value and derivatives ------------------------------------------------------- */
+
 static imp_wide schlick(imp_wide c)
 {
     const imp_wide x =
@@ -90,18 +92,91 @@ static imp_wide schlick_at(imp_wide e, imp_wide om)
     return imp__wide_choose(e > one, schlick(om),
                             imp__wide_choose(passes, schlick(ct), one));
 }
+/* Its derivative by e. */
+static imp_wide schlick_by_index(imp_wide e, imp_wide om)
+{
+    const imp_wide zero = imp__wide(0), one = imp__wide(1);
+    const imp_wide s2 = 1 - om * om, ct2 = 1 - s2 / (e * e);
+    const imp_wide_truth passes = (ct2 > zero) & ~(e > one);
+    const imp_wide ct = imp__wide_root(imp__wide_choose(passes, ct2, one));
+    const imp_wide x = imp__wide_larger(imp__wide_lesser(1 - ct, one), zero), x2 = x * x;
+    const imp_wide slope = imp__wide_choose(ct > zero, -5 * x2 * x2, zero);
+    return imp__wide_choose(passes, slope * s2 / (e * e * e * ct), zero);
+}
+
 /* imp__burley. */
-static imp_wide burley(imp_wide cos_o, imp_wide cos_i, imp_wide cos_d, imp_wide roughness,
-                       imp_wide flatness)
+struct burley {
+    imp_wide value, d_roughness, d_flatness;
+};
+static inline struct burley burley(imp_wide cos_o, imp_wide cos_i, imp_wide cos_d,
+                                   imp_wide roughness, imp_wide flatness)
 {
     const imp_wide Fo = schlick(cos_o), Fi = schlick(cos_i);
-    const imp_wide R = 2 * roughness * cos_d * cos_d;
+    const imp_wide R = 2 * roughness * cos_d * cos_d, dR = 2 * cos_d * cos_d;
     const imp_wide full =
         (1 - 0.5 * Fo) * (1 - 0.5 * Fi) + R * (Fo + Fi + Fo * Fi * (R - 1));
+    const imp_wide d_full = Fo + Fi + Fo * Fi * (2 * R - 1);
     const imp_wide q_o = 1 + Fo * (0.5 * R - 1), q_i = 1 + Fi * (0.5 * R - 1);
     const imp_wide slab = 1 / (cos_o + cos_i) - 0.5;
     const imp_wide flat = 1.25 * (q_o * q_i * slab + 0.5);
-    return full + (flat - full) * flatness;
+    const imp_wide d_flat = 1.25 * slab * 0.5 * (Fo * q_i + Fi * q_o);
+    return (struct burley){full + (flat - full) * flatness,
+                           dR * (d_full + (d_flat - d_full) * flatness), flat - full};
+}
+
+/* What value and derivatives have in common: the letters of front_add. */
+struct front {
+    imp_wide au, av, e, vm, om, D, Go, DG, W, F, R0, c, m, st, sheen, s_tint, lum,
+        lambert, gloss;
+    imp_wide3 h;
+    struct burley burley;
+    imp_wide_truth there;
+};
+static inline struct front front_of(const struct imp_bsdf *b,
+                                    const struct imp_wide_color *in, const imp_wide3 *wo,
+                                    const imp_wide3 *wi)
+{
+    const imp_wide zero = imp__wide(0), one = imp__wide(1);
+    struct front x = {.e = index_of(b->self, in)};
+    imp_wide cos_t;
+    roughness_of(in, &x.au, &x.av);
+    x.h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
+    x.vm = imp__wide3_inner(*wo, x.h);
+    x.om = imp__wide_lesser(x.vm, one);
+    x.there = imp__fronts(wo, wi) & (x.om > zero) & (imp__wide3_inner(*wi, x.h) > zero);
+    x.D = IMP_WIDE_OF(imp__ggx_d)(x.au, x.av, x.h);
+    x.Go = IMP_WIDE_OF(imp__ggx_g1)(x.au, x.av, *wo);
+    x.DG = x.D * x.Go * IMP_WIDE_OF(imp__ggx_g1)(x.au, x.av, *wi);
+    x.W = schlick_at(x.e, x.om);
+    x.F = IMP_WIDE_OF(imp__dielectric_from)(x.om, x.e, &cos_t);
+    const imp_wide r = (x.e - 1) / (x.e + 1);
+    x.R0 = r * r;
+    x.c = 1 / (4 * wo->z);
+    x.m = cut(in, METALLIC);
+    x.st = cut(in, SPEC_TINT);
+    x.sheen = cut(in, SHEEN);
+    x.s_tint = cut(in, SHEEN_TINT);
+    x.lum = in[LUM].c[0];
+    x.lambert = wi->z * IMP_INV_PI;
+    x.gloss = schlick(x.om) * wi->z;
+    x.burley = burley(wo->z, wi->z, x.om, cut(in, ROUGHNESS), cut(in, FLATNESS));
+    return x;
+}
+/* Its colours. */
+struct dyes {
+    imp_wide base, tint, metal, dyed, Fp, dye;
+};
+static inline struct dyes dyes_of(const struct front *x, imp_wide base)
+{
+    const imp_wide one = imp__wide(1), m = x->m, st = x->st;
+    struct dyes y = {
+        .base = base,
+        .tint = imp__wide_choose(x->lum > imp__wide(0), base * (1 / x->lum), one)};
+    y.metal = base + (one - base) * x->W;
+    y.dyed = y.tint * x->R0 + (one - y.tint * x->R0) * x->W;
+    y.Fp = y.metal * m + y.dyed * ((1 - m) * st) + (1 - m) * (1 - st) * x->F;
+    y.dye = one + (y.tint - one) * x->s_tint;
+    return y;
 }
 
 static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
@@ -109,48 +184,115 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
                                struct imp_wide_color *f)
 {
-    const imp_wide zero = imp__wide(0), one = imp__wide(1), e = index_of(b->self, in);
-    imp_wide au, av, q_facets, q_diffuse, cos_t;
+    const struct front x = front_of(b, in, wo, wi);
+    imp_wide q_facets, q_diffuse;
     (void)lobe;
-    chances_of(in, derivative, wo->z, e, &q_facets, &q_diffuse);
-    roughness_of(in, &au, &av);
-    const imp_wide3 h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
-    const imp_wide vm = imp__wide3_inner(*wo, h), om = imp__wide_lesser(vm, one);
-    const imp_wide_truth there =
-        imp__fronts(wo, wi) & (om > zero) & (imp__wide3_inner(*wi, h) > zero);
-    const imp_wide D = IMP_WIDE_OF(imp__ggx_d)(au, av, h),
-                   Go = IMP_WIDE_OF(imp__ggx_g1)(au, av, *wo),
-                   DG = D * Go * IMP_WIDE_OF(imp__ggx_g1)(au, av, *wi);
-
-    /* front_add */
-    const imp_wide m = cut(in, METALLIC), cos_i = wi->z, W = schlick_at(e, om),
-                   F = IMP_WIDE_OF(imp__dielectric_from)(om, e, &cos_t);
-    const imp_wide r = (e - 1) / (e + 1), R0 = r * r;
-    const imp_wide st = cut(in, SPEC_TINT), sheen = cut(in, SHEEN),
-                   s_tint = cut(in, SHEEN_TINT), lum = in[LUM].c[0];
-    const imp_wide c = 1 / (4 * wo->z), lambert = cos_i * IMP_INV_PI, brdf = 1 - m;
-    const imp_wide value =
-        burley(wo->z, cos_i, om, cut(in, ROUGHNESS), cut(in, FLATNESS));
-    const imp_wide gloss = schlick(om) * cos_i;
+    chances_of(in, derivative, wo->z, x.e, &q_facets, &q_diffuse);
     for (int k = 0; k < colors; k++) {
-        const imp_wide base = in[BASE].c[k],
-                       tint = imp__wide_choose(lum > zero, base * (1 / lum), one);
-        const imp_wide metal = base + (one - base) * W,
-                       dyed = tint * R0 + (one - tint * R0) * W;
-        const imp_wide Fp = metal * m + dyed * ((1 - m) * st) + (1 - m) * (1 - st) * F;
-        const imp_wide dye = one + (tint - one) * s_tint;
-        f->c[k] = Fp * (DG * c) + base * (value * lambert * brdf) +
-                  dye * (sheen * (1 - m) * gloss);
+        const struct dyes y = dyes_of(&x, in[BASE].c[k]);
+        f->c[k] = y.Fp * (x.DG * x.c) +
+                  y.base * (x.burley.value * x.lambert * (1 - x.m)) +
+                  y.dye * (x.sheen * (1 - x.m) * x.gloss);
     }
     return imp__wide_choose(
-        there,
+        x.there,
         q_facets *
-                imp__ggx_normals_pdf(au, av, imp__principled_wanted(derivative), wo, &h,
-                                     vm, D, Go) /
-                (4 * om) +
-            q_diffuse * cos_i * IMP_INV_PI,
-        zero);
+                imp__ggx_normals_pdf(x.au, x.av, imp__principled_wanted(derivative), wo,
+                                     &x.h, x.vm, x.D, x.Go) /
+                (4 * x.om) +
+            q_diffuse * wi->z * IMP_INV_PI,
+        imp__wide(0));
 }
 
-const struct imp_bsdf_lanes imp__principled_lanes = {
-    .covers = covers, .sample = sample_lanes, .pdf_eval = pdf_eval_lanes};
+/* Derivatives of DG by roughness and anisotropic (imp__burley_lobe). */
+static inline void facets_d(const struct imp_wide_color *in, const struct front *x,
+                            const imp_wide3 *wo, const imp_wide3 *wi, imp_wide d[2])
+{
+    const imp_wide zero = imp__wide(0), least = imp__wide(1e-3),
+                   roughness = cut(in, ROUGHNESS), r2 = roughness * roughness,
+                   a = imp__wide_root(1 - 0.9 * cut(in, ANISOTROPIC));
+    const imp_wide_truth own[2] = {r2 / a > least, r2 * a > least};
+    const imp_wide by[2][2] = {{2 * roughness / a, 2 * roughness * a},
+                               {0.45 * r2 / (a * a * a), -0.45 * r2 / a}};
+    imp_wide dlog_D[2], dGo[2], dGi[2];
+    const imp_wide Go = IMP_WIDE_OF(imp__ggx_g1_d)(x->au, x->av, *wo, dGo),
+                   Gi = IMP_WIDE_OF(imp__ggx_g1_d)(x->au, x->av, *wi, dGi);
+    IMP_WIDE_OF(imp__ggx_d_log)(x->au, x->av, x->h, dlog_D);
+    d[0] = d[1] = zero;
+    for (int k = 0; k < 2; k++) {
+        const imp_wide turn = x->D * (dlog_D[k] * Go * Gi + dGo[k] * Gi + Go * dGi[k]);
+        for (int j = 0; j < 2; j++)
+            d[j] += turn * imp__wide_choose(own[k], by[j][k], zero);
+    }
+}
+
+/* d eta/d specular (eta_of). */
+static imp_wide index_slope(const struct imp__principled_self *p,
+                            const struct imp_wide_color *in)
+{
+    if (p->by_eta) return imp__wide(1);
+    const imp_wide q =
+        imp__wide_root(0.08 * imp__wide_larger(cut(in, SPECULAR), imp__wide(1e-14)));
+    return 2 / ((1 - q) * (1 - q)) * 0.04 / q;
+}
+
+static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                         const imp_wide3 *wo, const imp_wide3 *wi,
+                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
+{
+    const struct imp__principled_self *p = b->self;
+    const imp_wide zero = imp__wide(0), one = imp__wide(1);
+    const struct front x = front_of(b, in, wo, wi);
+    imp_wide d_DG[2], F_c, F_e;
+    (void)lobe;
+    facets_d(in, &x, wo, wi, d_DG);
+    IMP_WIDE_OF(imp__dielectric_d)(x.om, x.e, &F_c, &F_e);
+    const imp_wide W = x.W, W_e = schlick_by_index(x.e, x.om), F = x.F, m = x.m,
+                   st = x.st, R0 = x.R0, DG = x.DG, c = x.c, sheen = x.sheen,
+                   gloss = x.gloss, lambert = x.lambert, brdf = 1 - m,
+                   r = (x.e - 1) / (x.e + 1), dR0 = 4 * r / ((x.e + 1) * (x.e + 1)),
+                   de = index_slope(p, in);
+    const imp_wide by_tint =
+        (1 - m) * st * R0 * (1 - W) * DG * c + sheen * (1 - m) * gloss * x.s_tint;
+    const imp_wide_truth dyes = x.lum > zero;
+    const imp_wide tint_base = imp__wide_choose(dyes, 1 / x.lum, zero),
+                   tint_lum = -1 / (x.lum * x.lum);
+    imp_wide_truth there[N_INPUTS];
+    for (int j = 0; j < N_INPUTS; j++) {
+        const bool number = j >= ROUGHNESS && j != ETA;
+        there[j] = x.there;
+        if (number) there[j] &= cut(in, j) == in[j].c[0];
+    }
+    for (int k = 0; k < colors; k++) {
+        const struct dyes y = dyes_of(&x, in[BASE].c[k]);
+        const imp_wide base = y.base, tint = y.tint;
+        const imp_wide d_e =
+            ((one - base) * (m * W_e) +
+             ((one - tint * R0) * W_e + tint * ((1 - W) * dR0)) * ((1 - m) * st) +
+             (1 - m) * (1 - st) * F_e) *
+            (DG * c);
+        const imp_wide own[N_INPUTS] = {
+            [BASE] = m * (1 - W) * DG * c + x.burley.value * lambert * brdf +
+                     by_tint * tint_base,
+            [LUM] = imp__wide_choose(dyes, by_tint * (base * tint_lum), zero),
+            [ROUGHNESS] =
+                y.Fp * (d_DG[0] * c) + base * (x.burley.d_roughness * lambert * brdf),
+            [ANISOTROPIC] = y.Fp * (d_DG[1] * c),
+            [METALLIC] = (y.metal - y.dyed * st - (1 - st) * F) * (DG * c) -
+                         base * (x.burley.value * lambert) - y.dye * (sheen * gloss),
+            [SPEC_TINT] = (y.dyed - F) * ((1 - m) * DG * c),
+            [SHEEN] = y.dye * ((1 - m) * gloss),
+            [SHEEN_TINT] = (tint - one) * (sheen * (1 - m) * gloss),
+            [FLATNESS] = base * (x.burley.d_flatness * lambert * brdf),
+            [ETA] = p->by_eta ? d_e * de : zero,
+            [SPECULAR] = p->by_eta ? zero : d_e * de};
+        for (int j = 0; j < N_INPUTS; j++)
+            d[j].c[k] = imp__wide_choose(there[j], own[j], zero);
+    }
+    return true;
+}
+
+const struct imp_bsdf_lanes imp__principled_lanes = {.covers = covers,
+                                                     .sample = sample_lanes,
+                                                     .pdf_eval = pdf_eval_lanes,
+                                                     .eval_d = eval_d_lanes};

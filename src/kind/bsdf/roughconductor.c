@@ -188,9 +188,10 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative
 }
 
 static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                         const imp_wide3 *wo, const imp_wide3 *wi, int colors,
-                         struct imp_wide_color *d)
+                         const imp_wide3 *wo, const imp_wide3 *wi,
+                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
 {
+    (void)lobe;
     const struct imp__roughness *r = b->self;
     const imp_wide zero = imp__wide(0);
     imp_wide au, av, dlog_D[2], dGi[2], dGo[2];

@@ -261,25 +261,37 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative
     return (v.wo.z > zero) & (c > zero) & kept;
 }
 
+/* struct facet; vm: wo.m, which om is but for rounding. */
+struct facets {
+    imp_wide3 m;
+    imp_wide n, vm, om, im;
+};
+static inline imp_wide_truth facets_of(const struct views *v, struct facets *f)
+{
+    const imp_wide zero = imp__wide(0), one = imp__wide(1);
+    const imp_wide3 h = imp__wide3_plus(
+        v->wo, imp__wide3_times(v->wi, imp__wide_choose(v->reflects, one, v->e)));
+    f->n = imp__wide_signed_as(imp__wide3_norm(h), h.z);
+    f->m = imp__wide3_times(h, 1 / f->n);
+    f->vm = imp__wide3_inner(v->wo, f->m);
+    f->om = imp__wide_lesser(f->vm, one);
+    f->im = imp__wide3_inner(v->wi, f->m);
+    return (v->wo.z > zero) & (v->wi.z != zero) & (imp__wide_magnitude(f->n) > zero) &
+           (f->om > zero) & ~((f->im > zero) ^ v->reflects) & (f->im != zero);
+}
+
 static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                const struct imp_wide_color *in, const imp_wide3 *wo,
                                const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
                                struct imp_wide_color *f)
 {
-    const imp_wide zero = imp__wide(0), one = imp__wide(1);
     const struct views v = views_of(in, wo, wi);
+    struct facets x;
     imp_wide au, av, cos_t, eta_t;
     imp__roughness_lanes(b->self, &in[ALPHA], &au, &av);
-    const imp_wide3 h = imp__wide3_plus(
-        v.wo, imp__wide3_times(v.wi, imp__wide_choose(v.reflects, one, v.e)));
-    const imp_wide n = imp__wide_signed_as(imp__wide3_norm(h), h.z);
-    const imp_wide3 m = imp__wide3_times(h, 1 / n);
-    const imp_wide vm = imp__wide3_inner(v.wo, m), om = imp__wide_lesser(vm, one),
-                   im = imp__wide3_inner(v.wi, m);
-    const imp_wide_truth there = imp__is_smooth(*lobe) & (v.wo.z > zero) &
-                                 (v.wi.z != zero) & (imp__wide_magnitude(n) > zero) &
-                                 (om > zero) & ~((im > zero) ^ v.reflects) & (im != zero);
-    const imp_wide D = IMP_WIDE_OF(imp__ggx_d)(au, av, m),
+    const imp_wide_truth there = imp__is_smooth(*lobe) & facets_of(&v, &x);
+    const imp_wide om = x.om, im = x.im, n = x.n;
+    const imp_wide D = IMP_WIDE_OF(imp__ggx_d)(au, av, x.m),
                    Go = IMP_WIDE_OF(imp__ggx_g1)(au, av, v.wo),
                    DG = D * IMP_WIDE_OF(imp__ggx_g1)(au, av, v.wi) * Go;
     const imp_wide F = IMP_WIDE_OF(imp__dielectric)(om, v.e, &cos_t, &eta_t);
@@ -287,12 +299,52 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                          (1 - F) * DG * om * -im / (v.wo.z * n * n));
     for (int c = 0; c < colors; c++)
         f->c[c] = imp__wide_choose(v.reflects, in[TINT_R].c[c], in[TINT_T].c[c]) * of;
-    const imp_wide p = imp__ggx_normals_pdf(
-        au, av, imp__roughness_wanted(b->self, derivative, ALPHA), &v.wo, &m, vm, D, Go);
+    const imp_wide p =
+        imp__ggx_normals_pdf(au, av, imp__roughness_wanted(b->self, derivative, ALPHA),
+                             &v.wo, &x.m, x.vm, D, Go);
     return imp__wide_choose(there,
                             imp__wide_choose(v.reflects, F * p / (4 * om),
                                              (1 - F) * p * v.e * v.e * -im / (n * n)),
-                            zero);
+                            imp__wide(0));
+}
+
+/* The index has no derivative (imp__ggx_glass_jumps). */
+static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                         const imp_wide3 *wo, const imp_wide3 *wi,
+                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
+{
+    const struct imp__roughness *r = b->self;
+    const imp_wide zero = imp__wide(0);
+    const struct views v = views_of(in, wo, wi);
+    struct facets x;
+    imp_wide au, av, cos_t, dlog_D[2], dGi[2], dGo[2], by[2];
+    imp__roughness_lanes(r, &in[ALPHA], &au, &av);
+    const imp_wide_truth there = imp__is_smooth(*lobe) & facets_of(&v, &x);
+    const imp_wide D = IMP_WIDE_OF(imp__ggx_d)(au, av, x.m),
+                   Gi = IMP_WIDE_OF(imp__ggx_g1_d)(au, av, v.wi, dGi),
+                   Go = IMP_WIDE_OF(imp__ggx_g1_d)(au, av, v.wo, dGo),
+                   F = IMP_WIDE_OF(imp__dielectric_from)(x.om, v.e, &cos_t);
+    IMP_WIDE_OF(imp__ggx_d_log)(au, av, x.m, dlog_D);
+    const imp_wide share = imp__wide_choose(v.reflects, F, 1 - F),
+                   rest = imp__wide_choose(v.reflects, D / (4 * v.wo.z),
+                                           D * x.om * -x.im / (v.wo.z * x.n * x.n)),
+                   all = share * rest * Gi * Go;
+    for (int j = 0; j < 2; j++) {
+        const int input = r->anisotropic ? ALPHA_U + j : ALPHA;
+        by[j] = share * rest * (dlog_D[j] * Gi * Go + dGi[j] * Go + Gi * dGo[j]);
+        by[j] = imp__wide_choose(there & ~(in[input].c[0] < IMP_ALPHA_MIN), by[j], zero);
+    }
+    for (int c = 0; c < colors; c++) {
+        const imp_wide tint =
+            imp__wide_choose(v.reflects, in[TINT_R].c[c], in[TINT_T].c[c]);
+        d[TINT_R].c[c] = imp__wide_choose(there & v.reflects, all, zero);
+        d[TINT_T].c[c] = imp__wide_choose(there & ~v.reflects, all, zero);
+        d[ETA].c[c] = zero;
+        d[ALPHA].c[c] = r->anisotropic ? zero : tint * by[0] + tint * by[1];
+        d[ALPHA_U].c[c] = r->anisotropic ? tint * by[0] : zero;
+        d[ALPHA_V].c[c] = r->anisotropic ? tint * by[1] : zero;
+    }
+    return true;
 }
 
 static imp_wide index_ratio_lanes(const struct imp_bsdf *b,
@@ -307,5 +359,6 @@ static imp_wide index_ratio_lanes(const struct imp_bsdf *b,
 const struct imp_bsdf_lanes imp__roughdielectric_lanes = {.covers = covers,
                                                           .sample = sample_lanes,
                                                           .pdf_eval = pdf_eval_lanes,
+                                                          .eval_d = eval_d_lanes,
                                                           .index_ratio =
                                                               index_ratio_lanes};

@@ -259,29 +259,34 @@ static struct at at_lanes(const struct imp_bsdf *b, const struct imp_wide_color 
     return at_inputs(b, own);
 }
 
-/* number() of imp__coat_T at mu. */
-static imp_wide lets_through(const struct at *a, imp_wide mu)
+/* imp__coat_T at mu, the first n of the dual. */
+static inline void coats(const struct at *a, imp_wide mu, int n, imp_wide T[3])
 {
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
-    const struct imp__coat *coat = &a->p->coat;
-    const double d_alpha = a->alpha - coat->alpha, d_eta = a->eta - coat->eta;
     const imp_wide x =
         imp__wide_larger(imp__wide_lesser(mu, one), zero) * (IMP_COAT_NODES - 1);
     const imp_wide k =
         imp__wide_lesser(imp__wide_floor(x), imp__wide(IMP_COAT_NODES - 2));
-    imp_wide own[3];
-    for (int j = 0; j < 3; j++) {
-        /* As a rule they are the table's own, and the rest is 0. */
-        if (j > 0 && d_alpha == 0 && d_eta == 0) {
-            own[j] = zero;
-            continue;
-        }
-        const double *from = (const double *)coat->T + j;
-        const imp_wide T = imp__wide_found(from, 4 * k),
+    for (int j = 0; j < n; j++) {
+        const double *from = (const double *)a->p->coat.T + j;
+        const imp_wide own = imp__wide_found(from, 4 * k),
                        next = imp__wide_found(from + 4, 4 * k);
-        own[j] = T + (next - T) * (x - k);
+        T[j] = own + (next - own) * (x - k);
     }
-    return own[0] + own[1] * d_alpha + own[2] * d_eta;
+}
+/* number(). */
+static inline imp_wide numbers(const struct at *a, const imp_wide T[3])
+{
+    const struct imp__coat *coat = &a->p->coat;
+    return T[0] + T[1] * (a->alpha - coat->alpha) + T[2] * (a->eta - coat->eta);
+}
+/* number() of imp__coat_T at mu: as a rule what the table was made for, so that the rest is 0. */
+static imp_wide lets_through(const struct at *a, imp_wide mu)
+{
+    const bool own = a->alpha == a->p->coat.alpha && a->eta == a->p->coat.eta;
+    imp_wide T[3] = {imp__wide(0), imp__wide(0), imp__wide(0)};
+    coats(a, mu, own ? 1 : 3, T);
+    return numbers(a, T);
 }
 
 static imp_wide facet_chances(const struct imp_wide_color *in, uint64_t derivative,
@@ -343,5 +348,54 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
         imp__wide(0));
 }
 
-const struct imp_bsdf_lanes imp__roughplastic_lanes = {
-    .covers = covers, .sample = sample_lanes, .pdf_eval = pdf_eval_lanes};
+static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                         const imp_wide3 *wo, const imp_wide3 *wi,
+                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
+{
+    const struct at a = at_lanes(b, in);
+    const imp_wide zero = imp__wide(0), one = imp__wide(1), alpha = imp__wide(a.alpha),
+                   eta = imp__wide(a.eta);
+    const imp_wide_truth here = imp__fronts(wo, wi);
+    const imp_wide3 h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
+    imp_wide dlog_D[2], dGi[2], dGo[2], F_c, F_e, Ti[3], To[3];
+    (void)lobe;
+    const imp_wide F = IMP_WIDE_OF(imp__dielectric_d)(
+        imp__wide_lesser(imp__wide3_inner(*wo, h), one), eta, &F_c, &F_e);
+    const imp_wide Gi = IMP_WIDE_OF(imp__ggx_g1_d)(alpha, alpha, *wi, dGi),
+                   Go = IMP_WIDE_OF(imp__ggx_g1_d)(alpha, alpha, *wo, dGo),
+                   c = IMP_WIDE_OF(imp__ggx_d)(alpha, alpha, h) / (4 * wo->z);
+    IMP_WIDE_OF(imp__ggx_d_log)(alpha, alpha, h, dlog_D);
+    const imp_wide by_tint = F * c * Gi * Go, facets_eta = F_e * c * Gi * Go,
+                   facets_alpha = F * c *
+                                  ((dlog_D[0] + dlog_D[1]) * Gi * Go +
+                                   (dGi[0] + dGi[1]) * Go + Gi * (dGo[0] + dGo[1]));
+
+    coats(&a, wi->z, 3, Ti);
+    coats(&a, wo->z, 3, To);
+    const imp__dual R = a.p->coat.R_int;
+    const double r = number(&a, R);
+    const imp_wide ti = numbers(&a, Ti), to = numbers(&a, To), T = ti * to;
+    const imp_wide lambert = imp__lamberts(wo, wi) / (eta * eta), through = T * lambert;
+    const imp_wide base_alpha = (Ti[1] * to + ti * To[1]) * lambert,
+                   base_eta = (Ti[2] * to + ti * To[2] - 2 * T / eta) * lambert,
+                   again_alpha = R[1] * T * lambert, again_eta = R[2] * T * lambert;
+    for (int k = 0; k < colors; k++) {
+        const imp_wide in_rho = in[DIFFUSE].c[k], tint = in[TINT].c[k],
+                       again = a.p->nonlinear ? in_rho : one;
+        const imp_wide q = 1 / (1 - again * r), d_rho = a.p->nonlinear ? q * q : q,
+                       d_R = again * in_rho * q * q, rho = in_rho * q;
+        const imp_wide own[N_INPUTS] = {
+            [DIFFUSE] = d_rho * through,
+            [TINT] = by_tint,
+            [ETA] = tint * facets_eta + (rho * base_eta + d_R * again_eta),
+            [ALPHA] = tint * facets_alpha + (rho * base_alpha + d_R * again_alpha)};
+        for (int j = 0; j < N_INPUTS; j++)
+            d[j].c[k] = imp__wide_choose(here, own[j], zero);
+    }
+    return true;
+}
+
+const struct imp_bsdf_lanes imp__roughplastic_lanes = {.covers = covers,
+                                                       .sample = sample_lanes,
+                                                       .pdf_eval = pdf_eval_lanes,
+                                                       .eval_d = eval_d_lanes};

@@ -252,8 +252,8 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
 }
 
 static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                         const imp_wide3 *wo, const imp_wide3 *wi, int colors,
-                         struct imp_wide_color *d)
+                         const imp_wide3 *wo, const imp_wide3 *wi,
+                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
 {
     const imp_wide zero = imp__wide(0);
     const imp_wide_truth back = wo->z < zero;
@@ -265,7 +265,8 @@ static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *
         const imp_wide_truth all = ~(imp_wide_truth){0}, here = b->n_child == 1 ? all
                                                                 : k > 0         ? back
                                                                                 : ~back;
-        if (!lanes->eval_d || !lanes->eval_d(c, in + b->child_in[k], &o, &i, colors, own))
+        if (!lanes->eval_d ||
+            !lanes->eval_d(c, in + b->child_in[k], &o, &i, lobe, colors, own))
             return false;
         for (int j = 0; b->n_child > 1 && j < c->n_in; j++)
             for (int m = 0; m < colors; m++)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Bitmaps in lanes: eval of bitmap.c, in colours. Indices are whole numbers among doubles, which are
+ * Bitmaps in lanes: eval and scatter of bitmap.c, in colours. Indices are whole numbers among doubles, which are
  * exact. */
 #include "bitmap_data.h"
 #include "color/rgb.h"
@@ -87,4 +87,19 @@ static void eval(const struct imp_texture *tex, const imp_wide uv[2], bool scala
     for (int c = 1; c < 4; c++) value->c[c] = value->c[0];
 }
 
-const struct imp_texture_lanes imp__bitmap_lanes = {.covers = covers, .eval = eval};
+static bool texels(const struct imp_texture *tex, const imp_wide uv[2], bool scalar,
+                   struct imp_wide_texels *out)
+{
+    const struct bitmap *t = tex->self;
+    if (scalar && t->channels == 3) return false; /* a luminance */
+    out->n = footprints(t, uv, out->element, out->weight);
+    for (int k = 0; k < out->n; k++) out->element[k] *= t->channels;
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
+        out->param[k] = tex->param;
+        out->channels[k] = (int8_t)t->channels;
+    }
+    return true;
+}
+
+const struct imp_texture_lanes imp__bitmap_lanes = {
+    .covers = covers, .eval = eval, .texels = texels};

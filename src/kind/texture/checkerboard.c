@@ -82,25 +82,48 @@ static bool covers(const struct imp_texture *t)
 {
     return !t->input[0]->texture && !t->input[1]->texture;
 }
-static void eval_lanes(const struct imp_texture *t, const imp_wide uv[2], bool scalar,
-                       struct imp_wide_color *value)
+/* Where it is the first input. */
+static imp_wide_truth is_first(const struct imp_texture *t, const imp_wide uv[2],
+                               bool scalar)
 {
     const struct checkerboard *c = t->self;
-    const struct imp_texcoord anywhere = {.prim = -1};
     imp_wide_truth second[2];
-    imp_spec color[2];
     for (int k = 0; k < 2; k++) {
         const imp_wide x =
             c->to_uv.m[k][0] * uv[0] + c->to_uv.m[k][1] * uv[1] + c->to_uv.m[k][2];
         second[k] = x - imp__wide_floor(x) > imp__wide(0.5);
-        imp_input_eval(t->input[k], &anywhere, scalar, &color[k]);
     }
-    const imp_wide_truth differ = second[0] ^ second[1],
-                         first = scalar ? differ : ~differ;
+    const imp_wide_truth differ = second[0] ^ second[1];
+    return scalar ? differ : ~differ;
+}
+static void eval_lanes(const struct imp_texture *t, const imp_wide uv[2], bool scalar,
+                       struct imp_wide_color *value)
+{
+    const struct imp_texcoord anywhere = {.prim = -1};
+    const imp_wide_truth first = is_first(t, uv, scalar);
+    imp_spec color[2];
+    for (int k = 0; k < 2; k++) imp_input_eval(t->input[k], &anywhere, scalar, &color[k]);
     for (int k = 0; k < 4; k++)
         value->c[k] =
             imp__wide_choose(first, imp__wide(color[0][k]), imp__wide(color[1][k]));
 }
 
-const struct imp_texture_lanes imp__checkerboard_lanes = {.covers = covers,
-                                                          .eval = eval_lanes};
+static bool texels_lanes(const struct imp_texture *t, const imp_wide uv[2], bool scalar,
+                         struct imp_wide_texels *out)
+{
+    const imp_wide_truth first = is_first(t, uv, scalar);
+    for (int k = 0; k < 2; k++)
+        if (t->input[k]->spectrum || (scalar && t->input[k]->count == 3)) return false;
+    out->n = 1;
+    out->element[0] = imp__wide(0);
+    out->weight[0] = imp__wide(1);
+    for (int k = 0; k < IMP_WIDE_LANES; k++) {
+        const struct imp_input *i = t->input[first[k] ? 0 : 1];
+        out->param[k] = i->param;
+        out->channels[k] = i->count == 3 ? 3 : 1;
+    }
+    return true;
+}
+
+const struct imp_texture_lanes imp__checkerboard_lanes = {
+    .covers = covers, .eval = eval_lanes, .texels = texels_lanes};

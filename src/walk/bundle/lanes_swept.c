@@ -21,12 +21,21 @@ static void derivatives(const struct imp_wide_color *d, uint64_t inputs, int col
     }
 }
 
-/* Luminances and components of others have derivatives, but no bit among the active inputs. */
-static bool all_own(const struct imp_bsdf *b)
+/* Luminances and components of others have derivatives, but no bit among the active inputs: with those of
+ * the luminances of active ones. */
+static uint64_t with_luminances(const struct imp_bsdf *b, uint64_t active)
+{
+    uint64_t all = active;
+    for (int j = 0; j < b->n_in; j++)
+        if (b->input[j]->luminance)
+            all |= (active >> (j - b->input[j]->luminance) & 1) << j;
+    return all;
+}
+static bool has_components(const struct imp_bsdf *b)
 {
     for (int j = 0; j < b->n_in; j++)
-        if (b->input[j]->luminance || b->input[j]->component) return false;
-    return true;
+        if (b->input[j]->component) return true;
+    return false;
 }
 
 /* False: the kind has none in lanes. */
@@ -38,17 +47,20 @@ static bool derivatives_keep(struct imp_arena *arena, const struct imp_bin *bin,
 {
     struct imp_wide_color d[IMP_INPUTS_MAX];
     const imp_wide scale[4] = {step->scale, step->scale, step->scale, step->scale};
+    const imp_wide_lobe smooth = imp__wide_smooth();
     const size_t n = (size_t)__builtin_popcountll(out->inputs) * (size_t)colors;
-    if (!bin->kernel || !bin->kernel->eval_d || !out->inputs || !all_own(bin->bsdf))
+    if (!bin->kernel || !bin->kernel->eval_d || !out->inputs || has_components(bin->bsdf))
         return false;
     if (out->lit) {
-        if (!bin->kernel->eval_d(bin->bsdf, v->in, &v->wo, &light->wi, colors, d))
+        if (!bin->kernel->eval_d(bin->bsdf, v->in, &v->wo, &light->wi, &smooth, colors,
+                                 d))
             return false;
         out->by_light = wide_take(arena, n * sizeof(imp_wide));
         if (out->by_light) derivatives(d, out->inputs, colors, lit, out->by_light);
     }
     if (out->on) {
-        if (!bin->kernel->eval_d(bin->bsdf, v->in, &v->wo, &step->wi, colors, d))
+        if (!bin->kernel->eval_d(bin->bsdf, v->in, &v->wo, &step->wi, &step->lobe, colors,
+                                 d))
             return false;
         out->by_step = wide_take(arena, n * sizeof(imp_wide));
         if (out->by_step) derivatives(d, out->inputs, colors, scale, out->by_step);
@@ -100,6 +112,28 @@ static void place_keep(struct imp_arena *arena, const struct imp_depth *d,
     }
 }
 
+/* False: some texture has no such form. */
+static bool texels_keep(struct imp_arena *arena, const struct imp_bin *bin,
+                        const struct imp_lanes_vertices *v, struct imp_swept_lanes *out)
+{
+    const struct imp_input *const *input = bin->bsdf->input;
+    const imp_wide uv[2] = {imp__wide_decide(v->x.uv[0]), imp__wide_decide(v->x.uv[1])};
+    size_t n = 0;
+    if (!bin->texels) return false;
+    for (uint64_t left = out->inputs; left; left &= left - 1)
+        n += !input[__builtin_ctzll(left)]->plain;
+    struct imp_wide_texels *t = wide_take(arena, n * sizeof *t);
+    out->texels = t;
+    if (!t) return true;
+    for (uint64_t left = out->inputs; left; left &= left - 1) {
+        const struct imp_input *i = input[__builtin_ctzll(left)];
+        if (!i->plain &&
+            !imp__texture_lanes(i->texture)->texels(i->texture, uv, i->scalar, t++))
+            return false;
+    }
+    return true;
+}
+
 static void light_keep(struct imp_arena *arena, const struct imp_lanes_lit *lit,
                        int colors, struct imp_swept_lanes *out)
 {
@@ -144,17 +178,20 @@ static struct imp_swept_lanes *lanes_keep(struct imp_depth *d, const struct imp_
     if (!differs && !light) return &b->swept->nothing;
     struct imp_swept_lanes *out = imp__arena_take(arena, 1, sizeof *out);
     if (!out) return NULL;
-    *out = (struct imp_swept_lanes){.bsdf = bin->bsdf,
-                                    .lit = lit->on,
-                                    .on = step->on,
-                                    .inputs = differs ? bin->derivative : 0};
+    *out = (struct imp_swept_lanes){
+        .bsdf = bin->bsdf,
+        .lit = lit->on,
+        .on = step->on,
+        .inputs = differs ? with_luminances(bin->bsdf, bin->derivative) : 0};
     if (light) light_keep(arena, lit, b->colors, out);
     if (!differs) return out;
     imp_wide by[4];
     for (int c = 0; c < b->colors; c++) by[c] = lit->light.radiance.c[c] * lit->weight;
     if (!derivatives_keep(arena, bin, v, by, lit, step, b->colors, out))
         dirs_keep(arena, bin, v, by, lit, step, b->colors, out);
-    if (!bin->plain) place_keep(arena, d, v, out);
+    if (!out->dirs && b->colors == 3 && out->inputs == bin->derivative)
+        out->numbers = bin->plain || texels_keep(arena, bin, v, out);
+    if (!out->numbers && !bin->plain) place_keep(arena, d, v, out);
     return out;
 }
 

@@ -37,12 +37,15 @@ struct imp_swept_light {
 struct imp_swept_lanes {
     const struct imp_bsdf *bsdf; /* NULL: the sky */
     unsigned lit, on; /* lanes whose light is seen, which shadow rays tell; which go on */
-    /* Derivatives of B and of w by the active inputs (bit j: input j), one behind the other [colors]; or
-     * what those by all inputs are computed of, else NULL. */
+    /* Derivatives of B and of w by the active inputs (bit j: input j) and by luminances of such, one behind
+     * the other [colors]; or what those by all inputs are computed of, else NULL. */
     uint64_t inputs;
     imp_wide *by_light, *by_step;
     struct imp_swept_dirs *dirs;
-    struct imp_swept_place *place; /* NULL: all inputs are constants */
+    struct imp_wide_texels
+        *texels; /* of inputs that are textures, if they have this form */
+    struct imp_swept_place *place; /* NULL: all inputs are constants, or have texels */
+    bool numbers; /* inputs with derivatives have them by numbers of the same colours */
     struct imp_swept_light *light; /* NULL: no emitter counts */
 };
 
@@ -101,7 +104,6 @@ void imp__swept_connect(const struct imp_bundle *bundle,
 void imp__swept_sweep(const struct imp_tracer *tracer, const struct imp_walk *walk,
                       imp_spec adjoint, struct imp_sink *sink);
 void imp__swept_both(const struct imp_tracer *tracer, const struct imp_walk *walk,
-                     imp_spec adjoint, imp_spec ratio, struct imp_sink *sink,
-                     struct imp_sink *second);
+                     imp_spec adjoint, imp_spec ratio, const struct imp_sink_pair *to);
 
 #endif

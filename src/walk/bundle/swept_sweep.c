@@ -19,10 +19,8 @@ static void light_piece(const struct imp_sweep *s, const struct imp_swept_light 
     if (!s->tracer->active->emitter[emitter]) return;
     if (imp_likely(
             imp__emitter_even(e, carried))) { /* of derivative 1, where it is seen */
-        imp_spec bar = P * lane_of(l->f.c, colors, k) * imp__spec(l->weight[k]);
-        imp__plain_scatter(e->input[0], &bar, s->sink);
-        bar *= s->ratio;
-        if (s->second) imp__plain_scatter(e->input[0], &bar, s->second);
+        imp__sweep_plain(s, e->input[0],
+                         P * lane_of(l->f.c, colors, k) * imp__spec(l->weight[k]));
         return;
     }
     struct imp_emitter_piece piece = {
@@ -43,9 +41,14 @@ static void light_piece(const struct imp_sweep *s, const struct imp_swept_light 
 
 /* The sky that it meets. */
 static void sky_piece(const struct imp_sweep *s, const struct imp_swept_light *l, int k,
-                      imp_spec P)
+                      const struct imp_carried *carried, imp_spec P)
 {
+    const struct imp_emitter *e = s->tracer->scene->emitters[l->emitter[0]];
     const imp_spec one = imp__spec(1);
+    if (imp_likely(imp__emitter_even(e, carried))) {
+        imp__sweep_plain(s, e->input[0], P * l->weight[k]);
+        return;
+    }
     struct imp_emitter_piece piece = {l->emitter[0],
                                       {{0, 0}, INFINITY, 1, imp__wide3_lane(&l->d, k)},
                                       {.p = imp__wide3_lane(&l->p, k), .prim = -1},
@@ -86,19 +89,31 @@ static inline imp_spec bar_kept(const struct imp_swept_lanes *of, int at, int co
     return bar;
 }
 
-/* By constants in colours, which are looked up nowhere. */
-static inline void constants_sweep(const struct imp_sweep *s,
-                                   const struct imp_swept_lanes *of, int k, int colors,
-                                   const struct arriving *a)
+static inline void texels_sweep(const struct imp_sweep *s,
+                                const struct imp_wide_texels *t, int k, imp_spec bar)
 {
+    const imp_spec other = bar * s->ratio;
+    if (t->param[k] < 0) return;
+    for (int j = 0; j < t->n; j++) {
+        const double weight = t->weight[j][k];
+        const imp_spec part = bar * weight, part_other = other * weight;
+        imp__sweep_add(s, t->param[k], (size_t)t->element[j][k], t->channels[k], &part,
+                       &part_other);
+    }
+}
+
+/* By constants in colours, and by texels that are known. */
+static inline void numbers_sweep(const struct imp_sweep *s,
+                                 const struct imp_swept_lanes *of, int k, int colors,
+                                 const struct arriving *a)
+{
+    const struct imp_wide_texels *texels = of->texels;
     int at = 0;
     for (uint64_t left = of->inputs; left; left &= left - 1, at += colors) {
         const struct imp_input *input = of->bsdf->input[__builtin_ctzll(left)];
-        imp_spec bar = bar_kept(of, at, colors, k, a);
-        imp__plain_scatter(input, &bar, s->sink);
-        if (!s->second) continue;
-        bar *= s->ratio;
-        imp__plain_scatter(input, &bar, s->second);
+        const imp_spec bar = bar_kept(of, at, colors, k, a);
+        if (input->plain) imp__sweep_plain(s, input, bar);
+        else texels_sweep(s, texels++, k, bar);
     }
 }
 
@@ -138,14 +153,14 @@ static inline void lane_sweep(const struct imp_sweep *s, const struct imp_swept_
 {
     struct arriving a = {.lit = of->lit >> k & 1, .light = P, .step = P * beyond};
     if (imp_unlikely(!of->bsdf)) {
-        if (of->light) sky_piece(s, of->light, k, P);
+        if (of->light) sky_piece(s, of->light, k, carried, P);
         return;
     }
     if (of->light && a.lit) light_piece(s, of->light, k, colors, carried, P);
     if (!of->inputs && !of->dirs) return;
     a.on = (of->on >> k & 1) && !imp__is_zero_used(a.step, carried);
     if (!a.lit && !a.on) return;
-    if (!of->place && !of->dirs && !carried) constants_sweep(s, of, k, colors, &a);
+    if (of->numbers) numbers_sweep(s, of, k, colors, &a);
     else inputs_sweep(s, of, k, colors, carried, &a);
 }
 
@@ -176,14 +191,13 @@ static void sweep(const struct imp_sweep *s, const struct imp_walk *walk, imp_sp
 void imp__swept_sweep(const struct imp_tracer *tracer, const struct imp_walk *walk,
                       imp_spec adjoint, struct imp_sink *sink)
 {
-    const struct imp_sweep s = {tracer, sink, NULL, {0}};
+    const struct imp_sweep s = {tracer, sink, NULL, NULL, {0}};
     sweep(&s, walk, adjoint);
 }
 
 void imp__swept_both(const struct imp_tracer *tracer, const struct imp_walk *walk,
-                     imp_spec adjoint, imp_spec ratio, struct imp_sink *sink,
-                     struct imp_sink *second)
+                     imp_spec adjoint, imp_spec ratio, const struct imp_sink_pair *to)
 {
-    const struct imp_sweep s = {tracer, sink, second, ratio};
+    const struct imp_sweep s = {tracer, to->first, to->second, to, ratio};
     sweep(&s, walk, adjoint);
 }

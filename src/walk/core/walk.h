@@ -126,6 +126,14 @@ struct imp_walk {
         *reduced; /* in place of vertices; NULL: they are there */
 };
 
+/* Two sinks, for the same pieces times two adjoints. */
+struct imp_sink_pair {
+    struct imp_sink *first, *second;
+    /* `bar` to the first, `other` to the second. NULL: by their own functions. */
+    void (*add)(const struct imp_sink_pair *to, int param, size_t element, int channels,
+                const imp_spec *bar, const imp_spec *other);
+};
+
 /* Sweep and tangent of what takes the place of vertices: the first member of struct
  * imp_reduced_of (kept/reduced.h) or of struct imp_swept_walk (bundle/swept.h), which has no tangent. The arguments are those of imp__walk_sweep_values and
  * imp__walk_tangent_values. */
@@ -134,8 +142,7 @@ struct imp_reduced_ops {
                   imp_spec adjoint, struct imp_sink *sink);
     /* Likewise with `ratio` times the adjoint, lane by lane, into a second sink. NULL: swept twice. */
     void (*both)(const struct imp_tracer *tracer, const struct imp_walk *walk,
-                 imp_spec adjoint, imp_spec ratio, struct imp_sink *sink,
-                 struct imp_sink *second);
+                 imp_spec adjoint, imp_spec ratio, const struct imp_sink_pair *to);
     imp_spec (*tangent)(const struct imp_tracer *tracer, const struct imp_walk *walk,
                         imp_dot_fn *dot, const void *x_dot);
 };
@@ -458,11 +465,11 @@ static inline void imp__walk_sweep(const struct imp_tracer *tracer,
         imp__gain_sweep(tracer, walk, adjoint, sink);
 }
 
-/* ... and for another adjoint into a second sink. Derivatives of kernels and emitters are computed
+/* ... and for another adjoint into the second sink. Derivatives of kernels and emitters are computed
  * once for both, where the first adjoint is nowhere 0 alone. */
 void imp__walk_sweep_both(const struct imp_tracer *tracer, const struct imp_walk *walk,
-                          imp_spec adjoint, imp_spec other, struct imp_sink *sink,
-                          struct imp_sink *second);
+                          imp_spec adjoint, imp_spec other,
+                          const struct imp_sink_pair *to);
 
 /* Forward mode: dL in the direction x_dot [active->n]. */
 imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_walk *walk,

@@ -225,39 +225,38 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
         walk->reduced->sweep(tracer, walk, adjoint, sink);
         return;
     }
-    const struct imp_sweep to = {tracer, sink, NULL, {0}};
+    const struct imp_sweep to = {tracer, sink, NULL, NULL, {0}};
     imp_spec P = adjoint;
     vertices_sweep(&to, true, walk, walk->first, walk->depth, &P);
     if (walk->moving) walk->moving->sweep(tracer, walk, adjoint, sink);
 }
 
 /* The second adjoint over the first, lane by lane. False: the first is 0 where the second is not. */
-static bool adjoints_divide(imp_spec first, imp_spec second, imp_spec *ratio)
+static inline bool adjoints_divide(imp_spec first, imp_spec second, imp_spec *ratio)
 {
-    for (int c = 0; c < 4; c++) {
-        if (first[c] == 0 && second[c] != 0) return false;
-        (*ratio)[c] = first[c] != 0 ? second[c] / first[c] : 0;
-    }
-    return true;
+    const imp_spec zero = {0};
+    const __typeof__(first == zero) none = first == zero, alone = none & (second != zero);
+    *ratio = (imp_spec)(~none & (__typeof__(none))(second / first));
+    return !((alone[0] | alone[1]) | (alone[2] | alone[3]));
 }
 
 void imp__walk_sweep_both(const struct imp_tracer *tracer, const struct imp_walk *walk,
-                          imp_spec adjoint, imp_spec other, struct imp_sink *sink,
-                          struct imp_sink *second)
+                          imp_spec adjoint, imp_spec other,
+                          const struct imp_sink_pair *to)
 {
-    struct imp_sweep to = {tracer, sink, second, {0}};
+    struct imp_sweep s = {tracer, to->first, to->second, to, {0}};
     if (walk->dropped || !walk->valid) return;
     if (imp_unlikely(walk->moving || tracer->sensor->gain) ||
         (walk->reduced && !walk->reduced->both) ||
         !adjoints_divide(imp__walk_values(tracer, walk, adjoint),
-                         imp__walk_values(tracer, walk, other), &to.ratio)) {
-        imp__walk_sweep(tracer, walk, adjoint, sink);
-        imp__walk_sweep(tracer, walk, other, second);
+                         imp__walk_values(tracer, walk, other), &s.ratio)) {
+        imp__walk_sweep(tracer, walk, adjoint, to->first);
+        imp__walk_sweep(tracer, walk, other, to->second);
         return;
     }
     imp_spec P = imp__walk_values(tracer, walk, adjoint);
-    if (walk->reduced) walk->reduced->both(tracer, walk, P, to.ratio, sink, second);
-    else vertices_sweep(&to, false, walk, walk->first, walk->depth, &P);
+    if (walk->reduced) walk->reduced->both(tracer, walk, P, s.ratio, to);
+    else vertices_sweep(&s, false, walk, walk->first, walk->depth, &P);
 }
 
 /* ---- Forward: pieces along a direction ------------------------------------------- */
