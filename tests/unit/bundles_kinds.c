@@ -66,7 +66,8 @@ static void ideal(void)
     "<texture type='bitmap' name='" name                                                 \
     "'><string name='filename' value='%s'/><boolean "                                    \
     "name='raw' value='true'/></texture>"
-#define GGX "<string name='distribution' value='ggx'/>"
+#define GGX    "<string name='distribution' value='ggx'/>"
+#define UNSEEN "<boolean name='sample_visible' value='false'/>"
 
 /* Bitmaps by all their wrap modes and filters, as colours and as numbers. */
 static void bitmaps(void)
@@ -118,6 +119,10 @@ static void all_kinds(void)
         KIND("roughdielectric", GGX ALPHA("alpha", ".08")),
         KIND("roughdielectric", GGX ALPHA("alpha_u", ".05") ALPHA("alpha_v", ".3")),
         KIND("roughconductor", ALPHA("alpha", ".2")),
+        KIND("roughconductor", ALPHA("alpha_u", ".05") ALPHA("alpha_v", ".3")),
+        KIND("roughplastic", RED ALPHA("alpha", ".04")),
+        KIND("roughdielectric", GGX UNSEEN ALPHA("alpha", ".2")),
+        KIND("roughconductor", UNSEEN ALPHA("alpha", ".1")),
         KIND("principled",
              PICTURE("base_color") ALPHA("metallic", ".4") ALPHA("clearcoat", ".5")),
         KIND("principled", ALPHA("spec_trans", ".8") ALPHA("roughness", ".3")),

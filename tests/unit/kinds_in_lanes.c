@@ -138,6 +138,10 @@ int main(void)
                                         "specular_transmittance") ALPHA("alpha", ".2")));
     compare(KIND("roughdielectric", GGX ALPHA("alpha_u", ".1") ALPHA("alpha_v", ".5")
                                         ALPHA("int_ior", "1") ALPHA("ext_ior", "1.6")));
+    compare(KIND("roughconductor", ALPHA("alpha", ".2") TINT("specular_reflectance")));
+    compare(KIND("roughplastic", RED TINT("specular_reflectance") ALPHA("alpha", ".3")));
+    compare(KIND("roughdielectric", TINT("specular_transmittance") ALPHA("alpha_u", ".3")
+                                        ALPHA("alpha_v", ".15")));
     compare(KIND("principled", ""));
     compare(KIND("principled",
                  TINT("base_color") ALPHA("spec_tint", ".6") ALPHA("sheen", ".7")

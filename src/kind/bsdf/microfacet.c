@@ -89,6 +89,11 @@ static double g1_exact(const struct imp__microfacet *f, const imp_v3 *v)
     return 2 / (1 + erf(a) + exp(-a * a) / (a * sqrt(IMP_PI)));
 }
 
+double imp__microfacet_g1_exact(const struct imp__microfacet *f, const imp_v3 *v)
+{
+    return g1_exact(f, v);
+}
+
 /* With the part of normals that are drawn for the derivative. */
 static double with_score(const struct imp__microfacet *f, const imp_v3 *m, double D,
                          double p)

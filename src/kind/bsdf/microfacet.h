@@ -48,6 +48,8 @@ double imp__microfacet_d_turned(const struct imp__microfacet *f, const imp_v3 *m
 /* G1(v) on the side of m (v.m > 0 is the caller's business); d (may be NULL): dG1/d(au,
  * av). */
 double imp__microfacet_g1(const struct imp__microfacet *f, const imp_v3 *v, double d[2]);
+/* What G1 of visible normals is divided by, v above the surface. */
+double imp__microfacet_g1_exact(const struct imp__microfacet *f, const imp_v3 *v);
 /* G1 and its slope as a function of t2 = (au^2 x^2 + av^2 y^2)/z^2. */
 double imp__microfacet_g1_of(const struct imp__microfacet *f, double t2, double *slope);
 /* G1(v), and its derivative by v. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * GGX (microfacet.h), a text in lanes (math/lane_text.h): D of normals m, and G1 of directions v, with
- * d ln D and dG1 by au and av. */
+ * d ln D and dG1 by au and av. Of Beckmann's facets the same without D, which is an exponential. */
 
 static inline real WIDE(imp__ggx_d)(real au, real av, real3 m)
 {
@@ -32,4 +32,26 @@ static inline real WIDE(imp__ggx_g1_d)(real au, real av, real3 v, real d[2])
     d[0] = slope * 2 * au * x2;
     d[1] = slope * 2 * av * y2;
     return g;
+}
+
+static inline void WIDE(imp__beckmann_d_log)(real au, real av, real3 m, real d[2])
+{
+    const real x = m.x / au, y = m.y / av, z2 = m.z * m.z;
+    d[0] = choose(m.z > 0, (2 * x * x / z2 - 1) / au, number(0));
+    d[1] = choose(m.z > 0, (2 * y * y / z2 - 1) / av, number(0));
+}
+
+static inline real WIDE(imp__beckmann_g1_d)(real au, real av, real3 v, real d[2])
+{
+    const real z2 = v.z * v.z, x2 = v.x * v.x / z2, y2 = v.y * v.y / z2;
+    const real t2 = au * au * x2 + av * av * y2;
+    const real a = 1 / root_of(t2); /* infinite at normal incidence */
+    const real n = (3.535 + 2.181 * a) * a, m = 1 + (2.276 + 2.577 * a) * a;
+    const truth all = a >= 1.6;
+    const real slope = choose(all, number(0),
+                              ((3.535 + 4.362 * a) * m - n * (2.276 + 5.154 * a)) /
+                                  (m * m) * (-0.5 * a / t2));
+    d[0] = slope * 2 * au * x2;
+    d[1] = slope * 2 * av * y2;
+    return choose(all, number(1), n / m);
 }

@@ -28,13 +28,18 @@ static imp_wide index_of(const struct imp__principled_self *p,
 }
 
 /* imp__burley_facets. */
-static void roughness_of(const struct imp_wide_color *in, imp_wide *au, imp_wide *av)
+static inline struct imp__facets facets_of(const struct imp_wide_color *in,
+                                           imp_wide_truth here, uint64_t derivative)
 {
     const imp_wide a = imp__wide_root(1 - 0.9 * cut(in, ANISOTROPIC)),
                    roughness = cut(in, ROUGHNESS), r2 = roughness * roughness,
                    least = imp__wide(1e-3);
-    *au = imp__wide_larger(r2 / a, least);
-    *av = imp__wide_larger(r2 * a, least);
+    return (struct imp__facets){IMP_GGX,
+                                true,
+                                imp__principled_wanted(derivative),
+                                imp__wide_larger(r2 / a, least),
+                                imp__wide_larger(r2 * a, least),
+                                here};
 }
 
 /* Chances of the facets and of the diffuse lobe (chances_of). */
@@ -59,13 +64,12 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative
                                    const imp_wide u[3], imp_wide3 *wi,
                                    imp_wide_lobe *lobe)
 {
-    imp_wide au, av, facets, diffuse;
+    imp_wide facets, diffuse;
     (void)lobe;
     chances_of(in, derivative, wo->z, index_of(b->self, in), &facets, &diffuse);
-    roughness_of(in, &au, &av);
     const imp_wide_truth lambert = u[0] < diffuse;
-    const imp_wide3 m =
-        imp__ggx_normals(au, av, imp__principled_wanted(derivative), wo, &u[1]);
+    const struct imp__facets q = facets_of(in, ~lambert, derivative);
+    const imp_wide3 m = imp__facets_normals(&q, wo, &u[1]);
     const imp_wide c = imp__wide3_inner(*wo, m);
     imp__lambert_samples(u, wo, wi);
     *wi = imp__wide3_choose(lambert, *wi, imp__mirrors_in(wo, &m, c));
@@ -108,8 +112,9 @@ static imp_wide schlick_by_index(imp_wide e, imp_wide om)
 struct burley {
     imp_wide value, d_roughness, d_flatness;
 };
-static inline struct burley burley(imp_wide cos_o, imp_wide cos_i, imp_wide cos_d,
-                                   imp_wide roughness, imp_wide flatness)
+static inline __attribute__((always_inline)) struct burley
+burley(imp_wide cos_o, imp_wide cos_i, imp_wide cos_d, imp_wide roughness,
+       imp_wide flatness)
 {
     const imp_wide Fo = schlick(cos_o), Fi = schlick(cos_i);
     const imp_wide R = 2 * roughness * cos_d * cos_d, dR = 2 * cos_d * cos_d;
@@ -126,27 +131,27 @@ static inline struct burley burley(imp_wide cos_o, imp_wide cos_i, imp_wide cos_
 
 /* What value and derivatives have in common: the letters of front_add. */
 struct front {
-    imp_wide au, av, e, vm, om, D, Go, DG, W, F, R0, c, m, st, sheen, s_tint, lum,
-        lambert, gloss;
+    imp_wide e, vm, om, D, Go, DG, W, F, R0, c, m, st, sheen, s_tint, lum, lambert, gloss;
     imp_wide3 h;
+    struct imp__facets facets;
     struct burley burley;
     imp_wide_truth there;
 };
-static inline struct front front_of(const struct imp_bsdf *b,
-                                    const struct imp_wide_color *in, const imp_wide3 *wo,
-                                    const imp_wide3 *wi)
+static inline __attribute__((always_inline)) struct front
+front_of(const struct imp_bsdf *b, const struct imp_wide_color *in, const imp_wide3 *wo,
+         const imp_wide3 *wi, uint64_t derivative)
 {
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
     struct front x = {.e = index_of(b->self, in)};
     imp_wide cos_t;
-    roughness_of(in, &x.au, &x.av);
+    x.facets = facets_of(in, imp__fronts(wo, wi), derivative);
     x.h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
     x.vm = imp__wide3_inner(*wo, x.h);
     x.om = imp__wide_lesser(x.vm, one);
     x.there = imp__fronts(wo, wi) & (x.om > zero) & (imp__wide3_inner(*wi, x.h) > zero);
-    x.D = IMP_WIDE_OF(imp__ggx_d)(x.au, x.av, x.h);
-    x.Go = IMP_WIDE_OF(imp__ggx_g1)(x.au, x.av, *wo);
-    x.DG = x.D * x.Go * IMP_WIDE_OF(imp__ggx_g1)(x.au, x.av, *wi);
+    x.D = imp__facets_d(&x.facets, x.h);
+    x.Go = imp__facets_g1(&x.facets, *wo);
+    x.DG = x.D * x.Go * imp__facets_g1(&x.facets, *wi);
     x.W = schlick_at(x.e, x.om);
     x.F = IMP_WIDE_OF(imp__dielectric_from)(x.om, x.e, &cos_t);
     const imp_wide r = (x.e - 1) / (x.e + 1);
@@ -184,7 +189,7 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
                                struct imp_wide_color *f)
 {
-    const struct front x = front_of(b, in, wo, wi);
+    const struct front x = front_of(b, in, wo, wi, derivative);
     imp_wide q_facets, q_diffuse;
     (void)lobe;
     chances_of(in, derivative, wo->z, x.e, &q_facets, &q_diffuse);
@@ -196,9 +201,7 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
     }
     return imp__wide_choose(
         x.there,
-        q_facets *
-                imp__ggx_normals_pdf(x.au, x.av, imp__principled_wanted(derivative), wo,
-                                     &x.h, x.vm, x.D, x.Go) /
+        q_facets * imp__facets_normals_pdf(&x.facets, wo, &x.h, x.vm, x.D, x.Go) /
                 (4 * x.om) +
             q_diffuse * wi->z * IMP_INV_PI,
         imp__wide(0));
@@ -215,9 +218,9 @@ static inline void facets_d(const struct imp_wide_color *in, const struct front 
     const imp_wide by[2][2] = {{2 * roughness / a, 2 * roughness * a},
                                {0.45 * r2 / (a * a * a), -0.45 * r2 / a}};
     imp_wide dlog_D[2], dGo[2], dGi[2];
-    const imp_wide Go = IMP_WIDE_OF(imp__ggx_g1_d)(x->au, x->av, *wo, dGo),
-                   Gi = IMP_WIDE_OF(imp__ggx_g1_d)(x->au, x->av, *wi, dGi);
-    IMP_WIDE_OF(imp__ggx_d_log)(x->au, x->av, x->h, dlog_D);
+    const imp_wide Go = imp__facets_g1_d(&x->facets, *wo, dGo),
+                   Gi = imp__facets_g1_d(&x->facets, *wi, dGi);
+    imp__facets_d_log(&x->facets, x->h, dlog_D);
     d[0] = d[1] = zero;
     for (int k = 0; k < 2; k++) {
         const imp_wide turn = x->D * (dlog_D[k] * Go * Gi + dGo[k] * Gi + Go * dGi[k]);
@@ -242,7 +245,7 @@ static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *
 {
     const struct imp__principled_self *p = b->self;
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
-    const struct front x = front_of(b, in, wo, wi);
+    const struct front x = front_of(b, in, wo, wi, 0);
     imp_wide d_DG[2], F_c, F_e;
     (void)lobe;
     facets_d(in, &x, wo, wi, d_DG);

@@ -142,9 +142,7 @@ const struct imp_bsdf_ops imp__roughconductor = {.size = sizeof(struct imp_bsdf_
                                                  .pdf_eval = pdf_eval,
                                                  .eval_directions_d = eval_directions_d};
 
-/* ---- In lanes: GGX, of visible normals ---------------------------------------------------- */
-
-static bool covers(const struct imp_bsdf *b) { return imp__facets_cover(b->self); }
+/* ---- In lanes ---------------------------------------------------------------------------- */
 
 static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                const struct imp_wide_color *in, const imp_wide3 *wo,
@@ -152,24 +150,20 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                struct imp_wide_color *f)
 {
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
-    imp_wide au, av;
     (void)lobe;
-    imp__roughness_lanes(b->self, &in[ALPHA], &au, &av);
+    const imp_wide_truth here = imp__fronts(wo, wi);
+    const struct imp__facets m =
+        imp__roughness_drawn_lanes(b->self, &in[ALPHA], here, derivative, ALPHA);
     const imp_wide3 h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
-    const imp_wide D = IMP_WIDE_OF(imp__ggx_d)(au, av, h),
-                   Go = IMP_WIDE_OF(imp__ggx_g1)(au, av, *wo),
-                   G = IMP_WIDE_OF(imp__ggx_g1)(au, av, *wi) * Go;
+    const imp_wide D = imp__facets_d(&m, h), Go = imp__facets_g1(&m, *wo),
+                   G = imp__facets_g1(&m, *wi) * Go;
     const imp_wide vm = imp__wide3_inner(*wo, h), by = D * G / (4 * wo->z),
                    c = imp__wide_lesser(vm, one);
     for (int k = 0; k < colors; k++)
         f->c[k] = IMP_WIDE_OF(imp__conductor)(c, in[ETA].c[k], in[K].c[k]) *
                   (in[TINT].c[k] * by);
     return imp__wide_choose(
-        imp__fronts(wo, wi),
-        imp__ggx_normals_pdf(au, av, imp__roughness_wanted(b->self, derivative, ALPHA),
-                             wo, &h, vm, D, Go) /
-            (4 * vm),
-        zero);
+        here, imp__facets_normals_pdf(&m, wo, &h, vm, D, Go) / (4 * vm), zero);
 }
 
 static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative,
@@ -177,11 +171,10 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative
                                    const imp_wide u[3], imp_wide3 *wi,
                                    imp_wide_lobe *lobe)
 {
-    imp_wide au, av;
     (void)lobe;
-    imp__roughness_lanes(b->self, &in[ALPHA], &au, &av);
-    const imp_wide3 h = imp__ggx_normals(
-        au, av, imp__roughness_wanted(b->self, derivative, ALPHA), wo, &u[1]);
+    const struct imp__facets m = imp__roughness_drawn_lanes(
+        b->self, &in[ALPHA], wo->z > imp__wide(0), derivative, ALPHA);
+    const imp_wide3 h = imp__facets_normals(&m, wo, &u[1]);
     const imp_wide c = imp__wide3_inner(*wo, h);
     *wi = imp__mirrors_in(wo, &h, c);
     return imp__fronts(wo, wi) & (c > imp__wide(0));
@@ -194,20 +187,19 @@ static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *
     (void)lobe;
     const struct imp__roughness *r = b->self;
     const imp_wide zero = imp__wide(0);
-    imp_wide au, av, dlog_D[2], dGi[2], dGo[2];
-    imp__roughness_lanes(r, &in[ALPHA], &au, &av);
+    const imp_wide_truth here = imp__fronts(wo, wi);
+    imp_wide dlog_D[2], dGi[2], dGo[2];
     const imp_wide3 h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
-    const imp_wide Gi = IMP_WIDE_OF(imp__ggx_g1_d)(au, av, *wi, dGi),
-                   Go = IMP_WIDE_OF(imp__ggx_g1_d)(au, av, *wo, dGo);
-    IMP_WIDE_OF(imp__ggx_d_log)(au, av, h, dlog_D);
-    const imp_wide c = imp__wide_choose(
-        imp__fronts(wo, wi), IMP_WIDE_OF(imp__ggx_d)(au, av, h) / (4 * wo->z), zero);
+    const struct imp__facets m = imp__roughness_lanes(r, &in[ALPHA], here);
+    const imp_wide Gi = imp__facets_g1_d(&m, *wi, dGi),
+                   Go = imp__facets_g1_d(&m, *wo, dGo);
+    imp__facets_d_log(&m, h, dlog_D);
+    const imp_wide c = imp__wide_choose(here, imp__facets_d(&m, h) / (4 * wo->z), zero);
     imp_wide by[2];
     for (int j = 0; j < 2; j++) {
         const int input = r->anisotropic ? ALPHA_U + j : ALPHA;
         by[j] = c * (dlog_D[j] * Gi * Go + dGi[j] * Go + Gi * dGo[j]);
-        by[j] = imp__wide_choose(imp__fronts(wo, wi) & ~(in[input].c[0] < IMP_ALPHA_MIN),
-                                 by[j], zero);
+        by[j] = imp__wide_choose(here & ~(in[input].c[0] < IMP_ALPHA_MIN), by[j], zero);
     }
     const imp_wide om = imp__wide_lesser(imp__wide3_inner(*wo, h), imp__wide(1)),
                    all = c * Gi * Go;
@@ -227,7 +219,5 @@ static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *
     return true;
 }
 
-const struct imp_bsdf_lanes imp__roughconductor_lanes = {.covers = covers,
-                                                         .sample = sample_lanes,
-                                                         .pdf_eval = pdf_eval_lanes,
-                                                         .eval_d = eval_d_lanes};
+const struct imp_bsdf_lanes imp__roughconductor_lanes = {
+    .sample = sample_lanes, .pdf_eval = pdf_eval_lanes, .eval_d = eval_d_lanes};

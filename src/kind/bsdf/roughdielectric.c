@@ -212,9 +212,7 @@ const struct imp_bsdf_ops imp__roughdielectric = {.size = sizeof(struct imp_bsdf
                                                   .eval_d = eval_d,
                                                   .eval_directions_d = eval_directions_d};
 
-/* ---- In lanes: GGX, of visible normals ---------------------------------------------------- */
-
-static bool covers(const struct imp_bsdf *b) { return imp__facets_cover(b->self); }
+/* ---- In lanes ---------------------------------------------------------------------------- */
 
 /* struct view, and what facet_of makes of it. */
 struct views {
@@ -242,11 +240,11 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative
 {
     const imp_wide zero = imp__wide(0);
     const struct views v = views_of(in, wo, wo);
-    imp_wide au, av, cos_t, eta_t;
+    imp_wide cos_t, eta_t;
     (void)lobe;
-    imp__roughness_lanes(b->self, &in[ALPHA], &au, &av);
-    const imp_wide3 m = imp__ggx_normals(
-        au, av, imp__roughness_wanted(b->self, derivative, ALPHA), &v.wo, &u[1]);
+    const struct imp__facets q =
+        imp__roughness_drawn_lanes(b->self, &in[ALPHA], v.wo.z > zero, derivative, ALPHA);
+    const imp_wide3 m = imp__facets_normals(&q, &v.wo, &u[1]);
     const imp_wide c = imp__wide3_inner(v.wo, m);
     const imp_wide_truth reflects =
         u[0] < IMP_WIDE_OF(imp__dielectric)(imp__wide_lesser(c, imp__wide(1)), v.e,
@@ -287,28 +285,42 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
 {
     const struct views v = views_of(in, wo, wi);
     struct facets x;
-    imp_wide au, av, cos_t, eta_t;
-    imp__roughness_lanes(b->self, &in[ALPHA], &au, &av);
+    imp_wide cos_t, eta_t;
     const imp_wide_truth there = imp__is_smooth(*lobe) & facets_of(&v, &x);
+    const struct imp__facets q =
+        imp__roughness_drawn_lanes(b->self, &in[ALPHA], there, derivative, ALPHA);
     const imp_wide om = x.om, im = x.im, n = x.n;
-    const imp_wide D = IMP_WIDE_OF(imp__ggx_d)(au, av, x.m),
-                   Go = IMP_WIDE_OF(imp__ggx_g1)(au, av, v.wo),
-                   DG = D * IMP_WIDE_OF(imp__ggx_g1)(au, av, v.wi) * Go;
+    const imp_wide D = imp__facets_d(&q, x.m), Go = imp__facets_g1(&q, v.wo),
+                   DG = D * imp__facets_g1(&q, v.wi) * Go;
     const imp_wide F = IMP_WIDE_OF(imp__dielectric)(om, v.e, &cos_t, &eta_t);
     const imp_wide of = imp__wide_choose(v.reflects, F * DG / (4 * v.wo.z),
                                          (1 - F) * DG * om * -im / (v.wo.z * n * n));
     for (int c = 0; c < colors; c++)
         f->c[c] = imp__wide_choose(v.reflects, in[TINT_R].c[c], in[TINT_T].c[c]) * of;
-    const imp_wide p =
-        imp__ggx_normals_pdf(au, av, imp__roughness_wanted(b->self, derivative, ALPHA),
-                             &v.wo, &x.m, x.vm, D, Go);
+    const imp_wide p = imp__facets_normals_pdf(&q, &v.wo, &x.m, x.vm, D, Go);
     return imp__wide_choose(there,
                             imp__wide_choose(v.reflects, F * p / (4 * om),
                                              (1 - F) * p * v.e * v.e * -im / (n * n)),
                             imp__wide(0));
 }
 
-/* The index has no derivative (imp__ggx_glass_jumps). */
+/* By the index, of Beckmann's facets: what `share` times rest has, where the facet turns. */
+static imp_wide by_index(const struct imp__facets *q, const struct views *v,
+                         const struct facets *x, imp_wide share, imp_wide F_c,
+                         imp_wide F_e)
+{
+    const imp_wide3 dm = imp__wide3_times(
+        imp__wide3_minus(v->wi, imp__wide3_times(x->m, x->im)), 1 / x->n);
+    const imp_wide dom = imp__wide3_inner(v->wo, dm), dim = imp__wide3_inner(v->wi, dm);
+    /* imp__microfacet_d_turned */
+    const imp_wide au2 = q->au * q->au, av2 = q->av * q->av, z = x->m.z, dz = dm.z;
+    const imp_wide s = x->m.x * x->m.x / au2 + x->m.y * x->m.y / av2,
+                   ds = 2 * (x->m.x * dm.x / au2 + x->m.y * dm.y / av2);
+    const imp_wide turned = (2 * s * dz / z - ds) / (z * z) - 4 * dz / z;
+    const imp_wide dlog = turned + dom / x->om + dim / x->im - 2 * x->im / x->n;
+    return imp__wide_choose(v->reflects, F_e, -(F_e + F_c * dom) + share * dlog);
+}
+
 static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
                          const imp_wide3 *wo, const imp_wide3 *wi,
                          const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
@@ -317,14 +329,13 @@ static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *
     const imp_wide zero = imp__wide(0);
     const struct views v = views_of(in, wo, wi);
     struct facets x;
-    imp_wide au, av, cos_t, dlog_D[2], dGi[2], dGo[2], by[2];
-    imp__roughness_lanes(r, &in[ALPHA], &au, &av);
+    imp_wide F_c, F_e, dlog_D[2], dGi[2], dGo[2], by[2], by_eta = zero;
     const imp_wide_truth there = imp__is_smooth(*lobe) & facets_of(&v, &x);
-    const imp_wide D = IMP_WIDE_OF(imp__ggx_d)(au, av, x.m),
-                   Gi = IMP_WIDE_OF(imp__ggx_g1_d)(au, av, v.wi, dGi),
-                   Go = IMP_WIDE_OF(imp__ggx_g1_d)(au, av, v.wo, dGo),
-                   F = IMP_WIDE_OF(imp__dielectric_from)(x.om, v.e, &cos_t);
-    IMP_WIDE_OF(imp__ggx_d_log)(au, av, x.m, dlog_D);
+    const struct imp__facets q = imp__roughness_lanes(r, &in[ALPHA], there);
+    const imp_wide D = imp__facets_d(&q, x.m), Gi = imp__facets_g1_d(&q, v.wi, dGi),
+                   Go = imp__facets_g1_d(&q, v.wo, dGo),
+                   F = IMP_WIDE_OF(imp__dielectric_d)(x.om, v.e, &F_c, &F_e);
+    imp__facets_d_log(&q, x.m, dlog_D);
     const imp_wide share = imp__wide_choose(v.reflects, F, 1 - F),
                    rest = imp__wide_choose(v.reflects, D / (4 * v.wo.z),
                                            D * x.om * -x.im / (v.wo.z * x.n * x.n)),
@@ -334,12 +345,17 @@ static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *
         by[j] = share * rest * (dlog_D[j] * Gi * Go + dGi[j] * Go + Gi * dGo[j]);
         by[j] = imp__wide_choose(there & ~(in[input].c[0] < IMP_ALPHA_MIN), by[j], zero);
     }
+    if (q.type != IMP_GGX) /* else the index has none (imp__ggx_glass_jumps) */
+        by_eta = imp__wide_choose(there,
+                                  by_index(&q, &v, &x, share, F_c, F_e) * rest * Gi * Go *
+                                      imp__wide_choose(v.back, -v.e * v.e, imp__wide(1)),
+                                  zero);
     for (int c = 0; c < colors; c++) {
         const imp_wide tint =
             imp__wide_choose(v.reflects, in[TINT_R].c[c], in[TINT_T].c[c]);
         d[TINT_R].c[c] = imp__wide_choose(there & v.reflects, all, zero);
         d[TINT_T].c[c] = imp__wide_choose(there & ~v.reflects, all, zero);
-        d[ETA].c[c] = zero;
+        d[ETA].c[c] = tint * by_eta;
         d[ALPHA].c[c] = r->anisotropic ? zero : tint * by[0] + tint * by[1];
         d[ALPHA_U].c[c] = r->anisotropic ? tint * by[0] : zero;
         d[ALPHA_V].c[c] = r->anisotropic ? tint * by[1] : zero;
@@ -356,8 +372,7 @@ static imp_wide index_ratio_lanes(const struct imp_bsdf *b,
     return imp__wide_choose(v.reflects, imp__wide(1), v.e);
 }
 
-const struct imp_bsdf_lanes imp__roughdielectric_lanes = {.covers = covers,
-                                                          .sample = sample_lanes,
+const struct imp_bsdf_lanes imp__roughdielectric_lanes = {.sample = sample_lanes,
                                                           .pdf_eval = pdf_eval_lanes,
                                                           .eval_d = eval_d_lanes,
                                                           .index_ratio =

@@ -242,13 +242,7 @@ const struct imp_bsdf_ops imp__roughplastic = {.size = sizeof(struct imp_bsdf_op
                                                .changed = changed,
                                                .eval_directions_d = eval_directions_d};
 
-/* ---- In lanes: GGX, of visible normals ---------------------------------------------------- */
-
-static bool covers(const struct imp_bsdf *b)
-{
-    const struct roughplastic *p = b->self;
-    return p->type == IMP_GGX && p->visible;
-}
+/* ---- In lanes ---------------------------------------------------------------------------- */
 
 /* Roughness and index are numbers, the same in all lanes. */
 static struct at at_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in)
@@ -257,6 +251,14 @@ static struct at at_lanes(const struct imp_bsdf *b, const struct imp_wide_color 
     own[ALPHA] = imp__spec(in[ALPHA].c[0][0]);
     own[ETA] = imp__spec(in[ETA].c[0][0]);
     return at_inputs(b, own);
+}
+
+static struct imp__facets facets_of(const struct at *a, imp_wide_truth here,
+                                    uint64_t derivative)
+{
+    const imp_wide alpha = imp__wide(a->alpha);
+    return (struct imp__facets){a->p->type, a->p->visible, wanted_of(derivative),
+                                alpha,      alpha,         here};
 }
 
 /* imp__coat_T at mu, the first n of the dual. */
@@ -292,8 +294,7 @@ static imp_wide lets_through(const struct at *a, imp_wide mu)
 static imp_wide facet_chances(const struct imp_wide_color *in, uint64_t derivative,
                               imp_wide through)
 {
-    const imp_wide T =
-        imp__wide_larger(imp__wide_lesser(through, imp__wide(1)), imp__wide(0));
+    const imp_wide T = imp__wide_clamp(through, 0, 1);
     return imp__coated_chances(&in[TINT], &in[DIFFUSE], derivative, 1 - T, OF_FACETS);
 }
 
@@ -303,10 +304,11 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative
                                    imp_wide_lobe *lobe)
 {
     const struct at a = at_lanes(b, in);
-    const imp_wide alpha = imp__wide(a.alpha);
     const imp_wide_truth facets =
         u[0] < facet_chances(in, derivative, lets_through(&a, wo->z));
-    const imp_wide3 h = imp__ggx_normals(alpha, alpha, wanted_of(derivative), wo, &u[1]);
+    const struct imp__facets m =
+        facets_of(&a, facets & (wo->z > imp__wide(0)), derivative);
+    const imp_wide3 h = imp__facets_normals(&m, wo, &u[1]);
     const imp_wide c = imp__wide3_inner(*wo, h);
     const imp_wide_truth drawn = imp__lambert_samples(u, wo, wi);
     (void)lobe;
@@ -320,12 +322,13 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                struct imp_wide_color *f)
 {
     const struct at a = at_lanes(b, in);
-    const imp_wide alpha = imp__wide(a.alpha), eta = imp__wide(a.eta);
+    const imp_wide_truth here = imp__fronts(wo, wi);
+    const struct imp__facets m = facets_of(&a, here, derivative);
+    const imp_wide eta = imp__wide(a.eta);
     const imp_wide3 h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
     const imp_wide vm = imp__wide3_inner(*wo, h), lambert = imp__lamberts(wo, wi);
-    const imp_wide D = IMP_WIDE_OF(imp__ggx_d)(alpha, alpha, h),
-                   Go = IMP_WIDE_OF(imp__ggx_g1)(alpha, alpha, *wo),
-                   Gi = IMP_WIDE_OF(imp__ggx_g1)(alpha, alpha, *wi);
+    const imp_wide D = imp__facets_d(&m, h), Go = imp__facets_g1(&m, *wo),
+                   Gi = imp__facets_g1(&m, *wi);
     const imp_wide To = lets_through(&a, wo->z), Ti = lets_through(&a, wi->z);
     imp_wide cos_t, eta_t;
     (void)lobe;
@@ -341,10 +344,8 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
     }
     const imp_wide q = facet_chances(in, derivative, To);
     return imp__wide_choose(
-        imp__fronts(wo, wi),
-        q * imp__ggx_normals_pdf(alpha, alpha, wanted_of(derivative), wo, &h, vm, D, Go) /
-                (4 * vm) +
-            (1 - q) * lambert,
+        here,
+        q * imp__facets_normals_pdf(&m, wo, &h, vm, D, Go) / (4 * vm) + (1 - q) * lambert,
         imp__wide(0));
 }
 
@@ -353,18 +354,18 @@ static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *
                          const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
 {
     const struct at a = at_lanes(b, in);
-    const imp_wide zero = imp__wide(0), one = imp__wide(1), alpha = imp__wide(a.alpha),
-                   eta = imp__wide(a.eta);
     const imp_wide_truth here = imp__fronts(wo, wi);
+    const struct imp__facets m = facets_of(&a, here, 0);
+    const imp_wide zero = imp__wide(0), one = imp__wide(1), eta = imp__wide(a.eta);
     const imp_wide3 h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
     imp_wide dlog_D[2], dGi[2], dGo[2], F_c, F_e, Ti[3], To[3];
     (void)lobe;
     const imp_wide F = IMP_WIDE_OF(imp__dielectric_d)(
         imp__wide_lesser(imp__wide3_inner(*wo, h), one), eta, &F_c, &F_e);
-    const imp_wide Gi = IMP_WIDE_OF(imp__ggx_g1_d)(alpha, alpha, *wi, dGi),
-                   Go = IMP_WIDE_OF(imp__ggx_g1_d)(alpha, alpha, *wo, dGo),
-                   c = IMP_WIDE_OF(imp__ggx_d)(alpha, alpha, h) / (4 * wo->z);
-    IMP_WIDE_OF(imp__ggx_d_log)(alpha, alpha, h, dlog_D);
+    const imp_wide Gi = imp__facets_g1_d(&m, *wi, dGi),
+                   Go = imp__facets_g1_d(&m, *wo, dGo),
+                   c = imp__facets_d(&m, h) / (4 * wo->z);
+    imp__facets_d_log(&m, h, dlog_D);
     const imp_wide by_tint = F * c * Gi * Go, facets_eta = F_e * c * Gi * Go,
                    facets_alpha = F * c *
                                   ((dlog_D[0] + dlog_D[1]) * Gi * Go +
@@ -395,7 +396,5 @@ static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *
     return true;
 }
 
-const struct imp_bsdf_lanes imp__roughplastic_lanes = {.covers = covers,
-                                                       .sample = sample_lanes,
-                                                       .pdf_eval = pdf_eval_lanes,
-                                                       .eval_d = eval_d_lanes};
+const struct imp_bsdf_lanes imp__roughplastic_lanes = {
+    .sample = sample_lanes, .pdf_eval = pdf_eval_lanes, .eval_d = eval_d_lanes};
