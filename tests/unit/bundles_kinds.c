@@ -125,6 +125,7 @@ static void all_kinds(void)
         KIND("roughconductor", UNSEEN ALPHA("alpha", ".1")),
         KIND("principled",
              PICTURE("base_color") ALPHA("metallic", ".4") ALPHA("clearcoat", ".5")),
+        KIND("principled", PICTURE("clearcoat_gloss") ALPHA("clearcoat", ".9")),
         KIND("principled", ALPHA("spec_trans", ".8") ALPHA("roughness", ".3")),
         KIND("principled",
              "<rgb name='base_color' value='.8,.3,.1'/>" ALPHA("spec_tint", ".6")

@@ -150,6 +150,10 @@ int main(void)
                              ALPHA("metallic", ".3") ALPHA("specular", ".4")));
     compare(KIND("principled", TINT("base_color") ALPHA("eta", ".7") ALPHA("sheen", ".4")
                                    ALPHA("metallic", ".2") ALPHA("spec_tint", ".9")));
+    compare(KIND("principled", TINT("base_color") ALPHA("clearcoat", ".7")
+                                   ALPHA("clearcoat_gloss", ".3") ALPHA("eta", ".8")
+                                       ALPHA("metallic", ".4")));
+    compare(KIND("principled", ALPHA("clearcoat", "0") ALPHA("specular", ".2")));
     compare(KIND("principled", ALPHA("roughness", "0.01") ALPHA("metallic", "1")
                                    ALPHA("anisotropic", "1")));
     compare(KIND("twosided", KIND("plastic", RED) GOLD(ALPHA("alpha", ".3"))));

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * principled in lanes, where nothing is transmitted and there is no clearcoat: facets, diffuse lobe and
- * sheen of principled.c, whose letters these are. */
+ * principled in lanes, where nothing is transmitted: facets, clearcoat, diffuse lobe and sheen of
+ * principled.c, whose letters these are. */
 #include "facet_lanes.h"
 #include "fresnel_lanes.h"
 #include "principled.h"
@@ -9,8 +9,16 @@
 static bool covers(const struct imp_bsdf *b)
 {
     const struct imp__principled_self *p = b->self;
-    return !p->transmits && !p->coated;
+    return !p->transmits;
 }
+
+static bool is_coated(const struct imp_bsdf *b)
+{
+    return ((const struct imp__principled_self *)b->self)->coated;
+}
+
+/* Functions that are compiled with a clearcoat and without one. */
+#define COATED_OR_NOT static inline __attribute__((always_inline))
 
 /* Numbers, cut. */
 static imp_wide cut(const struct imp_wide_color *in, int j)
@@ -42,39 +50,94 @@ static inline struct imp__facets facets_of(const struct imp_wide_color *in,
                                 here};
 }
 
-/* Chances of the facets and of the diffuse lobe (chances_of). */
-static void chances_of(const struct imp_wide_color *in, uint64_t derivative,
-                       imp_wide cos_o, imp_wide e, imp_wide *facets, imp_wide *diffuse)
+/* ---- Clearcoat ------------------------------------------------------------------- */
+
+static imp_wide coat_alpha(const struct imp_wide_color *in)
 {
+    return 0.1 - 0.099 * cut(in, GLOSS);
+}
+/* coat_d; logarithms are the C library's. */
+static imp_wide coat_d(const struct imp_wide_color *in, imp_wide z, imp_wide *d_log)
+{
+    const imp_wide alpha = coat_alpha(in), A = alpha * alpha, q = 1 + (A - 1) * z * z;
+    imp_wide l;
+    for (int k = 0; k < IMP_WIDE_LANES; k++)
+        l[k] = k > 0 && A[k] == A[k - 1] ? l[k - 1] : log(A[k]);
+    *d_log = (1 / (A - 1) - 1 / (A * l) - z * z / q) * 2 * alpha * -0.099;
+    return (A - 1) / (IMP_PI * l * q);
+}
+/* coat_normal, where `here`. */
+static void coat_normals(const struct imp_wide_color *in, const imp_wide u[2],
+                         imp_wide_truth here, imp_wide3 *m)
+{
+    const imp_wide alpha = coat_alpha(in), A = alpha * alpha;
+    for (unsigned left = imp__wide_bits(here); left; left &= left - 1) {
+        const int k = __builtin_ctz(left);
+        const double phi = IMP_2PI * u[1][k],
+                     z2 = (1 - pow(A[k], 1 - u[0][k])) / (1 - A[k]),
+                     s = sqrt(imp_max(0, 1 - z2));
+        imp__wide3_set(m, k, imp__v3(s * cos(phi), s * sin(phi), sqrt(imp_max(z2, 0))));
+    }
+}
+
+/* ---- Drawing --------------------------------------------------------------------- */
+
+struct chances {
+    imp_wide facets, diffuse, coat;
+};
+COATED_OR_NOT struct chances chances_of(const bool coated,
+                                        const struct imp_wide_color *in,
+                                        uint64_t derivative, imp_wide cos_o, imp_wide e)
+{
+    const imp_wide zero = imp__wide(0);
     imp_wide cos_t, eta_t;
     const imp_wide m = cut(in, METALLIC),
                    F = IMP_WIDE_OF(imp__dielectric)(cos_o, e, &cos_t, &eta_t);
-    const imp_wide f = imp__wide_larger(
-        m + (1 - m) * F, imp__wide(imp__lobe_least(derivative, IMP_OF_FACETS)));
-    imp_wide d = (1 - m) * imp__wide_larger(imp__wide(1), cut(in, SHEEN));
+    struct chances q = {
+        imp__wide_larger(m + (1 - m) * F,
+                         imp__wide(imp__lobe_least(derivative, IMP_OF_FACETS))),
+        (1 - m) * imp__wide_larger(imp__wide(1), cut(in, SHEEN)), zero};
     if (derivative)
-        d = imp__wide_larger(d, imp__wide(imp__lobe_least(derivative, IMP_OF_DIFFUSE)));
-    const imp_wide all = 1 / (f + d);
-    *facets = f * all;
-    *diffuse = d * all;
+        q.diffuse = imp__wide_larger(
+            q.diffuse, imp__wide(imp__lobe_least(derivative, IMP_OF_DIFFUSE)));
+    if (coated) {
+        const imp_wide coat = 0.25 * cut(in, CLEARCOAT),
+                       own = imp__wide_larger(coat, imp__wide(0.03));
+        q.coat = derivative ? own : imp__wide_choose(coat > zero, own, zero);
+    }
+    const imp_wide all = 1 / (q.facets + q.diffuse + q.coat);
+    return (struct chances){q.facets * all, q.diffuse * all, q.coat * all};
 }
 
+COATED_OR_NOT imp_wide_truth sample_as(const bool coated, const struct imp_bsdf *b,
+                                       uint64_t derivative,
+                                       const struct imp_wide_color *in,
+                                       const imp_wide3 *wo, const imp_wide u[3],
+                                       imp_wide3 *wi)
+{
+    const struct chances q =
+        chances_of(coated, in, derivative, wo->z, index_of(b->self, in));
+    const imp_wide_truth lambert = u[0] < q.diffuse,
+                         coat = coated ? ~lambert & (u[0] < q.diffuse + q.coat)
+                                       : (imp_wide_truth){0};
+    const struct imp__facets f = facets_of(in, ~(lambert | coat), derivative);
+    imp_wide3 m = imp__facets_normals(&f, wo, &u[1]);
+    if (coated) coat_normals(in, &u[1], coat, &m);
+    const imp_wide c = imp__wide3_inner(*wo, m);
+    imp__lambert_samples(u, wo, wi);
+    *wi = imp__wide3_choose(lambert, *wi, imp__mirrors_in(wo, &m, c));
+    return imp__fronts(wo, wi) &
+           (lambert |
+            ((c > imp__wide(0)) & (coat | (u[0] < q.diffuse + q.coat + q.facets))));
+}
 static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                    const struct imp_wide_color *in, const imp_wide3 *wo,
                                    const imp_wide u[3], imp_wide3 *wi,
                                    imp_wide_lobe *lobe)
 {
-    imp_wide facets, diffuse;
     (void)lobe;
-    chances_of(in, derivative, wo->z, index_of(b->self, in), &facets, &diffuse);
-    const imp_wide_truth lambert = u[0] < diffuse;
-    const struct imp__facets q = facets_of(in, ~lambert, derivative);
-    const imp_wide3 m = imp__facets_normals(&q, wo, &u[1]);
-    const imp_wide c = imp__wide3_inner(*wo, m);
-    imp__lambert_samples(u, wo, wi);
-    *wi = imp__wide3_choose(lambert, *wi, imp__mirrors_in(wo, &m, c));
-    return imp__fronts(wo, wi) &
-           (lambert | ((c > imp__wide(0)) & (u[0] < diffuse + facets)));
+    return is_coated(b) ? sample_as(true, b, derivative, in, wo, u, wi)
+                        : sample_as(false, b, derivative, in, wo, u, wi);
 }
 
 /* ---- Value and derivatives ------------------------------------------------------- */
@@ -112,9 +175,8 @@ static imp_wide schlick_by_index(imp_wide e, imp_wide om)
 struct burley {
     imp_wide value, d_roughness, d_flatness;
 };
-static inline __attribute__((always_inline)) struct burley
-burley(imp_wide cos_o, imp_wide cos_i, imp_wide cos_d, imp_wide roughness,
-       imp_wide flatness)
+COATED_OR_NOT struct burley burley(imp_wide cos_o, imp_wide cos_i, imp_wide cos_d,
+                                   imp_wide roughness, imp_wide flatness)
 {
     const imp_wide Fo = schlick(cos_o), Fi = schlick(cos_i);
     const imp_wide R = 2 * roughness * cos_d * cos_d, dR = 2 * cos_d * cos_d;
@@ -132,14 +194,15 @@ burley(imp_wide cos_o, imp_wide cos_i, imp_wide cos_d, imp_wide roughness,
 /* What value and derivatives have in common: the letters of front_add. */
 struct front {
     imp_wide e, vm, om, D, Go, DG, W, F, R0, c, m, st, sheen, s_tint, lum, lambert, gloss;
+    imp_wide coat_D, dlog_coat, coat, coat_F, cc; /* if coated */
     imp_wide3 h;
     struct imp__facets facets;
     struct burley burley;
     imp_wide_truth there;
 };
-static inline __attribute__((always_inline)) struct front
-front_of(const struct imp_bsdf *b, const struct imp_wide_color *in, const imp_wide3 *wo,
-         const imp_wide3 *wi, uint64_t derivative)
+COATED_OR_NOT struct front front_of(const bool coated, const struct imp_bsdf *b,
+                                    const struct imp_wide_color *in, const imp_wide3 *wo,
+                                    const imp_wide3 *wi, uint64_t derivative)
 {
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
     struct front x = {.e = index_of(b->self, in)};
@@ -165,6 +228,13 @@ front_of(const struct imp_bsdf *b, const struct imp_wide_color *in, const imp_wi
     x.lambert = wi->z * IMP_INV_PI;
     x.gloss = schlick(x.om) * wi->z;
     x.burley = burley(wo->z, wi->z, x.om, cut(in, ROUGHNESS), cut(in, FLATNESS));
+    if (!coated) return x;
+    const imp_wide quarter = imp__wide(0.25);
+    x.coat_D = coat_d(in, x.h.z, &x.dlog_coat);
+    x.coat = 0.25 * x.coat_D * IMP_WIDE_OF(imp__ggx_g1)(quarter, quarter, *wo) *
+             IMP_WIDE_OF(imp__ggx_g1)(quarter, quarter, *wi) * wi->z;
+    x.coat_F = 0.04 + 0.96 * x.W;
+    x.cc = cut(in, CLEARCOAT);
     return x;
 }
 /* Its colours. */
@@ -184,27 +254,35 @@ static inline struct dyes dyes_of(const struct front *x, imp_wide base)
     return y;
 }
 
-static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
-                               const struct imp_wide_color *in, const imp_wide3 *wo,
-                               const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
-                               struct imp_wide_color *f)
+COATED_OR_NOT imp_wide pdf_eval_as(const bool coated, const struct imp_bsdf *b,
+                                   uint64_t derivative, const struct imp_wide_color *in,
+                                   const imp_wide3 *wo, const imp_wide3 *wi, int colors,
+                                   struct imp_wide_color *f)
 {
-    const struct front x = front_of(b, in, wo, wi, derivative);
-    imp_wide q_facets, q_diffuse;
-    (void)lobe;
-    chances_of(in, derivative, wo->z, x.e, &q_facets, &q_diffuse);
+    const struct front x = front_of(coated, b, in, wo, wi, derivative);
+    const struct chances q = chances_of(coated, in, derivative, wo->z, x.e);
     for (int k = 0; k < colors; k++) {
         const struct dyes y = dyes_of(&x, in[BASE].c[k]);
         f->c[k] = y.Fp * (x.DG * x.c) +
                   y.base * (x.burley.value * x.lambert * (1 - x.m)) +
                   y.dye * (x.sheen * (1 - x.m) * x.gloss);
+        if (coated) f->c[k] += x.cc * x.coat * x.coat_F;
     }
-    return imp__wide_choose(
-        x.there,
-        q_facets * imp__facets_normals_pdf(&x.facets, wo, &x.h, x.vm, x.D, x.Go) /
-                (4 * x.om) +
-            q_diffuse * wi->z * IMP_INV_PI,
-        imp__wide(0));
+    imp_wide sum = q.facets *
+                       imp__facets_normals_pdf(&x.facets, wo, &x.h, x.vm, x.D, x.Go) /
+                       (4 * x.om) +
+                   q.diffuse * wi->z * IMP_INV_PI;
+    if (coated) sum += q.coat * x.coat_D * x.h.z / (4 * x.om);
+    return imp__wide_choose(x.there, sum, imp__wide(0));
+}
+static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
+                               const struct imp_wide_color *in, const imp_wide3 *wo,
+                               const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
+                               struct imp_wide_color *f)
+{
+    (void)lobe;
+    return is_coated(b) ? pdf_eval_as(true, b, derivative, in, wo, wi, colors, f)
+                        : pdf_eval_as(false, b, derivative, in, wo, wi, colors, f);
 }
 
 /* Derivatives of DG by roughness and anisotropic (imp__burley_lobe). */
@@ -239,15 +317,14 @@ static imp_wide index_slope(const struct imp__principled_self *p,
     return 2 / ((1 - q) * (1 - q)) * 0.04 / q;
 }
 
-static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                         const imp_wide3 *wo, const imp_wide3 *wi,
-                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
+COATED_OR_NOT void eval_d_as(const bool coated, const struct imp_bsdf *b,
+                             const struct imp_wide_color *in, const imp_wide3 *wo,
+                             const imp_wide3 *wi, int colors, struct imp_wide_color *d)
 {
     const struct imp__principled_self *p = b->self;
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
-    const struct front x = front_of(b, in, wo, wi, 0);
+    const struct front x = front_of(coated, b, in, wo, wi, 0);
     imp_wide d_DG[2], F_c, F_e;
-    (void)lobe;
     facets_d(in, &x, wo, wi, d_DG);
     IMP_WIDE_OF(imp__dielectric_d)(x.om, x.e, &F_c, &F_e);
     const imp_wide W = x.W, W_e = schlick_by_index(x.e, x.om), F = x.F, m = x.m,
@@ -269,11 +346,12 @@ static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *
     for (int k = 0; k < colors; k++) {
         const struct dyes y = dyes_of(&x, in[BASE].c[k]);
         const imp_wide base = y.base, tint = y.tint;
-        const imp_wide d_e =
+        imp_wide d_e =
             ((one - base) * (m * W_e) +
              ((one - tint * R0) * W_e + tint * ((1 - W) * dR0)) * ((1 - m) * st) +
              (1 - m) * (1 - st) * F_e) *
             (DG * c);
+        if (coated) d_e += x.cc * x.coat * 0.96 * W_e;
         const imp_wide own[N_INPUTS] = {
             [BASE] = m * (1 - W) * DG * c + x.burley.value * lambert * brdf +
                      by_tint * tint_base,
@@ -287,11 +365,21 @@ static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *
             [SHEEN] = y.dye * ((1 - m) * gloss),
             [SHEEN_TINT] = (tint - one) * (sheen * (1 - m) * gloss),
             [FLATNESS] = base * (x.burley.d_flatness * lambert * brdf),
+            [CLEARCOAT] = coated ? x.coat * x.coat_F : zero,
+            [GLOSS] = coated ? x.cc * x.coat * x.coat_F * x.dlog_coat : zero,
             [ETA] = p->by_eta ? d_e * de : zero,
             [SPECULAR] = p->by_eta ? zero : d_e * de};
         for (int j = 0; j < N_INPUTS; j++)
             d[j].c[k] = imp__wide_choose(there[j], own[j], zero);
     }
+}
+static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
+                         const imp_wide3 *wo, const imp_wide3 *wi,
+                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
+{
+    (void)lobe;
+    if (is_coated(b)) eval_d_as(true, b, in, wo, wi, colors, d);
+    else eval_d_as(false, b, in, wo, wi, colors, d);
     return true;
 }
 
