@@ -127,7 +127,7 @@ struct imp_texture_lanes {
      * anything. */
     void (*eval)(const struct imp_texture *t, const imp_wide uv[2], bool scalar,
                  struct imp_wide_color *value);
-    /* imp_texture_ops.scatter, likewise. False: it has no such form. */
+    /* imp_texture_ops.scatter, likewise. False, or NULL: it has no such form. */
     bool (*texels)(const struct imp_texture *t, const imp_wide uv[2], bool scalar,
                    struct imp_wide_texels *out);
 };

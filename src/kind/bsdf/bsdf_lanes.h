@@ -17,6 +17,35 @@ extern const struct imp_bsdf_lanes imp__conductor_lanes, imp__dielectric_lanes,
     imp__roughconductor_lanes, imp__roughdielectric_lanes, imp__roughplastic_lanes,
     imp__twosided_lanes;
 
+/* sample, pdf_eval and eval_d of struct imp_bsdf_lanes, compiled for both values of a condition on the
+ * material, which is their first argument: sample_as, pdf_eval_as, eval_d_as. */
+#define IMP_EITHER_WAY static inline __attribute__((always_inline))
+#define IMP_KERNEL_BY(is)                                                                \
+    static imp_wide_truth sample_lanes(                                                  \
+        const struct imp_bsdf *b, uint64_t derivative, const struct imp_wide_color *in,  \
+        const imp_wide3 *wo, const imp_wide u[3], imp_wide3 *wi, imp_wide_lobe *lobe)    \
+    {                                                                                    \
+        return imp_likely(is(b)) ? sample_as(true, b, derivative, in, wo, u, wi, lobe)   \
+                                 : sample_as(false, b, derivative, in, wo, u, wi, lobe); \
+    }                                                                                    \
+    static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,        \
+                                   const struct imp_wide_color *in, const imp_wide3 *wo, \
+                                   const imp_wide3 *wi, const imp_wide_lobe *lobe,       \
+                                   int colors, struct imp_wide_color *f)                 \
+    {                                                                                    \
+        return imp_likely(is(b))                                                         \
+                   ? pdf_eval_as(true, b, derivative, in, wo, wi, lobe, colors, f)       \
+                   : pdf_eval_as(false, b, derivative, in, wo, wi, lobe, colors, f);     \
+    }                                                                                    \
+    static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,  \
+                             const imp_wide3 *wo, const imp_wide3 *wi,                   \
+                             const imp_wide_lobe *lobe, int colors,                      \
+                             struct imp_wide_color *d)                                   \
+    {                                                                                    \
+        return imp_likely(is(b)) ? eval_d_as(true, b, in, wo, wi, lobe, colors, d)       \
+                                 : eval_d_as(false, b, in, wo, wi, lobe, colors, d);     \
+    }
+
 static inline imp_wide_truth imp__fronts(const imp_wide3 *wo, const imp_wide3 *wi)
 {
     const imp_wide zero = imp__wide(0);

@@ -23,14 +23,21 @@ struct imp__facets {
     imp_wide au, av;
     imp_wide_truth here; /* lanes that count */
 };
+/* Most are so: what is compiled for them knows it (`ggx`). */
+static inline bool imp__are_ggx_visible(const struct imp_bsdf *b)
+{
+    const struct imp__roughness *r = b->self;
+    return r->type == IMP_GGX && r->visible;
+}
 /* in: the three inputs. */
-static inline struct imp__facets imp__roughness_lanes(const struct imp__roughness *r,
+static inline struct imp__facets imp__roughness_lanes(const bool ggx,
+                                                      const struct imp__roughness *r,
                                                       const struct imp_wide_color *in,
                                                       imp_wide_truth here)
 {
     const imp_wide least = imp__wide(IMP_ALPHA_MIN);
-    return (struct imp__facets){r->type,
-                                r->visible,
+    return (struct imp__facets){ggx ? IMP_GGX : r->type,
+                                ggx || r->visible,
                                 0,
                                 imp__wide_larger(in[r->anisotropic ? 1 : 0].c[0], least),
                                 imp__wide_larger(in[r->anisotropic ? 2 : 0].c[0], least),
@@ -38,11 +45,11 @@ static inline struct imp__facets imp__roughness_lanes(const struct imp__roughnes
 }
 /* imp__roughness_drawn. */
 static inline struct imp__facets
-imp__roughness_drawn_lanes(const struct imp__roughness *r,
+imp__roughness_drawn_lanes(const bool ggx, const struct imp__roughness *r,
                            const struct imp_wide_color *in, imp_wide_truth here,
                            uint64_t derivative, int first)
 {
-    struct imp__facets f = imp__roughness_lanes(r, in, here);
+    struct imp__facets f = imp__roughness_lanes(ggx, r, in, here);
     f.wanted = imp__roughness_wanted(r, derivative, first);
     return f;
 }

@@ -17,9 +17,6 @@ static bool is_coated(const struct imp_bsdf *b)
     return ((const struct imp__principled_self *)b->self)->coated;
 }
 
-/* Functions that are compiled with a clearcoat and without one. */
-#define COATED_OR_NOT static inline __attribute__((always_inline))
-
 /* Numbers, cut. */
 static imp_wide cut(const struct imp_wide_color *in, int j)
 {
@@ -85,9 +82,9 @@ static void coat_normals(const struct imp_wide_color *in, const imp_wide u[2],
 struct chances {
     imp_wide facets, diffuse, coat;
 };
-COATED_OR_NOT struct chances chances_of(const bool coated,
-                                        const struct imp_wide_color *in,
-                                        uint64_t derivative, imp_wide cos_o, imp_wide e)
+IMP_EITHER_WAY struct chances chances_of(const bool coated,
+                                         const struct imp_wide_color *in,
+                                         uint64_t derivative, imp_wide cos_o, imp_wide e)
 {
     const imp_wide zero = imp__wide(0);
     imp_wide cos_t, eta_t;
@@ -109,12 +106,13 @@ COATED_OR_NOT struct chances chances_of(const bool coated,
     return (struct chances){q.facets * all, q.diffuse * all, q.coat * all};
 }
 
-COATED_OR_NOT imp_wide_truth sample_as(const bool coated, const struct imp_bsdf *b,
-                                       uint64_t derivative,
-                                       const struct imp_wide_color *in,
-                                       const imp_wide3 *wo, const imp_wide u[3],
-                                       imp_wide3 *wi)
+IMP_EITHER_WAY imp_wide_truth sample_as(const bool coated, const struct imp_bsdf *b,
+                                        uint64_t derivative,
+                                        const struct imp_wide_color *in,
+                                        const imp_wide3 *wo, const imp_wide u[3],
+                                        imp_wide3 *wi, imp_wide_lobe *lobe)
 {
+    (void)lobe;
     const struct chances q =
         chances_of(coated, in, derivative, wo->z, index_of(b->self, in));
     const imp_wide_truth lambert = u[0] < q.diffuse,
@@ -130,16 +128,6 @@ COATED_OR_NOT imp_wide_truth sample_as(const bool coated, const struct imp_bsdf 
            (lambert |
             ((c > imp__wide(0)) & (coat | (u[0] < q.diffuse + q.coat + q.facets))));
 }
-static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative,
-                                   const struct imp_wide_color *in, const imp_wide3 *wo,
-                                   const imp_wide u[3], imp_wide3 *wi,
-                                   imp_wide_lobe *lobe)
-{
-    (void)lobe;
-    return is_coated(b) ? sample_as(true, b, derivative, in, wo, u, wi)
-                        : sample_as(false, b, derivative, in, wo, u, wi);
-}
-
 /* ---- Value and derivatives ------------------------------------------------------- */
 
 static imp_wide schlick(imp_wide c)
@@ -175,8 +163,8 @@ static imp_wide schlick_by_index(imp_wide e, imp_wide om)
 struct burley {
     imp_wide value, d_roughness, d_flatness;
 };
-COATED_OR_NOT struct burley burley(imp_wide cos_o, imp_wide cos_i, imp_wide cos_d,
-                                   imp_wide roughness, imp_wide flatness)
+IMP_EITHER_WAY struct burley burley(imp_wide cos_o, imp_wide cos_i, imp_wide cos_d,
+                                    imp_wide roughness, imp_wide flatness)
 {
     const imp_wide Fo = schlick(cos_o), Fi = schlick(cos_i);
     const imp_wide R = 2 * roughness * cos_d * cos_d, dR = 2 * cos_d * cos_d;
@@ -200,9 +188,9 @@ struct front {
     struct burley burley;
     imp_wide_truth there;
 };
-COATED_OR_NOT struct front front_of(const bool coated, const struct imp_bsdf *b,
-                                    const struct imp_wide_color *in, const imp_wide3 *wo,
-                                    const imp_wide3 *wi, uint64_t derivative)
+IMP_EITHER_WAY struct front front_of(const bool coated, const struct imp_bsdf *b,
+                                     const struct imp_wide_color *in, const imp_wide3 *wo,
+                                     const imp_wide3 *wi, uint64_t derivative)
 {
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
     struct front x = {.e = index_of(b->self, in)};
@@ -254,11 +242,13 @@ static inline struct dyes dyes_of(const struct front *x, imp_wide base)
     return y;
 }
 
-COATED_OR_NOT imp_wide pdf_eval_as(const bool coated, const struct imp_bsdf *b,
-                                   uint64_t derivative, const struct imp_wide_color *in,
-                                   const imp_wide3 *wo, const imp_wide3 *wi, int colors,
-                                   struct imp_wide_color *f)
+IMP_EITHER_WAY imp_wide pdf_eval_as(const bool coated, const struct imp_bsdf *b,
+                                    uint64_t derivative, const struct imp_wide_color *in,
+                                    const imp_wide3 *wo, const imp_wide3 *wi,
+                                    const imp_wide_lobe *lobe, int colors,
+                                    struct imp_wide_color *f)
 {
+    (void)lobe;
     const struct front x = front_of(coated, b, in, wo, wi, derivative);
     const struct chances q = chances_of(coated, in, derivative, wo->z, x.e);
     for (int k = 0; k < colors; k++) {
@@ -275,16 +265,6 @@ COATED_OR_NOT imp_wide pdf_eval_as(const bool coated, const struct imp_bsdf *b,
     if (coated) sum += q.coat * x.coat_D * x.h.z / (4 * x.om);
     return imp__wide_choose(x.there, sum, imp__wide(0));
 }
-static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
-                               const struct imp_wide_color *in, const imp_wide3 *wo,
-                               const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
-                               struct imp_wide_color *f)
-{
-    (void)lobe;
-    return is_coated(b) ? pdf_eval_as(true, b, derivative, in, wo, wi, colors, f)
-                        : pdf_eval_as(false, b, derivative, in, wo, wi, colors, f);
-}
-
 /* Derivatives of DG by roughness and anisotropic (imp__burley_lobe). */
 static inline void facets_d(const struct imp_wide_color *in, const struct front *x,
                             const imp_wide3 *wo, const imp_wide3 *wi, imp_wide d[2])
@@ -317,10 +297,12 @@ static imp_wide index_slope(const struct imp__principled_self *p,
     return 2 / ((1 - q) * (1 - q)) * 0.04 / q;
 }
 
-COATED_OR_NOT void eval_d_as(const bool coated, const struct imp_bsdf *b,
-                             const struct imp_wide_color *in, const imp_wide3 *wo,
-                             const imp_wide3 *wi, int colors, struct imp_wide_color *d)
+IMP_EITHER_WAY bool eval_d_as(const bool coated, const struct imp_bsdf *b,
+                              const struct imp_wide_color *in, const imp_wide3 *wo,
+                              const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
+                              struct imp_wide_color *d)
 {
+    (void)lobe;
     const struct imp__principled_self *p = b->self;
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
     const struct front x = front_of(coated, b, in, wo, wi, 0);
@@ -372,16 +354,9 @@ COATED_OR_NOT void eval_d_as(const bool coated, const struct imp_bsdf *b,
         for (int j = 0; j < N_INPUTS; j++)
             d[j].c[k] = imp__wide_choose(there[j], own[j], zero);
     }
-}
-static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                         const imp_wide3 *wo, const imp_wide3 *wi,
-                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
-{
-    (void)lobe;
-    if (is_coated(b)) eval_d_as(true, b, in, wo, wi, colors, d);
-    else eval_d_as(false, b, in, wo, wi, colors, d);
     return true;
 }
+IMP_KERNEL_BY(is_coated)
 
 const struct imp_bsdf_lanes imp__principled_lanes = {.covers = covers,
                                                      .sample = sample_lanes,

@@ -144,16 +144,17 @@ const struct imp_bsdf_ops imp__roughconductor = {.size = sizeof(struct imp_bsdf_
 
 /* ---- In lanes ---------------------------------------------------------------------------- */
 
-static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
-                               const struct imp_wide_color *in, const imp_wide3 *wo,
-                               const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
-                               struct imp_wide_color *f)
+IMP_EITHER_WAY imp_wide pdf_eval_as(const bool ggx, const struct imp_bsdf *b,
+                                    uint64_t derivative, const struct imp_wide_color *in,
+                                    const imp_wide3 *wo, const imp_wide3 *wi,
+                                    const imp_wide_lobe *lobe, int colors,
+                                    struct imp_wide_color *f)
 {
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
     (void)lobe;
     const imp_wide_truth here = imp__fronts(wo, wi);
     const struct imp__facets m =
-        imp__roughness_drawn_lanes(b->self, &in[ALPHA], here, derivative, ALPHA);
+        imp__roughness_drawn_lanes(ggx, b->self, &in[ALPHA], here, derivative, ALPHA);
     const imp_wide3 h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
     const imp_wide D = imp__facets_d(&m, h), Go = imp__facets_g1(&m, *wo),
                    G = imp__facets_g1(&m, *wi) * Go;
@@ -166,23 +167,25 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
         here, imp__facets_normals_pdf(&m, wo, &h, vm, D, Go) / (4 * vm), zero);
 }
 
-static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative,
-                                   const struct imp_wide_color *in, const imp_wide3 *wo,
-                                   const imp_wide u[3], imp_wide3 *wi,
-                                   imp_wide_lobe *lobe)
+IMP_EITHER_WAY imp_wide_truth sample_as(const bool ggx, const struct imp_bsdf *b,
+                                        uint64_t derivative,
+                                        const struct imp_wide_color *in,
+                                        const imp_wide3 *wo, const imp_wide u[3],
+                                        imp_wide3 *wi, imp_wide_lobe *lobe)
 {
     (void)lobe;
     const struct imp__facets m = imp__roughness_drawn_lanes(
-        b->self, &in[ALPHA], wo->z > imp__wide(0), derivative, ALPHA);
+        ggx, b->self, &in[ALPHA], wo->z > imp__wide(0), derivative, ALPHA);
     const imp_wide3 h = imp__facets_normals(&m, wo, &u[1]);
     const imp_wide c = imp__wide3_inner(*wo, h);
     *wi = imp__mirrors_in(wo, &h, c);
     return imp__fronts(wo, wi) & (c > imp__wide(0));
 }
 
-static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                         const imp_wide3 *wo, const imp_wide3 *wi,
-                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
+IMP_EITHER_WAY bool eval_d_as(const bool ggx, const struct imp_bsdf *b,
+                              const struct imp_wide_color *in, const imp_wide3 *wo,
+                              const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
+                              struct imp_wide_color *d)
 {
     (void)lobe;
     const struct imp__roughness *r = b->self;
@@ -190,7 +193,7 @@ static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *
     const imp_wide_truth here = imp__fronts(wo, wi);
     imp_wide dlog_D[2], dGi[2], dGo[2];
     const imp_wide3 h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
-    const struct imp__facets m = imp__roughness_lanes(r, &in[ALPHA], here);
+    const struct imp__facets m = imp__roughness_lanes(ggx, r, &in[ALPHA], here);
     const imp_wide Gi = imp__facets_g1_d(&m, *wi, dGi),
                    Go = imp__facets_g1_d(&m, *wo, dGo);
     imp__facets_d_log(&m, h, dlog_D);
@@ -218,6 +221,8 @@ static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *
     }
     return true;
 }
+
+IMP_KERNEL_BY(imp__are_ggx_visible)
 
 const struct imp_bsdf_lanes imp__roughconductor_lanes = {
     .sample = sample_lanes, .pdf_eval = pdf_eval_lanes, .eval_d = eval_d_lanes};

@@ -233,17 +233,18 @@ static struct views views_of(const struct imp_wide_color *in, const imp_wide3 *w
     return v;
 }
 
-static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative,
-                                   const struct imp_wide_color *in, const imp_wide3 *wo,
-                                   const imp_wide u[3], imp_wide3 *wi,
-                                   imp_wide_lobe *lobe)
+IMP_EITHER_WAY imp_wide_truth sample_as(const bool ggx, const struct imp_bsdf *b,
+                                        uint64_t derivative,
+                                        const struct imp_wide_color *in,
+                                        const imp_wide3 *wo, const imp_wide u[3],
+                                        imp_wide3 *wi, imp_wide_lobe *lobe)
 {
     const imp_wide zero = imp__wide(0);
     const struct views v = views_of(in, wo, wo);
     imp_wide cos_t, eta_t;
     (void)lobe;
-    const struct imp__facets q =
-        imp__roughness_drawn_lanes(b->self, &in[ALPHA], v.wo.z > zero, derivative, ALPHA);
+    const struct imp__facets q = imp__roughness_drawn_lanes(
+        ggx, b->self, &in[ALPHA], v.wo.z > zero, derivative, ALPHA);
     const imp_wide3 m = imp__facets_normals(&q, &v.wo, &u[1]);
     const imp_wide c = imp__wide3_inner(v.wo, m);
     const imp_wide_truth reflects =
@@ -278,17 +279,18 @@ static inline imp_wide_truth facets_of(const struct views *v, struct facets *f)
            (f->om > zero) & ~((f->im > zero) ^ v->reflects) & (f->im != zero);
 }
 
-static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
-                               const struct imp_wide_color *in, const imp_wide3 *wo,
-                               const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
-                               struct imp_wide_color *f)
+IMP_EITHER_WAY imp_wide pdf_eval_as(const bool ggx, const struct imp_bsdf *b,
+                                    uint64_t derivative, const struct imp_wide_color *in,
+                                    const imp_wide3 *wo, const imp_wide3 *wi,
+                                    const imp_wide_lobe *lobe, int colors,
+                                    struct imp_wide_color *f)
 {
     const struct views v = views_of(in, wo, wi);
     struct facets x;
     imp_wide cos_t, eta_t;
     const imp_wide_truth there = imp__is_smooth(*lobe) & facets_of(&v, &x);
     const struct imp__facets q =
-        imp__roughness_drawn_lanes(b->self, &in[ALPHA], there, derivative, ALPHA);
+        imp__roughness_drawn_lanes(ggx, b->self, &in[ALPHA], there, derivative, ALPHA);
     const imp_wide om = x.om, im = x.im, n = x.n;
     const imp_wide D = imp__facets_d(&q, x.m), Go = imp__facets_g1(&q, v.wo),
                    DG = D * imp__facets_g1(&q, v.wi) * Go;
@@ -321,9 +323,10 @@ static imp_wide by_index(const struct imp__facets *q, const struct views *v,
     return imp__wide_choose(v->reflects, F_e, -(F_e + F_c * dom) + share * dlog);
 }
 
-static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                         const imp_wide3 *wo, const imp_wide3 *wi,
-                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
+IMP_EITHER_WAY bool eval_d_as(const bool ggx, const struct imp_bsdf *b,
+                              const struct imp_wide_color *in, const imp_wide3 *wo,
+                              const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
+                              struct imp_wide_color *d)
 {
     const struct imp__roughness *r = b->self;
     const imp_wide zero = imp__wide(0);
@@ -331,7 +334,7 @@ static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *
     struct facets x;
     imp_wide F_c, F_e, dlog_D[2], dGi[2], dGo[2], by[2], by_eta = zero;
     const imp_wide_truth there = imp__is_smooth(*lobe) & facets_of(&v, &x);
-    const struct imp__facets q = imp__roughness_lanes(r, &in[ALPHA], there);
+    const struct imp__facets q = imp__roughness_lanes(ggx, r, &in[ALPHA], there);
     const imp_wide D = imp__facets_d(&q, x.m), Gi = imp__facets_g1_d(&q, v.wi, dGi),
                    Go = imp__facets_g1_d(&q, v.wo, dGo),
                    F = IMP_WIDE_OF(imp__dielectric_d)(x.om, v.e, &F_c, &F_e);
@@ -371,6 +374,8 @@ static imp_wide index_ratio_lanes(const struct imp_bsdf *b,
     (void)b, (void)lobe;
     return imp__wide_choose(v.reflects, imp__wide(1), v.e);
 }
+
+IMP_KERNEL_BY(imp__are_ggx_visible)
 
 const struct imp_bsdf_lanes imp__roughdielectric_lanes = {.sample = sample_lanes,
                                                           .pdf_eval = pdf_eval_lanes,

@@ -20,8 +20,8 @@
 enum { DIFFUSE, TINT, ETA, ALPHA, N_INPUTS };
 
 struct roughplastic {
-    enum imp__distribution type;
-    bool visible, nonlinear;
+    struct imp__roughness r; /* first (imp__are_ggx_visible) */
+    bool nonlinear;
     struct imp__coat coat;
 };
 
@@ -45,7 +45,7 @@ static enum imp_status prepare(const struct imp_build *b)
 static void changed(const struct imp_bsdf *b)
 {
     struct roughplastic *p = b->self;
-    imp__coat_make(&p->coat, p->type, imp_max(b->input[ALPHA]->value[0], IMP_ALPHA_MIN),
+    imp__coat_make(&p->coat, p->r.type, imp_max(b->input[ALPHA]->value[0], IMP_ALPHA_MIN),
                    b->input[ETA]->value[0]);
 }
 
@@ -53,14 +53,11 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_b
 {
     enum imp_status st = IMP_OK;
     struct roughplastic *p = self;
-    struct imp__roughness r;
-    IMP_TRY(imp__roughness_build(b, &r));
+    IMP_TRY(imp__roughness_build(b, &p->r));
     IMP_TRY(imp_build_bool(b, "nonlinear", false, &p->nonlinear));
-    if (r.anisotropic)
+    if (p->r.anisotropic)
         IMP_TRY(imp_build_error(b, "alpha_u", IMP_E_SCENE,
                                 "has one roughness, 'alpha', for all directions"));
-    p->type = r.type;
-    p->visible = r.visible;
     bsdf->flags = IMP_BSDF_SMOOTH;
     changed(bsdf);
 out:
@@ -77,7 +74,7 @@ static struct at at_inputs(const struct imp_bsdf *b, const imp_spec *in)
 {
     const struct roughplastic *p = b->self;
     const double alpha = imp_max(in[ALPHA][0], IMP_ALPHA_MIN);
-    return (struct at){p, {p->type, p->visible, alpha, alpha, 0}, alpha, in[ETA][0]};
+    return (struct at){p, {p->r.type, p->r.visible, alpha, alpha, 0}, alpha, in[ETA][0]};
 }
 
 static unsigned wanted_of(uint64_t derivative)
@@ -253,14 +250,6 @@ static struct at at_lanes(const struct imp_bsdf *b, const struct imp_wide_color 
     return at_inputs(b, own);
 }
 
-static struct imp__facets facets_of(const struct at *a, imp_wide_truth here,
-                                    uint64_t derivative)
-{
-    const imp_wide alpha = imp__wide(a->alpha);
-    return (struct imp__facets){a->p->type, a->p->visible, wanted_of(derivative),
-                                alpha,      alpha,         here};
-}
-
 /* imp__coat_T at mu, the first n of the dual. */
 static inline void coats(const struct at *a, imp_wide mu, int n, imp_wide T[3])
 {
@@ -298,16 +287,17 @@ static imp_wide facet_chances(const struct imp_wide_color *in, uint64_t derivati
     return imp__coated_chances(&in[TINT], &in[DIFFUSE], derivative, 1 - T, OF_FACETS);
 }
 
-static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative,
-                                   const struct imp_wide_color *in, const imp_wide3 *wo,
-                                   const imp_wide u[3], imp_wide3 *wi,
-                                   imp_wide_lobe *lobe)
+IMP_EITHER_WAY imp_wide_truth sample_as(const bool ggx, const struct imp_bsdf *b,
+                                        uint64_t derivative,
+                                        const struct imp_wide_color *in,
+                                        const imp_wide3 *wo, const imp_wide u[3],
+                                        imp_wide3 *wi, imp_wide_lobe *lobe)
 {
     const struct at a = at_lanes(b, in);
     const imp_wide_truth facets =
         u[0] < facet_chances(in, derivative, lets_through(&a, wo->z));
-    const struct imp__facets m =
-        facets_of(&a, facets & (wo->z > imp__wide(0)), derivative);
+    const struct imp__facets m = imp__roughness_drawn_lanes(
+        ggx, &a.p->r, &in[ALPHA], facets & (wo->z > imp__wide(0)), derivative, ALPHA);
     const imp_wide3 h = imp__facets_normals(&m, wo, &u[1]);
     const imp_wide c = imp__wide3_inner(*wo, h);
     const imp_wide_truth drawn = imp__lambert_samples(u, wo, wi);
@@ -316,14 +306,16 @@ static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative
     return imp__fronts(wo, wi) & ((facets & (c > imp__wide(0))) | (~facets & drawn));
 }
 
-static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
-                               const struct imp_wide_color *in, const imp_wide3 *wo,
-                               const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
-                               struct imp_wide_color *f)
+IMP_EITHER_WAY imp_wide pdf_eval_as(const bool ggx, const struct imp_bsdf *b,
+                                    uint64_t derivative, const struct imp_wide_color *in,
+                                    const imp_wide3 *wo, const imp_wide3 *wi,
+                                    const imp_wide_lobe *lobe, int colors,
+                                    struct imp_wide_color *f)
 {
     const struct at a = at_lanes(b, in);
     const imp_wide_truth here = imp__fronts(wo, wi);
-    const struct imp__facets m = facets_of(&a, here, derivative);
+    const struct imp__facets m =
+        imp__roughness_drawn_lanes(ggx, &a.p->r, &in[ALPHA], here, derivative, ALPHA);
     const imp_wide eta = imp__wide(a.eta);
     const imp_wide3 h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
     const imp_wide vm = imp__wide3_inner(*wo, h), lambert = imp__lamberts(wo, wi);
@@ -349,13 +341,15 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
         imp__wide(0));
 }
 
-static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                         const imp_wide3 *wo, const imp_wide3 *wi,
-                         const imp_wide_lobe *lobe, int colors, struct imp_wide_color *d)
+IMP_EITHER_WAY bool eval_d_as(const bool ggx, const struct imp_bsdf *b,
+                              const struct imp_wide_color *in, const imp_wide3 *wo,
+                              const imp_wide3 *wi, const imp_wide_lobe *lobe, int colors,
+                              struct imp_wide_color *d)
 {
     const struct at a = at_lanes(b, in);
     const imp_wide_truth here = imp__fronts(wo, wi);
-    const struct imp__facets m = facets_of(&a, here, 0);
+    const struct imp__facets m =
+        imp__roughness_drawn_lanes(ggx, &a.p->r, &in[ALPHA], here, 0, ALPHA);
     const imp_wide zero = imp__wide(0), one = imp__wide(1), eta = imp__wide(a.eta);
     const imp_wide3 h = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
     imp_wide dlog_D[2], dGi[2], dGo[2], F_c, F_e, Ti[3], To[3];
@@ -395,6 +389,8 @@ static bool eval_d_lanes(const struct imp_bsdf *b, const struct imp_wide_color *
     }
     return true;
 }
+
+IMP_KERNEL_BY(imp__are_ggx_visible)
 
 const struct imp_bsdf_lanes imp__roughplastic_lanes = {
     .sample = sample_lanes, .pdf_eval = pdf_eval_lanes, .eval_d = eval_d_lanes};

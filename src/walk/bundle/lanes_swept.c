@@ -127,8 +127,9 @@ static bool texels_keep(struct imp_arena *arena, const struct imp_bin *bin,
     if (!t) return true;
     for (uint64_t left = out->inputs; left; left &= left - 1) {
         const struct imp_input *i = input[__builtin_ctzll(left)];
-        if (!i->plain &&
-            !imp__texture_lanes(i->texture)->texels(i->texture, uv, i->scalar, t++))
+        if (i->plain) continue;
+        const struct imp_texture_lanes *lanes = imp__texture_lanes(i->texture);
+        if (!lanes->texels || !lanes->texels(i->texture, uv, i->scalar, t++))
             return false;
     }
     return true;
