@@ -101,6 +101,10 @@ CAUSTIC = '''<scene version="3.0.0"><integrator type="ptracer"><integer name="ma
 <bsdf type="dielectric"><float name="int_ior" value="1.5"/><float name="ext_ior" value="1"/></bsdf></shape></scene>'''
 
 
+COAT = '<float name="clearcoat" value=".6"/>'
+GGX = '<string name="distribution" value="ggx"/>'
+
+
 def written(folder, name, text):
     path = '%s/%s.xml' % (folder, name)
     with open(path, 'w') as f:
@@ -114,15 +118,14 @@ def wax_mesh(folder):
     return folder + '/wax.ply'
 
 
-def floor_scene(folder, kind, colour):
-    """`textured` with its floor of another material."""
-    path = '%s/%s.xml' % (folder, kind)
+def floor_scene(folder, kind, colour, more=''):
+    """`textured` with its floor of another material; more: what else it has."""
+    path = '%s/%s%d.xml' % (folder, kind, len(more))
     with open(os.path.join(SCENES, 'textured.xml')) as f:
         text = f.read().replace('textured/', os.path.join(os.path.abspath(SCENES), 'textured/'))
     head, floor = text.split('<bsdf type="diffuse" id="floor">')
-    ggx = '<string name="distribution" value="ggx"/>' if kind == 'roughplastic' else ''
     with open(path, 'w') as f:
-        f.write(head + '<bsdf type="%s" id="floor">' % kind + ggx + floor.replace('"reflectance"', '"%s"' % colour, 1))
+        f.write(head + '<bsdf type="%s" id="floor">' % kind + more + floor.replace('"reflectance"', '"%s"' % colour, 1))
     return path
 
 
@@ -223,7 +226,11 @@ def main():
             'caustic from the lamp, 8 times': ['render', written(folder, 'caustic', CAUSTIC), *picture],
             'floor of principled': ['render', floor_scene(folder, 'principled', 'base_color'), *picture],
             'floor of plastic': ['render', floor_scene(folder, 'plastic', 'diffuse_reflectance'), *picture],
-            'floor of rough plastic': ['render', floor_scene(folder, 'roughplastic', 'diffuse_reflectance'), *picture],
+            'floor of principled, coated': ['render', floor_scene(folder, 'principled', 'base_color', COAT), *picture],
+            'floor of rough plastic': ['render', floor_scene(folder, 'roughplastic', 'diffuse_reflectance', GGX),
+                                       *picture],
+            'floor of rough plastic, Beckmann': ['render', floor_scene(folder, 'roughplastic', 'diffuse_reflectance'),
+                                                 *picture],
             'picture of the sky': ['render', sky_scene(folder), *picture],
             'functional, Cornell box': ['gradient', cornell, '-D', 'res=64', '--json'],
             'office, read': ['read', os.path.join(SCENES, 'office.xml'), '-m', 'mono', '--json'],
@@ -248,12 +255,12 @@ def main():
                 continue
             jobs['picture, for pose of ' + name] = ['render', scene, *picture]
             jobs['loss + gradient, pose of ' + name] = ['gradient', scene, '-T', target, '-p', shape + '.pose', '--json']
-        print('%-30s %s' % ('', '  '.join('%-24s' % p[-24:] for p in args.program)))
+        print('%-33s %s' % ('', '  '.join('%-24s' % p[-24:] for p in args.program)))
         for name, job in jobs.items():
             if args.only not in name:
                 continue
             try:
-                print('%-30s %s' % (name, compared(args, name, job, folder)), flush=True)
+                print('%-33s %s' % (name, compared(args, name, job, folder)), flush=True)
             except RuntimeError as error:
                 if not args.differ:
                     sys.exit(str(error))
