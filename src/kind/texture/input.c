@@ -8,6 +8,7 @@
 #include "base/arguments.h"
 #include "color/rgb.h"
 #include "color/spectrum.h"
+#include "input_parts.h"
 #include "kind/shape/shape.h"
 #include "math/vec.h"
 #include "placed.h"
@@ -48,36 +49,6 @@ static bool by_wavelength(const struct imp_input *input, const struct imp_texcoo
            !as_number(input, scalar);
 }
 
-/* Lane by lane, so that each piece stays in its lane. */
-static void spectrum_scatter(const struct imp_input *input, const struct imp_carried *c,
-                             const imp_spec *bar, struct imp_sink *sink)
-{
-    for (int k = 0; k < c->n; k++) {
-        struct imp__spectrum_at at;
-        imp__spectrum_at(input->spectrum, c->nm[k], &at);
-        for (int i = 0; i < at.n; i++) {
-            imp_spec part = {0};
-            part[k] = at.d[i] * (*bar)[k];
-            if (part[k] != 0)
-                sink->add(sink, input->param, at.first + (size_t)i, 1, &part);
-        }
-    }
-}
-
-static void spectrum_tangent(const struct imp_input *input, const struct imp_carried *c,
-                             imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot)
-{
-    for (int k = 0; k < c->n; k++) {
-        struct imp__spectrum_at at;
-        double sum = 0;
-        imp__spectrum_at(input->spectrum, c->nm[k], &at);
-        for (int i = 0; i < at.n; i++)
-            sum += at.d[i] * dot(x_dot, input->param, at.first + (size_t)i);
-        (*value_dot)[k] = sum;
-    }
-    for (int k = c->n; k < 4; k++) (*value_dot)[k] = (*value_dot)[0];
-}
-
 /* As a colour, though the mode has spectra: luminances are read so, and numbers
  * made of colours. The colour is that of imp__color_preview. */
 static bool by_colour(const struct imp_input *input, const struct imp_texcoord *at,
@@ -85,38 +56,6 @@ static bool by_colour(const struct imp_input *input, const struct imp_texcoord *
 {
     return input->spectrum && input->spectrum->color_d &&
            (!at->carried || as_number(input, scalar));
-}
-
-static double colour_slope(const struct imp_input *input, size_t k, size_t c)
-{
-    const bool cut = input->value[c] == 0 || input->value[c] == 1;
-    if (cut && input->spectrum->form != IMP_SPECTRUM_COLOR) return 0;
-    return input->spectrum->color_d[3 * k + c];
-}
-
-static void colour_scatter(const struct imp_input *input, bool number,
-                           const imp_spec *bar, struct imp_sink *sink)
-{
-    for (size_t k = 0; k < input->spectrum->n; k++) {
-        imp_spec part = {0};
-        double sum = 0;
-        for (size_t c = 0; c < 3; c++) {
-            part[c] = (*bar)[c] * colour_slope(input, k, c);
-            sum += colour_slope(input, k, c) / 3;
-        }
-        if (number) part = *bar * sum;
-        sink->add(sink, input->param, k, 1, &part);
-    }
-}
-
-static void colour_tangent(const struct imp_input *input, bool number, imp_dot_fn *dot,
-                           const void *x_dot, imp_spec *value_dot)
-{
-    imp_spec sum = {0};
-    for (size_t k = 0; k < input->spectrum->n; k++)
-        for (size_t c = 0; c < 3; c++)
-            sum[c] += colour_slope(input, k, c) * dot(x_dot, input->param, k);
-    *value_dot = number ? mean(sum[0], sum[1], sum[2]) : sum;
 }
 
 /* ---- Surfaces ---------------------------------------------------------------------- */
@@ -137,57 +76,13 @@ static const struct imp_texcoord *site_of(const struct imp_texcoord *at,
     return &site->at;
 }
 
-/* With h the height, the slopes of the raised surface have h_u and h_v along the normal in
- * place of what they had (Blinn 1978; along the normal a surface's own slopes vanish, but
- * where normals are interpolated): the normal is their cross product, on the side of the
- * geometric one. */
-struct bump {
-    imp_spec normal;
-    bool raised;    /* the texture has a slope there; false: the normal is z */
-    imp_v3 d_uv[2]; /* d normal/d slope */
-};
-static struct bump bump_at(const struct imp_input *input, const struct imp_texcoord *at)
-{
-    struct imp_texcoord plain = *at;
-    struct imp_surface made;
-    const struct imp_surface *x = at->surface;
-    imp_spec slope[2];
-    int prim;
-    struct bump b = {.normal = {0, 0, 1, 0}};
-    plain.carried = NULL;
-    if (!at->shape || !input->texture->ops->slope(input->texture, &plain, true, slope))
-        return b;
-    if (!x) {
-        at->shape->ops->place(at->shape, at->uv, &made, &prim);
-        x = &made;
-    }
-    if (imp_unlikely(at->shape->placed != NULL)) {
-        made = *x;
-        imp__surface_move(&made, &at->shape->placed[0], &at->shape->placed[1]);
-        x = &made;
-    }
-    const double scale = input->value[0];
-    const imp_v3 u = imp__v3(imp__dot(x->s, x->dp_du), imp__dot(x->t, x->dp_du),
-                             scale * slope[0][0]),
-                 v = imp__v3(imp__dot(x->s, x->dp_dv), imp__dot(x->t, x->dp_dv),
-                             scale * slope[1][0]);
-    const imp_v3 n = imp__cross(u, v);
-    const imp_v3 world = x->s * n[0] + x->t * n[1] + x->n * n[2];
-    const double side = imp__dot(world, x->ng) < 0 ? -1 : 1;
-    b.raised = true;
-    b.normal = n * side;
-    b.d_uv[0] = imp__v3(-v[1], v[0], 0) * (side * scale);
-    b.d_uv[1] = imp__v3(u[1], -u[0], 0) * (side * scale);
-    return b;
-}
-
 /* ---- One input ------------------------------------------------------------------- */
 
 static void input_eval(const struct imp_input *input, const struct imp_texcoord *at,
                        bool scalar, imp_spec *value)
 {
     if (imp_unlikely(input->bump)) {
-        *value = bump_at(input, at).normal;
+        *value = imp__bump_at(input, at).normal;
     } else if (imp_unlikely(input->vector) &&
                input->texture) { /* no colour: whatever the walk carries */
         struct imp_texcoord plain = *at;
@@ -212,8 +107,9 @@ static void input_scatter(const struct imp_input *input, const struct imp_texcoo
             imp__placed_scatter(input->texture, at, scalar, bar, sink);
     } else if (input->param < 0) return;
     else if (by_wavelength(input, at, scalar))
-        spectrum_scatter(input, at->carried, bar, sink);
-    else if (by_colour(input, at, scalar)) colour_scatter(input, scalar, bar, sink);
+        imp__input_spectrum_scatter(input, at->carried, bar, sink);
+    else if (by_colour(input, at, scalar))
+        imp__input_colour_scatter(input, scalar, bar, sink);
     else if (scalar && input->count == 3)
         weighted_scatter(sink, input->param, 0, *bar, third);
     else sink->add(sink, input->param, 0, input->count == 3 ? 3 : 1, bar);
@@ -232,9 +128,9 @@ static void input_tangent(const struct imp_input *input, const struct imp_texcoo
     } else if (input->param < 0) {
         *value_dot = imp__spec(0);
     } else if (by_wavelength(input, at, scalar)) {
-        spectrum_tangent(input, at->carried, dot, x_dot, value_dot);
+        imp__input_spectrum_tangent(input, at->carried, dot, x_dot, value_dot);
     } else if (by_colour(input, at, scalar)) {
-        colour_tangent(input, scalar, dot, x_dot, value_dot);
+        imp__input_colour_tangent(input, scalar, dot, x_dot, value_dot);
     } else if (input->count != 3) {
         *value_dot = imp__spec(dot(x_dot, input->param, 0));
     } else {
@@ -378,7 +274,7 @@ static void bump_scatter(const struct imp_input *bumped, const struct imp_texcoo
 {
     const struct imp_texture *t = bumped->texture;
     const struct imp_texcoord plain = as_colour(at);
-    const struct bump b = bump_at(bumped, at);
+    const struct imp__bump b = imp__bump_at(bumped, at);
     imp_spec slope_bar[2] = {{0}, {0}};
     if (!b.raised || !t->ops->slope_scatter) return;
     for (int i = 0; i < 2; i++)
@@ -409,7 +305,7 @@ static imp_spec vector_tangent(const struct imp_input *vector,
         return value_dot;
     }
     const struct imp_texture *t = vector->texture;
-    const struct bump b = bump_at(vector, at);
+    const struct imp__bump b = imp__bump_at(vector, at);
     if (!b.raised || !t->ops->slope_tangent) return value_dot;
     t->ops->slope_tangent(t, &plain, true, dot, x_dot, slope_dot);
     return b.d_uv[0] * slope_dot[0][0] + b.d_uv[1] * slope_dot[1][0];
