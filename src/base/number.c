@@ -11,7 +11,8 @@
 #include <stdlib.h>
 #include <strings.h>
 
-#define DIGITS_MAX 19 /* always fit 64 bits */
+#define DIGITS_MAX 19  /* always fit 64 bits */
+#define DIGITS_ALL 800 /* the halfway point of two doubles has at most 768 */
 
 static const uint64_t power_of_ten[] = {1,      10,      100,      1000,     10000,
                                         100000, 1000000, 10000000, 100000000};
@@ -72,20 +73,18 @@ IMP_COLD static bool word_read(const char **s, const char *end, double *out)
 /* mantissa * 10^exponent. */
 struct decimal {
     uint64_t mantissa;
-    int exponent;
-    bool sticky; /* digits other than 0 were cut off */
+    int64_t exponent;
 };
 
-/* By the C library in its "C" locale. */
-IMP_COLD static double value_rounded(const struct decimal *x)
+/* digits * 10^exponent by the C library in its "C" locale, else about so. text has room for the
+ * exponent behind its n digits, the first of which is not 0. */
+static double value_rounded(char *text, int n, int64_t exponent, double about)
 {
-    if (x->exponent > 400) return INFINITY;
-    if (x->exponent < -400) return 0;
-    char text[64];
-    snprintf(text, sizeof text, "%llu%se%d", (unsigned long long)x->mantissa,
-             x->sticky ? "1" : "", x->exponent - x->sticky);
+    if (n + exponent > 400) return INFINITY;
+    if (n + exponent < -400) return 0;
+    sprintf(text + n, "e%d", (int)exponent);
     const locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-    if (!c) return (double)x->mantissa * pow(10, x->exponent);
+    if (!c) return about;
     const double value = strtod_l(text, NULL, c);
     freelocale(c);
     return value;
@@ -99,46 +98,59 @@ static double value_of(const struct decimal *x)
                                    1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
                                    1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
     if (x->mantissa == 0) return 0;
-    if (x->mantissa <= (uint64_t)1 << 53 && !x->sticky) {
+    if (x->mantissa <= (uint64_t)1 << 53) {
         if (x->exponent < 0 && x->exponent >= -22)
             return (double)x->mantissa / power[-x->exponent];
         if (x->exponent >= 0 && x->exponent <= 22)
             return (double)x->mantissa * power[x->exponent];
     }
-    return value_rounded(x);
+    char text[64];
+    const int n = snprintf(text, sizeof text, "%llu", (unsigned long long)x->mantissa);
+    return value_rounded(text, n, x->exponent,
+                         (double)x->mantissa * pow(10, (double)x->exponent));
 }
 
-/* Digits with at most one point among them, more than DIGITS_MAX, leading zeros included: the first
- * that count are kept. */
-IMP_COLD static void long_decimal(const char *p, const char *end, struct decimal *out)
+/* Digits with at most one point among them, more than DIGITS_MAX, leading zeros included, times
+ * 10^exponent. All that can decide how it is rounded are kept, and a 1 for others that are not 0. */
+IMP_COLD static double long_decimal(const char *p, const char *end, int64_t exponent)
 {
-    int kept = 0;
-    bool fraction = false;
-    *out = (struct decimal){0};
+    char text[DIGITS_ALL + 32];
+    int n = 0;
+    double about = 0;
+    bool fraction = false, more = false;
     for (; p < end; p++) {
         if (*p == '.') {
             fraction = true;
-        } else if (kept < DIGITS_MAX) {
-            out->mantissa = 10 * out->mantissa + (uint64_t)(*p - '0');
-            kept += out->mantissa != 0; /* leading zeros are free */
-            if (fraction && out->exponent > -100000) out->exponent--;
+            continue;
+        }
+        exponent -= fraction;
+        if (n == 0 && *p == '0') continue; /* leading zeros are free */
+        if (n < DIGITS_ALL) {
+            text[n++] = *p;
+            about = 10 * about + (*p - '0');
         } else {
-            out->sticky |= *p != '0';
-            if (!fraction && out->exponent < 100000) out->exponent++;
+            more |= *p != '0';
+            exponent++;
         }
     }
+    if (n == 0) return 0;
+    if (more) {
+        text[n++] = '1';
+        exponent--;
+    }
+    return value_rounded(text, n, exponent, about * pow(10, (double)exponent));
 }
 
 /* What follows an 'e' at *s counts if it is a number. */
-IMP_COLD static void exponent_read(const char **s, const char *end, int *exponent)
+IMP_COLD static void exponent_read(const char **s, const char *end, int64_t *exponent)
 {
     const char *p = *s + 1;
     bool minus = false;
     if (p < end && (*p == '+' || *p == '-')) minus = *p++ == '-';
     if (p >= end || !is_digit(*p)) return;
-    int e = 0;
+    int64_t e = 0; /* far beyond the length of any text */
     for (; p < end && is_digit(*p); p++)
-        if (e < 100000) e = 10 * e + (*p - '0');
+        if (e < INT64_MAX / 100) e = 10 * e + (*p - '0');
     *exponent += minus ? -e : e;
     *s = p;
 }
@@ -157,13 +169,15 @@ bool imp__number(const char **s, const char *end, double *out)
         const char *point = p++;
         p = digits_read(p, end, &x.mantissa);
         digits += p - point - 1;
-        x.exponent = (int)(point + 1 - p);
+        x.exponent = point + 1 - p;
     }
     double value;
     if (digits > 0) {
-        if (digits > DIGITS_MAX) long_decimal(first, p, &x);
+        const char *last = p;
+        const int64_t by_point = x.exponent;
         if (p < end && (*p == 'e' || *p == 'E')) exponent_read(&p, end, &x.exponent);
-        value = value_of(&x);
+        value = digits <= DIGITS_MAX ? value_of(&x)
+                                     : long_decimal(first, last, x.exponent - by_point);
     } else {
         p = first;
         if (!word_read(&p, end, &value)) return false;

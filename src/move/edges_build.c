@@ -297,6 +297,9 @@ enum imp_status imp__edges_build(const struct imp_scene *scene, enum imp__edges_
     IMP_TRY(imp__sides_make(&x.sides, out->body, out->n_bodies));
     IMP_TRY(room_make(&x));
     IMP_TRY(imp__lines_find(&x.sides, line_cut, &x));
+    imp__sides_free(&x.sides); /* the largest of all, before there are more */
+    imp__release(x.ctx, x.cut);
+    x.cut = NULL;
     IMP_TRY(seams_add(&x));
     IMP_TRY(edges_order(&x));
     IMP_TRY(imp__arcs_find(scene, out));

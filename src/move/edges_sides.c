@@ -168,6 +168,9 @@ void imp__sides_free(struct imp__sides *x)
     imp__release(ctx, x->body);
     imp__release(ctx, x->map);
     imp__release(ctx, x->side);
+    x->body = NULL;
+    x->map = NULL;
+    x->side = NULL;
 }
 
 /* ---- Lines ------------------------------------------------------------------------------ */

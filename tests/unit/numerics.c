@@ -196,6 +196,43 @@ static void exponentials(void)
 
 /* Decimal numbers of up to 24 digits, with leading zeros, points and exponents, that end where the text
  * ends or before it; and whole numbers. The program's locale is "C". */
+/* Halfway points of neighbours, which have up to 768 digits, as they are, with the last digit one less,
+ * and with a digit far behind; and exponents that undo long rows of zeros. */
+static void long_decimals(void)
+{
+    enum { N = 6000, ZEROS = 200000 };
+    static char text[ZEROS + 2048];
+    int wrong = 0;
+    for (uint64_t i = 0; i < N; i++) {
+        const struct imp_key key = imp__key(7, 0, i);
+        const double x = ldexp(1 + imp__u01(key, 0), (int)(600 * imp__u01(key, 1)) - 300);
+        const long double half =
+            ((long double)x + (long double)nextafter(x, INFINITY)) / 2;
+        int n = snprintf(text, 1400, i % 2 ? "%.1080Lf" : "%.900Le", half);
+        char *e = strchr(text, 'e');
+        char *last = (e ? e : text + n) - 1;
+        if (i % 3 == 1) {
+            while (*last == '0' || *last == '.') last--;
+            *last = (char)(*last - 1);
+        } else if (i % 3 == 2) {
+            *last = '7';
+        }
+        const char *s = text, *end = text + n;
+        double y = 0;
+        wrong += !imp__number(&s, end, &y) || s != end || y != strtod(text, NULL);
+    }
+    tap_ok(wrong == 0, "long ones, half way between two doubles # %d of %d differ", wrong,
+           N);
+    memset(text, '0', ZEROS);
+    text[1] = '.';
+    sprintf(text + ZEROS, "123456789012345678901e%d", ZEROS);
+    const char *s = text;
+    double x = 0;
+    const bool read = imp__number(&s, text + strlen(text), &x);
+    tap_ok(read && *s == '\0' && x == strtod(text, NULL) && x > 10, "%d zeros # %g",
+           ZEROS, x);
+}
+
 static void decimals(void)
 {
     int wrong = 0, whole = 0, n = 0;
@@ -230,6 +267,7 @@ static void decimals(void)
     }
     tap_ok(wrong == 0, "decimal numbers as strtod reads them # %d of 200000 differ",
            wrong);
+    long_decimals();
     tap_ok(whole == 0 && n > 5000, "whole ones as strtoll # %d of %d differ", whole, n);
 }
 
