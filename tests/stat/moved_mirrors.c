@@ -153,9 +153,6 @@ static void refused_test(void)
     number_refused("a mirror under a mask",
                    room(PATH BATHROOM("<bsdf type='mask'>" MIRROR "</bsdf>")),
                    "block.pose", "under a mask");
-    number_refused("a ball",
-                   room(PATH "<shape type='sphere' id='ball'>" PERFECT "</shape>"),
-                   "block.pose", "curved shape");
     number_refused("a pane that light samples pass",
                    room("<integrator type='volpath'/>" WINDOW), "block.pose", "volpath");
     number_refused("a horizon in a mirror",

@@ -199,9 +199,12 @@ static imp_spec step_frozen(const struct imp__moved_by *m, struct stop *s, imp_s
     s->P = P * s->v->w;
     const bool mirrored = imp__is_mirrored(s->v);
     s->turns |= mirrored;
-    for (int k = 0; k < 2; k++)
-        s->leaves[k] = mirrored ? imp__mirror_turn(k ? s->old.n : s->here.n, s->from[k])
-                                : s->from[k];
+    for (int k = 0; k < 2; k++) {
+        s->leaves[k] = s->from[k];
+        if (mirrored)
+            imp__bend(k ? s->old.n : s->here.n, s->from[k], imp__vertex_ratio(s->v),
+                      &s->leaves[k]);
+    }
     if (!imp__goes_straight(s->v)) {
         const bool place =
             next->d.scatterer == IMP_AT_SKY || next->d.scatterer == IMP_IN_MEDIUM;

@@ -5,7 +5,11 @@
  * is compressed where the index is higher. Lobes are drawn with probabilities F and 1 -
  * F, whatever the tints are, so that a tint of 0 keeps its derivative. The index bends
  * paths and has no gradient: it can be set, and a request for its derivative is refused
- * (docs/estimators.md 9.3). */
+ * (docs/estimators.md 9.3).
+ *
+ * Where things move, directions turn, and with them F. Next to the limb of a ball little is refracted: at the
+ * distance x from it 1 - F ~ sqrt(x), whose derivative by x is of the same size over x. Drawn with the probability
+ * 1 - F its square would have no mean, so that neither lobe is then drawn with less than a tenth. */
 #include "bsdf_lanes.h"
 #include "fresnel.h"
 #include "fresnel_lanes.h"
@@ -41,6 +45,14 @@ static enum imp_status build(const struct imp_build *build, void *self,
     return IMP_OK;
 }
 
+#define LEAST 0.1
+static bool turns(uint64_t derivative) { return derivative >> ETA & 1; }
+/* The probability of a lobe that has this part of the power. */
+static double chance_of(uint64_t derivative, double part)
+{
+    return turns(derivative) && part < 1 ? LEAST + (1 - 2 * LEAST) * part : part;
+}
+
 /* Coefficient of a lobe without its tint; 0: nothing goes there. */
 static double coefficient(const imp_spec *in, const struct imp_dirs *d, double *chance)
 {
@@ -48,9 +60,13 @@ static double coefficient(const imp_spec *in, const struct imp_dirs *d, double *
     *chance = 0;
     if (d->wo[2] == 0) return 0;
     const double F = imp__fresnel_dielectric(d->wo[2], in[ETA][0], &cos_t, &eta_t);
-    if (d->lobe == REFLECT) return *chance = F;
+    const double reflects = chance_of(d->derivative, F);
+    if (d->lobe == REFLECT) {
+        *chance = reflects;
+        return F;
+    }
     if (d->lobe != REFRACT) return 0;
-    *chance = 1 - F;
+    *chance = 1 - reflects;
     return (1 - F) / (eta_t * eta_t);
 }
 
@@ -61,7 +77,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
     (void)b;
     if (d->wo[2] == 0) return false;
     const double F = imp__fresnel_dielectric(d->wo[2], in[ETA][0], &cos_t, &eta_t);
-    if (u[0] < F) {
+    if (u[0] < chance_of(d->derivative, F)) {
         d->lobe = REFLECT;
         d->wi = imp__v3(-d->wo[0], -d->wo[1], d->wo[2]);
     } else {
@@ -134,15 +150,21 @@ static imp_wide_truth is_lobe(const imp_wide_lobe *lobe, int k)
     return *lobe == (imp_wide_lobe){0} + k;
 }
 
+static imp_wide chance_of_lanes(uint64_t derivative, imp_wide part)
+{
+    const imp_wide mixed = LEAST + (1 - 2 * LEAST) * part;
+    return turns(derivative) ? imp__wide_choose(part < imp__wide(1), mixed, part) : part;
+}
+
 static imp_wide_truth sample_lanes(const struct imp_bsdf *b, uint64_t derivative,
                                    const struct imp_wide_color *in, const imp_wide3 *wo,
                                    const imp_wide u[3], imp_wide3 *wi,
                                    imp_wide_lobe *lobe)
 {
     imp_wide cos_t, eta_t;
-    (void)b, (void)derivative;
+    (void)b;
     const imp_wide F = IMP_WIDE_OF(imp__dielectric)(wo->z, in[ETA].c[0], &cos_t, &eta_t);
-    const imp_wide_truth reflects = u[0] < F;
+    const imp_wide_truth reflects = u[0] < chance_of_lanes(derivative, F);
     const imp_wide3 through = {-wo->x / eta_t, -wo->y / eta_t,
                                -imp__wide_signed_as(cos_t, wo->z)};
     *wi = imp__wide3_choose(reflects, imp__mirrors(wo), through);
@@ -157,10 +179,11 @@ static imp_wide pdf_eval_lanes(const struct imp_bsdf *b, uint64_t derivative,
 {
     imp_wide cos_t, eta_t;
     const imp_wide zero = imp__wide(0);
-    (void)b, (void)derivative, (void)wi;
+    (void)b, (void)wi;
     const imp_wide F = IMP_WIDE_OF(imp__dielectric)(wo->z, in[ETA].c[0], &cos_t, &eta_t);
     const imp_wide_truth reflects = is_lobe(lobe, REFLECT);
-    const imp_wide chance = imp__wide_choose(reflects, F, 1 - F),
+    const imp_wide drawn = chance_of_lanes(derivative, F),
+                   chance = imp__wide_choose(reflects, drawn, 1 - drawn),
                    of = imp__wide_choose(reflects, F, (1 - F) / (eta_t * eta_t));
     for (int c = 0; c < colors; c++)
         f->c[c] = imp__wide_choose(reflects, in[TINT_R].c[c], in[TINT_T].c[c]) * of;

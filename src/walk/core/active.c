@@ -3,6 +3,7 @@
  * Which objects depend on which active numbers, found once a job so that the sweep can
  * pass by a material nobody asked about. */
 #include "kind/texture/placed.h"
+#include "scene/pose.h"
 #include "walk.h"
 #include <string.h>
 
@@ -29,6 +30,24 @@ uint64_t imp__inputs_depend(const struct imp_bsdf *b, const uint8_t *chosen)
     uint64_t inputs = 0;
     for (int k = 0; k < b->n_in; k++)
         inputs |= (uint64_t)imp__input_depends(b->input[k], chosen) << k;
+    return inputs;
+}
+
+/* Does a chosen number move something? */
+static bool any_moves(const struct imp_scene *scene, const uint8_t *chosen)
+{
+    for (const struct imp_pose *p = scene->poses; p; p = p->next)
+        if (chosen[p->param]) return true;
+    return false;
+}
+
+/* The index of glass that reflects and bends in single directions. */
+static uint64_t index_input(const struct imp_bsdf *b)
+{
+    uint64_t inputs = 0;
+    if (b->straight || b->flags != (IMP_BSDF_DELTA | IMP_BSDF_TRANSMIT)) return 0;
+    for (int k = 0; b->ops->inputs[k].name; k++)
+        if (b->ops->inputs[k].flags & IMP_INPUT_INDEX) inputs |= UINT64_C(1) << k;
     return inputs;
 }
 
@@ -90,9 +109,11 @@ enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t 
         a.base[i] = chosen[i] ? (int64_t)a.n : -1;
         if (chosen[i]) a.n += scene->params[i].info.count;
     }
+    const bool moves = any_moves(scene, chosen);
     for (int b = 0; b < scene->n_bsdfs; b++) {
         a.inputs[b] = imp__inputs_depend(scene->bsdfs[b], chosen);
         a.bsdf[b] = a.inputs[b] != 0;
+        if (moves) a.inputs[b] |= index_input(scene->bsdfs[b]);
     }
     for (int e = 0; e < scene->n_emitters; e++)
         for (int k = 0; k < scene->emitters[e]->n_in; k++)

@@ -24,9 +24,11 @@ struct imp_active {
     int64_t *base;         /* [n_params] index in x of a parameter's first number, or -1;
                          parameters with the same numbers share it */
     struct imp_tied *tied; /* [n_params]; NULL: none of them is */
-    uint8_t *bsdf;    /* [n_bsdfs] does it depend on an active value; IMP_BY_EXTINCTION:
+    uint8_t *bsdf; /* [n_bsdfs] does it depend on an active value; IMP_BY_EXTINCTION:
                          by extinctions alone, which probes differentiate */
-    uint64_t *inputs; /* [n_bsdfs] bit j: its input j does, children's included */
+    /* [n_bsdfs] bit j: its input j does, children's included; of clear glass also the index, which does
+     * not, where something moves: lobes are then drawn for that. */
+    uint64_t *inputs;
     uint8_t *emitter; /* [n_emitters] */
     uint8_t *body;    /* [n_bodies]; NULL: none of them */
     uint8_t *medium;  /* [n_media] does its extinction; NULL: none of them */

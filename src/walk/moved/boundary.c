@@ -96,7 +96,11 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
     for (int k = 0; k < scene->n_all_shapes; k++) {
         const struct imp_bsdf *bsdf = imp__shape_bsdf(scene, scene->shapes[k]);
         out->passes |= bsdf->straight != 0;
-        out->mirrors |= imp__mirror_lobes(bsdf) != 0;
+        const struct imp_shape *s = scene->shapes[k];
+        const bool mirrors = imp__mirror_lobes(bsdf) != 0;
+        out->mirrors |= mirrors;
+        out->bends |=
+            mirrors && s->geometry != IMP_TRIANGLES && !(s->ops->flags & IMP_SHAPE_FLAT);
     }
     enum imp_status st = imp__moved_allowed(tracer);
     if (tracer->sensor->shape) /* by which edges are chosen: the middle of a meter */
@@ -125,6 +129,7 @@ void imp__boundary_free(struct imp__boundary *b)
     if (b->tracer) imp__release(b->tracer->scene->ctx, b->drawn);
     if (b->tracer) imp__release(b->tracer->scene->ctx, b->plane);
     if (b->tracer) imp__release(b->tracer->scene->ctx, b->plane_of);
+    if (b->tracer) imp__release(b->tracer->scene->ctx, b->bender);
     for (int k = 0; k < IMP_BOUNDARY_KINDS; k++) {
         imp__edge_choice_free(&b->choice[k]);
         if (b->tracer) imp__release(b->tracer->scene->ctx, b->part[k]);
@@ -175,7 +180,7 @@ static void eye_draw(struct imp__edge_draw *d)
     d->eye = d->b->camera;
     if (imp_unlikely(d->b->rays)) imp__ray_draw(d);
     else if (d->b->wide && !s->shape) imp__lens_point(s, d->lens, &d->eye);
-    if (imp_unlikely(s->shape && d->b->n_planes > 0)) {
+    if (imp_unlikely(s->shape && d->b->n_planes + d->b->n_benders > 0)) {
         struct imp_surface at = {.uv = {0}};
         imp__meter_draw(s, d->lens, &at);
         d->eye = at.p;
@@ -189,11 +194,13 @@ static void film_work(struct imp__edge_draw *d)
     if (d->b->tracer->sensor->shape) imp__draw_meter(d);
     else if (d->b->rays) imp__draw_ray(d);
     else imp__draw_film(d);
-    if (imp_likely(d->b->n_planes == 0)) return;
-    d->u = u;
-    d->chance = chance;
-    d->rim = d->touches = false;
-    imp__draw_mirrored(d);
+    for (int bent = 0; bent < 2; bent++) {
+        if (imp_likely((bent ? d->b->n_benders : d->b->n_planes) == 0)) continue;
+        d->u = u;
+        d->chance = chance;
+        d->rim = d->touches = false;
+        imp__draw_mirrored(d, bent);
+    }
 }
 
 static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)

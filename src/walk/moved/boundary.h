@@ -55,6 +55,12 @@
  * a vertex lines are reflected by chance; to the camera they are aimed, over chains of planes that are
  * drawn. Light samples meet no mirror: what a light sends over one is scattered light.
  *
+ * Mirrors that are balls, and balls of clear glass, turn lines likewise. Area across rays times solid angle
+ * times the square of the index of refraction stays as it is along each of them, so that lines from edges
+ * have no factor but of what is reflected or let through. From the camera to an edge a ray is looked for
+ * (boundary_bent.c), with W by its derivatives. At the limb of such a ball all light is reflected, and goes
+ * straight on: there nothing jumps but by the depth of walks, and tints.
+ *
  * In a medium x is also a point of it: f |cos| dA is then sigma p dV, p the phase
  * function times the albedo, and L is times what passes from the edge to x. Of what a lamp sends to such a
  * point a part is in `light`, and the rest in `scatter` (imp__glued_part).
@@ -119,6 +125,7 @@ struct imp__edge_item {
 };
 
 struct imp__plane;
+struct imp__bender;
 
 struct imp__boundary {
     const struct imp_tracer *tracer;
@@ -141,7 +148,8 @@ struct imp__boundary {
     bool parallel; /* its rays are: `camera` is their direction */
     bool rays;     /* they are one, or one for each pixel, and met by no line */
     bool wide;     /* they do not meet: a lens with an aperture, or a meter */
-    bool mirrors;  /* a material of the scene is a mirror, in part */
+    bool mirrors;  /* a material of the scene is a mirror, in part, or bends light */
+    bool bends;    /* ... on a curved shape: benders */
     bool passes;   /* a material of the scene lets light go straight on */
     bool through;  /* also light samples, and that is no bounce */
     const struct imp_medium *fog; /* which fills the scene; NULL: none */
@@ -150,6 +158,8 @@ struct imp__boundary {
     size_t n_planes, cap_planes, n_facets, cap_facets;
     struct imp__plane *plane; /* [n_planes] of flat mirrors: boundary_mirror.c */
     int *plane_of;            /* [n_facets] of these; -1: a facet without an area */
+    size_t n_benders, cap_benders;
+    struct imp__bender *bender; /* [n_benders] balls of these: boundary_bent.c */
     int n_lights;
     double *light_cdf; /* [n_emitters] of those that have draws, by power; last is 1 */
     /* [n_emitters] skies that have draws, and of these what a meter does not see by chance. */

@@ -298,6 +298,48 @@ static enum imp_status skies_allowed(const struct imp__boundary *b)
     return IMP_OK;
 }
 
+/* Rays turn where a ball is met elsewhere, and what is seen over it has no draws of all kinds. */
+static enum imp_status bends_allowed(const struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    const char *where = "in a scene with a curved mirror, or with glass that bends light";
+    if (!b->bends) return IMP_OK;
+    for (int k = 0; k < scene->n_environments; k++) {
+        const struct imp_emitter *e = scene->emitters[scene->environments[k]];
+        struct imp_sky_circle circle[IMP_SKY_CIRCLES];
+        if (e->ops->jumps(e, circle) > 0)
+            return imp__error(
+                scene->ctx, IMP_E_UNSUPPORTED,
+                "derivatives by what moves: light '%s' (%s) jumps at its horizon or sun, "
+                "%s",
+                e->name ? e->name : "", e->ops->name, where);
+    }
+    for (size_t k = 0; k < b->edges->n_bodies; k++) {
+        const struct imp__body *body = &b->edges->body[k];
+        struct imp__tube tube;
+        const char *why = imp__moves_smooth(scene, body->shape)
+                              ? "has vertex normals (face_normals "
+                                "makes it flat)"
+                          : imp__moves_cylinder(scene, body->shape, body->place, &tube)
+                              ? "is a cylinder"
+                              : NULL;
+        if (why)
+            return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                              "derivatives by what moves: shape '%s' %s, %s",
+                              scene->shapes[body->shape]->name, why, where);
+    }
+    for (size_t k = 0; k < 2 * b->edges->n_arcs; k++) {
+        const struct imp__edge_face *f = &b->edges->arc[k / 2].side[k % 2];
+        const struct imp_hit hit = {.shape = f->shape, .place = f->place};
+        if (imp__mirror_lobes(imp__hit_bsdf(scene, &hit)))
+            return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                              "derivatives by what moves: shape '%s' passes through "
+                              "another one, and is a mirror, or bends light",
+                              scene->shapes[f->shape]->name);
+    }
+    return IMP_OK;
+}
+
 #define AT_BORDER 1e-6 /* of the scene's size */
 
 /* A distant sensor is a mean over the ball around the scene's box: what moves must not move that. */
@@ -333,6 +375,7 @@ enum imp_status imp__boundary_allowed(const struct imp__boundary *b)
     if (st == IMP_OK) st = imp__borders_allowed(b);
     if (st == IMP_OK) st = turns_allowed(b);
     if (st == IMP_OK) st = skies_allowed(b);
+    if (st == IMP_OK) st = bends_allowed(b);
     if (st == IMP_OK) st = ball_allowed(b);
     if (st == IMP_OK) st = imp__rays_allowed(b);
     if (st == IMP_OK) st = facets_allowed(b);

@@ -155,11 +155,14 @@ bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w)
     struct imp__tube tube;
     const double u[2] = {imp__u01(d->key, IMP_EDGE_DIR_U),
                          imp__u01(d->key, IMP_EDGE_DIR_V)};
-    *w = imp__uniform_sphere(u);
     if (!d->item) {
         imp__edge_choice_draw(d->choice, d->u, &p);
-        return point_set(d, &p);
+        point_set(d, &p);
+        *w = imp__bent_direction(d, d->p, u, &d->spread);
+        return true;
     }
+    *w = imp__uniform_sphere(u);
+    d->spread = 4 * IMP_PI;
     if (d->item->arc) return arc_set(d);
     const double at[2] = {d->u, u[0]};
     if (is_tube(d, &tube)) return tube_touched(d, &tube, u, w);

@@ -6,15 +6,20 @@
 #include "walk/core/step.h"
 #include "walk/lights/light_step.h"
 
-imp_spec imp__look_through(struct imp__edge_draw *d, double px, double py)
+static imp_spec look_through(struct imp__edge_draw *d, double px, double py, int before)
 {
     const struct imp_tracer *t = d->b->tracer;
     struct imp_sensor_ray ray;
     struct imp_walk walk;
     t->sensor->ops->ray(t->sensor, px, py, d->lens, &ray);
     if (imp_unlikely(d->near > 0)) ray.t_near = d->near;
-    imp__edge_walk(d, &ray, 0, NULL, &walk);
+    imp__edge_walk(d, &ray, before, NULL, &walk);
     return walk.values;
+}
+
+imp_spec imp__look_through(struct imp__edge_draw *d, double px, double py)
+{
+    return look_through(d, px, py, 0);
 }
 
 struct imp__flux *imp__jump_add(struct imp__edge_draw *d,
@@ -41,12 +46,15 @@ static imp_spec look_beside(struct imp__edge_draw *d, const struct imp_sensor_sa
 {
     struct imp_sensor_sample at;
     struct imp_walk walk;
+    imp_spec R = imp__spec(1);
+    const int before = imp__edge_limb(d, m, &R) > 0;
+    if (imp_unlikely(before)) m = -m;
     if (imp__edge_face_look(d, to->p, d->b->parallel, m, apart, 0, &walk))
         return walk.values;
     const imp_v3 q = imp__edge_beside(d, w, m, apart);
     if (!imp__sensor_connect(d->b->tracer->sensor, &q, false, d->lens, &at))
         return imp__spec(0);
-    return imp__look_through(d, at.px, at.py);
+    return look_through(d, at.px, at.py, before) * R;
 }
 
 void imp__film_jump(struct imp__edge_draw *d, const struct imp_sensor_sample *to,
@@ -103,13 +111,26 @@ bool imp__edge_is_hidden(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, imp
     return false;
 }
 
-void imp__draw_mirrored(struct imp__edge_draw *d)
+/* Past the edge's point, as the mirror next to it sees it. */
+static imp_spec look_mirrored(struct imp__edge_draw *d, const struct imp__sight *s,
+                              imp_v3 m, double apart)
+{
+    struct imp_walk walk;
+    imp_spec R = imp__spec(1);
+    const int limb = imp__edge_limb(d, m, &R) > 0;
+    imp__look_past(d, &s->mirrors.first->at, limb ? -m : m, apart, s->bounces + limb,
+                   &walk);
+    return walk.values * R;
+}
+
+void imp__draw_mirrored(struct imp__edge_draw *d, bool bent)
 {
     const bool meter = d->b->tracer->sensor->shape != NULL;
     struct imp__sight s;
     imp_spec hidden;
-    if (!imp__sight_draw(d, 0, &s) || !imp__edge_any(d, s.eye, d->b->parallel) ||
-        !imp__sight_reach(d, &s, d->p))
+    if (bent ? !imp__bent_any(d, &s)
+             : !imp__sight_draw(d, 0, &s) || !imp__edge_any(d, s.eye, d->b->parallel) ||
+                   !imp__sight_reach(d, &s, d->p))
         return;
     const struct imp_surface *at = &s.mirrors.first->at;
     const imp_v3 r = d->p - at->p, o = imp__offset(at->p, at->ng, r),
@@ -120,20 +141,17 @@ void imp__draw_mirrored(struct imp__edge_draw *d)
         imp__edge_is_hidden(d, o, imp__edge_clear(d) - o, &hidden))
         return;
     const imp_v3 m = turned * (1 / sine);
-    struct imp_walk lo, hi;
-    imp__look_past(d, at, -m, apart, s.bounces, &lo);
-    imp__look_past(d, at, m, apart, s.bounces, &hi);
-    struct imp__flux *f = imp__jump_add(d, &s.to,
-                                        s.T * (lo.values - hi.values) *
-                                            (s.to.weight * sine * d->inv_pdf / s.chance),
-                                        1 + IMP_EDGE_ENDS + s.n);
+    const imp_spec jump =
+        look_mirrored(d, &s, -m, apart) - look_mirrored(d, &s, m, apart);
+    struct imp__flux *f =
+        imp__jump_add(d, &s.to, s.T * jump * (s.to.weight * sine * d->inv_pdf / s.chance),
+                      2 + IMP_EDGE_ENDS + s.mirrors.n);
     if (!f) return;
-    imp_v3 p = d->p;
     f->n_ends = imp__edge_ends(d, m, f->end);
-    const imp_v3 bar = imp__mirrors_bar(&s.mirrors, &p, -m, f->end, &f->n_ends);
-    const struct imp__glued image = {.p = p};
-    f->end[f->n_ends++] =
-        meter ? imp__meter_end(d, &s.to, bar) : imp__flux_camera(d, &image, bar);
+    const struct imp__seen seen =
+        imp__mirrors_seen(&s.mirrors, s.to.p, d->p, -m, f->end, &f->n_ends);
+    if (meter) f->end[f->n_ends++] = imp__meter_end(d, &s.to, seen.bar);
+    else imp__seen_camera(d, &seen, f);
 }
 
 void imp__draw_film(struct imp__edge_draw *d)

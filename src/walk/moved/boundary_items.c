@@ -37,7 +37,7 @@ static double turn_measure(const struct imp__boundary *b, const struct imp__edge
  * also receives light past edges at rest, and mirrors may move their images. */
 static bool film_at_rest(const struct imp__boundary *b)
 {
-    return !b->tracer->sensor->shape && !b->rays && b->n_planes == 0 &&
+    return !b->tracer->sensor->shape && !b->rays && b->n_planes + b->n_benders == 0 &&
            !imp__moves_shape(b->moves, IMP_MOVE_CAMERA, NULL);
 }
 static bool shape_moves(const struct imp__boundary *b, int shape, int64_t place)

@@ -168,15 +168,23 @@ static void flight_end(const struct imp__edge_draw *d, const struct flight *f,
 #define PASS_LEAST   0.1 /* probability of either choice at a mask */
 #define MIRRORS_SURE 4   /* behind so many mirrors, a line goes on by what it carries */
 
-/* A mirror is met, of what it reflects: *start is the image of where the line began. */
-static bool reflect(struct imp__edge_draw *d, const struct imp_hit *hit,
-                    const struct imp_surface *at, imp_spec F, imp_v3 *start,
-                    struct imp__line *line)
+/* A mirror is met, of what it reflects, or glass, of what it lets through and bends by this ratio: *start is
+ * the image of where the line began, or a place that is as far away. */
+static bool turn(struct imp__edge_draw *d, const struct imp_hit *hit,
+                 const struct imp_surface *at, double ratio, imp_spec F, imp_v3 *start,
+                 struct imp__line *line)
 {
     if (!imp__mirror_add(d, &line->mirrors, hit, at)) return false;
-    const struct imp__glued *x = &line->mirrors.last->x;
-    line->w = imp__mirror_turn(x->n, line->w);
-    *start = imp__mirror_image(x->p, x->n, *start);
+    struct imp__mirror *m = line->mirrors.last;
+    const struct imp__glued *x = &m->x;
+    if (!imp__bend(x->n, line->w, ratio, &line->w)) return false;
+    m->ratio = ratio > 0 ? 1 / ratio : 0;
+    if (imp_likely(x->curvature == 0 && ratio == 0)) {
+        *start = imp__mirror_image(x->p, x->n, *start);
+    } else {
+        *start = at->p - line->w * hit->t;
+        line->mirrors.bends = true;
+    }
     if (line->mirrors.n == 1) {
         line->T_mirrored = imp__spec(1);
         line->bounces_mirrored = 0;
@@ -188,24 +196,31 @@ static bool reflect(struct imp__edge_draw *d, const struct imp_hit *hit,
     return true;
 }
 
-/* Probabilities with which a line goes straight on, or is reflected, at a surface. Behind many perfect
+/* Probabilities with which a line goes straight on, is reflected, or is bent, at a surface. Behind many perfect
  * mirrors what it carries over these never becomes more than 1, so that its square has a mean. */
 struct fates {
-    double pass, reflect;
+    double pass, reflect, bend;
 };
 static struct fates fates_of(const struct imp__edge_draw *d, const struct imp_bsdf *b,
-                             imp_spec T, imp_spec F, const struct imp__line *line)
+                             imp_spec T, imp_spec F, imp_spec G,
+                             const struct imp__line *line)
 {
-    struct fates out = {0, 0};
-    const double t = imp__max_used(T, d->waves), r = imp__max_used(F, d->waves);
+    struct fates out = {0, 0, 0};
+    const double t = imp__max_used(T, d->waves), r = imp__max_used(F, d->waves),
+                 g = imp__max_used(G, d->waves);
     if (b->flags & IMP_BSDF_SMOOTH) {
         if (b->straight) out.pass = imp_clamp(t, PASS_LEAST, 1 - PASS_LEAST);
         if (r > 0)
             out.reflect = imp_clamp(r, PASS_LEAST, 1 - PASS_LEAST) * (1 - out.pass);
         return out;
     }
-    const double left = imp__max_used(line->T * (T + F), d->waves) * line->times,
+    const double left = imp__max_used(line->T * (T + F + G), d->waves) * line->times,
                  go = line->mirrors.n < MIRRORS_SURE ? 1 : imp_min(left, 1.0);
+    if (imp_unlikely(g > 0)) {
+        out.reflect = r > 0 ? imp_clamp(r / (r + g), PASS_LEAST, 1 - PASS_LEAST) * go : 0;
+        out.bend = go - out.reflect;
+        return out;
+    }
     if (!(r > 0)) {
         out.pass = b->straight ? 1 : 0;
         return out;
@@ -244,30 +259,31 @@ bool imp__edge_follow(struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
         if (!meets) return false;
         const struct imp_bsdf *b = imp__hit_bsdf(scene, hit);
         const bool mirrors = imp__mirror_lobes(b) != 0;
-        struct fates fate = {0, 0};
-        imp_spec T = {0}, F = {0};
-        double u = 1;
+        struct fates fate = {0, 0, 0};
+        imp_spec T = {0}, F = {0}, G = {0};
+        double u = 1, ratio = 0;
         if (imp_unlikely(b->straight || mirrors)) {
             if (b->straight) T = passed(d, b, hit, at, w);
             if (mirrors) F = imp__edge_reflected(d, hit, at, w);
-            fate = fates_of(d, b, T, F, line);
+            if (mirrors) G = imp__edge_refracted(d, hit, at, w, &ratio);
+            fate = fates_of(d, b, T, F, G, line);
             u = imp__u01(d->key, IMP_EDGE_PASS + dims * PASSES_MOST + n);
         }
-        if (u >= fate.pass + fate.reflect) {
+        if (u >= fate.pass + fate.reflect + fate.bend) {
             if (mirrors && !(b->flags & IMP_BSDF_SMOOTH)) return false;
             line->times *= 1 / (1 - fate.pass - fate.reflect);
             if (imp_unlikely(fades)) flight_end(d, &f, hit->t, false, line);
             return true;
         }
-        const bool passes = u < fate.pass;
-        line->times *= 1 / (passes ? fate.pass : fate.reflect);
+        const bool passes = u < fate.pass, bends = u >= fate.pass + fate.reflect;
+        line->times *= 1 / (passes ? fate.pass : bends ? fate.bend : fate.reflect);
         if (passes) {
             line->T *= T;
             line->T_mirrored *= T;
             line->bounces += !d->b->through;
             line->bounces_mirrored += !d->b->through;
         } else {
-            if (!reflect(d, hit, at, F, &start, line) ||
+            if (!turn(d, hit, at, bends ? ratio : 0, bends ? G : F, &start, line) ||
                 (longest >= 0 && line->bounces >= longest))
                 return false;
             w = line->w;

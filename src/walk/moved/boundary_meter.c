@@ -87,10 +87,13 @@ void imp__draw_meter(struct imp__edge_draw *d)
     const imp_v3 m = imp__normalize(turned);
     const double times = to.weight * d->inv_pdf * imp__length(turned) / to.dist;
     struct imp_walk lo, hi;
-    look_beside(d, &at, o, -m, apart, &lo);
-    look_beside(d, &at, o, m, apart, &hi);
+    imp_spec R;
+    const int limb = imp__edge_limb(d, m, &R);
+    look_beside(d, &at, o, limb < 0 ? m : -m, apart, &lo);
+    look_beside(d, &at, o, limb > 0 ? -m : m, apart, &hi);
     const struct imp__seen_from x = {.drawn = points ? NULL : d->b->drawn_to_meter};
-    const imp_spec jump = imp__arrives(d->b, &lo, x) - imp__arrives(d->b, &hi, x);
+    const imp_spec jump = imp__arrives_limb(d->b, &lo, x, limb < 0 ? &R : NULL) -
+                          imp__arrives_limb(d->b, &hi, x, limb > 0 ? &R : NULL);
     struct imp__flux *f = imp__jump_add(d, &to, jump * times, 1 + IMP_EDGE_ENDS);
     if (f) {
         f->n_ends = imp__edge_ends(d, m, f->end);

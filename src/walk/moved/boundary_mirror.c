@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What draws of the boundary see in flat mirrors (boundary.h): which planes are mirrors, chains of them
- * between a place and the camera, and velocities of images. */
+ * between a place and the camera, and velocities of images; and of what is seen in any. */
 #include "base/arguments.h"
 #include "base/context.h"
 #include "boundary_parts.h"
@@ -117,6 +117,10 @@ enum imp_status imp__mirrors_find(struct imp__boundary *b)
             IMP_CHECKED(facets_add(b, body));
             continue;
         }
+        if (!imp__moves_disk(scene, body->shape)) {
+            IMP_CHECKED(imp__benders_add(b, body));
+            continue;
+        }
         const struct imp__rim_point rim = imp__rim(scene, body->shape, body->place, 0, 0);
         const struct imp__plane x = {body->shape, body->place, -1, rim.p, rim.n, 0};
         IMP_CHECKED(plane_add(b, &x));
@@ -142,7 +146,8 @@ imp_spec imp__edge_reflected(const struct imp__edge_draw *d, const struct imp_hi
                                        .carried = imp__edge_waves(d)};
     imp_spec in[IMP_INPUTS_MAX], f, sum = {0};
     imp__evaluate_inputs(b, shape, &place, in);
-    for (uint64_t left = imp__mirror_lobes(b); left; left &= left - 1) {
+    const uint64_t bends = imp__is_glass(b) ? UINT64_C(1) << IMP_GLASS_BENDS : 0;
+    for (uint64_t left = imp__mirror_lobes(b) & ~bends; left; left &= left - 1) {
         const struct imp_dirs dirs = {imp__v3(-back[0], -back[1], back[2]), back,
                                       __builtin_ctzll(left), 0};
         imp__bsdf_eval(b, place.carried, in, &dirs, &f);
@@ -184,6 +189,43 @@ imp_v3 imp__mirrors_bar(const struct imp__mirrors *all, imp_v3 *p, imp_v3 bar,
         *p = y;
     }
     return bar;
+}
+
+struct imp__seen imp__mirrors_seen(const struct imp__mirrors *all, imp_v3 from, imp_v3 p,
+                                   imp_v3 bar, struct imp__flux_end *end, int *n_ends)
+{
+    struct imp__seen out = {p, bar, {0}};
+    if (imp_likely(!all->bends)) {
+        out.bar = imp__mirrors_bar(all, &out.p, bar, end, n_ends);
+        return out;
+    }
+    for (const struct imp__mirror *m = all->first; m; m = m->on) {
+        /* The ray from q along w is at p = q + t w: p' = q' + t w'. */
+        struct imp__link_point x = {.x = m->x, .moved_bar = out.bar};
+        const imp_v3 turn = out.turn + out.bar * imp__length(out.p - m->x.p),
+                     viewer = m->on ? m->on->x.p : from;
+        imp__bend_turn_bar(viewer, turn, m->ratio, &x);
+        out.bar = imp__slide_bar(&x, imp__normalize(m->x.p - viewer), NULL);
+        out.turn = -x.wo_bar;
+        out.p = m->x.p;
+        end[*n_ends] = imp__flux_glued(&x.x, (imp_v3){0});
+        end[(*n_ends)++].bar = x.bar;
+    }
+    return out;
+}
+
+void imp__seen_camera(const struct imp__edge_draw *d, const struct imp__seen *x,
+                      struct imp__flux *f)
+{
+    const struct imp__glued at = {.p = x->p};
+    f->end[f->n_ends++] = imp__flux_camera(d, &at, x->bar);
+    if (imp_likely(imp__is_zero(x->turn))) return;
+    /* The ray turns by (u(p) - u(o))/t, o another point of it. */
+    const struct imp__glued o = {.p = d->b->parallel ? x->p - d->eye : d->eye};
+    const double t = imp__length(x->p - o.p);
+    f->end[f->n_ends - 1].bar.v += x->turn * (1 / t);
+    f->end[f->n_ends] = imp__flux_camera(d, &o, x->turn * (-1 / t));
+    f->end[f->n_ends++].eye = x->p;
 }
 
 /* ---- To the camera ------------------------------------------------------------------- */
@@ -250,18 +292,30 @@ static bool leg_add(const struct imp__edge_draw *d, struct imp__sight *s, imp_v3
     return true;
 }
 
+imp_v3 imp__sight_image(const struct imp__sight *s, imp_v3 p)
+{
+    for (int k = s->n - 1; k >= 0; k--)
+        p = imp__mirror_image(s->plane[k]->p, s->plane[k]->n, p);
+    return p;
+}
+
+bool imp__sight_film(const struct imp__edge_draw *d, struct imp__sight *s, imp_v3 mirror)
+{
+    struct imp_shadow shadow;
+    if (!imp__sensor_connect(d->b->tracer->sensor, &mirror, false, d->lens, &s->to) ||
+        !imp__light_on_film(d->b->tracer->sensor, &s->to))
+        return false;
+    imp__light_shadow_aim(&s->mirrors.last->at, &s->to, &shadow);
+    return leg_add(d, s, shadow.o, shadow.d, shadow.reach);
+}
+
 /* The film position is that of the mirror next to the camera: a connection of the image itself would be
  * clipped, though only the way to that mirror is. path: from there to the place; 0: to a direction. */
 static bool film_set(const struct imp__edge_draw *d, struct imp__sight *s, imp_v3 mirror,
                      double path)
 {
     const double r = imp__length(mirror - d->eye);
-    struct imp_shadow shadow;
-    if (!imp__sensor_connect(d->b->tracer->sensor, &mirror, false, d->lens, &s->to) ||
-        !imp__light_on_film(d->b->tracer->sensor, &s->to))
-        return false;
-    imp__light_shadow_aim(&s->mirrors.last->at, &s->to, &shadow);
-    if (!leg_add(d, s, shadow.o, shadow.d, shadow.reach)) return false;
+    if (!imp__sight_film(d, s, mirror)) return false;
     if (!d->b->parallel) s->to.weight *= imp__sqr(path > 0 ? r / (r + path) : r);
     s->to.dist = path > 0 ? s->to.dist + path : INFINITY;
     return true;

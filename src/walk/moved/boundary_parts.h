@@ -36,8 +36,10 @@ struct imp__edge_draw {
     imp_v3
         out; /* of a line that touches: the outward normal; of a rim: in its surface, away from it */
     double inv_pdf; /* of the point, per length; of a line that touches a sphere */
-    int cell;       /* of the choice; behind all cells, of which sphere */
-    int prim;       /* of a medium's border: where the point is */
+    double
+        spread; /* one over the density of the direction of imp__edge_touched, where it touches nothing */
+    int cell; /* of the choice; behind all cells, of which sphere */
+    int prim; /* of a medium's border: where the point is */
     struct imp__flux *first, **end;
     bool no_memory;
     double lens
@@ -67,6 +69,8 @@ enum { IMP_EDGE_WALK_U, IMP_EDGE_WALK_V, IMP_EDGE_SURVIVE, IMP_EDGE_WALK_DIMS };
 #define IMP_EDGE_PART   (1u << 25) /* which part of a sky whose sun moves */
 #define IMP_EDGE_FLIGHT (1u << 24) /* two, of how far it goes in a medium: of each line */
 #define IMP_EDGE_MIRROR (1u << 26) /* by which mirrors it is seen: of each connection */
+#define IMP_EDGE_BENT                                                                    \
+    (1u << 28) /* whether it is seen from a ball that is a mirror or glass */
 #define IMP_EDGE_MEDIUM (1u << 27) /* of the point of a medium's border */
 
 /* So far beside an edge, per distance to it, it is looked past; rays are traced in float, whose
@@ -111,11 +115,13 @@ enum imp_status imp__mirrors_find(struct imp__boundary *b);
 /* Mirrors on a line, from where it begins on. */
 struct imp__mirror {
     struct imp__mirror *on; /* the next one; NULL: none */
+    double ratio; /* of glass, as imp__bend has it for what sees the line's beginning */
     struct imp__glued x;
     struct imp_surface at;
 };
 struct imp__mirrors {
     int n;
+    bool bends; /* one of them is curved, or glass: there are no images */
     struct imp__mirror *first, *last;
 };
 bool imp__mirror_add(struct imp__edge_draw *d, struct imp__mirrors *all,
@@ -127,6 +133,17 @@ imp_spec imp__edge_reflected(const struct imp__edge_draw *d, const struct imp_hi
  * what that is to the mirrors, n ends more, and, returned, to the velocity of the image there, *p then. */
 imp_v3 imp__mirrors_bar(const struct imp__mirrors *all, imp_v3 *p, imp_v3 bar,
                         struct imp__flux_end *end, int *n_ends);
+/* The same of any mirrors and glass, seen from the point `from`: what an adjoint of the point p is to them, and
+ * (p, bar) to the image of p, where there is one; else to the place p next to `from` where the ray meets
+ * the last of them, and (turn) to the direction of the ray. */
+struct imp__seen {
+    imp_v3 p, bar, turn;
+};
+struct imp__seen imp__mirrors_seen(const struct imp__mirrors *all, imp_v3 from, imp_v3 p,
+                                   imp_v3 bar, struct imp__flux_end *end, int *n_ends);
+/* What that counts where it is the camera that sees: two ends at most. */
+void imp__seen_camera(const struct imp__edge_draw *d, const struct imp__seen *x,
+                      struct imp__flux *f);
 /* How the camera may see a place: over planes, the first next to the camera, which are drawn with a
  * probability; `eye` is the camera's image, next to the place, or that of the direction of its rays.
  * False: there are no mirrors. */
@@ -148,6 +165,31 @@ bool imp__sight_draw(const struct imp__edge_draw *d, unsigned dims, struct imp__
 bool imp__sight_reach(struct imp__edge_draw *d, struct imp__sight *s, imp_v3 p);
 /* The same of what is infinitely far along the unit vector w. */
 bool imp__sight_reach_far(struct imp__edge_draw *d, struct imp__sight *s, imp_v3 w);
+
+/* The image of a point behind the planes, as the camera sees it. */
+imp_v3 imp__sight_image(const struct imp__sight *s, imp_v3 p);
+/* Connects a point of the mirror next to the camera, with what passes on the way. */
+bool imp__sight_film(const struct imp__edge_draw *d, struct imp__sight *s, imp_v3 mirror);
+
+/* ---- Curved mirrors and glass: boundary_bent.c ---- */
+enum imp_status imp__benders_add(struct imp__boundary *b, const struct imp__body *body);
+/* What a hit lets through of power along the unit vector w, and bends, by this ratio (imp__bend). 0: nothing. */
+imp_spec imp__edge_refracted(const struct imp__edge_draw *d, const struct imp_hit *hit,
+                             const struct imp_surface *at, imp_v3 w, double *ratio);
+/* A direction from a place, one over whose density is *spread: an even one, or, where there are balls, in half
+ * of all draws towards one. */
+imp_v3 imp__bent_direction(const struct imp__edge_draw *d, imp_v3 p, const double u[2],
+                           double *spread);
+/* How the camera may see a place over these; as imp__sight_draw and imp__sight_reach at once. */
+bool imp__bent_reach(struct imp__edge_draw *d, unsigned dims, imp_v3 p,
+                     struct imp__sight *s);
+/* The same of a point of an edge, as imp__edge_any chooses it, or of a ball that is touched by what the
+ * camera sees. */
+bool imp__bent_any(struct imp__edge_draw *d, struct imp__sight *s);
+/* Is the draw's point where a line touches such a ball, which reflects all light there? What is seen just inside of its limb is what is
+ * seen beside it, times *R, one vertex farther on; a look past it, so far apart, would see some of what
+ * lies within. 1: m points into the ball; -1: out of it; 0: it is no such point. */
+int imp__edge_limb(const struct imp__edge_draw *d, imp_v3 m, imp_spec *R);
 
 /* ---- Straight lines: boundary_line.c ---- */
 /* The material of what was hit, which in an instance may be its own. */
@@ -266,6 +308,8 @@ struct imp__seen_from {
     double farther; /* from x to where the walk begins */
     bool mirrored;  /* a mirror is between, and no light sample comes that way */
     const bool *drawn;
+    const imp_spec *limb
+        [2]; /* of imp__jumps: what each of the two looks has behind a limb; NULL: none */
 };
 imp_spec imp__arrives(const struct imp__boundary *b, const struct imp_walk *walk,
                       struct imp__seen_from x);
@@ -275,6 +319,9 @@ imp_spec imp__arrives(const struct imp__boundary *b, const struct imp_walk *walk
 imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
                      const struct imp_walk *hi, imp_spec times, imp_spec more,
                      struct imp__seen_from x, int *n);
+/* What a walk brings that leaves out what it has behind a limb (R, NULL: none), one vertex farther on. */
+imp_spec imp__arrives_limb(const struct imp__boundary *b, const struct imp_walk *walk,
+                           struct imp__seen_from x, const imp_spec *R);
 
 /* What light that arrives at `at` (a hit of this shape) along w brings to the sensor: from there,
  * and over further vertices. Light: radiance times all factors but f W(x). `back`: vertices that
@@ -368,7 +415,7 @@ void imp__boundary_work(struct imp__edge_draw *d, enum imp__boundary_kind kind);
 void imp__draw_film(struct imp__edge_draw *d);
 void imp__draw_meter(struct imp__edge_draw *d);
 /* As the sensor sees it over a chain of mirrors. */
-void imp__draw_mirrored(struct imp__edge_draw *d);
+void imp__draw_mirrored(struct imp__edge_draw *d, bool bent);
 void imp__draw_light(struct imp__edge_draw *d);
 void imp__draw_border(struct imp__edge_draw *d);
 /* Radiance, intensity or irradiance of a light with or without a shape along a line, which leaves it at

@@ -108,7 +108,7 @@ static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_ligh
                      const struct imp__mirrors *mirrors, struct link *last, int depth,
                      struct imp__flux *f)
 {
-    struct imp__glued seen = last->x.x; /* by the camera */
+    struct imp__seen seen = {last->x.x.p, {0}, {0}}; /* by the camera */
     for (int k = 0; k < light->n_ends; k++) f->end[f->n_ends++] = light->end[k];
     for (int k = 0; k < light->n_mirror_ends; k++)
         f->end[f->n_ends++] = light->mirror_end[k];
@@ -136,12 +136,14 @@ static void ends_set(const struct imp__edge_draw *d, const struct imp__edge_ligh
         if (!after && x.floats && !x.open)
             f->end[f->n_ends++] = imp__flux_camera(d, &on, far);
         if (imp_likely(between->n == 0)) continue;
-        imp_v3 p = x.x.p;
-        shift = imp__mirrors_bar(between, &p, shift, f->end, &f->n_ends);
-        if (!after) seen.p = p;
+        const struct imp__seen over = imp__mirrors_seen(
+            between, after ? after->x.x.p : to->p, x.x.p, shift, f->end, &f->n_ends);
+        shift = over.bar;
+        if (!after) seen = over;
     }
-    f->end[f->n_ends++] = d->b->tracer->sensor->shape ? imp__meter_end(d, to, shift)
-                                                      : imp__flux_camera(d, &seen, shift);
+    seen.bar = shift;
+    if (d->b->tracer->sensor->shape) f->end[f->n_ends++] = imp__meter_end(d, to, shift);
+    else imp__seen_camera(d, &seen, f);
 }
 
 /* Light for a path with so many vertices from the camera to where the light arrives. False: it would
@@ -165,7 +167,7 @@ static void flux_make(struct imp__edge_draw *d, const struct imp__edge_light *li
                       imp_spec L)
 {
     struct imp__flux *f = imp__flux_add(d, light->n_ends + light->n_mirror_ends + depth +
-                                               3 + k->n_mirrors + mirrors->n);
+                                               4 + k->n_mirrors + mirrors->n);
     if (!f) return;
     f->px = to->px;
     f->py = to->py;
@@ -241,17 +243,20 @@ static void connect(struct imp__edge_draw *d, const struct imp__edge_light *ligh
     flux_make(d, light, &to, &none, k, depth, L);
 }
 
-/* The same over mirrors. */
+/* The same over mirrors. bent: over curved ones and through glass. */
 static void connect_mirrored(struct imp__edge_draw *d,
                              const struct imp__edge_light *light, struct link *k,
-                             int depth, int passed, imp_spec T)
+                             int depth, int passed, imp_spec T, bool bent)
 {
     struct imp__sight s;
     struct imp__line line;
     imp_spec brings;
     if (!d->b->tracer->sensor->ops->connect ||
-        !light_at(d->b->tracer, light, depth + 2 + passed, &brings) ||
-        !imp__sight_draw(d, 1 + (unsigned)depth, &s) || !imp__sight_reach(d, &s, k->at.p))
+        !light_at(d->b->tracer, light, depth + 2 + passed, &brings))
+        return;
+    const unsigned number = 1 + (unsigned)depth;
+    if (bent ? !imp__bent_reach(d, number, k->at.p, &s)
+             : !imp__sight_draw(d, number, &s) || !imp__sight_reach(d, &s, k->at.p))
         return;
     const struct imp_surface *mirror = &s.mirrors.first->at;
     const imp_v3 r = mirror->p - k->at.p;
@@ -328,7 +333,9 @@ void imp__edge_reach(struct imp__edge_draw *d, const struct imp_hit *hit,
     for (int depth = 0; k && light_at(t, light, depth + 1 + passed, &L); depth++) {
         connect(d, light, k, depth, passed, T);
         if (imp_unlikely(d->b->n_planes > 0))
-            connect_mirrored(d, light, k, depth, passed, T);
+            connect_mirrored(d, light, k, depth, passed, T, false);
+        if (imp_unlikely(d->b->n_benders > 0))
+            connect_mirrored(d, light, k, depth, passed, T, true);
         const unsigned dims = IMP_EDGE_WALK + (unsigned)depth * IMP_EDGE_WALK_DIMS;
         imp_v3 wo, w;
         const double pdf = direction_draw(d, k, dims, &wo);

@@ -59,6 +59,15 @@ imp_spec imp__arrives(const struct imp__boundary *b, const struct imp_walk *walk
     return L;
 }
 
+imp_spec imp__arrives_limb(const struct imp__boundary *b, const struct imp_walk *walk,
+                           struct imp__seen_from x, const imp_spec *R)
+{
+    if (imp_likely(!R)) return imp__arrives(b, walk, x);
+    x.before++;
+    x.mirrored = true;
+    return imp__arrives(b, walk, x) * *R;
+}
+
 void imp__look_from(struct imp__edge_draw *d, const struct imp_surface *at, imp_v3 to,
                     int before, struct imp_walk *walk)
 {
@@ -83,7 +92,10 @@ imp_spec *imp__jumps(struct imp__edge_draw *d, const struct imp_walk *lo,
     const int between = x.before;
     for (int k = 0; k < *n; k++) {
         x.before = k + 1 + between;
-        jump[k] = (imp__arrives(d->b, lo, x) - imp__arrives(d->b, hi, x)) * times + more;
+        jump[k] = (imp__arrives_limb(d->b, lo, x, x.limb[0]) -
+                   imp__arrives_limb(d->b, hi, x, x.limb[1])) *
+                      times +
+                  more;
         any |= !imp__is_zero_used(jump[k], d->waves);
     }
     return any ? jump : NULL;
@@ -99,9 +111,8 @@ void imp__look_past(struct imp__edge_draw *d, const struct imp_surface *at, imp_
 
 /* A line over mirrors: its light's ends at these, and what x counts. False: no memory. */
 static bool mirrored_ends(struct imp__edge_draw *d, const struct imp__mirrors *mirrors,
-                          imp_v3 m, struct imp__edge_light *light)
+                          imp_v3 x, imp_v3 m, struct imp__edge_light *light)
 {
-    imp_v3 p = d->p;
     struct imp__flux_end *end =
         imp__arena_take(d->arena, (size_t)mirrors->n, sizeof *end);
     if (!end) {
@@ -109,7 +120,8 @@ static bool mirrored_ends(struct imp__edge_draw *d, const struct imp__mirrors *m
         return false;
     }
     light->mirror_end = end;
-    light->slide = imp__mirrors_bar(mirrors, &p, -m, end, &light->n_mirror_ends);
+    light->slide =
+        imp__mirrors_seen(mirrors, x, d->p, -m, end, &light->n_mirror_ends).bar;
     return true;
 }
 
@@ -141,24 +153,29 @@ void imp__draw_scatter(struct imp__edge_draw *d)
                            : imp__edge_near(d, -w, hit.t, apart, line.T);
     const int between = mirrored ? line.bounces_mirrored : 0;
     struct imp_walk lo, hi;
-    imp__look_past(d, viewer, -m, apart, 1 + between, &lo);
-    imp__look_past(d, viewer, m, apart, 1 + between, &hi);
+    imp_spec R;
+    const int limb = imp__edge_limb(d, m, &R);
+    imp__look_past(d, viewer, limb < 0 ? m : -m, apart, 1 + between + (limb < 0), &lo);
+    imp__look_past(d, viewer, limb > 0 ? -m : m, apart, 1 + between + (limb > 0), &hi);
 
     int depths;
     const imp_spec times =
-        T * ((d->touches ? 1 : sine * 4 * IMP_PI) * d->inv_pdf * line.times);
+        T * ((d->touches ? 1 : sine * d->spread) * d->inv_pdf * line.times);
     if (imp_likely(!mirrored)) {
         imp__seam_emission(d, &hit, &at, &lo, m, w, times);
         imp__seam_emission(d, &hit, &at, &hi, m, w, -times);
     }
-    const struct imp__seen_from x = {.before = between,
-                                     .floats = hit.shape < 0,
-                                     .mirrored = mirrored,
-                                     .drawn = b->drawn};
+    const struct imp__seen_from x = {
+        .before = between,
+        .floats = hit.shape < 0,
+        .mirrored = mirrored,
+        .drawn = b->drawn,
+        .limb = {limb < 0 ? &R : NULL, limb > 0 ? &R : NULL}};
     imp_spec *jump = imp__jumps(d, &lo, &hi, times, imp__spec(0), x, &depths);
     if (!jump) return;
     struct imp__edge_light light = {.w = line.w, .slide = -m};
-    if (imp_unlikely(mirrored) && !mirrored_ends(d, &line.mirrors, m, &light)) return;
+    if (imp_unlikely(mirrored) && !mirrored_ends(d, &line.mirrors, at.p, m, &light))
+        return;
     light.light = jump[0];
     if (max >= 0) {
         light.by_depth = jump;

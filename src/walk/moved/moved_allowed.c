@@ -14,7 +14,7 @@
 #include "walk/media/tracking.h"
 #include "walk/path/first_segment.h"
 
-extern const struct imp_bsdf_ops imp__mask;
+extern const struct imp_bsdf_ops imp__mask, imp__twosided, imp__conductor, imp__plastic;
 extern const struct imp_emitter_ops imp__area, imp__point_light, imp__spot_light,
     imp__directional, imp__projector;
 
@@ -33,13 +33,37 @@ static bool is_textured(const struct imp_input *const *input, int n)
     return false;
 }
 
-/* Why a shape that is a mirror, in part, has no draws for what is seen in it; NULL: it has. */
+/* Reflects it all light next to the limb of a ball, whatever it scatters or lets through elsewhere? */
+static bool is_all_at_limb(const struct imp_bsdf *b)
+{
+    if (b->ops == &imp__twosided) {
+        for (int k = 0; k < b->n_child; k++)
+            if (!is_all_at_limb(b->child[k])) return false;
+        return true;
+    }
+    return b->ops == &imp__conductor || b->ops == &imp__plastic || imp__is_glass(b);
+}
+
+/* Why a shape that is a mirror, in part, or bends light has no draws for what is seen in it; NULL: it has. */
 static const char *mirror_without_d(const struct imp_tracer *t, const struct imp_shape *s)
 {
+    const struct imp_bsdf *b = imp__shape_bsdf(t->scene, s);
+    struct imp_round round;
+    const bool ball =
+        s->geometry != IMP_TRIANGLES && imp__moves_sphere(t->scene, s->index, 0, &round);
+    if (imp__is_glass(b) && !ball)
+        return "bends light, on a shape that is no sphere: edges that are seen through "
+               "it "
+               "have no draws";
     if (s->smooth)
         return "is a mirror on a mesh with vertex normals (face_normals makes it flat)";
-    if (s->geometry != IMP_TRIANGLES && !(s->ops->flags & IMP_SHAPE_FLAT))
-        return "is a mirror on a curved shape: edges that are seen in it have no draws";
+    if (s->geometry != IMP_TRIANGLES && !(s->ops->flags & IMP_SHAPE_FLAT) && !ball)
+        return "is a mirror on a curved shape that is no sphere: edges that are seen in "
+               "it "
+               "have no draws";
+    if (ball && !is_all_at_limb(b))
+        return "reflects in single directions, on a sphere, and is none of conductor, "
+               "plastic and dielectric";
     if (s->emitter >= 0) return "is a mirror, and its shape is a light";
     if (t->scene->n_media > 0 && imp__segment_first(t)->through && t->sensor->medium)
         return "is a mirror in a medium";

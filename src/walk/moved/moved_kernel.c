@@ -183,7 +183,7 @@ const char *imp__kernel_without_d(const struct imp_bsdf *b, bool round)
                "seen in it have no draws";
     if (b->flags & IMP_BSDF_DELTA && b->flags & IMP_BSDF_TURNED)
         return "has normals of its own, with which single directions turn";
-    if (b->flags & IMP_BSDF_DELTA && !imp__bends_nothing(b))
+    if (b->flags & IMP_BSDF_DELTA && !imp__is_glass(b) && !imp__bends_nothing(b))
         return "bends light: edges that are seen through it have no draws";
     if (b->flags & IMP_BSDF_DELTA && !(b->flags & IMP_BSDF_SMOOTH)) return NULL;
     if (b->flags & IMP_BSDF_EMIT) return "emits light by itself";

@@ -2,15 +2,32 @@
  *
  * Mirrors of the chain from the camera, transposed (moved_mirror.h), and what is one. */
 #include "moved_mirror.h"
+#include "kind/bsdf/fresnel.h"
 #include "math/rng.h"
 #include "math/warp.h"
 #include "walk/core/vertex.h"
 
+extern const struct imp_bsdf_ops imp__dielectric;
+
+bool imp__is_glass(const struct imp_bsdf *b) { return b->ops == &imp__dielectric; }
+
 #define STEP 1e-5
+
+/* The same of glass, where differences do not know how near the angle is at which it reflects all. */
+static double glass_slope(const struct imp_vertex *v, double c)
+{
+    const struct imp_dirs inwards = {imp__v3(0, 0, c), {0}, IMP_GLASS_BENDS, 0};
+    double d_c, d_e;
+    const double F = imp__fresnel_dielectric_d(
+        fabs(c), v->bsdf->ops->index_ratio(v->bsdf, v->in, &inwards), &d_c, &d_e);
+    const double part = v->d.lobe == IMP_GLASS_BENDS ? F - 1 : F;
+    return part != 0 ? copysign(1, c) * d_c / part : 0;
+}
 
 /* d ln F/dc of a delta lobe, by lanes, at the cosine c of wo; 0 where F is. */
 static imp_spec slope(const struct imp_vertex *v, double c)
 {
+    if (imp__is_glass(v->bsdf)) return imp__spec(glass_slope(v, c));
     const bool straight = v->bsdf->straight >> v->d.lobe & 1;
     imp_spec F[2];
     for (int k = 0; k < 2; k++) {
@@ -54,14 +71,20 @@ void imp__lobe_bar(const struct imp_scene *scene, const struct imp_vertex *v, do
     x->bar.v -= slides.slide;
 }
 
-void imp__mirror_turn_bar(imp_v3 from, imp_v3 turn, struct imp__link_point *x)
+extern const struct imp_bsdf_ops imp__mask;
+
+void imp__bend_turn_bar(imp_v3 from, imp_v3 turn, double ratio, struct imp__link_point *x)
 {
-    const imp_v3 n = x->x.n, w = imp__normalize(x->x.p - from);
-    x->bar.n -= (turn * imp__dot(n, w) + w * imp__dot(n, turn)) * 2;
-    x->wo_bar -= imp__mirror_turn(n, turn);
+    const imp_v3 w = imp__normalize(x->x.p - from);
+    x->wo_bar -= imp__bend_bar(x->x.n, w, ratio, turn, &x->bar.n);
 }
 
-extern const struct imp_bsdf_ops imp__mask;
+double imp__vertex_ratio(const struct imp_vertex *v)
+{
+    const struct imp_dirs dirs = {imp__vertex_wo(v), {0}, v->d.lobe, 0};
+    if (!imp__is_glass(v->bsdf) || v->d.lobe != IMP_GLASS_BENDS) return 0;
+    return 1 / v->bsdf->ops->index_ratio(v->bsdf, v->in, &dirs);
+}
 
 bool imp__passes_by_angle(const struct imp_bsdf *b)
 {

@@ -23,8 +23,9 @@ static imp_v3 beyond_bar(struct imp__sweep *s, int k, const struct imp_vertex *v
     struct imp__link_point *x = &s->at[k], *next = x + 1;
     const imp_v3 w = imp__link_direction(x, next);
     if (next->sky) { /* the recorded direction is rounded */
-        const imp_v3 in = imp__normalize(x->x.p - imp__sweep_from(s, k)),
-                     out = imp__is_mirrored(v) ? imp__mirror_turn(x->x.n, in) : in;
+        const imp_v3 in = imp__normalize(x->x.p - imp__sweep_from(s, k));
+        imp_v3 out = in;
+        if (imp__is_mirrored(v)) imp__bend(x->x.n, in, imp__vertex_ratio(v), &out);
         if (imp_unlikely(s->moves->skies)) skies_sent_bar(s, k, v, out);
         return imp__skies_slope(scene, out, s->piece[k].on, v->carried);
     }
@@ -56,5 +57,6 @@ void imp__mirror_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
 {
     imp__lobe_bar(s->tracer->scene, v, s->walk->time, imp__sweep_from(s, k),
                   s->piece[k].step, &s->at[k]);
-    imp__mirror_turn_bar(imp__sweep_from(s, k), beyond_bar(s, k, v), &s->at[k]);
+    imp__bend_turn_bar(imp__sweep_from(s, k), beyond_bar(s, k, v), imp__vertex_ratio(v),
+                       &s->at[k]);
 }

@@ -94,7 +94,7 @@ static inline double imp__sweep_reach_bar(const struct imp__sweep *s, int k, imp
 /* Vertex k passes light straight on: its place does not move what follows, but a texture may let
  * pass another part, and a pane as it turns. */
 void imp__pass_bar(struct imp__sweep *s, int k, const struct imp_vertex *v);
-/* Vertex k is a mirror to what follows. */
+/* Vertex k is a mirror, or glass, to what follows. */
 void imp__mirror_bar(struct imp__sweep *s, int k, const struct imp_vertex *v);
 
 #endif

@@ -1,0 +1,242 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Derivatives by what moves, seen in mirrors that are balls, and through balls of clear glass: a glowing disk on the
+ * axis of a ball, as parallel rays along the axis see it; recorded walks (check's frozen rows);
+ * imp_problem_reverse against central differences. What is refused. */
+#include "imp_check_rows.h"
+#include "mean_gradient.h"
+#include "moves_kit.h"
+#include "moves_numbers.h"
+
+#define PATH    "<integrator type='path'><integer name='max_depth' value='4'/></integrator>"
+#define DEEP    "<integrator type='path'><integer name='max_depth' value='6'/></integrator>"
+#define SKY     "<emitter type='constant'><rgb name='radiance' value='.4,.5,.6'/></emitter>"
+#define METAL   "<bsdf type='conductor'><string name='material' value='Cu'/></bsdf>"
+#define PERFECT "<bsdf type='conductor'><string name='material' value='none'/></bsdf>"
+#define INDEX   1.5
+#define GLASS                                                                            \
+    "<bsdf type='dielectric'><float name='int_ior' value='1.5'/><float name='ext_ior' "  \
+    "value='1'/></bsdf>"
+#define DARK  "<bsdf type='diffuse' id='grey'><rgb name='reflectance' value='0'/></bsdf>"
+#define BLACK "<bsdf type='diffuse'><spectrum name='reflectance' value='0'/></bsdf>"
+
+#define BALL(BSDF)                                                                       \
+    "<shape type='sphere' id='ball'><float name='radius' value='.6'/><point "            \
+    "name='center' x='.95' y='-.8' z='.8'/>" BSDF "</shape>"
+#define BEHIND                                                                           \
+    "<shape type='sphere' id='behind'><float name='radius' value='.35'/><point "         \
+    "name='center' x='.9' y='1.2' z='.7'/><ref id='grey'/></shape>"
+#define FLAT                                                                             \
+    "<shape type='rectangle' id='mirror'><transform name='to_world'><scale x='1.1' "     \
+    "y='.9'/><rotate x='1' angle='90'/><rotate z='1' angle='-20'/><translate x='.9' "    \
+    "y='1.6' z='1.2'/></transform>" PERFECT "</shape>"
+#define TUBE                                                                             \
+    "<shape type='cylinder' id='tube'><float name='radius' value='.2'/><point "          \
+    "name='p0' "                                                                         \
+    "x='-2' y='0' z='1'/><point name='p1' x='-2' y='0' z='2'/></shape>"
+
+static imp_scene *room_of(const char *rest, const char *grey)
+{
+    return room_build(ctx, &(struct room_parts){.rest = rest, .grey = grey});
+}
+static imp_scene *room(const char *rest) { return room_of(rest, NULL); }
+
+/* ---- On an axis ---------------------------------------------------------------------------- */
+
+/* A ball of radius R at z; a disk of radius a at h, which glows towards the ball. */
+struct axis {
+    double R, z, a, h;
+};
+
+/* Where parallel rays along -z, s from the axis, meet the plane of the disk, s again, over a mirror; through
+ * glass, on the other side of it, by the angles i and t with sin i = s/R = INDEX sin t. */
+static double mirror_meets(const struct axis *x, double s)
+{
+    const double i = asin(s / x->R);
+    return s + (x->h - x->z - x->R * cos(i)) * tan(2 * i);
+}
+static double glass_meets(const struct axis *x, double s)
+{
+    const double i = asin(s / x->R), t = asin(s / x->R / INDEX), turn = 2 * (i - t);
+    /* It leaves the ball at the angle 2 t - i from the axis, on the other side of the middle. */
+    const double out = 2 * t - i, p = x->R * sin(out), q = x->z - x->R * cos(out);
+    return (q - x->h) * tan(turn) - p;
+}
+
+/* What is let through twice of unpolarised light. */
+static double passes(const struct axis *x, double s)
+{
+    const double i = asin(s / x->R), t = asin(s / x->R / INDEX), c = cos(i), d = cos(t),
+                 r = (c - INDEX * d) / (c + INDEX * d),
+                 p = (d - INDEX * c) / (d + INDEX * c);
+    return imp__sqr(1 - (r * r + p * p) / 2);
+}
+
+/* The root of meets(s) = to between lo and hi. */
+static double root(double (*meets)(const struct axis *, double), const struct axis *x,
+                   double to, double lo, double hi)
+{
+    const bool rises = meets(x, hi) > meets(x, lo);
+    for (int k = 0; k < 100; k++) {
+        const double middle = (lo + hi) / 2;
+        if ((meets(x, middle) < to) == rises) lo = middle;
+        else hi = middle;
+    }
+    return lo;
+}
+
+/* The mean of a picture of 2 x 2, the radiance being 1. */
+static double mirror_mean(const struct axis *x)
+{
+    const double s = root(mirror_meets, x, x->a, 0, 0.7 * x->R);
+    return IMP_PI * s * s / 4;
+}
+static double glass_mean(const struct axis *x)
+{
+    enum { N = 2000 };
+    const double end = root(glass_meets, x, x->a, 0.5 * x->R, 0.95 * x->R);
+    double sum = 0;
+    for (int k = 0; k < N; k++) { /* Gauss-Legendre of two points */
+        const double h = end / N, m = (k + 0.5) * h, g = h / sqrt(12);
+        sum += h / 2 * ((m - g) * passes(x, m - g) + (m + g) * passes(x, m + g));
+    }
+    return IMP_2PI * sum / 4;
+}
+
+/* By number k of R, z, a, h. */
+static double slope(double (*mean)(const struct axis *), struct axis x, int k)
+{
+    double *number[4] = {&x.R, &x.z, &x.a, &x.h};
+    const double at = *number[k], h = 1e-5;
+    *number[k] = at + h;
+    const double hi = mean(&x);
+    *number[k] = at - h;
+    return (hi - mean(&x)) / (2 * h);
+}
+
+static imp_scene *axis_scene(const struct axis *x, const char *bsdf, int depth,
+                             const char *faces)
+{
+    char xml[4096];
+    snprintf(
+        xml, sizeof xml,
+        "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' "
+        "value='%d'/></integrator><sensor type='orthographic' id='camera'>"
+        "<transform name='to_world'><lookat origin='0,0,2' target='0,0,0' "
+        "up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' "
+        "value='8'/><integer name='height' value='8'/><rfilter type='box'/></film>"
+        "</sensor><shape type='sphere' id='ball'><float name='radius' value='%g'/>"
+        "<point name='center' x='0' y='0' z='%g'/>%s</shape>"
+        "<shape type='disk' id='disk'><transform name='to_world'><scale value='%g'/>"
+        "%s<translate z='%g'/></transform>" BLACK
+        "<emitter type='area'><spectrum name='radiance' value='1'/></emitter></shape>"
+        "</scene>",
+        depth, x->R, x->z, bsdf, x->a, faces, x->h);
+    return test_scene_text(ctx, xml, IMP_MONO);
+}
+
+static void axis_test(const char *what, const struct axis *x, imp_scene *scene,
+                      double (*mean)(const struct axis *), int spp)
+{
+    static const struct {
+        const char *name;
+        int k, number;
+    } of[] = {{"ball.radius", 0, 0}, {"ball.center", 2, 1}, {"disk.pose", 2, 3}};
+    for (int j = 0; j < 3; j++) test_must(ctx, imp_scene_add_geometry(scene, of[j].name));
+    for (int j = 0; j < 3; j++) {
+        struct tap_stat g[6] = {{0, 0, 0}};
+        char name[128];
+        mean_gradient(ctx, scene, of[j].name, spp, 16, g);
+        snprintf(name, sizeof name, "%s, by %s[%d]", what, of[j].name, of[j].k);
+        const double right = slope(mean, *x, of[j].number);
+        tap_z(&g[of[j].k], right, 0.02 * fabs(right), name);
+    }
+    imp_scene_destroy(scene);
+}
+
+static void axes_test(int spp_axis)
+{
+    const struct axis mirror = {.8, 0, 1, 3}, glass = {.8, 0, .2, -1};
+    axis_test("a disk in a ball", &mirror,
+              axis_scene(&mirror, PERFECT, 2, "<rotate x='1' angle='180'/>"), mirror_mean,
+              spp_axis);
+    axis_test("a disk through a ball", &glass, axis_scene(&glass, GLASS, 3, ""),
+              glass_mean, spp_axis);
+}
+
+/* ---- Walks --------------------------------------------------------------------------------- */
+
+static void frozen_test(const char *what, imp_scene *scene)
+{
+    static const char *const names[] = {"block.pose", "camera.pose", "lamp.pose"};
+    struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
+    imp_problem *p;
+    o.paths = 250;
+    o.only = "frozen";
+    for (int k = 0; k < 3; k++) test_must(ctx, imp_scene_add_geometry(scene, names[k]));
+    test_must(ctx, imp_problem_create(scene, &p));
+    for (int k = 0; k < 3; k++) test_must(ctx, imp_problem_activate(p, names[k]));
+    test_check(ctx, p, &o, what);
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+}
+
+static void refused_test(void)
+{
+    number_refused("glass that is no ball",
+                   room(PATH "<shape type='cube' id='glass'>" GLASS "</shape>"),
+                   "block.pose", "no sphere");
+    number_refused("a tube that is a mirror",
+                   room(PATH "<shape type='cylinder' id='tube'>" PERFECT "</shape>"),
+                   "block.pose", "no sphere");
+    number_refused("a tube beside a ball", room(PATH BALL(PERFECT) TUBE), "block.pose",
+                   "curved mirror");
+    number_refused("a horizon in a ball",
+                   room(PATH "<emitter type='ciesky'/>" BALL(PERFECT)), "block.pose",
+                   "curved mirror");
+    number_refused("a ball in the floor",
+                   room(PATH "<shape type='sphere' id='ball'>" GLASS "</shape>"),
+                   "block.pose", "passes through");
+}
+
+int main(int argc, char **argv)
+{
+    const bool is_long = tap_is_long(argc, argv);
+    static const struct number images[] = {{"block.pose", 0, .02},
+                                           {"block.pose", 5, .02},
+                                           {"behind.center", 0, .01},
+                                           {"lamp.pose", 3, .02},
+                                           {NULL, 0, 0}},
+                               balls[] = {{"ball.center", 0, .01},
+                                          {"ball.center", 1, .01},
+                                          {"ball.center", 2, .01},
+                                          {"ball.radius", 0, .01},
+                                          {"camera.pose", 0, .01},
+                                          {"camera.pose", 4, .01},
+                                          {NULL, 0, 0}};
+    ctx = test_context(2);
+    adjoint_make();
+    axes_test(is_long ? 768 : 64);
+    frozen_test("walks over a ball", room(DEEP BALL(METAL)));
+    frozen_test("walks through glass", room(DEEP BALL(GLASS)));
+    frozen_test("walks through glass, under a sky", room(SKY DEEP BALL(GLASS)));
+    numbers_compare("images in a ball",
+                    room_of("<integrator type='direct'/>" SKY BALL(PERFECT) BEHIND, DARK),
+                    is_long ? 512 : 64, is_long ? 1024 : 128, .1, images);
+    if (is_long) {
+        numbers_compare("images in a ball in a flat mirror",
+                        room_of(DEEP SKY BALL(PERFECT) FLAT BEHIND, DARK), 256, 512, .1,
+                        images);
+        numbers_compare("images in glass", room_of(DEEP SKY BALL(GLASS) BEHIND, DARK),
+                        192, 512, .1, images);
+        numbers_compare(
+            "a ball that moves",
+            room_of("<integrator type='direct'/>" SKY BALL(PERFECT) BEHIND, DARK), 192,
+            640, .15, balls);
+        numbers_compare("a ball in a lit room", room(PATH BALL(METAL) BEHIND), 192, 512,
+                        .2, images);
+    }
+    refused_test();
+    imp_context_destroy(ctx);
+    return tap_done();
+}
