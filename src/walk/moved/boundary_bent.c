@@ -59,13 +59,27 @@ enum imp_status imp__benders_add(struct imp__boundary *b, const struct imp__body
     return IMP_OK;
 }
 
-/* The cosine of the half angle at which a ball is seen, and the direction of its middle. -1: from inside. */
-static double seen_cosine(const struct imp__bender *x, imp_v3 p, imp_v3 *way)
+/* A direction from p towards a ball, by the cosine of the angle at which it is met, which is even: near the limb,
+ * which few directions meet, what is seen moves fast. From inside: any. */
+static imp_v3 ball_direction(const struct imp__bender *x, imp_v3 p, const double u[2])
 {
     const imp_v3 r = x->round.centre - p;
-    const double d2 = imp__dot(r, r), r2 = imp__sqr(x->round.radius);
-    *way = r * (1 / sqrt(d2));
-    return d2 > r2 * (1 + IMP_BESIDE) ? sqrt(1 - r2 / d2) : -1;
+    const double D = imp__length(r), sine = sqrt(1 - u[0] * u[0]) * x->round.radius / D;
+    if (!(x->round.radius < D)) return imp__uniform_sphere(u);
+    const struct imp_frame f = imp__frame_from_normal(r * (1 / D));
+    return f.s * (sine * cos(IMP_2PI * u[1])) + f.t * (sine * sin(IMP_2PI * u[1])) +
+           f.n * sqrt(1 - sine * sine);
+}
+/* Its density: with w off the middle by the angle a, and c that cosine,  cos(a)/(2 pi (r/D)^2 c). */
+static double ball_density(const struct imp__bender *x, imp_v3 p, imp_v3 w)
+{
+    const imp_v3 r = x->round.centre - p;
+    const double d2 = imp__dot(r, r), r2 = imp__sqr(x->round.radius),
+                 along = imp__dot(r, w);
+    const double square = 1 - (d2 - along * along) / r2;
+    if (!(r2 < d2)) return 1 / (4 * IMP_PI);
+    if (!(along > 0) || !(square > 0)) return 0;
+    return along * sqrt(d2) / (IMP_2PI * r2 * sqrt(square));
 }
 
 imp_v3 imp__bent_direction(const struct imp__edge_draw *d, imp_v3 p, const double u[2],
@@ -73,23 +87,17 @@ imp_v3 imp__bent_direction(const struct imp__edge_draw *d, imp_v3 p, const doubl
 {
     const struct imp__boundary *b = d->b;
     const size_t n = b->n_benders;
-    imp_v3 way, w = imp__uniform_sphere(u);
+    imp_v3 w = imp__uniform_sphere(u);
     *spread = 4 * IMP_PI;
     if (imp_likely(n == 0)) return w;
     const double v = imp__u01(d->key, IMP_EDGE_BENT);
     if (v < 0.5) {
         const size_t k = imp_min((size_t)(2 * v * (double)n), n - 1);
-        const double least = seen_cosine(&b->bender[k], p, &way),
-                     c = least + (1 - least) * u[0], s = sqrt(imp_max(1 - c * c, 0.0));
-        const struct imp_frame f = imp__frame_from_normal(way);
-        w = f.s * (s * cos(IMP_2PI * u[1])) + f.t * (s * sin(IMP_2PI * u[1])) + way * c;
+        w = ball_direction(&b->bender[k], p, u);
     }
     double density = 0.5 / (4 * IMP_PI);
-    for (size_t k = 0; k < n; k++) {
-        const double least = seen_cosine(&b->bender[k], p, &way);
-        if (imp__dot(way, w) >= least)
-            density += 0.5 / (IMP_2PI * (1 - least) * (double)n);
-    }
+    for (size_t k = 0; k < n; k++)
+        density += 0.5 * ball_density(&b->bender[k], p, w) / (double)n;
     *spread = 1 / density;
     return w;
 }
