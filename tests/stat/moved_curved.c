@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Derivatives by what moves, seen in mirrors that are balls, and through balls of clear glass: a glowing disk on the
+ * Derivatives by what moves, seen in mirrors that are balls, and through clear glass: a glowing disk on the
  * axis of a ball, as parallel rays along the axis see it; recorded walks (check's frozen rows);
  * imp_problem_reverse against central differences. What is refused. */
 #include "imp_check_rows.h"
@@ -30,6 +30,10 @@
     "<shape type='rectangle' id='mirror'><transform name='to_world'><scale x='1.1' "     \
     "y='.9'/><rotate x='1' angle='90'/><rotate z='1' angle='-20'/><translate x='.9' "    \
     "y='1.6' z='1.2'/></transform>" PERFECT "</shape>"
+#define THICK                                                                            \
+    "<shape type='cube' id='pane'><transform name='to_world'><scale x='.7' y='.25' "     \
+    "z='.5'/><rotate x='1' y='.3' z='1' angle='25'/><translate x='.3' y='-1.4' "         \
+    "z='1.1'/></transform>" GLASS "</shape>"
 #define TUBE                                                                             \
     "<shape type='cylinder' id='tube'><float name='radius' value='.2'/><point "          \
     "name='p0' "                                                                         \
@@ -183,9 +187,15 @@ static void frozen_test(const char *what, imp_scene *scene)
 
 static void refused_test(void)
 {
-    number_refused("glass that is no ball",
-                   room(PATH "<shape type='cube' id='glass'>" GLASS "</shape>"),
-                   "block.pose", "no sphere");
+    number_refused("a disk of glass",
+                   room(PATH "<shape type='disk' id='glass'><transform name='to_world'>"
+                             "<translate x='-2' z='1'/></transform>" GLASS "</shape>"),
+                   "block.pose", "no mesh or sphere");
+    number_refused("a cube of glass in the floor",
+                   room(PATH "<shape type='cube' id='glass'><transform name='to_world'>"
+                             "<scale value='.3'/><translate x='-2'/></transform>" GLASS
+                             "</shape>"),
+                   "block.pose", "passes through");
     number_refused("a tube that is a mirror",
                    room(PATH "<shape type='cylinder' id='tube'>" PERFECT "</shape>"),
                    "block.pose", "no sphere");
@@ -207,6 +217,10 @@ int main(int argc, char **argv)
                                            {"behind.center", 0, .01},
                                            {"lamp.pose", 3, .02},
                                            {NULL, 0, 0}},
+                               block[] = {{"block.pose", 0, .02},
+                                          {"block.pose", 2, .02},
+                                          {"block.pose", 5, .02},
+                                          {NULL, 0, 0}},
                                balls[] = {{"ball.center", 0, .01},
                                           {"ball.center", 1, .01},
                                           {"ball.center", 2, .01},
@@ -233,6 +247,8 @@ int main(int argc, char **argv)
             "a ball that moves",
             room_of("<integrator type='direct'/>" SKY BALL(PERFECT) BEHIND, DARK), 192,
             640, .15, balls);
+        numbers_compare("through a block of glass", room_of(DEEP SKY THICK, DARK), 192,
+                        512, .1, block);
         numbers_compare("a ball in a lit room", room(PATH BALL(METAL) BEHIND), 192, 512,
                         .2, images);
     }

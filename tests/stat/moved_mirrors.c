@@ -148,8 +148,6 @@ static void disk_test(void)
 
 static void refused_test(void)
 {
-    number_refused("glass", room(PATH BATHROOM("<bsdf type='dielectric'/>")),
-                   "block.pose", "bends light");
     number_refused("a mirror under a mask",
                    room(PATH BATHROOM("<bsdf type='mask'>" MIRROR "</bsdf>")),
                    "block.pose", "under a mask");

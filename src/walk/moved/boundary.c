@@ -99,8 +99,8 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
         const struct imp_shape *s = scene->shapes[k];
         const bool mirrors = imp__mirror_lobes(bsdf) != 0;
         out->mirrors |= mirrors;
-        out->bends |=
-            mirrors && s->geometry != IMP_TRIANGLES && !(s->ops->flags & IMP_SHAPE_FLAT);
+        out->bends |= imp__is_glass(bsdf) || (mirrors && s->geometry != IMP_TRIANGLES &&
+                                              !(s->ops->flags & IMP_SHAPE_FLAT));
     }
     enum imp_status st = imp__moved_allowed(tracer);
     if (tracer->sensor->shape) /* by which edges are chosen: the middle of a meter */

@@ -149,7 +149,7 @@ struct imp__boundary {
     bool rays;     /* they are one, or one for each pixel, and met by no line */
     bool wide;     /* they do not meet: a lens with an aperture, or a meter */
     bool mirrors;  /* a material of the scene is a mirror, in part, or bends light */
-    bool bends;    /* ... on a curved shape: benders */
+    bool bends;    /* it bends light, or is on a curved shape: benders */
     bool passes;   /* a material of the scene lets light go straight on */
     bool through;  /* also light samples, and that is no bounce */
     const struct imp_medium *fog; /* which fills the scene; NULL: none */
@@ -158,8 +158,8 @@ struct imp__boundary {
     size_t n_planes, cap_planes, n_facets, cap_facets;
     struct imp__plane *plane; /* [n_planes] of flat mirrors: boundary_mirror.c */
     int *plane_of;            /* [n_facets] of these; -1: a facet without an area */
-    size_t n_benders, cap_benders;
-    struct imp__bender *bender; /* [n_benders] balls of these: boundary_bent.c */
+    size_t n_benders, n_balls, cap_benders;
+    struct imp__bender *bender; /* [n_benders] balls, then meshes: boundary_bent.c */
     int n_lights;
     double *light_cdf; /* [n_emitters] of those that have draws, by power; last is 1 */
     /* [n_emitters] skies that have draws, and of these what a meter does not see by chance. */

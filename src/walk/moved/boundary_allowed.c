@@ -298,6 +298,22 @@ static enum imp_status skies_allowed(const struct imp__boundary *b)
     return IMP_OK;
 }
 
+static enum imp_status seam_bends(const struct imp__boundary *b,
+                                  const struct imp__edge_face *f)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    const struct imp_hit hit = {.shape = f->shape, .place = f->place};
+    const struct imp_bsdf *own = imp__hit_bsdf(scene, &hit);
+    const int placed = imp__placed_shape(scene, f->shape, f->place);
+    if (!imp__mirror_lobes(own) ||
+        (scene->shapes[placed]->geometry == IMP_TRIANGLES && !imp__is_glass(own)))
+        return IMP_OK;
+    return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                      "derivatives by what moves: shape '%s' passes through another one, "
+                      "and is a curved mirror, or bends light",
+                      scene->shapes[f->shape]->name);
+}
+
 /* Rays turn where a ball is met elsewhere, and what is seen over it has no draws of all kinds. */
 static enum imp_status bends_allowed(const struct imp__boundary *b)
 {
@@ -328,14 +344,12 @@ static enum imp_status bends_allowed(const struct imp__boundary *b)
                               "derivatives by what moves: shape '%s' %s, %s",
                               scene->shapes[body->shape]->name, why, where);
     }
-    for (size_t k = 0; k < 2 * b->edges->n_arcs; k++) {
-        const struct imp__edge_face *f = &b->edges->arc[k / 2].side[k % 2];
-        const struct imp_hit hit = {.shape = f->shape, .place = f->place};
-        if (imp__mirror_lobes(imp__hit_bsdf(scene, &hit)))
-            return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                              "derivatives by what moves: shape '%s' passes through "
-                              "another one, and is a mirror, or bends light",
-                              scene->shapes[f->shape]->name);
+    for (size_t k = 0; k < 2 * b->edges->n_arcs; k++)
+        IMP_CHECKED(seam_bends(b, &b->edges->arc[k / 2].side[k % 2]));
+    for (size_t k = 0; k < b->edges->n; k++) {
+        const struct imp__edge *e = &b->edges->edge[k];
+        for (int j = 0; j < e->n_faces && e->seam; j++)
+            IMP_CHECKED(seam_bends(b, &b->edges->face[e->first + (size_t)j]));
     }
     return IMP_OK;
 }

@@ -35,27 +35,34 @@
 
 /* ---- What bends -------------------------------------------------------------------------- */
 
-/* A ball that is a mirror, or of glass. */
+/* A ball that is a mirror or of glass, or a mesh of glass. */
 struct imp__bender {
     int shape;
     int64_t place;
-    struct imp_round round;
+    struct imp_round round; /* of a ball */
+    int n_facets;           /* 0: it is a ball */
 };
 
 enum imp_status imp__benders_add(struct imp__boundary *b, const struct imp__body *body)
 {
     const struct imp_scene *scene = b->tracer->scene;
+    const struct imp_shape *s = scene->shapes[body->shape];
+    const bool mesh = s->geometry == IMP_TRIANGLES;
     struct imp__bender x = {.shape = body->shape, .place = body->place};
     struct imp__bender *more =
         imp__grow(scene->ctx, b->bender, &b->cap_benders, b->n_benders + 1, sizeof *more);
     if (!more) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for mirrors");
-    if (!imp__moves_sphere(scene, body->shape, body->place, &x.round))
+    if (mesh) x.n_facets = (int)s->triangles.n_triangles;
+    if (!mesh && !imp__moves_sphere(scene, body->shape, body->place, &x.round))
         return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
                           "derivatives by what moves: shape '%s' is a mirror, or bends "
                           "light, and no sphere where its instance has it",
-                          scene->shapes[body->shape]->name);
+                          s->name);
     b->bender = more;
     b->bender[b->n_benders++] = x;
+    if (mesh) return IMP_OK;
+    b->bender[b->n_benders - 1] = b->bender[b->n_balls]; /* balls come first */
+    b->bender[b->n_balls++] = x;
     return IMP_OK;
 }
 
@@ -86,7 +93,7 @@ imp_v3 imp__bent_direction(const struct imp__edge_draw *d, imp_v3 p, const doubl
                            double *spread)
 {
     const struct imp__boundary *b = d->b;
-    const size_t n = b->n_benders;
+    const size_t n = b->n_balls;
     imp_v3 w = imp__uniform_sphere(u);
     *spread = 4 * IMP_PI;
     if (imp_likely(n == 0)) return w;
@@ -320,16 +327,31 @@ enum { WHICH, POINT_U, POINT_V, PLANES, FIRST = PLANES + 2 + 2 * IMP_SIGHT_MAX }
 #define STOP_GLASS 0.05 /* the same within glass */
 #define PASSES     256  /* surfaces in all */
 
-/* A ray of the eye to a random point of a ball, or of its image in flat mirrors: where the ray is parallel
+/* A random point of a ball, or of a facet. */
+static imp_v3 bender_point(const struct imp__edge_draw *d, const struct imp__bender *x,
+                           const double u[3])
+{
+    double b[2];
+    if (x->n_facets == 0)
+        return x->round.centre + imp__uniform_sphere(&u[1]) * x->round.radius;
+    const int prim = imp_min((int)(u[0] * x->n_facets), x->n_facets - 1);
+    const struct imp__corners f =
+        imp__corners(d->b->tracer->scene, x->shape, prim, x->place);
+    imp__uniform_triangle(&u[1], b);
+    return f.p[0] + (f.p[1] - f.p[0]) * b[0] + (f.p[2] - f.p[0]) * b[1];
+}
+
+/* A ray of the eye to a random point of one of these, or of its image in flat mirrors: where the ray is parallel
  * to others, the place where it begins, else its direction. */
 static bool ray_draw(const struct imp__edge_draw *d, struct imp_key key, imp_v3 *from)
 {
     const struct imp__boundary *b = d->b;
     const size_t n = b->n_benders;
-    const double u[2] = {imp__u01(key, POINT_U), imp__u01(key, POINT_V)};
-    const size_t k = imp_min((size_t)(imp__u01(key, WHICH) * (double)n), n - 1);
-    imp_v3 p =
-        b->bender[k].round.centre + imp__uniform_sphere(u) * b->bender[k].round.radius;
+    const double which = imp__u01(key, WHICH) * (double)n;
+    const size_t k = imp_min((size_t)which, n - 1);
+    const double u[3] = {which - (double)k, imp__u01(key, POINT_U),
+                         imp__u01(key, POINT_V)};
+    imp_v3 p = bender_point(d, &b->bender[k], u);
     if (b->n_planes > 0 && imp__u01(key, PLANES) < 0.5) {
         struct imp__edge_draw other = *d;
         struct imp__sight s;

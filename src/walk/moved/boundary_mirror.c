@@ -115,6 +115,8 @@ enum imp_status imp__mirrors_find(struct imp__boundary *b)
         if (!imp__mirror_lobes(imp__shape_bsdf(scene, scene->shapes[placed]))) continue;
         if (scene->shapes[body->shape]->geometry == IMP_TRIANGLES) {
             IMP_CHECKED(facets_add(b, body));
+            if (imp__is_glass(imp__shape_bsdf(scene, scene->shapes[placed])))
+                IMP_CHECKED(imp__benders_add(b, body));
             continue;
         }
         if (!imp__moves_disk(scene, body->shape)) {

@@ -51,10 +51,9 @@ static const char *mirror_without_d(const struct imp_tracer *t, const struct imp
     struct imp_round round;
     const bool ball =
         s->geometry != IMP_TRIANGLES && imp__moves_sphere(t->scene, s->index, 0, &round);
-    if (imp__is_glass(b) && !ball)
-        return "bends light, on a shape that is no sphere: edges that are seen through "
-               "it "
-               "have no draws";
+    if (imp__is_glass(b) && !ball && s->geometry != IMP_TRIANGLES)
+        return "bends light, on a shape that is no mesh or sphere: edges that are seen "
+               "through it have no draws";
     if (s->smooth)
         return "is a mirror on a mesh with vertex normals (face_normals makes it flat)";
     if (s->geometry != IMP_TRIANGLES && !(s->ops->flags & IMP_SHAPE_FLAT) && !ball)

@@ -75,7 +75,9 @@ static inline imp_v3 imp__bend_bar(imp_v3 n, imp_v3 w, double ratio, imp_v3 bar,
         return imp__mirror_turn(n, bar);
     }
     const double side = imp__dot(n, w) > 0 ? -1 : 1, c = -side * imp__dot(n, w),
-                 cos_t = sqrt(1 - ratio * ratio * (1 - c * c)),
+                 square = 1 - ratio * ratio * (1 - c * c);
+    if (!(square > 0)) return (imp_v3){0}; /* as far as places that are rounded tell */
+    const double cos_t = sqrt(square),
                  by_c = side * imp__dot(n, bar) * (ratio - ratio * ratio * c / cos_t);
     *n_bar += bar * (side * (ratio * c - cos_t)) - w * (side * by_c);
     const imp_v3 w_bar = bar * ratio - n * (side * by_c);
