@@ -9,7 +9,8 @@
  *
  * Where things move, directions turn, and with them F. Next to the limb of a ball little is refracted: at the
  * distance x from it 1 - F ~ sqrt(x), whose derivative by x is of the same size over x. Drawn with the probability
- * 1 - F its square would have no mean, so that neither lobe is then drawn with less than a tenth. */
+ * 1 - F its square would have no mean. F and 1 - F have derivatives of one size: the lobe that has less of the
+ * power is then drawn with at least a tenth, and half where much is reflected. */
 #include "bsdf_lanes.h"
 #include "fresnel.h"
 #include "fresnel_lanes.h"
@@ -47,10 +48,11 @@ static enum imp_status build(const struct imp_build *build, void *self,
 
 #define LEAST 0.1
 static bool turns(uint64_t derivative) { return derivative >> ETA & 1; }
-/* The probability of a lobe that has this part of the power. */
+/* The probability of the lobe that reflects, which has this part of the power. */
 static double chance_of(uint64_t derivative, double part)
 {
-    return turns(derivative) && part < 1 ? LEAST + (1 - 2 * LEAST) * part : part;
+    return turns(derivative) && part < 1 ? LEAST + (1 - 2 * LEAST) * fmin(part, 0.5)
+                                         : part;
 }
 
 /* Coefficient of a lobe without its tint; 0: nothing goes there. */
@@ -152,7 +154,9 @@ static imp_wide_truth is_lobe(const imp_wide_lobe *lobe, int k)
 
 static imp_wide chance_of_lanes(uint64_t derivative, imp_wide part)
 {
-    const imp_wide mixed = LEAST + (1 - 2 * LEAST) * part;
+    const imp_wide half = imp__wide(0.5),
+                   least = imp__wide_choose(part < half, part, half),
+                   mixed = LEAST + (1 - 2 * LEAST) * least;
     return turns(derivative) ? imp__wide_choose(part < imp__wide(1), mixed, part) : part;
 }
 
