@@ -159,7 +159,7 @@ struct imp__boundary {
     struct imp__plane *plane; /* [n_planes] of flat mirrors: boundary_mirror.c */
     int *plane_of;            /* [n_facets] of these; -1: a facet without an area */
     size_t n_benders, n_balls, cap_benders;
-    struct imp__bender *bender; /* [n_benders] balls, then meshes: boundary_bent.c */
+    struct imp__bender *bender; /* [n_benders] balls, then meshes: boundary_bender.c */
     int n_lights;
     double *light_cdf; /* [n_emitters] of those that have draws, by power; last is 1 */
     /* [n_emitters] skies that have draws, and of these what a meter does not see by chance. */

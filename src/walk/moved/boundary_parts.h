@@ -171,7 +171,7 @@ imp_v3 imp__sight_image(const struct imp__sight *s, imp_v3 p);
 /* Connects a point of the mirror next to the camera, with what passes on the way. */
 bool imp__sight_film(const struct imp__edge_draw *d, struct imp__sight *s, imp_v3 mirror);
 
-/* ---- Curved mirrors and glass: boundary_bent.c ---- */
+/* ---- Curved mirrors and glass: boundary_bent.c, boundary_bender.c ---- */
 enum imp_status imp__benders_add(struct imp__boundary *b, const struct imp__body *body);
 /* What a hit lets through of power along the unit vector w, and bends, by this ratio (imp__bend). 0: nothing. */
 imp_spec imp__edge_refracted(const struct imp__edge_draw *d, const struct imp_hit *hit,

@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Inside of boundary_bent.c, boundary_root.c and boundary_bender.c: chains of curved mirrors and glass between
+ * the camera and a place, and rays that are roots. */
+#ifndef IMP_WALK_BENT_CHAIN_H
+#define IMP_WALK_BENT_CHAIN_H
+
+#include "boundary_parts.h"
+
+/* A ball that is a mirror or of glass, or a mesh of glass. */
+struct imp__bender {
+    int shape;
+    int64_t place;
+    struct imp_round round; /* of a ball */
+    int n_facets;           /* 0: it is a ball */
+};
+
+struct imp__bent_surface {
+    imp_v3 p, n;   /* of a plane a point and its normal; of a ball its centre */
+    double radius; /* 0: a plane */
+    bool inside;   /* the ray meets the ball from inside */
+    double ratio;  /* as imp__bend has it */
+    int shape;
+    int64_t place;
+    imp_v3 q, normal; /* where it is met; the normal there */
+};
+struct imp__bent_chain {
+    int n;
+    struct imp__bent_surface at[IMP_SIGHT_MAX];
+};
+/* A ray and its derivatives by two numbers. */
+struct imp__bent_ray {
+    imp_v3 o, w, o_d[2], w_d[2];
+};
+
+/* What the ray is to meet: a place, or, where radius > 0, a ball that it touches, at the plane across
+ * `across` through its centre. */
+struct imp__bent_goal {
+    imp_v3 p, across;
+    double radius;
+};
+struct imp__bent_root {
+    imp_v3 from; /* the direction at the eye, or where a parallel ray begins */
+    struct imp__bent_chain chain;
+    imp_v3 p, w;  /* where the goal is met, along w */
+    double det;   /* of dp/dw across w */
+    imp_v3 along; /* of lines that touch: the direction of the curve of all these */
+};
+
+/* The ray of a direction at the eye, or that begins at a place. */
+struct imp__bent_ray imp__bent_begin(const struct imp__edge_draw *d, imp_v3 from);
+/* Newton's method, from x->from over x->chain, by steps that bring the ray nearer to the goal. False: it ends
+ * nowhere. */
+bool imp__bent_find(const struct imp__edge_draw *d, const struct imp__bent_goal *goal,
+                    struct imp__bent_root *x);
+bool imp__bent_same(const struct imp__edge_draw *d, const struct imp__bent_root *a,
+                    const struct imp__bent_root *b);
+
+#endif

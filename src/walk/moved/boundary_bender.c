@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Balls that are mirrors, and glass (boundary.h): which there are, directions towards them, and what they let
+ * through. */
+#include "base/arguments.h"
+#include "base/context.h"
+#include "bent_chain.h"
+#include "math/warp.h"
+#include "moved_mirror.h"
+#include "walk/core/shaped.h"
+#include "walk/core/step.h"
+
+enum imp_status imp__benders_add(struct imp__boundary *b, const struct imp__body *body)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    const struct imp_shape *s = scene->shapes[body->shape];
+    const bool mesh = s->geometry == IMP_TRIANGLES;
+    struct imp__bender x = {.shape = body->shape, .place = body->place};
+    struct imp__bender *more =
+        imp__grow(scene->ctx, b->bender, &b->cap_benders, b->n_benders + 1, sizeof *more);
+    if (!more) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for mirrors");
+    if (mesh) x.n_facets = (int)s->triangles.n_triangles;
+    if (!mesh && !imp__moves_sphere(scene, body->shape, body->place, &x.round))
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "derivatives by what moves: shape '%s' is a mirror, or bends "
+                          "light, and no sphere where its instance has it",
+                          s->name);
+    b->bender = more;
+    b->bender[b->n_benders++] = x;
+    if (mesh) return IMP_OK;
+    b->bender[b->n_benders - 1] = b->bender[b->n_balls]; /* balls come first */
+    b->bender[b->n_balls++] = x;
+    return IMP_OK;
+}
+
+/* A direction from p towards a ball, by the cosine of the angle at which it is met, which is even: near the limb,
+ * which few directions meet, what is seen moves fast. From inside: any. */
+static imp_v3 ball_direction(const struct imp__bender *x, imp_v3 p, const double u[2])
+{
+    const imp_v3 r = x->round.centre - p;
+    const double D = imp__length(r), sine = sqrt(1 - u[0] * u[0]) * x->round.radius / D;
+    if (!(x->round.radius < D)) return imp__uniform_sphere(u);
+    const struct imp_frame f = imp__frame_from_normal(r * (1 / D));
+    return f.s * (sine * cos(IMP_2PI * u[1])) + f.t * (sine * sin(IMP_2PI * u[1])) +
+           f.n * sqrt(1 - sine * sine);
+}
+/* Its density: with w off the middle by the angle a, and c that cosine,  cos(a)/(2 pi (r/D)^2 c). */
+static double ball_density(const struct imp__bender *x, imp_v3 p, imp_v3 w)
+{
+    const imp_v3 r = x->round.centre - p;
+    const double d2 = imp__dot(r, r), r2 = imp__sqr(x->round.radius),
+                 along = imp__dot(r, w);
+    const double square = 1 - (d2 - along * along) / r2;
+    if (!(r2 < d2)) return 1 / (4 * IMP_PI);
+    if (!(along > 0) || !(square > 0)) return 0;
+    return along * sqrt(d2) / (IMP_2PI * r2 * sqrt(square));
+}
+
+imp_v3 imp__bent_direction(const struct imp__edge_draw *d, imp_v3 p, const double u[2],
+                           double *spread)
+{
+    const struct imp__boundary *b = d->b;
+    const size_t n = b->n_balls;
+    imp_v3 w = imp__uniform_sphere(u);
+    *spread = 4 * IMP_PI;
+    if (imp_likely(n == 0)) return w;
+    const double v = imp__u01(d->key, IMP_EDGE_BENT);
+    if (v < 0.5) {
+        const size_t k = imp_min((size_t)(2 * v * (double)n), n - 1);
+        w = ball_direction(&b->bender[k], p, u);
+    }
+    double density = 0.5 / (4 * IMP_PI);
+    for (size_t k = 0; k < n; k++)
+        density += 0.5 * ball_density(&b->bender[k], p, w) / (double)n;
+    *spread = 1 / density;
+    return w;
+}
+
+imp_spec imp__edge_refracted(const struct imp__edge_draw *d, const struct imp_hit *hit,
+                             const struct imp_surface *at, imp_v3 w, double *ratio)
+{
+    const struct imp_scene *scene = d->b->tracer->scene;
+    const struct imp_bsdf *b = imp__hit_bsdf(scene, hit);
+    const struct imp_shape *shape =
+        scene->shapes[imp__placed_shape(scene, hit->shape, hit->place)];
+    const struct imp_frame frame = {at->s, at->t, at->n};
+    const struct imp_texcoord place = {.uv = {at->uv[0], at->uv[1]},
+                                       .p = at->p,
+                                       .shape = shape,
+                                       .prim = hit->prim,
+                                       .carried = imp__edge_waves(d)};
+    const struct imp_dirs dirs = {imp__to_local(&frame, -w), {0}, IMP_GLASS_BENDS, 0};
+    imp_spec in[IMP_INPUTS_MAX], f;
+    *ratio = 0;
+    if (!imp__is_glass(b)) return imp__spec(0);
+    imp__evaluate_inputs(b, shape, &place, in);
+    imp__bsdf_eval(b, place.carried, in, &dirs, &f);
+    const double index = b->ops->index_ratio(b, in, &dirs);
+    *ratio = 1 / index;
+    return f * (index * index);
+}
