@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A sweep with two adjoints (imp__walk_sweep_both) beside two sweeps: the first sums have the same
- * bits, the second agree to rounding, also where an adjoint is 0. */
+ * bits, the second agree to rounding, also where an adjoint is 0. And the sums of gradients, which take both
+ * at once, beside the two sinks that they are, of few numbers and of many. */
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include "inverse/estimate/tally.h"
 #include "walk/core/walk.h"
 #include "walk/core/walk_integrator.h"
 
@@ -77,6 +79,73 @@ static void compare(const char *file, const char *more, enum imp_color_mode mode
     imp_scene_destroy(scene);
 }
 
+/* Of the present pixel, of two sums of which one has met them in the same order. */
+static size_t numbers_differ(const struct imp_tally *a, const struct imp_tally *b,
+                             size_t *met)
+{
+    size_t differ = a->n_triples != b->n_triples || a->n_singles != b->n_singles;
+    for (size_t k = 0; a->dense && k < a->active->n; k++) {
+        *met += a->batch[k] != 0 && a->error[k] != 0;
+        differ += a->batch[k] != b->batch[k] || a->error[k] != b->error[k];
+    }
+    for (size_t k = 0; !differ && k < a->n_triples; k++) {
+        const struct imp__tally_triple *x = &a->triples[k], *y = &b->triples[k];
+        *met += 3;
+        differ += x->key != y->key || memcmp(x->batch, y->batch, sizeof x->batch) != 0 ||
+                  memcmp(x->error, y->error, sizeof x->error) != 0;
+    }
+    for (size_t k = 0; !differ && k < a->n_singles; k++) {
+        const struct imp__tally_single *x = &a->singles[k], *y = &b->singles[k];
+        (*met)++;
+        differ += x->key != y->key || x->batch != y->batch || x->error != y->error;
+    }
+    return differ;
+}
+
+static void tallies(const char *file, bool many)
+{
+    imp_scene *scene = test_scene(ctx, file, IMP_RGB, NULL);
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_tracer tracer = {.scene = scene,
+                                .integrator = imp__walk_integrator(scene),
+                                .sensor = scene->sensors[0],
+                                .seed = 3};
+    static uint8_t chosen[PARAMS];
+    struct imp_active active;
+    struct imp_arena arena;
+    struct imp_tally at_once, apart;
+    size_t met = 0;
+    imp__tracer_numbers(&tracer, &run, SAMPLES);
+    for (size_t k = 0; k < scene->n_params && k < PARAMS; k++)
+        chosen[k] = (scene->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE) != 0;
+    test_must(ctx, imp__active_create(scene, chosen, &active));
+    tracer.active = &active;
+    test_must(ctx, imp__tally_create(ctx, &active, 3, 0, &at_once));
+    test_must(ctx, imp__tally_create(ctx, &active, 3, 0, &apart));
+    imp__arena_init(&arena, ctx);
+    for (int x = 0; x < SIDE * SIDE; x++)
+        for (int k = 0; k < SAMPLES; k++) {
+            struct imp_walk walk;
+            const imp_spec P = {.3 - .01 * k, k % 5 ? -.2 : 0, .1 + .02 * x, 0},
+                           E = {.02 * x, .3, -.7 + .1 * k, 0};
+            imp__walk_trace(&tracer, &arena, 7 * (x % SIDE), 7 * (x / SIDE), k, &walk);
+            imp__walk_sweep_both(&tracer, &walk, P, E, &at_once.both);
+            imp__walk_sweep_both(
+                &tracer, &walk, P, E,
+                &(struct imp_sink_pair){&apart.sink, &apart.errors.sink, NULL});
+            imp__arena_rewind(&arena, (struct imp_arena_mark){0});
+        }
+    const size_t differ = numbers_differ(&at_once, &apart, &met);
+    tap_ok(at_once.both.add && at_once.dense == !many && met > 10 && differ == 0,
+           "%s: sums of both at once, of %zu numbers # %zu met, %zu differ", file,
+           active.n, met, differ);
+    imp__arena_free(&arena);
+    imp__tally_destroy(&at_once);
+    imp__tally_destroy(&apart);
+    imp__active_destroy(ctx, &active);
+    imp_scene_destroy(scene);
+}
+
 int main(void)
 {
     ctx = test_context(1);
@@ -86,6 +155,8 @@ int main(void)
     compare("textured.xml", "", IMP_RGB);
     compare("fog.xml", "", IMP_RGB);
     compare("sky.xml", "", IMP_RGB);
+    tallies("cornell.xml", false);
+    tallies("textured.xml", true);
     imp_context_destroy(ctx);
     return tap_done();
 }
