@@ -403,7 +403,7 @@ struct imp_texture_ops {
                           bool scalar, imp_dot_fn *dot, const void *x_dot,
                           imp_spec d_uv_dot[2]);
 
-    /* For volumes that may be moved: both or neither. The affine map that puts it where it is,
+    /* For volumes that may be moved: with gradient and extent. The affine map that puts it where it is,
      * three rows of four: read or, one that has an inverse, set. */
     void (*place)(const struct imp_texture *t, double to_world[12], bool set);
     /* The derivative of eval with respect to the place in the world. False: values jump. */

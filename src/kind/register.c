@@ -196,6 +196,9 @@ static enum imp_status texture_check(imp_context *ctx, const char *function,
                               d->flags & IMP_INPUT_LUMINANCE    ? "LUMINANCE"
                               : d->flags & IMP_INPUT_WAVELENGTH ? "WAVELENGTH"
                                                                 : "COMPONENT");
+    if (own->texture.place && !(own->texture.gradient && own->texture.extent))
+        return imp__error(ctx, IMP_E_ARG, "%s: ops: '%s' has place, but no %s", function,
+                          own->head.name, own->texture.gradient ? "extent" : "gradient");
     return IMP_OK;
 }
 

@@ -313,6 +313,16 @@ static void too_many(void)
                           imp_dot_fn *, const void *, imp_spec *))abort;
     refused(ctx, imp_register_texture(ctx, &t), "a texture");
     refused(ctx, imp_register_volume(ctx, &t), "a volume");
+    t.inputs = NULL;
+    t.place = (void (*)(const struct imp_texture *, double *, bool))abort;
+    tap_ok(imp_register_volume(ctx, &t) == IMP_E_ARG &&
+               strstr(imp_last_error(ctx), "'many' has place, but no gradient"),
+           "a place without a gradient # %s", imp_last_error(ctx));
+    t.gradient = (bool (*)(const struct imp_texture *, const struct imp_texcoord *, bool,
+                           imp_spec *))abort;
+    tap_ok(imp_register_volume(ctx, &t) == IMP_E_ARG &&
+               strstr(imp_last_error(ctx), "'many' has place, but no extent"),
+           "a place without an extent # %s", imp_last_error(ctx));
     imp_context_destroy(ctx);
 }
 
