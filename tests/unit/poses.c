@@ -194,6 +194,31 @@ static void rotations_test(void)
     tap_ok(transposed < 1e-9, "and their derivative, transposed # %.1e", transposed);
 }
 
+/* What a tie makes equal moves at once. */
+static void tied_test(void)
+{
+    const double there[6] = {.3, -.2, .1, .2, -.4, .5}, none[6] = {0};
+    bool same;
+    imp_problem *p;
+    imp_scene *scene = room("", "", "", ""), *set = room("", "", "", "");
+    pose_set(scene, "block", there);
+    pose_set(scene, "lamp", none);
+    pose_set(set, "block", there);
+    pose_set(set, "lamp", there);
+    test_must(ctx, imp_problem_create(scene, &p));
+    test_must(ctx, imp_problem_activate(p, "block.pose"));
+    test_must(ctx, imp_problem_activate(p, "lamp.pose"));
+    test_must(ctx, imp_problem_tie(p, "*.pose", IMP_TIE_SAME));
+    imp_film *tied = picture(scene), *both = picture(set);
+    differs(tied, both, &same);
+    tap_ok(same, "poses that are tied: the picture of both");
+    imp_film_destroy(tied);
+    imp_film_destroy(both);
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+    imp_scene_destroy(set);
+}
+
 static void refused(imp_scene *scene, const char *object, enum imp_status status,
                     const char *word)
 {
@@ -222,6 +247,7 @@ int main(void)
     if (!f) return 99;
     fprintf(f, "0 0 2 .1\n1 0 2 .1\n");
     fclose(f);
+    tied_test();
     imp_scene *scene = room("<shape type='linearcurve' id='thread'><string "
                             "name='filename' value='poses_thread.txt'/></shape>",
                             "", "", "");

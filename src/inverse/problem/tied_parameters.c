@@ -8,6 +8,7 @@
 #include "match.h"
 #include "math/hash.h"
 #include "problem.h"
+#include "scene/pose.h"
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -92,21 +93,37 @@ static enum imp_status members_find(imp_problem *p, const char *glob,
     return IMP_OK;
 }
 
-/* Sets tied values to those of the first parameter. */
-static void made_equal(imp_problem *p, const struct imp__param_tie *t)
+/* Sets tied values to those of the first parameter: all of them, or none where something cannot be so
+ * placed. */
+static enum imp_status made_equal(imp_problem *p, const struct imp__param_tie *t)
 {
+    struct imp_scene *s = p->scene;
+    double *before = imp__alloc(p->ctx, imp_max(s->n_theta, (size_t)1), sizeof *before);
+    if (!before) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for a tie");
+    imp_scene_get_theta(s, before);
     size_t first = 0;
     while (!t->on[first]) first++;
     const struct imp__block *b = imp__problem_block(p, (size_t)p->active.base[first]);
-    for (size_t k = p->scene->n_params; k-- > first;) { /* the source comes last */
-        struct imp_param *q = &p->scene->params[k];
+    for (size_t k = s->n_params; k-- > first;) { /* the source comes last */
+        struct imp_param *q = &s->params[k];
         for (size_t e = 0; t->on[k] && e < q->info.count; e++)
             imp__param_set(q, e,
-                           imp_clamp(imp__param_get(&p->scene->params[first], e),
+                           imp_clamp(imp__param_get(&s->params[first], e),
                                      b->log ? exp(b->lo) : b->lo,
                                      b->log ? exp(b->hi) : b->hi));
     }
-    imp__theta_announce(p->scene);
+    imp__theta_announce(s);
+    enum imp_status st = imp__poses_settle(s);
+    if (st != IMP_OK) {
+        for (size_t k = 0; k < s->n_params; k++)
+            for (size_t e = 0; t->on[k] && e < s->params[k].info.count; e++)
+                imp__param_set(&s->params[k], e, before[s->params[k].info.offset + e]);
+        imp__theta_announce(s);
+        const enum imp_status back = imp__poses_settle(s);
+        if (back != IMP_OK) st = back;
+    }
+    imp__release(p->ctx, before);
+    return st;
 }
 
 static enum imp_status origin_take(imp_problem *p, const char *glob,
@@ -155,12 +172,11 @@ enum imp_status imp_problem_tie(imp_problem *p, const char *glob, enum imp_tie k
     if (kind == IMP_TIE_FACTOR) IMP_TRY(origin_take(p, glob, &t));
     p->ties[p->n_ties++] = t;
     st = imp__problem_layout(p, p->chosen);
-    if (st != IMP_OK) {
-        p->n_ties--;
-        goto out;
-    }
-    if (kind == IMP_TIE_SAME) made_equal(p, &t);
-    return IMP_OK;
+    if (st == IMP_OK && kind == IMP_TIE_SAME) st = made_equal(p, &t);
+    if (st == IMP_OK) return IMP_OK;
+    p->n_ties--;
+    const enum imp_status back = imp__problem_layout(p, p->chosen);
+    if (back != IMP_OK) st = back;
 out:
     tie_free(p->ctx, &t);
     return st;
