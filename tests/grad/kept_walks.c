@@ -683,6 +683,15 @@ static void refusals(void)
     imp_scene_destroy(other);
 
     scene = test_scene(ctx, "cornell.xml", IMP_RGB, "res=8");
+    test_must(ctx, imp_scene_add_geometry(scene, "tall_block.scale"));
+    walks = keep(scene, 4, 3, IMP_POINTS_INDEPENDENT, false, 0);
+    set(scene, "tall_block.scale", 0.8);
+    refused_with(scene, walks, "tall_block.scale has another value",
+                 "a shape that moved");
+    imp_walks_destroy(walks);
+    imp_scene_destroy(scene);
+
+    scene = test_scene(ctx, "cornell.xml", IMP_RGB, "res=8");
     walks = keep(scene, 300, 3, IMP_POINTS_SOBOL, false, 0); /* 64: the sets of a loss */
     imp_problem *p = problem_of(scene, "red.*");
     struct imp_estimate f;

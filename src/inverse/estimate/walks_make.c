@@ -9,6 +9,7 @@
 #include "film/film_measure.h"
 #include "replicates.h"
 #include "scene/in_medium.h"
+#include "scene/pose.h"
 #include "walk/rules/features.h"
 #include "walk/run/run.h"
 #include <string.h>
@@ -229,6 +230,9 @@ static enum imp_status chosen_make(struct imp_walks *w, const uint8_t *free)
             const int param = scene->bodies[b]->numbers[k].param;
             if (param >= 0) w->chosen[param] = w->flights[param] = 0;
         }
+    /* Rays and collisions are where things were; what a volume said there is not kept. */
+    for (const struct imp_pose *p = scene->poses; p; p = p->next)
+        w->chosen[p->param] = w->flights[p->param] = 0;
     return IMP_OK;
 }
 
