@@ -256,6 +256,10 @@ bool imp__volume_box(const struct imp_texture *t, imp_v3 *lo, imp_v3 *hi);
  * what is scattered there. NULL: none. */
 const struct imp_medium *imp__volume_jumps(const struct imp_scene *scene,
                                            const struct imp_pose *p);
+/* One that would if the volume's cells changed but those that are held [its numbers]. NULL: none is. */
+const struct imp_medium *imp__volume_may_jump(const struct imp_scene *scene,
+                                              const struct imp_pose *p,
+                                              const uint8_t *held);
 
 /* ---- pose_folds.c for pose.c ---- */
 /* A triangle of a mesh that its vertices' motion away from `rest` [3 n_vertices] makes vanish, or

@@ -19,6 +19,8 @@ const char *imp__volume_why(const struct imp_scene *scene, const struct imp_text
     if (!t->ops->place) return "it is no gridvolume";
     if (!t->ops->gradient(t, &nowhere, true, slope))
         return "its values jump from cell to cell (filter_type trilinear)";
+    if (t->param < 0 || scene->params[t->param].info.n_dims < 3)
+        return "its cells are no parameter";
     for (int k = 0; k < scene->n_textures; k++)
         if (scene->textures[k] != t && strcmp(scene->textures[k]->name, t->name) == 0)
             return "another texture has its name (give it an id)";
@@ -145,58 +147,128 @@ enum imp_status imp__volume_apply(const struct imp_pose *p, const struct imp_map
 
 /* ---- Where a moved volume ends ------------------------------------------------------- */
 
-/* Is a medium there, by the boxes of the shapes that bound it? */
-static bool may_reach(const struct imp_scene *scene, const struct imp_medium *m, imp_v3 p)
+struct border {
+    const struct imp_scene *scene;
+    const struct imp_medium *medium;
+    int n[3], channels; /* of the volume's cells */
+    bool changes;       /* do they but those that are held? */
+    const uint8_t *held;
+    bool everywhere; /* rays of the medium begin or go anywhere */
+    double near;
+    imp_v3 lo, hi; /* of all shapes that bound it from within */
+};
+
+/* Where a medium is, by the boxes of the shapes that bound it. */
+static struct border border_of(const struct imp_scene *scene, const struct imp_medium *m)
 {
-    const double near = 1e-6 * imp__length(scene->hi - scene->lo);
+    const struct imp_param_info *info = &scene->params[m->majorants->box->param].info;
+    struct border b = {.scene = scene,
+                       .medium = m,
+                       .n = {(int)info->dims[2], (int)info->dims[1], (int)info->dims[0]},
+                       .near = 1e-6 * imp__length(scene->hi - scene->lo),
+                       .lo = imp__v3(INFINITY, INFINITY, INFINITY),
+                       .hi = -imp__v3(INFINITY, INFINITY, INFINITY)};
+    b.channels = (int)(info->count / ((size_t)b.n[0] * b.n[1] * b.n[2]));
     for (int k = 0; k < scene->n_sensors; k++)
-        if (scene->sensors[k]->medium == m) return true;
+        b.everywhere |= scene->sensors[k]->medium == m;
     for (int k = 0; k < scene->n_all_shapes; k++) {
         const struct imp_shape *s = scene->shapes[k];
-        bool in = true;
-        if (s->exterior == m) return true;
+        b.everywhere |=
+            s->exterior == m || (s->interior == m && k >= imp__shapes_outside(scene));
         if (s->interior != m) continue;
-        if (k >= imp__shapes_outside(scene)) return true;
-        for (int i = 0; i < 3; i++)
-            in &= p[i] > s->lo[i] - near && p[i] < s->hi[i] + near;
-        if (in) return true;
+        b.lo = imp__lesser(b.lo, s->lo);
+        b.hi = imp__greater(b.hi, s->hi);
+    }
+    return b;
+}
+
+static bool boxes_meet(imp_v3 lo, imp_v3 hi, imp_v3 from, imp_v3 to, double near)
+{
+    bool meet = true;
+    for (int i = 0; i < 3; i++) meet &= hi[i] > from[i] - near && lo[i] < to[i] + near;
+    return meet;
+}
+
+static bool may_reach(const struct border *b, imp_v3 lo, imp_v3 hi)
+{
+    if (b->everywhere) return true;
+    if (!boxes_meet(lo, hi, b->lo, b->hi, b->near)) return false;
+    for (int k = 0; k < b->scene->n_all_shapes; k++) {
+        const struct imp_shape *s = b->scene->shapes[k];
+        if (s->interior == b->medium && boxes_meet(lo, hi, s->lo, s->hi, b->near))
+            return true;
     }
     return false;
 }
 
-static bool ends_dark(const struct imp_scene *scene, const struct imp_medium *m)
+/* At this place of the box, in the unit cube. */
+static bool is_dark(const struct border *b, imp_v3 x)
 {
-    const struct imp_majorants *g = m->majorants;
-    const struct imp_param_info *info = &scene->params[g->box->param].info;
-    const int n[3] = {(int)info->dims[2], (int)info->dims[1], (int)info->dims[0]};
-    for (int side = 0; side < 6; side++) {
-        const int axis = side / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
-        for (int i = 0; i <= n[u]; i++)
-            for (int j = 0; j <= n[v]; j++) {
-                imp_v3 x = {0};
-                imp_spec in[IMP_INPUTS_MAX];
-                struct imp_coefficients c;
-                /* The middles of cells, and the border of the side. */
-                x[axis] = side % 2;
-                x[u] = i == n[u] ? 1 : (i + 0.5) / n[u];
-                x[v] = j == n[v] ? 1 : (j + 0.5) / n[v];
-                const imp_v3 p = imp__point(&g->to_world, x);
-                const struct imp_texcoord at = {.p = p};
-                imp__inputs_eval(m->input, m->n_own, &at, in);
-                m->ops->eval(m, in, &c);
-                if (!imp__is_zero(c.extinction) && may_reach(scene, m, p)) return false;
+    imp_spec in[IMP_INPUTS_MAX];
+    struct imp_coefficients c;
+    const struct imp_medium *m = b->medium;
+    const struct imp_texcoord at = {.p = imp__point(&m->majorants->to_world, x)};
+    size_t cell = 0;
+    for (int a = 3; a-- > 0;)
+        cell =
+            cell * (size_t)b->n[a] + (size_t)imp_min((int)(x[a] * b->n[a]), b->n[a] - 1);
+    for (int k = 0; b->changes && k < b->channels; k++)
+        if (!b->held || !b->held[cell * (size_t)b->channels + (size_t)k]) return false;
+    imp__inputs_eval(m->input, m->n_own, &at, in);
+    m->ops->eval(m, in, &c);
+    return imp__is_zero(c.extinction);
+}
+
+/* The middle of a cell along an axis; -1 and n are the borders of the side. */
+static double middle_of(int i, int n) { return i < 0 ? 0 : i == n ? 1 : (i + 0.5) / n; }
+
+/* Each sample of a side of the box counts to the middles of its neighbours. */
+static bool side_is_dark(const struct border *b, int side)
+{
+    const int axis = side / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
+    for (int i = -1; i <= b->n[u]; i++)
+        for (int j = -1; j <= b->n[v]; j++) {
+            imp_v3 x = {0}, lo = imp__v3(INFINITY, INFINITY, INFINITY), hi = -lo;
+            x[axis] = side % 2;
+            for (int k = 0; k < 4; k++) {
+                x[u] = imp_clamp((i + (k & 1 ? 1.5 : -0.5)) / b->n[u], 0., 1.);
+                x[v] = imp_clamp((j + (k & 2 ? 1.5 : -0.5)) / b->n[v], 0., 1.);
+                const imp_v3 corner = imp__point(&b->medium->majorants->to_world, x);
+                lo = imp__lesser(lo, corner);
+                hi = imp__greater(hi, corner);
             }
-    }
+            x[u] = middle_of(i, b->n[u]);
+            x[v] = middle_of(j, b->n[v]);
+            if (may_reach(b, lo, hi) && !is_dark(b, x)) return false;
+        }
     return true;
+}
+
+static const struct imp_medium *bright_end(const struct imp_scene *scene,
+                                           const struct imp_pose *p, bool changes,
+                                           const uint8_t *held)
+{
+    for (int k = 0; k < scene->n_media; k++) {
+        const struct imp_medium *m = scene->media[k];
+        if (!m->majorants || m->majorants->box != p->texture) continue;
+        struct border b = border_of(scene, m);
+        b.changes = changes;
+        b.held = held;
+        for (int side = 0; side < 6; side++)
+            if (!side_is_dark(&b, side)) return m;
+    }
+    return NULL;
 }
 
 const struct imp_medium *imp__volume_jumps(const struct imp_scene *scene,
                                            const struct imp_pose *p)
 {
-    for (int k = 0; k < scene->n_media; k++) {
-        const struct imp_medium *m = scene->media[k];
-        if (m->majorants && m->majorants->box == p->texture && !ends_dark(scene, m))
-            return m;
-    }
-    return NULL;
+    return bright_end(scene, p, false, NULL);
+}
+
+const struct imp_medium *imp__volume_may_jump(const struct imp_scene *scene,
+                                              const struct imp_pose *p,
+                                              const uint8_t *held)
+{
+    return bright_end(scene, p, true, held);
 }

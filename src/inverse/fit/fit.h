@@ -97,6 +97,8 @@ bool imp__fit_smooths(const struct imp__fit *fit, const struct imp__block *block
 void imp__fit_smooth(double *v, bool step, void *fit);
 /* fit_goal.c: the goal of a search, which points to `fit`: it does not move any more. */
 void imp__fit_goal_make(struct imp__fit *fit);
+/* IMP_E_UNSUPPORTED where it would not be possible at any step: places beside outermost cells. */
+enum imp_status imp__fit_places(const struct imp_problem *p);
 /* Scale of the block's values in x [n], for `spans`. */
 void imp__fit_span_scale(const struct imp__block *block, const double *x,
                          struct imp__span *span);

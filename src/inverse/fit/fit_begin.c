@@ -183,6 +183,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
     else imp__points_of_losses(p, &f.outer);
     IMP_CHECKED(options_check(p, &f.options));
     options_default(&f.options);
+    IMP_CHECKED(imp__fit_places(p));
 
     p->use = use_of(&f);
     IMP_TRY(imp__fit_meshes(&f));

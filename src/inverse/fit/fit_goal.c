@@ -8,6 +8,7 @@
 #include "inverse/gradient/objective_gradient.h"
 #include "inverse/gradient/variate.h"
 #include "inverse/problem/loss.h"
+#include "scene/pose.h"
 #include "walk/kept/store.h"
 #include "walk/run/run.h"
 #include <math.h>
@@ -111,16 +112,50 @@ int imp__fit_spp(const struct imp__fit *f)
                             : p->scene->sensors[p->targets[0].desc.sensor]->spp;
 }
 
+static bool is_placed(const struct imp_problem *p, const struct imp_pose *q)
+{
+    return !imp__pose_moves(q) && p->active.base[q->param] >= 0;
+}
+
+static bool any_placed(const struct imp_problem *p)
+{
+    for (const struct imp_pose *q = p->scene->poses; q; q = q->next)
+        if (is_placed(p, q)) return true;
+    return false;
+}
+
+/* A volume ends at 0, and is to end there at all steps. */
+enum imp_status imp__fit_places(const struct imp_problem *p)
+{
+    for (const struct imp_pose *q = p->scene->poses; q; q = q->next) {
+        if (!is_placed(p, q) || p->active.base[q->texture->param] < 0) continue;
+        const struct imp_param_info *cells = &p->scene->params[q->texture->param].info;
+        const struct imp_medium *m =
+            imp__volume_may_jump(p->scene, q, p->held ? p->held + cells->offset : NULL);
+        if (m)
+            return imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                              "%s moves the border of a box, and the outermost cells of "
+                              "%s, at which medium '%s' ends, are fitted, too: hold "
+                              "these at 0",
+                              p->scene->params[q->param].info.name, cells->name, m->name);
+    }
+    return IMP_OK;
+}
+
 /* Where poses are active: may objects be as x has them? Not so: what cannot be moved (numbers beyond
- * floats), or where edges are none (a tube that passes through a wall). */
+ * floats), where edges are none (a tube that passes through a wall), or where a volume that moves does
+ * not end at 0. */
 static enum imp_status poses_allow(const struct imp__fit *f, const double *x)
 {
-    const enum imp_status st = imp_problem_set_x(f->problem, x);
-    return st == IMP_OK ? imp__moved_possible(f->problem, &f->run) : st;
+    const struct imp_problem *p = f->problem;
+    IMP_CHECKED(imp_problem_set_x(f->problem, x));
+    for (const struct imp_pose *q = p->scene->poses; q; q = q->next)
+        if (is_placed(p, q) && imp__volume_jumps(p->scene, q)) return IMP_E_BIAS;
+    return imp__problem_moves(p) ? imp__moved_possible(f->problem, &f->run) : IMP_OK;
 }
 static bool is_impossible(enum imp_status st)
 {
-    return st == IMP_E_UNSUPPORTED || st == IMP_E_NUMERIC;
+    return st == IMP_E_UNSUPPORTED || st == IMP_E_NUMERIC || st == IMP_E_BIAS;
 }
 static bool possible(const double *x, void *payload)
 {
@@ -253,7 +288,8 @@ void imp__fit_goal_make(struct imp__fit *f)
                                  .payload = f};
     if (f->allocation.n > 0) f->goal.measure = measure;
     if (f->n_meshes > 0) f->goal.smooth = imp__fit_smooth;
-    if (imp__problem_moves(f->problem)) f->goal.possible = possible;
+    if (imp__problem_moves(f->problem) || any_placed(f->problem))
+        f->goal.possible = possible;
     if (imp__fit_coarse_spp(f) < imp__fit_spp(f)) f->goal.coarsen = coarsen;
     if (imp__fit_keeps(f)) {
         f->goal.draw = imp__fit_draw;
