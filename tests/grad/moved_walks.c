@@ -417,7 +417,7 @@ int main(void)
             "'bulb'");
     refused(
         PATH
-        "<bsdf type='dielectric' id='wax'/><shape type='cube'><ref id='wax'/></shape>",
+        "<bsdf type='dielectric' id='wax'/><shape type='disk'><ref id='wax'/></shape>",
         "'wax'");
     refused(PATH "<shape type='cube'><bsdf type='diffuse' id='tiles'><texture "
                  "type='checkerboard' name='reflectance'/></bsdf></shape>",

@@ -133,11 +133,6 @@ static void refused_test(void)
         "a lamp without a size",
         room(FOG(".2", ".5", "") VOLPATH("2") "<emitter type='point' id='bulb'/>"),
         "block.pose", "no size");
-    number_refused(
-        "a medium that glows",
-        room("<medium type='homogeneous' id='fog'><rgb name='sigma_t' value='.2'/><rgb "
-             "name='emission' value='1'/></medium>" VOLPATH("2")),
-        "block.pose", "emits");
 }
 
 int main(int argc, char **argv)

@@ -310,9 +310,9 @@ int main(int argc, char **argv)
             "name='radius' value='.2'/></shape></shape>" PLACED(
                 "g", "<scale x='1.2'/><translate x='1.5' y='-1' z='1'/>", ""),
             "'ball'");
-    refused("glass in an instance",
+    refused("a disk of glass in an instance",
             DIRECT
-            "<shape type='shapegroup' id='g'><shape type='cube'><transform "
+            "<shape type='shapegroup' id='g'><shape type='disk'><transform "
             "name='to_world'><scale value='.2'/></transform><bsdf type='dielectric' "
             "id='clear'/></shape></shape>" PLACED(
                 "g", "<translate x='1.5' y='-1' z='1'/>", ""),
