@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Inside of boundary_bent.c, boundary_root.c and boundary_bender.c: chains of curved mirrors and glass between
- * the camera and a place, and rays that are roots. */
+ * Chains of curved mirrors and glass between the camera and a place, and rays that are roots
+ * (boundary_bent.c, boundary_root.c). */
 #ifndef IMP_WALK_BENT_CHAIN_H
 #define IMP_WALK_BENT_CHAIN_H
 
@@ -46,6 +46,23 @@ struct imp__bent_root {
     double det;   /* of dp/dw across w */
     imp_v3 along; /* of lines that touch: the direction of the curve of all these */
 };
+
+/* What a draw has found, of the key that these dimensions make. */
+struct imp__bent_found {
+    unsigned dims;
+    struct imp__bent_goal goal;
+    struct imp__bent_root root;
+};
+/* How the camera may see a place over curved mirrors and through glass; as imp__sight_draw and
+ * imp__sight_reach at once. s->chance has still to be divided by imp__bent_draws. */
+bool imp__bent_reach(struct imp__edge_draw *d, unsigned dims, imp_v3 p,
+                     struct imp__sight *s, struct imp__bent_found *x);
+/* The same of a point of an edge, as imp__edge_any chooses it, or of a ball that is touched by what the
+ * camera sees. */
+bool imp__bent_any(struct imp__edge_draw *d, struct imp__sight *s,
+                   struct imp__bent_found *x);
+/* One over the probability that a draw finds this, in the mean. It takes long: for what counts. */
+double imp__bent_draws(const struct imp__edge_draw *d, const struct imp__bent_found *x);
 
 /* The ray of a direction at the eye, or that begins at a place. */
 struct imp__bent_ray imp__bent_begin(const struct imp__edge_draw *d, imp_v3 from);

@@ -142,13 +142,26 @@ static bool chain_draw(const struct imp__edge_draw *d, struct imp_key key, imp_v
     return bends;
 }
 
-static bool root_draw(const struct imp__edge_draw *d, unsigned dims,
-                      const struct imp__bent_goal *goal, uint64_t number,
+/* Do they go over the same shapes in the same way? */
+static bool alike(const struct imp__bent_chain *a, const struct imp__bent_chain *b)
+{
+    bool same = a->n == b->n;
+    for (int k = 0; k < a->n && same; k++) {
+        const struct imp__bent_surface *x = &a->at[k], *y = &b->at[k];
+        same = x->shape == y->shape && x->place == y->place && x->inside == y->inside &&
+               (x->ratio == 0) == (y->ratio == 0);
+    }
+    return same;
+}
+
+/* of: the root is to be this one; NULL: any. */
+static bool root_draw(const struct imp__edge_draw *d, struct imp_key key,
+                      const struct imp__bent_goal *goal, const struct imp__bent_root *of,
                       struct imp__bent_root *x)
 {
-    const struct imp_key key = imp__key(d->key.state, dims, number);
     return ray_draw(d, key, &x->from) && chain_draw(d, key, x->from, &x->chain) &&
-           imp__bent_find(d, goal, x);
+           (!of || alike(&x->chain, &of->chain)) && imp__bent_find(d, goal, x) &&
+           (!of || imp__bent_same(d, of, x));
 }
 
 /* ---- What is seen ------------------------------------------------------------------------- */
@@ -223,52 +236,73 @@ static bool root_seen(struct imp__edge_draw *d, const struct imp__bent_root *x,
     return isfinite(s->to.weight);
 }
 
-#define DRAWS_MOST (1u << 22)
+#define COUNTS 0.1   /* what a root lets through that is always kept */
+#define STAGE  16384 /* draws, after which a draw goes on by chance */
+enum { KEEP = FIRST + 3 * PASSES, GO_ON };
 
-/* A root, and one over the probability with which it is found. */
-static bool root_reach(struct imp__edge_draw *d, unsigned dims,
-                       const struct imp__bent_goal *goal, struct imp__sight *s,
-                       struct imp__bent_root *x)
+/* Roots that let little through are kept by chance: over glass that reflects inside there are many, and each
+ * is looked for again as often as those that count. */
+static double kept_chance(const struct imp__edge_draw *d, const struct imp__sight *s)
+{
+    return imp_min(imp__max_used(s->T, d->waves) / COUNTS, 1);
+}
+
+/* The number of draws until one leads there. Behind a stage it goes on with probability 1/2, and counts twice as
+ * much, up to twice the number: there is no bound, the mean is the same, and few roots that are hardly ever
+ * found take long. */
+double imp__bent_draws(const struct imp__edge_draw *d, const struct imp__bent_found *x)
+{
+    double sum = 0, times = 1;
+    for (uint64_t k = 1, end = STAGE;; k++) {
+        const struct imp_key key = imp__key(d->key.state, x->dims, k);
+        struct imp__bent_root again;
+        sum += times;
+        if (root_draw(d, key, &x->goal, &x->root, &again)) return sum;
+        if (k < end) continue;
+        if (imp__u01(key, GO_ON) < 0.5) return sum;
+        times *= 2;
+        end += end;
+    }
+}
+
+/* A root, of the goal that is set. */
+static bool root_reach(struct imp__edge_draw *d, struct imp__sight *s,
+                       struct imp__bent_found *x)
 {
     const int max = d->b->tracer->integrator->max_depth;
+    const struct imp_key key = imp__key(d->key.state, x->dims, 0);
     *s = (struct imp__sight){.eye = d->eye};
     if (!d->b->tracer->sensor->ops->connect || (max >= 0 && max < 2) ||
-        !root_draw(d, dims, goal, 0, x) || !root_seen(d, x, s))
+        !root_draw(d, key, &x->goal, NULL, &x->root) || !root_seen(d, &x->root, s))
         return false;
-    /* More draws than that are needed of roots that are found once in as many; what is lost of these is
-     * their chance to have been found at all. */
-    for (uint64_t k = 1; k < DRAWS_MOST; k++) {
-        struct imp__bent_root again;
-        if (!root_draw(d, dims, goal, k, &again) || !imp__bent_same(d, x, &again))
-            continue;
-        s->chance = 1 / (double)k;
-        return true;
-    }
-    return false;
+    s->chance = kept_chance(d, s);
+    return imp__u01(key, KEEP) < s->chance;
 }
 
 bool imp__bent_reach(struct imp__edge_draw *d, unsigned dims, imp_v3 p,
-                     struct imp__sight *s)
+                     struct imp__sight *s, struct imp__bent_found *x)
 {
-    const struct imp__bent_goal goal = {.p = p};
-    struct imp__bent_root x;
-    return root_reach(d, dims, &goal, s, &x);
+    x->dims = dims;
+    x->goal = (struct imp__bent_goal){.p = p};
+    return root_reach(d, s, x);
 }
 
-bool imp__bent_any(struct imp__edge_draw *d, struct imp__sight *s)
+bool imp__bent_any(struct imp__edge_draw *d, struct imp__sight *s,
+                   struct imp__bent_found *x)
 {
     struct imp_round round;
-    struct imp__bent_root x;
     if (!d->item || d->item->kind != IMP_ITEM_ROUND ||
         !imp__moves_sphere(d->b->tracer->scene, d->item->shape, d->item->place, &round))
-        return imp__edge_any(d, d->eye, d->b->parallel) && imp__bent_reach(d, 0, d->p, s);
+        return imp__edge_any(d, d->eye, d->b->parallel) &&
+               imp__bent_reach(d, 0, d->p, s, x);
     const double u[2] = {d->u, imp__u01(d->key, IMP_EDGE_DIR_U)};
-    const struct imp__bent_goal goal = {
+    x->dims = 0;
+    x->goal = (struct imp__bent_goal){
         .p = round.centre, .across = imp__uniform_sphere(u), .radius = round.radius};
-    if (!root_reach(d, 0, &goal, s, &x)) return false;
-    d->out = (x.p - round.centre) * (1 / round.radius);
-    d->p = x.p;
-    d->along = imp__normalize(x.along);
+    if (!root_reach(d, s, x)) return false;
+    d->out = (x->root.p - round.centre) * (1 / round.radius);
+    d->p = x->root.p;
+    d->along = imp__normalize(x->root.along);
     d->inv_pdf = IMP_PI * round.radius / d->chance;
     return true;
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Edges as the camera sees them (boundary.h). */
-#include "boundary_parts.h"
+#include "bent_chain.h"
 #include "kind/cleared.h"
 #include "walk/core/step.h"
 #include "walk/lights/light_step.h"
@@ -127,8 +127,9 @@ void imp__draw_mirrored(struct imp__edge_draw *d, bool bent)
 {
     const bool meter = d->b->tracer->sensor->shape != NULL;
     struct imp__sight s;
+    struct imp__bent_found found;
     imp_spec hidden;
-    if (bent ? !imp__bent_any(d, &s)
+    if (bent ? !imp__bent_any(d, &s, &found)
              : !imp__sight_draw(d, 0, &s) || !imp__edge_any(d, s.eye, d->b->parallel) ||
                    !imp__sight_reach(d, &s, d->p))
         return;
@@ -143,6 +144,8 @@ void imp__draw_mirrored(struct imp__edge_draw *d, bool bent)
     const imp_v3 m = turned * (1 / sine);
     const imp_spec jump =
         look_mirrored(d, &s, -m, apart) - look_mirrored(d, &s, m, apart);
+    if (bent && imp__is_zero_used(jump, d->waves)) return;
+    if (bent) s.chance /= imp__bent_draws(d, &found);
     struct imp__flux *f =
         imp__jump_add(d, &s.to, s.T * jump * (s.to.weight * sine * d->inv_pdf / s.chance),
                       2 + IMP_EDGE_ENDS + s.mirrors.n);

@@ -180,12 +180,6 @@ imp_spec imp__edge_refracted(const struct imp__edge_draw *d, const struct imp_hi
  * of all draws towards one. */
 imp_v3 imp__bent_direction(const struct imp__edge_draw *d, imp_v3 p, const double u[2],
                            double *spread);
-/* How the camera may see a place over these; as imp__sight_draw and imp__sight_reach at once. */
-bool imp__bent_reach(struct imp__edge_draw *d, unsigned dims, imp_v3 p,
-                     struct imp__sight *s);
-/* The same of a point of an edge, as imp__edge_any chooses it, or of a ball that is touched by what the
- * camera sees. */
-bool imp__bent_any(struct imp__edge_draw *d, struct imp__sight *s);
 /* Is the draw's point where a line touches such a ball, which reflects all light there? What is seen just inside of its limb is what is
  * seen beside it, times *R, one vertex farther on; a look past it, so far apart, would see some of what
  * lies within. 1: m points into the ball; -1: out of it; 0: it is no such point. */

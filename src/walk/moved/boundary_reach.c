@@ -3,7 +3,7 @@
  * From a vertex behind an edge to the sensor: W(x) of boundary.h, by connections from that vertex
  * and from those that a walk by transposed kernels meets on. The vertex slides along the chain from
  * the camera, which is another one for each connection. */
-#include "boundary_parts.h"
+#include "bent_chain.h"
 #include "kind/bsdf/transport.h"
 #include "kind/cleared.h"
 #include "math/warp.h"
@@ -249,13 +249,14 @@ static void connect_mirrored(struct imp__edge_draw *d,
                              int depth, int passed, imp_spec T, bool bent)
 {
     struct imp__sight s;
+    struct imp__bent_found found;
     struct imp__line line;
     imp_spec brings;
     if (!d->b->tracer->sensor->ops->connect ||
         !light_at(d->b->tracer, light, depth + 2 + passed, &brings))
         return;
     const unsigned number = 1 + (unsigned)depth;
-    if (bent ? !imp__bent_reach(d, number, k->at.p, &s)
+    if (bent ? !imp__bent_reach(d, number, k->at.p, &s, &found)
              : !imp__sight_draw(d, number, &s) || !imp__sight_reach(d, &s, k->at.p))
         return;
     const struct imp_surface *mirror = &s.mirrors.first->at;
@@ -268,6 +269,7 @@ static void connect_mirrored(struct imp__edge_draw *d,
         !light_at(d->b->tracer, light, depth + 1 + passed + line.bounces + s.bounces,
                   &brings))
         return;
+    if (bent) s.chance /= imp__bent_draws(d, &found);
     flux_make(d, light, &s.to, &s.mirrors, k, depth,
               brings * T * K * line.T * s.T * (s.to.weight / s.chance));
 }

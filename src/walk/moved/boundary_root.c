@@ -119,11 +119,11 @@ static bool aim(const struct imp__edge_draw *d, const struct imp__bent_goal *goa
     return isfinite(*miss) && isfinite(step[0]) && isfinite(step[1]);
 }
 
-#define STEPS 40 /* of Newton's method */
+#define STEPS    20 /* of Newton's method */
+#define HALVINGS 4  /* of a step: starts that need more end nowhere, mostly */
 #define EXACT                                                                            \
     1e-9 /* of the scene's size: so near, one step more is as near as doubles are */
-#define WIDEST 0.5  /* a step, in radians, or in parts of the scene's size */
-#define LEAST  1e-4 /* of a step that is not made in full */
+#define WIDEST 0.5 /* a step, in radians, or in parts of the scene's size */
 
 static imp_v3 stepped(const struct imp__edge_draw *d, imp_v3 from, const double step[2],
                       double part)
@@ -145,8 +145,8 @@ bool imp__bent_find(const struct imp__edge_draw *d, const struct imp__bent_goal 
         double part = length > most ? most / length : 1;
         const imp_v3 from = x->from;
         double next, on[2];
-        for (;; part *= 0.5) {
-            if (part < LEAST) return false;
+        for (int halved = 0;; halved++, part *= 0.5) {
+            if (halved > HALVINGS) return false;
             x->from = stepped(d, from, step, part);
             if (aim(d, goal, x, &next, on) && (last || next < miss)) break;
             if (last) return false;
