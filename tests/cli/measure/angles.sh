@@ -25,9 +25,10 @@ importon render scene.xml -m mono -q --spp 64 --seed 5 -o light.pfm
 python3 "$ROOT/tests/cli/measure/camera.py" light.pfm view.ppm 2.2 0.01 1
 importon measure scene.xml view.ppm -m mono --stages lights --spp 2 -n 1 --rounds 1 --hold sky.data 2>/dev/null | grep 'by the means' |
     sed 's/:.*//'
-# A light that is held at a wrong intensity is named, though nothing that moves has derivatives beside a ball of glass.
+# A light that is held at a wrong intensity is named, though nothing that moves has derivatives beside a ball of frosted glass
+# with facets of GGX.
 sed 's/type="diffuse" id="floor"/type="plastic" id="floor"/
-    s|^</scene>|<shape type="sphere"> <point name="center" x="0" y="-5" z="0"/> <float name="radius" value=".1"/> <bsdf type="dielectric"/> </shape>&|' \
+    s|^</scene>|<shape type="sphere"> <point name="center" x="0" y="-5" z="0"/> <float name="radius" value=".1"/> <bsdf type="roughdielectric"> <string name="distribution" value="ggx"/> </bsdf> </shape>&|' \
     scene.xml >glossy.xml
 cone="--set lamp.cutoff_angle=12 --set lamp.beam_width=8"
 importon render glossy.xml -m mono -q --spp 1024 --seed 6 $cone --set lamp.intensity=4 -o view.pfm
