@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Rows of a plan: what each candidate adds, with its error, and which cannot be told apart. */
+ * Rows of a plan: the gain of each candidate with its standard error, and groups without a
+ * significant difference. */
 #include "plan_rows.h"
 #include "inverse/problem/problem.h"
 #include <math.h>

@@ -34,7 +34,7 @@ struct imp__plan_work {
 enum imp_status imp__plan_errors(const struct imp__plan_work *plan, const double *C,
                                  const double **out);
 
-/* Rows of the open candidates, by falling worth, in groups that cannot be told apart. */
+/* Rows of the open candidates, by falling worth, in groups without a significant difference. */
 enum imp_status imp__plan_rows(struct imp__plan_work *plan, struct imp_plan_result *r);
 
 #endif

@@ -261,8 +261,8 @@ static void place(const struct imp_texture *t, double to_world[12], bool set)
         const struct imp_mat4 unboxed = imp__mat4_multiply(&v->box, &v->to_unit);
         struct imp_mat4 world;
         imp__mat4_inverse(&unboxed, &world);
-        const bool rests = memcmp(&v->to_unit, &v->rest_to_unit, sizeof world) == 0;
-        memcpy(to_world, rests ? v->rest.m : world.m, rows);
+        const bool unmoved = memcmp(&v->to_unit, &v->rest_to_unit, sizeof world) == 0;
+        memcpy(to_world, unmoved ? v->rest.m : world.m, rows);
         return;
     }
     const struct imp_mat4 to = imp__mat4_of_rows(to_world),
