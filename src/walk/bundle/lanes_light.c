@@ -2,6 +2,7 @@
  *
  * Light samples in lanes (core/light.c, of walks alone). */
 #include "kind/shape/shape.h"
+#include "lanes_leave.h"
 #include "lanes_record.h"
 #include "scene/light_lanes.h"
 #include "swept.h"
@@ -376,7 +377,6 @@ void imp__lanes_sky_meet(struct imp_depth *d, const int32_t *order, int n,
     for (int i = 0; i < n; i += IMP_WIDE_LANES) {
         int32_t rest[IMP_WIDE_LANES];
         const int left = imp_min(n - i, IMP_WIDE_LANES);
-        for (int k = 0; k < IMP_WIDE_LANES; k++) rest[k] = order[i + (k < left ? k : 0)];
-        sky_work(d, rest, left, beyond);
+        sky_work(d, imp__lanes_filled(order + i, left, rest), left, beyond);
     }
 }

@@ -5,7 +5,7 @@
  * have a kernel, light samples and roulette, and nothing more. */
 #include "in_media.h"
 #include "lanes_kernel.h"
-#include "math/wide_offset.h"
+#include "lanes_leave.h"
 #include "reuse.h"
 #include "swept.h"
 
@@ -72,15 +72,8 @@ light_see(struct imp_depth *d, const struct imp_bin *bin,
     const struct imp_lanes_light *l = &lit->light;
     struct imp_shadows *to = d->shadows;
     const unsigned bits = lit->on;
-    const int n = to->ray.n;
     if (!bits) return;
-    const imp_wide3 o = imp__wide_offset(v->x.p, v->x.ng, l->at.wi);
-    imp__wide3_append(to->ray.o, n, bits, o);
-    imp__wide3_append(to->ray.d, n, bits,
-                      imp__wide3_choose(l->far, l->at.wi, imp__wide3_minus(l->at.p, o)));
-    imp__wide_append(&to->ray.far[n], bits,
-                     imp__wide_choose(l->far, imp__wide(INFINITY),
-                                      imp__wide(1 - 10 * IMP_RAY_EPSILON)));
+    imp__lanes_shadow_append(&to->ray, bits, v->x.p, v->x.ng, l);
     for (unsigned left = bits; left; left &= left - 1) {
         const int k = __builtin_ctz(left), i = to->ray.n++;
         to->at[i] = v->at + k;
@@ -99,10 +92,7 @@ static inline imp_wide_truth survives(const struct imp_depth *d,
     const struct imp_tracer *t = d->bundle->tracer;
     *survive = imp__wide(1);
     if (d->depth + 1 < t->integrator->rr_depth) return ~(imp_wide_truth){0};
-    imp_wide most = imp__wide_larger(beta[0], imp__wide_larger(beta[1], beta[2]));
-    if (colors > 3) most = imp__wide_larger(most, beta[3]);
-    const imp_wide q = imp__wide_lesser(most * eta * eta, imp__wide(0.95));
-    *survive = imp__wide_decide(imp__wide_larger(q, imp__wide(t->survival)));
+    *survive = imp__lanes_survival(beta, colors, eta, t->survival);
     return number(v, IMP_DIM_SURVIVE) < *survive;
 }
 
@@ -178,9 +168,7 @@ scatter_on(struct imp_depth *d, const struct imp_bin *bin,
     struct imp_flights *to = d->next;
     const unsigned bits = s->on;
     const int n = to->ray.n;
-    imp__wide3_append(to->ray.o, n, bits, imp__wide_offset(v->x.p, v->x.ng, s->world));
-    imp__wide3_append(to->ray.d, n, bits, s->world);
-    imp__wide_append(&to->ray.far[n], bits, imp__wide(INFINITY));
+    imp__lanes_ray_append(&to->ray, bits, v->x.p, v->x.ng, s->world);
     imp__wide3_append(to->from, n, bits, v->x.p);
     imp__wide_append(&to->pdf[n], bits,
                      any ? imp__wide_choose(imp__is_smooth(s->lobe), s->pdf, imp__wide(0))
@@ -285,11 +273,7 @@ void imp__vertices_in_lanes(struct imp_depth *d, const struct imp_bin *bin,
     if (d->bundle->colors > 3) imp__lanes_spectra_keep(d->bundle, bin, n);
     for (int i = 0; i < n; i += IMP_WIDE_LANES) {
         const int left = imp_min(n - i, IMP_WIDE_LANES);
-        const int32_t *here = order + i;
-        if (left < IMP_WIDE_LANES) { /* the lanes that are left repeat one */
-            for (int k = 0; k < IMP_WIDE_LANES; k++) rest[k] = here[k < left ? k : 0];
-            here = rest;
-        }
+        const int32_t *here = imp__lanes_filled(order + i, left, rest);
         const bool made = work_as(d, bin, here, left, at + i);
         for (int k = 0; !made && k < left; k++)
             if (bin->medium >= 0) imp__collision_alone(d, here[k], at + i + k);

@@ -3,9 +3,9 @@
  * First vertices and light samples of points of a grid. */
 #include "meter_lanes.h"
 #include "kind/sensor/receiver.h"
+#include "lanes_leave.h"
 #include "lanes_record.h"
 #include "math/trig.h"
-#include "math/wide_offset.h"
 #include "reuse.h"
 #include <string.h>
 
@@ -107,9 +107,7 @@ void imp__meter_others(struct imp_depth *d, const struct imp_meter_others *o)
         const imp_wide3 world = imp__out_of_wide_frame(&frame, wi);
         const unsigned on = imp__bits_first(n - k) & imp__wide_bits(wi.z > imp__wide(0));
         const int at_ray = to->ray.n;
-        imp__wide3_append(to->ray.o, at_ray, on, imp__wide_offset(x, ng, world));
-        imp__wide3_append(to->ray.d, at_ray, on, world);
-        imp__wide_append(&to->ray.far[at_ray], on, imp__wide(INFINITY));
+        imp__lanes_ray_append(&to->ray, on, x, ng, world);
         imp__wide3_append(to->from, at_ray, on, x);
         imp__wide_append(&to->pdf[at_ray], on, imp__wide_decide(wi.z * IMP_INV_PI));
         for (int c = 0; c < b->colors; c++)
@@ -192,17 +190,9 @@ static void light_add(struct imp_depth *d, int i, int l, int samples)
         imp__wide_choose(light.delta, 1 / density, imp__wide_power_over(density, by));
     on &= imp__wide_bits(light.at.drawn & (by > imp__wide(0)));
     if (!on) return;
-    const int n = to->ray.n;
-    const imp_wide3 o = imp__wide_offset(p, normal, light.at.wi);
-    imp__wide3_append(to->ray.o, n, on, o);
-    imp__wide3_append(
-        to->ray.d, n, on,
-        imp__wide3_choose(light.far, light.at.wi, imp__wide3_minus(light.at.p, o)));
-    imp__wide_append(&to->ray.far[n], on,
-                     imp__wide_choose(light.far, imp__wide(INFINITY),
-                                      imp__wide(1 - 10 * IMP_RAY_EPSILON)));
+    imp__lanes_shadow_append(&to->ray, on, p, normal, &light);
     for (int c = 0; c < b->colors; c++)
-        imp__wide_append(&r->sent[c][n], on, light.radiance.c[c] * weight);
+        imp__wide_append(&r->sent[c][to->ray.n], on, light.radiance.c[c] * weight);
     for (unsigned left = on; left; left &= left - 1)
         to->at[to->ray.n++] = walk[__builtin_ctz(left)];
 }

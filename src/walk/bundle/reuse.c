@@ -3,7 +3,7 @@
  * What points of a grid share: who sees whose first surface, and what each takes of it. */
 #include "reuse.h"
 #include "kind/sensor/receiver.h"
-#include "math/wide_offset.h"
+#include "lanes_leave.h"
 #include "walk/path/first_segment.h"
 #include <float.h>
 #include <string.h>
@@ -142,11 +142,9 @@ static void rays_on(struct imp_reuse *r, const struct imp_bundle_values *values,
         for (int k = 0; k < IMP_WIDE_LANES && i + k < values->n; k++)
             r->part[next][i + k] = here >> k & 1 ? p[k] : 0;
         if (next == 0 || !here) continue;
-        const int n = shadows->ray.n;
-        const imp_wide3 o = imp__wide_offset(from, imp__wide3_taken(r->normal, walk), d);
-        imp__wide3_append(shadows->ray.o, n, here, o);
-        imp__wide3_append(shadows->ray.d, n, here, imp__wide3_minus(m.x, o));
-        imp__wide_append(&shadows->ray.far[n], here, imp__wide(1 - 10 * IMP_RAY_EPSILON));
+        imp__lanes_sight_append(&shadows->ray, here, from,
+                                imp__wide3_taken(r->normal, walk), d, m.x,
+                                imp__wide(1 - 10 * IMP_RAY_EPSILON));
         for (unsigned left = here; left; left &= left - 1)
             shadows->at[shadows->ray.n++] = at[__builtin_ctz(left)];
     }

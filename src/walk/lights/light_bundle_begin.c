@@ -4,7 +4,7 @@
  * radiance that is the same everywhere; else, and where the sensor may see the light's point itself, by
  * the step of walks alone (light_start.c). */
 #include "light_bundle.h"
-#include "math/wide_offset.h"
+#include "walk/bundle/lanes_leave.h"
 #include "walk/core/emitted.h"
 
 /* Walk k, in flight already. */
@@ -75,9 +75,7 @@ static void send(struct imp_light_bundle *l, const struct imp_wide_emission *x, 
     if (colors > 3) none &= le.c[3] == zero;
     bits &= ~imp__wide_bits(none);
     const imp_wide by = 1 / imp__wide_decide(per / x->cos_p);
-    imp__wide3_append(to->rays.ray.o, n, bits, imp__wide_offset(x->p, x->ng, x->d));
-    imp__wide3_append(to->rays.ray.d, n, bits, x->d);
-    imp__wide_append(&to->rays.ray.far[n], bits, imp__wide(INFINITY));
+    imp__lanes_ray_append(&to->rays.ray, bits, x->p, x->ng, x->d);
     for (int c = 0; c < colors; c++) {
         imp__wide_append(&to->rays.beta[c][n], bits, imp__wide(1));
         imp__wide_append(&to->carries[c][n], bits, le.c[c] * by);

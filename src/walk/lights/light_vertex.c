@@ -3,8 +3,8 @@
  * Vertices of walks from lights in lanes (light_walk.c and light_reach.c, of walks alone): light is
  * scattered by transposed kernels (kind/bsdf/transport.h) and is connected to the sensor. */
 #include "light_bundle.h"
-#include "math/wide_offset.h"
 #include "walk/bundle/lanes_kernel.h"
+#include "walk/bundle/lanes_leave.h"
 
 static inline imp_wide number(const struct imp_lanes_vertices *v, int use)
 {
@@ -70,10 +70,7 @@ IMP_LANES_INLINE void connect(struct imp_light_bundle *l, const struct imp_bin *
     struct imp_light_views *to = &l->views;
     const struct imp_light_flights *from = &l->flights[l->at.depth & 1];
     const int n = to->ray.n;
-    const imp_wide3 o = imp__wide_offset(v->x.p, v->x.ng, w);
-    imp__wide3_append(to->ray.o, n, bits, o);
-    imp__wide3_append(to->ray.d, n, bits, imp__wide3_minus(seen.at.p, o));
-    imp__wide_append(&to->ray.far[n], bits, seen.reach);
+    imp__lanes_sight_append(&to->ray, bits, v->x.p, v->x.ng, w, seen.at.p, seen.reach);
     imp__wide_append(&to->px[n], bits, seen.at.px);
     imp__wide_append(&to->py[n], bits, seen.at.py);
     for (int c = 0; c < colors; c++)
@@ -96,9 +93,7 @@ static inline imp_wide_truth survives(const struct imp_light_bundle *l,
 {
     *survive = imp__wide(1);
     if (v->depth < l->bundle.tracer->integrator->rr_depth) return ~(imp_wide_truth){0};
-    imp_wide most = imp__wide_larger(beta[0], imp__wide_larger(beta[1], beta[2]));
-    if (colors > 3) most = imp__wide_larger(most, beta[3]);
-    *survive = imp__wide_decide(imp__wide_lesser(most, imp__wide(0.95)));
+    *survive = imp__lanes_survival(beta, colors, imp__wide(1), 0);
     return number(v, IMP_DIM_SURVIVE) < *survive;
 }
 
@@ -155,9 +150,7 @@ IMP_LANES_INLINE void scatter(struct imp_light_bundle *l, const struct imp_bin *
     struct imp_light_flights *to = &l->flights[~l->at.depth & 1];
     const int n = to->rays.ray.n;
     const imp_wide again = 1 / survive, scale = 1 / (pdf * survive);
-    imp__wide3_append(to->rays.ray.o, n, bits, imp__wide_offset(v->x.p, v->x.ng, w));
-    imp__wide3_append(to->rays.ray.d, n, bits, w);
-    imp__wide_append(&to->rays.ray.far[n], bits, imp__wide(INFINITY));
+    imp__lanes_ray_append(&to->rays.ray, bits, v->x.p, v->x.ng, w);
     for (int c = 0; c < colors; c++) {
         imp__wide_append(&to->rays.beta[c][n], bits, beta[c] * again);
         imp__wide_append(&to->carries[c][n], bits,
@@ -209,11 +202,6 @@ void imp__light_vertices(struct imp_light_bundle *l, const struct imp_bin *bin,
     for (int i = 0; i < n; i += IMP_WIDE_LANES) {
         int32_t rest[IMP_WIDE_LANES];
         const int left = imp_min(n - i, IMP_WIDE_LANES);
-        const int32_t *here = order + i;
-        if (left < IMP_WIDE_LANES) { /* the lanes that are left repeat one */
-            for (int k = 0; k < IMP_WIDE_LANES; k++) rest[k] = here[k < left ? k : 0];
-            here = rest;
-        }
-        work_as(l, bin, here, left);
+        work_as(l, bin, imp__lanes_filled(order + i, left, rest), left);
     }
 }
