@@ -127,6 +127,8 @@ static void all_kinds(void)
              PICTURE("base_color") ALPHA("metallic", ".4") ALPHA("clearcoat", ".5")),
         KIND("principled", PICTURE("clearcoat_gloss") ALPHA("clearcoat", ".9")),
         KIND("principled", ALPHA("spec_trans", ".8") ALPHA("roughness", ".3")),
+        KIND("principled", PICTURE("spec_trans") ALPHA("clearcoat", ".6")
+                               ALPHA("anisotropic", ".5") ALPHA("specular", ".7")),
         KIND("principled",
              "<rgb name='base_color' value='.8,.3,.1'/>" ALPHA("spec_tint", ".6")
                  ALPHA("sheen", ".7") ALPHA("sheen_tint", ".5") ALPHA("flatness", ".3")

@@ -171,6 +171,12 @@ int main(void)
     compare(KIND("principled", ALPHA("clearcoat", "0") ALPHA("specular", ".2")));
     compare(KIND("principled", ALPHA("roughness", "0.01") ALPHA("metallic", "1")
                                    ALPHA("anisotropic", "1")));
+    compare(KIND("principled",
+                 TINT("base_color") ALPHA("spec_trans", ".6") ALPHA("roughness", ".4")
+                     ALPHA("anisotropic", ".5") ALPHA("metallic", ".2")
+                         ALPHA("sheen", ".3") ALPHA("spec_tint", ".4")));
+    compare(KIND("principled", ALPHA("spec_trans", "1") ALPHA("eta", ".7")
+                                   ALPHA("roughness", ".1") ALPHA("clearcoat", ".7")));
     compare_as(GOLD(ALPHA("alpha", ".2")), true);
     compare_as(KIND("roughconductor", ALPHA("alpha_u", ".2") ALPHA("alpha_v", ".4")),
                true);
@@ -183,6 +189,12 @@ int main(void)
                             ALPHA("anisotropic", ".6") ALPHA("roughness", ".4")
                                 ALPHA("metallic", ".3") ALPHA("specular", ".4") ALPHA(
                                     "clearcoat", ".5") ALPHA("clearcoat_gloss", ".5")),
+               true);
+    compare_as(KIND("principled",
+                    TINT("base_color") ALPHA("spec_trans", ".7") ALPHA("roughness", ".4")
+                        ALPHA("metallic", ".3") ALPHA("sheen", ".4")
+                            ALPHA("specular", ".4") ALPHA("clearcoat", ".5")
+                                ALPHA("clearcoat_gloss", ".5")),
                true);
     compare(KIND("twosided", KIND("plastic", RED) GOLD(ALPHA("alpha", ".3"))));
     imp_context_destroy(ctx);

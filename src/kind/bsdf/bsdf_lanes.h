@@ -14,8 +14,8 @@
 
 extern const struct imp_bsdf_lanes imp__conductor_lanes, imp__dielectric_lanes,
     imp__diffuse_lanes, imp__plastic_lanes, imp__principled_lanes,
-    imp__roughconductor_lanes, imp__roughdielectric_lanes, imp__roughplastic_lanes,
-    imp__twosided_lanes;
+    imp__principled_clear_lanes, imp__roughconductor_lanes, imp__roughdielectric_lanes,
+    imp__roughplastic_lanes, imp__twosided_lanes;
 
 /* sample, pdf_eval and eval_d of struct imp_bsdf_lanes, compiled for both values of a condition on the
  * material, which is their first argument: sample_as, pdf_eval_as, eval_d_as. */

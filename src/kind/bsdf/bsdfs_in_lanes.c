@@ -18,13 +18,14 @@ static const struct {
             {&imp__plastic, &imp__plastic_lanes},
             {&imp__roughplastic, &imp__roughplastic_lanes},
             {&imp__roughdielectric, &imp__roughdielectric_lanes},
-            {&imp__principled, &imp__principled_lanes}};
+            {&imp__principled, &imp__principled_lanes},
+            {&imp__principled, &imp__principled_clear_lanes}};
 
 const struct imp_bsdf_lanes *imp__bsdf_lanes(const struct imp_bsdf *b)
 {
     for (size_t k = 0; k < imp_count(list); k++) {
         const struct imp_bsdf_lanes *l = list[k].lanes;
-        if (b->ops == list[k].ops) return !l->covers || l->covers(b) ? l : NULL;
+        if (b->ops == list[k].ops && (!l->covers || l->covers(b))) return l;
     }
     return NULL;
 }
