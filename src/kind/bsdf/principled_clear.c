@@ -64,7 +64,7 @@ IMP_EITHER_WAY imp_wide_truth sample_as(const bool coated, const struct imp_bsdf
 
 /* imp__principled_half. n: |wo + e wi| with the sign that turns m up; im: wi.m. */
 struct half {
-    struct imp__looks l;
+    struct imp__principled_sides l;
     imp_wide n, im;
     imp_wide_truth there, front;
 };
@@ -85,7 +85,7 @@ static inline struct half half_of(const struct side *s, imp_wide_lobe lobe)
     x.front = s->reflects & ~s->back;
     return x;
 }
-/* Of glass_add: share. */
+/* share of glass_add. */
 static inline imp_wide share_of(const struct side *s, const struct half *x,
                                 const struct imp__front *f)
 {

@@ -134,7 +134,7 @@ IMP_EITHER_WAY struct imp__burleys imp__burleys(imp_wide cos_o, imp_wide cos_i,
 
 /* Directions on one side of the surface, the side of wo, and the facet between them: struct
  * imp__principled_look. vm: wo.m, which om is but for rounding. */
-struct imp__looks {
+struct imp__principled_sides {
     imp_wide3 wo, wi, m;
     imp_wide e, vm, om;
 };
@@ -147,7 +147,7 @@ struct imp__front {
 };
 IMP_EITHER_WAY struct imp__front imp__front_of(const bool coated, const bool clear,
                                                const struct imp_wide_color *in,
-                                               const struct imp__looks *l,
+                                               const struct imp__principled_sides *l,
                                                imp_wide_truth here, uint64_t derivative)
 {
     struct imp__front x = {.e = l->e};
@@ -210,7 +210,7 @@ IMP_EITHER_WAY imp_wide imp__front_value(const bool coated, const struct imp__fr
 /* Derivatives of DG by roughness and anisotropic (imp__burley_lobe). */
 static inline void imp__facets_turn(const struct imp_wide_color *in,
                                     const struct imp__front *x,
-                                    const struct imp__looks *l, imp_wide d[2])
+                                    const struct imp__principled_sides *l, imp_wide d[2])
 {
     const imp_wide zero = imp__wide(0), least = imp__wide(1e-3),
                    roughness = imp__cut_of(in, ROUGHNESS), r2 = roughness * roughness,

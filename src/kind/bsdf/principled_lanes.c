@@ -45,10 +45,11 @@ IMP_EITHER_WAY imp_wide_truth sample_as(const bool coated, const struct imp_bsdf
 }
 
 static imp_wide_truth look(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                           const imp_wide3 *wo, const imp_wide3 *wi, struct imp__looks *l)
+                           const imp_wide3 *wo, const imp_wide3 *wi,
+                           struct imp__principled_sides *l)
 {
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
-    *l = (struct imp__looks){.wo = *wo, .wi = *wi, .e = index_of(b, in)};
+    *l = (struct imp__principled_sides){.wo = *wo, .wi = *wi, .e = index_of(b, in)};
     l->m = imp__wide3_unit(imp__wide3_plus(*wo, *wi));
     l->vm = imp__wide3_inner(*wo, l->m);
     l->om = imp__wide_lesser(l->vm, one);
@@ -61,7 +62,7 @@ IMP_EITHER_WAY imp_wide pdf_eval_as(const bool coated, const struct imp_bsdf *b,
                                     const imp_wide_lobe *lobe, int colors,
                                     struct imp_wide_color *f)
 {
-    struct imp__looks l;
+    struct imp__principled_sides l;
     (void)lobe;
     const imp_wide_truth there = look(b, in, wo, wi, &l);
     const struct imp__front x =
@@ -95,7 +96,7 @@ IMP_EITHER_WAY bool eval_d_as(const bool coated, const struct imp_bsdf *b,
     (void)lobe;
     const struct imp__principled_self *p = b->self;
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
-    struct imp__looks l;
+    struct imp__principled_sides l;
     const imp_wide_truth there = look(b, in, wo, wi, &l);
     const struct imp__front x =
         imp__front_of(coated, false, in, &l, imp__fronts(wo, wi), 0);
