@@ -4,6 +4,7 @@
  * parameters, with standard errors. The objective is a loss against target pictures; or
  * the inner product of the picture with a given adjoint image; or, with neither, the mean
  * of the picture over its pixels and channels. */
+#include "shared/blocks.h"
 #include "shared/command.h"
 #include "shared/overwrite.h"
 #include "shared/picture_files.h"

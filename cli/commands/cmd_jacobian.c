@@ -3,6 +3,7 @@
  * importon jacobian: one picture per control, dI/dtheta, all from one set of walks. A
  * colour is one control: lane c of a picture depends on lane c of a colour only, so the
  * three derivatives share one picture without loss (CONVENTIONS.md). */
+#include "shared/blocks.h"
 #include "shared/command.h"
 #include "shared/output.h"
 #include "shared/picture_files.h"

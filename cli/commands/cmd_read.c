@@ -6,6 +6,7 @@
 #include "read/read_ratings.h"
 #include "read/read_year.h"
 #include "read/room_page.h"
+#include "shared/blocks.h"
 #include "shared/command.h"
 #include "shared/overwrite.h"
 #include "shared/picture_files.h"

@@ -4,6 +4,7 @@
  * parameters, against other targets and in other regions, without the scene and without a
  * ray. Each answer has its standard error and the effective sample size; where too few
  * walks count it is refused. */
+#include "shared/blocks.h"
 #include "shared/command.h"
 #include "shared/picture_files.h"
 #include "shared/problem_options.h"

@@ -2,6 +2,7 @@
  *
  * importon elements --fit: lamp powers and reflectances for wanted measurements. */
 #include "cmd_elements.h"
+#include "shared/blocks.h"
 #include "shared/output.h"
 #include "shared/problem_options.h"
 #include "text/progress.h"

@@ -6,6 +6,7 @@
 #include "fit_answer.h"
 #include "fit_options.h"
 #include "fit_pictures.h"
+#include "shared/blocks.h"
 #include "shared/command.h"
 #include "shared/overwrite.h"
 #include "shared/picture_files.h"

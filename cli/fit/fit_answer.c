@@ -3,6 +3,7 @@
  * What a fit has found: its table, and its files: history, JSON, pictures, settings. */
 #include "fit_answer.h"
 #include "fit_scene.h"
+#include "shared/blocks.h"
 
 #include "fit_pictures.h"
 #include "shared/answer_file.h"

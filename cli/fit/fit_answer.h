@@ -4,6 +4,7 @@
 #ifndef IMP_CLI_FIT_ANSWER_H
 #define IMP_CLI_FIT_ANSWER_H
 
+#include "shared/blocks.h"
 #include "shared/problem_options.h"
 
 struct fit_answer {

@@ -2,6 +2,7 @@
  *
  * What a fit has found, in JSON. */
 #include "fit_answer.h"
+#include "shared/blocks.h"
 #include "shared/command.h"
 #include "shared/places.h"
 #include "text/progress.h"

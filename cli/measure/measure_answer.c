@@ -2,6 +2,7 @@
  *
  * A measurement's files: those of a fit, masks, and measure.json with stages and decisions. */
 #include "measure_answer.h"
+#include "shared/blocks.h"
 
 #include "fit/fit_answer.h"
 #include "fit/fit_pictures.h"

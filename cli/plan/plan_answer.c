@@ -2,6 +2,7 @@
  *
  * The answer of a plan as tables and as JSON. */
 #include "plan_answer.h"
+#include "shared/blocks.h"
 
 #include <math.h>
 #include <stdbool.h>

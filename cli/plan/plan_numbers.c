@@ -2,6 +2,7 @@
  *
  * --of and --prior: names of active numbers, patterns too. */
 #include "plan_numbers.h"
+#include "shared/blocks.h"
 
 #include <fnmatch.h>
 #include <math.h>

@@ -5,6 +5,7 @@
 #ifndef IMP_CLI_PLAN_NUMBERS_H
 #define IMP_CLI_PLAN_NUMBERS_H
 
+#include "shared/blocks.h"
 #include "shared/problem_options.h"
 #include <importon/plan.h>
 

@@ -3,6 +3,7 @@
  * Where the things that numbers of geometry move are in the pictures: the middle, how far a step
  * along x, y and z shifts it, and the way of a search. docs/report.md has the members. */
 #include "places.h"
+#include "blocks.h"
 #include "command.h"
 
 #include <math.h>

@@ -5,6 +5,7 @@
 #ifndef IMP_CLI_PLACES_H
 #define IMP_CLI_PLACES_H
 
+#include "blocks.h"
 #include "problem_options.h"
 
 /* Numbers of a search [n][n_numbers], as imp_fit_step.history_x; n 0: none. Things with a to_world

@@ -8,6 +8,7 @@
 #include "fit/fit_answer.h"
 #include "fit/fit_options.h"
 #include "fit/fit_pictures.h"
+#include "shared/blocks.h"
 #include "shared/picture_files.h"
 #include "shared/places.h"
 #include "shared/problem_options.h"

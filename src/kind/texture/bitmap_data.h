@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a bitmap is made of (bitmap.c; bitmap_lanes.c). */
+ * What a bitmap is made of (bitmap.c, bitmap_build.c, bitmap_lanes.c). */
 #ifndef IMP_KIND_TEXTURE_BITMAP_DATA_H
 #define IMP_KIND_TEXTURE_BITMAP_DATA_H
 
+#include "kind/build.h"
 #include "lifted_texels.h"
 #include "uv.h"
 
@@ -23,5 +24,10 @@ struct bitmap {
     bool daylight;                    /* ... in which it is times daylight */
     struct imp__lifted_texels lifted; /* of three channels in a spectral mode */
 };
+
+/* ---- bitmap_build.c: as of struct imp_texture_ops ---- */
+enum imp_status imp__bitmap_build(const struct imp_build *b, void *self,
+                                  struct imp_texture *tex);
+void imp__bitmap_changed(const struct imp_texture *tex);
 
 #endif
