@@ -116,8 +116,8 @@ static double moments(const struct imp__goal *goal,
 /* The largest r of a smooth span, which all its numbers have; 0: of another one. */
 static double joint_root(const struct imp__span *a, const packed *r, size_t first)
 {
-    double most = 0;
-    for (size_t k = first; a->smooth && k < a->end; k++) most = fmax(most, r[k]);
+    packed most = 0;
+    for (size_t k = first; a->smooth && k < a->end; k++) most = imp_max(r[k], most);
     return most;
 }
 
