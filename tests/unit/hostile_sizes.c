@@ -89,7 +89,7 @@ static void films(void)
         imp_scene *s;
         struct imp_run run = IMP_RUN_INIT;
         imp_film *film = NULL;
-        const double start = imp__now();
+        const double start = processor_s();
         enum imp_status st = load("", cases[k].film, BALL, &s);
         const bool loaded = st == IMP_OK;
         run.spp = 1;
@@ -214,6 +214,9 @@ static void one_pixel(void)
     imp_scene_destroy(s);
 }
 
+/* Of all threads: what else the machine does is no part of it. */
+static double processor_s(void) { return (double)clock() / CLOCKS_PER_SEC; }
+
 #define WHITE "<bsdf type='diffuse'><rgb name='reflectance' value='1'/></bsdf>"
 
 /* Nothing ends a walk in a closed white room without roulette. */
@@ -222,7 +225,7 @@ static void endless(void)
     imp_scene *s;
     struct imp_run run = IMP_RUN_INIT;
     imp_film *film = NULL;
-    const double start = imp__now();
+    const double start = processor_s();
     test_must(ctx,
               load("<integer name='max_depth' value='-1'/><integer name='rr_depth' "
                    "value='2147483647'/>",
@@ -232,7 +235,7 @@ static void endless(void)
                    "</shape>",
                    &s));
     run.spp = 64;
-    tap_ok(imp_render(s, &run, &film) == IMP_E_PATHS && !film && imp__now() - start < 20,
+    tap_ok(imp_render(s, &run, &film) == IMP_E_PATHS && !film && processor_s() - start < 20,
            "walks without end # %s", imp_last_error(ctx));
     char *text = NULL;
     test_must(ctx, imp_walk_describe(s, &run, 3, 3, 0, 0, &text));
@@ -344,7 +347,7 @@ static void many_shapes(void)
     struct imp_run run = IMP_RUN_INIT;
     imp_film *film;
     const int n = 100000;
-    const double start = imp__now();
+    const double start = processor_s();
     test_must(ctx, imp_scene_create(ctx, NULL, &s));
     test_camera(s, -1, 40, 2, 2);
     for (int i = 0; i < n; i++) {
@@ -359,7 +362,7 @@ static void many_shapes(void)
     imp_scene_get_info(s, &info);
     test_must(ctx, imp_render(s, &run, &film));
     tap_ok(info.n_shapes == n && imp_scene_n_params(s) == (size_t)n &&
-               imp__now() - start < 20,
+               processor_s() - start < 20,
            "%d spheres # %zu MB", n, info.memory_bytes >> 20);
     imp_film_destroy(film);
     imp_scene_destroy(s);
@@ -433,9 +436,9 @@ static void unread(void)
         (size_t)snprintf(xml, size, "<scene version='3.0.0'><shape type='sphere'>");
     for (int k = 0; k < N; k++) n += (size_t)snprintf(xml + n, size - n, one, k);
     n += (size_t)snprintf(xml + n, size - n, "</shape></scene>");
-    const clock_t begun = clock();
+    const double begun = processor_s();
     const enum imp_status st = imp_scene_load_string(ctx, xml, n, "test", &o, &s);
-    const double seconds = (double)(clock() - begun) / CLOCKS_PER_SEC;
+    const double seconds = processor_s() - begun;
     tap_ok(st == IMP_E_SCENE &&
                strstr(imp_last_error(ctx), "'radiu00000', 'radiu00001'") && seconds < 5,
            "%d unknown properties are refused # %.2g s", N, seconds);
