@@ -149,7 +149,8 @@ def annual(scene: Scene, weather: Any, sensor: Any = 0, *, opens: float = 8, clo
     Examples
     --------
     >>> scene = importon.load_string('''<scene version="3.0.0"><integrator type="path"/><emitter type="ciesky"/>
-    ... <shape type="rectangle"><sensor type="irradiancemeter"/></shape></scene>''', mode="mono")
+    ... <shape type="rectangle"><sensor type="irradiancemeter"><film type="hdrfilm"><integer name="width" value="8"/>
+    ... <integer name="height" value="8"/></film></sensor></shape></scene>''', mode="mono")
     >>> hours = importon.Weather(hour=[12.5], sun=[[.6, 0, .8]], diffuse=[100], direct=[0], diffuse_illuminance=[12000],
     ...                          direct_illuminance=[0])
     >>> year = importon.annual(scene, hours, spp=64)
