@@ -19,6 +19,8 @@
 #include <math.h>
 #include <string.h>
 
+#define HIDDEN 0.1 /* of its size */
+
 void imp__uncertainty_destroy(imp_context *ctx, struct imp__uncertainty *u)
 {
     if (!u) return;
@@ -78,6 +80,15 @@ static void loose_add(const struct imp__sampled *s, const struct imp__directions
     }
 }
 
+/* Eigenvalues are in units of kappa over the size of a direction squared. */
+static bool is_hidden(const struct imp__directions *d, double kappa)
+{
+    bool hidden = false;
+    for (size_t j = 0; j < d->m; j++)
+        hidden |= d->loose[j] && d->values[j] + 2 * d->se[j] > kappa / (HIDDEN * HIDDEN);
+    return hidden;
+}
+
 /* What else is not known of the variables that move. A step that was not taken is an error of
  * all that it would have moved. A variable that is held at a bound may be inside, and would take
  * the others along by -G H: with w the way from the bound inwards to where it wants to be and
@@ -133,6 +144,7 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
                       ? a.every.values[n - 1] / a.every.values[0]
                       : INFINITY;
     u.n_loose = (int)a.every.n_loose;
+    u.hidden = is_hidden(&a.every, a.kappa);
     memcpy(u.loosest, a.every.vectors, n * sizeof *u.loosest);
     for (size_t k = 0; k < n; k++) {
         struct imp_fit_variable *v = &variables[k];
@@ -149,6 +161,10 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
             imp__interval_free(
                 goal, k, imp__interval_se(&a.free, n, k, u.measurement, u.monte_carlo),
                 v);
+        const double step = fabs(u.x[k] - a.from[k]) / v->se;
+        if (rounds->at_newton || held || a.fixed[k] || !(step > u.step)) continue;
+        u.step = step;
+        u.step_of = k;
     }
     *out = u;
     u = (struct imp__uncertainty){.found = true};

@@ -16,7 +16,12 @@ struct imp__uncertainty {
     double *G;           /* [n][n] inverse of H in the directions that are determined */
     double condition;    /* of the scaled H; INFINITY if it is singular */
     int n_loose;         /* directions that are not determined */
-    double *loosest;     /* [n] unit vector, in units of the scales: the worst of them */
+    bool hidden;     /* one of these may be, to a tenth of its size: the noise is ours */
+    double *loosest; /* [n] unit vector, in units of the scales: the worst of them */
+    /* The largest step from the end of a search to x, in standard errors; 0: none is known, or
+     * the search ended by few samples (at_newton). */
+    double step;
+    size_t step_of; /* this variable's */
     /* Estimated variance of the data in units of 1/weight; 0: known. */
     double noise_scale;
     struct imp_estimate loss; /* at x, by the same samples; value NAN: not known */

@@ -194,7 +194,7 @@ enum imp_status imp__fit_shift(struct imp__fit *fit, const double *x, const doub
  */
 const char *imp__fit_warning(const struct imp__fit *fit, int bias_order,
                              const struct imp_fit_variable *variables,
-                             const double *loosest, const char *no_intervals,
+                             const struct imp__uncertainty *u, const char *no_intervals,
                              const struct imp__fit_residual *residual,
                              const struct imp__fit_shift *shift);
 

@@ -4,6 +4,7 @@
  * interval, bias of order 1/spp. */
 #include "fit.h"
 #include "inverse/problem/loss.h"
+#include "search/covariance.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -12,6 +13,7 @@
 #define MISFIT    2   /* warn above this chi^2 per degree of freedom, if it is also */
 #define MISFIT_Z  3   /* this many standard errors above 1 */
 #define LEFT_OVER 0.2 /* warn above this relative residual of the targets */
+#define FAR       3   /* warn above this step at the end, in standard errors */
 #define FEW       10  /* with fewer degrees of freedom chi^2 is too noisy to judge */
 
 struct text {
@@ -36,9 +38,10 @@ static void put_name(struct text *t, const struct imp__fit *f, size_t i)
 }
 
 static void put_loose(struct text *t, const struct imp__fit *f,
-                      const struct imp_fit_variable *v, const double *direction)
+                      const struct imp_fit_variable *v, const struct imp__uncertainty *u)
 {
     const size_t n = f->problem->n;
+    const double *direction = u->loosest;
     size_t count = 0, held = 0, shown = 0;
     for (size_t i = 0; i < n; i++) {
         count += !v[i].determined;
@@ -52,6 +55,7 @@ static void put_loose(struct text *t, const struct imp__fit *f,
         put_name(t, f, i);
     }
     if (count > shown) put(t, " and %zu more", count - shown);
+    if (u->hidden) put(t, ", or these samples are too few to tell: use more");
     if (held) put(t, ", whose intervals rest on the prior");
     /* Warn of an undetermined combination; a single variable has its own warning. */
     double largest = 0;
@@ -112,11 +116,12 @@ static bool much_left(const struct imp__fit_residual *r)
 
 const char *imp__fit_warning(const struct imp__fit *f, int bias_order,
                              const struct imp_fit_variable *variables,
-                             const double *loosest, const char *no_intervals,
+                             const struct imp__uncertainty *u, const char *no_intervals,
                              const struct imp__fit_residual *residual,
                              const struct imp__fit_shift *shift)
 {
     struct text t = {.used = 0};
+    const double *loosest = u->loosest;
     if (residual->chi2 > MISFIT && residual->chi2 - 1 > MISFIT_Z * residual->chi2_se)
         put(&t,
             "the scene does not explain the pictures: what is left is %.*f +- %.1g times "
@@ -136,7 +141,15 @@ const char *imp__fit_warning(const struct imp__fit *f, int bias_order,
             t.used ? "; " : "", residual->count, f->problem->n,
             residual->freedom > 0 ? "little" : "nothing",
             residual->freedom > 0 ? "are uncertain" : "are without it");
-    if (loosest) put_loose(&t, f, variables, loosest);
+    if (loosest) put_loose(&t, f, variables, u);
+    if (u->step > FAR) {
+        put(&t, "%sthe search had not ended: the last step moved ", t.used ? "; " : "");
+        put_name(&t, f, u->step_of);
+        put(&t,
+            " by %.1f of its standard errors, which hold near the end alone. Use more "
+            "iterations or samples",
+            u->step);
+    }
     if (f->errors.x) put_errors(&t, f);
     if (no_intervals) put(&t, "%sno intervals: %s", t.used ? "; " : "", no_intervals);
     if (bias_order > 0)

@@ -307,8 +307,7 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
         .reason = !f->stopped                                       ? s->reason
                   : f->deadline_s > 0 && imp__now() > f->deadline_s ? "time limit reached"
                                                                     : "cancelled",
-        .warning = imp__fit_warning(f, objective.bias_order, rows, u->loosest, why, &left,
-                                    shift),
+        .warning = imp__fit_warning(f, objective.bias_order, rows, u, why, &left, shift),
         .shift = shift->of_se >= 0 ? shift->of_se : NAN,
         .spp = spp_taken(f),
         .residual = left.relative,
