@@ -38,11 +38,11 @@ struct imp__annual_sun {
  * without hours. */
 struct imp__annual_hours {
     size_t n, blocks;
-    size_t *hour;                              /* [n] of the caller's */
-    imp__annual_lanes (*sky)[IMP__PATCHES][2]; /* [blocks / 2] */
-    double *sun;                               /* [n] E_s, lx; 0: none */
-    imp_v3 *to_sun;                            /* [n] unit, world */
-    int *cell;                                 /* [n] of the sun; -1: none */
+    const struct imp_weather_hour *given; /* the caller's */
+    size_t *hour;                         /* [n] of them */
+    double *sun;                          /* [n] E_s, lx; 0: none */
+    imp_v3 *to_sun;                       /* [n] unit, world */
+    int *cell;                            /* [n] of the sun; -1: none */
     /* Patches in which the sun is at some hour. */
     int n_cells;
     int cell_of[IMP__PATCHES];  /* -1: the sun is never there */
@@ -51,6 +51,9 @@ struct imp__annual_hours {
     size_t n_suns;              /* hours with a sun */
     struct imp__annual_sun *suns;
 };
+
+/* Skies of two blocks of hours. */
+typedef imp__annual_lanes imp__annual_skies[IMP__PATCHES][2];
 
 struct imp__annual {
     const struct imp_scene *scene;
@@ -70,44 +73,64 @@ static inline double imp__annual_light(bool mono, imp_spec x)
     return mono ? x[0] : imp__luminance(x[0], x[1], x[2]);
 }
 
-/* One point: its coefficients, [IMP__PATCHES] and [n_cells]; its hours, [hours.blocks]: all light, and
- * the sun's alone. */
+/* What comes from a patch; what comes straight from the sun at an hour, with E_s: groups g and
+ * g + IMP__SUN_RAYS have the same. */
+enum { IMP__SUN_RAYS = IMP__GROUPS / 2 };
+struct imp__annual_part {
+    float C;
+    int patch;
+};
+struct imp__annual_sunlit {
+    size_t hour;
+    float light[IMP__SUN_RAYS];
+};
+
+/* One point: of each group what comes from patches, those without light left out; I [n_cells];
+ * hours in which the sun comes straight, and from which of them on they have not been counted. */
 struct imp__annual_at {
-    float (*C)[IMP__GROUPS], (*I)[IMP__GROUPS];
-    imp__annual_lanes (*E)[IMP__GROUPS], (*S)[IMP__GROUPS];
+    const struct imp__annual_part *part[IMP__GROUPS];
+    int parts[IMP__GROUPS];
+    float (*I)[IMP__GROUPS];
+    const struct imp__annual_sunlit *sunlit;
+    size_t n_sunlit, next;
 };
 
-/* Points that a worker has at once: the skies, which are large, are read once for all of them. */
-enum { IMP__POINTS = 4 };
+/* What a thread needs, while it makes coefficients of a point. */
 struct imp__annual_worker {
-    struct imp_arena arena;
+    struct imp_arena arena; /* of walks */
+    struct imp_arena keep;  /* of what a point has */
     struct imp_drops drops;
-    struct imp__annual_at at[IMP__POINTS];
-    double *C_sum, *I_sum; /* coefficients of a group, while it is summed */
+    double *C_sum, *I_sum;             /* of a group, [IMP__PATCHES] each */
+    struct imp__annual_sunlit *sunlit; /* [n_suns] */
 };
 
-/* annual_hours.c: IMP_E_ARG for numbers out of range; skies and suns of hours that are checked. */
+/* annual_hours.c: IMP_E_ARG for numbers out of range; suns of hours that are checked, which `out`
+ * borrows; skies of some blocks, in pairs. */
 enum imp_status imp__annual_hours_check(imp_context *ctx, size_t n,
                                         const struct imp_weather_hour *hour);
 enum imp_status imp__annual_hours_make(const struct imp__annual *a, size_t n,
                                        const struct imp_weather_hour *hour,
                                        struct imp__annual_hours *out);
+enum imp_status imp__annual_skies_make(const struct imp__annual *a, size_t first,
+                                       size_t blocks, imp__annual_skies *out);
 void imp__annual_hours_free(imp_context *ctx, struct imp__annual_hours *h);
 
 /* annual_sun.c: what of the light from direction w reaches o: 0 or 1 but for panes. */
 imp_spec imp__annual_passes(const struct imp__annual *a, double time, imp_v3 o, imp_v3 w);
-/* S: the suns of all hours, straight to the point of pixel (x, y), by groups. */
-void imp__annual_direct(const struct imp__annual *a, int x, int y,
-                        struct imp__annual_at *at);
+/* The suns of all hours, straight to the point of pixel (x, y): how many of them come. */
+size_t imp__annual_direct(const struct imp__annual *a, int x, int y,
+                          struct imp__annual_sunlit *out);
 
-/* annual_walks.c: coefficients of pixel (x, y). */
+/* annual_walks.c: coefficients of pixel (x, y). IMP_E_NOMEM has no message. */
 enum imp_status imp__annual_walks(const struct imp__annual *a, int x, int y,
                                   struct imp__annual_worker *w,
                                   struct imp__annual_at *at);
 
-/* annual_light.c: E of points. */
-void imp__annual_hours_light(const struct imp__annual *a, const struct imp__annual_at *at,
-                             size_t points);
+/* annual_light.c: E of some blocks from `block` on, whose skies begin at `sky`; E has the direct suns at
+ * first. */
+void imp__annual_light_add(const struct imp__annual *a, const struct imp__annual_at *at,
+                           const imp__annual_skies *sky, size_t block, size_t blocks,
+                           imp__annual_lanes (*E)[IMP__GROUPS]);
 
 /* annual_sums.c: numbers of a year of one point, as all groups have them, halves and quarters. */
 enum imp__annual_number {
@@ -121,16 +144,41 @@ enum imp__annual_number {
 };
 struct imp__annual_numbers {
     double of[IMP__ANNUAL_NUMBERS][IMP__VARIANTS];
+    double mean[IMP__GROUPS], exposure[IMP__GROUPS]; /* sums, by groups */
 };
-/* used [hours.blocks]: -1 of an hour of use, else 0. all: how many of the year are, lit or not. */
-void imp__annual_add(const struct imp__annual *a, const struct imp_annual_options *o,
-                     const imp__annual_mask *used, size_t all,
-                     const struct imp__annual_at *at, struct imp__annual_numbers *out);
+/* Counts by lanes of as many blocks as one likes. */
+struct imp__annual_counts {
+    imp__annual_mask of[IMP__ANNUAL_NUMBERS][IMP__VARIANTS];
+};
+/* Blocks whose sums are floats, at most. used: -1 of an hour of use, else 0. sun: has a block any? */
+enum { IMP__BATCH = 8 };
+void imp__annual_add(const struct imp_annual_options *o, const imp__annual_mask *used,
+                     size_t blocks, const imp__annual_lanes (*E)[IMP__GROUPS],
+                     const imp__annual_lanes (*S)[IMP__GROUPS], const bool *sun,
+                     struct imp__annual_counts *counts, struct imp__annual_numbers *out);
+void imp__annual_count(const struct imp__annual_counts *counts,
+                       struct imp__annual_numbers *out);
+/* Sums become numbers. all: hours of use in the year; lit: those with light. */
+void imp__annual_end(const struct imp_annual_options *o, size_t all, size_t lit,
+                     struct imp__annual_numbers *out);
 /* Value and error of a number's variants. */
 struct imp_estimate imp__annual_estimate(const double variant[IMP__VARIANTS]);
 void imp__annual_point_set(const struct imp__annual_numbers *x,
                            struct imp_annual_point *out);
 /* Mean of the groups, and its error. */
 struct imp_estimate imp__annual_mean(const double group[IMP__GROUPS]);
+
+/* annual_points.c: numbers [points] of a grid; readings of hours, if they are wanted, [points] [n]. */
+struct imp__annual_year {
+    const struct imp__annual *a;
+    const struct imp_annual_options *options;
+    const struct imp_run *run;
+    size_t n, points;             /* hours as given */
+    const imp__annual_mask *used; /* [hours.blocks] */
+    size_t n_used;                /* of the year */
+    double *reading, *se;         /* NULL: not wanted */
+    struct imp__annual_numbers *numbers;
+};
+enum imp_status imp__annual_points(const struct imp__annual_year *year);
 
 #endif

@@ -52,18 +52,18 @@ static imp_v3 sun_of(const struct imp__sky_patches *p, const struct imp_weather_
 /* ---- Skies -------------------------------------------------------------------------- */
 
 struct job {
-    const struct imp__sky_patches *patches;
-    const struct imp_weather_hour *hour;
-    struct imp__annual_hours *out;
+    const struct imp__annual *a;
+    size_t block; /* the first */
+    imp__annual_skies *out;
 };
 
 /* Without light: a sky of one radiance, which counts 0 times. */
-static double sky_of(const struct job *j, size_t k, struct imp__sky_shape *out)
+static double sky_of(const struct imp__annual *a, size_t k, struct imp__sky_shape *out)
 {
-    const struct imp__sky_patches *p = j->patches;
+    const struct imp__sky_patches *p = &a->patches;
     *out = (struct imp__sky_shape){.axis = {p->axis[0], p->axis[1], p->axis[2]}};
-    if (k >= j->out->n) return 0;
-    const struct imp_weather_hour *h = &j->hour[j->out->hour[k]];
+    if (k >= a->hours.n) return 0;
+    const struct imp_weather_hour *h = &a->hours.given[a->hours.hour[k]];
     if (!(h->diffuse_illuminance > 0)) return 0;
     const double up = h->sun[2];
     out->sun = sun_of(p, h);
@@ -77,18 +77,25 @@ static double sky_of(const struct job *j, size_t k, struct imp__sky_shape *out)
     return h->diffuse_illuminance;
 }
 
-static enum imp_status skies_make(size_t first, size_t end, void *payload)
+static enum imp_status skies_work(size_t first, size_t end, void *payload)
 {
     const struct job *j = payload;
     for (size_t block = first; block < end; block++) {
         struct imp__sky_shape sky[IMP__AT_ONCE];
         double level[IMP__AT_ONCE];
         for (size_t t = 0; t < IMP__AT_ONCE; t++)
-            level[t] = sky_of(j, block * IMP__AT_ONCE + t, &sky[t]);
-        imp__sky_patches_fill(j->patches, sky, level,
-                              &j->out->sky[block / 2][0][block % 2]);
+            level[t] = sky_of(j->a, (j->block + block) * IMP__AT_ONCE + t, &sky[t]);
+        imp__sky_patches_fill(&j->a->patches, sky, level,
+                              &j->out[block / 2][0][block % 2]);
     }
     return IMP_OK;
+}
+
+enum imp_status imp__annual_skies_make(const struct imp__annual *a, size_t first,
+                                       size_t blocks, imp__annual_skies *out)
+{
+    struct job j = {a, first, out};
+    return imp__parallel_ranges(a->scene->ctx, blocks, 8, skies_work, &j);
 }
 
 /* ---- The sun's patches ---------------------------------------------------------------- */
@@ -195,18 +202,17 @@ enum imp_status imp__annual_hours_make(const struct imp__annual *a, size_t n,
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = a->scene->ctx;
-    struct imp__annual_hours h = {.n = 0};
+    struct imp__annual_hours h = {.given = hour};
     for (size_t i = 0; i < n; i++) h.n += has_light(&hour[i]);
     if (h.n == 0)
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "none of the %zu hours has any daylight", n));
     h.blocks = 2 * ((h.n + 2 * IMP__AT_ONCE - 1) / (2 * IMP__AT_ONCE));
     h.hour = imp__alloc(ctx, h.n, sizeof *h.hour);
-    h.sky = imp__alloc(ctx, h.blocks / 2, sizeof *h.sky);
     h.sun = imp__alloc(ctx, h.n, sizeof *h.sun);
     h.to_sun = imp__alloc(ctx, h.n, sizeof *h.to_sun);
     h.cell = imp__alloc(ctx, h.n, sizeof *h.cell);
-    if (!h.hour || !h.sky || !h.sun || !h.to_sun || !h.cell)
-        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu skies", h.n));
+    if (!h.hour || !h.sun || !h.to_sun || !h.cell)
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu suns", h.n));
     for (size_t i = 0, k = 0; i < n; i++) {
         if (!has_light(&hour[i])) continue;
         h.hour[k] = i;
@@ -214,8 +220,6 @@ enum imp_status imp__annual_hours_make(const struct imp__annual *a, size_t n,
         h.sun[k++] = has_sun(&hour[i]) ? hour[i].direct_illuminance : 0;
     }
     IMP_TRY(suns_draw_by(ctx, &a->patches, &h));
-    struct job j = {&a->patches, hour, &h};
-    IMP_TRY(imp__parallel_ranges(ctx, h.blocks, 8, skies_make, &j));
     *out = h;
     h = (struct imp__annual_hours){.n = 0};
 out:
@@ -226,7 +230,6 @@ out:
 void imp__annual_hours_free(imp_context *ctx, struct imp__annual_hours *h)
 {
     imp__release(ctx, h->hour);
-    imp__release(ctx, h->sky);
     imp__release(ctx, h->sun);
     imp__release(ctx, h->to_sun);
     imp__release(ctx, h->cell);

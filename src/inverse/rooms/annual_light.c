@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The illuminances of a year's hours at some points, from their coefficients. Points take turns at each
- * block of hours, whose skies are read from memory once for all of them. */
+ * The illuminances of some hours at a point, from its coefficients. */
 #include "annual.h"
 #include <string.h>
 
@@ -39,13 +38,13 @@ static inline void suns_light(const struct imp__annual_hours *h,
     turn_over(out);
 }
 
-/* The hours of two blocks. */
+/* The hours of two blocks, and how many such pairs a coefficient is read for: as sums wait for each
+ * other, and there are registers. */
 typedef float pair __attribute__((vector_size(8 * IMP__AT_ONCE)));
-/* As many sums as there are registers for, beside what they are made of. */
-#ifdef __AVX512F__
-enum { SUMS = IMP__GROUPS / 2 };
+#ifdef __AVX__
+enum { PAIRS = 4 };
 #else
-enum { SUMS = IMP__GROUPS / 4 };
+enum { PAIRS = 2 };
 #endif
 
 static inline pair joined(imp__annual_lanes a, imp__annual_lanes b)
@@ -54,61 +53,48 @@ static inline pair joined(imp__annual_lanes a, imp__annual_lanes b)
                                    15);
 }
 
-/* sum_p C_p L_p + S of the hours of two blocks, for the groups from `first` on. */
-static void pair_light(const struct imp__annual *a, const struct imp__annual_at *at,
-                       const int *seen, int n, size_t block, int first)
+/* E += sum_p C_p L_p of so many pairs of blocks. At 1,024 samples one group in nine has light from
+ * a patch from which some have. */
+static inline __attribute__((always_inline)) void
+pairs_add(const struct imp__annual_at *at, const imp__annual_skies *L,
+          imp__annual_lanes (*E)[IMP__GROUPS], const int pairs)
 {
-    const imp__annual_lanes(*L)[2] = a->hours.sky[block / 2];
-    const size_t ahead = /* of the next blocks */
-        block + 2 < a->hours.blocks ? IMP__PATCHES : 0;
-    imp__annual_lanes(*E)[IMP__GROUPS] = &at->E[block];
-    pair sum[SUMS];
-    for (int g = 0; g < SUMS; g++) sum[g] = joined(E[0][first + g], E[1][first + g]);
-    for (int i = 0; i < n; i++) {
-        const float *C = at->C[seen[i]] + first;
-        const pair here = joined(L[seen[i]][0], L[seen[i]][1]);
-        if (first == 0) __builtin_prefetch(L + ahead + seen[i]);
-        for (int g = 0; g < SUMS; g++) sum[g] += here * C[g];
-    }
-    for (int g = 0; g < SUMS; g++) {
-        E[0][first + g] = __builtin_shufflevector(sum[g], sum[g], 0, 1, 2, 3, 4, 5, 6, 7);
-        E[1][first + g] =
-            __builtin_shufflevector(sum[g], sum[g], 8, 9, 10, 11, 12, 13, 14, 15);
-    }
-}
-
-/* E = sum_p C_p L_p + S + E_s I of two blocks. */
-static void blocks_light(const struct imp__annual *a, const struct imp__annual_at *at,
-                         const int *seen, int n, size_t block)
-{
-    for (size_t b = block; b < block + 2; b++)
-        for (int first = 0; first < IMP__GROUPS; first += IMP__AT_ONCE) {
-            imp__annual_lanes x[IMP__AT_ONCE];
-            suns_light(&a->hours, at, b, first, x);
-            for (int g = 0; g < IMP__AT_ONCE; g++)
-                at->E[b][first + g] = at->S[b][first + g] + x[g];
+    for (int g = 0; g < IMP__GROUPS; g++) {
+        const struct imp__annual_part *part = at->part[g];
+        pair sum[PAIRS];
+        for (int k = 0; k < pairs; k++) sum[k] = joined(E[2 * k][g], E[2 * k + 1][g]);
+        for (int i = 0; i < at->parts[g]; i++)
+            for (int k = 0; k < pairs; k++) {
+                pair here;
+                memcpy(&here, L[k][part[i].patch], sizeof here);
+                sum[k] += here * part[i].C;
+            }
+        for (int k = 0; k < pairs; k++) {
+            E[2 * k][g] = __builtin_shufflevector(sum[k], sum[k], 0, 1, 2, 3, 4, 5, 6, 7);
+            E[2 * k + 1][g] =
+                __builtin_shufflevector(sum[k], sum[k], 8, 9, 10, 11, 12, 13, 14, 15);
         }
-    for (int first = 0; first < IMP__GROUPS; first += SUMS)
-        pair_light(a, at, seen, n, block, first);
-}
-
-/* Patches from which any light comes. */
-static int seen_of(const struct imp__annual_at *at, int seen[IMP__PATCHES])
-{
-    int n = 0;
-    for (int p = 0; p < IMP__PATCHES; p++) {
-        bool any = false;
-        for (int g = 0; g < IMP__GROUPS; g++) any |= at->C[p][g] != 0;
-        if (any) seen[n++] = p;
     }
-    return n;
 }
 
-void imp__annual_hours_light(const struct imp__annual *a, const struct imp__annual_at *at,
-                             size_t points)
+/* E += E_s I of a block. */
+static void suns_add(const struct imp__annual_hours *h, const struct imp__annual_at *at,
+                     size_t block, imp__annual_lanes E[IMP__GROUPS])
 {
-    int seen[IMP__POINTS][IMP__PATCHES], n[IMP__POINTS];
-    for (size_t i = 0; i < points; i++) n[i] = seen_of(&at[i], seen[i]);
-    for (size_t b = 0; b < a->hours.blocks; b += 2)
-        for (size_t i = 0; i < points; i++) blocks_light(a, &at[i], seen[i], n[i], b);
+    for (int first = 0; first < IMP__GROUPS; first += IMP__AT_ONCE) {
+        imp__annual_lanes x[IMP__AT_ONCE];
+        suns_light(h, at, block, first, x);
+        for (int g = 0; g < IMP__AT_ONCE; g++) E[first + g] += x[g];
+    }
+}
+
+void imp__annual_light_add(const struct imp__annual *a, const struct imp__annual_at *at,
+                           const imp__annual_skies *sky, size_t block, size_t blocks,
+                           imp__annual_lanes (*E)[IMP__GROUPS])
+{
+    size_t b = 0;
+    for (size_t k = 0; k < blocks; k++) suns_add(&a->hours, at, block + k, E[k]);
+    for (; b + 2 * PAIRS <= blocks; b += 2 * PAIRS)
+        pairs_add(at, &sky[b / 2], &E[b], PAIRS);
+    for (; b < blocks; b += 2) pairs_add(at, &sky[b / 2], &E[b], 1);
 }

@@ -1,35 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Daylight of a year at the points of a grid: options, scenes without it, and the loop over the
- * points. An item of work is one or some points with sums of their own: the number of threads changes
- * no bit. */
+ * Daylight of a year at the points of a grid: options, scenes without it, and what all points say. */
 #include "annual.h"
 #include "base/arguments.h"
 #include "film/film_measure.h"
 #include "kind/emitter/sky_shape.h"
 #include "kind/sensor/receiver.h"
-#include "point_loop.h"
 #include "walk/path/first_segment.h"
 #include "walk/rules/features.h"
 #include "walk/run/run.h"
 #include <float.h>
 #include <math.h>
 #include <string.h>
-
-struct job {
-    struct imp__annual *a;
-    struct imp_annual_options options;
-    const struct imp_run *run;
-    size_t n;                            /* hours as given */
-    imp__annual_mask *used;              /* [hours.blocks] -1: an hour of use */
-    size_t n_used;                       /* of the year */
-    size_t points, each;                 /* of all; of an item of work */
-    struct imp__annual_worker *worker;   /* [threads] */
-    struct imp__annual_numbers *numbers; /* [points] */
-    double *reading, *se;
-    pthread_mutex_t lock;
-    struct imp_drops drops;
-};
 
 /* ---- Options ----------------------------------------------------------------------- */
 
@@ -131,102 +113,6 @@ static enum imp_status annual_begin(const struct imp_scene *scene,
     return IMP_OK;
 }
 
-/* ---- A point ------------------------------------------------------------------------- */
-
-static void hours_give(const struct job *j, size_t point, const struct imp__annual_at *at)
-{
-    const struct imp__annual_hours *h = &j->a->hours;
-    for (size_t k = 0; k < h->n; k++) {
-        double group[IMP__GROUPS];
-        for (int g = 0; g < IMP__GROUPS; g++)
-            group[g] = (double)at->E[k / IMP__AT_ONCE][g][k % IMP__AT_ONCE];
-        const struct imp_estimate e = imp__annual_mean(group);
-        if (j->reading) j->reading[point * j->n + h->hour[k]] = e.value;
-        if (j->se) j->se[point * j->n + h->hour[k]] = e.se;
-    }
-}
-
-static enum imp_status point_walk(const struct imp__annual *a, size_t point,
-                                  struct imp__annual_worker *w, struct imp__annual_at *at)
-{
-    const int width = a->sensor->film.crop_w;
-    const int x = (int)(point % (size_t)width), y = (int)(point / (size_t)width);
-    const enum imp_status st = imp__annual_walks(a, x, y, w, at);
-    if (st == IMP_E_NOMEM)
-        return imp__error(a->scene->ctx, st, "no memory for walks of a year");
-    if (st == IMP_OK) imp__annual_direct(a, x, y, at);
-    return st;
-}
-
-static enum imp_status points_work(size_t i, int worker, int slot, void *payload)
-{
-    enum imp_status st = IMP_OK;
-    struct job *j = payload;
-    struct imp__annual_worker *w = &j->worker[worker];
-    const size_t first = i * j->each, n = imp_min(j->each, j->points - first);
-    (void)slot;
-    for (size_t k = 0; k < n && st == IMP_OK; k++)
-        st = point_walk(j->a, first + k, w, &w->at[k]);
-    if (imp__drops_total(&w->drops) > 0) {
-        pthread_mutex_lock(&j->lock);
-        imp__drops_merge(&j->drops, &w->drops);
-        pthread_mutex_unlock(&j->lock);
-        memset(&w->drops, 0, sizeof w->drops);
-    }
-    if (st != IMP_OK) return st;
-    imp__annual_hours_light(j->a, w->at, n);
-    for (size_t k = 0; k < n; k++) {
-        imp__annual_add(j->a, &j->options, j->used, j->n_used, &w->at[k],
-                        &j->numbers[first + k]);
-        if (j->reading || j->se) hours_give(j, first + k, &w->at[k]);
-    }
-    return IMP_OK;
-}
-
-static bool at_make(imp_context *ctx, const struct imp__annual_hours *h,
-                    struct imp__annual_at *at)
-{
-    at->C = imp__alloc(ctx, IMP__PATCHES, sizeof *at->C);
-    at->I = imp__alloc(ctx, (size_t)h->n_cells + 1, sizeof *at->I);
-    at->E = imp__alloc(ctx, h->blocks, sizeof *at->E);
-    at->S = imp__alloc(ctx, h->blocks, sizeof *at->S);
-    return at->C && at->I && at->E && at->S;
-}
-
-static enum imp_status workers_make(struct job *j, int threads)
-{
-    imp_context *ctx = j->a->scene->ctx;
-    j->worker = imp__alloc(ctx, (size_t)threads, sizeof *j->worker);
-    if (!j->worker) return IMP_E_NOMEM;
-    for (int t = 0; t < threads; t++) {
-        struct imp__annual_worker *w = &j->worker[t];
-        imp__arena_init(&w->arena, ctx);
-        w->C_sum = imp__alloc(ctx, IMP__PATCHES, sizeof *w->C_sum);
-        w->I_sum = imp__alloc(ctx, IMP__PATCHES, sizeof *w->I_sum);
-        bool got = w->C_sum && w->I_sum;
-        for (size_t k = 0; k < j->each; k++) got &= at_make(ctx, &j->a->hours, &w->at[k]);
-        if (!got) return IMP_E_NOMEM;
-    }
-    return IMP_OK;
-}
-static void workers_free(struct job *j, int threads)
-{
-    imp_context *ctx = j->a->scene->ctx;
-    for (int t = 0; j->worker && t < threads; t++) {
-        struct imp__annual_worker *w = &j->worker[t];
-        if (w->arena.ctx) imp__arena_free(&w->arena);
-        imp__release(ctx, w->C_sum);
-        imp__release(ctx, w->I_sum);
-        for (int k = 0; k < IMP__POINTS; k++) {
-            imp__release(ctx, w->at[k].C);
-            imp__release(ctx, w->at[k].I);
-            imp__release(ctx, w->at[k].E);
-            imp__release(ctx, w->at[k].S);
-        }
-    }
-    imp__release(ctx, j->worker);
-}
-
 /* ---- The grid ------------------------------------------------------------------------ */
 
 /* Variants of a part of the points: those whose number m is above (or, `least`, not below) a
@@ -246,38 +132,38 @@ static struct imp_estimate part_of(const struct imp__annual_numbers *x, size_t n
     return e;
 }
 
-static void summarise(const struct job *j, size_t n, struct imp_annual_summary *out)
+static void summarise(const struct imp__annual_year *y, struct imp_annual_summary *out)
 {
-    const struct imp_annual_options *o = &j->options;
-    struct imp__annual_numbers mean = {{{0}}};
+    const struct imp_annual_options *o = y->options;
+    const size_t n = y->points;
+    struct imp__annual_numbers mean = {.mean = {0}};
     for (size_t i = 0; i < n; i++)
         for (int m = 0; m < IMP__ANNUAL_NUMBERS; m++)
             for (int k = 0; k < IMP__VARIANTS; k++)
-                mean.of[m][k] += j->numbers[i].of[m][k] / (double)n;
-    out->hours = j->n_used;
+                mean.of[m][k] += y->numbers[i].of[m][k] / (double)n;
+    out->hours = y->n_used;
     imp__annual_point_set(&mean, &out->average);
-    out->spatial_autonomy = part_of(j->numbers, n, IMP__AUTONOMY, o->part, true);
-    out->sun_exposure = part_of(j->numbers, n, IMP__SUNLIT, o->sunlit_hours, false);
+    out->spatial_autonomy = part_of(y->numbers, n, IMP__AUTONOMY, o->part, true);
+    out->sun_exposure = part_of(y->numbers, n, IMP__SUNLIT, o->sunlit_hours, false);
 }
 
-static enum imp_status use_set(struct job *j, const struct imp_weather_hour *hour)
+static enum imp_status use_set(struct imp__annual_year *y,
+                               const struct imp_weather_hour *hour,
+                               imp__annual_mask *used)
 {
-    const struct imp__annual_hours *h = &j->a->hours;
-    const struct imp_annual_options *o = &j->options;
-    j->used = imp__alloc(j->a->scene->ctx, h->blocks, sizeof *j->used);
-    if (!j->used) return IMP_E_NOMEM;
-    for (size_t i = 0, k = 0; i < j->n; i++) {
-        const bool used = hour[i].hour > o->opens && hour[i].hour < o->closes;
-        j->n_used += used;
+    const struct imp__annual_hours *h = &y->a->hours;
+    const struct imp_annual_options *o = y->options;
+    for (size_t i = 0, k = 0; i < y->n; i++) {
+        const bool is = hour[i].hour > o->opens && hour[i].hour < o->closes;
+        y->n_used += is;
         if (k >= h->n || h->hour[k] != i) continue;
-        j->used[k / IMP__AT_ONCE][k % IMP__AT_ONCE] = -used;
+        used[k / IMP__AT_ONCE][k % IMP__AT_ONCE] = -is;
         k++;
     }
-    if (j->n_used == 0)
-        return imp__error(j->a->scene->ctx, IMP_E_ARG,
-                          "none of the hours lies between %g and %g", o->opens,
-                          o->closes);
-    return IMP_OK;
+    y->used = used;
+    if (y->n_used > 0) return IMP_OK;
+    return imp__error(y->a->scene->ctx, IMP_E_ARG,
+                      "none of the hours lies between %g and %g", o->opens, o->closes);
 }
 
 enum imp_status imp_annual_read(imp_scene *scene, const struct imp_run *run, size_t n,
@@ -290,15 +176,17 @@ enum imp_status imp_annual_read(imp_scene *scene, const struct imp_run *run, siz
     enum imp_status st = IMP_OK;
     const struct imp_sensor *sensor;
     struct imp_run own;
+    struct imp_annual_options o = {.size = 0};
     struct imp__annual a = {.sky = -1};
-    struct job j = {.a = &a, .run = &own, .n = n, .reading = reading, .se = se};
-    bool locked = false;
+    struct imp__annual_year y = {
+        .a = &a, .options = &o, .run = &own, .n = n, .reading = reading, .se = se};
+    imp__annual_mask *used = NULL;
     IMP_REQUIRE(NULL, scene, "scene");
     imp_context *ctx = scene->ctx;
     IMP_REQUIRE(ctx, hour, "hour");
     IMP_RUN(ctx, own, run);
-    IMP_OPTIONS(ctx, j.options, options, "options");
-    IMP_CHECKED(options_take(ctx, &j.options));
+    IMP_OPTIONS(ctx, o, options, "options");
+    IMP_CHECKED(options_take(ctx, &o));
     if (summary) IMP_SIZED(ctx, summary, "summary");
     IMP_CHECKED(imp__annual_hours_check(ctx, n, hour));
     IMP_CHECKED(imp__run_traces(ctx, __func__, &own));
@@ -308,36 +196,25 @@ enum imp_status imp_annual_read(imp_scene *scene, const struct imp_run *run, siz
     a.scene = scene;
     IMP_TRY(annual_begin(scene, &own, sensor, &a));
     IMP_TRY(imp__annual_hours_make(&a, n, hour, &a.hours));
-    IMP_TRY(use_set(&j, hour));
-    const size_t points = (size_t)sensor->film.crop_w * (size_t)sensor->film.crop_h;
-    j.points = points;
-    /* Some, unless threads would go without. */
-    j.each =
-        imp_clamp(points / (4 * (size_t)ctx->threads), (size_t)1, (size_t)IMP__POINTS);
-    IMP_TRY(workers_make(&j, ctx->threads));
-    j.numbers = imp__alloc(ctx, points, sizeof *j.numbers);
-    if (!j.numbers) IMP_TRY(IMP_E_NOMEM);
-    if (reading) memset(reading, 0, points * n * sizeof *reading);
-    if (se) memset(se, 0, points * n * sizeof *se);
-    locked = pthread_mutex_init(&j.lock, NULL) == 0;
-    if (!locked) IMP_TRY(IMP_E_NOMEM);
-    const double walks = (double)a.walks * IMP__GROUPS * (double)points;
-    IMP_TRY(imp__point_loop(ctx, &own, (points + j.each - 1) / j.each, walks, "year",
-                            points_work, &j, &j.drops));
-    for (size_t i = 0; point && i < points; i++)
-        imp__annual_point_set(&j.numbers[i], &point[i]);
+    y.points = (size_t)sensor->film.crop_w * (size_t)sensor->film.crop_h;
+    used = imp__alloc(ctx, a.hours.blocks, sizeof *used);
+    y.numbers = imp__alloc(ctx, y.points, sizeof *y.numbers);
+    if (!used || !y.numbers)
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for daylight of a year"));
+    IMP_TRY(use_set(&y, hour, used));
+    if (reading) memset(reading, 0, y.points * n * sizeof *reading);
+    if (se) memset(se, 0, y.points * n * sizeof *se);
+    IMP_TRY(imp__annual_points(&y));
+    for (size_t i = 0; point && i < y.points; i++)
+        imp__annual_point_set(&y.numbers[i], &point[i]);
     if (summary) {
         struct imp_annual_summary all = {.size = sizeof all};
-        summarise(&j, points, &all);
+        summarise(&y, &all);
         st = imp__info_give(ctx, __func__, "summary", summary, &all, sizeof all);
     }
 out:
-    if (st == IMP_E_NOMEM && !j.numbers)
-        imp__error(ctx, st, "no memory for daylight of a year");
-    if (locked) pthread_mutex_destroy(&j.lock);
-    workers_free(&j, ctx->threads);
-    imp__release(ctx, j.numbers);
-    imp__release(ctx, j.used);
+    imp__release(ctx, y.numbers);
+    imp__release(ctx, used);
     imp__annual_hours_free(ctx, &a.hours);
     return st;
 }

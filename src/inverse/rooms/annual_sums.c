@@ -143,8 +143,6 @@ struct imp_estimate imp__annual_mean(const double group[IMP__GROUPS])
 
 /* ---- Hours ------------------------------------------------------------------------- */
 
-enum { BLOCKS = 8 }; /* whose sums are floats */
-
 typedef imp__annual_lanes lanes;
 typedef imp__annual_mask mask;
 
@@ -178,80 +176,72 @@ static inline void variants_at_once(const lanes group[IMP__GROUPS],
     VARIANTS_FILL(x, out);
 }
 
-/* Sums over some blocks, by lanes: counts, and numbers of hours that are not whole. Those of useful
- * daylight count what is below each bound, until the last block is there. */
+/* Sums over a batch, by lanes. Counts of useful daylight are of what is below each bound, until the
+ * last block is there. */
 struct sums {
-    mask count[IMP__ANNUAL_NUMBERS][IMP__VARIANTS];
     lanes part[IMP__VARIANTS], mean[IMP__GROUPS], exposure[IMP__GROUPS];
 };
 
-static inline bool any_light(const lanes group[IMP__GROUPS])
-{
-    mask any = {0};
-    for (int g = 0; g < IMP__GROUPS; g++) any |= group[g] != splat(0);
-    int bits = 0;
-    for (int t = 0; t < IMP__AT_ONCE; t++) bits |= any[t];
-    return bits != 0;
-}
-
+/* straight: NULL if no hour has a sun. */
 static void block_add(const struct imp_annual_options *o, const lanes all[IMP__GROUPS],
-                      const lanes straight[IMP__GROUPS], mask used, struct sums *s)
+                      const lanes *straight, mask used, struct sums *s,
+                      mask count[IMP__ANNUAL_NUMBERS][IMP__VARIANTS])
 {
     const lanes wanted = splat(o->wanted), each = splat(1 / o->wanted), one = splat(1);
     const lanes lo = splat(o->useful[0]), middle = splat(o->useful[1]),
                 hi = splat(o->useful[2]), sunlit = splat(o->sunlit);
     lanes E[IMP__VARIANTS], S[IMP__VARIANTS];
     variants_at_once(all, E);
-    const bool sun = any_light(straight);
-    if (sun) variants_at_once(straight, S);
+    if (straight) variants_at_once(straight, S);
     for (int g = 0; g < IMP__GROUPS; g++) {
         s->mean[g] += only(used, all[g]);
         s->exposure[g] += all[g];
     }
     for (int v = 0; v < IMP__VARIANTS; v++) {
-        s->count[IMP__AUTONOMY][v] -= (E[v] >= wanted) & used;
+        count[IMP__AUTONOMY][v] -= (E[v] >= wanted) & used;
         s->part[v] += only(used, lesser(one, E[v] * each));
-        s->count[IMP__USEFUL][v] -= (E[v] < lo) & used;
-        s->count[IMP__USEFUL + 1][v] -= (E[v] < middle) & used;
-        s->count[IMP__USEFUL + 2][v] -= (E[v] <= hi) & used;
+        count[IMP__USEFUL][v] -= (E[v] < lo) & used;
+        count[IMP__USEFUL + 1][v] -= (E[v] < middle) & used;
+        count[IMP__USEFUL + 2][v] -= (E[v] <= hi) & used;
     }
-    for (int v = 0; sun && v < IMP__VARIANTS; v++)
-        s->count[IMP__SUNLIT][v] -= (S[v] >= sunlit) & used;
+    for (int v = 0; straight && v < IMP__VARIANTS; v++)
+        count[IMP__SUNLIT][v] -= (S[v] >= sunlit) & used;
 }
 
-static void groups_flush(lanes x[IMP__GROUPS], double sum[IMP__GROUPS])
+static double lanes_sum(double sum, lanes x)
 {
-    for (int g = 0; g < IMP__GROUPS; g++) {
-        for (int t = 0; t < IMP__AT_ONCE; t++) sum[g] += (double)x[g][t];
-        x[g] = splat(0);
-    }
+    for (int t = 0; t < IMP__AT_ONCE; t++) sum += (double)x[t];
+    return sum;
 }
 
-void imp__annual_add(const struct imp__annual *a, const struct imp_annual_options *o,
-                     const imp__annual_mask *used, size_t all,
-                     const struct imp__annual_at *at, struct imp__annual_numbers *out)
+void imp__annual_add(const struct imp_annual_options *o, const mask *used, size_t blocks,
+                     const lanes (*E)[IMP__GROUPS], const lanes (*S)[IMP__GROUPS],
+                     const bool *sun, struct imp__annual_counts *counts,
+                     struct imp__annual_numbers *out)
 {
-    const struct imp__annual_hours *h = &a->hours;
-    double mean[IMP__GROUPS] = {0}, exposure[IMP__GROUPS] = {0};
     struct sums s;
-    size_t lit = 0;
     memset(&s, 0, sizeof s);
-    *out = (struct imp__annual_numbers){{{0}}};
-    for (size_t b = 0; b < h->blocks; b++) {
-        block_add(o, at->E[b], at->S[b], used[b], &s);
-        for (int t = 0; t < IMP__AT_ONCE; t++) lit += used[b][t] != 0;
-        if ((b + 1) % BLOCKS != 0 && b + 1 < h->blocks) continue;
-        groups_flush(s.mean, mean);
-        groups_flush(s.exposure, exposure);
-        for (int v = 0; v < IMP__VARIANTS; v++) {
-            for (int t = 0; t < IMP__AT_ONCE; t++)
-                out->of[IMP__CONTINUOUS][v] += (double)s.part[v][t];
-            s.part[v] = splat(0);
-        }
+    for (size_t b = 0; b < blocks; b++)
+        block_add(o, E[b], sun[b] ? S[b] : NULL, used[b], &s, counts->of);
+    for (int g = 0; g < IMP__GROUPS; g++) {
+        out->mean[g] = lanes_sum(out->mean[g], s.mean[g]);
+        out->exposure[g] = lanes_sum(out->exposure[g], s.exposure[g]);
     }
+    for (int v = 0; v < IMP__VARIANTS; v++)
+        out->of[IMP__CONTINUOUS][v] = lanes_sum(out->of[IMP__CONTINUOUS][v], s.part[v]);
+}
+
+void imp__annual_count(const struct imp__annual_counts *counts,
+                       struct imp__annual_numbers *out)
+{
     for (int m = 0; m < IMP__ANNUAL_NUMBERS; m++)
         for (int v = 0; v < IMP__VARIANTS; v++)
-            for (int t = 0; t < IMP__AT_ONCE; t++) out->of[m][v] += s.count[m][v][t];
+            for (int t = 0; t < IMP__AT_ONCE; t++) out->of[m][v] += counts->of[m][v][t];
+}
+
+void imp__annual_end(const struct imp_annual_options *o, size_t all, size_t lit,
+                     struct imp__annual_numbers *out)
+{
     for (int v = 0; v < IMP__VARIANTS; v++) { /* what is between the bounds */
         double *of[4];
         for (int k = 0; k < 4; k++) of[k] = &out->of[IMP__USEFUL + k][v];
@@ -265,8 +255,8 @@ void imp__annual_add(const struct imp__annual *a, const struct imp_annual_option
     else
         for (int v = 0; v < IMP__VARIANTS; v++)
             out->of[IMP__USEFUL + 1][v] += (double)(all - lit);
-    variants_of(mean, out->of[IMP__MEAN]);
-    variants_of(exposure, out->of[IMP__EXPOSURE]);
+    variants_of(out->mean, out->of[IMP__MEAN]);
+    variants_of(out->exposure, out->of[IMP__EXPOSURE]);
     const double part = all > 0 ? 1 / (double)all : 0;
     for (int m = 0; m <= IMP__MEAN; m++)
         for (int v = 0; v < IMP__VARIANTS; v++) out->of[m][v] *= part;

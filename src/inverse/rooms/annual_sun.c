@@ -13,7 +13,6 @@
 #include "scene/instances.h"
 #include "walk/core/step.h"
 #include <math.h>
-#include <string.h>
 
 #define RADIUS       0.004675 /* rad, of the kind `sun` */
 #define SURFACES_MAX 64       /* panes behind each other */
@@ -179,7 +178,7 @@ static double weight(const struct imp_sensor *s, const struct imp_frame *frame, 
 
 /* Points of the disc that cover it evenly: rings of one area, a golden angle apart. Each is
  * uniform on the disc when all are turned and shifted by u. */
-enum { RAYS = IMP__GROUPS / 2 };
+enum { RAYS = IMP__SUN_RAYS };
 struct disc {
     double across[RAYS][2], along[RAYS];
 };
@@ -208,19 +207,23 @@ struct direct {
     struct imp_surface at;
     struct imp_frame frame;
     double by; /* what the sensor weighs the sun with; 0: none comes */
-    /* What has hidden suns of a fixed point, the last CURTAINS. */
+    /* What has hidden suns of a fixed point, the last CURTAINS, and which of them hid one last. */
     struct curtain curtain[CURTAINS];
-    unsigned curtains;
+    unsigned curtains, last;
 };
 
 /* Does one of them hide the sun in direction w? */
-static bool is_hidden(const struct direct *d, imp_v3 w)
+static bool is_hidden(struct direct *d, imp_v3 w)
 {
     const unsigned n = imp_min(d->curtains, (unsigned)CURTAINS);
     if (n == 0) return false;
     const imp_v3 o = imp__offset(d->at.p, d->at.ng, w); /* as rays begin */
-    for (unsigned k = 1; k <= n; k++)
-        if (hides(&d->curtain[(d->curtains - k) % CURTAINS], o, w)) return true;
+    if (hides(&d->curtain[d->last], o, w)) return true;
+    for (unsigned k = 0; k < n; k++)
+        if (k != d->last && hides(&d->curtain[k], o, w)) {
+            d->last = k;
+            return true;
+        }
     return false;
 }
 
@@ -230,7 +233,8 @@ static bool hides_all(struct direct *d, const struct imp_hit *hit, imp_v3 o, imp
     struct curtain c;
     if (hit->shape < 0 || !curtain_of(d->a->scene, hit, &c) || !hides(&c, o, w))
         return false;
-    d->curtain[d->curtains++ % CURTAINS] = c;
+    d->last = d->curtains++ % CURTAINS;
+    d->curtain[d->last] = c;
     return true;
 }
 
@@ -279,8 +283,8 @@ static void rays_bring(struct direct *d, const struct imp_frame *sun,
     }
 }
 
-void imp__annual_direct(const struct imp__annual *a, int x, int y,
-                        struct imp__annual_at *at)
+size_t imp__annual_direct(const struct imp__annual *a, int x, int y,
+                          struct imp__annual_sunlit *out)
 {
     enum { DISCS = 64 };
     const struct imp__annual_hours *h = &a->hours;
@@ -298,15 +302,19 @@ void imp__annual_direct(const struct imp__annual *a, int x, int y,
     }
     const struct imp_key looks = imp__key(a->tracer.seed, d.pixel, UINT64_MAX - 1);
     place_draw(a, x, y, imp__key(a->tracer.seed, d.pixel, UINT64_MAX), &d.at, &d.frame);
-    memset(at->S, 0, h->blocks * sizeof *at->S);
+    size_t n = 0;
     for (size_t k = 0; k < h->n; k++) {
-        imp__annual_lanes *S = at->S[k / IMP__AT_ONCE];
-        const size_t lane = k % IMP__AT_ONCE;
         double brings[RAYS];
         if (!(h->sun[k] > 0) || is_hidden(&d, h->to_sun[k])) continue;
         const struct imp_frame sun = imp__frame_from_normal(h->to_sun[k]);
         rays_bring(&d, &sun, &disc[k % DISCS], k, imp__u01(looks, (uint32_t)k), brings);
-        for (int g = 0; g < RAYS; g++)
-            S[g][lane] = S[g + RAYS][lane] = (float)(h->sun[k] * brings[g]);
+        bool any = false;
+        for (int g = 0; g < RAYS; g++) {
+            out[n].light[g] = (float)(h->sun[k] * brings[g]);
+            any |= out[n].light[g] != 0;
+        }
+        out[n].hour = k;
+        n += any;
     }
+    return n;
 }

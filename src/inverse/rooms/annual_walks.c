@@ -123,12 +123,32 @@ static int64_t sample_of(const struct imp__annual *a, int g, int64_t i)
     return g * sets * IMP_SET_POINTS + i;
 }
 
+/* What comes from patches to group g. */
+static bool parts_keep(struct imp__annual_worker *w, double each, int g,
+                       struct imp__annual_at *at)
+{
+    struct imp__annual_part part[IMP__PATCHES];
+    int n = 0;
+    for (int p = 0; p < IMP__PATCHES; p++) {
+        const float C = (float)(w->C_sum[p] * each);
+        if (C != 0) part[n++] = (struct imp__annual_part){.C = C, .patch = p};
+    }
+    struct imp__annual_part *kept = imp__arena_take(&w->keep, (size_t)n, sizeof *kept);
+    if (!kept) return false;
+    memcpy(kept, part, (size_t)n * sizeof *kept);
+    at->part[g] = kept;
+    at->parts[g] = n;
+    return true;
+}
+
 enum imp_status imp__annual_walks(const struct imp__annual *a, int x, int y,
                                   struct imp__annual_worker *w, struct imp__annual_at *at)
 {
     struct walk_job j = {.a = a, .w = w, .mono = a->scene->mode == IMP_MONO};
     struct imp_walk walk;
     const double each = 1 / (double)a->walks;
+    at->I = imp__arena_take(&w->keep, (size_t)a->hours.n_cells + 1, sizeof *at->I);
+    if (!at->I) return IMP_E_NOMEM;
     for (int g = 0; g < IMP__GROUPS; g++) {
         memset(w->C_sum, 0, IMP__PATCHES * sizeof *w->C_sum);
         memset(w->I_sum, 0, IMP__PATCHES * sizeof *w->I_sum);
@@ -151,9 +171,9 @@ enum imp_status imp__annual_walks(const struct imp__annual *a, int x, int y,
             imp__arena_rewind(&w->arena, mark);
             if (j.st != IMP_OK) return j.st;
         }
-        for (int p = 0; p < IMP__PATCHES; p++) at->C[p][g] = (float)(w->C_sum[p] * each);
         for (int c = 0; c < a->hours.n_cells; c++)
             at->I[c][g] = (float)(w->I_sum[c] * each);
+        if (!parts_keep(w, each, g, at)) return IMP_E_NOMEM;
     }
     return IMP_OK;
 }
