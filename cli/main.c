@@ -131,13 +131,15 @@ int cli_run_command(int argc, char **argv)
     return rc;
 }
 
-/* A check or a fit makes hundreds of pictures of the same size. What one frees stays with
- * the process for the next; else glibc gives it back and takes it again, and the page
- * faults cost 4 % of a check. */
+/* A check or a fit makes hundreds of pictures of the same size, and a large scene is read through
+ * arrays that are released before the next ones are made. What one frees stays with the process for the
+ * next; else glibc gives it back and takes it again, and the page faults, with pages that the system
+ * clears, cost 4 % of a check and 6 to 9 % of the reading of a room of 100,000 polygons. */
 static void memory_keep(void)
 {
 #ifdef __GLIBC__
     mallopt(M_TRIM_THRESHOLD, 4 << 20);
+    mallopt(M_MMAP_THRESHOLD, 32 << 20); /* the most that it takes */
 #endif
 }
 
