@@ -48,6 +48,30 @@ imp_v3 imp__sun_direction(const struct imp__sun_date *d)
     return imp__v3(-cos(azimuth) * sin(seen), -sin(azimuth) * sin(seen), cos(seen));
 }
 
+static int days_of(int year, int month)
+{
+    static const int days[] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
+    const bool leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
+    return days[month - 1] + (month == 2 && leap);
+}
+
+/* Clocks are up to three hours from the sun's, in the west of China and, by summer time, of
+ * Alaska. */
+#define CLOCK_OFF_MOST 3.5
+static void clock_check(const struct imp_build *b, const struct imp__sun_date *d)
+{
+    const double off = remainder(d->timezone - d->longitude / 15, 24);
+    if (fabs(off) <= CLOCK_OFF_MOST) return;
+    char where[512];
+    imp__warn(
+        b->ctx,
+        "%s: emitter '%s' (%s): clocks of time zone %g are %.2g hours %s the sun of "
+        "longitude %g: do they belong together?",
+        imp__loc_text(b->node->loc, where, sizeof where), b->node->id ? b->node->id : "",
+        b->node->type, d->timezone, fabs(off), off > 0 ? "ahead of" : "behind",
+        d->longitude);
+}
+
 static enum imp_status date_read(const struct imp_build *b, imp_v3 *sun)
 {
     enum imp_status st = IMP_OK;
@@ -68,6 +92,10 @@ static enum imp_status date_read(const struct imp_build *b, imp_v3 *sun)
     d.year = (int)year;
     d.month = (int)month;
     d.day = (int)day;
+    if (d.day > days_of(d.year, d.month))
+        IMP_TRY(imp_build_error(b, "day", IMP_E_SCENE, "month %d of %d has no day %d",
+                                d.month, d.year, d.day));
+    clock_check(b, &d);
     *sun = imp__sun_direction(&d);
 out:
     return st;

@@ -46,3 +46,10 @@ cat >night.xml <<'X'
 <shape type="rectangle"><sensor type="irradiancemeter" id="grid"/></shape></scene>
 X
 importon read night.xml -m mono >/dev/null
+# Days that no month has; places and clocks that do not belong together: the time zone was forgotten.
+sed 's/"month" value="12"/"month" value="2"/; s/"day" value="21"/"day" value="30"/' night.xml >day.xml
+importon read day.xml -m mono
+sed 's/<float name="timezone" value="1"\/>//; s/"hour" value="22"/"hour" value="18"/' night.xml >zone.xml
+importon read zone.xml -m mono >/dev/null
+sed 's/"longitude" value="10"/"longitude" value="-100"/; s/"timezone" value="1"/"timezone" value="-6"/; s/"hour" value="22"/"hour" value="12"/' night.xml >right.xml
+importon read right.xml -m mono >/dev/null
