@@ -7,6 +7,7 @@
 #include "film/film_integrator.h"
 #include "load.h"
 #include "luminaire_files.h"
+#include "luminaire_openings.h"
 #include "search.h"
 #include "setting_lines.h"
 #include "tree.h"
@@ -77,6 +78,7 @@ enum imp_status imp__scene_finish(struct imp_scene *scene)
 {
     enum imp_status st = imp__survey(scene);
     if (st == IMP_OK) st = imp__files_attach(scene);
+    if (st == IMP_OK) st = imp__luminaire_openings_make(scene);
     if (st == IMP_OK) given_count(scene->root);
     if (st == IMP_OK) st = imp__scene_build(scene, imp__integrator_kinds);
     if (st == IMP_OK) st = imp__graded_finish(scene);
