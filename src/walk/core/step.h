@@ -159,7 +159,8 @@ bool imp__sensor_vertex(struct imp_step *s);
  * surface, whose vertex comes first. */
 void imp__walk_on(struct imp_step *s);
 void imp__walk_on_meter(struct imp_step *s);
-void imp__walk_on_hit(struct imp_step *s, struct imp_hit *hit); /* which the ray has */
+/* From a hit that the ray has, as of imp__walk_along. */
+void imp__walk_on_hit(struct imp_step *s, struct imp_hit *hit, imp_v3 along);
 /* What is scattered at point p of a medium back along s->d: a walk of its own, that
  * begins with a copy of s; its walk is empty. */
 imp_spec imp__walk_scattered(struct imp_step *s, const struct imp_bsdf *scatterer,

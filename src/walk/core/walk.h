@@ -300,11 +300,13 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
 
 /* A walk with these random numbers that begins with a given ray, of these wavelengths (NULL: of
  * colours), in this medium; `depth` vertices of a path lie before it. hit: what the ray meets; NULL: it
- * is traced. */
+ * is traced. along: of such a hit, the direction to which the frame is turned about its normal; 0: it
+ * stays. */
 void imp__walk_along(const struct imp_tracer *tracer, struct imp_arena *arena,
                      struct imp_key key, const struct imp_sensor_ray *ray,
                      const struct imp_waves *waves, int depth, struct imp_hit *hit,
-                     const struct imp_medium *medium, struct imp_walk *walk);
+                     imp_v3 along, const struct imp_medium *medium,
+                     struct imp_walk *walk);
 
 /* Nothing yet; its key, film position, point and time are set behind this. Field by field, as
  * compilers clear structs of this size by an instruction that takes 2 % of a walk. */

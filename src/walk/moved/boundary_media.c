@@ -74,12 +74,22 @@ imp_spec imp__edge_unclipped(const struct imp__edge_draw *d,
     return imp__edge_uncleared(d, to->p, -to->wo, imp__edge_clip(d, to));
 }
 
+/* The two sides of a crease scatter with the same random numbers. Where the frames of both have the
+ * edge for an axis, the directions that they draw differ by the crease's angle alone. */
+static imp_v3 frame_along(const struct imp__edge_draw *d, const struct imp_hit *hit)
+{
+    const bool turns =
+        d->edge && imp__is_lambertian(imp__hit_bsdf(d->b->tracer->scene, hit));
+    return turns ? d->along : (imp_v3){0};
+}
+
 void imp__edge_walk(struct imp__edge_draw *d, const struct imp_sensor_ray *ray,
                     int before, struct imp_hit *hit, struct imp_walk *walk)
 {
     const imp_v3 o = ray->o + ray->d * (hit ? hit->t * (1 - IMP_BESIDE) : ray->t_near);
     imp__walk_along(imp__edge_tracer(d), d->arena, imp__key_branch(d->key, 0, 1), ray,
-                    d->waves, before, hit, imp__edge_medium(d, o, ray->d), walk);
+                    d->waves, before, hit, hit ? frame_along(d, hit) : (imp_v3){0},
+                    imp__edge_medium(d, o, ray->d), walk);
 }
 
 /* ---- Borders ---------------------------------------------------------------------------- */

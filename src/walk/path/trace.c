@@ -75,12 +75,27 @@ void imp__walk_on_meter(struct imp_step *s)
     imp__walk_on(s);
 }
 
-void imp__walk_on_hit(struct imp_step *s, struct imp_hit *hit)
+/* Turns the frame of v about its normal. */
+static void frame_turn(struct imp_step *s, struct imp_vertex *v, imp_v3 along,
+                       struct imp_surface *at, struct imp_frame *frame)
+{
+    const imp_v3 in_plane = along - frame->n * imp__dot(frame->n, along);
+    const double length = imp__length(in_plane);
+    if (!(length > 0)) return;
+    frame->s = at->s = in_plane * (1 / length);
+    frame->t = at->t = imp__cross(frame->n, frame->s);
+    s->wo_drawn = imp__to_local(frame, -s->d);
+    s->wo = imp__decide(s->wo_drawn);
+    if (s->recorded) imp__store_v3(v->d.wo, s->wo);
+}
+
+void imp__walk_on_hit(struct imp_step *s, struct imp_hit *hit, imp_v3 along)
 {
     struct imp_surface at;
     struct imp_frame frame;
     imp__step_numbers(s);
     struct imp_vertex *v = imp__surface_meet(s, hit, &at, &frame);
+    if (v && !imp__is_zero(along)) frame_turn(s, v, along, &at, &frame);
     if (!v || !imp__end_arrive(s, v, hit, &at, &frame) ||
         !imp__vertex_work(&sensor_end, s, v, hit, &at, &frame))
         return;

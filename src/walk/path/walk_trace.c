@@ -179,7 +179,7 @@ void imp__step_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
 void imp__walk_along(const struct imp_tracer *tracer, struct imp_arena *arena,
                      struct imp_key key, const struct imp_sensor_ray *ray,
                      const struct imp_waves *waves, int depth, struct imp_hit *hit,
-                     const struct imp_medium *medium, struct imp_walk *walk)
+                     imp_v3 along, const struct imp_medium *medium, struct imp_walk *walk)
 {
     imp_spec scratch[IMP_INPUTS_MAX];
     struct imp_step s;
@@ -196,7 +196,7 @@ void imp__walk_along(const struct imp_tracer *tracer, struct imp_arena *arena,
     s.depth = depth;
     if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s)) {
         s.flight.medium = s.flight.here = medium;
-        if (hit) imp__walk_on_hit(&s, hit);
+        if (hit) imp__walk_on_hit(&s, hit, along);
         else imp__walk_on(&s);
     }
     walk_close(tracer, walk);
