@@ -3,7 +3,6 @@
  * One tile in one pass: the samples of its pixels, one by one or in bundles, and what they
  * add to the sums of pixels, of sets and of patches. */
 #include "film_pass.h"
-#include <float.h>
 #include <string.h>
 
 /* A picture holds floats. */
@@ -15,18 +14,7 @@ static IMP_COLD enum imp_drop cause_of(const double *value, int n)
 }
 static inline enum imp_drop beyond_float(const double *value, int n)
 {
-    bool fine = true;
-    for (int c = 0; c < n; c++) fine &= fabs(value[c]) <= FLT_MAX;
-    return imp_likely(fine) ? IMP_DROP_NONE : cause_of(value, n);
-}
-
-/* Sums of n values and of their squares. */
-static inline void box_add(const double *restrict value, int n, double *restrict sums)
-{
-    for (int c = 0; c < n; c++) {
-        sums[2 * c] += value[c];
-        sums[2 * c + 1] += value[c] * value[c];
-    }
+    return imp_likely(imp__fits_float(value, n)) ? IMP_DROP_NONE : cause_of(value, n);
 }
 
 static void sample_take(const struct imp_passes *r, struct imp_tile_worker *w,
@@ -154,7 +142,7 @@ enum imp_status imp__pass_work(const struct imp_tile *t, struct imp_tile_worker 
                 imp__patch_splat(&r->patch, t, patch, &s);
                 continue;
             }
-            box_add(s.value, n, own);
+            imp__box_add(s.value, n, own);
         }
         if (r->patch.border > 0)
             imp__patch_add(&r->patch, t, patch, s.x, s.y, r->set > 1 ? n_sets : s1 - s0,

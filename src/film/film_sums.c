@@ -139,6 +139,16 @@ static float error_of(double freedom, double W, double spread)
                : INFINITY;
 }
 
+float imp__box_mean(double sum, double W) { return (float)(W != 0 ? sum / W : 0); }
+
+float imp__box_error(double sum, double square, double W, double q)
+{
+    const double all = W != 0 ? sum : 0, mean = W != 0 ? sum / W : 0;
+    const double spread =
+        (W != 0 ? square : 0) - 2 * (q * mean) * all + q * mean * mean * W;
+    return error_of(freedom_of(false, W, W * q), W, spread);
+}
+
 static enum imp_status not_finite(const imp_film *film, size_t pixel, int channel)
 {
     return imp__error(film->ctx, IMP_E_NUMERIC,
@@ -158,17 +168,13 @@ static enum imp_status box_row(size_t item, int worker, int slot, void *payload)
     for (size_t x = 0; x < (size_t)s->width; x++) {
         const size_t pixel = y * (size_t)s->width + x;
         const double W = count[x / (size_t)s->side], q = s->set;
-        const double freedom = freedom_of(false, W, W * q);
         if (f->weights) f->weights[pixel] = W;
         for (size_t k = pixel * C; k < (pixel + 1) * C; k++) {
-            const double sum = W != 0 ? s->sum[f->film][k] : 0;
-            const double mean = W != 0 ? sum / W : 0;
             if (f->errors) {
-                const double square = W != 0 ? s->square[f->film][k] : 0;
-                const double spread = square - 2 * (q * mean) * sum + q * mean * mean * W;
-                film->se[k] = error_of(freedom, W, spread);
+                film->se[k] =
+                    imp__box_error(s->sum[f->film][k], s->square[f->film][k], W, q);
             } else {
-                film->mean[k] = (float)mean;
+                film->mean[k] = imp__box_mean(s->sum[f->film][k], W);
                 if (!isfinite(film->mean[k]))
                     return not_finite(film, pixel, (int)(k - pixel * C));
             }

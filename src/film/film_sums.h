@@ -28,6 +28,7 @@
 #include "base/film.h"
 #include "film_filter.h"
 #include "film_tiles.h"
+#include <float.h>
 
 struct imp_film_sums {
     imp_context *ctx;
@@ -69,5 +70,28 @@ enum imp_status imp__film_sums_finish(struct imp_film_sums *s, bool strata,
 /* The same of what is there so far, into films with room for both; the sums stay. */
 enum imp_status imp__film_sums_look(struct imp_film_sums *s, bool strata,
                                     imp_film **films);
+
+/* ---- A pixel of a box filter ---------------------------------------------------------- */
+
+/* Can a picture, of floats, hold them? Else their walk is dropped. */
+static inline bool imp__fits_float(const double *value, int n)
+{
+    bool fine = true;
+    for (int c = 0; c < n; c++) fine &= fabs(value[c]) <= FLT_MAX;
+    return fine;
+}
+/* Sums of n values and of their squares, [n][2]. */
+static inline void imp__box_add(const double *restrict value, int n,
+                                double *restrict sums)
+{
+    for (int c = 0; c < n; c++) {
+        sums[2 * c] += value[c];
+        sums[2 * c + 1] += value[c] * value[c];
+    }
+}
+/* The mean of W samples and its error, of the sums of a value and its squares; of W sums of q samples the
+ * same per sample. */
+float imp__box_mean(double sum, double W);
+float imp__box_error(double sum, double square, double W, double q);
 
 #endif

@@ -39,25 +39,27 @@ enum imp_status imp__moved_adjoint_fixed(imp_context *ctx,
 
 enum imp_status imp__moved_adjoint_loss(imp_context *ctx,
                                         const struct imp_film_desc *film, int channels,
-                                        const struct imp__splat *splat, int R,
-                                        int contrasts, struct imp__moved_adjoint *out)
+                                        int R, int contrasts,
+                                        struct imp__moved_adjoint *out)
 {
-    const size_t C = (size_t)channels;
     IMP_CHECKED(create(ctx, film, channels, R / 2, out));
     out->contrasts = contrasts;
-    const size_t n = values_of(out);
+    return IMP_OK;
+}
+
+void imp__moved_adjoint_read(struct imp__moved_adjoint *a, const struct imp__splat *splat)
+{
+    const size_t C = (size_t)a->channels, n = values_of(a);
     for (size_t p = 0; p < n / C && splat->n > 0; p++) {
         const imp_spec mean = imp__splat_pixel(splat, -1, p);
-        for (size_t c = 0; c < C; c++) out->image[p * C + c] = mean[c];
-        for (int q = 0; q < out->pairs; q++) {
+        for (size_t c = 0; c < C; c++) a->image[p * C + c] = mean[c];
+        for (int q = 0; q < a->pairs; q++) {
             const imp_spec apart = (imp__splat_pixel(splat, 2 * q, p) -
                                     imp__splat_pixel(splat, 2 * q + 1, p)) *
-                                   (1. / R);
-            for (size_t c = 0; c < C; c++)
-                out->apart[(size_t)q * n + p * C + c] = apart[c];
+                                   (0.5 / a->pairs);
+            for (size_t c = 0; c < C; c++) a->apart[(size_t)q * n + p * C + c] = apart[c];
         }
     }
-    return IMP_OK;
 }
 
 void imp__moved_adjoint_free(struct imp__moved_adjoint *a)

@@ -41,16 +41,18 @@ struct imp__moved_adjoint {
 };
 
 /* Adjoints of a fixed image, [crop_h][crop_w][channels], and of the pictures of a loss's R
- * replicates, an even number (a merge of parts, which makes no draw, has no pictures: splat->n
- * 0). Either is ended by imp__moved_adjoint_free. IMP_E_NOMEM. */
+ * replicates, an even number, which may be there later: `read` takes them (a merge of parts, which makes
+ * no draw, has none: splat->n 0). Either is ended by imp__moved_adjoint_free. IMP_E_NOMEM. */
 enum imp_status imp__moved_adjoint_fixed(imp_context *ctx,
                                          const struct imp_film_desc *film, int channels,
                                          const float *image,
                                          struct imp__moved_adjoint *out);
 enum imp_status imp__moved_adjoint_loss(imp_context *ctx,
                                         const struct imp_film_desc *film, int channels,
-                                        const struct imp__splat *splat, int R,
-                                        int contrasts, struct imp__moved_adjoint *out);
+                                        int R, int contrasts,
+                                        struct imp__moved_adjoint *out);
+void imp__moved_adjoint_read(struct imp__moved_adjoint *a,
+                             const struct imp__splat *splat);
 void imp__moved_adjoint_free(struct imp__moved_adjoint *a);
 
 /* Signs of pixel (x, y), also of one in the margin, and of a pair: bit m of contrast m. */

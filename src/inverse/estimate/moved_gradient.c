@@ -283,7 +283,7 @@ static bool draws_add(const struct draws *d, struct imp_arena *arena,
 }
 
 bool imp__moved_replicate(const struct imp__moved_gradient *m, struct imp_arena *arena,
-                          struct imp__replicates plan, int x, int y, int b,
+                          struct imp__replicates plan, int x, int y, int b, bool draws,
                           double *inside, double *contrasts, struct imp_sink *sink)
 {
     const size_t n = m->moves.n, part = (size_t)m->adjoint.contrasts * n;
@@ -293,7 +293,7 @@ bool imp__moved_replicate(const struct imp__moved_gradient *m, struct imp_arena 
         d.half[0] = contrasts + part;
         d.half[1] = contrasts + 2 * part;
     }
-    if (!draws_add(&d, arena, plan, x, y, b)) return false;
+    if (draws && !draws_add(&d, arena, plan, x, y, b)) return false;
     const uint64_t signs = contrasts ? imp__contrast_signs(&m->adjoint, x, y, b / 2) : 0;
     const double share = contrasts ? (b % 2 ? -0.5 : 0.5) / m->adjoint.pairs : 0;
     for (size_t e = 0; e < n; e++) {

@@ -73,11 +73,11 @@ static inline size_t imp__moved_contrasts(const struct imp__moved_gradient *m)
     return m && m->adjoint.pairs > 0 ? 3 * (size_t)m->adjoint.contrasts * m->moves.n : 0;
 }
 /* Replicate b of pixel (x, y), of plan.n walks, which gave `inside` [IMP_MOVED_BARS][moves.n], the
- * first row of which is theirs: adds that and its draws to the sink, and to the contrasts (NULL: a
+ * first row of which is theirs: adds that and, if `draws`, its draws to the sink, and to the contrasts (NULL: a
  * fixed adjoint). The other rows are 0 before, all are behind it. False: no memory. */
 #define IMP_MOVED_BARS 3
 bool imp__moved_replicate(const struct imp__moved_gradient *m, struct imp_arena *arena,
-                          struct imp__replicates plan, int x, int y, int b,
+                          struct imp__replicates plan, int x, int y, int b, bool draws,
                           double *inside, double *contrasts, struct imp_sink *sink);
 /* Adds the draws of replicate b of pixel (x, y) to bar [moves.n], of several replicates; velocity
  * [moves.n] is 0 before and after. False: no memory. */

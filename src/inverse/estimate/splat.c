@@ -4,6 +4,7 @@
  * part left out (splat.h). */
 #include "splat.h"
 #include "film/film_picture.h"
+#include "film/film_sums.h"
 #include "film/film_tiles.h"
 #include "inverse/problem/loss.h"
 #include "inverse/problem/target_channels.h"
@@ -129,6 +130,40 @@ static double loss_variance(const struct imp__splat *s, int R)
     return imp__overlap_variance(overlap.loss, overlap.few, pixels, tiles);
 }
 
+static size_t pixels_of(const struct imp__splat *s)
+{
+    return (size_t)s->film->crop_w * (size_t)s->film->crop_h;
+}
+static const char *names_of(int channels) { return channels == 3 ? "R,G,B" : "Y"; }
+
+/* Weights, and room for films. Ended by imp__splat_destroy, also after a failure. */
+static enum imp_status begin(const struct imp_problem *p, const struct imp_tracer *tracer,
+                             const struct imp__target *target, const float *seed,
+                             struct imp__replicates plan, struct imp__splat *s)
+{
+    *s = (struct imp__splat){.target = target,
+                             .seed = seed,
+                             .film = &tracer->sensor->film,
+                             .channels = p->scene->channels,
+                             .m = target && plan.m < plan.n ? plan.m : 1};
+    s->n = plan.R * s->m;
+    s->weights = imp__alloc(p->ctx, (size_t)s->n, sizeof *s->weights);
+    s->films = imp__alloc(p->ctx, (size_t)s->n, sizeof *s->films);
+    bool fine = s->weights && s->films;
+    for (int k = 0; k < s->n && fine; k++) {
+        s->weights[k] = imp__alloc(p->ctx, pixels_of(s), sizeof **s->weights);
+        fine = s->weights[k];
+    }
+    return fine ? IMP_OK : imp__error(p->ctx, IMP_E_NOMEM, "no memory");
+}
+
+static double replicate_loss(const struct imp__splat *s, int b)
+{
+    double value = 0;
+    for (size_t p = 0; p < pixels_of(s); p++) pixel_loss(s, b, p, &value);
+    return value;
+}
+
 enum imp_status imp__splat_create(const struct imp_problem *p,
                                   const struct imp_tracer *tracer,
                                   const struct imp__target *target, const float *seed,
@@ -137,22 +172,12 @@ enum imp_status imp__splat_create(const struct imp_problem *p,
 {
     imp_context *ctx = p->ctx;
     enum imp_status st = IMP_OK;
-    struct imp__splat s = {.target = target,
-                           .seed = seed,
-                           .film = &tracer->sensor->film,
-                           .channels = p->scene->channels,
-                           .m = target && plan.m < plan.n ? plan.m : 1};
+    struct imp__splat s;
     const bool one_by_one = plan.m == plan.n;
-    const size_t pixels = (size_t)s.film->crop_w * (size_t)s.film->crop_h;
     double sum = 0;
-    s.n = plan.R * s.m;
-    s.weights = imp__alloc(ctx, (size_t)s.n, sizeof *s.weights);
-    s.films = imp__alloc(ctx, (size_t)s.n, sizeof *s.films);
-    if (!s.weights || !s.films) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
+    IMP_TRY(begin(p, tracer, target, seed, plan, &s));
     for (int k = 0; k < s.n; k++) {
         const int b = k / s.m, set = k % s.m;
-        s.weights[k] = imp__alloc(ctx, pixels, sizeof **s.weights);
-        if (!s.weights[k]) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
         struct imp_run own = *run;
         own.spp = plan.n;
         if (s.m > 1)
@@ -164,7 +189,7 @@ enum imp_status imp__splat_create(const struct imp_problem *p,
         const struct imp_picture picture = {
             .sensor = tracer->sensor,
             .stage = "picture",
-            .names = n == 3 ? "R,G,B" : "Y",
+            .names = names_of(n),
             .n = n,
             .sample = target ? sample_radiance : sample_position,
             .payload = tracer,
@@ -174,9 +199,7 @@ enum imp_status imp__splat_create(const struct imp_problem *p,
             .walks = target ? imp__bundle_use(tracer) : NULL};
         IMP_TRY(imp__picture_make(ctx, &picture, &own, &s.films[k]));
         if (!target || set < s.m - 1) continue;
-        double value = 0;
-        for (size_t p = 0; p < pixels; p++) pixel_loss(&s, b, p, &value);
-        sum += value;
+        sum += replicate_loss(&s, b);
     }
     s.objective = sum / plan.R;
     if (target) s.objective_variance = loss_variance(&s, plan.R);
@@ -184,6 +207,48 @@ enum imp_status imp__splat_create(const struct imp_problem *p,
 out:
     if (st != IMP_OK) imp__splat_destroy(ctx, &s);
     return st;
+}
+
+/* ---- Pictures that are made as walks go ---------------------------------------------- */
+
+enum imp_status imp__splat_begin(const struct imp_problem *p,
+                                 const struct imp_tracer *tracer,
+                                 const struct imp__target *target,
+                                 struct imp__replicates plan, struct imp__splat *out)
+{
+    enum imp_status st = begin(p, tracer, target, NULL, plan, out);
+    for (int k = 0; k < out->n && st == IMP_OK; k++)
+        st = imp__film_create(p->ctx, out->film->crop_w, out->film->crop_h,
+                              names_of(out->channels), true, &out->films[k]);
+    if (st != IMP_OK) imp__splat_destroy(p->ctx, out);
+    return st;
+}
+
+void imp__splat_take(const struct imp__splat *s, int b, int set, size_t pixel, int n,
+                     const struct imp_walk *walks)
+{
+    const int k = s->m > 1 ? b * s->m + set : b;
+    double sums[2 * 3] = {0};
+    for (int i = 0; i < n; i++) {
+        double value[3];
+        for (int c = 0; c < s->channels; c++) value[c] = walks[i].L[c];
+        if (imp_likely(imp__fits_float(value, s->channels)))
+            imp__box_add(value, s->channels, sums);
+    }
+    s->weights[k][pixel] = n;
+    for (int c = 0; c < s->channels; c++) {
+        const size_t at = pixel * (size_t)s->channels + (size_t)c;
+        s->films[k]->mean[at] = imp__box_mean(sums[2 * c], n);
+        s->films[k]->se[at] = imp__box_error(sums[2 * c], sums[2 * c + 1], n, 1);
+    }
+}
+
+void imp__splat_end(struct imp__splat *s, struct imp__replicates plan)
+{
+    double sum = 0;
+    for (int b = 0; b < plan.R; b++) sum += replicate_loss(s, b);
+    s->objective = sum / plan.R;
+    s->objective_variance = loss_variance(s, plan.R);
 }
 
 void imp__splat_destroy(imp_context *ctx, struct imp__splat *s)

@@ -107,7 +107,7 @@ static enum imp_status pixels_work(const struct imp_tile *t, struct imp_tile_wor
     const int b0 = imp__replicates_begin(plan, (int)t->part);
     const int b1 = imp__replicates_begin(plan, (int)t->part + 1);
     struct imp__tile_walks walks = {.bundled = false};
-    if (!i->job->light)
+    if (!i->job->light && i->job->of != IMP_JOB_OF_DRAWS)
         imp__tile_walks_begin(&i->job->tracer, t, w, plan, b0, b1, plan.n, counts, i->job,
                               &walks);
     for (int y = t->y0; y < t->y1; y++)

@@ -20,6 +20,10 @@
 struct imp__allocation;
 struct imp__moved_gradient;
 
+/* What a job with poses is of: a fixed adjoint is known before, that of draws in a loss when all walks
+ * are there. */
+enum imp__job_of { IMP_JOB_OF_ALL, IMP_JOB_OF_WALKS, IMP_JOB_OF_DRAWS };
+
 struct imp__gradient_job {
     const struct imp_problem *problem;
     struct imp__totals *totals;
@@ -27,7 +31,9 @@ struct imp__gradient_job {
     struct imp__replicates plan;
     const struct imp__target *target; /* NULL: fixed adjoint */
     const float *seed;                /* fixed adjoint image, [h][w][channels] */
-    const struct imp__splat *splat;   /* wide filters: pass 2; NULL: box */
+    const struct imp__splat *splat;   /* wide filters and poses: pictures; else NULL */
+    bool splat_made; /* its pictures are there; else they are made of this job's walks */
+    enum imp__job_of of;
     /* Adjoints in light tracing; NULL: walks begin at the sensor. */
     const struct imp__light_adjoints *light;
     const struct imp__moved_gradient *moved; /* NULL: no pose is active */

@@ -52,6 +52,7 @@ static double *inside_begin(const struct replicate *r)
 static void inside_end(const struct replicate *r, double *inside)
 {
     const struct imp__gradient_job *j = r->job;
+    if (!j->bars_of_replicates && j->of == IMP_JOB_OF_WALKS) return;
     if (!j->bars_of_replicates) {
         r->worker->no_memory |=
             !imp__moved_draws(j->moved, &r->worker->arena, r->plan, r->x, r->y, r->b,
@@ -60,36 +61,70 @@ static void inside_end(const struct replicate *r, double *inside)
     }
     const size_t n = imp__moved_contrasts(j->moved);
     double *contrasts = n ? j->item_contrasts + (size_t)r->worker->index * n : NULL;
-    r->worker->no_memory |=
-        !imp__moved_replicate(j->moved, &r->worker->arena, r->plan, r->x, r->y, r->b,
-                              inside, contrasts, &r->tally->sink);
+    r->worker->no_memory |= !imp__moved_replicate(
+        j->moved, &r->worker->arena, r->plan, r->x, r->y, r->b, j->of != IMP_JOB_OF_WALKS,
+        inside, contrasts, &r->tally->sink);
+}
+
+/* A walk of a set, by its adjoint. */
+static void sweep_one(const struct replicate *r, int set, const struct imp_walk *walk,
+                      double *inside)
+{
+    const struct imp__gradient_job *j = r->job;
+    const bool moves = imp_unlikely(inside != NULL) && imp__moved_touched(j->moved, walk),
+               sweeps = imp_likely(!inside) || !j->moved->alone;
+    if (!moves && !sweeps) return;
+    const imp_spec P = adjoint_of(r, set, walk);
+    if (sweeps) imp__walk_sweep(&j->tracer, walk, P, &r->tally->sink);
+    if (moves)
+        r->worker->no_memory |=
+            !imp__moved_walk(j->moved, &r->worker->arena, walk, P, inside);
+}
+
+static int set_size(const struct replicate *r, int set)
+{
+    return imp__replicates_set(r->plan, set + 1) - imp__replicates_set(r->plan, set);
 }
 
 static void sweep_each(const struct replicate *r)
 {
     const struct imp__gradient_job *j = r->job;
     double *inside = inside_begin(r);
-    for (int s = 0; s < r->plan.m; s++) {
-        const int n =
-            imp__replicates_set(r->plan, s + 1) - imp__replicates_set(r->plan, s);
-        for (int i = 0; i < n; i++) {
+    for (int s = 0; s < r->plan.m && j->of != IMP_JOB_OF_DRAWS; s++)
+        for (int i = 0; i < set_size(r, s); i++) {
             const struct imp_arena_mark mark = imp__arena_mark(&r->worker->arena);
             struct imp_walk walk;
             trace(r, s, i, &walk);
-            const bool moves = imp_unlikely(inside != NULL) &&
-                               imp__moved_touched(j->moved, &walk),
-                       sweeps = imp_likely(!inside) || !j->moved->alone;
-            if (moves || sweeps) {
-                const imp_spec P = adjoint_of(r, s, &walk);
-                if (sweeps) imp__walk_sweep(&j->tracer, &walk, P, &r->tally->sink);
-                if (moves)
-                    r->worker->no_memory |=
-                        !imp__moved_walk(j->moved, &r->worker->arena, &walk, P, inside);
-            }
+            sweep_one(r, s, &walk, inside);
             imp__arena_rewind(&r->worker->arena, mark);
         }
-    }
     if (imp_unlikely(inside != NULL)) inside_end(r, inside);
+}
+
+/* The same of walks that are kept until the pictures have their pixel. */
+static void sweep_pictures(const struct replicate *r)
+{
+    const struct imp__splat *splat = r->job->splat;
+    double *inside = inside_begin(r);
+    struct imp_walk *walks =
+        imp__arena_take(&r->worker->arena, (size_t)r->plan.n, sizeof *walks);
+    if (!walks) {
+        r->worker->no_memory = true;
+        return;
+    }
+    for (int s = 0, k = 0; s < r->plan.m; s++)
+        for (int i = 0; i < set_size(r, s); i++) trace(r, s, i, &walks[k++]);
+    for (int s = 0; splat->m > 1 && s < r->plan.m; s++)
+        imp__splat_take(splat, r->b, s, r->pixel, set_size(r, s),
+                        walks + imp__replicates_set(r->plan, s));
+    if (splat->m == 1) imp__splat_take(splat, r->b, 0, r->pixel, r->plan.n, walks);
+    for (int s = 0; s < r->plan.m; s++)
+        for (int i = 0; i < set_size(r, s); i++) {
+            const struct imp_arena_mark mark = imp__arena_mark(&r->worker->arena);
+            sweep_one(r, s, &walks[imp__replicates_set(r->plan, s) + i], inside);
+            imp__arena_rewind(&r->worker->arena, mark);
+        }
+    if (inside) inside_end(r, inside);
 }
 
 /* ---- Adjoints made of residuals ----------------------------------------------------- */
@@ -187,10 +222,11 @@ double imp__gradient_replicate(struct imp__gradient_job *j, struct imp__replicat
         .b = b,
         .pixel = (size_t)y * (size_t)j->width + (size_t)x,
     };
-    imp__tile_walks_ready(walks);
+    if (j->of != IMP_JOB_OF_DRAWS) imp__tile_walks_ready(walks);
     const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
     double value = 0;
     if (j->target && !j->splat) value = sweep_residuals(&r, part, moments, variance);
+    else if (j->splat && !j->splat_made) sweep_pictures(&r);
     else sweep_each(&r);
     imp__tally_batch(r.tally, b);
     imp__arena_rewind(&w->arena, mark);

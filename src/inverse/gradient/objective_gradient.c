@@ -45,6 +45,7 @@ static enum imp_status splat_prepare(struct imp__gradient_job *j,
             IMP_TRY(imp__team_keep(ctx, value, sizeof value, &known));
     }
     j->splat = splat;
+    j->splat_made = true;
     j->totals->objective += value[0];
     j->totals->variance += value[1];
 out:
@@ -68,14 +69,32 @@ static void variance_add(struct imp__totals *t, size_t n, const double *more)
         else if (t->spread.sum && more[k] != 0) imp__fixed_add(&t->spread, k, more[k]);
 }
 
-/* The gradient of a target by poses too: adjoints from the pictures of pass 1, and errors from
- * contrasts (moved_adjoint.h). */
+/* One pass makes the pictures and sweeps the walks, which are kept for so long: a pixel's samples are
+ * its own, and few. Teams share pictures out in another way. */
+static bool goes_once(const struct imp__gradient_job *j)
+{
+    const int n = j->plan.m < j->plan.n ? (j->plan.n - 1) / j->plan.m + 1 : j->plan.n;
+    return imp__film_border(&j->tracer.sensor->film) == 0 && n <= IMP_SPLAT_SET &&
+           !j->tracer.kept && !j->problem->ctx->team && !j->totals->many;
+}
+
+/* Where it does, all walks; their pictures are made of them. */
+static enum imp_status once_prepare(struct imp__gradient_job *j, struct imp__splat *splat)
+{
+    IMP_CHECKED(imp__splat_begin(j->problem, &j->tracer, j->target, j->plan, splat));
+    j->splat = splat;
+    return IMP_OK;
+}
+
+/* The gradient of a target by poses too: adjoints from the pictures, and errors from
+ * contrasts (moved_adjoint.h). Of few numbers walks come before draws, whose adjoints are those of all
+ * walks. */
 static enum imp_status moved_estimate(struct imp__gradient_job *j,
                                       struct imp__moved_gradient *moved,
-                                      const struct imp__splat *splat,
-                                      const struct imp_run *run, double lo, double hi,
-                                      double start_s)
+                                      struct imp__splat *splat, const struct imp_run *run,
+                                      double lo, double hi, double start_s)
 {
+    const double half = (lo + hi) / 2;
     enum imp_status st = IMP_OK;
     imp_context *ctx = j->problem->ctx;
     const size_t n = j->problem->n;
@@ -85,21 +104,33 @@ static enum imp_status moved_estimate(struct imp__gradient_job *j,
     if (!before) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for errors"));
     variance_read(j->totals, n, before);
     IMP_TRY(imp__moved_adjoint_loss(ctx, &j->tracer.sensor->film,
-                                    j->problem->scene->channels, splat, j->plan.R,
+                                    j->problem->scene->channels, j->plan.R,
                                     errors            ? IMP_CONTRASTS_MANY
                                     : j->totals->many ? 0
                                                       : IMP_CONTRASTS,
                                     &moved->adjoint));
+    if (!j->totals->many || errors) {
+        j->contrasts = imp__alloc(ctx, imp__moved_contrasts(moved), sizeof *j->contrasts);
+        if (!j->contrasts) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for errors"));
+        memset(j->contrasts, 0, imp__moved_contrasts(moved) * sizeof *j->contrasts);
+    }
+    if (!j->totals->many) {
+        j->of = IMP_JOB_OF_WALKS;
+        IMP_TRY(imp__gradient_job_run(j, run, "gradient", lo, half, start_s));
+        j->of = IMP_JOB_OF_DRAWS;
+        lo = half;
+    }
+    if (!j->splat_made) {
+        imp__splat_end(splat, j->plan);
+        j->splat_made = true;
+        j->totals->objective += splat->objective;
+        j->totals->variance += splat->objective_variance;
+    }
+    imp__moved_adjoint_read(&moved->adjoint, splat);
     IMP_TRY(imp__moved_learn(moved, run->spp));
     imp__moved_share(moved);
-    if (j->totals->many && !errors) {
-        st = imp__gradient_job_run(j, run, "gradient", lo, hi, start_s);
-        goto out;
-    }
-    j->contrasts = imp__alloc(ctx, imp__moved_contrasts(moved), sizeof *j->contrasts);
-    if (!j->contrasts) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for errors"));
-    memset(j->contrasts, 0, imp__moved_contrasts(moved) * sizeof *j->contrasts);
     IMP_TRY(imp__gradient_job_run(j, run, "gradient", lo, hi, start_s));
+    if (j->totals->many && !errors) goto out;
     variance_read(j->totals, n, own);
     for (size_t k = 0; k < n; k++) own[k] -= before[k];
     IMP_TRY(imp__moved_variance(moved, j->tracer.active, j->contrasts, own, more));
@@ -166,7 +197,8 @@ static enum imp_status target_estimate(struct imp_problem *p,
         j.variate = imp__variate_use(p->variate, target, &j.tracer, &j.there);
     const bool moves = imp__problem_moves(p);
     if (moves && want_gradient) st = moved_begin(&j, number, &moved);
-    if (st == IMP_OK && (moves || imp__film_border(&j.tracer.sensor->film) > 0))
+    if (st == IMP_OK && j.moved && goes_once(&j)) st = once_prepare(&j, &splat);
+    else if (st == IMP_OK && (moves || imp__film_border(&j.tracer.sensor->film) > 0))
         st = splat_prepare(&j, &own, &splat);
     if (st == IMP_OK && j.moved)
         st = moved_estimate(&j, &moved, &splat, &own, lo, hi, start_s);

@@ -151,7 +151,7 @@ struct imp_problem {
     struct imp_arena measure_arena; /* of the measurement whose last fit this is */
 };
 
-/* Is some pose active? Then losses have two passes whatever the filter (splat.h). */
+/* Is some pose active? Then losses have pictures of replicates, whatever the filter (splat.h). */
 bool imp__problem_moves(const struct imp_problem *p);
 
 /* ---- tied_parameters.c ---- */
