@@ -161,6 +161,26 @@ static double noise_of(const struct pilot *x)
     return x->contrasts > 0 ? sum / x->contrasts : 0;
 }
 
+/* Where edges are more than the first draws, few of these see one that matters, and rare ones that bring
+ * much, above all of scattered light, none. Draws by what they have found tell second moments and the noise
+ * of light better. Moments are halved, as those of the best chances are (moment_after). */
+static void look_again(struct pilot *x, int64_t n)
+{
+    const size_t sums = 3 * (size_t)x->b->moves->n_movers * (size_t)x->contrasts;
+    struct imp__edge_draw d;
+    for (int h = 0; h < 2; h++)
+        for (size_t k = 0; k < sums; k++) x->noise[h][k] = 0;
+    for (int kind = 0; kind < IMP_BOUNDARY_KINDS; kind++) {
+        double sum = 0;
+        for (int64_t i = 0; i < n; i++) {
+            if (!look(x, (enum imp__boundary_kind)kind, 2 * n + i, n, (int)(i & 1), &d))
+                continue;
+            for (int k = 0; k < x->n_groups; k += 6) sum += square3(x->group + k);
+        }
+        x->b->moment[kind] = sum / (2.0 * (double)n);
+    }
+}
+
 /* Cells in place of the one of the beginning. */
 static enum imp_status cells_make(struct imp__boundary *b, int kind, int n)
 {
@@ -201,6 +221,8 @@ enum imp_status imp__boundary_learn(struct imp__boundary *b, int64_t draws,
         if (b->edges->n > 0) IMP_TRY(cells_make(b, kind, cells));
         kind_learn(&x, (enum imp__boundary_kind)kind, (int64_t)cells * LOOKS);
     }
+    if (contrasts > 0 && (size_t)cells * LOOKS < b->edges->n && !x.no_memory)
+        look_again(&x, (int64_t)cells * LOOKS);
     if (x.no_memory) st = imp__error(ctx, IMP_E_NOMEM, "no memory for edges");
     b->noise = noise_of(&x);
 out:
