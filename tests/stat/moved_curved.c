@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Derivatives by what moves, seen in mirrors that are balls, and through clear glass: a glowing disk on the
- * axis of a ball, as parallel rays along the axis see it; recorded walks (check's frozen rows);
+ * Derivatives by what moves, seen in mirrors that are balls or tubes, and through clear glass: a glowing disk
+ * on the axis of a ball, or a strip along a tube, as parallel rays across it see it; recorded walks (check's frozen rows);
  * imp_problem_reverse against central differences. What is refused. */
 #include "imp_check_rows.h"
 #include "mean_gradient.h"
@@ -34,10 +34,15 @@
     "<shape type='cube' id='pane'><transform name='to_world'><scale x='.7' y='.25' "     \
     "z='.5'/><rotate x='1' y='.3' z='1' angle='25'/><translate x='.3' y='-1.4' "         \
     "z='1.1'/></transform>" GLASS "</shape>"
-#define TUBE                                                                             \
-    "<shape type='cylinder' id='tube'><float name='radius' value='.2'/><point "          \
-    "name='p0' "                                                                         \
-    "x='-2' y='0' z='1'/><point name='p1' x='-2' y='0' z='2'/></shape>"
+#define TUBE(BSDF)                                                                       \
+    "<shape type='cylinder' id='tube'><float name='radius' value='.45'/><point "         \
+    "name='p0' value='0,0,-.6'/><point name='p1' value='0,0,.6'/><transform "            \
+    "name='to_world'><rotate x='1' y='.4' angle='50'/><translate x='.9' y='-.7' "        \
+    "z='1'/></transform>" BSDF "</shape>"
+#define POLE                                                                             \
+    "<shape type='cylinder' id='pole'><float name='radius' value='.2'/><point "          \
+    "name='p0' x='1.9' y='-.2' z='.3'/><point name='p1' x='1.7' y='.3' z='1.3'/>"        \
+    "<ref id='grey'/></shape>"
 
 static imp_scene *room_of(const char *rest, const char *grey)
 {
@@ -47,9 +52,11 @@ static imp_scene *room(const char *rest) { return room_of(rest, NULL); }
 
 /* ---- On an axis ---------------------------------------------------------------------------- */
 
-/* A ball of radius R at z; a disk of radius a at h, which glows towards the ball. */
+/* A ball of radius R at z; a disk of radius a at h, which glows towards the ball. Or, across the film, a tube,
+ * and a strip as wide as 2 a. Or a black ball, or tube, of radius a in its place, before a sky. */
 struct axis {
     double R, z, a, h;
+    bool tube, round;
 };
 
 /* Where parallel rays along -z, s from the axis, meet the plane of the disk, s again, over a mirror; through
@@ -58,6 +65,12 @@ static double mirror_meets(const struct axis *x, double s)
 {
     const double i = asin(s / x->R);
     return s + (x->h - x->z - x->R * cos(i)) * tan(2 * i);
+}
+/* How far they are from the middle of what is there, over a mirror. */
+static double mirror_passes(const struct axis *x, double s)
+{
+    const double i = asin(s / x->R);
+    return s * cos(2 * i) + (x->h - x->z - x->R * cos(i)) * sin(2 * i);
 }
 static double glass_meets(const struct axis *x, double s)
 {
@@ -93,7 +106,12 @@ static double root(double (*meets)(const struct axis *, double), const struct ax
 static double mirror_mean(const struct axis *x)
 {
     const double s = root(mirror_meets, x, x->a, 0, 0.7 * x->R);
-    return IMP_PI * s * s / 4;
+    return x->tube ? s : IMP_PI * s * s / 4;
+}
+static double shade_mean(const struct axis *x)
+{
+    const double s = root(mirror_passes, x, x->a, 0, 0.7 * x->R);
+    return 1 - (x->tube ? s : IMP_PI * s * s / 4);
 }
 static double glass_mean(const struct axis *x)
 {
@@ -101,10 +119,13 @@ static double glass_mean(const struct axis *x)
     const double end = root(glass_meets, x, x->a, 0.5 * x->R, 0.95 * x->R);
     double sum = 0;
     for (int k = 0; k < N; k++) { /* Gauss-Legendre of two points */
-        const double h = end / N, m = (k + 0.5) * h, g = h / sqrt(12);
-        sum += h / 2 * ((m - g) * passes(x, m - g) + (m + g) * passes(x, m + g));
+        const double h = end / N, m = (k + 0.5) * h, g = h / sqrt(12), lo = m - g,
+                     hi = m + g;
+        sum += h / 2 *
+               ((x->tube ? 1 : IMP_PI * lo / 2) * passes(x, lo) +
+                (x->tube ? 1 : IMP_PI * hi / 2) * passes(x, hi));
     }
-    return IMP_2PI * sum / 4;
+    return sum;
 }
 
 /* By number k of R, z, a, h. */
@@ -118,6 +139,10 @@ static double slope(double (*mean)(const struct axis *), struct axis x, int k)
     return (hi - mean(&x)) / (2 * h);
 }
 
+/* It covers the film. */
+#define LONG(ID)                                                                         \
+    "<shape type='cylinder' id='" ID "'><point name='p0' value='0,-3,0'/>"               \
+    "<point name='p1' value='0,3,0'/>"
 static imp_scene *axis_scene(const struct axis *x, const char *bsdf, int depth,
                              const char *faces)
 {
@@ -129,30 +154,42 @@ static imp_scene *axis_scene(const struct axis *x, const char *bsdf, int depth,
         "<transform name='to_world'><lookat origin='0,0,2' target='0,0,0' "
         "up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' "
         "value='8'/><integer name='height' value='8'/><rfilter type='box'/></film>"
-        "</sensor><shape type='sphere' id='ball'><float name='radius' value='%g'/>"
-        "<point name='center' x='0' y='0' z='%g'/>%s</shape>"
-        "<shape type='disk' id='disk'><transform name='to_world'><scale value='%g'/>"
-        "%s<translate z='%g'/></transform>" BLACK
-        "<emitter type='area'><spectrum name='radiance' value='1'/></emitter></shape>"
-        "</scene>",
-        depth, x->R, x->z, bsdf, x->a, faces, x->h);
+        "</sensor>%s<float name='radius' value='%g'/><transform "
+        "name='to_world'><translate z='%g'/></transform>%s</shape>"
+        "%s<transform name='to_world'><scale x='%g' y='%g' z='%g'/>%s"
+        "<translate z='%g'/></transform>" BLACK "%s</scene>",
+        depth, x->tube ? LONG("ball") : "<shape type='sphere' id='ball'>", x->R, x->z,
+        bsdf,
+        x->round && x->tube ? LONG("disk")
+        : x->round          ? "<shape type='sphere' id='disk'>"
+        : x->tube           ? "<shape type='rectangle' id='disk'>"
+                            : "<shape type='disk' id='disk'>",
+        x->a, x->tube && !x->round ? 9 : x->a, x->a, faces, x->h,
+        x->round
+            ? "</shape><emitter type='constant'><spectrum name='radiance' value='1'/>"
+              "</emitter>"
+            : "<emitter type='area'><spectrum name='radiance' value='1'/></emitter>"
+              "</shape>");
     return test_scene_text(ctx, xml, IMP_MONO);
 }
 
 static void axis_test(const char *what, const struct axis *x, imp_scene *scene,
                       double (*mean)(const struct axis *), int spp)
 {
-    static const struct {
+    const struct {
         const char *name;
         int k, number;
-    } of[] = {{"ball.radius", 0, 0}, {"ball.center", 2, 1}, {"disk.pose", 2, 3}};
+    } of[] = {{x->tube ? "ball.scale" : "ball.radius", 0, 0},
+              {x->tube ? "ball.pose" : "ball.center", 2, 1},
+              {"disk.pose", 2, 3}};
     for (int j = 0; j < 3; j++) test_must(ctx, imp_scene_add_geometry(scene, of[j].name));
     for (int j = 0; j < 3; j++) {
         struct tap_stat g[6] = {{0, 0, 0}};
         char name[128];
         mean_gradient(ctx, scene, of[j].name, spp, 16, g);
         snprintf(name, sizeof name, "%s, by %s[%d]", what, of[j].name, of[j].k);
-        const double right = slope(mean, *x, of[j].number);
+        const double by = x->tube && j == 0 ? x->R : 1,
+                     right = by * slope(mean, *x, of[j].number);
         tap_z(&g[of[j].k], right, 0.02 * fabs(right), name);
     }
     imp_scene_destroy(scene);
@@ -160,12 +197,26 @@ static void axis_test(const char *what, const struct axis *x, imp_scene *scene,
 
 static void axes_test(int spp_axis)
 {
-    const struct axis mirror = {.8, 0, 1, 3}, glass = {.8, 0, .2, -1};
+    const struct axis mirror = {.8, 0, 1, 3, false, false},
+                      glass = {.8, 0, .2, -1, false, false},
+                      pipe = {.8, 0, 1, 3, true, false},
+                      rod = {.8, 0, .2, -1, true, false},
+                      ball = {.8, 0, .9, 3, false, true},
+                      pole = {.8, 0, .9, 3, true, true};
     axis_test("a disk in a ball", &mirror,
               axis_scene(&mirror, PERFECT, 2, "<rotate x='1' angle='180'/>"), mirror_mean,
               spp_axis);
     axis_test("a disk through a ball", &glass, axis_scene(&glass, GLASS, 3, ""),
               glass_mean, spp_axis);
+    axis_test("a strip in a tube", &pipe,
+              axis_scene(&pipe, PERFECT, 2, "<rotate x='1' angle='180'/>"), mirror_mean,
+              spp_axis);
+    axis_test("a strip through a rod", &rod, axis_scene(&rod, GLASS, 3, ""), glass_mean,
+              spp_axis);
+    axis_test("a ball in a ball", &ball, axis_scene(&ball, PERFECT, 2, ""), shade_mean,
+              spp_axis);
+    axis_test("a pole in a tube", &pole, axis_scene(&pole, PERFECT, 2, ""), shade_mean,
+              spp_axis);
 }
 
 /* ---- Walks --------------------------------------------------------------------------------- */
@@ -187,20 +238,19 @@ static void frozen_test(const char *what, imp_scene *scene)
 
 static void refused_test(void)
 {
-    number_refused("a disk of glass",
-                   room(PATH "<shape type='disk' id='glass'><transform name='to_world'>"
-                             "<translate x='-2' z='1'/></transform>" GLASS "</shape>"),
-                   "block.pose", "no mesh or sphere");
     number_refused("a cube of glass in the floor",
                    room(PATH "<shape type='cube' id='glass'><transform name='to_world'>"
                              "<scale value='.3'/><translate x='-2'/></transform>" GLASS
                              "</shape>"),
                    "block.pose", "passes through");
-    number_refused("a tube that is a mirror",
-                   room(PATH "<shape type='cylinder' id='tube'>" PERFECT "</shape>"),
-                   "block.pose", "no sphere");
-    number_refused("a tube beside a ball", room(PATH BALL(PERFECT) TUBE), "block.pose",
-                   "curved mirror");
+    number_refused("an oval tube that is a mirror",
+                   room(PATH "<shape type='cylinder' id='tube'><transform "
+                             "name='to_world'><scale x='.3' y='.2' z='.5'/><translate "
+                             "x='-2' z='1'/></transform>" PERFECT "</shape>"),
+                   "block.pose", "no sphere or circular cylinder");
+    number_refused("a thin tube of glass",
+                   room(PATH TUBE("<bsdf type='thindielectric'/>")), "block.pose",
+                   "none of conductor");
     number_refused("a horizon in a ball",
                    room(PATH "<emitter type='ciesky'/>" BALL(PERFECT)), "block.pose",
                    "curved mirror");
@@ -227,7 +277,19 @@ int main(int argc, char **argv)
                                           {"ball.radius", 0, .01},
                                           {"camera.pose", 0, .01},
                                           {"camera.pose", 4, .01},
-                                          {NULL, 0, 0}};
+                                          {NULL, 0, 0}},
+                               tube[] = {{"tube.pose", 0, .01},
+                                         {"tube.pose", 2, .01},
+                                         {"tube.pose", 3, .01},
+                                         {"tube.scale", 0, .02},
+                                         {"behind.center", 0, .01},
+                                         {"lamp.pose", 3, .02},
+                                         {NULL, 0, 0}},
+                               pole[] = {{"pole.pose", 0, .02},
+                                         {"pole.pose", 1, .02},
+                                         {"pole.pose", 4, .02},
+                                         {"pole.scale", 0, .04},
+                                         {NULL, 0, 0}};
     ctx = test_context(2);
     adjoint_make();
     axes_test(is_long ? 768 : 64);
@@ -237,7 +299,20 @@ int main(int argc, char **argv)
     numbers_compare("images in a ball",
                     room_of("<integrator type='direct'/>" SKY BALL(PERFECT) BEHIND, DARK),
                     is_long ? 512 : 64, is_long ? 1024 : 128, .1, images);
+    numbers_compare("a pole in a tube",
+                    room_of("<integrator type='direct'/>" SKY TUBE(PERFECT) POLE, DARK),
+                    is_long ? 512 : 64, is_long ? 1024 : 64, .1, pole);
     if (is_long) {
+        numbers_compare(
+            "a tube that moves",
+            room_of("<integrator type='direct'/>" SKY TUBE(PERFECT) BEHIND, DARK), 192,
+            640, .15, tube);
+        numbers_compare("a rod of glass", room_of(DEEP SKY TUBE(GLASS) POLE BEHIND, DARK),
+                        192, 640, .15, tube);
+        numbers_compare(
+            "a pole in a ball",
+            room_of("<integrator type='direct'/>" SKY BALL(PERFECT) POLE, DARK), 256, 640,
+            .1, pole);
         numbers_compare("images in a ball in a flat mirror",
                         room_of(DEEP SKY BALL(PERFECT) FLAT BEHIND, DARK), 256, 512, .1,
                         images);

@@ -7,18 +7,28 @@
 
 #include "boundary_parts.h"
 
-/* A ball that is a mirror or of glass, or a mesh of glass. */
+/* A ball or cylinder that is a mirror or of glass, or a disk or mesh of glass. */
+enum imp__bender_kind {
+    IMP_BENDER_BALL,
+    IMP_BENDER_TUBE,
+    IMP_BENDER_DISK,
+    IMP_BENDER_MESH
+};
 struct imp__bender {
+    enum imp__bender_kind kind;
     int shape;
     int64_t place;
     struct imp_round round; /* of a ball */
-    int n_facets;           /* 0: it is a ball */
+    double index;           /* of a ball of glass, inside over outside; 0: another */
+    struct imp__tube tube;
+    int n_facets; /* of a mesh */
 };
 
 struct imp__bent_surface {
     imp_v3 p, n;   /* of a plane a point and its normal; of a ball its centre */
+    imp_v3 axis;   /* of a cylinder, p a point of it; 0: it is none */
     double radius; /* 0: a plane */
-    bool inside;   /* the ray meets the ball from inside */
+    bool inside;   /* the ray meets it from inside */
     double ratio;  /* as imp__bend has it */
     int shape;
     int64_t place;
@@ -34,9 +44,9 @@ struct imp__bent_ray {
 };
 
 /* What the ray is to meet: a place, or, where radius > 0, a ball that it touches, at the plane across
- * `across` through its centre. */
+ * `across` through its centre; of a cylinder about the axis through p, at that plane through p. */
 struct imp__bent_goal {
-    imp_v3 p, across;
+    imp_v3 p, across, axis;
     double radius;
 };
 struct imp__bent_root {
@@ -52,24 +62,36 @@ struct imp__bent_found {
     unsigned dims;
     struct imp__bent_goal goal;
     struct imp__bent_root root;
+    double draws; /* one over the probability to find it; 0: not known */
 };
 /* How the camera may see a place over curved mirrors and through glass; as imp__sight_draw and
  * imp__sight_reach at once. s->chance has still to be divided by imp__bent_draws. */
 bool imp__bent_reach(struct imp__edge_draw *d, unsigned dims, imp_v3 p,
                      struct imp__sight *s, struct imp__bent_found *x);
-/* The same of a point of an edge, as imp__edge_any chooses it, or of a ball that is touched by what the
- * camera sees. */
+/* The same of a point of an edge, as imp__edge_any chooses it, or of a ball or cylinder that is touched by
+ * what the camera sees. */
 bool imp__bent_any(struct imp__edge_draw *d, struct imp__sight *s,
                    struct imp__bent_found *x);
 /* One over the probability that a draw finds this, in the mean. It takes long: for what counts. */
 double imp__bent_draws(const struct imp__edge_draw *d, const struct imp__bent_found *x);
 
+static inline imp_v3 imp__across_axis(imp_v3 axis, imp_v3 r)
+{
+    return r - axis * imp__dot(axis, r);
+}
 /* The ray of a direction at the eye, or that begins at a place. */
 struct imp__bent_ray imp__bent_begin(const struct imp__edge_draw *d, imp_v3 from);
 /* Newton's method, from x->from over x->chain, by steps that bring the ray nearer to the goal. False: it ends
  * nowhere. */
 bool imp__bent_find(const struct imp__edge_draw *d, const struct imp__bent_goal *goal,
                     struct imp__bent_root *x);
+/* Is it a chain over one ball, of which all roots are known? */
+bool imp__round_chain(const struct imp__edge_draw *d, const struct imp__bent_goal *goal,
+                      const struct imp__bent_chain *c);
+/* A root over such a chain, and one over the probability to draw it. False: none. */
+bool imp__round_draw(const struct imp__edge_draw *d, struct imp_key key,
+                     const struct imp__bent_goal *goal, struct imp__bent_root *x,
+                     double *draws);
 bool imp__bent_same(const struct imp__edge_draw *d, const struct imp__bent_root *a,
                     const struct imp__bent_root *b);
 

@@ -332,17 +332,11 @@ static enum imp_status bends_allowed(const struct imp__boundary *b)
     }
     for (size_t k = 0; k < b->edges->n_bodies; k++) {
         const struct imp__body *body = &b->edges->body[k];
-        struct imp__tube tube;
-        const char *why = imp__moves_smooth(scene, body->shape)
-                              ? "has vertex normals (face_normals "
-                                "makes it flat)"
-                          : imp__moves_cylinder(scene, body->shape, body->place, &tube)
-                              ? "is a cylinder"
-                              : NULL;
-        if (why)
+        if (imp__moves_smooth(scene, body->shape))
             return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                              "derivatives by what moves: shape '%s' %s, %s",
-                              scene->shapes[body->shape]->name, why, where);
+                              "derivatives by what moves: shape '%s' has vertex normals "
+                              "(face_normals makes it flat), %s",
+                              scene->shapes[body->shape]->name, where);
     }
     for (size_t k = 0; k < 2 * b->edges->n_arcs; k++)
         IMP_CHECKED(seam_bends(b, &b->edges->arc[k / 2].side[k % 2]));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Balls that are mirrors, and glass (boundary.h): which there are, directions towards them, and what they let
+ * Balls and cylinders that are mirrors, and glass (boundary.h): which there are, directions towards them, and what they let
  * through. */
 #include "base/arguments.h"
 #include "base/context.h"
@@ -10,24 +10,46 @@
 #include "walk/core/shaped.h"
 #include "walk/core/step.h"
 
+/* The index of a ball of glass, inside over outside; 0: it is a mirror. */
+static double ball_index(const struct imp_scene *scene, const struct imp__bender *x)
+{
+    const struct imp_hit hit = {.shape = x->shape, .place = x->place};
+    const struct imp_bsdf *b = imp__hit_bsdf(scene, &hit);
+    const struct imp_dirs dirs = {{0, 0, 1, 0}, {0}, IMP_GLASS_BENDS, 0};
+    const struct imp_texcoord nowhere = {.prim = 0};
+    imp_spec in[IMP_INPUTS_MAX];
+    if (!imp__is_glass(b)) return 0;
+    imp__inputs_eval(b->input, b->n_in, &nowhere, in);
+    const double index = b->ops->index_ratio(b, in, &dirs);
+    const struct imp__rim_point at = imp__rim(scene, x->shape, x->place, 0, 0);
+    return imp__dot(at.n, at.p - x->round.centre) > 0 ? index : 1 / index;
+}
+
 enum imp_status imp__benders_add(struct imp__boundary *b, const struct imp__body *body)
 {
     const struct imp_scene *scene = b->tracer->scene;
     const struct imp_shape *s = scene->shapes[body->shape];
-    const bool mesh = s->geometry == IMP_TRIANGLES;
-    struct imp__bender x = {.shape = body->shape, .place = body->place};
+    struct imp__bender x = {
+        .kind = IMP_BENDER_MESH, .shape = body->shape, .place = body->place};
     struct imp__bender *more =
         imp__grow(scene->ctx, b->bender, &b->cap_benders, b->n_benders + 1, sizeof *more);
     if (!more) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for mirrors");
-    if (mesh) x.n_facets = (int)s->triangles.n_triangles;
-    if (!mesh && !imp__moves_sphere(scene, body->shape, body->place, &x.round))
+    if (s->geometry == IMP_TRIANGLES) x.n_facets = (int)s->triangles.n_triangles;
+    else if (imp__moves_disk(scene, body->shape)) x.kind = IMP_BENDER_DISK;
+    else if (imp__moves_sphere(scene, body->shape, body->place, &x.round))
+        x.kind = IMP_BENDER_BALL;
+    else if (imp__moves_cylinder(scene, body->shape, body->place, &x.tube))
+        x.kind = IMP_BENDER_TUBE;
+    else
         return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
                           "derivatives by what moves: shape '%s' is a mirror, or bends "
-                          "light, and no sphere where its instance has it",
+                          "light, and no sphere or circular cylinder where its instance "
+                          "has it",
                           s->name);
     b->bender = more;
     b->bender[b->n_benders++] = x;
-    if (mesh) return IMP_OK;
+    if (x.kind != IMP_BENDER_BALL) return IMP_OK;
+    x.index = ball_index(scene, &x);
     b->bender[b->n_benders - 1] = b->bender[b->n_balls]; /* balls come first */
     b->bender[b->n_balls++] = x;
     return IMP_OK;

@@ -29,16 +29,24 @@ enum { WHICH, POINT_U, POINT_V, PLANES, FIRST = PLANES + 2 + 2 * IMP_SIGHT_MAX }
 #define STOP_GLASS 0.05 /* the same within glass */
 #define PASSES     256  /* surfaces in all */
 
-/* A random point of a ball, or of a facet. */
+/* A random point of one of these, with random numbers u in [0, 1). */
 static imp_v3 bender_point(const struct imp__edge_draw *d, const struct imp__bender *x,
                            const double u[3])
 {
+    const struct imp_scene *scene = d->b->tracer->scene;
     double b[2];
-    if (x->n_facets == 0)
+    if (x->kind == IMP_BENDER_BALL)
         return x->round.centre + imp__uniform_sphere(&u[1]) * x->round.radius;
+    if (x->kind == IMP_BENDER_TUBE)
+        return imp__rim(scene, x->shape, x->place, 0, u[1]).p +
+               x->tube.axis * (x->tube.length * u[2]);
+    if (x->kind == IMP_BENDER_DISK) {
+        const imp_v3 p = imp__rim(scene, x->shape, x->place, 0, u[1]).p,
+                     q = imp__rim(scene, x->shape, x->place, 0, u[1] + 0.5).p;
+        return p + (q - p) * (0.5 * (1 - sqrt(u[2])));
+    }
     const int prim = imp_min((int)(u[0] * x->n_facets), x->n_facets - 1);
-    const struct imp__corners f =
-        imp__corners(d->b->tracer->scene, x->shape, prim, x->place);
+    const struct imp__corners f = imp__corners(scene, x->shape, prim, x->place);
     imp__uniform_triangle(&u[1], b);
     return f.p[0] + (f.p[1] - f.p[0]) * b[0] + (f.p[2] - f.p[0]) * b[1];
 }
@@ -73,6 +81,7 @@ static bool surface_draw(const struct imp__edge_draw *d, const struct imp_hit *h
 {
     const struct imp_scene *scene = d->b->tracer->scene;
     struct imp_round round;
+    struct imp__tube tube;
     double ratio;
     const imp_spec F = imp__edge_reflected(d, hit, at, w),
                    T = imp__edge_refracted(d, hit, at, w, &ratio);
@@ -89,6 +98,11 @@ static bool surface_draw(const struct imp__edge_draw *d, const struct imp_hit *h
         out->p = round.centre;
         out->radius = round.radius;
         out->inside = imp__dot(at->p - round.centre, w) > 0;
+    } else if (imp__moves_cylinder(scene, shape, hit->place, &tube)) {
+        out->p = tube.base;
+        out->axis = tube.axis;
+        out->radius = tube.radius;
+        out->inside = imp__dot(imp__across_axis(tube.axis, at->p - tube.base), w) > 0;
     } else {
         out->p = at->p;
         out->n = at->ng;
@@ -130,7 +144,8 @@ static bool chain_draw(const struct imp__edge_draw *d, struct imp_key key, imp_v
         if (!mirrors || out->n == longest || !surface_draw(d, &hit, &at, w, v, &s) ||
             (bends && stop < (glass ? STOP_GLASS : STOP)))
             break;
-        const imp_v3 n = s.radius > 0 ? imp__normalize(at.p - s.p) : s.n;
+        const imp_v3 n =
+            s.radius > 0 ? imp__normalize(imp__across_axis(s.axis, at.p - s.p)) : s.n;
         imp_v3 next;
         if (!imp__bend(n, w, s.ratio, &next)) break;
         if (s.ratio > 0) glass = imp__dot(next, n) < 0;
@@ -160,8 +175,8 @@ static bool root_draw(const struct imp__edge_draw *d, struct imp_key key,
                       struct imp__bent_root *x)
 {
     return ray_draw(d, key, &x->from) && chain_draw(d, key, x->from, &x->chain) &&
-           (!of || alike(&x->chain, &of->chain)) && imp__bent_find(d, goal, x) &&
-           (!of || imp__bent_same(d, of, x));
+           (of ? alike(&x->chain, &of->chain) : !imp__round_chain(d, goal, &x->chain)) &&
+           imp__bent_find(d, goal, x) && (!of || imp__bent_same(d, of, x));
 }
 
 /* ---- What is seen ------------------------------------------------------------------------- */
@@ -238,7 +253,8 @@ static bool root_seen(struct imp__edge_draw *d, const struct imp__bent_root *x,
 
 #define COUNTS 0.1   /* what a root lets through that is always kept */
 #define STAGE  16384 /* draws, after which a draw goes on by chance */
-enum { KEEP = FIRST + 3 * PASSES, GO_ON };
+#define ROUND  0.7   /* of draws, where there are balls: over one of them */
+enum { KEEP = FIRST + 3 * PASSES, GO_ON, WHETHER_ROUND };
 
 /* Roots that let little through are kept by chance: over glass that reflects inside there are many, and each
  * is looked for again as often as those that count. */
@@ -247,19 +263,41 @@ static double kept_chance(const struct imp__edge_draw *d, const struct imp__sigh
     return imp_min(imp__max_used(s->T, d->waves) / COUNTS, 1);
 }
 
+/* How often a root is looked for over one ball, where all are known. */
+static double round_chance(const struct imp__edge_draw *d,
+                           const struct imp__bent_goal *goal)
+{
+    return d->b->n_balls > 0 && !(goal->radius > 0) ? ROUND : 0;
+}
+
+/* A root, and x->draws where it is known. */
+static bool root_any(const struct imp__edge_draw *d, struct imp_key key,
+                     struct imp__bent_found *x)
+{
+    const double chance = round_chance(d, &x->goal);
+    x->draws = 0;
+    if (!(imp__u01(key, WHETHER_ROUND) < chance))
+        return root_draw(d, key, &x->goal, NULL, &x->root);
+    if (!imp__round_draw(d, key, &x->goal, &x->root, &x->draws)) return false;
+    x->draws /= chance;
+    return true;
+}
+
 /* The number of draws until one leads there. Behind a stage it goes on with probability 1/2, and counts twice as
  * much, up to twice the number: there is no bound, the mean is the same, and few roots that are hardly ever
  * found take long. */
 double imp__bent_draws(const struct imp__edge_draw *d, const struct imp__bent_found *x)
 {
     double sum = 0, times = 1;
+    if (x->draws > 0) return x->draws;
+    const double chance = round_chance(d, &x->goal);
     for (uint64_t k = 1, end = STAGE;; k++) {
         const struct imp_key key = imp__key(d->key.state, x->dims, k);
         struct imp__bent_root again;
         sum += times;
-        if (root_draw(d, key, &x->goal, &x->root, &again)) return sum;
+        if (root_draw(d, key, &x->goal, &x->root, &again)) return sum / (1 - chance);
         if (k < end) continue;
-        if (imp__u01(key, GO_ON) < 0.5) return sum;
+        if (imp__u01(key, GO_ON) < 0.5) return sum / (1 - chance);
         times *= 2;
         end += end;
     }
@@ -273,7 +311,7 @@ static bool root_reach(struct imp__edge_draw *d, struct imp__sight *s,
     const struct imp_key key = imp__key(d->key.state, x->dims, 0);
     *s = (struct imp__sight){.eye = d->eye};
     if (!d->b->tracer->sensor->ops->connect || (max >= 0 && max < 2) ||
-        !root_draw(d, key, &x->goal, NULL, &x->root) || !root_seen(d, &x->root, s))
+        !root_any(d, key, x) || !root_seen(d, &x->root, s))
         return false;
     s->chance = kept_chance(d, s);
     return imp__u01(key, KEEP) < s->chance;
@@ -287,12 +325,43 @@ bool imp__bent_reach(struct imp__edge_draw *d, unsigned dims, imp_v3 p,
     return root_reach(d, s, x);
 }
 
+/* A place on the wall of a cylinder that is touched by what the camera sees. */
+static bool wall_reach(struct imp__edge_draw *d, const struct imp__tube *c,
+                       struct imp__sight *s, struct imp__bent_found *x)
+{
+    const struct imp_frame f = imp__frame_from_normal(c->axis);
+    const double v = d->u < 0.5 ? 2 * d->u : 2 * d->u - 1;
+    x->dims = 0;
+    x->goal = (struct imp__bent_goal){.p = c->base, .axis = c->axis, .radius = c->radius};
+    if (d->u < 0.5) {
+        x->goal.across = c->axis;
+        x->goal.p += c->axis * (v * c->length);
+    } else x->goal.across = f.s * cos(IMP_PI * v) + f.t * sin(IMP_PI * v);
+    if (!root_reach(d, s, x)) return false;
+    const double up = imp__dot(c->axis, x->root.p - c->base);
+    if (!(up > 0) || !(up < c->length)) return false;
+    d->p = x->root.p;
+    d->out = imp__normalize(imp__across_axis(c->axis, d->p - c->base));
+    d->along = imp__normalize(x->root.along);
+    const double rises = fabs(imp__dot(d->along, c->axis)),
+                 turns = sqrt(imp_max(1 - rises * rises, 0.0));
+    d->inv_pdf = 2 / ((rises / c->length + turns / (IMP_PI * c->radius)) * d->chance);
+    return true;
+}
+
 bool imp__bent_any(struct imp__edge_draw *d, struct imp__sight *s,
                    struct imp__bent_found *x)
 {
+    const struct imp_scene *scene = d->b->tracer->scene;
     struct imp_round round;
-    if (!d->item || d->item->kind != IMP_ITEM_ROUND ||
-        !imp__moves_sphere(d->b->tracer->scene, d->item->shape, d->item->place, &round))
+    struct imp__tube tube;
+    const bool curved = d->item && d->item->kind == IMP_ITEM_ROUND;
+    if (curved && imp__moves_cylinder(scene, d->item->shape, d->item->place, &tube)) {
+        bool wall;
+        return imp__edge_tube_part(d, &tube, &wall) &&
+               (wall ? wall_reach(d, &tube, s, x) : imp__bent_reach(d, 0, d->p, s, x));
+    }
+    if (!curved || !imp__moves_sphere(scene, d->item->shape, d->item->place, &round))
         return imp__edge_any(d, d->eye, d->b->parallel) &&
                imp__bent_reach(d, 0, d->p, s, x);
     const double u[2] = {d->u, imp__u01(d->key, IMP_EDGE_DIR_U)};

@@ -54,9 +54,7 @@ static bool rim_set(struct imp__edge_draw *d, int k)
     return true;
 }
 
-/* The parts of a cylinder's edges: its rims, and its two silhouettes, or lines that touch it. Divides
- * d->chance by the probability, and makes d->u uniform again. */
-static int tube_part(struct imp__edge_draw *d, const struct imp__tube *c)
+bool imp__edge_tube_part(struct imp__edge_draw *d, const struct imp__tube *c, bool *wall)
 {
     const double all = 2 * IMP_2PI * c->radius + 2 * c->length;
     const double rim = IMP_2PI * c->radius / all, part[3] = {rim, rim, 1 - 2 * rim};
@@ -64,15 +62,17 @@ static int tube_part(struct imp__edge_draw *d, const struct imp__tube *c)
     for (; k < 2 && d->u >= part[k]; k++) d->u -= part[k];
     d->u = imp_clamp(d->u / part[k], 0.0, 1 - 0x1p-53);
     d->chance *= part[k];
-    return k;
+    *wall = k == 2;
+    return *wall || (!d->item->closed[k] && rim_set(d, k));
 }
 
 /* The lines on which lines from there touch the cylinder, or a rim. */
 static bool tube_silhouette(struct imp__edge_draw *d, const struct imp__tube *c,
                             imp_v3 from, bool parallel)
 {
-    const int k = tube_part(d, c);
-    if (k < 2) return !d->item->closed[k] && rim_set(d, k);
+    bool wall;
+    if (!imp__edge_tube_part(d, c, &wall)) return false;
+    if (!wall) return true;
     imp_v3 way = parallel ? from : c->base - from;
     way -= c->axis * imp__dot(c->axis, way);
     const double D = imp__length(way), sine = parallel ? 0 : c->radius / D;
@@ -135,8 +135,9 @@ bool imp__edge_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel)
 static bool tube_touched(struct imp__edge_draw *d, const struct imp__tube *c,
                          const double u[2], imp_v3 *w)
 {
-    const int k = tube_part(d, c);
-    if (k < 2) return !d->item->closed[k] && rim_set(d, k);
+    bool wall;
+    if (!imp__edge_tube_part(d, c, &wall)) return false;
+    if (!wall) return true;
     const struct imp_frame f = imp__frame_from_normal(c->axis);
     const double phi = IMP_2PI * d->u, psi = IMP_2PI * u[1];
     d->touches = true;

@@ -126,6 +126,8 @@ enum imp_status imp__mirrors_find(struct imp__boundary *b)
         const struct imp__rim_point rim = imp__rim(scene, body->shape, body->place, 0, 0);
         const struct imp__plane x = {body->shape, body->place, -1, rim.p, rim.n, 0};
         IMP_CHECKED(plane_add(b, &x));
+        if (imp__is_glass(imp__shape_bsdf(scene, scene->shapes[placed])))
+            IMP_CHECKED(imp__benders_add(b, body));
     }
     return IMP_OK;
 }

@@ -99,6 +99,10 @@ bool imp__edge_item_choose(struct imp__edge_draw *d);
 bool imp__edge_any(struct imp__edge_draw *d, imp_v3 from, bool parallel);
 bool imp__edge_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel);
 bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w);
+/* The parts of a cylinder's edges: its rims, of which a point is set, or its wall, with its two silhouettes or
+ * lines that touch it. Divides d->chance by the probability, and makes d->u uniform again. False: a rim that
+ * is the edge of a lid. */
+bool imp__edge_tube_part(struct imp__edge_draw *d, const struct imp__tube *c, bool *wall);
 /* The velocity of the edge's point, as its surface carries it, or its two surfaces, counts m: the ends
  * of a flux, one or two. */
 #define IMP_EDGE_ENDS 2

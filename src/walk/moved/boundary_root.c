@@ -4,7 +4,7 @@
  *
  * A ray depends on the two numbers of its direction at the eye (or, of parallel rays, of where it begins),
  * and so do its place and direction behind each surface: with q' where it meets one of normal n, and
- * n' = q'/R on a ball of radius R,
+ * n' = q'/R on a ball of radius R, or the part of it across the axis of a cylinder,
  *
  *     q' = o' + t w' - w n.(o' + t w')/(n.w),   w_o' as moved_mirror.h has it.
  *
@@ -14,7 +14,11 @@
  * from a plane through the centre, which is drawn. Circles of such planes, on a ball of radius R, meet a
  * curve on it (Crofton) as
  *
- *     int F dl = pi R E[sum over crossings of F]. */
+ *     int F dl = pi R E[sum over crossings of F].
+ *
+ * On a cylinder of length L circles about its axis meet a piece of the curve along the unit vector t with the
+ * density |t.axis|/L, and pairs of lines along the axis with |t x axis|/(pi R). Both are drawn, half of the time
+ * each, and a crossing counts one over the mean of the two, which is nowhere 0. */
 #include "base/arguments.h"
 #include "bent_chain.h"
 #include "math/warp.h"
@@ -38,17 +42,18 @@ struct imp__bent_ray imp__bent_begin(const struct imp__edge_draw *d, imp_v3 from
 /* On to a surface of the chain, and beyond it. False: it is not met, or reflects all. */
 static bool pencil_pass(struct imp__bent_ray *x, struct imp__bent_surface *s)
 {
-    const imp_v3 r = x->o - s->p;
+    const imp_v3 r = imp__across_axis(s->axis, x->o - s->p);
     double t;
     if (s->radius > 0) {
-        const double b = imp__dot(r, x->w),
-                     square = b * b - (imp__dot(r, r) - imp__sqr(s->radius));
+        const double a = 1 - imp__sqr(imp__dot(s->axis, x->w)), b = imp__dot(r, x->w),
+                     square = b * b - a * (imp__dot(r, r) - imp__sqr(s->radius));
         if (!(square > 0)) return false;
-        t = s->inside ? -b + sqrt(square) : -b - sqrt(square);
+        t = (s->inside ? -b + sqrt(square) : -b - sqrt(square)) / a;
     } else t = -imp__dot(s->n, r) / imp__dot(s->n, x->w);
     if (!(t > 0)) return false;
     s->q = x->o + x->w * t;
-    s->normal = s->radius > 0 ? (s->q - s->p) * (1 / s->radius) : s->n;
+    s->normal =
+        s->radius > 0 ? imp__across_axis(s->axis, s->q - s->p) * (1 / s->radius) : s->n;
     const double along = imp__dot(s->normal, x->w), side = along > 0 ? -1 : 1,
                  c = fabs(along);
     const imp_v3 n = s->normal * side;
@@ -60,7 +65,9 @@ static bool pencil_pass(struct imp__bent_ray *x, struct imp__bent_surface *s)
     for (int k = 0; k < 2; k++) {
         imp_v3 shift = x->o_d[k] + x->w_d[k] * t;
         shift += x->w * (imp__dot(n, shift) / c);
-        const imp_v3 turn = s->radius > 0 ? shift * (side / s->radius) : (imp_v3){0};
+        const imp_v3 turn = s->radius > 0
+                                ? imp__across_axis(s->axis, shift) * (side / s->radius)
+                                : (imp_v3){0};
         const double c_d = -(imp__dot(turn, x->w) + imp__dot(n, x->w_d[k]));
         x->o_d[k] = shift;
         x->w_d[k] = x->w_d[k] * (r_i == 0 ? 1 : r_i) + turn * by_n + n * (by_c * c_d);
@@ -82,8 +89,9 @@ static bool aim(const struct imp__edge_draw *d, const struct imp__bent_goal *goa
     imp_v3 at[2];
     for (int k = 0; k < x->chain.n; k++)
         if (!pencil_pass(&ray, &x->chain.at[k])) return false;
-    const imp_v3 to = goal->p - ray.o;
-    const double t = imp__dot(to, ray.w);
+    const imp_v3 to = imp__across_axis(goal->axis, goal->p - ray.o),
+                 w = imp__across_axis(goal->axis, ray.w);
+    const double square = imp__dot(w, w), t = imp__dot(to, ray.w) / square;
     if (!(t > 0)) return false;
     const struct imp_frame f = imp__frame_from_normal(ray.w);
     x->w = ray.w;
@@ -92,12 +100,14 @@ static bool aim(const struct imp__edge_draw *d, const struct imp__bent_goal *goa
     x->det = imp__dot(f.s, at[0]) * imp__dot(f.t, at[1]) -
              imp__dot(f.s, at[1]) * imp__dot(f.t, at[0]);
     if (goal->radius > 0) {
-        const imp_v3 e = x->p - goal->p;
+        const imp_v3 e = imp__across_axis(goal->axis, x->p - goal->p);
         const double length = imp__length(e);
         F[0] = length - goal->radius;
-        F[1] = imp__dot(e, goal->across);
+        F[1] = imp__dot(x->p - goal->p, goal->across);
         for (int k = 0; k < 2; k++) {
-            const double t_d = imp__dot(to, ray.w_d[k]) - imp__dot(ray.o_d[k], ray.w);
+            const double t_d =
+                (imp__dot(to - w * (2 * t), ray.w_d[k]) - imp__dot(ray.o_d[k], w)) /
+                square;
             at[k] += ray.w * t_d;
             J[0][k] = imp__dot(e, at[k]) / length;
             J[1][k] = imp__dot(goal->across, at[k]);

@@ -49,20 +49,17 @@ static const char *mirror_without_d(const struct imp_tracer *t, const struct imp
 {
     const struct imp_bsdf *b = imp__shape_bsdf(t->scene, s);
     struct imp_round round;
-    const bool ball =
-        s->geometry != IMP_TRIANGLES && imp__moves_sphere(t->scene, s->index, 0, &round);
-    if (imp__is_glass(b) && !ball && s->geometry != IMP_TRIANGLES)
-        return "bends light, on a shape that is no mesh or sphere: edges that are seen "
-               "through it have no draws";
+    struct imp__tube tube;
+    const bool curved = imp__moves_sphere(t->scene, s->index, 0, &round) ||
+                        imp__moves_cylinder(t->scene, s->index, 0, &tube);
     if (s->smooth)
         return "is a mirror on a mesh with vertex normals (face_normals makes it flat)";
-    if (s->geometry != IMP_TRIANGLES && !(s->ops->flags & IMP_SHAPE_FLAT) && !ball)
-        return "is a mirror on a curved shape that is no sphere: edges that are seen in "
-               "it "
-               "have no draws";
-    if (ball && !is_all_at_limb(b))
-        return "reflects in single directions, on a sphere, and is none of conductor, "
-               "plastic and dielectric";
+    if (s->geometry != IMP_TRIANGLES && !(s->ops->flags & IMP_SHAPE_FLAT) && !curved)
+        return "is a mirror, or bends light, on a curved shape that is no sphere or "
+               "circular cylinder: edges that are seen in it have no draws";
+    if (curved && !is_all_at_limb(b))
+        return "reflects in single directions, on a sphere or cylinder, and is none of "
+               "conductor, plastic and dielectric";
     if (s->emitter >= 0) return "is a mirror, and its shape is a light";
     if (t->scene->n_media > 0 && imp__segment_first(t)->through && t->sensor->medium)
         return "is a mirror in a medium";
