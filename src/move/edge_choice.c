@@ -4,8 +4,6 @@
 #include "edge_choice.h"
 #include "base/context.h"
 
-#define KEPT 0.15 /* probability that stays with the measure */
-
 enum imp_status imp__edge_choice_begin(const struct imp__edges *edges,
                                        const struct imp__edge_tree *tree,
                                        const double *measure, int n_cells,
@@ -63,13 +61,13 @@ static double root_near(const struct imp__edge_choice *c, const double *moment, 
     return sqrt(0.5 * moment[k] + 0.25 * (before + after));
 }
 
-void imp__edge_choice_learn(struct imp__edge_choice *c, const double *moment)
+void imp__edge_choice_learn(struct imp__edge_choice *c, const double *moment, double kept)
 {
     double sum = 0, before = 0;
     for (int k = 0; k < c->n_cells; k++) sum += root_near(c, moment, k);
     if (!(sum > 0) || !(sum < INFINITY)) return;
     for (int k = 0; k < c->n_cells; k++) {
-        before += KEPT / c->n_cells + (1 - KEPT) * root_near(c, moment, k) / sum;
+        before += kept / c->n_cells + (1 - kept) * root_near(c, moment, k) / sum;
         c->cell[k + 1] = before;
     }
     for (int k = 0; k <= c->n_cells; k++) c->cell[k] /= before;

@@ -53,8 +53,9 @@ enum imp_status imp__edge_choice_begin(const struct imp__edges *edges,
                                        struct imp__edge_choice *out);
 void imp__edge_choice_free(struct imp__edge_choice *c);
 /* Second moments [n_cells] of what is estimated, per cell: integrals of the square over length,
- * of any unit. All zero: the choice stays as it is. */
-void imp__edge_choice_learn(struct imp__edge_choice *c, const double *moment);
+ * of any unit. All zero: the choice stays as it is. kept: the probability that stays with the measure. */
+void imp__edge_choice_learn(struct imp__edge_choice *c, const double *moment,
+                            double kept);
 
 /* u in [0, 1); neighbours on the list have neighbouring u. */
 void imp__edge_choice_draw(const struct imp__edge_choice *c, double u,

@@ -122,7 +122,7 @@ static void choice_test(int rings)
         moment[k] =
             k % 3 && k > 3 ? exp(3 * imp__u01(imp__key(2, 0, (uint64_t)k), 0)) : 0;
     test_must(ctx, imp__edge_choice_begin(&edges, &tree, measure, CELLS, &c));
-    imp__edge_choice_learn(&c, moment);
+    imp__edge_choice_learn(&c, moment, 0.15);
     draws_test(&c, "by what a pilot has found", 0.08);
     const double kept = c.cell[1] - c.cell[0];
     tap_near(kept, 0.15 / CELLS, 1e-12, 0, "a cell in which nothing was found is kept");

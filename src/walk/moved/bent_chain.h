@@ -48,6 +48,7 @@ struct imp__bent_ray {
 struct imp__bent_goal {
     imp_v3 p, across, axis;
     double radius;
+    bool on_glass; /* it lies on flat glass, or a rim of glass, and is seen from within */
 };
 struct imp__bent_root {
     imp_v3 from; /* the direction at the eye, or where a parallel ray begins */
@@ -85,6 +86,29 @@ struct imp__bent_ray imp__bent_begin(const struct imp__edge_draw *d, imp_v3 from
  * nowhere. */
 bool imp__bent_find(const struct imp__edge_draw *d, const struct imp__bent_goal *goal,
                     struct imp__bent_root *x);
+/* How often light is reflected inside, up to `most`: m with the chance 1/((m + 1)(m + 2)), the last with the
+ * rest. */
+static inline int imp__inside_draw(double u, int most, double *chance)
+{
+    const int m = imp_min((int)(imp_min(1 / (1 - u), 1e6)) - 1, most);
+    *chance *= m < most ? 1 / ((m + 1.0) * (m + 2.0)) : 1 / (m + 1.0);
+    return m;
+}
+/* Plane k of a flat mirror or of glass, and which ones its shape has: how many, from which on. */
+struct imp__plane_range {
+    size_t first, n;
+    double index; /* behind its normal over in front of it; 0: it bends nothing */
+};
+/* The index of what is behind a hit's normal over what is in front of it; 0: it bends nothing. */
+double imp__glass_index(const struct imp_scene *scene, const struct imp__body *body);
+struct imp__plane_range imp__plane_surface(const struct imp__boundary *b, size_t k,
+                                           struct imp__bent_surface *out);
+/* Is it a chain of a plane that bends and planes that reflect behind it? Such roots are known; of places within
+ * glass. */
+bool imp__flat_chain(const struct imp__bent_goal *goal, const struct imp__bent_chain *c);
+bool imp__flat_draw(const struct imp__edge_draw *d, struct imp_key key,
+                    const struct imp__bent_goal *goal, struct imp__bent_root *x,
+                    double *draws);
 /* Is it a chain over one ball, of which all roots are known? */
 bool imp__round_chain(const struct imp__edge_draw *d, const struct imp__bent_goal *goal,
                       const struct imp__bent_chain *c);

@@ -11,18 +11,13 @@
 #include "walk/core/step.h"
 
 /* The index of a ball of glass, inside over outside; 0: it is a mirror. */
-static double ball_index(const struct imp_scene *scene, const struct imp__bender *x)
+static double ball_index(const struct imp_scene *scene, const struct imp__body *body,
+                         const struct imp_round *ball)
 {
-    const struct imp_hit hit = {.shape = x->shape, .place = x->place};
-    const struct imp_bsdf *b = imp__hit_bsdf(scene, &hit);
-    const struct imp_dirs dirs = {{0, 0, 1, 0}, {0}, IMP_GLASS_BENDS, 0};
-    const struct imp_texcoord nowhere = {.prim = 0};
-    imp_spec in[IMP_INPUTS_MAX];
-    if (!imp__is_glass(b)) return 0;
-    imp__inputs_eval(b->input, b->n_in, &nowhere, in);
-    const double index = b->ops->index_ratio(b, in, &dirs);
-    const struct imp__rim_point at = imp__rim(scene, x->shape, x->place, 0, 0);
-    return imp__dot(at.n, at.p - x->round.centre) > 0 ? index : 1 / index;
+    const double index = imp__glass_index(scene, body);
+    const struct imp__rim_point at = imp__rim(scene, body->shape, body->place, 0, 0);
+    const bool outwards = imp__dot(at.n, at.p - ball->centre) > 0;
+    return index > 0 && !outwards ? 1 / index : index;
 }
 
 enum imp_status imp__benders_add(struct imp__boundary *b, const struct imp__body *body)
@@ -49,7 +44,7 @@ enum imp_status imp__benders_add(struct imp__boundary *b, const struct imp__body
     b->bender = more;
     b->bender[b->n_benders++] = x;
     if (x.kind != IMP_BENDER_BALL) return IMP_OK;
-    x.index = ball_index(scene, &x);
+    x.index = ball_index(scene, body, &x.round);
     b->bender[b->n_benders - 1] = b->bender[b->n_balls]; /* balls come first */
     b->bender[b->n_balls++] = x;
     return IMP_OK;

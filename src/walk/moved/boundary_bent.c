@@ -26,7 +26,7 @@
 enum { WHICH, POINT_U, POINT_V, PLANES, FIRST = PLANES + 2 + 2 * IMP_SIGHT_MAX };
 #define LOBE_LEAST 0.1  /* probability of either lobe */
 #define STOP       0.3  /* that a chain ends before what it could go on with */
-#define STOP_GLASS 0.05 /* the same within glass */
+#define STOP_OTHER 0.05 /* the same where the place is hardly: within glass, or outside */
 #define PASSES     256  /* surfaces in all */
 
 /* A random point of one of these, with random numbers u in [0, 1). */
@@ -112,7 +112,7 @@ static bool surface_draw(const struct imp__edge_draw *d, const struct imp_hit *h
 
 /* The chain of surfaces that a ray meets. False: none, or flat mirrors alone. */
 static bool chain_draw(const struct imp__edge_draw *d, struct imp_key key, imp_v3 from,
-                       struct imp__bent_chain *out)
+                       bool on_glass, struct imp__bent_chain *out)
 {
     const struct imp_scene *scene = d->b->tracer->scene;
     const int depth = d->b->tracer->integrator->max_depth,
@@ -142,7 +142,7 @@ static bool chain_draw(const struct imp__edge_draw *d, struct imp_key key, imp_v
             continue;
         }
         if (!mirrors || out->n == longest || !surface_draw(d, &hit, &at, w, v, &s) ||
-            (bends && stop < (glass ? STOP_GLASS : STOP)))
+            (bends && stop < (glass == on_glass ? STOP : STOP_OTHER)))
             break;
         const imp_v3 n =
             s.radius > 0 ? imp__normalize(imp__across_axis(s.axis, at.p - s.p)) : s.n;
@@ -174,8 +174,11 @@ static bool root_draw(const struct imp__edge_draw *d, struct imp_key key,
                       const struct imp__bent_goal *goal, const struct imp__bent_root *of,
                       struct imp__bent_root *x)
 {
-    return ray_draw(d, key, &x->from) && chain_draw(d, key, x->from, &x->chain) &&
-           (of ? alike(&x->chain, &of->chain) : !imp__round_chain(d, goal, &x->chain)) &&
+    return ray_draw(d, key, &x->from) &&
+           chain_draw(d, key, x->from, goal->on_glass, &x->chain) &&
+           (of ? alike(&x->chain, &of->chain)
+               : !imp__round_chain(d, goal, &x->chain) &&
+                     !imp__flat_chain(goal, &x->chain)) &&
            imp__bent_find(d, goal, x) && (!of || imp__bent_same(d, of, x));
 }
 
@@ -253,8 +256,7 @@ static bool root_seen(struct imp__edge_draw *d, const struct imp__bent_root *x,
 
 #define COUNTS 0.1   /* what a root lets through that is always kept */
 #define STAGE  16384 /* draws, after which a draw goes on by chance */
-#define ROUND  0.7   /* of draws, where there are balls: over one of them */
-enum { KEEP = FIRST + 3 * PASSES, GO_ON, WHETHER_ROUND };
+enum { KEEP = FIRST + 3 * PASSES, GO_ON, WHICH_WAY };
 
 /* Roots that let little through are kept by chance: over glass that reflects inside there are many, and each
  * is looked for again as often as those that count. */
@@ -263,23 +265,35 @@ static double kept_chance(const struct imp__edge_draw *d, const struct imp__sigh
     return imp_min(imp__max_used(s->T, d->waves) / COUNTS, 1);
 }
 
-/* How often a root is looked for over one ball, where all are known. */
-static double round_chance(const struct imp__edge_draw *d,
+/* How often a root is looked for over one ball or within flat glass, where all are known; else by trials. */
+struct ways {
+    double round, flat, trials;
+};
+static struct ways ways_of(const struct imp__edge_draw *d,
                            const struct imp__bent_goal *goal)
 {
-    return d->b->n_balls > 0 && !(goal->radius > 0) ? ROUND : 0;
+    const bool known = !(goal->radius > 0);
+    const double round = known && d->b->n_balls > 0 ? 2 : 0,
+                 flat = !known || d->b->n_planes == 0 ? 0
+                        : goal->on_glass              ? 2
+                                                      : 0.1,
+                 all = 1 / (round + flat + 1);
+    return (struct ways){round * all, flat * all, all};
 }
 
 /* A root, and x->draws where it is known. */
 static bool root_any(const struct imp__edge_draw *d, struct imp_key key,
                      struct imp__bent_found *x)
 {
-    const double chance = round_chance(d, &x->goal);
+    const struct ways way = ways_of(d, &x->goal);
+    const double u = imp__u01(key, WHICH_WAY);
+    const bool round = u < way.round, flat = !round && u < way.round + way.flat;
     x->draws = 0;
-    if (!(imp__u01(key, WHETHER_ROUND) < chance))
-        return root_draw(d, key, &x->goal, NULL, &x->root);
-    if (!imp__round_draw(d, key, &x->goal, &x->root, &x->draws)) return false;
-    x->draws /= chance;
+    if (!round && !flat) return root_draw(d, key, &x->goal, NULL, &x->root);
+    if (!(round ? imp__round_draw : imp__flat_draw)(d, key, &x->goal, &x->root,
+                                                    &x->draws))
+        return false;
+    x->draws /= round ? way.round : way.flat;
     return true;
 }
 
@@ -290,14 +304,14 @@ double imp__bent_draws(const struct imp__edge_draw *d, const struct imp__bent_fo
 {
     double sum = 0, times = 1;
     if (x->draws > 0) return x->draws;
-    const double chance = round_chance(d, &x->goal);
+    const double chance = ways_of(d, &x->goal).trials;
     for (uint64_t k = 1, end = STAGE;; k++) {
         const struct imp_key key = imp__key(d->key.state, x->dims, k);
         struct imp__bent_root again;
         sum += times;
-        if (root_draw(d, key, &x->goal, &x->root, &again)) return sum / (1 - chance);
+        if (root_draw(d, key, &x->goal, &x->root, &again)) return sum / chance;
         if (k < end) continue;
-        if (imp__u01(key, GO_ON) < 0.5) return sum / (1 - chance);
+        if (imp__u01(key, GO_ON) < 0.5) return sum / chance;
         times *= 2;
         end += end;
     }
@@ -322,6 +336,28 @@ bool imp__bent_reach(struct imp__edge_draw *d, unsigned dims, imp_v3 p,
 {
     x->dims = dims;
     x->goal = (struct imp__bent_goal){.p = p};
+    return root_reach(d, s, x);
+}
+
+/* Is the draw's point one of an edge of glass? */
+static bool is_on_glass(const struct imp__edge_draw *d)
+{
+    struct imp_hit own = {.shape = -1};
+    if (d->edge) {
+        const struct imp__edge_face *f = &d->b->edges->face[d->edge->first];
+        own.shape = f->shape;
+        own.place = f->place;
+    } else if (d->rim && d->item->shape >= 0) {
+        own.shape = d->item->shape;
+        own.place = d->item->place;
+    }
+    return own.shape >= 0 && imp__is_glass(imp__hit_bsdf(d->b->tracer->scene, &own));
+}
+static bool edge_reach(struct imp__edge_draw *d, struct imp__sight *s,
+                       struct imp__bent_found *x)
+{
+    x->dims = 0;
+    x->goal = (struct imp__bent_goal){.p = d->p, .on_glass = is_on_glass(d)};
     return root_reach(d, s, x);
 }
 
@@ -359,11 +395,10 @@ bool imp__bent_any(struct imp__edge_draw *d, struct imp__sight *s,
     if (curved && imp__moves_cylinder(scene, d->item->shape, d->item->place, &tube)) {
         bool wall;
         return imp__edge_tube_part(d, &tube, &wall) &&
-               (wall ? wall_reach(d, &tube, s, x) : imp__bent_reach(d, 0, d->p, s, x));
+               (wall ? wall_reach(d, &tube, s, x) : edge_reach(d, s, x));
     }
     if (!curved || !imp__moves_sphere(scene, d->item->shape, d->item->place, &round))
-        return imp__edge_any(d, d->eye, d->b->parallel) &&
-               imp__bent_reach(d, 0, d->p, s, x);
+        return imp__edge_any(d, d->eye, d->b->parallel) && edge_reach(d, s, x);
     const double u[2] = {d->u, imp__u01(d->key, IMP_EDGE_DIR_U)};
     x->dims = 0;
     x->goal = (struct imp__bent_goal){

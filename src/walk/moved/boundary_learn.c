@@ -88,7 +88,11 @@ static bool look(struct pilot *x, enum imp__boundary_kind kind, int64_t index, i
 
 static double square3(const double *v) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
 
-#define KEPT 0.3 /* probability that stays as it was */
+#define KEPT 0.3 /* probability that stays as it was, of spheres and edges */
+/* The same along the list of edges; and where they may be seen over chains that few draws find, which a pilot
+ * misses, and whose roots count for much. */
+#define KEPT_ALONG 0.15
+#define KEPT_BENT  0.5
 
 /* Spheres and edges by roots of the second moments that each would have alone. What is counted of one
  * that was chosen with the probability c is that moment over c. */
@@ -147,7 +151,9 @@ static void kind_learn(struct pilot *x, enum imp__boundary_kind kind, int64_t n)
         x->moment[d.cell] += sum;
     }
     x->b->moment[kind] = moment_after(x, x->b->part[kind], c->n_cells, n);
-    if (x->b->edges->n > 0) imp__edge_choice_learn(c, x->moment);
+    if (x->b->edges->n > 0)
+        imp__edge_choice_learn(c, x->moment,
+                               x->b->n_benders > 0 ? KEPT_BENT : KEPT_ALONG);
     if (x->b->n_items > 0) parts_learn(x, x->b->part[kind], c->n_cells);
 }
 

@@ -4,7 +4,7 @@
  * between a place and the camera, and velocities of images; and of what is seen in any. */
 #include "base/arguments.h"
 #include "base/context.h"
-#include "boundary_parts.h"
+#include "bent_chain.h"
 #include "kind/cleared.h"
 #include "moved_mirror.h"
 #include "walk/core/shaped.h"
@@ -19,6 +19,9 @@ struct imp__plane {
     int64_t facet; /* of the shape's first one: where plane_of has it; -1: it is a disk */
     imp_v3 p, n;   /* a point; unit normal */
     double loose;  /* how far from that the normal may be, in radians */
+    size_t first, behind; /* planes of the shape */
+    double
+        index; /* of glass, behind the normal over in front of it; 0: it bends nothing */
 };
 
 #define SAME 1e-6 /* of the scene's size: what is nearer is in the plane */
@@ -49,6 +52,7 @@ static bool plane_has(const struct imp__plane *x, const imp_v3 p[3], imp_v3 n,
                       double loose)
 {
     if (imp__length(imp__cross(x->n, n)) > x->loose + loose) return false;
+    if (x->index > 0 && imp__dot(x->n, n) < 0) return false; /* glass is on one side */
     for (int k = 0; k < 3; k++) {
         const imp_v3 r = p[k] - x->p;
         if (fabs(imp__dot(x->n, r)) > ROUND * most(p[k]) + x->loose * imp__length(r))
@@ -59,9 +63,10 @@ static bool plane_has(const struct imp__plane *x, const imp_v3 p[3], imp_v3 n,
 
 /* The plane of a triangle among those of its shape, from `first` on: the largest one tells its normal. */
 static enum imp_status facet_add(struct imp__boundary *b, size_t first,
-                                 struct imp__plane x, const imp_v3 p[3], int *plane)
+                                 struct imp__plane x, const imp_v3 p[3], double side,
+                                 int *plane)
 {
-    const imp_v3 n = imp__cross(p[1] - p[0], p[2] - p[0]);
+    const imp_v3 n = imp__cross(p[1] - p[0], p[2] - p[0]) * side;
     double longest = 0, far = 0;
     *plane = -1;
     if (imp__is_zero(n)) return IMP_OK;
@@ -81,6 +86,43 @@ static enum imp_status facet_add(struct imp__boundary *b, size_t first,
     return IMP_OK;
 }
 
+double imp__glass_index(const struct imp_scene *scene, const struct imp__body *body)
+{
+    const struct imp_hit hit = {.shape = body->shape, .place = body->place};
+    const struct imp_bsdf *b = imp__hit_bsdf(scene, &hit);
+    const struct imp_dirs dirs = {{0, 0, 1, 0}, {0}, IMP_GLASS_BENDS, 0};
+    const struct imp_texcoord nowhere = {.prim = 0};
+    imp_spec in[IMP_INPUTS_MAX];
+    if (!imp__is_glass(b)) return 0;
+    imp__inputs_eval(b->input, b->n_in, &nowhere, in);
+    return b->ops->index_ratio(b, in, &dirs);
+}
+
+/* Where normals of hits point, 1: as the order of corners tells. */
+static double side_of(const struct imp_scene *scene, const struct imp__body *body, int n)
+{
+    struct imp_hit hit = {.shape = body->shape, .place = body->place};
+    for (; hit.prim < n; hit.prim++) {
+        const imp_v3 unused = {0};
+        const struct imp__corners f =
+            imp__corners(scene, body->shape, hit.prim, body->place);
+        struct imp_surface at;
+        imp__hit_surface(scene, &hit, &unused, &unused, &at);
+        const double side = imp__dot(at.ng, imp__cross(f.p[1] - f.p[0], f.p[2] - f.p[0]));
+        if (side != 0) return side > 0 ? 1 : -1;
+    }
+    return 1;
+}
+
+/* Planes from `first` on are all that a shape has. */
+static void planes_end(struct imp__boundary *b, size_t first)
+{
+    for (size_t k = first; k < b->n_planes; k++) {
+        b->plane[k].first = first;
+        b->plane[k].behind = b->n_planes;
+    }
+}
+
 static enum imp_status facets_add(struct imp__boundary *b, const struct imp__body *body)
 {
     const struct imp_scene *scene = b->tracer->scene;
@@ -90,12 +132,15 @@ static enum imp_status facets_add(struct imp__boundary *b, const struct imp__bod
         imp__grow(scene->ctx, b->plane_of, &b->cap_facets, b->n_facets + n, sizeof *more);
     if (!more) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for mirrors");
     b->plane_of = more;
-    const struct imp__plane x = {
-        .shape = body->shape, .place = body->place, .facet = (int64_t)b->n_facets};
+    const struct imp__plane x = {.shape = body->shape,
+                                 .place = body->place,
+                                 .facet = (int64_t)b->n_facets,
+                                 .index = imp__glass_index(scene, body)};
+    const double side = x.index > 0 ? side_of(scene, body, (int)n) : 1;
     for (size_t i = 0; i < n; i++) {
         const struct imp__corners f =
             imp__corners(scene, body->shape, (int)i, body->place);
-        IMP_CHECKED(facet_add(b, first, x, f.p, &b->plane_of[b->n_facets++]));
+        IMP_CHECKED(facet_add(b, first, x, f.p, side, &b->plane_of[b->n_facets++]));
         if (b->n_planes - first > MOST)
             return imp__error(
                 scene->ctx, IMP_E_UNSUPPORTED,
@@ -106,6 +151,15 @@ static enum imp_status facets_add(struct imp__boundary *b, const struct imp__bod
     return IMP_OK;
 }
 
+struct imp__plane_range imp__plane_surface(const struct imp__boundary *b, size_t k,
+                                           struct imp__bent_surface *out)
+{
+    const struct imp__plane *x = &b->plane[k];
+    *out = (struct imp__bent_surface){
+        .p = x->p, .n = x->n, .shape = x->shape, .place = x->place};
+    return (struct imp__plane_range){x->first, x->behind - x->first, x->index};
+}
+
 enum imp_status imp__mirrors_find(struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
@@ -113,8 +167,10 @@ enum imp_status imp__mirrors_find(struct imp__boundary *b)
         const struct imp__body *body = &b->edges->body[k];
         const int placed = imp__placed_shape(scene, body->shape, body->place);
         if (!imp__mirror_lobes(imp__shape_bsdf(scene, scene->shapes[placed]))) continue;
+        const size_t first = b->n_planes;
         if (scene->shapes[body->shape]->geometry == IMP_TRIANGLES) {
             IMP_CHECKED(facets_add(b, body));
+            planes_end(b, first);
             if (imp__is_glass(imp__shape_bsdf(scene, scene->shapes[placed])))
                 IMP_CHECKED(imp__benders_add(b, body));
             continue;
@@ -124,8 +180,14 @@ enum imp_status imp__mirrors_find(struct imp__boundary *b)
             continue;
         }
         const struct imp__rim_point rim = imp__rim(scene, body->shape, body->place, 0, 0);
-        const struct imp__plane x = {body->shape, body->place, -1, rim.p, rim.n, 0};
+        const struct imp__plane x = {.shape = body->shape,
+                                     .place = body->place,
+                                     .facet = -1,
+                                     .p = rim.p,
+                                     .n = rim.n,
+                                     .index = imp__glass_index(scene, body)};
         IMP_CHECKED(plane_add(b, &x));
+        planes_end(b, first);
         if (imp__is_glass(imp__shape_bsdf(scene, scene->shapes[placed])))
             IMP_CHECKED(imp__benders_add(b, body));
     }

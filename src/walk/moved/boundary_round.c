@@ -123,14 +123,6 @@ enum { WHICH_BALL, WHICH_WAY, WHICH_ROOT };
 #define REFLECTED 0.25 /* of glass */
 #define WAYS      (4 * IMP_SIGHT_MAX)
 
-/* How often it is reflected inside, up to `most`: m with the chance 1/((m + 1)(m + 2)), the last with the rest. */
-static int inside_draw(double u, int most, double *chance)
-{
-    const int m = imp_min((int)(imp_min(1 / (1 - u), 1e6)) - 1, most);
-    *chance *= m < most ? 1 / ((m + 1.0) * (m + 2.0)) : 1 / (m + 1.0);
-    return m;
-}
-
 static void chain_set(const struct imp__bender *ball, int inside,
                       struct imp__bent_chain *out)
 {
@@ -169,8 +161,8 @@ bool imp__round_draw(const struct imp__edge_draw *d, struct imp_key key,
         chance *= u < REFLECTED ? REFLECTED : 1 - REFLECTED;
         if (u >= REFLECTED) {
             turn.index = ball->index;
-            turn.inside =
-                1 + inside_draw((u - REFLECTED) / (1 - REFLECTED), longest - 2, &chance);
+            turn.inside = 1 + imp__inside_draw((u - REFLECTED) / (1 - REFLECTED),
+                                               longest - 2, &chance);
         }
     }
     const imp_v3 towards = imp__normalize(e), normal = imp__cross(towards, p);
