@@ -17,6 +17,9 @@
 #define GLASS                                                                            \
     "<bsdf type='dielectric'><float name='int_ior' value='1.5'/><float name='ext_ior' "  \
     "value='1'/></bsdf>"
+#define WIDE_SUN                                                                         \
+    "<emitter type='sun'><vector name='direction' value='-.9,.1,-.5'/><float "           \
+    "name='radius' value='.5'/><rgb name='radiance' value='3'/></emitter>"
 #define DARK  "<bsdf type='diffuse' id='grey'><rgb name='reflectance' value='0'/></bsdf>"
 #define BLACK "<bsdf type='diffuse'><spectrum name='reflectance' value='0'/></bsdf>"
 
@@ -219,6 +222,42 @@ static void axes_test(int spp_axis)
               2 * spp_axis);
 }
 
+/* ---- Skies --------------------------------------------------------------------------------- */
+
+/* Parallel rays from above see a sky in a ball of radius R: with i the angle to its normal, overcast, from the
+ * horizon on (i = pi/4) as bright as (1 + 2 cos 2i)/3; a sun of radius a (i = a/2). */
+static void sky_test(const char *what, const char *sky, double right, int spp)
+{
+    enum { ROOM = 2048 };
+    char xml[ROOM];
+    struct tap_stat g[1] = {{0, 0, 0}};
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' "
+             "value='3'/></integrator><sensor type='orthographic' id='camera'><transform "
+             "name='to_world'><lookat origin='0,0,2' target='0,0,0' up='0,1,0'/>"
+             "</transform><film type='hdrfilm'><integer name='width' value='8'/><integer "
+             "name='height' value='8'/><rfilter type='box'/></film></sensor>"
+             "<shape type='sphere' id='ball'><float name='radius' value='.8'/>" PERFECT
+             "</shape>%s</scene>",
+             sky);
+    imp_scene *scene = test_scene_text(ctx, xml, IMP_MONO);
+    test_must(ctx, imp_scene_add_geometry(scene, "ball.radius"));
+    mean_gradient(ctx, scene, "ball.radius", spp, 16, g);
+    tap_z(&g[0], right, 0.01 * fabs(right), what);
+    imp_scene_destroy(scene);
+}
+
+static void skies_test(int spp)
+{
+    sky_test("a horizon in a ball that grows",
+             "<emitter type='ciesky'><float name='zenith' value='1'/></emitter>",
+             .8 * IMP_PI / 6, spp);
+    sky_test("a sun in a ball that grows",
+             "<emitter type='sun'><vector name='direction' value='0,0,-1'/><float "
+             "name='radius' value='.3'/><rgb name='radiance' value='10'/></emitter>",
+             5 * IMP_PI * .8 * imp__sqr(sin(.15)), spp);
+}
+
 /* ---- Walks --------------------------------------------------------------------------------- */
 
 static void frozen_test(const char *what, imp_scene *scene)
@@ -251,9 +290,17 @@ static void refused_test(void)
     number_refused("a thin tube of glass",
                    room(PATH TUBE("<bsdf type='thindielectric'/>")), "block.pose",
                    "none of conductor");
-    number_refused("a horizon in a ball",
-                   room(PATH "<emitter type='ciesky'/>" BALL(PERFECT)), "block.pose",
-                   "curved mirror");
+    number_refused(
+        "a horizon in a ball, to a meter",
+        test_scene_text(ctx,
+                        "<scene version='3.0.0'>" PATH "<emitter type='ciesky'/>" BALL(
+                            PERFECT) "<shape type='rectangle'><sensor "
+                                     "type='irradiancemeter'><film type='hdrfilm'>"
+                                     "<integer name='width' value='24'/><integer "
+                                     "name='height' value='16'/></film></sensor></shape>"
+                                     "</scene>",
+                        IMP_RGB),
+        "ball.center", "the sensor is a surface");
     number_refused("a ball in the floor",
                    room(PATH "<shape type='sphere' id='ball'>" GLASS "</shape>"),
                    "block.pose", "passes through");
@@ -297,6 +344,7 @@ int main(int argc, char **argv)
     ctx = test_context(2);
     adjoint_make();
     axes_test(is_long ? 768 : 48);
+    skies_test(is_long ? 1024 : 64);
     frozen_test("walks over a ball", room(DEEP BALL(METAL)));
     frozen_test("walks through glass", room(DEEP BALL(GLASS)));
     frozen_test("walks through glass, under a sky", room(SKY DEEP BALL(GLASS)));
@@ -312,7 +360,7 @@ int main(int argc, char **argv)
             room_of("<integrator type='direct'/>" SKY TUBE(PERFECT) BEHIND, DARK), 192,
             640, .15, tube);
         numbers_compare("a rod of glass", room_of(DEEP SKY TUBE(GLASS) POLE BEHIND, DARK),
-                        192, 640, .15, tube);
+                        384, 640, .15, tube);
         numbers_compare(
             "a pole in a ball",
             room_of("<integrator type='direct'/>" SKY BALL(PERFECT) POLE, DARK), 256, 640,
@@ -330,6 +378,11 @@ int main(int argc, char **argv)
                         512, .1, block);
         numbers_compare("a block of glass that moves", room_of(DEEP SKY THICK, DARK), 512,
                         640, .25, pane);
+        numbers_compare("a wide sun over a ball", room(PATH WIDE_SUN BALL(PERFECT)), 192,
+                        512, .2, balls);
+        numbers_compare("an overcast sky over a rod of glass",
+                        room_of(DEEP "<emitter type='ciesky'/>" TUBE(GLASS) BEHIND, DARK),
+                        192, 512, .2, images);
         numbers_compare("a ball in a lit room", room(PATH BALL(METAL) BEHIND), 192, 512,
                         .2, images);
     }

@@ -18,7 +18,7 @@ struct imp__bender {
     enum imp__bender_kind kind;
     int shape;
     int64_t place;
-    struct imp_round round; /* of a ball */
+    struct imp_round round; /* of a ball; of others a ball around it */
     double index;           /* of a ball of glass, inside over outside; 0: another */
     struct imp__tube tube;
     int n_facets; /* of a mesh */
@@ -43,18 +43,19 @@ struct imp__bent_ray {
     imp_v3 o, w, o_d[2], w_d[2];
 };
 
-/* What the ray is to meet: a place, or, where radius > 0, a ball that it touches, at the plane across
+/* What the ray is to meet: a place, or a direction, or, where radius > 0, a ball that it touches, at the plane across
  * `across` through its centre; of a cylinder about the axis through p, at that plane through p. */
 struct imp__bent_goal {
     imp_v3 p, across, axis;
     double radius;
+    bool far;      /* `across` is the unit direction that is wanted behind all surfaces */
     bool on_glass; /* it lies on flat glass, or a rim of glass, and is seen from within */
 };
 struct imp__bent_root {
     imp_v3 from; /* the direction at the eye, or where a parallel ray begins */
     struct imp__bent_chain chain;
     imp_v3 p, w;  /* where the goal is met, along w */
-    double det;   /* of dp/dw across w */
+    double det;   /* of dp/dw across w; of a direction, of that by the one at the eye */
     imp_v3 along; /* of lines that touch: the direction of the curve of all these */
 };
 
@@ -73,6 +74,9 @@ bool imp__bent_reach(struct imp__edge_draw *d, unsigned dims, imp_v3 p,
  * what the camera sees. */
 bool imp__bent_any(struct imp__edge_draw *d, struct imp__sight *s,
                    struct imp__bent_found *x);
+/* The same of what is infinitely far along the unit vector w. */
+bool imp__bent_reach_far(struct imp__edge_draw *d, imp_v3 w, struct imp__sight *s,
+                         struct imp__bent_found *x);
 /* One over the probability that a draw finds this, in the mean. It takes long: for what counts. */
 double imp__bent_draws(const struct imp__edge_draw *d, const struct imp__bent_found *x);
 

@@ -55,7 +55,7 @@
  * a vertex lines are reflected by chance; to the camera they are aimed, over chains of planes that are
  * drawn. Light samples meet no mirror: what a light sends over one is scattered light.
  *
- * Mirrors that are balls, and balls of clear glass, turn lines likewise. Area across rays times solid angle
+ * Mirrors that are balls or tubes, and clear glass, turn lines likewise. Area across rays times solid angle
  * times the square of the index of refraction stays as it is along each of them, so that lines from edges
  * have no factor but of what is reflected or let through. From the camera to an edge a ray is looked for
  * (boundary_bent.c), with W by its derivatives. At the limb of such a ball all light is reflected, and goes

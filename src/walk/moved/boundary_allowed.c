@@ -273,7 +273,17 @@ static enum imp_status turns_allowed(const struct imp__boundary *b)
     return IMP_OK;
 }
 
-/* Where a mirror turns, circles at which a sky jumps move in it as any vertex sees it, and none is drawn
+/* Is it no glass, and of planes? */
+static bool is_flat(const struct imp_scene *scene, const struct imp_hit *hit)
+{
+    struct imp_round round;
+    struct imp__tube tube;
+    return !imp__is_glass(imp__hit_bsdf(scene, hit)) &&
+           !imp__moves_sphere(scene, hit->shape, hit->place, &round) &&
+           !imp__moves_cylinder(scene, hit->shape, hit->place, &tube);
+}
+
+/* Where a flat mirror turns, circles at which a sky jumps move in it as any vertex sees it, and none is drawn
  * there but what the camera sees; of parallel rays not that either. */
 static enum imp_status skies_allowed(const struct imp__boundary *b)
 {
@@ -286,7 +296,7 @@ static enum imp_status skies_allowed(const struct imp__boundary *b)
             const struct imp__body *x = &b->edges->body[j];
             const struct imp_hit hit = {.shape = x->shape, .place = x->place};
             turns |=
-                imp__mirror_lobes(imp__hit_bsdf(scene, &hit)) &&
+                imp__mirror_lobes(imp__hit_bsdf(scene, &hit)) && is_flat(scene, &hit) &&
                 imp__moves_shape(b->moves, imp__carrier(scene, x->shape, x->place), NULL);
         }
         if (turns && e->ops->jumps(e, circle) > 0)
@@ -323,11 +333,11 @@ static enum imp_status bends_allowed(const struct imp__boundary *b)
     for (int k = 0; k < scene->n_environments; k++) {
         const struct imp_emitter *e = scene->emitters[scene->environments[k]];
         struct imp_sky_circle circle[IMP_SKY_CIRCLES];
-        if (e->ops->jumps(e, circle) > 0)
+        if (b->tracer->sensor->shape && e->ops->jumps(e, circle) > 0)
             return imp__error(
                 scene->ctx, IMP_E_UNSUPPORTED,
                 "derivatives by what moves: light '%s' (%s) jumps at its horizon or sun, "
-                "%s",
+                "and the sensor is a surface, %s",
                 e->name ? e->name : "", e->ops->name, where);
     }
     for (size_t k = 0; k < b->edges->n_bodies; k++) {

@@ -20,6 +20,35 @@ static double ball_index(const struct imp_scene *scene, const struct imp__body *
     return index > 0 && !outwards ? 1 / index : index;
 }
 
+/* A ball around a shape. */
+static struct imp_round ball_around(const struct imp_scene *scene,
+                                    const struct imp__bender *x)
+{
+    imp_v3 lo = {INFINITY, INFINITY, INFINITY, 0}, hi = -lo;
+    for (int k = 0; k < x->n_facets; k++) {
+        const struct imp__corners f = imp__corners(scene, x->shape, k, x->place);
+        for (int i = 0; i < 3; i++)
+            for (int c = 0; c < 3; c++) {
+                lo[c] = imp_min(lo[c], f.p[i][c]);
+                hi[c] = imp_max(hi[c], f.p[i][c]);
+            }
+    }
+    struct imp_round out = {.centre = (lo + hi) * 0.5,
+                            .radius = 0.5 * imp__length(hi - lo)};
+    if (x->kind == IMP_BENDER_TUBE) {
+        out.centre = x->tube.base + x->tube.axis * (0.5 * x->tube.length);
+        out.radius = hypot(0.5 * x->tube.length, x->tube.radius);
+    }
+    if (x->kind == IMP_BENDER_DISK) {
+        const imp_v3 p = imp__rim(scene, x->shape, x->place, 0, 0).p,
+                     q = imp__rim(scene, x->shape, x->place, 0, 0.25).p;
+        out.centre = (p + imp__rim(scene, x->shape, x->place, 0, 0.5).p) * 0.5;
+        /* An oval one is within the sum of two conjugate radii. */
+        out.radius = imp__length(p - out.centre) + imp__length(q - out.centre);
+    }
+    return out;
+}
+
 enum imp_status imp__benders_add(struct imp__boundary *b, const struct imp__body *body)
 {
     const struct imp_scene *scene = b->tracer->scene;
@@ -41,6 +70,7 @@ enum imp_status imp__benders_add(struct imp__boundary *b, const struct imp__body
                           "light, and no sphere or circular cylinder where its instance "
                           "has it",
                           s->name);
+    if (x.kind != IMP_BENDER_BALL) x.round = ball_around(scene, &x);
     b->bender = more;
     b->bender[b->n_benders++] = x;
     if (x.kind != IMP_BENDER_BALL) return IMP_OK;
@@ -71,6 +101,42 @@ static double ball_density(const struct imp__bender *x, imp_v3 p, imp_v3 w)
     if (!(r2 < d2)) return 1 / (4 * IMP_PI);
     if (!(along > 0) || !(square > 0)) return 0;
     return along * sqrt(d2) / (IMP_2PI * r2 * sqrt(square));
+}
+
+#define ANYWHERE 0.1 /* of lines: across the whole scene, over flat mirrors, too */
+
+/* A point of a disk, and does a line through p meet it? */
+static imp_v3 disk_point(const struct imp_round *x, const struct imp_frame *f,
+                         const double u[2])
+{
+    const double r = x->radius * sqrt(u[0]);
+    return x->centre + f->s * (r * cos(IMP_2PI * u[1])) +
+           f->t * (r * sin(IMP_2PI * u[1]));
+}
+static double disk_density(const struct imp_round *x, imp_v3 w, imp_v3 p)
+{
+    const imp_v3 r = imp__across_axis(w, p - x->centre);
+    return imp__dot(r, r) < imp__sqr(x->radius) ? IMP_INV_PI / imp__sqr(x->radius) : 0;
+}
+
+imp_v3 imp__bent_line(const struct imp__edge_draw *d, imp_v3 w, const double u[2],
+                      double *spread)
+{
+    const struct imp__boundary *b = d->b;
+    const struct imp_scene *scene = b->tracer->scene;
+    const struct imp_round whole = {.centre = (scene->lo + scene->hi) * 0.5,
+                                    .radius = 0.5 * b->size};
+    const struct imp_frame f = imp__frame_from_normal(w);
+    const size_t n = b->n_benders;
+    const double v = imp__u01(d->key, IMP_EDGE_BENT) / (1 - ANYWHERE);
+    const imp_v3 p = disk_point(
+        v < 1 ? &b->bender[imp_min((size_t)(v * (double)n), n - 1)].round : &whole, &f,
+        u);
+    double density = ANYWHERE * disk_density(&whole, w, p);
+    for (size_t k = 0; k < n; k++)
+        density += (1 - ANYWHERE) * disk_density(&b->bender[k].round, w, p) / (double)n;
+    *spread = 1 / density;
+    return p + w * (2 * b->size);
 }
 
 imp_v3 imp__bent_direction(const struct imp__edge_draw *d, imp_v3 p, const double u[2],

@@ -274,9 +274,9 @@ static struct ways ways_of(const struct imp__edge_draw *d,
 {
     const bool known = !(goal->radius > 0);
     const double round = known && d->b->n_balls > 0 ? 2 : 0,
-                 flat = !known || d->b->n_planes == 0 ? 0
-                        : goal->on_glass              ? 2
-                                                      : 0.1,
+                 flat = !known || goal->far || d->b->n_planes == 0 ? 0
+                        : goal->on_glass                           ? 2
+                                                                   : 0.1,
                  all = 1 / (round + flat + 1);
     return (struct ways){round * all, flat * all, all};
 }
@@ -336,6 +336,14 @@ bool imp__bent_reach(struct imp__edge_draw *d, unsigned dims, imp_v3 p,
 {
     x->dims = dims;
     x->goal = (struct imp__bent_goal){.p = p};
+    return root_reach(d, s, x);
+}
+
+bool imp__bent_reach_far(struct imp__edge_draw *d, imp_v3 w, struct imp__sight *s,
+                         struct imp__bent_found *x)
+{
+    x->dims = 0;
+    x->goal = (struct imp__bent_goal){.across = w, .far = true};
     return root_reach(d, s, x);
 }
 

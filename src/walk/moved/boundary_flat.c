@@ -14,7 +14,8 @@
 bool imp__flat_chain(const struct imp__bent_goal *goal, const struct imp__bent_chain *c)
 {
     const struct imp__bent_surface *first = &c->at[0];
-    if (c->n == 0 || goal->radius > 0 || first->radius > 0 || !(first->ratio > 0))
+    if (c->n == 0 || goal->far || goal->radius > 0 || first->radius > 0 ||
+        !(first->ratio > 0))
         return false;
     for (int k = 1; k < c->n; k++) {
         const struct imp__bent_surface *s = &c->at[k];

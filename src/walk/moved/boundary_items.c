@@ -106,7 +106,8 @@ static bool is_border(const struct imp__sky_sun *sun, const struct imp_sky_circl
     return sun->radius > 0 && c->cosine > 0 && imp__dot(c->axis, sun->towards) > 1 - 1e-9;
 }
 
-/* Circles of a camera's pictures of skies, if it or the sky moves. */
+/* Circles of a camera's pictures of skies, if it or the sky moves; or whatever moves, where curved mirrors or
+ * glass show them. */
 static void circles_find(struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
@@ -115,7 +116,9 @@ static void circles_find(struct imp__boundary *b)
     for (int k = 0; k < scene->n_environments; k++) {
         const int sky = scene->environments[k];
         const struct imp_emitter *e = scene->emitters[sky];
-        if (!camera && !imp__moves_shape(b->moves, IMP_MOVE_EMITTER(sky), NULL)) continue;
+        if (!camera && b->n_benders == 0 &&
+            !imp__moves_shape(b->moves, IMP_MOVE_EMITTER(sky), NULL))
+            continue;
         const bool parts = imp__sky_in_parts(b->moves, sky);
         struct imp__sky_sun sun;
         imp__sky_sun_read(e, &sun);
@@ -123,7 +126,7 @@ static void circles_find(struct imp__boundary *b)
         const int n = e->ops->jumps(e, circle);
         for (int i = 0; i < n; i++) {
             const bool glued = !parts || is_border(&sun, &circle[i]);
-            if (camera || glued)
+            if (camera || glued || b->n_benders > 0)
                 b->item[b->n_items++] = (struct imp__edge_item){.kind = IMP_ITEM_SKY,
                                                                 .shape = -1,
                                                                 .sky = sky,
@@ -231,7 +234,8 @@ static double item_length(const struct imp__boundary *b,
 {
     if (item->kind == IMP_ITEM_BORDER) return kind == IMP_BOUNDARY_LIGHT ? b->size : 0;
     if (item->kind == IMP_ITEM_SKY) /* as large as the scene, if anything is there */
-        return kind == IMP_BOUNDARY_FILM
+        return kind == IMP_BOUNDARY_FILM ||
+                       (kind == IMP_BOUNDARY_SCATTER && b->n_benders > 0)
                    ? IMP_PI * (b->size > 0 && b->size < INFINITY ? b->size : 1) *
                          sqrt(1 - imp__sqr(item->circle.cosine))
                    : 0;

@@ -257,14 +257,11 @@ imp_v3 imp__mirrors_bar(const struct imp__mirrors *all, imp_v3 *p, imp_v3 bar,
     return bar;
 }
 
-struct imp__seen imp__mirrors_seen(const struct imp__mirrors *all, imp_v3 from, imp_v3 p,
-                                   imp_v3 bar, struct imp__flux_end *end, int *n_ends)
+/* From what is to the ray behind the first mirror, at the place out.p. */
+static struct imp__seen seen_through(const struct imp__mirrors *all, imp_v3 from,
+                                     struct imp__seen out, struct imp__flux_end *end,
+                                     int *n_ends)
 {
-    struct imp__seen out = {p, bar, {0}};
-    if (imp_likely(!all->bends)) {
-        out.bar = imp__mirrors_bar(all, &out.p, bar, end, n_ends);
-        return out;
-    }
     for (const struct imp__mirror *m = all->first; m; m = m->on) {
         /* The ray from q along w is at p = q + t w: p' = q' + t w'. */
         struct imp__link_point x = {.x = m->x, .moved_bar = out.bar};
@@ -278,6 +275,23 @@ struct imp__seen imp__mirrors_seen(const struct imp__mirrors *all, imp_v3 from, 
         end[(*n_ends)++].bar = x.bar;
     }
     return out;
+}
+
+struct imp__seen imp__mirrors_seen(const struct imp__mirrors *all, imp_v3 from, imp_v3 p,
+                                   imp_v3 bar, struct imp__flux_end *end, int *n_ends)
+{
+    struct imp__seen out = {p, bar, {0}};
+    if (imp_unlikely(all->bends)) return seen_through(all, from, out, end, n_ends);
+    out.bar = imp__mirrors_bar(all, &out.p, bar, end, n_ends);
+    return out;
+}
+
+struct imp__seen imp__mirrors_seen_far(const struct imp__mirrors *all, imp_v3 from,
+                                       imp_v3 turn, struct imp__flux_end *end,
+                                       int *n_ends)
+{
+    const struct imp__seen begin = {all->first->x.p, {0}, turn};
+    return seen_through(all, from, begin, end, n_ends);
 }
 
 void imp__seen_camera(const struct imp__edge_draw *d, const struct imp__seen *x,

@@ -145,6 +145,10 @@ struct imp__seen {
 };
 struct imp__seen imp__mirrors_seen(const struct imp__mirrors *all, imp_v3 from, imp_v3 p,
                                    imp_v3 bar, struct imp__flux_end *end, int *n_ends);
+/* The same of an adjoint of the direction behind all of them. */
+struct imp__seen imp__mirrors_seen_far(const struct imp__mirrors *all, imp_v3 from,
+                                       imp_v3 turn, struct imp__flux_end *end,
+                                       int *n_ends);
 /* What that counts where it is the camera that sees: two ends at most. */
 void imp__seen_camera(const struct imp__edge_draw *d, const struct imp__seen *x,
                       struct imp__flux *f);
@@ -176,6 +180,10 @@ imp_v3 imp__sight_image(const struct imp__sight *s, imp_v3 p);
 bool imp__sight_film(const struct imp__edge_draw *d, struct imp__sight *s, imp_v3 mirror);
 
 /* ---- Curved mirrors and glass: boundary_bent.c, boundary_bender.c ---- */
+/* A line of the direction w that meets the scene, mostly one that meets such a shape: a point of it before all
+ * shapes, and one over the density per area across it. */
+imp_v3 imp__bent_line(const struct imp__edge_draw *d, imp_v3 w, const double u[2],
+                      double *spread);
 enum imp_status imp__benders_add(struct imp__boundary *b, const struct imp__body *body);
 /* What a hit lets through of power along the unit vector w, and bends, by this ratio (imp__bend). 0: nothing. */
 imp_spec imp__edge_refracted(const struct imp__edge_draw *d, const struct imp_hit *hit,
@@ -423,6 +431,11 @@ imp_spec imp__edge_sent(const struct imp__edge_draw *d, int light, double cosine
 void imp__draw_scatter(struct imp__edge_draw *d);
 void imp__draw_sky_film(struct imp__edge_draw *d);
 void imp__draw_sky_mirrored(struct imp__edge_draw *d);
+/* Over curved mirrors and glass, as the camera sees it, and what it lights so. */
+void imp__draw_sky_bent(struct imp__edge_draw *d);
+void imp__draw_sky_scatter(struct imp__edge_draw *d);
+/* A direction of the item's circle; sets d->along and d->inv_pdf, per length at the distance 1. */
+imp_v3 imp__sky_circle_draw(struct imp__edge_draw *d);
 /* How much more arrives from next to w, a point of the item's circle, on the side that m points away
  * from. */
 imp_spec imp__sky_jump(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m);

@@ -79,6 +79,33 @@ static bool pencil_pass(struct imp__bent_ray *x, struct imp__bent_surface *s)
 
 /* ---- Roots ------------------------------------------------------------------------------- */
 
+/* How far F is from 0, of the derivative J, and the step there. */
+static bool newton_step(const double F[2], double J[2][2], double *miss, double step[2])
+{
+    const double det = J[0][0] * J[1][1] - J[0][1] * J[1][0];
+    *miss = sqrt(F[0] * F[0] + F[1] * F[1]);
+    step[0] = -(J[1][1] * F[0] - J[0][1] * F[1]) / det;
+    step[1] = -(J[0][0] * F[1] - J[1][0] * F[0]) / det;
+    return isfinite(*miss) && isfinite(step[0]) && isfinite(step[1]);
+}
+
+/* The same of a direction. */
+static bool aim_far(const struct imp__bent_goal *goal, const struct imp__bent_ray *ray,
+                    struct imp__bent_root *x, double *miss, double step[2])
+{
+    const struct imp_frame f = imp__frame_from_normal(goal->across);
+    const double F[2] = {imp__dot(f.s, ray->w), imp__dot(f.t, ray->w)};
+    double J[2][2];
+    if (!(imp__dot(goal->across, ray->w) > 0)) return false;
+    for (int k = 0; k < 2; k++) {
+        J[0][k] = imp__dot(f.s, ray->w_d[k]);
+        J[1][k] = imp__dot(f.t, ray->w_d[k]);
+    }
+    x->p = ray->o;
+    x->det = J[0][0] * J[1][1] - J[0][1] * J[1][0];
+    return newton_step(F, J, miss, step);
+}
+
 /* How far the ray of these numbers is from the goal, and the step to it. False: it does not go over the
  * chain, or away from the goal. */
 static bool aim(const struct imp__edge_draw *d, const struct imp__bent_goal *goal,
@@ -89,12 +116,13 @@ static bool aim(const struct imp__edge_draw *d, const struct imp__bent_goal *goa
     imp_v3 at[2];
     for (int k = 0; k < x->chain.n; k++)
         if (!pencil_pass(&ray, &x->chain.at[k])) return false;
+    x->w = ray.w;
+    if (goal->far) return aim_far(goal, &ray, x, miss, step);
     const imp_v3 to = imp__across_axis(goal->axis, goal->p - ray.o),
                  w = imp__across_axis(goal->axis, ray.w);
     const double square = imp__dot(w, w), t = imp__dot(to, ray.w) / square;
     if (!(t > 0)) return false;
     const struct imp_frame f = imp__frame_from_normal(ray.w);
-    x->w = ray.w;
     x->p = ray.o + ray.w * t;
     for (int k = 0; k < 2; k++) at[k] = ray.o_d[k] + ray.w_d[k] * t;
     x->det = imp__dot(f.s, at[0]) * imp__dot(f.t, at[1]) -
@@ -122,11 +150,7 @@ static bool aim(const struct imp__edge_draw *d, const struct imp__bent_goal *goa
             J[1][k] = imp__dot(f.t, at[k]);
         }
     }
-    const double det = J[0][0] * J[1][1] - J[0][1] * J[1][0];
-    *miss = sqrt(F[0] * F[0] + F[1] * F[1]);
-    step[0] = -(J[1][1] * F[0] - J[0][1] * F[1]) / det;
-    step[1] = -(J[0][0] * F[1] - J[1][0] * F[0]) / det;
-    return isfinite(*miss) && isfinite(step[0]) && isfinite(step[1]);
+    return newton_step(F, J, miss, step);
 }
 
 #define STEPS    20 /* of Newton's method */
@@ -146,10 +170,11 @@ static imp_v3 stepped(const struct imp__edge_draw *d, imp_v3 from, const double 
 bool imp__bent_find(const struct imp__edge_draw *d, const struct imp__bent_goal *goal,
                     struct imp__bent_root *x)
 {
+    const double exact = EXACT * (goal->far ? 1 : d->b->size);
     double miss, step[2];
     if (!aim(d, goal, x, &miss, step)) return false;
     for (int k = 0; k < STEPS; k++) {
-        const bool last = miss <= EXACT * d->b->size;
+        const bool last = miss <= exact;
         const double length = sqrt(step[0] * step[0] + step[1] * step[1]),
                      most = WIDEST * (d->b->parallel ? d->b->size : 1);
         double part = length > most ? most / length : 1;

@@ -22,7 +22,7 @@
 
 /* What the angle depends on; lengths per radius of the ball. */
 struct turn {
-    double eye, place; /* distances; INFINITY: parallel rays */
+    double eye, place; /* distances; INFINITY: parallel rays, and directions */
     double index;      /* of glass; 0: it reflects */
     int inside;        /* m + 1 */
 };
@@ -107,7 +107,8 @@ bool imp__round_chain(const struct imp__edge_draw *d, const struct imp__bent_goa
         !imp__is_zero(first->axis))
         return false;
     const double near = d->b->parallel ? INFINITY : imp__length(d->eye - first->p);
-    if (!(near > first->radius) || !(imp__length(goal->p - first->p) > first->radius))
+    if (!(near > first->radius) ||
+        (!goal->far && !(imp__length(goal->p - first->p) > first->radius)))
         return false;
     if (first->ratio == 0) return c->n == 1;
     for (int k = 1; k < c->n; k++) {
@@ -150,10 +151,10 @@ bool imp__round_draw(const struct imp__edge_draw *d, struct imp_key key,
     const double which = imp__u01(key, WHICH_BALL) * (double)b->n_balls;
     const struct imp__bender *ball = &b->bender[imp_min((size_t)which, b->n_balls - 1)];
     const double R = ball->round.radius, u = imp__u01(key, WHICH_WAY);
-    const imp_v3 p = goal->p - ball->round.centre,
+    const imp_v3 p = goal->far ? goal->across : goal->p - ball->round.centre,
                  e = b->parallel ? -d->eye : d->eye - ball->round.centre;
     struct turn turn = {.eye = b->parallel ? INFINITY : imp__length(e) / R,
-                        .place = imp__length(p) / R};
+                        .place = goal->far ? INFINITY : imp__length(p) / R};
     double chance = 1 / (double)b->n_balls;
     if (goal->radius > 0 || longest < 1 || !(turn.eye > 1) || !(turn.place > 1))
         return false;

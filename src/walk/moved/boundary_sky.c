@@ -25,8 +25,7 @@ imp_spec imp__sky_jump(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m)
     return L[0] - L[1];
 }
 
-/* A direction of the item's circle; sets d->along and d->inv_pdf, per length at the distance 1. */
-static imp_v3 circle_draw(struct imp__edge_draw *d)
+imp_v3 imp__sky_circle_draw(struct imp__edge_draw *d)
 {
     const struct imp_sky_circle *c = &d->item->circle;
     const double psi = IMP_2PI * d->u;
@@ -40,7 +39,7 @@ static imp_v3 circle_draw(struct imp__edge_draw *d)
 void imp__draw_sky_film(struct imp__edge_draw *d)
 {
     const struct imp_sensor *sensor = d->b->tracer->sensor;
-    const imp_v3 w = circle_draw(d);
+    const imp_v3 w = imp__sky_circle_draw(d);
     struct imp_sensor_sample to;
     struct imp__line line;
     if (d->b->fog) return; /* none of it comes through */
@@ -54,7 +53,7 @@ void imp__draw_sky_film(struct imp__edge_draw *d)
 void imp__draw_sky_mirrored(struct imp__edge_draw *d)
 {
     const int max = d->b->tracer->integrator->max_depth;
-    const imp_v3 w = circle_draw(d), m = imp__cross(d->along, w);
+    const imp_v3 w = imp__sky_circle_draw(d), m = imp__cross(d->along, w);
     struct imp__sight s;
     struct imp__line line;
     if (!d->b->tracer->sensor->ops->connect || !imp__sight_draw(d, 0, &s) ||
