@@ -26,6 +26,15 @@ struct imp_majorants {
     } * control;
 };
 
+/* Cells of a volume along x, y and z, by what is told of its numbers. */
+static inline void imp__grid_cells(const struct imp_param_info *info, int n[3])
+{
+    const bool colours = info->flags & IMP_PARAM_COLOR; /* [layers y][x][3] */
+    n[2] = (int)info->layers;
+    n[1] = colours ? (int)(info->dims[0] / info->layers) : (int)info->dims[1];
+    n[0] = (int)info->dims[colours ? 1 : 2];
+}
+
 /* Makes m->majorants, unless its extinction is the same everywhere. */
 enum imp_status imp__majorants_create(struct imp_scene *scene,
                                       const struct imp_node *node, struct imp_medium *m);

@@ -23,9 +23,13 @@ static inline bool imp__is_border(const struct imp_scene *scene,
     return s->interior != s->exterior && imp__shape_bsdf(scene, s)->flags & IMP_BSDF_NULL;
 }
 
+/* Has a medium of the scene an extinction that varies? */
+bool imp__media_vary(const struct imp_scene *scene);
+
 struct imp__borders {
     const struct imp_scene *scene;
-    bool any;
+    bool any;                         /* media end within the scene, or vary */
+    bool varies;                      /* one of them does */
     const struct imp_medium *outside; /* of all of them */
 };
 /* otherwise: the medium outside where there is none. */

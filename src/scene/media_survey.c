@@ -54,10 +54,20 @@ static imp_v3 inner_point(const struct imp_shape *s)
     return p;
 }
 
+bool imp__media_vary(const struct imp_scene *scene)
+{
+    for (int k = 0; k < scene->n_media; k++)
+        if (scene->media[k]->majorants) return true;
+    return false;
+}
+
 struct imp__borders imp__borders_of(const struct imp_scene *scene,
                                     const struct imp_medium *otherwise)
 {
-    struct imp__borders out = {.scene = scene, .outside = otherwise};
+    struct imp__borders out = {.scene = scene,
+                               .any = otherwise && otherwise->majorants,
+                               .varies = imp__media_vary(scene),
+                               .outside = otherwise};
     for (int k = 0; k < scene->n_all_shapes; k++) {
         const struct imp_shape *s = scene->shapes[k];
         if (!imp__is_border(scene, s)) continue;

@@ -256,6 +256,10 @@ bool imp__volume_box(const struct imp_texture *t, imp_v3 *lo, imp_v3 *hi);
  * what is scattered there. NULL: none. */
 const struct imp_medium *imp__volume_jumps(const struct imp_scene *scene,
                                            const struct imp_pose *p);
+/* Does a medium end at a side of its own box where it is not 0, within what bounds it? outside: nothing else
+ * does. moves: what bounds it does, and may touch no such side. */
+bool imp__medium_ends_bright(const struct imp_scene *scene, const struct imp_medium *m,
+                             bool outside, bool moves);
 /* One that would if the volume's cells changed but those that are held [its numbers]. NULL: none is. */
 const struct imp_medium *imp__volume_may_jump(const struct imp_scene *scene,
                                               const struct imp_pose *p,

@@ -164,10 +164,10 @@ static struct border border_of(const struct imp_scene *scene, const struct imp_m
     const struct imp_param_info *info = &scene->params[m->majorants->box->param].info;
     struct border b = {.scene = scene,
                        .medium = m,
-                       .n = {(int)info->dims[2], (int)info->dims[1], (int)info->dims[0]},
                        .near = 1e-6 * imp__length(scene->hi - scene->lo),
                        .lo = imp__v3(INFINITY, INFINITY, INFINITY),
                        .hi = -imp__v3(INFINITY, INFINITY, INFINITY)};
+    imp__grid_cells(info, b.n);
     b.channels = (int)(info->count / ((size_t)b.n[0] * b.n[1] * b.n[2]));
     for (int k = 0; k < scene->n_sensors; k++)
         b.everywhere |= scene->sensors[k]->medium == m;
@@ -242,6 +242,49 @@ static bool side_is_dark(const struct border *b, int side)
             if (may_reach(b, lo, hi) && !is_dark(b, x)) return false;
         }
     return true;
+}
+
+/* Lie all shapes that bound the medium from within on this side, or before it? In their own way (`moves`)
+ * they may not touch it. */
+static bool side_is_behind(const struct border *b, int side, bool moves)
+{
+    const int axis = side / 2;
+    const struct imp_majorants *g = b->medium->majorants;
+    imp_v3 edge = {0};
+    edge[axis] = 1;
+    const double near =
+        (moves ? -1 : 1) * b->near / imp__length(imp__vector(&g->to_world, edge));
+    double most = -INFINITY;
+    if (b->everywhere) return false;
+    for (int k = 0; k < b->scene->n_all_shapes; k++) {
+        const struct imp_shape *s = b->scene->shapes[k];
+        const struct imp_triangles *t = &s->triangles;
+        const bool mesh = s->geometry == IMP_TRIANGLES;
+        const size_t n = mesh ? t->n_vertices : 8;
+        if (s->interior != b->medium) continue;
+        for (size_t i = 0; i < n; i++) {
+            imp_v3 p;
+            for (int a = 0; a < 3; a++)
+                p[a] = mesh ? (double)t->positions[3 * i + (size_t)a]
+                            : (i >> a & 1 ? s->hi : s->lo)[a];
+            p[3] = 0;
+            const double u = imp__point(&g->to_unit, p)[axis];
+            most = imp_max(most, side % 2 ? u - 1 : -u);
+        }
+    }
+    return most <= near;
+}
+
+bool imp__medium_ends_bright(const struct imp_scene *scene, const struct imp_medium *m,
+                             bool outside, bool moves)
+{
+    if (!m->majorants) return false;
+    if (!m->majorants->box) return true;
+    struct border b = border_of(scene, m);
+    b.everywhere = outside;
+    for (int side = 0; side < 6; side++)
+        if (!side_is_behind(&b, side, moves) && !side_is_dark(&b, side)) return true;
+    return false;
 }
 
 static const struct imp_medium *bright_end(const struct imp_scene *scene,

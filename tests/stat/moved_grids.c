@@ -307,8 +307,6 @@ static void refused_test(void)
         "cloud.pose", "jump from cell to cell");
     number_refused("a number that volumes lack", full(FULL("") VOLPATH("2")),
                    "cloud.radius", "it is a volume");
-    number_refused("a block where a cloud varies", room(CLOUD VOLPATH("2")), "block.pose",
-                   "varies");
     scene = room(CLOUD VOLPATH("2"));
     test_must(ctx, imp_scene_add_geometry(scene, "cloud.to_world"));
     tap_ok(imp_scene_add_geometry(scene, "cloud.pose") == IMP_E_UNSUPPORTED &&

@@ -3,6 +3,7 @@
  * A recorded walk from stop to stop where something has moved (check_moved.h). */
 #include "check_moved.h"
 #include "math/offset.h"
+#include "walk/media/media_along.h"
 #include "walk/media/tracking.h"
 #include "walk/moved/moved_mirror.h"
 #include "walk/moved/moved_sky.h"
@@ -19,7 +20,8 @@ struct stop {
     bool turns;        /* the ray beyond it comes from a mirror */
     imp_v3 leaves[2];  /* its direction, now and then */
     imp_spec grows;    /* how the light that arrives there has changed on the way */
-    imp_spec P;        /* of light that leaves it, where its kernel has not changed */
+    imp_spec glows, scatters; /* and what a point of a medium emits and scatters */
+    imp_spec P; /* of light that leaves it, where its kernel has not changed */
 };
 
 static imp_spec stop_ratio(const struct imp__moved_by *m, const struct stop *s,
@@ -37,12 +39,45 @@ static imp_spec fades(imp_spec extinction, double longer)
     return T;
 }
 
-/* The same of a line, now and then so long, that has become longer all over: in media that this track
- * crosses. */
-static imp_spec line_fades(const struct imp__moved_by *m, const struct imp_track *track,
-                           const struct imp_carried *carried, const double d[2])
+/* A line, now and then. */
+struct way {
+    imp_v3 o[2], w[2]; /* unit */
+    double length[2];
+};
+
+/* What media that vary let pass of it, now over then: borders stay at their parts of the line or, where it has
+ * become longer at its end, at their distances. */
+static imp_spec varying_fades(const struct imp__moved_by *m, const struct way *x,
+                              bool by_parts, const struct imp_carried *carried)
 {
+    struct imp__media_line line =
+        imp__media_line(&m->borders, x->o[1], x->w[1], x->length[1]);
+    struct imp__along a[2] = {{.depth = {0}}, {.depth = {0}}};
+    const double parts =
+        by_parts && isfinite(x->length[1]) ? x->length[0] / x->length[1] : 1;
+    struct imp__stretch s;
+    imp_spec T;
+    while (imp__media_next(&line, &s)) {
+        const double far = s.far < x->length[1] ? s.far * parts : x->length[0];
+        if (!s.medium) continue;
+        imp__along_add(m->borders.scene, s.medium, x->o[0], x->w[0], s.near * parts, far,
+                       carried, false, &a[0]);
+        imp__along_add(m->borders.scene, s.medium, x->o[1], x->w[1], s.near, s.far,
+                       carried, false, &a[1]);
+    }
+    for (int c = 0; c < 4; c++) T[c] = exp(a[1].depth[c] - a[0].depth[c]);
+    return T;
+}
+
+/* The same of a line from a stop, now and then so long, that has become longer all over: in media that this
+ * track crosses. */
+static imp_spec line_fades(const struct imp__moved_by *m, const struct imp_track *track,
+                           const struct stop *s, const imp_v3 w[2], const double d[2])
+{
+    const struct imp_carried *carried = s->v->carried;
+    const struct way way = {{s->x, s->old.p}, {w[0], w[1]}, {d[0], d[1]}};
     if (!m->borders.any) return fades(m->extinction, d[0] - d[1]);
+    if (m->borders.varies) return varying_fades(m, &way, true, carried);
     if (!track || !isfinite(d[1])) return imp__spec(1);
     return fades(imp__track_depth(m->c->problem->scene, track, carried),
                  (d[0] - d[1]) / d[1]);
@@ -59,6 +94,15 @@ static imp_spec extinction_before(const struct imp__moved_by *m, imp_v3 p, imp_v
     return medium ? imp__extinction_at(medium, p, carried, in) : imp__spec(0);
 }
 
+/* What passes a way to the surface at p with the normal n, now over then. */
+static imp_spec way_fades(const struct imp__moved_by *m, const struct way *x, imp_v3 p,
+                          imp_v3 n, const struct imp_carried *carried)
+{
+    return m->borders.varies ? varying_fades(m, x, false, carried)
+                             : fades(extinction_before(m, p, n, x->w[1], carried),
+                                     x->length[0] - x->length[1]);
+}
+
 /* Light from a place of a lamp, now and then, to a stop: `glued` to the place, it has become so many
  * times as much. Of a point of a medium only a part of it is glued, and the rest has a fixed
  * direction. */
@@ -73,10 +117,10 @@ static imp_spec lamp_ratio(const struct imp__moved_by *m, const struct stop *s, 
     struct imp__moved_at met = *now;
     w[0] = w[1] = imp__normalize(then->p - s->old.p);
     const double fixed = imp__length(imp__moved_met(s->x, w[0], &met) - s->x);
-    const imp_spec extinction =
-        extinction_before(m, then->p, then->n, w[0], s->v->carried);
+    const struct way way = {{s->x, s->old.p}, {w[0], w[1]}, {fixed, d[1]}};
     return glued * imp__glued_part(e, d[0], &unused) +
-           stop_ratio(m, s, w, lobe) * fades(extinction, fixed - d[1]) *
+           stop_ratio(m, s, w, lobe) *
+               way_fades(m, &way, then->p, then->n, s->v->carried) *
                (1 - imp__glued_part(e, fixed, &unused));
 }
 
@@ -93,7 +137,7 @@ static double light_frozen(const struct imp__moved_by *m, const struct stop *s,
     const struct imp_emitter *e = scene->emitters[l->emitter];
     imp_spec all = stop_ratio(m, s, to, IMP_SMOOTH);
     const double then = l->dist, d[2] = {then + farther, then};
-    const imp_spec T = line_fades(m, s->v->to_light, s->v->carried, d);
+    const imp_spec T = line_fades(m, s->v->to_light, s, to, d);
     if (s->floats && e->shape) {
         const struct imp__glued y =
             imp__glued_at(scene, e->shape->index, &l->located, 0, imp__decided_v3(l->d));
@@ -114,13 +158,39 @@ static double met_frozen(const struct imp__moved_by *m, const struct stop *s,
     const double now = imp__moved_receives(s->x, y->here.p, y->here.n),
                  then = imp__moved_receives(s->old.p, y->old.p, y->old.n);
     const double d[2] = {imp__length(y->here.p - s->x), imp__length(y->old.p - s->old.p)};
-    const imp_spec T = line_fades(m, s->v->on, s->v->carried, d);
+    const imp_spec T = line_fades(m, s->v->on, s, to, d);
     imp_spec all = stop_ratio(m, s, to, s->v->d.lobe);
     if (!s->floats)
         return imp__sum_used(s->P * y->v->e * all * T, scene->lanes) * now / then;
     all = lamp_ratio(m, s, s->v->d.lobe, scene->emitters[y->v->d.met.emitter], &y->here,
                      &y->old, all * (now / then) * T);
     return imp__sum_used(s->P * y->v->e * all, scene->lanes);
+}
+
+/* How coefficients have changed on the way to where a point of a medium that varies is now: of light that it
+ * scatters, and of what it emits. */
+static void place_changed(const struct imp__moved_by *m, struct stop *s)
+{
+    const struct imp_medium *medium = m->borders.scene->media[s->v->d.shape];
+    struct imp_coefficients c[2];
+    for (int k = 0; k < 2; k++) {
+        const struct imp_texcoord at = {.p = k ? s->old.p : s->x,
+                                        .carried = s->v->carried};
+        imp_spec in[IMP_INPUTS_MAX];
+        imp__inputs_eval(medium->input, medium->n_own, &at, in);
+        medium->ops->eval(medium, in, &c[k]);
+    }
+    const imp_spec *sigma[2] = {&c[0].extinction, &c[1].extinction};
+    for (int k = 0; k < 4; k++) {
+        const double a = (*sigma[0])[k], b = (*sigma[1])[k];
+        if (!(a > 0 && b > 0)) continue;
+        const double albedo[2] = {c[0].scattering[k] / a, c[1].scattering[k] / b},
+                     glow[2] = {(1 - albedo[0]) * c[0].emission[k],
+                                (1 - albedo[1]) * c[1].emission[k]};
+        s->grows[k] *= a / b;
+        if (albedo[1] > 0) s->scatters[k] = albedo[0] / albedo[1];
+        if (glow[1] > 0) s->glows[k] = glow[0] / glow[1];
+    }
 }
 
 /* A point of a medium, at a part of its stretch of the ray from `begin` (now and then) to what lies
@@ -135,7 +205,12 @@ static void float_at(const struct imp__moved_by *m, struct stop *s, imp_v3 o,
     const double t = imp__length(p.x.p - begin[1]);
     s->x = begin[0] + s->from[0] * t;
     s->grows = imp__spec(1);
-    if (p.open) return;
+    struct way way = {{begin[0], begin[1]}, {s->from[0], s->from[1]}, {t, t}};
+    if (p.open) {
+        if (m->borders.varies) s->grows = varying_fades(m, &way, false, s->v->carried);
+        place_changed(m, s);
+        return;
+    }
     const struct imp__glued beyond = imp__link_glued(&p);
     struct imp__moved_at there = imp__moved_placed(m, &beyond),
                          rest = imp__moved_rest(&beyond);
@@ -145,7 +220,11 @@ static void float_at(const struct imp__moved_by *m, struct stop *s, imp_v3 o,
     const imp_spec extinction =
         imp__extinction_at(scene->media[s->v->d.shape], p.x.p, s->v->carried, in);
     s->x = begin[0] + s->from[0] * (t + p.part * longer);
-    s->grows = fades(extinction, p.part * longer) * (1 + longer / p.stretch);
+    way.length[0] += p.part * longer;
+    s->grows = (m->borders.varies ? varying_fades(m, &way, false, s->v->carried)
+                                  : fades(extinction, p.part * longer)) *
+               (1 + longer / p.stretch);
+    place_changed(m, s);
 }
 
 /* The direction of what leaves a mirror, or a pass behind one, now, of that which was recorded, and
@@ -163,7 +242,10 @@ static struct stop stop_at(const struct imp__moved_by *m, const struct imp_walk 
 {
     const struct imp_scene *scene = m->c->problem->scene;
     const bool turns = m->shape == IMP_MOVE_CAMERA && seen;
-    struct stop s = {.v = v, .floats = v->d.scatterer == IMP_IN_MEDIUM};
+    struct stop s = {.v = v,
+                     .floats = v->d.scatterer == IMP_IN_MEDIUM,
+                     .glows = imp__spec(1),
+                     .scatters = imp__spec(1)};
     if (s.floats) s.old.p = imp__decided_v3(v->d.p);
     else s.old = imp__moved_glued(scene, v, walk->time);
     imp_v3 o = seen ? walk->ray.o : before->x;
@@ -183,10 +265,11 @@ static struct stop stop_at(const struct imp__moved_by *m, const struct imp_walk 
     const bool meter = !before && m->c->tracer.sensor->shape;
     s.x = meter ? s.here.p : imp__moved_met(o, s.from[0], &s.here);
     s.here.shade = s.old.smooth ? imp__moved_shade(m, &s.old, s.x) : s.here.n;
-    if (m->fades)
-        s.grows =
-            fades(extinction_before(m, s.old.p, s.old.n, s.old.p - begin[1], v->carried),
-                  imp__length(s.x - begin[0]) - imp__length(s.old.p - begin[1]));
+    const struct way way = {
+        {begin[0], begin[1]},
+        {s.from[0], s.from[1]},
+        {imp__length(s.x - begin[0]), imp__length(s.old.p - begin[1])}};
+    if (m->fades) s.grows = way_fades(m, &way, s.old.p, s.old.n, v->carried);
     return s;
 }
 
@@ -216,6 +299,24 @@ static imp_spec step_frozen(const struct imp__moved_by *m, struct stop *s, imp_s
     return s->P * stop_ratio(m, s, w, s->v->d.lobe);
 }
 
+/* Media that vary on the way to the sky, from a stop or, where it is seen, from the camera. */
+static imp_spec sky_fades(const struct imp__moved_by *m, const struct imp_walk *walk,
+                          const struct stop *s, bool seen, const struct imp_vertex *sky)
+{
+    const bool turns = m->shape == IMP_MOVE_CAMERA && seen;
+    const imp_v3 d = seen ? walk->ray.d : imp__normalize(imp__decided_v3(sky->d.p)),
+                 to = turns ? imp__moved_turn(m, d) : d;
+    struct way way = {{s->x, s->old.p}, {to, d}, {INFINITY, INFINITY}};
+    if (!m->borders.varies) return imp__spec(1);
+    if (seen) {
+        way.o[1] = walk->ray.o + d * walk->ray.t_near;
+        way.o[0] =
+            (turns ? m->to + imp__moved_turn(m, walk->ray.o - m->from) : walk->ray.o) +
+            to * walk->ray.t_near;
+    }
+    return varying_fades(m, &way, false, sky->carried);
+}
+
 double imp__frozen_walk(struct imp__moved_by *m, const struct imp_walk *walk, imp_spec P)
 {
     const struct imp_scene *scene = m->c->problem->scene;
@@ -243,7 +344,8 @@ double imp__frozen_walk(struct imp__moved_by *m, const struct imp_walk *walk, im
                     : imp__skies_from(
                           scene, m->shape == IMP_MOVE_CAMERA ? imp__moved_turn(m, d) : d,
                           v->carried);
-            return value + imp__sum_used(P * sky, scene->lanes);
+            return value + imp__sum_used(P * sky * sky_fades(m, walk, &here, seen, v),
+                                         scene->lanes);
         }
         const struct stop before = here;
         const bool passed =
@@ -251,7 +353,8 @@ double imp__frozen_walk(struct imp__moved_by *m, const struct imp_walk *walk, im
         here = stop_at(m, walk, v, here.v ? &before : NULL, seen);
         here.turns = before.v && before.turns && imp__goes_straight(v);
         if (m->fades) P *= here.grows;
-        if (here.floats) value += imp__sum_used(P * v->e, scene->lanes);
+        if (here.floats) value += imp__sum_used(P * v->e * here.glows, scene->lanes);
+        P *= here.scatters;
         if (!here.floats && v->d.met.emitter >= 0) {
             if (from.v) value += met_frozen(m, &from, &here);
             else if (passed) value += imp__sum_used(P * v->e, scene->lanes);

@@ -5,6 +5,7 @@
 #include "film/film_measure.h"
 #include "film/film_picture.h"
 #include "replicates.h"
+#include "scene/media_around.h"
 #include "walk/graded/graded.h"
 #include "walk/lights/light_walk.h"
 #include "walk/path/baseline.h"
@@ -60,6 +61,7 @@ enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
                                .guide = imp__guide_of(p->scene, integrator, run->guide),
                                .collisions_fixed = integrator->from_lights};
     imp__tracer_numbers(out, run, 0);
+    if (imp__problem_moves(p) && imp__media_vary(p->scene)) out->headroom = 1 + 1e-9;
     if (integrator->from_lights) out->points = NULL; /* groups would share a set */
     if (waves)
         out->wavelengths =

@@ -8,6 +8,7 @@
 #include "moved_mirror.h"
 #include "moved_sky.h"
 #include "scene/camera_gain.h"
+#include "scene/majorants.h"
 #include "scene/pose.h"
 #include "walk/core/lane_mis.h"
 #include "walk/path/first_segment.h"
@@ -77,6 +78,22 @@ static enum imp_status lights_make(struct imp__boundary *b)
     return IMP_OK;
 }
 
+/* As far as boxes of media are, which may be larger than the scene. */
+static double outside_of(const struct imp_scene *scene, double size)
+{
+    const imp_v3 middle = (scene->lo + scene->hi) * 0.5;
+    double far = 2 * size;
+    for (int k = 0; k < scene->n_media; k++) {
+        const struct imp_majorants *g = scene->media[k]->majorants;
+        for (int i = 0; g && i < 8; i++) {
+            const imp_v3 unit = imp__v3(i & 1, i >> 1 & 1, i >> 2);
+            far = imp_max(
+                far, 2 * (size + imp__length(imp__point(&g->to_world, unit) - middle)));
+        }
+    }
+    return far;
+}
+
 enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
                                     const struct imp__moves *moves,
                                     const struct imp__edges *edges,
@@ -90,6 +107,7 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
     out->size = imp__length(scene->hi - scene->lo);
     out->through = imp__segment_first(tracer)->through;
     imp_spec extinction;
+    out->outside = outside_of(scene, out->size);
     out->media = moves->borders.any;
     if (!out->media && imp__fog(tracer, NULL, &extinction))
         out->fog = tracer->sensor->medium;

@@ -155,6 +155,7 @@ struct imp__boundary {
     const struct imp_medium *fog; /* which fills the scene; NULL: none */
     bool media;                   /* media end within the scene: moves->borders */
     double size;                  /* of the scene */
+    double outside; /* so far from its points is nothing, nor a medium that varies */
     size_t n_planes, cap_planes, n_facets, cap_facets;
     struct imp__plane *plane; /* [n_planes] of flat mirrors: boundary_mirror.c */
     int *plane_of;            /* [n_facets] of these; -1: a facet without an area */

@@ -5,6 +5,7 @@
 #include "base/arguments.h"
 #include "boundary_parts.h"
 #include "moved_sky.h"
+#include "scene/majorants.h"
 #include "walk/media/tracking.h"
 
 extern const struct imp_emitter_ops imp__projector;
@@ -217,7 +218,9 @@ static double border_length(const struct imp_shape *s, double area)
     const struct imp_medium *side[2] = {s->interior, s->exterior};
     imp_spec sigma[2] = {{0}, {0}}, in[IMP_INPUTS_MAX];
     for (int k = 0; k < 2; k++)
-        if (side[k]) sigma[k] = imp__extinction_at(side[k], (imp_v3){0}, NULL, in);
+        if (side[k] && side[k]->majorants)
+            sigma[k] = imp__spec((double)side[k]->majorants->most);
+        else if (side[k]) sigma[k] = imp__extinction_at(side[k], (imp_v3){0}, NULL, in);
     double most = 0;
     for (int c = 0; c < 3; c++) {
         const double least = BY_LENGTH * imp_max(sigma[0][c], sigma[1][c]);

@@ -168,7 +168,9 @@ static bool jump_follow(struct imp__edge_draw *d, imp_v3 o, imp_v3 out, imp_v3 i
 /* Parallel light does not, where the medium around the scene has no end. */
 static bool comes_through(const struct imp__edge_draw *d, const struct source *s)
 {
-    return !s->parallel || !(d->b->media ? d->b->moves->borders.outside : d->b->fog);
+    const struct imp_medium *outside =
+        d->b->media ? d->b->moves->borders.outside : d->b->fog;
+    return !s->parallel || !outside || outside->majorants;
 }
 
 void imp__draw_light(struct imp__edge_draw *d)
@@ -183,7 +185,7 @@ void imp__draw_light(struct imp__edge_draw *d)
         return;
 
     /* Parallel light: from outside the scene. */
-    const imp_v3 from = s.parallel ? d->p - s.p * (2 * b->size) : s.p;
+    const imp_v3 from = s.parallel ? d->p - s.p * b->outside : s.p;
     const imp_v3 r = d->p - from, turned = imp__cross(d->along, r);
     const double t_y = imp__length(r), sine = imp__length(turned) / t_y;
     const double cosine = e->shape ? imp__dot(s.y.n, r) / t_y : 1;
@@ -243,7 +245,7 @@ void imp__draw_border_light(struct imp__edge_draw *d)
     const struct imp_emitter *e = b->tracer->scene->emitters[s.light];
     if (!(s.density > 0) || !comes_through(d, &s) || !imp__border_point(d, &x)) return;
 
-    const imp_v3 from = s.parallel ? d->p - s.p * (2 * b->size) : s.p;
+    const imp_v3 from = s.parallel ? d->p - s.p * b->outside : s.p;
     const imp_v3 r = d->p - from, w = imp__normalize(r);
     const double t_y = imp__length(r), cosine = e->shape ? imp__dot(s.y.n, w) : 1;
     if (!(cosine > IMP_GRAZING)) return;

@@ -4,6 +4,7 @@
  * materials all of it. What passes is a factor, and moves no point behind it. */
 #include "boundary_parts.h"
 #include "moved_mirror.h"
+#include "walk/media/media_along.h"
 #include "walk/media/tracking.h"
 
 #define PASSES_MOST 1024 /* surfaces on a line: of more, nothing comes through */
@@ -90,6 +91,7 @@ bool imp__edge_line(const struct imp__edge_draw *d, imp_v3 o, imp_v3 r, double t
  * the angle under which that sees it (Kulla and Fajardo 2012). One chance is as good as the other. A
  * distance by the angle may lie where nothing scatters; then the line brings nothing. */
 struct flight {
+    imp_v3 o, w;
     bool aims;
     double nearest, apart,
         first; /* the eye: along the line, off it; angle where it begins */
@@ -104,8 +106,12 @@ struct flight {
 static struct flight flight_of(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w,
                                double from, unsigned dims)
 {
-    struct flight f = {
-        .aims = !d->b->parallel, .aimed = INFINITY, .depth = INFINITY, .T = imp__spec(1)};
+    struct flight f = {.o = o,
+                       .w = w,
+                       .aims = !d->b->parallel,
+                       .aimed = INFINITY,
+                       .depth = INFINITY,
+                       .T = imp__spec(1)};
     f.medium = imp__edge_medium(d, o + w * from, w);
     const imp_v3 r = d->eye - o;
     const int lanes = d->b->tracer->scene->lanes;
@@ -130,10 +136,30 @@ static struct flight flight_of(const struct imp__edge_draw *d, imp_v3 o, imp_v3 
 
 enum flown { FLOWN_THROUGH, FLOWN_SCATTERED, FLOWN_LOST };
 
+/* The same in a medium that varies. */
+static enum flown varying_on(const struct imp__edge_draw *d, struct flight *f,
+                             double till)
+{
+    const struct imp_medium *m = f->medium;
+    double far = till;
+    if (f->aimed < till) far = f->aimed;
+    else if (!(f->aimed < INFINITY))
+        far =
+            imp_min(till, imp__along_until(d->b->tracer->scene, m, f->o, f->w, f->gone,
+                                           till, imp__edge_waves(d), f->lane, &f->depth));
+    f->T *= imp__edge_fading(d, m, f->o, f->w, f->gone, far);
+    f->gone = far;
+    if (!(far < till)) return FLOWN_THROUGH;
+    return imp__is_zero_used(imp__edge_extinction(d, m, f->o + f->w * far), d->waves)
+               ? FLOWN_LOST
+               : FLOWN_SCATTERED;
+}
+
 /* On to this length, or to where light is scattered before, f->gone then. */
 static enum flown flight_on(const struct imp__edge_draw *d, struct flight *f, double till)
 {
-    const imp_spec sigma = imp__edge_extinction(d, f->medium);
+    if (f->medium && f->medium->majorants) return varying_on(d, f, till);
+    const imp_spec sigma = imp__edge_extinction(d, f->medium, f->o);
     const double mine = sigma[f->lane],
                  far = f->aimed < till ? f->aimed
                        : mine > 0      ? imp_min(till, f->gone + f->depth / mine)
@@ -153,7 +179,8 @@ static void flight_end(const struct imp__edge_draw *d, const struct flight *f,
                        double length, bool floats, struct imp__line *line)
 {
     const int lanes = d->b->tracer->scene->lanes;
-    const imp_spec sigma = floats ? imp__edge_extinction(d, f->medium) : imp__spec(1);
+    const imp_spec sigma =
+        floats ? imp__edge_extinction(d, f->medium, f->o + f->w * length) : imp__spec(1);
     double p = imp__sum_used(sigma * f->T, lanes) / lanes;
     if (f->aims) {
         const double x = (length - f->nearest) / f->apart, all = IMP_PI / 2 - f->first;

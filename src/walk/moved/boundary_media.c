@@ -14,6 +14,7 @@
 #include "math/warp.h"
 #include "walk/core/step.h"
 #include "walk/lights/light_step.h"
+#include "walk/media/media_along.h"
 #include "walk/media/tracking.h"
 
 /* ---- Lines ------------------------------------------------------------------------------ */
@@ -25,37 +26,35 @@ const struct imp_medium *imp__edge_medium(const struct imp__edge_draw *d, imp_v3
     return imp__borders_at(&d->b->moves->borders, o, w);
 }
 
-imp_spec imp__edge_extinction(const struct imp__edge_draw *d, const struct imp_medium *m)
+imp_spec imp__edge_extinction(const struct imp__edge_draw *d, const struct imp_medium *m,
+                              imp_v3 p)
 {
-    imp_spec in[IMP_INPUTS_MAX];
     if (!d->b->media) return d->extinction;
-    return m ? imp__extinction_at(m, (imp_v3){0}, imp__edge_waves(d), in) : imp__spec(0);
+    return m ? imp__extinction_in(m, p, imp__edge_waves(d)) : imp__spec(0);
 }
 
-#define BORDERS_MOST 1024
+imp_spec imp__edge_fading(const struct imp__edge_draw *d, const struct imp_medium *m,
+                          imp_v3 o, imp_v3 w, double near, double far)
+{
+    struct imp__along a = {.depth = {0}};
+    if (!m || !m->majorants)
+        return imp__attenuation(imp__edge_extinction(d, m, o), imp_max(far - near, 0.0));
+    imp__along_add(d->b->tracer->scene, m, o, w, near, far, imp__edge_waves(d), false,
+                   &a);
+    return imp__attenuation(a.depth, 1);
+}
 
 imp_spec imp__edge_cleared(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w,
                            double length)
 {
-    const struct imp__borders *b = &d->b->moves->borders;
-    const imp_v3 start = o;
     imp_spec T = imp__spec(1);
     if (imp_likely(!d->b->media))
         return d->b->fog ? imp__attenuation(d->extinction, length) : T;
-    const struct imp_medium *medium = b->outside;
-    double from = 0;
-    for (int n = 0; n < BORDERS_MOST; n++) {
-        bool outwards;
-        const struct imp_shape *s = imp__border_next(b->scene, &o, w, &outwards);
-        const double t = s ? imp__dot(o - start, w) : INFINITY;
-        if (s) medium = outwards ? s->interior : s->exterior;
-        T *= imp__attenuation(imp__edge_extinction(d, medium),
-                              imp_max(imp_min(t, length) - from, 0.0));
-        if (!(t < length)) return T;
-        from = t;
-        medium = outwards ? s->exterior : s->interior;
-    }
-    return imp__spec(0);
+    struct imp__media_line line = imp__media_line(&d->b->moves->borders, o, w, length);
+    struct imp__stretch s;
+    while (imp__media_next(&line, &s))
+        T *= imp__edge_fading(d, s.medium, o, w, s.near, s.far);
+    return line.from < length ? imp__spec(0) : T; /* too many borders */
 }
 
 imp_spec imp__edge_uncleared(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w,
@@ -97,11 +96,12 @@ void imp__edge_walk(struct imp__edge_draw *d, const struct imp_sensor_ray *ray,
 /* What a medium emits per length. NULL: nothing. */
 static imp_spec glow_of(const struct imp__edge_draw *d, const struct imp_medium *m)
 {
-    const struct imp_texcoord nowhere = {.prim = -1, .carried = imp__edge_waves(d)};
+    const struct imp_texcoord at = {.p = d->p, .prim = -1, .carried = imp__edge_waves(d)};
     imp_spec in[IMP_INPUTS_MAX];
     struct imp_coefficients c;
-    if (!m || !m->emits) return imp__spec(0);
-    imp__inputs_eval(m->input, m->n_own, &nowhere, in);
+    if (!m || !m->emits || imp__is_zero(imp__edge_extinction(d, m, d->p)))
+        return imp__spec(0);
+    imp__inputs_eval(m->input, m->n_own, &at, in);
     m->ops->eval(m, in, &c);
     return (c.extinction - c.scattering) * c.emission;
 }
@@ -126,9 +126,21 @@ bool imp__border_point(struct imp__edge_draw *d, struct imp__border_point *x)
     }
     x->inside = s->interior;
     x->outside = s->exterior;
-    x->more = imp__edge_extinction(d, s->interior) - imp__edge_extinction(d, s->exterior);
+    x->more = imp__edge_extinction(d, s->interior, d->p) -
+              imp__edge_extinction(d, s->exterior, d->p);
     x->glow = glow_of(d, s->interior) - glow_of(d, s->exterior);
     return true;
+}
+
+/* Is anything scattered in this medium, at the point of the draw? */
+static bool scatters_there(const struct imp__edge_draw *d, const struct imp_medium *m)
+{
+    const struct imp_texcoord at = {.p = d->p};
+    imp_spec in[IMP_INPUTS_MAX];
+    struct imp_coefficients c;
+    imp__inputs_eval(m->input, m->n_own, &at, in);
+    m->ops->eval(m, in, &c);
+    return !imp__is_zero(c.scattering);
 }
 
 void imp__border_scatter(struct imp__edge_draw *d, const struct imp__border_point *x,
@@ -148,7 +160,7 @@ void imp__border_scatter(struct imp__edge_draw *d, const struct imp__border_poin
     for (int k = 0; k < light.n_depths; k++) by_depth[k] = -light.by_depth[k];
     for (int side = 0; side < 2; side++) {
         const struct imp_medium *m = medium[side];
-        if (m && imp__medium_scatters(m)) {
+        if (m && scatters_there(d, m)) {
             const struct imp_hit hit = {.shape = -1, .prim = m->index};
             imp__edge_reach(d, &hit, &at, &light);
         }

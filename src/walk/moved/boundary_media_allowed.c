@@ -4,6 +4,7 @@
  * where a vertex moves. */
 #include "base/arguments.h"
 #include "boundary_parts.h"
+#include "scene/pose.h"
 #include "scene/sealed.h"
 
 #define TOUCH 1e-4 /* of a triangle: what is nearer to its sides touches it */
@@ -82,10 +83,33 @@ static enum imp_status lamps_allowed(const struct imp_scene *scene)
     return st;
 }
 
+/* A medium ends at the box of its grid, too. */
+static enum imp_status boxes_allowed(const struct imp__boundary *b)
+{
+    const struct imp_scene *scene = b->tracer->scene;
+    for (int k = 0; k < scene->n_media; k++) {
+        const struct imp_medium *m = scene->media[k];
+        bool moves = false;
+        for (int i = 0; i < scene->n_all_shapes; i++)
+            moves |=
+                scene->shapes[i]->interior == m && imp__moves_shape(b->moves, i, NULL);
+        if (imp__medium_ends_bright(scene, m, m == b->moves->borders.outside, moves))
+            return imp__error(
+                scene->ctx, IMP_E_UNSUPPORTED,
+                "derivatives by what moves: medium '%s' (%s) ends at a side of its "
+                "grid where it is not 0%s",
+                m->name, m->ops->name,
+                moves ? ", and what bounds it, which moves, lies not within that side"
+                      : " and nothing else bounds it");
+    }
+    return IMP_OK;
+}
+
 enum imp_status imp__borders_allowed(const struct imp__boundary *b)
 {
     const struct imp_scene *scene = b->tracer->scene;
     if (!b->media) return IMP_OK;
+    IMP_CHECKED(boxes_allowed(b));
     for (int k = 0; k < b->moves->n_movers; k++) {
         const struct imp__mover *m = &b->moves->mover[k];
         if (m->kind != IMP_MOVE_VERTICES || m->shape < 0 || b->moves->seams_join)

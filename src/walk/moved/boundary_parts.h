@@ -233,7 +233,11 @@ static inline bool imp__edge_fades(const struct imp__edge_draw *d)
 /* The medium in which a line from o along w begins. NULL: none. */
 const struct imp_medium *imp__edge_medium(const struct imp__edge_draw *d, imp_v3 o,
                                           imp_v3 w);
-imp_spec imp__edge_extinction(const struct imp__edge_draw *d, const struct imp_medium *m);
+imp_spec imp__edge_extinction(const struct imp__edge_draw *d, const struct imp_medium *m,
+                              imp_v3 p);
+/* What one medium lets pass on the line o + t w between these distances. */
+imp_spec imp__edge_fading(const struct imp__edge_draw *d, const struct imp_medium *m,
+                          imp_v3 o, imp_v3 w, double near, double far);
 /* What media let pass from o along the unit vector w over this length; and one over that. */
 imp_spec imp__edge_cleared(const struct imp__edge_draw *d, imp_v3 o, imp_v3 w,
                            double length);

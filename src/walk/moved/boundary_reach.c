@@ -39,7 +39,7 @@ static void link_float(const struct imp__edge_draw *d, struct link *k,
     k->frame = (struct imp_frame){{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
     k->wi = -w;
     k->cos_i = 1;
-    k->extinction = imp__edge_extinction(d, m);
+    k->extinction = imp__edge_extinction(d, m, at->p);
     imp__evaluate_inputs(k->bsdf, NULL, &place, k->in);
 }
 

@@ -24,7 +24,13 @@
  *     d ln w_k = (1 - sigma s D) D'/D,  of what reaches the surface  -sigma D'
  *     d ln B_k = ... - tau d'/d
  *
- * Where a border ends the stretch, D' = 0: that the border moves is a part of the boundary (boundary.h).
+ * Where sigma varies it is that at the end of the ray, and media at rest are met elsewhere: a line from x to
+ * y, of which the point at the part r moves by v(r) = (1 - r) x' + r y', and the point of the medium have
+ *
+ *     d ln T = -int grad sigma . v dt, of a ray that is shifted with v_k' alone,
+ *     d ln w_k = ... + grad ln(sigma p) . v_{k+1}',  p albedo times phase function
+ *
+ * beside those (media/media_along.h). Where a border ends the stretch, D' = 0: that the border moves is a part of the boundary (boundary.h).
  *
  * of Lambertian materials (of others moved_kernel.h), w' the part of (V_y - v_k')/d across w; of a light at a point without
  * cos_y and dA_y, of parallel light (n'.w + n.w')/(n.w) alone. Of emission that is met the

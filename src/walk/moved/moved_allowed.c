@@ -11,6 +11,7 @@
 #include "moved_mirror.h"
 #include "scene/instances.h"
 #include "scene/pose.h"
+#include "walk/media/media_along.h"
 #include "walk/media/tracking.h"
 #include "walk/path/first_segment.h"
 
@@ -154,20 +155,24 @@ static enum imp_status lights_allowed(const struct imp_tracer *t)
 }
 
 /* Why walks through this medium have no such derivative; NULL: they have. */
-static const char *medium_without_d(const struct imp_medium *m)
+static const char *medium_without_d(const struct imp_tracer *t,
+                                    const struct imp_medium *m)
 {
-    if (m->majorants) return "has an extinction that varies";
-    if (is_textured(m->input, m->n_in)) return "has numbers that vary";
-    if (m->scatterer->shaped) return "has a spectrum for a number";
-    return NULL;
+    const char *why = imp__along_without(t->scene, m);
+    return !why && m->scatterer->shaped ? "has a spectrum for a number" : why;
 }
 
+#define EVERYWHERE 1e30
 bool imp__medium_scatters(const struct imp_medium *m)
 {
     imp_spec in[IMP_INPUTS_MAX];
     struct imp_coefficients c;
     const struct imp_texcoord nowhere = {.prim = 0};
     imp__inputs_eval(m->input, m->n_own, &nowhere, in);
+    /* The most of what varies: scattering does not fall where a number of it rises. */
+    const imp_v3 hi = imp__v3(EVERYWHERE, EVERYWHERE, EVERYWHERE), lo = -hi;
+    for (int j = 0; j < m->n_own; j++)
+        if (m->input[j]->texture) imp__input_most(m->input[j], &lo, &hi, &in[j]);
     m->ops->eval(m, in, &c);
     return !imp__is_zero(c.scattering);
 }
@@ -229,7 +234,7 @@ static enum imp_status medium_allowed(const struct imp_tracer *t,
                                       const struct imp_medium *m)
 {
     const struct imp_scene *scene = t->scene;
-    const char *why = medium_without_d(m);
+    const char *why = medium_without_d(t, m);
     if (why) return refuse(t, "medium", m->name, m->ops->name, why);
     for (int k = 0; k < scene->n_emitters && imp__medium_scatters(m); k++) {
         const struct imp_emitter *e = scene->emitters[k];

@@ -25,16 +25,50 @@ static void met_read(const struct imp__sweep *s, const struct imp_vertex *v, imp
     piece->lit = k;
 }
 
-double imp__sweep_line_bar(const struct imp__sweep *s, imp_spec bar,
-                           const struct imp_track *track,
-                           const struct imp_carried *carried, double d)
+/* The sum over the lanes of -bar times this, which is a vector by its components. */
+static imp_v3 vector_bar(const struct imp__sweep *s, imp_spec bar, const imp_spec of[3])
 {
-    if (imp_likely(!s->fog && !s->media)) return 0;
-    if (s->fog) return imp__sweep_length_bar(s, bar, s->extinction);
+    const int lanes = s->tracer->scene->lanes;
+    return imp__v3(-imp__sum_used(bar * of[0], lanes), -imp__sum_used(bar * of[1], lanes),
+                   -imp__sum_used(bar * of[2], lanes));
+}
+
+struct imp__line_bar imp__sweep_line_bar(const struct imp__sweep *s, imp_spec bar,
+                                         const struct imp_track *track,
+                                         const struct imp_carried *carried, imp_v3 x,
+                                         imp_v3 y)
+{
+    struct imp__line_bar out = {0, {0}, {0}};
     const struct imp_scene *scene = s->tracer->scene;
-    return track ? imp__sweep_length_bar(
-                       s, bar, imp__track_depth(scene, track, carried) * (1 / d))
-                 : 0;
+    if (imp_likely(!s->fog && !s->media)) return out;
+    if (s->fog) {
+        out.along = imp__sweep_length_bar(s, bar, s->extinction);
+        return out;
+    }
+    const double d = imp__length(y - x);
+    if (imp_unlikely(s->varies)) {
+        const struct imp__along a =
+            imp__media_along(&s->moves->borders, x, (y - x) * (1 / d), d, carried);
+        out.along = imp__sweep_length_bar(s, bar, a.depth * (1 / d));
+        out.to = vector_bar(s, bar, a.turn) * (1 / d);
+        out.from = vector_bar(s, bar, a.slope) - out.to;
+    } else if (track) {
+        out.along = imp__sweep_length_bar(
+            s, bar, imp__track_depth(scene, track, carried) * (1 / d));
+    }
+    return out;
+}
+
+imp_v3 imp__sweep_shift_bar(const struct imp__sweep *s, imp_spec bar,
+                            const struct imp_carried *carried, imp_v3 o, imp_v3 w,
+                            double length, imp_v3 *turn)
+{
+    *turn = (imp_v3){0};
+    if (imp_likely(!s->varies)) return (imp_v3){0};
+    const struct imp__along a =
+        imp__media_along(&s->moves->borders, o, w, length, carried);
+    *turn = vector_bar(s, bar, a.turn);
+    return vector_bar(s, bar, a.slope);
 }
 
 /* The extinction on the side of a surface that w, which leads there, comes from. */
@@ -46,6 +80,22 @@ static imp_spec extinction_before(const struct imp__sweep *s, imp_v3 p, imp_v3 n
     const struct imp_medium *m =
         imp__borders_at(&s->moves->borders, imp__offset(p, ng, -w), -w);
     return m ? imp__extinction_at(m, p, carried, in) : imp__spec(0);
+}
+
+/* Where it is a point of a medium that varies, its place is one to what scatters and glows there: of
+ * light that reaches it with P. */
+static void place_read(struct imp__sweep *s, int k, const struct imp_vertex *v,
+                       imp_spec P)
+{
+    const struct imp_medium *m = s->tracer->scene->media[v->d.shape];
+    const int lanes = s->tracer->scene->lanes;
+    struct imp__point_slopes slope;
+    if (!imp__point_slopes(m, s->at[k].x.p, v->carried, &slope)) return;
+    const imp_spec scattered = P * (v->b + v->w * v->beyond), all = scattered + P * v->e;
+    for (int i = 0; i < 3; i++)
+        s->at[k].moved_bar[i] = imp__sum_used(
+            all * slope.extinction[i] + scattered * slope.albedo[i] + P * slope.glow[i],
+            lanes);
 }
 
 /* What vertex k is in, or lies behind. */
@@ -90,6 +140,7 @@ static int read_walk(struct imp__sweep *s, imp_spec adjoint)
                                                 v->d.place, v->ng);
         }
         if (imp_unlikely(s->fog || s->media)) media_read(s, n, v);
+        if (imp_unlikely(s->at[n].floats)) place_read(s, n, v, P);
         s->at[n].turns = n > s->first && imp_unlikely(turns_on(&s->at[n - 1], v->prev));
         if (n == s->front) {
             s->seen = P;
@@ -183,8 +234,11 @@ static void delta_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
     const imp_v3 at = imp__v3(aim[0], aim[1], aim[2]);
     if (e->ops->flags & IMP_EMITTER_FAR) {
         const struct imp__kernel_bar far = light_kernel(s, k, v, -at);
+        imp_v3 turn;
+        s->at[k].moved_bar += imp__sweep_shift_bar(s, s->piece[k].light, v->carried,
+                                                   s->at[k].x.p, -at, INFINITY, &turn);
         imp__scatter_bar(&s->at[k], &far);
-        imp__light_velocity_bar(s->moves, light, at, -far.wi, s->theta_bar);
+        imp__light_velocity_bar(s->moves, light, at, -far.wi - turn, s->theta_bar);
         return;
     }
     const imp_v3 r = s->at[k].x.p - at;
@@ -207,10 +261,11 @@ static void delta_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
     /* The light turned by a vector sends along d what it sent along d turned back. */
     imp__light_turn_bar(s->moves, light, imp__cross(slope, d), s->theta_bar);
     const struct imp__kernel_bar kernel = light_kernel(s, k, v, r * (-1 / distance));
-    const double along =
-        imp__sweep_line_bar(s, s->piece[k].light, v->to_light, v->carried, distance);
-    const imp_v3 bar = imp__point_bar(&s->at[k], at, &kernel, weight, along) - turn;
-    s->at[k].moved_bar += turn;
+    const struct imp__line_bar line = imp__sweep_line_bar(
+        s, s->piece[k].light, v->to_light, v->carried, s->at[k].x.p, at);
+    const imp_v3 bar =
+        imp__point_bar(&s->at[k], at, &kernel, weight, line.along) - turn + line.to;
+    s->at[k].moved_bar += turn + line.from;
     imp__light_velocity_bar(s->moves, light, at, bar, s->theta_bar);
 }
 
@@ -222,10 +277,13 @@ static void lamp_bar(struct imp__sweep *s, int k, struct imp__link_point *y, imp
 {
     struct imp__link_point *x = &s->at[k];
     const double d = imp__length(y->x.p - x->x.p),
-                 bar = imp__sum_used(light, s->tracer->scene->lanes),
-                 along = imp__sweep_line_bar(s, light, track, carried, d);
+                 bar = imp__sum_used(light, s->tracer->scene->lanes);
+    const struct imp__line_bar line =
+        imp__sweep_line_bar(s, light, track, carried, x->x.p, y->x.p);
     if (imp_likely(!x->floats)) {
-        imp__connection_bar(x, y, kernel, bar, along);
+        imp__connection_bar(x, y, kernel, bar, line.along);
+        x->moved_bar += line.from;
+        y->bar.v += line.to;
         return;
     }
     double slope;
@@ -233,8 +291,11 @@ static void lamp_bar(struct imp__sweep *s, int k, struct imp__link_point *y, imp
                  fixed = imp__sweep_length_bar(
                      s, light, extinction_before(s, y->x.p, y->x.n, w, carried));
     kernel->wi *= part;
-    imp__connection_bar(x, y, kernel, bar * part, along * part + bar * slope);
+    imp__connection_bar(x, y, kernel, bar * part, line.along * part + bar * slope);
     x->moved_bar += imp__reached_bar(y, w, fixed * (1 - part) - bar * slope);
+    /* What is glued goes with both ends; the rest is shifted with x. */
+    x->moved_bar += line.from + line.to * (1 - part);
+    y->bar.v += line.to * part;
 }
 
 /* What a sky sends to vertex k along w: the part that is glued to it goes with it. */
@@ -256,6 +317,9 @@ static void sky_sample_bar(struct imp__sweep *s, int k, const struct imp_vertex 
     const struct imp__kernel_d *d =
         kernel_derive(s, k, v, w, IMP_SMOOTH, &derived) ? &derived : NULL;
     const struct imp__kernel_bar kernel = kernel_bar(s, k, d, w, s->piece[k].light);
+    imp_v3 turn;
+    s->at[k].moved_bar += imp__sweep_shift_bar(s, s->piece[k].light, v->carried,
+                                               s->at[k].x.p, w, INFINITY, &turn);
     imp__scatter_bar(&s->at[k], &kernel);
     if (imp_unlikely(s->moves->skies))
         sky_bar(s, k, v->d.light.emitter, w, d, s->piece[k].light, v->carried);
@@ -331,6 +395,10 @@ static void step_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
         kernel_derive(s, k, v, w, v->d.lobe, &derived) ? &derived : NULL;
     const struct imp__kernel_bar on = kernel_bar(s, k, d, w, piece->step);
     imp__scatter_bar(x, &on);
+    imp_v3 turn;
+    x->moved_bar += imp__sweep_shift_bar(
+        s, piece->step, v->carried, x->x.p, w,
+        next->sky ? INFINITY : imp__length(next->x.p - x->x.p), &turn);
     if (next->sky) {
         if (imp_unlikely(s->moves->skies)) skies_met_bar(s, k, v, w, d);
         return;
@@ -341,12 +409,32 @@ static void step_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
     imp__link_velocity_bar(s->moves, next, s->theta_bar);
 }
 
+/* The camera's ray fades on its way to vertex k, and turns with it: light of this adjoint. */
+static void seen_fades_bar(struct imp__sweep *s, int k, imp_spec bar)
+{
+    const struct imp_sensor_ray *ray = &s->walk->ray;
+    const imp_v3 begin = imp__sweep_begin(s, k),
+                 r = s->at[k].sky ? ray->d : s->at[k].x.p - begin;
+    const double length = imp__length(r), before = imp__length(begin - ray->o);
+    const imp_v3 w = r * (1 / length);
+    imp_v3 turn;
+    if (imp_likely(!s->varies)) return;
+    const imp_v3 shift = imp__sweep_shift_bar(s, bar, s->walk->first->carried, begin, w,
+                                              s->at[k].sky ? INFINITY : length, &turn);
+    turn += shift * before;
+    imp__camera_velocity_bar(s->moves, ray->o + w, ray->o, shift - turn, s->theta_bar);
+    imp__camera_velocity_bar(s->moves, ray->o, ray->o + w, turn, s->theta_bar);
+}
+
 /* What the camera's ray meets: its vertices up to `front`. */
 static void front_bar(struct imp__sweep *s)
 {
     const struct imp_vertex *v = s->walk->first;
     for (int k = 0; k < s->front; k++) v = v ? v->next : NULL;
     if (v && s->at[s->front].sky) {
+        imp_spec sent = {0};
+        for (const struct imp_vertex *y = v; y; y = y->next) sent += y->e;
+        seen_fades_bar(s, s->front, s->seen * sent);
         imp__skies_seen_bar(s->moves, &s->walk->ray, s->seen, s->walk->first->carried,
                             s->theta_bar);
         v = NULL;
@@ -360,6 +448,7 @@ static void front_bar(struct imp__sweep *s)
         /* From the surface before it, which moves along the ray itself, or from the camera. */
         struct imp__link_point *x = &s->at[k];
         const double along = imp__sweep_reach_bar(s, k, s->piece[k].all);
+        seen_fades_bar(s, k, s->piece[k].all);
         x->along += along;
         if (imp_unlikely(s->fog && k > s->first))
             x[-1].along +=
@@ -416,6 +505,7 @@ bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
                            .through = imp__segment_first(tracer)->through};
     s.front = s.first;
     s.media = moves->borders.any;
+    s.varies = s.media && moves->borders.varies;
     s.fog = !s.media && imp__fog(tracer, walk->first->carried, &s.extinction);
     s.at = imp__arena_take(arena, (size_t)walk->n, sizeof *s.at);
     s.piece = imp__arena_take(arena, (size_t)walk->n, sizeof *s.piece);

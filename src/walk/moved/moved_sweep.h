@@ -7,6 +7,7 @@
 #include "moved_chain.h"
 #include "moved_sent.h"
 #include "walk/core/vertex.h"
+#include "walk/media/media_along.h"
 #include "walk/media/tracking.h"
 
 /* What the values of vertex k depend on, as adjoints of their logarithms, by lanes. */
@@ -32,7 +33,8 @@ struct imp__sweep {
     bool meter;          /* the sensor is a surface, which is vertex `first` */
     bool through;        /* light samples pass what lets light go straight on */
     bool fog;            /* a medium fills the scene */
-    bool media;          /* media end within it */
+    bool media;          /* media end within it, or vary */
+    bool varies;         /* one of them does */
     imp_spec extinction; /* fog: of that */
 };
 
@@ -72,11 +74,22 @@ static inline double imp__sweep_length_bar(const struct imp__sweep *s, imp_spec 
     return -imp__sum_used(bar * extinction, s->tracer->scene->lanes);
 }
 
-/* The same where both ends move, and all between them in proportion, over media that this track has
- * crossed (NULL: none): of the length d. */
-double imp__sweep_line_bar(const struct imp__sweep *s, imp_spec bar,
-                           const struct imp_track *track,
-                           const struct imp_carried *carried, double d);
+/* The same where both ends move, and all between them in proportion, on the line from x to y over media that
+ * this track has crossed (NULL: none): of its length, and, of media that vary, of its ends. */
+struct imp__line_bar {
+    double along;
+    imp_v3 from, to;
+};
+struct imp__line_bar imp__sweep_line_bar(const struct imp__sweep *s, imp_spec bar,
+                                         const struct imp_track *track,
+                                         const struct imp_carried *carried, imp_v3 x,
+                                         imp_v3 y);
+
+/* An adjoint of the logarithm of the light on a line from o along w, in media that vary: what it is to a
+ * shift of all of the line, which is returned, and to w; up to this length. */
+imp_v3 imp__sweep_shift_bar(const struct imp__sweep *s, imp_spec bar,
+                            const struct imp_carried *carried, imp_v3 o, imp_v3 w,
+                            double length, imp_v3 *turn);
 
 /* The ray from a vertex, or from the camera, to vertex k carries light of this adjoint, of which the
  * logarithm changes with its length: by what the surface there moves or, where k floats at the part s
