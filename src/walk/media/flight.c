@@ -324,7 +324,7 @@ bool imp__fly(struct imp_free_flight *w, const struct imp_medium *m, double near
 {
     struct imp_step *s = w->s;
     struct imp_majorant_walk cells;
-    const imp_spec before = w->f;
+    const struct imp_flown before = {w->f, w->p};
     const int first = w->track ? w->track->n : 0;
     bool hit, fixed = false;
     if (!(near < far)) return false;

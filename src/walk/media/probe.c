@@ -14,22 +14,27 @@ void imp__probe_begin(const struct imp_walk *walk, struct imp_probing *p)
     *p = (struct imp_probing){.followed = u < FOLLOWED};
 }
 
-/* The value at distance t of the events behind `first`, which lie before it. */
-static imp_spec value_to(const struct imp_step *s, const struct imp_medium *m,
-                         const struct imp_track *track, int first, double near, double t)
+/* At distance t, `from` times the events behind `first`, which lie before it. */
+static struct imp_flown flown_to(const struct imp_step *s, const struct imp_medium *m,
+                                 const struct imp_track *track, int first,
+                                 struct imp_flown from, double near, double t)
 {
     const struct imp_carried *carried = s->at.carried;
-    imp_spec f = imp__spec(1), in[IMP_INPUTS_MAX];
+    const bool room = imp_unlikely(s->tracer->headroom > 1);
+    imp_spec f = imp__spec(1), p = f, in[IMP_INPUTS_MAX];
     if (!m->majorants)
-        return imp__attenuation(
+        f = p = imp__attenuation(
             imp__extinction_at(m, imp__decided_v3(track->o), carried, in), t - near);
-    for (int i = first; i < track->n && track->event[i].t < t; i++) {
+    for (int i = first; m->majorants && i < track->n && track->event[i].t < t; i++) {
         const struct imp_event *e = &track->event[i];
-        const imp_v3 p =
+        const imp_v3 at =
             imp__decided_v3(track->o) + imp__decided_v3(track->d) * (double)e->t;
-        f *= 1 - imp__extinction_at(m, p, carried, in) * (1 / (double)e->bound);
+        const imp_spec null =
+            1 - imp__extinction_at(m, at, carried, in) * (1 / (double)e->bound);
+        f *= null;
+        p *= room ? imp__lesser(null, imp__spec(1 - IMP_REAL_LEAST)) : null;
     }
-    return f;
+    return (struct imp_flown){from.value * f, from.density * p};
 }
 
 /* Where a stretch is probed: at s on [near, far], with 1/p(s); `length`: what it counts in
@@ -69,7 +74,7 @@ bool imp__probe_diverges(const struct imp_step *s, const struct imp_medium *m)
 }
 
 void imp__probe_offer(struct imp_step *s, const struct imp_medium *m,
-                      const struct imp_track *track, int first, imp_spec before,
+                      const struct imp_track *track, int first, struct imp_flown before,
                       double near, double far, bool open)
 {
     struct imp_probing *p = s->probing;
@@ -94,9 +99,9 @@ void imp__probe_offer(struct imp_step *s, const struct imp_medium *m,
         s->walk->dropped = IMP_DROP_MEMORY;
         return;
     }
-    const imp_spec f = before * value_to(s, m, track, first, near, t);
+    const struct imp_flown f = flown_to(s, m, track, first, before, near, t);
     *p->state = *s;
-    const imp_spec pass = f * imp__lane_mis_decide(p->state, f);
+    const imp_spec pass = f.value * imp__lane_mis_decide(p->state, f.density);
     p->state->beta *= pass;
     p->state->flight.here = p->state->flight.medium = m;
     p->state->flight.nest_here = s->flight.nest;

@@ -52,11 +52,15 @@ struct imp_probing {
 /* `scattered` of *p is set by whoever traces the walk. */
 void imp__probe_begin(const struct imp_walk *walk, struct imp_probing *p);
 
+/* A value, and the density with which its flight was drawn: the same, unless there is headroom
+ * (flight.h). */
+struct imp_flown {
+    imp_spec value, density;
+};
 /* The flight has gone from near to far in m, with events [first, track->n) of the track;
- * `before`: the segment's value at `near`; open: only a
- * collision could have ended it. */
+ * `before`: the segment's at `near`; open: only a collision could have ended it. */
 void imp__probe_offer(struct imp_step *s, const struct imp_medium *m,
-                      const struct imp_track *track, int first, imp_spec before,
+                      const struct imp_track *track, int first, struct imp_flown before,
                       double near, double far, bool open);
 /* A flight passes an endless medium of extinction 0. Is the derivative infinite, since light
  * comes from infinity, or from all of the medium? */
