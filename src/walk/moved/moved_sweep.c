@@ -75,11 +75,10 @@ imp_v3 imp__sweep_shift_bar(const struct imp__sweep *s, imp_spec bar,
 static imp_spec extinction_before(const struct imp__sweep *s, imp_v3 p, imp_v3 ng,
                                   imp_v3 w, const struct imp_carried *carried)
 {
-    imp_spec in[IMP_INPUTS_MAX];
     if (imp_likely(!s->media)) return s->extinction;
     const struct imp_medium *m =
         imp__borders_at(&s->moves->borders, imp__offset(p, ng, -w), -w);
-    return m ? imp__extinction_at(m, p, carried, in) : imp__spec(0);
+    return m ? imp__extinction_in(m, p, carried) : imp__spec(0);
 }
 
 /* Where it is a point of a medium that varies, its place is one to what scatters and glows there: of
