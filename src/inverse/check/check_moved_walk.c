@@ -45,8 +45,8 @@ struct way {
     double length[2];
 };
 
-/* What media that vary let pass of it, now over then: borders stay at their parts of the line or, where it has
- * become longer at its end, at their distances. */
+/* What media that vary let pass of it, now over then: borders, and sides of a grid's box, stay at their parts of
+ * the line or, where it has become longer at its end, at their distances. */
 static imp_spec varying_fades(const struct imp__moved_by *m, const struct way *x,
                               bool by_parts, const struct imp_carried *carried)
 {
@@ -58,12 +58,20 @@ static imp_spec varying_fades(const struct imp__moved_by *m, const struct way *x
     struct imp__stretch s;
     imp_spec T;
     while (imp__media_next(&line, &s)) {
-        const double far = s.far < x->length[1] ? s.far * parts : x->length[0];
-        if (!s.medium) continue;
-        imp__along_add(m->borders.scene, s.medium, x->o[0], x->w[0], s.near * parts, far,
-                       carried, false, &a[0]);
-        imp__along_add(m->borders.scene, s.medium, x->o[1], x->w[1], s.near, s.far,
-                       carried, false, &a[1]);
+        const bool grid = s.medium && s.medium->majorants;
+        if (!s.medium ||
+            (grid && !imp__along_box(s.medium, x->o[1], x->w[1], &s.near, &s.far)))
+            continue;
+        const double near[2] = {s.near * parts, s.near},
+                     far[2] = {s.far < x->length[1] ? s.far * parts : x->length[0],
+                               s.far};
+        for (int k = 0; k < 2; k++)
+            if (grid)
+                a[k].depth += imp__along_beyond(m->borders.scene, s.medium, x->o[k],
+                                                x->w[k], near[k], far[k], carried);
+            else
+                imp__along_add(m->borders.scene, s.medium, x->o[k], x->w[k], near[k],
+                               far[k], carried, false, &a[k]);
     }
     for (int c = 0; c < 4; c++) T[c] = exp(a[1].depth[c] - a[0].depth[c]);
     return T;

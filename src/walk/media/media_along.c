@@ -125,19 +125,24 @@ static void planes_add(struct pieces *p, const struct imp_scene *scene,
     }
 }
 
-/* False: none of the medium is there. */
-static bool pieces_begin(struct pieces *p, const struct imp_scene *scene, double near,
-                         double far)
+bool imp__along_box(const struct imp_medium *m, imp_v3 o, imp_v3 w, double *near,
+                    double *far)
 {
     struct imp_majorant_walk cells;
-    if (!imp__majorants_enter(p->m->majorants, p->o, p->w, near, far, &cells))
-        return false;
-    p->from = cells.t;
-    p->end = cells.end;
+    if (!imp__majorants_enter(m->majorants, o, w, *near, *far, &cells)) return false;
+    *near = cells.t;
+    *far = cells.end;
+    return true;
+}
+
+static void pieces_begin(struct pieces *p, const struct imp_scene *scene, double near,
+                         double far)
+{
+    p->from = near;
+    p->end = far;
     for (int j = 0; j < p->m->n_own; j++)
         if (is_extinction(p->m, j) && varies(p->m->input[j]))
             planes_add(p, scene, p->m->input[j]->texture);
-    return true;
 }
 
 /* Sets p->to. False: the line has left. */
@@ -181,7 +186,8 @@ void imp__along_add(const struct imp_scene *scene, const struct imp_medium *m, i
         a->depth += uniform_depth(m, o, far - near, carried);
         return;
     }
-    if (!pieces_begin(&p, scene, near, far)) return;
+    if (!imp__along_box(m, o, w, &near, &far)) return;
+    pieces_begin(&p, scene, near, far);
     for (; piece_next(&p); p.from = p.to) {
         if (!slopes) {
             a->depth += depth_of(&p, p.from, p.to);
@@ -198,6 +204,17 @@ void imp__along_add(const struct imp_scene *scene, const struct imp_medium *m, i
             }
         }
     }
+}
+
+imp_spec imp__along_beyond(const struct imp_scene *scene, const struct imp_medium *m,
+                           imp_v3 o, imp_v3 w, double near, double far,
+                           const struct imp_carried *carried)
+{
+    struct pieces p = {.m = m, .o = o, .w = w, .carried = carried};
+    imp_spec depth = {0};
+    pieces_begin(&p, scene, near, far);
+    for (; piece_next(&p); p.from = p.to) depth += depth_of(&p, p.from, p.to);
+    return depth;
 }
 
 /* Within a piece the depth is a polynomial that does not fall: Newton's steps, or halves of what is left. */
@@ -234,7 +251,8 @@ double imp__along_until(const struct imp_scene *scene, const struct imp_medium *
         *depth -= sigma > 0 ? sigma * (far - near) : 0;
         return INFINITY;
     }
-    if (!pieces_begin(&p, scene, near, far)) return INFINITY;
+    if (!imp__along_box(m, o, w, &near, &far)) return INFINITY;
+    pieces_begin(&p, scene, near, far);
     for (; piece_next(&p); p.from = p.to) {
         const double here = depth_of(&p, p.from, p.to)[lane];
         if (here > *depth) return search(&p, lane, *depth);

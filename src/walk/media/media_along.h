@@ -30,6 +30,13 @@ imp_spec imp__extinction_in(const struct imp_medium *m, imp_v3 p,
 void imp__along_add(const struct imp_scene *scene, const struct imp_medium *m, imp_v3 o,
                     imp_v3 w, double near, double far, const struct imp_carried *carried,
                     bool slopes, struct imp__along *a);
+/* The part of a line that is in the box of a medium that varies. False: none is. */
+bool imp__along_box(const struct imp_medium *m, imp_v3 o, imp_v3 w, double *near,
+                    double *far);
+/* The optical depth as if the box had no sides. */
+imp_spec imp__along_beyond(const struct imp_scene *scene, const struct imp_medium *m,
+                           imp_v3 o, imp_v3 w, double near, double far,
+                           const struct imp_carried *carried);
 /* Where a lane has this much optical depth behind `near`; INFINITY: not before `far`, *depth is then what
  * is left of it. */
 double imp__along_until(const struct imp_scene *scene, const struct imp_medium *m,
