@@ -22,7 +22,8 @@ const struct arg_option options_params[] = {
     {ARG_LIST | ARG_REPLAYS, 'p', "param", "GLOB",
      "active parameters: a name or a pattern (default '*'); of geometry NAME.pose, "
      "scale, to_world, "
-     "vertex_positions, center, radius, p0, p1, x_fov, position, direction, turn",
+     "vertex_positions, control_points, center, radius, p0, p1, x_fov, position, "
+     "direction, turn",
      &problem_options.params, 0, 0, NULL},
     {ARG_LIST | ARG_REPLAYS, 0, "same", "GLOB,..",
      "values of all these are equal: one paint", &problem_options.same, 0, 0, NULL},

@@ -610,6 +610,8 @@ imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
  *     NAME.vertex_positions  of a mesh: [vertices][3], world; vertex normals, if it has any, are
  *                            computed from them
  *     NAME.vertex_normals    of a mesh with vertex normals: [vertices][3], world, of any length
+ *     NAME.control_points    of a bsplinecurve without textures: [points][4], x, y, z and radius,
+ *                            world; not beside pose and scale; IMP_E_NUMERIC: a radius below 0
  *     NAME.center, NAME.radius   of a sphere: world; not beside pose and scale
  *     NAME.p0, NAME.p1, NAME.radius   of a circular cylinder without textures: the middles of its
  *                            ends, world; likewise

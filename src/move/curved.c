@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Spheres, disks and open circular cylinders, as what moves has them (moves.h), also in instances:
- * rims, and points that are glued to them. */
+ * rims, and points that are glued to them and to curves. */
 #include "kind/shape/shape.h"
 #include "math/warp.h"
-#include "moves.h"
+#include "strand.h"
 
 extern const struct imp_shape_ops imp__sphere, imp__disk, imp__cylinder;
 
@@ -27,6 +27,15 @@ static bool stretches_alike(const struct imp_map *map, double *factor)
     }
     *factor = sqrt(square);
     return true;
+}
+
+bool imp__place_alike(const struct imp_scene *scene, int64_t place, double *factor)
+{
+    struct imp_map map[2];
+    *factor = 1;
+    if (place == 0) return true;
+    imp__place_map(scene, place, 0, &map[0], &map[1]);
+    return stretches_alike(&map[0], factor);
 }
 
 double imp__place_scale(const struct imp_scene *scene, int64_t place)
@@ -90,7 +99,8 @@ bool imp__moves_curved(const struct imp_scene *scene, int shape, int64_t place)
     struct imp__tube tube;
     return imp__moves_disk(scene, shape) ||
            imp__moves_sphere(scene, shape, place, &round) ||
-           imp__moves_cylinder(scene, shape, place, &tube);
+           imp__moves_cylinder(scene, shape, place, &tube) ||
+           imp__is_strand(scene, shape, place);
 }
 
 /* ---- Rims -------------------------------------------------------------------------- */
@@ -176,10 +186,32 @@ bool imp__rims_meet(const struct imp_scene *scene, const struct imp__rim_name *a
 
 /* ---- Points ------------------------------------------------------------------------- */
 
-struct imp__glued imp__glued_curved(const struct imp_scene *scene, int shape,
+static void strand_glue(const struct imp_scene *scene, imp_v3 p, struct imp__glued *x)
+{
+    struct imp__strand line;
+    struct imp__strand_point at;
+    x->b[0] = imp__strand_foot(scene, x->shape, x->place, x->prim, p);
+    imp__strand_at(scene, x->shape, x->place, x->prim, x->b[0], &line);
+    const struct imp__strand_axes axes = imp__strand_axes(&line);
+    const imp_v3 q = p - line.c, across = q - axes.a * imp__dot(axes.a, q),
+                 e = imp__dot(across, across) > 0 ? imp__normalize(across) : axes.s;
+    x->n = e;
+    if (!imp__strand_point(&line, &axes, e, &at)) return;
+    x->p = at.p;
+    x->n = at.n;
+    x->strand = line.r > 0;
+    if (!x->strand) return;
+    x->turn[0] = at.n_v;
+    x->slope[0] = at.along * (1 / imp__dot(at.along, at.along));
+    x->turn[1] = at.n_t;
+    x->slope[1] = at.around * (1 / line.r);
+}
+
+struct imp__glued imp__glued_curved(const struct imp_scene *scene, int shape, int prim,
                                     int64_t place, imp_v3 p, imp_v3 n)
 {
     struct imp__glued x = {.shape = shape,
+                           .prim = prim,
                            .place = place,
                            .carrier = imp__carrier(scene, shape, place),
                            .b = {1, 0, 0},
@@ -196,11 +228,14 @@ struct imp__glued imp__glued_curved(const struct imp_scene *scene, int shape,
         x.p = tube.base + up + x.n * tube.radius;
         x.curvature = 1 / tube.radius;
         x.straight = tube.axis;
+    } else if (scene->shapes[shape]->geometry == IMP_CURVES) {
+        strand_glue(scene, p, &x);
     } else {
         x.n = imp__rim(scene, shape, place, 0, 0).n;
     }
     if (!(imp__dot(x.n, n) < 0)) return x;
     x.n = -x.n;
     x.curvature = -x.curvature;
+    for (int k = 0; k < 2; k++) x.turn[k] = -x.turn[k];
     return x;
 }

@@ -64,7 +64,8 @@ struct imp__edges {
 };
 
 /* All edges of the scene's shapes of triangles, flat or with vertex normals, also in instances.
- * IMP_E_UNSUPPORTED, with its name: another shape that is no sphere, disk or circular cylinder, or that
+ * IMP_E_UNSUPPORTED, with its name: another shape that is no sphere, disk, circular cylinder or
+ * bsplinecurve, or that
  * its instance makes none; an instance whose place changes with time. */
 enum imp_status imp__edges_build(const struct imp_scene *scene, enum imp__edges_of of,
                                  struct imp__edges *out);
@@ -88,7 +89,7 @@ double imp__edge_turn(const struct imp__edges *edges, const struct imp__edge *e)
  * NULL: none. */
 const struct imp__edge *imp__edges_torn(const struct imp__edges *edges,
                                         const struct imp__moves *moves);
-/* A disk or cylinder that passes through another shape: where they meet is an edge that is in no list.
+/* A disk, cylinder or curve that passes through another shape: where they meet is an edge that is in no list.
  * -1: none; *other: the other shape. */
 int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
                        int *other);

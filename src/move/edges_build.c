@@ -9,6 +9,7 @@
 #include "edges_seams.h"
 #include "edges_sides.h"
 #include "kind/sensor/receiver.h"
+#include "strand.h"
 #include <stdlib.h>
 
 #define NEAR 2e-6 /* of the scene's size: sides nearer to each other lie on each other */
@@ -75,8 +76,8 @@ static enum imp_status refuse(const struct building *x, const struct imp_shape *
                               const char *why)
 {
     return imp__error(x->ctx, IMP_E_UNSUPPORTED,
-                      "derivatives by what moves are of triangles, spheres, disks and "
-                      "circular cylinders, and shape '%s' (%s) %s",
+                      "derivatives by what moves are of triangles, spheres, disks, "
+                      "circular cylinders and bsplinecurves, and shape '%s' (%s) %s",
                       s->name, s->ops->name, why);
 }
 
@@ -86,6 +87,9 @@ static enum imp_status bodies_allowed(const struct building *x)
     for (size_t k = 0; k < x->out->n_bodies; k++) {
         const struct imp__body *body = &x->out->body[k];
         const struct imp_shape *s = x->scene->shapes[body->shape];
+        if (imp__is_strand(x->scene, body->shape, body->place) &&
+            imp__strand_folds(x->scene, body->shape, body->place) >= 0)
+            return refuse(x, s, "bends more sharply than its radius allows");
         if (imp__moves_curved(x->scene, body->shape, body->place)) continue;
         if (s->smooth && !imp__moves_smooth(x->scene, body->shape))
             return refuse(x, s, "has normals of its own over its triangles");

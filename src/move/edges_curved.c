@@ -5,6 +5,7 @@
 #include "edges.h"
 #include "kind/sensor/receiver.h"
 #include "math/offset.h"
+#include "strand.h"
 
 #define TOUCH 1e-5 /* of a sphere's radius: nearer surfaces touch it */
 #define END   1e-5 /* of a segment: nearer hits are of what begins there */
@@ -92,6 +93,27 @@ static bool tube_meets(const struct imp__tube *c, const struct imp_round *round)
     return least < round->radius * (1 - TOUCH) && most > round->radius * (1 + TOUCH);
 }
 
+/* A sphere and the circles of a curve. */
+static bool strand_meets(const struct imp_scene *scene, const struct imp__body *body,
+                         const struct imp_round *round)
+{
+    enum { PLACES = 16 };
+    const struct imp_curves *k = &scene->shapes[body->shape]->curves;
+    for (size_t i = 0; i < k->n_segments; i++)
+        for (int m = 0; m <= PLACES; m++) {
+            struct imp__strand x;
+            imp__strand_at(scene, body->shape, body->place, (int)i, (double)m / PLACES,
+                           &x);
+            const struct imp__strand_axes axes = imp__strand_axes(&x);
+            const imp_v3 r = round->centre - x.c;
+            const double z = imp__dot(r, axes.a), rho = imp__length(r - axes.a * z);
+            if (hypot(rho - x.r, z) < round->radius * (1 - TOUCH) &&
+                hypot(rho + x.r, z) > round->radius * (1 + TOUCH))
+                return true;
+        }
+    return false;
+}
+
 bool imp__body_is_away(const struct imp_scene *scene, const struct imp__body *body,
                        const struct imp_map *map, const struct imp_round *round)
 {
@@ -104,7 +126,7 @@ bool imp__body_is_away(const struct imp_scene *scene, const struct imp__body *bo
     return away;
 }
 
-/* Does the surface of a sphere meet this disk or cylinder? Where they touch, it does not. */
+/* Does the surface of a sphere meet this disk, cylinder or curve? Where they touch, it does not. */
 static bool meets_sphere(const struct imp_scene *scene, const struct imp__body *body,
                          const struct imp_round *round)
 {
@@ -115,6 +137,8 @@ static bool meets_sphere(const struct imp_scene *scene, const struct imp__body *
     if (imp__body_is_away(scene, body, &map[0], round)) return false;
     if (imp__moves_cylinder(scene, body->shape, place, &tube))
         return tube_meets(&tube, round);
+    if (imp__is_strand(scene, body->shape, place))
+        return strand_meets(scene, body, round);
     return imp__moves_disk(scene, body->shape) && disk_meets(scene, body, round);
 }
 
@@ -136,10 +160,73 @@ static int spheres_pierced(const struct imp__edges *edges, const struct imp_scen
     return -1;
 }
 
+/* ---- Curves ----------------------------------------------------------------------------- */
+
+/* A point at a turn about a curve's line. */
+static imp_v3 strand_place(const struct imp_scene *scene, const struct imp__body *body,
+                           int segment, double v, double turn)
+{
+    struct imp__strand x;
+    imp__strand_at(scene, body->shape, body->place, segment, v, &x);
+    const struct imp__strand_axes axes = imp__strand_axes(&x);
+    return x.c + (axes.s * cos(IMP_2PI * turn) + axes.t * sin(IMP_2PI * turn)) * x.r;
+}
+
+/* What a chord of a curve's surface passes through: another shape, or a segment of the same that is no
+ * neighbour. -1: nothing. */
+static int chord_pierces(const struct imp__edges *edges, const struct imp_scene *scene,
+                         const struct imp__body *body, int segment, imp_v3 a, imp_v3 b)
+{
+    const imp_v3 d = b - a;
+    struct imp_hit hit;
+    for (double from = END; imp__intersect(scene, &a, &d, from, 1 - END, &hit);
+         from = hit.t + END) {
+        const bool own = is_hit(&hit, body->shape, body->place);
+        if (own ? abs(hit.prim - segment) > 1
+                : imp__edges_pair(edges, scene, hit.shape, body->shape))
+            return hit.shape;
+    }
+    return -1;
+}
+
+/* Lines along a curve, and the rims of its ends. */
+static int strands_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
+                           int *other)
+{
+    enum { ALONG = 4, AROUND = 6, RIM = 16 };
+    for (size_t k = 0; k < edges->n_bodies; k++) {
+        const struct imp__body *body = &edges->body[k];
+        const struct imp_curves *c = &scene->shapes[body->shape]->curves;
+        if (!imp__is_strand(scene, body->shape, body->place)) continue;
+        *other = body->shape;
+        for (int i = 0; i < (int)c->n_segments; i++) {
+            const int ends = imp__strand_ends(c, i);
+            for (int j = 0; j < AROUND * ALONG; j++) {
+                const double turn = (double)(j / ALONG) / AROUND, v = j % ALONG;
+                const int met = chord_pierces(
+                    edges, scene, body, i, strand_place(scene, body, i, v / ALONG, turn),
+                    strand_place(scene, body, i, (v + 1) / ALONG, turn));
+                if (met >= 0) return met;
+            }
+            for (int j = 0; j < 2 * RIM; j++) {
+                const int end = j / RIM;
+                if (!(ends & 1 << end)) continue;
+                const double turn = (double)(j % RIM) / RIM;
+                const int met = chord_pierces(
+                    edges, scene, body, i, strand_place(scene, body, i, end, turn),
+                    strand_place(scene, body, i, end, turn + 1.0 / RIM));
+                if (met >= 0) return met;
+            }
+        }
+    }
+    return -1;
+}
+
 int imp__curved_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
                         int *other)
 {
-    const int pierced = spheres_pierced(edges, scene, other);
+    int pierced = spheres_pierced(edges, scene, other);
+    if (pierced < 0) pierced = strands_pierced(edges, scene, other);
     return pierced >= 0 ? pierced : rims_pierced(edges, scene, other);
 }
 

@@ -64,9 +64,10 @@ struct imp__glued imp__glued_at(const struct imp_scene *scene, int shape,
     const double uv[2] = {x->at[0], x->at[1]};
     struct imp_surface at;
     int prim;
-    if (place > 0) imp__located_surface(scene, shape, x, place, 0, &at);
+    if (place > 0 || s->geometry == IMP_CURVES)
+        imp__located_surface(scene, shape, x, place, 0, &at);
     else s->ops->place(s, uv, &at, &prim);
-    return imp__glued_curved(scene, shape, place, at.p, n);
+    return imp__glued_curved(scene, shape, x->prim, place, at.p, n);
 }
 
 struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int prim,
@@ -75,7 +76,8 @@ struct imp__glued imp__glued_near(const struct imp_scene *scene, int shape, int 
     const struct imp_shape *s = scene->shapes[shape];
     struct imp_map map[2];
     double b[3];
-    if (s->geometry != IMP_TRIANGLES) return imp__glued_curved(scene, shape, place, p, n);
+    if (s->geometry != IMP_TRIANGLES)
+        return imp__glued_curved(scene, shape, prim, place, p, n);
     if (place > 0) {
         imp__place_map(scene, place, 0, &map[0], &map[1]);
         p = imp__map_point(&map[1], p);

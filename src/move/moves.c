@@ -7,6 +7,7 @@
 #include "kind/emitter/from_point.h"
 #include "kind/emitter/ies.h"
 #include "kind/emitter/projector.h"
+#include "strand.h"
 #include "suns.h"
 
 struct imp__moves imp__moves_begin(const struct imp_scene *scene,
@@ -102,20 +103,27 @@ static enum imp_status shape_mover(const struct imp__moves *moves, struct imp__m
     imp_context *ctx = moves->scene->ctx;
     const struct imp_shape *s = moves->scene->shapes[m->shape];
     if (s->geometry != IMP_TRIANGLES && !imp__moves_curved(moves->scene, m->shape, 0))
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "shape '%s' (%s) is neither made of triangles nor a sphere, "
-                          "disk or circular cylinder, and has no derivative by its place",
-                          s->name, s->ops->name);
+        return imp__error(
+            ctx, IMP_E_UNSUPPORTED,
+            "shape '%s' (%s) is neither made of triangles nor a sphere, "
+            "disk, circular cylinder or bsplinecurve, and has no derivative by its place",
+            s->name, s->ops->name);
     if ((m->kind == IMP_MOVE_VERTICES || m->kind == IMP_MOVE_NORMALS) &&
         (s->geometry != IMP_TRIANGLES || s->ops->surface != imp__mesh_surface))
         return imp__error(ctx, IMP_E_UNSUPPORTED,
                           "shape '%s' (%s) is no mesh, and has no vertices that move",
                           s->name, s->ops->name);
+    if ((m->kind == IMP_MOVE_CONTROL) && s->geometry != IMP_CURVES)
+        return imp__error(ctx, IMP_E_UNSUPPORTED,
+                          "shape '%s' (%s) is no bsplinecurve, and has no points of "
+                          "control",
+                          s->name, s->ops->name);
     m->centre = (s->lo + s->hi) * 0.5;
-    m->count = m->kind == IMP_MOVE_POSE     ? 6
-               : m->kind == IMP_MOVE_SCALE  ? 1
-               : m->kind == IMP_MOVE_AFFINE ? IMP_AFFINE_NUMBERS
-                                            : 3 * s->triangles.n_vertices;
+    m->count = m->kind == IMP_MOVE_POSE      ? 6
+               : m->kind == IMP_MOVE_SCALE   ? 1
+               : m->kind == IMP_MOVE_AFFINE  ? IMP_AFFINE_NUMBERS
+               : m->kind == IMP_MOVE_CONTROL ? 4 * s->curves.n_points
+                                             : 3 * s->triangles.n_vertices;
     if (m->kind != IMP_MOVE_VERTICES || !imp__moves_smooth(moves->scene, m->shape))
         return IMP_OK;
     m->count *= 2;
@@ -302,6 +310,7 @@ struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
         case IMP_MOVE_NORMALS:
             normals_velocity(x, vertices_of(moves, x), theta, &out);
             break;
+        case IMP_MOVE_CONTROL: imp__strand_velocity(moves, x, theta, &out); break;
         case IMP_MOVE_AFFINE:
             imp__affine_velocity(moves->scene, x, r, theta, &out);
             break;
@@ -333,6 +342,7 @@ void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *
             break;
         case IMP_MOVE_VERTICES: vertices_bar(moves, x, bar, theta); break;
         case IMP_MOVE_NORMALS: normals_bar(x, vertices_of(moves, x), bar, theta); break;
+        case IMP_MOVE_CONTROL: imp__strand_bar(moves, x, bar, theta); break;
         case IMP_MOVE_AFFINE: imp__affine_bar(moves->scene, x, r, bar, theta); break;
         default: break;
         }
@@ -343,6 +353,12 @@ size_t imp__mover_touched(const struct imp__moves *moves, const struct imp__move
                           const struct imp__glued *x, size_t index[IMP_TOUCHED_MOST])
 {
     size_t n = 0;
+    if (mover->kind == IMP_MOVE_CONTROL) {
+        const struct imp_curves *k = &moves->scene->shapes[x->shape]->curves;
+        for (; n < 4 * ((size_t)k->degree + 1); n++)
+            index[n] = mover->first + 4 * (size_t)k->first[x->prim] + n;
+        return n;
+    }
     if (mover->kind != IMP_MOVE_VERTICES && mover->kind != IMP_MOVE_NORMALS) {
         for (; n < mover->count; n++) index[n] = mover->first + n;
         return n;

@@ -7,6 +7,7 @@
  *     scale     V = s (X - c) at the scale 1 of the shape as it is, or over that scale (1)
  *     affine    V = e + A (X - c), A row by row (12): of what is stretched or turned as a whole
  *     vertices  V = b_0 e_0 + b_1 e_1 + b_2 e_2, of a triangle with weights b (3 each)
+ *     control   of a bsplinecurve: x, y, z and radius of each point (4 each; strand.h)
  *     normals   V = 0, of a triangle with weights b of the vertex normals n_i:  N' = b_0 n_0' + b_1 n_1'
  *               + b_2 n_2' (3 each)
  *     view      of a camera: the velocity of what a fixed film position sees by its field of view,
@@ -51,6 +52,7 @@ enum imp__move_kind {
     IMP_MOVE_SCALE,
     IMP_MOVE_VERTICES,
     IMP_MOVE_NORMALS,
+    IMP_MOVE_CONTROL,
     IMP_MOVE_AFFINE,
     IMP_MOVE_LIGHT,
     IMP_MOVE_AXIS,
@@ -96,12 +98,13 @@ struct imp__moves {
     bool seams_join;
 };
 
-/* A point that is glued to its triangle, or to a sphere, disk or cylinder, world. */
+/* A point that is glued to its triangle, or to a sphere, disk, cylinder or curve, world. */
 struct imp__glued {
     int shape, prim;
     int64_t place; /* the instance that the shape is in (imp_hit.place); 0: none */
     int carrier;   /* by whose movers it moves, as imp__mover.shape */
-    double b[3];   /* weights of the vertices, as the shape's indices have them */
+    double b[3];   /* weights of the vertices, as the shape's indices have them; of a
+                      curve its place in the segment */
     imp_v3 p, n;   /* place, and the unit geometric normal of either side */
     imp_v3 s; /* a unit direction in the surface that is glued to it; 0: none is wanted */
     double
@@ -109,8 +112,8 @@ struct imp__glued {
                          curvature x */
     imp_v3 straight; /* unit: along which it does not, of a cylinder; else 0 */
     /* Meshes with vertex normals: N/|N| and |N|; shifted by x in the surface it turns by
-     * sum_k turn[k] (slope[k].x). */
-    bool smooth;
+     * sum_k turn[k] (slope[k].x). So does the normal of a curve (strand). */
+    bool smooth, strand;
     double length;
     imp_v3 shade, turn[2], slope[2];
 };
@@ -143,7 +146,7 @@ struct imp__moves imp__moves_begin(const struct imp_scene *scene,
                                    const struct imp_sensor *sensor);
 void imp__moves_free(struct imp__moves *moves);
 /* Adds a mover behind the last; its numbers are theta[first .. first + count). IMP_E_UNSUPPORTED:
- * a shape that is neither made of triangles nor a sphere, disk or cylinder, or a camera whose rays
+ * a shape that is neither made of triangles nor a sphere, disk, cylinder or bsplinecurve, or a camera whose rays
  * meet in no point. */
 enum imp_status imp__moves_add(struct imp__moves *moves, enum imp__move_kind kind,
                                int shape);
@@ -168,7 +171,7 @@ struct imp__velocity imp__velocity_of(const struct imp__moves *moves,
 void imp__velocity_bar(const struct imp__moves *moves, const struct imp__glued *x,
                        const struct imp__velocity *bar, double *theta_bar);
 /* Numbers that the velocity of a point of its shape depends on, by their index among all; of vertices
- * those of one triangle. Returns how many. */
+ * those of one triangle, of a curve those of one segment. Returns how many. */
 #define IMP_TOUCHED_MOST 18
 size_t imp__mover_touched(const struct imp__moves *moves, const struct imp__mover *mover,
                           const struct imp__glued *x, size_t index[IMP_TOUCHED_MOST]);
@@ -206,7 +209,9 @@ struct imp__tube {
 };
 bool imp__moves_cylinder(const struct imp_scene *scene, int shape, int64_t place,
                          struct imp__tube *out);
-/* One of these? */
+/* Does the place stretch all directions alike? By *factor. */
+bool imp__place_alike(const struct imp_scene *scene, int64_t place, double *factor);
+/* One of these, or a curve (strand.h)? */
 bool imp__moves_curved(const struct imp_scene *scene, int shape, int64_t place);
 /* The length of what has the length 1 in the group, on the average over volumes; 1: of the world. */
 double imp__place_scale(const struct imp_scene *scene, int64_t place);
@@ -227,8 +232,9 @@ struct imp__rim_name {
 };
 bool imp__rims_meet(const struct imp_scene *scene, const struct imp__rim_name *a,
                     const struct imp__rim_name *b);
-/* The point next to p, whose normal n is on this side; in a direction from the middle of a sphere. */
-struct imp__glued imp__glued_curved(const struct imp_scene *scene, int shape,
+/* The point next to p, whose normal n is on this side; in a direction from the middle of a sphere; on a
+ * segment of a curve. */
+struct imp__glued imp__glued_curved(const struct imp_scene *scene, int shape, int prim,
                                     int64_t place, imp_v3 p, imp_v3 n);
 
 /* ---- cameras_lights.c ---- */

@@ -77,10 +77,10 @@ enum imp_status imp__moves_add_pose(struct imp__moves *moves, const struct imp_p
     static const enum imp__move_kind kind[IMP_POSE_KINDS] = {
         [IMP_POSE_RIGID] = IMP_MOVE_POSE,      [IMP_POSE_SCALE] = IMP_MOVE_SCALE,
         [IMP_POSE_WORLD] = IMP_MOVE_AFFINE,    [IMP_POSE_VERTICES] = IMP_MOVE_VERTICES,
-        [IMP_POSE_NORMALS] = IMP_MOVE_NORMALS, [IMP_POSE_POSITION] = IMP_MOVE_LIGHT,
-        [IMP_POSE_DIRECTION] = IMP_MOVE_LIGHT, [IMP_POSE_TURN] = IMP_MOVE_TURN,
-        [IMP_POSE_SUN] = IMP_MOVE_SUN,         [IMP_POSE_SUN_RADIUS] = IMP_MOVE_DISC,
-        [IMP_POSE_PICTURE] = IMP_MOVE_SPREAD};
+        [IMP_POSE_NORMALS] = IMP_MOVE_NORMALS, [IMP_POSE_CONTROL] = IMP_MOVE_CONTROL,
+        [IMP_POSE_POSITION] = IMP_MOVE_LIGHT,  [IMP_POSE_DIRECTION] = IMP_MOVE_LIGHT,
+        [IMP_POSE_TURN] = IMP_MOVE_TURN,       [IMP_POSE_SUN] = IMP_MOVE_SUN,
+        [IMP_POSE_SUN_RADIUS] = IMP_MOVE_DISC, [IMP_POSE_PICTURE] = IMP_MOVE_SPREAD};
     int shape = pose->sensor          ? IMP_MOVE_CAMERA
                 : pose->instance >= 0 ? IMP_MOVE_INSTANCE(pose->instance)
                                       : pose->shape;

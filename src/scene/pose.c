@@ -132,6 +132,25 @@ static enum imp_status sensor_apply(const struct imp_pose *p)
     return IMP_OK;
 }
 
+/* The points of a curve, before its pose. */
+static enum imp_status control_apply(const struct imp_pose *p, struct imp_shape *s)
+{
+    const struct imp_pose *set = imp__pose_beside(p, IMP_POSE_CONTROL);
+    float *points = (float *)(uintptr_t)s->curves.points;
+    const size_t n = 4 * s->curves.n_points;
+    memcpy(points, p->object->control, n * sizeof *points);
+    for (size_t k = 0; set && k < n; k++) {
+        points[k] = (float)set->number[k];
+        if (k % 4 == 3 ? !(points[k] >= 0 && points[k] < 1e18f)
+                       : !(fabsf(points[k]) < 1e18f))
+            return imp__error(
+                p->scene->ctx, IMP_E_NUMERIC, "%s holds %s of point %zu that is %g",
+                p->scene->params[set->param].info.name,
+                k % 4 == 3 ? "a radius" : "a coordinate", k / 4, set->number[k]);
+    }
+    return IMP_OK;
+}
+
 /* False: it is no cylinder with numbers of its own. */
 static bool ends_apply(const struct imp_pose *p, struct imp_shape *s)
 {
@@ -159,7 +178,8 @@ static enum imp_status shape_apply(const struct imp_pose *p)
                           *turned = imp__pose_beside(p, IMP_POSE_NORMALS);
     const size_t n = 3 * s->triangles.n_vertices;
     float *positions = (float *)(uintptr_t)s->triangles.positions;
-    memcpy(s->self, p->rest, p->rest_size);
+    if (p->rest_size > 0) memcpy(s->self, p->rest, p->rest_size);
+    if (s->geometry == IMP_CURVES) IMP_CHECKED(control_apply(p, s));
     s->area = p->rest_area;
     const struct imp_map by = map_of(p);
     const struct imp_pose *world = world_of(p);
@@ -217,8 +237,10 @@ double imp__pose_large(const struct imp_pose *p, size_t e)
     case IMP_POSE_SCALE:
     case IMP_POSE_RADIUS: return 0.3 * p->number[0];
     case IMP_POSE_NORMALS: return 0.3;
+    case IMP_POSE_CONTROL:
     case IMP_POSE_VERTICES: {
         const struct imp_shape *s = p->scene->shapes[p->shape];
+        if (p->kind == IMP_POSE_CONTROL && e % 4 == 3) return 0.3 * p->number[e];
         return 0.1 * imp__length(s->hi - s->lo);
     }
     case IMP_POSE_PICTURE:

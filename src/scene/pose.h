@@ -10,6 +10,7 @@
  *     NAME.vertex_positions  of a mesh: the vertices, three numbers each, world
  *     NAME.vertex_normals    of a mesh that has some: three numbers each, world, of any length; in a
  *                            triangle they are weighted, and the sum is made unit
+ *     NAME.control_points    of a bsplinecurve: four numbers each, x, y, z and radius, world
  *     NAME.center, .radius   of a sphere, world
  *     NAME.p0, .p1, .radius  of a circular cylinder: the middles of its ends, world; its points turn with
  *                            the axis as little as possible
@@ -40,6 +41,7 @@ enum imp_pose_kind {
     IMP_POSE_WORLD,
     IMP_POSE_VERTICES,
     IMP_POSE_NORMALS,
+    IMP_POSE_CONTROL,
     IMP_POSE_CENTER,
     IMP_POSE_RADIUS,
     IMP_POSE_END_0,
@@ -94,11 +96,12 @@ struct imp_pose {
     /* The first one of the same object has what follows. */
     struct imp_pose *object;
     bool due; /* its numbers, or another's of the object, changed since it was moved */
-    /* As the file has it: the kind's object, a volume's to_world, and positions and normals of a mesh. */
+    /* As the file has it: the kind's object, a volume's to_world, and positions and normals of a mesh, points of a curve. */
     void *rest;
     size_t rest_size;
     double rest_area;              /* of a shape, as it was then */
     float *positions, *normals;    /* NULL: in the object, or none */
+    float *control;                /* points of a curve; else NULL */
     struct imp_receiver *receiver; /* of a shape with a meter that has one; else NULL */
     struct imp__ies *table;        /* of a shape that shines by a table; else NULL */
 };

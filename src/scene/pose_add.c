@@ -105,11 +105,14 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
     struct imp__sky_sun sun;
     if (imp__pose_is_view(p->kind)) p->sensor->ops->view(p->sensor, view, false);
     const bool rows = p->kind == IMP_POSE_VERTICES || p->kind == IMP_POSE_NORMALS;
+    const struct imp_curves *curve =
+        p->kind == IMP_POSE_CONTROL ? &scene->shapes[p->shape]->curves : NULL;
     const bool place = (p->kind >= IMP_POSE_POSITION && p->kind <= IMP_POSE_SUN) ||
                        (imp__pose_is_round(p->kind) && p->kind != IMP_POSE_RADIUS);
     p->n = p->kind == IMP_POSE_RIGID   ? 6
            : p->kind == IMP_POSE_WORLD ? 12
            : rows                      ? 3 * t->n_vertices
+           : curve                     ? 4 * curve->n_points
            : place                     ? 3
                                        : 1;
     p->number = imp__arena_array(&scene->arena, p->n, sizeof *p->number);
@@ -123,6 +126,9 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_pose *p)
         break;
     case IMP_POSE_VERTICES:
         for (size_t k = 0; k < p->n; k++) p->number[k] = t->positions[k];
+        break;
+    case IMP_POSE_CONTROL:
+        for (size_t k = 0; k < p->n; k++) p->number[k] = curve->points[k];
         break;
     case IMP_POSE_NORMALS: {
         const struct imp__mesh *m = scene->shapes[p->shape]->self;
@@ -170,6 +176,7 @@ static const struct tail {
     [IMP_POSE_WORLD] = {"to_world", "1, scene units", -INFINITY, INFINITY},
     [IMP_POSE_VERTICES] = {"vertex_positions", "scene units", -INFINITY, INFINITY},
     [IMP_POSE_NORMALS] = {"vertex_normals", "1", -INFINITY, INFINITY},
+    [IMP_POSE_CONTROL] = {"control_points", "scene units", -INFINITY, INFINITY},
     [IMP_POSE_CENTER] = {"center", "scene units", -INFINITY, INFINITY},
     [IMP_POSE_RADIUS] = {"radius", "scene units", 1e-6, INFINITY},
     [IMP_POSE_END_0] = {"p0", "scene units", -INFINITY, INFINITY},
@@ -202,22 +209,22 @@ static enum imp_status param_add(struct imp_scene *scene, const char *object,
     char *name = imp__arena_take(&scene->arena, length, 1);
     if (!name) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
     snprintf(name, length, "%s.%s", object, tail->name);
-    const bool rows = p->kind == IMP_POSE_VERTICES || p->kind == IMP_POSE_NORMALS,
-               map = p->kind == IMP_POSE_WORLD;
+    const bool map = p->kind == IMP_POSE_WORLD;
+    const size_t row = p->kind == IMP_POSE_CONTROL                                   ? 4
+                       : p->kind == IMP_POSE_VERTICES || p->kind == IMP_POSE_NORMALS ? 3
+                                                                                     : 0;
     const struct imp_param param = {
         .info = {.size = sizeof param.info,
                  .name = name,
                  .unit = tail->unit,
-                 .dims = {map    ? 3
-                          : rows ? p->n / 3
-                                 : p->n,
-                          map    ? 4
-                          : rows ? 3
-                                 : 0},
-                 .n_dims = map || rows ? 2 : 1,
+                 .dims = {map       ? 3
+                          : row > 0 ? p->n / row
+                                    : p->n,
+                          map ? 4 : row},
+                 .n_dims = map || row > 0 ? 2 : 1,
                  .lo = tail->lo,
                  .hi = tail->hi,
-                 .flags = IMP_PARAM_DIFFERENTIABLE | (rows ? IMP_PARAM_LIST : 0u)},
+                 .flags = IMP_PARAM_DIFFERENTIABLE | (row > 0 ? IMP_PARAM_LIST : 0u)},
         .store = IMP_STORE_DOUBLES,
         .degree = IMP_DEGREE_OTHER,
         .doubles = p->number};
@@ -249,6 +256,7 @@ static int family(enum imp_pose_kind kind)
     const bool view = imp__pose_is_view(kind) || kind == IMP_POSE_PICTURE;
     return view                        ? 0
            : kind == IMP_POSE_VERTICES ? 2
+           : kind == IMP_POSE_CONTROL  ? 6
            : kind == IMP_POSE_NORMALS  ? 5
            : imp__pose_is_round(kind)  ? 3
            : kind == IMP_POSE_WORLD    ? 4
@@ -276,6 +284,8 @@ static const char *beside_why(const struct imp_pose *p)
                        : "single normals turn, and the whole turns with them";
         if (own == 2 || other == 2)
             return "single vertices move, and the whole moves with them";
+        if (own == 6 || other == 6)
+            return "single points move, and the whole moves with them";
         return own == 4 || other == 4
                    ? "to_world says where it is, or other numbers"
                    : "pose and scale say where it is, or center, p0, p1 and radius";
@@ -350,7 +360,8 @@ enum imp_status imp_scene_add_geometry(imp_scene *scene, const char *name)
     return imp__error(
         scene->ctx, IMP_E_ARG,
         "'%s' names no number of geometry: NAME.pose, scale, to_world, "
-        "vertex_positions, vertex_normals, center, radius, p0, p1, x_fov, "
+        "vertex_positions, vertex_normals, control_points, center, radius, p0, p1, "
+        "x_fov, "
         "principal_point_offset_x, _y, "
         "opencv_k1, k2, p1, p2, k3, aperture_radius, "
         "focus_distance, position, direction, turn, sun_direction or sun_radius",

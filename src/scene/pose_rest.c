@@ -57,15 +57,19 @@ enum imp_status imp__pose_rest_keep(struct imp_scene *scene, struct imp_pose *p)
                        : p->group >= 0 ? (void *)scene->world->instance
                                        : (void *)&scene->world->instance[p->instance];
     const size_t n = m ? 3 * s->triangles.n_vertices : 0;
-    p->rest = imp__arena_take(&scene->arena, 1, p->rest_size);
+    const bool curve = s && s->geometry == IMP_CURVES;
+    const size_t n_control = curve ? 4 * s->curves.n_points : 0;
+    p->rest = imp__arena_take(&scene->arena, 1, p->rest_size + 1);
+    if (curve) p->control = imp__arena_take(&scene->arena, n_control, sizeof *p->control);
     if (r) p->receiver = imp__arena_take(&scene->arena, 1, sizeof *r);
     if (m) p->positions = imp__arena_take(&scene->arena, n, sizeof *p->positions);
     if (m && m->normals)
         p->normals = imp__arena_take(&scene->arena, n, sizeof *p->normals);
     if (!p->rest || (r && !p->receiver) || (m && !p->positions) ||
-        (m && m->normals && !p->normals))
+        (curve && !p->control) || (m && m->normals && !p->normals))
         return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a pose");
-    memcpy(p->rest, self, p->rest_size);
+    if (p->rest_size > 0) memcpy(p->rest, self, p->rest_size);
+    if (curve) memcpy(p->control, s->curves.points, n_control * sizeof *p->control);
     p->rest_area = s ? s->area : 0;
     if (r) *p->receiver = *r;
     if (m) memcpy(p->positions, s->triangles.positions, n * sizeof *p->positions);

@@ -12,12 +12,21 @@
 extern const struct imp_sensor_ops imp__distant;
 extern const struct imp_emitter_ops imp__projector;
 
+bool imp__pose_looks_up(const struct imp_scene *scene, const struct imp_shape *s)
+{
+    const struct imp_bsdf *b = imp__shape_bsdf(scene, s);
+    for (int k = 0; k < b->n_in; k++)
+        if (b->input[k]->texture) return true;
+    return false;
+}
+
 /* What else is made from where shapes are, and is not made again. NULL: nothing is in the way, as
  * below. */
 static const char *shape_why(const struct imp_scene *scene, const struct imp_shape *s)
 {
     if (!s->ops->move)
-        return "it is not made of triangles, and no sphere, disk or cylinder";
+        return "it is not made of triangles, and no sphere, disk, cylinder or "
+               "bsplinecurve";
     if (s->index >= imp__shapes_outside(scene))
         return "it is in a shape group: its instances have poses";
     if (scene->n_bodies > 0) return "there are media of graded index";
@@ -27,6 +36,8 @@ static const char *shape_why(const struct imp_scene *scene, const struct imp_sha
     if (scene->lights_in_tree) return "lights are chosen by a tree (light_choice)";
     if (scene->aims.aimed) return "directions are aimed at shapes";
     if (s->placed || s->by_triangle) return "its textures need more than uv";
+    if (s->geometry == IMP_CURVES && imp__pose_looks_up(scene, s))
+        return "its texture would turn about its line, by where z is";
     return NULL;
 }
 
@@ -42,17 +53,11 @@ static const char *size_why(const struct imp_scene *scene, const struct imp_shap
     for (int k = 0; k < scene->n_sensors; k++)
         if (scene->sensors[k]->shape == s) return "it is a sensor";
     if (kind == IMP_POSE_VERTICES && !is_mesh) return "it is no mesh";
+    if (kind == IMP_POSE_CONTROL && s->geometry != IMP_CURVES)
+        return "it is no bsplinecurve";
     if (kind == IMP_POSE_NORMALS && !(is_mesh && s->smooth))
         return "it is no mesh with vertex normals";
     return NULL;
-}
-
-bool imp__pose_looks_up(const struct imp_scene *scene, const struct imp_shape *s)
-{
-    const struct imp_bsdf *b = imp__shape_bsdf(scene, s);
-    for (int k = 0; k < b->n_in; k++)
-        if (b->input[k]->texture) return true;
-    return false;
 }
 
 /* A sphere, or a circular cylinder, and which of their numbers this is. */

@@ -45,9 +45,10 @@ const char *imp__world_instance_why(const struct imp_scene *scene, int k)
         const struct imp_shape *s = scene->shapes[group->within[i]];
         struct imp_round round;
         if (imp__shape_round(s, &round) ||
-            s->ops == &imp__cylinder) /* an oval one, too */
-            return "a sphere or cylinder in it would be stretched: it has a pose and a "
-                   "scale";
+            s->ops == &imp__cylinder || /* an oval one, too */
+            s->geometry == IMP_CURVES)
+            return "a sphere, cylinder or curve in it would be stretched: it has a pose "
+                   "and a scale";
     }
     return NULL;
 }

@@ -45,8 +45,15 @@ imp_v3 imp__moved_turn(const struct imp__moved_by *m, imp_v3 d)
 
 struct imp__moved_at imp__moved_rest(const struct imp__glued *x)
 {
-    return (struct imp__moved_at){x->p,         x->n,        x->s,
-                                  x->curvature, x->straight, imp__shading_normal(x)};
+    return (struct imp__moved_at){.p = x->p,
+                                  .n = x->n,
+                                  .s = x->s,
+                                  .curvature = x->curvature,
+                                  .straight = x->straight,
+                                  .shade = imp__shading_normal(x),
+                                  .strand = x->strand,
+                                  .turn = {x->turn[0], x->turn[1]},
+                                  .slope = {x->slope[0], x->slope[1]}};
 }
 struct imp__moved_at imp__moved_placed(const struct imp__moved_by *m,
                                        const struct imp__glued *x)
@@ -56,12 +63,17 @@ struct imp__moved_at imp__moved_placed(const struct imp__moved_by *m,
     if (m->pose->kind == IMP_POSE_SCALE) {
         at.p = m->from + (x->p - m->from) * m->by;
         at.curvature /= m->by;
+        for (int k = 0; k < 2; k++) at.slope[k] *= 1 / m->by;
     } else {
         at.p = m->to + imp__moved_turn(m, x->p - m->from);
         at.n = imp__moved_turn(m, x->n);
         at.s = imp__moved_turn(m, x->s);
         at.straight = imp__moved_turn(m, x->straight);
         at.shade = imp__moved_turn(m, imp__shading_normal(x));
+        for (int k = 0; k < 2; k++) {
+            at.turn[k] = imp__moved_turn(m, x->turn[k]);
+            at.slope[k] = imp__moved_turn(m, x->slope[k]);
+        }
     }
     return at;
 }
@@ -117,6 +129,12 @@ struct imp__glued imp__moved_glued(const struct imp_scene *scene,
 imp_v3 imp__moved_met(imp_v3 o, imp_v3 w, struct imp__moved_at *x)
 {
     const double plane = imp__dot(x->n, x->p - o) / imp__dot(x->n, w);
+    if (x->strand) { /* by its slopes, which is right to the first order */
+        const imp_v3 p = o + w * plane, r = p - x->p;
+        x->n = imp__normalize(x->n + x->turn[0] * imp__dot(x->slope[0], r) +
+                              x->turn[1] * imp__dot(x->slope[1], r));
+        return p;
+    }
     if (x->curvature == 0) return o + w * plane;
     const imp_v3 centre = x->p - x->n * (1 / x->curvature);
     /* A cylinder is met in the plane across its axis. */

@@ -33,6 +33,8 @@ struct imp__moved_at {
     imp_v3 p, n, s;
     double curvature;
     imp_v3 straight, shade;
+    bool strand; /* as imp__glued has it, with turn and slope */
+    imp_v3 turn[2], slope[2];
 };
 struct imp__moved_at imp__moved_rest(const struct imp__glued *x);
 struct imp__moved_at imp__moved_placed(const struct imp__moved_by *m,

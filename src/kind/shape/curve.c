@@ -239,12 +239,34 @@ void imp__curve_surface(const struct imp_curves *k, int segment, const float at[
     surface_at(k, &here, &x, x.axis * along + round * across, out);
 }
 
-#define CURVE_OPS(name_, build_, place_)                                                 \
+/* Turned, shifted and stretched alike, with the radii. */
+static void move(struct imp_shape *s, const double to_world[12])
+{
+    float *points = (float *)(uintptr_t)s->curves.points; /* its own, of build() */
+    const double scale = imp__length(imp__rows_vector(to_world, imp__v3(1, 0, 0)));
+    s->lo = imp__v3(INFINITY, INFINITY, INFINITY);
+    s->hi = -s->lo;
+    for (size_t k = 0; k < s->curves.n_points; k++) {
+        float *q = points + 4 * k;
+        const imp_v3 p = imp__rows_point(to_world, imp__v3(q[0], q[1], q[2]));
+        const double r = q[3] * scale;
+        for (int i = 0; i < 3; i++) {
+            q[i] = (float)p[i];
+            s->lo[i] = imp_min(p[i] - r, s->lo[i]);
+            s->hi[i] = imp_max(p[i] + r, s->hi[i]);
+        }
+        q[3] = (float)r;
+    }
+    s->lo[3] = s->hi[3] = 0;
+    s->area = area_of(&s->curves);
+}
+
+#define CURVE_OPS(name_, build_, place_, move_)                                          \
     {                                                                                    \
         .size = sizeof(struct imp_shape_ops), .name = name_, .build = build_,            \
-        .surface = surface, .place = place_                                              \
+        .surface = surface, .place = place_, .move = move_                               \
     }
 const struct imp_shape_ops imp__bsplinecurve =
-    CURVE_OPS("bsplinecurve", bspline_build, place);
+    CURVE_OPS("bsplinecurve", bspline_build, place, move);
 const struct imp_shape_ops imp__linearcurve =
-    CURVE_OPS("linearcurve", linear_build, NULL);
+    CURVE_OPS("linearcurve", linear_build, NULL, NULL);

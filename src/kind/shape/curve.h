@@ -14,6 +14,8 @@ struct imp__curve_at {
 };
 void imp__curve_at(const struct imp_curves *k, int segment, double v,
                    struct imp__curve_at *out);
+/* Weights of a segment's degree + 1 points in the line, and in its first three derivatives. */
+void imp__curve_weights(int degree, double v, double b[4][4]);
 
 /* Along the line, unit; any direction where points coincide. */
 static inline imp_v3 imp__curve_axis(const struct imp__curve_at *at)

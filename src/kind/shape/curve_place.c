@@ -11,23 +11,28 @@ static imp_v3 load(const struct imp_curves *k, size_t i)
     return imp__v3(p[0], p[1], p[2]);
 }
 
+void imp__curve_weights(int degree, double v, double b[4][4])
+{
+    const double w = 1 - v;
+    const double line[4][4] = {{w, v}, {-1, 1}};
+    const double spline[4][4] = {
+        /* uniform, cubic */
+        {w * w * w / 6, (v * v * (3 * v - 6) + 4) / 6, (3 * v * (1 + v * w) + 1) / 6,
+         v * v * v / 6},
+        {-w * w / 2, v * (3 * v - 4) / 2, (1 + v * (2 - 3 * v)) / 2, v * v / 2},
+        {w, 3 * v - 2, 1 - 3 * v, v},
+        {-1, 3, -3, 1}};
+    for (int j = 0; j < 4; j++)
+        for (int m = 0; m < 4; m++) b[j][m] = degree == 1 ? line[j][m] : spline[j][m];
+}
+
 void imp__curve_at(const struct imp_curves *k, int segment, double v,
                    struct imp__curve_at *out)
 {
     const size_t i = k->first[segment];
-    const double w = 1 - v;
-    /* Weights of value and derivatives, of at most four points. */
-    double b[3][4] = {{w, v}, {-1, 1}, {0, 0}};
     const int n = k->degree + 1;
-    if (n == 4) { /* uniform cubic B-spline */
-        const double all[3][4] = {
-            {w * w * w / 6, (v * v * (3 * v - 6) + 4) / 6, (3 * v * (1 + v * w) + 1) / 6,
-             v * v * v / 6},
-            {-w * w / 2, v * (3 * v - 4) / 2, (1 + v * (2 - 3 * v)) / 2, v * v / 2},
-            {w, 3 * v - 2, 1 - 3 * v, v}};
-        for (int j = 0; j < 3; j++)
-            for (int m = 0; m < 4; m++) b[j][m] = all[j][m];
-    }
+    double b[4][4];
+    imp__curve_weights(k->degree, v, b);
     *out = (struct imp__curve_at){.r = 0};
     for (int m = 0; m < n; m++) {
         const imp_v3 p = load(k, i + (size_t)m);

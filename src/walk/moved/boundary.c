@@ -115,6 +115,7 @@ enum imp_status imp__boundary_begin(const struct imp_tracer *tracer,
         const struct imp_bsdf *bsdf = imp__shape_bsdf(scene, scene->shapes[k]);
         out->passes |= bsdf->straight != 0;
         const struct imp_shape *s = scene->shapes[k];
+        out->one_sided |= s->geometry == IMP_CURVES;
         const bool mirrors = imp__mirror_lobes(bsdf) != 0;
         out->mirrors |= mirrors;
         out->bends |= imp__is_glass(bsdf) || (mirrors && s->geometry != IMP_TRIANGLES &&

@@ -31,6 +31,10 @@
  * disks and cylinders are edges with one face, by their length; the rim on which a disk closes a
  * cylinder is one edge with two.
  *
+ * The outline of a bsplinecurve is found at a place of its line, as turns at which a line touches it, two
+ * of them or four (move/strand.h); of all lines that touch it, with the surface's curvature k along the
+ * line, dl dw sin(phi) is  k dA dpsi.  Its ends are rims with one face, seen from outside alone.
+ *
  * A mesh with vertex normals n_s, beside its geometric normal n, has two more places where light
  * jumps. Kernels are those of n_s, and vanish where it turns away from where the light goes:
  *
@@ -95,8 +99,8 @@ enum imp__boundary_kind { IMP_BOUNDARY_FILM, IMP_BOUNDARY_LIGHT, IMP_BOUNDARY_SC
 
 /* What has edges that are in no list. */
 enum imp__edge_item_kind {
-    IMP_ITEM_ROUND, /* silhouettes of spheres and cylinders, rims of disks and cylinders */
-    IMP_ITEM_ARC,   /* seams of spheres */
+    IMP_ITEM_ROUND, /* silhouettes of spheres, cylinders and curves, rims of disks, cylinders and curves */
+    IMP_ITEM_ARC,     /* seams of spheres */
     IMP_ITEM_SHADING, /* of a mesh with vertex normals */
     IMP_ITEM_HORIZON,
     IMP_ITEM_BORDER, /* of a projector's picture, to what it lights; it has no shape */
@@ -115,8 +119,9 @@ struct imp__edge_item {
      * direction out of the cylinder, at its end; 0: it closes none. */
     bool closed[2];
     imp_v3 wall;
-    double
-        *until; /* of meshes: [n_triangles + 1] area of the triangles before this one */
+    double *
+        until; /* of meshes: [n_triangles + 1] area of the triangles before this one; of curves:
+                   [n_segments + 1] length of edges of the segments before this one */
     /* IMP_ITEM_SHADING: triangles in which the shading normal may turn away from the camera, and
      * [n_seen + 1] the perimeters of those before, over distances. */
     size_t n_seen;
@@ -150,8 +155,10 @@ struct imp__boundary {
     bool wide;     /* they do not meet: a lens with an aperture, or a meter */
     bool mirrors;  /* a material of the scene is a mirror, in part, or bends light */
     bool bends;    /* it bends light, or is on a curved shape: benders */
-    bool passes;   /* a material of the scene lets light go straight on */
-    bool through;  /* also light samples, and that is no bounce */
+    bool
+        one_sided; /* a shape is met from outside alone, so that lines have a sense: curves */
+    bool passes;                  /* a material of the scene lets light go straight on */
+    bool through;                 /* also light samples, and that is no bounce */
     const struct imp_medium *fog; /* which fills the scene; NULL: none */
     bool media;                   /* media end within the scene: moves->borders */
     double size;                  /* of the scene */

@@ -2,8 +2,9 @@
  *
  * Places and motions that the boundary cannot differentiate (boundary.h), refused by name. */
 #include "base/arguments.h"
-#include "boundary_parts.h"
+#include "boundary_one_sided.h"
 #include "math/warp.h"
+#include "move/strand.h"
 #include "moved_mirror.h"
 #include "moved_sky.h"
 
@@ -186,7 +187,8 @@ static enum imp_status edges_allowed(const struct imp__boundary *b)
         return imp__error(
             scene->ctx, IMP_E_UNSUPPORTED,
             "derivatives by what moves: shape '%s' passes through shape '%s', "
-            "and where they meet is no edge: one of them is a disk or cylinder",
+            "and where they meet is no edge: one of them is a disk or cylinder, or a "
+            "curve",
             scene->shapes[other]->name, scene->shapes[pierced]->name);
     return seams_allowed(b);
 }
@@ -342,11 +344,14 @@ static enum imp_status bends_allowed(const struct imp__boundary *b)
     }
     for (size_t k = 0; k < b->edges->n_bodies; k++) {
         const struct imp__body *body = &b->edges->body[k];
-        if (imp__moves_smooth(scene, body->shape))
+        const char *why = imp__moves_smooth(scene, body->shape)
+                              ? "has vertex normals (face_normals makes it flat)"
+                          : imp__is_strand(scene, body->shape, body->place) ? "is a curve"
+                                                                            : NULL;
+        if (why)
             return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                              "derivatives by what moves: shape '%s' has vertex normals "
-                              "(face_normals makes it flat), %s",
-                              scene->shapes[body->shape]->name, where);
+                              "derivatives by what moves: shape '%s' %s, %s",
+                              scene->shapes[body->shape]->name, why, where);
     }
     for (size_t k = 0; k < 2 * b->edges->n_arcs; k++)
         IMP_CHECKED(seam_bends(b, &b->edges->arc[k / 2].side[k % 2]));
@@ -390,6 +395,7 @@ static enum imp_status ball_allowed(const struct imp__boundary *b)
 enum imp_status imp__boundary_allowed(const struct imp__boundary *b)
 {
     enum imp_status st = edges_allowed(b);
+    if (st == IMP_OK) st = imp__one_sided_allowed(b);
     if (st == IMP_OK) st = imp__borders_allowed(b);
     if (st == IMP_OK) st = turns_allowed(b);
     if (st == IMP_OK) st = skies_allowed(b);

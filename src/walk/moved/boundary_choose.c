@@ -41,6 +41,11 @@ static bool is_tube(const struct imp__edge_draw *d, struct imp__tube *tube)
     return imp__moves_cylinder(d->b->tracer->scene, d->item->shape, d->item->place, tube);
 }
 
+static bool is_curve(const struct imp__edge_draw *d)
+{
+    return d->b->tracer->scene->shapes[d->item->shape]->geometry == IMP_CURVES;
+}
+
 /* A point of rim k. */
 static bool rim_set(struct imp__edge_draw *d, int k)
 {
@@ -92,6 +97,7 @@ static bool ball_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel
     struct imp_round round;
     struct imp__tube tube;
     if (is_tube(d, &tube)) return tube_silhouette(d, &tube, from, parallel);
+    if (is_curve(d)) return imp__strand_silhouette(d, from, parallel);
     if (!is_ball(d, &round)) return rim_set(d, 0);
     const imp_v3 way = parallel ? from : round.centre - from;
     const double D = imp__length(way), sine = parallel ? 0 : round.radius / D;
@@ -167,6 +173,7 @@ bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w)
     if (d->item->arc) return arc_set(d);
     const double at[2] = {d->u, u[0]};
     if (is_tube(d, &tube)) return tube_touched(d, &tube, u, w);
+    if (is_curve(d)) return imp__strand_touched(d, u, w);
     if (!is_ball(d, &round)) return rim_set(d, 0);
     d->touches = true;
     d->out = imp__uniform_sphere(at);
@@ -218,6 +225,7 @@ imp_v3 imp__edge_clear(const struct imp__edge_draw *d)
 bool imp__edge_merges(const struct imp__edge_draw *d, imp_v3 w, double beside)
 {
     struct imp__tube c;
+    if (d->rim && !d->item->arc && is_curve(d)) return imp__strand_merges(d, w, beside);
     if (!d->rim || d->item->arc || !is_tube(d, &c) || imp__dot(w, d->out) >= 0)
         return false;
     const imp_v3 r = d->p - c.base, n = imp__normalize(r - c.axis * imp__dot(c.axis, r));

@@ -196,8 +196,12 @@ static enum imp_status items_find(struct imp__boundary *b)
             .kind = IMP_ITEM_ARC, .shape = -1, .arc = &b->edges->arc[k]};
     for (size_t k = 0; k < b->edges->n_bodies; k++) {
         const struct imp__body *body = &b->edges->body[k];
-        if (imp__moves_curved(scene, body->shape, body->place))
-            b->item[b->n_items++] = round_item(b, body);
+        if (imp__moves_curved(scene, body->shape, body->place)) {
+            struct imp__edge_item *item = &b->item[b->n_items++];
+            *item = round_item(b, body);
+            if (scene->shapes[body->shape]->geometry == IMP_CURVES)
+                IMP_CHECKED(imp__strand_lengths(b, item));
+        }
         if (!imp__moves_smooth(scene, body->shape)) continue;
         for (int i = 0; i < 2; i++) {
             struct imp__edge_item *item = &b->item[b->n_items++];
@@ -254,6 +258,8 @@ static double item_length(const struct imp__boundary *b,
         return IMP_2PI * round.radius;
     if (imp__moves_cylinder(b->tracer->scene, item->shape, item->place, &tube))
         return 2 * IMP_2PI * tube.radius + 2 * tube.length;
+    if (item->kind == IMP_ITEM_ROUND && item->until)
+        return item->until[s->curves.n_segments];
     if (item->kind == IMP_ITEM_ROUND)
         return IMP_2PI * sqrt(s->area * IMP_INV_PI) *
                imp__place_scale(b->tracer->scene, item->place);

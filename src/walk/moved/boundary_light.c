@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Silhouettes between a light and what it lights (boundary.h). */
-#include "boundary_parts.h"
+#include "boundary_one_sided.h"
 #include "moved_sky.h"
 #include "walk/core/emitted.h"
 
@@ -173,6 +173,46 @@ static bool comes_through(const struct imp__edge_draw *d, const struct source *s
     return !s->parallel || !outside || outside->majorants;
 }
 
+static void lit_add(struct imp__edge_draw *d, const struct line *l, struct imp_hit *hit,
+                    const struct imp_surface *at, struct imp__edge_light *light)
+{
+    ends_set(d, l, imp__length(at->p - d->p), light);
+    imp__edge_reach(d, hit, at, light);
+}
+
+/* What is lit is what sees the light: of all that is met behind the edge, up to what both senses of the
+ * line meet (boundary_one_sided.c). */
+static void seen_work(struct imp__edge_draw *d, const struct line *l, imp_v3 o, imp_v3 to,
+                      struct imp__edge_light light)
+{
+    enum { WALLS = 16 };
+    const struct imp__boundary *b = d->b;
+    const struct imp_scene *scene = b->tracer->scene;
+    const double contact = IMP_CONTACT * b->size / l->t_y;
+    bool meter =
+        b->tracer->sensor->shape && (!l->from->sky || b->drawn_to_meter[l->from->light]);
+    struct imp_hit hit = {.t = 1};
+    for (int k = 0; k < WALLS; k++) {
+        struct imp_surface at;
+        struct imp__edge_light own = light;
+        struct imp__meter_point x;
+        const bool meets =
+            imp__intersect(scene, &o, &to, (double)hit.t + contact, INFINITY, &hit);
+        if (meter && imp__meter_meet(d, o, to, meets ? &hit : NULL, &x)) {
+            meter = false;
+            if (imp__one_sided_sees(d, &x.at, o)) {
+                ends_set(d, l, imp__length(x.at.p - d->p), &own);
+                imp__meter_reach(d, &x, &own);
+                own = light;
+            }
+        }
+        if (!meets) return;
+        imp__hit_surface(scene, &hit, &o, &to, &at);
+        if (imp__one_sided_sees(d, &at, o)) lit_add(d, l, &hit, &at, &own);
+        if (scene->shapes[hit.shape]->geometry != IMP_CURVES) return;
+    }
+}
+
 void imp__draw_light(struct imp__edge_draw *d)
 {
     const struct imp__boundary *b = d->b;
@@ -199,17 +239,19 @@ void imp__draw_light(struct imp__edge_draw *d)
     const imp_v3 o = e->shape ? imp__offset(from, s.y.ng, r) : from;
     const double beside = IMP_BESIDE * (t_y + imp__length(d->p));
     const imp_v3 to = d->p + m * beside - o;
-    if (imp__edge_merges(d, to, beside)) return;
+    const bool backwards = b->one_sided && d->item && d->item->shape >= 0 && d->rim &&
+                           scene->shapes[d->item->shape]->geometry == IMP_CURVES;
+    if (imp__edge_merges(d, backwards ? -to : to, beside)) return;
     struct imp_hit hit;
     struct imp_surface at;
     imp_spec T = imp__spec(1);
     const bool follows = imp__edge_fades(d) || (b->passes && b->through);
-    bool meets;
+    bool meets = true;
     if (imp_unlikely(follows)) {
         const imp_v3 inside = d->p - m * beside - o;
         meets = jump_follow(d, o, to, inside, t_y, &hit, &at, &T);
         if (imp__is_zero_used(T, d->waves)) return;
-    } else {
+    } else if (imp_likely(!b->one_sided)) {
         meets = imp__intersect(scene, &o, &to, 0, INFINITY, &hit);
         if (meets && hit.t < 1 + IMP_CONTACT * b->size / t_y) return;
     }
@@ -223,6 +265,10 @@ void imp__draw_light(struct imp__edge_draw *d)
         T *= imp__glued_part(e, imp__length(at.p - s.p), &slope);
     }
     light.light = T * le * (-cosine * sine * d->inv_pdf / (spread * s.density));
+    if (imp_unlikely(b->one_sided && !follows)) {
+        seen_work(d, &line, o, to, light);
+        return;
+    }
     struct imp__meter_point x;
     if (b->tracer->sensor->shape && (!s.sky || b->drawn_to_meter[s.light]) &&
         imp__meter_meet(d, o, to, meets ? &hit : NULL, &x)) {
@@ -231,8 +277,7 @@ void imp__draw_light(struct imp__edge_draw *d)
     }
     if (!meets) return;
     if (imp_likely(!follows)) imp__hit_surface(scene, &hit, &o, &to, &at);
-    ends_set(d, &line, imp__length(at.p - d->p), &light);
-    imp__edge_reach(d, &hit, &at, &light);
+    lit_add(d, &line, &hit, &at, &light);
 }
 
 /* A line through a border, and what is scattered there. */

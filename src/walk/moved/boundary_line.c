@@ -2,7 +2,7 @@
  *
  * Straight lines between the points of a draw (boundary.h): masks let a part of the light pass, null
  * materials all of it. What passes is a factor, and moves no point behind it. */
-#include "boundary_parts.h"
+#include "boundary_one_sided.h"
 #include "moved_mirror.h"
 #include "walk/media/media_along.h"
 #include "walk/media/tracking.h"
@@ -267,6 +267,9 @@ bool imp__edge_follow(struct imp__edge_draw *d, imp_v3 o, imp_v3 w, double from,
     const bool fades = imp__edge_fades(d);
     const int longest = d->b->tracer->integrator->max_depth;
     *line = (struct imp__line){.T = imp__spec(1), .times = 1, .w = w};
+    if (imp_unlikely(d->b->one_sided))
+        return imp__one_sided_follow(d, o, w, from, IMP_EDGE_PASS + dims * PASSES_MOST,
+                                     hit, at, line);
     if (imp_unlikely(fades)) f = flight_of(d, o, w, from, dims);
     for (unsigned n = 0; n < PASSES_MOST; n++) {
         const bool meets = imp__intersect(scene, &o, &w, from, INFINITY, hit);

@@ -38,8 +38,9 @@ struct imp__edge_draw {
     double inv_pdf; /* of the point, per length; of a line that touches a sphere */
     double
         spread; /* one over the density of the direction of imp__edge_touched, where it touches nothing */
-    int cell; /* of the choice; behind all cells, of which sphere */
-    int prim; /* of a medium's border: where the point is */
+    int cell;     /* of the choice; behind all cells, of which sphere */
+    int prim;     /* of a medium's border, or a curve: where the point is */
+    double place; /* of a curve: along its segment */
     struct imp__flux *first, **end;
     bool no_memory;
     double lens
@@ -103,6 +104,13 @@ bool imp__edge_touched(struct imp__edge_draw *d, imp_v3 *w);
  * lines that touch it. Divides d->chance by the probability, and makes d->u uniform again. False: a rim that
  * is the edge of a lid. */
 bool imp__edge_tube_part(struct imp__edge_draw *d, const struct imp__tube *c, bool *wall);
+/* ---- Curves: boundary_strand.c ---- */
+/* The same of an item that is one; its lengths (imp__edge_item.until); imp__edge_merges. */
+bool imp__strand_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel);
+bool imp__strand_touched(struct imp__edge_draw *d, const double u[2], imp_v3 *w);
+enum imp_status imp__strand_lengths(const struct imp__boundary *b,
+                                    struct imp__edge_item *item);
+bool imp__strand_merges(const struct imp__edge_draw *d, imp_v3 w, double beside);
 /* The velocity of the edge's point, as its surface carries it, or its two surfaces, counts m: the ends
  * of a flux, one or two. */
 #define IMP_EDGE_ENDS 2

@@ -4,6 +4,7 @@
  * and from those that a walk by transposed kernels meets on. The vertex slides along the chain from
  * the camera, which is another one for each connection. */
 #include "bent_chain.h"
+#include "boundary_one_sided.h"
 #include "kind/bsdf/transport.h"
 #include "kind/cleared.h"
 #include "math/warp.h"
@@ -175,6 +176,16 @@ static void flux_make(struct imp__edge_draw *d, const struct imp__edge_light *li
     ends_set(d, light, to, mirrors, k, depth, f);
 }
 
+/* A line to the camera. */
+static bool line_open(const struct imp__edge_draw *d, const struct imp_shadow *shadow,
+                      struct imp__line *line)
+{
+    if (imp_likely(!d->b->one_sided))
+        return imp__edge_line(d, shadow->o, shadow->d, shadow->reach, line);
+    *line = (struct imp__line){.T = imp__spec(1), .times = 1};
+    return imp__one_sided_line(d, shadow->o, shadow->d, shadow->reach);
+}
+
 /* To the point that a single ray looks at, and from there to the sensor: radiance times area that leaves
  * k brings  f cos_i/r^2  of its own there. */
 static void ray_connect(struct imp__edge_draw *d, const struct imp__edge_light *light,
@@ -203,7 +214,7 @@ static void ray_connect(struct imp__edge_draw *d, const struct imp__edge_light *
     if (imp__is_zero_used(L, d->waves)) return;
     there.p = imp__offset(ray->at.p, ray->at.ng, -there.wo);
     imp__light_shadow_aim(&k->at, &there, &shadow);
-    if (!imp__edge_line(d, shadow.o, shadow.d, shadow.reach, &line)) return;
+    if (!line_open(d, &shadow, &line)) return;
     flux_make(d, light, &to, &none, end, depth + 1, L);
 }
 
@@ -228,7 +239,7 @@ static void connect(struct imp__edge_draw *d, const struct imp__edge_light *ligh
     imp_spec L = brings * T * kernel(k, imp__to_local(&k->frame, to.wo)) * to.weight;
     if (imp__is_zero_used(L, d->waves)) return;
     imp__light_shadow_aim(&k->at, &to, &shadow);
-    if (!imp__edge_line(d, shadow.o, shadow.d, shadow.reach, &line)) return;
+    if (!line_open(d, &shadow, &line)) return;
     if (imp_unlikely(line.bounces > 0)) {
         if (!light_at(t, light, depth + 1 + passed + line.bounces, &brings)) return;
         L = brings * T * kernel(k, imp__to_local(&k->frame, to.wo)) * to.weight;

@@ -130,6 +130,9 @@ static inline imp_v3 imp__slide_bar(struct imp__link_point *x, imp_v3 w, imp_v3 
          * normals the shading normal does. */
         imp_v3 turn = (x->bar.n - x->x.n * imp__dot(x->x.n, x->bar.n)) * x->x.curvature;
         turn -= x->x.straight * imp__dot(x->x.straight, turn);
+        if (imp_unlikely(x->x.strand))
+            turn = x->x.slope[0] * imp__dot(x->x.turn[0], x->bar.n) +
+                   x->x.slope[1] * imp__dot(x->x.turn[1], x->bar.n);
         if (x->x.smooth)
             turn = x->x.slope[0] * imp__dot(x->x.turn[0], x->bar.shade) +
                    x->x.slope[1] * imp__dot(x->x.turn[1], x->bar.shade);
