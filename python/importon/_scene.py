@@ -206,6 +206,7 @@ class Scene:
 
         `NAME.pose` as `add_pose`; `NAME.scale` of a shape, instance, group or gridvolume; `NAME.to_world` of a shape,
         instance, gridvolume, camera, spot or projector, the upper three rows of its matrix; `NAME.vertex_positions` and `NAME.vertex_normals` of a mesh;
+        `NAME.control_points` of a bsplinecurve, x, y, z and radius of each;
         `NAME.center` and `NAME.radius` of a sphere; `NAME.p0`, `NAME.p1` and `NAME.radius` of a circular
         cylinder; `NAME.x_fov`, `NAME.principal_point_offset_x` and `_y`, `NAME.opencv_k1`,
         `_k2`, `_p1`, `_p2` and `_k3` of a perspective camera or thin lens;
