@@ -143,7 +143,7 @@ static enum imp_status location(struct reader *r, struct imp_weather_info *info)
 
 static enum imp_status head_read(struct reader *r, struct imp_weather_info *info)
 {
-    int periods, records;
+    int periods = 0, records = 0;
     IMP_CHECKED(location(r, info));
     do
         if (!next(r)) return fail(r, 0, "the file ends before its line DATA PERIODS");
@@ -198,7 +198,7 @@ static enum imp_status light(const struct reader *r, int field, const char *what
 static enum imp_status row_read(const struct reader *r, const struct imp_weather_info *w,
                                 struct rows *all, double *dew, struct imp_weather_hour *h)
 {
-    int hour;
+    int hour = 0;
     if (r->n < FIELDS_LEAST || r->n > FIELDS_MAX || (all->fields && r->n != all->fields))
         return fail(r, 0, "a row of %d fields; %s%d", r->n,
                     all->fields ? "the first row has " : "rows have 35, at least ",

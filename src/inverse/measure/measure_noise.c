@@ -156,7 +156,7 @@ static enum imp_status noise_by_photo(struct imp__measure *m, struct imp__photo 
 
 enum imp_status imp__measure_noise(struct imp__measure *m, struct imp__photo *p)
 {
-    double variance, of;
+    double variance = 0, of = 0;
     if (imp__measure_noise_varies(p)) return noise_by_photo(m, p);
     if (p->desc.noise > 0) {
         noise_set(p, p->desc.noise, 0);
@@ -178,7 +178,7 @@ enum imp_status imp__measure_noise(struct imp__measure *m, struct imp__photo *p)
 enum imp_status imp__measure_noise_again(struct imp__measure *m, struct imp__photo *p,
                                          bool *changed)
 {
-    double variance, of;
+    double variance = 0, of = 0;
     if (p->noise_of == 0) return IMP_OK; /* it was given */
     IMP_CHECKED(neighbours_variance(m, p, p->left, p->own, &variance, &of));
     const double before = p->noise,

@@ -108,7 +108,7 @@ static void paths_draw(struct imp_depth *d, const int32_t *list, int n)
     const uint64_t where = (uint64_t)d->depth << 32 | (uint32_t)IMP_FLIGHT_ALONG;
     for (int i = 0; i < n; i += IMP_WIDE_LANES) {
         struct few w;
-        struct imp_wide_block block;
+        struct imp_wide_block block = {.hash = {0}};
         imp_wide sigma[3];
         few_take(d, list, n, i, &w);
         for (int k = 0; k < IMP_WIDE_LANES; k++)
