@@ -19,8 +19,8 @@
 #include <math.h>
 #include <string.h>
 
-#define HIDDEN  0.1  /* of its size */
-#define ROUNDED 1e-6 /* of its scale */
+#define HIDDEN 0.1  /* of its size */
+#define STEP   1e-2 /* of its scale: a step that far is told */
 
 void imp__uncertainty_destroy(imp_context *ctx, struct imp__uncertainty *u)
 {
@@ -162,9 +162,8 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
             imp__interval_free(
                 goal, k, imp__interval_se(&a.free, n, k, u.measurement, u.monte_carlo),
                 v);
-        /* Without noise, rounding is no step. */
         const double away = fabs(u.x[k] - a.from[k]), step = away / v->se;
-        if (rounds->at_newton || held || a.fixed[k] || !(away > ROUNDED * s.scale[k]) ||
+        if (rounds->at_newton || held || a.fixed[k] || !(away > STEP * s.scale[k]) ||
             !(step > u.step))
             continue;
         u.step = step;
