@@ -142,7 +142,8 @@ const char *imp__fit_warning(const struct imp__fit *f, int bias_order,
             residual->freedom > 0 ? "little" : "nothing",
             residual->freedom > 0 ? "are uncertain" : "are without it");
     if (loosest) put_loose(&t, f, variables, u);
-    if (u->step > FAR) {
+    /* Levenberg-Marquardt's steps say themselves how near it is. */
+    if (u->step > FAR && f->options.optimizer != IMP_LM) {
         put(&t, "%sthe search had not ended: the last step moved ", t.used ? "; " : "");
         put_name(&t, f, u->step_of);
         put(&t,
