@@ -71,15 +71,35 @@ int fit_loosest_write(imp_problem *problem, const double *x_dot)
     return rc;
 }
 
+/* "a,b,c" of the sensor's film, then "se.a,se.b,se.c" where errors are known. To be freed. */
+static char *channel_names(const struct imp_target *t)
+{
+    static const char *const rgb[] = {"R", "G", "B"}, *const y[] = {"Y"};
+    struct imp_sensor_info sensor = {.size = sizeof sensor};
+    const char *const *name = t->channels == 3 ? rgb : y;
+    char *text = NULL;
+    size_t size = 0;
+    if (imp_scene_get_sensor(cli.scene, t->sensor, &sensor) == IMP_OK &&
+        sensor.n_responses)
+        name = sensor.response_names;
+    FILE *to = open_memstream(&text, &size);
+    if (!to) return NULL;
+    for (int part = 0; part < (t->noise_se ? 2 : 1); part++)
+        for (int c = 0; c < t->channels; c++)
+            fprintf(to, "%s%s%s", part + c ? "," : "", part ? "se." : "", name[c]);
+    fclose(to);
+    return text;
+}
+
 static enum imp_status film_of(const struct imp_target *t, imp_film **out)
 {
     const size_t n = (size_t)t->width * (size_t)t->height, c = (size_t)t->channels,
                  all = t->noise_se ? 2 * c : c;
-    const char *names = c == 3        ? t->noise_se ? "R,G,B,se.R,se.G,se.B" : "R,G,B"
-                        : t->noise_se ? "Y,se.Y"
-                                      : "Y";
+    char *names = channel_names(t);
+    if (!names) return IMP_E_NOMEM;
     const enum imp_status st =
         imp_film_create(cli.context, t->width, t->height, names, out);
+    free(names);
     if (st != IMP_OK) return st;
     float *to = imp_film_mean(*out);
     for (size_t i = 0; i < n; i++) {

@@ -9,6 +9,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 static int channel_index(imp_film *film, int n, const char *name)
 {
@@ -17,15 +18,45 @@ static int channel_index(imp_film *film, int n, const char *name)
     return -1;
 }
 
-/* The colour channels of a picture: three, or one. */
+/* The colour channels of a picture: three, or one. 0: it has others, and index[0] is the first. */
 static int colour_channels(imp_film *film, int n, int index[3])
 {
     static const char *const rgb[3] = {"R", "G", "B"};
     for (int c = 0; c < 3; c++) index[c] = channel_index(film, n, rgb[c]);
     if (index[0] >= 0 && index[1] >= 0 && index[2] >= 0) return 3;
     index[0] = channel_index(film, n, "Y");
-    if (index[0] < 0) index[0] = 0;
-    return 1;
+    if (index[0] >= 0) return 1;
+    index[0] = 0;
+    return n == 1;
+}
+
+/* An array has no names: which of two numbers would be the luminance? */
+static int is_pair_of_numbers(const char *path, int n)
+{
+    const char *dot = strrchr(path, '.');
+    return n == 2 && dot && !strcasecmp(dot, ".npy");
+}
+
+enum { NAMES_SHOWN = 6 };
+
+static int foreign_channels(imp_film *film, const char *path, int n, int sensor)
+{
+    struct imp_scene_info scene = {.size = sizeof scene};
+    char names[256] = "", more[32] = "";
+    imp_scene_get_info(cli.scene, &scene);
+    const char *own = scene.channels == 3 ? "R, G, B" : "Y";
+    if (is_pair_of_numbers(path, n))
+        return cli_error(EXIT_USAGE,
+                         "%s has 2 channels without names; the film of sensor %d has %s",
+                         path, sensor, own);
+    for (int c = 0; c < n && c < NAMES_SHOWN; c++) {
+        const size_t at = strlen(names);
+        snprintf(names + at, sizeof names - at, "%s%.30s", c ? ", " : "",
+                 imp_film_channel(film, c));
+    }
+    if (n > NAMES_SHOWN) snprintf(more, sizeof more, ", ... (%d)", n);
+    return cli_error(EXIT_USAGE, "%s has channels %s%s; the film of sensor %d has %s",
+                     path, names, more, sensor, own);
 }
 
 /* Those of a film's response curves, by name. */
@@ -212,8 +243,13 @@ int picture_target(const char *spec, const char *mask, struct imp_target *target
     imp_film_get_info(film, &info);
     index = cli_alloc((size_t)sensor.n_responses + 3, sizeof *index);
     int channels = sensor.n_responses;
-    if (channels) rc = curve_channels(film, path, &info, &sensor, index);
-    else channels = colour_channels(film, info.channels, index);
+    if (channels) {
+        rc = curve_channels(film, path, &info, &sensor, index);
+    } else {
+        channels = colour_channels(film, info.channels, index);
+        if (!channels || is_pair_of_numbers(path, info.channels))
+            rc = foreign_channels(film, path, info.channels, target->sensor);
+    }
     if (rc) goto out;
     const size_t n = (size_t)info.width * (size_t)info.height;
     target->width = info.width;

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 from collections.abc import Mapping
 from typing import Any, Optional
 
@@ -208,13 +209,26 @@ class Problem:
             self.check(lib.imp_problem_add_smoothness(self.pointer, text(glob, "smooth"), float(weight)))
 
 
-def _colours(picture: Picture, channels: int) -> tuple[Any, Any]:
-    """The colour channels of a file's picture, and their errors."""
-    names = list(picture.channels)
-    at = ([names.index(c) for c in "RGB"] if {"R", "G", "B"} <= set(names)
-          else [names.index("Y") if "Y" in names else 0])
+def _colours(picture: Picture, scene: Scene, sensor: int, path: Any) -> tuple[Any, Any]:
+    """The colour channels of a picture, and their errors; of a film with response curves, its own."""
+    names, channels = list(picture.channels), scene.channels
+    info = make(_c.imp_sensor_info)
+    scene._context.check(lib.imp_scene_get_sensor(scene._handle.pointer, sensor, ctypes.byref(info)))
+    curves = ctypes.cast(info.response_names, ctypes.POINTER(ctypes.c_char_p))
+    own = [curves[k].decode() for k in range(info.n_responses)] or (["R", "G", "B"] if channels == 3 else ["Y"])
+    name = "target" if path is None else os.fsdecode(path)
+    pair = len(names) == 2 and name.lower().endswith(".npy")  # an array, which has no names
+    if info.n_responses and set(own) <= set(names):
+        at = [names.index(c) for c in own]
+    elif {"R", "G", "B"} <= set(names):
+        at = [names.index(c) for c in "RGB"]
+    elif not pair and ("Y" in names or len(names) == 1):
+        at = [names.index("Y") if "Y" in names else 0]
+    else:
+        raise ArgumentError("%s has channels %s; the film of sensor %d has %s" % (
+            name, ", ".join(names), sensor, ", ".join(own)))
     pixels, se = np.asarray(picture), picture.se
-    if len(at) == 3 and channels == 1 or pixels.shape[2] == len(at):
+    if len(at) == 3 and channels == 1 or at == list(range(pixels.shape[2])):
         return pixels, se
     return pixels[..., at], None if se is None else se[..., at]
 
@@ -331,7 +345,7 @@ def _one_target(scene: Scene, target: Any, sensor: int, weights: Any, loss: str,
         target, whole = _fewer(scene, path, read(path), sensor)
     se = noise_se
     if isinstance(target, Picture) and target.ndim == 3 and target.channels:
-        pixels, own = _colours(target, scene.channels)
+        pixels, own = _colours(target, scene, sensor, path)
         if noise_se is None and own is not None and np.isfinite(own).all():
             se = own  # one sample has no error
     else:

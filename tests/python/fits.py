@@ -344,6 +344,20 @@ def test_bad_fits():
     raises(TypeError, lambda: im.fit(s, target, p, lr=.1))
 
 
+def test_foreign_channels():
+    """Bins are a target of a film of the same bins, and of no other; an array of two numbers is none"""
+    scene = lambda **kw: im.load_file(os.path.join(SCENES, "cornell.xml"), mode="spectral", res=8, **kw)
+    bins = im.render(scene(bins=(400, 700, 4)), spp=16)
+    im.write("bins.exr", bins)
+    np.save("two.npy", np.zeros((8, 8, 2), np.float32))
+    for target, words in ((bins, ("S0.437.5nm", "R, G, B")), ("bins.exr", ("bins.exr", "S0.437.5nm", "R, G, B")),
+                          ("two.npy", ("two.npy", "R, G, B"))):
+        raises(im.ArgumentError, lambda: im.fit(scene(), target, ["red.*"], spp=4), *words)
+    for target in (bins, "bins.exr"):
+        f = im.fit(scene(bins=(400, 700, 4)), target, ["red.*"], spp=4, max_iterations=1)
+        assert np.isfinite(f.loss)
+
+
 def test_texture():
     """A texture of thousands of numbers: no errors, and it comes closer"""
     s = im.load_file(os.path.join(SCENES, "textured.xml"))

@@ -92,3 +92,12 @@ cat >meter.xml <<'XML'
 </scene>
 XML
 importon render -m spectral meter.xml -q --no-manifest --no-preview --spp 4 --bins 400,700,3 -o m.exr && grep -ao 'S0\.[0-9,]*nm' m.exr | sort -u
+# Bins are no target of a film of colours, nor is an array of two numbers; the copy of a target has
+# the bins that it was given.
+importon fit -m spectral lamp.xml --target s.exr --spp 4 -p lamp.radiance.values -q
+importon fit -m spectral lamp.xml --target s.exr --spp 16 -p lamp.radiance.values --bins 400,700,6 -n 1 -q -o found >/dev/null &&
+    importon compare s.exr found/target.exr --json | grep -o '"max_abs":0,'
+python3 -c 'import struct, sys
+head = "{\"descr\": \"<f4\", \"fortran_order\": False, \"shape\": (4, 6, 2), }".replace("\"", chr(39)).ljust(117) + "\n"
+sys.stdout.buffer.write(b"\x93NUMPY\1\0" + struct.pack("<H", 118) + head.encode() + bytes(4 * 4 * 6 * 2))' >two.npy
+importon fit lamp.xml --target two.npy --spp 4 -p 'lamp.*' -q
