@@ -220,6 +220,14 @@ static int answer(const struct imp_run *run, imp_film *primal, imp_film **films,
     return rc;
 }
 
+/* Has every pixel some? */
+static int has_samples(const imp_film *film)
+{
+    struct imp_film_info info = {.size = sizeof info};
+    imp_film_get_info(film, &info);
+    return info.spp > 0;
+}
+
 static int run_jacobian(int n, char **operand)
 {
     imp_problem *problem = NULL;
@@ -245,21 +253,24 @@ static int run_jacobian(int n, char **operand)
         return rc;
     }
     const struct imp_run run = cli_run();
-    progress_deadline(cli.time_s);
     const size_t n_x = imp_problem_n_variables(problem);
     films = cli_alloc(n_x, sizeof *films);
     means = cli_alloc(n_x, sizeof *means);
     group = cli_alloc(n_x, sizeof *group);
     const int n_groups = group_numbers(blocks, n_blocks, group);
     enum imp_status st = imp_problem_jacobian(problem, &run, &primal, films);
-    if (st == IMP_PART || (primal && !cli_failed(st))) {
-        progress_resume(); /* a time limit was that of the pictures */
+    const int whole = !primal || has_samples(primal);
+    if (st == IMP_PART || (primal && whole && !cli_failed(st))) {
+        progress_resume(); /* the pictures that are there get their errors */
         st = imp_problem_jacobian_sums(problem, NULL, &run, primal, films, group,
                                        n_groups, &mean, means);
     }
     if (cli_failed(st)) rc = cli_fail(st, cli.scene_path);
-    /* none: stopped before anything was there */
-    if (!rc && primal) rc = answer(&run, primal, films, mean, means, blocks, n_blocks);
+    /* none, or not of every pixel: their means would be those of a part */
+    if (!rc && (!primal || !whole) && st != IMP_PART)
+        cli_say("interrupted in the first pass: no pictures are written");
+    if (!rc && primal && whole)
+        rc = answer(&run, primal, films, mean, means, blocks, n_blocks);
     if (!rc) rc = cli_done();
     sheet_free(&sheet);
     imp_film_destroy(primal);

@@ -1227,7 +1227,7 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_problem_jacobian(imp_problem *problem
  * NULL: each number is a sum of its own, and n_groups is ignored.
  * @param[out] value of the picture; may be NULL.
  * @param[out] sums  [n_groups], or [n].
- * @return IMP_OK; IMP_CANCELLED, with NaN for errors, which are NaN too if primal was
+ * @return IMP_OK; IMP_CANCELLED, with NaN for errors; all are NaN if primal was
  * interrupted before every pixel had its samples; IMP_E_ARG if the films are not this
  * problem's, and IMP_E_PATHS, with nothing written; IMP_E_NOMEM.
  */

@@ -79,6 +79,15 @@ static void pictures(int at)
     run = stopped_run(at);
     film = NULL;
     st = imp_problem_jacobian(problem, &run, &film, films);
+    struct imp_film_info info = {.size = sizeof info};
+    struct imp_estimate mean = {.value = -7}, sums[N];
+    imp_film_get_info(film, &info);
+    const struct imp_run again = IMP_RUN_INIT;
+    int told = imp_problem_jacobian_sums(problem, NULL, &again, film, films, NULL, 0,
+                                         &mean, sums) == IMP_OK;
+    for (int k = 0; k < N; k++) told &= isfinite(sums[k].value) == (info.spp > 0);
+    tap_ok(told && isfinite(mean.value) == (info.spp > 0),
+           "means of pictures with %d samples", (int)info.spp);
     int fine = film_fine(film);
     for (int k = 0; k < N; k++) fine &= film_fine(films[k]);
     tap_ok(st == IMP_CANCELLED && fine, "jacobian, stopped at report %d", at);

@@ -348,10 +348,12 @@ enum imp_status imp_problem_jacobian_sums(imp_problem *p, const float *adjoint,
         if (ended != IMP_CANCELLED && f.moved) IMP_TRY(edge_errors(ctx, &f, &own, se));
         if (ended == IMP_PART) IMP_TRY(IMP_PART);
     }
+    const double none = f.spp > 0 ? 0 : NAN;
     if (value)
-        *value = (struct imp_estimate){.value = inner_product(&f, primal), .se = se[0]};
+        *value =
+            (struct imp_estimate){.value = none + inner_product(&f, primal), .se = se[0]};
     for (size_t g = 0; g < n; g++)
-        sums[g] = (struct imp_estimate){.value = 0, .se = se[g + 1]};
+        sums[g] = (struct imp_estimate){.value = none, .se = se[g + 1]};
     for (size_t k = 0; k < p->n; k++) sums[each[k]].value += inner_product(&f, films[k]);
 out:
     imp__moved_end(&moved);
