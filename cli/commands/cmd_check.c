@@ -64,6 +64,11 @@ static int run_check(int n, char **operand)
     const enum imp_status st = imp_check(problem, &check, &run, &rows, &n_rows);
     if (cli_failed(st)) {
         rc = cli_fail(st, cli.scene_path);
+    } else if (st == IMP_CANCELLED && n_rows == 0) {
+        rc = cli_done();
+        if (!rc)
+            rc = cli_error(EXIT_RUN, "%s: time ended before the first check",
+                           cli.scene_path);
     } else {
         const size_t failed = check_rows_count(rows, n_rows, 0),
                      noisy = check_rows_count(rows, n_rows, -1);
@@ -73,9 +78,10 @@ static int run_check(int n, char **operand)
         if (!cli.json) check_rows_print(rows, n_rows);
         else if (!cli_failed(imp_problem_get_spp(problem, -1, &fresh, &taken)))
             print_json(&run, taken, rows, n_rows);
-        cli_say("%zu check%s, %zu failed, %zu too noisy to tell%s", n_rows,
+        cli_say("%zu check%s, %zu failed, %zu too noisy to tell%s%s", n_rows,
                 plural((long long)n_rows), failed, noisy,
-                noisy ? " (more --fresh-spp or --draws-time)" : "");
+                noisy ? " (more --fresh-spp or --draws-time)" : "",
+                st == IMP_CANCELLED ? "; stopped before the others" : "");
         rc = cli_done();
         if (!rc && failed) rc = EXIT_NO;
     }
