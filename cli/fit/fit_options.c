@@ -25,7 +25,7 @@ const struct arg_option options_search[] = {
     {ARG_NUMBER | ARG_REPLAYS, 0, "lr", "RATE",
      "learning rate of adam (default 0.05); for values with two bounds it falls, in fits "
      "of more than 64 values with control variates",
-     &fit_choice.learning_rate, 1e-12, 1e6, NULL},
+     &fit_choice.learning_rate, 1e-12, 1, NULL},
     {ARG_NUMBER | ARG_REPLAYS, 0, "momentum", "B",
      "adam: the decay factor of the mean gradient, beta1 (default 0.9; 0.5 for values "
      "with two bounds in fits of more than 64 values with control variates)",

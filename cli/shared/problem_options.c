@@ -112,8 +112,15 @@ static int needs_target(void)
                          : o->stay.n     ? "stay"
                          : o->smooth.n   ? "smooth"
                                          : NULL;
-    if (o->targets.n || !option) return 0;
-    return cli_error(EXIT_USAGE, "--%s is part of a loss, and needs a --target", option);
+    if (!o->targets.n && option)
+        return cli_error(EXIT_USAGE, "--%s is part of a loss, and needs a --target",
+                         option);
+    if (o->epsilon > 0 && losses[o->loss] != IMP_LOSS_RELATIVE_L2 &&
+        losses[o->loss] != IMP_LOSS_LOG)
+        return cli_error(
+            EXIT_USAGE, "--epsilon is of the relative and log losses: --loss %s has none",
+            loss_word());
+    return 0;
 }
 
 int target_sensor(size_t i)

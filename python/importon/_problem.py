@@ -365,6 +365,8 @@ def _one_target(scene: Scene, target: Any, sensor: int, weights: Any, loss: str,
         weights = numbers(weights, "weights", np.float32, shape=pixels.shape[:2])
     if whole is not None:
         weights = whole if weights is None else numbers(weights * whole, "weights", np.float32)
+    if epsilon and loss in ("l2", "l1"):
+        raise ArgumentError("epsilon is of the relative and log losses: %r has none" % loss)
     t = make(_c.imp_target, sensor=sensor, width=pixels.shape[1], height=pixels.shape[0],
              channels=pixels.shape[2], pixels=address(pixels), weights=address(weights),
              loss=choice("imp_loss", loss, "loss"), epsilon=float(epsilon), noise_se=address(se))

@@ -337,7 +337,9 @@ def test_bad_fits():
     s, target, p, truth = setting()
     for words, kw in ((("optimizer", "adam"), dict(optimizer="sgd")), (("max_iterations",), dict(max_iterations=-1)),
                       (("learning_rate",), dict(learning_rate=float("nan"))), (("momentum",), dict(momentum=1)), (("loss",), dict(loss="l0")),
-                      (("l1",), dict(optimizer="lm", loss="l1")), (("no/where/c",), dict(checkpoint="no/where/c")),
+                      (("l1",), dict(optimizer="lm", loss="l1")), (("learning_rate 100", "[0, 1]"), dict(learning_rate=100)),
+                      (("epsilon", "l2"), dict(epsilon=3)), (("learning_rate", "Adam"), dict(optimizer="lm", learning_rate=.1)),
+                      (("momentum", "Adam"), dict(optimizer="lbfgs", momentum=.5)), (("memory", "L-BFGS"), dict(memory=1e6)), (("no/where/c",), dict(checkpoint="no/where/c")),
                       (("noise_se",), dict(noise_se=np.full((16, 16, 3), -1.)))):
         raises(im.Error, lambda: im.fit(s, target, p, spp=4, **kw), *words)
     assert np.allclose(p[RED], [.4, .3, .2])

@@ -107,6 +107,27 @@ static enum imp_status worlds_check(const struct imp_problem *p)
     return IMP_OK;
 }
 
+/* What another optimiser has is not ignored. */
+static enum imp_status foreign_check(imp_context *ctx, const struct imp_fit_options *o)
+{
+    const bool adam = o->optimizer == IMP_ADAM, keeps = !adam && o->optimizer != IMP_LM;
+    const char *of_adam = o->learning_rate > 0                       ? "learning_rate"
+                          : o->momentum > 0                          ? "momentum"
+                          : o->allocation == IMP_ALLOCATION_VARIANCE ? "allocation"
+                          : o->control_variate == IMP_VARIATES_ON    ? "control_variate"
+                                                                     : NULL;
+    const char *of_kept = o->memory > 0 ? "memory" : o->headroom > 1 ? "headroom" : NULL;
+    if (!adam && of_adam)
+        return imp__error(ctx, IMP_E_ARG, "%s is Adam's: no other optimiser has it",
+                          of_adam);
+    if (!keeps && of_kept)
+        return imp__error(ctx, IMP_E_ARG,
+                          "%s is of walks that L-BFGS, MMA and SLSQP keep: no other "
+                          "optimiser has it",
+                          of_kept);
+    return IMP_OK;
+}
+
 static enum imp_status options_check(const struct imp_problem *p,
                                      const struct imp_fit_options *o)
 {
@@ -118,16 +139,21 @@ static enum imp_status options_check(const struct imp_problem *p,
         return imp__error(ctx, IMP_E_ARG, "nothing to fit: no parameter is active");
     if (p->n_targets == 0)
         return imp__error(ctx, IMP_E_ARG, "nothing to fit to: no target");
-    if (o->max_iterations < 0 || !(o->learning_rate >= 0) || !(o->tolerance >= 0) ||
-        isinf(o->tolerance) || o->learning_rate > 1 || !(o->momentum >= 0) ||
-        !(o->momentum < 1))
-        return imp__error(ctx, IMP_E_ARG,
-                          "max_iterations %d, learning_rate %g (0 to 1), tolerance %g, "
-                          "momentum %g (below 1): out of range",
-                          o->max_iterations, o->learning_rate, o->tolerance, o->momentum);
+    if (o->max_iterations < 0)
+        return imp__error(ctx, IMP_E_ARG, "max_iterations %d is below 0",
+                          o->max_iterations);
+    if (!(o->learning_rate >= 0) || o->learning_rate > 1)
+        return imp__error(ctx, IMP_E_ARG, "learning_rate %g is outside [0, 1]",
+                          o->learning_rate);
+    if (!(o->tolerance >= 0) || isinf(o->tolerance))
+        return imp__error(ctx, IMP_E_ARG, "tolerance %g must be finite and >= 0",
+                          o->tolerance);
+    if (!(o->momentum >= 0) || !(o->momentum < 1))
+        return imp__error(ctx, IMP_E_ARG, "momentum %g is outside [0, 1)", o->momentum);
     if ((unsigned)o->allocation > IMP_ALLOCATION_VARIANCE)
         return imp__error(ctx, IMP_E_ARG, "allocation %d does not exist",
                           (int)o->allocation);
+    IMP_CHECKED(foreign_check(ctx, o));
     IMP_CHECKED(worlds_check(p));
     IMP_CHECKED(imp__fit_levels_allowed(p, o));
     IMP_CHECKED(imp__fit_clipped_allowed(p, o));
