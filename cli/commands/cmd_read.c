@@ -311,8 +311,6 @@ static int run_read(int n, char **operand)
     imp_scene_get_info(cli.scene, &scene);
     if (scene.n_sensors == 0)
         return cli_error(EXIT_USAGE, "%s: there is no sensor in it", cli.scene_path);
-    if (cli.time_s > 0)
-        return cli_error(EXIT_USAGE, "read takes --spp samples, and has no --time");
     const int year = year_wanted.weather != NULL;
     const int ugr = ratings_wanted.ugr, dgp = ratings_wanted.dgp;
     if (!o.grid && !year && !ugr && !dgp && (o.csv || o.svg))
@@ -425,12 +423,15 @@ static int run_read(int n, char **operand)
     return found.apart || !met ? EXIT_NO : cli_done();
 }
 
+/* Readings take --spp samples: a clock cannot end them, and no manifest has them. */
+static const struct arg_option options_part[] = {OPTION_PART, {0}};
+
 const struct command command_read = {
     {"read",
      "SCENE",
      "the readings of all sensors, with units, errors and derivatives",
      {options, options_ratings, options_wants, options_year, options_params, options_run,
-      options_limits, options_scene, options_file, options_general},
+      options_part, options_scene, options_file, options_general},
      1,
      1},
     run_read,

@@ -81,6 +81,8 @@ int cli_fail(enum imp_status status, const char *what)
     const int ended_code = ranks_ended(&ended);
     if (ended_code) return cli_error(ended_code, "%s", ended);
     const char *message = cli.context ? imp_last_error(cli.context) : "";
+    if (status == IMP_CANCELLED && !strcmp(message, imp_status_text(status)))
+        message = "interrupted before there was a result";
     if (!message[0]) message = imp_status_text(status);
     const size_t n =
         what ? strlen(what) : 0; /* "FILE:LINE:COLUMN: ..." names it already */

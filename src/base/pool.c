@@ -311,7 +311,8 @@ static enum imp_status loop_run(imp_context *ctx, const struct imp_loop *loop,
         st = r.status;
         if (st != IMP_OK)
             imp__error(ctx, st, "%s", r.error); /* from the worker's thread */
-        if (st == IMP_OK && r.committed < loop->n_items) st = IMP_CANCELLED;
+        if (st == IMP_OK && r.committed < loop->n_items)
+            st = imp__error(ctx, IMP_CANCELLED, "%s", imp_status_text(IMP_CANCELLED));
         if (st == IMP_OK) report(&r, r.committed, true);
     }
     if (done) *done = r.committed;

@@ -125,7 +125,9 @@ static enum imp_status goal_iterated(const struct imp__search *s, void *payload)
         if (st != IMP_OK) return st;
     }
     const bool stops = show_step(f, s);
-    return report(f, false) || stops ? IMP_CANCELLED : IMP_OK;
+    return report(f, false) || stops ? imp__error(f->b->ctx, IMP_CANCELLED, "%s",
+                                                  imp_status_text(IMP_CANCELLED))
+                                     : IMP_OK;
 }
 
 /* Active numbers by M of sobolev.h. */

@@ -70,8 +70,12 @@ static void pictures(int at)
     double x_dot[N] = {1, 2, 3, 4, 5, 6};
     imp_film *film = NULL, *films[N] = {NULL};
 
+    imp_scene *none = NULL; /* leaves a message */
+    tap_ok(imp_scene_load(ctx, "no file", NULL, &none) == IMP_E_IO, "no such scene");
     enum imp_status st = imp_render(scene, &run, &film);
     tap_ok(st == IMP_CANCELLED && film_fine(film), "render, stopped at report %d", at);
+    tap_ok(!strcmp(imp_last_error(ctx), imp_status_text(IMP_CANCELLED)),
+           "the message is its own # %s", imp_last_error(ctx));
     run = stopped_run(at);
     film = NULL;
     st = imp_problem_forward(problem, x_dot, &run, &film);

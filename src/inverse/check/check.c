@@ -124,7 +124,9 @@ enum imp_status imp__check_progress(struct imp__check *c, double work)
     report(c, c->done / fmax(c->total, 1));
     const enum imp_status st = imp__team_any(c->ctx, c->stopped, &c->stopped);
     if (st != IMP_OK) return st;
-    return c->stopped ? IMP_CANCELLED : IMP_OK;
+    return c->stopped
+               ? imp__error(c->ctx, IMP_CANCELLED, "%s", imp_status_text(IMP_CANCELLED))
+               : IMP_OK;
 }
 
 /* Progress of one evaluation, which is one piece of work. */

@@ -49,7 +49,9 @@ enum imp_status imp__fit_goes_on(struct imp__fit *f, double fraction)
 {
     report(f, fraction);
     IMP_CHECKED(imp__team_any(f->problem->ctx, f->stopped, &f->stopped));
-    return f->stopped ? IMP_CANCELLED : IMP_OK;
+    return f->stopped ? imp__error(f->problem->ctx, IMP_CANCELLED, "%s",
+                                   imp_status_text(IMP_CANCELLED))
+                      : IMP_OK;
 }
 
 /* Progress of the evaluation at work. */

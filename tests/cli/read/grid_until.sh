@@ -17,3 +17,8 @@ read_until .05 --time 3
 read_until .05 --from lights
 read_until .05 --part 1/2 -o part
 importon read "$ROOT/scenes/office.xml" --until .05
+# Ctrl-C leaves no reading, and says so.
+importon read "$ROOT/scenes/office.xml" -m mono --grid --spp 1000000 &
+sleep 1
+kill -INT $!
+wait $!
