@@ -36,9 +36,11 @@ static int has_channel(const imp_film *film, const char *name)
     return 0;
 }
 
-static void print_text(const struct imp_compare_result *r)
+/* xyz: of other channels than the files have. */
+static void print_text(const struct imp_compare_result *r, bool xyz)
 {
-    printf("mean          %.9g   %.9g\n", r->mean_a, r->mean_b);
+    printf("mean%s%.9g   %.9g\n", xyz ? " of XYZ   " : "          ", r->mean_a,
+           r->mean_b);
     printf("rmse          %.6g\n", r->rmse);
     printf("relative rmse %.6g\n", r->relative_rmse);
     printf("max |a-b|     %.6g\n", r->max_abs);
@@ -78,6 +80,7 @@ static int run_compare(int n, char **operand)
         struct json j = cli_json();
         json_text(&j, "test", operand[0]);
         json_text(&j, "reference", operand[1]);
+        if (options_z.xyz) json_text(&j, "channels", "XYZ");
         json_number(&j, "mean_test", r.mean_a);
         json_number(&j, "mean_reference", r.mean_b);
         json_number(&j, "rmse", r.rmse);
@@ -92,7 +95,7 @@ static int run_compare(int n, char **operand)
         json_bool(&j, "agree", r.agree);
         cli_json_end(&j);
     } else {
-        print_text(&r);
+        print_text(&r, options_z.xyz);
     }
     rc = r.agree ? EXIT_DONE : EXIT_NO;
 out:

@@ -169,7 +169,7 @@ static void luminaires_put(FILE *f, const struct room_page *p)
             "<section>\n<h2>Luminaires</h2>\n<div "
             "class=\"scroll\"><table>\n<thead><tr><th>Name"
             "</th>%s<th>position</th><th>dimmed "
-            "to</th><th>flux</th><th>power</th></tr></thead>\n",
+            "to</th><th>maintenance</th><th>flux</th><th>power</th></tr></thead>\n",
             p->file_of ? "<th>file</th>" : "");
     for (int i = 0; i < n; i++) {
         struct imp_luminaire_info l = {.size = sizeof l};
@@ -185,16 +185,19 @@ static void luminaires_put(FILE *f, const struct room_page *p)
             fprintf(f, "</td><td>");
             text_put(f, p->file_of(l.name, p->payload));
         }
-        fprintf(f, "</td><td>%.4g, %.4g, %.4g</td><td>%.3g %%</td><td>%.5g lm</td><td>",
-                l.position[0], l.position[1], l.position[2], 100 * l.level, l.flux);
+        fprintf(f,
+                "</td><td>%.4g, %.4g, %.4g</td><td>%.3g %%</td><td>%.3g</td><td>%.5g "
+                "lm</td><td>",
+                l.position[0], l.position[1], l.position[2], 100 * l.level, l.maintenance,
+                l.flux);
         if (full > 0 || l.watts > 0) fprintf(f, "%.4g W", w);
         else all_watts = 0;
         fprintf(f, "</td></tr>\n");
         watts += w;
         flux += l.flux;
     }
-    fprintf(f, "<tr><td>%d in all</td>%s<td></td><td></td><td>%.5g lm</td><td>", rows,
-            p->file_of ? "<td></td>" : "", flux);
+    fprintf(f, "<tr><td>%d in all</td>%s<td></td><td></td><td></td><td>%.5g lm</td><td>",
+            rows, p->file_of ? "<td></td>" : "", flux);
     if (all_watts) fprintf(f, "%.4g W", watts);
     fprintf(f, "</td></tr>\n</table></div>\n<p class=\"faint\">Flux in operation: with "
                "dimming and "
@@ -295,8 +298,15 @@ static void command_put(FILE *f, const struct imp_run *run)
             "<section class=\"faint\">\n<p>importon %s, seed %llu</p>\n<p><code>importon",
             imp_version(), (unsigned long long)run->seed);
     for (int k = 0; k < cli.argc; k++) {
+        char *word = NULL;
+        size_t size = 0;
+        FILE *to = open_memstream(&word, &size);
+        if (!to) break;
+        quote_word(to, cli.argv[k]);
+        fclose(to);
         fputc(' ', f);
-        text_put(f, cli.argv[k]);
+        text_put(f, word);
+        free(word);
     }
     fprintf(f, "</code></p>\n</section>\n");
 }

@@ -219,7 +219,7 @@ double picture_range(imp_film *film)
 
 /* Append `word` to a shell command line, quoted where the shell would split or expand it.
  */
-static void quote_word(FILE *f, const char *word)
+void quote_word(FILE *f, const char *word)
 {
     const char *p = word;
     while (isalnum((unsigned char)*p) || (*p && strchr("-_./=,:@%+", *p))) p++;

@@ -6,10 +6,13 @@
 #define IMP_CLI_CMD_PICTURE_H
 
 #include <importon/importon.h>
+#include <stdio.h>
 
 /* Read a picture; "-" is stdin (EXR). 0, or an exit code with the reason printed. */
 int picture_read(const char *path, imp_film **out);
 
+/* As a shell reads it: in quotes where that is needed. */
+void quote_word(FILE *f, const char *word);
 /* Record command line, version, seed, spp and time in the film. */
 void picture_stamp(imp_film *film, const struct imp_run *run);
 

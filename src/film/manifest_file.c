@@ -3,6 +3,8 @@
  * The file of a manifest. */
 #include "manifest_file.h"
 #include "math/hash.h"
+#include <stdio.h>
+#include <unistd.h>
 
 #define MAGIC          "impproof"
 #define MANIFEST_ORDER 0x01020304u
@@ -72,13 +74,24 @@ out:
     return st;
 }
 
+/* The name of a result in place of its manifest's, which lies beside it. */
+static enum imp_status not_manifest(imp_context *ctx, const char *path)
+{
+    char beside[1024];
+    const int n = snprintf(beside, sizeof beside, "%s.manifest", path);
+    if (n > 0 && (size_t)n < sizeof beside && access(beside, F_OK) == 0)
+        return imp__error(ctx, IMP_E_SCENE, "%s: not a manifest; that of it is %s", path,
+                          beside);
+    return imp__error(ctx, IMP_E_SCENE, "%s: not a manifest", path);
+}
+
 enum imp_status imp__manifest_take(imp_manifest *m, const char *path)
 {
     struct head head;
     uint64_t sum;
     const struct imp_bytes *file = &m->bytes;
     if (file->size < sizeof head + sizeof sum || memcmp(file->data, MAGIC, 8))
-        return imp__error(m->ctx, IMP_E_SCENE, "%s: not a manifest", path);
+        return not_manifest(m->ctx, path);
     struct imp__reading r = {file, 0, file->size - sizeof sum};
     imp__take(&r, &head, sizeof head);
     memcpy(&sum, file->data + r.end, sizeof sum);

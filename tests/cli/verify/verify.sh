@@ -61,3 +61,7 @@ echo "a file of another kind" >none.exr.manifest
 "${render[@]}" -o none.exr
 ls | grep none
 cat none.exr.manifest
+# The name of a result is no manifest, and its manifest is named.
+importon render "$ROOT/scenes/furnace.xml" -D res=4 --spp 4 -q -o result.pfm
+importon verify result.pfm
+echo "exit $?"
