@@ -7,6 +7,9 @@
 
 #include "convert.h"
 
+/* Light has longer waves: a spectrum that ends below was written in micrometres. */
+#define IMP_LIGHT_FIRST_NM 100.0
+
 /* Three numbers, or one where the mode or the input has room for one only. */
 void imp__color_rgb_set(const struct imp__color_ask *ask, const double rgb[3],
                         struct imp__color *out);

@@ -2,6 +2,7 @@
  *
  * Conversion of colours, numbers and spectra to the one or three numbers of a
  * parameter (docs/scene-format.md 2.1). */
+#include "cie.h"
 #include "color_set.h"
 #include "math/vec.h"
 #include "rgb.h"
@@ -177,7 +178,34 @@ static enum imp_status check_samples(const struct imp__color_ask *ask,
                                    "%s = %g at %g nm is outside [0, 1]", name, v[i],
                                    nm[i]);
     }
+    if (nm[n - 1] < IMP_LIGHT_FIRST_NM)
+        return imp__prop_error(ctx, node, prop, IMP_E_SCENE,
+                               "wavelengths of a spectrum are in nm: %g to %g nm is no "
+                               "light (micrometres?)",
+                               nm[0], nm[n - 1]);
     return IMP_OK;
+}
+
+/* Said where a colour in rgb is not what its samples are. */
+static void warn_of_loss(const struct imp__color_ask *ask, const struct imp_node *node,
+                         const struct imp_prop *prop, size_t n, const double *nm,
+                         const double *v)
+{
+    char where[256];
+    const char *name = prop ? prop->name : "values";
+    size_t most = 0;
+    if (imp__color_wants_spectrum(ask) && !ask->scalar) return;
+    for (size_t i = 1; i < n; i++)
+        if (v[i] > v[most]) most = i;
+    imp__loc_text(prop ? prop->loc : node->loc, where, sizeof where);
+    if (nm[n - 1] < IMP_CIE_FIRST_NM || nm[0] > IMP_CIE_LAST_NM)
+        imp__warn(ask->ctx, "%s: %s: %g to %g nm are not visible: its colour is black",
+                  where, name, nm[0], nm[n - 1]);
+    else if (v[most] > 1 && ask->role == IMP_REFLECTANCE)
+        imp__warn(ask->ctx,
+                  "%s: %s = %g at %g nm is above 1: its colour is cut to [0,1], and "
+                  "spectral modes refuse it",
+                  where, name, v[most], nm[most]);
 }
 
 /* ---- Properties -------------------------------------------------------------------- */
@@ -193,6 +221,7 @@ enum imp_status imp__color_samples_set(const struct imp__color_ask *ask,
     enum imp_status st = IMP_OK;
     double rgb[3];
     IMP_TRY(check_samples(ask, node, prop, n, nm, v));
+    warn_of_loss(ask, node, prop, n, nm, v);
     imp__spectrum_to_rgb(n, nm, v, ask->role != IMP_EMISSION, rgb);
     for (int c = 0; c < 3; c++)
         rgb[c] = ask->role == IMP_REFLECTANCE ? imp_clamp(rgb[c], 0.0, 1.0)

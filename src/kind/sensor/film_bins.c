@@ -7,6 +7,7 @@
  * with names of the OpenEXR layout for spectral images (format/exr_spectral.h): S0 and the
  * wavelength in the middle. */
 #include "base/number.h"
+#include "color/color_set.h"
 #include "color/spectrum.h"
 #include "sensor_film.h"
 #include <stdio.h>
@@ -39,6 +40,10 @@ enum imp_status imp__film_bins_build(const struct imp_build *b, const char *text
                                "bins '%s' are no wavelengths from, to in nm and number "
                                "of bins (1 to %d), as in '400, 700, 30'",
                                text, IMP_RESPONSES_MAX);
+    if (to < IMP_LIGHT_FIRST_NM)
+        return imp_build_error(b, "bins", IMP_E_SCENE,
+                               "bins are in nm: %g to %g nm is no light (micrometres?)",
+                               from, to);
     const double w = (to - from) / (double)n;
     struct imp_spectrum *curve = imp__arena_array(b->arena, (size_t)n, sizeof *curve);
     const char **names = imp__arena_array(b->arena, (size_t)n, sizeof *names);

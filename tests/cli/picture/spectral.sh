@@ -79,7 +79,7 @@ importon fit -m spectral lamp.xml --bins 400,700,6 --target s.exr --spp 16 --set
 # As the scene file has it; and what is none.
 sed 's/type="hdrfilm">/type="specfilm"><string name="bins" value="400,700,6"\/>/' lamp.xml >own.xml
 importon render -m spectral own.xml -q --no-manifest --no-preview --se -o own.exr && importon compare s.exr own.exr --json | grep -o '"max_abs":0,'
-for bins in 400,700 400,700,0 400,700,65 700,400,3 0,700,3 400,inf,3 400,700,3x ""; do
+for bins in 400,700 400,700,0 400,700,65 700,400,3 0,700,3 400,inf,3 400,700,3x .4,.7,6 ""; do
     importon render -m spectral lamp.xml -q --bins "$bins" -o x.exr
 done
 importon render lamp.xml -q --bins 400,700,6 -o x.exr

@@ -13,6 +13,7 @@ points '400:.1'
 points '400:-.1, 500:.2'
 points '400:.1, 500:1.2'
 points '400:.1, 500:nan'
+points '.4:.1, .7:.2'
 file() {
     printf "$1" >a.spd
     scene "<spectrum name='reflectance' filename='a.spd'/>"
@@ -60,3 +61,8 @@ importon info - <<<"<scene version='3.0.0'><sensor type='perspective'>
 <spectrum name='srf' value='400:0, 500:1'/></sensor></scene>"
 importon info - <<<"<scene version='3.0.0'><sensor type='perspective'><film type='specfilm'>
 <spectrum name='a' value='400:0, 500:1'/></film></sensor></scene>"
+# A colour in rgb that is not what its samples are.
+importon info - <<<"<scene version='3.0.0'><emitter type='constant'/><shape type='sphere'>
+<bsdf type='diffuse' id='infrared'><spectrum name='reflectance' value='900:.1, 1700:.2'/></bsdf></shape>
+<shape type='sphere'><bsdf type='diffuse' id='percent'>
+<spectrum name='reflectance' value='400:20, 700:30'/></bsdf></shape></scene>" | grep reflectance
