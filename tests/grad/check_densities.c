@@ -153,6 +153,25 @@ static void wrong_areas(void)
     imp_scene_destroy(s);
 }
 
+/* A host's shape may draw no points of its area: no walks begin on it, and no row fails. */
+static void no_areas(void)
+{
+    imp_scene *s = test_scene(ctx, "cornell.xml", IMP_RGB, "res=16");
+    imp_problem *p = test_problem(ctx, s, "red.*");
+    struct imp_shape *lamp = (struct imp_shape *)(uintptr_t)s->emitters[0]->shape;
+    const struct imp_shape_ops *ops = lamp->ops;
+    struct imp_shape_ops plain = *ops;
+    plain.sample_area = NULL;
+    lamp->ops = &plain;
+    check(p, "areas,leaves,points", 3);
+    lamp->ops = ops;
+    tap_ok(n.failed == 0 && n.blind == 0 && n.rows == 1,
+           "a lamp that draws no points has its row of points alone # %d rows, %d fail",
+           n.rows, n.failed);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
 /* Weights of wavelengths, by a cumulative distribution that is not what it was. */
 static void wrong_waves(void)
 {
@@ -201,6 +220,7 @@ int main(void)
     right_rows("cornell.xml", IMP_SPECTRAL, "res=16", "areas,leaves,film,waves", 4);
     right_rows("fog.xml", IMP_RGB, "res=16", "flights,passes,areas,leaves,film", 5);
     wrong_areas();
+    no_areas();
     wrong_waves();
     options();
     imp_context_destroy(ctx);

@@ -191,12 +191,14 @@ static bool alike(const struct imp_emitter *a, const struct imp_emitter *b)
     return a->ops == b->ops &&
            (a->shape ? a->shape->ops : NULL) == (b->shape ? b->shape->ops : NULL);
 }
-/* Walks that begin at it have densities that are looked at here. */
+/* Walks that begin at it have densities that are looked at here; on a shape that draws no
+ * points none does. */
 static bool looked_at(const struct imp_emitter *e)
 {
     const unsigned other = IMP_EMITTER_FAR | IMP_EMITTER_ENVIRONMENT;
     if (!e->ops->sample_emission || !e->ops->pdf_emission) return false;
-    return e->shape ? e->shape->area > 0 : !(e->ops->flags & other); /* check_far.c */
+    if (e->shape) return e->shape->ops->sample_area && e->shape->area > 0;
+    return !(e->ops->flags & other); /* check_far.c */
 }
 
 enum imp_status imp__check_areas(struct imp__draw_list *l,
@@ -215,8 +217,7 @@ enum imp_status imp__check_areas(struct imp__draw_list *l,
             before += looked_at(scene->emitters[j]) && alike(e, scene->emitters[j]);
         if (!looked_at(e) || before >= ALIKE) continue;
         const char *name = e->name ? e->name : e->ops->name;
-        if (e->shape && e->shape->ops->sample_area)
-            IMP_TRY(surface_add(l, t, e->shape, NULL, "areas", name));
+        if (e->shape) IMP_TRY(surface_add(l, t, e->shape, NULL, "areas", name));
         IMP_TRY(surface_add(l, t, e->shape, e, "leaves", name));
     }
 out:
