@@ -19,6 +19,7 @@
  * what tilted lamps keep of it is for the emitter, whose tilt it is. */
 #include "ies_file.h"
 #include "base/number.h"
+#include "kind/emitter/ies.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -312,6 +313,13 @@ static enum imp_status parse(struct reader *r, struct imp_arena *keep,
     d->vertical = v;
     d->horizontal = h;
     d->candela = cd;
+    const double table = imp__ies_flux(&(struct imp__ies){.data = d, .factor = 1});
+    if (d->lamp_flux > 0 && table > (1 + IMP_IES_OFF_MAX) * d->lamp_flux)
+        imp__warn(
+            r->ctx,
+            "%s: its intensities are %.4g lm, and its lamps give %.4g lm alone; the "
+            "intensities count",
+            r->name, table, d->lamp_flux);
 out:
     return st;
 }

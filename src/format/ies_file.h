@@ -9,6 +9,7 @@
 
 #define IMP_IES_BYTES_MAX  ((size_t)1 << 26)
 #define IMP_IES_ANGLES_MAX 36001 /* of each kind */
+#define IMP_IES_OFF_MAX    0.1   /* of flux, output ratio and table, before a warning */
 
 /* The table in `text`, which is zero-terminated; `name` is for messages, what is kept
  * goes to the arena. Every number of the answer is finite, angles ascend and lie in

@@ -20,14 +20,13 @@
 #include "ldt_file.h"
 #include "base/number.h"
 #include "ies_file.h"
+#include "kind/emitter/ies.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #define NUMBER_MAX 1e12
 #define SETS_MAX   20
-#define OFF_MAX    0.1 /* of flux, output ratio and table, before a warning */
-#define DEGREE     (3.14159265358979323846 / 180)
 
 struct lines {
     imp_context *ctx;
@@ -235,30 +234,12 @@ static enum imp_status turns(struct lines *r, const struct head *h, const struct
     return IMP_OK;
 }
 
-/* Int I dw by the trapezoid rule in both angles. */
-static double flux_of(const struct imp_ies_data *d)
-{
-    const int n = d->n_vertical, m = d->n_horizontal;
-    double sum = 0;
-    for (int j = 0; j < imp_max(m - 1, 1); j++)
-        for (int i = 0; i + 1 < n; i++) {
-            const double *p = d->candela + (size_t)j * (size_t)n + (size_t)i;
-            const double *q = m > 1 ? p + n : p;
-            const double band =
-                cos(d->vertical[i] * DEGREE) - cos(d->vertical[i + 1] * DEGREE);
-            const double width =
-                m > 1 ? (d->horizontal[j + 1] - d->horizontal[j]) * DEGREE : 360 * DEGREE;
-            sum += 0.25 * (p[0] + p[1] + q[0] + q[1]) * band * width;
-        }
-    const double whole = m > 1 ? d->horizontal[m - 1] - d->horizontal[0] : 360;
-    return sum * 360 / whole;
-}
-
 static void contradictions_tell(const struct lines *r, const struct head *h,
                                 const struct imp_ies_data *d)
 {
-    const double table = flux_of(d), says = h->flux * h->output_ratio / 100;
-    if (h->flux > 0 && h->output_ratio > 0 && fabs(table - says) > OFF_MAX * says)
+    const double table = imp__ies_flux(&(struct imp__ies){.data = d, .factor = 1});
+    const double says = h->flux * h->output_ratio / 100;
+    if (h->flux > 0 && h->output_ratio > 0 && fabs(table - says) > IMP_IES_OFF_MAX * says)
         imp__warn(
             r->ctx,
             "%s: its intensities are %.4g lm, and its lamps of %.4g lm with a light "

@@ -584,6 +584,46 @@ static void tilted(void)
     remove("tilted_lamp.ies");
 }
 
+static void hear(enum imp_log_level level, const char *message, void *payload)
+{
+    if (level == IMP_LOG_WARNING) snprintf(payload, 200, "%s", message);
+}
+
+/* An intensity I below the horizon is 2 pi I lm, of lamps of 1000 lm: more than they give is a
+ * contradiction, less is what the luminaire keeps. */
+static void contradictions(void)
+{
+    static const struct {
+        const char *counts, *candela;
+        bool warned;
+    } files[] = {{"1 1000", "170 170", false},
+                 {"1 1000", "180 180", true},
+                 {"2 500", "180 180", true},
+                 {"1 -1", "180 180", false},
+                 {"1 1000", "20 20", false}};
+    struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
+    imp_context *loud;
+    char said[200], text[200];
+    o.log = hear;
+    o.log_payload = said;
+    test_must(NULL, imp_context_create(&o, &loud));
+    for (size_t k = 0; k < imp_count(files); k++) {
+        struct imp_arena keep;
+        struct imp_ies_data d;
+        said[0] = 0;
+        snprintf(text, sizeof text,
+                 "IESNA91\nTILT=NONE\n%s 1 2 1 1 2 0 0 0\n1 1 40\n0 90\n0\n%s\n",
+                 files[k].counts, files[k].candela);
+        tap_ok(load(loud, text, strlen(text), &keep, &d) == IMP_OK &&
+                   (strstr(said, "and its lamps give 1000 lm alone") != NULL) ==
+                       files[k].warned &&
+                   !*said == !files[k].warned,
+               "lamps %s, candela %s # %s", files[k].counts, files[k].candela, said);
+        imp__arena_free(&keep);
+    }
+    imp_context_destroy(loud);
+}
+
 int main(void)
 {
     ctx = test_context(1);
@@ -596,6 +636,7 @@ int main(void)
     bounds();
     scenes();
     tilted();
+    contradictions();
     imp_context_destroy(ctx);
     return tap_done();
 }
