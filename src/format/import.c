@@ -37,7 +37,7 @@ static enum imp_status parameter(const struct imp__import *in, const char *name,
     enum imp_status st = IMP_OK;
     char dollar[40];
     snprintf(dollar, sizeof dollar, "$%s", name);
-    IMP_TRY(imp__params_default(in->params, name, missing));
+    IMP_TRY(imp__params_assume(in->params, name, missing));
     IMP_TRY(imp__params_expand(in->params, in->scratch, dollar, out));
 out:
     return st;

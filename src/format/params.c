@@ -17,7 +17,8 @@ static enum imp_status no_memory(imp_context *ctx)
     return imp__error(ctx, IMP_E_NOMEM, "parameters: out of memory");
 }
 
-static struct imp_variable *find(struct imp_params *p, const char *name, size_t length)
+static struct imp_variable *find(const struct imp_params *p, const char *name,
+                                 size_t length)
 {
     for (size_t i = 0; i < p->n; i++)
         if (p->at[i].length == length && memcmp(p->at[i].name, name, length) == 0)
@@ -40,7 +41,8 @@ static enum imp_status add(struct imp_params *p, const char *name, size_t length
     memcpy(name_copy, name, length);
     size_t i = p->n++;
     for (; i > 0 && at[i - 1].length < length; i--) at[i] = at[i - 1];
-    at[i] = (struct imp_variable){name_copy, value_copy, length, given, false};
+    at[i] = (struct imp_variable){
+        .name = name_copy, .value = value_copy, .length = length, .given = given};
     return IMP_OK;
 }
 
@@ -81,6 +83,21 @@ enum imp_status imp__params_default(struct imp_params *p, const char *name,
     /* The first one counts: a file sets the defaults of what it includes. */
     if (find(p, name, strlen(name))) return IMP_OK;
     return add(p, name, strlen(name), value, false);
+}
+
+enum imp_status imp__params_assume(struct imp_params *p, const char *name,
+                                   const char *value)
+{
+    if (find(p, name, strlen(name))) return IMP_OK;
+    const enum imp_status st = add(p, name, strlen(name), value, false);
+    if (st == IMP_OK) find(p, name, strlen(name))->assumed = true;
+    return st;
+}
+
+bool imp__params_assumed(const struct imp_params *p, const char *name)
+{
+    const struct imp_variable *v = find(p, name, strlen(name));
+    return v && v->assumed;
 }
 
 static struct imp_variable *match(struct imp_params *p, const char *text)

@@ -15,6 +15,7 @@ struct imp_params {
         const char *name, *value;
         size_t length;
         bool given, used; /* by the caller; somewhere in the file */
+        bool assumed;     /* by the reader of an included file: nobody gave it */
     } * at;
     size_t n, capacity;
     size_t expanded; /* bytes written by expansion so far */
@@ -28,6 +29,10 @@ void imp__params_free(struct imp_params *p);
 /* <default>: sets the value unless the caller gave one. */
 enum imp_status imp__params_default(struct imp_params *p, const char *name,
                                     const char *value);
+/* The same by the reader of an included file. */
+enum imp_status imp__params_assume(struct imp_params *p, const char *name,
+                                   const char *value);
+bool imp__params_assumed(const struct imp_params *p, const char *name);
 /* Replace $name and \$. *out is `text` itself if nothing had to be done, else lives in
  * `scratch`. The message has no location. */
 enum imp_status imp__params_expand(struct imp_params *p, struct imp_arena *scratch,

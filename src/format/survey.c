@@ -7,6 +7,7 @@
 #include "film/film_integrator.h"
 #include "kind/registry.h"
 #include "kind/sensor/sensor_film.h"
+#include "light_units.h"
 #include "load.h"
 #include "scene/instances.h"
 #include "scene/scene_build.h"
@@ -375,6 +376,9 @@ static void idle_list(struct imp_scene *scene)
 enum imp_status imp__survey_finish(struct imp_scene *scene)
 {
     if (!scene->root) return IMP_OK;
-    if (!scene->rayless) idle_list(scene); /* a second scene: the first has reported it */
+    if (!scene->rayless) { /* a second scene: the first has reported it */
+        idle_list(scene);
+        imp__light_units_unsaid(scene);
+    }
     return scene->lenient ? unused_list(scene, scene->root) : IMP_OK;
 }

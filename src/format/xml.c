@@ -5,6 +5,7 @@
 #include "xml.h"
 #include "hooks.h"
 #include "import.h"
+#include "light_units.h"
 #include "search.h"
 #include <expat.h>
 #include <stdio.h>
@@ -252,6 +253,8 @@ enum imp_status imp__xml_read(struct imp_scene *scene, const struct imp_bytes *t
                                meant ? meant : "", meant ? "'?" : ""));
     IMP_TRY(imp__tree_resolve(&r.tree));
     scene->root = r.tree.root;
+    if (imp__params_assumed(&r.params, "efficacy"))
+        imp__light_units_mixed(scene, scene->root);
 out:
     imp__params_free(&r.params);
     imp__arena_free(&r.scratch);

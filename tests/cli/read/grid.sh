@@ -61,7 +61,7 @@ print('<scene version="3.0.0"><integrator type="path"/><emitter type="ies" id="l
 print('<shape type="cube"><transform name="to_world"><scale x="%g" y="%g" z="%g"/><translate z="%g"/></transform>'
       '<boolean name="flip_normals" value="true"/></shape>' % (3 * u, 2 * u, 1.4 * u, 1.4 * u))
 print('<shape type="rectangle"><transform name="to_world"><scale value="%g"/><translate z="%g"/></transform>'
-      '<sensor type="irradiancemeter" id="work"><boolean name="virtual" value="true"/><string name="at" value="points"/>'
+      '<sensor type="irradiancemeter" id="work"><boolean name="virtual" value="true"/><string name="at" value="points"/><string name="units" value="photometric"/>'
       '<film type="hdrfilm"><integer name="width" value="2"/><integer name="height" value="2"/></film></sensor></shape></scene>' % (u, .75 * u))
 X
 }
