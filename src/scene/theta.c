@@ -138,6 +138,15 @@ static bool is_geometry(const char *name)
     return false;
 }
 
+/* A number of geometry of this scene, which becomes a parameter where it is asked for. */
+static bool is_to_be_added(const struct imp_scene *scene, const char *name)
+{
+    struct imp_geometry_walk walk = {0};
+    while (imp__geometry_next(scene, &walk))
+        if (strcmp(walk.name, name) == 0) return true;
+    return false;
+}
+
 enum imp_status imp_scene_find_param(const imp_scene *scene, const char *name,
                                      size_t *index)
 {
@@ -148,6 +157,13 @@ enum imp_status imp_scene_find_param(const imp_scene *scene, const char *name,
          tail = strchr(tail, '.') ? strchr(tail, '.') + 1 : NULL)
         if (imp__theta_exact(scene, tail, index)) return IMP_OK;
     if (imp__theta_alias(scene, name, index)) return IMP_OK;
+    if (is_to_be_added(scene, name))
+        return imp__error(
+            scene->ctx, IMP_E_ARG,
+            "'%s' is geometry: it becomes a parameter by "
+            "imp_scene_add_geometry (Scene.add_geometry, before traverse; the "
+            "command's -p and --set)",
+            name);
     const struct imp_near_names near = imp__theta_near(scene, name);
     if (is_geometry(name))
         return imp__error(scene->ctx, IMP_E_ARG,

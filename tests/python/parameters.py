@@ -187,6 +187,8 @@ def test_to_world():
         del d["large-box"]
         return d, im.load_dict(d)
     d, s = scene()
+    raises(im.ParameterError, lambda: im.traverse(s).keep(["small-box.to_world"]),
+           "'small-box.to_world' is geometry", "Scene.add_geometry")
     assert s.add_geometry("small-box.to_world") == "small-box.to_world" and "light.to_world" in s.geometry_names
     p = im.traverse(s)
     there = np.array(p["small-box.to_world"])
