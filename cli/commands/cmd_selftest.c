@@ -4,6 +4,7 @@
  * contracts?
  */
 #include "shared/command.h"
+#include "text/progress.h"
 
 #include <string.h>
 
@@ -106,6 +107,7 @@ static int run_selftest(int n, char **operand)
     selftest.samples = o.samples;
     selftest.directions = o.directions;
     selftest.seed = cli.seed;
+    selftest.progress = progress_report;
     const enum imp_status st = imp_selftest(cli.scene, (enum imp_selftest_subject)subject,
                                             &selftest, &rows, &n_rows);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);

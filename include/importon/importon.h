@@ -1589,12 +1589,14 @@ struct imp_selftest_options {
                          rows would see an error of 2 % (imp_selftest_row.sees) */
     int directions; /**< of sight, or places of reference, of an object; 0: 12 */
     uint64_t seed;
+    imp_progress_fn progress; /**< may be NULL */
+    void *progress_payload;
 };
 #define IMP_SELFTEST_OPTIONS_INIT IMP_INIT_ZERO(struct imp_selftest_options)
 /** Test the contracts of kinds on the scene's own objects. Rows belong to the scene until
  * its next self-test; their names live as long as the scene.
- * @return IMP_OK also where rows fail: look at `ok`; IMP_E_ARG (an unknown subject, too
- * few samples) or IMP_E_NOMEM. */
+ * @return IMP_OK also where rows fail: look at `ok`; IMP_CANCELLED without rows; IMP_E_ARG (an
+ * unknown subject, too few samples) or IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_selftest(imp_scene *scene, enum imp_selftest_subject subject,
              const struct imp_selftest_options *options,

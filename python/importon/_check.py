@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Optional
 
 from . import _c
-from ._library import choice, context, integer, lib, make, not_inside, rows_of, warn_said
+from ._library import choice, context, failure, integer, lib, make, not_inside, rows_of, run, warn_said
 from ._picture import read, to_film
 from ._problem import Problem, check_scene, run_options
 from ._scene import Scene
@@ -221,7 +221,7 @@ def check(scene: Scene, params: Any = None, target: Any = None, *, spp: int = 0,
 
 
 def selftest(scene: Scene, subject: str = "material", *, samples: int = 0, directions: int = 0,
-             seed: int = 0) -> Check:
+             seed: int = 0, progress: Any = None) -> Check:
     """Test the contracts of kinds on the scene's own objects: densities against draws,
     albedos against quadrature, derivatives against differences, ...
 
@@ -236,6 +236,8 @@ def selftest(scene: Scene, subject: str = "material", *, samples: int = 0, direc
     directions : int
         Directions of sight, or places, of an object; 0: 12.
     seed : int
+    progress : bool or callable, optional
+        As `render`'s.
 
     Returns
     -------
@@ -260,9 +262,11 @@ def selftest(scene: Scene, subject: str = "material", *, samples: int = 0, direc
                    directions=integer(directions, "directions"), seed=integer(seed, "seed", 0, 2**64 - 1))
     with scene.lock:
         rows, n = ctypes.c_void_p(), ctypes.c_size_t()
-        scene._context.check(lib.imp_selftest(scene.pointer, choice("imp_selftest_subject", subject, "subject"),
-                                              ctypes.byref(options), ctypes.byref(rows), ctypes.byref(n)))
-        warn_said()
+        status, message = run(scene._context, options, progress, lib.imp_selftest, scene.pointer,
+                              choice("imp_selftest_subject", subject, "subject"), ctypes.byref(options),
+                              ctypes.byref(rows), ctypes.byref(n))
+        if status:
+            raise failure(status, message)
         return check_rows(rows.value, n.value, _c.imp_selftest_row, SelfTestRow)
 
 

@@ -59,6 +59,7 @@ struct imp__draws imp__draws_test(const struct imp__drawn *d, int samples, uint6
         }
     imp__sphere_tree_reset(tree);
     for (int i = 0; i < samples; i++) {
+        if (i % 1000 == 0 && d->stopped && d->stopped(d->watch)) return r;
         const struct imp_key key = imp__key(seed, 2, (uint64_t)i / 1000);
         if (!draw(d, key, (uint32_t)(i % 1000), &w, &lobe)) none++;
         else if (lobe < 0) imp__sphere_tree_find(tree, w)->count++;
@@ -69,6 +70,7 @@ struct imp__draws imp__draws_test(const struct imp__drawn *d, int samples, uint6
     for (int i = 0; i < tree->n && d->density; i++) {
         const struct imp__sphere_cell *c = &tree->cell[i];
         if (c->child) continue;
+        if (d->stopped && d->stopped(d->watch)) return r;
         double mass =
             imp__sphere_cell_integral(c, d->density, d->payload, 0.02 / samples, depth);
         /* Where draws and quadrature differ, a peak may lie between the nodes. */

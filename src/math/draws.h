@@ -19,6 +19,10 @@ struct imp__drawn {
     /* Draws that the cells are cut by, 0: 1500. More find narrower peaks, and leave
      * larger cells to broad ones. */
     uint32_t pilot;
+    /* Asked now and then whether to go no further, with an answer that means nothing; NULL:
+     * never. */
+    bool (*stopped)(void *watch);
+    void *watch;
 };
 struct imp__draws {
     double chance; /* p of the chi-square; 1: too few cells for a test */

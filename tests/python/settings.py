@@ -145,6 +145,7 @@ def test_selftest():
     raises(im.ArgumentError, lambda: im.selftest(s, "lamp"), "material")
     raises(im.ArgumentError, lambda: im.selftest(s, samples=-3))
     raises(TypeError, lambda: im.selftest(s, samples=1e5))
+    raises(im.Cancelled, lambda: im.selftest(s, samples=10**9, progress=lambda p: p.stage == "selftest"), "cancelled")
 
 
 def test_walk():

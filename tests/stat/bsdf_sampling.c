@@ -83,8 +83,12 @@ static struct imp__draws check(struct point *p, int samples, uint64_t seed, int 
                                bool narrow)
 {
     static struct imp__sphere_tree tree;
-    const struct imp__drawn d = {draw, p->b->flags & IMP_BSDF_SMOOTH ? density : NULL,
-                                 chance, p, narrow ? 12000 : 0};
+    const struct imp__drawn d = {.draw = draw,
+                                 .density =
+                                     p->b->flags & IMP_BSDF_SMOOTH ? density : NULL,
+                                 .chance = chance,
+                                 .payload = p,
+                                 .pilot = narrow ? 12000 : 0};
     p->sane = true;
     const struct imp__draws r = imp__draws_test(&d, samples, seed, depth, &tree);
     p->sane &= !r.overflow;

@@ -52,7 +52,8 @@ static void normals(void)
     for (int i = 0; i < 12; i++) {
         struct imp__microfacet f = {i % 2 ? IMP_GGX : IMP_BECKMANN, true, 0.6, 0.35,
                                     wanted[i / 2]};
-        const struct imp__drawn d = {normal_draw, normal_density, NULL, &f, 0};
+        const struct imp__drawn d = {
+            .draw = normal_draw, .density = normal_density, .payload = &f};
         const struct imp__draws r =
             imp__draws_test(&d, 60000, 40 + (uint64_t)i, IMP_SPHERE_STEPS + 3, &tree);
         tap_ok(r.chance > level && fabs(r.total - 1) < 1e-4 && r.none == 0 &&
@@ -113,7 +114,8 @@ static void visit(const struct kind_case *c, void *payload)
         }
         if (!rough) return;
         p.wo = kind_direction(2 * i, 21);
-        const struct imp__drawn d = {draw, density, NULL, &p, 6000};
+        const struct imp__drawn d = {
+            .draw = draw, .density = density, .payload = &p, .pilot = 6000};
         const struct imp__draws r =
             imp__draws_test(&d, 20000, 80 + (uint64_t)i, IMP_SPHERE_SMOOTH, &tree);
         if (r.chance < level)

@@ -153,6 +153,22 @@ static void samples(void)
            imp_status_text(st), calls, (long long)info.spp);
     imp_film_destroy(film);
 
+    struct imp_selftest_options o = IMP_SELFTEST_OPTIONS_INIT;
+    o.samples = INT32_MAX;
+    o.progress = stop_now;
+    o.progress_payload = &calls;
+    for (int subject = IMP_SELFTEST_MATERIAL; subject <= IMP_SELFTEST_LIGHT; subject++) {
+        const struct imp_selftest_row *rows = NULL;
+        size_t n = 0;
+        calls = 0;
+        const double start = processor_s();
+        st = imp_selftest(s, (enum imp_selftest_subject)subject, &o, &rows, &n);
+        tap_ok(st == IMP_CANCELLED && calls == 1 && !rows && n == 0 &&
+                   processor_s() - start < 2,
+               "self-test %d of as many draws, cancelled # %s", subject,
+               imp_last_error(ctx));
+    }
+
     imp_problem *p = test_problem(ctx, s, "*");
     static float pixels[9 * 9 * 3];
     struct imp_target t = IMP_TARGET_INIT;

@@ -3,14 +3,39 @@
  * imp_selftest: the rows, one a contract and object. */
 #include "selftest.h"
 #include "base/arguments.h"
+#include "base/pool.h"
 #include "math/warp.h"
 #include <string.h>
 
 /* ---- Rows ------------------------------------------------------------------------ */
 
+#define ASKS_S 0.1 /* seconds between two questions to the caller */
+
+bool imp__selftest_stopped(struct imp__selftest *t)
+{
+    if (t->stopped || !t->options.progress) return t->stopped;
+    const double now = imp__now(), elapsed = now - t->start_s;
+    if (now - t->asked_s < ASKS_S) return false;
+    t->asked_s = now;
+    const struct imp_progress p = {
+        .size = sizeof p,
+        .stage = "selftest",
+        .fraction = t->part,
+        .elapsed_s = elapsed,
+        .eta_s = t->part > 0 ? elapsed * (1 - t->part) / t->part : -1,
+        .rate = elapsed > 0 ? (double)t->n_rows / elapsed : 0,
+        .rate_unit = "rows"};
+    t->stopped = t->options.progress(&p, t->options.progress_payload) != 0;
+    return t->stopped;
+}
+
+bool imp__selftest_watch(void *test) { return imp__selftest_stopped(test); }
+
 enum imp_status imp__selftest_row(struct imp__selftest *t,
                                   const struct imp_selftest_row *row)
 {
+    if (imp__selftest_stopped(t))
+        return imp__error(t->ctx, IMP_CANCELLED, "the self-test was cancelled");
     struct imp_selftest_row *rows =
         imp__grow(t->ctx, t->rows, &t->cap_rows, t->n_rows + 1, sizeof *rows);
     if (!rows) return imp__error(t->ctx, IMP_E_NOMEM, "no memory for a self-test");
@@ -145,6 +170,7 @@ enum imp_status imp_selftest(imp_scene *scene, enum imp_selftest_subject subject
         return imp__error(ctx, IMP_E_ARG, "samples and directions must be >= 0");
     if (!scene->committed)
         return imp__error(ctx, IMP_E_ARG, "imp_selftest: the scene is not committed");
+    t.start_s = t.asked_s = imp__now();
     t.raises = t.options.samples == 0;
     if (t.options.samples == 0) t.options.samples = 200000;
     if (t.options.directions == 0) t.options.directions = 12;

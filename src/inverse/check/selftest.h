@@ -20,7 +20,16 @@ struct imp__selftest {
     struct imp__sphere_tree *tree;
     struct imp_selftest_row *rows;
     size_t n_rows, cap_rows;
+    double start_s, asked_s; /* imp__now(); when the caller was asked last */
+    double part;             /* of the objects that are done */
+    bool stopped;            /* by the caller */
 };
+
+/* Asks the caller, a few times a second, whether to go on; a number that was stopped on its way
+ * means nothing, and no row is added any more (IMP_CANCELLED). */
+bool imp__selftest_stopped(struct imp__selftest *t);
+/* The same as a function of draws.h; the payload is the test. */
+bool imp__selftest_watch(void *test);
 
 /* Add a row; ok is error <= limit, or what it is already if that is -1. */
 enum imp_status imp__selftest_row(struct imp__selftest *t,

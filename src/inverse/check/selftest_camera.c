@@ -59,8 +59,10 @@ out:
 enum imp_status imp__selftest_cameras(struct imp__selftest *t)
 {
     enum imp_status st = IMP_OK;
-    for (int k = 0; k < t->scene->n_sensors; k++)
+    for (int k = 0; k < t->scene->n_sensors; k++) {
+        t->part = (double)k / t->scene->n_sensors;
         IMP_TRY(camera(t, t->scene->sensors[k]));
+    }
 out:
     return st;
 }

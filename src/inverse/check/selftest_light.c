@@ -240,7 +240,7 @@ static struct light light_at(const struct imp__selftest *t, const struct imp_emi
 }
 
 /* Light by n draws of its own at each place, and by directions drawn without it. */
-static void light_take(const struct imp__selftest *t, const struct imp_emitter *e, int n,
+static void light_take(struct imp__selftest *t, const struct imp_emitter *e, int n,
                        struct found *r)
 {
     const bool delta = e->ops->flags & IMP_EMITTER_DELTA;
@@ -252,6 +252,7 @@ static void light_take(const struct imp__selftest *t, const struct imp_emitter *
         struct cone cone = cone_of(&l);
         if (e->ops->flags & IMP_EMITTER_ENVIRONMENT) spot_set(&l, t->options.seed, &cone);
         for (int k = 0; k < n; k++) {
+            if (k % 1000 == 0 && imp__selftest_stopped(t)) return;
             const struct imp_key key =
                 imp__key(t->options.seed, 400 + (uint64_t)i, (uint64_t)k);
             const double u[4] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2),
@@ -268,14 +269,15 @@ static void light_take(const struct imp__selftest *t, const struct imp_emitter *
 }
 
 /* A sky is the same from everywhere. */
-static void sky_take(const struct imp__selftest *t, const struct imp_emitter *e, int n,
+static void sky_take(struct imp__selftest *t, const struct imp_emitter *e, int n,
                      struct found *r)
 {
     r->chances = (struct imp__chances)IMP_CHANCES_INIT;
     r->total = (struct imp__scores){0};
     for (int i = 0; i < SKY_PLACES; i++) {
         struct light l = light_at(t, e, i);
-        const struct imp__drawn d = {sky_draw, sky_density, NULL, &l, 0};
+        const struct imp__drawn d = {sky_draw, sky_density,         NULL, &l,
+                                     0,        imp__selftest_watch, t};
         const struct imp__draws test = imp__draws_test(
             &d, n, t->options.seed + (uint64_t)i, IMP_SPHERE_STEPS, t->tree);
         imp__chances_add(&r->chances, &test, n);
@@ -329,8 +331,10 @@ enum imp_status imp__selftest_lights(struct imp__selftest *t)
 {
     enum imp_status st = IMP_OK;
     t->level = imp__sidak(0.01, SKY_PLACES + 1);
-    for (int k = 0; k < t->scene->n_emitters; k++)
+    for (int k = 0; k < t->scene->n_emitters; k++) {
+        t->part = (double)k / t->scene->n_emitters;
         IMP_TRY(light(t, t->scene->emitters[k]));
+    }
 out:
     return st;
 }

@@ -190,11 +190,12 @@ struct drawn {
 };
 
 /* Albedo by draws, smooth lobes and all. */
-static void albedo_take(const struct imp__selftest *t, struct point *p, int i, int n,
+static void albedo_take(struct imp__selftest *t, struct point *p, int i, int n,
                         struct drawn *r)
 {
     struct imp__mean smooth[3] = {{0}}, all[3] = {{0}};
     for (int k = 0; k < n; k++) {
+        if (k % 1000 == 0 && imp__selftest_stopped(t)) return;
         const struct imp_key key =
             imp__key(t->options.seed, 300 + (uint64_t)i, (uint64_t)k);
         const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
@@ -226,15 +227,17 @@ static void albedo_take(const struct imp__selftest *t, struct point *p, int i, i
 
 /* Draws for the directions of sight, n for each. The albedo is integrated over the cells that
  * the draws of the same direction were counted in. */
-static void draws_take(const struct imp__selftest *t, const struct imp_bsdf *b, int n,
+static void draws_take(struct imp__selftest *t, const struct imp_bsdf *b, int n,
                        struct drawn *r)
 {
     *r = (struct drawn){.chances = IMP_CHANCES_INIT, .most = -1};
     for (int i = 0; i < t->options.directions; i++) {
         struct point p = {.lane = 0};
         place(t, b, i, &p);
-        const struct imp__drawn d = {draw, b->flags & IMP_BSDF_SMOOTH ? density : NULL,
-                                     chance, &p, 0};
+        const struct imp__drawn d = {draw,   b->flags & IMP_BSDF_SMOOTH ? density : NULL,
+                                     chance, &p,
+                                     0,      imp__selftest_watch,
+                                     t};
         const struct imp__draws test = imp__draws_test(
             &d, n, t->options.seed + 900 + (uint64_t)i, IMP_SPHERE_STEPS, t->tree);
         imp__chances_add(&r->chances, &test, n);
@@ -308,6 +311,7 @@ enum imp_status imp__selftest_materials(struct imp__selftest *t)
     enum imp_status st = IMP_OK;
     t->level = imp__sidak(0.01, (1.0 + t->options.directions) * t->scene->n_bsdfs);
     for (int k = 0; k < t->scene->n_bsdfs; k++) {
+        t->part = (double)k / t->scene->n_bsdfs;
         const struct imp_bsdf *b = t->scene->bsdfs[k];
         if (imp__is_in_medium(b)) continue; /* phase functions have tests of their own */
         IMP_TRY(imp__selftest_bsdf(t, b, b->name, b->ops->name));

@@ -16,6 +16,7 @@ enum imp_status imp__selftest_phases(struct imp__selftest *t)
     enum imp_status st = IMP_OK;
     t->level = imp__sidak(0.01, (1.0 + t->options.directions) * t->scene->n_media);
     for (int k = 0; k < t->scene->n_media; k++) {
+        t->part = (double)k / t->scene->n_media;
         const struct imp_medium *m = t->scene->media[k];
         IMP_TRY(imp__selftest_bsdf(t, m->pure, m->phase->name, m->phase->ops->name));
     }
@@ -115,6 +116,7 @@ enum imp_status imp__selftest_media(struct imp__selftest *t)
     enum imp_status st = IMP_OK;
     t->level = 0.01;
     for (int k = 0; k < t->scene->n_media; k++) {
+        t->part = (double)k / t->scene->n_media;
         const struct imp_medium *m = t->scene->media[k];
         const char *name = m->name, *kind = m->ops->name;
         struct tally a = {0};

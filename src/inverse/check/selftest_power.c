@@ -60,8 +60,9 @@ void imp__scores_end(struct imp__scores *s)
 
 int imp__selftest_more(const struct imp__selftest *t, int n, double sees)
 {
+    if (!t->raises || t->stopped) return 0;
     const int most = (t->options.samples / t->options.directions + 1) * MOST;
-    if (!t->raises || sees <= IMP_SELFTEST_WANTED || n >= most) return 0;
+    if (sees <= IMP_SELFTEST_WANTED || n >= most) return 0;
     const double times = imp__sqr(sees / (SPARE * IMP_SELFTEST_WANTED));
     return (int)fmin((double)n * fmin(times, GROWS) + 1, most);
 }

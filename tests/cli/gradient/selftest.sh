@@ -6,4 +6,10 @@ import json, sys
 a = json.load(sys.stdin)
 print(a["command"], a["subject"], a["failed"], [r["contract"] for r in a["rows"]])'
 importon selftest camera cornell.xml >/dev/null
+env --default-signal=INT "$(type -P importon)" selftest material cornell.xml --samples 1000000000 --progress always 2>"$OLDPWD/told" &
+for ((k = 0; k < 200; k++)); do [[ -s $OLDPWD/told ]] && break; sleep 0.1; done
+kill -INT $!
+wait $!
+echo $?
+grep -o 'cornell.xml: .* cancelled' "$OLDPWD/told"
 importon selftest phases cornell.xml
