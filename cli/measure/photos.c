@@ -8,6 +8,7 @@
 #include "shared/photograph.h"
 #include "shared/picture_files.h"
 #include "shared/problem_options.h"
+#include "shared/sensors.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -126,23 +127,6 @@ int photos_scene(int n, char **operand, char **path)
 
 /* ---- Sensors --------------------------------------------------------------------------- */
 
-static int n_sensors(void)
-{
-    struct imp_scene_info info = {.size = sizeof info};
-    return imp_scene_get_info(cli.scene, &info) == IMP_OK ? info.n_sensors : 0;
-}
-
-/* The sensor with this name; -1: there is none. */
-static int sensor_named(const char *name, size_t length)
-{
-    for (int s = 0; s < n_sensors(); s++) {
-        struct imp_sensor_info info = {.size = sizeof info};
-        if (imp_scene_get_sensor(cli.scene, s, &info) != IMP_OK) continue;
-        if (strlen(info.name) == length && !strncmp(info.name, name, length)) return s;
-    }
-    return -1;
-}
-
 /* By the file's name without its folder and ending. */
 static int sensor_of_file(const char *path)
 {
@@ -153,16 +137,8 @@ static int sensor_of_file(const char *path)
 
 static int no_sensor(const char *what)
 {
-    char names[256] = "";
-    size_t used = 0;
-    for (int s = 0; s < n_sensors(); s++) {
-        struct imp_sensor_info info = {.size = sizeof info};
-        if (imp_scene_get_sensor(cli.scene, s, &info) != IMP_OK ||
-            used > sizeof names - 64)
-            continue;
-        used += (size_t)snprintf(names + used, sizeof names - used, "%s%.40s",
-                                 s ? ", " : "", info.name);
-    }
+    char names[256];
+    sensor_names(names, sizeof names);
     return cli_error(EXIT_USAGE,
                      "%s: no sensor has this name; the scene has %s: rename the file, or "
                      "give --photo SENSOR=FILE",
@@ -280,7 +256,7 @@ static int file_read(struct photos *p, const char *word)
         return rc;
     }
     sensor = sensor_of_file(word);
-    if (sensor < 0 && n_sensors() == 1) sensor = 0;
+    if (sensor < 0 && sensor_count() == 1) sensor = 0;
     return sensor < 0 ? no_sensor(word) : photo_read(p, word, sensor);
 }
 

@@ -3,6 +3,8 @@
  * Options of candidates, and the list that they make. */
 #include "plan_candidates.h"
 
+#include "shared/sensors.h"
+
 #include <fnmatch.h>
 #include <math.h>
 #include <stdbool.h>
@@ -62,13 +64,6 @@ int numbers_read(const char *text, double *out, int most)
 
 enum { LIST_MAX = 4096 };
 
-static int n_sensors(void)
-{
-    struct imp_scene_info info = {.size = sizeof info};
-    imp_scene_get_info(cli.scene, &info);
-    return info.n_sensors;
-}
-
 /* Indices of sensors; *n of them. */
 static int sensors_read(const char *option, const char *text, int *out, int *n)
 {
@@ -80,9 +75,9 @@ static int sensors_read(const char *option, const char *text, int *out, int *n)
                        option, text);
     for (int k = 0; k < *n && !rc; k++) {
         out[k] = (int)v[k];
-        if (v[k] != floor(v[k]) || v[k] < 0 || v[k] >= n_sensors())
+        if (v[k] != floor(v[k]) || v[k] < 0 || v[k] >= sensor_count())
             rc = cli_error(EXIT_USAGE, "--%s %s: there is no sensor %g; the scene has %d",
-                           option, text, v[k], n_sensors());
+                           option, text, v[k], sensor_count());
         for (int i = 0; i < k && !rc; i++)
             if (out[i] == out[k])
                 rc = cli_error(EXIT_USAGE, "--%s %s: sensor %d is there twice", option,
@@ -135,7 +130,7 @@ static int sensors_add(struct candidates *out, const int *have, int n_have)
 {
     int *list = cli_alloc(LIST_MAX, sizeof *list), n = 0;
     int rc = o.sensors ? sensors_read("sensors", o.sensors, list, &n) : 0;
-    for (int s = 0; s < n_sensors() && n < LIST_MAX && !o.sensors; s++) {
+    for (int s = 0; s < sensor_count() && n < LIST_MAX && !o.sensors; s++) {
         bool taken = false;
         for (int k = 0; k < n_have; k++) taken |= have[k] == s;
         if (!taken) list[n++] = s;
@@ -351,9 +346,9 @@ int candidates_make(struct candidates *out)
     *out = (struct candidates){0};
     int rc = have_add(out, have, &n_have);
     const int places = (o.sphere != NULL) + (o.path != NULL);
-    if (!rc && places > 0 && (cli.sensor < 0 || cli.sensor >= n_sensors()))
+    if (!rc && places > 0 && (cli.sensor < 0 || cli.sensor >= sensor_count()))
         rc = cli_error(EXIT_USAGE, "--sensor %d: the scene has %d", cli.sensor,
-                       n_sensors());
+                       sensor_count());
     if (!rc && places == 0 && o.up)
         rc = cli_error(EXIT_USAGE, "--up is of --sphere and --path");
     if (!rc && (places == 0 || o.sensors)) rc = sensors_add(out, have, n_have);
@@ -363,7 +358,8 @@ int candidates_make(struct candidates *out)
         rc = cli_error(EXIT_USAGE,
                        "plan: there are no candidates: the scene has %d sensor%s%s; see "
                        "--sphere and --path",
-                       n_sensors(), plural(n_sensors()), o.have ? ", all of --have" : "");
+                       sensor_count(), plural(sensor_count()),
+                       o.have ? ", all of --have" : "");
     if (!rc) rc = lamps_multiply(out);
     if (!rc) rc = exposures_multiply(out);
     for (size_t i = 0; i < o.costs.n && !rc; i++) rc = cost_set(out, o.costs.item[i]);

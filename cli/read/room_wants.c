@@ -3,6 +3,7 @@
  * --want: what a grid shall have. */
 #include "room_wants.h"
 #include "shared/command.h"
+#include "shared/sensors.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -35,26 +36,6 @@ const char *want_unit(const struct imp_design_want *w)
 }
 bool wants_given(void) { return wants.n > 0; }
 
-static int sensor_find(const char *name, const char *text, int *out)
-{
-    struct imp_scene_info scene = {.size = sizeof scene};
-    char *end;
-    imp_scene_get_info(cli.scene, &scene);
-    for (int s = 0; s < scene.n_sensors; s++) {
-        struct imp_sensor_info info = {.size = sizeof info};
-        if (imp_scene_get_sensor(cli.scene, s, &info) != IMP_OK || !info.name) continue;
-        if (strcmp(info.name, name) != 0) continue;
-        *out = s;
-        return 0;
-    }
-    const long number = strtol(name, &end, 10);
-    if (*name && !*end && number >= 0 && number < scene.n_sensors) {
-        *out = (int)number;
-        return 0;
-    }
-    return cli_error(EXIT_USAGE, "--want %s: the scene has no sensor '%s'", text, name);
-}
-
 /* "GRID.WHAT=V" */
 static int want_read(const char *text, struct imp_design_want *out)
 {
@@ -69,12 +50,19 @@ static int want_read(const char *text, struct imp_design_want *out)
             if (!strcmp(dot + 1, want_words[k])) of = k;
     }
     *out = (struct imp_design_want)IMP_DESIGN_WANT_INIT;
-    if (of < 0 || !equal || end == equal + 1 || *end || !isfinite(value))
+    if (of >= 0 && equal && end > equal + 1 && *end && isfinite(value))
+        rc = cli_error(
+            EXIT_USAGE,
+            "--want %s: '%s' behind the number: V is in the grid's unit, which is "
+            "not written",
+            text, end);
+    else if (of < 0 || !equal || end == equal + 1 || !isfinite(value))
         rc = cli_error(EXIT_USAGE,
                        "--want %s: expected GRID.WHAT=V, WHAT one of average, minimum, "
                        "maximum, uniformity, ugr",
                        text);
-    else rc = sensor_find(copy, text, &out->sensor);
+    else if ((out->sensor = sensor_find(copy)) < 0)
+        rc = cli_error(EXIT_USAGE, "--want %s: the scene has no sensor '%s'", text, copy);
     out->of = (enum imp_design_want_of)(of < 0 ? 0 : of);
     out->value = value;
     free(copy);

@@ -7,6 +7,7 @@
 #include "part.h"
 #include "proof.h"
 #include "ranks.h"
+#include "sensors.h"
 #include "settings.h"
 #include "text/progress.h"
 
@@ -280,6 +281,7 @@ int cli_load(const char *path)
         return st == IMP_E_IO ? EXIT_USAGE : rc;
     }
     for (size_t i = 0; i < cli.sets.n && !rc; i++) rc = settings_apply(cli.sets.item[i]);
+    if (!rc && cli.sensor_text) rc = sensor_set(cli.sensor_text);
     if (!rc && cli.dump) rc = dump();
     if (!rc && (cli.guide || cli.guide_share > 0 || cli.guide_roulette > 0))
         rc = guide_make();

@@ -75,8 +75,8 @@ const struct arg_option options_scene[] = {
 
 const struct arg_option options_run[] =
     {/* --sensor first: options_walks */
-     {ARG_INT | ARG_REPLAYS, 's', "sensor", "N", "index of the sensor, from 0",
-      &cli.sensor, 0, 1e6, NULL},
+     {ARG_TEXT | ARG_REPLAYS, 's', "sensor", "SENSOR", "its name, or its index from 0",
+      &cli.sensor_text, 0, 0, NULL},
      {ARG_INT | ARG_REPLAYS, 0, "spp", "N",
       "samples per pixel (default: those of the scene)", &cli.spp, 1, 1e9, NULL},
      {ARG_SEED | ARG_REPLAYS, 0, "seed", "N", "seed of the random numbers (default 0)",

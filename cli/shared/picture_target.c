@@ -5,6 +5,7 @@
 
 #include "command.h"
 #include "photograph.h"
+#include "sensors.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -98,18 +99,19 @@ static float *extract(const float *from, size_t n_pixels, int stride, const int 
     return out;
 }
 
-/* The "@3" of "FILE@3"; a name with '@' and no digits after it is a name. */
+/* The "@3" or "@NAME" of "FILE@3"; with '@' and neither after it, it is the name of a file. */
 static const char *sensor_part(const char *spec)
 {
     const char *at = strrchr(spec, '@');
-    return at && at[1] && strspn(at + 1, "0123456789") == strlen(at + 1) && strlen(at) < 8
-               ? at
-               : NULL;
+    if (!at || !at[1]) return NULL;
+    const bool digits = strspn(at + 1, "0123456789") == strlen(at + 1) && strlen(at) < 8;
+    return digits || sensor_find(at + 1) >= 0 ? at : NULL;
 }
 int picture_sensor(const char *spec)
 {
     const char *at = sensor_part(spec);
-    return at ? atoi(at + 1) : -1;
+    const int named = at ? sensor_find(at + 1) : -1;
+    return !at ? -1 : named >= 0 ? named : atoi(at + 1);
 }
 
 /* "=V", "=V,V,V" or either with "+-SE": the reading of a sensor of one pixel, or of every pixel
@@ -136,6 +138,10 @@ static int number_target(const char *text, int sensor, struct imp_target *target
         }
         break;
     }
+    const char *at = strrchr(text, '@');
+    if (at)
+        return cli_error(EXIT_USAGE, "--target %s: the scene has no sensor '%s'", text,
+                         at + 1);
     if (!fine || (n != 1 && n != scene.channels))
         return cli_error(
             EXIT_USAGE,

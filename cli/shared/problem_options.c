@@ -38,9 +38,9 @@ const struct arg_option options_params[] = {
     {0}};
 
 const struct arg_option options_targets[] = {
-    {ARG_LIST | ARG_REPLAYS, 'T', "target", "FILE[@N]",
-     "picture to match, of sensor N; several without @N: one for each sensor, in "
-     "order",
+    {ARG_LIST | ARG_REPLAYS, 'T', "target", "FILE[@SENSOR]",
+     "picture to match, of this sensor (name or number); several without @SENSOR: one "
+     "for each sensor, in order",
      &problem_options.targets, 0, 0, NULL},
     {ARG_LIST | ARG_REPLAYS, 0, "mask", "FILE",
      "weights of the pixels, one for each --target in order", &problem_options.masks, 0,
