@@ -121,8 +121,9 @@ imp_spec imp__annual_passes(const struct imp__annual *a, double time, imp_v3 o, 
 size_t imp__annual_direct(const struct imp__annual *a, int x, int y,
                           struct imp__annual_sunlit *out);
 
-/* annual_walks.c: coefficients of pixel (x, y). IMP_E_NOMEM has no message. */
-enum imp_status imp__annual_walks(const struct imp__annual *a, int x, int y,
+/* annual_walks.c: coefficients of group g at pixel (x, y); at->I has room. IMP_E_NOMEM has no
+ * message. */
+enum imp_status imp__annual_walks(const struct imp__annual *a, int x, int y, int g,
                                   struct imp__annual_worker *w,
                                   struct imp__annual_at *at);
 

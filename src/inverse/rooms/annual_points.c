@@ -41,18 +41,23 @@ static void drops_take(struct job *j, struct imp__annual_worker *w)
     memset(&w->drops, 0, sizeof w->drops);
 }
 
-static enum imp_status point_walk(size_t i, int worker, int slot, void *payload)
+/* An item is a group of a point: a caller who stops does not wait for all walks of it. Threads
+ * side by side are at other points, whose numbers are not in the same cache lines. */
+static enum imp_status group_walk(size_t item, int worker, int slot, void *payload)
 {
     struct job *j = payload;
+    const size_t i = item % j->points;
+    const int g = (int)(item / j->points);
     struct imp__annual_worker *w = &j->worker[worker];
     struct imp__annual_at *at = &j->at[i];
     const struct imp__annual *a = j->y->a;
     const size_t width = (size_t)a->sensor->film.crop_w, point = j->first + i;
     const int x = (int)(point % width), y = (int)(point / width);
     (void)slot;
-    const enum imp_status st = imp__annual_walks(a, x, y, w, at);
+    const enum imp_status st = imp__annual_walks(a, x, y, g, w, at);
     drops_take(j, w);
     if (st != IMP_OK) return st == IMP_E_NOMEM ? no_memory(j) : st;
+    if (g > 0) return IMP_OK;
     at->next = 0;
     at->n_sunlit = imp__annual_direct(a, x, y, w->sunlit);
     struct imp__annual_sunlit *kept =
@@ -67,8 +72,14 @@ static enum imp_status points_walk(struct job *j, double start)
 {
     const struct imp__annual_year *y = j->y;
     const double all = (double)y->points, walks = (double)y->a->walks * IMP__GROUPS;
-    const struct imp_loop loop = {.n_items = j->points,
-                                  .work = point_walk,
+    for (size_t i = 0; i < j->points; i++) {
+        struct imp__annual_at *at = &j->at[i];
+        const size_t cells = (size_t)y->a->hours.n_cells + 1;
+        at->I = imp__arena_take(&j->worker[0].keep, cells, sizeof *at->I);
+        if (!at->I) return no_memory(j);
+    }
+    const struct imp_loop loop = {.n_items = j->points * IMP__GROUPS,
+                                  .work = group_walk,
                                   .payload = j,
                                   .progress = y->run->progress,
                                   .progress_payload = y->run->progress_payload,

@@ -141,39 +141,33 @@ static bool parts_keep(struct imp__annual_worker *w, double each, int g,
     return true;
 }
 
-enum imp_status imp__annual_walks(const struct imp__annual *a, int x, int y,
+enum imp_status imp__annual_walks(const struct imp__annual *a, int x, int y, int g,
                                   struct imp__annual_worker *w, struct imp__annual_at *at)
 {
     struct walk_job j = {.a = a, .w = w, .mono = a->scene->mode == IMP_MONO};
     struct imp_walk walk;
     const double each = 1 / (double)a->walks;
-    at->I = imp__arena_take(&w->keep, (size_t)a->hours.n_cells + 1, sizeof *at->I);
-    if (!at->I) return IMP_E_NOMEM;
-    for (int g = 0; g < IMP__GROUPS; g++) {
-        memset(w->C_sum, 0, IMP__PATCHES * sizeof *w->C_sum);
-        memset(w->I_sum, 0, IMP__PATCHES * sizeof *w->I_sum);
-        for (int64_t i = 0; i < a->walks; i++) {
-            const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
-            const int64_t sample = sample_of(a, g, i);
-            imp__walk_trace(&a->tracer, &w->arena, x, y, sample, &walk);
-            if (walk.dropped == IMP_DROP_MEMORY) return IMP_E_NOMEM;
-            j.walk = &walk;
-            if (walk.dropped != IMP_DROP_NONE) {
-                const struct imp_drop_key key = {.seed = a->tracer.seed,
-                                                 .sample = sample,
-                                                 .cause = walk.dropped,
-                                                 .x = x + a->sensor->film.crop_x,
-                                                 .y = y + a->sensor->film.crop_y};
-                imp__drops_add(&w->drops, &key);
-            } else if (walk.valid) {
-                walk_add(&j, &walk, imp__spec(1), 0, 0, false, false);
-            }
-            imp__arena_rewind(&w->arena, mark);
-            if (j.st != IMP_OK) return j.st;
+    memset(w->C_sum, 0, IMP__PATCHES * sizeof *w->C_sum);
+    memset(w->I_sum, 0, IMP__PATCHES * sizeof *w->I_sum);
+    for (int64_t i = 0; i < a->walks; i++) {
+        const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
+        const int64_t sample = sample_of(a, g, i);
+        imp__walk_trace(&a->tracer, &w->arena, x, y, sample, &walk);
+        if (walk.dropped == IMP_DROP_MEMORY) return IMP_E_NOMEM;
+        j.walk = &walk;
+        if (walk.dropped != IMP_DROP_NONE) {
+            const struct imp_drop_key key = {.seed = a->tracer.seed,
+                                             .sample = sample,
+                                             .cause = walk.dropped,
+                                             .x = x + a->sensor->film.crop_x,
+                                             .y = y + a->sensor->film.crop_y};
+            imp__drops_add(&w->drops, &key);
+        } else if (walk.valid) {
+            walk_add(&j, &walk, imp__spec(1), 0, 0, false, false);
         }
-        for (int c = 0; c < a->hours.n_cells; c++)
-            at->I[c][g] = (float)(w->I_sum[c] * each);
-        if (!parts_keep(w, each, g, at)) return IMP_E_NOMEM;
+        imp__arena_rewind(&w->arena, mark);
+        if (j.st != IMP_OK) return j.st;
     }
-    return IMP_OK;
+    for (int c = 0; c < a->hours.n_cells; c++) at->I[c][g] = (float)(w->I_sum[c] * each);
+    return parts_keep(w, each, g, at) ? IMP_OK : IMP_E_NOMEM;
 }
