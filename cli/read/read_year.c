@@ -7,6 +7,7 @@
 #include "shared/command.h"
 #include "shared/output.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -97,8 +98,9 @@ static void text_print(const struct year *y)
     grid_size_text(&y->grid, size, sizeof size);
     printf("%s: %s, %zu hours of use (%d to %d)\n", y->grid.name, size, y->all.hours,
            year_wanted.hours[0], year_wanted.hours[1]);
-    printf("weather: %s, %g N, %g E%s\n", y->weather.place, y->weather.latitude,
-           y->weather.longitude,
+    const double north = y->weather.latitude, east = y->weather.longitude;
+    printf("weather: %s, %g %c, %g %c%s\n", y->weather.place, fabs(north),
+           north < 0 ? 'S' : 'N', fabs(east), east < 0 ? 'W' : 'E',
            y->weather.modelled ? "; illuminances by Perez' model from radiation" : "");
     part_print("autonomy", wanted, a->autonomy);
     part_print("continuous", wanted, a->continuous);

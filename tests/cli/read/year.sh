@@ -20,6 +20,8 @@ X
 importon read "$ROOT/scenes/daylit.xml" -m mono -D spp=64 --year town.epw --hours 9,17 --wanted 500 | sed -n 1,2p
 sed '1s/,50,10,1,/,50,10,13,/' town.epw >noon.epw
 importon read "$ROOT/scenes/daylit.xml" -m mono -D spp=4 --year noon.epw >/dev/null
+sed '1s/,50,10,1,/,-50,-10,-1,/' town.epw >south.epw
+importon read "$ROOT/scenes/daylit.xml" -m mono -D spp=4 --year south.epw 2>/dev/null | sed -n 2p
 importon read "$ROOT/scenes/daylit.xml" --year town.epw --grid
 importon read "$ROOT/scenes/office.xml" --year town.epw
 importon read "$ROOT/scenes/office.xml" --year town.epw --sensor 0
