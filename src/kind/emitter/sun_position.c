@@ -72,6 +72,19 @@ static void clock_check(const struct imp_build *b, const struct imp__sun_date *d
         d->longitude);
 }
 
+/* Half a place: the other half is in Tokyo. */
+static void place_check(const struct imp_build *b)
+{
+    const bool north = imp_build_has(b, "latitude"), east = imp_build_has(b, "longitude");
+    if (north == east) return;
+    char where[512];
+    imp__warn(b->ctx, "%s: emitter '%s' (%s): it has no %s, and Tokyo's is taken%s",
+              imp__loc_text(b->node->loc, where, sizeof where),
+              b->node->id ? b->node->id : "", b->node->type,
+              north ? "longitude" : "latitude",
+              north && !imp_build_has(b, "timezone") ? ", with its time zone" : "");
+}
+
 static enum imp_status date_read(const struct imp_build *b, imp_v3 *sun)
 {
     enum imp_status st = IMP_OK;
@@ -95,6 +108,7 @@ static enum imp_status date_read(const struct imp_build *b, imp_v3 *sun)
     if (d.day > days_of(d.year, d.month))
         IMP_TRY(imp_build_error(b, "day", IMP_E_SCENE, "month %d of %d has no day %d",
                                 d.month, d.year, d.day));
+    place_check(b);
     clock_check(b, &d);
     *sun = imp__sun_direction(&d);
 out:

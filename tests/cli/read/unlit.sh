@@ -53,3 +53,6 @@ sed 's/<float name="timezone" value="1"\/>//; s/"hour" value="22"/"hour" value="
 importon read zone.xml -m mono >/dev/null
 sed 's/"longitude" value="10"/"longitude" value="-100"/; s/"timezone" value="1"/"timezone" value="-6"/; s/"hour" value="22"/"hour" value="12"/' night.xml >right.xml
 importon read right.xml -m mono >/dev/null
+# A latitude alone.
+sed -E 's/<float name="(longitude|timezone)"[^>]*>//g; s/value="22"/value="12"/' night.xml >place.xml
+importon read place.xml -m mono >/dev/null
