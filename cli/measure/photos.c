@@ -8,7 +8,7 @@
 #include "shared/photograph.h"
 #include "shared/picture_files.h"
 #include "shared/problem_options.h"
-#include "shared/sensors.h"
+#include "shared/sensor_names.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -3,7 +3,7 @@
  * Options of candidates, and the list that they make. */
 #include "plan_candidates.h"
 
-#include "shared/sensors.h"
+#include "shared/sensor_names.h"
 
 #include <fnmatch.h>
 #include <math.h>

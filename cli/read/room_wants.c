@@ -3,7 +3,7 @@
  * --want: what a grid shall have. */
 #include "room_wants.h"
 #include "shared/command.h"
-#include "shared/sensors.h"
+#include "shared/sensor_names.h"
 
 #include <math.h>
 #include <stdlib.h>

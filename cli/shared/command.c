@@ -7,7 +7,7 @@
 #include "part.h"
 #include "proof.h"
 #include "ranks.h"
-#include "sensors.h"
+#include "sensor_names.h"
 #include "settings.h"
 #include "text/progress.h"
 

@@ -5,7 +5,7 @@
 
 #include "command.h"
 #include "photograph.h"
-#include "sensors.h"
+#include "sensor_names.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -6,9 +6,9 @@
 
 #include "scene/scene.h"
 
-/* Of a scene file whose Radiance files have no efficacy. */
+/* Where a scene file has Radiance files without efficacy. */
 void imp__light_units_mixed(const struct imp_scene *scene, const struct imp_node *root);
-/* Of meters without units. */
+/* Names meters without units. */
 void imp__light_units_unsaid(const struct imp_scene *scene);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Which sensor an option means. */
-#include "sensors.h"
+#include "sensor_names.h"
 #include "command.h"
 
 #include <stdbool.h>

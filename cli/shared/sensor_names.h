@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Sensors of the scene as options name them: by name, or by number from 0. */
-#ifndef IMP_CLI_SENSORS_H
-#define IMP_CLI_SENSORS_H
+#ifndef IMP_CLI_SENSOR_NAMES_H
+#define IMP_CLI_SENSOR_NAMES_H
 
 #include <stddef.h>
 
