@@ -31,7 +31,7 @@ _importon()
     elif ((COMP_CWORD == 2)) && [[ $command == bend ]]; then
         words='trace check fit view'
     elif ((COMP_CWORD == 2)) && [[ $command == selftest ]]; then
-        words='material light camera'
+        words='material light camera phase medium shape'
     fi
     if [[ $words ]]; then
         mapfile -t COMPREPLY < <(compgen -W "$words" -- "$word")

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon selftest: do the materials, lights, cameras and media of a scene keep their
- * contracts?
+ * importon selftest: do the materials, lights, cameras, media and shapes of a scene keep
+ * their contracts?
  */
 #include "shared/command.h"
 #include "text/progress.h"
@@ -24,7 +24,8 @@ static const struct arg_option options[] = {
      NULL},
     {0}};
 
-static const char *const subjects[] = {"material", "light", "camera", "phase", "medium"};
+static const char *const subjects[] = {"material", "light",  "camera",
+                                       "phase",    "medium", "shape"};
 enum { SUBJECTS = sizeof subjects / sizeof subjects[0] };
 
 static const char *verdict(const struct imp_selftest_row *r)
@@ -99,8 +100,8 @@ static int run_selftest(int n, char **operand)
     while (subject < SUBJECTS && strcmp(operand[0], subjects[subject]) != 0) subject++;
     if (subject == SUBJECTS)
         return cli_error(EXIT_USAGE,
-                         "selftest: '%s' is not material, light, camera, phase or "
-                         "medium",
+                         "selftest: '%s' is not material, light, camera, phase, medium "
+                         "or shape",
                          operand[0]);
     int rc = cli_load(operand[1]);
     if (rc) return rc;
@@ -122,8 +123,8 @@ static int run_selftest(int n, char **operand)
 
 const struct command command_selftest = {
     {"selftest",
-     "material|light|camera|phase|medium SCENE",
-     "test the contracts of materials, lights, cameras and media",
+     "material|light|... SCENE",
+     "test the contracts of materials, lights, cameras, media, shapes",
      {options, options_scene, options_file, options_general},
      2,
      2},

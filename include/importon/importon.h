@@ -1547,8 +1547,9 @@ enum imp_selftest_subject {
     IMP_SELFTEST_MATERIAL,
     IMP_SELFTEST_LIGHT,
     IMP_SELFTEST_CAMERA,
-    IMP_SELFTEST_PHASE, /**< phase functions of media */
-    IMP_SELFTEST_MEDIUM /**< what media are at places of their box, or at the origin */
+    IMP_SELFTEST_PHASE,  /**< phase functions of media */
+    IMP_SELFTEST_MEDIUM, /**< what media are at places of their box, or at the origin */
+    IMP_SELFTEST_SHAPE   /**< shapes; those of groups where the group has them */
 };
 /** One contract of one object, with the inputs that it has in the scene:
  *
@@ -1564,7 +1565,24 @@ enum imp_selftest_subject {
  *   light       by a light's own draws against directions drawn without it
  *   unit, smooth, filter    rays and the reconstruction filter of a camera
  *   part        scattering is not above the extinction
- *   bounded     extinction is not above what flights take for its bound */
+ *   bounded     extinction is not above what flights take for its bound
+ *
+ * and of shapes, along random lines through a box larger than theirs:
+ *
+ *   hits        are on the line at t, nearest first, with a finite surface
+ *   normal      frames are orthonormal; neighbouring hits lie across ng
+ *   uv          neighbouring hits differ by dp_du, dp_dv; `place` gives them back
+ *   sides       normals of closed analytic shapes point outwards, or, mirrored or with
+ *               flip_normals, inwards
+ *   box         nothing lies outside of lo and hi
+ *   met         rays of the scene meet the shape where its own functions do
+ *   moves       hits of analytic shapes go with `move` and `placed`
+ *   area        against the number of crossings, of triangles against their sum
+ *   drawn       points by area lie on the surface, with its normal and uv
+ *   points      are as many in each part of the box as its area says
+ *   towards     points drawn towards a place lie where they say
+ *   density     of these points, against the density for the same hit
+ *   angle       mean of 1/density against the solid angle, in each part of the box */
 struct imp_selftest_row {
     size_t size;
     const char *object, *kind, *contract;
@@ -1577,7 +1595,7 @@ struct imp_selftest_row {
     enum imp_verdict
         ok; /**< open: not promised, and not so; or, where `sees` is above 0.02,
                               as it should be, with too few draws to tell */
-    /** In a row that draws ("draws", "normalised", "albedo", "light"): the relative error of the
+    /** In a row that draws ("draws", "normalised", "albedo", "light", "area", "points", "angle"): the relative error of the
      * density or light that it would have found with a probability of 0.95, in all directions
      * or places together; of "draws" the root of the mean square over what is drawn. 0: of
      * other rows. */

@@ -679,6 +679,9 @@ struct imp_shape_ops {
     const char *name;
     size_t object_size;
     unsigned flags;
+    /* Reads its properties, to_world and flip_normals among them, and sets self, geometry,
+     * area, lo, hi and s->flip_normals. The engine turns no normal: those of `surface` and
+     * of the draws are as the properties say. */
     enum imp_status (*build)(const struct imp_build *build, void *self,
                              struct imp_shape *s);
     /* Nearest hit with tmin < t < tmax, in double; IMP_ANALYTIC only. Sets t, u, v, prim.

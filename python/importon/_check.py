@@ -81,7 +81,9 @@ class SelfTestRow(Row):
     ----------
     object, kind, contract : str
         The object's name, its type, and "finite", "covers", "normalised", "draws", "albedo",
-        "energy", "reciprocal", "derivative", "density", "light", "unit", "smooth" or "filter".
+        "energy", "reciprocal", "derivative", "density", "light", "unit", "smooth", "filter",
+        "part" or "bounded"; of shapes "hits", "normal", "uv", "sides", "box", "met", "moves",
+        "area", "drawn", "points", "towards", "density" or "angle".
     value, reference, se : float
         se of their difference; 0: none.
     answers : float
@@ -229,7 +231,7 @@ def selftest(scene: Scene, subject: str = "material", *, samples: int = 0, direc
     ----------
     scene : Scene
     subject : str
-        "material", "light" or "camera".
+        "material", "light", "camera", "phase", "medium" or "shape".
     samples : int
         Draws of an object; 0: 200,000, and up to 16 times as many until rows that draw would
         see an error of 2 %.

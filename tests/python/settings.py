@@ -130,10 +130,10 @@ def test_weights():
 
 
 def test_selftest():
-    """Self-tests of materials, lights and cameras: rows that hold; the command's numbers"""
+    """Self-tests of materials, lights, shapes and cameras: rows that hold; the command's numbers"""
     s = im.load_file(CORNELL, res=12)
     for subject, contracts in (("material", {"draws", "albedo", "derivative"}), ("light", {"density", "light"}),
-                               ("camera", {"unit", "filter"})):
+                               ("shape", {"hits", "normal", "box", "area", "angle"}), ("camera", {"unit", "filter"})):
         rows = im.selftest(s, subject, samples=20000, directions=2, seed=5)
         assert rows and {r.contract for r in rows} >= contracts, rows
         assert "<table>" in rows._repr_html_() and "self-test: ok" in rows._repr_html_()

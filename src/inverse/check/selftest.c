@@ -149,6 +149,7 @@ static enum imp_status run(struct imp__selftest *t, enum imp_selftest_subject su
     case IMP_SELFTEST_CAMERA: return imp__selftest_cameras(t);
     case IMP_SELFTEST_PHASE: return imp__selftest_phases(t);
     case IMP_SELFTEST_MEDIUM: return imp__selftest_media(t);
+    case IMP_SELFTEST_SHAPE: return imp__selftest_shapes(t);
     }
     return imp__error(t->ctx, IMP_E_ARG, "imp_selftest: subject = %d", (int)subject);
 }

@@ -84,6 +84,7 @@ enum imp_status imp__selftest_lights(struct imp__selftest *t);
 enum imp_status imp__selftest_cameras(struct imp__selftest *t);
 enum imp_status imp__selftest_phases(struct imp__selftest *t);
 enum imp_status imp__selftest_media(struct imp__selftest *t);
+enum imp_status imp__selftest_shapes(struct imp__selftest *t);
 
 /* The contracts of one material, or of what scatters like one; name and kind are given. */
 enum imp_status imp__selftest_bsdf(struct imp__selftest *t, const struct imp_bsdf *b,

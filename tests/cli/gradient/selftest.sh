@@ -12,4 +12,5 @@ kill -INT $!
 wait $!
 echo $?
 grep -o 'cornell.xml: .* cancelled' "$OLDPWD/told"
+importon selftest -q --samples 12000 shape cornell.xml | head -3
 importon selftest phases cornell.xml
