@@ -114,12 +114,13 @@ static void point_take(const struct imp__probe *p, const double u[2], bool looke
 }
 
 /* n lines and n points. */
-static void area_take(const struct imp__selftest *t, const struct imp__probe *p, int n,
+static void area_take(struct imp__selftest *t, const struct imp__probe *p, int n,
                       bool points, struct area *a)
 {
     const double most = imp__probe_most(p) / 5;
     *a = (struct area){0};
     for (int k = 0; k < n; k++) {
+        if (k % 1000 == 0 && imp__selftest_stopped(t)) return;
         line_take(p, imp__key(t->options.seed, 53, (uint64_t)k), a);
         const struct imp_key key = imp__key(t->options.seed, 54, (uint64_t)k);
         const double u[2] = {imp__u01(key, 0), imp__u01(key, 1)};
