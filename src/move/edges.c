@@ -115,22 +115,31 @@ static bool any_seamless(const struct imp__edges *edges, const struct imp_scene 
     return false;
 }
 
+/* What is seamless on the way from a to b, and no part of `own`. -1: nothing. */
+static int way_pierces(const struct imp__edges *edges, const struct imp_scene *scene,
+                       imp_v3 a, imp_v3 b, int own)
+{
+    const imp_v3 d = b - a;
+    struct imp_hit hit;
+    for (double from = END; imp__intersect(scene, &a, &d, from, 1 - END, &hit);
+         from = imp_max(from, (double)hit.t) + END)
+        if (is_seamless(scene, hit.shape, hit.place) &&
+            imp__edges_pair(edges, scene, hit.shape, own))
+            return hit.shape;
+    return -1;
+}
+
+/* Both ways: curves are met from outside alone. */
 int imp__edges_pierced(const struct imp__edges *edges, const struct imp_scene *scene,
                        int *other)
 {
     if (!any_seamless(edges, scene)) return -1;
     for (size_t k = 0; k < edges->n; k++) {
         const struct imp__edge *e = &edges->edge[k];
-        const imp_v3 d = e->b - e->a;
-        struct imp_hit hit;
-        for (double from = END; imp__intersect(scene, &e->a, &d, from, 1 - END, &hit);
-             from = imp_max(from, (double)hit.t) + END) {
-            *other = edges->face[e->first].shape;
-            if (!is_seamless(scene, hit.shape, hit.place) ||
-                !imp__edges_pair(edges, scene, hit.shape, *other))
-                continue;
-            return hit.shape;
-        }
+        *other = edges->face[e->first].shape;
+        int met = way_pierces(edges, scene, e->a, e->b, *other);
+        if (met < 0) met = way_pierces(edges, scene, e->b, e->a, *other);
+        if (met >= 0) return met;
     }
     return imp__curved_pierced(edges, scene, other);
 }

@@ -44,14 +44,16 @@ static int segment_pierces(const struct imp__edges *edges, const struct imp_scen
                            const struct imp__body *body, const struct imp__rim_name *but,
                            imp_v3 a, imp_v3 b, double end)
 {
-    const imp_v3 d = b - a;
-    struct imp_hit hit;
-    for (double from = end; imp__intersect(scene, &a, &d, from, 1 - end, &hit);
-         from = hit.t + END)
-        if (imp__edges_pair(edges, scene, hit.shape, body->shape) &&
-            !is_hit(&hit, body->shape, body->place) &&
-            !(but && is_hit(&hit, but->shape, but->place)))
-            return hit.shape;
+    for (int back = 0; back < 2; back++) { /* curves are met from outside alone */
+        const imp_v3 o = back ? b : a, d = back ? a - b : b - a;
+        struct imp_hit hit;
+        for (double from = end; imp__intersect(scene, &o, &d, from, 1 - end, &hit);
+             from = hit.t + END)
+            if (imp__edges_pair(edges, scene, hit.shape, body->shape) &&
+                !is_hit(&hit, body->shape, body->place) &&
+                !(but && is_hit(&hit, but->shape, but->place)))
+                return hit.shape;
+    }
     return -1;
 }
 
@@ -172,21 +174,37 @@ static imp_v3 strand_place(const struct imp_scene *scene, const struct imp__body
     return x.c + (axes.s * cos(IMP_2PI * turn) + axes.t * sin(IMP_2PI * turn)) * x.r;
 }
 
-/* What a chord of a curve's surface passes through: another shape, or a segment of the same that is no
- * neighbour. -1: nothing. */
-static int chord_pierces(const struct imp__edges *edges, const struct imp_scene *scene,
-                         const struct imp__body *body, int segment, imp_v3 a, imp_v3 b)
+/* Is it this segment, or does it go on where this one ends? */
+static bool is_neighbour(const struct imp_curves *c, int segment, int other)
 {
+    return other == segment || (other == segment + 1 && c->joined[segment] & 2) ||
+           (other == segment - 1 && c->joined[segment] & 1);
+}
+
+/* What a line passes through on its way from a to b: another shape, or a segment of the same that is no
+ * neighbour. -1: nothing. */
+static int line_pierces(const struct imp__edges *edges, const struct imp_scene *scene,
+                        const struct imp__body *body, int segment, imp_v3 a, imp_v3 b)
+{
+    const struct imp_curves *c = &scene->shapes[body->shape]->curves;
     const imp_v3 d = b - a;
     struct imp_hit hit;
     for (double from = END; imp__intersect(scene, &a, &d, from, 1 - END, &hit);
          from = hit.t + END) {
         const bool own = is_hit(&hit, body->shape, body->place);
-        if (own ? abs(hit.prim - segment) > 1
+        if (own ? !is_neighbour(c, segment, hit.prim)
                 : imp__edges_pair(edges, scene, hit.shape, body->shape))
             return hit.shape;
     }
     return -1;
+}
+
+/* A chord of a curve's surface, both ways: curves are met from outside alone. */
+static int chord_pierces(const struct imp__edges *edges, const struct imp_scene *scene,
+                         const struct imp__body *body, int segment, imp_v3 a, imp_v3 b)
+{
+    const int met = line_pierces(edges, scene, body, segment, a, b);
+    return met >= 0 ? met : line_pierces(edges, scene, body, segment, b, a);
 }
 
 /* Lines along a curve, and the rims of its ends. */
