@@ -240,8 +240,10 @@ double imp__pose_large(const struct imp_pose *p, size_t e)
     case IMP_POSE_CONTROL:
     case IMP_POSE_VERTICES: {
         const struct imp_shape *s = p->scene->shapes[p->shape];
-        if (p->kind == IMP_POSE_CONTROL && e % 4 == 3) return 0.3 * p->number[e];
-        return 0.1 * imp__length(s->hi - s->lo);
+        const double size = imp__length(s->hi - s->lo);
+        if (p->kind == IMP_POSE_CONTROL && e % 4 == 3) /* a tip has none */
+            return imp_max(0.3 * p->number[e], 1e-2 * size);
+        return 0.1 * size;
     }
     case IMP_POSE_PICTURE:
     case IMP_POSE_FOV: return 10;
