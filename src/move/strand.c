@@ -23,7 +23,7 @@ void imp__strand_at(const struct imp_scene *scene, int shape, int64_t place, int
     const size_t first = k->first[segment], n = (size_t)k->degree + 1;
     double b[4][4], factor = 1;
     imp_v3 sum[4] = {{0}, {0}, {0}, {0}};
-    *out = (struct imp__strand){.r = 0};
+    *out = (struct imp__strand){.v = v};
     imp__curve_weights(k->degree, v, b);
     for (size_t m = 0; m < n; m++) {
         const float *q = k->points + 4 * (first + m);
@@ -46,6 +46,15 @@ void imp__strand_at(const struct imp_scene *scene, int shape, int64_t place, int
     out->r *= factor;
     out->r1 *= factor;
     out->r2 *= factor;
+}
+
+void imp__strand_end(const struct imp_scene *scene, int shape, int64_t place, int segment,
+                     bool end, struct imp__strand *out)
+{
+    const double next = 1e-3;
+    imp__strand_at(scene, shape, place, segment, end, out);
+    if (!(imp__dot(out->d1, out->d1) > 0))
+        imp__strand_at(scene, shape, place, segment, end ? 1 - next : next, out);
 }
 
 double imp__strand_foot(const struct imp_scene *scene, int shape, int64_t place,
@@ -73,8 +82,8 @@ double imp__strand_foot(const struct imp_scene *scene, int shape, int64_t place,
 /* Where points coincide at an end, next to it. */
 struct imp__strand_axes imp__strand_axes(const struct imp__strand *x)
 {
-    const double length = imp__length(x->d1);
-    const imp_v3 d = length > 0 ? x->d1 : imp__dot(x->d2, x->d2) > 0 ? x->d2 : x->d3;
+    const double length = imp__length(x->d1), to = x->v > 0.5 ? -1 : 1;
+    const imp_v3 d = length > 0 ? x->d1 : imp__dot(x->d2, x->d2) > 0 ? x->d2 * to : x->d3;
     const imp_v3 a = imp__dot(d, d) > 0 ? imp__normalize(d) : imp__v3(1, 0, 0);
     const struct imp_frame f = imp__frame_from_normal(a);
     return (struct imp__strand_axes){a, f.s, f.t, length};
@@ -150,7 +159,8 @@ static double root_find(const struct outline *f, double lo, double hi, double at
     return t;
 }
 
-#define DEEPEST 12
+#define DEEPEST  12
+#define STRAIGHT 1e-12 /* a look along a straight line: no turn is before another */
 
 /* Roots between lo and hi; those that no bound tells apart, 1e-4 and nearer, are one or none. */
 static void roots_find(const struct outline *f, double lo, double hi, double at_lo,
@@ -184,6 +194,7 @@ int imp__strand_outline(const struct imp__strand *x, const struct imp__strand_ax
                         .b = L * x->r1 * imp__dot(axes->a, D)};
     const double bent = f.r * hypot(f.k[0], f.k[1]), away = hypot(f.D[0], f.D[1]);
     f.most = f.l * away + f.plus * bent + 2 * bent * away;
+    if (!(f.most > STRAIGHT * f.l * imp__length(D))) return 0;
     double slope, value[CELLS + 1];
     int n = 0;
     for (int i = 0; i < CELLS; i++)
@@ -205,12 +216,15 @@ int imp__strand_ends(const struct imp_curves *k, int segment)
 
 int imp__strand_folds(const struct imp_scene *scene, int shape, int64_t place)
 {
-    enum { PLACES = 8 };
+    enum { PLACES = 16 };
     const struct imp_curves *k = &scene->shapes[shape]->curves;
     for (size_t i = 0; i < k->n_segments; i++)
-        for (int m = 0; m < PLACES; m++) {
+        for (int m = 0; m <= PLACES; m++) {
             struct imp__strand x;
-            imp__strand_at(scene, shape, place, (int)i, (m + 0.5) / PLACES, &x);
+            const int ends = imp__strand_ends(k, (int)i);
+            if ((m == 0 && ends & 1) || (m == PLACES && ends & 2))
+                imp__strand_end(scene, shape, place, (int)i, m > 0, &x);
+            else imp__strand_at(scene, shape, place, (int)i, (double)m / PLACES, &x);
             const double L2 = imp__dot(x.d1, x.d1);
             const imp_v3 across = x.d2 - x.d1 * (imp__dot(x.d1, x.d2) / L2);
             if (!(L2 > x.r * imp__length(across))) return (int)i;

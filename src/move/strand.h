@@ -18,12 +18,15 @@
 /* The line of a segment at v, world, with derivatives with respect to v. */
 struct imp__strand {
     imp_v3 c, d1, d2, d3;
-    double r, r1, r2;
+    double r, r1, r2, v;
 };
 /* What is no bsplinecurve, or stretched by its instance, has none. */
 bool imp__is_strand(const struct imp_scene *scene, int shape, int64_t place);
 void imp__strand_at(const struct imp_scene *scene, int shape, int64_t place, int segment,
                     double v, struct imp__strand *out);
+/* The line at the beginning of a segment, or at its end: next to it where points coincide there. */
+void imp__strand_end(const struct imp_scene *scene, int shape, int64_t place, int segment,
+                     bool end, struct imp__strand *out);
 /* v of the point of the segment's line next to p. */
 double imp__strand_foot(const struct imp_scene *scene, int shape, int64_t place,
                         int segment, imp_v3 p);

@@ -58,7 +58,7 @@ static imp_v3 inwards(const struct imp__edge_draw *d, const struct imp__edge_fac
 
 imp_v3 imp__edge_beside(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m, double apart)
 {
-    const imp_v3 past = d->p + m * apart;
+    const imp_v3 past = d->p + m * (d->rim ? imp__strand_apart(d, w, apart) : apart);
     const struct imp__edge_face *f = d->edge ? face_seen(d, w, m) : NULL;
     if (!f) return past;
     const struct imp__corners facet =

@@ -111,6 +111,8 @@ bool imp__strand_touched(struct imp__edge_draw *d, const double u[2], imp_v3 *w)
 enum imp_status imp__strand_lengths(const struct imp__boundary *b,
                                     struct imp__edge_item *item);
 bool imp__strand_merges(const struct imp__edge_draw *d, imp_v3 w, double beside);
+/* How far from an edge looks along w past it are: from the rim of a curve's end further than from others. */
+double imp__strand_apart(const struct imp__edge_draw *d, imp_v3 w, double apart);
 /* The velocity of the edge's point, as its surface carries it, or its two surfaces, counts m: the ends
  * of a flux, one or two. */
 #define IMP_EDGE_ENDS 2

@@ -15,6 +15,11 @@ static const struct imp_curves *curves_of(const struct imp__edge_draw *d)
     return &d->b->tracer->scene->shapes[d->item->shape]->curves;
 }
 
+static bool is_strand(const struct imp__edge_draw *d)
+{
+    return d->b->tracer->scene->shapes[d->item->shape]->geometry == IMP_CURVES;
+}
+
 static void line_at(const struct imp__edge_draw *d, struct imp__strand *x)
 {
     imp__strand_at(d->b->tracer->scene, d->item->shape, d->item->place, d->prim, d->place,
@@ -112,19 +117,48 @@ static bool rim_set(struct imp__edge_draw *d, int k)
     return true;
 }
 
-/* A rim is one where its wall is met from outside. Next to the outline the wall beside an open end, into
- * which a look goes, is thinner than the look is apart from the rim. */
-bool imp__strand_merges(const struct imp__edge_draw *d, imp_v3 w, double beside)
+/* A rim is one where its wall is met from outside: how wide that is beside an open end, as far as the
+ * outline. A look along w, with the part c along the normal, touches the wall at a distance of c/k from the
+ * rim, c^2/2k beside it, where k is the wall's curvature along w. 0: it is no rim. */
+static double rim_width(const struct imp__edge_draw *d, imp_v3 w)
 {
     struct imp__strand x;
+    struct imp__strand_point at;
+    imp__strand_end(d->b->tracer->scene, d->item->shape, d->item->place, d->prim,
+                    d->place > 0, &x);
+    const struct imp__strand_axes axes = imp__strand_axes(&x);
+    const imp_v3 q = d->p - x.c, e = imp__normalize(q - axes.a * imp__dot(axes.a, q)),
+                 r = imp__normalize(w);
+    if (!imp__strand_point(&x, &axes, e, &at)) return 0;
+    const double c = imp__dot(at.n, r);
+    if (!(c < 0)) return 0;
+    const imp_v3 t = imp__normalize(r - at.n * c);
+    const double k = imp__strand_bends(&at, &x, t);
+    return k * imp__dot(t, d->out) < 0 ? 0.5 * c * c / fabs(k) : INFINITY;
+}
+
+bool imp__strand_merges(const struct imp__edge_draw *d, imp_v3 w, double beside)
+{
+    return !(rim_width(d, w) > beside);
+}
+
+#define UNMET                                                                            \
+    16 /* of how far looks are apart: rays, in float, miss a wall nearer to its end */
+
+double imp__strand_apart(const struct imp__edge_draw *d, imp_v3 w, double apart)
+{
+    struct imp__strand x;
+    if (!d->rim || !d->item || d->item->arc || d->item->shape < 0 || !is_strand(d))
+        return apart;
     line_at(d, &x);
-    const imp_v3 n = imp__normalize(d->p - x.c);
-    const double cosine = imp__dot(n, imp__normalize(w - d->out * imp__dot(d->out, w)));
-    return !(cosine < 0) ||
-           (imp__dot(w, d->out) < 0 && 0.5 * x.r * cosine * cosine < beside);
+    const double most = imp_min(0.02 * x.r, 0.02 * rim_width(d, w));
+    return imp_max(apart, imp_min(UNMET * apart, most));
 }
 
 /* ---- Outlines ------------------------------------------------------------------------ */
+
+/* Lines through an open end may touch the wall from inside, and miss what of it they meet from there: these
+ * are clear of it on the inner side. Where the end is shut to a line, it meets the wall before. */
 
 bool imp__strand_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel)
 {
@@ -143,15 +177,15 @@ bool imp__strand_silhouette(struct imp__edge_draw *d, imp_v3 from, bool parallel
     const imp_v3 e = axes.s * cos(turn[k]) + axes.t * sin(turn[k]);
     if (!imp__strand_point(&x, &axes, e, &at)) return false;
     const imp_v3 w = imp__normalize(parallel ? from : at.p - from);
-    if (!(imp__strand_bends(&at, &x, w) > 0)) return false; /* it is inside */
+    const double bends = imp__strand_bends(&at, &x, w);
     const imp_v3 along =
         at.along - at.around * (x.r * imp__dot(at.n_v, w) / imp__dot(at.n_t, w));
     const double rate = imp__length(along);
-    d->out = at.n;
+    d->out = bends < 0 ? -at.n : at.n;
     d->p = at.p;
     d->along = along * (1 / rate);
     d->inv_pdf = rate * n / d->chance;
-    return rate < INFINITY;
+    return rate < INFINITY && bends != 0;
 }
 
 bool imp__strand_touched(struct imp__edge_draw *d, const double u[2], imp_v3 *w)
@@ -169,11 +203,11 @@ bool imp__strand_touched(struct imp__edge_draw *d, const double u[2], imp_v3 *w)
     if (!imp__strand_point(&x, &axes, e, &at)) return false;
     *w = imp__normalize(at.along) * cos(psi) + at.around * sin(psi);
     const double bends = imp__strand_bends(&at, &x, *w);
-    if (!(bends > 0)) return false; /* it is inside */
+    if (!(fabs(bends) > 0)) return false;
     d->touches = true;
-    d->out = at.n;
+    d->out = bends < 0 ? -at.n : at.n;
     d->p = at.p;
     d->along = imp__cross(d->out, *w);
-    d->inv_pdf = IMP_2PI * IMP_2PI * at.area * bends / d->chance;
+    d->inv_pdf = IMP_2PI * IMP_2PI * at.area * fabs(bends) / d->chance;
     return true;
 }
