@@ -37,6 +37,13 @@ static enum imp_status file_set(struct imp_scene *scene, struct imp_node *node,
     return IMP_OK;
 }
 
+/* Copies at one place are alternatives, and their black shapes would stand in each other. */
+static bool has_opening(const struct imp_node *node)
+{
+    const struct imp_prop *p = imp__node_prop(node, "opening");
+    return p && !(p->type == IMP_PROP_BOOL && !p->integer);
+}
+
 /* A copy at the end of the scene, with the id "ID:NAME". */
 static enum imp_status node_copy(struct imp_scene *scene, const struct imp_node *from,
                                  const char *file, size_t length)
@@ -78,6 +85,10 @@ static enum imp_status node_take(struct imp_scene *scene, struct imp_node *node,
         return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
                                "luminaires: it has a texture or another object in it");
     if (!strchr(files, ',')) return file_set(scene, node, files, strlen(files));
+    if (has_opening(node))
+        return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
+                               "luminaires: several files at one place need points, as "
+                               "black shapes hide each other: set its opening to false");
     for (const char *file = files;;) {
         const size_t n = strcspn(file, ",");
         const enum imp_status st = node_copy(scene, node, file, n);

@@ -14,15 +14,20 @@ static enum imp_status no_memory(struct imp_scene *scene)
     return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for the scene");
 }
 
-/* Does any light leave across nadir's plane? Of type B, whose angles end there, none does. */
+/* Does any light leave across nadir's plane, at an angle of the table or between two of them? Of type B,
+ * whose angles end there, none does. */
 static bool shines_behind(const struct imp_ies_data *d)
 {
     const double level = d->type == IMP_PHOTOMETRY_C ? 90 : 0;
     if (d->type == IMP_PHOTOMETRY_B) return false;
+    const double *v = d->vertical;
     for (int j = 0; j < d->n_horizontal; j++)
-        for (int k = 0; k < d->n_vertical; k++)
-            if (d->vertical[k] > level && d->candela[j * d->n_vertical + k] > 0)
+        for (int k = 0; k < d->n_vertical; k++) {
+            const bool crosses =
+                k + 1 < d->n_vertical && v[k] < level && v[k + 1] > level;
+            if ((v[k] > level || crosses) && d->candela[j * d->n_vertical + k] > 0)
                 return true;
+        }
     return false;
 }
 
@@ -34,7 +39,8 @@ static bool number_add(struct imp_scene *scene, struct imp_node *node, const cha
     return p != NULL;
 }
 
-/* A shape without children, of the given half sides in the luminaire's own space. */
+/* A shape without children, of the given half sides in the luminaire's own space. A box hangs from the
+ * luminaire's place along nadir: half of it would be behind the ceiling else. */
 static struct imp_node *shape_of(struct imp_scene *scene, const struct imp_node *lamp,
                                  const double half[3], bool flat)
 {
@@ -45,6 +51,7 @@ static struct imp_node *shape_of(struct imp_scene *scene, const struct imp_node 
     for (int k = 0; k < 16; k++)
         to_world[k] =
             (place ? place->number[k] : k % 5 == 0) * (k % 4 < 3 ? half[k % 4] : 1);
+    for (int k = 0; k < 12 && !flat; k += 4) to_world[k + 3] += to_world[k + 2];
     if (lamp->id) {
         id = imp__arena_array(&scene->arena, strlen(lamp->id) + sizeof "_opening", 1);
         if (!id) return NULL;
@@ -64,6 +71,15 @@ static struct imp_node *shape_of(struct imp_scene *scene, const struct imp_node 
     return got ? shape : NULL;
 }
 
+static bool has_id(const struct imp_node *node, const char *id)
+{
+    bool has = node->id && !strcmp(node->id, id);
+    for (size_t i = 0; i < node->n_children && !has; i++)
+        has = node->children[i].node && !node->children[i].ref &&
+              has_id(node->children[i].node, id);
+    return has;
+}
+
 /* In place of the luminaire in `at`. */
 static enum imp_status opening_make(struct imp_scene *scene, struct imp_child *at)
 {
@@ -80,6 +96,9 @@ static enum imp_status opening_make(struct imp_scene *scene, struct imp_child *a
     const double height = d->size[2] > 0 ? d->size[2] : THIN;
     const double half[3] = {d->size[0] / 2, d->size[1] / 2, flat ? 1 : height / 2};
     struct imp_node *shape = shape_of(scene, lamp, half, flat);
+    if (shape && shape->id && has_id(scene->root, shape->id))
+        return imp__node_error(scene->ctx, lamp, IMP_E_SCENE,
+                               "opening: the id of its shape, '%s', is taken", shape->id);
     if (!shape || !imp__node_add_child(&scene->arena, shape, lamp, NULL, lamp->loc))
         return no_memory(scene);
     at->node = shape;

@@ -110,14 +110,14 @@ static void flat(void)
     tap_ok(off > .08, "where the point is up to %.0f %% off", 100 * off);
 }
 
-/* At 400 m, where a box of 1.2 m has 1000 cd in each direction to 1.2/400. Of one without a height, 1 cm
- * thick, little is drawn on the sides. */
+/* At 400 m from its middle, where a box of 1.2 m has 1000 cd in each direction to 1.2/400. Of one without a
+ * height, 1 cm thick, little is drawn on the sides. Here z points down, and boxes lie above z = 0. */
 static void box(void)
 {
     static const struct {
         const char *to_world, *what;
-    } meter[] = {{"<translate z='-400'/>", "below"},
-                 {"<rotate x='1' angle='180'/><translate z='400'/>", "above"},
+    } meter[] = {{"<translate z='-400'/>", "behind"},
+                 {"<rotate x='1' angle='180'/><translate z='400'/>", "below"},
                  {"<rotate y='1' angle='-90'/><translate x='400'/>", "beside"}};
     static const char *const sizes[] = {".6 1.2 .3", ".6 1.2 0"};
     for (int k = 0; k < 2; k++) {
@@ -132,12 +132,13 @@ static void box(void)
                 "<scene version='3.0.0'><integrator type='path'/><emitter type='ies' "
                 "id='lamp'>" FILE_OF("alike.ies") OPENING
                 "</emitter><shape type='rectangle'><transform name='to_world'><scale "
-                "value='.01'/>%s</transform><sensor type='irradiancemeter' id='m'>"
+                "value='.01'/>%s<translate z='%g'/></transform><sensor "
+                "type='irradiancemeter' id='m'>"
                 "<boolean name='virtual' value='true'/><string name='at' "
                 "value='points'/><string name='units' value='photometric'/><film "
                 "type='hdrfilm'><integer name='width' value='1'/><integer "
                 "name='height' value='1'/></film></sensor></shape></scene>",
-                meter[m].to_world);
+                meter[m].to_world, k ? .005 : .15);
             imp_scene *s = test_scene_text(ctx, xml, IMP_MONO);
             run.spp = m < 2 ? 16384 : 65536;
             test_must(ctx, imp_grid_read(s, &run, &value, &se, &mean, NULL));
@@ -182,6 +183,60 @@ static void names(void)
     imp_scene_destroy(s);
 }
 
+/* Four angles of a table of 100 cd, of which one is 0, and what its opening is: in a box the middle is half
+ * of the centimetre lower. */
+static void behind(void)
+{
+    static const struct {
+        const char *what, *angles, *candela;
+        double z;
+    } rows[] = {{"dark from the horizon on", "0 60 90 180", "100 100 0 0", 1},
+                {"light at the horizon alone", "0 60 90 180", "100 100 100 0", 1},
+                {"light at 100 degrees", "0 60 100 180", "100 100 100 0", .995},
+                {"light until 100 degrees", "0 80 100 180", "100 100 0 0", .995}};
+    for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
+        char xml[4096];
+        struct imp_luminaire_info info = {.size = sizeof info};
+        FILE *f = fopen("behind.ies", "w");
+        if (!f) exit(99);
+        fprintf(f,
+                "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 4 1 1 2 .6 1.2 0\n1 1 0\n%s\n0\n"
+                "%s\n",
+                rows[k].angles, rows[k].candela);
+        fclose(f);
+        scene_text(xml, sizeof xml, LAMP("behind.ies", OPENING));
+        imp_scene *s = test_scene_text(ctx, xml, IMP_MONO);
+        test_must(ctx, imp_scene_get_luminaire(s, 0, &info));
+        imp_scene_destroy(s);
+        tap_ok(fabs(info.position[2] - rows[k].z) < 1e-6, "%s: a %s (middle %g)",
+               rows[k].what, rows[k].z < 1 ? "box" : "rectangle", info.position[2]);
+    }
+}
+
+/* At one place: as points only. */
+static void several(void)
+{
+    static const char *const files[] = {"lamp=lambert.ies,alike.ies"};
+    for (int open = 0; open < 2; open++) {
+        char xml[4096];
+        struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
+        imp_scene *s = NULL;
+        o.mode = IMP_MONO;
+        o.luminaires = files;
+        o.n_luminaires = 1;
+        scene_text(xml, sizeof xml,
+                   open ? LAMP("lambert.ies", OPENING)
+                        : LAMP("lambert.ies", "<boolean name='opening' value='false'/>"));
+        const enum imp_status st =
+            imp_scene_load_string(ctx, xml, strlen(xml), "test", &o, &s);
+        tap_ok(open ? st == IMP_E_UNSUPPORTED &&
+                          strstr(imp_last_error(ctx), "black shapes hide each other")
+                    : st == IMP_OK,
+               "several files: %s", open ? imp_last_error(ctx) : "points");
+        imp_scene_destroy(s);
+    }
+}
+
 static void refused(const char *lamp, const char *needle)
 {
     char xml[4096];
@@ -203,6 +258,8 @@ int main(void)
     box();
     by_hand();
     names();
+    behind();
+    several();
     table_write("point.ies", true, "0 0 0");
     refused(LAMP("point.ies", OPENING), "names no luminous opening");
     refused(LAMP("lambert.ies", "<string name='opening' value='yes'/>"),
@@ -210,6 +267,8 @@ int main(void)
     refused("<shape type='rectangle'><emitter type='ies'>" FILE_OF("lambert.ies") OPENING
             "</emitter></shape>",
             "opening");
+    refused(LAMP("lambert.ies", OPENING) "<shape type='sphere' id='lamp_opening'/>",
+            "'lamp_opening', is taken");
     imp_context_destroy(ctx);
     return tap_done();
 }
