@@ -164,6 +164,65 @@ static void scenes(void)
     }
 }
 
+/* A cosine of 1000 cd below the horizon, `above` behind it; 1.15 m x .28 m, and so high. */
+static void table_write(double above, double height)
+{
+    FILE *f = fopen("glare_box.ies", "w");
+    if (!f) exit(99);
+    fprintf(f, "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 181 1 1 2 .28 1.15 %g\n1 1 0\n",
+            height);
+    for (int v = 0; v <= 180; v++) fprintf(f, "%d\n", v);
+    fputs("0\n", f);
+    for (int v = 0; v <= 180; v++)
+        fprintf(f, "%.9g\n", v <= 90 ? 1000 * cos(v * M_PI / 180) : above);
+    fclose(f);
+}
+
+/* Boxes at z from 2.7 - height to 2.7, seen as their middles; nothing of the box is what hides it. */
+static void boxes(void)
+{
+    static const struct {
+        const char *what, *rest;
+        double above, given, height; /* height 0: nothing is seen */
+    } rows[] = {{"a box", "", 0, .1, .1},
+                {"a box of 1 cm", "", 100, 0, .01},
+                {"a box that is hidden",
+                 "<shape type='sphere'><transform name='to_world'><scale value='.2'/>"
+                 "<translate y='2.6' z='2.4'/></transform><bsdf type='diffuse'><rgb "
+                 "name='reflectance' value='0'/></bsdf></shape>",
+                 0, .1, 0}};
+    for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
+        char xml[4096];
+        struct imp_run run = IMP_RUN_INIT;
+        double ugr[2], se[2];
+        table_write(rows[k].above, rows[k].given);
+        snprintf(xml, sizeof xml,
+                 EYES(SIGHT) "<emitter type='ies' id='a'><string name='filename' "
+                             "value='glare_box.ies'/><boolean name='opening' "
+                             "value='true'/><transform name='to_world'><rotate x='1' "
+                             "angle='180'/><translate y='3' z='2.7'/></transform>"
+                             "</emitter>%s</scene>",
+                 rows[k].rest);
+        imp_scene *s = test_scene_text(ctx, xml, IMP_MONO);
+        run.spp = 65536;
+        test_must(ctx, imp_grid_glare(s, &run, ugr, se));
+        imp_scene_destroy(s);
+        const double h = rows[k].height, up = 1.5 - h / 2, r2 = 10 + up * up,
+                     r = sqrt(r2);
+        const double area = (1.15 * .28 * up + h * (1.15 * 3 + .28)) / r,
+                     L = 1000 * up / r / area;
+        const double p =
+            imp_guth_position(atan2(1, up) * 180 / M_PI, acos(3 / r) * 180 / M_PI);
+        const double truth =
+            h > 0 ? 8 * log10(.25 / 20 * L * L * area / r2 / (p * p)) : -INFINITY;
+        for (int e = 0; e < 2; e++)
+            tap_ok(truth == ugr[e] ||
+                       (fabs(ugr[e] - truth) < .1 && se[e] > 0 && se[e] < .05),
+                   "%s, observer %d: %.3f +- %.3f, by hand %.3f", rows[k].what, e, ugr[e],
+                   se[e], truth);
+    }
+}
+
 /* ---- Tables -------------------------------------------------------------------------- */
 
 /* From a rectangle of x by y to the one opposite at distance 1, by quadrature. */
@@ -307,6 +366,7 @@ int main(void)
     formula();
     disks();
     scenes();
+    boxes();
     tables();
     refused();
     imp_context_destroy(ctx);

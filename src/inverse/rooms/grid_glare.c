@@ -19,6 +19,18 @@ static double scale_of(const struct imp_scene *scene, const struct imp_emitter *
     return scene->channels == 1 ? c[0] : imp__luminance(c[0], c[1], c[2]);
 }
 
+/* Does nothing else stand between the eye and the middle of the luminaire at eye + d? A solid one hides its
+ * middle itself. */
+static bool is_free(const struct imp_scene *scene, const struct imp_emitter *e,
+                    imp_v3 eye, imp_v3 d)
+{
+    const double just_before = 1 - 1e-3;
+    struct imp_hit hit;
+    if (!e->shape) return !imp__occluded_at(scene, 0, &eye, &d, 0, just_before);
+    return !imp__intersect(scene, &eye, &d, 0, just_before, &hit) ||
+           (hit.place == 0 && scene->shapes[hit.shape] == e->shape);
+}
+
 bool imp__glare_look(const struct imp_scene *scene, const struct imp_emitter *e,
                      imp_v3 eye, imp_v3 sight, imp_v3 up, struct imp__glare_seen *out)
 {
@@ -30,8 +42,7 @@ bool imp__glare_look(const struct imp_scene *scene, const struct imp_emitter *e,
     if (!(r > 0)) return false;
     const imp_v3 w = d * (1 / r), back = -w;
     const double ahead = imp__dot(w, sight);
-    /* Just before the luminaire, which may be a shape itself. */
-    if (!(ahead > 0) || imp__occluded_at(scene, 0, &eye, &d, 0, 1 - 1e-3)) return false;
+    if (!(ahead > 0) || !is_free(scene, e, eye, d)) return false;
     const double intensity = imp__ies_intensity(x, back) * scale_of(scene, e);
     const double area =
         e->shape ? imp__ies_projected(x, back) : imp__ies_opening(x, back);
