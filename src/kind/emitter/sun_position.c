@@ -56,10 +56,11 @@ static int days_of(int year, int month)
 }
 
 /* Clocks are up to three hours from the sun's, in the west of China and, by summer time, of
- * Alaska. */
+ * Alaska. A time zone of 0 that is given is universal time, which is right everywhere. */
 #define CLOCK_OFF_MOST 3.5
 static void clock_check(const struct imp_build *b, const struct imp__sun_date *d)
 {
+    if (d->timezone == 0 && imp_build_has(b, "timezone")) return;
     const double off = remainder(d->timezone - d->longitude / 15, 24);
     if (fabs(off) <= CLOCK_OFF_MOST) return;
     char where[512];

@@ -51,6 +51,9 @@ sed 's/"month" value="12"/"month" value="2"/; s/"day" value="21"/"day" value="30
 importon read day.xml -m mono
 sed 's/<float name="timezone" value="1"\/>//; s/"hour" value="22"/"hour" value="18"/' night.xml >zone.xml
 importon read zone.xml -m mono >/dev/null
+# Hours in universal time are right at every longitude.
+sed 's/"longitude" value="10"/"longitude" value="-100"/; s/"timezone" value="1"/"timezone" value="0"/; s/"hour" value="22"/"hour" value="18"/' night.xml >utc.xml
+importon read utc.xml -m mono >/dev/null
 sed 's/"longitude" value="10"/"longitude" value="-100"/; s/"timezone" value="1"/"timezone" value="-6"/; s/"hour" value="22"/"hour" value="12"/' night.xml >right.xml
 importon read right.xml -m mono >/dev/null
 # A latitude alone.
