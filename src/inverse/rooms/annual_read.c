@@ -184,6 +184,7 @@ enum imp_status imp_annual_read(imp_scene *scene, const struct imp_run *run, siz
     IMP_REQUIRE(NULL, scene, "scene");
     imp_context *ctx = scene->ctx;
     IMP_REQUIRE(ctx, hour, "hour");
+    IMP_FLOAT_MODE;
     IMP_RUN(ctx, own, run);
     IMP_OPTIONS(ctx, o, options, "options");
     IMP_CHECKED(options_take(ctx, &o));
