@@ -9,14 +9,17 @@
 #include <string.h>
 
 enum {
-    AT_ONCE = 256,        /* points */
+    AT_ONCE = 256,        /* points, at most */
     PART = 4 * IMP__BATCH /* blocks of hours */
 };
+/* For hours with direct sun, all points at work together. */
+#define SUNLIT_BYTES (256.0 * 1024 * 1024)
 
 struct job {
     const struct imp__annual_year *y;
     struct imp__annual_worker *worker; /* [threads] */
-    struct imp__annual_at *at;         /* [AT_ONCE] */
+    size_t at_once;                    /* points */
+    struct imp__annual_at *at;         /* [at_once] */
     size_t first, points;              /* those at work */
     imp__annual_skies *sky;            /* [PART / 2] */
     size_t block, blocks;              /* of the part */
@@ -195,20 +198,30 @@ static void workers_free(struct job *j, int threads)
     imp__release(ctx, j->worker);
 }
 
+/* As many as have room, in the worst case that the sun comes to all of them at each hour. */
+static size_t at_once(const struct imp__annual_year *y)
+{
+    const double each =
+        (double)(y->a->hours.n_suns + 1) * sizeof(struct imp__annual_sunlit);
+    const double room = imp_clamp(SUNLIT_BYTES / each, 1.0, (double)AT_ONCE);
+    const size_t threads = imp_min((size_t)y->a->scene->ctx->threads, (size_t)AT_ONCE);
+    return imp_max((size_t)room, threads);
+}
+
 enum imp_status imp__annual_points(const struct imp__annual_year *y)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = y->a->scene->ctx;
     const int threads = ctx->threads;
     const double start = imp__now();
-    struct job j = {.y = y};
+    struct job j = {.y = y, .at_once = at_once(y)};
     size_t lit = 0;
     if (pthread_mutex_init(&j.lock, NULL) != 0) return no_memory(&j);
-    j.at = imp__alloc(ctx, imp_min(y->points, (size_t)AT_ONCE), sizeof *j.at);
+    j.at = imp__alloc(ctx, imp_min(y->points, j.at_once), sizeof *j.at);
     j.sky = imp__alloc(ctx, PART / 2, sizeof *j.sky);
     if (!workers_make(&j, threads) || !j.at || !j.sky) IMP_TRY(no_memory(&j));
-    for (; j.first < y->points; j.first += AT_ONCE) {
-        j.points = imp_min(y->points - j.first, (size_t)AT_ONCE);
+    for (; j.first < y->points; j.first += j.at_once) {
+        j.points = imp_min(y->points - j.first, j.at_once);
         IMP_TRY(points_walk(&j, start));
         IMP_TRY(points_year(&j));
         for (int t = 0; t < threads; t++)
