@@ -30,6 +30,7 @@ struct imp__bent_surface {
     double radius; /* 0: a plane */
     bool inside;   /* the ray meets it from inside */
     double ratio;  /* as imp__bend has it */
+    int plane;     /* its number, from 1 on; 0: it is none */
     int shape;
     int64_t place;
     imp_v3 q, normal; /* where it is met; the normal there */
@@ -107,6 +108,8 @@ struct imp__plane_range {
 double imp__glass_index(const struct imp_scene *scene, const struct imp__body *body);
 struct imp__plane_range imp__plane_surface(const struct imp__boundary *b, size_t k,
                                            struct imp__bent_surface *out);
+/* The number of the plane that has been hit, from 1 on; 0: it is none. */
+int imp__plane_number(const struct imp__boundary *b, const struct imp_hit *hit);
 /* Is it a chain of a plane that bends and planes that reflect behind it? Such roots are known; of places within
  * glass. */
 bool imp__flat_chain(const struct imp__bent_goal *goal, const struct imp__bent_chain *c);

@@ -103,9 +103,12 @@ static bool surface_draw(const struct imp__edge_draw *d, const struct imp_hit *h
         out->axis = tube.axis;
         out->radius = tube.radius;
         out->inside = imp__dot(imp__across_axis(tube.axis, at->p - tube.base), w) > 0;
-    } else {
-        out->p = at->p;
-        out->n = at->ng;
+    } else { /* as imp__flat_draw has it: facets of a face are in one plane */
+        const int number = imp__plane_number(d->b, hit);
+        if (number == 0) return false;
+        const double by = out->ratio;
+        imp__plane_surface(d->b, (size_t)number - 1, out);
+        out->ratio = by;
     }
     return true;
 }
@@ -163,8 +166,8 @@ static bool alike(const struct imp__bent_chain *a, const struct imp__bent_chain 
     bool same = a->n == b->n;
     for (int k = 0; k < a->n && same; k++) {
         const struct imp__bent_surface *x = &a->at[k], *y = &b->at[k];
-        same = x->shape == y->shape && x->place == y->place && x->inside == y->inside &&
-               (x->ratio == 0) == (y->ratio == 0);
+        same = x->plane == y->plane && x->shape == y->shape && x->place == y->place &&
+               x->inside == y->inside && (x->ratio == 0) == (y->ratio == 0);
     }
     return same;
 }
@@ -196,6 +199,8 @@ static bool surface_met(const struct imp__edge_draw *d, const struct imp__bent_s
         (hit->shape != s->shape &&
          hit->shape != imp__placed_shape(scene, s->shape, s->place)))
         return false;
+    if (s->plane > 0 && imp__plane_number(d->b, hit) != s->plane)
+        return false; /* of another face, which has roots of its own */
     imp__hit_surface(scene, hit, &o, &down, at);
     at->p = s->q;
     return true;

@@ -156,8 +156,26 @@ struct imp__plane_range imp__plane_surface(const struct imp__boundary *b, size_t
 {
     const struct imp__plane *x = &b->plane[k];
     *out = (struct imp__bent_surface){
-        .p = x->p, .n = x->n, .shape = x->shape, .place = x->place};
+        .p = x->p, .n = x->n, .plane = (int)k + 1, .shape = x->shape, .place = x->place};
     return (struct imp__plane_range){x->first, x->behind - x->first, x->index};
+}
+
+/* Is it a hit of this plane's shape? */
+static bool is_of_shape(const struct imp__boundary *b, const struct imp__plane *x,
+                        const struct imp_hit *hit)
+{
+    return hit->place == x->place &&
+           (hit->shape == x->shape ||
+            hit->shape == imp__placed_shape(b->tracer->scene, x->shape, x->place));
+}
+
+int imp__plane_number(const struct imp__boundary *b, const struct imp_hit *hit)
+{
+    size_t k = 0;
+    while (k < b->n_planes && !is_of_shape(b, &b->plane[k], hit)) k = b->plane[k].behind;
+    if (k == b->n_planes) return 0;
+    const int64_t facet = b->plane[k].facet;
+    return 1 + (facet < 0 ? (int)k : b->plane_of[facet + hit->prim]);
 }
 
 enum imp_status imp__mirrors_find(struct imp__boundary *b)
@@ -350,10 +368,7 @@ static bool mirror_met(struct imp__edge_draw *d, const struct imp__plane *x, imp
     const imp_v3 o = imp__offset(q, x->n, -w);
     const double near = imp__dot(x->n, q - o) / imp__dot(x->n, w);
     if (!imp__intersect(scene, &o, &w, 0, 2 * near, hit)) return false;
-    if (hit->place != x->place ||
-        (hit->shape != x->shape &&
-         hit->shape != imp__placed_shape(scene, x->shape, x->place)))
-        return false;
+    if (!is_of_shape(d->b, x, hit)) return false;
     if (x->facet >= 0 && d->b->plane_of[x->facet + hit->prim] != x - d->b->plane)
         return false; /* a facet of another plane */
     imp__hit_surface(scene, hit, &o, &w, at);
