@@ -105,18 +105,22 @@ static double ball_density(const struct imp__bender *x, imp_v3 p, imp_v3 w)
 
 #define ANYWHERE 0.1 /* of lines: across the whole scene, over flat mirrors, too */
 
-/* A point of a disk, and does a line through p meet it? */
-static imp_v3 disk_point(const struct imp_round *x, const struct imp_frame *f,
+/* A point of the disk that a ball is across lines, and its density where a line through p meets it. At the limb of a
+ * true ball, where what is seen slides fast, as ball_direction:  1/(2 pi R^2 c),  c = sqrt(1 - (r/R)^2).  What is
+ * around another shape has no limb: any point. */
+static imp_v3 disk_point(const struct imp_round *x, bool limb, const struct imp_frame *f,
                          const double u[2])
 {
-    const double r = x->radius * sqrt(u[0]);
+    const double r = x->radius * sqrt(limb ? 1 - u[0] * u[0] : u[0]);
     return x->centre + f->s * (r * cos(IMP_2PI * u[1])) +
            f->t * (r * sin(IMP_2PI * u[1]));
 }
-static double disk_density(const struct imp_round *x, imp_v3 w, imp_v3 p)
+static double disk_density(const struct imp_round *x, bool limb, imp_v3 w, imp_v3 p)
 {
     const imp_v3 r = imp__across_axis(w, p - x->centre);
-    return imp__dot(r, r) < imp__sqr(x->radius) ? IMP_INV_PI / imp__sqr(x->radius) : 0;
+    const double r2 = imp__sqr(x->radius), square = 1 - imp__dot(r, r) / r2;
+    if (!(square > 0)) return 0;
+    return limb ? 1 / (IMP_2PI * r2 * sqrt(square)) : IMP_INV_PI / r2;
 }
 
 imp_v3 imp__bent_line(const struct imp__edge_draw *d, imp_v3 w, const double u[2],
@@ -129,12 +133,14 @@ imp_v3 imp__bent_line(const struct imp__edge_draw *d, imp_v3 w, const double u[2
     const struct imp_frame f = imp__frame_from_normal(w);
     const size_t n = b->n_benders;
     const double v = imp__u01(d->key, IMP_EDGE_BENT) / (1 - ANYWHERE);
-    const imp_v3 p = disk_point(
-        v < 1 ? &b->bender[imp_min((size_t)(v * (double)n), n - 1)].round : &whole, &f,
-        u);
-    double density = ANYWHERE * disk_density(&whole, w, p);
+    const size_t drawn = imp_min((size_t)(v * (double)n), n - 1);
+    const imp_v3 p = v < 1
+                         ? disk_point(&b->bender[drawn].round, drawn < b->n_balls, &f, u)
+                         : disk_point(&whole, false, &f, u);
+    double density = ANYWHERE * disk_density(&whole, false, w, p);
     for (size_t k = 0; k < n; k++)
-        density += (1 - ANYWHERE) * disk_density(&b->bender[k].round, w, p) / (double)n;
+        density += (1 - ANYWHERE) *
+                   disk_density(&b->bender[k].round, k < b->n_balls, w, p) / (double)n;
     *spread = 1 / density;
     return p + w * (2 * b->size);
 }
