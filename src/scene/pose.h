@@ -259,6 +259,9 @@ bool imp__volume_box(const struct imp_texture *t, imp_v3 *lo, imp_v3 *hi);
  * what is scattered there. NULL: none. */
 const struct imp_medium *imp__volume_jumps(const struct imp_scene *scene,
                                            const struct imp_pose *p);
+/* Is p within the box of this medium, or next to a side of it, as far as a border on that side may be? */
+bool imp__medium_reaches(const struct imp_scene *scene, const struct imp_medium *m,
+                         imp_v3 p);
 /* Does a medium end at a side of its own box where it is not 0, within what bounds it? outside: nothing else
  * does. moves: what bounds it does, and may touch no such side. */
 bool imp__medium_ends_bright(const struct imp_scene *scene, const struct imp_medium *m,

@@ -147,6 +147,39 @@ enum imp_status imp__volume_apply(const struct imp_pose *p, const struct imp_map
 
 /* ---- Where a moved volume ends ------------------------------------------------------- */
 
+/* Places of shapes are float. */
+#define NEAR 1e-6   /* of the scene's diagonal */
+#define ULPS 2.5e-7 /* of the largest coordinate */
+#define RIM  1e-5   /* of the box, of hits */
+static double near_of(const struct imp_scene *scene)
+{
+    double most = 0;
+    for (int a = 0; a < 3; a++)
+        most = imp_max(most, imp_max(fabs(scene->lo[a]), fabs(scene->hi[a])));
+    return imp_max(NEAR * imp__length(scene->hi - scene->lo), ULPS * most);
+}
+
+/* Within `near` of a side, of the box. */
+static double near_side(const struct imp_majorants *g, double near, int axis)
+{
+    imp_v3 edge = {0};
+    edge[axis] = 1;
+    return near / imp__length(imp__vector(&g->to_world, edge));
+}
+
+bool imp__medium_reaches(const struct imp_scene *scene, const struct imp_medium *m,
+                         imp_v3 p)
+{
+    if (!m->majorants) return true;
+    const imp_v3 u = imp__point(&m->majorants->to_unit, p);
+    const double near = near_of(scene);
+    for (int a = 0; a < 3; a++) {
+        const double by = imp_max(RIM, near_side(m->majorants, 2 * near, a));
+        if (!(u[a] >= -by && u[a] <= 1 + by)) return false;
+    }
+    return true;
+}
+
 struct border {
     const struct imp_scene *scene;
     const struct imp_medium *medium;
@@ -164,7 +197,7 @@ static struct border border_of(const struct imp_scene *scene, const struct imp_m
     const struct imp_param_info *info = &scene->params[m->majorants->box->param].info;
     struct border b = {.scene = scene,
                        .medium = m,
-                       .near = 1e-6 * imp__length(scene->hi - scene->lo),
+                       .near = near_of(scene),
                        .lo = imp__v3(INFINITY, INFINITY, INFINITY),
                        .hi = -imp__v3(INFINITY, INFINITY, INFINITY)};
     imp__grid_cells(info, b.n);
@@ -250,10 +283,7 @@ static bool side_is_behind(const struct border *b, int side, bool moves)
 {
     const int axis = side / 2;
     const struct imp_majorants *g = b->medium->majorants;
-    imp_v3 edge = {0};
-    edge[axis] = 1;
-    const double near =
-        (moves ? -1 : 1) * b->near / imp__length(imp__vector(&g->to_world, edge));
+    const double near = (moves ? -1 : 1) * near_side(g, b->near, axis);
     double most = -INFINITY;
     if (b->everywhere) return false;
     for (int k = 0; k < b->scene->n_all_shapes; k++) {

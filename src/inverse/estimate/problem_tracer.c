@@ -61,7 +61,8 @@ enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
                                .guide = imp__guide_of(p->scene, integrator, run->guide),
                                .collisions_fixed = integrator->from_lights};
     imp__tracer_numbers(out, run, 0);
-    if (imp__problem_moves(p) && imp__media_vary(p->scene)) out->headroom = 1 + 1e-9;
+    if (imp__problem_moves(p) && imp__media_vary(p->scene))
+        out->headroom = IMP_HEADROOM_MOVES;
     if (integrator->from_lights) out->points = NULL; /* groups would share a set */
     if (waves)
         out->wavelengths =

@@ -244,7 +244,7 @@ enum imp_status imp__walks_weigh(const struct imp_walks *w, const struct imp_sto
     enum imp_status st = IMP_OK;
     struct imp_densities own = w->densities; /* with `moved` of this call */
     own.guided = w->guided;
-    own.least = w->headroom > 1 ? IMP_REAL_LEAST : 0;
+    own.least = imp__real_least(w->headroom);
     uint8_t *changed = imp__alloc(ctx, w->scene->n_params + 1, 1);
     const size_t walks = imp__store_tiles(store);
     own.moved = imp__alloc(ctx, (size_t)w->scene->n_bsdfs + 1, 1);

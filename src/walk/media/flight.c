@@ -182,7 +182,7 @@ static bool collide(struct imp_free_flight *w, const struct imp_medium *m, doubl
     imp_spec sigma;
     if (!tentative(w, m, t, bound, &sigma)) return true;
     imp_spec p = sigma;
-    for (int c = 0; has_room(w) && c < 4; c++) p[c] = imp_max(IMP_REAL_LEAST, p[c]);
+    if (has_room(w)) p = imp__greater(p, imp__spec(imp__real_least(s->tracer->headroom)));
     const bool real = collides && uniform(w) < p[imp__lane_mis_drew(s)];
     w->f *= real ? sigma : 1 - sigma;
     w->p *= real ? p : 1 - p;

@@ -8,7 +8,8 @@
  * bound or one over the size of the box, and are real with the probability max(sigma/b',
  * 1/10) of a lane. Then there is a density wherever 0 <= sigma <= b', also where sigma is
  * 0, and the value of a flight is no longer its density. So it is where things move, whose derivatives have
- * the slope of the extinction over the density of a collision (moved/moved_sweep.c), with h next to 1. */
+ * the slope of the extinction over the density of a collision (moved/moved_sweep.c), with h next to 1 and
+ * 1/1000 in place of 1/10 (imp__real_least). */
 #ifndef IMP_WALK_FLIGHT_H
 #define IMP_WALK_FLIGHT_H
 

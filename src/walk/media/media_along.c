@@ -5,6 +5,7 @@
 #include "math/lanes.h"
 #include "math/vec.h"
 #include "scene/majorants.h"
+#include "scene/pose.h"
 #include "tracking.h"
 #include <math.h>
 
@@ -19,18 +20,11 @@ static bool varies(const struct imp_input *in)
     return in->texture && !(in->texture->ops->flags & IMP_TEXTURE_CONSTANT);
 }
 
-#define RIM                                                                              \
-    1e-5 /* of the box: what lies on its side is in it, as far as hits are exact */
-
-imp_spec imp__extinction_in(const struct imp_medium *m, imp_v3 p,
-                            const struct imp_carried *carried)
+imp_spec imp__extinction_in(const struct imp_scene *scene, const struct imp_medium *m,
+                            imp_v3 p, const struct imp_carried *carried)
 {
     imp_spec in[IMP_INPUTS_MAX];
-    if (m->majorants) {
-        const imp_v3 u = imp__point(&m->majorants->to_unit, p);
-        for (int a = 0; a < 3; a++)
-            if (!(u[a] > -RIM && u[a] < 1 + RIM)) return imp__spec(0);
-    }
+    if (!imp__medium_reaches(scene, m, p)) return imp__spec(0);
     return imp__extinction_at(m, p, carried, in);
 }
 
@@ -153,7 +147,8 @@ static bool piece_next(struct pieces *p)
     for (int k = 0; k < p->n; k++) p->to = imp_min(p->to, p->next[k]);
     p->to = imp_max(p->to, p->from);
     for (int k = 0; k < p->n; k++)
-        if (!(p->next[k] > p->to)) p->next[k] += p->each[k];
+        if (!(p->next[k] > p->to)) /* on, also where a step is lost to rounding */
+            p->next[k] = imp_max(p->next[k] + p->each[k], nextafter(p->to, INFINITY));
     return true;
 }
 

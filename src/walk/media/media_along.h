@@ -22,9 +22,9 @@ struct imp__along {
 /* Why the integrals are not exact, in words that follow the medium's name; NULL: they are. */
 const char *imp__along_without(const struct imp_scene *scene, const struct imp_medium *m);
 
-/* Extinction at p: 0 outside the box in which the medium is. */
-imp_spec imp__extinction_in(const struct imp_medium *m, imp_v3 p,
-                            const struct imp_carried *carried);
+/* Extinction at p: 0 outside the box in which the medium is, as far as hits are exact. */
+imp_spec imp__extinction_in(const struct imp_scene *scene, const struct imp_medium *m,
+                            imp_v3 p, const struct imp_carried *carried);
 
 /* Adds one medium on the line o + t w, w unit, from `near` to `far`; slopes: not the depth alone. */
 void imp__along_add(const struct imp_scene *scene, const struct imp_medium *m, imp_v3 o,

@@ -20,7 +20,7 @@ static struct imp_flown flown_to(const struct imp_step *s, const struct imp_medi
                                  struct imp_flown from, double near, double t)
 {
     const struct imp_carried *carried = s->at.carried;
-    const bool room = imp_unlikely(s->tracer->headroom > 1);
+    const double least = imp__real_least(s->tracer->headroom);
     imp_spec f = imp__spec(1), p = f, in[IMP_INPUTS_MAX];
     if (!m->majorants)
         f = p = imp__attenuation(
@@ -32,7 +32,7 @@ static struct imp_flown flown_to(const struct imp_step *s, const struct imp_medi
         const imp_spec null =
             1 - imp__extinction_at(m, at, carried, in) * (1 / (double)e->bound);
         f *= null;
-        p *= room ? imp__lesser(null, imp__spec(1 - IMP_REAL_LEAST)) : null;
+        p *= imp__lesser(null, imp__spec(1 - least));
     }
     return (struct imp_flown){from.value * f, from.density * p};
 }

@@ -99,10 +99,15 @@ imp_spec imp__track_depth(const struct imp_scene *scene, const struct imp_track 
 /* The segment's value at the scene's present parameters. */
 imp_spec imp__track_eval(const struct imp_scene *scene, const struct imp_track *track,
                          const struct imp_carried *carried);
-/* With headroom, the least probability of a real collision (flight.h). */
-#define IMP_REAL_LEAST 0.1
+#define IMP_HEADROOM_MOVES (1 + 1e-9) /* where things move in media that vary */
+/* With headroom, the least probability of a real collision (flight.h), 0 without. Where things move, each
+ * collision that is not real multiplies weights by up to 1/(1 - least), and there may be hundreds. */
+static inline double imp__real_least(double headroom)
+{
+    return headroom > IMP_HEADROOM_MOVES ? 0.1 : headroom > 1 ? 0.001 : 0;
+}
 /* The density with which its events would be drawn there, under their bounds; `least`: of a
- * real collision, IMP_REAL_LEAST or 0. At the draw it is the decided one. */
+ * real collision (imp__real_least). At the draw it is the decided one. */
 imp_spec imp__track_density(const struct imp_scene *scene, const struct imp_track *track,
                             const struct imp_carried *carried, double least);
 /* Along a walk: has it a derivative with the events where they are? */

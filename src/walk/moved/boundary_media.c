@@ -30,7 +30,8 @@ imp_spec imp__edge_extinction(const struct imp__edge_draw *d, const struct imp_m
                               imp_v3 p)
 {
     if (!d->b->media) return d->extinction;
-    return m ? imp__extinction_in(m, p, imp__edge_waves(d)) : imp__spec(0);
+    return m ? imp__extinction_in(d->b->tracer->scene, m, p, imp__edge_waves(d))
+             : imp__spec(0);
 }
 
 imp_spec imp__edge_fading(const struct imp__edge_draw *d, const struct imp_medium *m,

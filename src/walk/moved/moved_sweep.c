@@ -40,7 +40,7 @@ struct imp__line_bar imp__sweep_line_bar(const struct imp__sweep *s, imp_spec ba
 {
     struct imp__line_bar out = {0, {0}, {0}};
     const struct imp_scene *scene = s->tracer->scene;
-    if (imp_likely(!s->fog && !s->media)) return out;
+    if (imp_likely(!s->fog && !s->media) || imp__is_zero_used(bar, carried)) return out;
     if (s->fog) {
         out.along = imp__sweep_length_bar(s, bar, s->extinction);
         return out;
@@ -64,7 +64,7 @@ imp_v3 imp__sweep_shift_bar(const struct imp__sweep *s, imp_spec bar,
                             double length, imp_v3 *turn)
 {
     *turn = (imp_v3){0};
-    if (imp_likely(!s->varies)) return (imp_v3){0};
+    if (imp_likely(!s->varies) || imp__is_zero_used(bar, carried)) return (imp_v3){0};
     const struct imp__along a =
         imp__media_along(&s->moves->borders, o, w, length, carried);
     *turn = vector_bar(s, bar, a.turn);
@@ -78,7 +78,7 @@ static imp_spec extinction_before(const struct imp__sweep *s, imp_v3 p, imp_v3 n
     if (imp_likely(!s->media)) return s->extinction;
     const struct imp_medium *m =
         imp__borders_at(&s->moves->borders, imp__offset(p, ng, -w), -w);
-    return m ? imp__extinction_in(m, p, carried) : imp__spec(0);
+    return m ? imp__extinction_in(s->tracer->scene, m, p, carried) : imp__spec(0);
 }
 
 /* Where it is a point of a medium that varies, its place is one to what scatters and glows there: of
@@ -297,7 +297,8 @@ static void lamp_bar(struct imp__sweep *s, int k, struct imp__link_point *y, imp
     y->bar.v += line.to * part;
 }
 
-/* What a sky sends to vertex k along w: the part that is glued to it goes with it. */
+/* What a sky sends to vertex k along w: the part that is glued to it goes with it, through other
+ * media. */
 static void sky_bar(const struct imp__sweep *s, int k, int sky, imp_v3 w,
                     const struct imp__kernel_d *d, imp_spec bar,
                     const struct imp_carried *carried)
@@ -305,7 +306,9 @@ static void sky_bar(const struct imp__sweep *s, int k, int sky, imp_v3 w,
     const imp_spec glued =
         imp__sky_sent_bar(s->moves, sky, w, bar, carried, s->theta_bar);
     const struct imp__kernel_bar kernel = kernel_part(s, k, d, w, glued);
-    imp__light_velocity_bar(s->moves, sky, w, kernel.wi, s->theta_bar);
+    imp_v3 turn;
+    imp__sweep_shift_bar(s, glued, carried, s->at[k].x.p, w, INFINITY, &turn);
+    imp__light_velocity_bar(s->moves, sky, w, kernel.wi + turn, s->theta_bar);
 }
 
 /* The light sample of a sky. */
