@@ -260,7 +260,7 @@ static void room_test(int more)
                                         {NULL, 0, 0}};
     numbers_compare("a cloud of cells",
                     filled_by(CLOUD VOLPATH("4"), cloud_file, white_file, false),
-                    32 * more, 16 * more, .065, cloud);
+                    64 * more, 32 * more, .065, cloud);
     numbers_compare("air that varies",
                     filled_by(AIR VOLPATH("3"), cloud_file, white_file, true), 8 * more,
                     8 * more, .05, air);

@@ -250,7 +250,7 @@ static void kind_work(struct imp__edge_draw *d, enum imp__boundary_kind kind)
         if (item == IMP_ITEM_SHADING) imp__draw_shading_scatter(d);
         if (item == IMP_ITEM_HORIZON) imp__draw_horizon(d);
         if (item == IMP_ITEM_MEDIUM) imp__draw_border_scatter(d);
-        if (item == IMP_ITEM_SKY) imp__draw_sky_scatter(d);
+        if (item == IMP_ITEM_SKY && d->b->n_benders > 0) imp__draw_sky_scatter(d);
         break;
     }
 }
