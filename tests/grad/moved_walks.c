@@ -415,10 +415,9 @@ int main(void)
     refused(PATH
             "<shape type='rectangle'><emitter type='directionalarea' id='bulb'/></shape>",
             "'bulb'");
-    refused(
-        PATH
-        "<bsdf type='dielectric' id='wax'/><shape type='disk'><ref id='wax'/></shape>",
-        "'wax'");
+    refused(PATH "<bsdf type='thindielectric' id='wax'/><shape type='sphere'><ref "
+                 "id='wax'/></shape>",
+            "'wax'");
     refused(PATH "<shape type='cube'><bsdf type='diffuse' id='tiles'><texture "
                  "type='checkerboard' name='reflectance'/></bsdf></shape>",
             "values jump");
