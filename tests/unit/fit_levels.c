@@ -242,6 +242,7 @@ static void fits(void)
     tap_near(v.start, .5, 1e-6, 0, "its start is that of the fit, not of a level");
 
     o.levels = 2;
+    o.learning_rate = 0;
     o.optimizer = IMP_LBFGS;
     tap_ok(imp_fit(p, &o, &run, &r) == IMP_E_ARG &&
                strstr(imp_last_error(ctx), "are Adam's"),

@@ -78,13 +78,17 @@ static void aliases(imp_context *ctx)
                "'%s' is no parameter", none[k]);
     }
     static const char *const geometry[] = {"ball.vertex_positions", "ball.positions",
-                                           "leaf.to_world", "camera.x_fov"};
+                                           "camera.x_fov"};
     for (size_t k = 0; k < sizeof geometry / sizeof *geometry; k++) {
         size_t index;
         tap_ok(imp_scene_find_param(s, geometry[k], &index) == IMP_E_ARG &&
                    strstr(imp_last_error(ctx), "are not among them"),
                "%s: numbers that move things are no parameters", geometry[k]);
     }
+    size_t leaf;
+    tap_ok(imp_scene_find_param(s, "leaf.to_world", &leaf) == IMP_E_ARG &&
+               strstr(imp_last_error(ctx), "imp_scene_add_geometry"),
+           "and what of this scene becomes one says by what");
     imp_scene_destroy(s);
 }
 
