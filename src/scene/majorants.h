@@ -26,7 +26,7 @@ struct imp_majorants {
     } * control;
 };
 
-/* Cells of a volume along x, y and z, by what is told of its numbers. */
+/* Numbers of cells of a volume along x, y and z. */
 static inline void imp__grid_cells(const struct imp_param_info *info, int n[3])
 {
     const bool colours = info->flags & IMP_PARAM_COLOR; /* [layers y][x][3] */
