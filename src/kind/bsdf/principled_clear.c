@@ -2,6 +2,7 @@
  *
  * principled in lanes, where something is transmitted: the lobes in front, and glass_add of
  * principled.c, whose letters these are. */
+#include "clear_lanes.h"
 #include "principled_front.h"
 
 static bool covers(const struct imp_bsdf *b)
@@ -9,22 +10,12 @@ static bool covers(const struct imp_bsdf *b)
     return ((const struct imp__principled_self *)b->self)->transmits;
 }
 
-/* struct imp__principled_look, before its facet is known. */
-struct side {
-    imp_wide3 wo, wi;
-    imp_wide e;
-    imp_wide_truth back, reflects;
-};
-static struct side side_of(const struct imp_bsdf *b, const struct imp_wide_color *in,
-                           imp_wide specular, const imp_wide3 *wo, const imp_wide3 *wi)
+/* specular: the number. */
+static struct imp__clear_side side_of(const struct imp_bsdf *b,
+                                      const struct imp_wide_color *in, imp_wide specular,
+                                      const imp_wide3 *wo, const imp_wide3 *wi)
 {
-    const imp_wide zero = imp__wide(0), eta = imp__index_of(b->self, in, specular);
-    struct side s = {.wo = *wo, .wi = *wi, .back = wo->z < zero};
-    s.wo.z = imp__wide_choose(s.back, -wo->z, wo->z);
-    s.wi.z = imp__wide_choose(s.back, -wi->z, wi->z);
-    s.e = imp__wide_choose(s.back, 1 / eta, eta);
-    s.reflects = s.wi.z > zero;
-    return s;
+    return imp__clear_side(imp__index_of(b->self, in, specular), wo, wi);
 }
 
 IMP_EITHER_WAY imp_wide_truth sample_as(const bool coated, const struct imp_bsdf *b,
@@ -35,7 +26,7 @@ IMP_EITHER_WAY imp_wide_truth sample_as(const bool coated, const struct imp_bsdf
 {
     (void)lobe;
     const imp_wide zero = imp__wide(0), one = imp__wide(1);
-    const struct side s = side_of(b, in, imp__cut_of(in, SPECULAR), wo, wo);
+    const struct imp__clear_side s = side_of(b, in, imp__cut_of(in, SPECULAR), wo, wo);
     const struct imp__lobe_chances q =
         imp__lobe_chances(coated, true, in, derivative, s.wo.z, s.e, s.back);
     const imp_wide_truth above = s.wo.z > zero, lambert = u[0] < q.diffuse,
@@ -62,37 +53,28 @@ IMP_EITHER_WAY imp_wide_truth sample_as(const bool coated, const struct imp_bsdf
     return above & (lambert | ((c > zero) & passes)) & kept;
 }
 
-/* imp__principled_half. n: |wo + e wi| with the sign that turns m up; im: wi.m. */
+/* imp__principled_half. */
 struct half {
     struct imp__principled_sides l;
-    imp_wide n, im;
+    struct imp__clear_half f;
     imp_wide_truth there, front;
 };
-static inline struct half half_of(const struct side *s, imp_wide_lobe lobe)
+static inline struct half half_of(const struct imp__clear_side *s, imp_wide_lobe lobe)
 {
-    const imp_wide zero = imp__wide(0), one = imp__wide(1);
-    struct half x = {.l = {.wo = s->wo, .wi = s->wi, .e = s->e}};
-    const imp_wide3 h = imp__wide3_plus(
-        s->wo, imp__wide3_times(s->wi, imp__wide_choose(s->reflects, one, s->e)));
-    x.n = imp__wide_signed_as(imp__wide3_norm(h), h.z);
-    x.l.m = imp__wide3_times(h, 1 / x.n);
-    x.l.vm = imp__wide3_inner(s->wo, x.l.m);
-    x.l.om = imp__wide_lesser(x.l.vm, one);
-    x.im = imp__wide3_inner(s->wi, x.l.m);
-    x.there = imp__is_smooth(lobe) & (s->wo.z > zero) & (s->wi.z != zero) &
-              (imp__wide_magnitude(x.n) > zero) & (x.l.om > zero) &
-              ~((x.im > zero) ^ s->reflects) & (x.im != zero);
-    x.front = s->reflects & ~s->back;
+    struct half x = {.there = imp__is_smooth(lobe) & imp__clear_half(s, &x.f),
+                     .front = s->reflects & ~s->back};
+    x.l = (struct imp__principled_sides){s->wo, s->wi, x.f.m, s->e, x.f.vm, x.f.om};
     return x;
 }
 /* share of glass_add. */
-static inline imp_wide share_of(const struct side *s, const struct half *x,
+static inline imp_wide share_of(const struct imp__clear_side *s, const struct half *x,
                                 const struct imp__front *f)
 {
     return imp__wide_choose(s->reflects, f->F * f->c,
-                            (1 - f->F) * (x->l.om * -x->im / (s->wo.z * x->n * x->n)));
+                            (1 - f->F) *
+                                (x->l.om * -x->f.im / (s->wo.z * x->f.n * x->f.n)));
 }
-static inline imp_wide color_of(const struct side *s, imp_wide base)
+static inline imp_wide color_of(const struct imp__clear_side *s, imp_wide base)
 {
     return imp__wide_choose(s->reflects, imp__wide(1), imp__wide_root(base));
 }
@@ -103,7 +85,7 @@ IMP_EITHER_WAY imp_wide pdf_eval_as(const bool coated, const struct imp_bsdf *b,
                                     const imp_wide_lobe *lobe, int colors,
                                     struct imp_wide_color *f)
 {
-    const struct side s = side_of(b, in, imp__cut_of(in, SPECULAR), wo, wi);
+    const struct imp__clear_side s = side_of(b, in, imp__cut_of(in, SPECULAR), wo, wi);
     const struct half x = half_of(&s, *lobe);
     const struct imp__front y =
         imp__front_of(coated, true, in, &x.l, x.there, derivative);
@@ -121,8 +103,8 @@ IMP_EITHER_WAY imp_wide pdf_eval_as(const bool coated, const struct imp_bsdf *b,
     if (coated)
         sum = imp__wide_choose(q.coat > imp__wide(0),
                                sum + q.coat * y.coat_D * x.l.m.z / (4 * om), sum);
-    sum =
-        imp__wide_choose(s.reflects, sum, q.glass * p * s.e * s.e * -x.im / (x.n * x.n));
+    sum = imp__wide_choose(s.reflects, sum,
+                           q.glass * p * s.e * s.e * -x.f.im / (x.f.n * x.f.n));
     return imp__wide_choose(x.there, sum, imp__wide(0));
 }
 
@@ -132,7 +114,7 @@ IMP_EITHER_WAY bool eval_d_as(const bool coated, const struct imp_bsdf *b,
                               struct imp_wide_color *d)
 {
     const imp_wide zero = imp__wide(0);
-    const struct side s = side_of(b, in, imp__cut_of(in, SPECULAR), wo, wi);
+    const struct imp__clear_side s = side_of(b, in, imp__cut_of(in, SPECULAR), wo, wi);
     const struct half x = half_of(&s, *lobe);
     const struct imp__front y = imp__front_of(coated, true, in, &x.l, x.there, 0);
     const imp_wide share = share_of(&s, &x, &y), m = y.m, t = y.t, both = (1 - m) * t;
@@ -166,7 +148,7 @@ static imp_wide index_ratio_lanes(const struct imp_bsdf *b,
                                   const struct imp_wide_color *in, const imp_wide3 *wo,
                                   const imp_wide3 *wi, const imp_wide_lobe *lobe)
 {
-    const struct side s = side_of(b, in, in[SPECULAR].c[0], wo, wi);
+    const struct imp__clear_side s = side_of(b, in, in[SPECULAR].c[0], wo, wi);
     (void)lobe;
     return imp__wide_choose(s.reflects, imp__wide(1), s.e);
 }

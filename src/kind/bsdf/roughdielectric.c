@@ -16,7 +16,7 @@
  * Transmission ends where the facet lies in the surface, wo_z + e wi_z = 0. D of Beckmann
  * goes to 0 there: at fixed directions the value is smooth in the index, unlike a ray that it
  * bends, and the index has a gradient. With GGX it jumps (imp__ggx_glass_jumps). */
-#include "facet_lanes.h"
+#include "clear_lanes.h"
 #include "fresnel.h"
 #include "fresnel_lanes.h"
 #include "presets.h"
@@ -214,25 +214,6 @@ const struct imp_bsdf_ops imp__roughdielectric = {.size = sizeof(struct imp_bsdf
 
 /* ---- In lanes ---------------------------------------------------------------------------- */
 
-/* struct view, and what facet_of makes of it. */
-struct views {
-    imp_wide3 wo, wi;
-    imp_wide e;
-    imp_wide_truth back, reflects;
-};
-static struct views views_of(const struct imp_wide_color *in, const imp_wide3 *wo,
-                             const imp_wide3 *wi)
-{
-    const imp_wide zero = imp__wide(0), eta = in[ETA].c[0];
-    const imp_wide_truth back = wo->z < zero;
-    struct views v = {.wo = *wo, .wi = *wi, .back = back};
-    v.wo.z = imp__wide_choose(back, -wo->z, wo->z);
-    v.wi.z = imp__wide_choose(back, -wi->z, wi->z);
-    v.e = imp__wide_choose(back, 1 / eta, eta);
-    v.reflects = v.wi.z > zero;
-    return v;
-}
-
 IMP_EITHER_WAY imp_wide_truth sample_as(const bool ggx, const struct imp_bsdf *b,
                                         uint64_t derivative,
                                         const struct imp_wide_color *in,
@@ -240,7 +221,7 @@ IMP_EITHER_WAY imp_wide_truth sample_as(const bool ggx, const struct imp_bsdf *b
                                         imp_wide3 *wi, imp_wide_lobe *lobe)
 {
     const imp_wide zero = imp__wide(0);
-    const struct views v = views_of(in, wo, wo);
+    const struct imp__clear_side v = imp__clear_side(in[ETA].c[0], wo, wo);
     imp_wide cos_t, eta_t;
     (void)lobe;
     const struct imp__facets q = imp__roughness_drawn_lanes(
@@ -260,35 +241,16 @@ IMP_EITHER_WAY imp_wide_truth sample_as(const bool ggx, const struct imp_bsdf *b
     return (v.wo.z > zero) & (c > zero) & kept;
 }
 
-/* struct facet; vm: wo.m, which om is but for rounding. */
-struct facets {
-    imp_wide3 m;
-    imp_wide n, vm, om, im;
-};
-static inline imp_wide_truth facets_of(const struct views *v, struct facets *f)
-{
-    const imp_wide zero = imp__wide(0), one = imp__wide(1);
-    const imp_wide3 h = imp__wide3_plus(
-        v->wo, imp__wide3_times(v->wi, imp__wide_choose(v->reflects, one, v->e)));
-    f->n = imp__wide_signed_as(imp__wide3_norm(h), h.z);
-    f->m = imp__wide3_times(h, 1 / f->n);
-    f->vm = imp__wide3_inner(v->wo, f->m);
-    f->om = imp__wide_lesser(f->vm, one);
-    f->im = imp__wide3_inner(v->wi, f->m);
-    return (v->wo.z > zero) & (v->wi.z != zero) & (imp__wide_magnitude(f->n) > zero) &
-           (f->om > zero) & ~((f->im > zero) ^ v->reflects) & (f->im != zero);
-}
-
 IMP_EITHER_WAY imp_wide pdf_eval_as(const bool ggx, const struct imp_bsdf *b,
                                     uint64_t derivative, const struct imp_wide_color *in,
                                     const imp_wide3 *wo, const imp_wide3 *wi,
                                     const imp_wide_lobe *lobe, int colors,
                                     struct imp_wide_color *f)
 {
-    const struct views v = views_of(in, wo, wi);
-    struct facets x;
+    const struct imp__clear_side v = imp__clear_side(in[ETA].c[0], wo, wi);
+    struct imp__clear_half x;
     imp_wide cos_t, eta_t;
-    const imp_wide_truth there = imp__is_smooth(*lobe) & facets_of(&v, &x);
+    const imp_wide_truth there = imp__is_smooth(*lobe) & imp__clear_half(&v, &x);
     const struct imp__facets q =
         imp__roughness_drawn_lanes(ggx, b->self, &in[ALPHA], there, derivative, ALPHA);
     const imp_wide om = x.om, im = x.im, n = x.n;
@@ -307,8 +269,8 @@ IMP_EITHER_WAY imp_wide pdf_eval_as(const bool ggx, const struct imp_bsdf *b,
 }
 
 /* By the index, of Beckmann's facets: what `share` times rest has, where the facet turns. */
-static imp_wide by_index(const struct imp__facets *q, const struct views *v,
-                         const struct facets *x, imp_wide share, imp_wide F_c,
+static imp_wide by_index(const struct imp__facets *q, const struct imp__clear_side *v,
+                         const struct imp__clear_half *x, imp_wide share, imp_wide F_c,
                          imp_wide F_e)
 {
     const imp_wide3 dm = imp__wide3_times(
@@ -330,10 +292,10 @@ IMP_EITHER_WAY bool eval_d_as(const bool ggx, const struct imp_bsdf *b,
 {
     const struct imp__roughness *r = b->self;
     const imp_wide zero = imp__wide(0);
-    const struct views v = views_of(in, wo, wi);
-    struct facets x;
+    const struct imp__clear_side v = imp__clear_side(in[ETA].c[0], wo, wi);
+    struct imp__clear_half x;
     imp_wide F_c, F_e, dlog_D[2], dGi[2], dGo[2], by[2], by_eta = zero;
-    const imp_wide_truth there = imp__is_smooth(*lobe) & facets_of(&v, &x);
+    const imp_wide_truth there = imp__is_smooth(*lobe) & imp__clear_half(&v, &x);
     const struct imp__facets q = imp__roughness_lanes(ggx, r, &in[ALPHA], there);
     const imp_wide D = imp__facets_d(&q, x.m), Gi = imp__facets_g1_d(&q, v.wi, dGi),
                    Go = imp__facets_g1_d(&q, v.wo, dGo),
@@ -370,7 +332,7 @@ static imp_wide index_ratio_lanes(const struct imp_bsdf *b,
                                   const struct imp_wide_color *in, const imp_wide3 *wo,
                                   const imp_wide3 *wi, const imp_wide_lobe *lobe)
 {
-    const struct views v = views_of(in, wo, wi);
+    const struct imp__clear_side v = imp__clear_side(in[ETA].c[0], wo, wi);
     (void)b, (void)lobe;
     return imp__wide_choose(v.reflects, imp__wide(1), v.e);
 }
