@@ -305,6 +305,7 @@ static int run_read(int n, char **operand)
     imp_problem *problem = NULL;
     struct findings found = {0, 0};
     (void)n;
+    cli.brief = !o.ends && !o.shares && !year_wanted.weather;
     int rc = cli_load(operand[0]);
     if (rc) return rc;
     struct imp_run run = cli_run();

@@ -259,6 +259,7 @@ static int run_render(int n, char **operand)
     if (!rc && o.until > 0 && (o.pixel[0] != NO_PIXEL || o.paths))
         rc =
             cli_error(EXIT_USAGE, "--until is of pictures: not with --pixel and --paths");
+    cli.brief = 1;
     if (!rc) rc = cli_load(operand[0]);
     if (rc) return rc;
     struct imp_run run = cli_run();

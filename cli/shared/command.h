@@ -70,6 +70,7 @@ struct cli {
     int lenient; /* enum imp_lenience; an option sets 1, IMP_LENIENT_WARN */
     /* options_run */
     int sensor, spp;
+    int brief; /* spp are all that the scene's runs will take: set before cli_load */
     const char *sensor_text; /* --sensor, until the scene is there */
     uint64_t seed;
     double time_s;

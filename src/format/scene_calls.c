@@ -81,6 +81,7 @@ enum imp_status imp_scene_create(imp_context *ctx, const struct imp_load_options
                            "integrator's property"));
     IMP_TRY(imp__scene_new(ctx, o.mode, o.upsampling, &scene));
     scene->lenient = o.lenient;
+    scene->spp = o.spp;
     IMP_TRY(imp__search_init(scene, o.search, o.n_search, NULL));
     scene->tree = imp__arena_array(&scene->arena, 1, sizeof *scene->tree);
     if (!scene->tree) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "scene: out of memory"));

@@ -26,6 +26,8 @@ enum imp_status imp__load_options(imp_context *ctx, const struct imp_load_option
         (int)to->upsampling > IMP_UPSAMPLING_LINEAR)
         return imp__error(ctx, IMP_E_ARG, "upsampling %d is not known",
                           (int)to->upsampling);
+    if (to->spp < 0)
+        return imp__error(ctx, IMP_E_ARG, "spp is %lld: 0 or more", (long long)to->spp);
     if ((to->n_defines && !to->defines) || (to->n_search && !to->search) ||
         (to->n_luminaires && !to->luminaires))
         return imp__error(ctx, IMP_E_ARG,
@@ -175,6 +177,7 @@ static enum imp_status load(imp_context *ctx, const struct imp__load_file *f,
     struct imp_scene *scene = NULL;
     IMP_TRY(imp__scene_new(ctx, o->mode, o->upsampling, &scene));
     scene->lenient = o->lenient;
+    scene->spp = o->spp;
     IMP_TRY(imp__search_init(scene, o->search, o->n_search, f->folder));
     IMP_TRY(imp__xml_read(scene, &f->text, f->name, o));
     if (o->weights) IMP_TRY(weights_set(scene, o->weights));

@@ -204,6 +204,23 @@ static bool is_few(const struct imp_scene *scene, const struct content *c)
     return !c->aims && n <= IMP_SHAPE_BALLS;
 }
 
+/* Trees of low quality, along Morton's curve, are made in a third of the time. In a room of 200,000
+ * triangles that is 25 ms less, and 2.9 us more for each walk: they are ahead with fewer walks than a
+ * twentieth of the triangles, and are made for half as many. */
+#define WALKS_FEW 40 /* times as many triangles */
+static bool is_brief(const struct imp_scene *scene, const struct content *c)
+{
+    double walks = 0, triangles = 0;
+    if (scene->spp == 0 || c->aims || c->group != scene->world) return false;
+    for (int k = 0; k < scene->n_sensors; k++) {
+        const struct imp_film_desc *film = &scene->sensors[k]->film;
+        walks += (double)scene->spp * film->crop_w * film->crop_h;
+    }
+    for (int i = 0; i < c->n; i++)
+        triangles += (double)primitives_of(shape_at(scene, c, i));
+    return WALKS_FEW * walks < triangles;
+}
+
 static void intersector_free(imp_context *ctx, struct imp_intersector *x)
 {
     imp__facets_destroy(ctx, x->facets);
@@ -257,6 +274,8 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
         rtcSetSceneFlags(
             x->rtc, (is_robust(scene, c) ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE) |
                         (c->aims ? RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION : 0));
+    x->brief = is_brief(scene, c);
+    if (x->rtc && x->brief) rtcSetSceneBuildQuality(x->rtc, RTC_BUILD_QUALITY_LOW);
     const bool instances = c->group && c->group->n_instances > 0;
     size_t primitives = 0;
     bool curves = false;
@@ -269,7 +288,7 @@ static enum imp_status intersector_make(struct imp_scene *scene, const struct co
         }
         if (s && s->geometry == IMP_TRIANGLES && x->facets) continue;
         RTCGeometry g = s ? imp__geometry_create(rtc, s, x->quads ? x->quads[i] : NULL,
-                                                 c->aims != NULL)
+                                                 c->aims != NULL, x->brief)
                           : imp__instances_create(rtc, c->group);
         if (!g) break;
         rtcAttachGeometryByID(x->rtc, g, (unsigned)i);

@@ -67,7 +67,7 @@ static RTCGeometry curves_create(RTCDevice rtc, const struct imp_curves *c)
 }
 
 RTCGeometry imp__geometry_create(RTCDevice rtc, const struct imp_shape *s,
-                                 const struct imp_tree_quads *quads, bool all)
+                                 const struct imp_tree_quads *quads, bool all, bool brief)
 {
     if (s->geometry == IMP_CURVES) return curves_create(rtc, &s->curves);
     const bool analytic = s->geometry == IMP_ANALYTIC;
@@ -94,6 +94,7 @@ RTCGeometry imp__geometry_create(RTCDevice rtc, const struct imp_shape *s,
                                        t->indices, 0, 3 * sizeof(uint32_t),
                                        t->n_triangles);
     }
+    if (brief) rtcSetGeometryBuildQuality(g, RTC_BUILD_QUALITY_LOW);
     rtcCommitGeometry(g);
     return g;
 }

@@ -15,6 +15,7 @@ struct imp_intersector {
     struct imp_shape_balls balls;
     struct imp_facets *facets;
     bool holds;      /* Embree's scene is not empty */
+    bool brief;      /* its tree was made in little time */
     bool calls_back; /* for analytic shapes or instances */
     bool packets;    /* it takes eight rays at a time, and each has its numbers then */
     int first;       /* index of its first shape */
@@ -60,9 +61,10 @@ static inline void imp__mesh_hit(const struct imp_intersector *x, imp_v3 o, imp_
 }
 
 /* For a scene of Embree; NULL: it has no memory. quads: of a mesh, or NULL; all: all hits of a ray are
- * reported, not the nearest. */
+ * reported, not the nearest; brief: its own tree is made in little time. */
 RTCGeometry imp__geometry_create(RTCDevice rtc, const struct imp_shape *s,
-                                 const struct imp_tree_quads *quads, bool all);
+                                 const struct imp_tree_quads *quads, bool all,
+                                 bool brief);
 RTCGeometry imp__instances_create(RTCDevice rtc, const struct imp_group *g);
 
 /* What Embree calls for analytic shapes. */

@@ -90,6 +90,7 @@ struct imp_scene {
     struct imp_arena arena; /* nodes, objects, names */
     enum imp_color_mode mode;
     bool linear_colors; /* become spectra by the linear basis */
+    int64_t spp;        /* that all its runs will take, about; 0: not known */
     int channels;       /* of a walk's radiance: 3 or 1 */
     int lanes;          /* of its values: 4 wavelengths, else as many as channels */
     const struct imp_wavelengths *wavelengths; /* [n_sensors][IMP_WAVES_DRAWN]; NULL:
