@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Chains of curved mirrors and glass between the camera and a place, and rays that are roots
- * (boundary_bent.c, boundary_root.c). */
+ * (boundary_bent.c, boundary_bent_draw.c, boundary_root.c). */
 #ifndef IMP_WALK_BENT_CHAIN_H
 #define IMP_WALK_BENT_CHAIN_H
 
@@ -80,6 +80,25 @@ bool imp__bent_reach_far(struct imp__edge_draw *d, imp_v3 w, struct imp__sight *
                          struct imp__bent_found *x);
 /* One over the probability that a draw finds this, in the mean. It takes long: for what counts. */
 double imp__bent_draws(const struct imp__edge_draw *d, const struct imp__bent_found *x);
+
+/* ---- Draws of chains: boundary_bent_draw.c ---- */
+/* Random numbers of a draw: of the ball, two of the point on it, of planes before it; then for each
+ * surface; and of roots. */
+#define IMP_BENT_PASSES 256 /* surfaces in all */
+enum {
+    IMP_BENT_WHICH,
+    IMP_BENT_POINT_U,
+    IMP_BENT_POINT_V,
+    IMP_BENT_PLANES,
+    IMP_BENT_FIRST = IMP_BENT_PLANES + 2 + 2 * IMP_SIGHT_MAX,
+    IMP_BENT_KEEP = IMP_BENT_FIRST + 3 * IMP_BENT_PASSES,
+    IMP_BENT_GO_ON,
+    IMP_BENT_WHICH_WAY
+};
+/* A root that a draw finds. of: it is to be this one; NULL: any. False: none. */
+bool imp__bent_draw(const struct imp__edge_draw *d, struct imp_key key,
+                    const struct imp__bent_goal *goal, const struct imp__bent_root *of,
+                    struct imp__bent_root *x);
 
 static inline imp_v3 imp__across_axis(imp_v3 axis, imp_v3 r)
 {

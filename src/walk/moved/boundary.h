@@ -164,7 +164,7 @@ struct imp__boundary {
     double size;                  /* of the scene */
     double outside; /* so far from its points is nothing, nor a medium that varies */
     size_t n_planes, cap_planes, n_facets, cap_facets;
-    struct imp__plane *plane; /* [n_planes] of flat mirrors: boundary_mirror.c */
+    struct imp__plane *plane; /* [n_planes] of flat mirrors: boundary_planes.c */
     int *plane_of;            /* [n_facets] of these; -1: a facet without an area */
     size_t n_benders, n_balls, cap_benders;
     struct imp__bender *bender; /* [n_benders] balls, then meshes: boundary_bender.c */

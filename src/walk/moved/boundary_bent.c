@@ -9,181 +9,8 @@
  *
  *     E[K f(r)] = sum over r of p(r) f(r)/p(r). */
 #include "base/arguments.h"
-#include "base/context.h"
 #include "bent_chain.h"
-#include "kind/cleared.h"
-#include "kind/shape/shape.h"
-#include "math/offset.h"
-#include "math/warp.h"
 #include "moved_mirror.h"
-#include "walk/core/step.h"
-#include "walk/lights/light_step.h"
-
-/* ---- Draws of chains ---------------------------------------------------------------------- */
-
-/* Random numbers of a draw: of the ball, two of the point on it, of planes before it; then for each
- * surface. */
-enum { WHICH, POINT_U, POINT_V, PLANES, FIRST = PLANES + 2 + 2 * IMP_SIGHT_MAX };
-#define LOBE_LEAST 0.1  /* probability of either lobe */
-#define STOP       0.3  /* that a chain ends before what it could go on with */
-#define STOP_OTHER 0.05 /* the same where the place is hardly: within glass, or outside */
-#define PASSES     256  /* surfaces in all */
-
-/* A random point of one of these, with random numbers u in [0, 1). */
-static imp_v3 bender_point(const struct imp__edge_draw *d, const struct imp__bender *x,
-                           const double u[3])
-{
-    const struct imp_scene *scene = d->b->tracer->scene;
-    double b[2];
-    if (x->kind == IMP_BENDER_BALL)
-        return x->round.centre + imp__uniform_sphere(&u[1]) * x->round.radius;
-    if (x->kind == IMP_BENDER_TUBE)
-        return imp__rim(scene, x->shape, x->place, 0, u[1]).p +
-               x->tube.axis * (x->tube.length * u[2]);
-    if (x->kind == IMP_BENDER_DISK) {
-        const imp_v3 p = imp__rim(scene, x->shape, x->place, 0, u[1]).p,
-                     q = imp__rim(scene, x->shape, x->place, 0, u[1] + 0.5).p;
-        return p + (q - p) * (0.5 * (1 - sqrt(u[2])));
-    }
-    const int prim = imp_min((int)(u[0] * x->n_facets), x->n_facets - 1);
-    const struct imp__corners f = imp__corners(scene, x->shape, prim, x->place);
-    imp__uniform_triangle(&u[1], b);
-    return f.p[0] + (f.p[1] - f.p[0]) * b[0] + (f.p[2] - f.p[0]) * b[1];
-}
-
-/* A ray of the eye to a random point of one of these, or of its image in flat mirrors: where the ray is parallel
- * to others, the place where it begins, else its direction. */
-static bool ray_draw(const struct imp__edge_draw *d, struct imp_key key, imp_v3 *from)
-{
-    const struct imp__boundary *b = d->b;
-    const size_t n = b->n_benders;
-    const double which = imp__u01(key, WHICH) * (double)n;
-    const size_t k = imp_min((size_t)which, n - 1);
-    const double u[3] = {which - (double)k, imp__u01(key, POINT_U),
-                         imp__u01(key, POINT_V)};
-    imp_v3 p = bender_point(d, &b->bender[k], u);
-    if (b->n_planes > 0 && imp__u01(key, PLANES) < 0.5) {
-        struct imp__edge_draw other = *d;
-        struct imp__sight s;
-        other.key = key;
-        if (!imp__sight_draw(&other, 0, &s)) return false;
-        p = imp__sight_image(&s, p);
-    }
-    if (b->parallel) *from = p - d->eye * (2 * b->size);
-    else *from = imp__normalize(p - d->eye);
-    return true;
-}
-
-/* The surface that a ray along w has hit, which reflects or bends it by chance. False: it ends there. */
-static bool surface_draw(const struct imp__edge_draw *d, const struct imp_hit *hit,
-                         const struct imp_surface *at, imp_v3 w, double u,
-                         struct imp__bent_surface *out)
-{
-    const struct imp_scene *scene = d->b->tracer->scene;
-    struct imp_round round;
-    struct imp__tube tube;
-    double ratio;
-    const imp_spec F = imp__edge_reflected(d, hit, at, w),
-                   T = imp__edge_refracted(d, hit, at, w, &ratio);
-    const double f = imp__max_used(F, d->waves), t = imp__max_used(T, d->waves);
-    if (!(f + t > 0)) return false;
-    const double chance = !(t > 0)   ? 1
-                          : !(f > 0) ? 0
-                                     : imp_clamp(f / (f + t), LOBE_LEAST, 1 - LOBE_LEAST);
-    const int shape = hit->shape;
-    *out = (struct imp__bent_surface){.shape = shape, .place = hit->place};
-    /* index of where the ray comes from, over that of where it goes: the eye is on this side */
-    out->ratio = u < chance ? 0 : ratio;
-    if (imp__moves_sphere(scene, shape, hit->place, &round)) {
-        out->p = round.centre;
-        out->radius = round.radius;
-        out->inside = imp__dot(at->p - round.centre, w) > 0;
-    } else if (imp__moves_cylinder(scene, shape, hit->place, &tube)) {
-        out->p = tube.base;
-        out->axis = tube.axis;
-        out->radius = tube.radius;
-        out->inside = imp__dot(imp__across_axis(tube.axis, at->p - tube.base), w) > 0;
-    } else { /* as imp__flat_draw has it: facets of a face are in one plane */
-        const int number = imp__plane_number(d->b, hit);
-        if (number == 0) return false;
-        const double by = out->ratio;
-        imp__plane_surface(d->b, (size_t)number - 1, out);
-        out->ratio = by;
-    }
-    return true;
-}
-
-/* The chain of surfaces that a ray meets. False: none, or flat mirrors alone. */
-static bool chain_draw(const struct imp__edge_draw *d, struct imp_key key, imp_v3 from,
-                       bool on_glass, struct imp__bent_chain *out)
-{
-    const struct imp_scene *scene = d->b->tracer->scene;
-    const int depth = d->b->tracer->integrator->max_depth,
-              longest = depth < 0 ? IMP_SIGHT_MAX : imp_min(depth - 1, IMP_SIGHT_MAX);
-    const struct imp__bent_ray ray = imp__bent_begin(d, from);
-    imp_v3 o = ray.o, w = ray.w;
-    bool bends = false, glass = false;
-    out->n = 0;
-    for (unsigned k = 0; k < PASSES; k++) {
-        const double u = imp__u01(key, FIRST + 3 * k),
-                     v = imp__u01(key, FIRST + 3 * k + 1),
-                     stop = imp__u01(key, FIRST + 3 * k + 2);
-        struct imp_hit hit;
-        struct imp_surface at;
-        struct imp__bent_surface s;
-        if (!imp__intersect(scene, &o, &w, 0, INFINITY, &hit)) break;
-        imp__hit_surface(scene, &hit, &o, &w, &at);
-        const struct imp_bsdf *b = imp__hit_bsdf(scene, &hit);
-        const bool mirrors = imp__mirror_lobes(b) != 0;
-        struct imp_sensor_sample to;
-        /* In front of the camera's near clip, or of where its rays begin, nothing is met. */
-        const bool clipped =
-            out->n == 0 &&
-            !imp__sensor_connect(d->b->tracer->sensor, &at.p, false, d->lens, &to);
-        if (clipped || (b->straight && (!mirrors || u < 0.5))) {
-            o = imp__offset(at.p, at.ng, w);
-            continue;
-        }
-        if (!mirrors || out->n == longest || !surface_draw(d, &hit, &at, w, v, &s) ||
-            (bends && stop < (glass == on_glass ? STOP : STOP_OTHER)))
-            break;
-        const imp_v3 n =
-            s.radius > 0 ? imp__normalize(imp__across_axis(s.axis, at.p - s.p)) : s.n;
-        imp_v3 next;
-        if (!imp__bend(n, w, s.ratio, &next)) break;
-        if (s.ratio > 0) glass = imp__dot(next, n) < 0;
-        out->at[out->n++] = s;
-        bends |= s.radius > 0 || s.ratio > 0;
-        w = next;
-        o = imp__offset(at.p, at.ng, w);
-    }
-    return bends;
-}
-
-/* Do they go over the same shapes in the same way? */
-static bool alike(const struct imp__bent_chain *a, const struct imp__bent_chain *b)
-{
-    bool same = a->n == b->n;
-    for (int k = 0; k < a->n && same; k++) {
-        const struct imp__bent_surface *x = &a->at[k], *y = &b->at[k];
-        same = x->plane == y->plane && x->shape == y->shape && x->place == y->place &&
-               x->inside == y->inside && (x->ratio == 0) == (y->ratio == 0);
-    }
-    return same;
-}
-
-/* of: the root is to be this one; NULL: any. */
-static bool root_draw(const struct imp__edge_draw *d, struct imp_key key,
-                      const struct imp__bent_goal *goal, const struct imp__bent_root *of,
-                      struct imp__bent_root *x)
-{
-    return ray_draw(d, key, &x->from) &&
-           chain_draw(d, key, x->from, goal->on_glass, &x->chain) &&
-           (of ? alike(&x->chain, &of->chain)
-               : !imp__round_chain(d, goal, &x->chain) &&
-                     !imp__flat_chain(goal, &x->chain)) &&
-           imp__bent_find(d, goal, x) && (!of || imp__bent_same(d, of, x));
-}
 
 /* ---- What is seen ------------------------------------------------------------------------- */
 
@@ -261,7 +88,6 @@ static bool root_seen(struct imp__edge_draw *d, const struct imp__bent_root *x,
 
 #define COUNTS 0.1   /* what a root lets through that is always kept */
 #define STAGE  16384 /* draws, after which a draw goes on by chance */
-enum { KEEP = FIRST + 3 * PASSES, GO_ON, WHICH_WAY };
 
 /* Roots that let little through are kept by chance: over glass that reflects inside there are many, and each
  * is looked for again as often as those that count. */
@@ -291,10 +117,10 @@ static bool root_any(const struct imp__edge_draw *d, struct imp_key key,
                      struct imp__bent_found *x)
 {
     const struct ways way = ways_of(d, &x->goal);
-    const double u = imp__u01(key, WHICH_WAY);
+    const double u = imp__u01(key, IMP_BENT_WHICH_WAY);
     const bool round = u < way.round, flat = !round && u < way.round + way.flat;
     x->draws = 0;
-    if (!round && !flat) return root_draw(d, key, &x->goal, NULL, &x->root);
+    if (!round && !flat) return imp__bent_draw(d, key, &x->goal, NULL, &x->root);
     if (!(round ? imp__round_draw : imp__flat_draw)(d, key, &x->goal, &x->root,
                                                     &x->draws))
         return false;
@@ -314,9 +140,9 @@ double imp__bent_draws(const struct imp__edge_draw *d, const struct imp__bent_fo
         const struct imp_key key = imp__key(d->key.state, x->dims, k);
         struct imp__bent_root again;
         sum += times;
-        if (root_draw(d, key, &x->goal, &x->root, &again)) return sum / chance;
+        if (imp__bent_draw(d, key, &x->goal, &x->root, &again)) return sum / chance;
         if (k < end) continue;
-        if (imp__u01(key, GO_ON) < 0.5) return sum / chance;
+        if (imp__u01(key, IMP_BENT_GO_ON) < 0.5) return sum / chance;
         times *= 2;
         end += end;
     }
@@ -333,7 +159,7 @@ static bool root_reach(struct imp__edge_draw *d, struct imp__sight *s,
         !root_any(d, key, x) || !root_seen(d, &x->root, s))
         return false;
     s->chance = kept_chance(d, s);
-    return imp__u01(key, KEEP) < s->chance;
+    return imp__u01(key, IMP_BENT_KEEP) < s->chance;
 }
 
 bool imp__bent_reach(struct imp__edge_draw *d, unsigned dims, imp_v3 p,

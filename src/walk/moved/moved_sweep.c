@@ -3,12 +3,9 @@
  * The interior derivative of a walk by what moves (moved.h): adjoints of its values from the first
  * vertex to the last, then adjoints of its places from the last to the first. */
 #include "moved_sweep.h"
-#include "kind/emitter/from_point.h"
 #include "moved_mirror.h"
 #include "moved_sky.h"
 #include "walk/path/first_segment.h"
-
-extern const struct imp_emitter_ops imp__projector;
 
 /* Emission that the step from v meets, and that is glued to its light where a light sample could
  * have brought it, from behind passes only if these let samples through. */
@@ -23,62 +20,6 @@ static void met_read(const struct imp__sweep *s, const struct imp_vertex *v, imp
     if (!y || !imp__sweep_emitted(y)) return;
     piece->met = P * y->e;
     piece->lit = k;
-}
-
-/* The sum over the lanes of -bar times this, which is a vector by its components. */
-static imp_v3 vector_bar(const struct imp__sweep *s, imp_spec bar, const imp_spec of[3])
-{
-    const int lanes = s->tracer->scene->lanes;
-    return imp__v3(-imp__sum_used(bar * of[0], lanes), -imp__sum_used(bar * of[1], lanes),
-                   -imp__sum_used(bar * of[2], lanes));
-}
-
-struct imp__line_bar imp__sweep_line_bar(const struct imp__sweep *s, imp_spec bar,
-                                         const struct imp_track *track,
-                                         const struct imp_carried *carried, imp_v3 x,
-                                         imp_v3 y)
-{
-    struct imp__line_bar out = {0, {0}, {0}};
-    const struct imp_scene *scene = s->tracer->scene;
-    if (imp_likely(!s->fog && !s->media) || imp__is_zero_used(bar, carried)) return out;
-    if (s->fog) {
-        out.along = imp__sweep_length_bar(s, bar, s->extinction);
-        return out;
-    }
-    const double d = imp__length(y - x);
-    if (imp_unlikely(s->varies)) {
-        const struct imp__along a =
-            imp__media_along(&s->moves->borders, x, (y - x) * (1 / d), d, carried);
-        out.along = imp__sweep_length_bar(s, bar, a.depth * (1 / d));
-        out.to = vector_bar(s, bar, a.turn) * (1 / d);
-        out.from = vector_bar(s, bar, a.slope) - out.to;
-    } else if (track) {
-        out.along = imp__sweep_length_bar(
-            s, bar, imp__track_depth(scene, track, carried) * (1 / d));
-    }
-    return out;
-}
-
-imp_v3 imp__sweep_shift_bar(const struct imp__sweep *s, imp_spec bar,
-                            const struct imp_carried *carried, imp_v3 o, imp_v3 w,
-                            double length, imp_v3 *turn)
-{
-    *turn = (imp_v3){0};
-    if (imp_likely(!s->varies) || imp__is_zero_used(bar, carried)) return (imp_v3){0};
-    const struct imp__along a =
-        imp__media_along(&s->moves->borders, o, w, length, carried);
-    *turn = vector_bar(s, bar, a.turn);
-    return vector_bar(s, bar, a.slope);
-}
-
-/* The extinction on the side of a surface that w, which leads there, comes from. */
-static imp_spec extinction_before(const struct imp__sweep *s, imp_v3 p, imp_v3 ng,
-                                  imp_v3 w, const struct imp_carried *carried)
-{
-    if (imp_likely(!s->media)) return s->extinction;
-    const struct imp_medium *m =
-        imp__borders_at(&s->moves->borders, imp__offset(p, ng, -w), -w);
-    return m ? imp__extinction_in(s->tracer->scene, m, p, carried) : imp__spec(0);
 }
 
 /* Where it is a point of a medium that varies, its place is one to what scatters and glows there: of
@@ -106,7 +47,7 @@ static void media_read(struct imp__sweep *s, int k, const struct imp_vertex *v)
         x->extinction = imp__extinction_at(s->tracer->scene->media[v->d.shape], x->x.p,
                                            v->carried, in);
     else if (!x->sky)
-        x->extinction = extinction_before(s, x->x.p, x->x.n,
+        x->extinction = imp__sweep_before(s, x->x.p, x->x.n,
                                           x->x.p - imp__sweep_begin(s, k), v->carried);
 }
 
@@ -156,201 +97,6 @@ static int read_walk(struct imp__sweep *s, imp_spec adjoint)
     return n;
 }
 
-/* Is it the point of a meter, in whose place a white surface is? */
-static bool is_meter(const struct imp__sweep *s, int k)
-{
-    return s->meter && k == s->first;
-}
-
-/* The derivatives of vertex k's kernel towards w, from the places of the chain, which are exact to
- * each other; recorded directions are rounded. False: it is Lambertian without textures, and w and
- * its normal are enough. */
-static bool kernel_derive(const struct imp__sweep *s, int k, const struct imp_vertex *v,
-                          imp_v3 w, int lobe, struct imp__kernel_d *out)
-{
-    struct imp_surface at = {.s = {1, 0, 0, 0}, .t = {0, 1, 0, 0}, .n = {0, 0, 1, 0}};
-    if (imp_likely(imp__is_plain(v->bsdf)) || is_meter(s, k) ||
-        (imp_likely(!s->at[k].floats) &&
-         !imp__decided_surface(s->tracer->scene, &v->d, s->walk->time, &at)))
-        return false;
-    const imp_v3 from = k > s->front ? s->at[k - 1].x.p : s->walk->ray.o;
-    const struct imp_frame frame = {at.s, at.t, at.n};
-    const struct imp_dirs dirs = {
-        imp__to_local(&frame, imp__normalize(from - s->at[k].x.p)),
-        imp__to_local(&frame, w), lobe, 0};
-    imp__kernel_derive(v, &at, &dirs, out);
-    return true;
-}
-
-/* The adjoint of vertex k's kernel towards w from that of its logarithm, by lanes. derived: by
- * kernel_derive; NULL: Lambertian. */
-static struct imp__kernel_bar kernel_part(const struct imp__sweep *s, int k,
-                                          const struct imp__kernel_d *derived, imp_v3 w,
-                                          imp_spec bar)
-{
-    const int lanes = s->tracer->scene->lanes;
-    const imp_v3 n = imp__shading_normal(&s->at[k].x);
-    if (imp_unlikely(derived)) return imp__kernel_times(derived, bar, lanes);
-    const double sum = imp__sum_used(bar, lanes);
-    return is_meter(s, k) ? imp__meter_times(s->tracer->sensor, s->at[k].x.n, w, sum)
-                          : imp__lambert_times(n, w, sum);
-}
-
-/* And what it is to the direction to the camera. */
-static struct imp__kernel_bar kernel_bar(struct imp__sweep *s, int k,
-                                         const struct imp__kernel_d *derived, imp_v3 w,
-                                         imp_spec bar)
-{
-    struct imp__kernel_bar out = kernel_part(s, k, derived, w, bar);
-    if (!derived) return out;
-    if (imp_unlikely(s->at[k].floats)) { /* its frame has the axes of the world */
-        out.n = (imp_v3){0};
-        out.turn = 0;
-    } else {
-        s->at[k].x.s = derived->frame.s;
-    }
-    if (k <= s->front || imp_unlikely(s->at[k].turns)) s->at[k].wo_bar += out.wo;
-    return out;
-}
-
-/* The same of its light sample, towards w. */
-static struct imp__kernel_bar light_kernel(struct imp__sweep *s, int k,
-                                           const struct imp_vertex *v, imp_v3 w)
-{
-    struct imp__kernel_d d;
-    const bool derived = kernel_derive(s, k, v, w, IMP_SMOOTH, &d);
-    return kernel_bar(s, k, derived ? &d : NULL, w, s->piece[k].light);
-}
-
-/* A light sample of a point, or of parallel light. */
-static void delta_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
-{
-    const int light = v->d.light.emitter;
-    struct imp_emitter *e = s->tracer->scene->emitters[light];
-    const double weight = imp__sum_used(s->piece[k].light, s->tracer->scene->lanes);
-    double aim[3];
-    e->ops->aim(e, aim, false);
-    const imp_v3 at = imp__v3(aim[0], aim[1], aim[2]);
-    if (e->ops->flags & IMP_EMITTER_FAR) {
-        const struct imp__kernel_bar far = light_kernel(s, k, v, -at);
-        imp_v3 turn;
-        s->at[k].moved_bar += imp__sweep_shift_bar(s, s->piece[k].light, v->carried,
-                                                   s->at[k].x.p, -at, INFINITY, &turn);
-        imp__scatter_bar(&s->at[k], &far);
-        imp__light_velocity_bar(s->moves, light, at, -far.wi - turn, s->theta_bar);
-        return;
-    }
-    const imp_v3 r = s->at[k].x.p - at;
-    const double distance = imp__length(r);
-    const imp_v3 d = r * (1 / distance);
-    const int lanes = s->tracer->scene->lanes;
-    const imp_v3 slope =
-        imp_unlikely(imp__has_picture(e))
-            ? imp__picture_slope(e, d, s->piece[k].light, lanes, v->carried)
-            : imp__sent_slope(e, d, lanes, v->carried) * weight;
-    const imp_v3 turn = slope * (1 / distance);
-    if (imp_unlikely(e->ops == &imp__projector)) {
-        /* Along d another place of the picture comes, as bright as it is by the angle: the part of the
-         * slope that is not  d ln 1/cos^3. */
-        const imp_v3 axis = imp__light_frame_of(e)->axis[2];
-        const imp_v3 of_picture = slope - axis * (-3 * weight / imp__dot(axis, d));
-        imp__light_spread_bar(s->moves, light, d,
-                              d * imp__dot(d, of_picture) - of_picture, s->theta_bar);
-    }
-    /* The light turned by a vector sends along d what it sent along d turned back. */
-    imp__light_turn_bar(s->moves, light, imp__cross(slope, d), s->theta_bar);
-    const struct imp__kernel_bar kernel = light_kernel(s, k, v, r * (-1 / distance));
-    const struct imp__line_bar line = imp__sweep_line_bar(
-        s, s->piece[k].light, v->to_light, v->carried, s->at[k].x.p, at);
-    const imp_v3 bar =
-        imp__point_bar(&s->at[k], at, &kernel, weight, line.along) - turn + line.to;
-    s->at[k].moved_bar += turn + line.from;
-    imp__light_velocity_bar(s->moves, light, at, bar, s->theta_bar);
-}
-
-/* Light from the point y of a lamp that reaches vertex k, along -w, over media that it has crossed. */
-static void lamp_bar(struct imp__sweep *s, int k, struct imp__link_point *y, imp_v3 w,
-                     struct imp__kernel_bar *kernel, const struct imp_emitter *e,
-                     imp_spec light, const struct imp_track *track,
-                     const struct imp_carried *carried)
-{
-    struct imp__link_point *x = &s->at[k];
-    const double d = imp__length(y->x.p - x->x.p),
-                 bar = imp__sum_used(light, s->tracer->scene->lanes);
-    const struct imp__line_bar line =
-        imp__sweep_line_bar(s, light, track, carried, x->x.p, y->x.p);
-    if (imp_likely(!x->floats)) {
-        imp__connection_bar(x, y, kernel, bar, line.along);
-        x->moved_bar += line.from;
-        y->bar.v += line.to;
-        return;
-    }
-    double slope;
-    const double part = imp__glued_part(e, d, &slope),
-                 fixed = imp__sweep_length_bar(
-                     s, light, extinction_before(s, y->x.p, y->x.n, w, carried));
-    kernel->wi *= part;
-    imp__connection_bar(x, y, kernel, bar * part, line.along * part + bar * slope);
-    x->moved_bar += imp__reached_bar(y, w, fixed * (1 - part) - bar * slope);
-    /* What is glued goes with both ends; the rest is shifted with x. */
-    x->moved_bar += line.from + line.to * (1 - part);
-    y->bar.v += line.to * part;
-}
-
-/* What a sky sends to vertex k along w: the part that is glued to it goes with it, through other
- * media. */
-static void sky_bar(const struct imp__sweep *s, int k, int sky, imp_v3 w,
-                    const struct imp__kernel_d *d, imp_spec bar,
-                    const struct imp_carried *carried)
-{
-    const imp_spec glued =
-        imp__sky_sent_bar(s->moves, sky, w, bar, carried, s->theta_bar);
-    const struct imp__kernel_bar kernel = kernel_part(s, k, d, w, glued);
-    imp_v3 turn;
-    imp__sweep_shift_bar(s, glued, carried, s->at[k].x.p, w, INFINITY, &turn);
-    imp__light_velocity_bar(s->moves, sky, w, kernel.wi + turn, s->theta_bar);
-}
-
-/* The light sample of a sky. */
-static void sky_sample_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
-{
-    const imp_v3 w = imp__normalize(-imp__decided_v3(v->d.light.d));
-    struct imp__kernel_d derived;
-    const struct imp__kernel_d *d =
-        kernel_derive(s, k, v, w, IMP_SMOOTH, &derived) ? &derived : NULL;
-    const struct imp__kernel_bar kernel = kernel_bar(s, k, d, w, s->piece[k].light);
-    imp_v3 turn;
-    s->at[k].moved_bar += imp__sweep_shift_bar(s, s->piece[k].light, v->carried,
-                                               s->at[k].x.p, w, INFINITY, &turn);
-    imp__scatter_bar(&s->at[k], &kernel);
-    if (imp_unlikely(s->moves->skies))
-        sky_bar(s, k, v->d.light.emitter, w, d, s->piece[k].light, v->carried);
-}
-
-/* The light sample of vertex k. */
-static void light_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
-{
-    const struct imp_scene *scene = s->tracer->scene;
-    const struct imp_emitter *e = scene->emitters[v->d.light.emitter];
-    if (e->ops->flags & IMP_EMITTER_DELTA) {
-        delta_bar(s, k, v);
-        return;
-    }
-    if (e->ops->flags & IMP_EMITTER_ENVIRONMENT) {
-        sky_sample_bar(s, k, v);
-        return;
-    }
-    struct imp__link_point y = imp__surface_point(
-        scene, e->shape->index, &v->d.light.located, 0, imp__decided_v3(v->d.light.d));
-    const imp_v3 w = imp__link_direction(&s->at[k], &y);
-    const imp_spec light = s->piece[k].light;
-    const double bar = imp__sum_used(light, scene->lanes);
-    struct imp__kernel_bar kernel = light_kernel(s, k, v, w);
-    kernel.wi -= imp__sweep_table_bar(s, e, &y.x, -w, bar, v->carried);
-    lamp_bar(s, k, &y, w, &kernel, e, light, v->to_light, v->carried);
-    imp__velocity_bar(s->moves, &y.x, &y.bar, s->theta_bar);
-}
-
 /* Emission that the step from vertex k meets: a light sample could have brought it. */
 static void met_bar(struct imp__sweep *s, int k, const struct imp_vertex *v, imp_v3 w,
                     const struct imp__kernel_d *d)
@@ -364,12 +110,12 @@ static void met_bar(struct imp__sweep *s, int k, const struct imp_vertex *v, imp
     struct imp__kernel_d behind;
     if (imp_unlikely(piece->lit > k + 1)) { /* places of passes are not exact */
         w = imp__link_direction(&s->at[k], y);
-        d = kernel_derive(s, k, v, w, v->d.lobe, &behind) ? &behind : NULL;
+        d = imp__sweep_kernel(s, k, v, w, v->d.lobe, &behind) ? &behind : NULL;
     }
-    struct imp__kernel_bar met = kernel_bar(s, k, d, w, piece->met);
+    struct imp__kernel_bar met = imp__sweep_kernel_bar(s, k, d, w, piece->met);
     const struct imp_emitter *e = scene->emitters[lit->d.met.emitter];
     met.wi -= imp__sweep_table_bar(s, e, &y->x, -w, bar, lit->carried);
-    lamp_bar(s, k, y, w, &met, e, piece->met, v->on, v->carried);
+    imp__sweep_lamp_bar(s, k, y, w, &met, e, piece->met, v->on, v->carried);
     if (piece->lit == k + 1) return;
     imp__velocity_bar(s->moves, &y->x, &y->bar, s->theta_bar);
     y->bar = (struct imp__velocity){.area = 0};
@@ -382,7 +128,8 @@ static void skies_met_bar(const struct imp__sweep *s, int k, const struct imp_ve
 {
     for (const struct imp_vertex *y = v->next; y; y = y->next) {
         if (imp__is_zero(y->e)) continue;
-        sky_bar(s, k, y->d.met.emitter, w, d, s->piece[k].on * y->e, v->carried);
+        imp__sweep_sky_bar(s, k, y->d.met.emitter, w, d, s->piece[k].on * y->e,
+                           v->carried);
     }
 }
 
@@ -394,8 +141,8 @@ static void step_bar(struct imp__sweep *s, int k, const struct imp_vertex *v)
     const imp_v3 w = imp__link_direction(x, next);
     struct imp__kernel_d derived;
     const struct imp__kernel_d *d =
-        kernel_derive(s, k, v, w, v->d.lobe, &derived) ? &derived : NULL;
-    const struct imp__kernel_bar on = kernel_bar(s, k, d, w, piece->step);
+        imp__sweep_kernel(s, k, v, w, v->d.lobe, &derived) ? &derived : NULL;
+    const struct imp__kernel_bar on = imp__sweep_kernel_bar(s, k, d, w, piece->step);
     imp__scatter_bar(x, &on);
     imp_v3 turn;
     x->moved_bar += imp__sweep_shift_bar(
@@ -515,7 +262,7 @@ bool imp__moved_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
     int k = read_walk(&s, adjoint) - 1;
     for (const struct imp_vertex *v = walk->last; v; v = v->prev, k--) {
         if (k < s.first || s.at[k].sky) continue;
-        if (v->d.connection == IMP_CONNECTED) light_bar(&s, k, v);
+        if (v->d.connection == IMP_CONNECTED) imp__light_sample_bar(&s, k, v);
         if (!v->d.goes_on || !v->next) continue;
         if (imp_unlikely(imp__goes_straight(v))) imp__pass_bar(&s, k, v);
         else if (imp_unlikely(imp__is_mirrored(v))) imp__mirror_bar(&s, k, v);

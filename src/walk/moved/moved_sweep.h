@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Inside of the interior derivative (moved_sweep.c, moved_pass.c): a walk while its adjoints are swept. */
+ * Inside of the interior derivative (moved_sweep.c, moved_fades.c, moved_lit.c, moved_pass.c): a walk while its adjoints are swept. */
 #ifndef IMP_WALK_MOVED_SWEEP_H
 #define IMP_WALK_MOVED_SWEEP_H
 
@@ -91,6 +91,10 @@ imp_v3 imp__sweep_shift_bar(const struct imp__sweep *s, imp_spec bar,
                             const struct imp_carried *carried, imp_v3 o, imp_v3 w,
                             double length, imp_v3 *turn);
 
+/* The extinction on the side of a surface that w, which leads there, comes from. */
+imp_spec imp__sweep_before(const struct imp__sweep *s, imp_v3 p, imp_v3 ng, imp_v3 w,
+                           const struct imp_carried *carried);
+
 /* The ray from a vertex, or from the camera, to vertex k carries light of this adjoint, of which the
  * logarithm changes with its length: by what the surface there moves or, where k floats at the part s
  * of a stretch of length D,  ln(sigma exp(-sigma s D) D). Borders stay. */
@@ -103,6 +107,30 @@ static inline double imp__sweep_reach_bar(const struct imp__sweep *s, int k, imp
     if (x->open) return 0;
     return imp__sum_used(bar, s->tracer->scene->lanes) / x->stretch + x->part * along;
 }
+
+/* ---- moved_lit.c ---- */
+/* The derivatives of vertex k's kernel towards w, from the places of the chain, which are exact to
+ * each other; recorded directions are rounded. False: it is Lambertian without textures, and w and
+ * its normal are enough. */
+bool imp__sweep_kernel(const struct imp__sweep *s, int k, const struct imp_vertex *v,
+                       imp_v3 w, int lobe, struct imp__kernel_d *out);
+/* The adjoint of vertex k's kernel towards w from that of its logarithm, by lanes; what it is to the
+ * direction to the camera is kept. derived: by imp__sweep_kernel; NULL: Lambertian. */
+struct imp__kernel_bar imp__sweep_kernel_bar(struct imp__sweep *s, int k,
+                                             const struct imp__kernel_d *derived,
+                                             imp_v3 w, imp_spec bar);
+/* Light from the point y of a lamp that reaches vertex k, along -w, over media that it has crossed. */
+void imp__sweep_lamp_bar(struct imp__sweep *s, int k, struct imp__link_point *y, imp_v3 w,
+                         struct imp__kernel_bar *kernel, const struct imp_emitter *e,
+                         imp_spec light, const struct imp_track *track,
+                         const struct imp_carried *carried);
+/* What a sky sends to vertex k along w: the part that is glued to it goes with it, through other
+ * media. */
+void imp__sweep_sky_bar(const struct imp__sweep *s, int k, int sky, imp_v3 w,
+                        const struct imp__kernel_d *d, imp_spec bar,
+                        const struct imp_carried *carried);
+/* The light sample of vertex k. */
+void imp__light_sample_bar(struct imp__sweep *s, int k, const struct imp_vertex *v);
 
 /* Vertex k passes light straight on: its place does not move what follows, but a texture may let
  * pass another part, and a pane as it turns. */
