@@ -56,19 +56,30 @@ static imp_v3 inwards(const struct imp__edge_draw *d, const struct imp__edge_fac
     return r;
 }
 
-imp_v3 imp__edge_beside(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m, double apart)
+/* The point at which a look aims, where this face, with its corners, is seen beside the edge. */
+static imp_v3 beside_face(const struct imp__edge_draw *d, const struct imp__edge_face *f,
+                          const imp_v3 p[3], imp_v3 w, imp_v3 m, double apart)
 {
-    const imp_v3 past = d->p + m * (d->rim ? imp__strand_apart(d, w, apart) : apart);
-    const struct imp__edge_face *f = d->edge ? face_seen(d, w, m) : NULL;
-    if (!f) return past;
-    const struct imp__corners facet =
-        imp__corners(d->b->tracer->scene, f->shape, f->prim, f->place);
-    const imp_v3 *p = facet.p;
+    const imp_v3 past = d->p + m * apart;
     if (is_inside(p, f->n, past - w * (apart * imp__dot(m, f->n) / imp__dot(w, f->n))))
         return past;
     const imp_v3 middle = inwards(d, f, p);
     const double across = imp__dot(middle, m);
     return d->p + middle * (across > 2 * apart ? apart / across : 0.5);
+}
+
+static struct imp__corners corners_of(const struct imp__edge_draw *d,
+                                      const struct imp__edge_face *f)
+{
+    return imp__corners(d->b->tracer->scene, f->shape, f->prim, f->place);
+}
+
+imp_v3 imp__edge_beside(const struct imp__edge_draw *d, imp_v3 w, imp_v3 m, double apart)
+{
+    const struct imp__edge_face *f = d->edge ? face_seen(d, w, m) : NULL;
+    if (!f) return d->p + m * (d->rim ? imp__strand_apart(d, w, apart) : apart);
+    const struct imp__corners facet = corners_of(d, f);
+    return beside_face(d, f, facet.p, w, m, apart);
 }
 
 /* Weights of the second and third corner at a point of the triangle's plane. */
@@ -90,17 +101,22 @@ bool imp__edge_face_hit(const struct imp__edge_draw *d, const struct imp__edge_f
             hit->shape == imp__placed_shape(d->b->tracer->scene, f->shape, f->place));
 }
 
-void imp__look_at(struct imp__edge_draw *d, imp_v3 o, struct imp_hit *hit, int before,
-                  struct imp_walk *walk)
+static void look_at(struct imp__edge_draw *d, const imp_v3 p[3], imp_v3 o,
+                    struct imp_hit *hit, int before, struct imp_walk *walk)
 {
-    const struct imp__corners facet =
-        imp__corners(d->b->tracer->scene, hit->shape, hit->prim, hit->place);
-    const imp_v3 *p = facet.p;
     const imp_v3 r = p[0] + (p[1] - p[0]) * hit->u + (p[2] - p[0]) * hit->v - o;
     struct imp_sensor_ray ray = {.o = o, .t_near = 0, .t_far = INFINITY};
     hit->t = imp__length(r);
     ray.d = r * (1 / hit->t);
     imp__edge_walk(d, &ray, before, hit, walk);
+}
+
+void imp__look_at(struct imp__edge_draw *d, imp_v3 o, struct imp_hit *hit, int before,
+                  struct imp_walk *walk)
+{
+    const struct imp__corners facet =
+        imp__corners(d->b->tracer->scene, hit->shape, hit->prim, hit->place);
+    look_at(d, facet.p, o, hit, before, walk);
 }
 
 bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, bool parallel, imp_v3 m,
@@ -109,16 +125,14 @@ bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, bool parallel, imp_
     const imp_v3 w = imp__normalize(d->p - o);
     const struct imp__edge_face *f = d->edge ? face_seen(d, w, m) : NULL;
     if (!f) return false;
-    const imp_v3 past = imp__edge_beside(d, w, m, apart);
+    const struct imp__corners facet = corners_of(d, f);
+    const imp_v3 *p = facet.p, past = beside_face(d, f, p, w, m, apart);
     const imp_v3 from = parallel ? o + (past - d->p) : o,
                  to = imp__normalize(past - from);
     struct imp_hit hit;
     if (!imp__intersect(d->b->tracer->scene, &from, &to, d->near, INFINITY, &hit) ||
         !imp__edge_face_hit(d, f, &hit))
         return false;
-    const struct imp__corners facet =
-        imp__corners(d->b->tracer->scene, f->shape, f->prim, f->place);
-    const imp_v3 *p = facet.p;
     const imp_v3 middle = inwards(d, f, p);
     const double across = imp__dot(middle, f->in), next = NEXT * apart;
     double b[2];
@@ -127,6 +141,6 @@ bool imp__edge_face_look(struct imp__edge_draw *d, imp_v3 o, bool parallel, imp_
     weights(p, d->p + on, b);
     hit.u = b[0];
     hit.v = b[1];
-    imp__look_at(d, o, &hit, before, walk);
+    look_at(d, p, o, &hit, before, walk);
     return true;
 }
