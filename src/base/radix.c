@@ -38,3 +38,21 @@ void imp__radix_sort(struct imp_keyed *list, size_t n, struct imp_keyed *spare)
     }
     if (from != list) memcpy(list, from, n * sizeof *list);
 }
+
+void imp__keyed_order(struct imp_keyed *list, size_t n, void *things, size_t size,
+                      void *spare)
+{
+    char *at = things;
+    for (size_t k = 0; k < n; k++) { /* each cycle from its first place on */
+        if (list[k].value == k) continue;
+        size_t to = k;
+        memcpy(spare, at + k * size, size);
+        for (size_t from = list[to].value; from != k; from = list[to].value) {
+            memcpy(at + to * size, at + from * size, size);
+            list[to].value = to;
+            to = from;
+        }
+        memcpy(at + to * size, spare, size);
+        list[to].value = to;
+    }
+}

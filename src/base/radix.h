@@ -16,6 +16,11 @@ struct imp_keyed {
 
 /* spare [n]: room. */
 void imp__radix_sort(struct imp_keyed *list, size_t n, struct imp_keyed *spare);
+/* Puts things [n] of this size in the order of a sorted list, whose values are where they are and become
+ * where they will be. In place: a second list of large things would cost more than its order does. spare: room
+ * for one. */
+void imp__keyed_order(struct imp_keyed *list, size_t n, void *things, size_t size,
+                      void *spare);
 
 /* Keys of finite doubles, which rise with them; the same of both zeros. */
 static inline uint64_t imp__radix_key(double x)
@@ -24,14 +29,6 @@ static inline uint64_t imp__radix_key(double x)
     x += 0.0;
     memcpy(&bits, &x, sizeof bits);
     return bits ^ (bits >> 63 ? UINT64_MAX : (uint64_t)1 << 63);
-}
-/* The double of such a key. */
-static inline double imp__radix_double(uint64_t key)
-{
-    const uint64_t bits = key ^ (key >> 63 ? (uint64_t)1 << 63 : UINT64_MAX);
-    double x;
-    memcpy(&x, &bits, sizeof x);
-    return x;
 }
 
 #endif

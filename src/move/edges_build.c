@@ -257,26 +257,21 @@ static enum imp_status edges_order(struct building *x)
     struct imp__edges *out = x->out;
     const size_t n = out->n;
     struct imp_keyed *keyed = imp__alloc_raw(x->ctx, 2 * n, sizeof *keyed);
-    struct imp__edge *edge = imp__alloc_raw(x->ctx, n, sizeof *edge);
     struct imp__edge_face *face = imp__alloc_raw(x->ctx, out->n_faces, sizeof *face);
-    const bool fits = keyed && edge && face;
+    const bool fits = keyed && face;
     for (size_t k = 0; k < n && fits; k++)
         keyed[k] = (struct imp_keyed){code_of(x, &out->edge[k]), k};
     if (fits) {
         size_t n_faces = 0;
+        struct imp__edge spare;
         imp__radix_sort(keyed, n, keyed + n);
-        for (size_t k = 0; k < n; k++) {
-            edge[k] = out->edge[keyed[k].value];
-            faces_move(out, face, &n_faces, &edge[k]);
-        }
+        imp__keyed_order(keyed, n, out->edge, sizeof *out->edge, &spare);
+        for (size_t k = 0; k < n; k++) faces_move(out, face, &n_faces, &out->edge[k]);
         for (size_t k = 0; k < out->n_laid; k++)
             faces_move(out, face, &n_faces, &out->laid[k]);
-        imp__release(x->ctx, out->edge);
         imp__release(x->ctx, out->face);
-        out->edge = edge;
         out->face = face;
     } else {
-        imp__release(x->ctx, edge);
         imp__release(x->ctx, face);
     }
     imp__release(x->ctx, keyed);

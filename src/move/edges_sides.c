@@ -7,18 +7,11 @@
 #include "base/context.h"
 #include "base/radix.h"
 #include <stdlib.h>
-#include <string.h>
 
 /* Directions that no scene is aligned with: by the first a line gets its sense, by the second
  * the point of it that is nearest to the middle becomes a number. */
 static imp_v3 sense(void) { return imp__v3(0.5377, 0.6180, 0.5736); }
 static imp_v3 mark(void) { return imp__v3(-0.4423, 0.7071, -0.5515); }
-
-/* Which side it is, and where. */
-struct name {
-    uint32_t body, prim, corner;
-    double a[3], b[3];
-};
 
 /* A side with its triangle. */
 struct ends {
@@ -106,7 +99,7 @@ static enum imp_status bodies_take(struct imp__sides *x, const struct imp__body 
 }
 
 /* Sets n. */
-static void names_make(struct imp__sides *x, struct name *name, struct imp_keyed *keyed)
+static void sides_list(struct imp__sides *x, struct imp_keyed *keyed)
 {
     for (size_t k = 0; k < x->n_bodies; k++) {
         const struct imp_shape *s = x->scene->shapes[x->body[k].shape];
@@ -116,11 +109,12 @@ static void names_make(struct imp__sides *x, struct name *name, struct imp_keyed
                 const struct ends e = ends_of(&f, c);
                 double key;
                 if (!key_find(x, &e, &key)) continue;
-                name[x->n] = (struct name){(uint32_t)k,
-                                           (uint32_t)j,
-                                           (uint32_t)c,
-                                           {e.a[0], e.a[1], e.a[2]},
-                                           {e.b[0], e.b[1], e.b[2]}};
+                x->side[x->n] = (struct imp__side){.a = {e.a[0], e.a[1], e.a[2]},
+                                                   .b = {e.b[0], e.b[1], e.b[2]},
+                                                   .key = key,
+                                                   .body = (uint32_t)k,
+                                                   .prim = (uint32_t)j,
+                                                   .corner = (uint8_t)c};
                 keyed[x->n] = (struct imp_keyed){imp__radix_key(key), x->n};
                 x->n++;
             }
@@ -128,36 +122,22 @@ static void names_make(struct imp__sides *x, struct name *name, struct imp_keyed
     }
 }
 
-static void side_fill(const struct name *name, uint64_t key, struct imp__side *out)
-{
-    *out = (struct imp__side){.key = imp__radix_double(key),
-                              .body = name->body,
-                              .prim = name->prim,
-                              .corner = (uint8_t)name->corner};
-    memcpy(out->a, name->a, sizeof out->a);
-    memcpy(out->b, name->b, sizeof out->b);
-}
-
 enum imp_status imp__sides_make(struct imp__sides *x, const struct imp__body *body,
                                 size_t n_bodies)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = x->scene->ctx;
-    struct name *name = NULL;
     struct imp_keyed *keyed = NULL;
+    struct imp__side spare;
     size_t n;
     IMP_TRY(bodies_take(x, body, n_bodies, &n));
-    name = imp__alloc_raw(ctx, n, sizeof *name);
+    x->side = imp__alloc_raw(ctx, n, sizeof *x->side);
     keyed = imp__alloc_raw(ctx, 2 * n, sizeof *keyed);
-    if (!name || !keyed) IMP_TRY(no_memory(x));
-    names_make(x, name, keyed);
+    if (!x->side || !keyed) IMP_TRY(no_memory(x));
+    sides_list(x, keyed);
     imp__radix_sort(keyed, x->n, keyed + n);
-    x->side = imp__alloc_raw(ctx, x->n, sizeof *x->side);
-    if (!x->side) IMP_TRY(no_memory(x));
-    for (size_t k = 0; k < x->n; k++)
-        side_fill(&name[keyed[k].value], keyed[k].key, &x->side[k]);
+    imp__keyed_order(keyed, x->n, x->side, sizeof *x->side, &spare);
 out:
-    imp__release(ctx, name);
     imp__release(ctx, keyed);
     return st;
 }
