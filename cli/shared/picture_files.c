@@ -12,6 +12,9 @@
 #include <ctype.h>
 #include <errno.h>
 #include <inttypes.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 #include <math.h>
 #include <stdio_ext.h>
 #include <stdlib.h>
@@ -169,10 +172,19 @@ static int write_to_stdout(const imp_film *film, const struct imp_write_options 
     return cli_error(EXIT_RUN, "standard output: %s", strerror(code));
 }
 
+/* Gives back what was freed in making the picture, or its file: the next file takes memory of its own. */
+static void memory_return(void)
+{
+#ifdef __GLIBC__
+    malloc_trim(0);
+#endif
+}
+
 int picture_write(const imp_film *film, const char *path, const struct picture_options *o)
 {
     struct imp_write_options options = IMP_WRITE_OPTIONS_INIT;
     if (cli.verifies) return 0;
+    memory_return();
     options.half = o->half;
     options.standard_error = o->standard_error;
     options.exposure = o->exposure;
@@ -184,6 +196,7 @@ int picture_write(const imp_film *film, const char *path, const struct picture_o
     enum imp_status st = imp_film_write(film, path, &options);
     char *preview = o->no_preview ? NULL : preview_path(path);
     if (st == IMP_OK) manifest_wrote(path);
+    memory_return();
     if (st == IMP_OK && preview) st = imp_film_write(film, preview, &options);
     if (st == IMP_OK && preview) manifest_wrote(preview);
     free(preview);

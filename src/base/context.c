@@ -297,6 +297,20 @@ void imp__release(imp_context *ctx, void *memory)
     if (memory) ctx->allocator.release(memory, ctx->allocator.payload);
 }
 
+void *imp__shrunk(imp_context *ctx, void *memory, size_t bytes)
+{
+    void *p;
+    if (ctx->allocator.allocate == default_allocate) {
+        p = realloc(memory, bytes);
+        return p ? p : memory;
+    }
+    p = imp__alloc_raw(ctx, bytes, 1);
+    if (!p) return memory;
+    memcpy(p, memory, bytes);
+    imp__release(ctx, memory);
+    return p;
+}
+
 void imp_free(imp_context *ctx, void *memory)
 {
     IMP_REQUIRE_OR(NULL, ctx, "context", );

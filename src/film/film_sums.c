@@ -21,9 +21,8 @@ double imp__film_sums_bytes(const struct imp_film_sums *s)
 {
     const double pixels = (double)pixels_of(s), n = s->n;
     const double counts = (double)s->across * s->down * sizeof *s->count;
-    const double film = (double)s->n / s->n_films * sizeof(float);
-    /* box: one film's means or errors are there beside all sums; wide: all films are */
-    if (s->border == 0) return pixels * (n * 2 * sizeof(double) + film) + counts;
+    /* box: means and errors take the place of sums; wide: they lie beside these */
+    if (s->border == 0) return pixels * n * 2 * sizeof(double) + counts;
     return (double)s->down * (double)row_doubles(s) * sizeof(double) +
            pixels * n * 2 * sizeof(float) + counts;
 }
@@ -120,7 +119,9 @@ struct finish {
     bool keep;           /* the sums stay, and films have their room */
     double *weights;
     imp_film **films;
-    int film;  /* box: which */
+    int film; /* box: which */
+    float *
+        floats; /* box: its errors, or means; where the sums go, in the memory of one of them */
     int row0;  /* first row of the loop */
     double *t; /* wide: [threads][sums] of a pixel */
 };
@@ -162,7 +163,7 @@ static enum imp_status box_row(size_t item, int worker, int slot, void *payload)
     const struct finish *f = payload;
     const struct imp_film_sums *s = f->s;
     imp_film *film = f->films[f->film];
-    const size_t C = (size_t)film->channels, y = item;
+    const size_t C = (size_t)film->channels, y = (size_t)f->row0 + item;
     const int32_t *count = s->count + y / (size_t)s->side * (size_t)s->across;
     (void)worker, (void)slot;
     for (size_t x = 0; x < (size_t)s->width; x++) {
@@ -171,11 +172,11 @@ static enum imp_status box_row(size_t item, int worker, int slot, void *payload)
         if (f->weights) f->weights[pixel] = W;
         for (size_t k = pixel * C; k < (pixel + 1) * C; k++) {
             if (f->errors) {
-                film->se[k] =
+                f->floats[k] =
                     imp__box_error(s->sum[f->film][k], s->square[f->film][k], W, q);
             } else {
-                film->mean[k] = imp__box_mean(s->sum[f->film][k], W);
-                if (!isfinite(film->mean[k]))
+                f->floats[k] = imp__box_mean(s->sum[f->film][k], W);
+                if (!isfinite(f->floats[k]))
                     return not_finite(film, pixel, (int)(k - pixel * C));
             }
         }
@@ -183,28 +184,45 @@ static enum imp_status box_row(size_t item, int worker, int slot, void *payload)
     return IMP_OK;
 }
 
-/* Films one by one, errors first: what is freed makes room for what comes. */
+/* Rows one by one put floats where doubles were that are read by then: row y ends before row (y + 1)/2 of
+ * these. So those of [a, 2 a) can be made together when those before are there. */
+static enum imp_status box_rows(struct finish *f)
+{
+    const struct imp_film_sums *s = f->s;
+    enum imp_status st = IMP_OK;
+    int rows;
+    for (f->row0 = 0; f->row0 < s->height && st == IMP_OK; f->row0 += rows) {
+        rows = f->keep ? s->height : imp_min(imp_max(f->row0, 1), s->height - f->row0);
+        const struct imp_loop loop = {
+            .n_items = (size_t)rows, .work = box_row, .payload = f};
+        st = imp__parallel(s->ctx, &loop, NULL);
+    }
+    return st;
+}
+
+/* Sums become floats in their own memory, whose second half is given back. */
+static void floats_become(const imp_film *film, double **sums, float **floats)
+{
+    *floats = imp__shrunk(film->ctx, *sums, imp__film_values(film) * sizeof **floats);
+    *sums = NULL;
+}
+
+/* Films one by one, errors first, which are made of both sums. */
 static enum imp_status box_finish(struct finish *f)
 {
     struct imp_film_sums *s = f->s;
     enum imp_status st = IMP_OK;
-    const struct imp_loop loop = {
-        .n_items = (size_t)s->height, .work = box_row, .payload = f};
     for (f->film = 0; f->film < s->n_films; f->film++) {
         imp_film *film = f->films[f->film];
-        if (!f->keep) IMP_TRY(imp__film_room(film, &film->se));
+        double **sum = &s->sum[f->film], **square = &s->square[f->film];
         f->errors = true;
-        IMP_TRY(imp__parallel(s->ctx, &loop, NULL));
-        if (!f->keep) {
-            imp__release(s->ctx, s->square[f->film]);
-            s->square[f->film] = NULL;
-            IMP_TRY(imp__film_room(film, &film->mean));
-        }
+        f->floats = f->keep ? film->se : (float *)*square;
+        IMP_TRY(box_rows(f));
+        if (!f->keep) floats_become(film, square, &film->se);
         f->errors = false;
-        IMP_TRY(imp__parallel(s->ctx, &loop, NULL));
-        if (f->keep) continue;
-        imp__release(s->ctx, s->sum[f->film]);
-        s->sum[f->film] = NULL;
+        f->floats = f->keep ? film->mean : (float *)*sum;
+        IMP_TRY(box_rows(f));
+        if (!f->keep) floats_become(film, sum, &film->mean);
     }
 out:
     return st;

@@ -63,8 +63,8 @@ void imp__film_sums_destroy(struct imp_film_sums *s);
 /* Add the sums of `count` samples a pixel of a tile; different tiles at once. */
 void imp__film_sums_add(struct imp_film_sums *s, size_t tile, const double *sums,
                         int count);
-/* Means and errors of the films [n_films], which have none yet; the sums are freed on the
- * way. `strata`: errors were taken within them. weights: as in struct imp_picture. */
+/* Means and errors of the films [n_films], which have none yet; the sums are used
+ * up. `strata`: errors were taken within them. weights: as in struct imp_picture. */
 enum imp_status imp__film_sums_finish(struct imp_film_sums *s, bool strata,
                                       double *weights, imp_film **films);
 /* The same of what is there so far, into films with room for both; the sums stay. */

@@ -199,6 +199,16 @@ static float *clamped(imp_context *ctx, const imp_film *f, const float *from)
     return to;
 }
 
+/* Room for the longest file, of which as much is touched as is written: growing would hold it twice. */
+static void room_take(const struct exr_writer *w, struct imp_bytes *bytes)
+{
+    const size_t values = imp__film_values(w->film) * (w->se ? 2 : 1) +
+                          (w->rgb ? imp__film_values(w->rgb) : 0);
+    const size_t room = values * (w->half ? 2 : 4) + 8 * (size_t)w->film->height + 65536;
+    bytes->data = imp__alloc_raw(w->film->ctx, room, 1);
+    bytes->capacity = bytes->data ? room : 0; /* else it grows */
+}
+
 enum imp_status imp__exr_encode(const imp_film *f, const struct imp_write_options *o,
                                 struct imp_bytes *out)
 {
@@ -223,6 +233,7 @@ enum imp_status imp__exr_encode(const imp_film *f, const struct imp_write_option
         for (size_t i = 0; w->rgb && i < imp__film_values(w->rgb); i++)
             w->rgb->mean[i] = clamp_half(w->rgb->mean[i]);
     }
+    room_take(w, &bytes);
     EXR(exr_start_write(&w->exr, "picture", EXR_WRITE_FILE_DIRECTLY, &setup));
     IMP_TRY(header_write(w));
     IMP_TRY(pixels_write(w));
